@@ -1,0 +1,28 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cmath>
+#include <numbers>
+
+namespace risley {
+
+inline constexpr double kPi = std::numbers::pi;
+inline constexpr double kTwoPi = 2.0 * std::numbers::pi;
+inline constexpr double kRadiansPerDegree = std::numbers::pi / 180.0;
+inline constexpr double kDegreesPerRadian = 180.0 / std::numbers::pi;
+
+/// Degrees exist only at the edges (files, command line, plots).
+constexpr double radians_from_degrees(double degrees) { return degrees * kRadiansPerDegree; }
+constexpr double degrees_from_radians(double radians) { return radians * kDegreesPerRadian; }
+
+/// The same angle in [-pi, pi].
+inline double wrap_to_pi(double angle) { return std::remainder(angle, kTwoPi); }
+
+/// The same angle in [0, 2 pi).
+inline double wrap_to_two_pi(double angle) {
+  const double wrapped = angle - kTwoPi * std::floor(angle / kTwoPi);
+  return wrapped < kTwoPi ? wrapped : 0.0;
+}
+
+}  // namespace risley

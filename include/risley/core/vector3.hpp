@@ -1,0 +1,47 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cmath>
+
+namespace risley {
+
+/// Three components of any scalar the model runs in. Eigen is not used here because its
+/// vectorisation assumes that a scalar is one number, and a batch is several.
+template <class T>
+struct Vector3 {
+  T x{}, y{}, z{};
+
+  friend Vector3 operator+(const Vector3& a, const Vector3& b) {
+    return {a.x + b.x, a.y + b.y, a.z + b.z};
+  }
+  friend Vector3 operator-(const Vector3& a, const Vector3& b) {
+    return {a.x - b.x, a.y - b.y, a.z - b.z};
+  }
+  friend Vector3 operator-(const Vector3& a) { return {-a.x, -a.y, -a.z}; }
+  friend Vector3 operator*(const T& s, const Vector3& a) { return {s * a.x, s * a.y, s * a.z}; }
+  Vector3& operator+=(const Vector3& b) { return *this = *this + b; }
+};
+
+template <class T>
+T dot(const Vector3<T>& a, const Vector3<T>& b) {
+  return a.x * b.x + a.y * b.y + a.z * b.z;
+}
+
+template <class T>
+Vector3<T> cross(const Vector3<T>& a, const Vector3<T>& b) {
+  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
+
+template <class T>
+T norm(const Vector3<T>& a) {
+  using std::sqrt;
+  return sqrt(dot(a, a));
+}
+
+template <class T>
+Vector3<T> normalized(const Vector3<T>& a) {
+  return (T(1.0) / norm(a)) * a;
+}
+
+}  // namespace risley

@@ -1,0 +1,107 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace risley::recordings {
+
+/// Observations as columns, one row per return (all returns of one shot share its time and follow
+/// each other). Every column has the same length.
+struct Observations {
+  /// Time of the shot, ns. The origin is the recording's (RecordingHeader::time_reference); a
+  /// clock that wraps every second (PPS) has been made continuous by the reader.
+  std::vector<std::int64_t> time_ns;
+  /// Azimuth from X towards Y in (-pi, pi], zenith from Z in [0, pi], rad. Meaningful where
+  /// valid; a null return keeps the angles its record holds, or NaN when it holds none.
+  std::vector<double> azimuth, zenith;
+  /// Range, m; 0 where the shot had no return, NaN where the format holds no ranges.
+  std::vector<double> range;
+  /// Width of the format's rounding step at this point, rad, rad and m; 0 where values are not
+  /// rounded or the step is unknown. A Cartesian record of step q has q / (r sin zenith), q / r
+  /// and q: its rounding error is the same in all directions.
+  std::vector<float> azimuth_resolution, zenith_resolution, range_resolution;
+  std::vector<std::uint8_t> intensity;      ///< as the sensor reports it, 0-255
+  std::vector<std::uint8_t> return_number;  ///< from 1
+  std::vector<std::uint8_t> tag;            ///< the format's tag byte, 0 where it has none
+  std::vector<std::uint8_t> beam;           ///< firing beam ("line") from 0; 0 on one-beam sensors
+  std::vector<std::uint8_t> device;         ///< row of RecordingHeader::devices
+  std::vector<std::uint8_t> valid;          ///< 1 where the direction can be trusted
+
+  std::size_t size() const { return time_ns.size(); }
+  void clear();
+  void resize(std::size_t rows);
+  void append(const Observations& other);
+};
+
+/// Header of one sensor data packet as it was recorded, kept so that a packet format can be
+/// written again byte by byte.
+struct Packet {
+  std::uint32_t rows = 0;  ///< observations of this packet in the chunk, in order; 0 for IMU
+  std::uint64_t frame = 0; ///< number of the file's frame that holds it, from 0
+  std::uint8_t device_index = 0, version = 5, slot = 1, lidar_id = 1, reserved = 0;
+  std::uint32_t status = 0;
+  std::uint8_t timestamp_type = 0, data_type = 1;
+  std::array<std::uint8_t, 8> timestamp{};
+};
+
+/// One inertial sample as the sensor sends it: rad/s and multiples of g.
+struct ImuSample {
+  std::int64_t time_ns = 0;
+  std::uint8_t device = 0;
+  std::array<float, 3> angular_velocity{}, acceleration_g{};
+};
+
+/// A piece of a recording: rows, and, for packet formats, the packets they came in. The packets
+/// stand in file order, and each IMU packet (data type 6) owns the next entry of imu.
+struct Chunk {
+  Observations observations;
+  std::vector<Packet> packets;
+  std::vector<ImuSample> imu;
+
+  void clear();
+};
+
+/// One sensor of a recording.
+struct Device {
+  std::string serial;      ///< broadcast code, e.g. "0TFDG3B006H2Z11"; empty when unknown
+  std::string hub_serial;  ///< broadcast code of the hub, empty without one
+  std::uint8_t index = 0;  ///< the key by which packets name it
+  std::uint8_t type = 1;   ///< Livox device type (1 Mid-40, 2 Tele-15, 3 Horizon, 6 Mid-70, 7 Avia)
+  bool extrinsic_enabled = false;
+  std::array<float, 3> roll_pitch_yaw_deg{};
+  std::array<float, 3> translation_m{};
+};
+
+/// Commercial name of a Livox device type, "unknown" for others.
+std::string device_type_name(std::uint8_t type);
+
+/// What the origin of the times is.
+enum class TimeReference : std::uint8_t { relative, power_on, ptp, utc, pps };
+
+std::string to_string(TimeReference reference);
+
+/// What is known about a recording before its first row is read.
+struct RecordingHeader {
+  std::string format;                ///< short name, e.g. "lvx-1.1", "scan-sequence-csv"
+  std::vector<Device> devices;       ///< at least one
+  TimeReference time_reference = TimeReference::relative;
+  bool has_range = true;
+  bool has_intensity = true;
+  bool cartesian = false;            ///< records hold x, y, z and not angles
+  int returns_per_shot = 1;
+  std::uint32_t frame_duration_ms = 50;
+  /// Format-specific details a writer of the same format needs to write the same bytes again
+  /// (decimals, firmware type, ...), as name = value.
+  std::vector<std::pair<std::string, std::string>> details;
+
+  /// Value of a detail, or the fallback.
+  std::string detail(const std::string& name, const std::string& fallback = {}) const;
+  void set_detail(const std::string& name, const std::string& value);
+};
+
+}  // namespace risley::recordings

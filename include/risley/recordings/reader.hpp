@@ -1,0 +1,64 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "risley/core/error.hpp"
+#include "risley/core/progress.hpp"
+#include "risley/recordings/observations.hpp"
+
+namespace risley::recordings {
+
+/// Something a user should know that does not make the recording useless: a tail cut off while
+/// recording, a packet of an unknown type that was stepped over.
+struct ReadWarning {
+  FilePlace place;
+  std::string message;
+  std::uint64_t lost_records = 0;  ///< records known to be lost, 0 when it cannot be known
+};
+
+/// Rows per chunk unless the caller asks otherwise: large enough to be fast, a few MB small.
+inline constexpr std::size_t kDefaultChunkRows = 65536;
+
+/// Reads one recording from start to end in pieces, so that memory does not grow with its length.
+class Reader {
+ public:
+  virtual ~Reader() = default;
+  const RecordingHeader& header() const { return header_; }
+  const std::vector<ReadWarning>& warnings() const { return warnings_; }
+  /// How often a PPS clock began a new second so far, over all devices; 0 for other clocks.
+  std::uint64_t clock_wraps() const { return clock_wraps_; }
+
+  /// Replaces the chunk by the next rows, about max_rows (packets stay whole).
+  /// @return false when there is nothing more
+  /// @throws FileError at damage in the body, after every sound row before it was returned
+  virtual bool read(Chunk& chunk, std::size_t max_rows = kDefaultChunkRows) = 0;
+
+  /// Part of the file already read, [0, 1].
+  virtual double fraction_read() const = 0;
+
+ protected:
+  RecordingHeader header_;
+  std::vector<ReadWarning> warnings_;
+  std::uint64_t clock_wraps_ = 0;
+};
+
+/// Opens a recording of any known format, recognised by its content and not by its name.
+/// @throws FileError when it is missing, empty, of no known format, or its header is damaged
+std::unique_ptr<Reader> open_recording(const std::string& path);
+
+/// A whole recording in memory.
+struct Recording {
+  RecordingHeader header;
+  Chunk data;
+  std::vector<ReadWarning> warnings;
+};
+
+/// Reads a whole recording into memory. @throws FileError
+Recording load_recording(const std::string& path, const Progress& progress = {});
+
+}  // namespace risley::recordings

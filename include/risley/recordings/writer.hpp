@@ -1,0 +1,42 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "risley/recordings/observations.hpp"
+
+namespace risley::recordings {
+
+/// Writes one recording in pieces. The file appears under its name only at close(); a writer
+/// destroyed before leaves nothing.
+class Writer {
+ public:
+  virtual ~Writer() = default;
+
+  /// Appends rows. @throws FileError when the disk refuses, InvalidArgument when the format cannot
+  /// hold a value (the message names the column, the row and the allowed range)
+  virtual void write(const Chunk& chunk) = 0;
+
+  /// Completes the file and gives it its name. @throws FileError
+  virtual void close() = 0;
+};
+
+/// A format that can be written, and how it is chosen by the end of a file name.
+struct WritableFormat {
+  std::string name;         ///< as RecordingHeader::format
+  std::string ending;       ///< ".lvx"; the longest ending that fits wins
+  std::string description;
+};
+
+/// All formats that can be written.
+const std::vector<WritableFormat>& writable_formats();
+
+/// Creates a recording in the format that the file name's ending asks for.
+/// @param header  of the recording the rows come from; what the format cannot hold is dropped
+/// @throws InvalidArgument for an unknown ending (the message lists the known ones), FileError
+std::unique_ptr<Writer> create_recording(const std::string& path, const RecordingHeader& header);
+
+}  // namespace risley::recordings

@@ -1,0 +1,128 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "risley/optics/parameters.hpp"
+
+#include <array>
+#include <cmath>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "risley/core/angle.hpp"
+#include "risley/core/error.hpp"
+#include "risley/optics/prism.hpp"
+
+namespace risley {
+namespace {
+
+// Bounds are those of physics and of a Risley sensor in one piece, not of a preset: air to water
+// around the prisms, any optical glass, and errors that still let the beam through.
+constexpr double kLargestError = radians_from_degrees(10.0);
+constexpr double kLargestWedge = radians_from_degrees(60.0);
+constexpr double kFastest = radians_from_degrees(1e6);
+
+std::vector<ParameterInfo> build_list(int prisms) {
+  std::vector<ParameterInfo> list;
+  const auto add = [&](std::string name, std::string words, std::string symbol, const char* unit,
+                       double si, double lower, double upper, std::vector<int> places) {
+    list.push_back({std::move(name), std::move(words), std::move(symbol), unit,
+                    ParameterKind::train, si, lower, upper, std::move(places)});
+  };
+  const auto add_error = [&](const std::string& name, const std::string& words,
+                             const std::string& symbol, int at) {
+    add(name + "_deg", words, symbol, "deg", kRadiansPerDegree, -kLargestError, kLargestError,
+        {at});
+  };
+  std::vector<int> every_index, every_wedge;
+  for (int i = 0; i < prisms; ++i) {
+    every_index.push_back(place::refractive_index(i));
+    every_wedge.push_back(place::wedge_angle(i));
+  }
+  add("refractive_index_air", "refractive index around the prisms", "n_air", "1", 1.0, 0.9, 1.5,
+      {place::refractive_index_air});
+  add("refractive_index", "refractive index of all prisms", "n_prism", "1", 1.0, 1.0, 4.0,
+      every_index);
+  add("wedge_angle_deg", "wedge angle of all prisms", "α", "deg", kRadiansPerDegree, 0.0,
+      kLargestWedge, every_wedge);
+  add_error("incident_beam_horizontal", "horizontal incident beam direction error", "Δφ_L0",
+            place::incident_beam_horizontal);
+  add_error("incident_beam_vertical", "vertical incident beam direction error", "Δθ_L0",
+            place::incident_beam_vertical);
+  for (int i = 0; i < prisms; ++i) {
+    const char letter = prism_letter(i);
+    const char capital = static_cast<char>(letter - 'a' + 'A');
+    if (i + 1 < prisms) {
+      add_error(fmt::format("bearing_tilt_{}_horizontal", letter),
+                fmt::format("horizontal bearing tilt of prism {}", capital),
+                fmt::format("Δφ_R{}", capital), place::bearing_tilt_horizontal(i));
+      add_error(fmt::format("bearing_tilt_{}_vertical", letter),
+                fmt::format("vertical bearing tilt of prism {}", capital),
+                fmt::format("Δθ_R{}", capital), place::bearing_tilt_vertical(i));
+    }
+    add_error(fmt::format("prism_tilt_{}_horizontal", letter),
+              fmt::format("horizontal tilt of prism {}", capital), fmt::format("Δφ_{}", capital),
+              place::prism_tilt_horizontal(i));
+    add_error(fmt::format("prism_tilt_{}_vertical", letter),
+              fmt::format("vertical tilt of prism {}", capital), fmt::format("Δθ_{}", capital),
+              place::prism_tilt_vertical(i));
+    add(fmt::format("refractive_index_{}", letter),
+        fmt::format("refractive index of prism {}", capital), fmt::format("n_{}", capital), "1",
+        1.0, 1.0, 4.0, {place::refractive_index(i)});
+    add(fmt::format("wedge_angle_{}_deg", letter), fmt::format("wedge angle of prism {}", capital),
+        fmt::format("α_{}", capital), "deg", kRadiansPerDegree, 0.0, kLargestWedge,
+        {place::wedge_angle(i)});
+  }
+  for (int i = 0; i < prisms; ++i) {
+    const char letter = prism_letter(i);
+    const char capital = static_cast<char>(letter - 'a' + 'A');
+    list.push_back({fmt::format("angular_velocity_{}_deg_per_s", letter),
+                    fmt::format("angular velocity of prism {}", capital),
+                    fmt::format("ω_{}", capital), "deg/s", ParameterKind::angular_velocity,
+                    kRadiansPerDegree, -kFastest, kFastest, {i}});
+  }
+  for (int i = 0; i < prisms; ++i) {
+    const char letter = prism_letter(i);
+    const char capital = static_cast<char>(letter - 'a' + 'A');
+    list.push_back({fmt::format("rotation_angle_{}_deg", letter),
+                    fmt::format("rotation angle of prism {} at the first used observation", capital),
+                    fmt::format("Ω_{}", capital), "deg", ParameterKind::rotation_angle,
+                    kRadiansPerDegree, -1e9, 1e9, {i}});
+  }
+  return list;
+}
+
+}  // namespace
+
+const std::vector<ParameterInfo>& parameter_list(int prisms) {
+  static const std::array<std::vector<ParameterInfo>, kMaxPrisms> lists = [] {
+    std::array<std::vector<ParameterInfo>, kMaxPrisms> built;
+    for (int n = 1; n <= kMaxPrisms; ++n) built[static_cast<std::size_t>(n - 1)] = build_list(n);
+    return built;
+  }();
+  if (prisms < 1 || prisms > kMaxPrisms) {
+    throw InvalidArgument(
+        fmt::format("number of prisms = {}, allowed 1 to {}", prisms, kMaxPrisms));
+  }
+  return lists[static_cast<std::size_t>(prisms - 1)];
+}
+
+const ParameterInfo& find_parameter(std::string_view name, int prisms) {
+  const auto& list = parameter_list(prisms);
+  for (const auto& parameter : list) {
+    if (parameter.name == name) return parameter;
+  }
+  std::vector<std::string> names;
+  for (const auto& parameter : list) names.push_back(parameter.name);
+  throw InvalidArgument(
+      fmt::format("unknown parameter \"{}\", known: {}", name, fmt::join(names, ", ")));
+}
+
+void check_bounds(const ParameterInfo& parameter, double value) {
+  if (std::isfinite(value) && value >= parameter.lower && value <= parameter.upper) return;
+  throw InvalidArgument(fmt::format(
+      "{} = {:.10g} {}, allowed {:.10g} to {:.10g}", parameter.name, value / parameter.si_per_unit,
+      parameter.unit, parameter.lower / parameter.si_per_unit,
+      parameter.upper / parameter.si_per_unit));
+}
+
+}  // namespace risley

@@ -1,0 +1,118 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "recordings/formats/block_file.hpp"
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "recordings/formats/little_endian.hpp"
+#include "risley/core/error.hpp"
+
+namespace risley::recordings {
+
+FileDescriptor::~FileDescriptor() { close(); }
+
+int FileDescriptor::close() {
+  if (value_ < 0) return 0;
+  const int result = ::close(value_);
+  value_ = -1;
+  return result == 0 ? 0 : errno;
+}
+
+BlockInput::BlockInput(std::string path)
+    : path_(std::move(path)), file_(::open(path_.c_str(), O_RDONLY | O_CLOEXEC)) {
+  if (file_.get() < 0) {
+    throw FileError(path_, {}, fmt::format("cannot be read: {}", std::strerror(errno)));
+  }
+  struct stat status {};
+  if (::fstat(file_.get(), &status) != 0 || !S_ISREG(status.st_mode)) {
+    throw FileError(path_, {}, "is not a regular file");
+  }
+  size_ = static_cast<std::uint64_t>(status.st_size);
+  block_.resize(std::min<std::uint64_t>(kBlockBytes, size_));
+}
+
+const std::uint8_t* BlockInput::at(std::uint64_t offset, std::size_t count) {
+  if (offset < block_offset_ || offset + count > block_offset_ + block_bytes_) {
+    block_offset_ = offset;
+    block_bytes_ = 0;
+    while (block_bytes_ < count) {
+      const ssize_t got = ::pread(file_.get(), block_.data() + block_bytes_,
+                                  block_.size() - block_bytes_,
+                                  static_cast<off_t>(offset + block_bytes_));
+      if (got < 0 && errno == EINTR) continue;
+      if (got <= 0) {
+        throw FileError(path_, {offset + block_bytes_, {}},
+                        got < 0 ? fmt::format("cannot be read: {}", std::strerror(errno))
+                                : std::string("the file became shorter while it was read"));
+      }
+      block_bytes_ += static_cast<std::size_t>(got);
+    }
+  }
+  return block_.data() + (offset - block_offset_);
+}
+
+BlockOutput::BlockOutput(std::string path)
+    : output_(std::move(path)),
+      file_(::open(output_.temporary_path().c_str(), O_WRONLY | O_CLOEXEC)) {
+  if (file_.get() < 0) {
+    throw FileError(output_.path(), {},
+                    fmt::format("cannot be written: {}", std::strerror(errno)));
+  }
+  block_.reserve(BlockInput::kBlockBytes);
+}
+
+std::uint8_t* BlockOutput::append(std::size_t count) {
+  if (block_.size() + count > block_.capacity()) flush();
+  block_.resize(block_.size() + count);
+  return block_.data() + (block_.size() - count);
+}
+
+void BlockOutput::patch_u64(std::uint64_t offset, std::uint64_t value) {
+  // A number may stand across the border of what was written already.
+  std::uint8_t bytes[8];
+  store<std::uint64_t>(bytes, value);
+  if (offset >= written_) {
+    std::copy_n(bytes, 8, block_.data() + (offset - written_));
+    return;
+  }
+  if (offset + 8 > written_) flush();
+  write_at(bytes, 8, offset);
+}
+
+void BlockOutput::flush() {
+  write_at(block_.data(), block_.size(), written_);
+  written_ += block_.size();
+  block_.clear();
+}
+
+void BlockOutput::write_at(const std::uint8_t* bytes, std::size_t count, std::uint64_t offset) {
+  while (count > 0) {
+    const ssize_t done = ::pwrite(file_.get(), bytes, count, static_cast<off_t>(offset));
+    if (done < 0 && errno == EINTR) continue;
+    if (done <= 0) {
+      throw FileError(output_.path(), {offset, {}},
+                      fmt::format("cannot be written: {}", std::strerror(errno)));
+    }
+    bytes += done;
+    count -= static_cast<std::size_t>(done);
+    offset += static_cast<std::uint64_t>(done);
+  }
+}
+
+void BlockOutput::commit() {
+  flush();
+  if (const int error = file_.close(); error != 0) {
+    throw FileError(output_.path(), {},
+                    fmt::format("cannot be written: {}", std::strerror(error)));
+  }
+  output_.commit();
+}
+
+}  // namespace risley::recordings

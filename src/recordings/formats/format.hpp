@@ -1,0 +1,47 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "risley/recordings/reader.hpp"
+#include "risley/recordings/writer.hpp"
+
+namespace risley::recordings {
+
+/// One recording format. Adding a format means one pair of files in this folder that defines one
+/// of these, and one line in formats/registry.cpp.
+struct Format {
+  std::string_view name;         ///< RecordingHeader::format
+  std::string_view ending;       ///< file name ending for writing; empty when it is only read
+  std::string_view description;  ///< one line for the help
+  /// Whether a file that starts with these bytes (up to 4096) is of this format.
+  bool (*recognises)(std::string_view head);
+  std::unique_ptr<Reader> (*open)(const std::string& path);
+  /// nullptr when the format is only read.
+  std::unique_ptr<Writer> (*create)(const std::string& path, const RecordingHeader& header);
+};
+
+extern const Format kLvx11Format;             // lvx11.cpp
+extern const Format kLvx10Format;             // lvx10.cpp
+extern const Format kScanSequenceCsvFormat;   // scan_sequence_csv.cpp
+extern const Format kOpenpylivoxCsvFormat;    // openpylivox_csv.cpp
+extern const Format kOpenpylivoxBinFormat;    // openpylivox_bin.cpp
+extern const Format kViewerCsvFormat;         // viewer_csv.cpp
+extern const Format kNetcdfFormat;            // netcdf.cpp
+
+/// Detail by which a NetCDF file remembers the format its rows first came from.
+inline constexpr const char* kSourceFormat = "source_format";
+
+/// The format whose details the header has: its own, or the one it had before NetCDF.
+inline std::string source_format(const RecordingHeader& header) {
+  return header.detail(kSourceFormat, header.format);
+}
+
+/// All formats, in the order in which they are tried.
+const std::vector<const Format*>& all_formats();
+
+}  // namespace risley::recordings

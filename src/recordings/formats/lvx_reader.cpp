@@ -1,0 +1,429 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "recordings/formats/lvx_reader.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include <fmt/format.h>
+
+#include "recordings/formats/cartesian.hpp"
+#include "recordings/formats/little_endian.hpp"
+
+namespace risley::recordings {
+namespace {
+
+/// Text of a field that is filled up with NUL.
+std::string text_field(const std::uint8_t* bytes, std::size_t count) {
+  return {bytes, std::find(bytes, bytes + count, std::uint8_t{0})};
+}
+
+/// The points of an LVX 1.0 package: as data type 0, but floats in metres.
+/// @return number of the first record that is no point
+std::optional<std::size_t> decode_float_points(const std::uint8_t* bytes, std::size_t points,
+                                               std::int64_t time_ns, std::uint8_t device,
+                                               Observations& o, std::size_t first_row) {
+  for (std::size_t point = 0; point < points; ++point, bytes += 13) {
+    const std::size_t row = first_row + point;
+    const Vector3<double> position{load<float>(bytes), load<float>(bytes + 4),
+                                   load<float>(bytes + 8)};
+    if (!std::isfinite(position.x + position.y + position.z)) return point;
+    set_cartesian(o, row, position, kMillimetre);
+    o.intensity[row] = bytes[12];
+    o.tag[row] = 0;
+    o.time_ns[row] = time_ns + kGrid100kHz.offset_ns(static_cast<std::uint32_t>(point));
+    o.beam[row] = 0;
+    o.return_number[row] = 1;
+    o.device[row] = device;
+  }
+  return std::nullopt;
+}
+
+/// What the first packets of one device say.
+struct FirstPackets {
+  std::int64_t shortest_period_ns = std::numeric_limits<std::int64_t>::max();
+  std::optional<std::int64_t> last_time_ns;
+  std::uint8_t data_type = 0;
+  // Records of the Mid-40 firmware that stores n returns as n records have intensity 200 (second
+  // return) or 250 (third), or are null: counted for n = 2 and 3.
+  std::array<std::size_t, 4> fitting{}, contradicting{};
+};
+
+void count_interleaved(FirstPackets& first, const Observations& o, std::size_t row,
+                       std::size_t rows) {
+  for (std::size_t i = 0; i < rows; ++i, ++row) {
+    if (!o.valid[row]) continue;
+    for (std::size_t n = 2; n <= 3; ++n) {
+      if (i % n == 0) continue;
+      ++(o.intensity[row] == (i % n == 1 ? 200 : 250) ? first.fitting : first.contradicting)[n];
+    }
+  }
+}
+
+bool period_is(const FirstPackets& first, double expected_ns) {
+  return std::fabs(static_cast<double>(first.shortest_period_ns) - expected_ns) < 0.04 * expected_ns;
+}
+
+}  // namespace
+
+const std::uint8_t* lvx_header_bytes(BlockInput& file, std::uint64_t offset, std::size_t count,
+                                     std::string_view part) {
+  if (offset + count > file.size()) {
+    throw FileError(file.path(), {file.size(), {}},
+                    fmt::format("the file ends in the {}, which takes bytes {} to {}", part, offset,
+                                offset + count - 1));
+  }
+  return file.at(offset, count);
+}
+
+std::array<std::uint8_t, 4> lvx_version(BlockInput& file) {
+  const std::uint8_t* bytes = lvx_header_bytes(file, 0, kLvxPublicHeaderBytes, "LVX file header");
+  if (!std::equal(kLvxName.begin(), kLvxName.end(), bytes,
+                  [](char a, std::uint8_t b) { return static_cast<std::uint8_t>(a) == b; })) {
+    throw FileError(file.path(), {0, {}}, "expected 'livox_tech' and six zero bytes");
+  }
+  const auto code = load<std::uint32_t>(bytes + 20);
+  if (code != kLvxMagicCode) {
+    throw FileError(file.path(), {20, {}},
+                    fmt::format("expected the magic code {:08X} of LVX, found {:08X}",
+                                kLvxMagicCode, code));
+  }
+  return {bytes[16], bytes[17], bytes[18], bytes[19]};
+}
+
+std::vector<Device> read_lvx_devices(BlockInput& file, std::uint64_t offset, std::size_t count,
+                                     bool has_extrinsic_flag) {
+  if (count == 0) {
+    throw FileError(file.path(), {offset - 1, {}}, "number of devices = 0, allowed 1 to 255");
+  }
+  const std::size_t bytes_per_device = has_extrinsic_flag ? 59 : 58;
+  const std::uint8_t* bytes =
+      lvx_header_bytes(file, offset, count * bytes_per_device, "device table");
+  std::vector<Device> devices(count);
+  for (std::size_t i = 0; i < count; ++i, bytes += bytes_per_device) {
+    Device& device = devices[i];
+    device.serial = text_field(bytes, 16);
+    device.hub_serial = text_field(bytes + 16, 16);
+    device.index = bytes[32];
+    device.type = bytes[33];
+    device.extrinsic_enabled = has_extrinsic_flag && bytes[34] != 0;
+    const std::uint8_t* numbers = bytes + bytes_per_device - 24;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      device.roll_pitch_yaw_deg[axis] = load<float>(numbers + 4 * axis);
+      device.translation_m[axis] = load<float>(numbers + 12 + 4 * axis);
+    }
+    for (std::size_t other = 0; other < i; ++other) {
+      if (devices[other].index == device.index) {
+        throw FileError(file.path(), {offset + i * bytes_per_device + 32, {}},
+                        fmt::format("device index {} stands twice in the device table",
+                                    device.index));
+      }
+    }
+  }
+  return devices;
+}
+
+LvxReader::LvxReader(BlockInput file, RecordingHeader header, const LvxVersion& version)
+    : file_(std::move(file)), version_(version) {
+  header_ = std::move(header);
+  grids_.resize(header_.devices.size());
+  device_rows_.fill(-1);
+  for (std::size_t row = 0; row < header_.devices.size(); ++row) {
+    device_rows_[header_.devices[row].index] = static_cast<int>(row);
+  }
+  rewind();
+  describe();
+}
+
+void LvxReader::rewind() {
+  position_ = version_.first_frame;
+  frames_ = 0;
+  in_frame_ = open_ended_ = ended_ = false;
+  failure_.reset();
+  warnings_.clear();
+  clocks_.assign(header_.devices.size(), {});
+  clock_wraps_ = 0;
+  stepped_over_.clear();
+  frames_stepped_over_.clear();
+}
+
+/// Completes the header from the first packets: what they hold, from when their times count, and
+/// the shot rate of devices whose type does not tell it.
+void LvxReader::describe() {
+  constexpr std::size_t kEnoughRows = 20'000;
+  std::vector<FirstPackets> first(header_.devices.size());
+  Chunk chunk;
+  // Damage behind the first sound packets is reported when the caller comes to it.
+  try {
+    read(chunk, kEnoughRows);
+  } catch (const FileError&) {
+    chunk.clear();
+  }
+  bool described = false;
+  std::size_t row = 0;
+  for (const Packet& packet : chunk.packets) {
+    if (packet.rows == 0) continue;
+    const RecordLayout& layout = *record_layout(packet.data_type);
+    if (!described) {
+      header_.time_reference = time_reference_of(packet.timestamp_type);
+      header_.cartesian = layout.cartesian;
+      header_.returns_per_shot = layout.returns;
+      described = true;
+    }
+    FirstPackets& device = first[chunk.observations.device[row]];
+    const std::int64_t time = chunk.observations.time_ns[row];
+    if (device.last_time_ns && device.data_type == packet.data_type &&
+        time > *device.last_time_ns) {
+      device.shortest_period_ns = std::min(device.shortest_period_ns, time - *device.last_time_ns);
+    }
+    device.last_time_ns = time;
+    device.data_type = packet.data_type;
+    if (packet.data_type < 2) count_interleaved(device, chunk.observations, row, packet.rows);
+    row += packet.rows;
+  }
+  if (!described) {
+    header_.cartesian = version_.float_points;
+  }
+  rewind();
+
+  for (std::size_t i = 0; i < first.size(); ++i) {
+    const FirstPackets& device = first[i];
+    if (!device.last_time_ns || version_.float_points) continue;
+    if (!shot_grid(header_.devices[i].type, device.data_type)) {
+      const RecordLayout& layout = *record_layout(device.data_type);
+      const double interval_ns = static_cast<double>(device.shortest_period_ns) / layout.records;
+      grids_[i] = interval_ns < 7000 ? kGrid240kHz : kGrid100kHz;
+      warnings_.push_back(
+          {{}, fmt::format("device {} has the unknown type {}; by the distance of its packets it "
+                           "measures at {} kHz",
+                           i, header_.devices[i].type, interval_ns < 7000 ? 240 : 100), 0});
+    } else if (device.data_type < 2) {
+      // 50 shots of two records in 500 us, or 34 shots of three in 567 us (the last is cut).
+      constexpr std::size_t kEnough = 10;
+      const auto is_interleaved = [&](std::size_t n, double period_ns) {
+        return period_is(device, period_ns) && device.fitting[n] >= kEnough &&
+               device.contradicting[n] == 0;
+      };
+      if (is_interleaved(2, 500'000)) grids_[i] = ShotGrid{10'000, 1, 1, 2};
+      if (is_interleaved(3, 566'667)) grids_[i] = ShotGrid{50'000, 3, 1, 3};
+      if (grids_[i]) {
+        header_.returns_per_shot = std::max<int>(header_.returns_per_shot,
+                                                 grids_[i]->records_per_shot);
+      }
+    }
+  }
+}
+
+double LvxReader::fraction_read() const {
+  return static_cast<double>(std::min(position_, file_.size())) /
+         static_cast<double>(file_.size());
+}
+
+void LvxReader::fail(std::uint64_t offset, std::string problem) {
+  failure_.emplace(file_.path(), FilePlace{offset, {}}, std::move(problem));
+  ended_ = true;
+}
+
+bool LvxReader::read(Chunk& chunk, std::size_t max_rows) {
+  chunk.packets.clear();
+  chunk.imu.clear();
+  // No record has less than 7 bytes per row, so a huge max_rows costs no memory.
+  const std::uint64_t left = file_.size() - std::min(position_, file_.size());
+  chunk.observations.resize(static_cast<std::size_t>(
+      std::min<std::uint64_t>(max_rows, left / 7)));
+  std::size_t rows = 0;
+  while (!ended_) {
+    if (!in_frame_) {
+      open_frame();
+    } else if (next_package(chunk, rows, max_rows) == Step::chunk_full) {
+      break;
+    }
+  }
+  chunk.observations.resize(rows);
+  if (!chunk.packets.empty()) return true;
+  if (failure_) throw FileError(*failure_);
+  return false;
+}
+
+void LvxReader::open_frame() {
+  if (position_ == file_.size()) {
+    ended_ = true;
+    if (frames_ == 0) {
+      warnings_.push_back({{position_, {}}, "the file ends before its first frame", 0});
+    }
+    return;
+  }
+  const std::uint64_t left = file_.size() - position_;
+  if (left < version_.frame_header_bytes) {
+    warnings_.push_back(
+        {{position_, {}},
+         fmt::format("cut off while recording: {} bytes left, a frame header has {}", left,
+                     version_.frame_header_bytes),
+         0});
+    position_ = file_.size();
+    ended_ = true;
+    return;
+  }
+  const std::uint8_t* bytes = file_.at(position_, version_.frame_header_bytes);
+  const auto current = load<std::uint64_t>(bytes);
+  if (current != position_) {
+    fail(position_, fmt::format("a frame header gives its own position as {}", current));
+    return;
+  }
+  next_offset_ = load<std::uint64_t>(bytes + kLvxFrameNextAt);
+  position_ += version_.frame_header_bytes;
+  open_ended_ = next_offset_ < position_ || next_offset_ > file_.size();
+  frame_end_ = open_ended_ ? file_.size() : next_offset_;
+  in_frame_ = true;
+  ++frames_;
+}
+
+void LvxReader::stop_at_cut(std::optional<std::size_t> records) {
+  const std::uint64_t left = frame_end_ - position_;
+  std::string message = "cut off while recording: ";
+  if (left == 0) {
+    message += "the last packet is whole";
+  } else if (records) {
+    message += fmt::format("{} bytes of a packet of {} records are left", left, *records);
+  } else {
+    message += fmt::format("{} bytes of a packet are left", left);
+  }
+  if (open_ended_ && next_offset_ > file_.size()) {
+    message += fmt::format(", its frame should end at byte {}", next_offset_);
+  } else if (open_ended_) {
+    message += fmt::format(", its frame was never closed (next offset {})", next_offset_);
+  }
+  warnings_.push_back({{position_, {}}, message, records.value_or(0)});
+  position_ = file_.size();
+  ended_ = true;
+}
+
+void LvxReader::step_over(std::uint8_t data_type) {
+  // One warning per data type, however long the recording is.
+  const std::uint64_t frames = ++frames_stepped_over_[data_type];
+  const auto [entry, is_new] = stepped_over_.try_emplace(data_type, warnings_.size());
+  if (is_new) warnings_.push_back({{position_, {}}, {}, 0});
+  warnings_[entry->second].message = fmt::format(
+      "a packet has the unknown data type {}; the rest of {} was stepped over", data_type,
+      frames == 1 ? std::string("its frame") : fmt::format("its and of {} more frames", frames - 1));
+  position_ = frame_end_;
+  in_frame_ = false;
+  ended_ = open_ended_;
+}
+
+LvxReader::Step LvxReader::next_package(Chunk& chunk, std::size_t& rows, std::size_t max_rows) {
+  const std::uint64_t left = frame_end_ - position_;
+  if (left == 0) {
+    in_frame_ = false;
+    if (open_ended_) stop_at_cut(0);
+    return Step::end;
+  }
+  const bool at_file_end = frame_end_ == file_.size();
+  const std::size_t known = std::min<std::uint64_t>(left, kLvxPackageHeaderBytes);
+  const std::uint8_t* bytes = file_.at(position_, known);
+
+  // A frame that was never closed may still be followed by a whole one.
+  if (open_ended_ && left >= version_.frame_header_bytes &&
+      load<std::uint64_t>(bytes) == position_) {
+    warnings_.push_back({{position_, {}},
+                         fmt::format("the frame before was never closed (next offset {})",
+                                     next_offset_),
+                         0});
+    in_frame_ = false;
+    return Step::end;
+  }
+
+  const int device = device_rows_[bytes[0]];
+  if (device < 0) {
+    fail(position_, fmt::format("a packet names device {}, which is not in the device table",
+                                bytes[0]));
+    return Step::end;
+  }
+  // LVX 1.0 was written before the version was settled.
+  if (known > 1 && (version_.float_points ? bytes[1] == 0 : bytes[1] != kPacketVersion)) {
+    fail(position_ + 1, fmt::format("packet version = {}, expected {}", bytes[1], kPacketVersion));
+    return Step::end;
+  }
+  constexpr std::size_t kDataTypeAt = 10;
+  const RecordLayout* layout = nullptr;
+  if (known > kDataTypeAt) {
+    const std::uint8_t data_type = bytes[kDataTypeAt];
+    layout = version_.float_points && data_type != 0 ? nullptr : record_layout(data_type);
+    if (!layout) {
+      if (known < kLvxPackageHeaderBytes && !at_file_end) {
+        fail(position_, fmt::format("a packet of the unknown data type {} does not fit into its "
+                                    "frame, which ends at byte {}",
+                                    data_type, frame_end_));
+      } else {
+        step_over(data_type);
+      }
+      return Step::end;
+    }
+  }
+  if (known < kLvxPackageHeaderBytes || kLvxPackageHeaderBytes + layout->bytes() > left) {
+    if (at_file_end) {
+      stop_at_cut(layout ? std::optional<std::size_t>(layout->records) : std::nullopt);
+    } else {
+      fail(position_, fmt::format("a packet does not fit into its frame, which ends at byte {}",
+                                  frame_end_));
+    }
+    return Step::end;
+  }
+
+  // Packets stay whole; one alone is delivered however small the chunk is to be.
+  if (!chunk.packets.empty() &&
+      (rows + layout->rows() > max_rows || chunk.packets.size() >= max_rows)) {
+    return Step::chunk_full;
+  }
+  bytes = file_.at(position_, kLvxPackageHeaderBytes + layout->bytes());
+  Packet packet = decode_packet_header(bytes + 1);
+  packet.device_index = bytes[0];
+  packet.frame = frames_ - 1;
+  packet.rows = static_cast<std::uint32_t>(layout->rows());
+  const auto device_row = static_cast<std::size_t>(device);
+  PacketClock& clock = clocks_[device_row];
+  const std::uint64_t wraps_before = clock.wraps();
+  const std::optional<std::int64_t> time = clock.time_ns(packet);
+  if (!time) {
+    fail(position_ + 9,
+         fmt::format("timestamp of type {} with the bytes {:02X} is no time", packet.timestamp_type,
+                     fmt::join(packet.timestamp, " ")));
+    return Step::end;
+  }
+  clock_wraps_ += clock.wraps() - wraps_before;
+
+  const std::uint8_t* records = bytes + kLvxPackageHeaderBytes;
+  const auto device_number = static_cast<std::uint8_t>(device);
+  if (packet.data_type == kImuDataType) {
+    ImuSample sample = decode_imu(records);
+    sample.time_ns = *time;
+    sample.device = device_number;
+    chunk.imu.push_back(sample);
+  } else {
+    Observations& o = chunk.observations;
+    if (o.size() < rows + layout->rows()) o.resize(rows + layout->rows());
+    const ShotGrid grid =
+        grids_[device_row]
+            ? *grids_[device_row]
+            : shot_grid(header_.devices[device_row].type, packet.data_type).value_or(kGrid100kHz);
+    const std::optional<std::size_t> impossible =
+        version_.float_points
+            ? decode_float_points(records, layout->records, *time, device_number, o, rows)
+            : decode_records(*layout, records, *time, grid, device_number, o, rows);
+    if (impossible) {
+      fail(position_ + kLvxPackageHeaderBytes + *impossible * layout->bytes_per_record,
+           version_.float_points
+               ? std::string("a point has a coordinate that is no number")
+               : std::string("a return has an angle outside zenith [0, 18000] or azimuth "
+                             "[0, 36000] x 0.01 deg"));
+      return Step::end;
+    }
+    rows += layout->rows();
+  }
+  chunk.packets.push_back(packet);
+  position_ += kLvxPackageHeaderBytes + layout->bytes();
+  return Step::package;
+}
+
+}  // namespace risley::recordings

@@ -1,0 +1,87 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "recordings/formats/block_file.hpp"
+#include "recordings/formats/packet.hpp"
+#include "risley/core/error.hpp"
+#include "risley/recordings/reader.hpp"
+
+namespace risley::recordings {
+
+/// The first 24 bytes of every LVX file: 16 bytes of name, 4 of version, 4 of magic code.
+inline constexpr std::string_view kLvxName{"livox_tech\0\0\0\0\0\0", 16};
+inline constexpr std::uint32_t kLvxMagicCode = 0xAC0EA767;
+inline constexpr std::size_t kLvxPublicHeaderBytes = 24;
+
+/// In front of each package's records: the device index and the packet header.
+inline constexpr std::size_t kLvxPackageHeaderBytes = 1 + kPacketHeaderBytes;
+
+/// Where a frame header holds the positions of itself and of the next frame, and its number.
+inline constexpr std::size_t kLvxFrameNextAt = 8, kLvxFrameIndexAt = 16;
+
+/// What the versions of LVX do differently.
+struct LvxVersion {
+  std::uint64_t first_frame = 0;      ///< byte offset
+  std::size_t frame_header_bytes = 24;
+  bool float_points = false;          ///< LVX 1.0: data type 0 holds floats in metres
+};
+
+/// Bytes of a file's header. @throws FileError that names the missing part when it is cut off
+const std::uint8_t* lvx_header_bytes(BlockInput& file, std::uint64_t offset, std::size_t count,
+                                     std::string_view part);
+
+/// Checks name and magic code, and returns the four version bytes. @throws FileError
+std::array<std::uint8_t, 4> lvx_version(BlockInput& file);
+
+/// Reads the device table. @throws FileError when it is empty, cut off or names a device twice
+std::vector<Device> read_lvx_devices(BlockInput& file, std::uint64_t offset, std::size_t count,
+                                     bool has_extrinsic_flag);
+
+/// Reads the frames and packages that all LVX 1 files consist of.
+class LvxReader final : public Reader {
+ public:
+  LvxReader(BlockInput file, RecordingHeader header, const LvxVersion& version);
+
+  bool read(Chunk& chunk, std::size_t max_rows) override;
+  double fraction_read() const override;
+
+ private:
+  enum class Step { package, chunk_full, end };
+
+  void describe();
+  void rewind();
+  void open_frame();
+  Step next_package(Chunk& chunk, std::size_t& rows, std::size_t max_rows);
+  void stop_at_cut(std::optional<std::size_t> records);
+  void step_over(std::uint8_t data_type);
+  void fail(std::uint64_t offset, std::string problem);
+
+  BlockInput file_;
+  LvxVersion version_;
+  std::array<int, 256> device_rows_{};           // by device index, -1 for none
+  std::vector<std::optional<ShotGrid>> grids_;   // by device row; empty: as the types say
+  std::vector<PacketClock> clocks_;              // by device row
+  std::map<std::uint8_t, std::size_t> stepped_over_;  // data type -> its warning
+  std::map<std::uint8_t, std::uint64_t> frames_stepped_over_;
+
+  std::uint64_t position_ = 0;    // of the next package, or of the next frame
+  std::uint64_t frame_end_ = 0;
+  std::uint64_t next_offset_ = 0; // as the frame header gives it
+  std::uint64_t frames_ = 0;      // begun so far
+  bool in_frame_ = false;
+  bool open_ended_ = false;       // the frame header does not say where the frame ends
+  bool ended_ = false;
+  std::optional<FileError> failure_;
+};
+
+}  // namespace risley::recordings

@@ -1,0 +1,54 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string_view>
+
+#include "risley/recordings/observations.hpp"
+
+// What the text and the binary captures of openpylivox have in common. Both hold one sensor and
+// returns with a distance only: its name, its clock's origin and shots without return are lost.
+namespace risley::recordings {
+
+inline constexpr std::string_view kOpenpylivoxCsvName = "openpylivox-csv";
+inline constexpr std::string_view kOpenpylivoxBinName = "openpylivox-bin";
+
+/// Device type of a sensor that is not a Mid-40 and about which no more is known.
+inline constexpr std::uint8_t kUnknownDeviceType = 255;
+
+/// What the records of a file are.
+struct OpenpylivoxLayout {
+  bool imu = false;       ///< inertial samples and no points
+  int firmware_type = 1;  ///< 1 normal; 2 dual, 3 triple: Mid-40 firmware, one record per return
+  int data_type = 1;      ///< 0 to 5 as in the sensor's packets
+
+  bool cartesian() const { return data_type % 2 == 0; }
+  bool tagged() const { return data_type >= 2; }
+  bool paired() const { return data_type >= 4; }  ///< both returns of a shot in one record
+  int returns_per_shot() const { return paired() ? 2 : firmware_type; }
+};
+
+/// Layout for rows of this recording: its own when it came from openpylivox, otherwise the one
+/// with its coordinates, returns per shot and (not for the Mid-40) tags.
+/// @throws InvalidArgument when it has no ranges or more returns than any layout holds
+OpenpylivoxLayout openpylivox_layout(const RecordingHeader& header);
+
+/// Fills the header of a recording with this layout.
+void describe_openpylivox(RecordingHeader& header, const OpenpylivoxLayout& layout);
+
+/// Goes through the rows on their way into a file.
+class OpenpylivoxRowFilter {
+ public:
+  /// Whether the row holds a return and so is to be written.
+  /// @throws InvalidArgument when the range or angles are no numbers, or a second device appears
+  bool accepts(const Observations& rows, std::size_t row);
+  std::uint64_t rows_seen() const { return rows_seen_; }
+
+ private:
+  std::uint64_t rows_seen_ = 0;
+  std::optional<std::uint8_t> device_;
+};
+
+}  // namespace risley::recordings

@@ -1,0 +1,268 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+// Binary captures of openpylivox: the records of the sensor's packets, each followed by its time
+// as a double in seconds. Times are read to the nearest nanosecond and written as the double
+// nearest to that, so that a file of ours comes back byte by byte, and one of the program itself
+// up to the rounding noise far below a nanosecond that its summing leaves. Records without any
+// return are left out when writing, as the program does.
+#include <array>
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "recordings/formats/block_file.hpp"
+#include "recordings/formats/format.hpp"
+#include "recordings/formats/little_endian.hpp"
+#include "recordings/formats/openpylivox.hpp"
+#include "recordings/formats/packet.hpp"
+#include "recordings/formats/seconds.hpp"
+#include "risley/core/error.hpp"
+
+namespace risley::recordings {
+namespace {
+
+constexpr std::string_view kSignature = "OPENPYLIVOX";
+constexpr std::string_view kImuSignature = "OPENPYLIVOX_IMU";
+constexpr std::uint64_t kHeaderBytes = 15;  // of both kinds
+constexpr std::size_t kTimeBytes = 8;
+
+/// Where the parts of a record stand.
+struct RecordParts {
+  RecordLayout points{};  ///< of one record
+  std::size_t time_at = 0;
+  bool return_digit = false;
+
+  std::size_t bytes() const { return time_at + kTimeBytes + (return_digit ? 1 : 0); }
+};
+
+RecordParts parts_of(const OpenpylivoxLayout& layout) {
+  RecordParts parts;
+  parts.points = *record_layout(layout.imu ? kImuDataType
+                                           : static_cast<std::uint8_t>(layout.data_type));
+  parts.points.records = 1;
+  parts.time_at = parts.points.bytes_per_record;
+  parts.return_digit = !layout.imu && layout.firmware_type > 1;
+  return parts;
+}
+
+class OpenpylivoxBinReader final : public Reader {
+ public:
+  explicit OpenpylivoxBinReader(const std::string& path) : input_(path) {
+    header_.format = kOpenpylivoxBinName;
+    layout_ = read_layout();
+    parts_ = parts_of(layout_);
+    describe_openpylivox(header_, layout_);
+  }
+
+  bool read(Chunk& chunk, std::size_t max_rows) override {
+    chunk.clear();
+    for (std::size_t rows = 0; rows < max_rows; rows += layout_.paired() ? 2 : 1) {
+      if (offset_ + parts_.bytes() > input_.size()) {
+        report_tail();
+        break;
+      }
+      try {
+        append_record(input_.at(offset_, parts_.bytes()), chunk);
+      } catch (const FileError&) {
+        if (rows == 0) throw;
+        break;  // the next call meets it again
+      }
+      offset_ += parts_.bytes();
+    }
+    return chunk.observations.size() > 0 || !chunk.imu.empty();
+  }
+
+  double fraction_read() const override {
+    return static_cast<double>(offset_) / static_cast<double>(input_.size());
+  }
+
+ private:
+  [[noreturn]] void fail(std::uint64_t offset, const std::string& problem) const {
+    throw FileError(input_.path(), {.byte_offset = offset, .line = {}}, problem);
+  }
+
+  OpenpylivoxLayout read_layout() {
+    if (input_.size() < kHeaderBytes) {
+      fail(input_.size(), fmt::format("expected a header of {} bytes, found the file's end",
+                                      kHeaderBytes));
+    }
+    const std::uint8_t* const bytes = input_.at(0, kHeaderBytes);
+    const std::string_view head(reinterpret_cast<const char*>(bytes), kHeaderBytes);
+    if (!head.starts_with(kSignature)) fail(0, fmt::format("expected {}", kSignature));
+    OpenpylivoxLayout layout;
+    layout.imu = head == kImuSignature;
+    if (layout.imu) return layout;
+    layout.firmware_type = load<std::int16_t>(bytes + 11);
+    layout.data_type = load<std::int16_t>(bytes + 13);
+    if (layout.firmware_type < 1 || layout.firmware_type > 3) {
+      fail(11, fmt::format("expected a firmware type in [1, 3], found {}", layout.firmware_type));
+    }
+    const int most = layout.firmware_type == 1 ? 5 : 1;
+    if (layout.data_type < 0 || layout.data_type > most) {
+      fail(13, fmt::format("expected a data type in [0, {}] with firmware type {}, found {}", most,
+                           layout.firmware_type, layout.data_type));
+    }
+    return layout;
+  }
+
+  void append_record(const std::uint8_t* bytes, Chunk& chunk) const {
+    const double seconds = load<double>(bytes + parts_.time_at);
+    const auto time_ns = nanoseconds_from_seconds(seconds);
+    if (!time_ns) {
+      fail(offset_ + parts_.time_at,
+           fmt::format("expected a time within +-9.2e9 s, found {}", seconds));
+    }
+    if (layout_.imu) {
+      chunk.imu.push_back(decode_imu(bytes));
+      chunk.imu.back().time_ns = *time_ns;
+      return;
+    }
+    const int return_number = parts_.return_digit ? bytes[parts_.bytes() - 1] - '0' : 1;
+    if (return_number < 1 || return_number > layout_.returns_per_shot()) {
+      fail(offset_ + parts_.bytes() - 1,
+           fmt::format("expected a return number in '1' to '{}', found byte 0x{:02x}",
+                       layout_.returns_per_shot(), bytes[parts_.bytes() - 1]));
+    }
+    auto& rows = chunk.observations;
+    const std::size_t row = rows.size();
+    rows.resize(row + parts_.points.rows());
+    if (decode_records(parts_.points, bytes, *time_ns, kGrid100kHz, 0, rows, row)) {
+      rows.resize(row);
+      fail(offset_, "expected a zenith in [0, 180] deg and an azimuth in [0, 360] deg, found a "
+                    "return beyond");
+    }
+    if (parts_.return_digit) rows.return_number[row] = static_cast<std::uint8_t>(return_number);
+  }
+
+  void report_tail() {
+    if (offset_ == input_.size() || tail_reported_) return;
+    tail_reported_ = true;
+    warnings_.push_back({{.byte_offset = offset_, .line = {}},
+                         fmt::format("the last record is cut off: expected {} bytes, found {}; it "
+                                     "was left out",
+                                     parts_.bytes(), input_.size() - offset_),
+                         1});
+  }
+
+  BlockInput input_;
+  OpenpylivoxLayout layout_;
+  RecordParts parts_;
+  std::uint64_t offset_ = kHeaderBytes;
+  bool tail_reported_ = false;
+};
+
+class OpenpylivoxBinWriter final : public Writer {
+ public:
+  OpenpylivoxBinWriter(const std::string& path, const RecordingHeader& header)
+      : layout_(openpylivox_layout(header)), parts_(parts_of(layout_)), output_(path) {
+    std::uint8_t* const bytes = output_.append(kHeaderBytes);
+    const auto signature = layout_.imu ? kImuSignature : kSignature;
+    std::copy(signature.begin(), signature.end(), bytes);
+    if (layout_.imu) return;
+    store<std::int16_t>(bytes + 11, static_cast<std::int16_t>(layout_.firmware_type));
+    store<std::int16_t>(bytes + 13, static_cast<std::int16_t>(layout_.data_type));
+  }
+
+  void write(const Chunk& chunk) override {
+    if (layout_.imu) {
+      for (const auto& sample : chunk.imu) {
+        std::uint8_t* const bytes = append_record(sample.time_ns);
+        encode_imu(sample, bytes);
+      }
+      return;
+    }
+    const auto& rows = chunk.observations;
+    for (std::size_t row = 0; row < rows.size(); ++row) {
+      const std::uint64_t number = filter_.rows_seen();
+      const bool has_return = filter_.accepts(rows, row);
+      require_return_number(rows.return_number[row], number);
+      if (layout_.paired()) {
+        add_to_pair(rows, row, has_return);
+      } else if (has_return) {
+        encode(rows, row, number, rows.time_ns[row], rows.return_number[row]);
+      }
+    }
+  }
+
+  void close() override {
+    finish_pair();
+    output_.commit();
+  }
+
+ private:
+  void require_return_number(int return_number, std::uint64_t row_number) const {
+    if (return_number >= 1 && return_number <= layout_.returns_per_shot()) return;
+    throw InvalidArgument(fmt::format("row {}: return number {}, allowed 1 to {} in this file",
+                                      row_number, return_number, layout_.returns_per_shot()));
+  }
+
+  /// Room for one record, with its time filled in.
+  std::uint8_t* append_record(std::int64_t time_ns) {
+    std::uint8_t* const bytes = output_.append(parts_.bytes());
+    store<double>(bytes + parts_.time_at, seconds_from_nanoseconds(time_ns));
+    return bytes;
+  }
+
+  void encode(const Observations& rows, std::size_t row, std::uint64_t row_number,
+              std::int64_t time_ns, int return_number) {
+    std::array<std::uint8_t, 64> record{};
+    encode_record(parts_.points, rows, row, row_number, record.data());
+    std::uint8_t* const bytes = append_record(time_ns);
+    std::copy_n(record.data(), parts_.points.bytes_per_record, bytes);
+    if (parts_.return_digit) {
+      bytes[parts_.bytes() - 1] = static_cast<std::uint8_t>('0' + return_number);
+    }
+  }
+
+  /// Collects the returns of a shot, which one record holds together.
+  void add_to_pair(const Observations& rows, std::size_t row, bool has_return) {
+    const std::size_t slot = rows.return_number[row] - std::size_t{1};
+    if (pair_open_ && (slot == 0 || pair_.time_ns[0] != rows.time_ns[row])) finish_pair();
+    if (!pair_open_) {
+      pair_.clear();
+      pair_.resize(2);
+      pair_open_ = true;
+      pair_has_return_ = false;
+      pair_.time_ns[0] = rows.time_ns[row];
+      pair_row_number_ = filter_.rows_seen() - 1 - slot;
+    }
+    pair_.azimuth[slot] = rows.azimuth[row];
+    pair_.zenith[slot] = rows.zenith[row];
+    pair_.range[slot] = rows.range[row];
+    pair_.intensity[slot] = rows.intensity[row];
+    pair_.tag[slot] = rows.tag[row];
+    pair_.valid[slot] = has_return ? 1 : 0;
+    pair_has_return_ = pair_has_return_ || has_return;
+    if (slot == 1) finish_pair();
+  }
+
+  void finish_pair() {
+    if (pair_open_ && pair_has_return_) encode(pair_, 0, pair_row_number_, pair_.time_ns[0], 1);
+    pair_open_ = false;
+  }
+
+  OpenpylivoxLayout layout_;
+  RecordParts parts_;
+  BlockOutput output_;
+  OpenpylivoxRowFilter filter_;
+  Observations pair_;  ///< two rows
+  std::uint64_t pair_row_number_ = 0;
+  bool pair_open_ = false, pair_has_return_ = false;
+};
+
+}  // namespace
+
+const Format kOpenpylivoxBinFormat = {
+    kOpenpylivoxBinName,
+    ".bin",
+    "openpylivox binary capture: points with intensity and time",
+    [](std::string_view head) { return head.starts_with(kSignature); },
+    [](const std::string& path) -> std::unique_ptr<Reader> {
+      return std::make_unique<OpenpylivoxBinReader>(path);
+    },
+    [](const std::string& path, const RecordingHeader& header) -> std::unique_ptr<Writer> {
+      return std::make_unique<OpenpylivoxBinWriter>(path, header);
+    },
+};
+
+}  // namespace risley::recordings

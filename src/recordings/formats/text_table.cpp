@@ -1,0 +1,387 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "recordings/formats/text_table.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <charconv>
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+
+#include "recordings/formats/seconds.hpp"
+#include "risley/core/error.hpp"
+
+namespace risley::recordings {
+namespace {
+
+constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
+constexpr std::size_t kReadBlock = std::size_t{1} << 18;
+constexpr std::size_t kLongestLine = std::size_t{1} << 16;
+constexpr std::int64_t kLargestExactDouble = std::int64_t{1} << 53;
+
+constexpr std::array<std::int64_t, 19> kPowersOfTen = [] {
+  std::array<std::int64_t, 19> powers{};
+  std::int64_t power = 1;
+  for (auto& entry : powers) {
+    entry = power;
+    power = power <= INT64_MAX / 10 ? power * 10 : power;
+  }
+  return powers;
+}();
+
+bool is_blank(char c) { return c == ' ' || c == '\t'; }
+
+std::string_view trimmed(std::string_view text) {
+  while (!text.empty() && is_blank(text.front())) text.remove_prefix(1);
+  while (!text.empty() && is_blank(text.back())) text.remove_suffix(1);
+  return text;
+}
+
+/// For messages: short, and without bytes that a terminal would act on.
+std::string printable(std::string_view text) {
+  constexpr std::size_t kLongest = 80;
+  std::string result;
+  for (const char c : text.substr(0, kLongest)) {
+    const auto byte = static_cast<unsigned char>(c);
+    result += byte < 0x20 || byte >= 0x7F ? fmt::format("\\x{:02x}", byte) : std::string(1, c);
+  }
+  return text.size() > kLongest ? result + "..." : result;
+}
+
+/// Digits after the point of a plain decimal fraction, 0 for anything else.
+int decimals_of(std::string_view field) {
+  const auto point = field.find('.');
+  if (point == std::string_view::npos) return 0;
+  const auto fraction = field.substr(point + 1);
+  const bool plain = std::all_of(fraction.begin(), fraction.end(),
+                                 [](char c) { return c >= '0' && c <= '9'; });
+  return plain ? static_cast<int>(fraction.size()) : 0;
+}
+
+}  // namespace
+
+std::string normalized_header(std::string_view text) {
+  if (text.starts_with(kByteOrderMark)) text.remove_prefix(kByteOrderMark.size());
+  text = text.substr(0, text.find('\n'));
+  std::string header(text);
+  std::erase_if(header, [](char c) { return is_blank(c) || c == '\r'; });
+  return header;
+}
+
+LineReader::LineReader(const std::string& path)
+    : path_(path), file_(nullptr, &std::fclose), buffer_(kReadBlock) {
+  std::error_code code;
+  if (std::filesystem::is_directory(path, code)) {
+    throw FileError(path, {}, "is a folder, expected a file");
+  }
+  file_.reset(std::fopen(path.c_str(), "rb"));
+  if (!file_) throw FileError(path, {}, fmt::format("cannot be read: {}", std::strerror(errno)));
+  std::setvbuf(file_.get(), nullptr, _IONBF, 0);
+  file_size_ = std::filesystem::file_size(path, code);
+  if (code) file_size_ = 0;
+}
+
+double LineReader::fraction_read() const {
+  if (file_size_ == 0) return at_end_ ? 1.0 : 0.0;
+  const double consumed = static_cast<double>(bytes_read_ - (end_ - begin_));
+  return std::min(1.0, consumed / static_cast<double>(file_size_));
+}
+
+void LineReader::require_length(std::size_t length) const {
+  if (length <= kLongestLine) return;
+  throw FileError(
+      path_, {.byte_offset = {}, .line = line_number_ + 1},
+      fmt::format("expected a line of at most {} bytes, found a longer one", kLongestLine));
+}
+
+void LineReader::refill() {
+  std::memmove(buffer_.data(), buffer_.data() + begin_, end_ - begin_);
+  end_ -= begin_;
+  begin_ = 0;
+  const std::size_t count =
+      std::fread(buffer_.data() + end_, 1, buffer_.size() - end_, file_.get());
+  if (count == 0 && std::ferror(file_.get()) != 0) {
+    throw FileError(path_, {.byte_offset = bytes_read_, .line = {}},
+                    fmt::format("cannot be read: {}", std::strerror(errno)));
+  }
+  at_end_ = count == 0;
+  end_ += count;
+  bytes_read_ += count;
+}
+
+bool LineReader::next(std::string_view& line) {
+  std::size_t searched = 0;
+  const char* newline = nullptr;
+  while (true) {
+    const std::size_t unread = end_ - begin_;
+    newline = static_cast<const char*>(
+        std::memchr(buffer_.data() + begin_ + searched, '\n', unread - searched));
+    if (newline != nullptr || at_end_) break;
+    require_length(unread);
+    searched = unread;
+    refill();
+  }
+  if (newline == nullptr && begin_ == end_) return false;
+  const char* const start = buffer_.data() + begin_;
+  const char* const stop = newline != nullptr ? newline : buffer_.data() + end_;
+  require_length(static_cast<std::size_t>(stop - start));
+  has_line_end_ = newline != nullptr;
+  begin_ = static_cast<std::size_t>(stop - buffer_.data()) + (has_line_end_ ? 1 : 0);
+  line = std::string_view(start, static_cast<std::size_t>(stop - start));
+  if (!line.empty() && line.back() == '\r') {
+    line.remove_suffix(1);
+    has_line_end_ = true;  // the line feed alone was cut off
+  }
+  if (line_number_++ == 0 && line.starts_with(kByteOrderMark)) {
+    line.remove_prefix(kByteOrderMark.size());
+  }
+  return true;
+}
+
+Decimal decimal_field(std::string_view field, std::string_view column) {
+  constexpr std::size_t kMostDigits = 18;
+  Decimal number;
+  const char* c = field.data();
+  const char* const end = c + field.size();
+  const bool negative = c != end && *c == '-';
+  if (negative) ++c;
+  std::size_t digit_count = 0;
+  const char* point = nullptr;
+  for (; c != end; ++c) {
+    if (*c >= '0' && *c <= '9' && digit_count < kMostDigits) {
+      number.digits = number.digits * 10 + (*c - '0');
+      ++digit_count;
+    } else if (*c == '.' && point == nullptr) {
+      point = c;
+    } else {
+      break;
+    }
+  }
+  if (c == end && digit_count > 0) {
+    number.decimals = point != nullptr ? static_cast<int>(end - point - 1) : 0;
+    if (number.digits < kLargestExactDouble) {
+      // Both are exact doubles, so the quotient is the nearest double.
+      number.value = static_cast<double>(number.digits) /
+                     static_cast<double>(kPowersOfTen[static_cast<std::size_t>(number.decimals)]);
+      if (negative) number.value = -number.value;
+    } else {
+      std::from_chars(field.data(), end, number.value);
+    }
+    if (negative) number.digits = -number.digits;
+    return number;
+  }
+  number = {};
+  const auto result = std::from_chars(field.data(), end, number.value);
+  if (field.empty() || result.ec != std::errc() || result.ptr != end ||
+      !std::isfinite(number.value)) {
+    throw BadRow{fmt::format("expected a finite number in column {}, found \"{}\"", column,
+                             printable(field))};
+  }
+  return number;
+}
+
+std::int64_t integer_field(std::string_view field, std::string_view column, std::int64_t low,
+                           std::int64_t high) {
+  std::int64_t value = 0;
+  const auto result = std::from_chars(field.data(), field.data() + field.size(), value);
+  if (field.empty() || result.ec != std::errc() || result.ptr != field.data() + field.size() ||
+      value < low || value > high) {
+    throw BadRow{fmt::format("expected a whole number in [{}, {}] in column {}, found \"{}\"", low,
+                             high, column, printable(field))};
+  }
+  return value;
+}
+
+std::int64_t nanoseconds_of(const Decimal& seconds, std::string_view column) {
+  std::int64_t time_ns = 0;
+  if (seconds.decimals >= 0 && seconds.decimals <= 9) {
+    const auto scale = kPowersOfTen[static_cast<std::size_t>(9 - seconds.decimals)];
+    if (!__builtin_mul_overflow(seconds.digits, scale, &time_ns)) return time_ns;
+  } else if (seconds.decimals > 9) {
+    const auto scale = kPowersOfTen[static_cast<std::size_t>(seconds.decimals - 9)];
+    const auto half = seconds.digits < 0 ? -scale / 2 : scale / 2;
+    return (seconds.digits + half) / scale;
+  } else if (const auto rounded = nanoseconds_from_seconds(seconds.value)) {
+    return *rounded;
+  }
+  throw BadRow{fmt::format("expected a time within +-9.2e9 s in column {}, found {}", column,
+                           seconds.value)};
+}
+
+std::int64_t nanoseconds_field(std::string_view field, std::string_view column) {
+  return nanoseconds_of(decimal_field(field, column), column);
+}
+
+TextTableReader::TextTableReader(const std::string& path, std::string format)
+    : path_(path), lines_(path) {
+  header_.format = std::move(format);
+  header_.devices.resize(1);
+  std::string_view line;
+  if (!lines_.next(line)) fail(1, "expected a header line, found an empty file");
+  table_header_ = normalized_header(line);
+  if (!lines_.has_line_end()) {
+    warnings_.push_back({{.byte_offset = {}, .line = 1},
+                         "the file ends within its header line; it holds no rows",
+                         0});
+  }
+}
+
+void TextTableReader::fail(std::uint64_t line, const std::string& problem) const {
+  throw FileError(path_, {.byte_offset = {}, .line = line}, problem);
+}
+
+void TextTableReader::refuse_header(const std::string& expected) const {
+  fail(1, fmt::format("expected the header {}, found \"{}\"", expected, printable(table_header_)));
+}
+
+bool TextTableReader::split(std::string_view line, std::span<std::string_view> fields,
+                            std::size_t& count) const {
+  count = 0;
+  while (true) {
+    const auto comma = line.find(',');
+    if (count < fields.size()) fields[count] = trimmed(line.substr(0, comma));
+    ++count;
+    if (comma == std::string_view::npos) return count == fields.size();
+    line.remove_prefix(comma + 1);
+  }
+}
+
+bool TextTableReader::read(Chunk& chunk, std::size_t max_rows) {
+  chunk.clear();
+  if (pending_) throw FileError(*pending_);
+  const auto stop = [&](FileError error) {
+    finished_ = true;
+    pending_.emplace(std::move(error));
+    if (chunk.observations.size() == 0 && chunk.imu.empty()) throw FileError(*pending_);
+  };
+  try {
+    std::string_view line;
+    while (!finished_ && chunk.observations.size() + chunk.imu.size() < max_rows) {
+      if (!lines_.next(line)) {
+        finished_ = true;
+        break;
+      }
+      if (trimmed(line).empty()) {
+        if (!empty_line_) empty_line_ = lines_.line_number();
+        continue;
+      }
+      if (empty_line_) {
+        fail(*empty_line_, fmt::format("expected {} fields, found an empty line", fields_.size()));
+      }
+      std::size_t count = 0;
+      const bool all_fields = split(line, fields_, count);
+      const int decimals = all_fields ? decimals_of(fields_.back()) : 0;
+      if (!lines_.has_line_end() &&
+          !(all_fields && decimals > 0 && decimals == last_field_decimals_)) {
+        warnings_.push_back({{.byte_offset = {}, .line = lines_.line_number()},
+                             fmt::format("the last line has no line end and may be cut off "
+                                         "(\"{}\"); it was left out",
+                                         printable(line)),
+                             1});
+        finished_ = true;
+        break;
+      }
+      if (!all_fields) {
+        fail(lines_.line_number(), fmt::format("expected {} fields, found {}: \"{}\"",
+                                               fields_.size(), count, printable(line)));
+      }
+      append_row(fields_, chunk);
+      last_field_decimals_ = decimals;
+    }
+  } catch (const BadRow& bad) {
+    stop(FileError(path_, {.byte_offset = {}, .line = lines_.line_number()}, bad.problem));
+  } catch (const FileError& error) {
+    stop(error);
+  }
+  return chunk.observations.size() + chunk.imu.size() > 0;
+}
+
+std::size_t append_observation(Observations& rows, std::int64_t time_ns) {
+  const std::size_t row = rows.size();
+  rows.resize(row + 1);
+  rows.time_ns[row] = time_ns;
+  rows.return_number[row] = 1;
+  return row;
+}
+
+TextOutput::TextOutput(const std::string& path)
+    : output_(path), file_(std::fopen(output_.temporary_path().c_str(), "wb"), &std::fclose) {
+  if (!file_) fail();
+  std::setvbuf(file_.get(), nullptr, _IONBF, 0);
+}
+
+void TextOutput::fail() const {
+  throw FileError(output_.path(), {}, fmt::format("cannot be written: {}", std::strerror(errno)));
+}
+
+void TextOutput::flush() {
+  if (std::fwrite(buffer_.data(), 1, buffer_.size(), file_.get()) != buffer_.size()) fail();
+  buffer_.clear();
+}
+
+void TextOutput::close() {
+  flush();
+  if (std::fclose(file_.release()) != 0) fail();
+  output_.commit();
+}
+
+void TextOutput::append_digits(std::uint64_t digits, int decimals, bool negative) {
+  std::array<char, 32> text{};
+  char* const end = text.data() + text.size();
+  char* c = end;
+  int written = 0;
+  do {
+    *--c = static_cast<char>('0' + digits % 10);
+    digits /= 10;
+    if (++written == decimals) *--c = '.';
+  } while (digits > 0 || written <= decimals);
+  if (negative) *--c = '-';
+  buffer_.append(c, end);
+}
+
+void TextOutput::append_fixed(double value, int decimals) {
+  const double scaled =
+      std::nearbyint(std::abs(value) * static_cast<double>(
+                                           kPowersOfTen[static_cast<std::size_t>(decimals)]));
+  if (scaled < static_cast<double>(kLargestExactDouble)) {
+    append_digits(static_cast<std::uint64_t>(scaled), decimals, std::signbit(value));
+  } else {
+    fmt::format_to(fmt::appender(buffer_), "{:.{}f}", value, decimals);
+  }
+}
+
+void TextOutput::append_decimal(std::int64_t digits, int decimals) {
+  const auto magnitude = static_cast<std::uint64_t>(digits);
+  append_digits(digits < 0 ? 0 - magnitude : magnitude, decimals, digits < 0);
+}
+
+void TimeColumn::look_at(const std::vector<std::int64_t>& times_ns) {
+  if (decided_ || times_ns.empty()) return;
+  decided_ = true;
+  for (const auto time_ns : times_ns) {
+    if (!fits(time_ns)) {
+      decimals_ = 9;
+      return;
+    }
+  }
+}
+
+bool TimeColumn::fits(std::int64_t time_ns) const {
+  return decimals_ >= 9 || time_ns % kPowersOfTen[static_cast<std::size_t>(9 - decimals_)] == 0;
+}
+
+void TimeColumn::append(TextOutput& output, std::int64_t time_ns) const {
+  if (decimals_ > 9) {  // a source with more digits than nanoseconds
+    output.append_decimal(time_ns, 9);
+    for (int i = 9; i < decimals_; ++i) output.buffer().push_back('0');
+  } else if (fits(time_ns)) {
+    output.append_decimal(time_ns / kPowersOfTen[static_cast<std::size_t>(9 - decimals_)],
+                          decimals_);
+  } else {
+    output.append_decimal(time_ns, 9);
+  }
+}
+
+}  // namespace risley::recordings

@@ -1,0 +1,189 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstdint>
+#include <cstdio>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "risley/core/output_file.hpp"
+#include "risley/recordings/observations.hpp"
+#include "risley/recordings/reader.hpp"
+
+namespace risley::recordings {
+
+/// First line of a text without byte order mark, line end and blanks: what a header is
+/// recognised by.
+std::string normalized_header(std::string_view text);
+
+/// Reads a file line by line in large blocks, in constant memory.
+class LineReader {
+ public:
+  /// @throws FileError when the file is missing or cannot be read
+  explicit LineReader(const std::string& path);
+
+  /// The next line without its line end (LF or CR LF) and, in line 1, without a byte order mark;
+  /// it lives until the next call. false at the end of the file.
+  /// @throws FileError when the disk fails or a line is longer than 64 KiB
+  bool next(std::string_view& line);
+
+  std::uint64_t line_number() const { return line_number_; }  ///< of the last line, from 1
+  bool has_line_end() const { return has_line_end_; }         ///< of the last line
+  double fraction_read() const;
+
+ private:
+  void refill();
+  void require_length(std::size_t length) const;
+
+  std::string path_;
+  std::unique_ptr<std::FILE, int (*)(std::FILE*)> file_;
+  std::vector<char> buffer_;
+  std::size_t begin_ = 0, end_ = 0;  ///< unread part of the buffer
+  bool at_end_ = false, has_line_end_ = true;
+  std::uint64_t line_number_ = 0, bytes_read_ = 0, file_size_ = 0;
+};
+
+/// What is wrong with one line; TextTableReader adds the file and the line.
+struct BadRow {
+  std::string problem;
+};
+
+/// A number as it stands in a text: digits * 10^-decimals, exact.
+struct Decimal {
+  double value = 0.0;
+  std::int64_t digits = 0;
+  int decimals = -1;  ///< digits after the point; -1 where only `value` is known (exponents)
+};
+
+/// @throws BadRow with the column's name when the field is not a finite number
+Decimal decimal_field(std::string_view field, std::string_view column);
+
+/// @throws BadRow with the column's name when the field is no whole number in [low, high]
+std::int64_t integer_field(std::string_view field, std::string_view column, std::int64_t low,
+                           std::int64_t high);
+
+/// Seconds as whole nanoseconds, exact up to 9 decimals and rounded beyond.
+/// @throws BadRow when they do not fit 64 bits
+std::int64_t nanoseconds_field(std::string_view field, std::string_view column);
+std::int64_t nanoseconds_of(const Decimal& seconds, std::string_view column);
+
+/// Reads a comma separated table with one header line. A byte order mark, CR LF, blanks around
+/// fields and empty lines at the end are accepted. A last line without line end counts only when
+/// it is certainly whole: it has all fields, and the last one is a decimal fraction with as many
+/// decimals as that of the line before; otherwise it is dropped with a warning. Any other line
+/// that is not a sound row is damage: the rows before it are returned, then FileError is thrown.
+class TextTableReader : public Reader {
+ public:
+  bool read(Chunk& chunk, std::size_t max_rows) final;
+  double fraction_read() const final { return lines_.fraction_read(); }
+
+ protected:
+  using Fields = std::span<const std::string_view>;
+
+  /// Opens the file and reads its header line.
+  TextTableReader(const std::string& path, std::string format);
+
+  const std::string& table_header() const { return table_header_; }  ///< normalised
+  /// How many fields a row has; to be called once by the constructor of the derived class.
+  void set_column_count(std::size_t columns) { fields_.resize(columns); }
+  /// @throws FileError at line 1: what was expected there
+  [[noreturn]] void refuse_header(const std::string& expected) const;
+
+  /// Adds the observations of one row. Must not change the chunk when it throws BadRow.
+  virtual void append_row(Fields fields, Chunk& chunk) = 0;
+
+  /// Shows the sound rows among the first max_rows to a function, until that returns false or
+  /// throws BadRow: how a reader learns what the header must tell before the first row is read.
+  template <class Function>
+  void look_ahead(std::size_t max_rows, Function&& function) const;
+
+  [[noreturn]] void fail(std::uint64_t line, const std::string& problem) const;
+  std::string path_;
+
+ private:
+  bool split(std::string_view line, std::span<std::string_view> fields, std::size_t& count) const;
+
+  LineReader lines_;
+  std::string table_header_;
+  std::vector<std::string_view> fields_;
+  int last_field_decimals_ = -1;  ///< of the row before, -1 before the first
+  std::optional<std::uint64_t> empty_line_;
+  std::optional<FileError> pending_;
+  bool finished_ = false;
+};
+
+template <class Function>
+void TextTableReader::look_ahead(std::size_t max_rows, Function&& function) const {
+  try {
+    LineReader lines(path_);
+    std::string_view line;
+    std::vector<std::string_view> fields(fields_.size());
+    std::size_t count = 0;
+    lines.next(line);
+    for (std::size_t row = 0; row < max_rows && lines.next(line); ++row) {
+      if (!lines.has_line_end() || !split(line, fields, count) || !function(Fields(fields))) return;
+    }
+  } catch (const BadRow&) {  // read() reports it when it gets there
+  } catch (const FileError&) {
+  }
+}
+
+/// Adds one row to all columns and sets those a text format rarely knows: intensity and tag 0,
+/// first return, first beam, first device.
+std::size_t append_observation(Observations& rows, std::int64_t time_ns);
+
+/// Text that goes to a file in large blocks and appears under its name at close().
+class TextOutput {
+ public:
+  /// @throws FileError
+  explicit TextOutput(const std::string& path);
+
+  fmt::memory_buffer& buffer() { return buffer_; }
+  void append(std::string_view text) { buffer_.append(text.data(), text.data() + text.size()); }
+  /// value with a fixed number of decimals, rounded to nearest.
+  void append_fixed(double value, int decimals);
+  /// digits * 10^-decimals.
+  void append_decimal(std::int64_t digits, int decimals);
+  /// Hands a full buffer to the file; to be called after each row. @throws FileError
+  void end_row() {
+    buffer_.push_back('\n');
+    if (buffer_.size() >= kBlockSize) flush();
+  }
+  /// @throws FileError
+  void close();
+
+ private:
+  static constexpr std::size_t kBlockSize = std::size_t{1} << 20;
+  void append_digits(std::uint64_t digits, int decimals, bool negative);
+  void flush();
+  [[noreturn]] void fail() const;
+
+  OutputFile output_;
+  std::unique_ptr<std::FILE, int (*)(std::FILE*)> file_;
+  fmt::memory_buffer buffer_;
+};
+
+/// How a text format writes times: with the decimals it usually has where they are exact, and
+/// with 9 (whole nanoseconds) where they are not. The first chunk decides for the whole file;
+/// only a later time that does not fit is written with 9 decimals on its own.
+class TimeColumn {
+ public:
+  explicit TimeColumn(int decimals) : decimals_(decimals) {}
+  void look_at(const std::vector<std::int64_t>& times_ns);
+  void append(TextOutput& output, std::int64_t time_ns) const;
+
+ private:
+  bool fits(std::int64_t time_ns) const;
+
+  int decimals_;
+  bool decided_ = false;
+};
+
+}  // namespace risley::recordings

@@ -1,0 +1,72 @@
+# SPDX-FileCopyrightText: 2026 The risley authors
+# SPDX-License-Identifier: MIT
+"""tools/check_layers.py finds each kind of wrong include in a tree made for the purpose."""
+import pathlib
+import sys
+import tempfile
+import unittest
+
+sys.path.insert(0, str(pathlib.Path(__file__).parents[2] / "tools"))
+import check_layers  # noqa: E402
+
+LAYERS = """risley_add_layer(core)
+risley_add_layer(simulation LAYERS core)
+risley_add_layer(estimation   LAYERS core)
+risley_add_layer(report LAYERS core estimation)
+"""
+
+
+class CheckLayersTest(unittest.TestCase):
+    def errors(self, files, layers=LAYERS):
+        with tempfile.TemporaryDirectory() as folder:
+            root = pathlib.Path(folder)
+            for name, text in {"CMakeLists.txt": layers, **files}.items():
+                (root / name).parent.mkdir(parents=True, exist_ok=True)
+                (root / name).write_text(text, encoding="utf-8")
+            return check_layers.check(root)
+
+    def test_includes_of_declared_layers_pass(self):
+        self.assertEqual(self.errors({
+            "include/risley/core/angle.hpp": "#include <cmath>\n",
+            "include/risley/estimation/ekf.hpp": '#include "risley/core/angle.hpp"\n',
+            "src/report/html.cpp": '#include "risley/estimation/ekf.hpp"\n#include "report/page.hpp"\n',
+            "apps/risley/main.cpp": '#include "risley/simulation/a.hpp"\n#include "verb.hpp"\n',
+        }), [])
+
+    def test_every_wrong_include_is_found_with_its_line(self):
+        for name, include, expected in (
+            ("src/estimation/ekf.cpp", '#include "risley/simulation/noise.hpp"',
+             "src/estimation/ekf.cpp:2: may not include the layer simulation"),
+            ("include/risley/simulation/noise.hpp", "#include <risley/estimation/ekf.hpp>",
+             "include/risley/simulation/noise.hpp:2: may not include the layer estimation"),
+            ("src/core/angle.cpp", '  #  include "report/page.hpp"',
+             "src/core/angle.cpp:2: may not include the layer report"),
+            ("src/core/angle.cpp", '#include "../report/page.hpp"',
+             "src/core/angle.cpp:2: \"../report/page.hpp\" hides its layer"),
+            ("apps/risley/main.cpp", '#include "risley/clouds/cloud.hpp"',
+             "apps/risley/main.cpp:2: risley/clouds/cloud.hpp is in no declared layer"),
+        ):
+            with self.subTest(include=include):
+                errors = self.errors({name: f"// first line\n{include}\n"})
+                self.assertEqual(len(errors), 1, errors)
+                self.assertTrue(errors[0].startswith(expected), errors[0])
+
+    def test_an_undeclared_folder_is_found(self):
+        self.assertEqual(self.errors({"src/clouds/cloud.cpp": ""}),
+                         ["src/clouds: the folder is no declared layer"])
+
+    def test_a_layer_may_declare_only_what_stands_above_it(self):
+        errors = self.errors({}, "risley_add_layer(core LAYERS optics)\nrisley_add_layer(optics)\n")
+        self.assertEqual(
+            errors, ["CMakeLists.txt: core declares optics, which does not stand above it"])
+
+    def test_simulation_and_estimation_stay_strangers_through_others(self):
+        errors = self.errors({}, "risley_add_layer(simulation)\n"
+                                 "risley_add_layer(scenes LAYERS simulation)\n"
+                                 "risley_add_layer(estimation LAYERS scenes)\n")
+        self.assertEqual(errors, [
+            "CMakeLists.txt: estimation reaches simulation; the two must stay strangers"])
+
+
+if __name__ == "__main__":
+    unittest.main()

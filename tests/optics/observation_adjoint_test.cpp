@@ -1,0 +1,199 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "risley/optics/observation_adjoint.hpp"
+
+#include <cmath>
+
+#include <ceres/jet.h>
+#include <gtest/gtest.h>
+
+#include "optics/trains.hpp"
+#include "risley/core/simd.hpp"
+#include "risley/optics/batch.hpp"
+
+namespace risley {
+namespace {
+
+template <int N>
+constexpr int kColumns = parameter_count(N) + N;
+
+/// Derivatives of the forward model by forward-mode automatic differentiation: the oracle.
+template <int N, class Inner = double>
+struct Oracle {
+  using Jet = ceres::Jet<double, kColumns<N>>;
+  SphericalAngles<Jet> angles;
+  Vector3<Jet> direction;
+
+  Oracle(const PrismTrain& train, const std::vector<double>& rotation_angles) {
+    std::array<Jet, parameter_count(N)> parameters;
+    for (int i = 0; i < parameter_count(N); ++i) {
+      parameters[static_cast<std::size_t>(i)] = Jet(train[i], i);
+    }
+    std::array<Jet, N> rotation;
+    for (int i = 0; i < N; ++i) {
+      rotation[static_cast<std::size_t>(i)] =
+          Jet(rotation_angles[static_cast<std::size_t>(i)], parameter_count(N) + i);
+    }
+    direction = trace(prepare<Jet, N>(parameters, face_order_array<N>(train)), rotation).direction;
+    angles = angles_from_direction(direction);
+  }
+};
+
+/// Largest difference of a gradient to the oracle's, relative to the oracle's largest entry.
+template <int N, class Get>
+double difference(const ceres::Jet<double, kColumns<N>>& oracle, const Get& entry) {
+  double worst = 0;
+  const double scale = oracle.v.template lpNorm<Eigen::Infinity>();
+  for (int i = 0; i < kColumns<N>; ++i) worst = std::max(worst, std::abs(entry(i) - oracle.v[i]));
+  return worst / scale;
+}
+
+template <class T, int N, class Lane>
+auto entry_of(const Gradient<T, N>& gradient, const Lane& lane) {
+  return [&gradient, lane](int i) {
+    return lane(i < parameter_count(N)
+                    ? gradient.parameters[static_cast<std::size_t>(i)]
+                    : gradient.rotation_angles[static_cast<std::size_t>(i - parameter_count(N))]);
+  };
+}
+
+/// Worst relative difference of all five gradients, with the adjoint evaluated in T.
+template <class T, int N, class Lane>
+double adjoint_error(const PrismTrain& train, const std::vector<double>& angles, const Lane& lane) {
+  std::array<T, parameter_count(N)> parameters;
+  for (int i = 0; i < parameter_count(N); ++i) {
+    parameters[static_cast<std::size_t>(i)] = T(train[i]);
+  }
+  std::array<T, N> rotation;
+  for (std::size_t i = 0; i < N; ++i) rotation[i] = T(angles[i]);
+  const auto order = face_order_array<N>(train);
+  const auto prepared = prepare<T, N>(parameters, order);
+  const auto derivatives = prepare_derivatives<T, N>(parameters, order);
+  const auto by_angles = linearise_angles(prepared, derivatives, rotation);
+  const auto by_direction = linearise_direction(prepared, derivatives, rotation);
+
+  const Oracle<N> oracle(train, angles);
+  double worst = difference<N>(oracle.angles.azimuth, entry_of(by_angles.azimuth, lane));
+  worst = std::max(worst, difference<N>(oracle.angles.zenith, entry_of(by_angles.zenith, lane)));
+  worst = std::max(worst, difference<N>(oracle.direction.x, entry_of(by_direction.components[0], lane)));
+  worst = std::max(worst, difference<N>(oracle.direction.y, entry_of(by_direction.components[1], lane)));
+  worst = std::max(worst, difference<N>(oracle.direction.z, entry_of(by_direction.components[2], lane)));
+  // The value itself.
+  worst = std::max(worst, std::abs(lane(by_angles.angles.azimuth) - oracle.angles.azimuth.a));
+  worst = std::max(worst, std::abs(lane(by_angles.angles.zenith) - oracle.angles.zenith.a));
+  return worst;
+}
+
+template <int N>
+void check_all_scalars(const std::string& face_order) {
+  using Jet = ceres::Jet<double, 2>;
+  using Batch = xsimd::batch<double>;
+  std::mt19937 generator(5);
+  for (unsigned seed = 0; seed < 20; ++seed) {
+    const PrismTrain train = testing::imperfect_train(face_order, 0.5, seed);
+    for (int i = 0; i < 20; ++i) {
+      const auto angles = testing::random_angles(N, generator);
+      EXPECT_LT((adjoint_error<double, N>(train, angles, [](double v) { return v; })), 1e-12);
+      EXPECT_LT((adjoint_error<Jet, N>(train, angles, [](const Jet& v) { return v.a; })), 1e-12);
+      EXPECT_LT((adjoint_error<Batch, N>(train, angles,
+                                         [](const Batch& v) {
+                                           double lanes[Batch::size];
+                                           v.store_unaligned(lanes);
+                                           return lanes[Batch::size - 1];
+                                         })),
+                1e-12);
+    }
+  }
+}
+
+class AdjointOfEveryTrain : public ::testing::TestWithParam<std::string> {};
+
+TEST_P(AdjointOfEveryTrain, EqualsAutomaticDifferentiationInEveryScalar) {
+  if (parse_face_order(GetParam()).size() == 2) {
+    check_all_scalars<2>(GetParam());
+  } else {
+    check_all_scalars<3>(GetParam());
+  }
+}
+
+TEST_P(AdjointOfEveryTrain, EqualsCentralDifferences) {
+  PrismTrain train = testing::imperfect_train(GetParam(), 0.5, 1);
+  std::mt19937 generator(6);
+  const auto angles = testing::random_angles(train.prisms(), generator);
+  with_prism_count(train.prisms(), [&]<int N>() {
+    std::array<double, N> rotation;
+    std::copy_n(angles.begin(), N, rotation.begin());
+    const auto order = face_order_array<N>(train);
+    const auto parameters = parameter_array<N>(train);
+    const auto result = linearise_angles(prepare<double, N>(parameters, order),
+                                         prepare_derivatives<double, N>(parameters, order), rotation);
+    for (int i = 0; i < parameter_count(N); ++i) {
+      if (i == place::bearing_tilt_horizontal(N - 1) || i == place::bearing_tilt_vertical(N - 1)) {
+        EXPECT_EQ(result.zenith.parameters[static_cast<std::size_t>(i)], 0.0);
+        continue;
+      }
+      const double step = 1e-6;
+      PrismTrain up = train, down = train;
+      up.set_place(i, train[i] + step);
+      down.set_place(i, train[i] - step);
+      const double numeric = (observe(up, angles).zenith - observe(down, angles).zenith) / (2 * step);
+      EXPECT_NEAR(result.zenith.parameters[static_cast<std::size_t>(i)], numeric, 1e-8) << i;
+    }
+  });
+}
+
+TEST_P(AdjointOfEveryTrain, BatchesOfEveryInstructionSetEqualTheScalarModel) {
+  const PrismTrain train = testing::imperfect_train(GetParam(), 0.5, 2);
+  const int prisms = train.prisms();
+  constexpr std::size_t kShots = 37;  // no multiple of any lane count
+  std::mt19937 generator(8);
+  std::vector<std::vector<double>> columns(static_cast<std::size_t>(prisms),
+                                           std::vector<double>(kShots));
+  for (auto& column : columns) {
+    for (double& angle : column) angle = testing::random_angles(1, generator)[0];
+  }
+  const std::vector<std::span<const double>> angles(columns.begin(), columns.end());
+  const auto gradient_columns = static_cast<std::size_t>(parameter_count(prisms) + prisms);
+  for (const InstructionSet set : available_instruction_sets()) {
+    SCOPED_TRACE(to_string(set));
+    std::vector<double> x(kShots), y(kShots), z(kShots), azimuth(kShots), zenith(kShots);
+    EXPECT_EQ(observe_batch(train, angles, {x, y, z, azimuth, zenith}, set), 0u);
+    std::vector<std::vector<double>> d_azimuth(gradient_columns, std::vector<double>(kShots));
+    auto d_zenith = d_azimuth;
+    std::vector<double> azimuth2(kShots), zenith2(kShots);
+    LinearisationColumns out{azimuth2, zenith2, {d_azimuth.begin(), d_azimuth.end()},
+                             {d_zenith.begin(), d_zenith.end()}};
+    EXPECT_EQ(linearise_batch(train, angles, out, set), 0u);
+    for (std::size_t i = 0; i < kShots; ++i) {
+      std::vector<double> shot_angles;
+      for (const auto& column : columns) shot_angles.push_back(column[i]);
+      const Observation shot = observe(train, shot_angles);
+      EXPECT_NEAR(x[i], shot.direction.x, 2e-15);
+      EXPECT_NEAR(y[i], shot.direction.y, 2e-15);
+      EXPECT_NEAR(z[i], shot.direction.z, 2e-15);
+      EXPECT_NEAR(azimuth[i], shot.azimuth, 2e-15);
+      EXPECT_NEAR(zenith[i], shot.zenith, 2e-15);
+      EXPECT_NEAR(azimuth2[i], shot.azimuth, 2e-15);
+      EXPECT_NEAR(zenith2[i], shot.zenith, 2e-15);
+      with_prism_count(prisms, [&]<int N>() {
+        const Oracle<N> oracle(train, shot_angles);
+        EXPECT_LT(difference<N>(oracle.angles.azimuth,
+                                [&](int c) { return d_azimuth[static_cast<std::size_t>(c)][i]; }),
+                  1e-12);
+        EXPECT_LT(difference<N>(oracle.angles.zenith,
+                                [&](int c) { return d_zenith[static_cast<std::size_t>(c)][i]; }),
+                  1e-12);
+      });
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(FaceOrders, AdjointOfEveryTrain,
+                         ::testing::ValuesIn(testing::all_face_orders()), [](const auto& order) {
+                           std::string name = order.param;
+                           std::erase(name, '-');
+                           return name;
+                         });
+
+}  // namespace
+}  // namespace risley

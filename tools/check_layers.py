@@ -1,0 +1,97 @@
+#!/usr/bin/env python3
+# SPDX-FileCopyrightText: 2026 The risley authors
+# SPDX-License-Identifier: MIT
+"""Checks that no file includes a layer which its own layer does not declare in CMakeLists.txt.
+
+Usage: tools/check_layers.py [ROOT]
+Exit status: 0 all well, 1 a rule is broken (one line each: file:line: what is wrong).
+"""
+import pathlib
+import re
+import sys
+
+LAYER = re.compile(r"^\s*risley_add_layer\(\s*(\w+)(?:\s+LAYERS\s+([\w\s]*))?\)", re.MULTILINE)
+INCLUDE = re.compile(r'^\s*#\s*include\s*["<]([^">]+)[">]')
+STRANGERS = ("simulation", "estimation")  # they meet only in tests, so their agreement counts
+
+
+def declared_layers(cmake_text):
+    """{layer: set of the layers it may include}, lowest layer first."""
+    return {name: set((below or "").split()) for name, below in LAYER.findall(cmake_text)}
+
+
+def check_declarations(layers):
+    """Errors within the list itself: an unknown or later layer, strangers that are linked."""
+    errors = []
+    known = {}  # layer: everything it reaches
+    for name, below in layers.items():
+        for layer in sorted(below - known.keys()):
+            errors.append(f"CMakeLists.txt: {name} declares {layer}, which does not stand above it")
+        known[name] = below.union(*(known.get(layer, set()) for layer in below))
+    for one, other in (STRANGERS, STRANGERS[::-1]):
+        if other in known.get(one, set()):
+            errors.append(f"CMakeLists.txt: {one} reaches {other}; the two must stay strangers")
+    return errors
+
+
+def included_layer(include, layers):
+    """The layer that an #include names, or None for a library or a neighbour."""
+    parts = include.split("/")
+    if parts[0] == "risley" and len(parts) > 2:
+        return parts[1]
+    return parts[0] if len(parts) > 1 and parts[0] in layers else None
+
+
+def check_file(path, shown, allowed, layers):
+    errors = []
+    for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1):
+        match = INCLUDE.match(line)
+        if not match:
+            continue
+        include = match.group(1)
+        if ".." in include.split("/"):
+            errors.append(f'{shown}:{number}: "{include}" hides its layer, name it from the root')
+            continue
+        layer = included_layer(include, layers)
+        if layer is None:
+            continue
+        if layer not in layers:
+            errors.append(f"{shown}:{number}: {include} is in no declared layer")
+        elif layer not in allowed:
+            errors.append(f"{shown}:{number}: may not include the layer {layer} ({include})")
+    return errors
+
+
+def check(root):
+    """Every error of the tree under root, as text."""
+    layers = declared_layers((root / "CMakeLists.txt").read_text(encoding="utf-8"))
+    if not layers:
+        return ["CMakeLists.txt: no risley_add_layer found"]
+    errors = check_declarations(layers)
+    for top in (root / "include/risley", root / "src"):
+        for folder in sorted(entry for entry in top.glob("*") if entry.is_dir()):
+            if folder.name not in layers:
+                errors.append(f"{folder.relative_to(root)}: the folder is no declared layer")
+    for folder in ("include/risley", "src", "apps"):
+        for path in sorted((root / folder).rglob("*.[ch]pp")):
+            shown = path.relative_to(root)
+            if folder == "apps":
+                allowed = layers.keys()
+            else:
+                layer = path.relative_to(root / folder).parts[0]
+                if layer not in layers:
+                    continue
+                allowed = layers[layer] | {layer}
+            errors += check_file(path, shown, allowed, layers)
+    return errors
+
+
+def main():
+    root = pathlib.Path(sys.argv[1]) if len(sys.argv) > 1 else pathlib.Path(__file__).parents[1]
+    errors = check(root)
+    print("\n".join(errors) if errors else "check_layers: every include points downwards")
+    return 1 if errors else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
