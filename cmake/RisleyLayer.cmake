@@ -17,10 +17,6 @@ function(risley_add_layer name)
   file(GLOB_RECURSE headers CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/include/risley/${name}/*.hpp)
   file(GLOB_RECURSE sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/src/${name}/*.cpp)
   list(FILTER sources EXCLUDE REGEX "_kernel\\.cpp$") # built once per instruction set
-  if(NOT sources) # until the layer is written
-    set(sources ${PROJECT_BINARY_DIR}/generated/empty_${name}.cpp)
-    file(CONFIGURE OUTPUT ${sources} CONTENT "")
-  endif()
   set(target risley_${name})
   add_library(${target} STATIC ${sources})
   add_library(risley::${name} ALIAS ${target})

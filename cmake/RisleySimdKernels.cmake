@@ -4,9 +4,6 @@
 # dispatcher in src/optics/batch.cpp picks one at run time. Only these files get wide-instruction
 # flags, and tests/architecture checks that nothing compiled with them can leak into the rest.
 set(kernel ${PROJECT_SOURCE_DIR}/src/optics/batch_kernel.cpp)
-if(NOT EXISTS ${kernel}) # until the batch is written
-  return()
-endif()
 
 function(risley_add_kernel name)
   add_library(risley_kernel_${name} OBJECT ${kernel})

@@ -36,7 +36,11 @@ const std::vector<WritableFormat>& writable_formats();
 
 /// Creates a recording in the format that the file name's ending asks for.
 /// @param header  of the recording the rows come from; what the format cannot hold is dropped
-/// @throws InvalidArgument for an unknown ending (the message lists the known ones), FileError
-std::unique_ptr<Writer> create_recording(const std::string& path, const RecordingHeader& header);
+/// @param format  name of a writable format that is to be written whatever the ending; empty asks
+///                the ending
+/// @throws InvalidArgument for an unknown ending or format (the message lists the known ones),
+///         FileError
+std::unique_ptr<Writer> create_recording(const std::string& path, const RecordingHeader& header,
+                                         const std::string& format = {});
 
 }  // namespace risley::recordings

@@ -19,11 +19,18 @@ std::vector<std::string> builtin_preset_names();
 /// @throws InvalidArgument for an unknown name; the message lists the known ones
 Sensor load_sensor(const std::string& name_or_path);
 
-/// Reads preset text. @param path  for messages only
+/// Reads preset text: one YAML map, version first (risley_preset: 1). A physical value reads
+/// {value, unit, sigma, source}, where sigma, in the same unit, and source come together or not at
+/// all; 0 stands for an unknown divergence or size. A value of all prisms stands under its shared
+/// name or under the prisms' own names. covariance: {names, matrix}, element [i][j] in the unit of
+/// names[i] times that of names[j], so degrees as everywhere in files.
+/// @param path  for messages only
+/// @throws FileError with the line
 Sensor parse_preset(const std::string& text, const std::string& path);
 
 /// Writes the schema that parse_preset reads. Numbers keep all their digits, so reading the text
 /// gives the same sensor and writing it again gives the same text.
+/// @throws InvalidArgument for numbers that are not finite or a covariance of the wrong size
 std::string preset_text(const Sensor& sensor);
 
 }  // namespace risley::sensors

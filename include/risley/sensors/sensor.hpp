@@ -16,7 +16,7 @@ namespace risley::sensors {
 
 /// How well one named value is known and who says so.
 struct Knowledge {
-  std::string name;    ///< as in parameter_list()
+  std::string name;    ///< as in parameter_list(), or a preset's field such as "range_noise_m"
   double sigma = 0;    ///< one standard deviation, SI units; 0 when taken as exact
   std::string source;  ///< data sheet page, paper table, or the calibration that found it
 };
@@ -35,24 +35,24 @@ struct Sensor {
   /// Which of two speed combinations this is, for sensors that have two. In the second one the
   /// fast rotor comes first and both directions are kept: (wA, wB) becomes (-wB, -wA).
   std::optional<SpeedCombination> combination;
-  std::vector<Knowledge> knowledge;  ///< of train parameters and speeds, any order
+  std::vector<Knowledge> knowledge;  ///< of parameters, speeds and the numbers below, any order
 
   /// Joint covariance of named values, SI units; empty for presets that are no calibration.
   std::vector<std::string> covariance_names;
   Eigen::MatrixXd covariance;  ///< [names, names]
 
-  double angle_noise = 0;            ///< 1 sigma of azimuth and zenith before rounding, rad
-  double range_noise = 0;            ///< 1 sigma, m
-  double angle_resolution = 0;       ///< rounding step of reported angles, rad
-  double range_resolution = 0;       ///< rounding step of reported ranges, m
-  double range_minimum = 0;          ///< no return below, m
-  double range_maximum = 0;          ///< no return beyond, m
-  double field_of_view = 0;          ///< full cone, rad
-  double shot_rate = 0;              ///< shots per second
-  int device_type = 1;               ///< Livox device type of recordings
+  double angle_noise = 0;       ///< 1 sigma of azimuth and zenith before rounding, rad
+  double range_noise = 0;       ///< 1 sigma, m
+  double angle_resolution = 0;  ///< rounding step of reported angles, rad
+  double range_resolution = 0;  ///< rounding step of reported ranges, m
+  double range_minimum = 0;     ///< no return below, m
+  double range_maximum = 0;     ///< no return beyond, m
+  double field_of_view = 0;     ///< full cone, rad
+  double shot_rate = 0;         ///< shots per second
+  int device_type = 1;          ///< Livox device type of recordings
   double beam_divergence_horizontal = 0, beam_divergence_vertical = 0;  ///< full angle, rad
-  double prism_thickness = 0;        ///< on the axis, m                        [B21 App. A]
-  double prism_spacing = 0;          ///< between perpendicular faces, m        [B21 App. A]
+  double prism_thickness = 0;  ///< on the axis, m                        [B21 App. A]
+  double prism_spacing = 0;    ///< between perpendicular faces, m        [B21 App. A]
 
   /// Where the numbers come from when they were computed: name and value pairs such as command,
   /// version, seed, input_sha256.
@@ -62,7 +62,8 @@ struct Sensor {
 
   /// Value of a train parameter or angular velocity, SI units. @throws InvalidArgument
   double get(std::string_view parameter) const;
-  /// Sets a train parameter or an angular velocity, SI units, within bounds.
+  /// Sets a train parameter or an angular velocity, SI units, within bounds. What was known of all
+  /// prisms together becomes known of each when one of them is set alone.
   /// @throws InvalidArgument naming the parameter, value, unit and range
   void set(std::string_view parameter, double value);
   /// Knowledge of a parameter, or nullptr when nothing is recorded.
@@ -71,7 +72,7 @@ struct Sensor {
   void set_knowledge(Knowledge entry);
 };
 
-/// The same sensor running its other speed combination.
+/// The same sensor in that speed combination; what is known of the speeds goes with them.
 /// @throws InvalidArgument when the sensor has only one
 Sensor with_combination(const Sensor& sensor, SpeedCombination combination);
 

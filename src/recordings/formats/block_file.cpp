@@ -11,8 +11,9 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "recordings/formats/little_endian.hpp"
 #include "risley/core/error.hpp"
+
+#include "recordings/formats/little_endian.hpp"
 
 namespace risley::recordings {
 
@@ -43,9 +44,9 @@ const std::uint8_t* BlockInput::at(std::uint64_t offset, std::size_t count) {
     block_offset_ = offset;
     block_bytes_ = 0;
     while (block_bytes_ < count) {
-      const ssize_t got = ::pread(file_.get(), block_.data() + block_bytes_,
-                                  block_.size() - block_bytes_,
-                                  static_cast<off_t>(offset + block_bytes_));
+      const ssize_t got =
+          ::pread(file_.get(), block_.data() + block_bytes_, block_.size() - block_bytes_,
+                  static_cast<off_t>(offset + block_bytes_));
       if (got < 0 && errno == EINTR) continue;
       if (got <= 0) {
         throw FileError(path_, {offset + block_bytes_, {}},
@@ -62,8 +63,7 @@ BlockOutput::BlockOutput(std::string path)
     : output_(std::move(path)),
       file_(::open(output_.temporary_path().c_str(), O_WRONLY | O_CLOEXEC)) {
   if (file_.get() < 0) {
-    throw FileError(output_.path(), {},
-                    fmt::format("cannot be written: {}", std::strerror(errno)));
+    throw FileError(output_.path(), {}, fmt::format("cannot be written: {}", std::strerror(errno)));
   }
   block_.reserve(BlockInput::kBlockBytes);
 }
@@ -109,8 +109,7 @@ void BlockOutput::write_at(const std::uint8_t* bytes, std::size_t count, std::ui
 void BlockOutput::commit() {
   flush();
   if (const int error = file_.close(); error != 0) {
-    throw FileError(output_.path(), {},
-                    fmt::format("cannot be written: {}", std::strerror(error)));
+    throw FileError(output_.path(), {}, fmt::format("cannot be written: {}", std::strerror(error)));
   }
   output_.commit();
 }

@@ -80,8 +80,6 @@ inline Vector3<double> cartesian_point(const Observations& rows, std::size_t row
 }
 
 /// Nearest whole number of steps.
-inline std::int64_t whole_steps(double value, double step) {
-  return std::llround(value / step);
-}
+inline std::int64_t whole_steps(double value, double step) { return std::llround(value / step); }
 
 }  // namespace risley::recordings

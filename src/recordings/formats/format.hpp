@@ -33,6 +33,9 @@ extern const Format kOpenpylivoxBinFormat;    // openpylivox_bin.cpp
 extern const Format kViewerCsvFormat;         // viewer_csv.cpp
 extern const Format kNetcdfFormat;            // netcdf.cpp
 
+/// Device::type of a sensor that is not a Mid-40 and about which a format tells no more.
+inline constexpr std::uint8_t kUnknownDeviceType = 255;
+
 /// Detail by which a NetCDF file remembers the format its rows first came from.
 inline constexpr const char* kSourceFormat = "source_format";
 

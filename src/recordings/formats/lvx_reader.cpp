@@ -62,7 +62,8 @@ void count_interleaved(FirstPackets& first, const Observations& o, std::size_t r
 }
 
 bool period_is(const FirstPackets& first, double expected_ns) {
-  return std::fabs(static_cast<double>(first.shortest_period_ns) - expected_ns) < 0.04 * expected_ns;
+  return std::fabs(static_cast<double>(first.shortest_period_ns) - expected_ns) <
+         0.04 * expected_ns;
 }
 
 }  // namespace
@@ -85,9 +86,9 @@ std::array<std::uint8_t, 4> lvx_version(BlockInput& file) {
   }
   const auto code = load<std::uint32_t>(bytes + 20);
   if (code != kLvxMagicCode) {
-    throw FileError(file.path(), {20, {}},
-                    fmt::format("expected the magic code {:08X} of LVX, found {:08X}",
-                                kLvxMagicCode, code));
+    throw FileError(
+        file.path(), {20, {}},
+        fmt::format("expected the magic code {:08X} of LVX, found {:08X}", kLvxMagicCode, code));
   }
   return {bytes[16], bytes[17], bytes[18], bytes[19]};
 }
@@ -115,9 +116,9 @@ std::vector<Device> read_lvx_devices(BlockInput& file, std::uint64_t offset, std
     }
     for (std::size_t other = 0; other < i; ++other) {
       if (devices[other].index == device.index) {
-        throw FileError(file.path(), {offset + i * bytes_per_device + 32, {}},
-                        fmt::format("device index {} stands twice in the device table",
-                                    device.index));
+        throw FileError(
+            file.path(), {offset + i * bytes_per_device + 32, {}},
+            fmt::format("device index {} stands twice in the device table", device.index));
       }
     }
   }
@@ -195,9 +196,11 @@ void LvxReader::describe() {
       const double interval_ns = static_cast<double>(device.shortest_period_ns) / layout.records;
       grids_[i] = interval_ns < 7000 ? kGrid240kHz : kGrid100kHz;
       warnings_.push_back(
-          {{}, fmt::format("device {} has the unknown type {}; by the distance of its packets it "
-                           "measures at {} kHz",
-                           i, header_.devices[i].type, interval_ns < 7000 ? 240 : 100), 0});
+          {{},
+           fmt::format("device {} has the unknown type {}; by the distance of its packets it "
+                       "measures at {} kHz",
+                       i, header_.devices[i].type, interval_ns < 7000 ? 240 : 100),
+           0});
     } else if (device.data_type < 2) {
       // 50 shots of two records in 500 us, or 34 shots of three in 567 us (the last is cut).
       constexpr std::size_t kEnough = 10;
@@ -208,16 +211,15 @@ void LvxReader::describe() {
       if (is_interleaved(2, 500'000)) grids_[i] = ShotGrid{10'000, 1, 1, 2};
       if (is_interleaved(3, 566'667)) grids_[i] = ShotGrid{50'000, 3, 1, 3};
       if (grids_[i]) {
-        header_.returns_per_shot = std::max<int>(header_.returns_per_shot,
-                                                 grids_[i]->records_per_shot);
+        header_.returns_per_shot =
+            std::max<int>(header_.returns_per_shot, grids_[i]->records_per_shot);
       }
     }
   }
 }
 
 double LvxReader::fraction_read() const {
-  return static_cast<double>(std::min(position_, file_.size())) /
-         static_cast<double>(file_.size());
+  return static_cast<double>(std::min(position_, file_.size())) / static_cast<double>(file_.size());
 }
 
 void LvxReader::fail(std::uint64_t offset, std::string problem) {
@@ -230,13 +232,12 @@ bool LvxReader::read(Chunk& chunk, std::size_t max_rows) {
   chunk.imu.clear();
   // No record has less than 7 bytes per row, so a huge max_rows costs no memory.
   const std::uint64_t left = file_.size() - std::min(position_, file_.size());
-  chunk.observations.resize(static_cast<std::size_t>(
-      std::min<std::uint64_t>(max_rows, left / 7)));
+  chunk.observations.resize(static_cast<std::size_t>(std::min<std::uint64_t>(max_rows, left / 7)));
   std::size_t rows = 0;
   while (!ended_) {
     if (!in_frame_) {
       open_frame();
-    } else if (next_package(chunk, rows, max_rows) == Step::chunk_full) {
+    } else if (!next_package(chunk, rows, max_rows)) {
       break;
     }
   }
@@ -306,18 +307,19 @@ void LvxReader::step_over(std::uint8_t data_type) {
   if (is_new) warnings_.push_back({{position_, {}}, {}, 0});
   warnings_[entry->second].message = fmt::format(
       "a packet has the unknown data type {}; the rest of {} was stepped over", data_type,
-      frames == 1 ? std::string("its frame") : fmt::format("its and of {} more frames", frames - 1));
+      frames == 1 ? std::string("its frame")
+                  : fmt::format("its and of {} more frames", frames - 1));
   position_ = frame_end_;
   in_frame_ = false;
   ended_ = open_ended_;
 }
 
-LvxReader::Step LvxReader::next_package(Chunk& chunk, std::size_t& rows, std::size_t max_rows) {
+bool LvxReader::next_package(Chunk& chunk, std::size_t& rows, std::size_t max_rows) {
   const std::uint64_t left = frame_end_ - position_;
   if (left == 0) {
     in_frame_ = false;
     if (open_ended_) stop_at_cut(0);
-    return Step::end;
+    return true;
   }
   const bool at_file_end = frame_end_ == file_.size();
   const std::size_t known = std::min<std::uint64_t>(left, kLvxPackageHeaderBytes);
@@ -326,24 +328,24 @@ LvxReader::Step LvxReader::next_package(Chunk& chunk, std::size_t& rows, std::si
   // A frame that was never closed may still be followed by a whole one.
   if (open_ended_ && left >= version_.frame_header_bytes &&
       load<std::uint64_t>(bytes) == position_) {
-    warnings_.push_back({{position_, {}},
-                         fmt::format("the frame before was never closed (next offset {})",
-                                     next_offset_),
-                         0});
+    warnings_.push_back(
+        {{position_, {}},
+         fmt::format("the frame before was never closed (next offset {})", next_offset_),
+         0});
     in_frame_ = false;
-    return Step::end;
+    return true;
   }
 
   const int device = device_rows_[bytes[0]];
   if (device < 0) {
-    fail(position_, fmt::format("a packet names device {}, which is not in the device table",
-                                bytes[0]));
-    return Step::end;
+    fail(position_,
+         fmt::format("a packet names device {}, which is not in the device table", bytes[0]));
+    return true;
   }
   // LVX 1.0 was written before the version was settled.
   if (known > 1 && (version_.float_points ? bytes[1] == 0 : bytes[1] != kPacketVersion)) {
     fail(position_ + 1, fmt::format("packet version = {}, expected {}", bytes[1], kPacketVersion));
-    return Step::end;
+    return true;
   }
   constexpr std::size_t kDataTypeAt = 10;
   const RecordLayout* layout = nullptr;
@@ -358,23 +360,23 @@ LvxReader::Step LvxReader::next_package(Chunk& chunk, std::size_t& rows, std::si
       } else {
         step_over(data_type);
       }
-      return Step::end;
+      return true;
     }
   }
   if (known < kLvxPackageHeaderBytes || kLvxPackageHeaderBytes + layout->bytes() > left) {
     if (at_file_end) {
       stop_at_cut(layout ? std::optional<std::size_t>(layout->records) : std::nullopt);
     } else {
-      fail(position_, fmt::format("a packet does not fit into its frame, which ends at byte {}",
-                                  frame_end_));
+      fail(position_,
+           fmt::format("a packet does not fit into its frame, which ends at byte {}", frame_end_));
     }
-    return Step::end;
+    return true;
   }
 
   // Packets stay whole; one alone is delivered however small the chunk is to be.
   if (!chunk.packets.empty() &&
       (rows + layout->rows() > max_rows || chunk.packets.size() >= max_rows)) {
-    return Step::chunk_full;
+    return false;
   }
   bytes = file_.at(position_, kLvxPackageHeaderBytes + layout->bytes());
   Packet packet = decode_packet_header(bytes + 1);
@@ -386,10 +388,9 @@ LvxReader::Step LvxReader::next_package(Chunk& chunk, std::size_t& rows, std::si
   const std::uint64_t wraps_before = clock.wraps();
   const std::optional<std::int64_t> time = clock.time_ns(packet);
   if (!time) {
-    fail(position_ + 9,
-         fmt::format("timestamp of type {} with the bytes {:02X} is no time", packet.timestamp_type,
-                     fmt::join(packet.timestamp, " ")));
-    return Step::end;
+    fail(position_ + 9, fmt::format("timestamp of type {} with the bytes {:02X} is no time",
+                                    packet.timestamp_type, fmt::join(packet.timestamp, " ")));
+    return true;
   }
   clock_wraps_ += clock.wraps() - wraps_before;
 
@@ -417,13 +418,13 @@ LvxReader::Step LvxReader::next_package(Chunk& chunk, std::size_t& rows, std::si
                ? std::string("a point has a coordinate that is no number")
                : std::string("a return has an angle outside zenith [0, 18000] or azimuth "
                              "[0, 36000] x 0.01 deg"));
-      return Step::end;
+      return true;
     }
     rows += layout->rows();
   }
   chunk.packets.push_back(packet);
   position_ += kLvxPackageHeaderBytes + layout->bytes();
-  return Step::package;
+  return true;
 }
 
 }  // namespace risley::recordings

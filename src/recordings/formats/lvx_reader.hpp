@@ -11,10 +11,11 @@
 #include <string_view>
 #include <vector>
 
-#include "recordings/formats/block_file.hpp"
-#include "recordings/formats/packet.hpp"
 #include "risley/core/error.hpp"
 #include "risley/recordings/reader.hpp"
+
+#include "recordings/formats/block_file.hpp"
+#include "recordings/formats/packet.hpp"
 
 namespace risley::recordings {
 
@@ -31,9 +32,9 @@ inline constexpr std::size_t kLvxFrameNextAt = 8, kLvxFrameIndexAt = 16;
 
 /// What the versions of LVX do differently.
 struct LvxVersion {
-  std::uint64_t first_frame = 0;      ///< byte offset
+  std::uint64_t first_frame = 0;  ///< byte offset
   std::size_t frame_header_bytes = 24;
-  bool float_points = false;          ///< LVX 1.0: data type 0 holds floats in metres
+  bool float_points = false;  ///< LVX 1.0: data type 0 holds floats in metres
 };
 
 /// Bytes of a file's header. @throws FileError that names the missing part when it is cut off
@@ -56,30 +57,29 @@ class LvxReader final : public Reader {
   double fraction_read() const override;
 
  private:
-  enum class Step { package, chunk_full, end };
-
   void describe();
   void rewind();
   void open_frame();
-  Step next_package(Chunk& chunk, std::size_t& rows, std::size_t max_rows);
+  /// @return false when the next packet has to wait for the next chunk
+  bool next_package(Chunk& chunk, std::size_t& rows, std::size_t max_rows);
   void stop_at_cut(std::optional<std::size_t> records);
   void step_over(std::uint8_t data_type);
   void fail(std::uint64_t offset, std::string problem);
 
   BlockInput file_;
   LvxVersion version_;
-  std::array<int, 256> device_rows_{};           // by device index, -1 for none
-  std::vector<std::optional<ShotGrid>> grids_;   // by device row; empty: as the types say
-  std::vector<PacketClock> clocks_;              // by device row
+  std::array<int, 256> device_rows_{};                // by device index, -1 for none
+  std::vector<std::optional<ShotGrid>> grids_;        // by device row; empty: as the types say
+  std::vector<PacketClock> clocks_;                   // by device row
   std::map<std::uint8_t, std::size_t> stepped_over_;  // data type -> its warning
   std::map<std::uint8_t, std::uint64_t> frames_stepped_over_;
 
-  std::uint64_t position_ = 0;    // of the next package, or of the next frame
+  std::uint64_t position_ = 0;  // of the next package, or of the next frame
   std::uint64_t frame_end_ = 0;
-  std::uint64_t next_offset_ = 0; // as the frame header gives it
-  std::uint64_t frames_ = 0;      // begun so far
+  std::uint64_t next_offset_ = 0;  // as the frame header gives it
+  std::uint64_t frames_ = 0;       // begun so far
   bool in_frame_ = false;
-  bool open_ended_ = false;       // the frame header does not say where the frame ends
+  bool open_ended_ = false;  // the frame header does not say where the frame ends
   bool ended_ = false;
   std::optional<FileError> failure_;
 };

@@ -5,19 +5,19 @@
 // bits. Equal recordings give equal bytes, in whatever pieces they are written: blocks of rows and
 // of packet headers go to the file in an order that depends on their content alone.
 // The NetCDF library is not thread-safe: one NetCDF file of a process at a time.
-#include <netcdf.h>
-
 #include <algorithm>
 #include <array>
 #include <optional>
 #include <type_traits>
 
 #include <fmt/format.h>
+#include <netcdf.h>
+
+#include "risley/core/error.hpp"
+#include "risley/core/output_file.hpp"
 
 #include "recordings/formats/format.hpp"
 #include "recordings/formats/packet.hpp"
-#include "risley/core/error.hpp"
-#include "risley/core/output_file.hpp"
 
 namespace risley::recordings {
 namespace {
@@ -52,7 +52,7 @@ struct Column {
 
 /// Calls a function with every column of the row table.
 template <class Rows, class Function>
-void for_each_column(Rows& rows, Function&& f) {
+void for_each_column(Rows&& rows, Function&& f) {
   f(Column{"time", "ns", "time of the shot"}, rows.time_ns);
   f(Column{"azimuth", "radian", "azimuth from X towards Y"}, rows.azimuth);
   f(Column{"zenith", "radian", "zenith angle from Z"}, rows.zenith);
@@ -84,7 +84,7 @@ struct PacketColumns {
 };
 
 template <class Packets, class Function>
-void for_each_packet_column(Packets& p, Function&& f) {
+void for_each_packet_column(Packets&& p, Function&& f) {
   f(Column{"packet_rows", "1", "number of rows of the packet"}, p.rows);
   f(Column{"packet_frame", "1", "number of the frame that holds the packet"}, p.frame);
   f(Column{"packet_device_index", "1", "index by which the packet names its device"},
@@ -107,7 +107,7 @@ struct ImuColumns {
 };
 
 template <class Imu, class Function>
-void for_each_imu_column(Imu& imu, Function&& f) {
+void for_each_imu_column(Imu&& imu, Function&& f) {
   f(Column{"imu_time", "ns", "time of the inertial sample"}, imu.time_ns);
   f(Column{"imu_device", "1", "row of the device table"}, imu.device);
   f(Column{"imu_angular_velocity", "radian s-1", "angular velocity", kAxisDimension, 3},
@@ -125,7 +125,7 @@ struct DeviceColumns {
 };
 
 template <class Devices, class Function>
-void for_each_device_column(Devices& d, Function&& f) {
+void for_each_device_column(Devices&& d, Function&& f) {
   const char* const length = "serial_length";
   f(Column{"device_serial", nullptr, "broadcast code", length, d.serial_length}, d.serial);
   f(Column{"device_hub_serial", nullptr, "broadcast code of the hub", length, d.serial_length},
@@ -134,8 +134,7 @@ void for_each_device_column(Devices& d, Function&& f) {
   f(Column{"device_type", "1", "device type of the sensor"}, d.type);
   f(Column{"device_extrinsic_enabled", "1", "1 where the pose is to be applied"},
     d.extrinsic_enabled);
-  f(Column{"device_roll_pitch_yaw", "degree", "attitude", kAxisDimension, 3},
-    d.roll_pitch_yaw_deg);
+  f(Column{"device_roll_pitch_yaw", "degree", "attitude", kAxisDimension, 3}, d.roll_pitch_yaw_deg);
   f(Column{"device_translation", "m", "position", kAxisDimension, 3}, d.translation_m);
 }
 
@@ -222,6 +221,14 @@ std::size_t dimension_length(const NcFile& file, const char* name) {
   return length;
 }
 
+/// Blocks are written and read whole and in order: a cache of many would only cost memory.
+template <class T>
+void keep_few_blocks(const NcFile& file, int variable, const Column& column, std::size_t block) {
+  file.check(
+      nc_set_var_chunk_cache(file.id(), variable, 2 * block * column.width * sizeof(T), 7, 1.0F),
+      fmt::format("set the cache of variable {}", column.name));
+}
+
 /// Defines variables of one table, whose entries run along `dimension`.
 /// @param block  entries per compressed block; 0 for a table of fixed length, kept in one piece
 struct DefineColumns {
@@ -239,17 +246,14 @@ struct DefineColumns {
     if (rank == 2) {
       file.check(nc_inq_dimid(file.id(), column.inner_dimension, &dimensions[1]), action);
     }
-    file.check(nc_def_var(file.id(), column.name, nc_type_of<T>(), rank, dimensions.data(),
-                          &variable),
-               action);
+    file.check(
+        nc_def_var(file.id(), column.name, nc_type_of<T>(), rank, dimensions.data(), &variable),
+        action);
     if (block > 0) {
       file.check(nc_def_var_chunking(file.id(), variable, NC_CHUNKED, chunk.data()), action);
       file.check(nc_def_var_deflate(file.id(), variable, NC_SHUFFLE, 1, 1), action);
       file.check(nc_def_var_fletcher32(file.id(), variable, NC_FLETCHER32), action);
-      // Blocks are written whole: a cache of many would only cost memory.
-      file.check(nc_set_var_chunk_cache(file.id(), variable, 2 * block * column.width * sizeof(T),
-                                        7, 1.0F),
-                 action);
+      keep_few_blocks<T>(file, variable, column, block);
     }
     if (column.units != nullptr) put_text(file, file.id(), variable, "units", column.units);
     put_text(file, file.id(), variable, "long_name", column.long_name);
@@ -296,6 +300,7 @@ struct GetColumns {
 struct RequireColumns {
   const NcFile& file;
   const char* dimension;
+  std::size_t block = 0;  ///< as in DefineColumns
 
   template <class T>
   void operator()(const Column& column, const std::vector<T>&) const {
@@ -313,6 +318,7 @@ struct RequireColumns {
     file.check(nc_inq_vardimid(file.id(), variable, dimensions.data()), "read the dimensions");
     require_dimension(column, dimensions[0], dimension, std::nullopt);
     if (rank == 2) require_dimension(column, dimensions[1], column.inner_dimension, column.width);
+    if (block > 0) keep_few_blocks<T>(file, variable, column, block);
   }
 
   void require_dimension(const Column& column, int id, const char* name,
@@ -426,8 +432,8 @@ class NetcdfWriter final : public Writer {
     flush(true);
     const std::size_t samples = imu_.time_ns.size();
     for (std::size_t start = 0; start < samples; start += kImuBlock) {
-      for_each_imu_column(
-          imu_, PutColumns{file_, start, start, std::min(kImuBlock, samples - start)});
+      for_each_imu_column(imu_,
+                          PutColumns{file_, start, start, std::min(kImuBlock, samples - start)});
     }
     file_.close();
     output_.commit();
@@ -555,9 +561,9 @@ class NetcdfReader final : public Reader {
     row_count_ = dimension_length(file_, "row");
     packet_count_ = dimension_length(file_, "packet");
     imu_count_ = dimension_length(file_, "imu_sample");
-    for_each_column(Observations{}, RequireColumns{file_, "row"});
-    for_each_packet_column(PacketColumns{}, RequireColumns{file_, "packet"});
-    for_each_imu_column(ImuColumns{}, RequireColumns{file_, "imu_sample"});
+    for_each_column(Observations{}, RequireColumns{file_, "row", kRowBlock});
+    for_each_packet_column(PacketColumns{}, RequireColumns{file_, "packet", kPacketBlock});
+    for_each_imu_column(ImuColumns{}, RequireColumns{file_, "imu_sample", kImuBlock});
   }
 
   bool read(Chunk& chunk, std::size_t max_rows) override {
@@ -575,16 +581,14 @@ class NetcdfReader final : public Reader {
     }
     row_ += chunk.observations.size();
     imu_sample_ += chunk.imu.size();
-    const bool some =
-        chunk.observations.size() > 0 || !chunk.packets.empty() || !chunk.imu.empty();
+    const bool some = chunk.observations.size() > 0 || !chunk.packets.empty() || !chunk.imu.empty();
     if (!some && pending_) throw FileError(*pending_);
     return some;
   }
 
   double fraction_read() const override {
     const std::size_t total = row_count_ + imu_count_;
-    return total == 0 ? 1.0
-                      : static_cast<double>(row_ + imu_sample_) / static_cast<double>(total);
+    return total == 0 ? 1.0 : static_cast<double>(row_ + imu_sample_) / static_cast<double>(total);
   }
 
  private:
@@ -666,8 +670,7 @@ class NetcdfReader final : public Reader {
     Observations block;
     while (rows.size() < count) {
       const std::size_t start = row_ + rows.size();
-      const std::size_t length =
-          std::min(kRowBlock - start % kRowBlock, count - rows.size());
+      const std::size_t length = std::min(kRowBlock - start % kRowBlock, count - rows.size());
       for_each_column(block, GetColumns{file_, start, length});
       rows.append(block);
     }

@@ -8,8 +8,9 @@
 
 #include <fmt/format.h>
 
-#include "recordings/formats/format.hpp"
 #include "risley/core/error.hpp"
+
+#include "recordings/formats/format.hpp"
 
 namespace risley::recordings {
 namespace {
@@ -35,9 +36,9 @@ OpenpylivoxLayout openpylivox_layout(const RecordingHeader& header) {
   layout.imu = own && header.detail(kContent) == "imu";
   if (layout.imu) return layout;
   if (!header.has_range) {
-    throw InvalidArgument(fmt::format(
-        "a {} recording has no ranges; openpylivox files hold points, which need them",
-        header.format));
+    throw InvalidArgument(
+        fmt::format("a {} recording has no ranges; openpylivox files hold points, which need them",
+                    header.format));
   }
   if (own) {
     const auto firmware_type = whole_number(header.detail(kFirmwareType), 1, 3);
@@ -52,10 +53,10 @@ OpenpylivoxLayout openpylivox_layout(const RecordingHeader& header) {
   const bool tags = !header.devices.empty() && header.devices.front().type != kMid40;
   const int most_returns = tags ? 2 : 3;
   if (header.returns_per_shot < 1 || header.returns_per_shot > most_returns) {
-    throw InvalidArgument(fmt::format("returns_per_shot = {}, an openpylivox file of a {} holds 1 "
-                                      "to {}",
-                                      header.returns_per_shot, tags ? "tagged sensor" : "Mid-40",
-                                      most_returns));
+    throw InvalidArgument(
+        fmt::format("returns_per_shot = {}, an openpylivox file of a {} holds 1 "
+                    "to {}",
+                    header.returns_per_shot, tags ? "tagged sensor" : "Mid-40", most_returns));
   }
   if (tags) {
     layout.data_type = first + 2 * header.returns_per_shot;
@@ -96,9 +97,10 @@ bool OpenpylivoxRowFilter::accepts(const Observations& rows, std::size_t row) {
   }
   if (!device_) device_ = rows.device[row];
   if (*device_ != rows.device[row]) {
-    throw InvalidArgument(fmt::format("row {}: device {} after device {}; an openpylivox file "
-                                      "holds one sensor",
-                                      number, rows.device[row], *device_));
+    throw InvalidArgument(
+        fmt::format("row {}: device {} after device {}; an openpylivox file "
+                    "holds one sensor",
+                    number, rows.device[row], *device_));
   }
   return true;
 }

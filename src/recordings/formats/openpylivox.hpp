@@ -15,9 +15,6 @@ namespace risley::recordings {
 inline constexpr std::string_view kOpenpylivoxCsvName = "openpylivox-csv";
 inline constexpr std::string_view kOpenpylivoxBinName = "openpylivox-bin";
 
-/// Device type of a sensor that is not a Mid-40 and about which no more is known.
-inline constexpr std::uint8_t kUnknownDeviceType = 255;
-
 /// What the records of a file are.
 struct OpenpylivoxLayout {
   bool imu = false;       ///< inertial samples and no points

@@ -10,13 +10,14 @@
 
 #include <fmt/format.h>
 
+#include "risley/core/error.hpp"
+
 #include "recordings/formats/block_file.hpp"
 #include "recordings/formats/format.hpp"
 #include "recordings/formats/little_endian.hpp"
 #include "recordings/formats/openpylivox.hpp"
 #include "recordings/formats/packet.hpp"
 #include "recordings/formats/seconds.hpp"
-#include "risley/core/error.hpp"
 
 namespace risley::recordings {
 namespace {
@@ -37,8 +38,8 @@ struct RecordParts {
 
 RecordParts parts_of(const OpenpylivoxLayout& layout) {
   RecordParts parts;
-  parts.points = *record_layout(layout.imu ? kImuDataType
-                                           : static_cast<std::uint8_t>(layout.data_type));
+  parts.points =
+      *record_layout(layout.imu ? kImuDataType : static_cast<std::uint8_t>(layout.data_type));
   parts.points.records = 1;
   parts.time_at = parts.points.bytes_per_record;
   parts.return_digit = !layout.imu && layout.firmware_type > 1;
@@ -83,8 +84,8 @@ class OpenpylivoxBinReader final : public Reader {
 
   OpenpylivoxLayout read_layout() {
     if (input_.size() < kHeaderBytes) {
-      fail(input_.size(), fmt::format("expected a header of {} bytes, found the file's end",
-                                      kHeaderBytes));
+      fail(input_.size(),
+           fmt::format("expected a header of {} bytes, found the file's end", kHeaderBytes));
     }
     const std::uint8_t* const bytes = input_.at(0, kHeaderBytes);
     const std::string_view head(reinterpret_cast<const char*>(bytes), kHeaderBytes);
@@ -128,8 +129,9 @@ class OpenpylivoxBinReader final : public Reader {
     rows.resize(row + parts_.points.rows());
     if (decode_records(parts_.points, bytes, *time_ns, kGrid100kHz, 0, rows, row)) {
       rows.resize(row);
-      fail(offset_, "expected a zenith in [0, 180] deg and an azimuth in [0, 360] deg, found a "
-                    "return beyond");
+      fail(offset_,
+           "expected a zenith in [0, 180] deg and an azimuth in [0, 360] deg, found a "
+           "return beyond");
     }
     if (parts_.return_digit) rows.return_number[row] = static_cast<std::uint8_t>(return_number);
   }

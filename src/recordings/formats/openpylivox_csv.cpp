@@ -179,8 +179,9 @@ class OpenpylivoxCsvWriter final : public Writer {
  private:
   static Variant variant_for(const RecordingHeader& header) {
     const OpenpylivoxLayout layout = openpylivox_layout(header);
-    const Variant* const own =
-        source_format(header) == kOpenpylivoxCsvName ? find_variant(header.detail(kColumns)) : nullptr;
+    const Variant* const own = source_format(header) == kOpenpylivoxCsvName
+                                   ? find_variant(header.detail(kColumns))
+                                   : nullptr;
     if (own != nullptr) return *own;
     // What the program's own conversion of its binary files writes has the return number always.
     const bool with_number = layout.tagged() || layout.firmware_type > 1 ||

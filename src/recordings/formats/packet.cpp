@@ -9,9 +9,10 @@
 
 #include <fmt/format.h>
 
+#include "risley/core/error.hpp"
+
 #include "recordings/formats/cartesian.hpp"
 #include "recordings/formats/little_endian.hpp"
-#include "risley/core/error.hpp"
 
 namespace risley::recordings {
 namespace {
@@ -56,8 +57,8 @@ std::optional<std::size_t> decode_spherical(std::size_t records, const std::uint
         azimuth == kHalfTurn
             ? kPi
             : radians_from_degrees((over_half ? azimuth - kFullTurn : azimuth) / 100.0);
-    const double zenith_rad = std::min(radians_from_degrees(zenith / 100.0),
-                                       zenith <= kHalfTurn ? kPi : 1e3);
+    const double zenith_rad =
+        std::min(radians_from_degrees(zenith / 100.0), zenith <= kHalfTurn ? kPi : 1e3);
     for (int number = 0; number < kReturns; ++number, ++row) {
       const auto depth = load<std::uint32_t>(bytes + depth_at(kReturns, number));
       if (depth > 0 && !possible) return record;
@@ -74,11 +75,11 @@ void decode_cartesian(std::size_t points, const std::uint8_t* bytes, Observation
                       std::size_t row) {
   constexpr std::size_t kBytes = kTagged ? 14 : 13;
   for (const std::size_t end = row + points; row < end; ++row, bytes += kBytes) {
-    set_cartesian(o, row,
-                  {load<std::int32_t>(bytes) * kMillimetre,
-                   load<std::int32_t>(bytes + 4) * kMillimetre,
-                   load<std::int32_t>(bytes + 8) * kMillimetre},
-                  kMillimetre);
+    set_cartesian(
+        o, row,
+        {load<std::int32_t>(bytes) * kMillimetre, load<std::int32_t>(bytes + 4) * kMillimetre,
+         load<std::int32_t>(bytes + 8) * kMillimetre},
+        kMillimetre);
     o.intensity[row] = bytes[12];
     o.tag[row] = kTagged ? bytes[13] : 0;
   }
@@ -107,8 +108,7 @@ bool has_return(const Observations& o, std::size_t row, std::uint64_t row_number
     refuse(row_number, "zenith", degrees_from_radians(o.zenith[row]), "deg", "[0, 180] deg");
   }
   if (!(std::fabs(o.azimuth[row]) < kPi + kSlack)) {
-    refuse(row_number, "azimuth", degrees_from_radians(o.azimuth[row]), "deg",
-           "[-180, 180] deg");
+    refuse(row_number, "azimuth", degrees_from_radians(o.azimuth[row]), "deg", "[-180, 180] deg");
   }
   return true;
 }
@@ -137,8 +137,9 @@ RawAngles raw_angles(const Observations& o, std::size_t row, bool trusted) {
   }
   const auto zenith = std::lround(degrees_from_radians(o.zenith[row]) * 100.0);
   const auto azimuth_steps = std::lround(degrees_from_radians(azimuth) * 100.0);
-  return {static_cast<std::uint16_t>(zenith),
-          static_cast<std::uint16_t>(azimuth_steps < 0 ? azimuth_steps + kFullTurn : azimuth_steps)};
+  return {
+      static_cast<std::uint16_t>(zenith),
+      static_cast<std::uint16_t>(azimuth_steps < 0 ? azimuth_steps + kFullTurn : azimuth_steps)};
 }
 
 void encode_spherical(const RecordLayout& layout, const Observations& o, std::size_t first_row,
@@ -227,15 +228,19 @@ std::uint8_t data_type_of(bool cartesian, bool tagged, int returns) {
 
 std::optional<ShotGrid> shot_grid(std::uint8_t device_type, std::uint8_t data_type) {
   if (data_type < 2) return kGrid100kHz;
-  if (data_type > kImuDataType) return kGrid240kHz;
   switch (device_type) {
     case 1:
-    case 6: return kGrid100kHz;
+    case 6:
+      return kGrid100kHz;
     case 2:
     case 3:
-    case 7: return kGrid240kHz;
-    default: return std::nullopt;
+    case 7:
+      return kGrid240kHz;
+    default:
+      break;
   }
+  if (data_type > kImuDataType) return kGrid240kHz;  // only the Avia has three returns
+  return std::nullopt;
 }
 
 void encode_packet_header(const Packet& packet, std::uint8_t* bytes) {
@@ -264,20 +269,28 @@ Packet decode_packet_header(const std::uint8_t* bytes) {
 
 TimeReference time_reference_of(std::uint8_t timestamp_type) {
   switch (timestamp_type) {
-    case 1: return TimeReference::ptp;
-    case 3: return TimeReference::utc;
-    case 4: return TimeReference::pps;
-    default: return TimeReference::power_on;
+    case 1:
+      return TimeReference::ptp;
+    case 3:
+      return TimeReference::utc;
+    case 4:
+      return TimeReference::pps;
+    default:
+      return TimeReference::power_on;
   }
 }
 
 std::uint8_t timestamp_type_of(TimeReference reference) {
   switch (reference) {
-    case TimeReference::ptp: return 1;
-    case TimeReference::utc: return 3;
-    case TimeReference::pps: return 4;
+    case TimeReference::ptp:
+      return 1;
+    case TimeReference::utc:
+      return 3;
+    case TimeReference::pps:
+      return 4;
     case TimeReference::relative:
-    case TimeReference::power_on: return 0;
+    case TimeReference::power_on:
+      return 0;
   }
   return 0;
 }
@@ -344,7 +357,8 @@ std::int64_t PacketClock::pps_time(std::int64_t since_edge_ns) {
     const std::int64_t seconds = (last_since_edge_ns_ - kDisorder + kSecond - 1) / kSecond;
     second_ns_ += std::max<std::int64_t>(seconds, 1) * kSecond;
     ++wraps_;
-  } else if (since_edge_ns < kSecond && -back > kSecond - kDisorder && second_ns_ > 0) {
+  } else if (last_since_edge_ns_ < kAfterEdge && -back > kSecond - kDisorder &&
+             since_edge_ns < kSecond && second_ns_ > 0) {
     return second_ns_ - kSecond + since_edge_ns;  // overtaken by the first packet of the second
   } else if (back > 0) {
     return second_ns_ + since_edge_ns;

@@ -23,8 +23,8 @@ inline constexpr std::uint8_t kImuDataType = 6;
 /// How a data type stores its points. All numbers are little-endian and packed.
 struct RecordLayout {
   bool cartesian, tagged;
-  std::uint8_t returns;          ///< per shot; 0 for the inertial sample
-  std::uint16_t records;         ///< per packet
+  std::uint8_t returns;   ///< per shot; 0 for the inertial sample
+  std::uint16_t records;  ///< per packet
   std::uint16_t bytes_per_record;
 
   std::size_t bytes() const { return std::size_t{records} * bytes_per_record; }
@@ -84,7 +84,7 @@ class PacketClock {
  private:
   std::int64_t pps_time(std::int64_t since_edge_ns);
 
-  std::int64_t second_ns_ = 0;          // time of the last PPS edge
+  std::int64_t second_ns_ = 0;  // time of the last PPS edge
   std::int64_t last_since_edge_ns_ = 0;
   std::uint64_t wraps_ = 0;
 };

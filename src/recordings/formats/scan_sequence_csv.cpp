@@ -37,8 +37,7 @@ float resolution_of(int decimals) {
 
 class ScanSequenceReader final : public TextTableReader {
  public:
-  explicit ScanSequenceReader(const std::string& path)
-      : TextTableReader(path, std::string(kName)) {
+  explicit ScanSequenceReader(const std::string& path) : TextTableReader(path, std::string(kName)) {
     if (table_header() != kHeader) refuse_header(std::string(kHeader));
     set_column_count(3);
     header_.has_range = header_.has_intensity = false;
@@ -105,8 +104,8 @@ class ScanSequenceReader final : public TextTableReader {
     if (!shot_numbers_) {
       time_ns = nanoseconds_of(row.time, kTimeColumn);
     } else if (row.time.decimals != 0) {
-      throw BadRow{fmt::format("expected a shot number in column {}, found \"{}\"", kTimeColumn,
-                               fields[0])};
+      throw BadRow{
+          fmt::format("expected a shot number in column {}, found \"{}\"", kTimeColumn, fields[0])};
     }
     azimuth_decimals_ = std::max(azimuth_decimals_, row.azimuth.decimals);
     zenith_decimals_ = std::max(zenith_decimals_, row.zenith.decimals);
@@ -184,9 +183,9 @@ class ScanSequenceWriter final : public Writer {
   void require_one_device(std::uint8_t device) {
     if (!device_) device_ = device;
     if (*device_ == device) return;
-    throw InvalidArgument(fmt::format(
-        "row {}: device {} after device {}; a scan sequence holds one sensor", rows_seen_, device,
-        *device_));
+    throw InvalidArgument(
+        fmt::format("row {}: device {} after device {}; a scan sequence holds one sensor",
+                    rows_seen_, device, *device_));
   }
 
   void append_row(const Observations& rows, std::size_t i) {

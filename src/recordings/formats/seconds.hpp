@@ -12,8 +12,7 @@ namespace risley::recordings {
 inline std::optional<std::int64_t> nanoseconds_from_seconds(double seconds) {
   if (!(std::abs(seconds) < 9.2e9)) return std::nullopt;
   const double whole = std::floor(seconds);
-  return static_cast<std::int64_t>(whole) * 1'000'000'000 +
-         std::llround((seconds - whole) * 1e9);
+  return static_cast<std::int64_t>(whole) * 1'000'000'000 + std::llround((seconds - whole) * 1e9);
 }
 
 /// The nearest double; from about 100 days on, where doubles are coarser than 1 ns, the fraction

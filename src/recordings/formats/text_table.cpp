@@ -10,8 +10,9 @@
 #include <cstring>
 #include <filesystem>
 
-#include "recordings/formats/seconds.hpp"
 #include "risley/core/error.hpp"
+
+#include "recordings/formats/seconds.hpp"
 
 namespace risley::recordings {
 namespace {
@@ -55,8 +56,8 @@ int decimals_of(std::string_view field) {
   const auto point = field.find('.');
   if (point == std::string_view::npos) return 0;
   const auto fraction = field.substr(point + 1);
-  const bool plain = std::all_of(fraction.begin(), fraction.end(),
-                                 [](char c) { return c >= '0' && c <= '9'; });
+  const bool plain =
+      std::all_of(fraction.begin(), fraction.end(), [](char c) { return c >= '0' && c <= '9'; });
   return plain ? static_cast<int>(fraction.size()) : 0;
 }
 
@@ -141,7 +142,8 @@ bool LineReader::next(std::string_view& line) {
 }
 
 Decimal decimal_field(std::string_view field, std::string_view column) {
-  constexpr std::size_t kMostDigits = 18;
+  constexpr std::size_t kMostDigits = 19;
+  constexpr std::int64_t kRoomForOneMore = INT64_MAX / 10 - 1;
   Decimal number;
   const char* c = field.data();
   const char* const end = c + field.size();
@@ -150,7 +152,7 @@ Decimal decimal_field(std::string_view field, std::string_view column) {
   std::size_t digit_count = 0;
   const char* point = nullptr;
   for (; c != end; ++c) {
-    if (*c >= '0' && *c <= '9' && digit_count < kMostDigits) {
+    if (*c >= '0' && *c <= '9' && digit_count < kMostDigits && number.digits <= kRoomForOneMore) {
       number.digits = number.digits * 10 + (*c - '0');
       ++digit_count;
     } else if (*c == '.' && point == nullptr) {
@@ -159,8 +161,9 @@ Decimal decimal_field(std::string_view field, std::string_view column) {
       break;
     }
   }
-  if (c == end && digit_count > 0) {
-    number.decimals = point != nullptr ? static_cast<int>(end - point - 1) : 0;
+  const std::ptrdiff_t decimals = point != nullptr ? end - point - 1 : 0;
+  if (c == end && digit_count > 0 && decimals < std::ssize(kPowersOfTen)) {
+    number.decimals = static_cast<int>(decimals);
     if (number.digits < kLargestExactDouble) {
       // Both are exact doubles, so the quotient is the nearest double.
       number.value = static_cast<double>(number.digits) /
@@ -342,9 +345,8 @@ void TextOutput::append_digits(std::uint64_t digits, int decimals, bool negative
 }
 
 void TextOutput::append_fixed(double value, int decimals) {
-  const double scaled =
-      std::nearbyint(std::abs(value) * static_cast<double>(
-                                           kPowersOfTen[static_cast<std::size_t>(decimals)]));
+  const double scaled = std::nearbyint(
+      std::abs(value) * static_cast<double>(kPowersOfTen[static_cast<std::size_t>(decimals)]));
   if (scaled < static_cast<double>(kLargestExactDouble)) {
     append_digits(static_cast<std::uint64_t>(scaled), decimals, std::signbit(value));
   } else {

@@ -96,6 +96,8 @@ class TextTableReader : public Reader {
   /// @throws FileError at line 1: what was expected there
   [[noreturn]] void refuse_header(const std::string& expected) const;
 
+  std::uint64_t line_number() const { return lines_.line_number(); }
+
   /// Adds the observations of one row. Must not change the chunk when it throws BadRow.
   virtual void append_row(Fields fields, Chunk& chunk) = 0;
 

@@ -1,0 +1,123 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "command.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <csignal>
+#include <cstdio>
+#include <cstdlib>
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include "risley/core/error.hpp"
+
+namespace risley::app {
+namespace {
+
+volatile std::sig_atomic_t interrupted = 0;
+
+void note_signal(int) { interrupted = 1; }
+
+double number_from(const std::string& text, std::string_view name) {
+  char* end = nullptr;
+  const double value = std::strtod(text.c_str(), &end);
+  if (text.empty() || *end != '\0' || !std::isfinite(value)) {
+    throw InvalidArgument(fmt::format("{} = '{}', expected a number", name, text));
+  }
+  return value;
+}
+
+std::string duration_text(double seconds) {
+  const int whole = static_cast<int>(std::min(seconds, 359999.0) + 0.5);
+  if (whole < 60) return fmt::format("{} s", whole);
+  if (whole < 3600) return fmt::format("{} min {:02} s", whole / 60, whole % 60);
+  return fmt::format("{} h {:02} min", whole / 3600, whole / 60 % 60);
+}
+
+}  // namespace
+
+void watch_signals() {
+  std::signal(SIGINT, note_signal);
+  std::signal(SIGTERM, note_signal);
+}
+
+void check_interrupt() {
+  if (interrupted != 0) throw Interrupted();
+}
+
+double now() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+ProgressBar::ProgressBar(std::string_view label, const CommonOptions& common)
+    : label_(label), visible_(!common.quiet && isatty(STDERR_FILENO) != 0), started_(now()) {}
+
+ProgressBar::~ProgressBar() {
+  if (visible_ && shown_ >= 0) std::fputs("\r\033[K", stderr);
+}
+
+Progress ProgressBar::callback() {
+  return [this](double fraction) { show(fraction); };
+}
+
+void ProgressBar::show(double fraction) {
+  check_interrupt();
+  const double time = now();
+  if (!visible_ || time - shown_ < 0.1) return;  // ten times a second is smooth enough
+  shown_ = time;
+  constexpr int kWidth = 30;
+  const double done = std::clamp(fraction, 0.0, 1.0);
+  const int filled = static_cast<int>(done * kWidth);
+  const double elapsed = time - started_;
+  const std::string remaining =
+      done > 0.01 && elapsed > 1 ? duration_text(elapsed * (1 - done) / done) + " left" : "";
+  fmt::print(stderr, "\r\033[K{} [{:=<{}}{: <{}}] {:3.0f} % {}", label_, "", filled, "",
+             kWidth - filled, 100 * done, remaining);
+  std::fflush(stderr);
+}
+
+std::pair<std::string, double> split_assignment(const std::string& text) {
+  const std::size_t equals = text.find('=');
+  if (equals == std::string::npos || equals == 0) {
+    throw InvalidArgument(fmt::format("'{}', expected NAME=VALUE", text));
+  }
+  const std::string name = text.substr(0, equals);
+  return {name, number_from(text.substr(equals + 1), name)};
+}
+
+std::pair<std::string, double> parameter_assignment(const std::string& text, int prisms) {
+  auto [name, value] = split_assignment(text);
+  const ParameterInfo& parameter = find_parameter(name, prisms);
+  value *= parameter.si_per_unit;
+  check_bounds(parameter, value);
+  return {name, value};
+}
+
+double positive_number(const std::string& text, std::string_view option, std::string_view unit) {
+  const double value = number_from(text, option);
+  check_positive(value, option, unit);
+  return value;
+}
+
+void check_positive(double value, std::string_view option, std::string_view unit) {
+  if (!(value > 0) || !std::isfinite(value)) {
+    throw InvalidArgument(fmt::format("{} = {} {}, allowed above 0", option, value, unit));
+  }
+}
+
+void check_not_negative(double value, std::string_view option, std::string_view unit) {
+  if (!(value >= 0) || !std::isfinite(value)) {
+    throw InvalidArgument(fmt::format("{} = {} {}, allowed 0 and above", option, value, unit));
+  }
+}
+
+void print_json(const Json& object) {
+  // Serial numbers come from files and may hold bytes that are no UTF-8.
+  const std::string text = object.dump(2, ' ', false, Json::error_handler_t::replace);
+  fmt::print("{}\n", text);
+}
+
+}  // namespace risley::app

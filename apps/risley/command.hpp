@@ -1,0 +1,98 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include "risley/core/progress.hpp"
+#include "risley/optics/parameters.hpp"
+
+namespace risley::app {
+
+using Json = nlohmann::ordered_json;
+
+/// What the shell sees.
+enum ExitStatus : int {
+  kDone = 0,
+  kNumbersFailed = 1,
+  kWrongUsage = 2,
+  kBadFile = 3,
+  kInterrupted = 130,  ///< 128 + SIGINT, as shells have it
+};
+
+/// Options that every verb has.
+struct CommonOptions {
+  bool json = false;
+  bool quiet = false;
+  bool verbose = false;
+  int threads = 0;  ///< 0: all cores
+  std::uint64_t seed = 0;
+  std::string command;  ///< as typed, quoted for a shell
+};
+
+/// Does the work of a verb and prints its result.
+using Run = std::function<ExitStatus(const CommonOptions&)>;
+
+/// Each declares its options and gives what runs it.
+Run declare_info(CLI::App& verb);
+Run declare_convert(CLI::App& verb);
+Run declare_simulate(CLI::App& verb);
+Run declare_estimate(CLI::App& verb);
+
+/// The user pressed Ctrl-C, or the system asked to end.
+class Interrupted : public std::runtime_error {
+ public:
+  Interrupted() : std::runtime_error("interrupted") {}
+};
+
+/// From now on SIGINT and SIGTERM are noticed by check_interrupt, so that every output in the
+/// making is removed by its owner.
+void watch_signals();
+/// @throws Interrupted
+void check_interrupt();
+
+/// A bar with the remaining time on stderr, only on a terminal and not with --quiet. The bar is
+/// gone when the object is.
+class ProgressBar {
+ public:
+  ProgressBar(std::string_view label, const CommonOptions& common);
+  ~ProgressBar();
+  ProgressBar(const ProgressBar&) = delete;
+  ProgressBar& operator=(const ProgressBar&) = delete;
+
+  /// For a library function; also the place where an interrupt is noticed.
+  Progress callback();
+  void show(double fraction);
+
+ private:
+  std::string label_;
+  bool visible_;
+  double started_, shown_ = -1.0;
+};
+
+/// Seconds on a clock that never jumps.
+double now();
+
+/// "NAME=VALUE" with a value in the unit of the name. @throws InvalidArgument
+std::pair<std::string, double> split_assignment(const std::string& text);
+/// As split_assignment, as SI. @throws InvalidArgument also for unknown names and out of bounds
+std::pair<std::string, double> parameter_assignment(const std::string& text, int prisms);
+
+/// A value of --rate-hz and the like. @throws InvalidArgument naming the option
+double positive_number(const std::string& text, std::string_view option, std::string_view unit);
+/// @throws InvalidArgument unless the value is finite and above (or at) zero
+void check_positive(double value, std::string_view option, std::string_view unit);
+void check_not_negative(double value, std::string_view option, std::string_view unit);
+
+/// Prints one JSON object and a line feed on stdout.
+void print_json(const Json& object);
+
+}  // namespace risley::app

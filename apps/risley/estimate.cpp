@@ -1,0 +1,434 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include <algorithm>
+#include <filesystem>
+#include <memory>
+#include <optional>
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include "risley/core/angle.hpp"
+#include "risley/core/error.hpp"
+#include "risley/core/output_file.hpp"
+#include "risley/estimation/evaluation.hpp"
+#include "risley/recordings/time_audit.hpp"
+#include "risley/report/estimate_page.hpp"
+#include "risley/report/number_text.hpp"
+#include "risley/report/states_file.hpp"
+#include "risley/sensors/preset.hpp"
+
+#include "command.hpp"
+#include "recording_text.hpp"
+#include "table.hpp"
+
+namespace risley::app {
+namespace {
+
+using estimation::Estimate;
+using estimation::Evaluation;
+
+constexpr double kPaperProcessNoiseDeg = 850;  // deg/s per sqrt(s)  [B21 section 2.4]
+constexpr const char* kDefaultRate = "1000";
+
+struct EstimateCommandOptions {
+  std::string input, folder, method = "ekf", rate_hz = kDefaultRate, sensor, states = "knots",
+                             mirror = "auto", process_noise = "auto", truth;
+  std::optional<double> noise_angle_deg;
+  std::vector<std::string> fixed, freed;
+};
+
+/// What reading the recording leaves.
+struct ReadResult {
+  std::unique_ptr<recordings::Reader> reader;
+  recordings::TimeAuditResult audit;
+  estimation::ShotSelector selector;
+  double seconds = 0;
+};
+
+ReadResult read_recording(const EstimateCommandOptions& options, const CommonOptions& common) {
+  const double started = now();
+  estimation::SelectionOptions selection;
+  if (options.rate_hz != "full") {
+    selection.rate = positive_number(options.rate_hz, "--rate-hz", "Hz");
+  }
+  ReadResult result{recordings::open_recording(options.input), {},
+                    estimation::ShotSelector(selection)};
+  if (result.reader->header().devices.size() > 1) {
+    throw InvalidArgument(fmt::format(
+        "{} holds {} sensors, an estimation takes the recording of one", options.input,
+        result.reader->header().devices.size()));
+  }
+  ProgressBar bar("reading", common);
+  recordings::TimeAudit audit;
+  recordings::Chunk chunk;
+  while (result.reader->read(chunk)) {
+    audit.add(chunk);
+    result.selector.add(chunk.observations);
+    bar.show(result.reader->fraction_read());
+  }
+  result.audit = audit.result();
+  result.seconds = now() - started;
+  return result;
+}
+
+/// The built-in preset of the instrument that made a recording.
+sensors::Sensor sensor_of_recording(const recordings::RecordingHeader& header) {
+  const std::uint8_t type = header.devices.front().type;
+  std::optional<sensors::Sensor> found;
+  for (const std::string& name : sensors::builtin_preset_names()) {
+    sensors::Sensor sensor = sensors::load_sensor(name);
+    // Presets of single units and of reversed rotors have longer names than that of the type.
+    if (sensor.device_type == type && (!found || name.size() < found->name.size())) {
+      found = std::move(sensor);
+    }
+  }
+  if (!found) {
+    throw InvalidArgument(
+        fmt::format("no built-in preset for the recording's sensor ({}): say which with --sensor",
+                    recordings::device_type_name(type)));
+  }
+  return *found;
+}
+
+std::vector<estimation::RotorProcess> rotor_process(const std::string& text, int prisms) {
+  if (text == "auto") return {};
+  estimation::RotorProcess process;
+  process.acceleration = radians_from_degrees(
+      text == "paper" ? kPaperProcessNoiseDeg
+                      : positive_number(text, "--process-noise", "deg/s per sqrt(s)"));
+  return std::vector<estimation::RotorProcess>(static_cast<std::size_t>(prisms), process);
+}
+
+estimation::EstimateOptions estimate_options(const EstimateCommandOptions& options,
+                                             const recordings::RecordingHeader& header) {
+  estimation::EstimateOptions result;
+  result.sensor = options.sensor.empty() ? sensor_of_recording(header)
+                                         : sensors::load_sensor(options.sensor);
+  const int prisms = result.sensor.prisms();
+  if (options.noise_angle_deg) {
+    check_positive(*options.noise_angle_deg, "--noise-angle-deg", "deg");
+    result.angle_noise = radians_from_degrees(*options.noise_angle_deg);
+  }
+  for (const std::string& text : options.fixed) {
+    if (text.find('=') == std::string::npos) {
+      find_parameter(text, prisms);
+      result.fixed.push_back(text);
+      continue;
+    }
+    const auto [name, value] = parameter_assignment(text, prisms);
+    if (find_parameter(name, prisms).kind != ParameterKind::train) {
+      throw InvalidArgument(fmt::format("--fix {}: only parameters of the prisms can be held", name));
+    }
+    result.sensor.set(name, value);
+    result.fixed.push_back(name);
+  }
+  result.additional = options.freed;
+  result.rotor_process = rotor_process(options.process_noise, prisms);
+  if (options.mirror != "auto") result.mirrored = options.mirror == "yes";
+  return result;
+}
+
+/// Truth files by the name of the YAML one; the columns stand beside it.
+Evaluation evaluate_with(const std::string& truth_path, const Estimate& estimate) {
+  const std::filesystem::path preset(truth_path);
+  if (preset.extension() != ".yaml") {
+    throw InvalidArgument(fmt::format("--truth = {}, expected OUT.truth.yaml", truth_path));
+  }
+  const sensors::Sensor sensor = sensors::load_sensor(truth_path);
+  const recordings::TruthColumns columns =
+      recordings::load_truth(std::filesystem::path(preset).replace_extension(".nc").string());
+  return estimation::evaluate(estimate, sensor, columns);
+}
+
+double in_file_unit(const std::string& name, double value, int prisms) {
+  return value / find_parameter(name, prisms).si_per_unit;
+}
+
+Json moments_json(const estimation::Moments& moments) {
+  return {{"mean", degrees_from_radians(moments.mean)},
+          {"std", degrees_from_radians(moments.std)},
+          {"rms", degrees_from_radians(moments.rms)},
+          {"skewness", moments.skewness},
+          {"kurtosis", moments.kurtosis}};
+}
+
+Json evaluation_json(const Evaluation& evaluation, int prisms) {
+  Json parameters = Json::object(), rmse = Json::object();
+  for (const estimation::TruthComparison& one : evaluation.parameters) {
+    parameters[one.name] = {{"true", in_file_unit(one.name, one.truth, prisms)},
+                            {"error", in_file_unit(one.name, one.error, prisms)},
+                            {"error_over_sigma", one.error_over_sigma}};
+  }
+  for (std::size_t i = 0; i < evaluation.rotation_angle_rmse.size(); ++i) {
+    rmse[std::string(1, prism_letter(static_cast<int>(i)))] =
+        degrees_from_radians(evaluation.rotation_angle_rmse[i]);
+  }
+  return {{"parameters", parameters},
+          {"rotation_angle_rmse_deg", rmse},
+          {"nees_parameters", evaluation.nees_parameters},
+          {"nees_rotation_angles", evaluation.nees_rotation_angles}};
+}
+
+Json start_json(const estimation::Start& start) {
+  Json angles = Json::object(), speeds = Json::object();
+  for (std::size_t i = 0; i < start.rotation_angle.size(); ++i) {
+    const std::string letter(1, prism_letter(static_cast<int>(i)));
+    angles[letter] = degrees_from_radians(start.rotation_angle[i]);
+    speeds[letter] = degrees_from_radians(start.angular_velocity[i]);
+  }
+  return {{"method", start.method},
+          {"time_ns", start.time_ns},
+          {"rotation_angle_deg", angles},
+          {"angular_velocity_deg_per_s", speeds},
+          {"residual_rms_deg", degrees_from_radians(start.residual_rms)}};
+}
+
+/// Parameters of the prisms that the estimation did not touch.
+Json fixed_json(const Estimate& estimate) {
+  std::vector<int> free_places;
+  for (const estimation::FreeParameter& free : estimate.filter.free) {
+    free_places.insert(free_places.end(), free.places.begin(), free.places.end());
+  }
+  Json object = Json::object();
+  for (const ParameterInfo& info : parameter_list(estimate.sensor.prisms())) {
+    if (info.kind != ParameterKind::train || info.places.size() > 1) continue;
+    if (std::find(free_places.begin(), free_places.end(), info.places.front()) !=
+        free_places.end()) {
+      continue;
+    }
+    object[info.name] = estimate.sensor.get(info.name) / info.si_per_unit;
+  }
+  return object;
+}
+
+/// Everything one run of the verb found.
+struct Outcome {
+  Estimate estimate;
+  std::optional<Evaluation> evaluation;
+  std::vector<std::string> warnings;  ///< of the recording
+  double read_s = 0, solve_s = 0, total_s = 0;
+};
+
+Json outcome_json(const Outcome& outcome) {
+  const Estimate& e = outcome.estimate;
+  const int prisms = e.sensor.prisms();
+  Json parameters = Json::object();
+  for (const estimation::EstimatedValue& value : e.values) {
+    parameters[value.name] = {{"value", in_file_unit(value.name, value.value, prisms)},
+                              {"sigma", in_file_unit(value.name, value.sigma, prisms)}};
+  }
+  Json rotors = Json::array();
+  for (const estimation::RotorProcess& process : e.filter.rotor_process) {
+    rotors.push_back(degrees_from_radians(process.acceleration));
+  }
+  std::vector<std::string> warnings = outcome.warnings;
+  warnings.insert(warnings.end(), e.warnings.begin(), e.warnings.end());
+  Json object = {{"converged", e.converged},
+                 {"reason", e.reason},
+                 {"method", e.method},
+                 {"observations_used", e.filter.states.size()},
+                 {"outliers", e.filter.outliers},
+                 {"combination", nullptr},
+                 {"mirrored", e.mirrored},
+                 {"parameters", parameters},
+                 {"fixed", fixed_json(e)},
+                 {"residuals",
+                  {{"azimuth_deg", moments_json(e.azimuth_residuals)},
+                   {"zenith_deg", moments_json(e.zenith_residuals)},
+                   {"expected_rms_deg", degrees_from_radians(e.expected_residual)}}},
+                 {"noise_angle_deg", degrees_from_radians(e.angle_noise)},
+                 {"process_noise_deg_per_s_per_sqrt_s", rotors},
+                 {"start", start_json(e.start)},
+                 {"warnings", warnings},
+                 {"seconds",
+                  {{"read", outcome.read_s}, {"solve", outcome.solve_s}, {"total", outcome.total_s}}}};
+  if (e.sensor.combination) object["combination"] = static_cast<int>(*e.sensor.combination);
+  if (outcome.evaluation) object["truth"] = evaluation_json(*outcome.evaluation, prisms);
+  return object;
+}
+
+void print_outcome(const Outcome& outcome) {
+  const Estimate& e = outcome.estimate;
+  const int prisms = e.sensor.prisms();
+  fmt::print("{}\n", e.converged ? "converged" : "NOT CONVERGED: " + e.reason);
+  fmt::print("{} shots used, {} of them outliers{}; read {:.2f} s, solved {:.2f} s\n\n",
+             grouped(e.filter.states.size()), grouped(e.filter.outliers),
+             (e.sensor.combination ? fmt::format(", speed combination {}",
+                                                 static_cast<int>(*e.sensor.combination))
+                                   : std::string()) +
+                 (e.mirrored ? ", mirrored" : ""),
+             outcome.read_s, outcome.solve_s);
+  std::vector<std::string> head = {"parameter", "value", "+- sigma", "unit"};
+  if (outcome.evaluation) head.insert(head.end(), {"truth", "error", "error/sigma"});
+  Table table(head);
+  for (const estimation::EstimatedValue& value : e.values) {
+    const double sigma = in_file_unit(value.name, value.sigma, prisms);
+    const report::NumberText text =
+        report::number_text(in_file_unit(value.name, value.value, prisms), sigma);
+    std::vector<std::string> row = {value.name, text.value, text.sigma,
+                                    find_parameter(value.name, prisms).unit};
+    if (outcome.evaluation) {
+      for (const estimation::TruthComparison& one : outcome.evaluation->parameters) {
+        if (one.name != value.name) continue;
+        row.push_back(report::text_to_place_of(in_file_unit(one.name, one.truth, prisms), sigma));
+        row.push_back(report::text_to_place_of(in_file_unit(one.name, one.error, prisms), sigma));
+        row.push_back(fmt::format("{:.2f}", one.error_over_sigma));
+      }
+    }
+    table.add(row);
+  }
+  table.print();
+  fmt::print("\n");
+  Table residuals({"residual", "mean deg", "std deg", "rms deg", "skewness", "excess kurtosis"});
+  const auto add = [&residuals](const char* name, const estimation::Moments& m) {
+    residuals.add({name, fmt::format("{:.6f}", degrees_from_radians(m.mean)),
+                   fmt::format("{:.6f}", degrees_from_radians(m.std)),
+                   fmt::format("{:.6f}", degrees_from_radians(m.rms)),
+                   fmt::format("{:.3f}", m.skewness), fmt::format("{:.3f}", m.kurtosis)});
+  };
+  add("azimuth", e.azimuth_residuals);
+  add("zenith", e.zenith_residuals);
+  residuals.print();
+  if (outcome.evaluation) {
+    fmt::print("\nrotation angle rmse:");
+    for (std::size_t i = 0; i < outcome.evaluation->rotation_angle_rmse.size(); ++i) {
+      fmt::print(" {} {:.5f} deg", prism_letter(static_cast<int>(i)),
+                 degrees_from_radians(outcome.evaluation->rotation_angle_rmse[i]));
+    }
+    fmt::print("\nNEES per degree of freedom (1 is honest): parameters {:.3g}, rotation angles {:.3g}\n",
+               outcome.evaluation->nees_parameters, outcome.evaluation->nees_rotation_angles);
+  }
+}
+
+/// calibration.yaml, states.nc and report.html.
+void write_folder(const EstimateCommandOptions& options, const CommonOptions& common,
+                  const ReadResult& input, const sensors::Sensor& nominal, const Outcome& outcome) {
+  namespace fs = std::filesystem;
+  const std::vector<std::pair<std::string, std::string>> provenance = {
+      {"command", common.command},
+      {"version", RISLEY_VERSION},
+      {"seed", std::to_string(common.seed)},
+      {"input", options.input},
+      {"input_sha256", sha256_of_file(options.input)}};
+  const auto path = [&](const char* name) { return (fs::path(options.folder) / name).string(); };
+  sensors::Sensor calibrated = outcome.estimate.sensor;
+  calibrated.provenance = provenance;
+  write_text_file(path("calibration.yaml"), sensors::preset_text(calibrated));
+  if (options.states != "none") {
+    report::write_states(path("states.nc"), outcome.estimate.filter.states, provenance);
+  }
+  write_text_file(path("report.html"),
+                  report::estimate_page({outcome.estimate, nominal, outcome.evaluation,
+                                         input.selector.head(),
+                                         fs::path(options.input).filename().string(),
+                                         input.reader->header().format, input.audit.observations,
+                                         input.audit.duration_s, provenance, outcome.warnings}));
+}
+
+/// Wrong wishes are told before an hour of reading.
+void check_options(const EstimateCommandOptions& options) {
+  if (options.method != "ekf") {
+    throw InvalidArgument("--method map is not available in this version, allowed: ekf");
+  }
+  if (options.states == "all" && options.rate_hz != "full") {
+    throw InvalidArgument(
+        "--states all needs --rate-hz full: the filter has states at the shots it uses only");
+  }
+  if (options.folder.empty()) return;
+  std::error_code code;
+  std::filesystem::create_directories(options.folder, code);
+  if (code || !std::filesystem::is_directory(options.folder)) {
+    throw FileError(options.folder, {},
+                    fmt::format("cannot be made a folder: {}",
+                                code ? code.message() : "a file has this name"));
+  }
+}
+
+ExitStatus run_estimate(const EstimateCommandOptions& options, const CommonOptions& common) {
+  const double started = now();
+  check_options(options);
+  const ReadResult input = read_recording(options, common);
+  const estimation::EstimateOptions settings = estimate_options(options, input.reader->header());
+  const estimation::SelectionCounts& counts = input.selector.counts();
+  spdlog::debug("{} observations of format {}, {} without a direction, {} out of order; {} shots used "
+                "with sensor {}",
+                counts.rows, input.reader->header().format, counts.invalid, counts.out_of_order,
+                input.selector.series().size(), settings.sensor.name);
+  Outcome outcome;
+  outcome.warnings = warning_texts(input.reader->warnings());
+  if (input.audit.time_resets > 0) {
+    outcome.warnings.push_back(fmt::format(
+        "the clock of the recording jumps {} times: only what lies after the highest time so far "
+        "is used", input.audit.time_resets));
+  }
+  outcome.read_s = input.seconds;
+  const double solving = now();
+  {
+    ProgressBar bar("estimating", common);
+    outcome.estimate = estimation::estimate_with_ekf(
+        input.selector.series(), input.selector.head(), settings, bar.callback());
+  }
+  outcome.solve_s = now() - solving;
+  const estimation::Start& start = outcome.estimate.start;
+  spdlog::debug("start by {}: residuals of {:.3g} deg", start.method,
+                degrees_from_radians(start.residual_rms));
+  if (!options.truth.empty()) outcome.evaluation = evaluate_with(options.truth, outcome.estimate);
+  if (!options.folder.empty()) {
+    write_folder(options, common, input, settings.sensor, outcome);
+  }
+  outcome.total_s = now() - started;
+  const Estimate& e = outcome.estimate;
+  for (const std::string& warning : outcome.warnings) spdlog::warn(warning);
+  for (const std::string& warning : e.warnings) spdlog::warn(warning);
+  if (!e.converged) spdlog::error("not converged: {}", e.reason);
+  if (common.json) {
+    print_json(outcome_json(outcome));
+  } else {
+    print_outcome(outcome);
+  }
+  return e.converged ? kDone : kNumbersFailed;
+}
+
+}  // namespace
+
+Run declare_estimate(CLI::App& verb) {
+  const auto options = std::make_shared<EstimateCommandOptions>();
+  EstimateCommandOptions& o = *options;
+  verb.add_option("INPUT", o.input, "Recording of one sensor, of any known format")->required();
+  verb.add_option("-o,--output", o.folder,
+                  "Folder for calibration.yaml, states.nc and report.html");
+  verb.add_option("--method", o.method, "ekf: the paper's two filters and their combination")
+      ->check(CLI::IsMember({"ekf", "map"}))
+      ->capture_default_str();
+  verb.add_option("--rate-hz", o.rate_hz, "Shots per second to use, or 'full' for all")
+      ->capture_default_str();
+  verb.add_option("--noise-angle-deg", o.noise_angle_deg,
+                  "1 sigma of azimuth and zenith before rounding (default: the sensor's)");
+  verb.add_option("--sensor", o.sensor,
+                  "Preset by name, or a preset or calibration file (default: from the recording)");
+  verb.add_option("--fix", o.fixed, "Hold a parameter, at a value if one is given (repeatable)")
+      ->type_name("NAME[=VALUE]")
+      ->expected(1)
+      ->take_all();
+  verb.add_option("--free", o.freed, "Estimate one more parameter (repeatable)")
+      ->type_name("NAME")
+      ->expected(1)
+      ->take_all();
+  verb.add_option("--states", o.states,
+                  "Which rotor states to write: at the shots used, at all shots, none")
+      ->check(CLI::IsMember({"knots", "all", "none"}))
+      ->capture_default_str();
+  verb.add_option("--mirror", o.mirror,
+                  "Whether the elevation in the file has the opposite sign; auto finds out")
+      ->check(CLI::IsMember({"auto", "yes", "no"}))
+      ->capture_default_str();
+  verb.add_option("--process-noise", o.process_noise,
+                  "Random walk of the speeds in deg/s per sqrt(s): auto (maximum likelihood), paper "
+                  "(850) or a number")
+      ->capture_default_str();
+  verb.add_option("--truth", o.truth, "OUT.truth.yaml of a simulation, to judge the estimate by");
+  return [options](const CommonOptions& common) { return run_estimate(*options, common); };
+}
+
+}  // namespace risley::app

@@ -1,0 +1,164 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include <algorithm>
+#include <cstring>
+#include <map>
+#include <memory>
+#include <optional>
+
+#include <fmt/format.h>
+#include <spdlog/sinks/stdout_color_sinks.h>
+#include <spdlog/spdlog.h>
+#include <tbb/global_control.h>
+
+#include "risley/core/error.hpp"
+
+#include "command.hpp"
+
+namespace risley::app {
+namespace {
+
+struct Verb {
+  const char* name;
+  const char* description;
+  const char* example;
+  Run (*declare)(CLI::App& verb);
+};
+
+constexpr Verb kVerbs[] = {
+    {"info", "What a recording holds, with an audit of its times",
+     "  risley info recording.lvx\n  risley info recording.lvx --json", declare_info},
+    {"convert", "One recording format into another, by the ending of the output",
+     "  risley convert recording.lvx -o recording.csv", declare_convert},
+    {"simulate", "A recording whose truth is known",
+     "  risley simulate -o room.lvx --sensor mid-40 --scene data/room.yaml --duration-s 10\n"
+     "  risley simulate -o unit.csv --rate-hz 1000 --set prism_tilt_a_vertical_deg=0.1 --seed 7",
+     declare_simulate},
+    {"estimate", "The sensor's parameters and rotation angles from one recording",
+     "  risley estimate recording.lvx -o result/\n"
+     "  risley estimate unit.csv --truth unit.csv.truth.yaml --json",
+     declare_estimate},
+};
+
+void add_common_options(CLI::App& verb, CommonOptions& common) {
+  const std::string group = "Common options";
+  verb.add_flag("--json", common.json, "Print exactly one JSON object on stdout")->group(group);
+  verb.add_option("--threads", common.threads, "Number of threads (default: all cores)")
+      ->check(CLI::Range(1, 4096))
+      ->group(group);
+  verb.add_option("--seed", common.seed, "Seed of everything random (default 0)")->group(group);
+  auto* quiet = verb.add_flag("--quiet", common.quiet, "No progress bar and no warnings on stderr")
+                    ->group(group);
+  verb.add_flag("--verbose", common.verbose, "Say more on stderr")->excludes(quiet)->group(group);
+}
+
+/// The command as it could be typed again.
+std::string shell_text(int argc, char** argv) {
+  std::string command = "risley";
+  constexpr std::string_view kPlain =
+      "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-+=.,:/@%";
+  for (int i = 1; i < argc; ++i) {
+    const std::string_view word = argv[i];
+    command += ' ';
+    if (!word.empty() && word.find_first_not_of(kPlain) == std::string_view::npos) {
+      command += word;
+      continue;
+    }
+    command += '\'';
+    for (const char c : word) command += c == '\'' ? std::string("'\\''") : std::string(1, c);
+    command += '\'';
+  }
+  return command;
+}
+
+/// Tells of an error: words on stderr, and with --json an object on stdout.
+ExitStatus fail(ExitStatus status, const std::string& message, bool json, Json details = {}) {
+  spdlog::error(message);
+  if (json) {
+    Json object = {{"error", message}, {"exit_status", static_cast<int>(status)}};
+    if (details.is_object()) object.update(details);
+    print_json(object);
+  }
+  return status;
+}
+
+ExitStatus run_verb(const Run& run, const CommonOptions& common) {
+  try {
+    return run(common);
+  } catch (const InvalidArgument& error) {
+    return fail(kWrongUsage, error.what(), common.json);
+  } catch (const FileError& error) {
+    Json details = {{"file", error.path()}};
+    if (error.place().byte_offset) details["byte_offset"] = *error.place().byte_offset;
+    if (error.place().line) details["line"] = *error.place().line;
+    return fail(kBadFile, error.what(), common.json, details);
+  } catch (const EstimationError& error) {
+    return fail(kNumbersFailed, error.what(), common.json,
+                {{"converged", false}, {"reason", error.what()}});
+  } catch (const Interrupted& error) {
+    return fail(kInterrupted, error.what(), common.json);
+  } catch (const std::exception& error) {  // out of memory, a bug: nothing the user did
+    return fail(kNumbersFailed, fmt::format("internal error: {}", error.what()), common.json);
+  }
+}
+
+/// What was wrong, in words; CLI11 would not name an unknown verb.
+std::string usage_error(const CLI::ParseError& error, int argc, char** argv) {
+  const std::string_view first = argc > 1 ? argv[1] : "-";
+  std::string known;
+  for (const Verb& verb : kVerbs) {
+    if (first == verb.name) return fmt::format("{} (see risley {} --help)", error.what(), first);
+    known += fmt::format("{}{}", known.empty() ? "" : ", ", verb.name);
+  }
+  if (first.starts_with('-')) return fmt::format("{} (see risley --help)", error.what());
+  return fmt::format("unknown verb '{}', known: {}", first, known);
+}
+
+ExitStatus run_command(int argc, char** argv) {
+  CLI::App app("Observation model, simulator and estimator for Risley-prism lidars", "risley");
+  app.set_version_flag("--version", "risley " RISLEY_VERSION);
+  app.require_subcommand(1);
+  app.footer("Exit status: 0 done, 1 the numbers failed, 2 wrong usage, 3 a file is bad.\n"
+             "risley VERB --help tells more.");
+  CommonOptions common;
+  common.command = shell_text(argc, argv);
+  std::map<const CLI::App*, Run> runs;
+  for (const Verb& verb : kVerbs) {
+    CLI::App& sub = *app.add_subcommand(verb.name, verb.description);
+    runs[&sub] = verb.declare(sub);
+    add_common_options(sub, common);
+    sub.footer(fmt::format("Example:\n{}", verb.example));
+  }
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    if (error.get_exit_code() == 0) {  // --help, --version
+      app.exit(error);
+      return kDone;
+    }
+    const bool json = std::any_of(argv + 1, argv + argc,
+                                  [](const char* word) { return std::strcmp(word, "--json") == 0; });
+    return fail(kWrongUsage, usage_error(error, argc, argv), json);
+  }
+  if (common.quiet) spdlog::set_level(spdlog::level::err);
+  if (common.verbose) spdlog::set_level(spdlog::level::debug);
+  std::optional<tbb::global_control> limit;
+  if (common.threads > 0) {
+    limit.emplace(tbb::global_control::max_allowed_parallelism,
+                  static_cast<std::size_t>(common.threads));
+  }
+  return run_verb(runs.at(app.get_subcommands().front()), common);
+}
+
+}  // namespace
+}  // namespace risley::app
+
+int main(int argc, char** argv) {
+  const auto log = spdlog::stderr_color_mt("risley");
+  log->set_pattern("risley: %^%l%$: %v");
+  log->set_level(spdlog::level::trace);
+  spdlog::set_default_logger(log);
+  spdlog::set_level(spdlog::level::warn);
+  risley::app::watch_signals();
+  return risley::app::run_command(argc, argv);
+}

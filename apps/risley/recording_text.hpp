@@ -1,0 +1,31 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "risley/core/error.hpp"
+#include "risley/recordings/reader.hpp"
+
+#include "command.hpp"
+
+namespace risley::app {
+
+/// Commercial name of the sensor that made a recording; of several, each once.
+std::string sensor_name(const recordings::RecordingHeader& header);
+
+/// What a reader warned of, as "message (place)".
+std::vector<std::string> warning_texts(const std::vector<recordings::ReadWarning>& warnings);
+Json warnings_json(const std::vector<recordings::ReadWarning>& warnings);
+/// The same on stderr.
+void log_warnings(const std::vector<recordings::ReadWarning>& warnings);
+
+/// The keys that tell of damage in the body of a file.
+Json damage_json(const FileError& damage);
+
+/// 1234567 as "1 234 567".
+std::string grouped(std::uint64_t number);
+
+}  // namespace risley::app

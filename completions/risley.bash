@@ -1,0 +1,66 @@
+# SPDX-FileCopyrightText: 2026 The risley authors
+# SPDX-License-Identifier: MIT
+# Completion of the risley command for bash. The test cli.completion_test fails when an option of
+# the command is missing here.
+_risley() {
+  local current=${COMP_WORDS[COMP_CWORD]} previous=${COMP_WORDS[COMP_CWORD-1]}
+  local verbs="info convert simulate estimate"
+  local common="--help --json --threads --seed --quiet --verbose"
+  local names="refractive_index_air refractive_index refractive_index_a refractive_index_b
+    wedge_angle_deg wedge_angle_a_deg wedge_angle_b_deg
+    incident_beam_horizontal_deg incident_beam_vertical_deg
+    bearing_tilt_a_horizontal_deg bearing_tilt_a_vertical_deg
+    prism_tilt_a_horizontal_deg prism_tilt_a_vertical_deg
+    prism_tilt_b_horizontal_deg prism_tilt_b_vertical_deg"
+  local speeds="angular_velocity_a_deg_per_s angular_velocity_b_deg_per_s"
+  local verb="" word
+  for word in "${COMP_WORDS[@]:1:COMP_CWORD-1}"; do
+    case " $verbs " in *" $word "*) verb=$word; break ;; esac
+  done
+
+  local choices=""
+  case $previous in
+    --quantize) choices="yes no" ;;
+    --rotor) choices="constant sinusoidal hunting random-walk" ;;
+    --method) choices="ekf" ;;
+    --states) choices="knots all none" ;;
+    --mirror) choices="auto yes no" ;;
+    --process-noise) choices="auto paper" ;;
+    --rate-hz) [ "$verb" = estimate ] && choices="full" ;;
+    --fix | --free) choices=$names ;;
+    --set) choices="$names $speeds" ;;
+    --reported) choices="nominal $names" ;;
+    --sensor) choices="mid-40 mid-40-reversed mid-40-table3" ;;
+    --format) choices="lvx-1.1 netcdf openpylivox-bin openpylivox-csv scan-sequence-csv" ;;
+  esac
+  if [ -n "$choices" ]; then
+    mapfile -t COMPREPLY < <(compgen -W "$choices" -- "$current")
+    case $previous in --set) compopt -o nospace ;; esac
+    [ "$previous" = --sensor ] && mapfile -t -O "${#COMPREPLY[@]}" COMPREPLY \
+      < <(compgen -f -- "$current")
+    return
+  fi
+  if [[ $current == -* ]]; then
+    case $verb in
+      "") choices="--help --version" ;;
+      info) choices="$common" ;;
+      convert) choices="$common --output --format" ;;
+      simulate)
+        choices="$common --output --sensor --duration-s --rate-hz --noise-angle-deg
+          --noise-range-m --quantize --rotor --set --reported --scene --station
+          --start-angles-deg" ;;
+      estimate)
+        choices="$common --output --method --rate-hz --noise-angle-deg --sensor --fix --free
+          --states --mirror --process-noise --truth" ;;
+    esac
+    mapfile -t COMPREPLY < <(compgen -W "$choices" -- "$current")
+    return
+  fi
+  if [ -z "$verb" ]; then
+    mapfile -t COMPREPLY < <(compgen -W "$verbs" -- "$current")
+  else
+    compopt -o default
+    COMPREPLY=()
+  fi
+}
+complete -F _risley risley

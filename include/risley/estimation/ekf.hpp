@@ -1,0 +1,72 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "risley/core/progress.hpp"
+#include "risley/estimation/angle_series.hpp"
+#include "risley/estimation/free_parameters.hpp"
+#include "risley/estimation/initialisation.hpp"
+#include "risley/estimation/rotor_process.hpp"
+
+namespace risley::estimation {
+
+/// Settings of the extended Kalman filter.
+struct EkfOptions {
+  double angle_noise = 0;                 ///< 1 sigma of azimuth and zenith before rounding, rad
+  std::vector<FreeParameter> free;        ///< constants to estimate
+  /// Noise of the rotors [prisms]; empty chooses it by maximum likelihood of the innovations after
+  /// the first pass (which takes two passes or more).
+  std::vector<RotorProcess> rotor_process;
+  double parameter_walk = 0;              ///< random walk of every free angle, rad / sqrt(s)
+  /// Innovations with a chi-square (2 degrees of freedom) above this are outliers, once the first
+  /// gate_after updates are through; before, the gate stands at 400.
+  double gate_chi_square = 13.816;        // one good shot in a thousand
+  std::size_t gate_after = 50;
+  /// Passes over the data; each starts where the one before ended at the first shot, so that
+  /// everything is linearised near the answer.
+  int passes = 2;
+};
+
+/// What the filter knows of one rotor state at every used shot.
+struct RotorStates {
+  std::vector<std::int64_t> time_ns;
+  std::vector<std::vector<double>> rotation_angle;          ///< [prisms][shots], rad, unwrapped
+  std::vector<std::vector<double>> angular_velocity;        ///< [prisms][shots], rad/s
+  /// Covariance of the rotation angles, upper triangle row by row [prisms (prisms+1)/2][shots].
+  std::vector<std::vector<double>> rotation_angle_covariance;
+  std::vector<std::vector<double>> angular_velocity_sigma;  ///< [prisms][shots], rad/s
+  std::vector<double> azimuth_residual, zenith_residual;    ///< observed minus smoothed, rad
+  std::vector<unsigned char> outlier;
+
+  std::size_t size() const { return time_ns.size(); }
+};
+
+/// Result of the two filters and their optimal combination.
+struct EkfResult {
+  std::vector<FreeParameter> free;
+  Eigen::VectorXd parameters;            ///< mean over the smoothed estimates, SI units
+  Eigen::MatrixXd covariance;            ///< of parameters, mean over the smoothed covariances
+  PrismTrain train{parse_face_order("PA-AP")};  ///< with the estimated parameters
+  RotorStates states;
+  std::vector<RotorProcess> rotor_process;
+  std::size_t outliers = 0;
+  double log_likelihood = 0;             ///< of the forward filter's innovations
+};
+
+/// Forward filter, backward filter, and their combination weighted by inverse covariance, with the
+/// free parameters, and angle and speed of every rotor as states.        [B21 section 2.4]
+/// Departures from the paper: constants have no process noise unless asked for; the backward filter
+/// starts from a wide prior at the forward filter's last state, so no observation counts twice;
+/// process noise is continuous and found by maximum likelihood. docs/theory/ekf.md
+/// Memory is that of the result: filtered covariances live for one block of shots at a time.
+/// @throws EstimationError when the series is empty or the filter diverges (message says where)
+EkfResult run_ekf(const AngleSeries& series, const Start& start, const EkfOptions& options,
+                  const Progress& progress = {});
+
+}  // namespace risley::estimation

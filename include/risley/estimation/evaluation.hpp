@@ -1,0 +1,36 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "risley/estimation/estimate.hpp"
+#include "risley/recordings/truth.hpp"
+
+namespace risley::estimation {
+
+/// Error of one quantity against the truth, SI units.
+struct TruthComparison {
+  std::string name;
+  double truth = 0;
+  double error = 0;
+  double error_over_sigma = 0;
+};
+
+/// An estimate judged by the truth that a simulation left.
+struct Evaluation {
+  std::vector<TruthComparison> parameters;
+  std::vector<std::vector<double>> rotation_angle_error;  ///< [prisms][shots], rad
+  std::vector<double> rotation_angle_rmse;                ///< [prisms], rad
+  double nees_parameters = 0;               ///< per degree of freedom; 1 is honest
+  double nees_rotation_angles = 0;          ///< per degree of freedom, mean over shots
+};
+
+/// @param truth_sensor  the simulated sensor
+/// @param truth         its rotation angles at every shot
+/// @throws InvalidArgument when no shot of the estimate is in the truth
+Evaluation evaluate(const Estimate& estimate, const sensors::Sensor& truth_sensor,
+                    const recordings::TruthColumns& truth);
+
+}  // namespace risley::estimation

@@ -1,0 +1,111 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "risley/core/progress.hpp"
+#include "risley/recordings/observations.hpp"
+#include "risley/recordings/reader.hpp"
+
+namespace risley::recordings {
+
+/// Smallest and largest value seen; empty when there was none.
+struct ValueRange {
+  double min, max;
+};
+
+/// Missing time inside a recording.
+struct TimeGaps {
+  std::uint64_t count = 0;
+  double total_s = 0;    ///< missing time: the steps without the nominal step each would have had
+  double largest_s = 0;  ///< missing time of the largest one
+  std::int64_t largest_after_ns = 0;  ///< time of the last shot before it
+  std::uint64_t largest_at_row = 0;   ///< first row after it, from 0
+};
+
+/// Rows by the four fields of the tag byte, each with the values 0 to 3.
+struct TagCounts {
+  std::array<std::uint64_t, 4> position{};   ///< bits 0-1: noise by position
+  std::array<std::uint64_t, 4> intensity{};  ///< bits 2-3: noise by intensity
+  std::array<std::uint64_t, 4> echo{};       ///< bits 4-5: number of the echo
+  std::array<std::uint64_t, 4> reserved{};   ///< bits 6-7
+};
+
+/// What a recording holds and how sound its times are.
+struct TimeAuditResult {
+  std::uint64_t observations = 0;  ///< rows: one per return
+  std::uint64_t shots = 0;
+  std::uint64_t no_return = 0;                       ///< rows that are not valid
+  std::int64_t first_time_ns = 0, last_time_ns = 0;  ///< of the first and the last row
+  /// From the first to the last shot of the device that covers most, s; jumps of the clock, back
+  /// or to another time source, do not count.
+  double duration_s = 0;
+  double nominal_step_s = 0;  ///< median time between two shots of one device
+  double rate_hz = 0;         ///< shots of one device per second, gaps left out; 0 when unknown
+  TimeGaps gaps;              ///< steps longer than 1.8 nominal steps
+  /// Backward jumps, and jumps where the source of time changes. Packets that are repeated or
+  /// come late by less than 10 ms are none.
+  std::uint64_t time_resets = 0;
+  std::uint64_t non_monotonic_packets = 0;    ///< not later than the device's packet before
+  std::uint64_t pps_wraps = 0;                ///< Reader::clock_wraps(), when a reader was audited
+  std::optional<ValueRange> azimuth, zenith;  ///< of valid rows, rad
+  std::optional<ValueRange> range;            ///< of valid rows that have one, m
+  std::array<std::uint64_t, 256> rows_by_return_number{};
+  TagCounts tags;
+  std::vector<std::uint64_t> rows_by_device;            ///< up to the last device with rows
+  std::array<std::uint64_t, 9> packets_by_data_type{};  ///< data types 0 to 8
+  std::uint64_t imu = 0;                                ///< inertial samples
+};
+
+/// Audits a recording chunk by chunk; its memory does not grow with the recording.
+class TimeAudit {
+ public:
+  void add(const Chunk& chunk);
+
+  /// What was seen so far.
+  TimeAuditResult result() const;
+
+ private:
+  /// Steps that are kept until the nominal step can be told.
+  static constexpr std::size_t kStepsForMedian = 4096;
+
+  struct TimeStep {
+    std::int64_t step_ns, before_ns;
+    std::uint64_t row;
+    bool source_changed;
+  };
+
+  /// One device. A shot is compared with the shot before it of the same device.
+  struct DeviceState {
+    std::uint64_t rows = 0;
+    bool started = false, source_changed = false, late_packet = false;
+    std::int64_t last_shot_ns = 0;
+    std::uint8_t last_return = 0;
+    std::optional<std::int64_t> last_packet_ns;
+    std::optional<std::uint8_t> timestamp_type;
+    std::vector<TimeStep> first_steps;
+    std::int64_t nominal_ns = 0;  // 0 until it is known
+    std::int64_t covered_ns = 0;
+    std::int64_t regular_ns = 0;
+    std::uint64_t regular_steps = 0;
+    std::uint64_t resets = 0;
+    TimeGaps gaps;
+  };
+
+  void add_row(const Observations& rows, std::size_t row);
+  void add_packet(const Packet& packet, std::uint8_t device, std::int64_t time_ns);
+  static void add_step(DeviceState& state, const TimeStep& step);
+  static void settle(DeviceState& state);
+
+  TimeAuditResult totals_;
+  std::vector<DeviceState> devices_;
+};
+
+/// Reads a recording to its end and audits it. @throws FileError at damage
+TimeAuditResult audit_recording(Reader& reader, const Progress& progress = {});
+
+}  // namespace risley::recordings

@@ -1,0 +1,51 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace risley::recordings {
+
+/// What a simulation knows of every shot and a sensor does not tell. SI units. One row per shot; a
+/// recording in a format of fixed rate can have more rows, so rows are matched by their time.
+struct TruthColumns {
+  std::vector<std::int64_t> time_ns;                  ///< as in the recording, ascending
+  std::vector<std::vector<double>> rotation_angle;    ///< [prisms][rows], rad, not wrapped
+  std::vector<std::vector<double>> angular_velocity;  ///< [prisms][rows], rad/s
+  std::vector<double> azimuth, zenith;                ///< of the beam, rad
+  std::vector<double> range;                          ///< m, NaN where the beam hits nothing
+
+  std::size_t size() const { return time_ns.size(); }
+  int prisms() const { return static_cast<int>(rotation_angle.size()); }
+  void resize(int prisms, std::size_t rows);
+};
+
+/// Writes truth columns piece by piece as NetCDF-4: time (s), rotation_angle_a_deg,
+/// angular_velocity_a_deg_per_s, ..., azimuth_deg, zenith_deg, range_m along the dimension "shot".
+/// The file appears under its name only at close(); a writer destroyed before leaves nothing. The
+/// NetCDF library is not thread-safe: one NetCDF file of a process at a time.
+class TruthWriter {
+ public:
+  /// @throws FileError
+  TruthWriter(const std::string& path, int prisms);
+  ~TruthWriter();
+
+  /// Appends rows. @throws InvalidArgument when the columns differ in length or in prisms,
+  /// FileError
+  void write(const TruthColumns& rows);
+  /// Completes the file. @throws FileError
+  void close();
+
+ private:
+  class File;
+  std::unique_ptr<File> file_;
+};
+
+/// Reads a whole truth file. @throws FileError
+TruthColumns load_truth(const std::string& path);
+
+}  // namespace risley::recordings

@@ -1,0 +1,22 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <string>
+
+namespace risley::report {
+
+/// A value and its sigma for people, with the digits that mean something.
+struct NumberText {
+  std::string value, sigma;
+};
+
+/// Two significant digits of the sigma, and the value to the same place. Without a sigma (0 or not
+/// finite) the value has seven significant digits and the sigma's text is empty.
+NumberText number_text(double value, double sigma);
+
+/// A value to the place of the second significant digit of a sigma, for a column beside
+/// number_text.
+std::string text_to_place_of(double value, double sigma);
+
+}  // namespace risley::report

@@ -1,0 +1,81 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "risley/recordings/observations.hpp"
+#include "risley/recordings/reader.hpp"
+#include "risley/recordings/truth.hpp"
+#include "risley/sensors/sensor.hpp"
+#include "risley/simulation/rotor_dynamics.hpp"
+#include "risley/simulation/scene.hpp"
+
+namespace risley::simulation {
+
+/// What to simulate. SI units; an optional that is empty takes the true sensor's own value.
+struct SimulationSettings {
+  sensors::Sensor truth;  ///< where the beam really goes
+  /// What the sensor believes of its optics, when that is wrong: it reports directions from these
+  /// parameters, while its beam and its ranges follow the truth.                [B21 section 3.3]
+  std::optional<sensors::Sensor> reported;
+
+  double duration = 1.0;              ///< s
+  std::optional<double> rate;         ///< shots per second
+  std::optional<double> angle_noise;  ///< 1 sigma of azimuth and zenith, rad
+  std::optional<double> range_noise;  ///< 1 sigma, m
+  bool quantize = true;               ///< round to the sensor's resolution, as sensors do
+
+  RotorKind rotor = RotorKind::constant;
+  std::optional<RotorSettings> rotor_settings;  ///< instead of what the kind stands for
+  /// Rotation angles at time zero, rad, one per prism; empty: uniformly random from the seed.
+  std::vector<double> start_angles;
+
+  std::optional<Scene> scene;  ///< without one there are no ranges
+  std::string station;         ///< of the scene; empty: at its origin, X forward
+
+  std::uint64_t seed = 0;
+  int threads = 0;  ///< 0: as many as the machine has
+};
+
+/// A simulated sensor that gives its recording piece by piece, so that memory does not grow with
+/// the number of shots. The numbers depend on the settings without threads alone, not on the size
+/// of the pieces.
+///
+/// Shot i is fired at round(i 1e9 / rate) ns, and the truth is that of this rounded time. Beams
+/// start at the sensor's origin (Appendix A's offset within the prisms is left out). A beam that
+/// hits nothing, or beyond the sensor's limits of range, has no return: range 0 and valid 0, with
+/// the direction it was reported for. A beam that does not get through the prisms has NaN angles
+/// too. Without a scene every range is NaN and the header says has_range = false.
+/// Intensity is that of a matt surface of 80 % reflectivity, 120 times the cosine of incidence on
+/// the sensor's scale where 150 stands for 100 %; ranges do not weaken it.
+class Scanner {
+ public:
+  /// @throws InvalidArgument naming setting, value and allowed range
+  explicit Scanner(SimulationSettings settings);
+  ~Scanner();
+
+  const SimulationSettings& settings() const;
+  const recordings::RecordingHeader& header() const;
+  /// Number of shots of the whole recording.
+  std::uint64_t shots() const;
+  /// Number of shots given so far, and of those among them without a return.
+  std::uint64_t shots_done() const;
+  std::uint64_t no_return() const;
+  /// Rotation angles at time zero, rad.
+  const std::vector<double>& start_angles() const;
+
+  /// Replaces both by the next rows, at most max_rows. @return false when there is nothing more
+  bool read(recordings::Chunk& chunk, recordings::TruthColumns& truth,
+            std::size_t max_rows = recordings::kDefaultChunkRows);
+
+ private:
+  class Work;
+  std::unique_ptr<Work> work_;
+};
+
+}  // namespace risley::simulation

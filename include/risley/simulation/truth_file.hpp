@@ -1,0 +1,43 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "risley/core/progress.hpp"
+#include "risley/simulation/scanner.hpp"
+
+namespace risley::simulation {
+
+/// Where the truth of a recording is written.
+std::string truth_preset_path(const std::string& recording);   ///< OUT.truth.yaml
+std::string truth_columns_path(const std::string& recording);  ///< OUT.truth.nc
+
+/// The true sensor, with all that makes the simulation again in its provenance: the given pairs
+/// (command, version), seed, start angles, duration, rate, noise, rounding, rotor motion and what
+/// the sensor reports instead of the truth.
+sensors::Sensor truth_preset(const Scanner& scanner,
+                             const std::vector<std::pair<std::string, std::string>>& provenance);
+
+/// What was written.
+struct SimulationResult {
+  std::uint64_t observations = 0;
+  std::uint64_t no_return = 0;
+  sensors::Sensor truth;             ///< as in OUT.truth.yaml
+  std::vector<double> start_angles;  ///< rotation angles at time zero, rad
+};
+
+/// Simulates a whole recording and writes it with its truth: OUT in the format that its ending asks
+/// for, OUT.truth.yaml (a sensor preset) and OUT.truth.nc (see recordings::TruthWriter). Memory
+/// does not grow with the duration.
+/// @param provenance  goes into the preset first, e.g. {"command", ...}
+/// @throws InvalidArgument for settings or an ending that make no sense, FileError
+SimulationResult simulate_to_file(
+    const SimulationSettings& settings, const std::string& path,
+    const std::vector<std::pair<std::string, std::string>>& provenance,
+    const Progress& progress = {});
+
+}  // namespace risley::simulation

@@ -1,0 +1,481 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "risley/estimation/ekf.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <limits>
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <fmt/format.h>
+
+#include "estimation/residual_model.hpp"
+#include "risley/core/angle.hpp"
+#include "risley/core/error.hpp"
+
+namespace risley::estimation {
+namespace {
+
+/// How loose the rotors are before the first observation of either direction.
+constexpr double kAngleSigma = radians_from_degrees(5.0);
+constexpr double kSpeedSigma = radians_from_degrees(100.0);
+/// Chi-square of the innovations while the filter settles.
+constexpr double kOpenGate = 400.0;
+/// Filtered states kept at a time for the combination.
+constexpr std::size_t kBlock = 1024;
+/// Noise of the rotors in the first pass when the second is to choose it: far above that of real
+/// rotors, so that the filter follows them wherever they go.
+constexpr RotorProcess kSettlingProcess{radians_from_degrees(30.0), 0.0};
+/// Shots that the search for the process noise looks at.
+constexpr std::size_t kLikelihoodShots = 10000;
+
+/// Mean and covariance: free parameters, then angle and speed of each rotor.
+struct State {
+  Eigen::VectorXd mean;
+  Eigen::MatrixXd covariance;
+};
+
+/// Where the model is linearised when not at the filter's own state: the smoothed answer of the
+/// pass before. With it a forward-backward pass is one Gauss-Newton step of the whole trajectory.
+struct Reference {
+  Eigen::VectorXd parameters;
+  const RotorStates* states = nullptr;
+};
+
+template <int N>
+class Filter {
+ public:
+  Filter(const AngleSeries& series, const PrismTrain& train, const EkfOptions& options,
+         const std::vector<RotorProcess>& process, const Reference* reference)
+      : series_(series),
+        options_(options),
+        process_(process),
+        reference_(reference),
+        model_(train, options.free),
+        statics_(static_cast<Eigen::Index>(options.free.size())),
+        size_(statics_ + 2 * N),
+        jacobian_(2, size_),
+        cross_(size_, 2),
+        gain_(size_, 2) {
+    if (reference_) model_.set(reference_->parameters);
+  }
+
+  Eigen::Index statics() const { return statics_; }
+  Eigen::Index size() const { return size_; }
+
+  /// The covariance before any observation.
+  Eigen::MatrixXd wide_covariance() const {
+    Eigen::VectorXd sigma(size_);
+    for (Eigen::Index i = 0; i < statics_; ++i) {
+      sigma[i] = options_.free[static_cast<std::size_t>(i)].prior_sigma;
+    }
+    for (Eigen::Index k = 0; k < N; ++k) {
+      sigma[statics_ + 2 * k] = kAngleSigma;
+      sigma[statics_ + 2 * k + 1] = kSpeedSigma;
+    }
+    return sigma.array().square().matrix().asDiagonal();
+  }
+
+  /// Moves a state by dt seconds, forwards or backwards.                     [B21 Eq. (27)]
+  void predict(State& state, double dt) const {
+    Eigen::MatrixXd& p = state.covariance;
+    for (Eigen::Index k = 0; k < N; ++k) {
+      const Eigen::Index angle = statics_ + 2 * k, speed = angle + 1;
+      state.mean[angle] += dt * state.mean[speed];
+      p.row(angle) += dt * p.row(speed);
+      p.col(angle) += dt * p.col(speed);
+      const auto q = step_covariance(process_[static_cast<std::size_t>(k)], dt);
+      p(angle, angle) += q.angle_angle;
+      p(angle, speed) += q.angle_speed;
+      p(speed, angle) += q.angle_speed;
+      p(speed, speed) += q.speed_speed;
+    }
+    if (options_.parameter_walk > 0) {
+      p.diagonal().head(statics_).array() +=
+          options_.parameter_walk * options_.parameter_walk * std::abs(dt);
+    }
+  }
+
+  /// What one observation did.
+  struct Update {
+    bool accepted = false;
+    double chi_square = 0;
+    double log_likelihood = 0;
+  };
+
+  /// Takes the observation of a row into a state, unless it lies beyond the gate.
+  Update update(State& state, std::size_t row, double gate) {
+    linearise(state, row);
+    Eigen::MatrixXd& p = state.covariance;
+    cross_.noalias() = p * jacobian_.transpose();
+    Eigen::Matrix2d innovation_covariance = jacobian_ * cross_;
+    const double noise = options_.angle_noise * options_.angle_noise;
+    innovation_covariance(0, 0) += noise + series_.azimuth_rounding_variance[row];
+    innovation_covariance(1, 1) += noise + series_.zenith_rounding_variance[row];
+    const double determinant = innovation_covariance.determinant();
+    const Eigen::Matrix2d inverse = innovation_covariance.inverse();
+    Update result;
+    result.chi_square = innovation_.dot(inverse * innovation_);
+    if (!(result.chi_square <= gate)) return result;
+    result.accepted = true;
+    result.log_likelihood = -0.5 * (result.chi_square + std::log(determinant));
+    gain_.noalias() = cross_ * inverse;
+    state.mean.noalias() += gain_ * innovation_;
+    p.noalias() -= gain_ * cross_.transpose();
+    // Rounding would otherwise let the two halves drift apart.
+    p.template triangularView<Eigen::StrictlyLower>() = p.transpose();
+    return result;
+  }
+
+  /// Observed minus modelled at a state, rad; NaN when the beam does not get through.
+  Eigen::Vector2d residual_at(const Eigen::VectorXd& mean, std::size_t row) {
+    model_.set(mean.head(statics_));
+    model_.linearise(angles(mean));
+    const Eigen::Vector2d residual = model_.residual(series_.azimuth[row], series_.zenith[row]);
+    if (reference_) model_.set(reference_->parameters);
+    return residual;
+  }
+
+ private:
+  std::array<double, N> angles(const Eigen::VectorXd& mean) const {
+    std::array<double, N> result;
+    for (Eigen::Index k = 0; k < N; ++k) {
+      result[static_cast<std::size_t>(k)] = mean[statics_ + 2 * k];
+    }
+    return result;
+  }
+
+  /// Sets innovation_ and jacobian_.
+  void linearise(const State& state, std::size_t row) {
+    std::array<double, N> at;
+    if (reference_) {
+      for (std::size_t k = 0; k < N; ++k) at[k] = reference_->states->rotation_angle[k][row];
+    } else {
+      model_.set(state.mean.head(statics_));
+      at = angles(state.mean);
+    }
+    model_.linearise(at);  // an invalid beam makes the innovation NaN, which no gate lets through
+    innovation_ = model_.residual(series_.azimuth[row], series_.zenith[row]);
+    jacobian_.setZero();
+    jacobian_.leftCols(statics_) = model_.d_parameters();
+    for (Eigen::Index k = 0; k < N; ++k) {
+      jacobian_.col(statics_ + 2 * k) = model_.d_angles().col(k);
+    }
+    if (reference_) {
+      innovation_ -= model_.d_parameters() * (state.mean.head(statics_) - reference_->parameters);
+      for (Eigen::Index k = 0; k < N; ++k) {
+        innovation_ -= model_.d_angles().col(k) *
+                       (state.mean[statics_ + 2 * k] - at[static_cast<std::size_t>(k)]);
+      }
+    }
+  }
+
+  const AngleSeries& series_;
+  const EkfOptions& options_;
+  const std::vector<RotorProcess>& process_;
+  const Reference* reference_;
+  ResidualModel<N> model_;
+  Eigen::Index statics_, size_;
+  Eigen::Vector2d innovation_;
+  Eigen::Matrix2Xd jacobian_;
+  Eigen::MatrixX2d cross_, gain_;
+};
+
+/// State at the first shot of a series, from a start at some other time.
+template <int N>
+State first_state(const Filter<N>& filter, const AngleSeries& series, const Start& start,
+                  const std::vector<FreeParameter>& free) {
+  State state;
+  state.mean.resize(filter.size());
+  state.mean.head(filter.statics()) = free_values(start.train, free);
+  const double ahead = 1e-9 * static_cast<double>(series.time_ns[0] - start.time_ns);
+  for (Eigen::Index k = 0; k < N; ++k) {
+    const double speed = start.angular_velocity[static_cast<std::size_t>(k)];
+    const double angle = start.rotation_angle[static_cast<std::size_t>(k)] + ahead * speed;
+    state.mean[filter.statics() + 2 * k] = wrap_to_pi(angle);
+    state.mean[filter.statics() + 2 * k + 1] = speed;
+  }
+  state.covariance = filter.wide_covariance();
+  return state;
+}
+
+/// State at the first shot, from a reference.
+template <int N>
+State first_state(const Filter<N>& filter, const Reference& reference) {
+  State state{Eigen::VectorXd(filter.size()), filter.wide_covariance()};
+  state.mean.head(filter.statics()) = reference.parameters;
+  for (Eigen::Index k = 0; k < N; ++k) {
+    const auto rotor = static_cast<std::size_t>(k);
+    state.mean[filter.statics() + 2 * k] = reference.states->rotation_angle[rotor][0];
+    state.mean[filter.statics() + 2 * k + 1] = reference.states->angular_velocity[rotor][0];
+  }
+  return state;
+}
+
+/// White accelerations from decimal logarithms of (deg/s) / sqrt(s).
+template <int N>
+std::vector<RotorProcess> processes(const std::array<double, N>& decades) {
+  std::vector<RotorProcess> result;
+  for (const double d : decades) result.push_back({radians_from_degrees(std::pow(10.0, d)), 0.0});
+  return result;
+}
+
+/// Shots that no filter may take although its prior is still wide enough to swallow them: those
+/// among the first that lie far from what the start, or the pass before, expects.
+template <int N>
+std::vector<unsigned char> screen(const AngleSeries& series, const Start& start,
+                                  const EkfOptions& options, const Reference* reference) {
+  std::vector<unsigned char> outlier(series.size(), 0);
+  const PrismTrain& start_train = start.train;
+  ResidualModel<N> model(start_train, options.free);
+  model.set(reference ? reference->parameters : free_values(start_train, options.free));
+  const double start_limit = std::max(radians_from_degrees(0.1), 8.0 * start.residual_rms);
+  for (std::size_t i = 0; i < std::min(options.gate_after, series.size()); ++i) {
+    const double t = 1e-9 * static_cast<double>(series.time_ns[i] - start.time_ns);
+    if (!reference && t > kStartWindow) break;
+    std::array<double, N> angle;
+    for (std::size_t k = 0; k < N; ++k) {
+      angle[k] = reference ? reference->states->rotation_angle[k][i]
+                           : start.rotation_angle[k] + t * start.angular_velocity[k];
+    }
+    model.linearise(angle);
+    const double variance = options.angle_noise * options.angle_noise +
+                            series.azimuth_rounding_variance[i] +
+                            series.zenith_rounding_variance[i];
+    const double limit = reference ? 6.0 * std::sqrt(variance) : start_limit;
+    outlier[i] = !(model.residual(series.azimuth[i], series.zenith[i]).norm() < limit);
+  }
+  return outlier;
+}
+
+/// Log likelihood of the innovations over the first shots for a choice of process noise, linearised
+/// at a reference so that it is that of a linear filter, whatever the noise.
+template <int N>
+double likelihood(const AngleSeries& series, const PrismTrain& train, const EkfOptions& options,
+                  const std::vector<RotorProcess>& process, const Reference& reference) {
+  Filter<N> filter(series, train, options, process, &reference);
+  State state = first_state(filter, reference);
+  double sum = 0;
+  const std::size_t shots = std::min(series.size(), kLikelihoodShots);
+  for (std::size_t i = 0; i < shots; ++i) {
+    if (i > 0) filter.predict(state, series.time(i) - series.time(i - 1));
+    if (reference.states->outlier[i]) continue;
+    const double gain =
+        filter.update(state, i, std::numeric_limits<double>::infinity()).log_likelihood;
+    if (i >= options.gate_after) sum += gain;  // before, the wide prior speaks
+  }
+  return std::isfinite(sum) ? sum : -std::numeric_limits<double>::infinity();
+}
+
+/// Maximum of a function of one variable, golden section.
+double maximise(const std::function<double(double)>& f, double a, double b, double tolerance) {
+  const double ratio = 0.5 * (std::sqrt(5.0) - 1.0);
+  double left = b - ratio * (b - a), right = a + ratio * (b - a);
+  double at_left = f(left), at_right = f(right);
+  while (b - a > tolerance) {
+    if (at_left > at_right) {
+      b = right;
+      right = left;
+      at_right = at_left;
+      left = b - ratio * (b - a);
+      at_left = f(left);
+    } else {
+      a = left;
+      left = right;
+      at_left = at_right;
+      right = a + ratio * (b - a);
+      at_right = f(right);
+    }
+  }
+  return 0.5 * (a + b);
+}
+
+/// White acceleration of every rotor that makes the innovations likeliest: one value for all on a
+/// coarse grid, then each rotor's own.
+template <int N>
+std::vector<RotorProcess> likeliest_process(const AngleSeries& series, const PrismTrain& train,
+                                            const EkfOptions& options,
+                                            const Reference& reference) {
+  const auto likelihood_of = [&](const std::array<double, N>& decades) {
+    return likelihood<N>(series, train, options, processes<N>(decades), reference);
+  };
+  std::array<double, N> decades;
+  decades.fill(0.0);
+  double best = -std::numeric_limits<double>::infinity();
+  for (double trial = 3.0; trial >= -3.0; trial -= 0.5) {
+    std::array<double, N> all;
+    all.fill(trial);
+    const double value = likelihood_of(all);
+    if (value > best) {
+      best = value;
+      decades = all;
+    }
+  }
+  for (std::size_t k = 0; k < N; ++k) {
+    const double middle = decades[k];
+    decades[k] = maximise(
+        [&](double trial) {
+          std::array<double, N> changed = decades;
+          changed[k] = trial;
+          return likelihood_of(changed);
+        },
+        middle - 0.75, middle + 0.75, 0.1);
+  }
+  return processes<N>(decades);
+}
+
+/// One forward and one backward filter and their combination.
+template <int N>
+EkfResult run_pass(const AngleSeries& series, const State& first, const PrismTrain& train,
+                   const EkfOptions& options, const std::vector<RotorProcess>& process,
+                   const Reference* reference, std::vector<unsigned char> screened,
+                   const Progress& progress) {
+  Filter<N> filter(series, train, options, process, reference);
+  const std::size_t shots = series.size();
+  const Eigen::Index statics = filter.statics();
+  EkfResult result{options.free, {}, {}, train, {}, process, 0, 0};
+  RotorStates& out = result.states;
+  out.time_ns = series.time_ns;
+  out.outlier = std::move(screened);
+  result.outliers = static_cast<std::size_t>(std::count(out.outlier.begin(), out.outlier.end(), 1));
+  out.rotation_angle.assign(N, std::vector<double>(shots));
+  out.angular_velocity = out.angular_velocity_sigma = out.rotation_angle;
+  out.rotation_angle_covariance.assign(N * (N + 1) / 2, std::vector<double>(shots));
+  out.azimuth_residual.resize(shots);
+  out.zenith_residual.resize(shots);
+
+  const auto gap_before = [&](std::size_t i) { return series.time(i) - series.time(i - 1); };
+  const auto forward_step = [&](State& state, std::size_t i, bool decide) {
+    if (i > 0) filter.predict(state, gap_before(i));
+    if (out.outlier[i]) return;
+    if (!decide) {
+      filter.update(state, i, std::numeric_limits<double>::infinity());
+      return;
+    }
+    const auto update =
+        filter.update(state, i, i < options.gate_after ? kOpenGate : options.gate_chi_square);
+    if (update.accepted) {
+      result.log_likelihood += update.log_likelihood;
+    } else {
+      out.outlier[i] = 1;
+      ++result.outliers;
+    }
+  };
+
+  // Forward: decides on outliers and keeps the state before each block.
+  std::vector<State> before_block;
+  State state = first;
+  for (std::size_t i = 0; i < shots; ++i) {
+    if (i % kBlock == 0) {
+      before_block.push_back(state);
+      report_progress(progress, 0.3 * static_cast<double>(i) / static_cast<double>(shots));
+    }
+    forward_step(state, i, true);
+    if (!state.mean.allFinite()) {
+      throw EstimationError(fmt::format("the filter diverged at shot {} ({:.6f} s)", i,
+                                        series.time(i)));
+    }
+  }
+
+  // Backward, block by block: the forward filter runs again through the block and is combined with
+  // what the backward filter knows of the shots behind it.
+  State backward{state.mean, filter.wide_covariance()};
+  Eigen::VectorXd mean_parameters = Eigen::VectorXd::Zero(statics);
+  Eigen::MatrixXd mean_covariance = Eigen::MatrixXd::Zero(statics, statics);
+  std::vector<State> filtered(std::min(kBlock, shots));
+  for (std::size_t block = before_block.size(); block-- > 0;) {
+    const std::size_t begin = block * kBlock, end = std::min(begin + kBlock, shots);
+    state = before_block[block];
+    for (std::size_t i = begin; i < end; ++i) {
+      forward_step(state, i, false);
+      filtered[i - begin] = state;
+    }
+    for (std::size_t i = end; i-- > begin;) {
+      if (i + 1 < shots) filter.predict(backward, -gap_before(i + 1));
+      const State& f = filtered[i - begin];
+      const Eigen::MatrixXd share = (f.covariance + backward.covariance)
+                                        .ldlt()
+                                        .solve(f.covariance)
+                                        .transpose();
+      const Eigen::VectorXd mean = f.mean + share * (backward.mean - f.mean);
+      const Eigen::MatrixXd covariance = f.covariance - share * f.covariance;
+      mean_parameters += mean.head(statics);
+      mean_covariance += covariance.topLeftCorner(statics, statics);
+      std::size_t entry = 0;
+      for (Eigen::Index k = 0; k < N; ++k) {
+        const Eigen::Index angle = statics + 2 * k;
+        const auto rotor = static_cast<std::size_t>(k);
+        out.rotation_angle[rotor][i] = mean[angle];
+        out.angular_velocity[rotor][i] = mean[angle + 1];
+        out.angular_velocity_sigma[rotor][i] = std::sqrt(covariance(angle + 1, angle + 1));
+        for (Eigen::Index l = k; l < N; ++l) {
+          out.rotation_angle_covariance[entry++][i] = covariance(angle, statics + 2 * l);
+        }
+      }
+      const Eigen::Vector2d residual = filter.residual_at(mean, i);
+      out.azimuth_residual[i] = residual[0];
+      out.zenith_residual[i] = residual[1];
+      if (!out.outlier[i]) {
+        filter.update(backward, i, std::numeric_limits<double>::infinity());
+      }
+    }
+    report_progress(progress, 0.3 + 0.7 * static_cast<double>(shots - begin) /
+                                        static_cast<double>(shots));
+  }
+  result.parameters = mean_parameters / static_cast<double>(shots);
+  result.covariance = mean_covariance / static_cast<double>(shots);
+  result.covariance = 0.5 * (result.covariance + result.covariance.transpose().eval());
+  result.train = with_free_values(train, options.free, result.parameters);
+  return result;
+}
+
+template <int N>
+EkfResult run(const AngleSeries& series, const Start& start, const EkfOptions& options,
+              const Progress& progress) {
+  const bool choose = options.rotor_process.empty();
+  std::vector<RotorProcess> process =
+      choose ? std::vector<RotorProcess>(N, kSettlingProcess) : options.rotor_process;
+  if (process.size() != N) {
+    throw InvalidArgument(
+        fmt::format("process noise for {} rotors given, the train has {}", process.size(), N));
+  }
+  State first = first_state(Filter<N>(series, start.train, options, process, nullptr), series,
+                            start, options.free);
+  EkfResult result = run_pass<N>(series, first, start.train, options, process, nullptr,
+                                 screen<N>(series, start, options, nullptr),
+                                 [&](double f) { report_progress(progress, f / options.passes); });
+  for (int pass = 1; pass < options.passes; ++pass) {
+    const Reference reference{result.parameters, &result.states};
+    if (choose && pass == 1) {
+      process = likeliest_process<N>(series, start.train, options, reference);
+    }
+    first = first_state(Filter<N>(series, start.train, options, process, &reference), reference);
+    EkfResult next = run_pass<N>(
+        series, first, start.train, options, process, &reference,
+        screen<N>(series, start, options, &reference),
+        [&](double f) { report_progress(progress, (pass + f) / options.passes); });
+    result = std::move(next);
+  }
+  return result;
+}
+
+}  // namespace
+
+EkfResult run_ekf(const AngleSeries& series, const Start& start, const EkfOptions& options,
+                  const Progress& progress) {
+  if (series.size() == 0) throw EstimationError("no valid shot to estimate from");
+  if (!(options.angle_noise > 0) || !std::isfinite(options.angle_noise)) {
+    throw InvalidArgument(fmt::format("angle noise = {} deg, allowed above 0",
+                                      degrees_from_radians(options.angle_noise)));
+  }
+  if (options.passes < 1) {
+    throw InvalidArgument(fmt::format("passes = {}, allowed 1 or more", options.passes));
+  }
+  return with_prism_count(start.train.prisms(), [&]<int N>() {
+    return run<N>(series, start, options, progress);
+  });
+}
+
+}  // namespace risley::estimation

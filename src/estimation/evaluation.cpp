@@ -1,0 +1,111 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "risley/estimation/evaluation.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Core>
+
+#include "risley/core/angle.hpp"
+#include "risley/core/error.hpp"
+
+namespace risley::estimation {
+namespace {
+
+/// Row of the truth for every shot of the estimate, by time.
+std::vector<std::size_t> matching_rows(const std::vector<std::int64_t>& shots,
+                                       const std::vector<std::int64_t>& truth) {
+  constexpr std::size_t kNone = static_cast<std::size_t>(-1);
+  std::vector<std::size_t> rows(shots.size(), kNone);
+  std::size_t row = 0, found = 0;
+  for (std::size_t i = 0; i < shots.size(); ++i) {
+    while (row < truth.size() && truth[row] < shots[i]) ++row;
+    if (row < truth.size() && truth[row] == shots[i]) {
+      rows[i] = row;
+      ++found;
+    }
+  }
+  if (found != shots.size()) {
+    throw InvalidArgument("the truth belongs to another recording: " +
+                          std::to_string(shots.size() - found) + " of " +
+                          std::to_string(shots.size()) + " shots have no row in it");
+  }
+  return rows;
+}
+
+}  // namespace
+
+Evaluation evaluate(const Estimate& estimate, const sensors::Sensor& truth_sensor,
+                    const recordings::TruthColumns& truth) {
+  const RotorStates& states = estimate.filter.states;
+  const int prisms = estimate.sensor.prisms();
+  if (truth_sensor.prisms() != prisms || truth.prisms() != prisms) {
+    throw InvalidArgument("the truth belongs to a sensor with another number of prisms");
+  }
+  const auto rows = matching_rows(states.time_ns, truth.time_ns);
+  const auto rotor_count = static_cast<std::size_t>(prisms);
+  const double duration = 1e-9 * static_cast<double>(states.time_ns.back() - states.time_ns.front());
+
+  Evaluation result;
+  const auto compare = [&](const EstimatedValue& value, double true_value, double error) {
+    result.parameters.push_back({value.name, true_value, error,
+                                 value.sigma > 0 ? error / value.sigma : 0.0});
+  };
+  for (const EstimatedValue& value : estimate.values) {
+    const ParameterInfo& info = find_parameter(value.name, prisms);
+    const auto rotor = static_cast<std::size_t>(info.places.front());
+    if (info.kind == ParameterKind::train) {
+      const double true_value = truth_sensor.train[info.places.front()];
+      compare(value, true_value, value.value - true_value);
+    } else if (info.kind == ParameterKind::angular_velocity) {
+      // What counts is the speed the rotor really had, not the nominal one.
+      const auto& angle = truth.rotation_angle[rotor];
+      const double true_value = duration > 0
+                                    ? (angle[rows.back()] - angle[rows.front()]) / duration
+                                    : truth.angular_velocity[rotor][rows.front()];
+      compare(value, true_value, value.value - true_value);
+    } else {
+      const double true_value = wrap_to_pi(truth.rotation_angle[rotor][rows.front()]);
+      compare(value, true_value, wrap_to_pi(value.value - true_value));
+    }
+  }
+
+  const auto statics = static_cast<Eigen::Index>(estimate.filter.free.size());
+  if (statics > 0) {
+    Eigen::VectorXd error(statics);
+    for (Eigen::Index i = 0; i < statics; ++i) {
+      error[i] = result.parameters[static_cast<std::size_t>(i)].error;
+    }
+    result.nees_parameters =
+        error.dot(estimate.filter.covariance.ldlt().solve(error)) / static_cast<double>(statics);
+  }
+
+  std::vector<double> squares(rotor_count, 0.0);
+  Eigen::VectorXd error(prisms);
+  Eigen::MatrixXd covariance(prisms, prisms);
+  result.rotation_angle_error.assign(rotor_count, std::vector<double>(rows.size()));
+  double nees = 0;
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    std::size_t entry = 0;
+    for (std::size_t k = 0; k < rotor_count; ++k) {
+      const auto row = static_cast<Eigen::Index>(k);
+      error[row] = wrap_to_pi(states.rotation_angle[k][i] - truth.rotation_angle[k][rows[i]]);
+      result.rotation_angle_error[k][i] = error[row];
+      squares[k] += error[row] * error[row];
+      for (std::size_t l = k; l < rotor_count; ++l) {
+        const auto column = static_cast<Eigen::Index>(l);
+        covariance(row, column) = covariance(column, row) =
+            states.rotation_angle_covariance[entry++][i];
+      }
+    }
+    nees += error.dot(covariance.ldlt().solve(error)) / prisms;
+  }
+  const auto count = static_cast<double>(rows.size());
+  for (const double sum : squares) result.rotation_angle_rmse.push_back(std::sqrt(sum / count));
+  result.nees_rotation_angles = nees / count;
+  return result;
+}
+
+}  // namespace risley::estimation

@@ -1,0 +1,15 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "recordings/formats/format.hpp"
+
+namespace risley::recordings {
+
+const std::vector<const Format*>& all_formats() {
+  static const std::vector<const Format*> formats{
+      &kLvx11Format,     &kLvx10Format,          &kNetcdfFormat,          &kOpenpylivoxBinFormat,
+      &kViewerCsvFormat, &kOpenpylivoxCsvFormat, &kScanSequenceCsvFormat,
+  };
+  return formats;
+}
+
+}  // namespace risley::recordings

@@ -1,0 +1,96 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "risley/recordings/reader.hpp"
+
+#include <algorithm>
+#include <cctype>
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+
+#include <fmt/format.h>
+
+#include "recordings/formats/format.hpp"
+
+namespace risley::recordings {
+namespace {
+
+constexpr std::size_t kHeadBytes = 4096;
+
+std::string known_formats() {
+  std::string names;
+  for (const Format* format : all_formats()) {
+    names += fmt::format("{}{}", names.empty() ? "" : ", ", format->name);
+  }
+  return names;
+}
+
+/// The first bytes of an unknown file, as text where they are text.
+std::string shown(std::string_view head) {
+  constexpr std::size_t kShown = 16;
+  head = head.substr(0, kShown);
+  const bool is_text = std::all_of(head.begin(), head.end(), [](char c) {
+    return std::isprint(static_cast<unsigned char>(c)) != 0;
+  });
+  if (is_text) return fmt::format("'{}'", head);
+  std::string bytes;
+  for (const char c : head) {
+    bytes += fmt::format("{}{:02X}", bytes.empty() ? "" : " ", static_cast<unsigned char>(c));
+  }
+  return bytes;
+}
+
+std::string read_head(const std::string& path) {
+  namespace fs = std::filesystem;
+  std::error_code code;
+  const fs::file_status status = fs::status(path, code);
+  if (status.type() == fs::file_type::not_found) throw FileError(path, {}, "no such file");
+  if (status.type() == fs::file_type::directory) {
+    throw FileError(path, {}, "is a folder, expected a recording");
+  }
+  if (status.type() != fs::file_type::regular) {
+    throw FileError(path, {}, "is not a regular file, expected a recording");
+  }
+  std::ifstream stream(path, std::ios::binary);
+  if (!stream) throw FileError(path, {}, fmt::format("cannot be read: {}", std::strerror(errno)));
+  std::string head(kHeadBytes, '\0');
+  stream.read(head.data(), static_cast<std::streamsize>(head.size()));
+  if (stream.bad()) throw FileError(path, {}, "cannot be read");
+  head.resize(static_cast<std::size_t>(stream.gcount()));
+  if (head.empty()) {
+    throw FileError(path, {0, {}},
+                    fmt::format("is empty, expected a recording ({})", known_formats()));
+  }
+  return head;
+}
+
+}  // namespace
+
+std::unique_ptr<Reader> open_recording(const std::string& path) {
+  const std::string head = read_head(path);
+  for (const Format* format : all_formats()) {
+    if (format->recognises(head)) return format->open(path);
+  }
+  throw FileError(path, {0, {}},
+                  fmt::format("is of no known kind: expected {}; it begins with {}",
+                              known_formats(), shown(head)));
+}
+
+Recording load_recording(const std::string& path, const Progress& progress) {
+  const std::unique_ptr<Reader> reader = open_recording(path);
+  Recording recording;
+  Chunk chunk;
+  while (reader->read(chunk)) {
+    recording.data.observations.append(chunk.observations);
+    recording.data.packets.insert(recording.data.packets.end(), chunk.packets.begin(),
+                                  chunk.packets.end());
+    recording.data.imu.insert(recording.data.imu.end(), chunk.imu.begin(), chunk.imu.end());
+    report_progress(progress, reader->fraction_read());
+  }
+  recording.header = reader->header();
+  recording.warnings = reader->warnings();
+  return recording;
+}
+
+}  // namespace risley::recordings

@@ -1,0 +1,36 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "risley/report/number_text.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+
+namespace risley::report {
+namespace {
+
+bool is_sigma(double sigma) { return std::isfinite(sigma) && sigma > 0; }
+
+/// Decimals that show two significant digits; 0.0996 is shown as 0.10, so round first.
+int decimals_for(double sigma) {
+  const double exponent = std::floor(std::log10(sigma));
+  const double leading = std::round(sigma / std::pow(10.0, exponent - 1));
+  const int place = static_cast<int>(exponent) + (leading >= 100 ? 1 : 0);
+  return std::clamp(1 - place, 0, 15);
+}
+
+}  // namespace
+
+NumberText number_text(double value, double sigma) {
+  if (!is_sigma(sigma)) return {fmt::format("{:.7g}", value), ""};
+  const int decimals = decimals_for(sigma);
+  return {fmt::format("{:.{}f}", value, decimals), fmt::format("{:.{}f}", sigma, decimals)};
+}
+
+std::string text_to_place_of(double value, double sigma) {
+  if (!is_sigma(sigma)) return fmt::format("{:.7g}", value);
+  return fmt::format("{:.{}f}", value, decimals_for(sigma));
+}
+
+}  // namespace risley::report

@@ -1,0 +1,475 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "risley/sensors/preset.hpp"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <filesystem>
+#include <numbers>
+
+#include <Eigen/Eigenvalues>
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "risley/core/output_file.hpp"
+
+#include "sensors/builtin_presets.hpp"
+#include "sensors/yaml_map.hpp"
+
+namespace risley::sensors {
+namespace {
+
+constexpr int kSchemaVersion = 1;
+
+/// SI units per file unit. Extended precision, so that a value in degrees exists for every value
+/// in radians and reading what was written gives the same bits.
+long double scale_of(std::string_view unit) {
+  return unit.starts_with("deg") ? std::numbers::pi_v<long double> / 180.0L : 1.0L;
+}
+
+double si_from_file(long double value, long double scale) {
+  return static_cast<double>(value * scale);
+}
+
+/// The shortest decimal that reads as exactly this value.
+std::string file_number(double value, long double scale, std::string_view field) {
+  if (!std::isfinite(value)) {
+    throw InvalidArgument(fmt::format("{} = {}, a preset holds finite numbers only", field, value));
+  }
+  const long double in_file = static_cast<long double>(value) / scale;
+  std::array<char, 64> text{};
+  char* const begin = text.data();
+  char* const limit = begin + text.size();
+  const auto reads_back = [&](const char* end) {
+    long double again = 0;
+    std::from_chars(begin, end, again);
+    return si_from_file(again, scale) == value;
+  };
+  char* end = begin;
+  int decimals = 0;
+  for (; decimals < 24; ++decimals) {
+    end = std::to_chars(begin, limit, in_file, std::chars_format::scientific, decimals).ptr;
+    if (reads_back(end)) break;
+  }
+  int exponent = 0;
+  const char* digits = std::find(begin, end, 'e') + 1;
+  std::from_chars(*digits == '+' ? digits + 1 : digits, end, exponent);
+  if (exponent >= -5 && exponent < 16) {  // as people write it
+    end = std::to_chars(begin, limit, in_file, std::chars_format::fixed,
+                        std::max(0, decimals - exponent))
+              .ptr;
+  }
+  return {begin, end};
+}
+
+std::string yaml_quoted(std::string_view text) {
+  std::string out = "\"";
+  for (const char c : text) {
+    if (c == '"' || c == '\\') {
+      out += '\\';
+      out += c;
+    } else if (static_cast<unsigned char>(c) < 0x20) {
+      out += fmt::format("\\x{:02x}", static_cast<unsigned char>(c));
+    } else {
+      out += c;
+    }
+  }
+  return out + '"';
+}
+
+/// A number of a sensor that is no parameter of the observation model.
+struct Specification {
+  const char* section;
+  const char* name;
+  const char* unit;
+  double Sensor::*member;
+  long double lower, upper;  ///< in the unit of the file
+};
+
+constexpr std::array kSpecifications{
+    Specification{"noise", "angle_noise_deg", "deg", &Sensor::angle_noise, 0, 10},
+    Specification{"noise", "range_noise_m", "m", &Sensor::range_noise, 0, 100},
+    Specification{"resolution", "angle_resolution_deg", "deg", &Sensor::angle_resolution, 0, 10},
+    Specification{"resolution", "range_resolution_m", "m", &Sensor::range_resolution, 0, 10},
+    Specification{"limits", "range_minimum_m", "m", &Sensor::range_minimum, 0, 1e5},
+    Specification{"limits", "range_maximum_m", "m", &Sensor::range_maximum, 1e-3L, 1e6},
+    Specification{"limits", "field_of_view_deg", "deg", &Sensor::field_of_view, 0, 360},
+    Specification{"rates", "shot_rate_hz", "Hz", &Sensor::shot_rate, 1e-3L, 1e9},
+    Specification{"beam", "beam_divergence_horizontal_deg", "deg",
+                  &Sensor::beam_divergence_horizontal, 0, 90},
+    Specification{"beam", "beam_divergence_vertical_deg", "deg", &Sensor::beam_divergence_vertical,
+                  0, 90},
+    Specification{"geometry", "prism_thickness_m", "m", &Sensor::prism_thickness, 0, 1},
+    Specification{"geometry", "prism_spacing_m", "m", &Sensor::prism_spacing, 0, 10},
+};
+
+/// Section names in file order.
+std::vector<std::string_view> section_names() {
+  std::vector<std::string_view> names;
+  for (const Specification& entry : kSpecifications) {
+    if (names.empty() || names.back() != entry.section) names.emplace_back(entry.section);
+  }
+  return names;
+}
+
+/// A value of the file with its line.
+struct Quantity {
+  long double value = 0;
+  std::size_t line = 0;
+};
+
+/// Reads one {value, unit, sigma, source}; sigma and source come together or not at all.
+Quantity read_quantity(const YamlMap& parent, std::string_view name, std::string_view unit,
+                       Sensor& sensor) {
+  const YamlMap::Entry& entry = parent.at(name);
+  const YamlMap map(entry.value, parent.path(), parent.field(name));
+  map.allow_only({"value", "unit", "sigma", "source"});
+  const std::string found_unit = map.text("unit");
+  if (found_unit != unit) {
+    fail_at(map.path(), map.at("unit").line,
+            fmt::format("{} = \"{}\", expected \"{}\"", map.field("unit"), found_unit, unit));
+  }
+  const YamlMap::Entry& value = map.at("value");
+  if (map.find("sigma") != nullptr || map.find("source") != nullptr) {
+    const long double sigma = map.number("sigma", 0.0L, 1e9L, unit);
+    std::string source = map.text("source");
+    if (source.empty())
+      fail_at(map.path(), map.at("source").line, map.field("source") + " is empty");
+    sensor.set_knowledge(
+        {std::string(name), si_from_file(sigma, scale_of(unit)), std::move(source)});
+  }
+  return {yaml_number(value.value, map.path(), map.field("value")), value.line};
+}
+
+void read_parameters(const YamlMap& map, Sensor& sensor) {
+  const auto& list = parameter_list(sensor.prisms());
+  std::vector<const std::string*> owner(static_cast<std::size_t>(parameter_count(sensor.prisms())),
+                                        nullptr);
+  std::vector<bool> has_speed(static_cast<std::size_t>(sensor.prisms()), false);
+  for (const YamlMap::Entry& entry : map.entries()) {
+    const auto found = std::find_if(list.begin(), list.end(), [&](const ParameterInfo& info) {
+      return info.name == entry.key && info.kind != ParameterKind::rotation_angle;
+    });
+    if (found == list.end()) {
+      fail_at(
+          map.path(), entry.line,
+          fmt::format("unknown parameter {} of a sensor with {} prisms (face_order {})",
+                      map.field(entry.key), sensor.prisms(), to_string(sensor.train.face_order())));
+    }
+    const Quantity quantity = read_quantity(map, entry.key, found->unit, sensor);
+    double value = si_from_file(quantity.value, scale_of(found->unit));
+    // A bound itself may have been rounded the other way.
+    for (const double bound : {found->lower, found->upper}) {
+      if (std::abs(value - bound) <= 1e-15 * std::abs(bound)) value = bound;
+    }
+    try {
+      check_bounds(*found, value);
+    } catch (const InvalidArgument& error) {
+      fail_at(map.path(), quantity.line, error.what());
+    }
+    if (found->kind == ParameterKind::angular_velocity) {
+      const auto rotor = static_cast<std::size_t>(found->places.front());
+      sensor.angular_velocity[rotor] = value;
+      has_speed[rotor] = true;
+      continue;
+    }
+    for (const int place : found->places) {
+      const std::string*& taken = owner[static_cast<std::size_t>(place)];
+      if (taken != nullptr) {
+        fail_at(map.path(), entry.line,
+                fmt::format("{} says again what {} says", map.field(entry.key), *taken));
+      }
+      taken = &entry.key;
+      sensor.train.set_place(place, value);
+    }
+  }
+  for (const ParameterInfo& info : list) {
+    const auto at = static_cast<std::size_t>(info.places.front());
+    const bool missing = (info.kind == ParameterKind::train && owner[at] == nullptr) ||
+                         (info.kind == ParameterKind::angular_velocity && !has_speed[at]);
+    if (missing) {
+      fail_at(map.path(), map.line(), fmt::format("{} is missing", map.field(info.name)));
+    }
+  }
+}
+
+void read_specifications(const YamlMap& root, Sensor& sensor) {
+  for (const std::string_view section : section_names()) {
+    const YamlMap map(root.at(section).value, root.path(), std::string(section));
+    for (const YamlMap::Entry& entry : map.entries()) {
+      const bool known = std::any_of(
+          kSpecifications.begin(), kSpecifications.end(),
+          [&](const Specification& s) { return s.section == section && s.name == entry.key; });
+      if (!known) {
+        fail_at(map.path(), entry.line, fmt::format("unknown field {}", map.field(entry.key)));
+      }
+    }
+    for (const Specification& s : kSpecifications) {
+      if (s.section != section) continue;
+      const Quantity quantity = read_quantity(map, s.name, s.unit, sensor);
+      if (quantity.value < s.lower || quantity.value > s.upper) {
+        fail_at(map.path(), quantity.line,
+                fmt::format("{} = {:g} {}, allowed {:g} to {:g}", map.field(s.name), quantity.value,
+                            s.unit, s.lower, s.upper));
+      }
+      sensor.*s.member = si_from_file(quantity.value, scale_of(s.unit));
+    }
+  }
+  if (sensor.range_minimum >= sensor.range_maximum) {
+    fail_at(root.path(), root.at("limits").line,
+            fmt::format("limits.range_minimum_m = {:g} m, allowed below range_maximum_m = {:g} m",
+                        sensor.range_minimum, sensor.range_maximum));
+  }
+}
+
+void read_covariance(const YamlMap& root, Sensor& sensor) {
+  const YamlMap map(root.at("covariance").value, root.path(), "covariance");
+  map.allow_only({"names", "matrix"});
+  const YamlMap::Entry& names = map.at("names");
+  if (!names.value.IsSequence() || names.value.size() == 0) {
+    fail_at(map.path(), names.line, "covariance.names: expected a list of parameter names");
+  }
+  std::vector<long double> scale;
+  for (const auto& node : names.value) {
+    const std::string name = yaml_text(node, map.path(), "covariance.names");
+    try {
+      scale.push_back(scale_of(find_parameter(name, sensor.prisms()).unit));
+    } catch (const InvalidArgument& error) {
+      fail_at(map.path(), yaml_line(node), fmt::format("covariance.names: {}", error.what()));
+    }
+    auto& known = sensor.covariance_names;
+    if (std::find(known.begin(), known.end(), name) != known.end()) {
+      fail_at(map.path(), yaml_line(node), fmt::format("covariance.names: {} stands twice", name));
+    }
+    known.push_back(name);
+  }
+  const YamlMap::Entry& matrix = map.at("matrix");
+  const std::size_t n = scale.size();
+  if (!matrix.value.IsSequence() || matrix.value.size() != n) {
+    fail_at(map.path(), matrix.line,
+            fmt::format("covariance.matrix: expected {} rows, one per name, found {}", n,
+                        matrix.value.size()));
+  }
+  const auto size = static_cast<Eigen::Index>(n);
+  sensor.covariance.resize(size, size);
+  std::vector<std::size_t> line(n);
+  for (std::size_t i = 0; i < n; ++i) {
+    const YAML::Node row = matrix.value[i];
+    line[i] = yaml_line(row);
+    if (!row.IsSequence() || row.size() != n) {
+      fail_at(
+          map.path(), line[i],
+          fmt::format("covariance.matrix[{}]: expected {} numbers, found {}", i, n, row.size()));
+    }
+    for (std::size_t j = 0; j < n; ++j) {
+      const auto field = fmt::format("covariance.matrix[{}][{}]", i, j);
+      sensor.covariance(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) =
+          si_from_file(yaml_number(row[j], map.path(), field), scale[i] * scale[j]);
+    }
+  }
+  const Eigen::MatrixXd& c = sensor.covariance;
+  for (Eigen::Index i = 0; i < size; ++i) {
+    if (!(c(i, i) > 0.0)) {
+      fail_at(map.path(), line[static_cast<std::size_t>(i)],
+              fmt::format("covariance.matrix[{0}][{0}]: a variance must be above 0", i));
+    }
+    for (Eigen::Index j = 0; j < i; ++j) {
+      if (std::abs(c(i, j) - c(j, i)) > 1e-12 * std::sqrt(c(i, i) * c(j, j))) {
+        fail_at(
+            map.path(), line[static_cast<std::size_t>(i)],
+            fmt::format("covariance.matrix is not symmetric: [{0}][{1}] differs from [{1}][{0}]", i,
+                        j));
+      }
+    }
+  }
+  const Eigen::VectorXd over_sigma = c.diagonal().cwiseSqrt().cwiseInverse();
+  const Eigen::MatrixXd correlation = over_sigma.asDiagonal() * c * over_sigma.asDiagonal();
+  const double smallest =
+      Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(correlation, Eigen::EigenvaluesOnly)
+          .eigenvalues()
+          .minCoeff();
+  if (smallest < -1e-9) {
+    fail_at(map.path(), matrix.line,
+            fmt::format("covariance.matrix is not positive: the smallest eigenvalue of its "
+                        "correlations is {:.3g}, allowed 0 and above",
+                        smallest));
+  }
+}
+
+/// Writes one quantity with what is known of it.
+std::string quantity_text(const Sensor& sensor, std::string_view name, double value,
+                          std::string_view unit, const Knowledge* known) {
+  const long double scale = scale_of(unit);
+  std::string text = fmt::format("  {}: {{value: {}, unit: {}", name,
+                                 file_number(value, scale, name), yaml_quoted(unit));
+  if (known == nullptr) known = sensor.find_knowledge(name);
+  if (known != nullptr) {
+    text += fmt::format(", sigma: {}, source: {}", file_number(known->sigma, scale, name),
+                        yaml_quoted(known->source));
+  }
+  return text + "}\n";
+}
+
+std::string parameters_text(const Sensor& sensor) {
+  std::string text = "parameters:\n";
+  const auto& list = parameter_list(sensor.prisms());
+  const auto own_of = [&](const ParameterInfo& shared) {
+    std::vector<const ParameterInfo*> own;
+    if (shared.kind != ParameterKind::train) return own;
+    for (const ParameterInfo& info : list) {
+      if (&info != &shared && info.kind == ParameterKind::train && info.places.size() == 1 &&
+          std::find(shared.places.begin(), shared.places.end(), info.places.front()) !=
+              shared.places.end()) {
+        own.push_back(&info);
+      }
+    }
+    return own;
+  };
+  std::vector<std::string_view> written;
+  const auto write = [&](const ParameterInfo& info, double value, const Knowledge* known) {
+    text += quantity_text(sensor, info.name, value, info.unit, known);
+    written.push_back(info.name);
+  };
+  for (const ParameterInfo& info : list) {
+    if (info.kind == ParameterKind::rotation_angle) continue;
+    if (std::find(written.begin(), written.end(), info.name) != written.end()) continue;
+    const double value = sensor.get(info.name);
+    const auto own = own_of(info);
+    const bool alike = std::all_of(own.begin(), own.end(), [&](const ParameterInfo* each) {
+      return sensor.get(each->name) == value && sensor.find_knowledge(each->name) == nullptr;
+    });
+    if (alike) {
+      write(info, value, nullptr);
+      for (const ParameterInfo* each : own) written.push_back(each->name);
+      continue;
+    }
+    for (const ParameterInfo* each : own) {
+      const Knowledge* known = sensor.find_knowledge(each->name);
+      if (known == nullptr) known = sensor.find_knowledge(info.name);
+      write(*each, sensor.get(each->name), known);
+    }
+  }
+  return text;
+}
+
+std::string covariance_text(const Sensor& sensor) {
+  const auto n = static_cast<Eigen::Index>(sensor.covariance_names.size());
+  if (sensor.covariance.rows() != n || sensor.covariance.cols() != n) {
+    throw InvalidArgument(fmt::format("covariance is {} x {}, expected {} x {}, one row per name",
+                                      sensor.covariance.rows(), sensor.covariance.cols(), n, n));
+  }
+  std::vector<long double> scale;
+  for (const std::string& name : sensor.covariance_names) {
+    scale.push_back(scale_of(find_parameter(name, sensor.prisms()).unit));
+  }
+  std::string text = "# Element [i][j] is in the unit of names[i] times the unit of names[j].\n";
+  text += fmt::format("covariance:\n  names: [{}]\n  matrix:\n",
+                      fmt::join(sensor.covariance_names, ", "));
+  for (Eigen::Index i = 0; i < n; ++i) {
+    std::vector<std::string> row;
+    for (Eigen::Index j = 0; j < n; ++j) {
+      const auto unit = scale[static_cast<std::size_t>(i)] * scale[static_cast<std::size_t>(j)];
+      row.push_back(file_number(sensor.covariance(i, j), unit, "covariance"));
+    }
+    text += fmt::format("    - [{}]\n", fmt::join(row, ", "));
+  }
+  return text;
+}
+
+}  // namespace
+
+std::vector<std::string> builtin_preset_names() {
+  std::vector<std::string> names;
+  for (const BuiltinPreset& preset : builtin_presets()) names.emplace_back(preset.name);
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
+Sensor load_sensor(const std::string& name_or_path) {
+  for (const BuiltinPreset& preset : builtin_presets()) {
+    if (preset.name == name_or_path) {
+      return parse_preset(preset.text, fmt::format("built-in preset {}", preset.name));
+    }
+  }
+  const std::filesystem::path path(name_or_path);
+  if (path.extension() == ".yaml" || path.extension() == ".yml" || std::filesystem::exists(path)) {
+    return parse_preset(read_text_file(name_or_path), name_or_path);
+  }
+  throw InvalidArgument(
+      fmt::format("sensor \"{}\" is neither a file nor a known preset; known presets: {}",
+                  name_or_path, fmt::join(builtin_preset_names(), ", ")));
+}
+
+Sensor parse_preset(const std::string& text, const std::string& path) {
+  const YamlMap root(parse_yaml(text, path), path, "");
+  if (root.find("risley_preset") == nullptr) {
+    fail_at(path, root.line(), "is no sensor preset: risley_preset is missing");
+  }
+  root.integer("risley_preset", kSchemaVersion, kSchemaVersion);
+  root.allow_only({"risley_preset", "name", "manufacturer", "model", "serial", "face_order",
+                   "combination", "device_type", "parameters", "noise", "resolution", "limits",
+                   "rates", "beam", "geometry", "covariance", "provenance"});
+  Sensor sensor;
+  sensor.name = root.text("name");
+  sensor.manufacturer = root.text("manufacturer");
+  sensor.model = root.text("model");
+  if (root.find("serial") != nullptr) sensor.serial = root.text("serial");
+  try {
+    sensor.train = PrismTrain(parse_face_order(root.text("face_order")));
+  } catch (const InvalidArgument& error) {
+    fail_at(path, root.at("face_order").line, fmt::format("face_order: {}", error.what()));
+  }
+  sensor.angular_velocity.assign(static_cast<std::size_t>(sensor.prisms()), 0.0);
+  if (root.find("combination") != nullptr) {
+    if (sensor.prisms() != 2) {
+      fail_at(path, root.at("combination").line,
+              fmt::format("combination is for sensors with 2 prisms, this one has {}",
+                          sensor.prisms()));
+    }
+    sensor.combination = static_cast<SpeedCombination>(root.integer("combination", 1, 2));
+  }
+  sensor.device_type = root.integer("device_type", 0, 255);
+  read_parameters(YamlMap(root.at("parameters").value, path, "parameters"), sensor);
+  read_specifications(root, sensor);
+  if (root.find("covariance") != nullptr) read_covariance(root, sensor);
+  if (root.find("provenance") != nullptr) {
+    const YamlMap provenance(root.at("provenance").value, path, "provenance");
+    for (const YamlMap::Entry& entry : provenance.entries()) {
+      sensor.provenance.emplace_back(entry.key, provenance.text(entry.key));
+    }
+  }
+  return sensor;
+}
+
+std::string preset_text(const Sensor& sensor) {
+  std::string text = fmt::format("risley_preset: {}\nname: {}\nmanufacturer: {}\nmodel: {}\n",
+                                 kSchemaVersion, yaml_quoted(sensor.name),
+                                 yaml_quoted(sensor.manufacturer), yaml_quoted(sensor.model));
+  if (!sensor.serial.empty()) text += fmt::format("serial: {}\n", yaml_quoted(sensor.serial));
+  text += fmt::format("face_order: {}\n", to_string(sensor.train.face_order()));
+  if (sensor.combination) {
+    text += fmt::format("combination: {}\n", static_cast<int>(*sensor.combination));
+  }
+  text += fmt::format("device_type: {}\n", sensor.device_type);
+  text += parameters_text(sensor);
+  for (const std::string_view section : section_names()) {
+    text += fmt::format("{}:\n", section);
+    for (const Specification& s : kSpecifications) {
+      if (s.section == section) {
+        text += quantity_text(sensor, s.name, sensor.*s.member, s.unit, nullptr);
+      }
+    }
+  }
+  if (!sensor.covariance_names.empty()) text += covariance_text(sensor);
+  if (!sensor.provenance.empty()) {
+    text += "provenance:\n";
+    for (const auto& [key, value] : sensor.provenance) {
+      text += fmt::format("  {}: {}\n", yaml_quoted(key), yaml_quoted(value));
+    }
+  }
+  return text;
+}
+
+}  // namespace risley::sensors

@@ -1,0 +1,68 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <initializer_list>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <yaml-cpp/yaml.h>
+
+/// Strict reading of YAML: every mistake becomes a FileError with its line.
+namespace risley::sensors {
+
+/// @throws FileError where the text is not YAML
+YAML::Node parse_yaml(const std::string& text, const std::string& path);
+
+/// Line of a node from 1, 0 when unknown.
+std::size_t yaml_line(const YAML::Node& node);
+
+/// @throws FileError always
+[[noreturn]] void fail_at(const std::string& path, std::size_t line, const std::string& problem);
+
+/// The node's finite number. @param field  for the message
+long double yaml_number(const YAML::Node& node, const std::string& path, const std::string& field);
+
+/// The node's plain text.
+std::string yaml_text(const YAML::Node& node, const std::string& path, const std::string& field);
+
+/// A map whose keys are all known: unknown, repeated and missing keys are errors.
+class YamlMap {
+ public:
+  struct Entry {
+    std::string key;
+    std::size_t line;
+    YAML::Node value;
+  };
+
+  /// @param field  how messages call this map, e.g. "planes[2]"; empty for the whole file
+  YamlMap(const YAML::Node& node, std::string path, std::string field);
+
+  /// @throws FileError for a key that is not among these
+  void allow_only(std::initializer_list<std::string_view> keys) const;
+
+  const std::vector<Entry>& entries() const { return entries_; }
+  /// The entry of that key, or nullptr.
+  const Entry* find(std::string_view key) const;
+  /// The entry of that key. @throws FileError naming the key when it is missing
+  const Entry& at(std::string_view key) const;
+
+  std::string text(std::string_view key) const;
+  /// @throws FileError with value, unit and range unless lower <= number <= upper
+  long double number(std::string_view key, long double lower, long double upper,
+                     std::string_view unit) const;
+  int integer(std::string_view key, int lower, int upper) const;
+
+  /// How messages call an entry, e.g. "noise.angle_noise_deg".
+  std::string field(std::string_view key) const;
+  const std::string& path() const { return path_; }
+  std::size_t line() const { return line_; }
+
+ private:
+  std::string path_, field_;
+  std::size_t line_ = 0;
+  std::vector<Entry> entries_;
+};
+
+}  // namespace risley::sensors

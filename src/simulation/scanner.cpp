@@ -1,0 +1,256 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "risley/simulation/scanner.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <span>
+#include <string_view>
+#include <utility>
+
+#include <fmt/format.h>
+#include <oneapi/tbb/blocked_range.h>
+#include <oneapi/tbb/parallel_for.h>
+#include <oneapi/tbb/task_arena.h>
+
+#include "risley/core/angle.hpp"
+#include "risley/optics/batch.hpp"
+#include "risley/simulation/noise.hpp"
+
+#include "simulation/streams.hpp"
+
+namespace risley::simulation {
+namespace {
+
+constexpr std::size_t kBlockRows = 4096;
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+constexpr double kMattIntensity = 120.0;
+
+void check_range(std::string_view name, double value, std::string_view unit, double lower,
+                 double upper) {
+  if (value >= lower && value <= upper) return;
+  throw InvalidArgument(
+      fmt::format("{} = {:g} {}, allowed {:g} to {:g}", name, value, unit, lower, upper));
+}
+
+SimulationSettings checked(SimulationSettings settings) {
+  const auto prisms = static_cast<std::size_t>(settings.truth.prisms());
+  check_range("duration", settings.duration, "s", 1e-9, 1e7);
+  if (!settings.rate) settings.rate = settings.truth.shot_rate;
+  check_range("rate", *settings.rate, "Hz", 1e-3, 1e9);
+  check_range("duration times rate", settings.duration * *settings.rate, "shots", 0.5, 1e12);
+  if (!settings.angle_noise) settings.angle_noise = settings.truth.angle_noise;
+  if (!settings.range_noise) settings.range_noise = settings.truth.range_noise;
+  check_range("threads", settings.threads, "", 0, 4096);
+  check_range("device type", settings.truth.device_type, "", 0, 255);
+  if (settings.truth.angular_velocity.size() != prisms) {
+    throw InvalidArgument(fmt::format("sensor \"{}\" has {} speeds for {} prisms",
+                                      settings.truth.name, settings.truth.angular_velocity.size(),
+                                      prisms));
+  }
+  if (settings.reported && settings.reported->prisms() != settings.truth.prisms()) {
+    throw InvalidArgument(fmt::format("the reported sensor has {} prisms, the true one {}",
+                                      settings.reported->prisms(), prisms));
+  }
+  if (settings.start_angles.empty()) {
+    const RandomStream random(settings.seed, stream::kStartAngles);
+    for (std::size_t i = 0; i < prisms; ++i) {
+      settings.start_angles.push_back(kTwoPi * random.uniform(i));
+    }
+  }
+  if (settings.start_angles.size() != prisms) {
+    throw InvalidArgument(
+        fmt::format("{} start angles given for {} prisms", settings.start_angles.size(), prisms));
+  }
+  if (!settings.rotor_settings) {
+    settings.rotor_settings = rotor_settings(settings.rotor, settings.truth.prisms());
+  }
+  if (!settings.station.empty() && !settings.scene) {
+    throw InvalidArgument(fmt::format("station \"{}\" needs a scene", settings.station));
+  }
+  return settings;
+}
+
+NoiseSettings noise_settings(const SimulationSettings& settings) {
+  NoiseSettings noise;
+  noise.angle = *settings.angle_noise;
+  noise.range = *settings.range_noise;
+  if (settings.quantize) {
+    noise.angle_resolution = settings.truth.angle_resolution;
+    noise.range_resolution = settings.truth.range_resolution;
+  }
+  return noise;
+}
+
+recordings::RecordingHeader make_header(const SimulationSettings& settings) {
+  recordings::RecordingHeader header;
+  header.format = "simulation";
+  recordings::Device device;
+  // Broadcast codes have 15 characters, of which the last counts the sensor's heads.
+  device.serial = settings.truth.serial.empty()
+                      ? fmt::format("SIM{:011}1", settings.seed % 100'000'000'000)
+                      : settings.truth.serial;
+  device.type = static_cast<std::uint8_t>(settings.truth.device_type);
+  header.devices.push_back(device);
+  header.time_reference = recordings::TimeReference::power_on;
+  header.has_range = settings.scene.has_value();
+  header.has_intensity = settings.scene.has_value();
+  return header;
+}
+
+std::span<double> part(std::vector<double>& column, std::size_t first, std::size_t count) {
+  return std::span(column).subspan(first, count);
+}
+
+}  // namespace
+
+class Scanner::Work {
+ public:
+  explicit Work(SimulationSettings given)
+      : settings(checked(std::move(given))),
+        header(make_header(settings)),
+        shots(static_cast<std::uint64_t>(std::llround(settings.duration * *settings.rate))),
+        noise_(noise_settings(settings), settings.seed),
+        arena_(settings.threads == 0 ? oneapi::tbb::task_arena::automatic : settings.threads) {
+    if (settings.scene) station_ = settings.scene->station(settings.station);
+    for (int i = 0; i < settings.truth.prisms(); ++i) {
+      const auto at = static_cast<std::size_t>(i);
+      rotors_.emplace_back(*settings.rotor_settings, i, settings.start_angles[at],
+                           settings.truth.angular_velocity[at], time_of(shots - 1), settings.seed);
+    }
+  }
+
+  bool read(recordings::Chunk& chunk, recordings::TruthColumns& truth, std::size_t max_rows) {
+    chunk.clear();
+    const auto rows = static_cast<std::size_t>(std::min<std::uint64_t>(max_rows, shots - done));
+    chunk.observations.resize(rows);
+    truth.resize(settings.truth.prisms(), rows);
+    if (rows == 0) return false;
+    const std::size_t blocks = (rows + kBlockRows - 1) / kBlockRows;
+    arena_.execute([&] {
+      oneapi::tbb::parallel_for(std::size_t{0}, blocks, [&](std::size_t block) {
+        const std::size_t first = block * kBlockRows;
+        fill(chunk.observations, truth, first, std::min(kBlockRows, rows - first));
+      });
+    });
+    const auto& valid = chunk.observations.valid;
+    no_return += static_cast<std::uint64_t>(std::count(valid.begin(), valid.end(), 0));
+    done += rows;
+    return true;
+  }
+
+  const SimulationSettings settings;
+  const recordings::RecordingHeader header;
+  const std::uint64_t shots;
+  std::uint64_t done = 0, no_return = 0;
+
+ private:
+  std::int64_t time_of(std::uint64_t shot) const {
+    return std::llround(static_cast<long double>(shot) * 1e9L /
+                        static_cast<long double>(*settings.rate));
+  }
+
+  /// Rows [first, first + count) of the pieces; the row 0 of a piece is shot number done.
+  void fill(recordings::Observations& rows, recordings::TruthColumns& truth, std::size_t first,
+            std::size_t count) const {
+    const std::uint64_t first_shot = done + first;
+    const auto times = std::span(truth.time_ns).subspan(first, count);
+    for (std::size_t i = 0; i < count; ++i) times[i] = time_of(first_shot + i);
+    std::copy(times.begin(), times.end(),
+              rows.time_ns.begin() + static_cast<std::ptrdiff_t>(first));
+
+    std::vector<std::vector<double>> wrapped(rotors_.size());
+    std::vector<std::span<const double>> angles;
+    for (std::size_t prism = 0; prism < rotors_.size(); ++prism) {
+      const auto angle = part(truth.rotation_angle[prism], first, count);
+      rotors_[prism].evaluate(times, angle, part(truth.angular_velocity[prism], first, count));
+      wrapped[prism].resize(count);
+      std::transform(angle.begin(), angle.end(), wrapped[prism].begin(), wrap_to_two_pi);
+      angles.emplace_back(wrapped[prism]);
+    }
+    std::vector<double> x, y, z;
+    DirectionColumns beam;
+    if (settings.scene) {
+      for (auto* column : {&x, &y, &z}) column->resize(count);
+      beam = {x, y, z, {}, {}};
+    }
+    beam.azimuth = part(truth.azimuth, first, count);
+    beam.zenith = part(truth.zenith, first, count);
+    observe_batch(settings.truth.train, angles, beam);
+
+    const auto azimuth = part(rows.azimuth, first, count);
+    const auto zenith = part(rows.zenith, first, count);
+    if (settings.reported) {
+      observe_batch(settings.reported->train, angles, {{}, {}, {}, azimuth, zenith});
+    } else {
+      std::copy(beam.azimuth.begin(), beam.azimuth.end(), azimuth.begin());
+      std::copy(beam.zenith.begin(), beam.zenith.end(), zenith.begin());
+    }
+    for (std::size_t i = 0; i < count; ++i) {  // without a beam there is nothing to report
+      if (std::isnan(beam.azimuth[i])) azimuth[i] = zenith[i] = kNaN;
+    }
+    noise_.apply_to_angles(first_shot, azimuth, zenith);
+
+    const auto range = part(rows.range, first, count);
+    const auto true_range = part(truth.range, first, count);
+    for (std::size_t i = 0; i < count; ++i) {
+      const std::size_t row = first + i;
+      true_range[i] = kNaN;
+      range[i] = settings.scene ? 0.0 : kNaN;
+      rows.intensity[row] = 0;
+      if (settings.scene && !std::isnan(beam.azimuth[i])) {
+        const auto hit = nearest_hit(*settings.scene, station_.position,
+                                     station_.scene_from_sensor({x[i], y[i], z[i]}));
+        if (hit) {
+          true_range[i] = hit->range;
+          if (hit->range >= settings.truth.range_minimum &&
+              hit->range <= settings.truth.range_maximum) {
+            range[i] = hit->range;
+            rows.intensity[row] =
+                static_cast<std::uint8_t>(std::lround(kMattIntensity * hit->cosine));
+          }
+        }
+      }
+    }
+    noise_.apply_to_ranges(first_shot, range);
+
+    const auto angle_step = static_cast<float>(noise_.settings().angle_resolution);
+    const auto range_step = static_cast<float>(noise_.settings().range_resolution);
+    for (std::size_t row = first; row < first + count; ++row) {
+      const bool valid = !std::isnan(rows.azimuth[row]) && rows.range[row] != 0.0;
+      rows.azimuth_resolution[row] = angle_step;
+      rows.zenith_resolution[row] = angle_step;
+      rows.range_resolution[row] = settings.scene ? range_step : 0.0F;
+      if (!valid) rows.intensity[row] = 0;
+      rows.return_number[row] = 1;
+      rows.tag[row] = 0;
+      rows.beam[row] = 0;
+      rows.device[row] = 0;
+      rows.valid[row] = valid ? 1 : 0;
+    }
+  }
+
+  ObservationNoise noise_;
+  oneapi::tbb::task_arena arena_;
+  Station station_;
+  std::vector<RotorMotion> rotors_;
+};
+
+Scanner::Scanner(SimulationSettings settings)
+    : work_(std::make_unique<Work>(std::move(settings))) {}
+Scanner::~Scanner() = default;
+
+const SimulationSettings& Scanner::settings() const { return work_->settings; }
+const recordings::RecordingHeader& Scanner::header() const { return work_->header; }
+std::uint64_t Scanner::shots() const { return work_->shots; }
+std::uint64_t Scanner::shots_done() const { return work_->done; }
+std::uint64_t Scanner::no_return() const { return work_->no_return; }
+const std::vector<double>& Scanner::start_angles() const { return work_->settings.start_angles; }
+
+bool Scanner::read(recordings::Chunk& chunk, recordings::TruthColumns& truth,
+                   std::size_t max_rows) {
+  return work_->read(chunk, truth, max_rows);
+}
+
+}  // namespace risley::simulation

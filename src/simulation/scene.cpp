@@ -1,0 +1,181 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "risley/simulation/scene.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <tuple>
+#include <utility>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "risley/core/angle.hpp"
+#include "risley/core/error.hpp"
+#include "risley/core/output_file.hpp"
+
+#include "sensors/yaml_map.hpp"
+
+namespace risley::simulation {
+namespace {
+
+using sensors::fail_at;
+using sensors::YamlMap;
+
+constexpr double kFarthest = 1e6;  // m
+
+double number(const YamlMap& map, std::string_view key, double lower, double upper,
+              std::string_view unit) {
+  return static_cast<double>(map.number(key, lower, upper, unit));
+}
+
+double angle(const YamlMap& map, std::string_view key, double lower_deg, double upper_deg) {
+  return radians_from_degrees(number(map, key, lower_deg, upper_deg, "deg"));
+}
+
+template <std::size_t N>
+std::array<double, N> numbers(const YamlMap& map, std::string_view key, double lower,
+                              double upper) {
+  const YamlMap::Entry& entry = map.at(key);
+  if (!entry.value.IsSequence() || entry.value.size() != N) {
+    fail_at(map.path(), entry.line,
+            fmt::format("{}: expected a list of {} numbers in m", map.field(key), N));
+  }
+  std::array<double, N> values{};
+  for (std::size_t i = 0; i < N; ++i) {
+    const std::string field = fmt::format("{}[{}]", map.field(key), i);
+    values[i] = static_cast<double>(sensors::yaml_number(entry.value[i], map.path(), field));
+    if (values[i] < lower || values[i] > upper) {
+      fail_at(map.path(), entry.line,
+              fmt::format("{} = {:g} m, allowed {:g} to {:g}", field, values[i], lower, upper));
+    }
+  }
+  return values;
+}
+
+/// The name of an entry that no earlier entry has.
+template <class Entries>
+std::string new_name(const YamlMap& map, const Entries& earlier) {
+  std::string name = map.text("name");
+  if (name.empty()) fail_at(map.path(), map.at("name").line, map.field("name") + " is empty");
+  for (const auto& entry : earlier) {
+    if (entry.name == name) {
+      fail_at(map.path(), map.at("name").line,
+              fmt::format("{} = \"{}\" stands twice", map.field("name"), name));
+    }
+  }
+  return name;
+}
+
+ScenePlane read_plane(const YamlMap& map, const std::vector<ScenePlane>& earlier) {
+  map.allow_only({"name", "distance_m", "normal_azimuth_deg", "normal_zenith_deg", "extent_m",
+                  "center_m", "sigma_deg"});
+  ScenePlane plane;
+  plane.name = new_name(map, earlier);
+  const double azimuth = angle(map, "normal_azimuth_deg", -360, 360);
+  const double zenith = angle(map, "normal_zenith_deg", 0, 180);
+  plane.plane =
+      plane_from_angles({azimuth, zenith}, number(map, "distance_m", 1e-3, kFarthest, "m"));
+  plane.horizontal_axis = {-std::sin(azimuth), std::cos(azimuth), 0.0};
+  plane.vertical_axis = cross(plane.plane.normal, plane.horizontal_axis);
+  if (map.find("extent_m") != nullptr) plane.extent = numbers<2>(map, "extent_m", 1e-3, kFarthest);
+  if (const auto* center = map.find("center_m")) {
+    if (!plane.extent) {
+      fail_at(map.path(), center->line,
+              fmt::format("{} needs {}", map.field("center_m"), map.field("extent_m")));
+    }
+    plane.center = numbers<2>(map, "center_m", -kFarthest, kFarthest);
+  }
+  if (map.find("sigma_deg") != nullptr) plane.normal_sigma = angle(map, "sigma_deg", 0, 180);
+  return plane;
+}
+
+Station read_station(const YamlMap& map, const std::vector<Station>& earlier) {
+  map.allow_only({"name", "position_m", "roll_deg", "pitch_deg", "yaw_deg", "sigma_deg"});
+  Station station;
+  station.name = new_name(map, earlier);
+  if (map.find("position_m") != nullptr) {
+    const auto [x, y, z] = numbers<3>(map, "position_m", -kFarthest, kFarthest);
+    station.position = {x, y, z};
+  }
+  const auto optional_angle = [&](std::string_view key, double lower_deg) {
+    return map.find(key) == nullptr ? 0.0 : angle(map, key, lower_deg, 360);
+  };
+  station.roll = optional_angle("roll_deg", -360);
+  station.pitch = optional_angle("pitch_deg", -360);
+  station.yaw = optional_angle("yaw_deg", -360);
+  station.sigma = optional_angle("sigma_deg", 0);
+  return station;
+}
+
+}  // namespace
+
+Vector3<double> Station::scene_from_sensor(const Vector3<double>& direction) const {
+  const auto turned = [](double a, double b, double by) {
+    return std::pair{std::cos(by) * a - std::sin(by) * b, std::sin(by) * a + std::cos(by) * b};
+  };
+  Vector3<double> v = direction;
+  if (roll != 0.0) std::tie(v.y, v.z) = turned(v.y, v.z, roll);
+  if (pitch != 0.0) std::tie(v.z, v.x) = turned(v.z, v.x, pitch);
+  if (yaw != 0.0) std::tie(v.x, v.y) = turned(v.x, v.y, yaw);
+  return v;
+}
+
+Station Scene::station(std::string_view name) const {
+  if (name.empty()) return {};
+  std::vector<std::string> known;
+  for (const Station& station : stations) {
+    if (station.name == name) return station;
+    known.push_back(station.name);
+  }
+  throw InvalidArgument(
+      fmt::format("unknown station \"{}\", the scene has: {}", name,
+                  known.empty() ? "none" : fmt::format("{}", fmt::join(known, ", "))));
+}
+
+std::optional<Hit> nearest_hit(const Scene& scene, const Vector3<double>& origin,
+                               const Vector3<double>& direction) {
+  std::optional<Hit> nearest;
+  for (std::size_t i = 0; i < scene.planes.size(); ++i) {
+    const ScenePlane& each = scene.planes[i];
+    const double range = hit_distance(each.plane, origin, direction);
+    if (!(range > 0.0 && range <= kFarthest) || (nearest && range >= nearest->range)) continue;
+    if (each.extent) {
+      const Vector3<double> from_foot =
+          origin + range * direction - each.plane.distance * each.plane.normal;
+      const double across = dot(from_foot, each.horizontal_axis) - each.center[0];
+      const double up = dot(from_foot, each.vertical_axis) - each.center[1];
+      if (std::abs(across) > 0.5 * (*each.extent)[0] || std::abs(up) > 0.5 * (*each.extent)[1]) {
+        continue;
+      }
+    }
+    nearest = Hit{range, std::min(1.0, std::abs(dot(each.plane.normal, direction))), i};
+  }
+  return nearest;
+}
+
+Scene parse_scene(const std::string& text, const std::string& path) {
+  const YamlMap root(sensors::parse_yaml(text, path), path, "");
+  root.allow_only({"planes", "stations"});
+  Scene scene;
+  const auto for_each_map = [&](std::string_view key, auto&& read) {
+    const YamlMap::Entry* entry = root.find(key);
+    if (entry == nullptr) return;
+    if (!entry->value.IsSequence()) {
+      fail_at(path, entry->line, fmt::format("{}: expected a list", key));
+    }
+    for (std::size_t i = 0; i < entry->value.size(); ++i) {
+      read(YamlMap(entry->value[i], path, fmt::format("{}[{}]", key, i)));
+    }
+  };
+  for_each_map("planes",
+               [&](const YamlMap& map) { scene.planes.push_back(read_plane(map, scene.planes)); });
+  for_each_map("stations", [&](const YamlMap& map) {
+    scene.stations.push_back(read_station(map, scene.stations));
+  });
+  return scene;
+}
+
+Scene load_scene(const std::string& path) { return parse_scene(read_text_file(path), path); }
+
+}  // namespace risley::simulation

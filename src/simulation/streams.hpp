@@ -1,0 +1,18 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstdint>
+
+/// What each stream of random numbers is for. A number once given keeps its meaning, or seeds would
+/// change theirs.
+namespace risley::simulation::stream {
+
+inline constexpr std::uint64_t kStartAngles = 1;
+inline constexpr std::uint64_t kOscillationPhases = 2;
+inline constexpr std::uint64_t kAzimuthNoise = 3;
+inline constexpr std::uint64_t kZenithNoise = 4;
+inline constexpr std::uint64_t kRangeNoise = 5;
+constexpr std::uint64_t random_walk(int prism) { return 100 + static_cast<std::uint64_t>(prism); }
+
+}  // namespace risley::simulation::stream

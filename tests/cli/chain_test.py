@@ -1,0 +1,166 @@
+#!/usr/bin/env python3
+# SPDX-FileCopyrightText: 2026 The risley authors
+# SPDX-License-Identifier: MIT
+"""Simulate, look, convert, estimate: the keys that scripts read, and results that repeat."""
+import hashlib
+import pathlib
+import unittest
+
+from command import SOURCE, CommandTest
+
+INFO_KEYS = {"format", "sensor", "observations", "no_return", "duration_s", "rate_hz", "has_range",
+             "gaps", "time_resets", "azimuth_deg", "zenith_deg"}
+ESTIMATE_KEYS = {"converged", "method", "observations_used", "outliers", "combination", "mirrored",
+                 "parameters", "residuals", "seconds", "truth"}
+MOMENTS = {"mean", "std", "rms", "skewness", "kurtosis"}
+ESTIMATED = {"refractive_index", "incident_beam_horizontal_deg", "incident_beam_vertical_deg",
+             "bearing_tilt_a_horizontal_deg", "bearing_tilt_a_vertical_deg",
+             "prism_tilt_a_vertical_deg", "prism_tilt_b_horizontal_deg",
+             "prism_tilt_b_vertical_deg", "angular_velocity_a_deg_per_s",
+             "angular_velocity_b_deg_per_s", "rotation_angle_a_deg", "rotation_angle_b_deg"}
+ROOM = SOURCE / "data" / "room.yaml"
+
+
+def digest(path):
+    return hashlib.sha256(pathlib.Path(path).read_bytes()).hexdigest()
+
+
+class ChainTest(CommandTest):
+    def check_info(self, name, expected):
+        info = self.expect_json(0, "info", name)
+        self.assertLessEqual(INFO_KEYS, info.keys())
+        for key in ("azimuth_deg", "zenith_deg"):
+            self.assertLessEqual({"min", "max"}, info[key].keys())
+            self.assertLess(info[key]["min"], info[key]["max"])
+        for key, value in expected.items():
+            self.assertEqual(info[key], value, key)
+        return info
+
+    def check_estimate(self, result):
+        self.assertLessEqual(ESTIMATE_KEYS, result.keys())
+        self.assertTrue(result["converged"])
+        self.assertEqual(result["method"], "ekf")
+        self.assertFalse(result["mirrored"])
+        self.assertLessEqual(ESTIMATED, result["parameters"].keys())
+        for value in result["parameters"].values():
+            self.assertEqual(value.keys(), {"value", "sigma"})
+        for axis in ("azimuth_deg", "zenith_deg"):
+            self.assertLessEqual(MOMENTS, result["residuals"][axis].keys())
+        self.assertLessEqual({"read", "solve", "total"}, result["seconds"].keys())
+        truth = result["truth"]
+        self.assertEqual(truth["parameters"].keys(), result["parameters"].keys())
+        for name, value in truth["parameters"].items():
+            self.assertEqual(value.keys(), {"true", "error", "error_over_sigma"})
+            self.assertLess(abs(value["error_over_sigma"]), 6, name)
+        self.assertEqual(truth["rotation_angle_rmse_deg"].keys(), {"a", "b"})
+        self.assertLessEqual({"nees_parameters", "nees_rotation_angles"}, truth.keys())
+
+    def test_lvx(self):
+        simulated = self.expect_json(
+            0, "simulate", "-o", "unit.lvx", "--sensor", "mid-40-table3", "--scene", ROOM,
+            "--duration-s", "4", "--rate-hz", "1000", "--seed", "1")
+        self.assertEqual(simulated["observations"], 4000)
+        self.assertAlmostEqual(simulated["truth"]["wedge_angle_deg"], 18, places=9)
+        info = self.check_info("unit.lvx", {"has_range": True, "time_resets": 0})
+        self.assertIn("Mid-40", info["sensor"])
+        # The packets of this format have a place for each of 100 000 shots a second.
+        self.assertEqual(info["observations"] - info["no_return"], 4000)
+        result = self.expect_json(0, "estimate", "unit.lvx", "--truth", "unit.lvx.truth.yaml",
+                                  "-o", "out")
+        self.check_estimate(result)
+        self.assertEqual(result["combination"], 2)
+        self.assertEqual({path.name for path in (self.folder / "out").iterdir()},
+                         {"calibration.yaml", "states.nc", "report.html"})
+        page = (self.folder / "out" / "report.html").read_text(encoding="utf-8")
+        self.assertIn(digest(self.folder / "unit.lvx"), page)
+        self.assertIn("risley estimate unit.lvx", page)
+        self.assertNotRegex(page, r"(src|href)\s*=\s*[\"']?(https?:)?//")
+        self.assertLess(len(page), 4_000_000)
+        calibration = (self.folder / "out" / "calibration.yaml").read_text(encoding="utf-8")
+        self.assertIn(digest(self.folder / "unit.lvx"), calibration)
+        # A calibration is a preset: it serves as a sensor.
+        again = self.expect_json(0, "estimate", "unit.lvx", "--sensor", "out/calibration.yaml")
+        self.assertTrue(again["converged"])
+
+    def test_csv(self):
+        simulated = self.expect_json(
+            0, "simulate", "-o", "unit.csv", "--duration-s", "4", "--rate-hz", "1000",
+            "--noise-angle-deg", "0.01", "--quantize", "no", "--seed", "2",
+            "--set", "prism_tilt_a_vertical_deg=0.1", "--start-angles-deg", "10,20")
+        truth = simulated["truth"]
+        self.assertAlmostEqual(truth["prism_tilt_a_vertical_deg"], 0.1, places=9)
+        self.assertAlmostEqual(truth["rotation_angle_a_deg"], 10, places=9)
+        self.check_info("unit.csv", {"observations": 4000, "has_range": False, "gaps": 0})
+        self.assertEqual(self.expect_json(0, "convert", "unit.csv", "-o", "unit.nc")
+                         ["observations"], 4000)
+        self.check_info("unit.nc", {"observations": 4000, "has_range": False})
+        self.expect(0, "convert", "unit.nc", "-o", "again", "--format", "scan-sequence-csv")
+        self.assertEqual(digest(self.folder / "unit.csv"), digest(self.folder / "again"))
+        result = self.expect_json(0, "estimate", "unit.csv", "--truth", "unit.csv.truth.yaml",
+                                  "--noise-angle-deg", "0.01")
+        self.check_estimate(result)
+        self.assertEqual(result["combination"], 1)
+        self.assertEqual(result["observations_used"], 4000)
+
+    def test_fixed_and_freed(self):
+        self.expect(0, "simulate", "-o", "fix.csv", "--duration-s", "2", "--rate-hz", "1000",
+                    "--noise-angle-deg", "0.01", "--quantize", "no")
+        result = self.expect_json(0, "estimate", "fix.csv", "--noise-angle-deg", "0.01",
+                                  "--fix", "refractive_index=1.51", "--fix",
+                                  "bearing_tilt_a_vertical_deg",
+                                  "--free", "prism_tilt_a_horizontal_deg")
+        self.assertNotIn("refractive_index", result["parameters"])
+        self.assertNotIn("bearing_tilt_a_vertical_deg", result["parameters"])
+        self.assertIn("prism_tilt_a_horizontal_deg", result["parameters"])
+        self.assertEqual(result["fixed"]["refractive_index_a"], 1.51)
+        self.expect(2, "estimate", "fix.csv", "--fix", "no_such_parameter")
+
+    def test_reported_nominal(self):
+        arguments = ("--sensor", "mid-40-table3", "--rate-hz", "1000", "--duration-s", "0.2",
+                     "--noise-angle-deg", "0", "--quantize", "no")
+        self.expect(0, "simulate", "-o", "true.csv", *arguments)
+        self.expect(0, "simulate", "-o", "believed.csv", *arguments, "--reported", "nominal")
+        self.assertNotEqual(digest(self.folder / "true.csv"), digest(self.folder / "believed.csv"))
+
+    def test_same_seed_same_bytes(self):
+        outputs = []
+        for threads, seed in ((1, 5), (2, 5), (2, 6)):
+            folder = self.folder / f"{threads}-{seed}"
+            folder.mkdir()
+            # The command is part of the truth file, so the folder must not be.
+            import command
+            done = command.run("simulate", "-o", "same.lvx", "--scene", ROOM, "--duration-s", "0.5",
+                               "--rotor", "sinusoidal", "--threads", threads, "--seed", seed,
+                               folder=folder)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            outputs.append((digest(folder / "same.lvx"), digest(folder / "same.lvx.truth.nc")))
+        self.assertEqual(outputs[0], outputs[1])
+        self.assertNotEqual(outputs[0][0], outputs[2][0])
+
+    def test_recordings_that_cannot_answer(self):
+        self.expect(0, "simulate", "-o", "short.csv", "--duration-s", "0.03")
+        invalid = ["//Distance,Zenith,Azimuth,Inten-sity,Time\n"]
+        invalid += [f"0.000,90.00,0.00,0,{0.00001 * i:.6f}\n" for i in range(100)]
+        (self.folder / "blind.csv").write_text("".join(invalid))
+        for name in ("short.csv", "blind.csv"):
+            with self.subTest(name=name):
+                result = self.expect_json(1, "estimate", name)
+                self.assertFalse(result["converged"])
+                self.assertTrue(result["reason"])
+                self.assertEqual(result["exit_status"], 1)
+                self.assertTrue(self.expect(1, "estimate", name).stderr)
+
+    def test_not_converged_still_writes(self):
+        self.expect(0, "simulate", "-o", "noisy.csv", "--duration-s", "1", "--rate-hz", "2000",
+                    "--noise-angle-deg", "0.05", "--quantize", "no")
+        result = self.expect_json(1, "estimate", "noisy.csv", "--noise-angle-deg", "0.002",
+                                  "--process-noise", "1", "-o", "noisy")
+        self.assertFalse(result["converged"])
+        self.assertTrue(result["reason"])
+        self.assertTrue(result["parameters"])
+        page = (self.folder / "noisy" / "report.html").read_text(encoding="utf-8")
+        self.assertIn("Not converged", page)
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,47 @@
+# SPDX-FileCopyrightText: 2026 The risley authors
+# SPDX-License-Identifier: MIT
+"""Runs the risley command for the tests beside this file."""
+import json
+import os
+import pathlib
+import shutil
+import subprocess
+import tempfile
+import unittest
+
+COMMAND = os.environ["RISLEY_COMMAND"]
+SOURCE = pathlib.Path(os.environ["RISLEY_SOURCE_DIR"])
+
+
+def run(*arguments, folder=None):
+    """The finished process, with text of stdout and stderr."""
+    return subprocess.run([COMMAND, *map(str, arguments)], cwd=folder, capture_output=True,
+                          text=True, timeout=300, check=False)
+
+
+class CommandTest(unittest.TestCase):
+    """A test with a folder of its own."""
+
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = pathlib.Path(tempfile.mkdtemp(prefix="risley-cli-"))
+
+    @classmethod
+    def tearDownClass(cls):
+        shutil.rmtree(cls.folder)
+
+    def expect(self, status, *arguments):
+        """Runs in the test's folder and demands an exit status."""
+        done = run(*arguments, folder=self.folder)
+        self.assertEqual(done.returncode, status, f"{arguments}\n{done.stdout}\n{done.stderr}")
+        return done
+
+    def expect_json(self, status, *arguments):
+        """As expect with --json: stdout must be one object and nothing else."""
+        result = json.loads(self.expect(status, *arguments, "--json").stdout)
+        self.assertIsInstance(result, dict)
+        return result
+
+    def names(self):
+        """What lies in the folder."""
+        return {path.name for path in self.folder.iterdir()}

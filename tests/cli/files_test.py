@@ -1,0 +1,124 @@
+#!/usr/bin/env python3
+# SPDX-FileCopyrightText: 2026 The risley authors
+# SPDX-License-Identifier: MIT
+"""Missing, unknown and damaged files."""
+import os
+import struct
+import unittest
+
+from command import CommandTest
+
+HEADER = "Time/s,Azimuth/deg,Zenith/deg\n"
+# Name, content, and what message and JSON must tell.
+BAD = [
+    ("missing.lvx", None, "no such file", {}),
+    ("empty.lvx", b"", "empty", {"byte_offset": 0}),
+    ("unknown.lvx", b"\x89PNG\r\n\x1a\n" + bytes(64), "no known kind", {"byte_offset": 0}),
+    ("magic.lvx", b"livox_tick" + bytes(200), "no known kind", {"byte_offset": 0}),
+    ("nan.csv", (HEADER + "0.00001,1.0,90.0\n0.00002,nan,90.0\n").encode(), "nan", {"line": 3}),
+    ("word.csv", (HEADER + "0.00001,1.0,90.0\n0.00002,1.0,up\n").encode(), "up", {"line": 3}),
+]
+
+
+class FilesTest(CommandTest):
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        for name, content, _, _ in BAD:
+            if content is not None:
+                (cls.folder / name).write_bytes(content)
+
+    def test_bad_inputs(self):
+        for name, _, words, place in BAD:
+            for verb in ("info", "estimate"):
+                with self.subTest(name=name, verb=verb):
+                    done = self.expect(3, verb, name)
+                    self.assertIn(name, done.stderr)
+                    self.assertIn(words, done.stderr)
+                    result = self.expect_json(3, verb, name)
+                    self.assertEqual(result["exit_status"], 3)
+                    self.assertIn(words, result["error"])
+                    for key, value in place.items():
+                        self.assertEqual(result[key], value)
+
+    def test_rows_before_damage_are_told(self):
+        result = self.expect_json(3, "info", "nan.csv")
+        self.assertEqual(result["observations"], 1)
+
+    def test_bad_side_files(self):
+        (self.folder / "bad.yaml").write_text("planes:\n  - {name: wall, distance: 3}\n")
+        for arguments in (["--scene", "bad.yaml"], ["--sensor", "bad.yaml"],
+                          ["--scene", "missing.yaml"]):
+            before = self.names()
+            done = self.expect(3, "simulate", "-o", "out.csv", *arguments)
+            self.assertIn(arguments[1], done.stderr)
+            self.assertEqual(self.names(), before)
+
+    def test_unwritable_output_leaves_nothing(self):
+        self.expect(0, "simulate", "-o", "good.csv", "--rate-hz", "1000")
+        before = self.names()
+        for arguments in (["simulate", "-o", "nowhere/out.csv", "--rate-hz", "1000"],
+                          ["convert", "good.csv", "-o", "nowhere/out.csv"],
+                          ["estimate", "good.csv", "-o", "good.csv/results"]):
+            with self.subTest(arguments=arguments):
+                done = self.expect(3, *arguments)
+                self.assertIn(arguments[-1] if "-o" == arguments[-2] else arguments[2], done.stderr)
+                self.assertEqual(self.names(), before)
+
+    @unittest.skipUnless(os.path.exists("/dev/full"), "no /dev/full")
+    def test_full_disk_is_an_error(self):
+        self.expect(3, "simulate", "-o", "/dev/full/out.csv", "--rate-hz", "1000")
+
+
+def damaged_lvx(lvx):
+    """The same file with a wrong packet version in its last frame: (bytes, offset of that frame)."""
+    data = bytearray(lvx)
+    frame, last = 29 + 59 * data[28], 0
+    while frame < len(data):
+        last = frame
+        frame = struct.unpack_from("<Q", data, frame + 8)[0]
+    data[last + 24 + 1] = 99
+    return bytes(data), last
+
+
+class LvxTest(CommandTest):
+    """Recordings whose end or body is lost."""
+
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        import command
+        done = command.run("simulate", "-o", "whole.lvx", "--sensor", "mid-40", "--duration-s", "0.5",
+                           "--scene", command.SOURCE / "data" / "room.yaml", folder=cls.folder)
+        assert done.returncode == 0, done.stderr
+        cls.whole = (cls.folder / "whole.lvx").read_bytes()
+
+    def test_cut_tail_is_a_warning(self):
+        (self.folder / "cut.lvx").write_bytes(self.whole[:-1000])
+        whole = self.expect_json(0, "info", "whole.lvx")
+        self.assertEqual(whole["warnings"], [])
+        cut = self.expect_json(0, "info", "cut.lvx")
+        self.assertEqual(len(cut["warnings"]), 1)
+        self.assertLess(0.9 * whole["observations"], cut["observations"])
+        self.assertLess(cut["observations"], whole["observations"])
+        done = self.expect(0, "convert", "cut.lvx", "-o", "cut.nc")
+        self.assertIn("warning", done.stderr)
+        self.assertEqual(self.expect_json(0, "info", "cut.nc")["observations"],
+                         cut["observations"])
+
+    def test_sound_part_of_a_damaged_body_is_saved(self):
+        data, _ = damaged_lvx(self.whole)
+        (self.folder / "damaged.lvx").write_bytes(data)
+        info = self.expect_json(3, "info", "damaged.lvx")
+        whole = self.expect_json(0, "info", "whole.lvx")
+        self.assertLess(0, info["observations"])
+        self.assertLess(info["observations"], whole["observations"])
+        self.assertIn("byte_offset", info)
+        saved = self.expect_json(3, "convert", "damaged.lvx", "-o", "saved.nc")
+        self.assertEqual(saved["observations"], info["observations"])
+        self.assertEqual(self.expect_json(0, "info", "saved.nc")["observations"],
+                         info["observations"])
+
+
+if __name__ == "__main__":
+    unittest.main()

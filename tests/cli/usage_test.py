@@ -1,0 +1,85 @@
+#!/usr/bin/env python3
+# SPDX-FileCopyrightText: 2026 The risley authors
+# SPDX-License-Identifier: MIT
+"""Help, versions and wrong usage."""
+import re
+import unittest
+
+from command import CommandTest
+
+VERBS = ("info", "convert", "simulate", "estimate")
+
+# Arguments that are wrong, and what the message must name.
+WRONG = [
+    ([], "subcommand"),
+    (["frobnicate"], "frobnicate"),
+    (["info"], "INPUT"),
+    (["info", "a.lvx", "--colour"], "--colour"),
+    (["info", "a.lvx", "--threads", "0"], "--threads"),
+    (["convert", "a.lvx"], "--output"),
+    (["convert", "a.lvx", "-o", "b.lvx", "--format", "pdf"], "pdf"),
+    (["simulate"], "--output"),
+    (["simulate", "-o", "a.xyz"], ".xyz"),
+    (["simulate", "-o", "a.csv", "--sensor", "mid-41"], "mid-41"),
+    (["simulate", "-o", "a.csv", "--rotor", "square"], "square"),
+    (["simulate", "-o", "a.csv", "--quantize", "maybe"], "maybe"),
+    (["simulate", "-o", "a.csv", "--duration-s", "-1"], "--duration-s"),
+    (["simulate", "-o", "a.csv", "--duration-s", "nan"], "--duration-s"),
+    (["simulate", "-o", "a.csv", "--rate-hz", "0"], "--rate-hz"),
+    (["simulate", "-o", "a.csv", "--noise-angle-deg", "-0.1"], "--noise-angle-deg"),
+    (["simulate", "-o", "a.csv", "--noise-angle-deg", "inf"], "--noise-angle-deg"),
+    (["simulate", "-o", "a.csv", "--set", "refractive_index=9"], "refractive_index = 9"),
+    (["simulate", "-o", "a.csv", "--set", "refractive_index=nan"], "refractive_index"),
+    (["simulate", "-o", "a.csv", "--set", "refractive_index=1.5x"], "1.5x"),
+    (["simulate", "-o", "a.csv", "--set", "refractive_index"], "NAME=VALUE"),
+    (["simulate", "-o", "a.csv", "--set", "wedge=18"], "wedge"),
+    (["simulate", "-o", "a.csv", "--set", "wedge_angle_deg=75"], "wedge_angle_deg = 75 deg"),
+    (["simulate", "-o", "a.csv", "--reported", "perfect"], "perfect"),
+    (["simulate", "-o", "a.csv", "--start-angles-deg", "1,2,3"], "start"),
+    (["simulate", "-o", "a.csv", "--quiet", "--verbose"], "--quiet"),
+    (["estimate", "a.csv", "--rate-hz", "fast"], "--rate-hz"),
+    (["estimate", "a.csv", "--method", "guess"], "guess"),
+    (["estimate", "a.csv", "--states", "all"], "--rate-hz full"),
+]
+
+
+class UsageTest(CommandTest):
+    def test_version(self):
+        self.assertRegex(self.expect(0, "--version").stdout, r"^risley \d+\.\d+\.\d+\n$")
+
+    def test_help_has_every_verb(self):
+        text = self.expect(0, "--help").stdout
+        for verb in VERBS:
+            self.assertIn(verb, text)
+
+    def test_help_of_each_verb_has_an_example(self):
+        for verb in VERBS:
+            text = self.expect(0, verb, "--help").stdout
+            self.assertRegex(text, rf"Example:\n\s+risley {verb} ")
+            for option in ("--json", "--threads", "--seed", "--quiet", "--verbose"):
+                self.assertIn(option, text)
+
+    def test_wrong_usage(self):
+        (self.folder / "a.lvx").write_bytes(b"")
+        (self.folder / "a.csv").write_text("Time/s,Azimuth/deg,Zenith/deg\n0,1,90\n")
+        before = self.names()
+        for arguments, named in WRONG:
+            with self.subTest(arguments=arguments):
+                done = self.expect(2, *arguments)
+                self.assertIn(named, done.stderr)
+                self.assertEqual(done.stdout, "")
+                self.assertEqual(self.names(), before)
+
+    def test_wrong_usage_as_json(self):
+        for arguments in (["info"], ["simulate", "-o", "a.csv", "--set", "refractive_index=9"]):
+            result = self.expect_json(2, *arguments)
+            self.assertEqual(result["exit_status"], 2)
+            self.assertTrue(result["error"])
+
+    def test_no_bar_off_a_terminal(self):
+        done = self.expect(0, "simulate", "-o", "bar.csv", "--rate-hz", "1000")
+        self.assertIsNone(re.search(r"[\r\033]", done.stderr))
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,179 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <iterator>
+#include <optional>
+#include <string>
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include "risley/core/error.hpp"
+
+#include "recordings/formats/format.hpp"
+
+namespace risley::recordings::format_tests {
+
+/// A new folder, removed with its owner.
+class TemporaryFolder {
+ public:
+  TemporaryFolder() {
+    static int count = 0;
+    const std::string name = fmt::format("risley-formats-{}-{}", ::getpid(), ++count);
+    path_ = std::filesystem::temp_directory_path() / name;
+    std::filesystem::create_directories(path_);
+  }
+  ~TemporaryFolder() {
+    std::error_code ignored;
+    std::filesystem::remove_all(path_, ignored);
+  }
+  std::string file(const std::string& name) const { return (path_ / name).string(); }
+  std::size_t count() const {
+    return static_cast<std::size_t>(std::distance(std::filesystem::directory_iterator(path_), {}));
+  }
+
+ private:
+  std::filesystem::path path_;
+};
+
+inline void put_bytes(const std::string& path, std::string_view bytes) {
+  std::ofstream stream(path, std::ios::binary | std::ios::trunc);
+  stream.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  ASSERT_TRUE(stream.good());
+}
+
+inline std::string get_bytes(const std::string& path) {
+  std::ifstream stream(path, std::ios::binary);
+  EXPECT_TRUE(stream.good()) << path;
+  return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+/// All that reading a file gave, up to its end or to its damage.
+struct Outcome {
+  Recording recording;
+  std::optional<FileError> error;
+  bool opened = false;
+
+  const Observations& rows() const { return recording.data.observations; }
+};
+
+inline Outcome read_all(const Format& format, const std::string& path,
+                        std::size_t chunk_rows = kDefaultChunkRows) {
+  Outcome outcome;
+  std::unique_ptr<Reader> reader;
+  try {
+    reader = format.open(path);
+    outcome.opened = true;
+    outcome.recording.header = reader->header();
+    Chunk chunk;
+    while (reader->read(chunk, chunk_rows)) {
+      auto& all = outcome.recording.data;
+      all.observations.append(chunk.observations);
+      all.packets.insert(all.packets.end(), chunk.packets.begin(), chunk.packets.end());
+      all.imu.insert(all.imu.end(), chunk.imu.begin(), chunk.imu.end());
+      EXPECT_GE(reader->fraction_read(), 0.0);
+      EXPECT_LE(reader->fraction_read(), 1.0);
+    }
+  } catch (const FileError& error) {
+    outcome.error = error;
+    EXPECT_EQ(error.path(), path);
+    EXPECT_FALSE(error.problem().empty());
+  }
+  if (reader) outcome.recording.warnings = reader->warnings();
+  return outcome;
+}
+
+inline Outcome read_text(const Format& format, std::string_view bytes,
+                         std::size_t chunk_rows = kDefaultChunkRows) {
+  const TemporaryFolder folder;
+  const std::string path = folder.file("input");
+  put_bytes(path, bytes);
+  return read_all(format, path, chunk_rows);
+}
+
+inline void write_all(const Format& format, const std::string& path, const RecordingHeader& header,
+                      const Chunk& chunk) {
+  auto writer = format.create(path, header);
+  writer->write(chunk);
+  writer->close();
+}
+
+/// Reads a file in pieces of a few rows and writes it again piece by piece.
+inline std::string copy_of(const Format& format, const std::string& path, std::size_t chunk_rows,
+                           const Format* target = nullptr) {
+  const TemporaryFolder folder;
+  const std::string copy = folder.file("copy");
+  auto reader = format.open(path);
+  auto writer = (target != nullptr ? *target : format).create(copy, reader->header());
+  Chunk chunk;
+  while (reader->read(chunk, chunk_rows)) writer->write(chunk);
+  writer->close();
+  return get_bytes(copy);
+}
+
+inline std::string rewritten(const Format& format, std::string_view bytes,
+                             std::size_t chunk_rows = 3, const Format* target = nullptr) {
+  const TemporaryFolder folder;
+  const std::string path = folder.file("input");
+  put_bytes(path, bytes);
+  return copy_of(format, path, chunk_rows, target);
+}
+
+template <class T>
+bool same_bits(const std::vector<T>& part, const std::vector<T>& whole) {
+  return part.size() <= whole.size() &&
+         (part.empty() || std::memcmp(part.data(), whole.data(), part.size() * sizeof(T)) == 0);
+}
+
+/// Whether the rows are the first rows of the whole, bit by bit.
+inline bool is_prefix(const Observations& part, const Observations& whole) {
+  return same_bits(part.time_ns, whole.time_ns) && same_bits(part.azimuth, whole.azimuth) &&
+         same_bits(part.zenith, whole.zenith) && same_bits(part.range, whole.range) &&
+         same_bits(part.azimuth_resolution, whole.azimuth_resolution) &&
+         same_bits(part.zenith_resolution, whole.zenith_resolution) &&
+         same_bits(part.range_resolution, whole.range_resolution) &&
+         same_bits(part.intensity, whole.intensity) &&
+         same_bits(part.return_number, whole.return_number) && same_bits(part.tag, whole.tag) &&
+         same_bits(part.beam, whole.beam) && same_bits(part.device, whole.device) &&
+         same_bits(part.valid, whole.valid);
+}
+
+inline bool is_same(const Observations& a, const Observations& b) {
+  return a.size() == b.size() && is_prefix(a, b);
+}
+
+/// Cuts the file behind every `step`-th byte: reading must give the first rows of the whole, and
+/// wherever `expected_rows` says that part of a record is left, a warning or an error.
+/// @param expected_rows  complete rows in the first n bytes, and whether something else is left
+inline void check_cuts(
+    const Format& format, const std::string& bytes, std::size_t step,
+    const std::function<std::pair<std::size_t, bool>(std::string_view)>& expected_rows) {
+  const TemporaryFolder folder;
+  const std::string path = folder.file("cut");
+  put_bytes(path, bytes);
+  const Outcome whole = read_all(format, path);
+  ASSERT_FALSE(whole.error) << whole.error->what();
+  for (std::size_t length = 0; length < bytes.size(); length += step) {
+    SCOPED_TRACE(fmt::format("cut behind byte {}", length));
+    const auto head = std::string_view(bytes).substr(0, length);
+    put_bytes(path, head);
+    const Outcome cut = read_all(format, path, 2);
+    ASSERT_TRUE(is_prefix(cut.rows(), whole.rows()));
+    if (!cut.opened) {
+      ASSERT_TRUE(cut.error);
+      ASSERT_EQ(cut.rows().size(), 0U);
+      continue;
+    }
+    const auto [rows, something_left] = expected_rows(head);
+    ASSERT_EQ(cut.rows().size() + cut.recording.data.imu.size(), rows);
+    ASSERT_EQ(!cut.recording.warnings.empty() || cut.error.has_value(), something_left);
+  }
+}
+
+}  // namespace risley::recordings::format_tests

@@ -1,0 +1,429 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "risley/core/angle.hpp"
+
+#include "recordings/format_tests.hpp"
+#include "recordings/formats/little_endian.hpp"
+#include "recordings/formats/packet.hpp"
+
+namespace risley::recordings {
+namespace {
+
+using namespace format_tests;
+using ::testing::HasSubstr;
+
+template <class T>
+void append(std::string& bytes, std::type_identity_t<T> value) {
+  std::uint8_t raw[sizeof(T)];
+  store<T>(raw, value);
+  bytes.append(reinterpret_cast<const char*>(raw), sizeof(T));
+}
+
+/// A capture as the program writes it: fixed records of the given layout.
+std::string capture(int firmware_type, int data_type, int records) {
+  std::string bytes = "OPENPYLIVOX";
+  append<std::int16_t>(bytes, static_cast<std::int16_t>(firmware_type));
+  append<std::int16_t>(bytes, static_cast<std::int16_t>(data_type));
+  const bool paired = data_type >= 4, tagged = data_type >= 2;
+  for (int k = 0; k < records; ++k) {
+    const int returns = paired ? 2 : 1;
+    if (data_type % 2 == 0) {
+      for (int r = 0; r < returns; ++r) {
+        append<std::int32_t>(bytes, 1000 + 10 * k + r);
+        append<std::int32_t>(bytes, -2000 + k);
+        append<std::int32_t>(bytes, 300 - 100 * k);
+        append<std::uint8_t>(bytes, static_cast<std::uint8_t>(k + r));
+        if (tagged) append<std::uint8_t>(bytes, static_cast<std::uint8_t>(0x10 * (r + 1)));
+      }
+    } else {
+      const auto zenith = static_cast<std::uint16_t>(9000 + k);
+      const auto azimuth = static_cast<std::uint16_t>((35'998 + k) % 36'000);
+      if (!paired) append<std::uint32_t>(bytes, 5000 + k);
+      append<std::uint16_t>(bytes, zenith);
+      append<std::uint16_t>(bytes, azimuth);
+      for (int r = 0; r < returns; ++r) {
+        if (paired) append<std::uint32_t>(bytes, k == 1 && r == 1 ? 0 : 5000 + k + r);
+        append<std::uint8_t>(bytes, static_cast<std::uint8_t>(k + r));
+        if (tagged) append<std::uint8_t>(bytes, static_cast<std::uint8_t>(0x10 * (r + 1)));
+      }
+    }
+    append<double>(bytes, (1'234'567'890'123 + 10'000 * (k / firmware_type)) / 1e9);
+    if (firmware_type > 1) bytes += static_cast<char>('1' + k % firmware_type);
+  }
+  return bytes;
+}
+
+struct Layout {
+  int firmware_type, data_type;
+  std::size_t record_bytes;
+};
+const std::vector<Layout> kLayouts = {{1, 0, 21}, {1, 1, 17}, {1, 2, 22}, {1, 3, 18}, {1, 4, 36},
+                                      {1, 5, 24}, {2, 0, 22}, {2, 1, 18}, {3, 0, 22}, {3, 1, 18}};
+
+std::string imu_capture(int records) {
+  std::string bytes = "OPENPYLIVOX_IMU";
+  for (int k = 0; k < records; ++k) {
+    for (int i = 0; i < 6; ++i) append<float>(bytes, 0.125F * static_cast<float>(i + k));
+    append<double>(bytes, 0.005 * k);
+  }
+  return bytes;
+}
+
+TEST(OpenpylivoxBin, ReadsEveryLayout) {
+  for (const auto& layout : kLayouts) {
+    SCOPED_TRACE(fmt::format("firmware {}, data type {}", layout.firmware_type, layout.data_type));
+    const std::string bytes = capture(layout.firmware_type, layout.data_type, 6);
+    ASSERT_EQ(bytes.size(), 15 + 6 * layout.record_bytes);
+    EXPECT_TRUE(kOpenpylivoxBinFormat.recognises(bytes));
+    const Outcome outcome = read_text(kOpenpylivoxBinFormat, bytes, 3);
+    ASSERT_FALSE(outcome.error) << outcome.error->what();
+    EXPECT_TRUE(outcome.recording.warnings.empty());
+    const auto& header = outcome.recording.header;
+    const bool paired = layout.data_type >= 4;
+    EXPECT_EQ(header.cartesian, layout.data_type % 2 == 0);
+    EXPECT_EQ(header.returns_per_shot, paired ? 2 : layout.firmware_type);
+    const auto& rows = outcome.rows();
+    ASSERT_EQ(rows.size(), paired ? 12U : 6U);
+    EXPECT_EQ(rows.time_ns[0], 1'234'567'890'123);
+    EXPECT_EQ(rows.time_ns.back(), 1'234'567'890'123 + 10'000 * (5 / layout.firmware_type));
+    EXPECT_EQ(rows.return_number[1], paired ? 2 : layout.firmware_type == 1 ? 1 : 2);
+    EXPECT_EQ(rows.tag[0], layout.data_type >= 2 ? 0x10 : 0);
+    if (header.cartesian) {
+      EXPECT_NEAR(rows.azimuth[0], std::atan2(-2000.0, 1000.0), 1e-15);
+      EXPECT_NEAR(rows.range[0], std::sqrt(1000.0 * 1000 + 2000.0 * 2000 + 300.0 * 300) / 1000,
+                  1e-12);
+      EXPECT_FLOAT_EQ(rows.range_resolution[0], 1e-3F);
+      EXPECT_FLOAT_EQ(rows.zenith_resolution[0], static_cast<float>(1e-3 / rows.range[0]));
+      EXPECT_FLOAT_EQ(rows.azimuth_resolution[0],
+                      static_cast<float>(1e-3 / (rows.range[0] * std::sin(rows.zenith[0]))));
+    } else {
+      EXPECT_NEAR(rows.azimuth[0], radians_from_degrees(-0.02), 1e-15);
+      EXPECT_NEAR(rows.zenith[0], radians_from_degrees(90.0), 1e-15);
+      EXPECT_DOUBLE_EQ(rows.range[0], 5.0);
+      EXPECT_FLOAT_EQ(rows.azimuth_resolution[0], static_cast<float>(radians_from_degrees(0.01)));
+    }
+  }
+}
+
+TEST(OpenpylivoxBin, RewritesTheSameBytes) {
+  for (const auto& layout : kLayouts) {
+    SCOPED_TRACE(fmt::format("firmware {}, data type {}", layout.firmware_type, layout.data_type));
+    const std::string bytes = capture(layout.firmware_type, layout.data_type, 7);
+    for (const std::size_t chunk_rows : {std::size_t{1}, std::size_t{4}, kDefaultChunkRows}) {
+      EXPECT_TRUE(rewritten(kOpenpylivoxBinFormat, bytes, chunk_rows) == bytes);
+    }
+  }
+  EXPECT_TRUE(rewritten(kOpenpylivoxBinFormat, imu_capture(5)) == imu_capture(5));
+}
+
+TEST(OpenpylivoxBin, CutAtEveryByte) {
+  for (const auto& layout : kLayouts) {
+    SCOPED_TRACE(fmt::format("firmware {}, data type {}", layout.firmware_type, layout.data_type));
+    check_cuts(kOpenpylivoxBinFormat, capture(layout.firmware_type, layout.data_type, 5), 1,
+               [&](std::string_view head) {
+                 const std::size_t body = head.size() - 15;
+                 const std::size_t rows_per_record = layout.data_type >= 4 ? 2 : 1;
+                 return std::pair{body / layout.record_bytes * rows_per_record,
+                                  body % layout.record_bytes != 0};
+               });
+  }
+  check_cuts(kOpenpylivoxBinFormat, imu_capture(3), 1, [](std::string_view head) {
+    return std::pair{(head.size() - 15) / 32, (head.size() - 15) % 32 != 0};
+  });
+}
+
+TEST(OpenpylivoxBin, SaysWhereItIsDamaged) {
+  struct Case {
+    const char* name;
+    std::string bytes;
+    std::uint64_t offset;
+    std::size_t sound_rows;
+  };
+  const auto with = [](std::string bytes, std::size_t offset, std::string_view change) {
+    return bytes.replace(offset, change.size(), change);
+  };
+  const std::string nan("\0\0\0\0\0\0\xF8\x7F", 8);
+  const std::vector<Case> cases = {
+      {"empty", "", 0, 0},
+      {"short", "OPENPYLIVOX\1", 12, 0},
+      {"other", "OPENPYLIVER4567", 0, 0},
+      {"firmware", with(capture(1, 0, 2), 11, "\4"), 11, 0},
+      {"data type", with(capture(1, 0, 2), 13, "\6"), 13, 0},
+      {"data type of special firmware", with(capture(2, 0, 2), 13, "\2"), 13, 0},
+      {"time", with(capture(1, 0, 4), 15 + 2 * 21 + 13, nan), 15 + 2 * 21 + 13, 2},
+      {"return digit", with(capture(2, 0, 4), 15 + 3 * 22 - 1, "3"), 15 + 3 * 22 - 1, 2},
+      {"zenith", with(capture(1, 1, 4), 15 + 2 * 17 + 4, "\xFF\xFF"), 15 + 2 * 17, 2},
+  };
+  for (const auto& c : cases) {
+    for (const std::size_t chunk_rows : {std::size_t{1}, kDefaultChunkRows}) {
+      SCOPED_TRACE(c.name);
+      const Outcome outcome = read_text(kOpenpylivoxBinFormat, c.bytes, chunk_rows);
+      ASSERT_TRUE(outcome.error);
+      EXPECT_EQ(outcome.error->place().byte_offset, c.offset);
+      EXPECT_EQ(outcome.rows().size(), c.sound_rows);
+    }
+  }
+}
+
+// ---- text ----------------------------------------------------------------------------------
+
+const std::vector<std::string> kTables = {
+    "//X,Y,Z,Inten-sity,Time\n"
+    "1.234,-5.678,0.010,17,0.000010\n3.000,0.000,-0.001,255,0.000020\n",
+    "//Distance,Zenith,Azimuth,Inten-sity,Time\n"
+    "12.345,90.01,359.99,17,86399.999990\n1.000,0.00,0.00,0,86400.000000\n"
+    "2.000,180.00,360.00,3,86400.000010\n2.000,5.00,180.00,3,86400.000020\n",
+    "//X,Y,Z,Inten-sity,Time,ReturnNum\n"
+    "1.234,-5.678,0.010,17,0.000010,1\n1.235,-5.680,0.010,200,0.000010,2\n",
+    "//Distance,Zenith,Azimuth,Inten-sity,Time,ReturnNum\n"
+    "12.345,90.01,359.99,17,0.000010,1\n12.545,90.01,359.99,200,0.000010,2\n"
+    "12.745,90.01,359.99,250,0.000010,3\n",
+    "//X,Y,Z,Inten-sity,Time,ReturnNum,ReturnType,sConf,iConf\n"
+    "1.234,-5.678,0.010,17,0.000010,1,1,0,2\n1.235,-5.680,0.010,20,0.000010,2,3,3,3\n",
+    "//Distance,Zenith,Azimuth,Inten-sity,Time,ReturnNum,ReturnType,sConf,iConf\n"
+    "12.345,90.01,359.99,17,0.000010,1,0,0,1\n12.545,90.01,359.99,20,0.000014,1,2,1,0\n",
+    "//gyro_x,gyro_y,gyro_z,acc_x,acc_y,acc_z,time\n"
+    "0.012345,-0.000001,-0.000000,0.100000,1.250000,-0.987654,1.000000\n"
+    "0.500000,0.250000,7.123456,0.000000,-1.000000,0.999999,1.005000\n"};
+
+TEST(OpenpylivoxCsv, RewritesTheSameBytes) {
+  for (const auto& table : kTables) {
+    SCOPED_TRACE(table);
+    EXPECT_TRUE(kOpenpylivoxCsvFormat.recognises(table));
+    EXPECT_FALSE(kScanSequenceCsvFormat.recognises(table));
+    EXPECT_EQ(rewritten(kOpenpylivoxCsvFormat, table, 1), table);
+    EXPECT_EQ(rewritten(kOpenpylivoxCsvFormat, table), table);
+  }
+}
+
+TEST(OpenpylivoxCsv, ReadsTheColumns) {
+  const Outcome dual = read_text(kOpenpylivoxCsvFormat, kTables[4]);
+  ASSERT_FALSE(dual.error);
+  EXPECT_EQ(dual.recording.header.returns_per_shot, 2);
+  EXPECT_EQ(dual.rows().tag, (std::vector<std::uint8_t>{0b00'10'01'00, 0b11'11'11'00}));
+  EXPECT_EQ(dual.rows().return_number, (std::vector<std::uint8_t>{1, 2}));
+  EXPECT_NEAR(dual.rows().azimuth[0], std::atan2(-5.678, 1.234), 1e-15);
+
+  const Outcome polar = read_text(kOpenpylivoxCsvFormat, kTables[1]);
+  ASSERT_FALSE(polar.error);
+  EXPECT_EQ(polar.rows().time_ns[0], 86'399'999'990'000);
+  EXPECT_DOUBLE_EQ(polar.rows().range[0], 12.345);
+  EXPECT_NEAR(polar.rows().azimuth[0], radians_from_degrees(-0.01), 1e-15);
+  EXPECT_DOUBLE_EQ(polar.rows().azimuth[3], kPi);
+  EXPECT_EQ(polar.rows().intensity[0], 17);
+  EXPECT_EQ(polar.recording.header.devices[0].type, 1);
+
+  const Outcome nulls =
+      read_text(kOpenpylivoxCsvFormat, "//X,Y,Z,Inten-sity,Time\n0.000,0.000,0.000,0,0.000010\n");
+  ASSERT_EQ(nulls.rows().size(), 1U);
+  EXPECT_EQ(nulls.rows().valid[0], 0);
+  EXPECT_EQ(nulls.rows().range[0], 0.0);
+}
+
+TEST(OpenpylivoxCsv, CutAtEveryByte) {
+  for (const auto& table : kTables) {
+    SCOPED_TRACE(table);
+    const auto columns = std::count(
+        table.begin(), table.begin() + static_cast<std::ptrdiff_t>(table.find('\n')), ',');
+    check_cuts(kOpenpylivoxCsvFormat, table, 1, [&](std::string_view head) {
+      const auto lines = static_cast<std::size_t>(std::count(head.begin(), head.end(), '\n'));
+      if (lines == 0) return std::pair{std::size_t{0}, true};
+      const auto tail = head.substr(head.rfind('\n') + 1);
+      if (tail.empty()) return std::pair{lines - 1, false};
+      const auto point = tail.rfind('.');
+      const bool whole = std::count(tail.begin(), tail.end(), ',') == columns && lines > 1 &&
+                         point != tail.npos && point > tail.rfind(',') &&
+                         tail.size() - point - 1 == 6;
+      return std::pair{whole ? lines : lines - 1, !whole};
+    });
+  }
+}
+
+TEST(OpenpylivoxCsv, AcceptsVariantsOfText) {
+  for (const auto& table : kTables) {
+    std::string windows, blanks;
+    for (const char c : table) {
+      windows += c == '\n' ? std::string("\r\n") : std::string(1, c);
+      blanks += c == ',' ? std::string(", ") : std::string(1, c);
+    }
+    const Outcome plain = read_text(kOpenpylivoxCsvFormat, table);
+    for (const auto& variant : {windows, "\xEF\xBB\xBF" + windows, blanks, table + "\n"}) {
+      SCOPED_TRACE(variant);
+      EXPECT_TRUE(kOpenpylivoxCsvFormat.recognises(variant));
+      const Outcome outcome = read_text(kOpenpylivoxCsvFormat, variant);
+      EXPECT_FALSE(outcome.error);
+      EXPECT_TRUE(is_same(outcome.rows(), plain.rows()));
+      EXPECT_EQ(outcome.recording.data.imu.size(), plain.recording.data.imu.size());
+    }
+  }
+}
+
+TEST(OpenpylivoxCsv, NamesTheDamagedLine) {
+  struct Case {
+    std::size_t table;
+    const char* row;
+    const char* problem;
+  };
+  for (const auto& c : {Case{0, "1.0,2.0,3.0,4", "found 4"},
+                        {0, "nan,2.0,3.0,4,0.1", "column X"},
+                        {0, "1.0,2.0,3e9,4,0.1", "expected Z"},
+                        {0, "1.0,2.0,3.0,256,0.1", "[0, 255]"},
+                        {0, "1.0,2.0,3.0,4.5,0.1", "Inten-sity"},
+                        {1, "-1.0,90.0,0.0,4,0.1", "Distance"},
+                        {1, "1.0,180.01,0.0,4,0.1", "Zenith"},
+                        {1, "1.0,90.0,360.01,4,0.1", "Azimuth"},
+                        {1, "1.0,90.0,inf,4,0.1", "Azimuth"},
+                        {1, "1.0,90.0,0.0,4,x", "Time"},
+                        {2, "1.0,2.0,3.0,4,0.1,0", "ReturnNum"},
+                        {2, "1.0,2.0,3.0,4,0.1,4", "ReturnNum"},
+                        {4, "1.0,2.0,3.0,4,0.1,1,4,0,0", "ReturnType"},
+                        {4, "1.0,2.0,3.0,4,0.1,1,0,-1,0", "sConf"},
+                        {4, "1.0,2.0,3.0,4,0.1,1,0,0,9", "iConf"},
+                        {6, "0,0,0,0,0,nan,1.0", "acc_z"}}) {
+    SCOPED_TRACE(c.row);
+    const std::string text = kTables[c.table] + c.row + "\n" + "more\n";
+    const auto rows = static_cast<std::size_t>(std::count(text.begin(), text.end(), '\n')) - 3;
+    const Outcome outcome = read_text(kOpenpylivoxCsvFormat, text);
+    ASSERT_TRUE(outcome.error);
+    EXPECT_EQ(outcome.error->place().line, rows + 2);
+    EXPECT_EQ(outcome.rows().size() + outcome.recording.data.imu.size(), rows);
+    EXPECT_THAT(outcome.error->problem(), HasSubstr(c.problem));
+  }
+  for (const std::string header : {"//X,Y,Z\n", "X,Y,Z,Inten-sity,Time\n", ""}) {
+    EXPECT_FALSE(kOpenpylivoxCsvFormat.recognises(header));
+    EXPECT_TRUE(read_text(kOpenpylivoxCsvFormat, header).error);
+  }
+}
+
+// ---- both ----------------------------------------------------------------------------------
+
+TEST(Openpylivox, TextAndBinaryHoldTheSame) {
+  for (const auto& layout : kLayouts) {
+    SCOPED_TRACE(fmt::format("firmware {}, data type {}", layout.firmware_type, layout.data_type));
+    const std::string bytes = capture(layout.firmware_type, layout.data_type, 6);
+    const Outcome binary = read_text(kOpenpylivoxBinFormat, bytes);
+    const std::string table = rewritten(kOpenpylivoxBinFormat, bytes, 3, &kOpenpylivoxCsvFormat);
+    EXPECT_THAT(table, HasSubstr("ReturnNum"));  // as the program's own conversion
+    const Outcome text = read_text(kOpenpylivoxCsvFormat, table);
+    ASSERT_FALSE(text.error) << text.error->what();
+    const bool null_dropped = layout.data_type == 5;
+    ASSERT_EQ(text.rows().size(), binary.rows().size() - (null_dropped ? 1 : 0));
+    EXPECT_EQ(text.rows().time_ns[0], binary.rows().time_ns[0]);
+    EXPECT_EQ(text.recording.header.returns_per_shot, binary.recording.header.returns_per_shot);
+    const std::string back = rewritten(kOpenpylivoxCsvFormat, table, 2, &kOpenpylivoxBinFormat);
+    if (layout.data_type != 5) {  // the null return's intensity is not in the table
+      EXPECT_TRUE(back == bytes);
+    } else {
+      EXPECT_EQ(back.size(), bytes.size());
+    }
+  }
+}
+
+RecordingHeader foreign_header(bool cartesian, int returns, std::uint8_t device_type) {
+  RecordingHeader header;
+  header.format = "lvx-1.1";
+  header.devices.resize(1);
+  header.devices[0].type = device_type;
+  header.cartesian = cartesian;
+  header.returns_per_shot = returns;
+  return header;
+}
+
+Chunk one_row(double range) {
+  Chunk chunk;
+  chunk.observations.resize(1);
+  chunk.observations.range[0] = range;
+  chunk.observations.zenith[0] = 1.5;
+  chunk.observations.return_number[0] = 1;
+  chunk.observations.valid[0] = range != 0.0;
+  return chunk;
+}
+
+TEST(Openpylivox, ChoosesTheLayoutByTheHeader) {
+  struct Case {
+    bool cartesian;
+    int returns;
+    std::uint8_t device_type;
+    int firmware_type, data_type;
+  };
+  const TemporaryFolder folder;
+  for (const auto& c : {Case{true, 1, 1, 1, 0},
+                        {false, 1, 1, 1, 1},
+                        {true, 2, 1, 2, 0},
+                        {false, 3, 1, 3, 1},
+                        {true, 1, 6, 1, 2},
+                        {false, 1, 3, 1, 3},
+                        {true, 2, 7, 1, 4},
+                        {false, 2, 7, 1, 5}}) {
+    const std::string path = folder.file("chosen.bin");
+    const auto header = foreign_header(c.cartesian, c.returns, c.device_type);
+    write_all(kOpenpylivoxBinFormat, path, header, one_row(10.0));
+    const std::string bytes = get_bytes(path);
+    EXPECT_EQ(bytes[11], c.firmware_type);
+    EXPECT_EQ(bytes[13], c.data_type);
+    EXPECT_EQ(read_all(kOpenpylivoxBinFormat, path).rows().valid[0], 1);
+  }
+  for (const auto* format : {&kOpenpylivoxBinFormat, &kOpenpylivoxCsvFormat}) {
+    EXPECT_THROW(format->create(folder.file("x"), foreign_header(true, 3, 7)), InvalidArgument);
+    auto header = foreign_header(false, 1, 1);
+    header.has_range = false;
+    EXPECT_THROW(format->create(folder.file("x"), header), InvalidArgument);
+  }
+}
+
+TEST(Openpylivox, RefusesWhatItCannotHoldAndDropsNulls) {
+  const TemporaryFolder folder;
+  for (const auto* format : {&kOpenpylivoxBinFormat, &kOpenpylivoxCsvFormat}) {
+    const std::string path = folder.file("written");
+    write_all(*format, path, foreign_header(false, 1, 1), one_row(0.0));
+    EXPECT_EQ(read_all(*format, path).rows().size(), 0U);
+    for (const double range : {std::numeric_limits<double>::quiet_NaN(), -1.0,
+                               std::numeric_limits<double>::infinity()}) {
+      auto writer = format->create(folder.file("x"), foreign_header(false, 1, 1));
+      EXPECT_THROW(writer->write(one_row(range)), InvalidArgument);
+    }
+    Chunk chunk = one_row(1.0);
+    chunk.observations.azimuth[0] = std::numeric_limits<double>::quiet_NaN();
+    EXPECT_THROW(format->create(folder.file("x"), foreign_header(false, 1, 1))->write(chunk),
+                 InvalidArgument);
+    chunk = one_row(1.0);
+    chunk.observations.append(one_row(1.0).observations);
+    chunk.observations.device[1] = 1;
+    EXPECT_THROW(format->create(folder.file("x"), foreign_header(false, 1, 1))->write(chunk),
+                 InvalidArgument);
+  }
+  EXPECT_THROW(kOpenpylivoxBinFormat.create(folder.file("x"), foreign_header(false, 1, 1))
+                   ->write(one_row(5e6)),
+               InvalidArgument);
+  EXPECT_THROW(kOpenpylivoxBinFormat.create(folder.file("x"), foreign_header(true, 1, 1))
+                   ->write(one_row(3e6)),
+               InvalidArgument);
+  Chunk second = one_row(1.0);
+  second.observations.return_number[0] = 2;
+  EXPECT_THROW(
+      kOpenpylivoxBinFormat.create(folder.file("x"), foreign_header(true, 1, 1))->write(second),
+      InvalidArgument);
+  EXPECT_EQ(folder.count(), 1U) << "an unfinished writer must leave nothing";
+}
+
+TEST(Openpylivox, LargeTimesComeBack) {
+  const TemporaryFolder folder;
+  const std::string first = folder.file("first.bin");
+  Chunk chunk = one_row(10.0);
+  chunk.observations.time_ns[0] = 1'600'000'000'123'456'789;  // a PTP clock
+  write_all(kOpenpylivoxBinFormat, first, foreign_header(false, 1, 1), chunk);
+  EXPECT_NEAR(static_cast<double>(read_all(kOpenpylivoxBinFormat, first).rows().time_ns[0] -
+                                  chunk.observations.time_ns[0]),
+              0.0, 240.0);
+  EXPECT_TRUE(copy_of(kOpenpylivoxBinFormat, first, 1) == get_bytes(first));
+}
+
+}  // namespace
+}  // namespace risley::recordings

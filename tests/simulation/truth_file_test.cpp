@@ -1,0 +1,119 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "risley/simulation/truth_file.hpp"
+
+#include <filesystem>
+#include <string>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "risley/core/angle.hpp"
+#include "risley/core/output_file.hpp"
+#include "risley/recordings/reader.hpp"
+#include "risley/recordings/truth.hpp"
+#include "risley/sensors/preset.hpp"
+
+namespace risley::simulation {
+namespace {
+
+using ::testing::Contains;
+using ::testing::Pair;
+
+namespace fs = std::filesystem;
+
+class TruthFile : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    const auto* test = ::testing::UnitTest::GetInstance()->current_test_info();
+    folder_ = fs::path(::testing::TempDir()) / (std::string("risley_truth_") + test->name());
+    fs::remove_all(folder_);
+    fs::create_directories(folder_);
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+  std::string path(const std::string& name) const { return (folder_ / name).string(); }
+
+  SimulationSettings settings() const {
+    SimulationSettings s;
+    s.truth = sensors::load_sensor("mid-40-table3");
+    s.duration = 1.5;
+    s.rate = 2000;
+    s.rotor = RotorKind::sinusoidal;
+    s.seed = 77;
+    s.scene = load_scene(std::string(RISLEY_SOURCE_DIR) + "/data/room.yaml");
+    return s;
+  }
+
+  fs::path folder_;
+};
+
+TEST_F(TruthFile, RecordingAndTruthComeBack) {
+  const SimulationSettings s = settings();
+  const SimulationResult result = simulate_to_file(s, path("out.nc"), {{"command", "risley test"}});
+  EXPECT_EQ(result.observations, 3000u);
+
+  Scanner scanner(s);
+  recordings::Chunk chunk;
+  recordings::TruthColumns expected;
+  ASSERT_TRUE(scanner.read(chunk, expected));
+  EXPECT_EQ(result.no_return, scanner.no_return());
+  const recordings::TruthColumns truth = recordings::load_truth(truth_columns_path(path("out.nc")));
+  EXPECT_EQ(truth.time_ns, expected.time_ns);
+  ASSERT_EQ(truth.prisms(), 2);
+  for (std::size_t i = 0; i < truth.size(); ++i) {
+    for (std::size_t prism = 0; prism < 2; ++prism) {
+      ASSERT_DOUBLE_EQ(truth.rotation_angle[prism][i], expected.rotation_angle[prism][i]);
+      ASSERT_DOUBLE_EQ(truth.angular_velocity[prism][i], expected.angular_velocity[prism][i]);
+    }
+    ASSERT_DOUBLE_EQ(truth.azimuth[i], expected.azimuth[i]);
+    ASSERT_DOUBLE_EQ(truth.zenith[i], expected.zenith[i]);
+    ASSERT_DOUBLE_EQ(truth.range[i], expected.range[i]);
+  }
+  const recordings::Recording recording = recordings::load_recording(path("out.nc"));
+  EXPECT_EQ(recording.data.observations.time_ns, truth.time_ns);
+  EXPECT_EQ(recording.data.observations.azimuth, chunk.observations.azimuth);
+  EXPECT_EQ(recording.data.observations.range, chunk.observations.range);
+}
+
+TEST_F(TruthFile, PresetIsTheTrueSensorWithAllThatMakesItAgain) {
+  SimulationSettings s = settings();
+  s.truth.set("prism_tilt_a_vertical_deg", radians_from_degrees(0.5));
+  s.reported = s.truth;
+  s.reported->train = s.truth.train.without_errors();
+  simulate_to_file(s, path("out.nc"), {{"command", "risley simulate --seed 77"}});
+  const sensors::Sensor truth = sensors::load_sensor(truth_preset_path(path("out.nc")));
+  EXPECT_EQ(truth.train.parameters(), s.truth.train.parameters());
+  EXPECT_EQ(truth.angular_velocity, s.truth.angular_velocity);
+  EXPECT_THAT(truth.provenance, Contains(Pair("command", "risley simulate --seed 77")));
+  EXPECT_THAT(truth.provenance, Contains(Pair("seed", "77")));
+  EXPECT_THAT(truth.provenance, Contains(Pair("rotor", "sinusoidal")));
+  EXPECT_THAT(truth.provenance, Contains(Pair("duration_s", "1.5")));
+  EXPECT_THAT(truth.provenance, Contains(Pair("rate_hz", "2000")));
+  EXPECT_THAT(truth.provenance, Contains(Pair("reported prism_tilt_a_vertical_deg", "0")));
+  EXPECT_THAT(truth.provenance, Contains(Pair("start_rotation_angle_b_deg", ::testing::_)));
+}
+
+TEST_F(TruthFile, SameSeedGivesTheSameBytes) {
+  SimulationSettings s = settings();
+  s.threads = 1;
+  simulate_to_file(s, path("one.nc"), {});
+  s.threads = 2;
+  simulate_to_file(s, path("two.nc"), {});
+  for (const char* ending : {".nc", ".nc.truth.nc", ".nc.truth.yaml"}) {
+    EXPECT_EQ(sha256_of_file(path("one") + ending), sha256_of_file(path("two") + ending)) << ending;
+  }
+  s.seed = 78;
+  simulate_to_file(s, path("three.nc"), {});
+  for (const char* ending : {".nc", ".nc.truth.nc", ".nc.truth.yaml"}) {
+    EXPECT_NE(sha256_of_file(path("one") + ending), sha256_of_file(path("three") + ending));
+  }
+}
+
+TEST_F(TruthFile, NothingIsLeftWhenTheOutputCannotBeWritten) {
+  EXPECT_THROW(simulate_to_file(settings(), path("out.unknown"), {}), InvalidArgument);
+  EXPECT_THROW(simulate_to_file(settings(), path("missing/out.nc"), {}), FileError);
+  EXPECT_TRUE(fs::is_empty(folder_));
+}
+
+}  // namespace
+}  // namespace risley::simulation
