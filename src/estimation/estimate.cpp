@@ -93,8 +93,26 @@ double expected_residual(const AngleSeries& series, double angle_noise) {
   return std::sqrt(angle_noise * angle_noise + rounding / (2.0 * double(series.size())));
 }
 
+/// A parameter that ended where no sensor of the kind can be, as words; empty when there is none.
+/// A tilt of a whole wedge angle, for one, turns a prism into one with its faces exchanged: such a
+/// fit is as good as the right one, and its numbers mean nothing.
+std::string implausible_parameter(const EkfResult& filter, const PrismTrain& nominal) {
+  constexpr double kLargest = 5.0;  // prior sigmas
+  for (std::size_t i = 0; i < filter.free.size(); ++i) {
+    const FreeParameter& parameter = filter.free[i];
+    const double change = filter.parameters[static_cast<Eigen::Index>(i)] - nominal[parameter.places[0]];
+    if (std::abs(change) <= kLargest * parameter.prior_sigma) continue;
+    const ParameterInfo& info = find_parameter(parameter.name, filter.train.prisms());
+    return fmt::format(
+        "{} came out {:.4g}{} away from the sensor's value, more than any such sensor can be: wrong "
+        "face order, wrong wedge angles or another sensor",
+        parameter.name, change / info.si_per_unit, info.unit == "1" ? "" : " " + info.unit);
+  }
+  return {};
+}
+
 /// Says whether the result can be believed.
-void judge(Estimate& estimate) {
+void judge(Estimate& estimate, const PrismTrain& nominal) {
   const double rms = std::sqrt(0.5 * (estimate.azimuth_residuals.rms * estimate.azimuth_residuals.rms +
                                       estimate.zenith_residuals.rms * estimate.zenith_residuals.rms));
   const double ratio = rms / estimate.expected_residual;
@@ -115,6 +133,8 @@ void judge(Estimate& estimate) {
                      "or mirror image, or a start that did not pull in", 100 * outlier_share));
   } else if (ratio > 3.0) {
     fail(residuals + ": the model does not describe these data, or their noise is larger");
+  } else if (std::string words = implausible_parameter(estimate.filter, nominal); !words.empty()) {
+    fail(std::move(words));
   } else if (ratio > 1.3) {
     estimate.warnings.push_back(residuals + ": the sigmas are too small by about that factor");
   } else if (ratio < 0.93) {
@@ -166,7 +186,7 @@ Estimate estimate_with_ekf(const AngleSeries& recorded_series, const AngleSeries
   estimate.values = named_values(estimate.filter, series.duration());
   estimate.sensor =
       calibrated_sensor(options.sensor, estimate.filter, estimate.start, estimate.values);
-  judge(estimate);
+  judge(estimate, options.sensor.train);
   return estimate;
 }
 

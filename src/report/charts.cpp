@@ -29,6 +29,15 @@ const char* kind_name(SeriesKind kind) {
   return "points";
 }
 
+const char* kind_name(ChartKind kind) {
+  switch (kind) {
+    case ChartKind::full_turn: return "full_turn";
+    case ChartKind::map: return "map";
+    case ChartKind::plain: break;
+  }
+  return "plain";
+}
+
 std::size_t stride_for(std::size_t rows, std::size_t most) {
   return rows <= most ? 1 : (rows + most - 1) / most;
 }
@@ -39,7 +48,7 @@ std::string figure_html(const Chart& chart, std::size_t number) {
   std::string html = fmt::format(
       "<figure{}><figcaption>{}</figcaption>\n<div class=\"plot\"><canvas id=\"chart-{}\" "
       "role=\"img\" aria-label=\"{}: {} over {}\"></canvas></div>",
-      chart.map ? " class=\"map\"" : "", escape_html(chart.title), number,
+      chart.kind == ChartKind::map ? " class=\"map\"" : "", escape_html(chart.title), number,
       escape_html(chart.title), escape_html(chart.y_label), escape_html(chart.x_label));
   if (!chart.note.empty()) html += fmt::format("\n<p class=\"note\">{}</p>", escape_html(chart.note));
   return html + "</figure>\n";
@@ -54,8 +63,8 @@ std::string chart_json(const Chart& chart, std::size_t number) {
                           json_numbers(one.y));
   }
   return fmt::format(
-      "{{\"id\":\"chart-{}\",\"x_label\":{},\"y_label\":{},\"map\":{},\"series\":[{}]}}", number,
-      json_string(chart.x_label), json_string(chart.y_label), chart.map, series);
+      "{{\"id\":\"chart-{}\",\"x_label\":{},\"y_label\":{},\"kind\":\"{}\",\"series\":[{}]}}", number,
+      json_string(chart.x_label), json_string(chart.y_label), kind_name(chart.kind), series);
 }
 
 std::vector<std::size_t> every_nth(std::size_t rows, std::size_t most) {
@@ -64,9 +73,10 @@ std::vector<std::size_t> every_nth(std::size_t rows, std::size_t most) {
   return kept;
 }
 
-std::string every_nth_note(std::size_t rows, std::size_t most) {
+std::string every_nth_note(std::size_t rows, std::size_t most, std::string_view what) {
   const std::size_t stride = stride_for(rows, most);
-  return stride == 1 ? "" : fmt::format("Drawn: one of every {} shots, of {}.", stride, rows);
+  if (stride == 1) return fmt::format("All {} {} are drawn.", rows, what);
+  return fmt::format("Of {} {} one in {} is drawn.", rows, what, stride);
 }
 
 Series peak_line(std::string label, std::string colour, std::size_t rows, const Column& x,
@@ -95,8 +105,9 @@ Series peak_line(std::string label, std::string colour, std::size_t rows, const 
 
 std::string peak_line_note(std::size_t rows) {
   const std::size_t bin = stride_for(rows, kLineBins);
-  if (bin <= 2) return "";
-  return fmt::format("Drawn: the smallest and the largest of every {} shots, of {}.", bin, rows);
+  if (bin <= 2) return fmt::format("All {} shots are drawn.", rows);
+  return fmt::format("Of every {} of {} shots the smallest and the largest value are drawn.", bin,
+                     rows);
 }
 
 std::vector<Series> histogram(const std::string& label, const std::string& colour,

@@ -6,6 +6,7 @@
 #include <functional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "risley/estimation/diagnostics.hpp"
@@ -14,6 +15,13 @@ namespace risley::report {
 
 /// How page.js draws a series.
 enum class SeriesKind { points, line, steps };
+
+/// What the axes of a diagram are.
+enum class ChartKind {
+  plain,
+  full_turn,  ///< x runs from 0 to 360 degree
+  map,        ///< square, equal scales, both axes turned: a view along the beam
+};
 
 /// One drawn series.
 struct Series {
@@ -27,8 +35,8 @@ struct Series {
 struct Chart {
   std::string title, x_label, y_label;
   std::vector<Series> series;
-  std::string note;             ///< under the diagram: what was thinned
-  bool map = false;             ///< square, equal scales, both axes turned: a view along the beam
+  std::string note;  ///< under the diagram: what was thinned
+  ChartKind kind = ChartKind::plain;
 };
 
 /// A diagram as a figure element, and its data as a JSON object that page.js draws.
@@ -40,8 +48,8 @@ using Column = std::function<double(std::size_t)>;
 
 /// Every row that a thinning to at most so many points keeps: all, or each n-th.
 std::vector<std::size_t> every_nth(std::size_t rows, std::size_t most);
-/// In words, or nothing when all are shown.
-std::string every_nth_note(std::size_t rows, std::size_t most);
+/// The same in words.
+std::string every_nth_note(std::size_t rows, std::size_t most, std::string_view what = "shots");
 
 /// A line that keeps peaks: of every bin of rows the smallest and the largest value, in the order
 /// they stand; short columns stay as they are.

@@ -194,7 +194,8 @@ std::string correlation_html(const Estimate& e) {
   for (Eigen::Index i = 0; i < covariance.rows(); ++i) {
     html += fmt::format("<tr>{}", parameter_head(*infos[static_cast<std::size_t>(i)]));
     for (Eigen::Index j = 0; j < covariance.cols(); ++j) {
-      const double r = covariance(i, j) / std::sqrt(covariance(i, i) * covariance(j, j));
+      double r = covariance(i, j) / std::sqrt(covariance(i, i) * covariance(j, j));
+      if (std::abs(r) < 0.005) r = 0;  // not "-0.00"
       html += fmt::format("<td style=\"background:rgba(var(--{}),{:.2f})\">{:.2f}</td>",
                           r < 0 ? "minus" : "plus", 0.75 * std::min(std::abs(r), 1.0), r);
     }
@@ -265,7 +266,7 @@ class ChartPage {
       shots.y.push_back(degrees_from_radians(head.zenith[i]));
     }
     Chart chart{"Scan pattern of the first 0.09 s, as recorded", "azimuth, deg", "zenith, deg", {shots},
-                every_nth_note(rows, kMostMapPoints), true};
+                every_nth_note(rows, kMostMapPoints), ChartKind::map};
     return figure(chart);
   }
 
@@ -311,8 +312,7 @@ class ChartPage {
     }
     std::string note = every_nth_note(states_.size(), kMostPoints);
     if (!rows.empty()) {
-      const std::string all = every_nth_note(rows.size(), kMostPoints);
-      note += all.empty() ? " Every outlier is drawn." : " Outliers: " + all;
+      note += " " + every_nth_note(rows.size(), kMostPoints, "outliers");
     }
     Chart chart{title, "time, s", "observed minus estimated, deg", {used}, note};
     if (!rows.empty()) chart.series.push_back(outliers);
@@ -334,7 +334,8 @@ class ChartPage {
     Chart chart{fmt::format("Residuals over the rotation angle of prism {}", letter(rotor)),
                 "rotation angle, deg", "observed minus estimated, deg", {},
                 every_nth_note(states_.size(), kMostPoints / 2) +
-                    " Lines: means over 5° of all shots that were used."};
+                    " Lines: means over 5° of all shots that were used.",
+                ChartKind::full_turn};
     const auto add = [&](const std::string& name, const std::vector<double>& residual,
                          const std::string& colour, const std::string& mean_colour) {
       const auto value = [&residual](std::size_t i) { return degrees_from_radians(residual[i]); };

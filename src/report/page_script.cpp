@@ -23,7 +23,7 @@ std::string_view page_script() {
       borderColor: colour,
       backgroundColor: series.kind === 'steps' ? colour + '55' : colour,
       borderWidth: series.kind === 'steps' ? 1 : 1.5,
-      pointRadius: line ? 0 : 1.2,
+      pointRadius: line ? 0 : points.length < 500 ? 2.5 : 1.2,
       pointHitRadius: 4,
       pointBorderWidth: 0,
     };
@@ -54,22 +54,21 @@ std::string_view page_script() {
         grid: { color: colour('grid'), borderColor: colour('muted') },
       });
       const scales = { x: axis(chart.x_label), y: axis(chart.y_label) };
-      if (chart.map && chart.series.some((one) => one.x.length > 0)) {
+      if (chart.kind === 'map' && chart.series.some((one) => one.x.length > 0)) {
         const limits = mapLimits(chart.series);
         Object.assign(scales.x, limits.x, { reverse: true });
         Object.assign(scales.y, limits.y, { reverse: true });
-      } else {
-        const x = chart.series.flatMap((one) => one.x).filter((v) => v !== null);
-        if (x.length > 1) {
-          scales.x.min = x.reduce((a, b) => Math.min(a, b));
-          scales.x.max = x.reduce((a, b) => Math.max(a, b));
-        }
+      }
+      if (chart.kind === 'full_turn') {
+        Object.assign(scales.x, { min: 0, max: 360 });
+        scales.x.ticks.stepSize = 60;
       }
       return new Chart(document.getElementById(chart.id), {
         type: 'scatter',
         data: { datasets: chart.series.map((one) => dataset(one, colour(one.colour))) },
         options: {
           animation: false,
+          locale: 'en',
           responsive: true,
           maintainAspectRatio: false,
           scales: scales,

@@ -25,7 +25,7 @@ std::string_view page_style() {
 * { box-sizing: border-box; }
 body { margin: 0; background: var(--paper); color: var(--ink);
        font: 16px/1.5 system-ui, -apple-system, "Segoe UI", "DejaVu Sans", sans-serif; }
-main { max-width: 76rem; margin: 0 auto; padding: 1.5rem 1.25rem 4rem; }
+main { max-width: 84rem; margin: 0 auto; padding: 1.5rem 1.25rem 4rem; }
 h1 { font-size: 1.5rem; margin: 0; overflow-wrap: anywhere; }
 h2 { font-size: 1.2rem; margin: 2.5rem 0 0.75rem; }
 p { margin: 0.5rem 0; max-width: 60rem; }
@@ -39,12 +39,12 @@ p { margin: 0.5rem 0; max-width: 60rem; }
 .verdict ul { margin: 0.5rem 0; padding-left: 1.3rem; }
 .wide { overflow-x: auto; }
 table { border-collapse: collapse; font-variant-numeric: tabular-nums; font-size: 0.9rem; }
-th, td { padding: 0.3rem 0.7rem; text-align: right; border-bottom: 1px solid var(--grid);
+th, td { padding: 0.3rem 0.55rem; text-align: right; border-bottom: 1px solid var(--grid);
          white-space: nowrap; }
 th { font-weight: 600; }
 th:first-child, td.text { text-align: left; }
 thead th { border-bottom: 2px solid var(--muted); vertical-align: bottom; }
-tbody th { font-weight: 400; text-align: left; }
+tbody th { font-weight: 400; text-align: left; white-space: normal; min-width: 13rem; }
 td.far { color: var(--bad); font-weight: 600; }
 .name { display: block; font-size: 0.8rem; color: var(--muted);
         font-family: ui-monospace, "DejaVu Sans Mono", monospace; }

@@ -35,7 +35,7 @@ struct RotorSettings {
   double acceleration_noise = 0;           ///< rad/s/sqrt(s), the same for all prisms
 };
 
-/// The settings that a kind stands for. No two periods have a common multiple within minutes.
+/// The settings that a kind stands for. Every prism has its own period.
 /// constant:    nothing is added.
 /// sinusoidal:  2.2 deg/s standard deviation of the speed [B21 Table 3], periods 3, 4.3, 5.9 and
 ///              7.7 s, random walk 0.05 deg/s/sqrt(s).
