@@ -31,7 +31,7 @@ double number_from(const std::string& text, std::string_view name) {
 }
 
 std::string duration_text(double seconds) {
-  const int whole = static_cast<int>(std::min(seconds, 359999.0) + 0.5);
+  const int whole = static_cast<int>(std::lround(std::min(seconds, 359999.0)));
   if (whole < 60) return fmt::format("{} s", whole);
   if (whole < 3600) return fmt::format("{} min {:02} s", whole / 60, whole % 60);
   return fmt::format("{} h {:02} min", whole / 3600, whole / 60 % 60);

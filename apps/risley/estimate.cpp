@@ -52,12 +52,12 @@ ReadResult read_recording(const EstimateCommandOptions& options, const CommonOpt
   if (options.rate_hz != "full") {
     selection.rate = positive_number(options.rate_hz, "--rate-hz", "Hz");
   }
-  ReadResult result{recordings::open_recording(options.input), {},
-                    estimation::ShotSelector(selection)};
+  ReadResult result{
+      recordings::open_recording(options.input), {}, estimation::ShotSelector(selection)};
   if (result.reader->header().devices.size() > 1) {
-    throw InvalidArgument(fmt::format(
-        "{} holds {} sensors, an estimation takes the recording of one", options.input,
-        result.reader->header().devices.size()));
+    throw InvalidArgument(
+        fmt::format("{} holds {} sensors, an estimation takes the recording of one", options.input,
+                    result.reader->header().devices.size()));
   }
   ProgressBar bar("reading", common);
   recordings::TimeAudit audit;
@@ -103,8 +103,8 @@ std::vector<estimation::RotorProcess> rotor_process(const std::string& text, int
 estimation::EstimateOptions estimate_options(const EstimateCommandOptions& options,
                                              const recordings::RecordingHeader& header) {
   estimation::EstimateOptions result;
-  result.sensor = options.sensor.empty() ? sensor_of_recording(header)
-                                         : sensors::load_sensor(options.sensor);
+  result.sensor =
+      options.sensor.empty() ? sensor_of_recording(header) : sensors::load_sensor(options.sensor);
   const int prisms = result.sensor.prisms();
   if (options.noise_angle_deg) {
     check_positive(*options.noise_angle_deg, "--noise-angle-deg", "deg");
@@ -118,7 +118,8 @@ estimation::EstimateOptions estimate_options(const EstimateCommandOptions& optio
     }
     const auto [name, value] = parameter_assignment(text, prisms);
     if (find_parameter(name, prisms).kind != ParameterKind::train) {
-      throw InvalidArgument(fmt::format("--fix {}: only parameters of the prisms can be held", name));
+      throw InvalidArgument(
+          fmt::format("--fix {}: only parameters of the prisms can be held", name));
     }
     result.sensor.set(name, value);
     result.fixed.push_back(name);
@@ -224,25 +225,26 @@ Json outcome_json(const Outcome& outcome) {
   }
   std::vector<std::string> warnings = outcome.warnings;
   warnings.insert(warnings.end(), e.warnings.begin(), e.warnings.end());
-  Json object = {{"converged", e.converged},
-                 {"reason", e.reason},
-                 {"method", e.method},
-                 {"observations_used", e.filter.states.size()},
-                 {"outliers", e.filter.outliers},
-                 {"combination", nullptr},
-                 {"mirrored", e.mirrored},
-                 {"parameters", parameters},
-                 {"fixed", fixed_json(e)},
-                 {"residuals",
-                  {{"azimuth_deg", moments_json(e.azimuth_residuals)},
-                   {"zenith_deg", moments_json(e.zenith_residuals)},
-                   {"expected_rms_deg", degrees_from_radians(e.expected_residual)}}},
-                 {"noise_angle_deg", degrees_from_radians(e.angle_noise)},
-                 {"process_noise_deg_per_s_per_sqrt_s", rotors},
-                 {"start", start_json(e.start)},
-                 {"warnings", warnings},
-                 {"seconds",
-                  {{"read", outcome.read_s}, {"solve", outcome.solve_s}, {"total", outcome.total_s}}}};
+  Json object = {
+      {"converged", e.converged},
+      {"reason", e.reason},
+      {"method", e.method},
+      {"observations_used", e.filter.states.size()},
+      {"outliers", e.filter.outliers},
+      {"combination", nullptr},
+      {"mirrored", e.mirrored},
+      {"parameters", parameters},
+      {"fixed", fixed_json(e)},
+      {"residuals",
+       {{"azimuth_deg", moments_json(e.azimuth_residuals)},
+        {"zenith_deg", moments_json(e.zenith_residuals)},
+        {"expected_rms_deg", degrees_from_radians(e.expected_residual)}}},
+      {"noise_angle_deg", degrees_from_radians(e.angle_noise)},
+      {"process_noise_deg_per_s_per_sqrt_s", rotors},
+      {"start", start_json(e.start)},
+      {"warnings", warnings},
+      {"seconds",
+       {{"read", outcome.read_s}, {"solve", outcome.solve_s}, {"total", outcome.total_s}}}};
   if (e.sensor.combination) object["combination"] = static_cast<int>(*e.sensor.combination);
   if (outcome.evaluation) object["truth"] = evaluation_json(*outcome.evaluation, prisms);
   return object;
@@ -254,9 +256,9 @@ void print_outcome(const Outcome& outcome) {
   fmt::print("{}\n", e.converged ? "converged" : "NOT CONVERGED: " + e.reason);
   fmt::print("{} shots used, {} of them outliers{}; read {:.2f} s, solved {:.2f} s\n\n",
              grouped(e.filter.states.size()), grouped(e.filter.outliers),
-             (e.sensor.combination ? fmt::format(", speed combination {}",
-                                                 static_cast<int>(*e.sensor.combination))
-                                   : std::string()) +
+             (e.sensor.combination
+                  ? fmt::format(", speed combination {}", static_cast<int>(*e.sensor.combination))
+                  : std::string()) +
                  (e.mirrored ? ", mirrored" : ""),
              outcome.read_s, outcome.solve_s);
   std::vector<std::string> head = {"parameter", "value", "+- sigma", "unit"};
@@ -296,8 +298,9 @@ void print_outcome(const Outcome& outcome) {
       fmt::print(" {} {:.5f} deg", prism_letter(static_cast<int>(i)),
                  degrees_from_radians(outcome.evaluation->rotation_angle_rmse[i]));
     }
-    fmt::print("\nNEES per degree of freedom (1 is honest): parameters {:.3g}, rotation angles {:.3g}\n",
-               outcome.evaluation->nees_parameters, outcome.evaluation->nees_rotation_angles);
+    fmt::print(
+        "\nNEES per degree of freedom (1 is honest): parameters {:.3g}, rotation angles {:.3g}\n",
+        outcome.evaluation->nees_parameters, outcome.evaluation->nees_rotation_angles);
   }
 }
 
@@ -318,12 +321,12 @@ void write_folder(const EstimateCommandOptions& options, const CommonOptions& co
   if (options.states != "none") {
     report::write_states(path("states.nc"), outcome.estimate.filter.states, provenance);
   }
-  write_text_file(path("report.html"),
-                  report::estimate_page({outcome.estimate, nominal, outcome.evaluation,
-                                         input.selector.head(),
-                                         fs::path(options.input).filename().string(),
-                                         input.reader->header().format, input.audit.observations,
-                                         input.audit.duration_s, provenance, outcome.warnings}));
+  write_text_file(
+      path("report.html"),
+      report::estimate_page({outcome.estimate, nominal, outcome.evaluation, input.selector.head(),
+                             fs::path(options.input).filename().string(),
+                             input.reader->header().format, input.audit.observations,
+                             input.audit.duration_s, provenance, outcome.warnings}));
 }
 
 /// Wrong wishes are told before an hour of reading.
@@ -339,9 +342,9 @@ void check_options(const EstimateCommandOptions& options) {
   std::error_code code;
   std::filesystem::create_directories(options.folder, code);
   if (code || !std::filesystem::is_directory(options.folder)) {
-    throw FileError(options.folder, {},
-                    fmt::format("cannot be made a folder: {}",
-                                code ? code.message() : "a file has this name"));
+    throw FileError(
+        options.folder, {},
+        fmt::format("cannot be made a folder: {}", code ? code.message() : "a file has this name"));
   }
 }
 
@@ -351,23 +354,25 @@ ExitStatus run_estimate(const EstimateCommandOptions& options, const CommonOptio
   const ReadResult input = read_recording(options, common);
   const estimation::EstimateOptions settings = estimate_options(options, input.reader->header());
   const estimation::SelectionCounts& counts = input.selector.counts();
-  spdlog::debug("{} observations of format {}, {} without a direction, {} out of order; {} shots used "
-                "with sensor {}",
-                counts.rows, input.reader->header().format, counts.invalid, counts.out_of_order,
-                input.selector.series().size(), settings.sensor.name);
+  spdlog::debug(
+      "{} observations of format {}, {} without a direction, {} out of order; {} shots used "
+      "with sensor {}",
+      counts.rows, input.reader->header().format, counts.invalid, counts.out_of_order,
+      input.selector.series().size(), settings.sensor.name);
   Outcome outcome;
   outcome.warnings = warning_texts(input.reader->warnings());
   if (input.audit.time_resets > 0) {
     outcome.warnings.push_back(fmt::format(
         "the clock of the recording jumps {} times: only what lies after the highest time so far "
-        "is used", input.audit.time_resets));
+        "is used",
+        input.audit.time_resets));
   }
   outcome.read_s = input.seconds;
   const double solving = now();
   {
     ProgressBar bar("estimating", common);
-    outcome.estimate = estimation::estimate_with_ekf(
-        input.selector.series(), input.selector.head(), settings, bar.callback());
+    outcome.estimate = estimation::estimate_with_ekf(input.selector.series(), input.selector.head(),
+                                                     settings, bar.callback());
   }
   outcome.solve_s = now() - solving;
   const estimation::Start& start = outcome.estimate.start;
@@ -423,9 +428,10 @@ Run declare_estimate(CLI::App& verb) {
                   "Whether the elevation in the file has the opposite sign; auto finds out")
       ->check(CLI::IsMember({"auto", "yes", "no"}))
       ->capture_default_str();
-  verb.add_option("--process-noise", o.process_noise,
-                  "Random walk of the speeds in deg/s per sqrt(s): auto (maximum likelihood), paper "
-                  "(850) or a number")
+  verb.add_option(
+          "--process-noise", o.process_noise,
+          "Random walk of the speeds in deg/s per sqrt(s): auto (maximum likelihood), paper "
+          "(850) or a number")
       ->capture_default_str();
   verb.add_option("--truth", o.truth, "OUT.truth.yaml of a simulation, to judge the estimate by");
   return [options](const CommonOptions& common) { return run_estimate(*options, common); };

@@ -35,11 +35,11 @@ Json devices_json(const recordings::RecordingHeader& header, const TimeAuditResu
   Json devices = Json::array();
   for (std::size_t i = 0; i < header.devices.size(); ++i) {
     const recordings::Device& device = header.devices[i];
-    devices.push_back({{"type", recordings::device_type_name(device.type)},
-                       {"serial", device.serial},
-                       {"hub_serial", device.hub_serial},
-                       {"observations",
-                        i < audit.rows_by_device.size() ? audit.rows_by_device[i] : 0}});
+    devices.push_back(
+        {{"type", recordings::device_type_name(device.type)},
+         {"serial", device.serial},
+         {"hub_serial", device.hub_serial},
+         {"observations", i < audit.rows_by_device.size() ? audit.rows_by_device[i] : 0}});
   }
   return devices;
 }

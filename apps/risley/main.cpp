@@ -72,7 +72,8 @@ std::string shell_text(int argc, char** argv) {
 }
 
 /// Tells of an error: words on stderr, and with --json an object on stdout.
-ExitStatus fail(ExitStatus status, const std::string& message, bool json, Json details = {}) {
+ExitStatus fail(ExitStatus status, const std::string& message, bool json,
+                const Json& details = {}) {
   spdlog::error(message);
   if (json) {
     Json object = {{"error", message}, {"exit_status", static_cast<int>(status)}};
@@ -118,8 +119,9 @@ ExitStatus run_command(int argc, char** argv) {
   CLI::App app("Observation model, simulator and estimator for Risley-prism lidars", "risley");
   app.set_version_flag("--version", "risley " RISLEY_VERSION);
   app.require_subcommand(1);
-  app.footer("Exit status: 0 done, 1 the numbers failed, 2 wrong usage, 3 a file is bad.\n"
-             "risley VERB --help tells more.");
+  app.footer(
+      "Exit status: 0 done, 1 the numbers failed, 2 wrong usage, 3 a file is bad.\n"
+      "risley VERB --help tells more.");
   CommonOptions common;
   common.command = shell_text(argc, argv);
   std::map<const CLI::App*, Run> runs;
@@ -136,8 +138,8 @@ ExitStatus run_command(int argc, char** argv) {
       app.exit(error);
       return kDone;
     }
-    const bool json = std::any_of(argv + 1, argv + argc,
-                                  [](const char* word) { return std::strcmp(word, "--json") == 0; });
+    const bool json = std::any_of(
+        argv + 1, argv + argc, [](const char* word) { return std::strcmp(word, "--json") == 0; });
     return fail(kWrongUsage, usage_error(error, argc, argv), json);
   }
   if (common.quiet) spdlog::set_level(spdlog::level::err);

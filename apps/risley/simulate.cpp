@@ -140,8 +140,8 @@ Run declare_simulate(CLI::App& verb) {
     {
       ProgressBar bar("simulating", common);
       result = simulation::simulate_to_file(
-          settings, options->output,
-          {{"command", common.command}, {"version", RISLEY_VERSION}}, bar.callback());
+          settings, options->output, {{"command", common.command}, {"version", RISLEY_VERSION}},
+          bar.callback());
     }
     if (!common.json) {
       print_result(*options, result);

@@ -133,7 +133,7 @@ class Filter {
   Eigen::Vector2d residual_at(const Eigen::VectorXd& mean, std::size_t row) {
     model_.set(mean.head(statics_));
     model_.linearise(angles(mean));
-    const Eigen::Vector2d residual = model_.residual(series_.azimuth[row], series_.zenith[row]);
+    Eigen::Vector2d residual = model_.residual(series_.azimuth[row], series_.zenith[row]);
     if (reference_) model_.set(reference_->parameters);
     return residual;
   }
@@ -218,6 +218,7 @@ State first_state(const Filter<N>& filter, const Reference& reference) {
 template <int N>
 std::vector<RotorProcess> processes(const std::array<double, N>& decades) {
   std::vector<RotorProcess> result;
+  result.reserve(N);
   for (const double d : decades) result.push_back({radians_from_degrees(std::pow(10.0, d)), 0.0});
   return result;
 }

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <complex>
 #include <limits>
+#include <utility>
 
 #include <Eigen/Cholesky>
 #include <fmt/format.h>
@@ -146,7 +147,7 @@ WindowFit fit_window(const AngleSeries& head, std::size_t first, std::size_t las
 
   Eigen::MatrixXd normal;
   Eigen::VectorXd gradient;
-  WindowFit fit{state, 0};
+  WindowFit fit{std::move(state), 0};
   double damping = 1e-3;
   double cost = evaluate(fit.state, &normal, &gradient, &fit.rms);
   for (int iteration = 0; iteration < 60 && std::isfinite(cost); ++iteration) {

@@ -39,15 +39,15 @@ std::vector<ParameterInfo> build_list(int prisms) {
     every_wedge.push_back(place::wedge_angle(i));
   }
   add("refractive_index_air", "refractive index around the prisms", "n_air", "1", 1.0, 0.9, 1.5,
-      {place::refractive_index_air});
+      {place::refractive_index_air()});
   add("refractive_index", "refractive index of all prisms", "n_prism", "1", 1.0, 1.0, 4.0,
       every_index);
   add("wedge_angle_deg", "wedge angle of all prisms", "α", "deg", kRadiansPerDegree, 0.0,
       kLargestWedge, every_wedge);
   add_error("incident_beam_horizontal", "horizontal incident beam direction error", "Δφ_L0",
-            place::incident_beam_horizontal);
+            place::incident_beam_horizontal());
   add_error("incident_beam_vertical", "vertical incident beam direction error", "Δθ_L0",
-            place::incident_beam_vertical);
+            place::incident_beam_vertical());
   for (int i = 0; i < prisms; ++i) {
     const char letter = prism_letter(i);
     const char capital = static_cast<char>(letter - 'a' + 'A');
@@ -112,6 +112,7 @@ const ParameterInfo& find_parameter(std::string_view name, int prisms) {
     if (parameter.name == name) return parameter;
   }
   std::vector<std::string> names;
+  names.reserve(list.size());
   for (const auto& parameter : list) names.push_back(parameter.name);
   throw InvalidArgument(
       fmt::format("unknown parameter \"{}\", known: {}", name, fmt::join(names, ", ")));

@@ -39,7 +39,7 @@ void PrismTrain::set(std::string_view name, double value) {
 
 PrismTrain PrismTrain::without_errors() const {
   PrismTrain ideal(face_order_);
-  ideal.set_place(place::refractive_index_air, (*this)[place::refractive_index_air]);
+  ideal.set_place(place::refractive_index_air(), (*this)[place::refractive_index_air()]);
   for (int i = 0; i < prisms(); ++i) {
     ideal.set_place(place::refractive_index(i), (*this)[place::refractive_index(i)]);
     ideal.set_place(place::wedge_angle(i), (*this)[place::wedge_angle(i)]);

@@ -22,18 +22,24 @@ constexpr std::size_t kAngleBins = 72;
 
 const char* kind_name(SeriesKind kind) {
   switch (kind) {
-    case SeriesKind::line: return "line";
-    case SeriesKind::steps: return "steps";
-    case SeriesKind::points: break;
+    case SeriesKind::line:
+      return "line";
+    case SeriesKind::steps:
+      return "steps";
+    case SeriesKind::points:
+      break;
   }
   return "points";
 }
 
 const char* kind_name(ChartKind kind) {
   switch (kind) {
-    case ChartKind::full_turn: return "full_turn";
-    case ChartKind::map: return "map";
-    case ChartKind::plain: break;
+    case ChartKind::full_turn:
+      return "full_turn";
+    case ChartKind::map:
+      return "map";
+    case ChartKind::plain:
+      break;
   }
   return "plain";
 }
@@ -50,21 +56,23 @@ std::string figure_html(const Chart& chart, std::size_t number) {
       "role=\"img\" aria-label=\"{}: {} over {}\"></canvas></div>",
       chart.kind == ChartKind::map ? " class=\"map\"" : "", escape_html(chart.title), number,
       escape_html(chart.title), escape_html(chart.y_label), escape_html(chart.x_label));
-  if (!chart.note.empty()) html += fmt::format("\n<p class=\"note\">{}</p>", escape_html(chart.note));
+  if (!chart.note.empty())
+    html += fmt::format("\n<p class=\"note\">{}</p>", escape_html(chart.note));
   return html + "</figure>\n";
 }
 
 std::string chart_json(const Chart& chart, std::size_t number) {
   std::string series;
   for (const Series& one : chart.series) {
-    series += fmt::format("{}{{\"label\":{},\"colour\":{},\"kind\":\"{}\",\"x\":{},\"y\":{}}}",
-                          series.empty() ? "" : ",", json_string(one.label),
-                          json_string(one.colour), kind_name(one.kind), json_numbers(one.x),
-                          json_numbers(one.y));
+    series +=
+        fmt::format("{}{{\"label\":{},\"colour\":{},\"kind\":\"{}\",\"x\":{},\"y\":{}}}",
+                    series.empty() ? "" : ",", json_string(one.label), json_string(one.colour),
+                    kind_name(one.kind), json_numbers(one.x), json_numbers(one.y));
   }
   return fmt::format(
-      "{{\"id\":\"chart-{}\",\"x_label\":{},\"y_label\":{},\"kind\":\"{}\",\"series\":[{}]}}", number,
-      json_string(chart.x_label), json_string(chart.y_label), kind_name(chart.kind), series);
+      "{{\"id\":\"chart-{}\",\"x_label\":{},\"y_label\":{},\"kind\":\"{}\",\"series\":[{}]}}",
+      number, json_string(chart.x_label), json_string(chart.y_label), kind_name(chart.kind),
+      series);
 }
 
 std::vector<std::size_t> every_nth(std::size_t rows, std::size_t most) {
@@ -121,8 +129,8 @@ std::vector<Series> histogram(const std::string& label, const std::string& colou
   counts.y.assign(kHistogramBins, 0.0);
   for (std::size_t i = 0; i < values.size(); ++i) {
     if ((!skip.empty() && skip[i] != 0) || !std::isfinite(values[i])) continue;
-    const double bin = std::clamp(std::floor((values[i] - first) / width), 0.0,
-                                  double(kHistogramBins - 1));
+    const double bin =
+        std::clamp(std::floor((values[i] - first) / width), 0.0, double(kHistogramBins - 1));
     counts.y[static_cast<std::size_t>(bin)] += 1.0;
   }
   for (std::size_t i = 0; i < kHistogramBins; ++i) {

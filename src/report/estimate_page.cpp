@@ -11,7 +11,10 @@
 #include "risley/core/angle.hpp"
 #include "risley/report/number_text.hpp"
 
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Woverlength-strings"  // Chart.js is one string
 #include "report/chart_js.hpp"
+#pragma GCC diagnostic pop
 #include "report/charts.hpp"
 #include "report/html.hpp"
 #include "report/page_assets.hpp"
@@ -23,10 +26,10 @@ using estimation::Estimate;
 using estimation::Moments;
 using estimation::RotorStates;
 
-constexpr std::size_t kMostPoints = 4000;       // per scatter diagram
-constexpr std::size_t kMostMapPoints = 9000;    // of the scan pattern
-constexpr double kPatternDuration = 0.09;       // s, as in the paper's figures of the pattern
-constexpr double kFarOff = 3.0;                 // errors beyond so many sigmas stand out
+constexpr std::size_t kMostPoints = 4000;     // per scatter diagram
+constexpr std::size_t kMostMapPoints = 9000;  // of the scan pattern
+constexpr double kPatternDuration = 0.09;     // s, as in the paper's figures of the pattern
+constexpr double kFarOff = 3.0;               // errors beyond so many sigmas stand out
 
 /// "Δφ_L0" with a lowered index.
 std::string symbol_html(const std::string& symbol) {
@@ -53,7 +56,8 @@ std::string verdict_html(const EstimatePageInput& input) {
   std::vector<std::string> warnings = e.warnings;
   warnings.insert(warnings.end(), input.warnings.begin(), input.warnings.end());
   const std::string facts = fmt::format(
-      "What is left unexplained is {:.3g}° in azimuth and {:.3g}° in zenith (root mean square); noise "
+      "What is left unexplained is {:.3g}° in azimuth and {:.3g}° in zenith (root mean square); "
+      "noise "
       "and rounding alone would leave {:.3g}°. {} of {} shots were left out as outliers.",
       degrees_from_radians(e.azimuth_residuals.rms), degrees_from_radians(e.zenith_residuals.rms),
       degrees_from_radians(e.expected_residual), e.filter.outliers, e.filter.states.size());
@@ -77,9 +81,8 @@ std::string verdict_html(const EstimatePageInput& input) {
         "<code>--sensor</code>.</p>";
   }
   if (!e.converged && !warnings.empty()) advice += list_html(warnings);
-  return fmt::format(
-      "<section class=\"verdict {}\"><strong>{}</strong><p>{}</p>{}</section>\n", kind,
-      escape_html(title), escape_html(facts), advice);
+  return fmt::format("<section class=\"verdict {}\"><strong>{}</strong><p>{}</p>{}</section>\n",
+                     kind, escape_html(title), escape_html(facts), advice);
 }
 
 std::string subject_text(const EstimatePageInput& input) {
@@ -143,8 +146,9 @@ std::string parameters_html(const EstimatePageInput& input) {
     }
     html += "</tr>\n";
   }
-  html += "</tbody></table></div>\n<p class=\"note\">σ is one standard deviation. Angular velocities "
-          "are means over the recording, rotation angles are those at the first used shot.</p>\n";
+  html +=
+      "</tbody></table></div>\n<p class=\"note\">σ is one standard deviation. Angular velocities "
+      "are means over the recording, rotation angles are those at the first used shot.</p>\n";
   if (truth) {
     std::string rmse;
     for (std::size_t i = 0; i < input.evaluation->rotation_angle_rmse.size(); ++i) {
@@ -153,7 +157,8 @@ std::string parameters_html(const EstimatePageInput& input) {
                           prism_letter(static_cast<int>(i)));
     }
     html += fmt::format(
-        "<p>Against the truth: rotation angles are off by {} (root mean square). The squared errors "
+        "<p>Against the truth: rotation angles are off by {} (root mean square). The squared "
+        "errors "
         "are {:.3g} times (parameters) and {:.3g} times (rotation angles) what the stated sigmas "
         "promise; 1 is honest, far above 1 means sigmas that are too small.</p>\n",
         escape_html(rmse), input.evaluation->nees_parameters,
@@ -174,7 +179,8 @@ std::string moments_html(const Estimate& e) {
          "<th>standard deviation, deg</th><th>root mean square, deg</th><th>skewness</th>"
          "<th>excess kurtosis</th><th>shots</th></tr></thead><tbody>\n" +
          row("azimuth", e.azimuth_residuals) + row("zenith", e.zenith_residuals) +
-         "</tbody></table></div>\n<p class=\"note\">Residual: observed minus estimated. Outliers are "
+         "</tbody></table></div>\n<p class=\"note\">Residual: observed minus estimated. Outliers "
+         "are "
          "left out of this table and of the histograms. Skewness and excess kurtosis of a normal "
          "distribution are 0.</p>\n";
 }
@@ -182,8 +188,9 @@ std::string moments_html(const Estimate& e) {
 std::string correlation_html(const Estimate& e) {
   const auto& free = e.filter.free;
   if (free.empty()) return "";
-  std::string html = "<h2>Correlations of the parameters</h2>\n<div class=\"wide\">"
-                     "<table class=\"heat\"><thead><tr><th></th>";
+  std::string html =
+      "<h2>Correlations of the parameters</h2>\n<div class=\"wide\">"
+      "<table class=\"heat\"><thead><tr><th></th>";
   std::vector<const ParameterInfo*> infos;
   for (const auto& parameter : free) {
     infos.push_back(&find_parameter(parameter.name, e.sensor.prisms()));
@@ -201,9 +208,10 @@ std::string correlation_html(const Estimate& e) {
     }
     html += "</tr>\n";
   }
-  return html + "</tbody></table></div>\n<p class=\"note\">Blue: the two rise together. Red: one "
-                "rises where the other falls. Near ±1 only their sum or difference is well "
-                "known.</p>\n";
+  return html +
+         "</tbody></table></div>\n<p class=\"note\">Blue: the two rise together. Red: one "
+         "rises where the other falls. Near ±1 only their sum or difference is well "
+         "known.</p>\n";
 }
 
 std::string provenance_html(const EstimatePageInput& input) {
@@ -240,7 +248,8 @@ class ChartPage {
   std::string rotors() {
     std::string html = "<div class=\"charts\">\n";
     for (std::size_t rotor = 0; rotor < states_.angular_velocity.size(); ++rotor) {
-      html += figure({fmt::format("Angular velocity of prism {}", letter(rotor)), "time, s",
+      html += figure({fmt::format("Angular velocity of prism {}", letter(rotor)),
+                      "time, s",
                       "angular velocity, deg/s",
                       {line("", rotor, states_.angular_velocity[rotor])},
                       peak_line_note(states_.size())});
@@ -249,8 +258,10 @@ class ChartPage {
       const auto& errors = input_.evaluation->rotation_angle_error;
       for (std::size_t rotor = 0; rotor < errors.size(); ++rotor) {
         html += figure({fmt::format("Error of the rotation angle of prism {}", letter(rotor)),
-                        "time, s", "estimate minus truth, deg",
-                        {line("", rotor, errors[rotor])}, peak_line_note(states_.size())});
+                        "time, s",
+                        "estimate minus truth, deg",
+                        {line("", rotor, errors[rotor])},
+                        peak_line_note(states_.size())});
       }
     }
     return html + "</div>\n";
@@ -265,8 +276,12 @@ class ChartPage {
       shots.x.push_back(degrees_from_radians(head.azimuth[i]));
       shots.y.push_back(degrees_from_radians(head.zenith[i]));
     }
-    Chart chart{"Scan pattern of the first 0.09 s, as recorded", "azimuth, deg", "zenith, deg", {shots},
-                every_nth_note(rows, kMostMapPoints), ChartKind::map};
+    Chart chart{"Scan pattern of the first 0.09 s, as recorded",
+                "azimuth, deg",
+                "zenith, deg",
+                {shots},
+                every_nth_note(rows, kMostMapPoints),
+                ChartKind::map};
     return figure(chart);
   }
 
@@ -286,7 +301,8 @@ class ChartPage {
     return 1e-9 * static_cast<double>(states_.time_ns[row] - states_.time_ns[0]);
   }
 
-  Series line(const std::string& label, std::size_t rotor, const std::vector<double>& values) const {
+  Series line(const std::string& label, std::size_t rotor,
+              const std::vector<double>& values) const {
     return peak_line(
         label, colour_of(rotor), states_.size(), [this](std::size_t i) { return time(i); },
         [&values](std::size_t i) { return degrees_from_radians(values[i]); });
@@ -321,10 +337,11 @@ class ChartPage {
 
   std::string one_histogram(const std::string& title, const std::vector<double>& residual,
                             const Moments& moments, const std::string& colour) {
-    return figure({title, "observed minus estimated, deg", "shots",
-                   histogram("residuals", colour, residual, states_.outlier, moments,
-                             kDegreesPerRadian),
-                   "All shots. The outermost bins hold everything beyond 4.5 standard deviations."});
+    return figure(
+        {title, "observed minus estimated, deg", "shots",
+         histogram("residuals", colour, residual, states_.outlier, moments, kDegreesPerRadian),
+         "All shots but the outliers. The outermost bins hold everything beyond 4.5 standard "
+         "deviations."});
   }
 
   std::string residuals_over_angle(std::size_t rotor) {
@@ -332,7 +349,9 @@ class ChartPage {
       return degrees_from_radians(wrap_to_two_pi(states_.rotation_angle[rotor][i]));
     };
     Chart chart{fmt::format("Residuals over the rotation angle of prism {}", letter(rotor)),
-                "rotation angle, deg", "observed minus estimated, deg", {},
+                "rotation angle, deg",
+                "observed minus estimated, deg",
+                {},
                 every_nth_note(states_.size(), kMostPoints / 2) +
                     " Lines: means over 5° of all shots that were used.",
                 ChartKind::full_turn};

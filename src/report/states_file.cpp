@@ -123,14 +123,14 @@ std::vector<Column> columns_of(const estimation::RotorStates& states) {
                        &states.rotation_angle_covariance[entry++], k, true});
     for (std::size_t j = i + 1; j < prisms; ++j) {
       const char b = prism_letter(static_cast<int>(j));
-      covariances.push_back({fmt::format("rotation_angle_covariance_{}{}_deg2", a, b), "degree2",
-                             fmt::format("covariance of the rotation angles of prisms {} and {}",
-                                         a, b),
-                             &states.rotation_angle_covariance[entry++], k * k});
+      covariances.push_back(
+          {fmt::format("rotation_angle_covariance_{}{}_deg2", a, b), "degree2",
+           fmt::format("covariance of the rotation angles of prisms {} and {}", a, b),
+           &states.rotation_angle_covariance[entry++], k * k});
     }
     columns.push_back({fmt::format("angular_velocity_{}_deg_per_s", a), "degree s-1",
-                       fmt::format("angular velocity of prism {}", a),
-                       &states.angular_velocity[i], k});
+                       fmt::format("angular velocity of prism {}", a), &states.angular_velocity[i],
+                       k});
     columns.push_back({fmt::format("angular_velocity_sigma_{}_deg_per_s", a), "degree s-1",
                        fmt::format("standard deviation of the angular velocity of prism {}", a),
                        &states.angular_velocity_sigma[i], k});
@@ -157,6 +157,7 @@ void write_states(const std::string& path, const estimation::RotorStates& states
   const int time_ns = file.define("time_ns", NC_INT64, "ns", "the same without rounding");
   const std::vector<Column> columns = columns_of(states);
   std::vector<int> variables;
+  variables.reserve(columns.size());
   for (const Column& column : columns) {
     variables.push_back(file.define(column.name, NC_DOUBLE, column.units, column.long_name));
   }

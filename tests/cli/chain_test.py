@@ -6,7 +6,7 @@ import hashlib
 import pathlib
 import unittest
 
-from command import SOURCE, CommandTest
+from command import SOURCE, CommandTest, run
 
 INFO_KEYS = {"format", "sensor", "observations", "no_return", "duration_s", "rate_hz", "has_range",
              "gaps", "time_resets", "azimuth_deg", "zenith_deg"}
@@ -127,11 +127,9 @@ class ChainTest(CommandTest):
         for threads, seed in ((1, 5), (2, 5), (2, 6)):
             folder = self.folder / f"{threads}-{seed}"
             folder.mkdir()
-            # The command is part of the truth file, so the folder must not be.
-            import command
-            done = command.run("simulate", "-o", "same.lvx", "--scene", ROOM, "--duration-s", "0.5",
-                               "--rotor", "sinusoidal", "--threads", threads, "--seed", seed,
-                               folder=folder)
+            done = run("simulate", "-o", "same.lvx", "--scene", ROOM, "--duration-s", "0.5",
+                       "--rotor", "sinusoidal", "--threads", threads, "--seed", seed,
+                       folder=folder)
             self.assertEqual(done.returncode, 0, done.stderr)
             outputs.append((digest(folder / "same.lvx"), digest(folder / "same.lvx.truth.nc")))
         self.assertEqual(outputs[0], outputs[1])
@@ -151,15 +149,18 @@ class ChainTest(CommandTest):
                 self.assertTrue(self.expect(1, "estimate", name).stderr)
 
     def test_not_converged_still_writes(self):
-        self.expect(0, "simulate", "-o", "noisy.csv", "--duration-s", "1", "--rate-hz", "2000",
+        name = "<b>noisy's.csv"  # must not become part of the page's HTML
+        self.expect(0, "simulate", "-o", name, "--duration-s", "1", "--rate-hz", "2000",
                     "--noise-angle-deg", "0.05", "--quantize", "no")
-        result = self.expect_json(1, "estimate", "noisy.csv", "--noise-angle-deg", "0.002",
+        result = self.expect_json(1, "estimate", name, "--noise-angle-deg", "0.002",
                                   "--process-noise", "1", "-o", "noisy")
         self.assertFalse(result["converged"])
         self.assertTrue(result["reason"])
         self.assertTrue(result["parameters"])
         page = (self.folder / "noisy" / "report.html").read_text(encoding="utf-8")
         self.assertIn("Not converged", page)
+        self.assertNotIn("<b>noisy", page)
+        self.assertIn("&lt;b&gt;noisy", page)
 
 
 if __name__ == "__main__":

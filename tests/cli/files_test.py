@@ -3,10 +3,13 @@
 # SPDX-License-Identifier: MIT
 """Missing, unknown and damaged files."""
 import os
+import signal
 import struct
+import subprocess
+import time
 import unittest
 
-from command import CommandTest
+from command import COMMAND, SOURCE, CommandTest, run
 
 HEADER = "Time/s,Azimuth/deg,Zenith/deg\n"
 # Name, content, and what message and JSON must tell.
@@ -62,8 +65,21 @@ class FilesTest(CommandTest):
                           ["estimate", "good.csv", "-o", "good.csv/results"]):
             with self.subTest(arguments=arguments):
                 done = self.expect(3, *arguments)
-                self.assertIn(arguments[-1] if "-o" == arguments[-2] else arguments[2], done.stderr)
+                self.assertIn(arguments[arguments.index("-o") + 1], done.stderr)
                 self.assertEqual(self.names(), before)
+
+    def test_interrupted_run_leaves_nothing(self):
+        before = self.names()
+        with subprocess.Popen([COMMAND, "simulate", "-o", "long.csv", "--duration-s", "1000"],
+                              cwd=self.folder, stdout=subprocess.DEVNULL,
+                              stderr=subprocess.DEVNULL) as process:
+            limit = time.monotonic() + 30
+            while self.names() == before and time.monotonic() < limit:
+                time.sleep(0.02)
+            self.assertNotEqual(self.names(), before)  # it was at work
+            process.send_signal(signal.SIGINT)
+            self.assertEqual(process.wait(30), 130)
+        self.assertEqual(self.names(), before)
 
     @unittest.skipUnless(os.path.exists("/dev/full"), "no /dev/full")
     def test_full_disk_is_an_error(self):
@@ -71,14 +87,14 @@ class FilesTest(CommandTest):
 
 
 def damaged_lvx(lvx):
-    """The same file with a wrong packet version in its last frame: (bytes, offset of that frame)."""
+    """The same file with a wrong packet version in its last frame."""
     data = bytearray(lvx)
     frame, last = 29 + 59 * data[28], 0
     while frame < len(data):
         last = frame
         frame = struct.unpack_from("<Q", data, frame + 8)[0]
     data[last + 24 + 1] = 99
-    return bytes(data), last
+    return bytes(data)
 
 
 class LvxTest(CommandTest):
@@ -87,9 +103,8 @@ class LvxTest(CommandTest):
     @classmethod
     def setUpClass(cls):
         super().setUpClass()
-        import command
-        done = command.run("simulate", "-o", "whole.lvx", "--sensor", "mid-40", "--duration-s", "0.5",
-                           "--scene", command.SOURCE / "data" / "room.yaml", folder=cls.folder)
+        done = run("simulate", "-o", "whole.lvx", "--duration-s", "0.5", "--scene",
+                   SOURCE / "data" / "room.yaml", folder=cls.folder)
         assert done.returncode == 0, done.stderr
         cls.whole = (cls.folder / "whole.lvx").read_bytes()
 
@@ -107,8 +122,7 @@ class LvxTest(CommandTest):
                          cut["observations"])
 
     def test_sound_part_of_a_damaged_body_is_saved(self):
-        data, _ = damaged_lvx(self.whole)
-        (self.folder / "damaged.lvx").write_bytes(data)
+        (self.folder / "damaged.lvx").write_bytes(damaged_lvx(self.whole))
         info = self.expect_json(3, "info", "damaged.lvx")
         whole = self.expect_json(0, "info", "whole.lvx")
         self.assertLess(0, info["observations"])

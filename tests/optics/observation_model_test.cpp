@@ -64,7 +64,7 @@ TEST_P(LawsOfEveryTrain, GlassOfAirOrPlatesWithoutWedgeDeviateNothing) {
   plate.set("wedge_angle_deg", 0.0);
   for (const PrismTrain& train : {air, plate}) {
     const Vector3<double> incident =
-        leaning_direction(train[place::incident_beam_horizontal], train[place::incident_beam_vertical]);
+        leaning_direction(train[place::incident_beam_horizontal()], train[place::incident_beam_vertical()]);
     for (int i = 0; i < 50; ++i) {
       const auto shot = observe(train, testing::random_angles(train.prisms(), generator));
       EXPECT_LT(angle_between(shot.direction, incident), 1e-14);

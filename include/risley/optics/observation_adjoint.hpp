@@ -48,11 +48,11 @@ PreparedDerivatives<T, N> prepare_derivatives(const std::array<T, parameter_coun
     return Vector3<T>{-cos_h * sin_v, sin_h * sin_v, cos_v};
   };
   PreparedDerivatives<T, N> d;
-  const T& beam_h = p(place::incident_beam_horizontal);
-  const T& beam_v = p(place::incident_beam_vertical);
+  const T& beam_h = p(place::incident_beam_horizontal());
+  const T& beam_v = p(place::incident_beam_vertical());
   d.incident_horizontal = horizontal_rate(beam_h, beam_v);
   d.incident_vertical = vertical_rate(beam_h, beam_v);
-  d.air = p(place::refractive_index_air);
+  d.air = p(place::refractive_index_air());
   for (int prism = 0; prism < N; ++prism) {
     const bool last = prism == N - 1;
     d.glass[static_cast<std::size_t>(prism)] = p(place::refractive_index(prism));
@@ -168,9 +168,9 @@ Gradient<T, N> trace_adjoint(const PreparedTrain<T, N>& train, const PreparedDer
     at(place::bearing_tilt_vertical(prism)) = bearing_v;
     gradient.rotation_angles[k] = angle;
   }
-  at(place::refractive_index_air) = air_bar;
-  at(place::incident_beam_horizontal) = dot(beam, d.incident_horizontal);
-  at(place::incident_beam_vertical) = dot(beam, d.incident_vertical);
+  at(place::refractive_index_air()) = air_bar;
+  at(place::incident_beam_horizontal()) = dot(beam, d.incident_horizontal);
+  at(place::incident_beam_vertical()) = dot(beam, d.incident_vertical);
   return gradient;
 }
 

@@ -69,9 +69,9 @@ PreparedTrain<T, N> prepare(const std::array<T, parameter_count(N)>& parameters,
                             const std::array<FaceOrder, N>& face_order) {
   const auto p = [&](int at) -> const T& { return parameters[static_cast<std::size_t>(at)]; };
   PreparedTrain<T, N> train;
-  train.incident = leaning_direction(p(place::incident_beam_horizontal),
-                                     p(place::incident_beam_vertical));  // Eq. (14)
-  const T& air = p(place::refractive_index_air);
+  train.incident = leaning_direction(p(place::incident_beam_horizontal()),
+                                     p(place::incident_beam_vertical()));  // Eq. (14)
+  const T& air = p(place::refractive_index_air());
   for (int prism = 0; prism < N; ++prism) {
     const bool last = prism == N - 1;
     const T bearing_h = last ? T(0.0) : p(place::bearing_tilt_horizontal(prism));

@@ -12,9 +12,9 @@ namespace risley {
 /// prism in beam order. The last prism's axis is the X axis of the sensor, so its two
 /// bearing-tilt places exist only to keep the stride and always hold zero.
 namespace place {
-inline constexpr int refractive_index_air = 0;
-inline constexpr int incident_beam_horizontal = 1;
-inline constexpr int incident_beam_vertical = 2;
+constexpr int refractive_index_air() { return 0; }
+constexpr int incident_beam_horizontal() { return 1; }
+constexpr int incident_beam_vertical() { return 2; }
 constexpr int refractive_index(int prism) { return 3 + 6 * prism; }
 constexpr int wedge_angle(int prism) { return 4 + 6 * prism; }
 constexpr int prism_tilt_horizontal(int prism) { return 5 + 6 * prism; }

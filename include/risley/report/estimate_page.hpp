@@ -18,16 +18,16 @@ namespace risley::report {
 /// All that the page of one estimation shows. References must live until the page is made.
 struct EstimatePageInput {
   const estimation::Estimate& estimate;
-  const sensors::Sensor& nominal;                            ///< what the estimation started from
-  const std::optional<estimation::Evaluation>& evaluation;   ///< when the truth is known
-  const estimation::AngleSeries& head;                       ///< every shot of the beginning
-  std::string recording;                                     ///< file name of the input
+  const sensors::Sensor& nominal;                           ///< what the estimation started from
+  const std::optional<estimation::Evaluation>& evaluation;  ///< when the truth is known
+  const estimation::AngleSeries& head;                      ///< every shot of the beginning
+  std::string recording;                                    ///< file name of the input
   std::string recording_format;
-  std::uint64_t observations = 0;                            ///< rows of the recording
-  double duration = 0;                                       ///< of the recording, s
+  std::uint64_t observations = 0;  ///< rows of the recording
+  double duration = 0;             ///< of the recording, s
   /// How to make it again: name and value pairs such as command, version, seed, input_sha256.
   std::vector<std::pair<std::string, std::string>> provenance;
-  std::vector<std::string> warnings;                         ///< beside those of the estimate
+  std::vector<std::string> warnings;  ///< beside those of the estimate
 };
 
 /// One self-contained HTML page (Chart.js included, no network): the verdict first, then

@@ -5,6 +5,7 @@
 // nearest to that, so that a file of ours comes back byte by byte, and one of the program itself
 // up to the rounding noise far below a nanosecond that its summing leaves. Records without any
 // return are left out when writing, as the program does.
+#include <algorithm>
 #include <array>
 #include <cmath>
 

@@ -216,11 +216,11 @@ const RecordLayout* record_layout(std::uint8_t data_type) {
 }
 
 std::uint8_t data_type_of(bool cartesian, bool tagged, int returns) {
-  for (std::uint8_t type = 0; type < kLayouts.size(); ++type) {
+  for (std::size_t type = 0; type < kLayouts.size(); ++type) {
     const RecordLayout& layout = kLayouts[type];
     if (layout.cartesian == cartesian && layout.returns == returns &&
         layout.tagged == (tagged || returns > 1)) {
-      return type;
+      return static_cast<std::uint8_t>(type);
     }
   }
   throw InvalidArgument(fmt::format("returns per shot = {}, allowed 1 to 3", returns));

@@ -20,7 +20,8 @@ inline std::optional<std::int64_t> nanoseconds_from_seconds(double seconds) {
 inline double seconds_from_nanoseconds(std::int64_t time_ns) {
   constexpr std::int64_t kExact = std::int64_t{1} << 53, kSecond = 1'000'000'000;
   if (time_ns > -kExact && time_ns < kExact) return static_cast<double>(time_ns) / 1e9;
-  return static_cast<double>(time_ns / kSecond) + static_cast<double>(time_ns % kSecond) / 1e9;
+  const std::int64_t whole = time_ns / kSecond;
+  return static_cast<double>(whole) + static_cast<double>(time_ns - whole * kSecond) / 1e9;
 }
 
 }  // namespace risley::recordings

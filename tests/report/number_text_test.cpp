@@ -1,0 +1,35 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "risley/report/number_text.hpp"
+
+#include <limits>
+
+#include <gtest/gtest.h>
+
+namespace risley::report {
+namespace {
+
+TEST(NumberText, ShowsTwoDigitsOfTheSigmaAndTheValueToTheSamePlace) {
+  struct Case {
+    double value, sigma;
+    const char *value_text, *sigma_text;
+  };
+  const Case cases[] = {
+      {1.50900361, 0.0000058, "1.5090036", "0.0000058"},
+      {-43789.80085, 0.00045, "-43789.80085", "0.00045"},
+      {0.123456, 0.0996, "0.12", "0.10"},  // the sigma's rounding moves its place
+      {12.3, 0.995, "12.3", "1.0"},
+      {1234.5, 37.2, "1234", "37"},
+      {1.25, 0.0, "1.25", ""},
+      {1.25, std::numeric_limits<double>::quiet_NaN(), "1.25", ""},
+  };
+  for (const Case& one : cases) {
+    const NumberText text = number_text(one.value, one.sigma);
+    EXPECT_EQ(text.value, one.value_text);
+    EXPECT_EQ(text.sigma, one.sigma_text);
+    EXPECT_EQ(text_to_place_of(one.value, one.sigma), one.value_text);
+  }
+}
+
+}  // namespace
+}  // namespace risley::report
