@@ -25,7 +25,8 @@ OutputFile::OutputFile(std::string path)
   if (fs::is_directory(path_)) throw FileError(path_, {}, "is a folder, expected a file name");
   // Found out now rather than after an hour of work.
   std::ofstream probe(temporary_path_, std::ios::binary);
-  if (!probe) throw FileError(path_, {}, fmt::format("cannot be written: {}", std::strerror(errno)));
+  if (!probe)
+    throw FileError(path_, {}, fmt::format("cannot be written: {}", std::strerror(errno)));
 }
 
 OutputFile::OutputFile(OutputFile&& other) noexcept
@@ -51,7 +52,8 @@ void write_text_file(const std::string& path, const std::string& text) {
   std::ofstream stream(output.temporary_path(), std::ios::binary);
   stream.write(text.data(), static_cast<std::streamsize>(text.size()));
   stream.close();
-  if (!stream) throw FileError(path, {}, fmt::format("cannot be written: {}", std::strerror(errno)));
+  if (!stream)
+    throw FileError(path, {}, fmt::format("cannot be written: {}", std::strerror(errno)));
   output.commit();
 }
 

@@ -11,9 +11,10 @@
 #include <Eigen/LU>
 #include <fmt/format.h>
 
-#include "estimation/residual_model.hpp"
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
+
+#include "estimation/residual_model.hpp"
 
 namespace risley::estimation {
 namespace {
@@ -297,8 +298,7 @@ double maximise(const std::function<double(double)>& f, double a, double b, doub
 /// coarse grid, then each rotor's own.
 template <int N>
 std::vector<RotorProcess> likeliest_process(const AngleSeries& series, const PrismTrain& train,
-                                            const EkfOptions& options,
-                                            const Reference& reference) {
+                                            const EkfOptions& options, const Reference& reference) {
   const auto likelihood_of = [&](const std::array<double, N>& decades) {
     return likelihood<N>(series, train, options, processes<N>(decades), reference);
   };
@@ -375,8 +375,8 @@ EkfResult run_pass(const AngleSeries& series, const State& first, const PrismTra
     }
     forward_step(state, i, true);
     if (!state.mean.allFinite()) {
-      throw EstimationError(fmt::format("the filter diverged at shot {} ({:.6f} s)", i,
-                                        series.time(i)));
+      throw EstimationError(
+          fmt::format("the filter diverged at shot {} ({:.6f} s)", i, series.time(i)));
     }
   }
 
@@ -396,10 +396,8 @@ EkfResult run_pass(const AngleSeries& series, const State& first, const PrismTra
     for (std::size_t i = end; i-- > begin;) {
       if (i + 1 < shots) filter.predict(backward, -gap_before(i + 1));
       const State& f = filtered[i - begin];
-      const Eigen::MatrixXd share = (f.covariance + backward.covariance)
-                                        .ldlt()
-                                        .solve(f.covariance)
-                                        .transpose();
+      const Eigen::MatrixXd share =
+          (f.covariance + backward.covariance).ldlt().solve(f.covariance).transpose();
       const Eigen::VectorXd mean = f.mean + share * (backward.mean - f.mean);
       const Eigen::MatrixXd covariance = f.covariance - share * f.covariance;
       mean_parameters += mean.head(statics);
@@ -422,8 +420,8 @@ EkfResult run_pass(const AngleSeries& series, const State& first, const PrismTra
         filter.update(backward, i, std::numeric_limits<double>::infinity());
       }
     }
-    report_progress(progress, 0.3 + 0.7 * static_cast<double>(shots - begin) /
-                                        static_cast<double>(shots));
+    report_progress(progress,
+                    0.3 + 0.7 * static_cast<double>(shots - begin) / static_cast<double>(shots));
   }
   result.parameters = mean_parameters / static_cast<double>(shots);
   result.covariance = mean_covariance / static_cast<double>(shots);
@@ -453,10 +451,10 @@ EkfResult run(const AngleSeries& series, const Start& start, const EkfOptions& o
       process = likeliest_process<N>(series, start.train, options, reference);
     }
     first = first_state(Filter<N>(series, start.train, options, process, &reference), reference);
-    EkfResult next = run_pass<N>(
-        series, first, start.train, options, process, &reference,
-        screen<N>(series, start, options, &reference),
-        [&](double f) { report_progress(progress, (pass + f) / options.passes); });
+    EkfResult next = run_pass<N>(series, first, start.train, options, process, &reference,
+                                 screen<N>(series, start, options, &reference), [&](double f) {
+                                   report_progress(progress, (pass + f) / options.passes);
+                                 });
     result = std::move(next);
   }
   return result;
@@ -474,9 +472,8 @@ EkfResult run_ekf(const AngleSeries& series, const Start& start, const EkfOption
   if (options.passes < 1) {
     throw InvalidArgument(fmt::format("passes = {}, allowed 1 or more", options.passes));
   }
-  return with_prism_count(start.train.prisms(), [&]<int N>() {
-    return run<N>(series, start, options, progress);
-  });
+  return with_prism_count(start.train.prisms(),
+                          [&]<int N>() { return run<N>(series, start, options, progress); });
 }
 
 }  // namespace risley::estimation

@@ -100,11 +100,13 @@ std::string implausible_parameter(const EkfResult& filter, const PrismTrain& nom
   constexpr double kLargest = 5.0;  // prior sigmas
   for (std::size_t i = 0; i < filter.free.size(); ++i) {
     const FreeParameter& parameter = filter.free[i];
-    const double change = filter.parameters[static_cast<Eigen::Index>(i)] - nominal[parameter.places[0]];
+    const double change =
+        filter.parameters[static_cast<Eigen::Index>(i)] - nominal[parameter.places[0]];
     if (std::abs(change) <= kLargest * parameter.prior_sigma) continue;
     const ParameterInfo& info = find_parameter(parameter.name, filter.train.prisms());
     return fmt::format(
-        "{} came out {:.4g}{} away from the sensor's value, more than any such sensor can be: wrong "
+        "{} came out {:.4g}{} away from the sensor's value, more than any such sensor can be: "
+        "wrong "
         "face order, wrong wedge angles or another sensor",
         parameter.name, change / info.si_per_unit, info.unit == "1" ? "" : " " + info.unit);
   }
@@ -113,8 +115,9 @@ std::string implausible_parameter(const EkfResult& filter, const PrismTrain& nom
 
 /// Says whether the result can be believed.
 void judge(Estimate& estimate, const PrismTrain& nominal) {
-  const double rms = std::sqrt(0.5 * (estimate.azimuth_residuals.rms * estimate.azimuth_residuals.rms +
-                                      estimate.zenith_residuals.rms * estimate.zenith_residuals.rms));
+  const double rms =
+      std::sqrt(0.5 * (estimate.azimuth_residuals.rms * estimate.azimuth_residuals.rms +
+                       estimate.zenith_residuals.rms * estimate.zenith_residuals.rms));
   const double ratio = rms / estimate.expected_residual;
   const auto shots = static_cast<double>(estimate.filter.states.size());
   const double outlier_share = static_cast<double>(estimate.filter.outliers) / shots;
@@ -129,8 +132,10 @@ void judge(Estimate& estimate, const PrismTrain& nominal) {
   if (!std::isfinite(ratio)) {
     fail("no residual could be formed");
   } else if (outlier_share > 0.3) {
-    fail(fmt::format("{:.0f} % of the shots do not fit the model: wrong sensor, speed combination "
-                     "or mirror image, or a start that did not pull in", 100 * outlier_share));
+    fail(
+        fmt::format("{:.0f} % of the shots do not fit the model: wrong sensor, speed combination "
+                    "or mirror image, or a start that did not pull in",
+                    100 * outlier_share));
   } else if (ratio > 3.0) {
     fail(residuals + ": the model does not describe these data, or their noise is larger");
   } else if (std::string words = implausible_parameter(estimate.filter, nominal); !words.empty()) {
@@ -164,9 +169,9 @@ Estimate estimate_with_ekf(const AngleSeries& recorded_series, const AngleSeries
   ekf.angle_noise = estimate.angle_noise;
   ekf.free = chosen_parameters(options);
   ekf.rotor_process = options.rotor_process;
-  estimate.mirrored = options.mirrored ? *options.mirrored
-                                       : is_mirrored(recorded_head, options.sensor, ekf.free,
-                                                     estimate.angle_noise);
+  estimate.mirrored =
+      options.mirrored ? *options.mirrored
+                       : is_mirrored(recorded_head, options.sensor, ekf.free, estimate.angle_noise);
   AngleSeries turned_series, turned_head;
   if (estimate.mirrored) {
     turned_series = mirror_image(recorded_series);

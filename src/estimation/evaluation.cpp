@@ -28,9 +28,9 @@ std::vector<std::size_t> matching_rows(const std::vector<std::int64_t>& shots,
     }
   }
   if (found != shots.size()) {
-    throw InvalidArgument("the truth belongs to another recording: " +
-                          std::to_string(shots.size() - found) + " of " +
-                          std::to_string(shots.size()) + " shots have no row in it");
+    throw InvalidArgument(
+        "the truth belongs to another recording: " + std::to_string(shots.size() - found) + " of " +
+        std::to_string(shots.size()) + " shots have no row in it");
   }
   return rows;
 }
@@ -46,12 +46,13 @@ Evaluation evaluate(const Estimate& estimate, const sensors::Sensor& truth_senso
   }
   const auto rows = matching_rows(states.time_ns, truth.time_ns);
   const auto rotor_count = static_cast<std::size_t>(prisms);
-  const double duration = 1e-9 * static_cast<double>(states.time_ns.back() - states.time_ns.front());
+  const double duration =
+      1e-9 * static_cast<double>(states.time_ns.back() - states.time_ns.front());
 
   Evaluation result;
   const auto compare = [&](const EstimatedValue& value, double true_value, double error) {
-    result.parameters.push_back({value.name, true_value, error,
-                                 value.sigma > 0 ? error / value.sigma : 0.0});
+    result.parameters.push_back(
+        {value.name, true_value, error, value.sigma > 0 ? error / value.sigma : 0.0});
   };
   for (const EstimatedValue& value : estimate.values) {
     const ParameterInfo& info = find_parameter(value.name, prisms);
@@ -62,9 +63,8 @@ Evaluation evaluate(const Estimate& estimate, const sensors::Sensor& truth_senso
     } else if (info.kind == ParameterKind::angular_velocity) {
       // What counts is the speed the rotor really had, not the nominal one.
       const auto& angle = truth.rotation_angle[rotor];
-      const double true_value = duration > 0
-                                    ? (angle[rows.back()] - angle[rows.front()]) / duration
-                                    : truth.angular_velocity[rotor][rows.front()];
+      const double true_value = duration > 0 ? (angle[rows.back()] - angle[rows.front()]) / duration
+                                             : truth.angular_velocity[rotor][rows.front()];
       compare(value, true_value, value.value - true_value);
     } else {
       const double true_value = wrap_to_pi(truth.rotation_angle[rotor][rows.front()]);

@@ -35,7 +35,8 @@ std::vector<FreeParameter> free_parameters(const std::vector<std::string>& names
     const ParameterInfo& info = find_parameter(name, prisms);
     if (info.kind != ParameterKind::train) {
       throw InvalidArgument(fmt::format(
-          "{} is always estimated and cannot be chosen, choose among the prisms' parameters", name));
+          "{} is always estimated and cannot be chosen, choose among the prisms' parameters",
+          name));
     }
     for (const int at : info.places) {
       if (std::find(taken.begin(), taken.end(), at) != taken.end()) {

@@ -12,17 +12,18 @@
 #include <fmt/format.h>
 #include <unsupported/Eigen/FFT>
 
-#include "estimation/residual_model.hpp"
 #include "risley/core/direction.hpp"
 #include "risley/core/error.hpp"
 #include "risley/optics/observation_model.hpp"
+
+#include "estimation/residual_model.hpp"
 
 namespace risley::estimation {
 namespace {
 
 using Complex = std::complex<double>;
 
-constexpr double kShortest = 0.05;      // s of data that tell the rotors apart
+constexpr double kShortest = 0.05;  // s of data that tell the rotors apart
 constexpr std::size_t kFewestShots = 40;
 
 /// y + iz of every shot: the transverse part of the unit vector.
@@ -34,7 +35,8 @@ Complex transverse(const AngleSeries& series, std::size_t i) {
 /// Typical time between shots, ns: the median, which gaps do not move.
 double median_step_ns(const AngleSeries& series, std::size_t shots) {
   std::vector<std::int64_t> steps;
-  for (std::size_t i = 1; i < shots; ++i) steps.push_back(series.time_ns[i] - series.time_ns[i - 1]);
+  for (std::size_t i = 1; i < shots; ++i)
+    steps.push_back(series.time_ns[i] - series.time_ns[i - 1]);
   const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
   std::nth_element(steps.begin(), middle, steps.end());
   return static_cast<double>(*middle);
@@ -51,8 +53,8 @@ Complex transform_at(const std::vector<double>& time, const std::vector<Complex>
 }
 
 /// Maximum of the transform's magnitude near a start, by golden section.
-double refine_peak(const std::vector<double>& time, const std::vector<Complex>& value,
-                   double start, double half_width) {
+double refine_peak(const std::vector<double>& time, const std::vector<Complex>& value, double start,
+                   double half_width) {
   const double ratio = 0.5 * (std::sqrt(5.0) - 1.0);
   double a = start - half_width, b = start + half_width;
   double left = b - ratio * (b - a), right = a + ratio * (b - a);
@@ -192,8 +194,8 @@ WindowFit pull_in(const AngleSeries& head, std::size_t row, const sensors::Senso
     if (last - first < 8) continue;
     for (const bool move_parameters : {false, true}) {
       if (move_parameters && half_width < 0.02) continue;
-      fit = fit_window<N>(head, first, last, origin, sensor.train, free, fit.state,
-                          move_parameters, noise);
+      fit = fit_window<N>(head, first, last, origin, sensor.train, free, fit.state, move_parameters,
+                          noise);
     }
   }
   return fit;
@@ -223,7 +225,8 @@ std::vector<SpectralLine> rotor_lines(const AngleSeries& series) {
   const double span = std::min(window, series.duration());  // of the transform, s
   Complex mean = 0;
   std::size_t used = 0;
-  for (; used < series.size() && series.time(used) <= span; ++used) mean += transverse(series, used);
+  for (; used < series.size() && series.time(used) <= span; ++used)
+    mean += transverse(series, used);
   mean /= static_cast<double>(used);
   for (std::size_t i = 0; i < used; ++i) {
     const double hann = 0.5 - 0.5 * std::cos(kTwoPi * series.time(i) / span);
@@ -250,12 +253,14 @@ std::vector<SpectralLine> rotor_lines(const AngleSeries& series) {
   for (int line = 0; line < 2; ++line) {
     std::size_t peak = bins;
     for (std::size_t k = 0; k < bins; ++k) {
-      if (!taken[k] && (peak == bins || std::norm(spectrum[k]) > std::norm(spectrum[peak]))) peak = k;
+      if (!taken[k] && (peak == bins || std::norm(spectrum[k]) > std::norm(spectrum[peak])))
+        peak = k;
     }
     // The main lobe of a Hann window is four resolved bins wide, here sixteen.
     for (std::size_t k = 0; k < 33; ++k) taken[(peak + bins + k - 16) % bins] = true;
-    const double signed_bin = peak <= bins / 2 ? static_cast<double>(peak)
-                                               : static_cast<double>(peak) - static_cast<double>(bins);
+    const double signed_bin = peak <= bins / 2
+                                  ? static_cast<double>(peak)
+                                  : static_cast<double>(peak) - static_cast<double>(bins);
     const double speed = refine_peak(time, value, signed_bin * bin_speed, 2.0 * bin_speed);
     const Complex sum = transform_at(time, value, speed);
     lines.push_back({speed, std::abs(sum) / weight, std::arg(sum)});
@@ -323,8 +328,7 @@ std::size_t zero_position_row(const AngleSeries& series, const PrismTrain& train
 Start find_start(const AngleSeries& head, const sensors::Sensor& sensor,
                  const std::vector<FreeParameter>& free, double angle_noise) {
   const RotorIdentification rotors = identify_rotors(rotor_lines(head), sensor);
-  const std::vector<double> speed{rotors.line[0].angular_velocity,
-                                  rotors.line[1].angular_velocity};
+  const std::vector<double> speed{rotors.line[0].angular_velocity, rotors.line[1].angular_velocity};
   const double noise = std::max(angle_noise, radians_from_degrees(1e-4));
   const auto statics = static_cast<Eigen::Index>(free.size());
 
@@ -339,16 +343,21 @@ Start find_start(const AngleSeries& head, const sensors::Sensor& sensor,
                    {fit.state[statics + 1], fit.state[statics + 3]}, noise);
   if (!(fit.rms < good_start_residual(head, angle_noise))) {
     // At rotation angle zero the beam leans to -Z, so a line's phase is the angle less 90 degrees.
-    const WindowFit by_phase = pull_in<2>(
-        head, 0, sensor, free,
-        {rotors.line[0].phase + kPi / 2, rotors.line[1].phase + kPi / 2}, speed, noise);
+    const WindowFit by_phase =
+        pull_in<2>(head, 0, sensor, free,
+                   {rotors.line[0].phase + kPi / 2, rotors.line[1].phase + kPi / 2}, speed, noise);
     if (by_phase.rms < fit.rms) {
       fit = by_phase;
       method = "spectral phases";
     }
   }
-  Start start{head.time_ns[0], {}, {}, with_free_values(sensor.train, free, fit.state.head(statics)),
-              rotors.combination, method, fit.rms};
+  Start start{head.time_ns[0],
+              {},
+              {},
+              with_free_values(sensor.train, free, fit.state.head(statics)),
+              rotors.combination,
+              method,
+              fit.rms};
   for (Eigen::Index k = 0; k < 2; ++k) {
     start.rotation_angle.push_back(fit.state[statics + 2 * k]);
     start.angular_velocity.push_back(fit.state[statics + 2 * k + 1]);

@@ -77,7 +77,8 @@ class ResidualModel {
 };
 
 /// Values of the free parameters in a train, SI units.
-inline Eigen::VectorXd free_values(const PrismTrain& train, const std::vector<FreeParameter>& free) {
+inline Eigen::VectorXd free_values(const PrismTrain& train,
+                                   const std::vector<FreeParameter>& free) {
   Eigen::VectorXd values(static_cast<Eigen::Index>(free.size()));
   for (std::size_t i = 0; i < free.size(); ++i) {
     values[static_cast<Eigen::Index>(i)] = train[free[i].places.front()];

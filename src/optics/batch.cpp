@@ -59,9 +59,12 @@ void check_available(InstructionSet set) {
 
 std::string to_string(InstructionSet set) {
   switch (set) {
-    case InstructionSet::baseline: return "baseline";
-    case InstructionSet::avx2: return "avx2";
-    case InstructionSet::avx512: return "avx512";
+    case InstructionSet::baseline:
+      return "baseline";
+    case InstructionSet::avx2:
+      return "avx2";
+    case InstructionSet::avx512:
+      return "avx512";
   }
   return "baseline";
 }
@@ -117,7 +120,8 @@ std::size_t linearise_batch(const PrismTrain& train,
   BatchArguments& a = call.arguments;
   const auto gradient = [&](std::string_view name, const std::vector<std::span<double>>& columns,
                             std::vector<double*>& pointers) {
-    const auto expected = static_cast<std::size_t>(parameter_count(train.prisms()) + train.prisms());
+    const auto expected =
+        static_cast<std::size_t>(parameter_count(train.prisms()) + train.prisms());
     if (columns.size() != expected) {
       throw InvalidArgument(
           fmt::format("{} has {} columns, expected {}", name, columns.size(), expected));

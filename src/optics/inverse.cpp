@@ -159,8 +159,8 @@ InverseSolution solve(const PrismTrain& train, const Vector& direction,
   const auto miss = [&](double angle) { return gap.miss(angle); };
   InverseSolution solution;
   const auto add = [&](double last_angle) {
-    solution.pairs.push_back({wrap_to_two_pi(gap.angle_towards(gap.backward(last_angle))),
-                              wrap_to_two_pi(last_angle)});
+    solution.pairs.push_back(
+        {wrap_to_two_pi(gap.angle_towards(gap.backward(last_angle))), wrap_to_two_pi(last_angle)});
   };
 
   constexpr double kStep = kTwoPi / kSamples;
@@ -217,8 +217,9 @@ InverseSolution rotation_angles_for(const PrismTrain& train, const Vector3<doubl
     throw InvalidArgument("the inverse needs at least 2 prisms, the train has 1");
   }
   if (fixed_angles.size() != static_cast<std::size_t>(train.prisms() - 2)) {
-    throw InvalidArgument(fmt::format("{} fixed rotation angles given, a train of {} prisms needs {}",
-                                      fixed_angles.size(), train.prisms(), train.prisms() - 2));
+    throw InvalidArgument(
+        fmt::format("{} fixed rotation angles given, a train of {} prisms needs {}",
+                    fixed_angles.size(), train.prisms(), train.prisms() - 2));
   }
   const double length = norm(direction);
   if (!(std::abs(length - 1.0) < 1e-6)) {
@@ -226,9 +227,12 @@ InverseSolution rotation_angles_for(const PrismTrain& train, const Vector3<doubl
   }
   const Vector3<double> unit = normalized(direction);
   switch (train.prisms()) {
-    case 2: return solve<2>(train, unit, fixed_angles);
-    case 3: return solve<3>(train, unit, fixed_angles);
-    default: return solve<4>(train, unit, fixed_angles);
+    case 2:
+      return solve<2>(train, unit, fixed_angles);
+    case 3:
+      return solve<3>(train, unit, fixed_angles);
+    default:
+      return solve<4>(train, unit, fixed_angles);
   }
 }
 

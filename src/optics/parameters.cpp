@@ -77,16 +77,27 @@ std::vector<ParameterInfo> build_list(int prisms) {
     const char capital = static_cast<char>(letter - 'a' + 'A');
     list.push_back({fmt::format("angular_velocity_{}_deg_per_s", letter),
                     fmt::format("angular velocity of prism {}", capital),
-                    fmt::format("ω_{}", capital), "deg/s", ParameterKind::angular_velocity,
-                    kRadiansPerDegree, -kFastest, kFastest, {i}});
+                    fmt::format("ω_{}", capital),
+                    "deg/s",
+                    ParameterKind::angular_velocity,
+                    kRadiansPerDegree,
+                    -kFastest,
+                    kFastest,
+                    {i}});
   }
   for (int i = 0; i < prisms; ++i) {
     const char letter = prism_letter(i);
     const char capital = static_cast<char>(letter - 'a' + 'A');
-    list.push_back({fmt::format("rotation_angle_{}_deg", letter),
-                    fmt::format("rotation angle of prism {} at the first used observation", capital),
-                    fmt::format("Ω_{}", capital), "deg", ParameterKind::rotation_angle,
-                    kRadiansPerDegree, -1e9, 1e9, {i}});
+    list.push_back(
+        {fmt::format("rotation_angle_{}_deg", letter),
+         fmt::format("rotation angle of prism {} at the first used observation", capital),
+         fmt::format("Ω_{}", capital),
+         "deg",
+         ParameterKind::rotation_angle,
+         kRadiansPerDegree,
+         -1e9,
+         1e9,
+         {i}});
   }
   return list;
 }
@@ -120,10 +131,10 @@ const ParameterInfo& find_parameter(std::string_view name, int prisms) {
 
 void check_bounds(const ParameterInfo& parameter, double value) {
   if (std::isfinite(value) && value >= parameter.lower && value <= parameter.upper) return;
-  throw InvalidArgument(fmt::format(
-      "{} = {:.10g} {}, allowed {:.10g} to {:.10g}", parameter.name, value / parameter.si_per_unit,
-      parameter.unit, parameter.lower / parameter.si_per_unit,
-      parameter.upper / parameter.si_per_unit));
+  throw InvalidArgument(fmt::format("{} = {:.10g} {}, allowed {:.10g} to {:.10g}", parameter.name,
+                                    value / parameter.si_per_unit, parameter.unit,
+                                    parameter.lower / parameter.si_per_unit,
+                                    parameter.upper / parameter.si_per_unit));
 }
 
 }  // namespace risley

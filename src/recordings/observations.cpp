@@ -49,23 +49,35 @@ void Chunk::clear() {
 
 std::string device_type_name(std::uint8_t type) {
   switch (type) {
-    case 0: return "Livox Hub";
-    case 1: return "Livox Mid-40";
-    case 2: return "Livox Tele-15";
-    case 3: return "Livox Horizon";
-    case 6: return "Livox Mid-70";
-    case 7: return "Livox Avia";
-    default: return "unknown";
+    case 0:
+      return "Livox Hub";
+    case 1:
+      return "Livox Mid-40";
+    case 2:
+      return "Livox Tele-15";
+    case 3:
+      return "Livox Horizon";
+    case 6:
+      return "Livox Mid-70";
+    case 7:
+      return "Livox Avia";
+    default:
+      return "unknown";
   }
 }
 
 std::string to_string(TimeReference reference) {
   switch (reference) {
-    case TimeReference::relative: return "relative";
-    case TimeReference::power_on: return "power-on";
-    case TimeReference::ptp: return "PTP";
-    case TimeReference::utc: return "UTC";
-    case TimeReference::pps: return "PPS";
+    case TimeReference::relative:
+      return "relative";
+    case TimeReference::power_on:
+      return "power-on";
+    case TimeReference::ptp:
+      return "PTP";
+    case TimeReference::utc:
+      return "UTC";
+    case TimeReference::pps:
+      return "PPS";
   }
   return "relative";
 }

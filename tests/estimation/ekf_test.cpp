@@ -9,10 +9,11 @@
 #include <Eigen/Cholesky>
 #include <gtest/gtest.h>
 
-#include "estimation/series.hpp"
 #include "risley/core/error.hpp"
 #include "risley/estimation/diagnostics.hpp"
 #include "risley/estimation/estimate.hpp"
+
+#include "estimation/series.hpp"
 
 namespace risley::estimation {
 namespace {
@@ -38,7 +39,8 @@ TEST(Ekf, NoiseFreeConstantSpeedIsRecoveredFarBelowTheStatedNoise) {
   EXPECT_EQ(result.outliers, 0u);
   for (std::size_t i = 0; i < result.free.size(); ++i) {
     const double truth = sensor.train.get(result.free[i].name);
-    EXPECT_NEAR(result.parameters[static_cast<Eigen::Index>(i)], truth, 2e-6) << result.free[i].name;
+    EXPECT_NEAR(result.parameters[static_cast<Eigen::Index>(i)], truth, 2e-6)
+        << result.free[i].name;
   }
   EXPECT_LT(degrees_from_radians(moments(result.states.azimuth_residual).rms), 1e-4);
 }
@@ -57,8 +59,10 @@ TEST(Ekf, MeanAndCovarianceEqualTheWeightedLeastSquaresOfTheWholeTrajectory) {
   Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(statics + 4, statics + 4);
   Eigen::VectorXd gradient = Eigen::VectorXd::Zero(statics + 4);
   for (std::size_t i = 0; i < series.size(); ++i) {
-    std::array<double, 2> angle{result.states.rotation_angle[0][i], result.states.rotation_angle[1][i]};
-    const Eigen::Vector2d residual(result.states.azimuth_residual[i], result.states.zenith_residual[i]);
+    std::array<double, 2> angle{result.states.rotation_angle[0][i],
+                                result.states.rotation_angle[1][i]};
+    const Eigen::Vector2d residual(result.states.azimuth_residual[i],
+                                   result.states.zenith_residual[i]);
     Eigen::MatrixXd row(2, statics + 4);
     const double h = 1e-6;
     const auto at = [&](const PrismTrain& train, double a, double b) {
@@ -76,13 +80,15 @@ TEST(Ekf, MeanAndCovarianceEqualTheWeightedLeastSquaresOfTheWholeTrajectory) {
     for (Eigen::Index k = 0; k < 2; ++k) {
       const double a = k == 0 ? h : 0, b = k == 1 ? h : 0;
       row.col(statics + 2 * k) = (at(result.train, angle[0] + a, angle[1] + b) -
-                                  at(result.train, angle[0] - a, angle[1] - b)) / (2 * h);
+                                  at(result.train, angle[0] - a, angle[1] - b)) /
+                                 (2 * h);
       row.col(statics + 2 * k + 1) = series.time(i) * row.col(statics + 2 * k);
     }
     normal += row.transpose() * row / (kNoise * kNoise);
     gradient += row.transpose() * residual / (kNoise * kNoise);
   }
-  const Eigen::MatrixXd covariance = normal.ldlt().solve(Eigen::MatrixXd::Identity(statics + 4, statics + 4));
+  const Eigen::MatrixXd covariance =
+      normal.ldlt().solve(Eigen::MatrixXd::Identity(statics + 4, statics + 4));
   const Eigen::VectorXd step = normal.ldlt().solve(gradient);
   for (Eigen::Index i = 0; i < statics; ++i) {
     const double sigma = std::sqrt(covariance(i, i));

@@ -6,8 +6,9 @@
 
 #include <gtest/gtest.h>
 
-#include "estimation/series.hpp"
 #include "risley/core/error.hpp"
+
+#include "estimation/series.hpp"
 
 namespace risley::estimation {
 namespace {
@@ -20,8 +21,7 @@ sensors::Sensor random_sensor(std::mt19937_64& generator, double error_deg, doub
   std::uniform_real_distribution<double> uniform(-1.0, 1.0);
   auto sensor = sensors::load_sensor(uniform(generator) < 0 ? "mid-40" : "mid-40-reversed");
   for (const std::string& name : default_free_names(2)) {
-    const double step = name == "refractive_index" ? 0.002
-                                                   : radians_from_degrees(error_deg);
+    const double step = name == "refractive_index" ? 0.002 : radians_from_degrees(error_deg);
     sensor.set(name, sensor.get(name) + step * normal(generator));
   }
   for (double& speed : sensor.angular_velocity) speed *= 1.0 + speed_share * uniform(generator);

@@ -20,8 +20,8 @@ inline estimation::AngleSeries constant_speed_series(const sensors::Sensor& sens
   std::normal_distribution<double> normal;
   estimation::AngleSeries series;
   const auto shots = static_cast<std::size_t>(std::llround(duration * rate)) + 1;
-  const auto train = prepare<double, 2>(parameter_array<2>(sensor.train),
-                                        face_order_array<2>(sensor.train));
+  const auto train =
+      prepare<double, 2>(parameter_array<2>(sensor.train), face_order_array<2>(sensor.train));
   for (std::size_t i = 0; i < shots; ++i) {
     const auto ns = std::llround(1e9 * static_cast<double>(i) / rate);
     const double t = 1e-9 * static_cast<double>(ns);

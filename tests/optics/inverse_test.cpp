@@ -7,9 +7,10 @@
 
 #include <gtest/gtest.h>
 
-#include "optics/trains.hpp"
 #include "risley/core/error.hpp"
 #include "risley/optics/observation_model.hpp"
+
+#include "optics/trains.hpp"
 
 namespace risley {
 namespace {
@@ -44,9 +45,8 @@ class InverseOfEveryTrain : public ::testing::TestWithParam<std::string> {};
 TEST_P(InverseOfEveryTrain, FindsTheGivenPairAndItsPartner) {
   std::mt19937 generator(7);
   for (const double error_deg : {0.0, 0.3}) {
-    const PrismTrain train = error_deg == 0.0
-                                 ? PrismTrain(parse_face_order(GetParam()))
-                                 : testing::imperfect_train(GetParam(), error_deg, 11);
+    const PrismTrain train = error_deg == 0.0 ? PrismTrain(parse_face_order(GetParam()))
+                                              : testing::imperfect_train(GetParam(), error_deg, 11);
     int with_two = 0;
     const int count = 10000 / 2;  // per kind of train; both together are the 10,000 of the claim
     for (int i = 0; i < count; ++i) {
@@ -128,8 +128,7 @@ TEST(Inverse, NearTheCentreOfAnImperfectSensorEveryPairIsRight) {
 
 TEST(Inverse, RefusesWhatItCannotAnswer) {
   const PrismTrain two(parse_face_order("PA-AP")), three(parse_face_order("PA-AP-PA"));
-  EXPECT_THROW(rotation_angles_for(PrismTrain(parse_face_order("PA")), {1, 0, 0}),
-               InvalidArgument);
+  EXPECT_THROW(rotation_angles_for(PrismTrain(parse_face_order("PA")), {1, 0, 0}), InvalidArgument);
   EXPECT_THROW(rotation_angles_for(two, {2, 0, 0}), InvalidArgument);
   EXPECT_THROW(rotation_angles_for(two, {NAN, 0, 0}), InvalidArgument);
   EXPECT_THROW(rotation_angles_for(three, {1, 0, 0}), InvalidArgument);

@@ -7,9 +7,10 @@
 #include <ceres/jet.h>
 #include <gtest/gtest.h>
 
-#include "optics/trains.hpp"
 #include "risley/core/simd.hpp"
 #include "risley/optics/batch.hpp"
+
+#include "optics/trains.hpp"
 
 namespace risley {
 namespace {
@@ -75,9 +76,12 @@ double adjoint_error(const PrismTrain& train, const std::vector<double>& angles,
   const Oracle<N> oracle(train, angles);
   double worst = difference<N>(oracle.angles.azimuth, entry_of(by_angles.azimuth, lane));
   worst = std::max(worst, difference<N>(oracle.angles.zenith, entry_of(by_angles.zenith, lane)));
-  worst = std::max(worst, difference<N>(oracle.direction.x, entry_of(by_direction.components[0], lane)));
-  worst = std::max(worst, difference<N>(oracle.direction.y, entry_of(by_direction.components[1], lane)));
-  worst = std::max(worst, difference<N>(oracle.direction.z, entry_of(by_direction.components[2], lane)));
+  worst = std::max(worst,
+                   difference<N>(oracle.direction.x, entry_of(by_direction.components[0], lane)));
+  worst = std::max(worst,
+                   difference<N>(oracle.direction.y, entry_of(by_direction.components[1], lane)));
+  worst = std::max(worst,
+                   difference<N>(oracle.direction.z, entry_of(by_direction.components[2], lane)));
   // The value itself.
   worst = std::max(worst, std::abs(lane(by_angles.angles.azimuth) - oracle.angles.azimuth.a));
   worst = std::max(worst, std::abs(lane(by_angles.angles.zenith) - oracle.angles.zenith.a));
@@ -125,8 +129,9 @@ TEST_P(AdjointOfEveryTrain, EqualsCentralDifferences) {
     std::copy_n(angles.begin(), N, rotation.begin());
     const auto order = face_order_array<N>(train);
     const auto parameters = parameter_array<N>(train);
-    const auto result = linearise_angles(prepare<double, N>(parameters, order),
-                                         prepare_derivatives<double, N>(parameters, order), rotation);
+    const auto result =
+        linearise_angles(prepare<double, N>(parameters, order),
+                         prepare_derivatives<double, N>(parameters, order), rotation);
     for (int i = 0; i < parameter_count(N); ++i) {
       if (i == place::bearing_tilt_horizontal(N - 1) || i == place::bearing_tilt_vertical(N - 1)) {
         EXPECT_EQ(result.zenith.parameters[static_cast<std::size_t>(i)], 0.0);
@@ -136,7 +141,8 @@ TEST_P(AdjointOfEveryTrain, EqualsCentralDifferences) {
       PrismTrain up = train, down = train;
       up.set_place(i, train[i] + step);
       down.set_place(i, train[i] - step);
-      const double numeric = (observe(up, angles).zenith - observe(down, angles).zenith) / (2 * step);
+      const double numeric =
+          (observe(up, angles).zenith - observe(down, angles).zenith) / (2 * step);
       EXPECT_NEAR(result.zenith.parameters[static_cast<std::size_t>(i)], numeric, 1e-8) << i;
     }
   });
@@ -161,7 +167,9 @@ TEST_P(AdjointOfEveryTrain, BatchesOfEveryInstructionSetEqualTheScalarModel) {
     std::vector<std::vector<double>> d_azimuth(gradient_columns, std::vector<double>(kShots));
     auto d_zenith = d_azimuth;
     std::vector<double> azimuth2(kShots), zenith2(kShots);
-    LinearisationColumns out{azimuth2, zenith2, {d_azimuth.begin(), d_azimuth.end()},
+    LinearisationColumns out{azimuth2,
+                             zenith2,
+                             {d_azimuth.begin(), d_azimuth.end()},
                              {d_zenith.begin(), d_zenith.end()}};
     EXPECT_EQ(linearise_batch(train, angles, out, set), 0u);
     for (std::size_t i = 0; i < kShots; ++i) {

@@ -9,8 +9,9 @@
 #include <Eigen/Geometry>
 #include <gtest/gtest.h>
 
-#include "optics/trains.hpp"
 #include "risley/optics/batch.hpp"
+
+#include "optics/trains.hpp"
 
 namespace risley {
 namespace {
@@ -63,8 +64,8 @@ TEST_P(LawsOfEveryTrain, GlassOfAirOrPlatesWithoutWedgeDeviateNothing) {
   air.set("refractive_index", air.get("refractive_index_air"));
   plate.set("wedge_angle_deg", 0.0);
   for (const PrismTrain& train : {air, plate}) {
-    const Vector3<double> incident =
-        leaning_direction(train[place::incident_beam_horizontal()], train[place::incident_beam_vertical()]);
+    const Vector3<double> incident = leaning_direction(train[place::incident_beam_horizontal()],
+                                                       train[place::incident_beam_vertical()]);
     for (int i = 0; i < 50; ++i) {
       const auto shot = observe(train, testing::random_angles(train.prisms(), generator));
       EXPECT_LT(angle_between(shot.direction, incident), 1e-14);
@@ -78,8 +79,9 @@ TEST_P(LawsOfEveryTrain, DirectionsAreUnitVectorsAndAnglesTellTheSameDirection) 
     const auto shot = observe(train, testing::random_angles(train.prisms(), generator));
     ASSERT_TRUE(shot.valid);
     EXPECT_NEAR(norm(shot.direction), 1.0, 4e-15);
-    EXPECT_LT(angle_between(direction_from_angles<double>({shot.azimuth, shot.zenith}), shot.direction),
-              2e-15);
+    EXPECT_LT(
+        angle_between(direction_from_angles<double>({shot.azimuth, shot.zenith}), shot.direction),
+        2e-15);
   }
 }
 
@@ -99,8 +101,8 @@ TEST_P(LawsOfEveryTrain, IdealModelEqualsThePaperEquationsWrittenOutWithQuaterni
       const double th = train[place::prism_tilt_horizontal(prism)];
       const double tv = train[place::prism_tilt_vertical(prism)];
       const double wedge = train[place::wedge_angle(prism)];
-      const bool pa = train.face_order()[static_cast<std::size_t>(prism)] ==
-                      FaceOrder::perpendicular_angled;
+      const bool pa =
+          train.face_order()[static_cast<std::size_t>(prism)] == FaceOrder::perpendicular_angled;
       const Eigen::Quaterniond turn(
           Eigen::AngleAxisd(angles[static_cast<std::size_t>(prism)], lean(bh, bv)));
       const Eigen::Vector3d first = turn * lean(bh + th, bv + tv - (pa ? 0 : wedge));
@@ -171,7 +173,8 @@ TEST(ObservationModel, WrongNumbersOfAnglesAreRefused) {
   const PrismTrain train(parse_face_order("PA-AP"));
   EXPECT_THROW(observe(train, std::array{0.0}), InvalidArgument);
   const std::vector<double> a(3), b(4);
-  EXPECT_THROW(observe_batch(train, std::vector<std::span<const double>>{a, b}, {}), InvalidArgument);
+  EXPECT_THROW(observe_batch(train, std::vector<std::span<const double>>{a, b}, {}),
+               InvalidArgument);
   EXPECT_THROW(observe_batch(train, std::vector<std::span<const double>>{a}, {}), InvalidArgument);
 }
 

@@ -18,7 +18,9 @@ struct Simulated {
 };
 
 inline void append(recordings::TruthColumns& all, const recordings::TruthColumns& more) {
-  const auto add = [](auto& to, const auto& from) { to.insert(to.end(), from.begin(), from.end()); };
+  const auto add = [](auto& to, const auto& from) {
+    to.insert(to.end(), from.begin(), from.end());
+  };
   if (all.prisms() == 0) all.resize(more.prisms(), 0);
   add(all.time_ns, more.time_ns);
   for (std::size_t k = 0; k < all.rotation_angle.size(); ++k) {

@@ -54,18 +54,22 @@ MonteCarlo run(int seeds, const std::vector<estimation::RotorProcess>& process =
   sum.nees_angles /= seeds;
   sum.residual_std_deg /= seeds;
   sum.within_two_sigma = covered / counted;
-  for (const auto& [name, value] : sum.rmse) ::testing::Test::RecordProperty(name, std::to_string(value));
+  for (const auto& [name, value] : sum.rmse)
+    ::testing::Test::RecordProperty(name, std::to_string(value));
   return sum;
 }
 
 TEST(Table3, DefaultTuningReachesTheBoundAndKnowsIt) {
   const MonteCarlo result = run(20);
   // 1.5 times the Cramer-Rao bound of 30 s at 1 kHz and 0.01 degree.
-  const std::map<std::string, double> limit{
-      {"refractive_index", 6.5e-6},          {"incident_beam_horizontal_deg", 1.6e-4},
-      {"incident_beam_vertical_deg", 1.6e-4}, {"bearing_tilt_a_horizontal_deg", 3.0e-3},
-      {"bearing_tilt_a_vertical_deg", 3.0e-3}, {"prism_tilt_a_vertical_deg", 3.0e-3},
-      {"prism_tilt_b_horizontal_deg", 3.6e-3}, {"prism_tilt_b_vertical_deg", 3.6e-3}};
+  const std::map<std::string, double> limit{{"refractive_index", 6.5e-6},
+                                            {"incident_beam_horizontal_deg", 1.6e-4},
+                                            {"incident_beam_vertical_deg", 1.6e-4},
+                                            {"bearing_tilt_a_horizontal_deg", 3.0e-3},
+                                            {"bearing_tilt_a_vertical_deg", 3.0e-3},
+                                            {"prism_tilt_a_vertical_deg", 3.0e-3},
+                                            {"prism_tilt_b_horizontal_deg", 3.6e-3},
+                                            {"prism_tilt_b_vertical_deg", 3.6e-3}};
   for (const auto& [name, largest] : limit) {
     EXPECT_LE(result.rmse.at(name), largest) << name;
     EXPECT_GT(result.rmse.at(name), 0.3 * largest / 1.5) << name << " is better than possible";

@@ -12,8 +12,8 @@ namespace risley::estimation {
 
 /// The directions of single shots in time order: what an estimator sees of a recording.
 struct AngleSeries {
-  std::vector<std::int64_t> time_ns;     ///< as recorded, strictly increasing
-  std::vector<double> azimuth, zenith;   ///< rad
+  std::vector<std::int64_t> time_ns;    ///< as recorded, strictly increasing
+  std::vector<double> azimuth, zenith;  ///< rad
   /// Variance of the format's rounding, (step^2) / 12, rad^2.
   std::vector<double> azimuth_rounding_variance, zenith_rounding_variance;
 

@@ -18,15 +18,15 @@ namespace risley::estimation {
 
 /// Settings of the extended Kalman filter.
 struct EkfOptions {
-  double angle_noise = 0;                 ///< 1 sigma of azimuth and zenith before rounding, rad
-  std::vector<FreeParameter> free;        ///< constants to estimate
+  double angle_noise = 0;           ///< 1 sigma of azimuth and zenith before rounding, rad
+  std::vector<FreeParameter> free;  ///< constants to estimate
   /// Noise of the rotors [prisms]; empty chooses it by maximum likelihood of the innovations after
   /// the first pass (which takes two passes or more).
   std::vector<RotorProcess> rotor_process;
-  double parameter_walk = 0;              ///< random walk of every free angle, rad / sqrt(s)
+  double parameter_walk = 0;  ///< random walk of every free angle, rad / sqrt(s)
   /// Innovations with a chi-square (2 degrees of freedom) above this are outliers, once the first
   /// gate_after updates are through; before, the gate stands at 400.
-  double gate_chi_square = 13.816;        // one good shot in a thousand
+  double gate_chi_square = 13.816;  // one good shot in a thousand
   std::size_t gate_after = 50;
   /// Passes over the data; each starts where the one before ended at the first shot, so that
   /// everything is linearised near the answer.
@@ -36,8 +36,8 @@ struct EkfOptions {
 /// What the filter knows of one rotor state at every used shot.
 struct RotorStates {
   std::vector<std::int64_t> time_ns;
-  std::vector<std::vector<double>> rotation_angle;          ///< [prisms][shots], rad, unwrapped
-  std::vector<std::vector<double>> angular_velocity;        ///< [prisms][shots], rad/s
+  std::vector<std::vector<double>> rotation_angle;    ///< [prisms][shots], rad, unwrapped
+  std::vector<std::vector<double>> angular_velocity;  ///< [prisms][shots], rad/s
   /// Covariance of the rotation angles, upper triangle row by row [prisms (prisms+1)/2][shots].
   std::vector<std::vector<double>> rotation_angle_covariance;
   std::vector<std::vector<double>> angular_velocity_sigma;  ///< [prisms][shots], rad/s
@@ -50,13 +50,13 @@ struct RotorStates {
 /// Result of the two filters and their optimal combination.
 struct EkfResult {
   std::vector<FreeParameter> free;
-  Eigen::VectorXd parameters;            ///< mean over the smoothed estimates, SI units
-  Eigen::MatrixXd covariance;            ///< of parameters, mean over the smoothed covariances
+  Eigen::VectorXd parameters;  ///< mean over the smoothed estimates, SI units
+  Eigen::MatrixXd covariance;  ///< of parameters, mean over the smoothed covariances
   PrismTrain train{parse_face_order("PA-AP")};  ///< with the estimated parameters
   RotorStates states;
   std::vector<RotorProcess> rotor_process;
   std::size_t outliers = 0;
-  double log_likelihood = 0;             ///< of the forward filter's innovations
+  double log_likelihood = 0;  ///< of the forward filter's innovations
 };
 
 /// Forward filter, backward filter, and their combination weighted by inverse covariance, with the

@@ -23,8 +23,8 @@ struct Evaluation {
   std::vector<TruthComparison> parameters;
   std::vector<std::vector<double>> rotation_angle_error;  ///< [prisms][shots], rad
   std::vector<double> rotation_angle_rmse;                ///< [prisms], rad
-  double nees_parameters = 0;               ///< per degree of freedom; 1 is honest
-  double nees_rotation_angles = 0;          ///< per degree of freedom, mean over shots
+  double nees_parameters = 0;                             ///< per degree of freedom; 1 is honest
+  double nees_rotation_angles = 0;  ///< per degree of freedom, mean over shots
 };
 
 /// @param truth_sensor  the simulated sensor

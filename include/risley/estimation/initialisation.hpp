@@ -44,19 +44,20 @@ inline constexpr double kStartWindow = 0.05;
 
 /// What a filter starts from.
 struct Start {
-  std::int64_t time_ns = 0;               ///< of the angles: the first shot of the head
-  std::vector<double> rotation_angle;     ///< [prisms], rad
-  std::vector<double> angular_velocity;   ///< [prisms], rad/s
+  std::int64_t time_ns = 0;                     ///< of the angles: the first shot of the head
+  std::vector<double> rotation_angle;           ///< [prisms], rad
+  std::vector<double> angular_velocity;         ///< [prisms], rad/s
   PrismTrain train{parse_face_order("PA-AP")};  ///< free parameters fitted to the first shots
   std::optional<sensors::SpeedCombination> combination;
-  std::string method;                     ///< "zero position" or "spectral phases"
-  double residual_rms = 0;                ///< of the fit, rad
+  std::string method;       ///< "zero position" or "spectral phases"
+  double residual_rms = 0;  ///< of the fit, rad
 };
 
 /// The paper's start, made safe: the speeds and the combination come from the spectrum, the angles
 /// from the zero position, and least-squares fits at constant speed over up to 100 ms around it and
-/// then over the first 50 ms of the recording bring both to where a filter can take over. When that fit ends badly (the nearest shot may be many degrees
-/// from the zero position) the phases of the spectral lines replace the zero position.
+/// then over the first 50 ms of the recording bring both to where a filter can take over. When that
+/// fit ends badly (the nearest shot may be many degrees from the zero position) the phases of the
+/// spectral lines replace the zero position.
 /// @param head  every shot of about the first second
 /// @throws EstimationError naming what is missing: duration, shots, matching speeds
 Start find_start(const AngleSeries& head, const sensors::Sensor& sensor,

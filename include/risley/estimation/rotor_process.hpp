@@ -17,8 +17,8 @@ struct RotorProcess {
 };
 
 /// The heavy noise that makes the filter reproduce the paper's section 3.2: residuals of 0.0085
-/// degree where the noise is 0.01, and rotation angles of 0.025 degree. The paper does not print its
-/// tuning; this one lands in the middle of what it reports.
+/// degree where the noise is 0.01, and rotation angles of 0.025 degree. The paper does not print
+/// its tuning; this one lands in the middle of what it reports.
 inline constexpr RotorProcess kPaperProcess{radians_from_degrees(900.0), 0.0};
 
 /// Covariance that a step of dt seconds adds to (angle, speed).

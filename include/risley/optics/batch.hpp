@@ -41,8 +41,8 @@ std::size_t observe_batch(const PrismTrain& train,
 /// Azimuth, zenith and their gradients for many shots, columns as in Gradient: first the flat
 /// parameters, then the rotation angles.
 struct LinearisationColumns {
-  std::span<double> azimuth, zenith;                     ///< [shots], rad
-  std::vector<std::span<double>> d_azimuth, d_zenith;    ///< [parameter_count + prisms][shots]
+  std::span<double> azimuth, zenith;                   ///< [shots], rad
+  std::vector<std::span<double>> d_azimuth, d_zenith;  ///< [parameter_count + prisms][shots]
 };
 
 /// As observe_batch, with derivatives.

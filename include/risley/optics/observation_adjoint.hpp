@@ -62,13 +62,13 @@ PreparedDerivatives<T, N> prepare_derivatives(const std::array<T, parameter_coun
     for (int side = 0; side < 2; ++side) {
       const T sign(wedge_sign(face_order[static_cast<std::size_t>(prism)], side));
       const T h = bearing_h + p(place::prism_tilt_horizontal(prism));
-      const T v = bearing_v + p(place::prism_tilt_vertical(prism)) +
-                  sign * p(place::wedge_angle(prism));
+      const T v =
+          bearing_v + p(place::prism_tilt_vertical(prism)) + sign * p(place::wedge_angle(prism));
       const Vector3<T> normal = leaning_direction(h, v);
       // The derivative of a turning vector when its normal and its axis move together.
       const auto moved = [&](const Vector3<T>& d_normal, const Vector3<T>& d_axis) {
-        const Vector3<T> along = dot(axis, normal) * d_axis +
-                                 T(dot(d_axis, normal) + dot(axis, d_normal)) * axis;
+        const Vector3<T> along =
+            dot(axis, normal) * d_axis + T(dot(d_axis, normal) + dot(axis, d_normal)) * axis;
         return TurningVector<T>{along, d_normal - along,
                                 cross(d_axis, normal) + cross(axis, d_normal)};
       };
@@ -77,8 +77,7 @@ PreparedDerivatives<T, N> prepare_derivatives(const std::array<T, parameter_coun
       face.wedge_sign = sign;
       face.tilt_horizontal = moved(horizontal_rate(h, v), still);
       face.tilt_vertical = moved(vertical_rate(h, v), still);
-      face.bearing_horizontal =
-          moved(horizontal_rate(h, v), horizontal_rate(bearing_h, bearing_v));
+      face.bearing_horizontal = moved(horizontal_rate(h, v), horizontal_rate(bearing_h, bearing_v));
       face.bearing_vertical = moved(vertical_rate(h, v), vertical_rate(bearing_h, bearing_v));
     }
   }

@@ -40,9 +40,9 @@ struct ParameterInfo {
   std::string symbol;     ///< as in the paper
   std::string unit;       ///< of the value in files: "1", "deg" or "deg/s"
   ParameterKind kind = ParameterKind::train;
-  double si_per_unit = 1.0;      ///< multiply a file's value by this
-  double lower = 0, upper = 0;   ///< allowed range in SI units, both ends included
-  std::vector<int> places;       ///< of the flat vector, or the rotor's number
+  double si_per_unit = 1.0;     ///< multiply a file's value by this
+  double lower = 0, upper = 0;  ///< allowed range in SI units, both ends included
+  std::vector<int> places;      ///< of the flat vector, or the rotor's number
 };
 
 /// THE list of parameters for a train of so many prisms: those shared by all prisms first

@@ -36,9 +36,7 @@ class PrismTrain {
   void set(std::string_view name, double value);
 
   /// Sets one place without a bounds check, for solvers that step through the parameter space.
-  void set_place(int place, double value) {
-    parameters_[static_cast<std::size_t>(place)] = value;
-  }
+  void set_place(int place, double value) { parameters_[static_cast<std::size_t>(place)] = value; }
 
   /// The same glass and wedges with every error parameter zero.
   PrismTrain without_errors() const;
@@ -68,11 +66,16 @@ std::array<FaceOrder, N> face_order_array(const PrismTrain& train) {
 template <class Function>
 decltype(auto) with_prism_count(int prisms, Function&& function) {
   switch (prisms) {
-    case 1: return function.template operator()<1>();
-    case 2: return function.template operator()<2>();
-    case 3: return function.template operator()<3>();
-    case 4: return function.template operator()<4>();
-    default: throw InvalidArgument("number of prisms = " + std::to_string(prisms) + ", allowed 1 to 4");
+    case 1:
+      return function.template operator()<1>();
+    case 2:
+      return function.template operator()<2>();
+    case 3:
+      return function.template operator()<3>();
+    case 4:
+      return function.template operator()<4>();
+    default:
+      throw InvalidArgument("number of prisms = " + std::to_string(prisms) + ", allowed 1 to 4");
   }
 }
 

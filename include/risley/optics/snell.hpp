@@ -52,8 +52,7 @@ T refract_adjoint(const Refraction<T>& refraction, const Vector3<T>& incident,
   const T along_incident = dot(beam, incident);
   const T k = refraction.cosine_out - m * c;
   const T cosine_bar = along_normal * (m * m * c * over_out - m);
-  const T ratio_bar =
-      along_incident - along_normal * (m * (T(1.0) - c * c) * over_out + c);
+  const T ratio_bar = along_incident - along_normal * (m * (T(1.0) - c * c) * over_out + c);
   normal_bar = k * beam + cosine_bar * incident;
   beam = m * beam + cosine_bar * normal;
   return ratio_bar;

@@ -41,8 +41,8 @@ struct Observations {
 /// Header of one sensor data packet as it was recorded, kept so that a packet format can be
 /// written again byte by byte.
 struct Packet {
-  std::uint32_t rows = 0;  ///< observations of this packet in the chunk, in order; 0 for IMU
-  std::uint64_t frame = 0; ///< number of the file's frame that holds it, from 0
+  std::uint32_t rows = 0;   ///< observations of this packet in the chunk, in order; 0 for IMU
+  std::uint64_t frame = 0;  ///< number of the file's frame that holds it, from 0
   std::uint8_t device_index = 0, version = 5, slot = 1, lidar_id = 1, reserved = 0;
   std::uint32_t status = 0;
   std::uint8_t timestamp_type = 0, data_type = 1;
@@ -87,12 +87,12 @@ std::string to_string(TimeReference reference);
 
 /// What is known about a recording before its first row is read.
 struct RecordingHeader {
-  std::string format;                ///< short name, e.g. "lvx-1.1", "scan-sequence-csv"
-  std::vector<Device> devices;       ///< at least one
+  std::string format;           ///< short name, e.g. "lvx-1.1", "scan-sequence-csv"
+  std::vector<Device> devices;  ///< at least one
   TimeReference time_reference = TimeReference::relative;
   bool has_range = true;
   bool has_intensity = true;
-  bool cartesian = false;            ///< records hold x, y, z and not angles
+  bool cartesian = false;  ///< records hold x, y, z and not angles
   int returns_per_shot = 1;
   std::uint32_t frame_duration_ms = 50;
   /// Format-specific details a writer of the same format needs to write the same bytes again

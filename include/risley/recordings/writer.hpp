@@ -26,8 +26,8 @@ class Writer {
 
 /// A format that can be written, and how it is chosen by the end of a file name.
 struct WritableFormat {
-  std::string name;         ///< as RecordingHeader::format
-  std::string ending;       ///< ".lvx"; the longest ending that fits wins
+  std::string name;    ///< as RecordingHeader::format
+  std::string ending;  ///< ".lvx"; the longest ending that fits wins
   std::string description;
 };
 

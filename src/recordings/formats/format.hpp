@@ -25,13 +25,13 @@ struct Format {
   std::unique_ptr<Writer> (*create)(const std::string& path, const RecordingHeader& header);
 };
 
-extern const Format kLvx11Format;             // lvx11.cpp
-extern const Format kLvx10Format;             // lvx10.cpp
-extern const Format kScanSequenceCsvFormat;   // scan_sequence_csv.cpp
-extern const Format kOpenpylivoxCsvFormat;    // openpylivox_csv.cpp
-extern const Format kOpenpylivoxBinFormat;    // openpylivox_bin.cpp
-extern const Format kViewerCsvFormat;         // viewer_csv.cpp
-extern const Format kNetcdfFormat;            // netcdf.cpp
+extern const Format kLvx11Format;            // lvx11.cpp
+extern const Format kLvx10Format;            // lvx10.cpp
+extern const Format kScanSequenceCsvFormat;  // scan_sequence_csv.cpp
+extern const Format kOpenpylivoxCsvFormat;   // openpylivox_csv.cpp
+extern const Format kOpenpylivoxBinFormat;   // openpylivox_bin.cpp
+extern const Format kViewerCsvFormat;        // viewer_csv.cpp
+extern const Format kNetcdfFormat;           // netcdf.cpp
 
 /// Device::type of a sensor that is not a Mid-40 and about which a format tells no more.
 inline constexpr std::uint8_t kUnknownDeviceType = 255;
