@@ -28,7 +28,6 @@ namespace {
 using estimation::Estimate;
 using estimation::Evaluation;
 
-constexpr double kPaperProcessNoiseDeg = 850;  // deg/s per sqrt(s)  [B21 section 2.4]
 constexpr const char* kDefaultRate = "1000";
 
 struct EstimateCommandOptions {
@@ -93,10 +92,11 @@ sensors::Sensor sensor_of_recording(const recordings::RecordingHeader& header) {
 
 std::vector<estimation::RotorProcess> rotor_process(const std::string& text, int prisms) {
   if (text == "auto") return {};
-  estimation::RotorProcess process;
-  process.acceleration = radians_from_degrees(
-      text == "paper" ? kPaperProcessNoiseDeg
-                      : positive_number(text, "--process-noise", "deg/s per sqrt(s)"));
+  estimation::RotorProcess process = estimation::kPaperProcess;
+  if (text != "paper") {
+    process.acceleration =
+        radians_from_degrees(positive_number(text, "--process-noise", "deg/s per sqrt(s)"));
+  }
   return std::vector<estimation::RotorProcess>(static_cast<std::size_t>(prisms), process);
 }
 
@@ -304,7 +304,8 @@ void print_outcome(const Outcome& outcome) {
   }
 }
 
-/// calibration.yaml, states.nc and report.html.
+/// calibration.yaml, states.nc and report.html. An estimate that did not converge is no
+/// calibration: there is none then, not even an older one of the same name.
 void write_folder(const EstimateCommandOptions& options, const CommonOptions& common,
                   const ReadResult& input, const sensors::Sensor& nominal, const Outcome& outcome) {
   namespace fs = std::filesystem;
@@ -315,9 +316,14 @@ void write_folder(const EstimateCommandOptions& options, const CommonOptions& co
       {"input", options.input},
       {"input_sha256", sha256_of_file(options.input)}};
   const auto path = [&](const char* name) { return (fs::path(options.folder) / name).string(); };
-  sensors::Sensor calibrated = outcome.estimate.sensor;
-  calibrated.provenance = provenance;
-  write_text_file(path("calibration.yaml"), sensors::preset_text(calibrated));
+  if (outcome.estimate.converged) {
+    sensors::Sensor calibrated = outcome.estimate.sensor;
+    calibrated.provenance = provenance;
+    write_text_file(path("calibration.yaml"), sensors::preset_text(calibrated));
+  } else {
+    std::error_code ignored;
+    fs::remove(path("calibration.yaml"), ignored);
+  }
   if (options.states != "none") {
     report::write_states(path("states.nc"), outcome.estimate.filter.states, provenance);
   }
@@ -431,7 +437,7 @@ Run declare_estimate(CLI::App& verb) {
   verb.add_option(
           "--process-noise", o.process_noise,
           "Random walk of the speeds in deg/s per sqrt(s): auto (maximum likelihood), paper "
-          "(850) or a number")
+          "(900) or a number")
       ->capture_default_str();
   verb.add_option("--truth", o.truth, "OUT.truth.yaml of a simulation, to judge the estimate by");
   return [options](const CommonOptions& common) { return run_estimate(*options, common); };
