@@ -5,6 +5,7 @@
 #include <cmath>
 #include <map>
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include "statistics/simulated.hpp"
@@ -54,8 +55,17 @@ MonteCarlo run(int seeds, const std::vector<estimation::RotorProcess>& process =
   sum.nees_angles /= seeds;
   sum.residual_std_deg /= seeds;
   sum.within_two_sigma = covered / counted;
-  for (const auto& [name, value] : sum.rmse)
-    ::testing::Test::RecordProperty(name, std::to_string(value));
+  // The figures of the README and the closing notes: --gtest_output=json:FILE shows them.
+  const auto record = [](const std::string& name, double value) {
+    ::testing::Test::RecordProperty(name, fmt::format("{:.4g}", value));
+  };
+  for (const auto& [name, value] : sum.rmse) record("rmse_" + name, value);
+  record("rotation_angle_a_deg", sum.angle_a_deg);
+  record("rotation_angle_b_deg", sum.angle_b_deg);
+  record("nees_parameters", sum.nees_parameters);
+  record("nees_rotation_angles", sum.nees_angles);
+  record("residual_std_deg", sum.residual_std_deg);
+  record("within_two_sigma", sum.within_two_sigma);
   return sum;
 }
 
