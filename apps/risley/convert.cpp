@@ -69,19 +69,25 @@ Run declare_convert(CLI::App& verb) {
     }
     writer->close();
     log_warnings(reader->warnings());
+    const std::uint64_t written = observations - writer->left_out();
+    if (writer->left_out() > 0) {
+      spdlog::warn("{} of {} observations have no place in this format and were left out",
+                   writer->left_out(), observations);
+    }
     if (damage) {
-      spdlog::error("{}; the {} observations before it are saved in {}", damage->what(),
-                    observations, options->output);
+      spdlog::error("{}; the {} observations before it are saved in {}", damage->what(), written,
+                    options->output);
     }
     if (common.json) {
-      Json object = {{"observations", observations},
+      Json object = {{"observations", written},
+                     {"left_out", writer->left_out()},
                      {"input_format", reader->header().format},
                      {"output", options->output},
                      {"warnings", warnings_json(reader->warnings())}};
       if (damage) object.update(damage_json(*damage));
       print_json(object);
     } else {
-      fmt::print("{}: {} observations\n", options->output, grouped(observations));
+      fmt::print("{}: {} observations\n", options->output, grouped(written));
     }
     return damage ? kBadFile : kDone;
   };

@@ -106,6 +106,20 @@ TEST(ScanSequence, RewritesTheSameBytes) {
   }
 }
 
+TEST(ScanSequence, CountsWhatItHasNoPlaceFor) {
+  const Outcome whole = read_text(kScanSequenceCsvFormat, kSmall);
+  Chunk chunk = whole.recording.data;
+  chunk.observations.valid[2] = 0;          // a shot without a direction
+  chunk.observations.return_number[4] = 2;  // a further return of the shot before
+  chunk.observations.time_ns[4] = chunk.observations.time_ns[3];
+  const TemporaryFolder folder;
+  const auto writer = kScanSequenceCsvFormat.create(folder.file("out.csv"), whole.recording.header);
+  writer->write(chunk);
+  writer->close();
+  EXPECT_EQ(writer->left_out(), 2U);
+  EXPECT_EQ(read_all(kScanSequenceCsvFormat, folder.file("out.csv")).rows().size(), 4U);
+}
+
 TEST(ScanSequence, CutAtEveryByte) {
   check_cuts(kScanSequenceCsvFormat, kSmall, 1,
              [](std::string_view head) { return lines_in(head, 5); });

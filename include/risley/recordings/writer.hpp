@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <string>
 #include <vector>
@@ -22,6 +23,13 @@ class Writer {
 
   /// Completes the file and gives it its name. @throws FileError
   virtual void close() = 0;
+
+  /// Rows given so far that the format has no place for and that were left out: those without a
+  /// return in formats that only list points, further returns in a scan sequence.
+  std::uint64_t left_out() const { return left_out_; }
+
+ protected:
+  std::uint64_t left_out_ = 0;
 };
 
 /// A format that can be written, and how it is chosen by the end of a file name.

@@ -183,6 +183,8 @@ class OpenpylivoxBinWriter final : public Writer {
         add_to_pair(rows, row, has_return);
       } else if (has_return) {
         encode(rows, row, number, rows.time_ns[row], rows.return_number[row]);
+      } else {
+        ++left_out_;
       }
     }
   }
@@ -226,9 +228,11 @@ class OpenpylivoxBinWriter final : public Writer {
       pair_.resize(2);
       pair_open_ = true;
       pair_has_return_ = false;
+      pair_rows_ = 0;
       pair_.time_ns[0] = rows.time_ns[row];
       pair_row_number_ = filter_.rows_seen() - 1 - slot;
     }
+    ++pair_rows_;
     pair_.azimuth[slot] = rows.azimuth[row];
     pair_.zenith[slot] = rows.zenith[row];
     pair_.range[slot] = rows.range[row];
@@ -241,6 +245,7 @@ class OpenpylivoxBinWriter final : public Writer {
 
   void finish_pair() {
     if (pair_open_ && pair_has_return_) encode(pair_, 0, pair_row_number_, pair_.time_ns[0], 1);
+    if (pair_open_ && !pair_has_return_) left_out_ += pair_rows_;
     pair_open_ = false;
   }
 
@@ -249,7 +254,7 @@ class OpenpylivoxBinWriter final : public Writer {
   BlockOutput output_;
   OpenpylivoxRowFilter filter_;
   Observations pair_;  ///< two rows
-  std::uint64_t pair_row_number_ = 0;
+  std::uint64_t pair_row_number_ = 0, pair_rows_ = 0;
   bool pair_open_ = false, pair_has_return_ = false;
 };
 

@@ -170,7 +170,11 @@ class OpenpylivoxCsvWriter final : public Writer {
     const auto& rows = chunk.observations;
     time_.look_at(rows.time_ns);
     for (std::size_t i = 0; i < rows.size(); ++i) {
-      if (filter_.accepts(rows, i)) write_point(rows, i);
+      if (filter_.accepts(rows, i)) {
+        write_point(rows, i);
+      } else {
+        ++left_out_;
+      }
     }
   }
 

@@ -151,7 +151,10 @@ class ScanSequenceWriter final : public Writer {
     const auto& rows = chunk.observations;
     time_.look_at(rows.time_ns);
     for (std::size_t i = 0; i < rows.size(); ++i, ++rows_seen_) {
-      if (rows.valid[i] == 0) continue;
+      if (rows.valid[i] == 0) {
+        ++left_out_;
+        continue;
+      }
       if (!std::isfinite(rows.azimuth[i]) || !(rows.zenith[i] >= 0.0 && rows.zenith[i] <= kPi) ||
           std::abs(rows.azimuth[i]) > kPi) {
         throw InvalidArgument(fmt::format(
@@ -160,7 +163,10 @@ class ScanSequenceWriter final : public Writer {
             rows_seen_, rows.azimuth[i], rows.zenith[i]));
       }
       require_one_device(rows.device[i]);
-      if (rows.return_number[i] > 1 && last_time_ns_ == rows.time_ns[i]) continue;
+      if (rows.return_number[i] > 1 && last_time_ns_ == rows.time_ns[i]) {
+        ++left_out_;
+        continue;
+      }
       last_time_ns_ = rows.time_ns[i];
       append_row(rows, i);
     }
