@@ -19,6 +19,7 @@
 #include "risley/sensors/preset.hpp"
 
 #include "command.hpp"
+#include "observability_text.hpp"
 #include "recording_text.hpp"
 #include "table.hpp"
 
@@ -28,13 +29,22 @@ namespace {
 using estimation::Estimate;
 using estimation::Evaluation;
 
-constexpr const char* kDefaultRate = "1000";
+/// What the paper's filter can do in a time that one waits for.
+constexpr const char* kFilterRate = "1000";
 
 struct EstimateCommandOptions {
-  std::string input, folder, method = "ekf", rate_hz = kDefaultRate, sensor, states = "knots",
-                             mirror = "auto", process_noise = "auto", truth;
+  std::string input, folder, method = "map", rate_hz, sensor, states = "knots", mirror = "auto",
+                             process_noise = "auto", truth;
   std::optional<double> noise_angle_deg;
   std::vector<std::string> fixed, freed;
+
+  estimation::Method chosen_method() const {
+    return method == "ekf" ? estimation::Method::ekf : estimation::Method::map;
+  }
+  std::string rate() const {
+    if (!rate_hz.empty()) return rate_hz;
+    return chosen_method() == estimation::Method::ekf ? kFilterRate : "full";
+  }
 };
 
 /// What reading the recording leaves.
@@ -48,8 +58,8 @@ struct ReadResult {
 ReadResult read_recording(const EstimateCommandOptions& options, const CommonOptions& common) {
   const double started = now();
   estimation::SelectionOptions selection;
-  if (options.rate_hz != "full") {
-    selection.rate = positive_number(options.rate_hz, "--rate-hz", "Hz");
+  if (options.rate() != "full") {
+    selection.rate = positive_number(options.rate(), "--rate-hz", "Hz");
   }
   ReadResult result{
       recordings::open_recording(options.input), {}, estimation::ShotSelector(selection)};
@@ -137,8 +147,11 @@ Evaluation evaluate_with(const std::string& truth_path, const Estimate& estimate
     throw InvalidArgument(fmt::format("--truth = {}, expected OUT.truth.yaml", truth_path));
   }
   const sensors::Sensor sensor = sensors::load_sensor(truth_path);
-  const recordings::TruthColumns columns =
-      recordings::load_truth(std::filesystem::path(preset).replace_extension(".nc").string());
+  // One row per state: the truth of a full-rate recording is larger than the recording.
+  std::vector<std::int64_t> times = estimate.states.time_ns;
+  std::sort(times.begin(), times.end());
+  const recordings::TruthColumns columns = recordings::load_truth(
+      std::filesystem::path(preset).replace_extension(".nc").string(), times);
   return estimation::evaluate(estimate, sensor, columns);
 }
 
@@ -178,8 +191,7 @@ Json start_json(const estimation::Start& start) {
     angles[letter] = degrees_from_radians(start.rotation_angle[i]);
     speeds[letter] = degrees_from_radians(start.angular_velocity[i]);
   }
-  return {{"method", start.method},
-          {"time_ns", start.time_ns},
+  return {{"time_ns", start.time_ns},
           {"rotation_angle_deg", angles},
           {"angular_velocity_deg_per_s", speeds},
           {"residual_rms_deg", degrees_from_radians(start.residual_rms)}};
@@ -188,7 +200,7 @@ Json start_json(const estimation::Start& start) {
 /// Parameters of the prisms that the estimation did not touch.
 Json fixed_json(const Estimate& estimate) {
   std::vector<int> free_places;
-  for (const estimation::FreeParameter& free : estimate.filter.free) {
+  for (const estimation::FreeParameter& free : estimate.free) {
     free_places.insert(free_places.end(), free.places.begin(), free.places.end());
   }
   Json object = Json::object();
@@ -219,18 +231,22 @@ Json outcome_json(const Outcome& outcome) {
     parameters[value.name] = {{"value", in_file_unit(value.name, value.value, prisms)},
                               {"sigma", in_file_unit(value.name, value.sigma, prisms)}};
   }
-  Json rotors = Json::array();
-  for (const estimation::RotorProcess& process : e.filter.rotor_process) {
+  Json rotors = Json::array(), jerks = Json::array(), unobservable = Json::array();
+  for (const estimation::RotorProcess& process : e.rotor_process) {
     rotors.push_back(degrees_from_radians(process.acceleration));
+    jerks.push_back(degrees_from_radians(process.jerk));
+  }
+  for (const estimation::WeakDirection& weak : e.unobservable) {
+    unobservable.push_back(weak_direction_json(weak));
   }
   std::vector<std::string> warnings = outcome.warnings;
   warnings.insert(warnings.end(), e.warnings.begin(), e.warnings.end());
   Json object = {
       {"converged", e.converged},
       {"reason", e.reason},
-      {"method", e.method},
-      {"observations_used", e.filter.states.size()},
-      {"outliers", e.filter.outliers},
+      {"method", e.method == estimation::Method::map ? "map" : "ekf"},
+      {"observations_used", e.series.size() - (e.map ? e.map->unused_shots : 0)},
+      {"outliers", e.outliers},
       {"combination", nullptr},
       {"mirrored", e.mirrored},
       {"parameters", parameters},
@@ -241,10 +257,21 @@ Json outcome_json(const Outcome& outcome) {
         {"expected_rms_deg", degrees_from_radians(e.expected_residual)}}},
       {"noise_angle_deg", degrees_from_radians(e.angle_noise)},
       {"process_noise_deg_per_s_per_sqrt_s", rotors},
+      {"process_jerk_deg_per_s2_per_sqrt_s", jerks},
+      {"unobservable", unobservable},
       {"start", start_json(e.start)},
       {"warnings", warnings},
       {"seconds",
        {{"read", outcome.read_s}, {"solve", outcome.solve_s}, {"total", outcome.total_s}}}};
+  if (e.map) {
+    object["iterations"] = e.map->iterations;
+    object["residuals"]["autocorrelation"] = e.map->autocorrelation.rho.empty()
+                                                 ? 0.0
+                                                 : e.map->autocorrelation.rho.front();
+    object["residuals"]["autocorrelation_factor"] = e.map->autocorrelation.factor;
+    object["residuals"]["unit_variance"] = e.map->unit_variance;
+    object["residuals"]["variance_factor"] = e.map->variance_factor;
+  }
   if (e.sensor.combination) object["combination"] = static_cast<int>(*e.sensor.combination);
   if (outcome.evaluation) object["truth"] = evaluation_json(*outcome.evaluation, prisms);
   return object;
@@ -255,7 +282,7 @@ void print_outcome(const Outcome& outcome) {
   const int prisms = e.sensor.prisms();
   fmt::print("{}\n", e.converged ? "converged" : "NOT CONVERGED: " + e.reason);
   fmt::print("{} shots used, {} of them outliers{}; read {:.2f} s, solved {:.2f} s\n\n",
-             grouped(e.filter.states.size()), grouped(e.filter.outliers),
+             grouped(e.series.size()), grouped(e.outliers),
              (e.sensor.combination
                   ? fmt::format(", speed combination {}", static_cast<int>(*e.sensor.combination))
                   : std::string()) +
@@ -292,6 +319,12 @@ void print_outcome(const Outcome& outcome) {
   add("azimuth", e.azimuth_residuals);
   add("zenith", e.zenith_residuals);
   residuals.print();
+  if (e.map) {
+    fmt::print(
+        "\nresiduals: {:.3f} times the stated variance, autocorrelation factor {:.3f}; variances of "
+        "single shots multiplied by {:.3f}\n",
+        e.map->unit_variance, e.map->autocorrelation.factor, e.map->variance_factor);
+  }
   if (outcome.evaluation) {
     fmt::print("\nrotation angle rmse:");
     for (std::size_t i = 0; i < outcome.evaluation->rotation_angle_rmse.size(); ++i) {
@@ -302,6 +335,23 @@ void print_outcome(const Outcome& outcome) {
         "\nNEES per degree of freedom (1 is honest): parameters {:.3g}, rotation angles {:.3g}\n",
         outcome.evaluation->nees_parameters, outcome.evaluation->nees_rotation_angles);
   }
+}
+
+/// States at every used shot, or at one shot per knot of the trajectory.
+void write_state_file(const std::string& path, const EstimateCommandOptions& options,
+                      const Estimate& estimate,
+                      const std::vector<std::pair<std::string, std::string>>& provenance) {
+  report::StatesContent content;
+  content.prisms = estimate.sensor.prisms();
+  content.rows = options.states == "all" ? estimate.series.size() : estimate.states.size();
+  content.block = [&](estimation::ShotRange rows) {
+    return options.states == "all" ? estimation::states_of_shots(estimate, rows)
+                                   : estimation::rows_of(estimate.states, rows);
+  };
+  for (int prism = 0; prism < content.prisms; ++prism) {
+    content.residuals_over_angle.push_back(estimation::residuals_over_angle(estimate, prism));
+  }
+  report::write_states(path, content, provenance);
 }
 
 /// calibration.yaml, states.nc and report.html. An estimate that did not converge is no
@@ -325,7 +375,7 @@ void write_folder(const EstimateCommandOptions& options, const CommonOptions& co
     fs::remove(path("calibration.yaml"), ignored);
   }
   if (options.states != "none") {
-    report::write_states(path("states.nc"), outcome.estimate.filter.states, provenance);
+    write_state_file(path("states.nc"), options, outcome.estimate, provenance);
   }
   write_text_file(
       path("report.html"),
@@ -337,10 +387,8 @@ void write_folder(const EstimateCommandOptions& options, const CommonOptions& co
 
 /// Wrong wishes are told before an hour of reading.
 void check_options(const EstimateCommandOptions& options) {
-  if (options.method != "ekf") {
-    throw InvalidArgument("--method map is not available in this version, allowed: ekf");
-  }
-  if (options.states == "all" && options.rate_hz != "full") {
+  if (options.states == "all" && options.chosen_method() == estimation::Method::ekf &&
+      options.rate() != "full") {
     throw InvalidArgument(
         "--states all needs --rate-hz full: the filter has states at the shots it uses only");
   }
@@ -357,7 +405,7 @@ void check_options(const EstimateCommandOptions& options) {
 ExitStatus run_estimate(const EstimateCommandOptions& options, const CommonOptions& common) {
   const double started = now();
   check_options(options);
-  const ReadResult input = read_recording(options, common);
+  ReadResult input = read_recording(options, common);
   const estimation::EstimateOptions settings = estimate_options(options, input.reader->header());
   const estimation::SelectionCounts& counts = input.selector.counts();
   spdlog::debug(
@@ -367,23 +415,22 @@ ExitStatus run_estimate(const EstimateCommandOptions& options, const CommonOptio
       input.selector.series().size(), settings.sensor.name);
   Outcome outcome;
   outcome.warnings = warning_texts(input.reader->warnings());
-  if (input.audit.time_resets > 0) {
+  if (counts.clock_resets > 0) {
     outcome.warnings.push_back(fmt::format(
-        "the clock of the recording jumps {} times: only what lies after the highest time so far "
-        "is used",
-        input.audit.time_resets));
+        "the clock of the recording jumps back {} times: the pieces share the parameters, and their "
+        "rotors are found anew",
+        counts.clock_resets));
   }
   outcome.read_s = input.seconds;
   const double solving = now();
   {
     ProgressBar bar("estimating", common);
-    outcome.estimate = estimation::estimate_with_ekf(input.selector.series(), input.selector.head(),
-                                                     settings, bar.callback());
+    outcome.estimate = estimation::estimate(options.chosen_method(), input.selector.take_series(),
+                                            input.selector.head(), settings, bar.callback());
   }
   outcome.solve_s = now() - solving;
   const estimation::Start& start = outcome.estimate.start;
-  spdlog::debug("start by {}: residuals of {:.3g} deg", start.method,
-                degrees_from_radians(start.residual_rms));
+  spdlog::debug("start: residuals of {:.3g} deg", degrees_from_radians(start.residual_rms));
   if (!options.truth.empty()) outcome.evaluation = evaluate_with(options.truth, outcome.estimate);
   if (!options.folder.empty()) {
     write_folder(options, common, input, settings.sensor, outcome);
@@ -409,11 +456,10 @@ Run declare_estimate(CLI::App& verb) {
   verb.add_option("INPUT", o.input, "Recording of one sensor, of any known format")->required();
   verb.add_option("-o,--output", o.folder,
                   "Folder for calibration.yaml, states.nc and report.html");
-  verb.add_option("--method", o.method, "ekf: the paper's two filters and their combination")
-      ->check(CLI::IsMember({"ekf", "map"}))
+  verb.add_option("--method", o.method, "map: most probable trajectory of all shots at once; ekf: the paper's filter")
+      ->check(CLI::IsMember({"map", "ekf"}))
       ->capture_default_str();
-  verb.add_option("--rate-hz", o.rate_hz, "Shots per second to use, or 'full' for all")
-      ->capture_default_str();
+  verb.add_option("--rate-hz", o.rate_hz, "Shots per second to use, or 'full' for all (default: full with map, 1000 with ekf)");
   verb.add_option("--noise-angle-deg", o.noise_angle_deg,
                   "1 sigma of azimuth and zenith before rounding (default: the sensor's)");
   verb.add_option("--sensor", o.sensor,
@@ -427,7 +473,8 @@ Run declare_estimate(CLI::App& verb) {
       ->expected(1)
       ->take_all();
   verb.add_option("--states", o.states,
-                  "Which rotor states to write: at the shots used, at all shots, none")
+                  "Which rotor states to write: at one shot every 2 ms (ekf: at the shots used), at "
+                  "all shots, none")
       ->check(CLI::IsMember({"knots", "all", "none"}))
       ->capture_default_str();
   verb.add_option("--mirror", o.mirror,
@@ -436,8 +483,8 @@ Run declare_estimate(CLI::App& verb) {
       ->capture_default_str();
   verb.add_option(
           "--process-noise", o.process_noise,
-          "Random walk of the speeds in deg/s per sqrt(s): auto (maximum likelihood), paper "
-          "(900) or a number")
+          "How rotors may move: auto (random walks of speed and, with map, acceleration, by maximum "
+          "likelihood), paper (900), or a random walk of the speed in deg/s per sqrt(s)")
       ->capture_default_str();
   verb.add_option("--truth", o.truth, "OUT.truth.yaml of a simulation, to judge the estimate by");
   return [options](const CommonOptions& common) { return run_estimate(*options, common); };

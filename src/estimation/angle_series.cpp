@@ -6,14 +6,80 @@
 
 #include <fmt/format.h>
 
+#include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
 
 namespace risley::estimation {
 namespace {
 
 constexpr std::int64_t kHeadNs = 1'000'000'000;
+constexpr std::int64_t kResetNs = static_cast<std::int64_t>(kClockReset * 1e9);
+
+/// Picks shots on a fixed grid of ticks, so that gaps and jitter do not move them.
+class Ticks {
+ public:
+  Ticks(double rate, std::int64_t& origin, std::int64_t& next)
+      : rate_(rate), origin_(origin), next_(next) {}
+
+  void restart(std::int64_t time_ns) { origin_ = next_ = time_ns; }
+  bool take(std::int64_t time_ns) {
+    if (time_ns < next_) return false;
+    const double since = 1e-9 * static_cast<double>(time_ns - origin_);
+    const double tick = std::floor(since * rate_ + 1e-6) + 1.0;
+    next_ = origin_ + std::llround(tick / rate_ * 1e9);
+    return true;
+  }
+
+ private:
+  double rate_;
+  std::int64_t &origin_, &next_;
+};
 
 }  // namespace
+
+void AngleSeries::append(const AngleSeries& other, std::size_t row) {
+  time_ns.push_back(other.time_ns[row]);
+  azimuth.push_back(other.azimuth[row]);
+  zenith.push_back(other.zenith[row]);
+  azimuth_rounding_variance.push_back(other.azimuth_rounding_variance[row]);
+  zenith_rounding_variance.push_back(other.zenith_rounding_variance[row]);
+}
+
+AngleSeries rows_of(const AngleSeries& series, std::size_t begin, std::size_t end) {
+  AngleSeries rows;
+  for (std::size_t i = begin; i < end; ++i) rows.append(series, i);
+  return rows;
+}
+
+std::vector<ShotRange> stretches(const AngleSeries& series, double longest_gap) {
+  std::vector<ShotRange> ranges;
+  const auto longest_ns = static_cast<std::int64_t>(longest_gap * 1e9);
+  for (std::size_t i = 0; i < series.size(); ++i) {
+    const std::int64_t step = i == 0 ? -1 : series.time_ns[i] - series.time_ns[i - 1];
+    if (step <= 0 || step > longest_ns) ranges.push_back({i, i});
+    ranges.back().end = i + 1;
+  }
+  return ranges;
+}
+
+AngleSeries thinned(const AngleSeries& series, double rate, std::vector<ShotRange>& ranges) {
+  AngleSeries rows;
+  std::int64_t origin = 0, next = 0;
+  Ticks ticks(rate, origin, next);
+  for (ShotRange& range : ranges) {
+    const std::size_t begin = rows.size();
+    ticks.restart(series.time_ns[range.begin]);
+    for (std::size_t i = range.begin; i < range.end; ++i) {
+      if (ticks.take(series.time_ns[i])) rows.append(series, i);
+    }
+    range = {begin, rows.size()};
+  }
+  return rows;
+}
+
+void mirror(AngleSeries& series) {
+  for (double& zenith : series.zenith) zenith = kPi - zenith;
+}
 
 ShotSelector::ShotSelector(const SelectionOptions& options) : options_(options) {
   if (options_.rate && !(*options_.rate > 0)) {
@@ -23,13 +89,14 @@ ShotSelector::ShotSelector(const SelectionOptions& options) : options_(options) 
 
 void ShotSelector::add(const recordings::Observations& o) {
   const auto append = [&](AngleSeries& series, std::size_t i) {
-    const auto variance = [](float step) { return double(step) * double(step) / 12.0; };
+    const auto variance = [](float step) { return step * step / 12.0F; };
     series.time_ns.push_back(o.time_ns[i]);
     series.azimuth.push_back(o.azimuth[i]);
     series.zenith.push_back(o.zenith[i]);
     series.azimuth_rounding_variance.push_back(variance(o.azimuth_resolution[i]));
     series.zenith_rounding_variance.push_back(variance(o.zenith_resolution[i]));
   };
+  Ticks ticks(options_.rate.value_or(1.0), tick_origin_, next_tick_);
   for (std::size_t i = 0; i < o.size(); ++i) {
     ++counts_.rows;
     if (!o.valid[i] || !std::isfinite(o.azimuth[i]) || !std::isfinite(o.zenith[i])) {
@@ -37,20 +104,19 @@ void ShotSelector::add(const recordings::Observations& o) {
       continue;
     }
     const bool first = head_.size() == 0;
-    if (!first && o.time_ns[i] <= last_time_ns_) {
-      ++(o.time_ns[i] == last_time_ns_ ? counts_.further_returns : counts_.out_of_order);
+    const std::int64_t step = first ? 1 : o.time_ns[i] - last_time_ns_;
+    if (step <= 0 && step >= -kResetNs) {
+      ++(step == 0 ? counts_.further_returns : counts_.out_of_order);
       continue;
     }
+    if (step < 0) ++counts_.clock_resets;
+    if (first || step < 0) ticks.restart(o.time_ns[i]);
     last_time_ns_ = o.time_ns[i];
-    if (first || o.time_ns[i] - head_.time_ns.front() <= kHeadNs) append(head_, i);
-    if (options_.rate && !first && o.time_ns[i] < next_tick_) continue;
-    append(series_, i);
-    if (options_.rate) {
-      // Ticks stand on a fixed grid, so that gaps and jitter do not move them.
-      const double since = 1e-9 * double(o.time_ns[i] - series_.time_ns.front());
-      const double tick = std::floor(since * *options_.rate + 1e-6) + 1.0;
-      next_tick_ = series_.time_ns.front() + std::llround(tick / *options_.rate * 1e9);
+    // The head ends at the first reset.
+    if (first || (counts_.clock_resets == 0 && o.time_ns[i] - head_.time_ns.front() <= kHeadNs)) {
+      append(head_, i);
     }
+    if (!options_.rate || ticks.take(o.time_ns[i])) append(series_, i);
   }
 }
 

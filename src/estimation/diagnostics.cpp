@@ -5,6 +5,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
+
+#include "risley/core/angle.hpp"
 
 namespace risley::estimation {
 
@@ -45,6 +48,117 @@ Moments moments(std::span<const double> values, std::span<const unsigned char> s
     result.kurtosis = fourth / (second * second) - 3.0;
   }
   return result;
+}
+
+double robust_scale(std::span<const double> azimuth, std::span<const double> zenith) {
+  // Half of the lengths of normal pairs are below sigma sqrt(2 ln 2).
+  constexpr double kMedian = 1.1774100225154747;
+  constexpr std::size_t kEnough = 20000;
+  const std::size_t stride = std::max<std::size_t>(1, azimuth.size() / kEnough);
+  std::vector<double> squares;
+  for (std::size_t i = 0; i < azimuth.size(); i += stride) {
+    const double square = azimuth[i] * azimuth[i] + zenith[i] * zenith[i];
+    squares.push_back(std::isfinite(square) ? square : std::numeric_limits<double>::infinity());
+  }
+  if (squares.empty()) return std::numeric_limits<double>::infinity();
+  const auto middle = squares.begin() + static_cast<std::ptrdiff_t>(squares.size() / 2);
+  std::nth_element(squares.begin(), middle, squares.end());
+  return std::sqrt(*middle) / kMedian;
+}
+
+Autocorrelation autocorrelation(std::span<const std::int64_t> time_ns,
+                                std::span<const double> azimuth, std::span<const double> zenith,
+                                std::span<const unsigned char> skip) {
+  constexpr std::size_t kBlocks = 8, kBlockShots = 50000, kMostLags = 4000;
+  Autocorrelation result;
+  if (time_ns.size() < 100) return result;
+  std::vector<std::int64_t> steps;
+  for (std::size_t i = 1; i < std::min<std::size_t>(time_ns.size(), 20000); ++i) {
+    steps.push_back(time_ns[i] - time_ns[i - 1]);
+  }
+  std::nth_element(steps.begin(), steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2),
+                   steps.end());
+  const std::int64_t step = steps[steps.size() / 2];
+  // Blocks spread over the recording, left-out shots as zeros with weight zero.
+  struct Block {
+    std::vector<double> azimuth, zenith, weight;
+  };
+  std::vector<Block> blocks;
+  const std::size_t spacing = std::max(kBlockShots, time_ns.size() / kBlocks);
+  double variance = 0, used = 0;
+  for (std::size_t begin = 0; begin + 100 <= time_ns.size(); begin += spacing) {
+    Block block;
+    const std::size_t end = std::min(begin + kBlockShots, time_ns.size());
+    for (std::size_t i = begin; i < end; ++i) {
+      if (i > begin) {  // missing shots take their places
+        const std::int64_t missing = (time_ns[i] - time_ns[i - 1] + step / 2) / step - 1;
+        if (missing < 0 || missing > 1000) break;
+        block.azimuth.resize(block.azimuth.size() + static_cast<std::size_t>(missing), 0.0);
+        block.zenith.resize(block.azimuth.size(), 0.0);
+        block.weight.resize(block.azimuth.size(), 0.0);
+      }
+      const bool good = skip[i] == 0 && std::isfinite(azimuth[i]) && std::isfinite(zenith[i]);
+      block.azimuth.push_back(good ? azimuth[i] : 0.0);
+      block.zenith.push_back(good ? zenith[i] : 0.0);
+      block.weight.push_back(good ? 1.0 : 0.0);
+      variance += good ? azimuth[i] * azimuth[i] + zenith[i] * zenith[i] : 0.0;
+      used += good;
+    }
+    blocks.push_back(std::move(block));
+  }
+  if (!(used > 0) || !(variance > 0)) return result;
+  variance /= used;
+  for (std::size_t lag = 1; lag <= kMostLags; ++lag) {
+    double products = 0, pairs = 0;
+    for (const Block& block : blocks) {
+      for (std::size_t i = 0; i + lag < block.azimuth.size(); ++i) {
+        products += block.azimuth[i] * block.azimuth[i + lag] +
+                    block.zenith[i] * block.zenith[i + lag];
+        pairs += block.weight[i] * block.weight[i + lag];
+      }
+    }
+    if (pairs < 100) break;
+    const double rho = products / pairs / variance;
+    if (!(rho > 2.5 / std::sqrt(2.0 * pairs))) break;
+    result.rho.push_back(rho);
+    result.factor += 2.0 * rho;
+  }
+  return result;
+}
+
+AngleProfile angle_profile(std::span<const double> angle, std::span<const double> azimuth,
+                           std::span<const double> zenith, std::span<const unsigned char> skip,
+                           std::size_t bins) {
+  AngleProfile profile;
+  profile.count.assign(bins, 0);
+  profile.mean_azimuth.assign(bins, 0.0);
+  profile.mean_zenith.assign(bins, 0.0);
+  double squares_azimuth = 0, squares_zenith = 0, used = 0;
+  for (std::size_t i = 0; i < angle.size(); ++i) {
+    if (skip[i] != 0 || !std::isfinite(azimuth[i]) || !std::isfinite(zenith[i])) continue;
+    const double turn = wrap_to_two_pi(angle[i]) / kTwoPi;
+    const auto bin = std::min(static_cast<std::size_t>(turn * static_cast<double>(bins)), bins - 1);
+    ++profile.count[bin];
+    profile.mean_azimuth[bin] += azimuth[i];
+    profile.mean_zenith[bin] += zenith[i];
+    squares_azimuth += azimuth[i] * azimuth[i];
+    squares_zenith += zenith[i] * zenith[i];
+    ++used;
+  }
+  profile.sigma_azimuth = std::sqrt(squares_azimuth / std::max(used, 1.0));
+  profile.sigma_zenith = std::sqrt(squares_zenith / std::max(used, 1.0));
+  double chi2 = 0, counted = 0;
+  for (std::size_t bin = 0; bin < bins; ++bin) {
+    const auto n = static_cast<double>(profile.count[bin]);
+    profile.mean_azimuth[bin] /= n;  // NaN without a shot
+    profile.mean_zenith[bin] /= n;
+    if (profile.count[bin] == 0) continue;
+    chi2 += n * std::pow(profile.mean_azimuth[bin] / profile.sigma_azimuth, 2) +
+            n * std::pow(profile.mean_zenith[bin] / profile.sigma_zenith, 2);
+    counted += 2.0;
+  }
+  profile.chi2_per_bin = counted > 0 ? chi2 / counted : 0.0;
+  return profile;
 }
 
 }  // namespace risley::estimation

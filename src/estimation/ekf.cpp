@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <limits>
 
 #include <Eigen/Cholesky>
@@ -13,6 +12,7 @@
 
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
+#include "risley/core/golden_section.hpp"
 
 #include "estimation/residual_model.hpp"
 
@@ -113,8 +113,10 @@ class Filter {
     cross_.noalias() = p * jacobian_.transpose();
     Eigen::Matrix2d innovation_covariance = jacobian_ * cross_;
     const double noise = options_.angle_noise * options_.angle_noise;
-    innovation_covariance(0, 0) += noise + series_.azimuth_rounding_variance[row];
-    innovation_covariance(1, 1) += noise + series_.zenith_rounding_variance[row];
+    innovation_covariance(0, 0) +=
+        noise + static_cast<double>(series_.azimuth_rounding_variance[row]);
+    innovation_covariance(1, 1) +=
+        noise + static_cast<double>(series_.zenith_rounding_variance[row]);
     const double determinant = innovation_covariance.determinant();
     const Eigen::Matrix2d inverse = innovation_covariance.inverse();
     Update result;
@@ -236,7 +238,7 @@ std::vector<unsigned char> screen(const AngleSeries& series, const Start& start,
   const double start_limit = std::max(radians_from_degrees(0.1), 8.0 * start.residual_rms);
   for (std::size_t i = 0; i < std::min(options.gate_after, series.size()); ++i) {
     const double t = 1e-9 * static_cast<double>(series.time_ns[i] - start.time_ns);
-    if (!reference && t > kStartWindow) break;
+    if (!reference && std::abs(t) > kStartWindow) continue;
     std::array<double, N> angle;
     for (std::size_t k = 0; k < N; ++k) {
       angle[k] = reference ? reference->states->rotation_angle[k][i]
@@ -244,8 +246,8 @@ std::vector<unsigned char> screen(const AngleSeries& series, const Start& start,
     }
     model.linearise(angle);
     const double variance = options.angle_noise * options.angle_noise +
-                            series.azimuth_rounding_variance[i] +
-                            series.zenith_rounding_variance[i];
+                            static_cast<double>(series.azimuth_rounding_variance[i] +
+                                                series.zenith_rounding_variance[i]);
     const double limit = reference ? 6.0 * std::sqrt(variance) : start_limit;
     outlier[i] = !(model.residual(series.azimuth[i], series.zenith[i]).norm() < limit);
   }
@@ -271,29 +273,6 @@ double likelihood(const AngleSeries& series, const PrismTrain& train, const EkfO
   return std::isfinite(sum) ? sum : -std::numeric_limits<double>::infinity();
 }
 
-/// Maximum of a function of one variable, golden section.
-double maximise(const std::function<double(double)>& f, double a, double b, double tolerance) {
-  const double ratio = 0.5 * (std::sqrt(5.0) - 1.0);
-  double left = b - ratio * (b - a), right = a + ratio * (b - a);
-  double at_left = f(left), at_right = f(right);
-  while (b - a > tolerance) {
-    if (at_left > at_right) {
-      b = right;
-      right = left;
-      at_right = at_left;
-      left = b - ratio * (b - a);
-      at_left = f(left);
-    } else {
-      a = left;
-      left = right;
-      at_left = at_right;
-      right = a + ratio * (b - a);
-      at_right = f(right);
-    }
-  }
-  return 0.5 * (a + b);
-}
-
 /// White acceleration of every rotor that makes the innovations likeliest: one value for all on a
 /// coarse grid, then each rotor's own.
 template <int N>
@@ -316,11 +295,11 @@ std::vector<RotorProcess> likeliest_process(const AngleSeries& series, const Pri
   }
   for (std::size_t k = 0; k < N; ++k) {
     const double middle = decades[k];
-    decades[k] = maximise(
+    decades[k] = golden_section_minimum(
         [&](double trial) {
           std::array<double, N> changed = decades;
           changed[k] = trial;
-          return likelihood_of(changed);
+          return -likelihood_of(changed);
         },
         middle - 0.75, middle + 0.75, 0.1);
   }
@@ -439,6 +418,9 @@ EkfResult run(const AngleSeries& series, const Start& start, const EkfOptions& o
   if (process.size() != N) {
     throw InvalidArgument(
         fmt::format("process noise for {} rotors given, the train has {}", process.size(), N));
+  }
+  for (const RotorProcess& rotor : process) {
+    if (rotor.jerk != 0) throw InvalidArgument("white jerk is a motion model of the batch estimator");
   }
   State first = first_state(Filter<N>(series, start.train, options, process, nullptr), series,
                             start, options.free);

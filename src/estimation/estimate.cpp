@@ -4,11 +4,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <utility>
 
 #include <fmt/format.h>
 
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
+
+#include "estimation/residual_model.hpp"
 
 namespace risley::estimation {
 namespace {
@@ -28,16 +32,17 @@ std::vector<FreeParameter> chosen_parameters(const EstimateOptions& options) {
 }
 
 /// Parameters, mean speeds and first rotation angles as named values.
-std::vector<EstimatedValue> named_values(const EkfResult& filter, double duration) {
+/// @param stretches  rows of the states that are tied together
+std::vector<EstimatedValue> named_values(const Estimate& estimate,
+                                         const std::vector<ShotRange>& stretches) {
   std::vector<EstimatedValue> values;
-  for (std::size_t i = 0; i < filter.free.size(); ++i) {
+  for (std::size_t i = 0; i < estimate.free.size(); ++i) {
     const auto at = static_cast<Eigen::Index>(i);
-    values.push_back(
-        {filter.free[i].name, filter.parameters[at], std::sqrt(filter.covariance(at, at))});
+    values.push_back({estimate.free[i].name, estimate.parameters[at],
+                      std::sqrt(estimate.covariance(at, at))});
   }
-  const RotorStates& states = filter.states;
-  const int prisms = filter.train.prisms();
-  const std::size_t last = states.size() - 1;
+  const RotorStates& states = estimate.states;
+  const int prisms = states.prisms();
   std::size_t diagonal = 0;
   std::vector<EstimatedValue> angles;
   for (int rotor = 0; rotor < prisms; ++rotor) {
@@ -45,13 +50,20 @@ std::vector<EstimatedValue> named_values(const EkfResult& filter, double duratio
     const auto& angle = states.rotation_angle[k];
     const auto& variance = states.rotation_angle_covariance[diagonal];
     diagonal += static_cast<std::size_t>(prisms - rotor);
-    // The mean speed is the angle turned over the time it took; its ends are far apart and so
+    // The mean speed is the angle turned over the time it took; the ends are far apart and so
     // independent.
+    double turned = 0, time = 0, turned_variance = 0;
+    for (const ShotRange& rows : stretches) {
+      const std::size_t first = rows.begin, last = rows.end - 1;
+      turned += angle[last] - angle[first];
+      turned_variance += variance[first] + variance[last];
+      time += 1e-9 * static_cast<double>(states.time_ns[last] - states.time_ns[first]);
+    }
     EstimatedValue speed{fmt::format("angular_velocity_{}_deg_per_s", prism_letter(rotor)),
                          states.angular_velocity[k][0], states.angular_velocity_sigma[k][0]};
-    if (duration > 0) {
-      speed.value = (angle[last] - angle[0]) / duration;
-      speed.sigma = std::sqrt(variance[0] + variance[last]) / duration;
+    if (time > 0) {
+      speed.value = turned / time;
+      speed.sigma = std::sqrt(turned_variance) / time;
     }
     values.push_back(speed);
     angles.push_back({fmt::format("rotation_angle_{}_deg", prism_letter(rotor)),
@@ -62,18 +74,18 @@ std::vector<EstimatedValue> named_values(const EkfResult& filter, double duratio
 }
 
 /// The sensor preset that the estimate amounts to.
-sensors::Sensor calibrated_sensor(const sensors::Sensor& nominal, const EkfResult& filter,
-                                  const Start& start, const std::vector<EstimatedValue>& values) {
+sensors::Sensor calibrated_sensor(const sensors::Sensor& nominal, const PrismTrain& train,
+                                  const Estimate& estimate) {
   sensors::Sensor sensor = nominal;
-  sensor.train = filter.train;
-  sensor.combination = start.combination;
-  const auto statics = static_cast<Eigen::Index>(filter.free.size());
+  sensor.train = train;
+  sensor.combination = estimate.start.combination;
+  const auto statics = static_cast<Eigen::Index>(estimate.free.size());
   const Eigen::Index prisms = sensor.prisms();
   sensor.covariance_names.clear();
   sensor.covariance = Eigen::MatrixXd::Zero(statics + prisms, statics + prisms);
-  sensor.covariance.topLeftCorner(statics, statics) = filter.covariance;
+  sensor.covariance.topLeftCorner(statics, statics) = estimate.covariance;
   for (Eigen::Index i = 0; i < statics + prisms; ++i) {
-    const EstimatedValue& value = values[static_cast<std::size_t>(i)];
+    const EstimatedValue& value = estimate.values[static_cast<std::size_t>(i)];
     sensor.covariance_names.push_back(value.name);
     if (i >= statics) {
       sensor.angular_velocity[static_cast<std::size_t>(i - statics)] = value.value;
@@ -88,7 +100,8 @@ sensors::Sensor calibrated_sensor(const sensors::Sensor& nominal, const EkfResul
 double expected_residual(const AngleSeries& series, double angle_noise) {
   double rounding = 0;
   for (std::size_t i = 0; i < series.size(); ++i) {
-    rounding += series.azimuth_rounding_variance[i] + series.zenith_rounding_variance[i];
+    rounding += static_cast<double>(series.azimuth_rounding_variance[i]) +
+                static_cast<double>(series.zenith_rounding_variance[i]);
   }
   return std::sqrt(angle_noise * angle_noise + rounding / (2.0 * double(series.size())));
 }
@@ -96,14 +109,14 @@ double expected_residual(const AngleSeries& series, double angle_noise) {
 /// A parameter that ended where no sensor of the kind can be, as words; empty when there is none.
 /// A tilt of a whole wedge angle, for one, turns a prism into one with its faces exchanged: such a
 /// fit is as good as the right one, and its numbers mean nothing.
-std::string implausible_parameter(const EkfResult& filter, const PrismTrain& nominal) {
+std::string implausible_parameter(const Estimate& estimate, const PrismTrain& nominal) {
   constexpr double kLargest = 5.0;  // prior sigmas
-  for (std::size_t i = 0; i < filter.free.size(); ++i) {
-    const FreeParameter& parameter = filter.free[i];
+  for (std::size_t i = 0; i < estimate.free.size(); ++i) {
+    const FreeParameter& parameter = estimate.free[i];
     const double change =
-        filter.parameters[static_cast<Eigen::Index>(i)] - nominal[parameter.places[0]];
+        estimate.parameters[static_cast<Eigen::Index>(i)] - nominal[parameter.places[0]];
     if (std::abs(change) <= kLargest * parameter.prior_sigma) continue;
-    const ParameterInfo& info = find_parameter(parameter.name, filter.train.prisms());
+    const ParameterInfo& info = find_parameter(parameter.name, nominal.prisms());
     return fmt::format(
         "{} came out {:.4g}{} away from the sensor's value, more than any such sensor can be: "
         "wrong "
@@ -113,17 +126,24 @@ std::string implausible_parameter(const EkfResult& filter, const PrismTrain& nom
   return {};
 }
 
+/// Residuals below the stated noise by more than this say that the noise is not what was stated.
+constexpr double kFarBelow = 1.0 / 3.0;
+constexpr double kFarAbove = 3.0;
+/// A parameter combination that keeps more of its prior sigma than this was not measured.
+constexpr double kUnmeasured = 0.3;
+
 /// Says whether the result can be believed.
 void judge(Estimate& estimate, const PrismTrain& nominal) {
   const double rms =
       std::sqrt(0.5 * (estimate.azimuth_residuals.rms * estimate.azimuth_residuals.rms +
                        estimate.zenith_residuals.rms * estimate.zenith_residuals.rms));
   const double ratio = rms / estimate.expected_residual;
-  const auto shots = static_cast<double>(estimate.filter.states.size());
-  const double outlier_share = static_cast<double>(estimate.filter.outliers) / shots;
+  const auto shots = static_cast<double>(estimate.series.size());
+  const double outlier_share = static_cast<double>(estimate.outliers) / shots;
   const std::string residuals =
       fmt::format("residuals of {:.3g} deg where noise and rounding amount to {:.3g} deg",
                   degrees_from_radians(rms), degrees_from_radians(estimate.expected_residual));
+  const bool map = estimate.method == Method::map;
   estimate.converged = true;
   const auto fail = [&](std::string reason) {
     estimate.converged = false;
@@ -136,16 +156,42 @@ void judge(Estimate& estimate, const PrismTrain& nominal) {
         fmt::format("{:.0f} % of the shots do not fit the model: wrong sensor, speed combination "
                     "or mirror image, or a start that did not pull in",
                     100 * outlier_share));
-  } else if (ratio > 3.0) {
+  } else if (!estimate.unobservable.empty()) {
+    const WeakDirection& worst = estimate.unobservable.front();
+    fail(fmt::format(
+        "the data do not tell the combination {} (in units of 1 deg, or 0.01 of an index; its sigma "
+        "is {:.2g} of them): hold one of these fixed, or record longer",
+        direction_text(worst), worst.sigma));
+  } else if (ratio > kFarAbove) {
     fail(residuals + ": the model does not describe these data, or their noise is larger");
-  } else if (std::string words = implausible_parameter(estimate.filter, nominal); !words.empty()) {
+  } else if (std::string words = implausible_parameter(estimate, nominal); !words.empty()) {
     fail(std::move(words));
+  } else if (map && ratio < kFarBelow) {
+    fail(residuals +
+         ": the sigmas would be far too large; state the noise that the recording has with "
+         "--noise-angle-deg");
+  } else if (map && !estimate.map->settled) {
+    fail("the last steps still moved parameters by more than a tenth of their sigma");
   } else if (ratio > 1.3) {
-    estimate.warnings.push_back(residuals + ": the sigmas are too small by about that factor");
+    estimate.warnings.push_back(
+        residuals + (map ? ": the sigmas were enlarged by that factor"
+                         : ": the sigmas are too small by about that factor"));
   } else if (ratio < 0.93) {
     estimate.warnings.push_back(residuals +
                                 ": the rotors' noise is set so high that they follow the noise, or "
                                 "the stated noise is too large");
+  }
+  if (map && estimate.map->autocorrelation.factor > 1.05) {
+    estimate.warnings.push_back(fmt::format(
+        "residuals of neighbouring shots are correlated ({:.2f} from one to the next): every "
+        "variance was multiplied by {:.3g}",
+        estimate.map->autocorrelation.rho.front(), estimate.map->autocorrelation.factor));
+  }
+  if (map && estimate.map->unused_shots > 0) {
+    estimate.warnings.push_back(fmt::format(
+        "{} shots lie in pieces between clock resets or long gaps that are too short to find the "
+        "rotors' phases, or run in the other speed combination; they were not used",
+        estimate.map->unused_shots));
   }
   if (estimate.converged && outlier_share > 0.02) {
     estimate.warnings.push_back(
@@ -153,46 +199,124 @@ void judge(Estimate& estimate, const PrismTrain& nominal) {
   }
 }
 
+/// Runs the batch estimator and takes over what it found. @return rows of the states per stretch
+std::vector<ShotRange> take_map(Estimate& estimate, const EstimateOptions& options,
+                                const Progress& progress) {
+  BatchMapOptions settings;
+  settings.angle_noise = estimate.angle_noise;
+  settings.free = estimate.free;
+  settings.rotor_process = options.rotor_process;
+  estimate.map =
+      run_batch_map(estimate.series, estimate.start, options.sensor, settings, progress);
+  const BatchMapResult& result = *estimate.map;
+  estimate.parameters = result.parameters;
+  estimate.covariance = result.covariance;
+  estimate.rotor_process = result.rotor_process;
+  estimate.outliers = result.outliers;
+  estimate.states = states_of_knots(result, estimate.series);
+  estimate.azimuth_residuals = moments(result.azimuth_residual, result.outlier);
+  estimate.zenith_residuals = moments(result.zenith_residual, result.outlier);
+  estimate.unobservable = weak_directions(result.information, estimate.free, kUnmeasured);
+  std::vector<ShotRange> ranges;
+  const auto& begins = result.trajectory.stretch_begin;
+  for (std::size_t i = 0; i < begins.size(); ++i) {
+    ranges.push_back({begins[i], i + 1 < begins.size() ? begins[i + 1] : result.trajectory.size()});
+  }
+  return ranges;
+}
+
+/// As take_map, for the paper's filter.
+std::vector<ShotRange> take_ekf(Estimate& estimate, const EstimateOptions& options,
+                                const Progress& progress) {
+  EkfOptions settings;
+  settings.angle_noise = estimate.angle_noise;
+  settings.free = estimate.free;
+  settings.rotor_process = options.rotor_process;
+  EkfResult result = run_ekf(estimate.series, estimate.start, settings, progress);
+  estimate.parameters = std::move(result.parameters);
+  estimate.covariance = std::move(result.covariance);
+  estimate.rotor_process = std::move(result.rotor_process);
+  estimate.outliers = result.outliers;
+  estimate.states = std::move(result.states);
+  estimate.azimuth_residuals = moments(estimate.states.azimuth_residual, estimate.states.outlier);
+  estimate.zenith_residuals = moments(estimate.states.zenith_residual, estimate.states.outlier);
+  return {{0, estimate.states.size()}};
+}
+
 }  // namespace
 
-Estimate estimate_with_ekf(const AngleSeries& recorded_series, const AngleSeries& recorded_head,
-                           const EstimateOptions& options, const Progress& progress) {
-  if (recorded_series.size() == 0) throw EstimationError("the recording holds no valid shot");
+Estimate estimate(Method method, AngleSeries series, const AngleSeries& head,
+                  const EstimateOptions& options, const Progress& progress) {
+  if (series.size() == 0) throw EstimationError("the recording holds no valid shot");
   Estimate estimate;
-  estimate.method = "ekf";
+  estimate.method = method;
   estimate.angle_noise = options.angle_noise.value_or(options.sensor.angle_noise);
-  if (!(estimate.angle_noise > 0)) {
+  if (!(estimate.angle_noise > 0) || !std::isfinite(estimate.angle_noise)) {
     throw InvalidArgument(fmt::format("angle noise = {} deg, allowed above 0",
                                       degrees_from_radians(estimate.angle_noise)));
   }
-  EkfOptions ekf;
-  ekf.angle_noise = estimate.angle_noise;
-  ekf.free = chosen_parameters(options);
-  ekf.rotor_process = options.rotor_process;
-  estimate.mirrored =
-      options.mirrored ? *options.mirrored
-                       : is_mirrored(recorded_head, options.sensor, ekf.free, estimate.angle_noise);
-  AngleSeries turned_series, turned_head;
+  estimate.free = chosen_parameters(options);
+  estimate.series = std::move(series);
+  bool head_is_used = true;
+  if (method == Method::ekf) {
+    const auto ranges = stretches(estimate.series);
+    if (ranges.size() > 1) {
+      const auto longest = std::max_element(
+          ranges.begin(), ranges.end(),
+          [](const ShotRange& a, const ShotRange& b) { return a.size() < b.size(); });
+      estimate.warnings.push_back(fmt::format(
+          "the clock was reset or the recording paused {} times: the filter takes the longest "
+          "piece, {} of {} shots",
+          ranges.size() - 1, longest->size(), estimate.series.size()));
+      head_is_used = longest == ranges.begin();
+      estimate.series = rows_of(estimate.series, longest->begin, longest->end);
+    }
+  }
+  constexpr std::size_t kHeadRows = 2000;
+  estimate.start = find_start(
+      head_is_used ? head
+                   : rows_of(estimate.series, 0, std::min(kHeadRows, estimate.series.size())),
+      options.sensor, estimate.free, estimate.angle_noise, options.mirrored);
+  estimate.mirrored = estimate.start.mirrored;
   if (estimate.mirrored) {
-    turned_series = mirror_image(recorded_series);
-    turned_head = mirror_image(recorded_head);
+    mirror(estimate.series);
     estimate.warnings.push_back(
         "the recording is a mirror image (its elevation has the other sign) and was turned");
   }
-  const AngleSeries& series = estimate.mirrored ? turned_series : recorded_series;
-  const AngleSeries& head = estimate.mirrored ? turned_head : recorded_head;
-  estimate.start = find_start(head, options.sensor, ekf.free, estimate.angle_noise);
-  estimate.filter = run_ekf(series, estimate.start, ekf, progress);
-
-  const RotorStates& states = estimate.filter.states;
-  estimate.azimuth_residuals = moments(states.azimuth_residual, states.outlier);
-  estimate.zenith_residuals = moments(states.zenith_residual, states.outlier);
-  estimate.expected_residual = expected_residual(series, estimate.angle_noise);
-  estimate.values = named_values(estimate.filter, series.duration());
-  estimate.sensor =
-      calibrated_sensor(options.sensor, estimate.filter, estimate.start, estimate.values);
+  const std::vector<ShotRange> ranges = method == Method::map
+                                            ? take_map(estimate, options, progress)
+                                            : take_ekf(estimate, options, progress);
+  estimate.expected_residual = expected_residual(estimate.series, estimate.angle_noise);
+  estimate.values = named_values(estimate, ranges);
+  estimate.sensor = calibrated_sensor(
+      options.sensor, with_free_values(options.sensor.train, estimate.free, estimate.parameters),
+      estimate);
   judge(estimate, options.sensor.train);
   return estimate;
+}
+
+RotorStates states_of_shots(const Estimate& estimate, ShotRange shots) {
+  return estimate.map ? states_of_shots(*estimate.map, estimate.series, shots)
+                      : rows_of(estimate.states, shots);
+}
+
+AngleProfile residuals_over_angle(const Estimate& estimate, int prism) {
+  const auto rotor = static_cast<std::size_t>(prism);
+  if (!estimate.map) {
+    const RotorStates& states = estimate.states;
+    return angle_profile(states.rotation_angle[rotor], states.azimuth_residual,
+                         states.zenith_residual, states.outlier);
+  }
+  const BatchMapResult& map = *estimate.map;
+  std::vector<double> angle(estimate.series.size(), std::numeric_limits<double>::quiet_NaN());
+  const RotorTrajectory& t = map.trajectory;
+  for (std::size_t knot = 0; knot < t.size(); ++knot) {
+    for (std::size_t shot = t.first_shot[knot]; shot < t.last_shot[knot]; ++shot) {
+      angle[shot] = t.angle(
+          knot, rotor, 1e-9 * static_cast<double>(estimate.series.time_ns[shot] - t.time_ns[knot]));
+    }
+  }
+  return angle_profile(angle, map.azimuth_residual, map.zenith_residual, map.outlier);
 }
 
 }  // namespace risley::estimation

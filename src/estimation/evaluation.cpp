@@ -39,7 +39,7 @@ std::vector<std::size_t> matching_rows(const std::vector<std::int64_t>& shots,
 
 Evaluation evaluate(const Estimate& estimate, const sensors::Sensor& truth_sensor,
                     const recordings::TruthColumns& truth) {
-  const RotorStates& states = estimate.filter.states;
+  const RotorStates& states = estimate.states;
   const int prisms = estimate.sensor.prisms();
   if (truth_sensor.prisms() != prisms || truth.prisms() != prisms) {
     throw InvalidArgument("the truth belongs to a sensor with another number of prisms");
@@ -72,14 +72,14 @@ Evaluation evaluate(const Estimate& estimate, const sensors::Sensor& truth_senso
     }
   }
 
-  const auto statics = static_cast<Eigen::Index>(estimate.filter.free.size());
+  const auto statics = static_cast<Eigen::Index>(estimate.free.size());
   if (statics > 0) {
     Eigen::VectorXd error(statics);
     for (Eigen::Index i = 0; i < statics; ++i) {
       error[i] = result.parameters[static_cast<std::size_t>(i)].error;
     }
     result.nees_parameters =
-        error.dot(estimate.filter.covariance.ldlt().solve(error)) / static_cast<double>(statics);
+        error.dot(estimate.covariance.ldlt().solve(error)) / static_cast<double>(statics);
   }
 
   std::vector<double> squares(rotor_count, 0.0);

@@ -11,6 +11,7 @@
 #include <fmt/format.h>
 
 #include "risley/core/angle.hpp"
+#include "risley/core/golden_section.hpp"
 #include "risley/optics/observation_model.hpp"
 
 namespace risley {
@@ -124,30 +125,6 @@ double root_between(const Miss& miss, double a, double miss_a, double b, double 
   return std::abs(miss_a) < std::abs(miss_b) ? a : b;
 }
 
-/// Angle in (a, b) at which sign * miss is smallest, by golden section.
-template <class Miss>
-double lowest_between(const Miss& miss, double sign, double a, double b) {
-  const double ratio = 0.5 * (std::sqrt(5.0) - 1.0);
-  double left = b - ratio * (b - a), right = a + ratio * (b - a);
-  double miss_left = sign * miss(left), miss_right = sign * miss(right);
-  while (b - a > 1e-9) {
-    if (miss_left < miss_right) {
-      b = right;
-      right = left;
-      miss_right = miss_left;
-      left = b - ratio * (b - a);
-      miss_left = sign * miss(left);
-    } else {
-      a = left;
-      left = right;
-      miss_left = miss_right;
-      right = a + ratio * (b - a);
-      miss_right = sign * miss(right);
-    }
-  }
-  return 0.5 * (a + b);
-}
-
 template <int N>
 InverseSolution solve(const PrismTrain& train, const Vector& direction,
                       std::span<const double> fixed_angles) {
@@ -194,7 +171,8 @@ InverseSolution solve(const PrismTrain& train, const Vector& direction,
     const double sign = here > 0 ? 1.0 : -1.0;
     if (std::isfinite(before) && sign * before > sign * here && sign * after >= sign * here) {
       const double a = (i - 1) * kStep, b = (i + 1) * kStep;
-      const double lowest = lowest_between(miss, sign, a, b);
+      const double lowest = golden_section_minimum(
+          [&](double angle) { return sign * miss(angle); }, a, b, 1e-9);
       const double value = miss(lowest);
       if (std::abs(value) <= kHit) {
         add(lowest);

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 #include "risley/recordings/truth.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <optional>
 
@@ -183,53 +184,104 @@ TruthWriter::~TruthWriter() = default;
 void TruthWriter::write(const TruthColumns& rows) { file_->write(rows); }
 void TruthWriter::close() { file_->close(); }
 
-TruthColumns load_truth(const std::string& path) {
-  Handle handle(path);
-  int id = 0;
-  const int status = nc_open(path.c_str(), NC_NOWRITE, &id);
-  handle.opened(status, id, "be opened as NetCDF");
-  int version = 0;
-  if (nc_get_att_int(id, NC_GLOBAL, kMarker, &version) != NC_NOERR || version != kLayoutVersion) {
-    handle.fail(
-        fmt::format("is no truth file: attribute {} = {} is missing", kMarker, kLayoutVersion));
+namespace {
+
+/// An open truth file whose columns are read in blocks.
+class TruthFile {
+ public:
+  explicit TruthFile(const std::string& path) : handle_(path) {
+    int id = 0;
+    const int status = nc_open(path.c_str(), NC_NOWRITE, &id);
+    handle_.opened(status, id, "be opened as NetCDF");
+    int version = 0;
+    if (nc_get_att_int(id, NC_GLOBAL, kMarker, &version) != NC_NOERR || version != kLayoutVersion) {
+      handle_.fail(
+          fmt::format("is no truth file: attribute {} = {} is missing", kMarker, kLayoutVersion));
+    }
+    handle_.check(nc_inq_dimid(id, kDimension, &dimension_), "find dimension shot");
+    handle_.check(nc_inq_dimlen(id, dimension_, &count_), "read dimension shot");
+    for (int number = 0;
+         nc_inq_varid(id, variables(prisms_ + 1)[1 + prisms_].name.c_str(), &number) == NC_NOERR;) {
+      ++prisms_;
+    }
+    if (prisms_ == 0) handle_.fail("expected variable rotation_angle_a_deg, found none");
   }
-  int dimension = 0;
-  std::size_t count = 0;
-  handle.check(nc_inq_dimid(id, kDimension, &dimension), "find dimension shot");
-  handle.check(nc_inq_dimlen(id, dimension, &count), "read dimension shot");
-  int prisms = 0;
-  for (int number = 0;
-       nc_inq_varid(id, variables(prisms + 1)[1 + prisms].name.c_str(), &number) == NC_NOERR;) {
-    ++prisms;
-  }
-  if (prisms == 0) handle.fail("expected variable rotation_angle_a_deg, found none");
-  TruthColumns rows;
-  rows.resize(prisms, count);
-  const auto list = variables(prisms);
-  const auto read = [&](const Variable& variable, std::vector<double>& values) {
+
+  int prisms() const { return prisms_; }
+  std::size_t rows() const { return count_; }
+
+  /// Calls take(row, value) for every value of a variable, SI units, in order.
+  template <class Take>
+  void for_each(const Variable& variable, const Take& take) {
     int number = 0;
     nc_type type = NC_NAT;
     int rank = 0, along = 0;
-    handle.check(nc_inq_varid(id, variable.name.c_str(), &number),
-                 fmt::format("find variable {}", variable.name));
+    const int id = handle_.id();
+    handle_.check(nc_inq_varid(id, variable.name.c_str(), &number),
+                  fmt::format("find variable {}", variable.name));
     if (nc_inq_var(id, number, nullptr, &type, &rank, nullptr, nullptr) != NC_NOERR ||
         type != NC_DOUBLE || rank != 1 || nc_inq_vardimid(id, number, &along) != NC_NOERR ||
-        along != dimension) {
-      handle.fail(fmt::format("variable {}: expected numbers along dimension {}", variable.name,
-                              kDimension));
+        along != dimension_) {
+      handle_.fail(fmt::format("variable {}: expected numbers along dimension {}", variable.name,
+                               kDimension));
     }
-    values.resize(count);
-    if (count > 0) {
-      handle.check(nc_get_var_double(id, number, values.data()),
-                   fmt::format("read variable {}", variable.name));
+    for (std::size_t first = 0; first < count_; first += kBlockRows) {
+      block_.resize(std::min(kBlockRows, count_ - first));
+      const std::size_t count = block_.size();
+      handle_.check(nc_get_vara_double(id, number, &first, &count, block_.data()),
+                    fmt::format("read variable {}", variable.name));
+      for (std::size_t i = 0; i < count; ++i) take(first + i, block_[i] * variable.si_per_unit);
     }
-    for (double& value : values) value *= variable.si_per_unit;
-  };
-  std::vector<double> time;
-  read(list.front(), time);
-  for (std::size_t row = 0; row < count; ++row) rows.time_ns[row] = std::llround(time[row] * 1e9);
+  }
+
+ private:
+  Handle handle_;
+  int dimension_ = 0, prisms_ = 0;
+  std::size_t count_ = 0;
+  std::vector<double> block_;
+};
+
+std::int64_t nanoseconds(double seconds) { return std::llround(seconds * 1e9); }
+
+}  // namespace
+
+TruthColumns load_truth(const std::string& path) {
+  TruthFile file(path);
+  TruthColumns rows;
+  rows.resize(file.prisms(), file.rows());
+  const auto list = variables(file.prisms());
+  file.for_each(list.front(),
+                [&](std::size_t row, double t) { rows.time_ns[row] = nanoseconds(t); });
   const auto columns = columns_of(rows);
-  for (std::size_t i = 0; i < columns.size(); ++i) read(list[i + 1], *columns[i]);
+  for (std::size_t i = 0; i < columns.size(); ++i) {
+    file.for_each(list[i + 1], [&](std::size_t row, double value) { (*columns[i])[row] = value; });
+  }
+  return rows;
+}
+
+TruthColumns load_truth(const std::string& path, std::span<const std::int64_t> time_ns) {
+  TruthFile file(path);
+  TruthColumns rows;
+  rows.resize(file.prisms(), 0);
+  const auto list = variables(file.prisms());
+  std::vector<std::size_t> places;  // of the wanted rows
+  std::size_t wanted = 0;
+  file.for_each(list.front(), [&](std::size_t row, double t) {
+    const std::int64_t time = nanoseconds(t);
+    while (wanted < time_ns.size() && time_ns[wanted] < time) ++wanted;
+    if (wanted == time_ns.size() || time_ns[wanted] != time) return;
+    places.push_back(row);
+    rows.time_ns.push_back(time);
+  });
+  const auto columns = columns_of(rows);
+  for (std::size_t i = 0; i < columns.size(); ++i) {
+    std::size_t next = 0;
+    file.for_each(list[i + 1], [&](std::size_t row, double value) {
+      if (next == places.size() || places[next] != row) return;
+      ++next;
+      columns[i]->push_back(value);
+    });
+  }
   return rows;
 }
 

@@ -60,7 +60,7 @@ std::string verdict_html(const EstimatePageInput& input) {
       "noise "
       "and rounding alone would leave {:.3g}°. {} of {} shots were left out as outliers.",
       degrees_from_radians(e.azimuth_residuals.rms), degrees_from_radians(e.zenith_residuals.rms),
-      degrees_from_radians(e.expected_residual), e.filter.outliers, e.filter.states.size());
+      degrees_from_radians(e.expected_residual), e.outliers, e.series.size());
   std::string kind = "ok", title = "Healthy: the model describes this recording.", advice;
   if (!e.converged) {
     kind = "bad";
@@ -90,7 +90,7 @@ std::string subject_text(const EstimatePageInput& input) {
   std::string text =
       fmt::format("{} ({}), {} observations over {:.4g} s, {} shots used. Sensor {} with {} prisms",
                   input.recording, input.recording_format, input.observations, input.duration,
-                  e.filter.states.size(), e.sensor.name, e.sensor.prisms());
+                  e.series.size(), e.sensor.name, e.sensor.prisms());
   if (e.sensor.combination) {
     text += *e.sensor.combination == sensors::SpeedCombination::first
                 ? "; speed combination 1, the slow rotor first"
@@ -186,7 +186,7 @@ std::string moments_html(const Estimate& e) {
 }
 
 std::string correlation_html(const Estimate& e) {
-  const auto& free = e.filter.free;
+  const auto& free = e.free;
   if (free.empty()) return "";
   std::string html =
       "<h2>Correlations of the parameters</h2>\n<div class=\"wide\">"
@@ -197,7 +197,7 @@ std::string correlation_html(const Estimate& e) {
     html += fmt::format("<th scope=\"col\">{}</th>", symbol_html(infos.back()->symbol));
   }
   html += "</tr></thead><tbody>\n";
-  const Eigen::MatrixXd& covariance = e.filter.covariance;
+  const Eigen::MatrixXd& covariance = e.covariance;
   for (Eigen::Index i = 0; i < covariance.rows(); ++i) {
     html += fmt::format("<tr>{}", parameter_head(*infos[static_cast<std::size_t>(i)]));
     for (Eigen::Index j = 0; j < covariance.cols(); ++j) {
@@ -226,7 +226,7 @@ std::string provenance_html(const EstimatePageInput& input) {
 class ChartPage {
  public:
   explicit ChartPage(const EstimatePageInput& input)
-      : input_(input), states_(input.estimate.filter.states) {}
+      : input_(input), states_(input.estimate.states) {}
 
   std::string data() const { return "[" + data_ + "]"; }
 

@@ -19,14 +19,13 @@ namespace {
 
 constexpr std::size_t kBlockRows = 16384;
 
-/// A NetCDF file with one dimension, closed whatever happens.
+/// A NetCDF file, closed whatever happens.
 class NcFile {
  public:
-  NcFile(const OutputFile& output, std::size_t rows) : path_(output.path()), rows_(rows) {
+  explicit NcFile(const OutputFile& output) : path_(output.path()) {
     int id = 0;
     check(nc_create(output.temporary_path().c_str(), NC_NETCDF4 | NC_CLOBBER, &id));
     id_ = id;
-    check(nc_def_dim(id, "time", rows, &dimension_));
   }
   ~NcFile() {
     if (id_) nc_close(*id_);
@@ -34,16 +33,26 @@ class NcFile {
   NcFile(const NcFile&) = delete;
   NcFile& operator=(const NcFile&) = delete;
 
+  struct Dimension {
+    int id = 0;
+    std::size_t length = 0;
+  };
+  Dimension dimension(const std::string& name, std::size_t length) {
+    Dimension result{0, length};
+    check(nc_def_dim(*id_, name.c_str(), length, &result.id));
+    return result;
+  }
+
   void put_text(int variable, const std::string& name, const std::string& text) {
     check(nc_put_att_text(*id_, variable, name.c_str(), text.size(), text.data()));
   }
 
-  int define(const std::string& name, nc_type type, const std::string& units,
-             const std::string& long_name) {
+  int define(const Dimension& along, const std::string& name, nc_type type,
+             const std::string& units, const std::string& long_name) {
     int variable = 0;
-    check(nc_def_var(*id_, name.c_str(), type, 1, &dimension_, &variable));
-    if (rows_ > 0) {
-      const std::size_t chunk = std::min(rows_, kBlockRows);
+    check(nc_def_var(*id_, name.c_str(), type, 1, &along.id, &variable));
+    if (along.length > 0) {
+      const std::size_t chunk = std::min(along.length, kBlockRows);
       check(nc_def_var_chunking(*id_, variable, NC_CHUNKED, &chunk));
       check(nc_def_var_deflate(*id_, variable, 1, 1, 1));
     }
@@ -60,24 +69,20 @@ class NcFile {
 
   void end_definitions() { check(nc_enddef(*id_)); }
 
-  /// Fills a variable from a function of the row.
-  template <class Function>
-  void fill(int variable, Function&& value_of) {
-    std::vector<double> block;
-    for (std::size_t first = 0; first < rows_; first += kBlockRows) {
-      block.resize(std::min(kBlockRows, rows_ - first));
-      for (std::size_t i = 0; i < block.size(); ++i) block[i] = value_of(first + i);
-      const std::size_t count = block.size();
-      check(nc_put_vara_double(*id_, variable, &first, &count, block.data()));
-    }
+  /// Writes rows from first on.
+  void write(int variable, std::size_t first, const std::vector<double>& values) {
+    const std::size_t count = values.size();
+    check(nc_put_vara_double(*id_, variable, &first, &count, values.data()));
   }
-  void fill_times(int variable, const std::vector<std::int64_t>& time_ns) {
+  void write(int variable, std::size_t first, const std::vector<std::int64_t>& values) {
     static_assert(sizeof(long long) == sizeof(std::int64_t));
-    const std::vector<long long> values(time_ns.begin(), time_ns.end());
-    check(nc_put_var_longlong(*id_, variable, values.data()));
+    const std::vector<long long> wide(values.begin(), values.end());
+    const std::size_t count = wide.size();
+    check(nc_put_vara_longlong(*id_, variable, &first, &count, wide.data()));
   }
-  void fill_flags(int variable, const std::vector<unsigned char>& values) {
-    check(nc_put_var_uchar(*id_, variable, values.data()));
+  void write(int variable, std::size_t first, const std::vector<unsigned char>& values) {
+    const std::size_t count = values.size();
+    check(nc_put_vara_uchar(*id_, variable, &first, &count, values.data()));
   }
 
   void close() {
@@ -94,9 +99,7 @@ class NcFile {
   }
 
   std::string path_;
-  std::size_t rows_;
   std::optional<int> id_;
-  int dimension_ = 0;
 };
 
 /// One variable of doubles in file units.
@@ -145,35 +148,90 @@ std::vector<Column> columns_of(const estimation::RotorStates& states) {
 
 }  // namespace
 
-void write_states(const std::string& path, const estimation::RotorStates& states,
+void write_states(const std::string& path, const StatesContent& content,
                   const std::vector<std::pair<std::string, std::string>>& attributes) {
   OutputFile output(path);
-  NcFile file(output, states.size());
+  NcFile file(output);
   file.put_text(NC_GLOBAL, "Conventions", "CF-1.9");
   file.put_text(NC_GLOBAL, "title", "Estimated rotor states of a Risley-prism lidar");
   for (const auto& [name, value] : attributes) file.put_text(NC_GLOBAL, name, value);
+  const auto shots = file.dimension("time", content.rows);
   // No "since": the origin is the recording's, which need not be a date.
-  const int time = file.define("time", NC_DOUBLE, "s", "time of the shot, as in the recording");
-  const int time_ns = file.define("time_ns", NC_INT64, "ns", "the same without rounding");
-  const std::vector<Column> columns = columns_of(states);
+  const int time = file.define(shots, "time", NC_DOUBLE, "s", "time of the shot, as in the recording");
+  const int time_ns = file.define(shots, "time_ns", NC_INT64, "ns", "the same without rounding");
+  estimation::RotorStates block;
+  block.resize(content.prisms, 0);
   std::vector<int> variables;
-  variables.reserve(columns.size());
-  for (const Column& column : columns) {
-    variables.push_back(file.define(column.name, NC_DOUBLE, column.units, column.long_name));
+  for (const Column& column : columns_of(block)) {
+    variables.push_back(file.define(shots, column.name, NC_DOUBLE, column.units, column.long_name));
   }
-  const int outlier = file.define("outlier", NC_UBYTE, "", "shot left out as an outlier");
+  const int outlier = file.define(shots, "outlier", NC_UBYTE, "", "shot left out as an outlier");
   file.put_flags(outlier);
+
+  struct Profile {
+    int count, azimuth, zenith;
+  };
+  std::vector<Profile> profiles;
+  const auto& residuals = content.residuals_over_angle;
+  const std::size_t bins = residuals.empty() ? 0 : residuals.front().count.size();
+  int middle = 0;
+  if (bins > 0) {
+    const auto angles = file.dimension("prism_angle", bins);
+    middle = file.define(angles, "prism_angle", NC_DOUBLE, "degree",
+                         "rotation angle of a prism, middle of the bin");
+    for (std::size_t i = 0; i < residuals.size(); ++i) {
+      const char letter = prism_letter(static_cast<int>(i));
+      const auto define = [&](const std::string& name, const char* units, const std::string& what) {
+        return file.define(angles, name, NC_DOUBLE, units,
+                           fmt::format("{} by rotation angle of prism {}", what, letter));
+      };
+      profiles.push_back(
+          {define(fmt::format("residual_shots_by_angle_{}", letter), "1", "shots used"),
+           define(fmt::format("azimuth_residual_by_angle_{}_deg", letter), "degree",
+                  "mean azimuth residual"),
+           define(fmt::format("zenith_residual_by_angle_{}_deg", letter), "degree",
+                  "mean zenith residual")});
+    }
+  }
   file.end_definitions();
-  file.fill(time, [&](std::size_t i) { return 1e-9 * static_cast<double>(states.time_ns[i]); });
-  file.fill_times(time_ns, states.time_ns);
-  for (std::size_t c = 0; c < columns.size(); ++c) {
-    const Column& column = columns[c];
-    file.fill(variables[c], [&](std::size_t i) {
-      const double value = (*column.values)[i];
-      return column.scale * (column.root ? std::sqrt(value) : value);
+
+  std::vector<double> values;
+  for (std::size_t first = 0; first < content.rows; first += kBlockRows) {
+    block = content.block({first, std::min(first + kBlockRows, content.rows)});
+    values.resize(block.size());
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      values[i] = 1e-9 * static_cast<double>(block.time_ns[i]);
+    }
+    file.write(time, first, values);
+    file.write(time_ns, first, block.time_ns);
+    const std::vector<Column> columns = columns_of(block);
+    for (std::size_t c = 0; c < columns.size(); ++c) {
+      for (std::size_t i = 0; i < values.size(); ++i) {
+        const double value = (*columns[c].values)[i];
+        values[i] = columns[c].scale * (columns[c].root ? std::sqrt(value) : value);
+      }
+      file.write(variables[c], first, values);
+    }
+    file.write(outlier, first, block.outlier);
+  }
+  values.resize(bins);
+  const auto put = [&](int variable, const auto& value_of) {
+    for (std::size_t i = 0; i < bins; ++i) values[i] = value_of(i);
+    file.write(variable, 0, values);
+  };
+  if (bins > 0) {
+    put(middle, [&](std::size_t i) {
+      return 360.0 * (static_cast<double>(i) + 0.5) / static_cast<double>(bins);
     });
   }
-  file.fill_flags(outlier, states.outlier);
+  for (std::size_t k = 0; k < profiles.size(); ++k) {
+    put(profiles[k].count,
+        [&](std::size_t i) { return static_cast<double>(residuals[k].count[i]); });
+    put(profiles[k].azimuth,
+        [&](std::size_t i) { return degrees_from_radians(residuals[k].mean_azimuth[i]); });
+    put(profiles[k].zenith,
+        [&](std::size_t i) { return degrees_from_radians(residuals[k].mean_zenith[i]); });
+  }
   file.close();
   output.commit();
 }

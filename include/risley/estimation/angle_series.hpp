@@ -4,24 +4,49 @@
 
 #include <cstdint>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "risley/recordings/observations.hpp"
 
 namespace risley::estimation {
 
-/// The directions of single shots in time order: what an estimator sees of a recording.
+/// The directions of single shots in the order of the recording: what an estimator sees of it.
 struct AngleSeries {
-  std::vector<std::int64_t> time_ns;    ///< as recorded, strictly increasing
+  /// As recorded, increasing; a step back means that the sensor's clock was reset.
+  std::vector<std::int64_t> time_ns;
   std::vector<double> azimuth, zenith;  ///< rad
   /// Variance of the format's rounding, (step^2) / 12, rad^2.
-  std::vector<double> azimuth_rounding_variance, zenith_rounding_variance;
+  std::vector<float> azimuth_rounding_variance, zenith_rounding_variance;
 
   std::size_t size() const { return time_ns.size(); }
   /// Time since the first shot, s.
   double time(std::size_t i) const { return 1e-9 * static_cast<double>(time_ns[i] - time_ns[0]); }
+  /// Of a series without resets, s.
   double duration() const { return size() == 0 ? 0.0 : time(size() - 1); }
+  /// Appends one row of another series.
+  void append(const AngleSeries& other, std::size_t row);
 };
+
+/// Rows [begin, end) of a series.
+AngleSeries rows_of(const AngleSeries& series, std::size_t begin, std::size_t end);
+
+/// Rows [begin, end) of a series.
+struct ShotRange {
+  std::size_t begin = 0, end = 0;
+  std::size_t size() const { return end - begin; }
+};
+
+/// The stretches of a series: it is cut where the clock was reset and at gaps over which the turns
+/// of a rotor could not be counted (longer than longest_gap, s).
+std::vector<ShotRange> stretches(const AngleSeries& series, double longest_gap = 5.0);
+
+/// At most so many shots per second, evenly spread, of every given stretch.
+/// @param[in,out] ranges  rows of the series, on return those of the result
+AngleSeries thinned(const AngleSeries& series, double rate, std::vector<ShotRange>& ranges);
+
+/// The same shots with the sign of the elevation turned.
+void mirror(AngleSeries& series);
 
 /// How shots are chosen.
 struct SelectionOptions {
@@ -34,12 +59,16 @@ struct SelectionCounts {
   std::uint64_t rows = 0;             ///< observations offered
   std::uint64_t invalid = 0;          ///< without a direction
   std::uint64_t further_returns = 0;  ///< second and later returns of a shot
-  std::uint64_t out_of_order = 0;     ///< not later than the shot before
+  std::uint64_t out_of_order = 0;     ///< a little earlier than the shot before
+  std::uint64_t clock_resets = 0;     ///< steps back by more than kClockReset
 };
 
+/// Steps back in time up to this are shots out of order, longer ones a clock that was reset, s.
+inline constexpr double kClockReset = 0.01;
+
 /// Chooses shots from a recording that comes in pieces. Only the first return of a shot counts
-/// (all returns share its direction). A row whose time runs backwards is left out and counted;
-/// so of a recording whose clock jumps back only what lies after the highest time so far is used.
+/// (all returns share its direction). A row that is a little earlier than the one before is left out
+/// and counted; after a reset of the clock the series goes on with the new times.
 class ShotSelector {
  public:
   explicit ShotSelector(const SelectionOptions& options);
@@ -48,6 +77,8 @@ class ShotSelector {
 
   /// The chosen shots.
   const AngleSeries& series() const { return series_; }
+  /// The same, handed over: a long recording is not kept twice.
+  AngleSeries take_series() { return std::move(series_); }
   /// All shots of the first second, not thinned: the start of an estimation wants every one.
   const AngleSeries& head() const { return head_; }
   const SelectionCounts& counts() const { return counts_; }
@@ -57,7 +88,7 @@ class ShotSelector {
   AngleSeries series_, head_;
   SelectionCounts counts_;
   std::int64_t last_time_ns_ = 0;
-  std::int64_t next_tick_ = 0;
+  std::int64_t tick_origin_ = 0, next_tick_ = 0;
 };
 
 }  // namespace risley::estimation

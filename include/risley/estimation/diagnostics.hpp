@@ -3,7 +3,9 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <span>
+#include <vector>
 
 namespace risley::estimation {
 
@@ -20,5 +22,38 @@ struct Moments {
 /// Moments of the finite values of a column; NaN everywhere when there is none.
 /// @param skip  where not zero the value is left out (outliers); empty skips nothing
 Moments moments(std::span<const double> values, std::span<const unsigned char> skip = {});
+
+/// Standard deviation of one component of residual pairs, from the median of their lengths: half of
+/// the pairs may be gross errors. Infinite when half of them are NaN.
+double robust_scale(std::span<const double> azimuth, std::span<const double> zenith);
+
+/// How residuals of neighbouring shots hang together.
+struct Autocorrelation {
+  /// 1 + 2 (rho_1 + rho_2 + ...): by so much larger is the variance of a mean than that of as many
+  /// independent residuals. Never below 1.
+  double factor = 1.0;
+  std::vector<double> rho;  ///< at lags 1, 2, ... until it cannot be told from zero
+};
+
+/// Autocorrelation of residual columns, both axes together. Pairs count only where no shot is
+/// missing between them. The sum ends at the first lag whose rho is not significant (2.5 sigma).
+/// @param time_ns  of the shots  @param skip  where not zero the shot is left out
+Autocorrelation autocorrelation(std::span<const std::int64_t> time_ns,
+                                std::span<const double> azimuth, std::span<const double> zenith,
+                                std::span<const unsigned char> skip);
+
+/// Mean residuals over the rotation angle of one prism: where a bent sensor shows.
+struct AngleProfile {
+  std::vector<std::uint64_t> count;                      ///< [bins], shots
+  std::vector<double> mean_azimuth, mean_zenith;         ///< [bins], rad; NaN in an empty bin
+  double sigma_azimuth = 0, sigma_zenith = 0;            ///< of one shot, rad
+  /// Sum of squared means over their variances per bin and axis; about 1 when nothing is left.
+  double chi2_per_bin = 0;
+};
+
+/// @param angle  rotation angle of the prism at every shot, rad, any number of turns
+AngleProfile angle_profile(std::span<const double> angle, std::span<const double> azimuth,
+                           std::span<const double> zenith, std::span<const unsigned char> skip,
+                           std::size_t bins = 72);
 
 }  // namespace risley::estimation

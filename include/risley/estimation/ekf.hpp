@@ -13,6 +13,7 @@
 #include "risley/estimation/free_parameters.hpp"
 #include "risley/estimation/initialisation.hpp"
 #include "risley/estimation/rotor_process.hpp"
+#include "risley/estimation/rotor_states.hpp"
 
 namespace risley::estimation {
 
@@ -21,7 +22,7 @@ struct EkfOptions {
   double angle_noise = 0;           ///< 1 sigma of azimuth and zenith before rounding, rad
   std::vector<FreeParameter> free;  ///< constants to estimate
   /// Noise of the rotors [prisms]; empty chooses it by maximum likelihood of the innovations after
-  /// the first pass (which takes two passes or more).
+  /// the first pass (which takes two passes or more). The filter's rotors have no jerk.
   std::vector<RotorProcess> rotor_process;
   double parameter_walk = 0;  ///< random walk of every free angle, rad / sqrt(s)
   /// Innovations with a chi-square (2 degrees of freedom) above this are outliers, once the first
@@ -31,20 +32,6 @@ struct EkfOptions {
   /// Passes over the data; each starts where the one before ended at the first shot, so that
   /// everything is linearised near the answer.
   int passes = 2;
-};
-
-/// What the filter knows of one rotor state at every used shot.
-struct RotorStates {
-  std::vector<std::int64_t> time_ns;
-  std::vector<std::vector<double>> rotation_angle;    ///< [prisms][shots], rad, unwrapped
-  std::vector<std::vector<double>> angular_velocity;  ///< [prisms][shots], rad/s
-  /// Covariance of the rotation angles, upper triangle row by row [prisms (prisms+1)/2][shots].
-  std::vector<std::vector<double>> rotation_angle_covariance;
-  std::vector<std::vector<double>> angular_velocity_sigma;  ///< [prisms][shots], rad/s
-  std::vector<double> azimuth_residual, zenith_residual;    ///< observed minus smoothed, rad
-  std::vector<unsigned char> outlier;
-
-  std::size_t size() const { return time_ns.size(); }
 };
 
 /// Result of the two filters and their optimal combination.

@@ -7,10 +7,18 @@
 #include <vector>
 
 #include "risley/core/progress.hpp"
+#include "risley/estimation/batch_map.hpp"
 #include "risley/estimation/diagnostics.hpp"
 #include "risley/estimation/ekf.hpp"
+#include "risley/estimation/observability.hpp"
 
 namespace risley::estimation {
+
+/// How an estimate is made.
+enum class Method {
+  map,  ///< all shots at once: run_batch_map
+  ekf,  ///< the paper's filter: run_ekf
+};
 
 /// What the user asks for.
 struct EstimateOptions {
@@ -31,26 +39,44 @@ struct EstimatedValue {
 
 /// Everything one estimation found.
 struct Estimate {
-  std::string method;  ///< "ekf"
+  Method method = Method::map;
   bool converged = false;
   std::string reason;                 ///< why not converged; empty when converged
   std::vector<std::string> warnings;  ///< what the user should know all the same
   sensors::Sensor sensor;             ///< the calibrated sensor with its covariance
   bool mirrored = false;
-  std::vector<EstimatedValue> values;  ///< parameters, mean speeds, first rotation angles
-  EkfResult filter;
   Start start;
-  Moments azimuth_residuals, zenith_residuals;  ///< rad, outliers left out
+  std::vector<FreeParameter> free;
+  Eigen::VectorXd parameters;          ///< [free], SI units
+  Eigen::MatrixXd covariance;          ///< [free, free]
+  std::vector<EstimatedValue> values;  ///< parameters, mean speeds, first rotation angles
+  std::vector<RotorProcess> rotor_process;
+  /// Parameter combinations that the data do not tell; any makes the estimate not converged.
+  std::vector<WeakDirection> unobservable;
+
+  AngleSeries series;            ///< the shots, turned if they were mirrored
+  std::size_t outliers = 0;      ///< of the series
+  RotorStates states;            ///< at every shot (ekf), or at one shot per knot (map)
+  std::optional<BatchMapResult> map;  ///< all that the batch estimator knows
+
+  Moments azimuth_residuals, zenith_residuals;  ///< rad, of all shots, outliers left out
   double angle_noise = 0;                       ///< assumed, rad, before rounding
   double expected_residual = 0;                 ///< rms of noise and rounding together, rad
 };
 
-/// Estimates parameters and rotation angles with the paper's filter. A mirrored recording is turned
-/// first; results describe the turned one.
-/// @param recorded_series  shots to use, as recorded
-/// @param recorded_head    all shots of the first second, as recorded, for the start
+/// Rotor states of shots [begin, end) of an estimate's series.
+RotorStates states_of_shots(const Estimate& estimate, ShotRange shots);
+
+/// Mean residuals over the rotation angle of one prism, of all shots.
+AngleProfile residuals_over_angle(const Estimate& estimate, int prism);
+
+/// Estimates parameters and rotation angles. A mirrored recording is turned first; results describe
+/// the turned one. The filter works on one stretch of time alone and takes the longest where the
+/// clock was reset or the recording paused; the batch estimator takes all.
+/// @param series  shots to use, as recorded
+/// @param head    all shots of the first second, as recorded, for the start
 /// @throws EstimationError when the data cannot answer, InvalidArgument for unknown parameters
-Estimate estimate_with_ekf(const AngleSeries& recorded_series, const AngleSeries& recorded_head,
-                           const EstimateOptions& options, const Progress& progress = {});
+Estimate estimate(Method method, AngleSeries series, const AngleSeries& head,
+                  const EstimateOptions& options, const Progress& progress = {});
 
 }  // namespace risley::estimation

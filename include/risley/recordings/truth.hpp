@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -47,5 +48,9 @@ class TruthWriter {
 
 /// Reads a whole truth file. @throws FileError
 TruthColumns load_truth(const std::string& path);
+
+/// Reads the rows of some times, as many as the file has of them; memory does not grow with the
+/// length of the file. @param time_ns  ascending @throws FileError
+TruthColumns load_truth(const std::string& path, std::span<const std::int64_t> time_ns);
 
 }  // namespace risley::recordings

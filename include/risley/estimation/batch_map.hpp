@@ -1,0 +1,74 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "risley/core/progress.hpp"
+#include "risley/estimation/angle_series.hpp"
+#include "risley/estimation/diagnostics.hpp"
+#include "risley/estimation/free_parameters.hpp"
+#include "risley/estimation/initialisation.hpp"
+#include "risley/estimation/rotor_process.hpp"
+#include "risley/estimation/rotor_states.hpp"
+#include "risley/estimation/rotor_trajectory.hpp"
+
+namespace risley::estimation {
+
+/// Settings of the batch estimator.
+struct BatchMapOptions {
+  double angle_noise = 0;           ///< 1 sigma of azimuth and zenith before rounding, rad
+  std::vector<FreeParameter> free;  ///< constants to estimate; may be empty
+  /// Motion model of the rotors [prisms]; empty chooses it by maximum likelihood.
+  std::vector<RotorProcess> rotor_process;
+  double knot_interval = kKnotInterval;  ///< s
+  /// Shots with more chi2 (2 degrees of freedom) than this are outliers: 1 good one in 22,000.
+  double outlier_chi2 = 20.0;
+  int most_iterations = 40;  ///< of the coarse pass
+};
+
+/// The most probable parameters and trajectory.
+struct BatchMapResult {
+  Eigen::VectorXd parameters;           ///< [free], SI units
+  Eigen::MatrixXd covariance;           ///< [free, free], variance factor included
+  Eigen::MatrixXd information;          ///< of the data alone, variance factor included
+  PrismTrain train{parse_face_order("PA-AP")};  ///< with the estimated parameters
+  RotorTrajectory trajectory;           ///< with covariances
+  std::vector<RotorProcess> rotor_process;
+  std::vector<double> azimuth_residual, zenith_residual;  ///< [shots], rad; NaN for unused stretches
+  std::vector<unsigned char> outlier;                     ///< [shots]
+  std::size_t outliers = 0;
+  std::size_t unused_shots = 0;  ///< in stretches too short to find their rotors' phases
+  std::size_t iterations = 0;    ///< of both passes together
+  bool settled = false;          ///< the last step was a hundredth of a sigma or less
+  Autocorrelation autocorrelation;  ///< of the residuals
+  /// Mean square of residuals over stated variances, outliers left out.
+  double unit_variance = 0;
+  /// By how much the stated variances of single shots were enlarged: autocorrelation times excess.
+  double variance_factor = 1;
+};
+
+/// Maximum a posteriori estimate of the constant parameters and of the rotors' motion from all
+/// shots at once: Gauss-Newton over the whole trajectory with parameters that have no process noise,
+/// first on shots thinned to 1 kHz with weights that gross errors cannot bend, then on all of them,
+/// where one or two steps remain. At the end a hard cut decides on outliers, and the covariance is
+/// that of shots with the autocorrelation and the scatter that the residuals show.
+/// [B21 section 2.4 states the model; the method departs from it: docs/theory/map.md]
+/// @param series  as it is to be used (turned if it was mirrored)
+/// @param start   of the first stretch
+/// @throws EstimationError when there is nothing to estimate from; InvalidArgument
+BatchMapResult run_batch_map(const AngleSeries& series, const Start& start,
+                             const sensors::Sensor& sensor, const BatchMapOptions& options,
+                             const Progress& progress = {});
+
+/// Rotor states of shots [begin, end) of the series that a result was estimated from.
+RotorStates states_of_shots(const BatchMapResult& result, const AngleSeries& series,
+                            ShotRange shots);
+
+/// Rotor states of one shot per knot, the one nearest to it.
+RotorStates states_of_knots(const BatchMapResult& result, const AngleSeries& series);
+
+}  // namespace risley::estimation

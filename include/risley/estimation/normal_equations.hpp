@@ -1,0 +1,65 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstddef>
+#include <limits>
+#include <span>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "risley/estimation/angle_series.hpp"
+#include "risley/estimation/free_parameters.hpp"
+#include "risley/estimation/rotor_trajectory.hpp"
+#include "risley/optics/batch.hpp"
+#include "risley/optics/prism_train.hpp"
+
+namespace risley::estimation {
+
+/// How much a shot counts. chi2 is the sum of its squared residuals over their variances.
+struct ShotWeights {
+  double angle_noise = 0;  ///< 1 sigma of azimuth and zenith before rounding, rad
+  /// Geman-McClure: a shot weighs 1 / (1 + softening chi2)^2. 0 is least squares.
+  double softening = 0;
+  double cut = std::numeric_limits<double>::infinity();  ///< shots with more chi2 are outliers
+};
+
+/// Where residuals (observed minus modelled, rad) and outlier flags of all shots go; empty spans
+/// are not written, and rows of shots that no knot serves are left alone.
+struct ShotColumns {
+  std::span<double> azimuth_residual, zenith_residual;
+  std::span<unsigned char> outlier;
+};
+
+/// The normal equations of all shots at one linearisation, in the form the smoother wants: rotor
+/// states knot by knot, their coupling with the free parameters, and the parameters' own part.
+struct NormalEquations {
+  int prisms = 0;
+  int free = 0;
+  std::vector<double> curvature;  ///< [knots][prisms (prisms+1)/2][5] sums of products x time^0..4
+  std::vector<double> coupling;   ///< [knots][prisms][3][free]
+  std::vector<double> gradient;   ///< [knots][prisms][3]
+  Eigen::MatrixXd static_hessian;   ///< [free, free]
+  Eigen::VectorXd static_gradient;  ///< [free]
+  double cost = 0;                  ///< sum of the shots' losses
+  std::size_t shots = 0, outliers = 0;
+
+  std::size_t knots() const { return gradient.size() / static_cast<std::size_t>(3 * prisms); }
+
+  /// Multiplies all information: 1/f says that every variance is f times as large.
+  void scale(double factor);
+};
+
+/// Evaluates every shot of the knots and its derivatives with the batch model and sums them up. The
+/// sums do not depend on the number of threads.
+/// @param train  linearisation point of the parameters
+/// @param knots  linearisation point of the rotors
+/// @param set    instruction set, for tests and benchmarks
+/// @param[out] equations  keeps its memory between calls
+void accumulate(const AngleSeries& series, const RotorTrajectory& knots, const PrismTrain& train,
+                const std::vector<FreeParameter>& free, const ShotWeights& weights,
+                NormalEquations& equations, const ShotColumns& columns = {},
+                InstructionSet set = available_instruction_sets().back());
+
+}  // namespace risley::estimation

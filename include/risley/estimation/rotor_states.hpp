@@ -1,0 +1,48 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "risley/estimation/angle_series.hpp"
+
+namespace risley::estimation {
+
+/// What an estimation knows of the rotors at some shots, as columns of one length.
+struct RotorStates {
+  std::vector<std::int64_t> time_ns;                  ///< as recorded
+  std::vector<std::vector<double>> rotation_angle;    ///< [prisms][shots], rad, unwrapped
+  std::vector<std::vector<double>> angular_velocity;  ///< [prisms][shots], rad/s
+  /// Covariance of the rotation angles, upper triangle row by row [prisms (prisms+1)/2][shots].
+  std::vector<std::vector<double>> rotation_angle_covariance;
+  std::vector<std::vector<double>> angular_velocity_sigma;  ///< [prisms][shots], rad/s
+  std::vector<double> azimuth_residual, zenith_residual;    ///< observed minus estimated, rad
+  std::vector<unsigned char> outlier;                       ///< 1 where the shot was left out
+
+  std::size_t size() const { return time_ns.size(); }
+  int prisms() const { return static_cast<int>(rotation_angle.size()); }
+
+  /// Gives every column so many rows.
+  void resize(int prisms, std::size_t shots) {
+    const auto n = static_cast<std::size_t>(prisms);
+    time_ns.resize(shots);
+    rotation_angle.resize(n);
+    angular_velocity.resize(n);
+    angular_velocity_sigma.resize(n);
+    rotation_angle_covariance.resize(n * (n + 1) / 2);
+    for (auto* columns :
+         {&rotation_angle, &angular_velocity, &angular_velocity_sigma, &rotation_angle_covariance}) {
+      for (auto& column : *columns) column.resize(shots);
+    }
+    azimuth_residual.resize(shots);
+    zenith_residual.resize(shots);
+    outlier.resize(shots);
+  }
+};
+
+/// Rows [begin, end).
+RotorStates rows_of(const RotorStates& states, ShotRange rows);
+
+}  // namespace risley::estimation

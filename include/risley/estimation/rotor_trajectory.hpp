@@ -1,0 +1,73 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "risley/estimation/angle_series.hpp"
+
+namespace risley::estimation {
+
+/// Angle, speed and acceleration: the states of one rotor at a knot.
+inline constexpr int kStatesPerRotor = 3;
+
+/// How long a rotor is taken to move along one parabola, s. Around the middle of so short a piece
+/// real rotors leave the parabola by less than 1e-4 degree. docs/theory/map.md
+inline constexpr double kKnotInterval = 0.002;
+
+/// The motion of all rotors over a recording: one parabola of each per knot, a knot in the middle
+/// of the shots it serves. Knots follow each other in stretches; nothing ties the rotors of one
+/// stretch to those of the next, because the time between is unknown (the clock was reset) or too
+/// long to count the turns.
+struct RotorTrajectory {
+  int prisms = 0;
+  std::vector<std::int64_t> time_ns;                ///< [knots]
+  std::vector<std::size_t> first_shot, last_shot;   ///< [knots], rows of the series, last exclusive
+  std::vector<std::size_t> stretch_begin;           ///< first knot of each stretch
+  /// [knots][prisms][3]: angle (rad, unwrapped), speed (rad/s), acceleration (rad/s^2).
+  std::vector<double> state;
+  /// Joint covariance of a knot's states, upper triangle row by row [knots][d (d + 1) / 2] with
+  /// d = 3 prisms; empty where none was computed.
+  std::vector<double> covariance;
+
+  std::size_t size() const { return time_ns.size(); }
+  int states() const { return kStatesPerRotor * prisms; }
+  std::span<double> state_of(std::size_t knot) {
+    const auto d = static_cast<std::size_t>(states());
+    return {state.data() + knot * d, d};
+  }
+  std::span<const double> state_of(std::size_t knot) const {
+    const auto d = static_cast<std::size_t>(states());
+    return {state.data() + knot * d, d};
+  }
+
+  /// Rotation angle and speed of one rotor, rad and rad/s, seconds from a knot.
+  double angle(std::size_t knot, std::size_t rotor, double seconds) const {
+    const auto s = state_of(knot).subspan(kStatesPerRotor * rotor);
+    return s[0] + seconds * (s[1] + 0.5 * seconds * s[2]);
+  }
+  double speed(std::size_t knot, std::size_t rotor, double seconds) const {
+    const auto s = state_of(knot).subspan(kStatesPerRotor * rotor);
+    return s[1] + seconds * s[2];
+  }
+  /// Covariance of the angles of two rotors, rad^2, and variance of the speed of one, (rad/s)^2.
+  double angle_covariance(std::size_t knot, std::size_t a, std::size_t b, double seconds) const;
+  double speed_variance(std::size_t knot, std::size_t rotor, double seconds) const;
+
+ private:
+  double covariance_entry(std::size_t knot, std::size_t row, std::size_t column) const;
+};
+
+/// Knots for the shots of some stretches, on a regular grid from each stretch's first shot and only
+/// where there are shots; states are zero.
+RotorTrajectory make_knots(const AngleSeries& series, std::span<const ShotRange> ranges, int prisms,
+                           double interval = kKnotInterval);
+
+/// Fills the states of a trajectory with those of another one of the same stretches, each knot from
+/// the other's nearest knot.
+void interpolate(const RotorTrajectory& from, RotorTrajectory& to);
+
+}  // namespace risley::estimation

@@ -1,0 +1,47 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "risley/estimation/normal_equations.hpp"
+#include "risley/estimation/rotor_process.hpp"
+#include "risley/estimation/rotor_trajectory.hpp"
+
+namespace risley::estimation {
+
+/// What is known of the parameters before the data, about the linearisation point.
+struct ParameterPrior {
+  Eigen::VectorXd information;  ///< [free], 1 / sigma^2
+  Eigen::VectorXd gradient;     ///< [free], information times (prior mean minus linearisation)
+};
+
+/// The minimum of all terms together: shots, process noise, prior.
+struct SmootherSolution {
+  Eigen::VectorXd parameter_step;         ///< [free]
+  Eigen::MatrixXd parameter_covariance;   ///< [free, free], prior included
+  Eigen::MatrixXd parameter_information;  ///< [free, free], of the data alone, rotors eliminated
+  std::vector<double> state_step;         ///< [knots][prisms][3]
+  /// Only with covariances: joint covariance of each knot's states as in RotorTrajectory, and the
+  /// derivative of the smoothed states with respect to the parameters [knots][d][free], row-major.
+  std::vector<double> state_covariance, sensitivity;
+};
+
+/// One Gauss-Newton step of the whole trajectory. The parameters are constants without noise, so
+/// the states of every knot are affine functions of them: a forward pass over the knots carries
+/// mean, derivative and covariance of the rotor states and collects what the data say of the
+/// parameters; a backward pass (modified Bryson-Frazier, which inverts no covariance) brings back
+/// what later knots say of earlier ones. Equal to the solution of the full normal equations at a
+/// cost proportional to the number of knots.                    Derivation: docs/theory/map.md
+/// @param linearisation  the trajectory the equations were accumulated at
+/// @param process        [prisms]
+/// @param covariances    whether the covariances of the states are wanted
+/// @throws EstimationError when a covariance stops being positive definite (place in the message)
+SmootherSolution smooth(const NormalEquations& equations, const RotorTrajectory& linearisation,
+                        std::span<const RotorProcess> process, const ParameterPrior& prior,
+                        bool covariances);
+
+}  // namespace risley::estimation

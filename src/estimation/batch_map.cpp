@@ -1,0 +1,343 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "risley/estimation/batch_map.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <span>
+#include <utility>
+
+#include <Eigen/Cholesky>
+#include <fmt/format.h>
+
+#include "risley/core/error.hpp"
+#include "risley/estimation/normal_equations.hpp"
+#include "risley/estimation/process_likelihood.hpp"
+#include "risley/estimation/smoother.hpp"
+
+#include "estimation/residual_model.hpp"
+
+namespace risley::estimation {
+namespace {
+
+constexpr double kCoarseRate = 1000.0;  // Hz
+/// Noise of the rotors before their own is known: far above that of real ones.
+constexpr RotorProcess kSettlingProcess{radians_from_degrees(30.0), 0.0, 0.0};
+/// A step is small when it moves no parameter by more than this share of its sigma.
+constexpr double kSmallStep = 0.01;
+constexpr int kMostFullPasses = 4;
+/// Residual scatter above the stated one by this share enlarges the covariance.
+constexpr double kSignificantExcess = 1.02;
+
+/// Parameters and motion, and what one evaluation of them gave.
+class Iteration {
+ public:
+  Iteration(const AngleSeries& series, const BatchMapOptions& options, PrismTrain nominal,
+            PrismTrain train, RotorTrajectory knots)
+      : series_(series),
+        options_(options),
+        prior_mean_(free_values(nominal, options.free)),
+        train_(std::move(train)),
+        knots_(std::move(knots)) {
+    azimuth_.assign(series.size(), std::numeric_limits<double>::quiet_NaN());
+    zenith_ = azimuth_;
+    outlier_.assign(series.size(), 1);
+    weights_.angle_noise = options.angle_noise;
+  }
+
+  ShotWeights& weights() { return weights_; }
+  const PrismTrain& train() const { return train_; }
+  const RotorTrajectory& knots() const { return knots_; }
+  RotorTrajectory& knots() { return knots_; }
+  NormalEquations& equations() { return equations_; }
+  std::vector<double>& azimuth() { return azimuth_; }
+  std::vector<double>& zenith() { return zenith_; }
+  std::vector<unsigned char>& outlier() { return outlier_; }
+
+  /// Residuals and normal equations at the present state.
+  void evaluate() {
+    accumulate(series_, knots_, train_, options_.free, weights_, equations_,
+               {azimuth_, zenith_, outlier_});
+  }
+
+  /// Residual scale over the stated noise, not below 1; outliers do not count.
+  double level() const {
+    const double rounding =
+        0.5 * static_cast<double>(series_.azimuth_rounding_variance.front() +
+                                  series_.zenith_rounding_variance.front());
+    const double stated = std::sqrt(options_.angle_noise * options_.angle_noise + rounding);
+    return std::max(1.0, robust_scale(azimuth_, zenith_) / stated);
+  }
+
+  SmootherSolution solve(std::span<const RotorProcess> process, bool covariances) const {
+    ParameterPrior prior;
+    const auto n = static_cast<Eigen::Index>(options_.free.size());
+    prior.information.resize(n);
+    const Eigen::VectorXd values = free_values(train_, options_.free);
+    for (Eigen::Index i = 0; i < n; ++i) {
+      const double sigma = options_.free[static_cast<std::size_t>(i)].prior_sigma;
+      prior.information[i] = 1.0 / (sigma * sigma);
+    }
+    prior.gradient = prior.information.cwiseProduct(prior_mean_ - values);
+    return smooth(equations_, knots_, process, prior, covariances);
+  }
+
+  /// Takes a step. @return its largest share of a parameter's sigma, and of 0.01 noise in angles
+  double move(const SmootherSolution& solution) {
+    const Eigen::VectorXd values = free_values(train_, options_.free) + solution.parameter_step;
+    train_ = with_free_values(train_, options_.free, values);
+    double largest = 0;
+    for (Eigen::Index i = 0; i < values.size(); ++i) {
+      largest = std::max(largest, std::abs(solution.parameter_step[i]) /
+                                      std::sqrt(solution.parameter_covariance(i, i)));
+    }
+    double squares = 0;
+    for (std::size_t i = 0; i < knots_.state.size(); ++i) {
+      knots_.state[i] += solution.state_step[i];
+      if (i % kStatesPerRotor == 0) squares += solution.state_step[i] * solution.state_step[i];
+    }
+    const double angles = static_cast<double>(knots_.size()) * knots_.prisms;
+    return std::max(largest, 0.1 * std::sqrt(squares / angles) / options_.angle_noise);
+  }
+
+ private:
+  const AngleSeries& series_;
+  const BatchMapOptions& options_;
+  Eigen::VectorXd prior_mean_;
+  PrismTrain train_;
+  RotorTrajectory knots_;
+  ShotWeights weights_;
+  NormalEquations equations_;
+  std::vector<double> azimuth_, zenith_;
+  std::vector<unsigned char> outlier_;
+};
+
+/// Starts of all stretches of a thinned series; an empty one where none was found.
+struct StretchStart {
+  ShotRange shots;
+  std::optional<Start> start;
+};
+
+/// @param ranges  the stretches of the series
+std::vector<StretchStart> find_stretch_starts(const AngleSeries& series,
+                                              const std::vector<ShotRange>& ranges,
+                                              const Start& first, const sensors::Sensor& sensor,
+                                              double angle_noise) {
+  std::vector<StretchStart> result;
+  sensors::Sensor known = sensor;
+  known.train = first.train;
+  bool first_found = false;
+  for (const ShotRange& shots : ranges) {
+    result.push_back({shots, std::nullopt});
+    if (!first_found && first.time_ns >= series.time_ns[shots.begin] &&
+        first.time_ns <= series.time_ns[shots.end - 1]) {
+      first_found = true;
+      result.back().start = first;
+      continue;
+    }
+    try {
+      constexpr std::size_t kHead = 2000;
+      const AngleSeries head =
+          rows_of(series, shots.begin, std::min(shots.end, shots.begin + kHead));
+      Start start = find_start(head, known, {}, angle_noise);
+      if (start.combination == first.combination) result.back().start = std::move(start);
+    } catch (const EstimationError&) {  // too short or too empty: its shots stay unused
+    }
+  }
+  return result;
+}
+
+/// First knot of the stretch after one given by its number.
+std::size_t stretch_end(const RotorTrajectory& knots, std::size_t stretch) {
+  return stretch + 1 < knots.stretch_begin.size() ? knots.stretch_begin[stretch + 1] : knots.size();
+}
+
+/// Mean square of residuals over their stated variances, outliers left out.
+double unit_variance(const AngleSeries& series, double angle_noise, std::span<const double> azimuth,
+                     std::span<const double> zenith, std::span<const unsigned char> outlier) {
+  double sum = 0, count = 0;
+  const double noise = angle_noise * angle_noise;
+  for (std::size_t i = 0; i < series.size(); ++i) {
+    if (outlier[i]) continue;
+    sum += azimuth[i] * azimuth[i] /
+               (noise + static_cast<double>(series.azimuth_rounding_variance[i])) +
+           zenith[i] * zenith[i] /
+               (noise + static_cast<double>(series.zenith_rounding_variance[i]));
+    count += 2.0;
+  }
+  return count > 0 ? sum / count : std::numeric_limits<double>::quiet_NaN();
+}
+
+}  // namespace
+
+BatchMapResult run_batch_map(const AngleSeries& series, const Start& start,
+                             const sensors::Sensor& sensor, const BatchMapOptions& options,
+                             const Progress& progress) {
+  if (series.size() == 0) throw EstimationError("no valid shot to estimate from");
+  if (!(options.angle_noise > 0) || !std::isfinite(options.angle_noise)) {
+    throw InvalidArgument(fmt::format("angle noise = {} deg, allowed above 0",
+                                      degrees_from_radians(options.angle_noise)));
+  }
+  if (!(options.knot_interval > 0)) {
+    throw InvalidArgument(fmt::format("knot interval = {} s, allowed above 0",
+                                      options.knot_interval));
+  }
+  const int prisms = sensor.prisms();
+  const auto rotors = static_cast<std::size_t>(prisms);
+  const bool choose = options.rotor_process.empty();
+  if (!choose && options.rotor_process.size() != rotors) {
+    throw InvalidArgument(fmt::format("process noise for {} rotors given, the train has {}",
+                                      options.rotor_process.size(), prisms));
+  }
+  BatchMapResult result;
+  std::vector<RotorProcess> process =
+      choose ? std::vector<RotorProcess>(rotors, kSettlingProcess) : options.rotor_process;
+
+  // Coarse: tracked phases, then robust steps.
+  const std::vector<ShotRange> all_stretches = stretches(series);
+  std::vector<ShotRange> coarse_stretches = all_stretches;
+  const AngleSeries coarse_series = thinned(series, kCoarseRate, coarse_stretches);
+  const auto starts =
+      find_stretch_starts(coarse_series, coarse_stretches, start, sensor, options.angle_noise);
+  std::vector<ShotRange> coarse_used, used;
+  for (std::size_t s = 0; s < starts.size(); ++s) {
+    if (starts[s].start) {
+      coarse_used.push_back(coarse_stretches[s]);
+      used.push_back(all_stretches[s]);
+    } else {
+      result.unused_shots += all_stretches[s].size();
+    }
+  }
+  if (used.empty()) throw EstimationError("no stretch of the recording has a start");
+  Iteration coarse(coarse_series, options, sensor.train, start.train,
+                   make_knots(coarse_series, coarse_used, prisms, options.knot_interval));
+  for (std::size_t s = 0, stretch = 0; s < starts.size(); ++s) {
+    if (!starts[s].start) continue;
+    track_rotors(coarse_series, starts[s].shots, *starts[s].start, coarse.knots(),
+                 coarse.knots().stretch_begin[stretch], stretch_end(coarse.knots(), stretch));
+    ++stretch;
+  }
+  report_progress(progress, 0.05);
+  coarse.evaluate();
+  bool chosen = !choose;
+  double level = coarse.level();
+  for (int i = 0; i < options.most_iterations; ++i) {
+    coarse.weights().softening = 1.0 / (16.0 * level * level);
+    coarse.evaluate();
+    const double moved = coarse.move(coarse.solve(process, false));
+    ++result.iterations;
+    coarse.evaluate();
+    const double before = std::exchange(level, coarse.level());
+    report_progress(progress, 0.05 + 0.35 * (i + 1) / options.most_iterations);
+    if (moved > 0.1 || std::abs(level / before - 1.0) > 0.02) continue;
+    if (chosen) break;
+    process = likeliest_process(coarse.equations(), coarse.knots());
+    chosen = true;
+  }
+  report_progress(progress, 0.4);
+
+  // All shots: the same stretches, starting where the coarse pass ended.
+  Iteration full(series, options, sensor.train, coarse.train(),
+                 make_knots(series, used, prisms, options.knot_interval));
+  interpolate(coarse.knots(), full.knots());
+  full.weights().cut = options.outlier_chi2 * level * level;
+  double moved = std::numeric_limits<double>::infinity();
+  for (int pass = 0; pass < kMostFullPasses; ++pass) {
+    full.evaluate();
+    level = full.level();
+    full.weights().cut = options.outlier_chi2 * level * level;
+    // The rotors' noise shows more sharply in all shots than in the thinned ones.
+    result.autocorrelation =
+        autocorrelation(series.time_ns, full.azimuth(), full.zenith(), full.outlier());
+    result.unit_variance = unit_variance(series, options.angle_noise, full.azimuth(),
+                                         full.zenith(), full.outlier());
+    result.variance_factor =
+        result.autocorrelation.factor *
+        (result.unit_variance > kSignificantExcess ? result.unit_variance : 1.0);
+    full.equations().scale(1.0 / result.variance_factor);
+    if (choose) process = likeliest_process(full.equations(), full.knots());
+    const bool last = pass > 0 && (moved < 10 * kSmallStep || pass + 1 == kMostFullPasses);
+    SmootherSolution solution = full.solve(process, last);
+    moved = full.move(solution);
+    ++result.iterations;
+    report_progress(progress, 0.4 + 0.6 * (pass + 1) / kMostFullPasses);
+    if (!last) continue;
+    result.settled = moved < 10 * kSmallStep;
+    result.covariance = std::move(solution.parameter_covariance);
+    result.information = std::move(solution.parameter_information);
+    full.knots().covariance = std::move(solution.state_covariance);
+    break;
+  }
+  result.train = full.train();
+  result.parameters = free_values(result.train, options.free);
+  result.rotor_process = std::move(process);
+  result.trajectory = std::move(full.knots());
+  result.azimuth_residual = std::move(full.azimuth());
+  result.zenith_residual = std::move(full.zenith());
+  result.outlier = std::move(full.outlier());
+  result.outliers = full.equations().outliers;
+  report_progress(progress, 1.0);
+  return result;
+}
+
+namespace {
+
+/// Fills row of the states from a shot and the knot that serves it.
+void fill_state(const BatchMapResult& result, const AngleSeries& series, std::size_t knot,
+                std::size_t shot, std::size_t row, RotorStates& states) {
+  const RotorTrajectory& t = result.trajectory;
+  double seconds = 1e-9 * static_cast<double>(series.time_ns[shot] - t.time_ns[knot]);
+  if (shot < t.first_shot[knot] || shot >= t.last_shot[knot]) {  // of a stretch that was not used
+    seconds = std::numeric_limits<double>::quiet_NaN();
+  }
+  std::size_t entry = 0;
+  for (std::size_t k = 0; k < static_cast<std::size_t>(t.prisms); ++k) {
+    states.rotation_angle[k][row] = t.angle(knot, k, seconds);
+    states.angular_velocity[k][row] = t.speed(knot, k, seconds);
+    states.angular_velocity_sigma[k][row] = std::sqrt(t.speed_variance(knot, k, seconds));
+    for (std::size_t l = k; l < static_cast<std::size_t>(t.prisms); ++l) {
+      states.rotation_angle_covariance[entry++][row] = t.angle_covariance(knot, k, l, seconds);
+    }
+  }
+  states.time_ns[row] = series.time_ns[shot];
+  states.azimuth_residual[row] = result.azimuth_residual[shot];
+  states.zenith_residual[row] = result.zenith_residual[shot];
+  states.outlier[row] = result.outlier[shot];
+}
+
+}  // namespace
+
+RotorStates states_of_shots(const BatchMapResult& result, const AngleSeries& series,
+                            ShotRange shots) {
+  const RotorTrajectory& t = result.trajectory;
+  RotorStates states;
+  states.resize(t.prisms, shots.size());
+  auto knot = static_cast<std::size_t>(
+      std::upper_bound(t.first_shot.begin(), t.first_shot.end(), shots.begin) -
+      t.first_shot.begin());
+  knot = knot > 0 ? knot - 1 : 0;
+  for (std::size_t shot = shots.begin; shot < shots.end; ++shot) {
+    while (knot + 1 < t.size() && t.first_shot[knot + 1] <= shot) ++knot;
+    fill_state(result, series, knot, shot, shot - shots.begin, states);
+  }
+  return states;
+}
+
+RotorStates states_of_knots(const BatchMapResult& result, const AngleSeries& series) {
+  const RotorTrajectory& t = result.trajectory;
+  RotorStates states;
+  states.resize(t.prisms, t.size());
+  for (std::size_t knot = 0; knot < t.size(); ++knot) {
+    const auto begin = series.time_ns.begin();
+    const auto first = begin + static_cast<std::ptrdiff_t>(t.first_shot[knot]);
+    const auto last = begin + static_cast<std::ptrdiff_t>(t.last_shot[knot]);
+    auto shot = static_cast<std::size_t>(std::lower_bound(first, last, t.time_ns[knot]) - begin);
+    shot = std::min(shot, t.last_shot[knot] - 1);
+    fill_state(result, series, knot, shot, knot, states);
+  }
+  return states;
+}
+
+}  // namespace risley::estimation

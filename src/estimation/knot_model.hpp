@@ -1,0 +1,102 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstddef>
+
+#include <Eigen/Core>
+
+#include "risley/core/angle.hpp"
+#include "risley/estimation/normal_equations.hpp"
+#include "risley/estimation/rotor_process.hpp"
+#include "risley/estimation/rotor_trajectory.hpp"
+
+namespace risley::estimation {
+
+/// How loose a rotor is at the first knot of a stretch, about the linearisation point: so wide that
+/// it weighs nothing against the first milliseconds of data.
+inline constexpr double kFirstAngleSigma = 0.5;
+inline constexpr double kFirstSpeedSigma = radians_from_degrees(100.0);
+inline constexpr double kFirstAccelerationSigma = radians_from_degrees(10000.0);
+/// Of a rotor without jerk, whose acceleration is zero: only there to keep covariances definite.
+inline constexpr double kNoAccelerationSigma = 1e-9;
+
+inline double first_acceleration_sigma(const RotorProcess& process) {
+  return process.jerk > 0 ? kFirstAccelerationSigma : kNoAccelerationSigma;
+}
+
+/// Curvature block of two rotors at a knot: their states act on an angle as 1, t and t^2/2.
+/// @param powers  sums over the knot's shots of products times t^0..4
+inline Eigen::Matrix3d rotor_curvature(const double* powers) {
+  Eigen::Matrix3d h;
+  h << powers[0], powers[1], 0.5 * powers[2],  //
+      powers[1], powers[2], 0.5 * powers[3],   //
+      0.5 * powers[2], 0.5 * powers[3], 0.25 * powers[4];
+  return h;
+}
+
+/// Curvature of all states of a knot.
+template <int N>
+Eigen::Matrix<double, 3 * N, 3 * N> knot_curvature(const NormalEquations& equations,
+                                                   std::size_t knot) {
+  Eigen::Matrix<double, 3 * N, 3 * N> h;
+  const double* powers = equations.curvature.data() + knot * (N * (N + 1) / 2) * 5;
+  for (int k = 0; k < N; ++k) {
+    for (int l = k; l < N; ++l, powers += 5) {
+      h.template block<3, 3>(3 * k, 3 * l) = rotor_curvature(powers);
+      if (l != k) h.template block<3, 3>(3 * l, 3 * k) = rotor_curvature(powers);
+    }
+  }
+  return h;
+}
+
+/// rows := F rows for one rotor's three rows (or columns, given transposed): the state dt later.
+template <class Rows>
+void advance(Rows&& rows, double dt) {
+  rows.row(0) += dt * rows.row(1) + (0.5 * dt * dt) * rows.row(2);
+  rows.row(1) += dt * rows.row(2);
+}
+
+/// rows := F^T rows.
+template <class Rows>
+void retreat(Rows&& rows, double dt) {
+  rows.row(2) += dt * rows.row(1) + (0.5 * dt * dt) * rows.row(0);
+  rows.row(1) += dt * rows.row(0);
+}
+
+/// Process noise of one rotor over dt.
+inline Eigen::Matrix3d step_noise(const RotorProcess& process, double dt) {
+  const RotorStepCovariance q = step_covariance(process, dt);
+  Eigen::Matrix3d noise;
+  noise << q.angle_angle, q.angle_speed, q.angle_acceleration,  //
+      q.angle_speed, q.speed_speed, q.speed_acceleration,       //
+      q.angle_acceleration, q.speed_acceleration, q.acceleration_acceleration;
+  return noise;
+}
+
+/// Moves the covariance of a prior past information H without inverting either:
+/// (P^-1 + H)^-1 = W W^T with P = L L^T, I + L^T H L = R R^T, W = L R^-T.
+/// @param[out] log_determinant  of I + P H, when wanted
+/// @return false when P is not positive definite
+template <int D>
+bool add_information(Eigen::Matrix<double, D, D>& covariance,
+                     const Eigen::Matrix<double, D, D>& information,
+                     double* log_determinant = nullptr) {
+  using Square = Eigen::Matrix<double, D, D>;
+  const Eigen::LLT<Square> prior(covariance);
+  if (prior.info() != Eigen::Success) return false;
+  const Square lower = prior.matrixL();
+  Square inner = lower.transpose() * (information * lower);
+  inner.diagonal().array() += 1.0;
+  const Eigen::LLT<Square> updated(inner);
+  if (updated.info() != Eigen::Success) return false;
+  // W^T = R^-1 L^T
+  const Square root = updated.matrixL().solve(lower.transpose());
+  covariance.noalias() = root.transpose() * root;
+  if (log_determinant) {
+    *log_determinant = 2.0 * updated.matrixLLT().diagonal().array().log().sum();
+  }
+  return true;
+}
+
+}  // namespace risley::estimation

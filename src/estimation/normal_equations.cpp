@@ -1,0 +1,116 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "risley/estimation/normal_equations.hpp"
+
+#include <algorithm>
+
+#include <tbb/parallel_for.h>
+
+#include "estimation/normal_equations_kernel.hpp"
+
+namespace risley::estimation {
+namespace {
+
+static_assert(kRotorStates == kStatesPerRotor);
+
+/// Knots that one task sums up: fixed, so that sums do not depend on the number of threads.
+constexpr std::size_t kBlockKnots = 1000;
+
+NormalEquationCounts run_kernel(const NormalEquationArguments& arguments, InstructionSet set) {
+#ifdef RISLEY_HAS_X86_KERNELS
+  if (set == InstructionSet::avx512) return kernel_avx512::accumulate(arguments);
+  if (set == InstructionSet::avx2) return kernel_avx2::accumulate(arguments);
+#endif
+  static_cast<void>(set);
+  return kernel_baseline::accumulate(arguments);
+}
+
+}  // namespace
+
+void NormalEquations::scale(double factor) {
+  for (auto* column : {&curvature, &coupling, &gradient}) {
+    for (double& value : *column) value *= factor;
+  }
+  static_hessian *= factor;
+  static_gradient *= factor;
+}
+
+void accumulate(const AngleSeries& series, const RotorTrajectory& knots, const PrismTrain& train,
+                const std::vector<FreeParameter>& free, const ShotWeights& weights,
+                NormalEquations& equations, const ShotColumns& columns, InstructionSet set) {
+  const auto n = static_cast<int>(free.size());
+  const auto prisms = static_cast<std::size_t>(knots.prisms);
+  std::vector<int> place_begin{0}, places;
+  for (const FreeParameter& parameter : free) {
+    places.insert(places.end(), parameter.places.begin(), parameter.places.end());
+    place_begin.push_back(static_cast<int>(places.size()));
+  }
+  equations.prisms = knots.prisms;
+  equations.free = n;
+  equations.curvature.resize(knots.size() * (prisms * (prisms + 1) / 2) * kTimePowers);
+  equations.coupling.resize(knots.size() * prisms * kRotorStates * free.size());
+  equations.gradient.resize(knots.size() * prisms * kRotorStates);
+
+  NormalEquationArguments all;
+  all.parameters = train.parameters().data();
+  all.face_order = train.face_order().data();
+  all.prisms = knots.prisms;
+  all.free = n;
+  all.place_begin = place_begin.data();
+  all.places = places.data();
+  all.first_shot = knots.first_shot.data();
+  all.last_shot = knots.last_shot.data();
+  all.knot_time_ns = knots.time_ns.data();
+  all.state = knots.state.data();
+  all.time_ns = series.time_ns.data();
+  all.azimuth = series.azimuth.data();
+  all.zenith = series.zenith.data();
+  all.azimuth_rounding_variance = series.azimuth_rounding_variance.data();
+  all.zenith_rounding_variance = series.zenith_rounding_variance.data();
+  all.noise_variance = weights.angle_noise * weights.angle_noise;
+  all.softening = weights.softening;
+  all.cut = weights.cut;
+  all.curvature = equations.curvature.data();
+  all.coupling = equations.coupling.data();
+  all.gradient = equations.gradient.data();
+  if (!columns.azimuth_residual.empty()) {
+    all.azimuth_residual = columns.azimuth_residual.data();
+    all.zenith_residual = columns.zenith_residual.data();
+  }
+  if (!columns.outlier.empty()) all.outlier = columns.outlier.data();
+
+  const std::size_t blocks = (knots.size() + kBlockKnots - 1) / kBlockKnots;
+  const std::size_t triangle = free.size() * (free.size() + 1) / 2;
+  std::vector<double> hessians(blocks * triangle), gradients(blocks * free.size());
+  std::vector<NormalEquationCounts> counts(blocks);
+  tbb::parallel_for(std::size_t{0}, blocks, [&](std::size_t block) {
+    NormalEquationArguments mine = all;
+    mine.knot_begin = block * kBlockKnots;
+    mine.knot_end = std::min(mine.knot_begin + kBlockKnots, knots.size());
+    mine.static_hessian = hessians.data() + block * triangle;
+    mine.static_gradient = gradients.data() + block * free.size();
+    counts[block] = run_kernel(mine, set);
+  });
+
+  equations.static_hessian = Eigen::MatrixXd::Zero(n, n);
+  equations.static_gradient = Eigen::VectorXd::Zero(n);
+  equations.cost = 0;
+  equations.outliers = 0;
+  equations.shots = 0;
+  for (std::size_t knot = 0; knot < knots.size(); ++knot) {
+    equations.shots += knots.last_shot[knot] - knots.first_shot[knot];
+  }
+  for (std::size_t block = 0; block < blocks; ++block) {
+    equations.cost += counts[block].cost;
+    equations.outliers += counts[block].outliers;
+    const double* entry = hessians.data() + block * triangle;
+    for (int i = 0; i < n; ++i) {
+      equations.static_gradient[i] += gradients[block * free.size() + static_cast<std::size_t>(i)];
+      for (int j = i; j < n; ++j) equations.static_hessian(i, j) += *entry++;
+    }
+  }
+  equations.static_hessian.triangularView<Eigen::StrictlyLower>() =
+      equations.static_hessian.transpose();
+}
+
+}  // namespace risley::estimation

@@ -1,0 +1,290 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+// Compiled once per instruction set with RISLEY_KERNEL = baseline, avx2, avx512, under the rules of
+// optics/batch_kernel.cpp.
+#include "estimation/normal_equations_kernel.hpp"
+
+#include <array>
+
+#include "risley/core/simd.hpp"
+#include "risley/optics/observation_adjoint.hpp"
+
+#define RISLEY_JOIN2(a, b) a##b
+#define RISLEY_JOIN(a, b) RISLEY_JOIN2(a, b)
+#define RISLEY_KERNEL_NAMESPACE RISLEY_JOIN(kernel_, RISLEY_KERNEL)
+
+namespace risley::estimation::RISLEY_KERNEL_NAMESPACE {
+namespace {
+
+using Batch = xsimd::batch<double>;
+constexpr std::size_t kLanes = Batch::size;
+constexpr double kTurn = 6.283185307179586;
+
+double sum_of_lanes(const Batch& value) {
+  alignas(64) double lanes[kLanes];
+  value.store_aligned(lanes);
+  double sum = 0;
+  for (std::size_t i = 0; i < kLanes; ++i) sum += lanes[i];
+  return sum;
+}
+
+/// The same angle within half a turn, as a difference or for an accurate sine.
+Batch wrapped(const Batch& angle) { return angle - kTurn * xsimd::nearbyint(angle / kTurn); }
+
+double wrapped(double angle) { return angle - kTurn * __builtin_nearbyint(angle / kTurn); }
+
+/// One group of shots of a knot, a lane each. Lanes without a shot repeat the last one.
+struct Group {
+  Batch time, azimuth, zenith, azimuth_variance, zenith_variance;
+  std::size_t count;
+
+  Group(const NormalEquationArguments& a, std::size_t knot, std::size_t first) {
+    alignas(64) double lanes[5][kLanes];
+    const std::size_t last = a.last_shot[knot];
+    count = last - first < kLanes ? last - first : kLanes;
+    for (std::size_t i = 0; i < kLanes; ++i) {
+      const std::size_t shot = first + (i < count ? i : count - 1);
+      lanes[0][i] = 1e-9 * static_cast<double>(a.time_ns[shot] - a.knot_time_ns[knot]);
+      lanes[1][i] = a.azimuth[shot];
+      lanes[2][i] = a.zenith[shot];
+      lanes[3][i] = a.noise_variance + static_cast<double>(a.azimuth_rounding_variance[shot]);
+      lanes[4][i] = a.noise_variance + static_cast<double>(a.zenith_rounding_variance[shot]);
+    }
+    time = Batch::load_aligned(lanes[0]);
+    azimuth = Batch::load_aligned(lanes[1]);
+    zenith = Batch::load_aligned(lanes[2]);
+    azimuth_variance = Batch::load_aligned(lanes[3]);
+    zenith_variance = Batch::load_aligned(lanes[4]);
+  }
+};
+
+/// One observed angle of a group: residual and derivatives, all divided by its sigma.
+template <int N>
+struct Row {
+  Batch residual;
+  std::array<Batch, N> angles;
+  std::array<Batch, parameter_count(N)> free;
+};
+
+template <int N>
+void fill_row(const NormalEquationArguments& a, const Gradient<Batch, N>& gradient,
+              const Batch& residual, const Batch& scale, Row<N>& row) {
+  row.residual = scale * residual;
+  for (std::size_t k = 0; k < N; ++k) row.angles[k] = scale * gradient.rotation_angles[k];
+  for (int j = 0; j < a.free; ++j) {
+    Batch sum(0.0);
+    for (int p = a.place_begin[j]; p < a.place_begin[j + 1]; ++p) {
+      sum = sum + gradient.parameters[static_cast<std::size_t>(a.places[p])];
+    }
+    row.free[static_cast<std::size_t>(j)] = scale * sum;
+  }
+}
+
+/// Lanes that are not to count become zero in everything that is summed.
+template <int N>
+void clear_lanes(const NormalEquationArguments& a, const xsimd::batch_bool<double>& good,
+                 Row<N>& row) {
+  const Batch zero(0.0);
+  row.residual = xsimd::select(good, row.residual, zero);
+  for (std::size_t k = 0; k < N; ++k) row.angles[k] = xsimd::select(good, row.angles[k], zero);
+  for (int j = 0; j < a.free; ++j) {
+    const auto i = static_cast<std::size_t>(j);
+    row.free[i] = xsimd::select(good, row.free[i], zero);
+  }
+}
+
+/// Sums over the shots of one knot.
+template <int N>
+struct KnotSums {
+  static constexpr std::size_t kPairs = N * (N + 1) / 2;
+  Batch curvature[kPairs][kTimePowers];
+  Batch gradient[N][kRotorStates];
+  Batch coupling[N][kRotorStates][parameter_count(N)];
+
+  void clear(int free) {
+    const Batch zero(0.0);
+    for (auto& pair : curvature) {
+      for (Batch& sum : pair) sum = zero;
+    }
+    for (auto& rotor : gradient) {
+      for (Batch& sum : rotor) sum = zero;
+    }
+    for (auto& rotor : coupling) {
+      for (auto& state : rotor) {
+        for (int j = 0; j < free; ++j) state[j] = zero;
+      }
+    }
+  }
+
+  /// States act on an angle as 1, t and t^2/2.
+  void add(const Row<N>& first, const Row<N>& second, const Batch& time, int free) {
+    const Batch half_square = 0.5 * time * time;
+    std::size_t pair = 0;
+    for (std::size_t k = 0; k < N; ++k) {
+      for (std::size_t l = k; l < N; ++l, ++pair) {
+        Batch term = xsimd::fma(first.angles[k], first.angles[l], second.angles[k] * second.angles[l]);
+        for (int power = 0; power < kTimePowers; ++power) {
+          curvature[pair][power] = curvature[pair][power] + term;
+          term = term * time;
+        }
+      }
+      const auto spread = [&](Batch* states, const Batch& term, std::size_t stride) {
+        states[0] = states[0] + term;
+        states[stride] = xsimd::fma(term, time, states[stride]);
+        states[2 * stride] = xsimd::fma(term, half_square, states[2 * stride]);
+      };
+      spread(gradient[k],
+             xsimd::fma(first.angles[k], first.residual, second.angles[k] * second.residual), 1);
+      for (int j = 0; j < free; ++j) {
+        const auto i = static_cast<std::size_t>(j);
+        spread(&coupling[k][0][j],
+               xsimd::fma(first.angles[k], first.free[i], second.angles[k] * second.free[i]),
+               parameter_count(N));
+      }
+    }
+  }
+
+  void store(const NormalEquationArguments& a, std::size_t knot) const {
+    double* out = a.curvature + knot * kPairs * kTimePowers;
+    for (const auto& pair : curvature) {
+      for (const Batch& sum : pair) *out++ = sum_of_lanes(sum);
+    }
+    out = a.gradient + knot * N * kRotorStates;
+    for (const auto& rotor : gradient) {
+      for (const Batch& sum : rotor) *out++ = sum_of_lanes(sum);
+    }
+    out = a.coupling + knot * N * kRotorStates * static_cast<std::size_t>(a.free);
+    for (const auto& rotor : coupling) {
+      for (const auto& state : rotor) {
+        for (int j = 0; j < a.free; ++j) *out++ = sum_of_lanes(state[j]);
+      }
+    }
+  }
+};
+
+/// Sums over all shots.
+template <int N>
+struct StaticSums {
+  Batch hessian[parameter_count(N) * (parameter_count(N) + 1) / 2];
+  Batch gradient[parameter_count(N)];
+
+  explicit StaticSums(int free) {
+    for (int i = 0; i < free * (free + 1) / 2; ++i) hessian[i] = Batch(0.0);
+    for (int i = 0; i < free; ++i) gradient[i] = Batch(0.0);
+  }
+
+  void add(const Row<N>& first, const Row<N>& second, int free) {
+    Batch* entry = hessian;
+    for (int i = 0; i < free; ++i) {
+      const Batch& a = first.free[static_cast<std::size_t>(i)];
+      const Batch& b = second.free[static_cast<std::size_t>(i)];
+      gradient[i] = xsimd::fma(a, first.residual, xsimd::fma(b, second.residual, gradient[i]));
+      for (int j = i; j < free; ++j, ++entry) {
+        *entry = xsimd::fma(a, first.free[static_cast<std::size_t>(j)],
+                            xsimd::fma(b, second.free[static_cast<std::size_t>(j)], *entry));
+      }
+    }
+  }
+};
+
+template <int N>
+NormalEquationCounts accumulate_knots(const NormalEquationArguments& a) {
+  std::array<Batch, parameter_count(N)> parameters;
+  for (std::size_t i = 0; i < parameter_count(N); ++i) parameters[i] = Batch(a.parameters[i]);
+  std::array<FaceOrder, N> order;
+  __builtin_memcpy(&order, a.face_order, sizeof(order));
+  const auto train = prepare<Batch, N>(parameters, order);
+  const auto derivatives = prepare_derivatives<Batch, N>(parameters, order);
+
+  NormalEquationCounts counts;
+  Batch cost(0.0);
+  StaticSums<N> statics(a.free);
+  KnotSums<N> sums;
+  Row<N> azimuth_row, zenith_row;
+  alignas(64) double lanes[2][kLanes];
+  const Batch one(1.0);
+  for (std::size_t knot = a.knot_begin; knot < a.knot_end; ++knot) {
+    sums.clear(a.free);
+    std::array<Batch, N> angle, speed, half_acceleration;
+    for (std::size_t k = 0; k < N; ++k) {
+      const double* state = a.state + (knot * N + k) * kRotorStates;
+      angle[k] = Batch(wrapped(state[0]));
+      speed[k] = Batch(state[1]);
+      half_acceleration[k] = Batch(0.5 * state[2]);
+    }
+    for (std::size_t shot = a.first_shot[knot]; shot < a.last_shot[knot]; shot += kLanes) {
+      const Group group(a, knot, shot);
+      std::array<Batch, N> angles;
+      for (std::size_t k = 0; k < N; ++k) {
+        angles[k] =
+            xsimd::fma(group.time, xsimd::fma(group.time, half_acceleration[k], speed[k]), angle[k]);
+      }
+      const auto shots = linearise_angles(train, derivatives, angles);
+      const Batch azimuth_residual = wrapped(group.azimuth - shots.angles.azimuth);
+      const Batch zenith_residual = group.zenith - shots.angles.zenith;
+      const Batch chi2 = azimuth_residual * azimuth_residual / group.azimuth_variance +
+                         zenith_residual * zenith_residual / group.zenith_variance;
+      const Batch share = one / (one + a.softening * chi2);
+      fill_row(a, shots.azimuth, azimuth_residual, share / xsimd::sqrt(group.azimuth_variance),
+               azimuth_row);
+      fill_row(a, shots.zenith, zenith_residual, share / xsimd::sqrt(group.zenith_variance),
+               zenith_row);
+      // Comparison with NaN is false: a beam that does not get through counts as an outlier.
+      auto good = chi2 <= Batch(a.cut);
+      Batch loss = xsimd::select(good, chi2 * share, Batch(a.cut));
+      if (group.count < kLanes || !xsimd::all(good)) {
+        alignas(64) double number[kLanes];
+        for (std::size_t i = 0; i < kLanes; ++i) number[i] = static_cast<double>(i);
+        const auto present =
+            Batch::load_aligned(number) < Batch(static_cast<double>(group.count));
+        loss = xsimd::select(present, loss, Batch(0.0));
+        good = good & present;
+        clear_lanes(a, good, azimuth_row);
+        clear_lanes(a, good, zenith_row);
+        xsimd::select(good, one, Batch(0.0)).store_aligned(lanes[0]);
+        for (std::size_t i = 0; i < group.count; ++i) {
+          const bool out = lanes[0][i] == 0.0;
+          counts.outliers += out;
+          if (a.outlier) a.outlier[shot + i] = out;
+        }
+      } else if (a.outlier) {
+        for (std::size_t i = 0; i < kLanes; ++i) a.outlier[shot + i] = 0;
+      }
+      cost = cost + loss;
+      sums.add(azimuth_row, zenith_row, group.time, a.free);
+      statics.add(azimuth_row, zenith_row, a.free);
+      if (a.azimuth_residual) {
+        azimuth_residual.store_aligned(lanes[0]);
+        zenith_residual.store_aligned(lanes[1]);
+        for (std::size_t i = 0; i < group.count; ++i) {
+          a.azimuth_residual[shot + i] = lanes[0][i];
+          a.zenith_residual[shot + i] = lanes[1][i];
+        }
+      }
+    }
+    sums.store(a, knot);
+  }
+  for (int i = 0; i < a.free * (a.free + 1) / 2; ++i) {
+    a.static_hessian[i] = sum_of_lanes(statics.hessian[i]);
+  }
+  for (int i = 0; i < a.free; ++i) a.static_gradient[i] = sum_of_lanes(statics.gradient[i]);
+  counts.cost = sum_of_lanes(cost);
+  return counts;
+}
+
+}  // namespace
+
+NormalEquationCounts accumulate(const NormalEquationArguments& a) {
+  switch (a.prisms) {
+    case 1:
+      return accumulate_knots<1>(a);
+    case 2:
+      return accumulate_knots<2>(a);
+    case 3:
+      return accumulate_knots<3>(a);
+    default:
+      return accumulate_knots<4>(a);
+  }
+}
+
+}  // namespace risley::estimation::RISLEY_KERNEL_NAMESPACE

@@ -1,0 +1,193 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "risley/estimation/process_likelihood.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include <Eigen/Cholesky>
+
+#include "risley/core/golden_section.hpp"
+#include "risley/optics/prism_train.hpp"
+
+#include "estimation/knot_model.hpp"
+
+namespace risley::estimation {
+namespace {
+
+constexpr double kWindow = 0.010;  // s
+constexpr std::size_t kFewestShots = 8;
+/// How far the other rotors may be from the linearisation within a window, before its data.
+constexpr double kOtherSigma[] = {radians_from_degrees(1.0), radians_from_degrees(300.0),
+                                  radians_from_degrees(1e5)};
+/// Searched range of white acceleration, deg/s/sqrt(s), and white jerk, deg/s^2/sqrt(s), decades.
+constexpr double kLowestAcceleration = -6, kHighestAcceleration = 3;
+constexpr double kLowestJerk = -5, kHighestJerk = 5;
+/// A motion model with one number more must be this much likelier.
+constexpr double kWorthIt = 3.0;
+
+RotorProcess process_of(double acceleration_decade, double jerk_decade) {
+  const auto intensity = [](double decade) {
+    return std::isfinite(decade) ? radians_from_degrees(std::pow(10.0, decade)) : 0.0;
+  };
+  return {intensity(acceleration_decade), 0.0, intensity(jerk_decade)};
+}
+
+constexpr double kNone = -std::numeric_limits<double>::infinity();
+
+/// The decade that minimises a cost: steps of one decade, then a golden section around the best.
+template <class Cost>
+double best_decade(const Cost& cost, double lowest, double highest) {
+  double best = highest, best_cost = std::numeric_limits<double>::infinity();
+  for (double decade = highest; decade >= lowest; decade -= 1.0) {
+    const double value = cost(decade);
+    if (value < best_cost) {
+      best_cost = value;
+      best = decade;
+    }
+  }
+  return golden_section_minimum(cost, best - 1.0, best + 1.0, 0.06);
+}
+
+}  // namespace
+
+RotorWindows::RotorWindows(const NormalEquations& equations, const RotorTrajectory& at, int rotor,
+                           std::size_t most_windows) {
+  with_prism_count(at.prisms, [&]<int N>() {
+    constexpr int kD = 3 * N;
+    using Square = Eigen::Matrix<double, kD, kD>;
+    using Vector = Eigen::Matrix<double, kD, 1>;
+    // Own states first, the others behind them.
+    const auto own_first = [&](int k) { return k == rotor ? 0 : k < rotor ? k + 1 : k; };
+    std::size_t stretch = 0, before = 0;
+    for (std::size_t knot = 0; knot < at.size() && windows_.size() < most_windows;) {
+      const bool fresh = stretch < at.stretch_begin.size() && at.stretch_begin[stretch] == knot;
+      if (fresh) ++stretch;
+      const std::size_t end =
+          stretch < at.stretch_begin.size() ? at.stretch_begin[stretch] : at.size();
+      const std::size_t first = knot;
+      std::size_t shots = 0;
+      while (knot < end) {
+        const double span = 1e-9 * static_cast<double>(at.time_ns[knot] - at.time_ns[first]);
+        if (span >= 0.95 * kWindow && shots >= kFewestShots) break;
+        shots += at.last_shot[knot] - at.first_shot[knot];
+        ++knot;
+      }
+      const std::size_t middle = first + (knot - first) / 2;
+      Square curvature = Square::Zero();
+      Vector gradient = Vector::Zero();
+      const Vector center = Eigen::Map<const Vector>(at.state.data() + middle * kD);
+      for (std::size_t i = first; i < knot; ++i) {
+        const double dt = 1e-9 * static_cast<double>(at.time_ns[i] - at.time_ns[middle]);
+        // The knot's deviation as a function of the window's: T u + e.
+        Square h = knot_curvature<N>(equations, i);
+        Vector e = center;
+        for (int k = 0; k < N; ++k) advance(e.template middleRows<3>(3 * k), dt);
+        e -= Eigen::Map<const Vector>(at.state.data() + i * kD);
+        Vector g = Eigen::Map<const Vector>(equations.gradient.data() + i * kD) - h * e;
+        for (int k = 0; k < N; ++k) {
+          retreat(g.template middleRows<3>(3 * k), dt);
+          retreat(h.template middleRows<3>(3 * k), dt);
+        }
+        for (int k = 0; k < N; ++k) retreat(h.template middleCols<3>(3 * k).transpose(), dt);
+        curvature += h;
+        gradient += g;
+      }
+      Square sorted;
+      Vector sorted_gradient;
+      for (int k = 0; k < N; ++k) {
+        sorted_gradient.template segment<3>(3 * own_first(k)) = gradient.template segment<3>(3 * k);
+        for (int l = 0; l < N; ++l) {
+          sorted.template block<3, 3>(3 * own_first(k), 3 * own_first(l)) =
+              curvature.template block<3, 3>(3 * k, 3 * l);
+        }
+      }
+      Window window;
+      window.curvature = sorted.template topLeftCorner<3, 3>();
+      window.gradient = sorted_gradient.template head<3>();
+      if constexpr (N > 1) {
+        constexpr int kOthers = kD - 3;
+        Eigen::Matrix<double, kOthers, kOthers> others =
+            sorted.template bottomRightCorner<kOthers, kOthers>();
+        for (int i = 0; i < kOthers; ++i) {
+          others(i, i) += 1.0 / (kOtherSigma[i % 3] * kOtherSigma[i % 3]);
+        }
+        const Eigen::Matrix<double, kOthers, 3> cross =
+            sorted.template bottomLeftCorner<kOthers, 3>();
+        const Eigen::LDLT<Eigen::Matrix<double, kOthers, kOthers>> solver(others);
+        window.curvature -= cross.transpose() * solver.solve(cross);
+        window.gradient -= cross.transpose() *
+                           solver.solve(sorted_gradient.template tail<kOthers>());
+      }
+      window.state = center.template segment<3>(3 * rotor);
+      if (!fresh && !windows_.empty()) {
+        window.step = 1e-9 * static_cast<double>(at.time_ns[middle] - at.time_ns[before]);
+        Eigen::Vector3d moved = windows_.back().state;
+        advance(moved, window.step);
+        window.offset = moved - window.state;
+      }
+      before = middle;
+      windows_.push_back(window);
+    }
+  });
+}
+
+double RotorWindows::log_likelihood(const RotorProcess& process) const {
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d p;
+  double sum = 0;
+  for (const Window& window : windows_) {
+    if (window.step > 0) {
+      advance(mean, window.step);
+      mean += window.offset;
+      advance(p, window.step);
+      advance(p.transpose(), window.step);
+      p += step_noise(process, window.step);
+    } else {
+      const Eigen::Vector3d sigma(kFirstAngleSigma, kFirstSpeedSigma,
+                                  first_acceleration_sigma(process));
+      p = sigma.array().square().matrix().asDiagonal();
+      mean.setZero();
+      if (!(process.jerk > 0)) mean[2] = -window.state[2];
+    }
+    const Eigen::Vector3d gradient = window.gradient - window.curvature * mean;
+    double log_determinant = 0;
+    if (!add_information<3>(p, window.curvature, &log_determinant)) {
+      return -std::numeric_limits<double>::infinity();
+    }
+    const Eigen::Vector3d step = p * gradient;
+    sum += -0.5 * log_determinant + 0.5 * gradient.dot(step) -
+           0.5 * mean.dot(window.curvature * mean) + window.gradient.dot(mean);
+    mean += step;
+  }
+  return std::isfinite(sum) ? sum : -std::numeric_limits<double>::infinity();
+}
+
+std::vector<RotorProcess> likeliest_process(const NormalEquations& equations,
+                                            const RotorTrajectory& linearisation) {
+  std::vector<RotorProcess> result;
+  for (int rotor = 0; rotor < linearisation.prisms; ++rotor) {
+    const RotorWindows windows(equations, linearisation, rotor);
+    const auto cost = [&](double acceleration, double jerk) {
+      return -windows.log_likelihood(process_of(acceleration, jerk));
+    };
+    const double alone = best_decade([&](double a) { return cost(a, kNone); },
+                                     kLowestAcceleration, kHighestAcceleration);
+    double jerk = best_decade([&](double j) { return cost(kLowestAcceleration, j); }, kLowestJerk,
+                              kHighestJerk);
+    double acceleration = kLowestAcceleration;
+    // Both together: the walk first at the value that it has alone, then lower.
+    for (int round = 0; round < 2; ++round) {
+      acceleration = best_decade([&](double a) { return cost(a, jerk); }, kLowestAcceleration,
+                                 std::max(alone, kLowestAcceleration) + 0.5);
+      jerk = golden_section_minimum([&](double j) { return cost(acceleration, j); }, jerk - 1.0,
+                                    jerk + 1.0, 0.06);
+    }
+    const bool both = cost(acceleration, jerk) + kWorthIt < cost(alone, kNone);
+    result.push_back(both ? process_of(acceleration, jerk) : process_of(alone, kNone));
+  }
+  return result;
+}
+
+}  // namespace risley::estimation

@@ -1,0 +1,93 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "risley/estimation/rotor_trajectory.hpp"
+
+#include <cmath>
+#include <cstdlib>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "risley/core/error.hpp"
+
+namespace risley::estimation {
+
+double RotorTrajectory::covariance_entry(std::size_t knot, std::size_t row,
+                                         std::size_t column) const {
+  const auto d = static_cast<std::size_t>(states());
+  if (row > column) std::swap(row, column);
+  return covariance[knot * (d * (d + 1) / 2) + row * d - row * (row + 1) / 2 + column];
+}
+
+double RotorTrajectory::angle_covariance(std::size_t knot, std::size_t a, std::size_t b,
+                                         double seconds) const {
+  const double weight[] = {1.0, seconds, 0.5 * seconds * seconds};
+  double sum = 0;
+  for (std::size_t i = 0; i < kStatesPerRotor; ++i) {
+    for (std::size_t j = 0; j < kStatesPerRotor; ++j) {
+      sum += weight[i] * weight[j] *
+             covariance_entry(knot, kStatesPerRotor * a + i, kStatesPerRotor * b + j);
+    }
+  }
+  return sum;
+}
+
+double RotorTrajectory::speed_variance(std::size_t knot, std::size_t rotor, double seconds) const {
+  const std::size_t speed = kStatesPerRotor * rotor + 1;
+  return covariance_entry(knot, speed, speed) +
+         seconds * (2.0 * covariance_entry(knot, speed, speed + 1) +
+                    seconds * covariance_entry(knot, speed + 1, speed + 1));
+}
+
+RotorTrajectory make_knots(const AngleSeries& series, std::span<const ShotRange> ranges, int prisms,
+                           double interval) {
+  RotorTrajectory knots;
+  knots.prisms = prisms;
+  const auto interval_ns = static_cast<std::int64_t>(std::llround(interval * 1e9));
+  for (const ShotRange& range : ranges) {
+    if (range.size() == 0) continue;
+    knots.stretch_begin.push_back(knots.size());
+    const std::int64_t origin = series.time_ns[range.begin];
+    for (std::size_t i = range.begin; i < range.end;) {
+      const std::int64_t slot = (series.time_ns[i] - origin) / interval_ns;
+      const std::size_t first = i;
+      while (i < range.end && (series.time_ns[i] - origin) / interval_ns == slot) ++i;
+      knots.first_shot.push_back(first);
+      knots.last_shot.push_back(i);
+      knots.time_ns.push_back(series.time_ns[first] +
+                              (series.time_ns[i - 1] - series.time_ns[first]) / 2);
+    }
+  }
+  knots.state.assign(knots.size() * static_cast<std::size_t>(knots.states()), 0.0);
+  return knots;
+}
+
+void interpolate(const RotorTrajectory& from, RotorTrajectory& to) {
+  if (from.stretch_begin.size() != to.stretch_begin.size() || from.prisms != to.prisms) {
+    throw InvalidArgument(fmt::format("trajectories of {} and {} stretches, expected the same",
+                                      from.stretch_begin.size(), to.stretch_begin.size()));
+  }
+  const auto end_of = [](const RotorTrajectory& t, std::size_t stretch) {
+    return stretch + 1 < t.stretch_begin.size() ? t.stretch_begin[stretch + 1] : t.size();
+  };
+  for (std::size_t s = 0; s < to.stretch_begin.size(); ++s) {
+    std::size_t near = from.stretch_begin[s];
+    const std::size_t last = end_of(from, s) - 1;
+    for (std::size_t knot = to.stretch_begin[s]; knot < end_of(to, s); ++knot) {
+      const std::int64_t time = to.time_ns[knot];
+      while (near < last && std::llabs(from.time_ns[near + 1] - time) <=
+                                std::llabs(from.time_ns[near] - time)) {
+        ++near;
+      }
+      const double seconds = 1e-9 * static_cast<double>(time - from.time_ns[near]);
+      const auto state = to.state_of(knot);
+      for (std::size_t k = 0; k < static_cast<std::size_t>(to.prisms); ++k) {
+        state[kStatesPerRotor * k] = from.angle(near, k, seconds);
+        state[kStatesPerRotor * k + 1] = from.speed(near, k, seconds);
+        state[kStatesPerRotor * k + 2] = from.state_of(near)[kStatesPerRotor * k + 2];
+      }
+    }
+  }
+}
+
+}  // namespace risley::estimation
