@@ -114,6 +114,10 @@ class Iteration {
   std::vector<unsigned char> outlier_;
 };
 
+/// Softening of the weights (Geman-McClure) for residuals of a scale in units of the stated noise:
+/// a shot at four sigma weighs a quarter.
+double softening(double level) { return 1.0 / (16.0 * level * level); }
+
 /// Starts of all stretches of a thinned series; an empty one where none was found.
 struct StretchStart {
   ShotRange shots;
@@ -220,21 +224,25 @@ BatchMapResult run_batch_map(const AngleSeries& series, const Start& start,
     ++stretch;
   }
   report_progress(progress, 0.05);
-  coarse.evaluate();
   bool chosen = !choose;
-  double level = coarse.level();
+  double level = 0, moved = std::numeric_limits<double>::infinity();
   for (int i = 0; i < options.most_iterations; ++i) {
-    coarse.weights().softening = 1.0 / (16.0 * level * level);
-    coarse.evaluate();
-    const double moved = coarse.move(coarse.solve(process, false));
-    ++result.iterations;
+    if (i == 0) {  // the weights need a scale first
+      coarse.evaluate();
+      level = coarse.level();
+      coarse.weights().softening = softening(level);
+    }
     coarse.evaluate();
     const double before = std::exchange(level, coarse.level());
+    coarse.weights().softening = softening(level);
     report_progress(progress, 0.05 + 0.35 * (i + 1) / options.most_iterations);
-    if (moved > 0.1 || std::abs(level / before - 1.0) > 0.02) continue;
-    if (chosen) break;
-    process = likeliest_process(coarse.equations(), coarse.knots());
-    chosen = true;
+    if (moved < 0.1 && std::abs(level / before - 1.0) < 0.02) {
+      if (chosen) break;
+      process = likeliest_process(coarse.equations(), coarse.knots());
+      chosen = true;
+    }
+    moved = coarse.move(coarse.solve(process, false));
+    ++result.iterations;
   }
   report_progress(progress, 0.4);
 
@@ -243,7 +251,6 @@ BatchMapResult run_batch_map(const AngleSeries& series, const Start& start,
                  make_knots(series, used, prisms, options.knot_interval));
   interpolate(coarse.knots(), full.knots());
   full.weights().cut = options.outlier_chi2 * level * level;
-  double moved = std::numeric_limits<double>::infinity();
   for (int pass = 0; pass < kMostFullPasses; ++pass) {
     full.evaluate();
     level = full.level();
@@ -257,13 +264,14 @@ BatchMapResult run_batch_map(const AngleSeries& series, const Start& start,
         result.autocorrelation.factor *
         (result.unit_variance > kSignificantExcess ? result.unit_variance : 1.0);
     full.equations().scale(1.0 / result.variance_factor);
-    if (choose) process = likeliest_process(full.equations(), full.knots());
-    const bool last = pass > 0 && (moved < 10 * kSmallStep || pass + 1 == kMostFullPasses);
-    SmootherSolution solution = full.solve(process, last);
+    if (choose && pass == 0) process = likeliest_process(full.equations(), full.knots());
+    // The first step goes from what the thinned shots tell to what all tell, the second should be
+    // one of rounding.
+    SmootherSolution solution = full.solve(process, pass > 0);
     moved = full.move(solution);
     ++result.iterations;
     report_progress(progress, 0.4 + 0.6 * (pass + 1) / kMostFullPasses);
-    if (!last) continue;
+    if (pass == 0 || (moved > 10 * kSmallStep && pass + 1 < kMostFullPasses)) continue;
     result.settled = moved < 10 * kSmallStep;
     result.covariance = std::move(solution.parameter_covariance);
     result.information = std::move(solution.parameter_information);

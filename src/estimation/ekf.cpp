@@ -28,7 +28,7 @@ constexpr double kOpenGate = 400.0;
 constexpr std::size_t kBlock = 1024;
 /// Noise of the rotors in the first pass when the second is to choose it: far above that of real
 /// rotors, so that the filter follows them wherever they go.
-constexpr RotorProcess kSettlingProcess{radians_from_degrees(30.0), 0.0};
+constexpr RotorProcess kSettlingProcess{radians_from_degrees(30.0), 0.0, 0.0};
 /// Shots that the search for the process noise looks at.
 constexpr std::size_t kLikelihoodShots = 10000;
 
@@ -222,7 +222,7 @@ template <int N>
 std::vector<RotorProcess> processes(const std::array<double, N>& decades) {
   std::vector<RotorProcess> result;
   result.reserve(N);
-  for (const double d : decades) result.push_back({radians_from_degrees(std::pow(10.0, d)), 0.0});
+  for (const double d : decades) result.push_back({radians_from_degrees(std::pow(10.0, d)), 0.0, 0.0});
   return result;
 }
 

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <cmath>
 #include <cstddef>
 
 #include <Eigen/Core>
@@ -74,8 +75,24 @@ inline Eigen::Matrix3d step_noise(const RotorProcess& process, double dt) {
   return noise;
 }
 
+/// Lower Cholesky factor, in place; unrolled for the few sizes there are.
+/// @return false when the matrix is not positive definite
+template <int D>
+bool cholesky(Eigen::Matrix<double, D, D>& a) {
+  for (int j = 0; j < D; ++j) {
+    for (int k = 0; k < j; ++k) {
+      for (int i = j; i < D; ++i) a(i, j) -= a(i, k) * a(j, k);
+    }
+    if (!(a(j, j) > 0)) return false;
+    const double scale = 1.0 / std::sqrt(a(j, j));
+    for (int i = j; i < D; ++i) a(i, j) *= scale;
+    for (int i = 0; i < j; ++i) a(i, j) = 0;
+  }
+  return true;
+}
+
 /// Moves the covariance of a prior past information H without inverting either:
-/// (P^-1 + H)^-1 = W W^T with P = L L^T, I + L^T H L = R R^T, W = L R^-T.
+/// (P^-1 + H)^-1 = W W^T with P = L L^T, I + L^T H L = R R^T, W^T = R^-1 L^T.
 /// @param[out] log_determinant  of I + P H, when wanted
 /// @return false when P is not positive definite
 template <int D>
@@ -83,18 +100,21 @@ bool add_information(Eigen::Matrix<double, D, D>& covariance,
                      const Eigen::Matrix<double, D, D>& information,
                      double* log_determinant = nullptr) {
   using Square = Eigen::Matrix<double, D, D>;
-  const Eigen::LLT<Square> prior(covariance);
-  if (prior.info() != Eigen::Success) return false;
-  const Square lower = prior.matrixL();
+  Square lower = covariance;
+  if (!cholesky<D>(lower)) return false;
   Square inner = lower.transpose() * (information * lower);
   inner.diagonal().array() += 1.0;
-  const Eigen::LLT<Square> updated(inner);
-  if (updated.info() != Eigen::Success) return false;
-  // W^T = R^-1 L^T
-  const Square root = updated.matrixL().solve(lower.transpose());
+  if (!cholesky<D>(inner)) return false;
+  Square root = lower.transpose();
+  for (int i = 0; i < D; ++i) {
+    for (int k = 0; k < i; ++k) root.row(i) -= inner(i, k) * root.row(k);
+    root.row(i) *= 1.0 / inner(i, i);
+  }
   covariance.noalias() = root.transpose() * root;
   if (log_determinant) {
-    *log_determinant = 2.0 * updated.matrixLLT().diagonal().array().log().sum();
+    double product = 1.0;
+    for (int i = 0; i < D; ++i) product *= inner(i, i);
+    *log_determinant = 2.0 * std::log(product);
   }
   return true;
 }

@@ -39,15 +39,16 @@ constexpr double kNone = -std::numeric_limits<double>::infinity();
 /// The decade that minimises a cost: steps of one decade, then a golden section around the best.
 template <class Cost>
 double best_decade(const Cost& cost, double lowest, double highest) {
+  constexpr double kTolerance = 0.12;  // far below what the data tell
   double best = highest, best_cost = std::numeric_limits<double>::infinity();
-  for (double decade = highest; decade >= lowest; decade -= 1.0) {
+  for (double decade = highest; decade >= lowest - 1e-9; decade -= 1.0) {
     const double value = cost(decade);
     if (value < best_cost) {
       best_cost = value;
       best = decade;
     }
   }
-  return golden_section_minimum(cost, best - 1.0, best + 1.0, 0.06);
+  return golden_section_minimum(cost, best - 1.0, best + 1.0, kTolerance);
 }
 
 }  // namespace
@@ -172,20 +173,24 @@ std::vector<RotorProcess> likeliest_process(const NormalEquations& equations,
     const auto cost = [&](double acceleration, double jerk) {
       return -windows.log_likelihood(process_of(acceleration, jerk));
     };
-    const double alone = best_decade([&](double a) { return cost(a, kNone); },
-                                     kLowestAcceleration, kHighestAcceleration);
-    double jerk = best_decade([&](double j) { return cost(kLowestAcceleration, j); }, kLowestJerk,
-                              kHighestJerk);
-    double acceleration = kLowestAcceleration;
-    // Both together: the walk first at the value that it has alone, then lower.
-    for (int round = 0; round < 2; ++round) {
-      acceleration = best_decade([&](double a) { return cost(a, jerk); }, kLowestAcceleration,
-                                 std::max(alone, kLowestAcceleration) + 0.5);
-      jerk = golden_section_minimum([&](double j) { return cost(acceleration, j); }, jerk - 1.0,
-                                    jerk + 1.0, 0.06);
+    const double walk_alone = best_decade([&](double a) { return cost(a, kNone); },
+                                          kLowestAcceleration, kHighestAcceleration);
+    const double jerk_alone =
+        best_decade([&](double j) { return cost(kNone, j); }, kLowestJerk, kHighestJerk);
+    // Both together: the walk is then slower than it would have to be alone.
+    const double walk = best_decade([&](double a) { return cost(a, jerk_alone); }, walk_alone - 3.0,
+                                    walk_alone);
+    const double jerk =
+        best_decade([&](double j) { return cost(walk, j); }, jerk_alone - 1.0, jerk_alone);
+    // More numbers only where the data are so much likelier with them.
+    RotorProcess best = process_of(walk_alone, kNone);
+    double best_cost = cost(walk_alone, kNone) - kWorthIt;
+    if (const double value = cost(kNone, jerk_alone); value < best_cost) {
+      best = process_of(kNone, jerk_alone);
+      best_cost = value;
     }
-    const bool both = cost(acceleration, jerk) + kWorthIt < cost(alone, kNone);
-    result.push_back(both ? process_of(acceleration, jerk) : process_of(alone, kNone));
+    if (cost(walk, jerk) + kWorthIt < best_cost) best = process_of(walk, jerk);
+    result.push_back(best);
   }
   return result;
 }

@@ -51,7 +51,7 @@ TEST(Ekf, MeanAndCovarianceEqualTheWeightedLeastSquaresOfTheWholeTrajectory) {
   const auto sensor = bent_sensor();
   const auto series = testing::constant_speed_series(sensor, 0.5, 2.5, 0.6, 1000.0, 0.01, 3);
   EkfOptions options;
-  options.rotor_process = {{1e-9, 0}, {1e-9, 0}};
+  options.rotor_process = {{1e-9, 0, 0}, {1e-9, 0, 0}};
   options.gate_chi_square = std::numeric_limits<double>::infinity();
   options.passes = 4;
   const EkfResult result = run(series, options);
@@ -116,7 +116,7 @@ TEST(Ekf, AGapIsBridgedAndItsUncertaintyShown) {
   cut(series.azimuth_rounding_variance);
   cut(series.zenith_rounding_variance);
   EkfOptions options;
-  options.rotor_process.assign(2, {radians_from_degrees(1.5), 0.0});
+  options.rotor_process.assign(2, {radians_from_degrees(1.5), 0.0, 0.0});
   const EkfResult result = run(series, options);
   EXPECT_LT(result.outliers, 15u);
   const auto& variance = result.states.rotation_angle_covariance[0];
@@ -128,7 +128,7 @@ TEST(Ekf, PoliteRefusals) {
   options.angle_noise = kNoise;
   EXPECT_THROW(run_ekf({}, {}, options), EstimationError);
   const auto series = testing::constant_speed_series(bent_sensor(), 0, 0, 0.2, 1000.0);
-  options.rotor_process = {{1, 0}};
+  options.rotor_process = {{1, 0, 0}};
   EXPECT_THROW(run(series, options), InvalidArgument);
   EXPECT_THROW(free_parameters({"refractive_index", "refractive_index_a"}, 2), InvalidArgument);
   EXPECT_THROW(free_parameters({"angular_velocity_a_deg_per_s"}, 2), InvalidArgument);
@@ -151,7 +151,7 @@ TEST(AngleSeries, SelectsFirstReturnsInOrderOnAFixedGrid) {
   EXPECT_EQ(selector.counts().further_returns, 1u);
   EXPECT_EQ(selector.counts().out_of_order, 1u);
   EXPECT_EQ(selector.counts().invalid, 1u);
-  EXPECT_NEAR(selector.series().zenith_rounding_variance[0], 0.0012, 1e-9);
+  EXPECT_NEAR(static_cast<double>(selector.series().zenith_rounding_variance[0]), 0.0012, 1e-9);
   EXPECT_THROW(ShotSelector({0.0}), InvalidArgument);
 }
 

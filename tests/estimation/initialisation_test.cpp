@@ -51,8 +51,13 @@ TEST_P(StartOfRandomSensors, AlwaysFindsCombinationSpeedsAndAngles) {
       const double truth = (k == 0 ? a : b) + t * sensor.angular_velocity[k];
       EXPECT_LT(degrees_from_radians(std::abs(wrap_to_pi(start.rotation_angle[k] - truth))), 1.0);
     }
-    EXPECT_FALSE(is_mirrored(head, nominal, free, radians_from_degrees(0.01)));
-    EXPECT_TRUE(is_mirrored(mirror_image(head), nominal, free, radians_from_degrees(0.01)));
+    const auto found_mirrored = [&](const AngleSeries& shots) {
+      return find_start(shots, nominal, free, radians_from_degrees(0.01), std::nullopt).mirrored;
+    };
+    EXPECT_FALSE(found_mirrored(head));
+    AngleSeries turned = head;
+    mirror(turned);
+    EXPECT_TRUE(found_mirrored(turned));
   }
 }
 
@@ -60,25 +65,134 @@ INSTANTIATE_TEST_SUITE_P(Rates, StartOfRandomSensors, ::testing::Values(1000.0, 
 
 TEST(Initialisation, LinesCarryTheSpeedsOfTheRotors) {
   const auto sensor = sensors::load_sensor("mid-40");
-  const auto lines = rotor_lines(testing::constant_speed_series(sensor, 0.3, 1.0, 0.1, 100000.0));
-  ASSERT_EQ(lines.size(), 2u);
-  const auto rotors = identify_rotors(lines, sensor);
+  const auto series = testing::constant_speed_series(sensor, 0.3, 1.0, 0.1, 100000.0);
+  const RotorLines found = rotor_lines(series);
+  ASSERT_EQ(found.lines.size(), 2u);
+  const auto rotors = identify_rotors(found.lines, sensor);
   EXPECT_EQ(rotors.combination, SpeedCombination::first);
   EXPECT_NEAR(rotors.line[0].angular_velocity / sensor.angular_velocity[0], 1.0, 1e-4);
   EXPECT_NEAR(rotors.line[1].angular_velocity / sensor.angular_velocity[1], 1.0, 1e-4);
   // At rotation angle zero the beam leans to -Z.
-  EXPECT_NEAR(wrap_to_pi(rotors.line[0].phase + kPi / 2 - 0.3), 0.0, 0.02);
-  EXPECT_NEAR(wrap_to_pi(rotors.line[1].phase + kPi / 2 - 1.0), 0.0, 0.02);
+  const double t = 1e-9 * static_cast<double>(found.time_ns - series.time_ns[0]);
+  const double angles[] = {0.3 + t * sensor.angular_velocity[0],
+                           1.0 + t * sensor.angular_velocity[1]};
+  EXPECT_NEAR(wrap_to_pi(rotors.line[0].phase + kPi / 2 - angles[0]), 0.0, 0.02);
+  EXPECT_NEAR(wrap_to_pi(rotors.line[1].phase + kPi / 2 - angles[1]), 0.0, 0.02);
 }
 
-TEST(Initialisation, TheZeroPositionIsWhereBothAnglesAreNearlyZero) {
-  const auto sensor = sensors::load_sensor("mid-40");
-  const auto series = testing::constant_speed_series(sensor, 2.0, -1.0, 1.0, 100000.0);
-  const std::size_t row = zero_position_row(series, sensor.train);
-  for (std::size_t k = 0; k < 2; ++k) {
-    const double angle = (k == 0 ? 2.0 : -1.0) + series.time(row) * sensor.angular_velocity[k];
-    EXPECT_LT(std::abs(wrap_to_pi(angle)), radians_from_degrees(10.0));
+TEST(Initialisation, FiftyMillisecondsWithAGapAreEnough) {
+  const auto sensor = sensors::load_sensor("mid-40-table3");
+  const auto nominal = sensors::load_sensor("mid-40");
+  const auto free = free_parameters(default_free_names(2), 2);
+  for (const double rate : {2000.0, 100000.0}) {
+    const auto whole = testing::constant_speed_series(sensor, 2.0, -1.0, 0.0505, rate, 0.01, 3);
+    AngleSeries holed;
+    for (std::size_t i = 0; i < whole.size(); ++i) {
+      if (whole.time(i) < 0.018 || whole.time(i) > 0.028) holed.append(whole, i);
+    }
+    const Start start = find_start(holed, nominal, free, radians_from_degrees(0.01));
+    EXPECT_EQ(start.combination, SpeedCombination::second);
+    const double t = 1e-9 * static_cast<double>(start.time_ns - whole.time_ns[0]);
+    for (std::size_t k = 0; k < 2; ++k) {
+      const double truth = (k == 0 ? 2.0 : -1.0) + t * sensor.angular_velocity[k];
+      EXPECT_LT(degrees_from_radians(std::abs(wrap_to_pi(start.rotation_angle[k] - truth))), 0.5);
+      EXPECT_NEAR(degrees_from_radians(start.angular_velocity[k] - sensor.angular_velocity[k]), 0.0,
+                  30.0);
+    }
   }
+}
+
+TEST(Initialisation, TheBestCoveredWindowIsTaken) {
+  // 30 ms of shots, nothing for 0.3 s, then a whole second: the beginning alone could not answer.
+  const auto sensor = sensors::load_sensor("mid-40");
+  const auto whole = testing::constant_speed_series(sensor, 0.5, 2.5, 1.0, 1000.0, 0.01, 4);
+  AngleSeries holed;
+  for (std::size_t i = 0; i < whole.size(); ++i) {
+    if (whole.time(i) < 0.03 || whole.time(i) > 0.33) holed.append(whole, i);
+  }
+  const RotorLines found = rotor_lines(holed);
+  EXPECT_GT(found.time_ns, 330'000'000);
+  EXPECT_GT(found.shots.size(), 200u);
+}
+
+TEST(Initialisation, ATenthOfGrossErrorsDoesNotMatter) {
+  const auto sensor = sensors::load_sensor("mid-40-table3");
+  auto head = testing::constant_speed_series(sensor, 2.0, -1.0, 0.5, 1000.0, 0.01, 5);
+  std::mt19937_64 generator(6);
+  std::uniform_real_distribution<double> uniform(-0.3, 0.3);
+  for (std::size_t i = 0; i < head.size(); i += 10) {
+    head.azimuth[i] = uniform(generator);
+    head.zenith[i] = kPi / 2 + uniform(generator);
+  }
+  const Start start = find_start(head, sensors::load_sensor("mid-40"),
+                                 free_parameters(default_free_names(2), 2),
+                                 radians_from_degrees(0.01), std::nullopt);
+  EXPECT_FALSE(start.mirrored);
+  EXPECT_LT(degrees_from_radians(start.residual_rms), 0.02);
+  const double t = 1e-9 * static_cast<double>(start.time_ns - head.time_ns[0]);
+  EXPECT_LT(degrees_from_radians(
+                std::abs(wrap_to_pi(start.rotation_angle[0] - 2.0 - t * sensor.angular_velocity[0]))),
+            0.5);
+}
+
+TEST(Initialisation, AClockInAnotherUnitIsNamed) {
+  const auto sensor = sensors::load_sensor("mid-40");
+  auto head = testing::constant_speed_series(sensor, 0.5, 2.5, 0.5, 10000.0);
+  for (auto& time : head.time_ns) time *= 2;
+  try {
+    find_start(head, sensor, free_parameters(default_free_names(2), 2), 1e-4);
+    FAIL() << "accepted rotors at half their speed";
+  } catch (const EstimationError& error) {
+    EXPECT_NE(std::string(error.what()).find("0.5 times as fast"), std::string::npos)
+        << error.what();
+  }
+}
+
+TEST(Initialisation, TooFewShotsASecondToFollowTheRotorsAreRefused) {
+  const auto sensor = sensors::load_sensor("mid-40");
+  const auto head = testing::constant_speed_series(sensor, 0.5, 2.5, 1.0, 200.0);
+  EXPECT_THROW(
+      find_start(head, sensor, free_parameters(default_free_names(2), 2), 1e-4, std::nullopt),
+      EstimationError);
+}
+
+TEST(Initialisation, TrackedPhasesFollowAWanderingRotorOverAGap) {
+  const auto sensor = sensors::load_sensor("mid-40");
+  // Speeds as wander: a slow sine of 5 deg/s.
+  const auto motion = [&](double t, std::size_t k) {
+    const double swing = radians_from_degrees(5.0), rate = kTwoPi / 2.0;
+    return (k == 0 ? 0.5 : 2.5) + t * sensor.angular_velocity[k] +
+           swing / rate * (1.0 - std::cos(rate * t));
+  };
+  AngleSeries series;
+  const auto train =
+      prepare<double, 2>(parameter_array<2>(sensor.train), face_order_array<2>(sensor.train));
+  for (int i = 0; i < 6000; ++i) {
+    if (i > 2500 && i < 3700) continue;
+    const double t = 1e-3 * i;
+    const auto angles =
+        angles_from_direction(trace(train, {motion(t, 0), motion(t, 1)}).direction);
+    series.time_ns.push_back(1'000'000LL * i);
+    series.azimuth.push_back(angles.azimuth);
+    series.zenith.push_back(angles.zenith);
+    series.azimuth_rounding_variance.push_back(0);
+    series.zenith_rounding_variance.push_back(0);
+  }
+  const Start start = find_start(series, sensor, {}, 1e-4);
+  const ShotRange all{0, series.size()};
+  RotorTrajectory knots = make_knots(series, {&all, 1}, 2);
+  track_rotors(series, all, start, knots, 0, knots.size());
+  double squares = 0;
+  for (std::size_t knot = 0; knot < knots.size(); ++knot) {
+    for (std::size_t k = 0; k < 2; ++k) {
+      const double miss = wrap_to_pi(knots.state_of(knot)[3 * k] -
+                                     motion(1e-9 * static_cast<double>(knots.time_ns[knot]), k));
+      EXPECT_LT(std::abs(miss), radians_from_degrees(15.0)) << knot;
+      squares += miss * miss;
+    }
+  }
+  EXPECT_LT(std::sqrt(squares / (2.0 * static_cast<double>(knots.size()))),
+            radians_from_degrees(1.5));
 }
 
 TEST(Initialisation, TooLittleDataIsSaidInNumbers) {

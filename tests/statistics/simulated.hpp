@@ -57,18 +57,22 @@ inline simulation::SimulationSettings table3_settings(std::uint64_t seed) {
   return settings;
 }
 
-/// Estimates as the command does by default: from the nominal Mid-40.
-inline estimation::Estimate estimate(const recordings::Observations& observations,
+/// Estimates as the command does with its defaults: from the nominal Mid-40. The filter takes a
+/// thousand shots a second, the batch estimator all.
+inline estimation::Estimate estimate(estimation::Method method,
+                                     const recordings::Observations& observations,
                                      double angle_noise_deg,
                                      std::vector<estimation::RotorProcess> process = {},
                                      const std::string& sensor = "mid-40") {
-  estimation::ShotSelector selector({1000.0});
+  estimation::SelectionOptions selection;
+  if (method == estimation::Method::ekf) selection.rate = 1000.0;
+  estimation::ShotSelector selector(selection);
   selector.add(observations);
   estimation::EstimateOptions options;
   options.sensor = sensors::load_sensor(sensor);
   options.angle_noise = radians_from_degrees(angle_noise_deg);
   options.rotor_process = std::move(process);
-  return estimation::estimate_with_ekf(selector.series(), selector.head(), options);
+  return estimation::estimate(method, selector.take_series(), selector.head(), options);
 }
 
 }  // namespace risley::testing
