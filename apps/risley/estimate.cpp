@@ -19,6 +19,7 @@
 #include "risley/sensors/preset.hpp"
 
 #include "command.hpp"
+#include "estimation_input.hpp"
 #include "observability_text.hpp"
 #include "recording_text.hpp"
 #include "table.hpp"
@@ -47,59 +48,6 @@ struct EstimateCommandOptions {
   }
 };
 
-/// What reading the recording leaves.
-struct ReadResult {
-  std::unique_ptr<recordings::Reader> reader;
-  recordings::TimeAuditResult audit;
-  estimation::ShotSelector selector;
-  double seconds = 0;
-};
-
-ReadResult read_recording(const EstimateCommandOptions& options, const CommonOptions& common) {
-  const double started = now();
-  estimation::SelectionOptions selection;
-  if (options.rate() != "full") {
-    selection.rate = positive_number(options.rate(), "--rate-hz", "Hz");
-  }
-  ReadResult result{
-      recordings::open_recording(options.input), {}, estimation::ShotSelector(selection)};
-  if (result.reader->header().devices.size() > 1) {
-    throw InvalidArgument(
-        fmt::format("{} holds {} sensors, an estimation takes the recording of one", options.input,
-                    result.reader->header().devices.size()));
-  }
-  ProgressBar bar("reading", common);
-  recordings::TimeAudit audit;
-  recordings::Chunk chunk;
-  while (result.reader->read(chunk)) {
-    audit.add(chunk);
-    result.selector.add(chunk.observations);
-    bar.show(result.reader->fraction_read());
-  }
-  result.audit = audit.result();
-  result.seconds = now() - started;
-  return result;
-}
-
-/// The built-in preset of the instrument that made a recording.
-sensors::Sensor sensor_of_recording(const recordings::RecordingHeader& header) {
-  const std::uint8_t type = header.devices.front().type;
-  std::optional<sensors::Sensor> found;
-  for (const std::string& name : sensors::builtin_preset_names()) {
-    sensors::Sensor sensor = sensors::load_sensor(name);
-    // Presets of single units and of reversed rotors have longer names than that of the type.
-    if (sensor.device_type == type && (!found || name.size() < found->name.size())) {
-      found = std::move(sensor);
-    }
-  }
-  if (!found) {
-    throw InvalidArgument(
-        fmt::format("no built-in preset for the recording's sensor ({}): say which with --sensor",
-                    recordings::device_type_name(type)));
-  }
-  return *found;
-}
-
 std::vector<estimation::RotorProcess> rotor_process(const std::string& text, int prisms) {
   if (text == "auto") return {};
   estimation::RotorProcess process = estimation::kPaperProcess;
@@ -112,30 +60,10 @@ std::vector<estimation::RotorProcess> rotor_process(const std::string& text, int
 
 estimation::EstimateOptions estimate_options(const EstimateCommandOptions& options,
                                              const recordings::RecordingHeader& header) {
-  estimation::EstimateOptions result;
-  result.sensor =
-      options.sensor.empty() ? sensor_of_recording(header) : sensors::load_sensor(options.sensor);
-  const int prisms = result.sensor.prisms();
-  if (options.noise_angle_deg) {
-    check_positive(*options.noise_angle_deg, "--noise-angle-deg", "deg");
-    result.angle_noise = radians_from_degrees(*options.noise_angle_deg);
-  }
-  for (const std::string& text : options.fixed) {
-    if (text.find('=') == std::string::npos) {
-      find_parameter(text, prisms);
-      result.fixed.push_back(text);
-      continue;
-    }
-    const auto [name, value] = parameter_assignment(text, prisms);
-    if (find_parameter(name, prisms).kind != ParameterKind::train) {
-      throw InvalidArgument(
-          fmt::format("--fix {}: only parameters of the prisms can be held", name));
-    }
-    result.sensor.set(name, value);
-    result.fixed.push_back(name);
-  }
-  result.additional = options.freed;
-  result.rotor_process = rotor_process(options.process_noise, prisms);
+  estimation::EstimateOptions result = estimate_options(
+      EstimationWishes{options.sensor, options.noise_angle_deg, options.fixed, options.freed},
+      header);
+  result.rotor_process = rotor_process(options.process_noise, result.sensor.prisms());
   if (options.mirror != "auto") result.mirrored = options.mirror == "yes";
   return result;
 }
@@ -168,18 +96,27 @@ Json moments_json(const estimation::Moments& moments) {
 }
 
 Json evaluation_json(const Evaluation& evaluation, int prisms) {
-  Json parameters = Json::object(), rmse = Json::object();
+  Json parameters = Json::object();
   for (const estimation::TruthComparison& one : evaluation.parameters) {
     parameters[one.name] = {{"true", in_file_unit(one.name, one.truth, prisms)},
                             {"error", in_file_unit(one.name, one.error, prisms)},
                             {"error_over_sigma", one.error_over_sigma}};
   }
-  for (std::size_t i = 0; i < evaluation.rotation_angle_rmse.size(); ++i) {
-    rmse[std::string(1, prism_letter(static_cast<int>(i)))] =
-        degrees_from_radians(evaluation.rotation_angle_rmse[i]);
-  }
+  const auto by_prism = [](const std::vector<double>& values, double scale) {
+    Json object = Json::object();
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      object[std::string(1, prism_letter(static_cast<int>(i)))] = scale * values[i];
+    }
+    return object;
+  };
   return {{"parameters", parameters},
-          {"rotation_angle_rmse_deg", rmse},
+          {"rotation_angle_rmse_deg", by_prism(evaluation.rotation_angle_rmse, kDegreesPerRadian)},
+          {"rotation_angle_rmse_over_sigma",
+           by_prism(evaluation.rotation_angle_rmse_over_sigma, 1.0)},
+          {"angular_velocity_rmse_deg_per_s",
+           by_prism(evaluation.angular_velocity_rmse, kDegreesPerRadian)},
+          {"angular_velocity_rmse_over_sigma",
+           by_prism(evaluation.angular_velocity_rmse_over_sigma, 1.0)},
           {"nees_parameters", evaluation.nees_parameters},
           {"nees_rotation_angles", evaluation.nees_rotation_angles}};
 }
@@ -236,6 +173,11 @@ Json outcome_json(const Outcome& outcome) {
     rotors.push_back(degrees_from_radians(process.acceleration));
     jerks.push_back(degrees_from_radians(process.jerk));
   }
+  Json uneven = Json::object();
+  for (std::size_t k = 0; k < e.residuals_over_angle.size(); ++k) {
+    uneven[std::string(1, prism_letter(static_cast<int>(k)))] =
+        e.residuals_over_angle[k].chi2_per_bin;
+  }
   for (const estimation::WeakDirection& weak : e.unobservable) {
     unobservable.push_back(weak_direction_json(weak));
   }
@@ -259,6 +201,7 @@ Json outcome_json(const Outcome& outcome) {
       {"process_noise_deg_per_s_per_sqrt_s", rotors},
       {"process_jerk_deg_per_s2_per_sqrt_s", jerks},
       {"unobservable", unobservable},
+      {"residuals_over_angle_chi2_per_bin", uneven},
       {"start", start_json(e.start)},
       {"warnings", warnings},
       {"seconds",
@@ -348,16 +291,14 @@ void write_state_file(const std::string& path, const EstimateCommandOptions& opt
     return options.states == "all" ? estimation::states_of_shots(estimate, rows)
                                    : estimation::rows_of(estimate.states, rows);
   };
-  for (int prism = 0; prism < content.prisms; ++prism) {
-    content.residuals_over_angle.push_back(estimation::residuals_over_angle(estimate, prism));
-  }
+  content.residuals_over_angle = estimate.residuals_over_angle;
   report::write_states(path, content, provenance);
 }
 
 /// calibration.yaml, states.nc and report.html. An estimate that did not converge is no
 /// calibration: there is none then, not even an older one of the same name.
 void write_folder(const EstimateCommandOptions& options, const CommonOptions& common,
-                  const ReadResult& input, const sensors::Sensor& nominal, const Outcome& outcome) {
+                  const RecordingInput& input, const sensors::Sensor& nominal, const Outcome& outcome) {
   namespace fs = std::filesystem;
   const std::vector<std::pair<std::string, std::string>> provenance = {
       {"command", common.command},
@@ -405,7 +346,9 @@ void check_options(const EstimateCommandOptions& options) {
 ExitStatus run_estimate(const EstimateCommandOptions& options, const CommonOptions& common) {
   const double started = now();
   check_options(options);
-  ReadResult input = read_recording(options, common);
+  std::optional<double> rate;
+  if (options.rate() != "full") rate = positive_number(options.rate(), "--rate-hz", "Hz");
+  RecordingInput input = read_recording(options.input, rate, common);
   const estimation::EstimateOptions settings = estimate_options(options, input.reader->header());
   const estimation::SelectionCounts& counts = input.selector.counts();
   spdlog::debug(
@@ -464,14 +407,7 @@ Run declare_estimate(CLI::App& verb) {
                   "1 sigma of azimuth and zenith before rounding (default: the sensor's)");
   verb.add_option("--sensor", o.sensor,
                   "Preset by name, or a preset or calibration file (default: from the recording)");
-  verb.add_option("--fix", o.fixed, "Hold a parameter, at a value if one is given (repeatable)")
-      ->type_name("NAME[=VALUE]")
-      ->expected(1)
-      ->take_all();
-  verb.add_option("--free", o.freed, "Estimate one more parameter (repeatable)")
-      ->type_name("NAME")
-      ->expected(1)
-      ->take_all();
+  add_parameter_choice(verb, o.fixed, o.freed);
   verb.add_option("--states", o.states,
                   "Which rotor states to write: at one shot every 2 ms (ekf: at the shots used), at "
                   "all shots, none")

@@ -38,6 +38,10 @@ constexpr Verb kVerbs[] = {
      "  risley estimate recording.lvx -o result/\n"
      "  risley estimate unit.csv --truth unit.csv.truth.yaml --json",
      declare_estimate},
+    {"observability", "What a recording, planned or made, can tell of every parameter",
+     "  risley observability --sensor mid-40 --duration-s 30 --rate-hz 100000\n"
+     "  risley observability recording.lvx --free wedge_angle_deg",
+     declare_observability},
 };
 
 void add_common_options(CLI::App& verb, CommonOptions& common) {

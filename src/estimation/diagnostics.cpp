@@ -126,35 +126,34 @@ Autocorrelation autocorrelation(std::span<const std::int64_t> time_ns,
   return result;
 }
 
-AngleProfile angle_profile(std::span<const double> angle, std::span<const double> azimuth,
-                           std::span<const double> zenith, std::span<const unsigned char> skip,
-                           std::size_t bins) {
+AngleProfiler::AngleProfiler(std::size_t bins) : bins_(bins) {}
+
+void AngleProfiler::add(double angle, double azimuth_residual, double zenith_residual) {
+  const double turns = angle * (1.0 / kTwoPi);
+  const double bins = static_cast<double>(bins_.size());
+  const auto at = static_cast<std::size_t>((turns - std::floor(turns)) * bins);
+  Bin& bin = bins_[std::min(at, bins_.size() - 1)];
+  bin.count += 1.0;
+  bin.azimuth += azimuth_residual;
+  bin.zenith += zenith_residual;
+  squares_azimuth_ += azimuth_residual * azimuth_residual;
+  squares_zenith_ += zenith_residual * zenith_residual;
+}
+
+AngleProfile AngleProfiler::result() const {
   AngleProfile profile;
-  profile.count.assign(bins, 0);
-  profile.mean_azimuth.assign(bins, 0.0);
-  profile.mean_zenith.assign(bins, 0.0);
-  double squares_azimuth = 0, squares_zenith = 0, used = 0;
-  for (std::size_t i = 0; i < angle.size(); ++i) {
-    if (skip[i] != 0 || !std::isfinite(azimuth[i]) || !std::isfinite(zenith[i])) continue;
-    const double turn = wrap_to_two_pi(angle[i]) / kTwoPi;
-    const auto bin = std::min(static_cast<std::size_t>(turn * static_cast<double>(bins)), bins - 1);
-    ++profile.count[bin];
-    profile.mean_azimuth[bin] += azimuth[i];
-    profile.mean_zenith[bin] += zenith[i];
-    squares_azimuth += azimuth[i] * azimuth[i];
-    squares_zenith += zenith[i] * zenith[i];
-    ++used;
-  }
-  profile.sigma_azimuth = std::sqrt(squares_azimuth / std::max(used, 1.0));
-  profile.sigma_zenith = std::sqrt(squares_zenith / std::max(used, 1.0));
+  double used = 0;
+  for (const Bin& bin : bins_) used += bin.count;
+  profile.sigma_azimuth = std::sqrt(squares_azimuth_ / std::max(used, 1.0));
+  profile.sigma_zenith = std::sqrt(squares_zenith_ / std::max(used, 1.0));
   double chi2 = 0, counted = 0;
-  for (std::size_t bin = 0; bin < bins; ++bin) {
-    const auto n = static_cast<double>(profile.count[bin]);
-    profile.mean_azimuth[bin] /= n;  // NaN without a shot
-    profile.mean_zenith[bin] /= n;
-    if (profile.count[bin] == 0) continue;
-    chi2 += n * std::pow(profile.mean_azimuth[bin] / profile.sigma_azimuth, 2) +
-            n * std::pow(profile.mean_zenith[bin] / profile.sigma_zenith, 2);
+  for (const Bin& bin : bins_) {
+    profile.count.push_back(static_cast<std::uint64_t>(bin.count));
+    profile.mean_azimuth.push_back(bin.azimuth / bin.count);  // NaN without a shot
+    profile.mean_zenith.push_back(bin.zenith / bin.count);
+    if (!(bin.count > 0)) continue;
+    chi2 += bin.count * std::pow(profile.mean_azimuth.back() / profile.sigma_azimuth, 2) +
+            bin.count * std::pow(profile.mean_zenith.back() / profile.sigma_zenith, 2);
     counted += 2.0;
   }
   profile.chi2_per_bin = counted > 0 ? chi2 / counted : 0.0;

@@ -17,20 +17,6 @@
 namespace risley::estimation {
 namespace {
 
-/// The default free parameters less the fixed ones plus the additional ones.
-std::vector<FreeParameter> chosen_parameters(const EstimateOptions& options) {
-  const int prisms = options.sensor.prisms();
-  std::vector<std::string> names = default_free_names(prisms);
-  for (const std::string& name : options.fixed) {
-    find_parameter(name, prisms);  // an unknown name is an error; one that is not free is no harm
-    std::erase(names, name);
-  }
-  for (const std::string& name : options.additional) {
-    if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
-  }
-  return free_parameters(names, prisms);
-}
-
 /// Parameters, mean speeds and first rotation angles as named values.
 /// @param stretches  rows of the states that are tied together
 std::vector<EstimatedValue> named_values(const Estimate& estimate,
@@ -132,6 +118,12 @@ constexpr double kFarAbove = 3.0;
 /// A parameter combination that keeps more of its prior sigma than this was not measured.
 constexpr double kUnmeasured = 0.3;
 
+/// Squared means over a prism's angle, per bin: 1 with a scatter of 0.12 (72 bins, two axes) when
+/// nothing depends on the angle.
+constexpr double kUneven = 1.6;
+/// Residual variances above the stated one by more than this are worth a word.
+constexpr double kEnlarged = 1.1;
+
 /// Says whether the result can be believed.
 void judge(Estimate& estimate, const PrismTrain& nominal) {
   const double rms =
@@ -156,14 +148,14 @@ void judge(Estimate& estimate, const PrismTrain& nominal) {
         fmt::format("{:.0f} % of the shots do not fit the model: wrong sensor, speed combination "
                     "or mirror image, or a start that did not pull in",
                     100 * outlier_share));
+  } else if (ratio > kFarAbove) {
+    fail(residuals + ": the model does not describe these data, or their noise is larger");
   } else if (!estimate.unobservable.empty()) {
     const WeakDirection& worst = estimate.unobservable.front();
     fail(fmt::format(
         "the data do not tell the combination {} (in units of 1 deg, or 0.01 of an index; its sigma "
         "is {:.2g} of them): hold one of these fixed, or record longer",
         direction_text(worst), worst.sigma));
-  } else if (ratio > kFarAbove) {
-    fail(residuals + ": the model does not describe these data, or their noise is larger");
   } else if (std::string words = implausible_parameter(estimate, nominal); !words.empty()) {
     fail(std::move(words));
   } else if (map && ratio < kFarBelow) {
@@ -172,14 +164,28 @@ void judge(Estimate& estimate, const PrismTrain& nominal) {
          "--noise-angle-deg");
   } else if (map && !estimate.map->settled) {
     fail("the last steps still moved parameters by more than a tenth of their sigma");
-  } else if (ratio > 1.3) {
-    estimate.warnings.push_back(
-        residuals + (map ? ": the sigmas were enlarged by that factor"
-                         : ": the sigmas are too small by about that factor"));
+  } else if (map && estimate.map->unit_variance > kEnlarged) {
+    estimate.warnings.push_back(residuals + ": the sigmas were enlarged by that factor");
+  } else if (!map && ratio > 1.3) {
+    estimate.warnings.push_back(residuals + ": the sigmas are too small by about that factor");
   } else if (ratio < 0.93) {
     estimate.warnings.push_back(residuals +
                                 ": the rotors' noise is set so high that they follow the noise, or "
                                 "the stated noise is too large");
+  }
+  double unevenness = 1.0;
+  std::size_t uneven = 0;
+  for (std::size_t k = 0; k < estimate.residuals_over_angle.size(); ++k) {
+    if (estimate.residuals_over_angle[k].chi2_per_bin <= unevenness) continue;
+    unevenness = estimate.residuals_over_angle[k].chi2_per_bin;
+    uneven = k;
+  }
+  if (unevenness > kUneven * (map ? estimate.map->autocorrelation.factor : 1.0)) {
+    estimate.warnings.push_back(fmt::format(
+        "residuals depend on the rotation angle of prism {} ({:.3g} times what chance would make of "
+        "them): the model lacks something that this sensor has, or a parameter is held at a wrong "
+        "value; the sigmas do not cover that",
+        prism_letter(static_cast<int>(uneven)), unevenness));
   }
   if (map && estimate.map->autocorrelation.factor > 1.05) {
     estimate.warnings.push_back(fmt::format(
@@ -197,6 +203,35 @@ void judge(Estimate& estimate, const PrismTrain& nominal) {
     estimate.warnings.push_back(
         fmt::format("{:.1f} % of the shots were left out as outliers", 100 * outlier_share));
   }
+}
+
+/// Mean residuals over every prism's angle, of all shots that were used.
+std::vector<AngleProfile> profiles(const Estimate& estimate) {
+  std::vector<AngleProfile> result;
+  for (std::size_t k = 0; k < static_cast<std::size_t>(estimate.states.prisms()); ++k) {
+    AngleProfiler profiler;
+    if (estimate.map) {
+      const BatchMapResult& map = *estimate.map;
+      const RotorTrajectory& t = map.trajectory;
+      for (std::size_t knot = 0; knot < t.size(); ++knot) {
+        for (std::size_t i = t.first_shot[knot]; i < t.last_shot[knot]; ++i) {
+          if (map.outlier[i]) continue;
+          const double seconds =
+              1e-9 * static_cast<double>(estimate.series.time_ns[i] - t.time_ns[knot]);
+          profiler.add(t.angle(knot, k, seconds), map.azimuth_residual[i], map.zenith_residual[i]);
+        }
+      }
+    } else {
+      const RotorStates& states = estimate.states;
+      for (std::size_t i = 0; i < states.size(); ++i) {
+        if (states.outlier[i] || !std::isfinite(states.azimuth_residual[i])) continue;
+        profiler.add(states.rotation_angle[k][i], states.azimuth_residual[i],
+                     states.zenith_residual[i]);
+      }
+    }
+    result.push_back(profiler.result());
+  }
+  return result;
 }
 
 /// Runs the batch estimator and takes over what it found. @return rows of the states per stretch
@@ -245,6 +280,19 @@ std::vector<ShotRange> take_ekf(Estimate& estimate, const EstimateOptions& optio
 
 }  // namespace
 
+std::vector<FreeParameter> chosen_parameters(const EstimateOptions& options) {
+  const int prisms = options.sensor.prisms();
+  std::vector<std::string> names = default_free_names(prisms);
+  for (const std::string& name : options.fixed) {
+    find_parameter(name, prisms);  // an unknown name is an error; one that is not free is no harm
+    std::erase(names, name);
+  }
+  for (const std::string& name : options.additional) {
+    if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
+  }
+  return free_parameters(names, prisms);
+}
+
 Estimate estimate(Method method, AngleSeries series, const AngleSeries& head,
                   const EstimateOptions& options, const Progress& progress) {
   if (series.size() == 0) throw EstimationError("the recording holds no valid shot");
@@ -291,6 +339,7 @@ Estimate estimate(Method method, AngleSeries series, const AngleSeries& head,
   estimate.sensor = calibrated_sensor(
       options.sensor, with_free_values(options.sensor.train, estimate.free, estimate.parameters),
       estimate);
+  estimate.residuals_over_angle = profiles(estimate);
   judge(estimate, options.sensor.train);
   return estimate;
 }
@@ -298,25 +347,6 @@ Estimate estimate(Method method, AngleSeries series, const AngleSeries& head,
 RotorStates states_of_shots(const Estimate& estimate, ShotRange shots) {
   return estimate.map ? states_of_shots(*estimate.map, estimate.series, shots)
                       : rows_of(estimate.states, shots);
-}
-
-AngleProfile residuals_over_angle(const Estimate& estimate, int prism) {
-  const auto rotor = static_cast<std::size_t>(prism);
-  if (!estimate.map) {
-    const RotorStates& states = estimate.states;
-    return angle_profile(states.rotation_angle[rotor], states.azimuth_residual,
-                         states.zenith_residual, states.outlier);
-  }
-  const BatchMapResult& map = *estimate.map;
-  std::vector<double> angle(estimate.series.size(), std::numeric_limits<double>::quiet_NaN());
-  const RotorTrajectory& t = map.trajectory;
-  for (std::size_t knot = 0; knot < t.size(); ++knot) {
-    for (std::size_t shot = t.first_shot[knot]; shot < t.last_shot[knot]; ++shot) {
-      angle[shot] = t.angle(
-          knot, rotor, 1e-9 * static_cast<double>(estimate.series.time_ns[shot] - t.time_ns[knot]));
-    }
-  }
-  return angle_profile(angle, map.azimuth_residual, map.zenith_residual, map.outlier);
 }
 
 }  // namespace risley::estimation

@@ -82,7 +82,8 @@ Evaluation evaluate(const Estimate& estimate, const sensors::Sensor& truth_senso
         error.dot(estimate.covariance.ldlt().solve(error)) / static_cast<double>(statics);
   }
 
-  std::vector<double> squares(rotor_count, 0.0);
+  std::vector<double> squares(rotor_count, 0.0), variances = squares, speed_squares = squares,
+                                                  speed_variances = squares;
   Eigen::VectorXd error(prisms);
   Eigen::MatrixXd covariance(prisms, prisms);
   result.rotation_angle_error.assign(rotor_count, std::vector<double>(rows.size()));
@@ -94,6 +95,10 @@ Evaluation evaluate(const Estimate& estimate, const sensors::Sensor& truth_senso
       error[row] = wrap_to_pi(states.rotation_angle[k][i] - truth.rotation_angle[k][rows[i]]);
       result.rotation_angle_error[k][i] = error[row];
       squares[k] += error[row] * error[row];
+      variances[k] += states.rotation_angle_covariance[entry][i];
+      speed_squares[k] +=
+          std::pow(states.angular_velocity[k][i] - truth.angular_velocity[k][rows[i]], 2);
+      speed_variances[k] += std::pow(states.angular_velocity_sigma[k][i], 2);
       for (std::size_t l = k; l < rotor_count; ++l) {
         const auto column = static_cast<Eigen::Index>(l);
         covariance(row, column) = covariance(column, row) =
@@ -103,7 +108,13 @@ Evaluation evaluate(const Estimate& estimate, const sensors::Sensor& truth_senso
     nees += error.dot(covariance.ldlt().solve(error)) / prisms;
   }
   const auto count = static_cast<double>(rows.size());
-  for (const double sum : squares) result.rotation_angle_rmse.push_back(std::sqrt(sum / count));
+  for (std::size_t k = 0; k < rotor_count; ++k) {
+    result.rotation_angle_rmse.push_back(std::sqrt(squares[k] / count));
+    result.angular_velocity_rmse.push_back(std::sqrt(speed_squares[k] / count));
+    result.rotation_angle_rmse_over_sigma.push_back(std::sqrt(squares[k] / variances[k]));
+    result.angular_velocity_rmse_over_sigma.push_back(
+        std::sqrt(speed_squares[k] / speed_variances[k]));
+  }
   result.nees_rotation_angles = nees / count;
   return result;
 }

@@ -4,9 +4,17 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include <Eigen/Eigenvalues>
 #include <fmt/format.h>
+
+#include "risley/core/angle.hpp"
+#include "risley/core/error.hpp"
+#include "risley/estimation/estimate.hpp"
+#include "risley/estimation/normal_equations.hpp"
+#include "risley/estimation/smoother.hpp"
+#include "risley/optics/observation_model.hpp"
 
 namespace risley::estimation {
 
@@ -52,6 +60,330 @@ std::string direction_text(const WeakDirection& direction) {
     text += fmt::format("{:.2f} {}", std::abs(weight), name);
   }
   return text;
+}
+
+namespace {
+
+/// Below this share of the largest, an eigenvalue of the scaled information is its rounding.
+constexpr double kNoInformation = 1e-12;
+constexpr std::size_t kMostShots = 600000;
+constexpr double kMostDuration = 2000.0;
+/// Correlations from here on make two quantities hard to tell apart.
+constexpr double kStrong = 0.9;
+/// From here on one is as good as the other.
+constexpr double kTwin = 0.98;
+
+/// Every parameter of the prisms that exists, shared ones under their shared names.
+std::vector<FreeParameter> all_parameters(int prisms) {
+  std::vector<std::string> names{"refractive_index_air", "refractive_index", "wedge_angle_deg"};
+  for (const ParameterInfo& info : parameter_list(prisms)) {
+    const bool error = info.name.find("tilt") != std::string::npos ||
+                       info.name.find("incident_beam") != std::string::npos;
+    if (info.kind == ParameterKind::train && error && info.places.size() == 1) {
+      names.push_back(info.name);
+    }
+  }
+  return free_parameters(names, prisms);
+}
+
+/// Inverse of some rows of an information matrix; regular tells whether there is one.
+Eigen::MatrixXd restricted_covariance(const Eigen::MatrixXd& information,
+                                      const Eigen::VectorXd& scale,
+                                      const std::vector<Eigen::Index>& rows, bool& regular) {
+  const auto n = static_cast<Eigen::Index>(rows.size());
+  Eigen::MatrixXd scaled(n, n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    for (Eigen::Index j = 0; j < n; ++j) {
+      const Eigen::Index a = rows[static_cast<std::size_t>(i)];
+      const Eigen::Index b = rows[static_cast<std::size_t>(j)];
+      scaled(i, j) = scale[a] * information(a, b) * scale[b];
+    }
+  }
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(scaled);
+  regular = n == 0 || solver.eigenvalues()[0] > kNoInformation * solver.eigenvalues()[n - 1];
+  if (!regular) return {};
+  Eigen::MatrixXd covariance = solver.eigenvectors() *
+                               solver.eigenvalues().cwiseInverse().asDiagonal() *
+                               solver.eigenvectors().transpose();
+  for (Eigen::Index i = 0; i < n; ++i) {
+    covariance.row(i) *= scale[rows[static_cast<std::size_t>(i)]];
+    covariance.col(i) *= scale[rows[static_cast<std::size_t>(i)]];
+  }
+  return covariance;
+}
+
+/// Parameters and the rotors' states in the middle of a recording, as one linear model: the states
+/// are s = S p + rest, where the rest has a covariance of its own.
+struct Middle {
+  Eigen::MatrixXd sensitivity;  ///< [2 prisms, all]: angles, then speeds
+  Eigen::MatrixXd rest;         ///< [2 prisms, 2 prisms]
+};
+
+Middle middle_of(const SmootherSolution& solution, const RotorTrajectory& knots) {
+  const Eigen::Index d = knots.states(), n = solution.parameter_covariance.rows();
+  const std::size_t knot = knots.size() / 2;
+  using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+  const Eigen::MatrixXd all =
+      Eigen::Map<const RowMajor>(solution.sensitivity.data() + knot * static_cast<std::size_t>(d * n),
+                                 d, n);
+  Eigen::MatrixXd total(d, d);
+  const double* entry =
+      solution.state_covariance.data() + knot * static_cast<std::size_t>(d * (d + 1) / 2);
+  for (Eigen::Index i = 0; i < d; ++i) {
+    for (Eigen::Index j = i; j < d; ++j) total(i, j) = total(j, i) = *entry++;
+  }
+  total -= all * solution.parameter_covariance * all.transpose();
+  Middle middle{Eigen::MatrixXd(2 * knots.prisms, n),
+                Eigen::MatrixXd(2 * knots.prisms, 2 * knots.prisms)};
+  const auto row_of = [&](Eigen::Index i) {
+    return i < knots.prisms ? kStatesPerRotor * i : kStatesPerRotor * (i - knots.prisms) + 1;
+  };
+  for (Eigen::Index i = 0; i < 2 * knots.prisms; ++i) {
+    middle.sensitivity.row(i) = all.row(row_of(i));
+    for (Eigen::Index j = 0; j < 2 * knots.prisms; ++j) {
+      middle.rest(i, j) = total(row_of(i), row_of(j));
+    }
+  }
+  return middle;
+}
+
+/// Covariance of some parameters and the states in the middle, from that of the parameters.
+Eigen::MatrixXd joint_covariance(const Eigen::MatrixXd& parameters, const Middle& middle,
+                                 const std::vector<Eigen::Index>& rows) {
+  const auto n = static_cast<Eigen::Index>(rows.size()), m = middle.rest.rows();
+  Eigen::MatrixXd sensitivity(m, n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    sensitivity.col(i) = middle.sensitivity.col(rows[static_cast<std::size_t>(i)]);
+  }
+  Eigen::MatrixXd joint(n + m, n + m);
+  joint.topLeftCorner(n, n) = parameters;
+  joint.bottomLeftCorner(m, n) = sensitivity * parameters;
+  joint.topRightCorner(n, m) = joint.bottomLeftCorner(m, n).transpose();
+  joint.bottomRightCorner(m, m) = middle.rest + sensitivity * parameters * sensitivity.transpose();
+  return joint;
+}
+
+/// Sorts by strength and leaves the strongest and those beyond kTwin.
+void keep_strongest(std::vector<std::pair<std::string, double>>& twins) {
+  std::stable_sort(twins.begin(), twins.end(), [](const auto& a, const auto& b) {
+    return std::abs(a.second) > std::abs(b.second);
+  });
+  std::size_t kept = std::min<std::size_t>(1, twins.size());
+  while (kept < twins.size() && std::abs(twins[kept].second) >= kTwin) ++kept;
+  twins.resize(kept);
+}
+
+/// Everything from the normal equations with all parameters.
+/// @param information_per_square  shots over the variance of an angle, 1 / rad^2
+Observability analyse(const NormalEquations& equations, const RotorTrajectory& knots,
+                      const std::vector<RotorProcess>& process,
+                      const std::vector<FreeParameter>& all, const std::vector<FreeParameter>& free,
+                      double duration, double shots, double information_per_square) {
+  const auto n = static_cast<Eigen::Index>(all.size());
+  const Eigen::Index prisms = knots.prisms;
+  ParameterPrior prior{Eigen::VectorXd(n), Eigen::VectorXd::Zero(n)};
+  Eigen::VectorXd scale(n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    scale[i] = all[static_cast<std::size_t>(i)].prior_sigma;
+    prior.information[i] = 1.0 / (scale[i] * scale[i]);
+  }
+  const SmootherSolution solution = smooth(equations, knots, process, prior, true);
+  const Middle middle = middle_of(solution, knots);
+
+  Observability result;
+  result.shots = shots;
+  result.duration = duration;
+  result.rate = duration > 0 ? shots / duration : 0;
+  result.unobservable = weak_directions(solution.parameter_information, all, 1.0);
+  for (const FreeParameter& parameter : all) result.correlation_names.push_back(parameter.name);
+  for (const char* quantity : {"rotation_angle_{}_deg", "angular_velocity_{}_deg_per_s"}) {
+    for (int k = 0; k < knots.prisms; ++k) {
+      result.correlation_names.push_back(fmt::format(fmt::runtime(quantity), prism_letter(k)));
+    }
+  }
+  std::vector<Eigen::Index> every(all.size());
+  for (std::size_t i = 0; i < every.size(); ++i) every[i] = static_cast<Eigen::Index>(i);
+  const Eigen::MatrixXd joint = joint_covariance(solution.parameter_covariance, middle, every);
+  const Eigen::VectorXd inverse_sigma = joint.diagonal().array().rsqrt();
+  result.correlation = inverse_sigma.asDiagonal() * joint * inverse_sigma.asDiagonal();
+
+  std::vector<Eigen::Index> chosen;
+  for (const FreeParameter& parameter : free) {
+    for (Eigen::Index i = 0; i < n; ++i) {
+      if (all[static_cast<std::size_t>(i)].name == parameter.name) chosen.push_back(i);
+    }
+  }
+  // One quantity among parameters and the states in the middle.
+  const auto describe = [&](Eigen::Index quantity, std::vector<Eigen::Index> rows) {
+    QuantityObservability found;
+    found.name = result.correlation_names[static_cast<std::size_t>(quantity)];
+    const bool parameter = quantity < n;
+    const auto at = std::find(rows.begin(), rows.end(), quantity);
+    found.free = !parameter || at != rows.end();
+    if (parameter && at == rows.end()) rows.push_back(quantity);
+    bool regular = false;
+    const Eigen::MatrixXd covariance =
+        restricted_covariance(solution.parameter_information, scale, rows, regular);
+    if (!regular) {
+      found.sigma = std::numeric_limits<double>::infinity();
+      // Whom it cannot be told from shows under the wide priors.
+      for (Eigen::Index j = 0; j < result.correlation.rows(); ++j) {
+        if (j == quantity) continue;
+        found.twins.emplace_back(result.correlation_names[static_cast<std::size_t>(j)],
+                                 result.correlation(quantity, j));
+      }
+      keep_strongest(found.twins);
+      return found;
+    }
+    const Eigen::MatrixXd both = joint_covariance(covariance, middle, rows);
+    const auto count = static_cast<Eigen::Index>(rows.size());
+    const Eigen::Index place =
+        parameter ? std::find(rows.begin(), rows.end(), quantity) - rows.begin()
+                  : count + quantity - n;
+    found.sigma = std::sqrt(both(place, place));
+    for (Eigen::Index j = 0; j < both.rows(); ++j) {
+      if (j == place) continue;
+      const Eigen::Index name = j < count ? rows[static_cast<std::size_t>(j)] : n + j - count;
+      found.twins.emplace_back(result.correlation_names[static_cast<std::size_t>(name)],
+                               both(place, j) / std::sqrt(both(place, place) * both(j, j)));
+    }
+    keep_strongest(found.twins);
+    return found;
+  };
+  for (Eigen::Index i = 0; i < n + 2 * prisms; ++i) {
+    QuantityObservability quantity = describe(i, chosen);
+    double squares = 0;
+    if (i < n) {
+      squares = equations.static_hessian(i, i);
+    } else {
+      // Entry (k, k) of the pairs of rotors; sums over all knots.
+      const Eigen::Index k = (i - n) % prisms;
+      const Eigen::Index pair = k * prisms - k * (k - 1) / 2;
+      const Eigen::Index pairs = prisms * (prisms + 1) / 2;
+      for (std::size_t knot = 0; knot < knots.size(); ++knot) {
+        squares += equations.curvature[(knot * static_cast<std::size_t>(pairs) +
+                                        static_cast<std::size_t>(pair)) *
+                                       5];
+      }
+      if (i >= n + prisms) squares *= duration * duration / 12.0;
+    }
+    quantity.sensitivity = std::sqrt(squares / information_per_square);
+    result.quantities.push_back(std::move(quantity));
+  }
+  return result;
+}
+
+}  // namespace
+
+Observability observability_of_plan(const ObservabilityPlan& plan) {
+  const auto positive = [](double value, const char* name, const char* unit) {
+    if (!(value > 0) || !std::isfinite(value)) {
+      throw InvalidArgument(fmt::format("{} = {} {}, allowed above 0", name, value, unit));
+    }
+  };
+  positive(plan.duration, "duration", "s");
+  positive(plan.rate, "rate", "Hz");
+  const double variance = plan.angle_noise * plan.angle_noise +
+                          plan.angle_resolution * plan.angle_resolution / 12.0;
+  positive(variance, "noise and rounding", "rad^2");
+  const PrismTrain& train = plan.sensor.train;
+  const double duration = std::min(plan.duration, kMostDuration);
+  const double shots = plan.duration * plan.rate;
+  const double rate = std::min(plan.rate, static_cast<double>(kMostShots) / duration);
+  const auto count = static_cast<std::size_t>(std::floor(duration * rate)) + 1;
+
+  AngleSeries series;
+  std::vector<double> angles(static_cast<std::size_t>(train.prisms()));
+  for (std::size_t i = 0; i < count; ++i) {
+    const double t = static_cast<double>(i) / rate;
+    series.time_ns.push_back(std::llround(1e9 * t));
+    for (std::size_t k = 0; k < angles.size(); ++k) {
+      angles[k] = wrap_to_pi(plan.sensor.angular_velocity[k] * (1e-9 * static_cast<double>(series.time_ns.back())));
+    }
+    const Observation shot = observe(train, angles);
+    series.azimuth.push_back(shot.azimuth);
+    series.zenith.push_back(shot.zenith);
+    series.azimuth_rounding_variance.push_back(0);
+    series.zenith_rounding_variance.push_back(0);
+  }
+  const ShotRange range{0, series.size()};
+  RotorTrajectory knots = make_knots(series, {&range, 1}, train.prisms());
+  for (std::size_t knot = 0; knot < knots.size(); ++knot) {
+    const auto state = knots.state_of(knot);
+    for (std::size_t k = 0; k < angles.size(); ++k) {
+      const double speed = plan.sensor.angular_velocity[k];
+      state[kStatesPerRotor * k] = speed * (1e-9 * static_cast<double>(knots.time_ns[knot]));
+      state[kStatesPerRotor * k + 1] = speed;
+    }
+  }
+  std::vector<RotorProcess> process = plan.rotor_process;
+  if (process.empty()) process.assign(angles.size(), kTypicalRotor);
+  const std::vector<FreeParameter> all = all_parameters(train.prisms());
+  NormalEquations equations;
+  // Fewer shots count for all of them.
+  const double share = shots / static_cast<double>(count);
+  accumulate(series, knots, train, all, {std::sqrt(variance / share), 0.0}, equations);
+  return analyse(equations, knots, process, all, plan.free, plan.duration, shots, shots / variance);
+}
+
+Observability observability_of_estimate(const Estimate& estimate) {
+  if (!estimate.map) {
+    throw InvalidArgument("observability needs an estimate of the batch estimator (method map)");
+  }
+  const BatchMapResult& map = *estimate.map;
+  const std::vector<FreeParameter> all = all_parameters(estimate.sensor.prisms());
+  NormalEquations equations;
+  ShotWeights weights;
+  weights.angle_noise = estimate.angle_noise;
+  weights.cut = 20.0 * std::max(1.0, map.unit_variance);
+  accumulate(estimate.series, map.trajectory, map.train, all, weights, equations);
+  equations.scale(1.0 / map.variance_factor);
+  const double shots = static_cast<double>(equations.shots - equations.outliers);
+  const double variance =
+      estimate.expected_residual * estimate.expected_residual * map.variance_factor;
+  double duration = 0;
+  for (const ShotRange& range : stretches(estimate.series)) {
+    duration += 1e-9 * static_cast<double>(estimate.series.time_ns[range.end - 1] -
+                                           estimate.series.time_ns[range.begin]);
+  }
+  return analyse(equations, map.trajectory, map.rotor_process, all, estimate.free, duration, shots,
+                 shots / variance);
+}
+
+std::vector<std::string> observability_words(const Observability& observability, int prisms) {
+  std::vector<std::string> words;
+  for (const QuantityObservability& quantity : observability.quantities) {
+    const ParameterInfo& info = find_parameter(quantity.name, prisms);
+    if (info.kind != ParameterKind::train) continue;
+    const std::string unit = info.unit == "1" ? "" : " " + info.unit;
+    const double sigma = quantity.sigma / info.si_per_unit;
+    std::string twins;
+    for (const auto& [name, rho] : quantity.twins) {
+      if (!twins.empty()) twins += " or ";
+      twins += std::abs(rho) < kStrong ? name : fmt::format("{} (rho = {:.4f})", name, rho);
+    }
+    const std::string twin = fmt::format("{} cannot be told from {}", quantity.name, twins);
+    if (!std::isfinite(sigma)) {
+      words.push_back(twin +
+                      ", however long a sensor with these parameters records: keep it fixed");
+      continue;
+    }
+    if (quantity.free || std::abs(quantity.twins.front().second) < kStrong) continue;
+    // What would be worth freeing it: a hundredth of a degree, or 1e-5 of an index.
+    const double target = info.unit == "1" ? 1e-5 : 0.01;
+    const double needed = observability.duration * std::pow(sigma / target, 2);
+    if (needed <= observability.duration) {
+      words.push_back(
+          fmt::format("{} acts nearly like {}, but this recording tells them apart: freed, its sigma "
+                      "is {:.2g}{}, and {:.3g} s at {:.4g} Hz reach {}{}",
+                      quantity.name, twins, sigma, unit, needed, observability.rate, target, unit));
+    } else {
+      words.push_back(fmt::format(
+          "{}: keep it fixed. Freed, its sigma is {:.2g}{}; {}{} would take {:.3g} s at {:.4g} Hz",
+          twin, sigma, unit, target, unit, needed, observability.rate));
+    }
+  }
+  return words;
 }
 
 }  // namespace risley::estimation

@@ -44,16 +44,28 @@ Autocorrelation autocorrelation(std::span<const std::int64_t> time_ns,
 
 /// Mean residuals over the rotation angle of one prism: where a bent sensor shows.
 struct AngleProfile {
-  std::vector<std::uint64_t> count;                      ///< [bins], shots
-  std::vector<double> mean_azimuth, mean_zenith;         ///< [bins], rad; NaN in an empty bin
-  double sigma_azimuth = 0, sigma_zenith = 0;            ///< of one shot, rad
-  /// Sum of squared means over their variances per bin and axis; about 1 when nothing is left.
+  std::vector<std::uint64_t> count;               ///< [bins], shots
+  std::vector<double> mean_azimuth, mean_zenith;  ///< [bins], rad; NaN in an empty bin
+  double sigma_azimuth = 0, sigma_zenith = 0;     ///< of one shot, rad
+  /// Mean of the squared means over their variances, per bin and axis; about 1 when nothing depends
+  /// on the angle.
   double chi2_per_bin = 0;
 };
 
-/// @param angle  rotation angle of the prism at every shot, rad, any number of turns
-AngleProfile angle_profile(std::span<const double> angle, std::span<const double> azimuth,
-                           std::span<const double> zenith, std::span<const unsigned char> skip,
-                           std::size_t bins = 72);
+/// Collects an AngleProfile shot by shot.
+class AngleProfiler {
+ public:
+  explicit AngleProfiler(std::size_t bins = 72);
+  /// @param angle  rotation angle of the prism, rad, any number of turns
+  void add(double angle, double azimuth_residual, double zenith_residual);
+  AngleProfile result() const;
+
+ private:
+  struct Bin {
+    double count = 0, azimuth = 0, zenith = 0;
+  };
+  std::vector<Bin> bins_;
+  double squares_azimuth_ = 0, squares_zenith_ = 0;
+};
 
 }  // namespace risley::estimation

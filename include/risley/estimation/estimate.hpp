@@ -30,6 +30,10 @@ struct EstimateOptions {
   std::optional<bool> mirrored;             ///< the elevation's sign is turned; empty: find out
 };
 
+/// What a user's choice leaves free: the default parameters less the fixed ones plus the others.
+/// @throws InvalidArgument for unknown names
+std::vector<FreeParameter> chosen_parameters(const EstimateOptions& options);
+
 /// One estimated quantity, SI units.
 struct EstimatedValue {
   std::string name;
@@ -60,15 +64,13 @@ struct Estimate {
   std::optional<BatchMapResult> map;  ///< all that the batch estimator knows
 
   Moments azimuth_residuals, zenith_residuals;  ///< rad, of all shots, outliers left out
+  std::vector<AngleProfile> residuals_over_angle;  ///< [prisms], of all shots
   double angle_noise = 0;                       ///< assumed, rad, before rounding
   double expected_residual = 0;                 ///< rms of noise and rounding together, rad
 };
 
 /// Rotor states of shots [begin, end) of an estimate's series.
 RotorStates states_of_shots(const Estimate& estimate, ShotRange shots);
-
-/// Mean residuals over the rotation angle of one prism, of all shots.
-AngleProfile residuals_over_angle(const Estimate& estimate, int prism);
 
 /// Estimates parameters and rotation angles. A mirrored recording is turned first; results describe
 /// the turned one. The filter works on one stretch of time alone and takes the longest where the

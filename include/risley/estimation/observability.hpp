@@ -2,15 +2,12 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include <Eigen/Core>
 
-#include "risley/core/progress.hpp"
-#include "risley/estimation/angle_series.hpp"
 #include "risley/estimation/free_parameters.hpp"
 #include "risley/estimation/rotor_process.hpp"
 #include "risley/sensors/sensor.hpp"
@@ -41,44 +38,57 @@ struct ObservabilityPlan {
   sensors::Sensor sensor;
   double duration = 30;     ///< s
   double rate = 100000;     ///< shots per second
-  double angle_noise = 0;   ///< 1 sigma of azimuth and zenith, rad
-  double angle_resolution = 0;  ///< rounding step, rad; 0: none
+  double angle_noise = 0;   ///< 1 sigma of azimuth and zenith before rounding, rad
+  double angle_resolution = 0;      ///< rounding step, rad; 0: none
   std::vector<FreeParameter> free;  ///< what the bounds are for
-  /// Motion model; empty takes rotors like those that the paper saw (Fig. 9).
+  /// Motion model [prisms]; empty takes kTypicalRotor.
   std::vector<RotorProcess> rotor_process;
 };
 
-/// What one parameter means to the observations and what they mean to it.
-struct ParameterObservability {
-  std::string name;
-  bool free = false;  ///< among the free ones of the plan
-  /// Root mean square change of azimuth and zenith together for a change of the parameter alone,
-  /// rad per SI unit.
+/// A rotor that moves as the paper saw it: speeds that swing by 2.2 deg/s within seconds (Fig. 9).
+inline constexpr RotorProcess kTypicalRotor{0.0, 0.0, radians_from_degrees(4.0)};
+
+/// What one quantity means to the observations and what they mean to it. SI units.
+struct QuantityObservability {
+  std::string name;   ///< as in parameter_list()
+  bool free = false;  ///< among the free ones; rotation angles and speeds always are
+  /// Root mean square change of azimuth and zenith together for a change of this alone, rad per
+  /// unit. A speed turns the prism about the middle of the recording.
   double sensitivity = 0;
-  /// Cramer-Rao bound, SI units: with the free parameters, and this one too when it is not among
-  /// them. Infinite where the data cannot tell.
+  /// Cramer-Rao bound with the free quantities, and with this one too when it is not among them;
+  /// infinite where no data of the kind can tell. Rotation angles and speeds: in the middle.
   double sigma = 0;
-  /// What it is mixed up with, by name, and the correlation: the strongest one, rotation angles and
-  /// speeds included.
-  std::string twin;
-  double twin_correlation = 0;
+  /// What it is most correlated with among those, and how much: the strongest, and others beyond
+  /// 0.98, strongest first.
+  std::vector<std::pair<std::string, double>> twins;
 };
 
-/// Section 2.3 of the paper for any plan, sensor and recording.
+/// Section 2.3 of the paper for any sensor, plan and recording.
 struct Observability {
-  std::vector<ParameterObservability> parameters;  ///< of the prisms, shared names
-  /// Joint correlation of the free parameters, then of each rotor's angle and speed in the middle
-  /// of the recording.
+  std::vector<QuantityObservability> quantities;  ///< all of the prisms, then angles, then speeds
+  /// Correlation of everything in quantities with all of the prisms' parameters free, under their
+  /// wide priors (1 degree, 0.01 of an index): what would happen to who frees everything.
   std::vector<std::string> correlation_names;
   Eigen::MatrixXd correlation;
-  /// With every parameter of the prisms free: combinations that no data of this plan tell.
+  /// With all of the prisms' parameters free: combinations that keep their prior sigma or more.
   std::vector<WeakDirection> unobservable;
-  double observations = 0;  ///< shots
-  std::vector<std::string> words;  ///< for people: what to hold fixed, and what it would take
+  double shots = 0, duration = 0, rate = 0;
 };
 
-/// Cramer-Rao bounds of a plan: the information of constantly turning prisms with the plan's motion
-/// model, on a quarter of a second or so and scaled up where that is exact enough.
-Observability observability_of_plan(const ObservabilityPlan& plan, const Progress& progress = {});
+/// Cramer-Rao bounds of a plan: the information of prisms that turn at the sensor's speeds under the
+/// plan's motion model. Information grows with the number of shots, so large plans are evaluated
+/// with fewer shots of higher weight, and beyond 2,000 s with less time.
+/// @throws InvalidArgument for a plan without duration, rate or noise
+Observability observability_of_plan(const ObservabilityPlan& plan);
+
+struct Estimate;
+
+/// The same for a recording that was estimated: its own shots, gaps, outliers and rotors.
+/// @throws InvalidArgument when the estimate is not one of the batch estimator
+Observability observability_of_estimate(const Estimate& estimate);
+
+/// What a user should know, in sentences: which parameters to hold fixed, what each is mixed up
+/// with, and how long a recording would have to be to tell them after all.
+std::vector<std::string> observability_words(const Observability& observability, int prisms);
 
 }  // namespace risley::estimation

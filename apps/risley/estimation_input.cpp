@@ -1,0 +1,98 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "estimation_input.hpp"
+
+#include <fmt/format.h>
+
+#include "risley/core/angle.hpp"
+#include "risley/core/error.hpp"
+#include "risley/sensors/preset.hpp"
+
+namespace risley::app {
+namespace {
+
+/// The built-in preset of the instrument that made a recording.
+sensors::Sensor sensor_of_recording(const recordings::RecordingHeader& header) {
+  const std::uint8_t type = header.devices.front().type;
+  std::optional<sensors::Sensor> found;
+  for (const std::string& name : sensors::builtin_preset_names()) {
+    sensors::Sensor sensor = sensors::load_sensor(name);
+    // Presets of single units and of reversed rotors have longer names than that of the type.
+    if (sensor.device_type == type && (!found || name.size() < found->name.size())) {
+      found = std::move(sensor);
+    }
+  }
+  if (!found) {
+    throw InvalidArgument(
+        fmt::format("no built-in preset for the recording's sensor ({}): say which with --sensor",
+                    recordings::device_type_name(type)));
+  }
+  return *found;
+}
+
+}  // namespace
+
+RecordingInput read_recording(const std::string& path, std::optional<double> rate,
+                              const CommonOptions& common) {
+  const double started = now();
+  RecordingInput result{recordings::open_recording(path), {}, estimation::ShotSelector({rate})};
+  if (result.reader->header().devices.size() > 1) {
+    throw InvalidArgument(
+        fmt::format("{} holds {} sensors, an estimation takes the recording of one", path,
+                    result.reader->header().devices.size()));
+  }
+  ProgressBar bar("reading", common);
+  recordings::TimeAudit audit;
+  recordings::Chunk chunk;
+  while (result.reader->read(chunk)) {
+    audit.add(chunk);
+    result.selector.add(chunk.observations);
+    bar.show(result.reader->fraction_read());
+  }
+  result.audit = audit.result();
+  result.seconds = now() - started;
+  return result;
+}
+
+estimation::EstimateOptions estimate_options(
+    const EstimationWishes& wishes, const std::optional<recordings::RecordingHeader>& header) {
+  estimation::EstimateOptions result;
+  if (wishes.sensor.empty() && !header) throw InvalidArgument("--sensor is missing");
+  result.sensor =
+      wishes.sensor.empty() ? sensor_of_recording(*header) : sensors::load_sensor(wishes.sensor);
+  const int prisms = result.sensor.prisms();
+  if (wishes.noise_angle_deg) {
+    check_positive(*wishes.noise_angle_deg, "--noise-angle-deg", "deg");
+    result.angle_noise = radians_from_degrees(*wishes.noise_angle_deg);
+  }
+  for (const std::string& text : wishes.fixed) {
+    if (text.find('=') == std::string::npos) {
+      find_parameter(text, prisms);
+      result.fixed.push_back(text);
+      continue;
+    }
+    const auto [name, value] = parameter_assignment(text, prisms);
+    if (find_parameter(name, prisms).kind != ParameterKind::train) {
+      throw InvalidArgument(
+          fmt::format("--fix {}: only parameters of the prisms can be held", name));
+    }
+    result.sensor.set(name, value);
+    result.fixed.push_back(name);
+  }
+  result.additional = wishes.freed;
+  return result;
+}
+
+void add_parameter_choice(CLI::App& verb, std::vector<std::string>& fixed,
+                          std::vector<std::string>& freed) {
+  verb.add_option("--fix", fixed, "Hold a parameter, at a value if one is given (repeatable)")
+      ->type_name("NAME[=VALUE]")
+      ->expected(1)
+      ->take_all();
+  verb.add_option("--free", freed, "Estimate one more parameter (repeatable)")
+      ->type_name("NAME")
+      ->expected(1)
+      ->take_all();
+}
+
+}  // namespace risley::app

@@ -1,0 +1,344 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+// How long does the batch estimator take for all shots of a recording, on one core? The peer is a
+// forward extended Kalman filter written plainly with Eigen and automatic differentiation. The
+// column error_over_bound says how good each result is: about 1 is as good as the data allow.
+// Compare rows of one run; the argument is the recording's length in seconds, so that
+// --benchmark_filter=/3 is the short way. `ratio` measures both back to back.
+#include <array>
+#include <chrono>
+#include <cmath>
+#include <ctime>
+#include <map>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+#include <Eigen/LU>
+#include <benchmark/benchmark.h>
+#include <ceres/jet.h>
+#include <tbb/global_control.h>
+
+#include "risley/core/angle.hpp"
+#include "risley/estimation/estimate.hpp"
+#include "risley/estimation/normal_equations.hpp"
+#include "risley/optics/observation_model.hpp"
+#include "risley/sensors/preset.hpp"
+#include "risley/simulation/scanner.hpp"
+
+namespace risley {
+namespace {
+
+/// Everything here runs on one core.
+const tbb::global_control one_core(tbb::global_control::max_allowed_parallelism, 1);
+
+constexpr double kAngleNoise = radians_from_degrees(0.01);
+
+/// The eight constants that are estimated, with the smallest standard deviation that 30 s at 100 kHz
+/// allow (Cramer-Rao); it falls with the root of the time.
+struct Bound {
+  const char* name;
+  double bound;  // index, or deg
+};
+constexpr std::array<Bound, 8> kBounds{{{"refractive_index", 4.3e-7},
+                                        {"incident_beam_horizontal_deg", 1.05e-5},
+                                        {"incident_beam_vertical_deg", 1.05e-5},
+                                        {"bearing_tilt_a_horizontal_deg", 2.0e-4},
+                                        {"bearing_tilt_a_vertical_deg", 2.0e-4},
+                                        {"prism_tilt_a_vertical_deg", 1.9e-4},
+                                        {"prism_tilt_b_horizontal_deg", 2.4e-4},
+                                        {"prism_tilt_b_vertical_deg", 2.3e-4}}};
+
+/// Root mean square of error over bound.
+double error_over_bound(const Eigen::VectorXd& parameters, int seconds) {
+  const sensors::Sensor truth = sensors::load_sensor("mid-40-table3");
+  double sum = 0;
+  for (std::size_t i = 0; i < kBounds.size(); ++i) {
+    const ParameterInfo& info = find_parameter(kBounds[i].name, 2);
+    const double bound = kBounds[i].bound * info.si_per_unit * std::sqrt(30.0 / seconds);
+    const double error = parameters[static_cast<Eigen::Index>(i)] - truth.get(kBounds[i].name);
+    sum += error * error / (bound * bound);
+  }
+  return std::sqrt(sum / static_cast<double>(kBounds.size()));
+}
+
+/// What both estimators get: every shot, and those of the first second for the start.
+struct Recording {
+  estimation::AngleSeries series, head;
+};
+
+/// Table 3's unit at 100 kHz, simulated once per length.
+const Recording& recording(int seconds) {
+  static std::map<int, Recording> recordings;
+  const auto known = recordings.find(seconds);
+  if (known != recordings.end()) return known->second;
+  simulation::SimulationSettings settings;
+  settings.truth = sensors::load_sensor("mid-40-table3");
+  settings.duration = seconds;
+  settings.rate = 100000.0;
+  settings.angle_noise = kAngleNoise;
+  settings.quantize = false;
+  settings.rotor = simulation::RotorKind::sinusoidal;
+  settings.seed = 1;
+  simulation::Scanner scanner(settings);
+  estimation::ShotSelector selector({});
+  recordings::Chunk chunk;
+  recordings::TruthColumns truth;
+  while (scanner.read(chunk, truth)) selector.add(chunk.observations);
+  Recording result;
+  result.head = selector.head();
+  result.series = selector.take_series();
+  return recordings.emplace(seconds, std::move(result)).first->second;
+}
+
+/// As the command calls it: from the nominal Mid-40, everything else found from the data.
+estimation::EstimateOptions map_options() {
+  estimation::EstimateOptions options;
+  options.sensor = sensors::load_sensor("mid-40");
+  options.angle_noise = kAngleNoise;
+  return options;
+}
+
+/// The peer. Model, derivatives and filter are the plain ones, but competent: fixed sizes on the
+/// stack, nothing computed twice, products of 12 x 12 matrices unrolled by the compiler instead of
+/// going through Eigen's blocked product (which takes longer), and the library's own observation
+/// model as a template of Jets, which is leaner than Eq. (10-26) as printed. One Jet carries a
+/// shot's twelve derivatives. The train is prepared anew for every shot because the filter has
+/// changed its parameters.
+class PlainFilter {
+ public:
+  static constexpr int kStates = 12;  // eight constants as in kBounds, angle and speed of A, of B
+  using Vector = Eigen::Matrix<double, kStates, 1>;
+  using Matrix = Eigen::Matrix<double, kStates, kStates>;
+
+  PlainFilter(const estimation::Start& start, std::int64_t time_ns)
+      : fixed_(parameter_array<2>(start.train)),
+        face_order_(face_order_array<2>(start.train)),
+        time_ns_(time_ns) {
+    for (std::size_t i = 0; i < kBounds.size(); ++i) {
+      const auto at = static_cast<Eigen::Index>(i);
+      mean_[at] = start.train.get(kBounds[i].name);
+      covariance_(at, at) = square(i == 0 ? kIndexSigma : kTiltSigma);
+    }
+    const double ahead = 1e-9 * static_cast<double>(time_ns - start.time_ns);
+    for (int rotor = 0; rotor < 2; ++rotor) {
+      const auto k = static_cast<std::size_t>(rotor);
+      const int angle = angle_of(rotor), speed = angle + 1;
+      mean_[angle] = start.rotation_angle[k] + ahead * start.angular_velocity[k];
+      mean_[speed] = start.angular_velocity[k];
+      covariance_(angle, angle) = square(kAngleSigma);
+      covariance_(speed, speed) = square(kSpeedSigma);
+    }
+  }
+
+  /// Constant speed with white acceleration.                                  [B21 Eq. (27)]
+  void predict(std::int64_t time_ns) {
+    const double dt = 1e-9 * static_cast<double>(time_ns - time_ns_);
+    time_ns_ = time_ns;
+    Matrix f = Matrix::Identity(), q = Matrix::Zero();
+    for (int rotor = 0; rotor < 2; ++rotor) {
+      const int angle = angle_of(rotor), speed = angle + 1;
+      f(angle, speed) = dt;
+      q(angle, angle) = kAcceleration * kAcceleration * dt * dt * dt / 3.0;
+      q(angle, speed) = q(speed, angle) = kAcceleration * kAcceleration * dt * dt / 2.0;
+      q(speed, speed) = kAcceleration * kAcceleration * dt;
+    }
+    mean_ = f * mean_;
+    const Matrix turned = f.lazyProduct(covariance_);
+    covariance_ = turned.lazyProduct(f.transpose()) + q;
+  }
+
+  void update(double azimuth, double zenith) {
+    const SphericalAngles<Jet> model = observe_with_derivatives();
+    const Eigen::Vector2d innovation(azimuth - model.azimuth.a, zenith - model.zenith.a);
+    Eigen::Matrix<double, 2, kStates> h;
+    h.row(0) = model.azimuth.v.transpose();
+    h.row(1) = model.zenith.v.transpose();
+    const Eigen::Matrix2d noise = square(kAngleNoise) * Eigen::Matrix2d::Identity();
+    const Eigen::Matrix<double, kStates, 2> cross = covariance_ * h.transpose();
+    const Eigen::Matrix2d innovation_covariance = h * cross + noise;
+    const Eigen::Matrix<double, kStates, 2> gain = cross * innovation_covariance.inverse();
+    mean_ += gain * innovation;
+    const Matrix rest = Matrix::Identity() - gain * h;
+    const Matrix kept = rest.lazyProduct(covariance_);
+    covariance_ = kept.lazyProduct(rest.transpose()) + gain * noise * gain.transpose();  // Joseph
+  }
+
+  const Vector& mean() const { return mean_; }
+
+ private:
+  using Jet = ceres::Jet<double, kStates>;
+
+  // What the start leaves open, and rotors as loose as ...
+#ifdef TUNE
+#define KNOB(n, d) (std::getenv(n) ? std::atof(std::getenv(n)) : d)
+  static inline const double kIndexSigma = KNOB("KI", 0.01);
+  static inline const double kTiltSigma = radians_from_degrees(KNOB("KT", 1.0));
+  static inline const double kAngleSigma = radians_from_degrees(KNOB("KA", 5.0));
+  static inline const double kSpeedSigma = radians_from_degrees(KNOB("KS", 100.0));
+  static inline const double kAcceleration = radians_from_degrees(KNOB("KQ", 1.0));
+#else
+  static constexpr double kIndexSigma = 0.01;
+  static constexpr double kTiltSigma = radians_from_degrees(1.0);
+  static constexpr double kAngleSigma = radians_from_degrees(5.0);
+  static constexpr double kSpeedSigma = radians_from_degrees(100.0);
+  static constexpr double kAcceleration = radians_from_degrees(1.0);
+#endif
+
+  static constexpr double square(double x) { return x * x; }
+  static constexpr int angle_of(int rotor) { return 8 + 2 * rotor; }
+
+  SphericalAngles<Jet> observe_with_derivatives() const {
+    std::array<Jet, parameter_count(2)> parameters;
+    for (std::size_t i = 0; i < parameters.size(); ++i) parameters[i] = Jet(fixed_[i]);
+    const auto set = [&](int at, int state) {
+      parameters[static_cast<std::size_t>(at)] = Jet(mean_[state], state);
+    };
+    set(place::refractive_index(0), 0);
+    set(place::refractive_index(1), 0);
+    set(place::incident_beam_horizontal(), 1);
+    set(place::incident_beam_vertical(), 2);
+    set(place::bearing_tilt_horizontal(0), 3);
+    set(place::bearing_tilt_vertical(0), 4);
+    set(place::prism_tilt_vertical(0), 5);
+    set(place::prism_tilt_horizontal(1), 6);
+    set(place::prism_tilt_vertical(1), 7);
+    const auto train = prepare<Jet, 2>(parameters, face_order_);
+    const std::array<Jet, 2> angles{Jet(mean_[angle_of(0)], angle_of(0)),
+                                    Jet(mean_[angle_of(1)], angle_of(1))};
+    return angles_from_direction(trace(train, angles).direction);
+  }
+
+  std::array<double, parameter_count(2)> fixed_;
+  std::array<FaceOrder, 2> face_order_;
+  std::int64_t time_ns_;
+  Vector mean_ = Vector::Zero();
+  Matrix covariance_ = Matrix::Zero();
+};
+
+/// One run of an estimator.
+struct Run {
+  Eigen::VectorXd parameters;
+  double seconds = 0;      // of the wall clock
+  double cpu_seconds = 0;  // of this process: what a busy machine changes least
+};
+
+class Stopwatch {
+ public:
+  void stop(Run& run) const {
+    const auto now = std::chrono::steady_clock::now();
+    run.seconds = std::chrono::duration<double>(now - wall_).count();
+    run.cpu_seconds = static_cast<double>(std::clock() - cpu_) / CLOCKS_PER_SEC;
+  }
+
+ private:
+  std::chrono::steady_clock::time_point wall_ = std::chrono::steady_clock::now();
+  std::clock_t cpu_ = std::clock();
+};
+
+/// The whole call that the command's `solve` measures, start, covariances and states included.
+Run run_map(const Recording& data) {
+  const estimation::EstimateOptions options = map_options();
+  estimation::AngleSeries series = data.series;
+  Run run;
+  const Stopwatch stopwatch;
+  const auto estimate =
+      estimation::estimate(estimation::Method::map, std::move(series), data.head, options);
+  stopwatch.stop(run);
+  if (!estimate.converged) throw std::runtime_error("not converged: " + estimate.reason);
+  run.parameters = estimate.parameters;
+  return run;
+}
+
+/// Forwards through all shots; its start is a gift.
+Run run_peer(const Recording& data) {
+  const estimation::EstimateOptions options = map_options();
+  const auto free = estimation::free_parameters(estimation::default_free_names(2), 2);
+  const estimation::Start start =
+      estimation::find_start(data.head, options.sensor, free, kAngleNoise, options.mirrored);
+  const estimation::AngleSeries& series = data.series;
+  Run run;
+  const Stopwatch stopwatch;
+  PlainFilter filter(start, series.time_ns[0]);
+  for (std::size_t i = 0; i < series.size(); ++i) {
+    filter.predict(series.time_ns[i]);
+    filter.update(series.azimuth[i], series.zenith[i]);
+  }
+  stopwatch.stop(run);
+  run.parameters = filter.mean().head<8>();
+  return run;
+}
+
+template <class Estimator>
+void run_estimator(benchmark::State& state, Estimator estimator) {
+  const auto seconds = static_cast<int>(state.range(0));
+  const Recording& data = recording(seconds);
+  for (auto _ : state) {
+    const Run run = estimator(data);
+    state.SetIterationTime(run.seconds);
+    const double millions = 1e-6 * static_cast<double>(data.series.size());
+    state.counters["s_per_Mshot"] = run.seconds / millions;
+    state.counters["cpu_s_per_Mshot"] = run.cpu_seconds / millions;
+    state.counters["error_over_bound"] = error_over_bound(run.parameters, seconds);
+  }
+}
+
+void batch_map(benchmark::State& state) { run_estimator(state, run_map); }
+void plain_ekf(benchmark::State& state) { run_estimator(state, run_peer); }
+
+/// Both back to back: the share of the peer's time that the batch estimator takes.
+void ratio(benchmark::State& state) {
+  const Recording& data = recording(static_cast<int>(state.range(0)));
+  for (auto _ : state) {
+    const Run map = run_map(data), peer = run_peer(data);
+    state.SetIterationTime(map.seconds + peer.seconds);
+    state.counters["map_s"] = map.seconds;
+    state.counters["peer_s"] = peer.seconds;
+    state.counters["ratio"] = map.seconds / peer.seconds;
+    state.counters["cpu_ratio"] = map.cpu_seconds / peer.cpu_seconds;
+  }
+}
+
+/// The step of the batch estimator that sees every shot, at its answer.
+void accumulate(benchmark::State& state, InstructionSet set) {
+  const Recording& data = recording(3);
+  static const auto answer =
+      estimation::estimate(estimation::Method::map, data.series, data.head, map_options());
+  const std::size_t shots = data.series.size();
+  std::vector<double> azimuth(shots), zenith(shots);
+  std::vector<unsigned char> outlier(shots);
+  const estimation::ShotWeights weights{kAngleNoise, 0.0, 20.0};
+  estimation::NormalEquations equations;
+  for (auto _ : state) {
+    estimation::accumulate(answer.series, answer.map->trajectory, answer.map->train, answer.free,
+                           weights, equations, {azimuth, zenith, outlier}, set);
+    benchmark::ClobberMemory();
+  }
+  state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(shots));
+  state.counters["ns_per_shot"] =
+      benchmark::Counter(1e-9 * static_cast<double>(shots),
+                         benchmark::Counter::kIsIterationInvariantRate | benchmark::Counter::kInvert);
+}
+
+const bool registered = [] {
+  const auto once = [](const char* name, void (*function)(benchmark::State&)) {
+    benchmark::RegisterBenchmark(name, function)
+        ->Arg(3)
+        ->Arg(30)
+        ->Iterations(1)
+        ->UseManualTime()
+        ->Unit(benchmark::kSecond);
+  };
+  once("batch_map", batch_map);
+  once("plain_ekf", plain_ekf);
+  once("ratio", ratio);
+  for (const InstructionSet set : available_instruction_sets()) {
+    benchmark::RegisterBenchmark(("accumulate/" + to_string(set)).c_str(), accumulate, set)
+        ->Unit(benchmark::kMillisecond);
+  }
+  return true;
+}();
+
+}  // namespace
+}  // namespace risley
