@@ -4,7 +4,7 @@
 # the command is missing here.
 _risley() {
   local current=${COMP_WORDS[COMP_CWORD]} previous=${COMP_WORDS[COMP_CWORD-1]}
-  local verbs="info convert simulate estimate"
+  local verbs="info convert simulate estimate observability"
   local common="--help --json --threads --seed --quiet --verbose"
   local names="refractive_index_air refractive_index refractive_index_a refractive_index_b
     wedge_angle_deg wedge_angle_a_deg wedge_angle_b_deg
@@ -22,11 +22,11 @@ _risley() {
   case $previous in
     --quantize) choices="yes no" ;;
     --rotor) choices="constant sinusoidal hunting random-walk" ;;
-    --method) choices="ekf" ;;
+    --method) choices="map ekf" ;;
     --states) choices="knots all none" ;;
     --mirror) choices="auto yes no" ;;
     --process-noise) choices="auto paper" ;;
-    --rate-hz) [ "$verb" = estimate ] && choices="full" ;;
+    --rate-hz) case $verb in estimate | observability) choices="full" ;; esac ;;
     --fix | --free) choices=$names ;;
     --set) choices="$names $speeds" ;;
     --reported) choices="nominal $names" ;;
@@ -52,6 +52,9 @@ _risley() {
       estimate)
         choices="$common --output --method --rate-hz --noise-angle-deg --sensor --fix --free
           --states --mirror --process-noise --truth" ;;
+      observability)
+        choices="$common --sensor --duration-s --rate-hz --noise-angle-deg --no-rounding
+          --fix --free" ;;
     esac
     mapfile -t COMPREPLY < <(compgen -W "$choices" -- "$current")
     return

@@ -144,24 +144,4 @@ std::vector<Series> histogram(const std::string& label, const std::string& colou
   return {counts, curve};
 }
 
-Series mean_over_angle(std::string label, std::string colour, std::size_t rows,
-                       const Column& angle_deg, const Column& y,
-                       std::span<const unsigned char> skip) {
-  std::vector<double> sum(kAngleBins, 0.0), count(kAngleBins, 0.0);
-  constexpr double kWidth = 360.0 / double(kAngleBins);
-  for (std::size_t i = 0; i < rows; ++i) {
-    if (skip[i] != 0 || !std::isfinite(y(i))) continue;
-    const auto bin = std::min(static_cast<std::size_t>(angle_deg(i) / kWidth), kAngleBins - 1);
-    sum[bin] += y(i);
-    count[bin] += 1.0;
-  }
-  Series series{std::move(label), std::move(colour), SeriesKind::line, {}, {}};
-  for (std::size_t bin = 0; bin < kAngleBins; ++bin) {
-    if (count[bin] == 0) continue;
-    series.x.push_back((double(bin) + 0.5) * kWidth);
-    series.y.push_back(sum[bin] / count[bin]);
-  }
-  return series;
-}
-
 }  // namespace risley::report

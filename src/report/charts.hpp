@@ -63,9 +63,4 @@ std::vector<Series> histogram(const std::string& label, const std::string& colou
                               std::span<const double> values, std::span<const unsigned char> skip,
                               const estimation::Moments& moments, double scale);
 
-/// Means of y over bins of an angle in [0, 360) degree.
-Series mean_over_angle(std::string label, std::string colour, std::size_t rows,
-                       const Column& angle_deg, const Column& y,
-                       std::span<const unsigned char> skip);
-
 }  // namespace risley::report

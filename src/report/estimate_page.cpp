@@ -185,6 +185,16 @@ std::string moments_html(const Estimate& e) {
          "distribution are 0.</p>\n";
 }
 
+/// What the residuals did to the sigmas.
+std::string variance_html(const Estimate& e) {
+  if (!e.map) return "";
+  return fmt::format(
+      "<p>Residuals show {:.3f} times the variance that was stated, and their autocorrelation "
+      "multiplies the variance of means by {:.3f}; for that every variance on this page was "
+      "multiplied by {:.3f}.</p>\n",
+      e.map->unit_variance, e.map->autocorrelation.factor, e.map->variance_factor);
+}
+
 std::string correlation_html(const Estimate& e) {
   const auto& free = e.free;
   if (free.empty()) return "";
@@ -226,19 +236,22 @@ std::string provenance_html(const EstimatePageInput& input) {
 class ChartPage {
  public:
   explicit ChartPage(const EstimatePageInput& input)
-      : input_(input), states_(input.estimate.states) {}
+      : input_(input),
+        states_(input.estimate.states),
+        azimuth_(input.estimate.map ? input.estimate.map->azimuth_residual
+                                    : states_.azimuth_residual),
+        zenith_(input.estimate.map ? input.estimate.map->zenith_residual : states_.zenith_residual),
+        outlier_(input.estimate.map ? input.estimate.map->outlier : states_.outlier) {}
 
   std::string data() const { return "[" + data_ + "]"; }
 
   std::string residuals() {
     const Estimate& e = input_.estimate;
     std::string html = "<div class=\"charts\">\n";
-    html += residuals_over_time("Azimuth residuals over time", states_.azimuth_residual, "a");
-    html += residuals_over_time("Zenith residuals over time", states_.zenith_residual, "b");
-    html += one_histogram("Histogram of the azimuth residuals", states_.azimuth_residual,
-                          e.azimuth_residuals, "a");
-    html += one_histogram("Histogram of the zenith residuals", states_.zenith_residual,
-                          e.zenith_residuals, "b");
+    html += residuals_over_time("Azimuth residuals over time", azimuth_, "a");
+    html += residuals_over_time("Zenith residuals over time", zenith_, "b");
+    html += one_histogram("Histogram of the azimuth residuals", azimuth_, e.azimuth_residuals, "a");
+    html += one_histogram("Histogram of the zenith residuals", zenith_, e.zenith_residuals, "b");
     for (std::size_t rotor = 0; rotor < states_.rotation_angle.size(); ++rotor) {
       html += residuals_over_angle(rotor);
     }
@@ -300,6 +313,7 @@ class ChartPage {
   double time(std::size_t row) const {
     return 1e-9 * static_cast<double>(states_.time_ns[row] - states_.time_ns[0]);
   }
+  double shot_time(std::size_t shot) const { return input_.estimate.series.time(shot); }
 
   Series line(const std::string& label, std::size_t rotor,
               const std::vector<double>& values) const {
@@ -312,21 +326,22 @@ class ChartPage {
                                   const std::string& colour) {
     Series used{"used", colour, SeriesKind::points, {}, {}};
     Series outliers{"outliers", "bad", SeriesKind::points, {}, {}};
-    for (const std::size_t i : every_nth(states_.size(), kMostPoints)) {
-      if (states_.outlier[i] != 0) continue;
-      used.x.push_back(time(i));
+    const std::size_t shots = residual.size();
+    for (const std::size_t i : every_nth(shots, kMostPoints)) {
+      if (outlier_[i] != 0) continue;
+      used.x.push_back(shot_time(i));
       used.y.push_back(degrees_from_radians(residual[i]));
     }
     // Outliers are few and matter: each is drawn as long as that is possible.
     std::vector<std::size_t> rows;
-    for (std::size_t i = 0; i < states_.size(); ++i) {
-      if (states_.outlier[i] != 0) rows.push_back(i);
+    for (std::size_t i = 0; i < shots; ++i) {
+      if (outlier_[i] != 0 && std::isfinite(residual[i])) rows.push_back(i);
     }
     for (const std::size_t k : every_nth(rows.size(), kMostPoints)) {
-      outliers.x.push_back(time(rows[k]));
+      outliers.x.push_back(shot_time(rows[k]));
       outliers.y.push_back(degrees_from_radians(residual[rows[k]]));
     }
-    std::string note = every_nth_note(states_.size(), kMostPoints);
+    std::string note = every_nth_note(shots, kMostPoints);
     if (!rows.empty()) {
       note += " " + every_nth_note(rows.size(), kMostPoints, "outliers");
     }
@@ -339,7 +354,7 @@ class ChartPage {
                             const Moments& moments, const std::string& colour) {
     return figure(
         {title, "observed minus estimated, deg", "shots",
-         histogram("residuals", colour, residual, states_.outlier, moments, kDegreesPerRadian),
+         histogram("residuals", colour, residual, outlier_, moments, kDegreesPerRadian),
          "All shots but the outliers. The outermost bins hold everything beyond 4.5 standard "
          "deviations."});
   }
@@ -352,11 +367,14 @@ class ChartPage {
                 "rotation angle, deg",
                 "observed minus estimated, deg",
                 {},
-                every_nth_note(states_.size(), kMostPoints / 2) +
+                every_nth_note(states_.size(), kMostPoints / 2,
+                               input_.estimate.map ? "knots" : "shots") +
                     " Lines: means over 5° of all shots that were used.",
                 ChartKind::full_turn};
+    const estimation::AngleProfile& profile = input_.estimate.residuals_over_angle[rotor];
     const auto add = [&](const std::string& name, const std::vector<double>& residual,
-                         const std::string& colour, const std::string& mean_colour) {
+                         const std::vector<double>& mean, const std::string& colour,
+                         const std::string& mean_colour) {
       const auto value = [&residual](std::size_t i) { return degrees_from_radians(residual[i]); };
       Series points{name, colour, SeriesKind::points, {}, {}};
       for (const std::size_t i : every_nth(states_.size(), kMostPoints / 2)) {
@@ -364,17 +382,24 @@ class ChartPage {
         points.x.push_back(angle(i));
         points.y.push_back(value(i));
       }
-      chart.series.push_back(mean_over_angle("mean of " + name, mean_colour, states_.size(), angle,
-                                             value, states_.outlier));
+      Series means{"mean of " + name, mean_colour, SeriesKind::line, {}, {}};
+      for (std::size_t bin = 0; bin < mean.size(); ++bin) {
+        means.x.push_back(360.0 * (static_cast<double>(bin) + 0.5) /
+                          static_cast<double>(mean.size()));
+        means.y.push_back(degrees_from_radians(mean[bin]));
+      }
+      chart.series.push_back(means);
       chart.series.push_back(points);
     };
-    add("azimuth", states_.azimuth_residual, "a", "ink");
-    add("zenith", states_.zenith_residual, "b", "c");
+    add("azimuth", states_.azimuth_residual, profile.mean_azimuth, "a", "ink");
+    add("zenith", states_.zenith_residual, profile.mean_zenith, "b", "c");
     return figure(chart);
   }
 
   const EstimatePageInput& input_;
   const RotorStates& states_;
+  const std::vector<double>&azimuth_, &zenith_;  // residuals of all shots
+  const std::vector<unsigned char>& outlier_;
   std::string data_;
   std::size_t number_ = 0;
 };
@@ -393,7 +418,8 @@ std::string estimate_page(const EstimatePageInput& input) {
   page += verdict_html(input);
   page += parameters_html(input);
   page += "<h2>Rotors</h2>\n" + charts.rotors();
-  page += "<h2>Residuals</h2>\n" + moments_html(input.estimate) + charts.residuals();
+  page += "<h2>Residuals</h2>\n" + moments_html(input.estimate) +
+          variance_html(input.estimate) + charts.residuals();
   page += "<h2>Scan pattern</h2>\n" + charts.pattern();
   page += correlation_html(input.estimate);
   page += provenance_html(input);

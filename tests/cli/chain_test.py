@@ -36,10 +36,10 @@ class ChainTest(CommandTest):
             self.assertEqual(info[key], value, key)
         return info
 
-    def check_estimate(self, result):
+    def check_estimate(self, result, method="map"):
         self.assertLessEqual(ESTIMATE_KEYS, result.keys())
         self.assertTrue(result["converged"])
-        self.assertEqual(result["method"], "ekf")
+        self.assertEqual(result["method"], method)
         self.assertFalse(result["mirrored"])
         self.assertLessEqual(ESTIMATED, result["parameters"].keys())
         for value in result["parameters"].values():
@@ -101,6 +101,14 @@ class ChainTest(CommandTest):
         self.check_estimate(result)
         self.assertEqual(result["combination"], 1)
         self.assertEqual(result["observations_used"], 4000)
+        filtered = self.expect_json(0, "estimate", "unit.csv", "--truth", "unit.csv.truth.yaml",
+                                    "--noise-angle-deg", "0.01", "--method", "ekf", "-o", "ekf")
+        self.check_estimate(filtered, "ekf")
+        for name, value in result["parameters"].items():
+            if name.startswith("rotation_angle"):
+                continue
+            self.assertAlmostEqual(value["value"], filtered["parameters"][name]["value"],
+                                   delta=2 * value["sigma"], msg=name)
 
     def test_fixed_and_freed(self):
         self.expect(0, "simulate", "-o", "fix.csv", "--duration-s", "2", "--rate-hz", "1000",
@@ -108,12 +116,67 @@ class ChainTest(CommandTest):
         result = self.expect_json(0, "estimate", "fix.csv", "--noise-angle-deg", "0.01",
                                   "--fix", "refractive_index=1.51", "--fix",
                                   "bearing_tilt_a_vertical_deg",
-                                  "--free", "prism_tilt_a_horizontal_deg")
+                                  "--free", "prism_tilt_a_horizontal_deg", "--method", "ekf")
         self.assertNotIn("refractive_index", result["parameters"])
         self.assertNotIn("bearing_tilt_a_vertical_deg", result["parameters"])
         self.assertIn("prism_tilt_a_horizontal_deg", result["parameters"])
         self.assertEqual(result["fixed"]["refractive_index_a"], 1.51)
         self.expect(2, "estimate", "fix.csv", "--fix", "no_such_parameter")
+        # The batch estimator knows that this data cannot tell the tilt, and names it.
+        result = self.expect_json(1, "estimate", "fix.csv", "--noise-angle-deg", "0.01",
+                                  "--free", "prism_tilt_a_horizontal_deg")
+        self.assertFalse(result["converged"])
+        self.assertIn("prism_tilt_a_horizontal_deg", result["reason"])
+        self.assertIn("prism_tilt_a_horizontal_deg", result["unobservable"][0]["direction"])
+        self.assertGreater(result["unobservable"][0]["sigma"], 0.3)
+
+    def test_states(self):
+        self.expect(0, "simulate", "-o", "full.lvx", "--scene", ROOM, "--duration-s", "0.5")
+        sizes = {}
+        for states in ("knots", "all", "none"):
+            self.expect(0, "estimate", "full.lvx", "--states", states, "-o", states)
+            path = self.folder / states / "states.nc"
+            sizes[states] = path.stat().st_size if path.exists() else 0
+        self.assertEqual(sizes["none"], 0)
+        self.assertGreater(sizes["all"], 20 * sizes["knots"])
+        self.assertGreater(sizes["knots"], 1000)
+        self.expect(2, "estimate", "full.lvx", "--states", "all", "--method", "ekf")
+
+    def test_clock_reset(self):
+        self.expect(0, "simulate", "-o", "one.csv", "--duration-s", "2", "--rate-hz", "1000",
+                    "--noise-angle-deg", "0.01", "--quantize", "no")
+        lines = (self.folder / "one.csv").read_text().splitlines()
+        for i in range(1001, len(lines)):
+            time, rest = lines[i].split(",", 1)
+            lines[i] = f"{float(time) - 0.9:.5f},{rest}"
+        (self.folder / "reset.csv").write_text("\n".join(lines) + "\n")
+        result = self.expect_json(0, "estimate", "reset.csv", "--noise-angle-deg", "0.01")
+        self.assertTrue(result["converged"])
+        self.assertEqual(result["observations_used"], 2000)
+        self.assertTrue(any("clock" in warning for warning in result["warnings"]))
+
+    def test_observability(self):
+        plan = self.expect_json(0, "observability", "--duration-s", "10", "--rate-hz", "1000",
+                                "--noise-angle-deg", "0.01", "--no-rounding")
+        self.assertLessEqual({"parameters", "correlation", "unobservable"}, plan.keys())
+        self.assertLessEqual(ESTIMATED, plan["parameters"].keys())
+        for value in plan["parameters"].values():
+            self.assertLessEqual({"sigma", "sensitivity"}, value.keys())
+        names = plan["correlation"]["names"]
+        self.assertEqual(len(plan["correlation"]["matrix"]), len(names))
+        self.assertEqual(len(plan["correlation"]["matrix"][0]), len(names))
+        self.assertIsNone(plan["parameters"]["refractive_index_air"]["sigma"])
+        self.assertTrue(any("refractive_index_air" in weak["direction"]
+                            for weak in plan["unobservable"]))
+        self.expect(0, "simulate", "-o", "seen.csv", "--duration-s", "10", "--rate-hz", "1000",
+                    "--noise-angle-deg", "0.01", "--quantize", "no", "--rotor", "sinusoidal")
+        seen = self.expect_json(0, "observability", "seen.csv", "--noise-angle-deg", "0.01")
+        for name in ("refractive_index", "bearing_tilt_a_vertical_deg", "prism_tilt_b_vertical_deg"):
+            self.assertAlmostEqual(seen["parameters"][name]["sigma"] /
+                                   plan["parameters"][name]["sigma"], 1, delta=0.05)
+        text = self.expect(0, "observability", "seen.csv", "--noise-angle-deg", "0.01").stdout
+        self.assertIn("keep it fixed", text)
+        self.expect(2, "observability", "--duration-s", "0")
 
     def test_reported_nominal(self):
         arguments = ("--sensor", "mid-40-table3", "--rate-hz", "1000", "--duration-s", "0.2",

@@ -27,6 +27,46 @@ class VendorTest(CommandTest):
             if "tilt" in name or "incident_beam" in name:
                 self.assertLess(abs(value[name]), 1e-3, name)
 
+    def check_exactly_nominal(self, result):
+        self.assertTrue(result["converged"])
+        self.assertEqual(result["method"], "map")
+        self.assertEqual(result["combination"], 2)
+        value = {name: one["value"] for name, one in result["parameters"].items()}
+        self.assertAlmostEqual(value["refractive_index"], 1.5089, delta=2e-7)
+        self.assertAlmostEqual(value["angular_velocity_a_deg_per_s"], -43764, delta=0.001)
+        self.assertAlmostEqual(value["angular_velocity_b_deg_per_s"], 27984, delta=0.001)
+        for name in value:
+            if "tilt" in name or "incident_beam" in name:
+                self.assertLess(abs(value[name]), 1e-5, name)
+        for axis in ("azimuth_deg", "zenith_deg"):
+            self.assertLess(result["residuals"][axis]["rms"], 5e-6)
+
+    def test_all_shots_to_the_last_digit(self):
+        recording = pathlib.Path(FOLDER) / "livox-mid-40-sequence.csv"
+        arguments = ("--method", "map", "--rate-hz", "full", "--noise-angle-deg", "0.000005")
+        result = self.expect_json(0, "estimate", recording, *arguments)
+        self.check_exactly_nominal(result)
+        self.assertFalse(result["mirrored"])
+        freed = self.expect_json(0, "estimate", recording, *arguments, "--free", "wedge_angle_deg")
+        self.assertTrue(freed["converged"])
+        self.assertAlmostEqual(freed["parameters"]["wedge_angle_deg"]["value"], 18, delta=1e-4)
+
+    def test_public_copies_have_the_elevation_the_other_way(self):
+        lines = (pathlib.Path(FOLDER) / "livox-mid-40-sequence.csv").read_text().splitlines()
+        with open(self.folder / "mirrored.csv", "w", encoding="ascii") as file:
+            file.write(lines[0] + "\n")
+            for line in lines[1:]:
+                time, azimuth, zenith = line.split(",")
+                file.write(f"{time},{azimuth},{180 - float(zenith):.5f}\n")
+        result = self.expect_json(0, "estimate", "mirrored.csv", "--noise-angle-deg", "0.000005")
+        self.check_exactly_nominal(result)
+        self.assertTrue(result["mirrored"])
+        self.assertTrue(any("mirror" in warning for warning in result["warnings"]))
+        # Taken as it is, it is refused and not bent until it fits.
+        taken = self.expect_json(1, "estimate", "mirrored.csv", "--noise-angle-deg", "0.000005",
+                                 "--mirror", "no")
+        self.assertFalse(taken["converged"])
+
 
 if __name__ == "__main__":
     if not FOLDER:

@@ -46,17 +46,5 @@ TEST(Charts, AHistogramCountsEveryUsedValue) {
   EXPECT_NEAR(std::accumulate(series[1].y.begin(), series[1].y.end(), 0.0), 6.0, 1e-3);
 }
 
-TEST(Charts, MeansOverAnAngleFindAPeriodicError) {
-  constexpr std::size_t kRows = 7200;
-  const auto angle = [](std::size_t i) { return 0.05 * double(i); };
-  const std::vector<unsigned char> skip(kRows, 0);
-  const Series means = mean_over_angle(
-      "", "a", kRows, angle, [&](std::size_t i) { return angle(i) < 180 ? 1.0 : -1.0; }, skip);
-  ASSERT_EQ(means.x.size(), 72u);
-  EXPECT_EQ(means.x.front(), 2.5);
-  EXPECT_EQ(means.y.front(), 1.0);
-  EXPECT_EQ(means.y.back(), -1.0);
-}
-
 }  // namespace
 }  // namespace risley::report

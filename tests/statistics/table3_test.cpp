@@ -5,10 +5,9 @@
 #include <cmath>
 #include <map>
 
-#include <fmt/format.h>
 #include <gtest/gtest.h>
 
-#include "statistics/simulated.hpp"
+#include "statistics/monte_carlo.hpp"
 
 namespace risley {
 namespace {
@@ -17,61 +16,12 @@ using estimation::Estimate;
 using estimation::Evaluation;
 using estimation::Method;
 
-/// Root mean square errors and mean NEES over seeds.
-struct MonteCarlo {
-  std::map<std::string, double> rmse;  // file units
-  double angle_a_deg = 0, angle_b_deg = 0;
-  double nees_parameters = 0, nees_angles = 0;
-  double residual_std_deg = 0;
-  double within_two_sigma = 0;
-};
-
-MonteCarlo run(int seeds, const std::vector<estimation::RotorProcess>& process = {}) {
-  MonteCarlo sum;
-  double angle_a = 0, angle_b = 0, covered = 0, counted = 0;
-  for (int seed = 0; seed < seeds; ++seed) {
-    const auto settings = testing::table3_settings(static_cast<std::uint64_t>(seed));
-    const testing::Simulated data = testing::simulate(settings);
-    const Estimate estimate = testing::estimate(Method::ekf, data.observations, 0.01, process);
-    EXPECT_TRUE(estimate.converged) << "seed " << seed << ": " << estimate.reason;
-    EXPECT_EQ(estimate.sensor.combination, sensors::SpeedCombination::second) << "seed " << seed;
-    EXPECT_FALSE(estimate.mirrored) << "seed " << seed;
-    const Evaluation evaluation = evaluate(estimate, settings.truth, data.truth);
-    for (const auto& row : evaluation.parameters) {
-      const double error = row.error / find_parameter(row.name, 2).si_per_unit;
-      sum.rmse[row.name] += error * error;
-      covered += std::abs(row.error_over_sigma) < 2.0;
-      counted += 1.0;
-    }
-    angle_a += std::pow(degrees_from_radians(evaluation.rotation_angle_rmse[0]), 2);
-    angle_b += std::pow(degrees_from_radians(evaluation.rotation_angle_rmse[1]), 2);
-    sum.nees_parameters += evaluation.nees_parameters;
-    sum.nees_angles += evaluation.nees_rotation_angles;
-    sum.residual_std_deg += degrees_from_radians(estimate.azimuth_residuals.std);
-  }
-  for (auto& [name, squares] : sum.rmse) squares = std::sqrt(squares / seeds);
-  sum.angle_a_deg = std::sqrt(angle_a / seeds);
-  sum.angle_b_deg = std::sqrt(angle_b / seeds);
-  sum.nees_parameters /= seeds;
-  sum.nees_angles /= seeds;
-  sum.residual_std_deg /= seeds;
-  sum.within_two_sigma = covered / counted;
-  // The figures of the README and the closing notes: --gtest_output=json:FILE shows them.
-  const auto record = [](const std::string& name, double value) {
-    ::testing::Test::RecordProperty(name, fmt::format("{:.4g}", value));
-  };
-  for (const auto& [name, value] : sum.rmse) record("rmse_" + name, value);
-  record("rotation_angle_a_deg", sum.angle_a_deg);
-  record("rotation_angle_b_deg", sum.angle_b_deg);
-  record("nees_parameters", sum.nees_parameters);
-  record("nees_rotation_angles", sum.nees_angles);
-  record("residual_std_deg", sum.residual_std_deg);
-  record("within_two_sigma", sum.within_two_sigma);
-  return sum;
+testing::MonteCarlo run(int seeds, const std::vector<estimation::RotorProcess>& process = {}) {
+  return testing::monte_carlo(Method::ekf, seeds, testing::table3_settings, process);
 }
 
 TEST(Table3, DefaultTuningReachesTheBoundAndKnowsIt) {
-  const MonteCarlo result = run(20);
+  const testing::MonteCarlo result = run(20);
   // 1.5 times the Cramer-Rao bound of 30 s at 1 kHz and 0.01 degree.
   const std::map<std::string, double> limit{{"refractive_index", 6.5e-6},
                                             {"incident_beam_horizontal_deg", 1.6e-4},
@@ -96,7 +46,7 @@ TEST(Table3, DefaultTuningReachesTheBoundAndKnowsIt) {
 }
 
 TEST(Table3, HeavyProcessNoiseReproducesThePapersResidualsAndAngles) {
-  const MonteCarlo result = run(4, {estimation::kPaperProcess, estimation::kPaperProcess});
+  const testing::MonteCarlo result = run(4, {estimation::kPaperProcess, estimation::kPaperProcess});
   EXPECT_GE(result.residual_std_deg, 0.0080);
   EXPECT_LE(result.residual_std_deg, 0.0086);
   for (const double rmse : {result.angle_a_deg, result.angle_b_deg}) {
