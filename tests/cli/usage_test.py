@@ -7,7 +7,7 @@ import unittest
 
 from command import CommandTest
 
-VERBS = ("info", "convert", "simulate", "estimate")
+VERBS = ("info", "convert", "simulate", "estimate", "observability")
 
 # Arguments that are wrong, and what the message must name.
 WRONG = [
@@ -39,7 +39,7 @@ WRONG = [
     (["simulate", "-o", "a.csv", "--quiet", "--verbose"], "--quiet"),
     (["estimate", "a.csv", "--rate-hz", "fast"], "--rate-hz"),
     (["estimate", "a.csv", "--method", "guess"], "guess"),
-    (["estimate", "a.csv", "--states", "all"], "--rate-hz full"),
+    (["estimate", "a.csv", "--method", "ekf", "--states", "all"], "--rate-hz full"),
 ]
 
 

@@ -37,7 +37,8 @@ struct Problem {
   Vector residuals;  ///< [2 shots]
 
   Problem(int prisms, int free, std::vector<std::size_t> stretch_begin, std::size_t knots,
-          std::vector<RotorProcess> motion, unsigned seed)
+          std::vector<RotorProcess> motion, unsigned seed, double gap = 0.01,
+          std::size_t gap_before = 4)
       : process(std::move(motion)) {
     std::mt19937_64 generator(seed);
     std::normal_distribution<double> normal;
@@ -48,7 +49,7 @@ struct Problem {
     std::int64_t time = 7'000'000'000;
     for (std::size_t knot = 0; knot < knots; ++knot) {
       time += static_cast<std::int64_t>(2e6 * uniform(generator));
-      if (knot == 4) time += 100'000'000;                             // a gap
+      if (knot == gap_before) time += std::llround(1e9 * gap);
       if (knot > 0 && knot == at.stretch_begin.back()) time = 1'000;  // the clock was reset
       at.time_ns.push_back(time);
       for (std::size_t k = 0; k < n; ++k) {
@@ -212,7 +213,8 @@ double difference(const Found& found, const Matrix& expected, const Vector& left
 }
 
 void expect_dense_solution(const Problem& p) {
-  constexpr double kTolerance = 1e-8;  // of a sigma
+  // Shares of a sigma: rounding. A smoothed variance is a small difference of wider ones.
+  constexpr double kTolerance = 1e-9, kStateTolerance = 1e-8, kVarianceTolerance = 2e-7;
   const Dense dense(p);
   const Vector sigma = dense.parameter_covariance.diagonal().cwiseSqrt();
   const Vector weight = dense.parameter_information.diagonal().cwiseSqrt();
@@ -229,7 +231,9 @@ void expect_dense_solution(const Problem& p) {
               kTolerance);
     const Eigen::Map<const Eigen::VectorXd> states(
         found.state_step.data(), static_cast<Eigen::Index>(found.state_step.size()));
-    EXPECT_LE(difference(states, dense.state_step, state_sigma, one), kTolerance);
+    // The zero acceleration of a rotor without jerk is only as exact as what it cancels.
+    const Vector state_size = state_sigma + Real(1e-6) * dense.state_step.cwiseAbs();
+    EXPECT_LE(difference(states, dense.state_step, state_size, one), kStateTolerance);
     if (!covariances) {
       EXPECT_TRUE(found.state_covariance.empty());
       EXPECT_TRUE(found.sensitivity.empty());
@@ -241,7 +245,7 @@ void expect_dense_solution(const Problem& p) {
     const Eigen::Map<const RowMajor> sensitivity(found.sensitivity.data(), dense.sensitivity.rows(),
                                                  dense.sensitivity.cols());
     EXPECT_LE(difference(sensitivity, dense.sensitivity, state_sigma, sigma.cwiseInverse()),
-              kTolerance);
+              kStateTolerance);
     ASSERT_EQ(found.state_covariance.size(),
               p.at.size() * static_cast<std::size_t>(d * (d + 1) / 2));
     const double* entry = found.state_covariance.data();
@@ -249,7 +253,7 @@ void expect_dense_solution(const Problem& p) {
       for (Eigen::Index i = knot * d; i < (knot + 1) * d; ++i) {
         for (Eigen::Index j = i; j < (knot + 1) * d; ++j) {
           const Real scale = state_sigma[i] * state_sigma[j];
-          EXPECT_LE(std::abs(*entry++ - dense.state_covariance(i, j)), kTolerance * scale)
+          EXPECT_LE(std::abs(*entry++ - dense.state_covariance(i, j)), kVarianceTolerance * scale)
               << "knot " << knot << ", entry " << i - knot * d << " " << j - knot * d;
         }
       }
@@ -280,8 +284,8 @@ TEST(Smoother, EqualsTheDenseSolutionWithoutParameters) {
   expect_dense_solution({2, 0, {0, 3}, 6, {kSwing, kWalk}, 31});
 }
 
-TEST(Smoother, EqualsTheDenseSolutionOverALongerRun) {
-  expect_dense_solution({2, 3, {0, 20, 21}, 60, {kSwing, kWalk}, 41});
+TEST(Smoother, EqualsTheDenseSolutionOverALongerRunWithAGap) {
+  expect_dense_solution({2, 3, {0, 20, 21}, 60, {kSwing, kWalk}, 41, 0.1, 40});
 }
 
 TEST(Smoother, RotorsWithoutJerkEndWithoutAcceleration) {
