@@ -35,27 +35,69 @@ double wrapped(double angle) { return angle - kTurn * __builtin_nearbyint(angle 
 
 /// One group of shots of a knot, a lane each. Lanes without a shot repeat the last one.
 struct Group {
-  Batch time, azimuth, zenith, azimuth_variance, zenith_variance;
+  Batch time, azimuth, zenith, azimuth_rounding, zenith_rounding;
   std::size_t count;
 
   Group(const NormalEquationArguments& a, std::size_t knot, std::size_t first) {
     alignas(64) double lanes[5][kLanes];
     const std::size_t last = a.last_shot[knot];
-    count = last - first < kLanes ? last - first : kLanes;
-    for (std::size_t i = 0; i < kLanes; ++i) {
-      const std::size_t shot = first + (i < count ? i : count - 1);
-      lanes[0][i] = 1e-9 * static_cast<double>(a.time_ns[shot] - a.knot_time_ns[knot]);
-      lanes[1][i] = a.azimuth[shot];
-      lanes[2][i] = a.zenith[shot];
-      lanes[3][i] = a.noise_variance + static_cast<double>(a.azimuth_rounding_variance[shot]);
-      lanes[4][i] = a.noise_variance + static_cast<double>(a.zenith_rounding_variance[shot]);
+    const std::int64_t origin = a.knot_time_ns[knot];
+    if (first + kLanes <= last) {  // the rule, in loops that the compiler can widen
+      count = kLanes;
+      for (std::size_t i = 0; i < kLanes; ++i) {
+        lanes[0][i] = 1e-9 * static_cast<double>(a.time_ns[first + i] - origin);
+      }
+      for (std::size_t i = 0; i < kLanes; ++i) {
+        lanes[3][i] = static_cast<double>(a.azimuth_rounding_variance[first + i]);
+        lanes[4][i] = static_cast<double>(a.zenith_rounding_variance[first + i]);
+      }
+      azimuth = Batch::load_unaligned(a.azimuth + first);
+      zenith = Batch::load_unaligned(a.zenith + first);
+    } else {
+      count = last - first;
+      for (std::size_t i = 0; i < kLanes; ++i) {
+        const std::size_t shot = i < count ? first + i : last - 1;
+        lanes[0][i] = 1e-9 * static_cast<double>(a.time_ns[shot] - origin);
+        lanes[1][i] = a.azimuth[shot];
+        lanes[2][i] = a.zenith[shot];
+        lanes[3][i] = static_cast<double>(a.azimuth_rounding_variance[shot]);
+        lanes[4][i] = static_cast<double>(a.zenith_rounding_variance[shot]);
+      }
+      azimuth = Batch::load_aligned(lanes[1]);
+      zenith = Batch::load_aligned(lanes[2]);
     }
     time = Batch::load_aligned(lanes[0]);
-    azimuth = Batch::load_aligned(lanes[1]);
-    zenith = Batch::load_aligned(lanes[2]);
-    azimuth_variance = Batch::load_aligned(lanes[3]);
-    zenith_variance = Batch::load_aligned(lanes[4]);
+    azimuth_rounding = Batch::load_aligned(lanes[3]);
+    zenith_rounding = Batch::load_aligned(lanes[4]);
   }
+};
+
+/// Weights of a group's angles. Rounding is mostly the same from shot to shot, and division and
+/// root are slow, so they are only done anew when it changes.
+class Weights {
+ public:
+  explicit Weights(double noise_variance)
+      : azimuth_root(0.0),
+        zenith_root(0.0),
+        noise_(noise_variance),
+        azimuth_rounding_(-1.0),  // like no group's
+        zenith_rounding_(-1.0) {}
+
+  void set(const Group& group) {
+    if (xsimd::all((group.azimuth_rounding == azimuth_rounding_) &
+                   (group.zenith_rounding == zenith_rounding_))) {
+      return;
+    }
+    azimuth_rounding_ = group.azimuth_rounding;
+    zenith_rounding_ = group.zenith_rounding;
+    azimuth_root = Batch(1.0) / xsimd::sqrt(noise_ + azimuth_rounding_);
+    zenith_root = Batch(1.0) / xsimd::sqrt(noise_ + zenith_rounding_);
+  }
+
+  Batch azimuth_root, zenith_root;  ///< one over sigma
+
+ private:
+  Batch noise_, azimuth_rounding_, zenith_rounding_;
 };
 
 /// One observed angle of a group: residual and derivatives, all divided by its sigma.
@@ -201,8 +243,8 @@ NormalEquationCounts accumulate_knots(const NormalEquationArguments& a) {
   StaticSums<N> statics(a.free);
   KnotSums<N> sums;
   Row<N> azimuth_row, zenith_row;
-  alignas(64) double lanes[2][kLanes];
   const Batch one(1.0);
+  Weights weights(a.noise_variance);
   for (std::size_t knot = a.knot_begin; knot < a.knot_end; ++knot) {
     sums.clear(a.free);
     std::array<Batch, N> angle, speed, half_acceleration;
@@ -222,13 +264,14 @@ NormalEquationCounts accumulate_knots(const NormalEquationArguments& a) {
       const auto shots = linearise_angles(train, derivatives, angles);
       const Batch azimuth_residual = wrapped(group.azimuth - shots.angles.azimuth);
       const Batch zenith_residual = group.zenith - shots.angles.zenith;
-      const Batch chi2 = azimuth_residual * azimuth_residual / group.azimuth_variance +
-                         zenith_residual * zenith_residual / group.zenith_variance;
-      const Batch share = one / (one + a.softening * chi2);
-      fill_row(a, shots.azimuth, azimuth_residual, share / xsimd::sqrt(group.azimuth_variance),
-               azimuth_row);
-      fill_row(a, shots.zenith, zenith_residual, share / xsimd::sqrt(group.zenith_variance),
-               zenith_row);
+      weights.set(group);
+      const Batch normalised_azimuth = weights.azimuth_root * azimuth_residual;
+      const Batch normalised_zenith = weights.zenith_root * zenith_residual;
+      const Batch chi2 =
+          xsimd::fma(normalised_azimuth, normalised_azimuth, normalised_zenith * normalised_zenith);
+      const Batch share = a.softening > 0 ? one / (one + a.softening * chi2) : one;
+      fill_row(a, shots.azimuth, azimuth_residual, share * weights.azimuth_root, azimuth_row);
+      fill_row(a, shots.zenith, zenith_residual, share * weights.zenith_root, zenith_row);
       // Comparison with NaN is false: a beam that does not get through counts as an outlier.
       auto good = chi2 <= Batch(a.cut);
       Batch loss = xsimd::select(good, chi2 * share, Batch(a.cut));
@@ -241,9 +284,10 @@ NormalEquationCounts accumulate_knots(const NormalEquationArguments& a) {
         good = good & present;
         clear_lanes(a, good, azimuth_row);
         clear_lanes(a, good, zenith_row);
-        xsimd::select(good, one, Batch(0.0)).store_aligned(lanes[0]);
+        alignas(64) double counted[kLanes];
+        xsimd::select(good, one, Batch(0.0)).store_aligned(counted);
         for (std::size_t i = 0; i < group.count; ++i) {
-          const bool out = lanes[0][i] == 0.0;
+          const bool out = counted[i] == 0.0;
           counts.outliers += out;
           if (a.outlier) a.outlier[shot + i] = out;
         }
@@ -253,12 +297,16 @@ NormalEquationCounts accumulate_knots(const NormalEquationArguments& a) {
       cost = cost + loss;
       sums.add(azimuth_row, zenith_row, group.time, a.free);
       statics.add(azimuth_row, zenith_row, a.free);
-      if (a.azimuth_residual) {
-        azimuth_residual.store_aligned(lanes[0]);
-        zenith_residual.store_aligned(lanes[1]);
+      if (a.azimuth_residual && group.count == kLanes) {
+        azimuth_residual.store_unaligned(a.azimuth_residual + shot);
+        zenith_residual.store_unaligned(a.zenith_residual + shot);
+      } else if (a.azimuth_residual) {
+        alignas(64) double azimuths[kLanes], zeniths[kLanes];
+        azimuth_residual.store_aligned(azimuths);
+        zenith_residual.store_aligned(zeniths);
         for (std::size_t i = 0; i < group.count; ++i) {
-          a.azimuth_residual[shot + i] = lanes[0][i];
-          a.zenith_residual[shot + i] = lanes[1][i];
+          a.azimuth_residual[shot + i] = azimuths[i];
+          a.zenith_residual[shot + i] = zeniths[i];
         }
       }
     }

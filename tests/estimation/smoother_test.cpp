@@ -285,7 +285,7 @@ TEST(Smoother, EqualsTheDenseSolutionWithoutParameters) {
 }
 
 TEST(Smoother, EqualsTheDenseSolutionOverALongerRunWithAGap) {
-  expect_dense_solution({2, 3, {0, 20, 21}, 60, {kSwing, kWalk}, 41, 0.1, 40});
+  expect_dense_solution({2, 3, {0, 14, 15}, 40, {kSwing, kWalk}, 41, 0.1, 28});
 }
 
 TEST(Smoother, RotorsWithoutJerkEndWithoutAcceleration) {

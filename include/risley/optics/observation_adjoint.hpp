@@ -118,59 +118,80 @@ Trace<T, N> trace_forward(const PreparedTrain<T, N>& train,
   return out;
 }
 
-/// Reverse pass: the gradient of a scalar result from its derivative with respect to the emergent
-/// direction. One pass per result, whatever the number of parameters.
-/// @param seed  d result / d direction [3]
-template <ModelScalar T, int N>
-Gradient<T, N> trace_adjoint(const PreparedTrain<T, N>& train, const PreparedDerivatives<T, N>& d,
-                             const Trace<T, N>& forward, const Vector3<T>& seed) {
-  Gradient<T, N> gradient;
-  const auto at = [&](int where) -> T& {
-    return gradient.parameters[static_cast<std::size_t>(where)];
-  };
-  Vector3<T> beam = seed;
-  T air_bar(0.0);
+/// Reverse pass: the gradients of some scalar results from their derivatives with respect to the
+/// emergent direction, all at once because they share how the faces move.
+/// @param seeds  d result / d direction [results][3]
+template <ModelScalar T, int N, std::size_t Results>
+std::array<Gradient<T, N>, Results> trace_adjoint(const PreparedTrain<T, N>& train,
+                                                  const PreparedDerivatives<T, N>& d,
+                                                  const Trace<T, N>& forward,
+                                                  const std::array<Vector3<T>, Results>& seeds) {
+  std::array<Gradient<T, N>, Results> gradients;
+  std::array<Vector3<T>, Results> beams = seeds;
+  std::array<T, Results> air_bar;
+  for (T& bar : air_bar) bar = T(0.0);
   for (int prism = N - 1; prism >= 0; --prism) {
     const auto k = static_cast<std::size_t>(prism);
+    const bool last = prism == N - 1;
     const T& sine = forward.sine[k];
     const T& cosine = forward.cosine[k];
-    T angle(0.0), wedge(0.0), tilt_h(0.0), tilt_v(0.0), bearing_h(0.0), bearing_v(0.0);
-    std::array<T, 2> ratio_bar;
-    for (int side = 1; side >= 0; --side) {
-      const std::size_t i = 2 * k + static_cast<std::size_t>(side);
-      Vector3<T> normal_bar;
-      ratio_bar[static_cast<std::size_t>(side)] =
-          refract_adjoint(forward.refraction[i], forward.incident[i], forward.normal[i],
-                          train.faces[i].index_ratio, beam, normal_bar);
-      const auto& face = d.faces[i];
-      angle = angle + dot(normal_bar, train.faces[i].normal.turning_rate(sine, cosine));
-      tilt_h = tilt_h + dot(normal_bar, face.tilt_horizontal.at(sine, cosine));
-      const T vertical = dot(normal_bar, face.tilt_vertical.at(sine, cosine));
-      tilt_v = tilt_v + vertical;
-      wedge = wedge + face.wedge_sign * vertical;
-      if (prism < N - 1) {
-        bearing_h = bearing_h + dot(normal_bar, face.bearing_horizontal.at(sine, cosine));
-        bearing_v = bearing_v + dot(normal_bar, face.bearing_vertical.at(sine, cosine));
-      }
-    }
-    // Ratios: air / glass into the prism, glass / air out of it.
     const T& glass = d.glass[k];
     const T over_glass = T(1.0) / glass;
     const T over_air = T(1.0) / d.air;
-    at(place::refractive_index(prism)) =
-        ratio_bar[1] * over_air - ratio_bar[0] * d.air * over_glass * over_glass;
-    air_bar = air_bar + ratio_bar[0] * over_glass - ratio_bar[1] * glass * over_air * over_air;
-    at(place::wedge_angle(prism)) = wedge;
-    at(place::prism_tilt_horizontal(prism)) = tilt_h;
-    at(place::prism_tilt_vertical(prism)) = tilt_v;
-    at(place::bearing_tilt_horizontal(prism)) = bearing_h;
-    at(place::bearing_tilt_vertical(prism)) = bearing_v;
-    gradient.rotation_angles[k] = angle;
+    for (Gradient<T, N>& gradient : gradients) {
+      gradient.rotation_angles[k] = T(0.0);
+      for (int i = 3 + 6 * prism; i < 9 + 6 * prism; ++i) {
+        gradient.parameters[static_cast<std::size_t>(i)] = T(0.0);
+      }
+    }
+    for (int side = 1; side >= 0; --side) {
+      const std::size_t i = 2 * k + static_cast<std::size_t>(side);
+      const auto& face = d.faces[i];
+      const Vector3<T> turning = train.faces[i].normal.turning_rate(sine, cosine);
+      const Vector3<T> tilt_horizontal = face.tilt_horizontal.at(sine, cosine);
+      const Vector3<T> tilt_vertical = face.tilt_vertical.at(sine, cosine);
+      Vector3<T> bearing_horizontal, bearing_vertical;
+      if (!last) {
+        bearing_horizontal = face.bearing_horizontal.at(sine, cosine);
+        bearing_vertical = face.bearing_vertical.at(sine, cosine);
+      }
+      for (std::size_t r = 0; r < Results; ++r) {
+        Gradient<T, N>& gradient = gradients[r];
+        const auto add = [&](int where, const T& value) {
+          T& sum = gradient.parameters[static_cast<std::size_t>(where)];
+          sum = sum + value;
+        };
+        Vector3<T> normal_bar;
+        const T ratio_bar = refract_adjoint(forward.refraction[i], forward.incident[i],
+                                            forward.normal[i], train.faces[i].index_ratio,
+                                            beams[r], normal_bar);
+        gradient.rotation_angles[k] = gradient.rotation_angles[k] + dot(normal_bar, turning);
+        const T vertical = dot(normal_bar, tilt_vertical);
+        add(place::prism_tilt_horizontal(prism), dot(normal_bar, tilt_horizontal));
+        add(place::prism_tilt_vertical(prism), vertical);
+        add(place::wedge_angle(prism), face.wedge_sign * vertical);
+        if (!last) {
+          add(place::bearing_tilt_horizontal(prism), dot(normal_bar, bearing_horizontal));
+          add(place::bearing_tilt_vertical(prism), dot(normal_bar, bearing_vertical));
+        }
+        // Ratios: air / glass into the prism, glass / air out of it.
+        if (side == 0) {
+          add(place::refractive_index(prism), -ratio_bar * d.air * over_glass * over_glass);
+          air_bar[r] = air_bar[r] + ratio_bar * over_glass;
+        } else {
+          add(place::refractive_index(prism), ratio_bar * over_air);
+          air_bar[r] = air_bar[r] - ratio_bar * glass * over_air * over_air;
+        }
+      }
+    }
   }
-  at(place::refractive_index_air()) = air_bar;
-  at(place::incident_beam_horizontal()) = dot(beam, d.incident_horizontal);
-  at(place::incident_beam_vertical()) = dot(beam, d.incident_vertical);
-  return gradient;
+  for (std::size_t r = 0; r < Results; ++r) {
+    auto& parameters = gradients[r].parameters;
+    parameters[place::refractive_index_air()] = air_bar[r];
+    parameters[place::incident_beam_horizontal()] = dot(beams[r], d.incident_horizontal);
+    parameters[place::incident_beam_vertical()] = dot(beams[r], d.incident_vertical);
+  }
+  return gradients;
 }
 
 /// d azimuth and d zenith / d direction [3]; NaN on the Z axis, where azimuth has no derivative.
@@ -206,9 +227,10 @@ AngleLinearisation<T, N> linearise_angles(const PreparedTrain<T, N>& train,
                                           const RotationAngles<T, N>& rotation_angle) {
   const Trace<T, N> forward = trace_forward(train, rotation_angle);
   const AngleSeeds<T> seeds = angle_seeds(forward.direction());
-  return {forward.direction(), angles_from_direction(forward.direction()),
-          trace_adjoint(train, derivatives, forward, seeds.azimuth),
-          trace_adjoint(train, derivatives, forward, seeds.zenith), forward.valid()};
+  const auto gradients = trace_adjoint(train, derivatives, forward,
+                                       std::array<Vector3<T>, 2>{seeds.azimuth, seeds.zenith});
+  return {forward.direction(), angles_from_direction(forward.direction()), gradients[0],
+          gradients[1], forward.valid()};
 }
 
 /// The three components of the direction of one shot and their gradients.
@@ -226,9 +248,10 @@ DirectionLinearisation<T, N> linearise_direction(const PreparedTrain<T, N>& trai
   const Trace<T, N> forward = trace_forward(train, rotation_angle);
   const T zero(0.0), one(1.0);
   return {forward.direction(),
-          {trace_adjoint(train, derivatives, forward, Vector3<T>{one, zero, zero}),
-           trace_adjoint(train, derivatives, forward, Vector3<T>{zero, one, zero}),
-           trace_adjoint(train, derivatives, forward, Vector3<T>{zero, zero, one})},
+          trace_adjoint(train, derivatives, forward,
+                        std::array<Vector3<T>, 3>{Vector3<T>{one, zero, zero},
+                                                  Vector3<T>{zero, one, zero},
+                                                  Vector3<T>{zero, zero, one}}),
           forward.valid()};
 }
 
