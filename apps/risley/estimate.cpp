@@ -109,16 +109,16 @@ Json evaluation_json(const Evaluation& evaluation, int prisms) {
     }
     return object;
   };
-  return {{"parameters", parameters},
-          {"rotation_angle_rmse_deg", by_prism(evaluation.rotation_angle_rmse, kDegreesPerRadian)},
-          {"rotation_angle_rmse_over_sigma",
-           by_prism(evaluation.rotation_angle_rmse_over_sigma, 1.0)},
-          {"angular_velocity_rmse_deg_per_s",
-           by_prism(evaluation.angular_velocity_rmse, kDegreesPerRadian)},
-          {"angular_velocity_rmse_over_sigma",
-           by_prism(evaluation.angular_velocity_rmse_over_sigma, 1.0)},
-          {"nees_parameters", evaluation.nees_parameters},
-          {"nees_rotation_angles", evaluation.nees_rotation_angles}};
+  return {
+      {"parameters", parameters},
+      {"rotation_angle_rmse_deg", by_prism(evaluation.rotation_angle_rmse, kDegreesPerRadian)},
+      {"rotation_angle_rmse_over_sigma", by_prism(evaluation.rotation_angle_rmse_over_sigma, 1.0)},
+      {"angular_velocity_rmse_deg_per_s",
+       by_prism(evaluation.angular_velocity_rmse, kDegreesPerRadian)},
+      {"angular_velocity_rmse_over_sigma",
+       by_prism(evaluation.angular_velocity_rmse_over_sigma, 1.0)},
+      {"nees_parameters", evaluation.nees_parameters},
+      {"nees_rotation_angles", evaluation.nees_rotation_angles}};
 }
 
 Json start_json(const estimation::Start& start) {
@@ -208,9 +208,8 @@ Json outcome_json(const Outcome& outcome) {
        {{"read", outcome.read_s}, {"solve", outcome.solve_s}, {"total", outcome.total_s}}}};
   if (e.map) {
     object["iterations"] = e.map->iterations;
-    object["residuals"]["autocorrelation"] = e.map->autocorrelation.rho.empty()
-                                                 ? 0.0
-                                                 : e.map->autocorrelation.rho.front();
+    object["residuals"]["autocorrelation"] =
+        e.map->autocorrelation.rho.empty() ? 0.0 : e.map->autocorrelation.rho.front();
     object["residuals"]["autocorrelation_factor"] = e.map->autocorrelation.factor;
     object["residuals"]["unit_variance"] = e.map->unit_variance;
     object["residuals"]["variance_factor"] = e.map->variance_factor;
@@ -264,7 +263,8 @@ void print_outcome(const Outcome& outcome) {
   residuals.print();
   if (e.map) {
     fmt::print(
-        "\nresiduals: {:.3f} times the stated variance, autocorrelation factor {:.3f}; variances of "
+        "\nresiduals: {:.3f} times the stated variance, autocorrelation factor {:.3f}; variances "
+        "of "
         "single shots multiplied by {:.3f}\n",
         e.map->unit_variance, e.map->autocorrelation.factor, e.map->variance_factor);
   }
@@ -298,7 +298,8 @@ void write_state_file(const std::string& path, const EstimateCommandOptions& opt
 /// calibration.yaml, states.nc and report.html. An estimate that did not converge is no
 /// calibration: there is none then, not even an older one of the same name.
 void write_folder(const EstimateCommandOptions& options, const CommonOptions& common,
-                  const RecordingInput& input, const sensors::Sensor& nominal, const Outcome& outcome) {
+                  const RecordingInput& input, const sensors::Sensor& nominal,
+                  const Outcome& outcome) {
   namespace fs = std::filesystem;
   const std::vector<std::pair<std::string, std::string>> provenance = {
       {"command", common.command},
@@ -359,10 +360,11 @@ ExitStatus run_estimate(const EstimateCommandOptions& options, const CommonOptio
   Outcome outcome;
   outcome.warnings = warning_texts(input.reader->warnings());
   if (counts.clock_resets > 0) {
-    outcome.warnings.push_back(fmt::format(
-        "the clock of the recording jumps back {} times: the pieces share the parameters, and their "
-        "rotors are found anew",
-        counts.clock_resets));
+    outcome.warnings.push_back(
+        fmt::format("the clock of the recording jumps back {} times: the pieces share the "
+                    "parameters, and their "
+                    "rotors are found anew",
+                    counts.clock_resets));
   }
   outcome.read_s = input.seconds;
   const double solving = now();
@@ -399,28 +401,32 @@ Run declare_estimate(CLI::App& verb) {
   verb.add_option("INPUT", o.input, "Recording of one sensor, of any known format")->required();
   verb.add_option("-o,--output", o.folder,
                   "Folder for calibration.yaml, states.nc and report.html");
-  verb.add_option("--method", o.method, "map: most probable trajectory of all shots at once; ekf: the paper's filter")
+  verb.add_option("--method", o.method,
+                  "map: most probable trajectory of all shots at once; ekf: the paper's filter")
       ->check(CLI::IsMember({"map", "ekf"}))
       ->capture_default_str();
-  verb.add_option("--rate-hz", o.rate_hz, "Shots per second to use, or 'full' for all (default: full with map, 1000 with ekf)");
+  verb.add_option(
+      "--rate-hz", o.rate_hz,
+      "Shots per second to use, or 'full' for all (default: full with map, 1000 with ekf)");
   verb.add_option("--noise-angle-deg", o.noise_angle_deg,
                   "1 sigma of azimuth and zenith before rounding (default: the sensor's)");
   verb.add_option("--sensor", o.sensor,
                   "Preset by name, or a preset or calibration file (default: from the recording)");
   add_parameter_choice(verb, o.fixed, o.freed);
-  verb.add_option("--states", o.states,
-                  "Which rotor states to write: at one shot every 2 ms (ekf: at the shots used), at "
-                  "all shots, none")
+  verb.add_option(
+          "--states", o.states,
+          "Which rotor states to write: at one shot every 2 ms (ekf: at the shots used), at "
+          "all shots, none")
       ->check(CLI::IsMember({"knots", "all", "none"}))
       ->capture_default_str();
   verb.add_option("--mirror", o.mirror,
                   "Whether the elevation in the file has the opposite sign; auto finds out")
       ->check(CLI::IsMember({"auto", "yes", "no"}))
       ->capture_default_str();
-  verb.add_option(
-          "--process-noise", o.process_noise,
-          "How rotors may move: auto (random walks of speed and, with map, acceleration, by maximum "
-          "likelihood), paper (900), or a random walk of the speed in deg/s per sqrt(s)")
+  verb.add_option("--process-noise", o.process_noise,
+                  "How rotors may move: auto (random walks of speed and, with map, acceleration, "
+                  "by maximum "
+                  "likelihood), paper (900), or a random walk of the speed in deg/s per sqrt(s)")
       ->capture_default_str();
   verb.add_option("--truth", o.truth, "OUT.truth.yaml of a simulation, to judge the estimate by");
   return [options](const CommonOptions& common) { return run_estimate(*options, common); };

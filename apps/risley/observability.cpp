@@ -69,12 +69,12 @@ void print_observability(const Observability& o, int prisms) {
                                   : "never";
     table.add({quantity.name, quantity.free ? sigma : fmt::format("({})", sigma), info.unit,
                fmt::format("{:.3g}", degrees_from_radians(quantity.sensitivity) * info.si_per_unit),
-               quantity.twins.front().first,
-               fmt::format("{:.4f}", quantity.twins.front().second)});
+               quantity.twins.front().first, fmt::format("{:.4f}", quantity.twins.front().second)});
   }
   table.print();
   fmt::print(
-      "\nsigma: Cramer-Rao bound. In brackets: held fixed by default; the bound if it were freed.\n");
+      "\nsigma: Cramer-Rao bound. In brackets: held fixed by default; the bound if it were "
+      "freed.\n");
   for (const auto& weak : o.unobservable) {
     fmt::print("not told by such data: {}\n", direction_text(weak));
   }
@@ -113,8 +113,7 @@ ExitStatus run_observability(const ObservabilityCommandOptions& options,
       rate = positive_number(options.rate_hz, "--rate-hz", "Hz");
     }
     RecordingInput input = read_recording(options.input, rate, common);
-    const estimation::EstimateOptions settings =
-        estimate_options(wishes, input.reader->header());
+    const estimation::EstimateOptions settings = estimate_options(wishes, input.reader->header());
     prisms = settings.sensor.prisms();
     ProgressBar bar("estimating", common);
     const estimation::Estimate estimate =
@@ -140,13 +139,15 @@ Run declare_observability(CLI::App& verb) {
   const auto options = std::make_shared<ObservabilityCommandOptions>();
   ObservabilityCommandOptions& o = *options;
   verb.add_option("INPUT", o.input, "Recording to judge; without one, a plan is judged");
-  verb.add_option("--sensor", o.sensor,
-                  "Preset by name, or a preset or calibration file (default: from the recording, or "
-                  "mid-40)");
+  verb.add_option(
+      "--sensor", o.sensor,
+      "Preset by name, or a preset or calibration file (default: from the recording, or "
+      "mid-40)");
   verb.add_option("--duration-s", o.duration_s, "Length of the planned recording")
       ->capture_default_str();
-  verb.add_option("--rate-hz", o.rate_hz,
-                  "Shots per second of the plan (default: the sensor's), or to use of the recording");
+  verb.add_option(
+      "--rate-hz", o.rate_hz,
+      "Shots per second of the plan (default: the sensor's), or to use of the recording");
   verb.add_option("--noise-angle-deg", o.noise_angle_deg,
                   "1 sigma of azimuth and zenith before rounding (default: the sensor's)");
   verb.add_flag("!--no-rounding", o.rounding,

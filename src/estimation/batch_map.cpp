@@ -64,9 +64,8 @@ class Iteration {
 
   /// Residual scale over the stated noise, not below 1; outliers do not count.
   double level() const {
-    const double rounding =
-        0.5 * static_cast<double>(series_.azimuth_rounding_variance.front() +
-                                  series_.zenith_rounding_variance.front());
+    const double rounding = 0.5 * static_cast<double>(series_.azimuth_rounding_variance.front() +
+                                                      series_.zenith_rounding_variance.front());
     const double stated = std::sqrt(options_.angle_noise * options_.angle_noise + rounding);
     return std::max(1.0, robust_scale(azimuth_, zenith_) / stated);
   }
@@ -165,10 +164,10 @@ double unit_variance(const AngleSeries& series, double angle_noise, std::span<co
   const double noise = angle_noise * angle_noise;
   for (std::size_t i = 0; i < series.size(); ++i) {
     if (outlier[i]) continue;
-    sum += azimuth[i] * azimuth[i] /
-               (noise + static_cast<double>(series.azimuth_rounding_variance[i])) +
-           zenith[i] * zenith[i] /
-               (noise + static_cast<double>(series.zenith_rounding_variance[i]));
+    sum +=
+        azimuth[i] * azimuth[i] /
+            (noise + static_cast<double>(series.azimuth_rounding_variance[i])) +
+        zenith[i] * zenith[i] / (noise + static_cast<double>(series.zenith_rounding_variance[i]));
     count += 2.0;
   }
   return count > 0 ? sum / count : std::numeric_limits<double>::quiet_NaN();
@@ -185,8 +184,8 @@ BatchMapResult run_batch_map(const AngleSeries& series, const Start& start,
                                       degrees_from_radians(options.angle_noise)));
   }
   if (!(options.knot_interval > 0)) {
-    throw InvalidArgument(fmt::format("knot interval = {} s, allowed above 0",
-                                      options.knot_interval));
+    throw InvalidArgument(
+        fmt::format("knot interval = {} s, allowed above 0", options.knot_interval));
   }
   const int prisms = sensor.prisms();
   const auto rotors = static_cast<std::size_t>(prisms);
@@ -258,8 +257,8 @@ BatchMapResult run_batch_map(const AngleSeries& series, const Start& start,
     // The rotors' noise shows more sharply in all shots than in the thinned ones.
     result.autocorrelation =
         autocorrelation(series.time_ns, full.azimuth(), full.zenith(), full.outlier());
-    result.unit_variance = unit_variance(series, options.angle_noise, full.azimuth(),
-                                         full.zenith(), full.outlier());
+    result.unit_variance =
+        unit_variance(series, options.angle_noise, full.azimuth(), full.zenith(), full.outlier());
     result.variance_factor =
         result.autocorrelation.factor *
         (result.unit_variance > kSignificantExcess ? result.unit_variance : 1.0);

@@ -112,8 +112,8 @@ Autocorrelation autocorrelation(std::span<const std::int64_t> time_ns,
     double products = 0, pairs = 0;
     for (const Block& block : blocks) {
       for (std::size_t i = 0; i + lag < block.azimuth.size(); ++i) {
-        products += block.azimuth[i] * block.azimuth[i + lag] +
-                    block.zenith[i] * block.zenith[i + lag];
+        products +=
+            block.azimuth[i] * block.azimuth[i + lag] + block.zenith[i] * block.zenith[i + lag];
         pairs += block.weight[i] * block.weight[i + lag];
       }
     }

@@ -222,7 +222,8 @@ template <int N>
 std::vector<RotorProcess> processes(const std::array<double, N>& decades) {
   std::vector<RotorProcess> result;
   result.reserve(N);
-  for (const double d : decades) result.push_back({radians_from_degrees(std::pow(10.0, d)), 0.0, 0.0});
+  for (const double d : decades)
+    result.push_back({radians_from_degrees(std::pow(10.0, d)), 0.0, 0.0});
   return result;
 }
 
@@ -420,7 +421,8 @@ EkfResult run(const AngleSeries& series, const Start& start, const EkfOptions& o
         fmt::format("process noise for {} rotors given, the train has {}", process.size(), N));
   }
   for (const RotorProcess& rotor : process) {
-    if (rotor.jerk != 0) throw InvalidArgument("white jerk is a motion model of the batch estimator");
+    if (rotor.jerk != 0)
+      throw InvalidArgument("white jerk is a motion model of the batch estimator");
   }
   State first = first_state(Filter<N>(series, start.train, options, process, nullptr), series,
                             start, options.free);

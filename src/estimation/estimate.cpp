@@ -24,8 +24,8 @@ std::vector<EstimatedValue> named_values(const Estimate& estimate,
   std::vector<EstimatedValue> values;
   for (std::size_t i = 0; i < estimate.free.size(); ++i) {
     const auto at = static_cast<Eigen::Index>(i);
-    values.push_back({estimate.free[i].name, estimate.parameters[at],
-                      std::sqrt(estimate.covariance(at, at))});
+    values.push_back(
+        {estimate.free[i].name, estimate.parameters[at], std::sqrt(estimate.covariance(at, at))});
   }
   const RotorStates& states = estimate.states;
   const int prisms = states.prisms();
@@ -152,10 +152,11 @@ void judge(Estimate& estimate, const PrismTrain& nominal) {
     fail(residuals + ": the model does not describe these data, or their noise is larger");
   } else if (!estimate.unobservable.empty()) {
     const WeakDirection& worst = estimate.unobservable.front();
-    fail(fmt::format(
-        "the data do not tell the combination {} (in units of 1 deg, or 0.01 of an index; its sigma "
-        "is {:.2g} of them): hold one of these fixed, or record longer",
-        direction_text(worst), worst.sigma));
+    fail(
+        fmt::format("the data do not tell the combination {} (in units of 1 deg, or 0.01 of an "
+                    "index; its sigma "
+                    "is {:.2g} of them): hold one of these fixed, or record longer",
+                    direction_text(worst), worst.sigma));
   } else if (std::string words = implausible_parameter(estimate, nominal); !words.empty()) {
     fail(std::move(words));
   } else if (map && ratio < kFarBelow) {
@@ -182,7 +183,8 @@ void judge(Estimate& estimate, const PrismTrain& nominal) {
   }
   if (unevenness > kUneven * (map ? estimate.map->autocorrelation.factor : 1.0)) {
     estimate.warnings.push_back(fmt::format(
-        "residuals depend on the rotation angle of prism {} ({:.3g} times what chance would make of "
+        "residuals depend on the rotation angle of prism {} ({:.3g} times what chance would make "
+        "of "
         "them): the model lacks something that this sensor has, or a parameter is held at a wrong "
         "value; the sigmas do not cover that",
         prism_letter(static_cast<int>(uneven)), unevenness));
@@ -241,8 +243,7 @@ std::vector<ShotRange> take_map(Estimate& estimate, const EstimateOptions& optio
   settings.angle_noise = estimate.angle_noise;
   settings.free = estimate.free;
   settings.rotor_process = options.rotor_process;
-  estimate.map =
-      run_batch_map(estimate.series, estimate.start, options.sensor, settings, progress);
+  estimate.map = run_batch_map(estimate.series, estimate.start, options.sensor, settings, progress);
   const BatchMapResult& result = *estimate.map;
   estimate.parameters = result.parameters;
   estimate.covariance = result.covariance;

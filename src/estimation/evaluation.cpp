@@ -83,7 +83,7 @@ Evaluation evaluate(const Estimate& estimate, const sensors::Sensor& truth_senso
   }
 
   std::vector<double> squares(rotor_count, 0.0), variances = squares, speed_squares = squares,
-                                                  speed_variances = squares;
+                                                 speed_variances = squares;
   Eigen::VectorXd error(prisms);
   Eigen::MatrixXd covariance(prisms, prisms);
   result.rotation_angle_error.assign(rotor_count, std::vector<double>(rows.size()));

@@ -203,9 +203,8 @@ WindowFit fit_window(const AngleSeries& shots, const PrismTrain& nominal,
       double cost = evaluate(fit.train, fit.knot);
       Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(d + n, d + n);
       Eigen::VectorXd gradient(d + n);
-      with_prism_count(prisms, [&]<int N>() {
-        normal.topLeftCorner(d, d) = knot_curvature<N>(equations, 0);
-      });
+      with_prism_count(
+          prisms, [&]<int N>() { normal.topLeftCorner(d, d) = knot_curvature<N>(equations, 0); });
       using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
       normal.topRightCorner(d, n) = Eigen::Map<const RowMajor>(equations.coupling.data(), d, n);
       normal.bottomLeftCorner(n, d) = normal.topRightCorner(d, n).transpose();
@@ -479,7 +478,8 @@ void track_rotors(const AngleSeries& series, ShotRange shots, const Start& start
   const auto follow = [&](std::int64_t direction) {
     std::vector<Point> points{{start.time_ns, start.rotation_angle, start.angular_velocity}};
     Point now = points.back();
-    const std::int64_t end = direction > 0 ? series.time_ns[shots.end - 1] : series.time_ns[shots.begin];
+    const std::int64_t end =
+        direction > 0 ? series.time_ns[shots.end - 1] : series.time_ns[shots.begin];
     std::vector<double> angle;
     while (direction * (end - now.time_ns) > 0) {
       const double dt = seconds(0, direction * step_ns);

@@ -164,7 +164,8 @@ struct KnotSums {
     std::size_t pair = 0;
     for (std::size_t k = 0; k < N; ++k) {
       for (std::size_t l = k; l < N; ++l, ++pair) {
-        Batch term = xsimd::fma(first.angles[k], first.angles[l], second.angles[k] * second.angles[l]);
+        Batch term =
+            xsimd::fma(first.angles[k], first.angles[l], second.angles[k] * second.angles[l]);
         for (int power = 0; power < kTimePowers; ++power) {
           curvature[pair][power] = curvature[pair][power] + term;
           term = term * time;
@@ -258,8 +259,8 @@ NormalEquationCounts accumulate_knots(const NormalEquationArguments& a) {
       const Group group(a, knot, shot);
       std::array<Batch, N> angles;
       for (std::size_t k = 0; k < N; ++k) {
-        angles[k] =
-            xsimd::fma(group.time, xsimd::fma(group.time, half_acceleration[k], speed[k]), angle[k]);
+        angles[k] = xsimd::fma(group.time, xsimd::fma(group.time, half_acceleration[k], speed[k]),
+                               angle[k]);
       }
       const auto shots = linearise_angles(train, derivatives, angles);
       const Batch azimuth_residual = wrapped(group.azimuth - shots.angles.azimuth);
@@ -278,8 +279,7 @@ NormalEquationCounts accumulate_knots(const NormalEquationArguments& a) {
       if (group.count < kLanes || !xsimd::all(good)) {
         alignas(64) double number[kLanes];
         for (std::size_t i = 0; i < kLanes; ++i) number[i] = static_cast<double>(i);
-        const auto present =
-            Batch::load_aligned(number) < Batch(static_cast<double>(group.count));
+        const auto present = Batch::load_aligned(number) < Batch(static_cast<double>(group.count));
         loss = xsimd::select(present, loss, Batch(0.0));
         good = good & present;
         clear_lanes(a, good, azimuth_row);

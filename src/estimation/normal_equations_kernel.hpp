@@ -21,12 +21,12 @@ struct NormalEquationArguments {
   const double* parameters = nullptr;     ///< flat vector
   const FaceOrder* face_order = nullptr;  ///< [prisms]
   int prisms = 0;
-  int free = 0;                        ///< number of free parameters
-  const int* place_begin = nullptr;    ///< [free + 1], into places
-  const int* places = nullptr;         ///< of the flat vector
+  int free = 0;                      ///< number of free parameters
+  const int* place_begin = nullptr;  ///< [free + 1], into places
+  const int* places = nullptr;       ///< of the flat vector
   std::size_t knot_begin = 0, knot_end = 0;
-  const std::size_t* first_shot = nullptr;   ///< [knots]
-  const std::size_t* last_shot = nullptr;    ///< [knots], one behind the last
+  const std::size_t* first_shot = nullptr;  ///< [knots]
+  const std::size_t* last_shot = nullptr;   ///< [knots], one behind the last
   const std::int64_t* knot_time_ns = nullptr;
   const double* state = nullptr;  ///< [knots][prisms][3]; angles of any number of turns
   const std::int64_t* time_ns = nullptr;
@@ -38,11 +38,11 @@ struct NormalEquationArguments {
   double softening = 0;       ///< shots weigh 1 / (1 + softening chi2)^2
   double cut = 0;             ///< shots with a larger chi2 weigh nothing
 
-  double* curvature = nullptr;  ///< [knots][prisms (prisms+1)/2][kTimePowers]
-  double* coupling = nullptr;   ///< [knots][prisms][3][free]
-  double* gradient = nullptr;   ///< [knots][prisms][3]
-  double* static_hessian = nullptr;   ///< [free (free+1)/2], upper triangle row by row
-  double* static_gradient = nullptr;  ///< [free]
+  double* curvature = nullptr;         ///< [knots][prisms (prisms+1)/2][kTimePowers]
+  double* coupling = nullptr;          ///< [knots][prisms][3][free]
+  double* gradient = nullptr;          ///< [knots][prisms][3]
+  double* static_hessian = nullptr;    ///< [free (free+1)/2], upper triangle row by row
+  double* static_gradient = nullptr;   ///< [free]
   double* azimuth_residual = nullptr;  ///< [shots], or nullptr
   double* zenith_residual = nullptr;
   unsigned char* outlier = nullptr;  ///< [shots], or nullptr

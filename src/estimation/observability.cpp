@@ -26,8 +26,8 @@ std::vector<WeakDirection> weak_directions(const Eigen::MatrixXd& information,
   if (n == 0) return weak;
   Eigen::VectorXd scale(n);
   for (Eigen::Index i = 0; i < n; ++i) scale[i] = free[static_cast<std::size_t>(i)].prior_sigma;
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(
-      scale.asDiagonal() * information * scale.asDiagonal());
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(scale.asDiagonal() * information *
+                                                              scale.asDiagonal());
   const double largest = solver.eigenvalues()[n - 1];
   for (Eigen::Index i = 0; i < n; ++i) {  // weakest first
     // Below this, eigenvalues are rounding of the largest.
@@ -123,9 +123,8 @@ Middle middle_of(const SmootherSolution& solution, const RotorTrajectory& knots)
   const Eigen::Index d = knots.states(), n = solution.parameter_covariance.rows();
   const std::size_t knot = knots.size() / 2;
   using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-  const Eigen::MatrixXd all =
-      Eigen::Map<const RowMajor>(solution.sensitivity.data() + knot * static_cast<std::size_t>(d * n),
-                                 d, n);
+  const Eigen::MatrixXd all = Eigen::Map<const RowMajor>(
+      solution.sensitivity.data() + knot * static_cast<std::size_t>(d * n), d, n);
   Eigen::MatrixXd total(d, d);
   const double* entry =
       solution.state_covariance.data() + knot * static_cast<std::size_t>(d * (d + 1) / 2);
@@ -237,9 +236,9 @@ Observability analyse(const NormalEquations& equations, const RotorTrajectory& k
     }
     const Eigen::MatrixXd both = joint_covariance(covariance, middle, rows);
     const auto count = static_cast<Eigen::Index>(rows.size());
-    const Eigen::Index place =
-        parameter ? std::find(rows.begin(), rows.end(), quantity) - rows.begin()
-                  : count + quantity - n;
+    const Eigen::Index place = parameter
+                                   ? std::find(rows.begin(), rows.end(), quantity) - rows.begin()
+                                   : count + quantity - n;
     found.sigma = std::sqrt(both(place, place));
     for (Eigen::Index j = 0; j < both.rows(); ++j) {
       if (j == place) continue;
@@ -283,8 +282,8 @@ Observability observability_of_plan(const ObservabilityPlan& plan) {
   };
   positive(plan.duration, "duration", "s");
   positive(plan.rate, "rate", "Hz");
-  const double variance = plan.angle_noise * plan.angle_noise +
-                          plan.angle_resolution * plan.angle_resolution / 12.0;
+  const double variance =
+      plan.angle_noise * plan.angle_noise + plan.angle_resolution * plan.angle_resolution / 12.0;
   positive(variance, "noise and rounding", "rad^2");
   const PrismTrain& train = plan.sensor.train;
   const double duration = std::min(plan.duration, kMostDuration);
@@ -298,7 +297,8 @@ Observability observability_of_plan(const ObservabilityPlan& plan) {
     const double t = static_cast<double>(i) / rate;
     series.time_ns.push_back(std::llround(1e9 * t));
     for (std::size_t k = 0; k < angles.size(); ++k) {
-      angles[k] = wrap_to_pi(plan.sensor.angular_velocity[k] * (1e-9 * static_cast<double>(series.time_ns.back())));
+      angles[k] = wrap_to_pi(plan.sensor.angular_velocity[k] *
+                             (1e-9 * static_cast<double>(series.time_ns.back())));
     }
     const Observation shot = observe(train, angles);
     series.azimuth.push_back(shot.azimuth);
@@ -373,10 +373,10 @@ std::vector<std::string> observability_words(const Observability& observability,
     const double target = info.unit == "1" ? 1e-5 : 0.01;
     const double needed = observability.duration * std::pow(sigma / target, 2);
     if (needed <= observability.duration) {
-      words.push_back(
-          fmt::format("{} acts nearly like {}, but this recording tells them apart: freed, its sigma "
-                      "is {:.2g}{}, and {:.3g} s at {:.4g} Hz reach {}{}",
-                      quantity.name, twins, sigma, unit, needed, observability.rate, target, unit));
+      words.push_back(fmt::format(
+          "{} acts nearly like {}, but this recording tells them apart: freed, its sigma "
+          "is {:.2g}{}, and {:.3g} s at {:.4g} Hz reach {}{}",
+          quantity.name, twins, sigma, unit, needed, observability.rate, target, unit));
     } else {
       words.push_back(fmt::format(
           "{}: keep it fixed. Freed, its sigma is {:.2g}{}; {}{} would take {:.3g} s at {:.4g} Hz",

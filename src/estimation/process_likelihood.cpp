@@ -118,8 +118,8 @@ RotorWindows::RotorWindows(const NormalEquations& equations, const RotorTrajecto
             sorted.template bottomLeftCorner<kOthers, 3>();
         const Eigen::LDLT<Eigen::Matrix<double, kOthers, kOthers>> solver(others);
         window.curvature -= cross.transpose() * solver.solve(cross);
-        window.gradient -= cross.transpose() *
-                           solver.solve(sorted_gradient.template tail<kOthers>());
+        window.gradient -=
+            cross.transpose() * solver.solve(sorted_gradient.template tail<kOthers>());
       }
       window.state = center.template segment<3>(3 * rotor);
       if (!fresh && !windows_.empty()) {
@@ -178,8 +178,8 @@ std::vector<RotorProcess> likeliest_process(const NormalEquations& equations,
     const double jerk_alone =
         best_decade([&](double j) { return cost(kNone, j); }, kLowestJerk, kHighestJerk);
     // Both together: the walk is then slower than it would have to be alone.
-    const double walk = best_decade([&](double a) { return cost(a, jerk_alone); }, walk_alone - 3.0,
-                                    walk_alone);
+    const double walk =
+        best_decade([&](double a) { return cost(a, jerk_alone); }, walk_alone - 3.0, walk_alone);
     const double jerk =
         best_decade([&](double j) { return cost(walk, j); }, jerk_alone - 1.0, jerk_alone);
     // More numbers only where the data are so much likelier with them.

@@ -75,8 +75,8 @@ void interpolate(const RotorTrajectory& from, RotorTrajectory& to) {
     const std::size_t last = end_of(from, s) - 1;
     for (std::size_t knot = to.stretch_begin[s]; knot < end_of(to, s); ++knot) {
       const std::int64_t time = to.time_ns[knot];
-      while (near < last && std::llabs(from.time_ns[near + 1] - time) <=
-                                std::llabs(from.time_ns[near] - time)) {
+      while (near < last &&
+             std::llabs(from.time_ns[near + 1] - time) <= std::llabs(from.time_ns[near] - time)) {
         ++near;
       }
       const double seconds = 1e-9 * static_cast<double>(time - from.time_ns[near]);

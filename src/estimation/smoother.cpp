@@ -25,8 +25,7 @@ class Smoother {
   using Affine = Eigen::Matrix<double, kD, Eigen::Dynamic, Eigen::ColMajor, kD, kMostFree + 1>;
   using AffineMap = Eigen::Map<Eigen::Matrix<double, kD, Eigen::Dynamic>>;
   using SquareMap = Eigen::Map<Square>;
-  using Coupling =
-      Eigen::Map<const Eigen::Matrix<double, kD, Eigen::Dynamic, Eigen::RowMajor>>;
+  using Coupling = Eigen::Map<const Eigen::Matrix<double, kD, Eigen::Dynamic, Eigen::RowMajor>>;
 
  public:
   Smoother(const NormalEquations& equations, const RotorTrajectory& at,
@@ -43,9 +42,9 @@ class Smoother {
     const Eigen::VectorXd scale = total.diagonal().array().rsqrt();
     const Eigen::MatrixXd scaled = scale.asDiagonal() * total * scale.asDiagonal();
     const Eigen::LDLT<Eigen::MatrixXd> solver(scaled);
-    out.parameter_covariance =
-        scale.asDiagonal() * solver.solve(Eigen::MatrixXd::Identity(free_, free_)) *
-        scale.asDiagonal();
+    out.parameter_covariance = scale.asDiagonal() *
+                               solver.solve(Eigen::MatrixXd::Identity(free_, free_)) *
+                               scale.asDiagonal();
     out.parameter_step =
         scale.asDiagonal() * solver.solve(scale.asDiagonal() * (gradient_ + prior.gradient));
     if (!out.parameter_step.allFinite()) {
@@ -133,7 +132,8 @@ class Smoother {
     p.setZero();
     for (int k = 0; k < N; ++k) {
       const RotorProcess& process = process_[static_cast<std::size_t>(k)];
-      const double sigma[] = {kFirstAngleSigma, kFirstSpeedSigma, first_acceleration_sigma(process)};
+      const double sigma[] = {kFirstAngleSigma, kFirstSpeedSigma,
+                              first_acceleration_sigma(process)};
       for (int i = 0; i < 3; ++i) p(3 * k + i, 3 * k + i) = sigma[i] * sigma[i];
       if (!(process.jerk > 0)) x(3 * k + 2, 0) = -state(knot)[3 * k + 2];
     }
@@ -152,8 +152,7 @@ class Smoother {
     x.col(0) += offset;
     for (int k = 0; k < N; ++k) {
       advance(p.template middleCols<3>(3 * k).transpose(), dt);
-      p.template block<3, 3>(3 * k, 3 * k) +=
-          step_noise(process_[static_cast<std::size_t>(k)], dt);
+      p.template block<3, 3>(3 * k, 3 * k) += step_noise(process_[static_cast<std::size_t>(k)], dt);
     }
   }
 

@@ -171,8 +171,8 @@ InverseSolution solve(const PrismTrain& train, const Vector& direction,
     const double sign = here > 0 ? 1.0 : -1.0;
     if (std::isfinite(before) && sign * before > sign * here && sign * after >= sign * here) {
       const double a = (i - 1) * kStep, b = (i + 1) * kStep;
-      const double lowest = golden_section_minimum(
-          [&](double angle) { return sign * miss(angle); }, a, b, 1e-9);
+      const double lowest =
+          golden_section_minimum([&](double angle) { return sign * miss(angle); }, a, b, 1e-9);
       const double value = miss(lowest);
       if (std::abs(value) <= kHit) {
         add(lowest);

@@ -363,14 +363,14 @@ class ChartPage {
     const auto angle = [this, rotor](std::size_t i) {
       return degrees_from_radians(wrap_to_two_pi(states_.rotation_angle[rotor][i]));
     };
-    Chart chart{fmt::format("Residuals over the rotation angle of prism {}", letter(rotor)),
-                "rotation angle, deg",
-                "observed minus estimated, deg",
-                {},
-                every_nth_note(states_.size(), kMostPoints / 2,
-                               input_.estimate.map ? "knots" : "shots") +
-                    " Lines: means over 5° of all shots that were used.",
-                ChartKind::full_turn};
+    Chart chart{
+        fmt::format("Residuals over the rotation angle of prism {}", letter(rotor)),
+        "rotation angle, deg",
+        "observed minus estimated, deg",
+        {},
+        every_nth_note(states_.size(), kMostPoints / 2, input_.estimate.map ? "knots" : "shots") +
+            " Lines: means over 5° of all shots that were used.",
+        ChartKind::full_turn};
     const estimation::AngleProfile& profile = input_.estimate.residuals_over_angle[rotor];
     const auto add = [&](const std::string& name, const std::vector<double>& residual,
                          const std::vector<double>& mean, const std::string& colour,
@@ -418,8 +418,8 @@ std::string estimate_page(const EstimatePageInput& input) {
   page += verdict_html(input);
   page += parameters_html(input);
   page += "<h2>Rotors</h2>\n" + charts.rotors();
-  page += "<h2>Residuals</h2>\n" + moments_html(input.estimate) +
-          variance_html(input.estimate) + charts.residuals();
+  page += "<h2>Residuals</h2>\n" + moments_html(input.estimate) + variance_html(input.estimate) +
+          charts.residuals();
   page += "<h2>Scan pattern</h2>\n" + charts.pattern();
   page += correlation_html(input.estimate);
   page += provenance_html(input);

@@ -157,7 +157,8 @@ void write_states(const std::string& path, const StatesContent& content,
   for (const auto& [name, value] : attributes) file.put_text(NC_GLOBAL, name, value);
   const auto shots = file.dimension("time", content.rows);
   // No "since": the origin is the recording's, which need not be a date.
-  const int time = file.define(shots, "time", NC_DOUBLE, "s", "time of the shot, as in the recording");
+  const int time =
+      file.define(shots, "time", NC_DOUBLE, "s", "time of the shot, as in the recording");
   const int time_ns = file.define(shots, "time_ns", NC_INT64, "ns", "the same without rounding");
   estimation::RotorStates block;
   block.resize(content.prisms, 0);

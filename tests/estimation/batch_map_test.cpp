@@ -62,8 +62,8 @@ TEST(BatchMap, NoiseFreeConstantSpeedIsRecoveredFarBelowTheStatedNoise) {
 TEST(BatchMap, AgreesWithTheFilterOnTheSameMotionModel) {
   // With the same motion model, and no shot left out, both solve the same problem.
   const auto sensor = sensors::load_sensor("mid-40");
-  const auto series = testing::constant_speed_series(sensors::load_sensor("mid-40-table3"), 0.5, 2.5,
-                                                     3.0, 1000.0, 0.01, 3);
+  const auto series = testing::constant_speed_series(sensors::load_sensor("mid-40-table3"), 0.5,
+                                                     2.5, 3.0, 1000.0, 0.01, 3);
   BatchMapOptions batch;
   batch.angle_noise = kNoise;
   batch.free = free_parameters(default_free_names(2), 2);
@@ -86,8 +86,8 @@ TEST(BatchMap, AgreesWithTheFilterOnTheSameMotionModel) {
 }
 
 TEST(BatchMap, TheLengthOfTheKnotsDoesNotMatter) {
-  const auto series = testing::constant_speed_series(sensors::load_sensor("mid-40-table3"), 0.5, 2.5,
-                                                     2.0, 10000.0, 0.01, 4);
+  const auto series = testing::constant_speed_series(sensors::load_sensor("mid-40-table3"), 0.5,
+                                                     2.5, 2.0, 10000.0, 0.01, 4);
   const auto sensor = sensors::load_sensor("mid-40");
   BatchMapOptions options;
   options.angle_noise = kNoise;
@@ -126,8 +126,8 @@ TEST(BatchMap, AnySubsetOfParametersCanBeHeldOrFreed) {
 }
 
 TEST(BatchMap, WhatTheDataDoNotTellIsNamedAndNotConverged) {
-  const auto series = testing::constant_speed_series(sensors::load_sensor("mid-40-table3"), 0.5, 2.5,
-                                                     2.0, 1000.0, 0.01, 6);
+  const auto series = testing::constant_speed_series(sensors::load_sensor("mid-40-table3"), 0.5,
+                                                     2.5, 2.0, 1000.0, 0.01, 6);
   for (const char* name :
        {"refractive_index_air", "prism_tilt_a_horizontal_deg", "wedge_angle_deg"}) {
     EstimateOptions options = nominal_options();
@@ -144,7 +144,7 @@ TEST(BatchMap, AResetOfTheClockAndALongPauseSplitTheRotorsAndNotTheParameters) {
   const auto whole = testing::constant_speed_series(sensor, 0.5, 2.5, 3.0, 1000.0, 0.01, 7);
   AngleSeries pieces = whole;
   for (std::size_t i = 0; i < pieces.size(); ++i) {
-    if (i >= 1000) pieces.time_ns[i] += 60'000'000'000;    // a minute's pause
+    if (i >= 1000) pieces.time_ns[i] += 60'000'000'000;  // a minute's pause
     if (i >= 2000) pieces.time_ns[i] -= 61'900'000'000;  // and a reset
   }
   const Estimate result = estimate_map(pieces, nominal_options());
@@ -193,8 +193,8 @@ TEST(BatchMap, StatesOfShotsAndKnotsAreOneTrajectory) {
 }
 
 TEST(BatchMap, ResultsDoNotDependOnTheNumberOfThreads) {
-  const auto series = testing::constant_speed_series(sensors::load_sensor("mid-40-table3"), 0.5, 2.5,
-                                                     5.0, 1000.0, 0.01, 9);
+  const auto series = testing::constant_speed_series(sensors::load_sensor("mid-40-table3"), 0.5,
+                                                     2.5, 5.0, 1000.0, 0.01, 9);
   std::vector<Estimate> results;
   for (const std::size_t threads : {1, 2}) {
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);

@@ -124,14 +124,14 @@ TEST(Initialisation, ATenthOfGrossErrorsDoesNotMatter) {
     head.azimuth[i] = uniform(generator);
     head.zenith[i] = kPi / 2 + uniform(generator);
   }
-  const Start start = find_start(head, sensors::load_sensor("mid-40"),
-                                 free_parameters(default_free_names(2), 2),
-                                 radians_from_degrees(0.01), std::nullopt);
+  const Start start =
+      find_start(head, sensors::load_sensor("mid-40"), free_parameters(default_free_names(2), 2),
+                 radians_from_degrees(0.01), std::nullopt);
   EXPECT_FALSE(start.mirrored);
   EXPECT_LT(degrees_from_radians(start.residual_rms), 0.02);
   const double t = 1e-9 * static_cast<double>(start.time_ns - head.time_ns[0]);
-  EXPECT_LT(degrees_from_radians(
-                std::abs(wrap_to_pi(start.rotation_angle[0] - 2.0 - t * sensor.angular_velocity[0]))),
+  EXPECT_LT(degrees_from_radians(std::abs(
+                wrap_to_pi(start.rotation_angle[0] - 2.0 - t * sensor.angular_velocity[0]))),
             0.5);
 }
 
@@ -170,8 +170,7 @@ TEST(Initialisation, TrackedPhasesFollowAWanderingRotorOverAGap) {
   for (int i = 0; i < 6000; ++i) {
     if (i > 2500 && i < 3700) continue;
     const double t = 1e-3 * i;
-    const auto angles =
-        angles_from_direction(trace(train, {motion(t, 0), motion(t, 1)}).direction);
+    const auto angles = angles_from_direction(trace(train, {motion(t, 0), motion(t, 1)}).direction);
     series.time_ns.push_back(1'000'000LL * i);
     series.azimuth.push_back(angles.azimuth);
     series.zenith.push_back(angles.zenith);

@@ -52,7 +52,8 @@ TEST(Observability, BoundsOfAPlanAreThoseOfMonteCarloStudies) {
 
 TEST(Observability, BoundsFallWithTheSquareRootOfTheShots) {
   const Observability all = observability_of_plan(plan_of("mid-40", 10, 1000));
-  const Observability more = observability_of_plan(plan_of("mid-40", 30, 100000));  // thinned inside
+  const Observability more =
+      observability_of_plan(plan_of("mid-40", 30, 100000));  // thinned inside
   for (const QuantityObservability& one : all.quantities) {
     if (!one.free || one.name.find("angul") == 0 || one.name.find("rotation") == 0) continue;
     EXPECT_NEAR(one.sigma / quantity(more, one.name).sigma, std::sqrt(300.0), 0.3) << one.name;
@@ -60,8 +61,8 @@ TEST(Observability, BoundsFallWithTheSquareRootOfTheShots) {
 }
 
 TEST(Observability, ABoundIsTheEstimatesSigma) {
-  const auto series = testing::constant_speed_series(sensors::load_sensor("mid-40-table3"), 0.5, 2.5,
-                                                     2.0, 1000.0, 0.01, 1);
+  const auto series = testing::constant_speed_series(sensors::load_sensor("mid-40-table3"), 0.5,
+                                                     2.5, 2.0, 1000.0, 0.01, 1);
   EstimateOptions options;
   options.sensor = sensors::load_sensor("mid-40");
   options.angle_noise = radians_from_degrees(0.01);
@@ -103,7 +104,8 @@ TEST(Observability, Section23OfThePaper) {
   // The index of air cannot be told at all, prism A's horizontal tilt hardly: it goes with A's
   // rotation angle at -0.99, and moves the beam least of all.
   EXPECT_TRUE(std::isinf(quantity(all, "refractive_index_air").sigma));
-  EXPECT_NEAR(correlation(all, "prism_tilt_a_horizontal_deg", "rotation_angle_a_deg"), -0.99, 0.012);
+  EXPECT_NEAR(correlation(all, "prism_tilt_a_horizontal_deg", "rotation_angle_a_deg"), -0.99,
+              0.012);
   const auto& tilt = quantity(all, "prism_tilt_a_horizontal_deg");
   for (const QuantityObservability& one : all.quantities) {
     if (one.name == tilt.name) continue;

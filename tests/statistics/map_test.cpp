@@ -15,8 +15,8 @@ namespace risley {
 namespace {
 
 using estimation::Method;
-using testing::MonteCarlo;
 using testing::monte_carlo;
+using testing::MonteCarlo;
 using testing::table3_settings;
 
 /// Section 3.2 of the paper at the sensor's full rate.
@@ -96,9 +96,9 @@ TEST(Map, RoundedAnglesOfARealSensorKeepTheirSigma) {
     return settings;
   });
   EXPECT_LE(result.rmse.at("refractive_index"), 3.2e-7);
-  for (const char* tilt : {"bearing_tilt_a_horizontal_deg", "bearing_tilt_a_vertical_deg",
-                           "prism_tilt_a_vertical_deg", "prism_tilt_b_horizontal_deg",
-                           "prism_tilt_b_vertical_deg"}) {
+  for (const char* tilt :
+       {"bearing_tilt_a_horizontal_deg", "bearing_tilt_a_vertical_deg", "prism_tilt_a_vertical_deg",
+        "prism_tilt_b_horizontal_deg", "prism_tilt_b_vertical_deg"}) {
     EXPECT_LE(result.rmse.at(tilt), 1.8e-4) << tilt;
   }
   EXPECT_LE(result.angle_a_deg, 6e-4);
@@ -254,13 +254,11 @@ TEST(Map, AParameterHeldAtAWrongValueShowsOverThePrismsAngle) {
   options.sensor = sensors::load_sensor("mid-40");
   options.angle_noise = radians_from_degrees(0.01);
   options.fixed = {"prism_tilt_b_vertical_deg"};  // true: -0.383
-  const auto wrong =
-      estimation::estimate(Method::map, selector.series(), selector.head(), options);
+  const auto wrong = estimation::estimate(Method::map, selector.series(), selector.head(), options);
   EXPECT_GT(wrong.residuals_over_angle[1].chi2_per_bin, 1.6);
   EXPECT_FALSE(wrong.warnings.empty());
   options.fixed.clear();
-  const auto right =
-      estimation::estimate(Method::map, selector.series(), selector.head(), options);
+  const auto right = estimation::estimate(Method::map, selector.series(), selector.head(), options);
   EXPECT_LT(right.residuals_over_angle[1].chi2_per_bin, 1.4);
   EXPECT_TRUE(right.warnings.empty());
 }

@@ -64,7 +64,8 @@ TEST(Table3, MatchedRandomWalkRotorsGiveHonestAngles) {
     settings.duration = 10.0;
     const auto data = testing::simulate(settings);
     const auto walk = simulation::rotor_settings(settings.rotor, 2).acceleration_noise;
-    const auto estimate = testing::estimate(Method::ekf, data.observations, 0.01, {{walk, 0, 0}, {walk, 0, 0}});
+    const auto estimate =
+        testing::estimate(Method::ekf, data.observations, 0.01, {{walk, 0, 0}, {walk, 0, 0}});
     nees += evaluate(estimate, settings.truth, data.truth).nees_rotation_angles / kSeeds;
   }
   EXPECT_NEAR(nees, 1.0, 0.06);

@@ -67,8 +67,8 @@ struct SelectionCounts {
 inline constexpr double kClockReset = 0.01;
 
 /// Chooses shots from a recording that comes in pieces. Only the first return of a shot counts
-/// (all returns share its direction). A row that is a little earlier than the one before is left out
-/// and counted; after a reset of the clock the series goes on with the new times.
+/// (all returns share its direction). A row that is a little earlier than the one before is left
+/// out and counted; after a reset of the clock the series goes on with the new times.
 class ShotSelector {
  public:
   explicit ShotSelector(const SelectionOptions& options);

@@ -32,18 +32,19 @@ struct BatchMapOptions {
 
 /// The most probable parameters and trajectory.
 struct BatchMapResult {
-  Eigen::VectorXd parameters;           ///< [free], SI units
-  Eigen::MatrixXd covariance;           ///< [free, free], variance factor included
-  Eigen::MatrixXd information;          ///< of the data alone, variance factor included
+  Eigen::VectorXd parameters;                   ///< [free], SI units
+  Eigen::MatrixXd covariance;                   ///< [free, free], variance factor included
+  Eigen::MatrixXd information;                  ///< of the data alone, variance factor included
   PrismTrain train{parse_face_order("PA-AP")};  ///< with the estimated parameters
-  RotorTrajectory trajectory;           ///< with covariances
+  RotorTrajectory trajectory;                   ///< with covariances
   std::vector<RotorProcess> rotor_process;
-  std::vector<double> azimuth_residual, zenith_residual;  ///< [shots], rad; NaN for unused stretches
-  std::vector<unsigned char> outlier;                     ///< [shots]
+  std::vector<double> azimuth_residual,
+      zenith_residual;                 ///< [shots], rad; NaN for unused stretches
+  std::vector<unsigned char> outlier;  ///< [shots]
   std::size_t outliers = 0;
-  std::size_t unused_shots = 0;  ///< in stretches too short to find their rotors' phases
-  std::size_t iterations = 0;    ///< of both passes together
-  bool settled = false;          ///< the last step was a hundredth of a sigma or less
+  std::size_t unused_shots = 0;     ///< in stretches too short to find their rotors' phases
+  std::size_t iterations = 0;       ///< of both passes together
+  bool settled = false;             ///< the last step was a hundredth of a sigma or less
   Autocorrelation autocorrelation;  ///< of the residuals
   /// Mean square of residuals over stated variances, outliers left out.
   double unit_variance = 0;
@@ -52,10 +53,10 @@ struct BatchMapResult {
 };
 
 /// Maximum a posteriori estimate of the constant parameters and of the rotors' motion from all
-/// shots at once: Gauss-Newton over the whole trajectory with parameters that have no process noise,
-/// first on shots thinned to 1 kHz with weights that gross errors cannot bend, then on all of them,
-/// where one or two steps remain. At the end a hard cut decides on outliers, and the covariance is
-/// that of shots with the autocorrelation and the scatter that the residuals show.
+/// shots at once: Gauss-Newton over the whole trajectory with parameters that have no process
+/// noise, first on shots thinned to 1 kHz with weights that gross errors cannot bend, then on all
+/// of them, where one or two steps remain. At the end a hard cut decides on outliers, and the
+/// covariance is that of shots with the autocorrelation and the scatter that the residuals show.
 /// [B21 section 2.4 states the model; the method departs from it: docs/theory/map.md]
 /// @param series  as it is to be used (turned if it was mirrored)
 /// @param start   of the first stretch

@@ -58,15 +58,15 @@ struct Estimate {
   /// Parameter combinations that the data do not tell; any makes the estimate not converged.
   std::vector<WeakDirection> unobservable;
 
-  AngleSeries series;            ///< the shots, turned if they were mirrored
-  std::size_t outliers = 0;      ///< of the series
-  RotorStates states;            ///< at every shot (ekf), or at one shot per knot (map)
+  AngleSeries series;                 ///< the shots, turned if they were mirrored
+  std::size_t outliers = 0;           ///< of the series
+  RotorStates states;                 ///< at every shot (ekf), or at one shot per knot (map)
   std::optional<BatchMapResult> map;  ///< all that the batch estimator knows
 
-  Moments azimuth_residuals, zenith_residuals;  ///< rad, of all shots, outliers left out
+  Moments azimuth_residuals, zenith_residuals;     ///< rad, of all shots, outliers left out
   std::vector<AngleProfile> residuals_over_angle;  ///< [prisms], of all shots
-  double angle_noise = 0;                       ///< assumed, rad, before rounding
-  double expected_residual = 0;                 ///< rms of noise and rounding together, rad
+  double angle_noise = 0;                          ///< assumed, rad, before rounding
+  double expected_residual = 0;                    ///< rms of noise and rounding together, rad
 };
 
 /// Rotor states of shots [begin, end) of an estimate's series.

@@ -26,7 +26,7 @@ struct Evaluation {
   std::vector<double> angular_velocity_rmse;              ///< [prisms], rad/s
   /// Root mean square errors over the root mean square of the stated sigmas [prisms].
   std::vector<double> rotation_angle_rmse_over_sigma, angular_velocity_rmse_over_sigma;
-  double nees_parameters = 0;                             ///< per degree of freedom; 1 is honest
+  double nees_parameters = 0;       ///< per degree of freedom; 1 is honest
   double nees_rotation_angles = 0;  ///< per degree of freedom, mean over shots
 };
 

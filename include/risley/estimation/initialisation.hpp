@@ -65,9 +65,9 @@ struct Start {
 /// parameters and motion to the same shots. It needs no zero position and so loses no shot.
 ///
 /// Whether a recording holds the mirror image of what the sensor can produce (its elevation has the
-/// other sign), as public copies of some vendor files do, cannot be told from the speeds: a mirrored
-/// first combination turns like the second. The optics can: prisms bend differently when met from
-/// the other side, and the fit leaves a tenth of a degree for the wrong image.
+/// other sign), as public copies of some vendor files do, cannot be told from the speeds: a
+/// mirrored first combination turns like the second. The optics can: prisms bend differently when
+/// met from the other side, and the fit leaves a tenth of a degree for the wrong image.
 /// @param head      every shot of about the first second, as recorded
 /// @param mirrored  whether the recording is a mirror image; empty finds out
 /// @throws EstimationError naming what is missing: duration, shots, matching speeds
@@ -76,8 +76,8 @@ Start find_start(const AngleSeries& head, const sensors::Sensor& sensor,
                  std::optional<bool> mirrored = false);
 
 /// Follows the phases of both spectral lines through a stretch, 25 ms at a time, and so gives every
-/// knot of it angles and speeds that are right to a degree or so, without a model of the rotors, over
-/// gaps and among outliers.
+/// knot of it angles and speeds that are right to a degree or so, without a model of the rotors,
+/// over gaps and among outliers.
 /// @param series   thinned to about 1 kHz
 /// @param shots    the stretch's rows
 /// @param start    of this stretch

@@ -37,10 +37,10 @@ struct ShotColumns {
 struct NormalEquations {
   int prisms = 0;
   int free = 0;
-  std::vector<double> curvature;  ///< [knots][prisms (prisms+1)/2][5] sums of products x time^0..4
-  std::vector<double> coupling;   ///< [knots][prisms][3][free]
-  std::vector<double> gradient;   ///< [knots][prisms][3]
-  Eigen::MatrixXd static_hessian;   ///< [free, free]
+  std::vector<double> curvature;   ///< [knots][prisms (prisms+1)/2][5] sums of products x time^0..4
+  std::vector<double> coupling;    ///< [knots][prisms][3][free]
+  std::vector<double> gradient;    ///< [knots][prisms][3]
+  Eigen::MatrixXd static_hessian;  ///< [free, free]
   Eigen::VectorXd static_gradient;  ///< [free]
   double cost = 0;                  ///< sum of the shots' losses
   std::size_t shots = 0, outliers = 0;

@@ -36,9 +36,9 @@ std::string direction_text(const WeakDirection& direction);
 /// A recording that need not exist yet.
 struct ObservabilityPlan {
   sensors::Sensor sensor;
-  double duration = 30;     ///< s
-  double rate = 100000;     ///< shots per second
-  double angle_noise = 0;   ///< 1 sigma of azimuth and zenith before rounding, rad
+  double duration = 30;             ///< s
+  double rate = 100000;             ///< shots per second
+  double angle_noise = 0;           ///< 1 sigma of azimuth and zenith before rounding, rad
   double angle_resolution = 0;      ///< rounding step, rad; 0: none
   std::vector<FreeParameter> free;  ///< what the bounds are for
   /// Motion model [prisms]; empty takes kTypicalRotor.
@@ -75,9 +75,9 @@ struct Observability {
   double shots = 0, duration = 0, rate = 0;
 };
 
-/// Cramer-Rao bounds of a plan: the information of prisms that turn at the sensor's speeds under the
-/// plan's motion model. Information grows with the number of shots, so large plans are evaluated
-/// with fewer shots of higher weight, and beyond 2,000 s with less time.
+/// Cramer-Rao bounds of a plan: the information of prisms that turn at the sensor's speeds under
+/// the plan's motion model. Information grows with the number of shots, so large plans are
+/// evaluated with fewer shots of higher weight, and beyond 2,000 s with less time.
 /// @throws InvalidArgument for a plan without duration, rate or noise
 Observability observability_of_plan(const ObservabilityPlan& plan);
 

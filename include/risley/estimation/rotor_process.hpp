@@ -14,7 +14,7 @@ namespace risley::estimation {
 struct RotorProcess {
   double acceleration = 0;  ///< white acceleration: random walk of the speed, (rad/s) / sqrt(s)
   double angle_walk = 0;    ///< random walk of the angle, rad / sqrt(s)
-  double jerk = 0;  ///< white jerk: random walk of the acceleration, (rad/s^2) / sqrt(s)
+  double jerk = 0;          ///< white jerk: random walk of the acceleration, (rad/s^2) / sqrt(s)
 };
 
 /// The heavy noise that makes the filter reproduce the paper's section 3.2: residuals of 0.0085
@@ -36,13 +36,13 @@ constexpr RotorStepCovariance step_covariance(const RotorProcess& process, doubl
   const double q = process.acceleration * process.acceleration;
   const double j = process.jerk * process.jerk;
   const double step2 = step * step, step3 = step2 * step;
-  return {q * step3 / 3.0 + process.angle_walk * process.angle_walk * step +
-              j * step3 * step2 / 20.0,
-          sign * (q * step2 / 2.0 + j * step2 * step2 / 8.0),
-          j * step3 / 6.0,
-          q * step + j * step3 / 3.0,
-          sign * j * step2 / 2.0,
-          j * step};
+  return {
+      q * step3 / 3.0 + process.angle_walk * process.angle_walk * step + j * step3 * step2 / 20.0,
+      sign * (q * step2 / 2.0 + j * step2 * step2 / 8.0),
+      j * step3 / 6.0,
+      q * step + j * step3 / 3.0,
+      sign * j * step2 / 2.0,
+      j * step};
 }
 
 }  // namespace risley::estimation

@@ -32,8 +32,8 @@ struct RotorStates {
     angular_velocity.resize(n);
     angular_velocity_sigma.resize(n);
     rotation_angle_covariance.resize(n * (n + 1) / 2);
-    for (auto* columns :
-         {&rotation_angle, &angular_velocity, &angular_velocity_sigma, &rotation_angle_covariance}) {
+    for (auto* columns : {&rotation_angle, &angular_velocity, &angular_velocity_sigma,
+                          &rotation_angle_covariance}) {
       for (auto& column : *columns) column.resize(shots);
     }
     azimuth_residual.resize(shots);

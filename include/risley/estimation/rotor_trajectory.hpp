@@ -24,9 +24,9 @@ inline constexpr double kKnotInterval = 0.002;
 /// long to count the turns.
 struct RotorTrajectory {
   int prisms = 0;
-  std::vector<std::int64_t> time_ns;                ///< [knots]
-  std::vector<std::size_t> first_shot, last_shot;   ///< [knots], rows of the series, last exclusive
-  std::vector<std::size_t> stretch_begin;           ///< first knot of each stretch
+  std::vector<std::int64_t> time_ns;               ///< [knots]
+  std::vector<std::size_t> first_shot, last_shot;  ///< [knots], rows of the series, last exclusive
+  std::vector<std::size_t> stretch_begin;          ///< first knot of each stretch
   /// [knots][prisms][3]: angle (rad, unwrapped), speed (rad/s), acceleration (rad/s^2).
   std::vector<double> state;
   /// Joint covariance of a knot's states, upper triangle row by row [knots][d (d + 1) / 2] with

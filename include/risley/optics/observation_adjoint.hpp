@@ -162,9 +162,9 @@ std::array<Gradient<T, N>, Results> trace_adjoint(const PreparedTrain<T, N>& tra
           sum = sum + value;
         };
         Vector3<T> normal_bar;
-        const T ratio_bar = refract_adjoint(forward.refraction[i], forward.incident[i],
-                                            forward.normal[i], train.faces[i].index_ratio,
-                                            beams[r], normal_bar);
+        const T ratio_bar =
+            refract_adjoint(forward.refraction[i], forward.incident[i], forward.normal[i],
+                            train.faces[i].index_ratio, beams[r], normal_bar);
         gradient.rotation_angles[k] = gradient.rotation_angles[k] + dot(normal_bar, turning);
         const T vertical = dot(normal_bar, tilt_vertical);
         add(place::prism_tilt_horizontal(prism), dot(normal_bar, tilt_horizontal));
@@ -248,10 +248,10 @@ DirectionLinearisation<T, N> linearise_direction(const PreparedTrain<T, N>& trai
   const Trace<T, N> forward = trace_forward(train, rotation_angle);
   const T zero(0.0), one(1.0);
   return {forward.direction(),
-          trace_adjoint(train, derivatives, forward,
-                        std::array<Vector3<T>, 3>{Vector3<T>{one, zero, zero},
-                                                  Vector3<T>{zero, one, zero},
-                                                  Vector3<T>{zero, zero, one}}),
+          trace_adjoint(
+              train, derivatives, forward,
+              std::array<Vector3<T>, 3>{Vector3<T>{one, zero, zero}, Vector3<T>{zero, one, zero},
+                                        Vector3<T>{zero, zero, one}}),
           forward.valid()};
 }
 
