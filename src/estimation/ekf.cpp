@@ -239,7 +239,7 @@ std::vector<unsigned char> screen(const AngleSeries& series, const Start& start,
   const double start_limit = std::max(radians_from_degrees(0.1), 8.0 * start.residual_rms);
   for (std::size_t i = 0; i < std::min(options.gate_after, series.size()); ++i) {
     const double t = 1e-9 * static_cast<double>(series.time_ns[i] - start.time_ns);
-    if (!reference && std::abs(t) > kStartWindow) continue;
+    if (!reference && std::abs(t) > start.reach) continue;
     std::array<double, N> angle;
     for (std::size_t k = 0; k < N; ++k) {
       angle[k] = reference ? reference->states->rotation_angle[k][i]

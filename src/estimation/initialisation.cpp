@@ -273,6 +273,9 @@ Start start_from(const AngleSeries& shots, const RotorLines& found, const sensor
   const WindowFit fit = fit_window(shots, sensor.train, free, knot, noise);
   Start start;
   start.time_ns = found.time_ns;
+  start.reach = 1e-9 * static_cast<double>(
+                           std::max(found.time_ns - shots.time_ns.front(),
+                                    shots.time_ns.back() - found.time_ns));
   start.train = fit.train;
   start.combination = rotors.combination;
   start.residual_rms = fit.rms;

@@ -46,12 +46,10 @@ struct RotorIdentification {
 RotorIdentification identify_rotors(const std::vector<SpectralLine>& lines,
                                     const sensors::Sensor& sensor);
 
-/// How far from its reference time a start may be trusted, s.
-inline constexpr double kStartWindow = 0.04;
-
 /// What an estimation starts from. All of the recording as it is to be used: turned if mirrored.
 struct Start {
   std::int64_t time_ns = 0;                     ///< of the angles
+  double reach = 0;                             ///< it was fitted to shots so far around, s
   std::vector<double> rotation_angle;           ///< [prisms], rad
   std::vector<double> angular_velocity;         ///< [prisms], rad/s
   std::vector<double> line_offset;              ///< [prisms], rotation angle less the line's phase
