@@ -84,7 +84,7 @@ void print_observability(const Observability& o, int prisms) {
 }
 
 Observability observe_plan(const ObservabilityCommandOptions& options,
-                           estimation::EstimateOptions settings) {
+                           const estimation::EstimateOptions& settings) {
   estimation::ObservabilityPlan plan;
   plan.sensor = settings.sensor;
   plan.duration = options.duration_s;

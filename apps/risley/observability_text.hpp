@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include "risley/estimation/observability.hpp"
+#include "risley/estimation/weak_directions.hpp"
 
 #include "command.hpp"
 

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 #include "risley/estimation/angle_series.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include <fmt/format.h>
@@ -75,6 +76,17 @@ AngleSeries thinned(const AngleSeries& series, double rate, std::vector<ShotRang
     range = {begin, rows.size()};
   }
   return rows;
+}
+
+std::int64_t median_step_ns(std::span<const std::int64_t> time_ns) {
+  constexpr std::size_t kEnough = 20000;
+  std::vector<std::int64_t> steps;
+  for (std::size_t i = 1; i < std::min(time_ns.size(), kEnough); ++i) {
+    steps.push_back(time_ns[i] - time_ns[i - 1]);
+  }
+  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
+  std::nth_element(steps.begin(), middle, steps.end());
+  return *middle;
 }
 
 void mirror(AngleSeries& series) {

@@ -15,6 +15,7 @@
 #include "risley/core/error.hpp"
 #include "risley/estimation/normal_equations.hpp"
 #include "risley/estimation/process_likelihood.hpp"
+#include "risley/estimation/rotor_track.hpp"
 #include "risley/estimation/smoother.hpp"
 
 #include "estimation/residual_model.hpp"
@@ -34,7 +35,7 @@ constexpr double kSignificantExcess = 1.02;
 /// Parameters and motion, and what one evaluation of them gave.
 class Iteration {
  public:
-  Iteration(const AngleSeries& series, const BatchMapOptions& options, PrismTrain nominal,
+  Iteration(const AngleSeries& series, const BatchMapOptions& options, const PrismTrain& nominal,
             PrismTrain train, RotorTrajectory knots)
       : series_(series),
         options_(options),

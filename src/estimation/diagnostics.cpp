@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "risley/core/angle.hpp"
+#include "risley/estimation/angle_series.hpp"
 
 namespace risley::estimation {
 
@@ -72,13 +73,7 @@ Autocorrelation autocorrelation(std::span<const std::int64_t> time_ns,
   constexpr std::size_t kBlocks = 8, kBlockShots = 50000, kMostLags = 4000;
   Autocorrelation result;
   if (time_ns.size() < 100) return result;
-  std::vector<std::int64_t> steps;
-  for (std::size_t i = 1; i < std::min<std::size_t>(time_ns.size(), 20000); ++i) {
-    steps.push_back(time_ns[i] - time_ns[i - 1]);
-  }
-  std::nth_element(steps.begin(), steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2),
-                   steps.end());
-  const std::int64_t step = steps[steps.size() / 2];
+  const std::int64_t step = median_step_ns(time_ns);
   // Blocks spread over the recording, left-out shots as zeros with weight zero.
   struct Block {
     std::vector<double> azimuth, zenith, weight;
@@ -90,12 +85,16 @@ Autocorrelation autocorrelation(std::span<const std::int64_t> time_ns,
     Block block;
     const std::size_t end = std::min(begin + kBlockShots, time_ns.size());
     for (std::size_t i = begin; i < end; ++i) {
-      if (i > begin) {  // missing shots take their places
+      if (i > begin) {  // missing shots take their places; behind a long gap a new block begins
         const std::int64_t missing = (time_ns[i] - time_ns[i - 1] + step / 2) / step - 1;
-        if (missing < 0 || missing > 1000) break;
-        block.azimuth.resize(block.azimuth.size() + static_cast<std::size_t>(missing), 0.0);
-        block.zenith.resize(block.azimuth.size(), 0.0);
-        block.weight.resize(block.azimuth.size(), 0.0);
+        if (missing < 0 || missing > 1000) {
+          blocks.push_back(std::exchange(block, {}));
+        } else if (missing > 0) {
+          const std::size_t size = block.azimuth.size() + static_cast<std::size_t>(missing);
+          for (auto* column : {&block.azimuth, &block.zenith, &block.weight}) {
+            column->resize(size, 0.0);
+          }
+        }
       }
       const bool good = skip[i] == 0 && std::isfinite(azimuth[i]) && std::isfinite(zenith[i]);
       block.azimuth.push_back(good ? azimuth[i] : 0.0);
@@ -108,6 +107,7 @@ Autocorrelation autocorrelation(std::span<const std::int64_t> time_ns,
   }
   if (!(used > 0) || !(variance > 0)) return result;
   variance /= used;
+  double scatter = 1.0;
   for (std::size_t lag = 1; lag <= kMostLags; ++lag) {
     double products = 0, pairs = 0;
     for (const Block& block : blocks) {
@@ -119,9 +119,11 @@ Autocorrelation autocorrelation(std::span<const std::int64_t> time_ns,
     }
     if (pairs < 100) break;
     const double rho = products / pairs / variance;
-    if (!(rho > 2.5 / std::sqrt(2.0 * pairs))) break;
+    // Bartlett: rho of correlated residuals scatters more.
+    if (!(rho > 2.5 * std::sqrt(scatter / (2.0 * pairs)))) break;
     result.rho.push_back(rho);
     result.factor += 2.0 * rho;
+    scatter += 2.0 * rho * rho;
   }
   return result;
 }

@@ -246,6 +246,8 @@ NormalEquationCounts accumulate_knots(const NormalEquationArguments& a) {
   Row<N> azimuth_row, zenith_row;
   const Batch one(1.0);
   Weights weights(a.noise_variance);
+  // A shot that is out costs as much as one can.
+  const Batch lost(a.softening * a.cut > 1.0 ? 1.0 / a.softening : a.cut);
   for (std::size_t knot = a.knot_begin; knot < a.knot_end; ++knot) {
     sums.clear(a.free);
     std::array<Batch, N> angle, speed, half_acceleration;
@@ -275,7 +277,7 @@ NormalEquationCounts accumulate_knots(const NormalEquationArguments& a) {
       fill_row(a, shots.zenith, zenith_residual, share * weights.zenith_root, zenith_row);
       // Comparison with NaN is false: a beam that does not get through counts as an outlier.
       auto good = chi2 <= Batch(a.cut);
-      Batch loss = xsimd::select(good, chi2 * share, Batch(a.cut));
+      Batch loss = xsimd::select(good, chi2 * share, lost);
       if (group.count < kLanes || !xsimd::all(good)) {
         alignas(64) double number[kLanes];
         for (std::size_t i = 0; i < kLanes; ++i) number[i] = static_cast<double>(i);

@@ -26,6 +26,7 @@ constexpr double kLowestAcceleration = -6, kHighestAcceleration = 3;
 constexpr double kLowestJerk = -5, kHighestJerk = 5;
 /// A motion model with one number more must be this much likelier.
 constexpr double kWorthIt = 3.0;
+constexpr int kRounds = 8;
 
 RotorProcess process_of(double acceleration_decade, double jerk_decade) {
   const auto intensity = [](double decade) {
@@ -177,11 +178,15 @@ std::vector<RotorProcess> likeliest_process(const NormalEquations& equations,
                                           kLowestAcceleration, kHighestAcceleration);
     const double jerk_alone =
         best_decade([&](double j) { return cost(kNone, j); }, kLowestJerk, kHighestJerk);
-    // Both together: the walk is then slower than it would have to be alone.
-    const double walk =
-        best_decade([&](double a) { return cost(a, jerk_alone); }, walk_alone - 3.0, walk_alone);
-    const double jerk =
-        best_decade([&](double j) { return cost(walk, j); }, jerk_alone - 1.0, jerk_alone);
+    // Both together: each is then less than it would have to be alone. They trade places slowly, so
+    // several rounds.
+    double walk = walk_alone, jerk = jerk_alone;
+    for (int round = 0; round < kRounds; ++round) {
+      const double before = cost(walk, jerk);
+      walk = best_decade([&](double a) { return cost(a, jerk); }, walk_alone - 3.0, walk_alone);
+      jerk = best_decade([&](double j) { return cost(walk, j); }, jerk_alone - 2.0, jerk_alone);
+      if (before - cost(walk, jerk) < 0.1 * kWorthIt) break;
+    }
     // More numbers only where the data are so much likelier with them.
     RotorProcess best = process_of(walk_alone, kNone);
     double best_cost = cost(walk_alone, kNone) - kWorthIt;

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include <Eigen/Cholesky>
+#include <Eigen/LU>
 #include <fmt/format.h>
 
 #include "risley/core/error.hpp"
@@ -105,11 +106,7 @@ class Smoother {
         predict(knot, x, p);
       }
       const Square h = knot_curvature<N>(equations_, knot);
-      if (!add_information<kD>(p, h)) {
-        throw EstimationError(
-            fmt::format("the rotors' covariance is not positive definite at {:.6f} s",
-                        1e-9 * static_cast<double>(at_.time_ns[knot] - at_.time_ns[0])));
-      }
+      if (!add_information<kD>(p, h)) throw not_definite(knot);
       e = gradient_at(knot, h, x);
       moved.noalias() = p * e;
       if (free_ > 0) {
@@ -139,17 +136,21 @@ class Smoother {
     }
   }
 
+  /// Where the motion from the knot before misses a knot's linearisation: states are deviations
+  /// from the linearisation, which need not follow the motion itself.
+  Vector step_offset(std::size_t knot) const {
+    Vector offset = state(knot - 1);
+    for (int k = 0; k < N; ++k) advance(offset.template middleRows<3>(3 * k), step_before(knot));
+    return offset - state(knot);
+  }
+
   void predict(std::size_t knot, Affine& x, Square& p) const {
     const double dt = step_before(knot);
-    // States are deviations from the linearisation, which need not follow the motion itself.
-    Vector offset = state(knot - 1);
     for (int k = 0; k < N; ++k) {
       advance(x.template middleRows<3>(3 * k), dt);
-      advance(offset.template middleRows<3>(3 * k), dt);
       advance(p.template middleRows<3>(3 * k), dt);
     }
-    offset -= state(knot);
-    x.col(0) += offset;
+    x.col(0) += step_offset(knot);
     for (int k = 0; k < N; ++k) {
       advance(p.template middleCols<3>(3 * k).transpose(), dt);
       p.template block<3, 3>(3 * k, 3 * k) += step_noise(process_[static_cast<std::size_t>(k)], dt);
@@ -162,6 +163,7 @@ class Smoother {
     return true;
   }
 
+  /// Smoothed means alone (modified Bryson-Frazier).
   void backward(SmootherSolution& out) {
     Eigen::VectorXd one(free_ + 1);
     one << 1.0, out.parameter_step;
@@ -184,50 +186,65 @@ class Smoother {
     }
   }
 
+  /// As backward, with covariances: what the later knots say of a state as information Y and vector
+  /// y, so that nothing is ever a small difference of large numbers.
   void backward_with_covariance(SmootherSolution& out) {
     constexpr std::size_t kTriangle = kD * (kD + 1) / 2;
     out.state_covariance.resize(at_.size() * kTriangle);
     out.sensitivity.resize(at_.size() * kD * static_cast<std::size_t>(free_));
-    Affine lambda = Affine::Zero(kD, free_ + 1), smoothed(kD, free_ + 1), x, e;
-    Square big_lambda = Square::Zero();
+    Affine later = Affine::Zero(kD, free_ + 1), smoothed(kD, free_ + 1), x;
+    Square information = Square::Zero();
     std::size_t stretch = at_.stretch_begin.size();
     for (std::size_t knot = at_.size(); knot-- > 0;) {
-      const Square p = covariance(knot);
+      Square p = covariance(knot);
       x = affine(knot);
-      const Affine back = p * lambda;
-      smoothed = x - back;
+      if (!add_information<kD>(p, information)) throw not_definite(knot);
+      smoothed = x + p * (later - information * x);
       const auto sensitivity = smoothed.rightCols(free_);
       Eigen::Map<Vector>(out.state_step.data() + knot * kD) =
           smoothed.col(0) + sensitivity * out.parameter_step;
       Eigen::Map<Eigen::Matrix<double, kD, Eigen::Dynamic, Eigen::RowMajor>>(
           out.sensitivity.data() + knot * kD * static_cast<std::size_t>(free_), kD, free_) =
           sensitivity;
-      const Square lp = big_lambda * p;
-      Square total = p - p * lp;
-      total += sensitivity * out.parameter_covariance * sensitivity.transpose();
+      const Square total = p + sensitivity * out.parameter_covariance * sensitivity.transpose();
       double* entry = out.state_covariance.data() + knot * kTriangle;
       for (int i = 0; i < kD; ++i) {
         for (int j = i; j < kD; ++j) *entry++ = 0.5 * (total(i, j) + total(j, i));
       }
       if (is_stretch_begin(knot, stretch)) {
-        lambda.setZero();
-        big_lambda.setZero();
+        later.setZero();
+        information.setZero();
         continue;
       }
-      const Square h = knot_curvature<N>(equations_, knot);
-      e = gradient_at(knot, h, x);
-      lambda = lambda - h * back - e;
-      Square keep = -(p * h);
-      keep.diagonal().array() += 1.0;
-      big_lambda = keep.transpose() * big_lambda * keep + h * keep;
-      big_lambda = (0.5 * (big_lambda + big_lambda.transpose())).eval();
+      // This knot's own shots, then the noise of the step before it: J := (I + J Q)^-1 J.
       const double dt = step_before(knot);
+      information += knot_curvature<N>(equations_, knot);
+      later.col(0) += gradient(knot);
+      later.rightCols(free_) -= coupling(knot);
+      Square spread = Square::Identity();
       for (int k = 0; k < N; ++k) {
-        retreat(lambda.template middleRows<3>(3 * k), dt);
-        retreat(big_lambda.template middleRows<3>(3 * k), dt);
+        spread.template middleCols<3>(3 * k) +=
+            information.template middleCols<3>(3 * k) *
+            step_noise(process_[static_cast<std::size_t>(k)], dt);
       }
-      for (int k = 0; k < N; ++k) retreat(big_lambda.template middleCols<3>(3 * k).transpose(), dt);
+      const Eigen::PartialPivLU<Square> solver(spread);
+      information = solver.solve(information).eval();
+      information = (0.5 * (information + information.transpose())).eval();
+      later = solver.solve(later).eval();
+      later.col(0) -= information * step_offset(knot);
+      for (int k = 0; k < N; ++k) {
+        retreat(later.template middleRows<3>(3 * k), dt);
+        retreat(information.template middleRows<3>(3 * k), dt);
+      }
+      for (int k = 0; k < N; ++k)
+        retreat(information.template middleCols<3>(3 * k).transpose(), dt);
     }
+  }
+
+  EstimationError not_definite(std::size_t knot) const {
+    return EstimationError(
+        fmt::format("the rotors' covariance is not positive definite at {:.6f} s",
+                    1e-9 * static_cast<double>(at_.time_ns[knot] - at_.time_ns[0])));
   }
 
   const NormalEquations& equations_;

@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "risley/core/error.hpp"
+#include "risley/estimation/rotor_track.hpp"
 
 #include "estimation/series.hpp"
 

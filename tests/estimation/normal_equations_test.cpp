@@ -3,7 +3,9 @@
 #include "risley/estimation/normal_equations.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <limits>
 #include <random>
 #include <string>
 #include <utility>

@@ -106,13 +106,13 @@ TEST(Observability, Section23OfThePaper) {
   EXPECT_TRUE(std::isinf(quantity(all, "refractive_index_air").sigma));
   EXPECT_NEAR(correlation(all, "prism_tilt_a_horizontal_deg", "rotation_angle_a_deg"), -0.99,
               0.012);
-  const auto& tilt = quantity(all, "prism_tilt_a_horizontal_deg");
+  const QuantityObservability tilt = quantity(all, "prism_tilt_a_horizontal_deg");
   for (const QuantityObservability& one : all.quantities) {
     if (one.name == tilt.name) continue;
     EXPECT_GT(one.sensitivity, tilt.sensitivity) << one.name;
   }
   // Wedge and index are not one quantity: enough data tell them apart.
-  const auto& wedge = quantity(all, "wedge_angle_deg");
+  const QuantityObservability wedge = quantity(all, "wedge_angle_deg");
   EXPECT_TRUE(std::isfinite(wedge.sigma));
   EXPECT_GT(std::abs(wedge.twins.front().second), 0.999);
   ASSERT_FALSE(all.unobservable.empty());

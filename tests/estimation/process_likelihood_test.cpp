@@ -6,7 +6,6 @@
 #include <array>
 #include <cmath>
 #include <random>
-#include <utility>
 #include <vector>
 
 #include <Eigen/QR>
@@ -314,7 +313,7 @@ TEST(LikeliestProcess, IsLikelierThanItsTenthAndItsTenfold) {
 }
 
 // One sweep over walk and jerk ends beside the maximum: 10 to 30 below the truth, which has both.
-TEST(LikeliestProcess, DISABLED_FindsWalkAndJerkTogether) {
+TEST(LikeliestProcess, FindsWalkAndJerkTogether) {
   const std::vector<RotorProcess> truth{{degrees(6.0), 0.0, degrees(50.0)},
                                         {degrees(6.0), 0.0, degrees(50.0)}};
   for (unsigned seed = 1; seed <= 3; ++seed) {

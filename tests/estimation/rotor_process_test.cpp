@@ -3,7 +3,6 @@
 #include "risley/estimation/rotor_process.hpp"
 
 #include <cmath>
-#include <string>
 #include <vector>
 
 #include <Eigen/Core>

@@ -166,40 +166,38 @@ TEST_F(StatesFile, EveryColumnComesBackInTheUnitsOfTheFile) {
     next = rows.end;
   }
   EXPECT_EQ(next, kRows);
-  {
-    const Reader file(path());
-    EXPECT_EQ(file.text("", "Conventions"), "CF-1.9");
-    EXPECT_EQ(file.text("", "command"), "risley estimate x.lvx");
-    EXPECT_EQ(file.text("", "seed"), "7");
-    // Columns 0 1: angles, 2 3: speeds, 4 5: their sigmas, 6 7 8: covariances aa ab bb, 9 10.
-    expect_column(file, "rotation_angle_a_deg", "degree", kRows, degrees(0));
-    expect_column(file, "rotation_angle_b_deg", "degree", kRows, degrees(1));
-    expect_column(file, "angular_velocity_a_deg_per_s", "degree s-1", kRows, degrees(2));
-    expect_column(file, "angular_velocity_b_deg_per_s", "degree s-1", kRows, degrees(3));
-    expect_column(file, "angular_velocity_sigma_a_deg_per_s", "degree s-1", kRows, degrees(4));
-    expect_column(file, "angular_velocity_sigma_b_deg_per_s", "degree s-1", kRows, degrees(5));
-    expect_column(file, "rotation_angle_sigma_a_deg", "degree", kRows, root(6));
-    expect_column(file, "rotation_angle_covariance_ab_deg2", "degree2", kRows, [](std::size_t row) {
-      return degrees_from_radians(degrees_from_radians(number(7, row)));
-    });
-    expect_column(file, "rotation_angle_sigma_b_deg", "degree", kRows, root(8));
-    expect_column(file, "azimuth_residual_deg", "degree", kRows,
-                  [](std::size_t row) { return -degrees_from_radians(number(9, row)); });
-    expect_column(file, "zenith_residual_deg", "degree", kRows, degrees(10));
-    expect_column(file, "time", "s", kRows,
-                  [](std::size_t row) { return 1e-9 * static_cast<double>(time_of(row)); });
-    EXPECT_EQ(file.text("time_ns", "units"), "ns");
-    const std::vector<long long> time = file.integers("time_ns");
-    const std::vector<long long> outlier = file.integers("outlier");
-    ASSERT_EQ(time.size(), kRows);
-    for (std::size_t row = 0; row < kRows; ++row) {
-      ASSERT_EQ(time[row], time_of(row));
-      ASSERT_EQ(outlier[row], is_outlier(row) ? 1 : 0);
-    }
-    EXPECT_EQ(file.flags("outlier"), (std::vector<unsigned char>{0, 1}));
-    EXPECT_EQ(file.text("outlier", "flag_meanings"), "used left_out");
-    EXPECT_EQ(file.variables(), 14);
+  const Reader file(path());
+  EXPECT_EQ(file.text("", "Conventions"), "CF-1.9");
+  EXPECT_EQ(file.text("", "command"), "risley estimate x.lvx");
+  EXPECT_EQ(file.text("", "seed"), "7");
+  // Columns 0 1: angles, 2 3: speeds, 4 5: their sigmas, 6 7 8: covariances aa ab bb, 9 10.
+  expect_column(file, "rotation_angle_a_deg", "degree", kRows, degrees(0));
+  expect_column(file, "rotation_angle_b_deg", "degree", kRows, degrees(1));
+  expect_column(file, "angular_velocity_a_deg_per_s", "degree s-1", kRows, degrees(2));
+  expect_column(file, "angular_velocity_b_deg_per_s", "degree s-1", kRows, degrees(3));
+  expect_column(file, "angular_velocity_sigma_a_deg_per_s", "degree s-1", kRows, degrees(4));
+  expect_column(file, "angular_velocity_sigma_b_deg_per_s", "degree s-1", kRows, degrees(5));
+  expect_column(file, "rotation_angle_sigma_a_deg", "degree", kRows, root(6));
+  expect_column(file, "rotation_angle_covariance_ab_deg2", "degree2", kRows, [](std::size_t row) {
+    return degrees_from_radians(degrees_from_radians(number(7, row)));
+  });
+  expect_column(file, "rotation_angle_sigma_b_deg", "degree", kRows, root(8));
+  expect_column(file, "azimuth_residual_deg", "degree", kRows,
+                [](std::size_t row) { return -degrees_from_radians(number(9, row)); });
+  expect_column(file, "zenith_residual_deg", "degree", kRows, degrees(10));
+  expect_column(file, "time", "s", kRows,
+                [](std::size_t row) { return 1e-9 * static_cast<double>(time_of(row)); });
+  EXPECT_EQ(file.text("time_ns", "units"), "ns");
+  const std::vector<long long> time = file.integers("time_ns");
+  const std::vector<long long> outlier = file.integers("outlier");
+  ASSERT_EQ(time.size(), kRows);
+  for (std::size_t row = 0; row < kRows; ++row) {
+    ASSERT_EQ(time[row], time_of(row));
+    ASSERT_EQ(outlier[row], is_outlier(row) ? 1 : 0);
   }
+  EXPECT_EQ(file.flags("outlier"), (std::vector<unsigned char>{0, 1}));
+  EXPECT_EQ(file.text("outlier", "flag_meanings"), "used left_out");
+  EXPECT_EQ(file.variables(), 14);
 }
 
 TEST_F(StatesFile, EveryPairOfPrismsHasItsCovariance) {

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -44,6 +45,10 @@ std::vector<ShotRange> stretches(const AngleSeries& series, double longest_gap =
 /// At most so many shots per second, evenly spread, of every given stretch.
 /// @param[in,out] ranges  rows of the series, on return those of the result
 AngleSeries thinned(const AngleSeries& series, double rate, std::vector<ShotRange>& ranges);
+
+/// Typical time between shots, ns: the median of the first 20,000 steps, which gaps do not move.
+/// @param time_ns  of at least two shots
+std::int64_t median_step_ns(std::span<const std::int64_t> time_ns);
 
 /// The same shots with the sign of the elevation turned.
 void mirror(AngleSeries& series);

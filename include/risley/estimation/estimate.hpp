@@ -10,7 +10,7 @@
 #include "risley/estimation/batch_map.hpp"
 #include "risley/estimation/diagnostics.hpp"
 #include "risley/estimation/ekf.hpp"
-#include "risley/estimation/observability.hpp"
+#include "risley/estimation/weak_directions.hpp"
 
 namespace risley::estimation {
 

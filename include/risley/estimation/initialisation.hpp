@@ -2,37 +2,16 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <complex>
 #include <optional>
-#include <span>
 #include <string>
 #include <vector>
 
 #include "risley/estimation/angle_series.hpp"
 #include "risley/estimation/free_parameters.hpp"
-#include "risley/estimation/rotor_trajectory.hpp"
+#include "risley/estimation/spectral_lines.hpp"
 #include "risley/sensors/sensor.hpp"
 
 namespace risley::estimation {
-
-/// One line of the spectrum of y + iz, the beam's position across the axis.
-struct SpectralLine {
-  double angular_velocity = 0;  ///< rad/s, signed: right-handed about X is positive
-  double amplitude = 0;         ///< of the unit vector's transverse part
-  double phase = 0;             ///< rad, at the reference time
-};
-
-/// The two strongest lines, strongest first. To first order a prism adds a vector that turns with
-/// it, so each rotor owns one line. Taken from the best covered stretch of about 80 ms (more where
-/// shots are rare); shots may be missing and unevenly spaced.
-struct RotorLines {
-  std::int64_t time_ns = 0;  ///< reference time of the phases: the middle of the used shots
-  ShotRange shots;           ///< used rows
-  std::vector<SpectralLine> lines;
-};
-
-/// @throws EstimationError when the series spans less than 50 ms or has too few shots
-RotorLines rotor_lines(const AngleSeries& series);
 
 /// Which rotor turns how, read off the spectrum: never by trying both combinations, because the
 /// wrong one can end with small residuals and wrong parameters.
@@ -72,15 +51,5 @@ struct Start {
 Start find_start(const AngleSeries& head, const sensors::Sensor& sensor,
                  const std::vector<FreeParameter>& free, double angle_noise,
                  std::optional<bool> mirrored = false);
-
-/// Follows the phases of both spectral lines through a stretch, 25 ms at a time, and so gives every
-/// knot of it angles and speeds that are right to a degree or so, without a model of the rotors,
-/// over gaps and among outliers.
-/// @param series   thinned to about 1 kHz
-/// @param shots    the stretch's rows
-/// @param start    of this stretch
-/// @param[in,out] knots   of the series; states of knots [first, last) are filled
-void track_rotors(const AngleSeries& series, ShotRange shots, const Start& start,
-                  RotorTrajectory& knots, std::size_t first, std::size_t last);
 
 }  // namespace risley::estimation

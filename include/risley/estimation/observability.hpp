@@ -8,30 +8,13 @@
 
 #include <Eigen/Core>
 
+#include "risley/estimation/estimate.hpp"
 #include "risley/estimation/free_parameters.hpp"
 #include "risley/estimation/rotor_process.hpp"
+#include "risley/estimation/weak_directions.hpp"
 #include "risley/sensors/sensor.hpp"
 
 namespace risley::estimation {
-
-/// A combination of parameters that data do not tell.
-struct WeakDirection {
-  /// Parameters by name, each in its prior sigmas (1 degree, 0.01 in an index), as a unit vector;
-  /// weights below 0.05 are left out. The largest is positive.
-  std::vector<std::pair<std::string, double>> weights;
-  double ratio = 0;  ///< its singular value over the largest one
-  double sigma = 0;  ///< of the combination after the data, in prior sigmas
-};
-
-/// Singular values of what data say of the parameters, each scaled by its prior sigma: the
-/// directions that stay wider than most_sigma prior sigmas.
-/// @param information  [free, free], of the data alone, rotors eliminated
-std::vector<WeakDirection> weak_directions(const Eigen::MatrixXd& information,
-                                           const std::vector<FreeParameter>& free,
-                                           double most_sigma);
-
-/// "0.71 refractive_index_air - 0.70 refractive_index"
-std::string direction_text(const WeakDirection& direction);
 
 /// A recording that need not exist yet.
 struct ObservabilityPlan {
@@ -44,9 +27,6 @@ struct ObservabilityPlan {
   /// Motion model [prisms]; empty takes kTypicalRotor.
   std::vector<RotorProcess> rotor_process;
 };
-
-/// A rotor that moves as the paper saw it: speeds that swing by 2.2 deg/s within seconds (Fig. 9).
-inline constexpr RotorProcess kTypicalRotor{0.0, 0.0, radians_from_degrees(4.0)};
 
 /// What one quantity means to the observations and what they mean to it. SI units.
 struct QuantityObservability {
@@ -80,8 +60,6 @@ struct Observability {
 /// evaluated with fewer shots of higher weight, and beyond 2,000 s with less time.
 /// @throws InvalidArgument for a plan without duration, rate or noise
 Observability observability_of_plan(const ObservabilityPlan& plan);
-
-struct Estimate;
 
 /// The same for a recording that was estimated: its own shots, gaps, outliers and rotors.
 /// @throws InvalidArgument when the estimate is not one of the batch estimator

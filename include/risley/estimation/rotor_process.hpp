@@ -22,6 +22,9 @@ struct RotorProcess {
 /// its tuning; this one lands in the middle of what it reports.
 inline constexpr RotorProcess kPaperProcess{radians_from_degrees(900.0), 0.0, 0.0};
 
+/// A rotor that moves as the paper saw it: speeds that swing by 2.2 deg/s within seconds (Fig. 9).
+inline constexpr RotorProcess kTypicalRotor{0.0, 0.0, radians_from_degrees(4.0)};
+
 /// Covariance that a step of dt seconds adds to (angle, speed, acceleration).
 struct RotorStepCovariance {
   double angle_angle = 0, angle_speed = 0, angle_acceleration = 0;

@@ -33,9 +33,10 @@ struct SmootherSolution {
 /// One Gauss-Newton step of the whole trajectory. The parameters are constants without noise, so
 /// the states of every knot are affine functions of them: a forward pass over the knots carries
 /// mean, derivative and covariance of the rotor states and collects what the data say of the
-/// parameters; a backward pass (modified Bryson-Frazier, which inverts no covariance) brings back
-/// what later knots say of earlier ones. Equal to the solution of the full normal equations at a
-/// cost proportional to the number of knots.                    Derivation: docs/theory/map.md
+/// parameters; a backward pass brings back what later knots say of earlier ones (as information
+/// where covariances are wanted, else in the quicker form of Bryson and Frazier). Equal to the
+/// solution of the full normal equations at a cost proportional to the number of knots. Derivation:
+/// docs/theory/map.md
 /// @param linearisation  the trajectory the equations were accumulated at
 /// @param process        [prisms]
 /// @param covariances    whether the covariances of the states are wanted
