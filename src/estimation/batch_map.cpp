@@ -26,8 +26,9 @@ namespace {
 constexpr double kCoarseRate = 1000.0;  // Hz
 /// Noise of the rotors before their own is known: far above that of real ones.
 constexpr RotorProcess kSettlingProcess{radians_from_degrees(30.0), 0.0, 0.0};
-/// A step is small when it moves no parameter by more than this share of its sigma.
-constexpr double kSmallStep = 0.01;
+/// A step is small when it moves no parameter by more than this share of its sigma: what is left
+/// is of second order.
+constexpr double kSmallStep = 0.1;
 constexpr int kMostFullPasses = 4;
 /// Residual scatter above the stated one by this share enlarges the covariance.
 constexpr double kSignificantExcess = 1.02;
@@ -63,12 +64,19 @@ class Iteration {
                {azimuth_, zenith_, outlier_});
   }
 
-  /// Residual scale over the stated noise, not below 1; outliers do not count.
+  /// Residual scale over the stated noise and rounding, not below 1; outliers do not count.
   double level() const {
-    const double rounding = 0.5 * static_cast<double>(series_.azimuth_rounding_variance.front() +
-                                                      series_.zenith_rounding_variance.front());
-    const double stated = std::sqrt(options_.angle_noise * options_.angle_noise + rounding);
-    return std::max(1.0, robust_scale(azimuth_, zenith_) / stated);
+    constexpr std::size_t kEnough = 20000;
+    const double noise = options_.angle_noise * options_.angle_noise;
+    const std::size_t stride = std::max<std::size_t>(1, series_.size() / kEnough);
+    std::vector<double> azimuth, zenith;
+    for (std::size_t i = 0; i < series_.size(); i += stride) {
+      azimuth.push_back(azimuth_[i] / std::sqrt(noise + static_cast<double>(
+                                                            series_.azimuth_rounding_variance[i])));
+      zenith.push_back(zenith_[i] /
+                       std::sqrt(noise + static_cast<double>(series_.zenith_rounding_variance[i])));
+    }
+    return std::max(1.0, robust_scale(azimuth, zenith));
   }
 
   SmootherSolution solve(std::span<const RotorProcess> process, bool covariances) const {
@@ -84,7 +92,8 @@ class Iteration {
     return smooth(equations_, knots_, process, prior, covariances);
   }
 
-  /// Takes a step. @return its largest share of a parameter's sigma, and of 0.01 noise in angles
+  /// Takes a step. @return its largest share of a parameter's sigma, or root mean square share of
+  /// the angles' sigmas (of the noise of a shot where those were not computed)
   double move(const SmootherSolution& solution) {
     const Eigen::VectorXd values = free_values(train_, options_.free) + solution.parameter_step;
     train_ = with_free_values(train_, options_.free, values);
@@ -93,13 +102,20 @@ class Iteration {
       largest = std::max(largest, std::abs(solution.parameter_step[i]) /
                                       std::sqrt(solution.parameter_covariance(i, i)));
     }
-    double squares = 0;
+    const auto d = static_cast<std::size_t>(knots_.states());
+    const std::size_t triangle = d * (d + 1) / 2;
+    double squares = 0, variances = 0;
     for (std::size_t i = 0; i < knots_.state.size(); ++i) {
       knots_.state[i] += solution.state_step[i];
-      if (i % kStatesPerRotor == 0) squares += solution.state_step[i] * solution.state_step[i];
+      if (i % kStatesPerRotor != 0) continue;
+      squares += solution.state_step[i] * solution.state_step[i];
+      const std::size_t row = i % d;
+      variances +=
+          solution.state_covariance.empty()
+              ? options_.angle_noise * options_.angle_noise
+              : solution.state_covariance[i / d * triangle + row * d - row * (row - 1) / 2];
     }
-    const double angles = static_cast<double>(knots_.size()) * knots_.prisms;
-    return std::max(largest, 0.1 * std::sqrt(squares / angles) / options_.angle_noise);
+    return std::max(largest, std::sqrt(squares / variances));
   }
 
  private:
@@ -236,7 +252,7 @@ BatchMapResult run_batch_map(const AngleSeries& series, const Start& start,
     const double before = std::exchange(level, coarse.level());
     coarse.weights().softening = softening(level);
     report_progress(progress, 0.05 + 0.35 * (i + 1) / options.most_iterations);
-    if (moved < 0.1 && std::abs(level / before - 1.0) < 0.02) {
+    if (moved < kSmallStep && std::abs(level / before - 1.0) < 0.02) {
       if (chosen) break;
       process = likeliest_process(coarse.equations(), coarse.knots());
       chosen = true;
@@ -271,8 +287,8 @@ BatchMapResult run_batch_map(const AngleSeries& series, const Start& start,
     moved = full.move(solution);
     ++result.iterations;
     report_progress(progress, 0.4 + 0.6 * (pass + 1) / kMostFullPasses);
-    if (pass == 0 || (moved > 10 * kSmallStep && pass + 1 < kMostFullPasses)) continue;
-    result.settled = moved < 10 * kSmallStep;
+    if (pass == 0 || (moved > kSmallStep && pass + 1 < kMostFullPasses)) continue;
+    result.settled = moved <= kSmallStep;
     result.covariance = std::move(solution.parameter_covariance);
     result.information = std::move(solution.parameter_information);
     full.knots().covariance = std::move(solution.state_covariance);

@@ -129,13 +129,15 @@ void judge(Estimate& estimate, const PrismTrain& nominal) {
   const double rms =
       std::sqrt(0.5 * (estimate.azimuth_residuals.rms * estimate.azimuth_residuals.rms +
                        estimate.zenith_residuals.rms * estimate.zenith_residuals.rms));
-  const double ratio = rms / estimate.expected_residual;
+  const bool map = estimate.method == Method::map;
+  // Rounding may differ from shot to shot; the unit variance weighs each by its own.
+  const double ratio =
+      map ? std::sqrt(estimate.map->unit_variance) : rms / estimate.expected_residual;
   const auto shots = static_cast<double>(estimate.series.size());
   const double outlier_share = static_cast<double>(estimate.outliers) / shots;
   const std::string residuals =
       fmt::format("residuals of {:.3g} deg where noise and rounding amount to {:.3g} deg",
                   degrees_from_radians(rms), degrees_from_radians(estimate.expected_residual));
-  const bool map = estimate.method == Method::map;
   estimate.converged = true;
   const auto fail = [&](std::string reason) {
     estimate.converged = false;
@@ -279,6 +281,34 @@ std::vector<ShotRange> take_ekf(Estimate& estimate, const EstimateOptions& optio
   return {{0, estimate.states.size()}};
 }
 
+/// A start from the first second, or, where that holds too little, from the first place in the
+/// series that has enough.
+Start start_anywhere(const AngleSeries& series, const AngleSeries& head,
+                     const EstimateOptions& options, const Estimate& estimate) {
+  const auto start_of = [&](const AngleSeries& shots) {
+    return find_start(shots, options.sensor, estimate.free, estimate.angle_noise, options.mirrored);
+  };
+  try {
+    return start_of(head);
+  } catch (const EstimationError&) {
+    constexpr std::size_t kPlaces = 50;
+    constexpr std::int64_t kLongestNs = 500'000'000;
+    for (std::size_t place = 1; place < kPlaces; ++place) {
+      const std::size_t begin = place * series.size() / kPlaces;
+      std::size_t end = begin;
+      while (end < series.size() && series.time_ns[end] >= series.time_ns[begin] &&
+             series.time_ns[end] - series.time_ns[begin] < kLongestNs) {
+        ++end;
+      }
+      try {
+        return start_of(rows_of(series, begin, end));
+      } catch (const EstimationError&) {  // nor here
+      }
+    }
+    throw;
+  }
+}
+
 }  // namespace
 
 std::vector<FreeParameter> chosen_parameters(const EstimateOptions& options) {
@@ -322,10 +352,11 @@ Estimate estimate(Method method, AngleSeries series, const AngleSeries& head,
     }
   }
   constexpr std::size_t kHeadRows = 2000;
-  estimate.start = find_start(
+  estimate.start = start_anywhere(
+      estimate.series,
       head_is_used ? head
                    : rows_of(estimate.series, 0, std::min(kHeadRows, estimate.series.size())),
-      options.sensor, estimate.free, estimate.angle_noise, options.mirrored);
+      options, estimate);
   estimate.mirrored = estimate.start.mirrored;
   if (estimate.mirrored) {
     mirror(estimate.series);

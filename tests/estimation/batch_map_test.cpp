@@ -165,6 +165,16 @@ TEST(BatchMap, AResetOfTheClockAndALongPauseSplitTheRotorsAndNotTheParameters) {
   EXPECT_FALSE(std::isnan(states_of_shots(shorter, {2970, 2971}).rotation_angle[0][0]));
 }
 
+TEST(BatchMap, ABeginningThatTellsNothingIsNoObstacle) {
+  // A lone shot, nothing for three seconds, then data.
+  const auto sensor = sensors::load_sensor("mid-40-table3");
+  auto series = testing::constant_speed_series(sensor, 0.5, 2.5, 2.0, 1000.0, 0.01, 11);
+  for (std::size_t i = 1; i < series.size(); ++i) series.time_ns[i] += 3'000'000'000;
+  const Estimate result = estimate_map(series, nominal_options());
+  ASSERT_TRUE(result.converged) << result.reason;
+  EXPECT_LT(worst_error(result, sensor), 4.5);
+}
+
 TEST(BatchMap, StatesOfShotsAndKnotsAreOneTrajectory) {
   const auto sensor = sensors::load_sensor("mid-40-table3");
   const auto series = testing::constant_speed_series(sensor, 0.5, 2.5, 0.5, 10000.0, 0.01, 8);

@@ -44,7 +44,7 @@ struct BatchMapResult {
   std::size_t outliers = 0;
   std::size_t unused_shots = 0;     ///< in stretches too short to find their rotors' phases
   std::size_t iterations = 0;       ///< of both passes together
-  bool settled = false;             ///< the last step was a hundredth of a sigma or less
+  bool settled = false;             ///< the last step was a tenth of a sigma or less
   Autocorrelation autocorrelation;  ///< of the residuals
   /// Mean square of residuals over stated variances, outliers left out.
   double unit_variance = 0;
