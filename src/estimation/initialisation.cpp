@@ -218,7 +218,7 @@ Start find_start(const AngleSeries& head, const sensors::Sensor& sensor,
         1.0 / step, degrees_from_radians(fastest), fastest / (0.9 * kPi)));
   }
   const double noise = std::max(angle_noise, radians_from_degrees(1e-4));
-  // The middle part of the window, thinned.
+  // The shots of the lines, thinned.
   AngleSeries shots;
   const std::size_t stride = std::max<std::size_t>(1, found.shots.size() / kEnoughShots);
   for (std::size_t i = found.shots.begin; i < found.shots.end; i += stride) shots.append(head, i);

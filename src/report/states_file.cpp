@@ -55,6 +55,8 @@ class NcFile {
       const std::size_t chunk = std::min(along.length, kBlockRows);
       check(nc_def_var_chunking(*id_, variable, NC_CHUNKED, &chunk));
       check(nc_def_var_deflate(*id_, variable, 1, 1, 1));
+      // Rows come in order: one chunk at a time is all that needs keeping, not megabytes each.
+      check(nc_set_var_chunk_cache(*id_, variable, chunk * sizeof(double), 3, 1.0F));
     }
     if (!units.empty()) put_text(variable, "units", units);
     put_text(variable, "long_name", long_name);
