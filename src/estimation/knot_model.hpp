@@ -2,7 +2,6 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <algorithm>
 #include <cmath>
 #include <cstddef>
 
@@ -19,14 +18,12 @@ namespace risley::estimation {
 /// it weighs nothing against the first milliseconds of data.
 inline constexpr double kFirstAngleSigma = 0.5;
 inline constexpr double kFirstSpeedSigma = radians_from_degrees(100.0);
-/// Of the acceleration, as so many square roots of a second of its own random walk: more would
-/// cost the backward pass its digits where a gap follows the first knots.
-inline constexpr double kFirstAccelerationWalk = 30.0;
+inline constexpr double kFirstAccelerationSigma = radians_from_degrees(1000.0);
 /// Of a rotor without jerk, whose acceleration is zero: only there to keep covariances definite.
 inline constexpr double kNoAccelerationSigma = 1e-9;
 
 inline double first_acceleration_sigma(const RotorProcess& process) {
-  return std::max(kFirstAccelerationWalk * process.jerk, kNoAccelerationSigma);
+  return process.jerk > 0 ? kFirstAccelerationSigma : kNoAccelerationSigma;
 }
 
 /// Curvature block of two rotors at a knot: their states act on an angle as 1, t and t^2/2.
