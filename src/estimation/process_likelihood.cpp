@@ -178,23 +178,24 @@ std::vector<RotorProcess> likeliest_process(const NormalEquations& equations,
                                           kLowestAcceleration, kHighestAcceleration);
     const double jerk_alone =
         best_decade([&](double j) { return cost(kNone, j); }, kLowestJerk, kHighestJerk);
-    // Both together: each is then less than it would have to be alone. They trade places slowly, so
-    // several rounds.
-    double walk = walk_alone, jerk = jerk_alone;
-    for (int round = 0; round < kRounds; ++round) {
-      const double before = cost(walk, jerk);
-      walk = best_decade([&](double a) { return cost(a, jerk); }, walk_alone - 3.0, walk_alone);
-      jerk = best_decade([&](double j) { return cost(walk, j); }, jerk_alone - 2.0, jerk_alone);
-      if (before - cost(walk, jerk) < 0.1 * kWorthIt) break;
-    }
     // More numbers only where the data are so much likelier with them.
     RotorProcess best = process_of(walk_alone, kNone);
-    double best_cost = cost(walk_alone, kNone) - kWorthIt;
-    if (const double value = cost(kNone, jerk_alone); value < best_cost) {
+    double best_cost = cost(walk_alone, kNone);
+    if (const double value = cost(kNone, jerk_alone); value + kWorthIt < best_cost) {
       best = process_of(kNone, jerk_alone);
       best_cost = value;
     }
-    if (cost(walk, jerk) + kWorthIt < best_cost) best = process_of(walk, jerk);
+    // Both together: each is then less than it would have to be alone. They trade places slowly, so
+    // several rounds, as long as that promises to be worth it.
+    double walk = walk_alone, jerk = jerk_alone, both = std::numeric_limits<double>::infinity();
+    for (int round = 0; round < kRounds; ++round) {
+      const double before = both;
+      walk = best_decade([&](double a) { return cost(a, jerk); }, walk_alone - 3.0, walk_alone);
+      jerk = best_decade([&](double j) { return cost(walk, j); }, jerk_alone - 2.0, jerk_alone);
+      both = cost(walk, jerk);
+      if (before - both < 0.1 * kWorthIt || both > best_cost - 0.1 * kWorthIt) break;
+    }
+    if (both + kWorthIt < best_cost) best = process_of(walk, jerk);
     result.push_back(best);
   }
   return result;
