@@ -18,7 +18,6 @@ namespace {
 constexpr std::size_t kLineBins = 600;
 constexpr std::size_t kHistogramBins = 61;
 constexpr double kHistogramHalfWidth = 4.5;  // standard deviations
-constexpr std::size_t kAngleBins = 72;
 
 const char* kind_name(SeriesKind kind) {
   switch (kind) {
