@@ -9,7 +9,6 @@
 #include <span>
 #include <utility>
 
-#include <Eigen/Cholesky>
 #include <fmt/format.h>
 
 #include "risley/core/error.hpp"
@@ -130,10 +129,6 @@ class Iteration {
   std::vector<unsigned char> outlier_;
 };
 
-/// Softening of the weights (Geman-McClure) for residuals of a scale in units of the stated noise:
-/// a shot at four sigma weighs a quarter.
-double softening(double level) { return 1.0 / (16.0 * level * level); }
-
 /// Starts of all stretches of a thinned series; an empty one where none was found.
 struct StretchStart {
   ShotRange shots;
@@ -246,11 +241,11 @@ BatchMapResult run_batch_map(const AngleSeries& series, const Start& start,
     if (i == 0) {  // the weights need a scale first
       coarse.evaluate();
       level = coarse.level();
-      coarse.weights().softening = softening(level);
+      coarse.weights().softening = softening_at(level);
     }
     coarse.evaluate();
     const double before = std::exchange(level, coarse.level());
-    coarse.weights().softening = softening(level);
+    coarse.weights().softening = softening_at(level);
     report_progress(progress, 0.05 + 0.35 * (i + 1) / options.most_iterations);
     if (moved < kSmallStep && std::abs(level / before - 1.0) < 0.02) {
       if (chosen) break;

@@ -68,7 +68,7 @@ WindowFit fit_window(const AngleSeries& shots, const PrismTrain& nominal,
     double damping = 1e-4;
     for (int iteration = 0; iteration < 25; ++iteration) {
       const double level = std::max(scale() / noise, 1.0);
-      weights.softening = 1.0 / (16.0 * level * level);
+      weights.softening = softening_at(level);
       double cost = evaluate(fit.train, fit.knot);
       Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(d + n, d + n);
       Eigen::VectorXd gradient(d + n);

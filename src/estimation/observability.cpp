@@ -290,7 +290,7 @@ Observability observability_of_estimate(const Estimate& estimate) {
   NormalEquations equations;
   ShotWeights weights;
   weights.angle_noise = estimate.angle_noise;
-  weights.cut = 20.0 * std::max(1.0, map.unit_variance);
+  weights.cut = BatchMapOptions{}.outlier_chi2 * std::max(1.0, map.unit_variance);
   accumulate(estimate.series, map.trajectory, map.train, all, weights, equations);
   equations.scale(1.0 / map.variance_factor);
   const double shots = static_cast<double>(equations.shots - equations.outliers);

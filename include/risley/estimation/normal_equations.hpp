@@ -25,6 +25,10 @@ struct ShotWeights {
   double cut = std::numeric_limits<double>::infinity();  ///< shots with more chi2 are outliers
 };
 
+/// Softening for residuals whose scale is so many times the stated noise: a shot at four of these
+/// sigmas weighs a quarter.
+constexpr double softening_at(double level) { return 1.0 / (16.0 * level * level); }
+
 /// Where residuals (observed minus modelled, rad) and outlier flags of all shots go; empty spans
 /// are not written, and rows of shots that no knot serves are left alone.
 struct ShotColumns {
