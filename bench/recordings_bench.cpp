@@ -32,8 +32,8 @@ class Recording {
     settings.truth = sensors::load_sensor("mid-40");
     settings.rate = 100000.0;
     settings.duration = static_cast<double>(kShots) / *settings.rate;
-    settings.scene = simulation::Scene{};
-    simulation::ScenePlane wall;
+    settings.scene = scenes::Scene{};
+    scenes::ScenePlane wall;
     wall.name = "wall";
     wall.plane = {{1, 0, 0}, 10.0};
     settings.scene->planes.push_back(wall);

@@ -20,7 +20,8 @@ namespace risley::app {
 namespace {
 
 struct SimulateOptions {
-  std::string output, sensor = "mid-40", quantize = "yes", rotor = "constant", scene, station;
+  std::string output, sensor = "mid-40", quantize = "yes", beam_origin = "yes", rotor = "constant",
+                      scene, station;
   double duration_s = 1.0;
   std::optional<double> rate_hz, noise_angle_deg, noise_range_m;
   std::vector<std::string> assignments, reported;
@@ -47,6 +48,7 @@ simulation::SimulationSettings settings_from(const SimulateOptions& options,
   simulation::SimulationSettings settings;
   settings.truth = sensors::load_sensor(options.sensor);
   for (const std::string& text : options.assignments) assign(settings.truth, text);
+  if (options.beam_origin == "no") settings.truth.set_prism_geometry({});
   if (!options.reported.empty()) {
     settings.reported = settings.truth;
     for (const std::string& text : options.reported) {
@@ -68,7 +70,7 @@ simulation::SimulationSettings settings_from(const SimulateOptions& options,
   for (const double angle_deg : options.start_angles_deg) {
     settings.start_angles.push_back(radians_from_degrees(angle_deg));
   }
-  if (!options.scene.empty()) settings.scene = simulation::load_scene(options.scene);
+  if (!options.scene.empty()) settings.scene = scenes::load_scene(options.scene);
   settings.station = options.station;
   settings.seed = common.seed;
   settings.threads = common.threads;
@@ -112,6 +114,10 @@ Run declare_simulate(CLI::App& verb) {
                   "1 sigma of azimuth and zenith (default: the sensor's)");
   verb.add_option("--noise-range-m", o.noise_range_m, "1 sigma of ranges (default: the sensor's)");
   verb.add_option("--quantize", o.quantize, "Round to the sensor's resolution")
+      ->check(CLI::IsMember({"yes", "no"}))
+      ->capture_default_str();
+  verb.add_option("--beam-origin", o.beam_origin,
+                  "Start beams where they leave the last prism; 'no': at the sensor's origin")
       ->check(CLI::IsMember({"yes", "no"}))
       ->capture_default_str();
   verb.add_option("--rotor", o.rotor, "How the rotors run")

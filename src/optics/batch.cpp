@@ -23,6 +23,7 @@ struct Call {
   BatchArguments arguments;
   std::vector<const double*> angle_columns;
   std::vector<double*> d_azimuth, d_zenith;
+  std::vector<double> face_position;
 
   Call(const PrismTrain& train, std::span<const std::span<const double>> rotation_angles) {
     if (rotation_angles.size() != static_cast<std::size_t>(train.prisms())) {
@@ -99,6 +100,13 @@ std::size_t observe_batch(const PrismTrain& train,
   a.direction[2] = call.column("z", out.z, false);
   a.azimuth = call.column("azimuth", out.azimuth, false);
   a.zenith = call.column("zenith", out.zenith, false);
+  if (!out.origin_x.empty()) {
+    call.face_position = face_positions(train.face_order(), out.geometry);
+    a.face_position = call.face_position.data();
+    a.origin[0] = call.column("origin_x", out.origin_x, true);
+    a.origin[1] = call.column("origin_y", out.origin_y, true);
+    a.origin[2] = call.column("origin_z", out.origin_z, true);
+  }
 #ifdef RISLEY_HAS_X86_KERNELS
   if (set == InstructionSet::avx512) return kernel_avx512::observe(a);
   if (set == InstructionSet::avx2) return kernel_avx2::observe(a);

@@ -8,6 +8,7 @@
 #include <array>
 
 #include "risley/core/simd.hpp"
+#include "risley/optics/beam_origin.hpp"
 #include "risley/optics/observation_adjoint.hpp"
 
 #define RISLEY_JOIN2(a, b) a##b
@@ -78,9 +79,23 @@ template <int N>
 std::size_t observe_shots(const BatchArguments& a) {
   const Inputs<N> inputs(a);
   const auto train = prepare<Batch, N>(inputs.parameters, face_orders<N>(a.face_order));
+  std::array<Batch, 2 * N> face_position;
+  for (std::size_t i = 0; i < 2 * N; ++i) {
+    face_position[i] = Batch(a.face_position ? a.face_position[i] : 0.0);
+  }
   std::size_t invalid = 0;
   for (std::size_t shot = 0; shot < a.shots; shot += kLanes) {
-    const Vector3<Batch> direction = trace(train, inputs.angles(shot)).direction;
+    Vector3<Batch> direction;
+    if (a.face_position) {
+      const auto forward = trace_forward(train, inputs.angles(shot));
+      direction = forward.direction();
+      const Vector3<Batch> origin = beam_origin(forward, face_position);
+      store(origin.x, a.origin[0], shot, a.shots);
+      store(origin.y, a.origin[1], shot, a.shots);
+      store(origin.z, a.origin[2], shot, a.shots);
+    } else {
+      direction = trace(train, inputs.angles(shot)).direction;
+    }
     invalid += count_invalid(direction.x, shot, a.shots);
     if (a.direction[0]) store(direction.x, a.direction[0], shot, a.shots);
     if (a.direction[1]) store(direction.y, a.direction[1], shot, a.shots);

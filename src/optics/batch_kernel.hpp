@@ -19,6 +19,8 @@ struct BatchArguments {
   double* direction[3] = {nullptr, nullptr, nullptr};
   double* azimuth = nullptr;
   double* zenith = nullptr;
+  const double* face_position = nullptr;  ///< [2 prisms], for the origin
+  double* origin[3] = {nullptr, nullptr, nullptr};
   double* const* d_azimuth = nullptr;  ///< [parameter_count + prisms][shots]
   double* const* d_zenith = nullptr;
 };

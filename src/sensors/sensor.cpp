@@ -67,6 +67,14 @@ void Sensor::set(std::string_view parameter, double value) {
   }
 }
 
+void Sensor::set_prism_geometry(const PrismGeometry& geometry) {
+  prism_thickness = geometry.thickness;
+  prism_spacing = geometry.spacing;
+  std::erase_if(knowledge, [](const Knowledge& entry) {
+    return entry.name == "prism_thickness_m" || entry.name == "prism_spacing_m";
+  });
+}
+
 const Knowledge* Sensor::find_knowledge(std::string_view parameter) const {
   const auto found =
       std::find_if(knowledge.begin(), knowledge.end(),

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <oneapi/tbb/blocked_range.h>
 #include <oneapi/tbb/parallel_for.h>
 #include <oneapi/tbb/task_arena.h>
@@ -83,14 +84,24 @@ NoiseSettings noise_settings(const SimulationSettings& settings) {
   return noise;
 }
 
+/// A serial number that follows from the optics, so that all recordings of one simulated unit agree
+/// on it. Broadcast codes have 15 characters, of which the last counts the sensor's heads.
+std::string simulated_serial(const sensors::Sensor& sensor) {
+  std::uint64_t hash = 14695981039346656037U;  // FNV-1a, the same on every machine
+  const std::string text = to_string(sensor.train.face_order()) +
+                           fmt::format("{}", fmt::join(sensor.train.parameters(), ","));
+  for (const char c : text) {
+    hash = (hash ^ static_cast<unsigned char>(c)) * 1099511628211U;
+  }
+  return fmt::format("SIM{:011}1", hash % 100'000'000'000);
+}
+
 recordings::RecordingHeader make_header(const SimulationSettings& settings) {
   recordings::RecordingHeader header;
   header.format = "simulation";
   recordings::Device device;
-  // Broadcast codes have 15 characters, of which the last counts the sensor's heads.
-  device.serial = settings.truth.serial.empty()
-                      ? fmt::format("SIM{:011}1", settings.seed % 100'000'000'000)
-                      : settings.truth.serial;
+  device.serial =
+      settings.truth.serial.empty() ? simulated_serial(settings.truth) : settings.truth.serial;
   device.type = static_cast<std::uint8_t>(settings.truth.device_type);
   header.devices.push_back(device);
   header.time_reference = recordings::TimeReference::power_on;
@@ -169,11 +180,11 @@ class Scanner::Work {
       std::transform(angle.begin(), angle.end(), wrapped[prism].begin(), wrap_to_two_pi);
       angles.emplace_back(wrapped[prism]);
     }
-    std::vector<double> x, y, z;
+    std::vector<double> x, y, z, origin_x, origin_y, origin_z;
     DirectionColumns beam;
     if (settings.scene) {
-      for (auto* column : {&x, &y, &z}) column->resize(count);
-      beam = {x, y, z, {}, {}};
+      for (auto* column : {&x, &y, &z, &origin_x, &origin_y, &origin_z}) column->resize(count);
+      beam = {x, y, z, {}, {}, origin_x, origin_y, origin_z, settings.truth.prism_geometry()};
     }
     beam.azimuth = part(truth.azimuth, first, count);
     beam.zenith = part(truth.zenith, first, count);
@@ -182,7 +193,10 @@ class Scanner::Work {
     const auto azimuth = part(rows.azimuth, first, count);
     const auto zenith = part(rows.zenith, first, count);
     if (settings.reported) {
-      observe_batch(settings.reported->train, angles, {{}, {}, {}, azimuth, zenith});
+      DirectionColumns reported;
+      reported.azimuth = azimuth;
+      reported.zenith = zenith;
+      observe_batch(settings.reported->train, angles, reported);
     } else {
       std::copy(beam.azimuth.begin(), beam.azimuth.end(), azimuth.begin());
       std::copy(beam.zenith.begin(), beam.zenith.end(), zenith.begin());
@@ -200,8 +214,10 @@ class Scanner::Work {
       range[i] = settings.scene ? 0.0 : kNaN;
       rows.intensity[row] = 0;
       if (settings.scene && !std::isnan(beam.azimuth[i])) {
-        const auto hit = nearest_hit(*settings.scene, station_.position,
-                                     station_.scene_from_sensor({x[i], y[i], z[i]}));
+        const auto hit = scenes::nearest_hit(
+            *settings.scene,
+            station_.position + station_.scene_from_sensor({origin_x[i], origin_y[i], origin_z[i]}),
+            station_.scene_from_sensor({x[i], y[i], z[i]}));
         if (hit) {
           true_range[i] = hit->range;
           if (hit->range >= settings.truth.range_minimum &&
@@ -233,7 +249,7 @@ class Scanner::Work {
 
   ObservationNoise noise_;
   oneapi::tbb::task_arena arena_;
-  Station station_;
+  scenes::Station station_;
   std::vector<RotorMotion> rotors_;
 };
 

@@ -55,8 +55,8 @@ Whole scan(const SimulationSettings& settings, std::size_t max_rows = 65536) {
   return whole;
 }
 
-Scene wall_at(double distance_m) {
-  return parse_scene(
+scenes::Scene wall_at(double distance_m) {
+  return scenes::parse_scene(
       "planes: [{name: wall, normal_azimuth_deg: 10, normal_zenith_deg: 80, "
       "distance_m: " +
           std::to_string(distance_m) + "}]",
@@ -181,19 +181,21 @@ TEST(Scanner, QuantizeRoundsAndSaysSo) {
 TEST(Scanner, RangesEndOnThePlane) {
   SimulationSettings settings = exact("mid-40-table3");
   settings.duration = 0.05;
-  settings.scene = parse_scene(
+  settings.scene = scenes::parse_scene(
       "planes: [{name: wall, distance_m: 30, normal_azimuth_deg: 10, normal_zenith_deg: 80}]\n"
       "stations: [{name: other, position_m: [1, -2, 0.5], roll_deg: 30, pitch_deg: -5, yaw_deg: "
       "12}]",
       "wall");
   for (const std::string name : {"", "other"}) {
     settings.station = name;
-    const Station station = settings.scene->station(name);
+    const scenes::Station station = settings.scene->station(name);
     const Whole whole = scan(settings);
     for (std::size_t i = 0; i < whole.rows.size(); ++i) {
-      const Vector3<double> direction = station.scene_from_sensor(
-          direction_from_angles<double>({whole.truth.azimuth[i], whole.truth.zenith[i]}));
-      const Vector3<double> point = station.position + whole.rows.range[i] * direction;
+      const std::array<double, 2> angles{whole.truth.rotation_angle[0][i],
+                                         whole.truth.rotation_angle[1][i]};
+      const Ray ray = emergent_ray(settings.truth.train, settings.truth.prism_geometry(), angles);
+      const Vector3<double> point = station.position + station.scene_from_sensor(ray.origin) +
+                                    whole.rows.range[i] * station.scene_from_sensor(ray.direction);
       ASSERT_NEAR(signed_distance(settings.scene->planes[0].plane, point), 0.0, 1e-12);
       ASSERT_EQ(whole.rows.range[i], whole.truth.range[i]);
       ASSERT_GT(whole.rows.intensity[i], 60);
@@ -216,7 +218,7 @@ TEST(Scanner, NoSceneMeansNoRanges) {
 TEST(Scanner, BeyondTheLimitsOfRangeThereIsNoReturn) {
   SimulationSettings settings = exact("mid-40");
   settings.duration = 0.05;
-  settings.scene = parse_scene(
+  settings.scene = scenes::parse_scene(
       "planes: [{name: wall, distance_m: 12, normal_azimuth_deg: 0, normal_zenith_deg: 90}]", "w");
   settings.truth.range_maximum = 12.3;
   settings.truth.range_minimum = 12.05;
@@ -247,8 +249,9 @@ TEST(Scanner, BeyondTheLimitsOfRangeThereIsNoReturn) {
 
 TEST(Scanner, BeamsBesideABoardHitNothing) {
   SimulationSettings settings = exact("mid-40");
+  settings.truth.set_prism_geometry({});
   settings.duration = 0.05;
-  settings.scene = parse_scene(
+  settings.scene = scenes::parse_scene(
       "planes: [{name: board, distance_m: 10, normal_azimuth_deg: 0, normal_zenith_deg: 90, "
       "extent_m: [2, 1]}]",
       "board");
@@ -324,8 +327,16 @@ TEST(Scanner, HeaderDescribesTheSensor) {
   const auto& header = scanner.header();
   ASSERT_EQ(header.devices.size(), 1u);
   EXPECT_EQ(header.devices[0].type, 1);
-  EXPECT_EQ(header.devices[0].serial, "SIM000000000051");
-  EXPECT_EQ(header.devices[0].serial.size(), 15u);
+  const std::string serial = header.devices[0].serial;
+  EXPECT_TRUE(serial.starts_with("SIM"));
+  EXPECT_EQ(serial.size(), 15u);
+  // It belongs to the unit: other seeds and other beliefs leave it, other optics do not.
+  settings.seed = 6;
+  settings.reported = settings.truth;
+  settings.reported->train = settings.truth.train.without_errors();
+  EXPECT_EQ(Scanner(settings).header().devices[0].serial, serial);
+  settings.truth.set("prism_tilt_a_vertical_deg", 0.01);
+  EXPECT_NE(Scanner(settings).header().devices[0].serial, serial);
   EXPECT_EQ(header.time_reference, recordings::TimeReference::power_on);
   EXPECT_TRUE(header.has_range);
   EXPECT_FALSE(header.cartesian);

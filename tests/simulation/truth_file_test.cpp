@@ -40,7 +40,7 @@ class TruthFile : public ::testing::Test {
     s.rate = 2000;
     s.rotor = RotorKind::sinusoidal;
     s.seed = 77;
-    s.scene = load_scene(std::string(RISLEY_SOURCE_DIR) + "/data/room.yaml");
+    s.scene = scenes::load_scene(std::string(RISLEY_SOURCE_DIR) + "/data/room.yaml");
     return s;
   }
 

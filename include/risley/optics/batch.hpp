@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "risley/optics/beam_origin.hpp"
 #include "risley/optics/prism_train.hpp"
 
 namespace risley {
@@ -23,6 +24,9 @@ const std::vector<InstructionSet>& available_instruction_sets();
 struct DirectionColumns {
   std::span<double> x, y, z;          ///< unit vector, sensor frame
   std::span<double> azimuth, zenith;  ///< rad
+  /// Where the beam leaves the last face, m, sensor frame: all three or none.    [B21 App. A]
+  std::span<double> origin_x{}, origin_y{}, origin_z{};
+  PrismGeometry geometry{};  ///< of the prisms, for the origin
 };
 
 /// Where many shots of one train point. A shot that does not get through is NaN in every column.

@@ -10,6 +10,7 @@
 
 #include <Eigen/Core>
 
+#include "risley/optics/beam_origin.hpp"
 #include "risley/optics/prism_train.hpp"
 
 namespace risley::sensors {
@@ -59,6 +60,7 @@ struct Sensor {
   std::vector<std::pair<std::string, std::string>> provenance;
 
   int prisms() const { return train.prisms(); }
+  PrismGeometry prism_geometry() const { return {prism_thickness, prism_spacing}; }
 
   /// Value of a train parameter or angular velocity, SI units. @throws InvalidArgument
   double get(std::string_view parameter) const;
@@ -66,6 +68,8 @@ struct Sensor {
   /// prisms together becomes known of each when one of them is set alone.
   /// @throws InvalidArgument naming the parameter, value, unit and range
   void set(std::string_view parameter, double value);
+  /// Sets the prisms' sizes and forgets who said otherwise.
+  void set_prism_geometry(const PrismGeometry& geometry);
   /// Knowledge of a parameter, or nullptr when nothing is recorded.
   const Knowledge* find_knowledge(std::string_view parameter) const;
   /// Replaces or adds the knowledge of a parameter.

@@ -11,9 +11,9 @@
 #include "risley/recordings/observations.hpp"
 #include "risley/recordings/reader.hpp"
 #include "risley/recordings/truth.hpp"
+#include "risley/scenes/scene.hpp"
 #include "risley/sensors/sensor.hpp"
 #include "risley/simulation/rotor_dynamics.hpp"
-#include "risley/simulation/scene.hpp"
 
 namespace risley::simulation {
 
@@ -35,8 +35,8 @@ struct SimulationSettings {
   /// Rotation angles at time zero, rad, one per prism; empty: uniformly random from the seed.
   std::vector<double> start_angles;
 
-  std::optional<Scene> scene;  ///< without one there are no ranges
-  std::string station;         ///< of the scene; empty: at its origin, X forward
+  std::optional<scenes::Scene> scene;  ///< without one there are no ranges
+  std::string station;                 ///< of the scene; empty: at its origin, X forward
 
   std::uint64_t seed = 0;
   int threads = 0;  ///< 0: as many as the machine has
@@ -47,12 +47,13 @@ struct SimulationSettings {
 /// of the pieces.
 ///
 /// Shot i is fired at round(i 1e9 / rate) ns, and the truth is that of this rounded time. Beams
-/// start at the sensor's origin (Appendix A's offset within the prisms is left out). A beam that
-/// hits nothing, or beyond the sensor's limits of range, has no return: range 0 and valid 0, with
-/// the direction it was reported for. A beam that does not get through the prisms has NaN angles
-/// too. Without a scene every range is NaN and the header says has_range = false.
-/// Intensity is that of a matt surface of 80 % reflectivity, 120 times the cosine of incidence on
-/// the sensor's scale where 150 stands for 100 %; ranges do not weaken it.
+/// start where they leave the last prism [B21 App. A], and ranges count from there; a sensor whose
+/// prism sizes are 0 sends all of them from its origin. A beam that hits nothing, or beyond the
+/// sensor's limits of range, has no return: range 0 and valid 0, with the direction it was reported
+/// for. A beam that does not get through the prisms has NaN angles too. Without a scene every range
+/// is NaN and the header says has_range = false. Intensity is that of a matt surface of 80 %
+/// reflectivity, 120 times the cosine of incidence on the sensor's scale where 150 stands for 100
+/// %; ranges do not weaken it.
 class Scanner {
  public:
   /// @throws InvalidArgument naming setting, value and allowed range

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-#include "risley/simulation/scene.hpp"
+#include "risley/scenes/scene.hpp"
 
 #include <string>
 #include <vector>
@@ -11,7 +11,7 @@
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
 
-namespace risley::simulation {
+namespace risley::scenes {
 namespace {
 
 using ::testing::HasSubstr;
@@ -207,4 +207,4 @@ INSTANTIATE_TEST_SUITE_P(
     [](const auto& each) { return std::string(each.param.name); });
 
 }  // namespace
-}  // namespace risley::simulation
+}  // namespace risley::scenes

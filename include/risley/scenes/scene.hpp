@@ -10,7 +10,7 @@
 
 #include "risley/core/plane.hpp"
 
-namespace risley::simulation {
+namespace risley::scenes {
 
 /// One flat surface, seen from both sides. Its foot is the point nearest to the scene's origin. Its
 /// horizontal axis is Z x normal, to the left for a wall ahead, (-sin azimuth, cos azimuth, 0) also
@@ -69,4 +69,4 @@ Scene parse_scene(const std::string& text, const std::string& path);
 /// parse_scene of a file. @throws FileError
 Scene load_scene(const std::string& path);
 
-}  // namespace risley::simulation
+}  // namespace risley::scenes

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-#include "risley/simulation/scene.hpp"
+#include "risley/scenes/scene.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -16,7 +16,7 @@
 
 #include "sensors/yaml_map.hpp"
 
-namespace risley::simulation {
+namespace risley::scenes {
 namespace {
 
 using sensors::fail_at;
@@ -178,4 +178,4 @@ Scene parse_scene(const std::string& text, const std::string& path) {
 
 Scene load_scene(const std::string& path) { return parse_scene(read_text_file(path), path); }
 
-}  // namespace risley::simulation
+}  // namespace risley::scenes
