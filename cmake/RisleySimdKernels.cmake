@@ -35,3 +35,4 @@ endfunction()
 
 risley_add_kernels(optics)
 risley_add_kernels(estimation)
+risley_add_kernels(calibration)

@@ -47,6 +47,7 @@ Run declare_convert(CLI::App& verb);
 Run declare_simulate(CLI::App& verb);
 Run declare_estimate(CLI::App& verb);
 Run declare_observability(CLI::App& verb);
+Run declare_calibrate(CLI::App& verb);
 
 /// The user pressed Ctrl-C, or the system asked to end.
 class Interrupted : public std::runtime_error {

@@ -301,12 +301,7 @@ void write_folder(const EstimateCommandOptions& options, const CommonOptions& co
                   const RecordingInput& input, const sensors::Sensor& nominal,
                   const Outcome& outcome) {
   namespace fs = std::filesystem;
-  const std::vector<std::pair<std::string, std::string>> provenance = {
-      {"command", common.command},
-      {"version", RISLEY_VERSION},
-      {"seed", std::to_string(common.seed)},
-      {"input", options.input},
-      {"input_sha256", sha256_of_file(options.input)}};
+  const auto provenance = provenance_of(common, {options.input});
   const auto path = [&](const char* name) { return (fs::path(options.folder) / name).string(); };
   if (outcome.estimate.converged) {
     sensors::Sensor calibrated = outcome.estimate.sensor;
@@ -334,14 +329,7 @@ void check_options(const EstimateCommandOptions& options) {
     throw InvalidArgument(
         "--states all needs --rate-hz full: the filter has states at the shots it uses only");
   }
-  if (options.folder.empty()) return;
-  std::error_code code;
-  std::filesystem::create_directories(options.folder, code);
-  if (code || !std::filesystem::is_directory(options.folder)) {
-    throw FileError(
-        options.folder, {},
-        fmt::format("cannot be made a folder: {}", code ? code.message() : "a file has this name"));
-  }
+  if (!options.folder.empty()) make_result_folder(options.folder);
 }
 
 ExitStatus run_estimate(const EstimateCommandOptions& options, const CommonOptions& common) {
@@ -349,7 +337,7 @@ ExitStatus run_estimate(const EstimateCommandOptions& options, const CommonOptio
   check_options(options);
   std::optional<double> rate;
   if (options.rate() != "full") rate = positive_number(options.rate(), "--rate-hz", "Hz");
-  RecordingInput input = read_recording(options.input, rate, common);
+  RecordingInput input = read_recording(options.input, {rate}, common);
   const estimation::EstimateOptions settings = estimate_options(options, input.reader->header());
   const estimation::SelectionCounts& counts = input.selector.counts();
   spdlog::debug(

@@ -2,10 +2,13 @@
 // SPDX-License-Identifier: MIT
 #include "estimation_input.hpp"
 
+#include <filesystem>
+
 #include <fmt/format.h>
 
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
+#include "risley/core/output_file.hpp"
 #include "risley/sensors/preset.hpp"
 
 namespace risley::app {
@@ -32,10 +35,11 @@ sensors::Sensor sensor_of_recording(const recordings::RecordingHeader& header) {
 
 }  // namespace
 
-RecordingInput read_recording(const std::string& path, std::optional<double> rate,
+RecordingInput read_recording(const std::string& path,
+                              const estimation::SelectionOptions& selection,
                               const CommonOptions& common) {
   const double started = now();
-  RecordingInput result{recordings::open_recording(path), {}, estimation::ShotSelector({rate})};
+  RecordingInput result{recordings::open_recording(path), {}, estimation::ShotSelector(selection)};
   if (result.reader->header().devices.size() > 1) {
     throw InvalidArgument(
         fmt::format("{} holds {} sensors, an estimation takes the recording of one", path,
@@ -52,6 +56,29 @@ RecordingInput read_recording(const std::string& path, std::optional<double> rat
   result.audit = audit.result();
   result.seconds = now() - started;
   return result;
+}
+
+std::vector<std::pair<std::string, std::string>> provenance_of(
+    const CommonOptions& common, const std::vector<std::string>& inputs) {
+  std::vector<std::pair<std::string, std::string>> result = {{"command", common.command},
+                                                             {"version", RISLEY_VERSION},
+                                                             {"seed", std::to_string(common.seed)}};
+  for (std::size_t i = 0; i < inputs.size(); ++i) {
+    const std::string name = i == 0 ? "input" : fmt::format("input_{}", i + 1);
+    result.emplace_back(name, inputs[i]);
+    result.emplace_back(name + "_sha256", sha256_of_file(inputs[i]));
+  }
+  return result;
+}
+
+void make_result_folder(const std::string& folder) {
+  std::error_code code;
+  std::filesystem::create_directories(folder, code);
+  if (code || !std::filesystem::is_directory(folder)) {
+    throw FileError(
+        folder, {},
+        fmt::format("cannot be made a folder: {}", code ? code.message() : "a file has this name"));
+  }
 }
 
 estimation::EstimateOptions estimate_options(

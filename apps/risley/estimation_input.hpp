@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "risley/estimation/angle_series.hpp"
@@ -25,9 +26,16 @@ struct RecordingInput {
 };
 
 /// Reads all of a recording of one sensor.
-/// @param rate  shots per second to keep, Hz; empty keeps all
-RecordingInput read_recording(const std::string& path, std::optional<double> rate,
+RecordingInput read_recording(const std::string& path,
+                              const estimation::SelectionOptions& selection,
                               const CommonOptions& common);
+
+/// {"command", ...}, {"version", ...}, {"seed", ...}, and file and SHA-256 of every input.
+std::vector<std::pair<std::string, std::string>> provenance_of(
+    const CommonOptions& common, const std::vector<std::string>& inputs);
+
+/// Makes a folder for results, before an hour of computing. @throws FileError
+void make_result_folder(const std::string& folder);
 
 /// What the user says about sensor and parameters, as typed.
 struct EstimationWishes {

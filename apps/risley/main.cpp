@@ -42,6 +42,11 @@ constexpr Verb kVerbs[] = {
      "  risley observability --sensor mid-40 --duration-s 30 --rate-hz 100000\n"
      "  risley observability recording.lvx --free wedge_angle_deg",
      declare_observability},
+    {"calibrate", "The sensor's parameters from scans of plane walls",
+     "  risley calibrate wall.lvx -o calibration/\n"
+     "  risley calibrate upright.lvx flipped.lvx --stations stations.yaml -o calibration/\n"
+     "  risley calibrate --plan hall.yaml --duration-s 30",
+     declare_calibrate},
 };
 
 void add_common_options(CLI::App& verb, CommonOptions& common) {

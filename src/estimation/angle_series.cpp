@@ -44,6 +44,7 @@ void AngleSeries::append(const AngleSeries& other, std::size_t row) {
   zenith.push_back(other.zenith[row]);
   azimuth_rounding_variance.push_back(other.azimuth_rounding_variance[row]);
   zenith_rounding_variance.push_back(other.zenith_rounding_variance[row]);
+  if (!other.range.empty()) range.push_back(other.range[row]);
 }
 
 AngleSeries rows_of(const AngleSeries& series, std::size_t begin, std::size_t end) {
@@ -107,6 +108,7 @@ void ShotSelector::add(const recordings::Observations& o) {
     series.zenith.push_back(o.zenith[i]);
     series.azimuth_rounding_variance.push_back(variance(o.azimuth_resolution[i]));
     series.zenith_rounding_variance.push_back(variance(o.zenith_resolution[i]));
+    if (options_.ranges) series.range.push_back(o.range[i]);
   };
   Ticks ticks(options_.rate.value_or(1.0), tick_origin_, next_tick_);
   for (std::size_t i = 0; i < o.size(); ++i) {

@@ -17,6 +17,7 @@
 #include "risley/estimation/rotor_track.hpp"
 #include "risley/estimation/smoother.hpp"
 
+#include "estimation/normal_equations_kernel.hpp"
 #include "estimation/residual_model.hpp"
 
 namespace risley::estimation {
@@ -185,6 +186,37 @@ double unit_variance(const AngleSeries& series, double angle_noise, std::span<co
   return count > 0 ? sum / count : std::numeric_limits<double>::quiet_NaN();
 }
 
+/// Sum over the knots of what their shots tell of the angles [prisms, prisms].
+Eigen::MatrixXd shared_angle_information(const NormalEquations& equations) {
+  const auto prisms = static_cast<Eigen::Index>(equations.prisms);
+  const std::size_t pairs = equations.curvature.size() / equations.knots() / kTimePowers;
+  Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(prisms, prisms);
+  for (std::size_t knot = 0; knot < equations.knots(); ++knot) {
+    const double* entry = equations.curvature.data() + knot * pairs * kTimePowers;
+    for (Eigen::Index k = 0; k < prisms; ++k) {
+      for (Eigen::Index l = k; l < prisms; ++l, entry += kTimePowers) sum(k, l) += *entry;
+    }
+  }
+  return sum.selfadjointView<Eigen::Upper>();
+}
+
+/// Mean over the knots of d rotation angles / d parameters [prisms, free].
+/// @param sensitivity  of all states [knots][states][free]
+Eigen::MatrixXd mean_angle_sensitivity(const std::vector<double>& sensitivity,
+                                       const RotorTrajectory& knots, std::size_t free) {
+  const auto states = static_cast<std::size_t>(knots.states());
+  Eigen::MatrixXd mean = Eigen::MatrixXd::Zero(knots.prisms, static_cast<Eigen::Index>(free));
+  for (std::size_t knot = 0; knot < knots.size(); ++knot) {
+    for (Eigen::Index k = 0; k < mean.rows(); ++k) {
+      const std::size_t row = knot * states + static_cast<std::size_t>(k) * kStatesPerRotor;
+      for (Eigen::Index j = 0; j < mean.cols(); ++j) {
+        mean(k, j) += sensitivity[row * free + static_cast<std::size_t>(j)];
+      }
+    }
+  }
+  return mean / static_cast<double>(knots.size());
+}
+
 }  // namespace
 
 BatchMapResult run_batch_map(const AngleSeries& series, const Start& start,
@@ -287,6 +319,9 @@ BatchMapResult run_batch_map(const AngleSeries& series, const Start& start,
     result.covariance = std::move(solution.parameter_covariance);
     result.information = std::move(solution.parameter_information);
     full.knots().covariance = std::move(solution.state_covariance);
+    result.angle_sensitivity =
+        mean_angle_sensitivity(solution.sensitivity, full.knots(), options.free.size());
+    result.angle_information = shared_angle_information(full.equations());
     break;
   }
   result.train = full.train();

@@ -11,13 +11,9 @@
 #include "risley/core/angle.hpp"
 #include "risley/report/number_text.hpp"
 
-#pragma GCC diagnostic push
-#pragma GCC diagnostic ignored "-Woverlength-strings"  // Chart.js is one string
-#include "report/chart_js.hpp"
-#pragma GCC diagnostic pop
 #include "report/charts.hpp"
 #include "report/html.hpp"
-#include "report/page_assets.hpp"
+#include "report/page_parts.hpp"
 
 namespace risley::report {
 namespace {
@@ -29,60 +25,27 @@ using estimation::RotorStates;
 constexpr std::size_t kMostPoints = 4000;     // per scatter diagram
 constexpr std::size_t kMostMapPoints = 9000;  // of the scan pattern
 constexpr double kPatternDuration = 0.09;     // s, as in the paper's figures of the pattern
-constexpr double kFarOff = 3.0;               // errors beyond so many sigmas stand out
 
-/// "Δφ_L0" with a lowered index.
-std::string symbol_html(const std::string& symbol) {
-  const std::size_t underscore = symbol.find('_');
-  if (underscore == std::string::npos) return escape_html(symbol);
-  return fmt::format("{}<sub>{}</sub>", escape_html(symbol.substr(0, underscore)),
-                     escape_html(symbol.substr(underscore + 1)));
-}
-
-std::string parameter_head(const ParameterInfo& parameter) {
-  return fmt::format("<th scope=\"row\">{}, {}<span class=\"name\">{}</span></th>",
-                     escape_html(parameter.long_name), symbol_html(parameter.symbol),
-                     escape_html(parameter.name));
-}
-
-std::string list_html(const std::vector<std::string>& items) {
-  std::string html = "<ul>";
-  for (const std::string& item : items) html += fmt::format("<li>{}</li>", escape_html(item));
-  return html + "</ul>";
-}
-
-std::string verdict_html(const EstimatePageInput& input) {
+Verdict verdict_of(const EstimatePageInput& input) {
   const Estimate& e = input.estimate;
-  std::vector<std::string> warnings = e.warnings;
-  warnings.insert(warnings.end(), input.warnings.begin(), input.warnings.end());
-  const std::string facts = fmt::format(
+  Verdict verdict;
+  verdict.converged = e.converged;
+  verdict.reason = e.reason;
+  verdict.warnings = e.warnings;
+  verdict.warnings.insert(verdict.warnings.end(), input.warnings.begin(), input.warnings.end());
+  verdict.facts = fmt::format(
       "What is left unexplained is {:.3g}° in azimuth and {:.3g}° in zenith (root mean square); "
-      "noise "
-      "and rounding alone would leave {:.3g}°. {} of {} shots were left out as outliers.",
+      "noise and rounding alone would leave {:.3g}°. {} of {} shots were left out as outliers.",
       degrees_from_radians(e.azimuth_residuals.rms), degrees_from_radians(e.zenith_residuals.rms),
       degrees_from_radians(e.expected_residual), e.outliers, e.series.size());
-  std::string kind = "ok", title = "Healthy: the model describes this recording.", advice;
-  if (!e.converged) {
-    kind = "bad";
-    title = "Not converged: do not use these numbers.";
-    advice = fmt::format(
-        "<p><b>Why:</b> {}</p><p><b>What to do:</b> check that --sensor is the instrument that "
-        "recorded, that --noise-angle-deg is its noise, and whether the file has the sign of the "
-        "elevation turned (--mirror yes); a longer recording or --rate-hz full gives the "
-        "estimation more to hold on to.</p>",
-        escape_html(e.reason));
-  } else if (!warnings.empty()) {
-    kind = "care";
-    title = "Converged: usable, with care.";
-    advice = list_html(warnings);
-  } else {
-    advice =
-        "<p><b>What to do:</b> nothing. Any command takes <code>calibration.yaml</code> with "
-        "<code>--sensor</code>.</p>";
-  }
-  if (!e.converged && !warnings.empty()) advice += list_html(warnings);
-  return fmt::format("<section class=\"verdict {}\"><strong>{}</strong><p>{}</p>{}</section>\n",
-                     kind, escape_html(title), escape_html(facts), advice);
+  verdict.healthy = "Healthy: the model describes this recording.";
+  verdict.mend_html =
+      "check that --sensor is the instrument that recorded, that --noise-angle-deg is its noise, "
+      "and whether the file has the sign of the elevation turned (--mirror yes); a longer "
+      "recording or --rate-hz full gives the estimation more to hold on to.";
+  verdict.use_html =
+      "nothing. Any command takes <code>calibration.yaml</code> with <code>--sensor</code>.";
+  return verdict;
 }
 
 std::string subject_text(const EstimatePageInput& input) {
@@ -195,44 +158,7 @@ std::string variance_html(const Estimate& e) {
       e.map->unit_variance, e.map->autocorrelation.factor, e.map->variance_factor);
 }
 
-std::string correlation_html(const Estimate& e) {
-  const auto& free = e.free;
-  if (free.empty()) return "";
-  std::string html =
-      "<h2>Correlations of the parameters</h2>\n<div class=\"wide\">"
-      "<table class=\"heat\"><thead><tr><th></th>";
-  std::vector<const ParameterInfo*> infos;
-  for (const auto& parameter : free) {
-    infos.push_back(&find_parameter(parameter.name, e.sensor.prisms()));
-    html += fmt::format("<th scope=\"col\">{}</th>", symbol_html(infos.back()->symbol));
-  }
-  html += "</tr></thead><tbody>\n";
-  const Eigen::MatrixXd& covariance = e.covariance;
-  for (Eigen::Index i = 0; i < covariance.rows(); ++i) {
-    html += fmt::format("<tr>{}", parameter_head(*infos[static_cast<std::size_t>(i)]));
-    for (Eigen::Index j = 0; j < covariance.cols(); ++j) {
-      double r = covariance(i, j) / std::sqrt(covariance(i, i) * covariance(j, j));
-      if (std::abs(r) < 0.005) r = 0;  // not "-0.00"
-      html += fmt::format("<td style=\"background:rgba(var(--{}),{:.2f})\">{:.2f}</td>",
-                          r < 0 ? "minus" : "plus", 0.75 * std::min(std::abs(r), 1.0), r);
-    }
-    html += "</tr>\n";
-  }
-  return html +
-         "</tbody></table></div>\n<p class=\"note\">Blue: the two rise together. Red: one "
-         "rises where the other falls. Near ±1 only their sum or difference is well "
-         "known.</p>\n";
-}
-
-std::string provenance_html(const EstimatePageInput& input) {
-  std::string html = "<h2>How to make it again</h2>\n<dl>\n";
-  for (const auto& [name, value] : input.provenance) {
-    html += fmt::format("<dt>{}</dt><dd>{}</dd>\n", escape_html(name), escape_html(value));
-  }
-  return html + "</dl>\n";
-}
-
-/// All diagrams of the page in one numbering.
+/// All diagrams of the page.
 class ChartPage {
  public:
   explicit ChartPage(const EstimatePageInput& input)
@@ -243,7 +169,7 @@ class ChartPage {
         zenith_(input.estimate.map ? input.estimate.map->zenith_residual : states_.zenith_residual),
         outlier_(input.estimate.map ? input.estimate.map->outlier : states_.outlier) {}
 
-  std::string data() const { return "[" + data_ + "]"; }
+  const Figures& figures() const { return figures_; }
 
   std::string residuals() {
     const Estimate& e = input_.estimate;
@@ -299,11 +225,7 @@ class ChartPage {
   }
 
  private:
-  std::string figure(const Chart& chart) {
-    if (number_ > 0) data_ += ",\n";
-    data_ += chart_json(chart, number_);
-    return figure_html(chart, number_++);
-  }
+  std::string figure(const Chart& chart) { return figures_.add(chart); }
 
   static std::string letter(std::size_t rotor) {
     return std::string(1, prism_letter(static_cast<int>(rotor)));
@@ -400,36 +322,23 @@ class ChartPage {
   const RotorStates& states_;
   const std::vector<double>&azimuth_, &zenith_;  // residuals of all shots
   const std::vector<unsigned char>& outlier_;
-  std::string data_;
-  std::size_t number_ = 0;
+  Figures figures_;
 };
 
 }  // namespace
 
 std::string estimate_page(const EstimatePageInput& input) {
+  const Estimate& e = input.estimate;
   ChartPage charts(input);
-  const std::string title = "risley estimate: " + input.recording;
-  std::string page = fmt::format(
-      "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
-      "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
-      "<title>{}</title>\n<style>\n{}</style>\n</head>\n<body>\n<main>\n<h1>{}</h1>\n"
-      "<p class=\"lead\">{}</p>\n",
-      escape_html(title), page_style(), escape_html(title), escape_html(subject_text(input)));
-  page += verdict_html(input);
-  page += parameters_html(input);
-  page += "<h2>Rotors</h2>\n" + charts.rotors();
-  page += "<h2>Residuals</h2>\n" + moments_html(input.estimate) + variance_html(input.estimate) +
-          charts.residuals();
-  page += "<h2>Scan pattern</h2>\n" + charts.pattern();
-  page += correlation_html(input.estimate);
-  page += provenance_html(input);
-  page += "</main>\n<script>";
-  page += kChartJs;
-  page += "</script>\n<script type=\"application/json\" id=\"page-data\">\n" + charts.data();
-  page += "\n</script>\n<script>\n";
-  page += page_script();
-  page += "</script>\n</body>\n</html>\n";
-  return page;
+  std::string body = verdict_html(verdict_of(input));
+  body += parameters_html(input);
+  body += "<h2>Rotors</h2>\n" + charts.rotors();
+  body += "<h2>Residuals</h2>\n" + moments_html(e) + variance_html(e) + charts.residuals();
+  body += "<h2>Scan pattern</h2>\n" + charts.pattern();
+  body += correlation_html(e.free, e.covariance, e.sensor.prisms());
+  body += provenance_html(input.provenance);
+  return page_html("risley estimate: " + input.recording, subject_text(input), body,
+                   charts.figures());
 }
 
 }  // namespace risley::report

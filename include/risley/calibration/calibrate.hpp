@@ -1,0 +1,132 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "risley/calibration/datum.hpp"
+#include "risley/calibration/planar_adjustment.hpp"
+#include "risley/calibration/plane_points.hpp"
+#include "risley/core/progress.hpp"
+#include "risley/estimation/weak_directions.hpp"
+#include "risley/scenes/scene.hpp"
+#include "risley/sensors/sensor.hpp"
+
+namespace risley::calibration {
+
+/// How a calibration is made.
+enum class CalibrationMethod {
+  adjustment,  ///< Gauss-Helmert adjustment of all recordings together: adjust()
+  paper,       ///< unweighted point-to-plane distances, SVD planes                [B21 Eq. (32)]
+};
+
+/// Formal sigma of the shared rotation above which a user is warned, rad (0.05 degree).
+inline constexpr double kPoorDatum = 8.7266462599716477e-4;
+
+/// A direction of the parameter space wider than this after the data makes a calibration fail, in
+/// prior sigmas of the parameters (1 degree, 0.01 in an index).
+inline constexpr double kWidestDirection = 0.5;
+
+struct CalibrationOptions {
+  CalibrationMethod method = CalibrationMethod::adjustment;
+  sensors::Sensor sensor;               ///< noise, geometry, name; its errors are not used
+  /// Default free parameters to hold, at the believed value or at one that is given, SI units.
+  std::vector<std::pair<std::string, std::optional<double>>> fixed;
+  std::vector<std::string> additional;  ///< further parameters to free
+  std::optional<double> range_noise;    ///< 1 sigma, m, default the sensor's
+  std::optional<double> prior_sigma;    ///< of every free angle about the believed value, rad
+  double range_offset_sigma = 0.05;     ///< prior of the range offset, m; 0 holds it at 0
+  bool beam_origin = true;              ///< beams start where they leave the last prism
+  std::optional<scenes::Scene> planes;  ///< known normals, as seen from the scene's origin
+  /// The station of each recording [recordings]; empty: unknown poses, or the origin of the scene
+  /// where planes are given.
+  std::vector<scenes::Station> stations;
+  std::uint64_t seed = 0;               ///< of the search for planes
+};
+
+/// One wall in one recording.
+struct CalibratedPlane {
+  std::string name;
+  std::size_t recording = 0;
+  Vector3<double> normal;  ///< sensor frame
+  double distance = 0;     ///< from the sensor's origin, m
+  std::size_t points = 0;
+  /// Shots that lie near the plane (within ten sigmas) and were not used.
+  std::size_t outliers = 0;
+  double rms = 0;         ///< of point-to-plane distances after the calibration, m
+  double rms_before = 0;  ///< the same with the believed parameters and a plane fitted to them, m
+  double range_sigma = 0;  ///< of one range, found by variance components, m
+};
+
+/// A compact region that stands off its plane by a constant step.
+struct SurfaceStep {
+  std::size_t recording = 0, plane = 0;  ///< row of Calibration::planes
+  double height = 0;                     ///< m, positive away from the sensor
+  double azimuth = 0, zenith = 0;        ///< middle of the region, rad, sensor frame
+  double size = 0;                       ///< square root of the solid angle it fills, rad
+  std::size_t points = 0;
+};
+
+/// Mean distance from the plane over a variable, before and after.
+struct ThicknessProfile {
+  std::string variable;  ///< "incidence", "rotation_angle_a", ...
+  std::vector<double> from, to;                     ///< bin edges, rad
+  std::vector<std::size_t> count;                   ///< [bins]
+  std::vector<double> rms_before, rms_after;        ///< [bins], m; NaN in an empty bin
+  std::vector<double> mean_before, mean_after;      ///< [bins], m; NaN in an empty bin
+};
+
+/// One point of a cloud for pictures.
+struct SamplePoint {
+  std::size_t recording = 0;
+  int plane = -1;  ///< row of Calibration::planes, -1: none
+  Vector3<double> point;  ///< sensor frame, m, after the calibration
+  double before = 0, after = 0;  ///< distance from the plane, m; NaN without a plane
+  double azimuth = 0, zenith = 0;  ///< of the beam after the calibration, rad
+};
+
+/// Everything one calibration found.
+struct Calibration {
+  bool converged = false;
+  std::string reason;                 ///< why not; empty when converged
+  std::vector<std::string> warnings;
+  CalibrationMethod method = CalibrationMethod::adjustment;
+  sensors::Sensor sensor;             ///< calibrated, with covariance
+  PrismTrain believed{parse_face_order("PA-AP")};  ///< what the sensor computed directions with
+  std::vector<estimation::FreeParameter> free;
+  Eigen::VectorXd parameters;         ///< [free], SI
+  Eigen::MatrixXd covariance;         ///< [free, free], everything included
+  double range_offset = 0, range_offset_sigma = 0;  ///< m; sigma 0 where it was held
+  std::vector<CalibratedPlane> planes;
+  std::vector<SurfaceStep> steps;
+  DatumKind datum_kind = DatumKind::none;
+  FormalDatum datum;                  ///< after
+  FormalDatum datum_without_common;   ///< without the common errors of the rotation angles
+  std::vector<estimation::WeakDirection> unobservable;
+  std::vector<PriorTest> prior_tests;
+  double sigma0 = 0;      ///< standard deviation of unit weight against the stated range noise
+  double unevenness = 1;  ///< chi2 per cell of mean residuals over 1 degree: 1 for flat walls
+  double variance_factor = 1;  ///< by which the covariance was enlarged for uneven walls
+  int iterations = 0;  ///< of the longest adjustment, the one that starts from the believed values
+  /// What the recordings together say of the believed parameters moves the rotation angles of each
+  /// by this [recordings][prisms], rad.
+  std::vector<std::vector<double>> angle_shift;
+  double rms_before = 0, rms_after = 0;  ///< over all planes, m
+  std::size_t points = 0;                ///< used
+  std::vector<ThicknessProfile> profiles;
+  std::vector<SamplePoint> sample;       ///< at most 20,000 shots, evenly spread
+};
+
+/// Calibrates a sensor on the walls that its recordings saw.
+/// @throws EstimationError when there is nothing to calibrate on: no plane, points on one line,
+///         recordings of different sensors, stations or planes that contradict the data
+/// @throws InvalidArgument for unknown parameters or stations that do not match the recordings
+Calibration calibrate(const std::vector<RangedRecording>& recordings,
+                      const CalibrationOptions& options, const Progress& progress = {});
+
+}  // namespace risley::calibration

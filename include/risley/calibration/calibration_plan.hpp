@@ -1,0 +1,67 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "risley/calibration/datum.hpp"
+#include "risley/estimation/weak_directions.hpp"
+#include "risley/scenes/scene.hpp"
+#include "risley/sensors/sensor.hpp"
+
+namespace risley::calibration {
+
+/// A calibration that somebody thinks of making.
+struct CalibrationPlan {
+  sensors::Sensor sensor;
+  /// Walls, and the stations to scan them from; without stations one scan from the origin. Normals
+  /// with a sigma_deg are known, and so are rotations of stations when stations_known.
+  scenes::Scene scene;
+  bool stations_known = true;
+  double duration = 10.0;             ///< of every recording, s
+  std::optional<double> rate;         ///< shots per second, default the sensor's
+  std::optional<double> range_noise;  ///< 1 sigma, m, default the sensor's
+  std::optional<double> prior_sigma;  ///< of every free angle, rad
+  double range_offset_sigma = 0.05;   ///< m
+  bool beam_origin = true;
+  std::vector<std::string> fixed, additional;  ///< parameters
+};
+
+/// What one wall gives.
+struct PlannedWall {
+  std::string name, station;
+  double share = 0;              ///< of the station's shots
+  double mean_incidence = 0;     ///< rad
+  double mean_range = 0;         ///< m
+};
+
+/// What it will reach.
+struct CalibrationForecast {
+  std::vector<estimation::FreeParameter> free;
+  Eigen::MatrixXd covariance;    ///< [free, free], SI
+  double range_offset_sigma = 0;  ///< m
+  DatumKind datum_kind = DatumKind::none;
+  FormalDatum datum;
+  std::vector<estimation::WeakDirection> unobservable;
+  std::vector<PlannedWall> walls;
+  double shots = 0;              ///< with a return, of all recordings
+  std::vector<std::string> advice;  ///< what would make it better, in words
+};
+
+/// Cramer-Rao bound of the calibration: the normal equations of the default method at the sensor's
+/// parameters for shots that meet the scene, noise alone. Uneven walls and wrong indices come on
+/// top. A sample of the shots stands for all.
+/// @throws EstimationError when no shot meets a wall; InvalidArgument
+CalibrationForecast forecast(const CalibrationPlan& plan);
+
+/// Free parameters of a calibration: what walls can tell, less the fixed ones plus the others. The
+/// refractive index is held unless asked for, since the recording itself tells it better.
+std::vector<estimation::FreeParameter> calibration_parameters(
+    int prisms, const std::vector<std::string>& fixed, const std::vector<std::string>& additional);
+
+}  // namespace risley::calibration

@@ -1,0 +1,55 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "risley/core/vector3.hpp"
+#include "risley/estimation/free_parameters.hpp"
+#include "risley/optics/prism_train.hpp"
+
+namespace risley::calibration {
+
+/// Errors of directions, split into the rotation that all beams share (the gauge: only a datum from
+/// outside can see it) and what is left (the shape of the bundle of beams, which walls do see).
+struct DirectionErrors {
+  double azimuth_rmse = 0, zenith_rmse = 0;  ///< rad
+  double azimuth_bias = 0, zenith_bias = 0;  ///< mean, rad
+  double total = 0;                          ///< sqrt(azimuth_rmse^2 + zenith_rmse^2), rad
+  double gauge = 0;  ///< RMS over the beams of the best-fitting rigid rotation, rad
+  double shape = 0;  ///< RMS of what is left, rad
+  Vector3<double> rotation;  ///< the best-fitting one: roll, pitch, yaw about X, Y, Z, rad
+};
+
+/// @param computed, truth  unit vectors of the same beams; pairs with a NaN are left out
+DirectionErrors direction_errors(std::span<const Vector3<double>> computed,
+                                 std::span<const Vector3<double>> truth);
+
+/// What a covariance of parameters means for the beams.
+struct FormalDatum {
+  double sigma_roll = 0, sigma_pitch = 0, sigma_yaw = 0;  ///< of the shared rotation, rad
+  double gauge = 0, shape = 0, total = 0;                 ///< expected RMS over the beams, rad
+};
+
+/// Propagates a covariance to a bundle of beams.
+/// @param rotation_angles  [prisms][beams], rad
+FormalDatum formal_datum(const PrismTrain& train,
+                         const std::vector<estimation::FreeParameter>& free,
+                         const Eigen::MatrixXd& covariance,
+                         const std::vector<std::vector<double>>& rotation_angles);
+
+/// What ties the frame of the calibrated beams to the outside.
+enum class DatumKind {
+  none,      ///< walls of unknown orientation: boresight only through the bundle's shape
+  planes,    ///< normals of walls known in the sensor's frame
+  stations,  ///< rotations of the sensor between recordings known
+  both,
+};
+
+/// "walls only", "known planes", "known stations", "known planes and stations".
+const char* to_string(DatumKind kind);
+
+}  // namespace risley::calibration

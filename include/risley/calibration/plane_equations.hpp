@@ -1,0 +1,73 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "risley/calibration/plane_points.hpp"
+#include "risley/core/plane.hpp"
+#include "risley/optics/batch.hpp"
+
+namespace risley::calibration {
+
+/// Where the range of every shot is predicted from: the sensor's optics and one plane.
+struct PlaneView {
+  PrismTrain train{parse_face_order("PA-AP")};
+  PrismGeometry geometry;
+  std::vector<int> places;    ///< of the flat parameter vector: those to differentiate by
+  double range_offset = 0;    ///< what the sensor adds to a true range, m
+  double range_variance = 0;  ///< of one range, rounding included, m^2
+  Plane plane;                ///< sensor frame
+  Vector3<double> tangent_1, tangent_2;  ///< unit vectors that make an orthogonal triad with normal
+};
+
+/// Columns of the normal equations of one plane.
+///   0 .. places-1    parameters of the train, in the order of PlaneView::places
+///   + rotor          rotation angle of that rotor, the same shift at every shot
+///   + prisms         range offset
+///   + prisms + 1, 2  normal towards tangent 1 and 2, rad
+///   + prisms + 3     distance of the plane
+struct PlaneColumns {
+  int places = 0, prisms = 0;
+  int rotation_angle(int rotor) const { return places + rotor; }
+  int range_offset() const { return places + prisms; }
+  int normal(int tangent) const { return places + prisms + 1 + tangent; }
+  int distance() const { return places + prisms + 3; }
+  int size() const { return places + prisms + 4; }
+};
+
+/// Sums over the shots of one plane.
+struct PlaneEquations {
+  Eigen::MatrixXd hessian;   ///< [columns, columns], J^T W J
+  Eigen::VectorXd gradient;  ///< [columns], J^T W residual
+  double cost = 0;           ///< sum of squared residuals over their variances
+  std::size_t shots = 0;     ///< that were used
+  std::size_t lost = 0;      ///< whose beam does not meet the plane in front of the sensor
+};
+
+/// Residuals of single shots; empty spans are not written. A lost shot is NaN.
+struct ResidualColumns {
+  std::span<double> residual;  ///< measured minus predicted range, m
+  std::span<double> variance;  ///< of the residual, m^2
+};
+
+/// Residual and derivatives of every shot, summed up. The residual of a shot is its range less the
+/// one predicted from plane, optics and rotation angles,
+///   r = (d - n.o) / (n.L)
+/// with beam origin o and direction L, so the derivatives hold the predicted range. (Eq. 32's
+/// point-to-plane distances hold the measured one; its noise then biases the solution.) The variance
+/// of a residual is that of the range plus what the covariance of the rotation angles makes of it,
+/// which grows with the angle of incidence: the Gauss-Helmert model with the condition solved for
+/// the range. The derivative of the beam's origin is left out: it is a thousandth of the rest, and
+/// the residuals themselves are exact. docs/theory/calibration.md
+/// The sums do not depend on the number of threads.
+/// @param set  instruction set, for tests and benchmarks
+PlaneEquations plane_equations(const RangedShots& shots, const PlaneView& view,
+                               const ResidualColumns& columns = {},
+                               InstructionSet set = available_instruction_sets().back());
+
+}  // namespace risley::calibration

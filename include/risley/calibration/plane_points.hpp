@@ -1,0 +1,59 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "risley/core/vector3.hpp"
+#include "risley/estimation/estimate.hpp"
+
+namespace risley::calibration {
+
+/// Shots with a range, as columns of one length: what a calibration sees of a recording. A shot is a
+/// range and the rotation angles at which it was measured; the direction that the sensor reported
+/// plays no further part, so that its own calibration cannot bend the new one.
+struct RangedShots {
+  std::vector<std::vector<double>> rotation_angle;  ///< [prisms][shots], rad, within half a turn
+  /// Covariance of the rotation angles, upper triangle row by row [prisms (prisms+1)/2][shots],
+  /// rad^2.
+  std::vector<std::vector<float>> angle_covariance;
+  std::vector<double> range;  ///< m, as measured
+
+  std::size_t size() const { return range.size(); }
+  int prisms() const { return static_cast<int>(rotation_angle.size()); }
+  void resize(int prisms, std::size_t shots);
+  /// Copies one row of other shots to a row of these.
+  void set_row(std::size_t row, const RangedShots& from, std::size_t from_row);
+};
+
+/// One recording, ready to be calibrated with.
+struct RangedRecording {
+  std::string name;    ///< for messages: its file
+  std::string serial;  ///< of the sensor, empty when unknown
+  RangedShots shots;
+  std::vector<std::int64_t> time_ns;  ///< [shots]
+  sensors::Sensor believed;  ///< as estimated: what the sensor computes its directions with
+  /// What the estimate says of the believed parameters.
+  std::vector<estimation::FreeParameter> free;
+  Eigen::MatrixXd covariance;         ///< [free, free], SI units
+  Eigen::MatrixXd angle_sensitivity;  ///< [prisms, free], see BatchMapResult
+  Eigen::MatrixXd mean_angle_covariance;  ///< [prisms, prisms], rad^2, at given parameters
+  std::size_t without_range = 0;      ///< shots that had a direction and no range
+  std::size_t outliers = 0;           ///< shots whose reported direction was an outlier
+};
+
+/// Takes the shots that have a range and a sound direction out of an estimate.
+/// @param estimate  converged, by the batch estimator, of a series with ranges
+/// @throws EstimationError when it did not converge or has no ranges
+RangedRecording ranged_recording(const estimation::Estimate& estimate, std::string name,
+                                 std::string serial);
+
+/// At most so many shots, evenly spread. @return their rows
+std::vector<std::size_t> spread_rows(std::size_t shots, std::size_t most);
+
+}  // namespace risley::calibration

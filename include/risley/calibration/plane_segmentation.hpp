@@ -1,0 +1,69 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "risley/core/plane.hpp"
+#include "risley/core/vector3.hpp"
+
+namespace risley::calibration {
+
+/// How planes are told from clutter.
+struct SegmentationOptions {
+  double range_noise = 0.02;  ///< 1 sigma along the beam, m
+  /// 1 sigma of directions that are not calibrated yet, without the rotation that all share, rad.
+  double pointing_noise = 0;
+  double gate = 3.0;  ///< a point belongs to a plane within so many sigmas
+  std::size_t most_planes = 12;
+  /// A plane has at least so many points, and this part of all.
+  std::size_t least_points = 100;
+  double least_fraction = 0.03;
+  /// A plane fills at least this in its shorter extent, seen from the sensor, rad (1.5 degree): a
+  /// row of points is none. The extent is the width between the 5 % and 95 % quantiles across the
+  /// longer principal axis, over 0.9.
+  double least_extent = 0.026;
+  /// Points so near to an edge that noise decides which plane they are nearer to are clutter. Else
+  /// each of the planes lacks those that noise carried to the other one, which bends an adjustment
+  /// by about as much as noise does, more with more points. The planes themselves are always fitted
+  /// without them.
+  bool leave_out_edges = false;
+  std::uint64_t seed = 0;
+};
+
+/// Planes and the points that lie on them.
+struct Segmentation {
+  std::vector<Plane> planes;        ///< largest first, sensor frame
+  std::vector<int> label;           ///< [points], row of planes, -1 for clutter
+  std::vector<std::size_t> points;  ///< [planes]
+  /// The points fill no area: all of them, or all that are no strays, lie on a line or a narrow
+  /// strip, and there are no planes.
+  bool on_one_line = false;
+};
+
+/// 1 sigma of a point's distance from a plane: range noise counts along the normal, noise of the
+/// direction with the sine of the angle of incidence.
+double distance_sigma(const Plane& plane, const Vector3<double>& point,
+                      const SegmentationOptions& options);
+
+/// Finds flat surfaces in points around the origin: RANSAC for the largest plane, a fit to its
+/// points, the next one among the rest, and at the end every point to the plane it is nearest to,
+/// in sigmas, with new fits, until no label changes. A plane takes points only where it holds a
+/// share of those around, a few degrees wide; its extension elsewhere would take the tails of other
+/// planes' noise, all on one side. Planes that explain each other's points are one, and slices of a
+/// body, which hold less than half of the points around them, are none. Fits compare ranges, so
+/// that their noise does not bias the normal. Points that are not finite, or at the origin, are
+/// clutter. The result depends on points and options alone.
+/// @throws InvalidArgument for options that make no sense
+Segmentation segment_planes(std::span<const Vector3<double>> points,
+                            const SegmentationOptions& options);
+
+/// Plane that fits points best (smallest singular value), its normal away from the origin.
+/// @param use  rows of the points
+/// @throws EstimationError when there are fewer than three points or they lie on one line
+Plane fitted_plane(std::span<const Vector3<double>> points, std::span<const std::size_t> use);
+
+}  // namespace risley::calibration

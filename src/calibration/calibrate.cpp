@@ -1,0 +1,821 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "risley/calibration/calibrate.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <utility>
+
+#include <Eigen/Cholesky>
+#include <fmt/format.h>
+#include <tbb/parallel_for.h>
+
+#include "risley/calibration/calibration_plan.hpp"
+#include "risley/calibration/paper_adjustment.hpp"
+#include "risley/calibration/plane_segmentation.hpp"
+#include "risley/calibration/surface_steps.hpp"
+#include "risley/core/angle.hpp"
+#include "risley/core/error.hpp"
+
+#include "calibration/wall_matching.hpp"
+
+namespace risley::calibration {
+namespace {
+
+using Eigen::Index;
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+constexpr std::size_t kCoarseShots = 40000;  // of all recordings together, to find the planes with
+constexpr std::size_t kBundleBeams = 4000;   // for formal sigmas of the beams
+constexpr std::size_t kSampleShots = 20000;  // for pictures
+constexpr int kCoarseRounds = 5;
+constexpr int kFullRounds = 2;
+/// A shot belongs to a plane within so many sigmas.
+constexpr double kGate = 3.0;
+/// Variance of a normal distribution cut off at the gate.
+constexpr double kVarianceWithinGate = 0.97334;
+constexpr double kNearby = 10.0;  // sigmas: what lies between this and the gate is an outlier
+/// Part of the rotation angles' sigma that a direction has: the sine of a prism's deflection.
+constexpr double kAngleLever = 0.17;
+/// How far directions may be bent before the first adjustment, 1 sigma.
+constexpr double kStartPointing = radians_from_degrees(0.1);
+constexpr double kLeastRangeSigma = 1e-7;  // m
+/// Mean chi2 per parameter above which recordings are of different sensors.
+constexpr double kMostDisagreement = 6.0;
+constexpr std::size_t kBlockShots = 65536;
+
+// ---- What the sensor believes -------------------------------------------------------------------
+
+/// The believed parameters as all recordings together tell them.
+struct Belief {
+  sensors::Sensor sensor;
+  std::vector<estimation::FreeParameter> free;
+  Eigen::MatrixXd covariance;
+  std::vector<std::vector<double>> angle_shift;  ///< [recordings][prisms]
+};
+
+void check_same_sensor(const std::vector<RangedRecording>& recordings) {
+  const RangedRecording& first = recordings.front();
+  for (const RangedRecording& other : recordings) {
+    if (!first.serial.empty() && !other.serial.empty() && first.serial != other.serial) {
+      throw InvalidArgument(
+          fmt::format("the recordings are of different sensors: {} of serial number {}, {} of {}",
+                      first.name, first.serial, other.name, other.serial));
+    }
+    if (first.believed.train.face_order() != other.believed.train.face_order() ||
+        first.believed.combination != other.believed.combination) {
+      throw InvalidArgument(fmt::format(
+          "the recordings are of different sensors: the rotors of {} and {} run differently",
+          first.name, other.name));
+    }
+  }
+}
+
+Belief pooled_belief(const std::vector<RangedRecording>& recordings) {
+  const RangedRecording& first = recordings.front();
+  const auto n = static_cast<Index>(first.free.size());
+  Belief belief{first.believed, first.free, first.covariance, {}};
+  const auto values = [n](const RangedRecording& recording) {
+    Eigen::VectorXd v(n);
+    for (Index j = 0; j < n; ++j) {
+      v[j] = recording.believed.train[recording.free[static_cast<std::size_t>(j)].places.front()];
+    }
+    return v;
+  };
+  Eigen::VectorXd mean = values(first);
+  if (recordings.size() > 1 && n > 0) {
+    Eigen::MatrixXd information = Eigen::MatrixXd::Zero(n, n);
+    Eigen::VectorXd weighted = Eigen::VectorXd::Zero(n);
+    for (const RangedRecording& recording : recordings) {
+      const Eigen::MatrixXd own =
+          recording.covariance.llt().solve(Eigen::MatrixXd::Identity(n, n));
+      information += own;
+      weighted += own * values(recording);
+    }
+    belief.covariance = information.llt().solve(Eigen::MatrixXd::Identity(n, n));
+    mean = belief.covariance * weighted;
+    for (const RangedRecording& recording : recordings) {
+      const Eigen::VectorXd off = values(recording) - mean;
+      const double chi2 =
+          off.dot((recording.covariance - belief.covariance).ldlt().solve(off)) /
+          static_cast<double>(n);
+      if (chi2 > kMostDisagreement) {
+        Index worst = 0;
+        off.cwiseAbs().cwiseQuotient(recording.covariance.diagonal().cwiseSqrt()).maxCoeff(&worst);
+        const ParameterInfo& info = find_parameter(
+            belief.free[static_cast<std::size_t>(worst)].name, belief.sensor.prisms());
+        throw EstimationError(fmt::format(
+            "the recordings are of different sensors, or of one whose stored calibration changed: "
+            "{} differs from the others' {} by {:.4g} {}",
+            recording.name, info.name, off[worst] / info.si_per_unit, info.unit));
+      }
+    }
+  }
+  for (Index j = 0; j < n; ++j) {
+    for (const int place : belief.free[static_cast<std::size_t>(j)].places) {
+      belief.sensor.train.set_place(place, mean[j]);
+    }
+  }
+  for (const RangedRecording& recording : recordings) {
+    const Eigen::VectorXd shift = recording.angle_sensitivity * (mean - values(recording));
+    belief.angle_shift.emplace_back(shift.data(), shift.data() + shift.size());
+  }
+  return belief;
+}
+
+// ---- Shots --------------------------------------------------------------------------------------
+
+/// Lines of sight of shots.
+struct Rays {
+  std::vector<double> x, y, z, origin_x, origin_y, origin_z;
+
+  Rays(const PrismTrain& train, const PrismGeometry& geometry, const RangedShots& shots) {
+    for (auto* column : {&x, &y, &z, &origin_x, &origin_y, &origin_z}) column->resize(shots.size());
+    tbb::parallel_for(std::size_t{0}, (shots.size() + kBlockShots - 1) / kBlockShots,
+                      [&](std::size_t block) {
+                        const std::size_t begin = block * kBlockShots;
+                        const std::size_t count = std::min(kBlockShots, shots.size() - begin);
+                        std::vector<std::span<const double>> angles;
+                        for (const auto& column : shots.rotation_angle) {
+                          angles.emplace_back(std::span(column).subspan(begin, count));
+                        }
+                        const auto part = [&](std::vector<double>& column) {
+                          return std::span(column).subspan(begin, count);
+                        };
+                        DirectionColumns out{part(x), part(y), part(z), {}, {}};
+                        out.origin_x = part(origin_x);
+                        out.origin_y = part(origin_y);
+                        out.origin_z = part(origin_z);
+                        out.geometry = geometry;
+                        observe_batch(train, angles, out);
+                      });
+  }
+  Vector3<double> direction(std::size_t i) const { return {x[i], y[i], z[i]}; }
+  Vector3<double> origin(std::size_t i) const { return {origin_x[i], origin_y[i], origin_z[i]}; }
+  Vector3<double> point(std::size_t i, double range) const {
+    return origin(i) + range * direction(i);
+  }
+};
+
+RangedShots rows_of(const RangedShots& shots, const std::vector<std::size_t>& rows) {
+  RangedShots result;
+  result.resize(shots.prisms(), rows.size());
+  for (std::size_t i = 0; i < rows.size(); ++i) result.set_row(i, shots, rows[i]);
+  return result;
+}
+
+/// Typical sigma of a direction that comes from the rotation angles' covariance, rad.
+double pointing_of_angles(const RangedShots& shots) {
+  double sum = 0;
+  const std::vector<std::size_t> rows = spread_rows(shots.size(), 2000);
+  for (const std::size_t row : rows) {
+    std::size_t entry = 0;
+    for (int k = 0; k < shots.prisms(); ++k) {
+      sum += static_cast<double>(shots.angle_covariance[entry][row]);
+      entry += static_cast<std::size_t>(shots.prisms() - k);
+    }
+  }
+  return kAngleLever * std::sqrt(sum / static_cast<double>(rows.size()));
+}
+
+/// Which view of its recording each shot belongs to.
+struct Labels {
+  std::vector<int> view;           ///< [shots], row of PlanarProblem::views, -1: none
+  std::vector<std::size_t> near;   ///< [views], shots near a plane that were left out
+};
+
+/// Every shot to the plane that explains its range best, in sigmas. Where two planes meet no range
+/// can tell them apart; shots there go to neither, and that is decided by the predicted ranges alone:
+/// a choice by the measured one would keep those whose noise points away from the other plane.
+Labels label_shots(const PlanarProblem& problem, std::size_t recording, const RangedShots& shots,
+                   double pointing) {
+  const Rays rays(problem.train, problem.geometry, shots);
+  Labels labels{std::vector<int>(shots.size(), -1),
+                std::vector<std::size_t>(problem.views.size(), 0)};
+  std::vector<std::pair<int, PlaneView>> planes;
+  for (std::size_t v = 0; v < problem.views.size(); ++v) {
+    if (problem.views[v].recording == recording) {
+      planes.emplace_back(static_cast<int>(v), plane_view(problem, v));
+    }
+  }
+  std::vector<int> closest(shots.size(), -1);
+  tbb::parallel_for(std::size_t{0}, (shots.size() + kBlockShots - 1) / kBlockShots,
+                    [&](std::size_t block) {
+                      const std::size_t end = std::min((block + 1) * kBlockShots, shots.size());
+                      std::vector<double> predicted(planes.size()), sigma(planes.size());
+                      std::size_t nearest = 0;
+                      for (std::size_t i = block * kBlockShots; i < end; ++i) {
+                        double best = kNearby;
+                        for (std::size_t p = 0; p < planes.size(); ++p) {
+                          const PlaneView& plane = planes[p].second;
+                          const Vector3<double> direction = rays.direction(i);
+                          const double range =
+                              hit_distance(plane.plane, rays.origin(i), direction);
+                          const double cosine = dot(plane.plane.normal, direction);
+                          const double across =
+                              pointing * range * std::sqrt(std::max(0.0, 1.0 - cosine * cosine)) /
+                              cosine;
+                          predicted[p] = range;
+                          sigma[p] = std::sqrt(plane.range_variance + across * across);
+                          const double off =
+                              std::abs(shots.range[i] - plane.range_offset - range) / sigma[p];
+                          if (range > 0 && off < best) {
+                            best = off;
+                            nearest = p;
+                          }
+                        }
+                        if (best == kNearby) continue;
+                        closest[i] = planes[nearest].first;
+                        bool edge = false;
+                        for (std::size_t p = 0; p < planes.size(); ++p) {
+                          edge = edge || (p != nearest &&
+                                          std::abs(predicted[p] - predicted[nearest]) <
+                                              kGate * (sigma[p] + sigma[nearest]));
+                        }
+                        if (edge) continue;
+                        if (best <= kGate) labels.view[i] = closest[i];
+                      }
+                    });
+  for (std::size_t i = 0; i < shots.size(); ++i) {
+    if (labels.view[i] < 0 && closest[i] >= 0) ++labels.near[static_cast<std::size_t>(closest[i])];
+  }
+  return labels;
+}
+
+/// Gives the views of one recording the shots that are labelled theirs.
+void hand_out(const RangedShots& shots, const std::vector<int>& view, std::size_t recording,
+              PlanarProblem& problem) {
+  std::vector<std::vector<std::size_t>> rows(problem.views.size());
+  for (std::size_t i = 0; i < view.size(); ++i) {
+    if (view[i] >= 0) rows[static_cast<std::size_t>(view[i])].push_back(i);
+  }
+  for (std::size_t v = 0; v < problem.views.size(); ++v) {
+    if (problem.views[v].recording != recording) continue;
+    problem.views[v].shots = std::make_shared<const RangedShots>(rows_of(shots, rows[v]));
+  }
+}
+
+/// Variance component of every view: what its residuals say of the range noise.
+void update_range_variances(PlanarSolution& solution) {
+  for (std::size_t v = 0; v < solution.chi2.size(); ++v) {
+    if (solution.redundancy[v] < 30) continue;
+    const double factor = solution.chi2[v] / solution.redundancy[v] / kVarianceWithinGate;
+    double& variance = solution.problem.views[v].range_variance;
+    variance = std::max(variance * factor, kLeastRangeSigma * kLeastRangeSigma);
+  }
+}
+
+// ---- The calibration ----------------------------------------------------------------------------
+
+/// Information of the priors on the free parameters.
+Eigen::MatrixXd prior_information(const PlanarProblem& problem) {
+  Eigen::VectorXd information(static_cast<Index>(problem.prior_sigma.size()));
+  for (Index j = 0; j < information.size(); ++j) {
+    const double sigma = problem.prior_sigma[static_cast<std::size_t>(j)];
+    information[j] = 1.0 / (sigma * sigma);
+  }
+  return information.asDiagonal();
+}
+
+/// One run, from recordings to results.
+class Work {
+ public:
+  Work(const std::vector<RangedRecording>& recordings, const CalibrationOptions& options,
+       const Progress& progress)
+      : recordings_(recordings), options_(options), progress_(progress) {
+    if (recordings.empty()) throw InvalidArgument("no recording to calibrate on");
+    if (!options.stations.empty() && options.stations.size() != recordings.size()) {
+      throw InvalidArgument(fmt::format("{} stations given for {} recordings",
+                                        options.stations.size(), recordings.size()));
+    }
+    check_same_sensor(recordings);
+    belief_ = pooled_belief(recordings);
+    range_noise_ = options.range_noise.value_or(options.sensor.range_noise);
+    if (!(range_noise_ > 0)) {
+      throw InvalidArgument(fmt::format("range noise = {} m, allowed above 0", range_noise_));
+    }
+    // Rounding adds its own variance.
+    range_noise_ = std::hypot(range_noise_, options.sensor.range_resolution / std::sqrt(12.0));
+    for (std::size_t r = 0; r < recordings.size(); ++r) {
+      shots_.push_back(recordings[r].shots);
+      for (std::size_t k = 0; k < belief_.angle_shift[r].size(); ++k) {
+        for (double& angle : shots_[r].rotation_angle[k]) angle += belief_.angle_shift[r][k];
+      }
+      pointing_.push_back(pointing_of_angles(shots_[r]));
+    }
+  }
+
+  Calibration run() {
+    set_up();
+    find_walls();
+    report_progress(progress_, 0.3);
+    adjust_coarsely();
+    report_progress(progress_, 0.5);
+    PlanarSolution solution = adjust_fully();
+    report_progress(progress_, 0.9);
+    fill_result(solution);
+    judge(solution);
+    report_progress(progress_, 1.0);
+    return std::move(result_);
+  }
+
+ private:
+  bool paper() const { return options_.method == CalibrationMethod::paper; }
+
+  void set_up() {
+    PlanarProblem& p = problem_;
+    p.train = belief_.sensor.train;
+    if (options_.beam_origin) p.geometry = options_.sensor.prism_geometry();
+    std::vector<std::string> held;
+    for (const auto& [name, value] : options_.fixed) {
+      held.push_back(name);
+      if (!value) continue;
+      for (const int place : find_parameter(name, p.train.prisms()).places) {
+        p.train.set_place(place, *value);
+      }
+    }
+    p.prior = p.train;
+    p.free = calibration_parameters(p.train.prisms(), held, options_.additional);
+    for (const estimation::FreeParameter& free : p.free) {
+      const bool angle = find_parameter(free.name, p.train.prisms()).unit == "deg";
+      p.prior_sigma.push_back(options_.prior_sigma && angle
+                                  ? *options_.prior_sigma
+                                  : std::numeric_limits<double>::infinity());
+    }
+    p.range_offset_sigma = options_.range_offset_sigma;
+    p.considered = belief_.free;
+    p.considered_covariance = belief_.covariance;
+    for (const RangedRecording& recording : recordings_) {
+      p.angle_sensitivity.push_back(recording.angle_sensitivity);
+      p.mean_angle_covariance.push_back(recording.mean_angle_covariance);
+    }
+  }
+
+  /// Planes in every recording by itself, then which of them are the same wall.
+  void find_walls() {
+    const std::size_t most = std::max<std::size_t>(kCoarseShots / recordings_.size(), 5000);
+    std::vector<FoundPlane> found;
+    bool one_line = false;
+    for (std::size_t r = 0; r < recordings_.size(); ++r) {
+      coarse_.push_back(rows_of(shots_[r], spread_rows(shots_[r].size(), most)));
+      const Rays rays(problem_.train, problem_.geometry, coarse_[r]);
+      std::vector<Vector3<double>> points;
+      for (std::size_t i = 0; i < coarse_[r].size(); ++i) {
+        points.push_back(rays.point(i, coarse_[r].range[i]));
+      }
+      SegmentationOptions settings;
+      settings.range_noise = range_noise_;
+      settings.pointing_noise = std::hypot(kStartPointing, pointing_[r]);
+      settings.gate = kGate;
+      settings.leave_out_edges = true;
+      settings.seed = options_.seed + r;
+      const Segmentation segmentation = segment_planes(points, settings);
+      one_line = one_line || segmentation.on_one_line;
+      for (std::size_t i = 0; i < segmentation.planes.size(); ++i) {
+        found.push_back({r, segmentation.planes[i], segmentation.points[i], 0});
+      }
+      start_labels_.push_back(segmentation.label);
+      if (segmentation.planes.empty()) {
+        const std::string why =
+            segmentation.on_one_line
+                ? "all points lie on one line: a wall has to fill an area of the field of view"
+                : fmt::format("no plane found among {} points", points.size());
+        if (recordings_.size() == 1) {
+          throw EstimationError(fmt::format("{}: {}", recordings_[r].name, why));
+        }
+        result_.warnings.push_back(fmt::format("{}: {}; it is left out", recordings_[r].name, why));
+      }
+    }
+    if (found.empty()) {
+      throw EstimationError(one_line ? "all points lie on one line: a wall has to fill an area"
+                                     : "no plane found in any recording");
+    }
+    std::vector<std::string> names;
+    for (const RangedRecording& recording : recordings_) names.push_back(recording.name);
+    // The paper's method knows no datum.
+    WallMatching matching = paper() ? match_walls(found, names, std::nullopt, {})
+                                    : match_walls(found, names, options_.planes, options_.stations);
+    problem_.walls = std::move(matching.walls);
+    problem_.stations = std::move(matching.stations);
+    problem_.stations_known = matching.stations_known;
+    result_.warnings.insert(result_.warnings.end(), matching.warnings.begin(),
+                            matching.warnings.end());
+    const bool planes = std::any_of(problem_.walls.begin(), problem_.walls.end(),
+                                    [](const Wall& wall) { return wall.normal_sigma >= 0; });
+    const bool stations =
+        problem_.stations_known && !options_.stations.empty() && recordings_.size() > 1;
+    result_.datum_kind = planes && stations ? DatumKind::both
+                         : planes           ? DatumKind::planes
+                         : stations         ? DatumKind::stations
+                                            : DatumKind::none;
+    std::vector<std::size_t> first_view(recordings_.size(), 0);
+    for (std::size_t i = 0; i < found.size(); ++i) {
+      if (i == 0 || found[i].recording != found[i - 1].recording) {
+        first_view[found[i].recording] = i;
+      }
+      problem_.views.push_back({found[i].recording, found[i].wall, found[i].plane.distance,
+                                range_noise_ * range_noise_, nullptr});
+    }
+    for (std::size_t r = 0; r < recordings_.size(); ++r) {
+      for (int& label : start_labels_[r]) {
+        if (label >= 0) label += static_cast<int>(first_view[r]);
+      }
+      hand_out(coarse_[r], start_labels_[r], r, problem_);
+    }
+  }
+
+  PlanarSolution solve(const PlanarProblem& problem) {
+    solved_variance_.clear();
+    for (const WallView& view : problem.views) solved_variance_.push_back(view.range_variance);
+    PlanarSolution solution = paper() ? adjust_as_paper(problem) : adjust(problem);
+    if (paper()) {
+      for (std::size_t v = 0; v < solved_variance_.size(); ++v) {
+        solved_variance_[v] = solution.problem.views[v].range_variance;
+      }
+    }
+    return solution;
+  }
+
+  /// Views that lost their shots when labels changed are no views any more.
+  void drop_empty_views(PlanarProblem& problem) const {
+    std::erase_if(problem.views, [](const WallView& view) { return view.shots->size() < 30; });
+    if (problem.views.empty()) {
+      throw EstimationError("no plane is left once every shot went to the plane it fits best");
+    }
+  }
+
+  void adjust_coarsely() {
+    drop_empty_views(problem_);
+    for (int round = 0; round < kCoarseRounds; ++round) {
+      PlanarSolution solution = solve(problem_);
+      result_.iterations = std::max(result_.iterations, solution.iterations);
+      if (!std::isfinite(solution.cost)) throw EstimationError("the adjustment diverged");
+      update_range_variances(solution);
+      problem_ = std::move(solution.problem);
+      for (std::size_t r = 0; r < recordings_.size(); ++r) {
+        hand_out(coarse_[r], label_shots(problem_, r, coarse_[r], pointing_[r]).view, r, problem_);
+      }
+      drop_empty_views(problem_);
+    }
+  }
+
+  void label_all() {
+    near_.assign(problem_.views.size(), 0);
+    labels_.clear();
+    for (std::size_t r = 0; r < recordings_.size(); ++r) {
+      Labels labels = label_shots(problem_, r, shots_[r], pointing_[r]);
+      for (std::size_t v = 0; v < near_.size(); ++v) near_[v] += labels.near[v];
+      labels_.push_back(std::move(labels.view));
+    }
+  }
+
+  PlanarSolution adjust_fully() {
+    label_all();
+    for (std::size_t r = 0; r < recordings_.size(); ++r) {
+      hand_out(shots_[r], labels_[r], r, problem_);
+    }
+    PlanarSolution solution;
+    for (int round = 0; round < kFullRounds; ++round) {
+      solution = solve(problem_);
+      update_range_variances(solution);
+      problem_ = solution.problem;
+      report_progress(progress_, 0.5 + 0.15 * (round + 1));
+      if (round + 1 == kFullRounds) break;
+      label_all();
+      leave_out_steps();
+      for (std::size_t r = 0; r < recordings_.size(); ++r) {
+        hand_out(shots_[r], labels_[r], r, problem_);
+      }
+    }
+    inspect(problem_, nullptr);
+    return solution;
+  }
+
+  /// Residuals of one view's shots as distances from its plane.
+  struct Distances {
+    std::vector<double> azimuth, zenith, distance, sigma, incidence;
+    std::vector<std::size_t> rows;  ///< of the recording
+  };
+
+  Distances distances_of(const PlanarProblem& problem, std::size_t view) const {
+    const std::size_t r = problem.views[view].recording;
+    Distances d;
+    for (std::size_t i = 0; i < labels_[r].size(); ++i) {
+      if (labels_[r][i] == static_cast<int>(view)) d.rows.push_back(i);
+    }
+    const RangedShots shots = rows_of(shots_[r], d.rows);
+    const PlaneView plane = plane_view(problem, view);
+    const Rays rays(problem.train, problem.geometry, shots);
+    const double pointing = pointing_[r];
+    for (std::size_t i = 0; i < shots.size(); ++i) {
+      const Vector3<double> direction = rays.direction(i);
+      const auto angles = angles_from_direction(direction);
+      const double cosine = dot(plane.plane.normal, direction);
+      const double range = shots.range[i] - plane.range_offset;
+      const double across = pointing * range * std::sqrt(std::max(0.0, 1.0 - cosine * cosine));
+      d.azimuth.push_back(angles.azimuth);
+      d.zenith.push_back(angles.zenith);
+      d.distance.push_back(signed_distance(plane.plane, rays.point(i, range)));
+      d.sigma.push_back(std::sqrt(plane.range_variance * cosine * cosine + across * across));
+      d.incidence.push_back(std::acos(std::clamp(cosine, -1.0, 1.0)));
+    }
+    return d;
+  }
+
+  /// Looks at the walls: how uneven they are, and which regions stand off.
+  /// @param leave_out  labels that lose the shots of such regions; nullptr only looks
+  void inspect(const PlanarProblem& problem, std::vector<std::vector<int>>* leave_out) {
+    double squares = 0, cells = 0;
+    for (std::size_t v = 0; v < problem.views.size(); ++v) {
+      const Distances d = distances_of(problem, v);
+      const SurfaceReport report = inspect_surface({d.azimuth, d.zenith, d.distance, d.sigma});
+      squares += report.unevenness * static_cast<double>(report.cells);
+      cells += static_cast<double>(report.cells);
+      if (leave_out == nullptr) continue;
+      for (const StepRegion& step : report.steps) {
+        for (const std::size_t row : step.rows) {
+          (*leave_out)[problem.views[v].recording][d.rows[row]] = -1;
+        }
+        result_.steps.push_back({problem.views[v].recording, v, step.height, step.azimuth,
+                                 step.zenith, std::sqrt(step.solid_angle), step.points});
+      }
+    }
+    if (cells > 0) {
+      result_.unevenness = squares / cells;
+      const double significant = 1.0 + 4.0 * std::sqrt(2.0 / cells);
+      result_.variance_factor = result_.unevenness > significant ? result_.unevenness : 1.0;
+    }
+  }
+
+  void leave_out_steps() {
+    result_.steps.clear();
+    if (!paper()) inspect(problem_, &labels_);
+  }
+
+  /// RMS of point-to-plane distances of a view with other optics, and the distances; the plane is
+  /// fitted to them.
+  std::pair<double, std::vector<double>> thickness(const PrismTrain& train,
+                                                   const RangedShots& shots) const {
+    const Rays rays(train, problem_.geometry, shots);
+    std::vector<Vector3<double>> points;
+    for (std::size_t i = 0; i < shots.size(); ++i) points.push_back(rays.point(i, shots.range[i]));
+    std::vector<std::size_t> all(points.size());
+    std::iota(all.begin(), all.end(), std::size_t{0});
+    const Plane plane = fitted_plane(points, all);
+    std::vector<double> distance;
+    double squares = 0;
+    for (const Vector3<double>& point : points) {
+      distance.push_back(signed_distance(plane, point));
+      squares += distance.back() * distance.back();
+    }
+    return {std::sqrt(squares / static_cast<double>(points.size())), std::move(distance)};
+  }
+
+  void fill_result(const PlanarSolution& solution);
+  void fill_planes(const PlanarSolution& solution);
+  void fill_sensor(const PlanarSolution& solution);
+  void judge(const PlanarSolution& solution);
+
+  const std::vector<RangedRecording>& recordings_;
+  const CalibrationOptions& options_;
+  const Progress& progress_;
+  Belief belief_;
+  double range_noise_ = 0;
+  std::vector<RangedShots> shots_, coarse_;   // [recordings]
+  std::vector<double> pointing_;              // [recordings]
+  std::vector<std::vector<int>> start_labels_, labels_;
+  std::vector<std::size_t> near_;
+  std::vector<double> solved_variance_;  // [views] of the last solve, m^2
+  PlanarProblem problem_;
+  Calibration result_;
+};
+
+/// Root mean squares and means over bins of a variable.
+class ProfileBuilder {
+ public:
+  ProfileBuilder(std::string variable, double from, double to, std::size_t bins)
+      : from_(from), width_((to - from) / static_cast<double>(bins)), sums_(bins) {
+    profile_.variable = std::move(variable);
+  }
+  void add(double at, double before, double after) {
+    const double bin = std::floor((at - from_) / width_);
+    if (!(bin >= 0) || bin >= static_cast<double>(sums_.size())) return;
+    Sums& s = sums_[static_cast<std::size_t>(bin)];
+    ++s.count;
+    s.before += before;
+    s.after += after;
+    s.before2 += before * before;
+    s.after2 += after * after;
+  }
+  ThicknessProfile result() && {
+    for (std::size_t i = 0; i < sums_.size(); ++i) {
+      const Sums& s = sums_[i];
+      const double n = s.count > 0 ? static_cast<double>(s.count) : kNaN;
+      profile_.from.push_back(from_ + width_ * static_cast<double>(i));
+      profile_.to.push_back(from_ + width_ * static_cast<double>(i + 1));
+      profile_.count.push_back(s.count);
+      profile_.rms_before.push_back(std::sqrt(s.before2 / n));
+      profile_.rms_after.push_back(std::sqrt(s.after2 / n));
+      profile_.mean_before.push_back(s.before / n);
+      profile_.mean_after.push_back(s.after / n);
+    }
+    return std::move(profile_);
+  }
+
+ private:
+  struct Sums {
+    std::size_t count = 0;
+    double before = 0, after = 0, before2 = 0, after2 = 0;
+  };
+  double from_, width_;
+  std::vector<Sums> sums_;
+  ThicknessProfile profile_;
+};
+
+void Work::fill_planes(const PlanarSolution& solution) {
+  const PlanarProblem& p = solution.problem;
+  const auto prisms = static_cast<std::size_t>(p.train.prisms());
+  std::vector<ProfileBuilder> builders;
+  builders.emplace_back("incidence", 0.0, kPi / 2, 45);
+  for (std::size_t k = 0; k < prisms; ++k) {
+    builders.emplace_back(fmt::format("rotation_angle_{}", prism_letter(static_cast<int>(k))), 0.0,
+                          kTwoPi, 72);
+  }
+  double before2 = 0, after2 = 0;
+  std::vector<std::vector<double>> before_of(recordings_.size()), after_of(recordings_.size());
+  for (std::size_t r = 0; r < recordings_.size(); ++r) {
+    before_of[r].assign(shots_[r].size(), kNaN);
+    after_of[r].assign(shots_[r].size(), kNaN);
+  }
+  for (std::size_t v = 0; v < p.views.size(); ++v) {
+    const std::size_t r = p.views[v].recording;
+    const Distances d = distances_of(p, v);
+    const RangedShots shots = rows_of(shots_[r], d.rows);
+    const auto [rms_before, before] = thickness(belief_.sensor.train, shots);
+    CalibratedPlane plane;
+    plane.name = p.walls[p.views[v].wall].name;
+    plane.recording = r;
+    const PlaneView view = plane_view(p, v);
+    plane.normal = view.plane.normal;
+    plane.distance = view.plane.distance;
+    plane.points = d.rows.size();
+    plane.outliers = near_[v];
+    plane.rms_before = rms_before;
+    plane.range_sigma = std::sqrt(p.views[v].range_variance);
+    double squares = 0;
+    for (std::size_t i = 0; i < d.rows.size(); ++i) {
+      squares += d.distance[i] * d.distance[i];
+      before_of[r][d.rows[i]] = before[i];
+      after_of[r][d.rows[i]] = d.distance[i];
+      builders[0].add(d.incidence[i], before[i], d.distance[i]);
+      for (std::size_t k = 0; k < prisms; ++k) {
+        builders[k + 1].add(wrap_to_two_pi(shots.rotation_angle[k][i]), before[i], d.distance[i]);
+      }
+    }
+    const auto n = static_cast<double>(d.rows.size());
+    plane.rms = std::sqrt(squares / n);
+    before2 += n * rms_before * rms_before;
+    after2 += squares;
+    result_.points += d.rows.size();
+    result_.planes.push_back(std::move(plane));
+  }
+  result_.rms_before = std::sqrt(before2 / static_cast<double>(result_.points));
+  result_.rms_after = std::sqrt(after2 / static_cast<double>(result_.points));
+  for (ProfileBuilder& builder : builders) {
+    result_.profiles.push_back(std::move(builder).result());
+  }
+  for (std::size_t r = 0; r < recordings_.size(); ++r) {
+    const std::vector<std::size_t> rows =
+        spread_rows(shots_[r].size(), kSampleShots / recordings_.size());
+    const RangedShots shots = rows_of(shots_[r], rows);
+    const Rays rays(p.train, p.geometry, shots);
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+      const auto angles = angles_from_direction(rays.direction(i));
+      result_.sample.push_back({r, labels_[r][rows[i]],
+                                rays.point(i, shots.range[i] - p.range_offset),
+                                before_of[r][rows[i]], after_of[r][rows[i]], angles.azimuth,
+                                angles.zenith});
+    }
+  }
+}
+
+void Work::fill_sensor(const PlanarSolution& solution) {
+  sensors::Sensor& sensor = result_.sensor;
+  sensor = options_.sensor;
+  sensor.serial = recordings_.front().serial;
+  sensor.train = solution.problem.train;
+  sensor.angular_velocity = belief_.sensor.angular_velocity;
+  sensor.combination = belief_.sensor.combination;
+  sensor.provenance.clear();
+  sensor.covariance_names.clear();
+  if (!options_.beam_origin) sensor.set_prism_geometry({});
+  for (const sensors::Knowledge& known : belief_.sensor.knowledge) {
+    const bool speed = known.name.starts_with("angular_velocity");
+    const bool material = known.name.starts_with("refractive_index");
+    if (speed || material) sensor.set_knowledge(known);
+  }
+  for (std::size_t j = 0; j < result_.free.size(); ++j) {
+    const auto at = static_cast<Index>(j);
+    sensor.covariance_names.push_back(result_.free[j].name);
+    sensor.set_knowledge({result_.free[j].name, std::sqrt(result_.covariance(at, at)),
+                          "calibrated on plane walls by risley calibrate"});
+  }
+  sensor.covariance = result_.covariance;
+}
+
+void Work::fill_result(const PlanarSolution& solution) {
+  const PlanarProblem& p = solution.problem;
+  result_.method = options_.method;
+  result_.believed = belief_.sensor.train;
+  result_.angle_shift = belief_.angle_shift;
+  result_.free = p.free;
+  result_.parameters = solution.parameters;
+  result_.covariance = solution.covariance * result_.variance_factor;
+  result_.range_offset = p.range_offset;
+  result_.range_offset_sigma = solution.range_offset_sigma * std::sqrt(result_.variance_factor);
+  result_.prior_tests = solution.prior_tests;
+  result_.unobservable = estimation::weak_directions(
+      solution.information / result_.variance_factor + prior_information(p), p.free,
+      kWidestDirection);
+  double stated = 0, redundancy = 0;
+  for (std::size_t v = 0; v < p.views.size(); ++v) {
+    stated += solution.chi2[v] * solved_variance_[v];
+    redundancy += solution.redundancy[v];
+  }
+  result_.sigma0 = std::sqrt(stated / redundancy / kVarianceWithinGate) / range_noise_;
+  fill_planes(solution);
+  fill_sensor(solution);
+  std::vector<std::vector<double>> beams(static_cast<std::size_t>(p.train.prisms()));
+  for (std::size_t r = 0; r < recordings_.size(); ++r) {
+    for (const std::size_t row :
+         spread_rows(shots_[r].size(), kBundleBeams / recordings_.size())) {
+      for (std::size_t k = 0; k < beams.size(); ++k) {
+        beams[k].push_back(shots_[r].rotation_angle[k][row]);
+      }
+    }
+  }
+  result_.datum = formal_datum(p.train, p.free, result_.covariance, beams);
+}
+
+void Work::judge(const PlanarSolution& solution) {
+  Calibration& c = result_;
+  c.converged = solution.converged && c.covariance.allFinite();
+  if (!c.converged) c.reason = "the adjustment did not converge";
+  if (!c.unobservable.empty()) {
+    c.converged = false;
+    c.reason = fmt::format(
+        "the walls do not tell {}, only to {:.2g} degrees: walls tilted by 30 degrees and more "
+        "against the axis do, or a prior (--prior-sigma-deg)",
+        estimation::direction_text(c.unobservable.front()), c.unobservable.front().sigma);
+  }
+  const PriorTest* worst = nullptr;
+  for (const PriorTest& test : c.prior_tests) {
+    if (test.degrees_of_freedom == 0 || test.chi2 <= test.critical) continue;
+    if (worst == nullptr || test.chi2 > worst->chi2) worst = &test;
+  }
+  if (worst != nullptr) {
+    c.converged = false;
+    c.reason = fmt::format(
+        "{} {} contradicts the data: its stated rotation is off by {:.3g} degrees, chi2 {:.3g} where "
+        "{:.3g} is the limit",
+        worst->station ? "station" : "plane", worst->name, degrees_from_radians(worst->misfit),
+        worst->chi2, worst->critical);
+  }
+  const double boresight = std::hypot(c.datum.sigma_pitch, c.datum.sigma_yaw);
+  if (boresight > kPoorDatum) {
+    c.warnings.push_back(fmt::format(
+        "the direction that all beams share is only known to {:.2g} degrees (pitch {:.2g}, yaw "
+        "{:.2g}); their directions against each other to {:.2g}",
+        degrees_from_radians(boresight), degrees_from_radians(c.datum.sigma_pitch),
+        degrees_from_radians(c.datum.sigma_yaw), degrees_from_radians(c.datum.shape)));
+  }
+  for (const SurfaceStep& step : c.steps) {
+    c.warnings.push_back(fmt::format(
+        "{}: a region of {:.2g} degrees stands {:.0f} mm off plane {} (azimuth {:.1f}, zenith "
+        "{:.1f}); its {} shots are left out",
+        recordings_[step.recording].name, degrees_from_radians(step.size), 1e3 * step.height,
+        c.planes[step.plane].name, degrees_from_radians(step.azimuth),
+        degrees_from_radians(step.zenith), step.points));
+  }
+  if (c.variance_factor > 1.0) {
+    c.warnings.push_back(fmt::format(
+        "the walls are uneven: means over a square degree scatter {:.2g} times as much as the noise "
+        "allows; variances are enlarged by that, and boresight may be off by more",
+        c.unevenness));
+  }
+  if (solution.lost > 0) {
+    c.warnings.push_back(fmt::format("{} shots do not meet their plane", solution.lost));
+  }
+}
+
+}  // namespace
+
+Calibration calibrate(const std::vector<RangedRecording>& recordings,
+                      const CalibrationOptions& options, const Progress& progress) {
+  return Work(recordings, options, progress).run();
+}
+
+}  // namespace risley::calibration

@@ -1,0 +1,227 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "risley/calibration/calibration_plan.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include <fmt/format.h>
+
+#include "risley/calibration/calibrate.hpp"
+#include "risley/calibration/planar_adjustment.hpp"
+#include "risley/core/angle.hpp"
+#include "risley/core/error.hpp"
+#include "risley/optics/batch.hpp"
+
+#include "calibration/wall_matching.hpp"
+
+namespace risley::calibration {
+namespace {
+
+using Eigen::Index;
+
+constexpr std::size_t kSampleShots = 20000;  // of every recording
+constexpr double kUsefulIncidence = radians_from_degrees(30.0);
+
+/// Rotation angles of a sample of one recording: spread over its whole time, from angles that no
+/// rational relation ties to the next recording's.
+std::vector<std::vector<double>> sample_angles(const CalibrationPlan& plan, std::size_t recording) {
+  std::vector<std::vector<double>> angles;
+  for (std::size_t k = 0; k < plan.sensor.angular_velocity.size(); ++k) {
+    std::vector<double> column(kSampleShots);
+    const double start = 1.0 + static_cast<double>(recording) * (2.0 + static_cast<double>(k));
+    for (std::size_t i = 0; i < kSampleShots; ++i) {
+      const double time =
+          plan.duration * (static_cast<double>(i) + 0.5) / static_cast<double>(kSampleShots);
+      column[i] = std::remainder(
+          rotation_angle_at(start, plan.sensor.angular_velocity[k], time), kTwoPi);
+    }
+    angles.push_back(std::move(column));
+  }
+  return angles;
+}
+
+/// What a planned recording sees: the shots of each plane of the scene.
+struct Seen {
+  std::vector<std::vector<std::size_t>> rows;  ///< [planes]
+  std::vector<double> incidence, range;        ///< [planes], sums
+};
+
+std::vector<std::string> advice_for(const CalibrationForecast& f, const CalibrationPlan& plan) {
+  std::vector<std::string> advice;
+  double steep = 0, all = 0, far = 0;
+  for (const PlannedWall& wall : f.walls) {
+    all += wall.share;
+    far += wall.share * wall.mean_range;
+    if (wall.mean_incidence > kUsefulIncidence) steep += wall.share;
+  }
+  if (all > 0) far /= all;
+  const auto recordings =
+      static_cast<double>(std::max<std::size_t>(1, plan.scene.stations.size()));
+  if (all < 0.9 * recordings) {
+    advice.push_back(fmt::format(
+        "only {:.0f} % of the shots meet a wall: walls that fill the field of view tell more",
+        100.0 * all / recordings));
+  }
+  if (std::hypot(f.datum.sigma_pitch, f.datum.sigma_yaw) > kPoorDatum) {
+    if (steep < 0.5 * all) {
+      advice.push_back(
+          "turn the sensor so that the walls stand at 50 to 65 degrees of incidence: from 10 to 60 "
+          "degrees the common direction becomes known ten times better");
+    }
+    if (far < 20.0) {
+      advice.push_back(
+          fmt::format("the walls are {:.0f} m away: the sigma falls as the distance grows", far));
+    }
+    if (f.datum_kind == DatumKind::none || f.datum_kind == DatumKind::planes) {
+      advice.push_back(
+          "scan the same walls with the body flipped by 180 degrees about its axis and turned by 30 "
+          "degrees to both sides against a stop (stations with a sigma_deg): that alone makes the "
+          "common direction independent of the walls' flatness");
+    }
+    advice.push_back("record longer: the sigma falls with the square root of the duration");
+  }
+  return advice;
+}
+
+}  // namespace
+
+std::vector<estimation::FreeParameter> calibration_parameters(
+    int prisms, const std::vector<std::string>& fixed,
+    const std::vector<std::string>& additional) {
+  std::vector<std::string> names;
+  for (const std::string& name : estimation::default_free_names(prisms)) {
+    if (name != "refractive_index") names.push_back(name);
+  }
+  for (const std::string& name : fixed) {
+    find_parameter(name, prisms);
+    std::erase(names, name);
+  }
+  for (const std::string& name : additional) {
+    if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
+  }
+  return estimation::free_parameters(names, prisms);
+}
+
+CalibrationForecast forecast(const CalibrationPlan& plan) {
+  const sensors::Sensor& sensor = plan.sensor;
+  const double rate = plan.rate.value_or(sensor.shot_rate);
+  const double noise = plan.range_noise.value_or(sensor.range_noise);
+  if (!(plan.duration > 0) || !(rate > 0) || !(noise > 0)) {
+    throw InvalidArgument(
+        fmt::format("duration = {} s, rate = {} Hz, range noise = {} m: all must be above 0",
+                    plan.duration, rate, noise));
+  }
+  CalibrationForecast result;
+  PlanarProblem problem;
+  problem.train = problem.prior = sensor.train;
+  if (plan.beam_origin) problem.geometry = sensor.prism_geometry();
+  problem.free = calibration_parameters(sensor.prisms(), plan.fixed, plan.additional);
+  for (const auto& free : problem.free) {
+    const bool angle = find_parameter(free.name, sensor.prisms()).unit == "deg";
+    problem.prior_sigma.push_back(plan.prior_sigma && angle
+                                      ? *plan.prior_sigma
+                                      : std::numeric_limits<double>::infinity());
+  }
+  problem.range_offset_sigma = plan.range_offset_sigma;
+  // One shot of the sample stands for several: its variance is divided by their number.
+  const double weight = plan.duration * rate / static_cast<double>(kSampleShots);
+  const double variance =
+      (noise * noise + sensor.range_resolution * sensor.range_resolution / 12.0) / weight;
+
+  std::vector<scenes::Station> stations = plan.scene.stations;
+  const bool with_stations = !stations.empty();
+  if (!with_stations) stations.push_back({});
+  std::vector<FoundPlane> found;
+  std::vector<std::string> names;
+  std::vector<std::vector<double>> bundle(static_cast<std::size_t>(sensor.prisms()));
+  for (std::size_t r = 0; r < stations.size(); ++r) {
+    const scenes::Station& station = stations[r];
+    names.push_back(station.name.empty() ? "the sensor" : station.name);
+    RangedShots all;
+    all.resize(sensor.prisms(), kSampleShots);
+    all.rotation_angle = sample_angles(plan, r);
+    for (std::size_t k = 0; k < bundle.size(); ++k) {
+      for (const std::size_t row : spread_rows(kSampleShots, 2000)) {
+        bundle[k].push_back(all.rotation_angle[k][row]);
+      }
+    }
+    Seen seen;
+    seen.rows.resize(plan.scene.planes.size());
+    seen.incidence.resize(plan.scene.planes.size());
+    seen.range.resize(plan.scene.planes.size());
+    for (std::size_t i = 0; i < kSampleShots; ++i) {
+      std::vector<double> angles;
+      for (const auto& column : all.rotation_angle) angles.push_back(column[i]);
+      const Ray ray = emergent_ray(problem.train, problem.geometry, angles);
+      if (!ray.valid) continue;
+      const auto hit =
+          nearest_hit(plan.scene, station.position + station.scene_from_sensor(ray.origin),
+                      station.scene_from_sensor(ray.direction));
+      if (!hit || hit->range < sensor.range_minimum || hit->range > sensor.range_maximum) continue;
+      all.range[i] = hit->range;
+      seen.rows[hit->plane].push_back(i);
+      seen.incidence[hit->plane] += std::acos(hit->cosine);
+      seen.range[hit->plane] += hit->range;
+    }
+    for (std::size_t w = 0; w < seen.rows.size(); ++w) {
+      const auto n = static_cast<double>(seen.rows[w].size());
+      if (seen.rows[w].size() < 30) continue;
+      const scenes::ScenePlane& plane = plan.scene.planes[w];
+      result.walls.push_back({plane.name, names.back(), n / static_cast<double>(kSampleShots),
+                              seen.incidence[w] / n, seen.range[w] / n});
+      result.shots += n * weight;
+      auto shots = std::make_shared<RangedShots>();
+      shots->resize(sensor.prisms(), seen.rows[w].size());
+      for (std::size_t i = 0; i < seen.rows[w].size(); ++i) shots->set_row(i, all, seen.rows[w][i]);
+      // The plane in the sensor's frame: R^T n, and nearer by what the station stands towards it.
+      const Vector3<double>& n_scene = plane.plane.normal;
+      const Vector3<double> axes[] = {station.scene_from_sensor({1, 0, 0}),
+                                      station.scene_from_sensor({0, 1, 0}),
+                                      station.scene_from_sensor({0, 0, 1})};
+      Plane mine{{dot(axes[0], n_scene), dot(axes[1], n_scene), dot(axes[2], n_scene)},
+                 plane.plane.distance - dot(n_scene, station.position)};
+      if (mine.distance < 0) mine = {-mine.normal, -mine.distance};
+      found.push_back({r, mine, seen.rows[w].size(), 0});
+      problem.views.push_back({r, 0, mine.distance, variance, std::move(shots)});
+    }
+  }
+  if (problem.views.empty()) throw EstimationError("no shot of the plan meets a wall");
+
+  const bool known_normals =
+      std::any_of(plan.scene.planes.begin(), plan.scene.planes.end(),
+                  [](const scenes::ScenePlane& plane) { return plane.normal_sigma.has_value(); });
+  const bool tied = plan.stations_known && with_stations;
+  std::optional<scenes::Scene> planes;
+  if (known_normals || tied) planes = plan.scene;
+  WallMatching matching = match_walls(
+      found, names, planes, tied ? plan.scene.stations : std::vector<scenes::Station>{});
+  problem.walls = std::move(matching.walls);
+  problem.stations = std::move(matching.stations);
+  problem.stations_known = matching.stations_known;
+  for (std::size_t i = 0; i < found.size(); ++i) problem.views[i].wall = found[i].wall;
+  const bool both = tied && stations.size() > 1;
+  result.datum_kind = known_normals && both ? DatumKind::both
+                      : known_normals       ? DatumKind::planes
+                      : both                ? DatumKind::stations
+                                            : DatumKind::none;
+
+  AdjustmentOptions options;
+  options.most_iterations = 0;  // ranges are exact: the plan is its own solution
+  const PlanarSolution solution = adjust(problem, options);
+  result.free = problem.free;
+  result.covariance = solution.covariance;
+  result.range_offset_sigma = solution.range_offset_sigma;
+  Eigen::MatrixXd information = solution.information;
+  for (Index j = 0; j < information.rows(); ++j) {
+    const double sigma = problem.prior_sigma[static_cast<std::size_t>(j)];
+    information(j, j) += 1.0 / (sigma * sigma);
+  }
+  result.unobservable = estimation::weak_directions(information, problem.free, kWidestDirection);
+  result.datum = formal_datum(problem.train, problem.free, result.covariance, bundle);
+  result.advice = advice_for(result, plan);
+  return result;
+}
+
+}  // namespace risley::calibration

@@ -1,0 +1,166 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "risley/calibration/datum.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Geometry>
+
+#include "risley/core/angle.hpp"
+#include "risley/core/error.hpp"
+#include "risley/optics/observation_adjoint.hpp"
+
+namespace risley::calibration {
+namespace {
+
+using Eigen::Index;
+using Eigen::Matrix3d;
+
+Matrix3d cross_matrix(const Eigen::Vector3d& v) {
+  Matrix3d m;
+  m << 0, -v[2], v[1], v[2], 0, -v[0], -v[1], v[0], 0;
+  return m;
+}
+
+Eigen::Vector3d eigen(const Vector3<double>& v) { return {v.x, v.y, v.z}; }
+
+/// One beam of a bundle and how it follows the parameters.
+struct BundleBeam {
+  Eigen::Vector3d direction;
+  Eigen::Matrix<double, 3, Eigen::Dynamic> jacobian;    ///< of the direction [3, free]
+  Eigen::Matrix<double, 2, Eigen::Dynamic> of_angles;   ///< of azimuth and zenith [2, free]
+};
+
+template <int N>
+std::vector<BundleBeam> bundle(const PrismTrain& train,
+                               const std::vector<estimation::FreeParameter>& free,
+                               const std::vector<std::vector<double>>& rotation_angles) {
+  const auto parameters = parameter_array<N>(train);
+  const auto order = face_order_array<N>(train);
+  const auto prepared = prepare<double, N>(parameters, order);
+  const auto derivatives = prepare_derivatives<double, N>(parameters, order);
+  const auto n = static_cast<Index>(free.size());
+  std::vector<BundleBeam> beams;
+  for (std::size_t i = 0; i < rotation_angles.front().size(); ++i) {
+    std::array<double, N> angles;
+    for (std::size_t k = 0; k < N; ++k) angles[k] = rotation_angles[k][i];
+    const auto linear = linearise_direction(prepared, derivatives, angles);
+    if (!linear.valid) continue;
+    BundleBeam beam{eigen(linear.direction), {}, {}};
+    beam.jacobian.resize(3, n);
+    for (Index row = 0; row < 3; ++row) {
+      const auto& gradient = linear.components[static_cast<std::size_t>(row)].parameters;
+      for (Index j = 0; j < n; ++j) {
+        double sum = 0;
+        for (const int place : free[static_cast<std::size_t>(j)].places) {
+          sum += gradient[static_cast<std::size_t>(place)];
+        }
+        beam.jacobian(row, j) = sum;
+      }
+    }
+    const AngleSeeds<double> seeds = angle_seeds(linear.direction);
+    beam.of_angles.resize(2, n);
+    beam.of_angles.row(0) = eigen(seeds.azimuth).transpose() * beam.jacobian;
+    beam.of_angles.row(1) = eigen(seeds.zenith).transpose() * beam.jacobian;
+    beams.push_back(std::move(beam));
+  }
+  return beams;
+}
+
+}  // namespace
+
+DirectionErrors direction_errors(std::span<const Vector3<double>> computed,
+                                 std::span<const Vector3<double>> truth) {
+  if (computed.size() != truth.size()) {
+    throw InvalidArgument("computed and true directions differ in number");
+  }
+  Matrix3d normal = Matrix3d::Zero();
+  Eigen::Vector3d right = Eigen::Vector3d::Zero();
+  DirectionErrors errors;
+  double count = 0;
+  const auto sound = [&](std::size_t i) {
+    return std::isfinite(computed[i].x) && std::isfinite(truth[i].x);
+  };
+  for (std::size_t i = 0; i < truth.size(); ++i) {
+    if (!sound(i)) continue;
+    count += 1.0;
+    const Eigen::Vector3d beam = eigen(truth[i]), error = eigen(computed[i]) - beam;
+    normal += Matrix3d::Identity() - beam * beam.transpose();
+    right += beam.cross(error);
+    const auto a = angles_from_direction(computed[i]), b = angles_from_direction(truth[i]);
+    const double azimuth = std::remainder(a.azimuth - b.azimuth, kTwoPi);
+    const double zenith = a.zenith - b.zenith;
+    errors.azimuth_bias += azimuth;
+    errors.zenith_bias += zenith;
+    errors.azimuth_rmse += azimuth * azimuth;
+    errors.zenith_rmse += zenith * zenith;
+  }
+  if (count < 3) throw InvalidArgument("fewer than three directions to compare");
+  const Eigen::Vector3d turn = normal.ldlt().solve(right);
+  for (std::size_t i = 0; i < truth.size(); ++i) {
+    if (!sound(i)) continue;
+    const Eigen::Vector3d beam = eigen(truth[i]), rigid = turn.cross(beam);
+    errors.gauge += rigid.squaredNorm();
+    errors.shape += (eigen(computed[i]) - beam - rigid).squaredNorm();
+  }
+  errors.azimuth_bias /= count;
+  errors.zenith_bias /= count;
+  for (double* sum : {&errors.azimuth_rmse, &errors.zenith_rmse, &errors.gauge, &errors.shape}) {
+    *sum = std::sqrt(*sum / count);
+  }
+  errors.total = std::hypot(errors.azimuth_rmse, errors.zenith_rmse);
+  errors.rotation = {turn[0], turn[1], turn[2]};
+  return errors;
+}
+
+FormalDatum formal_datum(const PrismTrain& train,
+                         const std::vector<estimation::FreeParameter>& free,
+                         const Eigen::MatrixXd& covariance,
+                         const std::vector<std::vector<double>>& rotation_angles) {
+  const auto beams = with_prism_count(train.prisms(), [&]<int N>() {
+    return bundle<N>(train, free, rotation_angles);
+  });
+  if (beams.empty()) throw InvalidArgument("no beam gets through the prisms");
+  Matrix3d normal = Matrix3d::Zero();
+  Eigen::MatrixXd right = Eigen::MatrixXd::Zero(3, static_cast<Index>(free.size()));
+  for (const BundleBeam& beam : beams) {
+    normal += Matrix3d::Identity() - beam.direction * beam.direction.transpose();
+    right += cross_matrix(beam.direction) * beam.jacobian;
+  }
+  // The shared rotation as a linear function of the parameters.
+  const Eigen::MatrixXd turn = normal.ldlt().solve(right);
+  const Matrix3d turn_covariance = turn * covariance * turn.transpose();
+  FormalDatum datum;
+  datum.sigma_roll = std::sqrt(turn_covariance(0, 0));
+  datum.sigma_pitch = std::sqrt(turn_covariance(1, 1));
+  datum.sigma_yaw = std::sqrt(turn_covariance(2, 2));
+  const auto count = static_cast<double>(beams.size());
+  datum.gauge = std::sqrt(turn_covariance.cwiseProduct(normal).sum() / count);
+  for (const BundleBeam& beam : beams) {
+    const Eigen::MatrixXd rest = beam.jacobian + cross_matrix(beam.direction) * turn;
+    datum.shape += (rest * covariance * rest.transpose()).trace();
+    datum.total += (beam.of_angles * covariance * beam.of_angles.transpose()).trace();
+  }
+  datum.shape = std::sqrt(std::max(0.0, datum.shape) / count);
+  datum.total = std::sqrt(std::max(0.0, datum.total) / count);
+  return datum;
+}
+
+const char* to_string(DatumKind kind) {
+  switch (kind) {
+    case DatumKind::none:
+      return "walls only";
+    case DatumKind::planes:
+      return "known planes";
+    case DatumKind::stations:
+      return "known stations";
+    case DatumKind::both:
+      return "known planes and stations";
+  }
+  return "walls only";
+}
+
+}  // namespace risley::calibration

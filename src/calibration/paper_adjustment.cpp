@@ -1,0 +1,195 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "risley/calibration/paper_adjustment.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numeric>
+
+#include <Eigen/Cholesky>
+#include <tbb/parallel_for.h>
+
+#include "risley/calibration/plane_segmentation.hpp"
+#include "risley/core/error.hpp"
+#include "risley/optics/beam_origin.hpp"
+
+namespace risley::calibration {
+namespace {
+
+using Eigen::Index;
+
+constexpr std::size_t kBlockShots = 4096;
+constexpr double kStandsStill = 1e-10;  // relative change of the standard deviation of unit weight
+
+/// Points of one view and the derivatives of their distances from a plane yet to be fitted.
+struct Cloud {
+  std::vector<Vector3<double>> points;
+  Plane plane;
+};
+
+/// Sums of one view with the plane's unknowns still in: [free, offset along the normal, two tilts].
+struct Sums {
+  Eigen::MatrixXd hessian;
+  Eigen::VectorXd gradient;
+  double squares = 0;
+};
+
+template <int N>
+class View {
+ public:
+  View(const PlanarProblem& p, const RangedShots& shots)
+      : p_(p), shots_(shots), prepared_(prepare<double, N>(parameter_array<N>(p.train),
+                                                           face_order_array<N>(p.train))),
+        derivatives_(prepare_derivatives<double, N>(parameter_array<N>(p.train),
+                                                    face_order_array<N>(p.train))) {
+    const auto positions = face_positions(p.train.face_order(), p.geometry);
+    std::copy(positions.begin(), positions.end(), face_position_.begin());
+  }
+
+  Cloud cloud() const {
+    Cloud cloud;
+    cloud.points.resize(shots_.size());
+    tbb::parallel_for(std::size_t{0}, blocks(), [&](std::size_t block) {
+      for (std::size_t i = begin(block); i < end(block); ++i) {
+        const auto trace = trace_forward(prepared_, angles(i));
+        cloud.points[i] =
+            beam_origin(trace, face_position_) + shots_.range[i] * trace.direction();
+      }
+    });
+    std::vector<std::size_t> all(cloud.points.size());
+    std::iota(all.begin(), all.end(), std::size_t{0});
+    cloud.plane = fitted_plane(cloud.points, all);
+    return cloud;
+  }
+
+  Sums sums(const Cloud& cloud) const {
+    const auto free = static_cast<Index>(p_.free.size()), size = free + 3;
+    const auto [t1, t2] = tangents_of(cloud.plane.normal);
+    std::vector<Sums> parts(blocks());
+    tbb::parallel_for(std::size_t{0}, blocks(), [&, t1 = t1, t2 = t2](std::size_t block) {
+      Sums& part = parts[block];
+      part.hessian = Eigen::MatrixXd::Zero(size, size);
+      part.gradient = Eigen::VectorXd::Zero(size);
+      Eigen::VectorXd row(size);
+      for (std::size_t i = begin(block); i < end(block); ++i) {
+        const auto trace = trace_forward(prepared_, angles(i));
+        const auto gradient =
+            trace_adjoint(prepared_, derivatives_, trace,
+                          std::array<Vector3<double>, 1>{shots_.range[i] * cloud.plane.normal});
+        for (Index j = 0; j < free; ++j) {
+          row[j] = 0;
+          for (const int place : p_.free[static_cast<std::size_t>(j)].places) {
+            row[j] += gradient[0].parameters[static_cast<std::size_t>(place)];
+          }
+        }
+        const double distance = signed_distance(cloud.plane, cloud.points[i]);
+        row[free] = -1.0;
+        row[free + 1] = dot(cloud.points[i], t1);
+        row[free + 2] = dot(cloud.points[i], t2);
+        part.hessian.selfadjointView<Eigen::Upper>().rankUpdate(row);
+        part.gradient -= distance * row;  // the residuals are the negated distances
+        part.squares += distance * distance;
+      }
+    });
+    Sums sum{Eigen::MatrixXd::Zero(size, size), Eigen::VectorXd::Zero(size), 0.0};
+    for (const Sums& part : parts) {
+      sum.hessian += part.hessian;
+      sum.gradient += part.gradient;
+      sum.squares += part.squares;
+    }
+    sum.hessian.triangularView<Eigen::StrictlyLower>() = sum.hessian.transpose();
+    return sum;
+  }
+
+ private:
+  std::size_t blocks() const { return (shots_.size() + kBlockShots - 1) / kBlockShots; }
+  std::size_t begin(std::size_t block) const { return block * kBlockShots; }
+  std::size_t end(std::size_t block) const {
+    return std::min(begin(block) + kBlockShots, shots_.size());
+  }
+  std::array<double, N> angles(std::size_t i) const {
+    std::array<double, N> result;
+    for (std::size_t k = 0; k < N; ++k) result[k] = shots_.rotation_angle[k][i];
+    return result;
+  }
+
+  const PlanarProblem& p_;
+  const RangedShots& shots_;
+  PreparedTrain<double, N> prepared_;
+  PreparedDerivatives<double, N> derivatives_;
+  std::array<double, 2 * N> face_position_{};
+};
+
+}  // namespace
+
+PlanarSolution adjust_as_paper(PlanarProblem problem, int most_iterations,
+                               const Progress& progress) {
+  if (problem.views.empty()) throw EstimationError("no wall to calibrate on");
+  const auto free = static_cast<Index>(problem.free.size());
+  PlanarSolution solution;
+  for (const WallView& view : problem.views) solution.shots += view.shots->size();
+  const double redundancy = static_cast<double>(solution.shots) - static_cast<double>(free) -
+                            3.0 * static_cast<double>(problem.views.size());
+  double unit_weight = 0;
+  while (true) {
+    Eigen::MatrixXd hessian = Eigen::MatrixXd::Zero(free, free);
+    Eigen::VectorXd gradient = Eigen::VectorXd::Zero(free);
+    double squares = 0;
+    solution.chi2.clear();
+    for (std::size_t v = 0; v < problem.views.size(); ++v) {
+      WallView& view = problem.views[v];
+      const auto [plane, sums] = with_prism_count(problem.train.prisms(), [&]<int N>() {
+        const View<N> one(problem, *view.shots);
+        const Cloud cloud = one.cloud();
+        return std::pair{cloud.plane, one.sums(cloud)};
+      });
+      const Eigen::LLT<Eigen::MatrixXd> own(sums.hessian.bottomRightCorner(3, 3));
+      const Eigen::MatrixXd cross = sums.hessian.bottomLeftCorner(3, free);
+      hessian += sums.hessian.topLeftCorner(free, free) - cross.transpose() * own.solve(cross);
+      gradient +=
+          sums.gradient.head(free) - cross.transpose() * own.solve(sums.gradient.tail(3));
+      squares += sums.squares;
+      solution.chi2.push_back(sums.squares);
+      problem.walls[view.wall].normal = plane.normal;
+      view.distance = plane.distance;
+    }
+    const double before = std::exchange(unit_weight, std::sqrt(squares / redundancy));
+    solution.cost = squares;
+    solution.information = hessian / (unit_weight * unit_weight);
+    const Eigen::LDLT<Eigen::MatrixXd> solver(hessian);
+    solution.covariance =
+        solver.solve(Eigen::MatrixXd::Identity(free, free)) * unit_weight * unit_weight;
+    if (std::abs(before - unit_weight) <= kStandsStill * unit_weight) {
+      solution.converged = true;
+      break;
+    }
+    if (solution.iterations >= most_iterations) break;
+    const Eigen::VectorXd step = solver.solve(gradient);
+    if (!step.allFinite()) break;
+    for (Index j = 0; j < free; ++j) {
+      for (const int place : problem.free[static_cast<std::size_t>(j)].places) {
+        problem.train.set_place(place, problem.train[place] + step[j]);
+      }
+    }
+    ++solution.iterations;
+    report_progress(progress, static_cast<double>(solution.iterations) / most_iterations);
+  }
+  solution.parameters.resize(free);
+  for (Index j = 0; j < free; ++j) {
+    solution.parameters[j] =
+        problem.train[problem.free[static_cast<std::size_t>(j)].places.front()];
+  }
+  for (std::size_t v = 0; v < problem.views.size(); ++v) {
+    WallView& view = problem.views[v];
+    view.range_variance = unit_weight * unit_weight;
+    solution.chi2[v] /= view.range_variance;
+    const auto shots = static_cast<double>(view.shots->size());
+    solution.redundancy.push_back(shots * redundancy / static_cast<double>(solution.shots));
+    solution.distance_sigma.push_back(unit_weight / std::sqrt(shots));
+  }
+  solution.problem = std::move(problem);
+  return solution;
+}
+
+}  // namespace risley::calibration

@@ -1,0 +1,484 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "risley/calibration/planar_adjustment.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <Eigen/Geometry>
+#include <fmt/format.h>
+
+#include "risley/core/error.hpp"
+
+namespace risley::calibration {
+namespace {
+
+using Eigen::Index;
+
+constexpr double kLeastDamping = 1e-12;
+constexpr double kMostDamping = 1e12;
+/// Steps that promise to lower the cost by less are taken unasked, in the unit of one squared sigma:
+/// so near the minimum the derivatives' last thousandth (the beam's origin) decides what the cost
+/// does, and not whether the step is right.
+constexpr double kSmallPromise = 1e-2;
+
+Eigen::Vector3d eigen(const Vector3<double>& v) { return {v.x, v.y, v.z}; }
+Vector3<double> plain(const Eigen::Vector3d& v) { return {v[0], v[1], v[2]}; }
+
+/// Rotation by a vector: its direction is the axis, its length the angle.
+Eigen::Matrix3d rotation(const Eigen::Vector3d& by) {
+  const double angle = by.norm();
+  if (angle == 0.0) return Eigen::Matrix3d::Identity();
+  return Eigen::AngleAxisd(angle, by / angle).toRotationMatrix();
+}
+
+Eigen::Vector3d rotation_vector(const Eigen::Matrix3d& matrix) {
+  const Eigen::AngleAxisd turn(matrix);
+  return turn.angle() * turn.axis();
+}
+
+/// Chi-square that a sound sample with so many degrees of freedom exceeds once in 10,000.
+double critical_chi2(int degrees_of_freedom) {
+  constexpr double kCritical[] = {0.0, 15.137, 18.421, 21.108};
+  return kCritical[std::clamp(degrees_of_freedom, 0, 3)];
+}
+
+/// Where each unknown stands in the vector of all.
+class Unknowns {
+ public:
+  explicit Unknowns(const PlanarProblem& p)
+      : free_(static_cast<Index>(p.free.size())), normal_(p.walls.size(), -1),
+        rotation_(p.stations.size(), -1), distance_(p.views.size(), -1) {
+    Index next = free_;
+    if (p.range_offset_sigma > 0) offset_ = next++;
+    for (std::size_t w = 0; w < p.walls.size(); ++w) {
+      if (p.walls[w].normal_sigma == 0.0) continue;
+      normal_[w] = next;
+      next += 2;
+    }
+    for (std::size_t s = 0; s < p.stations.size(); ++s) {
+      if (!p.stations_known || p.stations[s].sigma == 0.0) continue;
+      rotation_[s] = next;
+      next += 3;
+    }
+    for (Index& distance : distance_) distance = next++;
+    size_ = next;
+  }
+  Index free() const { return free_; }
+  Index size() const { return size_; }
+  /// Negative where the quantity is held.
+  Index range_offset() const { return offset_; }
+  Index normal(std::size_t wall) const { return normal_[wall]; }
+  Index rotation(std::size_t station) const { return rotation_[station]; }
+  Index distance(std::size_t view) const { return distance_[view]; }
+
+ private:
+  Index free_ = 0, offset_ = -1, size_ = 0;
+  std::vector<Index> normal_, rotation_, distance_;
+};
+
+/// The columns of plane_equations() and the parameters behind them.
+struct Places {
+  std::vector<int> all;  ///< places of the flat vector, each once
+
+  explicit Places(const PlanarProblem& p) {
+    for (const auto* list : {&p.free, &p.considered}) {
+      for (const estimation::FreeParameter& parameter : *list) {
+        for (const int place : parameter.places) {
+          if (std::find(all.begin(), all.end(), place) == all.end()) all.push_back(place);
+        }
+      }
+    }
+  }
+  Index column(int place) const {
+    return std::find(all.begin(), all.end(), place) - all.begin();
+  }
+};
+
+bool is_free(const PlanarProblem& p, int place) {
+  return std::any_of(p.free.begin(), p.free.end(), [place](const auto& parameter) {
+    return std::find(parameter.places.begin(), parameter.places.end(), place) !=
+           parameter.places.end();
+  });
+}
+
+/// Considered quantities: believed parameters, then the mean angles of every recording.
+Index considered_size(const PlanarProblem& p) {
+  return static_cast<Index>(p.considered.size()) +
+         static_cast<Index>(p.mean_angle_covariance.size()) * p.train.prisms();
+}
+
+Eigen::MatrixXd considered_covariance(const PlanarProblem& p) {
+  const Index size = considered_size(p);
+  Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(size, size);
+  Index at = static_cast<Index>(p.considered.size());
+  if (at > 0) covariance.topLeftCorner(at, at) = p.considered_covariance;
+  for (const Eigen::MatrixXd& own : p.mean_angle_covariance) {
+    covariance.block(at, at, own.rows(), own.cols()) = own;
+    at += own.rows();
+  }
+  return covariance;
+}
+
+/// d columns of one view / d unknowns, and d columns / d considered parameters.
+struct Chain {
+  Eigen::MatrixXd unknowns, considered;
+};
+
+Chain chain_of(const PlanarProblem& p, const Unknowns& at, const Places& places, std::size_t view) {
+  const WallView& seen = p.views[view];
+  const PlaneColumns columns{static_cast<int>(places.all.size()), p.train.prisms()};
+  Chain chain{Eigen::MatrixXd::Zero(columns.size(), at.size()),
+              Eigen::MatrixXd::Zero(columns.size(), considered_size(p))};
+  for (Index j = 0; j < at.free(); ++j) {
+    for (const int place : p.free[static_cast<std::size_t>(j)].places) {
+      chain.unknowns(places.column(place), j) = 1.0;
+    }
+  }
+  if (at.range_offset() >= 0) chain.unknowns(columns.range_offset(), at.range_offset()) = 1.0;
+  // The tangents in the sensor's frame are those of the scene turned, see plane_view().
+  const Wall& wall = p.walls[seen.wall];
+  const auto [u1, u2] = tangents_of(wall.normal);
+  if (const Index normal = at.normal(seen.wall); normal >= 0) {
+    chain.unknowns(columns.normal(0), normal) = 1.0;
+    chain.unknowns(columns.normal(1), normal + 1) = 1.0;
+  }
+  if (const Index turn = at.rotation(seen.recording); turn >= 0) {
+    // A station turned by rho about the scene's axes sees the normal turned back: + n x rho.
+    const Eigen::Vector3d n = eigen(wall.normal);
+    chain.unknowns.block<1, 3>(columns.normal(0), turn) = eigen(u1).cross(n).transpose();
+    chain.unknowns.block<1, 3>(columns.normal(1), turn) = eigen(u2).cross(n).transpose();
+  }
+  chain.unknowns(columns.distance(), at.distance(view)) = 1.0;
+  const auto believed = static_cast<Index>(p.considered.size());
+  for (Index j = 0; j < believed; ++j) {
+    for (const int place : p.considered[static_cast<std::size_t>(j)].places) {
+      // The other error parameters that the sensor believes in only act through the angles.
+      if (is_material(place, p.train.prisms()) && !is_free(p, place)) {
+        chain.considered(places.column(place), j) = 1.0;
+      }
+    }
+    if (p.angle_sensitivity.empty()) continue;
+    for (int k = 0; k < p.train.prisms(); ++k) {
+      chain.considered(columns.rotation_angle(k), j) =
+          p.angle_sensitivity[seen.recording](k, j);
+    }
+  }
+  if (!p.mean_angle_covariance.empty()) {
+    const Index mine = believed + static_cast<Index>(seen.recording) * p.train.prisms();
+    for (int k = 0; k < p.train.prisms(); ++k) {
+      chain.considered(columns.rotation_angle(k), mine + k) = 1.0;
+    }
+  }
+  return chain;
+}
+
+/// Sum of all normal equations and priors at one point.
+struct System {
+  Eigen::MatrixXd hessian;     ///< [unknowns, unknowns]
+  Eigen::VectorXd gradient;    ///< [unknowns]
+  Eigen::MatrixXd considered;  ///< J^T W d prediction / d considered [unknowns, considered]
+  Eigen::MatrixXd data_hessian;  ///< without priors
+  double cost = 0;
+  std::size_t shots = 0, lost = 0;
+  std::vector<Eigen::MatrixXd> view_hessian;  ///< [views] of [unknowns, unknowns]
+  std::vector<double> view_cost;              ///< [views]
+};
+
+/// Adjusted less stated normal, in the tangents of the adjusted one, rad.
+Eigen::Vector2d misfit_of(const Wall& wall) {
+  const auto [u1, u2] = tangents_of(wall.normal);
+  const Vector3<double> difference = wall.normal - wall.stated;
+  return {dot(u1, difference), dot(u2, difference)};
+}
+
+/// Adjusted after stated rotation, scene frame, rad.
+Eigen::Vector3d misfit_of(const StationPose& station) {
+  return rotation_vector(station.scene_from_sensor * station.stated.transpose());
+}
+
+/// What is known before.
+void add_priors(const PlanarProblem& p, const Unknowns& at, System& system) {
+  const auto tie = [&](Index unknown, double sigma, double off) {
+    const double information = 1.0 / (sigma * sigma);
+    system.hessian(unknown, unknown) += information;
+    system.gradient[unknown] -= information * off;
+    system.cost += information * off * off;
+  };
+  for (std::size_t j = 0; j < p.prior_sigma.size(); ++j) {
+    if (!std::isfinite(p.prior_sigma[j])) continue;
+    const int place = p.free[j].places.front();
+    tie(static_cast<Index>(j), p.prior_sigma[j], p.train[place] - p.prior[place]);
+  }
+  if (at.range_offset() >= 0) tie(at.range_offset(), p.range_offset_sigma, p.range_offset);
+  for (std::size_t w = 0; w < p.walls.size(); ++w) {
+    if (!(p.walls[w].normal_sigma > 0)) continue;
+    const Eigen::Vector2d off = misfit_of(p.walls[w]);
+    for (Index i = 0; i < 2; ++i) tie(at.normal(w) + i, p.walls[w].normal_sigma, off[i]);
+  }
+  for (std::size_t s = 0; s < p.stations.size(); ++s) {
+    if (at.rotation(s) < 0) continue;
+    const Eigen::Vector3d off = misfit_of(p.stations[s]);
+    for (Index i = 0; i < 3; ++i) tie(at.rotation(s) + i, p.stations[s].sigma, off[i]);
+  }
+}
+
+System build_system(const PlanarProblem& p, const Unknowns& at, const Places& places,
+                    InstructionSet set) {
+  System system;
+  const Index n = at.size(), considered = considered_size(p);
+  system.hessian = Eigen::MatrixXd::Zero(n, n);
+  system.gradient = Eigen::VectorXd::Zero(n);
+  system.considered = Eigen::MatrixXd::Zero(n, considered);
+  for (std::size_t view = 0; view < p.views.size(); ++view) {
+    PlaneView plane = plane_view(p, view);
+    plane.places = places.all;
+    const PlaneEquations equations = plane_equations(*p.views[view].shots, plane, {}, set);
+    const Chain chain = chain_of(p, at, places, view);
+    system.view_hessian.push_back(chain.unknowns.transpose() * equations.hessian * chain.unknowns);
+    system.view_cost.push_back(equations.cost);
+    system.hessian += system.view_hessian.back();
+    system.gradient += chain.unknowns.transpose() * equations.gradient;
+    system.considered += chain.unknowns.transpose() * equations.hessian * chain.considered;
+    system.cost += equations.cost;
+    system.shots += equations.shots;
+    system.lost += equations.lost;
+  }
+  system.data_hessian = system.hessian;
+  add_priors(p, at, system);
+  return system;
+}
+
+void move(PlanarProblem& p, const Unknowns& at, const Eigen::VectorXd& step) {
+  for (Index j = 0; j < at.free(); ++j) {
+    for (const int place : p.free[static_cast<std::size_t>(j)].places) {
+      p.train.set_place(place, p.train[place] + step[j]);
+    }
+  }
+  if (at.range_offset() >= 0) p.range_offset += step[at.range_offset()];
+  for (std::size_t w = 0; w < p.walls.size(); ++w) {
+    if (at.normal(w) < 0) continue;
+    Vector3<double>& normal = p.walls[w].normal;
+    const auto [u1, u2] = tangents_of(normal);
+    normal = normalized(normal + step[at.normal(w)] * u1 + step[at.normal(w) + 1] * u2);
+  }
+  for (std::size_t s = 0; s < p.stations.size(); ++s) {
+    if (at.rotation(s) < 0) continue;
+    Eigen::Matrix3d& turn = p.stations[s].scene_from_sensor;
+    turn = rotation(step.segment<3>(at.rotation(s))) * turn;
+  }
+  for (std::size_t v = 0; v < p.views.size(); ++v) p.views[v].distance += step[at.distance(v)];
+}
+
+/// Unknowns differ by many orders of magnitude, so the matrix is scaled before it is factorised.
+class ScaledSolver {
+ public:
+  ScaledSolver(const Eigen::MatrixXd& matrix, double damping)
+      : scale_(matrix.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse()),
+        solver_((Eigen::MatrixXd(scale_.asDiagonal() * matrix * scale_.asDiagonal()) +
+                 damping * Eigen::MatrixXd::Identity(matrix.rows(), matrix.cols()))) {}
+  bool ok() const { return solver_.info() == Eigen::Success; }
+  Eigen::MatrixXd solve(const Eigen::MatrixXd& right) const {
+    return scale_.asDiagonal() * solver_.solve(scale_.asDiagonal() * right);
+  }
+
+ private:
+  Eigen::VectorXd scale_;
+  Eigen::LLT<Eigen::MatrixXd> solver_;
+};
+
+/// Information on the free parameters when everything else is unknown. Directions without any
+/// information come out as zero, also where the others cannot be told apart.
+Eigen::MatrixXd eliminated(const Eigen::MatrixXd& hessian, Index free) {
+  const Index rest = hessian.rows() - free;
+  if (rest == 0) return hessian;
+  const Eigen::VectorXd scale =
+      hessian.diagonal().tail(rest).cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(
+      scale.asDiagonal() * hessian.bottomRightCorner(rest, rest) * scale.asDiagonal());
+  Eigen::VectorXd inverse = solver.eigenvalues();
+  for (double& value : inverse) value = value > 1e-13 * static_cast<double>(rest) ? 1.0 / value : 0.0;
+  const Eigen::MatrixXd half = inverse.cwiseSqrt().asDiagonal() * solver.eigenvectors().transpose() *
+                               scale.asDiagonal() * hessian.bottomLeftCorner(rest, free);
+  return hessian.topLeftCorner(free, free) - half.transpose() * half;
+}
+
+PriorTest test_of(std::string name, bool station, const Eigen::VectorXd& misfit, double sigma,
+                  const Eigen::MatrixXd& posterior) {
+  PriorTest test;
+  test.name = std::move(name);
+  test.station = station;
+  test.misfit = misfit.norm();
+  // Covariance of prior less adjusted: what the data added. Directions in which the data say
+  // nothing have no misfit and are no degrees of freedom.
+  const Eigen::MatrixXd covariance =
+      sigma * sigma * Eigen::MatrixXd::Identity(misfit.size(), misfit.size()) - posterior;
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(covariance);
+  for (Index i = 0; i < misfit.size(); ++i) {
+    if (solver.eigenvalues()[i] < 1e-3 * sigma * sigma) continue;
+    const double part = solver.eigenvectors().col(i).dot(misfit);
+    test.chi2 += part * part / solver.eigenvalues()[i];
+    ++test.degrees_of_freedom;
+  }
+  test.critical = critical_chi2(test.degrees_of_freedom);
+  return test;
+}
+
+void check(const PlanarProblem& p) {
+  if (p.views.empty()) throw EstimationError("no wall to calibrate on");
+  if (p.free.empty()) throw InvalidArgument("no parameter is free: there is nothing to calibrate");
+  if (!p.prior_sigma.empty() && p.prior_sigma.size() != p.free.size()) {
+    throw InvalidArgument(fmt::format("{} prior sigmas given for {} free parameters",
+                                      p.prior_sigma.size(), p.free.size()));
+  }
+  for (const WallView& view : p.views) {
+    if (!view.shots || view.shots->size() == 0) {
+      throw InvalidArgument("a view of a wall has no shots");
+    }
+    if (view.recording >= p.stations.size() || view.wall >= p.walls.size()) {
+      throw InvalidArgument("a view names a recording or a wall that is not there");
+    }
+    if (!(view.range_variance > 0)) {
+      throw InvalidArgument(
+          fmt::format("range variance = {} m^2, allowed above 0", view.range_variance));
+    }
+  }
+}
+
+}  // namespace
+
+bool is_material(int place, int prisms) {
+  if (place == place::refractive_index_air()) return true;
+  for (int k = 0; k < prisms; ++k) {
+    if (place == place::refractive_index(k) || place == place::wedge_angle(k)) return true;
+  }
+  return false;
+}
+
+std::pair<Vector3<double>, Vector3<double>> tangents_of(const Vector3<double>& normal) {
+  // Across the axis that the normal is farthest from.
+  const Vector3<double> axis = std::abs(normal.z) < 0.9 ? Vector3<double>{0, 0, 1}
+                                                        : Vector3<double>{1, 0, 0};
+  const Vector3<double> first = normalized(cross(axis, normal));
+  return {first, cross(normal, first)};
+}
+
+PlaneView plane_view(const PlanarProblem& problem, std::size_t view) {
+  const WallView& seen = problem.views[view];
+  const Wall& wall = problem.walls[seen.wall];
+  const Eigen::Matrix3d turn =
+      problem.stations[seen.recording].scene_from_sensor.transpose();
+  const auto [u1, u2] = tangents_of(wall.normal);
+  PlaneView plane;
+  plane.train = problem.train;
+  plane.geometry = problem.geometry;
+  plane.range_offset = problem.range_offset;
+  plane.range_variance = seen.range_variance;
+  plane.plane = {plain(turn * eigen(wall.normal)), seen.distance};
+  plane.tangent_1 = plain(turn * eigen(u1));
+  plane.tangent_2 = plain(turn * eigen(u2));
+  return plane;
+}
+
+PlanarSolution adjust(PlanarProblem problem, const AdjustmentOptions& options,
+                      const Progress& progress) {
+  check(problem);
+  const Unknowns at(problem);
+  const Places places(problem);
+  PlanarSolution solution;
+  System system = build_system(problem, at, places, options.set);
+  double damping = 1e-8;
+  while (solution.iterations < options.most_iterations) {
+    const ScaledSolver solver(system.hessian, damping);
+    if (!solver.ok()) {  // flat in some direction
+      damping = std::max(10.0 * damping, 1e-8);
+      if (damping > kMostDamping) break;
+      continue;
+    }
+    const Eigen::VectorXd step = solver.solve(system.gradient);
+    const double promised = step.dot(system.gradient);
+    if (promised <= options.tolerance) {
+      // The step is right to second order and costs nothing more.
+      move(problem, at, step);
+      solution.converged = true;
+      break;
+    }
+    PlanarProblem trial = problem;
+    move(trial, at, step);
+    System next = build_system(trial, at, places, options.set);
+    ++solution.iterations;
+    report_progress(progress, static_cast<double>(solution.iterations) / options.most_iterations);
+    // Shots that lose their plane would make any step look good.
+    const bool better = next.lost <= system.lost && (next.cost <= system.cost || promised < kSmallPromise);
+    if (better) {
+      problem = std::move(trial);
+      system = std::move(next);
+      damping = std::max(damping / 10.0, kLeastDamping);
+    } else {
+      damping = std::max(damping * 100.0, 1e-6);
+      if (damping > kMostDamping) break;
+    }
+  }
+  solution.cost = system.cost;
+  solution.shots = system.shots;
+  solution.lost = system.lost;
+
+  const Index free = at.free(), n = at.size();
+  solution.information = eliminated(system.data_hessian, free);
+  const ScaledSolver solver(system.hessian, kLeastDamping);
+  Eigen::MatrixXd covariance = Eigen::MatrixXd::Constant(n, n, std::numeric_limits<double>::infinity());
+  if (solver.ok()) {
+    covariance = solver.solve(Eigen::MatrixXd::Identity(n, n));
+    for (std::size_t view = 0; view < problem.views.size(); ++view) {
+      const double share = covariance.cwiseProduct(system.view_hessian[view]).sum();
+      solution.redundancy.push_back(static_cast<double>(problem.views[view].shots->size()) - share);
+    }
+  } else {
+    solution.converged = false;
+    solution.redundancy.assign(problem.views.size(), 0.0);
+  }
+  solution.chi2 = system.view_cost;
+  if (solver.ok()) {
+    for (std::size_t w = 0; w < problem.walls.size(); ++w) {
+      const Wall& wall = problem.walls[w];
+      if (!(wall.normal_sigma > 0)) continue;
+      solution.prior_tests.push_back(
+          test_of(wall.name, false, misfit_of(wall), wall.normal_sigma,
+                  covariance.block(at.normal(w), at.normal(w), 2, 2)));
+    }
+    for (std::size_t s = 0; s < problem.stations.size(); ++s) {
+      const StationPose& station = problem.stations[s];
+      if (at.rotation(s) < 0) continue;
+      solution.prior_tests.push_back(
+          test_of(station.name, true, misfit_of(station), station.sigma,
+                  covariance.block(at.rotation(s), at.rotation(s), 3, 3)));
+    }
+  }
+  if (considered_size(problem) > 0 && solver.ok()) {
+    // Errors of the considered parameters shift the solution by -N^-1 J^T W K.
+    const Eigen::MatrixXd shift = covariance * system.considered;
+    covariance += shift * considered_covariance(problem) * shift.transpose();
+  }
+  solution.covariance = covariance.topLeftCorner(free, free);
+  const auto sigma = [&](Index i) { return i < 0 ? 0.0 : std::sqrt(covariance(i, i)); };
+  solution.range_offset_sigma = sigma(at.range_offset());
+  for (std::size_t v = 0; v < problem.views.size(); ++v) {
+    solution.distance_sigma.push_back(sigma(at.distance(v)));
+  }
+  for (std::size_t w = 0; w < problem.walls.size(); ++w) {
+    const Index normal = at.normal(w);
+    solution.normal_sigma.push_back(normal < 0 ? 0.0 : std::hypot(sigma(normal), sigma(normal + 1)));
+  }
+  solution.parameters.resize(free);
+  for (Index j = 0; j < free; ++j) {
+    solution.parameters[j] = problem.train[problem.free[static_cast<std::size_t>(j)].places.front()];
+  }
+  solution.problem = std::move(problem);
+  return solution;
+}
+
+}  // namespace risley::calibration

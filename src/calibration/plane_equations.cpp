@@ -1,0 +1,145 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "risley/calibration/plane_equations.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <string_view>
+
+#include <fmt/format.h>
+#include <tbb/parallel_for.h>
+
+#include "risley/core/error.hpp"
+
+#include "calibration/plane_equations_kernel.hpp"
+
+namespace risley::calibration {
+namespace {
+
+/// Shots that one task sums up: fixed, so that sums do not depend on the number of threads.
+constexpr std::size_t kChunkShots = 8192;
+
+std::size_t run_kernel(const PlaneArguments& arguments, InstructionSet set) {
+#ifdef RISLEY_HAS_X86_KERNELS
+  if (set == InstructionSet::avx512) return kernel_avx512::accumulate_plane(arguments);
+  if (set == InstructionSet::avx2) return kernel_avx2::accumulate_plane(arguments);
+#endif
+  static_cast<void>(set);
+  return kernel_baseline::accumulate_plane(arguments);
+}
+
+void check_count(std::string_view columns, std::size_t count, std::size_t expected) {
+  if (count != expected) {
+    throw InvalidArgument(fmt::format("{} has {} columns, expected {}", columns, count, expected));
+  }
+}
+
+void check_length(std::string_view column, std::size_t length, std::size_t shots) {
+  if (length != shots) {
+    throw InvalidArgument(
+        fmt::format("column {} has {} values, the ranges have {}", column, length, shots));
+  }
+}
+
+void check(const RangedShots& shots, const PlaneView& view, const ResidualColumns& columns,
+           InstructionSet set) {
+  const auto& sets = available_instruction_sets();
+  if (std::find(sets.begin(), sets.end(), set) == sets.end()) {
+    throw InvalidArgument(
+        fmt::format("this processor or binary has no {} instructions", to_string(set)));
+  }
+  const auto prisms = static_cast<std::size_t>(view.train.prisms());
+  check_count("rotation_angle", shots.rotation_angle.size(), prisms);
+  check_count("angle_covariance", shots.angle_covariance.size(), prisms * (prisms + 1) / 2);
+  for (const auto& column : shots.rotation_angle) {
+    check_length("rotation_angle", column.size(), shots.size());
+  }
+  for (const auto& column : shots.angle_covariance) {
+    check_length("angle_covariance", column.size(), shots.size());
+  }
+  if (!columns.residual.empty()) check_length("residual", columns.residual.size(), shots.size());
+  if (!columns.variance.empty()) check_length("variance", columns.variance.size(), shots.size());
+  const int all_places = parameter_count(view.train.prisms());
+  if (view.places.size() > static_cast<std::size_t>(all_places)) {
+    throw InvalidArgument(fmt::format("{} places given, a train of {} prisms has {}",
+                                      view.places.size(), prisms, all_places));
+  }
+  for (const int place : view.places) {
+    if (place < 0 || place >= all_places) {
+      throw InvalidArgument(fmt::format("place = {}, allowed 0 to {}", place, all_places - 1));
+    }
+  }
+  if (!(view.range_variance > 0) || !std::isfinite(view.range_variance)) {
+    throw InvalidArgument(
+        fmt::format("range_variance = {} m^2, must be positive", view.range_variance));
+  }
+}
+
+void copy(const Vector3<double>& from, double* to) {
+  to[0] = from.x;
+  to[1] = from.y;
+  to[2] = from.z;
+}
+
+}  // namespace
+
+PlaneEquations plane_equations(const RangedShots& shots, const PlaneView& view,
+                               const ResidualColumns& columns, InstructionSet set) {
+  check(shots, view, columns, set);
+  const PlaneColumns layout{static_cast<int>(view.places.size()), view.train.prisms()};
+  const std::vector<double> face_position = face_positions(view.train.face_order(), view.geometry);
+  std::vector<const double*> rotation_angle;
+  std::vector<const float*> angle_covariance;
+  for (const auto& column : shots.rotation_angle) rotation_angle.push_back(column.data());
+  for (const auto& column : shots.angle_covariance) angle_covariance.push_back(column.data());
+
+  PlaneArguments all;
+  all.parameters = view.train.parameters().data();
+  all.face_order = view.train.face_order().data();
+  all.prisms = layout.prisms;
+  all.face_position = face_position.data();
+  all.places = view.places.data();
+  all.place_count = layout.places;
+  all.range_offset = view.range_offset;
+  all.range_variance = view.range_variance;
+  copy(view.plane.normal, all.normal);
+  all.distance = view.plane.distance;
+  copy(view.tangent_1, all.tangent[0]);
+  copy(view.tangent_2, all.tangent[1]);
+  all.rotation_angle = rotation_angle.data();
+  all.angle_covariance = angle_covariance.data();
+  all.range = shots.range.data();
+  if (!columns.residual.empty()) all.residual = columns.residual.data();
+  if (!columns.variance.empty()) all.variance = columns.variance.data();
+
+  const int size = layout.size();
+  const auto triangle = static_cast<std::size_t>((size + 1) * (size + 2) / 2);
+  const std::size_t chunks = (shots.size() + kChunkShots - 1) / kChunkShots;
+  std::vector<double> products(chunks * triangle);
+  std::vector<std::size_t> lost(chunks);
+  tbb::parallel_for(std::size_t{0}, chunks, [&](std::size_t chunk) {
+    PlaneArguments mine = all;
+    mine.begin = chunk * kChunkShots;
+    mine.end = std::min(mine.begin + kChunkShots, shots.size());
+    mine.products = products.data() + chunk * triangle;
+    lost[chunk] = run_kernel(mine, set);
+  });
+
+  PlaneEquations equations;
+  equations.hessian = Eigen::MatrixXd::Zero(size, size);
+  equations.gradient = Eigen::VectorXd::Zero(size);
+  const double* entry = products.data();
+  for (std::size_t chunk = 0; chunk < chunks; ++chunk) {
+    for (int i = 0; i < size; ++i) {
+      for (int j = i; j < size; ++j) equations.hessian(i, j) += *entry++;
+      equations.gradient[i] += *entry++;
+    }
+    equations.cost += *entry++;
+    equations.lost += lost[chunk];
+  }
+  equations.hessian.triangularView<Eigen::StrictlyLower>() = equations.hessian.transpose();
+  equations.shots = shots.size() - equations.lost;
+  return equations;
+}
+
+}  // namespace risley::calibration

@@ -1,0 +1,290 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+// Compiled once per instruction set with RISLEY_KERNEL = baseline, avx2, avx512, under the rules of
+// optics/batch_kernel.cpp.
+#include "calibration/plane_equations_kernel.hpp"
+
+#include <array>
+
+#include "risley/core/simd.hpp"
+#include "risley/optics/beam_origin.hpp"
+#include "risley/optics/observation_adjoint.hpp"
+
+#define RISLEY_JOIN2(a, b) a##b
+#define RISLEY_JOIN(a, b) RISLEY_JOIN2(a, b)
+#define RISLEY_KERNEL_NAMESPACE RISLEY_JOIN(kernel_, RISLEY_KERNEL)
+
+namespace risley::calibration::RISLEY_KERNEL_NAMESPACE {
+namespace {
+
+using Batch = xsimd::batch<double>;
+using Lanes = xsimd::batch_bool<double>;
+constexpr std::size_t kLanes = Batch::size;
+constexpr double kLargest = __DBL_MAX__;
+
+/// Groups of shots whose rows are kept until they are multiplied with each other: enough that the
+/// sums stay in registers for a while, few enough that the rows stay in the nearest cache.
+constexpr std::size_t kGroups = 16;
+constexpr std::size_t kBlock = kGroups * kLanes;
+/// The products are summed up in squares of so many rows and columns, as the registers allow.
+constexpr std::size_t kTile = kLanes == 8 ? 4 : 3;
+
+constexpr std::size_t tiles_of(std::size_t columns) { return (columns + kTile - 1) / kTile; }
+
+double sum_of_lanes(const Batch& value) {
+  alignas(64) double lanes[kLanes];
+  value.store_aligned(lanes);
+  double sum = 0;
+  for (std::size_t i = 0; i < kLanes; ++i) sum += lanes[i];
+  return sum;
+}
+
+/// Sums of the products of all pairs of columns.
+template <int N>
+class Products {
+ public:
+  /// @param columns  residual included
+  explicit Products(std::size_t columns) : columns_(columns), tiles_(tiles_of(columns)) {
+    const Batch zero(0.0);
+    for (std::size_t i = 0; i < tiles_ * (tiles_ + 1) / 2 * kTile * kTile; ++i) sums_[i] = zero;
+    for (std::size_t group = 0; group < kGroups; ++group) {
+      for (std::size_t i = columns; i < stride(); ++i) row(group)[i] = zero;
+    }
+  }
+
+  /// Where the columns of a group go, each times the root of the weight.
+  Batch* row(std::size_t group) { return rows_ + group * stride(); }
+
+  /// Adds the products of the first groups.
+  void add(std::size_t groups) {
+    Batch* sums = sums_;
+    for (std::size_t i = 0; i < tiles_; ++i) {
+      for (std::size_t j = i; j < tiles_; ++j, sums += kTile * kTile) {
+        add_tile(rows_ + i * kTile, rows_ + j * kTile, groups, sums);
+      }
+    }
+  }
+
+  void store(double* out) const {
+    for (std::size_t i = 0; i < columns_; ++i) {
+      const std::size_t row_tile = i / kTile;
+      const Batch* first =
+          sums_ + (row_tile * tiles_ - row_tile * (row_tile + 1) / 2) * kTile * kTile;
+      for (std::size_t j = i; j < columns_; ++j) {
+        *out++ = sum_of_lanes(first[j / kTile * kTile * kTile + i % kTile * kTile + j % kTile]);
+      }
+    }
+  }
+
+ private:
+  static constexpr std::size_t kMost = tiles_of(parameter_count(N) + N + 5);
+
+  std::size_t stride() const { return tiles_ * kTile; }
+
+  void add_tile(const Batch* left, const Batch* right, std::size_t groups, Batch* sums) const {
+    Batch sum[kTile][kTile];
+    for (std::size_t i = 0; i < kTile; ++i) {
+      for (std::size_t j = 0; j < kTile; ++j) sum[i][j] = sums[i * kTile + j];
+    }
+    for (std::size_t group = 0; group < groups; ++group, left += stride(), right += stride()) {
+      for (std::size_t i = 0; i < kTile; ++i) {
+        for (std::size_t j = 0; j < kTile; ++j)
+          sum[i][j] = xsimd::fma(left[i], right[j], sum[i][j]);
+      }
+    }
+    for (std::size_t i = 0; i < kTile; ++i) {
+      for (std::size_t j = 0; j < kTile; ++j) sums[i * kTile + j] = sum[i][j];
+    }
+  }
+
+  std::size_t columns_, tiles_;
+  Batch rows_[kGroups * kMost * kTile];
+  Batch sums_[kMost * (kMost + 1) / 2 * kTile * kTile];
+};
+
+/// Everything of a call that is the same for all shots.
+template <int N>
+struct Constants {
+  PreparedTrain<Batch, N> train;
+  PreparedDerivatives<Batch, N> derivatives;
+  std::array<Batch, 2 * N> face_position;
+  Vector3<Batch> normal, tangent_1, tangent_2;
+  Batch distance, range_offset, range_variance;
+
+  explicit Constants(const PlaneArguments& a)
+      : normal(vector(a.normal)),
+        tangent_1(vector(a.tangent[0])),
+        tangent_2(vector(a.tangent[1])),
+        distance(a.distance),
+        range_offset(a.range_offset),
+        range_variance(a.range_variance) {
+    std::array<Batch, parameter_count(N)> parameters;
+    for (std::size_t i = 0; i < parameter_count(N); ++i) parameters[i] = Batch(a.parameters[i]);
+    std::array<FaceOrder, N> order;
+    __builtin_memcpy(&order, a.face_order, sizeof(order));
+    train = prepare<Batch, N>(parameters, order);
+    derivatives = prepare_derivatives<Batch, N>(parameters, order);
+    for (std::size_t i = 0; i < 2 * N; ++i) face_position[i] = Batch(a.face_position[i]);
+  }
+
+ private:
+  static Vector3<Batch> vector(const double* v) { return {Batch(v[0]), Batch(v[1]), Batch(v[2])}; }
+};
+
+/// The columns of one block of shots. Behind the last shot of a call follow some that are lost.
+template <int N>
+class Block {
+ public:
+  static constexpr std::size_t kPairs = N * (N + 1) / 2;
+
+  /// Columns [from, from + shots). @param shots  1 to kBlock
+  void load(const PlaneArguments& a, std::size_t from, std::size_t shots) {
+    shots_ = shots;
+    const bool full = shots == kBlock;
+    for (std::size_t k = 0; k < N; ++k) {
+      rotation_angle_[k] =
+          full ? a.rotation_angle[k] + from : padded(a.rotation_angle[k] + from, angles_[k], 0.0);
+    }
+    range_ = full ? a.range + from : padded(a.range + from, ranges_, __builtin_nan(""));
+    for (std::size_t pair = 0; pair < kPairs; ++pair) {
+      const float* column = a.angle_covariance[pair] + from;
+      for (std::size_t i = 0; i < shots; ++i) {
+        covariance_[pair][i] = static_cast<double>(column[i]);
+      }
+      for (std::size_t i = shots; i < kBlock; ++i) covariance_[pair][i] = 0;
+    }
+  }
+
+  std::size_t groups() const { return (shots_ + kLanes - 1) / kLanes; }
+  std::size_t shots() const { return shots_; }
+  Batch rotation_angle(std::size_t rotor, std::size_t group) const {
+    return Batch::load_unaligned(rotation_angle_[rotor] + group * kLanes);
+  }
+  Batch range(std::size_t group) const { return Batch::load_unaligned(range_ + group * kLanes); }
+  Batch covariance(std::size_t pair, std::size_t group) const {
+    return Batch::load_aligned(covariance_[pair] + group * kLanes);
+  }
+
+ private:
+  const double* padded(const double* column, double* copy, double value) const {
+    for (std::size_t i = 0; i < shots_; ++i) copy[i] = column[i];
+    for (std::size_t i = shots_; i < kBlock; ++i) copy[i] = value;
+    return copy;
+  }
+
+  std::size_t shots_ = 0;
+  const double* rotation_angle_[N];
+  const double* range_;
+  alignas(64) double covariance_[kPairs][kBlock];
+  alignas(64) double angles_[N][kBlock];
+  alignas(64) double ranges_[kBlock];
+};
+
+/// What a block leaves for ResidualColumns.
+struct BlockResiduals {
+  alignas(64) double residual[kBlock];
+  alignas(64) double variance[kBlock];
+};
+
+/// One group of shots, a lane each: writes its row.
+/// @return lanes that are lost
+template <int N>
+std::size_t fill_row(const PlaneArguments& a, const Constants<N>& c, const Block<N>& block,
+                     std::size_t group, Batch* row, BlockResiduals& residuals) {
+  const Batch zero(0.0), one(1.0);
+  std::array<Batch, N> angles;
+  for (std::size_t k = 0; k < N; ++k) angles[k] = block.rotation_angle(k, group);
+  const auto forward = trace_forward(c.train, angles);
+  const Vector3<Batch>& direction = forward.direction();
+  const Vector3<Batch> origin = beam_origin(forward, c.face_position);
+  const Batch approach = dot(c.normal, direction);
+  const Batch over_approach = one / approach;
+  const Batch range = (c.distance - dot(c.normal, origin)) * over_approach;
+  Batch residual = block.range(group) - c.range_offset - range;
+
+  const std::array<Vector3<Batch>, 1> seeds{-range * over_approach * c.normal};
+  const auto gradients = trace_adjoint(c.train, c.derivatives, forward, seeds);
+  const Gradient<Batch, N>& gradient = gradients[0];
+  Batch variance = c.range_variance;
+  std::size_t pair = 0;
+  for (std::size_t k = 0; k < N; ++k) {
+    Batch sum = gradient.rotation_angles[k] * block.covariance(pair++, group);
+    for (std::size_t l = k + 1; l < N; ++l) {
+      const Batch twice = gradient.rotation_angles[l] + gradient.rotation_angles[l];
+      sum = xsimd::fma(twice, block.covariance(pair++, group), sum);
+    }
+    variance = xsimd::fma(gradient.rotation_angles[k], sum, variance);
+  }
+
+  const Batch scale = one / xsimd::sqrt(variance);
+  Batch* column = row;
+  for (int i = 0; i < a.place_count; ++i) {
+    *column++ = scale * gradient.parameters[static_cast<std::size_t>(a.places[i])];
+  }
+  for (std::size_t k = 0; k < N; ++k) *column++ = scale * gradient.rotation_angles[k];
+  *column++ = scale;
+  const Batch slope = scale * over_approach;
+  const Vector3<Batch> point = origin + range * direction;
+  *column++ = -slope * dot(c.tangent_1, point);
+  *column++ = -slope * dot(c.tangent_2, point);
+  *column++ = slope;
+  *column++ = scale * residual;
+
+  // Comparison with NaN is false: so is what a beam that does not get through leads to.
+  const Lanes good = (approach > Batch(kLeastApproach)) & (range > zero) &
+                     (xsimd::abs(residual) <= Batch(kLargest)) & (variance > zero) &
+                     (variance <= Batch(kLargest));
+  std::size_t lost = 0;
+  if (!xsimd::all(good)) {
+    for (Batch* entry = row; entry != column; ++entry) *entry = xsimd::select(good, *entry, zero);
+    const Batch nan(__builtin_nan(""));
+    residual = xsimd::select(good, residual, nan);
+    variance = xsimd::select(good, variance, nan);
+    lost = static_cast<std::size_t>(sum_of_lanes(xsimd::select(good, zero, one)));
+  }
+  residual.store_aligned(residuals.residual + group * kLanes);
+  variance.store_aligned(residuals.variance + group * kLanes);
+  return lost;
+}
+
+template <int N>
+std::size_t accumulate_shots(const PlaneArguments& a) {
+  const Constants<N> constants(a);
+  Products<N> products(static_cast<std::size_t>(a.place_count) + N + 5);
+  Block<N> block;
+  BlockResiduals residuals;
+  std::size_t lost = 0;
+  for (std::size_t shot = a.begin; shot < a.end; shot += kBlock) {
+    block.load(a, shot, a.end - shot < kBlock ? a.end - shot : kBlock);
+    for (std::size_t group = 0; group < block.groups(); ++group) {
+      lost += fill_row(a, constants, block, group, products.row(group), residuals);
+    }
+    lost -= block.groups() * kLanes - block.shots();
+    products.add(block.groups());
+    for (std::size_t i = 0; a.residual && i < block.shots(); ++i) {
+      a.residual[shot + i] = residuals.residual[i];
+    }
+    for (std::size_t i = 0; a.variance && i < block.shots(); ++i) {
+      a.variance[shot + i] = residuals.variance[i];
+    }
+  }
+  products.store(a.products);
+  return lost;
+}
+
+}  // namespace
+
+std::size_t accumulate_plane(const PlaneArguments& a) {
+  switch (a.prisms) {
+    case 1:
+      return accumulate_shots<1>(a);
+    case 2:
+      return accumulate_shots<2>(a);
+    case 3:
+      return accumulate_shots<3>(a);
+    default:
+      return accumulate_shots<4>(a);
+  }
+}
+
+}  // namespace risley::calibration::RISLEY_KERNEL_NAMESPACE

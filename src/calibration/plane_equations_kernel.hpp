@@ -1,0 +1,53 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstddef>
+
+#include "risley/optics/prism.hpp"
+
+namespace risley::calibration {
+
+/// A beam that meets the plane at a flatter angle, as the cosine of the angle of incidence, counts
+/// as parallel to it.
+inline constexpr double kLeastApproach = 1e-3;
+
+/// Plain arguments of one call, see optics/batch_kernel.hpp for why they are plain. Columns are
+/// those of all shots; the call works on shots [begin, end).
+struct PlaneArguments {
+  const double* parameters = nullptr;     ///< flat vector
+  const FaceOrder* face_order = nullptr;  ///< [prisms]
+  int prisms = 0;
+  const double* face_position = nullptr;  ///< [2 prisms]
+  const int* places = nullptr;            ///< of the flat vector, at most all of them
+  int place_count = 0;
+  double range_offset = 0;
+  double range_variance = 0;
+  double normal[3] = {0, 0, 0};
+  double distance = 0;
+  double tangent[2][3] = {{0, 0, 0}, {0, 0, 0}};
+
+  const double* const* rotation_angle = nullptr;   ///< [prisms][shots]
+  const float* const* angle_covariance = nullptr;  ///< [prisms (prisms+1)/2][shots]
+  const double* range = nullptr;                   ///< [shots]
+  std::size_t begin = 0, end = 0;
+
+  /// Weighted products of the columns of PlaneColumns and, behind them, the residual: upper
+  /// triangle row by row [(columns + 1) (columns + 2) / 2].
+  double* products = nullptr;
+  double* residual = nullptr;  ///< [shots], or nullptr
+  double* variance = nullptr;  ///< [shots], or nullptr
+};
+
+/// @return number of lost shots
+namespace kernel_baseline {
+std::size_t accumulate_plane(const PlaneArguments& arguments);
+}
+namespace kernel_avx2 {
+std::size_t accumulate_plane(const PlaneArguments& arguments);
+}
+namespace kernel_avx512 {
+std::size_t accumulate_plane(const PlaneArguments& arguments);
+}
+
+}  // namespace risley::calibration

@@ -1,0 +1,107 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "risley/calibration/plane_points.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include <Eigen/LU>
+#include <fmt/format.h>
+
+#include "risley/core/angle.hpp"
+#include "risley/core/error.hpp"
+
+namespace risley::calibration {
+namespace {
+
+constexpr std::size_t kBlockShots = 65536;
+
+}  // namespace
+
+void RangedShots::resize(int prisms, std::size_t shots) {
+  const auto n = static_cast<std::size_t>(prisms);
+  rotation_angle.resize(n);
+  angle_covariance.resize(n * (n + 1) / 2);
+  for (auto& column : rotation_angle) column.resize(shots);
+  for (auto& column : angle_covariance) column.resize(shots);
+  range.resize(shots);
+}
+
+void RangedShots::set_row(std::size_t row, const RangedShots& from, std::size_t from_row) {
+  for (std::size_t k = 0; k < rotation_angle.size(); ++k) {
+    rotation_angle[k][row] = from.rotation_angle[k][from_row];
+  }
+  for (std::size_t k = 0; k < angle_covariance.size(); ++k) {
+    angle_covariance[k][row] = from.angle_covariance[k][from_row];
+  }
+  range[row] = from.range[from_row];
+}
+
+RangedRecording ranged_recording(const estimation::Estimate& estimate, std::string name,
+                                 std::string serial) {
+  if (!estimate.converged) {
+    throw EstimationError(
+        fmt::format("{}: the rotation angles were not found: {}", name, estimate.reason));
+  }
+  if (!estimate.map || estimate.series.range.size() != estimate.series.size()) {
+    throw EstimationError(
+        fmt::format("{}: calibration needs ranges and an estimate of all shots", name));
+  }
+  const int prisms = estimate.sensor.prisms();
+  RangedRecording recording;
+  recording.believed = estimate.sensor;
+  recording.free = estimate.free;
+  recording.covariance = estimate.covariance;
+  recording.angle_sensitivity = estimate.map->angle_sensitivity;
+  recording.mean_angle_covariance = estimate.map->angle_information.inverse();
+  recording.serial = std::move(serial);
+  RangedShots& shots = recording.shots;
+  shots.resize(prisms, estimate.series.size());
+  recording.time_ns.resize(estimate.series.size());
+  std::size_t row = 0;
+  for (std::size_t begin = 0; begin < estimate.series.size(); begin += kBlockShots) {
+    const std::size_t end = std::min(begin + kBlockShots, estimate.series.size());
+    const estimation::RotorStates states = states_of_shots(*estimate.map, estimate.series, {begin, end});
+    for (std::size_t i = 0; i < states.size(); ++i) {
+      const double range = estimate.series.range[begin + i];
+      if (!(range > 0.0)) {
+        ++recording.without_range;
+        continue;
+      }
+      if (states.outlier[i] != 0 || std::isnan(states.rotation_angle[0][i])) {
+        ++recording.outliers;
+        continue;
+      }
+      for (std::size_t k = 0; k < shots.rotation_angle.size(); ++k) {
+        shots.rotation_angle[k][row] =
+            std::remainder(states.rotation_angle[k][i], kTwoPi);
+      }
+      for (std::size_t k = 0; k < shots.angle_covariance.size(); ++k) {
+        shots.angle_covariance[k][row] = static_cast<float>(states.rotation_angle_covariance[k][i]);
+      }
+      shots.range[row] = range;
+      recording.time_ns[row] = states.time_ns[i];
+      ++row;
+    }
+  }
+  shots.resize(prisms, row);
+  recording.time_ns.resize(row);
+  if (row == 0) {
+    throw EstimationError(fmt::format("{}: no shot has both a direction and a range", name));
+  }
+  recording.name = std::move(name);
+  return recording;
+}
+
+std::vector<std::size_t> spread_rows(std::size_t shots, std::size_t most) {
+  const std::size_t count = std::min(shots, most);
+  std::vector<std::size_t> rows(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    rows[i] = static_cast<std::size_t>((static_cast<double>(i) + 0.5) * static_cast<double>(shots) /
+                                       static_cast<double>(count));
+  }
+  return rows;
+}
+
+}  // namespace risley::calibration

@@ -1,0 +1,448 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "risley/report/calibration_page.hpp"
+
+#include <cmath>
+#include <limits>
+#include <regex>
+#include <set>
+#include <string>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "risley/core/angle.hpp"
+#include "risley/core/direction.hpp"
+#include "risley/core/random.hpp"
+#include "risley/sensors/preset.hpp"
+
+namespace risley::report {
+namespace {
+
+using calibration::Calibration;
+using testing::HasSubstr;
+using testing::Not;
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+constexpr double kNoise = 0.015;  // of the distances, m
+
+double deg(double degrees) { return radians_from_degrees(degrees); }
+
+calibration::CalibratedPlane wall(const std::string& name, std::size_t recording, double azimuth,
+                                  double zenith, double distance) {
+  calibration::CalibratedPlane plane;
+  plane.name = name;
+  plane.recording = recording;
+  plane.normal = direction_from_angles<double>({deg(azimuth), deg(zenith)});
+  plane.distance = distance;
+  plane.points = 20000;
+  plane.outliers = 7;
+  plane.rms = 0.0151;
+  plane.rms_before = 0.0214;
+  plane.range_sigma = 0.0149;
+  return plane;
+}
+
+calibration::ThicknessProfile profile(const std::string& variable, double from, double to,
+                                      std::size_t bins) {
+  calibration::ThicknessProfile result;
+  result.variable = variable;
+  for (std::size_t i = 0; i < bins; ++i) {
+    const double width = (to - from) / double(bins), left = from + double(i) * width;
+    result.from.push_back(left);
+    result.to.push_back(left + width);
+    const bool empty = i == 2;
+    result.count.push_back(empty ? 0 : 1000 + i);
+    result.mean_before.push_back(empty ? kNaN : 0.01 * std::sin(2 * left));
+    result.mean_after.push_back(empty ? kNaN : 0.0005 * std::sin(5 * left));
+    result.rms_before.push_back(empty ? kNaN : std::hypot(kNoise, result.mean_before.back()));
+    result.rms_after.push_back(empty ? kNaN : kNoise);
+  }
+  return result;
+}
+
+/// Shots of a rosette on the nearest plane of their recording; one in 20 hits none.
+std::vector<calibration::SamplePoint> sample_on(
+    const std::vector<calibration::CalibratedPlane>& planes, std::size_t recordings,
+    std::size_t points) {
+  const RandomStream noise(1, 0);
+  std::vector<calibration::SamplePoint> sample;
+  for (std::size_t i = 0; i < points; ++i) {
+    calibration::SamplePoint one;
+    one.recording = i % recordings;
+    const double turn = 0.0137 * double(i);
+    one.azimuth = deg(19.2) * std::cos(turn) * std::cos(3.11 * turn);
+    one.zenith = deg(90) + deg(19.2) * std::cos(turn) * std::sin(3.11 * turn);
+    const Vector3<double> beam = direction_from_angles<double>({one.azimuth, one.zenith});
+    double range = 100;
+    for (std::size_t k = 0; k < planes.size(); ++k) {
+      const double hit = planes[k].distance / dot(planes[k].normal, beam);
+      if (planes[k].recording != one.recording || !(hit > 0) || hit >= range) continue;
+      range = hit;
+      one.plane = static_cast<int>(k);
+    }
+    one.after = kNoise * noise.normal(2 * i);
+    one.before = one.after + 0.01 * std::sin(4 * one.azimuth / deg(19.2));
+    if (i % 20 == 0) {
+      one.plane = -1;
+      one.before = one.after = kNaN;
+      range *= 0.3 + 0.7 * noise.uniform(2 * i + 1);
+    }
+    one.point = range * beam;
+    sample.push_back(one);
+  }
+  return sample;
+}
+
+/// A calibration as two recordings of rooms would give it.
+Calibration example(std::size_t points = 2000) {
+  Calibration c;
+  c.converged = true;
+  c.sensor = sensors::load_sensor("mid-40");
+  c.sensor.serial = "1PQD&7";
+  c.believed = c.sensor.train;
+  c.free = estimation::free_parameters(estimation::default_free_names(2), 2);
+  const auto n = static_cast<Eigen::Index>(c.free.size());
+  c.parameters.resize(n);
+  c.covariance = Eigen::MatrixXd::Zero(n, n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const std::string& name = c.free[static_cast<std::size_t>(i)].name;
+    c.parameters[i] = c.sensor.get(name) + deg(0.013) * double(i + 1);
+    for (Eigen::Index j = 0; j < n; ++j) {
+      c.covariance(i, j) = std::pow(-0.7, std::abs(i - j)) * deg(0.002) * deg(0.002);
+    }
+  }
+  c.range_offset = -0.0123;
+  c.range_offset_sigma = 0.0021;
+  c.planes = {wall("front <wall> & door", 0, 5, 92, 8.0), wall("left", 0, 70, 90, 3.0),
+              wall("floor", 0, 0, 178, 1.2), wall("hall", 1, -55, 88, 6.0)};
+  c.steps.push_back({0, 0, -0.0213, deg(3.2), deg(91.5), deg(2.5), 341});
+  c.datum_kind = calibration::DatumKind::none;
+  c.datum = {deg(0.0041), deg(0.0123), deg(0.0098), deg(0.0157), deg(0.0032), deg(0.016)};
+  c.datum_without_common = {deg(0.002), deg(0.01), deg(0.008), deg(0.013), deg(0.0021), deg(0.013)};
+  c.prior_tests = {{"flipped <180>", true, deg(0.02), 4.5, 3, 21.1},
+                   {"ceiling", false, deg(0.4), 80.5, 2, 18.4},
+                   {"nobody knows", false, kNaN, kNaN, 2, 18.4},
+                   {"unseen", true, 0, 0, 0, 0}};
+  c.sigma0 = 0.98;
+  c.unevenness = 1.4;
+  c.variance_factor = 1.4;
+  c.iterations = 6;
+  c.rms_before = 0.0214;
+  c.rms_after = 0.0151;
+  c.points = 80000;
+  c.profiles = {profile("incidence", 0, deg(80), 16), profile("rotation_angle_a", -kPi, kPi, 36),
+                profile("rotation_angle_b", -kPi, kPi, 36)};
+  c.sample = sample_on(c.planes, 2, points);
+  return c;
+}
+
+/// What the page is made of, with everything that belongs to it.
+struct Page {
+  sensors::Sensor nominal = sensors::load_sensor("mid-40");
+  Calibration calibration = example();
+  std::optional<CalibrationPageInput::Truth> truth;
+  std::vector<std::string> warnings;
+
+  CalibrationPageInput input() const {
+    return {calibration,
+            nominal,
+            truth,
+            {"room <1>.lvx", "hall.lvx"},
+            100000,
+            {{"command", "risley calibrate \"room <1>.lvx\" hall.lvx"}, {"version", "0.1.0"}},
+            warnings};
+  }
+  std::string html() const { return calibration_page(input()); }
+};
+
+CalibrationPageInput::Truth example_truth() {
+  CalibrationPageInput::Truth truth;
+  truth.before = {deg(0.10), deg(0.11), deg(0.05), deg(-0.06),
+                  deg(0.15), deg(0.12), deg(0.09), {deg(0.01), deg(0.06), deg(-0.05)}};
+  truth.after = {deg(0.01),   deg(0.012), deg(0.005),  deg(-0.006),
+                 deg(0.0156), deg(0.015), deg(0.0043), {deg(0.001), deg(0.006), deg(-0.005)}};
+  truth.sensor = sensors::load_sensor("mid-40");
+  return truth;
+}
+
+/// The page's own part: no style, no scripts.
+std::string visible(const std::string& html) {
+  const std::size_t first = html.find("<main>"), last = html.find("</main>");
+  EXPECT_NE(first, std::string::npos);
+  EXPECT_NE(last, std::string::npos);
+  return html.substr(first, last - first);
+}
+
+std::string data_text(const std::string& html) {
+  const std::string start = "<script type=\"application/json\" id=\"page-data\">";
+  const std::size_t first = html.find(start) + start.size();
+  return html.substr(first, html.find("</script>", first) - first);
+}
+
+nlohmann::json data(const std::string& html) { return nlohmann::json::parse(data_text(html)); }
+
+/// Titles of the diagrams, in the order of their data.
+std::vector<std::string> titles(const std::string& html) {
+  std::vector<std::string> found;
+  const std::regex caption("<figcaption>([^<]*)</figcaption>");
+  for (std::sregex_iterator i(html.begin(), html.end(), caption), end; i != end; ++i) {
+    found.push_back((*i)[1]);
+  }
+  return found;
+}
+
+nlohmann::json chart(const std::string& html, const std::string& title) {
+  const std::string shown = visible(html);
+  const std::vector<std::string> all = titles(shown);
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    if (all[i] == title) return data(html).at(i);
+  }
+  ADD_FAILURE() << "no diagram " << title;
+  return {};
+}
+
+const nlohmann::json& series(const nlohmann::json& chart, const std::string& label) {
+  for (const auto& one : chart.at("series")) {
+    if (one.at("label") == label) return one;
+  }
+  throw std::runtime_error("no series " + label);
+}
+
+void expect_sound(const std::string& html) {
+  const std::string shown = visible(html);
+  const std::regex not_finite("(^|[^A-Za-z])(nan|inf)([^A-Za-z]|$)", std::regex::icase);
+  std::smatch found;
+  EXPECT_FALSE(std::regex_search(shown, found, not_finite)) << found.prefix().str().substr(
+      found.prefix().length() > 200 ? static_cast<std::size_t>(found.prefix().length() - 200) : 0);
+  EXPECT_FALSE(std::regex_search(data_text(html), not_finite));
+
+  const nlohmann::json charts = data(html);
+  EXPECT_EQ(charts.size(), titles(shown).size());
+  const std::set<std::string> colours = {"a", "b", "c", "d", "ink", "bad"};
+  for (const auto& one : charts) {
+    EXPECT_THAT(shown, HasSubstr("<canvas id=\"" + one.at("id").get<std::string>() + "\""));
+    for (const auto& drawn : one.at("series")) {
+      EXPECT_EQ(drawn.at("x").size(), drawn.at("y").size());
+      EXPECT_TRUE(colours.contains(drawn.at("colour").get<std::string>()));
+      for (const auto& x : drawn.at("x")) EXPECT_TRUE(x.is_number());
+    }
+  }
+}
+
+TEST(CalibrationPage, SaysFirstThatAGoodCalibrationIsHealthy) {
+  Page page;
+  page.truth = example_truth();
+  const std::string html = page.html(), shown = visible(html);
+  expect_sound(html);
+  EXPECT_THAT(shown, HasSubstr("class=\"verdict ok\""));
+  EXPECT_THAT(shown, HasSubstr("21.4 mm thick before and 15.1 mm after"));
+  EXPECT_THAT(shown, HasSubstr("80000 points"));
+  EXPECT_THAT(shown, HasSubstr("roll 0.0041°, pitch 0.0123°"));
+  EXPECT_THAT(shown, Not(HasSubstr("must not be trusted")));
+  EXPECT_LT(shown.find("class=\"verdict"), shown.find("<h2>"));
+}
+
+TEST(CalibrationPage, HasEverySection) {
+  Page page;
+  page.truth = example_truth();
+  const std::string shown = visible(page.html());
+  for (const char* text :
+       {"<h2>Parameters</h2>", "<h2>Datum</h2>", "Against the truth", "against the data",
+        "<h2>Walls</h2>", "Steps on the walls", "<h2>Thickness of the walls</h2>",
+        "<h2>What was taken for a wall</h2>", "<h2>Correlations of the parameters</h2>",
+        "<h2>How to make it again</h2>", "range offset"}) {
+    EXPECT_THAT(shown, HasSubstr(text));
+  }
+  EXPECT_THAT(
+      titles(shown),
+      testing::ElementsAre(
+          "Thickness over the angle of incidence", "Thickness over the rotation angle of prism a",
+          "Thickness over the rotation angle of prism b",
+          "Histogram of the distances from the planes",
+          "Distances from the planes over the azimuth",
+          "Sign of what is left, all recordings together", "Field of view: room &lt;1&gt;.lvx",
+          "From above: room &lt;1&gt;.lvx", "From the side: room &lt;1&gt;.lvx",
+          "Field of view: hall.lvx", "From above: hall.lvx", "From the side: hall.lvx"));
+}
+
+TEST(CalibrationPage, EscapesNames) {
+  Page page;
+  page.warnings = {"<script>alert(1)</script>"};
+  const std::string html = page.html(), shown = visible(html);
+  expect_sound(html);
+  EXPECT_THAT(shown, HasSubstr("front &lt;wall&gt; &amp; door"));
+  EXPECT_THAT(shown, HasSubstr("flipped &lt;180&gt;"));
+  EXPECT_THAT(shown, HasSubstr("1PQD&amp;7"));
+  EXPECT_THAT(html, HasSubstr("<title>risley calibrate: room &lt;1&gt;.lvx and 1 more</title>"));
+  EXPECT_THAT(html, Not(HasSubstr("<wall>")));
+  EXPECT_THAT(html, Not(HasSubstr("<script>alert")));
+}
+
+TEST(CalibrationPage, AnyWarningAsksForCare) {
+  Page page;
+  page.calibration.warnings = {"the walls are uneven"};
+  page.warnings = {"a gap of 2 s"};
+  const std::string shown = visible(page.html());
+  EXPECT_THAT(shown, HasSubstr("class=\"verdict care\""));
+  EXPECT_THAT(shown, HasSubstr("<li>the walls are uneven</li><li>a gap of 2 s</li>"));
+}
+
+TEST(CalibrationPage, APoorDatumSaysWhatHelps) {
+  Page page;
+  page.calibration.datum.sigma_pitch = deg(0.03);
+  page.calibration.datum.sigma_yaw = deg(0.039);
+  EXPECT_THAT(visible(page.html()), HasSubstr("class=\"verdict ok\""));
+  page.calibration.datum.sigma_yaw = deg(0.041);
+  std::string shown = visible(page.html());
+  EXPECT_THAT(shown, HasSubstr("class=\"verdict care\""));
+  EXPECT_THAT(shown, HasSubstr("must not be trusted"));
+  EXPECT_THAT(shown, HasSubstr("--stations"));
+  EXPECT_THAT(shown, HasSubstr("--planes"));
+  page.calibration.datum.sigma_yaw = kNaN;  // an unknown one is no better
+  shown = visible(page.html());
+  EXPECT_THAT(shown, HasSubstr("must not be trusted"));
+  expect_sound(page.html());
+}
+
+TEST(CalibrationPage, AFailureSaysWhyAndWhatToDo) {
+  Page page;
+  page.calibration = Calibration();
+  page.calibration.sensor = sensors::load_sensor("mid-40");
+  page.calibration.reason = "the walls do not tell pitch & yaw";
+  page.calibration.warnings = {"a single wall"};
+  page.calibration.rms_after = kNaN;
+  page.calibration.free = estimation::free_parameters(estimation::default_free_names(2), 2);
+  page.calibration.datum.sigma_pitch = std::numeric_limits<double>::infinity();
+  page.calibration.unobservable = {
+      {{{"prism_tilt_a_vertical_deg", 0.8}, {"incident_beam_vertical_deg", -0.6}}, 1e-9, 40}};
+  page.truth = example_truth();
+  page.truth->before.azimuth_rmse = kNaN;
+  const std::string html = page.html(), shown = visible(html);
+  expect_sound(html);
+  EXPECT_THAT(shown, HasSubstr("class=\"verdict bad\""));
+  EXPECT_THAT(shown, HasSubstr("the walls do not tell pitch &amp; yaw"));
+  EXPECT_THAT(shown, HasSubstr("<li>a single wall</li>"));
+  EXPECT_THAT(shown, HasSubstr("What to do:"));
+  EXPECT_THAT(shown, HasSubstr("0.80 prism_tilt_a_vertical_deg - 0.60 incident_beam_vertical_deg"));
+  EXPECT_THAT(shown, HasSubstr("There are no points to draw."));
+  EXPECT_TRUE(data(html).empty());
+}
+
+TEST(CalibrationPage, NumbersThatAreNotFiniteAreDashes) {
+  Page page;
+  Calibration& c = page.calibration;
+  page.truth = example_truth();
+  c.planes[1].rms_before = c.planes[1].distance = kNaN;
+  c.parameters[2] = kNaN;
+  c.covariance(3, 3) = kNaN;
+  c.covariance(4, 4) = -1.0;
+  c.range_offset = kNaN;
+  c.unevenness = std::numeric_limits<double>::infinity();
+  c.steps[0].height = kNaN;
+  c.sample[1].azimuth = c.sample[2].point.x = c.sample[3].after = c.sample[4].before = kNaN;
+  c.profiles[0].from[1] = kNaN;
+  c.profiles[1].rms_before.assign(36, kNaN);
+  expect_sound(page.html());
+}
+
+TEST(CalibrationPage, ParametersStandBesideWhatWasBelievedAndTrue) {
+  Page page;
+  page.truth = example_truth();
+  Calibration& c = page.calibration;
+  c.free = estimation::free_parameters({"prism_tilt_a_vertical_deg"}, 2);
+  c.parameters = Eigen::VectorXd::Constant(1, deg(0.3));
+  c.covariance = Eigen::MatrixXd::Constant(1, 1, deg(0.02) * deg(0.02));
+  c.believed.set("prism_tilt_a_vertical_deg", deg(0.11));
+  page.truth->sensor->set("prism_tilt_a_vertical_deg", deg(0.22));
+  const std::string shown = visible(page.html());
+  EXPECT_THAT(shown, HasSubstr("<td>0.300</td><td>0.020</td><td>deg</td><td>0</td><td>0.11</td>"
+                               "<td>0.190</td><td>0.220</td><td>0.080</td>"
+                               "<td class=\"far\">4.00</td>"));
+  EXPECT_THAT(shown, HasSubstr("<td>-12.3</td><td>2.1</td><td>mm</td>"));
+  c.range_offset_sigma = 0;  // it was held
+  EXPECT_THAT(visible(page.html()), Not(HasSubstr("range offset")));
+}
+
+TEST(CalibrationPage, WithoutTruthThereAreNoTruthColumns) {
+  const std::string shown = visible(Page().html());
+  EXPECT_THAT(shown, Not(HasSubstr("truth")));
+}
+
+TEST(CalibrationPage, JudgesWhatWasKnownBefore) {
+  const std::string shown = visible(Page().html());
+  EXPECT_THAT(shown, HasSubstr("<td>fits</td>"));
+  EXPECT_THAT(shown, HasSubstr("<td class=\"far\">contradicts the data</td>"));
+  EXPECT_THAT(shown, HasSubstr("<td>2</td><td>18.4</td><td>not tested</td>"));
+  EXPECT_THAT(shown, HasSubstr("<td>0</td><td>0</td><td>not tested</td>"));
+}
+
+TEST(CalibrationPage, AStepStandsWithItsHeightAndPlace) {
+  EXPECT_THAT(visible(Page().html()),
+              HasSubstr("front &lt;wall&gt; &amp; door in room &lt;1&gt;.lvx: 21.3 mm towards the "
+                        "sensor, about 2.5° wide, around azimuth 3.2° and zenith 91.5°, 341 "
+                        "points"));
+}
+
+TEST(CalibrationPage, RotationAnglesRunFromZeroToAFullTurn) {
+  const auto drawn = chart(Page().html(), "Thickness over the rotation angle of prism a");
+  EXPECT_EQ(drawn.at("kind"), "full_turn");
+  const auto& after = series(drawn, "RMS after");
+  const auto x = after.at("x").get<std::vector<double>>();
+  EXPECT_TRUE(std::is_sorted(x.begin(), x.end()));
+  EXPECT_NEAR(x.front(), 5, 1e-4);
+  EXPECT_NEAR(x.back(), 355, 1e-4);
+  // The bin from -160 to -150 degrees is empty.
+  EXPECT_NEAR(x[20], 205, 1e-4);
+  EXPECT_TRUE(after.at("y").at(20).is_null());
+  EXPECT_NEAR(after.at("y").at(0), 1000 * kNoise, 1e-3);
+}
+
+TEST(CalibrationPage, TheHistogramCountsEverySamplePointOnAPlane) {
+  const std::string html = Page().html();
+  const auto drawn = chart(html, "Histogram of the distances from the planes");
+  for (const char* label : {"before", "after"}) {
+    double sum = 0;
+    for (const auto& count : series(drawn, label).at("y")) sum += count.get<double>();
+    EXPECT_EQ(sum, 1900);
+  }
+  EXPECT_EQ(series(drawn, "before").at("x"), series(drawn, "after").at("x"));
+}
+
+TEST(CalibrationPage, CellMeansShowAPlaneThatIsBent) {
+  Page page;
+  page.calibration = example(20000);
+  for (auto& point : page.calibration.sample) {
+    if (point.plane >= 0) point.after = point.azimuth > 0 ? 0.001 : -0.001;
+  }
+  const std::string html = page.html();
+  const auto drawn = chart(html, "Sign of what is left, all recordings together");
+  EXPECT_EQ(drawn.at("kind"), "map");
+  ASSERT_FALSE(series(drawn, "beyond the plane").at("x").empty());
+  ASSERT_FALSE(series(drawn, "before the plane").at("x").empty());
+  for (const auto& x : series(drawn, "beyond the plane").at("x")) EXPECT_GT(x, 0);
+  for (const auto& x : series(drawn, "before the plane").at("x")) EXPECT_LT(x, 0);
+  EXPECT_THAT(visible(html), HasSubstr("root mean square of 1.00 mm"));
+}
+
+TEST(CalibrationPage, ViewsAreThinnedAndSayHow) {
+  Page page;
+  page.calibration = example(20000);
+  const std::string html = page.html();
+  const auto drawn = chart(html, "From above: room &lt;1&gt;.lvx");
+  std::size_t points = 0;
+  for (const auto& one : drawn.at("series")) points += one.at("x").size();
+  EXPECT_LE(points, 4001u);
+  EXPECT_THAT(visible(html), HasSubstr("Of 10000 sample points one in 3 is drawn."));
+  EXPECT_EQ(series(drawn, "no plane").at("colour"), "ink");
+  EXPECT_EQ(series(drawn, "front <wall> & door").at("colour"), "a");
+  EXPECT_EQ(series(drawn, "sensor").at("x").at(0), 0);
+  // Every point of the floor is below the sensor.
+  for (const auto& z : series(chart(html, "From the side: room &lt;1&gt;.lvx"), "floor").at("y")) {
+    EXPECT_GT(z, 1.0);
+  }
+}
+
+}  // namespace
+}  // namespace risley::report
