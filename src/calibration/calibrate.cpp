@@ -758,6 +758,8 @@ void Work::fill_result(const PlanarSolution& solution) {
     }
   }
   result_.datum = formal_datum(p.train, p.free, result_.covariance, beams);
+  result_.datum_without_common = formal_datum(
+      p.train, p.free, solution.noise_covariance * result_.variance_factor, beams);
 }
 
 void Work::judge(const PlanarSolution& solution) {

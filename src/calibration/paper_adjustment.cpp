@@ -175,6 +175,7 @@ PlanarSolution adjust_as_paper(PlanarProblem problem, int most_iterations,
     ++solution.iterations;
     report_progress(progress, static_cast<double>(solution.iterations) / most_iterations);
   }
+  solution.noise_covariance = solution.covariance;
   solution.parameters.resize(free);
   for (Index j = 0; j < free; ++j) {
     solution.parameters[j] =

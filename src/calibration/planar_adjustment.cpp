@@ -458,6 +458,7 @@ PlanarSolution adjust(PlanarProblem problem, const AdjustmentOptions& options,
                   covariance.block(at.rotation(s), at.rotation(s), 3, 3)));
     }
   }
+  solution.noise_covariance = covariance.topLeftCorner(free, free);
   if (considered_size(problem) > 0 && solver.ok()) {
     // Errors of the considered parameters shift the solution by -N^-1 J^T W K.
     const Eigen::MatrixXd shift = covariance * system.considered;

@@ -87,8 +87,8 @@ struct PlanarSolution {
   double cost = 0;  ///< shots and priors, at the minimum
   std::size_t shots = 0, lost = 0;
   Eigen::VectorXd parameters;  ///< [free], SI
-  /// Covariance of the free parameters, and of all that was estimated, common errors included.
-  Eigen::MatrixXd covariance;
+  Eigen::MatrixXd covariance;        ///< [free, free], common errors of the angles included
+  Eigen::MatrixXd noise_covariance;  ///< [free, free], of the ranges' noise and the priors alone
   double range_offset_sigma = 0;         ///< m
   std::vector<double> distance_sigma;    ///< [views], m
   std::vector<double> normal_sigma;      ///< [walls], of the two angles together, rad
