@@ -4,7 +4,7 @@
 # the command is missing here.
 _risley() {
   local current=${COMP_WORDS[COMP_CWORD]} previous=${COMP_WORDS[COMP_CWORD-1]}
-  local verbs="info convert simulate estimate observability"
+  local verbs="info convert simulate estimate observability calibrate"
   local common="--help --json --threads --seed --quiet --verbose"
   local names="refractive_index_air refractive_index refractive_index_a refractive_index_b
     wedge_angle_deg wedge_angle_a_deg wedge_angle_b_deg
@@ -20,13 +20,13 @@ _risley() {
 
   local choices=""
   case $previous in
-    --quantize) choices="yes no" ;;
+    --quantize | --beam-origin) choices="yes no" ;;
     --rotor) choices="constant sinusoidal hunting random-walk" ;;
-    --method) choices="map ekf" ;;
+    --method) case $verb in calibrate) choices="adjustment paper" ;; *) choices="map ekf" ;; esac ;;
     --states) choices="knots all none" ;;
     --mirror) choices="auto yes no" ;;
     --process-noise) choices="auto paper" ;;
-    --rate-hz) case $verb in estimate | observability) choices="full" ;; esac ;;
+    --rate-hz) case $verb in estimate | observability | calibrate) choices="full" ;; esac ;;
     --fix | --free) choices=$names ;;
     --set) choices="$names $speeds" ;;
     --reported) choices="nominal $names" ;;
@@ -47,7 +47,7 @@ _risley() {
       convert) choices="$common --output --format" ;;
       simulate)
         choices="$common --output --sensor --duration-s --rate-hz --noise-angle-deg
-          --noise-range-m --quantize --rotor --set --reported --scene --station
+          --noise-range-m --quantize --beam-origin --rotor --set --reported --scene --station
           --start-angles-deg" ;;
       estimate)
         choices="$common --output --method --rate-hz --noise-angle-deg --sensor --fix --free
@@ -55,6 +55,10 @@ _risley() {
       observability)
         choices="$common --sensor --duration-s --rate-hz --noise-angle-deg --no-rounding
           --fix --free" ;;
+      calibrate)
+        choices="$common --output --method --planes --stations --station --plan --duration-s
+          --rate-hz --noise-angle-deg --noise-range-m --sensor --fix --free --prior-sigma-deg
+          --range-offset-sigma-m --beam-origin --states --mirror --truth" ;;
     esac
     mapfile -t COMPREPLY < <(compgen -W "$choices" -- "$current")
     return

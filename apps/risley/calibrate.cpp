@@ -94,6 +94,12 @@ calibration::CalibrationOptions calibration_options(const CalibrateCommandOption
   if (options.method == "paper") result.method = calibration::CalibrationMethod::paper;
   if (options.noise_range_m) check_positive(*options.noise_range_m, "--noise-range-m", "m");
   result.range_noise = options.noise_range_m;
+  if (options.method == "paper" &&
+      (!options.planes.empty() || !options.stations.empty() || options.prior_sigma_deg)) {
+    throw InvalidArgument(
+        "--method paper knows no --planes, --stations and --prior-sigma-deg: its walls are all it "
+        "has");
+  }
   if (options.prior_sigma_deg) {
     check_positive(*options.prior_sigma_deg, "--prior-sigma-deg", "deg");
     result.prior_sigma = radians_from_degrees(*options.prior_sigma_deg);
@@ -155,8 +161,12 @@ RangedRecording read_and_estimate(const CalibrateCommandOptions& options,
   const double started = now();
   ProgressBar bar(fmt::format("rotation angles {}/{}", number + 1, options.inputs.size()), common);
   const auto run = [&](estimation::AngleSeries series) {
-    return estimation::estimate(estimation::Method::map, std::move(series), input.selector.head(),
-                                settings, bar.callback());
+    try {
+      return estimation::estimate(estimation::Method::map, std::move(series), input.selector.head(),
+                                  settings, bar.callback());
+    } catch (const EstimationError& error) {
+      throw EstimationError(fmt::format("{}: {}", path, error.what()));
+    }
   };
   estimation::Estimate estimate = run(input.selector.take_series());
   // A noise that was not stated and turns out far smaller than the preset's is taken as found: only
@@ -230,19 +240,19 @@ TruthErrors evaluate_with(const CalibrateCommandOptions& options,
 }
 
 Json errors_json(const DirectionErrors& e) {
-  return {{"azimuth_rmse_deg", deg(e.azimuth_rmse)}, {"zenith_rmse_deg", deg(e.zenith_rmse)},
-          {"azimuth_bias_deg", deg(e.azimuth_bias)}, {"zenith_bias_deg", deg(e.zenith_bias)},
-          {"total_deg", deg(e.total)},               {"gauge_deg", deg(e.gauge)},
+  return {{"azimuth_rmse_deg", deg(e.azimuth_rmse)},
+          {"zenith_rmse_deg", deg(e.zenith_rmse)},
+          {"azimuth_bias_deg", deg(e.azimuth_bias)},
+          {"zenith_bias_deg", deg(e.zenith_bias)},
+          {"total_deg", deg(e.total)},
+          {"gauge_deg", deg(e.gauge)},
           {"shape_deg", deg(e.shape)}};
 }
 
 Json datum_json(calibration::DatumKind kind, const FormalDatum& datum) {
-  return {{"kind", calibration::to_string(kind)},
-          {"sigma_roll_deg", deg(datum.sigma_roll)},
-          {"sigma_pitch_deg", deg(datum.sigma_pitch)},
-          {"sigma_yaw_deg", deg(datum.sigma_yaw)},
-          {"sigma_gauge_deg", deg(datum.gauge)},
-          {"sigma_shape_deg", deg(datum.shape)},
+  return {{"kind", calibration::to_string(kind)},      {"sigma_roll_deg", deg(datum.sigma_roll)},
+          {"sigma_pitch_deg", deg(datum.sigma_pitch)}, {"sigma_yaw_deg", deg(datum.sigma_yaw)},
+          {"sigma_gauge_deg", deg(datum.gauge)},       {"sigma_shape_deg", deg(datum.shape)},
           {"sigma_total_deg", deg(datum.total)}};
 }
 
@@ -266,8 +276,8 @@ Json outcome_json(const CalibrateCommandOptions& options, const Outcome& outcome
     const auto at = static_cast<Eigen::Index>(j);
     parameters[c.free[j].name] = {
         {"value", in_file_unit(c.free[j].name, c.parameters[at], prisms)},
-        {"sigma", finite_or_null(
-                      in_file_unit(c.free[j].name, std::sqrt(c.covariance(at, at)), prisms))}};
+        {"sigma",
+         finite_or_null(in_file_unit(c.free[j].name, std::sqrt(c.covariance(at, at)), prisms))}};
   }
   for (const calibration::CalibratedPlane& plane : c.planes) {
     planes.push_back({{"name", plane.name},
@@ -311,32 +321,31 @@ Json outcome_json(const CalibrateCommandOptions& options, const Outcome& outcome
   }
   std::vector<std::string> warnings = outcome.warnings;
   warnings.insert(warnings.end(), c.warnings.begin(), c.warnings.end());
-  Json object = {
-      {"converged", c.converged},
-      {"reason", c.reason},
-      {"method", options.method},
-      {"iterations", c.iterations},
-      {"observations", outcome.observations},
-      {"points", c.points},
-      {"parameters", parameters},
-      {"range_offset_m", {{"value", c.range_offset}, {"sigma", c.range_offset_sigma}}},
-      {"planes", planes},
-      {"steps", steps},
-      {"datum", datum_json(c.datum_kind, c.datum)},
-      {"prior_tests", tests},
-      {"unobservable", unobservable_json(c.unobservable)},
-      {"before", {{"plane_rms_m", c.rms_before}}},
-      {"after", {{"plane_rms_m", c.rms_after}}},
-      {"sigma0", c.sigma0},
-      {"unevenness", c.unevenness},
-      {"variance_factor", c.variance_factor},
-      {"thickness", profiles},
-      {"warnings", warnings},
-      {"seconds",
-       {{"read", outcome.read_s},
-        {"rotation_angles", outcome.angles_s},
-        {"solve", outcome.solve_s},
-        {"total", outcome.total_s}}}};
+  Json object = {{"converged", c.converged},
+                 {"reason", c.reason},
+                 {"method", options.method},
+                 {"iterations", c.iterations},
+                 {"observations", outcome.observations},
+                 {"points", c.points},
+                 {"parameters", parameters},
+                 {"range_offset_m", {{"value", c.range_offset}, {"sigma", c.range_offset_sigma}}},
+                 {"planes", planes},
+                 {"steps", steps},
+                 {"datum", datum_json(c.datum_kind, c.datum)},
+                 {"prior_tests", tests},
+                 {"unobservable", unobservable_json(c.unobservable)},
+                 {"before", {{"plane_rms_m", c.rms_before}}},
+                 {"after", {{"plane_rms_m", c.rms_after}}},
+                 {"sigma0", c.sigma0},
+                 {"unevenness", c.unevenness},
+                 {"variance_factor", c.variance_factor},
+                 {"thickness", profiles},
+                 {"warnings", warnings},
+                 {"seconds",
+                  {{"read", outcome.read_s},
+                   {"rotation_angles", outcome.angles_s},
+                   {"solve", outcome.solve_s},
+                   {"total", outcome.total_s}}}};
   if (outcome.truth) {
     object["truth"] = {{"before", errors_json(outcome.truth->before)},
                        {"after", errors_json(outcome.truth->after)}};
@@ -389,23 +398,28 @@ void print_outcome(const CalibrateCommandOptions& options, const Outcome& outcom
   fmt::print("\n");
   Table planes({"plane", "recording", "distance m", "points", "outliers", "before mm", "after mm"});
   for (const calibration::CalibratedPlane& plane : c.planes) {
-    planes.add({plane.name,
-                std::filesystem::path(options.inputs[plane.recording]).filename().string(),
-                fmt::format("{:.3f}", plane.distance), grouped(plane.points),
-                grouped(plane.outliers), fmt::format("{:.2f}", 1e3 * plane.rms_before),
-                fmt::format("{:.2f}", 1e3 * plane.rms)});
+    planes.add(
+        {plane.name, std::filesystem::path(options.inputs[plane.recording]).filename().string(),
+         fmt::format("{:.3f}", plane.distance), grouped(plane.points), grouped(plane.outliers),
+         fmt::format("{:.2f}", 1e3 * plane.rms_before), fmt::format("{:.2f}", 1e3 * plane.rms)});
   }
   planes.print();
   fmt::print("\n");
   print_datum(c.datum_kind, c.datum);
   for (const calibration::PriorTest& test : c.prior_tests) {
+    if (test.degrees_of_freedom == 0) {
+      fmt::print("{} {}: not tested by these data\n", test.station ? "station" : "plane",
+                 test.name);
+      continue;
+    }
     fmt::print("{} {}: misfit {:.3g} deg, chi2 {:.3g}, limit {:.3g}\n",
                test.station ? "station" : "plane", test.name, deg(test.misfit), test.chi2,
                test.critical);
   }
   if (outcome.truth) {
     fmt::print("\n");
-    Table errors({"error, deg", "azimuth rmse", "zenith rmse", "total", "shared rotation", "shape"});
+    Table errors(
+        {"error, deg", "azimuth rmse", "zenith rmse", "total", "shared rotation", "shape"});
     const auto add = [&errors](const char* name, const DirectionErrors& e) {
       errors.add({name, fmt::format("{:.5f}", deg(e.azimuth_rmse)),
                   fmt::format("{:.5f}", deg(e.zenith_rmse)), fmt::format("{:.5f}", deg(e.total)),
@@ -435,8 +449,7 @@ void write_folder(const CalibrateCommandOptions& options, const CommonOptions& c
     calibrated.provenance = provenance;
     write_text_file(path("calibration.yaml"), sensors::preset_text(calibrated));
   } else {
-    std::error_code ignored;
-    fs::remove(path("calibration.yaml"), ignored);
+    remove_calibration(options.folder);
   }
   std::vector<std::string> names;
   for (const std::string& input : options.inputs) {
@@ -451,6 +464,18 @@ void write_folder(const CalibrateCommandOptions& options, const CommonOptions& c
                                             provenance, outcome.warnings}));
 }
 
+/// Each recording stands for observations of its own.
+void check_inputs(const CalibrateCommandOptions& options) {
+  for (std::size_t i = 0; i < options.inputs.size(); ++i) {
+    for (std::size_t j = 0; j < i; ++j) {
+      std::error_code ignored;
+      if (std::filesystem::equivalent(options.inputs[i], options.inputs[j], ignored)) {
+        throw InvalidArgument(fmt::format("{} is given twice", options.inputs[i]));
+      }
+    }
+  }
+}
+
 ExitStatus run_calibration(const CalibrateCommandOptions& options, const CommonOptions& common) {
   const double started = now();
   if (!options.folder.empty()) make_result_folder(options.folder);
@@ -459,6 +484,7 @@ ExitStatus run_calibration(const CalibrateCommandOptions& options, const CommonO
     throw InvalidArgument(fmt::format("{} truth files for {} recordings: --truth takes one each",
                                       options.truths.size(), options.inputs.size()));
   }
+  check_inputs(options);
   Outcome outcome;
   std::vector<RangedRecording> recordings;
   for (std::size_t r = 0; r < options.inputs.size(); ++r) {
@@ -499,9 +525,9 @@ Json forecast_json(const CalibrationForecast& f, int prisms) {
   Json parameters = Json::object(), walls = Json::array();
   for (std::size_t j = 0; j < f.free.size(); ++j) {
     const auto at = static_cast<Eigen::Index>(j);
-    parameters[f.free[j].name] = {{"sigma", finite_or_null(in_file_unit(
-                                                f.free[j].name,
-                                                std::sqrt(f.covariance(at, at)), prisms))}};
+    parameters[f.free[j].name] = {
+        {"sigma",
+         finite_or_null(in_file_unit(f.free[j].name, std::sqrt(f.covariance(at, at)), prisms))}};
   }
   for (const calibration::PlannedWall& wall : f.walls) {
     walls.push_back({{"name", wall.name},
@@ -534,8 +560,7 @@ void print_forecast(const CalibrationForecast& f, int prisms) {
     const auto at = static_cast<Eigen::Index>(j);
     const std::string& name = f.free[j].name;
     table.add({name,
-               fmt::format("{:.2g}",
-                           in_file_unit(name, std::sqrt(f.covariance(at, at)), prisms)),
+               fmt::format("{:.2g}", in_file_unit(name, std::sqrt(f.covariance(at, at)), prisms)),
                find_parameter(name, prisms).unit});
   }
   table.print();
@@ -601,13 +626,15 @@ Run declare_calibrate(CLI::App& verb) {
                   "(repeatable)")
       ->type_name("NAME")
       ->expected(1)
+      ->allow_extra_args(false)
       ->take_all();
   verb.add_option("--plan", o.plan,
-                  "Scene (YAML) to plan for: says what a calibration there would reach");
+                  "Scene (YAML) to plan for: says what a calibration there would reach")
+      ->excludes("--output", "--method", "--planes", "--stations", "--station");
   verb.add_option("--duration-s", o.duration_s, "Length of each planned recording")
+      ->needs("--plan")
       ->capture_default_str();
-  verb.add_option("--rate-hz", o.rate_hz,
-                  "Shots per second to use, or of the plan; 'full' for all")
+  verb.add_option("--rate-hz", o.rate_hz, "Shots per second to use, or of the plan; 'full' for all")
       ->capture_default_str();
   verb.add_option("--noise-angle-deg", o.noise_angle_deg,
                   "1 sigma of azimuth and zenith before rounding (default: the sensor's)");
@@ -635,6 +662,7 @@ Run declare_calibrate(CLI::App& verb) {
   verb.add_option("--truth", o.truths,
                   "OUT.truth.yaml of each recording's simulation, to judge the calibration by")
       ->expected(1)
+      ->allow_extra_args(false)
       ->take_all();
   return [options](const CommonOptions& common) {
     // `--truth A B` leaves B among the recordings.
@@ -645,7 +673,12 @@ Run declare_calibrate(CLI::App& verb) {
     options->inputs.erase(truth, options->inputs.end());
     if (!options->plan.empty()) return run_plan(*options, common);
     if (options->inputs.empty()) throw InvalidArgument("INPUT is missing: a recording, or --plan");
-    return run_calibration(*options, common);
+    try {
+      return run_calibration(*options, common);
+    } catch (const EstimationError&) {
+      remove_calibration(options->folder);
+      throw;
+    }
   };
 }
 

@@ -308,8 +308,7 @@ void write_folder(const EstimateCommandOptions& options, const CommonOptions& co
     calibrated.provenance = provenance;
     write_text_file(path("calibration.yaml"), sensors::preset_text(calibrated));
   } else {
-    std::error_code ignored;
-    fs::remove(path("calibration.yaml"), ignored);
+    remove_calibration(options.folder);
   }
   if (options.states != "none") {
     write_state_file(path("states.nc"), options, outcome.estimate, provenance);
@@ -417,7 +416,14 @@ Run declare_estimate(CLI::App& verb) {
                   "likelihood), paper (900), or a random walk of the speed in deg/s per sqrt(s)")
       ->capture_default_str();
   verb.add_option("--truth", o.truth, "OUT.truth.yaml of a simulation, to judge the estimate by");
-  return [options](const CommonOptions& common) { return run_estimate(*options, common); };
+  return [options](const CommonOptions& common) {
+    try {
+      return run_estimate(*options, common);
+    } catch (const EstimationError&) {
+      remove_calibration(options->folder);
+      throw;
+    }
+  };
 }
 
 }  // namespace risley::app

@@ -81,6 +81,12 @@ void make_result_folder(const std::string& folder) {
   }
 }
 
+void remove_calibration(const std::string& folder) {
+  if (folder.empty()) return;
+  std::error_code ignored;
+  std::filesystem::remove(std::filesystem::path(folder) / "calibration.yaml", ignored);
+}
+
 estimation::EstimateOptions estimate_options(
     const EstimationWishes& wishes, const std::optional<recordings::RecordingHeader>& header) {
   estimation::EstimateOptions result;
@@ -115,10 +121,12 @@ void add_parameter_choice(CLI::App& verb, std::vector<std::string>& fixed,
   verb.add_option("--fix", fixed, "Hold a parameter, at a value if one is given (repeatable)")
       ->type_name("NAME[=VALUE]")
       ->expected(1)
+      ->allow_extra_args(false)
       ->take_all();
   verb.add_option("--free", freed, "Estimate one more parameter (repeatable)")
       ->type_name("NAME")
       ->expected(1)
+      ->allow_extra_args(false)
       ->take_all();
 }
 

@@ -37,6 +37,9 @@ std::vector<std::pair<std::string, std::string>> provenance_of(
 /// Makes a folder for results, before an hour of computing. @throws FileError
 void make_result_folder(const std::string& folder);
 
+/// What failed is no calibration: takes an older one out of the folder; nothing for an empty name.
+void remove_calibration(const std::string& folder);
+
 /// What the user says about sensor and parameters, as typed.
 struct EstimationWishes {
   std::string sensor;  ///< empty: from the recording

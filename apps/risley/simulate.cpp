@@ -126,12 +126,14 @@ Run declare_simulate(CLI::App& verb) {
   verb.add_option("--set", o.assignments, "NAME=VALUE of the true sensor (repeatable)")
       ->type_name("NAME=VALUE")
       ->expected(1)
+      ->allow_extra_args(false)
       ->take_all();
   verb.add_option("--reported", o.reported,
                   "What the sensor believes where it differs from the truth (repeatable); "
                   "'nominal' sets every error parameter to 0")
       ->type_name("NAME=VALUE|nominal")
       ->expected(1)
+      ->allow_extra_args(false)
       ->take_all();
   verb.add_option("--scene", o.scene, "Planes around the sensor (YAML); without it no ranges");
   verb.add_option("--station", o.station, "Station of the scene to stand on");

@@ -3,15 +3,12 @@
 #include "risley/calibration/calibrate.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 #include <numeric>
 #include <utility>
 
-#include <Eigen/Cholesky>
 #include <fmt/format.h>
-#include <tbb/parallel_for.h>
 
 #include "risley/calibration/calibration_plan.hpp"
 #include "risley/calibration/paper_adjustment.hpp"
@@ -20,6 +17,8 @@
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
 
+#include "calibration/belief.hpp"
+#include "calibration/shot_labels.hpp"
 #include "calibration/wall_matching.hpp"
 
 namespace risley::calibration {
@@ -33,230 +32,11 @@ constexpr std::size_t kBundleBeams = 4000;   // for formal sigmas of the beams
 constexpr std::size_t kSampleShots = 20000;  // for pictures
 constexpr int kCoarseRounds = 5;
 constexpr int kFullRounds = 2;
-/// A shot belongs to a plane within so many sigmas.
-constexpr double kGate = 3.0;
 /// Variance of a normal distribution cut off at the gate.
 constexpr double kVarianceWithinGate = 0.97334;
-constexpr double kNearby = 10.0;  // sigmas: what lies between this and the gate is an outlier
-/// Part of the rotation angles' sigma that a direction has: the sine of a prism's deflection.
-constexpr double kAngleLever = 0.17;
 /// How far directions may be bent before the first adjustment, 1 sigma.
 constexpr double kStartPointing = radians_from_degrees(0.1);
 constexpr double kLeastRangeSigma = 1e-7;  // m
-/// Mean chi2 per parameter above which recordings are of different sensors.
-constexpr double kMostDisagreement = 6.0;
-constexpr std::size_t kBlockShots = 65536;
-
-// ---- What the sensor believes -------------------------------------------------------------------
-
-/// The believed parameters as all recordings together tell them.
-struct Belief {
-  sensors::Sensor sensor;
-  std::vector<estimation::FreeParameter> free;
-  Eigen::MatrixXd covariance;
-  std::vector<std::vector<double>> angle_shift;  ///< [recordings][prisms]
-};
-
-void check_same_sensor(const std::vector<RangedRecording>& recordings) {
-  const RangedRecording& first = recordings.front();
-  for (const RangedRecording& other : recordings) {
-    if (!first.serial.empty() && !other.serial.empty() && first.serial != other.serial) {
-      throw InvalidArgument(
-          fmt::format("the recordings are of different sensors: {} of serial number {}, {} of {}",
-                      first.name, first.serial, other.name, other.serial));
-    }
-    if (first.believed.train.face_order() != other.believed.train.face_order() ||
-        first.believed.combination != other.believed.combination) {
-      throw InvalidArgument(fmt::format(
-          "the recordings are of different sensors: the rotors of {} and {} run differently",
-          first.name, other.name));
-    }
-  }
-}
-
-Belief pooled_belief(const std::vector<RangedRecording>& recordings) {
-  const RangedRecording& first = recordings.front();
-  const auto n = static_cast<Index>(first.free.size());
-  Belief belief{first.believed, first.free, first.covariance, {}};
-  const auto values = [n](const RangedRecording& recording) {
-    Eigen::VectorXd v(n);
-    for (Index j = 0; j < n; ++j) {
-      v[j] = recording.believed.train[recording.free[static_cast<std::size_t>(j)].places.front()];
-    }
-    return v;
-  };
-  Eigen::VectorXd mean = values(first);
-  if (recordings.size() > 1 && n > 0) {
-    Eigen::MatrixXd information = Eigen::MatrixXd::Zero(n, n);
-    Eigen::VectorXd weighted = Eigen::VectorXd::Zero(n);
-    for (const RangedRecording& recording : recordings) {
-      const Eigen::MatrixXd own =
-          recording.covariance.llt().solve(Eigen::MatrixXd::Identity(n, n));
-      information += own;
-      weighted += own * values(recording);
-    }
-    belief.covariance = information.llt().solve(Eigen::MatrixXd::Identity(n, n));
-    mean = belief.covariance * weighted;
-    for (const RangedRecording& recording : recordings) {
-      const Eigen::VectorXd off = values(recording) - mean;
-      const double chi2 =
-          off.dot((recording.covariance - belief.covariance).ldlt().solve(off)) /
-          static_cast<double>(n);
-      if (chi2 > kMostDisagreement) {
-        Index worst = 0;
-        off.cwiseAbs().cwiseQuotient(recording.covariance.diagonal().cwiseSqrt()).maxCoeff(&worst);
-        const ParameterInfo& info = find_parameter(
-            belief.free[static_cast<std::size_t>(worst)].name, belief.sensor.prisms());
-        throw EstimationError(fmt::format(
-            "the recordings are of different sensors, or of one whose stored calibration changed: "
-            "{} differs from the others' {} by {:.4g} {}",
-            recording.name, info.name, off[worst] / info.si_per_unit, info.unit));
-      }
-    }
-  }
-  for (Index j = 0; j < n; ++j) {
-    for (const int place : belief.free[static_cast<std::size_t>(j)].places) {
-      belief.sensor.train.set_place(place, mean[j]);
-    }
-  }
-  for (const RangedRecording& recording : recordings) {
-    const Eigen::VectorXd shift = recording.angle_sensitivity * (mean - values(recording));
-    belief.angle_shift.emplace_back(shift.data(), shift.data() + shift.size());
-  }
-  return belief;
-}
-
-// ---- Shots --------------------------------------------------------------------------------------
-
-/// Lines of sight of shots.
-struct Rays {
-  std::vector<double> x, y, z, origin_x, origin_y, origin_z;
-
-  Rays(const PrismTrain& train, const PrismGeometry& geometry, const RangedShots& shots) {
-    for (auto* column : {&x, &y, &z, &origin_x, &origin_y, &origin_z}) column->resize(shots.size());
-    tbb::parallel_for(std::size_t{0}, (shots.size() + kBlockShots - 1) / kBlockShots,
-                      [&](std::size_t block) {
-                        const std::size_t begin = block * kBlockShots;
-                        const std::size_t count = std::min(kBlockShots, shots.size() - begin);
-                        std::vector<std::span<const double>> angles;
-                        for (const auto& column : shots.rotation_angle) {
-                          angles.emplace_back(std::span(column).subspan(begin, count));
-                        }
-                        const auto part = [&](std::vector<double>& column) {
-                          return std::span(column).subspan(begin, count);
-                        };
-                        DirectionColumns out{part(x), part(y), part(z), {}, {}};
-                        out.origin_x = part(origin_x);
-                        out.origin_y = part(origin_y);
-                        out.origin_z = part(origin_z);
-                        out.geometry = geometry;
-                        observe_batch(train, angles, out);
-                      });
-  }
-  Vector3<double> direction(std::size_t i) const { return {x[i], y[i], z[i]}; }
-  Vector3<double> origin(std::size_t i) const { return {origin_x[i], origin_y[i], origin_z[i]}; }
-  Vector3<double> point(std::size_t i, double range) const {
-    return origin(i) + range * direction(i);
-  }
-};
-
-RangedShots rows_of(const RangedShots& shots, const std::vector<std::size_t>& rows) {
-  RangedShots result;
-  result.resize(shots.prisms(), rows.size());
-  for (std::size_t i = 0; i < rows.size(); ++i) result.set_row(i, shots, rows[i]);
-  return result;
-}
-
-/// Typical sigma of a direction that comes from the rotation angles' covariance, rad.
-double pointing_of_angles(const RangedShots& shots) {
-  double sum = 0;
-  const std::vector<std::size_t> rows = spread_rows(shots.size(), 2000);
-  for (const std::size_t row : rows) {
-    std::size_t entry = 0;
-    for (int k = 0; k < shots.prisms(); ++k) {
-      sum += static_cast<double>(shots.angle_covariance[entry][row]);
-      entry += static_cast<std::size_t>(shots.prisms() - k);
-    }
-  }
-  return kAngleLever * std::sqrt(sum / static_cast<double>(rows.size()));
-}
-
-/// Which view of its recording each shot belongs to.
-struct Labels {
-  std::vector<int> view;           ///< [shots], row of PlanarProblem::views, -1: none
-  std::vector<std::size_t> near;   ///< [views], shots near a plane that were left out
-};
-
-/// Every shot to the plane that explains its range best, in sigmas. Where two planes meet no range
-/// can tell them apart; shots there go to neither, and that is decided by the predicted ranges alone:
-/// a choice by the measured one would keep those whose noise points away from the other plane.
-Labels label_shots(const PlanarProblem& problem, std::size_t recording, const RangedShots& shots,
-                   double pointing) {
-  const Rays rays(problem.train, problem.geometry, shots);
-  Labels labels{std::vector<int>(shots.size(), -1),
-                std::vector<std::size_t>(problem.views.size(), 0)};
-  std::vector<std::pair<int, PlaneView>> planes;
-  for (std::size_t v = 0; v < problem.views.size(); ++v) {
-    if (problem.views[v].recording == recording) {
-      planes.emplace_back(static_cast<int>(v), plane_view(problem, v));
-    }
-  }
-  std::vector<int> closest(shots.size(), -1);
-  tbb::parallel_for(std::size_t{0}, (shots.size() + kBlockShots - 1) / kBlockShots,
-                    [&](std::size_t block) {
-                      const std::size_t end = std::min((block + 1) * kBlockShots, shots.size());
-                      std::vector<double> predicted(planes.size()), sigma(planes.size());
-                      std::size_t nearest = 0;
-                      for (std::size_t i = block * kBlockShots; i < end; ++i) {
-                        double best = kNearby;
-                        for (std::size_t p = 0; p < planes.size(); ++p) {
-                          const PlaneView& plane = planes[p].second;
-                          const Vector3<double> direction = rays.direction(i);
-                          const double range =
-                              hit_distance(plane.plane, rays.origin(i), direction);
-                          const double cosine = dot(plane.plane.normal, direction);
-                          const double across =
-                              pointing * range * std::sqrt(std::max(0.0, 1.0 - cosine * cosine)) /
-                              cosine;
-                          predicted[p] = range;
-                          sigma[p] = std::sqrt(plane.range_variance + across * across);
-                          const double off =
-                              std::abs(shots.range[i] - plane.range_offset - range) / sigma[p];
-                          if (range > 0 && off < best) {
-                            best = off;
-                            nearest = p;
-                          }
-                        }
-                        if (best == kNearby) continue;
-                        closest[i] = planes[nearest].first;
-                        bool edge = false;
-                        for (std::size_t p = 0; p < planes.size(); ++p) {
-                          edge = edge || (p != nearest &&
-                                          std::abs(predicted[p] - predicted[nearest]) <
-                                              kGate * (sigma[p] + sigma[nearest]));
-                        }
-                        if (edge) continue;
-                        if (best <= kGate) labels.view[i] = closest[i];
-                      }
-                    });
-  for (std::size_t i = 0; i < shots.size(); ++i) {
-    if (labels.view[i] < 0 && closest[i] >= 0) ++labels.near[static_cast<std::size_t>(closest[i])];
-  }
-  return labels;
-}
-
-/// Gives the views of one recording the shots that are labelled theirs.
-void hand_out(const RangedShots& shots, const std::vector<int>& view, std::size_t recording,
-              PlanarProblem& problem) {
-  std::vector<std::vector<std::size_t>> rows(problem.views.size());
-  for (std::size_t i = 0; i < view.size(); ++i) {
-    if (view[i] >= 0) rows[static_cast<std::size_t>(view[i])].push_back(i);
-  }
-  for (std::size_t v = 0; v < problem.views.size(); ++v) {
-    if (problem.views[v].recording != recording) continue;
-    problem.views[v].shots = std::make_shared<const RangedShots>(rows_of(shots, rows[v]));
-  }
-}
 
 /// Variance component of every view: what its residuals say of the range noise.
 void update_range_variances(PlanarSolution& solution) {
@@ -267,8 +47,6 @@ void update_range_variances(PlanarSolution& solution) {
     variance = std::max(variance * factor, kLeastRangeSigma * kLeastRangeSigma);
   }
 }
-
-// ---- The calibration ----------------------------------------------------------------------------
 
 /// Information of the priors on the free parameters.
 Eigen::MatrixXd prior_information(const PlanarProblem& problem) {
@@ -291,7 +69,6 @@ class Work {
       throw InvalidArgument(fmt::format("{} stations given for {} recordings",
                                         options.stations.size(), recordings.size()));
     }
-    check_same_sensor(recordings);
     belief_ = pooled_belief(recordings);
     range_noise_ = options.range_noise.value_or(options.sensor.range_noise);
     if (!(range_noise_ > 0)) {
@@ -330,15 +107,15 @@ class Work {
     p.train = belief_.sensor.train;
     if (options_.beam_origin) p.geometry = options_.sensor.prism_geometry();
     std::vector<std::string> held;
+    for (const auto& [name, value] : options_.fixed) held.push_back(name);
+    p.free = calibration_parameters(p.train.prisms(), held, options_.additional);
     for (const auto& [name, value] : options_.fixed) {
-      held.push_back(name);
       if (!value) continue;
       for (const int place : find_parameter(name, p.train.prisms()).places) {
         p.train.set_place(place, *value);
       }
     }
     p.prior = p.train;
-    p.free = calibration_parameters(p.train.prisms(), held, options_.additional);
     for (const estimation::FreeParameter& free : p.free) {
       const bool angle = find_parameter(free.name, p.train.prisms()).unit == "deg";
       p.prior_sigma.push_back(options_.prior_sigma && angle
@@ -430,13 +207,7 @@ class Work {
   PlanarSolution solve(const PlanarProblem& problem) {
     solved_variance_.clear();
     for (const WallView& view : problem.views) solved_variance_.push_back(view.range_variance);
-    PlanarSolution solution = paper() ? adjust_as_paper(problem) : adjust(problem);
-    if (paper()) {
-      for (std::size_t v = 0; v < solved_variance_.size(); ++v) {
-        solved_variance_[v] = solution.problem.views[v].range_variance;
-      }
-    }
-    return solution;
+    return paper() ? adjust_as_paper(problem) : adjust(problem);
   }
 
   /// Views that lost their shots when labels changed are no views any more.
@@ -584,8 +355,8 @@ class Work {
   const Progress& progress_;
   Belief belief_;
   double range_noise_ = 0;
-  std::vector<RangedShots> shots_, coarse_;   // [recordings]
-  std::vector<double> pointing_;              // [recordings]
+  std::vector<RangedShots> shots_, coarse_;  // [recordings]
+  std::vector<double> pointing_;             // [recordings]
   std::vector<std::vector<int>> start_labels_, labels_;
   std::vector<std::size_t> near_;
   std::vector<double> solved_variance_;  // [views] of the last solve, m^2
@@ -694,10 +465,9 @@ void Work::fill_planes(const PlanarSolution& solution) {
     const Rays rays(p.train, p.geometry, shots);
     for (std::size_t i = 0; i < rows.size(); ++i) {
       const auto angles = angles_from_direction(rays.direction(i));
-      result_.sample.push_back({r, labels_[r][rows[i]],
-                                rays.point(i, shots.range[i] - p.range_offset),
-                                before_of[r][rows[i]], after_of[r][rows[i]], angles.azimuth,
-                                angles.zenith});
+      result_.sample.push_back(
+          {r, labels_[r][rows[i]], rays.point(i, shots.range[i] - p.range_offset),
+           before_of[r][rows[i]], after_of[r][rows[i]], angles.azimuth, angles.zenith});
     }
   }
 }
@@ -750,16 +520,15 @@ void Work::fill_result(const PlanarSolution& solution) {
   fill_sensor(solution);
   std::vector<std::vector<double>> beams(static_cast<std::size_t>(p.train.prisms()));
   for (std::size_t r = 0; r < recordings_.size(); ++r) {
-    for (const std::size_t row :
-         spread_rows(shots_[r].size(), kBundleBeams / recordings_.size())) {
+    for (const std::size_t row : spread_rows(shots_[r].size(), kBundleBeams / recordings_.size())) {
       for (std::size_t k = 0; k < beams.size(); ++k) {
         beams[k].push_back(shots_[r].rotation_angle[k][row]);
       }
     }
   }
   result_.datum = formal_datum(p.train, p.free, result_.covariance, beams);
-  result_.datum_without_common = formal_datum(
-      p.train, p.free, solution.noise_covariance * result_.variance_factor, beams);
+  result_.datum_without_common =
+      formal_datum(p.train, p.free, solution.noise_covariance * result_.variance_factor, beams);
 }
 
 void Work::judge(const PlanarSolution& solution) {
@@ -781,10 +550,18 @@ void Work::judge(const PlanarSolution& solution) {
   if (worst != nullptr) {
     c.converged = false;
     c.reason = fmt::format(
-        "{} {} contradicts the data: its stated rotation is off by {:.3g} degrees, chi2 {:.3g} where "
-        "{:.3g} is the limit",
+        "{} {} contradicts the data: what is stated of it is off by {:.3g} degrees, chi2 {:.3g} "
+        "where {:.3g} is the limit",
         worst->station ? "station" : "plane", worst->name, degrees_from_radians(worst->misfit),
         worst->chi2, worst->critical);
+    std::string others;
+    for (const PriorTest& test : c.prior_tests) {
+      if (&test == worst || test.degrees_of_freedom == 0 || test.chi2 <= test.critical) continue;
+      others += (others.empty() ? "" : ", ") + test.name;
+    }
+    if (!others.empty()) {
+      c.reason += fmt::format("; so do {}: they contradict each other", others);
+    }
   }
   const double boresight = std::hypot(c.datum.sigma_pitch, c.datum.sigma_yaw);
   if (boresight > kPoorDatum) {
@@ -803,10 +580,11 @@ void Work::judge(const PlanarSolution& solution) {
         degrees_from_radians(step.zenith), step.points));
   }
   if (c.variance_factor > 1.0) {
-    c.warnings.push_back(fmt::format(
-        "the walls are uneven: means over a square degree scatter {:.2g} times as much as the noise "
-        "allows; variances are enlarged by that, and boresight may be off by more",
-        c.unevenness));
+    c.warnings.push_back(
+        fmt::format("the walls are uneven: means over a square degree scatter {:.2g} times as much "
+                    "as the noise "
+                    "allows; variances are enlarged by that, and boresight may be off by more",
+                    c.unevenness));
   }
   if (solution.lost > 0) {
     c.warnings.push_back(fmt::format("{} shots do not meet their plane", solution.lost));

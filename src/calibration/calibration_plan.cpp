@@ -34,8 +34,8 @@ std::vector<std::vector<double>> sample_angles(const CalibrationPlan& plan, std:
     for (std::size_t i = 0; i < kSampleShots; ++i) {
       const double time =
           plan.duration * (static_cast<double>(i) + 0.5) / static_cast<double>(kSampleShots);
-      column[i] = std::remainder(
-          rotation_angle_at(start, plan.sensor.angular_velocity[k], time), kTwoPi);
+      column[i] =
+          std::remainder(rotation_angle_at(start, plan.sensor.angular_velocity[k], time), kTwoPi);
     }
     angles.push_back(std::move(column));
   }
@@ -57,8 +57,7 @@ std::vector<std::string> advice_for(const CalibrationForecast& f, const Calibrat
     if (wall.mean_incidence > kUsefulIncidence) steep += wall.share;
   }
   if (all > 0) far /= all;
-  const auto recordings =
-      static_cast<double>(std::max<std::size_t>(1, plan.scene.stations.size()));
+  const auto recordings = static_cast<double>(std::max<std::size_t>(1, plan.scene.stations.size()));
   if (all < 0.9 * recordings) {
     advice.push_back(fmt::format(
         "only {:.0f} % of the shots meet a wall: walls that fill the field of view tell more",
@@ -76,7 +75,8 @@ std::vector<std::string> advice_for(const CalibrationForecast& f, const Calibrat
     }
     if (f.datum_kind == DatumKind::none || f.datum_kind == DatumKind::planes) {
       advice.push_back(
-          "scan the same walls with the body flipped by 180 degrees about its axis and turned by 30 "
+          "scan the same walls with the body flipped by 180 degrees about its axis and turned by "
+          "30 "
           "degrees to both sides against a stop (stations with a sigma_deg): that alone makes the "
           "common direction independent of the walls' flatness");
     }
@@ -88,14 +88,19 @@ std::vector<std::string> advice_for(const CalibrationForecast& f, const Calibrat
 }  // namespace
 
 std::vector<estimation::FreeParameter> calibration_parameters(
-    int prisms, const std::vector<std::string>& fixed,
-    const std::vector<std::string>& additional) {
+    int prisms, const std::vector<std::string>& fixed, const std::vector<std::string>& additional) {
   std::vector<std::string> names;
   for (const std::string& name : estimation::default_free_names(prisms)) {
     if (name != "refractive_index") names.push_back(name);
   }
   for (const std::string& name : fixed) {
-    find_parameter(name, prisms);
+    if (find_parameter(name, prisms).kind != ParameterKind::train) {
+      throw InvalidArgument(
+          fmt::format("{} cannot be held, choose among the prisms' parameters", name));
+    }
+    if (std::find(additional.begin(), additional.end(), name) != additional.end()) {
+      throw InvalidArgument(fmt::format("{} can be held or freed, not both", name));
+    }
     std::erase(names, name);
   }
   for (const std::string& name : additional) {
@@ -120,9 +125,8 @@ CalibrationForecast forecast(const CalibrationPlan& plan) {
   problem.free = calibration_parameters(sensor.prisms(), plan.fixed, plan.additional);
   for (const auto& free : problem.free) {
     const bool angle = find_parameter(free.name, sensor.prisms()).unit == "deg";
-    problem.prior_sigma.push_back(plan.prior_sigma && angle
-                                      ? *plan.prior_sigma
-                                      : std::numeric_limits<double>::infinity());
+    problem.prior_sigma.push_back(
+        plan.prior_sigma && angle ? *plan.prior_sigma : std::numeric_limits<double>::infinity());
   }
   problem.range_offset_sigma = plan.range_offset_sigma;
   // One shot of the sample stands for several: its variance is divided by their number.
@@ -195,8 +199,8 @@ CalibrationForecast forecast(const CalibrationPlan& plan) {
   const bool tied = plan.stations_known && with_stations;
   std::optional<scenes::Scene> planes;
   if (known_normals || tied) planes = plan.scene;
-  WallMatching matching = match_walls(
-      found, names, planes, tied ? plan.scene.stations : std::vector<scenes::Station>{});
+  WallMatching matching = match_walls(found, names, planes,
+                                      tied ? plan.scene.stations : std::vector<scenes::Station>{});
   problem.walls = std::move(matching.walls);
   problem.stations = std::move(matching.stations);
   problem.stations_known = matching.stations_known;

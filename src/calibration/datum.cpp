@@ -30,8 +30,8 @@ Eigen::Vector3d eigen(const Vector3<double>& v) { return {v.x, v.y, v.z}; }
 /// One beam of a bundle and how it follows the parameters.
 struct BundleBeam {
   Eigen::Vector3d direction;
-  Eigen::Matrix<double, 3, Eigen::Dynamic> jacobian;    ///< of the direction [3, free]
-  Eigen::Matrix<double, 2, Eigen::Dynamic> of_angles;   ///< of azimuth and zenith [2, free]
+  Eigen::Matrix<double, 3, Eigen::Dynamic> jacobian;   ///< of the direction [3, free]
+  Eigen::Matrix<double, 2, Eigen::Dynamic> of_angles;  ///< of azimuth and zenith [2, free]
 };
 
 template <int N>
@@ -120,9 +120,8 @@ FormalDatum formal_datum(const PrismTrain& train,
                          const std::vector<estimation::FreeParameter>& free,
                          const Eigen::MatrixXd& covariance,
                          const std::vector<std::vector<double>>& rotation_angles) {
-  const auto beams = with_prism_count(train.prisms(), [&]<int N>() {
-    return bundle<N>(train, free, rotation_angles);
-  });
+  const auto beams = with_prism_count(
+      train.prisms(), [&]<int N>() { return bundle<N>(train, free, rotation_angles); });
   if (beams.empty()) throw InvalidArgument("no beam gets through the prisms");
   Matrix3d normal = Matrix3d::Zero();
   Eigen::MatrixXd right = Eigen::MatrixXd::Zero(3, static_cast<Index>(free.size()));

@@ -39,8 +39,9 @@ template <int N>
 class View {
  public:
   View(const PlanarProblem& p, const RangedShots& shots)
-      : p_(p), shots_(shots), prepared_(prepare<double, N>(parameter_array<N>(p.train),
-                                                           face_order_array<N>(p.train))),
+      : p_(p),
+        shots_(shots),
+        prepared_(prepare<double, N>(parameter_array<N>(p.train), face_order_array<N>(p.train))),
         derivatives_(prepare_derivatives<double, N>(parameter_array<N>(p.train),
                                                     face_order_array<N>(p.train))) {
     const auto positions = face_positions(p.train.face_order(), p.geometry);
@@ -53,8 +54,7 @@ class View {
     tbb::parallel_for(std::size_t{0}, blocks(), [&](std::size_t block) {
       for (std::size_t i = begin(block); i < end(block); ++i) {
         const auto trace = trace_forward(prepared_, angles(i));
-        cloud.points[i] =
-            beam_origin(trace, face_position_) + shots_.range[i] * trace.direction();
+        cloud.points[i] = beam_origin(trace, face_position_) + shots_.range[i] * trace.direction();
       }
     });
     std::vector<std::size_t> all(cloud.points.size());
@@ -136,7 +136,6 @@ PlanarSolution adjust_as_paper(PlanarProblem problem, int most_iterations,
     Eigen::MatrixXd hessian = Eigen::MatrixXd::Zero(free, free);
     Eigen::VectorXd gradient = Eigen::VectorXd::Zero(free);
     double squares = 0;
-    solution.chi2.clear();
     for (std::size_t v = 0; v < problem.views.size(); ++v) {
       WallView& view = problem.views[v];
       const auto [plane, sums] = with_prism_count(problem.train.prisms(), [&]<int N>() {
@@ -147,10 +146,8 @@ PlanarSolution adjust_as_paper(PlanarProblem problem, int most_iterations,
       const Eigen::LLT<Eigen::MatrixXd> own(sums.hessian.bottomRightCorner(3, 3));
       const Eigen::MatrixXd cross = sums.hessian.bottomLeftCorner(3, free);
       hessian += sums.hessian.topLeftCorner(free, free) - cross.transpose() * own.solve(cross);
-      gradient +=
-          sums.gradient.head(free) - cross.transpose() * own.solve(sums.gradient.tail(3));
+      gradient += sums.gradient.head(free) - cross.transpose() * own.solve(sums.gradient.tail(3));
       squares += sums.squares;
-      solution.chi2.push_back(sums.squares);
       problem.walls[view.wall].normal = plane.normal;
       view.distance = plane.distance;
     }
@@ -181,13 +178,16 @@ PlanarSolution adjust_as_paper(PlanarProblem problem, int most_iterations,
     solution.parameters[j] =
         problem.train[problem.free[static_cast<std::size_t>(j)].places.front()];
   }
+  solution.chi2.clear();
   for (std::size_t v = 0; v < problem.views.size(); ++v) {
-    WallView& view = problem.views[v];
-    view.range_variance = unit_weight * unit_weight;
-    solution.chi2[v] /= view.range_variance;
-    const auto shots = static_cast<double>(view.shots->size());
+    const RangedShots& own = *problem.views[v].shots;
+    const auto shots = static_cast<double>(own.size());
     solution.redundancy.push_back(shots * redundancy / static_cast<double>(solution.shots));
     solution.distance_sigma.push_back(unit_weight / std::sqrt(shots));
+    // As ranges, like every other adjustment has them.
+    const PlaneEquations equations = plane_equations(own, plane_view(problem, v));
+    solution.chi2.push_back(equations.cost);
+    solution.lost += equations.lost;
   }
   solution.problem = std::move(problem);
   return solution;

@@ -21,9 +21,9 @@ using Eigen::Index;
 
 constexpr double kLeastDamping = 1e-12;
 constexpr double kMostDamping = 1e12;
-/// Steps that promise to lower the cost by less are taken unasked, in the unit of one squared sigma:
-/// so near the minimum the derivatives' last thousandth (the beam's origin) decides what the cost
-/// does, and not whether the step is right.
+/// Steps that promise to lower the cost by less are taken unasked, in the unit of one squared
+/// sigma: so near the minimum the derivatives' last thousandth (the beam's origin) decides what the
+/// cost does, and not whether the step is right.
 constexpr double kSmallPromise = 1e-2;
 
 Eigen::Vector3d eigen(const Vector3<double>& v) { return {v.x, v.y, v.z}; }
@@ -51,8 +51,10 @@ double critical_chi2(int degrees_of_freedom) {
 class Unknowns {
  public:
   explicit Unknowns(const PlanarProblem& p)
-      : free_(static_cast<Index>(p.free.size())), normal_(p.walls.size(), -1),
-        rotation_(p.stations.size(), -1), distance_(p.views.size(), -1) {
+      : free_(static_cast<Index>(p.free.size())),
+        normal_(p.walls.size(), -1),
+        rotation_(p.stations.size(), -1),
+        distance_(p.views.size(), -1) {
     Index next = free_;
     if (p.range_offset_sigma > 0) offset_ = next++;
     for (std::size_t w = 0; w < p.walls.size(); ++w) {
@@ -94,9 +96,7 @@ struct Places {
       }
     }
   }
-  Index column(int place) const {
-    return std::find(all.begin(), all.end(), place) - all.begin();
-  }
+  Index column(int place) const { return std::find(all.begin(), all.end(), place) - all.begin(); }
 };
 
 bool is_free(const PlanarProblem& p, int place) {
@@ -164,8 +164,7 @@ Chain chain_of(const PlanarProblem& p, const Unknowns& at, const Places& places,
     }
     if (p.angle_sensitivity.empty()) continue;
     for (int k = 0; k < p.train.prisms(); ++k) {
-      chain.considered(columns.rotation_angle(k), j) =
-          p.angle_sensitivity[seen.recording](k, j);
+      chain.considered(columns.rotation_angle(k), j) = p.angle_sensitivity[seen.recording](k, j);
     }
   }
   if (!p.mean_angle_covariance.empty()) {
@@ -182,7 +181,6 @@ struct System {
   Eigen::MatrixXd hessian;     ///< [unknowns, unknowns]
   Eigen::VectorXd gradient;    ///< [unknowns]
   Eigen::MatrixXd considered;  ///< J^T W d prediction / d considered [unknowns, considered]
-  Eigen::MatrixXd data_hessian;  ///< without priors
   double cost = 0;
   std::size_t shots = 0, lost = 0;
   std::vector<Eigen::MatrixXd> view_hessian;  ///< [views] of [unknowns, unknowns]
@@ -248,7 +246,6 @@ System build_system(const PlanarProblem& p, const Unknowns& at, const Places& pl
     system.shots += equations.shots;
     system.lost += equations.lost;
   }
-  system.data_hessian = system.hessian;
   add_priors(p, at, system);
   return system;
 }
@@ -301,9 +298,11 @@ Eigen::MatrixXd eliminated(const Eigen::MatrixXd& hessian, Index free) {
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(
       scale.asDiagonal() * hessian.bottomRightCorner(rest, rest) * scale.asDiagonal());
   Eigen::VectorXd inverse = solver.eigenvalues();
-  for (double& value : inverse) value = value > 1e-13 * static_cast<double>(rest) ? 1.0 / value : 0.0;
-  const Eigen::MatrixXd half = inverse.cwiseSqrt().asDiagonal() * solver.eigenvectors().transpose() *
-                               scale.asDiagonal() * hessian.bottomLeftCorner(rest, free);
+  for (double& value : inverse)
+    value = value > 1e-13 * static_cast<double>(rest) ? 1.0 / value : 0.0;
+  const Eigen::MatrixXd half = inverse.cwiseSqrt().asDiagonal() *
+                               solver.eigenvectors().transpose() * scale.asDiagonal() *
+                               hessian.bottomLeftCorner(rest, free);
   return hessian.topLeftCorner(free, free) - half.transpose() * half;
 }
 
@@ -361,8 +360,8 @@ bool is_material(int place, int prisms) {
 
 std::pair<Vector3<double>, Vector3<double>> tangents_of(const Vector3<double>& normal) {
   // Across the axis that the normal is farthest from.
-  const Vector3<double> axis = std::abs(normal.z) < 0.9 ? Vector3<double>{0, 0, 1}
-                                                        : Vector3<double>{1, 0, 0};
+  const Vector3<double> axis =
+      std::abs(normal.z) < 0.9 ? Vector3<double>{0, 0, 1} : Vector3<double>{1, 0, 0};
   const Vector3<double> first = normalized(cross(axis, normal));
   return {first, cross(normal, first)};
 }
@@ -370,8 +369,7 @@ std::pair<Vector3<double>, Vector3<double>> tangents_of(const Vector3<double>& n
 PlaneView plane_view(const PlanarProblem& problem, std::size_t view) {
   const WallView& seen = problem.views[view];
   const Wall& wall = problem.walls[seen.wall];
-  const Eigen::Matrix3d turn =
-      problem.stations[seen.recording].scene_from_sensor.transpose();
+  const Eigen::Matrix3d turn = problem.stations[seen.recording].scene_from_sensor.transpose();
   const auto [u1, u2] = tangents_of(wall.normal);
   PlaneView plane;
   plane.train = problem.train;
@@ -413,7 +411,8 @@ PlanarSolution adjust(PlanarProblem problem, const AdjustmentOptions& options,
     ++solution.iterations;
     report_progress(progress, static_cast<double>(solution.iterations) / options.most_iterations);
     // Shots that lose their plane would make any step look good.
-    const bool better = next.lost <= system.lost && (next.cost <= system.cost || promised < kSmallPromise);
+    const bool better =
+        next.lost <= system.lost && (next.cost <= system.cost || promised < kSmallPromise);
     if (better) {
       problem = std::move(trial);
       system = std::move(next);
@@ -428,9 +427,15 @@ PlanarSolution adjust(PlanarProblem problem, const AdjustmentOptions& options,
   solution.lost = system.lost;
 
   const Index free = at.free(), n = at.size();
-  solution.information = eliminated(system.data_hessian, free);
+  Eigen::MatrixXd hessian = system.hessian;
+  for (std::size_t j = 0; j < problem.prior_sigma.size(); ++j) {
+    const auto i = static_cast<Index>(j);
+    hessian(i, i) -= 1.0 / (problem.prior_sigma[j] * problem.prior_sigma[j]);
+  }
+  solution.information = eliminated(hessian, free);
   const ScaledSolver solver(system.hessian, kLeastDamping);
-  Eigen::MatrixXd covariance = Eigen::MatrixXd::Constant(n, n, std::numeric_limits<double>::infinity());
+  Eigen::MatrixXd covariance =
+      Eigen::MatrixXd::Constant(n, n, std::numeric_limits<double>::infinity());
   if (solver.ok()) {
     covariance = solver.solve(Eigen::MatrixXd::Identity(n, n));
     for (std::size_t view = 0; view < problem.views.size(); ++view) {
@@ -446,9 +451,8 @@ PlanarSolution adjust(PlanarProblem problem, const AdjustmentOptions& options,
     for (std::size_t w = 0; w < problem.walls.size(); ++w) {
       const Wall& wall = problem.walls[w];
       if (!(wall.normal_sigma > 0)) continue;
-      solution.prior_tests.push_back(
-          test_of(wall.name, false, misfit_of(wall), wall.normal_sigma,
-                  covariance.block(at.normal(w), at.normal(w), 2, 2)));
+      solution.prior_tests.push_back(test_of(wall.name, false, misfit_of(wall), wall.normal_sigma,
+                                             covariance.block(at.normal(w), at.normal(w), 2, 2)));
     }
     for (std::size_t s = 0; s < problem.stations.size(); ++s) {
       const StationPose& station = problem.stations[s];
@@ -472,11 +476,13 @@ PlanarSolution adjust(PlanarProblem problem, const AdjustmentOptions& options,
   }
   for (std::size_t w = 0; w < problem.walls.size(); ++w) {
     const Index normal = at.normal(w);
-    solution.normal_sigma.push_back(normal < 0 ? 0.0 : std::hypot(sigma(normal), sigma(normal + 1)));
+    solution.normal_sigma.push_back(normal < 0 ? 0.0
+                                               : std::hypot(sigma(normal), sigma(normal + 1)));
   }
   solution.parameters.resize(free);
   for (Index j = 0; j < free; ++j) {
-    solution.parameters[j] = problem.train[problem.free[static_cast<std::size_t>(j)].places.front()];
+    solution.parameters[j] =
+        problem.train[problem.free[static_cast<std::size_t>(j)].places.front()];
   }
   solution.problem = std::move(problem);
   return solution;

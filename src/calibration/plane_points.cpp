@@ -62,7 +62,8 @@ RangedRecording ranged_recording(const estimation::Estimate& estimate, std::stri
   std::size_t row = 0;
   for (std::size_t begin = 0; begin < estimate.series.size(); begin += kBlockShots) {
     const std::size_t end = std::min(begin + kBlockShots, estimate.series.size());
-    const estimation::RotorStates states = states_of_shots(*estimate.map, estimate.series, {begin, end});
+    const estimation::RotorStates states =
+        states_of_shots(*estimate.map, estimate.series, {begin, end});
     for (std::size_t i = 0; i < states.size(); ++i) {
       const double range = estimate.series.range[begin + i];
       if (!(range > 0.0)) {
@@ -74,8 +75,7 @@ RangedRecording ranged_recording(const estimation::Estimate& estimate, std::stri
         continue;
       }
       for (std::size_t k = 0; k < shots.rotation_angle.size(); ++k) {
-        shots.rotation_angle[k][row] =
-            std::remainder(states.rotation_angle[k][i], kTwoPi);
+        shots.rotation_angle[k][row] = std::remainder(states.rotation_angle[k][i], kTwoPi);
       }
       for (std::size_t k = 0; k < shots.angle_covariance.size(); ++k) {
         shots.angle_covariance[k][row] = static_cast<float>(states.rotation_angle_covariance[k][i]);

@@ -16,8 +16,8 @@ namespace {
 
 /// Found planes are off by the calibration errors that the adjustment will find: a degree or two.
 constexpr double kSameDirection = radians_from_degrees(5.0);
-constexpr double kSameDistance = 0.05;         // of the distance
-constexpr double kSameDistanceAtLeast = 0.3;   // m
+constexpr double kSameDistance = 0.05;        // of the distance
+constexpr double kSameDistanceAtLeast = 0.3;  // m
 
 /// A found plane as the scene has it.
 Plane in_scene(const Plane& plane, const scenes::Station& station) {
@@ -62,6 +62,11 @@ WallMatching match_walls(std::vector<FoundPlane>& found, const std::vector<std::
       station.stated.col(i) << turned.x, turned.y, turned.z;
     }
     station.scene_from_sensor = station.stated;
+    if (!stations.empty() && pose.sigma == 0.0) {
+      result.warnings.push_back(fmt::format(
+          "station {} has no sigma_deg: its rotation is taken as exact and is not tested",
+          pose.name));
+    }
     result.stations.push_back(std::move(station));
   }
   if (!result.stations_known) {
@@ -109,7 +114,8 @@ WallMatching match_walls(std::vector<FoundPlane>& found, const std::vector<std::
     std::size_t best = where.size();
     for (std::size_t w = 0; w < where.size(); ++w) {
       if (w == except) continue;
-      if (best == where.size() || angle_of(where[w], plane) < angle_of(where[best], plane)) best = w;
+      if (best == where.size() || angle_of(where[w], plane) < angle_of(where[best], plane))
+        best = w;
     }
     return best;
   };

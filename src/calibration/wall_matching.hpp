@@ -15,9 +15,9 @@ namespace risley::calibration {
 /// A plane that was found in one recording.
 struct FoundPlane {
   std::size_t recording = 0;
-  Plane plane;             ///< sensor frame
+  Plane plane;  ///< sensor frame
   std::size_t points = 0;
-  std::size_t wall = 0;    ///< row of WallMatching::walls
+  std::size_t wall = 0;  ///< row of WallMatching::walls
 };
 
 /// Which planes of which recordings are the same wall.
@@ -28,9 +28,9 @@ struct WallMatching {
   std::vector<std::string> warnings;
 };
 
-/// Without stations and known planes every found plane is a wall of its own: nothing is known of the
-/// poses. Otherwise planes are compared in the scene's frame, by normal and distance, with the known
-/// ones and with each other.
+/// Without stations and known planes every found plane is a wall of its own: nothing is known of
+/// the poses. Otherwise planes are compared in the scene's frame, by normal and distance, with the
+/// known ones and with each other.
 /// @param[in,out] found   gets its walls
 /// @param recordings      names [recordings]
 /// @param planes          known or named walls; those with a normal_sigma have known normals

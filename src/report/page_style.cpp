@@ -28,6 +28,7 @@ body { margin: 0; background: var(--paper); color: var(--ink);
 main { max-width: 84rem; margin: 0 auto; padding: 1.5rem 1.25rem 4rem; }
 h1 { font-size: 1.5rem; margin: 0; overflow-wrap: anywhere; }
 h2 { font-size: 1.2rem; margin: 2.5rem 0 0.75rem; }
+h3 { font-size: 1rem; margin: 1.5rem 0 0.5rem; }
 p { margin: 0.5rem 0; max-width: 60rem; }
 .lead, .note { color: var(--muted); }
 .note { font-size: 0.85rem; margin: 0.4rem 0 0; }

@@ -7,7 +7,7 @@ import unittest
 
 from command import CommandTest
 
-VERBS = ("info", "convert", "simulate", "estimate", "observability")
+VERBS = ("info", "convert", "simulate", "estimate", "observability", "calibrate")
 
 # Arguments that are wrong, and what the message must name.
 WRONG = [

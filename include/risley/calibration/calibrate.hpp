@@ -34,7 +34,7 @@ inline constexpr double kWidestDirection = 0.5;
 
 struct CalibrationOptions {
   CalibrationMethod method = CalibrationMethod::adjustment;
-  sensors::Sensor sensor;               ///< noise, geometry, name; its errors are not used
+  sensors::Sensor sensor;  ///< noise, geometry, name; its errors are not used
   /// Default free parameters to hold, at the believed value or at one that is given, SI units.
   std::vector<std::pair<std::string, std::optional<double>>> fixed;
   std::vector<std::string> additional;  ///< further parameters to free
@@ -46,7 +46,7 @@ struct CalibrationOptions {
   /// The station of each recording [recordings]; empty: unknown poses, or the origin of the scene
   /// where planes are given.
   std::vector<scenes::Station> stations;
-  std::uint64_t seed = 0;               ///< of the search for planes
+  std::uint64_t seed = 0;  ///< of the search for planes
 };
 
 /// One wall in one recording.
@@ -58,8 +58,8 @@ struct CalibratedPlane {
   std::size_t points = 0;
   /// Shots that lie near the plane (within ten sigmas) and were not used.
   std::size_t outliers = 0;
-  double rms = 0;         ///< of point-to-plane distances after the calibration, m
-  double rms_before = 0;  ///< the same with the believed parameters and a plane fitted to them, m
+  double rms = 0;          ///< of point-to-plane distances after the calibration, m
+  double rms_before = 0;   ///< the same with the believed parameters and a plane fitted to them, m
   double range_sigma = 0;  ///< of one range, found by variance components, m
 };
 
@@ -74,43 +74,43 @@ struct SurfaceStep {
 
 /// Mean distance from the plane over a variable, before and after.
 struct ThicknessProfile {
-  std::string variable;  ///< "incidence", "rotation_angle_a", ...
-  std::vector<double> from, to;                     ///< bin edges, rad
-  std::vector<std::size_t> count;                   ///< [bins]
-  std::vector<double> rms_before, rms_after;        ///< [bins], m; NaN in an empty bin
-  std::vector<double> mean_before, mean_after;      ///< [bins], m; NaN in an empty bin
+  std::string variable;                         ///< "incidence", "rotation_angle_a", ...
+  std::vector<double> from, to;                 ///< bin edges, rad
+  std::vector<std::size_t> count;               ///< [bins]
+  std::vector<double> rms_before, rms_after;    ///< [bins], m; NaN in an empty bin
+  std::vector<double> mean_before, mean_after;  ///< [bins], m; NaN in an empty bin
 };
 
 /// One point of a cloud for pictures.
 struct SamplePoint {
   std::size_t recording = 0;
-  int plane = -1;  ///< row of Calibration::planes, -1: none
-  Vector3<double> point;  ///< sensor frame, m, after the calibration
-  double before = 0, after = 0;  ///< distance from the plane, m; NaN without a plane
+  int plane = -1;                  ///< row of Calibration::planes, -1: none
+  Vector3<double> point;           ///< sensor frame, m, after the calibration
+  double before = 0, after = 0;    ///< distance from the plane, m; NaN without a plane
   double azimuth = 0, zenith = 0;  ///< of the beam after the calibration, rad
 };
 
 /// Everything one calibration found.
 struct Calibration {
   bool converged = false;
-  std::string reason;                 ///< why not; empty when converged
+  std::string reason;  ///< why not; empty when converged
   std::vector<std::string> warnings;
   CalibrationMethod method = CalibrationMethod::adjustment;
-  sensors::Sensor sensor;             ///< calibrated, with covariance
+  sensors::Sensor sensor;                          ///< calibrated, with covariance
   PrismTrain believed{parse_face_order("PA-AP")};  ///< what the sensor computed directions with
   std::vector<estimation::FreeParameter> free;
-  Eigen::VectorXd parameters;         ///< [free], SI
-  Eigen::MatrixXd covariance;         ///< [free, free], everything included
+  Eigen::VectorXd parameters;                       ///< [free], SI
+  Eigen::MatrixXd covariance;                       ///< [free, free], everything included
   double range_offset = 0, range_offset_sigma = 0;  ///< m; sigma 0 where it was held
   std::vector<CalibratedPlane> planes;
   std::vector<SurfaceStep> steps;
   DatumKind datum_kind = DatumKind::none;
-  FormalDatum datum;                  ///< after
-  FormalDatum datum_without_common;   ///< without the common errors of the rotation angles
+  FormalDatum datum;                 ///< after
+  FormalDatum datum_without_common;  ///< without the common errors of the rotation angles
   std::vector<estimation::WeakDirection> unobservable;
   std::vector<PriorTest> prior_tests;
-  double sigma0 = 0;      ///< standard deviation of unit weight against the stated range noise
-  double unevenness = 1;  ///< chi2 per cell of mean residuals over 1 degree: 1 for flat walls
+  double sigma0 = 0;           ///< standard deviation of unit weight against the stated range noise
+  double unevenness = 1;       ///< chi2 per cell of mean residuals over 1 degree: 1 for flat walls
   double variance_factor = 1;  ///< by which the covariance was enlarged for uneven walls
   int iterations = 0;  ///< of the longest adjustment, the one that starts from the believed values
   /// What the recordings together say of the believed parameters moves the rotation angles of each
@@ -119,7 +119,7 @@ struct Calibration {
   double rms_before = 0, rms_after = 0;  ///< over all planes, m
   std::size_t points = 0;                ///< used
   std::vector<ThicknessProfile> profiles;
-  std::vector<SamplePoint> sample;       ///< at most 20,000 shots, evenly spread
+  std::vector<SamplePoint> sample;  ///< at most 20,000 shots, evenly spread
 };
 
 /// Calibrates a sensor on the walls that its recordings saw.

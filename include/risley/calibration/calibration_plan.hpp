@@ -35,21 +35,21 @@ struct CalibrationPlan {
 /// What one wall gives.
 struct PlannedWall {
   std::string name, station;
-  double share = 0;              ///< of the station's shots
-  double mean_incidence = 0;     ///< rad
-  double mean_range = 0;         ///< m
+  double share = 0;           ///< of the station's shots
+  double mean_incidence = 0;  ///< rad
+  double mean_range = 0;      ///< m
 };
 
 /// What it will reach.
 struct CalibrationForecast {
   std::vector<estimation::FreeParameter> free;
-  Eigen::MatrixXd covariance;    ///< [free, free], SI
+  Eigen::MatrixXd covariance;     ///< [free, free], SI
   double range_offset_sigma = 0;  ///< m
   DatumKind datum_kind = DatumKind::none;
   FormalDatum datum;
   std::vector<estimation::WeakDirection> unobservable;
   std::vector<PlannedWall> walls;
-  double shots = 0;              ///< with a return, of all recordings
+  double shots = 0;                 ///< with a return, of all recordings
   std::vector<std::string> advice;  ///< what would make it better, in words
 };
 

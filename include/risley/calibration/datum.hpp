@@ -19,8 +19,8 @@ struct DirectionErrors {
   double azimuth_rmse = 0, zenith_rmse = 0;  ///< rad
   double azimuth_bias = 0, zenith_bias = 0;  ///< mean, rad
   double total = 0;                          ///< sqrt(azimuth_rmse^2 + zenith_rmse^2), rad
-  double gauge = 0;  ///< RMS over the beams of the best-fitting rigid rotation, rad
-  double shape = 0;  ///< RMS of what is left, rad
+  double gauge = 0;          ///< RMS over the beams of the best-fitting rigid rotation, rad
+  double shape = 0;          ///< RMS of what is left, rad
   Vector3<double> rotation;  ///< the best-fitting one: roll, pitch, yaw about X, Y, Z, rad
 };
 

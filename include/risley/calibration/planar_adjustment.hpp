@@ -52,8 +52,8 @@ struct PlanarProblem {
   PrismTrain prior{parse_face_order("PA-AP")};  ///< where the priors of the parameters stand
   /// Prior sigma of every free parameter [free], SI; empty or infinite: none.
   std::vector<double> prior_sigma;
-  double range_offset = 0;        ///< start value, m
-  double range_offset_sigma = 0;  ///< prior about 0, m; 0 holds it at 0
+  double range_offset = 0;            ///< start value, m
+  double range_offset_sigma = 0;      ///< prior about 0, m; 0 holds it at 0
   std::vector<StationPose> stations;  ///< [recordings]
   bool stations_known = false;        ///< whether their rotations tie the walls together
   std::vector<Wall> walls;
@@ -71,10 +71,10 @@ struct PlanarProblem {
 
 /// Residual of a piece of prior knowledge: what it said less what the adjustment found.
 struct PriorTest {
-  std::string name;    ///< of the station or wall
+  std::string name;  ///< of the station or wall
   bool station = false;
-  double misfit = 0;   ///< length of the rotation between both, rad
-  double chi2 = 0;     ///< of the misfit
+  double misfit = 0;  ///< length of the rotation between both, rad
+  double chi2 = 0;    ///< of the misfit
   int degrees_of_freedom = 0;
   double critical = 0;  ///< chi2 that a sound one exceeds once in 10,000
 };
@@ -86,13 +86,15 @@ struct PlanarSolution {
   int iterations = 0;
   double cost = 0;  ///< shots and priors, at the minimum
   std::size_t shots = 0, lost = 0;
-  Eigen::VectorXd parameters;  ///< [free], SI
-  Eigen::MatrixXd covariance;        ///< [free, free], common errors of the angles included
-  Eigen::MatrixXd noise_covariance;  ///< [free, free], of the ranges' noise and the priors alone
-  double range_offset_sigma = 0;         ///< m
-  std::vector<double> distance_sigma;    ///< [views], m
-  std::vector<double> normal_sigma;      ///< [walls], of the two angles together, rad
-  Eigen::MatrixXd information;           ///< [free, free] of the data alone, all others eliminated
+  Eigen::VectorXd parameters;          ///< [free], SI
+  Eigen::MatrixXd covariance;          ///< [free, free], common errors of the angles included
+  Eigen::MatrixXd noise_covariance;    ///< [free, free], of the ranges' noise and the priors alone
+  double range_offset_sigma = 0;       ///< m
+  std::vector<double> distance_sigma;  ///< [views], m
+  std::vector<double> normal_sigma;    ///< [walls], of the two angles together, rad
+  /// What data, stations and known walls say of the free parameters, everything else eliminated and
+  /// without the priors of the parameters themselves [free, free].
+  Eigen::MatrixXd information;
   std::vector<PriorTest> prior_tests;
   /// Redundancy of every view: its shots less its share of the unknowns [views].
   std::vector<double> redundancy;
@@ -115,8 +117,8 @@ PlanarSolution adjust(PlanarProblem problem, const AdjustmentOptions& options = 
 /// The view of a problem as plane_equations() wants it.
 PlaneView plane_view(const PlanarProblem& problem, std::size_t view);
 
-/// Whether a place of the flat vector describes what the prisms are made of (index, wedge), which the
-/// sensor and the calibration share, and not how they are mounted.
+/// Whether a place of the flat vector describes what the prisms are made of (index, wedge), which
+/// the sensor and the calibration share, and not how they are mounted.
 bool is_material(int place, int prisms);
 
 /// Two unit vectors that make a right-handed orthogonal triad with a unit vector.

@@ -59,12 +59,12 @@ struct ResidualColumns {
 /// one predicted from plane, optics and rotation angles,
 ///   r = (d - n.o) / (n.L)
 /// with beam origin o and direction L, so the derivatives hold the predicted range. (Eq. 32's
-/// point-to-plane distances hold the measured one; its noise then biases the solution.) The variance
-/// of a residual is that of the range plus what the covariance of the rotation angles makes of it,
-/// which grows with the angle of incidence: the Gauss-Helmert model with the condition solved for
-/// the range. The derivative of the beam's origin is left out: it is a thousandth of the rest, and
-/// the residuals themselves are exact. docs/theory/calibration.md
-/// The sums do not depend on the number of threads.
+/// point-to-plane distances hold the measured one; its noise then biases the solution.) The
+/// variance of a residual is that of the range plus what the covariance of the rotation angles
+/// makes of it, which grows with the angle of incidence: the Gauss-Helmert model with the condition
+/// solved for the range. The derivative of the beam's origin is left out: it is a thousandth of the
+/// rest, and the residuals themselves are exact. docs/theory/calibration.md The sums do not depend
+/// on the number of threads.
 /// @param set  instruction set, for tests and benchmarks
 PlaneEquations plane_equations(const RangedShots& shots, const PlaneView& view,
                                const ResidualColumns& columns = {},

@@ -14,8 +14,8 @@
 
 namespace risley::calibration {
 
-/// Shots with a range, as columns of one length: what a calibration sees of a recording. A shot is a
-/// range and the rotation angles at which it was measured; the direction that the sensor reported
+/// Shots with a range, as columns of one length: what a calibration sees of a recording. A shot is
+/// a range and the rotation angles at which it was measured; the direction that the sensor reported
 /// plays no further part, so that its own calibration cannot bend the new one.
 struct RangedShots {
   std::vector<std::vector<double>> rotation_angle;  ///< [prisms][shots], rad, within half a turn
@@ -40,11 +40,11 @@ struct RangedRecording {
   sensors::Sensor believed;  ///< as estimated: what the sensor computes its directions with
   /// What the estimate says of the believed parameters.
   std::vector<estimation::FreeParameter> free;
-  Eigen::MatrixXd covariance;         ///< [free, free], SI units
-  Eigen::MatrixXd angle_sensitivity;  ///< [prisms, free], see BatchMapResult
+  Eigen::MatrixXd covariance;             ///< [free, free], SI units
+  Eigen::MatrixXd angle_sensitivity;      ///< [prisms, free], see BatchMapResult
   Eigen::MatrixXd mean_angle_covariance;  ///< [prisms, prisms], rad^2, at given parameters
-  std::size_t without_range = 0;      ///< shots that had a direction and no range
-  std::size_t outliers = 0;           ///< shots whose reported direction was an outlier
+  std::size_t without_range = 0;          ///< shots that had a direction and no range
+  std::size_t outliers = 0;               ///< shots whose reported direction was an outlier
 };
 
 /// Takes the shots that have a range and a sound direction out of an estimate.

@@ -1,0 +1,88 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "calibration/belief.hpp"
+
+#include <Eigen/Cholesky>
+#include <fmt/format.h>
+
+#include "risley/core/error.hpp"
+
+namespace risley::calibration {
+namespace {
+
+using Eigen::Index;
+
+/// Mean chi2 per parameter above which recordings are of different sensors.
+constexpr double kMostDisagreement = 6.0;
+
+void check_same_sensor(const std::vector<RangedRecording>& recordings) {
+  const RangedRecording& first = recordings.front();
+  for (const RangedRecording& other : recordings) {
+    if (!first.serial.empty() && !other.serial.empty() && first.serial != other.serial) {
+      throw InvalidArgument(
+          fmt::format("the recordings are of different sensors: {} of serial number {}, {} of {}",
+                      first.name, first.serial, other.name, other.serial));
+    }
+    if (first.believed.train.face_order() != other.believed.train.face_order() ||
+        first.believed.combination != other.believed.combination) {
+      throw InvalidArgument(fmt::format(
+          "the recordings are of different sensors: the rotors of {} and {} run differently",
+          first.name, other.name));
+    }
+  }
+}
+
+}  // namespace
+
+Belief pooled_belief(const std::vector<RangedRecording>& recordings) {
+  check_same_sensor(recordings);
+  const RangedRecording& first = recordings.front();
+  const auto n = static_cast<Index>(first.free.size());
+  Belief belief{first.believed, first.free, first.covariance, {}};
+  const auto values = [n](const RangedRecording& recording) {
+    Eigen::VectorXd v(n);
+    for (Index j = 0; j < n; ++j) {
+      v[j] = recording.believed.train[recording.free[static_cast<std::size_t>(j)].places.front()];
+    }
+    return v;
+  };
+  Eigen::VectorXd mean = values(first);
+  if (recordings.size() > 1 && n > 0) {
+    Eigen::MatrixXd information = Eigen::MatrixXd::Zero(n, n);
+    Eigen::VectorXd weighted = Eigen::VectorXd::Zero(n);
+    for (const RangedRecording& recording : recordings) {
+      const Eigen::MatrixXd own = recording.covariance.llt().solve(Eigen::MatrixXd::Identity(n, n));
+      information += own;
+      weighted += own * values(recording);
+    }
+    belief.covariance = information.llt().solve(Eigen::MatrixXd::Identity(n, n));
+    mean = belief.covariance * weighted;
+    for (const RangedRecording& recording : recordings) {
+      const Eigen::VectorXd off = values(recording) - mean;
+      const double chi2 = off.dot((recording.covariance - belief.covariance).ldlt().solve(off)) /
+                          static_cast<double>(n);
+      if (chi2 > kMostDisagreement) {
+        Index worst = 0;
+        off.cwiseAbs().cwiseQuotient(recording.covariance.diagonal().cwiseSqrt()).maxCoeff(&worst);
+        const ParameterInfo& info = find_parameter(
+            belief.free[static_cast<std::size_t>(worst)].name, belief.sensor.prisms());
+        throw EstimationError(fmt::format(
+            "the recordings are of different sensors, or of one whose stored calibration changed: "
+            "{} differs from the others' {} by {:.4g} {}",
+            recording.name, info.name, off[worst] / info.si_per_unit, info.unit));
+      }
+    }
+  }
+  for (Index j = 0; j < n; ++j) {
+    for (const int place : belief.free[static_cast<std::size_t>(j)].places) {
+      belief.sensor.train.set_place(place, mean[j]);
+    }
+  }
+  for (const RangedRecording& recording : recordings) {
+    const Eigen::VectorXd shift = recording.angle_sensitivity * (mean - values(recording));
+    belief.angle_shift.emplace_back(shift.data(), shift.data() + shift.size());
+  }
+  return belief;
+}
+
+}  // namespace risley::calibration

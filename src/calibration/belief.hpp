@@ -1,0 +1,28 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "risley/calibration/plane_points.hpp"
+
+namespace risley::calibration {
+
+/// The believed parameters as all recordings together tell them: what the sensor computes its
+/// directions with.
+struct Belief {
+  sensors::Sensor sensor;
+  std::vector<estimation::FreeParameter> free;
+  Eigen::MatrixXd covariance;                    ///< [free, free], SI units
+  std::vector<std::vector<double>> angle_shift;  ///< [recordings][prisms], rad
+};
+
+/// Mean of the recordings' own estimates, weighted by their information, and how far it moves the
+/// rotation angles of each.
+/// @throws InvalidArgument for recordings of different sensors by serial number or rotors,
+///         EstimationError when their parameters disagree
+Belief pooled_belief(const std::vector<RangedRecording>& recordings);
+
+}  // namespace risley::calibration

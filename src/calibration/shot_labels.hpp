@@ -1,0 +1,57 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "risley/calibration/planar_adjustment.hpp"
+#include "risley/calibration/plane_points.hpp"
+
+namespace risley::calibration {
+
+/// A shot belongs to a plane within so many sigmas.
+inline constexpr double kGate = 3.0;
+/// What lies beyond the gate and within so many sigmas is an outlier of its plane.
+inline constexpr double kNearby = 10.0;
+
+/// Lines of sight of shots.
+class Rays {
+ public:
+  Rays(const PrismTrain& train, const PrismGeometry& geometry, const RangedShots& shots);
+
+  Vector3<double> direction(std::size_t i) const { return {x_[i], y_[i], z_[i]}; }
+  Vector3<double> origin(std::size_t i) const { return {origin_x_[i], origin_y_[i], origin_z_[i]}; }
+  Vector3<double> point(std::size_t i, double range) const {
+    return origin(i) + range * direction(i);
+  }
+
+ private:
+  std::vector<double> x_, y_, z_, origin_x_, origin_y_, origin_z_;
+};
+
+/// Some shots by their rows.
+RangedShots rows_of(const RangedShots& shots, const std::vector<std::size_t>& rows);
+
+/// Typical sigma of a direction that comes from the rotation angles' covariance, rad.
+double pointing_of_angles(const RangedShots& shots);
+
+/// Which view of its recording each shot belongs to.
+struct Labels {
+  std::vector<int> view;          ///< [shots], row of PlanarProblem::views, -1: none
+  std::vector<std::size_t> near;  ///< [views], shots near a plane that were left out
+};
+
+/// Every shot to the plane that explains its range best, in sigmas. Where two planes meet no range
+/// can tell them apart; shots there go to neither, and that is decided by the predicted ranges
+/// alone: a choice by the measured one would keep those whose noise points away from the other
+/// plane.
+/// @param pointing  1 sigma of the directions, rad
+Labels label_shots(const PlanarProblem& problem, std::size_t recording, const RangedShots& shots,
+                   double pointing);
+
+/// Gives the views of one recording the shots that are labelled theirs.
+void hand_out(const RangedShots& shots, const std::vector<int>& view, std::size_t recording,
+              PlanarProblem& problem);
+
+}  // namespace risley::calibration

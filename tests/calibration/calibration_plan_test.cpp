@@ -1,0 +1,266 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "risley/calibration/calibration_plan.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "risley/calibration/planar_adjustment.hpp"
+#include "risley/core/angle.hpp"
+#include "risley/core/error.hpp"
+#include "risley/sensors/preset.hpp"
+
+#include "calibration/walls.hpp"
+
+namespace risley::calibration {
+namespace {
+
+using Eigen::Index;
+using ::testing::Contains;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::Not;
+using testing::station;
+using testing::wall;
+
+/// 10 s at 1 kHz without a range offset.
+CalibrationPlan plan_of(scenes::Scene scene) {
+  CalibrationPlan plan;
+  plan.sensor = sensors::load_sensor("mid-40-table3");
+  plan.scene = std::move(scene);
+  plan.rate = 1000.0;
+  plan.range_offset_sigma = 0;
+  return plan;
+}
+
+scenes::Scene one_wall() { return {{wall("wall", 10, 80, 30)}, {}}; }
+
+scenes::Scene corner() { return {{wall("left", 40, 88, 10), wall("right", -45, 85, 12)}, {}}; }
+
+/// Upright, flipped, and turned to both sides.
+scenes::Scene stations() {
+  scenes::Scene scene = corner();
+  scene.stations = {station("upright", 0, 0, 0, 0.02), station("flipped", 180, 0, 0, 0.02),
+                    station("to the left", 0, 0, 30, 0.02, {1, 0.5, 0}),
+                    station("to the right", 0, 0, -30, 0.02, {0, -1, 0.2})};
+  return scene;
+}
+
+double total_deg(const scenes::Scene& scene) {
+  return degrees_from_radians(forecast(plan_of(scene)).datum.total);
+}
+
+/// The whole sum over shots at random rotation angles.
+void expect_adjustment(const CalibrationPlan& plan) {
+  const auto shots = static_cast<std::size_t>(plan.duration * *plan.rate);
+  const sensors::Sensor& sensor = plan.sensor;
+  const double noise = plan.range_noise.value_or(sensor.range_noise);
+  const double sigma = std::hypot(noise, sensor.range_resolution / std::sqrt(12.0));
+  PlanarProblem p = testing::planar_problem(
+      sensor.train, plan.beam_origin ? sensor.prism_geometry() : PrismGeometry{}, plan.scene, sigma,
+      {shots});
+  p.free = calibration_parameters(2, plan.fixed, plan.additional);
+  if (plan.prior_sigma) {
+    for (const auto& free : p.free) {
+      p.prior_sigma.push_back(free.name == "refractive_index" ? HUGE_VAL : *plan.prior_sigma);
+    }
+  }
+  p.range_offset_sigma = plan.range_offset_sigma;
+  const PlanarSolution expected = adjust(p);
+  const CalibrationForecast found = forecast(plan);
+  ASSERT_EQ(found.free.size(), p.free.size());
+  for (Index i = 0; i < expected.covariance.rows(); ++i) {
+    for (Index j = 0; j < expected.covariance.rows(); ++j) {
+      const double size = std::sqrt(expected.covariance(i, i) * expected.covariance(j, j));
+      EXPECT_NEAR(found.covariance(i, j), expected.covariance(i, j), 0.03 * size)
+          << found.free[static_cast<std::size_t>(i)].name << ", "
+          << found.free[static_cast<std::size_t>(j)].name;
+    }
+  }
+  EXPECT_NEAR(found.range_offset_sigma, expected.range_offset_sigma,
+              0.02 * expected.range_offset_sigma);
+  EXPECT_NEAR(found.shots, static_cast<double>(expected.shots), 0.01 * found.shots);
+}
+
+TEST(Forecast, IsTheCovarianceOfTheAdjustment) {
+  CalibrationPlan plan = plan_of(corner());
+  plan.duration = 40;
+  expect_adjustment(plan);
+}
+
+TEST(Forecast, IsItWithStationsAndKnownPlanesToo) {
+  CalibrationPlan plan = plan_of(stations());
+  plan.duration = 20;
+  plan.scene.planes[1].normal_sigma = radians_from_degrees(0.03);
+  plan.range_offset_sigma = 0.05;
+  plan.range_noise = 0.01;
+  plan.prior_sigma = radians_from_degrees(0.1);
+  plan.additional = {"refractive_index"};
+  plan.fixed = {"bearing_tilt_a_vertical_deg"};
+  plan.beam_origin = false;
+  expect_adjustment(plan);
+}
+
+/// What a prototype in another language found for the same plans.
+TEST(Forecast, ReproducesKnownNumbers) {
+  EXPECT_NEAR(total_deg(one_wall()), 0.099, 0.03 * 0.099);
+  EXPECT_NEAR(total_deg({{wall("tilted", 60, 90, 15)}, {}}), 0.0138, 0.03 * 0.0138);
+  const double corner_distance = 10.0 * std::cos(radians_from_degrees(45.0));
+  EXPECT_NEAR(
+      total_deg(
+          {{wall("left", 45, 90, corner_distance), wall("right", -45, 90, corner_distance)}, {}}),
+      0.1094, 0.03 * 0.1094);
+}
+
+TEST(Forecast, FallsWithTheRootOfTheDurationAndWithTheNoise) {
+  CalibrationPlan plan = plan_of(one_wall());
+  const CalibrationForecast once = forecast(plan);
+  plan.duration *= 4;
+  const CalibrationForecast longer = forecast(plan);
+  EXPECT_NEAR(longer.datum.total / once.datum.total, 0.5, 0.01);
+  EXPECT_NEAR(longer.shots / once.shots, 4.0, 0.01);
+  plan.duration /= 4;
+  *plan.rate *= 4;
+  EXPECT_NEAR(forecast(plan).datum.total / once.datum.total, 0.5, 0.01);
+  *plan.rate /= 4;
+  plan.sensor.range_resolution = 0;
+  const double without_rounding = forecast(plan).datum.total;
+  EXPECT_LT(without_rounding, once.datum.total);
+  plan.range_noise = 0.005;
+  EXPECT_NEAR(forecast(plan).datum.total / without_rounding, 0.25, 0.01);
+}
+
+TEST(Forecast, TakesRateAndNoiseFromTheSensor) {
+  CalibrationPlan stated = plan_of(one_wall()), own = stated;
+  own.rate.reset();
+  stated.rate = own.sensor.shot_rate;
+  stated.range_noise = own.sensor.range_noise;
+  EXPECT_EQ(forecast(own).datum.total, forecast(stated).datum.total);
+}
+
+TEST(Forecast, TellsWhichWallsAreSeen) {
+  CalibrationPlan plan = plan_of(corner());
+  plan.scene.planes.push_back(wall("behind", 180, 90, 5));
+  const CalibrationForecast alone = forecast(plan);
+  ASSERT_EQ(alone.walls.size(), 2u);
+  EXPECT_EQ(alone.walls[0].name, "left");
+  EXPECT_EQ(alone.walls[1].name, "right");
+  EXPECT_NEAR(alone.walls[0].share + alone.walls[1].share, 1.0, 1e-12);
+  EXPECT_NEAR(alone.shots, 10000.0, 1e-6);
+  EXPECT_NEAR(degrees_from_radians(alone.walls[0].mean_incidence), 41, 5);
+  EXPECT_NEAR(alone.walls[0].mean_range, 10.0 / std::cos(radians_from_degrees(40.0)), 1.5);
+  EXPECT_EQ(alone.datum_kind, DatumKind::none);
+
+  plan.scene.stations = stations().stations;
+  const CalibrationForecast tied = forecast(plan);
+  EXPECT_EQ(tied.datum_kind, DatumKind::stations);
+  std::vector<std::string> from;
+  for (const PlannedWall& seen : tied.walls) from.push_back(seen.station);
+  EXPECT_THAT(from, Contains("upright"));
+  EXPECT_THAT(from, Contains("flipped"));
+  EXPECT_NEAR(tied.shots, 40000.0, 400.0);
+  plan.scene.planes[0].normal_sigma = 1e-3;
+  EXPECT_EQ(forecast(plan).datum_kind, DatumKind::both);
+  plan.stations_known = false;
+  plan.scene.stations.resize(1);
+  EXPECT_EQ(forecast(plan).datum_kind, DatumKind::planes);
+}
+
+/// Knowing how the sensor stood is worth more than the shots alone.
+TEST(Forecast, KnownStationsAreADatum) {
+  CalibrationPlan plan = plan_of(stations());
+  const double known = forecast(plan).datum.gauge;
+  plan.stations_known = false;
+  const CalibrationForecast unknown = forecast(plan);
+  EXPECT_EQ(unknown.datum_kind, DatumKind::none);
+  EXPECT_LT(known, 0.5 * unknown.datum.gauge);
+}
+
+TEST(Forecast, WhatAPlanWallDoesNotTellIsUnobservable) {
+  CalibrationPlan plan = plan_of({{wall("across", 0, 90, 30)}, {}});
+  const CalibrationForecast poor = forecast(plan);
+  ASSERT_FALSE(poor.unobservable.empty());
+  EXPECT_THAT(estimation::direction_text(poor.unobservable[0]), HasSubstr("incident_beam"));
+  EXPECT_TRUE(forecast(plan_of(one_wall())).unobservable.empty());
+  // What a prior holds is not unknown.
+  plan.prior_sigma = radians_from_degrees(0.1);
+  const CalibrationForecast held = forecast(plan);
+  EXPECT_TRUE(held.unobservable.empty());
+  EXPECT_TRUE(held.covariance.allFinite());
+}
+
+TEST(Forecast, AdvisesWhereSomethingIsPoor) {
+  const auto advice_of = [](const CalibrationPlan& plan) { return forecast(plan).advice; };
+  CalibrationPlan poor = plan_of(one_wall());
+  poor.scene.planes[0].plane.distance = 15;
+  EXPECT_THAT(advice_of(poor), Contains(HasSubstr("50 to 65 degrees")));
+  EXPECT_THAT(advice_of(poor), Contains(HasSubstr("16 m away")));
+  EXPECT_THAT(advice_of(poor), Contains(HasSubstr("flipped by 180 degrees")));
+  EXPECT_THAT(advice_of(poor), Contains(HasSubstr("record longer")));
+  EXPECT_THAT(advice_of(poor), Not(Contains(HasSubstr("% of the shots"))));
+
+  // Far walls are not too near, steep ones are steep enough.
+  EXPECT_THAT(advice_of(plan_of(one_wall())), Not(Contains(HasSubstr("m away"))));
+  CalibrationPlan steep = plan_of({{wall("tilted", 60, 90, 15)}, {}});
+  steep.duration = 0.1;
+  EXPECT_THAT(advice_of(steep), Not(Contains(HasSubstr("50 to 65 degrees"))));
+  EXPECT_THAT(advice_of(steep), Contains(HasSubstr("record longer")));
+
+  CalibrationPlan small = plan_of({{wall("tilted", 60, 90, 15)}, {}});
+  small.duration = 1000;
+  EXPECT_THAT(advice_of(small), ElementsAre());  // nothing to say
+  scenes::ScenePlane& plane = small.scene.planes[0];
+  plane.horizontal_axis = normalized(cross(Vector3<double>{0, 0, 1}, plane.plane.normal));
+  plane.vertical_axis = cross(plane.plane.normal, plane.horizontal_axis);
+  plane.extent = {2000.0, 9.0};
+  EXPECT_THAT(advice_of(small), ElementsAre(HasSubstr("% of the shots meet a wall")));
+
+  CalibrationPlan tied = plan_of(stations());
+  tied.duration = 0.05;
+  EXPECT_THAT(advice_of(tied), Not(Contains(HasSubstr("flipped by 180 degrees"))));
+}
+
+TEST(Forecast, RefusesWhatCannotBePlanned) {
+  EXPECT_THROW(forecast(plan_of({{wall("behind", 180, 90, 5)}, {}})), EstimationError);
+  EXPECT_THROW(forecast(plan_of({})), EstimationError);
+  EXPECT_THROW(forecast(plan_of({{wall("too far", 10, 80, 400)}, {}})), EstimationError);
+  EXPECT_THROW(forecast(plan_of({{wall("too near", 10, 80, 0.1)}, {}})), EstimationError);
+  const auto refused = [](const auto& spoil) {
+    CalibrationPlan plan = plan_of(one_wall());
+    spoil(plan);
+    EXPECT_THROW(forecast(plan), InvalidArgument);
+  };
+  refused([](auto& plan) { plan.duration = 0; });
+  refused([](auto& plan) { plan.rate = -1.0; });
+  refused([](auto& plan) { plan.range_noise = 0.0; });
+  refused([](auto& plan) { plan.fixed = {"no_such_parameter"}; });
+  refused([](auto& plan) { plan.additional = {"no_such_parameter"}; });
+}
+
+TEST(CalibrationParameters, AreTheTiltsThatWallsTell) {
+  const auto names = [](const auto& free) {
+    std::vector<std::string> all;
+    for (const auto& parameter : free) all.push_back(parameter.name);
+    return all;
+  };
+  EXPECT_EQ(names(calibration_parameters(2, {}, {})), testing::kTiltNames);
+  EXPECT_EQ(calibration_parameters(3, {}, {}).size(), 10u);
+  EXPECT_EQ(names(calibration_parameters(2, {"prism_tilt_a_vertical_deg"},
+                                         {"refractive_index", "incident_beam_vertical_deg"})),
+            (std::vector<std::string>{"incident_beam_horizontal_deg", "incident_beam_vertical_deg",
+                                      "bearing_tilt_a_horizontal_deg",
+                                      "bearing_tilt_a_vertical_deg", "prism_tilt_b_horizontal_deg",
+                                      "prism_tilt_b_vertical_deg", "refractive_index"}));
+  // Fixing what is held anyway is no mistake.
+  EXPECT_EQ(names(calibration_parameters(2, {"refractive_index"}, {})), testing::kTiltNames);
+  EXPECT_THROW(calibration_parameters(2, {"bearing_tilt_c_vertical_deg"}, {}), InvalidArgument);
+}
+
+}  // namespace
+}  // namespace risley::calibration

@@ -1,0 +1,195 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "risley/calibration/plane_points.hpp"
+
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "risley/core/angle.hpp"
+#include "risley/core/error.hpp"
+#include "risley/sensors/preset.hpp"
+
+namespace risley::calibration {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+
+TEST(SpreadRows, AreEvenlySpread) {
+  EXPECT_THAT(spread_rows(0, 5), ElementsAre());
+  EXPECT_THAT(spread_rows(5, 0), ElementsAre());
+  EXPECT_THAT(spread_rows(3, 3), ElementsAre(0, 1, 2));
+  EXPECT_THAT(spread_rows(3, 100), ElementsAre(0, 1, 2));
+  EXPECT_THAT(spread_rows(10, 1), ElementsAre(5));
+  EXPECT_THAT(spread_rows(10, 2), ElementsAre(2, 7));
+  EXPECT_THAT(spread_rows(9, 3), ElementsAre(1, 4, 7));
+  const std::vector<std::size_t> rows = spread_rows(1234567, 20000);
+  ASSERT_EQ(rows.size(), 20000u);
+  for (std::size_t i = 1; i < rows.size(); ++i) {
+    const std::size_t step = rows[i] - rows[i - 1];
+    ASSERT_TRUE(step == 61 || step == 62) << i;
+  }
+  EXPECT_LT(rows.front(), 62u);
+  EXPECT_GT(rows.back(), 1234567u - 62u);
+  EXPECT_LT(rows.back(), 1234567u);
+}
+
+TEST(RangedShots, RowsAreCopiedWhole) {
+  RangedShots from, to;
+  from.resize(3, 2);
+  to.resize(3, 4);
+  EXPECT_EQ(from.size(), 2u);
+  EXPECT_EQ(from.prisms(), 3);
+  EXPECT_EQ(from.angle_covariance.size(), 6u);
+  for (std::size_t k = 0; k < 3; ++k) {
+    from.rotation_angle[k] = {0.1 + static_cast<double>(k), 1.1 + static_cast<double>(k)};
+  }
+  for (std::size_t k = 0; k < 6; ++k) {
+    from.angle_covariance[k] = {2.0F, 3.0F + static_cast<float>(k)};
+  }
+  from.range = {7, 8};
+  to.set_row(2, from, 1);
+  for (std::size_t k = 0; k < 3; ++k) {
+    EXPECT_THAT(to.rotation_angle[k], ElementsAre(0, 0, 1.1 + static_cast<double>(k), 0));
+  }
+  for (std::size_t k = 0; k < 6; ++k) {
+    EXPECT_THAT(to.angle_covariance[k], ElementsAre(0, 0, 3.0F + static_cast<float>(k), 0));
+  }
+  EXPECT_THAT(to.range, ElementsAre(0, 0, 8, 0));
+}
+
+constexpr std::size_t kShots = 200;
+
+/// An estimate by hand: rotors at constant speed, a knot every 2 ms with ten shots.
+estimation::Estimate some_estimate() {
+  estimation::Estimate estimate;
+  estimate.converged = true;
+  estimate.sensor = sensors::load_sensor("mid-40");
+  estimate.free = estimation::free_parameters({"refractive_index"}, 2);
+  estimate.covariance = Eigen::MatrixXd::Constant(1, 1, 4e-8);
+  for (std::size_t i = 0; i < kShots; ++i) {
+    estimate.series.time_ns.push_back(static_cast<std::int64_t>(1'000'000'000 + 200'000 * i));
+    estimate.series.azimuth.push_back(0.0);
+    estimate.series.zenith.push_back(0.5 * kPi);
+    estimate.series.range.push_back(10.0 + 0.01 * static_cast<double>(i));
+  }
+  estimation::BatchMapResult map;
+  const std::vector<estimation::ShotRange> all{{0, kShots}};
+  map.trajectory = estimation::make_knots(estimate.series, all, 2);
+  for (std::size_t knot = 0; knot < map.trajectory.size(); ++knot) {
+    const double time = 1e-9 * static_cast<double>(map.trajectory.time_ns[knot]) - 1.0;
+    const auto state = map.trajectory.state_of(knot);
+    for (std::size_t k = 0; k < 2; ++k) {
+      state[3 * k] = 1.0 + estimate.sensor.angular_velocity[k] * time;
+      state[3 * k + 1] = estimate.sensor.angular_velocity[k];
+    }
+    for (int i = 0; i < 21; ++i) map.trajectory.covariance.push_back(0.0);
+    double* covariance = map.trajectory.covariance.data() + 21 * knot;
+    covariance[0] = 1e-8 * static_cast<double>(knot + 1);  // of the angles of both rotors
+    covariance[3] = -2e-9;
+    covariance[15] = 3e-8;
+  }
+  map.azimuth_residual.assign(kShots, 0.0);
+  map.zenith_residual.assign(kShots, 0.0);
+  map.outlier.assign(kShots, 0);
+  map.angle_sensitivity = Eigen::Vector2d{0.25, -0.75};
+  map.angle_information = Eigen::Vector2d{1e8, 4e8}.asDiagonal();
+  estimate.map = map;
+  return estimate;
+}
+
+TEST(RangedRecording, HoldsRangesAndRotationAngles) {
+  const estimation::Estimate estimate = some_estimate();
+  const RangedRecording recording = ranged_recording(estimate, "one.lvx", "3GGD0042");
+  EXPECT_EQ(recording.name, "one.lvx");
+  EXPECT_EQ(recording.serial, "3GGD0042");
+  EXPECT_EQ(recording.believed.name, "mid-40");
+  ASSERT_EQ(recording.free.size(), 1u);
+  EXPECT_EQ(recording.covariance(0, 0), 4e-8);
+  EXPECT_EQ(recording.angle_sensitivity, estimate.map->angle_sensitivity);
+  EXPECT_NEAR(recording.mean_angle_covariance(0, 0), 1e-8, 1e-20);
+  EXPECT_NEAR(recording.mean_angle_covariance(1, 1), 0.25e-8, 1e-20);
+  EXPECT_EQ(recording.without_range, 0u);
+  EXPECT_EQ(recording.outliers, 0u);
+  ASSERT_EQ(recording.shots.size(), kShots);
+  ASSERT_EQ(recording.shots.prisms(), 2);
+  EXPECT_EQ(recording.time_ns, estimate.series.time_ns);
+  EXPECT_EQ(recording.shots.range, estimate.series.range);
+  for (std::size_t i = 0; i < kShots; ++i) {
+    const double time = 2e-4 * static_cast<double>(i);
+    for (std::size_t k = 0; k < 2; ++k) {
+      const double angle = recording.shots.rotation_angle[k][i];
+      EXPECT_LE(std::abs(angle), kPi);
+      EXPECT_NEAR(std::remainder(angle - 1.0 - estimate.sensor.angular_velocity[k] * time, kTwoPi),
+                  0.0, 1e-9);
+    }
+    EXPECT_FLOAT_EQ(recording.shots.angle_covariance[0][i], 1e-8F * static_cast<float>(i / 10 + 1));
+    EXPECT_FLOAT_EQ(recording.shots.angle_covariance[1][i], -2e-9F);
+    EXPECT_FLOAT_EQ(recording.shots.angle_covariance[2][i], 3e-8F);
+  }
+}
+
+TEST(RangedRecording, LeavesOutWhatHasNoRangeOrNoDirection) {
+  estimation::Estimate estimate = some_estimate();
+  estimate.series.range[3] = kNaN;
+  estimate.series.range[4] = 0.0;
+  estimate.series.range[199] = -1.0;
+  estimate.map->outlier[3] = 1;  // counted as one without range
+  estimate.map->outlier[10] = 1;
+  estimate.map->outlier[11] = 1;
+  estimate.map->trajectory.last_shot[5] -= 4;  // four shots of the sixth knot were not used
+  const RangedRecording recording = ranged_recording(estimate, "one.lvx", "");
+  EXPECT_EQ(recording.without_range, 3u);
+  EXPECT_EQ(recording.outliers, 6u);
+  const std::size_t left = kShots - 9;
+  EXPECT_EQ(recording.time_ns.size(), left);
+  EXPECT_EQ(recording.shots.size(), left);
+  for (const auto& column : recording.shots.rotation_angle) EXPECT_EQ(column.size(), left);
+  for (const auto& column : recording.shots.angle_covariance) EXPECT_EQ(column.size(), left);
+  // Rows stay together.
+  for (std::size_t i = 0; i < left; ++i) {
+    const auto shot = static_cast<std::size_t>((recording.time_ns[i] - 1'000'000'000) / 200'000);
+    EXPECT_EQ(recording.shots.range[i], 10.0 + 0.01 * static_cast<double>(shot));
+    EXPECT_NEAR(
+        std::remainder(recording.shots.rotation_angle[0][i] - 1.0 -
+                           estimate.sensor.angular_velocity[0] * 2e-4 * static_cast<double>(shot),
+                       kTwoPi),
+        0.0, 1e-9);
+  }
+}
+
+TEST(RangedRecording, RefusesWhatIsNoEstimateWithRanges) {
+  const auto error_of = [](const estimation::Estimate& estimate) -> std::string {
+    try {
+      ranged_recording(estimate, "one.lvx", "");
+    } catch (const EstimationError& error) {
+      return error.what();
+    }
+    return "nothing was thrown";
+  };
+  estimation::Estimate estimate = some_estimate();
+  estimate.converged = false;
+  estimate.reason = "it did not settle";
+  EXPECT_THAT(error_of(estimate), AllOf(HasSubstr("one.lvx"), HasSubstr("it did not settle")));
+  estimate = some_estimate();
+  estimate.series.range.clear();
+  EXPECT_THAT(error_of(estimate), AllOf(HasSubstr("one.lvx"), HasSubstr("ranges")));
+  estimate = some_estimate();
+  estimate.map.reset();
+  EXPECT_THAT(error_of(estimate), HasSubstr("one.lvx"));
+  estimate = some_estimate();
+  estimate.series.range.assign(kShots, 0.0);
+  EXPECT_THAT(error_of(estimate), HasSubstr("no shot has both"));
+}
+
+}  // namespace
+}  // namespace risley::calibration
