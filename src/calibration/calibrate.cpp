@@ -135,7 +135,6 @@ class Work {
   void find_walls() {
     const std::size_t most = std::max<std::size_t>(kCoarseShots / recordings_.size(), 5000);
     std::vector<FoundPlane> found;
-    bool one_line = false;
     for (std::size_t r = 0; r < recordings_.size(); ++r) {
       coarse_.push_back(rows_of(shots_[r], spread_rows(shots_[r].size(), most)));
       const Rays rays(problem_.train, problem_.geometry, coarse_[r]);
@@ -150,26 +149,21 @@ class Work {
       settings.leave_out_edges = true;
       settings.seed = options_.seed + r;
       const Segmentation segmentation = segment_planes(points, settings);
-      one_line = one_line || segmentation.on_one_line;
       for (std::size_t i = 0; i < segmentation.planes.size(); ++i) {
         found.push_back({r, segmentation.planes[i], segmentation.points[i], 0});
       }
       start_labels_.push_back(segmentation.label);
       if (segmentation.planes.empty()) {
-        const std::string why =
+        const std::string why = fmt::format(
+            "{}: no plane found among {} points{}", recordings_[r].name, points.size(),
             segmentation.on_one_line
-                ? "all points lie on one line: a wall has to fill an area of the field of view"
-                : fmt::format("no plane found among {} points", points.size());
-        if (recordings_.size() == 1) {
-          throw EstimationError(fmt::format("{}: {}", recordings_[r].name, why));
-        }
-        result_.warnings.push_back(fmt::format("{}: {}; it is left out", recordings_[r].name, why));
+                ? ": what is flat in them lies on one line, and a wall has to fill an area"
+                : "");
+        if (recordings_.size() == 1) throw EstimationError(why);
+        result_.warnings.push_back(why + "; it is left out");
       }
     }
-    if (found.empty()) {
-      throw EstimationError(one_line ? "all points lie on one line: a wall has to fill an area"
-                                     : "no plane found in any recording");
-    }
+    if (found.empty()) throw EstimationError("no plane found in any recording");
     std::vector<std::string> names;
     for (const RangedRecording& recording : recordings_) names.push_back(recording.name);
     // The paper's method knows no datum.

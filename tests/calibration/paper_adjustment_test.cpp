@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstddef>
 #include <memory>
+#include <numeric>
 #include <vector>
 
 #include <Eigen/Cholesky>
@@ -127,9 +128,10 @@ void expect_brute_force(const PlanarProblem& p, double sigma_tolerance) {
   }
   EXPECT_NEAR(solution.cost, expected.squares,
               (1e-9 + sigma_tolerance * sigma_tolerance) * expected.squares);
-  for (const WallView& view : solution.problem.views) {
-    EXPECT_NEAR(std::sqrt(view.range_variance), expected.sigma0, 1e-6 * expected.sigma0);
-  }
+  const double redundancy =
+      std::accumulate(solution.redundancy.begin(), solution.redundancy.end(), 0.0);
+  EXPECT_NEAR(std::sqrt(solution.cost / redundancy), expected.sigma0,
+              (1e-9 + sigma_tolerance * sigma_tolerance) * expected.sigma0);
   // The data alone, and nothing else.
   const Eigen::MatrixXd inverse = solution.covariance.inverse();
   EXPECT_LT((solution.information - inverse).norm(), 1e-6 * inverse.norm());
@@ -173,14 +175,18 @@ TEST(PaperAdjustment, LeavesThePlanesItFitted) {
     EXPECT_NEAR(view.distance, plane.distance, 1e-7);
     const Vector3<double>& normal = solution.problem.walls[view.wall].normal;
     EXPECT_LT((testing::eigen(normal) - plane.normal).norm(), 1e-8);
-    EXPECT_NEAR(solution.chi2[v], plane.residuals.squaredNorm() / view.range_variance, 1e-4);
     shots += view.shots->size();
     redundancy += solution.redundancy[v];
-    for (std::size_t i = 0; i < view.shots->size(); ++i) {  // along the normal it is less
+    double chi2 = 0;
+    for (std::size_t i = 0; i < view.shots->size(); ++i) {
       const Ray ray =
           emergent_ray(solution.problem.train, p.geometry, testing::angles_of(*view.shots, i));
-      noise += std::pow(kRangeNoise * dot(normal, ray.direction), 2);
+      const double range =
+          hit_distance({testing::plain(plane.normal), plane.distance}, ray.origin, ray.direction);
+      chi2 += std::pow((view.shots->range[i] - range) / kRangeNoise, 2);
+      noise += std::pow(kRangeNoise * dot(normal, ray.direction), 2);  // less along the normal
     }
+    EXPECT_NEAR(solution.chi2[v], chi2, 1e-4 * chi2);  // of ranges, not of distances
   }
   EXPECT_EQ(solution.shots, shots);
   EXPECT_NEAR(redundancy, static_cast<double>(shots) - 7 - 3 * 2, 1e-9);

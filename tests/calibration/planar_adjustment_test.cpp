@@ -438,6 +438,19 @@ TEST(PlanarAdjustment, ConvergesFromZeroForAnySensor) {
   EXPECT_NEAR(chi2, 7.0, 3.0 * std::sqrt(14.0 / kSeeds));
 }
 
+/// From a normal so far off, steps that lose the plane would leave nothing to fit.
+TEST(PlanarAdjustment, ShotsThatLoseThePlaneMakeNoStepGood) {
+  PlanarProblem p = planar_problem(some_train(), kGeometry, {{wall("steep", 60, 90, 15)}, {}},
+                                   kRangeNoise, {500, kRangeNoise, 0, 0, 1});
+  p.walls[0].normal =
+      testing::plain(turn_by({0, 0, -20 * kDegree}) * testing::eigen(p.walls[0].normal));
+  const PlanarSolution solution = adjust(p);
+  EXPECT_TRUE(solution.converged);
+  EXPECT_EQ(solution.lost, 0u);
+  EXPECT_EQ(solution.shots, 500u);
+  EXPECT_LT(solution.cost, 600.0);
+}
+
 /// What was stated stays stated, also when the start is the solution.
 TEST(PlanarAdjustment, ItsOwnResultIsWhereItStays) {
   const PlanarSolution first = adjust(everything({}));
@@ -508,23 +521,24 @@ TEST(PlanarAdjustment, EveryUnknownTakesAShot) {
               static_cast<double>(solution.shots) - 7 - 4 - 2, 1e-6);
 }
 
-TEST(PlanarAdjustment, InformationIsWhatTheDataAloneSay) {
-  const scenes::Scene scene{{wall("left", 40, 88, 10), wall("right", -45, 85, 12)}, {}};
-  PlanarProblem p =
-      planar_problem(some_train(), kGeometry, scene, kRangeNoise, {1000, kRangeNoise, 0, 0, 13});
-  const PlanarSolution without = adjust(p);
-  const Eigen::MatrixXd inverse = without.covariance.inverse();
-  EXPECT_LT((without.information - inverse).norm(), 1e-6 * inverse.norm());
-
-  p.prior_sigma.assign(p.free.size(), 0.01 * kDegree);
-  p.prior_sigma[2] = kInfinity;
-  const PlanarSolution with = adjust(p);
-  Eigen::MatrixXd expected = with.covariance.inverse();
-  for (std::size_t j = 0; j < p.prior_sigma.size(); ++j) {
-    expected(static_cast<Index>(j), static_cast<Index>(j)) -=
-        1.0 / (p.prior_sigma[j] * p.prior_sigma[j]);
+/// Walls and stations that are known count, what is known of the parameters themselves does not.
+TEST(PlanarAdjustment, InformationLeavesOutThePriorsOfParameters) {
+  scenes::Scene upright = corner();
+  upright.stations.clear();
+  PlanarProblem without =
+      planar_problem(some_train(), kGeometry, upright, kRangeNoise, {1000, kRangeNoise, 0, 0, 13});
+  PlanarProblem with = without;
+  with.prior_sigma.assign(with.free.size(), 0.01 * kDegree);
+  with.prior_sigma[2] = kInfinity;
+  for (const PlanarProblem& p : {without, with, everything(kGeometry)}) {
+    const PlanarSolution solution = adjust(p);
+    Eigen::MatrixXd expected = solution.covariance.inverse();
+    for (std::size_t j = 0; j < p.prior_sigma.size(); ++j) {
+      expected(static_cast<Index>(j), static_cast<Index>(j)) -=
+          1.0 / (p.prior_sigma[j] * p.prior_sigma[j]);
+    }
+    EXPECT_LT((solution.information - expected).norm(), 1e-6 * expected.norm());
   }
-  EXPECT_LT((with.information - expected).norm(), 1e-6 * expected.norm());
 }
 
 /// A plane across the beam tells the shape of the bundle of beams and not where it points.
@@ -594,6 +608,8 @@ void expect_added(const PlanarProblem& with, const Eigen::MatrixXd& responses,
   without.mean_angle_covariance.clear();
   const PlanarSolution a = adjust(without), b = adjust(with);
   EXPECT_EQ(a.parameters, b.parameters);
+  EXPECT_EQ(a.covariance, a.noise_covariance);
+  EXPECT_EQ(a.covariance, b.noise_covariance);
   const Eigen::MatrixXd expected = responses * covariance * responses.transpose();
   const Index n = a.parameters.size();
   for (Index i = 0; i < n; ++i) {
@@ -636,25 +652,25 @@ TEST(CommonErrors, OfAllAnglesOfARecordingReachTheResult) {
 /// such as the index, act directly too, as long as the adjustment does not find them itself.
 TEST(CommonErrors, OfBelievedParametersReachTheResult) {
   const std::vector<std::string> names{"refractive_index", "incident_beam_vertical_deg",
-                                       "wedge_angle_b_deg"};
+                                       "prism_tilt_a_horizontal_deg", "wedge_angle_b_deg"};
   for (const bool index_free : {false, true}) {
     SCOPED_TRACE(index_free);
     PlanarProblem p = exact_corner();
     p.considered = estimation::free_parameters(names, 2);
-    p.considered_covariance.resize(3, 3);
-    p.considered_covariance << 1e-8, -2e-9, 3e-9, -2e-9, 4e-8, 1e-9, 3e-9, 1e-9, 2e-8;
-    Eigen::MatrixXd upright(2, 3), flipped(2, 3);
-    upright << 0.3, -0.7, 0.1, 0.9, 0.4, -0.2;
-    flipped << 0.5, -0.6, 0.4, 0.7, 0.2, 0.3;
+    p.considered_covariance = Eigen::MatrixXd::Constant(4, 4, 3e-9);
+    p.considered_covariance += Eigen::Vector4d{1e-8, 4e-8, 3e-8, 2e-8}.asDiagonal();
+    Eigen::MatrixXd upright(2, 4), flipped(2, 4);
+    upright << 0.3, -0.7, 0.8, 0.1, 0.9, 0.4, 0.1, -0.2;
+    flipped << 0.5, -0.6, 0.7, 0.4, 0.7, 0.2, 0.2, 0.3;
     p.angle_sensitivity = {upright, flipped};
     if (index_free) {
       p.free.push_back(estimation::free_parameters({"refractive_index"}, 2).front());
       p.prior_sigma.push_back(1e-4);
     }
-    Eigen::MatrixXd responses(static_cast<Index>(p.free.size() + 1 + p.views.size()), 3);
-    for (Index i = 0; i < 3; ++i) {
+    Eigen::MatrixXd responses(static_cast<Index>(p.free.size() + 1 + p.views.size()), 4);
+    for (Index i = 0; i < 4; ++i) {
       responses.col(i) = response(p, [&, i](PlanarProblem& changed, double step) {
-        if ((i == 0 && !index_free) || i == 2) {
+        if ((i == 0 && !index_free) || i == 3) {
           for (const int at : p.considered[static_cast<std::size_t>(i)].places) {
             changed.train.set_place(at, changed.train[at] + step);
           }

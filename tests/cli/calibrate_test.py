@@ -69,7 +69,8 @@ class CalibrateTest(CommandTest):
 
     def refused(self, status, named, *arguments):
         """No calibration: the exit status, and a message that names the thing."""
-        done = self.expect(status, "calibrate", *arguments, "-o", "refused", "--json")
+        output = [] if "--plan" in arguments else ["-o", "refused"]
+        done = self.expect(status, "calibrate", *arguments, *output, "--json")
         result = json.loads(done.stdout)
         if "converged" in result:
             self.assertFalse(result["converged"])
@@ -382,6 +383,15 @@ class CalibrateTest(CommandTest):
                 ("allowed -10 to 10", ["hall.nc", "--fix", "incident_beam_vertical_deg=99"]),
                 ("mid-41", ["hall.nc", "--sensor", "mid-41"]),
                 ("--plan", ["hall.nc", "--plan", HALL]),
+                ("--output", ["--plan", HALL, "-o", "planned"]),
+                ("--stations", ["--plan", HALL, "--stations", STATIONS]),
+                ("--duration-s", ["hall.nc", "--duration-s", "3"]),
+                ("given twice", ["hall.nc", "./hall.nc"]),
+                ("angular_velocity_a_deg_per_s",
+                 ["hall.nc", "--fix", "angular_velocity_a_deg_per_s=3"]),
+                ("not both", ["hall.nc", "--fix", "refractive_index", "--free",
+                              "refractive_index"]),
+                ("--method paper", [*TURNED, "--method", "paper", "--stations", STATIONS]),
                 ("--duration-s", ["--plan", HALL, "--duration-s", "0"]),
                 ("--rate-hz", ["--plan", HALL, "--rate-hz", "-1"])):
             with self.subTest(arguments=arguments):
