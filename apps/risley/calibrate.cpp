@@ -17,23 +17,19 @@
 #include "risley/core/output_file.hpp"
 #include "risley/recordings/truth.hpp"
 #include "risley/report/calibration_page.hpp"
-#include "risley/report/number_text.hpp"
-#include "risley/report/states_file.hpp"
 #include "risley/sensors/preset.hpp"
 
+#include "calibration_text.hpp"
 #include "command.hpp"
 #include "estimation_input.hpp"
-#include "observability_text.hpp"
 #include "recording_text.hpp"
-#include "table.hpp"
+#include "result_folder.hpp"
 
 namespace risley::app {
 namespace {
 
 using calibration::Calibration;
-using calibration::CalibrationForecast;
 using calibration::DirectionErrors;
-using calibration::FormalDatum;
 using calibration::RangedRecording;
 
 struct CalibrateCommandOptions {
@@ -46,28 +42,6 @@ struct CalibrateCommandOptions {
 
 constexpr double kFarBelow = 0.4;  // of the expected residual
 constexpr double kLeastAngleNoise = radians_from_degrees(1e-7);
-
-/// Errors of the beams' directions before and after, of all recordings together.
-struct TruthErrors {
-  DirectionErrors before, after;
-  sensors::Sensor sensor;
-};
-
-/// Everything one run of the verb found.
-struct Outcome {
-  Calibration calibration;
-  sensors::Sensor nominal;
-  std::optional<TruthErrors> truth;
-  std::vector<std::string> warnings;  ///< of the recordings
-  std::uint64_t observations = 0;
-  double read_s = 0, angles_s = 0, solve_s = 0, total_s = 0;
-};
-
-double deg(double radians) { return degrees_from_radians(radians); }
-
-double in_file_unit(const std::string& name, double value, int prisms) {
-  return value / find_parameter(name, prisms).si_per_unit;
-}
 
 /// The stations of the recordings, in their order.
 std::vector<scenes::Station> stations_for(const CalibrateCommandOptions& options) {
@@ -88,6 +62,13 @@ std::vector<scenes::Station> stations_for(const CalibrateCommandOptions& options
   return stations;
 }
 
+/// rad
+std::optional<double> prior_sigma(const CalibrateCommandOptions& options) {
+  if (!options.prior_sigma_deg) return std::nullopt;
+  check_positive(*options.prior_sigma_deg, "--prior-sigma-deg", "deg");
+  return radians_from_degrees(*options.prior_sigma_deg);
+}
+
 calibration::CalibrationOptions calibration_options(const CalibrateCommandOptions& options,
                                                     const CommonOptions& common) {
   calibration::CalibrationOptions result;
@@ -100,10 +81,7 @@ calibration::CalibrationOptions calibration_options(const CalibrateCommandOption
         "--method paper knows no --planes, --stations and --prior-sigma-deg: its walls are all it "
         "has");
   }
-  if (options.prior_sigma_deg) {
-    check_positive(*options.prior_sigma_deg, "--prior-sigma-deg", "deg");
-    result.prior_sigma = radians_from_degrees(*options.prior_sigma_deg);
-  }
+  result.prior_sigma = prior_sigma(options);
   check_not_negative(options.range_offset_sigma_m, "--range-offset-sigma-m", "m");
   result.range_offset_sigma = options.range_offset_sigma_m;
   result.beam_origin = options.beam_origin == "yes";
@@ -119,25 +97,10 @@ std::string states_name(const CalibrateCommandOptions& options, std::size_t reco
   return options.inputs.size() == 1 ? "states.nc" : fmt::format("states_{}.nc", recording + 1);
 }
 
-void write_state_file(const CalibrateCommandOptions& options, const CommonOptions& common,
-                      const estimation::Estimate& estimate, std::size_t recording) {
-  report::StatesContent content;
-  content.prisms = estimate.sensor.prisms();
-  content.rows = options.states == "all" ? estimate.series.size() : estimate.states.size();
-  content.block = [&](estimation::ShotRange rows) {
-    return options.states == "all" ? estimation::states_of_shots(estimate, rows)
-                                   : estimation::rows_of(estimate.states, rows);
-  };
-  content.residuals_over_angle = estimate.residuals_over_angle;
-  report::write_states(
-      (std::filesystem::path(options.folder) / states_name(options, recording)).string(), content,
-      provenance_of(common, {options.inputs[recording]}));
-}
-
 /// Reads one recording and finds its rotation angles.
 RangedRecording read_and_estimate(const CalibrateCommandOptions& options,
                                   const CommonOptions& common, std::size_t number,
-                                  Outcome& outcome) {
+                                  CalibrationOutcome& outcome) {
   const std::string& path = options.inputs[number];
   estimation::SelectionOptions selection;
   selection.ranges = true;
@@ -183,7 +146,9 @@ RangedRecording read_and_estimate(const CalibrateCommandOptions& options,
   RangedRecording recording =
       calibration::ranged_recording(estimate, path, input.reader->header().devices.front().serial);
   if (!options.folder.empty() && options.states != "none") {
-    write_state_file(options, common, estimate, number);
+    write_states_of(estimate, options.states,
+                    (std::filesystem::path(options.folder) / states_name(options, number)).string(),
+                    provenance_of(common, {path}));
   }
   outcome.angles_s += now() - started;
   return recording;
@@ -239,201 +204,9 @@ TruthErrors evaluate_with(const CalibrateCommandOptions& options,
           sensors::load_sensor(options.truths.front())};
 }
 
-Json errors_json(const DirectionErrors& e) {
-  return {{"azimuth_rmse_deg", deg(e.azimuth_rmse)},
-          {"zenith_rmse_deg", deg(e.zenith_rmse)},
-          {"azimuth_bias_deg", deg(e.azimuth_bias)},
-          {"zenith_bias_deg", deg(e.zenith_bias)},
-          {"total_deg", deg(e.total)},
-          {"gauge_deg", deg(e.gauge)},
-          {"shape_deg", deg(e.shape)}};
-}
-
-Json datum_json(calibration::DatumKind kind, const FormalDatum& datum) {
-  return {{"kind", calibration::to_string(kind)},      {"sigma_roll_deg", deg(datum.sigma_roll)},
-          {"sigma_pitch_deg", deg(datum.sigma_pitch)}, {"sigma_yaw_deg", deg(datum.sigma_yaw)},
-          {"sigma_gauge_deg", deg(datum.gauge)},       {"sigma_shape_deg", deg(datum.shape)},
-          {"sigma_total_deg", deg(datum.total)}};
-}
-
-Json vector_json(const Vector3<double>& v) { return {v.x, v.y, v.z}; }
-
-Json unobservable_json(const std::vector<estimation::WeakDirection>& directions) {
-  Json list = Json::array();
-  for (const auto& direction : directions) list.push_back(weak_direction_json(direction));
-  return list;
-}
-
-/// NaN has no place in JSON.
-Json finite_or_null(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
-
-Json outcome_json(const CalibrateCommandOptions& options, const Outcome& outcome) {
-  const Calibration& c = outcome.calibration;
-  const int prisms = c.sensor.prisms();
-  Json parameters = Json::object(), planes = Json::array(), steps = Json::array(),
-       tests = Json::array(), profiles = Json::object();
-  for (std::size_t j = 0; j < c.free.size(); ++j) {
-    const auto at = static_cast<Eigen::Index>(j);
-    parameters[c.free[j].name] = {
-        {"value", in_file_unit(c.free[j].name, c.parameters[at], prisms)},
-        {"sigma",
-         finite_or_null(in_file_unit(c.free[j].name, std::sqrt(c.covariance(at, at)), prisms))}};
-  }
-  for (const calibration::CalibratedPlane& plane : c.planes) {
-    planes.push_back({{"name", plane.name},
-                      {"recording", options.inputs[plane.recording]},
-                      {"normal", vector_json(plane.normal)},
-                      {"offset_m", plane.distance},
-                      {"points", plane.points},
-                      {"outliers", plane.outliers},
-                      {"rms_m", plane.rms},
-                      {"before_rms_m", plane.rms_before},
-                      {"range_sigma_m", plane.range_sigma}});
-  }
-  for (const calibration::SurfaceStep& step : c.steps) {
-    steps.push_back({{"recording", options.inputs[step.recording]},
-                     {"plane", c.planes[step.plane].name},
-                     {"height_m", step.height},
-                     {"azimuth_deg", deg(step.azimuth)},
-                     {"zenith_deg", deg(step.zenith)},
-                     {"size_deg", deg(step.size)},
-                     {"points", step.points}});
-  }
-  for (const calibration::PriorTest& test : c.prior_tests) {
-    tests.push_back({{"name", test.name},
-                     {"kind", test.station ? "station" : "plane"},
-                     {"misfit_deg", deg(test.misfit)},
-                     {"chi2", test.chi2},
-                     {"degrees_of_freedom", test.degrees_of_freedom},
-                     {"critical", test.critical}});
-  }
-  for (const calibration::ThicknessProfile& profile : c.profiles) {
-    Json rows = Json::array();
-    for (std::size_t i = 0; i < profile.count.size(); ++i) {
-      if (profile.count[i] == 0) continue;
-      rows.push_back({{"from_deg", deg(profile.from[i])},
-                      {"to_deg", deg(profile.to[i])},
-                      {"points", profile.count[i]},
-                      {"before_rms_m", profile.rms_before[i]},
-                      {"after_rms_m", profile.rms_after[i]}});
-    }
-    profiles[profile.variable] = rows;
-  }
-  std::vector<std::string> warnings = outcome.warnings;
-  warnings.insert(warnings.end(), c.warnings.begin(), c.warnings.end());
-  Json object = {{"converged", c.converged},
-                 {"reason", c.reason},
-                 {"method", options.method},
-                 {"iterations", c.iterations},
-                 {"observations", outcome.observations},
-                 {"points", c.points},
-                 {"parameters", parameters},
-                 {"range_offset_m", {{"value", c.range_offset}, {"sigma", c.range_offset_sigma}}},
-                 {"planes", planes},
-                 {"steps", steps},
-                 {"datum", datum_json(c.datum_kind, c.datum)},
-                 {"prior_tests", tests},
-                 {"unobservable", unobservable_json(c.unobservable)},
-                 {"before", {{"plane_rms_m", c.rms_before}}},
-                 {"after", {{"plane_rms_m", c.rms_after}}},
-                 {"sigma0", c.sigma0},
-                 {"unevenness", c.unevenness},
-                 {"variance_factor", c.variance_factor},
-                 {"thickness", profiles},
-                 {"warnings", warnings},
-                 {"seconds",
-                  {{"read", outcome.read_s},
-                   {"rotation_angles", outcome.angles_s},
-                   {"solve", outcome.solve_s},
-                   {"total", outcome.total_s}}}};
-  if (outcome.truth) {
-    object["truth"] = {{"before", errors_json(outcome.truth->before)},
-                       {"after", errors_json(outcome.truth->after)}};
-  }
-  return object;
-}
-
-void print_datum(calibration::DatumKind kind, const FormalDatum& datum) {
-  fmt::print(
-      "datum: {}; 1 sigma of roll {:.2g}, pitch {:.2g}, yaw {:.2g} deg; of the beams against each "
-      "other {:.2g} deg\n",
-      calibration::to_string(kind), deg(datum.sigma_roll), deg(datum.sigma_pitch),
-      deg(datum.sigma_yaw), deg(datum.shape));
-}
-
-void print_outcome(const CalibrateCommandOptions& options, const Outcome& outcome) {
-  const Calibration& c = outcome.calibration;
-  const int prisms = c.sensor.prisms();
-  fmt::print("{}\n", c.converged ? "converged" : "NOT CONVERGED: " + c.reason);
-  fmt::print(
-      "{} points on {} planes, {:.2f} mm thick before, {:.2f} mm after; read {:.2f} s, rotation "
-      "angles {:.2f} s, solved {:.2f} s\n\n",
-      grouped(c.points), c.planes.size(), 1e3 * c.rms_before, 1e3 * c.rms_after, outcome.read_s,
-      outcome.angles_s, outcome.solve_s);
-  std::vector<std::string> head = {"parameter", "value", "+- sigma", "unit", "before"};
-  if (outcome.truth) head.insert(head.end(), {"truth", "error/sigma"});
-  Table table(head);
-  for (std::size_t j = 0; j < c.free.size(); ++j) {
-    const std::string& name = c.free[j].name;
-    const auto at = static_cast<Eigen::Index>(j);
-    const double sigma = in_file_unit(name, std::sqrt(c.covariance(at, at)), prisms);
-    const double value = in_file_unit(name, c.parameters[at], prisms);
-    const report::NumberText text = report::number_text(value, sigma);
-    std::vector<std::string> row = {
-        name, text.value, text.sigma, find_parameter(name, prisms).unit,
-        report::text_to_place_of(in_file_unit(name, c.believed.get(name), prisms), sigma)};
-    if (outcome.truth) {
-      const double truth = in_file_unit(name, outcome.truth->sensor.get(name), prisms);
-      row.push_back(report::text_to_place_of(truth, sigma));
-      row.push_back(fmt::format("{:.2f}", (value - truth) / sigma));
-    }
-    table.add(row);
-  }
-  if (c.range_offset_sigma > 0) {
-    const report::NumberText text =
-        report::number_text(1e3 * c.range_offset, 1e3 * c.range_offset_sigma);
-    table.add({"range offset", text.value, text.sigma, "mm", "0"});
-  }
-  table.print();
-  fmt::print("\n");
-  Table planes({"plane", "recording", "distance m", "points", "outliers", "before mm", "after mm"});
-  for (const calibration::CalibratedPlane& plane : c.planes) {
-    planes.add(
-        {plane.name, std::filesystem::path(options.inputs[plane.recording]).filename().string(),
-         fmt::format("{:.3f}", plane.distance), grouped(plane.points), grouped(plane.outliers),
-         fmt::format("{:.2f}", 1e3 * plane.rms_before), fmt::format("{:.2f}", 1e3 * plane.rms)});
-  }
-  planes.print();
-  fmt::print("\n");
-  print_datum(c.datum_kind, c.datum);
-  for (const calibration::PriorTest& test : c.prior_tests) {
-    if (test.degrees_of_freedom == 0) {
-      fmt::print("{} {}: not tested by these data\n", test.station ? "station" : "plane",
-                 test.name);
-      continue;
-    }
-    fmt::print("{} {}: misfit {:.3g} deg, chi2 {:.3g}, limit {:.3g}\n",
-               test.station ? "station" : "plane", test.name, deg(test.misfit), test.chi2,
-               test.critical);
-  }
-  if (outcome.truth) {
-    fmt::print("\n");
-    Table errors(
-        {"error, deg", "azimuth rmse", "zenith rmse", "total", "shared rotation", "shape"});
-    const auto add = [&errors](const char* name, const DirectionErrors& e) {
-      errors.add({name, fmt::format("{:.5f}", deg(e.azimuth_rmse)),
-                  fmt::format("{:.5f}", deg(e.zenith_rmse)), fmt::format("{:.5f}", deg(e.total)),
-                  fmt::format("{:.5f}", deg(e.gauge)), fmt::format("{:.5f}", deg(e.shape))});
-    };
-    add("before", outcome.truth->before);
-    add("after", outcome.truth->after);
-    errors.print();
-  }
-}
-
 /// calibration.yaml and report.html; what did not converge is no calibration.
 void write_folder(const CalibrateCommandOptions& options, const CommonOptions& common,
-                  const Outcome& outcome) {
+                  const CalibrationOutcome& outcome) {
   namespace fs = std::filesystem;
   const Calibration& c = outcome.calibration;
   std::vector<std::pair<std::string, std::string>> provenance =
@@ -485,7 +258,8 @@ ExitStatus run_calibration(const CalibrateCommandOptions& options, const CommonO
                                       options.truths.size(), options.inputs.size()));
   }
   check_inputs(options);
-  Outcome outcome;
+  CalibrationOutcome outcome;
+  outcome.recordings = options.inputs;
   std::vector<RangedRecording> recordings;
   for (std::size_t r = 0; r < options.inputs.size(); ++r) {
     recordings.push_back(read_and_estimate(options, common, r, outcome));
@@ -514,63 +288,11 @@ ExitStatus run_calibration(const CalibrateCommandOptions& options, const CommonO
   for (const std::string& warning : c.warnings) spdlog::warn(warning);
   if (!c.converged) spdlog::error("not converged: {}", c.reason);
   if (common.json) {
-    print_json(outcome_json(options, outcome));
+    print_json(calibration_json(outcome));
   } else {
-    print_outcome(options, outcome);
+    print_calibration(outcome);
   }
   return c.converged ? kDone : kNumbersFailed;
-}
-
-Json forecast_json(const CalibrationForecast& f, int prisms) {
-  Json parameters = Json::object(), walls = Json::array();
-  for (std::size_t j = 0; j < f.free.size(); ++j) {
-    const auto at = static_cast<Eigen::Index>(j);
-    parameters[f.free[j].name] = {
-        {"sigma",
-         finite_or_null(in_file_unit(f.free[j].name, std::sqrt(f.covariance(at, at)), prisms))}};
-  }
-  for (const calibration::PlannedWall& wall : f.walls) {
-    walls.push_back({{"name", wall.name},
-                     {"station", wall.station},
-                     {"share", wall.share},
-                     {"mean_incidence_deg", deg(wall.mean_incidence)},
-                     {"mean_range_m", wall.mean_range}});
-  }
-  return {{"parameters", parameters},
-          {"range_offset_m", {{"sigma", finite_or_null(f.range_offset_sigma)}}},
-          {"datum", datum_json(f.datum_kind, f.datum)},
-          {"unobservable", unobservable_json(f.unobservable)},
-          {"walls", walls},
-          {"observations", f.shots},
-          {"advice", f.advice}};
-}
-
-void print_forecast(const CalibrationForecast& f, int prisms) {
-  fmt::print("{:.3g} shots meet a wall\n\n", f.shots);
-  Table walls({"wall", "station", "share %", "incidence deg", "range m"});
-  for (const calibration::PlannedWall& wall : f.walls) {
-    walls.add({wall.name, wall.station, fmt::format("{:.1f}", 100 * wall.share),
-               fmt::format("{:.1f}", deg(wall.mean_incidence)),
-               fmt::format("{:.1f}", wall.mean_range)});
-  }
-  walls.print();
-  fmt::print("\n");
-  Table table({"parameter", "sigma", "unit"});
-  for (std::size_t j = 0; j < f.free.size(); ++j) {
-    const auto at = static_cast<Eigen::Index>(j);
-    const std::string& name = f.free[j].name;
-    table.add({name,
-               fmt::format("{:.2g}", in_file_unit(name, std::sqrt(f.covariance(at, at)), prisms)),
-               find_parameter(name, prisms).unit});
-  }
-  table.print();
-  fmt::print("\n");
-  print_datum(f.datum_kind, f.datum);
-  fmt::print("expected error of a direction: {:.2g} deg\n", deg(f.datum.total));
-  for (const auto& weak : f.unobservable) {
-    fmt::print("not told by these walls: {}\n", direction_text(weak));
-  }
-  for (const std::string& words : f.advice) fmt::print("advice: {}\n", words);
 }
 
 ExitStatus run_plan(const CalibrateCommandOptions& options, const CommonOptions& common) {
@@ -588,14 +310,11 @@ ExitStatus run_plan(const CalibrateCommandOptions& options, const CommonOptions&
   if (options.rate_hz != "full") plan.rate = positive_number(options.rate_hz, "--rate-hz", "Hz");
   if (options.noise_range_m) check_positive(*options.noise_range_m, "--noise-range-m", "m");
   plan.range_noise = options.noise_range_m;
-  if (options.prior_sigma_deg) {
-    check_positive(*options.prior_sigma_deg, "--prior-sigma-deg", "deg");
-    plan.prior_sigma = radians_from_degrees(*options.prior_sigma_deg);
-  }
+  plan.prior_sigma = prior_sigma(options);
   check_not_negative(options.range_offset_sigma_m, "--range-offset-sigma-m", "m");
   plan.range_offset_sigma = options.range_offset_sigma_m;
   plan.beam_origin = options.beam_origin == "yes";
-  const CalibrationForecast forecast = calibration::forecast(plan);
+  const calibration::CalibrationForecast forecast = calibration::forecast(plan);
   if (common.json) {
     print_json(forecast_json(forecast, plan.sensor.prisms()));
   } else {

@@ -15,13 +15,13 @@
 #include "risley/recordings/time_audit.hpp"
 #include "risley/report/estimate_page.hpp"
 #include "risley/report/number_text.hpp"
-#include "risley/report/states_file.hpp"
 #include "risley/sensors/preset.hpp"
 
 #include "command.hpp"
 #include "estimation_input.hpp"
 #include "observability_text.hpp"
 #include "recording_text.hpp"
+#include "result_folder.hpp"
 #include "table.hpp"
 
 namespace risley::app {
@@ -280,21 +280,6 @@ void print_outcome(const Outcome& outcome) {
   }
 }
 
-/// States at every used shot, or at one shot per knot of the trajectory.
-void write_state_file(const std::string& path, const EstimateCommandOptions& options,
-                      const Estimate& estimate,
-                      const std::vector<std::pair<std::string, std::string>>& provenance) {
-  report::StatesContent content;
-  content.prisms = estimate.sensor.prisms();
-  content.rows = options.states == "all" ? estimate.series.size() : estimate.states.size();
-  content.block = [&](estimation::ShotRange rows) {
-    return options.states == "all" ? estimation::states_of_shots(estimate, rows)
-                                   : estimation::rows_of(estimate.states, rows);
-  };
-  content.residuals_over_angle = estimate.residuals_over_angle;
-  report::write_states(path, content, provenance);
-}
-
 /// calibration.yaml, states.nc and report.html. An estimate that did not converge is no
 /// calibration: there is none then, not even an older one of the same name.
 void write_folder(const EstimateCommandOptions& options, const CommonOptions& common,
@@ -311,7 +296,7 @@ void write_folder(const EstimateCommandOptions& options, const CommonOptions& co
     remove_calibration(options.folder);
   }
   if (options.states != "none") {
-    write_state_file(path("states.nc"), options, outcome.estimate, provenance);
+    write_states_of(outcome.estimate, options.states, path("states.nc"), provenance);
   }
   write_text_file(
       path("report.html"),

@@ -2,13 +2,10 @@
 // SPDX-License-Identifier: MIT
 #include "estimation_input.hpp"
 
-#include <filesystem>
-
 #include <fmt/format.h>
 
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
-#include "risley/core/output_file.hpp"
 #include "risley/sensors/preset.hpp"
 
 namespace risley::app {
@@ -56,35 +53,6 @@ RecordingInput read_recording(const std::string& path,
   result.audit = audit.result();
   result.seconds = now() - started;
   return result;
-}
-
-std::vector<std::pair<std::string, std::string>> provenance_of(
-    const CommonOptions& common, const std::vector<std::string>& inputs) {
-  std::vector<std::pair<std::string, std::string>> result = {{"command", common.command},
-                                                             {"version", RISLEY_VERSION},
-                                                             {"seed", std::to_string(common.seed)}};
-  for (std::size_t i = 0; i < inputs.size(); ++i) {
-    const std::string name = i == 0 ? "input" : fmt::format("input_{}", i + 1);
-    result.emplace_back(name, inputs[i]);
-    result.emplace_back(name + "_sha256", sha256_of_file(inputs[i]));
-  }
-  return result;
-}
-
-void make_result_folder(const std::string& folder) {
-  std::error_code code;
-  std::filesystem::create_directories(folder, code);
-  if (code || !std::filesystem::is_directory(folder)) {
-    throw FileError(
-        folder, {},
-        fmt::format("cannot be made a folder: {}", code ? code.message() : "a file has this name"));
-  }
-}
-
-void remove_calibration(const std::string& folder) {
-  if (folder.empty()) return;
-  std::error_code ignored;
-  std::filesystem::remove(std::filesystem::path(folder) / "calibration.yaml", ignored);
 }
 
 estimation::EstimateOptions estimate_options(

@@ -5,7 +5,6 @@
 #include <memory>
 #include <optional>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "risley/estimation/angle_series.hpp"
@@ -29,16 +28,6 @@ struct RecordingInput {
 RecordingInput read_recording(const std::string& path,
                               const estimation::SelectionOptions& selection,
                               const CommonOptions& common);
-
-/// {"command", ...}, {"version", ...}, {"seed", ...}, and file and SHA-256 of every input.
-std::vector<std::pair<std::string, std::string>> provenance_of(
-    const CommonOptions& common, const std::vector<std::string>& inputs);
-
-/// Makes a folder for results, before an hour of computing. @throws FileError
-void make_result_folder(const std::string& folder);
-
-/// What failed is no calibration: takes an older one out of the folder; nothing for an empty name.
-void remove_calibration(const std::string& folder);
 
 /// What the user says about sensor and parameters, as typed.
 struct EstimationWishes {

@@ -3,10 +3,14 @@
 // Calibrations on plane walls against the truth: section 3.3 of the paper and set-ups that do
 // better, errors that the covariances foretell, and walls that are not what they should be.
 // RISLEY_SEEDS=200 gives every Monte Carlo so many seeds.
+#include <algorithm>
 #include <cmath>
-#include <limits>
 #include <memory>
+#include <string>
+#include <utility>
+#include <vector>
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include "risley/calibration/calibration_plan.hpp"
@@ -22,9 +26,9 @@ using testing::calibrate_walls;
 using testing::JudgedCalibration;
 using testing::record_walls;
 using testing::seeds_or;
+using testing::wall_errors;
 using testing::wall_options;
 using testing::wall_settings;
-using testing::wall_errors;
 using testing::WallMonteCarlo;
 using testing::WallRecording;
 
@@ -51,17 +55,15 @@ scenes::Scene hall() {
 /// Three walls at right angles whose corner is on the axis 10 m away; all normals are inclined to
 /// the axis alike, by 54.7 degrees.
 scenes::Scene cube_corner() {
-  const double inclination = degrees_from_radians(std::acos(1.0 / std::sqrt(3.0)));
+  const double cosine = 1.0 / std::sqrt(3.0), sine = std::sqrt(2.0 / 3.0);
   std::string text = "planes:\n";
-  for (const double about_deg : {90.0, 210.0, 330.0}) {
-    // A normal turned about X from straight up.
+  for (const double about_deg : {0.0, 120.0, 240.0}) {
     const double about = radians_from_degrees(about_deg);
-    const double sine = std::sin(radians_from_degrees(inclination));
-    const auto normal = angles_from_direction<double>(
-        {1.0 / std::sqrt(3.0), sine * std::cos(about), sine * std::sin(about)});
+    const auto normal =
+        angles_from_direction<double>({cosine, -sine * std::sin(about), sine * std::cos(about)});
     text += fmt::format(
         "  - {{name: at {}, distance_m: {}, normal_azimuth_deg: {}, normal_zenith_deg: {}}}\n",
-        about_deg, 10.0 / std::sqrt(3.0), degrees_from_radians(normal.azimuth),
+        about_deg, 10.0 * cosine, degrees_from_radians(normal.azimuth),
         degrees_from_radians(normal.zenith));
   }
   return scenes::parse_scene(text, "cube corner");
@@ -81,13 +83,15 @@ scenes::Scene tilted_wall() {
       "tilted wall");
 }
 
-void expect_honest(const WallMonteCarlo& result, double ratio_tolerance) {
-  EXPECT_NEAR(result.total_ratio(), 1.0, ratio_tolerance);
+/// Errors are what the covariances promise. The errors of directions have but one or two degrees of
+/// freedom that count, so their ratio scatters by 0.1 at 200 seeds.
+void expect_honest(const WallMonteCarlo& result) {
+  EXPECT_NEAR(result.total_ratio(), 1.0, 0.1 * std::sqrt(200.0 / result.runs));
   EXPECT_NEAR(result.nees(), 1.0, result.nees_band());
   EXPECT_GE(result.within_two_sigma(), 0.90);
 }
 
-TEST(Calibration, Section33ScattersAsThePapersMethodMust) {
+TEST(Calibration, Section33ScattersAsItMustByBothMethods) {
   // 200 seeds: mean total within 0.008 degree, scatter over bound within 0.1. Their scatter falls
   // with the square root of the number.
   const int seeds = seeds_or(60);
@@ -107,17 +111,17 @@ TEST(Calibration, Section33ScattersAsThePapersMethodMust) {
   EXPECT_NEAR(paper.mean_total(), 0.087, 0.008 * wider);
   EXPECT_LE(paper.mean_shape(), 0.007);
   EXPECT_NEAR(paper.total_ratio(), 1.0, 0.1 * wider);
-  expect_honest(adjusted, 0.1 * wider);
+  expect_honest(adjusted);
   EXPECT_LE(adjusted.mean_shape(), 0.007);
 }
 
-TEST(Calibration, AHallTellsFiveTimesAsMuch) {
+TEST(Calibration, AHallTellsTenTimesAsMuch) {
   const int seeds = seeds_or(20);
   const WallMonteCarlo result = testing::wall_monte_carlo(
       seeds, [](std::uint64_t seed) { return wall_settings(hall(), seed); }, wall_options());
   result.record();
   EXPECT_LE(result.mean_total(), 0.015);
-  expect_honest(result, 0.1 * std::sqrt(200.0 / seeds));
+  expect_honest(result);
 }
 
 TEST(Calibration, StationsStatedWithErrorsGiveWhatTheyPromise) {
@@ -148,7 +152,7 @@ TEST(Calibration, StationsStatedWithErrorsGiveWhatTheyPromise) {
   }
   result.record();
   EXPECT_LE(result.mean_total(), 0.014);
-  expect_honest(result, 0.1 * std::sqrt(200.0 / seeds));
+  expect_honest(result);
 }
 
 TEST(Calibration, FullRateNarrowsOneWallTenTimes) {
@@ -196,7 +200,7 @@ void expect_clutter_harmless(scenes::Scene (*scene)()) {
   cluttered.record("cluttered_");
   EXPECT_LE(cluttered.mean_gauge(), 1.15 * clean.mean_gauge());
   EXPECT_LE(cluttered.mean_shape(), 1.15 * clean.mean_shape());
-  expect_honest(cluttered, 0.1 * std::sqrt(200.0 / seeds));
+  expect_honest(cluttered);
 }
 
 TEST(Calibration, PeopleBeforeOneWallDoNoHarm) { expect_clutter_harmless(section33_wall); }
@@ -239,7 +243,7 @@ PrismTrain adjusted_with_true_labels(const WallRecording& walls) {
 }
 
 void expect_segmentation_nearly_as_good_as_truth(scenes::Scene (*scene)()) {
-  const int seeds = seeds_or(15);
+  const int seeds = seeds_or(12);
   double found = 0, known = 0;
   for (int seed = 0; seed < seeds; ++seed) {
     const WallRecording walls =
@@ -308,41 +312,90 @@ TEST(Calibration, WithoutNoiseEveryParameterIsFoundToTheLastDigit) {
   }
 }
 
-/// Moves a part of the wall back, away from the sensor: what lies within so many degrees.
-void add_recess(WallRecording& walls, double depth, double azimuth_deg, double zenith_deg,
-                double size_deg) {
+/// Moves a part of the wall back, away from the sensor. @return number of its shots
+std::size_t add_recess(WallRecording& walls, double depth, double azimuth_deg, double zenith_deg,
+                       double size_deg) {
+  std::size_t moved = 0;
   for (std::size_t i = 0; i < walls.size(); ++i) {
     const auto angles = angles_from_direction(walls.direction(i));
-    if (std::abs(degrees_from_radians(angles.azimuth) - azimuth_deg) < 0.5 * size_deg &&
-        std::abs(degrees_from_radians(angles.zenith) - zenith_deg) < 0.5 * size_deg) {
-      walls.recording.shots.range[i] += depth / walls.hit(i).cosine;
+    if (std::abs(degrees_from_radians(angles.azimuth) - azimuth_deg) > 0.5 * size_deg ||
+        std::abs(degrees_from_radians(angles.zenith) - zenith_deg) > 0.5 * size_deg) {
+      continue;
     }
+    walls.recording.shots.range[i] += depth / walls.hit(i).cosine;
+    ++moved;
   }
+  return moved;
 }
 
-TEST(Calibration, ADoorThatStandsBackIsSeenAndLeftOut) {
-  const int seeds = seeds_or(5);
+/// The same wall, plain and with a door that stands back, at 10 kHz.
+struct DoorMonteCarlo {
   WallMonteCarlo clean, with_door;
+  std::vector<calibration::Calibration> calibrations;  ///< [seeds], with the door
+  std::vector<std::size_t> in_door;                    ///< [seeds], shots
+
+  void expect_within(double factor) const {
+    clean.record("clean_");
+    with_door.record("door_");
+    EXPECT_EQ(clean.steps, 0);
+    EXPECT_LE(with_door.mean_gauge(), factor * clean.mean_gauge());
+    EXPECT_LE(with_door.mean_shape(), factor * clean.mean_shape());
+  }
+};
+
+constexpr double kDoorAzimuthDeg = 6.0, kDoorZenithDeg = 93.0, kDoorSizeDeg = 5.0;
+
+DoorMonteCarlo with_door(double depth) {
+  DoorMonteCarlo result;
+  const int seeds = seeds_or(5);
   for (int seed = 0; seed < seeds; ++seed) {
     WallRecording walls = record_walls(
         wall_settings(section33_wall(), static_cast<std::uint64_t>(seed), 10000.0, 5.0));
-    clean.add(calibrate_walls({&walls}, wall_options()), walls.settings.truth);
-    add_recess(walls, 0.1, 6.0, 93.0, 5.0);
-    const JudgedCalibration judged = calibrate_walls({&walls}, wall_options());
-    with_door.add(judged, walls.settings.truth);
-    ASSERT_EQ(judged.calibration.steps.size(), 1u) << seed;
-    const calibration::SurfaceStep& step = judged.calibration.steps.front();
-    EXPECT_NEAR(step.height, 0.1, 0.02);
-    EXPECT_NEAR(degrees_from_radians(step.azimuth), 6.0, 1.0);
-    EXPECT_NEAR(degrees_from_radians(step.zenith), 93.0, 1.0);
-    EXPECT_NEAR(degrees_from_radians(step.size), 5.0, 1.0);
-    EXPECT_FALSE(judged.calibration.warnings.empty());
+    result.clean.add(calibrate_walls({&walls}, wall_options()), walls.settings.truth);
+    result.in_door.push_back(
+        add_recess(walls, depth, kDoorAzimuthDeg, kDoorZenithDeg, kDoorSizeDeg));
+    JudgedCalibration judged = calibrate_walls({&walls}, wall_options());
+    result.with_door.add(judged, walls.settings.truth);
+    result.calibrations.push_back(std::move(judged.calibration));
   }
-  clean.record("clean_");
-  with_door.record("door_");
-  EXPECT_EQ(clean.steps, 0);
-  EXPECT_LE(with_door.mean_gauge(), 1.5 * clean.mean_gauge());
-  EXPECT_LE(with_door.mean_shape(), 1.5 * clean.mean_shape());
+  return result;
+}
+
+/// Expects every calibration to name one step, the door.
+void expect_named(const DoorMonteCarlo& result, double least_height, double largest_height) {
+  for (const calibration::Calibration& c : result.calibrations) {
+    ASSERT_EQ(c.steps.size(), 1u);
+    const calibration::SurfaceStep& step = c.steps.front();
+    EXPECT_GE(step.height, least_height);
+    EXPECT_LE(step.height, largest_height);
+    EXPECT_NEAR(degrees_from_radians(step.azimuth), kDoorAzimuthDeg, 1.0);
+    EXPECT_NEAR(degrees_from_radians(step.zenith), kDoorZenithDeg, 1.0);
+    EXPECT_NEAR(degrees_from_radians(step.size), kDoorSizeDeg, 1.0);
+    EXPECT_FALSE(c.warnings.empty());
+  }
+}
+
+TEST(Calibration, AShallowDoorIsNamedAndLeftOut) {
+  const DoorMonteCarlo result = with_door(0.02);
+  expect_named(result, 0.016, 0.024);
+  result.expect_within(1.5);
+}
+
+TEST(Calibration, ADoorThatNoiseReachesAcrossIsNamedAndMostlyLeftOut) {
+  // The gate cuts the far half of its shots off, which makes it look shallower than it is.
+  const DoorMonteCarlo result = with_door(0.05);
+  expect_named(result, 0.035, 0.06);
+  result.expect_within(2.0);
+}
+
+TEST(Calibration, ADoorFarBeyondTheNoiseIsNoPartOfTheWall) {
+  const DoorMonteCarlo result = with_door(0.1);
+  for (std::size_t seed = 0; seed < result.calibrations.size(); ++seed) {
+    const calibration::Calibration& c = result.calibrations[seed];
+    ASSERT_EQ(c.planes.size(), 1u);
+    EXPECT_GE(c.planes.front().outliers, 0.9 * static_cast<double>(result.in_door[seed]));
+  }
+  result.expect_within(1.5);
 }
 
 /// Waves of the wall along both of its axes.
@@ -362,6 +415,8 @@ void add_waves(WallRecording& walls, double amplitude, double wavelength) {
 }
 
 TEST(Calibration, AWavyWallIsSaidAndPaidFor) {
+  // Paid for in part: the variance factor takes the cells for independent, and waves that are
+  // longer than a cell are not.
   WallMonteCarlo result;
   for (int seed = 0; seed < seeds_or(2); ++seed) {
     auto scene = tilted_wall();

@@ -1,0 +1,278 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "calibration_text.hpp"
+
+#include <cmath>
+#include <filesystem>
+
+#include <fmt/format.h>
+
+#include "risley/core/angle.hpp"
+#include "risley/report/number_text.hpp"
+
+#include "observability_text.hpp"
+#include "recording_text.hpp"
+#include "table.hpp"
+
+namespace risley::app {
+namespace {
+
+using calibration::Calibration;
+using calibration::CalibrationForecast;
+using calibration::DirectionErrors;
+using calibration::FormalDatum;
+
+double deg(double radians) { return degrees_from_radians(radians); }
+
+double in_file_unit(const std::string& name, double value, int prisms) {
+  return value / find_parameter(name, prisms).si_per_unit;
+}
+
+Json errors_json(const DirectionErrors& e) {
+  return {{"azimuth_rmse_deg", deg(e.azimuth_rmse)},
+          {"zenith_rmse_deg", deg(e.zenith_rmse)},
+          {"azimuth_bias_deg", deg(e.azimuth_bias)},
+          {"zenith_bias_deg", deg(e.zenith_bias)},
+          {"total_deg", deg(e.total)},
+          {"gauge_deg", deg(e.gauge)},
+          {"shape_deg", deg(e.shape)}};
+}
+
+Json datum_json(calibration::DatumKind kind, const FormalDatum& datum) {
+  return {{"kind", calibration::to_string(kind)},      {"sigma_roll_deg", deg(datum.sigma_roll)},
+          {"sigma_pitch_deg", deg(datum.sigma_pitch)}, {"sigma_yaw_deg", deg(datum.sigma_yaw)},
+          {"sigma_gauge_deg", deg(datum.gauge)},       {"sigma_shape_deg", deg(datum.shape)},
+          {"sigma_total_deg", deg(datum.total)}};
+}
+
+Json vector_json(const Vector3<double>& v) { return {v.x, v.y, v.z}; }
+
+Json unobservable_json(const std::vector<estimation::WeakDirection>& directions) {
+  Json list = Json::array();
+  for (const auto& direction : directions) list.push_back(weak_direction_json(direction));
+  return list;
+}
+
+/// NaN has no place in JSON.
+Json finite_or_null(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
+
+void print_datum(calibration::DatumKind kind, const FormalDatum& datum) {
+  fmt::print(
+      "datum: {}; 1 sigma of roll {:.2g}, pitch {:.2g}, yaw {:.2g} deg; of the beams against each "
+      "other {:.2g} deg\n",
+      calibration::to_string(kind), deg(datum.sigma_roll), deg(datum.sigma_pitch),
+      deg(datum.sigma_yaw), deg(datum.shape));
+}
+
+}  // namespace
+
+Json calibration_json(const CalibrationOutcome& outcome) {
+  const Calibration& c = outcome.calibration;
+  const int prisms = c.sensor.prisms();
+  Json parameters = Json::object(), planes = Json::array(), steps = Json::array(),
+       tests = Json::array(), profiles = Json::object();
+  for (std::size_t j = 0; j < c.free.size(); ++j) {
+    const auto at = static_cast<Eigen::Index>(j);
+    parameters[c.free[j].name] = {
+        {"value", in_file_unit(c.free[j].name, c.parameters[at], prisms)},
+        {"sigma",
+         finite_or_null(in_file_unit(c.free[j].name, std::sqrt(c.covariance(at, at)), prisms))}};
+  }
+  for (const calibration::CalibratedPlane& plane : c.planes) {
+    planes.push_back({{"name", plane.name},
+                      {"recording", outcome.recordings[plane.recording]},
+                      {"normal", vector_json(plane.normal)},
+                      {"offset_m", plane.distance},
+                      {"points", plane.points},
+                      {"outliers", plane.outliers},
+                      {"rms_m", plane.rms},
+                      {"before_rms_m", plane.rms_before},
+                      {"range_sigma_m", plane.range_sigma}});
+  }
+  for (const calibration::SurfaceStep& step : c.steps) {
+    steps.push_back({{"recording", outcome.recordings[step.recording]},
+                     {"plane", c.planes[step.plane].name},
+                     {"height_m", step.height},
+                     {"azimuth_deg", deg(step.azimuth)},
+                     {"zenith_deg", deg(step.zenith)},
+                     {"size_deg", deg(step.size)},
+                     {"points", step.points}});
+  }
+  for (const calibration::PriorTest& test : c.prior_tests) {
+    tests.push_back({{"name", test.name},
+                     {"kind", test.station ? "station" : "plane"},
+                     {"misfit_deg", deg(test.misfit)},
+                     {"chi2", test.chi2},
+                     {"degrees_of_freedom", test.degrees_of_freedom},
+                     {"critical", test.critical}});
+  }
+  for (const calibration::ThicknessProfile& profile : c.profiles) {
+    Json rows = Json::array();
+    for (std::size_t i = 0; i < profile.count.size(); ++i) {
+      if (profile.count[i] == 0) continue;
+      rows.push_back({{"from_deg", deg(profile.from[i])},
+                      {"to_deg", deg(profile.to[i])},
+                      {"points", profile.count[i]},
+                      {"before_rms_m", profile.rms_before[i]},
+                      {"after_rms_m", profile.rms_after[i]}});
+    }
+    profiles[profile.variable] = rows;
+  }
+  std::vector<std::string> warnings = outcome.warnings;
+  warnings.insert(warnings.end(), c.warnings.begin(), c.warnings.end());
+  Json object = {
+      {"converged", c.converged},
+      {"reason", c.reason},
+      {"method", c.method == calibration::CalibrationMethod::paper ? "paper" : "adjustment"},
+      {"iterations", c.iterations},
+      {"observations", outcome.observations},
+      {"points", c.points},
+      {"parameters", parameters},
+      {"range_offset_m", {{"value", c.range_offset}, {"sigma", c.range_offset_sigma}}},
+      {"planes", planes},
+      {"steps", steps},
+      {"datum", datum_json(c.datum_kind, c.datum)},
+      {"prior_tests", tests},
+      {"unobservable", unobservable_json(c.unobservable)},
+      {"before", {{"plane_rms_m", c.rms_before}}},
+      {"after", {{"plane_rms_m", c.rms_after}}},
+      {"sigma0", c.sigma0},
+      {"unevenness", c.unevenness},
+      {"variance_factor", c.variance_factor},
+      {"thickness", profiles},
+      {"warnings", warnings},
+      {"seconds",
+       {{"read", outcome.read_s},
+        {"rotation_angles", outcome.angles_s},
+        {"solve", outcome.solve_s},
+        {"total", outcome.total_s}}}};
+  if (outcome.truth) {
+    object["truth"] = {{"before", errors_json(outcome.truth->before)},
+                       {"after", errors_json(outcome.truth->after)}};
+  }
+  return object;
+}
+
+void print_calibration(const CalibrationOutcome& outcome) {
+  const Calibration& c = outcome.calibration;
+  const int prisms = c.sensor.prisms();
+  fmt::print("{}\n", c.converged ? "converged" : "NOT CONVERGED: " + c.reason);
+  fmt::print(
+      "{} points on {} planes, {:.2f} mm thick before, {:.2f} mm after; read {:.2f} s, rotation "
+      "angles {:.2f} s, solved {:.2f} s\n\n",
+      grouped(c.points), c.planes.size(), 1e3 * c.rms_before, 1e3 * c.rms_after, outcome.read_s,
+      outcome.angles_s, outcome.solve_s);
+  std::vector<std::string> head = {"parameter", "value", "+- sigma", "unit", "before"};
+  if (outcome.truth) head.insert(head.end(), {"truth", "error/sigma"});
+  Table table(head);
+  for (std::size_t j = 0; j < c.free.size(); ++j) {
+    const std::string& name = c.free[j].name;
+    const auto at = static_cast<Eigen::Index>(j);
+    const double sigma = in_file_unit(name, std::sqrt(c.covariance(at, at)), prisms);
+    const double value = in_file_unit(name, c.parameters[at], prisms);
+    const report::NumberText text = report::number_text(value, sigma);
+    std::vector<std::string> row = {
+        name, text.value, text.sigma, find_parameter(name, prisms).unit,
+        report::text_to_place_of(in_file_unit(name, c.believed.get(name), prisms), sigma)};
+    if (outcome.truth) {
+      const double truth = in_file_unit(name, outcome.truth->sensor.get(name), prisms);
+      row.push_back(report::text_to_place_of(truth, sigma));
+      row.push_back(fmt::format("{:.2f}", (value - truth) / sigma));
+    }
+    table.add(row);
+  }
+  if (c.range_offset_sigma > 0) {
+    const report::NumberText text =
+        report::number_text(1e3 * c.range_offset, 1e3 * c.range_offset_sigma);
+    table.add({"range offset", text.value, text.sigma, "mm", "0"});
+  }
+  table.print();
+  fmt::print("\n");
+  Table planes({"plane", "recording", "distance m", "points", "outliers", "before mm", "after mm"});
+  for (const calibration::CalibratedPlane& plane : c.planes) {
+    planes.add(
+        {plane.name, std::filesystem::path(outcome.recordings[plane.recording]).filename().string(),
+         fmt::format("{:.3f}", plane.distance), grouped(plane.points), grouped(plane.outliers),
+         fmt::format("{:.2f}", 1e3 * plane.rms_before), fmt::format("{:.2f}", 1e3 * plane.rms)});
+  }
+  planes.print();
+  fmt::print("\n");
+  print_datum(c.datum_kind, c.datum);
+  for (const calibration::PriorTest& test : c.prior_tests) {
+    if (test.degrees_of_freedom == 0) {
+      fmt::print("{} {}: not tested by these data\n", test.station ? "station" : "plane",
+                 test.name);
+      continue;
+    }
+    fmt::print("{} {}: misfit {:.3g} deg, chi2 {:.3g}, limit {:.3g}\n",
+               test.station ? "station" : "plane", test.name, deg(test.misfit), test.chi2,
+               test.critical);
+  }
+  if (outcome.truth) {
+    fmt::print("\n");
+    Table errors(
+        {"error, deg", "azimuth rmse", "zenith rmse", "total", "shared rotation", "shape"});
+    const auto add = [&errors](const char* name, const DirectionErrors& e) {
+      errors.add({name, fmt::format("{:.5f}", deg(e.azimuth_rmse)),
+                  fmt::format("{:.5f}", deg(e.zenith_rmse)), fmt::format("{:.5f}", deg(e.total)),
+                  fmt::format("{:.5f}", deg(e.gauge)), fmt::format("{:.5f}", deg(e.shape))});
+    };
+    add("before", outcome.truth->before);
+    add("after", outcome.truth->after);
+    errors.print();
+  }
+}
+
+Json forecast_json(const CalibrationForecast& f, int prisms) {
+  Json parameters = Json::object(), walls = Json::array();
+  for (std::size_t j = 0; j < f.free.size(); ++j) {
+    const auto at = static_cast<Eigen::Index>(j);
+    parameters[f.free[j].name] = {
+        {"sigma",
+         finite_or_null(in_file_unit(f.free[j].name, std::sqrt(f.covariance(at, at)), prisms))}};
+  }
+  for (const calibration::PlannedWall& wall : f.walls) {
+    walls.push_back({{"name", wall.name},
+                     {"station", wall.station},
+                     {"share", wall.share},
+                     {"mean_incidence_deg", deg(wall.mean_incidence)},
+                     {"mean_range_m", wall.mean_range}});
+  }
+  return {{"parameters", parameters},
+          {"range_offset_m", {{"sigma", finite_or_null(f.range_offset_sigma)}}},
+          {"datum", datum_json(f.datum_kind, f.datum)},
+          {"unobservable", unobservable_json(f.unobservable)},
+          {"walls", walls},
+          {"observations", f.shots},
+          {"advice", f.advice}};
+}
+
+void print_forecast(const CalibrationForecast& f, int prisms) {
+  fmt::print("{:.3g} shots meet a wall\n\n", f.shots);
+  Table walls({"wall", "station", "share %", "incidence deg", "range m"});
+  for (const calibration::PlannedWall& wall : f.walls) {
+    walls.add({wall.name, wall.station, fmt::format("{:.1f}", 100 * wall.share),
+               fmt::format("{:.1f}", deg(wall.mean_incidence)),
+               fmt::format("{:.1f}", wall.mean_range)});
+  }
+  walls.print();
+  fmt::print("\n");
+  Table table({"parameter", "sigma", "unit"});
+  for (std::size_t j = 0; j < f.free.size(); ++j) {
+    const auto at = static_cast<Eigen::Index>(j);
+    const std::string& name = f.free[j].name;
+    table.add({name,
+               fmt::format("{:.2g}", in_file_unit(name, std::sqrt(f.covariance(at, at)), prisms)),
+               find_parameter(name, prisms).unit});
+  }
+  table.print();
+  fmt::print("\n");
+  print_datum(f.datum_kind, f.datum);
+  fmt::print("expected error of a direction: {:.2g} deg\n", deg(f.datum.total));
+  for (const auto& weak : f.unobservable) {
+    fmt::print("not told by these walls: {}\n", direction_text(weak));
+  }
+  for (const std::string& words : f.advice) fmt::print("advice: {}\n", words);
+}
+
+}  // namespace risley::app
