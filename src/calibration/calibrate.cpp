@@ -31,7 +31,9 @@ constexpr std::size_t kCoarseShots = 40000;  // of all recordings together, to f
 constexpr std::size_t kBundleBeams = 4000;   // for formal sigmas of the beams
 constexpr std::size_t kSampleShots = 20000;  // for pictures
 constexpr int kCoarseRounds = 5;
-constexpr int kFullRounds = 2;
+constexpr int kMostFullRounds = 5;
+/// A plane is a step of a larger one when this part of its points lies near that.
+constexpr double kStepShare = 0.9;
 /// Variance of a normal distribution cut off at the gate.
 constexpr double kVarianceWithinGate = 0.97334;
 /// How far directions may be bent before the first adjustment, 1 sigma.
@@ -56,6 +58,39 @@ Eigen::MatrixXd prior_information(const PlanarProblem& problem) {
     information[j] = 1.0 / (sigma * sigma);
   }
   return information.asDiagonal();
+}
+
+/// A smaller plane a few sigmas off a larger one is a step of it: two planes that nearly coincide
+/// could not share out their shots.
+void absorb_steps(const std::vector<Vector3<double>>& points, const SegmentationOptions& settings,
+                  Segmentation& segmentation) {
+  for (std::size_t k = segmentation.planes.size(); k-- > 1;) {
+    bool step = false;
+    for (std::size_t larger = 0; larger < k && !step; ++larger) {
+      const Plane& plane = segmentation.planes[larger];
+      double near = 0, all = 0;
+      for (std::size_t i = 0; i < points.size(); ++i) {
+        if (segmentation.label[i] != static_cast<int>(k)) continue;
+        all += 1.0;
+        near += std::abs(signed_distance(plane, points[i])) <=
+                        kNearby * distance_sigma(plane, points[i], settings)
+                    ? 1.0
+                    : 0.0;
+      }
+      step = near >= kStepShare * all;
+    }
+    if (!step) continue;
+    const auto at = static_cast<std::ptrdiff_t>(k);
+    segmentation.planes.erase(segmentation.planes.begin() + at);
+    segmentation.points.erase(segmentation.points.begin() + at);
+    for (int& label : segmentation.label) {
+      if (label == static_cast<int>(k)) {
+        label = -1;
+      } else if (label > static_cast<int>(k)) {
+        --label;
+      }
+    }
+  }
 }
 
 /// One run, from recordings to results.
@@ -148,7 +183,8 @@ class Work {
       settings.gate = kGate;
       settings.leave_out_edges = true;
       settings.seed = options_.seed + r;
-      const Segmentation segmentation = segment_planes(points, settings);
+      Segmentation segmentation = segment_planes(points, settings);
+      absorb_steps(points, settings, segmentation);
       for (std::size_t i = 0; i < segmentation.planes.size(); ++i) {
         found.push_back({r, segmentation.planes[i], segmentation.points[i], 0});
       }
@@ -230,10 +266,12 @@ class Work {
   void label_all() {
     near_.assign(problem_.views.size(), 0);
     labels_.clear();
+    nearby_.clear();
     for (std::size_t r = 0; r < recordings_.size(); ++r) {
       Labels labels = label_shots(problem_, r, shots_[r], pointing_[r]);
       for (std::size_t v = 0; v < near_.size(); ++v) near_[v] += labels.near[v];
       labels_.push_back(std::move(labels.view));
+      nearby_.push_back(std::move(labels.nearby));
     }
   }
 
@@ -242,20 +280,25 @@ class Work {
     for (std::size_t r = 0; r < recordings_.size(); ++r) {
       hand_out(shots_[r], labels_[r], r, problem_);
     }
+    // The first solution bends towards steps and hides their rims: labels and solution take turns
+    // until what is left out stays the same.
     PlanarSolution solution;
-    for (int round = 0; round < kFullRounds; ++round) {
+    std::size_t left_out = 0;
+    bool settled = false;
+    for (int round = 0; round < kMostFullRounds; ++round) {
       solution = solve(problem_);
       update_range_variances(solution);
       problem_ = solution.problem;
-      report_progress(progress_, 0.5 + 0.15 * (round + 1));
-      if (round + 1 == kFullRounds) break;
+      report_progress(progress_, 0.5 + 0.08 * (round + 1));
+      if (settled || round + 1 == kMostFullRounds) break;
       label_all();
-      leave_out_steps();
+      const std::size_t before = std::exchange(left_out, leave_out_steps());
+      settled = std::max(before, left_out) - std::min(before, left_out) <= left_out / 100;
       for (std::size_t r = 0; r < recordings_.size(); ++r) {
         hand_out(shots_[r], labels_[r], r, problem_);
       }
     }
-    inspect(problem_, nullptr);
+    judge_evenness();
     return solution;
   }
 
@@ -265,11 +308,13 @@ class Work {
     std::vector<std::size_t> rows;  ///< of the recording
   };
 
-  Distances distances_of(const PlanarProblem& problem, std::size_t view) const {
+  /// @param labels  labels_ or nearby_
+  Distances distances_of(const PlanarProblem& problem, std::size_t view,
+                         const std::vector<std::vector<int>>& labels) const {
     const std::size_t r = problem.views[view].recording;
     Distances d;
-    for (std::size_t i = 0; i < labels_[r].size(); ++i) {
-      if (labels_[r][i] == static_cast<int>(view)) d.rows.push_back(i);
+    for (std::size_t i = 0; i < labels[r].size(); ++i) {
+      if (labels[r][i] == static_cast<int>(view)) d.rows.push_back(i);
     }
     const RangedShots shots = rows_of(shots_[r], d.rows);
     const PlaneView plane = plane_view(problem, view);
@@ -290,34 +335,39 @@ class Work {
     return d;
   }
 
-  /// Looks at the walls: how uneven they are, and which regions stand off.
-  /// @param leave_out  labels that lose the shots of such regions; nullptr only looks
-  void inspect(const PlanarProblem& problem, std::vector<std::vector<int>>* leave_out) {
+  /// Takes regions that stand off their wall out of the labels. They are looked for among the
+  /// outliers too, where most shots of a larger step are. @return number of their shots
+  std::size_t leave_out_steps() {
+    result_.steps.clear();
+    std::size_t shots = 0;
+    if (paper()) return shots;
+    for (std::size_t v = 0; v < problem_.views.size(); ++v) {
+      const std::size_t r = problem_.views[v].recording;
+      const Distances d = distances_of(problem_, v, nearby_);
+      for (const StepRegion& step :
+           inspect_surface({d.azimuth, d.zenith, d.distance, d.sigma}).steps) {
+        for (const std::size_t row : step.rows) labels_[r][d.rows[row]] = -1;
+        shots += step.rows.size();
+        result_.steps.push_back({r, v, step.height, step.azimuth, step.zenith,
+                                 std::sqrt(step.solid_angle), step.points});
+      }
+    }
+    return shots;
+  }
+
+  /// How far means over the walls scatter beyond noise.
+  void judge_evenness() {
     double squares = 0, cells = 0;
-    for (std::size_t v = 0; v < problem.views.size(); ++v) {
-      const Distances d = distances_of(problem, v);
+    for (std::size_t v = 0; v < problem_.views.size(); ++v) {
+      const Distances d = distances_of(problem_, v, labels_);
       const SurfaceReport report = inspect_surface({d.azimuth, d.zenith, d.distance, d.sigma});
       squares += report.unevenness * static_cast<double>(report.cells);
       cells += static_cast<double>(report.cells);
-      if (leave_out == nullptr) continue;
-      for (const StepRegion& step : report.steps) {
-        for (const std::size_t row : step.rows) {
-          (*leave_out)[problem.views[v].recording][d.rows[row]] = -1;
-        }
-        result_.steps.push_back({problem.views[v].recording, v, step.height, step.azimuth,
-                                 step.zenith, std::sqrt(step.solid_angle), step.points});
-      }
     }
-    if (cells > 0) {
-      result_.unevenness = squares / cells;
-      const double significant = 1.0 + 4.0 * std::sqrt(2.0 / cells);
-      result_.variance_factor = result_.unevenness > significant ? result_.unevenness : 1.0;
-    }
-  }
-
-  void leave_out_steps() {
-    result_.steps.clear();
-    if (!paper()) inspect(problem_, &labels_);
+    if (cells == 0) return;
+    result_.unevenness = squares / cells;
+    const double significant = 1.0 + 4.0 * std::sqrt(2.0 / cells);
+    result_.variance_factor = result_.unevenness > significant ? result_.unevenness : 1.0;
   }
 
   /// RMS of point-to-plane distances of a view with other optics, and the distances; the plane is
@@ -349,9 +399,9 @@ class Work {
   const Progress& progress_;
   Belief belief_;
   double range_noise_ = 0;
-  std::vector<RangedShots> shots_, coarse_;  // [recordings]
-  std::vector<double> pointing_;             // [recordings]
-  std::vector<std::vector<int>> start_labels_, labels_;
+  std::vector<RangedShots> shots_, coarse_;                       // [recordings]
+  std::vector<double> pointing_;                                  // [recordings]
+  std::vector<std::vector<int>> start_labels_, labels_, nearby_;  // [recordings][shots]
   std::vector<std::size_t> near_;
   std::vector<double> solved_variance_;  // [views] of the last solve, m^2
   PlanarProblem problem_;
@@ -417,7 +467,7 @@ void Work::fill_planes(const PlanarSolution& solution) {
   }
   for (std::size_t v = 0; v < p.views.size(); ++v) {
     const std::size_t r = p.views[v].recording;
-    const Distances d = distances_of(p, v);
+    const Distances d = distances_of(p, v, labels_);
     const RangedShots shots = rows_of(shots_[r], d.rows);
     const auto [rms_before, before] = thickness(belief_.sensor.train, shots);
     CalibratedPlane plane;

@@ -68,7 +68,7 @@ double pointing_of_angles(const RangedShots& shots) {
 Labels label_shots(const PlanarProblem& problem, std::size_t recording, const RangedShots& shots,
                    double pointing) {
   const Rays rays(problem.train, problem.geometry, shots);
-  Labels labels{std::vector<int>(shots.size(), -1),
+  Labels labels{std::vector<int>(shots.size(), -1), std::vector<int>(shots.size(), -1),
                 std::vector<std::size_t>(problem.views.size(), 0)};
   std::vector<std::pair<int, PlaneView>> planes;
   for (std::size_t v = 0; v < problem.views.size(); ++v) {
@@ -107,6 +107,7 @@ Labels label_shots(const PlanarProblem& problem, std::size_t recording, const Ra
                                                 kGate * (sigma[p] + sigma[nearest]));
           }
           if (edge) continue;
+          labels.nearby[i] = closest[i];
           if (best <= kGate) labels.view[i] = closest[i];
         }
       });

@@ -39,6 +39,7 @@ double pointing_of_angles(const RangedShots& shots);
 /// Which view of its recording each shot belongs to.
 struct Labels {
   std::vector<int> view;          ///< [shots], row of PlanarProblem::views, -1: none
+  std::vector<int> nearby;        ///< [shots], the same with the outliers of each plane
   std::vector<std::size_t> near;  ///< [views], shots near a plane that were left out
 };
 
