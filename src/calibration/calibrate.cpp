@@ -224,7 +224,7 @@ class Work {
         first_view[found[i].recording] = i;
       }
       problem_.views.push_back({found[i].recording, found[i].wall, found[i].plane.distance,
-                                range_noise_ * range_noise_, nullptr});
+                                range_noise_ * range_noise_, nullptr, found[i].side});
     }
     for (std::size_t r = 0; r < recordings_.size(); ++r) {
       for (int& label : start_labels_[r]) {

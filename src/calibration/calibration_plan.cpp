@@ -188,7 +188,7 @@ CalibrationForecast forecast(const CalibrationPlan& plan) {
                  plane.plane.distance - dot(n_scene, station.position)};
       if (mine.distance < 0) mine = {-mine.normal, -mine.distance};
       found.push_back({r, mine, seen.rows[w].size(), 0});
-      problem.views.push_back({r, 0, mine.distance, variance, std::move(shots)});
+      problem.views.push_back({r, 0, mine.distance, variance, std::move(shots), 1.0});
     }
   }
   if (problem.views.empty()) throw EstimationError("no shot of the plan meets a wall");
@@ -204,7 +204,10 @@ CalibrationForecast forecast(const CalibrationPlan& plan) {
   problem.walls = std::move(matching.walls);
   problem.stations = std::move(matching.stations);
   problem.stations_known = matching.stations_known;
-  for (std::size_t i = 0; i < found.size(); ++i) problem.views[i].wall = found[i].wall;
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    problem.views[i].wall = found[i].wall;
+    problem.views[i].side = found[i].side;
+  }
   const bool both = tied && stations.size() > 1;
   result.datum_kind = known_normals && both ? DatumKind::both
                       : known_normals       ? DatumKind::planes

@@ -127,6 +127,15 @@ PlanarSolution adjust_as_paper(PlanarProblem problem, int most_iterations,
                                const Progress& progress) {
   if (problem.views.empty()) throw EstimationError("no wall to calibrate on");
   const auto free = static_cast<Index>(problem.free.size());
+  // Every view is a wall of its own in the sensor's frame.
+  std::vector<Wall> walls;
+  for (WallView& view : problem.views) {
+    walls.push_back(problem.walls[view.wall]);
+    view.wall = walls.size() - 1;
+    view.side = 1.0;
+  }
+  problem.walls = std::move(walls);
+  for (StationPose& station : problem.stations) station.scene_from_sensor.setIdentity();
   PlanarSolution solution;
   for (const WallView& view : problem.views) solution.shots += view.shots->size();
   const double redundancy = static_cast<double>(solution.shots) - static_cast<double>(free) -

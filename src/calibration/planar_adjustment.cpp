@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <string_view>
 #include <utility>
 
 #include <Eigen/Cholesky>
@@ -185,6 +186,7 @@ struct System {
   std::size_t shots = 0, lost = 0;
   std::vector<Eigen::MatrixXd> view_hessian;  ///< [views] of [unknowns, unknowns]
   std::vector<double> view_cost;              ///< [views]
+  std::vector<std::size_t> view_shots;        ///< [views], that met their plane
 };
 
 /// Adjusted less stated normal, in the tangents of the adjusted one, rad.
@@ -239,6 +241,7 @@ System build_system(const PlanarProblem& p, const Unknowns& at, const Places& pl
     const Chain chain = chain_of(p, at, places, view);
     system.view_hessian.push_back(chain.unknowns.transpose() * equations.hessian * chain.unknowns);
     system.view_cost.push_back(equations.cost);
+    system.view_shots.push_back(equations.shots);
     system.hessian += system.view_hessian.back();
     system.gradient += chain.unknowns.transpose() * equations.gradient;
     system.considered += chain.unknowns.transpose() * equations.hessian * chain.considered;
@@ -334,6 +337,33 @@ void check(const PlanarProblem& p) {
     throw InvalidArgument(fmt::format("{} prior sigmas given for {} free parameters",
                                       p.prior_sigma.size(), p.free.size()));
   }
+  for (const double sigma : p.prior_sigma) {
+    if (!(sigma > 0)) {
+      throw InvalidArgument(fmt::format("prior sigma = {}, allowed above 0", sigma));
+    }
+  }
+  const auto expect = [](std::string_view what, const Eigen::MatrixXd& matrix, Index rows,
+                         Index columns) {
+    if (matrix.rows() == rows && matrix.cols() == columns) return;
+    throw InvalidArgument(fmt::format("{} is {} x {}, expected {} x {}", what, matrix.rows(),
+                                      matrix.cols(), rows, columns));
+  };
+  const auto considered = static_cast<Index>(p.considered.size());
+  if (considered > 0) {
+    expect("considered_covariance", p.considered_covariance, considered, considered);
+  }
+  for (const auto* list : {&p.angle_sensitivity, &p.mean_angle_covariance}) {
+    if (!list->empty() && list->size() != p.stations.size()) {
+      throw InvalidArgument(fmt::format("common errors of {} recordings given, expected {}",
+                                        list->size(), p.stations.size()));
+    }
+  }
+  for (const auto& own : p.angle_sensitivity) {
+    expect("angle_sensitivity", own, p.train.prisms(), considered);
+  }
+  for (const auto& own : p.mean_angle_covariance) {
+    expect("mean_angle_covariance", own, p.train.prisms(), p.train.prisms());
+  }
   for (const WallView& view : p.views) {
     if (!view.shots || view.shots->size() == 0) {
       throw InvalidArgument("a view of a wall has no shots");
@@ -369,7 +399,8 @@ std::pair<Vector3<double>, Vector3<double>> tangents_of(const Vector3<double>& n
 PlaneView plane_view(const PlanarProblem& problem, std::size_t view) {
   const WallView& seen = problem.views[view];
   const Wall& wall = problem.walls[seen.wall];
-  const Eigen::Matrix3d turn = problem.stations[seen.recording].scene_from_sensor.transpose();
+  const Eigen::Matrix3d turn =
+      seen.side * problem.stations[seen.recording].scene_from_sensor.transpose();
   const auto [u1, u2] = tangents_of(wall.normal);
   PlaneView plane;
   plane.train = problem.train;
@@ -422,6 +453,12 @@ PlanarSolution adjust(PlanarProblem problem, const AdjustmentOptions& options,
       if (damping > kMostDamping) break;
     }
   }
+  for (std::size_t view = 0; view < problem.views.size(); ++view) {
+    if (system.view_shots[view] == 0) {
+      throw EstimationError(fmt::format("no shot meets the plane of wall {}",
+                                        problem.walls[problem.views[view].wall].name));
+    }
+  }
   solution.cost = system.cost;
   solution.shots = system.shots;
   solution.lost = system.lost;
@@ -440,7 +477,7 @@ PlanarSolution adjust(PlanarProblem problem, const AdjustmentOptions& options,
     covariance = solver.solve(Eigen::MatrixXd::Identity(n, n));
     for (std::size_t view = 0; view < problem.views.size(); ++view) {
       const double share = covariance.cwiseProduct(system.view_hessian[view]).sum();
-      solution.redundancy.push_back(static_cast<double>(problem.views[view].shots->size()) - share);
+      solution.redundancy.push_back(static_cast<double>(system.view_shots[view]) - share);
     }
   } else {
     solution.converged = false;

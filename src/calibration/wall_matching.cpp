@@ -19,10 +19,16 @@ constexpr double kSameDirection = radians_from_degrees(5.0);
 constexpr double kSameDistance = 0.05;        // of the distance
 constexpr double kSameDistanceAtLeast = 0.3;  // m
 
-/// A found plane as the scene has it.
+/// A found plane as the scene has it: its normal away from the scene's origin, which is towards the
+/// station where that stands behind the wall.
 Plane in_scene(const Plane& plane, const scenes::Station& station) {
   const Vector3<double> normal = station.scene_from_sensor(plane.normal);
-  return {normal, plane.distance + dot(normal, station.position)};
+  const double distance = plane.distance + dot(normal, station.position);
+  return distance < 0 ? Plane{-normal, -distance} : Plane{normal, distance};
+}
+
+double side_of(const Plane& plane, const Plane& scene, const scenes::Station& station) {
+  return dot(station.scene_from_sensor(plane.normal), scene.normal) < 0 ? -1.0 : 1.0;
 }
 
 double angle_of(const Plane& a, const Plane& b) { return angle_between(a.normal, b.normal); }
@@ -108,6 +114,7 @@ WallMatching match_walls(std::vector<FoundPlane>& found, const std::vector<std::
       result.walls[best].normal = mine.normal;  // listed by name only
     }
     plane.wall = best;
+    plane.side = side_of(plane.plane, mine, poses[plane.recording]);
     seen_by[best].push_back(plane.recording);
   }
   const auto nearest = [&](const Plane& plane, std::size_t except) {
@@ -130,7 +137,7 @@ WallMatching match_walls(std::vector<FoundPlane>& found, const std::vector<std::
                                             result.walls[w].name, normal_text(where[w])));
     }
   }
-  if (known_given && !known_seen) {
+  if (known_given && !known_seen && !found.empty()) {
     const Plane first = in_scene(found.front().plane, poses[found.front().recording]);
     throw EstimationError(
         fmt::format("none of the known planes is seen: the largest plane of {} is at {}",

@@ -18,6 +18,7 @@ struct FoundPlane {
   Plane plane;  ///< sensor frame
   std::size_t points = 0;
   std::size_t wall = 0;  ///< row of WallMatching::walls
+  double side = 1.0;     ///< -1 where the wall was seen from behind
 };
 
 /// Which planes of which recordings are the same wall.

@@ -52,6 +52,8 @@ scenes::Scene stations() {
   return scene;
 }
 
+const scenes::Station kUpright = station("upright", 0, 0, 0, 0.02);
+
 double total_deg(const scenes::Scene& scene) {
   return degrees_from_radians(forecast(plan_of(scene)).datum.total);
 }
@@ -107,6 +109,16 @@ TEST(Forecast, IsItWithStationsAndKnownPlanesToo) {
   expect_adjustment(plan);
 }
 
+/// A prior of the angles that is narrow against what the shots tell, and no word of the index.
+TEST(Forecast, PriorsAreOfAngles) {
+  CalibrationPlan plan = plan_of(corner());
+  plan.duration = 40;
+  plan.range_noise = 0.5;
+  plan.additional = {"refractive_index"};
+  plan.prior_sigma = radians_from_degrees(0.002);
+  expect_adjustment(plan);
+}
+
 /// What a prototype in another language found for the same plans.
 TEST(Forecast, ReproducesKnownNumbers) {
   EXPECT_NEAR(total_deg(one_wall()), 0.099, 0.03 * 0.099);
@@ -134,6 +146,10 @@ TEST(Forecast, FallsWithTheRootOfTheDurationAndWithTheNoise) {
   EXPECT_LT(without_rounding, once.datum.total);
   plan.range_noise = 0.005;
   EXPECT_NEAR(forecast(plan).datum.total / without_rounding, 0.25, 0.01);
+  // A step of rounding spreads like noise of its length over the root of twelve.
+  plan.range_noise = 1e-6;
+  plan.sensor.range_resolution = 0.02 * std::sqrt(12.0);
+  EXPECT_NEAR(forecast(plan).datum.total / without_rounding, 1.0, 0.01);
 }
 
 TEST(Forecast, TakesRateAndNoiseFromTheSensor) {
@@ -170,6 +186,37 @@ TEST(Forecast, TellsWhichWallsAreSeen) {
   plan.stations_known = false;
   plan.scene.stations.resize(1);
   EXPECT_EQ(forecast(plan).datum_kind, DatumKind::planes);
+  // One station has nothing to be compared with.
+  plan.stations_known = true;
+  EXPECT_EQ(forecast(plan).datum_kind, DatumKind::planes);
+  plan.scene.planes[0].normal_sigma.reset();
+  EXPECT_EQ(forecast(plan).datum_kind, DatumKind::none);
+}
+
+TEST(Forecast, StartsBeamsWhereTheyLeaveThePrisms) {
+  CalibrationPlan plan = plan_of(corner());
+  const CalibrationForecast thick = forecast(plan);
+  plan.beam_origin = false;
+  const CalibrationForecast without = forecast(plan);
+  EXPECT_NE(thick.walls.at(0).mean_range, without.walls.at(0).mean_range);
+  plan.beam_origin = true;
+  plan.sensor.set_prism_geometry({});
+  const CalibrationForecast thin = forecast(plan);
+  EXPECT_EQ(thin.walls.at(0).mean_range, without.walls.at(0).mean_range);
+  EXPECT_EQ(thin.datum.total, without.datum.total);
+}
+
+/// Flipped in azimuth, the back of a wall is the front of one that leans the other way.
+TEST(Forecast, WallsHaveTwoSides) {
+  CalibrationPlan behind = plan_of(one_wall());
+  scenes::Station beyond = station("beyond", 0, 0, 180, 0);
+  beyond.position = 60.0 * behind.scene.planes[0].plane.normal;
+  behind.scene.stations = {beyond};
+  behind.stations_known = false;
+  const CalibrationForecast back = forecast(behind);
+  const CalibrationForecast front = forecast(plan_of({{wall("wall", 10, 100, 30)}, {}}));
+  EXPECT_NEAR(back.datum.total / front.datum.total, 1.0, 1e-6);
+  EXPECT_NEAR(back.walls.at(0).mean_range, front.walls.at(0).mean_range, 1e-6);
 }
 
 /// Knowing how the sensor stood is worth more than the shots alone.
@@ -182,7 +229,17 @@ TEST(Forecast, KnownStationsAreADatum) {
   EXPECT_LT(known, 0.5 * unknown.datum.gauge);
 }
 
-TEST(Forecast, WhatAPlanWallDoesNotTellIsUnobservable) {
+TEST(Forecast, KnownNormalsAreADatum) {
+  CalibrationPlan plan = plan_of(corner());
+  plan.rate = 10.0;
+  const double unknown = forecast(plan).datum.gauge;
+  for (scenes::ScenePlane& plane : plan.scene.planes) {
+    plane.normal_sigma = radians_from_degrees(0.001);
+  }
+  EXPECT_LT(forecast(plan).datum.gauge, 0.5 * unknown);
+}
+
+TEST(Forecast, WhatAPlaneWallDoesNotTellIsUnobservable) {
   CalibrationPlan plan = plan_of({{wall("across", 0, 90, 30)}, {}});
   const CalibrationForecast poor = forecast(plan);
   ASSERT_FALSE(poor.unobservable.empty());
@@ -204,6 +261,7 @@ TEST(Forecast, AdvisesWhereSomethingIsPoor) {
   EXPECT_THAT(advice_of(poor), Contains(HasSubstr("flipped by 180 degrees")));
   EXPECT_THAT(advice_of(poor), Contains(HasSubstr("record longer")));
   EXPECT_THAT(advice_of(poor), Not(Contains(HasSubstr("% of the shots"))));
+  EXPECT_THAT(advice_of(plan_of(corner())), Contains(HasSubstr("13 m away")));  // of both walls
 
   // Far walls are not too near, steep ones are steep enough.
   EXPECT_THAT(advice_of(plan_of(one_wall())), Not(Contains(HasSubstr("m away"))));
@@ -220,6 +278,16 @@ TEST(Forecast, AdvisesWhereSomethingIsPoor) {
   plane.vertical_axis = cross(plane.plane.normal, plane.horizontal_axis);
   plane.extent = {2000.0, 9.0};
   EXPECT_THAT(advice_of(small), ElementsAre(HasSubstr("% of the shots meet a wall")));
+  // Of each of several stations.
+  small.scene.stations = {kUpright, kUpright};
+  EXPECT_THAT(advice_of(small), ElementsAre(HasSubstr("% of the shots meet a wall")));
+  small.scene.stations.clear();
+  // Nearly all is enough.
+  plane.extent = {2000.0, 21.5};
+  const double share = forecast(small).walls.at(0).share;
+  EXPECT_GT(share, 0.91);
+  EXPECT_LT(share, 0.98);
+  EXPECT_THAT(advice_of(small), ElementsAre());
 
   CalibrationPlan tied = plan_of(stations());
   tied.duration = 0.05;

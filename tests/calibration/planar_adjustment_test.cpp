@@ -894,6 +894,35 @@ TEST(PlanarAdjustment, RefusesWhatMakesNoSense) {
   EXPECT_THROW(adjust(with([](auto& p) { p.views[0].wall = 2; })), InvalidArgument);
   EXPECT_THROW(adjust(with([](auto& p) { p.views[0].recording = 2; })), InvalidArgument);
   EXPECT_THROW(adjust(with([](auto& p) { p.views[0].range_variance = 0; })), InvalidArgument);
+  EXPECT_THROW(adjust(with([](auto& p) { p.prior_sigma[0] = 0; })), InvalidArgument);
+  EXPECT_THROW(adjust(with([](auto& p) {
+                 p.considered = p.free;
+                 p.considered_covariance.resize(0, 0);
+               })),
+               InvalidArgument);
+  EXPECT_THROW(adjust(with([](auto& p) {
+                 p.mean_angle_covariance.assign(p.stations.size(), Eigen::MatrixXd::Zero(1, 1));
+               })),
+               InvalidArgument);
+  EXPECT_THROW(adjust(with([](auto& p) {
+                 p.angle_sensitivity.assign(p.stations.size(), Eigen::MatrixXd::Zero(5, 1));
+               })),
+               InvalidArgument);
+  // A wall that stands behind the sensor is met by no shot.
+  EXPECT_THROW(adjust(with([](auto& p) { p.walls[0].normal = -p.walls[0].normal; })),
+               EstimationError);
+}
+
+TEST(PlanarAdjustment, LostShotsAddNoRedundancy) {
+  PlanarProblem p =
+      planar_problem(some_train(), kGeometry, corner(), kRangeNoise, {1000, kRangeNoise, 0, 0, 12});
+  const double whole = adjust(p).redundancy[0];
+  auto shots = std::make_shared<RangedShots>(*p.views[0].shots);
+  for (std::size_t i = 0; i < 50; ++i) shots->range[i] = std::nan("");
+  p.views[0].shots = shots;
+  const PlanarSolution solution = adjust(p);
+  EXPECT_EQ(solution.lost, 50u);
+  EXPECT_NEAR(solution.redundancy[0], whole - 50.0, 1.0);
 }
 
 }  // namespace

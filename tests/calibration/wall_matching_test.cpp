@@ -111,6 +111,29 @@ TEST(WallMatching, AFlippedStationSeesTheSameWalls) {
   EXPECT_EQ(matching.stations[1].scene_from_sensor, matching.stations[1].stated);
 }
 
+/// Scene planes have two sides: one seen from behind is the same wall, its normal the other way.
+TEST(WallMatching, AWallSeenFromBehindIsTheSame) {
+  const scenes::ScenePlane between = wall("between", 0, 90, 8);
+  const scenes::Station beyond = station("beyond", 0, 0, 180, 0.05, {20, 0, 0});
+  FoundPlane behind = found_from(1, beyond, between);
+  EXPECT_DOUBLE_EQ(behind.plane.distance, -12.0);
+  behind.plane = {-behind.plane.normal, 12.0};  // as a sensor has it
+  std::vector<FoundPlane> found{found_from(0, kUpright, between), behind};
+  const WallMatching matching =
+      match_walls(found, {"one", "two"}, std::nullopt, {kUpright, beyond});
+  EXPECT_THAT(walls_of(found), ElementsAre(0, 0));
+  EXPECT_EQ(found[0].side, 1.0);
+  EXPECT_EQ(found[1].side, -1.0);
+  PlanarProblem problem;
+  problem.walls = matching.walls;
+  problem.stations = matching.stations;
+  problem.views.push_back({1, 0, 12.0, 1e-4, nullptr, found[1].side});
+  const PlaneView view = plane_view(problem, 0);
+  EXPECT_LT(angle_between(view.plane.normal, behind.plane.normal), 1e-14);
+  EXPECT_NEAR(dot(view.tangent_1, view.plane.normal), 0.0, 1e-15);
+  EXPECT_NEAR(dot(view.tangent_2, view.plane.normal), 0.0, 1e-15);
+}
+
 /// Parallel walls are told apart by their distances in the scene.
 TEST(WallMatching, PositionsShiftDistances) {
   const scenes::ScenePlane near = wall("near", 0, 90, 8), far = wall("far", 0, 90, 14);

@@ -28,8 +28,8 @@ struct DirectionErrors {
 DirectionErrors direction_errors(std::span<const Vector3<double>> computed,
                                  std::span<const Vector3<double>> truth);
 
-/// What a covariance of parameters means for the beams. A shot's own rotation angles add their noise
-/// to its direction, which is no part of this.
+/// What a covariance of parameters means for the beams. A shot's own rotation angles add their
+/// noise to its direction, which is no part of this.
 struct FormalDatum {
   double sigma_roll = 0, sigma_pitch = 0, sigma_yaw = 0;  ///< of the shared rotation, rad
   double gauge = 0, shape = 0, total = 0;                 ///< expected RMS over the beams, rad

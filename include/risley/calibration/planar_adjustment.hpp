@@ -42,6 +42,7 @@ struct WallView {
   double distance = 0;        ///< m
   double range_variance = 0;  ///< of one range, m^2
   std::shared_ptr<const RangedShots> shots;
+  double side = 1.0;  ///< -1 where the recording saw the wall from behind, against its normal
 };
 
 /// Least squares of all recordings together: ranges against explicit planes.

@@ -19,8 +19,8 @@ struct AngleSeries {
   std::vector<double> azimuth, zenith;  ///< rad
   /// Variance of the format's rounding, (step^2) / 12, rad^2.
   std::vector<float> azimuth_rounding_variance, zenith_rounding_variance;
-  /// Ranges of the shots, m, NaN where there is none; empty unless they were asked for. No estimator
-  /// looks at them: they travel along for what comes after.
+  /// Ranges of the shots, m, NaN where there is none; empty unless they were asked for. No
+  /// estimator looks at them: they travel along for what comes after.
   std::vector<double> range;
 
   std::size_t size() const { return time_ns.size(); }

@@ -37,8 +37,8 @@ struct BatchMapResult {
   Eigen::MatrixXd information;                  ///< of the data alone, variance factor included
   PrismTrain train{parse_face_order("PA-AP")};  ///< with the estimated parameters
   RotorTrajectory trajectory;                   ///< with covariances
-  /// How the rotation angles follow the parameters, mean over the recording [prisms, free]: an error
-  /// of the parameters moves all angles of a rotor by nearly the same.
+  /// How the rotation angles follow the parameters, mean over the recording [prisms, free]: an
+  /// error of the parameters moves all angles of a rotor by nearly the same.
   Eigen::MatrixXd angle_sensitivity;
   /// What all shots together tell of a shift that all angles of a rotor share, at given parameters
   /// [prisms, prisms], rad^-2: its inverse is the covariance of the mean errors of the angles.
