@@ -22,8 +22,10 @@ using Eigen::Index;
 
 constexpr double kLeastDamping = 1e-12;
 constexpr double kMostDamping = 1e12;
+/// A step that is damped by more promises little wherever it stands.
+constexpr double kMostConvergedDamping = 1e-3;
 /// Steps that promise to lower the cost by less are taken unasked, in the unit of one squared
-/// sigma: so near the minimum the derivatives' last thousandth (the beam's origin) decides what the
+/// sigma: so near the minimum what the derivatives leave out (the beam's origin) decides what the
 /// cost does, and not whether the step is right.
 constexpr double kSmallPromise = 1e-2;
 
@@ -433,7 +435,7 @@ PlanarSolution adjust(PlanarProblem problem, const AdjustmentOptions& options,
     if (promised <= options.tolerance) {
       // The step is right to second order and costs nothing more.
       move(problem, at, step);
-      solution.converged = true;
+      solution.converged = damping <= kMostConvergedDamping;
       break;
     }
     PlanarProblem trial = problem;

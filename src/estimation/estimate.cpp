@@ -115,9 +115,6 @@ std::string implausible_parameter(const Estimate& estimate, const PrismTrain& no
 /// Residuals below the stated noise by more than this say that the noise is not what was stated.
 constexpr double kFarBelow = 1.0 / 3.0;
 constexpr double kFarAbove = 3.0;
-/// Residuals below this are what arithmetic leaves of a simulation without noise: no stated noise
-/// would be right for it. 1e-9 degree.
-constexpr double kNoiseFree = radians_from_degrees(1e-9);
 /// A parameter combination that keeps more of its prior sigma than this was not measured.
 constexpr double kUnmeasured = 0.3;
 
@@ -164,7 +161,8 @@ void judge(Estimate& estimate, const PrismTrain& nominal) {
                     direction_text(worst), worst.sigma));
   } else if (std::string words = implausible_parameter(estimate, nominal); !words.empty()) {
     fail(std::move(words));
-  } else if (map && ratio < kFarBelow && rms > kNoiseFree) {
+  } else if (map && ratio < kFarBelow) {
+    estimate.noise_overstated = true;
     fail(residuals +
          ": the sigmas would be far too large; state the noise that the recording has with "
          "--noise-angle-deg");

@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include <Eigen/LU>
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
@@ -56,7 +57,31 @@ TEST(BatchMap, NoiseFreeConstantSpeedIsRecoveredFarBelowTheStatedNoise) {
   }
   // No noise at all is far below what was stated, which the verdict says.
   EXPECT_FALSE(result.converged);
+  EXPECT_TRUE(result.noise_overstated);
   EXPECT_NE(result.reason.find("--noise-angle-deg"), std::string::npos) << result.reason;
+}
+
+TEST(BatchMap, TellsWhatAllAnglesOfARotorHaveInCommon) {
+  // Rotors at constant speed have nothing but common errors. In the middle of the recording the
+  // speed's error plays no part, so an angle's covariance there is that of the mean angle at given
+  // parameters plus what the parameters' errors add.
+  const auto sensor = sensors::load_sensor("mid-40");
+  const auto series = testing::constant_speed_series(sensors::load_sensor("mid-40-table3"), 0.5,
+                                                     2.5, 2.0, 2000.0, 0.01, 6);
+  BatchMapOptions options;
+  options.angle_noise = kNoise;
+  options.free = free_parameters(default_free_names(2), 2);
+  options.rotor_process.assign(2, {1e-9, 0.0, 0.0});
+  const Start start = find_start(series, sensor, options.free, kNoise);
+  const BatchMapResult map = run_batch_map(series, start, sensor, options);
+  const Eigen::MatrixXd common =
+      map.angle_information.inverse() +
+      map.angle_sensitivity * map.covariance * map.angle_sensitivity.transpose();
+  const std::size_t middle = map.trajectory.size() / 2;
+  for (std::size_t k = 0; k < 2; ++k) {
+    const auto i = static_cast<Eigen::Index>(k);
+    EXPECT_NEAR(map.trajectory.angle_covariance(middle, k, k, 0.0) / common(i, i), 1.0, 0.1) << k;
+  }
 }
 
 TEST(BatchMap, AgreesWithTheFilterOnTheSameMotionModel) {

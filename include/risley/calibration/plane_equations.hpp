@@ -62,7 +62,7 @@ struct ResidualColumns {
 /// point-to-plane distances hold the measured one; its noise then biases the solution.) The
 /// variance of a residual is that of the range plus what the covariance of the rotation angles
 /// makes of it, which grows with the angle of incidence: the Gauss-Helmert model with the condition
-/// solved for the range. The derivative of the beam's origin is left out: it is a thousandth of the
+/// solved for the range. The derivative of the beam's origin is left out: a few thousandths of the
 /// rest, and the residuals themselves are exact. docs/theory/calibration.md The sums do not depend
 /// on the number of threads.
 /// @param set  instruction set, for tests and benchmarks

@@ -48,7 +48,9 @@ struct RangedRecording {
 };
 
 /// Takes the shots that have a range and a sound direction out of an estimate.
-/// @param estimate  converged, by the batch estimator, of a series with ranges
+/// @param estimate  converged (or with its noise overstated: angles of a recording without noise
+/// are
+///                  good enough), by the batch estimator, of a series with ranges
 /// @throws EstimationError when it did not converge or has no ranges
 RangedRecording ranged_recording(const estimation::Estimate& estimate, std::string name,
                                  std::string serial);

@@ -45,7 +45,10 @@ struct EstimatedValue {
 struct Estimate {
   Method method = Method::map;
   bool converged = false;
-  std::string reason;                 ///< why not converged; empty when converged
+  std::string reason;  ///< why not converged; empty when converged
+  /// Not converged for the one reason that residuals are far below the stated noise: values are
+  /// sound, sigmas far too large.
+  bool noise_overstated = false;
   std::vector<std::string> warnings;  ///< what the user should know all the same
   sensors::Sensor sensor;             ///< the calibrated sensor with its covariance
   bool mirrored = false;
