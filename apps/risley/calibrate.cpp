@@ -164,6 +164,7 @@ void compare(const RangedRecording& recording, const PrismTrain& calibrated,
              ComparedBeams& beams) {
   const std::vector<std::size_t> rows = calibration::spread_rows(recording.shots.size(), most);
   std::vector<std::int64_t> times;
+  times.reserve(rows.size());
   for (const std::size_t row : rows) times.push_back(recording.time_ns[row]);
   std::sort(times.begin(), times.end());
   const recordings::TruthColumns truth = recordings::load_truth(
