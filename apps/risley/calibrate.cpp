@@ -62,6 +62,12 @@ std::vector<scenes::Station> stations_for(const CalibrateCommandOptions& options
   return stations;
 }
 
+/// What recordings and plans share.
+void check_numbers(const CalibrateCommandOptions& options) {
+  if (options.noise_range_m) check_positive(*options.noise_range_m, "--noise-range-m", "m");
+  check_not_negative(options.range_offset_sigma_m, "--range-offset-sigma-m", "m");
+}
+
 /// rad
 std::optional<double> prior_sigma(const CalibrateCommandOptions& options) {
   if (!options.prior_sigma_deg) return std::nullopt;
@@ -71,9 +77,9 @@ std::optional<double> prior_sigma(const CalibrateCommandOptions& options) {
 
 calibration::CalibrationOptions calibration_options(const CalibrateCommandOptions& options,
                                                     const CommonOptions& common) {
+  check_numbers(options);
   calibration::CalibrationOptions result;
   if (options.method == "paper") result.method = calibration::CalibrationMethod::paper;
-  if (options.noise_range_m) check_positive(*options.noise_range_m, "--noise-range-m", "m");
   result.range_noise = options.noise_range_m;
   if (options.method == "paper" &&
       (!options.planes.empty() || !options.stations.empty() || options.prior_sigma_deg)) {
@@ -82,7 +88,6 @@ calibration::CalibrationOptions calibration_options(const CalibrateCommandOption
         "has");
   }
   result.prior_sigma = prior_sigma(options);
-  check_not_negative(options.range_offset_sigma_m, "--range-offset-sigma-m", "m");
   result.range_offset_sigma = options.range_offset_sigma_m;
   result.beam_origin = options.beam_origin == "yes";
   if (!options.planes.empty()) result.planes = scenes::load_scene(options.planes);
@@ -298,6 +303,7 @@ ExitStatus run_calibration(const CalibrateCommandOptions& options, const CommonO
 
 ExitStatus run_plan(const CalibrateCommandOptions& options, const CommonOptions& common) {
   if (!options.inputs.empty()) throw InvalidArgument("--plan takes no recordings");
+  check_numbers(options);
   calibration::CalibrationPlan plan;
   plan.scene = scenes::load_scene(options.plan);
   EstimationWishes wishes{options.sensor, std::nullopt, options.fixed, options.freed};
@@ -309,10 +315,8 @@ ExitStatus run_plan(const CalibrateCommandOptions& options, const CommonOptions&
   check_positive(options.duration_s, "--duration-s", "s");
   plan.duration = options.duration_s;
   if (options.rate_hz != "full") plan.rate = positive_number(options.rate_hz, "--rate-hz", "Hz");
-  if (options.noise_range_m) check_positive(*options.noise_range_m, "--noise-range-m", "m");
   plan.range_noise = options.noise_range_m;
   plan.prior_sigma = prior_sigma(options);
-  check_not_negative(options.range_offset_sigma_m, "--range-offset-sigma-m", "m");
   plan.range_offset_sigma = options.range_offset_sigma_m;
   plan.beam_origin = options.beam_origin == "yes";
   const calibration::CalibrationForecast forecast = calibration::forecast(plan);

@@ -50,16 +50,6 @@ void update_range_variances(PlanarSolution& solution) {
   }
 }
 
-/// Information of the priors on the free parameters.
-Eigen::MatrixXd prior_information(const PlanarProblem& problem) {
-  Eigen::VectorXd information(static_cast<Index>(problem.prior_sigma.size()));
-  for (Index j = 0; j < information.size(); ++j) {
-    const double sigma = problem.prior_sigma[static_cast<std::size_t>(j)];
-    information[j] = 1.0 / (sigma * sigma);
-  }
-  return information.asDiagonal();
-}
-
 /// A smaller plane a few sigmas off a larger one is a step of it: two planes that nearly coincide
 /// could not share out their shots.
 void absorb_steps(const std::vector<Vector3<double>>& points, const SegmentationOptions& settings,
@@ -151,12 +141,7 @@ class Work {
       }
     }
     p.prior = p.train;
-    for (const estimation::FreeParameter& free : p.free) {
-      const bool angle = find_parameter(free.name, p.train.prisms()).unit == "deg";
-      p.prior_sigma.push_back(options_.prior_sigma && angle
-                                  ? *options_.prior_sigma
-                                  : std::numeric_limits<double>::infinity());
-    }
+    p.prior_sigma = prior_sigmas(p.free, p.train.prisms(), options_.prior_sigma);
     p.range_offset_sigma = options_.range_offset_sigma;
     p.considered = belief_.free;
     p.considered_covariance = belief_.covariance;
@@ -214,10 +199,7 @@ class Work {
                                     [](const Wall& wall) { return wall.normal_sigma >= 0; });
     const bool stations =
         problem_.stations_known && !options_.stations.empty() && recordings_.size() > 1;
-    result_.datum_kind = planes && stations ? DatumKind::both
-                         : planes           ? DatumKind::planes
-                         : stations         ? DatumKind::stations
-                                            : DatumKind::none;
+    result_.datum_kind = datum_kind(planes, stations);
     std::vector<std::size_t> first_view(recordings_.size(), 0);
     for (std::size_t i = 0; i < found.size(); ++i) {
       if (i == 0 || found[i].recording != found[i - 1].recording) {

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include <fmt/format.h>
 
@@ -18,8 +17,6 @@
 
 namespace risley::calibration {
 namespace {
-
-using Eigen::Index;
 
 constexpr std::size_t kSampleShots = 20000;  // of every recording
 constexpr double kUsefulIncidence = radians_from_degrees(30.0);
@@ -123,11 +120,7 @@ CalibrationForecast forecast(const CalibrationPlan& plan) {
   problem.train = problem.prior = sensor.train;
   if (plan.beam_origin) problem.geometry = sensor.prism_geometry();
   problem.free = calibration_parameters(sensor.prisms(), plan.fixed, plan.additional);
-  for (const auto& free : problem.free) {
-    const bool angle = find_parameter(free.name, sensor.prisms()).unit == "deg";
-    problem.prior_sigma.push_back(
-        plan.prior_sigma && angle ? *plan.prior_sigma : std::numeric_limits<double>::infinity());
-  }
+  problem.prior_sigma = prior_sigmas(problem.free, sensor.prisms(), plan.prior_sigma);
   problem.range_offset_sigma = plan.range_offset_sigma;
   // One shot of the sample stands for several: its variance is divided by their number.
   const double weight = plan.duration * rate / static_cast<double>(kSampleShots);
@@ -208,11 +201,7 @@ CalibrationForecast forecast(const CalibrationPlan& plan) {
     problem.views[i].wall = found[i].wall;
     problem.views[i].side = found[i].side;
   }
-  const bool both = tied && stations.size() > 1;
-  result.datum_kind = known_normals && both ? DatumKind::both
-                      : known_normals       ? DatumKind::planes
-                      : both                ? DatumKind::stations
-                                            : DatumKind::none;
+  result.datum_kind = datum_kind(known_normals, tied && stations.size() > 1);
 
   AdjustmentOptions options;
   options.most_iterations = 0;  // ranges are exact: the plan is its own solution
@@ -220,12 +209,8 @@ CalibrationForecast forecast(const CalibrationPlan& plan) {
   result.free = problem.free;
   result.covariance = solution.covariance;
   result.range_offset_sigma = solution.range_offset_sigma;
-  Eigen::MatrixXd information = solution.information;
-  for (Index j = 0; j < information.rows(); ++j) {
-    const double sigma = problem.prior_sigma[static_cast<std::size_t>(j)];
-    information(j, j) += 1.0 / (sigma * sigma);
-  }
-  result.unobservable = estimation::weak_directions(information, problem.free, kWidestDirection);
+  result.unobservable = estimation::weak_directions(
+      solution.information + prior_information(problem), problem.free, kWidestDirection);
   result.datum = formal_datum(problem.train, problem.free, result.covariance, bundle);
   result.advice = advice_for(result, plan);
   return result;

@@ -148,6 +148,11 @@ FormalDatum formal_datum(const PrismTrain& train,
   return datum;
 }
 
+DatumKind datum_kind(bool planes, bool stations) {
+  if (planes) return stations ? DatumKind::both : DatumKind::planes;
+  return stations ? DatumKind::stations : DatumKind::none;
+}
+
 const char* to_string(DatumKind kind) {
   switch (kind) {
     case DatumKind::none:

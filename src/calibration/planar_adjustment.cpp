@@ -398,6 +398,24 @@ std::pair<Vector3<double>, Vector3<double>> tangents_of(const Vector3<double>& n
   return {first, cross(normal, first)};
 }
 
+std::vector<double> prior_sigmas(const std::vector<estimation::FreeParameter>& free, int prisms,
+                                 std::optional<double> angle_sigma) {
+  std::vector<double> sigmas;
+  for (const estimation::FreeParameter& parameter : free) {
+    const bool angle = find_parameter(parameter.name, prisms).unit == "deg";
+    sigmas.push_back(angle && angle_sigma ? *angle_sigma : std::numeric_limits<double>::infinity());
+  }
+  return sigmas;
+}
+
+Eigen::MatrixXd prior_information(const PlanarProblem& problem) {
+  Eigen::VectorXd information = Eigen::VectorXd::Zero(static_cast<Index>(problem.free.size()));
+  for (std::size_t j = 0; j < problem.prior_sigma.size(); ++j) {
+    information[static_cast<Index>(j)] = 1.0 / (problem.prior_sigma[j] * problem.prior_sigma[j]);
+  }
+  return information.asDiagonal();
+}
+
 PlaneView plane_view(const PlanarProblem& problem, std::size_t view) {
   const WallView& seen = problem.views[view];
   const Wall& wall = problem.walls[seen.wall];
@@ -467,10 +485,7 @@ PlanarSolution adjust(PlanarProblem problem, const AdjustmentOptions& options,
 
   const Index free = at.free(), n = at.size();
   Eigen::MatrixXd hessian = system.hessian;
-  for (std::size_t j = 0; j < problem.prior_sigma.size(); ++j) {
-    const auto i = static_cast<Index>(j);
-    hessian(i, i) -= 1.0 / (problem.prior_sigma[j] * problem.prior_sigma[j]);
-  }
+  hessian.topLeftCorner(free, free) -= prior_information(problem);
   solution.information = eliminated(hessian, free);
   const ScaledSolver solver(system.hessian, kLeastDamping);
   Eigen::MatrixXd covariance =

@@ -50,6 +50,9 @@ enum class DatumKind {
   both,
 };
 
+/// @param planes, stations  whether such statements tie the frame
+DatumKind datum_kind(bool planes, bool stations);
+
 /// "walls only", "known planes", "known stations", "known planes and stations".
 const char* to_string(DatumKind kind);
 

@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -114,6 +115,15 @@ struct AdjustmentOptions {
 /// @throws EstimationError when a beam leaves all planes, or nothing is to be estimated
 PlanarSolution adjust(PlanarProblem problem, const AdjustmentOptions& options = {},
                       const Progress& progress = {});
+
+/// Prior sigmas of free parameters when every angle has the same [free], SI; infinite for others,
+/// and for all without one.
+/// @param angle_sigma  rad
+std::vector<double> prior_sigmas(const std::vector<estimation::FreeParameter>& free, int prisms,
+                                 std::optional<double> angle_sigma);
+
+/// Information of the priors on the free parameters [free, free].
+Eigen::MatrixXd prior_information(const PlanarProblem& problem);
 
 /// The view of a problem as plane_equations() wants it.
 PlaneView plane_view(const PlanarProblem& problem, std::size_t view);
