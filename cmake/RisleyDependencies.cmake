@@ -10,6 +10,10 @@ find_package(OpenSSL REQUIRED COMPONENTS Crypto)
 find_package(xsimd REQUIRED)
 find_package(PkgConfig REQUIRED)
 pkg_check_modules(NETCDF REQUIRED IMPORTED_TARGET GLOBAL netcdf)
+include(RisleyRosbag)
+find_package(SQLite3 REQUIRED)
+find_package(fastcdr REQUIRED)
+find_library(RISLEY_LASZIP_LIBRARY laszip) # optional: Debian 13 has it, Debian 12 does not
 find_path(RISLEY_RANDOM123_INCLUDE_DIR Random123/philox.h REQUIRED)
 find_file(RISLEY_CHART_JS chart.min.js
           PATHS /usr/share/javascript/chart.js /usr/share/nodejs/chart.js/dist REQUIRED)

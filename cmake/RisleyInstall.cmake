@@ -18,6 +18,7 @@ write_basic_package_version_file(${PROJECT_BINARY_DIR}/risleyConfigVersion.cmake
                                  COMPATIBILITY SameMinorVersion)
 install(FILES ${PROJECT_BINARY_DIR}/risleyConfig.cmake
               ${PROJECT_BINARY_DIR}/risleyConfigVersion.cmake
+              ${CMAKE_CURRENT_LIST_DIR}/RisleyRosbag.cmake
         DESTINATION ${package_dir})
 
 if(TARGET risley)

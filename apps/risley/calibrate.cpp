@@ -218,10 +218,6 @@ void write_folder(const CalibrateCommandOptions& options, const CommonOptions& c
   std::vector<std::pair<std::string, std::string>> provenance =
       provenance_of(common, options.inputs);
   provenance.emplace_back("datum", calibration::to_string(c.datum_kind));
-  if (c.range_offset_sigma > 0) {
-    provenance.emplace_back("range_offset_m", fmt::format("{}", c.range_offset));
-    provenance.emplace_back("range_offset_sigma_m", fmt::format("{}", c.range_offset_sigma));
-  }
   const auto path = [&](const char* name) { return (fs::path(options.folder) / name).string(); };
   if (c.converged) {
     sensors::Sensor calibrated = c.sensor;

@@ -79,6 +79,25 @@ void ProgressBar::show(double fraction) {
   std::fflush(stderr);
 }
 
+Failure current_failure() {
+  try {
+    throw;
+  } catch (const InvalidArgument& error) {
+    return {kWrongUsage, error.what(), {}};
+  } catch (const FileError& error) {
+    Json details = {{"file", error.path()}};
+    if (error.place().byte_offset) details["byte_offset"] = *error.place().byte_offset;
+    if (error.place().line) details["line"] = *error.place().line;
+    return {kBadFile, error.what(), details};
+  } catch (const EstimationError& error) {
+    return {kNumbersFailed, error.what(), {{"converged", false}, {"reason", error.what()}}};
+  } catch (const Interrupted& error) {
+    return {kInterrupted, error.what(), {}};
+  } catch (const std::exception& error) {  // out of memory, a bug: nothing the user did
+    return {kNumbersFailed, fmt::format("internal error: {}", error.what()), {}};
+  }
+}
+
 std::pair<std::string, double> split_assignment(const std::string& text) {
   const std::size_t equals = text.find('=');
   if (equals == std::string::npos || equals == 0) {

@@ -38,6 +38,16 @@ struct CommonOptions {
   std::string command;  ///< as typed, quoted for a shell
 };
 
+/// How an exception ends a command.
+struct Failure {
+  ExitStatus status = kNumbersFailed;
+  std::string message;
+  Json details;  ///< for --json, may be null
+};
+
+/// Of the exception that is being handled.
+Failure current_failure();
+
 /// Does the work of a verb and prints its result.
 using Run = std::function<ExitStatus(const CommonOptions&)>;
 
@@ -48,6 +58,7 @@ Run declare_simulate(CLI::App& verb);
 Run declare_estimate(CLI::App& verb);
 Run declare_observability(CLI::App& verb);
 Run declare_calibrate(CLI::App& verb);
+Run declare_cloud(CLI::App& verb);
 
 /// The user pressed Ctrl-C, or the system asked to end.
 class Interrupted : public std::runtime_error {

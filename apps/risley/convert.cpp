@@ -1,22 +1,27 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
+#include <algorithm>
 #include <memory>
 #include <optional>
+#include <vector>
 
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include "risley/core/error.hpp"
 #include "risley/recordings/reader.hpp"
 #include "risley/recordings/writer.hpp"
 
 #include "command.hpp"
+#include "many_files.hpp"
 #include "recording_text.hpp"
 
 namespace risley::app {
 namespace {
 
 struct ConvertOptions {
-  std::string input, output, format;
+  std::vector<std::string> inputs;
+  std::string output, format;
 };
 
 std::string known_endings() {
@@ -33,63 +38,88 @@ std::set<std::string> format_names() {
   return names;
 }
 
+/// Ending of a format's files in a folder.
+std::string ending_of(const std::string& format) {
+  for (const auto& known : recordings::writable_formats()) {
+    if (known.name == format) return known.ending;
+  }
+  throw InvalidArgument("several recordings need --format, because -o is a folder");
+}
+
+/// NetCDF's library is not thread-safe.
+bool may_run_together(const std::vector<FileJob>& jobs) {
+  return std::none_of(jobs.begin(), jobs.end(), [](const FileJob& job) {
+    return job.input.ends_with(".nc") || job.output.ends_with(".nc");
+  });
+}
+
+FileOutcome convert(const FileJob& job, const std::string& format, const Progress& progress) {
+  const auto reader = recordings::open_recording(job.input);
+  const auto writer = recordings::create_recording(job.output, reader->header(), format);
+  spdlog::debug("{} is {}", job.input, reader->header().format);
+  std::uint64_t observations = 0;
+  std::optional<FileError> damage;
+  recordings::Chunk chunk;
+  const auto read_next = [&] {
+    try {
+      return reader->read(chunk);
+    } catch (const FileError& error) {
+      damage = error;  // the sound part is worth keeping
+      return false;
+    }
+  };
+  while (read_next()) {
+    writer->write(chunk);
+    observations += chunk.observations.size();
+    report_progress(progress, reader->fraction_read());
+  }
+  writer->close();
+  log_warnings(reader->warnings());
+  const std::uint64_t written = observations - writer->left_out();
+  if (writer->left_out() > 0) {
+    spdlog::warn("{}: {} of {} observations have no place in this format and were left out",
+                 job.output, writer->left_out(), observations);
+  }
+  Json json = {{"observations", written},
+               {"left_out", writer->left_out()},
+               {"input_format", reader->header().format},
+               {"input", job.input},
+               {"output", job.output},
+               {"warnings", warnings_json(reader->warnings())}};
+  if (damage) {
+    spdlog::error("{}; the {} observations before it are saved in {}", damage->what(), written,
+                  job.output);
+    json.update(damage_json(*damage));
+  }
+  return {damage ? kBadFile : kDone, json,
+          fmt::format("{}: {} observations", job.output, grouped(written))};
+}
+
 }  // namespace
 
 Run declare_convert(CLI::App& verb) {
   const auto options = std::make_shared<ConvertOptions>();
-  verb.add_option("INPUT", options->input, "Recording, of any known format")->required();
-  verb.add_option("-o,--output", options->output,
-                  "Recording to write; its ending chooses the format:" + known_endings())
+  verb.add_option("INPUT", options->inputs,
+                  "Recordings, of any known format, or patterns such as '*.lvx'")
       ->required();
-  verb.add_option("--format", options->format, "Format to write, whatever the ending")
+  verb.add_option("-o,--output", options->output,
+                  "Recording to write, or a folder for several (made where it is missing); its "
+                  "ending chooses the format:" +
+                      known_endings())
+      ->required();
+  verb.add_option("--format", options->format,
+                  "Format to write, whatever the ending; needed for a folder")
       ->check(CLI::IsMember(format_names()));
   return [options](const CommonOptions& common) {
-    const auto reader = recordings::open_recording(options->input);
-    const auto writer =
-        recordings::create_recording(options->output, reader->header(), options->format);
-    spdlog::debug("{} is {}", options->input, reader->header().format);
-    std::uint64_t observations = 0;
-    std::optional<FileError> damage;
-    {
-      ProgressBar bar("converting", common);
-      recordings::Chunk chunk;
-      const auto read_next = [&] {
-        try {
-          return reader->read(chunk);
-        } catch (const FileError& error) {
-          damage = error;  // the sound part is worth keeping
-          return false;
-        }
-      };
-      while (read_next()) {
-        writer->write(chunk);
-        observations += chunk.observations.size();
-        bar.show(reader->fraction_read());
-      }
-    }
-    writer->close();
-    log_warnings(reader->warnings());
-    const std::uint64_t written = observations - writer->left_out();
-    if (writer->left_out() > 0) {
-      spdlog::warn("{} of {} observations have no place in this format and were left out",
-                   writer->left_out(), observations);
-    }
-    if (damage) {
-      spdlog::error("{}; the {} observations before it are saved in {}", damage->what(), written,
-                    options->output);
-    }
-    if (common.json) {
-      Json object = {{"observations", written},
-                     {"left_out", writer->left_out()},
-                     {"input_format", reader->header().format},
-                     {"output", options->output},
-                     {"warnings", warnings_json(reader->warnings())}};
-      if (damage) object.update(damage_json(*damage));
-      print_json(object);
-    } else {
-      fmt::print("{}: {} observations\n", options->output, grouped(written));
-    }
-    return damage ? kBadFile : kDone;
+    const bool folder = output_is_folder(options->inputs, options->output);
+    const std::vector<FileJob> jobs =
+        file_jobs(options->inputs, options->output, folder ? ending_of(options->format) : "");
+    return run_file_jobs(
+        jobs, may_run_together(jobs), "converting", "observations",
+        [&](const FileJob& job, const Progress& progress) {
+          return convert(job, options->format, progress);
+        },
+        common);
   };
 }
 

@@ -47,6 +47,10 @@ constexpr Verb kVerbs[] = {
      "  risley calibrate upright.lvx flipped.lvx --stations stations.yaml -o calibration/\n"
      "  risley calibrate --plan hall.yaml --duration-s 30",
      declare_calibrate},
+    {"cloud", "Points with their covariance from recordings and a calibration",
+     "  risley cloud recording.lvx --calibration calibration/calibration.yaml -o cloud.las\n"
+     "  risley cloud 'flight/*.lvx' --calibration mid-40 --format ply -o clouds/",
+     declare_cloud},
 };
 
 void add_common_options(CLI::App& verb, CommonOptions& common) {
@@ -95,20 +99,9 @@ ExitStatus fail(ExitStatus status, const std::string& message, bool json,
 ExitStatus run_verb(const Run& run, const CommonOptions& common) {
   try {
     return run(common);
-  } catch (const InvalidArgument& error) {
-    return fail(kWrongUsage, error.what(), common.json);
-  } catch (const FileError& error) {
-    Json details = {{"file", error.path()}};
-    if (error.place().byte_offset) details["byte_offset"] = *error.place().byte_offset;
-    if (error.place().line) details["line"] = *error.place().line;
-    return fail(kBadFile, error.what(), common.json, details);
-  } catch (const EstimationError& error) {
-    return fail(kNumbersFailed, error.what(), common.json,
-                {{"converged", false}, {"reason", error.what()}});
-  } catch (const Interrupted& error) {
-    return fail(kInterrupted, error.what(), common.json);
-  } catch (const std::exception& error) {  // out of memory, a bug: nothing the user did
-    return fail(kNumbersFailed, fmt::format("internal error: {}", error.what()), common.json);
+  } catch (...) {
+    const Failure failure = current_failure();
+    return fail(failure.status, failure.message, common.json, failure.details);
   }
 }
 

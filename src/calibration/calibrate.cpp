@@ -519,7 +519,20 @@ void Work::fill_sensor(const PlanarSolution& solution) {
     sensor.set_knowledge({result_.free[j].name, std::sqrt(result_.covariance(at, at)),
                           "calibrated on plane walls by risley calibrate"});
   }
+  sensor.reference = sensors::CalibrationReference::planes;
   sensor.covariance = result_.covariance;
+  sensor.range_offset = solution.problem.range_offset;
+  std::erase_if(sensor.knowledge,
+                [](const sensors::Knowledge& entry) { return entry.name == "range_offset_m"; });
+  if (!(result_.range_offset_sigma > 0)) return;
+  const Index n = result_.covariance.rows();
+  sensor.covariance_names.emplace_back("range_offset_m");
+  sensor.set_knowledge({"range_offset_m", result_.range_offset_sigma,
+                        "calibrated on plane walls by risley calibrate"});
+  sensor.covariance.conservativeResize(n + 1, n + 1);
+  sensor.covariance.col(n).head(n) = solution.range_offset_covariance * result_.variance_factor;
+  sensor.covariance.row(n).head(n) = sensor.covariance.col(n).head(n).transpose();
+  sensor.covariance(n, n) = result_.range_offset_sigma * result_.range_offset_sigma;
 }
 
 void Work::fill_result(const PlanarSolution& solution) {

@@ -525,6 +525,10 @@ PlanarSolution adjust(PlanarProblem problem, const AdjustmentOptions& options,
   solution.covariance = covariance.topLeftCorner(free, free);
   const auto sigma = [&](Index i) { return i < 0 ? 0.0 : std::sqrt(covariance(i, i)); };
   solution.range_offset_sigma = sigma(at.range_offset());
+  solution.range_offset_covariance = Eigen::VectorXd::Zero(free);
+  if (at.range_offset() >= 0) {
+    solution.range_offset_covariance = covariance.col(at.range_offset()).head(free);
+  }
   for (std::size_t v = 0; v < problem.views.size(); ++v) {
     solution.distance_sigma.push_back(sigma(at.distance(v)));
   }

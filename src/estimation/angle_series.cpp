@@ -130,7 +130,10 @@ void ShotSelector::add(const recordings::Observations& o) {
     if (first || (counts_.clock_resets == 0 && o.time_ns[i] - head_.time_ns.front() <= kHeadNs)) {
       append(head_, i);
     }
-    if (!options_.rate || ticks.take(o.time_ns[i])) append(series_, i);
+    if (!options_.rate || ticks.take(o.time_ns[i])) {
+      append(series_, i);
+      if (options_.rows) rows_.push_back(static_cast<std::size_t>(counts_.rows - 1));
+    }
   }
 }
 

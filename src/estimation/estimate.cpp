@@ -65,6 +65,7 @@ sensors::Sensor calibrated_sensor(const sensors::Sensor& nominal, const PrismTra
   sensors::Sensor sensor = nominal;
   sensor.train = train;
   sensor.combination = estimate.start.combination;
+  sensor.reference = sensors::CalibrationReference::directions;
   const auto statics = static_cast<Eigen::Index>(estimate.free.size());
   const Eigen::Index prisms = sensor.prisms();
   sensor.covariance_names.clear();

@@ -19,17 +19,23 @@ double RotorTrajectory::covariance_entry(std::size_t knot, std::size_t row,
   return covariance[knot * (d * (d + 1) / 2) + row * d - row * (row + 1) / 2 + column];
 }
 
-double RotorTrajectory::angle_covariance(std::size_t knot, std::size_t a, std::size_t b,
-                                         double seconds) const {
-  const double weight[] = {1.0, seconds, 0.5 * seconds * seconds};
-  double sum = 0;
+std::array<double, 5> RotorTrajectory::angle_covariance_terms(std::size_t knot, std::size_t a,
+                                                              std::size_t b) const {
+  constexpr double kWeight[] = {1.0, 1.0, 0.5};  // of time^0, time^1, time^2 in an angle
+  std::array<double, 5> terms{};
   for (std::size_t i = 0; i < kStatesPerRotor; ++i) {
     for (std::size_t j = 0; j < kStatesPerRotor; ++j) {
-      sum += weight[i] * weight[j] *
-             covariance_entry(knot, kStatesPerRotor * a + i, kStatesPerRotor * b + j);
+      terms[i + j] += kWeight[i] * kWeight[j] *
+                      covariance_entry(knot, kStatesPerRotor * a + i, kStatesPerRotor * b + j);
     }
   }
-  return sum;
+  return terms;
+}
+
+double RotorTrajectory::angle_covariance(std::size_t knot, std::size_t a, std::size_t b,
+                                         double seconds) const {
+  const std::array<double, 5> c = angle_covariance_terms(knot, a, b);
+  return c[0] + seconds * (c[1] + seconds * (c[2] + seconds * (c[3] + seconds * c[4])));
 }
 
 double RotorTrajectory::speed_variance(std::size_t knot, std::size_t rotor, double seconds) const {

@@ -41,6 +41,14 @@ void Observations::append(const Observations& other) {
       *this, other);
 }
 
+void Observations::drop_front(std::size_t rows) {
+  for_each_column(
+      [rows](auto& column) {
+        column.erase(column.begin(), column.begin() + static_cast<std::ptrdiff_t>(rows));
+      },
+      *this);
+}
+
 void Chunk::clear() {
   observations.clear();
   packets.clear();

@@ -86,11 +86,20 @@ struct Specification {
   const char* unit;
   double Sensor::*member;
   long double lower, upper;  ///< in the unit of the file
+  /// A preset without it has 0 there.
+  bool optional = false;
 };
 
 constexpr std::array kSpecifications{
     Specification{"noise", "angle_noise_deg", "deg", &Sensor::angle_noise, 0, 10},
     Specification{"noise", "range_noise_m", "m", &Sensor::range_noise, 0, 100},
+    Specification{"noise", "range_noise_per_range", "1", &Sensor::range_noise_per_range, 0, 1,
+                  true},
+    Specification{"noise", "range_noise_incidence_m", "m", &Sensor::range_noise_incidence, 0, 100,
+                  true},
+    Specification{"noise", "range_noise_weak_return_m", "m", &Sensor::range_noise_weak_return, 0,
+                  100, true},
+    Specification{"range", "range_offset_m", "m", &Sensor::range_offset, -100, 100, true},
     Specification{"resolution", "angle_resolution_deg", "deg", &Sensor::angle_resolution, 0, 10},
     Specification{"resolution", "range_resolution_m", "m", &Sensor::range_resolution, 0, 10},
     Specification{"limits", "range_minimum_m", "m", &Sensor::range_minimum, 0, 1e5},
@@ -112,6 +121,11 @@ std::vector<std::string_view> section_names() {
     if (names.empty() || names.back() != entry.section) names.emplace_back(entry.section);
   }
   return names;
+}
+
+/// The unit of a value that a covariance can name. @throws InvalidArgument for other names
+std::string_view unit_of(const std::string& name, int prisms) {
+  return name == "range_offset_m" ? "m" : std::string_view(find_parameter(name, prisms).unit);
 }
 
 /// A value of the file with its line.
@@ -197,6 +211,10 @@ void read_parameters(const YamlMap& map, Sensor& sensor) {
 
 void read_specifications(const YamlMap& root, Sensor& sensor) {
   for (const std::string_view section : section_names()) {
+    const bool optional =
+        std::all_of(kSpecifications.begin(), kSpecifications.end(),
+                    [&](const Specification& s) { return s.section != section || s.optional; });
+    if (optional && root.find(std::string(section)) == nullptr) continue;
     const YamlMap map(root.at(section).value, root.path(), std::string(section));
     for (const YamlMap::Entry& entry : map.entries()) {
       const bool known = std::any_of(
@@ -207,7 +225,7 @@ void read_specifications(const YamlMap& root, Sensor& sensor) {
       }
     }
     for (const Specification& s : kSpecifications) {
-      if (s.section != section) continue;
+      if (s.section != section || (s.optional && map.find(s.name) == nullptr)) continue;
       const Quantity quantity = read_quantity(map, s.name, s.unit, sensor);
       if (quantity.value < s.lower || quantity.value > s.upper) {
         fail_at(map.path(), quantity.line,
@@ -235,7 +253,7 @@ void read_covariance(const YamlMap& root, Sensor& sensor) {
   for (const auto& node : names.value) {
     const std::string name = yaml_text(node, map.path(), "covariance.names");
     try {
-      scale.push_back(scale_of(find_parameter(name, sensor.prisms()).unit));
+      scale.push_back(scale_of(unit_of(name, sensor.prisms())));
     } catch (const InvalidArgument& error) {
       fail_at(map.path(), yaml_line(node), fmt::format("covariance.names: {}", error.what()));
     }
@@ -362,7 +380,7 @@ std::string covariance_text(const Sensor& sensor) {
   }
   std::vector<long double> scale;
   for (const std::string& name : sensor.covariance_names) {
-    scale.push_back(scale_of(find_parameter(name, sensor.prisms()).unit));
+    scale.push_back(scale_of(unit_of(name, sensor.prisms())));
   }
   std::string text = "# Element [i][j] is in the unit of names[i] times the unit of names[j].\n";
   text += fmt::format("covariance:\n  names: [{}]\n  matrix:\n",
@@ -410,7 +428,8 @@ Sensor parse_preset(const std::string& text, const std::string& path) {
   root.integer("risley_preset", kSchemaVersion, kSchemaVersion);
   root.allow_only({"risley_preset", "name", "manufacturer", "model", "serial", "face_order",
                    "combination", "device_type", "parameters", "noise", "resolution", "limits",
-                   "rates", "beam", "geometry", "covariance", "provenance"});
+                   "range", "rates", "beam", "geometry", "calibrated_against", "covariance",
+                   "provenance"});
   Sensor sensor;
   sensor.name = root.text("name");
   sensor.manufacturer = root.text("manufacturer");
@@ -433,6 +452,17 @@ Sensor parse_preset(const std::string& text, const std::string& path) {
   sensor.device_type = root.integer("device_type", 0, 255);
   read_parameters(YamlMap(root.at("parameters").value, path, "parameters"), sensor);
   read_specifications(root, sensor);
+  if (root.find("calibrated_against") != nullptr) {
+    const std::string against = root.text("calibrated_against");
+    if (against == to_string(CalibrationReference::directions)) {
+      sensor.reference = CalibrationReference::directions;
+    } else if (against == to_string(CalibrationReference::planes)) {
+      sensor.reference = CalibrationReference::planes;
+    } else {
+      fail_at(path, root.at("calibrated_against").line,
+              fmt::format("calibrated_against = \"{}\", allowed directions, planes", against));
+    }
+  }
   if (root.find("covariance") != nullptr) read_covariance(root, sensor);
   if (root.find("provenance") != nullptr) {
     const YamlMap provenance(root.at("provenance").value, path, "provenance");
@@ -455,12 +485,18 @@ std::string preset_text(const Sensor& sensor) {
   text += fmt::format("device_type: {}\n", sensor.device_type);
   text += parameters_text(sensor);
   for (const std::string_view section : section_names()) {
-    text += fmt::format("{}:\n", section);
+    std::string fields;
     for (const Specification& s : kSpecifications) {
-      if (s.section == section) {
-        text += quantity_text(sensor, s.name, sensor.*s.member, s.unit, nullptr);
+      if (s.section != section) continue;
+      if (s.optional && sensor.*s.member == 0.0 && sensor.find_knowledge(s.name) == nullptr) {
+        continue;
       }
+      fields += quantity_text(sensor, s.name, sensor.*s.member, s.unit, nullptr);
     }
+    if (!fields.empty()) text += fmt::format("{}:\n{}", section, fields);
+  }
+  if (sensor.reference != CalibrationReference::none) {
+    text += fmt::format("calibrated_against: {}\n", to_string(sensor.reference));
   }
   if (!sensor.covariance_names.empty()) text += covariance_text(sensor);
   if (!sensor.provenance.empty()) {

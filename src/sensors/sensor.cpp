@@ -25,6 +25,25 @@ std::size_t rotor_of(const ParameterInfo& parameter) {
 
 }  // namespace
 
+std::string to_string(CalibrationReference reference) {
+  switch (reference) {
+    case CalibrationReference::none:
+      return "none";
+    case CalibrationReference::directions:
+      return "directions";
+    case CalibrationReference::planes:
+      return "planes";
+  }
+  return {};
+}
+
+double Sensor::range_variance(double range, double tan_incidence, double intensity) const {
+  const auto square = [](double x) { return x * x; };
+  return square(range_noise) + square(range_noise_per_range * range) +
+         square(range_noise_incidence * tan_incidence) +
+         square(range_noise_weak_return) / std::max(intensity, 1.0);
+}
+
 double Sensor::get(std::string_view parameter) const {
   const ParameterInfo& info = find_sensor_parameter(parameter, prisms());
   if (info.kind == ParameterKind::train) return train.get(parameter);

@@ -88,12 +88,13 @@ struct PlanarSolution {
   int iterations = 0;
   double cost = 0;  ///< shots and priors, at the minimum
   std::size_t shots = 0, lost = 0;
-  Eigen::VectorXd parameters;          ///< [free], SI
-  Eigen::MatrixXd covariance;          ///< [free, free], common errors of the angles included
-  Eigen::MatrixXd noise_covariance;    ///< [free, free], of the ranges' noise and the priors alone
-  double range_offset_sigma = 0;       ///< m
-  std::vector<double> distance_sigma;  ///< [views], m
-  std::vector<double> normal_sigma;    ///< [walls], of the two angles together, rad
+  Eigen::VectorXd parameters;        ///< [free], SI
+  Eigen::MatrixXd covariance;        ///< [free, free], common errors of the angles included
+  Eigen::MatrixXd noise_covariance;  ///< [free, free], of the ranges' noise and the priors alone
+  double range_offset_sigma = 0;     ///< m
+  Eigen::VectorXd range_offset_covariance;  ///< with the parameters [free], SI; 0 where it is held
+  std::vector<double> distance_sigma;       ///< [views], m
+  std::vector<double> normal_sigma;         ///< [walls], of the two angles together, rad
   /// What data, stations and known walls say of the free parameters, everything else eliminated and
   /// without the priors of the parameters themselves [free, free].
   Eigen::MatrixXd information;

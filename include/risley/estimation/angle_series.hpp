@@ -61,6 +61,7 @@ struct SelectionOptions {
   /// Take at most so many shots per second, evenly spread; empty takes all.
   std::optional<double> rate;
   bool ranges = false;  ///< keep the ranges too
+  bool rows = false;    ///< remember which observation each shot was
 };
 
 /// What was seen while choosing.
@@ -91,11 +92,15 @@ class ShotSelector {
   /// All shots of the first second, not thinned: the start of an estimation wants every one.
   const AngleSeries& head() const { return head_; }
   const SelectionCounts& counts() const { return counts_; }
+  /// Number of each chosen shot's observation, counted over all that were offered; empty unless
+  /// asked for.
+  const std::vector<std::size_t>& rows() const { return rows_; }
 
  private:
   SelectionOptions options_;
   AngleSeries series_, head_;
   SelectionCounts counts_;
+  std::vector<std::size_t> rows_;
   std::int64_t last_time_ns_ = 0;
   std::int64_t tick_origin_ = 0, next_tick_ = 0;
 };

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -53,6 +54,10 @@ struct RotorTrajectory {
     const auto s = state_of(knot).subspan(kStatesPerRotor * rotor);
     return s[1] + seconds * s[2];
   }
+  /// Covariance of the angles of two rotors as a polynomial in the seconds from a knot: rad^2 times
+  /// s^0, s^-1, ... s^-4.
+  std::array<double, 5> angle_covariance_terms(std::size_t knot, std::size_t a,
+                                               std::size_t b) const;
   /// Covariance of the angles of two rotors, rad^2, and variance of the speed of one, (rad/s)^2.
   double angle_covariance(std::size_t knot, std::size_t a, std::size_t b, double seconds) const;
   double speed_variance(std::size_t knot, std::size_t rotor, double seconds) const;

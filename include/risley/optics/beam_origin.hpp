@@ -25,20 +25,103 @@ struct PrismGeometry {
 std::vector<double> face_positions(const std::vector<FaceOrder>& face_order,
                                    const PrismGeometry& geometry);
 
-/// The point where the beam leaves the last face, m, sensor frame. The incident beam meets the
-/// first face on the axis; every further point is where the beam meets the next face. A face is
-/// taken to cross the axis at the same point whatever its tilt.                            [B21
-/// App. A]
+/// Where the beam crosses every face.
+template <ModelScalar T, int N>
+struct BeamPath {
+  std::array<Vector3<T>, 2 * N> point;  ///< m, sensor frame
+  std::array<T, 2 * N> length;          ///< from the face before, m; that of the first face is 0
+
+  /// The point where the beam leaves the last face, m, sensor frame.
+  const Vector3<T>& origin() const { return point[2 * N - 1]; }
+};
+
+/// The incident beam meets the first face on the axis; every further point is where the beam meets
+/// the next face. A face is taken to cross the axis at the same point whatever its tilt.
+/// [B21 App. A]
 /// @param face_position  as face_positions() gives them
 template <ModelScalar T, int N>
-Vector3<T> beam_origin(const Trace<T, N>& trace, const std::array<T, 2 * N>& face_position) {
-  Vector3<T> point{face_position[0], T(0.0), T(0.0)};
+BeamPath<T, N> beam_path(const Trace<T, N>& trace, const std::array<T, 2 * N>& face_position) {
+  BeamPath<T, N> path;
+  path.point[0] = {face_position[0], T(0.0), T(0.0)};
+  path.length[0] = T(0.0);
   for (std::size_t i = 1; i < 2 * N; ++i) {
-    const Vector3<T> to_face{face_position[i] - point.x, -point.y, -point.z};
-    const T length = dot(trace.normal[i], to_face) / trace.refraction[i].cosine_in;
-    point += length * trace.incident[i];
+    const Vector3<T>& before = path.point[i - 1];
+    const Vector3<T> to_face{face_position[i] - before.x, -before.y, -before.z};
+    path.length[i] = dot(trace.normal[i], to_face) / trace.refraction[i].cosine_in;
+    path.point[i] = before + path.length[i] * trace.incident[i];
   }
-  return point;
+  return path;
+}
+
+/// The point where the beam leaves the last face, m, sensor frame: see beam_path().
+template <ModelScalar T, int N>
+Vector3<T> beam_origin(const Trace<T, N>& trace, const std::array<T, 2 * N>& face_position) {
+  return beam_path(trace, face_position).origin();
+}
+
+/// What a result that depends on the beam's origin adds to the derivatives at the faces.
+template <ModelScalar T, int N>
+struct BeamPathAdjoint {
+  std::array<Vector3<T>, 2 * N> incident, normal;  ///< d result / d beam and normal of each face
+  std::array<T, 2 * N> face_position;              ///< d result / d position of each face
+};
+
+/// Reverse pass of beam_path().                            Derivation: docs/theory/derivatives.md
+/// @param origin_bar  d result / d origin
+template <ModelScalar T, int N>
+BeamPathAdjoint<T, N> beam_path_adjoint(const Trace<T, N>& trace, const BeamPath<T, N>& path,
+                                        const std::array<T, 2 * N>& face_position,
+                                        Vector3<T> origin_bar) {
+  BeamPathAdjoint<T, N> out;
+  const Vector3<T> zero{T(0.0), T(0.0), T(0.0)};
+  out.incident[0] = out.normal[0] = zero;
+  for (std::size_t i = 2 * N - 1; i > 0; --i) {
+    const Vector3<T>& before = path.point[i - 1];
+    const Vector3<T>& beam = trace.incident[i];
+    const Vector3<T>& normal = trace.normal[i];
+    const Vector3<T> to_face{face_position[i] - before.x, -before.y, -before.z};
+    // length = normal . to_face / normal . beam
+    const T numerator_bar = dot(origin_bar, beam) / trace.refraction[i].cosine_in;
+    const T cosine_bar = -(numerator_bar * path.length[i]);
+    out.incident[i] = path.length[i] * origin_bar + cosine_bar * normal;
+    out.normal[i] = numerator_bar * to_face + cosine_bar * beam;
+    out.face_position[i] = numerator_bar * normal.x;
+    origin_bar = origin_bar - numerator_bar * normal;
+  }
+  out.face_position[0] = origin_bar.x;
+  return out;
+}
+
+/// A point at some range along the beam and how two of its components depend on everything: those
+/// along two vectors across the beam. Its third component moves by less than a hundredth of a
+/// degree's worth of the beam's origin and is left out.
+template <ModelScalar T, int N>
+struct PointLinearisation {
+  std::array<Gradient<T, N>, 2> across;
+  std::array<std::array<T, 2 * N>, 2> face_position;  ///< d component / d position of each face
+};
+
+/// @param across  two vectors [3], perpendicular to the beam and to each other
+/// @param range   from the origin, m
+template <ModelScalar T, int N>
+PointLinearisation<T, N> linearise_point(const PreparedTrain<T, N>& train,
+                                         const PreparedDerivatives<T, N>& derivatives,
+                                         const Trace<T, N>& trace, const BeamPath<T, N>& path,
+                                         const std::array<T, 2 * N>& face_position,
+                                         const std::array<Vector3<T>, 2>& across, const T& range) {
+  std::array<BeamPathAdjoint<T, N>, 2> paths;
+  for (std::size_t r = 0; r < 2; ++r) {
+    paths[r] = beam_path_adjoint(trace, path, face_position, across[r]);
+  }
+  PointLinearisation<T, N> out;
+  out.across = trace_adjoint(
+      train, derivatives, trace, std::array<Vector3<T>, 2>{range * across[0], range * across[1]},
+      [&paths](std::size_t face, std::size_t r, Vector3<T>& beam, Vector3<T>& normal) {
+        beam = beam + paths[r].incident[face];
+        normal = normal + paths[r].normal[face];
+      });
+  for (std::size_t r = 0; r < 2; ++r) out.face_position[r] = paths[r].face_position;
+  return out;
 }
 
 /// A beam as a line in space.

@@ -118,14 +118,23 @@ Trace<T, N> trace_forward(const PreparedTrain<T, N>& train,
   return out;
 }
 
+/// For results that depend on the beam behind the last face alone.
+struct NothingAtFaces {
+  template <class Vector>
+  void operator()(std::size_t, std::size_t, Vector&, Vector&) const {}
+};
+
 /// Reverse pass: the gradients of some scalar results from their derivatives with respect to the
 /// emergent direction, all at once because they share how the faces move.
-/// @param seeds  d result / d direction [results][3]
-template <ModelScalar T, int N, std::size_t Results>
+/// @param seeds    d result / d direction [results][3]
+/// @param at_face  called as (face, result, beam, normal): adds to d result / d incident beam of
+///                 the face and d result / d its normal what does not come through the refraction
+template <ModelScalar T, int N, std::size_t Results, class AtFace = NothingAtFaces>
 std::array<Gradient<T, N>, Results> trace_adjoint(const PreparedTrain<T, N>& train,
                                                   const PreparedDerivatives<T, N>& d,
                                                   const Trace<T, N>& forward,
-                                                  const std::array<Vector3<T>, Results>& seeds) {
+                                                  const std::array<Vector3<T>, Results>& seeds,
+                                                  const AtFace& at_face = {}) {
   std::array<Gradient<T, N>, Results> gradients;
   std::array<Vector3<T>, Results> beams = seeds;
   std::array<T, Results> air_bar;
@@ -165,6 +174,7 @@ std::array<Gradient<T, N>, Results> trace_adjoint(const PreparedTrain<T, N>& tra
         const T ratio_bar =
             refract_adjoint(forward.refraction[i], forward.incident[i], forward.normal[i],
                             train.faces[i].index_ratio, beams[r], normal_bar);
+        at_face(i, r, beams[r], normal_bar);
         gradient.rotation_angles[k] = gradient.rotation_angles[k] + dot(normal_bar, turning);
         const T vertical = dot(normal_bar, tilt_vertical);
         add(place::prism_tilt_horizontal(prism), dot(normal_bar, tilt_horizontal));

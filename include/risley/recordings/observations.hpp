@@ -36,6 +36,8 @@ struct Observations {
   void clear();
   void resize(std::size_t rows);
   void append(const Observations& other);
+  /// Removes rows from the beginning.
+  void drop_front(std::size_t rows);
 };
 
 /// Header of one sensor data packet as it was recorded, kept so that a packet format can be

@@ -25,6 +25,15 @@ struct Knowledge {
 /// Which nominal direction of rotation the rotors run in.            [B21 section 2.4]
 enum class SpeedCombination : int { first = 1, second = 2 };
 
+/// What a calibration holds a sensor's parameters against.
+enum class CalibrationReference {
+  none,        ///< a type or an assumption, no calibration
+  directions,  ///< the directions that the sensor reports: its own calibration is taken as true
+  planes,      ///< plane walls: where the beam truly goes
+};
+
+std::string to_string(CalibrationReference reference);
+
 /// A named instrument: its optics, its rotors, its noise and its limits. SI units.
 struct Sensor {
   std::string name;          ///< "mid-40"
@@ -38,19 +47,25 @@ struct Sensor {
   std::optional<SpeedCombination> combination;
   std::vector<Knowledge> knowledge;  ///< of parameters, speeds and the numbers below, any order
 
-  /// Joint covariance of named values, SI units; empty for presets that are no calibration.
+  CalibrationReference reference = CalibrationReference::none;
+  /// Joint covariance of named values, SI units; empty for presets that are no calibration. The
+  /// names are those of parameter_list() and range_offset_m.
   std::vector<std::string> covariance_names;
   Eigen::MatrixXd covariance;  ///< [names, names]
 
-  double angle_noise = 0;       ///< 1 sigma of azimuth and zenith before rounding, rad
-  double range_noise = 0;       ///< 1 sigma, m
-  double angle_resolution = 0;  ///< rounding step of reported angles, rad
-  double range_resolution = 0;  ///< rounding step of reported ranges, m
-  double range_minimum = 0;     ///< no return below, m
-  double range_maximum = 0;     ///< no return beyond, m
-  double field_of_view = 0;     ///< full cone, rad
-  double shot_rate = 0;         ///< shots per second
-  int device_type = 1;          ///< Livox device type of recordings
+  double angle_noise = 0;              ///< 1 sigma of azimuth and zenith before rounding, rad
+  double range_noise = 0;              ///< 1 sigma, m; see range_variance() for what comes on top
+  double range_noise_per_range = 0;    ///< part that grows with the range, m per m
+  double range_noise_incidence = 0;    ///< part that grows with tan(angle of incidence), m
+  double range_noise_weak_return = 0;  ///< part at intensity 1; falls with the root of it, m
+  double range_offset = 0;             ///< what the sensor adds to a true range, m
+  double angle_resolution = 0;         ///< rounding step of reported angles, rad
+  double range_resolution = 0;         ///< rounding step of reported ranges, m
+  double range_minimum = 0;            ///< no return below, m
+  double range_maximum = 0;            ///< no return beyond, m
+  double field_of_view = 0;            ///< full cone, rad
+  double shot_rate = 0;                ///< shots per second
+  int device_type = 1;                 ///< Livox device type of recordings
   double beam_divergence_horizontal = 0, beam_divergence_vertical = 0;  ///< full angle, rad
   double prism_thickness = 0;  ///< on the axis, m                        [B21 App. A]
   double prism_spacing = 0;    ///< between perpendicular faces, m        [B21 App. A]
@@ -60,6 +75,13 @@ struct Sensor {
   std::vector<std::pair<std::string, std::string>> provenance;
 
   int prisms() const { return train.prisms(); }
+  /// Variance of one range by its parts, which are independent of each other; rounding not
+  /// included.
+  /// @param range          m
+  /// @param tan_incidence  of the angle between beam and surface normal; 0 where it is not known
+  /// @param intensity      as the sensor reports it; 0 counts as 1
+  double range_variance(double range, double tan_incidence, double intensity) const;
+
   PrismGeometry prism_geometry() const { return {prism_thickness, prism_spacing}; }
 
   /// Value of a train parameter or angular velocity, SI units. @throws InvalidArgument

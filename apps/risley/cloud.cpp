@@ -1,0 +1,192 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include <algorithm>
+#include <filesystem>
+#include <memory>
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include "risley/cloud/make_cloud.hpp"
+#include "risley/core/angle.hpp"
+#include "risley/core/output_file.hpp"
+#include "risley/sensors/preset.hpp"
+
+#include "command.hpp"
+#include "many_files.hpp"
+#include "recording_text.hpp"
+#include "result_folder.hpp"
+
+namespace risley::app {
+namespace {
+
+struct CloudCommandOptions {
+  std::vector<std::string> inputs;
+  std::string output, calibration, format;
+  std::string directions = "smoothed", beam_origin = "yes", beam_divergence = "yes",
+              covariance = "yes", common_factors = "no", time = "gps";
+  std::string rate_hz = fmt::format("{:.0f}", cloud::kTrackingRate);
+  std::optional<double> noise_angle_deg;
+  double las_scale_m = cloud::CloudWriterOptions{}.las_scale;
+};
+
+std::string known_endings() {
+  std::string text;
+  for (const cloud::CloudFormat& format : cloud::cloud_formats()) {
+    text += fmt::format("\n  {:<8} {} ({})", format.ending, format.description, format.name);
+  }
+  return text;
+}
+
+std::set<std::string> format_names() {
+  std::set<std::string> names;
+  for (const auto& format : cloud::cloud_formats()) names.insert(format.name);
+  return names;
+}
+
+cloud::CloudOptions cloud_options(const CloudCommandOptions& options) {
+  cloud::CloudOptions result;
+  result.pointing.reported_directions = options.directions == "reported";
+  result.pointing.beam_origin = options.beam_origin == "yes";
+  result.pointing.beam_divergence = options.beam_divergence == "yes";
+  result.pointing.covariance = options.covariance == "yes";
+  result.loadings = options.common_factors == "yes";
+  if (result.loadings && !result.pointing.covariance) {
+    throw InvalidArgument("--common-factors yes and --covariance no do not go together");
+  }
+  result.rate.reset();
+  if (options.rate_hz != "full") {
+    result.rate = positive_number(options.rate_hz, "--rate-hz", "Hz");
+  }
+  if (options.noise_angle_deg) {
+    check_positive(*options.noise_angle_deg, "--noise-angle-deg", "deg");
+    result.angle_noise = radians_from_degrees(*options.noise_angle_deg);
+  }
+  check_positive(options.las_scale_m, "--las-scale-m", "m");
+  result.writer.format = options.format;
+  result.writer.las_scale = options.las_scale_m;
+  result.writer.gps_time = options.time == "gps";
+  return result;
+}
+
+Json summary_json(const FileJob& job, const cloud::CloudSummary& s) {
+  std::vector<std::string> warnings = s.warnings;
+  for (std::string& text : warning_texts(s.read_warnings)) warnings.push_back(std::move(text));
+  Json json = {
+      {"points", s.points},
+      {"format", s.format},
+      {"input", job.input},
+      {"output", job.output},
+      {"observations", s.observations},
+      {"no_return", s.no_return},
+      {"outliers", s.outliers},
+      {"without_rotation_angle", s.without_rotation_angle},
+      {"mirrored", s.mirrored},
+      {"residuals",
+       {{"azimuth_deg", {{"rms", degrees_from_radians(s.azimuth_residual_rms)}}},
+        {"zenith_deg", {{"rms", degrees_from_radians(s.zenith_residual_rms)}}}}},
+      {"repointing_deg", {{"rms", degrees_from_radians(s.repointing_rms)}}},
+      {"common_factors", s.factors},
+      {"warnings", warnings},
+  };
+  if (s.damage) json.update(damage_json(*s.damage));
+  return json;
+}
+
+FileOutcome make_one(const FileJob& job, const CloudCommandOptions& options,
+                     const sensors::Sensor& calibration, const CommonOptions& common,
+                     const Progress& progress) {
+  cloud::CloudOptions settings = cloud_options(options);
+  settings.provenance = provenance_of(common, {job.input});
+  settings.provenance.emplace_back("calibration", options.calibration);
+  if (std::filesystem::exists(options.calibration)) {
+    settings.provenance.emplace_back("calibration_sha256", sha256_of_file(options.calibration));
+  }
+  const auto reader = recordings::open_recording(job.input);
+  const cloud::CloudSummary s =
+      cloud::make_cloud(*reader, calibration, job.output, settings, progress);
+  log_warnings(s.read_warnings);
+  for (const std::string& warning : s.warnings) spdlog::warn("{}: {}", job.input, warning);
+  if (s.damage) {
+    spdlog::error("{}; the {} points before it are saved in {}", s.damage->what(), s.points,
+                  job.output);
+  }
+  std::string text = fmt::format("{}: {} points", job.output, grouped(s.points));
+  if (s.no_return > 0) text += fmt::format(", {} shots without return", grouped(s.no_return));
+  if (s.outliers > 0) text += fmt::format(", {} outliers left out", grouped(s.outliers));
+  if (s.without_rotation_angle > 0) {
+    text += fmt::format(", {} without rotation angles", grouped(s.without_rotation_angle));
+  }
+  return {s.damage ? kBadFile : kDone, summary_json(job, s), text};
+}
+
+}  // namespace
+
+Run declare_cloud(CLI::App& verb) {
+  const auto options = std::make_shared<CloudCommandOptions>();
+  CloudCommandOptions& o = *options;
+  const auto yes_no = [&verb](const char* name, std::string& value, const char* description) {
+    verb.add_option(name, value, description)
+        ->check(CLI::IsMember({"yes", "no"}))
+        ->capture_default_str();
+  };
+  verb.add_option("INPUT", o.inputs, "Recordings with ranges, or patterns such as '*.lvx'")
+      ->required();
+  verb.add_option("--calibration", o.calibration,
+                  "calibration.yaml of estimate or calibrate, or a preset by name")
+      ->required();
+  verb.add_option("-o,--output", o.output,
+                  "Cloud to write, or a folder for several (made where it is missing); its ending "
+                  "chooses the format:" +
+                      known_endings())
+      ->required();
+  verb.add_option("--format", o.format,
+                  "Format to write, whatever the ending; in a folder las-1.4 unless said otherwise")
+      ->check(CLI::IsMember(format_names()));
+  verb.add_option("--directions", o.directions,
+                  "smoothed: where the calibration sends the beam at the smoothed rotation angles; "
+                  "reported: where the sensor says")
+      ->check(CLI::IsMember({"smoothed", "reported"}))
+      ->capture_default_str();
+  yes_no("--beam-origin", o.beam_origin,
+         "Start beams where they leave the last prism; 'no': at the sensor's origin");
+  yes_no("--covariance", o.covariance, "Give every point its covariance");
+  yes_no("--beam-divergence", o.beam_divergence, "Count the footprint's size in the covariance");
+  yes_no("--common-factors", o.common_factors,
+         "Give every point the loadings of the errors that all points share, for covariances "
+         "between points");
+  verb.add_option("--rate-hz", o.rate_hz,
+                  "Directions per second that rotation angles are found from; 'full' for all")
+      ->capture_default_str();
+  verb.add_option("--noise-angle-deg", o.noise_angle_deg,
+                  "1 sigma of azimuth and zenith before rounding (default: the calibration's)");
+  verb.add_option("--las-scale-m", o.las_scale_m, "LAS stores coordinates as multiples of this")
+      ->capture_default_str();
+  verb.add_option("--time", o.time,
+                  "LAS: gps for GPS time where the recording's clock is UTC; recording for the "
+                  "clock as it is")
+      ->check(CLI::IsMember({"gps", "recording"}))
+      ->capture_default_str();
+  return [options](const CommonOptions& common) {
+    cloud_options(*options);  // what is wrong with them is wrong with every file
+    const sensors::Sensor calibration = sensors::load_sensor(options->calibration);
+    std::string ending;
+    if (output_is_folder(options->inputs, options->output)) {
+      if (options->format.empty()) options->format = cloud::cloud_formats().front().name;
+      ending = cloud::find_cloud_format("", options->format).ending;
+    }
+    const std::vector<FileJob> jobs = file_jobs(options->inputs, options->output, ending);
+    // NetCDF's library is not thread-safe.
+    const bool parallel = std::none_of(jobs.begin(), jobs.end(), [](const FileJob& job) {
+      return job.input.ends_with(".nc") || job.output.ends_with(".nc");
+    });
+    return run_file_jobs(
+        jobs, parallel, "making points", "points",
+        [&](const FileJob& job, const Progress& progress) {
+          return make_one(job, *options, calibration, common, progress);
+        },
+        common);
+  };
+}
+
+}  // namespace risley::app

@@ -1,0 +1,165 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "many_files.hpp"
+
+#include <algorithm>
+#include <atomic>
+#include <filesystem>
+#include <mutex>
+#include <numeric>
+
+#include <fmt/format.h>
+#include <glob.h>
+#include <spdlog/spdlog.h>
+#include <tbb/parallel_for.h>
+
+#include "risley/core/error.hpp"
+
+#include "recording_text.hpp"
+#include "result_folder.hpp"
+
+namespace risley::app {
+namespace {
+
+namespace fs = std::filesystem;
+
+bool is_pattern(const std::string& name) {
+  std::error_code ignored;
+  return name.find_first_of("*?[") != std::string::npos && !fs::exists(name, ignored);
+}
+
+std::vector<std::string> files_of(const std::string& pattern) {
+  glob_t found{};
+  std::vector<std::string> names;
+  if (::glob(pattern.c_str(), GLOB_MARK, nullptr, &found) == 0) {
+    for (std::size_t i = 0; i < found.gl_pathc; ++i) {
+      const std::string name = found.gl_pathv[i];
+      if (!name.ends_with('/')) names.push_back(name);
+    }
+  }
+  ::globfree(&found);
+  if (names.empty()) throw InvalidArgument(fmt::format("{}: no file has such a name", pattern));
+  return names;
+}
+
+/// The progress of all jobs together.
+class SharedProgress {
+ public:
+  SharedProgress(std::size_t jobs, Progress shown) : fraction_(jobs), shown_(std::move(shown)) {}
+
+  Progress of(std::size_t job) {
+    return [this, job](double fraction) {
+      const std::scoped_lock lock(mutex_);
+      fraction_[job] = fraction;
+      report_progress(shown_, std::accumulate(fraction_.begin(), fraction_.end(), 0.0) /
+                                  static_cast<double>(fraction_.size()));
+    };
+  }
+
+ private:
+  std::mutex mutex_;
+  std::vector<double> fraction_;
+  Progress shown_;
+};
+
+FileOutcome failed(const FileJob& job, const Failure& failure) {
+  Json json = {{"input", job.input},
+               {"error", failure.message},
+               {"exit_status", static_cast<int>(failure.status)}};
+  if (failure.details.is_object()) json.update(failure.details);
+  return {failure.status, json, fmt::format("{}: failed: {}", job.input, failure.message)};
+}
+
+}  // namespace
+
+bool output_is_folder(const std::vector<std::string>& inputs, const std::string& output) {
+  std::error_code ignored;
+  return inputs.size() > 1 || output.ends_with('/') || fs::is_directory(output, ignored) ||
+         std::any_of(inputs.begin(), inputs.end(), is_pattern);
+}
+
+std::vector<FileJob> file_jobs(const std::vector<std::string>& inputs, const std::string& output,
+                               const std::string& ending) {
+  if (!output_is_folder(inputs, output)) return {{inputs.front(), output}};
+  make_result_folder(output);
+  std::vector<FileJob> jobs;
+  for (const std::string& input : inputs) {
+    for (const std::string& name : is_pattern(input) ? files_of(input) : std::vector{input}) {
+      const fs::path made = fs::path(output) / (fs::path(name).stem().string() + ending);
+      for (const FileJob& other : jobs) {
+        if (other.output == made.string()) {
+          throw InvalidArgument(fmt::format("{} and {} would both be written to {}", other.input,
+                                            name, made.string()));
+        }
+      }
+      std::error_code ignored;
+      if (fs::equivalent(name, made, ignored)) {
+        throw InvalidArgument(fmt::format("{} would be overwritten by itself", name));
+      }
+      jobs.push_back({name, made.string()});
+    }
+  }
+  return jobs;
+}
+
+ExitStatus run_file_jobs(const std::vector<FileJob>& jobs, bool parallel, const std::string& label,
+                         const char* counted,
+                         const std::function<FileOutcome(const FileJob&, const Progress&)>& work,
+                         const CommonOptions& common) {
+  if (jobs.size() == 1) {
+    FileOutcome outcome;
+    {
+      ProgressBar bar(label, common);
+      outcome = work(jobs.front(), bar.callback());
+    }
+    common.json ? print_json(outcome.json) : fmt::print("{}\n", outcome.text);
+    return outcome.status;
+  }
+  std::vector<FileOutcome> outcomes(jobs.size());
+  {
+    ProgressBar bar(label, common);
+    SharedProgress progress(jobs.size(), bar.callback());
+    const auto run_one = [&](std::size_t i) {
+      try {
+        outcomes[i] = work(jobs[i], progress.of(i));
+      } catch (const Interrupted&) {
+        throw;
+      } catch (...) {
+        outcomes[i] = failed(jobs[i], current_failure());
+      }
+    };
+    if (parallel) {
+      tbb::parallel_for(std::size_t{0}, jobs.size(), run_one, tbb::simple_partitioner());
+    } else {
+      for (std::size_t i = 0; i < jobs.size(); ++i) run_one(i);
+    }
+  }
+  ExitStatus status = kDone;
+  std::size_t sound = 0;
+  std::uint64_t total = 0;
+  Json files = Json::array();
+  for (const FileOutcome& outcome : outcomes) {
+    if (outcome.status == kDone) {
+      ++sound;
+    } else if (status == kDone) {
+      status = outcome.status;
+    }
+    total += outcome.json.value(counted, std::uint64_t{0});
+    files.push_back(outcome.json);
+  }
+  if (common.json) {
+    print_json({{counted, total},
+                {"files_done", sound},
+                {"files_failed", jobs.size() - sound},
+                {"files", files}});
+  } else {
+    for (const FileOutcome& outcome : outcomes) fmt::print("{}\n", outcome.text);
+    fmt::print("{} of {} files done, {} {} in all\n", sound, jobs.size(), grouped(total), counted);
+  }
+  for (const FileOutcome& outcome : outcomes) {
+    if (outcome.status != kDone) spdlog::error(outcome.text);
+  }
+  return status;
+}
+
+}  // namespace risley::app

@@ -1,0 +1,63 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "risley/cloud/cloud_writer.hpp"
+#include "risley/cloud/pointing.hpp"
+#include "risley/cloud/rotor_tracking.hpp"
+#include "risley/core/error.hpp"
+#include "risley/core/progress.hpp"
+#include "risley/recordings/reader.hpp"
+
+namespace risley::cloud {
+
+/// Directions per second that rotation angles are found from unless the caller asks otherwise: the
+/// angles are then known to about 0.001 degree, the beam to 0.0002.
+inline constexpr double kTrackingRate = 10000.0;
+
+/// What the user asks for.
+struct CloudOptions {
+  PointingOptions pointing;
+  std::optional<double> rate = kTrackingRate;  ///< of RotorTracker; empty: all directions
+  std::optional<double> angle_noise;           ///< rad; empty: the calibration's
+  bool loadings = false;                       ///< points carry the loadings of the common factors
+  CloudWriterOptions writer;
+  std::vector<std::pair<std::string, std::string>> provenance;
+};
+
+/// What came of it. Every observation is in exactly one of the counts.
+struct CloudSummary {
+  std::uint64_t observations = 0;
+  std::uint64_t points = 0;
+  std::uint64_t no_return = 0;
+  /// The reported direction contradicts the rotors' motion: a damaged record.
+  std::uint64_t outliers = 0;
+  /// In pieces of time where the rotors' motion was not found, or not through the prisms.
+  std::uint64_t without_rotation_angle = 0;
+  std::string format;                ///< name of the CloudFormat written
+  std::vector<std::string> factors;  ///< names of the model's common factors
+  bool mirrored = false;
+  double azimuth_residual_rms = 0, zenith_residual_rms = 0;  ///< rad, of the points
+  /// How far points were moved from where the sensor says, rms over some beams, rad.
+  double repointing_rms = 0;
+  std::vector<std::string> warnings;
+  std::vector<recordings::ReadWarning> read_warnings;
+  /// Damage in the recording's body; what came before it is in the cloud.
+  std::optional<FileError> damage;
+};
+
+/// Turns a recording into points, piece by piece: memory does not grow with the recording, and the
+/// file does not depend on the number of threads. Nothing appears at `path` unless all went well.
+/// @throws InvalidArgument for a recording of several sensors or a calibration of another one;
+///         EstimationError when the rotors' motion cannot be found; FileError
+CloudSummary make_cloud(recordings::Reader& reader, const sensors::Sensor& calibration,
+                        const std::string& path, const CloudOptions& options,
+                        const Progress& progress = {});
+
+}  // namespace risley::cloud

@@ -1,0 +1,89 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "risley/cloud/points.hpp"
+#include "risley/cloud/rotor_tracking.hpp"
+#include "risley/optics/batch.hpp"
+#include "risley/optics/beam_origin.hpp"
+#include "risley/sensors/sensor.hpp"
+
+namespace risley::cloud {
+
+/// How points are made from shots.
+struct PointingOptions {
+  /// Points go where the sensor says; otherwise where the calibration sends the beam at the
+  /// smoothed rotation angles.
+  bool reported_directions = false;
+  bool beam_origin = true;      ///< the beam starts at the last prism, not at the frame's origin
+  bool beam_divergence = true;  ///< the footprint's size is part of the covariance
+  bool covariance = true;
+};
+
+/// One quantity that all points of a cloud share an error of, times one standard deviation.
+struct CommonFactor {
+  std::string name;
+  Eigen::VectorXd
+      weights;  ///< [places + prisms + 2]: flat vector, rotation angles, thickness, spacing
+  double range_offset = 0;  ///< m
+};
+
+/// Where the beam of a sensor goes, and how wrong that may be. Derivation: docs/theory/cloud.md
+struct PointingModel {
+  PrismTrain train{parse_face_order("PA-AP")};     ///< where it truly goes
+  PrismTrain believed{parse_face_order("PA-AP")};  ///< what the sensor computes directions with
+  PrismGeometry geometry;                          ///< all zero without a beam origin
+  double range_offset = 0;                         ///< m
+  double angle_noise = 0;                          ///< of reported directions, rad
+  sensors::Sensor sensor;                          ///< range noise and rounding are taken from here
+  PointingOptions options;
+  std::vector<int> places;  ///< of the flat vector that have a common factor
+  std::vector<CommonFactor> factors;
+};
+
+/// Standard deviation of a direction within a beam of a full divergence angle: a quarter of it.
+/// [Lichti and Gordon 2004, error propagation in directly georeferenced terrestrial laser scanner
+/// point clouds: the uncertainty of a uniformly lit beam]
+inline constexpr double kDivergenceSigma = 0.25;
+
+/// A model from a calibration and what the beginning of a recording says of the sensor.
+/// - Calibrated against directions, or a type that is not calibrated: the reported directions are
+///   taken as true but for their noise. Rotation angles were found with the same parameters, so an
+///   error of the parameters moves them too and most of it cancels.
+/// - Calibrated against planes: directions come from the calibration, rotation angles from what the
+///   sensor believes; both have errors of their own.
+/// @throws InvalidArgument for a calibration of another sensor (face order)
+PointingModel pointing_model(const sensors::Sensor& calibration, const SensorBelief& belief,
+                             const PointingOptions& options);
+
+/// Some shots with a range, as columns of one length.
+struct PointedShots {
+  std::vector<std::vector<double>> rotation_angle;    ///< [prisms][shots], rad
+  std::vector<std::vector<double>> angle_covariance;  ///< upper triangle [..][shots], rad^2
+  std::vector<double> azimuth, zenith;                ///< as reported, rad
+  /// Variance of the rounding, rad^2, rad^2 and m^2.
+  std::vector<double> azimuth_rounding, zenith_rounding, range_rounding;
+  std::vector<double> range;                          ///< as reported, m
+  std::vector<double> intensity;                      ///< as reported
+  std::array<std::vector<double>, 3> surface_normal;  ///< NaN where not known
+
+  std::size_t size() const { return range.size(); }
+  void resize(int prisms, std::size_t shots);
+};
+
+/// Cartesian points with covariance [B21 Eq. (31), App. A]. Fills x, y, z, covariance, range,
+/// incidence, rotation_angle, residuals and loading, as far as the header announces them; the
+/// points' other columns are the caller's. A beam that does not get through the prisms gives NaN.
+/// @param header  of the points, with one factor name per factor of the model or none
+void compute_points(const PointingModel& model, const CloudHeader& header,
+                    const PointedShots& shots, Points& points,
+                    InstructionSet set = available_instruction_sets().back());
+
+}  // namespace risley::cloud

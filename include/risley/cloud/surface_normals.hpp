@@ -1,0 +1,70 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "risley/core/vector3.hpp"
+
+namespace risley::cloud {
+
+/// Directions of the surfaces that a sensor looks at, from the ranges around each direction. Cells
+/// of one degree collect the moments of inverse range over azimuth and zenith, in which a plane is
+/// linear to a good approximation; a cell and its eight neighbours together make one fit.
+/// Derivation: docs/theory/cloud.md
+class SurfaceNormals {
+ public:
+  /// @param range_noise  1 sigma, m: surfaces whose ranges scatter more than kRoughest times as
+  ///                     much are edges, leaves or several surfaces, and get no normal
+  explicit SurfaceNormals(double range_noise);
+
+  /// How much more than the noise ranges may scatter about a surface.
+  static constexpr double kRoughest = 2.0;
+
+  /// Forgets all shots.
+  void clear();
+  /// Adds one shot. @param azimuth, zenith  rad @param range  m, > 0
+  void add(double azimuth, double zenith, double range);
+  /// Fits all cells to the shots added.
+  void fit();
+  /// Unit normal of the surface in a direction, of either sign, sensor frame; NaN where there is
+  /// none.
+  Vector3<double> normal(double azimuth, double zenith) const {
+    const std::size_t cell = cell_of(azimuth, zenith);
+    if (cell == kNowhere) return kNone;
+    const auto& n = normals_[cell];
+    return {n[0], n[1], n[2]};
+  }
+
+ private:
+  static constexpr std::size_t kNowhere = static_cast<std::size_t>(-1);
+  static constexpr int kHalf = 90;         // cells on either side of the X axis
+  static constexpr int kSide = 2 * kHalf;  // cells along azimuth and along zenith
+  static constexpr double kCellsPerRadian = 57.29577951308232;
+  static const Vector3<double> kNone;
+
+  /// Weighted by range^4, so that residuals of inverse range count as ranges do.
+  struct Moments {
+    double n = 0, a = 0, z = 0, aa = 0, az = 0, zz = 0, q = 0, qa = 0, qz = 0, qq = 0;
+    double count = 0;
+    void add(const Moments& other);
+  };
+
+  static std::size_t cell_of(double azimuth, double zenith) {
+    const double column = azimuth * kCellsPerRadian + kHalf;
+    const double row = zenith * kCellsPerRadian;
+    if (!(column >= 0 && column < kSide && row >= 0 && row < kSide)) return kNowhere;
+    return static_cast<std::size_t>(row) * kSide + static_cast<std::size_t>(column);
+  }
+  std::array<float, 3> fitted(const Moments& moments) const;
+
+  double range_noise_;
+  std::vector<Moments> moments_;
+  std::vector<std::size_t> touched_;
+  std::vector<std::array<float, 3>> normals_;
+};
+
+}  // namespace risley::cloud

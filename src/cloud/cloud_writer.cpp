@@ -1,0 +1,64 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "risley/cloud/cloud_writer.hpp"
+
+#include <algorithm>
+#include <cctype>
+
+#include <fmt/format.h>
+
+#include "risley/core/error.hpp"
+
+#include "cloud/formats/cloud_format.hpp"
+
+namespace risley::cloud {
+namespace {
+
+std::string lower_case(std::string text) {
+  std::transform(text.begin(), text.end(), text.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return text;
+}
+
+}  // namespace
+
+const std::vector<CloudFormat>& cloud_formats() {
+  static const std::vector<CloudFormat> formats = [] {
+    std::vector<CloudFormat> list;
+    for (const CloudWriterFormat* format : all_cloud_formats()) {
+      list.push_back({std::string(format->name), std::string(format->ending),
+                      std::string(format->description)});
+    }
+    return list;
+  }();
+  return formats;
+}
+
+const CloudFormat& find_cloud_format(const std::string& path, const std::string& format) {
+  const std::string name = lower_case(path);
+  std::string known;
+  for (const CloudFormat& one : cloud_formats()) {
+    if (format.empty() ? name.ends_with(one.ending) : one.name == format) return one;
+    const std::string& word = format.empty() ? one.ending : one.name;
+    if (!known.ends_with(word)) known += fmt::format("{}{}", known.empty() ? "" : ", ", word);
+  }
+  if (!format.empty()) throw InvalidArgument(fmt::format("format = {}, allowed {}", format, known));
+#ifndef RISLEY_HAS_LASZIP
+  if (name.ends_with(".laz")) {
+    throw InvalidArgument(
+        fmt::format("{}: this build has no LASzip (Debian 13 has it), allowed {}", path, known));
+  }
+#endif
+  throw InvalidArgument(fmt::format("{}: unknown ending, allowed {}", path, known));
+}
+
+std::unique_ptr<CloudWriter> create_cloud(const std::string& path, const CloudHeader& header,
+                                          const CloudWriterOptions& options) {
+  const CloudFormat& found = find_cloud_format(path, options.format);
+  const auto& formats = all_cloud_formats();
+  const auto it = std::find_if(formats.begin(), formats.end(),
+                               [&found](const auto* format) { return format->name == found.name; });
+  return (*it)->create(path, header, options);
+}
+
+}  // namespace risley::cloud

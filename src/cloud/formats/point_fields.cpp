@@ -1,0 +1,221 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "cloud/formats/point_fields.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <utility>
+
+#include <fmt/format.h>
+#include <xsimd/xsimd.hpp>
+
+#include "risley/core/angle.hpp"
+
+namespace risley::cloud {
+namespace {
+
+/// A field whose numbers are a column as it is, or scaled. @param column  gives it from the points
+template <class Column>
+PointField scaled(std::string name, std::string unit, std::string description, FieldType type,
+                  Column column, double scale = 1.0) {
+  PointField field{std::move(name), std::move(unit), std::move(description), type, {}, {}};
+  field.values = [column, scale](const Points& points, std::span<double> values) {
+    const auto* from = column(points).data();
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      values[i] = scale * static_cast<double>(from[i]);
+    }
+  };
+  if (type == FieldType::float32) {
+    field.floats = [column, scale](const Points& points, std::size_t first,
+                                   std::span<float> values) {
+      const auto* from = column(points).data() + first;
+      for (std::size_t i = 0; i < values.size(); ++i) {
+        values[i] = static_cast<float>(scale * static_cast<double>(from[i]));
+      }
+    };
+  }
+  return field;
+}
+
+/// Square roots. std::sqrt sets errno below zero, which keeps compilers from taking several at
+/// once.
+template <class Number>
+void square_roots(const double* from, std::span<Number> to) {
+  using Batch = xsimd::batch<double>;
+  const std::size_t whole = to.size() - to.size() % Batch::size;
+  for (std::size_t i = 0; i < whole; i += Batch::size) {
+    alignas(Batch::arch_type::alignment()) double roots[Batch::size];
+    xsimd::sqrt(Batch::load_unaligned(from + i)).store_aligned(roots);
+    for (std::size_t k = 0; k < Batch::size; ++k) to[i + k] = static_cast<Number>(roots[k]);
+  }
+  for (std::size_t i = whole; i < to.size(); ++i) to[i] = static_cast<Number>(std::sqrt(from[i]));
+}
+
+PointField standard_deviation(const char* axis, CovarianceTerm term) {
+  PointField field{fmt::format("Std{}", axis), "m", fmt::format("1 sigma of {} (m)", axis),
+                   FieldType::float32,         {},  {}};
+  field.values = [term](const Points& points, std::span<double> values) {
+    square_roots(points.covariance[term].data(), values);
+  };
+  field.floats = [term](const Points& points, std::size_t first, std::span<float> values) {
+    square_roots(points.covariance[term].data() + first, values);
+  };
+  return field;
+}
+
+constexpr double kDegrees = 1.0 / kRadiansPerDegree;
+
+template <class T>
+void put(std::span<const double> values, std::uint8_t* out, std::size_t stride) {
+  for (const double value : values) {
+    const T number = static_cast<T>(value);
+    std::memcpy(out, &number, sizeof number);
+    out += stride;
+  }
+}
+
+}  // namespace
+
+std::size_t bytes_of(FieldType type) {
+  switch (type) {
+    case FieldType::uint8:
+      return 1;
+    case FieldType::float32:
+      return 4;
+    case FieldType::float64:
+      return 8;
+  }
+  return 0;
+}
+
+std::vector<PointField> coordinate_fields() {
+  constexpr FieldType kType = FieldType::float64;
+  return {
+      scaled(
+          "X", "m", "forward", kType, [](const Points& p) -> auto& { return p.x; }),
+      scaled(
+          "Y", "m", "left", kType, [](const Points& p) -> auto& { return p.y; }),
+      scaled(
+          "Z", "m", "up", kType, [](const Points& p) -> auto& { return p.z; }),
+  };
+}
+
+std::vector<PointField> sensor_fields() {
+  constexpr FieldType kType = FieldType::uint8;
+  return {
+      scaled(
+          "Time", "s", "of the shot, recording's clock", FieldType::float64,
+          [](const Points& p) -> auto& { return p.time_ns; }, 1e-9),
+      scaled(
+          "Intensity", "", "as reported, 0-255", kType,
+          [](const Points& p) -> auto& { return p.intensity; }),
+      scaled(
+          "ReturnNumber", "", "from 1", kType,
+          [](const Points& p) -> auto& { return p.return_number; }),
+      scaled(
+          "NumberOfReturns", "", "of the shot", kType,
+          [](const Points& p) -> auto& { return p.number_of_returns; }),
+      scaled(
+          "Tag", "", "of the sensor's record", kType,
+          [](const Points& p) -> auto& { return p.tag; }),
+      scaled(
+          "Beam", "", "firing beam, from 0", kType,
+          [](const Points& p) -> auto& { return p.beam; }),
+  };
+}
+
+std::vector<PointField> uncertainty_fields(const CloudHeader& header) {
+  std::vector<PointField> fields;
+  const auto add = [&fields](std::string name, std::string unit, std::string description,
+                             auto column, double scale = 1.0) {
+    fields.push_back(scaled(std::move(name), std::move(unit), std::move(description),
+                            FieldType::float32, column, scale));
+  };
+  if (header.has_covariance) {
+    constexpr std::pair<const char*, CovarianceTerm> kAxes[] = {{"X", kXX}, {"Y", kYY}, {"Z", kZZ}};
+    const auto add_term = [&add](std::string name, const char* description, CovarianceTerm term) {
+      add(
+          std::move(name), "m2",
+          description, [term](const Points& p) -> auto& { return p.covariance[term]; });
+    };
+    for (const auto& [axis, term] : kAxes) fields.push_back(standard_deviation(axis, term));
+    for (const auto& [axis, term] : kAxes) {
+      add_term(fmt::format("Variance{}", axis), "variance (m2)", term);
+    }
+    add_term("CovarianceXY", "covariance (m2)", kXY);
+    add_term("CovarianceXZ", "covariance (m2)", kXZ);
+    add_term("CovarianceYZ", "covariance (m2)", kYZ);
+  }
+  add(
+      "LidarRange", "m", "range from the last prism (m)",
+      [](const Points& p) -> auto& { return p.range; });
+  add(
+      "IncidenceAngle", "degrees", "beam to surface normal (deg)",
+      [](const Points& p) -> auto& { return p.incidence; }, kDegrees);
+  if (header.has_rotation_angles) {
+    for (std::size_t k = 0; k < static_cast<std::size_t>(header.prisms); ++k) {
+      add(
+          fmt::format("PrismAngle{}", k + 1), "degrees",
+          "rotation angle (deg)", [k](const Points& p) -> auto& { return p.rotation_angle[k]; },
+          kDegrees);
+    }
+    add(
+        "ResidualAzimuth", "degrees", "reported - smoothed (deg)",
+        [](const Points& p) -> auto& { return p.azimuth_residual; }, kDegrees);
+    add(
+        "ResidualZenith", "degrees", "reported - smoothed (deg)",
+        [](const Points& p) -> auto& { return p.zenith_residual; }, kDegrees);
+  }
+  return fields;
+}
+
+std::vector<PointField> loading_fields(const CloudHeader& header) {
+  constexpr char kAxes[] = {'X', 'Y', 'Z'};
+  std::vector<PointField> fields;
+  for (std::size_t k = 0; k < header.factors.size(); ++k) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      fields.push_back(scaled(
+          fmt::format("Loading{}{}", k + 1, kAxes[axis]), "m", "per sigma of a common factor",
+          FieldType::float32,
+          [ k, axis ](const Points& p) -> auto& { return p.loading[k][axis]; }));
+    }
+  }
+  return fields;
+}
+
+std::vector<PointField> all_fields(const CloudHeader& header) {
+  std::vector<PointField> fields = coordinate_fields();
+  for (auto& more : {sensor_fields(), uncertainty_fields(header), loading_fields(header)}) {
+    fields.insert(fields.end(), more.begin(), more.end());
+  }
+  return fields;
+}
+
+RecordPacker::RecordPacker(std::vector<PointField> fields) : fields_(std::move(fields)) {
+  for (const PointField& field : fields_) {
+    offsets_.push_back(record_bytes_);
+    record_bytes_ += bytes_of(field.type);
+  }
+}
+
+void RecordPacker::pack(const Points& points, std::uint8_t* out, std::size_t stride) {
+  values_.resize(points.size());
+  for (std::size_t k = 0; k < fields_.size(); ++k) {
+    fields_[k].values(points, values_);
+    std::uint8_t* first = out + offsets_[k];
+    switch (fields_[k].type) {
+      case FieldType::uint8:
+        put<std::uint8_t>(values_, first, stride);
+        break;
+      case FieldType::float32:
+        put<float>(values_, first, stride);
+        break;
+      case FieldType::float64:
+        put<double>(values_, first, stride);
+        break;
+    }
+  }
+}
+
+}  // namespace risley::cloud

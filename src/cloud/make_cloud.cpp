@@ -1,0 +1,400 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "risley/cloud/make_cloud.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <memory>
+#include <utility>
+
+#include <fmt/format.h>
+#include <tbb/parallel_pipeline.h>
+#include <tbb/task_arena.h>
+
+#include "risley/cloud/surface_normals.hpp"
+#include "risley/core/angle.hpp"
+#include "risley/optics/observation_model.hpp"
+
+namespace risley::cloud {
+namespace {
+
+using recordings::Observations;
+
+/// Rows that are worked on together: some seconds, so that the start of each piece costs little.
+constexpr std::size_t kPieceRows = std::size_t{1} << 20;
+/// Pieces overlap by so much, because rotation angles are less certain at the end of one.
+constexpr std::int64_t kOverlapNs = 100'000'000;
+/// Surfaces are taken to stand still for so long.
+constexpr std::int64_t kSurfaceNs = 1'000'000'000;
+constexpr std::size_t kSurfaceShots = 25000;
+constexpr std::size_t kBlockRows = 4096;
+/// As BatchMapOptions::outlier_chi2.
+constexpr double kOutlierChi2 = 20.0;
+constexpr double kLeastRangeNoise = 1e-3;  // m, for telling surfaces
+
+double square(double x) { return x * x; }
+
+/// Some rows of a piece on their way to the file.
+struct Block {
+  std::vector<std::size_t> rows;
+  std::vector<std::uint8_t> returns;  ///< of each row's shot
+  PointedShots shots;
+  Points points;
+  std::uint64_t outliers = 0, without_rotation_angle = 0;
+  double azimuth_squares = 0, zenith_squares = 0;
+};
+
+/// First row of those at the end of a piece that belong to the last kOverlapNs of its clock.
+std::size_t overlap_begin(const Observations& piece, std::size_t end) {
+  std::size_t row = end;
+  while (row > 0 && piece.time_ns[row - 1] > piece.time_ns[end - 1] - kOverlapNs &&
+         piece.time_ns[row - 1] <= piece.time_ns[end - 1] + kOverlapNs) {
+    --row;
+  }
+  return row;
+}
+
+/// All returns of a shot stand together.
+bool same_shot(const Observations& o, std::size_t a, std::size_t b) {
+  return o.time_ns[a] == o.time_ns[b] && o.return_number[a] != o.return_number[b];
+}
+
+class Work {
+ public:
+  Work(recordings::Reader& reader, const sensors::Sensor& calibration, const std::string& path,
+       const CloudOptions& options, const Progress& progress)
+      : reader_(reader),
+        calibration_(calibration),
+        path_(path),
+        options_(options),
+        progress_(progress) {}
+
+  CloudSummary run() {
+    check_sensor();
+    summary_.format = find_cloud_format(path_, options_.writer.format).name;
+    bool more = true;
+    while (more) {
+      more = fill_piece();
+      if (piece_.size() == 0) break;
+      if (!writer_) set_up();
+      std::size_t end = more ? overlap_begin(piece_, piece_.size()) : piece_.size();
+      if (end <= done_) end = piece_.size();  // times that make no sense
+      if (end > done_) emit(end);
+      if (!more) break;
+      const std::size_t keep = overlap_begin(piece_, std::max(done_, std::size_t{1}));
+      piece_.drop_front(keep);
+      first_row_ += keep;
+      done_ -= keep;
+    }
+    finish();
+    return std::move(summary_);
+  }
+
+ private:
+  void check_sensor() const {
+    const auto& devices = reader_.header().devices;
+    if (devices.size() > 1) {
+      std::string names;
+      for (const auto& device : devices) {
+        names += fmt::format("{}{}", names.empty() ? "" : ", ",
+                             device.serial.empty() ? "unknown" : device.serial);
+      }
+      throw InvalidArgument(fmt::format(
+          "the recording holds {} sensors ({}), a calibration is of one", devices.size(), names));
+    }
+    const std::string& serial = devices.front().serial;
+    if (!serial.empty() && !calibration_.serial.empty() && serial != calibration_.serial) {
+      throw InvalidArgument(fmt::format(
+          "a calibration of another sensor: its serial number is {}, the recording's {}",
+          calibration_.serial, serial));
+    }
+    if (!reader_.header().has_range) {
+      throw InvalidArgument("the recording has no ranges, so it has no points");
+    }
+  }
+
+  /// Reads until the piece is full. @return whether there is more
+  bool fill_piece() {
+    recordings::Chunk chunk;
+    while (piece_.size() < done_ + kPieceRows) {
+      bool read = false;
+      try {
+        read = reader_.read(chunk);
+      } catch (const FileError& error) {
+        summary_.damage = error;  // the sound part is worth keeping
+      }
+      if (!read) return false;
+      if (belief_ && belief_->mirrored) mirror(chunk.observations);
+      piece_.append(chunk.observations);
+      summary_.observations += chunk.observations.size();
+      report_progress(progress_, reader_.fraction_read());
+    }
+    return true;
+  }
+
+  static void mirror(Observations& rows) {
+    for (double& zenith : rows.zenith) zenith = kPi - zenith;
+  }
+
+  /// Everything that wants to have seen the beginning of the recording.
+  void set_up() {
+    estimation::ShotSelector selector({});
+    selector.add(piece_);
+    belief_ = sensor_belief(selector.series(), selector.head(), calibration_, options_.angle_noise);
+    if (belief_->mirrored) mirror(piece_);
+    summary_.mirrored = belief_->mirrored;
+    summary_.warnings = belief_->warnings;
+    model_ = pointing_model(calibration_, *belief_, options_.pointing);
+    for (const CommonFactor& factor : model_.factors) summary_.factors.push_back(factor.name);
+    tracker_ = std::make_unique<RotorTracker>(*belief_, options_.rate);
+    normals_ = std::make_unique<SurfaceNormals>(
+        std::max(std::sqrt(calibration_.range_variance(0, 0, 255) +
+                           square(calibration_.range_resolution) / 12.0),
+                 kLeastRangeNoise));
+    header_.sensor = fmt::format("{} {}", calibration_.manufacturer, calibration_.model);
+    header_.serial = reader_.header().devices.front().serial;
+    if (header_.serial.empty()) header_.serial = calibration_.serial;
+    header_.time_reference = reader_.header().time_reference;
+    header_.prisms = calibration_.prisms();
+    header_.has_covariance = options_.pointing.covariance;
+    if (options_.loadings && header_.has_covariance) header_.factors = summary_.factors;
+    header_.provenance = options_.provenance;
+    writer_ = create_cloud(path_, header_, options_.writer);
+  }
+
+  /// Turns rows [done_, end) of the piece into points.
+  void emit(std::size_t end) {
+    try {
+      tracker_->track(piece_);
+    } catch (const EstimationError& error) {
+      for (std::size_t row = done_; row < end; ++row) {
+        ++(has_return(row) ? summary_.without_rotation_angle : summary_.no_return);
+      }
+      summary_.warnings.push_back(fmt::format("no points from observations {} to {}: {}",
+                                              first_row_ + done_, first_row_ + end - 1,
+                                              error.what()));
+      done_ = end;
+      return;
+    }
+    if (!repointing_known_) find_repointing();
+    while (done_ < end) {
+      const std::size_t surface_end = end_of_surface(done_, end);
+      find_surfaces(done_, surface_end);
+      write_rows(done_, surface_end);
+      done_ = surface_end;
+    }
+  }
+
+  bool has_return(std::size_t row) const { return piece_.valid[row] != 0 && piece_.range[row] > 0; }
+
+  std::size_t end_of_surface(std::size_t begin, std::size_t end) const {
+    std::size_t row = begin;
+    const std::int64_t first = piece_.time_ns[begin];
+    while (row < end && std::llabs(piece_.time_ns[row] - first) < kSurfaceNs) ++row;
+    return row;
+  }
+
+  void find_surfaces(std::size_t begin, std::size_t end) {
+    normals_->clear();
+    const std::size_t stride = std::max<std::size_t>(1, (end - begin) / kSurfaceShots);
+    for (std::size_t row = begin; row < end; row += stride) {
+      if (!has_return(row)) continue;
+      normals_->add(piece_.azimuth[row], piece_.zenith[row],
+                    piece_.range[row] - calibration_.range_offset);
+    }
+    normals_->fit();
+  }
+
+  /// Blocks are made in parallel and written in order. No more of them are on their way than there
+  /// are, and they finish in order, so each is free again when its turn comes.
+  void write_rows(std::size_t begin, std::size_t end) {
+    const auto threads = static_cast<std::size_t>(tbb::this_task_arena::max_concurrency());
+    blocks_.resize(threads > 1 ? 2 * threads : 1);
+    std::size_t next = begin, turn = 0;
+    const auto choose = [&](tbb::flow_control& control) -> Block* {
+      if (next == end) {
+        control.stop();
+        return nullptr;
+      }
+      Block* block = &blocks_[turn++ % blocks_.size()];
+      next = choose_rows(next, end, *block);
+      return block;
+    };
+    const auto compute_block = [this](Block* block) {
+      compute(*block);
+      return block;
+    };
+    const auto write_block = [this](Block* block) { write(*block); };
+    using tbb::filter_mode;
+    tbb::parallel_pipeline(
+        blocks_.size(),
+        tbb::make_filter<void, Block*>(filter_mode::serial_in_order, choose) &
+            tbb::make_filter<Block*, Block*>(filter_mode::parallel, compute_block) &
+            tbb::make_filter<Block*, void>(filter_mode::serial_in_order, write_block));
+  }
+
+  /// Takes up to kBlockRows rows that have a return. @return where the next block begins
+  std::size_t choose_rows(std::size_t begin, std::size_t end, Block& block) {
+    block.rows.clear();
+    block.returns.clear();
+    std::size_t row = begin;
+    while (row < end && block.rows.size() < kBlockRows) {
+      std::size_t shot_end = row + 1;
+      while (shot_end < end && same_shot(piece_, row, shot_end)) ++shot_end;
+      std::size_t returns = 0;
+      for (std::size_t i = row; i < shot_end; ++i) returns += has_return(i) ? 1 : 0;
+      for (std::size_t i = row; i < shot_end; ++i) {
+        if (!has_return(i)) {
+          ++summary_.no_return;
+          continue;
+        }
+        block.rows.push_back(i);
+        block.returns.push_back(
+            static_cast<std::uint8_t>(std::max<std::size_t>(returns, piece_.return_number[i])));
+      }
+      row = shot_end;
+    }
+    return row;
+  }
+
+  void compute(Block& block) const {
+    const std::size_t n = block.rows.size();
+    PointedShots& shots = block.shots;
+    Points& points = block.points;
+    shots.resize(header_.prisms, n);
+    header_.resize(points, n);
+    tracker_->angles(piece_, block.rows, shots.rotation_angle, shots.angle_covariance);
+    for (std::size_t i = 0; i < n; ++i) {
+      const std::size_t row = block.rows[i];
+      points.time_ns[i] = piece_.time_ns[row];
+      points.intensity[i] = piece_.intensity[row];
+      points.return_number[i] = piece_.return_number[row];
+      points.number_of_returns[i] = block.returns[i];
+      points.tag[i] = piece_.tag[row];
+      points.beam[i] = piece_.beam[row];
+      shots.azimuth[i] = piece_.azimuth[row];
+      shots.zenith[i] = piece_.zenith[row];
+      shots.range[i] = piece_.range[row];
+      shots.intensity[i] = piece_.intensity[row];
+      const auto variance = [](float step) {
+        return static_cast<double>(step) * static_cast<double>(step) / 12.0;
+      };
+      shots.azimuth_rounding[i] = variance(piece_.azimuth_resolution[row]);
+      shots.zenith_rounding[i] = variance(piece_.zenith_resolution[row]);
+      shots.range_rounding[i] = variance(piece_.range_resolution[row]);
+      const Vector3<double> normal = normals_->normal(piece_.azimuth[row], piece_.zenith[row]);
+      shots.surface_normal[0][i] = normal.x;
+      shots.surface_normal[1][i] = normal.y;
+      shots.surface_normal[2][i] = normal.z;
+    }
+    compute_points(model_, header_, shots, points);
+    keep_sound(block);
+  }
+
+  /// Takes out of a block what has no point.
+  void keep_sound(Block& block) const {
+    block.outliers = block.without_rotation_angle = 0;
+    block.azimuth_squares = block.zenith_squares = 0;
+    Points& points = block.points;
+    const double noise = square(model_.angle_noise);
+    const double limit = kOutlierChi2 * belief_->residual_variance_factor;
+    std::vector<std::size_t> sound;
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      if (!std::isfinite(points.x[i])) {
+        ++block.without_rotation_angle;
+        continue;
+      }
+      const double azimuth = square(points.azimuth_residual[i]);
+      const double zenith = square(points.zenith_residual[i]);
+      if (!(azimuth / (noise + block.shots.azimuth_rounding[i]) +
+                zenith / (noise + block.shots.zenith_rounding[i]) <=
+            limit)) {
+        ++block.outliers;
+        continue;
+      }
+      block.azimuth_squares += azimuth;
+      block.zenith_squares += zenith;
+      sound.push_back(i);
+    }
+    if (sound.size() == points.size()) return;
+    points.keep(sound);
+  }
+
+  void write(const Block& block) {
+    writer_->write(block.points);
+    summary_.points += block.points.size();
+    summary_.outliers += block.outliers;
+    summary_.without_rotation_angle += block.without_rotation_angle;
+    summary_.azimuth_residual_rms += block.azimuth_squares;
+    summary_.zenith_residual_rms += block.zenith_squares;
+  }
+
+  /// How far the calibration moves the beams, seen on shots of the first piece.
+  void find_repointing() {
+    constexpr std::size_t kBeams = 2000;
+    std::vector<std::size_t> rows;
+    const std::size_t stride = std::max<std::size_t>(1, piece_.size() / kBeams);
+    for (std::size_t row = 0; row < piece_.size(); row += stride) rows.push_back(row);
+    PointedShots shots;
+    shots.resize(header_.prisms, rows.size());
+    tracker_->angles(piece_, rows, shots.rotation_angle, shots.angle_covariance);
+    double squares = 0, count = 0;
+    std::vector<double> angles(shots.rotation_angle.size());
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+      for (std::size_t k = 0; k < angles.size(); ++k) angles[k] = shots.rotation_angle[k][i];
+      const Observation to = observe(model_.train, angles);
+      const Observation from = observe(model_.believed, angles);
+      if (!to.valid || !from.valid) continue;
+      squares += square(norm(to.direction - from.direction));
+      count += 1;
+    }
+    if (count == 0) return;
+    summary_.repointing_rms = std::sqrt(squares / count);
+    repointing_known_ = true;
+  }
+
+  void finish() {
+    summary_.read_warnings = reader_.warnings();
+    if (!writer_) {
+      if (summary_.damage) throw FileError(*summary_.damage);
+      throw EstimationError("the recording holds no valid shot");
+    }
+    if (summary_.points == 0) {
+      throw EstimationError(summary_.warnings.empty() ? std::string("no shot has a point")
+                                                      : summary_.warnings.back());
+    }
+    const auto n = static_cast<double>(summary_.points);
+    summary_.azimuth_residual_rms = std::sqrt(summary_.azimuth_residual_rms / n);
+    summary_.zenith_residual_rms = std::sqrt(summary_.zenith_residual_rms / n);
+    writer_->close();
+  }
+
+  recordings::Reader& reader_;
+  const sensors::Sensor& calibration_;
+  const std::string& path_;
+  const CloudOptions& options_;
+  const Progress& progress_;
+  CloudSummary summary_;
+  std::optional<SensorBelief> belief_;
+  PointingModel model_;
+  std::unique_ptr<RotorTracker> tracker_;
+  std::unique_ptr<SurfaceNormals> normals_;
+  CloudHeader header_;
+  std::unique_ptr<CloudWriter> writer_;
+  std::vector<Block> blocks_;
+  Observations piece_;
+  std::size_t done_ = 0;         // rows of the piece that are in the file
+  std::uint64_t first_row_ = 0;  // number of the piece's first observation
+  bool repointing_known_ = false;
+};
+
+}  // namespace
+
+CloudSummary make_cloud(recordings::Reader& reader, const sensors::Sensor& calibration,
+                        const std::string& path, const CloudOptions& options,
+                        const Progress& progress) {
+  return Work(reader, calibration, path, options, progress).run();
+}
+
+}  // namespace risley::cloud

@@ -1,0 +1,78 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstddef>
+
+#include "risley/optics/prism.hpp"
+
+namespace risley::cloud {
+
+/// Most common factors that a call can take.
+inline constexpr int kMostFactors = 64;
+
+/// Plain arguments of one call, see optics/batch_kernel.hpp for why they are plain. Every column
+/// has one entry per shot and room for whole groups: a multiple of kPointPadding.
+inline constexpr std::size_t kPointPadding = 8;
+
+struct PointArguments {
+  int prisms = 0;
+  const FaceOrder* face_order = nullptr;        ///< [prisms]
+  const double* parameters = nullptr;           ///< flat vector: where the beam truly goes
+  const double* believed_parameters = nullptr;  ///< what directions are reported with; may be equal
+  const double* face_position = nullptr;        ///< [2 prisms], m
+  /// d face position / d thickness and / d spacing [2 prisms].
+  const double* face_over_thickness = nullptr;
+  const double* face_over_spacing = nullptr;
+  bool reported_directions = false;  ///< points go where the sensor says, not where the model does
+
+  double angle_noise_variance = 0;  ///< of reported angles before rounding, rad^2
+  double range_offset = 0;          ///< m
+  /// Parts of the range's variance, m^2, see sensors::Sensor::range_variance.
+  double range_variance = 0, range_variance_per_range2 = 0, range_variance_incidence = 0,
+         range_variance_weak_return = 0;
+  /// Of the beam's direction before the prisms, rad^2.
+  double divergence_variance_horizontal = 0, divergence_variance_vertical = 0;
+
+  /// Common factors: what one standard deviation of each does to the flat vector's places, to the
+  /// rotation angles, to thickness and spacing [place_count + prisms + 2][factors], and to the
+  /// range offset [factors].
+  const int* places = nullptr;
+  int place_count = 0;
+  int factors = 0;
+  const double* factor = nullptr;
+  const double* range_factor = nullptr;
+
+  std::size_t shots = 0;
+  const double* const* rotation_angle = nullptr;    ///< [prisms][shots], rad
+  const double* const* angle_covariance = nullptr;  ///< [prisms (prisms+1)/2][shots], rad^2
+  const double* azimuth = nullptr;                  ///< [shots], as reported, rad
+  const double* zenith = nullptr;
+  const double* azimuth_variance = nullptr;  ///< [shots], of the rounding, rad^2
+  const double* zenith_variance = nullptr;
+  const double* range = nullptr;              ///< [shots], as reported, m
+  const double* rounding_variance = nullptr;  ///< [shots], of the range, m^2
+  const double* intensity = nullptr;          ///< [shots]
+  /// Unit normal of the surface that a shot met, NaN where it is not known [3][shots].
+  const double* const* surface_normal = nullptr;
+
+  double* point[3] = {};       ///< [shots], m; NaN where the beam does not get through
+  double* covariance[6] = {};  ///< upper triangle [shots], m^2, or nullptr
+  double* corrected_range = nullptr;
+  double* incidence = nullptr;  ///< [shots], rad
+  double* azimuth_residual = nullptr;
+  double* zenith_residual = nullptr;
+  double* const* loading = nullptr;  ///< [factors * 3][shots], m, or nullptr
+};
+
+namespace kernel_baseline {
+void compute_points(const PointArguments& arguments);
+}
+namespace kernel_avx2 {
+void compute_points(const PointArguments& arguments);
+}
+namespace kernel_avx512 {
+void compute_points(const PointArguments& arguments);
+}
+
+}  // namespace risley::cloud

@@ -1,0 +1,212 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "risley/cloud/rotor_tracking.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdlib>
+#include <limits>
+#include <span>
+#include <utility>
+
+#include <Eigen/Cholesky>
+#include <fmt/format.h>
+
+#include "risley/core/error.hpp"
+
+namespace risley::cloud {
+namespace {
+
+using Eigen::Index;
+using estimation::kStatesPerRotor;
+using sensors::CalibrationReference;
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+/// Mean chi2 per parameter above which a recording is of another sensor than its calibration.
+constexpr double kMostDisagreement = 9.0;
+/// How far from a knot, besides the way to the next direction, its parabola is trusted, s.
+constexpr double kReach = 2.0 * estimation::kKnotInterval;
+
+/// What the belief leaves free: the parameters whose covariance the calibration tells, where it is
+/// one against directions, otherwise the default ones.
+void choose_parameters(const sensors::Sensor& calibration, estimation::EstimateOptions& options) {
+  if (calibration.reference != CalibrationReference::directions) return;
+  const auto defaults = estimation::default_free_names(calibration.prisms());
+  const auto& names = calibration.covariance_names;
+  for (const std::string& name : defaults) {
+    if (std::find(names.begin(), names.end(), name) == names.end()) options.fixed.push_back(name);
+  }
+  for (const std::string& name : names) {
+    if (name == "range_offset_m") continue;
+    if (find_parameter(name, calibration.prisms()).kind != ParameterKind::train) continue;
+    if (std::find(defaults.begin(), defaults.end(), name) == defaults.end()) {
+      options.additional.push_back(name);
+    }
+  }
+}
+
+/// A calibration against directions must describe those of the recording.
+void check_same_sensor(const estimation::Estimate& estimate, const sensors::Sensor& calibration) {
+  const auto n = static_cast<Index>(estimate.free.size());
+  if (n == 0) return;
+  Eigen::VectorXd off(n);
+  Eigen::MatrixXd covariance = estimate.covariance;
+  std::vector<Index> rows;
+  for (Index j = 0; j < n; ++j) {
+    const auto& free = estimate.free[static_cast<std::size_t>(j)];
+    const auto& names = calibration.covariance_names;
+    const auto at = std::find(names.begin(), names.end(), free.name);
+    if (at == names.end()) return;
+    rows.push_back(at - names.begin());
+    off[j] = estimate.parameters[j] - calibration.train[free.places.front()];
+  }
+  covariance += Eigen::MatrixXd(calibration.covariance(rows, rows));
+  const double chi2 = off.dot(covariance.ldlt().solve(off)) / static_cast<double>(n);
+  if (chi2 <= kMostDisagreement) return;
+  Index worst = 0;
+  off.cwiseAbs().cwiseQuotient(covariance.diagonal().cwiseSqrt()).maxCoeff(&worst);
+  const ParameterInfo& info =
+      find_parameter(estimate.free[static_cast<std::size_t>(worst)].name, calibration.prisms());
+  throw EstimationError(
+      fmt::format("a calibration of another sensor: by the recording's directions {} is {:.4g} {} "
+                  "away from the "
+                  "calibration's, {:.3g} sigma",
+                  info.name, off[worst] / info.si_per_unit, info.unit,
+                  std::abs(off[worst]) / std::sqrt(covariance(worst, worst))));
+}
+
+}  // namespace
+
+SensorBelief sensor_belief(const estimation::AngleSeries& beginning,
+                           const estimation::AngleSeries& head, const sensors::Sensor& calibration,
+                           std::optional<double> angle_noise) {
+  estimation::EstimateOptions options;
+  options.sensor = calibration;
+  options.angle_noise = angle_noise;
+  choose_parameters(calibration, options);
+  const estimation::Estimate estimate =
+      estimation::estimate(estimation::Method::map, beginning, head, options);
+  if (!estimate.converged && !estimate.noise_overstated) {
+    throw EstimationError(fmt::format(
+        "the rotation angles were not found, or the calibration is of another sensor: {}",
+        estimate.reason));
+  }
+  if (calibration.reference != CalibrationReference::none && calibration.combination &&
+      estimate.start.combination && *calibration.combination != *estimate.start.combination) {
+    throw InvalidArgument(fmt::format(
+        "a calibration of another sensor: its rotors run in speed combination {}, the recording's "
+        "in {}",
+        static_cast<int>(*calibration.combination), static_cast<int>(*estimate.start.combination)));
+  }
+  SensorBelief belief;
+  belief.sensor = estimate.sensor;
+  belief.free = estimate.free;
+  belief.covariance = estimate.covariance;
+  belief.angle_sensitivity = estimate.map->angle_sensitivity;
+  belief.rotor_process = estimate.rotor_process;
+  belief.start = estimate.start;
+  belief.angle_noise = estimate.angle_noise;
+  belief.residual_variance_factor = std::max(1.0, estimate.map->unit_variance);
+  belief.mirrored = estimate.mirrored;
+  belief.warnings = estimate.warnings;
+  if (estimate.noise_overstated) belief.warnings.push_back(estimate.reason);
+  if (calibration.reference == CalibrationReference::directions) {
+    check_same_sensor(estimate, calibration);
+    belief.sensor.train = calibration.train;
+  }
+  belief.start.train = belief.sensor.train;
+  return belief;
+}
+
+RotorTracker::RotorTracker(const SensorBelief& belief, std::optional<double> rate)
+    : belief_(belief), rate_(rate) {}
+
+estimation::Start RotorTracker::start_of(const estimation::AngleSeries& series,
+                                         const estimation::AngleSeries& head) const {
+  const std::int64_t time = series.time_ns.front();
+  const auto& knots = result_.trajectory;
+  if (knots.size() == 0 && belief_.start.time_ns >= time &&
+      belief_.start.time_ns <= series.time_ns.back()) {
+    return belief_.start;
+  }
+  // The piece before ends where this one begins: go on from there.
+  for (std::size_t knot = knots.size(); knot-- > 0;) {
+    const double seconds = 1e-9 * static_cast<double>(time - knots.time_ns[knot]);
+    if (std::abs(seconds) > kReach) continue;
+    estimation::Start start = belief_.start;
+    start.time_ns = time;
+    for (std::size_t k = 0; k < start.rotation_angle.size(); ++k) {
+      start.rotation_angle[k] = knots.angle(knot, k, seconds);
+      start.angular_velocity[k] = knots.speed(knot, k, seconds);
+    }
+    return start;
+  }
+  return estimation::find_start(head, belief_.sensor, {}, belief_.angle_noise);
+}
+
+void RotorTracker::track(const recordings::Observations& rows) {
+  estimation::ShotSelector selector({rate_, false, true});
+  selector.add(rows);
+  const estimation::AngleSeries& series = selector.series();
+  if (series.size() == 0) throw EstimationError("no valid shot");
+  estimation::BatchMapOptions options;
+  options.angle_noise = belief_.angle_noise;
+  options.rotor_process = belief_.rotor_process;
+  const estimation::Start start = start_of(series, selector.head());
+  result_ = {};
+  result_ = run_batch_map(series, start, belief_.sensor, options);
+  first_row_.clear();
+  for (const std::size_t shot : result_.trajectory.first_shot) {
+    first_row_.push_back(selector.rows()[shot]);
+  }
+}
+
+void RotorTracker::angles(const recordings::Observations& piece, std::span<const std::size_t> rows,
+                          std::vector<std::vector<double>>& angle,
+                          std::vector<std::vector<double>>& covariance) const {
+  const estimation::RotorTrajectory& knots = result_.trajectory;
+  const auto prisms = static_cast<std::size_t>(knots.prisms);
+  const double reach = kReach + (rate_ ? 1.0 / *rate_ : 0.0);
+  constexpr std::size_t kTerms = 5;  // a covariance of angles is a polynomial of 4th degree in time
+  std::vector<std::array<double, kTerms>> terms(covariance.size());
+  std::size_t knot = 0;
+  if (!rows.empty() && knots.size() > 0) {
+    const auto after = std::upper_bound(first_row_.begin(), first_row_.end(), rows.front());
+    knot = static_cast<std::size_t>(std::max<std::ptrdiff_t>(after - first_row_.begin() - 1, 0));
+  }
+  std::size_t prepared = static_cast<std::size_t>(-1);
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    while (knot + 1 < knots.size() && first_row_[knot + 1] <= rows[i]) ++knot;
+    const std::int64_t time = piece.time_ns[rows[i]];
+    std::size_t near = knot;
+    // The border between two knots lies between the chosen shots, not at the first of them.
+    if (knot + 1 < knots.size() &&
+        std::llabs(knots.time_ns[knot + 1] - time) < std::llabs(knots.time_ns[knot] - time)) {
+      ++near;
+    }
+    const double t = knots.size() > 0 ? 1e-9 * static_cast<double>(time - knots.time_ns[near])
+                                      : std::numeric_limits<double>::infinity();
+    if (std::abs(t) > reach) {
+      for (auto& column : angle) column[i] = kNaN;
+      for (auto& column : covariance) column[i] = kNaN;
+      continue;
+    }
+    if (near != prepared) {
+      prepared = near;
+      std::size_t pair = 0;
+      for (std::size_t k = 0; k < prisms; ++k) {
+        for (std::size_t l = k; l < prisms; ++l) {
+          terms[pair++] = knots.angle_covariance_terms(near, k, l);
+        }
+      }
+    }
+    for (std::size_t k = 0; k < prisms; ++k) angle[k][i] = knots.angle(near, k, t);
+    for (std::size_t pair = 0; pair < terms.size(); ++pair) {
+      const auto& c = terms[pair];
+      covariance[pair][i] = c[0] + t * (c[1] + t * (c[2] + t * (c[3] + t * c[4])));
+    }
+  }
+}
+
+}  // namespace risley::cloud

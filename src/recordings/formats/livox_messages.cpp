@@ -1,0 +1,524 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "recordings/formats/livox_messages.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include <fmt/format.h>
+
+#include "risley/core/error.hpp"
+
+#include "recordings/formats/cartesian.hpp"
+#include "recordings/formats/format.hpp"
+#include "recordings/formats/little_endian.hpp"
+
+namespace risley::recordings {
+namespace {
+
+constexpr std::int64_t kSecond = 1'000'000'000;
+constexpr std::int64_t kLatestTime = 230LL * 31'557'600 * kSecond;  // the year 2200
+constexpr std::int64_t kYear2000 = 946'684'800 * kSecond;
+constexpr std::size_t kMostReturns = 3;
+constexpr std::uint8_t kMid40 = 1, kMid70 = 6, kAvia = 7;
+/// How much describe() looks at, of all topics together.
+constexpr std::size_t kPointsLookedAt = 1'000'000, kMessagesLookedAt = 4096;
+constexpr std::size_t kPointMessagesLookedAt = 24;
+constexpr double kStandardGravity = 9.80665;  // m/s^2
+/// Longer means of acceleration are m/s^2, shorter ones g: half way between 1 and 9.8 in ratio.
+constexpr double kLongestInG = 3.13;
+
+/// The broadcast code with which a topic of the driver's multi-topic mode ends, or nothing: 14
+/// capital letters and digits, and the digit of the head.
+std::string serial_of(std::string_view topic) {
+  constexpr std::size_t kCodeLength = 15;
+  const std::size_t underscore = topic.rfind('_');
+  if (underscore == topic.npos) return {};
+  const std::string_view code = topic.substr(underscore + 1);
+  const auto is_digit = [](char c) { return c >= '0' && c <= '9'; };
+  const auto is_code = [&](char c) { return is_digit(c) || (c >= 'A' && c <= 'Z'); };
+  const bool fits = code.size() == kCodeLength && std::all_of(code.begin(), code.end(), is_code) &&
+                    code.back() >= '1' && code.back() <= '3' &&
+                    std::any_of(code.begin(), code.end() - 1, is_digit);
+  return fits ? std::string(code) : std::string();
+}
+
+std::string_view name_space_of(std::string_view topic) {
+  return topic.substr(0, topic.rfind('/') == topic.npos ? 0 : topic.rfind('/'));
+}
+
+template <class T>
+double value_at(const std::uint8_t* bytes) {
+  return static_cast<double>(load<T>(bytes));
+}
+
+/// How a datatype of a PointField is read.
+struct Datatype {
+  std::size_t bytes = 0;  ///< 0 for an unknown one
+  double (*value)(const std::uint8_t* bytes) = nullptr;
+};
+
+Datatype datatype(std::uint8_t code) {
+  switch (code) {
+    case 1:
+      return {1, value_at<std::int8_t>};
+    case 2:
+      return {1, value_at<std::uint8_t>};
+    case 3:
+      return {2, value_at<std::int16_t>};
+    case 4:
+      return {2, value_at<std::uint16_t>};
+    case 5:
+      return {4, value_at<std::int32_t>};
+    case 6:
+      return {4, value_at<std::uint32_t>};
+    case 7:
+      return {4, value_at<float>};
+    case 8:
+      return {8, value_at<double>};
+    default:
+      return {};
+  }
+}
+
+/// A field of a cloud that is read.
+struct FieldReader {
+  std::size_t offset = 0;
+  double (*value)(const std::uint8_t* bytes) = nullptr;
+
+  explicit operator bool() const { return value != nullptr; }
+  double operator()(const std::uint8_t* point) const { return value(point + offset); }
+  /// The nearest whole number of a byte; 0 where the field is missing or holds no number.
+  std::uint8_t byte(const std::uint8_t* point) const {
+    if (value == nullptr) return 0;
+    const double number = (*this)(point);
+    if (!(number > 0.0)) return 0;
+    return static_cast<std::uint8_t>(std::lround(std::min(number, 255.0)));
+  }
+};
+
+FieldReader find_field(const CloudLayout& layout, std::string_view name, bool required) {
+  const auto field = std::find_if(layout.fields.begin(), layout.fields.end(),
+                                  [&](const CloudLayout::Field& f) { return f.name == name; });
+  if (field == layout.fields.end()) {
+    if (!required) return {};
+    std::string names;
+    for (const CloudLayout::Field& other : layout.fields) {
+      names += (names.empty() ? "" : ", ") + other.name;
+    }
+    throw BadMessage{fmt::format("expected the fields x, y and z in the point cloud, found {}",
+                                 names.empty() ? "none" : names)};
+  }
+  const Datatype type = datatype(field->datatype);
+  if (type.bytes == 0) {
+    throw BadMessage{fmt::format("expected a datatype in [1, 8] for the field {}, found {}", name,
+                                 field->datatype)};
+  }
+  if (std::uint64_t{field->offset} + type.bytes > layout.point_step) {
+    throw BadMessage{fmt::format("the field {} takes bytes {} to {} of a point of {} bytes", name,
+                                 field->offset, field->offset + type.bytes - 1, layout.point_step)};
+  }
+  return {field->offset, type.value};
+}
+
+double median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+bool is_close(double value, double expected) {
+  return std::fabs(value - expected) < 0.05 * expected;
+}
+
+/// Number of points from `first` on that have its time and line: the returns of one shot.
+std::size_t run_length(const std::vector<MessagePoint>& points, std::size_t first) {
+  std::size_t end = first + 1;
+  while (end < points.size() && points[end].offset_ns == points[first].offset_ns &&
+         points[end].line == points[first].line) {
+    ++end;
+  }
+  return end - first;
+}
+
+}  // namespace
+
+std::int64_t message_time(std::uint64_t time_ns) {
+  if (time_ns > static_cast<std::uint64_t>(kLatestTime)) {
+    throw BadMessage{fmt::format("expected a time before the year 2200, found {} ns", time_ns)};
+  }
+  return static_cast<std::int64_t>(time_ns);
+}
+
+std::int64_t message_time(std::int64_t seconds, std::uint32_t nanoseconds) {
+  if (seconds < 0) {
+    throw BadMessage{fmt::format("expected a time of 0 or later, found {} s", seconds)};
+  }
+  return message_time(static_cast<std::uint64_t>(seconds) * kSecond + nanoseconds);
+}
+
+void require_room(std::string_view what, std::uint64_t count, std::size_t bytes_each,
+                  std::size_t bytes_left) {
+  if (count <= bytes_left / bytes_each) return;
+  throw BadMessage{fmt::format("expected {} {} of at least {} bytes each, found {} bytes", count,
+                               what, bytes_each, bytes_left)};
+}
+
+void append_point(BagMessage& message, const MessagePoint& point) {
+  if (!std::isfinite(point.x + point.y + point.z)) {
+    throw BadMessage{
+        fmt::format("point {} has a coordinate that is no number", message.points.size() + 1)};
+  }
+  message.points.push_back(point);
+}
+
+void decode_cloud(const CloudLayout& layout, std::span<const std::uint8_t> data,
+                  BagMessage& message) {
+  message.points.clear();
+  if (layout.big_endian) {
+    throw BadMessage{"the point cloud is big-endian, expected a little-endian one"};
+  }
+  const FieldReader x = find_field(layout, "x", true), y = find_field(layout, "y", true),
+                    z = find_field(layout, "z", true);
+  const FieldReader intensity = find_field(layout, "intensity", false),
+                    tag = find_field(layout, "tag", false),
+                    line = find_field(layout, "line", false);
+  message.has_intensity = static_cast<bool>(intensity);
+  const std::uint64_t row_bytes = std::uint64_t{layout.width} * layout.point_step;
+  if (layout.width == 0 || layout.height == 0) return;
+  if (layout.height > 1 && layout.row_step < row_bytes) {
+    throw BadMessage{fmt::format("expected rows of at least {} bytes in the point cloud, found {}",
+                                 row_bytes, layout.row_step)};
+  }
+  const std::uint64_t rows_before_last = std::uint64_t{layout.height - 1} * layout.row_step;
+  if (row_bytes > data.size() || rows_before_last > data.size() - row_bytes) {
+    throw BadMessage{fmt::format("expected {} x {} points of {} bytes, found {} bytes",
+                                 layout.height, layout.width, layout.point_step, data.size())};
+  }
+  message.points.reserve(std::size_t{layout.height} * layout.width);
+  for (std::size_t row = 0; row < layout.height; ++row) {
+    const std::uint8_t* bytes = data.data() + row * layout.row_step;
+    for (std::size_t column = 0; column < layout.width; ++column, bytes += layout.point_step) {
+      MessagePoint point;
+      point.x = x(bytes);
+      point.y = y(bytes);
+      point.z = z(bytes);
+      // Also numbers whose squares are none.
+      if (!std::isfinite(point.x * point.x + point.y * point.y + point.z * point.z)) {
+        point.x = point.y = point.z = 0.0;
+      }
+      point.intensity = intensity.byte(bytes);
+      point.tag = tag.byte(bytes);
+      point.line = line.byte(bytes);
+      message.points.push_back(point);
+    }
+  }
+}
+
+void MessageReader::set_topics(std::vector<BagTopic> topics) {
+  topics_ = std::move(topics);
+  devices_.assign(topics_.size(), std::nullopt);
+  clouds_.assign(topics_.size(), {});
+  acceleration_units_.assign(topics_.size(), 1.0);
+  const auto has_kind = [this](MessageKind kind) {
+    return std::any_of(topics_.begin(), topics_.end(),
+                       [kind](const BagTopic& topic) { return topic.kind == kind; });
+  };
+  // Beside the driver's own messages, clouds are the same points again or of other origin.
+  const MessageKind wanted =
+      has_kind(MessageKind::points) ? MessageKind::points : MessageKind::cloud;
+  if (!has_kind(wanted)) {
+    std::string found;
+    for (const BagTopic& topic : topics_) {
+      found += fmt::format("{}{} ({})", found.empty() ? "" : ", ", topic.name, topic.type);
+    }
+    fail(
+        fmt::format("holds no points of a lidar: expected a topic of type CustomMsg of a Livox "
+                    "driver or sensor_msgs PointCloud2, found {}",
+                    found.empty() ? "no topic" : found));
+  }
+  header_.devices.clear();
+  for (std::size_t i = 0; i < topics_.size(); ++i) {
+    const BagTopic& topic = topics_[i];
+    if (topic.kind == MessageKind::cloud && wanted == MessageKind::points) {
+      warn(
+          fmt::format("the point clouds of topic {} were left out: the Livox driver's own "
+                      "messages have better times",
+                      topic.name));
+    }
+    if (topic.kind != wanted) continue;
+    if (header_.devices.size() > UINT8_MAX) {
+      fail("holds more than 256 topics of lidar points, expected at most 256");
+    }
+    Device device;
+    device.serial = serial_of(topic.name);
+    device.index = static_cast<std::uint8_t>(header_.devices.size());
+    device.type = kUnknownDeviceType;
+    devices_[i] = device.index;
+    header_.devices.push_back(device);
+  }
+  choose_imu_topics();
+}
+
+/// An IMU belongs to the lidar of its serial or name space, or to the only lidar when it is itself
+/// the only one.
+void MessageReader::choose_imu_topics() {
+  const auto imu_topics = std::count_if(topics_.begin(), topics_.end(), [](const BagTopic& topic) {
+    return topic.kind == MessageKind::imu;
+  });
+  for (std::size_t i = 0; i < topics_.size(); ++i) {
+    if (topics_[i].kind != MessageKind::imu) continue;
+    const std::string serial = serial_of(topics_[i].name);
+    std::vector<std::uint8_t> candidates;
+    for (std::size_t lidar = 0; lidar < topics_.size(); ++lidar) {
+      if (!devices_[lidar] || topics_[lidar].kind == MessageKind::imu) continue;
+      const bool same_sensor =
+          serial == header_.devices[*devices_[lidar]].serial &&
+          (!serial.empty() || name_space_of(topics_[lidar].name) == name_space_of(topics_[i].name));
+      if (same_sensor) candidates.push_back(*devices_[lidar]);
+    }
+    if (candidates.size() == 1) {
+      devices_[i] = candidates.front();
+    } else if (imu_topics == 1 && header_.devices.size() == 1) {
+      devices_[i] = std::uint8_t{0};
+    } else {
+      warn(
+          fmt::format("the inertial samples of topic {} were left out: it does not say to which "
+                      "lidar they belong",
+                      topics_[i].name));
+    }
+  }
+}
+
+/// What the first messages of one topic say.
+struct MessageReader::FirstMessages {
+  std::optional<std::int64_t> last_time_ns;
+  std::size_t last_points = 0;
+  std::vector<double> rates;      ///< of a cloud: points per second from a message to the next
+  std::vector<double> intervals;  ///< between shots, ns
+  std::size_t most_returns = 1;
+  bool tagged = false, several_lines = false;
+  std::vector<double> accelerations;
+};
+
+void MessageReader::describe() {
+  header_.cartesian = true;
+  header_.has_intensity = false;
+  std::vector<FirstMessages> first(topics_.size());
+  std::size_t points = 0, messages = 0, point_messages = 0;
+  std::optional<std::int64_t> first_time_ns;
+  BagMessage message;
+  try {
+    while (points < kPointsLookedAt && messages < kMessagesLookedAt &&
+           point_messages < kPointMessagesLookedAt * header_.devices.size() && next(message)) {
+      ++messages;
+      FirstMessages& topic = first[message.topic];
+      if (topics_[message.topic].kind == MessageKind::imu) {
+        const auto& a = message.acceleration;
+        topic.accelerations.push_back(std::hypot(a[0], a[1], a[2]));
+        continue;
+      }
+      ++point_messages;
+      points += message.points.size();
+      header_.has_intensity = header_.has_intensity || message.has_intensity;
+      if (!first_time_ns) first_time_ns = message.time_ns;
+      if (topic.last_time_ns && message.time_ns > *topic.last_time_ns && topic.last_points > 0) {
+        topic.rates.push_back(static_cast<double>(topic.last_points) * kSecond /
+                              static_cast<double>(message.time_ns - *topic.last_time_ns));
+      }
+      topic.last_time_ns = message.time_ns;
+      topic.last_points = message.points.size();
+      const bool has_times = topics_[message.topic].kind == MessageKind::points;
+      for (std::size_t i = 0; i < message.points.size();) {
+        const MessagePoint& point = message.points[i];
+        topic.tagged = topic.tagged || point.tag != 0;
+        topic.several_lines = topic.several_lines || point.line != 0;
+        const std::size_t run = has_times ? run_length(message.points, i) : 1;
+        if (run <= kMostReturns) topic.most_returns = std::max(topic.most_returns, run);
+        if (i + run < message.points.size() && has_times &&
+            message.points[i + run].offset_ns > point.offset_ns) {
+          topic.intervals.push_back(message.points[i + run].offset_ns - point.offset_ns);
+        }
+        i += run;
+      }
+    }
+  } catch (const FileError&) {
+    // Reported when the caller comes to it, behind the sound messages.
+  }
+  if (point_messages == 0) header_.has_intensity = true;
+  if (first_time_ns) {
+    header_.time_reference =
+        *first_time_ns >= kYear2000 ? TimeReference::utc : TimeReference::power_on;
+  }
+  for (std::size_t i = 0; i < topics_.size(); ++i) {
+    if (!devices_[i]) continue;
+    if (topics_[i].kind == MessageKind::cloud) settle_cloud_grid(i, first[i]);
+    if (topics_[i].kind != MessageKind::imu) {
+      describe_device(i, first[i]);
+    } else if (!first[i].accelerations.empty() && median(first[i].accelerations) > kLongestInG) {
+      acceleration_units_[i] = 1.0 / kStandardGravity;
+      warn(
+          fmt::format("the accelerations of topic {} are in m/s^2 by their size and were "
+                      "divided by {} m/s^2",
+                      topics_[i].name, kStandardGravity));
+    }
+  }
+  rewind();
+}
+
+/// Tells the model where only one is left: three returns have only the Avia, 100 kHz only the
+/// Mid-40, which has no tags, and the Mid-70, which has.
+void MessageReader::describe_device(std::size_t topic, const FirstMessages& first) {
+  const bool is_cloud = topics_[topic].kind == MessageKind::cloud;
+  const int returns = is_cloud ? clouds_[topic].returns : static_cast<int>(first.most_returns);
+  header_.returns_per_shot = std::max(header_.returns_per_shot, returns);
+  Device& device = header_.devices[*devices_[topic]];
+  if (returns == 3) {
+    device.type = kAvia;
+  } else if (!is_cloud && !first.intervals.empty() && is_close(median(first.intervals), 1e4) &&
+             !first.several_lines) {
+    device.type = first.tagged || returns > 1 ? kMid70 : kMid40;
+  }
+}
+
+/// Finds the shots per second and the returns per shot of a cloud topic from its points per
+/// second.
+void MessageReader::settle_cloud_grid(std::size_t topic, const FirstMessages& first) {
+  struct Candidate {
+    double rate_hz;  ///< points per second
+    ShotGrid grid;
+    int returns;
+  };
+  static constexpr std::array<Candidate, 5> kCandidates{{
+      {100'000, kGrid100kHz, 1},
+      {200'000, kGrid100kHz, 2},
+      {240'000, kGrid240kHz, 1},
+      {480'000, kGrid240kHz, 2},
+      {720'000, kGrid240kHz, 3},
+  }};
+  const bool is_known = !first.rates.empty();
+  const double rate = is_known ? median(first.rates) : first.several_lines ? 240'000 : 100'000;
+  const auto distance = [rate](const Candidate& c) {
+    return std::fabs(std::log(rate / c.rate_hz));
+  };
+  const Candidate& best =
+      *std::min_element(kCandidates.begin(), kCandidates.end(),
+                        [&](const auto& a, const auto& b) { return distance(a) < distance(b); });
+  clouds_[topic] = {best.grid, best.returns};
+  std::string message = fmt::format(
+      "the points of topic {} have no times of their own: each got its message's time and {} us "
+      "per shot, {}",
+      topics_[topic].name, best.grid.beams == 1 ? "10" : "4.1667",
+      best.returns == 1 ? "one point" : fmt::format("{} points", best.returns));
+  if (!is_known) {
+    message += "; too few messages to check that";
+  } else if (!is_close(rate, best.rate_hz)) {
+    message += fmt::format(
+        "; but {:.0f} points per second fit no known sensor: points may be missing, and those "
+        "behind them have wrong times",
+        rate);
+  }
+  warn(std::move(message));
+}
+
+bool MessageReader::read(Chunk& chunk, std::size_t max_rows) {
+  chunk.clear();
+  max_rows = std::max<std::size_t>(max_rows, 1);
+  while (!failure_ && chunk.observations.size() + chunk.imu.size() < max_rows) {
+    try {
+      if (!next(message_)) break;
+    } catch (const FileError& error) {
+      failure_.emplace(error);
+      break;
+    }
+    append(message_, chunk);
+  }
+  if (chunk.observations.size() > 0 || !chunk.imu.empty()) return true;
+  if (failure_) throw FileError(*failure_);
+  return false;
+}
+
+void MessageReader::append(const BagMessage& message, Chunk& chunk) {
+  const std::uint8_t device = *devices_[message.topic];
+  switch (*topics_[message.topic].kind) {
+    case MessageKind::points:
+      append_points(message, device, chunk.observations);
+      break;
+    case MessageKind::cloud:
+      append_cloud(message, device, chunk.observations);
+      break;
+    case MessageKind::imu:
+      append_imu(message, device, chunk.imu);
+      break;
+  }
+}
+
+namespace {
+
+void set_row(Observations& rows, std::size_t row, const MessagePoint& point, std::int64_t time_ns,
+             std::size_t return_number, std::uint8_t device) {
+  set_cartesian(rows, row, {point.x, point.y, point.z}, kMillimetre);
+  rows.time_ns[row] = time_ns;
+  rows.intensity[row] = point.intensity;
+  rows.return_number[row] = static_cast<std::uint8_t>(return_number);
+  rows.tag[row] = point.tag;
+  rows.beam[row] = point.line;
+  rows.device[row] = device;
+}
+
+}  // namespace
+
+void MessageReader::append_points(const BagMessage& message, std::uint8_t device,
+                                  Observations& rows) {
+  const std::vector<MessagePoint>& points = message.points;
+  std::size_t row = rows.size();
+  rows.resize(row + points.size());
+  for (std::size_t first = 0; first < points.size();) {
+    const std::size_t run = run_length(points, first);
+    const bool is_shot = run <= kMostReturns;
+    if (!is_shot && !equal_times_reported_) {
+      equal_times_reported_ = true;
+      warn(
+          fmt::format("{} points of topic {} have the same time; more than {} are taken as shots "
+                      "of their own, without knowledge of when they were fired",
+                      run, topics_[message.topic].name, kMostReturns));
+    }
+    for (std::size_t i = 0; i < run; ++i, ++row) {
+      const MessagePoint& point = points[first + i];
+      set_row(rows, row, point, message.time_ns + point.offset_ns, is_shot ? i + 1 : 1, device);
+    }
+    first += run;
+  }
+}
+
+void MessageReader::append_cloud(const BagMessage& message, std::uint8_t device,
+                                 Observations& rows) const {
+  const CloudGrid& cloud = clouds_[message.topic];
+  const std::int64_t numerator = cloud.grid.interval_numerator_ns;
+  const std::int64_t denominator = cloud.grid.interval_denominator;
+  const auto returns = static_cast<std::size_t>(cloud.returns);
+  const std::size_t first_row = rows.size();
+  rows.resize(first_row + message.points.size());
+  for (std::size_t i = 0; i < message.points.size(); ++i) {
+    const auto shot = static_cast<std::int64_t>(i / returns);
+    const std::int64_t offset_ns = (shot * numerator + denominator / 2) / denominator;
+    set_row(rows, first_row + i, message.points[i], message.time_ns + offset_ns, i % returns + 1,
+            device);
+  }
+}
+
+void MessageReader::append_imu(const BagMessage& message, std::uint8_t device,
+                               std::vector<ImuSample>& samples) {
+  ImuSample sample;
+  sample.time_ns = message.time_ns;
+  sample.device = device;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    sample.angular_velocity[axis] = static_cast<float>(message.angular_velocity[axis]);
+    sample.acceleration_g[axis] =
+        static_cast<float>(message.acceleration[axis] * acceleration_units_[message.topic]);
+  }
+  samples.push_back(sample);
+}
+
+}  // namespace risley::recordings

@@ -1,0 +1,567 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+// Bags of ROS 1, version 2.0, read through rosbag_storage. That library trusts the lengths and
+// positions in a file, so the structure is checked before the file is given to it. For that, chunks
+// that are compressed are unpacked once more than for reading.
+#include <algorithm>
+#include <cstring>
+#include <fstream>
+#include <memory>
+#include <utility>
+
+#include <console_bridge/console.h>
+#include <fmt/format.h>
+#include <rosbag/bag.h>
+#include <rosbag/chunked_file.h>
+#include <rosbag/view.h>
+
+#include "risley/core/error.hpp"
+
+#include "recordings/formats/format.hpp"
+#include "recordings/formats/little_endian.hpp"
+#include "recordings/formats/livox_messages.hpp"
+
+namespace risley::recordings {
+namespace {
+
+constexpr std::string_view kName = "ros1-bag";
+constexpr std::string_view kSignature = "#ROSBAG V2.0";
+constexpr std::string_view kMend = "; the command `rosbag reindex` mends it";
+
+constexpr std::string_view kCustomMd5 = "e4d6829bdfe657cb6c21a746c86b21a6";
+constexpr std::string_view kCloudMd5 = "1158d486dd51d683ce2f1be655c3c181";
+constexpr std::string_view kImuMd5 = "6a62c6daae103f4ff57a132d6f95cec2";
+
+std::optional<MessageKind> kind_of(std::string_view md5) {
+  if (md5 == kCustomMd5) return MessageKind::points;
+  if (md5 == kCloudMd5) return MessageKind::cloud;
+  if (md5 == kImuMd5) return MessageKind::imu;
+  return std::nullopt;
+}
+
+/// What a topic's type is called in messages: md5 sums matter where the name alone would fit.
+std::string shown_type(const std::string& type, const std::string& md5) {
+  const bool named_alike = type.ends_with("/CustomMsg") || type == "sensor_msgs/PointCloud2";
+  return named_alike && !kind_of(md5) ? fmt::format("{} with the unknown md5 {}", type, md5) : type;
+}
+
+/// While it lives, rosbag_storage and its like print nothing: they log what they throw.
+class Silence {
+ public:
+  Silence() : handler_(console_bridge::getOutputHandler()) { console_bridge::noOutputHandler(); }
+  ~Silence() { console_bridge::useOutputHandler(handler_); }
+  Silence(const Silence&) = delete;
+  Silence& operator=(const Silence&) = delete;
+
+ private:
+  console_bridge::OutputHandler* handler_;
+};
+
+/// Checks that every record of a bag lies where the file and its index say.
+class BagStructure {
+ public:
+  /// @throws FileError
+  static void check(const std::string& path) { BagStructure(path).check_records(); }
+
+ private:
+  enum Op : std::uint8_t {
+    kMessageData = 2,
+    kFileHeader = 3,
+    kIndexData = 4,
+    kChunk = 5,
+    kChunkInfo = 6,
+    kConnection = 7,
+  };
+  struct Record {
+    std::uint64_t offset = 0, data = 0, end = 0;
+    std::string header;
+    std::uint8_t op = 0;
+
+    std::uint64_t data_bytes() const { return end - data; }
+  };
+  explicit BagStructure(const std::string& path) : path_(path), stream_(path, std::ios::binary) {
+    stream_.seekg(0, std::ios::end);
+    size_ = static_cast<std::uint64_t>(stream_.tellg());
+    if (!stream_) throw FileError(path_, {}, "cannot be read");
+  }
+
+  [[noreturn]] void fail(std::uint64_t offset, const std::string& problem) const {
+    if (unpacked_.empty()) throw FileError(path_, {offset, {}}, problem);
+    throw FileError(path_, {chunks_.back(), {}},
+                    fmt::format("{}, at byte {} of the unpacked chunk", problem, offset));
+  }
+  [[noreturn]] void fail_cut(std::uint64_t offset) const {
+    fail(offset, fmt::format("the bag is cut off inside a record that begins here, the file ends "
+                             "at byte {}{}",
+                             size_, kMend));
+  }
+
+  /// Reads from the file, or from the chunk that was unpacked.
+  void read(std::uint64_t offset, char* bytes, std::size_t count) {
+    if (!unpacked_.empty()) {
+      std::copy_n(unpacked_.begin() + static_cast<std::ptrdiff_t>(offset), count, bytes);
+      return;
+    }
+    stream_.seekg(static_cast<std::streamoff>(offset));
+    stream_.read(bytes, static_cast<std::streamsize>(count));
+    if (!stream_) fail(offset, "cannot be read");
+  }
+  std::uint32_t read_u32(std::uint64_t offset) {
+    std::uint32_t value = 0;
+    read(offset, reinterpret_cast<char*>(&value), sizeof value);
+    return value;
+  }
+
+  /// The record at an offset, which must end before the limit: that of the file or of a chunk.
+  Record record_at(std::uint64_t offset, std::uint64_t limit) {
+    constexpr std::uint32_t kLongestHeader = 1U << 20U;
+    const auto leave = [&] {
+      if (unpacked_.empty() && limit == size_) fail_cut(offset);
+      fail(offset,
+           fmt::format("a record does not fit into its chunk, which ends at byte {}", limit));
+    };
+    Record record;
+    record.offset = offset;
+    if (limit - offset < 8) leave();
+    const std::uint32_t header_bytes = read_u32(offset);
+    if (header_bytes > limit - offset - 8) leave();
+    if (header_bytes > kLongestHeader) {
+      fail(offset, fmt::format("expected a record header of at most {} bytes, found {}",
+                               kLongestHeader, header_bytes));
+    }
+    record.header.resize(header_bytes);
+    read(offset + 4, record.header.data(), header_bytes);
+    record.data = offset + 8 + header_bytes;
+    const std::uint32_t data_bytes = read_u32(record.data - 4);
+    if (data_bytes > limit - record.data) leave();
+    record.end = record.data + data_bytes;
+    record.op = number<std::uint8_t>(record, "op");
+    return record;
+  }
+
+  /// Calls visit(name, value) for the fields of a header, which stand behind their lengths.
+  template <class Visit>
+  void for_each_field(std::uint64_t offset, std::string_view header, Visit&& visit) const {
+    while (!header.empty()) {
+      std::uint32_t length = 0;
+      if (header.size() >= sizeof length) std::memcpy(&length, header.data(), sizeof length);
+      header.remove_prefix(std::min(header.size(), sizeof length));
+      const std::string_view text = header.substr(0, length);
+      const std::size_t equals = text.find('=');
+      if (length == 0 || length > header.size() || equals == text.npos) {
+        fail(offset, "expected fields NAME=VALUE in the header of a record, found others");
+      }
+      header.remove_prefix(length);
+      visit(text.substr(0, equals), text.substr(equals + 1));
+    }
+  }
+
+  std::optional<std::string_view> field(const Record& record, std::string_view name) const {
+    std::optional<std::string_view> found;
+    for_each_field(record.offset, record.header,
+                   [&](std::string_view field_name, std::string_view value) {
+                     if (field_name == name) found = value;
+                   });
+    return found;
+  }
+
+  template <class T>
+  T number(const Record& record, std::string_view name) const {
+    const auto value = field(record, name);
+    if (!value || value->size() != sizeof(T)) {
+      fail(record.offset,
+           fmt::format("expected a record with the field {} of {} bytes", name, sizeof(T)));
+    }
+    return load<T>(reinterpret_cast<const std::uint8_t*>(value->data()));
+  }
+
+  void check_records() {
+    const std::uint64_t first = kSignature.size() + 1;
+    if (size_ < first) fail_cut(0);
+    const Record header = record_at(first, size_);
+    if (header.op != kFileHeader) {
+      fail(first,
+           fmt::format("expected the file header (op {}), found op {}", +kFileHeader, header.op));
+    }
+    if (const auto encryptor = field(header, "encryptor"); encryptor && !encryptor->empty()) {
+      fail(first, fmt::format("the bag is encrypted ({}), expected one that is not", *encryptor));
+    }
+    const auto index = number<std::uint64_t>(header, "index_pos");
+    if (index == 0) {
+      fail(first, fmt::format("the bag was not closed and has no index{}", kMend));
+    }
+    if (index > size_) {
+      fail(size_, fmt::format("the bag is cut off: its index begins at byte {}, the file ends at "
+                              "byte {}{}",
+                              index, size_, kMend));
+    }
+    bool index_found = index == size_;
+    for (std::uint64_t offset = header.end; offset < size_;) {
+      const Record record = record_at(offset, size_);
+      index_found = index_found || offset == index;
+      check_record(record);
+      offset = record.end;
+    }
+    if (!index_found) fail(first, fmt::format("no record begins at byte {}, the index's", index));
+  }
+
+  void check_record(const Record& record) {
+    switch (record.op) {
+      case kChunk:
+        check_chunk(record);
+        break;
+      case kIndexData:
+        check_index(record);
+        break;
+      case kChunkInfo: {
+        require_entries(record, 8);
+        const auto position = number<std::uint64_t>(record, "chunk_pos");
+        if (!std::binary_search(chunks_.begin(), chunks_.end(), position)) {
+          fail(record.offset,
+               fmt::format("no chunk begins at byte {}, where the index has one", position));
+        }
+        break;
+      }
+      case kConnection:
+        check_connection(record);
+        break;
+      default:
+        fail(record.offset, fmt::format("expected a record of op 4 to 7, found {}", record.op));
+    }
+  }
+
+  /// The data of a connection is one more header.
+  void check_connection(const Record& record) {
+    std::string data(record.data_bytes(), '\0');
+    read(record.data, data.data(), data.size());
+    for_each_field(record.data, data, [](std::string_view, std::string_view) {});
+  }
+
+  void check_chunk(const Record& record) {
+    chunks_.push_back(record.offset);
+    messages_.clear();
+    const auto bytes = number<std::uint32_t>(record, "size");
+    const std::string_view compression = field(record, "compression").value_or("");
+    if (compression == "none") {
+      if (bytes != record.data_bytes()) {
+        fail(record.offset,
+             fmt::format("expected a chunk of {} bytes, found {}", bytes, record.data_bytes()));
+      }
+      check_messages(record.data, record.end);
+      return;
+    }
+    unpack(record, compression, bytes);
+    if (bytes > 0) check_messages(0, bytes);
+    unpacked_.clear();
+  }
+
+  void unpack(const Record& record, std::string_view compression, std::uint32_t bytes) {
+    constexpr std::uint32_t kLargestChunk = 1U << 30U;
+    if (compression != "bz2" && compression != "lz4") {
+      fail(record.offset,
+           fmt::format("expected a compression of none, bz2 or lz4, found \"{}\"", compression));
+    }
+    if (bytes > kLargestChunk) {
+      fail(record.offset,
+           fmt::format("expected a chunk of at most {} bytes when unpacked, found {}",
+                       kLargestChunk, bytes));
+    }
+    std::vector<std::uint8_t> packed(record.data_bytes());
+    read(record.data, reinterpret_cast<char*>(packed.data()), packed.size());
+    // What the compressed bytes do not fill stays zero and is no record.
+    std::vector<std::uint8_t> unpacked(bytes);
+    try {
+      const Silence silence;
+      rosbag::ChunkedFile().decompress(
+          compression == "bz2" ? rosbag::compression::BZ2 : rosbag::compression::LZ4,
+          unpacked.data(), bytes, packed.data(), static_cast<unsigned>(packed.size()));
+    } catch (const std::exception& error) {
+      fail(record.offset, fmt::format("the chunk cannot be unpacked: {}", error.what()));
+    }
+    unpacked_ = std::move(unpacked);
+  }
+
+  /// Checks the records inside a chunk and notes where messages begin.
+  void check_messages(std::uint64_t begin, std::uint64_t end) {
+    for (std::uint64_t offset = begin; offset < end;) {
+      const Record record = record_at(offset, end);
+      if (record.op == kMessageData) {
+        messages_.push_back(static_cast<std::uint32_t>(offset - begin));
+      } else if (record.op == kConnection) {
+        check_connection(record);
+      } else {
+        fail(offset, fmt::format("expected a message or a connection in the chunk, found op {}",
+                                 record.op));
+      }
+      offset = record.end;
+    }
+  }
+
+  void require_entries(const Record& record, std::uint64_t bytes_each) const {
+    const auto count = number<std::uint32_t>(record, "count");
+    if (count * bytes_each == record.data_bytes()) return;
+    fail(record.offset, fmt::format("expected {} entries of {} bytes, found {} bytes", count,
+                                    bytes_each, record.data_bytes()));
+  }
+
+  void check_index(const Record& record) {
+    constexpr std::size_t kEntryBytes = 12, kOffsetAt = 8;
+    require_entries(record, kEntryBytes);
+    if (chunks_.empty()) fail(record.offset, "an index of messages stands in front of all chunks");
+    std::vector<std::uint8_t> entries(record.data_bytes());
+    read(record.data, reinterpret_cast<char*>(entries.data()), entries.size());
+    for (std::size_t at = 0; at < entries.size(); at += kEntryBytes) {
+      const auto offset = load<std::uint32_t>(entries.data() + at + kOffsetAt);
+      if (!std::binary_search(messages_.begin(), messages_.end(), offset)) {
+        fail(record.data + at, fmt::format("no message begins at byte {} of the chunk, where the "
+                                           "index has one",
+                                           offset));
+      }
+    }
+  }
+
+  std::string path_;
+  std::ifstream stream_;
+  std::uint64_t size_ = 0;
+  std::vector<std::uint64_t> chunks_;
+  std::vector<std::uint32_t> messages_;  ///< where those of the last chunk begin in it
+  std::vector<std::uint8_t> unpacked_;   ///< a compressed chunk while it is looked at
+};
+
+/// The bytes of one serialised message, taken from the front.
+class MessageBytes {
+ public:
+  explicit MessageBytes(std::span<const std::uint8_t> bytes) : left_(bytes) {}
+
+  std::size_t left() const { return left_.size(); }
+
+  std::span<const std::uint8_t> take(std::size_t count, std::string_view what) {
+    require_room(what, count, 1, left());
+    const auto taken = left_.first(count);
+    left_ = left_.subspan(count);
+    return taken;
+  }
+
+  template <class T>
+  T number(std::string_view what) {
+    if (left() < sizeof(T)) {
+      throw BadMessage{fmt::format("expected {} bytes of {}, found {}", sizeof(T), what, left())};
+    }
+    return load<T>(take(sizeof(T), what).data());
+  }
+
+  std::string text(std::string_view what) {
+    const auto bytes = take(number<std::uint32_t>(what), what);
+    return {bytes.begin(), bytes.end()};
+  }
+
+  void require_end() const {
+    if (left() > 0) {
+      throw BadMessage{fmt::format("expected the end of the message, found {} more bytes", left())};
+    }
+  }
+
+ private:
+  std::span<const std::uint8_t> left_;
+};
+
+/// std_msgs/Header: its stamp, not yet checked.
+struct Stamp {
+  std::uint32_t seconds = 0, nanoseconds = 0;
+};
+
+Stamp take_header(MessageBytes& bytes) {
+  bytes.number<std::uint32_t>("the sequence number");
+  Stamp stamp;
+  stamp.seconds = bytes.number<std::uint32_t>("the stamp");
+  stamp.nanoseconds = bytes.number<std::uint32_t>("the stamp");
+  bytes.text("characters of the frame name");
+  return stamp;
+}
+
+void decode_points(MessageBytes bytes, BagMessage& message) {
+  take_header(bytes);
+  message.time_ns = message_time(bytes.number<std::uint64_t>("the time base"));
+  bytes.number<std::uint32_t>("the number of points");
+  bytes.take(4, "bytes of lidar number and reserve");
+  const auto count = bytes.number<std::uint32_t>("the length of the points");
+  require_room("points", count, kCustomPointBytes, bytes.left());
+  message.points.reserve(count);
+  for (std::uint32_t i = 0; i < count; ++i) {
+    const std::uint8_t* at = bytes.take(kCustomPointBytes, "bytes of a point").data();
+    append_point(message, {load<std::uint32_t>(at), load<float>(at + 4), load<float>(at + 8),
+                           load<float>(at + 12), at[16], at[17], at[18]});
+  }
+  bytes.require_end();
+}
+
+void decode_cloud_message(MessageBytes bytes, BagMessage& message) {
+  const Stamp stamp = take_header(bytes);
+  message.time_ns = message_time(std::int64_t{stamp.seconds}, stamp.nanoseconds);
+  CloudLayout layout;
+  layout.height = bytes.number<std::uint32_t>("the height");
+  layout.width = bytes.number<std::uint32_t>("the width");
+  const auto fields = bytes.number<std::uint32_t>("the number of fields");
+  constexpr std::size_t kShortestField = 13;
+  require_room("fields", fields, kShortestField, bytes.left());
+  for (std::uint32_t i = 0; i < fields; ++i) {
+    CloudLayout::Field field;
+    field.name = bytes.text("characters of a field's name");
+    field.offset = bytes.number<std::uint32_t>("a field's offset");
+    field.datatype = bytes.number<std::uint8_t>("a field's datatype");
+    field.count = bytes.number<std::uint32_t>("a field's count");
+    layout.fields.push_back(std::move(field));
+  }
+  layout.big_endian = bytes.number<std::uint8_t>("the byte order") != 0;
+  layout.point_step = bytes.number<std::uint32_t>("the bytes per point");
+  layout.row_step = bytes.number<std::uint32_t>("the bytes per row");
+  const auto data_bytes = bytes.number<std::uint32_t>("the length of the data");
+  const auto data = bytes.take(data_bytes, "bytes of data");
+  bytes.number<std::uint8_t>("the mark of density");
+  bytes.require_end();
+  decode_cloud(layout, data, message);
+}
+
+void decode_imu_message(MessageBytes bytes, BagMessage& message) {
+  constexpr std::size_t kOrientation = 13 * sizeof(double), kCovariance = 9 * sizeof(double);
+  const Stamp stamp = take_header(bytes);
+  message.time_ns = message_time(std::int64_t{stamp.seconds}, stamp.nanoseconds);
+  bytes.take(kOrientation, "bytes of the orientation");
+  for (double& value : message.angular_velocity) value = bytes.number<double>("angular velocity");
+  bytes.take(kCovariance, "bytes of a covariance");
+  for (double& value : message.acceleration) value = bytes.number<double>("acceleration");
+  bytes.take(kCovariance, "bytes of a covariance");
+  bytes.require_end();
+}
+
+class Ros1BagReader final : public MessageReader {
+ public:
+  explicit Ros1BagReader(const std::string& path) : MessageReader(path) {
+    header_.format = kName;
+    BagStructure::check(path);
+    guarded("be opened", [&] {
+      bag_.open(path, rosbag::bagmode::Read);
+      set_topics(find_topics());
+    });
+    rewind();
+    describe();
+  }
+
+  double fraction_read() const override {
+    return message_count_ == 0 ? 1.0 : static_cast<double>(messages_read_) / message_count_;
+  }
+
+ private:
+  using Key = std::pair<std::string, std::string>;  ///< topic and md5
+
+  /// Calls a function of rosbag_storage, whose errors are of many types.
+  template <class Function>
+  void guarded(const char* what, Function&& function) const {
+    const Silence silence;
+    try {
+      function();
+    } catch (const FileError&) {
+      throw;
+    } catch (const rosbag::BagUnindexedException&) {
+      fail(fmt::format("the bag has no index{}", kMend));
+    } catch (const std::exception& error) {
+      fail(fmt::format("the bag cannot {}: {}", what, error.what()));
+    }
+  }
+
+  std::vector<BagTopic> find_topics() {
+    rosbag::View all(bag_);
+    std::vector<std::pair<Key, std::string>> connections;
+    for (const rosbag::ConnectionInfo* connection : all.getConnections()) {
+      connections.emplace_back(Key(connection->topic, connection->md5sum), connection->datatype);
+    }
+    std::sort(connections.begin(), connections.end());
+    std::vector<BagTopic> topics;
+    for (const auto& [key, type] : connections) {
+      // A topic has a connection for every node that sends to it.
+      if (!known_.empty() && known_.back() == key) continue;
+      known_.push_back(key);
+      topics.push_back({key.first, shown_type(type, key.second), kind_of(key.second)});
+    }
+    return topics;
+  }
+
+  std::size_t topic_of(const std::string& name, const std::string& md5) const {
+    const auto found = std::lower_bound(known_.begin(), known_.end(), Key(name, md5));
+    return static_cast<std::size_t>(found - known_.begin());
+  }
+
+  void rewind() override {
+    guarded("be read", [this] {
+      view_ =
+          std::make_unique<rosbag::View>(bag_, [this](const rosbag::ConnectionInfo* connection) {
+            return is_wanted(topic_of(connection->topic, connection->md5sum));
+          });
+      message_count_ = view_->size();
+      position_ = view_->begin();
+    });
+    messages_read_ = 0;
+    topic_messages_.assign(topics().size(), 0);
+  }
+
+  bool next(BagMessage& message) override {
+    if (messages_read_ == message_count_) return false;
+    std::uint64_t number = 0;
+    const std::string where =
+        fmt::format("be read behind message {} of {}", messages_read_, message_count_);
+    guarded(where.c_str(), [&] {
+      if (messages_read_ > 0) ++position_;
+      const rosbag::MessageInstance& instance = *position_;
+      message.topic = topic_of(instance.getTopic(), instance.getMD5Sum());
+      number = ++topic_messages_[message.topic];
+      bytes_.resize(instance.size());
+      ros::serialization::OStream stream(bytes_.data(), instance.size());
+      instance.write(stream);
+    });
+    ++messages_read_;
+    message.points.clear();
+    message.has_intensity = true;
+    const BagTopic& topic = topics()[message.topic];
+    try {
+      const MessageBytes bytes(bytes_);
+      switch (*topic.kind) {
+        case MessageKind::points:
+          decode_points(bytes, message);
+          break;
+        case MessageKind::cloud:
+          decode_cloud_message(bytes, message);
+          break;
+        case MessageKind::imu:
+          decode_imu_message(bytes, message);
+          break;
+      }
+    } catch (const BadMessage& bad) {
+      fail(fmt::format("message {} of topic {} ({}): {}", number, topic.name, topic.type,
+                       bad.problem));
+    }
+    return true;
+  }
+
+  rosbag::Bag bag_;
+  std::unique_ptr<rosbag::View> view_;
+  rosbag::View::iterator position_;
+  std::vector<Key> known_;  ///< by topic, ascending
+  std::uint32_t message_count_ = 0, messages_read_ = 0;
+  std::vector<std::uint64_t> topic_messages_;
+  std::vector<std::uint8_t> bytes_;
+};
+
+}  // namespace
+
+const Format kRos1BagFormat = {
+    kName,
+    "",
+    "bag of ROS 1: messages of Livox drivers, point clouds (read only)",
+    [](std::string_view head) { return head.starts_with(kSignature); },
+    [](const std::string& path) -> std::unique_ptr<Reader> {
+      return std::make_unique<Ros1BagReader>(path);
+    },
+    nullptr,
+};
+
+}  // namespace risley::recordings

@@ -1,0 +1,404 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+// Bags of ROS 2 as rosbag2 stores them by default: a SQLite database whose messages are in CDR.
+// Messages come in the order of their ids, which is that of recording. The database is opened so
+// that nothing is written beside it, unless SQLite's own files there hold a part of it.
+#include <algorithm>
+#include <array>
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <system_error>
+
+#include <fastcdr/Cdr.h>
+#include <fastcdr/FastBuffer.h>
+#include <fastcdr/exceptions/Exception.h>
+#include <fmt/format.h>
+#include <sqlite3.h>
+#if __has_include(<fastcdr/config.h>)
+#include <fastcdr/config.h>
+#endif
+
+#include "risley/core/error.hpp"
+
+#include "recordings/formats/format.hpp"
+#include "recordings/formats/livox_messages.hpp"
+
+namespace risley::recordings {
+namespace {
+
+using namespace std::string_view_literals;
+
+constexpr std::string_view kName = "ros2-bag";
+constexpr std::string_view kSignature = "SQLite format 3\0"sv;
+
+std::optional<MessageKind> kind_of(std::string_view type) {
+  if (type == "livox_interfaces/msg/CustomMsg" || type == "livox_ros_driver2/msg/CustomMsg") {
+    return MessageKind::points;
+  }
+  if (type == "sensor_msgs/msg/PointCloud2") return MessageKind::cloud;
+  if (type == "sensor_msgs/msg/Imu") return MessageKind::imu;
+  return std::nullopt;
+}
+
+/// A message in CDR, read from the front. The two major versions of Fast-CDR differ in names.
+class CdrMessage {
+ public:
+  /// @throws BadMessage, or an exception of Fast-CDR as all its functions do
+  explicit CdrMessage(std::span<const std::uint8_t> bytes)
+      : bytes_(bytes),
+        // Reading changes nothing, but the buffer is of bytes that could be written.
+        buffer_(reinterpret_cast<char*>(const_cast<std::uint8_t*>(bytes.data())), bytes.size()),
+#if defined(FASTCDR_VERSION_MAJOR) && FASTCDR_VERSION_MAJOR >= 2
+        cdr_(buffer_, eprosima::fastcdr::Cdr::DEFAULT_ENDIAN,
+             eprosima::fastcdr::CdrVersion::DDS_CDR)
+#else
+        cdr_(buffer_, eprosima::fastcdr::Cdr::DEFAULT_ENDIAN, eprosima::fastcdr::Cdr::DDS_CDR)
+#endif
+  {
+    constexpr std::size_t kEncapsulationBytes = 4;
+    // Plain CDR, big- or little-endian.
+    if (bytes.size() < kEncapsulationBytes || bytes[0] != 0 || bytes[1] > 1) {
+      throw BadMessage{
+          "expected a message that begins with 00 00 or 00 01, the marks of plain CDR"};
+    }
+    cdr_.read_encapsulation();
+  }
+
+  template <class T>
+  T number() {
+    T value{};
+    cdr_ >> value;
+    return value;
+  }
+
+  std::string text() {
+    std::string value;
+    cdr_ >> value;
+    return value;
+  }
+
+  std::size_t left() const {
+#if defined(FASTCDR_VERSION_MAJOR) && FASTCDR_VERSION_MAJOR >= 2
+    return bytes_.size() - cdr_.get_serialized_data_length();
+#else
+    return bytes_.size() - cdr_.getSerializedDataLength();
+#endif
+  }
+
+  /// Length of a sequence whose elements have at least so many bytes.
+  std::uint32_t length(std::string_view what, std::size_t bytes_each) {
+    const auto count = number<std::uint32_t>();
+    require_room(what, count, bytes_each, left());
+    return count;
+  }
+
+  std::span<const std::uint8_t> byte_sequence(std::string_view what) {
+    const std::size_t count = length(what, 1);
+    const auto bytes = bytes_.subspan(bytes_.size() - left(), count);
+    cdr_.jump(count);
+    return bytes;
+  }
+
+  void skip_doubles(int count) {
+    for (int i = 0; i < count; ++i) number<double>();
+  }
+
+ private:
+  std::span<const std::uint8_t> bytes_;
+  eprosima::fastcdr::FastBuffer buffer_;
+  eprosima::fastcdr::Cdr cdr_;
+};
+
+/// std_msgs/msg/Header: its stamp, not yet checked.
+struct Stamp {
+  std::int32_t seconds = 0;
+  std::uint32_t nanoseconds = 0;
+};
+
+Stamp take_header(CdrMessage& cdr) {
+  Stamp stamp;
+  stamp.seconds = cdr.number<std::int32_t>();
+  stamp.nanoseconds = cdr.number<std::uint32_t>();
+  cdr.text();
+  return stamp;
+}
+
+void decode_points(CdrMessage& cdr, BagMessage& message) {
+  take_header(cdr);
+  message.time_ns = message_time(cdr.number<std::uint64_t>());
+  cdr.number<std::uint32_t>();  // number of points, also in front of them
+  for (int i = 0; i < 4; ++i) cdr.number<std::uint8_t>();  // lidar number and reserve
+  const std::uint32_t count = cdr.length("points", kCustomPointBytes);
+  message.points.reserve(count);
+  for (std::uint32_t i = 0; i < count; ++i) {
+    MessagePoint point;
+    point.offset_ns = cdr.number<std::uint32_t>();
+    point.x = cdr.number<float>();
+    point.y = cdr.number<float>();
+    point.z = cdr.number<float>();
+    point.intensity = cdr.number<std::uint8_t>();
+    point.tag = cdr.number<std::uint8_t>();
+    point.line = cdr.number<std::uint8_t>();
+    append_point(message, point);
+  }
+}
+
+void decode_cloud_message(CdrMessage& cdr, BagMessage& message) {
+  const Stamp stamp = take_header(cdr);
+  message.time_ns = message_time(std::int64_t{stamp.seconds}, stamp.nanoseconds);
+  CloudLayout layout;
+  layout.height = cdr.number<std::uint32_t>();
+  layout.width = cdr.number<std::uint32_t>();
+  constexpr std::size_t kShortestField = 14;
+  const std::uint32_t fields = cdr.length("fields", kShortestField);
+  for (std::uint32_t i = 0; i < fields; ++i) {
+    CloudLayout::Field field;
+    field.name = cdr.text();
+    field.offset = cdr.number<std::uint32_t>();
+    field.datatype = cdr.number<std::uint8_t>();
+    field.count = cdr.number<std::uint32_t>();
+    layout.fields.push_back(std::move(field));
+  }
+  layout.big_endian = cdr.number<std::uint8_t>() != 0;
+  layout.point_step = cdr.number<std::uint32_t>();
+  layout.row_step = cdr.number<std::uint32_t>();
+  decode_cloud(layout, cdr.byte_sequence("values of data"), message);
+}
+
+void decode_imu_message(CdrMessage& cdr, BagMessage& message) {
+  constexpr int kOrientation = 13, kCovariance = 9;
+  const Stamp stamp = take_header(cdr);
+  message.time_ns = message_time(std::int64_t{stamp.seconds}, stamp.nanoseconds);
+  cdr.skip_doubles(kOrientation);
+  for (double& value : message.angular_velocity) value = cdr.number<double>();
+  cdr.skip_doubles(kCovariance);
+  for (double& value : message.acceleration) value = cdr.number<double>();
+}
+
+struct CloseDatabase {
+  void operator()(sqlite3* database) const { sqlite3_close(database); }
+};
+struct FinishStatement {
+  void operator()(sqlite3_stmt* statement) const { sqlite3_finalize(statement); }
+};
+using Database = std::unique_ptr<sqlite3, CloseDatabase>;
+using Statement = std::unique_ptr<sqlite3_stmt, FinishStatement>;
+
+/// A file's path as a URI of SQLite that promises that the file does not change.
+std::string immutable_uri(const std::string& path) {
+  std::string uri = "file:";
+  for (const char c : std::filesystem::absolute(path).string()) {
+    const bool is_special = c == '%' || c == '?' || c == '#';
+    uri += is_special ? fmt::format("%{:02X}", static_cast<unsigned>(c)) : std::string(1, c);
+  }
+  return uri + "?immutable=1";
+}
+
+/// Whether SQLite left a part of the database in a file beside it.
+bool has_journal(const std::string& path) {
+  for (const char* ending : {"-wal", "-journal"}) {
+    std::error_code code;
+    if (const auto bytes = std::filesystem::file_size(path + ending, code); !code && bytes > 0) {
+      return true;
+    }
+  }
+  return false;
+}
+
+/// Bytes that a database should have by its header: those of its pages, as far as it says.
+std::uint64_t bytes_by_header(const std::string& path, std::uint64_t file_bytes) {
+  constexpr std::size_t kPageBytesAt = 16, kChangesAt = 24, kPagesAt = 28, kPagesValidForAt = 92;
+  std::array<unsigned char, 100> head{};
+  std::ifstream stream(path, std::ios::binary);
+  stream.read(reinterpret_cast<char*>(head.data()), static_cast<std::streamsize>(head.size()));
+  if (!stream) return head.size();
+  const auto number = [&head](std::size_t at, std::size_t bytes) {
+    std::uint64_t value = 0;
+    for (std::size_t i = 0; i < bytes; ++i) value = value << 8U | head[at + i];
+    return value;
+  };
+  const std::uint64_t stored = number(kPageBytesAt, 2);
+  const std::uint64_t page_bytes = stored == 1 ? 65'536 : std::max<std::uint64_t>(stored, 1);
+  if (number(kChangesAt, 4) == number(kPagesValidForAt, 4)) return number(kPagesAt, 4) * page_bytes;
+  return (file_bytes + page_bytes - 1) / page_bytes * page_bytes;
+}
+
+class Ros2BagReader final : public MessageReader {
+ public:
+  explicit Ros2BagReader(const std::string& path) : MessageReader(path) {
+    header_.format = kName;
+    open_database();
+    set_topics(find_topics());
+    find_ids();
+    messages_ = prepare("SELECT id, topic_id, data FROM messages ORDER BY id");
+    describe();
+  }
+
+  double fraction_read() const override {
+    if (ended_ || last_id_ <= first_id_) return ended_ ? 1.0 : 0.0;
+    const double part = (static_cast<double>(id_) - static_cast<double>(first_id_)) /
+                        (static_cast<double>(last_id_) - static_cast<double>(first_id_));
+    return std::min(std::max(part, 0.0), 1.0);
+  }
+
+ private:
+  [[noreturn]] void fail_database(const char* what) const {
+    fail(fmt::format("the database cannot {}: {}", what,
+                     database_ ? sqlite3_errmsg(database_.get()) : "no memory"));
+  }
+
+  void open_database() {
+    const bool as_it_is = has_journal(path());
+    const std::string name = as_it_is ? path() : immutable_uri(path());
+    sqlite3* database = nullptr;
+    const int flags = SQLITE_OPEN_READONLY | (as_it_is ? 0 : SQLITE_OPEN_URI);
+    const int result = sqlite3_open_v2(name.c_str(), &database, flags, nullptr);
+    database_.reset(database);
+    if (result != SQLITE_OK) fail_database("be opened");
+    if (!as_it_is) require_all_pages();
+  }
+
+  /// SQLite reads what is missing at the end as zeros, which would make points of them.
+  void require_all_pages() const {
+    std::error_code code;
+    const std::uint64_t found = std::filesystem::file_size(path(), code);
+    if (code) fail(fmt::format("cannot be read: {}", code.message()));
+    const std::uint64_t expected = bytes_by_header(path(), found);
+    if (found >= expected) return;
+    throw FileError(path(), {found, {}},
+                    fmt::format("the database is cut off: expected {} bytes, found {}; the command "
+                                "`.recover` of sqlite3 saves what is left",
+                                expected, found));
+  }
+
+  Statement prepare(const std::string& query) const {
+    sqlite3_stmt* statement = nullptr;
+    if (sqlite3_prepare_v2(database_.get(), query.c_str(), -1, &statement, nullptr) != SQLITE_OK) {
+      fail_database("be read as a bag of ROS 2");
+    }
+    return Statement(statement);
+  }
+
+  bool step(sqlite3_stmt* statement, const char* what) const {
+    const int result = sqlite3_step(statement);
+    if (result == SQLITE_ROW) return true;
+    if (result != SQLITE_DONE) fail_database(what);
+    return false;
+  }
+
+  static std::string text_column(sqlite3_stmt* statement, int column) {
+    const unsigned char* text = sqlite3_column_text(statement, column);
+    const auto bytes = static_cast<std::size_t>(sqlite3_column_bytes(statement, column));
+    return text == nullptr ? std::string() : std::string(text, text + bytes);
+  }
+
+  std::vector<BagTopic> find_topics() {
+    const Statement query =
+        prepare("SELECT id, name, type, serialization_format FROM topics ORDER BY name, id");
+    std::vector<BagTopic> topics;
+    while (step(query.get(), "give its topics")) {
+      BagTopic topic;
+      topic.name = text_column(query.get(), 1);
+      topic.type = text_column(query.get(), 2);
+      topic.kind = kind_of(topic.type);
+      const std::string serialization = text_column(query.get(), 3);
+      if (topic.kind && serialization != "cdr") {
+        topic.kind.reset();
+        topic.type += fmt::format(", stored as \"{}\" instead of cdr", serialization);
+      }
+      ids_.push_back(sqlite3_column_int64(query.get(), 0));
+      topics.push_back(std::move(topic));
+    }
+    return topics;
+  }
+
+  void find_ids() {
+    // Each alone is found at one end of the table.
+    const Statement first = prepare("SELECT MIN(id) FROM messages");
+    const Statement last = prepare("SELECT MAX(id) FROM messages");
+    // A damaged end is no reason to keep back what stands in front of it.
+    if (sqlite3_step(first.get()) == SQLITE_ROW) first_id_ = sqlite3_column_int64(first.get(), 0);
+    if (sqlite3_step(last.get()) == SQLITE_ROW) last_id_ = sqlite3_column_int64(last.get(), 0);
+    id_ = first_id_;
+  }
+
+  void rewind() override {
+    sqlite3_reset(messages_.get());  // returns the last error again, which was reported
+    id_ = first_id_;
+    ended_ = false;
+  }
+
+  std::optional<std::size_t> topic_of(sqlite3_int64 id) const {
+    for (std::size_t i = 0; i < ids_.size(); ++i) {
+      if (ids_[i] == id && is_wanted(i)) return i;
+    }
+    return std::nullopt;
+  }
+
+  bool next(BagMessage& message) override {
+    if (ended_) return false;  // stepping again would begin anew
+    while (step(messages_.get(), "be read to its end")) {
+      id_ = sqlite3_column_int64(messages_.get(), 0);
+      const auto topic = topic_of(sqlite3_column_int64(messages_.get(), 1));
+      if (!topic) continue;
+      message.topic = *topic;
+      decode(message);
+      return true;
+    }
+    ended_ = true;
+    return false;
+  }
+
+  void decode(BagMessage& message) const {
+    const BagTopic& topic = topics()[message.topic];
+    const auto fail_here = [&](const std::string& problem) {
+      fail(
+          fmt::format("message row {} of topic {} ({}): {}", id_, topic.name, topic.type, problem));
+    };
+    const void* blob = sqlite3_column_blob(messages_.get(), 2);
+    const auto blob_bytes = static_cast<std::size_t>(sqlite3_column_bytes(messages_.get(), 2));
+    message.points.clear();
+    message.has_intensity = true;
+    try {
+      CdrMessage cdr({static_cast<const std::uint8_t*>(blob), blob == nullptr ? 0 : blob_bytes});
+      switch (*topic.kind) {
+        case MessageKind::points:
+          decode_points(cdr, message);
+          break;
+        case MessageKind::cloud:
+          decode_cloud_message(cdr, message);
+          break;
+        case MessageKind::imu:
+          decode_imu_message(cdr, message);
+          break;
+      }
+    } catch (const BadMessage& bad) {
+      fail_here(bad.problem);
+    } catch (const eprosima::fastcdr::exception::Exception& error) {
+      fail_here(
+          fmt::format("expected more than its {} bytes of CDR ({})", blob_bytes, error.what()));
+    }
+  }
+
+  Database database_;
+  std::vector<sqlite3_int64> ids_;  ///< by topic
+  sqlite3_int64 first_id_ = 0, last_id_ = 0, id_ = 0;
+  bool ended_ = false;
+  Statement messages_;  // after database_: finished before it is closed
+};
+
+}  // namespace
+
+const Format kRos2BagFormat = {
+    kName,
+    "",
+    "bag of ROS 2 in SQLite (.db3): messages of Livox drivers, point clouds (read only)",
+    [](std::string_view head) { return head.starts_with(kSignature); },
+    [](const std::string& path) -> std::unique_ptr<Reader> {
+      return std::make_unique<Ros2BagReader>(path);
+    },
+    nullptr,
+};
+
+}  // namespace risley::recordings

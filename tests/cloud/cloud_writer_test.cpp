@@ -1,0 +1,94 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "risley/cloud/cloud_writer.hpp"
+
+#include <algorithm>
+#include <filesystem>
+#include <set>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "risley/core/error.hpp"
+
+namespace risley::cloud {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::ThrowsMessage;
+
+TEST(CloudFormats, HaveNamesEndingsAndDescriptions) {
+  std::set<std::string> names;
+  for (const CloudFormat& format : cloud_formats()) {
+    EXPECT_TRUE(names.insert(format.name).second) << format.name;
+    EXPECT_TRUE(format.ending.starts_with('.')) << format.name;
+    EXPECT_FALSE(format.description.empty()) << format.name;
+  }
+  EXPECT_TRUE(names.contains("las-1.4"));
+  EXPECT_TRUE(names.contains("las-1.2"));
+}
+
+TEST(CloudFormats, AreFoundByEnding) {
+  EXPECT_EQ(find_cloud_format("folder/cloud.las", "").name, "las-1.4");
+  EXPECT_EQ(find_cloud_format("CLOUD.LAS", "").name, "las-1.4");
+  EXPECT_EQ(find_cloud_format("cloud.tar.las", "").name, "las-1.4");
+}
+
+TEST(CloudFormats, AreFoundByNameWhateverTheEnding) {
+  EXPECT_EQ(find_cloud_format("cloud.las", "las-1.2").name, "las-1.2");
+  EXPECT_EQ(find_cloud_format("cloud", "las-1.4").name, "las-1.4");
+  for (const CloudFormat& format : cloud_formats()) {
+    EXPECT_EQ(find_cloud_format("cloud.anything", format.name).ending, format.ending);
+  }
+}
+
+TEST(CloudFormats, EveryEndingHasADefault) {
+  for (const CloudFormat& format : cloud_formats()) {
+    EXPECT_EQ(find_cloud_format("cloud" + format.ending, "").ending, format.ending);
+  }
+}
+
+TEST(CloudFormats, UnknownEndingsAreRefusedWithTheKnownOnes) {
+  for (const char* path : {"cloud.docx", "cloud", "las", ""}) {
+    EXPECT_THAT([path] { find_cloud_format(path, ""); },
+                ThrowsMessage<InvalidArgument>(
+                    AllOf(HasSubstr(path), HasSubstr("unknown ending"), HasSubstr(".las"))));
+  }
+}
+
+TEST(CloudFormats, UnknownFormatsAreRefusedWithTheKnownOnes) {
+  EXPECT_THAT([] { find_cloud_format("cloud.las", "las-1.3"); },
+              ThrowsMessage<InvalidArgument>(AllOf(HasSubstr("format = las-1.3"),
+                                                   HasSubstr("las-1.4"), HasSubstr("las-1.2"))));
+  EXPECT_THAT([] { find_cloud_format("cloud.las", "LAS-1.4"); },
+              ThrowsMessage<InvalidArgument>(HasSubstr("format = LAS-1.4")));
+}
+
+TEST(CloudFormats, LazNeedsLaszip) {
+  const auto& formats = cloud_formats();
+  const bool has_laz = std::any_of(formats.begin(), formats.end(),
+                                   [](const auto& format) { return format.name == "laz"; });
+  if (has_laz) {
+    EXPECT_EQ(find_cloud_format("cloud.laz", "").name, "laz");
+    return;
+  }
+  EXPECT_THAT([] { find_cloud_format("cloud.laz", ""); },
+              ThrowsMessage<InvalidArgument>(AllOf(HasSubstr("LASzip"), HasSubstr(".las"))));
+  EXPECT_THROW(find_cloud_format("cloud.las", "laz"), InvalidArgument);
+}
+
+TEST(CreateCloud, RefusesWhatFindCloudFormatRefuses) {
+  EXPECT_THROW(create_cloud("cloud.docx", {}), InvalidArgument);
+  EXPECT_THROW(create_cloud("cloud.las", {}, {"no-format", 1e-4, true}), InvalidArgument);
+  EXPECT_FALSE(std::filesystem::exists("cloud.docx"));
+  EXPECT_FALSE(std::filesystem::exists("cloud.las"));
+}
+
+TEST(CreateCloud, RefusesMissingFolders) {
+  const auto folder = std::filesystem::temp_directory_path() / "risley-no-such-folder";
+  EXPECT_THROW(create_cloud((folder / "cloud.las").string(), {}), FileError);
+}
+
+}  // namespace
+}  // namespace risley::cloud

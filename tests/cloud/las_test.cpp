@@ -1,0 +1,532 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <limits>
+#include <random>
+#include <utility>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include "risley/cloud/cloud_writer.hpp"
+#include "risley/core/error.hpp"
+
+#include "cloud/formats/las_layout.hpp"
+#include "cloud/las_checker.hpp"
+
+namespace risley::cloud {
+namespace {
+
+using recordings::TimeReference;
+using testing::AllOf;
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+constexpr double kPi = 3.14159265358979323846;
+
+/// What a file's extra bytes must hold, worked out apart from the writer.
+struct Expected {
+  std::string name;
+  std::function<double(const Points&, std::size_t)> value;
+};
+
+std::vector<Expected> expected_floats(const CloudHeader& header) {
+  std::vector<Expected> list;
+  const auto degrees = [](double radians) { return radians * (180.0 / kPi); };
+  if (header.has_covariance) {
+    const std::pair<const char*, int> terms[] = {{"VarianceX", 0},    {"VarianceY", 3},
+                                                 {"VarianceZ", 5},    {"CovarianceXY", 1},
+                                                 {"CovarianceXZ", 2}, {"CovarianceYZ", 4}};
+    const std::pair<const char*, int> deviations[] = {{"StdX", 0}, {"StdY", 3}, {"StdZ", 5}};
+    for (const auto& [name, term] : deviations) {
+      list.push_back({name, [term = static_cast<std::size_t>(term)](const Points& p, auto i) {
+                        return std::sqrt(p.covariance[term][i]);
+                      }});
+    }
+    for (const auto& [name, term] : terms) {
+      list.push_back({name, [term = static_cast<std::size_t>(term)](const Points& p, auto i) {
+                        return p.covariance[term][i];
+                      }});
+    }
+  }
+  list.push_back({"LidarRange", [](const Points& p, auto i) { return p.range[i]; }});
+  list.push_back(
+      {"IncidenceAngle", [=](const Points& p, auto i) { return degrees(p.incidence[i]); }});
+  if (header.has_rotation_angles) {
+    for (std::size_t k = 0; k < static_cast<std::size_t>(header.prisms); ++k) {
+      list.push_back({"PrismAngle" + std::to_string(k + 1),
+                      [=](const Points& p, auto i) { return degrees(p.rotation_angle[k][i]); }});
+    }
+    list.push_back({"ResidualAzimuth",
+                    [=](const Points& p, auto i) { return degrees(p.azimuth_residual[i]); }});
+    list.push_back(
+        {"ResidualZenith", [=](const Points& p, auto i) { return degrees(p.zenith_residual[i]); }});
+  }
+  for (std::size_t k = 0; k < header.factors.size(); ++k) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      list.push_back({"Loading" + std::to_string(k + 1) + "XYZ"[axis],
+                      [=](const Points& p, auto i) { return p.loading[k][axis][i]; }});
+    }
+  }
+  return list;
+}
+
+Points random_points(const CloudHeader& header, std::size_t rows, unsigned seed = 1) {
+  std::mt19937_64 generator(seed);
+  const auto fill = [&generator](std::vector<double>& column, double low, double high) {
+    std::uniform_real_distribution<double> values(low, high);
+    for (double& value : column) value = values(generator);
+  };
+  Points points;
+  header.resize(points, rows);
+  for (auto* column : {&points.x, &points.y, &points.z}) fill(*column, -260.0, 260.0);
+  for (auto& column : points.covariance) fill(column, 0.0, 1e-4);
+  for (auto& column : points.rotation_angle) fill(column, 0.0, 2 * kPi);
+  fill(points.range, 0.1, 260.0);
+  fill(points.incidence, 0.0, kPi / 2);
+  fill(points.azimuth_residual, -1e-3, 1e-3);
+  fill(points.zenith_residual, -1e-3, 1e-3);
+  for (auto& factor : points.loading) {
+    for (auto& column : factor) fill(column, -0.01, 0.01);
+  }
+  for (std::size_t i = 0; i < rows; ++i) {
+    points.time_ns[i] = 123'456'789 + static_cast<std::int64_t>(i) * 10'000;
+    points.intensity[i] = static_cast<std::uint8_t>(generator());
+    points.number_of_returns[i] = static_cast<std::uint8_t>(1 + generator() % 3);
+    points.return_number[i] =
+        static_cast<std::uint8_t>(1 + generator() % points.number_of_returns[i]);
+    points.tag[i] = static_cast<std::uint8_t>(generator());
+    points.beam[i] = static_cast<std::uint8_t>(generator() % 6);
+    if (i % 7 == 3) points.incidence[i] = std::numeric_limits<double>::quiet_NaN();
+  }
+  return points;
+}
+
+template <class Column>
+Column part(const Column& column, std::size_t first, std::size_t rows) {
+  if (column.empty()) return {};
+  const auto begin = column.begin() + static_cast<std::ptrdiff_t>(first);
+  return Column(begin, begin + static_cast<std::ptrdiff_t>(rows));
+}
+
+Points slice(const Points& points, std::size_t first, std::size_t rows) {
+  Points piece = points;
+  const auto cut = [=](auto& column) { column = part(column, first, rows); };
+  cut(piece.time_ns);
+  for (auto* column : {&piece.x, &piece.y, &piece.z, &piece.range, &piece.incidence,
+                       &piece.azimuth_residual, &piece.zenith_residual}) {
+    cut(*column);
+  }
+  for (auto& column : piece.covariance) cut(column);
+  for (auto& column : piece.rotation_angle) cut(column);
+  for (auto* column : {&piece.intensity, &piece.return_number, &piece.number_of_returns, &piece.tag,
+                       &piece.beam}) {
+    cut(*column);
+  }
+  for (auto& factor : piece.loading) {
+    for (auto& column : factor) cut(column);
+  }
+  return piece;
+}
+
+class LasTest : public testing::Test {
+ protected:
+  LasTest() {
+    static int count = 0;
+    folder_ = std::filesystem::temp_directory_path() /
+              ("risley-las-" + std::to_string(::getpid()) + "-" + std::to_string(++count));
+    std::filesystem::create_directories(folder_);
+    header_.sensor = "mid-40";
+    header_.serial = "0TFDG3B006H2Z11";
+    header_.provenance = {{"command", "risley cloud"}, {"version", "0.1.0"}};
+  }
+  ~LasTest() override {
+    std::error_code ignored;
+    std::filesystem::remove_all(folder_, ignored);
+  }
+
+  std::string path(const std::string& name = "cloud.las") const {
+    return (folder_ / name).string();
+  }
+
+  bool folder_is_empty() const { return std::filesystem::is_empty(folder_); }
+
+  /// Writes all points in pieces of these lengths, again and again.
+  void write(const Points& points, std::vector<std::size_t> pieces = {100'000}) {
+    const auto writer = create_cloud(path(), header_, options_);
+    std::size_t first = 0;
+    for (std::size_t k = 0; first < points.size(); ++k) {
+      const std::size_t rows = std::min(pieces[k % pieces.size()], points.size() - first);
+      writer->write(rows == points.size() ? points : slice(points, first, rows));
+      first += rows;
+    }
+    writer->close();
+  }
+
+  std::string bytes() const {
+    std::ifstream stream(path(), std::ios::binary);
+    return {std::istreambuf_iterator<char>(stream), {}};
+  }
+
+  /// The message of the exception that writing ends with; the writer is gone after it.
+  template <class Exception>
+  std::string refusal(const Points& points, std::vector<std::size_t> pieces = {100'000}) {
+    try {
+      write(points, std::move(pieces));
+    } catch (const Exception& error) {
+      EXPECT_TRUE(folder_is_empty());
+      return error.what();
+    }
+    ADD_FAILURE() << "nothing was thrown";
+    return {};
+  }
+
+  void expect_equal(const las_checker::File& file, const Points& points) const {
+    ASSERT_EQ(file.points.size(), points.size());
+    const std::vector<Expected> floats = expected_floats(header_);
+    std::vector<std::string> names, expected_names;
+    for (const auto& field : file.extra) names.push_back(field.name);
+    for (const auto& field : floats) expected_names.push_back(field.name);
+    expected_names.insert(expected_names.end(), {"Tag", "Beam"});
+    ASSERT_EQ(names, expected_names);
+
+    const double scale = options_.las_scale;
+    EXPECT_THAT(file.scale, ElementsAre(scale, scale, scale));
+    EXPECT_THAT(file.offset, ElementsAre(0, 0, 0));
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const las_checker::Point& point = file.points[i];
+      const std::array<double, 3> xyz{points.x[i], points.y[i], points.z[i]};
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        ASSERT_EQ(point.xyz[axis], std::llrint(xyz[axis] / scale)) << i;
+      }
+      ASSERT_EQ(point.intensity, points.intensity[i] * 256) << i;
+      ASSERT_EQ(point.return_number, points.return_number[i]) << i;
+      ASSERT_EQ(point.number_of_returns, points.number_of_returns[i]) << i;
+      ASSERT_EQ(point.point_source, 1);
+      ASSERT_EQ(point.classification | point.user_data | point.scan_angle | point.scanner_channel,
+                0);
+      if (!file.gps_time) {
+        ASSERT_DOUBLE_EQ(point.gps_time, static_cast<double>(points.time_ns[i]) * 1e-9) << i;
+      }
+      for (std::size_t k = 0; k < floats.size(); ++k) {
+        const float stored = file.real(i, file.extra[k]);
+        const float expected = static_cast<float>(floats[k].value(points, i));
+        if (std::isnan(expected)) {
+          ASSERT_TRUE(std::isnan(stored)) << floats[k].name << i;
+        } else {
+          ASSERT_EQ(stored, expected) << floats[k].name << i;
+        }
+      }
+      ASSERT_EQ(file.byte(i, file.field("Tag")), points.tag[i]) << i;
+      ASSERT_EQ(file.byte(i, file.field("Beam")), points.beam[i]) << i;
+    }
+  }
+
+  std::filesystem::path folder_;
+  CloudHeader header_;
+  CloudWriterOptions options_;
+};
+
+/// Format, whether there are covariances and rotation angles, prisms, common factors.
+struct Variant {
+  const char* format;
+  bool covariance, angles;
+  int prisms;
+  std::size_t factors;
+};
+
+class LasVariants : public LasTest, public testing::WithParamInterface<Variant> {
+ protected:
+  LasVariants() {
+    options_.format = GetParam().format;
+    header_.has_covariance = GetParam().covariance;
+    header_.has_rotation_angles = GetParam().angles;
+    header_.prisms = GetParam().prisms;
+    header_.factors.assign(GetParam().factors, "factor");
+  }
+};
+
+TEST_P(LasVariants, KeepsEveryFieldOfEveryPoint) {
+  for (const std::size_t rows : {0, 1, 2, 3, 255, 256, 257, 4097}) {
+    const Points points = random_points(header_, rows);
+    write(points, {1, 300, 0, 5, 1021});
+    const las_checker::File file = las_checker::read(path());
+    EXPECT_EQ(file.minor_version, GetParam().format == std::string("las-1.4") ? 4 : 2);
+    EXPECT_FALSE(file.gps_time);
+    EXPECT_EQ(file.creation_year, 0);
+    ASSERT_NO_FATAL_FAILURE(expect_equal(file, points)) << rows;
+  }
+}
+
+TEST_P(LasVariants, PiecesMakeNoDifference) {
+  const Points points = random_points(header_, 3000);
+  write(points);
+  const std::string whole = bytes();
+  write(points);
+  EXPECT_TRUE(bytes() == whole) << "the same points gave other bytes";
+  write(points, {7, 256, 999});
+  EXPECT_TRUE(bytes() == whole);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    All, LasVariants,
+    testing::Values(Variant{"las-1.4", true, true, 2, 0}, Variant{"las-1.4", false, true, 3, 0},
+                    Variant{"las-1.4", true, false, 2, 4}, Variant{"las-1.4", false, false, 2, 0},
+                    Variant{"las-1.2", true, true, 3, 2}, Variant{"las-1.2", false, false, 2, 0}));
+
+TEST_F(LasTest, ManyBlocksOfTheBuffer) {
+  const Points points = random_points(header_, 40'000);  // several MB
+  write(points, {9973});
+  expect_equal(las_checker::read(path()), points);
+}
+
+TEST_F(LasTest, HeaderSaysWhoAndHow) {
+  write(random_points(header_, 3));
+  const las_checker::File file = las_checker::read(path());
+  EXPECT_EQ(file.system_identifier, "Livox Mid-40 0TFDG3B006H2Z11");
+  EXPECT_EQ(file.generating_software, "risley 0.1.0");
+  const auto* text = file.record("LASF_Spec", 3);
+  ASSERT_NE(text, nullptr);
+  EXPECT_EQ(text->data, std::string("command = risley cloud\nversion = 0.1.0\n") + '\0');
+  EXPECT_THAT(file.record("LASF_Projection", 2112)->data, HasSubstr("UNIT[\"metre\",1]"));
+  EXPECT_EQ(file.field("StdX").description, "1 sigma of X (m)");
+}
+
+TEST_F(LasTest, HeaderOfAnUnknownSensor) {
+  header_.sensor = "Gerät \"7\" with a name that is much too long for its field";
+  header_.serial.clear();
+  header_.provenance.clear();
+  write(random_points(header_, 1));
+  las_checker::File file = las_checker::read(path());
+  EXPECT_EQ(file.system_identifier.size(), 32U);
+  EXPECT_THAT(file.system_identifier, testing::StartsWith("Ger"));
+  EXPECT_EQ(file.generating_software, "risley");
+  EXPECT_EQ(file.record("LASF_Spec", 3), nullptr);
+
+  header_.sensor.clear();
+  write(random_points(header_, 1));
+  file = las_checker::read(path());
+  EXPECT_EQ(file.system_identifier, "OTHER");
+}
+
+TEST_F(LasTest, BoundingBoxIsThatOfTheRoundedCoordinates) {
+  options_.las_scale = 0.01;
+  Points points = random_points(header_, 3);
+  points.x = {1.2349, -0.004, 0.0};
+  points.y = {-7.126, -7.124, -7.0};
+  points.z = {0.005, 0.015, 0.025};  // ties, as far as these are
+  write(points);
+  const las_checker::File file = las_checker::read(path());
+  EXPECT_EQ(file.low[0], 0.0);
+  EXPECT_EQ(file.high[0], 123 * 0.01);
+  EXPECT_EQ(file.low[1], -713 * 0.01);
+  EXPECT_EQ(file.high[1], -700 * 0.01);
+}
+
+TEST_F(LasTest, FinerScale) {
+  options_.las_scale = 1e-5;
+  const Points points = random_points(header_, 500);
+  write(points);
+  const las_checker::File file = las_checker::read(path());
+  expect_equal(file, points);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    EXPECT_NEAR(file.points[i].xyz[2] * 1e-5, points.z[i], 0.5e-5 * (1 + 1e-9));
+  }
+}
+
+TEST_F(LasTest, RefusesScalesThatAreNone) {
+  for (const double scale : {0.0, -1e-3, std::numeric_limits<double>::quiet_NaN(),
+                             std::numeric_limits<double>::infinity()}) {
+    options_.las_scale = scale;
+    EXPECT_THAT(refusal<InvalidArgument>({}), HasSubstr("las_scale"));
+  }
+}
+
+TEST_F(LasTest, CoordinatesAtTheLimit) {
+  options_.las_scale = 1.0;
+  Points points = random_points(header_, 2);
+  points.x = {2147483647.0, -2147483647.0};
+  write(points);
+  expect_equal(las_checker::read(path()), points);
+  points.x[1] = 2147483648.0;
+  std::filesystem::remove(path());
+  EXPECT_THAT(refusal<InvalidArgument>(points), HasSubstr("point 2: X"));
+}
+
+TEST_F(LasTest, CoordinatesThatDoNotFit) {
+  // At every place of a block, so that each lane and the remainder are looked at.
+  for (const std::size_t wrong : {0, 1, 255, 256, 1000, 1001, 1002}) {
+    Points points = random_points(header_, 1003);
+    points.y[wrong] = -214748.4;
+    const std::string message = refusal<InvalidArgument>(points, {400, 1, 602});
+    EXPECT_THAT(message,
+                AllOf(HasSubstr("point " + std::to_string(wrong + 1) + ": Y = -214748.4 m"),
+                      HasSubstr("allowed -214748.3647 to 214748.3647 m")));
+    points.y[wrong] = 1.0;
+    for (const double value :
+         {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
+      points.z[wrong] = value;
+      EXPECT_THAT(refusal<InvalidArgument>(points),
+                  HasSubstr("point " + std::to_string(wrong + 1) + ": Z = "));
+    }
+  }
+}
+
+TEST_F(LasTest, AfterARefusalTheFileCannotBeCompleted) {
+  Points points = random_points(header_, 10);
+  const auto writer = create_cloud(path(), header_, options_);
+  writer->write(points);
+  points.x[3] = 1e9;
+  EXPECT_THROW(writer->write(points), InvalidArgument);
+  points.x[3] = 1;
+  EXPECT_THROW(writer->write(points), FileError);
+  EXPECT_THROW(writer->close(), FileError);
+  EXPECT_FALSE(std::filesystem::exists(path()));
+}
+
+TEST_F(LasTest, NothingIsLeftWithoutClose) {
+  { create_cloud(path(), header_, options_)->write(random_points(header_, 10)); }
+  EXPECT_TRUE(folder_is_empty());
+}
+
+TEST_F(LasTest, RefusesReturnsThatDoNotFit) {
+  Points points = random_points(header_, 600);
+  points.number_of_returns[511] = points.return_number[511] = 0;
+  EXPECT_THAT(refusal<InvalidArgument>(points),
+              HasSubstr("point 512: number_of_returns = 0, allowed 1 to 15"));
+  points.number_of_returns[511] = 3;
+  EXPECT_THAT(refusal<InvalidArgument>(points),
+              HasSubstr("point 512: return_number = 0, allowed 1 to 3"));
+  points.return_number[511] = 4;
+  EXPECT_THAT(refusal<InvalidArgument>(points),
+              HasSubstr("point 512: return_number = 4, allowed 1 to 3"));
+  points.number_of_returns[511] = 16;
+  EXPECT_THAT(refusal<InvalidArgument>(points), HasSubstr("allowed 1 to 15"));
+  points.number_of_returns[511] = 6;
+  options_.format = "las-1.2";
+  EXPECT_THAT(refusal<InvalidArgument>(points), HasSubstr("allowed 1 to 5"));
+}
+
+TEST_F(LasTest, AllReturnsThatLas14Counts) {
+  Points points = random_points(header_, 15);
+  for (std::size_t i = 0; i < 15; ++i) {
+    points.number_of_returns[i] = 15;
+    points.return_number[i] = static_cast<std::uint8_t>(i + 1);
+  }
+  write(points);
+  const las_checker::File file = las_checker::read(path());
+  EXPECT_THAT(file.points_by_return, testing::Each(1U));
+  expect_equal(file, points);
+}
+
+TEST_F(LasTest, RefusesColumnsOfOtherLengths) {
+  Points points = random_points(header_, 10);
+  points.beam.pop_back();
+  EXPECT_THAT(refusal<InvalidArgument>(points), HasSubstr("beam has 9 rows, time_ns has 10"));
+  points = random_points(header_, 10);
+  points.rotation_angle.pop_back();
+  EXPECT_THAT(refusal<InvalidArgument>(points), HasSubstr("rotation_angle has 1 columns"));
+}
+
+TEST_F(LasTest, RefusesMoreFactorsAndProvenanceThanThereIsRoomFor) {
+  header_.factors.assign(200, "factor");
+  EXPECT_THAT(refusal<InvalidArgument>({}), HasSubstr("factors = 200, allowed up to 108"));
+  header_.factors.assign(108, "factor");
+  const Points points = random_points(header_, 5);
+  write(points);
+  expect_equal(las_checker::read(path()), points);
+  std::filesystem::remove(path());
+  header_.provenance.emplace_back("command", std::string(70'000, 'x'));
+  EXPECT_THAT(refusal<InvalidArgument>({}), HasSubstr("provenance"));
+}
+
+TEST_F(LasTest, Las12CountsWith32Bits) {
+  las::Layout layout(las::Version::las_1_2, header_, options_);
+  const Points points = random_points(header_, 2);
+  std::vector<std::uint8_t> record(2 * layout.record_bytes());
+  las::Summary summary;
+  summary.points = 4'294'967'294;
+  EXPECT_THROW(layout.pack(points, 0, 2, record.data(), summary), InvalidArgument);
+  EXPECT_NO_THROW(layout.pack(points, 0, 1, record.data(), summary));
+  EXPECT_EQ(summary.points, 4'294'967'295);
+  EXPECT_THROW(layout.pack(points, 1, 1, record.data(), summary), InvalidArgument);
+}
+
+TEST_F(LasTest, FoldersThatAreNotThere) {
+  EXPECT_THROW(create_cloud(path("missing/cloud.las"), header_, options_), FileError);
+  EXPECT_THROW(create_cloud(folder_.string() + "/.", header_, {"las-1.4", 1e-4, true}), FileError);
+}
+
+TEST_F(LasTest, FullDisk) {
+  const std::string temporary = path() + ".part-" + std::to_string(::getpid());
+  for (const std::size_t rows : {10, 40'000}) {  // found out by close() and by write()
+    std::filesystem::create_symlink("/dev/full", temporary);
+    EXPECT_THAT(refusal<FileError>(random_points(header_, rows)), HasSubstr("cannot be written"));
+  }
+}
+
+TEST_F(LasTest, GpsTime) {
+  // 2021-08-26 is day 18865 since 1970, a Thursday: 18865 * 86400 + 7 * 3600 + 1.5 = 1629961201.5
+  // s. GPS week 2172 began on Sunday 2021-08-22, 2172 * 604800 = 1313625600 s after 1980-01-06;
+  // four days, seven hours, 1.5 s and 18 leap seconds later it is 1313996419.5 s.
+  header_.time_reference = TimeReference::utc;
+  Points points = random_points(header_, 5);
+  points.time_ns = {1'629'961'201'500'000'000, 1'483'228'800'000'000'000, 1'483'228'799'000'000'000,
+                    1'435'708'799'750'000'000, 1'341'100'799'000'000'000};
+  for (const char* format : {"las-1.4", "las-1.2"}) {
+    options_.format = format;
+    options_.gps_time = true;
+    write(points);
+    las_checker::File file = las_checker::read(path());
+    EXPECT_TRUE(file.gps_time);
+    EXPECT_EQ(file.creation_day, 238);
+    EXPECT_EQ(file.creation_year, 2021);
+    EXPECT_EQ(file.points[0].gps_time, 313'996'419.5);
+    // GPS time at leap seconds: 1167264018 s at 2017-01-01, 1119744017 s at 2015-07-01 and
+    // 1025136016 s at 2012-07-01 is the first second after each.
+    EXPECT_EQ(file.points[1].gps_time, 167'264'018.0);
+    EXPECT_EQ(file.points[2].gps_time, 167'264'018.0 - 2);
+    EXPECT_EQ(file.points[3].gps_time, 119'744'017.0 - 1.25);
+    EXPECT_EQ(file.points[4].gps_time, 25'136'016.0 - 2);
+
+    options_.gps_time = false;
+    write(points);
+    file = las_checker::read(path());
+    EXPECT_FALSE(file.gps_time);
+    EXPECT_EQ(file.points[0].gps_time, 1'629'961'201.5);
+    EXPECT_EQ(file.creation_day, 238);
+  }
+}
+
+TEST_F(LasTest, OtherClocksAreNotGpsTime) {
+  for (const auto reference :
+       {TimeReference::relative, TimeReference::power_on, TimeReference::ptp, TimeReference::pps}) {
+    header_.time_reference = reference;
+    Points points = random_points(header_, 2);
+    points.time_ns = {0, 987'654'321'012'345'678};
+    write(points);
+    const las_checker::File file = las_checker::read(path());
+    EXPECT_FALSE(file.gps_time);
+    EXPECT_EQ(file.creation_day, 0);
+    EXPECT_EQ(file.points[0].gps_time, 0.0);
+    EXPECT_EQ(file.points[1].gps_time, 987'654'321.012345678);
+  }
+}
+
+TEST_F(LasTest, CreationDayOfLeapYears) {
+  header_.time_reference = TimeReference::utc;
+  Points points = random_points(header_, 1);
+  points.time_ns = {1'735'689'599'999'999'999};  // 2024-12-31, just before midnight
+  write(points);
+  EXPECT_EQ(las_checker::read(path()).creation_day, 366);
+  EXPECT_EQ(las_checker::read(path()).creation_year, 2024);
+}
+
+}  // namespace
+}  // namespace risley::cloud

@@ -1,0 +1,127 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+// What all formats of a cloud promise.
+#include <csignal>
+#include <filesystem>
+#include <memory>
+
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+
+#include "risley/core/error.hpp"
+#include "risley/core/output_file.hpp"
+
+#include "cloud/cloud_samples.hpp"
+
+namespace risley::cloud {
+namespace {
+
+namespace fs = std::filesystem;
+
+class CloudWriters : public testing::TestWithParam<std::string> {
+ protected:
+  CloudWriters() {
+    for (const CloudCase& one : cloud_cases()) {
+      if (one.name == "many_points") many_ = one;
+    }
+    points_ = make_points(many_);
+    options_.format = GetParam();
+    path_ = folder_ / ("cloud." + GetParam());
+  }
+
+  TestFolder folder_;
+  CloudCase many_;
+  Points points_;
+  CloudWriterOptions options_;
+  std::string path_;
+};
+
+std::vector<std::string> formats_of_this_test() {
+  std::vector<std::string> formats;
+  for (const CloudFormat& format : cloud_formats()) {
+    // LAS and LAZ have a test of their own.
+    if (format.ending != ".las" && format.ending != ".laz") formats.push_back(format.name);
+  }
+  return formats;
+}
+
+INSTANTIATE_TEST_SUITE_P(Formats, CloudWriters, testing::ValuesIn(formats_of_this_test()),
+                         [](const auto& one) {
+                           return one.param == "ros1-bag" ? "ros1_bag" : one.param;
+                         });
+
+TEST_P(CloudWriters, GiveTheFileItsNameAtTheEnd) {
+  const auto writer = create_cloud(path_, many_.header, options_);
+  writer->write(points_);
+  EXPECT_FALSE(fs::exists(path_));
+  writer->close();
+  EXPECT_TRUE(fs::exists(path_));
+}
+
+TEST_P(CloudWriters, LeaveNothingWhenNotClosed) {
+  {
+    const auto writer = create_cloud(path_, many_.header, options_);
+    writer->write(points_);
+    EXPECT_FALSE(folder_.empty());
+  }
+  EXPECT_TRUE(folder_.empty());
+}
+
+TEST_P(CloudWriters, GiveTheSameBytesInWhateverPieces) {
+  {
+    const auto writer = create_cloud(path_, many_.header, options_);
+    writer->write(points_);
+    writer->close();
+  }
+  const std::string whole = read_text_file(path_);
+  write_uneven(path_, options_.format, many_.header, points_);
+  EXPECT_TRUE(whole == read_text_file(path_));
+}
+
+TEST_P(CloudWriters, RefuseAFolderThatIsNotThere) {
+  EXPECT_THROW(create_cloud(folder_ / "none/cloud", many_.header, options_), FileError);
+}
+
+/// No file of this process may be longer than so many bytes.
+class FileSizeLimit {
+ public:
+  explicit FileSizeLimit(rlim_t bytes) : handler_(std::signal(SIGXFSZ, SIG_IGN)) {
+    getrlimit(RLIMIT_FSIZE, &before_);
+    const rlimit limit{bytes, before_.rlim_max};
+    setrlimit(RLIMIT_FSIZE, &limit);
+  }
+  ~FileSizeLimit() {
+    setrlimit(RLIMIT_FSIZE, &before_);
+    std::signal(SIGXFSZ, handler_);
+  }
+  FileSizeLimit(const FileSizeLimit&) = delete;
+  FileSizeLimit& operator=(const FileSizeLimit&) = delete;
+
+ private:
+  rlimit before_{};
+  void (*handler_)(int);
+};
+
+TEST_P(CloudWriters, SayWhenTheDiskRefuses) {
+  many_.points = 50'000;
+  points_ = make_points(many_);
+  for (const rlim_t bytes : {1'000'000, 3'000'000}) {
+    std::unique_ptr<CloudWriter> writer;
+    {
+      const FileSizeLimit limit(bytes);
+      EXPECT_THROW(
+          {
+            writer = create_cloud(path_, many_.header, options_);
+            writer->write(points_);
+            writer->close();
+          },
+          FileError);
+    }
+    // HDF5 cannot close a file that must not grow even then: its fault would be at exit.
+    writer.reset();
+    EXPECT_TRUE(folder_.empty()) << bytes;
+  }
+}
+
+}  // namespace
+}  // namespace risley::cloud

@@ -1,0 +1,450 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sqlite3.h>
+
+#include "recordings/format_tests.hpp"
+
+namespace risley::recordings {
+namespace {
+
+using namespace format_tests;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+constexpr std::uint64_t kPowerOn = 5'000'000'000;          // ns since power-on
+constexpr std::uint64_t kUtc = 1'600'000'000'123'456'789;  // 2020
+constexpr const char* kTopic = "/livox/lidar";
+constexpr const char* kCustomType = "livox_ros_driver2/msg/CustomMsg";
+constexpr const char* kCloudType = "sensor_msgs/msg/PointCloud2";
+constexpr const char* kImuType = "sensor_msgs/msg/Imu";
+
+/// A message in CDR, written by hand: numbers stand at multiples of their size.
+class Cdr {
+ public:
+  explicit Cdr(bool big_endian = false) : big_endian_(big_endian) {
+    bytes_ = {'\0', big_endian ? '\0' : '\1', '\0', '\0'};
+  }
+  template <class T>
+  Cdr& put(std::type_identity_t<T> value) {
+    while ((bytes_.size() - 4) % sizeof(T) != 0) bytes_ += '\0';
+    std::string number(reinterpret_cast<const char*>(&value), sizeof value);
+    if (big_endian_) number.assign(number.rbegin(), number.rend());
+    bytes_ += number;
+    return *this;
+  }
+  Cdr& text(const std::string& value) {
+    put<std::uint32_t>(static_cast<std::uint32_t>(value.size() + 1));
+    bytes_ += value + '\0';
+    return *this;
+  }
+  Cdr& header(std::uint64_t time_ns) {
+    put<std::int32_t>(static_cast<std::int32_t>(time_ns / 1'000'000'000));
+    put<std::uint32_t>(static_cast<std::uint32_t>(time_ns % 1'000'000'000));
+    return text("livox_frame");
+  }
+  Cdr& raw(const std::string& bytes) {
+    bytes_ += bytes;
+    return *this;
+  }
+  const std::string& bytes() const { return bytes_; }
+
+ private:
+  bool big_endian_;
+  std::string bytes_;
+};
+
+struct Point {
+  std::uint32_t offset_ns;
+  float x, y, z;
+  std::uint8_t intensity = 0, tag = 0, line = 0;
+};
+
+std::string custom(std::uint64_t timebase, const std::vector<Point>& points,
+                   std::int64_t claimed_more = 0, bool big_endian = false) {
+  const auto count =
+      static_cast<std::uint32_t>(static_cast<std::int64_t>(points.size()) + claimed_more);
+  Cdr cdr(big_endian);
+  cdr.header(timebase + 137).put<std::uint64_t>(timebase).put<std::uint32_t>(count);
+  for (int i = 0; i < 4; ++i) cdr.put<std::uint8_t>(static_cast<std::uint8_t>(i));
+  cdr.put<std::uint32_t>(count);
+  for (const Point& p : points) {
+    cdr.put<std::uint32_t>(p.offset_ns).put<float>(p.x).put<float>(p.y).put<float>(p.z);
+    cdr.put<std::uint8_t>(p.intensity).put<std::uint8_t>(p.tag).put<std::uint8_t>(p.line);
+  }
+  return cdr.bytes();
+}
+
+std::vector<Point> shots(std::size_t count, float x = 2.0F) {
+  std::vector<Point> points;
+  for (std::uint32_t i = 0; i < count; ++i) {
+    const auto number = static_cast<float>(i);
+    points.push_back({i * 10'000, x + 0.001F * number, 0.25F, -0.5F + 0.002F * number,
+                      static_cast<std::uint8_t>(i)});
+  }
+  return points;
+}
+
+struct Field {
+  const char* name;
+  std::uint32_t offset;
+  std::uint8_t datatype;
+};
+
+/// As PCL's PointXYZI: with holes between the fields.
+std::string cloud(std::uint64_t time_ns, std::uint32_t points, std::uint32_t claimed_bytes = 0) {
+  constexpr std::uint32_t kStep = 32;
+  Cdr cdr;
+  cdr.header(time_ns).put<std::uint32_t>(1).put<std::uint32_t>(points);
+  const std::vector<Field> fields = {{"x", 0, 7}, {"y", 4, 7}, {"z", 8, 7}, {"intensity", 16, 7}};
+  cdr.put<std::uint32_t>(static_cast<std::uint32_t>(fields.size()));
+  for (const Field& field : fields) {
+    cdr.text(field.name).put<std::uint32_t>(field.offset).put<std::uint8_t>(field.datatype);
+    cdr.put<std::uint32_t>(1);
+  }
+  cdr.put<std::uint8_t>(0).put<std::uint32_t>(kStep).put<std::uint32_t>(kStep * points);
+  std::string data;
+  for (std::uint32_t i = 0; i < points; ++i) {
+    const std::vector<float> values = {3.0F, 4.0F, 0.0F, 9e9F, static_cast<float>(i % 256) + 0.2F,
+                                       9e9F, 9e9F, 9e9F};
+    data.append(reinterpret_cast<const char*>(values.data()), kStep);
+  }
+  cdr.put<std::uint32_t>(claimed_bytes != 0 ? claimed_bytes : kStep * points).raw(data);
+  return cdr.put<std::uint8_t>(1).bytes();
+}
+
+std::string imu(std::uint64_t time_ns) {
+  Cdr cdr;
+  cdr.header(time_ns);
+  for (int i = 0; i < 13; ++i) cdr.put<double>(0.0);
+  for (const double value : {0.25, -0.5, 0.125}) cdr.put<double>(value);
+  for (int i = 0; i < 9; ++i) cdr.put<double>(-1.0);
+  for (const double value : {0.0625, -0.03125, 1.0}) cdr.put<double>(value);
+  for (int i = 0; i < 9; ++i) cdr.put<double>(-1.0);
+  return cdr.bytes();
+}
+
+/// A bag of these messages, one each 10 ms.
+struct Bag {
+  struct Topic {
+    std::string name, type, format = "cdr";
+  };
+  std::vector<Topic> topics;
+  std::vector<std::pair<std::size_t, std::string>> messages;
+  std::string pragma;
+
+  std::size_t topic(const std::string& name, const std::string& type,
+                    const std::string& format = "cdr") {
+    topics.push_back({name, type, format});
+    return topics.size() - 1;
+  }
+  void add(std::size_t topic, std::string message) {
+    messages.emplace_back(topic, std::move(message));
+  }
+
+  /// Leaves the database open, as while recording.
+  std::shared_ptr<sqlite3> write(const std::string& path) const {
+    sqlite3* opened = nullptr;
+    EXPECT_EQ(sqlite3_open(path.c_str(), &opened), SQLITE_OK);
+    const std::shared_ptr<sqlite3> database(opened, sqlite3_close);
+    const auto run = [&](const std::string& sql) {
+      EXPECT_EQ(sqlite3_exec(opened, sql.c_str(), nullptr, nullptr, nullptr), SQLITE_OK) << sql;
+    };
+    run(pragma +
+        "PRAGMA page_size=512; PRAGMA synchronous=OFF;"
+        "CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT NOT NULL, type TEXT NOT NULL,"
+        " serialization_format TEXT NOT NULL, offered_qos_profiles TEXT NOT NULL);"
+        "CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER NOT NULL,"
+        " timestamp INTEGER NOT NULL, data BLOB NOT NULL);"
+        "CREATE INDEX timestamp_idx ON messages (timestamp ASC); BEGIN;");
+    for (std::size_t i = 0; i < topics.size(); ++i) {
+      run(fmt::format("INSERT INTO topics VALUES({}, '{}', '{}', '{}', '')", i + 10, topics[i].name,
+                      topics[i].type, topics[i].format));
+    }
+    sqlite3_stmt* insert = nullptr;
+    sqlite3_prepare_v2(opened, "INSERT INTO messages(topic_id, timestamp, data) VALUES(?, ?, ?)",
+                       -1, &insert, nullptr);
+    for (std::size_t i = 0; i < messages.size(); ++i) {
+      const std::string& blob = messages[i].second;
+      sqlite3_bind_int64(insert, 1, static_cast<sqlite3_int64>(messages[i].first + 10));
+      sqlite3_bind_int64(insert, 2, static_cast<sqlite3_int64>(kUtc + i * 10'000'000));
+      sqlite3_bind_blob(insert, 3, blob.data(), static_cast<int>(blob.size()), SQLITE_STATIC);
+      EXPECT_EQ(sqlite3_step(insert), SQLITE_DONE);
+      sqlite3_reset(insert);
+    }
+    sqlite3_finalize(insert);
+    run("COMMIT");
+    return database;
+  }
+  Outcome read(std::size_t chunk_rows = kDefaultChunkRows) const {
+    const TemporaryFolder folder;
+    const std::string path = folder.file("input.db3");
+    write(path).reset();
+    return read_all(kRos2BagFormat, path, chunk_rows);
+  }
+};
+
+Bag small_bag() {
+  Bag bag;
+  const std::size_t lidar = bag.topic(kTopic, kCustomType);
+  const std::size_t inertia = bag.topic("/livox/imu", kImuType);
+  const std::size_t other = bag.topic("/rosout", "rcl_interfaces/msg/Log");
+  for (std::uint64_t i = 0; i < 6; ++i) {
+    bag.add(other, "not looked at");
+    bag.add(lidar, custom(kPowerOn + i * 200'000, shots(20)));
+    bag.add(inertia, imu(kPowerOn + i * 200'000));
+  }
+  return bag;
+}
+
+TEST(Ros2Bag, ReadsEveryColumn) {
+  for (const bool big_endian : {false, true}) {
+    for (const char* type : {kCustomType, "livox_interfaces/msg/CustomMsg"}) {
+      Bag bag;
+      const std::size_t lidar = bag.topic(kTopic, type);
+      bag.add(lidar, custom(kUtc,
+                            {{0, 3.0F, 4.0F, 0.0F, 17, 0x10, 2},
+                             {10'000, 0.0F, 0.0F, 0.0F, 9, 0, 3},
+                             {20'000, -1.5F, 0.0F, 2.0F, 255, 0x05, 5}},
+                            0, big_endian));
+      bag.add(lidar, custom(kUtc + 30'000, {{0, 0.0F, 0.0F, 7.0F, 1}}, 0, big_endian));
+      const Outcome outcome = bag.read();
+      ASSERT_FALSE(outcome.error) << outcome.error->what();
+      const RecordingHeader& header = outcome.recording.header;
+      EXPECT_EQ(header.format, "ros2-bag");
+      EXPECT_TRUE(header.cartesian);
+      EXPECT_TRUE(header.has_range);
+      EXPECT_TRUE(header.has_intensity);
+      EXPECT_EQ(header.returns_per_shot, 1);
+      EXPECT_EQ(header.time_reference, TimeReference::utc);
+      ASSERT_EQ(header.devices.size(), 1U);
+      EXPECT_EQ(header.devices[0].type, kUnknownDeviceType);
+      EXPECT_TRUE(outcome.recording.warnings.empty());
+      const auto time = static_cast<std::int64_t>(kUtc);
+      const Observations& rows = outcome.rows();
+      EXPECT_THAT(rows.time_ns, ElementsAre(time, time + 10'000, time + 20'000, time + 30'000));
+      EXPECT_THAT(rows.range, ElementsAre(5.0, 0.0, 2.5, 7.0));
+      EXPECT_THAT(rows.valid, ElementsAre(1, 0, 1, 1));
+      EXPECT_THAT(rows.intensity, ElementsAre(17, 9, 255, 1));
+      EXPECT_THAT(rows.tag, ElementsAre(0x10, 0, 0x05, 0));
+      EXPECT_THAT(rows.beam, ElementsAre(2, 3, 5, 0));
+      EXPECT_THAT(rows.return_number, ElementsAre(1, 1, 1, 1));
+      EXPECT_THAT(rows.device, ElementsAre(0, 0, 0, 0));
+      EXPECT_DOUBLE_EQ(rows.azimuth[0], std::atan2(4.0, 3.0));
+      EXPECT_TRUE(std::isnan(rows.zenith[1]));
+      EXPECT_DOUBLE_EQ(rows.zenith[3], 0.0);
+      EXPECT_FLOAT_EQ(rows.azimuth_resolution[0], 0.001F / 5.0F);
+      EXPECT_FLOAT_EQ(rows.zenith_resolution[2], 0.001F / 2.5F);
+      EXPECT_FLOAT_EQ(rows.range_resolution[2], 0.001F);
+    }
+  }
+}
+
+TEST(Ros2Bag, ReturnsOfOneShotShareItsTime) {
+  Bag bag;
+  const std::size_t lidar = bag.topic(kTopic, kCustomType);
+  bag.add(lidar, custom(kPowerOn, {{0, 1.0F, 0.0F, 0.0F, 5, 0x10},
+                                   {0, 2.0F, 0.0F, 0.0F, 6, 0x20},
+                                   {10'000, 3.0F, 0.0F, 0.0F, 7, 0x10},
+                                   {10'000, 0.0F, 0.0F, 0.0F, 0, 0}}));
+  const Outcome outcome = bag.read();
+  EXPECT_EQ(outcome.recording.header.returns_per_shot, 2);
+  EXPECT_EQ(outcome.recording.header.time_reference, TimeReference::power_on);
+  EXPECT_THAT(outcome.rows().return_number, ElementsAre(1, 2, 1, 2));
+}
+
+TEST(Ros2Bag, Clouds) {
+  Bag bag;
+  const std::size_t lidar = bag.topic("/points", kCloudType);
+  for (std::uint64_t i = 0; i < 3; ++i) bag.add(lidar, cloud(kUtc + i * 1'000'000, 240));
+  const Outcome outcome = bag.read();
+  ASSERT_FALSE(outcome.error) << outcome.error->what();
+  ASSERT_EQ(outcome.rows().size(), 720U);
+  EXPECT_TRUE(outcome.recording.header.has_intensity);
+  for (std::size_t i = 0; i < 720; ++i) {
+    ASSERT_EQ(outcome.rows().range[i], 5.0);
+    ASSERT_EQ(outcome.rows().intensity[i], i % 240);
+    ASSERT_EQ(outcome.rows().tag[i], 0);
+    ASSERT_EQ(outcome.rows().time_ns[i],
+              static_cast<std::int64_t>(kUtc) + std::llround(static_cast<double>(i) * 12'500 / 3));
+  }
+  EXPECT_EQ(outcome.recording.warnings.size(), 1U);
+}
+
+TEST(Ros2Bag, InertialSamplesAndMessagesStayWhole) {
+  const TemporaryFolder folder;
+  const std::string path = folder.file("input.db3");
+  small_bag().write(path).reset();
+  const auto reader = open_recording(path);
+  Chunk chunk;
+  std::vector<ImuSample> samples;
+  std::size_t rows = 0;
+  double fraction = 0.0;
+  while (reader->read(chunk, 30)) {
+    EXPECT_EQ(chunk.observations.size() % 20, 0U);
+    EXPECT_LE(chunk.observations.size(), 49U);
+    EXPECT_GE(reader->fraction_read(), fraction);
+    fraction = reader->fraction_read();
+    rows += chunk.observations.size();
+    samples.insert(samples.end(), chunk.imu.begin(), chunk.imu.end());
+  }
+  EXPECT_FALSE(reader->read(chunk, 30));
+  EXPECT_EQ(rows, 120U);
+  EXPECT_EQ(fraction, 1.0);
+  ASSERT_EQ(samples.size(), 6U);
+  EXPECT_EQ(samples[1].time_ns, static_cast<std::int64_t>(kPowerOn) + 200'000);
+  EXPECT_THAT(samples[1].angular_velocity, ElementsAre(0.25F, -0.5F, 0.125F));
+  EXPECT_THAT(samples[1].acceleration_g, ElementsAre(0.0625F, -0.03125F, 1.0F));
+  EXPECT_EQ(folder.count(), 1U);  // nothing was written beside it
+  EXPECT_THROW(create_recording(folder.file("out.db3"), reader->header()), InvalidArgument);
+}
+
+TEST(Ros2Bag, EachTopicIsADevice) {
+  Bag bag;
+  const std::size_t second = bag.topic("/livox/lidar_3GGDJ9600100401", kCustomType);
+  const std::size_t first = bag.topic("/livox/lidar_0TFDG3B006H2Z11", kCustomType);
+  const std::size_t inertia = bag.topic("/livox/imu_3GGDJ9600100401", kImuType);
+  bag.topic("/map", kCloudType);
+  bag.add(second, custom(kPowerOn, shots(2)));
+  bag.add(first, custom(kPowerOn, shots(1)));
+  bag.add(inertia, imu(kPowerOn));
+  bag.add(second, custom(kPowerOn + 20'000, shots(1)));
+  const Outcome outcome = bag.read();
+  ASSERT_EQ(outcome.recording.header.devices.size(), 2U);
+  EXPECT_EQ(outcome.recording.header.devices[0].serial, "0TFDG3B006H2Z11");
+  EXPECT_EQ(outcome.recording.header.devices[1].serial, "3GGDJ9600100401");
+  EXPECT_THAT(outcome.rows().device, ElementsAre(1, 1, 0, 1));
+  EXPECT_EQ(outcome.recording.data.imu.at(0).device, 1);
+  ASSERT_EQ(outcome.recording.warnings.size(), 1U);
+  EXPECT_THAT(outcome.recording.warnings[0].message, HasSubstr("/map"));
+}
+
+TEST(Ros2Bag, ReadsWhatIsStillInTheJournal) {
+  const TemporaryFolder folder;
+  const std::string path = folder.file("a b?c#d%41.db3");
+  Bag bag = small_bag();
+  bag.pragma = "PRAGMA journal_mode=WAL;";
+  auto database = bag.write(path);
+  EXPECT_EQ(read_all(kRos2BagFormat, path).rows().size(), 120U);
+  database.reset();
+  EXPECT_EQ(folder.count(), 1U);
+  EXPECT_EQ(read_all(kRos2BagFormat, path).rows().size(), 120U);
+  EXPECT_EQ(folder.count(), 1U);
+}
+
+TEST(Ros2Bag, WithoutLidarMessages) {
+  const Outcome empty = Bag().read();
+  ASSERT_TRUE(empty.error);
+  EXPECT_THAT(empty.error->problem(), HasSubstr("found no topic"));
+
+  Bag bag;
+  bag.topic("/imu", kImuType);
+  bag.topic(kTopic, kCustomType, "protobuf");
+  const Outcome other = bag.read();
+  ASSERT_TRUE(other.error);
+  EXPECT_FALSE(other.opened);
+  EXPECT_THAT(other.error->problem(), HasSubstr("/imu (sensor_msgs/msg/Imu)"));
+  EXPECT_THAT(other.error->problem(), HasSubstr("stored as \"protobuf\" instead of cdr"));
+
+  bag.topic("/points", kCloudType);
+  const Outcome no_message = bag.read();
+  EXPECT_FALSE(no_message.error);
+  EXPECT_EQ(no_message.rows().size(), 0U);
+}
+
+TEST(Ros2Bag, OtherDatabasesAreRefused) {
+  const TemporaryFolder folder;
+  const std::string path = folder.file("other.db3");
+  sqlite3* database = nullptr;
+  ASSERT_EQ(sqlite3_open(path.c_str(), &database), SQLITE_OK);
+  sqlite3_exec(database, "CREATE TABLE topics(id, title)", nullptr, nullptr, nullptr);
+  sqlite3_close(database);
+  const Outcome outcome = read_all(kRos2BagFormat, path);
+  ASSERT_TRUE(outcome.error);
+  EXPECT_THAT(outcome.error->problem(), HasSubstr("cannot be read as a bag of ROS 2"));
+}
+
+TEST(Ros2Bag, DamagedMessagesAreNamed) {
+  struct Case {
+    const char* name;
+    std::string message;
+    const char* problem;
+  };
+  const std::string sound = custom(kPowerOn, shots(4));
+  std::vector<Case> cases;
+  cases.push_back({"count", custom(kPowerOn, shots(4), 1), "expected 5 points of at least 19"});
+  cases.push_back(
+      {"huge", custom(kPowerOn, shots(4), 4'294'967'000), "expected 4294967004 points"});
+  cases.push_back({"time", custom(~std::uint64_t{0}, shots(4)), "before the year 2200"});
+  cases.push_back({"nan", custom(kPowerOn, {{0, std::nanf(""), 0.0F, 0.0F}}), "point 1 has a"});
+  cases.push_back({"nothing", "", "the marks of plain CDR"});
+  cases.push_back({"mark", sound, "the marks of plain CDR"});
+  cases.back().message[1] = '\7';
+  for (std::size_t length = 4; length + 3 < sound.size(); length += 3) {
+    cases.push_back({"cut", sound.substr(0, length), "expected"});
+  }
+  for (const Case& c : cases) {
+    for (const std::size_t chunk_rows : {std::size_t{1}, kDefaultChunkRows}) {
+      SCOPED_TRACE(c.name);
+      Bag bag;
+      const std::size_t lidar = bag.topic(kTopic, kCustomType);
+      bag.add(lidar, sound);
+      bag.add(lidar, c.message);
+      bag.add(lidar, sound);
+      const Outcome outcome = bag.read(chunk_rows);
+      ASSERT_TRUE(outcome.error);
+      EXPECT_EQ(outcome.rows().size(), 4U);
+      EXPECT_THAT(outcome.error->problem(), HasSubstr("message row 2 of topic /livox/lidar"));
+      EXPECT_THAT(outcome.error->problem(), HasSubstr(c.problem));
+    }
+  }
+  Bag bag;
+  const std::size_t lidar = bag.topic(kTopic, kCloudType);
+  bag.add(lidar, cloud(kPowerOn, 4, 4000));
+  const Outcome outcome = bag.read();
+  ASSERT_TRUE(outcome.error);
+  EXPECT_THAT(outcome.error->problem(), HasSubstr("message row 1"));
+  EXPECT_THAT(outcome.error->problem(), HasSubstr("4000 values of data"));
+}
+
+TEST(Ros2Bag, CutAnywhere) {
+  const TemporaryFolder folder;
+  const std::string path = folder.file("input.db3");
+  small_bag().write(path).reset();
+  const std::string bytes = get_bytes(path);
+  for (std::size_t length = 0; length < bytes.size(); length += 97) {
+    SCOPED_TRACE(length);
+    put_bytes(path, std::string_view(bytes).substr(0, length));
+    const Outcome outcome = read_all(kRos2BagFormat, path);
+    ASSERT_TRUE(outcome.error);
+    ASSERT_EQ(outcome.rows().size(), 0U);
+    ASSERT_THAT(outcome.error->problem(), HasSubstr("cut off"));
+    ASSERT_EQ(outcome.error->place().byte_offset, length);
+  }
+}
+
+TEST(Ros2Bag, SurvivesAnyChangedByte) {
+  const TemporaryFolder folder;
+  const std::string path = folder.file("input.db3");
+  small_bag().write(path).reset();
+  const std::string bytes = get_bytes(path);
+  for (std::size_t at = 16; at < bytes.size(); at += 13) {
+    SCOPED_TRACE(at);
+    std::string changed = bytes;
+    changed[at] = static_cast<char>(changed[at] ^ (1 << (at % 8)));
+    put_bytes(path, changed);
+    const Outcome outcome = read_all(kRos2BagFormat, path);
+    ASSERT_LE(outcome.rows().size(), 1000U);
+  }
+}
+
+}  // namespace
+}  // namespace risley::recordings
