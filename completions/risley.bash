@@ -4,7 +4,7 @@
 # the command is missing here.
 _risley() {
   local current=${COMP_WORDS[COMP_CWORD]} previous=${COMP_WORDS[COMP_CWORD-1]}
-  local verbs="info convert simulate estimate observability calibrate"
+  local verbs="info convert simulate estimate observability calibrate cloud"
   local common="--help --json --threads --seed --quiet --verbose"
   local names="refractive_index_air refractive_index refractive_index_a refractive_index_b
     wedge_angle_deg wedge_angle_a_deg wedge_angle_b_deg
@@ -20,23 +20,30 @@ _risley() {
 
   local choices=""
   case $previous in
-    --quantize | --beam-origin) choices="yes no" ;;
+    --quantize | --beam-origin | --beam-divergence | --covariance | --common-factors)
+      choices="yes no" ;;
+    --directions) choices="smoothed reported" ;;
+    --time) choices="gps recording" ;;
     --rotor) choices="constant sinusoidal hunting random-walk" ;;
     --method) case $verb in calibrate) choices="adjustment paper" ;; *) choices="map ekf" ;; esac ;;
     --states) choices="knots all none" ;;
     --mirror) choices="auto yes no" ;;
     --process-noise) choices="auto paper" ;;
-    --rate-hz) case $verb in estimate | observability | calibrate) choices="full" ;; esac ;;
+    --rate-hz) case $verb in estimate | observability | calibrate | cloud) choices="full" ;; esac ;;
     --fix | --free) choices=$names ;;
     --set) choices="$names $speeds" ;;
     --reported) choices="nominal $names" ;;
-    --sensor) choices="mid-40 mid-40-reversed mid-40-table3" ;;
-    --format) choices="lvx-1.1 netcdf openpylivox-bin openpylivox-csv scan-sequence-csv" ;;
+    --sensor | --calibration) choices="mid-40 mid-40-reversed mid-40-table3" ;;
+    --format)
+      case $verb in
+        cloud) choices="las-1.4 las-1.2 ply pcd npy csv xyz netcdf ros1-bag" ;;
+        *) choices="lvx-1.1 netcdf openpylivox-bin openpylivox-csv scan-sequence-csv" ;;
+      esac ;;
   esac
   if [ -n "$choices" ]; then
     mapfile -t COMPREPLY < <(compgen -W "$choices" -- "$current")
     case $previous in --set) compopt -o nospace ;; esac
-    [ "$previous" = --sensor ] && mapfile -t -O "${#COMPREPLY[@]}" COMPREPLY \
+    [[ $previous == --sensor || $previous == --calibration ]] && mapfile -t -O "${#COMPREPLY[@]}" COMPREPLY \
       < <(compgen -f -- "$current")
     return
   fi
@@ -59,6 +66,10 @@ _risley() {
         choices="$common --output --method --planes --stations --station --plan --duration-s
           --rate-hz --noise-angle-deg --noise-range-m --sensor --fix --free --prior-sigma-deg
           --range-offset-sigma-m --beam-origin --states --mirror --truth" ;;
+      cloud)
+        choices="$common --output --calibration --format --directions --beam-origin --covariance
+          --beam-divergence --common-factors --rate-hz --noise-angle-deg --las-scale-m --time
+          --beam-origin-map" ;;
     esac
     mapfile -t COMPREPLY < <(compgen -W "$choices" -- "$current")
     return

@@ -10,6 +10,8 @@
 #include "risley/cloud/make_cloud.hpp"
 #include "risley/core/angle.hpp"
 #include "risley/core/output_file.hpp"
+#include "risley/optics/beam_origin_map.hpp"
+#include "risley/report/beam_origin_page.hpp"
 #include "risley/sensors/preset.hpp"
 
 #include "command.hpp"
@@ -22,7 +24,7 @@ namespace {
 
 struct CloudCommandOptions {
   std::vector<std::string> inputs;
-  std::string output, calibration, format;
+  std::string output, calibration, format, beam_origin_map;
   std::string directions = "smoothed", beam_origin = "yes", beam_divergence = "yes",
               covariance = "yes", common_factors = "no", time = "gps";
   std::string rate_hz = fmt::format("{:.0f}", cloud::kTrackingRate);
@@ -93,6 +95,38 @@ Json summary_json(const FileJob& job, const cloud::CloudSummary& s) {
   return json;
 }
 
+/// The maps of where beams start.
+ExitStatus write_beam_origin_map(const CloudCommandOptions& options,
+                                 const sensors::Sensor& calibration, const CommonOptions& common) {
+  constexpr std::size_t kSteps = 1081;  // every third of a degree, as in the paper's Fig. A1
+  constexpr double kCellDeg = 0.5;
+  const BeamOriginMap map = beam_origin_map(calibration.train, calibration.prism_geometry(), kSteps,
+                                            radians_from_degrees(kCellDeg));
+  if (map.size() == 0) throw EstimationError("no beam gets through the prisms");
+  write_text_file(options.beam_origin_map,
+                  report::beam_origin_page(map, calibration, provenance_of(common, {})));
+  const auto least = [](const auto& column) {
+    return *std::min_element(column.begin(), column.end());
+  };
+  const auto greatest = [](const auto& column) {
+    return *std::max_element(column.begin(), column.end());
+  };
+  const double y0 = least(map.least_y), y1 = greatest(map.greatest_y);
+  const double z0 = least(map.least_z), z1 = greatest(map.greatest_z);
+  if (common.json) {
+    print_json({{"html", options.beam_origin_map},
+                {"beams", map.beams},
+                {"cells", map.size()},
+                {"y_m", {{"min", y0}, {"max", y1}}},
+                {"z_m", {{"min", z0}, {"max", z1}}}});
+  } else {
+    fmt::print(
+        "{}: beams start {:.1f} to {:.1f} mm beside the origin in Y, {:.1f} to {:.1f} mm in Z\n",
+        options.beam_origin_map, 1e3 * y0, 1e3 * y1, 1e3 * z0, 1e3 * z1);
+  }
+  return kDone;
+}
+
 FileOutcome make_one(const FileJob& job, const CloudCommandOptions& options,
                      const sensors::Sensor& calibration, const CommonOptions& common,
                      const Progress& progress) {
@@ -130,16 +164,16 @@ Run declare_cloud(CLI::App& verb) {
         ->check(CLI::IsMember({"yes", "no"}))
         ->capture_default_str();
   };
-  verb.add_option("INPUT", o.inputs, "Recordings with ranges, or patterns such as '*.lvx'")
-      ->required();
+  auto* inputs =
+      verb.add_option("INPUT", o.inputs, "Recordings with ranges, or patterns such as '*.lvx'");
   verb.add_option("--calibration", o.calibration,
                   "calibration.yaml of estimate or calibrate, or a preset by name")
       ->required();
-  verb.add_option("-o,--output", o.output,
-                  "Cloud to write, or a folder for several (made where it is missing); its ending "
-                  "chooses the format:" +
-                      known_endings())
-      ->required();
+  auto* output = verb.add_option(
+      "-o,--output", o.output,
+      "Cloud to write, or a folder for several (made where it is missing); its ending "
+      "chooses the format:" +
+          known_endings());
   verb.add_option("--format", o.format,
                   "Format to write, whatever the ending; in a folder las-1.4 unless said otherwise")
       ->check(CLI::IsMember(format_names()));
@@ -167,9 +201,17 @@ Run declare_cloud(CLI::App& verb) {
                   "clock as it is")
       ->check(CLI::IsMember({"gps", "recording"}))
       ->capture_default_str();
+  verb.add_option("--beam-origin-map", o.beam_origin_map,
+                  "Page (HTML) with maps of where the calibration's beams start; no cloud is made")
+      ->excludes(inputs, output);
   return [options](const CommonOptions& common) {
     cloud_options(*options);  // what is wrong with them is wrong with every file
     const sensors::Sensor calibration = sensors::load_sensor(options->calibration);
+    if (!options->beam_origin_map.empty()) {
+      return write_beam_origin_map(*options, calibration, common);
+    }
+    if (options->inputs.empty()) throw InvalidArgument("INPUT is missing: a recording");
+    if (options->output.empty()) throw InvalidArgument("--output is missing");
     std::string ending;
     if (output_is_folder(options->inputs, options->output)) {
       if (options->format.empty()) options->format = cloud::cloud_formats().front().name;

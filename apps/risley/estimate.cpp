@@ -291,6 +291,7 @@ void write_folder(const EstimateCommandOptions& options, const CommonOptions& co
   if (outcome.estimate.converged) {
     sensors::Sensor calibrated = outcome.estimate.sensor;
     calibrated.provenance = provenance;
+    calibrated.serial = input.reader->header().devices.front().serial;
     write_text_file(path("calibration.yaml"), sensors::preset_text(calibrated));
   } else {
     remove_calibration(options.folder);

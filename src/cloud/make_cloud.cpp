@@ -21,8 +21,12 @@ namespace {
 
 using recordings::Observations;
 
+/// Rows at the beginning that the sensor's belief is found from: ten seconds of a Mid-40.
+constexpr std::size_t kBeginningRows = std::size_t{1} << 20;
 /// Rows that are worked on together: some seconds, so that the start of each piece costs little.
-constexpr std::size_t kPieceRows = std::size_t{1} << 20;
+constexpr std::size_t kPieceRows = std::size_t{1} << 18;
+/// The same where no rotation angles are needed: a surface's worth.
+constexpr std::size_t kReportedRows = std::size_t{1} << 16;
 /// Pieces overlap by so much, because rotation angles are less certain at the end of one.
 constexpr std::int64_t kOverlapNs = 100'000'000;
 /// Surfaces are taken to stand still for so long.
@@ -68,7 +72,8 @@ class Work {
         calibration_(calibration),
         path_(path),
         options_(options),
-        progress_(progress) {}
+        progress_(progress),
+        rotors_(needs_rotation_angles(calibration, options.pointing)) {}
 
   CloudSummary run() {
     check_sensor();
@@ -78,11 +83,12 @@ class Work {
       more = fill_piece();
       if (piece_.size() == 0) break;
       if (!writer_) set_up();
-      std::size_t end = more ? overlap_begin(piece_, piece_.size()) : piece_.size();
+      std::size_t end = more && rotors_ ? overlap_begin(piece_, piece_.size()) : piece_.size();
       if (end <= done_) end = piece_.size();  // times that make no sense
       if (end > done_) emit(end);
       if (!more) break;
-      const std::size_t keep = overlap_begin(piece_, std::max(done_, std::size_t{1}));
+      const std::size_t keep =
+          rotors_ ? overlap_begin(piece_, std::max(done_, std::size_t{1})) : done_;
       piece_.drop_front(keep);
       first_row_ += keep;
       done_ -= keep;
@@ -117,7 +123,8 @@ class Work {
   /// Reads until the piece is full. @return whether there is more
   bool fill_piece() {
     recordings::Chunk chunk;
-    while (piece_.size() < done_ + kPieceRows) {
+    const std::size_t wanted = !rotors_ ? kReportedRows : (belief_ ? kPieceRows : kBeginningRows);
+    while (piece_.size() < done_ + wanted) {
       bool read = false;
       try {
         read = reader_.read(chunk);
@@ -139,15 +146,20 @@ class Work {
 
   /// Everything that wants to have seen the beginning of the recording.
   void set_up() {
-    estimation::ShotSelector selector({});
-    selector.add(piece_);
-    belief_ = sensor_belief(selector.series(), selector.head(), calibration_, options_.angle_noise);
-    if (belief_->mirrored) mirror(piece_);
-    summary_.mirrored = belief_->mirrored;
-    summary_.warnings = belief_->warnings;
-    model_ = pointing_model(calibration_, *belief_, options_.pointing);
+    if (rotors_) {
+      estimation::ShotSelector selector({});
+      selector.add(piece_);
+      belief_ =
+          sensor_belief(selector.series(), selector.head(), calibration_, options_.angle_noise);
+      if (belief_->mirrored) mirror(piece_);
+      summary_.mirrored = belief_->mirrored;
+      summary_.warnings = belief_->warnings;
+      model_ = pointing_model(calibration_, *belief_, options_.pointing);
+      tracker_.emplace(*belief_, options_.rate);
+    } else {
+      model_ = reported_pointing_model(calibration_, options_.pointing, options_.angle_noise);
+    }
     for (const CommonFactor& factor : model_.factors) summary_.factors.push_back(factor.name);
-    tracker_ = std::make_unique<RotorTracker>(*belief_, options_.rate);
     normals_ = std::make_unique<SurfaceNormals>(
         std::max(std::sqrt(calibration_.range_variance(0, 0, 255) +
                            square(calibration_.range_resolution) / 12.0),
@@ -157,6 +169,7 @@ class Work {
     if (header_.serial.empty()) header_.serial = calibration_.serial;
     header_.time_reference = reader_.header().time_reference;
     header_.prisms = calibration_.prisms();
+    header_.has_rotation_angles = rotors_;
     header_.has_covariance = options_.pointing.covariance;
     if (options_.loadings && header_.has_covariance) header_.factors = summary_.factors;
     header_.provenance = options_.provenance;
@@ -165,6 +178,18 @@ class Work {
 
   /// Turns rows [done_, end) of the piece into points.
   void emit(std::size_t end) {
+    if (rotors_ && !track(end)) return;
+    while (done_ < end) {
+      const std::size_t surface_end = end_of_surface(done_, end);
+      find_surfaces(done_, surface_end);
+      write_rows(done_, surface_end);
+      done_ = surface_end;
+    }
+  }
+
+  /// Finds the rotation angles of the piece. @return whether there are any; without them rows up to
+  /// `end` are done
+  bool track(std::size_t end) {
     try {
       tracker_->track(piece_);
     } catch (const EstimationError& error) {
@@ -175,15 +200,10 @@ class Work {
                                               first_row_ + done_, first_row_ + end - 1,
                                               error.what()));
       done_ = end;
-      return;
+      return false;
     }
     if (!repointing_known_) find_repointing();
-    while (done_ < end) {
-      const std::size_t surface_end = end_of_surface(done_, end);
-      find_surfaces(done_, surface_end);
-      write_rows(done_, surface_end);
-      done_ = surface_end;
-    }
+    return true;
   }
 
   bool has_return(std::size_t row) const { return piece_.valid[row] != 0 && piece_.range[row] > 0; }
@@ -264,7 +284,9 @@ class Work {
     Points& points = block.points;
     shots.resize(header_.prisms, n);
     header_.resize(points, n);
-    tracker_->angles(piece_, block.rows, shots.rotation_angle, shots.angle_covariance);
+    if (rotors_) {
+      tracker_->angles(piece_, block.rows, shots.rotation_angle, shots.angle_covariance);
+    }
     for (std::size_t i = 0; i < n; ++i) {
       const std::size_t row = block.rows[i];
       points.time_ns[i] = piece_.time_ns[row];
@@ -289,13 +311,13 @@ class Work {
       shots.surface_normal[2][i] = normal.z;
     }
     compute_points(model_, header_, shots, points);
-    keep_sound(block);
+    block.outliers = block.without_rotation_angle = 0;
+    block.azimuth_squares = block.zenith_squares = 0;
+    if (rotors_) keep_sound(block);
   }
 
   /// Takes out of a block what has no point.
   void keep_sound(Block& block) const {
-    block.outliers = block.without_rotation_angle = 0;
-    block.azimuth_squares = block.zenith_squares = 0;
     Points& points = block.points;
     const double noise = square(model_.angle_noise);
     const double limit = kOutlierChi2 * belief_->residual_variance_factor;
@@ -378,7 +400,8 @@ class Work {
   CloudSummary summary_;
   std::optional<SensorBelief> belief_;
   PointingModel model_;
-  std::unique_ptr<RotorTracker> tracker_;
+  bool rotors_;  ///< points depend on the rotation angles
+  std::optional<RotorTracker> tracker_;
   std::unique_ptr<SurfaceNormals> normals_;
   CloudHeader header_;
   std::unique_ptr<CloudWriter> writer_;

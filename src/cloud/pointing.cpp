@@ -74,11 +74,10 @@ class Factors {
 
   /// @param moves_beam    errors of the parameters move the beam at given rotation angles
   /// @param moves_angles  they also move the rotation angles that were found
-  void add(const Uncertain& uncertain, bool moves_beam, bool moves_angles,
-           const std::string& prefix = {}) {
+  void add(const Uncertain& uncertain, bool moves_beam, bool moves_angles) {
     const Eigen::MatrixXd factor = lower_factor(uncertain.covariance);
     for (Index j = 0; j < factor.cols(); ++j) {
-      CommonFactor common = nothing(prefix + uncertain.names[static_cast<std::size_t>(j)]);
+      CommonFactor common = nothing(uncertain.names[static_cast<std::size_t>(j)]);
       for (Index i = j; i < factor.rows(); ++i) {
         const std::string& name = uncertain.names[static_cast<std::size_t>(i)];
         if (name == kRangeOffset) {
@@ -90,8 +89,19 @@ class Factors {
             common.weights[place] += factor(i, j);
           }
         }
-        if (moves_angles) add_angles(name, factor(i, j), common);
+        if (moves_angles) move_angles(name, factor(i, j), common);
       }
+      keep(std::move(common));
+    }
+  }
+
+  /// What errors of the believed parameters do to the rotation angles, as one factor per prism.
+  void add_angles(const Uncertain& uncertain) {
+    const Eigen::MatrixXd factor = lower_factor(belief_.angle_sensitivity * uncertain.covariance *
+                                                belief_.angle_sensitivity.transpose());
+    for (int j = 0; j < prisms(); ++j) {
+      CommonFactor common = nothing(fmt::format("rotation_angle_{}_deg", prism_letter(j)));
+      common.weights.segment(parameter_count(prisms()), prisms()) = factor.col(j);
       keep(std::move(common));
     }
   }
@@ -143,7 +153,7 @@ class Factors {
     return {std::move(name), Eigen::VectorXd::Zero(parameter_count(prisms()) + prisms() + 2), 0.0};
   }
 
-  void add_angles(const std::string& name, double value, CommonFactor& common) const {
+  void move_angles(const std::string& name, double value, CommonFactor& common) const {
     for (std::size_t j = 0; j < belief_.free.size(); ++j) {
       if (belief_.free[j].name != name) continue;
       for (int k = 0; k < prisms(); ++k) {
@@ -222,7 +232,7 @@ class Columns {
     for (const auto& column : shots.rotation_angle) angle_.push_back(column.data() + from);
     for (const auto& column : shots.angle_covariance) covariance_.push_back(column.data() + from);
     for (std::size_t i = 0; i < 3; ++i) normal_[i] = shots.surface_normal[i].data() + from;
-    a.rotation_angle = angle_.data();
+    if (header.has_rotation_angles) a.rotation_angle = angle_.data();
     a.angle_covariance = covariance_.data();
     a.surface_normal = normal_.data();
     a.azimuth = shots.azimuth.data() + from;
@@ -282,7 +292,7 @@ PointingModel pointing_model(const sensors::Sensor& calibration, const SensorBel
   Factors factors(model, belief);
   if (planes) {
     factors.add(calibrated(calibration), true, false);
-    factors.add(believed(belief), false, true, "reported_");
+    factors.add_angles(believed(belief));
   } else {
     const bool smoothed = !options.reported_directions;
     const bool type = calibration.reference == CalibrationReference::none;
@@ -295,6 +305,26 @@ PointingModel pointing_model(const sensors::Sensor& calibration, const SensorBel
                                       model.factors.size(), kMostFactors));
   }
   return model;
+}
+
+bool needs_rotation_angles(const sensors::Sensor& calibration, const PointingOptions& options) {
+  return !options.reported_directions || options.beam_origin ||
+         calibration.reference == sensors::CalibrationReference::planes;
+}
+
+PointingModel reported_pointing_model(const sensors::Sensor& calibration,
+                                      const PointingOptions& options,
+                                      std::optional<double> angle_noise) {
+  if (needs_rotation_angles(calibration, options)) {
+    throw InvalidArgument(
+        "points of reported directions need rotation angles for the beam's origin "
+        "and for a calibration against planes");
+  }
+  SensorBelief belief;
+  belief.sensor = calibration;
+  belief.covariance.resize(0, 0);
+  belief.angle_noise = angle_noise.value_or(calibration.angle_noise);
+  return pointing_model(calibration, belief, options);
 }
 
 void PointedShots::resize(int prisms, std::size_t shots) {
@@ -338,17 +368,24 @@ void compute_points(const PointingModel& model, const CloudHeader& header,
   }
   const std::size_t factors = model.factors.size();
   const std::size_t rows = model.places.size() + static_cast<std::size_t>(prisms) + 2;
-  std::vector<double> factor(rows * factors), range_factor(factors);
+  std::vector<int> factor_begin{0}, factor_row;
+  std::vector<double> factor_weight, range_factor(factors);
   for (std::size_t j = 0; j < factors; ++j) {
     range_factor[j] = model.factors[j].range_offset;
     for (std::size_t i = 0; i < rows; ++i) {
-      factor[i * factors + j] = model.factors[j].weights[static_cast<Index>(i)];
+      const double weight = model.factors[j].weights[static_cast<Index>(i)];
+      if (weight == 0) continue;
+      factor_row.push_back(static_cast<int>(i));
+      factor_weight.push_back(weight);
     }
+    factor_begin.push_back(static_cast<int>(factor_row.size()));
   }
   a.places = model.places.data();
   a.place_count = static_cast<int>(model.places.size());
   a.factors = static_cast<int>(factors);
-  a.factor = factor.data();
+  a.factor_begin = factor_begin.data();
+  a.factor_row = factor_row.data();
+  a.factor_weight = factor_weight.data();
   a.range_factor = range_factor.data();
 
   const std::size_t whole = shots.size() / kPointPadding * kPointPadding;

@@ -69,79 +69,150 @@ class Kernel {
   }
 
   /// Shots [at, at + kLanes).
-  void compute(std::size_t at) const {
+  [[gnu::flatten]] void compute(std::size_t at) const {
     std::array<Batch, N> angles;
     for (std::size_t k = 0; k < N; ++k) angles[k] = load(a_.rotation_angle[k], at);
     const auto forward = trace_forward(train_, angles);
     const auto path = beam_path(forward, face_position_);
-    const Batch azimuth = load(a_.azimuth, at), zenith = load(a_.zenith, at);
-
-    Vector3<Batch> direction = forward.direction();
-    std::array<Vector3<Batch>, 2> across;
+    const Sines azimuth = sines(a_.azimuth, at), zenith = sines(a_.zenith, at);
+    Ray ray{path.origin(), forward.direction(), {}};
     if (a_.reported_directions) {
-      const auto [sin_a, cos_a] = sin_cos(azimuth);
-      const auto [sin_z, cos_z] = sin_cos(zenith);
-      direction = {sin_z * cos_a, sin_z * sin_a, cos_z};
-      across = {Vector3<Batch>{-sin_a, cos_a, Batch(0.0)},
-                Vector3<Batch>{cos_z * cos_a, cos_z * sin_a, -sin_z}};
+      set_reported(azimuth, zenith, ray);
+      // The last face can stop a beam that has an origin.
+      ray.direction =
+          xsimd::select(forward.valid(), Batch(1.0), Batch(__builtin_nan(""))) * ray.direction;
     } else {
-      across = vectors_across(direction);
+      ray.across = vectors_across(ray.direction);
     }
     const Batch range = load(a_.range, at) - Batch(a_.range_offset);
-    const Vector3<Batch> point = path.origin() + range * direction;
+    const Batch cosine = store_point(at, ray, range);
+    if (a_.azimuth_residual) store_residuals(at, forward, azimuth, zenith);
+    if (!a_.covariance[0]) return;
+
+    const auto jacobian =
+        linearise_point(train_, derivatives_, forward, path, face_position_, ray.across, range);
+    BeamCovariance own = own_covariance(at, jacobian, zenith, range);
+    own.dd = own.dd + range_noise(at, range, cosine);
+    add_factors(at, jacobian, ray, own);
+    store_covariance(at, ray, own);
+  }
+
+  /// The same where no rotation angles are known: directions as reported, beams from the frame's
+  /// origin, a footprint along azimuth and zenith. Of the common factors the range offset remains.
+  [[gnu::flatten]] void compute_reported(std::size_t at) const {
+    const Sines azimuth = sines(a_.azimuth, at), zenith = sines(a_.zenith, at);
+    const Batch zero(0.0);
+    Ray ray{{zero, zero, zero}, {}, {}};
+    set_reported(azimuth, zenith, ray);
+    const Batch range = load(a_.range, at) - Batch(a_.range_offset);
+    const Batch cosine = store_point(at, ray, range);
+    if (!a_.covariance[0]) return;
+    BeamCovariance own{zero, zero, zero, zero, zero, range_noise(at, range, cosine)};
+    add_angle_noise(at, zenith, range, own);
+    const Batch range2 = range * range;
+    own.uu = xsimd::fma(range2, Batch(a_.divergence_variance_horizontal), own.uu);
+    own.vv = xsimd::fma(range2, Batch(a_.divergence_variance_vertical), own.vv);
+    for (int factor = 0; factor < a_.factors; ++factor) {
+      const Batch fd(-a_.range_factor[factor]);
+      own.dd = xsimd::fma(fd, fd, own.dd);
+      if (a_.loading) store_loading(at, factor, fd * ray.direction);
+    }
+    store_covariance(at, ray, own);
+  }
+
+ private:
+  /// Sine and cosine of one reported angle.
+  struct Sines {
+    Batch sine, cosine;
+  };
+  /// A beam and two directions across it.
+  struct Ray {
+    Vector3<Batch> origin, direction;
+    std::array<Vector3<Batch>, 2> across;
+  };
+
+  static Sines sines(const double* column, std::size_t at) {
+    const auto [sine, cosine] = sin_cos(load(column, at));
+    return {sine, cosine};
+  }
+
+  static void set_reported(const Sines& azimuth, const Sines& zenith, Ray& ray) {
+    ray.direction = {zenith.sine * azimuth.cosine, zenith.sine * azimuth.sine, zenith.cosine};
+    ray.across = {
+        Vector3<Batch>{-azimuth.sine, azimuth.cosine, Batch(0.0)},
+        Vector3<Batch>{zenith.cosine * azimuth.cosine, zenith.cosine * azimuth.sine, -zenith.sine}};
+  }
+
+  /// @return cosine of the angle of incidence, NaN where no surface is known
+  Batch store_point(std::size_t at, const Ray& ray, const Batch& range) const {
+    const Vector3<Batch> point = ray.origin + range * ray.direction;
     point.x.store_unaligned(a_.point[0] + at);
     point.y.store_unaligned(a_.point[1] + at);
     point.z.store_unaligned(a_.point[2] + at);
     range.store_unaligned(a_.corrected_range + at);
-
     const Vector3<Batch> normal{load(a_.surface_normal[0], at), load(a_.surface_normal[1], at),
                                 load(a_.surface_normal[2], at)};
-    const Batch cosine = xsimd::min(xsimd::abs(dot(normal, direction)), Batch(1.0));
-    const Batch sine = xsimd::sqrt(Batch(1.0) - cosine * cosine);
-    if (a_.incidence) {
-      const Batch incidence = xsimd::atan2(sine, cosine);
-      // The comparison is false for NaN, which atan2 need not hand on.
-      xsimd::select(normal.x == normal.x, incidence, Batch(__builtin_nan("")))
-          .store_unaligned(a_.incidence + at);
-    }
-    if (a_.azimuth_residual) store_residuals(at, angles, forward.direction(), azimuth, zenith);
-    if (!a_.covariance[0]) return;
-
-    const auto jacobian =
-        linearise_point(train_, derivatives_, forward, path, face_position_, across, range);
-    BeamCovariance own = own_covariance(at, jacobian, range);
-    own.dd = own.dd + range_noise(at, range, cosine, sine);
-    add_factors(at, jacobian, across, direction, own);
-    store_covariance(at, across, direction, own);
+    const Batch nan(__builtin_nan(""));
+    const Lanes known = normal.x == normal.x;  // min and acos need not hand NaN on
+    const Batch cosine =
+        xsimd::select(known, xsimd::min(xsimd::abs(dot(normal, ray.direction)), Batch(1.0)), nan);
+    xsimd::select(known, xsimd::acos(cosine), nan).store_unaligned(a_.incidence + at);
+    return cosine;
   }
 
- private:
-  void store_residuals(std::size_t at, const std::array<Batch, N>& angles,
-                       const Vector3<Batch>& direction, const Batch& azimuth,
-                       const Batch& zenith) const {
-    const Vector3<Batch> believed = same_ ? direction : trace(believed_, angles).direction;
-    const auto modelled = angles_from_direction(believed);
-    const Batch turn(2.0 * kPi), half(kPi);
-    Batch difference = azimuth - modelled.azimuth;
-    difference = xsimd::select(difference > half, difference - turn, difference);
-    difference = xsimd::select(difference < -half, difference + turn, difference);
-    difference.store_unaligned(a_.azimuth_residual + at);
-    (zenith - modelled.zenith).store_unaligned(a_.zenith_residual + at);
+  void store_loading(std::size_t at, int factor, const Vector3<Batch>& moved) const {
+    double* const* columns = a_.loading + 3 * factor;
+    moved.x.store_unaligned(columns[0] + at);
+    moved.y.store_unaligned(columns[1] + at);
+    moved.z.store_unaligned(columns[2] + at);
+  }
+
+  void add_angle_noise(std::size_t at, const Sines& zenith, const Batch& range,
+                       BeamCovariance& c) const {
+    const Batch noise(a_.angle_noise_variance);
+    const Batch across = range * zenith.sine;
+    c.uu = c.uu + across * across * (noise + load(a_.azimuth_variance, at));
+    c.vv = c.vv + range * range * (noise + load(a_.zenith_variance, at));
+  }
+
+  /// Reported direction minus that of the believed parameters. The series of the two angles are
+  /// exact to 1e-8 of them up to 0.1 rad; larger ones only have to be large.
+  void store_residuals(std::size_t at, const Trace<Batch, N>& forward, const Sines& azimuth,
+                       const Sines& zenith) const {
+    Vector3<Batch> d = forward.direction();
+    if (!same_) d = trace_again(forward);
+    const Batch horizontal = xsimd::sqrt(d.x * d.x + d.y * d.y);
+    const Batch across = azimuth.sine * d.x - azimuth.cosine * d.y;
+    const Batch along = azimuth.cosine * d.x + azimuth.sine * d.y;
+    const Batch t = across / along, t2 = t * t;
+    const Batch atan = t * (Batch(1.0) + t2 * (Batch(-1.0 / 3.0) + t2 * Batch(0.2)));
+    xsimd::select(t2 < Batch(0.25), atan, Batch(kPi / 2)).store_unaligned(a_.azimuth_residual + at);
+    const Batch s = zenith.sine * d.z - zenith.cosine * horizontal, s2 = s * s;
+    const Batch asin = s * (Batch(1.0) + s2 * (Batch(1.0 / 6.0) + s2 * Batch(3.0 / 40.0)));
+    asin.store_unaligned(a_.zenith_residual + at);
+  }
+
+  /// The same rotation angles through the believed train.
+  Vector3<Batch> trace_again(const Trace<Batch, N>& forward) const {
+    Vector3<Batch> beam = believed_.incident;
+#pragma GCC unroll 8
+    for (std::size_t i = 0; i < kFaces; ++i) {
+      const auto& face = believed_.faces[i];
+      const Vector3<Batch> normal = face.normal.at(forward.sine[i / 2], forward.cosine[i / 2]);
+      beam = refract(beam, normal, face.index_ratio).direction;
+    }
+    return beam;
   }
 
   /// What is independent from shot to shot, the range's noise aside.
   BeamCovariance own_covariance(std::size_t at, const PointLinearisation<Batch, N>& jacobian,
-                                const Batch& range) const {
+                                const Sines& zenith, const Batch& range) const {
     const Batch zero(0.0);
     BeamCovariance c{zero, zero, zero, zero, zero, zero};
     const auto& u = jacobian.across[0];
     const auto& v = jacobian.across[1];
     if (a_.reported_directions) {
-      const auto [sin_z, cos_z] = sin_cos(load(a_.zenith, at));
-      const Batch across = range * sin_z;
-      const Batch noise(a_.angle_noise_variance);
-      c.uu = across * across * (noise + load(a_.azimuth_variance, at));
-      c.vv = range * range * (noise + load(a_.zenith_variance, at));
+      add_angle_noise(at, zenith, range, c);
     } else {
       std::size_t pair = 0;
       for (std::size_t k = 0; k < N; ++k) {
@@ -169,13 +240,12 @@ class Kernel {
     return c;
   }
 
-  Batch range_noise(std::size_t at, const Batch& range, const Batch& cosine,
-                    const Batch& sine) const {
+  Batch range_noise(std::size_t at, const Batch& range, const Batch& cosine) const {
     Batch variance = Batch(a_.range_variance) + load(a_.rounding_variance, at) +
                      range * range * Batch(a_.range_variance_per_range2);
     if (a_.range_variance_incidence != 0) {
-      const Batch tangent = sine / cosine;
-      const Batch part = tangent * tangent * Batch(a_.range_variance_incidence);
+      const Batch squared = cosine * cosine;
+      const Batch part = (Batch(1.0) - squared) / squared * Batch(a_.range_variance_incidence);
       variance = variance + xsimd::select(part == part, part, Batch(0.0));
     }
     if (a_.range_variance_weak_return != 0) {
@@ -186,8 +256,7 @@ class Kernel {
   }
 
   /// Adds the common factors' covariance and stores their loadings.
-  void add_factors(std::size_t at, const PointLinearisation<Batch, N>& jacobian,
-                   const std::array<Vector3<Batch>, 2>& across, const Vector3<Batch>& direction,
+  void add_factors(std::size_t at, const PointLinearisation<Batch, N>& jacobian, const Ray& ray,
                    BeamCovariance& c) const {
     constexpr std::size_t kMostRows = parameter_count(N) + N + 2;
     Batch u[kMostRows], v[kMostRows];
@@ -210,9 +279,9 @@ class Kernel {
     }
     for (int factor = 0; factor < a_.factors; ++factor) {
       Batch fu(0.0), fv(0.0);
-      const double* weight = a_.factor + factor;
-      for (std::size_t row = 0; row < rows; ++row, weight += a_.factors) {
-        const Batch w(*weight);
+      for (int entry = a_.factor_begin[factor]; entry < a_.factor_begin[factor + 1]; ++entry) {
+        const Batch w(a_.factor_weight[entry]);
+        const auto row = static_cast<std::size_t>(a_.factor_row[entry]);
         fu = xsimd::fma(u[row], w, fu);
         fv = xsimd::fma(v[row], w, fv);
       }
@@ -224,19 +293,14 @@ class Kernel {
       c.vd = xsimd::fma(fv, fd, c.vd);
       c.dd = xsimd::fma(fd, fd, c.dd);
       if (a_.loading) {
-        const Vector3<Batch> moved = fu * across[0] + fv * across[1] + fd * direction;
-        double* const* columns = a_.loading + 3 * factor;
-        moved.x.store_unaligned(columns[0] + at);
-        moved.y.store_unaligned(columns[1] + at);
-        moved.z.store_unaligned(columns[2] + at);
+        store_loading(at, factor, fu * ray.across[0] + fv * ray.across[1] + fd * ray.direction);
       }
     }
   }
 
   /// From the frame of the beam into that of the sensor.
-  void store_covariance(std::size_t at, const std::array<Vector3<Batch>, 2>& across,
-                        const Vector3<Batch>& d, const BeamCovariance& c) const {
-    const Vector3<Batch>&u = across[0], &v = across[1];
+  void store_covariance(std::size_t at, const Ray& ray, const BeamCovariance& c) const {
+    const Vector3<Batch>&u = ray.across[0], &v = ray.across[1], &d = ray.direction;
     const Vector3<Batch> cu = c.uu * u + c.uv * v + c.ud * d;
     const Vector3<Batch> cv = c.uv * u + c.vv * v + c.vd * d;
     const Vector3<Batch> cd = c.ud * u + c.vd * v + c.dd * d;
@@ -261,7 +325,9 @@ class Kernel {
 template <int N>
 void compute_all(const PointArguments& a) {
   const Kernel<N> kernel(a);
-  for (std::size_t at = 0; at < a.shots; at += kLanes) kernel.compute(at);
+  for (std::size_t at = 0; at < a.shots; at += kLanes) {
+    a.rotation_angle ? kernel.compute(at) : kernel.compute_reported(at);
+  }
 }
 
 }  // namespace

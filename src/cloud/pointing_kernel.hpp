@@ -35,16 +35,19 @@ struct PointArguments {
   double divergence_variance_horizontal = 0, divergence_variance_vertical = 0;
 
   /// Common factors: what one standard deviation of each does to the flat vector's places, to the
-  /// rotation angles, to thickness and spacing [place_count + prisms + 2][factors], and to the
-  /// range offset [factors].
+  /// rotation angles, to thickness and spacing, in rows of that order [place_count + prisms + 2],
+  /// and to the range offset. Entries [factor_begin[k], factor_begin[k + 1]) are factor k's.
   const int* places = nullptr;
   int place_count = 0;
   int factors = 0;
-  const double* factor = nullptr;
-  const double* range_factor = nullptr;
+  const int* factor_begin = nullptr;  ///< [factors + 1]
+  const int* factor_row = nullptr;
+  const double* factor_weight = nullptr;
+  const double* range_factor = nullptr;  ///< [factors], m
 
   std::size_t shots = 0;
-  const double* const* rotation_angle = nullptr;    ///< [prisms][shots], rad
+  /// [prisms][shots], rad, or nullptr: then directions are as reported and start at the origin.
+  const double* const* rotation_angle = nullptr;
   const double* const* angle_covariance = nullptr;  ///< [prisms (prisms+1)/2][shots], rad^2
   const double* azimuth = nullptr;                  ///< [shots], as reported, rad
   const double* zenith = nullptr;
@@ -60,6 +63,7 @@ struct PointArguments {
   double* covariance[6] = {};  ///< upper triangle [shots], m^2, or nullptr
   double* corrected_range = nullptr;
   double* incidence = nullptr;  ///< [shots], rad
+  /// [shots], rad, or nullptr; those of outliers are only large.
   double* azimuth_residual = nullptr;
   double* zenith_residual = nullptr;
   double* const* loading = nullptr;  ///< [factors * 3][shots], m, or nullptr

@@ -25,8 +25,21 @@ using sensors::CalibrationReference;
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 /// Mean chi2 per parameter above which a recording is of another sensor than its calibration.
 constexpr double kMostDisagreement = 9.0;
-/// How far from a knot, besides the way to the next direction, its parabola is trusted, s.
-constexpr double kReach = 2.0 * estimation::kKnotInterval;
+/// How far a rotor may leave the parabola of a knot until the next, 1 sigma, rad.
+constexpr double kParabola = radians_from_degrees(2e-5);
+
+/// Fewer knots are faster: the longest interval over which these rotors move along parabolas.
+double knot_interval(const std::vector<estimation::RotorProcess>& process) {
+  double longest = estimation::kKnotInterval;
+  for (const double times : {2.0, 3.0, 5.0}) {
+    const double interval = times * estimation::kKnotInterval;
+    const bool smooth = std::all_of(process.begin(), process.end(), [interval](const auto& rotor) {
+      return step_covariance(rotor, interval / 2).angle_angle < kParabola * kParabola;
+    });
+    if (smooth) longest = interval;
+  }
+  return longest;
+}
 
 /// What the belief leaves free: the parameters whose covariance the calibration tells, where it is
 /// one against directions, otherwise the default ones.
@@ -120,7 +133,7 @@ SensorBelief sensor_belief(const estimation::AngleSeries& beginning,
 }
 
 RotorTracker::RotorTracker(const SensorBelief& belief, std::optional<double> rate)
-    : belief_(belief), rate_(rate) {}
+    : belief_(belief), rate_(rate), knot_interval_(knot_interval(belief.rotor_process)) {}
 
 estimation::Start RotorTracker::start_of(const estimation::AngleSeries& series,
                                          const estimation::AngleSeries& head) const {
@@ -133,7 +146,7 @@ estimation::Start RotorTracker::start_of(const estimation::AngleSeries& series,
   // The piece before ends where this one begins: go on from there.
   for (std::size_t knot = knots.size(); knot-- > 0;) {
     const double seconds = 1e-9 * static_cast<double>(time - knots.time_ns[knot]);
-    if (std::abs(seconds) > kReach) continue;
+    if (std::abs(seconds) > reach()) continue;
     estimation::Start start = belief_.start;
     start.time_ns = time;
     for (std::size_t k = 0; k < start.rotation_angle.size(); ++k) {
@@ -145,6 +158,8 @@ estimation::Start RotorTracker::start_of(const estimation::AngleSeries& series,
   return estimation::find_start(head, belief_.sensor, {}, belief_.angle_noise);
 }
 
+double RotorTracker::reach() const { return 2.0 * knot_interval_ + (rate_ ? 1.0 / *rate_ : 0.0); }
+
 void RotorTracker::track(const recordings::Observations& rows) {
   estimation::ShotSelector selector({rate_, false, true});
   selector.add(rows);
@@ -153,6 +168,7 @@ void RotorTracker::track(const recordings::Observations& rows) {
   estimation::BatchMapOptions options;
   options.angle_noise = belief_.angle_noise;
   options.rotor_process = belief_.rotor_process;
+  options.knot_interval = knot_interval_;
   const estimation::Start start = start_of(series, selector.head());
   result_ = {};
   result_ = run_batch_map(series, start, belief_.sensor, options);
@@ -167,7 +183,7 @@ void RotorTracker::angles(const recordings::Observations& piece, std::span<const
                           std::vector<std::vector<double>>& covariance) const {
   const estimation::RotorTrajectory& knots = result_.trajectory;
   const auto prisms = static_cast<std::size_t>(knots.prisms);
-  const double reach = kReach + (rate_ ? 1.0 / *rate_ : 0.0);
+  const double farthest = reach();
   constexpr std::size_t kTerms = 5;  // a covariance of angles is a polynomial of 4th degree in time
   std::vector<std::array<double, kTerms>> terms(covariance.size());
   std::size_t knot = 0;
@@ -187,7 +203,7 @@ void RotorTracker::angles(const recordings::Observations& piece, std::span<const
     }
     const double t = knots.size() > 0 ? 1e-9 * static_cast<double>(time - knots.time_ns[near])
                                       : std::numeric_limits<double>::infinity();
-    if (std::abs(t) > reach) {
+    if (std::abs(t) > farthest) {
       for (auto& column : angle) column[i] = kNaN;
       for (auto& column : covariance) column[i] = kNaN;
       continue;

@@ -7,7 +7,7 @@ import unittest
 
 from command import CommandTest
 
-VERBS = ("info", "convert", "simulate", "estimate", "observability", "calibrate")
+VERBS = ("info", "convert", "simulate", "estimate", "observability", "calibrate", "cloud")
 
 # Arguments that are wrong, and what the message must name.
 WRONG = [
@@ -37,6 +37,19 @@ WRONG = [
     (["simulate", "-o", "a.csv", "--reported", "perfect"], "perfect"),
     (["simulate", "-o", "a.csv", "--start-angles-deg", "1,2,3"], "start"),
     (["simulate", "-o", "a.csv", "--quiet", "--verbose"], "--quiet"),
+    (["convert", "a.lvx", "a.csv", "-o", "folder"], "--format"),
+    (["cloud", "a.lvx", "-o", "a.las"], "--calibration"),
+    (["cloud", "--calibration", "mid-40", "-o", "a.las"], "INPUT"),
+    (["cloud", "a.lvx", "--calibration", "mid-40"], "--output"),
+    (["cloud", "a.lvx", "--calibration", "mid-41", "-o", "a.las"], "mid-41"),
+    (["cloud", "a.lvx", "--calibration", "mid-40", "-o", "a.pdf"], ".pdf"),
+    (["cloud", "a.lvx", "--calibration", "mid-40", "-o", "a.las", "--format", "e57"], "e57"),
+    (["cloud", "a.lvx", "--calibration", "mid-40", "-o", "a.las", "--rate-hz", "0"], "--rate-hz"),
+    (["cloud", "a.lvx", "--calibration", "mid-40", "-o", "a.las", "--las-scale-m", "0"],
+     "--las-scale-m"),
+    (["cloud", "a.lvx", "--calibration", "mid-40", "-o", "a.las", "--covariance", "no",
+      "--common-factors", "yes"], "--common-factors"),
+    (["cloud", "none*.lvx", "--calibration", "mid-40", "-o", "folder/"], "none*.lvx"),
     (["estimate", "a.csv", "--rate-hz", "fast"], "--rate-hz"),
     (["estimate", "a.csv", "--method", "guess"], "guess"),
     (["estimate", "a.csv", "--method", "ekf", "--states", "all"], "--rate-hz full"),

@@ -5,13 +5,16 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <random>
 #include <string>
 #include <vector>
 
+#include <ceres/jet.h>
 #include <gtest/gtest.h>
 
 #include "risley/core/angle.hpp"
 #include "risley/core/plane.hpp"
+#include "risley/core/simd.hpp"
 #include "risley/optics/batch.hpp"
 
 #include "optics/trains.hpp"
@@ -126,6 +129,187 @@ TEST(BeamOrigin, EveryInstructionSetAgreesWithPlainNumbers) {
       const Ray ray = emergent_ray(train, kMid40, std::array<double, 2>{a[i], b[i]});
       EXPECT_LT(norm(ray.origin - Vector3<double>{x[i], y[i], z[i]}), 1e-16) << to_string(set);
     }
+  }
+}
+
+/// Parameters, rotation angles, face positions.
+template <int N>
+constexpr int kOriginColumns = parameter_count(N) + 3 * N;
+template <int N>
+using OriginJet = ceres::Jet<double, kOriginColumns<N>>;
+
+/// The beam's origin and direction by forward-mode automatic differentiation: the oracle.
+template <int N>
+struct OriginOracle {
+  Vector3<OriginJet<N>> origin, direction;
+
+  OriginOracle(const PrismTrain& train, const std::vector<double>& rotation_angles,
+               const std::vector<double>& positions) {
+    using Jet = OriginJet<N>;
+    std::array<Jet, parameter_count(N)> parameters;
+    for (int i = 0; i < parameter_count(N); ++i) {
+      parameters[static_cast<std::size_t>(i)] = Jet(train[i], i);
+    }
+    std::array<Jet, N> rotation;
+    std::array<Jet, 2 * N> position;
+    for (std::size_t i = 0; i < N; ++i) {
+      rotation[i] = Jet(rotation_angles[i], parameter_count(N) + static_cast<int>(i));
+    }
+    for (std::size_t i = 0; i < 2 * N; ++i) {
+      position[i] = Jet(positions[i], parameter_count(N) + N + static_cast<int>(i));
+    }
+    const auto forward =
+        trace_forward(prepare<Jet, N>(parameters, face_order_array<N>(train)), rotation);
+    origin = beam_origin(forward, position);
+    direction = forward.direction();
+  }
+};
+
+/// Largest difference of derivatives to the oracle's, relative to the oracle's largest entry.
+template <class T, int N, class Lane>
+double origin_difference(const OriginJet<N>& oracle, const Gradient<T, N>& gradient,
+                         const std::array<T, 2 * N>& face_position, const Lane& lane) {
+  double worst = 0;
+  for (int i = 0; i < kOriginColumns<N>; ++i) {
+    const int angle = i - parameter_count(N), face = angle - N;
+    const double entry = face >= 0 ? lane(face_position[static_cast<std::size_t>(face)])
+                         : angle >= 0
+                             ? lane(gradient.rotation_angles[static_cast<std::size_t>(angle)])
+                             : lane(gradient.parameters[static_cast<std::size_t>(i)]);
+    worst = std::max(worst, std::abs(entry - oracle.v[i]));
+    if (std::isnan(entry)) return 1.0;
+  }
+  return worst / oracle.v.template lpNorm<Eigen::Infinity>();
+}
+
+/// Worst relative difference of the origin's three components alone, and of two components of a
+/// point at some range, with everything evaluated in T.
+template <class T, int N, class Lane>
+std::array<double, 2> origin_adjoint_error(const PrismTrain& train,
+                                           const std::vector<double>& angles, double range,
+                                           const Lane& lane) {
+  const auto positions = face_positions(train.face_order(), kMid40);
+  std::array<T, parameter_count(N)> parameters;
+  for (int i = 0; i < parameter_count(N); ++i) {
+    parameters[static_cast<std::size_t>(i)] = T(train[i]);
+  }
+  std::array<T, N> rotation;
+  for (std::size_t i = 0; i < N; ++i) rotation[i] = T(angles[i]);
+  std::array<T, 2 * N> position;
+  for (std::size_t i = 0; i < 2 * N; ++i) position[i] = T(positions[i]);
+  const auto order = face_order_array<N>(train);
+  const auto prepared = prepare<T, N>(parameters, order);
+  const auto derivatives = prepare_derivatives<T, N>(parameters, order);
+  const auto forward = trace_forward(prepared, rotation);
+  const auto path = beam_path(forward, position);
+  const OriginOracle<N> oracle(train, angles, positions);
+
+  const Vector3<T> none{T(0.0), T(0.0), T(0.0)};
+  const std::array<Vector3<T>, 3> axes{Vector3<T>{T(1.0), T(0.0), T(0.0)},
+                                       Vector3<T>{T(0.0), T(1.0), T(0.0)},
+                                       Vector3<T>{T(0.0), T(0.0), T(1.0)}};
+  std::array<BeamPathAdjoint<T, N>, 3> paths;
+  for (std::size_t r = 0; r < 3; ++r) {
+    paths[r] = beam_path_adjoint(forward, path, position, axes[r]);
+  }
+  const auto gradients = trace_adjoint(
+      prepared, derivatives, forward, std::array<Vector3<T>, 3>{none, none, none},
+      [&paths](std::size_t face, std::size_t r, Vector3<T>& beam, Vector3<T>& normal) {
+        beam = beam + paths[r].incident[face];
+        normal = normal + paths[r].normal[face];
+      });
+  const std::array<OriginJet<N>, 3> component{oracle.origin.x, oracle.origin.y, oracle.origin.z};
+  std::array<double, 2> worst{};
+  for (std::size_t r = 0; r < 3; ++r) {
+    worst[0] = std::max(worst[0], origin_difference<T, N>(component[r], gradients[r],
+                                                          paths[r].face_position, lane));
+  }
+
+  const Vector3<double> beam{oracle.direction.x.a, oracle.direction.y.a, oracle.direction.z.a};
+  const Vector3<double> level = normalized(Vector3<double>{-beam.y, beam.x, 0.0});
+  const std::array<Vector3<double>, 2> across{level, cross(beam, level)};
+  const auto in_lanes = [](const Vector3<double>& v) { return Vector3<T>{T(v.x), T(v.y), T(v.z)}; };
+  const auto point = linearise_point(
+      prepared, derivatives, forward, path, position,
+      std::array<Vector3<T>, 2>{in_lanes(across[0]), in_lanes(across[1])}, T(range));
+  for (std::size_t r = 0; r < 2; ++r) {
+    using Jet = OriginJet<N>;
+    const auto along = [&](const Vector3<Jet>& v) {
+      return across[r].x * v.x + across[r].y * v.y + across[r].z * v.z;
+    };
+    const Jet moved = along(oracle.origin) + range * along(oracle.direction);
+    worst[1] = std::max(
+        worst[1], origin_difference<T, N>(moved, point.across[r], point.face_position[r], lane));
+  }
+  return worst;
+}
+
+// Parameters, rotation angles and face positions, for every face order, in plain numbers and in
+// batches.
+TEST(BeamOrigin, DerivativesEqualAutomaticDifferentiation) {
+  using Batch = xsimd::batch<double>;
+  const auto plain = [](double v) { return v; };
+  const auto last_lane = [](const Batch& v) {
+    double lanes[Batch::size];
+    v.store_unaligned(lanes);
+    return lanes[Batch::size - 1];
+  };
+  std::mt19937 generator(11);
+  for (const std::string& order : testing::all_face_orders()) {
+    SCOPED_TRACE(order);
+    for (unsigned seed = 0; seed < 5; ++seed) {
+      const PrismTrain train = testing::imperfect_train(order, 0.5, seed);
+      with_prism_count(train.prisms(), [&]<int N>() {
+        for (const double range : {0.5, 20.0, 200.0}) {
+          const auto angles = testing::random_angles(N, generator);
+          const auto in_double = origin_adjoint_error<double, N>(train, angles, range, plain);
+          const auto in_batches = origin_adjoint_error<Batch, N>(train, angles, range, last_lane);
+          EXPECT_LT(in_double[0], 1e-12);
+          EXPECT_LT(in_double[1], 1e-12);
+          EXPECT_LT(in_batches[0], 1e-12);
+          EXPECT_LT(in_batches[1], 1e-12);
+        }
+      });
+    }
+  }
+}
+
+// Moving a prism along the axis moves the positions that the geometry gives, face by face.
+TEST(BeamOrigin, DerivativesByThicknessAndSpacingEqualCentralDifferences) {
+  for (const char* order : {"PA-AP", "AP-PA", "PA-AP-AP", "AP-AP-PA"}) {
+    SCOPED_TRACE(order);
+    const PrismTrain train = testing::imperfect_train(order, 0.5, 9);
+    std::mt19937 generator(12);
+    const auto angles = testing::random_angles(train.prisms(), generator);
+    with_prism_count(train.prisms(), [&]<int N>() {
+      const auto forward = trace_forward(
+          prepare<double, N>(parameter_array<N>(train), face_order_array<N>(train)), [&angles] {
+            std::array<double, N> rotation;
+            std::copy_n(angles.begin(), N, rotation.begin());
+            return rotation;
+          }());
+      std::array<double, 2 * N> position;
+      const auto positions = face_positions(train.face_order(), kMid40);
+      std::copy_n(positions.begin(), 2 * N, position.begin());
+      const auto path = beam_path(forward, position);
+      constexpr double kStep = 1e-4;  // the origin is linear in both
+      const std::array<PrismGeometry, 2> units{PrismGeometry{1, 0}, PrismGeometry{0, 1}};
+      for (const PrismGeometry& unit : units) {
+        const auto moved = [&](double step) {
+          return emergent_ray(train,
+                              {kMid40.thickness + step * unit.thickness,
+                               kMid40.spacing + step * unit.spacing},
+                              angles)
+              .origin;
+        };
+        const Vector3<double> rate = (0.5 / kStep) * (moved(kStep) - moved(-kStep));
+        const auto over = face_positions(train.face_order(), unit);
+        const auto adjoint = beam_path_adjoint(forward, path, position, {0.0, 1.0, 0.0});
+        double sum = 0;
+        for (std::size_t i = 0; i < over.size(); ++i) sum += adjoint.face_position[i] * over[i];
+        EXPECT_NEAR(sum, rate.y, 1e-11);
+      }
+    });
   }
 }
 

@@ -18,8 +18,8 @@
 namespace risley::cloud {
 
 /// Directions per second that rotation angles are found from unless the caller asks otherwise: the
-/// angles are then known to about 0.001 degree, the beam to 0.0002.
-inline constexpr double kTrackingRate = 10000.0;
+/// angles are then known to about 0.0015 degree, the beam to 0.0003.
+inline constexpr double kTrackingRate = 5000.0;
 
 /// What the user asks for.
 struct CloudOptions {

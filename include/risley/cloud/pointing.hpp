@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstddef>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -63,6 +64,18 @@ inline constexpr double kDivergenceSigma = 0.25;
 PointingModel pointing_model(const sensors::Sensor& calibration, const SensorBelief& belief,
                              const PointingOptions& options);
 
+/// Whether points depend on the rotation angles at all: not where they go where the sensor says,
+/// start at the frame's origin, and the sensor's own directions are taken as true.
+bool needs_rotation_angles(const sensors::Sensor& calibration, const PointingOptions& options);
+
+/// A model without rotation angles. The footprint is then taken to keep the orientation that it has
+/// before the prisms.
+/// @param angle_noise  rad; empty: the calibration's
+/// @throws InvalidArgument where needs_rotation_angles()
+PointingModel reported_pointing_model(const sensors::Sensor& calibration,
+                                      const PointingOptions& options,
+                                      std::optional<double> angle_noise);
+
 /// Some shots with a range, as columns of one length.
 struct PointedShots {
   std::vector<std::vector<double>> rotation_angle;    ///< [prisms][shots], rad
@@ -81,7 +94,9 @@ struct PointedShots {
 /// Cartesian points with covariance [B21 Eq. (31), App. A]. Fills x, y, z, covariance, range,
 /// incidence, rotation_angle, residuals and loading, as far as the header announces them; the
 /// points' other columns are the caller's. A beam that does not get through the prisms gives NaN.
-/// @param header  of the points, with one factor name per factor of the model or none
+/// Residuals are exact to 1e-8 of them up to 0.1 rad; larger ones are only large.
+/// @param header  of the points: without rotation angles only where the model needs none; with one
+/// factor name per factor of the model or none
 void compute_points(const PointingModel& model, const CloudHeader& header,
                     const PointedShots& shots, Points& points,
                     InstructionSet set = available_instruction_sets().back());

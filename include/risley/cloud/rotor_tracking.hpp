@@ -62,8 +62,12 @@ class RotorTracker {
   estimation::Start start_of(const estimation::AngleSeries& series,
                              const estimation::AngleSeries& head) const;
 
+  /// How far from a knot its parabola is trusted, s.
+  double reach() const;
+
   const SensorBelief& belief_;
   std::optional<double> rate_;
+  double knot_interval_;  ///< s
   estimation::BatchMapResult result_;
   std::vector<std::size_t> first_row_;  ///< of the piece, of each knot's first shot
 };

@@ -12,6 +12,20 @@ template <class T>
 struct Vector3 {
   T x{}, y{}, z{};
 
+  Vector3() = default;
+  Vector3(const T& x_value, const T& y_value, const T& z_value)
+      : x(x_value), y(y_value), z(z_value) {}
+  // Member by member: gcc 12 copies three batches as one block of memory, which costs the kernels a
+  // tenth of their speed.
+  Vector3(const Vector3& other) : x(other.x), y(other.y), z(other.z) {}
+  Vector3& operator=(const Vector3& other) {
+    x = other.x;
+    y = other.y;
+    z = other.z;
+    return *this;
+  }
+  ~Vector3() = default;
+
   friend Vector3 operator+(const Vector3& a, const Vector3& b) {
     return {a.x + b.x, a.y + b.y, a.z + b.z};
   }

@@ -30,6 +30,7 @@ template <ModelScalar T, int N>
 struct BeamPath {
   std::array<Vector3<T>, 2 * N> point;  ///< m, sensor frame
   std::array<T, 2 * N> length;          ///< from the face before, m; that of the first face is 0
+  std::array<T, 2 * N> over_cosine;     ///< 1 / cosine of the angle of incidence, from face 1
 
   /// The point where the beam leaves the last face, m, sensor frame.
   const Vector3<T>& origin() const { return point[2 * N - 1]; }
@@ -44,10 +45,12 @@ BeamPath<T, N> beam_path(const Trace<T, N>& trace, const std::array<T, 2 * N>& f
   BeamPath<T, N> path;
   path.point[0] = {face_position[0], T(0.0), T(0.0)};
   path.length[0] = T(0.0);
+#pragma GCC unroll 8
   for (std::size_t i = 1; i < 2 * N; ++i) {
     const Vector3<T>& before = path.point[i - 1];
     const Vector3<T> to_face{face_position[i] - before.x, -before.y, -before.z};
-    path.length[i] = dot(trace.normal[i], to_face) / trace.refraction[i].cosine_in;
+    path.over_cosine[i] = T(1.0) / trace.refraction[i].cosine_in;
+    path.length[i] = dot(trace.normal[i], to_face) * path.over_cosine[i];
     path.point[i] = before + path.length[i] * trace.incident[i];
   }
   return path;
@@ -75,13 +78,14 @@ BeamPathAdjoint<T, N> beam_path_adjoint(const Trace<T, N>& trace, const BeamPath
   BeamPathAdjoint<T, N> out;
   const Vector3<T> zero{T(0.0), T(0.0), T(0.0)};
   out.incident[0] = out.normal[0] = zero;
+#pragma GCC unroll 8
   for (std::size_t i = 2 * N - 1; i > 0; --i) {
     const Vector3<T>& before = path.point[i - 1];
     const Vector3<T>& beam = trace.incident[i];
     const Vector3<T>& normal = trace.normal[i];
     const Vector3<T> to_face{face_position[i] - before.x, -before.y, -before.z};
     // length = normal . to_face / normal . beam
-    const T numerator_bar = dot(origin_bar, beam) / trace.refraction[i].cosine_in;
+    const T numerator_bar = dot(origin_bar, beam) * path.over_cosine[i];
     const T cosine_bar = -(numerator_bar * path.length[i]);
     out.incident[i] = path.length[i] * origin_bar + cosine_bar * normal;
     out.normal[i] = numerator_bar * to_face + cosine_bar * beam;

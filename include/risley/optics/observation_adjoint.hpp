@@ -105,8 +105,10 @@ Trace<T, N> trace_forward(const PreparedTrain<T, N>& train,
                           const RotationAngles<T, N>& rotation_angle) {
   Trace<T, N> out;
   Vector3<T> beam = train.incident;
+#pragma GCC unroll 4  // gcc 12 keeps batches in registers only where indices are constants
   for (std::size_t prism = 0; prism < N; ++prism) {
     std::tie(out.sine[prism], out.cosine[prism]) = sin_cos(rotation_angle[prism]);
+#pragma GCC unroll 2
     for (std::size_t side = 0; side < 2; ++side) {
       const std::size_t i = 2 * prism + side;
       out.incident[i] = beam;
@@ -139,6 +141,7 @@ std::array<Gradient<T, N>, Results> trace_adjoint(const PreparedTrain<T, N>& tra
   std::array<Vector3<T>, Results> beams = seeds;
   std::array<T, Results> air_bar;
   for (T& bar : air_bar) bar = T(0.0);
+#pragma GCC unroll 4
   for (int prism = N - 1; prism >= 0; --prism) {
     const auto k = static_cast<std::size_t>(prism);
     const bool last = prism == N - 1;
@@ -153,6 +156,7 @@ std::array<Gradient<T, N>, Results> trace_adjoint(const PreparedTrain<T, N>& tra
         gradient.parameters[static_cast<std::size_t>(i)] = T(0.0);
       }
     }
+#pragma GCC unroll 2
     for (int side = 1; side >= 0; --side) {
       const std::size_t i = 2 * k + static_cast<std::size_t>(side);
       const auto& face = d.faces[i];
@@ -164,6 +168,7 @@ std::array<Gradient<T, N>, Results> trace_adjoint(const PreparedTrain<T, N>& tra
         bearing_horizontal = face.bearing_horizontal.at(sine, cosine);
         bearing_vertical = face.bearing_vertical.at(sine, cosine);
       }
+#pragma GCC unroll 3
       for (std::size_t r = 0; r < Results; ++r) {
         Gradient<T, N>& gradient = gradients[r];
         const auto add = [&](int where, const T& value) {

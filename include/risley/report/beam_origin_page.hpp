@@ -1,0 +1,20 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "risley/optics/beam_origin_map.hpp"
+#include "risley/sensors/sensor.hpp"
+
+namespace risley::report {
+
+/// One self-contained HTML page with the maps of [B21 Fig. A1]: least and greatest Y and Z of the
+/// beam's origin over the field of view, and how far they lie apart.
+/// @param provenance  how to make it again: name and value pairs
+std::string beam_origin_page(const BeamOriginMap& map, const sensors::Sensor& sensor,
+                             const std::vector<std::pair<std::string, std::string>>& provenance);
+
+}  // namespace risley::report

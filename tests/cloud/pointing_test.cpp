@@ -1,0 +1,1126 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "risley/cloud/pointing.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <ostream>
+#include <string>
+#include <vector>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "risley/core/angle.hpp"
+#include "risley/core/direction.hpp"
+#include "risley/core/error.hpp"
+#include "risley/core/random.hpp"
+#include "risley/sensors/preset.hpp"
+
+#include "optics/trains.hpp"
+
+namespace risley::cloud {
+namespace {
+
+using Eigen::Index;
+using Eigen::Matrix3d;
+using Eigen::MatrixXd;
+using Eigen::Vector3d;
+using Eigen::VectorXd;
+using sensors::CalibrationReference;
+using ::testing::ElementsAre;
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+
+Vector3d eigen(const Vector3<double>& v) { return {v.x, v.y, v.z}; }
+
+/// A train, the sizes of its prisms, and the rotation angles of one shot.
+struct Beam {
+  PrismTrain train;
+  PrismGeometry geometry;
+  std::vector<double> angles;
+
+  Vector3d direction() const { return eigen(emergent_ray(train, geometry, angles).direction); }
+  Vector3d point(double range) const {
+    const Ray ray = emergent_ray(train, geometry, angles);
+    return eigen(ray.origin) + range * eigen(ray.direction);
+  }
+};
+
+/// Derivative of a point by the number that change(beam, step) changes.
+template <class Change>
+Vector3d rate_of(const Beam& beam, double range, double step, const Change& change) {
+  Beam up = beam, down = beam;
+  change(up, step);
+  change(down, -step);
+  return (up.point(range) - down.point(range)) / (2.0 * step);
+}
+
+Vector3d rate_by_place(const Beam& beam, double range, int place) {
+  return rate_of(beam, range, 1e-5, [place](Beam& b, double step) {
+    b.train.set_place(place, b.train[place] + step);
+  });
+}
+
+Vector3d rate_by_angle(const Beam& beam, double range, std::size_t prism) {
+  return rate_of(beam, range, 1e-5, [prism](Beam& b, double step) { b.angles[prism] += step; });
+}
+
+/// What one shot must give, in plain numbers.
+struct Expected {
+  Vector3d point = Vector3d::Zero(), direction = Vector3d::Zero();
+  /// Without and with the movement of the beam's origin along the beam.
+  Matrix3d covariance = Matrix3d::Zero(), full_covariance = Matrix3d::Zero();
+  /// How far the two may be apart by what is left out.
+  double left_out = 0;
+  std::vector<Vector3d> loading;
+  double range = 0, incidence = kNaN, azimuth_residual = 0, zenith_residual = 0;
+
+  /// An error that moves the point, less or with what it moves along the beam.
+  void add(const MatrixXd& rates, const MatrixXd& covariance_of_them) {
+    const Matrix3d across = Matrix3d::Identity() - direction * direction.transpose();
+    const Matrix3d whole = rates * covariance_of_them * rates.transpose();
+    covariance += across * whole * across;
+    full_covariance += whole;
+    const double along = std::sqrt(std::max(direction.dot(whole * direction), 0.0));
+    left_out += along * (2.0 * std::sqrt(whole.trace()) + along);
+  }
+};
+
+Beam beam_of(const PointingModel& model, const PointedShots& shots, std::size_t i) {
+  Beam beam{model.train, model.geometry, {}};
+  for (const auto& column : shots.rotation_angle) beam.angles.push_back(column[i]);
+  return beam;
+}
+
+Expected expected_point(const PointingModel& model, const PointedShots& shots, std::size_t i) {
+  const Beam beam = beam_of(model, shots, i);
+  const std::size_t prisms = beam.angles.size();
+  const Ray ray = emergent_ray(beam.train, beam.geometry, beam.angles);
+  const bool reported = model.options.reported_directions;
+  Expected e;
+  const double azimuth = shots.azimuth[i], zenith = shots.zenith[i];
+  e.direction = reported ? eigen(direction_from_angles(SphericalAngles<double>{azimuth, zenith}))
+                         : eigen(ray.direction);
+  e.range = shots.range[i] - model.range_offset;
+  e.point = eigen(ray.origin) + e.range * e.direction;
+  const Observation believed = observe(model.believed, beam.angles);
+  e.azimuth_residual = wrap_to_pi(azimuth - believed.azimuth);
+  e.zenith_residual = zenith - believed.zenith;
+
+  // The range.
+  const Vector3d normal(shots.surface_normal[0][i], shots.surface_normal[1][i],
+                        shots.surface_normal[2][i]);
+  double tangent = 0;
+  if (!normal.hasNaN()) {
+    e.incidence = std::atan2(normal.cross(e.direction).norm(), std::abs(normal.dot(e.direction)));
+    tangent = std::tan(e.incidence);
+  }
+  const double range_variance =
+      model.sensor.range_variance(e.range, tangent, shots.intensity[i]) + shots.range_rounding[i];
+  const Matrix3d along = e.direction * e.direction.transpose();
+  e.covariance += range_variance * along;
+  e.full_covariance += range_variance * along;
+
+  // The direction.
+  MatrixXd rates(3, static_cast<Index>(prisms));
+  for (std::size_t k = 0; k < prisms; ++k) {
+    rates.col(static_cast<Index>(k)) = rate_by_angle(beam, e.range, k);
+  }
+  if (reported) {
+    MatrixXd turned(3, 2);
+    const double noise = model.angle_noise * model.angle_noise;
+    turned.col(0) = e.range * std::sin(zenith) * Vector3d(-std::sin(azimuth), std::cos(azimuth), 0);
+    turned.col(1) = e.range * Vector3d(std::cos(zenith) * std::cos(azimuth),
+                                       std::cos(zenith) * std::sin(azimuth), -std::sin(zenith));
+    e.add(turned,
+          Eigen::Vector2d(noise + shots.azimuth_rounding[i], noise + shots.zenith_rounding[i])
+              .asDiagonal()
+              .toDenseMatrix());
+  } else {
+    MatrixXd covariance(rates.cols(), rates.cols());
+    std::size_t pair = 0;
+    for (Index k = 0; k < rates.cols(); ++k) {
+      for (Index l = k; l < rates.cols(); ++l) {
+        covariance(k, l) = covariance(l, k) = shots.angle_covariance[pair++][i];
+      }
+    }
+    e.add(rates, covariance);
+  }
+  if (model.options.beam_divergence) {
+    const double h = kDivergenceSigma * model.sensor.beam_divergence_horizontal;
+    const double v = kDivergenceSigma * model.sensor.beam_divergence_vertical;
+    MatrixXd spread(3, 2);
+    spread.col(0) = rate_by_place(beam, e.range, place::incident_beam_horizontal());
+    spread.col(1) = rate_by_place(beam, e.range, place::incident_beam_vertical());
+    e.add(spread, Eigen::Vector2d(h * h, v * v).asDiagonal().toDenseMatrix());
+  }
+
+  // What all shots share.
+  MatrixXd common(3, static_cast<Index>(model.places.size() + prisms + 2));
+  Index column = 0;
+  for (const int place : model.places) common.col(column++) = rate_by_place(beam, e.range, place);
+  for (Index k = 0; k < rates.cols(); ++k) common.col(column++) = rates.col(k);
+  common.col(column++) =
+      rate_of(beam, e.range, 1e-4, [](Beam& b, double step) { b.geometry.thickness += step; });
+  common.col(column++) =
+      rate_of(beam, e.range, 1e-4, [](Beam& b, double step) { b.geometry.spacing += step; });
+  const Matrix3d across = Matrix3d::Identity() - along;
+  for (const CommonFactor& factor : model.factors) {
+    const Vector3d whole = common * factor.weights;
+    const Vector3d moved = across * whole - factor.range_offset * e.direction;
+    const double extra = std::abs(e.direction.dot(whole));
+    e.loading.push_back(moved);
+    e.covariance += moved * moved.transpose();
+    const Vector3d full = whole - factor.range_offset * e.direction;
+    e.full_covariance += full * full.transpose();
+    e.left_out += extra * (2.0 * moved.norm() + extra);
+  }
+  return e;
+}
+
+Matrix3d covariance_of(const Points& points, std::size_t i) {
+  Matrix3d c;
+  const auto at = [&](CovarianceTerm term) { return points.covariance[term][i]; };
+  c << at(kXX), at(kXY), at(kXZ), at(kXY), at(kYY), at(kYZ), at(kXZ), at(kYZ), at(kZZ);
+  return c;
+}
+
+Vector3d point_of(const Points& points, std::size_t i) {
+  return {points.x[i], points.y[i], points.z[i]};
+}
+
+Vector3d loading_of(const Points& points, std::size_t factor, std::size_t i) {
+  const auto& columns = points.loading[factor];
+  return {columns[0][i], columns[1][i], columns[2][i]};
+}
+
+/// Random numbers one after the other.
+class Dice {
+ public:
+  explicit Dice(std::uint64_t seed) : stream_(seed, 77) {}
+  double normal() { return stream_.normal(next_++); }
+  double between(double a, double b) { return a + (b - a) * stream_.uniform(next_++); }
+
+ private:
+  RandomStream stream_;
+  std::uint64_t next_ = 0;
+};
+
+/// A model with everything in it: imperfect train, all parts of the range's noise, five factors
+/// that act on everything at once.
+PointingModel imperfect_model(const std::string& order, unsigned seed,
+                              const PointingOptions& options = {}) {
+  Dice dice(seed);
+  PointingModel model;
+  model.train = testing::imperfect_train(order, 0.5, seed);
+  model.believed = testing::imperfect_train(order, 0.5, seed + 1000);
+  if (options.beam_origin) model.geometry = {0.007, 0.030};
+  model.range_offset = 0.031;
+  model.angle_noise = 7e-5;
+  model.options = options;
+  sensors::Sensor& sensor = model.sensor;
+  sensor.train = model.train;
+  sensor.range_noise = 0.004;
+  sensor.range_noise_per_range = 1e-4;
+  sensor.range_noise_incidence = 0.002;
+  sensor.range_noise_weak_return = 0.03;
+  sensor.beam_divergence_horizontal = radians_from_degrees(0.03);
+  sensor.beam_divergence_vertical = radians_from_degrees(0.28);
+  const int prisms = model.train.prisms();
+  for (int place = 0; place < parameter_count(prisms); ++place) {
+    if (place == place::bearing_tilt_horizontal(prisms - 1)) continue;
+    if (place == place::bearing_tilt_vertical(prisms - 1)) continue;
+    if (place == place::incident_beam_vertical()) continue;  // not every place has a factor
+    model.places.push_back(place);
+  }
+  for (int j = 0; j < 5; ++j) {
+    CommonFactor factor;
+    factor.name = fmt::format("factor_{}", j);
+    factor.weights.resize(static_cast<Index>(model.places.size()) + prisms + 2);
+    for (double& weight : factor.weights) weight = 1e-4 * dice.normal();
+    factor.weights.tail(2) = 1e-3 * Eigen::Vector2d(dice.normal(), dice.normal());
+    factor.range_offset = 2e-3 * dice.normal();
+    model.factors.push_back(factor);
+  }
+  return model;
+}
+
+/// Shots at random rotation angles. Reported directions are near those of the believed train when
+/// residuals are wanted, or near the true beam.
+PointedShots random_shots(const PointingModel& model, std::size_t count, unsigned seed) {
+  Dice dice(seed + 5000);
+  const int prisms = model.train.prisms();
+  PointedShots shots;
+  shots.resize(prisms, count);
+  for (std::size_t i = 0; i < count; ++i) {
+    std::vector<double> angles;
+    MatrixXd root(prisms, prisms);
+    for (int k = 0; k < prisms; ++k) {
+      angles.push_back(dice.between(-20.0, 20.0));
+      shots.rotation_angle[static_cast<std::size_t>(k)][i] = angles.back();
+      for (int l = 0; l < prisms; ++l) root(k, l) = 3e-5 * dice.normal();
+    }
+    const MatrixXd covariance = root * root.transpose();
+    std::size_t pair = 0;
+    for (int k = 0; k < prisms; ++k) {
+      for (int l = k; l < prisms; ++l) shots.angle_covariance[pair++][i] = covariance(k, l);
+    }
+    const Observation seen = observe(model.train, angles);
+    shots.azimuth[i] = wrap_to_pi(seen.azimuth + 1e-4 * dice.normal());
+    shots.zenith[i] = seen.zenith + 1e-4 * dice.normal();
+    shots.azimuth_rounding[i] = 3e-9 * dice.between(0, 1);
+    shots.zenith_rounding[i] = 3e-9 * dice.between(0, 1);
+    shots.range_rounding[i] = 1e-6 * dice.between(0, 1);
+    shots.range[i] = i % 5 == 0 ? 0.5 + model.range_offset : std::exp(dice.between(-0.5, 5.3));
+    shots.intensity[i] = std::floor(dice.between(0, 256));
+    Vector3d normal(dice.normal(), dice.normal(), dice.normal());
+    normal.normalize();
+    if (i % 3 == 1) normal.setConstant(kNaN);
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      shots.surface_normal[axis][i] = normal[static_cast<Index>(axis)];
+    }
+  }
+  return shots;
+}
+
+CloudHeader header_of(const PointingModel& model, bool covariance = true, bool loadings = true) {
+  CloudHeader header;
+  header.prisms = model.train.prisms();
+  header.has_covariance = covariance;
+  if (loadings) {
+    for (const CommonFactor& factor : model.factors) header.factors.push_back(factor.name);
+  }
+  return header;
+}
+
+Points points_of(const PointingModel& model, const CloudHeader& header, const PointedShots& shots,
+                 InstructionSet set = available_instruction_sets().back()) {
+  Points points;
+  header.resize(points, shots.size());
+  compute_points(model, header, shots, points, set);
+  return points;
+}
+
+/// Largest entry of a difference of covariances over the stated one's trace.
+double relative_difference(const Matrix3d& found, const Matrix3d& stated) {
+  const double worst = (found - stated).cwiseAbs().maxCoeff() / stated.trace();
+  return std::isfinite(worst) ? worst : std::numeric_limits<double>::infinity();
+}
+
+void expect_points(const PointingModel& model, const PointedShots& shots, const Points& points) {
+  for (std::size_t i = 0; i < shots.size(); ++i) {
+    SCOPED_TRACE(fmt::format("shot {} of {}", i, shots.size()));
+    const Expected e = expected_point(model, shots, i);
+    EXPECT_LT((point_of(points, i) - e.point).norm(), 1e-14 * (10.0 + e.range));
+    EXPECT_DOUBLE_EQ(points.range[i], e.range);
+    EXPECT_NEAR(points.azimuth_residual[i], e.azimuth_residual,
+                1e-15 + 1e-8 * std::abs(e.azimuth_residual));
+    EXPECT_NEAR(points.zenith_residual[i], e.zenith_residual,
+                1e-15 + 1e-8 * std::abs(e.zenith_residual));
+    if (std::isnan(e.incidence)) {
+      EXPECT_TRUE(std::isnan(points.incidence[i]));
+    } else {
+      EXPECT_NEAR(points.incidence[i], e.incidence, 1e-7);  // root of 1 - cosine^2
+    }
+    for (std::size_t k = 0; k < points.rotation_angle.size(); ++k) {
+      const double angle = points.rotation_angle[k][i];
+      EXPECT_TRUE(angle >= 0 && angle < kTwoPi) << angle;
+      EXPECT_NEAR(wrap_to_pi(angle - shots.rotation_angle[k][i]), 0.0, 1e-14);
+    }
+    for (std::size_t j = 0; j < points.loading.size(); ++j) {
+      EXPECT_LT((loading_of(points, j, i) - e.loading[j]).norm(), 1e-9 * (10.0 + e.range));
+    }
+    if (points.covariance[0].empty()) continue;
+    const Matrix3d found = covariance_of(points, i);
+    EXPECT_LT(relative_difference(found, e.covariance), 1e-7);
+    EXPECT_LT((found - e.full_covariance).cwiseAbs().maxCoeff(),
+              e.left_out + 1e-7 * e.covariance.trace());
+  }
+}
+
+struct PointCase {
+  std::string order;
+  bool reported = false, origin = true;
+
+  friend std::ostream& operator<<(std::ostream& out, const PointCase& one) {
+    return out << one.order << (one.reported ? " reported" : " smoothed")
+               << (one.origin ? " with origin" : " from zero");
+  }
+};
+
+class PointsOfEveryTrain : public ::testing::TestWithParam<PointCase> {};
+
+// All columns of every length of tail.
+TEST_P(PointsOfEveryTrain, EqualPlainNumbersInEveryInstructionSet) {
+  PointingOptions options;
+  options.reported_directions = GetParam().reported;
+  options.beam_origin = GetParam().origin;
+  for (const InstructionSet set : available_instruction_sets()) {
+    SCOPED_TRACE(to_string(set));
+    for (unsigned count = 1; count <= 17; ++count) {
+      options.beam_divergence = count % 4 != 0;
+      const PointingModel model = imperfect_model(GetParam().order, count, options);
+      const PointedShots shots = random_shots(model, count, count);
+      expect_points(model, shots, points_of(model, header_of(model), shots, set));
+    }
+  }
+}
+
+std::vector<PointCase> point_cases() {
+  std::vector<PointCase> cases;
+  for (const char* order :
+       {"PA", "PA-PA", "PA-AP", "AP-AP", "AP-PA", "PA-AP-PA", "AP-PA-PA", "PA-AP-AP-PA"}) {
+    for (const bool reported : {false, true}) {
+      for (const bool origin : {true, false}) cases.push_back({order, reported, origin});
+    }
+  }
+  return cases;
+}
+
+INSTANTIATE_TEST_SUITE_P(Trains, PointsOfEveryTrain, ::testing::ValuesIn(point_cases()),
+                         [](const auto& one) {
+                           std::string name = one.param.order;
+                           std::erase(name, '-');
+                           name += one.param.reported ? "Reported" : "Smoothed";
+                           return name + (one.param.origin ? "WithOrigin" : "FromZero");
+                         });
+
+// A covariance or loadings less do not change what is left.
+TEST(ComputePoints, ColumnsDoNotDependOnWhichOthersAreThere) {
+  const PointingModel model = imperfect_model("PA-AP", 3);
+  const PointedShots shots = random_shots(model, 21, 3);
+  const Points all = points_of(model, header_of(model), shots);
+  const Points without_loadings = points_of(model, header_of(model, true, false), shots);
+  const Points bare = points_of(model, header_of(model, false, false), shots);
+  EXPECT_EQ(without_loadings.covariance, all.covariance);
+  EXPECT_TRUE(without_loadings.loading.empty());
+  for (const Points* points : {&without_loadings, &bare}) {
+    EXPECT_EQ(points->x, all.x);
+    EXPECT_EQ(points->y, all.y);
+    EXPECT_EQ(points->z, all.z);
+    EXPECT_EQ(points->range, all.range);
+  }
+  EXPECT_TRUE(bare.covariance[0].empty());
+}
+
+// Points where the sensor says, from the frame's origin; the footprint lies along azimuth and
+// zenith and the range offset is all that they share.
+TEST(ComputePoints, DoWithoutRotationAngles) {
+  sensors::Sensor sensor = sensors::load_sensor("mid-40-table3");
+  sensor.reference = CalibrationReference::directions;
+  sensor.range_offset = 0.02;
+  sensor.range_noise_incidence = 0.004;
+  sensor.range_noise_weak_return = 0.02;
+  sensor.set_knowledge({"range_offset_m", 0.005, "assumed"});
+  PointingOptions options;
+  options.reported_directions = true;
+  EXPECT_TRUE(needs_rotation_angles(sensor, options));
+  EXPECT_THROW(reported_pointing_model(sensor, options, std::nullopt), InvalidArgument);
+  options.beam_origin = false;
+  EXPECT_FALSE(needs_rotation_angles(sensor, options));
+  EXPECT_TRUE(needs_rotation_angles(sensor, {}));
+  for (const bool divergence : {true, false}) {
+    options.beam_divergence = divergence;
+    const PointingModel model = reported_pointing_model(sensor, options, 9e-5);
+    EXPECT_EQ(reported_pointing_model(sensor, options, std::nullopt).angle_noise,
+              sensor.angle_noise);
+    ASSERT_EQ(model.factors.size(), 1u);
+    CloudHeader header = header_of(model);
+    header.has_rotation_angles = false;
+    const PointedShots shots = random_shots(model, 19, 7);
+    for (const InstructionSet set : available_instruction_sets()) {
+      const Points points = points_of(model, header, shots, set);
+      EXPECT_TRUE(points.azimuth_residual.empty());
+      EXPECT_TRUE(points.rotation_angle.empty());
+      for (std::size_t i = 0; i < shots.size(); ++i) {
+        SCOPED_TRACE(fmt::format("{} shot {}", to_string(set), i));
+        const double azimuth = shots.azimuth[i], zenith = shots.zenith[i];
+        const double range = shots.range[i] - 0.02;
+        const Vector3d d = eigen(direction_from_angles(SphericalAngles<double>{azimuth, zenith}));
+        EXPECT_LT((point_of(points, i) - range * d).norm(), 1e-14 * (10.0 + range));
+        const Vector3d level(-std::sin(azimuth), std::cos(azimuth), 0.0);
+        const Vector3d upright = level.cross(d);
+        const double spread = divergence ? kDivergenceSigma : 0.0;
+        const double noise = 9e-5 * 9e-5;
+        const double h = std::pow(spread * sensor.beam_divergence_horizontal, 2) +
+                         std::pow(std::sin(zenith), 2) * (noise + shots.azimuth_rounding[i]);
+        const double v = std::pow(spread * sensor.beam_divergence_vertical, 2) + noise +
+                         shots.zenith_rounding[i];
+        const Vector3d normal(shots.surface_normal[0][i], shots.surface_normal[1][i],
+                              shots.surface_normal[2][i]);
+        const double tangent =
+            normal.hasNaN() ? 0.0 : normal.cross(d).norm() / std::abs(normal.dot(d));
+        const double along = sensor.range_variance(range, tangent, shots.intensity[i]) +
+                             shots.range_rounding[i] + 0.005 * 0.005;
+        const Matrix3d stated = range * range * h * level * level.transpose() +
+                                range * range * v * upright * upright.transpose() +
+                                along * d * d.transpose();
+        EXPECT_LT(relative_difference(covariance_of(points, i), stated), 1e-12);
+        EXPECT_LT((loading_of(points, 0, i) + 0.005 * d).norm(), 1e-15);
+      }
+    }
+  }
+  sensor.reference = CalibrationReference::planes;
+  EXPECT_TRUE(needs_rotation_angles(sensor, options));
+}
+
+TEST(ComputePoints, NoShotGivesNoPoint) {
+  const PointingModel model = imperfect_model("PA-AP", 3);
+  EXPECT_EQ(points_of(model, header_of(model), random_shots(model, 0, 1)).x.size(), 0u);
+}
+
+TEST(ComputePoints, WhatIsNotKnownIsNaNAndLeavesItsNeighboursAlone) {
+  for (const bool reported : {false, true}) {
+    PointingOptions options;
+    options.reported_directions = reported;
+    const PointingModel model = imperfect_model("PA-AP", 4, options);
+    const PointedShots shots = random_shots(model, 19, 4);
+    PointedShots broken = shots;
+    for (const std::size_t i : {0u, 6u, 18u}) broken.rotation_angle[i == 6][i] = kNaN;
+    for (const InstructionSet set : available_instruction_sets()) {
+      const Points sound = points_of(model, header_of(model), shots, set);
+      const Points points = points_of(model, header_of(model), broken, set);
+      for (std::size_t i = 0; i < shots.size(); ++i) {
+        SCOPED_TRACE(fmt::format("{} shot {}", to_string(set), i));
+        if (i == 0 || i == 6 || i == 18) {
+          EXPECT_TRUE(point_of(points, i).array().isNaN().all());
+        } else {
+          EXPECT_EQ(point_of(points, i), point_of(sound, i));
+          EXPECT_EQ(covariance_of(points, i), covariance_of(sound, i));
+        }
+      }
+    }
+  }
+}
+
+TEST(ComputePoints, ABeamThatDoesNotGetThroughHasNoPoint) {
+  for (const bool reported : {false, true}) {
+    for (const bool origin : {false, true}) {
+      PointingOptions options;
+      options.reported_directions = reported;
+      options.beam_origin = origin;
+      PointingModel model = imperfect_model("PA-PA", 5, options);
+      model.train.set("wedge_angle_deg", radians_from_degrees(31.0));
+      PointedShots shots = random_shots(imperfect_model("PA-PA", 5, options), 40, 5);
+      std::size_t lost = 0;
+      for (const InstructionSet set : available_instruction_sets()) {
+        const Points points = points_of(model, header_of(model), shots, set);
+        for (std::size_t i = 0; i < shots.size(); ++i) {
+          const Beam beam = beam_of(model, shots, i);
+          const bool valid = emergent_ray(beam.train, beam.geometry, beam.angles).valid;
+          lost += valid ? 0 : 1;
+          EXPECT_EQ(point_of(points, i).array().isNaN().all(), !valid);
+          EXPECT_EQ(point_of(points, i).array().isNaN().any(), !valid);
+        }
+      }
+      EXPECT_GT(lost, 5u);
+      EXPECT_LT(lost, 40 * available_instruction_sets().size());
+    }
+  }
+}
+
+// Each part alone, so that one cannot hide behind another.
+TEST(RangeNoise, FollowsTheSensorsRangeVariance) {
+  PointingModel quiet = imperfect_model("PA-AP", 6);
+  quiet.factors.clear();
+  quiet.places.clear();
+  sensors::Sensor& sensor = quiet.sensor;
+  sensor.range_noise = sensor.range_noise_per_range = 0;
+  sensor.range_noise_incidence = sensor.range_noise_weak_return = 0;
+  PointedShots shots = random_shots(quiet, 33, 6);
+  shots.intensity[0] = 0;
+  shots.intensity[2] = 255;
+  for (const auto part :
+       {&sensors::Sensor::range_noise, &sensors::Sensor::range_noise_per_range,
+        &sensors::Sensor::range_noise_incidence, &sensors::Sensor::range_noise_weak_return}) {
+    PointingModel model = quiet;
+    model.sensor.*part = 0.01;
+    for (const InstructionSet set : available_instruction_sets()) {
+      const Points points = points_of(model, header_of(model), shots, set);
+      for (std::size_t i = 0; i < shots.size(); ++i) {
+        const Expected e = expected_point(model, shots, i);
+        const double tangent = std::isnan(e.incidence) ? 0.0 : std::tan(e.incidence);
+        const double variance = model.sensor.range_variance(e.range, tangent, shots.intensity[i]) +
+                                shots.range_rounding[i];
+        const double along = e.direction.dot(covariance_of(points, i) * e.direction);
+        EXPECT_NEAR(along / variance, 1.0, 1e-6) << to_string(set) << " shot " << i;
+      }
+    }
+  }
+}
+
+/// Rebuilt from a model's factors: the covariance of all places, of the rotation angles, of
+/// thickness and spacing, and of the range offset.
+MatrixXd covariance_of_factors(const PointingModel& model) {
+  const int prisms = model.train.prisms();
+  const Index count = parameter_count(prisms), size = count + prisms + 3;
+  MatrixXd sum = MatrixXd::Zero(size, size);
+  for (const CommonFactor& factor : model.factors) {
+    VectorXd all = VectorXd::Zero(size);
+    Index row = 0;
+    for (const int place : model.places) all[place] = factor.weights[row++];
+    for (Index i = count; i < size - 1; ++i) all[i] = factor.weights[row++];
+    EXPECT_EQ(row, factor.weights.size());
+    all[size - 1] = factor.range_offset;
+    sum += all * all.transpose();
+  }
+  return sum;
+}
+
+std::vector<std::string> names_of(const PointingModel& model) {
+  std::vector<std::string> names;
+  for (const CommonFactor& factor : model.factors) names.push_back(factor.name);
+  return names;
+}
+
+/// A full covariance with strong correlations between quantities of given sigmas.
+MatrixXd correlated(const VectorXd& sigma, std::uint64_t seed) {
+  Dice dice(seed);
+  const Index n = sigma.size();
+  MatrixXd root(n, n + 1);
+  for (double& entry : root.reshaped()) entry = dice.normal();
+  root.col(0) *= 2.0;
+  MatrixXd c = root * root.transpose();
+  const VectorXd scale = c.diagonal().cwiseSqrt().cwiseInverse().cwiseProduct(sigma);
+  return scale.asDiagonal() * c * scale.asDiagonal();
+}
+
+/// Sigmas as a calibration finds them, SI units.
+VectorXd typical_sigmas(const std::vector<std::string>& names, double scale = 1.0) {
+  VectorXd sigma(static_cast<Index>(names.size()));
+  for (Index i = 0; i < sigma.size(); ++i) {
+    const std::string& name = names[static_cast<std::size_t>(i)];
+    sigma[i] = scale * (name == "range_offset_m"         ? 0.002
+                        : name.starts_with("refractive") ? 1e-4
+                                                         : radians_from_degrees(0.003));
+  }
+  return sigma;
+}
+
+/// A calibrated Mid-40 and what one of its recordings says.
+struct Case {
+  sensors::Sensor calibration = sensors::load_sensor("mid-40-table3");
+  SensorBelief belief;
+
+  explicit Case(CalibrationReference reference, std::uint64_t seed = 1) {
+    calibration.reference = reference;
+    belief.sensor = sensors::load_sensor("mid-40-table3");
+    belief.sensor.train = testing::imperfect_train("PA-AP", 0.2, 8);
+    belief.angle_noise = 6e-5;
+    set_free(estimation::default_free_names(2), seed);
+    if (reference == CalibrationReference::none) return;
+    calibration.covariance_names = estimation::default_free_names(2);
+    if (reference == CalibrationReference::planes) {
+      calibration.covariance_names.insert(calibration.covariance_names.begin() + 2,
+                                          "range_offset_m");
+      calibration.covariance_names.push_back("prism_tilt_a_horizontal_deg");
+      calibration.range_offset = 0.012;
+    }
+    calibration.covariance = correlated(typical_sigmas(calibration.covariance_names), seed + 1);
+  }
+
+  void set_free(const std::vector<std::string>& names, std::uint64_t seed) {
+    const int prisms = belief.sensor.prisms();
+    belief.free = estimation::free_parameters(names, prisms);
+    belief.covariance = correlated(typical_sigmas(names, 0.5), seed + 2);
+    belief.angle_sensitivity.resize(prisms, static_cast<Index>(names.size()));
+    Dice dice(seed + 3);
+    for (double& entry : belief.angle_sensitivity.reshaped()) entry = dice.normal();
+  }
+
+  /// [places + prisms + 3, names]: what named quantities do.
+  MatrixXd effect(const std::vector<std::string>& names, bool beam, bool angles) const {
+    const int prisms = calibration.prisms();
+    const Index count = parameter_count(prisms);
+    MatrixXd m = MatrixXd::Zero(count + prisms + 3, static_cast<Index>(names.size()));
+    for (Index j = 0; j < m.cols(); ++j) {
+      const std::string& name = names[static_cast<std::size_t>(j)];
+      if (name == "range_offset_m") {
+        m(m.rows() - 1, j) = 1.0;
+        continue;
+      }
+      if (beam) {
+        for (const int place : find_parameter(name, prisms).places) m(place, j) = 1.0;
+      }
+      for (std::size_t f = 0; angles && f < belief.free.size(); ++f) {
+        if (belief.free[f].name != name) continue;
+        m.block(count, j, prisms, 1) = belief.angle_sensitivity.col(static_cast<Index>(f));
+      }
+    }
+    return m;
+  }
+
+  std::vector<std::string> free_names() const {
+    std::vector<std::string> names;
+    for (const auto& free : belief.free) names.push_back(free.name);
+    return names;
+  }
+};
+
+/// Variances of thickness, spacing and (when it is not with the others) the range offset.
+MatrixXd geometry_variance(const sensors::Sensor& sensor, Index size) {
+  const auto variance = [&sensor](const char* name) {
+    const sensors::Knowledge* known = sensor.find_knowledge(name);
+    return known == nullptr ? 0.0 : known->sigma * known->sigma;
+  };
+  VectorXd all = VectorXd::Zero(size);
+  all[size - 3] = variance("prism_thickness_m");
+  all[size - 2] = variance("prism_spacing_m");
+  all[size - 1] = variance("range_offset_m");
+  return all.asDiagonal();
+}
+
+void expect_same_covariance(const MatrixXd& found, const MatrixXd& stated) {
+  ASSERT_EQ(found.rows(), stated.rows());
+  const VectorXd scale = stated.diagonal().cwiseSqrt();
+  for (Index i = 0; i < found.rows(); ++i) {
+    for (Index j = 0; j < found.cols(); ++j) {
+      EXPECT_NEAR(found(i, j), stated(i, j), 1e-9 * scale[i] * scale[j]) << i << ' ' << j;
+    }
+  }
+}
+
+TEST(PointingModel, OfATypeTakesTheRecordingsParametersAndTheirErrors) {
+  Case one(CalibrationReference::none);
+  one.calibration.set_knowledge({"range_offset_m", 0.005, "assumed"});
+  const PointingModel model = pointing_model(one.calibration, one.belief, {});
+  EXPECT_EQ(model.train.parameters(), one.belief.sensor.train.parameters());
+  EXPECT_EQ(model.believed.parameters(), one.belief.sensor.train.parameters());
+  EXPECT_EQ(model.angle_noise, 6e-5);
+  EXPECT_EQ(model.geometry.spacing, 0.030);
+  std::vector<std::string> names = one.free_names();
+  for (const char* more : {"prism_thickness_m", "prism_spacing_m", "range_offset_m"}) {
+    names.push_back(more);
+  }
+  EXPECT_EQ(names_of(model), names);
+  const MatrixXd effect = one.effect(one.free_names(), true, true);
+  MatrixXd stated = effect * one.belief.covariance * effect.transpose();
+  stated += geometry_variance(one.calibration, stated.rows());
+  expect_same_covariance(covariance_of_factors(model), stated);
+}
+
+TEST(PointingModel, CalibratedAgainstDirectionsMovesTheRotationAnglesToo) {
+  const Case one(CalibrationReference::directions);
+  const PointingModel model = pointing_model(one.calibration, one.belief, {});
+  EXPECT_EQ(model.train.parameters(), one.belief.sensor.train.parameters());
+  const auto& names = one.calibration.covariance_names;
+  const MatrixXd effect = one.effect(names, true, true);
+  MatrixXd stated = effect * one.calibration.covariance * effect.transpose();
+  stated += geometry_variance(one.calibration, stated.rows());
+  expect_same_covariance(covariance_of_factors(model), stated);
+  // Places that nothing moves are left out.
+  for (const int place :
+       {place::refractive_index_air(), place::wedge_angle(0), place::wedge_angle(1),
+        place::prism_tilt_horizontal(0), place::bearing_tilt_horizontal(1)}) {
+    EXPECT_EQ(std::count(model.places.begin(), model.places.end(), place), 0) << place;
+  }
+  EXPECT_EQ(model.places.size(), 9u);
+}
+
+TEST(PointingModel, ReportedDirectionsOwnNothingToTheParameters) {
+  const Case one(CalibrationReference::directions);
+  PointingOptions options;
+  options.reported_directions = true;
+  EXPECT_THAT(names_of(pointing_model(one.calibration, one.belief, options)),
+              ElementsAre("prism_thickness_m", "prism_spacing_m"));
+  options.beam_origin = false;
+  const PointingModel thin = pointing_model(one.calibration, one.belief, options);
+  EXPECT_THAT(names_of(thin), ElementsAre());
+  EXPECT_EQ(thin.geometry.thickness, 0.0);
+  EXPECT_TRUE(thin.places.empty());
+}
+
+TEST(PointingModel, CalibratedAgainstPlanesHasErrorsOfBothTrains) {
+  const Case one(CalibrationReference::planes);
+  const PointingModel model = pointing_model(one.calibration, one.belief, {});
+  EXPECT_EQ(model.train.parameters(), one.calibration.train.parameters());
+  EXPECT_EQ(model.believed.parameters(), one.belief.sensor.train.parameters());
+  EXPECT_EQ(model.range_offset, 0.012);
+  std::vector<std::string> names = one.calibration.covariance_names;
+  for (const char* own : {"rotation_angle_a_deg", "rotation_angle_b_deg"}) names.push_back(own);
+  names.push_back("prism_thickness_m");
+  names.push_back("prism_spacing_m");
+  EXPECT_EQ(names_of(model), names);
+  const MatrixXd beam = one.effect(one.calibration.covariance_names, true, false);
+  const MatrixXd angles = one.effect(one.free_names(), false, true);
+  MatrixXd stated = beam * one.calibration.covariance * beam.transpose() +
+                    angles * one.belief.covariance * angles.transpose();
+  stated += geometry_variance(one.calibration, stated.rows());
+  expect_same_covariance(covariance_of_factors(model), stated);
+}
+
+// Names that are no parameters of the beam have no factor.
+TEST(PointingModel, LeavesOutSpeedsOfACalibration) {
+  Case one(CalibrationReference::directions);
+  const MatrixXd inner = one.calibration.covariance;
+  auto& names = one.calibration.covariance_names;
+  names.insert(names.begin() + 1, "angular_velocity_a_deg_per_s");
+  one.calibration.covariance =
+      correlated(VectorXd::Constant(static_cast<Index>(names.size()), 1e-3), 9);
+  const PointingModel model = pointing_model(one.calibration, one.belief, {});
+  EXPECT_EQ(std::count(names.begin(), names.end(), "angular_velocity_a_deg_per_s"), 1);
+  const auto factors = names_of(model);
+  EXPECT_EQ(std::count(factors.begin(), factors.end(), "angular_velocity_a_deg_per_s"), 0);
+  EXPECT_EQ(factors.size(), names.size() - 1 + 2);
+}
+
+TEST(PointingModel, RefusesAnotherFaceOrder) {
+  Case one(CalibrationReference::directions);
+  one.belief.sensor.train = PrismTrain(parse_face_order("AP-PA"));
+  try {
+    pointing_model(one.calibration, one.belief, {});
+    FAIL();
+  } catch (const InvalidArgument& error) {
+    EXPECT_THAT(error.what(), ::testing::HasSubstr("PA-AP"));
+    EXPECT_THAT(error.what(), ::testing::HasSubstr("AP-PA"));
+  }
+}
+
+// One quantity determines another: one factor fewer, the same covariance.
+TEST(PointingModel, TakesACovarianceThatHasNoInverse) {
+  Case one(CalibrationReference::planes);
+  auto& c = one.calibration.covariance;
+  for (const double times : {1.0, -2.0}) {
+    c.row(4) = times * c.row(1);
+    c.col(4) = times * c.col(1);
+    const PointingModel model = pointing_model(one.calibration, one.belief, {});
+    const MatrixXd beam = one.effect(one.calibration.covariance_names, true, false);
+    const MatrixXd angles = one.effect(one.free_names(), false, true);
+    MatrixXd stated =
+        beam * c * beam.transpose() + angles * one.belief.covariance * angles.transpose();
+    stated += geometry_variance(one.calibration, stated.rows());
+    expect_same_covariance(covariance_of_factors(model), stated);
+    const auto names = names_of(model);
+    EXPECT_EQ(std::count(names.begin(), names.end(), one.calibration.covariance_names[4]), 0);
+    EXPECT_EQ(names.size(), static_cast<std::size_t>(c.rows()) - 1 + 2 + 2);
+  }
+}
+
+TEST(PointingModel, RefusesMoreFactorsThanItCanHold) {
+  Case one(CalibrationReference::planes);
+  const std::size_t many = 70;
+  one.calibration.covariance_names.assign(many, "wedge_angle_a_deg");
+  one.calibration.covariance =
+      1e-8 * MatrixXd::Identity(static_cast<Index>(many), static_cast<Index>(many));
+  EXPECT_THROW(pointing_model(one.calibration, one.belief, {}), InvalidArgument);
+}
+
+TEST(PointingModel, OfFourPrismsGivesPoints) {
+  Case one(CalibrationReference::planes);
+  const char* order = "PA-AP-PA-AP";
+  one.calibration.train = testing::imperfect_train(order, 0.3, 21);
+  one.belief.sensor.train = testing::imperfect_train(order, 0.3, 22);
+  one.set_free(estimation::default_free_names(4), 23);
+  one.calibration.covariance_names = estimation::default_free_names(4);
+  one.calibration.covariance = correlated(typical_sigmas(one.calibration.covariance_names), 24);
+  const PointingModel model = pointing_model(one.calibration, one.belief, {});
+  EXPECT_EQ(model.factors.size(), one.belief.free.size() + 4 + 2);
+  const MatrixXd beam = one.effect(one.calibration.covariance_names, true, false);
+  const MatrixXd angles = one.effect(one.free_names(), false, true);
+  MatrixXd stated = beam * one.calibration.covariance * beam.transpose() +
+                    angles * one.belief.covariance * angles.transpose();
+  stated += geometry_variance(one.calibration, stated.rows());
+  expect_same_covariance(covariance_of_factors(model), stated);
+  const PointedShots shots = random_shots(model, 11, 25);
+  expect_points(model, shots, points_of(model, header_of(model), shots));
+}
+
+// Rotation angles that follow an error of a parameter so that the direction stays where it was:
+// then the parameter's factor moves a point by what the beam's origin moves, and by nothing
+// without.
+TEST(PointingModel, AngleSensitivityTakesParameterErrorsOutOfThePoint) {
+  Case one(CalibrationReference::directions);
+  const Beam beam{one.belief.sensor.train, {}, {0.4, 1.7}};
+  MatrixXd by_angles(3, 2);
+  for (Index k = 0; k < 2; ++k) {
+    by_angles.col(k) = rate_by_angle(beam, 1.0, static_cast<std::size_t>(k));
+  }
+  const MatrixXd normal_matrix = by_angles.transpose() * by_angles;
+  for (std::size_t j = 0; j < one.belief.free.size(); ++j) {
+    Vector3d rate = Vector3d::Zero();
+    for (const int place : one.belief.free[j].places) rate += rate_by_place(beam, 1.0, place);
+    one.belief.angle_sensitivity.col(static_cast<Index>(j)) =
+        -normal_matrix.ldlt().solve(by_angles.transpose() * rate);
+  }
+  PointedShots shots;
+  shots.resize(2, 1);
+  shots.rotation_angle[0][0] = beam.angles[0];
+  shots.rotation_angle[1][0] = beam.angles[1];
+  shots.range[0] = 100.0;
+  PointingOptions options;
+  for (const bool origin : {false, true}) {
+    options.beam_origin = origin;
+    const PointingModel model = pointing_model(one.calibration, one.belief, options);
+    const Points points = points_of(model, header_of(model), shots);
+    for (std::size_t j = 0; j < one.belief.free.size(); ++j) {
+      EXPECT_LT(loading_of(points, j, 0).norm(), origin ? 1e-5 : 1e-11) << model.factors[j].name;
+    }
+  }
+}
+
+// --- Monte Carlo ------------------------------------------------------------------------------
+
+constexpr std::size_t kBeams = 100, kDraws = 1000;
+
+/// Half-widths of the band that all of so many means of squares lie in in 9,999 of 10,000 cases.
+/// [Wilson and Hilferty 1931, for the distribution of chi-square]
+struct ChiSquareBand {
+  double low, high;
+
+  ChiSquareBand(double degrees, double z) {
+    const double a = 2.0 / (9.0 * degrees);
+    low = std::pow(1.0 - a - z * std::sqrt(a), 3);
+    high = std::pow(1.0 - a + z * std::sqrt(a), 3);
+  }
+};
+constexpr double kWorstOf300 = 5.11;  ///< normal quantile at 1e-4 / 300, two-sided
+constexpr double kWorstOf100 = 4.89;  ///< at 1e-4 / 100
+
+/// Points of the truth as errors of everything move it [draws][beams], with what the model states.
+struct Draws {
+  Points points;
+  std::vector<std::vector<Vector3d>> moved;  ///< drawn point less stated one
+
+  Draws(const PointingModel& model, const PointedShots& shots, const Case& one)
+      : points(points_of(model, header_of(model), shots)) {
+    const MatrixXd parameter_root = root_of(one.calibration.covariance);
+    const MatrixXd belief_root = root_of(one.belief.covariance);
+    const double thickness = one.calibration.find_knowledge("prism_thickness_m")->sigma;
+    const double spacing = one.calibration.find_knowledge("prism_spacing_m")->sigma;
+    const double spread_h = kDivergenceSigma * model.sensor.beam_divergence_horizontal;
+    const double spread_v = kDivergenceSigma * model.sensor.beam_divergence_vertical;
+    std::vector<Eigen::Matrix2d> angle_root;
+    std::vector<double> range_sigma;
+    for (std::size_t i = 0; i < shots.size(); ++i) {
+      Eigen::Matrix2d c;
+      c << shots.angle_covariance[0][i], shots.angle_covariance[1][i], shots.angle_covariance[1][i],
+          shots.angle_covariance[2][i];
+      angle_root.push_back(c.llt().matrixL());
+      const Expected e = expected_point(model, shots, i);
+      const double tangent = std::isnan(e.incidence) ? 0 : std::tan(e.incidence);
+      range_sigma.push_back(
+          std::sqrt(model.sensor.range_variance(e.range, tangent, shots.intensity[i]) +
+                    shots.range_rounding[i]));
+    }
+    Dice dice(2026);
+    const auto normals = [&dice](Index n) {
+      VectorXd v(n);
+      for (double& x : v) x = dice.normal();
+      return v;
+    };
+    for (std::size_t draw = 0; draw < kDraws; ++draw) {
+      const VectorXd p = parameter_root * normals(parameter_root.cols());
+      const VectorXd b = belief_root * normals(belief_root.cols());
+      const VectorXd shift = one.belief.angle_sensitivity * b;
+      PrismTrain train = model.train;
+      double offset = model.range_offset;
+      for (Index j = 0; j < p.size(); ++j) {
+        const std::string& name = one.calibration.covariance_names[static_cast<std::size_t>(j)];
+        if (name == "range_offset_m") {
+          offset += p[j];
+          continue;
+        }
+        for (const int place : find_parameter(name, 2).places) {
+          train.set_place(place, train[place] + p[j]);
+        }
+      }
+      const PrismGeometry geometry{model.geometry.thickness + thickness * dice.normal(),
+                                   model.geometry.spacing + spacing * dice.normal()};
+      std::vector<Vector3d> row;
+      for (std::size_t i = 0; i < shots.size(); ++i) {
+        const Eigen::Vector2d noise = angle_root[i] * normals(2) + shift;
+        PrismTrain own = train;  // somewhere within the footprint
+        for (const auto& [place, sigma] : {std::pair{place::incident_beam_horizontal(), spread_h},
+                                           std::pair{place::incident_beam_vertical(), spread_v}}) {
+          own.set_place(place, own[place] + sigma * dice.normal());
+        }
+        const Beam beam{
+            own,
+            geometry,
+            {shots.rotation_angle[0][i] + noise[0], shots.rotation_angle[1][i] + noise[1]}};
+        const double range = shots.range[i] + range_sigma[i] * dice.normal() - offset;
+        row.push_back(beam.point(range) - point_of(points, i));
+      }
+      moved.push_back(std::move(row));
+    }
+  }
+
+  static MatrixXd root_of(const MatrixXd& c) { return c.llt().matrixL(); }
+};
+
+/// Compares the scatter of errors with a stated covariance, for many beams or pairs of them.
+struct Scatter {
+  std::vector<double> trace_ratio, diagonal_ratio, mahalanobis;
+  std::array<double, 3> coverage{};
+  std::array<double, 3> worst_coverage{};
+  static constexpr std::array<double, 3> kQuantile{2.365974, 6.251389, 11.344867};  // chi2, 3 dof
+  static constexpr std::array<double, 3> kShare{0.5, 0.9, 0.99};
+
+  void add(const std::vector<Vector3d>& errors, const Matrix3d& stated) {
+    Matrix3d sample = Matrix3d::Zero();
+    double sum = 0;
+    std::array<double, 3> inside{};
+    const Eigen::LLT<Matrix3d> factor(stated);
+    for (const Vector3d& error : errors) {
+      sample += error * error.transpose();
+      const double chi2 = error.dot(factor.solve(error));
+      sum += chi2;
+      for (std::size_t q = 0; q < 3; ++q) inside[q] += chi2 < kQuantile[q] ? 1 : 0;
+    }
+    const auto n = static_cast<double>(errors.size());
+    sample /= n;
+    trace_ratio.push_back(sample.trace() / stated.trace());
+    for (Index k = 0; k < 3; ++k) diagonal_ratio.push_back(sample(k, k) / stated(k, k));
+    mahalanobis.push_back(sum / (3.0 * n));
+    for (std::size_t q = 0; q < 3; ++q) {
+      coverage[q] += inside[q] / n;
+      worst_coverage[q] = std::max(worst_coverage[q], std::abs(inside[q] / n - kShare[q]));
+    }
+  }
+
+  static double mean(const std::vector<double>& values) {
+    double sum = 0;
+    for (const double v : values) sum += v;
+    return sum / static_cast<double>(values.size());
+  }
+  static std::pair<double, double> extremes(const std::vector<double>& values) {
+    const auto [low, high] = std::minmax_element(values.begin(), values.end());
+    return {*low, *high};
+  }
+
+  void record(const std::string& prefix) const {
+    const auto one = [&prefix](const char* name, double value) {
+      ::testing::Test::RecordProperty(prefix + name, fmt::format("{:.5g}", value));
+    };
+    one("trace_ratio", mean(trace_ratio));
+    one("smallest_diagonal_ratio", extremes(diagonal_ratio).first);
+    one("largest_diagonal_ratio", extremes(diagonal_ratio).second);
+    one("mahalanobis", mean(mahalanobis));
+    one("smallest_mahalanobis", extremes(mahalanobis).first);
+    one("largest_mahalanobis", extremes(mahalanobis).second);
+    for (std::size_t q = 0; q < 3; ++q) {
+      one(q == 0   ? "coverage_50"
+          : q == 1 ? "coverage_90"
+                   : "coverage_99",
+          coverage[q] / static_cast<double>(mahalanobis.size()));
+    }
+  }
+
+  bool within() const {
+    const ChiSquareBand diagonal(static_cast<double>(kDraws), kWorstOf300);
+    const ChiSquareBand distance(3.0 * kDraws, kWorstOf100);
+    const auto [low, high] = extremes(diagonal_ratio);
+    const auto [near, far] = extremes(mahalanobis);
+    return low > diagonal.low && high < diagonal.high && near > distance.low && far < distance.high;
+  }
+
+  void expect(double trace_tolerance) const {
+    EXPECT_NEAR(mean(trace_ratio), 1.0, trace_tolerance);
+    const ChiSquareBand diagonal(static_cast<double>(kDraws), kWorstOf300);
+    EXPECT_GT(extremes(diagonal_ratio).first, diagonal.low);
+    EXPECT_LT(extremes(diagonal_ratio).second, diagonal.high);
+    const ChiSquareBand distance(3.0 * kDraws, kWorstOf100);
+    EXPECT_GT(extremes(mahalanobis).first, distance.low);
+    EXPECT_LT(extremes(mahalanobis).second, distance.high);
+    for (std::size_t q = 0; q < 3; ++q) {
+      const double sigma = std::sqrt(kShare[q] * (1 - kShare[q]) / static_cast<double>(kDraws));
+      EXPECT_LT(worst_coverage[q], 5.3 * sigma) << kShare[q];
+      EXPECT_NEAR(coverage[q] / static_cast<double>(mahalanobis.size()), kShare[q], sigma)
+          << kShare[q];
+    }
+  }
+};
+
+PointedShots shots_over_the_field(const PointingModel& model) {
+  PointedShots shots = random_shots(model, kBeams, 31);
+  Dice dice(32);
+  for (std::size_t i = 0; i < kBeams; ++i) {
+    shots.range[i] = std::exp(dice.between(std::log(2.0), std::log(200.0)));
+    if (i % 2 == 1) {  // the neighbour of the beam before
+      for (auto& column : shots.rotation_angle) {
+        column[i] = column[i - 1] + radians_from_degrees(0.5) * dice.normal();
+      }
+      shots.range[i] = shots.range[i - 1] * dice.between(0.9, 1.1);
+    }
+    // Grazing incidence would make the range's noise too large for a straight line.
+    const std::array<double, 3> ahead{1.0, 0.2 * dice.normal(), 0.2 * dice.normal()};
+    const double length = norm(Vector3<double>{ahead[0], ahead[1], ahead[2]});
+    for (std::size_t k = 0; k < 3; ++k) {
+      if (!std::isnan(shots.surface_normal[k][i])) shots.surface_normal[k][i] = ahead[k] / length;
+    }
+  }
+  return shots;
+}
+
+class PointMonteCarlo : public ::testing::TestWithParam<bool> {
+ protected:
+  Case one_{CalibrationReference::planes, 41};
+  bool common_errors_lead_ = GetParam();
+
+  void SetUp() override {
+    if (common_errors_lead_) {
+      one_.calibration.range_noise = 0.0005;
+      one_.calibration.beam_divergence_horizontal = radians_from_degrees(0.003);
+      one_.calibration.beam_divergence_vertical = radians_from_degrees(0.003);
+    } else {
+      one_.calibration.range_noise_incidence = 0.005;
+      one_.calibration.range_noise_weak_return = 0.02;
+    }
+  }
+};
+
+// Draws of everything that can be wrong scatter as the covariances say, and differences of two
+// points of a cloud as their loadings say.
+TEST_P(PointMonteCarlo, ScatterIsWhatTheCovarianceSays) {
+  const PointingModel model = pointing_model(one_.calibration, one_.belief, {});
+  const PointedShots shots = shots_over_the_field(model);
+  const Draws draws(model, shots, one_);
+  Scatter single;
+  for (std::size_t i = 0; i < kBeams; ++i) {
+    std::vector<Vector3d> errors;
+    for (const auto& row : draws.moved) errors.push_back(row[i]);
+    single.add(errors, covariance_of(draws.points, i));
+  }
+  single.record("points_");
+  single.expect(0.05);
+
+  Scatter pairs, if_independent;
+  for (std::size_t i = 0; i < kBeams; i += 2) {
+    const std::size_t j = i + 1;
+    std::vector<Vector3d> errors;
+    for (const auto& row : draws.moved) errors.push_back(row[i] - row[j]);
+    const Matrix3d both = covariance_of(draws.points, i) + covariance_of(draws.points, j);
+    Matrix3d stated = both;
+    for (std::size_t f = 0; f < draws.points.loading.size(); ++f) {
+      const Vector3d a = loading_of(draws.points, f, i), b = loading_of(draws.points, f, j);
+      stated -= a * a.transpose() + b * b.transpose();
+      stated += (a - b) * (a - b).transpose();
+    }
+    pairs.add(errors, stated);
+    if_independent.add(errors, both);
+  }
+  pairs.record("differences_");
+  pairs.expect(0.05);
+  // As if every point had errors of its own.
+  if_independent.record("differences_if_independent_");
+  EXPECT_TRUE(pairs.within());
+  EXPECT_FALSE(if_independent.within());
+  if (common_errors_lead_) {
+    EXPECT_LT(Scatter::mean(if_independent.trace_ratio), 0.5);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Errors, PointMonteCarlo, ::testing::Bool(), [](const auto& common) {
+  return common.param ? "CommonOnesLead" : "OfAMid40";
+});
+
+}  // namespace
+}  // namespace risley::cloud

@@ -1,0 +1,156 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "risley/cloud/points.hpp"
+
+#include <cstdint>
+#include <numeric>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "risley/recordings/observations.hpp"
+
+namespace risley::cloud {
+namespace {
+
+/// Number of each column, a different one for each, so that mixed-up columns differ.
+template <class Function>
+void number_columns(Points& p, const Function& function) {
+  int number = 0;
+  const auto one = [&](auto& column) { function(column, number++); };
+  one(p.time_ns);
+  for (auto* column :
+       {&p.x, &p.y, &p.z, &p.range, &p.incidence, &p.azimuth_residual, &p.zenith_residual}) {
+    one(*column);
+  }
+  for (auto& column : p.covariance) one(column);
+  for (auto& column : p.rotation_angle) one(column);
+  for (auto* column : {&p.intensity, &p.return_number, &p.number_of_returns, &p.tag, &p.beam}) {
+    one(*column);
+  }
+  for (auto& factor : p.loading) {
+    for (auto& column : factor) one(column);
+  }
+}
+
+/// The value that a row of a column gets.
+template <class T>
+T value_at(int column, std::size_t row) {
+  return static_cast<T>(37 * column + 3 * static_cast<int>(row));
+}
+
+void fill(Points& points) {
+  number_columns(points, [](auto& column, int number) {
+    using T = typename std::decay_t<decltype(column)>::value_type;
+    for (std::size_t i = 0; i < column.size(); ++i) column[i] = value_at<T>(number, i);
+  });
+}
+
+/// Every column holds these rows of what fill() wrote, or is empty.
+void expect_rows(Points& points, const std::vector<std::size_t>& rows, bool all_full) {
+  number_columns(points, [&](auto& column, int number) {
+    using T = typename std::decay_t<decltype(column)>::value_type;
+    if (column.empty() && !all_full) return;
+    ASSERT_EQ(column.size(), rows.size()) << number;
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+      EXPECT_EQ(column[i], value_at<T>(number, rows[i])) << number << ' ' << i;
+    }
+  });
+}
+
+CloudHeader full_header() {
+  CloudHeader header;
+  header.prisms = 3;
+  header.factors = {"one", "two"};
+  return header;
+}
+
+TEST(Points, KeepTakesTheSameRowsOfEveryColumn) {
+  for (const std::vector<std::size_t>& rows :
+       {std::vector<std::size_t>{}, {0}, {9}, {0, 1, 2, 3, 4, 5, 6, 7, 8, 9}, {1, 2, 5, 9}}) {
+    Points points;
+    full_header().resize(points, 10);
+    fill(points);
+    points.keep(rows);
+    EXPECT_EQ(points.size(), rows.size());
+    expect_rows(points, rows, true);
+  }
+}
+
+TEST(Points, KeepLeavesColumnsEmptyThatAreNotThere) {
+  CloudHeader header;
+  header.has_covariance = header.has_rotation_angles = false;
+  Points points;
+  header.resize(points, 6);
+  fill(points);
+  const std::vector<std::size_t> rows{2, 3};
+  points.keep(rows);
+  expect_rows(points, rows, false);
+  EXPECT_EQ(points.x.size(), 2u);
+  EXPECT_TRUE(points.covariance[kZZ].empty());
+  EXPECT_TRUE(points.azimuth_residual.empty());
+  EXPECT_TRUE(points.loading.empty());
+}
+
+TEST(CloudHeader, ResizeGivesWhatItAnnouncesAndEmptiesTheRest) {
+  Points points;
+  full_header().resize(points, 7);
+  EXPECT_EQ(points.rotation_angle.size(), 3u);
+  EXPECT_EQ(points.loading.size(), 2u);
+  number_columns(points, [](auto& column, int number) { EXPECT_EQ(column.size(), 7u) << number; });
+
+  CloudHeader bare = full_header();
+  bare.has_covariance = bare.has_rotation_angles = false;
+  bare.factors.clear();
+  bare.resize(points, 4);
+  EXPECT_EQ(points.size(), 4u);
+  for (const auto* column : {&points.x, &points.y, &points.z, &points.range, &points.incidence}) {
+    EXPECT_EQ(column->size(), 4u);
+  }
+  for (const auto* column : {&points.intensity, &points.return_number, &points.number_of_returns,
+                             &points.tag, &points.beam}) {
+    EXPECT_EQ(column->size(), 4u);
+  }
+  for (const auto& column : points.covariance) EXPECT_TRUE(column.empty());
+  EXPECT_TRUE(points.rotation_angle.empty());
+  EXPECT_TRUE(points.azimuth_residual.empty());
+  EXPECT_TRUE(points.zenith_residual.empty());
+  EXPECT_TRUE(points.loading.empty());
+}
+
+TEST(Observations, DropFrontTakesTheSameRowsOffEveryColumn) {
+  recordings::Observations o;
+  const auto each = [&o](const auto& function) {
+    int number = 0;
+    const auto one = [&](auto& column) { function(column, number++); };
+    one(o.time_ns);
+    for (auto* column : {&o.azimuth, &o.zenith, &o.range}) one(*column);
+    for (auto* column : {&o.azimuth_resolution, &o.zenith_resolution, &o.range_resolution}) {
+      one(*column);
+    }
+    for (auto* column : {&o.intensity, &o.return_number, &o.tag, &o.beam, &o.device, &o.valid}) {
+      one(*column);
+    }
+  };
+  o.resize(9);
+  each([](auto& column, int number) {
+    using T = typename std::decay_t<decltype(column)>::value_type;
+    for (std::size_t i = 0; i < column.size(); ++i) column[i] = value_at<T>(number, i);
+  });
+  std::size_t first = 0;
+  for (const std::size_t rows : {0u, 2u, 4u, 3u}) {
+    o.drop_front(rows);
+    first += rows;
+    EXPECT_EQ(o.size(), 9 - first);
+    each([first](auto& column, int number) {
+      using T = typename std::decay_t<decltype(column)>::value_type;
+      ASSERT_EQ(column.size(), 9 - first) << number;
+      for (std::size_t i = 0; i < column.size(); ++i) {
+        EXPECT_EQ(column[i], value_at<T>(number, first + i)) << number;
+      }
+    });
+  }
+}
+
+}  // namespace
+}  // namespace risley::cloud

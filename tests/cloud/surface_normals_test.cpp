@@ -1,0 +1,309 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "risley/cloud/surface_normals.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include "risley/core/angle.hpp"
+#include "risley/core/error.hpp"
+#include "risley/core/plane.hpp"
+#include "risley/core/random.hpp"
+
+namespace risley::cloud {
+namespace {
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+const double kFieldRadius = radians_from_degrees(19.2);  // of a Mid-40
+const std::size_t kShots = 25000;                        // of one second of a cloud
+
+/// Nearer to the field's rim than this, the shots around a direction stand on one side of it.
+const double kRim = radians_from_degrees(2.2);
+
+/// A direction within the field of view about the X axis.
+struct Shot {
+  double azimuth = 0, zenith = 0;
+  Vector3<double> direction() const {
+    return direction_from_angles(SphericalAngles<double>{azimuth, zenith});
+  }
+};
+
+/// Directions uniform over the field of view.
+std::vector<Shot> shots_over_the_field(std::size_t count, std::uint64_t seed,
+                                       double radius = kFieldRadius) {
+  const RandomStream stream(seed, 1);
+  std::vector<Shot> shots;
+  for (std::uint64_t i = 0; shots.size() < count; ++i) {
+    const double a = radius * (2.0 * stream.uniform(2 * i) - 1.0);
+    const double e = radius * (2.0 * stream.uniform(2 * i + 1) - 1.0);
+    if (a * a + e * e < radius * radius) shots.push_back({a, kPi / 2 - e});
+  }
+  return shots;
+}
+
+/// A plane whose normal is tilted by this much towards some side, so far along the X axis.
+Plane tilted_plane(double tilt_deg, double side_deg, double ahead) {
+  const double tilt = radians_from_degrees(tilt_deg), side = radians_from_degrees(side_deg);
+  const Vector3<double> normal{std::cos(tilt), std::sin(tilt) * std::cos(side),
+                               std::sin(tilt) * std::sin(side)};
+  return {normal, ahead * normal.x};
+}
+
+double range_of(const Plane& plane, const Shot& shot) {
+  return hit_distance(plane, {0, 0, 0}, shot.direction());
+}
+
+/// Between two normals of either sign, degrees.
+double angle_deg(const Vector3<double>& a, const Vector3<double>& b) {
+  return degrees_from_radians(std::atan2(norm(cross(a, b)), std::abs(dot(a, b))));
+}
+
+bool none(const Vector3<double>& normal) {
+  return std::isnan(normal.x) && std::isnan(normal.y) && std::isnan(normal.z);
+}
+
+struct Outcome {
+  double worst_deg = 0, worst_inside_deg = 0, squares = 0;
+  std::size_t found = 0, missing = 0;
+  double rms_deg() const { return std::sqrt(squares / static_cast<double>(found)); }
+};
+
+/// Adds shots of a plane with noise and looks at the normals in the same directions.
+Outcome see(const Plane& plane, double range_noise, double noise, std::uint64_t seed) {
+  SurfaceNormals normals(range_noise);
+  const auto shots = shots_over_the_field(kShots, seed);
+  const RandomStream stream(seed, 2);
+  std::vector<Shot> met;
+  for (std::size_t i = 0; i < shots.size(); ++i) {
+    const double range = range_of(plane, shots[i]);
+    if (!(range > 0 && range < 260)) continue;
+    met.push_back(shots[i]);
+    normals.add(shots[i].azimuth, shots[i].zenith, range + noise * stream.normal(i));
+  }
+  normals.fit();
+  Outcome outcome;
+  for (const Shot& shot : met) {
+    const Vector3<double> normal = normals.normal(shot.azimuth, shot.zenith);
+    if (none(normal)) {
+      ++outcome.missing;
+      continue;
+    }
+    EXPECT_NEAR(norm(normal), 1.0, 1e-6);
+    const double off = angle_deg(normal, plane.normal);
+    outcome.worst_deg = std::max(outcome.worst_deg, off);
+    if (std::hypot(shot.azimuth, shot.zenith - kPi / 2) < kFieldRadius - kRim) {
+      outcome.worst_inside_deg = std::max(outcome.worst_inside_deg, off);
+    }
+    outcome.squares += off * off;
+    ++outcome.found;
+  }
+  return outcome;
+}
+
+TEST(SurfaceNormals, OfPlanesWithoutNoiseAreRightToAQuarterOfADegree) {
+  double worst = 0, worst_inside = 0;
+  for (const double ahead : {1.0, 5.0, 20.0, 60.0}) {
+    for (const double tilt : {0.0, 10.0, 25.0, 45.0, 60.0, 70.0}) {
+      for (const double side : {0.0, 60.0, 90.0, 200.0, 315.0}) {
+        SCOPED_TRACE(fmt::format("{} m, {} deg towards {} deg", ahead, tilt, side));
+        const Outcome outcome = see(tilted_plane(tilt, side, ahead), 0.02, 0.0, 3);
+        EXPECT_LT(outcome.worst_inside_deg, 0.25);
+        EXPECT_LT(outcome.worst_deg, 0.5);
+        worst_inside = std::max(worst_inside, outcome.worst_inside_deg);
+        // Far and steep, what is left out of the fit looks like roughness.
+        EXPECT_GT(outcome.found, (tilt < 70 ? 40 : 8) * outcome.missing);
+        worst = std::max(worst, outcome.worst_deg);
+      }
+    }
+  }
+  RecordProperty("worst_inside_deg", fmt::format("{:.3g}", worst_inside));
+  RecordProperty("worst_deg", fmt::format("{:.3g}", worst));
+}
+
+// A wall of range noise s at r metres, seen through a square of three degrees with n shots: the
+// slope of the range over an angle is known to s / (0.866 degree root n), which turns the normal by
+// that over r.
+TEST(SurfaceNormals, ScatterAsTheNoiseOfTheRangesSays) {
+  const double per_square = static_cast<double>(kShots) * 9.0 / (kPi * 19.2 * 19.2);
+  for (const auto& [ahead, noise] :
+       {std::pair{5.0, 0.005}, {5.0, 0.02}, {20.0, 0.01}, {20.0, 0.02}, {50.0, 0.02}}) {
+    SCOPED_TRACE(fmt::format("{} m, {} m", ahead, noise));
+    const Outcome outcome = see(tilted_plane(0, 0, ahead), noise, noise, 5);
+    const double slope =
+        noise / (ahead * radians_from_degrees(3.0 / std::sqrt(12.0)) * std::sqrt(per_square));
+    const double expected = degrees_from_radians(std::sqrt(2.0) * slope);
+    EXPECT_GT(outcome.rms_deg(), 0.9 * expected);
+    EXPECT_LT(outcome.rms_deg(), 1.4 * expected);  // fewer shots at the rim
+    EXPECT_EQ(outcome.missing, 0u);
+  }
+}
+
+// Two walls that meet at a corner: nothing within a degree of it, both walls beyond two.
+TEST(SurfaceNormals, EdgesHaveNone) {
+  const Plane left = tilted_plane(45, 0, 10.0), right = tilted_plane(45, 180, 10.0);
+  SurfaceNormals normals(0.01);
+  const RandomStream stream(7, 2);
+  const auto shots = shots_over_the_field(kShots, 7);
+  for (std::size_t i = 0; i < shots.size(); ++i) {
+    const double range = std::min(range_of(left, shots[i]), range_of(right, shots[i]));
+    normals.add(shots[i].azimuth, shots[i].zenith, range + 0.01 * stream.normal(i));
+  }
+  normals.fit();
+  for (const Shot& shot : shots) {
+    const double off = std::abs(degrees_from_radians(shot.azimuth));
+    const Vector3<double> normal = normals.normal(shot.azimuth, shot.zenith);
+    if (off < 1.0) {
+      EXPECT_TRUE(none(normal)) << off;
+    } else if (off > 2.0 && off < 17.0 && !none(normal)) {
+      EXPECT_LT(angle_deg(normal, (shot.azimuth > 0 ? left : right).normal), 2.0);
+    }
+  }
+  const auto right_of = normals.normal(radians_from_degrees(5.5), kPi / 2 - 0.05);
+  EXPECT_FALSE(none(right_of));
+}
+
+TEST(SurfaceNormals, LeavesHaveNone) {
+  SurfaceNormals normals(0.02);
+  const RandomStream stream(8, 2);
+  const auto shots = shots_over_the_field(kShots, 8);
+  for (std::size_t i = 0; i < shots.size(); ++i) {
+    normals.add(shots[i].azimuth, shots[i].zenith, 10.0 + 2.0 * stream.uniform(i));
+  }
+  normals.fit();
+  for (const Shot& shot : shots) EXPECT_TRUE(none(normals.normal(shot.azimuth, shot.zenith)));
+}
+
+// How much the ranges may scatter about a surface is the constant of the class: 2 times the noise.
+TEST(SurfaceNormals, RoughSurfacesHaveNone) {
+  const double noise = 0.02;
+  for (const auto& [times, share] : {std::pair{0.85 * SurfaceNormals::kRoughest, 1.0},
+                                     {1.15 * SurfaceNormals::kRoughest, 0.0}}) {
+    const Outcome outcome = see(tilted_plane(10, 30, 20.0), noise, times * noise, 9);
+    const auto found = static_cast<double>(outcome.found);
+    EXPECT_NEAR(found / (found + static_cast<double>(outcome.missing)), share, 0.02) << times;
+  }
+}
+
+TEST(SurfaceNormals, AFewShotsHaveNone) {
+  const Plane wall = tilted_plane(20, 0, 10.0);
+  const RandomStream stream(10, 1);
+  for (const std::size_t count : {0u, 1u, 3u, 11u, 12u, 40u}) {
+    SurfaceNormals normals(0.02);
+    for (std::size_t i = 0; i < count; ++i) {
+      const Shot shot{radians_from_degrees(0.1 + 0.8 * stream.uniform(2 * i)),
+                      radians_from_degrees(89.1 + 0.8 * stream.uniform(2 * i + 1))};
+      normals.add(shot.azimuth, shot.zenith, range_of(wall, shot));
+    }
+    normals.fit();
+    EXPECT_EQ(none(normals.normal(radians_from_degrees(0.5), radians_from_degrees(89.5))),
+              count < 12)
+        << count;
+    // Neighbours without a shot of their own.
+    EXPECT_TRUE(none(normals.normal(radians_from_degrees(1.5), radians_from_degrees(89.5))));
+  }
+}
+
+TEST(SurfaceNormals, ShotsAlongALineHaveNone) {
+  const Plane wall = tilted_plane(20, 0, 10.0);
+  SurfaceNormals normals(0.02);
+  for (int i = 0; i < 200; ++i) {
+    const double along = radians_from_degrees(0.004 * i + 0.1);
+    const Shot shot{along, kPi / 2 - 0.5 * along};
+    normals.add(shot.azimuth, shot.zenith, range_of(wall, shot));
+  }
+  normals.fit();
+  EXPECT_TRUE(none(normals.normal(radians_from_degrees(0.4), kPi / 2 - 0.003)));
+}
+
+TEST(SurfaceNormals, DirectionsOutsideTheGridHaveNone) {
+  const Plane wall = tilted_plane(0, 0, 10.0);
+  SurfaceNormals normals(0.02);
+  const double degree = radians_from_degrees(1.0);
+  const std::vector<Shot> outside{
+      {90.5 * degree, kPi / 2}, {-90.5 * degree, kPi / 2}, {kPi, kPi / 2}, {0, -0.5 * degree},
+      {0, 180.5 * degree},      {kNaN, kPi / 2},           {0, kNaN},      {1e300, kPi / 2}};
+  for (const Shot& shot : outside) {
+    for (int i = 0; i < 50; ++i) normals.add(shot.azimuth, shot.zenith, 5.0);
+  }
+  for (const Shot& shot : shots_over_the_field(kShots, 11)) {
+    normals.add(shot.azimuth, shot.zenith, range_of(wall, shot));
+  }
+  normals.fit();
+  for (const Shot& shot : outside) EXPECT_TRUE(none(normals.normal(shot.azimuth, shot.zenith)));
+  EXPECT_LT(angle_deg(normals.normal(0.01, kPi / 2 - 0.01), wall.normal), 0.2);
+}
+
+// Cells at the grid's rim have fewer neighbours and no wrong ones.
+TEST(SurfaceNormals, WorkAtTheRimOfTheGrid) {
+  for (const double azimuth_deg : {-89.5, 89.5}) {
+    const double towards = radians_from_degrees(azimuth_deg);
+    const Plane wall{{std::cos(towards), std::sin(towards), 0.0}, 10.0};
+    SurfaceNormals normals(0.02);
+    const RandomStream stream(12, 1);
+    for (std::uint64_t i = 0; i < 400; ++i) {
+      const Shot shot{towards + radians_from_degrees(stream.uniform(2 * i) - 0.5),
+                      kPi / 2 + radians_from_degrees(stream.uniform(2 * i + 1) - 0.5)};
+      normals.add(shot.azimuth, shot.zenith, range_of(wall, shot));
+      // On the other side of the grid, one row on: no neighbour.
+      normals.add(-shot.azimuth, shot.zenith, 3.0 + stream.uniform(i + 5000));
+    }
+    normals.fit();
+    EXPECT_LT(angle_deg(normals.normal(towards, kPi / 2 + 0.001), wall.normal), 0.2);
+    EXPECT_TRUE(none(normals.normal(-towards, kPi / 2 + 0.001)));
+  }
+}
+
+// As a new one: neither shots nor normals stay.
+TEST(SurfaceNormals, ClearForgets) {
+  const Plane before = tilted_plane(45, 0, 10.0), after = tilted_plane(30, 120, 25.0);
+  SurfaceNormals used(0.02), fresh(0.02);
+  for (const Shot& shot : shots_over_the_field(kShots, 13)) {
+    used.add(shot.azimuth, shot.zenith, range_of(before, shot));
+  }
+  used.fit();
+  used.clear();
+  used.fit();
+  EXPECT_TRUE(none(used.normal(0.01, kPi / 2)));
+  // Fewer shots within a smaller circle: the rest has no surface any more.
+  for (const Shot& shot : shots_over_the_field(3000, 14, radians_from_degrees(6.0))) {
+    used.add(shot.azimuth, shot.zenith, range_of(after, shot));
+    fresh.add(shot.azimuth, shot.zenith, range_of(after, shot));
+  }
+  used.fit();
+  fresh.fit();
+  for (const Shot& shot : shots_over_the_field(2000, 15)) {
+    const auto a = used.normal(shot.azimuth, shot.zenith);
+    const auto b = fresh.normal(shot.azimuth, shot.zenith);
+    EXPECT_EQ(none(a), none(b));
+    if (!none(a)) {
+      EXPECT_EQ(norm(a - b), 0.0);
+    }
+  }
+}
+
+TEST(SurfaceNormals, FittingTwiceChangesNothing) {
+  const Plane wall = tilted_plane(30, 120, 25.0);
+  SurfaceNormals normals(0.02);
+  for (const Shot& shot : shots_over_the_field(3000, 14)) {
+    normals.add(shot.azimuth, shot.zenith, range_of(wall, shot));
+  }
+  normals.fit();
+  const auto first = normals.normal(0.05, kPi / 2);
+  normals.fit();
+  EXPECT_EQ(norm(normals.normal(0.05, kPi / 2) - first), 0.0);
+}
+
+TEST(SurfaceNormals, RefuseANoiseThatIsNone) {
+  for (const double noise : {0.0, -0.01, kNaN, std::numeric_limits<double>::infinity()}) {
+    EXPECT_THROW(SurfaceNormals{noise}, InvalidArgument);
+  }
+}
+
+}  // namespace
+}  // namespace risley::cloud
