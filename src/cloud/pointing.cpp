@@ -417,7 +417,8 @@ void compute_points(const PointingModel& model, const CloudHeader& header,
   for (std::size_t k = 0; k < points.rotation_angle.size(); ++k) {
     for (std::size_t i = 0; i < shots.size(); ++i) {
       const double angle = shots.rotation_angle[k][i];
-      points.rotation_angle[k][i] = angle - kTwoPi * std::floor(angle / kTwoPi);
+      const double wrapped = angle - kTwoPi * std::floor(angle / kTwoPi);
+      points.rotation_angle[k][i] = wrapped >= kTwoPi ? 0.0 : wrapped;  // NaN stays
     }
   }
 }

@@ -186,7 +186,8 @@ class Kernel {
     const Batch along = azimuth.cosine * d.x + azimuth.sine * d.y;
     const Batch t = across / along, t2 = t * t;
     const Batch atan = t * (Batch(1.0) + t2 * (Batch(-1.0 / 3.0) + t2 * Batch(0.2)));
-    xsimd::select(t2 < Batch(0.25), atan, Batch(kPi / 2)).store_unaligned(a_.azimuth_residual + at);
+    const Lanes near = t2 < Batch(0.25) && along > Batch(0.0);
+    xsimd::select(near, atan, Batch(kPi / 2)).store_unaligned(a_.azimuth_residual + at);
     const Batch s = zenith.sine * d.z - zenith.cosine * horizontal, s2 = s * s;
     const Batch asin = s * (Batch(1.0) + s2 * (Batch(1.0 / 6.0) + s2 * Batch(3.0 / 40.0)));
     asin.store_unaligned(a_.zenith_residual + at);

@@ -98,8 +98,13 @@ SensorBelief sensor_belief(const estimation::AngleSeries& beginning,
   options.sensor = calibration;
   options.angle_noise = angle_noise;
   choose_parameters(calibration, options);
-  const estimation::Estimate estimate =
-      estimation::estimate(estimation::Method::map, beginning, head, options);
+  const estimation::Estimate estimate = [&] {
+    try {
+      return estimation::estimate(estimation::Method::map, beginning, head, options);
+    } catch (const EstimationError& error) {
+      throw EstimationError(fmt::format("the rotation angles were not found: {}", error.what()));
+    }
+  }();
   if (!estimate.converged && !estimate.noise_overstated) {
     throw EstimationError(fmt::format(
         "the rotation angles were not found, or the calibration is of another sensor: {}",

@@ -472,6 +472,46 @@ TEST(ComputePoints, DoWithoutRotationAngles) {
   EXPECT_TRUE(needs_rotation_angles(sensor, options));
 }
 
+// A damaged record must not look like a sound one, however far off it is.
+TEST(ComputePoints, ResidualsOfOutliersAreLarge) {
+  const PointingModel model = imperfect_model("PA-AP", 8);
+  const std::vector<double> offs{0.2, 0.4, 0.6, 1.0, 1.5, 2.0, 2.5, 2.9, 3.1, kPi};
+  PointedShots shots = random_shots(model, 2 * offs.size(), 8);
+  const PointedShots sound = shots;
+  for (std::size_t i = 0; i < offs.size(); ++i) {
+    shots.azimuth[i] = wrap_to_pi(sound.azimuth[i] + offs[i]);
+    shots.azimuth[offs.size() + i] = wrap_to_pi(sound.azimuth[offs.size() + i] - offs[i]);
+  }
+  for (const InstructionSet set : available_instruction_sets()) {
+    const Points points = points_of(model, header_of(model), shots, set);
+    for (std::size_t i = 0; i < shots.size(); ++i) {
+      EXPECT_GT(std::abs(points.azimuth_residual[i]), 0.15) << offs[i % offs.size()];
+    }
+  }
+  shots = sound;
+  for (std::size_t i = 0; i < shots.size(); ++i) {
+    const double off = std::min(offs[i % offs.size()], 1.2);
+    shots.zenith[i] += i < offs.size() ? off : -off;
+  }
+  for (const InstructionSet set : available_instruction_sets()) {
+    const Points points = points_of(model, header_of(model), shots, set);
+    for (std::size_t i = 0; i < shots.size(); ++i) {
+      EXPECT_GT(std::abs(points.zenith_residual[i]), 0.15) << offs[i % offs.size()];
+    }
+  }
+}
+
+TEST(ComputePoints, RotationAnglesAreBelowAFullTurn) {
+  const PointingModel model = imperfect_model("PA-AP", 9);
+  PointedShots shots = random_shots(model, 6, 9);
+  shots.rotation_angle[0] = {-1e-17, -1e-300, 0.0, kTwoPi, -kTwoPi, 1e6};
+  const Points points = points_of(model, header_of(model), shots);
+  for (const double angle : points.rotation_angle[0]) {
+    EXPECT_GE(angle, 0.0);
+    EXPECT_LT(angle, kTwoPi);
+  }
+}
+
 TEST(ComputePoints, NoShotGivesNoPoint) {
   const PointingModel model = imperfect_model("PA-AP", 3);
   EXPECT_EQ(points_of(model, header_of(model), random_shots(model, 0, 1)).x.size(), 0u);
@@ -740,7 +780,10 @@ TEST(PointingModel, ReportedDirectionsOwnNothingToTheParameters) {
 
 TEST(PointingModel, CalibratedAgainstPlanesHasErrorsOfBothTrains) {
   const Case one(CalibrationReference::planes);
-  const PointingModel model = pointing_model(one.calibration, one.belief, {});
+  // The range offset's sigma of the calibration's covariance counts, and no other one beside it.
+  sensors::Sensor calibration = one.calibration;
+  calibration.set_knowledge({"range_offset_m", 0.005, "assumed"});
+  const PointingModel model = pointing_model(calibration, one.belief, {});
   EXPECT_EQ(model.train.parameters(), one.calibration.train.parameters());
   EXPECT_EQ(model.believed.parameters(), one.belief.sensor.train.parameters());
   EXPECT_EQ(model.range_offset, 0.012);
@@ -784,13 +827,23 @@ TEST(PointingModel, RefusesAnotherFaceOrder) {
   }
 }
 
-// One quantity determines another: one factor fewer, the same covariance.
+// One quantity follows from others: one factor fewer, the same covariance.
 TEST(PointingModel, TakesACovarianceThatHasNoInverse) {
-  Case one(CalibrationReference::planes);
-  auto& c = one.calibration.covariance;
-  for (const double times : {1.0, -2.0}) {
-    c.row(4) = times * c.row(1);
-    c.col(4) = times * c.col(1);
+  for (std::uint64_t seed = 0; seed < 40; ++seed) {
+    SCOPED_TRACE(seed);
+    Case one(CalibrationReference::planes, 100 + seed);
+    auto& c = one.calibration.covariance;
+    const Index dependent = 4;
+    VectorXd times = VectorXd::Zero(c.rows());
+    if (seed < 2) {
+      times[1] = seed == 0 ? 1.0 : -2.0;
+    } else {
+      times[1] = 0.7;
+      times[3] = -1.3;
+    }
+    MatrixXd from = MatrixXd::Identity(c.rows(), c.rows());
+    from.row(dependent) = times;
+    c = MatrixXd(from * c * from.transpose());
     const PointingModel model = pointing_model(one.calibration, one.belief, {});
     const MatrixXd beam = one.effect(one.calibration.covariance_names, true, false);
     const MatrixXd angles = one.effect(one.free_names(), false, true);
@@ -799,7 +852,8 @@ TEST(PointingModel, TakesACovarianceThatHasNoInverse) {
     stated += geometry_variance(one.calibration, stated.rows());
     expect_same_covariance(covariance_of_factors(model), stated);
     const auto names = names_of(model);
-    EXPECT_EQ(std::count(names.begin(), names.end(), one.calibration.covariance_names[4]), 0);
+    const std::string& name = one.calibration.covariance_names[static_cast<std::size_t>(dependent)];
+    EXPECT_EQ(std::count(names.begin(), names.end(), name), 0);
     EXPECT_EQ(names.size(), static_cast<std::size_t>(c.rows()) - 1 + 2 + 2);
   }
 }

@@ -18,6 +18,8 @@ namespace {
 constexpr PrismGeometry kMid40{0.007, 0.030};
 constexpr double kCell = radians_from_degrees(0.5);
 
+PrismTrain ideal_mid_40() { return PrismTrain(parse_face_order("PA-AP")); }
+
 double least(const std::vector<double>& column) {
   return *std::min_element(column.begin(), column.end());
 }
