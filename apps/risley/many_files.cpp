@@ -81,7 +81,6 @@ bool output_is_folder(const std::vector<std::string>& inputs, const std::string&
 std::vector<FileJob> file_jobs(const std::vector<std::string>& inputs, const std::string& output,
                                const std::string& ending) {
   if (!output_is_folder(inputs, output)) return {{inputs.front(), output}};
-  make_result_folder(output);
   std::vector<FileJob> jobs;
   for (const std::string& input : inputs) {
     for (const std::string& name : is_pattern(input) ? files_of(input) : std::vector{input}) {
@@ -99,6 +98,7 @@ std::vector<FileJob> file_jobs(const std::vector<std::string>& inputs, const std
       jobs.push_back({name, made.string()});
     }
   }
+  make_result_folder(output);
   return jobs;
 }
 

@@ -123,8 +123,11 @@ class CalibrateTest(CommandTest):
         self.assertEqual({path.name for path in (self.folder / "out").iterdir()},
                          {"calibration.yaml", "states.nc", "report.html"})
         calibration = self.calibration_of("out")
-        for key in ("input_sha256", "datum", "range_offset_m", "range_offset_sigma_m"):
+        for key in ("input_sha256", "datum"):
             self.assertIn(f'"{key}": ', calibration)
+        self.assertIn("calibrated_against: planes", calibration)
+        self.assertRegex(calibration, r"range:\n  range_offset_m: {value: ")
+        self.assertRegex(calibration, r"names: \[.*, range_offset_m\]")
         page = (self.folder / "out" / "report.html").read_text(encoding="utf-8")
         self.assertIn("risley calibrate hall.nc", page)
         self.assertNotRegex(page, r"(src|href)\s*=\s*[\"']?(https?:)?//")

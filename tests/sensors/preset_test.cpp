@@ -397,5 +397,59 @@ INSTANTIATE_TEST_SUITE_P(
                 {"not positive", "-1"}}),
     [](const auto& each) { return std::string(each.param.name); });
 
+// What newer presets may say and older ones do not.
+TEST(PresetFile, OptionalFieldsTravelAndAreAbsentWhereNothingIsSaid) {
+  const Sensor plain = load_sensor("mid-40");
+  EXPECT_EQ(plain.range_offset, 0.0);
+  EXPECT_EQ(plain.reference, CalibrationReference::none);
+  for (const char* name : {"range_noise_per_range", "range_noise_incidence_m",
+                           "range_noise_weak_return_m", "range_offset_m", "calibrated_against"}) {
+    EXPECT_THAT(preset_text(plain), ::testing::Not(HasSubstr(name)));
+  }
+  Sensor told = plain;
+  told.range_noise_per_range = 2e-4;
+  told.range_noise_incidence = 0.003;
+  told.range_noise_weak_return = 0.05;
+  told.range_offset = -0.0125;
+  told.set_knowledge({"range_offset_m", 0.002, "walls"});
+  told.reference = CalibrationReference::planes;
+  told.covariance_names = {"incident_beam_vertical_deg", "range_offset_m"};
+  told.covariance = (Eigen::MatrixXd(2, 2) << 1e-8, -1e-8, -1e-8, 4e-6).finished();
+  const Sensor back = parse_preset(preset_text(told), "told.yaml");
+  EXPECT_EQ(back.range_noise_per_range, 2e-4);
+  EXPECT_EQ(back.range_noise_incidence, 0.003);
+  EXPECT_EQ(back.range_noise_weak_return, 0.05);
+  EXPECT_EQ(back.range_offset, -0.0125);
+  EXPECT_EQ(back.reference, CalibrationReference::planes);
+  EXPECT_EQ(back.covariance_names, told.covariance_names);
+  EXPECT_EQ(back.covariance, told.covariance);
+  expect_same(told, back);
+  EXPECT_EQ(preset_text(back), preset_text(told));
+}
+
+TEST(PresetFile, RefusesAnUnknownReference) {
+  Sensor told = load_sensor("mid-40");
+  told.reference = CalibrationReference::directions;
+  const std::string text =
+      replaced(preset_text(told), "calibrated_against: directions", "calibrated_against: walls");
+  try {
+    parse_preset(text, "told.yaml");
+    FAIL();
+  } catch (const FileError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("allowed directions, planes"));
+    EXPECT_EQ(error.place().line, line_of(text, "calibrated_against"));
+  }
+}
+
+TEST(SensorRangeVariance, AddsItsParts) {
+  Sensor sensor = load_sensor("mid-40");
+  EXPECT_EQ(sensor.range_variance(50.0, 3.0, 10.0), 4e-4);
+  sensor.range_noise_per_range = 1e-3;
+  sensor.range_noise_incidence = 0.01;
+  sensor.range_noise_weak_return = 0.03;
+  EXPECT_DOUBLE_EQ(sensor.range_variance(50.0, 3.0, 9.0), 4e-4 + 25e-4 + 9e-4 + 1e-4);
+  EXPECT_EQ(sensor.range_variance(0.0, 0.0, 0.0), sensor.range_variance(0.0, 0.0, 1.0));
+}
+
 }  // namespace
 }  // namespace risley::sensors
