@@ -3,7 +3,6 @@
 #include "many_files.hpp"
 
 #include <algorithm>
-#include <atomic>
 #include <filesystem>
 #include <mutex>
 #include <numeric>
@@ -12,6 +11,7 @@
 #include <glob.h>
 #include <spdlog/spdlog.h>
 #include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
 
 #include "risley/core/error.hpp"
 
@@ -121,7 +121,8 @@ ExitStatus run_file_jobs(const std::vector<FileJob>& jobs, bool parallel, const 
     SharedProgress progress(jobs.size(), bar.callback());
     const auto run_one = [&](std::size_t i) {
       try {
-        outcomes[i] = work(jobs[i], progress.of(i));
+        // A thread that waits within one file must not begin another.
+        tbb::this_task_arena::isolate([&] { outcomes[i] = work(jobs[i], progress.of(i)); });
       } catch (const Interrupted&) {
         throw;
       } catch (...) {

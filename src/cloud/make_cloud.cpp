@@ -164,8 +164,13 @@ class Work {
         std::max(std::sqrt(calibration_.range_variance(0, 0, 255) +
                            square(calibration_.range_resolution) / 12.0),
                  kLeastRangeNoise));
+    const recordings::Device& device = reader_.header().devices.front();
+    if (device.extrinsic_enabled) {
+      summary_.warnings.emplace_back(
+          "the recording's extrinsics are not applied: points stand in the frame of the sensor");
+    }
     header_.sensor = fmt::format("{} {}", calibration_.manufacturer, calibration_.model);
-    header_.serial = reader_.header().devices.front().serial;
+    header_.serial = device.serial;
     if (header_.serial.empty()) header_.serial = calibration_.serial;
     header_.time_reference = reader_.header().time_reference;
     header_.prisms = calibration_.prisms();
