@@ -31,7 +31,7 @@ constexpr std::size_t kReportedRows = std::size_t{1} << 16;
 constexpr std::int64_t kOverlapNs = 100'000'000;
 /// Surfaces are taken to stand still for so long.
 constexpr std::int64_t kSurfaceNs = 1'000'000'000;
-constexpr std::size_t kSurfaceShots = 25000;
+constexpr std::size_t kSurfaceShots = 16000;
 constexpr std::size_t kBlockRows = 4096;
 /// As BatchMapOptions::outlier_chi2.
 constexpr double kOutlierChi2 = 20.0;

@@ -8,7 +8,7 @@
 
 #include <fmt/format.h>
 
-#include "risley/core/angle.hpp"
+#include "risley/core/direction.hpp"
 #include "risley/core/error.hpp"
 
 namespace risley::cloud {
@@ -16,23 +16,18 @@ namespace {
 
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 constexpr double kLeastShots = 12;
+constexpr double kLeastForward = 0.1;  // X of the directions that are looked at
 
 }  // namespace
 
 const Vector3<double> SurfaceNormals::kNone{kNaN, kNaN, kNaN};
 
 void SurfaceNormals::Moments::add(const Moments& other) {
-  n += other.n;
-  a += other.a;
-  z += other.z;
-  aa += other.aa;
-  az += other.az;
-  zz += other.zz;
-  q += other.q;
-  qa += other.qa;
-  qz += other.qz;
-  qq += other.qq;
-  count += other.count;
+  for (const auto term :
+       {&Moments::n, &Moments::u, &Moments::v, &Moments::uu, &Moments::uv, &Moments::vv,
+        &Moments::q, &Moments::qu, &Moments::qv, &Moments::qq, &Moments::count}) {
+    this->*term += other.*term;
+  }
 }
 
 SurfaceNormals::SurfaceNormals(double range_noise) : range_noise_(range_noise) {
@@ -51,22 +46,24 @@ void SurfaceNormals::clear() {
 void SurfaceNormals::add(double azimuth, double zenith, double range) {
   const std::size_t cell = cell_of(azimuth, zenith);
   if (cell == kNowhere) return;
+  const Vector3<double> d = direction_from_angles<double>({azimuth, zenith});
+  if (!(d.x > kLeastForward)) return;
   Moments& m = moments_[cell];
   if (m.count == 0) touched_.push_back(cell);
-  const double elevation = kPi / 2 - zenith;
-  const double range2 = range * range;
-  const double w = range2 * range2;
-  const double q = 1.0 / range;
+  const double u = d.y / d.x, v = d.z / d.x;
+  const double depth = range * d.x;
+  const double q = 1.0 / depth;
+  const double w = range * range * depth * depth;
   m.n += w;
-  m.a += w * azimuth;
-  m.z += w * elevation;
-  m.aa += w * azimuth * azimuth;
-  m.az += w * azimuth * elevation;
-  m.zz += w * elevation * elevation;
+  m.u += w * u;
+  m.v += w * v;
+  m.uu += w * u * u;
+  m.uv += w * u * v;
+  m.vv += w * v * v;
   m.q += w * q;
-  m.qa += w * q * azimuth;
-  m.qz += w * q * elevation;
-  m.qq += range2;
+  m.qu += w * q * u;
+  m.qv += w * q * v;
+  m.qq += range * range;
   m.count += 1;
 }
 
@@ -86,26 +83,20 @@ void SurfaceNormals::fit() {
 
 std::array<float, 3> SurfaceNormals::fitted(const Moments& m) const {
   if (m.count < kLeastShots) return {kNaN, kNaN, kNaN};
-  // About the mean direction: 1/range = q + qa (azimuth - a) + qz (elevation - z).
-  const double a = m.a / m.n, z = m.z / m.n, q = m.q / m.n;
-  const double aa = m.aa - m.n * a * a, az = m.az - m.n * a * z, zz = m.zz - m.n * z * z;
-  const double qa = m.qa - m.n * q * a, qz = m.qz - m.n * q * z;
-  const double determinant = aa * zz - az * az;
+  // About the mean: q + slope_u (u - mean u) + slope_v (v - mean v).
+  const double u = m.u / m.n, v = m.v / m.n, q = m.q / m.n;
+  const double uu = m.uu - m.n * u * u, uv = m.uv - m.n * u * v, vv = m.vv - m.n * v * v;
+  const double qu = m.qu - m.n * q * u, qv = m.qv - m.n * q * v;
+  const double determinant = uu * vv - uv * uv;
   // Shots along one line tell a slope in one direction only.
-  if (!(determinant > 1e-3 * aa * zz)) return {kNaN, kNaN, kNaN};
-  const double slope_a = (qa * zz - qz * az) / determinant;
-  const double slope_z = (qz * aa - qa * az) / determinant;
-  const double misfit = m.qq - m.n * q * q - slope_a * qa - slope_z * qz;
+  if (!(determinant > 1e-3 * uu * vv)) return {kNaN, kNaN, kNaN};
+  const double slope_u = (qu * vv - qv * uv) / determinant;
+  const double slope_v = (qv * uu - qu * uv) / determinant;
+  const double misfit = m.qq - m.n * q * q - slope_u * qu - slope_v * qv;
   const double limit = kRoughest * range_noise_;
   if (misfit > limit * limit * (m.count - 3)) return {kNaN, kNaN, kNaN};
-  // normal / distance: its component along the mean direction is q, those along the derivatives of
-  // the direction with respect to azimuth and elevation are the slopes.
-  const double sin_a = std::sin(a), cos_a = std::cos(a), sin_z = std::sin(z), cos_z = std::cos(z);
-  const double across = slope_a / cos_z;
-  Vector3<double> normal{q * cos_z * cos_a - across * sin_a - slope_z * sin_z * cos_a,
-                         q * cos_z * sin_a + across * cos_a - slope_z * sin_z * sin_a,
-                         q * sin_z + slope_z * cos_z};
-  normal = normalized(normal);
+  const Vector3<double> normal =
+      normalized(Vector3<double>{q - u * slope_u - v * slope_v, slope_u, slope_v});
   return {static_cast<float>(normal.x), static_cast<float>(normal.y), static_cast<float>(normal.z)};
 }
 

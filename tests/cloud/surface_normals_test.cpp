@@ -106,18 +106,17 @@ Outcome see(const Plane& plane, double range_noise, double noise, std::uint64_t 
   return outcome;
 }
 
-TEST(SurfaceNormals, OfPlanesWithoutNoiseAreRightToAQuarterOfADegree) {
+TEST(SurfaceNormals, OfPlanesWithoutNoiseAreRight) {
   double worst = 0, worst_inside = 0;
   for (const double ahead : {1.0, 5.0, 20.0, 60.0}) {
     for (const double tilt : {0.0, 10.0, 25.0, 45.0, 60.0, 70.0}) {
       for (const double side : {0.0, 60.0, 90.0, 200.0, 315.0}) {
         SCOPED_TRACE(fmt::format("{} m, {} deg towards {} deg", ahead, tilt, side));
         const Outcome outcome = see(tilted_plane(tilt, side, ahead), 0.02, 0.0, 3);
-        EXPECT_LT(outcome.worst_inside_deg, 0.25);
-        EXPECT_LT(outcome.worst_deg, 0.5);
+        EXPECT_LT(outcome.worst_inside_deg, 1e-4);
+        EXPECT_LT(outcome.worst_deg, 1e-4);
         worst_inside = std::max(worst_inside, outcome.worst_inside_deg);
-        // Far and steep, what is left out of the fit looks like roughness.
-        EXPECT_GT(outcome.found, (tilt < 70 ? 40 : 8) * outcome.missing);
+        EXPECT_GT(outcome.found, 100 * outcome.missing);
         worst = std::max(worst, outcome.worst_deg);
       }
     }
@@ -267,9 +266,9 @@ TEST(SurfaceNormals, DirectionsOutsideTheGridHaveNone) {
   EXPECT_LT(angle_deg(normals.normal(0.01, kPi / 2 - 0.01), wall.normal), 0.2);
 }
 
-// Cells at the grid's rim have fewer neighbours and no wrong ones.
-TEST(SurfaceNormals, WorkAtTheRimOfTheGrid) {
-  for (const double azimuth_deg : {-89.5, 89.5}) {
+// Up to 84 degrees off the axis a surface is as good as ahead; flatter directions have none.
+TEST(SurfaceNormals, WorkAsFarAsTheyAreLookedAt) {
+  for (const double azimuth_deg : {-83.0, 83.0, 87.0}) {
     const double towards = radians_from_degrees(azimuth_deg);
     const Plane wall{{std::cos(towards), std::sin(towards), 0.0}, 10.0};
     SurfaceNormals normals(0.02);
@@ -278,12 +277,14 @@ TEST(SurfaceNormals, WorkAtTheRimOfTheGrid) {
       const Shot shot{towards + radians_from_degrees(stream.uniform(2 * i) - 0.5),
                       kPi / 2 + radians_from_degrees(stream.uniform(2 * i + 1) - 0.5)};
       normals.add(shot.azimuth, shot.zenith, range_of(wall, shot));
-      // On the other side of the grid, one row on: no neighbour.
-      normals.add(-shot.azimuth, shot.zenith, 3.0 + stream.uniform(i + 5000));
     }
     normals.fit();
-    EXPECT_LT(angle_deg(normals.normal(towards, kPi / 2 + 0.001), wall.normal), 0.2);
-    EXPECT_TRUE(none(normals.normal(-towards, kPi / 2 + 0.001)));
+    const auto normal = normals.normal(towards, kPi / 2 + 0.001);
+    if (azimuth_deg > 84) {
+      EXPECT_TRUE(none(normal));
+    } else {
+      EXPECT_LT(angle_deg(normal, wall.normal), 1e-4);
+    }
   }
 }
 

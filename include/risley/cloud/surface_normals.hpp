@@ -12,8 +12,9 @@
 namespace risley::cloud {
 
 /// Directions of the surfaces that a sensor looks at, from the ranges around each direction. Cells
-/// of one degree collect the moments of inverse range over azimuth and zenith, in which a plane is
-/// linear to a good approximation; a cell and its eight neighbours together make one fit.
+/// of one degree collect moments of inverse depth over y/x and z/x, in which a plane is linear; a
+/// cell and its eight neighbours together make one fit. Directions flatter than six degrees to the
+/// plane across the X axis, or behind it, have none.
 /// Derivation: docs/theory/cloud.md
 class SurfaceNormals {
  public:
@@ -24,7 +25,7 @@ class SurfaceNormals {
   /// How much more than the noise ranges may scatter about a surface.
   static constexpr double kRoughest = 2.0;
 
-  /// Forgets all shots.
+  /// Forgets all shots; normals stay until the next fit().
   void clear();
   /// Adds one shot. @param azimuth, zenith  rad @param range  m, > 0
   void add(double azimuth, double zenith, double range);
@@ -46,9 +47,9 @@ class SurfaceNormals {
   static constexpr double kCellsPerRadian = 57.29577951308232;
   static const Vector3<double> kNone;
 
-  /// Weighted by range^4, so that residuals of inverse range count as ranges do.
+  /// Of u = y/x, v = z/x and inverse depth q = 1/x, weighted so that residuals count as ranges do.
   struct Moments {
-    double n = 0, a = 0, z = 0, aa = 0, az = 0, zz = 0, q = 0, qa = 0, qz = 0, qq = 0;
+    double n = 0, u = 0, v = 0, uu = 0, uv = 0, vv = 0, q = 0, qu = 0, qv = 0, qq = 0;
     double count = 0;
     void add(const Moments& other);
   };
