@@ -292,25 +292,37 @@ class Work {
     if (rotors_) {
       tracker_->angles(piece_, block.rows, shots.rotation_angle, shots.angle_covariance);
     }
+    // Mostly every row has a return, and columns can be copied as they stand.
+    const bool whole = n > 0 && block.rows.back() - block.rows.front() + 1 == n;
+    const auto take = [&](const auto& from, auto& to, const auto& change) {
+      if (whole) {
+        const auto first = from.begin() + static_cast<std::ptrdiff_t>(block.rows.front());
+        std::transform(first, first + static_cast<std::ptrdiff_t>(n), to.begin(), change);
+      } else {
+        std::transform(block.rows.begin(), block.rows.end(), to.begin(),
+                       [&](std::size_t row) { return change(from[row]); });
+      }
+    };
+    const auto same = [](auto value) { return value; };
+    const auto variance = [](float step) {
+      return static_cast<double>(step) * static_cast<double>(step) / 12.0;
+    };
+    take(piece_.time_ns, points.time_ns, same);
+    take(piece_.intensity, points.intensity, same);
+    take(piece_.return_number, points.return_number, same);
+    points.number_of_returns = block.returns;
+    take(piece_.tag, points.tag, same);
+    take(piece_.beam, points.beam, same);
+    take(piece_.azimuth, shots.azimuth, same);
+    take(piece_.zenith, shots.zenith, same);
+    take(piece_.range, shots.range, same);
+    take(piece_.intensity, shots.intensity,
+         [](std::uint8_t value) { return static_cast<double>(value); });
+    take(piece_.azimuth_resolution, shots.azimuth_rounding, variance);
+    take(piece_.zenith_resolution, shots.zenith_rounding, variance);
+    take(piece_.range_resolution, shots.range_rounding, variance);
     for (std::size_t i = 0; i < n; ++i) {
-      const std::size_t row = block.rows[i];
-      points.time_ns[i] = piece_.time_ns[row];
-      points.intensity[i] = piece_.intensity[row];
-      points.return_number[i] = piece_.return_number[row];
-      points.number_of_returns[i] = block.returns[i];
-      points.tag[i] = piece_.tag[row];
-      points.beam[i] = piece_.beam[row];
-      shots.azimuth[i] = piece_.azimuth[row];
-      shots.zenith[i] = piece_.zenith[row];
-      shots.range[i] = piece_.range[row];
-      shots.intensity[i] = piece_.intensity[row];
-      const auto variance = [](float step) {
-        return static_cast<double>(step) * static_cast<double>(step) / 12.0;
-      };
-      shots.azimuth_rounding[i] = variance(piece_.azimuth_resolution[row]);
-      shots.zenith_rounding[i] = variance(piece_.zenith_resolution[row]);
-      shots.range_rounding[i] = variance(piece_.range_resolution[row]);
-      const Vector3<double> normal = normals_->normal(piece_.azimuth[row], piece_.zenith[row]);
+      const Vector3<double> normal = normals_->normal(shots.azimuth[i], shots.zenith[i]);
       shots.surface_normal[0][i] = normal.x;
       shots.surface_normal[1][i] = normal.y;
       shots.surface_normal[2][i] = normal.z;
