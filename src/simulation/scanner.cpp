@@ -222,7 +222,7 @@ class Scanner::Work {
           true_range[i] = hit->range;
           if (hit->range >= settings.truth.range_minimum &&
               hit->range <= settings.truth.range_maximum) {
-            range[i] = hit->range;
+            range[i] = std::max(0.0, hit->range + settings.truth.range_offset);
             rows.intensity[row] =
                 static_cast<std::uint8_t>(std::lround(kMattIntensity * hit->cosine));
           }

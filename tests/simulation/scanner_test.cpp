@@ -80,6 +80,19 @@ void expect_same(const std::vector<double>& a, const std::vector<double>& b) {
   }
 }
 
+// What a calibration says of the ranges is what its simulation does.
+TEST(Scanner, AddsTheSensorsRangeOffset) {
+  SimulationSettings settings = exact("mid-40-table3");
+  settings.duration = 0.01;
+  settings.scene = wall_at(10);
+  settings.truth.range_offset = 0.0125;
+  const Whole whole = scan(settings);
+  ASSERT_GT(whole.rows.size(), 100U);
+  for (std::size_t i = 0; i < whole.rows.size(); ++i) {
+    EXPECT_NEAR(whole.rows.range[i] - whole.truth.range[i], 0.0125, 1e-12);
+  }
+}
+
 TEST(Scanner, SameNumbersForAnyThreadCountAndAnyPieces) {
   SimulationSettings settings;
   settings.truth = sensors::load_sensor("mid-40-table3");
