@@ -158,9 +158,11 @@ class CloudTest(CommandTest):
         bent = self.folder / "bent.yaml"
         bent.write_text(re.sub(r"(incident_beam_vertical_deg: {value: )[^,]*", r"\g<1>0.4", text))
         self.refused(1, "incident_beam_vertical_deg", "wall.nc", "no.las", calibration=bent.name)
-        turned = self.folder / "turned.yaml"
-        turned.write_text(text.replace("combination: 1", "combination: 2"))
-        self.refused(2, "combination", "wall.nc", "no.las", calibration=turned.name)
+        # A unit whose rotors run the other way.
+        self.expect(0, "simulate", "-o", "turned.csv", "--sensor", "mid-40", "--rate-hz", 1000)
+        self.expect(0, "estimate", "turned.csv", "-o", "turned", "--quiet")
+        self.refused(2, "combination", "wall.nc", "no.las",
+                     calibration="turned/calibration.yaml")
 
     def test_coordinates_beyond_las(self):
         self.refused(2, "allowed", "wall.nc", "far.las", "--las-scale-m", "1e-9")

@@ -63,6 +63,7 @@ TEST(BeamOriginMap, AgreesWithSingleRaysForAnyNumberOfPrisms) {
     double y = 0;
     for (int i = 0; i < 4000; ++i) {
       std::vector<double> angles;
+      angles.reserve(static_cast<std::size_t>(train.prisms()));
       for (int k = 0; k < train.prisms(); ++k)
         angles.push_back(0.37 * (i + 1) * (k + 1.3 * k * k + 1));
       const Ray ray = emergent_ray(train, kMid40, angles);

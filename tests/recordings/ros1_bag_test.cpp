@@ -50,6 +50,7 @@ struct Serializer<risley::recordings::RawMessage> {
     const auto bytes = static_cast<std::uint32_t>(m.bytes.size());
     std::copy(m.bytes.begin(), m.bytes.end(), stream.advance(bytes));
   }
+  // NOLINTNEXTLINE(readability-identifier-naming): the name that ROS calls
   static std::uint32_t serializedLength(const risley::recordings::RawMessage& m) {
     return static_cast<std::uint32_t>(m.bytes.size());
   }

@@ -154,7 +154,7 @@ struct Bag {
   std::shared_ptr<sqlite3> write(const std::string& path) const {
     sqlite3* opened = nullptr;
     EXPECT_EQ(sqlite3_open(path.c_str(), &opened), SQLITE_OK);
-    const std::shared_ptr<sqlite3> database(opened, sqlite3_close);
+    std::shared_ptr<sqlite3> database(opened, sqlite3_close);
     const auto run = [&](const std::string& sql) {
       EXPECT_EQ(sqlite3_exec(opened, sql.c_str(), nullptr, nullptr, nullptr), SQLITE_OK) << sql;
     };
