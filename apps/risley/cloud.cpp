@@ -216,6 +216,8 @@ Run declare_cloud(CLI::App& verb) {
     if (output_is_folder(options->inputs, options->output)) {
       if (options->format.empty()) options->format = cloud::cloud_formats().front().name;
       ending = cloud::find_cloud_format("", options->format).ending;
+    } else {
+      cloud::find_cloud_format(options->output, options->format);  // before anything is read
     }
     const std::vector<FileJob> jobs = file_jobs(options->inputs, options->output, ending);
     // NetCDF's library is not thread-safe.

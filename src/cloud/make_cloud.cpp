@@ -23,6 +23,9 @@ using recordings::Observations;
 
 /// Rows at the beginning that the sensor's belief is found from: ten seconds of a Mid-40.
 constexpr std::size_t kBeginningRows = std::size_t{1} << 20;
+/// Shots of it that are enough: the believed parameters move points by far less than the
+/// calibration.
+constexpr std::size_t kBeliefShots = std::size_t{1} << 18;
 /// Rows that are worked on together: some seconds, so that the start of each piece costs little.
 constexpr std::size_t kPieceRows = std::size_t{1} << 18;
 /// The same where no rotation angles are needed: a surface's worth.
@@ -144,10 +147,19 @@ class Work {
     for (double& zenith : rows.zenith) zenith = kPi - zenith;
   }
 
+  /// As many directions a second of the beginning as the belief wants; empty for all.
+  std::optional<double> beginning_rate() const {
+    if (piece_.size() <= kBeliefShots) return std::nullopt;
+    const double seconds =
+        1e-9 * static_cast<double>(std::llabs(piece_.time_ns.back() - piece_.time_ns.front()));
+    if (seconds == 0) return std::nullopt;
+    return static_cast<double>(kBeliefShots) / seconds;
+  }
+
   /// Everything that wants to have seen the beginning of the recording.
   void set_up() {
     if (rotors_) {
-      estimation::ShotSelector selector({});
+      estimation::ShotSelector selector({beginning_rate()});
       selector.add(piece_);
       belief_ =
           sensor_belief(selector.series(), selector.head(), calibration_, options_.angle_noise);
@@ -155,6 +167,13 @@ class Work {
       summary_.mirrored = belief_->mirrored;
       summary_.warnings = belief_->warnings;
       model_ = pointing_model(calibration_, *belief_, options_.pointing);
+      if (calibration_.reference != model_.reference &&
+          model_.reference == sensors::CalibrationReference::planes) {
+        summary_.warnings.emplace_back(
+            "the recording's own directions do not agree with this sensor's parameters within "
+            "their "
+            "sigmas: points go where the parameters send the beam");
+      }
       tracker_.emplace(*belief_, options_.rate);
     } else {
       model_ = reported_pointing_model(calibration_, options_.pointing, options_.angle_noise);

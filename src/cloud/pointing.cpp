@@ -7,6 +7,7 @@
 #include <limits>
 #include <utility>
 
+#include <Eigen/Cholesky>
 #include <fmt/format.h>
 
 #include "risley/core/angle.hpp"
@@ -63,6 +64,38 @@ Uncertain believed(const SensorBelief& belief) {
   for (const auto& free : belief.free) result.names.push_back(free.name);
   result.covariance = belief.covariance;
   return result;
+}
+
+/// What a sensor that was not calibrated says of the parameters that a belief has.
+Uncertain assumed(const sensors::Sensor& sensor, const SensorBelief& belief) {
+  Uncertain result = believed(belief);
+  result.covariance.setZero();
+  for (std::size_t j = 0; j < belief.free.size(); ++j) {
+    const sensors::Knowledge* known = sensor.find_knowledge(belief.free[j].name);
+    const auto at = static_cast<Index>(j);
+    if (known != nullptr) result.covariance(at, at) = known->sigma * known->sigma;
+  }
+  return result;
+}
+
+/// What a calibration's parameters mean. Those of a sensor that was not calibrated are as good as
+/// their sigmas: where the reported directions agree with them these are the better knowledge,
+/// otherwise the sensor reports directions that it does not have.
+sensors::CalibrationReference meaning_of(const sensors::Sensor& calibration,
+                                         const SensorBelief& belief) {
+  using sensors::CalibrationReference;
+  if (calibration.reference != CalibrationReference::none) return calibration.reference;
+  const auto n = static_cast<Index>(belief.free.size());
+  if (n == 0) return CalibrationReference::directions;
+  Eigen::VectorXd off(n);
+  for (Index j = 0; j < n; ++j) {
+    const int place = belief.free[static_cast<std::size_t>(j)].places.front();
+    off[j] = belief.sensor.train[place] - calibration.train[place];
+  }
+  const Eigen::MatrixXd covariance = belief.covariance + assumed(calibration, belief).covariance;
+  const double chi2 = off.dot(covariance.ldlt().solve(off)) / static_cast<double>(n);
+  return chi2 <= kMostDisagreement ? CalibrationReference::directions
+                                   : CalibrationReference::planes;
 }
 
 /// Builds the common factors of a model.
@@ -281,7 +314,9 @@ PointingModel pointing_model(const sensors::Sensor& calibration, const SensorBel
         "recording's {}",
         to_string(calibration.train.face_order()), to_string(belief.sensor.train.face_order())));
   }
-  const bool planes = calibration.reference == CalibrationReference::planes;
+  model.reference = meaning_of(calibration, belief);
+  const bool type = calibration.reference == CalibrationReference::none;
+  const bool planes = model.reference == CalibrationReference::planes;
   model.sensor = calibration;
   model.options = options;
   model.believed = belief.sensor.train;
@@ -291,11 +326,10 @@ PointingModel pointing_model(const sensors::Sensor& calibration, const SensorBel
   model.angle_noise = belief.angle_noise;
   Factors factors(model, belief);
   if (planes) {
-    factors.add(calibrated(calibration), true, false);
+    factors.add(type ? assumed(calibration, belief) : calibrated(calibration), true, false);
     factors.add_angles(believed(belief));
   } else {
     const bool smoothed = !options.reported_directions;
-    const bool type = calibration.reference == CalibrationReference::none;
     factors.add(type ? believed(belief) : calibrated(calibration), smoothed, smoothed);
   }
   factors.add_geometry(calibration);

@@ -23,8 +23,6 @@ using estimation::kStatesPerRotor;
 using sensors::CalibrationReference;
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-/// Mean chi2 per parameter above which a recording is of another sensor than its calibration.
-constexpr double kMostDisagreement = 9.0;
 /// How far a rotor may leave the parabola of a knot until the next, 1 sigma, rad.
 constexpr double kParabola = radians_from_degrees(2e-5);
 

@@ -77,6 +77,16 @@ class CloudTest(CommandTest):
         self.assertGreater(thickness["smoothed"], 0.018)
         self.assertGreater(thickness["reported"], 1.05 * thickness["smoothed"])
 
+    def test_preset_that_contradicts_the_recording_is_taken_at_its_word(self):
+        found = self.cloud("wall.nc", "word.csv", calibration="mid-40-table3")
+        self.assertTrue(any("do not agree" in text for text in found["warnings"]))
+        off = self.distances(self.rows("word.csv"))
+        self.assertLess(math.sqrt(sum(d * d for d in off) / len(off)), 0.0205)
+        # The type says little, so the recording's own directions are taken.
+        found = self.cloud("wall.nc", "type.csv", calibration="mid-40")
+        self.assertEqual(found["repointing_deg"]["rms"], 0)
+        self.assertEqual(found["warnings"], [])
+
     def test_covariance_of_a_point_is_positive_and_consistent(self):
         self.cloud("wall.nc", "covariance.csv")
         for row in self.rows("covariance.csv")[::50]:

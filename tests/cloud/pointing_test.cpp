@@ -732,6 +732,9 @@ void expect_same_covariance(const MatrixXd& found, const MatrixXd& stated) {
 
 TEST(PointingModel, OfATypeTakesTheRecordingsParametersAndTheirErrors) {
   Case one(CalibrationReference::none);
+  for (const std::string& name : one.free_names()) {
+    one.calibration.set_knowledge({name, 0.05, "assumed"});
+  }
   one.calibration.set_knowledge({"range_offset_m", 0.005, "assumed"});
   const PointingModel model = pointing_model(one.calibration, one.belief, {});
   EXPECT_EQ(model.train.parameters(), one.belief.sensor.train.parameters());
@@ -747,6 +750,24 @@ TEST(PointingModel, OfATypeTakesTheRecordingsParametersAndTheirErrors) {
   MatrixXd stated = effect * one.belief.covariance * effect.transpose();
   stated += geometry_variance(one.calibration, stated.rows());
   expect_same_covariance(covariance_of_factors(model), stated);
+}
+
+// A unit whose parameters are known to 0.002 degree and that reports directions 0.2 degree off.
+TEST(PointingModel, AUnitThatContradictsTheRecordingIsTakenAtItsWord) {
+  Case one(CalibrationReference::none);
+  const PointingModel model = pointing_model(one.calibration, one.belief, {});
+  EXPECT_EQ(model.reference, CalibrationReference::planes);
+  EXPECT_EQ(model.train.parameters(), one.calibration.train.parameters());
+  EXPECT_EQ(model.believed.parameters(), one.belief.sensor.train.parameters());
+  const auto names = names_of(model);
+  for (const std::string& name : one.free_names()) {
+    EXPECT_THAT(names, ::testing::Contains(name));
+  }
+  for (const CommonFactor& factor : model.factors) {
+    if (factor.name != "incident_beam_vertical_deg") continue;
+    EXPECT_DOUBLE_EQ(factor.weights.lpNorm<Eigen::Infinity>(),
+                     one.calibration.find_knowledge(factor.name)->sigma);
+  }
 }
 
 TEST(PointingModel, CalibratedAgainstDirectionsMovesTheRotationAnglesToo) {

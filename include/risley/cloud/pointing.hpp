@@ -40,10 +40,12 @@ struct CommonFactor {
 struct PointingModel {
   PrismTrain train{parse_face_order("PA-AP")};     ///< where it truly goes
   PrismTrain believed{parse_face_order("PA-AP")};  ///< what the sensor computes directions with
-  PrismGeometry geometry;                          ///< all zero without a beam origin
-  double range_offset = 0;                         ///< m
-  double angle_noise = 0;                          ///< of reported directions, rad
-  sensors::Sensor sensor;                          ///< range noise and rounding are taken from here
+  /// What the parameters were held against, or count as: never none.
+  sensors::CalibrationReference reference = sensors::CalibrationReference::directions;
+  PrismGeometry geometry;   ///< all zero without a beam origin
+  double range_offset = 0;  ///< m
+  double angle_noise = 0;   ///< of reported directions, rad
+  sensors::Sensor sensor;   ///< range noise and rounding are taken from here
   PointingOptions options;
   std::vector<int> places;  ///< of the flat vector that have a common factor
   std::vector<CommonFactor> factors;
@@ -55,11 +57,13 @@ struct PointingModel {
 inline constexpr double kDivergenceSigma = 0.25;
 
 /// A model from a calibration and what the beginning of a recording says of the sensor.
-/// - Calibrated against directions, or a type that is not calibrated: the reported directions are
-///   taken as true but for their noise. Rotation angles were found with the same parameters, so an
-///   error of the parameters moves them too and most of it cancels.
+/// - Calibrated against directions: the reported directions are taken as true but for their noise.
+///   Rotation angles were found with the same parameters, so an error of the parameters moves them
+///   too and most of it cancels.
 /// - Calibrated against planes: directions come from the calibration, rotation angles from what the
 ///   sensor believes; both have errors of their own.
+/// - Not calibrated, as a type or a unit of the simulator: as directions where the recording agrees
+///   with the parameters within their sigmas, otherwise as planes with these sigmas.
 /// @throws InvalidArgument for a calibration of another sensor (face order)
 PointingModel pointing_model(const sensors::Sensor& calibration, const SensorBelief& belief,
                              const PointingOptions& options);

@@ -17,6 +17,10 @@
 
 namespace risley::cloud {
 
+/// Mean chi2 per parameter above which a recording does not have the parameters that a calibration
+/// states.
+inline constexpr double kMostDisagreement = 9.0;
+
 /// What a recording says of the sensor that made it.
 struct SensorBelief {
   sensors::Sensor sensor;  ///< with the parameters that its reported directions are computed with
