@@ -139,7 +139,7 @@ FileOutcome make_one(const FileJob& job, const CloudCommandOptions& options,
   const auto reader = recordings::open_recording(job.input);
   const cloud::CloudSummary s =
       cloud::make_cloud(*reader, calibration, job.output, settings, progress);
-  log_warnings(s.read_warnings);
+  log_warnings(job.input, s.read_warnings);
   for (const std::string& warning : s.warnings) spdlog::warn("{}: {}", job.input, warning);
   if (s.damage) {
     spdlog::error("{}; the {} points before it are saved in {}", s.damage->what(), s.points,

@@ -74,7 +74,7 @@ FileOutcome convert(const FileJob& job, const std::string& format, const Progres
     report_progress(progress, reader->fraction_read());
   }
   writer->close();
-  log_warnings(reader->warnings());
+  log_warnings(job.input, reader->warnings());
   const std::uint64_t written = observations - writer->left_out();
   if (writer->left_out() > 0) {
     spdlog::warn("{}: {} of {} observations have no place in this format and were left out",

@@ -141,7 +141,7 @@ Run declare_info(CLI::App& verb) {
     }
     TimeAuditResult result = audit.result();
     result.pps_wraps = reader->clock_wraps();
-    log_warnings(reader->warnings());
+    log_warnings(*input, reader->warnings());
     if (damage) spdlog::error(damage->what());
     if (common.json) {
       Json object = audit_json(*reader, result);

@@ -40,8 +40,8 @@ Json warnings_json(const std::vector<recordings::ReadWarning>& warnings) {
   return list;
 }
 
-void log_warnings(const std::vector<recordings::ReadWarning>& warnings) {
-  for (const std::string& text : warning_texts(warnings)) spdlog::warn(text);
+void log_warnings(const std::string& file, const std::vector<recordings::ReadWarning>& warnings) {
+  for (const std::string& text : warning_texts(warnings)) spdlog::warn("{}: {}", file, text);
 }
 
 Json damage_json(const FileError& damage) {
