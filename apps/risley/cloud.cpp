@@ -65,7 +65,6 @@ cloud::CloudOptions cloud_options(const CloudCommandOptions& options) {
     result.angle_noise = radians_from_degrees(*options.noise_angle_deg);
   }
   check_positive(options.las_scale_m, "--las-scale-m", "m");
-  result.writer.format = options.format;
   result.writer.las_scale = options.las_scale_m;
   result.writer.gps_time = options.time == "gps";
   return result;
@@ -127,15 +126,19 @@ ExitStatus write_beam_origin_map(const CloudCommandOptions& options,
   return kDone;
 }
 
-FileOutcome make_one(const FileJob& job, const CloudCommandOptions& options,
-                     const sensors::Sensor& calibration, const CommonOptions& common,
-                     const Progress& progress) {
-  cloud::CloudOptions settings = cloud_options(options);
-  settings.provenance = provenance_of(common, {job.input});
-  settings.provenance.emplace_back("calibration", options.calibration);
-  if (std::filesystem::exists(options.calibration)) {
-    settings.provenance.emplace_back("calibration_sha256", sha256_of_file(options.calibration));
+using Provenance = std::vector<std::pair<std::string, std::string>>;
+
+/// The calibration that all clouds of a command are made with.
+Provenance calibration_provenance(const std::string& calibration) {
+  Provenance result = {{"calibration", calibration}};
+  if (std::filesystem::exists(calibration)) {
+    result.emplace_back("calibration_sha256", sha256_of_file(calibration));
   }
+  return result;
+}
+
+FileOutcome make_one(const FileJob& job, const cloud::CloudOptions& settings,
+                     const sensors::Sensor& calibration, const Progress& progress) {
   const auto reader = recordings::open_recording(job.input);
   const cloud::CloudSummary s =
       cloud::make_cloud(*reader, calibration, job.output, settings, progress);
@@ -205,7 +208,7 @@ Run declare_cloud(CLI::App& verb) {
                   "Page (HTML) with maps of where the calibration's beams start; no cloud is made")
       ->excludes(inputs, output);
   return [options](const CommonOptions& common) {
-    cloud_options(*options);  // what is wrong with them is wrong with every file
+    cloud::CloudOptions settings = cloud_options(*options);
     const sensors::Sensor calibration = sensors::load_sensor(options->calibration);
     if (!options->beam_origin_map.empty()) {
       return write_beam_origin_map(*options, calibration, common);
@@ -220,14 +223,16 @@ Run declare_cloud(CLI::App& verb) {
       cloud::find_cloud_format(options->output, options->format);  // before anything is read
     }
     const std::vector<FileJob> jobs = file_jobs(options->inputs, options->output, ending);
-    // NetCDF's library is not thread-safe.
-    const bool parallel = std::none_of(jobs.begin(), jobs.end(), [](const FileJob& job) {
-      return job.input.ends_with(".nc") || job.output.ends_with(".nc");
-    });
+    settings.writer.format = options->format;
+    const Provenance of_calibration = calibration_provenance(options->calibration);
     return run_file_jobs(
-        jobs, parallel, "making points", "points",
+        jobs, "making points", "points",
         [&](const FileJob& job, const Progress& progress) {
-          return make_one(job, *options, calibration, common, progress);
+          cloud::CloudOptions mine = settings;
+          mine.provenance = provenance_of(common, {job.input});
+          mine.provenance.insert(mine.provenance.end(), of_calibration.begin(),
+                                 of_calibration.end());
+          return make_one(job, mine, calibration, progress);
         },
         common);
   };

@@ -1,6 +1,5 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-#include <algorithm>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -44,13 +43,6 @@ std::string ending_of(const std::string& format) {
     if (known.name == format) return known.ending;
   }
   throw InvalidArgument("several recordings need --format, because -o is a folder");
-}
-
-/// NetCDF's library is not thread-safe.
-bool may_run_together(const std::vector<FileJob>& jobs) {
-  return std::none_of(jobs.begin(), jobs.end(), [](const FileJob& job) {
-    return job.input.ends_with(".nc") || job.output.ends_with(".nc");
-  });
 }
 
 FileOutcome convert(const FileJob& job, const std::string& format, const Progress& progress) {
@@ -115,7 +107,7 @@ Run declare_convert(CLI::App& verb) {
     const std::vector<FileJob> jobs =
         file_jobs(options->inputs, options->output, folder ? ending_of(options->format) : "");
     return run_file_jobs(
-        jobs, may_run_together(jobs), "converting", "observations",
+        jobs, "converting", "observations",
         [&](const FileJob& job, const Progress& progress) {
           return convert(job, options->format, progress);
         },

@@ -62,6 +62,10 @@ class SharedProgress {
   Progress shown_;
 };
 
+bool is_netcdf(const FileJob& job) {
+  return job.input.ends_with(".nc") || job.output.ends_with(".nc");
+}
+
 FileOutcome failed(const FileJob& job, const Failure& failure) {
   Json json = {{"input", job.input},
                {"error", failure.message},
@@ -102,7 +106,7 @@ std::vector<FileJob> file_jobs(const std::vector<std::string>& inputs, const std
   return jobs;
 }
 
-ExitStatus run_file_jobs(const std::vector<FileJob>& jobs, bool parallel, const std::string& label,
+ExitStatus run_file_jobs(const std::vector<FileJob>& jobs, const std::string& label,
                          const char* counted,
                          const std::function<FileOutcome(const FileJob&, const Progress&)>& work,
                          const CommonOptions& common) {
@@ -129,7 +133,7 @@ ExitStatus run_file_jobs(const std::vector<FileJob>& jobs, bool parallel, const 
         outcomes[i] = failed(jobs[i], current_failure());
       }
     };
-    if (parallel) {
+    if (std::none_of(jobs.begin(), jobs.end(), is_netcdf)) {
       tbb::parallel_for(std::size_t{0}, jobs.size(), run_one, tbb::simple_partitioner());
     } else {
       for (std::size_t i = 0; i < jobs.size(); ++i) run_one(i);

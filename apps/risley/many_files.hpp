@@ -29,21 +29,20 @@ struct FileOutcome {
 /// @param output  a file name for one input; a folder, made where it is missing, for several
 ///                inputs, for a pattern, or where it exists as one
 /// @param ending  of the outputs in a folder, ".las"
-/// @throws InvalidArgument for a pattern without a file, for outputs that would overwrite each
-/// other
-///         or an input
+/// @throws InvalidArgument for a pattern without a file, and for outputs that would overwrite each
+///         other or an input
 std::vector<FileJob> file_jobs(const std::vector<std::string>& inputs, const std::string& output,
                                const std::string& ending);
 
 /// Whether file_jobs() puts its outputs into a folder.
 bool output_is_folder(const std::vector<std::string>& inputs, const std::string& output);
 
-/// Runs all jobs and prints what came of them. One alone is as if there were no others: its JSON is
+/// Runs all jobs, several at a time unless NetCDF is among them (its library is not thread-safe),
+/// and prints what came of them. One alone is as if there were no others: its JSON is
 /// the object, its errors leave by throwing. Of several, one that fails does not stop the rest; the
 /// JSON has an entry per file under "files" and the sum of `counted`.
-/// @param parallel  jobs may run at the same time
 /// @return kDone when all went well, otherwise the status of the first that did not
-ExitStatus run_file_jobs(const std::vector<FileJob>& jobs, bool parallel, const std::string& label,
+ExitStatus run_file_jobs(const std::vector<FileJob>& jobs, const std::string& label,
                          const char* counted,
                          const std::function<FileOutcome(const FileJob&, const Progress&)>& work,
                          const CommonOptions& common);

@@ -257,41 +257,40 @@ void for_each_computed_column(const Points& from, Points& to, const Function& fu
   }
 }
 
-/// Pointers to the columns of some shots and points, from a row on.
+/// Pointers to the columns of some shots and points.
 class Columns {
  public:
-  Columns(const CloudHeader& header, const PointedShots& shots, Points& points, std::size_t from,
-          PointArguments& a) {
-    for (const auto& column : shots.rotation_angle) angle_.push_back(column.data() + from);
-    for (const auto& column : shots.angle_covariance) covariance_.push_back(column.data() + from);
-    for (std::size_t i = 0; i < 3; ++i) normal_[i] = shots.surface_normal[i].data() + from;
+  Columns(const CloudHeader& header, const PointedShots& shots, Points& points, PointArguments& a) {
+    for (const auto& column : shots.rotation_angle) angle_.push_back(column.data());
+    for (const auto& column : shots.angle_covariance) covariance_.push_back(column.data());
+    for (std::size_t i = 0; i < 3; ++i) normal_[i] = shots.surface_normal[i].data();
     if (header.has_rotation_angles) a.rotation_angle = angle_.data();
     a.angle_covariance = covariance_.data();
     a.surface_normal = normal_.data();
-    a.azimuth = shots.azimuth.data() + from;
-    a.zenith = shots.zenith.data() + from;
-    a.azimuth_variance = shots.azimuth_rounding.data() + from;
-    a.zenith_variance = shots.zenith_rounding.data() + from;
-    a.range = shots.range.data() + from;
-    a.rounding_variance = shots.range_rounding.data() + from;
-    a.intensity = shots.intensity.data() + from;
-    a.point[0] = points.x.data() + from;
-    a.point[1] = points.y.data() + from;
-    a.point[2] = points.z.data() + from;
+    a.azimuth = shots.azimuth.data();
+    a.zenith = shots.zenith.data();
+    a.azimuth_variance = shots.azimuth_rounding.data();
+    a.zenith_variance = shots.zenith_rounding.data();
+    a.range = shots.range.data();
+    a.rounding_variance = shots.range_rounding.data();
+    a.intensity = shots.intensity.data();
+    a.point[0] = points.x.data();
+    a.point[1] = points.y.data();
+    a.point[2] = points.z.data();
     if (header.has_covariance) {
       for (std::size_t i = 0; i < kCovarianceTerms; ++i) {
-        a.covariance[i] = points.covariance[i].data() + from;
+        a.covariance[i] = points.covariance[i].data();
       }
     }
-    a.corrected_range = points.range.data() + from;
-    a.incidence = points.incidence.data() + from;
+    a.corrected_range = points.range.data();
+    a.incidence = points.incidence.data();
     if (header.has_rotation_angles) {
-      a.azimuth_residual = points.azimuth_residual.data() + from;
-      a.zenith_residual = points.zenith_residual.data() + from;
+      a.azimuth_residual = points.azimuth_residual.data();
+      a.zenith_residual = points.zenith_residual.data();
     }
     if (header.factors.empty()) return;
     for (auto& factor : points.loading) {
-      for (auto& column : factor) loading_.push_back(column.data() + from);
+      for (auto& column : factor) loading_.push_back(column.data());
     }
     a.loading = loading_.data();
   }
@@ -424,7 +423,7 @@ void compute_points(const PointingModel& model, const CloudHeader& header,
 
   const std::size_t whole = shots.size() / kPointPadding * kPointPadding;
   {
-    const Columns columns(header, shots, points, 0, a);
+    const Columns columns(header, shots, points, a);
     a.shots = whole;
     run_kernel(a, set);
   }
@@ -442,7 +441,7 @@ void compute_points(const PointingModel& model, const CloudHeader& header,
     };
     for_each_column(shots, last_shots,
                     [&](const auto& from, auto& to) { copy(from, whole, rest, to, 0); });
-    const Columns columns(header, last_shots, last_points, 0, a);
+    const Columns columns(header, last_shots, last_points, a);
     a.shots = kPointPadding;
     run_kernel(a, set);
     for_each_computed_column(last_points, points,
