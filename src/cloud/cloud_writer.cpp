@@ -3,24 +3,15 @@
 #include "risley/cloud/cloud_writer.hpp"
 
 #include <algorithm>
-#include <cctype>
 
 #include <fmt/format.h>
 
 #include "risley/core/error.hpp"
+#include "risley/core/text.hpp"
 
 #include "cloud/formats/cloud_format.hpp"
 
 namespace risley::cloud {
-namespace {
-
-std::string lower_case(std::string text) {
-  std::transform(text.begin(), text.end(), text.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return text;
-}
-
-}  // namespace
 
 const std::vector<CloudFormat>& cloud_formats() {
   static const std::vector<CloudFormat> formats = [] {

@@ -3,9 +3,10 @@
 #include "risley/recordings/writer.hpp"
 
 #include <algorithm>
-#include <cctype>
 
 #include <fmt/format.h>
+
+#include "risley/core/text.hpp"
 
 #include "recordings/formats/format.hpp"
 
@@ -43,12 +44,6 @@ const std::vector<Ending>& endings() {
     return list;
   }();
   return all;
-}
-
-std::string lower_case(std::string text) {
-  std::transform(text.begin(), text.end(), text.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return text;
 }
 
 }  // namespace
