@@ -327,15 +327,17 @@ std::vector<std::string> observability_words(const Observability& observability,
     // What would be worth freeing it: a hundredth of a degree, or 1e-5 of an index.
     const double target = info.unit == "1" ? 1e-5 : 0.01;
     const double needed = observability.duration * std::pow(sigma / target, 2);
+    const std::string seconds =
+        needed < 1000 ? fmt::format("{:.3g}", needed) : fmt::format("{:.0f}", needed);
     if (needed <= observability.duration) {
       words.push_back(fmt::format(
           "{} acts nearly like {}, but this recording tells them apart: freed, its sigma "
-          "is {:.2g}{}, and {:.3g} s at {:.4g} Hz reach {}{}",
-          quantity.name, twins, sigma, unit, needed, observability.rate, target, unit));
+          "is {:.2g}{}, and {} s at {:.6g} Hz reach {}{}",
+          quantity.name, twins, sigma, unit, seconds, observability.rate, target, unit));
     } else {
       words.push_back(fmt::format(
-          "{}: keep it fixed. Freed, its sigma is {:.2g}{}; {}{} would take {:.3g} s at {:.4g} Hz",
-          twin, sigma, unit, target, unit, needed, observability.rate));
+          "{}: keep it fixed. Freed, its sigma is {:.2g}{}; {}{} would take {} s at {:.6g} Hz",
+          twin, sigma, unit, target, unit, seconds, observability.rate));
     }
   }
   return words;

@@ -97,6 +97,20 @@ void TruthColumns::resize(int prisms, std::size_t rows) {
   for (auto* column : columns_of(*this)) column->resize(rows);
 }
 
+void TruthColumns::append(const TruthColumns& others) {
+  if (size() == 0) resize(others.prisms(), 0);
+  if (prisms() != others.prisms()) {
+    throw InvalidArgument(
+        fmt::format("truth columns of {} prisms, expected {}", others.prisms(), prisms()));
+  }
+  time_ns.insert(time_ns.end(), others.time_ns.begin(), others.time_ns.end());
+  const auto from = columns_of(others);
+  const auto to = columns_of(*this);
+  for (std::size_t i = 0; i < to.size(); ++i) {
+    to[i]->insert(to[i]->end(), from[i]->begin(), from[i]->end());
+  }
+}
+
 class TruthWriter::File {
  public:
   File(const std::string& path, int prisms)

@@ -315,7 +315,7 @@ TEST(RotorTracker, GoesOnAfterAClockReset) {
   const Simulated first = record(2.0, 10000, 13), second = record(1.5, 10000, 14);
   Simulated data = first;
   data.observations.append(second.observations);
-  testing::append(data.truth, second.truth);
+  data.truth.append(second.truth);
   const SensorBelief belief = belief_of(first.observations, calibration());
   for (const std::optional<double> rate :
        {std::optional<double>(1000.0), std::optional<double>()}) {

@@ -81,6 +81,26 @@ TEST_F(Truth, PiecesComeBackAsOneTable) {
   }
 }
 
+TEST_F(Truth, ColumnsAreAppendedRowByRow) {
+  TruthColumns all, more;
+  more.resize(2, 3);
+  for (std::size_t i = 0; i < 3; ++i) {
+    more.time_ns[i] = static_cast<std::int64_t>(i);
+    more.rotation_angle[1][i] = 0.5 * static_cast<double>(i);
+    more.range[i] = 10.0 + static_cast<double>(i);
+  }
+  all.append(more);
+  all.append(more);
+  ASSERT_EQ(all.size(), 6u);
+  EXPECT_EQ(all.prisms(), 2);
+  EXPECT_EQ(all.time_ns[4], 1);
+  EXPECT_EQ(all.rotation_angle[1], (std::vector<double>{0, 0.5, 1, 0, 0.5, 1}));
+  EXPECT_EQ(all.range[5], 12.0);
+  EXPECT_EQ(all.azimuth.size(), 6u);
+  more.resize(3, 3);
+  EXPECT_THROW(all.append(more), InvalidArgument);
+}
+
 TEST_F(Truth, VariablesHaveTheNamesAndUnitsOthersRead) {
   TruthWriter writer(path(), 2);
   TruthColumns one = rows(2, 1, 1);

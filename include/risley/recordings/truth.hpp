@@ -23,6 +23,9 @@ struct TruthColumns {
   std::size_t size() const { return time_ns.size(); }
   int prisms() const { return static_cast<int>(rotation_angle.size()); }
   void resize(int prisms, std::size_t rows);
+  /// Appends all rows of others; columns without rows take on their number of prisms.
+  /// @throws InvalidArgument for another number of prisms
+  void append(const TruthColumns& others);
 };
 
 /// Writes truth columns piece by piece as NetCDF-4: time (s), rotation_angle_a_deg,

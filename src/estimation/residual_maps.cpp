@@ -1,0 +1,117 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "risley/estimation/residual_maps.hpp"
+
+#include <cmath>
+#include <map>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "risley/core/angle.hpp"
+#include "risley/core/error.hpp"
+
+namespace risley::estimation {
+namespace {
+
+/// Collects residuals cell by cell.
+class MapMaker {
+ public:
+  explicit MapMaker(double cell) : cell_(cell) {
+    if (!(cell > 0)) {
+      throw InvalidArgument(
+          fmt::format("cell = {} deg, allowed above 0", degrees_from_radians(cell)));
+    }
+  }
+
+  void add(double x, double y, double azimuth_residual, double zenith_residual) {
+    if (!std::isfinite(x + y + azimuth_residual + zenith_residual)) return;
+    Cell& cell = cells_[{std::lround(std::floor(x / cell_)), std::lround(std::floor(y / cell_))}];
+    ++cell.count;
+    cell.azimuth += azimuth_residual;
+    cell.zenith += zenith_residual;
+    squares_azimuth_ += azimuth_residual * azimuth_residual;
+    squares_zenith_ += zenith_residual * zenith_residual;
+  }
+
+  ResidualMap result() const {
+    ResidualMap map;
+    map.cell = cell_;
+    for (const auto& [place, cell] : cells_) {
+      const auto count = static_cast<double>(cell.count);
+      map.x.push_back(cell_ * (static_cast<double>(place.first) + 0.5));
+      map.y.push_back(cell_ * (static_cast<double>(place.second) + 0.5));
+      map.count.push_back(cell.count);
+      map.mean_azimuth.push_back(cell.azimuth / count);
+      map.mean_zenith.push_back(cell.zenith / count);
+      map.shots += cell.count;
+    }
+    if (map.shots > 0) {
+      map.sigma_azimuth = std::sqrt(squares_azimuth_ / static_cast<double>(map.shots));
+      map.sigma_zenith = std::sqrt(squares_zenith_ / static_cast<double>(map.shots));
+    }
+    return map;
+  }
+
+ private:
+  struct Cell {
+    std::uint64_t count = 0;
+    double azimuth = 0, zenith = 0;
+  };
+  double cell_;
+  std::map<std::pair<long, long>, Cell> cells_;
+  double squares_azimuth_ = 0, squares_zenith_ = 0;
+};
+
+}  // namespace
+
+ResidualMap residuals_over_field(const Estimate& estimate, double cell) {
+  MapMaker maker(cell);
+  const auto& azimuth_residual =
+      estimate.map ? estimate.map->azimuth_residual : estimate.states.azimuth_residual;
+  const auto& zenith_residual =
+      estimate.map ? estimate.map->zenith_residual : estimate.states.zenith_residual;
+  const auto& outlier = estimate.map ? estimate.map->outlier : estimate.states.outlier;
+  const AngleSeries& shots = estimate.series;
+  for (std::size_t i = 0; i < shots.size(); ++i) {
+    if (outlier[i] != 0) continue;
+    maker.add(shots.azimuth[i] - azimuth_residual[i], shots.zenith[i] - zenith_residual[i],
+              azimuth_residual[i], zenith_residual[i]);
+  }
+  return maker.result();
+}
+
+ResidualMap residuals_over_angles(const Estimate& estimate, int prism_x, int prism_y, double cell) {
+  const int prisms = estimate.states.prisms();
+  if (prism_x < 0 || prism_y < 0 || prism_x >= prisms || prism_y >= prisms) {
+    throw InvalidArgument(
+        fmt::format("prisms {} and {}, allowed 0 to {}", prism_x, prism_y, prisms - 1));
+  }
+  MapMaker maker(cell);
+  const auto x = static_cast<std::size_t>(prism_x), y = static_cast<std::size_t>(prism_y);
+  if (estimate.map) {
+    const BatchMapResult& map = *estimate.map;
+    const RotorTrajectory& t = map.trajectory;
+    for (std::size_t knot = 0; knot < t.size(); ++knot) {
+      for (std::size_t i = t.first_shot[knot]; i < t.last_shot[knot]; ++i) {
+        if (map.outlier[i] != 0) continue;
+        const double seconds =
+            1e-9 * static_cast<double>(estimate.series.time_ns[i] - t.time_ns[knot]);
+        maker.add(wrap_to_two_pi(t.angle(knot, x, seconds)),
+                  wrap_to_two_pi(t.angle(knot, y, seconds)), map.azimuth_residual[i],
+                  map.zenith_residual[i]);
+      }
+    }
+    return maker.result();
+  }
+  const RotorStates& states = estimate.states;
+  for (std::size_t i = 0; i < states.size(); ++i) {
+    if (states.outlier[i] != 0) continue;
+    maker.add(wrap_to_two_pi(states.rotation_angle[x][i]),
+              wrap_to_two_pi(states.rotation_angle[y][i]), states.azimuth_residual[i],
+              states.zenith_residual[i]);
+  }
+  return maker.result();
+}
+
+}  // namespace risley::estimation
