@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The risley authors
 # SPDX-License-Identifier: MIT
-# Every library comes from the distribution; scripts/install-dependencies names the packages.
+# Every C++ library comes from the distribution; scripts/install-dependencies names the packages.
 find_package(Eigen3 3.4 REQUIRED NO_MODULE)
 find_package(fmt REQUIRED)
 find_package(TBB REQUIRED)
@@ -15,8 +15,6 @@ find_package(SQLite3 REQUIRED)
 find_package(fastcdr REQUIRED)
 find_library(RISLEY_LASZIP_LIBRARY laszip) # optional: Debian 13 has it, Debian 12 does not
 find_path(RISLEY_RANDOM123_INCLUDE_DIR Random123/philox.h REQUIRED)
-find_file(RISLEY_CHART_JS chart.min.js
-          PATHS /usr/share/javascript/chart.js /usr/share/nodejs/chart.js/dist REQUIRED)
 
 # yaml-cpp calls its target yaml-cpp up to 0.7 and yaml-cpp::yaml-cpp from 0.8 on.
 if(NOT TARGET yaml-cpp::yaml-cpp)

@@ -13,10 +13,11 @@
 
 #include "risley/calibration/calibration_plan.hpp"
 #include "risley/core/angle.hpp"
+#include "risley/core/direction.hpp"
 #include "risley/core/error.hpp"
 #include "risley/core/output_file.hpp"
 #include "risley/recordings/truth.hpp"
-#include "risley/report/calibration_page.hpp"
+#include "risley/report/calibration_report.hpp"
 #include "risley/sensors/preset.hpp"
 
 #include "calibration_text.hpp"
@@ -115,6 +116,7 @@ RangedRecording read_and_estimate(const CalibrateCommandOptions& options,
   RecordingInput input = read_recording(path, selection, common);
   outcome.read_s += input.seconds;
   outcome.observations += input.audit.observations;
+  outcome.reported.push_back(reported_recording(path, input));
   if (!input.reader->header().has_range) {
     throw EstimationError(
         fmt::format("{} holds no ranges: there is nothing to calibrate on", path));
@@ -205,18 +207,33 @@ TruthErrors evaluate_with(const CalibrateCommandOptions& options,
     compare(recordings[r], calibration.sensor.train, calibration.angle_shift[r], options.truths[r],
             kMostBeams / recordings.size(), beams);
   }
-  return {calibration::direction_errors(beams.before, beams.truth),
-          calibration::direction_errors(beams.after, beams.truth),
-          sensors::load_sensor(options.truths.front())};
+  TruthErrors errors{calibration::direction_errors(beams.before, beams.truth),
+                     calibration::direction_errors(beams.after, beams.truth),
+                     sensors::load_sensor(options.truths.front()),
+                     {},
+                     {},
+                     {},
+                     {}};
+  for (std::size_t i = 0; i < beams.truth.size(); ++i) {
+    const SphericalAngles<double> truth = angles_from_direction(beams.truth[i]);
+    const auto add = [&truth](const Vector3<double>& beam, std::vector<double>& azimuth,
+                              std::vector<double>& zenith) {
+      const SphericalAngles<double> computed = angles_from_direction(beam);
+      azimuth.push_back(wrap_to_pi(computed.azimuth - truth.azimuth));
+      zenith.push_back(computed.zenith - truth.zenith);
+    };
+    add(beams.before[i], errors.azimuth_before, errors.zenith_before);
+    add(beams.after[i], errors.azimuth_after, errors.zenith_after);
+  }
+  return errors;
 }
 
-/// calibration.yaml and report.html; what did not converge is no calibration.
+/// calibration.yaml, report.json and report.html; what did not converge is no calibration.
 void write_folder(const CalibrateCommandOptions& options, const CommonOptions& common,
                   const CalibrationOutcome& outcome) {
   namespace fs = std::filesystem;
   const Calibration& c = outcome.calibration;
-  std::vector<std::pair<std::string, std::string>> provenance =
-      provenance_of(common, options.inputs);
+  report::Provenance provenance = provenance_of(common, options.inputs);
   provenance.emplace_back("datum", calibration::to_string(c.datum_kind));
   const auto path = [&](const char* name) { return (fs::path(options.folder) / name).string(); };
   if (c.converged) {
@@ -226,17 +243,15 @@ void write_folder(const CalibrateCommandOptions& options, const CommonOptions& c
   } else {
     remove_calibration(options.folder);
   }
-  std::vector<std::string> names;
-  for (const std::string& input : options.inputs) {
-    names.push_back(fs::path(input).filename().string());
-  }
-  std::optional<report::CalibrationPageInput::Truth> truth;
+  std::optional<report::CalibrationReportInput::Truth> truth;
   if (outcome.truth) {
-    truth = {outcome.truth->before, outcome.truth->after, outcome.truth->sensor};
+    const TruthErrors& t = *outcome.truth;
+    truth = {t.before,        t.after,         t.sensor,      t.azimuth_before,
+             t.zenith_before, t.azimuth_after, t.zenith_after};
   }
-  write_text_file(path("report.html"),
-                  report::calibration_page({c, outcome.nominal, truth, names, outcome.observations,
-                                            provenance, outcome.warnings}));
+  write_report_of(report::calibration_report(
+                      {c, outcome.nominal, truth, outcome.reported, provenance, outcome.warnings}),
+                  options.folder);
 }
 
 /// Each recording stands for observations of its own.
@@ -330,8 +345,9 @@ Run declare_calibrate(CLI::App& verb) {
   const auto options = std::make_shared<CalibrateCommandOptions>();
   CalibrateCommandOptions& o = *options;
   verb.add_option("INPUT", o.inputs, "Recordings of one sensor, with ranges to plane walls");
-  verb.add_option("-o,--output", o.folder,
-                  "Folder for calibration.yaml, states.nc (states_1.nc, ...) and report.html");
+  verb.add_option(
+      "-o,--output", o.folder,
+      "Folder for calibration.yaml, states.nc (states_1.nc, ...), report.json and report.html");
   verb.add_option("--method", o.method,
                   "adjustment: all recordings together, weighted; paper: unweighted distances from "
                   "SVD planes")

@@ -9,6 +9,7 @@
 
 #include "risley/calibration/calibrate.hpp"
 #include "risley/calibration/calibration_plan.hpp"
+#include "risley/report/report_facts.hpp"
 
 #include "command.hpp"
 
@@ -18,12 +19,15 @@ namespace risley::app {
 struct TruthErrors {
   calibration::DirectionErrors before, after;
   sensors::Sensor sensor;
+  /// Computed minus true angles of the compared beams, rad.
+  std::vector<double> azimuth_before, zenith_before, azimuth_after, zenith_after;
 };
 
 /// Everything one calibration found.
 struct CalibrationOutcome {
   calibration::Calibration calibration;
   std::vector<std::string> recordings;  ///< as typed
+  std::vector<report::ReportedRecording> reported;
   sensors::Sensor nominal;
   std::optional<TruthErrors> truth;
   std::vector<std::string> warnings;  ///< of the recordings

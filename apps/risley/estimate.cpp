@@ -13,7 +13,7 @@
 #include "risley/core/output_file.hpp"
 #include "risley/estimation/evaluation.hpp"
 #include "risley/recordings/time_audit.hpp"
-#include "risley/report/estimate_page.hpp"
+#include "risley/report/estimate_report.hpp"
 #include "risley/report/number_text.hpp"
 #include "risley/sensors/preset.hpp"
 
@@ -280,8 +280,8 @@ void print_outcome(const Outcome& outcome) {
   }
 }
 
-/// calibration.yaml, states.nc and report.html. An estimate that did not converge is no
-/// calibration: there is none then, not even an older one of the same name.
+/// calibration.yaml, states.nc, report.json and report.html. An estimate that did not converge is
+/// no calibration: there is none then, not even an older one of the same name.
 void write_folder(const EstimateCommandOptions& options, const CommonOptions& common,
                   const RecordingInput& input, const sensors::Sensor& nominal,
                   const Outcome& outcome) {
@@ -299,12 +299,10 @@ void write_folder(const EstimateCommandOptions& options, const CommonOptions& co
   if (options.states != "none") {
     write_states_of(outcome.estimate, options.states, path("states.nc"), provenance);
   }
-  write_text_file(
-      path("report.html"),
-      report::estimate_page({outcome.estimate, nominal, outcome.evaluation, input.selector.head(),
-                             fs::path(options.input).filename().string(),
-                             input.reader->header().format, input.audit.observations,
-                             input.audit.duration_s, provenance, outcome.warnings}));
+  write_report_of(report::estimate_report(
+                      {outcome.estimate, nominal, outcome.evaluation, input.selector.head(),
+                       reported_recording(options.input, input), provenance, outcome.warnings}),
+                  options.folder);
 }
 
 /// Wrong wishes are told before an hour of reading.
@@ -373,7 +371,7 @@ Run declare_estimate(CLI::App& verb) {
   EstimateCommandOptions& o = *options;
   verb.add_option("INPUT", o.input, "Recording of one sensor, of any known format")->required();
   verb.add_option("-o,--output", o.folder,
-                  "Folder for calibration.yaml, states.nc and report.html");
+                  "Folder for calibration.yaml, states.nc, report.json and report.html");
   verb.add_option("--method", o.method,
                   "map: most probable trajectory of all shots at once; ekf: the paper's filter")
       ->check(CLI::IsMember({"map", "ekf"}))

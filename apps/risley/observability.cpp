@@ -16,6 +16,7 @@
 #include "command.hpp"
 #include "estimation_input.hpp"
 #include "observability_text.hpp"
+#include "recording_text.hpp"
 #include "table.hpp"
 
 namespace risley::app {
@@ -60,7 +61,8 @@ Json observability_json(const Observability& o, int prisms) {
 }
 
 void print_observability(const Observability& o, int prisms) {
-  fmt::print("{:.4g} s at {:.4g} Hz, {:.3g} shots\n\n", o.duration, o.rate, o.shots);
+  fmt::print("{:.4g} s at {:.6g} Hz, {} shots\n\n", o.duration, o.rate,
+             grouped(static_cast<std::uint64_t>(std::llround(o.shots))));
   Table table({"quantity", "sigma", "unit", "deg per unit", "most correlated with", "rho"});
   for (const auto& quantity : o.quantities) {
     const ParameterInfo& info = find_parameter(quantity.name, prisms);

@@ -12,11 +12,11 @@
 
 namespace risley::app {
 
-std::vector<std::pair<std::string, std::string>> provenance_of(
-    const CommonOptions& common, const std::vector<std::string>& inputs) {
-  std::vector<std::pair<std::string, std::string>> result = {{"command", common.command},
-                                                             {"version", RISLEY_VERSION},
-                                                             {"seed", std::to_string(common.seed)}};
+report::Provenance provenance_of(const CommonOptions& common,
+                                 const std::vector<std::string>& inputs) {
+  report::Provenance result = {{"command", common.command},
+                               {"version", RISLEY_VERSION},
+                               {"seed", std::to_string(common.seed)}};
   for (std::size_t i = 0; i < inputs.size(); ++i) {
     const std::string name = i == 0 ? "input" : fmt::format("input_{}", i + 1);
     result.emplace_back(name, inputs[i]);
@@ -42,8 +42,7 @@ void remove_calibration(const std::string& folder) {
 }
 
 void write_states_of(const estimation::Estimate& estimate, const std::string& which,
-                     const std::string& path,
-                     const std::vector<std::pair<std::string, std::string>>& provenance) {
+                     const std::string& path, const report::Provenance& provenance) {
   const bool all = which == "all";
   report::StatesContent content;
   content.prisms = estimate.sensor.prisms();
@@ -54,6 +53,18 @@ void write_states_of(const estimation::Estimate& estimate, const std::string& wh
   };
   content.residuals_over_angle = estimate.residuals_over_angle;
   report::write_states(path, content, provenance);
+}
+
+report::ReportedRecording reported_recording(const std::string& path, const RecordingInput& input) {
+  const recordings::RecordingHeader& header = input.reader->header();
+  return {std::filesystem::path(path).filename().string(), header.format,
+          to_string(header.time_reference), input.audit};
+}
+
+void write_report_of(const report::Report& report, const std::string& folder) {
+  const std::filesystem::path place(folder);
+  report::write_report((place / "report.json").string(), report);
+  write_text_file((place / "report.html").string(), report::report_page(report));
 }
 
 }  // namespace risley::app

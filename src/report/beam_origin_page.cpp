@@ -3,7 +3,6 @@
 #include "risley/report/beam_origin_page.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 #include <fmt/format.h>
@@ -16,27 +15,28 @@ namespace risley::report {
 namespace {
 
 constexpr double kMillimetres = 1e3;
-constexpr std::array kColours{"b", "c", "ink", "d", "bad"};
-
-/// One map in classes of equal width.
+/// One map. Values of both signs have colours that are neutral at 0.
 Chart map_chart(const BeamOriginMap& map, const char* title, const std::vector<double>& values) {
   const auto [least, greatest] = std::minmax_element(values.begin(), values.end());
-  const double width = (*greatest - *least) / static_cast<double>(kColours.size());
-  Chart chart{title, "azimuth, deg", "zenith, deg", {}, {}, ChartKind::map};
-  for (std::size_t k = 0; k < kColours.size(); ++k) {
-    const double from = *least + width * static_cast<double>(k);
-    chart.series.push_back(
-        {fmt::format("{:.1f} to {:.1f} mm", kMillimetres * from, kMillimetres * (from + width)),
-         kColours[k],
-         SeriesKind::points,
-         {},
-         {}});
-  }
+  Series cells{"", "ink", SeriesKind::cells, {}, {}};
+  cells.cell_width = cells.cell_height = degrees_from_radians(map.cell);
   for (std::size_t i = 0; i < map.size(); ++i) {
-    const double place = width > 0 ? (values[i] - *least) / width : 0.0;
-    Series& series = chart.series[std::min(static_cast<std::size_t>(place), kColours.size() - 1)];
-    series.x.push_back(degrees_from_radians(map.azimuth[i]));
-    series.y.push_back(degrees_from_radians(map.zenith[i]));
+    cells.x.push_back(degrees_from_radians(map.azimuth[i]));
+    cells.y.push_back(degrees_from_radians(map.zenith[i]));
+    cells.value.push_back(kMillimetres * values[i]);
+  }
+  Chart chart{
+      title,
+      "azimuth, deg",
+      "zenith, deg",
+      {cells},
+      fmt::format("From {:.1f} to {:.1f} mm.", kMillimetres * *least, kMillimetres * *greatest),
+      ChartKind::map};
+  chart.value_label = "mm";
+  if (*least < 0) {
+    const double most = kMillimetres * std::max(-*least, *greatest);
+    chart.palette = Palette::diverging;
+    chart.value_range = {-most, most};
   }
   return chart;
 }
@@ -51,25 +51,26 @@ std::vector<double> difference(const std::vector<double>& greatest,
 }  // namespace
 
 std::string beam_origin_page(const BeamOriginMap& map, const sensors::Sensor& sensor,
-                             const std::vector<std::pair<std::string, std::string>>& provenance) {
+                             const Provenance& provenance) {
   Figures figures;
   std::string body = fmt::format(
       "<p>Prisms {} mm thick with perpendicular faces {} mm apart shift the beam sideways. {} "
-      "beams, "
-      "cells of {} degree.</p>\n",
+      "beams, cells of {} degree.</p>\n",
       kMillimetres * sensor.prism_thickness, kMillimetres * sensor.prism_spacing, map.beams,
       degrees_from_radians(map.cell));
   if (map.size() > 0) {
     body += "<h2>Horizontal (Y)</h2>\n";
-    body += figures.add(map_chart(map, "Least Y of the beam's origin", map.least_y));
-    body += figures.add(map_chart(map, "Greatest Y of the beam's origin", map.greatest_y));
-    body += figures.add(
-        map_chart(map, "Y: greatest minus least", difference(map.greatest_y, map.least_y)));
+    body += charts_html(
+        {map_chart(map, "Least Y of the beam's origin", map.least_y),
+         map_chart(map, "Greatest Y of the beam's origin", map.greatest_y),
+         map_chart(map, "Y: greatest minus least", difference(map.greatest_y, map.least_y))},
+        figures);
     body += "<h2>Vertical (Z)</h2>\n";
-    body += figures.add(map_chart(map, "Least Z of the beam's origin", map.least_z));
-    body += figures.add(map_chart(map, "Greatest Z of the beam's origin", map.greatest_z));
-    body += figures.add(
-        map_chart(map, "Z: greatest minus least", difference(map.greatest_z, map.least_z)));
+    body += charts_html(
+        {map_chart(map, "Least Z of the beam's origin", map.least_z),
+         map_chart(map, "Greatest Z of the beam's origin", map.greatest_z),
+         map_chart(map, "Z: greatest minus least", difference(map.greatest_z, map.least_z))},
+        figures);
   }
   body += provenance_html(provenance);
   return page_html(

@@ -16,8 +16,8 @@ namespace risley::report {
 namespace {
 
 constexpr std::size_t kLineBins = 600;
-constexpr std::size_t kHistogramBins = 61;
-constexpr double kHistogramHalfWidth = 4.5;  // standard deviations
+constexpr double kFewestBins = 9, kMostBins = 61;  // of a histogram
+constexpr double kHistogramHalfWidth = 4.5;        // standard deviations
 
 const char* kind_name(SeriesKind kind) {
   switch (kind) {
@@ -25,6 +25,8 @@ const char* kind_name(SeriesKind kind) {
       return "line";
     case SeriesKind::steps:
       return "steps";
+    case SeriesKind::cells:
+      return "cells";
     case SeriesKind::points:
       break;
   }
@@ -35,8 +37,12 @@ const char* kind_name(ChartKind kind) {
   switch (kind) {
     case ChartKind::full_turn:
       return "full_turn";
+    case ChartKind::two_turns:
+      return "two_turns";
     case ChartKind::map:
       return "map";
+    case ChartKind::space:
+      return "space";
     case ChartKind::plain:
       break;
   }
@@ -50,11 +56,12 @@ std::size_t stride_for(std::size_t rows, std::size_t most) {
 }  // namespace
 
 std::string figure_html(const Chart& chart, std::size_t number) {
+  const std::string title = escape_html(chart.title);
   std::string html = fmt::format(
-      "<figure{}><figcaption>{}</figcaption>\n<div class=\"plot\"><canvas id=\"chart-{}\" "
-      "role=\"img\" aria-label=\"{}: {} over {}\"></canvas></div>",
-      chart.kind == ChartKind::map ? " class=\"map\"" : "", escape_html(chart.title), number,
-      escape_html(chart.title), escape_html(chart.y_label), escape_html(chart.x_label));
+      "<figure class=\"{}\"><figcaption>{}</figcaption>\n<div class=\"plot\" id=\"chart-{}\" "
+      "role=\"img\" tabindex=\"0\" aria-label=\"{}: {} over {}\"></div>",
+      kind_name(chart.kind), title, number, title, escape_html(chart.y_label),
+      escape_html(chart.x_label));
   if (!chart.note.empty())
     html += fmt::format("\n<p class=\"note\">{}</p>", escape_html(chart.note));
   return html + "</figure>\n";
@@ -63,15 +70,23 @@ std::string figure_html(const Chart& chart, std::size_t number) {
 std::string chart_json(const Chart& chart, std::size_t number) {
   std::string series;
   for (const Series& one : chart.series) {
-    series +=
-        fmt::format("{}{{\"label\":{},\"colour\":{},\"kind\":\"{}\",\"x\":{},\"y\":{}}}",
-                    series.empty() ? "" : ",", json_string(one.label), json_string(one.colour),
-                    kind_name(one.kind), json_numbers(one.x), json_numbers(one.y));
+    series += fmt::format(
+        "{}{{\"label\":{},\"colour\":{},\"kind\":\"{}\",\"x\":{},\"y\":{},\"z\":{},"
+        "\"value\":{},\"cell\":[{},{}]}}",
+        series.empty() ? "" : ",", json_string(one.label), json_string(one.colour),
+        kind_name(one.kind), json_numbers(one.x), json_numbers(one.y), json_numbers(one.z),
+        json_numbers(one.value), one.cell_width, one.cell_height);
   }
+  std::string range = "null";
+  if (chart.value_range)
+    range = json_numbers({chart.value_range->first, chart.value_range->second});
   return fmt::format(
-      "{{\"id\":\"chart-{}\",\"x_label\":{},\"y_label\":{},\"kind\":\"{}\",\"series\":[{}]}}",
-      number, json_string(chart.x_label), json_string(chart.y_label), kind_name(chart.kind),
-      series);
+      "{{\"id\":\"chart-{}\",\"title\":{},\"x_label\":{},\"y_label\":{},\"z_label\":{},"
+      "\"value_label\":{},\"kind\":\"{}\",\"palette\":\"{}\",\"value_range\":{},"
+      "\"series\":[{}]}}",
+      number, json_string(chart.title), json_string(chart.x_label), json_string(chart.y_label),
+      json_string(chart.z_label), json_string(chart.value_label), kind_name(chart.kind),
+      chart.palette == Palette::diverging ? "diverging" : "sequential", range, series);
 }
 
 std::vector<std::size_t> every_nth(std::size_t rows, std::size_t most) {
@@ -82,8 +97,8 @@ std::vector<std::size_t> every_nth(std::size_t rows, std::size_t most) {
 
 std::string every_nth_note(std::size_t rows, std::size_t most, std::string_view what) {
   const std::size_t stride = stride_for(rows, most);
-  if (stride == 1) return fmt::format("All {} {} are drawn.", rows, what);
-  return fmt::format("Of {} {} one in {} is drawn.", rows, what, stride);
+  if (stride == 1) return fmt::format("All {} {} are drawn.", count_text(rows), what);
+  return fmt::format("Of {} {} one in {} is drawn.", count_text(rows), what, stride);
 }
 
 Series peak_line(std::string label, std::string colour, std::size_t rows, const Column& x,
@@ -112,9 +127,9 @@ Series peak_line(std::string label, std::string colour, std::size_t rows, const 
 
 std::string peak_line_note(std::size_t rows) {
   const std::size_t bin = stride_for(rows, kLineBins);
-  if (bin <= 2) return fmt::format("All {} shots are drawn.", rows);
+  if (bin <= 2) return fmt::format("All {} shots are drawn.", count_text(rows));
   return fmt::format("Of every {} of {} shots the smallest and the largest value are drawn.", bin,
-                     rows);
+                     count_text(rows));
 }
 
 std::vector<Series> histogram(const std::string& label, const std::string& colour,
@@ -123,20 +138,24 @@ std::vector<Series> histogram(const std::string& label, const std::string& colou
   Series counts{label, colour, SeriesKind::steps, {}, {}};
   Series curve{"normal curve", "ink", SeriesKind::line, {}, {}};
   if (!(moments.std > 0)) return {counts};
-  const double width = 2 * kHistogramHalfWidth * moments.std / double(kHistogramBins);
+  // Rice's rule, and an odd number so that the mean stands in the middle of a bin.
+  const double rule = std::floor(std::cbrt(double(values.size())));
+  const auto bins = static_cast<std::size_t>(std::clamp(2 * rule + 1, kFewestBins, kMostBins));
+  const double width = 2 * kHistogramHalfWidth * moments.std / double(bins);
   const double first = moments.mean - kHistogramHalfWidth * moments.std;
-  counts.y.assign(kHistogramBins, 0.0);
+  counts.y.assign(bins, 0.0);
   for (std::size_t i = 0; i < values.size(); ++i) {
     if ((!skip.empty() && skip[i] != 0) || !std::isfinite(values[i])) continue;
-    const double bin =
-        std::clamp(std::floor((values[i] - first) / width), 0.0, double(kHistogramBins - 1));
+    const double bin = std::clamp(std::floor((values[i] - first) / width), 0.0, double(bins - 1));
     counts.y[static_cast<std::size_t>(bin)] += 1.0;
   }
-  for (std::size_t i = 0; i < kHistogramBins; ++i) {
-    const double middle = first + (double(i) + 0.5) * width;
-    const double z = (middle - moments.mean) / moments.std;
-    counts.x.push_back(scale * middle);
-    curve.x.push_back(scale * middle);
+  for (std::size_t i = 0; i < bins; ++i) {
+    counts.x.push_back(scale * (first + (double(i) + 0.5) * width));
+  }
+  constexpr int kCurvePoints = 91;
+  for (int i = 0; i < kCurvePoints; ++i) {
+    const double z = kHistogramHalfWidth * (2.0 * i / (kCurvePoints - 1) - 1.0);
+    curve.x.push_back(scale * (moments.mean + z * moments.std));
     curve.y.push_back(double(moments.count) * width / moments.std * std::exp(-0.5 * z * z) /
                       std::sqrt(kTwoPi));
   }

@@ -10,34 +10,9 @@
 #include <vector>
 
 #include "risley/estimation/diagnostics.hpp"
+#include "risley/report/chart.hpp"
 
 namespace risley::report {
-
-/// How page.js draws a series.
-enum class SeriesKind { points, line, steps };
-
-/// What the axes of a diagram are.
-enum class ChartKind {
-  plain,
-  full_turn,  ///< x runs from 0 to 360 degree
-  map,        ///< square, equal scales, both axes turned: a view along the beam
-};
-
-/// One drawn series.
-struct Series {
-  std::string label;
-  std::string colour;  ///< a colour of page.css: "a", "b", "c", "d", "ink", "bad"
-  SeriesKind kind = SeriesKind::points;
-  std::vector<double> x, y;
-};
-
-/// One diagram with labelled axes.
-struct Chart {
-  std::string title, x_label, y_label;
-  std::vector<Series> series;
-  std::string note;  ///< under the diagram: what was thinned
-  ChartKind kind = ChartKind::plain;
-};
 
 /// A diagram as a figure element, and its data as a JSON object that page.js draws.
 std::string figure_html(const Chart& chart, std::size_t number);
@@ -57,7 +32,8 @@ Series peak_line(std::string label, std::string colour, std::size_t rows, const 
                  const Column& y);
 std::string peak_line_note(std::size_t rows);
 
-/// Counts per bin within 4.5 standard deviations of the mean, and the normal curve of the same
+/// Counts per bin within 4.5 standard deviations of the mean (9 to 61 bins, by the cube root of the
+/// number of values), and the normal curve of the same
 /// mean, deviation and count. Values beyond stand in the outermost bins.
 std::vector<Series> histogram(const std::string& label, const std::string& colour,
                               std::span<const double> values, std::span<const unsigned char> skip,

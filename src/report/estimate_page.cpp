@@ -2,42 +2,31 @@
 // SPDX-License-Identifier: MIT
 #include "risley/report/estimate_page.hpp"
 
-#include <algorithm>
 #include <cmath>
-#include <optional>
 
 #include <fmt/format.h>
 
 #include "risley/core/angle.hpp"
 #include "risley/report/number_text.hpp"
 
-#include "report/charts.hpp"
 #include "report/html.hpp"
 #include "report/page_parts.hpp"
 
 namespace risley::report {
 namespace {
 
-using estimation::Estimate;
 using estimation::Moments;
-using estimation::RotorStates;
 
-constexpr std::size_t kMostPoints = 4000;     // per scatter diagram
-constexpr std::size_t kMostMapPoints = 9000;  // of the scan pattern
-constexpr double kPatternDuration = 0.09;     // s, as in the paper's figures of the pattern
-
-Verdict verdict_of(const EstimatePageInput& input) {
-  const Estimate& e = input.estimate;
+Verdict verdict_of(const EstimateReport& r) {
   Verdict verdict;
-  verdict.converged = e.converged;
-  verdict.reason = e.reason;
-  verdict.warnings = e.warnings;
-  verdict.warnings.insert(verdict.warnings.end(), input.warnings.begin(), input.warnings.end());
+  verdict.converged = r.converged;
+  verdict.reason = r.reason;
+  verdict.warnings = r.warnings;
   verdict.facts = fmt::format(
       "What is left unexplained is {:.3g}° in azimuth and {:.3g}° in zenith (root mean square); "
       "noise and rounding alone would leave {:.3g}°. {} of {} shots were left out as outliers.",
-      degrees_from_radians(e.azimuth_residuals.rms), degrees_from_radians(e.zenith_residuals.rms),
-      degrees_from_radians(e.expected_residual), e.outliers, e.series.size());
+      degrees_from_radians(r.azimuth_residuals.rms), degrees_from_radians(r.zenith_residuals.rms),
+      degrees_from_radians(r.expected_residual), count_text(r.outliers), count_text(r.shots));
   verdict.healthy = "Healthy: the model describes this recording.";
   verdict.mend_html =
       "check that --sensor is the instrument that recorded, that --noise-angle-deg is its noise, "
@@ -48,297 +37,158 @@ Verdict verdict_of(const EstimatePageInput& input) {
   return verdict;
 }
 
-std::string subject_text(const EstimatePageInput& input) {
-  const Estimate& e = input.estimate;
+std::string subject_text(const EstimateReport& r) {
+  const recordings::TimeAuditResult& audit = r.recording.audit;
   std::string text =
       fmt::format("{} ({}), {} observations over {:.4g} s, {} shots used. Sensor {} with {} prisms",
-                  input.recording, input.recording_format, input.observations, input.duration,
-                  e.series.size(), e.sensor.name, e.sensor.prisms());
-  if (e.sensor.combination) {
-    text += *e.sensor.combination == sensors::SpeedCombination::first
-                ? "; speed combination 1, the slow rotor first"
-                : "; speed combination 2, the fast rotor first";
+                  r.recording.name, r.recording.format, count_text(audit.observations),
+                  audit.duration_s, count_text(r.shots), r.sensor, r.prisms);
+  if (r.combination != 0) {
+    text += r.combination == 1 ? "; speed combination 1, the slow rotor first"
+                               : "; speed combination 2, the fast rotor first";
   }
-  if (e.mirrored) text += "; the sign of the elevation was turned";
+  if (r.mirrored) text += "; the sign of the elevation was turned";
   return text + ".";
 }
 
-/// The value an estimation started from, in the estimate's speed combination; none for angles.
-std::optional<double> nominal_value(const EstimatePageInput& input, const ParameterInfo& info) {
-  if (info.kind == ParameterKind::rotation_angle) return std::nullopt;
-  const auto& combination = input.estimate.sensor.combination;
-  if (info.kind == ParameterKind::angular_velocity && combination && input.nominal.combination) {
-    return with_combination(input.nominal, *combination).get(info.name);
-  }
-  return input.nominal.get(info.name);
-}
-
-std::string parameters_html(const EstimatePageInput& input) {
-  const Estimate& e = input.estimate;
-  const bool truth = input.evaluation.has_value();
+std::string parameters_html(const EstimateReport& r) {
   std::string html =
       "<h2>Parameters</h2>\n<div class=\"wide\"><table><thead><tr><th>parameter</th><th>value</th>"
       "<th>σ</th><th>unit</th><th>nominal</th><th>difference</th>";
-  if (truth) html += "<th>truth</th><th>error</th><th>error / σ</th>";
+  if (r.truth) html += "<th>truth</th><th>error</th><th>error / σ</th>";
   html += "</tr></thead><tbody>\n";
-  for (const estimation::EstimatedValue& value : e.values) {
-    const ParameterInfo& info = find_parameter(value.name, e.sensor.prisms());
-    const double scale = 1.0 / info.si_per_unit, sigma = value.sigma * scale;
-    const NumberText shown = number_text(value.value * scale, sigma);
+  for (const ReportedParameter& row : r.parameters) {
+    const ParameterInfo& info = find_parameter(row.name, r.prisms);
+    const double scale = 1.0 / info.si_per_unit, sigma = row.sigma * scale;
+    const NumberText shown = number_text(row.value * scale, sigma);
     html += fmt::format("<tr>{}<td>{}</td><td>{}</td><td>{}</td>", parameter_head(info),
                         shown.value, shown.sigma, escape_html(info.unit));
-    if (const auto nominal = nominal_value(input, info)) {
-      html += fmt::format("<td>{:.7g}</td><td>{}</td>", *nominal * scale,
-                          text_to_place_of((value.value - *nominal) * scale, sigma));
+    if (std::isfinite(row.nominal)) {
+      html += fmt::format("<td>{:.7g}</td><td>{}</td>", row.nominal * scale,
+                          text_to_place_of((row.value - row.nominal) * scale, sigma));
     } else {
       html += "<td></td><td></td>";
     }
-    if (truth) {
-      const auto& all = input.evaluation->parameters;
-      const auto found = std::find_if(all.begin(), all.end(),
-                                      [&](const auto& one) { return one.name == value.name; });
-      if (found != all.end()) {
-        html += fmt::format("<td>{}</td><td>{}</td><td{}>{:.2f}</td>",
-                            text_to_place_of(found->truth * scale, sigma),
-                            text_to_place_of(found->error * scale, sigma),
-                            std::abs(found->error_over_sigma) > kFarOff ? " class=\"far\"" : "",
-                            found->error_over_sigma);
-      } else {
-        html += "<td></td><td></td><td></td>";
-      }
+    if (r.truth && std::isfinite(row.truth)) {
+      html += fmt::format("<td>{}</td><td>{}</td><td{}>{}</td>",
+                          text_to_place_of(row.truth * scale, sigma),
+                          text_to_place_of(row.error * scale, sigma),
+                          std::abs(row.error_over_sigma) > kFarOff ? " class=\"far\"" : "",
+                          finite_text("{:.2f}", row.error_over_sigma));
+    } else if (r.truth) {
+      html += "<td></td><td></td><td></td>";
     }
     html += "</tr>\n";
   }
   html +=
       "</tbody></table></div>\n<p class=\"note\">σ is one standard deviation. Angular velocities "
       "are means over the recording, rotation angles are those at the first used shot.</p>\n";
-  if (truth) {
+  if (r.truth) {
     std::string rmse;
-    for (std::size_t i = 0; i < input.evaluation->rotation_angle_rmse.size(); ++i) {
+    for (std::size_t i = 0; i < r.truth->rotation_angle_rmse.size(); ++i) {
       rmse += fmt::format("{}{:.3g}° for prism {}", i == 0 ? "" : ", ",
-                          degrees_from_radians(input.evaluation->rotation_angle_rmse[i]),
+                          degrees_from_radians(r.truth->rotation_angle_rmse[i]),
                           prism_letter(static_cast<int>(i)));
     }
     html += fmt::format(
         "<p>Against the truth: rotation angles are off by {} (root mean square). The squared "
-        "errors "
-        "are {:.3g} times (parameters) and {:.3g} times (rotation angles) what the stated sigmas "
-        "promise; 1 is honest, far above 1 means sigmas that are too small.</p>\n",
-        escape_html(rmse), input.evaluation->nees_parameters,
-        input.evaluation->nees_rotation_angles);
+        "errors are {:.3g} times (parameters) and {:.3g} times (rotation angles) what the stated "
+        "sigmas promise; 1 is honest, far above 1 means sigmas that are too small.</p>\n",
+        escape_html(rmse), r.truth->nees_parameters, r.truth->nees_rotation_angles);
   }
   return html;
 }
 
-std::string moments_html(const Estimate& e) {
+std::string unobservable_html(const EstimateReport& r) {
+  std::string html = "<h2>What this recording does not tell</h2>\n";
+  if (!r.unobservable.empty()) {
+    std::vector<std::string> items;
+    for (const estimation::WeakDirection& weak : r.unobservable) {
+      items.push_back(fmt::format("{}: its sigma stays {:.2g}", direction_text(weak), weak.sigma));
+    }
+    html +=
+        "<p>These combinations of the free parameters were not measured (in units of 1 degree, "
+        "or 0.01 of an index). Hold one of each with <code>--fix</code>.</p>\n" +
+        list_html(items);
+  } else {
+    html += "<p>All free parameters were measured.</p>\n";
+  }
+  if (!r.advice.empty()) html += list_html(r.advice);
+  return html;
+}
+
+std::string pieces_html(const EstimateReport& r, Figures& figures) {
+  if (!r.pieces || r.parameter_charts.empty()) return "";
+  const EstimateReport::Pieces& p = *r.pieces;
+  std::string html = fmt::format(
+      "<h2>Do the parameters stand still?</h2>\n<p>Each dot is the estimate from one of {} pieces "
+      "of the recording alone ({:.2g} s or less), with its own sigma. Their differences are {} "
+      "times what their sigmas promise ({:.0f} degrees of freedom, so 1 ± {:.2f} is to be "
+      "expected of a sensor that does not change and of sigmas that are true).{}</p>\n",
+      p.count, p.duration, finite_text("{:.2f}", p.chi2), p.degrees_of_freedom,
+      p.degrees_of_freedom > 0 ? std::sqrt(2.0 / p.degrees_of_freedom) : 0.0,
+      p.failed == 0 ? "" : fmt::format(" {} more pieces gave no estimate.", p.failed));
+  return html + charts_html(r.parameter_charts, figures);
+}
+
+std::string moments_html(const EstimateReport& r) {
   const auto row = [](const char* name, const Moments& m) {
     const double k = kDegreesPerRadian;
     return fmt::format(
-        "<tr><th scope=\"row\">{}</th><td>{:.3g}</td><td>{:.3g}</td><td>{:.3g}</td><td>{:.2f}</td>"
-        "<td>{:.2f}</td><td>{}</td></tr>\n",
-        name, k * m.mean, k * m.std, k * m.rms, m.skewness, m.kurtosis, m.count);
+        "<tr><th scope=\"row\">{}</th><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td>"
+        "<td>{}</td></tr>\n",
+        name, finite_text("{:.3g}", k * m.mean), finite_text("{:.3g}", k * m.std),
+        finite_text("{:.3g}", k * m.rms), finite_text("{:.2f}", m.skewness),
+        finite_text("{:.2f}", m.kurtosis), count_text(m.count));
   };
   return "<div class=\"wide\"><table><thead><tr><th>residual</th><th>mean, deg</th>"
          "<th>standard deviation, deg</th><th>root mean square, deg</th><th>skewness</th>"
          "<th>excess kurtosis</th><th>shots</th></tr></thead><tbody>\n" +
-         row("azimuth", e.azimuth_residuals) + row("zenith", e.zenith_residuals) +
+         row("azimuth", r.azimuth_residuals) + row("zenith", r.zenith_residuals) +
          "</tbody></table></div>\n<p class=\"note\">Residual: observed minus estimated. Outliers "
-         "are "
-         "left out of this table and of the histograms. Skewness and excess kurtosis of a normal "
-         "distribution are 0.</p>\n";
+         "are left out of this table, of the histograms and of the maps. Skewness and excess "
+         "kurtosis of a normal distribution are 0.</p>\n";
 }
 
-/// What the residuals did to the sigmas.
-std::string variance_html(const Estimate& e) {
-  if (!e.map) return "";
-  return fmt::format(
-      "<p>Residuals show {:.3f} times the variance that was stated, and their autocorrelation "
-      "multiplies the variance of means by {:.3f}; for that every variance on this page was "
-      "multiplied by {:.3f}.</p>\n",
-      e.map->unit_variance, e.map->autocorrelation.factor, e.map->variance_factor);
+/// What the residuals did to the sigmas, and whether they hang on a prism's angle.
+std::string variance_html(const EstimateReport& r) {
+  std::string html;
+  if (r.variance) {
+    html += fmt::format(
+        "<p>Residuals show {:.3f} times the variance that was stated, and their autocorrelation "
+        "multiplies the variance of means by {:.3f}; for that every variance on this page was "
+        "multiplied by {:.3f}.</p>\n",
+        r.variance->unit_variance, r.variance->autocorrelation_factor, r.variance->variance_factor);
+  }
+  std::string uneven;
+  for (std::size_t k = 0; k < r.unevenness.size(); ++k) {
+    uneven +=
+        fmt::format("{}{} for prism {}", k == 0 ? "" : ", ", finite_text("{:.2f}", r.unevenness[k]),
+                    prism_letter(static_cast<int>(k)));
+  }
+  return html + fmt::format(
+                    "<p>Mean residuals over 5° of a prism's angle have so many times the variance "
+                    "that noise gives them: {}. Far above 1 the sensor is bent in a way that the "
+                    "free parameters do not describe.</p>\n",
+                    uneven);
 }
-
-/// All diagrams of the page.
-class ChartPage {
- public:
-  explicit ChartPage(const EstimatePageInput& input)
-      : input_(input),
-        states_(input.estimate.states),
-        azimuth_(input.estimate.map ? input.estimate.map->azimuth_residual
-                                    : states_.azimuth_residual),
-        zenith_(input.estimate.map ? input.estimate.map->zenith_residual : states_.zenith_residual),
-        outlier_(input.estimate.map ? input.estimate.map->outlier : states_.outlier) {}
-
-  const Figures& figures() const { return figures_; }
-
-  std::string residuals() {
-    const Estimate& e = input_.estimate;
-    std::string html = "<div class=\"charts\">\n";
-    html += residuals_over_time("Azimuth residuals over time", azimuth_, "a");
-    html += residuals_over_time("Zenith residuals over time", zenith_, "b");
-    html += one_histogram("Histogram of the azimuth residuals", azimuth_, e.azimuth_residuals, "a");
-    html += one_histogram("Histogram of the zenith residuals", zenith_, e.zenith_residuals, "b");
-    for (std::size_t rotor = 0; rotor < states_.rotation_angle.size(); ++rotor) {
-      html += residuals_over_angle(rotor);
-    }
-    return html + "</div>\n";
-  }
-
-  std::string rotors() {
-    std::string html = "<div class=\"charts\">\n";
-    for (std::size_t rotor = 0; rotor < states_.angular_velocity.size(); ++rotor) {
-      html += figure({fmt::format("Angular velocity of prism {}", letter(rotor)),
-                      "time, s",
-                      "angular velocity, deg/s",
-                      {line("", rotor, states_.angular_velocity[rotor])},
-                      peak_line_note(states_.size())});
-    }
-    if (input_.evaluation) {
-      const auto& errors = input_.evaluation->rotation_angle_error;
-      for (std::size_t rotor = 0; rotor < errors.size(); ++rotor) {
-        html += figure({fmt::format("Error of the rotation angle of prism {}", letter(rotor)),
-                        "time, s",
-                        "estimate minus truth, deg",
-                        {line("", rotor, errors[rotor])},
-                        peak_line_note(states_.size())});
-      }
-    }
-    return html + "</div>\n";
-  }
-
-  std::string pattern() {
-    const estimation::AngleSeries& head = input_.head;
-    std::size_t rows = 0;
-    while (rows < head.size() && head.time(rows) <= kPatternDuration) ++rows;
-    Series shots{"", "a", SeriesKind::points, {}, {}};
-    for (const std::size_t i : every_nth(rows, kMostMapPoints)) {
-      shots.x.push_back(degrees_from_radians(head.azimuth[i]));
-      shots.y.push_back(degrees_from_radians(head.zenith[i]));
-    }
-    Chart chart{"Scan pattern of the first 0.09 s, as recorded",
-                "azimuth, deg",
-                "zenith, deg",
-                {shots},
-                every_nth_note(rows, kMostMapPoints),
-                ChartKind::map};
-    return figure(chart);
-  }
-
- private:
-  std::string figure(const Chart& chart) { return figures_.add(chart); }
-
-  static std::string letter(std::size_t rotor) {
-    return std::string(1, prism_letter(static_cast<int>(rotor)));
-  }
-  static std::string colour_of(std::size_t rotor) { return letter(rotor); }
-
-  double time(std::size_t row) const {
-    return 1e-9 * static_cast<double>(states_.time_ns[row] - states_.time_ns[0]);
-  }
-  double shot_time(std::size_t shot) const { return input_.estimate.series.time(shot); }
-
-  Series line(const std::string& label, std::size_t rotor,
-              const std::vector<double>& values) const {
-    return peak_line(
-        label, colour_of(rotor), states_.size(), [this](std::size_t i) { return time(i); },
-        [&values](std::size_t i) { return degrees_from_radians(values[i]); });
-  }
-
-  std::string residuals_over_time(const std::string& title, const std::vector<double>& residual,
-                                  const std::string& colour) {
-    Series used{"used", colour, SeriesKind::points, {}, {}};
-    Series outliers{"outliers", "bad", SeriesKind::points, {}, {}};
-    const std::size_t shots = residual.size();
-    for (const std::size_t i : every_nth(shots, kMostPoints)) {
-      if (outlier_[i] != 0) continue;
-      used.x.push_back(shot_time(i));
-      used.y.push_back(degrees_from_radians(residual[i]));
-    }
-    // Outliers are few and matter: each is drawn as long as that is possible.
-    std::vector<std::size_t> rows;
-    for (std::size_t i = 0; i < shots; ++i) {
-      if (outlier_[i] != 0 && std::isfinite(residual[i])) rows.push_back(i);
-    }
-    for (const std::size_t k : every_nth(rows.size(), kMostPoints)) {
-      outliers.x.push_back(shot_time(rows[k]));
-      outliers.y.push_back(degrees_from_radians(residual[rows[k]]));
-    }
-    std::string note = every_nth_note(shots, kMostPoints);
-    if (!rows.empty()) {
-      note += " " + every_nth_note(rows.size(), kMostPoints, "outliers");
-    }
-    Chart chart{title, "time, s", "observed minus estimated, deg", {used}, note};
-    if (!rows.empty()) chart.series.push_back(outliers);
-    return figure(chart);
-  }
-
-  std::string one_histogram(const std::string& title, const std::vector<double>& residual,
-                            const Moments& moments, const std::string& colour) {
-    return figure(
-        {title, "observed minus estimated, deg", "shots",
-         histogram("residuals", colour, residual, outlier_, moments, kDegreesPerRadian),
-         "All shots but the outliers. The outermost bins hold everything beyond 4.5 standard "
-         "deviations."});
-  }
-
-  std::string residuals_over_angle(std::size_t rotor) {
-    const auto angle = [this, rotor](std::size_t i) {
-      return degrees_from_radians(wrap_to_two_pi(states_.rotation_angle[rotor][i]));
-    };
-    Chart chart{
-        fmt::format("Residuals over the rotation angle of prism {}", letter(rotor)),
-        "rotation angle, deg",
-        "observed minus estimated, deg",
-        {},
-        every_nth_note(states_.size(), kMostPoints / 2, input_.estimate.map ? "knots" : "shots") +
-            " Lines: means over 5° of all shots that were used.",
-        ChartKind::full_turn};
-    const estimation::AngleProfile& profile = input_.estimate.residuals_over_angle[rotor];
-    const auto add = [&](const std::string& name, const std::vector<double>& residual,
-                         const std::vector<double>& mean, const std::string& colour,
-                         const std::string& mean_colour) {
-      const auto value = [&residual](std::size_t i) { return degrees_from_radians(residual[i]); };
-      Series points{name, colour, SeriesKind::points, {}, {}};
-      for (const std::size_t i : every_nth(states_.size(), kMostPoints / 2)) {
-        if (states_.outlier[i] != 0) continue;
-        points.x.push_back(angle(i));
-        points.y.push_back(value(i));
-      }
-      Series means{"mean of " + name, mean_colour, SeriesKind::line, {}, {}};
-      for (std::size_t bin = 0; bin < mean.size(); ++bin) {
-        means.x.push_back(360.0 * (static_cast<double>(bin) + 0.5) /
-                          static_cast<double>(mean.size()));
-        means.y.push_back(degrees_from_radians(mean[bin]));
-      }
-      chart.series.push_back(means);
-      chart.series.push_back(points);
-    };
-    add("azimuth", states_.azimuth_residual, profile.mean_azimuth, "a", "ink");
-    add("zenith", states_.zenith_residual, profile.mean_zenith, "b", "c");
-    return figure(chart);
-  }
-
-  const EstimatePageInput& input_;
-  const RotorStates& states_;
-  const std::vector<double>&azimuth_, &zenith_;  // residuals of all shots
-  const std::vector<unsigned char>& outlier_;
-  Figures figures_;
-};
 
 }  // namespace
 
-std::string estimate_page(const EstimatePageInput& input) {
-  const Estimate& e = input.estimate;
-  ChartPage charts(input);
-  std::string body = verdict_html(verdict_of(input));
-  body += parameters_html(input);
-  body += "<h2>Rotors</h2>\n" + charts.rotors();
-  body += "<h2>Residuals</h2>\n" + moments_html(e) + variance_html(e) + charts.residuals();
-  body += "<h2>Scan pattern</h2>\n" + charts.pattern();
-  body += correlation_html(e.free, e.covariance, e.sensor.prisms());
-  body += provenance_html(input.provenance);
-  return page_html("risley estimate: " + input.recording, subject_text(input), body,
-                   charts.figures());
+std::string estimate_page(const EstimateReport& r) {
+  Figures figures;
+  std::string body = verdict_html(verdict_of(r));
+  body += parameters_html(r);
+  body += unobservable_html(r);
+  body += pieces_html(r, figures);
+  body += "<h2>Rotors</h2>\n" + charts_html(r.rotor_charts, figures);
+  body += "<h2>Residuals</h2>\n" + moments_html(r) + variance_html(r) +
+          charts_html(r.residual_charts, figures);
+  body += "<h2>Scan pattern</h2>\n" + charts_html(r.pattern_charts, figures);
+  body += correlation_html(r.free, r.covariance, r.prisms);
+  body += time_audit_html({r.recording});
+  body += provenance_html(r.provenance);
+  return page_html("risley estimate: " + r.recording.name, subject_text(r), body, figures);
 }
 
 }  // namespace risley::report

@@ -6,9 +6,14 @@
 
 namespace risley::report {
 
-/// JavaScript that draws the diagrams which stand as JSON in the element "page-data".
+// Texts that cmake/RisleyReportAssets.cmake embeds.
+
+/// page.js: draws the diagrams which stand as JSON in the element "page-data".
 std::string_view page_script();
-/// Style sheet with a light and a dark set of colours.
+/// page.css: style sheet with a light and a dark set of colours, and one for paper.
 std::string_view page_style();
+/// Apache ECharts, and what it needs for three dimensions.
+std::string_view echarts_script();
+std::string_view echarts_gl_script();
 
 }  // namespace risley::report

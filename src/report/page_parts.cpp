@@ -7,14 +7,18 @@
 
 #include <fmt/format.h>
 
-#pragma GCC diagnostic push
-#pragma GCC diagnostic ignored "-Woverlength-strings"  // Chart.js is one string
-#include "report/chart_js.hpp"
-#pragma GCC diagnostic pop
 #include "report/html.hpp"
 #include "report/page_assets.hpp"
 
 namespace risley::report {
+namespace {
+
+/// Before anything is drawn, so that a dark page never flashes.
+constexpr std::string_view kFirstScript =
+    "document.documentElement.dataset.theme = "
+    "matchMedia('(prefers-color-scheme: dark)').matches ? 'dark' : 'light';";
+
+}  // namespace
 
 std::string symbol_html(const std::string& symbol) {
   const std::size_t underscore = symbol.find('_');
@@ -37,7 +41,9 @@ std::string list_html(const std::vector<std::string>& items) {
 
 std::string finite_text(std::string_view format, double value) {
   if (!std::isfinite(value)) return "–";
-  return fmt::vformat(format, fmt::make_format_args(value));
+  const std::string text = fmt::vformat(format, fmt::make_format_args(value));
+  const bool zero = text.find_first_not_of("-0.") == std::string::npos;
+  return zero && text.front() == '-' ? text.substr(1) : text;  // not "-0.00"
 }
 
 std::string verdict_html(const Verdict& verdict) {
@@ -59,15 +65,15 @@ std::string verdict_html(const Verdict& verdict) {
                      kind, escape_html(title), escape_html(verdict.facts), advice);
 }
 
-std::string correlation_html(const std::vector<estimation::FreeParameter>& free,
+std::string correlation_html(const std::vector<std::string>& free,
                              const Eigen::MatrixXd& covariance, int prisms) {
   if (free.empty()) return "";
   std::string html =
       "<h2>Correlations of the parameters</h2>\n<div class=\"wide\">"
       "<table class=\"heat\"><thead><tr><th></th>";
   std::vector<const ParameterInfo*> infos;
-  for (const auto& parameter : free) {
-    infos.push_back(&find_parameter(parameter.name, prisms));
+  for (const std::string& name : free) {
+    infos.push_back(&find_parameter(name, prisms));
     html += fmt::format("<th scope=\"col\">{}</th>", symbol_html(infos.back()->symbol));
   }
   html += "</tr></thead><tbody>\n";
@@ -91,7 +97,33 @@ std::string correlation_html(const std::vector<estimation::FreeParameter>& free,
          "known.</p>\n";
 }
 
-std::string provenance_html(const std::vector<std::pair<std::string, std::string>>& provenance) {
+std::string time_audit_html(const std::vector<ReportedRecording>& recordings) {
+  std::string html =
+      "<h2>Times of the recording</h2>\n<div class=\"wide\"><table><thead><tr><th>recording</th>"
+      "<th>format</th><th>time from</th><th>shots</th><th>without return</th><th>duration, s</th>"
+      "<th>rate, Hz</th><th>gaps</th><th>missing, s</th><th>longest, s</th><th>clock resets</th>"
+      "<th>late packets</th><th>PPS seconds</th></tr></thead><tbody>\n";
+  for (const ReportedRecording& one : recordings) {
+    const recordings::TimeAuditResult& audit = one.audit;
+    const auto alarming = [](std::uint64_t count) { return count > 0 ? " class=\"far\"" : ""; };
+    html += fmt::format(
+        "<tr><th scope=\"row\">{}</th><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td>"
+        "<td>{}</td><td{}>{}</td><td>{}</td><td>{}</td><td{}>{}</td><td{}>{}</td><td>{}</td></"
+        "tr>\n",
+        escape_html(one.name), escape_html(one.format), escape_html(one.time_from), audit.shots,
+        audit.no_return, finite_text("{:.6g}", audit.duration_s),
+        finite_text("{:.6g}", audit.rate_hz), alarming(audit.gaps.count), audit.gaps.count,
+        finite_text("{:.4g}", audit.gaps.total_s), finite_text("{:.4g}", audit.gaps.largest_s),
+        alarming(audit.time_resets), audit.time_resets, alarming(audit.non_monotonic_packets),
+        audit.non_monotonic_packets, audit.pps_wraps);
+  }
+  return html +
+         "</tbody></table></div>\n<p class=\"note\">Gaps: steps longer than 1.8 usual ones. Clock "
+         "resets: jumps back, or to another source of time. In 10 µs a prism turns by up to half a "
+         "degree, so the estimation lives on sound times.</p>\n";
+}
+
+std::string provenance_html(const Provenance& provenance) {
   std::string html = "<h2>How to make it again</h2>\n<dl>\n";
   for (const auto& [name, value] : provenance) {
     html += fmt::format("<dt>{}</dt><dd>{}</dd>\n", escape_html(name), escape_html(value));
@@ -102,7 +134,25 @@ std::string provenance_html(const std::vector<std::pair<std::string, std::string
 std::string Figures::add(const Chart& chart) {
   if (number_ > 0) data_ += ",\n";
   data_ += chart_json(chart, number_);
+  has_space_ = has_space_ || chart.kind == ChartKind::space;
   return figure_html(chart, number_++);
+}
+
+std::string charts_html(const std::vector<Chart>& charts, Figures& figures) {
+  const auto is_square = [](const Chart& chart) {
+    return chart.kind == ChartKind::map || chart.kind == ChartKind::two_turns;
+  };
+  std::string html;
+  for (std::size_t first = 0, last = 0; first < charts.size(); first = last) {
+    // Rows of one height: square diagrams stand among their own, three in a row if that leaves none
+    // over.
+    while (last < charts.size() && is_square(charts[last]) == is_square(charts[first])) ++last;
+    const bool three = is_square(charts[first]) && (last - first) % 3 == 0;
+    html += three ? "<div class=\"charts three\">\n" : "<div class=\"charts\">\n";
+    for (std::size_t i = first; i < last; ++i) html += figures.add(charts[i]);
+    html += "</div>\n";
+  }
+  return html;
 }
 
 std::string page_html(const std::string& title, const std::string& lead,
@@ -110,13 +160,33 @@ std::string page_html(const std::string& title, const std::string& lead,
   std::string page = fmt::format(
       "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
       "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
-      "<title>{}</title>\n<style>\n{}</style>\n</head>\n<body>\n<main>\n<h1>{}</h1>\n"
-      "<p class=\"lead\">{}</p>\n",
-      escape_html(title), page_style(), escape_html(title), escape_html(lead));
+      "<link rel=\"icon\" "
+      "href=\"data:,\">\n<title>{}</title>\n<style>\n{}</style>\n<script>{}</script>\n</head>\n"
+      "<body>\n<main>\n<button id=\"theme\" type=\"button\">Light / dark</button>\n<h1>{}</h1>\n"
+      "<p class=\"lead\">{}</p>\n"
+      "<noscript><p class=\"verdict care\">The diagrams need JavaScript, which is off here. "
+      "Texts and tables are complete.</p></noscript>\n",
+      escape_html(title), page_style(), kFirstScript, escape_html(title), escape_html(lead));
   page += body_html;
+  page +=
+      "<p class=\"note help\">Diagrams: point at them for values; draw a box to zoom, double-click "
+      "to show all; <kbd>Ctrl</kbd> and the wheel zoom, <kbd>Shift</kbd> and dragging move. In "
+      "three dimensions drag to rotate, the wheel goes nearer. With the keyboard: <kbd>Tab</kbd> "
+      "to a diagram, <kbd>+</kbd> <kbd>-</kbd> zoom, arrows move or rotate, <kbd>0</kbd> shows "
+      "all, <kbd>n</kbd> <kbd>p</kbd> go through the points of the first series.</p>\n"
+      "<div id=\"spoken\" class=\"hidden\" aria-live=\"polite\"></div>\n"
+      "<footer>Diagrams by Apache ECharts (Apache License 2.0)";
+  page +=
+      figures.has_space() ? " and ECharts GL (BSD 3-Clause License).</footer>\n" : ".</footer>\n";
   page += "</main>\n<script>";
-  page += kChartJs;
-  page += "</script>\n<script type=\"application/json\" id=\"page-data\">\n" + figures.data();
+  page += echarts_script();
+  page += "</script>\n";
+  if (figures.has_space()) {
+    page += "<script>";
+    page += echarts_gl_script();
+    page += "</script>\n";
+  }
+  page += "<script type=\"application/json\" id=\"page-data\">\n" + figures.data();
   page += "\n</script>\n<script>\n";
   page += page_script();
   page += "</script>\n</body>\n</html>\n";

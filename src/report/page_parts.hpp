@@ -5,13 +5,12 @@
 #include <cstddef>
 #include <string>
 #include <string_view>
-#include <utility>
 #include <vector>
 
 #include <Eigen/Core>
 
-#include "risley/estimation/free_parameters.hpp"
 #include "risley/optics/parameters.hpp"
+#include "risley/report/report_facts.hpp"
 
 #include "report/charts.hpp"
 
@@ -47,12 +46,16 @@ struct Verdict {
 std::string verdict_html(const Verdict& verdict);
 
 /// Correlations of the free parameters as a table in colours; nothing when none is free.
+/// @param free        names
 /// @param covariance  [free, free]
-std::string correlation_html(const std::vector<estimation::FreeParameter>& free,
+std::string correlation_html(const std::vector<std::string>& free,
                              const Eigen::MatrixXd& covariance, int prisms);
 
+/// How sound the times of recordings are, as a table.
+std::string time_audit_html(const std::vector<ReportedRecording>& recordings);
+
 /// How to make a result again: name and value pairs.
-std::string provenance_html(const std::vector<std::pair<std::string, std::string>>& provenance);
+std::string provenance_html(const Provenance& provenance);
 
 /// The diagrams of one page in one numbering, and the data that they draw.
 class Figures {
@@ -61,13 +64,19 @@ class Figures {
   std::string add(const Chart& chart);
   /// The data of all diagrams so far, a JSON array.
   std::string data() const { return "[" + data_ + "]"; }
+  /// Whether any diagram has three axes.
+  bool has_space() const { return has_space_; }
 
  private:
   std::string data_;
   std::size_t number_ = 0;
+  bool has_space_ = false;
 };
 
-/// One self-contained page (Chart.js included, no network).
+/// Diagrams side by side, as far as the page is wide.
+std::string charts_html(const std::vector<Chart>& charts, Figures& figures);
+
+/// One self-contained page (Apache ECharts included, no network).
 /// @param lead       one sentence under the title, text
 /// @param body_html  all that follows
 std::string page_html(const std::string& title, const std::string& lead,

@@ -70,7 +70,7 @@ class ChainTest(CommandTest):
         self.check_estimate(result)
         self.assertEqual(result["combination"], 2)
         self.assertEqual({path.name for path in (self.folder / "out").iterdir()},
-                         {"calibration.yaml", "states.nc", "report.html"})
+                         {"calibration.yaml", "states.nc", "report.html", "report.json"})
         page = (self.folder / "out" / "report.html").read_text(encoding="utf-8")
         self.assertIn(digest(self.folder / "unit.lvx"), page)
         self.assertIn("risley estimate unit.lvx", page)

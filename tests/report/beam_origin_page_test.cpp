@@ -22,7 +22,7 @@ TEST(BeamOriginPage, ShowsSixMapsWithTheirExtremes) {
     ++maps;
   }
   EXPECT_EQ(maps, 6U);
-  EXPECT_THAT(page, ::testing::HasSubstr("-4.4 to"));
+  EXPECT_THAT(page, ::testing::HasSubstr("From -4.4 to"));
   EXPECT_THAT(page, ::testing::HasSubstr("to 4.4 mm"));
   EXPECT_THAT(page, ::testing::HasSubstr("risley cloud &lt;x&gt;"));
 }

@@ -142,28 +142,38 @@ Calibration example(std::size_t points = 2000) {
 struct Page {
   sensors::Sensor nominal = sensors::load_sensor("mid-40");
   Calibration calibration = example();
-  std::optional<CalibrationPageInput::Truth> truth;
+  std::optional<CalibrationReportInput::Truth> truth;
   std::vector<std::string> warnings;
 
-  CalibrationPageInput input() const {
-    return {calibration,
-            nominal,
-            truth,
-            {"room <1>.lvx", "hall.lvx"},
-            100000,
-            {{"command", "risley calibrate \"room <1>.lvx\" hall.lvx"}, {"version", "0.1.0"}},
-            warnings};
+  CalibrationReport report() const {
+    std::vector<ReportedRecording> recordings{{"room <1>.lvx", "lvx-1.1", "sensor", {}},
+                                              {"hall.lvx", "lvx-1.1", "sensor", {}}};
+    recordings[0].audit.observations = 60000;
+    recordings[1].audit.observations = 40000;
+    return calibration_report(
+        {calibration,
+         nominal,
+         truth,
+         recordings,
+         {{"command", "risley calibrate \"room <1>.lvx\" hall.lvx"}, {"version", "0.1.0"}},
+         warnings});
   }
-  std::string html() const { return calibration_page(input()); }
+  std::string html() const { return calibration_page(report()); }
 };
 
-CalibrationPageInput::Truth example_truth() {
-  CalibrationPageInput::Truth truth;
+CalibrationReportInput::Truth example_truth() {
+  CalibrationReportInput::Truth truth;
   truth.before = {deg(0.10), deg(0.11), deg(0.05), deg(-0.06),
                   deg(0.15), deg(0.12), deg(0.09), {deg(0.01), deg(0.06), deg(-0.05)}};
   truth.after = {deg(0.01),   deg(0.012), deg(0.005),  deg(-0.006),
                  deg(0.0156), deg(0.015), deg(0.0043), {deg(0.001), deg(0.006), deg(-0.005)}};
   truth.sensor = sensors::load_sensor("mid-40");
+  for (int i = 0; i < 1000; ++i) {
+    truth.azimuth_before.push_back(deg(0.05 + 0.01 * std::sin(i)));
+    truth.zenith_before.push_back(deg(-0.06 + 0.01 * std::cos(i)));
+    truth.azimuth_after.push_back(deg(0.005 + 0.001 * std::sin(i)));
+    truth.zenith_after.push_back(deg(-0.006 + 0.001 * std::cos(i)));
+  }
   return truth;
 }
 
@@ -222,7 +232,7 @@ void expect_sound(const std::string& html) {
   EXPECT_EQ(charts.size(), titles(shown).size());
   const std::set<std::string> colours = {"a", "b", "c", "d", "ink", "bad"};
   for (const auto& one : charts) {
-    EXPECT_THAT(shown, HasSubstr("<canvas id=\"" + one.at("id").get<std::string>() + "\""));
+    EXPECT_THAT(shown, HasSubstr("class=\"plot\" id=\"" + one.at("id").get<std::string>() + "\""));
     for (const auto& drawn : one.at("series")) {
       EXPECT_EQ(drawn.at("x").size(), drawn.at("y").size());
       EXPECT_TRUE(colours.contains(drawn.at("colour").get<std::string>()));
@@ -238,7 +248,7 @@ TEST(CalibrationPage, SaysFirstThatAGoodCalibrationIsHealthy) {
   expect_sound(html);
   EXPECT_THAT(shown, HasSubstr("class=\"verdict ok\""));
   EXPECT_THAT(shown, HasSubstr("21.4 mm thick before and 15.1 mm after"));
-  EXPECT_THAT(shown, HasSubstr("80000 points"));
+  EXPECT_THAT(shown, HasSubstr("80\u202f000 points"));
   EXPECT_THAT(shown, HasSubstr("roll 0.0041°, pitch 0.0123°"));
   EXPECT_THAT(shown, Not(HasSubstr("must not be trusted")));
   EXPECT_LT(shown.find("class=\"verdict"), shown.find("<h2>"));
@@ -246,25 +256,33 @@ TEST(CalibrationPage, SaysFirstThatAGoodCalibrationIsHealthy) {
 
 TEST(CalibrationPage, HasEverySection) {
   Page page;
+  page.calibration = example(20000);
   page.truth = example_truth();
   const std::string shown = visible(page.html());
   for (const char* text :
        {"<h2>Parameters</h2>", "<h2>Datum</h2>", "Against the truth", "against the data",
         "<h2>Walls</h2>", "Steps on the walls", "<h2>Thickness of the walls</h2>",
         "<h2>What was taken for a wall</h2>", "<h2>Correlations of the parameters</h2>",
-        "<h2>How to make it again</h2>", "range offset"}) {
+        "<h2>Times of the recording</h2>", "<h2>How to make it again</h2>", "range offset"}) {
     EXPECT_THAT(shown, HasSubstr(text));
   }
   EXPECT_THAT(
       titles(shown),
       testing::ElementsAre(
+          "Errors of the azimuth before", "Errors of the zenith angle before",
+          "Errors of the azimuth after", "Errors of the zenith angle after",
+          "Walls before the calibration: room &lt;1&gt;.lvx",
+          "Walls after the calibration: room &lt;1&gt;.lvx",
+          "Walls before the calibration: hall.lvx", "Walls after the calibration: hall.lvx",
           "Thickness over the angle of incidence", "Thickness over the rotation angle of prism a",
           "Thickness over the rotation angle of prism b",
           "Histogram of the distances from the planes",
           "Distances from the planes over the azimuth",
-          "Sign of what is left, all recordings together", "Field of view: room &lt;1&gt;.lvx",
-          "From above: room &lt;1&gt;.lvx", "From the side: room &lt;1&gt;.lvx",
-          "Field of view: hall.lvx", "From above: hall.lvx", "From the side: hall.lvx"));
+          "Mean distance from the planes over the field of view, before",
+          "Mean distance from the planes over the field of view, after",
+          "Field of view: room &lt;1&gt;.lvx", "From above: room &lt;1&gt;.lvx",
+          "From the side: room &lt;1&gt;.lvx", "Field of view: hall.lvx", "From above: hall.lvx",
+          "From the side: hall.lvx"));
 }
 
 TEST(CalibrationPage, EscapesNames) {
@@ -327,7 +345,7 @@ TEST(CalibrationPage, AFailureSaysWhyAndWhatToDo) {
   EXPECT_THAT(shown, HasSubstr("What to do:"));
   EXPECT_THAT(shown, HasSubstr("0.80 prism_tilt_a_vertical_deg - 0.60 incident_beam_vertical_deg"));
   EXPECT_THAT(shown, HasSubstr("There are no points to draw."));
-  EXPECT_TRUE(data(html).empty());
+  EXPECT_EQ(data(html).size(), 4u);  // against the truth, and nothing else
 }
 
 TEST(CalibrationPage, NumbersThatAreNotFiniteAreDashes) {
@@ -357,7 +375,7 @@ TEST(CalibrationPage, ParametersStandBesideWhatWasBelievedAndTrue) {
   c.believed.set("prism_tilt_a_vertical_deg", deg(0.11));
   page.truth->sensor->set("prism_tilt_a_vertical_deg", deg(0.22));
   const std::string shown = visible(page.html());
-  EXPECT_THAT(shown, HasSubstr("<td>0.300</td><td>0.020</td><td>deg</td><td>0</td><td>0.11</td>"
+  EXPECT_THAT(shown, HasSubstr("<td>0.300</td><td>0.020</td><td>deg</td><td>0</td><td>0.110</td>"
                                "<td>0.190</td><td>0.220</td><td>0.080</td>"
                                "<td class=\"far\">4.00</td>"));
   EXPECT_THAT(shown, HasSubstr("<td>-12.3</td><td>2.1</td><td>mm</td>"));
@@ -417,13 +435,59 @@ TEST(CalibrationPage, CellMeansShowAPlaneThatIsBent) {
     if (point.plane >= 0) point.after = point.azimuth > 0 ? 0.001 : -0.001;
   }
   const std::string html = page.html();
-  const auto drawn = chart(html, "Sign of what is left, all recordings together");
+  const auto drawn = chart(html, "Mean distance from the planes over the field of view, after");
   EXPECT_EQ(drawn.at("kind"), "map");
-  ASSERT_FALSE(series(drawn, "beyond the plane").at("x").empty());
-  ASSERT_FALSE(series(drawn, "before the plane").at("x").empty());
-  for (const auto& x : series(drawn, "beyond the plane").at("x")) EXPECT_GT(x, 0);
-  for (const auto& x : series(drawn, "before the plane").at("x")) EXPECT_LT(x, 0);
+  EXPECT_EQ(drawn.at("palette"), "diverging");
+  const auto& cells = drawn.at("series").at(0);
+  EXPECT_EQ(cells.at("kind"), "cells");
+  ASSERT_GT(cells.at("x").size(), 100u);
+  for (std::size_t i = 0; i < cells.at("x").size(); ++i) {
+    EXPECT_NEAR(cells.at("value").at(i), cells.at("x").at(i) > 0 ? 1.0 : -1.0, 1e-6);
+  }
   EXPECT_THAT(visible(html), HasSubstr("root mean square of 1.00 mm"));
+  // Both pictures have the same colours, or they could not be compared.
+  const auto before = chart(html, "Mean distance from the planes over the field of view, before");
+  EXPECT_EQ(before.at("value_range"), drawn.at("value_range"));
+}
+
+TEST(CalibrationPage, WallsInSpaceStandOffTheirPlanesByTheirEnlargedMeans) {
+  Page page;
+  page.calibration = example(20000);
+  Calibration& c = page.calibration;
+  c.planes = {wall("front", 0, 0, 90, 8.0)};
+  c.sample = sample_on(c.planes, 1, 20000);
+  for (auto& point : c.sample) {
+    if (point.plane < 0) continue;
+    point.after = 0;
+    point.point = (8.0 / point.point.x) * point.point;
+    point.before = 0.004;
+  }
+  const std::string html = page.html();
+  const auto before = chart(html, "Walls before the calibration: room &lt;1&gt;.lvx");
+  const auto after = chart(html, "Walls after the calibration: room &lt;1&gt;.lvx");
+  EXPECT_EQ(before.at("kind"), "space");
+  const auto& lifted = before.at("series").at(0);
+  ASSERT_GT(lifted.at("x").size(), 100u);
+  for (std::size_t i = 0; i < lifted.at("x").size(); ++i) {
+    // 4 mm on a wall 8 m away: a power of ten below 0.03 * 9 m / 4 mm is 10.
+    EXPECT_NEAR(lifted.at("x").at(i), 8.04, 1e-5);
+    EXPECT_NEAR(after.at("series").at(0).at("x").at(i), 8.0, 1e-5);
+    EXPECT_NEAR(lifted.at("value").at(i), 4.0, 1e-5);
+  }
+  EXPECT_THAT(visible(html), HasSubstr("drawn 10 times as large"));
+  EXPECT_THAT(html, HasSubstr("ECharts GL"));
+}
+
+TEST(CalibrationPage, ErrorsOfBeamsWithKnownTruthAreCountedBeforeAndAfter) {
+  Page page;
+  page.truth = example_truth();
+  const std::string html = page.html();
+  for (const char* title : {"Errors of the azimuth before", "Errors of the zenith angle after"}) {
+    const auto drawn = chart(html, title);
+    double sum = 0;
+    for (const auto& count : series(drawn, "errors").at("y")) sum += count.get<double>();
+    EXPECT_EQ(sum, 1000) << title;
+  }
 }
 
 TEST(CalibrationPage, ViewsAreThinnedAndSayHow) {
@@ -434,7 +498,7 @@ TEST(CalibrationPage, ViewsAreThinnedAndSayHow) {
   std::size_t points = 0;
   for (const auto& one : drawn.at("series")) points += one.at("x").size();
   EXPECT_LE(points, 4001u);
-  EXPECT_THAT(visible(html), HasSubstr("Of 10000 sample points one in 3 is drawn."));
+  EXPECT_THAT(visible(html), HasSubstr("Of 10\u202f000 sample points one in 3 is drawn."));
   EXPECT_EQ(series(drawn, "no plane").at("colour"), "ink");
   EXPECT_EQ(series(drawn, "front <wall> & door").at("colour"), "a");
   EXPECT_EQ(series(drawn, "sensor").at("x").at(0), 0);

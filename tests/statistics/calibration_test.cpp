@@ -273,7 +273,7 @@ WallRecording perfect_recording(scenes::Scene scene, std::uint64_t seed) {
   simulation::Scanner scanner(walls.settings);
   recordings::Chunk chunk;
   recordings::TruthColumns truth;
-  while (scanner.read(chunk, truth)) testing::append(walls.truth, truth);
+  while (scanner.read(chunk, truth)) walls.truth.append(truth);
   calibration::RangedRecording& recording = walls.recording;
   recording.name = "without noise";
   recording.believed = *walls.settings.reported;

@@ -17,21 +17,6 @@ struct Simulated {
   recordings::TruthColumns truth;
 };
 
-inline void append(recordings::TruthColumns& all, const recordings::TruthColumns& more) {
-  const auto add = [](auto& to, const auto& from) {
-    to.insert(to.end(), from.begin(), from.end());
-  };
-  if (all.prisms() == 0) all.resize(more.prisms(), 0);
-  add(all.time_ns, more.time_ns);
-  for (std::size_t k = 0; k < all.rotation_angle.size(); ++k) {
-    add(all.rotation_angle[k], more.rotation_angle[k]);
-    add(all.angular_velocity[k], more.angular_velocity[k]);
-  }
-  add(all.azimuth, more.azimuth);
-  add(all.zenith, more.zenith);
-  add(all.range, more.range);
-}
-
 inline Simulated simulate(const simulation::SimulationSettings& settings) {
   simulation::Scanner scanner(settings);
   Simulated result;
@@ -39,7 +24,7 @@ inline Simulated simulate(const simulation::SimulationSettings& settings) {
   recordings::TruthColumns truth;
   while (scanner.read(chunk, truth)) {
     result.observations.append(chunk.observations);
-    append(result.truth, truth);
+    result.truth.append(truth);
   }
   return result;
 }

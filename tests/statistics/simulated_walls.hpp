@@ -96,7 +96,7 @@ inline WallRecording record_walls(const simulation::SimulationSettings& settings
   recordings::TruthColumns truth;
   while (scanner.read(chunk, truth)) {
     selector.add(chunk.observations);
-    append(result.truth, truth);
+    result.truth.append(truth);
   }
   estimation::EstimateOptions options;
   options.sensor = sensors::load_sensor("mid-40");

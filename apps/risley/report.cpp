@@ -1,0 +1,53 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include <filesystem>
+#include <memory>
+
+#include <fmt/format.h>
+
+#include "risley/core/error.hpp"
+#include "risley/core/output_file.hpp"
+#include "risley/report/report_file.hpp"
+
+#include "command.hpp"
+
+namespace risley::app {
+namespace {
+
+struct ReportCommandOptions {
+  std::string folder, page;
+};
+
+ExitStatus run_report(const ReportCommandOptions& options, const CommonOptions& common) {
+  namespace fs = std::filesystem;
+  const fs::path folder(options.folder), data = folder / "report.json";
+  if (!fs::is_directory(folder)) {
+    throw FileError(options.folder, {}, "expected a folder that estimate or calibrate wrote");
+  }
+  if (!fs::exists(data)) {
+    throw FileError(data.string(), {},
+                    "is missing: estimate -o and calibrate -o write it beside calibration.yaml");
+  }
+  const report::Report report = report::read_report(data.string());
+  const std::string page = options.page.empty() ? (folder / "report.html").string() : options.page;
+  const std::string html = report::report_page(report);
+  write_text_file(page, html);
+  if (common.json) {
+    print_json({{"html", page}, {"bytes", html.size()}, {"verb", report::verb_of(report)}});
+  } else {
+    fmt::print("{}\n", page);
+  }
+  return kDone;
+}
+
+}  // namespace
+
+Run declare_report(CLI::App& verb) {
+  const auto options = std::make_shared<ReportCommandOptions>();
+  verb.add_option("DIR", options->folder, "Folder that estimate -o or calibrate -o wrote")
+      ->required();
+  verb.add_option("-o,--output", options->page, "The page (default: DIR/report.html)");
+  return [options](const CommonOptions& common) { return run_report(*options, common); };
+}
+
+}  // namespace risley::app

@@ -1,0 +1,80 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "risley/calibration/calibrate.hpp"
+#include "risley/calibration/datum.hpp"
+#include "risley/estimation/weak_directions.hpp"
+#include "risley/report/chart.hpp"
+#include "risley/report/report_facts.hpp"
+#include "risley/sensors/sensor.hpp"
+
+namespace risley::report {
+
+/// All that the page of one calibration says and draws, and all that report.json keeps of it.
+/// SI units; the diagrams are in the units of their axes.
+struct CalibrationReport {
+  std::vector<ReportedRecording> recordings;
+  std::uint64_t observations = 0;  ///< rows of all recordings
+  std::string sensor, serial, preset;
+  int prisms = 0;
+  calibration::CalibrationMethod method = calibration::CalibrationMethod::adjustment;
+
+  bool converged = false;
+  std::string reason;
+  std::vector<std::string> warnings;
+  std::size_t points = 0;  ///< used
+
+  std::vector<ReportedParameter> parameters;
+  double range_offset = 0, range_offset_sigma = 0;  ///< m; sigma 0 where it was held
+  std::vector<std::string> free;                    ///< what the covariance is of
+  Eigen::MatrixXd covariance;                       ///< [free, free]
+  std::vector<estimation::WeakDirection> unobservable;
+
+  calibration::DatumKind datum_kind = calibration::DatumKind::none;
+  calibration::FormalDatum datum, datum_without_common;
+  std::vector<calibration::PriorTest> prior_tests;
+  std::vector<calibration::CalibratedPlane> planes;
+  std::vector<calibration::SurfaceStep> steps;
+  double rms_before = kUnknown, rms_after = kUnknown;  ///< of all planes, m
+  double sigma0 = 0, unevenness = 1, variance_factor = 1;
+
+  /// Of the beams of all recordings together, against the truth of simulations.
+  struct Truth {
+    calibration::DirectionErrors before, after;
+  };
+  std::optional<Truth> truth;
+
+  std::vector<Chart> truth_charts, thickness_charts, wall_charts, view_charts;
+  Provenance provenance;
+};
+
+/// What a report is made of. References must live until it is made.
+struct CalibrationReportInput {
+  const calibration::Calibration& calibration;
+  const sensors::Sensor& nominal;  ///< preset the calibration started from
+  /// What is known of the truth.
+  struct Truth {
+    calibration::DirectionErrors before, after;
+    std::optional<sensors::Sensor> sensor;
+    /// Computed minus true angles of some beams, rad; may be empty.
+    std::vector<double> azimuth_before, zenith_before, azimuth_after, zenith_after;
+  };
+  std::optional<Truth> truth;
+  std::vector<ReportedRecording> recordings;
+  Provenance provenance;
+  std::vector<std::string> warnings;  ///< beside those of the calibration
+};
+
+/// Thins, bins and counts what the page draws. What is not finite stays so.
+CalibrationReport calibration_report(const CalibrationReportInput& input);
+
+}  // namespace risley::report

@@ -1,0 +1,59 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace risley::report {
+
+/// How a series is drawn.
+enum class SeriesKind {
+  points,
+  line,
+  steps,
+  cells,  ///< rectangles about x and y, coloured by value
+};
+
+/// What the axes of a diagram are.
+enum class ChartKind {
+  plain,
+  full_turn,  ///< x runs from 0 to 360 degree
+  two_turns,  ///< square, both axes run from 0 to 360 degree
+  map,        ///< square, equal scales, both axes turned: a view along the beam
+  space,      ///< three axes of equal scale, can be rotated; points only
+};
+
+/// Colours of values.
+enum class Palette {
+  sequential,  ///< from few to many
+  diverging,   ///< from below to above a middle
+};
+
+/// One drawn series.
+struct Series {
+  std::string label;
+  std::string colour;  ///< of the page: "a", "b", "c", "d", "ink", "bad"
+  SeriesKind kind = SeriesKind::points;
+  std::vector<double> x, y;
+  std::vector<double> z = {};      ///< where the diagram has a third axis
+  std::vector<double> value = {};  ///< what colours points or cells; empty: all in one colour
+  double cell_width = 0, cell_height = 0;
+};
+
+/// One diagram with labelled axes.
+struct Chart {
+  std::string title, x_label, y_label;
+  std::vector<Series> series;
+  std::string note;  ///< under the diagram: what was thinned
+  ChartKind kind = ChartKind::plain;
+  std::string z_label = {};
+  std::string value_label = {};
+  Palette palette = Palette::sequential;
+  /// Values that the ends of the colours stand for; without it the least and the greatest.
+  std::optional<std::pair<double, double>> value_range = {};
+};
+
+}  // namespace risley::report

@@ -1,0 +1,39 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <limits>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "risley/recordings/time_audit.hpp"
+
+namespace risley::report {
+
+// What reports of every kind hold. SI units.
+
+/// Name and value pairs such as command, version, seed, input_sha256: how to make a result again.
+using Provenance = std::vector<std::pair<std::string, std::string>>;
+
+/// A quantity that is not known, such as the truth of a real sensor.
+inline constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+
+/// One parameter beside all that it can be compared with; what is not known is NaN.
+struct ReportedParameter {
+  std::string name;
+  double value = kUnknown, sigma = kUnknown;
+  double nominal = kUnknown;   ///< of the preset
+  double believed = kUnknown;  ///< what the sensor computed its directions with
+  double truth = kUnknown, error = kUnknown, error_over_sigma = kUnknown;
+};
+
+/// One recording and the audit of its times.
+struct ReportedRecording {
+  std::string name;    ///< of the file
+  std::string format;  ///< as Reader's header says
+  std::string time_from;
+  recordings::TimeAuditResult audit;
+};
+
+}  // namespace risley::report

@@ -1,0 +1,30 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <string>
+#include <variant>
+
+#include "risley/report/calibration_report.hpp"
+#include "risley/report/estimate_report.hpp"
+
+namespace risley::report {
+
+/// A report of any kind.
+using Report = std::variant<EstimateReport, CalibrationReport>;
+
+/// Writes report.json: everything that the report's page says and draws (docs/files.md).
+/// Diagrams keep the digits that can be seen. @throws FileError
+void write_report(const std::string& path, const Report& report);
+
+/// Reads what write_report wrote. @throws FileError naming the byte where the text breaks off, or
+/// the field that is missing or of another kind
+Report read_report(const std::string& path);
+
+/// The page of a report of any kind.
+std::string report_page(const Report& report);
+
+/// "estimate" or "calibrate": the verb that made it.
+const char* verb_of(const Report& report);
+
+}  // namespace risley::report

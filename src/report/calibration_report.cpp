@@ -1,0 +1,523 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "risley/report/calibration_report.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <map>
+#include <string_view>
+
+#include <fmt/format.h>
+
+#include "risley/calibration/surface_steps.hpp"
+#include "risley/core/angle.hpp"
+#include "risley/estimation/diagnostics.hpp"
+
+#include "report/charts.hpp"
+#include "report/html.hpp"
+
+namespace risley::report {
+namespace {
+
+using calibration::Calibration;
+using calibration::SamplePoint;
+using calibration::ThicknessProfile;
+
+constexpr double kMillimetres = 1000.0;
+constexpr std::size_t kMostPoints = 3000;       // per scatter diagram
+constexpr std::size_t kMostViewPoints = 8000;   // of all recordings in one kind of view
+constexpr std::size_t kFewestViewPoints = 800;  // of one recording in it
+constexpr int kFewestInCell = 5;        // points that make a mean over a cell of the field of view
+constexpr std::size_t kMostSpaces = 3;  // recordings drawn in three dimensions
+constexpr double kShownThickness = 0.03;  // of walls in three dimensions, share of the range
+constexpr std::array<const char*, 5> kPlaneColours = {"a", "b", "c", "d", "bad"};
+constexpr const char* kClutterColour = "ink";
+
+std::string millimetres(double metres) { return fmt::format("{:.1f}", kMillimetres * metres); }
+
+/// Value at a row of a vector that may be too short, as it is when nothing was adjusted.
+double at(const Eigen::VectorXd& values, std::size_t row) {
+  const auto i = static_cast<Eigen::Index>(row);
+  return i < values.size() ? values[i] : kUnknown;
+}
+
+/// Sigma of a row of the covariance; zero where there is none.
+double sigma_at(const Eigen::MatrixXd& covariance, std::size_t row) {
+  const auto i = static_cast<Eigen::Index>(row);
+  if (i >= covariance.rows() || !(covariance(i, i) > 0)) return 0;
+  return std::sqrt(covariance(i, i));
+}
+
+std::vector<ReportedParameter> parameters_of(const CalibrationReportInput& input) {
+  const Calibration& c = input.calibration;
+  std::vector<ReportedParameter> rows;
+  for (std::size_t i = 0; i < c.free.size(); ++i) {
+    ReportedParameter row;
+    row.name = c.free[i].name;
+    row.value = at(c.parameters, i);
+    row.sigma = sigma_at(c.covariance, i);
+    row.nominal = input.nominal.get(row.name);
+    row.believed = c.believed.get(row.name);
+    if (input.truth && input.truth->sensor) {
+      row.truth = input.truth->sensor->get(row.name);
+      row.error = row.value - row.truth;
+      if (row.sigma > 0) row.error_over_sigma = row.error / row.sigma;
+    }
+    rows.push_back(row);
+  }
+  return rows;
+}
+
+std::string recording_name(const CalibrationReportInput& input, std::size_t recording) {
+  if (recording < input.recordings.size()) return input.recordings[recording].name;
+  return fmt::format("recording {}", recording + 1);
+}
+
+std::size_t recording_count(const CalibrationReportInput& input) {
+  std::size_t count = input.recordings.size();
+  for (const SamplePoint& point : input.calibration.sample) {
+    count = std::max(count, point.recording + 1);
+  }
+  return count;
+}
+
+std::string plane_name(const Calibration& c, std::size_t plane) {
+  return plane < c.planes.size() ? c.planes[plane].name : fmt::format("plane {}", plane + 1);
+}
+
+/// Value of a sample point in the unit of an axis.
+using PointValue = std::function<double(const SamplePoint&)>;
+
+double azimuth_degrees(const SamplePoint& p) { return degrees_from_radians(p.azimuth); }
+double zenith_degrees(const SamplePoint& p) { return degrees_from_radians(p.zenith); }
+double before_millimetres(const SamplePoint& p) { return kMillimetres * p.before; }
+double after_millimetres(const SamplePoint& p) { return kMillimetres * p.after; }
+
+/// All diagrams of the page.
+class CalibrationCharts {
+ public:
+  explicit CalibrationCharts(const CalibrationReportInput& input)
+      : input_(input), c_(input.calibration) {
+    for (const SamplePoint& point : c_.sample) {
+      if (point.plane >= 0) on_walls_.push_back(&point);
+    }
+  }
+
+  std::vector<Chart> thickness() const {
+    std::vector<Chart> charts;
+    for (const ThicknessProfile& profile : c_.profiles) charts.push_back(thickness_over(profile));
+    if (on_walls_.empty()) return charts;
+    charts.push_back(distances());
+    charts.push_back(distances_over_azimuth());
+    for (Chart& chart : cell_means()) charts.push_back(std::move(chart));
+    return charts;
+  }
+
+  std::vector<Chart> views() const {
+    std::vector<Chart> charts;
+    const std::size_t recordings = recording_count(input_);
+    for (std::size_t i = 0; i < recordings; ++i) {
+      const View view(c_, i, recordings);
+      if (view.empty()) continue;
+      const std::string name = recording_name(input_, i);
+      charts.push_back(view.chart("Field of view: " + name, "azimuth, deg", azimuth_degrees,
+                                  "zenith, deg", zenith_degrees));
+      charts.push_back(view.chart_with_sensor(
+          "From above: " + name, "X (forward), m", [](const SamplePoint& p) { return p.point.x; },
+          "Y (left), m", [](const SamplePoint& p) { return p.point.y; },
+          "Forward is to the left, the sensor's left is below."));
+      charts.push_back(view.chart_with_sensor(
+          "From the side: " + name, "X (forward), m",
+          [](const SamplePoint& p) { return p.point.x; }, "below the sensor (−Z), m",
+          [](const SamplePoint& p) { return -p.point.z; }, "Forward is to the left, up is up."));
+    }
+    return charts;
+  }
+
+  /// The walls in space, before and after, with their thickness enlarged.
+  std::vector<Chart> walls() const {
+    std::vector<Chart> charts;
+    const std::size_t recordings = std::min(recording_count(input_), kMostSpaces);
+    for (std::size_t recording = 0; recording < recordings; ++recording) {
+      for (Chart& chart : walls_in_space(recording)) charts.push_back(std::move(chart));
+    }
+    return charts;
+  }
+
+  /// Errors of beams whose truth is known.                                          [B21 Fig. 12]
+  std::vector<Chart> truth() const {
+    if (!input_.truth) return {};
+    const CalibrationReportInput::Truth& t = *input_.truth;
+    std::vector<Chart> charts;
+    const auto add = [&](const char* title, const char* colour, const std::vector<double>& errors) {
+      if (errors.empty()) return;
+      const estimation::Moments m = estimation::moments(errors);
+      charts.push_back({title, "computed minus true, deg", "beams",
+                        histogram("errors", colour, errors, {}, m, kDegreesPerRadian),
+                        fmt::format("{} beams: mean {:.3g}°, standard deviation {:.3g}°, root mean "
+                                    "square {:.3g}°. The outermost bins hold everything beyond 4.5 "
+                                    "standard deviations.",
+                                    count_text(m.count), degrees_from_radians(m.mean),
+                                    degrees_from_radians(m.std), degrees_from_radians(m.rms))});
+    };
+    add("Errors of the azimuth before", "b", t.azimuth_before);
+    add("Errors of the zenith angle before", "b", t.zenith_before);
+    add("Errors of the azimuth after", "a", t.azimuth_after);
+    add("Errors of the zenith angle after", "a", t.zenith_after);
+    return charts;
+  }
+
+ private:
+  /// The sample points of one recording, thinned and split by plane.
+  class View {
+   public:
+    View(const Calibration& c, std::size_t recording, std::size_t recordings) {
+      std::vector<const SamplePoint*> points;
+      for (const SamplePoint& point : c.sample) {
+        if (point.recording == recording) points.push_back(&point);
+      }
+      const std::size_t most = std::max(kMostViewPoints / recordings, kFewestViewPoints);
+      std::map<int, std::vector<const SamplePoint*>> by_plane;
+      for (const std::size_t i : every_nth(points.size(), most)) {
+        by_plane[std::max(points[i]->plane, -1)].push_back(points[i]);
+      }
+      const auto clutter = by_plane.find(-1);
+      std::size_t colour = 0;
+      for (const auto& [plane, members] : by_plane) {
+        if (plane < 0) continue;
+        groups_.push_back({plane_name(c, static_cast<std::size_t>(plane)),
+                           kPlaneColours[colour++ % kPlaneColours.size()], members});
+      }
+      if (clutter != by_plane.end())
+        groups_.push_back({"no plane", kClutterColour, clutter->second});
+      note_ = every_nth_note(points.size(), most, "sample points");
+      if (colour > kPlaneColours.size()) {
+        note_ += fmt::format(" Colours repeat after {} planes.", kPlaneColours.size());
+      }
+    }
+
+    bool empty() const { return groups_.empty(); }
+
+    Chart chart(std::string title, std::string x_label, const PointValue& x, std::string y_label,
+                const PointValue& y) const {
+      Chart chart{std::move(title), std::move(x_label), std::move(y_label), {}, note_,
+                  ChartKind::map};
+      for (const Group& group : groups_) {
+        Series series{group.name, group.colour, SeriesKind::points, {}, {}};
+        for (const SamplePoint* point : group.points) {
+          const double px = x(*point), py = y(*point);
+          if (!std::isfinite(px + py)) continue;
+          series.x.push_back(px);
+          series.y.push_back(py);
+        }
+        chart.series.push_back(std::move(series));
+      }
+      return chart;
+    }
+
+    Chart chart_with_sensor(std::string title, std::string x_label, const PointValue& x,
+                            std::string y_label, const PointValue& y,
+                            const std::string& orientation) const {
+      Chart result = chart(std::move(title), std::move(x_label), x, std::move(y_label), y);
+      result.series.push_back({"sensor", "ink", SeriesKind::points, {0.0}, {0.0}});
+      result.note += " " + orientation;
+      return result;
+    }
+
+   private:
+    struct Group {
+      std::string name, colour;
+      std::vector<const SamplePoint*> points;
+    };
+    std::vector<Group> groups_;
+    std::string note_;
+  };
+
+  static std::string variable_text(const std::string& variable) {
+    constexpr std::string_view kRotationAngle = "rotation_angle_";
+    if (variable == "incidence") return "angle of incidence";
+    if (variable.starts_with(kRotationAngle)) {
+      return "rotation angle of prism " + variable.substr(kRotationAngle.size());
+    }
+    std::string text = variable;
+    std::replace(text.begin(), text.end(), '_', ' ');
+    return text;
+  }
+
+  static Chart thickness_over(const ThicknessProfile& profile) {
+    const bool turn = profile.variable.starts_with("rotation_angle");
+    // Middle of every bin, in the order of the axis.
+    std::vector<std::pair<double, std::size_t>> bins;
+    for (std::size_t i = 0; i < profile.count.size(); ++i) {
+      const double middle = 0.5 * (profile.from[i] + profile.to[i]);
+      if (!std::isfinite(middle)) continue;
+      bins.emplace_back(degrees_from_radians(turn ? wrap_to_two_pi(middle) : middle), i);
+    }
+    std::sort(bins.begin(), bins.end());
+    std::size_t fewest = 0, most = 0;
+    for (const std::size_t count : profile.count) {
+      if (count == 0) continue;
+      fewest = fewest == 0 ? count : std::min(fewest, count);
+      most = std::max(most, count);
+    }
+    const auto line = [&](const char* label, const char* colour,
+                          const std::vector<double>& values) {
+      Series series{label, colour, SeriesKind::line, {}, {}};
+      for (const auto& [x, i] : bins) {
+        series.x.push_back(x);
+        series.y.push_back(kMillimetres * values[i]);
+      }
+      return series;
+    };
+    const std::string what = variable_text(profile.variable);
+    return {"Thickness over the " + what,
+            what + ", deg",
+            "distance from the plane, mm",
+            {line("RMS after", "a", profile.rms_after), line("RMS before", "b", profile.rms_before),
+             line("mean after", "c", profile.mean_after),
+             line("mean before", "d", profile.mean_before)},
+            fmt::format("All points in {} bins, which hold {} to {} points; empty bins "
+                        "leave a gap. A calibrated sensor has means near 0.",
+                        bins.size(), fewest, most),
+            turn ? ChartKind::full_turn : ChartKind::plain};
+  }
+
+  std::string sample_note() const {
+    return fmt::format("Of the {} used points the {} that stand in an evenly spread sample. ",
+                       count_text(c_.points), count_text(on_walls_.size()));
+  }
+
+  Chart distances() const {
+    std::vector<double> before, after;
+    for (const SamplePoint* point : on_walls_) {
+      before.push_back(point->before);
+      after.push_back(point->after);
+    }
+    // Both share their bins, or their heights could not be compared.
+    const estimation::Moments moments_before = estimation::moments(before);
+    const estimation::Moments moments_after = estimation::moments(after);
+    estimation::Moments both;
+    both.std = std::fmax(moments_before.rms, moments_after.rms);
+    Chart chart{"Histogram of the distances from the planes",
+                "distance from the plane, mm",
+                "points",
+                {histogram("after", "a", after, {}, both, kMillimetres).front(),
+                 histogram("before", "b", before, {}, both, kMillimetres).front()},
+                sample_note() + fmt::format("Root mean square {} mm before, {} mm after. The "
+                                            "outermost bins hold everything beyond.",
+                                            millimetres(moments_before.rms),
+                                            millimetres(moments_after.rms))};
+    return chart;
+  }
+
+  Chart distances_over_azimuth() const {
+    Series before{"before", "b", SeriesKind::points, {}, {}};
+    Series after{"after", "a", SeriesKind::points, {}, {}};
+    for (const std::size_t i : every_nth(on_walls_.size(), kMostPoints)) {
+      const SamplePoint& point = *on_walls_[i];
+      const auto add = [&point](Series& series, double distance) {
+        if (!std::isfinite(distance + point.azimuth)) return;
+        series.x.push_back(azimuth_degrees(point));
+        series.y.push_back(distance);
+      };
+      add(before, before_millimetres(point));
+      add(after, after_millimetres(point));
+    }
+    return {"Distances from the planes over the azimuth",
+            "azimuth, deg",
+            "distance from the plane, mm",
+            {after, before},
+            every_nth_note(on_walls_.size(), kMostPoints, "sample points on planes")};
+  }
+
+  /// Where in the field of view points lie beyond their planes, and where before them.
+  std::vector<Chart> cell_means() const {
+    struct Cell {
+      int count = 0;
+      double before = 0, after = 0;
+    };
+    std::map<std::pair<long, long>, Cell> cells;
+    double squares = 0;
+    std::size_t points = 0;
+    for (const SamplePoint* point : on_walls_) {
+      if (!std::isfinite(point->before + point->after + point->azimuth + point->zenith)) continue;
+      Cell& cell = cells[{std::lround(std::floor(point->azimuth / calibration::kSurfaceCell)),
+                          std::lround(std::floor(point->zenith / calibration::kSurfaceCell))}];
+      ++cell.count;
+      cell.before += point->before;
+      cell.after += point->after;
+      squares += point->after * point->after;
+      ++points;
+    }
+    const double width = degrees_from_radians(calibration::kSurfaceCell);
+    Series before{"", "ink", SeriesKind::cells, {}, {}}, after = before;
+    double largest = 0, before_squares = 0, after_squares = 0, noise_squares = 0;
+    for (const auto& [place, cell] : cells) {
+      if (cell.count < kFewestInCell) continue;
+      const double mean_before = cell.before / cell.count, mean_after = cell.after / cell.count;
+      for (Series* series : {&before, &after}) {
+        series->x.push_back(width * (static_cast<double>(place.first) + 0.5));
+        series->y.push_back(width * (static_cast<double>(place.second) + 0.5));
+        series->cell_width = series->cell_height = width;
+      }
+      before.value.push_back(kMillimetres * mean_before);
+      after.value.push_back(kMillimetres * mean_after);
+      largest = std::max({largest, std::abs(mean_before), std::abs(mean_after)});
+      before_squares += mean_before * mean_before;
+      after_squares += mean_after * mean_after;
+      noise_squares += squares / static_cast<double>(points) / cell.count;
+    }
+    if (after.x.empty()) return {};
+    const auto count = static_cast<double>(after.x.size());
+    const auto chart = [&](const char* when, const Series& series, double sum) {
+      Chart result{fmt::format("Mean distance from the planes over the field of view, {}", when),
+                   "azimuth, deg",
+                   "zenith, deg",
+                   {series},
+                   fmt::format("Means of {} sample points over cells of {:.3g} degree, all "
+                               "recordings together; cells with fewer than {} points are left out. "
+                               "The {} means have a root mean square of {:.2f} mm, where noise "
+                               "alone would leave about {:.2f} mm. Patches of one colour are walls "
+                               "that are not flat, or beams that are bent.",
+                               count_text(points), width, kFewestInCell,
+                               count_text(series.x.size()), kMillimetres * std::sqrt(sum / count),
+                               kMillimetres * std::sqrt(noise_squares / count)),
+                   ChartKind::map};
+      result.value_label = "mean distance, mm";
+      result.palette = Palette::diverging;
+      result.value_range = {-kMillimetres * largest, kMillimetres * largest};
+      return result;
+    };
+    return {chart("before", before, before_squares), chart("after", after, after_squares)};
+  }
+
+  /// Means of the points of one wall in a cell of the field of view: single points would show
+  /// nothing but the noise of ranges.
+  struct WallPatch {
+    int count = 0;
+    Vector3<double> foot;  ///< on the plane
+    double before = 0, after = 0;
+  };
+
+  std::vector<Chart> walls_in_space(std::size_t recording) const {
+    std::map<std::array<long, 3>, WallPatch> cells;
+    std::size_t points = 0;
+    for (const SamplePoint* point : on_walls_) {
+      if (point->recording != recording) continue;
+      if (!std::isfinite(point->before + point->after + point->azimuth + point->zenith)) continue;
+      WallPatch& patch =
+          cells[{point->plane, std::lround(std::floor(point->azimuth / calibration::kSurfaceCell)),
+                 std::lround(std::floor(point->zenith / calibration::kSurfaceCell))}];
+      const auto& plane = c_.planes[static_cast<std::size_t>(point->plane)];
+      patch.foot = patch.foot + point->point - point->after * plane.normal;
+      patch.before += point->before;
+      patch.after += point->after;
+      ++patch.count;
+      ++points;
+    }
+    Series before{"", "a", SeriesKind::points, {}, {}}, after = before;
+    double largest = 0, squares = 0, farthest = 0;
+    for (auto& [place, patch] : cells) {
+      if (patch.count < kFewestInCell) continue;
+      patch.foot = (1.0 / patch.count) * patch.foot;
+      patch.before /= patch.count;
+      patch.after /= patch.count;
+      largest = std::max({largest, std::abs(patch.before), std::abs(patch.after)});
+      farthest = std::max(farthest, norm(patch.foot));
+      squares += patch.before * patch.before;
+      before.value.push_back(kMillimetres * patch.before);
+      after.value.push_back(kMillimetres * patch.after);
+    }
+    if (before.value.empty()) return {};
+    const double rms = std::sqrt(squares / static_cast<double>(before.value.size()));
+    const double enlarged =
+        rms > 0 ? std::pow(10.0, std::floor(std::log10(kShownThickness * farthest / rms))) : 1.0;
+    for (const auto& cell : cells) {
+      const WallPatch& patch = cell.second;
+      if (patch.count < kFewestInCell) continue;
+      const Vector3<double>& normal = c_.planes[static_cast<std::size_t>(cell.first[0])].normal;
+      const auto add = [&](Series& series, double distance) {
+        const Vector3<double> at = patch.foot + enlarged * distance * normal;
+        series.x.push_back(at.x);
+        series.y.push_back(at.y);
+        series.z.push_back(at.z);
+      };
+      add(before, patch.before);
+      add(after, patch.after);
+    }
+    const auto chart = [&](const char* when, const Series& series) {
+      Chart result{
+          fmt::format("Walls {} the calibration: {}", when, recording_name(input_, recording)),
+          "X (forward), m",
+          "Y (left), m",
+          {series},
+          fmt::format("Each dot is the mean of the {} sample points of a wall within one "
+                      "degree, {} dots; cells with fewer than {} points are left out. "
+                      "Distances from the planes are drawn {:.0f} times as large. Drag to "
+                      "rotate.",
+                      count_text(points), count_text(series.x.size()), kFewestInCell, enlarged),
+          ChartKind::space};
+      result.z_label = "Z (up), m";
+      result.value_label = "mean distance from the plane, mm";
+      result.palette = Palette::diverging;
+      result.value_range = {-kMillimetres * largest, kMillimetres * largest};
+      return result;
+    };
+    return {chart("before", before), chart("after", after)};
+  }
+
+  const CalibrationReportInput& input_;
+  const Calibration& c_;
+  std::vector<const SamplePoint*> on_walls_;
+};
+
+}  // namespace
+
+CalibrationReport calibration_report(const CalibrationReportInput& input) {
+  const Calibration& c = input.calibration;
+  CalibrationReport report;
+  report.recordings = input.recordings;
+  for (const ReportedRecording& one : input.recordings) {
+    report.observations += one.audit.observations;
+  }
+  report.sensor = c.sensor.name;
+  report.serial = c.sensor.serial;
+  report.preset = input.nominal.name;
+  report.prisms = c.sensor.prisms();
+  report.method = c.method;
+  report.converged = c.converged;
+  report.reason = c.reason;
+  report.warnings = c.warnings;
+  report.warnings.insert(report.warnings.end(), input.warnings.begin(), input.warnings.end());
+  report.points = c.points;
+  report.parameters = parameters_of(input);
+  report.range_offset = c.range_offset;
+  report.range_offset_sigma = c.range_offset_sigma;
+  for (const estimation::FreeParameter& free : c.free) report.free.push_back(free.name);
+  report.covariance = c.covariance;
+  report.unobservable = c.unobservable;
+  report.datum_kind = c.datum_kind;
+  report.datum = c.datum;
+  report.datum_without_common = c.datum_without_common;
+  report.prior_tests = c.prior_tests;
+  report.planes = c.planes;
+  report.steps = c.steps;
+  report.rms_before = c.rms_before;
+  report.rms_after = c.rms_after;
+  report.sigma0 = c.sigma0;
+  report.unevenness = c.unevenness;
+  report.variance_factor = c.variance_factor;
+  if (input.truth) report.truth = {input.truth->before, input.truth->after};
+  report.provenance = input.provenance;
+  const CalibrationCharts charts(input);
+  report.truth_charts = charts.truth();
+  report.thickness_charts = charts.thickness();
+  report.wall_charts = charts.walls();
+  report.view_charts = charts.views();
+  return report;
+}
+
+}  // namespace risley::report

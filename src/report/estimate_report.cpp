@@ -1,0 +1,465 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "risley/report/estimate_report.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include <fmt/format.h>
+
+#include "risley/core/angle.hpp"
+#include "risley/estimation/observability.hpp"
+#include "risley/estimation/piecewise.hpp"
+#include "risley/estimation/residual_maps.hpp"
+
+#include "report/charts.hpp"
+#include "report/html.hpp"
+
+namespace risley::report {
+namespace {
+
+using estimation::Estimate;
+using estimation::Moments;
+using estimation::ResidualMap;
+using estimation::RotorStates;
+
+constexpr std::size_t kMostPoints = 4000;     // per scatter diagram
+constexpr std::size_t kMostMapPoints = 9000;  // of the scan pattern
+constexpr std::size_t kPieces = 20;
+constexpr double kPatternDuration = 0.09;  // s, as in [B21 Fig. 2a]
+constexpr double kDensityDuration = 0.5;   // s, as in [B21 Fig. 2b]
+constexpr double kDensityCell = 0.5;       // deg
+constexpr double kFieldCell = radians_from_degrees(1.0);
+constexpr double kAngleCell = radians_from_degrees(10.0);
+constexpr double kFewestInCell = 5;       // shots that make a mean
+constexpr double kFewestOfTypical = 0.1;  // and of a typical cell's shots
+
+std::string letter(std::size_t rotor) {
+  return std::string(1, prism_letter(static_cast<int>(rotor)));
+}
+
+/// The value an estimation started from, in the estimate's speed combination; none for angles.
+double nominal_value(const EstimateReportInput& input, const ParameterInfo& info) {
+  if (info.kind == ParameterKind::rotation_angle) return kUnknown;
+  const auto& combination = input.estimate.sensor.combination;
+  if (info.kind == ParameterKind::angular_velocity && combination && input.nominal.combination) {
+    return with_combination(input.nominal, *combination).get(info.name);
+  }
+  return input.nominal.get(info.name);
+}
+
+std::vector<ReportedParameter> parameters_of(const EstimateReportInput& input) {
+  const Estimate& e = input.estimate;
+  std::vector<ReportedParameter> rows;
+  for (const estimation::EstimatedValue& value : e.values) {
+    ReportedParameter row;
+    row.name = value.name;
+    row.value = value.value;
+    row.sigma = value.sigma;
+    row.nominal = nominal_value(input, find_parameter(value.name, e.sensor.prisms()));
+    if (input.evaluation) {
+      const auto& all = input.evaluation->parameters;
+      const auto found = std::find_if(all.begin(), all.end(),
+                                      [&](const auto& one) { return one.name == value.name; });
+      if (found != all.end()) {
+        row.truth = found->truth;
+        row.error = found->error;
+        row.error_over_sigma = found->error_over_sigma;
+      }
+    }
+    rows.push_back(row);
+  }
+  return rows;
+}
+
+/// Makes all diagrams.
+class EstimateCharts {
+ public:
+  explicit EstimateCharts(const EstimateReportInput& input)
+      : input_(input),
+        states_(input.estimate.states),
+        azimuth_(input.estimate.map ? input.estimate.map->azimuth_residual
+                                    : states_.azimuth_residual),
+        zenith_(input.estimate.map ? input.estimate.map->zenith_residual : states_.zenith_residual),
+        outlier_(input.estimate.map ? input.estimate.map->outlier : states_.outlier) {}
+
+  /// Every parameter from pieces of the recording alone, about the estimate of all.
+  std::vector<Chart> pieces(const estimation::PiecewiseEstimate& pieces,
+                            const std::vector<ReportedParameter>& parameters) const {
+    const Estimate& e = input_.estimate;
+    std::vector<Chart> charts;
+    for (std::size_t k = 0; k < e.free.size() && pieces.size() > 0; ++k) {
+      const ParameterInfo& info = find_parameter(e.free[k].name, e.sensor.prisms());
+      const double scale = 1.0 / info.si_per_unit;
+      const double all = e.parameters[static_cast<Eigen::Index>(k)];
+      Series points{"pieces", "a", SeriesKind::points, {}, {}};
+      Series whiskers{"± σ of a piece", "a", SeriesKind::line, {}, {}};
+      for (std::size_t i = 0; i < pieces.size(); ++i) {
+        const double y = scale * (pieces.value[k][i] - all), sigma = scale * pieces.sigma[k][i];
+        points.x.push_back(pieces.time[i]);
+        points.y.push_back(y);
+        for (const double end : {y - sigma, y + sigma, kUnknown}) {
+          whiskers.x.push_back(pieces.time[i]);
+          whiskers.y.push_back(end);
+        }
+      }
+      Chart chart{info.long_name,
+                  "time, s",
+                  fmt::format("difference from the estimate, {}", info.unit),
+                  {whiskers, points, level("all shots", "ink", 0.0)},
+                  {}};
+      for (const ReportedParameter& one : parameters) {
+        if (one.name == info.name && std::isfinite(one.truth)) {
+          chart.series.push_back(level("truth", "c", scale * (one.truth - all)));
+        }
+      }
+      charts.push_back(chart);
+    }
+    return charts;
+  }
+
+  std::vector<Chart> rotors() const {
+    std::vector<Chart> charts;
+    std::vector<Chart> distributions;
+    for (std::size_t rotor = 0; rotor < states_.angular_velocity.size(); ++rotor) {
+      const double mean =
+          estimation::moments(states_.angular_velocity[rotor], states_.outlier).mean;
+      const std::vector<double> change = about(states_.angular_velocity[rotor], mean);
+      const std::string label =
+          fmt::format("angular velocity less {:.5f}, deg/s", degrees_from_radians(mean));
+      charts.push_back({fmt::format("Angular velocity of prism {}", letter(rotor)),
+                        "time, s",
+                        label,
+                        {line(rotor, change)},
+                        peak_line_note(states_.size())});
+      if (!(estimation::moments(change, states_.outlier).std > 0)) continue;  // it stood still
+      distributions.push_back(distribution(
+          fmt::format("Distribution of the angular velocity of prism {}", letter(rotor)), label,
+          letter(rotor), change, "velocity"));
+    }
+    charts.insert(charts.end(), distributions.begin(), distributions.end());
+    if (!input_.evaluation) return charts;
+    const auto& errors = input_.evaluation->rotation_angle_error;
+    for (std::size_t rotor = 0; rotor < errors.size(); ++rotor) {
+      charts.push_back({fmt::format("Error of the rotation angle of prism {}", letter(rotor)),
+                        "time, s",
+                        "estimate minus truth, deg",
+                        {line(rotor, errors[rotor])},
+                        peak_line_note(states_.size())});
+    }
+    for (std::size_t rotor = 0; rotor < errors.size(); ++rotor) {
+      charts.push_back(distribution(
+          fmt::format("Distribution of the error of the rotation angle of prism {}", letter(rotor)),
+          "estimate minus truth, deg", letter(rotor), errors[rotor], "error"));
+    }
+    return charts;
+  }
+
+  std::vector<Chart> residuals() const {
+    const Estimate& e = input_.estimate;
+    std::vector<Chart> charts{
+        over_time("Azimuth residuals over time", azimuth_, "a"),
+        over_time("Zenith residuals over time", zenith_, "b"),
+        residual_histogram("Histogram of the azimuth residuals", azimuth_, e.azimuth_residuals,
+                           "a"),
+        residual_histogram("Histogram of the zenith residuals", zenith_, e.zenith_residuals, "b")};
+    const ResidualMap field = estimation::residuals_over_field(e, kFieldCell);
+    for (Chart& chart : maps(field, "the field of view", "azimuth, deg", "zenith, deg")) {
+      chart.kind = ChartKind::map;
+      charts.push_back(std::move(chart));
+    }
+    for (std::size_t rotor = 0; rotor < states_.rotation_angle.size(); ++rotor) {
+      charts.push_back(over_angle(rotor));
+    }
+    for (int x = 0; x < states_.prisms(); ++x) {
+      for (int y = x + 1; y < states_.prisms(); ++y) {
+        const ResidualMap map = estimation::residuals_over_angles(e, x, y, kAngleCell);
+        const auto axis = [](int prism) {
+          return fmt::format("rotation angle of prism {}, deg", prism_letter(prism));
+        };
+        for (Chart& chart :
+             maps(map,
+                  fmt::format("the angles of prisms {} and {}", prism_letter(x), prism_letter(y)),
+                  axis(x), axis(y))) {
+          chart.kind = ChartKind::two_turns;
+          charts.push_back(std::move(chart));
+        }
+      }
+    }
+    return charts;
+  }
+
+  std::vector<Chart> pattern() const {
+    const estimation::AngleSeries& head = input_.head;
+    const std::size_t rows = rows_until(kPatternDuration);
+    Series shots{"", "a", SeriesKind::points, {}, {}};
+    for (const std::size_t i : every_nth(rows, kMostMapPoints)) {
+      shots.x.push_back(degrees_from_radians(head.azimuth[i]));
+      shots.y.push_back(degrees_from_radians(head.zenith[i]));
+    }
+    return {{fmt::format("Scan pattern of the first {} s, as recorded", kPatternDuration),
+             "azimuth, deg",
+             "zenith, deg",
+             {shots},
+             every_nth_note(rows, kMostMapPoints),
+             ChartKind::map},
+            density()};
+  }
+
+ private:
+  Series level(const std::string& label, const std::string& colour, double value) const {
+    const double end = shot_time(input_.estimate.series.size() - 1);
+    return {label, colour, SeriesKind::line, {0.0, end}, {value, value}};
+  }
+
+  /// Values less their mean; what is rounding beside it is zero.
+  static std::vector<double> about(const std::vector<double>& values, double mean) {
+    constexpr double kRounding = 1e-9;
+    std::vector<double> result;
+    result.reserve(values.size());
+    for (const double value : values) {
+      const double difference = value - mean;
+      result.push_back(std::abs(difference) < kRounding * std::abs(mean) ? 0.0 : difference);
+    }
+    return result;
+  }
+
+  double time(std::size_t row) const {
+    return 1e-9 * static_cast<double>(states_.time_ns[row] - states_.time_ns[0]);
+  }
+  double shot_time(std::size_t shot) const { return input_.estimate.series.time(shot); }
+
+  std::size_t rows_until(double duration) const {
+    std::size_t rows = 0;
+    while (rows < input_.head.size() && input_.head.time(rows) <= duration) ++rows;
+    return rows;
+  }
+
+  Series line(std::size_t rotor, const std::vector<double>& values) const {
+    return peak_line(
+        "", letter(rotor), states_.size(), [this](std::size_t i) { return time(i); },
+        [&values](std::size_t i) { return degrees_from_radians(values[i]); });
+  }
+
+  Chart distribution(const std::string& title, const std::string& x_label,
+                     const std::string& colour, const std::vector<double>& values,
+                     const std::string& what) const {
+    const Moments moments = estimation::moments(values, states_.outlier);
+    return {title, x_label, "shots",
+            histogram(what, colour, values, states_.outlier, moments, kDegreesPerRadian),
+            fmt::format("At {} shots: mean {:.7g}, standard deviation {:.3g} deg{}. The outermost "
+                        "bins hold everything beyond 4.5 standard deviations.",
+                        count_text(moments.count), degrees_from_radians(moments.mean),
+                        degrees_from_radians(moments.std), what == "velocity" ? "/s" : "")};
+  }
+
+  Chart over_time(const std::string& title, const std::vector<double>& residual,
+                  const std::string& colour) const {
+    Series used{"used", colour, SeriesKind::points, {}, {}};
+    Series outliers{"outliers", "bad", SeriesKind::points, {}, {}};
+    const std::size_t shots = residual.size();
+    for (const std::size_t i : every_nth(shots, kMostPoints)) {
+      if (outlier_[i] != 0) continue;
+      used.x.push_back(shot_time(i));
+      used.y.push_back(degrees_from_radians(residual[i]));
+    }
+    // Outliers are few and matter: each is drawn as long as that is possible.
+    std::vector<std::size_t> rows;
+    for (std::size_t i = 0; i < shots; ++i) {
+      if (outlier_[i] != 0 && std::isfinite(residual[i])) rows.push_back(i);
+    }
+    for (const std::size_t k : every_nth(rows.size(), kMostPoints)) {
+      outliers.x.push_back(shot_time(rows[k]));
+      outliers.y.push_back(degrees_from_radians(residual[rows[k]]));
+    }
+    std::string note = every_nth_note(shots, kMostPoints);
+    if (!rows.empty()) {
+      note += " " + every_nth_note(rows.size(), kMostPoints, "outliers");
+    }
+    Chart chart{title, "time, s", "observed minus estimated, deg", {used}, note};
+    if (!rows.empty()) chart.series.push_back(outliers);
+    return chart;
+  }
+
+  Chart residual_histogram(const std::string& title, const std::vector<double>& residual,
+                           const Moments& moments, const std::string& colour) const {
+    return {title, "observed minus estimated, deg", "shots",
+            histogram("residuals", colour, residual, outlier_, moments, kDegreesPerRadian),
+            "All shots but the outliers. The outermost bins hold everything beyond 4.5 standard "
+            "deviations."};
+  }
+
+  /// Mean azimuth and zenith residuals over the cells of a plane.
+  static std::vector<Chart> maps(const ResidualMap& map, const std::string& over,
+                                 const std::string& x_label, const std::string& y_label) {
+    std::vector<std::uint64_t> counts = map.count;
+    const auto middle = counts.begin() + static_cast<std::ptrdiff_t>(counts.size() / 2);
+    std::nth_element(counts.begin(), middle, counts.end());
+    const double typical = counts.empty() ? 1.0 : static_cast<double>(*middle);
+    // A rim cell that few beams graze would decide the colours of all others.
+    const double fewest = std::max(kFewestInCell, std::ceil(kFewestOfTypical * typical));
+    std::vector<Chart> charts;
+    const auto add = [&](const char* what, const std::vector<double>& mean, double sigma) {
+      const double noise = degrees_from_radians(sigma / std::sqrt(typical));
+      Series cells{"", "ink", SeriesKind::cells, {}, {}};
+      cells.cell_width = cells.cell_height = degrees_from_radians(map.cell);
+      double largest = 3.0 * noise;  // a map of noise alone should look calm
+      for (std::size_t i = 0; i < map.size(); ++i) {
+        if (static_cast<double>(map.count[i]) < fewest) continue;
+        cells.x.push_back(degrees_from_radians(map.x[i]));
+        cells.y.push_back(degrees_from_radians(map.y[i]));
+        cells.value.push_back(degrees_from_radians(mean[i]));
+        largest = std::max(largest, std::abs(cells.value.back()));
+      }
+      Chart chart{
+          fmt::format("Mean {} residuals over {}", what, over),
+          x_label,
+          y_label,
+          {cells},
+          fmt::format("Means of all {} used shots over cells of {:.3g}°; cells with fewer "
+                      "than {} shots are left out. Noise alone leaves about {:.2g}° in a "
+                      "cell.",
+                      count_text(map.shots), degrees_from_radians(map.cell), fewest, noise)};
+      chart.value_label = "mean residual, deg";
+      chart.palette = Palette::diverging;
+      chart.value_range = {-largest, largest};
+      charts.push_back(chart);
+    };
+    add("azimuth", map.mean_azimuth, map.sigma_azimuth);
+    add("zenith", map.mean_zenith, map.sigma_zenith);
+    return charts;
+  }
+
+  Chart over_angle(std::size_t rotor) const {
+    const auto angle = [this, rotor](std::size_t i) {
+      return degrees_from_radians(wrap_to_two_pi(states_.rotation_angle[rotor][i]));
+    };
+    Chart chart{
+        fmt::format("Residuals over the rotation angle of prism {}", letter(rotor)),
+        "rotation angle, deg",
+        "observed minus estimated, deg",
+        {},
+        every_nth_note(states_.size(), kMostPoints / 2, input_.estimate.map ? "knots" : "shots") +
+            " Lines: means over 5° of all shots that were used.",
+        ChartKind::full_turn};
+    const estimation::AngleProfile& profile = input_.estimate.residuals_over_angle[rotor];
+    const auto add = [&](const std::string& name, const std::vector<double>& residual,
+                         const std::string& colour) {
+      Series points{name, colour, SeriesKind::points, {}, {}};
+      for (const std::size_t i : every_nth(states_.size(), kMostPoints / 2)) {
+        if (states_.outlier[i] != 0) continue;
+        points.x.push_back(angle(i));
+        points.y.push_back(degrees_from_radians(residual[i]));
+      }
+      chart.series.push_back(points);
+    };
+    const auto add_means = [&](const std::string& name, const std::vector<double>& mean,
+                               const std::string& colour) {
+      Series means{"mean of " + name, colour, SeriesKind::line, {}, {}};
+      for (std::size_t bin = 0; bin < mean.size(); ++bin) {
+        means.x.push_back(360.0 * (static_cast<double>(bin) + 0.5) /
+                          static_cast<double>(mean.size()));
+        means.y.push_back(degrees_from_radians(mean[bin]));
+      }
+      chart.series.push_back(means);
+    };
+    add("azimuth", states_.azimuth_residual, "a");
+    add("zenith", states_.zenith_residual, "b");
+    add_means("azimuth", profile.mean_azimuth, "ink");
+    add_means("zenith", profile.mean_zenith, "c");
+    return chart;
+  }
+
+  /// Shots per square degree.                                                      [B21 Fig. 2b]
+  Chart density() const {
+    const estimation::AngleSeries& head = input_.head;
+    const std::size_t rows = rows_until(kDensityDuration);
+    std::map<std::pair<long, long>, double> count;
+    for (std::size_t i = 0; i < rows; ++i) {
+      const auto cell = [](double angle) {
+        return std::lround(std::floor(degrees_from_radians(angle) / kDensityCell));
+      };
+      count[{cell(head.azimuth[i]), cell(head.zenith[i])}] += 1.0;
+    }
+    Series cells{"", "ink", SeriesKind::cells, {}, {}};
+    cells.cell_width = cells.cell_height = kDensityCell;
+    for (const auto& [place, shots] : count) {
+      cells.x.push_back(kDensityCell * (static_cast<double>(place.first) + 0.5));
+      cells.y.push_back(kDensityCell * (static_cast<double>(place.second) + 0.5));
+      cells.value.push_back(shots / (kDensityCell * kDensityCell));
+    }
+    Chart chart{fmt::format("Density after {} s, as recorded", kDensityDuration),
+                "azimuth, deg",
+                "zenith, deg",
+                {cells},
+                fmt::format("All {} shots, counted over cells of {}°. Colours end at ten times the "
+                            "mean density.",
+                            count_text(rows), kDensityCell),
+                ChartKind::map};
+    chart.value_label = "shots per square degree";
+    const double mean = count.empty()
+                            ? 1.0
+                            : static_cast<double>(rows) /
+                                  (static_cast<double>(count.size()) * kDensityCell * kDensityCell);
+    chart.value_range = {0.0, 10.0 * mean};
+    return chart;
+  }
+
+  const EstimateReportInput& input_;
+  const RotorStates& states_;
+  const std::vector<double>&azimuth_, &zenith_;  // residuals of all shots
+  const std::vector<unsigned char>& outlier_;
+};
+
+}  // namespace
+
+EstimateReport estimate_report(const EstimateReportInput& input) {
+  const Estimate& e = input.estimate;
+  EstimateReport report;
+  report.recording = input.recording;
+  report.sensor = e.sensor.name;
+  report.prisms = e.sensor.prisms();
+  report.combination = e.sensor.combination ? static_cast<int>(*e.sensor.combination) : 0;
+  report.mirrored = e.mirrored;
+  report.method = e.map ? "map" : "ekf";
+  report.converged = e.converged;
+  report.reason = e.reason;
+  report.warnings = e.warnings;
+  report.warnings.insert(report.warnings.end(), input.warnings.begin(), input.warnings.end());
+  report.shots = e.series.size();
+  report.outliers = e.outliers;
+  report.parameters = parameters_of(input);
+  for (const estimation::FreeParameter& free : e.free) report.free.push_back(free.name);
+  report.covariance = e.covariance;
+  report.unobservable = e.unobservable;
+  report.azimuth_residuals = e.azimuth_residuals;
+  report.zenith_residuals = e.zenith_residuals;
+  report.expected_residual = e.expected_residual;
+  for (const estimation::AngleProfile& profile : e.residuals_over_angle) {
+    report.unevenness.push_back(profile.chi2_per_bin);
+  }
+  if (input.evaluation) {
+    report.truth = {input.evaluation->rotation_angle_rmse, input.evaluation->nees_parameters,
+                    input.evaluation->nees_rotation_angles};
+  }
+  report.provenance = input.provenance;
+  const EstimateCharts charts(input);
+  if (e.map) {
+    report.variance = {e.map->unit_variance, e.map->autocorrelation.factor, e.map->variance_factor};
+    if (e.converged) {
+      report.advice =
+          estimation::observability_words(estimation::observability_of_estimate(e), report.prisms);
+      const auto pieces = estimation::estimate_piecewise(e, input.nominal, kPieces);
+      report.pieces = {pieces.size(), pieces.failed, pieces.duration, pieces.chi2,
+                       pieces.degrees_of_freedom};
+      report.parameter_charts = charts.pieces(pieces, report.parameters);
+    }
+  }
+  report.rotor_charts = charts.rotors();
+  report.residual_charts = charts.residuals();
+  report.pattern_charts = charts.pattern();
+  return report;
+}
+
+}  // namespace risley::report

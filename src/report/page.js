@@ -1,0 +1,510 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+// Draws the diagrams that stand as JSON in the element "page-data" with Apache ECharts.
+// window.risley.charts: [{data, chart}] once <html data-drawn="N"> is set.
+(function () {
+  'use strict';
+  const page = document.documentElement;
+  const data = JSON.parse(document.getElementById('page-data').textContent);
+  const sequential = ['#440154', '#414487', '#2a788e', '#22a884', '#7ad151', '#fde725'];
+  const margins = { left: 74, right: 24, top: 36, bottom: 52 };
+  const barWidth = 64; // of the colour scale
+  const zoomStep = 0.8, panStep = 0.1, turnStep = 10;
+  const thinnestBox = 8; // pixels
+  const longestPause = 200; // ms
+  let drawn = [];
+
+  // ECharts takes the height of a line from the width of this character, which is nearly nothing
+  // where no font has it.
+  const pen = document.createElement('canvas').getContext('2d');
+  echarts.setPlatformAPI({
+    measureText: (text, font) => {
+      pen.font = font;
+      return text === '国' ? { width: parseFloat(/([\d.]+)px/.exec(pen.font)[1]) }
+                          : pen.measureText(text);
+    },
+  });
+
+  const colour = (name) => getComputedStyle(page).getPropertyValue('--' + name).trim();
+  const rounded = (value, digits) =>
+    value === null || value === undefined ? '–' : String(Number(Number(value).toPrecision(digits)));
+  const short = (value) => rounded(value, 6);
+  const finite = (values) => values.filter((v) => v !== null);
+  const least = (values) => finite(values).reduce((a, b) => Math.min(a, b), Infinity);
+  const most = (values) => finite(values).reduce((a, b) => Math.max(a, b), -Infinity);
+  const every = (one, key) => one.series.flatMap((series) => series[key]);
+  // Digits that tell values from each other: more than six where they differ little.
+  const digitsOf = (values) => {
+    const from = least(values), to = most(values), size = Math.max(Math.abs(from), Math.abs(to));
+    if (!(to > from) || !Number.isFinite(size)) return 6;
+    return Math.min(6 + Math.max(0, Math.ceil(Math.log10(size / (to - from)))), 15);
+  };
+  // Ticks of an axis. They stand at round numbers; 0.00012 would be too long.
+  const marks = (values) => {
+    const tiny = Math.max(Math.abs(least(values)), Math.abs(most(values))) < 2e-3;
+    return (value) => {
+      const round = Number(value.toPrecision(12));
+      return tiny && round !== 0 ? round.toExponential() : String(round);
+    };
+  };
+  const hasValues = (one) => one.series.some((series) => series.value.length > 0);
+
+  // ---- two dimensions ----
+
+  function axis(label, gap, values) {
+    return {
+      type: 'value', scale: true, name: label, nameLocation: 'middle', nameGap: gap,
+      nameTextStyle: { color: colour('ink') },
+      axisLabel: { color: colour('muted'), hideOverlap: true, formatter: marks(values) },
+      axisLine: { show: true, lineStyle: { color: colour('muted') } },
+      splitLine: { lineStyle: { color: colour('grid') } },
+    };
+  }
+
+  // Equal scales on both axes: the wider span of the two.
+  function mapLimits(one) {
+    const x = [least(every(one, 'x')), most(every(one, 'x'))];
+    const y = [least(every(one, 'y')), most(every(one, 'y'))];
+    if (!Number.isFinite(x[0] + y[0])) return [{}, {}];
+    const half = 0.52 * Math.max(x[1] - x[0], y[1] - y[0], 1e-9);
+    const unit = Math.pow(10, Math.floor(Math.log10(half))) / 5;
+    const wide = Math.ceil((2 * half) / unit) * unit / 2;
+    return [x, y].map((v) => {
+      const middle = Math.round((v[0] + v[1]) / unit) * unit / 2;
+      return { min: middle - wide, max: middle + wide };
+    });
+  }
+
+  function cells(series) {
+    return {
+      type: 'custom', name: series.label, clip: true,
+      progressive: 0, // whole at once: a picture for the printer cannot wait
+      encode: { x: 0, y: 1 },
+      data: series.x.map((x, i) => [x, series.y[i], series.value[i]]),
+      renderItem: (params, api) => {
+        const [w, h] = series.cell;
+        const from = api.coord([api.value(0) - w / 2, api.value(1) - h / 2]);
+        const to = api.coord([api.value(0) + w / 2, api.value(1) + h / 2]);
+        return {
+          type: 'rect',
+          shape: {
+            x: Math.min(from[0], to[0]), y: Math.min(from[1], to[1]),
+            width: Math.abs(to[0] - from[0]) + 0.5, height: Math.abs(to[1] - from[1]) + 0.5,
+          },
+          style: { fill: api.visual('color') },
+        };
+      },
+    };
+  }
+
+  function flatSeries(series) {
+    if (series.kind === 'cells') return cells(series);
+    const points = series.x.map((x, i) => [x, series.y[i]]);
+    const tone = colour(series.colour);
+    if (series.kind === 'points') {
+      return {
+        type: 'scatter', name: series.label, data: points, itemStyle: { color: tone },
+        symbolSize: points.length < 500 ? 5 : 2.4, large: points.length > 1000, largeThreshold: 1000,
+        progressive: 0,
+      };
+    }
+    const steps = series.kind === 'steps';
+    return {
+      type: 'line', name: series.label, data: points, showSymbol: false, connectNulls: false,
+      step: steps ? 'middle' : false, itemStyle: { color: tone },
+      lineStyle: { color: tone, width: steps ? 1 : 1.6, type: series.dashed ? 'dashed' : 'solid' },
+      areaStyle: steps ? { color: tone, opacity: 0.3, origin: 'start' } : undefined,
+      emphasis: { disabled: true },
+    };
+  }
+
+  function tip(one) {
+    const row = (name, value) => name + ': <b>' + value + '</b>';
+    const digits = { x: digitsOf(every(one, 'x')), y: digitsOf(every(one, 'y')) };
+    const text = (item) => {
+      const rows = [row(one.x_label, rounded(item.value[0], digits.x)),
+                    row(one.y_label, rounded(item.value[1], digits.y))];
+      if (one.z_label) rows.push(row(one.z_label, short(item.value[2])));
+      const value = item.value[one.z_label ? 3 : 2];
+      if (one.value_label && value !== undefined) rows.push(row(one.value_label, short(value)));
+      return (item.seriesName ? item.seriesName + '<br>' : '') + rows.join('<br>');
+    };
+    const lines = one.series.some((series) => series.kind === 'line' || series.kind === 'steps');
+    return {
+      trigger: lines ? 'axis' : 'item', confine: true, transitionDuration: 0,
+      axisPointer: { type: 'line', snap: true, lineStyle: { color: colour('muted') } },
+      backgroundColor: colour('paper'), borderColor: colour('muted'),
+      textStyle: { color: colour('ink'), fontSize: 12 },
+      formatter: (items) =>
+        Array.isArray(items) ? items.map(text).slice(0, 4).join('<br>') : text(items),
+    };
+  }
+
+  function colourScale(one, dimension) {
+    const values = every(one, 'value');
+    const range = one.value_range || [least(values), most(values)];
+    const diverging = ['low', 'low-half', 'middle', 'high-half', 'high'].map(colour);
+    return {
+      type: 'continuous', dimension: dimension, min: range[0], max: range[1], calculable: false,
+      right: 0, top: 'middle', itemHeight: 150, itemWidth: 12, precision: 6, formatter: short,
+      text: [range[1], range[0]].map((end) => marks(range)(Number(rounded(end, 2)))),
+      seriesIndex: one.series.flatMap((series, i) => (series.value.length > 0 ? [i] : [])),
+      inRange: { color: one.palette === 'diverging' ? diverging : sequential },
+      textStyle: { color: colour('muted') },
+    };
+  }
+
+  function flatOption(one) {
+    const square = one.kind === 'map';
+    const scaled = hasValues(one);
+    const x = axis(one.x_label, 30, every(one, 'x')), y = axis(one.y_label, 52, every(one, 'y'));
+    if (square) {
+      const limits = mapLimits(one);
+      Object.assign(x, limits[0], { inverse: true, position: 'bottom' }); // as one looks out
+      Object.assign(y, limits[1], { inverse: true, position: 'left' });
+      // The ends are no round numbers.
+      for (const one of [x, y]) Object.assign(one.axisLabel, { showMinLabel: false, showMaxLabel: false });
+    }
+    if (one.kind === 'full_turn' || one.kind === 'two_turns') {
+      Object.assign(x, { min: 0, max: 360, interval: 60 });
+    }
+    if (one.kind === 'two_turns') Object.assign(y, { min: 0, max: 360, interval: 60 });
+    x.axisLine.onZero = false;
+    y.axisLine.onZero = false;
+    const zoom = (key) => ({
+      type: 'inside', [key]: 0, filterMode: 'none', zoomOnMouseWheel: 'ctrl',
+      moveOnMouseMove: 'shift', moveOnMouseWheel: false, preventDefaultMouseMove: false,
+    });
+    return {
+      animation: false, backgroundColor: 'transparent',
+      grid: {
+        ...margins, right: margins.right + (scaled ? barWidth : 0), containLabel: false,
+        outerBoundsMode: 'none',
+      },
+      xAxis: x, yAxis: y,
+      legend: {
+        show: one.series.length > 1, top: 0, left: margins.left, right: 125, type: 'scroll',
+        itemWidth: 16, itemHeight: 8,
+        textStyle: { color: colour('ink') }, inactiveColor: colour('grid'),
+        pageTextStyle: { color: colour('ink') },
+      },
+      tooltip: tip(one),
+      toolbox: {
+        right: 0, top: 0, itemSize: 13, iconStyle: { borderColor: colour('muted') },
+        emphasis: { iconStyle: { borderColor: colour('a') } },
+        feature: {
+          dataZoom: {
+            xAxisIndex: 0, yAxisIndex: 0, filterMode: 'none',
+            title: { zoom: 'Draw a box to zoom', back: 'One zoom back' },
+          },
+          restore: { title: 'Show all again' },
+          saveAsImage: { title: 'Save as PNG', name: one.id, pixelRatio: 2 },
+        },
+      },
+      dataZoom: [zoom('xAxisIndex'), zoom('yAxisIndex')],
+      visualMap: scaled ? [colourScale(one, 2)] : [],
+      series: one.series.map(flatSeries),
+    };
+  }
+
+  // ---- three dimensions ----
+
+  function spaceOption(one) {
+    const span = (key) => {
+      const values = every(one, key);
+      return [least(values), most(values)];
+    };
+    const spans = ['x', 'y', 'z'].map(span);
+    const widest = Math.max(...spans.map(([a, b]) => b - a), 1e-9);
+    const axis3d = (name, [min, max]) => ({
+      type: 'value', name: name, min: Math.floor(min), max: Math.ceil(max), splitNumber: 4,
+      nameGap: 20, nameTextStyle: { color: colour('ink'), fontSize: 14 },
+      axisLabel: {
+        color: colour('muted'), fontSize: 12, margin: 10,
+        formatter: (value) => (value > Math.floor(min) && value < Math.ceil(max) ? short(value) : ''),
+      },
+      axisLine: { lineStyle: { color: colour('muted') } },
+      splitLine: { lineStyle: { color: colour('grid') } },
+    });
+    const box = (k) => Math.max(100 * (spans[k][1] - spans[k][0]) / widest, 4);
+    return {
+      animation: false, backgroundColor: 'transparent',
+      tooltip: tip(one),
+      toolbox: {
+        right: 0, top: 0, itemSize: 13, iconStyle: { borderColor: colour('muted') },
+        emphasis: { iconStyle: { borderColor: colour('a') } },
+        feature: {
+          saveAsImage: {
+            title: 'Save as PNG', name: one.id, pixelRatio: window.devicePixelRatio || 1,
+          },
+        },
+      },
+      legend: {
+        show: one.series.length > 1, top: 0, left: 10, type: 'scroll',
+        itemWidth: 16, itemHeight: 8,
+        textStyle: { color: colour('ink') }, inactiveColor: colour('grid'),
+      },
+      visualMap: hasValues(one) ? [colourScale(one, 3)] : [],
+      xAxis3D: axis3d(one.x_label, spans[0]),
+      yAxis3D: axis3d(one.y_label, spans[1]),
+      zAxis3D: axis3d(one.z_label, spans[2]),
+      grid3D: {
+        left: 0, right: hasValues(one) ? barWidth : 0, top: -30, bottom: 0,
+        boxWidth: box(0), boxDepth: box(1), boxHeight: box(2),
+        viewControl: { alpha: 25, beta: -50, distance: 140, zoomSensitivity: 1, animation: false },
+        postEffect: { enable: false }, temporalSuperSampling: { enable: false },
+        axisPointer: { show: false },
+      },
+      series: one.series.map((series) => ({
+        type: 'scatter3D', name: series.label, symbolSize: series.x.length < 3000 ? 6 : 3,
+        itemStyle: series.value.length > 0 ? { opacity: 0.9 }
+                                           : { color: colour(series.colour), opacity: 0.9 },
+        data: series.x.map((x, i) =>
+          series.value.length > 0 ? [x, series.y[i], series.z[i], series.value[i]]
+                                  : [x, series.y[i], series.z[i]]),
+      })),
+    };
+  }
+
+  // ---- what a hand does with a diagram ----
+
+  function limitsNow(chart) {
+    return [0, 1].map((k) => {
+      const zoom = chart.getOption().dataZoom[k];
+      return [zoom.start, zoom.end];
+    });
+  }
+
+  function show(chart, limits) {
+    limits.forEach(([from, to], k) => {
+      const width = Math.min(to - from, 100);
+      const start = Math.min(Math.max(from, 0), 100 - width);
+      chart.dispatchAction({ type: 'dataZoom', dataZoomIndex: k, start: start, end: start + width });
+    });
+  }
+
+  const showAll = (chart) => show(chart, [[0, 100], [0, 100]]);
+
+  function zoomBy(chart, factor) {
+    show(chart, limitsNow(chart).map(([from, to]) => {
+      const middle = 0.5 * (from + to), half = 0.5 * factor * (to - from);
+      return [middle - half, middle + half];
+    }));
+  }
+
+  function panBy(chart, one, right, up) {
+    const way = one.kind === 'map' ? -panStep : panStep; // its axes are turned
+    show(chart, limitsNow(chart).map(([from, to], k) => {
+      const step = way * (k === 0 ? right : up) * (to - from);
+      return [from + step, to + step];
+    }));
+  }
+
+  function turnBy(chart, beta, alpha) {
+    const view = chart.getOption().grid3D[0].viewControl;
+    chart.setOption({
+      grid3D: {
+        viewControl: {
+          alpha: Math.min(Math.max(view.alpha + alpha, -90), 90), beta: view.beta + beta,
+        },
+      },
+    });
+  }
+
+  function nearBy(chart, factor) {
+    const view = chart.getOption().grid3D[0].viewControl;
+    chart.setOption({ grid3D: { viewControl: { distance: view.distance * factor } } });
+  }
+
+  // Reads the values of one point after another aloud.
+  function step(entry, forward) {
+    const series = entry.data.series[0];
+    if (!series || series.x.length === 0) return;
+    const count = series.x.length;
+    entry.point = entry.point === undefined ? 0 : (entry.point + forward + count) % count;
+    entry.chart.dispatchAction({ type: 'showTip', seriesIndex: 0, dataIndex: entry.point });
+    const value = series.value.length > 0 ? ', ' + short(series.value[entry.point]) : '';
+    document.getElementById('spoken').textContent =
+      entry.data.x_label + ' ' + rounded(series.x[entry.point], digitsOf(series.x)) + ', ' +
+      entry.data.y_label + ' ' + rounded(series.y[entry.point], digitsOf(series.y)) + value;
+  }
+
+  function onKey(event, entry) {
+    if (event.ctrlKey || event.metaKey || event.altKey) return;
+    const { chart, data: one } = entry;
+    const space = one.kind === 'space';
+    const keys = {
+      '+': () => (space ? nearBy(chart, zoomStep) : zoomBy(chart, zoomStep)),
+      '-': () => (space ? nearBy(chart, 1 / zoomStep) : zoomBy(chart, 1 / zoomStep)),
+      ArrowLeft: () => (space ? turnBy(chart, -turnStep, 0) : panBy(chart, one, -1, 0)),
+      ArrowRight: () => (space ? turnBy(chart, turnStep, 0) : panBy(chart, one, 1, 0)),
+      ArrowUp: () => (space ? turnBy(chart, 0, turnStep) : panBy(chart, one, 0, 1)),
+      ArrowDown: () => (space ? turnBy(chart, 0, -turnStep) : panBy(chart, one, 0, -1)),
+      0: () => (space ? draw(entry) : showAll(chart)),
+      n: () => step(entry, 1),
+      p: () => step(entry, -1),
+    };
+    const act = keys[event.key === '=' ? '+' : event.key];
+    if (!act) return;
+    act();
+    event.preventDefault();
+  }
+
+  // ---- the page ----
+
+  const isSquare = (one) => one.kind === 'map' || one.kind === 'two_turns';
+
+  function size(entry) {
+    if (!isSquare(entry.data)) return;
+    const figure = getComputedStyle(entry.place.parentElement);
+    const inside = entry.place.parentElement.clientWidth - parseFloat(figure.paddingLeft) -
+      parseFloat(figure.paddingRight);
+    const width = Math.min(inside, 640);
+    const right = margins.right + (hasValues(entry.data) ? barWidth : 0);
+    entry.place.style.width = width + 'px';
+    entry.place.style.height =
+      width - margins.left - right + margins.top + margins.bottom + 'px';
+  }
+
+  // Whether a box drawn with the mouse zooms.
+  function setBoxes(entry, active) {
+    if (entry.boxes === active) return;
+    entry.boxes = active;
+    entry.chart.dispatchAction({
+      type: 'takeGlobalCursor', key: 'dataZoomSelect', dataZoomSelectActive: active,
+    });
+  }
+
+  // again: in other colours, as it is turned or zoomed now.
+  function draw(entry, again) {
+    const one = entry.data;
+    if (one.kind === 'space') {
+      const option = spaceOption(one);
+      if (again) delete option.grid3D.viewControl; // a new camera would need a frame to stand right
+      entry.chart.setOption(option, !again);
+      return;
+    }
+    const limits = again ? limitsNow(entry.chart) : null;
+    const boxes = entry.boxes;
+    if (boxes) setBoxes(entry, false); // or the old toolbox goes on drawing beside the new
+    entry.chart.setOption(flatOption(one), true);
+    if (boxes) setBoxes(entry, true);
+    if (limits && limits.some(([from, to]) => to - from < 100)) show(entry.chart, limits);
+  }
+
+  // What ECharts leaves open: boxes and Shift exclude each other, a box that is hardly more than a
+  // line zooms along it alone, and without Ctrl the wheel belongs to the page.
+  function guideMouse(entry) {
+    const { chart, place } = entry;
+    let from = null, to = null, limits = null;
+    // Not before a mouse comes: it would draw every diagram twice.
+    place.addEventListener('pointerenter', () => setBoxes(entry, true));
+    place.addEventListener('pointerdown', (event) => {
+      setBoxes(entry, !event.shiftKey);
+      from = [event.clientX, event.clientY];
+      limits = limitsNow(chart);
+    }, true);
+    window.addEventListener('pointerup', (event) => {
+      to = [event.clientX, event.clientY];
+    }, true);
+    chart.on('datazoom', (event) => {
+      if (!from || !to || event.batch?.[0].startValue === undefined) return; // not by a box
+      limits.forEach(([start, end], k) => {
+        if (Math.abs(to[k] - from[k]) >= thinnestBox) return;
+        chart.dispatchAction({ type: 'dataZoom', dataZoomIndex: k, start: start, end: end });
+      });
+    });
+    for (const name of ['wheel', 'mousewheel']) {
+      place.addEventListener(name, (event) => {
+        if (!event.ctrlKey) event.stopPropagation();
+      }, true);
+    }
+    chart.getZr().on('dblclick', () => showAll(chart));
+  }
+
+  function make(one) {
+    const place = document.getElementById(one.id);
+    const entry = { data: one, place: place };
+    size(entry);
+    entry.chart = echarts.init(place);
+    draw(entry);
+    if (one.kind !== 'space') guideMouse(entry);
+    place.addEventListener('keydown', (event) => onKey(event, entry));
+    return entry;
+  }
+
+  // Three dimensions need WebGL, which remote desktops and old machines lack.
+  function makeOrSay(one) {
+    try {
+      return make(one);
+    } catch (error) {
+      const place = document.getElementById(one.id);
+      echarts.getInstanceByDom(place)?.dispose();
+      place.textContent = 'This diagram needs WebGL, which this browser does not offer.';
+      place.style.height = 'auto';
+      return null;
+    }
+  }
+
+  function redraw() {
+    drawn.forEach((entry) => draw(entry, true));
+  }
+
+  // Paper gets pictures in light colours: canvases do not follow the width of a sheet.
+  function beforePrint() {
+    page.dataset.printing = '1';
+    redraw();
+    drawn.forEach(({ chart, data: one, place }) => {
+      const picture = new Image();
+      picture.className = 'printed';
+      picture.alt = one.title;
+      picture.src = chart.getDataURL({ // WebGL gives no picture in another resolution
+        pixelRatio: one.kind === 'space' ? chart.getDevicePixelRatio() : 2,
+        backgroundColor: '#ffffff', excludeComponents: ['toolbox'],
+      });
+      place.after(picture);
+    });
+  }
+
+  function afterPrint() {
+    document.querySelectorAll('img.printed').forEach((picture) => picture.remove());
+    delete page.dataset.printing;
+    redraw();
+  }
+
+  function setTheme(dark) {
+    page.dataset.theme = dark ? 'dark' : 'light';
+    redraw();
+  }
+
+  async function start() {
+    let pause = performance.now();
+    for (const one of data) {
+      const entry = one.kind === 'space' ? makeOrSay(one) : make(one);
+      if (entry) drawn.push(entry);
+      if (performance.now() - pause < longestPause) continue;
+      await new Promise((done) => setTimeout(done)); // the page stays alive meanwhile
+      pause = performance.now();
+    }
+    window.risley = { charts: drawn };
+    page.dataset.drawn = String(drawn.length);
+    const main = document.querySelector('main');
+    let width = main.clientWidth;
+    new ResizeObserver(() => {
+      if (main.clientWidth === width) return;
+      width = main.clientWidth;
+      drawn.forEach((entry) => {
+        size(entry);
+        entry.chart.resize();
+      });
+    }).observe(main);
+  }
+
+  window.matchMedia('(prefers-color-scheme: dark)')
+    .addEventListener('change', (event) => setTheme(event.matches));
+  window.addEventListener('beforeprint', beforePrint);
+  window.addEventListener('afterprint', afterPrint);
+  document.getElementById('theme')
+    .addEventListener('click', () => setTheme(page.dataset.theme !== 'dark'));
+  start();
+})();

@@ -1,0 +1,405 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "risley/report/report_file.hpp"
+
+#include <cstdlib>
+
+#include <fmt/format.h>
+
+#include "risley/core/error.hpp"
+#include "risley/core/output_file.hpp"
+#include "risley/report/calibration_page.hpp"
+#include "risley/report/estimate_page.hpp"
+
+#include "report/html.hpp"
+#include "report/json_archive.hpp"
+
+namespace risley {
+
+template <class Archive, report::FieldsOf<Vector3<double>> T>
+void fields(Archive& archive, T& vector) {
+  archive("x", vector.x);
+  archive("y", vector.y);
+  archive("z", vector.z);
+}
+
+namespace recordings {
+
+template <class Archive, report::FieldsOf<ValueRange> T>
+void fields(Archive& archive, T& range) {
+  archive("min", range.min);
+  archive("max", range.max);
+}
+
+template <class Archive, report::FieldsOf<TimeGaps> T>
+void fields(Archive& archive, T& gaps) {
+  archive("count", gaps.count);
+  archive("total_s", gaps.total_s);
+  archive("largest_s", gaps.largest_s);
+  archive("largest_after_ns", gaps.largest_after_ns);
+  archive("largest_at_row", gaps.largest_at_row);
+}
+
+/// Without the counts by return, tag, device and packet, which reports do not show.
+template <class Archive, report::FieldsOf<TimeAuditResult> T>
+void fields(Archive& archive, T& audit) {
+  archive("observations", audit.observations);
+  archive("shots", audit.shots);
+  archive("no_return", audit.no_return);
+  archive("first_time_ns", audit.first_time_ns);
+  archive("last_time_ns", audit.last_time_ns);
+  archive("duration_s", audit.duration_s);
+  archive("nominal_step_s", audit.nominal_step_s);
+  archive("rate_hz", audit.rate_hz);
+  archive("gaps", audit.gaps);
+  archive("time_resets", audit.time_resets);
+  archive("non_monotonic_packets", audit.non_monotonic_packets);
+  archive("pps_wraps", audit.pps_wraps);
+  archive("azimuth_rad", audit.azimuth);
+  archive("zenith_rad", audit.zenith);
+  archive("range_m", audit.range);
+}
+
+}  // namespace recordings
+
+namespace estimation {
+
+template <class Archive, report::FieldsOf<Moments> T>
+void fields(Archive& archive, T& moments) {
+  archive("count", moments.count);
+  archive("mean", moments.mean);
+  archive("std", moments.std);
+  archive("rms", moments.rms);
+  archive("skewness", moments.skewness);
+  archive("kurtosis", moments.kurtosis);
+}
+
+template <class Archive, report::FieldsOf<WeakDirection> T>
+void fields(Archive& archive, T& weak) {
+  archive("weights", weak.weights);
+  archive("ratio", weak.ratio);
+  archive("sigma", weak.sigma);
+}
+
+}  // namespace estimation
+
+namespace calibration {
+
+std::span<const char* const> enum_names(CalibrationMethod) {
+  static constexpr const char* kNames[] = {"adjustment", "paper"};
+  return kNames;
+}
+
+std::span<const char* const> enum_names(DatumKind) {
+  static constexpr const char* kNames[] = {"none", "planes", "stations", "both"};
+  return kNames;
+}
+
+template <class Archive, report::FieldsOf<DirectionErrors> T>
+void fields(Archive& archive, T& errors) {
+  archive("azimuth_rmse", errors.azimuth_rmse);
+  archive("zenith_rmse", errors.zenith_rmse);
+  archive("azimuth_bias", errors.azimuth_bias);
+  archive("zenith_bias", errors.zenith_bias);
+  archive("total", errors.total);
+  archive("gauge", errors.gauge);
+  archive("shape", errors.shape);
+  archive("rotation", errors.rotation);
+}
+
+template <class Archive, report::FieldsOf<FormalDatum> T>
+void fields(Archive& archive, T& datum) {
+  archive("sigma_roll", datum.sigma_roll);
+  archive("sigma_pitch", datum.sigma_pitch);
+  archive("sigma_yaw", datum.sigma_yaw);
+  archive("gauge", datum.gauge);
+  archive("shape", datum.shape);
+  archive("total", datum.total);
+}
+
+template <class Archive, report::FieldsOf<PriorTest> T>
+void fields(Archive& archive, T& test) {
+  archive("name", test.name);
+  archive("station", test.station);
+  archive("misfit", test.misfit);
+  archive("chi2", test.chi2);
+  archive("degrees_of_freedom", test.degrees_of_freedom);
+  archive("critical", test.critical);
+}
+
+template <class Archive, report::FieldsOf<CalibratedPlane> T>
+void fields(Archive& archive, T& plane) {
+  archive("name", plane.name);
+  archive("recording", plane.recording);
+  archive("normal", plane.normal);
+  archive("distance_m", plane.distance);
+  archive("points", plane.points);
+  archive("outliers", plane.outliers);
+  archive("rms_m", plane.rms);
+  archive("rms_before_m", plane.rms_before);
+  archive("range_sigma_m", plane.range_sigma);
+}
+
+template <class Archive, report::FieldsOf<SurfaceStep> T>
+void fields(Archive& archive, T& step) {
+  archive("recording", step.recording);
+  archive("plane", step.plane);
+  archive("height_m", step.height);
+  archive("azimuth", step.azimuth);
+  archive("zenith", step.zenith);
+  archive("size", step.size);
+  archive("points", step.points);
+}
+
+}  // namespace calibration
+
+namespace report {
+namespace {
+
+constexpr const char* kFormat = "risley report";
+constexpr int kFormatVersion = 1;
+
+/// Numbers with the digits that a diagram needs.
+std::vector<double> shortened(const std::vector<double>& values) {
+  const int digits = digits_of(values);
+  std::vector<double> result;
+  result.reserve(values.size());
+  for (const double value : values) {
+    result.push_back(std::isfinite(value)
+                         ? std::strtod(fmt::format("{:.{}g}", value, digits).c_str(), nullptr)
+                         : value);
+  }
+  return result;
+}
+
+}  // namespace
+
+std::span<const char* const> enum_names(SeriesKind) {
+  static constexpr const char* kNames[] = {"points", "line", "steps", "cells"};
+  return kNames;
+}
+
+std::span<const char* const> enum_names(ChartKind) {
+  static constexpr const char* kNames[] = {"plain", "full_turn", "two_turns", "map", "space"};
+  return kNames;
+}
+
+std::span<const char* const> enum_names(Palette) {
+  static constexpr const char* kNames[] = {"sequential", "diverging"};
+  return kNames;
+}
+
+/// A column of a diagram: the writer shortens it, the reader takes it as it is.
+template <class Archive, class Column>
+void column(Archive& archive, const char* name, Column& values) {
+  if constexpr (std::is_const_v<Column>) {
+    archive(name, shortened(values));
+  } else {
+    archive(name, values);
+  }
+}
+
+template <class Archive, FieldsOf<Series> T>
+void fields(Archive& archive, T& series) {
+  archive("label", series.label);
+  archive("colour", series.colour);
+  archive("kind", series.kind);
+  column(archive, "x", series.x);
+  column(archive, "y", series.y);
+  column(archive, "z", series.z);
+  column(archive, "value", series.value);
+  archive("cell_width", series.cell_width);
+  archive("cell_height", series.cell_height);
+}
+
+template <class Archive, FieldsOf<Chart> T>
+void fields(Archive& archive, T& chart) {
+  archive("title", chart.title);
+  archive("kind", chart.kind);
+  archive("x_label", chart.x_label);
+  archive("y_label", chart.y_label);
+  archive("z_label", chart.z_label);
+  archive("value_label", chart.value_label);
+  archive("palette", chart.palette);
+  archive("value_range", chart.value_range);
+  archive("note", chart.note);
+  archive("series", chart.series);
+}
+
+template <class Archive, FieldsOf<ReportedParameter> T>
+void fields(Archive& archive, T& row) {
+  archive("name", row.name);
+  archive("value", row.value);
+  archive("sigma", row.sigma);
+  archive("nominal", row.nominal);
+  archive("believed", row.believed);
+  archive("truth", row.truth);
+  archive("error", row.error);
+  archive("error_over_sigma", row.error_over_sigma);
+}
+
+template <class Archive, FieldsOf<ReportedRecording> T>
+void fields(Archive& archive, T& recording) {
+  archive("name", recording.name);
+  archive("format", recording.format);
+  archive("time_from", recording.time_from);
+  archive("audit", recording.audit);
+}
+
+template <class Archive, FieldsOf<EstimateReport::Variance> T>
+void fields(Archive& archive, T& variance) {
+  archive("unit_variance", variance.unit_variance);
+  archive("autocorrelation_factor", variance.autocorrelation_factor);
+  archive("variance_factor", variance.variance_factor);
+}
+
+template <class Archive, FieldsOf<EstimateReport::Truth> T>
+void fields(Archive& archive, T& truth) {
+  archive("rotation_angle_rmse", truth.rotation_angle_rmse);
+  archive("nees_parameters", truth.nees_parameters);
+  archive("nees_rotation_angles", truth.nees_rotation_angles);
+}
+
+template <class Archive, FieldsOf<EstimateReport::Pieces> T>
+void fields(Archive& archive, T& pieces) {
+  archive("count", pieces.count);
+  archive("failed", pieces.failed);
+  archive("duration_s", pieces.duration);
+  archive("chi2_per_degree_of_freedom", pieces.chi2);
+  archive("degrees_of_freedom", pieces.degrees_of_freedom);
+}
+
+template <class Archive, FieldsOf<EstimateReport> T>
+void fields(Archive& archive, T& report) {
+  archive("recording", report.recording);
+  archive("sensor", report.sensor);
+  archive("prisms", report.prisms);
+  archive("combination", report.combination);
+  archive("mirrored", report.mirrored);
+  archive("method", report.method);
+  archive("converged", report.converged);
+  archive("reason", report.reason);
+  archive("warnings", report.warnings);
+  archive("shots", report.shots);
+  archive("outliers", report.outliers);
+  archive("parameters", report.parameters);
+  archive("free", report.free);
+  archive("covariance", report.covariance);
+  archive("unobservable", report.unobservable);
+  archive("advice", report.advice);
+  archive("azimuth_residuals", report.azimuth_residuals);
+  archive("zenith_residuals", report.zenith_residuals);
+  archive("expected_residual", report.expected_residual);
+  archive("variance", report.variance);
+  archive("residuals_over_angle_chi2_per_bin", report.unevenness);
+  archive("truth", report.truth);
+  archive("pieces", report.pieces);
+  archive("parameter_charts", report.parameter_charts);
+  archive("rotor_charts", report.rotor_charts);
+  archive("residual_charts", report.residual_charts);
+  archive("pattern_charts", report.pattern_charts);
+  archive("provenance", report.provenance);
+}
+
+template <class Archive, FieldsOf<CalibrationReport::Truth> T>
+void fields(Archive& archive, T& truth) {
+  archive("before", truth.before);
+  archive("after", truth.after);
+}
+
+template <class Archive, FieldsOf<CalibrationReport> T>
+void fields(Archive& archive, T& report) {
+  archive("recordings", report.recordings);
+  archive("observations", report.observations);
+  archive("sensor", report.sensor);
+  archive("serial", report.serial);
+  archive("preset", report.preset);
+  archive("prisms", report.prisms);
+  archive("method", report.method);
+  archive("converged", report.converged);
+  archive("reason", report.reason);
+  archive("warnings", report.warnings);
+  archive("points", report.points);
+  archive("parameters", report.parameters);
+  archive("range_offset_m", report.range_offset);
+  archive("range_offset_sigma_m", report.range_offset_sigma);
+  archive("free", report.free);
+  archive("covariance", report.covariance);
+  archive("unobservable", report.unobservable);
+  archive("datum_kind", report.datum_kind);
+  archive("datum", report.datum);
+  archive("datum_without_common", report.datum_without_common);
+  archive("prior_tests", report.prior_tests);
+  archive("planes", report.planes);
+  archive("steps", report.steps);
+  archive("rms_before_m", report.rms_before);
+  archive("rms_after_m", report.rms_after);
+  archive("sigma0", report.sigma0);
+  archive("unevenness", report.unevenness);
+  archive("variance_factor", report.variance_factor);
+  archive("truth", report.truth);
+  archive("truth_charts", report.truth_charts);
+  archive("thickness_charts", report.thickness_charts);
+  archive("wall_charts", report.wall_charts);
+  archive("view_charts", report.view_charts);
+  archive("provenance", report.provenance);
+}
+
+const char* verb_of(const Report& report) {
+  return std::holds_alternative<EstimateReport>(report) ? "estimate" : "calibrate";
+}
+
+void write_report(const std::string& path, const Report& report) {
+  const Json body = std::visit([](const auto& one) { return to_json(one); }, report);
+  Json object = {
+      {"format", kFormat}, {"format_version", kFormatVersion}, {"verb", verb_of(report)}};
+  object.update(body);
+  write_text_file(path, object.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n");
+}
+
+Report read_report(const std::string& path) {
+  const std::string text = read_text_file(path);
+  Json object;
+  try {
+    object = Json::parse(text);
+  } catch (const Json::parse_error& error) {
+    throw FileError(path, {error.byte, {}}, "the text is no JSON from here on");
+  }
+  try {
+    archive::expect(object.is_object(), "the file", "an object", object);
+    std::string format, verb;
+    int version = 0;
+    FieldReader reader(object, "");
+    reader("format", format);
+    if (format != kFormat) {
+      throw FieldError(fmt::format("format: expected '{}', found '{}'", kFormat, format));
+    }
+    reader("format_version", version);
+    if (version != kFormatVersion) {
+      throw FieldError(
+          fmt::format("format_version: expected {}, found {}", kFormatVersion, version));
+    }
+    reader("verb", verb);
+    if (verb == "estimate") {
+      EstimateReport report;
+      fields(reader, report);
+      return report;
+    }
+    if (verb == "calibrate") {
+      CalibrationReport report;
+      fields(reader, report);
+      return report;
+    }
+    throw FieldError(fmt::format("verb: expected estimate or calibrate, found '{}'", verb));
+  } catch (const FieldError& error) {
+    throw FileError(path, {}, error.what());
+  }
+}
+
+std::string report_page(const Report& report) {
+  if (const auto* estimate = std::get_if<EstimateReport>(&report)) return estimate_page(*estimate);
+  return calibration_page(std::get<CalibrationReport>(report));
+}
+
+}  // namespace report
+}  // namespace risley

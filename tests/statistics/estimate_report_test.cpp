@@ -1,0 +1,253 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+// What a report says of an estimation whose truth is known: pieces of the recording alone, maps of
+// residuals, and the page.
+#include "risley/report/estimate_report.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "risley/estimation/piecewise.hpp"
+#include "risley/estimation/residual_maps.hpp"
+#include "risley/report/estimate_page.hpp"
+
+#include "statistics/simulated.hpp"
+
+namespace risley {
+namespace {
+
+using estimation::Estimate;
+using estimation::Method;
+using ::testing::HasSubstr;
+using ::testing::Not;
+using testing::table3_settings;
+
+struct Case {
+  testing::Simulated data;
+  simulation::SimulationSettings settings;
+  Estimate estimate;
+  estimation::AngleSeries head;
+};
+
+Case make_case(std::uint64_t seed, Method method = Method::map,
+               const std::vector<std::string>& fixed = {}) {
+  Case one{{}, table3_settings(seed), {}, {}};
+  one.data = testing::simulate(one.settings);
+  estimation::ShotSelector selector({});
+  selector.add(one.data.observations);
+  estimation::EstimateOptions options;
+  options.sensor = sensors::load_sensor("mid-40");
+  options.angle_noise = radians_from_degrees(0.01);
+  options.fixed = fixed;
+  one.head = selector.head();
+  one.estimate = estimation::estimate(method, selector.take_series(), one.head, options);
+  return one;
+}
+
+TEST(PiecewiseEstimate, ScattersAsItsSigmasSay) {
+  // 20 pieces of 8 parameters, 6 recordings: 912 degrees of freedom, 1 +- 0.047.
+  double chi2 = 0;
+  constexpr int kSeeds = 6;
+  for (int seed = 0; seed < kSeeds; ++seed) {
+    const Case one = make_case(static_cast<std::uint64_t>(seed));
+    const auto pieces =
+        estimation::estimate_piecewise(one.estimate, sensors::load_sensor("mid-40"), 20);
+    EXPECT_EQ(pieces.size(), 20u);
+    EXPECT_EQ(pieces.failed, 0u);
+    EXPECT_EQ(pieces.degrees_of_freedom, 152);
+    EXPECT_NEAR(pieces.duration, 1.5, 0.01);
+    EXPECT_TRUE(std::is_sorted(pieces.time.begin(), pieces.time.end()));
+    chi2 += pieces.chi2 / kSeeds;
+  }
+  EXPECT_NEAR(chi2, 1.0, 0.19);  // four standard deviations
+}
+
+TEST(PiecewiseEstimate, ADriftShows) {
+  // A prism that tilts by 0.1 degree in the middle of the recording: two recordings one after the
+  // other, which no constant describes.
+  auto settings = table3_settings(3);
+  settings.duration = 15.0;
+  auto data = testing::simulate(settings);
+  simulation::SimulationSettings later = settings;
+  later.truth.set("prism_tilt_b_vertical_deg",
+                  settings.truth.get("prism_tilt_b_vertical_deg") + radians_from_degrees(0.1));
+  later.duration = 30.0;
+  const auto rest = testing::simulate(later);
+  const std::size_t half = data.observations.size();
+  estimation::ShotSelector selector({});
+  recordings::Observations all = data.observations;
+  const auto take = [&](auto& to, const auto& from) {
+    to.insert(to.end(), from.begin() + static_cast<std::ptrdiff_t>(half), from.end());
+  };
+  take(all.time_ns, rest.observations.time_ns);
+  take(all.azimuth, rest.observations.azimuth);
+  take(all.zenith, rest.observations.zenith);
+  recordings::Observations joined;
+  joined.append(rest.observations);
+  for (std::size_t i = 0; i < half; ++i) {
+    joined.azimuth[i] = all.azimuth[i];
+    joined.zenith[i] = all.zenith[i];
+  }
+  selector.add(joined);
+  estimation::EstimateOptions options;
+  options.sensor = sensors::load_sensor("mid-40");
+  options.angle_noise = radians_from_degrees(0.01);
+  const auto estimate =
+      estimation::estimate(Method::map, selector.take_series(), selector.head(), options);
+  const auto pieces = estimation::estimate_piecewise(estimate, sensors::load_sensor("mid-40"), 20);
+  EXPECT_GT(pieces.chi2, 2.0);
+}
+
+TEST(PiecewiseEstimate, RefusesWhatHasNoPieces) {
+  const Case filtered = make_case(1, Method::ekf);
+  const auto sensor = sensors::load_sensor("mid-40");
+  EXPECT_THROW(estimation::estimate_piecewise(filtered.estimate, sensor, 20), InvalidArgument);
+  const Case one = make_case(1);
+  EXPECT_THROW(estimation::estimate_piecewise(one.estimate, sensor, 0), InvalidArgument);
+  // Too short for an estimate: counted, not invented.
+  const auto tiny = estimation::estimate_piecewise(one.estimate, sensor, 100);
+  EXPECT_EQ(tiny.size(), 0u);
+  EXPECT_EQ(tiny.failed, 100u);
+  EXPECT_TRUE(std::isnan(tiny.chi2));
+}
+
+/// Mean square of the cells' means over what noise gives them.
+double unevenness(const estimation::ResidualMap& map) {
+  double sum = 0;
+  for (std::size_t i = 0; i < map.size(); ++i) {
+    const auto n = static_cast<double>(map.count[i]);
+    sum += 0.5 * n *
+           (std::pow(map.mean_azimuth[i] / map.sigma_azimuth, 2) +
+            std::pow(map.mean_zenith[i] / map.sigma_zenith, 2));
+  }
+  return sum / static_cast<double>(map.size());
+}
+
+TEST(ResidualMaps, AreNoiseForASensorThatTheModelDescribes) {
+  for (const Method method : {Method::map, Method::ekf}) {
+    const Case one = make_case(2, method);
+    const auto field = estimation::residuals_over_field(one.estimate, radians_from_degrees(1.0));
+    const auto angles =
+        estimation::residuals_over_angles(one.estimate, 0, 1, radians_from_degrees(10.0));
+    EXPECT_EQ(field.shots, one.estimate.series.size() - one.estimate.outliers);
+    EXPECT_EQ(angles.shots, field.shots);
+    EXPECT_EQ(angles.size(), 36u * 36u);
+    EXPECT_EQ(std::accumulate(angles.count.begin(), angles.count.end(), std::uint64_t{0}),
+              angles.shots);
+    for (std::size_t i = 0; i < angles.size(); ++i) {
+      EXPECT_GT(angles.x[i], 0);
+      EXPECT_LT(angles.x[i], kTwoPi);
+      EXPECT_LT(angles.y[i], kTwoPi);
+    }
+    // Over 1,000 cells and two axes: 1 +- 0.03.
+    EXPECT_NEAR(unevenness(field), 1.0, 0.15);
+    EXPECT_NEAR(unevenness(angles), 1.0, 0.15);
+  }
+}
+
+TEST(ResidualMaps, HavePatchesForASensorThatIsBentOtherwise) {
+  const Case one = make_case(1, Method::map, {"prism_tilt_b_vertical_deg"});  // true: -0.383
+  EXPECT_GT(unevenness(estimation::residuals_over_field(one.estimate, radians_from_degrees(2.0))),
+            1.3);
+  EXPECT_GT(
+      unevenness(estimation::residuals_over_angles(one.estimate, 0, 1, radians_from_degrees(20.0))),
+      1.5);
+}
+
+TEST(ResidualMaps, RefuseWhatMakesNoSense) {
+  const Case one = make_case(1);
+  EXPECT_THROW(estimation::residuals_over_field(one.estimate, 0), InvalidArgument);
+  EXPECT_THROW(estimation::residuals_over_angles(one.estimate, 0, 2, 0.1), InvalidArgument);
+  EXPECT_THROW(estimation::residuals_over_angles(one.estimate, -1, 1, 0.1), InvalidArgument);
+}
+
+report::EstimateReport report_of(const Case& one, bool truth = true) {
+  std::optional<estimation::Evaluation> evaluation;
+  if (truth) evaluation = estimation::evaluate(one.estimate, one.settings.truth, one.data.truth);
+  const sensors::Sensor nominal = sensors::load_sensor("mid-40");
+  const report::ReportedRecording recording{"unit <1>.lvx", "lvx-1.1", "sensor", {}};
+  const report::Provenance provenance{{"command", "risley estimate"}, {"seed", "5"}};
+  return report::estimate_report(
+      {one.estimate, nominal, evaluation, one.head, recording, provenance, {"a gap"}});
+}
+
+TEST(EstimatePage, HasEverySectionInItsOrder) {
+  const std::string html = report::estimate_page(report_of(make_case(5)));
+  std::size_t last = 0;
+  for (const char* text :
+       {"class=\"verdict", "<h2>Parameters</h2>", "<h2>What this recording does not tell</h2>",
+        "<h2>Do the parameters stand still?</h2>", "<h2>Rotors</h2>", "<h2>Residuals</h2>",
+        "<h2>Scan pattern</h2>", "<h2>Correlations of the parameters</h2>",
+        "<h2>Times of the recording</h2>", "<h2>How to make it again</h2>"}) {
+    const std::size_t at = html.find(text);
+    ASSERT_NE(at, std::string::npos) << text;
+    EXPECT_GT(at, last) << text;
+    last = at;
+  }
+  EXPECT_THAT(html, HasSubstr("unit &lt;1&gt;.lvx"));
+  EXPECT_THAT(html, Not(HasSubstr("unit <1>")));
+  EXPECT_THAT(html, HasSubstr("<li>a gap</li>"));
+}
+
+TEST(EstimateReport, DrawsEveryDistributionOfThePaper) {
+  const report::EstimateReport r = report_of(make_case(5));
+  EXPECT_EQ(r.parameter_charts.size(), 8u);  // Fig. 7
+  EXPECT_EQ(r.rotor_charts.size(), 8u);      // Figs. 8, 9, 11
+  EXPECT_EQ(r.residual_charts.size(), 10u);  // Fig. 10 and over time, field and angles
+  EXPECT_EQ(r.pattern_charts.size(), 2u);    // Fig. 2
+  for (const auto* charts :
+       {&r.parameter_charts, &r.rotor_charts, &r.residual_charts, &r.pattern_charts}) {
+    for (const report::Chart& chart : *charts) {
+      for (const report::Series& series : chart.series) {
+        EXPECT_FALSE(series.x.empty()) << chart.title;
+        EXPECT_EQ(series.x.size(), series.y.size()) << chart.title;
+        if (!series.value.empty()) {
+          EXPECT_EQ(series.value.size(), series.x.size());
+        }
+      }
+    }
+  }
+  // Thinned to what a page can hold, and said so.
+  EXPECT_LE(r.residual_charts[0].series[0].x.size(), 4000u);
+  EXPECT_THAT(r.residual_charts[0].note, HasSubstr("Of 30\u202f000 shots one in 8 is drawn."));
+  // The density counts every shot of its half second.
+  const report::Series& density = r.pattern_charts[1].series[0];
+  double shots = 0;
+  for (const double value : density.value)
+    shots += value * density.cell_width * density.cell_height;
+  EXPECT_NEAR(shots, 501, 1e-6);
+}
+
+TEST(EstimateReport, SpeedsAreDrawnAboutTheirMean) {
+  const Case one = make_case(5);
+  const report::EstimateReport r = report_of(one);
+  const report::Chart& chart = r.rotor_charts[0];
+  EXPECT_THAT(chart.y_label, HasSubstr("angular velocity less -437"));
+  for (const double change : chart.series[0].y) EXPECT_LT(std::abs(change), 6.0);  // sqrt(2) 2.2
+  const auto [least, greatest] =
+      std::minmax_element(chart.series[0].y.begin(), chart.series[0].y.end());
+  EXPECT_NEAR(*greatest - *least, 2 * std::sqrt(2.0) * 2.2, 0.8);
+}
+
+TEST(EstimateReport, WithoutTruthHasNoErrors) {
+  const Case one = make_case(5);
+  const report::EstimateReport r = report_of(one, false);
+  EXPECT_FALSE(r.truth);
+  EXPECT_EQ(r.rotor_charts.size(), 4u);
+  for (const report::ReportedParameter& row : r.parameters) EXPECT_TRUE(std::isnan(row.truth));
+  EXPECT_THAT(report::estimate_page(r), Not(HasSubstr("error / σ")));
+}
+
+TEST(EstimateReport, TheFilterHasNoPieces) {
+  const report::EstimateReport r = report_of(make_case(5, Method::ekf));
+  EXPECT_FALSE(r.pieces);
+  EXPECT_TRUE(r.parameter_charts.empty());
+  EXPECT_THAT(report::estimate_page(r), Not(HasSubstr("stand still")));
+}
+
+}  // namespace
+}  // namespace risley
