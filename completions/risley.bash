@@ -4,7 +4,7 @@
 # the command is missing here.
 _risley() {
   local current=${COMP_WORDS[COMP_CWORD]} previous=${COMP_WORDS[COMP_CWORD-1]}
-  local verbs="info convert simulate estimate observability calibrate cloud"
+  local verbs="info convert simulate estimate observability calibrate cloud report reproduce"
   local common="--help --json --threads --seed --quiet --verbose"
   local names="refractive_index_air refractive_index refractive_index_a refractive_index_b
     wedge_angle_deg wedge_angle_a_deg wedge_angle_b_deg
@@ -51,6 +51,7 @@ _risley() {
     case $verb in
       "") choices="--help --version" ;;
       info) choices="$common" ;;
+      report) choices="$common --output" ;;
       convert) choices="$common --output --format" ;;
       simulate)
         choices="$common --output --sensor --duration-s --rate-hz --noise-angle-deg
@@ -70,6 +71,7 @@ _risley() {
         choices="$common --output --calibration --format --directions --beam-origin --covariance
           --beam-divergence --common-factors --rate-hz --noise-angle-deg --las-scale-m --time
           --beam-origin-map" ;;
+      reproduce) choices="$common --output --full --recording" ;;
     esac
     mapfile -t COMPREPLY < <(compgen -W "$choices" -- "$current")
     return

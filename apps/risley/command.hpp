@@ -59,6 +59,8 @@ Run declare_estimate(CLI::App& verb);
 Run declare_observability(CLI::App& verb);
 Run declare_calibrate(CLI::App& verb);
 Run declare_cloud(CLI::App& verb);
+Run declare_report(CLI::App& verb);
+Run declare_reproduce(CLI::App& verb);
 
 /// The user pressed Ctrl-C, or the system asked to end.
 class Interrupted : public std::runtime_error {

@@ -51,6 +51,12 @@ constexpr Verb kVerbs[] = {
      "  risley cloud recording.lvx --calibration calibration/calibration.yaml -o cloud.las\n"
      "  risley cloud 'flight/*.lvx' --calibration mid-40 --format ply -o clouds/",
      declare_cloud},
+    {"report", "The page of a result folder, drawn again from its report.json",
+     "  risley report result/\n  risley report result/ -o sensor-17.html", declare_report},
+    {"reproduce", "Every table and figure of the paper, ours beside the paper's",
+     "  risley reproduce -o reproduction/\n"
+     "  risley reproduce --full --recording stationary.lvx -o reproduction/",
+     declare_reproduce},
 };
 
 void add_common_options(CLI::App& verb, CommonOptions& common) {

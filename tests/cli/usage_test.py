@@ -7,7 +7,8 @@ import unittest
 
 from command import CommandTest
 
-VERBS = ("info", "convert", "simulate", "estimate", "observability", "calibrate", "cloud")
+VERBS = ("info", "convert", "simulate", "estimate", "observability", "calibrate", "cloud",
+         "report", "reproduce")
 
 # Arguments that are wrong, and what the message must name.
 WRONG = [
@@ -50,6 +51,8 @@ WRONG = [
     (["cloud", "a.lvx", "--calibration", "mid-40", "-o", "a.las", "--covariance", "no",
       "--common-factors", "yes"], "--common-factors"),
     (["cloud", "none*.lvx", "--calibration", "mid-40", "-o", "folder/"], "none*.lvx"),
+    (["report"], "DIR"),
+    (["reproduce"], "--output"),
     (["estimate", "a.csv", "--rate-hz", "fast"], "--rate-hz"),
     (["estimate", "a.csv", "--method", "guess"], "guess"),
     (["estimate", "a.csv", "--method", "ekf", "--states", "all"], "--rate-hz full"),

@@ -1,0 +1,160 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "risley/reproduction/reproduce.hpp"
+
+#include <cmath>
+#include <filesystem>
+#include <memory>
+#include <string>
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include "risley/core/output_file.hpp"
+#include "risley/reproduction/reproduction_page.hpp"
+
+#include "command.hpp"
+#include "estimation_input.hpp"
+#include "recording_text.hpp"
+#include "result_folder.hpp"
+#include "table.hpp"
+
+namespace risley::app {
+namespace {
+
+using reproduction::Check;
+using reproduction::Reproduction;
+using reproduction::Row;
+
+struct ReproduceCommandOptions {
+  std::string folder, recording;
+  bool full = false;
+};
+
+/// A number, or null where there is none.
+Json number_json(double value) { return std::isfinite(value) ? Json(value) : Json(); }
+
+Json row_json(const Row& row) {
+  Json object = {{"term", row.term},
+                 {"paper", row.paper ? Json(row.paper->value) : Json()},
+                 {"paper_text", row.paper ? Json(row.paper->text) : Json()},
+                 {"ours", number_json(row.ours)},
+                 {"unit", row.unit},
+                 {"pass", passes(row)},
+                 {"bound", bound_text(row)},
+                 {"reason", reason_text(row)}};
+  if (row.sigma) object["sigma"] = number_json(*row.sigma);
+  if (row.distribution) {
+    object["distribution"] = {{"quantile_05", row.distribution->low},
+                              {"median", row.distribution->median},
+                              {"quantile_95", row.distribution->high},
+                              {"percentile_of_paper", row.distribution->percentile},
+                              {"draws", row.distribution->draws}};
+  }
+  Json checks = Json::array();
+  for (const Check& check : row.checks) {
+    checks.push_back({{"what", check.what},
+                      {"value", number_json(check.value)},
+                      {"least", number_json(check.least)},
+                      {"greatest", number_json(check.greatest)},
+                      {"why", check.why},
+                      {"pass", passes(check)}});
+  }
+  object["checks"] = checks;
+  if (!row.note.empty()) object["note"] = row.note;
+  return object;
+}
+
+Json reproduction_json(const Reproduction& found, const CommonOptions& common,
+                       const std::vector<std::string>& inputs) {
+  Json tables = Json::object();
+  for (const reproduction::Table& table : found.tables) {
+    Json rows = Json::array();
+    for (const Row& row : table.rows) rows.push_back(row_json(row));
+    tables[table.name] = {{"title", table.title}, {"method", table.method}, {"rows", rows}};
+  }
+  Json provenance = Json::object();
+  for (const auto& [name, value] : provenance_of(common, inputs)) provenance[name] = value;
+  return {{"rows", row_count(found)},
+          {"passed", passed_count(found)},
+          {"tables", tables},
+          {"provenance", provenance}};
+}
+
+void print_reproduction(const Reproduction& found) {
+  for (const reproduction::Table& table : found.tables) {
+    fmt::print("{}\n", table.title);
+    Table text({"", "term", "paper", "ours", "unit"});
+    for (const Row& row : table.rows) {
+      text.add({passes(row) ? "pass" : "FAIL", row.term, row.paper ? row.paper->text : "-",
+                fmt::format("{:.6g}", row.ours), row.unit});
+    }
+    text.print();
+    fmt::print("\n");
+  }
+  for (const reproduction::Table& table : found.tables) {
+    for (const Row& row : table.rows) {
+      if (!passes(row)) fmt::print("{}, {}: {}\n", table.name, row.term, reason_text(row));
+    }
+  }
+  fmt::print("{} of {} rows pass\n", passed_count(found), row_count(found));
+}
+
+/// The recording of a real unit, read as estimate reads one.
+reproduction::RealRecording real_recording(const std::string& path, const CommonOptions& common) {
+  RecordingInput input = read_recording(path, {}, common);
+  for (const std::string& warning : warning_texts(input.reader->warnings())) spdlog::warn(warning);
+  reproduction::RealRecording recording;
+  recording.name = std::filesystem::path(path).filename().string();
+  recording.sensor = estimate_options(EstimationWishes{}, input.reader->header()).sensor;
+  recording.head = input.selector.head();
+  recording.series = input.selector.take_series();
+  return recording;
+}
+
+ExitStatus run_reproduce(const ReproduceCommandOptions& options, const CommonOptions& common) {
+  make_result_folder(options.folder);
+  reproduction::ReproduceOptions settings;
+  settings.seed = common.seed;
+  if (options.full) settings.effort = reproduction::kFullEffort;
+  std::vector<std::string> inputs;
+  if (!options.recording.empty()) {
+    settings.recording = real_recording(options.recording, common);
+    inputs.push_back(options.recording);
+  }
+  Reproduction found;
+  {
+    ProgressBar bar("reproducing", common);
+    found = reproduction::reproduce(settings, bar.callback());
+  }
+  const Json object = reproduction_json(found, common, inputs);
+  const auto path = [&](const char* name) {
+    return (std::filesystem::path(options.folder) / name).string();
+  };
+  write_text_file(path("report.html"),
+                  reproduction::reproduction_page(found, provenance_of(common, inputs)));
+  write_text_file(path("reproduction.json"),
+                  object.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
+  if (common.json) {
+    print_json(object);
+  } else {
+    print_reproduction(found);
+  }
+  return passed_count(found) == row_count(found) ? kDone : kNumbersFailed;
+}
+
+}  // namespace
+
+Run declare_reproduce(CLI::App& verb) {
+  const auto options = std::make_shared<ReproduceCommandOptions>();
+  ReproduceCommandOptions& o = *options;
+  verb.add_option("-o,--output", o.folder, "Folder for reproduction.json and report.html")
+      ->required();
+  verb.add_flag("--full", o.full,
+                "More random draws, and Table 3 from all 100,000 shots a second (minutes)");
+  verb.add_option("--recording", o.recording,
+                  "Recording of a real, stationary Mid-40 for section 3.1");
+  return [options](const CommonOptions& common) { return run_reproduce(*options, common); };
+}
+
+}  // namespace risley::app
