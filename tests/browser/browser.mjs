@@ -1,0 +1,82 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+// Headless Chromium for the tests beside this file and for tools/pictures.mjs.
+//   RISLEY_PLAYWRIGHT  folder of the package playwright-core (CMake sets it)
+//   RISLEY_CHROMIUM    the browser, if it is not chromium or chromium-browser of PATH
+import { accessSync, constants } from 'node:fs';
+import { delimiter, join, resolve } from 'node:path';
+import { pathToFileURL } from 'node:url';
+
+export const longestDrawing = 60_000; // ms
+
+function findChromium() {
+  if (process.env.RISLEY_CHROMIUM) return process.env.RISLEY_CHROMIUM;
+  for (const name of ['chromium', 'chromium-browser']) {
+    for (const folder of (process.env.PATH ?? '').split(delimiter)) {
+      try {
+        accessSync(join(folder, name), constants.X_OK);
+        return join(folder, name);
+      } catch {
+        continue;
+      }
+    }
+  }
+  return undefined;
+}
+
+// Ends the process with the status that ctest shows as skipped, if something is missing.
+export function skipWithoutBrowser() {
+  const missing = [];
+  if (!process.env.RISLEY_PLAYWRIGHT) missing.push('RISLEY_PLAYWRIGHT');
+  if (!findChromium()) missing.push('chromium (or RISLEY_CHROMIUM)');
+  if (missing.length === 0) return;
+  console.log('SKIPPED: no ' + missing.join(', no '));
+  process.exit(77);
+}
+
+export async function launch() {
+  const index = join(resolve(process.env.RISLEY_PLAYWRIGHT), 'index.mjs');
+  const { chromium } = await import(pathToFileURL(index).href);
+  return chromium.launch({
+    executablePath: findChromium(),
+    // WebGL without a graphics card
+    args: ['--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--ignore-gpu-blocklist'],
+  });
+}
+
+// A new tab. complaints: what the page says or asks for and should not.
+export async function newTab(browser, options = {}) {
+  const context = await browser.newContext({
+    viewport: { width: 1300, height: 900 }, colorScheme: 'light', reducedMotion: 'reduce',
+    ...options,
+  });
+  const tab = await context.newPage();
+  const complaints = [];
+  let own;
+  tab.on('console', (message) => {
+    if (['error', 'warning'].includes(message.type())) {
+      complaints.push(message.type() + ' on the console: ' + message.text());
+    }
+  });
+  tab.on('pageerror', (error) => complaints.push('uncaught: ' + error.message));
+  tab.on('request', (request) => {
+    const url = request.url();
+    if (url !== own && !/^(data|blob):/.test(url)) complaints.push('request: ' + url);
+  });
+  const open = async (file) => {
+    own = pathToFileURL(resolve(file)).href;
+    await tab.goto(own);
+  };
+  return { tab, context, complaints, open };
+}
+
+// A new tab in which all diagrams of a page are drawn. milliseconds: from the start of the
+// navigation until then.
+export async function openPage(browser, file, options = {}) {
+  const opened = await newTab(browser, options);
+  await opened.open(file);
+  await opened.tab.waitForFunction(() => document.documentElement.dataset.drawn, null,
+                                   { timeout: longestDrawing, polling: 10 });
+  opened.milliseconds = await opened.tab.evaluate(() => performance.now());
+  return opened;
+}

@@ -1,0 +1,106 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+// The whole inspection of one page, as tests of node:test.
+//   RISLEY_COMMAND     the built command
+//   RISLEY_SOURCE_DIR  root of the repository
+//   RISLEY_ARTEFACTS   folder for screenshots, PDFs and opening times (default: artefacts)
+import assert from 'node:assert/strict';
+import { spawnSync } from 'node:child_process';
+import { appendFileSync, existsSync, mkdirSync, mkdtempSync, rmSync } from 'node:fs';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
+import { after, before, describe, test } from 'node:test';
+import * as checks from './checks.mjs';
+import { launch, newTab, openPage } from './browser.mjs';
+
+const artefacts = process.env.RISLEY_ARTEFACTS || 'artefacts';
+export const source = process.env.RISLEY_SOURCE_DIR;
+
+// A folder that goes when the process ends.
+export function ownFolder() {
+  const folder = mkdtempSync(join(tmpdir(), 'risley-browser-'));
+  process.on('exit', () => rmSync(folder, { recursive: true, force: true }));
+  return folder;
+}
+
+// Runs the command in a folder and demands an exit status.
+export function risley(folder, status, ...words) {
+  const done = spawnSync(process.env.RISLEY_COMMAND, [...words, '--quiet'],
+                         { cwd: folder, encoding: 'utf8', maxBuffer: 1 << 28 });
+  assert.equal(done.status, status, words.join(' ') + '\n' + done.stdout + done.stderr);
+  return done.stdout;
+}
+
+// make: makes the page and returns its path. says: what its text must match. whole: also what the
+// script that all pages share does with mouse, keys, colours and paper.
+export function inspect(name, make, says, whole = true) {
+  const testScript = whole ? test : () => undefined;
+  describe(name, () => {
+    let browser, page, file;
+    const good = async (complaints) => assert.deepEqual(await complaints, []);
+    const artefact = (ending) => join(artefacts, name + ending);
+
+    before(async () => {
+      mkdirSync(artefacts, { recursive: true });
+      file = make();
+      assert.ok(existsSync(file), file);
+      browser = await launch();
+      page = await openPage(browser, file);
+      const diagrams = await page.tab.evaluate(() => document.documentElement.dataset.drawn);
+      const line = `${name}: ${diagrams} diagrams drawn ${Math.round(page.milliseconds)} ms ` +
+        'after the start of the navigation';
+      console.log(line); // never asserted: machines differ
+      appendFileSync(artefact('.txt'), line + '\n');
+    });
+    after(() => browser?.close());
+
+    test('its file is small', () => good(checks.checkFile(file)));
+    test('says what it is about', async () => {
+      assert.match(await page.tab.locator('main').innerText(), says);
+    });
+    test('draws every diagram', async () => {
+      await page.tab.screenshot({ path: artefact('-light.png'), fullPage: true });
+      await good(checks.checkDrawn(page.tab));
+    });
+    testScript('changes its colours', () => good(checks.checkTheme(page.tab)));
+    test('shows values under the mouse', () => good(checks.checkHover(page.tab)));
+    testScript('zooms and moves with the mouse', () => good(checks.checkMouse(page.tab)));
+    testScript('rotates what has three dimensions', () => good(checks.checkRotation(page.tab)));
+    testScript('obeys the keyboard', () => good(checks.checkKeyboard(page.tab)));
+    testScript('prints', async () => {
+      const fresh = await openPage(browser, file);
+      await good(checks.checkPrint(fresh.tab, artefact('.pdf')));
+      await good(fresh.complaints);
+      await fresh.context.close();
+    });
+    testScript('starts dark where the system is dark', async () => {
+      const dark = await openPage(browser, file, { colorScheme: 'dark' });
+      assert.equal(await dark.tab.evaluate(() => document.documentElement.dataset.theme), 'dark');
+      await dark.tab.screenshot({ path: artefact('-dark.png'), fullPage: true });
+      await good(dark.complaints);
+      await dark.context.close();
+    });
+    testScript('fits a narrow screen', async () => {
+      const narrow = await openPage(browser, file, { viewport: { width: 400, height: 800 } });
+      await narrow.tab.screenshot({ path: artefact('-narrow.png'), fullPage: true });
+      await good(checks.checkWidth(narrow.tab));
+      await good(checks.checkDrawn(narrow.tab));
+      await good(narrow.complaints);
+      await narrow.context.close();
+      await page.tab.setViewportSize({ width: 400, height: 800 }); // and one that becomes narrow
+      await page.tab.waitForFunction(() => window.risley.charts.every(({ chart, place }) =>
+        place.getBoundingClientRect().right <= 400 && chart.getWidth() === place.clientWidth),
+        null, { timeout: 30_000 }).catch(() => {}); // all diagrams follow; the check judges
+      await good(checks.checkWidth(page.tab));
+      await page.tab.setViewportSize({ width: 1300, height: 900 });
+    });
+    testScript('is readable without JavaScript', async () => {
+      const bare = await newTab(browser, { javaScriptEnabled: false });
+      await bare.open(file);
+      await good(checks.checkWithoutScript(bare.tab, page.tab));
+      await good(bare.complaints);
+      await bare.context.close();
+    });
+    test('complains about nothing and asks for nothing', () => good(page.complaints));
+  });
+}
