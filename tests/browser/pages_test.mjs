@@ -1,7 +1,8 @@
 #!/usr/bin/env node
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-// The pages of estimate, calibrate and cloud, made by the command and opened in a browser.
+// The pages of estimate, calibrate and cloud, made by the command and opened in a browser. What
+// the script that they share does with mouse, keys, colours and paper is tried on two of them.
 import { join } from 'node:path';
 import { skipWithoutBrowser } from './browser.mjs';
 import { inspect, ownFolder, risley, source } from './pages.mjs';
@@ -26,11 +27,11 @@ inspect('calibrate', () => {
 inspect('cloud', () => {
   risley(folder, 0, 'cloud', '--calibration', 'mid-40', '--beam-origin-map', 'origins.html');
   return join(folder, 'origins.html');
-}, /beam/);
+}, /beam/, false);
 
 inspect('not-converged', () => {
   risley(folder, 0, 'simulate', '-o', 'short.nc', '--sensor', 'mid-40-table3', '--rotor',
          'sinusoidal', '--duration-s', '2', '--seed', '1');
   risley(folder, 1, 'estimate', 'short.nc', '--noise-angle-deg', '0.04', '-o', 'not-converged');
   return join(folder, 'not-converged/report.html');
-}, /Not converged: do not use these numbers/);
+}, /Not converged: do not use these numbers/, false);

@@ -1,7 +1,8 @@
 #!/usr/bin/env node
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-// The page of reproduce, which computes for minutes.
+// The page of reproduce, which computes for a minute.
+//   RISLEY_REPRODUCED  folder that cli.reproduce_test kept; without it the command runs here
 import { spawnSync } from 'node:child_process';
 import { join } from 'node:path';
 import { skipWithoutBrowser } from './browser.mjs';
@@ -16,6 +17,8 @@ if (spawnSync(process.env.RISLEY_COMMAND, ['reproduce', '--help'], { encoding: '
 const folder = ownFolder();
 
 inspect('reproduce', () => {
+  const kept = process.env.RISLEY_REPRODUCED;
+  if (kept) return join(kept, 'report.html');
   risley(folder, 0, 'reproduce', '-o', 'reproduce');
   return join(folder, 'reproduce/report.html');
 }, /Table 3/, false);
