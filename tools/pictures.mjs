@@ -214,7 +214,7 @@ function cloudPage() {
     y_label: 'Y (left), m', z_label: 'Z (up), m', value_label: 'standard deviation, mm',
     kind: 'space', palette: 'sequential', value_range: [at(0.01), at(0.99)],
     series: [{ label: '', colour: 'a', kind: 'points', x: pick(column.X, 3), y: pick(column.Y, 3),
-               z: pick(column.Z, 3), value: pick(sigma, 2), cell: [0, 0] }],
+               z: pick(column.Z, 3), value: pick(sigma, 2), cell_width: 0, cell_height: 0 }],
   };
   const page = readFileSync(join(folder, 'out/calibration/report.html'), 'utf8');
   const between = (text, from, to, middle) => {

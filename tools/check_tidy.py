@@ -1,0 +1,118 @@
+#!/usr/bin/env python3
+# SPDX-FileCopyrightText: 2026 The risley authors
+# SPDX-License-Identifier: MIT
+"""Runs clang-tidy with the checks of .clang-tidy on the sources in src/ and apps/.
+
+Most of its time goes into the headers of libraries, so the sources of a layer are looked at in one
+piece, as one file that includes them all. That also finds a name which stands for two things, or
+twice for the same, within a layer. Kernels, which have a compiler command of their own, and
+formats, of which each has a recognises and an open, are looked at alone.
+
+Usage: tools/check_tidy.py BUILD_FOLDER [--changed]
+  BUILD_FOLDER  holds compile_commands.json, as the preset dev writes it
+  --changed     only the sources that differ from the last commit, one by one
+RISLEY_JOBS limits the number of processes. Exit status: 0 all well, 1 a check fails, 77 skipped for
+want of clang-tidy.
+"""
+
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+from collections import defaultdict
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+
+
+def commands_of(build):
+    """The compiler's command for every source, without what it reads and writes."""
+    file = build / 'compile_commands.json'
+    if not file.exists():
+        sys.exit(f'check_tidy: {file} is missing; configure with --preset dev')
+    commands = {}
+    for entry in json.loads(file.read_text()):
+        source = Path(entry['directory'], entry['file']).resolve()
+        command = re.sub(r' -o \S+ -c \S+$', '', entry['command'])
+        commands.setdefault(source, (entry['directory'], command))  # kernels: the first set
+    return commands
+
+
+def changed_sources():
+    def git(*words):
+        return subprocess.run(['git', *words, '--', 'src', 'apps'], cwd=ROOT, check=True,
+                              capture_output=True, text=True).stdout.splitlines()
+    names = git('diff', '--name-only', '--diff-filter=d', 'HEAD')
+    names += git('ls-files', '--others', '--exclude-standard')
+    return sorted({ROOT / name for name in names if name.endswith('.cpp')})
+
+
+def pieces_of(sources, commands, together):
+    """Lists of sources that are looked at as one file, those that take longest first."""
+    groups = defaultdict(list)
+    for source in sources:
+        if source not in commands:
+            sys.exit(f'check_tidy: {source} is not in compile_commands.json; configure anew')
+        layer = source.relative_to(ROOT).parts[:2]
+        alone = (not together or source.stem.endswith('_kernel')
+                 or source.parent.name == 'formats')
+        groups[layer + ((source.name,) if alone else ())].append(source)
+    return sorted(groups.values(), key=len, reverse=True)
+
+
+def look_at(sources, number, folder, commands):
+    """Runs clang-tidy on one piece. Returns whether it passes, and what it said."""
+    piece = folder / f'piece_{number}.cpp'
+    piece.write_text(''.join(f'#include "{source}"\n' for source in sources))
+    place = folder / f'piece_{number}'
+    place.mkdir()
+    directory, command = commands[sources[0]]
+    (place / 'compile_commands.json').write_text(json.dumps(
+        [{'directory': directory, 'command': f'{command} -c {piece}', 'file': str(piece)}]))
+    done = subprocess.run(
+        ['clang-tidy', '-p', str(place), f'--config-file={ROOT / ".clang-tidy"}', '--quiet',
+         r'--header-filter=(include/risley|src|apps)/.*\.[hc]pp$',
+         '--extra-arg=-Wno-unknown-warning-option',
+         '--extra-arg=-Wno-shadow',  # of a name in another file; the compiler looks for real ones
+         str(piece)],
+        capture_output=True, text=True)
+    # Nobody asks how many warnings system headers would have given.
+    said = [line for line in (done.stdout + done.stderr).splitlines()
+            if not re.match(r'\d+ (warning|error).* (generated|treated)', line)]
+    return done.returncode == 0, '\n'.join(said)
+
+
+def main(arguments):
+    if not arguments or arguments[1:] not in ([], ['--changed']):
+        sys.exit(__doc__)
+    if not shutil.which('clang-tidy'):
+        print('check_tidy: SKIPPED, there is no clang-tidy (scripts/install-dependencies --lint)')
+        return 77
+    build = Path(arguments[0]).resolve()
+    commands = commands_of(build)
+    changed = arguments[1:] == ['--changed']
+    sources = changed_sources() if changed else sorted(
+        source for folder in ('src', 'apps') for source in (ROOT / folder).rglob('*.cpp'))
+    folder = build / 'tidy'
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir()
+    pieces = pieces_of(sources, commands, not changed)
+    jobs = int(os.environ.get('RISLEY_JOBS') or os.cpu_count())
+    with ThreadPoolExecutor(jobs) as pool:
+        results = list(pool.map(lambda piece: look_at(piece[1], piece[0], folder, commands),
+                                enumerate(pieces)))
+    for passed, said in results:
+        if said:
+            print(said)
+    if not all(passed for passed, _ in results):
+        print('check_tidy: failed, see above')
+        return 1
+    print(f'check_tidy: {len(sources)} sources pass')
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main(sys.argv[1:]))
