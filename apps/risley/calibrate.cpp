@@ -190,9 +190,9 @@ void compare(const RangedRecording& recording, const PrismTrain& calibrated,
   }
 }
 
-TruthErrors evaluate_with(const CalibrateCommandOptions& options,
-                          const std::vector<RangedRecording>& recordings,
-                          const Calibration& calibration) {
+report::CalibrationReportInput::Truth evaluate_with(const CalibrateCommandOptions& options,
+                                                    const std::vector<RangedRecording>& recordings,
+                                                    const Calibration& calibration) {
   if (options.truths.size() != recordings.size()) {
     throw InvalidArgument(fmt::format("{} truth files for {} recordings: --truth takes one each",
                                       options.truths.size(), recordings.size()));
@@ -207,13 +207,10 @@ TruthErrors evaluate_with(const CalibrateCommandOptions& options,
     compare(recordings[r], calibration.sensor.train, calibration.angle_shift[r], options.truths[r],
             kMostBeams / recordings.size(), beams);
   }
-  TruthErrors errors{calibration::direction_errors(beams.before, beams.truth),
-                     calibration::direction_errors(beams.after, beams.truth),
-                     sensors::load_sensor(options.truths.front()),
-                     {},
-                     {},
-                     {},
-                     {}};
+  report::CalibrationReportInput::Truth errors;
+  errors.before = calibration::direction_errors(beams.before, beams.truth);
+  errors.after = calibration::direction_errors(beams.after, beams.truth);
+  errors.sensor = sensors::load_sensor(options.truths.front());
   for (std::size_t i = 0; i < beams.truth.size(); ++i) {
     const SphericalAngles<double> truth = angles_from_direction(beams.truth[i]);
     const auto add = [&truth](const Vector3<double>& beam, std::vector<double>& azimuth,
@@ -243,14 +240,8 @@ void write_folder(const CalibrateCommandOptions& options, const CommonOptions& c
   } else {
     remove_calibration(options.folder);
   }
-  std::optional<report::CalibrationReportInput::Truth> truth;
-  if (outcome.truth) {
-    const TruthErrors& t = *outcome.truth;
-    truth = {t.before,        t.after,         t.sensor,      t.azimuth_before,
-             t.zenith_before, t.azimuth_after, t.zenith_after};
-  }
-  write_report_of(report::calibration_report(
-                      {c, outcome.nominal, truth, outcome.reported, provenance, outcome.warnings}),
+  write_report_of(report::calibration_report({c, outcome.nominal, outcome.truth, outcome.reported,
+                                              provenance, outcome.warnings}),
                   options.folder);
 }
 

@@ -24,10 +24,6 @@ using calibration::FormalDatum;
 
 double deg(double radians) { return degrees_from_radians(radians); }
 
-double in_file_unit(const std::string& name, double value, int prisms) {
-  return value / find_parameter(name, prisms).si_per_unit;
-}
-
 Json errors_json(const DirectionErrors& e) {
   return {{"azimuth_rmse_deg", deg(e.azimuth_rmse)},
           {"zenith_rmse_deg", deg(e.zenith_rmse)},
@@ -175,7 +171,7 @@ void print_calibration(const CalibrationOutcome& outcome) {
         name, text.value, text.sigma, find_parameter(name, prisms).unit,
         report::text_to_place_of(in_file_unit(name, c.believed.get(name), prisms), sigma)};
     if (outcome.truth) {
-      const double truth = in_file_unit(name, outcome.truth->sensor.get(name), prisms);
+      const double truth = in_file_unit(name, outcome.truth->sensor->get(name), prisms);
       row.push_back(report::text_to_place_of(truth, sigma));
       row.push_back(fmt::format("{:.2f}", (value - truth) / sigma));
     }

@@ -9,19 +9,11 @@
 
 #include "risley/calibration/calibrate.hpp"
 #include "risley/calibration/calibration_plan.hpp"
-#include "risley/report/report_facts.hpp"
+#include "risley/report/calibration_report.hpp"
 
 #include "command.hpp"
 
 namespace risley::app {
-
-/// Errors of the beams' directions before and after, of all recordings together.
-struct TruthErrors {
-  calibration::DirectionErrors before, after;
-  sensors::Sensor sensor;
-  /// Computed minus true angles of the compared beams, rad.
-  std::vector<double> azimuth_before, zenith_before, azimuth_after, zenith_after;
-};
 
 /// Everything one calibration found.
 struct CalibrationOutcome {
@@ -29,7 +21,7 @@ struct CalibrationOutcome {
   std::vector<std::string> recordings;  ///< as typed
   std::vector<report::ReportedRecording> reported;
   sensors::Sensor nominal;
-  std::optional<TruthErrors> truth;
+  std::optional<report::CalibrationReportInput::Truth> truth;
   std::vector<std::string> warnings;  ///< of the recordings
   std::uint64_t observations = 0;
   double read_s = 0, angles_s = 0, solve_s = 0, total_s = 0;

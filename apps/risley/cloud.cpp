@@ -32,7 +32,7 @@ struct CloudCommandOptions {
   double las_scale_m = cloud::CloudWriterOptions{}.las_scale;
 };
 
-std::string known_endings() {
+std::string cloud_endings() {
   std::string text;
   for (const cloud::CloudFormat& format : cloud::cloud_formats()) {
     text += fmt::format("\n  {:<8} {} ({})", format.ending, format.description, format.name);
@@ -40,7 +40,7 @@ std::string known_endings() {
   return text;
 }
 
-std::set<std::string> format_names() {
+std::set<std::string> cloud_format_names() {
   std::set<std::string> names;
   for (const auto& format : cloud::cloud_formats()) names.insert(format.name);
   return names;
@@ -126,11 +126,9 @@ ExitStatus write_beam_origin_map(const CloudCommandOptions& options,
   return kDone;
 }
 
-using Provenance = std::vector<std::pair<std::string, std::string>>;
-
 /// The calibration that all clouds of a command are made with.
-Provenance calibration_provenance(const std::string& calibration) {
-  Provenance result = {{"calibration", calibration}};
+report::Provenance calibration_provenance(const std::string& calibration) {
+  report::Provenance result = {{"calibration", calibration}};
   if (std::filesystem::exists(calibration)) {
     result.emplace_back("calibration_sha256", sha256_of_file(calibration));
   }
@@ -176,10 +174,10 @@ Run declare_cloud(CLI::App& verb) {
       "-o,--output", o.output,
       "Cloud to write, or a folder for several (made where it is missing); its ending "
       "chooses the format:" +
-          known_endings());
+          cloud_endings());
   verb.add_option("--format", o.format,
                   "Format to write, whatever the ending; in a folder las-1.4 unless said otherwise")
-      ->check(CLI::IsMember(format_names()));
+      ->check(CLI::IsMember(cloud_format_names()));
   verb.add_option("--directions", o.directions,
                   "smoothed: where the calibration sends the beam at the smoothed rotation angles; "
                   "reported: where the sensor says")
@@ -224,7 +222,7 @@ Run declare_cloud(CLI::App& verb) {
     }
     const std::vector<FileJob> jobs = file_jobs(options->inputs, options->output, ending);
     settings.writer.format = options->format;
-    const Provenance of_calibration = calibration_provenance(options->calibration);
+    const report::Provenance of_calibration = calibration_provenance(options->calibration);
     return run_file_jobs(
         jobs, "making points", "points",
         [&](const FileJob& job, const Progress& progress) {

@@ -115,6 +115,10 @@ std::pair<std::string, double> parameter_assignment(const std::string& text, int
   return {name, value};
 }
 
+double in_file_unit(const std::string& name, double value, int prisms) {
+  return value / find_parameter(name, prisms).si_per_unit;
+}
+
 double positive_number(const std::string& text, std::string_view option, std::string_view unit) {
   const double value = number_from(text, option);
   check_positive(value, option, unit);

@@ -23,7 +23,7 @@ struct ConvertOptions {
   std::string output, format;
 };
 
-std::string known_endings() {
+std::string recording_endings() {
   std::string text;
   for (const recordings::WritableFormat& format : recordings::writable_formats()) {
     text += fmt::format("\n  {:<18} {} ({})", format.ending, format.description, format.name);
@@ -31,7 +31,7 @@ std::string known_endings() {
   return text;
 }
 
-std::set<std::string> format_names() {
+std::set<std::string> recording_format_names() {
   std::set<std::string> names;
   for (const auto& format : recordings::writable_formats()) names.insert(format.name);
   return names;
@@ -97,11 +97,11 @@ Run declare_convert(CLI::App& verb) {
   verb.add_option("-o,--output", options->output,
                   "Recording to write, or a folder for several (made where it is missing); its "
                   "ending chooses the format:" +
-                      known_endings())
+                      recording_endings())
       ->required();
   verb.add_option("--format", options->format,
                   "Format to write, whatever the ending; needed for a folder")
-      ->check(CLI::IsMember(format_names()));
+      ->check(CLI::IsMember(recording_format_names()));
   return [options](const CommonOptions& common) {
     const bool folder = output_is_folder(options->inputs, options->output);
     const std::vector<FileJob> jobs =

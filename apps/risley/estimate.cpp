@@ -83,10 +83,6 @@ Evaluation evaluate_with(const std::string& truth_path, const Estimate& estimate
   return estimation::evaluate(estimate, sensor, columns);
 }
 
-double in_file_unit(const std::string& name, double value, int prisms) {
-  return value / find_parameter(name, prisms).si_per_unit;
-}
-
 Json moments_json(const estimation::Moments& moments) {
   return {{"mean", degrees_from_radians(moments.mean)},
           {"std", degrees_from_radians(moments.std)},

@@ -2,13 +2,11 @@
 // SPDX-License-Identifier: MIT
 #include "risley/reproduction/reproduce.hpp"
 
-#include <cmath>
 #include <filesystem>
 #include <memory>
 #include <string>
 
 #include <fmt/format.h>
-#include <spdlog/spdlog.h>
 
 #include "risley/core/output_file.hpp"
 #include "risley/reproduction/reproduction_page.hpp"
@@ -31,19 +29,17 @@ struct ReproduceCommandOptions {
   bool full = false;
 };
 
-/// A number, or null where there is none.
-Json number_json(double value) { return std::isfinite(value) ? Json(value) : Json(); }
-
+/// A number that is not finite prints as null.
 Json row_json(const Row& row) {
   Json object = {{"term", row.term},
                  {"paper", row.paper ? Json(row.paper->value) : Json()},
                  {"paper_text", row.paper ? Json(row.paper->text) : Json()},
-                 {"ours", number_json(row.ours)},
+                 {"ours", row.ours},
                  {"unit", row.unit},
                  {"pass", passes(row)},
                  {"bound", bound_text(row)},
                  {"reason", reason_text(row)}};
-  if (row.sigma) object["sigma"] = number_json(*row.sigma);
+  if (row.sigma) object["sigma"] = *row.sigma;
   if (row.distribution) {
     object["distribution"] = {{"quantile_05", row.distribution->low},
                               {"median", row.distribution->median},
@@ -54,9 +50,9 @@ Json row_json(const Row& row) {
   Json checks = Json::array();
   for (const Check& check : row.checks) {
     checks.push_back({{"what", check.what},
-                      {"value", number_json(check.value)},
-                      {"least", number_json(check.least)},
-                      {"greatest", number_json(check.greatest)},
+                      {"value", check.value},
+                      {"least", check.least},
+                      {"greatest", check.greatest},
                       {"why", check.why},
                       {"pass", passes(check)}});
   }
@@ -103,7 +99,7 @@ void print_reproduction(const Reproduction& found) {
 /// The recording of a real unit, read as estimate reads one.
 reproduction::RealRecording real_recording(const std::string& path, const CommonOptions& common) {
   RecordingInput input = read_recording(path, {}, common);
-  for (const std::string& warning : warning_texts(input.reader->warnings())) spdlog::warn(warning);
+  log_warnings(path, input.reader->warnings());
   reproduction::RealRecording recording;
   recording.name = std::filesystem::path(path).filename().string();
   recording.sensor = estimate_options(EstimationWishes{}, input.reader->header()).sensor;

@@ -27,9 +27,9 @@ namespace {
 using Eigen::Index;
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-constexpr std::size_t kCoarseShots = 40000;  // of all recordings together, to find the planes with
-constexpr std::size_t kBundleBeams = 4000;   // for formal sigmas of the beams
-constexpr std::size_t kSampleShots = 20000;  // for pictures
+constexpr std::size_t kCoarseShots = 40000;   // of all recordings together, to find the planes with
+constexpr std::size_t kBundleBeams = 4000;    // for formal sigmas of the beams
+constexpr std::size_t kPictureShots = 20000;  // for pictures
 constexpr int kCoarseRounds = 5;
 constexpr int kMostFullRounds = 5;
 /// A plane is a step of a larger one when this part of its points lies near that.
@@ -486,7 +486,7 @@ void Work::fill_planes(const PlanarSolution& solution) {
   }
   for (std::size_t r = 0; r < recordings_.size(); ++r) {
     const std::vector<std::size_t> rows =
-        spread_rows(shots_[r].size(), kSampleShots / recordings_.size());
+        spread_rows(shots_[r].size(), kPictureShots / recordings_.size());
     const RangedShots shots = rows_of(shots_[r], rows);
     const Rays rays(p.train, p.geometry, shots);
     for (std::size_t i = 0; i < rows.size(); ++i) {

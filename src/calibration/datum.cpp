@@ -13,6 +13,8 @@
 #include "risley/core/error.hpp"
 #include "risley/optics/observation_adjoint.hpp"
 
+#include "calibration/eigen_vectors.hpp"
+
 namespace risley::calibration {
 namespace {
 
@@ -24,8 +26,6 @@ Matrix3d cross_matrix(const Eigen::Vector3d& v) {
   m << 0, -v[2], v[1], v[2], 0, -v[0], -v[1], v[0], 0;
   return m;
 }
-
-Eigen::Vector3d eigen(const Vector3<double>& v) { return {v.x, v.y, v.z}; }
 
 /// One beam of a bundle and how it follows the parameters.
 struct BundleBeam {

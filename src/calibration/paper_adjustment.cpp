@@ -19,7 +19,7 @@ namespace {
 
 using Eigen::Index;
 
-constexpr std::size_t kBlockShots = 4096;
+constexpr std::size_t kAdjustedBlock = 4096;
 constexpr double kStandsStill = 1e-10;  // relative change of the standard deviation of unit weight
 
 /// Points of one view and the derivatives of their distances from a plane yet to be fitted.
@@ -103,10 +103,10 @@ class View {
   }
 
  private:
-  std::size_t blocks() const { return (shots_.size() + kBlockShots - 1) / kBlockShots; }
-  std::size_t begin(std::size_t block) const { return block * kBlockShots; }
+  std::size_t blocks() const { return (shots_.size() + kAdjustedBlock - 1) / kAdjustedBlock; }
+  std::size_t begin(std::size_t block) const { return block * kAdjustedBlock; }
   std::size_t end(std::size_t block) const {
-    return std::min(begin(block) + kBlockShots, shots_.size());
+    return std::min(begin(block) + kAdjustedBlock, shots_.size());
   }
   std::array<double, N> angles(std::size_t i) const {
     std::array<double, N> result;

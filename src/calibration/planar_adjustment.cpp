@@ -15,6 +15,8 @@
 
 #include "risley/core/error.hpp"
 
+#include "calibration/eigen_vectors.hpp"
+
 namespace risley::calibration {
 namespace {
 
@@ -28,9 +30,6 @@ constexpr double kMostConvergedDamping = 1e-3;
 /// sigma: so near the minimum what the derivatives leave out (the beam's origin) decides what the
 /// cost does, and not whether the step is right.
 constexpr double kSmallPromise = 1e-2;
-
-Eigen::Vector3d eigen(const Vector3<double>& v) { return {v.x, v.y, v.z}; }
-Vector3<double> plain(const Eigen::Vector3d& v) { return {v[0], v[1], v[2]}; }
 
 /// Rotation by a vector: its direction is the axis, its length the angle.
 Eigen::Matrix3d rotation(const Eigen::Vector3d& by) {

@@ -15,7 +15,7 @@
 namespace risley::calibration {
 namespace {
 
-constexpr std::size_t kBlockShots = 65536;
+constexpr std::size_t kStatesBlock = 65536;
 
 }  // namespace
 
@@ -60,8 +60,8 @@ RangedRecording ranged_recording(const estimation::Estimate& estimate, std::stri
   shots.resize(prisms, estimate.series.size());
   recording.time_ns.resize(estimate.series.size());
   std::size_t row = 0;
-  for (std::size_t begin = 0; begin < estimate.series.size(); begin += kBlockShots) {
-    const std::size_t end = std::min(begin + kBlockShots, estimate.series.size());
+  for (std::size_t begin = 0; begin < estimate.series.size(); begin += kStatesBlock) {
+    const std::size_t end = std::min(begin + kStatesBlock, estimate.series.size());
     const estimation::RotorStates states =
         states_of_shots(*estimate.map, estimate.series, {begin, end});
     for (std::size_t i = 0; i < states.size(); ++i) {

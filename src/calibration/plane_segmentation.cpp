@@ -27,7 +27,7 @@ constexpr int kFewestTrials = 60, kMostTrials = 1000;
 constexpr int kMostPolished = 40;           ///< candidates that are refitted before they are judged
 constexpr double kMissed = 1e-3;            ///< probability that no trial hit the largest plane
 constexpr int kMostRejected = 4;            ///< candidates set aside for filling no area
-constexpr int kMostRounds = 10;             ///< of labels and fits
+constexpr int kMostLabelRounds = 10;        ///< of labels and fits
 constexpr double kLeastShare = 0.1;         ///< of the points around: a plane is there
 constexpr std::size_t kLeastNear = 3;       ///< points around: a plane is there
 constexpr double kLeastFill = 0.5;          ///< of the points in a plane's own cells
@@ -415,7 +415,7 @@ class Segmenter {
 
   /// Labels and fits in turn until no label changes. Points at edges take no part in the fits.
   void settle() {
-    for (int round = 0; round < kMostRounds && !planes_.empty(); ++round) {
+    for (int round = 0; round < kMostLabelRounds && !planes_.empty(); ++round) {
       std::vector<int> labels = nearest_labels();
       const bool settled = round > 0 && labels == label_;
       label_ = std::move(labels);

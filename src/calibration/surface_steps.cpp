@@ -20,7 +20,7 @@ constexpr std::size_t kLeastPoints = 5;  ///< of a cell
 /// Cells that a smooth surface of degree 1, 2 and 3 needs.
 constexpr std::array<std::size_t, 4> kLeastCells{1, 10, 20, 40};
 constexpr double kTukey = 4.685;        ///< in robust sigmas: cells beyond have no weight
-constexpr int kMostRounds = 30;         ///< of weights and fits
+constexpr int kMostWeightRounds = 30;   ///< of weights and fits
 constexpr double kNormalMad = 1.4826;   ///< sigma over the median absolute value
 constexpr double kOff = 2.5;            ///< sigmas of a cell that stands off
 constexpr double kAround = 1.5;         ///< the same of its neighbours
@@ -111,7 +111,7 @@ class SmoothSurface {
     const auto size = static_cast<Eigen::Index>(terms);
     Eigen::MatrixXd design(static_cast<Eigen::Index>(cells.size()), size);
     Eigen::VectorXd values(design.rows());
-    for (int round = 0; round < kMostRounds; ++round) {
+    for (int round = 0; round < kMostWeightRounds; ++round) {
       for (Eigen::Index i = 0; i < design.rows(); ++i) {
         const Cell& cell = cells[static_cast<std::size_t>(i)];
         const double part = cell.z / (kTukey * spread_);

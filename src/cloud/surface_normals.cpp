@@ -14,13 +14,13 @@
 namespace risley::cloud {
 namespace {
 
-constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
+constexpr float kNoNormal = std::numeric_limits<float>::quiet_NaN();
 constexpr double kLeastShots = 12;
 constexpr double kLeastForward = 0.1;  // X of the directions that are looked at
 
 }  // namespace
 
-const Vector3<double> SurfaceNormals::kNone{kNaN, kNaN, kNaN};
+const Vector3<double> SurfaceNormals::kNone{kNoNormal, kNoNormal, kNoNormal};
 
 void SurfaceNormals::Moments::add(const Moments& other) {
   for (const auto term :
@@ -35,7 +35,7 @@ SurfaceNormals::SurfaceNormals(double range_noise) : range_noise_(range_noise) {
     throw InvalidArgument(fmt::format("range noise = {} m, allowed above 0", range_noise));
   }
   moments_.resize(static_cast<std::size_t>(kSide) * kSide);
-  normals_.assign(moments_.size(), {kNaN, kNaN, kNaN});
+  normals_.assign(moments_.size(), {kNoNormal, kNoNormal, kNoNormal});
 }
 
 void SurfaceNormals::clear() {
@@ -68,7 +68,8 @@ void SurfaceNormals::add(double azimuth, double zenith, double range) {
 }
 
 void SurfaceNormals::fit() {
-  std::fill(normals_.begin(), normals_.end(), std::array<float, 3>{kNaN, kNaN, kNaN});
+  std::fill(normals_.begin(), normals_.end(),
+            std::array<float, 3>{kNoNormal, kNoNormal, kNoNormal});
   for (const std::size_t cell : touched_) {
     const int row = static_cast<int>(cell) / kSide, column = static_cast<int>(cell) % kSide;
     Moments sum;
@@ -82,19 +83,19 @@ void SurfaceNormals::fit() {
 }
 
 std::array<float, 3> SurfaceNormals::fitted(const Moments& m) const {
-  if (m.count < kLeastShots) return {kNaN, kNaN, kNaN};
+  if (m.count < kLeastShots) return {kNoNormal, kNoNormal, kNoNormal};
   // About the mean: q + slope_u (u - mean u) + slope_v (v - mean v).
   const double u = m.u / m.n, v = m.v / m.n, q = m.q / m.n;
   const double uu = m.uu - m.n * u * u, uv = m.uv - m.n * u * v, vv = m.vv - m.n * v * v;
   const double qu = m.qu - m.n * q * u, qv = m.qv - m.n * q * v;
   const double determinant = uu * vv - uv * uv;
   // Shots along one line tell a slope in one direction only.
-  if (!(determinant > 1e-3 * uu * vv)) return {kNaN, kNaN, kNaN};
+  if (!(determinant > 1e-3 * uu * vv)) return {kNoNormal, kNoNormal, kNoNormal};
   const double slope_u = (qu * vv - qv * uv) / determinant;
   const double slope_v = (qv * uu - qu * uv) / determinant;
   const double misfit = m.qq - m.n * q * q - slope_u * qu - slope_v * qv;
   const double limit = kRoughest * range_noise_;
-  if (misfit > limit * limit * (m.count - 3)) return {kNaN, kNaN, kNaN};
+  if (misfit > limit * limit * (m.count - 3)) return {kNoNormal, kNoNormal, kNoNormal};
   const Vector3<double> normal =
       normalized(Vector3<double>{q - u * slope_u - v * slope_v, slope_u, slope_v});
   return {static_cast<float>(normal.x), static_cast<float>(normal.y), static_cast<float>(normal.z)};

@@ -24,8 +24,6 @@ namespace risley::estimation {
 namespace {
 
 constexpr double kCoarseRate = 1000.0;  // Hz
-/// Noise of the rotors before their own is known: far above that of real ones.
-constexpr RotorProcess kSettlingProcess{radians_from_degrees(30.0), 0.0, 0.0};
 /// A step is small when it moves no parameter by more than this share of its sigma: what is left
 /// is of second order.
 constexpr double kSmallStep = 0.1;

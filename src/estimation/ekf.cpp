@@ -26,9 +26,6 @@ constexpr double kSpeedSigma = radians_from_degrees(100.0);
 constexpr double kOpenGate = 400.0;
 /// Filtered states kept at a time for the combination.
 constexpr std::size_t kBlock = 1024;
-/// Noise of the rotors in the first pass when the second is to choose it: far above that of real
-/// rotors, so that the filter follows them wherever they go.
-constexpr RotorProcess kSettlingProcess{radians_from_degrees(30.0), 0.0, 0.0};
 /// Shots that the search for the process noise looks at.
 constexpr std::size_t kLikelihoodShots = 10000;
 

@@ -13,6 +13,7 @@
 #include "risley/core/error.hpp"
 
 #include "estimation/residual_model.hpp"
+#include "estimation/used_shots.hpp"
 
 namespace risley::estimation {
 namespace {
@@ -213,30 +214,13 @@ void judge(Estimate& estimate, const PrismTrain& nominal) {
 
 /// Mean residuals over every prism's angle, of all shots that were used.
 std::vector<AngleProfile> profiles(const Estimate& estimate) {
+  std::vector<AngleProfiler> profilers(static_cast<std::size_t>(estimate.states.prisms()));
+  for_each_used_shot(estimate, [&](const auto& angle, double azimuth, double zenith) {
+    for (std::size_t k = 0; k < profilers.size(); ++k) profilers[k].add(angle(k), azimuth, zenith);
+  });
   std::vector<AngleProfile> result;
-  for (std::size_t k = 0; k < static_cast<std::size_t>(estimate.states.prisms()); ++k) {
-    AngleProfiler profiler;
-    if (estimate.map) {
-      const BatchMapResult& map = *estimate.map;
-      const RotorTrajectory& t = map.trajectory;
-      for (std::size_t knot = 0; knot < t.size(); ++knot) {
-        for (std::size_t i = t.first_shot[knot]; i < t.last_shot[knot]; ++i) {
-          if (map.outlier[i]) continue;
-          const double seconds =
-              1e-9 * static_cast<double>(estimate.series.time_ns[i] - t.time_ns[knot]);
-          profiler.add(t.angle(knot, k, seconds), map.azimuth_residual[i], map.zenith_residual[i]);
-        }
-      }
-    } else {
-      const RotorStates& states = estimate.states;
-      for (std::size_t i = 0; i < states.size(); ++i) {
-        if (states.outlier[i] || !std::isfinite(states.azimuth_residual[i])) continue;
-        profiler.add(states.rotation_angle[k][i], states.azimuth_residual[i],
-                     states.zenith_residual[i]);
-      }
-    }
-    result.push_back(profiler.result());
-  }
+  result.reserve(profilers.size());
+  for (const AngleProfiler& profiler : profilers) result.push_back(profiler.result());
   return result;
 }
 
@@ -376,6 +360,13 @@ Estimate estimate(Method method, AngleSeries series, const AngleSeries& head,
   estimate.residuals_over_angle = profiles(estimate);
   judge(estimate, options.sensor.train);
   return estimate;
+}
+
+ShotResiduals shot_residuals(const Estimate& estimate) {
+  const auto of = [](const auto& holder) {
+    return ShotResiduals{holder.azimuth_residual, holder.zenith_residual, holder.outlier};
+  };
+  return estimate.map ? of(*estimate.map) : of(estimate.states);
 }
 
 RotorStates states_of_shots(const Estimate& estimate, ShotRange shots) {

@@ -15,13 +15,12 @@
 #include "risley/estimation/normal_equations.hpp"
 
 #include "estimation/knot_model.hpp"
+#include "estimation/line_fit.hpp"
 #include "estimation/residual_model.hpp"
 
 namespace risley::estimation {
 namespace {
 
-/// Shots that a start is fitted to; more would only cost time.
-constexpr std::size_t kEnoughShots = 1000;
 /// Slowest change of a speed that a fit over the first shots leaves to the rotors, rad/s^2.
 constexpr double kAccelerationSigma = radians_from_degrees(200.0);
 

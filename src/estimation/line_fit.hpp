@@ -14,6 +14,9 @@ namespace risley::estimation {
 
 using Complex = std::complex<double>;
 
+/// Shots that lines or a start are fitted to; more would only cost time.
+inline constexpr std::size_t kEnoughShots = 1000;
+
 /// Shots of a window as y + iz, the transverse part of the unit vector, with weights.
 struct TransverseShots {
   std::vector<double> time, weight;  // s from the reference time

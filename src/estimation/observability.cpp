@@ -21,7 +21,7 @@ namespace {
 
 /// Below this share of the largest, an eigenvalue of the scaled information is its rounding.
 constexpr double kNoInformation = 1e-12;
-constexpr std::size_t kMostShots = 600000;
+constexpr std::size_t kMostPlannedShots = 600000;
 constexpr double kMostDuration = 2000.0;
 /// Correlations from here on make two quantities hard to tell apart.
 constexpr double kStrong = 0.9;
@@ -243,7 +243,7 @@ Observability observability_of_plan(const ObservabilityPlan& plan) {
   const PrismTrain& train = plan.sensor.train;
   const double duration = std::min(plan.duration, kMostDuration);
   const double shots = plan.duration * plan.rate;
-  const double rate = std::min(plan.rate, static_cast<double>(kMostShots) / duration);
+  const double rate = std::min(plan.rate, static_cast<double>(kMostPlannedShots) / duration);
   const auto count = static_cast<std::size_t>(std::floor(duration * rate)) + 1;
 
   AngleSeries series;

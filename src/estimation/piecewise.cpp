@@ -17,8 +17,8 @@
 namespace risley::estimation {
 namespace {
 
-constexpr std::size_t kMostShots = 100000;  // of one piece
-constexpr std::size_t kFewestShots = 500;
+constexpr std::size_t kMostPieceShots = 100000;  // of one piece
+constexpr std::size_t kFewestPieceShots = 500;
 
 struct Piece {
   double time = 0, duration = 0;
@@ -40,8 +40,8 @@ std::optional<Piece> estimate_piece(const Estimate& estimate, const sensors::Sen
                                     ShotRange shots) {
   const RotorTrajectory& trajectory = estimate.map->trajectory;
   const auto knot = knot_of(trajectory, shots.begin);
-  shots.end = std::min(shots.end, shots.begin + kMostShots);
-  if (!knot || shots.size() < kFewestShots) return std::nullopt;
+  shots.end = std::min(shots.end, shots.begin + kMostPieceShots);
+  if (!knot || shots.size() < kFewestPieceShots) return std::nullopt;
   Start start = estimate.start;
   start.time_ns = estimate.series.time_ns[shots.begin];
   start.train = estimate.map->train;

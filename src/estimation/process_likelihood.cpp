@@ -17,7 +17,7 @@ namespace risley::estimation {
 namespace {
 
 constexpr double kWindow = 0.010;  // s
-constexpr std::size_t kFewestShots = 8;
+constexpr std::size_t kFewestWindowShots = 8;
 /// How far the other rotors may be from the linearisation within a window, before its data.
 constexpr double kOtherSigma[] = {radians_from_degrees(1.0), radians_from_degrees(300.0),
                                   radians_from_degrees(1e5)};
@@ -72,7 +72,7 @@ RotorWindows::RotorWindows(const NormalEquations& equations, const RotorTrajecto
       std::size_t shots = 0;
       while (knot < end) {
         const double span = 1e-9 * static_cast<double>(at.time_ns[knot] - at.time_ns[first]);
-        if (span >= 0.95 * kWindow && shots >= kFewestShots) break;
+        if (span >= 0.95 * kWindow && shots >= kFewestWindowShots) break;
         shots += at.last_shot[knot] - at.first_shot[knot];
         ++knot;
       }

@@ -11,6 +11,8 @@
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
 
+#include "estimation/used_shots.hpp"
+
 namespace risley::estimation {
 namespace {
 
@@ -67,16 +69,12 @@ class MapMaker {
 
 ResidualMap residuals_over_field(const Estimate& estimate, double cell) {
   MapMaker maker(cell);
-  const auto& azimuth_residual =
-      estimate.map ? estimate.map->azimuth_residual : estimate.states.azimuth_residual;
-  const auto& zenith_residual =
-      estimate.map ? estimate.map->zenith_residual : estimate.states.zenith_residual;
-  const auto& outlier = estimate.map ? estimate.map->outlier : estimate.states.outlier;
+  const ShotResiduals residuals = shot_residuals(estimate);
   const AngleSeries& shots = estimate.series;
   for (std::size_t i = 0; i < shots.size(); ++i) {
-    if (outlier[i] != 0) continue;
-    maker.add(shots.azimuth[i] - azimuth_residual[i], shots.zenith[i] - zenith_residual[i],
-              azimuth_residual[i], zenith_residual[i]);
+    if (residuals.outlier[i] != 0) continue;
+    const double azimuth = residuals.azimuth[i], zenith = residuals.zenith[i];
+    maker.add(shots.azimuth[i] - azimuth, shots.zenith[i] - zenith, azimuth, zenith);
   }
   return maker.result();
 }
@@ -89,28 +87,9 @@ ResidualMap residuals_over_angles(const Estimate& estimate, int prism_x, int pri
   }
   MapMaker maker(cell);
   const auto x = static_cast<std::size_t>(prism_x), y = static_cast<std::size_t>(prism_y);
-  if (estimate.map) {
-    const BatchMapResult& map = *estimate.map;
-    const RotorTrajectory& t = map.trajectory;
-    for (std::size_t knot = 0; knot < t.size(); ++knot) {
-      for (std::size_t i = t.first_shot[knot]; i < t.last_shot[knot]; ++i) {
-        if (map.outlier[i] != 0) continue;
-        const double seconds =
-            1e-9 * static_cast<double>(estimate.series.time_ns[i] - t.time_ns[knot]);
-        maker.add(wrap_to_two_pi(t.angle(knot, x, seconds)),
-                  wrap_to_two_pi(t.angle(knot, y, seconds)), map.azimuth_residual[i],
-                  map.zenith_residual[i]);
-      }
-    }
-    return maker.result();
-  }
-  const RotorStates& states = estimate.states;
-  for (std::size_t i = 0; i < states.size(); ++i) {
-    if (states.outlier[i] != 0) continue;
-    maker.add(wrap_to_two_pi(states.rotation_angle[x][i]),
-              wrap_to_two_pi(states.rotation_angle[y][i]), states.azimuth_residual[i],
-              states.zenith_residual[i]);
-  }
+  for_each_used_shot(estimate, [&](const auto& angle, double azimuth, double zenith) {
+    maker.add(wrap_to_two_pi(angle(x)), wrap_to_two_pi(angle(y)), azimuth, zenith);
+  });
   return maker.result();
 }
 

@@ -15,9 +15,7 @@ namespace {
 
 /// Half a window of the tracker, s.
 constexpr double kTrackStep = 0.025;
-constexpr std::size_t kFewestShots = 12;
-/// Shots of a window that are used; more would only cost time.
-constexpr std::size_t kEnoughShots = 1000;
+constexpr std::size_t kFewestTrackShots = 12;
 
 }  // namespace
 
@@ -40,7 +38,7 @@ void track_rotors(const AngleSeries& series, ShotRange shots, const Start& start
     const auto to = begin + static_cast<std::ptrdiff_t>(shots.end);
     ShotRange rows{static_cast<std::size_t>(std::lower_bound(from, to, middle - step_ns) - begin),
                    static_cast<std::size_t>(std::upper_bound(from, to, middle + step_ns) - begin)};
-    if (rows.size() < kFewestShots ||
+    if (rows.size() < kFewestTrackShots ||
         seconds(series.time_ns[rows.begin], series.time_ns[rows.end - 1]) < 0.6 * kTrackStep) {
       return false;
     }

@@ -20,9 +20,7 @@ namespace risley::estimation {
 namespace {
 
 constexpr double kShortest = 0.05;  // s of data that tell the rotors apart
-constexpr std::size_t kFewestShots = 40;
-/// Shots that refine the lines; more would only cost time.
-constexpr std::size_t kEnoughShots = 1000;
+constexpr std::size_t kFewestLineShots = 40;
 
 /// The stretch of about a window's length that holds most shots; the earliest of similar ones.
 ShotRange best_window(const AngleSeries& series, double window) {
@@ -79,11 +77,11 @@ std::vector<double> coarse_speeds(const AngleSeries& series, ShotRange rows, dou
 }  // namespace
 
 RotorLines rotor_lines(const AngleSeries& series) {
-  if (series.size() < kFewestShots || series.duration() < kShortest) {
+  if (series.size() < kFewestLineShots || series.duration() < kShortest) {
     throw EstimationError(
         fmt::format("the recording holds {} valid shots over {:.4f} s, at least {} shots over {} s "
                     "are needed to tell the rotors apart",
-                    series.size(), series.duration(), kFewestShots, kShortest));
+                    series.size(), series.duration(), kFewestLineShots, kShortest));
   }
   // A short window keeps the drift of the speeds small; slow recordings need a longer one.
   const auto step_ns = static_cast<double>(median_step_ns(series.time_ns));
@@ -91,12 +89,12 @@ RotorLines rotor_lines(const AngleSeries& series) {
   found.shots = best_window(series, std::clamp(500 * 1e-9 * step_ns, 0.082, 0.512));
   const std::int64_t first = series.time_ns[found.shots.begin];
   const std::int64_t last = series.time_ns[found.shots.end - 1];
-  if (found.shots.size() < kFewestShots ||
+  if (found.shots.size() < kFewestLineShots ||
       static_cast<double>(last - first) < 0.999e9 * kShortest) {
     throw EstimationError(fmt::format(
         "the best {:.4f} s of the recording's start hold {} valid shots, at least {} over {} s are "
         "needed to tell the rotors apart",
-        1e-9 * static_cast<double>(last - first), found.shots.size(), kFewestShots, kShortest));
+        1e-9 * static_cast<double>(last - first), found.shots.size(), kFewestLineShots, kShortest));
   }
   found.time_ns = first + (last - first) / 2;
   std::vector<double> speeds = coarse_speeds(series, found.shots, 1e-9 * step_ns);

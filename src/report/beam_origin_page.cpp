@@ -9,12 +9,12 @@
 
 #include "risley/core/angle.hpp"
 
+#include "report/html.hpp"
 #include "report/page_parts.hpp"
 
 namespace risley::report {
 namespace {
 
-constexpr double kMillimetres = 1e3;
 /// One map. Values of both signs have colours that are neutral at 0.
 Chart map_chart(const BeamOriginMap& map, const char* title, const std::vector<double>& values) {
   const auto [least, greatest] = std::minmax_element(values.begin(), values.end());

@@ -23,13 +23,9 @@ using calibration::FormalDatum;
 using calibration::PriorTest;
 using calibration::SurfaceStep;
 
-constexpr double kMillimetres = 1000.0;
 constexpr const char* kNothingToDraw = "<p>There are no points to draw.</p>\n";
 
-std::string millimetres(double metres) { return finite_text("{:.1f}", kMillimetres * metres); }
 std::string degrees(double radians) { return finite_text("{:.3g}", degrees_from_radians(radians)); }
-
-bool is_sigma(double sigma) { return std::isfinite(sigma) && sigma > 0; }
 
 /// A sigma that was never computed is zero.
 std::string sigma_degrees(double sigma) { return is_sigma(sigma) ? degrees(sigma) : "–"; }

@@ -26,17 +26,14 @@ using calibration::Calibration;
 using calibration::SamplePoint;
 using calibration::ThicknessProfile;
 
-constexpr double kMillimetres = 1000.0;
-constexpr std::size_t kMostPoints = 3000;       // per scatter diagram
+constexpr std::size_t kMostWallPoints = 3000;   // per scatter diagram
 constexpr std::size_t kMostViewPoints = 8000;   // of all recordings in one kind of view
 constexpr std::size_t kFewestViewPoints = 800;  // of one recording in it
-constexpr int kFewestInCell = 5;        // points that make a mean over a cell of the field of view
+constexpr int kFewestPointsInCell = 5;  // points that make a mean over a cell of the field of view
 constexpr std::size_t kMostSpaces = 3;  // recordings drawn in three dimensions
 constexpr double kShownThickness = 0.03;  // of walls in three dimensions, share of the range
 constexpr std::array<const char*, 5> kPlaneColours = {"a", "b", "c", "d", "bad"};
 constexpr const char* kClutterColour = "ink";
-
-std::string millimetres(double metres) { return fmt::format("{:.1f}", kMillimetres * metres); }
 
 /// Value at a row of a vector that may be too short, as it is when nothing was adjusted.
 double at(const Eigen::VectorXd& values, std::size_t row) {
@@ -316,7 +313,7 @@ class CalibrationCharts {
   Chart distances_over_azimuth() const {
     Series before{"before", "b", SeriesKind::points, {}, {}};
     Series after{"after", "a", SeriesKind::points, {}, {}};
-    for (const std::size_t i : every_nth(on_walls_.size(), kMostPoints)) {
+    for (const std::size_t i : every_nth(on_walls_.size(), kMostWallPoints)) {
       const SamplePoint& point = *on_walls_[i];
       const auto add = [&point](Series& series, double distance) {
         if (!std::isfinite(distance + point.azimuth)) return;
@@ -330,7 +327,7 @@ class CalibrationCharts {
             "azimuth, deg",
             "distance from the plane, mm",
             {after, before},
-            every_nth_note(on_walls_.size(), kMostPoints, "sample points on planes")};
+            every_nth_note(on_walls_.size(), kMostWallPoints, "sample points on planes")};
   }
 
   /// Where in the field of view points lie beyond their planes, and where before them.
@@ -356,7 +353,7 @@ class CalibrationCharts {
     Series before{"", "ink", SeriesKind::cells, {}, {}}, after = before;
     double largest = 0, before_squares = 0, after_squares = 0, noise_squares = 0;
     for (const auto& [place, cell] : cells) {
-      if (cell.count < kFewestInCell) continue;
+      if (cell.count < kFewestPointsInCell) continue;
       const double mean_before = cell.before / cell.count, mean_after = cell.after / cell.count;
       for (Series* series : {&before, &after}) {
         series->x.push_back(width * (static_cast<double>(place.first) + 0.5));
@@ -382,7 +379,7 @@ class CalibrationCharts {
                                "The {} means have a root mean square of {:.2f} mm, where noise "
                                "alone would leave about {:.2f} mm. Patches of one colour are walls "
                                "that are not flat, or beams that are bent.",
-                               count_text(points), width, kFewestInCell,
+                               count_text(points), width, kFewestPointsInCell,
                                count_text(series.x.size()), kMillimetres * std::sqrt(sum / count),
                                kMillimetres * std::sqrt(noise_squares / count)),
                    ChartKind::map};
@@ -421,7 +418,7 @@ class CalibrationCharts {
     Series before{"", "a", SeriesKind::points, {}, {}}, after = before;
     double largest = 0, squares = 0, farthest = 0;
     for (auto& [place, patch] : cells) {
-      if (patch.count < kFewestInCell) continue;
+      if (patch.count < kFewestPointsInCell) continue;
       patch.foot = (1.0 / patch.count) * patch.foot;
       patch.before /= patch.count;
       patch.after /= patch.count;
@@ -437,7 +434,7 @@ class CalibrationCharts {
         rms > 0 ? std::pow(10.0, std::floor(std::log10(kShownThickness * farthest / rms))) : 1.0;
     for (const auto& cell : cells) {
       const WallPatch& patch = cell.second;
-      if (patch.count < kFewestInCell) continue;
+      if (patch.count < kFewestPointsInCell) continue;
       const Vector3<double>& normal = c_.planes[static_cast<std::size_t>(cell.first[0])].normal;
       const auto add = [&](Series& series, double distance) {
         const Vector3<double> at = patch.foot + enlarged * distance * normal;
@@ -458,7 +455,8 @@ class CalibrationCharts {
                       "degree, {} dots; cells with fewer than {} points are left out. "
                       "Distances from the planes are drawn {:.0f} times as large. Drag to "
                       "rotate.",
-                      count_text(points), count_text(series.x.size()), kFewestInCell, enlarged),
+                      count_text(points), count_text(series.x.size()), kFewestPointsInCell,
+                      enlarged),
           ChartKind::space};
       result.z_label = "Z (up), m";
       result.value_label = "mean distance from the plane, mm";

@@ -4,12 +4,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include <fmt/format.h>
 
 #include "risley/core/angle.hpp"
 
+#include "report/chart_fields.hpp"
 #include "report/html.hpp"
 
 namespace risley::report {
@@ -18,36 +18,6 @@ namespace {
 constexpr std::size_t kLineBins = 600;
 constexpr double kFewestBins = 9, kMostBins = 61;  // of a histogram
 constexpr double kHistogramHalfWidth = 4.5;        // standard deviations
-
-const char* kind_name(SeriesKind kind) {
-  switch (kind) {
-    case SeriesKind::line:
-      return "line";
-    case SeriesKind::steps:
-      return "steps";
-    case SeriesKind::cells:
-      return "cells";
-    case SeriesKind::points:
-      break;
-  }
-  return "points";
-}
-
-const char* kind_name(ChartKind kind) {
-  switch (kind) {
-    case ChartKind::full_turn:
-      return "full_turn";
-    case ChartKind::two_turns:
-      return "two_turns";
-    case ChartKind::map:
-      return "map";
-    case ChartKind::space:
-      return "space";
-    case ChartKind::plain:
-      break;
-  }
-  return "plain";
-}
 
 std::size_t stride_for(std::size_t rows, std::size_t most) {
   return rows <= most ? 1 : (rows + most - 1) / most;
@@ -60,33 +30,25 @@ std::string figure_html(const Chart& chart, std::size_t number) {
   std::string html = fmt::format(
       "<figure class=\"{}\"><figcaption>{}</figcaption>\n<div class=\"plot\" id=\"chart-{}\" "
       "role=\"img\" tabindex=\"0\" aria-label=\"{}: {} over {}\"></div>",
-      kind_name(chart.kind), title, number, title, escape_html(chart.y_label),
-      escape_html(chart.x_label));
+      enum_names(chart.kind)[static_cast<std::size_t>(chart.kind)], title, number, title,
+      escape_html(chart.y_label), escape_html(chart.x_label));
   if (!chart.note.empty())
     html += fmt::format("\n<p class=\"note\">{}</p>", escape_html(chart.note));
   return html + "</figure>\n";
 }
 
 std::string chart_json(const Chart& chart, std::size_t number) {
-  std::string series;
-  for (const Series& one : chart.series) {
-    series += fmt::format(
-        "{}{{\"label\":{},\"colour\":{},\"kind\":\"{}\",\"x\":{},\"y\":{},\"z\":{},"
-        "\"value\":{},\"cell\":[{},{}]}}",
-        series.empty() ? "" : ",", json_string(one.label), json_string(one.colour),
-        kind_name(one.kind), json_numbers(one.x), json_numbers(one.y), json_numbers(one.z),
-        json_numbers(one.value), one.cell_width, one.cell_height);
+  Json object = to_json(chart);
+  object["id"] = fmt::format("chart-{}", number);
+  std::string safe;
+  for (const char c : object.dump(-1, ' ', false, Json::error_handler_t::replace)) {
+    if (c == '<') {  // only texts hold it, and "</script>" must not end the element
+      safe += "\\u003c";
+    } else {
+      safe += c;
+    }
   }
-  std::string range = "null";
-  if (chart.value_range)
-    range = json_numbers({chart.value_range->first, chart.value_range->second});
-  return fmt::format(
-      "{{\"id\":\"chart-{}\",\"title\":{},\"x_label\":{},\"y_label\":{},\"z_label\":{},"
-      "\"value_label\":{},\"kind\":\"{}\",\"palette\":\"{}\",\"value_range\":{},"
-      "\"series\":[{}]}}",
-      number, json_string(chart.title), json_string(chart.x_label), json_string(chart.y_label),
-      json_string(chart.z_label), json_string(chart.value_label), kind_name(chart.kind),
-      chart.palette == Palette::diverging ? "diverging" : "sequential", range, series);
+  return safe;
 }
 
 std::vector<std::size_t> every_nth(std::size_t rows, std::size_t most) {

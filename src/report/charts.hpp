@@ -14,7 +14,8 @@
 
 namespace risley::report {
 
-/// A diagram as a figure element, and its data as a JSON object that page.js draws.
+/// A diagram as a figure element, and its data as a JSON object that page.js draws and
+/// that may stand inside a script element.
 std::string figure_html(const Chart& chart, std::size_t number);
 std::string chart_json(const Chart& chart, std::size_t number);
 
@@ -33,8 +34,8 @@ Series peak_line(std::string label, std::string colour, std::size_t rows, const 
 std::string peak_line_note(std::size_t rows);
 
 /// Counts per bin within 4.5 standard deviations of the mean (9 to 61 bins, by the cube root of the
-/// number of values), and the normal curve of the same
-/// mean, deviation and count. Values beyond stand in the outermost bins.
+/// number of values), and the normal curve of the same mean, deviation and count. Values beyond
+/// stand in the outermost bins.
 std::vector<Series> histogram(const std::string& label, const std::string& colour,
                               std::span<const double> values, std::span<const unsigned char> skip,
                               const estimation::Moments& moments, double scale);

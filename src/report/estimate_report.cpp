@@ -24,15 +24,15 @@ using estimation::Moments;
 using estimation::ResidualMap;
 using estimation::RotorStates;
 
-constexpr std::size_t kMostPoints = 4000;     // per scatter diagram
-constexpr std::size_t kMostMapPoints = 9000;  // of the scan pattern
+constexpr std::size_t kMostShotPoints = 4000;  // per scatter diagram
+constexpr std::size_t kMostMapPoints = 9000;   // of the scan pattern
 constexpr std::size_t kPieces = 20;
 constexpr double kPatternDuration = 0.09;  // s, as in [B21 Fig. 2a]
 constexpr double kDensityDuration = 0.5;   // s, as in [B21 Fig. 2b]
 constexpr double kDensityCell = 0.5;       // deg
 constexpr double kFieldCell = radians_from_degrees(1.0);
 constexpr double kAngleCell = radians_from_degrees(10.0);
-constexpr double kFewestInCell = 5;       // shots that make a mean
+constexpr double kFewestShotsInCell = 5;  // shots that make a mean
 constexpr double kFewestOfTypical = 0.1;  // and of a typical cell's shots
 
 std::string letter(std::size_t rotor) {
@@ -79,10 +79,7 @@ class EstimateCharts {
   explicit EstimateCharts(const EstimateReportInput& input)
       : input_(input),
         states_(input.estimate.states),
-        azimuth_(input.estimate.map ? input.estimate.map->azimuth_residual
-                                    : states_.azimuth_residual),
-        zenith_(input.estimate.map ? input.estimate.map->zenith_residual : states_.zenith_residual),
-        outlier_(input.estimate.map ? input.estimate.map->outlier : states_.outlier) {}
+        residuals_(estimation::shot_residuals(input.estimate)) {}
 
   /// Every parameter from pieces of the recording alone, about the estimate of all.
   std::vector<Chart> pieces(const estimation::PiecewiseEstimate& pieces,
@@ -123,11 +120,10 @@ class EstimateCharts {
     std::vector<Chart> charts;
     std::vector<Chart> distributions;
     for (std::size_t rotor = 0; rotor < states_.angular_velocity.size(); ++rotor) {
-      const double mean =
-          estimation::moments(states_.angular_velocity[rotor], states_.outlier).mean;
-      const std::vector<double> change = about(states_.angular_velocity[rotor], mean);
+      const Moments speed = estimation::moments(states_.angular_velocity[rotor], states_.outlier);
+      const std::vector<double> change = about(states_.angular_velocity[rotor], speed.mean);
       const std::string label =
-          fmt::format("angular velocity less {:.5f}, deg/s", degrees_from_radians(mean));
+          fmt::format("angular velocity less {:.5f}, deg/s", degrees_from_radians(speed.mean));
       charts.push_back({fmt::format("Angular velocity of prism {}", letter(rotor)),
                         "time, s",
                         label,
@@ -158,12 +154,12 @@ class EstimateCharts {
 
   std::vector<Chart> residuals() const {
     const Estimate& e = input_.estimate;
-    std::vector<Chart> charts{
-        over_time("Azimuth residuals over time", azimuth_, "a"),
-        over_time("Zenith residuals over time", zenith_, "b"),
-        residual_histogram("Histogram of the azimuth residuals", azimuth_, e.azimuth_residuals,
-                           "a"),
-        residual_histogram("Histogram of the zenith residuals", zenith_, e.zenith_residuals, "b")};
+    std::vector<Chart> charts{over_time("Azimuth residuals over time", residuals_.azimuth, "a"),
+                              over_time("Zenith residuals over time", residuals_.zenith, "b"),
+                              residual_histogram("Histogram of the azimuth residuals",
+                                                 residuals_.azimuth, e.azimuth_residuals, "a"),
+                              residual_histogram("Histogram of the zenith residuals",
+                                                 residuals_.zenith, e.zenith_residuals, "b")};
     const ResidualMap field = estimation::residuals_over_field(e, kFieldCell);
     for (Chart& chart : maps(field, "the field of view", "azimuth, deg", "zenith, deg")) {
       chart.kind = ChartKind::map;
@@ -259,23 +255,23 @@ class EstimateCharts {
     Series used{"used", colour, SeriesKind::points, {}, {}};
     Series outliers{"outliers", "bad", SeriesKind::points, {}, {}};
     const std::size_t shots = residual.size();
-    for (const std::size_t i : every_nth(shots, kMostPoints)) {
-      if (outlier_[i] != 0) continue;
+    for (const std::size_t i : every_nth(shots, kMostShotPoints)) {
+      if (residuals_.outlier[i] != 0) continue;
       used.x.push_back(shot_time(i));
       used.y.push_back(degrees_from_radians(residual[i]));
     }
     // Outliers are few and matter: each is drawn as long as that is possible.
     std::vector<std::size_t> rows;
     for (std::size_t i = 0; i < shots; ++i) {
-      if (outlier_[i] != 0 && std::isfinite(residual[i])) rows.push_back(i);
+      if (residuals_.outlier[i] != 0 && std::isfinite(residual[i])) rows.push_back(i);
     }
-    for (const std::size_t k : every_nth(rows.size(), kMostPoints)) {
+    for (const std::size_t k : every_nth(rows.size(), kMostShotPoints)) {
       outliers.x.push_back(shot_time(rows[k]));
       outliers.y.push_back(degrees_from_radians(residual[rows[k]]));
     }
-    std::string note = every_nth_note(shots, kMostPoints);
+    std::string note = every_nth_note(shots, kMostShotPoints);
     if (!rows.empty()) {
-      note += " " + every_nth_note(rows.size(), kMostPoints, "outliers");
+      note += " " + every_nth_note(rows.size(), kMostShotPoints, "outliers");
     }
     Chart chart{title, "time, s", "observed minus estimated, deg", {used}, note};
     if (!rows.empty()) chart.series.push_back(outliers);
@@ -284,10 +280,11 @@ class EstimateCharts {
 
   Chart residual_histogram(const std::string& title, const std::vector<double>& residual,
                            const Moments& moments, const std::string& colour) const {
-    return {title, "observed minus estimated, deg", "shots",
-            histogram("residuals", colour, residual, outlier_, moments, kDegreesPerRadian),
-            "All shots but the outliers. The outermost bins hold everything beyond 4.5 standard "
-            "deviations."};
+    return {
+        title, "observed minus estimated, deg", "shots",
+        histogram("residuals", colour, residual, residuals_.outlier, moments, kDegreesPerRadian),
+        "All shots but the outliers. The outermost bins hold everything beyond 4.5 standard "
+        "deviations."};
   }
 
   /// Mean azimuth and zenith residuals over the cells of a plane.
@@ -298,7 +295,7 @@ class EstimateCharts {
     std::nth_element(counts.begin(), middle, counts.end());
     const double typical = counts.empty() ? 1.0 : static_cast<double>(*middle);
     // A rim cell that few beams graze would decide the colours of all others.
-    const double fewest = std::max(kFewestInCell, std::ceil(kFewestOfTypical * typical));
+    const double fewest = std::max(kFewestShotsInCell, std::ceil(kFewestOfTypical * typical));
     std::vector<Chart> charts;
     const auto add = [&](const char* what, const std::vector<double>& mean, double sigma) {
       const double noise = degrees_from_radians(sigma / std::sqrt(typical));
@@ -335,19 +332,19 @@ class EstimateCharts {
     const auto angle = [this, rotor](std::size_t i) {
       return degrees_from_radians(wrap_to_two_pi(states_.rotation_angle[rotor][i]));
     };
-    Chart chart{
-        fmt::format("Residuals over the rotation angle of prism {}", letter(rotor)),
-        "rotation angle, deg",
-        "observed minus estimated, deg",
-        {},
-        every_nth_note(states_.size(), kMostPoints / 2, input_.estimate.map ? "knots" : "shots") +
-            " Lines: means over 5° of all shots that were used.",
-        ChartKind::full_turn};
+    Chart chart{fmt::format("Residuals over the rotation angle of prism {}", letter(rotor)),
+                "rotation angle, deg",
+                "observed minus estimated, deg",
+                {},
+                every_nth_note(states_.size(), kMostShotPoints / 2,
+                               input_.estimate.map ? "knots" : "shots") +
+                    " Lines: means over 5° of all shots that were used.",
+                ChartKind::full_turn};
     const estimation::AngleProfile& profile = input_.estimate.residuals_over_angle[rotor];
     const auto add = [&](const std::string& name, const std::vector<double>& residual,
                          const std::string& colour) {
       Series points{name, colour, SeriesKind::points, {}, {}};
-      for (const std::size_t i : every_nth(states_.size(), kMostPoints / 2)) {
+      for (const std::size_t i : every_nth(states_.size(), kMostShotPoints / 2)) {
         if (states_.outlier[i] != 0) continue;
         points.x.push_back(angle(i));
         points.y.push_back(degrees_from_radians(residual[i]));
@@ -408,8 +405,7 @@ class EstimateCharts {
 
   const EstimateReportInput& input_;
   const RotorStates& states_;
-  const std::vector<double>&azimuth_, &zenith_;  // residuals of all shots
-  const std::vector<unsigned char>& outlier_;
+  estimation::ShotResiduals residuals_;
 };
 
 }  // namespace

@@ -2,13 +2,9 @@
 // SPDX-License-Identifier: MIT
 #include "report/html.hpp"
 
-#include <algorithm>
 #include <cmath>
-#include <iterator>
-#include <limits>
 
 #include <fmt/format.h>
-#include <nlohmann/json.hpp>
 
 namespace risley::report {
 
@@ -47,45 +43,13 @@ std::string count_text(std::uint64_t count) {
   return text;
 }
 
-std::string json_string(std::string_view text) {
-  const std::string quoted = nlohmann::json(std::string(text))
-                                 .dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
-  std::string safe;
-  for (const char c : quoted) {  // "</script>" must not end the element
-    if (c == '<') {
-      safe += "\\u003c";
-    } else {
-      safe += c;
-    }
-  }
-  return safe;
+std::string finite_text(std::string_view format, double value) {
+  if (!std::isfinite(value)) return "–";
+  const std::string text = fmt::vformat(format, fmt::make_format_args(value));
+  const bool zero = text.find_first_not_of("-0.") == std::string::npos;
+  return zero && text.front() == '-' ? text.substr(1) : text;  // not "-0.00"
 }
 
-int digits_of(const std::vector<double>& values) {
-  constexpr int kDigits = 7, kMostDigits = 15;
-  double least = std::numeric_limits<double>::infinity(), greatest = -least;
-  for (const double value : values) {
-    if (!std::isfinite(value)) continue;
-    least = std::min(least, value);
-    greatest = std::max(greatest, value);
-  }
-  const double size = std::max(std::abs(least), std::abs(greatest)), spread = greatest - least;
-  if (!(spread > 0) || !(size > spread)) return kDigits;
-  return std::min(kDigits + static_cast<int>(std::ceil(std::log10(size / spread))), kMostDigits);
-}
-
-std::string json_numbers(const std::vector<double>& values) {
-  const int digits = digits_of(values);
-  std::string text = "[";
-  for (const double value : values) {
-    if (text.size() > 1) text += ',';
-    if (std::isfinite(value)) {
-      fmt::format_to(std::back_inserter(text), "{:.{}g}", value, digits);
-    } else {
-      text += "null";
-    }
-  }
-  return text += ']';
-}
+std::string millimetres(double metres) { return finite_text("{:.1f}", kMillimetres * metres); }
 
 }  // namespace risley::report

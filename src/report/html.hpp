@@ -5,7 +5,6 @@
 #include <cstdint>
 #include <string>
 #include <string_view>
-#include <vector>
 
 namespace risley::report {
 
@@ -15,14 +14,12 @@ std::string escape_html(std::string_view text);
 /// 1234567 as "1 234 567", with spaces that do not break.
 std::string count_text(std::uint64_t count);
 
-/// Text as a quoted JSON string that may stand inside a script element.
-std::string json_string(std::string_view text);
+/// A number as text, and a dash for one that is not finite.
+/// @param format  of fmt, such as "{:.3g}"
+std::string finite_text(std::string_view format, double value);
 
-/// Significant digits that a diagram needs of numbers: seven, and more where they differ little
-/// beside their size, as the speeds of a steady rotor do.
-int digits_of(const std::vector<double>& values);
-
-/// Numbers as a JSON array, with so many digits; a value that is not finite becomes null.
-std::string json_numbers(const std::vector<double>& values);
+inline constexpr double kMillimetres = 1000.0;  // of a metre
+/// A length in metres as millimetres with one decimal, and a dash where there is none.
+std::string millimetres(double metres);
 
 }  // namespace risley::report

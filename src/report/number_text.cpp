@@ -10,8 +10,6 @@
 namespace risley::report {
 namespace {
 
-bool is_sigma(double sigma) { return std::isfinite(sigma) && sigma > 0; }
-
 /// Decimals that show two significant digits; 0.0996 is shown as 0.10, so round first.
 int decimals_for(double sigma) {
   const double exponent = std::floor(std::log10(sigma));
@@ -21,6 +19,8 @@ int decimals_for(double sigma) {
 }
 
 }  // namespace
+
+bool is_sigma(double sigma) { return std::isfinite(sigma) && sigma > 0; }
 
 NumberText number_text(double value, double sigma) {
   if (!is_sigma(sigma)) return {fmt::format("{:.7g}", value), ""};

@@ -82,7 +82,7 @@
       encode: { x: 0, y: 1 },
       data: series.x.map((x, i) => [x, series.y[i], series.value[i]]),
       renderItem: (params, api) => {
-        const [w, h] = series.cell;
+        const w = series.cell_width, h = series.cell_height;
         const from = api.coord([api.value(0) - w / 2, api.value(1) - h / 2]);
         const to = api.coord([api.value(0) + w / 2, api.value(1) + h / 2]);
         return {

@@ -39,13 +39,6 @@ std::string list_html(const std::vector<std::string>& items) {
   return html + "</ul>";
 }
 
-std::string finite_text(std::string_view format, double value) {
-  if (!std::isfinite(value)) return "–";
-  const std::string text = fmt::vformat(format, fmt::make_format_args(value));
-  const bool zero = text.find_first_not_of("-0.") == std::string::npos;
-  return zero && text.front() == '-' ? text.substr(1) : text;  // not "-0.00"
-}
-
 std::string verdict_html(const Verdict& verdict) {
   std::string kind = "ok", title = verdict.healthy, advice;
   const std::string warnings = verdict.warnings.empty() ? "" : list_html(verdict.warnings);

@@ -27,10 +27,6 @@ std::string parameter_head(const ParameterInfo& parameter);
 
 std::string list_html(const std::vector<std::string>& items);
 
-/// A number as text, and a dash for one that is not finite.
-/// @param format  of fmt, such as "{:.3g}"
-std::string finite_text(std::string_view format, double value);
-
 /// What a page says first.
 struct Verdict {
   bool converged = false;

@@ -2,8 +2,6 @@
 // SPDX-License-Identifier: MIT
 #include "risley/report/report_file.hpp"
 
-#include <cstdlib>
-
 #include <fmt/format.h>
 
 #include "risley/core/error.hpp"
@@ -11,7 +9,7 @@
 #include "risley/report/calibration_page.hpp"
 #include "risley/report/estimate_page.hpp"
 
-#include "report/html.hpp"
+#include "report/chart_fields.hpp"
 #include "report/json_archive.hpp"
 
 namespace risley {
@@ -159,72 +157,7 @@ namespace {
 constexpr const char* kFormat = "risley report";
 constexpr int kFormatVersion = 1;
 
-/// Numbers with the digits that a diagram needs.
-std::vector<double> shortened(const std::vector<double>& values) {
-  const int digits = digits_of(values);
-  std::vector<double> result;
-  result.reserve(values.size());
-  for (const double value : values) {
-    result.push_back(std::isfinite(value)
-                         ? std::strtod(fmt::format("{:.{}g}", value, digits).c_str(), nullptr)
-                         : value);
-  }
-  return result;
-}
-
 }  // namespace
-
-std::span<const char* const> enum_names(SeriesKind) {
-  static constexpr const char* kNames[] = {"points", "line", "steps", "cells"};
-  return kNames;
-}
-
-std::span<const char* const> enum_names(ChartKind) {
-  static constexpr const char* kNames[] = {"plain", "full_turn", "two_turns", "map", "space"};
-  return kNames;
-}
-
-std::span<const char* const> enum_names(Palette) {
-  static constexpr const char* kNames[] = {"sequential", "diverging"};
-  return kNames;
-}
-
-/// A column of a diagram: the writer shortens it, the reader takes it as it is.
-template <class Archive, class Column>
-void column(Archive& archive, const char* name, Column& values) {
-  if constexpr (std::is_const_v<Column>) {
-    archive(name, shortened(values));
-  } else {
-    archive(name, values);
-  }
-}
-
-template <class Archive, FieldsOf<Series> T>
-void fields(Archive& archive, T& series) {
-  archive("label", series.label);
-  archive("colour", series.colour);
-  archive("kind", series.kind);
-  column(archive, "x", series.x);
-  column(archive, "y", series.y);
-  column(archive, "z", series.z);
-  column(archive, "value", series.value);
-  archive("cell_width", series.cell_width);
-  archive("cell_height", series.cell_height);
-}
-
-template <class Archive, FieldsOf<Chart> T>
-void fields(Archive& archive, T& chart) {
-  archive("title", chart.title);
-  archive("kind", chart.kind);
-  archive("x_label", chart.x_label);
-  archive("y_label", chart.y_label);
-  archive("z_label", chart.z_label);
-  archive("value_label", chart.value_label);
-  archive("palette", chart.palette);
-  archive("value_range", chart.value_range);
-  archive("note", chart.note);
-  archive("series", chart.series);
-}
 
 template <class Archive, FieldsOf<ReportedParameter> T>
 void fields(Archive& archive, T& row) {

@@ -105,19 +105,19 @@ class NcFile {
 };
 
 /// One variable of doubles in file units.
-struct Column {
+struct StateColumn {
   std::string name, units, long_name;
   const std::vector<double>* values;
   double scale;
   bool root = false;  ///< the values are variances and the file holds sigmas
 };
 
-std::vector<Column> columns_of(const estimation::RotorStates& states) {
+std::vector<StateColumn> columns_of(const estimation::RotorStates& states) {
   const auto prisms = states.rotation_angle.size();
   const double k = kDegreesPerRadian;
-  std::vector<Column> columns;
+  std::vector<StateColumn> columns;
   std::size_t entry = 0;
-  std::vector<Column> covariances;
+  std::vector<StateColumn> covariances;
   for (std::size_t i = 0; i < prisms; ++i) {
     const char a = prism_letter(static_cast<int>(i));
     columns.push_back({fmt::format("rotation_angle_{}_deg", a), "degree",
@@ -165,7 +165,7 @@ void write_states(const std::string& path, const StatesContent& content,
   estimation::RotorStates block;
   block.resize(content.prisms, 0);
   std::vector<int> variables;
-  for (const Column& column : columns_of(block)) {
+  for (const StateColumn& column : columns_of(block)) {
     variables.push_back(file.define(shots, column.name, NC_DOUBLE, column.units, column.long_name));
   }
   const int outlier = file.define(shots, "outlier", NC_UBYTE, "", "shot left out as an outlier");
@@ -207,7 +207,7 @@ void write_states(const std::string& path, const StatesContent& content,
     }
     file.write(time, first, values);
     file.write(time_ns, first, block.time_ns);
-    const std::vector<Column> columns = columns_of(block);
+    const std::vector<StateColumn> columns = columns_of(block);
     for (std::size_t c = 0; c < columns.size(); ++c) {
       for (std::size_t i = 0; i < values.size(); ++i) {
         const double value = (*columns[c].values)[i];

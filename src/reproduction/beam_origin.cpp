@@ -21,7 +21,7 @@ namespace {
 constexpr double kMillimetres = 1e3;
 /// The paper's grid of 0.333 degree, both ends of the turn included.
 constexpr std::size_t kSteps = 1081;
-constexpr double kCell = radians_from_degrees(0.5);
+constexpr double kMapCell = radians_from_degrees(0.5);
 
 struct PapersBeam {
   const char *name, *rotation_angle_a, *rotation_angle_b, *azimuth, *zenith, *y, *z;
@@ -124,7 +124,7 @@ Table figure_a1(const BeamOriginMap& map) {
 
 Reproduction beam_origin_errors(const ReproduceOptions& options) {
   const BeamOriginMap map = beam_origin_map(options.type.train.without_errors(),
-                                            options.type.prism_geometry(), kSteps, kCell);
+                                            options.type.prism_geometry(), kSteps, kMapCell);
   Figure figure{"figure_a1", "figure_a1", "Fig. A1: corrections over the field of view", {}};
   figure.charts = {map_chart(map, "(a) least Y", map.least_y),
                    map_chart(map, "(b) greatest Y", map.greatest_y),

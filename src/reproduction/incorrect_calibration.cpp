@@ -117,7 +117,7 @@ Judged judge(const WallRun& wall, const ReproduceOptions& options, CalibrationMe
 }
 
 /// One draw of the paper's own case.
-struct Draw {
+struct CalibrationDraw {
   std::array<double, 2> before{};  ///< deg
   Judged paper, weighted;
   ShotErrors reported;  ///< of the first draw
@@ -135,17 +135,19 @@ Row distribution_row(std::string term, const char* paper, const std::vector<doub
   return row;
 }
 
-std::vector<double> column(const std::vector<Draw>& draws, const Judged Draw::*who,
-                           double DirectionErrors::*what) {
+std::vector<double> column(const std::vector<CalibrationDraw>& draws,
+                           const Judged CalibrationDraw::*who, double DirectionErrors::*what) {
   std::vector<double> values;
   values.reserve(draws.size());
-  for (const Draw& draw : draws) values.push_back(degrees_from_radians((draw.*who).errors.*what));
+  for (const CalibrationDraw& draw : draws)
+    values.push_back(degrees_from_radians((draw.*who).errors.*what));
   return values;
 }
 
-double share_converged(const std::vector<Draw>& draws, const Judged Draw::*who) {
+double share_converged(const std::vector<CalibrationDraw>& draws,
+                       const Judged CalibrationDraw::*who) {
   double sum = 0;
-  for (const Draw& draw : draws) sum += (draw.*who).converged;
+  for (const CalibrationDraw& draw : draws) sum += (draw.*who).converged;
   return sum;
 }
 
@@ -166,7 +168,7 @@ Row mean_bias(const char* axis, const std::vector<double>& bias) {
 
 constexpr double kPapersAzimuth = 0.066, kPapersZenith = 0.022;
 
-Table papers_rows(const std::vector<Draw>& draws) {
+Table papers_rows(const std::vector<CalibrationDraw>& draws) {
   Table table{"section_3_3",
               "Section 3.3: an incorrectly calibrated unit before a plane",
               fmt::format("The paper's case: 10 s at 1 kHz, a plane 30 m away turned by 10 and 10 "
@@ -178,21 +180,21 @@ Table papers_rows(const std::vector<Draw>& draws) {
   const auto initial = [&](const char* term, const char* paper, std::size_t axis) {
     std::vector<double> values;
     values.reserve(draws.size());
-    for (const Draw& draw : draws) values.push_back(draw.before[axis]);
+    for (const CalibrationDraw& draw : draws) values.push_back(draw.before[axis]);
     Row row{term, "deg", printed(paper), mean_of(values)};
     row.checks = {at_printed_digits(*row.paper, row.ours)};
     table.rows.push_back(row);
   };
   initial("RMSE of the reported azimuth", "0.077", 0);
   initial("RMSE of the reported zenith", "0.396", 1);
-  const auto azimuth_bias = column(draws, &Draw::paper, &DirectionErrors::azimuth_bias);
-  const auto zenith_bias = column(draws, &Draw::paper, &DirectionErrors::zenith_bias);
+  const auto azimuth_bias = column(draws, &CalibrationDraw::paper, &DirectionErrors::azimuth_bias);
+  const auto zenith_bias = column(draws, &CalibrationDraw::paper, &DirectionErrors::zenith_bias);
   table.rows.push_back(
       distribution_row("RMSE of the adjusted azimuth", "0.066",
-                       column(draws, &Draw::paper, &DirectionErrors::azimuth_rmse)));
+                       column(draws, &CalibrationDraw::paper, &DirectionErrors::azimuth_rmse)));
   table.rows.push_back(
       distribution_row("RMSE of the adjusted zenith", "0.022",
-                       column(draws, &Draw::paper, &DirectionErrors::zenith_rmse)));
+                       column(draws, &CalibrationDraw::paper, &DirectionErrors::zenith_rmse)));
   table.rows.push_back(distribution_row("bias of the adjusted azimuth", "-0.065", azimuth_bias));
   table.rows.push_back(distribution_row("bias of the adjusted zenith", "-0.021", zenith_bias));
   table.rows.push_back(mean_bias("azimuth", azimuth_bias));
@@ -200,25 +202,25 @@ Table papers_rows(const std::vector<Draw>& draws) {
   return table;
 }
 
-void add_ours(Table& table, const std::vector<Draw>& draws) {
+void add_ours(Table& table, const std::vector<CalibrationDraw>& draws) {
   const double papers_total = std::hypot(kPapersAzimuth, kPapersZenith);
   const auto count = static_cast<double>(draws.size());
   Row shape{"paper's adjustment: error that is not a rotation of all beams, mean",
             "deg",
             {},
-            mean_of(column(draws, &Draw::paper, &DirectionErrors::shape))};
+            mean_of(column(draws, &CalibrationDraw::paper, &DirectionErrors::shape))};
   shape.checks = {at_most("ours", shape.ours, 0.0228,
                           "what it was before, 0.0228: the bundle's shape is calibrated, what "
                           "stays is the direction that all beams share")};
   table.rows.push_back(shape);
   double squares = 0, formal = 0;
-  for (const Draw& draw : draws) {
+  for (const CalibrationDraw& draw : draws) {
     squares += std::pow(draw.weighted.errors.total, 2);
     formal += std::pow(draw.weighted.formal_total, 2);
   }
   Row weighted{"our adjustment at 1 kHz: total error, median", "deg", {}, 0};
-  weighted.distribution =
-      distribution_of(column(draws, &Draw::weighted, &DirectionErrors::total), papers_total);
+  weighted.distribution = distribution_of(
+      column(draws, &CalibrationDraw::weighted, &DirectionErrors::total), papers_total);
   weighted.ours = weighted.distribution->median;
   weighted.checks = {rms_ratio("root mean square of the total errors over the formal ones",
                                std::sqrt(squares / formal), 1.5 * count,
@@ -233,7 +235,8 @@ void add_ours(Table& table, const std::vector<Draw>& draws) {
   Row converged{"adjustments that converged, both kinds",
                 "1",
                 {},
-                share_converged(draws, &Draw::paper) + share_converged(draws, &Draw::weighted)};
+                share_converged(draws, &CalibrationDraw::paper) +
+                    share_converged(draws, &CalibrationDraw::weighted)};
   converged.checks = {at_least("ours", converged.ours, 2.0 * count, "all of them")};
   table.rows.push_back(converged);
 }
@@ -264,20 +267,20 @@ void add_full_rate(Table& table, const std::vector<Judged>& all) {
   table.rows.push_back(row);
 }
 
-Figure figure_12(const std::vector<Draw>& draws) {
+Figure figure_12(const std::vector<CalibrationDraw>& draws) {
   Figure figure{"figure_12",
                 "section_3_3",
                 "Fig. 12: errors of the directions before and after the adjustment (first draw)",
                 {}};
-  const Draw& first = draws.front();
+  const CalibrationDraw& first = draws.front();
   figure.charts = {
       histogram_chart("(a) azimuth before", "deg", first.reported.azimuth, kDegreesPerRadian),
       histogram_chart("(b) zenith before", "deg", first.reported.zenith, kDegreesPerRadian),
       histogram_chart("(c) azimuth after", "deg", first.paper.shots.azimuth, kDegreesPerRadian),
       histogram_chart("(d) zenith after", "deg", first.paper.shots.zenith, kDegreesPerRadian)};
   const report::Series ours{"our draws", "a", report::SeriesKind::points,
-                            column(draws, &Draw::paper, &DirectionErrors::azimuth_bias),
-                            column(draws, &Draw::paper, &DirectionErrors::zenith_bias)};
+                            column(draws, &CalibrationDraw::paper, &DirectionErrors::azimuth_bias),
+                            column(draws, &CalibrationDraw::paper, &DirectionErrors::zenith_bias)};
   const report::Series papers{
       "the paper's draw", "b", report::SeriesKind::points, {-0.065}, {-0.021}};
   figure.charts.push_back({"Biases after the adjustment: all draws and the paper's",
@@ -293,12 +296,12 @@ Figure figure_12(const std::vector<Draw>& draws) {
 
 Reproduction incorrect_calibration(const ReproduceOptions& options, const Progress& progress) {
   const Effort& effort = options.effort;
-  std::vector<Draw> draws(effort.wall_seeds);
+  std::vector<CalibrationDraw> draws(effort.wall_seeds);
   for_each_draw(
       draws.size(),
       [&](std::size_t i) {
         const WallRun wall = record_wall(options, i, kPapersRate, false);
-        Draw& draw = draws[i];
+        CalibrationDraw& draw = draws[i];
         draw.before = reported_errors(wall.run);
         draw.paper = judge(wall, options, CalibrationMethod::paper, false, i == 0);
         draw.weighted = judge(wall, options, CalibrationMethod::adjustment, false, false);

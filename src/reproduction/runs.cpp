@@ -14,6 +14,7 @@
 #include "risley/core/error.hpp"
 
 namespace risley::reproduction {
+
 SimulatedRun simulate(const simulation::SimulationSettings& settings, bool ranges) {
   simulation::Scanner scanner(settings);
   estimation::ShotSelector selector({{}, ranges});

@@ -21,7 +21,7 @@
 namespace risley::reproduction {
 namespace {
 
-constexpr double kCell = 0.25;             // deg
+constexpr double kDensityCell = 0.25;      // deg
 constexpr std::size_t kMostPoints = 4000;  ///< of the drawn pattern
 
 /// Cells of a square grid over azimuth and elevation.
@@ -48,8 +48,8 @@ Pattern scan(const ReproduceOptions& options, double duration) {
     const double zenith = degrees_from_radians(run.series.zenith[i]);
     pattern.azimuth_deg.push_back(azimuth);
     pattern.zenith_deg.push_back(zenith);
-    pattern.cell.emplace_back(static_cast<int>(std::floor(azimuth / kCell)),
-                              static_cast<int>(std::floor((zenith - 90.0) / kCell)));
+    pattern.cell.emplace_back(static_cast<int>(std::floor(azimuth / kDensityCell)),
+                              static_cast<int>(std::floor((zenith - 90.0) / kDensityCell)));
     const auto direction =
         direction_from_angles<double>({run.series.azimuth[i], run.series.zenith[i]});
     pattern.off_axis_deg.push_back(
@@ -106,7 +106,7 @@ Reproduction scan_pattern(const ReproduceOptions& options) {
   edge.checks = {at_least("ours", edge.ours, 2.0, "the paper: nonhomogeneous, as in the retina")};
   table.rows.push_back(edge);
 
-  const double all_cells = kPi * 19.2 * 19.2 / (kCell * kCell);
+  const double all_cells = kPi * 19.2 * 19.2 / (kDensityCell * kDensityCell);
   const auto share = [&](std::size_t shots) {
     return static_cast<double>(cells(pattern, 0, shots).size()) / all_cells;
   };

@@ -26,10 +26,10 @@ using estimation::Method;
 /// The noise that the paper simulates and the estimators are told.
 constexpr const char* kPapersNoise = "0.01";
 /// Half the width of the band of a mean that holds it in 999 of 1000 cases, in its sigmas.
-constexpr double kBand = 3.3;
+constexpr double kScatterBand = 3.3;
 
 /// What one draw leaves behind.
-struct Draw {
+struct UnitDraw {
   bool converged = false;
   std::map<std::string, double> value, sigma, error;              ///< file units
   std::array<double, 2> angle_rmse{}, angle_mean{}, speed_std{};  ///< deg, deg, deg/s
@@ -38,9 +38,9 @@ struct Draw {
   std::vector<std::vector<double>> angle_error;  ///< [prisms][shots], rad; of the first draw
 };
 
-Draw draw_of(const Estimate& estimate, const SimulatedRun& run, bool keep) {
+UnitDraw draw_of(const Estimate& estimate, const SimulatedRun& run, bool keep) {
   Evaluation evaluation = estimation::evaluate(estimate, run.settings.truth, run.truth);
-  Draw draw;
+  UnitDraw draw;
   draw.converged = estimate.converged;
   for (std::size_t i = 0; i < evaluation.parameters.size(); ++i) {
     const std::string& name = evaluation.parameters[i].name;
@@ -64,17 +64,17 @@ Draw draw_of(const Estimate& estimate, const SimulatedRun& run, bool keep) {
 }
 
 template <class Get>
-std::vector<double> column(const std::vector<Draw>& draws, const Get& get) {
+std::vector<double> column(const std::vector<UnitDraw>& draws, const Get& get) {
   std::vector<double> values;
   values.reserve(draws.size());
-  for (const Draw& draw : draws) values.push_back(get(draw));
+  for (const UnitDraw& draw : draws) values.push_back(get(draw));
   return values;
 }
 
-std::vector<Draw> draw_all(const ReproduceOptions& options, Method method, std::size_t draws,
-                           double rate, const std::vector<estimation::RotorProcess>& process,
-                           const Progress& progress) {
-  std::vector<Draw> result(draws);
+std::vector<UnitDraw> draw_all(const ReproduceOptions& options, Method method, std::size_t draws,
+                               double rate, const std::vector<estimation::RotorProcess>& process,
+                               const Progress& progress) {
+  std::vector<UnitDraw> result(draws);
   const double told = radians_from_degrees(printed(kPapersNoise).value);
   for_each_draw(
       draws,
@@ -104,7 +104,7 @@ std::map<std::string, double> bounds(const ReproduceOptions& options, double rat
 }
 
 /// The rows of Table 3 that the paper's numbers stand in, at any rate.
-Table table_of(const ReproduceOptions& options, const std::vector<Draw>& draws, double rate,
+Table table_of(const ReproduceOptions& options, const std::vector<UnitDraw>& draws, double rate,
                std::string name, std::string title, std::string method) {
   Table table{std::move(name), std::move(title), std::move(method), {}};
   const std::map<std::string, double> bound = bounds(options, rate);
@@ -114,12 +114,12 @@ Table table_of(const ReproduceOptions& options, const std::vector<Draw>& draws, 
     const ParameterInfo& info = find_parameter(key, 2);
     const Printed known = printed(papers.known), papers_sigma = printed(papers.sigma);
     Row row{info.long_name, info.unit, printed(papers.estimated),
-            mean_of(column(draws, [&](const Draw& draw) { return draw.value.at(key); }))};
+            mean_of(column(draws, [&](const UnitDraw& draw) { return draw.value.at(key); }))};
     const double rmse =
-        root_mean_square(column(draws, [&](const Draw& draw) { return draw.error.at(key); }));
+        root_mean_square(column(draws, [&](const UnitDraw& draw) { return draw.error.at(key); }));
     row.sigma =
-        root_mean_square(column(draws, [&](const Draw& draw) { return draw.sigma.at(key); }));
-    const double mean_band = kBand * bound.at(key) / std::sqrt(count);
+        root_mean_square(column(draws, [&](const UnitDraw& draw) { return draw.sigma.at(key); }));
+    const double mean_band = kScatterBand * bound.at(key) / std::sqrt(count);
     row.checks = {
         rms_ratio("root mean square error over the Cramer-Rao bound", rmse / bound.at(key), count,
                   fmt::format("{:.0f} seeds at the bound {:.2g}", count, bound.at(key))),
@@ -137,13 +137,13 @@ Table table_of(const ReproduceOptions& options, const std::vector<Draw>& draws, 
     const std::string key = kPapersSpeeds[k].name;
     const Printed paper = printed(kPapersSpeeds[k].estimated);
     Row row{find_parameter(key, 2).long_name, "deg/s", paper,
-            mean_of(column(draws, [&](const Draw& draw) { return draw.value.at(key); }))};
+            mean_of(column(draws, [&](const UnitDraw& draw) { return draw.value.at(key); }))};
     row.sigma =
-        root_mean_square(column(draws, [&](const Draw& draw) { return draw.sigma.at(key); }));
+        root_mean_square(column(draws, [&](const UnitDraw& draw) { return draw.sigma.at(key); }));
     const double rmse =
-        root_mean_square(column(draws, [&](const Draw& draw) { return draw.error.at(key); }));
+        root_mean_square(column(draws, [&](const UnitDraw& draw) { return draw.error.at(key); }));
     const double swing =
-        mean_of(column(draws, [&](const Draw& draw) { return draw.speed_std[k]; }));
+        mean_of(column(draws, [&](const UnitDraw& draw) { return draw.speed_std[k]; }));
     row.checks = {at_most("root mean square error of the mean speed", rmse, paper.half_digit,
                           "half the last printed digit"),
                   within("standard deviation of the speed over time", swing, 2.15 - 0.1, 2.25 + 0.1,
@@ -154,9 +154,9 @@ Table table_of(const ReproduceOptions& options, const std::vector<Draw>& draws, 
   }
   const double noise = printed(kPapersNoise).value;
   for (const auto& [axis, member] :
-       {std::pair("azimuth", &Draw::azimuth), std::pair("zenith", &Draw::zenith)}) {
+       {std::pair("azimuth", &UnitDraw::azimuth), std::pair("zenith", &UnitDraw::zenith)}) {
     Row row{fmt::format("{} observation errors, standard deviation", axis), "deg", printed("0.008"),
-            mean_of(column(draws, [m = member](const Draw& draw) {
+            mean_of(column(draws, [m = member](const UnitDraw& draw) {
               return degrees_from_radians((draw.*m).std);
             }))};
     row.checks = {within("ours over the simulated 0.01", row.ours / noise, 0.97, 1.01,
@@ -169,9 +169,10 @@ Table table_of(const ReproduceOptions& options, const std::vector<Draw>& draws, 
   }
   for (std::size_t k = 0; k < 2; ++k) {
     const Printed paper = printed(k == 0 ? "0.024" : "0.020");
-    Row row{fmt::format("rotation angle errors of prism {}, root mean square", k == 0 ? 'A' : 'B'),
-            "deg", paper,
-            root_mean_square(column(draws, [k](const Draw& draw) { return draw.angle_rmse[k]; }))};
+    Row row{
+        fmt::format("rotation angle errors of prism {}, root mean square", k == 0 ? 'A' : 'B'),
+        "deg", paper,
+        root_mean_square(column(draws, [k](const UnitDraw& draw) { return draw.angle_rmse[k]; }))};
     row.checks = {at_most("ours", row.ours, paper.value + paper.half_digit,
                           "not worse than the paper's at its printed digits")};
     row.note = fmt::format("{:.1f} times better: rotors are smooth and all shots speak for each.",
@@ -181,13 +182,13 @@ Table table_of(const ReproduceOptions& options, const std::vector<Draw>& draws, 
   Row nees{"squared parameter errors over stated variances",
            "1",
            {},
-           mean_of(column(draws, [](const Draw& draw) { return draw.nees_parameters; }))};
+           mean_of(column(draws, [](const UnitDraw& draw) { return draw.nees_parameters; }))};
   nees.checks = {mean_square_ratio("ours", nees.ours, 8.0 * count, "1 is honest")};
   table.rows.push_back(nees);
   Row angles{"squared rotation angle errors over stated variances",
              "1",
              {},
-             mean_of(column(draws, [](const Draw& draw) { return draw.nees_angles; }))};
+             mean_of(column(draws, [](const UnitDraw& draw) { return draw.nees_angles; }))};
   angles.checks = {within("ours", angles.ours, 0.5, 1.3,
                           "1 is honest; a sine is smoother than the random walks of the motion "
                           "model, which is therefore a little too careful")};
@@ -196,7 +197,8 @@ Table table_of(const ReproduceOptions& options, const std::vector<Draw>& draws, 
       "estimates that converged",
       "1",
       {},
-      mean_of(column(draws, [](const Draw& draw) { return draw.converged ? 1.0 : 0.0; })) * count};
+      mean_of(column(draws, [](const UnitDraw& draw) { return draw.converged ? 1.0 : 0.0; })) *
+          count};
   converged.checks = {at_least("ours", converged.ours, count, "all seeds")};
   table.rows.push_back(converged);
   return table;
@@ -215,7 +217,8 @@ std::vector<estimation::RotorProcess> papers_angle_walk() {
   return process;
 }
 
-Table filter_table(const std::vector<Draw>& speed_noise, const std::vector<Draw>& angle_noise) {
+Table filter_table(const std::vector<UnitDraw>& speed_noise,
+                   const std::vector<UnitDraw>& angle_noise) {
   Table table{
       "table_3_filter",
       "Table 3: what the paper's filter did with the noise",
@@ -224,7 +227,7 @@ Table filter_table(const std::vector<Draw>& speed_noise, const std::vector<Draw>
       "kinds of heavy noise, 30 s at 1 kHz: on the speeds (900 deg/s per root second, "
       "--process-noise paper), and on the rotation angles.",
       {}};
-  const auto add = [&](const char* kind, const std::vector<Draw>& draws, double slack,
+  const auto add = [&](const char* kind, const std::vector<UnitDraw>& draws, double slack,
                        const char* why) {
     const auto row = [&](std::string term, const char* paper, double ours) -> Row& {
       Row one{fmt::format("{}: {}", kind, term), "deg", printed(paper), ours};
@@ -232,17 +235,17 @@ Table filter_table(const std::vector<Draw>& speed_noise, const std::vector<Draw>
       table.rows.push_back(one);
       return table.rows.back();
     };
-    row("azimuth observation errors", "0.008", mean_of(column(draws, [](const Draw& draw) {
+    row("azimuth observation errors", "0.008", mean_of(column(draws, [](const UnitDraw& draw) {
           return degrees_from_radians(draw.azimuth.std);
         })));
-    row("zenith observation errors", "0.008", mean_of(column(draws, [](const Draw& draw) {
+    row("zenith observation errors", "0.008", mean_of(column(draws, [](const UnitDraw& draw) {
           return degrees_from_radians(draw.zenith.std);
         })));
     for (std::size_t k = 0; k < 2; ++k) {
-      Row& one = row(
-          fmt::format("rotation angle errors of prism {}", k == 0 ? 'A' : 'B'),
-          k == 0 ? "0.024" : "0.020",
-          root_mean_square(column(draws, [k](const Draw& draw) { return draw.angle_rmse[k]; })));
+      Row& one = row(fmt::format("rotation angle errors of prism {}", k == 0 ? 'A' : 'B'),
+                     k == 0 ? "0.024" : "0.020",
+                     root_mean_square(
+                         column(draws, [k](const UnitDraw& draw) { return draw.angle_rmse[k]; })));
       const double margin = one.paper->half_digit + slack * one.paper->value;
       one.checks = {
           within("ours", one.ours, one.paper->value - margin, one.paper->value + margin, why)};
@@ -255,7 +258,7 @@ Table filter_table(const std::vector<Draw>& speed_noise, const std::vector<Draw>
   return table;
 }
 
-Figure angle_figure(const std::vector<Draw>& draws, const std::vector<Draw>& filter) {
+Figure angle_figure(const std::vector<UnitDraw>& draws, const std::vector<UnitDraw>& filter) {
   Figure figure{"figure_11",
                 "table_3",
                 "Fig. 11: sample distribution of the errors of the rotation angles",

@@ -11,6 +11,7 @@
 #include <fmt/format.h>
 
 #include "risley/core/error.hpp"
+#include "risley/estimation/piecewise.hpp"
 
 #include "report/charts.hpp"
 #include "reproduction/papers_unit.hpp"
@@ -22,6 +23,7 @@ namespace {
 using estimation::Estimate;
 using estimation::Method;
 using estimation::Moments;
+using namespace std::string_literals;
 
 /// Residuals of the paper's real unit: rounding to 0.01 degree included.
 constexpr const char* kPapersResidual = "0.004";
@@ -106,13 +108,12 @@ Figure residual_figure(const Estimate& estimate, const std::string& table, const
                 table,
                 "Fig. 10: sample distribution of the residuals",
                 {}};
-  const bool map = estimate.map.has_value();
-  const auto& azimuth = map ? estimate.map->azimuth_residual : estimate.states.azimuth_residual;
-  const auto& zenith = map ? estimate.map->zenith_residual : estimate.states.zenith_residual;
-  const char* rate = map ? ", all shots" : ", filter at 1 kHz";
-  figure.charts = {
-      histogram_chart(fmt::format("(a) azimuth{}", rate), "deg", azimuth, kDegreesPerRadian),
-      histogram_chart(fmt::format("(b) zenith{}", rate), "deg", zenith, kDegreesPerRadian)};
+  const estimation::ShotResiduals residuals = estimation::shot_residuals(estimate);
+  const char* rate = estimate.map ? ", all shots" : ", filter at 1 kHz";
+  figure.charts = {histogram_chart(fmt::format("(a) azimuth{}", rate), "deg", residuals.azimuth,
+                                   kDegreesPerRadian),
+                   histogram_chart(fmt::format("(b) zenith{}", rate), "deg", residuals.zenith,
+                                   kDegreesPerRadian)};
   return figure;
 }
 
@@ -120,26 +121,22 @@ double speed_std(const Estimate& estimate, std::size_t prism) {
   return degrees_from_radians(standard_deviation(estimate.states.angular_velocity[prism]));
 }
 
-/// Estimates of every second of the recording alone, by parameter: Fig. 7's sample distributions.
-std::vector<std::vector<double>> estimates_of_pieces(const SimulatedRun& run,
-                                                     const ReproduceOptions& options,
-                                                     double angle_noise, const Progress& progress) {
-  const auto pieces = static_cast<std::size_t>(run.settings.duration / kPiece);
-  const std::size_t shots = run.series.size() / pieces;
-  std::vector<std::vector<double>> values(std::size(kPapersUnit), std::vector<double>(pieces));
-  for_each_draw(
-      pieces,
-      [&](std::size_t p) {
-        SimulatedRun piece;
-        piece.series = estimation::rows_of(run.series, p * shots, (p + 1) * shots);
-        piece.head = piece.series;
-        const Estimate estimate = estimate_run(Method::map, piece, options.type, angle_noise);
-        for (std::size_t j = 0; j < std::size(kPapersUnit); ++j) {
-          const std::string name = kPapersUnit[j].name;
-          values[j][p] = value_of(estimate, name).value / si_per_unit(name);
-        }
-      },
-      progress);
+/// Estimates of every second of the recording alone, by parameter and in the unit of files:
+/// Fig. 7's sample distributions.
+std::vector<std::vector<double>> estimates_of_pieces(const Estimate& estimate,
+                                                     const ReproduceOptions& options) {
+  const auto count = static_cast<std::size_t>(std::round(estimate.series.duration() / kPiece));
+  const estimation::PiecewiseEstimate pieces =
+      estimation::estimate_piecewise(estimate, options.type, count);
+  std::vector<std::vector<double>> values;
+  for (const PapersParameter& papers : kPapersUnit) {
+    const auto free =
+        std::find_if(estimate.free.begin(), estimate.free.end(),
+                     [&](const auto& parameter) { return parameter.name == papers.name; });
+    if (free == estimate.free.end()) throw InvalidArgument(papers.name + " was not estimated"s);
+    values.push_back(pieces.value[static_cast<std::size_t>(free - estimate.free.begin())]);
+    for (double& value : values.back()) value /= si_per_unit(papers.name);
+  }
   return values;
 }
 
@@ -178,15 +175,15 @@ Reproduction simulated(const ReproduceOptions& options, const Progress& progress
   const double told = std::sqrt(residual * residual - rounding);
   settings.angle_noise = scale * told;
   SimulatedRun run = simulate(settings);
-  report_progress(progress, 0.15);
+  report_progress(progress, 0.2);
 
   const Estimate all = estimate_run(Method::map, run, options.type, told);
-  report_progress(progress, 0.3);
+  report_progress(progress, 0.45);
   SimulatedRun thin;
   thin.series = thinned_to(run.series, kFilterRate);
   thin.head = run.head;
   const Estimate filtered = estimate_run(Method::ekf, thin, options.type, told);
-  report_progress(progress, 0.4);
+  report_progress(progress, 0.6);
 
   const std::string map_name = "all shots", filter_name = "filter at 1 kHz";
   for (const auto& [name, estimate] :
@@ -195,7 +192,8 @@ Reproduction simulated(const ReproduceOptions& options, const Progress& progress
     add_residuals(table, name, "azimuth", estimate->azimuth_residuals, "0.00", "0.64", false);
     add_residuals(table, name, "zenith", estimate->zenith_residuals, "0.01", "0.59", false);
   }
-  const auto pieces = estimates_of_pieces(run, options, told, part_of(progress, 0.4, 1.0));
+  const auto pieces = estimates_of_pieces(all, options);
+  report_progress(progress, 1.0);
   add_parameters(table, all, pieces);
 
   const estimation::Evaluation evaluation =

@@ -72,6 +72,13 @@ struct Estimate {
   double expected_residual = 0;                    ///< rms of noise and rounding together, rad
 };
 
+/// Residuals at every shot of an estimate's series: references into the estimate.
+struct ShotResiduals {
+  const std::vector<double>&azimuth, &zenith;  ///< observed minus estimated, rad; NaN: not used
+  const std::vector<unsigned char>& outlier;   ///< not 0: left out
+};
+ShotResiduals shot_residuals(const Estimate& estimate);
+
 /// Rotor states of shots [begin, end) of an estimate's series.
 RotorStates states_of_shots(const Estimate& estimate, ShotRange shots);
 

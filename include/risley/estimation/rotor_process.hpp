@@ -25,6 +25,10 @@ inline constexpr RotorProcess kPaperProcess{radians_from_degrees(900.0), 0.0, 0.
 /// A rotor that moves as the paper saw it: speeds that swing by 2.2 deg/s within seconds (Fig. 9).
 inline constexpr RotorProcess kTypicalRotor{0.0, 0.0, radians_from_degrees(4.0)};
 
+/// A rotor of which nothing is known yet: noise far above that of real ones, so that a first pass
+/// follows it wherever it goes.
+inline constexpr RotorProcess kSettlingProcess{radians_from_degrees(30.0), 0.0, 0.0};
+
 /// Covariance that a step of dt seconds adds to (angle, speed, acceleration).
 struct RotorStepCovariance {
   double angle_angle = 0, angle_speed = 0, angle_acceleration = 0;

@@ -11,6 +11,9 @@ struct NumberText {
   std::string value, sigma;
 };
 
+/// Whether a sigma is finite and above zero.
+bool is_sigma(double sigma);
+
 /// Two significant digits of the sigma, and the value to the same place. Without a sigma (0 or not
 /// finite) the value has seven significant digits and the sigma's text is empty.
 NumberText number_text(double value, double sigma);
