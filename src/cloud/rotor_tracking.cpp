@@ -108,13 +108,6 @@ SensorBelief sensor_belief(const estimation::AngleSeries& beginning,
         "the rotation angles were not found, or the calibration is of another sensor: {}",
         estimate.reason));
   }
-  if (calibration.reference != CalibrationReference::none && calibration.combination &&
-      estimate.start.combination && *calibration.combination != *estimate.start.combination) {
-    throw InvalidArgument(fmt::format(
-        "a calibration of another sensor: its rotors run in speed combination {}, the recording's "
-        "in {}",
-        static_cast<int>(*calibration.combination), static_cast<int>(*estimate.start.combination)));
-  }
   SensorBelief belief;
   belief.sensor = estimate.sensor;
   belief.free = estimate.free;

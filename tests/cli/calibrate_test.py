@@ -348,6 +348,15 @@ class CalibrateTest(CommandTest):
                       "incident_beam_vertical_deg=0.3")
         self.refused(1, ("hall.csv", "incident_beam_vertical_deg"), "hall.csv", "other.csv")
 
+    def test_a_power_up_between_recordings(self):
+        # The same unit, its rotors in the other combination of speeds.
+        self.simulate("switched.csv", HALL, "--set", "angular_velocity_a_deg_per_s=-27997.8",
+                      "--set", "angular_velocity_b_deg_per_s=43789.8")
+        result = self.expect_json(0, "calibrate", "hall.csv", "switched.csv",
+                                  *truth_of("hall.csv", "switched.csv"))
+        self.check(result, 10)
+        self.check_truth(result, 0.04)
+
     def test_stations_that_contradict_the_data(self):
         text = STATIONS.read_text()
         # Upside down, and said to be upright.

@@ -228,11 +228,18 @@ TEST(SensorBelief, RefusesAnotherFaceOrder) {
   }
 }
 
-TEST(SensorBelief, RefusesTheOtherSpeedCombination) {
+// A Mid-40 changes its speed combination at every power-up; its prisms stay what they are.
+TEST(SensorBelief, TakesACalibrationMadeInTheOtherSpeedCombination) {
   const Simulated data = record(2.0, 10000, 6);
-  const sensors::Sensor other =
-      sensors::with_combination(calibration(), sensors::SpeedCombination::first);
-  EXPECT_THROW(belief_of(data.observations, other), InvalidArgument);
+  const sensors::Sensor sensor = calibration();
+  const sensors::Sensor other = sensors::with_combination(sensor, sensors::SpeedCombination::first);
+  const SensorBelief belief = belief_of(data.observations, other);
+  EXPECT_EQ(belief.sensor.train.parameters(), sensor.train.parameters());
+  EXPECT_EQ(belief.sensor.combination, sensors::SpeedCombination::second);
+  EXPECT_NEAR(belief.sensor.angular_velocity[0], sensor.angular_velocity[0],
+              radians_from_degrees(10.0));
+  EXPECT_NEAR(belief.sensor.angular_velocity[1], sensor.angular_velocity[1],
+              radians_from_degrees(10.0));
 }
 
 /// Tracks a recording in pieces of so many seconds and looks at every row.

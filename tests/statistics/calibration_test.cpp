@@ -124,6 +124,29 @@ TEST(Calibration, AHallTellsTenTimesAsMuch) {
   expect_honest(result);
 }
 
+// Two recordings with a power-up between them, after which the rotors run in the other combination.
+TEST(Calibration, RecordingsInBothSpeedCombinationsTellOfOneSensor) {
+  const int seeds = seeds_or(20);
+  WallMonteCarlo result;
+  for (int seed = 0; seed < seeds; ++seed) {
+    std::vector<WallRecording> walls;
+    for (const auto combination :
+         {sensors::SpeedCombination::second, sensors::SpeedCombination::first}) {
+      auto settings = wall_settings(hall(), 1000 * walls.size() + static_cast<std::uint64_t>(seed),
+                                    1000.0, 5.0);
+      settings.truth = sensors::with_combination(settings.truth, combination);
+      settings.reported = sensors::with_combination(*settings.reported, combination);
+      walls.push_back(record_walls(settings));
+      ASSERT_EQ(walls.back().recording.believed.combination, combination) << seed;
+    }
+    result.add(calibrate_walls({&walls[0], &walls[1]}, wall_options()),
+               walls.front().settings.truth);
+  }
+  result.record();
+  EXPECT_LE(result.mean_total(), 0.015);
+  expect_honest(result);
+}
+
 TEST(Calibration, StationsStatedWithErrorsGiveWhatTheyPromise) {
   constexpr double kStated = radians_from_degrees(0.02);
   const int seeds = seeds_or(20);
