@@ -296,11 +296,12 @@ class ScaledSolver {
 /// information come out as zero, also where the others cannot be told apart.
 Eigen::MatrixXd eliminated(const Eigen::MatrixXd& hessian, Index free) {
   const Index rest = hessian.rows() - free;
-  if (rest == 0) return hessian;
+  if (rest <= 0) return hessian;
   const Eigen::VectorXd scale =
       hessian.diagonal().tail(rest).cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(
-      scale.asDiagonal() * hessian.bottomRightCorner(rest, rest) * scale.asDiagonal());
+  const Eigen::MatrixXd scaled =
+      scale.asDiagonal() * hessian.bottomRightCorner(rest, rest) * scale.asDiagonal();
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(scaled);
   Eigen::VectorXd inverse = solver.eigenvalues();
   for (double& value : inverse)
     value = value > 1e-13 * static_cast<double>(rest) ? 1.0 / value : 0.0;

@@ -3,6 +3,7 @@
 #include "risley/estimation/process_likelihood.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -61,7 +62,10 @@ RotorWindows::RotorWindows(const NormalEquations& equations, const RotorTrajecto
     using Square = Eigen::Matrix<double, kD, kD>;
     using Vector = Eigen::Matrix<double, kD, 1>;
     // Own states first, the others behind them.
-    const auto own_first = [&](int k) { return k == rotor ? 0 : k < rotor ? k + 1 : k; };
+    std::array<int, N> order{rotor};
+    for (int k = 0, next = 1; k < N && next < N; ++k) {
+      if (k != rotor) order[static_cast<std::size_t>(next++)] = k;
+    }
     std::size_t stretch = 0, before = 0;
     for (std::size_t knot = 0; knot < at.size() && windows_.size() < most_windows;) {
       const bool fresh = stretch < at.stretch_begin.size() && at.stretch_begin[stretch] == knot;
@@ -98,11 +102,12 @@ RotorWindows::RotorWindows(const NormalEquations& equations, const RotorTrajecto
       }
       Square sorted;
       Vector sorted_gradient;
-      for (int k = 0; k < N; ++k) {
-        sorted_gradient.template segment<3>(3 * own_first(k)) = gradient.template segment<3>(3 * k);
-        for (int l = 0; l < N; ++l) {
-          sorted.template block<3, 3>(3 * own_first(k), 3 * own_first(l)) =
-              curvature.template block<3, 3>(3 * k, 3 * l);
+      for (int i = 0; i < N; ++i) {
+        const int k = 3 * order[static_cast<std::size_t>(i)];
+        sorted_gradient.template segment<3>(3 * i) = gradient.template segment<3>(k);
+        for (int j = 0; j < N; ++j) {
+          const int l = 3 * order[static_cast<std::size_t>(j)];
+          sorted.template block<3, 3>(3 * i, 3 * j) = curvature.template block<3, 3>(k, l);
         }
       }
       Window window;
