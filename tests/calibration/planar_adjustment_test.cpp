@@ -708,7 +708,7 @@ TEST(CommonErrors, AddUp) {
 
 // ---------------------------------------------------------------- prior knowledge
 
-const PriorTest& test_of(const PlanarSolution& solution, const std::string& name) {
+PriorTest test_of(const PlanarSolution& solution, const std::string& name) {
   const auto found = std::find_if(solution.prior_tests.begin(), solution.prior_tests.end(),
                                   [&](const PriorTest& test) { return test.name == name; });
   EXPECT_NE(found, solution.prior_tests.end()) << name;
@@ -728,10 +728,10 @@ TEST(PriorTests, NameAStationThatStoodOtherwise) {
   p.stations[1].stated = turn_by({0, 0, 1.0 * kDegree}) * p.stations[1].stated;
   p.stations[0].sigma = 0.001 * kDegree;  // the other one is sure
   const PlanarSolution wrong = adjust(p);
-  const PriorTest& flipped = test_of(wrong, "flipped");
+  const PriorTest flipped = test_of(wrong, "flipped");
   EXPECT_GT(flipped.chi2, 3.0 * flipped.critical);
   EXPECT_GT(flipped.misfit, 0.3 * kDegree);  // the beam's tilt takes some of it
-  const PriorTest& upright = test_of(wrong, "upright");
+  const PriorTest upright = test_of(wrong, "upright");
   EXPECT_LT(upright.misfit, 0.01 * kDegree);
 }
 
