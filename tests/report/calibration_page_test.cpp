@@ -213,7 +213,7 @@ nlohmann::json chart(const std::string& html, const std::string& title) {
   return {};
 }
 
-const nlohmann::json& series(const nlohmann::json& chart, const std::string& label) {
+nlohmann::json series(const nlohmann::json& chart, const std::string& label) {
   for (const auto& one : chart.at("series")) {
     if (one.at("label") == label) return one;
   }
@@ -406,7 +406,7 @@ TEST(CalibrationPage, AStepStandsWithItsHeightAndPlace) {
 TEST(CalibrationPage, RotationAnglesRunFromZeroToAFullTurn) {
   const auto drawn = chart(Page().html(), "Thickness over the rotation angle of prism a");
   EXPECT_EQ(drawn.at("kind"), "full_turn");
-  const auto& after = series(drawn, "RMS after");
+  const auto after = series(drawn, "RMS after");
   const auto x = after.at("x").get<std::vector<double>>();
   EXPECT_TRUE(std::is_sorted(x.begin(), x.end()));
   EXPECT_NEAR(x.front(), 5, 1e-4);
@@ -422,7 +422,8 @@ TEST(CalibrationPage, TheHistogramCountsEverySamplePointOnAPlane) {
   const auto drawn = chart(html, "Histogram of the distances from the planes");
   for (const char* label : {"before", "after"}) {
     double sum = 0;
-    for (const auto& count : series(drawn, label).at("y")) sum += count.get<double>();
+    const auto counts = series(drawn, label).at("y");
+    for (const auto& count : counts) sum += count.get<double>();
     EXPECT_EQ(sum, 1900);
   }
   EXPECT_EQ(series(drawn, "before").at("x"), series(drawn, "after").at("x"));
@@ -485,7 +486,8 @@ TEST(CalibrationPage, ErrorsOfBeamsWithKnownTruthAreCountedBeforeAndAfter) {
   for (const char* title : {"Errors of the azimuth before", "Errors of the zenith angle after"}) {
     const auto drawn = chart(html, title);
     double sum = 0;
-    for (const auto& count : series(drawn, "errors").at("y")) sum += count.get<double>();
+    const auto counts = series(drawn, "errors").at("y");
+    for (const auto& count : counts) sum += count.get<double>();
     EXPECT_EQ(sum, 1000) << title;
   }
 }
@@ -503,7 +505,8 @@ TEST(CalibrationPage, ViewsAreThinnedAndSayHow) {
   EXPECT_EQ(series(drawn, "front <wall> & door").at("colour"), "a");
   EXPECT_EQ(series(drawn, "sensor").at("x").at(0), 0);
   // Every point of the floor is below the sensor.
-  for (const auto& z : series(chart(html, "From the side: room &lt;1&gt;.lvx"), "floor").at("y")) {
+  const auto heights = series(chart(html, "From the side: room &lt;1&gt;.lvx"), "floor").at("y");
+  for (const auto& z : heights) {
     EXPECT_GT(z, 1.0);
   }
 }

@@ -24,14 +24,14 @@ ReproduceOptions small_options() {
   return options;
 }
 
-const Table& table_of(const Reproduction& all, const std::string& name) {
+Table table_of(const Reproduction& all, const std::string& name) {
   const auto found = std::find_if(all.tables.begin(), all.tables.end(),
                                   [&](const Table& table) { return table.name == name; });
   if (found == all.tables.end()) throw InvalidArgument("no table " + name);
   return *found;
 }
 
-const Row& row_of(const Table& table, const std::string& term) {
+Row row_of(const Table& table, const std::string& term) {
   const auto found = std::find_if(table.rows.begin(), table.rows.end(), [&](const Row& row) {
     return row.term.find(term) != std::string::npos;
   });
@@ -111,7 +111,7 @@ TEST(Reproduce, Table3PassesAndMoreNoiseFails) {
   expect_all_pass(simulated_unit(options));
   options.angle_noise = radians_from_degrees(0.02);
   const Reproduction noisy = simulated_unit(options);
-  const Table& table = table_of(noisy, "table_3");
+  const Table table = table_of(noisy, "table_3");
   EXPECT_FALSE(passes(row_of(table, "azimuth observation errors")));
   EXPECT_FALSE(passes(row_of(table_of(noisy, "table_3_filter"), "noise on angles: azimuth")));
 }
