@@ -176,7 +176,7 @@ TEST(ReproductionPage, SaysTheVerdictInWords) {
   EXPECT_THAT(page, ::testing::HasSubstr("risley reproduce"));
   EXPECT_THAT(page, ::testing::HasSubstr("Fig. X"));
   EXPECT_THAT(page, ::testing::HasSubstr("\"title\":\"samples\""));
-  EXPECT_THAT(page, ::testing::HasSubstr("\"cell\":[0.5,0.5]"));
+  EXPECT_THAT(page, ::testing::HasSubstr("\"cell_width\":0.5"));
 }
 
 }  // namespace
