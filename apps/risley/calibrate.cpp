@@ -41,9 +41,6 @@ struct CalibrateCommandOptions {
   double range_offset_sigma_m = 0.05, duration_s = 10.0;
 };
 
-constexpr double kFarBelow = 0.4;  // of the expected residual
-constexpr double kLeastAngleNoise = radians_from_degrees(1e-7);
-
 /// The stations of the recordings, in their order.
 std::vector<scenes::Station> stations_for(const CalibrateCommandOptions& options) {
   if (options.stations.empty()) {
@@ -130,23 +127,14 @@ RangedRecording read_and_estimate(const CalibrateCommandOptions& options,
   }
   const double started = now();
   ProgressBar bar(fmt::format("rotation angles {}/{}", number + 1, options.inputs.size()), common);
-  const auto run = [&](estimation::AngleSeries series) {
+  const estimation::Estimate estimate = [&] {
     try {
-      return estimation::estimate(estimation::Method::map, std::move(series), input.selector.head(),
-                                  settings, bar.callback());
+      return estimation::estimate(estimation::Method::map, input.selector.take_series(),
+                                  input.selector.head(), settings, bar.callback());
     } catch (const EstimationError& error) {
       throw EstimationError(fmt::format("{}: {}", path, error.what()));
     }
-  };
-  estimation::Estimate estimate = run(input.selector.take_series());
-  // A noise that was not stated and turns out far smaller than the preset's is taken as found: only
-  // the rotation angles are wanted here, and they come out better.
-  const double residual = std::hypot(estimate.azimuth_residuals.rms, estimate.zenith_residuals.rms);
-  if (!options.noise_angle_deg && residual < kFarBelow * estimate.expected_residual) {
-    settings.angle_noise = std::max(residual / std::sqrt(2.0), kLeastAngleNoise);
-    if (estimate.mirrored) mirror(estimate.series);
-    estimate = run(std::move(estimate.series));
-  }
+  }();
   for (const std::string& text : estimate.warnings) {
     outcome.warnings.push_back(fmt::format("{}: {}", path, text));
   }

@@ -130,6 +130,19 @@ Json start_json(const estimation::Start& start) {
           {"residual_rms_deg", degrees_from_radians(start.residual_rms)}};
 }
 
+/// An angle and its sigma, rad, in degrees.
+Json value_json(double value, double sigma) {
+  return {{"value", degrees_from_radians(value)}, {"sigma", degrees_from_radians(sigma)}};
+}
+
+/// How the recording's frame is turned; zeros without sigma where it is the sensor's.
+Json frame_json(const Estimate& e) {
+  const estimation::FrameEstimate frame = e.frame.value_or(estimation::FrameEstimate{});
+  return {{"yaw_deg", value_json(frame.turn.yaw, std::sqrt(frame.covariance(0, 0)))},
+          {"pitch_deg", value_json(frame.turn.pitch, std::sqrt(frame.covariance(1, 1)))},
+          {"estimated", e.frame.has_value()}};
+}
+
 /// Parameters of the prisms that the estimation did not touch.
 Json fixed_json(const Estimate& estimate) {
   std::vector<int> free_places;
@@ -193,7 +206,11 @@ Json outcome_json(const Outcome& outcome) {
        {{"azimuth_deg", moments_json(e.azimuth_residuals)},
         {"zenith_deg", moments_json(e.zenith_residuals)},
         {"expected_rms_deg", degrees_from_radians(e.expected_residual)}}},
-      {"noise_angle_deg", degrees_from_radians(e.angle_noise)},
+      {"noise",
+       {{"azimuth_deg", value_json(e.noise.value.azimuth, e.noise.sigma.azimuth)},
+        {"zenith_deg", value_json(e.noise.value.zenith, e.noise.sigma.zenith)},
+        {"held", e.noise_held}}},
+      {"frame", frame_json(e)},
       {"process_noise_deg_per_s_per_sqrt_s", rotors},
       {"process_jerk_deg_per_s2_per_sqrt_s", jerks},
       {"unobservable", unobservable},

@@ -40,7 +40,7 @@ void RangedShots::set_row(std::size_t row, const RangedShots& from, std::size_t 
 
 RangedRecording ranged_recording(const estimation::Estimate& estimate, std::string name,
                                  std::string serial) {
-  if (!estimate.converged && !estimate.noise_overstated) {
+  if (!estimate.converged) {
     throw EstimationError(
         fmt::format("{}: the rotation angles were not found: {}", name, estimate.reason));
   }

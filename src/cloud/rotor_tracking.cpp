@@ -103,7 +103,7 @@ SensorBelief sensor_belief(const estimation::AngleSeries& beginning,
       throw EstimationError(fmt::format("the rotation angles were not found: {}", error.what()));
     }
   }();
-  if (!estimate.converged && !estimate.noise_overstated) {
+  if (!estimate.converged) {
     throw EstimationError(fmt::format(
         "the rotation angles were not found, or the calibration is of another sensor: {}",
         estimate.reason));
@@ -115,11 +115,10 @@ SensorBelief sensor_belief(const estimation::AngleSeries& beginning,
   belief.angle_sensitivity = estimate.map->angle_sensitivity;
   belief.rotor_process = estimate.rotor_process;
   belief.start = estimate.start;
-  belief.angle_noise = estimate.angle_noise;
+  belief.angle_noise = usable_noise(estimate.noise.value).rms();
   belief.residual_variance_factor = std::max(1.0, estimate.map->unit_variance);
   belief.mirrored = estimate.mirrored;
   belief.warnings = estimate.warnings;
-  if (estimate.noise_overstated) belief.warnings.push_back(estimate.reason);
   if (calibration.reference == CalibrationReference::directions) {
     check_same_sensor(estimate, calibration);
     belief.sensor.train = calibration.train;
@@ -151,7 +150,7 @@ estimation::Start RotorTracker::start_of(const estimation::AngleSeries& series,
     }
     return start;
   }
-  return estimation::find_start(head, belief_.sensor, {}, belief_.angle_noise);
+  return estimation::find_start(head, belief_.sensor, {{}, belief_.angle_noise, false, false});
 }
 
 double RotorTracker::reach() const { return 2.0 * knot_interval_ + (rate_ ? 1.0 / *rate_ : 0.0); }
@@ -162,7 +161,7 @@ void RotorTracker::track(const recordings::Observations& rows) {
   const estimation::AngleSeries& series = selector.series();
   if (series.size() == 0) throw EstimationError("no valid shot");
   estimation::BatchMapOptions options;
-  options.angle_noise = belief_.angle_noise;
+  options.angle_noise = estimation::equal_noise(belief_.angle_noise);
   options.rotor_process = belief_.rotor_process;
   options.knot_interval = knot_interval_;
   const estimation::Start start = start_of(series, selector.head());

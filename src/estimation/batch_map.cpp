@@ -17,6 +17,7 @@
 #include "risley/estimation/rotor_track.hpp"
 #include "risley/estimation/smoother.hpp"
 
+#include "estimation/knot_model.hpp"
 #include "estimation/normal_equations_kernel.hpp"
 #include "estimation/residual_model.hpp"
 
@@ -24,31 +25,52 @@ namespace risley::estimation {
 namespace {
 
 constexpr double kCoarseRate = 1000.0;  // Hz
+/// Short recordings are thinned less: the coarse pass has to know the parameters too.
+constexpr double kFewestCoarseShots = 10000.0;
 /// A step is small when it moves no parameter by more than this share of its sigma: what is left
 /// is of second order.
 constexpr double kSmallStep = 0.1;
-constexpr int kMostFullPasses = 4;
+constexpr int kMostFullPasses = 8;
 /// Residual scatter above the stated one by this share enlarges the covariance.
 constexpr double kSignificantExcess = 1.02;
+
+/// The constants of an estimation: the free parameters, then the frame's turn where that is free.
+struct Constants {
+  std::vector<FreeParameter> parameters, all;
+
+  Constants(const BatchMapOptions& options, int prisms)
+      : parameters(options.free), all(options.free) {
+    if (!(options.frame_sigma > 0)) return;
+    const auto frame = frame_parameters(prisms, options.frame_sigma);
+    all.insert(all.end(), frame.begin(), frame.end());
+  }
+  bool frame_is_free() const { return all.size() > parameters.size(); }
+  Eigen::Index count() const { return static_cast<Eigen::Index>(parameters.size()); }
+};
 
 /// Parameters and motion, and what one evaluation of them gave.
 class Iteration {
  public:
-  Iteration(const AngleSeries& series, const BatchMapOptions& options, const PrismTrain& nominal,
-            PrismTrain train, RotorTrajectory knots)
-      : series_(series),
-        options_(options),
+  Iteration(const AngleSeries& series, const BatchMapOptions& options, const Constants& constants,
+            const PrismTrain& nominal, PrismTrain train, RotorTrajectory knots,
+            const Eigen::Matrix3d& frame)
+      : recorded_(series),
+        constants_(constants),
+        noise_is_held_(options.angle_noise.has_value()),
         prior_mean_(free_values(nominal, options.free)),
         train_(std::move(train)),
-        knots_(std::move(knots)) {
+        knots_(std::move(knots)),
+        frame_(frame) {
     azimuth_.assign(series.size(), std::numeric_limits<double>::quiet_NaN());
     zenith_ = azimuth_;
     outlier_.assign(series.size(), 1);
-    weights_.angle_noise = options.angle_noise;
+    if (constants_.frame_is_free()) turn_shots();
   }
 
   ShotWeights& weights() { return weights_; }
+  const AngleSeries& series() const { return constants_.frame_is_free() ? turned_ : recorded_; }
   const PrismTrain& train() const { return train_; }
+  const Eigen::Matrix3d& frame() const { return frame_; }
   const RotorTrajectory& knots() const { return knots_; }
   RotorTrajectory& knots() { return knots_; }
   NormalEquations& equations() { return equations_; }
@@ -58,50 +80,68 @@ class Iteration {
 
   /// Residuals and normal equations at the present state.
   void evaluate() {
-    accumulate(series_, knots_, train_, options_.free, weights_, equations_,
+    accumulate(series(), knots_, train_, constants_.all, weights_, equations_,
                {azimuth_, zenith_, outlier_});
   }
 
-  /// Residual scale over the stated noise and rounding, not below 1; outliers do not count.
-  double level() const {
+  /// Residual scale over noise and rounding; outliers do not count. Noise that is held is not below
+  /// what it was said to be, noise that is found is what the residuals say, and the scale then 1.
+  double level() {
+    if (!noise_is_held_) {
+      weights_.angle_noise = robust_noise(series(), azimuth_, zenith_);
+      return 1.0;
+    }
     constexpr std::size_t kEnough = 20000;
-    const double noise = options_.angle_noise * options_.angle_noise;
-    const std::size_t stride = std::max<std::size_t>(1, series_.size() / kEnough);
+    const double azimuth_noise = weights_.angle_noise.azimuth * weights_.angle_noise.azimuth;
+    const double zenith_noise = weights_.angle_noise.zenith * weights_.angle_noise.zenith;
+    const std::size_t stride = std::max<std::size_t>(1, recorded_.size() / kEnough);
     std::vector<double> azimuth, zenith;
-    for (std::size_t i = 0; i < series_.size(); i += stride) {
-      azimuth.push_back(azimuth_[i] / std::sqrt(noise + static_cast<double>(
-                                                            series_.azimuth_rounding_variance[i])));
-      zenith.push_back(zenith_[i] /
-                       std::sqrt(noise + static_cast<double>(series_.zenith_rounding_variance[i])));
+    for (std::size_t i = 0; i < recorded_.size(); i += stride) {
+      const auto scale = [i](double noise, const std::vector<float>& rounding) {
+        return 1.0 / std::sqrt(noise + static_cast<double>(rounding[i]));
+      };
+      azimuth.push_back(azimuth_[i] * scale(azimuth_noise, series().azimuth_rounding_variance));
+      zenith.push_back(zenith_[i] * scale(zenith_noise, series().zenith_rounding_variance));
     }
     return std::max(1.0, robust_scale(azimuth, zenith));
   }
 
   SmootherSolution solve(std::span<const RotorProcess> process, bool covariances) const {
     ParameterPrior prior;
-    const auto n = static_cast<Eigen::Index>(options_.free.size());
+    const auto n = static_cast<Eigen::Index>(constants_.all.size());
     prior.information.resize(n);
-    const Eigen::VectorXd values = free_values(train_, options_.free);
+    Eigen::VectorXd offset = Eigen::VectorXd::Zero(n);
+    offset.head(constants_.count()) = prior_mean_ - free_values(train_, constants_.parameters);
+    if (constants_.frame_is_free()) {
+      const FrameTurn turn = turn_of(frame_);
+      offset.tail(2) = -Eigen::Vector2d(turn.yaw, turn.pitch);
+    }
     for (Eigen::Index i = 0; i < n; ++i) {
-      const double sigma = options_.free[static_cast<std::size_t>(i)].prior_sigma;
+      const double sigma = constants_.all[static_cast<std::size_t>(i)].prior_sigma;
       prior.information[i] = 1.0 / (sigma * sigma);
     }
-    prior.gradient = prior.information.cwiseProduct(prior_mean_ - values);
+    prior.gradient = prior.information.cwiseProduct(offset);
     return smooth(equations_, knots_, process, prior, covariances);
   }
 
-  /// Takes a step. @return its largest share of a parameter's sigma, or root mean square share of
+  /// Takes a step. @return its largest share of a constant's sigma, or root mean square share of
   /// the angles' sigmas (of the noise of a shot where those were not computed)
   double move(const SmootherSolution& solution) {
-    const Eigen::VectorXd values = free_values(train_, options_.free) + solution.parameter_step;
-    train_ = with_free_values(train_, options_.free, values);
+    const Eigen::VectorXd step = solution.parameter_step.head(constants_.count());
+    train_ = with_free_values(train_, constants_.parameters,
+                              free_values(train_, constants_.parameters) + step);
+    if (constants_.frame_is_free()) {
+      frame_ = turned_further(frame_, solution.parameter_step.tail(2));
+      turn_shots();
+    }
     double largest = 0;
-    for (Eigen::Index i = 0; i < values.size(); ++i) {
+    for (Eigen::Index i = 0; i < solution.parameter_step.size(); ++i) {
       largest = std::max(largest, std::abs(solution.parameter_step[i]) /
                                       std::sqrt(solution.parameter_covariance(i, i)));
     }
     const auto d = static_cast<std::size_t>(knots_.states());
     const std::size_t triangle = d * (d + 1) / 2;
+    const double noise = weights_.angle_noise.rms();
     double squares = 0, variances = 0;
     for (std::size_t i = 0; i < knots_.state.size(); ++i) {
       knots_.state[i] += solution.state_step[i];
@@ -110,18 +150,26 @@ class Iteration {
       const std::size_t row = i % d;
       variances +=
           solution.state_covariance.empty()
-              ? options_.angle_noise * options_.angle_noise
+              ? noise * noise
               : solution.state_covariance[i / d * triangle + row * d - row * (row - 1) / 2];
     }
     return std::max(largest, std::sqrt(squares / variances));
   }
 
  private:
-  const AngleSeries& series_;
-  const BatchMapOptions& options_;
+  void turn_shots() {
+    turned_ = recorded_;
+    turn(turned_, frame_.transpose());
+  }
+
+  const AngleSeries& recorded_;
+  const Constants& constants_;
+  bool noise_is_held_;
   Eigen::VectorXd prior_mean_;
   PrismTrain train_;
   RotorTrajectory knots_;
+  Eigen::Matrix3d frame_;
+  AngleSeries turned_;  ///< where the frame is free
   ShotWeights weights_;
   NormalEquations equations_;
   std::vector<double> azimuth_, zenith_;
@@ -155,7 +203,7 @@ std::vector<StretchStart> find_stretch_starts(const AngleSeries& series,
       constexpr std::size_t kHead = 2000;
       const AngleSeries head =
           rows_of(series, shots.begin, std::min(shots.end, shots.begin + kHead));
-      Start start = find_start(head, known, {}, angle_noise);
+      Start start = find_start(head, known, {{}, angle_noise, false, false});
       if (start.combination == first.combination) result.back().start = std::move(start);
     } catch (const EstimationError&) {  // too short or too empty: its shots stay unused
     }
@@ -169,19 +217,64 @@ std::size_t stretch_end(const RotorTrajectory& knots, std::size_t stretch) {
 }
 
 /// Mean square of residuals over their stated variances, outliers left out.
-double unit_variance(const AngleSeries& series, double angle_noise, std::span<const double> azimuth,
-                     std::span<const double> zenith, std::span<const unsigned char> outlier) {
+double unit_variance(const AngleSeries& series, const AngleNoise& noise,
+                     std::span<const double> azimuth, std::span<const double> zenith,
+                     std::span<const unsigned char> outlier) {
   double sum = 0, count = 0;
-  const double noise = angle_noise * angle_noise;
+  const double azimuth_noise = noise.azimuth * noise.azimuth;
+  const double zenith_noise = noise.zenith * noise.zenith;
   for (std::size_t i = 0; i < series.size(); ++i) {
     if (outlier[i]) continue;
-    sum +=
-        azimuth[i] * azimuth[i] /
-            (noise + static_cast<double>(series.azimuth_rounding_variance[i])) +
-        zenith[i] * zenith[i] / (noise + static_cast<double>(series.zenith_rounding_variance[i]));
+    sum += azimuth[i] * azimuth[i] /
+               (azimuth_noise + static_cast<double>(series.azimuth_rounding_variance[i])) +
+           zenith[i] * zenith[i] /
+               (zenith_noise + static_cast<double>(series.zenith_rounding_variance[i]));
     count += 2.0;
   }
   return count > 0 ? sum / count : std::numeric_limits<double>::quiet_NaN();
+}
+
+/// How many of the observed angles the estimate itself used up: the trace of curvature times
+/// covariance, states and constants together.
+double used_observations(const NormalEquations& equations, const SmootherSolution& solution) {
+  return with_prism_count(equations.prisms, [&]<int N>() {
+    constexpr Eigen::Index kD = 3 * N;
+    using RowMajor = Eigen::Matrix<double, kD, Eigen::Dynamic, Eigen::RowMajor>;
+    const auto n = static_cast<Eigen::Index>(equations.free);
+    double used = equations.static_hessian.cwiseProduct(solution.parameter_covariance).sum();
+    for (std::size_t knot = 0; knot < equations.knots(); ++knot) {
+      const auto curvature = knot_curvature<N>(equations, knot);
+      const double* entry = solution.state_covariance.data() + knot * (kD * (kD + 1) / 2);
+      for (Eigen::Index i = 0; i < kD; ++i) {
+        for (Eigen::Index j = i; j < kD; ++j) {
+          used += (i == j ? 1.0 : 2.0) * curvature(i, j) * *entry++;
+        }
+      }
+      if (n == 0) continue;
+      const auto at = static_cast<std::size_t>(kD * n) * knot;
+      const Eigen::Map<const RowMajor> coupling(equations.coupling.data() + at, kD, n);
+      const Eigen::Map<const RowMajor> sensitivity(solution.sensitivity.data() + at, kD, n);
+      used += 2.0 * coupling.cwiseProduct(sensitivity * solution.parameter_covariance).sum();
+    }
+    return used;
+  });
+}
+
+/// 1 + 2 (rho_1^2 + ...): how far squares of correlated residuals hang together.
+double square_factor(const Autocorrelation& autocorrelation) {
+  double factor = 1.0;
+  for (const double rho : autocorrelation.rho) factor += 2.0 * rho * rho;
+  return factor;
+}
+
+/// Rate, Hz, of the coarse pass.
+double coarse_rate(const AngleSeries& series, const std::vector<ShotRange>& ranges) {
+  double duration = 0;
+  for (const ShotRange& range : ranges) {
+    duration += 1e-9 * static_cast<double>(series.time_ns[range.end - 1] -
+                                           series.time_ns[range.begin]);
+  }
+  return std::max(kCoarseRate, kFewestCoarseShots / std::max(duration, 1e-3));
 }
 
 /// Sum over the knots of what their shots tell of the angles [prisms, prisms].
@@ -221,10 +314,7 @@ BatchMapResult run_batch_map(const AngleSeries& series, const Start& start,
                              const sensors::Sensor& sensor, const BatchMapOptions& options,
                              const Progress& progress) {
   if (series.size() == 0) throw EstimationError("no valid shot to estimate from");
-  if (!(options.angle_noise > 0) || !std::isfinite(options.angle_noise)) {
-    throw InvalidArgument(fmt::format("angle noise = {} deg, allowed above 0",
-                                      degrees_from_radians(options.angle_noise)));
-  }
+  if (options.angle_noise) check_noise(*options.angle_noise);
   if (!(options.knot_interval > 0)) {
     throw InvalidArgument(
         fmt::format("knot interval = {} s, allowed above 0", options.knot_interval));
@@ -241,11 +331,15 @@ BatchMapResult run_batch_map(const AngleSeries& series, const Start& start,
       choose ? std::vector<RotorProcess>(rotors, kSettlingProcess) : options.rotor_process;
 
   // Coarse: tracked phases, then robust steps.
+  const Constants constants(options, prisms);
   const std::vector<ShotRange> all_stretches = stretches(series);
   std::vector<ShotRange> coarse_stretches = all_stretches;
-  const AngleSeries coarse_series = thinned(series, kCoarseRate, coarse_stretches);
+  const AngleSeries coarse_series =
+      thinned(series, coarse_rate(series, all_stretches), coarse_stretches);
+  const AngleNoise first_noise = options.angle_noise.value_or(
+      equal_noise(std::max(start.residual_rms, kLeastAngleNoise)));
   const auto starts =
-      find_stretch_starts(coarse_series, coarse_stretches, start, sensor, options.angle_noise);
+      find_stretch_starts(coarse_series, coarse_stretches, start, sensor, first_noise.rms());
   std::vector<ShotRange> coarse_used, used;
   for (std::size_t s = 0; s < starts.size(); ++s) {
     if (starts[s].start) {
@@ -256,28 +350,34 @@ BatchMapResult run_batch_map(const AngleSeries& series, const Start& start,
     }
   }
   if (used.empty()) throw EstimationError("no stretch of the recording has a start");
-  Iteration coarse(coarse_series, options, sensor.train, start.train,
-                   make_knots(coarse_series, coarse_used, prisms, options.knot_interval));
+  Iteration coarse(coarse_series, options, constants, sensor.train, start.train,
+                   make_knots(coarse_series, coarse_used, prisms, options.knot_interval),
+                   Eigen::Matrix3d::Identity());
+  coarse.weights().angle_noise = first_noise;
   for (std::size_t s = 0, stretch = 0; s < starts.size(); ++s) {
     if (!starts[s].start) continue;
-    track_rotors(coarse_series, starts[s].shots, *starts[s].start, coarse.knots(),
+    track_rotors(coarse_series, starts[s].shots, *starts[s].start, first_noise, coarse.knots(),
                  coarse.knots().stretch_begin[stretch], stretch_end(coarse.knots(), stretch));
     ++stretch;
   }
   report_progress(progress, 0.05);
   bool chosen = !choose;
-  double level = 0, moved = std::numeric_limits<double>::infinity();
+  double level = 0, scale = 0, moved = std::numeric_limits<double>::infinity();
+  const auto rescale = [&] {
+    level = coarse.level();
+    coarse.weights().softening = softening_at(level);
+    scale = level * coarse.weights().angle_noise.rms();
+  };
   for (int i = 0; i < options.most_iterations; ++i) {
     if (i == 0) {  // the weights need a scale first
       coarse.evaluate();
-      level = coarse.level();
-      coarse.weights().softening = softening_at(level);
+      rescale();
     }
     coarse.evaluate();
-    const double before = std::exchange(level, coarse.level());
-    coarse.weights().softening = softening_at(level);
+    const double before = scale;
+    rescale();
     report_progress(progress, 0.05 + 0.35 * (i + 1) / options.most_iterations);
-    if (moved < kSmallStep && std::abs(level / before - 1.0) < 0.02) {
+    if (moved < kSmallStep && std::abs(scale / before - 1.0) < 0.02) {
       if (chosen) break;
       process = likeliest_process(coarse.equations(), coarse.knots());
       chosen = true;
@@ -288,19 +388,33 @@ BatchMapResult run_batch_map(const AngleSeries& series, const Start& start,
   report_progress(progress, 0.4);
 
   // All shots: the same stretches, starting where the coarse pass ended.
-  Iteration full(series, options, sensor.train, coarse.train(),
-                 make_knots(series, used, prisms, options.knot_interval));
+  Iteration full(series, options, constants, sensor.train, coarse.train(),
+                 make_knots(series, used, prisms, options.knot_interval), coarse.frame());
   interpolate(coarse.knots(), full.knots());
+  full.weights().angle_noise = coarse.weights().angle_noise;
   full.weights().cut = options.outlier_chi2 * level * level;
+  const bool noise_is_held = options.angle_noise.has_value();
+  double used_share = 0;
   for (int pass = 0; pass < kMostFullPasses; ++pass) {
     full.evaluate();
-    level = full.level();
+    if (noise_is_held) level = full.level();
     full.weights().cut = options.outlier_chi2 * level * level;
     // The rotors' noise shows more sharply in all shots than in the thinned ones.
     result.autocorrelation =
         autocorrelation(series.time_ns, full.azimuth(), full.zenith(), full.outlier());
+    const AngleNoise assumed = full.weights().angle_noise;
+    bool noise_is_found = true;
+    if (noise_is_held) {
+      result.noise.value = assumed;
+    } else {
+      result.noise =
+          noise_components(full.series(), full.azimuth(), full.zenith(), full.outlier(), used_share,
+                           square_factor(result.autocorrelation));
+      full.weights().angle_noise = usable_noise(result.noise.value);
+      noise_is_found = std::abs(assumed.rms() / full.weights().angle_noise.rms() - 1.0) < 0.01;
+    }
     result.unit_variance =
-        unit_variance(series, options.angle_noise, full.azimuth(), full.zenith(), full.outlier());
+        unit_variance(full.series(), assumed, full.azimuth(), full.zenith(), full.outlier());
     result.variance_factor =
         result.autocorrelation.factor *
         (result.unit_variance > kSignificantExcess ? result.unit_variance : 1.0);
@@ -309,20 +423,36 @@ BatchMapResult run_batch_map(const AngleSeries& series, const Start& start,
     // The first step goes from what the thinned shots tell to what all tell, the second should be
     // one of rounding.
     SmootherSolution solution = full.solve(process, pass > 0);
+    if (pass > 0) {
+      const std::size_t angles = 2 * (full.equations().shots - full.equations().outliers);
+      used_share = std::clamp(used_observations(full.equations(), solution) /
+                                  static_cast<double>(std::max<std::size_t>(1, angles)),
+                              0.0, 0.9);
+    }
     moved = full.move(solution);
     ++result.iterations;
     report_progress(progress, 0.4 + 0.6 * (pass + 1) / kMostFullPasses);
-    if (pass == 0 || (moved > kSmallStep && pass + 1 < kMostFullPasses)) continue;
+    // Two passes know how much the estimate used up; where that is much, noise needs a third.
+    const bool goes_on = moved > kSmallStep || !noise_is_found ||
+                         (pass < 2 && !noise_is_held && used_share > 1e-3);
+    if (pass == 0 || (goes_on && pass + 1 < kMostFullPasses)) continue;
     result.settled = moved <= kSmallStep;
-    result.covariance = std::move(solution.parameter_covariance);
+    const Eigen::Index n = constants.count();
+    result.covariance = solution.parameter_covariance.topLeftCorner(n, n);
+    if (constants.frame_is_free()) {
+      result.frame_covariance = solution.parameter_covariance.bottomRightCorner<2, 2>();
+    }
     result.information = std::move(solution.parameter_information);
     full.knots().covariance = std::move(solution.state_covariance);
     result.angle_sensitivity =
-        mean_angle_sensitivity(solution.sensitivity, full.knots(), options.free.size());
+        mean_angle_sensitivity(solution.sensitivity, full.knots(), constants.all.size())
+            .leftCols(n);
     result.angle_information = shared_angle_information(full.equations());
     break;
   }
   result.train = full.train();
+  result.frame = full.frame();
+  result.constants = constants.all;
   result.parameters = free_values(result.train, options.free);
   result.rotor_process = std::move(process);
   result.trajectory = std::move(full.knots());

@@ -85,13 +85,13 @@ sensors::Sensor calibrated_sensor(const sensors::Sensor& nominal, const PrismTra
 }
 
 /// Root mean square that noise and rounding together should leave, rad.
-double expected_residual(const AngleSeries& series, double angle_noise) {
+double expected_residual(const AngleSeries& series, const AngleNoise& noise) {
   double rounding = 0;
   for (std::size_t i = 0; i < series.size(); ++i) {
     rounding += static_cast<double>(series.azimuth_rounding_variance[i]) +
                 static_cast<double>(series.zenith_rounding_variance[i]);
   }
-  return std::sqrt(angle_noise * angle_noise + rounding / (2.0 * double(series.size())));
+  return std::sqrt(noise.rms() * noise.rms() + rounding / (2.0 * double(series.size())));
 }
 
 /// A parameter that ended where no sensor of the kind can be, as words; empty when there is none.
@@ -114,9 +114,13 @@ std::string implausible_parameter(const Estimate& estimate, const PrismTrain& no
   return {};
 }
 
-/// Residuals below the stated noise by more than this say that the noise is not what was stated.
-constexpr double kFarBelow = 1.0 / 3.0;
+/// Residuals above the stated noise, or parts of them that hang together above that of a healthy
+/// unit, by more than this factor say that the model does not describe the recording.
 constexpr double kFarAbove = 3.0;
+/// Noise that was found above the preset's by this factor is worth a word.
+constexpr double kNoisy = 2.0;
+/// Of the frame's turn about what the start found, rad.
+constexpr double kFrameSigma = radians_from_degrees(1.0);
 /// A parameter combination that keeps more of its prior sigma than this was not measured.
 constexpr double kUnmeasured = 0.3;
 
@@ -126,8 +130,27 @@ constexpr double kUneven = 1.6;
 /// Residual variances above the stated one by more than this are worth a word.
 constexpr double kEnlarged = 1.1;
 
+/// Says how the recording's frame is turned.
+std::string frame_words(const Estimate& estimate) {
+  const FrameEstimate& frame = *estimate.frame;
+  const bool has_sigma = frame.covariance(0, 0) > 0;
+  const auto angle = [&](double value, double variance) {
+    return has_sigma ? fmt::format("{:.3f} ± {:.3f} deg", degrees_from_radians(value),
+                                   degrees_from_radians(std::sqrt(variance)))
+                     : fmt::format("{:.3f} deg", degrees_from_radians(value));
+  };
+  return fmt::format(
+      "the recording's frame is not the sensor's: it is turned by {} in yaw and {} in pitch{}; a "
+      "roll about the optical axis cannot be told from the zeros of the rotation angles and was "
+      "taken as 0",
+      angle(frame.turn.yaw, frame.covariance(0, 0)),
+      angle(frame.turn.pitch, frame.covariance(1, 1)),
+      has_sigma ? "" : " (held at what the start found)");
+}
+
 /// Says whether the result can be believed.
-void judge(Estimate& estimate, const PrismTrain& nominal) {
+/// @param usual_noise  of a healthy unit, rad
+void judge(Estimate& estimate, const PrismTrain& nominal, double usual_noise) {
   const double rms =
       std::sqrt(0.5 * (estimate.azimuth_residuals.rms * estimate.azimuth_residuals.rms +
                        estimate.zenith_residuals.rms * estimate.zenith_residuals.rms));
@@ -137,6 +160,10 @@ void judge(Estimate& estimate, const PrismTrain& nominal) {
       map ? std::sqrt(estimate.map->unit_variance) : rms / estimate.expected_residual;
   const auto shots = static_cast<double>(estimate.series.size());
   const double outlier_share = static_cast<double>(estimate.outliers) / shots;
+  // What chance does not make: neighbouring residuals share it.
+  const double misfit = map && !estimate.map->autocorrelation.rho.empty()
+                            ? rms * std::sqrt(estimate.map->autocorrelation.rho.front())
+                            : 0.0;
   const std::string residuals =
       fmt::format("residuals of {:.3g} deg where noise and rounding amount to {:.3g} deg",
                   degrees_from_radians(rms), degrees_from_radians(estimate.expected_residual));
@@ -154,6 +181,12 @@ void judge(Estimate& estimate, const PrismTrain& nominal) {
                     100 * outlier_share));
   } else if (ratio > kFarAbove) {
     fail(residuals + ": the model does not describe these data, or their noise is larger");
+  } else if (!estimate.noise_held && misfit > kFarAbove * estimate.usual_residual) {
+    fail(fmt::format("residuals of {:.3g} deg, of which neighbouring shots share {:.3g} deg, where "
+                     "noise and rounding of a healthy unit amount to {:.3g} deg: the model does not "
+                     "describe these data",
+                     degrees_from_radians(rms), degrees_from_radians(misfit),
+                     degrees_from_radians(estimate.usual_residual)));
   } else if (!estimate.unobservable.empty()) {
     const WeakDirection& worst = estimate.unobservable.front();
     fail(
@@ -163,11 +196,6 @@ void judge(Estimate& estimate, const PrismTrain& nominal) {
                     direction_text(worst), worst.sigma));
   } else if (std::string words = implausible_parameter(estimate, nominal); !words.empty()) {
     fail(std::move(words));
-  } else if (map && ratio < kFarBelow) {
-    estimate.noise_overstated = true;
-    fail(residuals +
-         ": the sigmas would be far too large; state the noise that the recording has with "
-         "--noise-angle-deg");
   } else if (map && !estimate.map->settled) {
     fail("the last steps still moved parameters by more than a tenth of their sigma");
   } else if (map && estimate.map->unit_variance > kEnlarged) {
@@ -178,6 +206,13 @@ void judge(Estimate& estimate, const PrismTrain& nominal) {
     estimate.warnings.push_back(residuals +
                                 ": the rotors' noise is set so high that they follow the noise, or "
                                 "the stated noise is too large");
+  }
+  if (!estimate.noise_held && estimate.noise.value.rms() > kNoisy * usual_noise) {
+    estimate.warnings.push_back(fmt::format(
+        "the directions are {:.3g} times as noisy ({:.3g} deg) as the preset says of a healthy unit "
+        "({:.3g} deg)",
+        estimate.noise.value.rms() / usual_noise, degrees_from_radians(estimate.noise.value.rms()),
+        degrees_from_radians(usual_noise)));
   }
   double unevenness = 1.0;
   std::size_t uneven = 0;
@@ -224,14 +259,32 @@ std::vector<AngleProfile> profiles(const Estimate& estimate) {
   return result;
 }
 
+/// Turns the shots on by what the batch estimator found of their frame, and states the whole turn.
+void take_frame(Estimate& estimate) {
+  const BatchMapResult& result = *estimate.map;
+  turn(estimate.series, result.frame.transpose());
+  const Eigen::Matrix3d total = recording_from_sensor(estimate.frame->turn) * result.frame;
+  estimate.frame->turn = turn_of(total);
+  // Turns about the sensor's Z and Y axes; a yaw about the recording's Z moves the axis by its cosine.
+  const Eigen::DiagonalMatrix<double, 2> scale(
+      1.0 / std::max(std::cos(estimate.frame->turn.pitch), 1e-9), 1.0);
+  estimate.frame->covariance = scale * result.frame_covariance * scale;
+}
+
+BatchMapOptions map_options(const Estimate& estimate, const EstimateOptions& options) {
+  BatchMapOptions settings;
+  if (estimate.noise_held) settings.angle_noise = estimate.noise.value;
+  settings.free = estimate.free;
+  settings.rotor_process = options.rotor_process;
+  if (estimate.start.frame) settings.frame_sigma = kFrameSigma;
+  return settings;
+}
+
 /// Runs the batch estimator and takes over what it found. @return rows of the states per stretch
 std::vector<ShotRange> take_map(Estimate& estimate, const EstimateOptions& options,
                                 const Progress& progress) {
-  BatchMapOptions settings;
-  settings.angle_noise = estimate.angle_noise;
-  settings.free = estimate.free;
-  settings.rotor_process = options.rotor_process;
-  estimate.map = run_batch_map(estimate.series, estimate.start, options.sensor, settings, progress);
+  estimate.map = run_batch_map(estimate.series, estimate.start, options.sensor,
+                               map_options(estimate, options), progress);
   const BatchMapResult& result = *estimate.map;
   estimate.parameters = result.parameters;
   estimate.covariance = result.covariance;
@@ -240,7 +293,9 @@ std::vector<ShotRange> take_map(Estimate& estimate, const EstimateOptions& optio
   estimate.states = states_of_knots(result, estimate.series);
   estimate.azimuth_residuals = moments(result.azimuth_residual, result.outlier);
   estimate.zenith_residuals = moments(result.zenith_residual, result.outlier);
-  estimate.unobservable = weak_directions(result.information, estimate.free, kUnmeasured);
+  estimate.unobservable = weak_directions(result.information, result.constants, kUnmeasured);
+  estimate.noise = result.noise;
+  if (estimate.frame) take_frame(estimate);
   std::vector<ShotRange> ranges;
   const auto& begins = result.trajectory.stretch_begin;
   for (std::size_t i = 0; i < begins.size(); ++i) {
@@ -249,11 +304,55 @@ std::vector<ShotRange> take_map(Estimate& estimate, const EstimateOptions& optio
   return ranges;
 }
 
+/// Logarithm of the likelihood of residuals under the noise that was found in them, over the shots
+/// that neither of two results leaves out; correlated residuals count for as many as they are worth.
+double log_likelihood(const BatchMapResult& result, const AngleSeries& series,
+                      const std::vector<unsigned char>& also_out) {
+  const AngleNoise noise = usable_noise(result.noise.value);
+  const auto term = [](double residual, double sigma, float rounding) {
+    const double variance = sigma * sigma + static_cast<double>(rounding);
+    return -0.5 * (residual * residual / variance + std::log(variance));
+  };
+  double sum = 0;
+  for (std::size_t i = 0; i < series.size(); ++i) {
+    if (result.outlier[i] != 0 || also_out[i] != 0) continue;
+    sum += term(result.azimuth_residual[i], noise.azimuth, series.azimuth_rounding_variance[i]) +
+           term(result.zenith_residual[i], noise.zenith, series.zenith_rounding_variance[i]);
+  }
+  return sum / result.autocorrelation.factor;
+}
+
+/// Whether the coordinates of a Cartesian recording were rounded or cut off: its beginning is
+/// estimated both ways, and the likelier one counts where it is likelier beyond doubt.
+CoordinateRounding rounding_of(const Estimate& estimate, const EstimateOptions& options) {
+  constexpr std::size_t kEnoughShots = 50000;
+  constexpr double kVisible = 5.0, kDecisive = 12.5;  // sigmas, and a logarithm of a likelihood
+  const AngleSeries nearest =
+      rows_of(estimate.series, 0, std::min(kEnoughShots, estimate.series.size()));
+  if (half_step_signal(nearest, estimate.start.residual_rms) < kVisible) {
+    return CoordinateRounding::unknown;
+  }
+  AngleSeries cut = nearest;
+  add_half_steps(cut, recording_from_sensor(estimate.start.frame.value_or(FrameTurn{})));
+  const BatchMapOptions settings = map_options(estimate, options);
+  try {
+    const BatchMapResult rounded =
+        run_batch_map(nearest, estimate.start, options.sensor, settings);
+    const BatchMapResult mended = run_batch_map(cut, estimate.start, options.sensor, settings);
+    const double lead = log_likelihood(mended, cut, rounded.outlier) -
+                        log_likelihood(rounded, nearest, mended.outlier);
+    if (std::abs(lead) < kDecisive) return CoordinateRounding::unknown;
+    return lead > 0 ? CoordinateRounding::toward_zero : CoordinateRounding::nearest;
+  } catch (const EstimationError&) {
+    return CoordinateRounding::unknown;
+  }
+}
+
 /// As take_map, for the paper's filter.
 std::vector<ShotRange> take_ekf(Estimate& estimate, const EstimateOptions& options,
                                 const Progress& progress) {
   EkfOptions settings;
-  settings.angle_noise = estimate.angle_noise;
+  settings.angle_noise = estimate.noise.value.rms();
   settings.free = estimate.free;
   settings.rotor_process = options.rotor_process;
   EkfResult result = run_ekf(estimate.series, estimate.start, settings, progress);
@@ -272,7 +371,10 @@ std::vector<ShotRange> take_ekf(Estimate& estimate, const EstimateOptions& optio
 Start start_anywhere(const AngleSeries& series, const AngleSeries& head,
                      const EstimateOptions& options, const Estimate& estimate) {
   const auto start_of = [&](const AngleSeries& shots) {
-    return find_start(shots, options.sensor, estimate.free, estimate.angle_noise, options.mirrored);
+    return find_start(
+        shots, options.sensor,
+        {estimate.free, options.angle_noise.value_or(options.sensor.angle_noise), options.mirrored,
+         options.turned});
   };
   try {
     return start_of(head);
@@ -315,10 +417,10 @@ Estimate estimate(Method method, AngleSeries series, const AngleSeries& head,
   if (series.size() == 0) throw EstimationError("the recording holds no valid shot");
   Estimate estimate;
   estimate.method = method;
-  estimate.angle_noise = options.angle_noise.value_or(options.sensor.angle_noise);
-  if (!(estimate.angle_noise > 0) || !std::isfinite(estimate.angle_noise)) {
-    throw InvalidArgument(fmt::format("angle noise = {} deg, allowed above 0",
-                                      degrees_from_radians(estimate.angle_noise)));
+  estimate.noise_held = options.angle_noise.has_value() || method == Method::ekf;
+  if (estimate.noise_held) {
+    estimate.noise.value = equal_noise(options.angle_noise.value_or(options.sensor.angle_noise));
+    check_noise(estimate.noise.value);
   }
   estimate.free = chosen_parameters(options);
   estimate.series = std::move(series);
@@ -344,21 +446,35 @@ Estimate estimate(Method method, AngleSeries series, const AngleSeries& head,
                    : rows_of(estimate.series, 0, std::min(kHeadRows, estimate.series.size())),
       options, estimate);
   estimate.mirrored = estimate.start.mirrored;
+  prepare_shots(estimate.series, estimate.start);
+  if (estimate.start.frame) estimate.frame.emplace().turn = *estimate.start.frame;
+  if (options.cartesian && method == Method::map) {
+    estimate.coordinates = rounding_of(estimate, options);
+    if (estimate.coordinates == CoordinateRounding::toward_zero) {
+      add_half_steps(estimate.series,
+                     recording_from_sensor(estimate.start.frame.value_or(FrameTurn{})));
+      estimate.warnings.push_back(
+          "the coordinates were cut off to whole steps and not rounded: half a step was added to "
+          "each");
+    }
+  }
   if (estimate.mirrored) {
-    mirror(estimate.series);
     estimate.warnings.push_back(
         "the recording is a mirror image (its elevation has the other sign) and was turned");
   }
   const std::vector<ShotRange> ranges = method == Method::map
                                             ? take_map(estimate, options, progress)
                                             : take_ekf(estimate, options, progress);
-  estimate.expected_residual = expected_residual(estimate.series, estimate.angle_noise);
+  if (estimate.frame) estimate.warnings.push_back(frame_words(estimate));
+  estimate.expected_residual = expected_residual(estimate.series, estimate.noise.value);
+  const double usual_noise = options.sensor.angle_noise;
+  estimate.usual_residual = expected_residual(estimate.series, equal_noise(usual_noise));
   estimate.values = named_values(estimate, ranges);
   estimate.sensor = calibrated_sensor(
       options.sensor, with_free_values(options.sensor.train, estimate.free, estimate.parameters),
       estimate);
   estimate.residuals_over_angle = profiles(estimate);
-  judge(estimate, options.sensor.train);
+  judge(estimate, options.sensor.train, usual_noise);
   return estimate;
 }
 

@@ -8,14 +8,16 @@
 #include <utility>
 
 #include <Eigen/Cholesky>
+#include <Eigen/Geometry>
 #include <fmt/format.h>
 
+#include "risley/core/direction.hpp"
 #include "risley/core/error.hpp"
 #include "risley/estimation/diagnostics.hpp"
 #include "risley/estimation/normal_equations.hpp"
+#include "risley/estimation/spectral_lines.hpp"
 
 #include "estimation/knot_model.hpp"
-#include "estimation/line_fit.hpp"
 #include "estimation/residual_model.hpp"
 
 namespace risley::estimation {
@@ -23,234 +25,518 @@ namespace {
 
 /// Slowest change of a speed that a fit over the first shots leaves to the rotors, rad/s^2.
 constexpr double kAccelerationSigma = radians_from_degrees(200.0);
+/// Shots that a start is fitted to, at first and where answers have to be told apart.
+constexpr std::size_t kEnoughShots = 1000, kManyShots = 20000;
+/// Speeds are first looked for so near to the sensor's, as a share of them; those of a sensor whose
+/// clock or rotors are further off are found among all pairs.
+constexpr double kUsualShare = 0.06, kFarthestShare = 0.2;
+constexpr std::size_t kMostCandidates = 4;
+/// A pair of lines that leaves so many times as much as the best need not be tried.
+constexpr double kHopeless = 4.0;
+/// Residual of a fit that no other pair of speeds needs to compete with, rad: rotors that wander
+/// and noise of any usual size leave less, a wrong pair more.
+constexpr double kGoodResidual = radians_from_degrees(0.08);
+/// Two answers are told apart when their chi2 differ by this.
+constexpr double kDecisive = 25.0;
+/// How far outside the sensor's field of view a shot is noise or a unit's own error, rad, and how
+/// many shots may lie there.
+constexpr double kFieldMargin = radians_from_degrees(1.5);
+constexpr double kFewOutside = 0.15;
+constexpr double kFrameSigma = radians_from_degrees(1.0);
 
 /// A fit of parameters and one parabola per rotor to a few shots.
 struct WindowFit {
   PrismTrain train;
   RotorTrajectory knot;  // a single one
+  Eigen::Matrix3d frame = Eigen::Matrix3d::Identity();  // of the shots, from the sensor's
   double rms = std::numeric_limits<double>::infinity();
 };
 
 /// Robust least squares with Levenberg's damping: first the motion, then the parameters too.
-WindowFit fit_window(const AngleSeries& shots, const PrismTrain& nominal,
-                     const std::vector<FreeParameter>& free, RotorTrajectory knot, double noise) {
-  const int prisms = knot.prisms;
-  const auto n = static_cast<Eigen::Index>(free.size());
-  const Eigen::Index d = 3 * prisms;
-  const Eigen::VectorXd prior = free_values(nominal, free);
-  WindowFit fit{nominal, std::move(knot)};
-  NormalEquations equations;
-  std::vector<double> azimuth(shots.size()), zenith(shots.size());
-  ShotWeights weights;
-  weights.angle_noise = noise;
+class WindowFitter {
+ public:
+  /// @param frame  the frame's parameters where its turn is free
+  WindowFitter(const AngleSeries& shots, const PrismTrain& nominal,
+               const std::vector<FreeParameter>& free, const std::vector<FreeParameter>& frame,
+               double noise)
+      : shots_(shots), free_(free), all_(free), prior_(free_values(nominal, free)) {
+    all_.insert(all_.end(), frame.begin(), frame.end());
+    weights_.angle_noise = equal_noise(noise);
+    azimuth_.resize(shots.size());
+    zenith_.resize(shots.size());
+  }
 
-  /// Residual scale that half of the shots keep, as a standard deviation, rad.
-  const auto scale = [&] { return robust_scale(azimuth, zenith); };
-  const auto prior_cost = [&](const Eigen::VectorXd& values, const RotorTrajectory& motion) {
-    double cost = 0;
-    for (Eigen::Index i = 0; i < n; ++i) {
-      const double sigma = free[static_cast<std::size_t>(i)].prior_sigma;
-      cost += std::pow((values[i] - prior[i]) / sigma, 2);
+  void run(WindowFit& fit) {
+    const auto n = static_cast<Eigen::Index>(all_.size());
+    const Eigen::Index d = 3 * fit.knot.prisms;
+    evaluate(fit);
+    for (const bool move_parameters : {false, true}) {
+      double damping = 1e-4;
+      for (int iteration = 0; iteration < 25; ++iteration) {
+        weights_.softening = softening_at(std::max(level(), 1.0));
+        const double cost = evaluate(fit);
+        const auto [normal, gradient] = normal_equations(fit);
+        bool moved = false, done = false;
+        while (!moved && damping < 1e6) {
+          Eigen::MatrixXd damped = normal;
+          damped.diagonal() *= 1.0 + damping;
+          if (!move_parameters) damped.diagonal().tail(n).array() *= 1e12;
+          WindowFit trial = stepped(fit, damped.ldlt().solve(gradient), d);
+          const double trial_cost = evaluate(trial);
+          if (trial_cost < cost) {
+            done = cost - trial_cost < 1e-6 * cost;
+            fit = std::move(trial);
+            damping = std::max(damping / 10.0, 1e-9);
+            moved = true;
+          } else {
+            damping = std::max(10.0 * damping, 1e-3);
+          }
+        }
+        if (!moved || done) break;
+      }
+      evaluate(fit);
     }
-    for (int k = 0; k < prisms; ++k) {
-      cost += std::pow(motion.state[static_cast<std::size_t>(3 * k + 2)] / kAccelerationSigma, 2);
+    fit.rms = robust_scale(azimuth_, zenith_);
+    if (!std::isfinite(fit.rms)) fit.rms = std::numeric_limits<double>::infinity();
+  }
+
+ private:
+  bool turns() const { return all_.size() > free_.size(); }
+
+  /// Residual scale that half of the shots keep over the noise, rounding of each shot included.
+  double level() const {
+    std::vector<double> azimuth(azimuth_.size()), zenith(azimuth_.size());
+    const double noise = weights_.angle_noise.azimuth * weights_.angle_noise.azimuth;
+    for (std::size_t i = 0; i < azimuth.size(); ++i) {
+      azimuth[i] = azimuth_[i] / std::sqrt(noise + static_cast<double>(
+                                                       shots_.azimuth_rounding_variance[i]));
+      zenith[i] =
+          zenith_[i] / std::sqrt(noise + static_cast<double>(shots_.zenith_rounding_variance[i]));
+    }
+    return robust_scale(azimuth, zenith);
+  }
+
+  /// Offsets of the free values from their priors, the frame's turn last.
+  Eigen::VectorXd offsets(const WindowFit& fit) const {
+    Eigen::VectorXd offset(static_cast<Eigen::Index>(all_.size()));
+    offset.head(prior_.size()) = free_values(fit.train, free_) - prior_;
+    if (turns()) {
+      const FrameTurn turn = turn_of(fit.frame);
+      offset.tail(2) = Eigen::Vector2d(turn.yaw, turn.pitch);
+    }
+    return offset;
+  }
+
+  double evaluate(const WindowFit& fit) {
+    const AngleSeries* series = &shots_;
+    if (turns()) {
+      turned_ = shots_;
+      turn(turned_, fit.frame.transpose());
+      series = &turned_;
+    }
+    accumulate(*series, fit.knot, fit.train, all_, weights_, equations_, {azimuth_, zenith_, {}});
+    double cost = equations_.cost;
+    const Eigen::VectorXd offset = offsets(fit);
+    for (Eigen::Index i = 0; i < offset.size(); ++i) {
+      cost += std::pow(offset[i] / all_[static_cast<std::size_t>(i)].prior_sigma, 2);
+    }
+    for (int k = 0; k < fit.knot.prisms; ++k) {
+      cost += std::pow(fit.knot.state[static_cast<std::size_t>(3 * k + 2)] / kAccelerationSigma, 2);
     }
     return cost;
-  };
-  const auto evaluate = [&](const PrismTrain& train, const RotorTrajectory& motion) {
-    accumulate(shots, motion, train, free, weights, equations, {azimuth, zenith, {}});
-    return equations.cost + prior_cost(free_values(train, free), motion);
-  };
+  }
 
-  evaluate(fit.train, fit.knot);
-  for (const bool move_parameters : {false, true}) {
-    double damping = 1e-4;
-    for (int iteration = 0; iteration < 25; ++iteration) {
-      const double level = std::max(scale() / noise, 1.0);
-      weights.softening = softening_at(level);
-      double cost = evaluate(fit.train, fit.knot);
-      Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(d + n, d + n);
-      Eigen::VectorXd gradient(d + n);
-      with_prism_count(
-          prisms, [&]<int N>() { normal.topLeftCorner(d, d) = knot_curvature<N>(equations, 0); });
-      using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-      normal.topRightCorner(d, n) = Eigen::Map<const RowMajor>(equations.coupling.data(), d, n);
-      normal.bottomLeftCorner(n, d) = normal.topRightCorner(d, n).transpose();
-      normal.bottomRightCorner(n, n) = equations.static_hessian;
-      gradient.head(d) = Eigen::Map<const Eigen::VectorXd>(equations.gradient.data(), d);
-      gradient.tail(n) = equations.static_gradient;
-      const Eigen::VectorXd values = free_values(fit.train, free);
-      for (Eigen::Index i = 0; i < n; ++i) {
-        const double sigma = free[static_cast<std::size_t>(i)].prior_sigma;
-        normal(d + i, d + i) += 1.0 / (sigma * sigma);
-        gradient[d + i] += (prior[i] - values[i]) / (sigma * sigma);
+  std::pair<Eigen::MatrixXd, Eigen::VectorXd> normal_equations(const WindowFit& fit) const {
+    using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+    const auto n = static_cast<Eigen::Index>(all_.size());
+    const Eigen::Index d = 3 * fit.knot.prisms;
+    Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(d + n, d + n);
+    Eigen::VectorXd gradient(d + n);
+    with_prism_count(fit.knot.prisms, [&]<int N>() {
+      normal.topLeftCorner(d, d) = knot_curvature<N>(equations_, 0);
+    });
+    normal.topRightCorner(d, n) = Eigen::Map<const RowMajor>(equations_.coupling.data(), d, n);
+    normal.bottomLeftCorner(n, d) = normal.topRightCorner(d, n).transpose();
+    normal.bottomRightCorner(n, n) = equations_.static_hessian;
+    gradient.head(d) = Eigen::Map<const Eigen::VectorXd>(equations_.gradient.data(), d);
+    gradient.tail(n) = equations_.static_gradient;
+    const Eigen::VectorXd offset = offsets(fit);
+    for (Eigen::Index i = 0; i < n; ++i) {
+      const double sigma = all_[static_cast<std::size_t>(i)].prior_sigma;
+      normal(d + i, d + i) += 1.0 / (sigma * sigma);
+      gradient[d + i] -= offset[i] / (sigma * sigma);
+    }
+    for (Eigen::Index k = 0; k < fit.knot.prisms; ++k) {
+      const double weight = 1.0 / (kAccelerationSigma * kAccelerationSigma);
+      normal(3 * k + 2, 3 * k + 2) += weight;
+      gradient[3 * k + 2] -= weight * fit.knot.state[static_cast<std::size_t>(3 * k + 2)];
+    }
+    return {std::move(normal), std::move(gradient)};
+  }
+
+  WindowFit stepped(const WindowFit& fit, const Eigen::VectorXd& step, Eigen::Index d) const {
+    WindowFit next = fit;
+    next.train = with_free_values(fit.train, free_,
+                                  free_values(fit.train, free_) + step.segment(d, prior_.size()));
+    for (Eigen::Index i = 0; i < d; ++i) next.knot.state[static_cast<std::size_t>(i)] += step[i];
+    if (turns()) next.frame = turned_further(fit.frame, step.tail(2));
+    return next;
+  }
+
+  const AngleSeries& shots_;
+  const std::vector<FreeParameter>& free_;
+  std::vector<FreeParameter> all_;
+  Eigen::VectorXd prior_;
+  ShotWeights weights_;
+  NormalEquations equations_;
+  AngleSeries turned_;
+  std::vector<double> azimuth_, zenith_;
+};
+
+/// One way the recording may have come about.
+struct Hypothesis {
+  bool mirrored = false;
+  sensors::Sensor sensor;  // in one of its speed combinations
+
+  /// Speeds of the lines of y + iz as recorded: a mirror image turns the other way.
+  std::pair<double, double> recorded_speeds() const {
+    const double sign = mirrored ? -1.0 : 1.0;
+    return {sign * sensor.angular_velocity[0], sign * sensor.angular_velocity[1]};
+  }
+  std::string words() const {
+    return fmt::format("{}{}",
+                       sensor.combination
+                           ? fmt::format("speed combination {}",
+                                         static_cast<int>(*sensor.combination))
+                           : std::string("the sensor's speeds"),
+                       mirrored ? " mirrored" : " as recorded");
+  }
+};
+
+std::vector<Hypothesis> hypotheses_of(const sensors::Sensor& sensor, std::optional<bool> mirrored) {
+  std::vector<sensors::Sensor> combinations{sensor};
+  if (sensor.combination) {
+    using sensors::SpeedCombination;
+    const bool is_first = *sensor.combination == SpeedCombination::first;
+    combinations.push_back(
+        with_combination(sensor, is_first ? SpeedCombination::second : SpeedCombination::first));
+  }
+  std::vector<Hypothesis> all;
+  for (const bool image : {false, true}) {
+    if (mirrored && image != *mirrored) continue;
+    for (const sensors::Sensor& candidate : combinations) all.push_back({image, candidate});
+  }
+  return all;
+}
+
+/// Lines that may be a hypothesis's rotors: in beam order, as recorded.
+struct Trial {
+  const Hypothesis* hypothesis = nullptr;
+  RotorLines lines;
+};
+
+/// A trial and what came of it.
+struct Answer {
+  Trial trial;
+  WindowFit fit;
+};
+
+/// The shots of a window, ready to be fitted under any hypothesis.
+class StartWindow {
+ public:
+  StartWindow(const AngleSeries& head, const sensors::Sensor& sensor, const StartOptions& options,
+              const Eigen::Matrix3d& frame, bool frame_is_free)
+      : options_(options), frame_(frame), series_(head), noise_(least_noise(options)) {
+    if (!frame.isIdentity()) turn(series_, frame.transpose());
+    search_.emplace(series_);
+    if (frame_is_free) frame_parameters_ = frame_parameters(sensor.prisms(), kFrameSigma);
+  }
+
+  const LineSearch& search() const { return *search_; }
+  const Eigen::Matrix3d& frame() const { return frame_; }
+
+  /// @param most  shots to take part
+  WindowFit fit(const Trial& trial, std::size_t most) const {
+    const Hypothesis& h = *trial.hypothesis;
+    const AngleSeries shots = chosen(h.mirrored, most);
+    const ShotRange all{0, shots.size()};
+    WindowFit fit{h.sensor.train, make_knots(shots, {&all, 1}, h.sensor.prisms(), 1e9)};
+    fit.knot.time_ns[0] = search_->time_ns();
+    const double sign = h.mirrored ? -1.0 : 1.0;
+    for (std::size_t k = 0; k < trial.lines.lines.size(); ++k) {
+      const SpectralLine& line = trial.lines.lines[k];
+      // At rotation angle zero the beam leans to -Z, so a line's phase is the angle less 90 degrees.
+      fit.knot.state[3 * k] = sign * line.phase + kPi / 2;
+      fit.knot.state[3 * k + 1] = sign * line.angular_velocity;
+    }
+    WindowFitter(shots, h.sensor.train, options_.free, frame_parameters_, noise_).run(fit);
+    return fit;
+  }
+
+  std::size_t size(std::size_t most) const { return chosen(false, most).size(); }
+
+  Start start_of(const Answer& answer) const {
+    const Hypothesis& h = *answer.trial.hypothesis;
+    const ShotRange rows = search_->shots();
+    Start start;
+    start.time_ns = search_->time_ns();
+    start.reach = 1e-9 * static_cast<double>(
+                             std::max(start.time_ns - series_.time_ns[rows.begin],
+                                      series_.time_ns[rows.end - 1] - start.time_ns));
+    start.train = answer.fit.train;
+    start.combination = h.sensor.combination;
+    start.mirrored = h.mirrored;
+    start.residual_rms = answer.fit.rms;
+    for (std::size_t k = 0; k < answer.trial.lines.lines.size(); ++k) {
+      start.rotation_angle.push_back(wrap_to_pi(answer.fit.knot.state[3 * k]));
+      start.angular_velocity.push_back(answer.fit.knot.state[3 * k + 1]);
+    }
+    if (frame_parameters_.empty()) return start;
+    // The mirror of the mirrored recording: its frame turns the other way in elevation.
+    Eigen::Matrix3d total = frame_;
+    if (h.mirrored) {
+      const Eigen::DiagonalMatrix<double, 3> mirror(1.0, 1.0, -1.0);
+      total = (mirror * frame_ * mirror).eval();
+    }
+    start.frame = turn_of(total * answer.fit.frame);
+    return start;
+  }
+
+ private:
+  static double least_noise(const StartOptions& options) {
+    return std::max(options.angle_noise, radians_from_degrees(1e-4));
+  }
+
+  AngleSeries chosen(bool mirrored, std::size_t most) const {
+    AngleSeries shots;
+    const ShotRange rows = search_->shots();
+    const std::size_t stride = std::max<std::size_t>(1, rows.size() / most);
+    for (std::size_t i = rows.begin; i < rows.end; i += stride) shots.append(series_, i);
+    if (mirrored) mirror(shots);
+    return shots;
+  }
+
+  const StartOptions& options_;
+  Eigen::Matrix3d frame_;
+  AngleSeries series_;
+  double noise_;
+  std::optional<LineSearch> search_;
+  std::vector<FreeParameter> frame_parameters_;
+};
+
+/// Whether speeds of two lines are those of a hypothesis, in the order given.
+bool speeds_fit(const Hypothesis& hypothesis, const RotorLines& lines, double share) {
+  const auto [a, b] = hypothesis.recorded_speeds();
+  return std::abs(lines.lines[0].angular_velocity / a - 1.0) < share &&
+         std::abs(lines.lines[1].angular_velocity / b - 1.0) < share;
+}
+
+RotorLines exchanged(RotorLines lines) {
+  std::swap(lines.lines[0], lines.lines[1]);
+  return lines;
+}
+
+/// Best answers of all trials, best first; answers that differ in nothing but the last digits once.
+std::vector<Answer> answers_of(const StartWindow& window, const std::vector<Trial>& trials) {
+  double least = std::numeric_limits<double>::infinity();
+  for (const Trial& trial : trials) least = std::min(least, trial.lines.unexplained);
+  std::vector<Answer> answers;
+  for (const Trial& trial : trials) {
+    if (trial.lines.unexplained > kHopeless * least) continue;
+    answers.push_back({trial, window.fit(trial, kEnoughShots)});
+  }
+  std::stable_sort(answers.begin(), answers.end(),
+                   [](const Answer& a, const Answer& b) { return a.fit.rms < b.fit.rms; });
+  return answers;
+}
+
+/// Whether two answers say the same of rotors and image.
+bool same_answer(const Answer& a, const Answer& b, double resolved) {
+  if (a.trial.hypothesis != b.trial.hypothesis) return false;
+  for (std::size_t k = 0; k < a.trial.lines.lines.size(); ++k) {
+    if (std::abs(a.fit.knot.state[3 * k + 1] - b.fit.knot.state[3 * k + 1]) > resolved) {
+      return false;
+    }
+  }
+  return true;
+}
+
+/// By how much the chi2 of a rival exceeds the best one's.
+double chi2_lead(const Answer& best, const Answer& rival, std::size_t shots) {
+  const double ratio = rival.fit.rms / best.fit.rms;
+  return 2.0 * static_cast<double>(shots) * (ratio * ratio - 1.0);
+}
+
+/// What to say of lines that are no combination of the sensor's speeds.
+EstimationError unknown_speeds(const RotorLines& found, const sensors::Sensor& sensor,
+                               const std::vector<Hypothesis>& hypotheses) {
+  const double a = found.lines[0].angular_velocity, b = found.lines[1].angular_velocity;
+  const std::string words = fmt::format(
+      "the beam turns at {:.0f} and {:.0f} deg/s, which is no combination of {}'s {:.0f} and {:.0f} "
+      "deg/s",
+      degrees_from_radians(a), degrees_from_radians(b), sensor.name,
+      degrees_from_radians(sensor.angular_velocity[0]),
+      degrees_from_radians(sensor.angular_velocity[1]));
+  for (const Hypothesis& hypothesis : hypotheses) {
+    for (const auto& [first, second] : {std::pair(a, b), std::pair(b, a)}) {
+      const auto [expected_a, expected_b] = hypothesis.recorded_speeds();
+      const double ratio_a = first / expected_a, ratio_b = second / expected_b;
+      if (ratio_a > 0 && std::abs(ratio_a / ratio_b - 1.0) < 0.01) {
+        return EstimationError(
+            fmt::format("{}: both are {:.4g} times as fast, so the time stamps are in another unit "
+                        "or their clock is wrong",
+                        words, ratio_a));
       }
-      for (Eigen::Index k = 0; k < prisms; ++k) {
-        const double weight = 1.0 / (kAccelerationSigma * kAccelerationSigma);
-        normal(3 * k + 2, 3 * k + 2) += weight;
-        gradient[3 * k + 2] -= weight * fit.knot.state[static_cast<std::size_t>(3 * k + 2)];
-      }
-      bool moved = false, done = false;
-      while (!moved && damping < 1e6) {
-        Eigen::MatrixXd damped = normal;
-        damped.diagonal() *= 1.0 + damping;
-        if (!move_parameters) damped.diagonal().tail(n).array() *= 1e12;
-        const Eigen::VectorXd step = damped.ldlt().solve(gradient);
-        PrismTrain train = with_free_values(fit.train, free, values + step.tail(n));
-        RotorTrajectory motion = fit.knot;
-        for (Eigen::Index i = 0; i < d; ++i) motion.state[static_cast<std::size_t>(i)] += step[i];
-        const double trial = evaluate(train, motion);
-        if (trial < cost) {
-          done = cost - trial < 1e-6 * cost;
-          fit.train = std::move(train);
-          fit.knot = std::move(motion);
-          damping = std::max(damping / 10.0, 1e-9);
-          moved = true;
-        } else {
-          damping = std::max(10.0 * damping, 1e-3);
+    }
+  }
+  return EstimationError(words + ": wrong sensor, a moving sensor, or a mirrored recording");
+}
+
+/// Looks for the best answer in one window.
+Start find_in_window(const StartWindow& window, const sensors::Sensor& sensor,
+                     const StartOptions& options) {
+  const std::vector<Hypothesis> hypotheses = hypotheses_of(sensor, options.mirrored);
+  const LineSearch& search = window.search();
+  std::vector<Trial> trials;
+  for (const Hypothesis& h : hypotheses) {
+    for (RotorLines& lines : search.near(h.recorded_speeds(), kUsualShare, kMostCandidates)) {
+      trials.push_back({&h, std::move(lines)});
+    }
+  }
+  std::vector<Answer> answers = answers_of(window, trials);
+  if (answers.empty() || answers.front().fit.rms > kGoodResidual) {
+    double fastest = 0;
+    for (const double speed : sensor.angular_velocity) fastest = std::max(fastest, std::abs(speed));
+    const std::vector<RotorLines> everywhere = search.anywhere(2.1 * fastest, kMostCandidates);
+    std::vector<Trial> farther;
+    for (const RotorLines& lines : everywhere) {
+      for (const Hypothesis& h : hypotheses) {
+        for (const RotorLines& order : {lines, exchanged(lines)}) {
+          if (speeds_fit(h, order, kFarthestShare)) farther.push_back({&h, order});
         }
       }
-      if (!moved || done) break;
     }
-    evaluate(fit.train, fit.knot);
+    const std::vector<Answer> more = answers_of(window, farther);
+    answers.insert(answers.end(), more.begin(), more.end());
+    std::stable_sort(answers.begin(), answers.end(),
+                     [](const Answer& a, const Answer& b) { return a.fit.rms < b.fit.rms; });
+    const bool better_elsewhere =
+        !everywhere.empty() &&
+        (answers.empty() ||
+         everywhere.front().unexplained < 0.25 * answers.front().trial.lines.unexplained);
+    if (better_elsewhere) throw unknown_speeds(everywhere.front(), sensor, hypotheses);
+    if (answers.empty()) {
+      throw EstimationError("no pair of turning lines describes the directions of the beam");
+    }
   }
-  fit.rms = scale();
-  if (!std::isfinite(fit.rms)) fit.rms = std::numeric_limits<double>::infinity();
-  return fit;
+  // The best answer against the best one that says something else; more shots where it is close.
+  const double resolved = kTwoPi / (2.0 * std::max(1e-3, window.start_of(answers.front()).reach));
+  const auto rival = std::find_if(answers.begin() + 1, answers.end(), [&](const Answer& other) {
+    return !same_answer(answers.front(), other, resolved);
+  });
+  if (rival != answers.end() &&
+      chi2_lead(answers.front(), *rival, window.size(kEnoughShots)) < kDecisive) {
+    Answer one = answers.front(), other = *rival;
+    for (Answer* answer : {&one, &other}) answer->fit = window.fit(answer->trial, kManyShots);
+    if (other.fit.rms < one.fit.rms) std::swap(one, other);
+    if (!same_answer(one, other, resolved)) {
+      if (chi2_lead(one, other, window.size(kManyShots)) < kDecisive) {
+        throw EstimationError(fmt::format(
+            "undecided: {} with residuals of {:.3g} deg and {} with {:.3g} deg describe the shots "
+            "equally well; more of the field of view or a longer recording would tell them apart",
+            one.trial.hypothesis->words(), degrees_from_radians(one.fit.rms),
+            other.trial.hypothesis->words(), degrees_from_radians(other.fit.rms)));
+      }
+    }
+    return window.start_of(one);
+  }
+  return window.start_of(answers.front());
 }
 
-/// Residual, rad, below which a start is taken: behind a good fit only noise, rounding and the
-/// wander of the speeds over 0.1 s remain.
-double good_start_residual(const AngleSeries& head, double angle_noise) {
-  const double rounding = std::sqrt(static_cast<double>(head.zenith_rounding_variance.front()));
-  return 1.5 * (angle_noise + rounding) + radians_from_degrees(0.02);
+/// Share of the shots outside the cone that a sensor reaches about an axis.
+double share_outside(const AngleSeries& series, const Eigen::Vector3d& axis, double half_angle) {
+  std::size_t outside = 0;
+  const double limit = std::cos(half_angle);
+  for (std::size_t i = 0; i < series.size(); ++i) {
+    const auto v = direction_from_angles<double>({series.azimuth[i], series.zenith[i]});
+    outside += axis.dot(Eigen::Vector3d(v.x, v.y, v.z)) < limit;
+  }
+  return static_cast<double>(outside) / static_cast<double>(std::max<std::size_t>(1, series.size()));
 }
 
-/// A start from lines that stand for the given shots.
-Start start_from(const AngleSeries& shots, const RotorLines& found, const sensors::Sensor& sensor,
-                 const std::vector<FreeParameter>& free, double noise) {
-  const RotorIdentification rotors = identify_rotors(found.lines, sensor);
-  const ShotRange all{0, shots.size()};
-  RotorTrajectory knot = make_knots(shots, {&all, 1}, sensor.prisms(), 1e9);
-  knot.time_ns[0] = found.time_ns;
-  for (std::size_t k = 0; k < rotors.line.size(); ++k) {
-    // At rotation angle zero the beam leans to -Z, so a line's phase is the angle less 90 degrees.
-    knot.state[3 * k] = rotors.line[k].phase + kPi / 2;
-    knot.state[3 * k + 1] = rotors.line[k].angular_velocity;
+Eigen::Vector3d mean_direction(const AngleSeries& series) {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (std::size_t i = 0; i < series.size(); ++i) {
+    const auto v = direction_from_angles<double>({series.azimuth[i], series.zenith[i]});
+    sum += Eigen::Vector3d(v.x, v.y, v.z);
   }
-  const WindowFit fit = fit_window(shots, sensor.train, free, knot, noise);
-  Start start;
-  start.time_ns = found.time_ns;
-  start.reach = 1e-9 * static_cast<double>(std::max(found.time_ns - shots.time_ns.front(),
-                                                    shots.time_ns.back() - found.time_ns));
-  start.train = fit.train;
-  start.combination = rotors.combination;
-  start.residual_rms = fit.rms;
-  for (std::size_t k = 0; k < rotors.line.size(); ++k) {
-    start.rotation_angle.push_back(wrap_to_pi(fit.knot.state[3 * k]));
-    start.angular_velocity.push_back(fit.knot.state[3 * k + 1]);
-    start.line_offset.push_back(wrap_to_pi(fit.knot.state[3 * k] - rotors.line[k].phase));
+  return sum.norm() > 0 ? sum.normalized() : Eigen::Vector3d::UnitX();
+}
+
+/// The frame about whose X axis the lines turn, to a degree or so: the constant of the fit says by
+/// how much the axis was missed.
+Eigen::Matrix3d turned_frame(const AngleSeries& head, const sensors::Sensor& sensor,
+                             const StartOptions& options) {
+  const Eigen::Vector3d middle = mean_direction(head);
+  Eigen::Matrix3d frame = recording_from_sensor(
+      {std::atan2(middle.y(), middle.x()),
+       std::atan2(-middle.z(), std::hypot(middle.x(), middle.y()))});
+  constexpr int kRounds = 6;
+  for (int round = 0; round < kRounds; ++round) {
+    const StartWindow window(head, sensor, options, frame, false);
+    std::optional<RotorLines> best;
+    for (const Hypothesis& h : hypotheses_of(sensor, options.mirrored)) {
+      for (const RotorLines& lines : window.search().near(h.recorded_speeds(), kUsualShare, 1)) {
+        if (!best || lines.unexplained < best->unexplained) best = lines;
+      }
+    }
+    if (!best) break;
+    const Complex c = best->constant;
+    const double size = std::abs(c);
+    if (size > 0.5) break;  // no axis: the shots say nothing of it
+    const Eigen::Vector3d axis =
+        frame * Eigen::Vector3d(std::sqrt(1.0 - size * size), c.real(), c.imag());
+    frame = recording_from_sensor({std::atan2(axis.y(), axis.x()),
+                                   std::atan2(-axis.z(), std::hypot(axis.x(), axis.y()))});
+    if (size < radians_from_degrees(0.05)) break;
   }
-  return start;
+  return frame;
 }
 
 }  // namespace
 
-RotorIdentification identify_rotors(const std::vector<SpectralLine>& lines,
-                                    const sensors::Sensor& sensor) {
-  if (sensor.prisms() != 2 || lines.size() != 2) {
+Start find_start(const AngleSeries& head, const sensors::Sensor& sensor,
+                 const StartOptions& options) {
+  if (sensor.prisms() != 2) {
     throw InvalidArgument(fmt::format("{} has {} prisms; the start knows sensors with 2",
                                       sensor.name, sensor.prisms()));
   }
-  using sensors::SpeedCombination;
-  std::vector<sensors::Sensor> candidates{sensor};
-  if (sensor.combination) {
-    const bool is_first = *sensor.combination == SpeedCombination::first;
-    candidates.push_back(
-        with_combination(sensor, is_first ? SpeedCombination::second : SpeedCombination::first));
-  }
-  RotorIdentification best;
-  double best_miss = 0.2;
-  double clock = 1.0;  // ratio of both speeds to the sensor's, when it is one
-  for (const sensors::Sensor& candidate : candidates) {
-    for (const auto& order : {std::pair(0, 1), std::pair(1, 0)}) {
-      const SpectralLine& a = lines[static_cast<std::size_t>(order.first)];
-      const SpectralLine& b = lines[static_cast<std::size_t>(order.second)];
-      const double ratio_a = a.angular_velocity / candidate.angular_velocity[0];
-      const double ratio_b = b.angular_velocity / candidate.angular_velocity[1];
-      const double worst = std::max(std::abs(ratio_a - 1.0), std::abs(ratio_b - 1.0));
-      if (worst < best_miss) {
-        best_miss = worst;
-        best = {{a, b}, candidate.combination};
-      }
-      if (ratio_a > 0 && std::abs(ratio_a / ratio_b - 1.0) < 0.01) clock = ratio_a;
+  if (head.size() > 1) {
+    const double step = 1e-9 * static_cast<double>(median_step_ns(head.time_ns));
+    double fastest = 0;
+    for (const double speed : sensor.angular_velocity) fastest = std::max(fastest, std::abs(speed));
+    if (step * fastest > 0.9 * kPi) {
+      throw EstimationError(fmt::format(
+          "{:.0f} shots per second are too few to follow rotors of {:.0f} deg/s, at least {:.0f} "
+          "are needed",
+          1.0 / step, degrees_from_radians(fastest), fastest / (0.9 * kPi)));
     }
   }
-  if (best.line.empty()) {
-    const std::string words = fmt::format(
-        "the beam turns at {:.0f} and {:.0f} deg/s, which is no combination of {}'s {:.0f} and "
-        "{:.0f} deg/s",
-        degrees_from_radians(lines[0].angular_velocity),
-        degrees_from_radians(lines[1].angular_velocity), sensor.name,
-        degrees_from_radians(sensor.angular_velocity[0]),
-        degrees_from_radians(sensor.angular_velocity[1]));
-    throw EstimationError(
-        clock != 1.0 ? fmt::format("{}: both are {:.4g} times as fast, so the time stamps are in "
-                                   "another unit or their clock is wrong",
-                                   words, clock)
-                     : words + ": wrong sensor, a moving sensor, or a mirrored recording");
+  const double half_field = 0.5 * sensor.field_of_view + kFieldMargin;
+  const bool turned = options.turned.value_or(
+      sensor.field_of_view > 0 &&
+      share_outside(head, Eigen::Vector3d::UnitX(), half_field) > kFewOutside);
+  if (!turned) {
+    return find_in_window(StartWindow(head, sensor, options, Eigen::Matrix3d::Identity(), false),
+                          sensor, options);
   }
-  return best;
+  const Eigen::Matrix3d frame = turned_frame(head, sensor, options);
+  return find_in_window(StartWindow(head, sensor, options, frame, true), sensor, options);
 }
 
-Start find_start(const AngleSeries& head, const sensors::Sensor& sensor,
-                 const std::vector<FreeParameter>& free, double angle_noise,
-                 std::optional<bool> mirrored) {
-  RotorLines found = rotor_lines(head);
-  const double step = 1e-9 * static_cast<double>(median_step_ns(head.time_ns));
-  double fastest = 0;
-  for (const double speed : sensor.angular_velocity) fastest = std::max(fastest, std::abs(speed));
-  if (step * fastest > 0.9 * kPi) {
-    throw EstimationError(fmt::format(
-        "{:.0f} shots per second are too few to follow rotors of {:.0f} deg/s, at least {:.0f} are "
-        "needed",
-        1.0 / step, degrees_from_radians(fastest), fastest / (0.9 * kPi)));
-  }
-  const double noise = std::max(angle_noise, radians_from_degrees(1e-4));
-  // The shots of the lines, thinned.
-  AngleSeries shots;
-  const std::size_t stride = std::max<std::size_t>(1, found.shots.size() / kEnoughShots);
-  for (std::size_t i = found.shots.begin; i < found.shots.end; i += stride) shots.append(head, i);
-  AngleSeries turned = shots;
-  mirror(turned);
-  RotorLines turned_lines = found;
-  for (SpectralLine& line : turned_lines.lines) {
-    line.angular_velocity = -line.angular_velocity;
-    line.phase = -line.phase;
-  }
-  const auto start_of = [&](bool image) {
-    Start start = image ? start_from(turned, turned_lines, sensor, free, noise)
-                        : start_from(shots, found, sensor, free, noise);
-    start.mirrored = image;
-    return start;
-  };
-  if (mirrored) return start_of(*mirrored);
-  const auto attempt = [&](bool image) -> std::optional<Start> {
-    try {
-      return start_of(image);
-    } catch (const EstimationError&) {  // no combination of the sensor turns like this
-      return std::nullopt;
-    }
-  };
-  const double good = good_start_residual(head, angle_noise);
-  const std::optional<Start> as_recorded = attempt(false);
-  if (as_recorded && as_recorded->residual_rms < good) return *as_recorded;
-  const std::optional<Start> other = attempt(true);
-  if (other && (!as_recorded || other->residual_rms < good ||
-                other->residual_rms < 0.2 * as_recorded->residual_rms)) {
-    return *other;
-  }
-  return as_recorded ? *as_recorded : start_of(false);  // which says why not
+void prepare_shots(AngleSeries& series, const Start& start) {
+  if (start.mirrored) mirror(series);
+  if (start.frame) turn(series, recording_from_sensor(*start.frame).transpose());
 }
 
 }  // namespace risley::estimation

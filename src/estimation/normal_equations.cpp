@@ -67,7 +67,11 @@ void accumulate(const AngleSeries& series, const RotorTrajectory& knots, const P
   all.zenith = series.zenith.data();
   all.azimuth_rounding_variance = series.azimuth_rounding_variance.data();
   all.zenith_rounding_variance = series.zenith_rounding_variance.data();
-  all.noise_variance = weights.angle_noise * weights.angle_noise;
+  all.azimuth_noise_variance = weights.angle_noise.azimuth * weights.angle_noise.azimuth;
+  all.zenith_noise_variance = weights.angle_noise.zenith * weights.angle_noise.zenith;
+  all.turned = std::any_of(places.begin(), places.end(), [&](int place) {
+    return place == place::frame_yaw(knots.prisms) || place == place::frame_pitch(knots.prisms);
+  });
   all.softening = weights.softening;
   all.cut = weights.cut;
   all.curvature = equations.curvature.data();

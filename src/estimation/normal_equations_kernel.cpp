@@ -76,10 +76,11 @@ struct Group {
 /// root are slow, so they are only done anew when it changes.
 class Weights {
  public:
-  explicit Weights(double noise_variance)
+  Weights(double azimuth_noise_variance, double zenith_noise_variance)
       : azimuth_root(0.0),
         zenith_root(0.0),
-        noise_(noise_variance),
+        azimuth_noise_(azimuth_noise_variance),
+        zenith_noise_(zenith_noise_variance),
         azimuth_rounding_(-1.0),  // like no group's
         zenith_rounding_(-1.0) {}
 
@@ -90,14 +91,14 @@ class Weights {
     }
     azimuth_rounding_ = group.azimuth_rounding;
     zenith_rounding_ = group.zenith_rounding;
-    azimuth_root = Batch(1.0) / xsimd::sqrt(noise_ + azimuth_rounding_);
-    zenith_root = Batch(1.0) / xsimd::sqrt(noise_ + zenith_rounding_);
+    azimuth_root = Batch(1.0) / xsimd::sqrt(azimuth_noise_ + azimuth_rounding_);
+    zenith_root = Batch(1.0) / xsimd::sqrt(zenith_noise_ + zenith_rounding_);
   }
 
   Batch azimuth_root, zenith_root;  ///< one over sigma
 
  private:
-  Batch noise_, azimuth_rounding_, zenith_rounding_;
+  Batch azimuth_noise_, zenith_noise_, azimuth_rounding_, zenith_rounding_;
 };
 
 /// One observed angle of a group: residual and derivatives, all divided by its sigma.
@@ -245,7 +246,7 @@ NormalEquationCounts accumulate_knots(const NormalEquationArguments& a) {
   KnotSums<N> sums;
   Row<N> azimuth_row, zenith_row;
   const Batch one(1.0);
-  Weights weights(a.noise_variance);
+  Weights weights(a.azimuth_noise_variance, a.zenith_noise_variance);
   // A shot that is out costs as much as one can.
   const Batch lost(a.softening * a.cut > 1.0 ? 1.0 / a.softening : a.cut);
   for (std::size_t knot = a.knot_begin; knot < a.knot_end; ++knot) {
@@ -264,7 +265,8 @@ NormalEquationCounts accumulate_knots(const NormalEquationArguments& a) {
         angles[k] = xsimd::fma(group.time, xsimd::fma(group.time, half_acceleration[k], speed[k]),
                                angle[k]);
       }
-      const auto shots = linearise_angles(train, derivatives, angles);
+      auto shots = linearise_angles(train, derivatives, angles);
+      if (a.turned) add_turn_derivatives(shots);
       const Batch azimuth_residual = wrapped(group.azimuth - shots.angles.azimuth);
       const Batch zenith_residual = group.zenith - shots.angles.zenith;
       weights.set(group);

@@ -34,7 +34,9 @@ struct NormalEquationArguments {
   const double* zenith = nullptr;
   const float* azimuth_rounding_variance = nullptr;
   const float* zenith_rounding_variance = nullptr;
-  double noise_variance = 0;  ///< of azimuth and zenith, without rounding, rad^2
+  /// Without rounding, rad^2.
+  double azimuth_noise_variance = 0, zenith_noise_variance = 0;
+  bool turned = false;        ///< some place is one of the frame's turn
   double softening = 0;       ///< shots weigh 1 / (1 + softening chi2)^2
   double cut = 0;             ///< shots with a larger chi2 weigh nothing
 

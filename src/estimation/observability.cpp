@@ -277,7 +277,7 @@ Observability observability_of_plan(const ObservabilityPlan& plan) {
   NormalEquations equations;
   // Fewer shots count for all of them.
   const double share = shots / static_cast<double>(count);
-  accumulate(series, knots, train, all, {std::sqrt(variance / share), 0.0}, equations);
+  accumulate(series, knots, train, all, {equal_noise(std::sqrt(variance / share)), 0.0}, equations);
   return analyse(equations, knots, process, all, plan.free, plan.duration, shots, shots / variance);
 }
 
@@ -289,7 +289,7 @@ Observability observability_of_estimate(const Estimate& estimate) {
   const std::vector<FreeParameter> all = all_parameters(estimate.sensor.prisms());
   NormalEquations equations;
   ShotWeights weights;
-  weights.angle_noise = estimate.angle_noise;
+  weights.angle_noise = usable_noise(estimate.noise.value);
   weights.cut = BatchMapOptions{}.outlier_chi2 * std::max(1.0, map.unit_variance);
   accumulate(estimate.series, map.trajectory, map.train, all, weights, equations);
   equations.scale(1.0 / map.variance_factor);

@@ -51,7 +51,7 @@ std::optional<Piece> estimate_piece(const Estimate& estimate, const sensors::Sen
     start.angular_velocity[k] = trajectory.speed(*knot, k, seconds);
   }
   BatchMapOptions options;
-  options.angle_noise = estimate.angle_noise;
+  options.angle_noise = usable_noise(estimate.noise.value);
   options.free = estimate.free;
   options.rotor_process = estimate.rotor_process;
   const AngleSeries series = rows_of(estimate.series, shots.begin, shots.end);

@@ -4,115 +4,232 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
+#include <limits>
+#include <utility>
 #include <vector>
 
-#include "risley/core/angle.hpp"
+#include <Eigen/Cholesky>
 
-#include "estimation/line_fit.hpp"
+#include "risley/core/angle.hpp"
+#include "risley/estimation/diagnostics.hpp"
+#include "risley/estimation/normal_equations.hpp"
+
+#include "estimation/knot_model.hpp"
 
 namespace risley::estimation {
 namespace {
 
-/// Half a window of the tracker, s.
-constexpr double kTrackStep = 0.025;
-constexpr std::size_t kFewestTrackShots = 12;
+constexpr double kTrackStep = 0.025;  // s, a window of the tracker
+/// Of the start about the truth, where only few shots decided it.
+constexpr double kStartAngleSigma = radians_from_degrees(5.0);
+constexpr double kStartSpeedSigma = radians_from_degrees(100.0);
+/// Windows do not bend: what a rotor's speed changes within one is noise of the next.
+constexpr double kStraightSigma = 1e-3;
+/// A prediction this uncertain may lie in a neighbouring minimum: then a grid of angles is tried.
+constexpr double kLostSigma = radians_from_degrees(8.0);
+constexpr int kGridHalf = 4;
+constexpr double kGridStep = radians_from_degrees(15.0);
+
+template <int N>
+class Tracker {
+  static constexpr int kD = 3 * N;
+  using Square = Eigen::Matrix<double, kD, kD>;
+  using Vector = Eigen::Matrix<double, kD, 1>;
+
+ public:
+  struct State {
+    std::int64_t time_ns = 0;
+    Vector mean;
+    Square covariance;
+  };
+
+  Tracker(const AngleSeries& series, const Start& start, const AngleNoise& noise)
+      : series_(series), start_(start) {
+    weights_.angle_noise = noise;
+    knot_.prisms = N;
+    knot_.stretch_begin = {0};
+    knot_.state.resize(kD);
+    usual_level_ = std::max(1.0, start.residual_rms / noise.rms());
+  }
+
+  State first() const {
+    State state;
+    state.time_ns = start_.time_ns;
+    state.covariance.setZero();
+    for (std::size_t k = 0; k < N; ++k) {
+      const auto at = static_cast<Eigen::Index>(3 * k);
+      state.mean[at] = start_.rotation_angle[k];
+      state.mean[at + 1] = start_.angular_velocity[k];
+      state.mean[at + 2] = 0;
+      state.covariance(at, at) = kStartAngleSigma * kStartAngleSigma;
+      state.covariance(at + 1, at + 1) = kStartSpeedSigma * kStartSpeedSigma;
+      state.covariance(at + 2, at + 2) = kStraightSigma * kStraightSigma;
+    }
+    return state;
+  }
+
+  void predict(State& state, std::int64_t time_ns) const {
+    const double dt = 1e-9 * static_cast<double>(time_ns - state.time_ns);
+    state.time_ns = time_ns;
+    Square& p = state.covariance;
+    for (int k = 0; k < N; ++k) {
+      advance(state.mean.template middleRows<3>(3 * k), dt);
+      advance(p.template middleRows<3>(3 * k), dt);
+    }
+    for (int k = 0; k < N; ++k) advance(p.template middleCols<3>(3 * k).transpose(), dt);
+    for (int k = 0; k < N; ++k) {
+      p.template block<3, 3>(3 * k, 3 * k) += step_noise(kSettlingProcess, dt);
+    }
+  }
+
+  /// Takes the shots of some rows into a state. @return whether there were any
+  bool update(State& state, ShotRange rows) {
+    if (rows.size() == 0) return false;
+    const State predicted = state;
+    double uncertain = 0;
+    for (int k = 0; k < N; ++k) {
+      uncertain = std::max(uncertain, std::sqrt(state.covariance(3 * k, 3 * k)));
+    }
+    if (uncertain > kLostSigma) look_around(state, rows, uncertain);
+    constexpr int kRounds = 4;
+    for (int round = 0; round < kRounds; ++round) {
+      accumulate_at(state, rows);
+      weights_.softening = softening_at(level());
+      accumulate_at(state, rows);
+      Square normal = predicted.covariance.ldlt().solve(Square::Identity());
+      const Vector pull = normal * (predicted.mean - state.mean);
+      normal += knot_curvature<N>(equations_, 0);
+      const Eigen::LDLT<Square> solver(normal);
+      const Vector step =
+          solver.solve(Eigen::Map<const Vector>(equations_.gradient.data()) + pull);
+      if (!step.allFinite()) {
+        state = predicted;
+        return false;
+      }
+      state.mean += step;
+      state.covariance = solver.solve(Square::Identity());
+    }
+    state.covariance = (0.5 * (state.covariance + state.covariance.transpose())).eval();
+    return true;
+  }
+
+ private:
+  void accumulate_at(const State& state, ShotRange rows) {
+    knot_.time_ns = {state.time_ns};
+    knot_.first_shot = {rows.begin};
+    knot_.last_shot = {rows.end};
+    std::copy_n(state.mean.data(), kD, knot_.state.begin());
+    rows_ = rows;
+    residuals_.resize(2 * series_.size());
+    accumulate(series_, knot_, start_.train, {}, weights_, equations_,
+               {{residuals_.data(), series_.size()}, {residuals_.data() + series_.size(), series_.size()}, {}});
+  }
+
+  /// Scale of the residuals over the noise; that of the start where few shots tell.
+  double level() const {
+    constexpr std::size_t kFewestShots = 12;
+    if (rows_.size() < kFewestShots) return usual_level_;
+    const double noise = weights_.angle_noise.rms();
+    const double scale =
+        robust_scale({residuals_.data() + rows_.begin, rows_.size()},
+                     {residuals_.data() + series_.size() + rows_.begin, rows_.size()});
+    return std::clamp(scale / noise, 1.0, 1e6);
+  }
+
+  /// Moves the angles to the best of a grid about the prediction.
+  void look_around(State& state, ShotRange rows, double uncertain) {
+    const double softening = std::exchange(weights_.softening, softening_at(10.0 * usual_level_));
+    const int half = std::clamp(static_cast<int>(std::ceil(3.0 * uncertain / kGridStep)), 1, kGridHalf);
+    std::vector<int> offset(N, -half);
+    State best = state;
+    double least = std::numeric_limits<double>::infinity();
+    for (;;) {
+      State trial = state;
+      for (int k = 0; k < N; ++k) {
+        trial.mean[3 * k] += kGridStep * offset[static_cast<std::size_t>(k)];
+      }
+      accumulate_at(trial, rows);
+      if (equations_.cost < least) {
+        least = equations_.cost;
+        best = trial;
+      }
+      std::size_t digit = 0;
+      while (digit < offset.size() && ++offset[digit] > half) offset[digit++] = -half;
+      if (digit == offset.size()) break;
+    }
+    state.mean = best.mean;
+    weights_.softening = softening;
+  }
+
+  const AngleSeries& series_;
+  const Start& start_;
+  ShotWeights weights_;
+  RotorTrajectory knot_;
+  NormalEquations equations_;
+  std::vector<double> residuals_;
+  ShotRange rows_;
+  double usual_level_;
+};
+
+template <int N>
+void track(const AngleSeries& series, ShotRange shots, const Start& start, const AngleNoise& noise,
+           RotorTrajectory& knots, std::size_t first, std::size_t last) {
+  Tracker<N> tracker(series, start, noise);
+  using State = typename Tracker<N>::State;
+  const auto step_ns = static_cast<std::int64_t>(kTrackStep * 1e9);
+  const auto rows_about = [&](std::int64_t middle) {
+    const auto begin = series.time_ns.begin();
+    const auto from = begin + static_cast<std::ptrdiff_t>(shots.begin);
+    const auto to = begin + static_cast<std::ptrdiff_t>(shots.end);
+    return ShotRange{
+        static_cast<std::size_t>(std::lower_bound(from, to, middle - step_ns / 2) - begin),
+        static_cast<std::size_t>(std::lower_bound(from, to, middle + step_ns / 2) - begin)};
+  };
+  State at_start = tracker.first();
+  tracker.update(at_start, rows_about(start.time_ns));
+  const auto follow = [&](std::int64_t direction) {
+    std::vector<State> states{at_start};
+    const std::int64_t end =
+        direction > 0 ? series.time_ns[shots.end - 1] : series.time_ns[shots.begin];
+    State now = at_start;
+    while (direction * (end - now.time_ns) > 0) {
+      tracker.predict(now, now.time_ns + direction * step_ns);
+      if (tracker.update(now, rows_about(now.time_ns))) states.push_back(now);
+    }
+    if (now.time_ns != states.back().time_ns) states.push_back(now);  // only predicted
+    return states;
+  };
+  std::vector<State> points = follow(-1);
+  std::reverse(points.begin(), points.end());
+  const std::vector<State> ahead = follow(1);
+  points.insert(points.end(), ahead.begin() + 1, ahead.end());
+  std::size_t near = 0;
+  for (std::size_t knot = first; knot < last; ++knot) {
+    const std::int64_t time = knots.time_ns[knot];
+    while (near + 1 < points.size() && std::llabs(points[near + 1].time_ns - time) <
+                                           std::llabs(points[near].time_ns - time)) {
+      ++near;
+    }
+    const double seconds = 1e-9 * static_cast<double>(time - points[near].time_ns);
+    const auto state = knots.state_of(knot);
+    for (std::size_t k = 0; k < N; ++k) {
+      const auto at = static_cast<Eigen::Index>(3 * k);
+      state[3 * k] = points[near].mean[at] + seconds * points[near].mean[at + 1];
+      state[3 * k + 1] = points[near].mean[at + 1];
+      state[3 * k + 2] = 0;
+    }
+  }
+}
 
 }  // namespace
 
 void track_rotors(const AngleSeries& series, ShotRange shots, const Start& start,
-                  RotorTrajectory& knots, std::size_t first, std::size_t last) {
-  struct Point {
-    std::int64_t time_ns;
-    std::vector<double> angle, speed;
-  };
-  const auto prisms = static_cast<std::size_t>(knots.prisms);
-  const auto step_ns = static_cast<std::int64_t>(kTrackStep * 1e9);
-  const auto seconds = [](std::int64_t from, std::int64_t to) {
-    return 1e-9 * static_cast<double>(to - from);
-  };
-  // Phases of the lines near a time, with outliers weighed down once.
-  const auto measure = [&](std::int64_t middle, const std::vector<double>& speed,
-                           std::vector<double>& angle) {
-    const auto begin = series.time_ns.begin();
-    const auto from = begin + static_cast<std::ptrdiff_t>(shots.begin);
-    const auto to = begin + static_cast<std::ptrdiff_t>(shots.end);
-    ShotRange rows{static_cast<std::size_t>(std::lower_bound(from, to, middle - step_ns) - begin),
-                   static_cast<std::size_t>(std::upper_bound(from, to, middle + step_ns) - begin)};
-    if (rows.size() < kFewestTrackShots ||
-        seconds(series.time_ns[rows.begin], series.time_ns[rows.end - 1]) < 0.6 * kTrackStep) {
-      return false;
-    }
-    TransverseShots window = hann_shots(series, rows, middle, kEnoughShots);
-    LineFit fit = fit_lines(window, speed);
-    std::vector<double> miss(window.time.size());
-    for (std::size_t i = 0; i < miss.size(); ++i) {
-      Complex expected = fit.amplitude[0];
-      for (std::size_t k = 0; k < prisms; ++k) {
-        expected += fit.amplitude[k + 1] * std::polar(1.0, speed[k] * window.time[i]);
-      }
-      miss[i] = std::norm(window.value[i] - expected);
-    }
-    std::vector<double> sorted = miss;
-    std::nth_element(sorted.begin(), sorted.begin() + sorted.size() / 2, sorted.end());
-    const double limit = 9.0 * sorted[sorted.size() / 2] + 1e-12;
-    for (std::size_t i = 0; i < miss.size(); ++i) {
-      if (miss[i] > limit) window.weight[i] *= limit / miss[i] * 0.1;
-    }
-    fit = fit_lines(window, speed);
-    angle.resize(prisms);
-    for (std::size_t k = 0; k < prisms; ++k) {
-      angle[k] = std::arg(fit.amplitude[k + 1]) + start.line_offset[k];
-    }
-    return true;
-  };
-  const auto follow = [&](std::int64_t direction) {
-    std::vector<Point> points{{start.time_ns, start.rotation_angle, start.angular_velocity}};
-    Point now = points.back();
-    const std::int64_t end =
-        direction > 0 ? series.time_ns[shots.end - 1] : series.time_ns[shots.begin];
-    std::vector<double> angle;
-    while (direction * (end - now.time_ns) > 0) {
-      const double dt = seconds(0, direction * step_ns);
-      now.time_ns += direction * step_ns;
-      for (std::size_t k = 0; k < prisms; ++k) now.angle[k] += dt * now.speed[k];
-      if (!measure(now.time_ns, now.speed, angle)) continue;
-      const double since = seconds(points.back().time_ns, now.time_ns);
-      for (std::size_t k = 0; k < prisms; ++k) {
-        const double miss = wrap_to_pi(angle[k] - now.angle[k]);
-        now.angle[k] += 0.8 * miss;
-        now.speed[k] += 0.2 * miss / since;
-      }
-      points.push_back(now);
-    }
-    if (now.time_ns != points.back().time_ns) points.push_back(now);  // only predicted
-    return points;
-  };
-  std::vector<Point> points = follow(-1);
-  std::reverse(points.begin(), points.end());
-  const std::vector<Point> ahead = follow(1);
-  points.insert(points.end(), ahead.begin() + 1, ahead.end());
-  if (points.size() == 1) points.push_back(points.front());
-  std::size_t near = 0;
-  for (std::size_t knot = first; knot < last; ++knot) {
-    const std::int64_t time = knots.time_ns[knot];
-    while (near + 2 < points.size() && points[near + 1].time_ns <= time) ++near;
-    const Point& a = points[near];
-    const Point& b = points[near + 1];
-    const double h = seconds(a.time_ns, b.time_ns);
-    const double u = h > 0 ? seconds(a.time_ns, time) / h : 0.0;
-    const auto state = knots.state_of(knot);
-    for (std::size_t k = 0; k < prisms; ++k) {
-      if (!(h > 0) || u < 0 || u > 1) {
-        const Point& p = u > 1 ? b : a;
-        state[3 * k] = p.angle[k] + seconds(p.time_ns, time) * p.speed[k];
-        state[3 * k + 1] = p.speed[k];
-      } else {  // the straight line between both angles
-        state[3 * k] = a.angle[k] + u * (b.angle[k] - a.angle[k]);
-        state[3 * k + 1] = (b.angle[k] - a.angle[k]) / h;
-      }
-      state[3 * k + 2] = 0;
-    }
-  }
+                  const AngleNoise& noise, RotorTrajectory& knots, std::size_t first,
+                  std::size_t last) {
+  with_prism_count(knots.prisms, [&]<int N>() {
+    track<N>(series, shots, start, noise, knots, first, last);
+  });
 }
 
 }  // namespace risley::estimation

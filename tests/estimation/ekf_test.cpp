@@ -29,7 +29,9 @@ EkfResult run(const AngleSeries& series, EkfOptions options) {
   const auto nominal = sensors::load_sensor("mid-40");
   options.angle_noise = options.angle_noise > 0 ? options.angle_noise : kNoise;
   if (options.free.empty()) options.free = free_parameters(default_free_names(2), 2);
-  return run_ekf(series, find_start(series, nominal, options.free, options.angle_noise), options);
+  const Start start =
+      find_start(series, nominal, {options.free, options.angle_noise, false, false});
+  return run_ekf(series, start, options);
 }
 
 TEST(Ekf, NoiseFreeConstantSpeedIsRecoveredFarBelowTheStatedNoise) {

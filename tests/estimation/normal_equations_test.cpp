@@ -102,10 +102,12 @@ struct Reference {
               wrap_to_pi(state[3 * k]) + t * state[3 * k + 1] + 0.5 * t * t * state[3 * k + 2];
         }
         const auto shot = linearise_angles(prepared, derivatives, angles);
-        const double noise = weights.angle_noise * weights.angle_noise;
+        const auto square = [](double x) { return x * x; };
         const Eigen::Vector2d sigma(
-            std::sqrt(noise + static_cast<double>(r.series.azimuth_rounding_variance[i])),
-            std::sqrt(noise + static_cast<double>(r.series.zenith_rounding_variance[i])));
+            std::sqrt(square(weights.angle_noise.azimuth) +
+                      static_cast<double>(r.series.azimuth_rounding_variance[i])),
+            std::sqrt(square(weights.angle_noise.zenith) +
+                      static_cast<double>(r.series.zenith_rounding_variance[i])));
         azimuth_residual.push_back(wrap_to_pi(r.series.azimuth[i] - shot.angles.azimuth));
         zenith_residual.push_back(r.series.zenith[i] - shot.angles.zenith);
         Eigen::Vector2d residual(azimuth_residual.back(), zenith_residual.back());
@@ -239,10 +241,10 @@ TEST_P(NormalEquationsOfATrain, EqualTheScalarModel) {
   for (const int place : {place::incident_beam_vertical(), place::refractive_index(0)}) {
     train.set_place(place, truth[place] + 3e-4);
   }
-  const std::vector<ShotWeights> weights{{kNoise, 0.0, kInfinity},
+  const std::vector<ShotWeights> weights{{{kNoise, 1.7 * kNoise}, 0.0, kInfinity},
                                          {2 * kNoise, 0.05, kInfinity},
-                                         {kNoise, 0.05, 20.0},
-                                         {kNoise, 0.0, 1.5}};
+                                         {{kNoise, 1.7 * kNoise}, 0.05, 20.0},
+                                         {{kNoise, 1.7 * kNoise}, 0.0, 1.5}};
   NormalEquations equations;  // keeps its memory, not its values
   for (const auto& free : parameter_sets(train.prisms())) {
     for (const ShotWeights& weight : weights) {
@@ -286,7 +288,7 @@ TEST(NormalEquations, ABeamThatDoesNotGetThroughIsAnOutlierAndCountsNothing) {
     }
     const Recording r = record(train, {1, 9, 100, 1, 8, 30, 1, 60, 40, 1, 1, 7, 2, 50, 33, 17}, 4);
     const auto free = free_parameters(default_free_names(train.prisms()), train.prisms());
-    const ShotWeights weights{kNoise, 0.0, 1e9};  // so only those
+    const ShotWeights weights{{kNoise, 1.7 * kNoise}, 0.0, 1e9};  // so only those
     const Reference expected(r, train, free, weights);
     EXPECT_GT(expected.outliers, 50u);
     EXPECT_LT(expected.outliers, r.series.size() - 50);
@@ -309,7 +311,7 @@ TEST(NormalEquations, ABeamThatDoesNotGetThroughIsAnOutlierAndCountsNothing) {
 TEST(NormalEquations, ManyTurnsDoNotCostAccuracy) {
   const PrismTrain train = testing::imperfect_train("PA-AP", 0.5, 5);
   const auto free = free_parameters(default_free_names(2), 2);
-  const ShotWeights weights{kNoise, 0.01, 30.0};
+  const ShotWeights weights{{kNoise, 1.7 * kNoise}, 0.01, 30.0};
   Recording r = record(train, {1, 7, 100}, 6);
   const Recording few = r;
   // A power of two, so that the turns themselves are exact.
@@ -343,7 +345,7 @@ TEST(NormalEquations, TheNumberOfThreadsChangesNoBit) {
   const PrismTrain train = testing::imperfect_train("PA-AP", 0.5, 7);
   const auto free = free_parameters(default_free_names(2), 2);
   const Recording r = record(train, std::vector<std::size_t>(3500, 3), 8);
-  const ShotWeights weights{kNoise, 0.02, 50.0};
+  const ShotWeights weights{{kNoise, 1.7 * kNoise}, 0.02, 50.0};
   NormalEquations one, two;
   Columns columns_one(r.series.size()), columns_two(r.series.size());
   {

@@ -3,11 +3,13 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <vector>
 
 #include <Eigen/Core>
 
 #include "risley/core/progress.hpp"
+#include "risley/estimation/angle_noise.hpp"
 #include "risley/estimation/angle_series.hpp"
 #include "risley/estimation/diagnostics.hpp"
 #include "risley/estimation/free_parameters.hpp"
@@ -20,8 +22,11 @@ namespace risley::estimation {
 
 /// Settings of the batch estimator.
 struct BatchMapOptions {
-  double angle_noise = 0;           ///< 1 sigma of azimuth and zenith before rounding, rad
-  std::vector<FreeParameter> free;  ///< constants to estimate; may be empty
+  std::optional<AngleNoise> angle_noise;  ///< held; empty: found, one variance for each angle
+  std::vector<FreeParameter> free;        ///< constants to estimate; may be empty
+  /// 1 sigma of the turn that the series' frame may have against the sensor's about both axes across
+  /// the beam, rad; 0: none
+  double frame_sigma = 0;
   /// Motion model of the rotors [prisms]; empty chooses it by maximum likelihood.
   std::vector<RotorProcess> rotor_process;
   double knot_interval = kKnotInterval;  ///< s
@@ -34,8 +39,15 @@ struct BatchMapOptions {
 struct BatchMapResult {
   Eigen::VectorXd parameters;                   ///< [free], SI units
   Eigen::MatrixXd covariance;                   ///< [free, free], variance factor included
-  Eigen::MatrixXd information;                  ///< of the data alone, variance factor included
+  Eigen::MatrixXd information;  ///< [constants], of the data alone, variance factor included
   PrismTrain train{parse_face_order("PA-AP")};  ///< with the estimated parameters
+  /// Turn of the series' frame against the sensor's: residuals and angles are those of the series
+  /// turned back by it. Identity unless a frame_sigma was given.
+  Eigen::Matrix3d frame = Eigen::Matrix3d::Identity();
+  Eigen::Matrix2d frame_covariance = Eigen::Matrix2d::Zero();  ///< turns about Z and Y, rad^2
+  NoiseEstimate noise;      ///< sigma 0 where it was held
+  /// Parameters, frame: what the data alone tell of both together [free + 2 or 0].
+  std::vector<FreeParameter> constants;
   RotorTrajectory trajectory;                   ///< with covariances
   /// How the rotation angles follow the parameters, mean over the recording [prisms, free]: an
   /// error of the parameters moves all angles of a rotor by nearly the same.
@@ -64,7 +76,7 @@ struct BatchMapResult {
 /// of them, where one or two steps remain. At the end a hard cut decides on outliers, and the
 /// covariance is that of shots with the autocorrelation and the scatter that the residuals show.
 /// [B21 section 2.4 states the model; the method departs from it: docs/theory/map.md]
-/// @param series  as it is to be used (turned if it was mirrored)
+/// @param series  as it is to be used: prepare_shots()
 /// @param start   of the first stretch
 /// @throws EstimationError when there is nothing to estimate from; InvalidArgument
 BatchMapResult run_batch_map(const AngleSeries& series, const Start& start,

@@ -8,6 +8,7 @@
 
 #include "risley/core/progress.hpp"
 #include "risley/estimation/batch_map.hpp"
+#include "risley/estimation/coordinate_rounding.hpp"
 #include "risley/estimation/diagnostics.hpp"
 #include "risley/estimation/ekf.hpp"
 #include "risley/estimation/weak_directions.hpp"
@@ -23,11 +24,19 @@ enum class Method {
 /// What the user asks for.
 struct EstimateOptions {
   sensors::Sensor sensor;               ///< start values; its combination is read off the data
-  std::optional<double> angle_noise;    ///< rad, default the sensor's
+  /// 1 sigma of both angles before rounding, held, rad; empty: the batch estimator finds it, the
+  /// filter takes the sensor's
+  std::optional<double> angle_noise;
   std::vector<std::string> fixed;       ///< default free parameters to hold at the sensor's value
   std::vector<std::string> additional;  ///< further parameters to free
   std::vector<RotorProcess> rotor_process;  ///< empty: maximum likelihood
-  std::optional<bool> mirrored;             ///< the elevation's sign is turned; empty: find out
+  std::optional<bool> mirrored;  ///< the elevation's sign is turned; empty: find out
+  /// Directions come from coordinates in whole steps, such as millimetres, and the series has ranges:
+  /// finds out whether these were rounded or cut off.
+  bool cartesian = false;
+  /// The recording's frame is turned against the sensor's; empty: it is where shots lie outside the
+  /// sensor's field of view.
+  std::optional<bool> turned;
 };
 
 /// What a user's choice leaves free: the default parameters less the fixed ones plus the others.
@@ -46,12 +55,11 @@ struct Estimate {
   Method method = Method::map;
   bool converged = false;
   std::string reason;  ///< why not converged; empty when converged
-  /// Not converged for the one reason that residuals are far below the stated noise: values are
-  /// sound, sigmas far too large.
-  bool noise_overstated = false;
   std::vector<std::string> warnings;  ///< what the user should know all the same
   sensors::Sensor sensor;             ///< the calibrated sensor with its covariance
   bool mirrored = false;
+  std::optional<FrameEstimate> frame;  ///< of the recording, where it is not the sensor's
+  CoordinateRounding coordinates = CoordinateRounding::unknown;
   Start start;
   std::vector<FreeParameter> free;
   Eigen::VectorXd parameters;          ///< [free], SI units
@@ -61,15 +69,18 @@ struct Estimate {
   /// Parameter combinations that the data do not tell; any makes the estimate not converged.
   std::vector<WeakDirection> unobservable;
 
-  AngleSeries series;                 ///< the shots, turned if they were mirrored
+  AngleSeries series;                 ///< the shots in the sensor's frame, see prepare_shots()
   std::size_t outliers = 0;           ///< of the series
   RotorStates states;                 ///< at every shot (ekf), or at one shot per knot (map)
   std::optional<BatchMapResult> map;  ///< all that the batch estimator knows
 
   Moments azimuth_residuals, zenith_residuals;     ///< rad, of all shots, outliers left out
   std::vector<AngleProfile> residuals_over_angle;  ///< [prisms], of all shots
-  double angle_noise = 0;                          ///< assumed, rad, before rounding
-  double expected_residual = 0;                    ///< rms of noise and rounding together, rad
+  NoiseEstimate noise;                             ///< sigma 0 where it was held
+  bool noise_held = false;
+  double expected_residual = 0;  ///< rms of noise and rounding together, rad
+  /// The same with the noise that the sensor's preset states: what a healthy unit leaves, rad.
+  double usual_residual = 0;
 };
 
 /// Residuals at every shot of an estimate's series: references into the estimate.

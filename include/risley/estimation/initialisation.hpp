@@ -2,54 +2,59 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <cstdint>
 #include <optional>
-#include <string>
 #include <vector>
 
 #include "risley/estimation/angle_series.hpp"
+#include "risley/estimation/frame_turn.hpp"
 #include "risley/estimation/free_parameters.hpp"
-#include "risley/estimation/spectral_lines.hpp"
 #include "risley/sensors/sensor.hpp"
 
 namespace risley::estimation {
 
-/// Which rotor turns how, read off the spectrum: never by trying both combinations, because the
-/// wrong one can end with small residuals and wrong parameters.
-struct RotorIdentification {
-  std::vector<SpectralLine> line;  ///< [prisms], in beam order
-  std::optional<sensors::SpeedCombination> combination;
+/// How a start is looked for.
+struct StartOptions {
+  std::vector<FreeParameter> free;  ///< parameters that are fitted to the first shots
+  double angle_noise = 0;           ///< 1 sigma of azimuth and zenith, roughly, rad
+  /// Whether the recording is a mirror image; empty finds out.
+  std::optional<bool> mirrored = false;
+  /// Whether the recording's frame is turned against the sensor's; empty finds out: it is when shots
+  /// lie outside the sensor's field of view.
+  std::optional<bool> turned;
 };
 
-/// @throws EstimationError when no combination of the sensor's speeds is within 20 % of the lines;
-///         says when the recording's clock rather than the rotors must be off
-RotorIdentification identify_rotors(const std::vector<SpectralLine>& lines,
-                                    const sensors::Sensor& sensor);
-
-/// What an estimation starts from. All of the recording as it is to be used: turned if mirrored.
+/// What an estimation starts from. All of the recording as it is to be used: turned if mirrored,
+/// and turned into the sensor's frame.
 struct Start {
   std::int64_t time_ns = 0;                     ///< of the angles
   double reach = 0;                             ///< it was fitted to shots so far around, s
   std::vector<double> rotation_angle;           ///< [prisms], rad
   std::vector<double> angular_velocity;         ///< [prisms], rad/s
-  std::vector<double> line_offset;              ///< [prisms], rotation angle less the line's phase
   PrismTrain train{parse_face_order("PA-AP")};  ///< free parameters fitted to the first shots
   std::optional<sensors::SpeedCombination> combination;
-  bool mirrored = false;    ///< the recording is a mirror image and has to be turned
-  double residual_rms = 0;  ///< of the fit, rad; robust, so that outliers do not count
+  bool mirrored = false;           ///< the recording is a mirror image and has to be turned
+  std::optional<FrameTurn> frame;  ///< of the recording, where it is not the sensor's
+  double residual_rms = 0;         ///< of the fit, rad; robust, so that outliers do not count
 };
 
-/// Speeds, combination and rotation angles from the spectrum, then a robust least-squares fit of
-/// parameters and motion to the same shots. It needs no zero position and so loses no shot.
+/// Speeds, combination and rotation angles from fits of lines, then a robust least-squares fit of
+/// parameters and motion to the same shots, for every combination of the sensor's speeds and both
+/// mirror images that may be; the one that leaves least is the answer. It needs no zero position
+/// and so loses no shot, and half of the field may be missing.
 ///
 /// Whether a recording holds the mirror image of what the sensor can produce (its elevation has the
 /// other sign), as public copies of some vendor files do, cannot be told from the speeds: a
 /// mirrored first combination turns like the second. The optics can: prisms bend differently when
 /// met from the other side, and the fit leaves a tenth of a degree for the wrong image.
-/// @param head      every shot of about the first second, as recorded
-/// @param mirrored  whether the recording is a mirror image; empty finds out
-/// @throws EstimationError naming what is missing: duration, shots, matching speeds
+/// @param head  every shot of about the first second, as recorded
+/// @throws EstimationError naming what is missing: duration, shots, matching speeds; also when two
+///         answers fit equally well, and when the recording's clock rather than the rotors must be
+///         off
 Start find_start(const AngleSeries& head, const sensors::Sensor& sensor,
-                 const std::vector<FreeParameter>& free, double angle_noise,
-                 std::optional<bool> mirrored = false);
+                 const StartOptions& options);
+
+/// The shots as a start says they are to be used: turned if mirrored, and into the sensor's frame.
+void prepare_shots(AngleSeries& series, const Start& start);
 
 }  // namespace risley::estimation

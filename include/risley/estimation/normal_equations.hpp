@@ -9,6 +9,7 @@
 
 #include <Eigen/Core>
 
+#include "risley/estimation/angle_noise.hpp"
 #include "risley/estimation/angle_series.hpp"
 #include "risley/estimation/free_parameters.hpp"
 #include "risley/estimation/rotor_trajectory.hpp"
@@ -19,7 +20,7 @@ namespace risley::estimation {
 
 /// How much a shot counts. chi2 is the sum of its squared residuals over their variances.
 struct ShotWeights {
-  double angle_noise = 0;  ///< 1 sigma of azimuth and zenith before rounding, rad
+  AngleNoise angle_noise;
   /// Geman-McClure: a shot weighs 1 / (1 + softening chi2)^2. 0 is least squares.
   double softening = 0;
   double cut = std::numeric_limits<double>::infinity();  ///< shots with more chi2 are outliers

@@ -29,6 +29,10 @@ inline constexpr RotorProcess kTypicalRotor{0.0, 0.0, radians_from_degrees(4.0)}
 /// follows it wherever it goes.
 inline constexpr RotorProcess kSettlingProcess{radians_from_degrees(30.0), 0.0, 0.0};
 
+/// A rotor that moves along one parabola for ever: constant acceleration. The jerk only says that
+/// there is an acceleration.
+inline constexpr RotorProcess kConstantAcceleration{0.0, 0.0, 1e-12};
+
 /// Covariance that a step of dt seconds adds to (angle, speed, acceleration).
 struct RotorStepCovariance {
   double angle_angle = 0, angle_speed = 0, angle_acceleration = 0;

@@ -248,6 +248,21 @@ AngleLinearisation<T, N> linearise_angles(const PreparedTrain<T, N>& train,
           gradients[1], forward.valid()};
 }
 
+/// Fills the places of place::frame_yaw and place::frame_pitch: what a small turn of the emergent
+/// beam about Z and about Y does to both angles. No other function of this file writes there.
+template <ModelScalar T, int N>
+void add_turn_derivatives(AngleLinearisation<T, N>& shot) {
+  using std::sqrt;
+  constexpr auto kYaw = static_cast<std::size_t>(place::frame_yaw(N));
+  constexpr auto kPitch = static_cast<std::size_t>(place::frame_pitch(N));
+  const Vector3<T>& v = shot.direction;
+  const T horizontal2 = v.x * v.x + v.y * v.y;
+  shot.azimuth.parameters[kYaw] = T(1.0);
+  shot.zenith.parameters[kYaw] = T(0.0);
+  shot.azimuth.parameters[kPitch] = -v.y * v.z / horizontal2;
+  shot.zenith.parameters[kPitch] = v.x / sqrt(horizontal2);
+}
+
 /// The three components of the direction of one shot and their gradients.
 template <ModelScalar T, int N>
 struct DirectionLinearisation {

@@ -21,6 +21,10 @@ constexpr int prism_tilt_horizontal(int prism) { return 5 + 6 * prism; }
 constexpr int prism_tilt_vertical(int prism) { return 6 + 6 * prism; }
 constexpr int bearing_tilt_horizontal(int prism) { return 7 + 6 * prism; }
 constexpr int bearing_tilt_vertical(int prism) { return 8 + 6 * prism; }
+/// Derivatives keep in the last prism's two bearing places, which are no parameters, what a small
+/// turn of the whole emergent beam about Z (yaw) and about Y (pitch) does: turn_derivatives().
+constexpr int frame_yaw(int prisms) { return bearing_tilt_horizontal(prisms - 1); }
+constexpr int frame_pitch(int prisms) { return bearing_tilt_vertical(prisms - 1); }
 }  // namespace place
 
 /// Length of the flat parameter vector.

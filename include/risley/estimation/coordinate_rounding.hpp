@@ -1,0 +1,30 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <Eigen/Core>
+
+#include "risley/estimation/angle_series.hpp"
+
+namespace risley::estimation {
+
+/// How coordinates became whole steps.
+enum class CoordinateRounding {
+  unknown,      ///< no coordinates, or the data do not tell
+  nearest,      ///< to the nearest step
+  toward_zero,  ///< cut off: every coordinate is half a step too small in the mean
+};
+
+/// Adds to the coordinates of every shot half a step away from zero: what cutting off took in the
+/// mean. Directions and ranges change.
+/// @param series                 with ranges and the rounding variances of Cartesian records
+/// @param recording_from_sensor  from the series' frame to the one in which the coordinates were
+///                               cut off
+void add_half_steps(AngleSeries& series, const Eigen::Matrix3d& recording_from_sensor);
+
+/// How far the directions of such a series would move, in sigmas of all shots together: below 5 or
+/// so the two ways of rounding cannot be told apart.
+/// @param noise  of the angles beside the rounding, 1 sigma, rad
+double half_step_signal(const AngleSeries& series, double noise);
+
+}  // namespace risley::estimation

@@ -1,0 +1,47 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "risley/estimation/angle_series.hpp"
+#include "risley/estimation/free_parameters.hpp"
+
+namespace risley::estimation {
+
+/// How the frame of a recording stands against the sensor's: p_recording = Rz(yaw) Ry(pitch)
+/// p_sensor, rad. A hub or a vehicle's calibration turns clouds so. The sensor's optical axis then
+/// points to azimuth yaw and elevation -pitch. Directions alone do not tell a roll about that axis
+/// from other zeros of all rotation angles; it is taken as 0.
+struct FrameTurn {
+  double yaw = 0, pitch = 0;
+};
+
+/// Rotation that takes vectors of the sensor's frame to the recording's.
+Eigen::Matrix3d recording_from_sensor(const FrameTurn& turn);
+
+/// The turn whose optical axis is that of a rotation, which may roll.
+FrameTurn turn_of(const Eigen::Matrix3d& recording_from_sensor);
+
+/// A rotation followed by small turns about the sensor's Z axis (yaw) and Y axis (pitch), without the
+/// roll that this leaves. @param step  yaw and pitch, rad
+Eigen::Matrix3d turned_further(const Eigen::Matrix3d& recording_from_sensor,
+                               const Eigen::Vector2d& step);
+
+/// Turns all directions: v := rotation v. Rounding variances go along.
+void turn(AngleSeries& series, const Eigen::Matrix3d& rotation);
+
+/// A found turn with its covariance.
+struct FrameEstimate {
+  FrameTurn turn;
+  Eigen::Matrix2d covariance = Eigen::Matrix2d::Zero();  ///< of yaw and pitch, rad^2
+};
+
+/// What stands at the end of the free parameters where the frame's turn is estimated too: small
+/// turns of the recorded beam about the sensor's Z axis (yaw) and Y axis (pitch).
+/// @param prior_sigma  of each, rad
+std::vector<FreeParameter> frame_parameters(int prisms, double prior_sigma);
+
+}  // namespace risley::estimation

@@ -1,0 +1,52 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "risley/estimation/coordinate_rounding.hpp"
+
+#include <cmath>
+
+#include "risley/core/direction.hpp"
+
+namespace risley::estimation {
+namespace {
+
+/// Step of the coordinates of a shot, m, or 0: the zenith's rounding variance is that of q / range.
+double step_of(const AngleSeries& series, std::size_t i) {
+  const double range = series.range[i];
+  if (!(range > 0)) return 0.0;
+  return range * std::sqrt(12.0 * static_cast<double>(series.zenith_rounding_variance[i]));
+}
+
+}  // namespace
+
+void add_half_steps(AngleSeries& series, const Eigen::Matrix3d& recording_from_sensor) {
+  for (std::size_t i = 0; i < series.range.size(); ++i) {
+    const double half = 0.5 * step_of(series, i);
+    if (!(half > 0)) continue;
+    const auto v = direction_from_angles<double>({series.azimuth[i], series.zenith[i]});
+    Eigen::Vector3d point =
+        series.range[i] * (recording_from_sensor * Eigen::Vector3d(v.x, v.y, v.z));
+    for (double& coordinate : point) {
+      if (std::abs(coordinate) > half) coordinate += std::copysign(half, coordinate);
+    }
+    const Eigen::Vector3d moved = recording_from_sensor.transpose() * point;
+    const auto angles = angles_from_direction(Vector3<double>{moved.x(), moved.y(), moved.z()});
+    series.azimuth[i] = angles.azimuth;
+    series.zenith[i] = angles.zenith;
+    series.range[i] = moved.norm();
+  }
+}
+
+double half_step_signal(const AngleSeries& series, double noise) {
+  double sum = 0;
+  for (std::size_t i = 0; i < series.range.size(); ++i) {
+    const double step = step_of(series, i);
+    if (!(step > 0)) continue;
+    // About half a step in each direction across the beam.
+    const double angle = 0.5 * step / series.range[i];
+    const double rounding = static_cast<double>(series.zenith_rounding_variance[i]);
+    sum += 2.0 * angle * angle / (noise * noise + rounding);
+  }
+  return std::sqrt(sum);
+}
+
+}  // namespace risley::estimation

@@ -1,0 +1,63 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "risley/estimation/frame_turn.hpp"
+
+#include <cmath>
+
+#include <Eigen/Geometry>
+
+#include "risley/core/direction.hpp"
+#include "risley/optics/parameters.hpp"
+
+namespace risley::estimation {
+
+Eigen::Matrix3d recording_from_sensor(const FrameTurn& turn) {
+  return (Eigen::AngleAxisd(turn.yaw, Eigen::Vector3d::UnitZ()) *
+          Eigen::AngleAxisd(turn.pitch, Eigen::Vector3d::UnitY()))
+      .toRotationMatrix();
+}
+
+FrameTurn turn_of(const Eigen::Matrix3d& recording_from_sensor) {
+  const Eigen::Vector3d axis = recording_from_sensor.col(0);
+  return {std::atan2(axis.y(), axis.x()), std::atan2(-axis.z(), std::hypot(axis.x(), axis.y()))};
+}
+
+Eigen::Matrix3d turned_further(const Eigen::Matrix3d& rotation, const Eigen::Vector2d& step) {
+  const Eigen::Vector3d small(0.0, step[1], step[0]);
+  const double angle = small.norm();
+  if (!(angle > 0)) return rotation;
+  const Eigen::Matrix3d moved =
+      rotation * Eigen::AngleAxisd(angle, small / angle).toRotationMatrix();
+  return recording_from_sensor(turn_of(moved));
+}
+
+void turn(AngleSeries& series, const Eigen::Matrix3d& rotation) {
+  for (std::size_t i = 0; i < series.size(); ++i) {
+    const auto v = direction_from_angles<double>({series.azimuth[i], series.zenith[i]});
+    const double sine = std::hypot(v.x, v.y);
+    const Eigen::Vector3d direction = rotation * Eigen::Vector3d(v.x, v.y, v.z);
+    const auto angles =
+        angles_from_direction(Vector3<double>{direction.x(), direction.y(), direction.z()});
+    const double new_sine = std::sin(angles.zenith);
+    // Where azimuth grew before, seen from where it grows now: the two variances mix by that angle.
+    const Eigen::Vector3d along =
+        rotation * Eigen::Vector3d(-std::sin(series.azimuth[i]), std::cos(series.azimuth[i]), 0.0);
+    const double cosine = -std::sin(angles.azimuth) * along.x() + std::cos(angles.azimuth) * along.y();
+    const double share = cosine * cosine;
+    const double across = static_cast<double>(series.azimuth_rounding_variance[i]) * sine * sine;
+    const double down = static_cast<double>(series.zenith_rounding_variance[i]);
+    series.azimuth_rounding_variance[i] =
+        static_cast<float>((share * across + (1.0 - share) * down) / (new_sine * new_sine));
+    series.zenith_rounding_variance[i] =
+        static_cast<float>(share * down + (1.0 - share) * across);
+    series.azimuth[i] = angles.azimuth;
+    series.zenith[i] = angles.zenith;
+  }
+}
+
+std::vector<FreeParameter> frame_parameters(int prisms, double prior_sigma) {
+  return {{"frame_yaw_deg", {place::frame_yaw(prisms)}, prior_sigma},
+          {"frame_pitch_deg", {place::frame_pitch(prisms)}, prior_sigma}};
+}
+
+}  // namespace risley::estimation
