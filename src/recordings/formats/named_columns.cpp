@@ -194,6 +194,8 @@ NamedColumns::Meaning NamedColumns::meaning_of(std::string_view name) {
 NamedColumns::NamedColumns(std::vector<NamedColumn> columns) : columns_(std::move(columns)) {
   std::vector<Meaning> meanings;
   for (const NamedColumn& column : columns_) meanings.push_back(meaning_of(column.name));
+  // Tables of pandas begin with the number of the row, without a name.
+  if (columns_.size() > 1 && columns_.front().name.empty()) meanings.front().role = Role::index;
   const auto has = [&](Role role) {
     return std::any_of(meanings.begin(), meanings.end(),
                        [role](const Meaning& meaning) { return meaning.role == role; });
