@@ -541,7 +541,7 @@ TEST(Npy, Damage) {
         {"'<f4'", "(5, 7)", "5 x 7"},
         {"'<f4'", "()", "single element"},
         {"'|O'", "(5,)", "type"},
-        {"'<U5'", "(5,)", "no numbers"},
+        {"'<U5'", "(5,)", "another type"},
         {"'<f4", "(5,)", "',' or '}'"},
         {"[('x', '<f4')]", "(5,)", "azimuth and zenith"},
         {"'<f4'", "(-5, 3)", "0 or more"},

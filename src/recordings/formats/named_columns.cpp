@@ -428,6 +428,7 @@ void NamedColumns::settle_returns(RecordingHeader& header) {
   const Source* const returns = find(Role::return_number);
   if (returns == nullptr) return;
   const auto [low, high] = extent(returns->samples);
+  if (std::isnan(high)) return;
   return_offset_ = low == 0.0 ? 1 : 0;  // some count returns from 0
   header.returns_per_shot = static_cast<int>(std::clamp(high + return_offset_, 1.0, 255.0));
 }
