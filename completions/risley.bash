@@ -71,7 +71,7 @@ _risley() {
         choices="$common --output --calibration --format --directions --beam-origin --covariance
           --beam-divergence --common-factors --rate-hz --noise-angle-deg --las-scale-m --time
           --beam-origin-map --shot-rate-hz" ;;
-      reproduce) choices="$common --output --full --recording" ;;
+      reproduce) choices="$common --output --full --recording --shot-rate-hz" ;;
     esac
     mapfile -t COMPREPLY < <(compgen -W "$choices" -- "$current")
     return
