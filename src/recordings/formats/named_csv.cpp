@@ -117,6 +117,8 @@ std::optional<TableHead> find_head(std::string_view bytes) {
     head.layout.first_row_line = *comment + 2;
     return head;
   }
+  // Names that are cut off are none.
+  if (at + 1 == lines.size() && bytes.size() >= kHeadBytes) return std::nullopt;
   const auto first = row_of(at, delimiter_of(lines[at]));
   if (!all_numbers(first)) {
     take_names(at);

@@ -282,7 +282,7 @@ void add_table(const ArrayHeader& header, const OpenArray& open, BinaryTable& ta
     throw BadArray{fmt::format(
         "expected an array of named fields such as x, y and z, or of rows with 3 (x y z) or 4 (x y "
         "z intensity) numbers; found {} {}",
-        header.shape_text(), header.fields.empty() ? "elements that are no numbers" : "numbers")};
+        header.shape_text(), header.fields.empty() ? "elements of another type" : "numbers")};
   }
   const std::size_t first_lane = table.lanes.size();
   if (header.is_structured()) {

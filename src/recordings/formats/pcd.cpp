@@ -99,8 +99,8 @@ PcdHeader read_header(const std::string& path) {
         }
         if (!identity) {
           header.warnings.push_back(fmt::format(
-              "the header tells a pose, \"{}\": the points were taken as they stand, in the frame "
-              "that the sensor is told to have had it in",
+              "the header tells a pose of the sensor, \"{}\": the points were taken as they stand, "
+              "as if they were in its frame",
               printable(line)));
         }
       } else if (key == "DATA") {
@@ -190,7 +190,8 @@ BinaryTable binary_table(const std::string& path, PcdHeader header) {
     table.lanes.push_back({[=] { return std::make_unique<FileSource>(path, begin, UINT64_MAX); },
                            static_cast<std::size_t>(point_bytes)});
     const std::uint64_t left = file_size - begin;
-    if (point_bytes > 0 && header.points < left / point_bytes) {
+    if (point_bytes > 0 && header.points <= left / point_bytes &&
+        left > header.points * point_bytes) {
       table.warnings.push_back(fmt::format("{} bytes behind the last point were not read",
                                            left - header.points * point_bytes));
     }
