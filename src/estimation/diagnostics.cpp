@@ -108,22 +108,34 @@ Autocorrelation autocorrelation(std::span<const std::int64_t> time_ns,
   if (!(used > 0) || !(variance > 0)) return result;
   variance /= used;
   double scatter = 1.0;
-  for (std::size_t lag = 1; lag <= kMostLags; ++lag) {
-    double products = 0, pairs = 0;
-    for (const Block& block : blocks) {
-      for (std::size_t i = 0; i + lag < block.azimuth.size(); ++i) {
-        products +=
-            block.azimuth[i] * block.azimuth[i + lag] + block.zenith[i] * block.zenith[i + lag];
-        pairs += block.weight[i] * block.weight[i + lag];
+  // Lags are judged in groups of 1, 1, 2, 4, 8, ...: a weak correlation over many lags is worth as
+  // much as a strong one over few, and shows only in their mean.
+  for (std::size_t first = 1, group = 1; first + group <= kMostLags + 1; first += group) {
+    if (first > 2) group *= 2;
+    std::vector<double> rho;
+    double fewest_pairs = std::numeric_limits<double>::infinity(), sum = 0;
+    for (std::size_t lag = first; lag < first + group; ++lag) {
+      double products = 0, pairs = 0;
+      for (const Block& block : blocks) {
+        for (std::size_t i = 0; i + lag < block.azimuth.size(); ++i) {
+          products +=
+              block.azimuth[i] * block.azimuth[i + lag] + block.zenith[i] * block.zenith[i + lag];
+          pairs += block.weight[i] * block.weight[i + lag];
+        }
       }
+      fewest_pairs = std::min(fewest_pairs, pairs);
+      rho.push_back(pairs > 0 ? products / pairs / variance : 0.0);
+      sum += rho.back();
     }
-    if (pairs < 100) break;
-    const double rho = products / pairs / variance;
-    // Bartlett: rho of correlated residuals scatters more.
-    if (!(rho > 2.5 * std::sqrt(scatter / (2.0 * pairs)))) break;
-    result.rho.push_back(rho);
-    result.factor += 2.0 * rho;
-    scatter += 2.0 * rho * rho;
+    if (fewest_pairs < 100) break;
+    // Bartlett: rho of correlated residuals scatters more, and neighbouring lags share that: the
+    // variance of the sum of many is that of white residuals times the squared factor.
+    const double count = static_cast<double>(group);
+    const double spread = std::min(scatter * count * count, result.factor * result.factor * count);
+    if (!(sum > 2.5 * std::sqrt(spread / (2.0 * fewest_pairs)))) break;
+    for (const double one : rho) scatter += 2.0 * one * one;
+    result.factor += 2.0 * sum;
+    result.rho.insert(result.rho.end(), rho.begin(), rho.end());
   }
   return result;
 }

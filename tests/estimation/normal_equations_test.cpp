@@ -379,7 +379,7 @@ TEST(NormalEquations, ShotsThatNoKnotServesAreLeftAlone) {
   for (const InstructionSet set : available_instruction_sets()) {
     NormalEquations equations;
     Columns columns(r.series.size());
-    accumulate(r.series, r.knots, train, {}, {kNoise}, equations, columns.spans(), set);
+    accumulate(r.series, r.knots, train, {}, {equal_noise(kNoise)}, equations, columns.spans(), set);
     EXPECT_EQ(equations.shots, 18u);
     for (std::size_t i = 0; i < r.series.size(); ++i) {
       const bool served = i < 5 || i >= 25;
@@ -395,7 +395,7 @@ TEST(NormalEquations, ScalingScalesAllInformation) {
   const auto free = free_parameters(default_free_names(2), 2);
   const Recording r = record(train, {5, 20}, 12);
   NormalEquations wide, scaled;
-  accumulate(r.series, r.knots, train, free, {kNoise}, scaled);
+  accumulate(r.series, r.knots, train, free, {equal_noise(kNoise)}, scaled);
   scaled.scale(0.25);
   Recording half = r;  // the same data with twice the sigma everywhere
   for (auto* column :

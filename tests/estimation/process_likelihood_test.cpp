@@ -266,7 +266,7 @@ struct Simulation {
       std::copy_n(history.begin() + 6 * (truth.time_ns[knot] / kStep), 6,
                   truth.state_of(knot).begin());
     }
-    accumulate(series, truth, sensor.train, {}, {kNoise}, equations);
+    accumulate(series, truth, sensor.train, {}, {equal_noise(kNoise)}, equations);
   }
 };
 
