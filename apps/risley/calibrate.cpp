@@ -123,7 +123,7 @@ RangedRecording read_and_estimate(const CalibrateCommandOptions& options,
       EstimationWishes{options.sensor, options.noise_angle_deg, {}, {}}, input.reader->header());
   if (options.mirror != "auto") settings.mirrored = options.mirror == "yes";
   if (number == 0) outcome.nominal = settings.sensor;
-  for (const std::string& text : warning_texts(input.reader->warnings())) {
+  for (const std::string& text : input_warnings(input, options.sensor)) {
     outcome.warnings.push_back(fmt::format("{}: {}", path, text));
   }
   const double started = now();

@@ -51,6 +51,10 @@ struct EstimateCommandOptions {
 
 std::vector<estimation::RotorProcess> rotor_process(const std::string& text, int prisms) {
   if (text == "auto") return {};
+  if (text == "none") {
+    return std::vector<estimation::RotorProcess>(static_cast<std::size_t>(prisms),
+                                                 estimation::kConstantAcceleration);
+  }
   estimation::RotorProcess process = estimation::kPaperProcess;
   if (text != "paper") {
     process.acceleration =
@@ -212,6 +216,7 @@ Json outcome_json(const Outcome& outcome) {
         {"zenith_deg", value_json(e.noise.value.zenith, e.noise.sigma.zenith)},
         {"held", e.noise_held}}},
       {"frame", frame_json(e)},
+      {"coordinates", to_string(e.coordinates)},
       {"process_noise_deg_per_s_per_sqrt_s", rotors},
       {"process_jerk_deg_per_s2_per_sqrt_s", jerks},
       {"unobservable", unobservable},
@@ -231,6 +236,20 @@ Json outcome_json(const Outcome& outcome) {
   if (e.sensor.combination) object["combination"] = static_cast<int>(*e.sensor.combination);
   if (outcome.evaluation) object["truth"] = evaluation_json(*outcome.evaluation, prisms);
   return object;
+}
+
+void print_noise(const Estimate& e) {
+  const auto angle = [&](double value, double sigma) {
+    if (e.noise_held) return fmt::format("{:.3g}", degrees_from_radians(value));
+    const report::NumberText text =
+        report::number_text(degrees_from_radians(value), degrees_from_radians(sigma));
+    return fmt::format("{} +- {}", text.value, text.sigma);
+  };
+  fmt::print("\nnoise before rounding, {}: azimuth {} deg, zenith {} deg; a healthy unit: {:.3g} "
+             "deg\n",
+             e.noise_held ? "held" : "found", angle(e.noise.value.azimuth, e.noise.sigma.azimuth),
+             angle(e.noise.value.zenith, e.noise.sigma.zenith),
+             degrees_from_radians(e.usual_noise));
 }
 
 void print_outcome(const Outcome& outcome) {
@@ -275,6 +294,7 @@ void print_outcome(const Outcome& outcome) {
   add("azimuth", e.azimuth_residuals);
   add("zenith", e.zenith_residuals);
   residuals.print();
+  print_noise(e);
   if (e.map) {
     fmt::print(
         "\nresiduals: {:.3f} times the stated variance, autocorrelation factor {:.3f}; variances "
@@ -334,7 +354,8 @@ ExitStatus run_estimate(const EstimateCommandOptions& options, const CommonOptio
   check_options(options);
   std::optional<double> rate;
   if (options.rate() != "full") rate = positive_number(options.rate(), "--rate-hz", "Hz");
-  RecordingInput input = read_recording(options.input, options.reading, {rate}, common);
+  RecordingInput input =
+      read_recording(options.input, options.reading, {.rate = rate, .ranges = true}, common);
   const estimation::EstimateOptions settings = estimate_options(options, input.reader->header());
   const estimation::SelectionCounts& counts = input.selector.counts();
   spdlog::debug(
@@ -343,14 +364,7 @@ ExitStatus run_estimate(const EstimateCommandOptions& options, const CommonOptio
       counts.rows, input.reader->header().format, counts.invalid, counts.out_of_order,
       input.selector.series().size(), settings.sensor.name);
   Outcome outcome;
-  outcome.warnings = warning_texts(input.reader->warnings());
-  if (counts.clock_resets > 0) {
-    outcome.warnings.push_back(
-        fmt::format("the clock of the recording jumps back {} times: the pieces share the "
-                    "parameters, and their "
-                    "rotors are found anew",
-                    counts.clock_resets));
-  }
+  outcome.warnings = input_warnings(input, options.sensor);
   outcome.read_s = input.seconds;
   const double solving = now();
   {
@@ -394,7 +408,8 @@ Run declare_estimate(CLI::App& verb) {
       "--rate-hz", o.rate_hz,
       "Shots per second to use, or 'full' for all (default: full with map, 1000 with ekf)");
   verb.add_option("--noise-angle-deg", o.noise_angle_deg,
-                  "1 sigma of azimuth and zenith before rounding (default: the sensor's)");
+                  "Hold the noise of azimuth and zenith before rounding, 1 sigma, at this (default: "
+                  "found in the data; ekf: the sensor's)");
   verb.add_option("--sensor", o.sensor,
                   "Preset by name, or a preset or calibration file (default: from the recording)");
   add_reading_options(verb, o.reading);
@@ -412,7 +427,8 @@ Run declare_estimate(CLI::App& verb) {
   verb.add_option("--process-noise", o.process_noise,
                   "How rotors may move: auto (random walks of speed and, with map, acceleration, "
                   "by maximum "
-                  "likelihood), paper (900), or a random walk of the speed in deg/s per sqrt(s)")
+                  "likelihood), none (constant acceleration), paper (900), or a random walk of the "
+                  "speed in deg/s per sqrt(s)")
       ->capture_default_str();
   verb.add_option("--truth", o.truth, "OUT.truth.yaml of a simulation, to judge the estimate by");
   return [options](const CommonOptions& common) {

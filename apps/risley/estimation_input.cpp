@@ -8,12 +8,22 @@
 #include "risley/core/error.hpp"
 #include "risley/sensors/preset.hpp"
 
+#include "recording_text.hpp"
+
 namespace risley::app {
 namespace {
 
+/// Type of the sensor that is assumed where a file does not name its own.
+constexpr std::uint8_t kAssumedType = 1;  // Mid-40
+
+bool names_its_sensor(const recordings::RecordingHeader& header) {
+  return header.devices.front().type != recordings::kUnknownDeviceType;
+}
+
 /// The built-in preset of the instrument that made a recording.
 sensors::Sensor sensor_of_recording(const recordings::RecordingHeader& header) {
-  const std::uint8_t type = header.devices.front().type;
+  const std::uint8_t type =
+      names_its_sensor(header) ? header.devices.front().type : kAssumedType;
   std::optional<sensors::Sensor> found;
   for (const std::string& name : sensors::builtin_preset_names()) {
     sensors::Sensor sensor = sensors::load_sensor(name);
@@ -62,6 +72,7 @@ estimation::EstimateOptions estimate_options(
   if (wishes.sensor.empty() && !header) throw InvalidArgument("--sensor is missing");
   result.sensor =
       wishes.sensor.empty() ? sensor_of_recording(*header) : sensors::load_sensor(wishes.sensor);
+  result.cartesian = header && header->cartesian;
   const int prisms = result.sensor.prisms();
   if (wishes.noise_angle_deg) {
     check_positive(*wishes.noise_angle_deg, "--noise-angle-deg", "deg");
@@ -83,6 +94,21 @@ estimation::EstimateOptions estimate_options(
   }
   result.additional = wishes.freed;
   return result;
+}
+
+std::vector<std::string> input_warnings(const RecordingInput& input, const std::string& sensor) {
+  std::vector<std::string> warnings = warning_texts(input.reader->warnings());
+  if (sensor.empty() && !names_its_sensor(input.reader->header())) {
+    warnings.push_back(
+        "the file does not say which sensor recorded it: a Mid-40 was assumed; --sensor says which");
+  }
+  const std::uint64_t resets = input.selector.counts().clock_resets;
+  if (resets > 0) {
+    warnings.push_back(fmt::format("the clock of the recording jumps back {} times: the pieces "
+                                   "share the parameters, and their rotors are found anew",
+                                   resets));
+  }
+  return warnings;
 }
 
 void add_parameter_choice(CLI::App& verb, std::vector<std::string>& fixed,

@@ -41,6 +41,9 @@ struct EstimationWishes {
 estimation::EstimateOptions estimate_options(
     const EstimationWishes& wishes, const std::optional<recordings::RecordingHeader>& header);
 
+/// What to say of a recording beside its numbers. @param sensor  as typed; empty: not at all
+std::vector<std::string> input_warnings(const RecordingInput& input, const std::string& sensor);
+
 /// Declares --fix and --free.
 void add_parameter_choice(CLI::App& verb, std::vector<std::string>& fixed,
                           std::vector<std::string>& freed);

@@ -115,13 +115,15 @@ ExitStatus run_observability(const ObservabilityCommandOptions& options,
     if (!options.rate_hz.empty() && options.rate_hz != "full") {
       rate = positive_number(options.rate_hz, "--rate-hz", "Hz");
     }
-    RecordingInput input = read_recording(options.input, options.reading, {rate}, common);
+    RecordingInput input =
+        read_recording(options.input, options.reading, {.rate = rate, .ranges = true}, common);
     const estimation::EstimateOptions settings = estimate_options(wishes, input.reader->header());
     prisms = settings.sensor.prisms();
     ProgressBar bar("estimating", common);
     const estimation::Estimate estimate =
         estimation::estimate(estimation::Method::map, input.selector.take_series(),
                              input.selector.head(), settings, bar.callback());
+    for (const std::string& warning : input_warnings(input, options.sensor)) spdlog::warn(warning);
     for (const std::string& warning : estimate.warnings) spdlog::warn(warning);
     if (!estimate.converged) {
       spdlog::warn("the estimate did not converge: {}", estimate.reason);

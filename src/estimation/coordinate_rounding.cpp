@@ -18,6 +18,18 @@ double step_of(const AngleSeries& series, std::size_t i) {
 
 }  // namespace
 
+std::string to_string(CoordinateRounding rounding) {
+  switch (rounding) {
+    case CoordinateRounding::unknown:
+      return "unknown";
+    case CoordinateRounding::nearest:
+      return "nearest";
+    case CoordinateRounding::toward_zero:
+      return "toward zero";
+  }
+  return {};
+}
+
 void add_half_steps(AngleSeries& series, const Eigen::Matrix3d& recording_from_sensor) {
   for (std::size_t i = 0; i < series.range.size(); ++i) {
     const double half = 0.5 * step_of(series, i);

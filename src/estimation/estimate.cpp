@@ -149,8 +149,7 @@ std::string frame_words(const Estimate& estimate) {
 }
 
 /// Says whether the result can be believed.
-/// @param usual_noise  of a healthy unit, rad
-void judge(Estimate& estimate, const PrismTrain& nominal, double usual_noise) {
+void judge(Estimate& estimate, const PrismTrain& nominal) {
   const double rms =
       std::sqrt(0.5 * (estimate.azimuth_residuals.rms * estimate.azimuth_residuals.rms +
                        estimate.zenith_residuals.rms * estimate.zenith_residuals.rms));
@@ -207,12 +206,12 @@ void judge(Estimate& estimate, const PrismTrain& nominal, double usual_noise) {
                                 ": the rotors' noise is set so high that they follow the noise, or "
                                 "the stated noise is too large");
   }
-  if (!estimate.noise_held && estimate.noise.value.rms() > kNoisy * usual_noise) {
+  if (!estimate.noise_held && estimate.noise.value.rms() > kNoisy * estimate.usual_noise) {
     estimate.warnings.push_back(fmt::format(
         "the directions are {:.3g} times as noisy ({:.3g} deg) as the preset says of a healthy unit "
         "({:.3g} deg)",
-        estimate.noise.value.rms() / usual_noise, degrees_from_radians(estimate.noise.value.rms()),
-        degrees_from_radians(usual_noise)));
+        estimate.noise.value.rms() / estimate.usual_noise, degrees_from_radians(estimate.noise.value.rms()),
+        degrees_from_radians(estimate.usual_noise)));
   }
   double unevenness = 1.0;
   std::size_t uneven = 0;
@@ -467,14 +466,14 @@ Estimate estimate(Method method, AngleSeries series, const AngleSeries& head,
                                             : take_ekf(estimate, options, progress);
   if (estimate.frame) estimate.warnings.push_back(frame_words(estimate));
   estimate.expected_residual = expected_residual(estimate.series, estimate.noise.value);
-  const double usual_noise = options.sensor.angle_noise;
-  estimate.usual_residual = expected_residual(estimate.series, equal_noise(usual_noise));
+  estimate.usual_noise = options.sensor.angle_noise;
+  estimate.usual_residual = expected_residual(estimate.series, equal_noise(estimate.usual_noise));
   estimate.values = named_values(estimate, ranges);
   estimate.sensor = calibrated_sensor(
       options.sensor, with_free_values(options.sensor.train, estimate.free, estimate.parameters),
       estimate);
   estimate.residuals_over_angle = profiles(estimate);
-  judge(estimate, options.sensor.train, usual_noise);
+  judge(estimate, options.sensor.train);
   return estimate;
 }
 

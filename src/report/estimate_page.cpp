@@ -17,20 +17,37 @@ namespace {
 
 using estimation::Moments;
 
+/// What is known of the noise, in sentences; ends with a space.
+std::string noise_words(const EstimateReport& r) {
+  const double expected = degrees_from_radians(r.expected_residual);
+  if (!r.noise || r.noise->held) {
+    return fmt::format("The stated noise and rounding alone would leave {:.3g}°. ", expected);
+  }
+  const auto angle = [](double value, double sigma) {
+    const NumberText text =
+        number_text(degrees_from_radians(value), degrees_from_radians(sigma));
+    return fmt::format("{}° ± {}°", text.value, text.sigma);
+  };
+  return fmt::format(
+      "Beside rounding the directions have a noise of {} in azimuth and {} in zenith, found in the "
+      "data; a healthy unit of this kind has {:.3g}°. ",
+      angle(r.noise->azimuth, r.noise->azimuth_sigma), angle(r.noise->zenith, r.noise->zenith_sigma),
+      degrees_from_radians(r.noise->usual));
+}
+
 Verdict verdict_of(const EstimateReport& r) {
   Verdict verdict;
   verdict.converged = r.converged;
   verdict.reason = r.reason;
   verdict.warnings = r.warnings;
   verdict.facts = fmt::format(
-      "What is left unexplained is {:.3g}° in azimuth and {:.3g}° in zenith (root mean square); "
-      "noise and rounding alone would leave {:.3g}°. {} of {} shots were left out as outliers.",
+      "What is left unexplained is {:.3g}° in azimuth and {:.3g}° in zenith (root mean square). {}{} "
+      "of {} shots were left out as outliers.",
       degrees_from_radians(r.azimuth_residuals.rms), degrees_from_radians(r.zenith_residuals.rms),
-      degrees_from_radians(r.expected_residual), count_text(r.outliers), count_text(r.shots));
+      noise_words(r), count_text(r.outliers), count_text(r.shots));
   verdict.healthy = "Healthy: the model describes this recording.";
   verdict.mend_html =
-      "check that --sensor is the instrument that recorded, that --noise-angle-deg is its noise, "
-      "and whether the file has the sign of the elevation turned (--mirror yes); a longer "
+      "check that --sensor is the instrument that recorded, that its times are right, and whether the file has the sign of the elevation turned (--mirror yes); a longer "
       "recording or --rate-hz full gives the estimation more to hold on to.";
   verdict.use_html =
       "nothing. Any command takes <code>calibration.yaml</code> with <code>--sensor</code>.";
@@ -48,6 +65,10 @@ std::string subject_text(const EstimateReport& r) {
                                : "; speed combination 2, the fast rotor first";
   }
   if (r.mirrored) text += "; the sign of the elevation was turned";
+  if (r.frame) {
+    text += fmt::format("; the frame was turned back by {:.3f}° in yaw and {:.3f}° in pitch",
+                        degrees_from_radians(r.frame->yaw), degrees_from_radians(r.frame->pitch));
+  }
   return text + ".";
 }
 

@@ -56,23 +56,6 @@ class FieldWriter {
   Json& object_;
 };
 
-/// Takes fields from an object.
-class FieldReader {
- public:
-  FieldReader(const Json& object, std::string place) : object_(object), place_(std::move(place)) {}
-  template <class T>
-  void operator()(const char* name, T& value) {
-    const std::string place = place_.empty() ? name : place_ + "." + name;
-    const auto found = object_.find(name);
-    if (found == object_.end()) throw FieldError(place + " is missing");
-    from_json(*found, place, value);
-  }
-
- private:
-  const Json& object_;
-  std::string place_;
-};
-
 namespace archive {
 
 template <class T>
@@ -95,6 +78,27 @@ inline void expect(bool right, const std::string& place, const char* what, const
 }
 
 }  // namespace archive
+
+/// Takes fields from an object.
+class FieldReader {
+ public:
+  FieldReader(const Json& object, std::string place) : object_(object), place_(std::move(place)) {}
+  template <class T>
+  void operator()(const char* name, T& value) {
+    const std::string place = place_.empty() ? name : place_ + "." + name;
+    const auto found = object_.find(name);
+    if (found == object_.end()) {
+      // What older versions did not write yet.
+      if constexpr (archive::IsOptional<T>::value) return value.reset();
+      throw FieldError(place + " is missing");
+    }
+    from_json(*found, place, value);
+  }
+
+ private:
+  const Json& object_;
+  std::string place_;
+};
 
 template <class T>
 Json to_json(const T& value) {

@@ -179,6 +179,24 @@ void fields(Archive& archive, T& recording) {
   archive("audit", recording.audit);
 }
 
+template <class Archive, FieldsOf<EstimateReport::Noise> T>
+void fields(Archive& archive, T& noise) {
+  archive("held", noise.held);
+  archive("azimuth", noise.azimuth);
+  archive("azimuth_sigma", noise.azimuth_sigma);
+  archive("zenith", noise.zenith);
+  archive("zenith_sigma", noise.zenith_sigma);
+  archive("usual", noise.usual);
+}
+
+template <class Archive, FieldsOf<EstimateReport::Frame> T>
+void fields(Archive& archive, T& frame) {
+  archive("yaw", frame.yaw);
+  archive("yaw_sigma", frame.yaw_sigma);
+  archive("pitch", frame.pitch);
+  archive("pitch_sigma", frame.pitch_sigma);
+}
+
 template <class Archive, FieldsOf<EstimateReport::Variance> T>
 void fields(Archive& archive, T& variance) {
   archive("unit_variance", variance.unit_variance);
@@ -223,6 +241,8 @@ void fields(Archive& archive, T& report) {
   archive("azimuth_residuals", report.azimuth_residuals);
   archive("zenith_residuals", report.zenith_residuals);
   archive("expected_residual", report.expected_residual);
+  archive("noise", report.noise);
+  archive("frame", report.frame);
   archive("variance", report.variance);
   archive("residuals_over_angle_chi2_per_bin", report.unevenness);
   archive("truth", report.truth);

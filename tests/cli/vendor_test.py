@@ -51,6 +51,36 @@ class VendorTest(CommandTest):
         self.assertTrue(freed["converged"])
         self.assertAlmostEqual(freed["parameters"]["wedge_angle_deg"]["value"], 18, delta=1e-4)
 
+    def test_the_sequence_needs_no_option(self):
+        recording = pathlib.Path(FOLDER) / "livox-mid-40-sequence.csv"
+        result = self.expect_json(0, "estimate", recording)
+        self.check_exactly_nominal(result)
+        value = result["parameters"]["refractive_index"]["value"]
+        self.assertAlmostEqual(value, 1.5089, delta=1e-7)
+        for axis in ("azimuth_deg", "zenith_deg"):  # single precision, not the preset's noise
+            self.assertLess(result["noise"][axis]["value"], 5e-6)
+
+    def test_a_real_unit_half_under_the_sky_and_turned_by_a_hub(self):
+        recording = pathlib.Path(FOLDER) / "real" / "mid-40-hub-frame.csv"
+        result = self.expect_json(0, "estimate", recording, "--shot-rate-hz", "100000")
+        self.assertEqual(result["combination"], 1)
+        self.assertFalse(result["mirrored"])
+        value = {name: one["value"] for name, one in result["parameters"].items()}
+        self.assertAlmostEqual(value["refractive_index"], 1.5090, delta=0.0002)
+        self.assertAlmostEqual(value["angular_velocity_a_deg_per_s"], -28010, delta=5)
+        self.assertAlmostEqual(value["angular_velocity_b_deg_per_s"], 43812, delta=5)
+        self.assertAlmostEqual(result["frame"]["yaw_deg"]["value"], 25.86, delta=0.1)
+        self.assertAlmostEqual(result["frame"]["pitch_deg"]["value"], -0.03, delta=0.1)
+        for axis in ("azimuth_deg", "zenith_deg"):
+            self.assertLess(result["residuals"][axis]["rms"], 0.005)
+        self.assertTrue(any("Mid-40 was assumed" in one for one in result["warnings"]))
+        smooth = self.expect_json(0, "estimate", recording, "--shot-rate-hz", "100000",
+                                  "--process-noise", "none")
+        squares = [smooth["residuals"][axis]["rms"] ** 2 for axis in ("azimuth_deg", "zenith_deg")]
+        self.assertLess((sum(squares) / 2) ** 0.5, 0.012)
+        # Without times nothing is made up.
+        self.assertIn("--shot-rate-hz", self.expect(2, "estimate", recording).stderr)
+
     def test_public_copies_have_the_elevation_the_other_way(self):
         lines = (pathlib.Path(FOLDER) / "livox-mid-40-sequence.csv").read_text().splitlines()
         with open(self.folder / "mirrored.csv", "w", encoding="ascii") as file:
@@ -58,13 +88,12 @@ class VendorTest(CommandTest):
             for line in lines[1:]:
                 time, azimuth, zenith = line.split(",")
                 file.write(f"{time},{azimuth},{180 - float(zenith):.5f}\n")
-        result = self.expect_json(0, "estimate", "mirrored.csv", "--noise-angle-deg", "0.000005")
+        result = self.expect_json(0, "estimate", "mirrored.csv")
         self.check_exactly_nominal(result)
         self.assertTrue(result["mirrored"])
         self.assertTrue(any("mirror" in warning for warning in result["warnings"]))
         # Taken as it is, it is refused and not bent until it fits.
-        taken = self.expect_json(1, "estimate", "mirrored.csv", "--noise-angle-deg", "0.000005",
-                                 "--mirror", "no")
+        taken = self.expect_json(1, "estimate", "mirrored.csv", "--mirror", "no")
         self.assertFalse(taken["converged"])
 
 

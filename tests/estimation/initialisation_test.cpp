@@ -65,6 +65,103 @@ TEST_P(StartOfRandomSensors, AlwaysFindsCombinationSpeedsAndAngles) {
 
 INSTANTIATE_TEST_SUITE_P(Rates, StartOfRandomSensors, ::testing::Values(1000.0, 100000.0));
 
+/// Which shots of a recording found something to return from.
+struct Coverage {
+  const char* name;
+  bool (*returns)(const SphericalAngles<double>& shot, std::size_t number);
+};
+
+constexpr double kDegree = radians_from_degrees(1.0);
+constexpr Coverage kCoverages[] = {
+    {"below", [](const SphericalAngles<double>& s, std::size_t) { return s.zenith > kPi / 2 + 2 * kDegree; }},
+    {"above", [](const SphericalAngles<double>& s, std::size_t) { return s.zenith < kPi / 2; }},
+    {"left", [](const SphericalAngles<double>& s, std::size_t) { return s.azimuth > 0; }},
+    {"window",
+     [](const SphericalAngles<double>& s, std::size_t) {
+       return std::abs(s.azimuth - 5 * kDegree) < 6 * kDegree &&
+              std::abs(s.zenith - kPi / 2 - 4 * kDegree) < 6 * kDegree;
+     }},
+    {"fifth", [](const SphericalAngles<double>&, std::size_t number) { return number * 7919 % 10 < 2; }},
+};
+
+class StartUnderTheSky : public ::testing::TestWithParam<Coverage> {};
+
+TEST_P(StartUnderTheSky, FindsCombinationAndAnglesWhereShotsAreMissing) {
+  const auto nominal = sensors::load_sensor("mid-40");
+  const auto free = free_parameters(default_free_names(2), 2);
+  std::mt19937_64 generator(11);
+  std::uniform_real_distribution<double> phase(-kPi, kPi);
+  for (int i = 0; i < 12; ++i) {
+    SCOPED_TRACE(i);
+    const auto sensor = random_sensor(generator, 0.3, 0.01);
+    const double a = phase(generator), b = phase(generator);
+    const double duration = i % 3 == 0 ? 0.05 : 0.1;
+    const auto whole = testing::constant_speed_series(sensor, a, b, duration, 100000.0, 0.002,
+                                                      static_cast<unsigned>(i));
+    AngleSeries head;
+    for (std::size_t k = 0; k < whole.size(); ++k) {
+      if (GetParam().returns({whole.azimuth[k], whole.zenith[k]}, k)) head.append(whole, k);
+    }
+    const Start start = find_start(head, nominal, {free, 0.01 * kDegree, std::nullopt, {}});
+    ASSERT_EQ(start.combination, sensor.combination);
+    EXPECT_FALSE(start.mirrored);
+    EXPECT_FALSE(start.frame);
+    EXPECT_LT(degrees_from_radians(start.residual_rms), 0.02);
+    const double t = 1e-9 * static_cast<double>(start.time_ns - whole.time_ns[0]);
+    for (std::size_t k = 0; k < 2; ++k) {
+      const double truth = (k == 0 ? a : b) + t * sensor.angular_velocity[k];
+      EXPECT_LT(degrees_from_radians(std::abs(wrap_to_pi(start.rotation_angle[k] - truth))), 3.0);
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Coverages, StartUnderTheSky, ::testing::ValuesIn(kCoverages),
+                         [](const auto& coverage) { return coverage.param.name; });
+
+TEST(Initialisation, ATurnedFrameIsFoundAboutItsOpticalAxis) {
+  const auto sensor = sensors::load_sensor("mid-40-table3");
+  const auto whole = testing::constant_speed_series(sensor, 2.0, -1.0, 0.1, 100000.0, 0.002, 3);
+  for (const bool sky : {false, true}) {
+    for (const FrameTurn& turned : {FrameTurn{0.45, 0.0}, FrameTurn{-2.8, 0.3},
+                                    FrameTurn{0.0, radians_from_degrees(60.0)},
+                                    FrameTurn{radians_from_degrees(5.0), 0.0}}) {
+      AngleSeries head;
+      for (std::size_t i = 0; i < whole.size(); ++i) {
+        if (!sky || whole.zenith[i] > kPi / 2) head.append(whole, i);
+      }
+      turn(head, recording_from_sensor(turned));
+      const Start start = find_start(head, sensors::load_sensor("mid-40"),
+                                     {free_parameters(default_free_names(2), 2), 1e-4, {}, {}});
+      EXPECT_EQ(start.combination, sensor.combination);
+      EXPECT_FALSE(start.mirrored);
+      ASSERT_TRUE(start.frame) << turned.yaw;
+      // The incident beam's error and the axis are one to first order.
+      EXPECT_NEAR(wrap_to_pi(start.frame->yaw - turned.yaw), 0.0, radians_from_degrees(1.0));
+      EXPECT_NEAR(start.frame->pitch, turned.pitch, radians_from_degrees(1.0));
+      EXPECT_LT(degrees_from_radians(start.residual_rms), 0.02);
+    }
+  }
+}
+
+TEST(Initialisation, WhatTwoAnswersDescribeEquallyWellIsRefused) {
+  // A patch of the field so small that the optics leave no mark in it.
+  const auto sensor = sensors::load_sensor("mid-40");
+  const auto whole = testing::constant_speed_series(sensor, 0.5, 2.5, 0.1, 100000.0, 0.05, 5);
+  AngleSeries head;
+  for (std::size_t i = 0; i < whole.size(); ++i) {
+    if (std::abs(whole.azimuth[i]) < 2.5 * kDegree &&
+        std::abs(whole.zenith[i] - kPi / 2) < 2.5 * kDegree) {
+      head.append(whole, i);
+    }
+  }
+  try {
+    find_start(head, sensor, {free_parameters(default_free_names(2), 2), 1e-3, {}, {}});
+    FAIL() << "decided between combinations and mirror images in the noise";
+  } catch (const EstimationError& error) {
+    EXPECT_NE(std::string(error.what()).find("undecided"), std::string::npos) << error.what();
+  }
+}
+
 TEST(Initialisation, LinesCarryTheSpeedsOfTheRotors) {
   const auto sensor = sensors::load_sensor("mid-40");
   const auto series = testing::constant_speed_series(sensor, 0.3, 1.0, 0.1, 100000.0);

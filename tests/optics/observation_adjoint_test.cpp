@@ -196,6 +196,36 @@ TEST_P(AdjointOfEveryTrain, BatchesOfEveryInstructionSetEqualTheScalarModel) {
   }
 }
 
+TEST_P(AdjointOfEveryTrain, TurnsOfTheWholeBeamAreThoseOfTheDirection) {
+  const PrismTrain train = testing::imperfect_train(GetParam(), 0.5, 3);
+  std::mt19937 generator(7);
+  const auto angles = testing::random_angles(train.prisms(), generator);
+  with_prism_count(train.prisms(), [&]<int N>() {
+    std::array<double, N> rotation;
+    std::copy_n(angles.begin(), N, rotation.begin());
+    auto shot = linearise_angles(
+        prepare<double, N>(parameter_array<N>(train), face_order_array<N>(train)),
+        prepare_derivatives<double, N>(parameter_array<N>(train), face_order_array<N>(train)),
+        rotation);
+    add_turn_derivatives(shot);
+    const Vector3<double>& v = shot.direction;
+    const double step = 1e-6;
+    const auto difference = [&](const Vector3<double>& axis) {
+      const auto up = angles_from_direction(v + step * cross(axis, v));
+      const auto down = angles_from_direction(v - step * cross(axis, v));
+      return SphericalAngles<double>{(up.azimuth - down.azimuth) / (2 * step),
+                                     (up.zenith - down.zenith) / (2 * step)};
+    };
+    const auto yaw = difference({0, 0, 1}), pitch = difference({0, 1, 0});
+    const auto at_yaw = static_cast<std::size_t>(place::frame_yaw(N));
+    const auto at_pitch = static_cast<std::size_t>(place::frame_pitch(N));
+    EXPECT_NEAR(shot.azimuth.parameters[at_yaw], yaw.azimuth, 1e-8);
+    EXPECT_NEAR(shot.zenith.parameters[at_yaw], yaw.zenith, 1e-8);
+    EXPECT_NEAR(shot.azimuth.parameters[at_pitch], pitch.azimuth, 1e-8);
+    EXPECT_NEAR(shot.zenith.parameters[at_pitch], pitch.zenith, 1e-8);
+  });
+}
+
 INSTANTIATE_TEST_SUITE_P(FaceOrders, AdjointOfEveryTrain,
                          ::testing::ValuesIn(testing::all_face_orders()), [](const auto& order) {
                            std::string name = order.param;

@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <string>
+
 #include <Eigen/Core>
 
 #include "risley/estimation/angle_series.hpp"
@@ -14,6 +16,9 @@ enum class CoordinateRounding {
   nearest,      ///< to the nearest step
   toward_zero,  ///< cut off: every coordinate is half a step too small in the mean
 };
+
+/// "unknown", "nearest" or "toward zero".
+std::string to_string(CoordinateRounding rounding);
 
 /// Adds to the coordinates of every shot half a step away from zero: what cutting off took in the
 /// mean. Directions and ranges change.

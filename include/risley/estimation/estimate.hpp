@@ -81,6 +81,7 @@ struct Estimate {
   double expected_residual = 0;  ///< rms of noise and rounding together, rad
   /// The same with the noise that the sensor's preset states: what a healthy unit leaves, rad.
   double usual_residual = 0;
+  double usual_noise = 0;  ///< that noise, rad
 };
 
 /// Residuals at every shot of an estimate's series: references into the estimate.

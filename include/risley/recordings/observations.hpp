@@ -69,6 +69,9 @@ struct Chunk {
   void clear();
 };
 
+/// Device::type of a sensor about which a format tells nothing, or only that it is no Mid-40.
+inline constexpr std::uint8_t kUnknownDeviceType = 255;
+
 /// One sensor of a recording.
 struct Device {
   std::string serial;      ///< broadcast code, e.g. "0TFDG3B006H2Z11"; empty when unknown

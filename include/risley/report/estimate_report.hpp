@@ -42,6 +42,19 @@ struct EstimateReport {
 
   estimation::Moments azimuth_residuals, zenith_residuals;  ///< rad
   double expected_residual = kUnknown;                      ///< rms of noise and rounding, rad
+  /// Noise of the directions before rounding, rad.
+  struct Noise {
+    bool held = false;  ///< by the user or the method; sigmas are 0 then
+    double azimuth = kUnknown, azimuth_sigma = kUnknown;
+    double zenith = kUnknown, zenith_sigma = kUnknown;
+    double usual = kUnknown;  ///< of a healthy unit
+  };
+  std::optional<Noise> noise;
+  /// How the recording's frame is turned against the sensor's, rad; none where it is not.
+  struct Frame {
+    double yaw = 0, yaw_sigma = 0, pitch = 0, pitch_sigma = 0;
+  };
+  std::optional<Frame> frame;
   /// What residuals did to the sigmas; method map only.
   struct Variance {
     double unit_variance = 1, autocorrelation_factor = 1, variance_factor = 1;

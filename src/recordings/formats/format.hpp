@@ -41,9 +41,6 @@ extern const Format kNpyFormat;              // numpy.cpp
 extern const Format kNpzFormat;              // numpy.cpp
 extern const Format kNamedCsvFormat;         // named_csv.cpp
 
-/// Device::type of a sensor that is not a Mid-40 and about which a format tells no more.
-inline constexpr std::uint8_t kUnknownDeviceType = 255;
-
 /// Detail by which a NetCDF file remembers the format its rows first came from.
 inline constexpr const char* kSourceFormat = "source_format";
 
