@@ -34,6 +34,8 @@ extern const Format kViewerCsvFormat;        // viewer_csv.cpp
 extern const Format kNetcdfFormat;           // netcdf.cpp
 extern const Format kRos1BagFormat;          // ros1_bag.cpp
 extern const Format kRos2BagFormat;          // ros2_bag.cpp
+extern const Format kLasFormat;              // las.cpp
+extern const Format kLazFormat;              // las.cpp, laz.cpp
 
 /// Device::type of a sensor that is not a Mid-40 and about which a format tells no more.
 inline constexpr std::uint8_t kUnknownDeviceType = 255;

@@ -6,9 +6,17 @@ namespace risley::recordings {
 
 const std::vector<const Format*>& all_formats() {
   static const std::vector<const Format*> formats{
-      &kLvx11Format,           &kLvx10Format,     &kNetcdfFormat,
-      &kOpenpylivoxBinFormat,  &kViewerCsvFormat, &kOpenpylivoxCsvFormat,
-      &kScanSequenceCsvFormat, &kRos1BagFormat,   &kRos2BagFormat,
+      &kLvx11Format,
+      &kLvx10Format,
+      &kNetcdfFormat,
+      &kOpenpylivoxBinFormat,
+      &kViewerCsvFormat,
+      &kOpenpylivoxCsvFormat,
+      &kScanSequenceCsvFormat,
+      &kRos1BagFormat,
+      &kRos2BagFormat,
+      &kLasFormat,
+      &kLazFormat,
   };
   return formats;
 }
