@@ -50,27 +50,27 @@ _risley() {
   if [[ $current == -* ]]; then
     case $verb in
       "") choices="--help --version" ;;
-      info) choices="$common" ;;
+      info) choices="$common --shot-rate-hz" ;;
       report) choices="$common --output" ;;
-      convert) choices="$common --output --format" ;;
+      convert) choices="$common --output --format --shot-rate-hz" ;;
       simulate)
         choices="$common --output --sensor --duration-s --rate-hz --noise-angle-deg
           --noise-range-m --quantize --beam-origin --rotor --set --reported --scene --station
           --start-angles-deg" ;;
       estimate)
         choices="$common --output --method --rate-hz --noise-angle-deg --sensor --fix --free
-          --states --mirror --process-noise --truth" ;;
+          --states --mirror --process-noise --truth --shot-rate-hz" ;;
       observability)
         choices="$common --sensor --duration-s --rate-hz --noise-angle-deg --no-rounding
-          --fix --free" ;;
+          --fix --free --shot-rate-hz" ;;
       calibrate)
         choices="$common --output --method --planes --stations --station --plan --duration-s
           --rate-hz --noise-angle-deg --noise-range-m --sensor --fix --free --prior-sigma-deg
-          --range-offset-sigma-m --beam-origin --states --mirror --truth" ;;
+          --range-offset-sigma-m --beam-origin --states --mirror --truth --shot-rate-hz" ;;
       cloud)
         choices="$common --output --calibration --format --directions --beam-origin --covariance
           --beam-divergence --common-factors --rate-hz --noise-angle-deg --las-scale-m --time
-          --beam-origin-map" ;;
+          --beam-origin-map --shot-rate-hz" ;;
       reproduce) choices="$common --output --full --recording" ;;
     esac
     mapfile -t COMPREPLY < <(compgen -W "$choices" -- "$current")

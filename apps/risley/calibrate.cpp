@@ -39,6 +39,7 @@ struct CalibrateCommandOptions {
                       beam_origin = "yes", states = "knots", mirror = "auto", plan;
   std::optional<double> noise_angle_deg, noise_range_m, prior_sigma_deg;
   double range_offset_sigma_m = 0.05, duration_s = 10.0;
+  ReadingWishes reading;
 };
 
 constexpr double kFarBelow = 0.4;  // of the expected residual
@@ -113,7 +114,7 @@ RangedRecording read_and_estimate(const CalibrateCommandOptions& options,
   if (options.rate_hz != "full") {
     selection.rate = positive_number(options.rate_hz, "--rate-hz", "Hz");
   }
-  RecordingInput input = read_recording(path, selection, common);
+  RecordingInput input = read_recording(path, options.reading, selection, common);
   outcome.read_s += input.seconds;
   outcome.observations += input.audit.observations;
   outcome.reported.push_back(reported_recording(path, input));
@@ -369,6 +370,7 @@ Run declare_calibrate(CLI::App& verb) {
                   "1 sigma of ranges before rounding (default: the sensor's)");
   verb.add_option("--sensor", o.sensor,
                   "Preset by name, or a preset or calibration file (default: from the recording)");
+  add_reading_options(verb, o.reading);
   add_parameter_choice(verb, o.fixed, o.freed);
   verb.add_option("--prior-sigma-deg", o.prior_sigma_deg,
                   "1 sigma of every error angle about what the sensor believes (default: none)");

@@ -16,6 +16,7 @@
 
 #include "command.hpp"
 #include "many_files.hpp"
+#include "recording_input.hpp"
 #include "recording_text.hpp"
 #include "result_folder.hpp"
 
@@ -30,6 +31,7 @@ struct CloudCommandOptions {
   std::string rate_hz = fmt::format("{:.0f}", cloud::kTrackingRate);
   std::optional<double> noise_angle_deg;
   double las_scale_m = cloud::CloudWriterOptions{}.las_scale;
+  ReadingWishes reading;
 };
 
 std::string cloud_endings() {
@@ -135,9 +137,10 @@ report::Provenance calibration_provenance(const std::string& calibration) {
   return result;
 }
 
-FileOutcome make_one(const FileJob& job, const cloud::CloudOptions& settings,
-                     const sensors::Sensor& calibration, const Progress& progress) {
-  const auto reader = recordings::open_recording(job.input);
+FileOutcome make_one(const FileJob& job, const ReadingWishes& reading,
+                     const cloud::CloudOptions& settings, const sensors::Sensor& calibration,
+                     const Progress& progress) {
+  const auto reader = open_input(job.input, reading);
   const cloud::CloudSummary s =
       cloud::make_cloud(*reader, calibration, job.output, settings, progress);
   log_warnings(job.input, s.read_warnings);
@@ -190,6 +193,7 @@ Run declare_cloud(CLI::App& verb) {
   yes_no("--common-factors", o.common_factors,
          "Give every point the loadings of the errors that all points share, for covariances "
          "between points");
+  add_reading_options(verb, o.reading);
   verb.add_option("--rate-hz", o.rate_hz,
                   "Directions per second that rotation angles are found from; 'full' for all")
       ->capture_default_str();
@@ -230,7 +234,7 @@ Run declare_cloud(CLI::App& verb) {
           mine.provenance = provenance_of(common, {job.input});
           mine.provenance.insert(mine.provenance.end(), of_calibration.begin(),
                                  of_calibration.end());
-          return make_one(job, mine, calibration, progress);
+          return make_one(job, options->reading, mine, calibration, progress);
         },
         common);
   };

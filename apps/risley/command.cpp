@@ -13,6 +13,7 @@
 #include <unistd.h>
 
 #include "risley/core/error.hpp"
+#include "risley/recordings/reader.hpp"
 
 namespace risley::app {
 namespace {
@@ -82,6 +83,8 @@ void ProgressBar::show(double fraction) {
 Failure current_failure() {
   try {
     throw;
+  } catch (const recordings::MissingTimes& error) {
+    return {kWrongUsage, fmt::format("{}: say it with --shot-rate-hz", error.what()), {}};
   } catch (const InvalidArgument& error) {
     return {kWrongUsage, error.what(), {}};
   } catch (const FileError& error) {

@@ -13,6 +13,7 @@
 
 #include "command.hpp"
 #include "many_files.hpp"
+#include "recording_input.hpp"
 #include "recording_text.hpp"
 
 namespace risley::app {
@@ -21,6 +22,7 @@ namespace {
 struct ConvertOptions {
   std::vector<std::string> inputs;
   std::string output, format;
+  ReadingWishes reading;
 };
 
 std::string recording_endings() {
@@ -45,10 +47,9 @@ std::string ending_of(const std::string& format) {
   throw InvalidArgument("several recordings need --format, because -o is a folder");
 }
 
-FileOutcome convert(const FileJob& job, const std::string& format, const Progress& progress) {
-  const auto reader = recordings::open_recording(job.input);
-  const auto writer = recordings::create_recording(job.output, reader->header(), format);
-  spdlog::debug("{} is {}", job.input, reader->header().format);
+FileOutcome convert(const FileJob& job, const ConvertOptions& options, const Progress& progress) {
+  const auto reader = open_input(job.input, options.reading);
+  const auto writer = recordings::create_recording(job.output, reader->header(), options.format);
   std::uint64_t observations = 0;
   std::optional<FileError> damage;
   recordings::Chunk chunk;
@@ -102,6 +103,7 @@ Run declare_convert(CLI::App& verb) {
   verb.add_option("--format", options->format,
                   "Format to write, whatever the ending; needed for a folder")
       ->check(CLI::IsMember(recording_format_names()));
+  add_reading_options(verb, options->reading);
   return [options](const CommonOptions& common) {
     const bool folder = output_is_folder(options->inputs, options->output);
     const std::vector<FileJob> jobs =
@@ -109,7 +111,7 @@ Run declare_convert(CLI::App& verb) {
     return run_file_jobs(
         jobs, "converting", "observations",
         [&](const FileJob& job, const Progress& progress) {
-          return convert(job, options->format, progress);
+          return convert(job, *options, progress);
         },
         common);
   };

@@ -38,6 +38,7 @@ struct EstimateCommandOptions {
                              process_noise = "auto", truth;
   std::optional<double> noise_angle_deg;
   std::vector<std::string> fixed, freed;
+  ReadingWishes reading;
 
   estimation::Method chosen_method() const {
     return method == "ekf" ? estimation::Method::ekf : estimation::Method::map;
@@ -316,7 +317,7 @@ ExitStatus run_estimate(const EstimateCommandOptions& options, const CommonOptio
   check_options(options);
   std::optional<double> rate;
   if (options.rate() != "full") rate = positive_number(options.rate(), "--rate-hz", "Hz");
-  RecordingInput input = read_recording(options.input, {rate}, common);
+  RecordingInput input = read_recording(options.input, options.reading, {rate}, common);
   const estimation::EstimateOptions settings = estimate_options(options, input.reader->header());
   const estimation::SelectionCounts& counts = input.selector.counts();
   spdlog::debug(
@@ -379,6 +380,7 @@ Run declare_estimate(CLI::App& verb) {
                   "1 sigma of azimuth and zenith before rounding (default: the sensor's)");
   verb.add_option("--sensor", o.sensor,
                   "Preset by name, or a preset or calibration file (default: from the recording)");
+  add_reading_options(verb, o.reading);
   add_parameter_choice(verb, o.fixed, o.freed);
   verb.add_option(
           "--states", o.states,

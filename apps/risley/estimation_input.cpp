@@ -32,11 +32,12 @@ sensors::Sensor sensor_of_recording(const recordings::RecordingHeader& header) {
 
 }  // namespace
 
-RecordingInput read_recording(const std::string& path,
+RecordingInput read_recording(const std::string& path, const ReadingWishes& reading,
                               const estimation::SelectionOptions& selection,
                               const CommonOptions& common) {
   const double started = now();
-  RecordingInput result{recordings::open_recording(path), {}, estimation::ShotSelector(selection)};
+  RecordingInput result{open_input(path, reading), {}, estimation::ShotSelector(selection)};
+  recordings::require_times(result.reader->header());
   if (result.reader->header().devices.size() > 1) {
     throw InvalidArgument(
         fmt::format("{} holds {} sensors, an estimation takes the recording of one", path,

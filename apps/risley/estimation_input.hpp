@@ -13,6 +13,7 @@
 #include "risley/recordings/time_audit.hpp"
 
 #include "command.hpp"
+#include "recording_input.hpp"
 
 namespace risley::app {
 
@@ -24,8 +25,8 @@ struct RecordingInput {
   double seconds = 0;
 };
 
-/// Reads all of a recording of one sensor.
-RecordingInput read_recording(const std::string& path,
+/// Reads all of a recording of one sensor, which must have times.
+RecordingInput read_recording(const std::string& path, const ReadingWishes& reading,
                               const estimation::SelectionOptions& selection,
                               const CommonOptions& common);
 

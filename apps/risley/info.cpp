@@ -10,6 +10,7 @@
 #include "risley/recordings/time_audit.hpp"
 
 #include "command.hpp"
+#include "recording_input.hpp"
 #include "recording_text.hpp"
 #include "table.hpp"
 
@@ -56,23 +57,25 @@ Json counts_json(const Counts& counts) {
 
 Json audit_json(const recordings::Reader& reader, const TimeAuditResult& audit) {
   const recordings::RecordingHeader& header = reader.header();
+  const auto if_times = [&header](auto value) { return header.has_times ? Json(value) : Json(); };
   return {{"format", header.format},
           {"sensor", sensor_name(header)},
           {"observations", audit.observations},
           {"shots", audit.shots},
           {"no_return", audit.no_return},
-          {"duration_s", audit.duration_s},
-          {"rate_hz", audit.rate_hz},
+          {"has_times", header.has_times},
+          {"duration_s", if_times(audit.duration_s)},
+          {"rate_hz", if_times(audit.rate_hz)},
           {"has_range", header.has_range},
           {"has_intensity", header.has_intensity},
           {"cartesian", header.cartesian},
           {"time_reference", to_string(header.time_reference)},
-          {"first_time_ns", audit.first_time_ns},
-          {"last_time_ns", audit.last_time_ns},
+          {"first_time_ns", if_times(audit.first_time_ns)},
+          {"last_time_ns", if_times(audit.last_time_ns)},
           {"gaps", audit.gaps.count},
-          {"gaps_total_s", audit.gaps.total_s},
-          {"largest_gap_s", audit.gaps.largest_s},
-          {"largest_gap_after_ns", audit.gaps.largest_after_ns},
+          {"gaps_total_s", if_times(audit.gaps.total_s)},
+          {"largest_gap_s", if_times(audit.gaps.largest_s)},
+          {"largest_gap_after_ns", if_times(audit.gaps.largest_after_ns)},
           {"time_resets", audit.time_resets},
           {"non_monotonic_packets", audit.non_monotonic_packets},
           {"pps_wraps", audit.pps_wraps},
@@ -94,11 +97,16 @@ void print_audit(const recordings::Reader& reader, const TimeAuditResult& audit)
   table.add({"observations", grouped(audit.observations)});
   if (audit.shots != audit.observations) table.add({"shots", grouped(audit.shots)});
   table.add({"no return", grouped(audit.no_return)});
-  table.add({"duration", fmt::format("{:.6g} s", audit.duration_s)});
-  table.add({"rate", fmt::format("{:.6g} Hz", audit.rate_hz)});
-  table.add({"time from", to_string(header.time_reference)});
   std::string gaps = grouped(audit.gaps.count);
-  if (audit.gaps.count > 0) {
+  if (header.has_times) {
+    table.add({"duration", fmt::format("{:.6g} s", audit.duration_s)});
+    table.add({"rate", fmt::format("{:.6g} Hz", audit.rate_hz)});
+    table.add({"time from", to_string(header.time_reference)});
+  } else {
+    table.add({"times", "none of single shots: --shot-rate-hz counts them"});
+    gaps += " in the shot numbers";
+  }
+  if (header.has_times && audit.gaps.count > 0) {
     gaps += fmt::format(", {:.4g} s together, the largest {:.4g} s after {:.6f} s",
                         audit.gaps.total_s, audit.gaps.largest_s,
                         1e-9 * double(audit.gaps.largest_after_ns - audit.first_time_ns));
@@ -121,10 +129,11 @@ void print_audit(const recordings::Reader& reader, const TimeAuditResult& audit)
 
 Run declare_info(CLI::App& verb) {
   const auto input = std::make_shared<std::string>();
+  const auto reading = std::make_shared<ReadingWishes>();
   verb.add_option("INPUT", *input, "Recording, of any known format")->required();
-  return [input](const CommonOptions& common) {
-    const auto reader = recordings::open_recording(*input);
-    spdlog::debug("{} is {}", *input, reader->header().format);
+  add_reading_options(verb, *reading);
+  return [input, reading](const CommonOptions& common) {
+    const auto reader = open_input(*input, *reading);
     recordings::TimeAudit audit;
     std::optional<FileError> damage;
     {

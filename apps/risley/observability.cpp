@@ -31,6 +31,7 @@ struct ObservabilityCommandOptions {
   std::optional<double> noise_angle_deg;
   bool rounding = true;
   std::vector<std::string> fixed, freed;
+  ReadingWishes reading;
 };
 
 Json observability_json(const Observability& o, int prisms) {
@@ -114,7 +115,7 @@ ExitStatus run_observability(const ObservabilityCommandOptions& options,
     if (!options.rate_hz.empty() && options.rate_hz != "full") {
       rate = positive_number(options.rate_hz, "--rate-hz", "Hz");
     }
-    RecordingInput input = read_recording(options.input, {rate}, common);
+    RecordingInput input = read_recording(options.input, options.reading, {rate}, common);
     const estimation::EstimateOptions settings = estimate_options(wishes, input.reader->header());
     prisms = settings.sensor.prisms();
     ProgressBar bar("estimating", common);
@@ -154,6 +155,7 @@ Run declare_observability(CLI::App& verb) {
                   "1 sigma of azimuth and zenith before rounding (default: the sensor's)");
   verb.add_flag("!--no-rounding", o.rounding,
                 "Plan a recording whose angles are not rounded to the sensor's resolution");
+  add_reading_options(verb, o.reading);
   add_parameter_choice(verb, o.fixed, o.freed);
   return [options](const CommonOptions& common) { return run_observability(*options, common); };
 }

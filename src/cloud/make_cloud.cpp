@@ -121,6 +121,7 @@ class Work {
     if (!reader_.header().has_range) {
       throw InvalidArgument("the recording has no ranges, so it has no points");
     }
+    recordings::require_times(reader_.header());
   }
 
   /// Reads until the piece is full. @return whether there is more

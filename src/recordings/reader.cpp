@@ -3,8 +3,10 @@
 #include "risley/recordings/reader.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cctype>
 #include <cerrno>
+#include <cmath>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
@@ -65,9 +67,7 @@ std::string read_head(const std::string& path) {
   return head;
 }
 
-}  // namespace
-
-std::unique_ptr<Reader> open_recording(const std::string& path) {
+std::unique_ptr<Reader> open_as_it_is(const std::string& path) {
   const std::string head = read_head(path);
   for (const Format* format : all_formats()) {
     if (format->recognises(head)) return format->open(path);
@@ -77,8 +77,105 @@ std::unique_ptr<Reader> open_recording(const std::string& path) {
                               known_formats(), shown(head)));
 }
 
-Recording load_recording(const std::string& path, const Progress& progress) {
-  const std::unique_ptr<Reader> reader = open_recording(path);
+/// Gives every row the time that counting its shot gives.
+class CountingReader final : public Reader {
+ public:
+  CountingReader(std::unique_ptr<Reader> inner, std::string path, double shot_rate)
+      : inner_(std::move(inner)), path_(std::move(path)), shot_rate_(shot_rate) {
+    take_over();
+  }
+
+  bool read(Chunk& chunk, std::size_t max_rows) override {
+    if (failure_) throw FileError(*failure_);
+    bool more = false;
+    try {
+      more = inner_->read(chunk, max_rows);
+    } catch (const FileError&) {
+      take_over();
+      throw;
+    }
+    lost_samples_ += chunk.imu.size();
+    take_over();
+    chunk.packets.clear();
+    chunk.imu.clear();
+    Observations& rows = chunk.observations;
+    for (std::size_t row = 0; row < rows.size(); ++row) {
+      const std::optional<std::int64_t> time_ns = time_of(shot_number(rows, row));
+      if (!time_ns) {
+        failure_.emplace(path_, FilePlace{},
+                         fmt::format("shot number {} at {} Hz is beyond 9.2e9 s, the latest time; "
+                                     "expected smaller numbers or a higher shot rate",
+                                     rows.time_ns[row], shot_rate_));
+        rows.resize(row);
+        if (row == 0) throw FileError(*failure_);
+        break;
+      }
+      rows.time_ns[row] = *time_ns;
+    }
+    return more;
+  }
+
+  double fraction_read() const override { return inner_->fraction_read(); }
+
+ private:
+  /// What the inner reader knows by now.
+  void take_over() {
+    header_ = inner_->header();
+    header_.has_times = true;
+    header_.time_reference = TimeReference::relative;
+    warnings_ = inner_->warnings();
+    if (lost_samples_ == 0) return;
+    warnings_.push_back({{},
+                         "inertial samples were left out: their times are not those of counted "
+                         "shots",
+                         lost_samples_});
+  }
+
+  std::int64_t shot_number(const Observations& rows, std::size_t row) {
+    if (!inner_->header().has_times) return rows.time_ns[row];
+    std::int64_t& next = next_shot_[rows.device[row]];
+    if (rows.return_number[row] <= 1 || next == 0) ++next;
+    return next - 1;
+  }
+
+  std::optional<std::int64_t> time_of(std::int64_t shot) const {
+    constexpr long double kLatest = 9.2e18L;
+    const long double time_ns = static_cast<long double>(shot) * 1e9L / shot_rate_;
+    if (!(std::abs(time_ns) < kLatest)) return std::nullopt;
+    return std::llround(time_ns);
+  }
+
+  std::unique_ptr<Reader> inner_;
+  std::string path_;
+  double shot_rate_;
+  std::array<std::int64_t, 256> next_shot_{};  ///< by device
+  std::uint64_t lost_samples_ = 0;
+  std::optional<FileError> failure_;
+};
+
+}  // namespace
+
+std::unique_ptr<Reader> open_recording(const std::string& path, const ReadOptions& options) {
+  if (!options.shot_rate) return open_as_it_is(path);
+  const double rate = *options.shot_rate;
+  if (!(rate > 0.0) || !std::isfinite(rate)) {
+    throw InvalidArgument(
+        fmt::format("ReadOptions::shot_rate = {} Hz, expected a finite number above 0", rate));
+  }
+  return std::make_unique<CountingReader>(open_as_it_is(path), path, rate);
+}
+
+void require_times(const RecordingHeader& header) {
+  if (header.has_times) return;
+  throw MissingTimes(fmt::format(
+      "a recording of format {} that holds no times of single shots, which are needed here; "
+      "expected a shot rate to count them by",
+      header.format));
+}
+
+Recording load_recording(const std::string& path, const Progress& progress,
+                         const ReadOptions& options) {
+  const std::unique_ptr<Reader> reader = open_recording(path, options);
   Recording recording;
   Chunk chunk;
   while (reader->read(chunk)) {

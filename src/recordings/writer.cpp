@@ -46,6 +46,12 @@ const std::vector<Ending>& endings() {
   return all;
 }
 
+std::unique_ptr<Writer> create(const Format& format, const std::string& path,
+                               const RecordingHeader& header) {
+  if (!format.holds_shot_numbers) require_times(header);
+  return format.create(path, header);
+}
+
 }  // namespace
 
 const std::vector<WritableFormat>& writable_formats() {
@@ -66,7 +72,7 @@ std::unique_ptr<Writer> create_recording(const std::string& path, const Recordin
     std::string known;
     for (const Format* one : all_formats()) {
       if (one->create == nullptr) continue;
-      if (one->name == format) return one->create(path, header);
+      if (one->name == format) return create(*one, path, header);
       known += fmt::format("{}{}", known.empty() ? "" : ", ", one->name);
     }
     throw InvalidArgument(fmt::format("format = {}, allowed {}", format, known));
@@ -89,7 +95,7 @@ std::unique_ptr<Writer> create_recording(const std::string& path, const Recordin
     }
     throw InvalidArgument(fmt::format("{}: unknown ending, allowed {}", path, known));
   }
-  return best->format->create(path, header);
+  return create(*best->format, path, header);
 }
 
 }  // namespace risley::recordings

@@ -14,7 +14,8 @@ namespace risley::recordings {
 /// each other). Every column has the same length.
 struct Observations {
   /// Time of the shot, ns. The origin is the recording's (RecordingHeader::time_reference); a
-  /// clock that wraps every second (PPS) has been made continuous by the reader.
+  /// clock that wraps every second (PPS) has been made continuous by the reader. The number of the
+  /// shot in firing order where the recording has no times (RecordingHeader::has_times).
   std::vector<std::int64_t> time_ns;
   /// Azimuth from X towards Y in (-pi, pi], zenith from Z in [0, pi], rad. Meaningful where
   /// valid; a null return keeps the angles its record holds, or NaN when it holds none.
@@ -92,6 +93,9 @@ struct RecordingHeader {
   std::string format;           ///< short name, e.g. "lvx-1.1", "scan-sequence-csv"
   std::vector<Device> devices;  ///< at least one
   TimeReference time_reference = TimeReference::relative;
+  /// false when the file holds no times of single shots: Observations::time_ns then has shot
+  /// numbers 0, 1, 2, ..., in which shots without return and lost ones keep their places.
+  bool has_times = true;
   bool has_range = true;
   bool has_intensity = true;
   bool cartesian = false;  ///< records hold x, y, z and not angles

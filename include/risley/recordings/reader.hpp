@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -47,9 +48,27 @@ class Reader {
   std::uint64_t clock_wraps_ = 0;
 };
 
+/// How a recording is to be read.
+struct ReadOptions {
+  /// Shots of one device per second, Hz. Times are then counted: shot i is fired at i / shot_rate,
+  /// whatever times the file holds. Rows of a further return belong to the shot before them.
+  /// Packet headers and inertial samples, which have the file's times, are left out.
+  std::optional<double> shot_rate;
+};
+
 /// Opens a recording of any known format, recognised by its content and not by its name.
-/// @throws FileError when it is missing, empty, of no known format, or its header is damaged
-std::unique_ptr<Reader> open_recording(const std::string& path);
+/// @throws FileError when it is missing, empty, of no known format, or its header is damaged;
+///         InvalidArgument when shot_rate is not a finite number above 0
+std::unique_ptr<Reader> open_recording(const std::string& path, const ReadOptions& options = {});
+
+/// A recording without times was given to something that needs them.
+class MissingTimes : public InvalidArgument {
+ public:
+  using InvalidArgument::InvalidArgument;
+};
+
+/// @throws MissingTimes unless the recording has times of single shots
+void require_times(const RecordingHeader& header);
 
 /// A whole recording in memory.
 struct Recording {
@@ -58,7 +77,8 @@ struct Recording {
   std::vector<ReadWarning> warnings;
 };
 
-/// Reads a whole recording into memory. @throws FileError
-Recording load_recording(const std::string& path, const Progress& progress = {});
+/// Reads a whole recording into memory. @throws as open_recording
+Recording load_recording(const std::string& path, const Progress& progress = {},
+                         const ReadOptions& options = {});
 
 }  // namespace risley::recordings

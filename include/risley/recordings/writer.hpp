@@ -47,6 +47,7 @@ const std::vector<WritableFormat>& writable_formats();
 /// @param format  name of a writable format that is to be written whatever the ending; empty asks
 ///                the ending
 /// @throws InvalidArgument for an unknown ending or format (the message lists the known ones),
+///         MissingTimes for a recording without times and a format that holds nothing else,
 ///         FileError
 std::unique_ptr<Writer> create_recording(const std::string& path, const RecordingHeader& header,
                                          const std::string& format = {});

@@ -23,6 +23,7 @@ struct Format {
   std::unique_ptr<Reader> (*open)(const std::string& path);
   /// nullptr when the format is only read.
   std::unique_ptr<Writer> (*create)(const std::string& path, const RecordingHeader& header);
+  bool holds_shot_numbers = false;  ///< recordings without times can be written, too
 };
 
 extern const Format kLvx11Format;            // lvx11.cpp
@@ -36,6 +37,7 @@ extern const Format kRos1BagFormat;          // ros1_bag.cpp
 extern const Format kRos2BagFormat;          // ros2_bag.cpp
 extern const Format kLasFormat;              // las.cpp
 extern const Format kLazFormat;              // las.cpp, laz.cpp
+extern const Format kNamedCsvFormat;         // named_csv.cpp
 
 /// Device::type of a sensor that is not a Mid-40 and about which a format tells no more.
 inline constexpr std::uint8_t kUnknownDeviceType = 255;

@@ -26,6 +26,7 @@ constexpr std::string_view kName = "netcdf";
 constexpr std::string_view kSignature = "\x89HDF\r\n\x1a\n";
 constexpr const char* kMarker = "risley_recording";  ///< global attribute: version of this layout
 constexpr int kLayoutVersion = 1;
+constexpr const char* kHasTimes = "has_times";  ///< global attribute; 0: times are shot numbers
 constexpr const char* kDetailsGroup = "details";
 constexpr std::size_t kRowBlock = 32768, kPacketBlock = 1024, kImuBlock = 1024;
 constexpr std::size_t kShortestSerial = 16;
@@ -448,6 +449,7 @@ class NetcdfWriter final : public Writer {
     const bool unknown_source = header.format == kName && source_format(header) == kName;
     put_text(file_, id, NC_GLOBAL, kSourceFormat, unknown_source ? "" : source_format(header));
     put_text(file_, id, NC_GLOBAL, "time_reference", to_string(header.time_reference));
+    put_number(file_, kHasTimes, header.has_times ? 1 : 0);
     put_number(file_, "has_range", header.has_range ? 1 : 0);
     put_number(file_, "has_intensity", header.has_intensity ? 1 : 0);
     put_number(file_, "cartesian", header.cartesian ? 1 : 0);
@@ -604,6 +606,10 @@ class NetcdfReader final : public Reader {
     }
     header_.format = kName;
     header_.time_reference = read_time_reference();
+    int has_times = 0;  // files of earlier versions have times and do not say so
+    if (nc_inq_attid(id, NC_GLOBAL, kHasTimes, &has_times) == NC_NOERR) {
+      header_.has_times = get_number(file_, kHasTimes) != 0;
+    }
     header_.has_range = get_number(file_, "has_range") != 0;
     header_.has_intensity = get_number(file_, "has_intensity") != 0;
     header_.cartesian = get_number(file_, "cartesian") != 0;
@@ -729,6 +735,7 @@ const Format kNetcdfFormat = {
     [](const std::string& path, const RecordingHeader& header) -> std::unique_ptr<Writer> {
       return std::make_unique<NetcdfWriter>(path, header);
     },
+    true,
 };
 
 }  // namespace risley::recordings

@@ -17,6 +17,7 @@ const std::vector<const Format*>& all_formats() {
       &kRos2BagFormat,
       &kLasFormat,
       &kLazFormat,
+      &kNamedCsvFormat,
   };
   return formats;
 }

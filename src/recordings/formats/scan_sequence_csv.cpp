@@ -28,7 +28,6 @@ constexpr std::size_t kRowsLookedAt = 16384;
 constexpr const char* kTimeDecimals = "time_decimals";
 constexpr const char* kAzimuthDecimals = "azimuth_decimals";
 constexpr const char* kZenithDecimals = "zenith_decimals";
-constexpr const char* kTimeUnit = "time_unit";          ///< "shot" where times are shot numbers
 constexpr const char* kAzimuthSense = "azimuth_range";  ///< "0-360" or "-180-180"
 
 float resolution_of(int decimals) {
@@ -82,18 +81,19 @@ class ScanSequenceReader final : public TextTableReader {
     azimuth_decimals_ = azimuth_decimals;
     zenith_decimals_ = zenith_decimals;
     if (rows == 0) return;
-    if (time_decimals >= 0) header_.set_detail(kTimeDecimals, std::to_string(time_decimals));
+    if (time_decimals >= 0 && !all_shot_numbers) {
+      header_.set_detail(kTimeDecimals, std::to_string(time_decimals));
+    }
     if (azimuth_decimals >= 0) {
       header_.set_detail(kAzimuthDecimals, std::to_string(azimuth_decimals));
     }
     if (zenith_decimals >= 0) header_.set_detail(kZenithDecimals, std::to_string(zenith_decimals));
     if (beyond_180) header_.set_detail(kAzimuthSense, "0-360");
     if (all_shot_numbers) {
-      shot_numbers_ = true;
-      header_.set_detail(kTimeUnit, "shot");
+      header_.has_times = false;
       warnings_.push_back({{.byte_offset = {}, .line = 2},
                            "column Time/s holds shot numbers and no seconds; the time between "
-                           "shots is unknown, and a time of 1 ns stands for one shot",
+                           "shots is unknown",
                            0});
     }
   }
@@ -101,7 +101,7 @@ class ScanSequenceReader final : public TextTableReader {
   void append_row(Fields fields, Chunk& chunk) override {
     const Row row = parse(fields);
     std::int64_t time_ns = row.time.digits;
-    if (!shot_numbers_) {
+    if (header_.has_times) {
       time_ns = nanoseconds_of(row.time, kTimeColumn);
     } else if (row.time.decimals != 0) {
       throw BadRow{
@@ -129,7 +129,6 @@ class ScanSequenceReader final : public TextTableReader {
     return known.value;
   }
 
-  bool shot_numbers_ = false;
   int azimuth_decimals_ = -1, zenith_decimals_ = -1;
   Resolution known_azimuth_, known_zenith_;
 };
@@ -137,7 +136,7 @@ class ScanSequenceReader final : public TextTableReader {
 class ScanSequenceWriter final : public Writer {
  public:
   ScanSequenceWriter(const std::string& path, const RecordingHeader& header)
-      : shot_numbers_(detail_of(header, kTimeUnit) == "shot"),
+      : shot_numbers_(!header.has_times),
         from_zero_(detail_of(header, kAzimuthSense) == "0-360"),
         azimuth_decimals_(decimals_detail(header, kAzimuthDecimals)),
         zenith_decimals_(decimals_detail(header, kZenithDecimals)),
@@ -231,6 +230,7 @@ const Format kScanSequenceCsvFormat = {
     [](const std::string& path, const RecordingHeader& header) -> std::unique_ptr<Writer> {
       return std::make_unique<ScanSequenceWriter>(path, header);
     },
+    true,
 };
 
 }  // namespace risley::recordings

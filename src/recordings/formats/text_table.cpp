@@ -9,6 +9,7 @@
 #include <cmath>
 #include <cstring>
 #include <filesystem>
+#include <limits>
 
 #include "risley/core/error.hpp"
 
@@ -34,21 +35,29 @@ constexpr std::array<std::int64_t, 19> kPowersOfTen = [] {
 
 bool is_blank(char c) { return c == ' ' || c == '\t'; }
 
-std::string_view trimmed(std::string_view text) {
+std::string_view without_blanks_in_front(std::string_view text) {
   while (!text.empty() && is_blank(text.front())) text.remove_prefix(1);
-  while (!text.empty() && is_blank(text.back())) text.remove_suffix(1);
   return text;
 }
 
-/// For messages: short, and without bytes that a terminal would act on.
-std::string printable(std::string_view text) {
-  constexpr std::size_t kLongest = 80;
-  std::string result;
-  for (const char c : text.substr(0, kLongest)) {
-    const auto byte = static_cast<unsigned char>(c);
-    result += byte < 0x20 || byte >= 0x7F ? fmt::format("\\x{:02x}", byte) : std::string(1, c);
+template <class Function>
+void for_each_field(std::string_view line, char delimiter, Function&& function) {
+  if (delimiter == kBlanks) {
+    for (line = without_blanks_in_front(line); !line.empty();
+         line = without_blanks_in_front(line)) {
+      const auto end = std::find_if(line.begin(), line.end(), is_blank);
+      const auto length = static_cast<std::size_t>(end - line.begin());
+      function(line.substr(0, length));
+      line.remove_prefix(length);
+    }
+    return;
   }
-  return text.size() > kLongest ? result + "..." : result;
+  while (true) {
+    const auto end = line.find(delimiter);
+    function(trimmed(line.substr(0, end)));
+    if (end == std::string_view::npos) return;
+    line.remove_prefix(end + 1);
+  }
 }
 
 /// Digits after the point of a plain decimal fraction, 0 for anything else.
@@ -62,6 +71,28 @@ int decimals_of(std::string_view field) {
 }
 
 }  // namespace
+
+std::string_view trimmed(std::string_view text) {
+  text = without_blanks_in_front(text);
+  while (!text.empty() && is_blank(text.back())) text.remove_suffix(1);
+  return text;
+}
+
+std::string printable(std::string_view text) {
+  constexpr std::size_t kLongest = 80;
+  std::string result;
+  for (const char c : text.substr(0, kLongest)) {
+    const auto byte = static_cast<unsigned char>(c);
+    result += byte < 0x20 || byte >= 0x7F ? fmt::format("\\x{:02x}", byte) : std::string(1, c);
+  }
+  return text.size() > kLongest ? result + "..." : result;
+}
+
+std::vector<std::string_view> fields_of(std::string_view line, char delimiter) {
+  std::vector<std::string_view> fields;
+  for_each_field(line, delimiter, [&](std::string_view field) { fields.push_back(field); });
+  return fields;
+}
 
 std::string normalized_header(std::string_view text) {
   if (text.starts_with(kByteOrderMark)) text.remove_prefix(kByteOrderMark.size());
@@ -185,6 +216,20 @@ Decimal decimal_field(std::string_view field, std::string_view column) {
   return number;
 }
 
+Decimal number_or_nan(std::string_view field, std::string_view column) {
+  constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+  if (field.empty()) return {.value = kNaN};
+  if (field.front() == '+') field.remove_prefix(1);
+  const auto first = field.find_first_not_of('-');
+  if (first != field.npos && std::string_view("nNiI").find(field[first]) != field.npos) {
+    double value = 0.0;
+    const auto result = std::from_chars(field.data(), field.data() + field.size(), value);
+    const bool whole = result.ec == std::errc() && result.ptr == field.data() + field.size();
+    if (whole && !std::isfinite(value)) return {.value = kNaN};
+  }
+  return decimal_field(field, column);
+}
+
 std::int64_t integer_field(std::string_view field, std::string_view column, std::int64_t low,
                            std::int64_t high) {
   std::int64_t value = 0;
@@ -242,13 +287,18 @@ void TextTableReader::refuse_header(const std::string& expected) const {
 bool TextTableReader::split(std::string_view line, std::span<std::string_view> fields,
                             std::size_t& count) const {
   count = 0;
-  while (true) {
-    const auto comma = line.find(',');
-    if (count < fields.size()) fields[count] = trimmed(line.substr(0, comma));
+  for_each_field(line, delimiter_, [&](std::string_view field) {
+    if (count < fields.size()) fields[count] = field;
     ++count;
-    if (comma == std::string_view::npos) return count == fields.size();
-    line.remove_prefix(comma + 1);
+  });
+  return count == fields.size();
+}
+
+void TextTableReader::begin_rows_at(std::uint64_t line) {
+  std::string_view skipped;
+  while (lines_.line_number() + 1 < line && lines_.next(skipped)) {
   }
+  header_lines_ = lines_.line_number();
 }
 
 bool TextTableReader::read(Chunk& chunk, std::size_t max_rows) {
@@ -262,7 +312,15 @@ bool TextTableReader::read(Chunk& chunk, std::size_t max_rows) {
   try {
     std::string_view line;
     while (!finished_ && chunk.observations.size() + chunk.imu.size() < max_rows) {
+      if (rows_left_ == 0U) {
+        finished_ = true;
+        break;
+      }
       if (!lines_.next(line)) {
+        if (rows_left_) {
+          fail(lines_.line_number(),
+               fmt::format("expected {} more rows, found the end of the file", *rows_left_));
+        }
         finished_ = true;
         break;
       }
@@ -282,7 +340,7 @@ bool TextTableReader::read(Chunk& chunk, std::size_t max_rows) {
                              fmt::format("the last line has no line end and may be cut off "
                                          "(\"{}\"); it was left out",
                                          printable(line)),
-                             1});
+                             rows_left_.value_or(1)});
         finished_ = true;
         break;
       }
@@ -292,6 +350,7 @@ bool TextTableReader::read(Chunk& chunk, std::size_t max_rows) {
       }
       append_row(fields_, chunk);
       last_field_decimals_ = decimals;
+      if (rows_left_) --*rows_left_;
     }
   } catch (const BadRow& bad) {
     stop(FileError(path_, {.byte_offset = {}, .line = lines_.line_number()}, bad.problem));

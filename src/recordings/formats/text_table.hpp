@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <cstdio>
 #include <memory>
@@ -74,11 +75,28 @@ std::int64_t integer_field(std::string_view field, std::string_view column, std:
 std::int64_t nanoseconds_field(std::string_view field, std::string_view column);
 std::int64_t nanoseconds_of(const Decimal& seconds, std::string_view column);
 
-/// Reads a comma separated table with one header line. A byte order mark, CR LF, blanks around
-/// fields and empty lines at the end are accepted. A last line without line end counts only when
-/// it is certainly whole: it has all fields, and the last one is a decimal fraction with as many
-/// decimals as that of the line before; otherwise it is dropped with a warning. Any other line
-/// that is not a sound row is damage: the rows before it are returned, then FileError is thrown.
+/// A number, or NaN: an empty field, "nan" or an infinity. @throws BadRow for anything else
+Decimal number_or_nan(std::string_view field, std::string_view column);
+
+/// What stands between two fields: this character, or any number of blanks and tabs.
+inline constexpr char kBlanks = ' ';
+
+/// Text without blanks and tabs at its ends.
+std::string_view trimmed(std::string_view text);
+
+/// For messages: short, and without bytes that a terminal would act on.
+std::string printable(std::string_view text);
+
+/// Fields of a line, without the blanks around them.
+std::vector<std::string_view> fields_of(std::string_view line, char delimiter);
+
+/// Reads a table of rows, one per line, below one or more header lines. A byte order mark, CR LF,
+/// blanks around fields and empty lines at the end are accepted. A last line without line end
+/// counts only when it is certainly whole: it has all fields, and the last one is a decimal
+/// fraction with as many decimals as that of the line before; otherwise it is dropped with a
+/// warning. Any other line that is not a sound row is damage: the rows before it are returned, then
+/// FileError is thrown. Where the header tells the number of rows, fewer are damage and lines
+/// behind them are not read.
 class TextTableReader : public Reader {
  public:
   bool read(Chunk& chunk, std::size_t max_rows) final;
@@ -87,12 +105,18 @@ class TextTableReader : public Reader {
  protected:
   using Fields = std::span<const std::string_view>;
 
-  /// Opens the file and reads its header line.
+  /// Opens the file and reads its first line.
   TextTableReader(const std::string& path, std::string format);
 
   const std::string& table_header() const { return table_header_; }  ///< normalised
-  /// How many fields a row has; to be called once by the constructor of the derived class.
-  void set_column_count(std::size_t columns) { fields_.resize(columns); }
+  /// How a row is built; to be called once by the constructor of the derived class.
+  void set_column_count(std::size_t columns, char delimiter = ',') {
+    fields_.resize(columns);
+    delimiter_ = delimiter;
+  }
+  /// Steps over lines, so that the rows begin at this one (from 1).
+  void begin_rows_at(std::uint64_t line);
+  void set_row_count(std::uint64_t rows) { rows_left_ = rows; }
   /// @throws FileError at line 1: what was expected there
   [[noreturn]] void refuse_header(const std::string& expected) const;
 
@@ -112,6 +136,9 @@ class TextTableReader : public Reader {
  private:
   bool split(std::string_view line, std::span<std::string_view> fields, std::size_t& count) const;
 
+  char delimiter_ = ',';
+  std::optional<std::uint64_t> rows_left_;  ///< where the header tells the number of rows
+  std::uint64_t header_lines_ = 1;
   LineReader lines_;
   std::string table_header_;
   std::vector<std::string_view> fields_;
@@ -128,7 +155,9 @@ void TextTableReader::look_ahead(std::size_t max_rows, Function&& function) cons
     std::string_view line;
     std::vector<std::string_view> fields(fields_.size());
     std::size_t count = 0;
-    lines.next(line);
+    while (lines.line_number() < header_lines_ && lines.next(line)) {
+    }
+    if (rows_left_) max_rows = std::min<std::uint64_t>(max_rows, *rows_left_);
     for (std::size_t row = 0; row < max_rows && lines.next(line); ++row) {
       if (!lines.has_line_end() || !split(line, fields, count) || !function(Fields(fields))) return;
     }

@@ -1,0 +1,169 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+// What columns mean by their names, and how their cells become rows: shared by every format that
+// is a table whose columns have names.
+//
+// Names, in any case and order, each with or without a unit as "x_m", "x [mm]", "X (m)", "Time/s":
+// x, y, z; or azimuth (phi, yaw) and zenith (theta) or elevation (pitch, altitude), with or without
+// range (distance, depth, radius, r); time (timestamp, t, offset_time, gps_time); index (shot,
+// shot_number, row); intensity (reflectivity, reflectance, i); return_number (return, returnnum);
+// tag; line (beam, ring, laser_id).
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <initializer_list>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "risley/core/direction.hpp"
+#include "risley/recordings/observations.hpp"
+
+#include "recordings/formats/text_table.hpp"
+
+namespace risley::recordings {
+
+/// What the cells of a column are stored as.
+enum class CellType : std::uint8_t { text, integer, float32, float64 };
+
+struct NamedColumn {
+  std::string name;
+  CellType type = CellType::text;
+};
+
+/// Columns that cannot be rows; the reader adds the file and the place.
+struct BadColumns {
+  std::string problem;
+};
+
+/// How values are rounded: to multiples of a step, or to so many digits that each value has a step
+/// of its own. Both 0 where they are not rounded, or it is not known.
+struct Rounding {
+  double step = 0.0;      ///< in the unit of the values
+  double relative = 0.0;  ///< of the value
+  int decimals = -1;      ///< of texts: of the longest number seen; of others beyond any
+
+  double step_at(double value) const { return step > 0.0 ? step : relative * std::abs(value); }
+  /// Later numbers of a text may be longer than those looked at.
+  void notice(const Decimal& cell) {
+    if (cell.decimals <= decimals) return;
+    decimals = cell.decimals;
+    step = std::pow(10.0, -decimals);
+  }
+};
+
+/// Finds out how the values of one or several columns are rounded: whether all are whole multiples
+/// of 1, 0.1, ... 10^-6 as exactly as their type can hold these; if not, texts have the step of
+/// their last decimal and float32 its own precision.
+Rounding rounding_of(std::span<const std::vector<Decimal>* const> columns, CellType type);
+
+/// How many rows a reader shows to NamedColumns before the first is made.
+inline constexpr std::size_t kNamedRowsLookedAt = 8192;
+
+/// Turns the cells of named columns into observations.
+class NamedColumns {
+ public:
+  /// Finds the columns by their names.
+  /// @throws BadColumns when those of a direction are missing: what was found and what is needed
+  explicit NamedColumns(std::vector<NamedColumn> columns);
+
+  /// Numbers of the columns that rows are made of; look_at() and append() take their cells in this
+  /// order. Integers beyond 64 bits and floats have decimals = -1, cells without a number are NaN.
+  const std::vector<std::size_t>& wanted() const { return wanted_; }
+  const std::string& name(std::size_t wanted) const { return columns_[wanted_[wanted]].name; }
+
+  /// One of the first rows, kept until settle().
+  void look_at(std::span<const Decimal> cells);
+
+  /// Decides units, rounding and what times are by the rows looked at, and completes the header.
+  /// @param warnings  gets what was assumed and what is left out
+  /// @throws BadColumns when a unit cannot be told
+  void settle(RecordingHeader& header, std::vector<std::string>& warnings);
+
+  /// Adds one row. @throws BadRow, leaving the rows as they were
+  void append(std::span<const Decimal> cells, Observations& rows);
+
+ private:
+  enum class Role : std::uint8_t {
+    x,
+    y,
+    z,
+    range,
+    azimuth,
+    zenith,
+    elevation,
+    time,
+    index,
+    intensity,
+    return_number,
+    tag,
+    beam,
+    none
+  };
+  struct Unit {
+    enum class Kind : std::uint8_t { length, angle, time } kind;
+    double per_si;          ///< how many are 1 m or 1 rad
+    int decimal_shift = 0;  ///< of a time: seconds are the number * 10^-shift
+  };
+  struct Meaning {
+    Role role = Role::none;
+    std::optional<Unit> unit;
+  };
+  /// A column that is used, or that may be: its cell in look_at() and append().
+  struct Source {
+    std::size_t cell = 0;
+    Meaning meaning;
+    CellType type = CellType::text;
+    std::vector<Decimal> samples;
+  };
+
+  static Meaning meaning_of(std::string_view name);
+  static std::optional<Unit> unit_of(std::string_view text);
+  static Role role_of(std::string_view base);
+  [[noreturn]] void refuse_directions() const;
+  const Source* find(Role role) const;
+  const std::string& name_of(const Source& source) const { return name(source.cell); }
+  std::string names_of(std::initializer_list<Role> roles) const;
+
+  double length_unit(std::initializer_list<Role> roles, std::vector<std::string>& warnings) const;
+  double angle_unit(const Source& source) const;
+  Rounding rounding(std::initializer_list<Role> roles) const;
+  void settle_time(RecordingHeader& header, std::vector<std::string>& warnings);
+  void settle_index(std::vector<std::string>& warnings);
+  void settle_returns(RecordingHeader& header);
+  void settle_intensity(RecordingHeader& header, std::vector<std::string>& warnings);
+  bool is_shared_by_many(const Source& time) const;
+  int time_shift(const Source& time, RecordingHeader& header,
+                 std::vector<std::string>& warnings) const;
+
+  /// The cell of a role, nullptr where no column has it.
+  const Decimal* cell(std::span<const Decimal> cells, Role role) const;
+  std::uint8_t byte(std::span<const Decimal> cells, Role role) const;
+  std::uint8_t return_number(std::span<const Decimal> cells) const;
+  /// Time or shot number; counts the shot.
+  std::int64_t time_of(std::span<const Decimal> cells, std::uint8_t return_number);
+  Vector3<double> point(std::span<const Decimal> cells) const;
+  SphericalAngles<double> angles(std::span<const Decimal> cells) const;
+  double range(std::span<const Decimal> cells) const;
+  double length(const Decimal& cell, Role role, double low) const;
+  std::string name_of(Role role) const;
+
+  std::vector<NamedColumn> columns_;
+  std::vector<std::size_t> wanted_, unused_;
+  std::vector<Source> sources_;
+  std::array<std::optional<std::size_t>, static_cast<std::size_t>(Role::none)> cell_of_{};
+  bool cartesian_ = false;
+  double length_per_m_ = 1.0, azimuth_per_rad_ = 1.0, zenith_per_rad_ = 1.0;
+  int time_shift_ = 0;
+  double intensity_factor_ = 1.0;
+  int return_offset_ = 0;
+  Rounding length_rounding_, azimuth_rounding_, zenith_rounding_;
+  std::int64_t next_shot_ = 0;
+};
+
+}  // namespace risley::recordings

@@ -1,0 +1,240 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+// Texts with named columns in any order and unit, as scripts, CloudCompare, ParaView and
+// spreadsheets write them. Columns are separated by commas, semicolons, tabs or blanks. The header
+// line may begin with # or //, and comment lines may stand before it.
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <fstream>
+#include <optional>
+
+#include <fmt/format.h>
+
+#include "risley/core/error.hpp"
+
+#include "recordings/formats/format.hpp"
+#include "recordings/formats/named_columns.hpp"
+#include "recordings/formats/text_table.hpp"
+
+namespace risley::recordings {
+namespace {
+
+constexpr std::string_view kName = "named-csv";
+constexpr std::size_t kHeadBytes = 4096;  // as open_recording() shows them
+
+/// Where the columns of a text are named.
+struct TableHead {
+  std::vector<std::string> names;
+  char delimiter = ',';
+  std::uint64_t line = 1;            ///< of the names
+  std::uint64_t first_row_line = 2;  ///< of the first row
+  bool has_row = false;              ///< a row of as many numbers follows
+};
+
+bool is_comment(std::string_view line) { return line.starts_with('#') || line.starts_with("//"); }
+
+std::string_view without_comment_mark(std::string_view line) {
+  while (line.starts_with('#') || line.starts_with('/')) line.remove_prefix(1);
+  return trimmed(line);
+}
+
+char delimiter_of(std::string_view line) {
+  for (const char c : {'\t', ';', ','}) {
+    if (line.find(c) != line.npos) return c;
+  }
+  return kBlanks;
+}
+
+bool is_number(std::string_view field) {
+  try {
+    number_or_nan(field, "");
+    return true;
+  } catch (const BadRow&) {
+    return false;
+  }
+}
+
+bool all_numbers(const std::vector<std::string_view>& fields) {
+  return std::all_of(fields.begin(), fields.end(), is_number) &&
+         std::any_of(fields.begin(), fields.end(), [](auto field) { return !field.empty(); });
+}
+
+std::string unquoted(std::string_view name) {
+  if (name.size() >= 2 && name.front() == name.back() &&
+      (name.front() == '"' || name.front() == '\''))
+    name = trimmed(name.substr(1, name.size() - 2));
+  return std::string(name);
+}
+
+bool is_text(std::string_view head) {
+  return std::none_of(head.begin(), head.end(), [](char c) {
+    const auto byte = static_cast<unsigned char>(c);
+    return byte < 0x20 && c != '\n' && c != '\r' && c != '\t';
+  });
+}
+
+/// The lines of the first bytes of a file; the last one may be cut.
+struct HeadLines {
+  explicit HeadLines(std::string_view head) {
+    if (head.starts_with("\xEF\xBB\xBF")) head.remove_prefix(3);
+    while (!head.empty()) {
+      const auto end = head.find('\n');
+      std::string_view line = head.substr(0, end);
+      if (line.ends_with('\r')) line.remove_suffix(1);
+      lines.push_back(trimmed(line));
+      if (end == head.npos) return;
+      head.remove_prefix(end + 1);
+    }
+  }
+  std::vector<std::string_view> lines;
+};
+
+/// Finds the line of names: the first line that is no comment or, where that is a row of numbers,
+/// the comment before it. Names are empty when there is no such line.
+std::optional<TableHead> find_head(std::string_view bytes) {
+  if (!is_text(bytes)) return std::nullopt;
+  const std::vector<std::string_view> lines = HeadLines(bytes).lines;
+  std::optional<std::size_t> comment;
+  std::size_t at = 0;
+  for (; at < lines.size(); ++at) {
+    if (lines[at].empty()) continue;
+    if (!is_comment(lines[at])) break;
+    comment = at;
+  }
+  TableHead head;
+  const auto take_names = [&](std::size_t line) {
+    const std::string_view text = without_comment_mark(lines[line]);
+    head.delimiter = delimiter_of(text);
+    for (const auto name : fields_of(text, head.delimiter)) head.names.push_back(unquoted(name));
+    head.line = line + 1;
+  };
+  const auto row_of = [&](std::size_t line, char delimiter) {
+    auto fields = fields_of(lines[line], delimiter);
+    const bool cut = line + 1 == lines.size() && bytes.size() >= kHeadBytes;
+    if (cut && fields.size() > 1) fields.back() = "0";
+    return fields;
+  };
+  if (at == lines.size()) {  // comments alone: names without a row
+    if (!comment) return std::nullopt;
+    take_names(*comment);
+    head.first_row_line = *comment + 2;
+    return head;
+  }
+  const auto first = row_of(at, delimiter_of(lines[at]));
+  if (!all_numbers(first)) {
+    take_names(at);
+    head.first_row_line = at + 2;
+    head.has_row = at + 1 < lines.size() && !is_comment(lines[at + 1]) &&
+                   row_of(at + 1, head.delimiter).size() <= head.names.size() &&
+                   all_numbers(row_of(at + 1, head.delimiter));
+    return head;
+  }
+  if (first.size() < 2) return std::nullopt;
+  head.first_row_line = at + 1;
+  head.has_row = true;
+  head.delimiter = delimiter_of(lines[at]);
+  if (comment) {
+    take_names(*comment);
+    head.delimiter = delimiter_of(lines[at]);
+    if (head.names.size() != first.size()) head.names.clear();
+  }
+  return head;
+}
+
+std::vector<NamedColumn> columns_of(const TableHead& head) {
+  std::vector<NamedColumn> columns;
+  for (const std::string& name : head.names) columns.push_back({name, CellType::text});
+  return columns;
+}
+
+bool has_directions(const TableHead& head) {
+  try {
+    const NamedColumns columns(columns_of(head));
+    return true;
+  } catch (const BadColumns&) {
+    return false;
+  }
+}
+
+class NamedCsvReader final : public TextTableReader {
+ public:
+  explicit NamedCsvReader(const std::string& path)
+      : TextTableReader(path, std::string(kName)), head_(read_head()), columns_(find_columns()) {
+    set_column_count(head_.names.size(), head_.delimiter);
+    begin_rows_at(head_.first_row_line);
+    look_ahead(kNamedRowsLookedAt, [&](Fields fields) {
+      read_cells(fields);
+      columns_.look_at(cells_);
+      return true;
+    });
+    std::vector<std::string> warnings;
+    try {
+      columns_.settle(header_, warnings);
+    } catch (const BadColumns& bad) {
+      fail(head_.line, bad.problem);
+    }
+    for (std::string& warning : warnings) {
+      warnings_.push_back({{.byte_offset = {}, .line = head_.line}, std::move(warning), 0});
+    }
+  }
+
+ private:
+  TableHead read_head() const {
+    std::string bytes(kHeadBytes, '\0');
+    std::ifstream stream(path_, std::ios::binary);
+    stream.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+    bytes.resize(static_cast<std::size_t>(stream.gcount()));
+    const auto head = find_head(bytes);
+    if (!head) fail(1, "expected a text with a line of column names, found none");
+    if (head->names.empty()) {
+      fail(head->first_row_line,
+           "expected a line with the names of the columns before the first row, found numbers "
+           "without names; add one, such as x_m,y_m,z_m or time_s,azimuth_deg,zenith_deg,range_m");
+    }
+    return *head;
+  }
+
+  NamedColumns find_columns() const {
+    try {
+      return NamedColumns(columns_of(head_));
+    } catch (const BadColumns& bad) {
+      fail(head_.line, bad.problem);
+    }
+  }
+
+  void read_cells(Fields fields) {
+    const auto& wanted = columns_.wanted();
+    cells_.resize(wanted.size());
+    for (std::size_t i = 0; i < wanted.size(); ++i) {
+      cells_[i] = number_or_nan(fields[wanted[i]], columns_.name(i));
+    }
+  }
+
+  void append_row(Fields fields, Chunk& chunk) override {
+    read_cells(fields);
+    columns_.append(cells_, chunk.observations);
+  }
+
+  TableHead head_;
+  NamedColumns columns_;
+  std::vector<Decimal> cells_;
+};
+
+}  // namespace
+
+const Format kNamedCsvFormat = {
+    kName,
+    "",
+    "text table with named columns: x, y, z or azimuth, zenith, range (read only)",
+    [](std::string_view bytes) {
+      const auto head = find_head(bytes);
+      return head && (head->has_row || has_directions(*head));
+    },
+    [](const std::string& path) -> std::unique_ptr<Reader> {
+      return std::make_unique<NamedCsvReader>(path);
+    },
+    nullptr,
+};
+
+}  // namespace risley::recordings
