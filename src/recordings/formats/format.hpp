@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -41,6 +43,10 @@ extern const Format kNamedCsvFormat;         // named_csv.cpp
 
 /// Device::type of a sensor that is not a Mid-40 and about which a format tells no more.
 inline constexpr std::uint8_t kUnknownDeviceType = 255;
+
+/// Shots that share a time on average where it is that of their packet or frame: packets hold 96
+/// points and more.
+inline constexpr std::size_t kShotsOfOneTime = 32;
 
 /// Detail by which a NetCDF file remembers the format its rows first came from.
 inline constexpr const char* kSourceFormat = "source_format";

@@ -23,8 +23,6 @@ namespace las {
 namespace {
 
 constexpr std::size_t kPointsLookedAt = 8192;
-/// Shots that share a time on average where it is that of a packet or frame.
-constexpr std::size_t kShotsOfOneTime = 32;
 /// So many different coordinates that all are multiples of a coarser step are so on purpose.
 constexpr std::size_t kChangesForStep = 16;
 constexpr double kFarthest_m = 10e3;  // none of these sensors sees a twentieth of it
