@@ -12,6 +12,7 @@ find_package(PkgConfig REQUIRED)
 pkg_check_modules(NETCDF REQUIRED IMPORTED_TARGET GLOBAL netcdf)
 include(RisleyRosbag)
 find_package(SQLite3 REQUIRED)
+find_package(ZLIB REQUIRED)
 find_package(fastcdr REQUIRED)
 find_library(RISLEY_LASZIP_LIBRARY laszip) # optional: Debian 13 has it, Debian 12 does not
 find_path(RISLEY_RANDOM123_INCLUDE_DIR Random123/philox.h REQUIRED)

@@ -98,7 +98,7 @@ void print_reproduction(const Reproduction& found) {
 
 /// The recording of a real unit, read as estimate reads one.
 reproduction::RealRecording real_recording(const std::string& path, const CommonOptions& common) {
-  RecordingInput input = read_recording(path, {}, common);
+  RecordingInput input = read_recording(path, {}, {}, common);
   log_warnings(path, input.reader->warnings());
   reproduction::RealRecording recording;
   recording.name = std::filesystem::path(path).filename().string();

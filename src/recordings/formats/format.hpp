@@ -39,6 +39,10 @@ extern const Format kRos1BagFormat;          // ros1_bag.cpp
 extern const Format kRos2BagFormat;          // ros2_bag.cpp
 extern const Format kLasFormat;              // las.cpp
 extern const Format kLazFormat;              // las.cpp, laz.cpp
+extern const Format kPcdFormat;              // pcd.cpp
+extern const Format kPlyFormat;              // ply.cpp
+extern const Format kNpyFormat;              // numpy.cpp
+extern const Format kNpzFormat;              // numpy.cpp
 extern const Format kNamedCsvFormat;         // named_csv.cpp
 
 /// Device::type of a sensor that is not a Mid-40 and about which a format tells no more.

@@ -192,6 +192,8 @@ NamedColumns::Meaning NamedColumns::meaning_of(std::string_view name) {
 NamedColumns::NamedColumns(std::vector<NamedColumn> columns) : columns_(std::move(columns)) {
   std::vector<Meaning> meanings;
   for (const NamedColumn& column : columns_) meanings.push_back(meaning_of(column.name));
+  // Tables of pandas begin with the number of the row, without a name.
+  if (columns_.size() > 1 && columns_.front().name.empty()) meanings.front().role = Role::index;
   const auto has = [&](Role role) {
     return std::any_of(meanings.begin(), meanings.end(),
                        [role](const Meaning& meaning) { return meaning.role == role; });
@@ -424,6 +426,7 @@ void NamedColumns::settle_returns(RecordingHeader& header) {
   const Source* const returns = find(Role::return_number);
   if (returns == nullptr) return;
   const auto [low, high] = extent(returns->samples);
+  if (std::isnan(high)) return;
   return_offset_ = low == 0.0 ? 1 : 0;  // some count returns from 0
   header.returns_per_shot = static_cast<int>(std::clamp(high + return_offset_, 1.0, 255.0));
 }

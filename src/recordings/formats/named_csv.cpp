@@ -4,9 +4,8 @@
 // spreadsheets write them. Columns are separated by commas, semicolons, tabs or blanks. The header
 // line may begin with # or //, and comment lines may stand before it.
 #include <algorithm>
-#include <array>
-#include <cctype>
 #include <fstream>
+#include <memory>
 #include <optional>
 
 #include <fmt/format.h>
@@ -14,8 +13,7 @@
 #include "risley/core/error.hpp"
 
 #include "recordings/formats/format.hpp"
-#include "recordings/formats/named_columns.hpp"
-#include "recordings/formats/text_table.hpp"
+#include "recordings/formats/named_text.hpp"
 
 namespace risley::recordings {
 namespace {
@@ -23,13 +21,10 @@ namespace {
 constexpr std::string_view kName = "named-csv";
 constexpr std::size_t kHeadBytes = 4096;  // as open_recording() shows them
 
-/// Where the columns of a text are named.
+/// The beginning of a table: how its rows stand in the file, without names where there are none.
 struct TableHead {
-  std::vector<std::string> names;
-  char delimiter = ',';
-  std::uint64_t line = 1;            ///< of the names
-  std::uint64_t first_row_line = 2;  ///< of the first row
-  bool has_row = false;              ///< a row of as many numbers follows
+  NamedTextLayout layout;
+  bool has_row = false;  ///< a row of as many numbers follows
 };
 
 bool is_comment(std::string_view line) { return line.starts_with('#') || line.starts_with("//"); }
@@ -105,9 +100,10 @@ std::optional<TableHead> find_head(std::string_view bytes) {
   TableHead head;
   const auto take_names = [&](std::size_t line) {
     const std::string_view text = without_comment_mark(lines[line]);
-    head.delimiter = delimiter_of(text);
-    for (const auto name : fields_of(text, head.delimiter)) head.names.push_back(unquoted(name));
-    head.line = line + 1;
+    head.layout.delimiter = delimiter_of(text);
+    for (const auto name : fields_of(text, head.layout.delimiter))
+      head.layout.names.push_back(unquoted(name));
+    head.layout.names_line = line + 1;
   };
   const auto row_of = [&](std::size_t line, char delimiter) {
     auto fields = fields_of(lines[line], delimiter);
@@ -118,108 +114,61 @@ std::optional<TableHead> find_head(std::string_view bytes) {
   if (at == lines.size()) {  // comments alone: names without a row
     if (!comment) return std::nullopt;
     take_names(*comment);
-    head.first_row_line = *comment + 2;
+    head.layout.first_row_line = *comment + 2;
     return head;
   }
+  // Names that are cut off are none.
+  if (at + 1 == lines.size() && bytes.size() >= kHeadBytes) return std::nullopt;
   const auto first = row_of(at, delimiter_of(lines[at]));
   if (!all_numbers(first)) {
     take_names(at);
-    head.first_row_line = at + 2;
+    head.layout.first_row_line = at + 2;
     head.has_row = at + 1 < lines.size() && !is_comment(lines[at + 1]) &&
-                   row_of(at + 1, head.delimiter).size() <= head.names.size() &&
-                   all_numbers(row_of(at + 1, head.delimiter));
+                   row_of(at + 1, head.layout.delimiter).size() <= head.layout.names.size() &&
+                   all_numbers(row_of(at + 1, head.layout.delimiter));
     return head;
   }
   if (first.size() < 2) return std::nullopt;
-  head.first_row_line = at + 1;
+  head.layout.first_row_line = at + 1;
   head.has_row = true;
-  head.delimiter = delimiter_of(lines[at]);
+  head.layout.delimiter = delimiter_of(lines[at]);
   if (comment) {
     take_names(*comment);
-    head.delimiter = delimiter_of(lines[at]);
-    if (head.names.size() != first.size()) head.names.clear();
+    head.layout.delimiter = delimiter_of(lines[at]);
+    if (head.layout.names.size() != first.size()) head.layout.names.clear();
   }
   return head;
 }
 
-std::vector<NamedColumn> columns_of(const TableHead& head) {
-  std::vector<NamedColumn> columns;
-  for (const std::string& name : head.names) columns.push_back({name, CellType::text});
-  return columns;
-}
-
 bool has_directions(const TableHead& head) {
+  std::vector<NamedColumn> columns;
+  for (const std::string& name : head.layout.names) columns.push_back({name, CellType::text});
   try {
-    const NamedColumns columns(columns_of(head));
+    const NamedColumns found(std::move(columns));
     return true;
   } catch (const BadColumns&) {
     return false;
   }
 }
 
-class NamedCsvReader final : public TextTableReader {
- public:
-  explicit NamedCsvReader(const std::string& path)
-      : TextTableReader(path, std::string(kName)), head_(read_head()), columns_(find_columns()) {
-    set_column_count(head_.names.size(), head_.delimiter);
-    begin_rows_at(head_.first_row_line);
-    look_ahead(kNamedRowsLookedAt, [&](Fields fields) {
-      read_cells(fields);
-      columns_.look_at(cells_);
-      return true;
-    });
-    std::vector<std::string> warnings;
-    try {
-      columns_.settle(header_, warnings);
-    } catch (const BadColumns& bad) {
-      fail(head_.line, bad.problem);
-    }
-    for (std::string& warning : warnings) {
-      warnings_.push_back({{.byte_offset = {}, .line = head_.line}, std::move(warning), 0});
-    }
+NamedTextLayout read_layout(const std::string& path) {
+  std::string bytes(kHeadBytes, '\0');
+  std::ifstream stream(path, std::ios::binary);
+  stream.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  bytes.resize(static_cast<std::size_t>(stream.gcount()));
+  const auto head = find_head(bytes);
+  if (!head) {
+    throw FileError(path, {.byte_offset = {}, .line = 1},
+                    "expected a text with a line of column names, found none");
   }
-
- private:
-  TableHead read_head() const {
-    std::string bytes(kHeadBytes, '\0');
-    std::ifstream stream(path_, std::ios::binary);
-    stream.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-    bytes.resize(static_cast<std::size_t>(stream.gcount()));
-    const auto head = find_head(bytes);
-    if (!head) fail(1, "expected a text with a line of column names, found none");
-    if (head->names.empty()) {
-      fail(head->first_row_line,
-           "expected a line with the names of the columns before the first row, found numbers "
-           "without names; add one, such as x_m,y_m,z_m or time_s,azimuth_deg,zenith_deg,range_m");
-    }
-    return *head;
+  if (head->layout.names.empty()) {
+    throw FileError(
+        path, {.byte_offset = {}, .line = head->layout.first_row_line},
+        "expected a line with the names of the columns before the first row, found numbers "
+        "without names; add one, such as x_m,y_m,z_m or time_s,azimuth_deg,zenith_deg,range_m");
   }
-
-  NamedColumns find_columns() const {
-    try {
-      return NamedColumns(columns_of(head_));
-    } catch (const BadColumns& bad) {
-      fail(head_.line, bad.problem);
-    }
-  }
-
-  void read_cells(Fields fields) {
-    const auto& wanted = columns_.wanted();
-    cells_.resize(wanted.size());
-    for (std::size_t i = 0; i < wanted.size(); ++i) {
-      cells_[i] = number_or_nan(fields[wanted[i]], columns_.name(i));
-    }
-  }
-
-  void append_row(Fields fields, Chunk& chunk) override {
-    read_cells(fields);
-    columns_.append(cells_, chunk.observations);
-  }
-
-  TableHead head_;
-  NamedColumns columns_;
-  std::vector<Decimal> cells_;
-};
+  return head->layout;
+}
 
 }  // namespace
 
@@ -232,7 +181,7 @@ const Format kNamedCsvFormat = {
       return head && (head->has_row || has_directions(*head));
     },
     [](const std::string& path) -> std::unique_ptr<Reader> {
-      return std::make_unique<NamedCsvReader>(path);
+      return std::make_unique<NamedTextReader>(path, kName, read_layout(path));
     },
     nullptr,
 };

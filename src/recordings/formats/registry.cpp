@@ -17,6 +17,10 @@ const std::vector<const Format*>& all_formats() {
       &kRos2BagFormat,
       &kLasFormat,
       &kLazFormat,
+      &kPcdFormat,
+      &kPlyFormat,
+      &kNpyFormat,
+      &kNpzFormat,
       &kNamedCsvFormat,
   };
   return formats;

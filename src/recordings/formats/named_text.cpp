@@ -1,0 +1,94 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "recordings/formats/named_text.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "risley/core/error.hpp"
+
+#include "recordings/formats/block_file.hpp"
+
+namespace risley::recordings {
+
+NamedTextReader::NamedTextReader(const std::string& path, std::string_view format,
+                                 NamedTextLayout layout)
+    : TextTableReader(path, std::string(format)),
+      layout_(std::move(layout)),
+      columns_(find_columns()) {
+  set_column_count(layout_.names.size(), layout_.delimiter);
+  begin_rows_at(layout_.first_row_line);
+  if (layout_.rows) set_row_count(*layout_.rows);
+  look_ahead(kNamedRowsLookedAt, [&](Fields fields) {
+    read_cells(fields);
+    columns_.look_at(cells_);
+    return true;
+  });
+  try {
+    columns_.settle(header_, layout_.warnings);
+  } catch (const BadColumns& bad) {
+    fail(layout_.names_line, bad.problem);
+  }
+  for (std::string& warning : layout_.warnings) {
+    warnings_.push_back({{.byte_offset = {}, .line = layout_.names_line}, std::move(warning), 0});
+  }
+}
+
+NamedColumns NamedTextReader::find_columns() const {
+  std::vector<NamedColumn> columns;
+  for (const std::string& name : layout_.names) columns.push_back({name, CellType::text});
+  try {
+    return NamedColumns(std::move(columns));
+  } catch (const BadColumns& bad) {
+    fail(layout_.names_line, bad.problem);
+  }
+}
+
+void NamedTextReader::read_cells(Fields fields) {
+  const auto& wanted = columns_.wanted();
+  cells_.resize(wanted.size());
+  for (std::size_t i = 0; i < wanted.size(); ++i) {
+    cells_[i] = number_or_nan(fields[wanted[i]], columns_.name(i));
+  }
+}
+
+void NamedTextReader::append_row(Fields fields, Chunk& chunk) {
+  read_cells(fields);
+  columns_.append(cells_, chunk.observations);
+}
+
+HeaderLines::HeaderLines(const std::string& path) : path_(path) {
+  constexpr std::uint64_t kLongestHeader = std::uint64_t{1} << 16;
+  BlockInput file(path);
+  file_size_ = file.size();
+  const auto count = static_cast<std::size_t>(std::min(file_size_, kLongestHeader));
+  if (count > 0) bytes_.assign(reinterpret_cast<const char*>(file.at(0, count)), count);
+}
+
+std::string_view HeaderLines::next() {
+  const std::string_view rest = std::string_view(bytes_).substr(static_cast<std::size_t>(offset_));
+  const auto end = rest.find('\n');
+  ++line_;
+  if (end == rest.npos) {
+    fail(bytes_.size() < file_size_
+             ? fmt::format("expected a header of at most {} bytes, found a longer one",
+                           bytes_.size())
+             : std::string("expected more lines of the header, found the end of the file"));
+  }
+  offset_ += end + 1;
+  std::string_view line = rest.substr(0, end);
+  if (line.ends_with('\r')) line.remove_suffix(1);
+  return trimmed(line);
+}
+
+void HeaderLines::fail(const std::string& problem) const {
+  throw FileError(path_, {.byte_offset = {}, .line = line_}, problem);
+}
+
+std::uint64_t count_field(std::string_view field, std::string_view name) {
+  return static_cast<std::uint64_t>(integer_field(field, name, 0, INT64_MAX));
+}
+
+}  // namespace risley::recordings

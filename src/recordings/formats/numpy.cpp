@@ -1,0 +1,193 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+// NumPy arrays: one in a .npy file, several by name in a .npz file, which is a zip file.
+#include <algorithm>
+#include <memory>
+#include <optional>
+#include <set>
+
+#include <fmt/format.h>
+
+#include "risley/core/error.hpp"
+#include "risley/core/text.hpp"
+
+#include "recordings/formats/binary_table.hpp"
+#include "recordings/formats/format.hpp"
+#include "recordings/formats/npy_header.hpp"
+#include "recordings/formats/zip_archive.hpp"
+
+namespace risley::recordings {
+namespace {
+
+constexpr std::string_view kNpyName = "npy", kNpzName = "npz";
+constexpr std::string_view kMemberEnding = ".npy";
+
+BinaryTable npy_table(const std::string& path) {
+  FileSource source(path, 0, UINT64_MAX);
+  try {
+    const ArrayHeader header = read_array_header(source);
+    BinaryTable table;
+    add_table(
+        header,
+        [path](std::uint64_t offset) {
+          return std::make_unique<FileSource>(path, offset, UINT64_MAX);
+        },
+        table);
+    const std::uint64_t end = header.data_offset + header.elements() * header.element_bytes;
+    const std::uint64_t size = BlockInput(path).size();
+    if (size > end) {
+      table.warnings.push_back(fmt::format("{} bytes behind the array were not read", size - end));
+    }
+    return table;
+  } catch (const BadArray& bad) {
+    throw FileError(path, {0, {}}, bad.problem);
+  }
+}
+
+/// An array of an archive.
+struct Member {
+  std::string name;  ///< without its ending
+  ArrayHeader header;
+  OpenArray open;
+  std::uint64_t begin = 0;
+
+  bool is_column() const {
+    return header.shape.size() == 1 && !header.is_structured() && !header.fields.empty();
+  }
+};
+
+/// Chooses the array that is the points: the only table, or the one that is called so.
+const Member* find_table(const std::vector<Member>& members) {
+  static const std::set<std::string> names = {"points", "xyz",       "data",       "cloud",
+                                              "arr_0",  "positions", "point_cloud"};
+  const Member* only = nullptr;
+  std::size_t tables = 0;
+  for (const Member& member : members) {
+    if (!is_table(member.header)) continue;
+    if (names.contains(lower_case(member.name))) return &member;
+    only = &member;
+    ++tables;
+  }
+  return tables == 1 ? only : nullptr;
+}
+
+std::vector<Member> npz_members(const std::string& path, std::vector<std::string>& left_out) {
+  std::vector<Member> members;
+  for (const ZipMember& zipped : zip_members(path)) {
+    if (!zipped.name.ends_with(kMemberEnding)) {
+      left_out.push_back(zipped.name);
+      continue;
+    }
+    Member member;
+    member.name = zipped.name.substr(0, zipped.name.size() - kMemberEnding.size());
+    member.begin = zipped.begin;
+    member.open = [path, zipped](std::uint64_t offset) {
+      return open_member(path, zipped, offset);
+    };
+    const auto source = member.open(0);
+    try {
+      member.header = read_array_header(*source);
+    } catch (const BadArray& bad) {
+      throw FileError(path, {zipped.begin, {}},
+                      fmt::format("member {}: {}", printable(zipped.name), bad.problem));
+    }
+    const std::uint64_t expected =
+        member.header.data_offset + member.header.elements() * member.header.element_bytes;
+    if (!member.header.other_fields.empty() && member.header.fields.empty()) {
+      left_out.push_back(member.name);  // texts and objects
+      continue;
+    }
+    if (expected != zipped.bytes) {
+      throw FileError(path, {zipped.begin, {}},
+                      fmt::format("expected {} bytes in member {} ({} of {} bytes), found {}",
+                                  expected, printable(zipped.name), member.header.shape_text(),
+                                  member.header.element_bytes, zipped.bytes));
+    }
+    members.push_back(std::move(member));
+  }
+  return members;
+}
+
+BinaryTable npz_table(const std::string& path) {
+  std::vector<std::string> left_out;
+  const std::vector<Member> members = npz_members(path, left_out);
+  if (members.empty()) {
+    throw FileError(path, {0, {}}, "expected a zip file of NumPy arrays, found none in it");
+  }
+  BinaryTable table;
+  table.columns_offset = members.front().begin;
+  std::string found;
+  for (const Member& member : members) {
+    found += fmt::format("{}{} ({})", found.empty() ? "" : ", ", member.name,
+                         member.header.shape_text());
+  }
+  const Member* const points = find_table(members);
+  const Member* first_column = nullptr;
+  for (const Member& member : members) {
+    if (member.is_column() && first_column == nullptr) first_column = &member;
+  }
+  if (points != nullptr) {
+    table.columns_offset = points->begin;
+    add_table(points->header, points->open, table);
+  } else if (first_column != nullptr) {
+    // Most arrays have the length of the recording; others are something else.
+    std::size_t most = 0;
+    for (const Member& member : members) {
+      if (!member.is_column()) continue;
+      const auto as_long = static_cast<std::size_t>(
+          std::count_if(members.begin(), members.end(), [&](const Member& other) {
+            return other.is_column() && other.header.shape == member.header.shape;
+          }));
+      if (as_long > most) {
+        most = as_long;
+        table.rows = member.header.shape[0];
+      }
+    }
+  } else {
+    throw FileError(path, {table.columns_offset, {}},
+                    fmt::format("expected arrays x, y and z of equal length, or one array of "
+                                "points; found {}",
+                                printable(found)));
+  }
+  for (const Member& member : members) {
+    if (&member == points) continue;
+    if (member.is_column() && member.header.shape[0] == table.rows) {
+      add_column(member.header, member.name, member.open, table);
+    } else {
+      left_out.push_back(member.name);
+    }
+  }
+  if (!left_out.empty()) {
+    std::string names;
+    for (const std::string& name : left_out) names += (names.empty() ? "" : ", ") + name;
+    table.warnings.push_back(fmt::format("members that are no columns of {} rows were left out: {}",
+                                         table.rows, printable(names)));
+  }
+  return table;
+}
+
+}  // namespace
+
+const Format kNpyFormat = {
+    kNpyName,
+    "",
+    "NumPy array of named fields, or of rows x y z [intensity] (read only)",
+    [](std::string_view head) { return head.starts_with(kArraySignature); },
+    [](const std::string& path) -> std::unique_ptr<Reader> {
+      return std::make_unique<BinaryTableReader>(path, kNpyName, npy_table(path));
+    },
+    nullptr,
+};
+
+const Format kNpzFormat = {
+    kNpzName,
+    "",
+    "NumPy arrays by name, such as x, y, z and time (read only)",
+    [](std::string_view head) { return head.starts_with("PK\x03\x04"); },
+    [](const std::string& path) -> std::unique_ptr<Reader> {
+      return std::make_unique<BinaryTableReader>(path, kNpzName, npz_table(path));
+    },
+    nullptr,
+};
+
+}  // namespace risley::recordings
