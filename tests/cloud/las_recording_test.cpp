@@ -113,8 +113,8 @@ TEST_P(LasRecordingTest, ACutFileGivesThePointsBeforeAndThenThePlace) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Formats, LasRecordingTest, testing::ValuesIn(formats_of_this_build()),
-                         [](const auto& info) {
-                           std::string name = info.param;
+                         [](const auto& test) {
+                           std::string name = test.param;
                            std::erase_if(name, [](char c) { return c == '-' || c == '.'; });
                            return name;
                          });
