@@ -24,6 +24,7 @@ _risley() {
       choices="yes no" ;;
     --directions) choices="smoothed reported" ;;
     --time) choices="gps recording" ;;
+    --sensor-type) choices="avia horizon mid-40 mid-70 tele-15" ;;
     --rotor) choices="constant sinusoidal hunting random-walk" ;;
     --method) case $verb in calibrate) choices="adjustment paper" ;; *) choices="map ekf" ;; esac ;;
     --states) choices="knots all none" ;;
@@ -52,7 +53,7 @@ _risley() {
       "") choices="--help --version" ;;
       info) choices="$common --shot-rate-hz --share --share-ranges" ;;
       report) choices="$common --output" ;;
-      convert) choices="$common --output --format --shot-rate-hz" ;;
+      convert) choices="$common --output --format --sensor-type --shot-rate-hz" ;;
       simulate)
         choices="$common --output --sensor --duration-s --rate-hz --noise-angle-deg
           --noise-range-m --quantize --beam-origin --rotor --set --reported --scene --station
@@ -71,7 +72,7 @@ _risley() {
         choices="$common --output --calibration --format --directions --beam-origin --covariance
           --beam-divergence --common-factors --rate-hz --noise-angle-deg --las-scale-m --time
           --beam-origin-map --shot-rate-hz" ;;
-      reproduce) choices="$common --output --full --recording" ;;
+      reproduce) choices="$common --output --full --recording --shot-rate-hz" ;;
     esac
     mapfile -t COMPREPLY < <(compgen -W "$choices" -- "$current")
     return

@@ -1,7 +1,9 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
+#include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <vector>
 
 #include <fmt/format.h>
@@ -21,7 +23,7 @@ namespace {
 
 struct ConvertOptions {
   std::vector<std::string> inputs;
-  std::string output, format;
+  std::string output, format, sensor_type;
   ReadingWishes reading;
 };
 
@@ -39,6 +41,30 @@ std::set<std::string> recording_format_names() {
   return names;
 }
 
+/// Types of sensors by their names on the command line.
+const std::map<std::string, std::uint8_t>& sensor_types() {
+  static const std::map<std::string, std::uint8_t> types = {
+      {"avia", 7}, {"horizon", 3}, {"mid-40", 1}, {"mid-70", 6}, {"tele-15", 2}};
+  return types;
+}
+
+/// The header to write, with the type of sensor where the recording does not tell it.
+recordings::RecordingHeader header_of(const recordings::Reader& reader,
+                                      const std::string& sensor_type) {
+  recordings::RecordingHeader header = reader.header();
+  if (sensor_type.empty()) return header;
+  const std::uint8_t type = sensor_types().at(sensor_type);
+  for (recordings::Device& device : header.devices) {
+    const std::string told = recordings::device_type_name(device.type);
+    if (told != "unknown" && device.type != type) {
+      throw InvalidArgument(fmt::format("--sensor-type {}: the recording tells that it is of a {}",
+                                        sensor_type, told));
+    }
+    device.type = type;
+  }
+  return header;
+}
+
 /// Ending of a format's files in a folder.
 std::string ending_of(const std::string& format) {
   for (const auto& known : recordings::writable_formats()) {
@@ -49,7 +75,8 @@ std::string ending_of(const std::string& format) {
 
 FileOutcome convert(const FileJob& job, const ConvertOptions& options, const Progress& progress) {
   const auto reader = open_input(job.input, options.reading);
-  const auto writer = recordings::create_recording(job.output, reader->header(), options.format);
+  const auto writer = recordings::create_recording(
+      job.output, header_of(*reader, options.sensor_type), options.format);
   std::uint64_t observations = 0;
   std::optional<FileError> damage;
   recordings::Chunk chunk;
@@ -103,6 +130,11 @@ Run declare_convert(CLI::App& verb) {
   verb.add_option("--format", options->format,
                   "Format to write, whatever the ending; needed for a folder")
       ->check(CLI::IsMember(recording_format_names()));
+  std::set<std::string> type_names;
+  for (const auto& [name, type] : sensor_types()) type_names.insert(name);
+  verb.add_option("--sensor-type", options->sensor_type,
+                  "Sensor that recorded, where the recording does not tell; LVX needs it")
+      ->check(CLI::IsMember(type_names));
   add_reading_options(verb, options->reading);
   return [options](const CommonOptions& common) {
     const bool folder = output_is_folder(options->inputs, options->output);

@@ -26,6 +26,7 @@ using reproduction::Row;
 
 struct ReproduceCommandOptions {
   std::string folder, recording;
+  ReadingWishes reading;
   bool full = false;
 };
 
@@ -97,8 +98,9 @@ void print_reproduction(const Reproduction& found) {
 }
 
 /// The recording of a real unit, read as estimate reads one.
-reproduction::RealRecording real_recording(const std::string& path, const CommonOptions& common) {
-  RecordingInput input = read_recording(path, {}, {}, common);
+reproduction::RealRecording real_recording(const std::string& path, const ReadingWishes& reading,
+                                           const CommonOptions& common) {
+  RecordingInput input = read_recording(path, reading, {}, common);
   log_warnings(path, input.reader->warnings());
   reproduction::RealRecording recording;
   recording.name = std::filesystem::path(path).filename().string();
@@ -115,7 +117,7 @@ ExitStatus run_reproduce(const ReproduceCommandOptions& options, const CommonOpt
   if (options.full) settings.effort = reproduction::kFullEffort;
   std::vector<std::string> inputs;
   if (!options.recording.empty()) {
-    settings.recording = real_recording(options.recording, common);
+    settings.recording = real_recording(options.recording, options.reading, common);
     inputs.push_back(options.recording);
   }
   Reproduction found;
@@ -150,6 +152,7 @@ Run declare_reproduce(CLI::App& verb) {
                 "More random draws, and Table 3 from all 100,000 shots a second (minutes)");
   verb.add_option("--recording", o.recording,
                   "Recording of a real, stationary Mid-40 for section 3.1");
+  add_reading_options(verb, o.reading);
   return [options](const CommonOptions& common) { return run_reproduce(*options, common); };
 }
 

@@ -42,7 +42,7 @@ class CompletionTest(CommandTest):
     def test_choices(self):
         for verb, option in (("simulate", "--rotor"), ("simulate", "--quantize"),
                              ("estimate", "--states"), ("estimate", "--mirror"),
-                             ("convert", "--format")):
+                             ("convert", "--format"), ("convert", "--sensor-type")):
             text = self.expect(0, verb, "--help").stdout
             shown = re.search(option + r" TEXT:\{([^}]+)\}", text).group(1)
             self.assertEqual(complete("risley", verb, option, ""), set(shown.split(",")), option)

@@ -92,7 +92,7 @@ class ExcerptTest : public testing::Test {
   }
 
   Excerpt share(const std::string& recording, const ExcerptOptions& options = {}) {
-    const Excerpt excerpt = write_excerpt(recording, path_, options);
+    Excerpt excerpt = write_excerpt(recording, path_, options);
     shared_ = load_recording(path_);
     EXPECT_EQ(excerpt.observations, rows().size());
     return excerpt;

@@ -271,7 +271,8 @@ TEST(LasTest, TimesOfPacketsAreNoTimesOfShots) {
     SCOPED_TRACE(shared);
     LasFile file = some_file(1000);
     for (std::size_t i = 0; i < 1000; ++i) {
-      file.points[i].gps_time = 3.0 + 1e-3 * static_cast<double>(i / shared);
+      const std::size_t packet = i / shared;
+      file.points[i].gps_time = 3.0 + 1e-3 * static_cast<double>(packet);
     }
     const Outcome outcome = read_las(file.bytes());
     EXPECT_FALSE(outcome.recording.header.has_times);
@@ -299,7 +300,8 @@ TEST(LasTest, ReturnsOfOneShotShareItsNumber) {
 TEST(LasTest, SixBeamsMayFireTogether) {
   LasFile file = some_file(600);
   for (std::size_t i = 0; i < 600; ++i) {
-    file.points[i].gps_time = 1e-3 * static_cast<double>(i / 6);
+    const std::size_t shot = i / 6;
+    file.points[i].gps_time = 1e-3 * static_cast<double>(shot);
   }
   EXPECT_TRUE(read_las(file.bytes()).recording.header.has_times);
 }

@@ -25,7 +25,7 @@ Decimal cell_of(const std::uint8_t* bytes) {
   } else {
     Decimal cell{.value = static_cast<double>(number)};
     if (std::in_range<std::int64_t>(number)) {
-      cell.digits = static_cast<std::int64_t>(number);
+      cell.digits = static_cast<std::int64_t>(+number);
       cell.decimals = 0;
     }
     return cell;

@@ -25,7 +25,7 @@ namespace {
 constexpr std::size_t kPointsLookedAt = 8192;
 /// So many different coordinates that all are multiples of a coarser step are so on purpose.
 constexpr std::size_t kChangesForStep = 16;
-constexpr double kFarthest_m = 10e3;  // none of these sensors sees a twentieth of it
+constexpr double kFarthest = 10e3;  // none of these sensors sees a twentieth of it
 constexpr std::string_view kAxes = "xyz";
 
 /// Points without compression.
@@ -315,7 +315,7 @@ class LasReader final : public Reader {
 
   void warn_of_maps() {
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      if (std::abs(file_.offset[axis]) > kFarthest_m) {
+      if (std::abs(file_.offset[axis]) > kFarthest) {
         warn_of_map(fmt::format("the offset of {} is {} m", kAxes[axis], file_.offset[axis]));
         return;
       }
@@ -340,7 +340,7 @@ class LasReader final : public Reader {
     rows.tag[row] = point.tag;
     rows.beam[row] = point.beam;
     rows.device[row] = 0;
-    if (rows.range[row] > kFarthest_m && !map_reported_) {
+    if (rows.range[row] > kFarthest && !map_reported_) {
       warn_of_map(fmt::format("point {} is {:.0f} m from the origin", row_ + 1, rows.range[row]));
     }
     last_ = point;

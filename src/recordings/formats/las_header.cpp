@@ -16,7 +16,7 @@
 namespace risley::recordings::las {
 namespace {
 
-constexpr double kFinestScale_m = 1e-9, kCoarsestScale_m = 1.0, kLargestOffset_m = 1e9;
+constexpr double kFinestScale = 1e-9, kCoarsestScale = 1.0, kLargestOffset = 1e9;
 /// Bytes of the public header.
 constexpr std::uint64_t kEncodingAt = 6, kVersionAt = 24, kSystemAt = 26, kSoftwareAt = 58,
                         kHeaderSizeAt = 94, kPointsAt = 96, kRecordCountAt = 100,
@@ -130,14 +130,14 @@ class HeaderReader {
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const std::uint64_t scale_at = kScaleAt + 8 * axis, offset_at = kOffsetAt + 8 * axis;
       const auto scale = header_.scale[axis] = number<double>(scale_at);
-      if (!(scale >= kFinestScale_m && scale <= kCoarsestScale_m)) {
+      if (!(scale >= kFinestScale && scale <= kCoarsestScale)) {
         fail(scale_at, fmt::format("expected a scale of {} in [{:g}, {:g}] m, found {}",
-                                   kAxes[axis], kFinestScale_m, kCoarsestScale_m, scale));
+                                   kAxes[axis], kFinestScale, kCoarsestScale, scale));
       }
       const auto offset = header_.offset[axis] = number<double>(offset_at);
-      if (!(std::abs(offset) <= kLargestOffset_m)) {
+      if (!(std::abs(offset) <= kLargestOffset)) {
         fail(offset_at, fmt::format("expected an offset of {} within +-{:g} m, found {}",
-                                    kAxes[axis], kLargestOffset_m, offset));
+                                    kAxes[axis], kLargestOffset, offset));
       }
     }
   }

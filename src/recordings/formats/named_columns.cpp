@@ -24,10 +24,10 @@ constexpr double kLeastChance = 1e-9;
 constexpr int kFinestDecimals = 6;
 /// How exactly arithmetic and the type itself keep a decimal fraction, relative.
 constexpr double kFloat32Precision = 0x1p-22, kFloat64Precision = 0x1p-50;
-constexpr double kFarthest_m = 1e9;
+constexpr double kFarthest = 1e9;         // m
 constexpr double kAngleSlack_deg = 1e-4;  // of float32 at 360
 /// Times of 2001 to 2099 as seconds since 1970.
-constexpr double kEarliestEpoch_s = 1e9, kLatestEpoch_s = 4.1e9;
+constexpr double kEarliestEpoch = 1e9, kLatestEpoch = 4.1e9;
 
 bool is_whole(double value) { return value == std::floor(value); }
 
@@ -332,11 +332,12 @@ bool NamedColumns::is_shared_by_many(const Source& time) const {
 int NamedColumns::time_shift(const Source& time, RecordingHeader& header,
                              std::vector<std::string>& warnings) const {
   const std::string name = printable(name_of(time));
-  const auto [low, high] = extent(time.samples);
+  const auto extent_of_times = extent(time.samples);
+  const double low = extent_of_times.first, high = extent_of_times.second;
   const bool gps = lower_case(name).starts_with("gps");
   const auto since_1970 = [&](int shift) {
     const double per_second = std::pow(10.0, shift);
-    return low >= kEarliestEpoch_s * per_second && high <= kLatestEpoch_s * per_second;
+    return low >= kEarliestEpoch * per_second && high <= kLatestEpoch * per_second;
   };
   if (time.meaning.unit) {
     const int shift = time.meaning.unit->decimal_shift;
@@ -552,15 +553,15 @@ std::int64_t NamedColumns::time_of(std::span<const Decimal> cells, std::uint8_t 
 /// A coordinate or a range, m; NaN where there is none.
 double NamedColumns::length(const Decimal& cell, Role role, double low) const {
   const double value = cell.value / length_per_m_;
-  if (value < low || value > kFarthest_m) {
+  if (value < low || value > kFarthest) {
     throw BadRow{
-        fmt::format("expected {} in [{}, {}] m, found {}", name_of(role), low, kFarthest_m, value)};
+        fmt::format("expected {} in [{}, {}] m, found {}", name_of(role), low, kFarthest, value)};
   }
   return value;
 }
 
 Vector3<double> NamedColumns::point(std::span<const Decimal> cells) const {
-  const auto coordinate = [&](Role role) { return length(*cell(cells, role), role, -kFarthest_m); };
+  const auto coordinate = [&](Role role) { return length(*cell(cells, role), role, -kFarthest); };
   const Vector3<double> point{coordinate(Role::x), coordinate(Role::y), coordinate(Role::z)};
   return std::isnan(point.x + point.y + point.z) ? Vector3<double>{} : point;
 }
