@@ -51,7 +51,7 @@ _risley() {
   if [[ $current == -* ]]; then
     case $verb in
       "") choices="--help --version" ;;
-      info) choices="$common --shot-rate-hz" ;;
+      info) choices="$common --shot-rate-hz --share --share-ranges" ;;
       report) choices="$common --output" ;;
       convert) choices="$common --output --format --sensor-type --shot-rate-hz" ;;
       simulate)

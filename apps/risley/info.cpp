@@ -2,11 +2,15 @@
 // SPDX-License-Identifier: MIT
 #include <memory>
 #include <optional>
+#include <string>
+#include <vector>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <spdlog/spdlog.h>
 
 #include "risley/core/angle.hpp"
+#include "risley/recordings/excerpt.hpp"
 #include "risley/recordings/time_audit.hpp"
 
 #include "command.hpp"
@@ -17,8 +21,15 @@
 namespace risley::app {
 namespace {
 
+using recordings::Excerpt;
 using recordings::TimeAuditResult;
 using recordings::ValueRange;
+
+struct InfoCommandOptions {
+  std::string input, share;
+  bool share_ranges = false;
+  ReadingWishes reading;
+};
 
 Json range_json(const std::optional<ValueRange>& range, double scale) {
   if (!range) return {{"min", nullptr}, {"max", nullptr}};
@@ -125,42 +136,109 @@ void print_audit(const recordings::Reader& reader, const TimeAuditResult& audit)
   table.print();
 }
 
+/// What an excerpt holds, and what of a recording it does not.
+struct ExcerptContents {
+  std::vector<std::string> holds, lacks;
+};
+
+ExcerptContents contents_of(const Excerpt& excerpt) {
+  ExcerptContents contents;
+  contents.holds = {excerpt.rounded ? "directions and their resolution, rounded" : "directions",
+                    excerpt.has_times ? "times from 0" : "shot numbers from 0",
+                    "shots without return in their places", "return numbers, tags and beams",
+                    "the type of the sensor and the format of the recording"};
+  contents.lacks = {"serial numbers",   "date and time of day", "file names",    "intensities",
+                    "inertial samples", "extrinsics",           "packet headers"};
+  auto& ranges = excerpt.has_ranges ? contents.holds : contents.lacks;
+  ranges.insert(ranges.begin() + 1, "ranges");
+  return contents;
+}
+
+Json excerpt_json(const std::string& path, const Excerpt& excerpt) {
+  const ExcerptContents contents = contents_of(excerpt);
+  return {{"output", path},
+          {"observations", excerpt.observations},
+          {"shots", excerpt.shots},
+          {"no_return", excerpt.no_return},
+          {"duration_s", excerpt.has_times ? Json(excerpt.duration) : Json()},
+          {"has_range", excerpt.has_ranges},
+          {"rounded", excerpt.rounded},
+          {"holds", contents.holds},
+          {"does_not_hold", contents.lacks}};
+}
+
+void print_excerpt(const std::string& path, const Excerpt& excerpt) {
+  const ExcerptContents contents = contents_of(excerpt);
+  const std::string duration =
+      excerpt.has_times ? fmt::format(" in {:.6g} s", excerpt.duration) : "";
+  fmt::print("\n{}: {} shots{}, {} observations without return\n", path, grouped(excerpt.shots),
+             duration, grouped(excerpt.no_return));
+  fmt::print("  holds: {}\n  does not hold: {}\n", fmt::join(contents.holds, "; "),
+             fmt::join(contents.lacks, "; "));
+  if (excerpt.rounded) {
+    fmt::print(
+        "  Directions are rounded because coordinates in whole steps give away their range; "
+        "it is left\n  known to a factor of two.\n");
+  }
+}
+
+ExitStatus run_info(const InfoCommandOptions& options, const CommonOptions& common) {
+  if (options.share_ranges && options.share.empty()) {
+    throw InvalidArgument("--share-ranges needs --share: it says what an excerpt holds");
+  }
+  std::optional<Excerpt> excerpt;
+  if (!options.share.empty()) {  // first, because it may have to be refused
+    ProgressBar bar("sharing", common);
+    excerpt =
+        recordings::write_excerpt(options.input, options.share, {.ranges = options.share_ranges},
+                                  read_options(options.reading), bar.callback());
+  }
+  const auto reader = open_input(options.input, options.reading);
+  recordings::TimeAudit audit;
+  std::optional<FileError> damage;
+  {
+    ProgressBar bar("reading", common);
+    recordings::Chunk chunk;
+    try {
+      while (reader->read(chunk)) {
+        audit.add(chunk);
+        bar.show(reader->fraction_read());
+      }
+    } catch (const FileError& error) {
+      damage = error;  // what was sound before is still told
+    }
+  }
+  TimeAuditResult result = audit.result();
+  result.pps_wraps = reader->clock_wraps();
+  log_warnings(options.input, reader->warnings());
+  if (damage) spdlog::error(damage->what());
+  if (common.json) {
+    Json object = audit_json(*reader, result);
+    if (excerpt) object["excerpt"] = excerpt_json(options.share, *excerpt);
+    if (damage) object.update(damage_json(*damage));
+    print_json(object);
+  } else {
+    print_audit(*reader, result);
+    if (excerpt) print_excerpt(options.share, *excerpt);
+  }
+  return damage ? kBadFile : kDone;
+}
+
 }  // namespace
 
 Run declare_info(CLI::App& verb) {
-  const auto input = std::make_shared<std::string>();
-  const auto reading = std::make_shared<ReadingWishes>();
-  verb.add_option("INPUT", *input, "Recording, of any known format")->required();
-  add_reading_options(verb, *reading);
-  return [input, reading](const CommonOptions& common) {
-    const auto reader = open_input(*input, *reading);
-    recordings::TimeAudit audit;
-    std::optional<FileError> damage;
-    {
-      ProgressBar bar("reading", common);
-      recordings::Chunk chunk;
-      try {
-        while (reader->read(chunk)) {
-          audit.add(chunk);
-          bar.show(reader->fraction_read());
-        }
-      } catch (const FileError& error) {
-        damage = error;  // what was sound before is still told
-      }
-    }
-    TimeAuditResult result = audit.result();
-    result.pps_wraps = reader->clock_wraps();
-    log_warnings(*input, reader->warnings());
-    if (damage) spdlog::error(damage->what());
-    if (common.json) {
-      Json object = audit_json(*reader, result);
-      if (damage) object.update(damage_json(*damage));
-      print_json(object);
-    } else {
-      print_audit(*reader, result);
-    }
-    return damage ? kBadFile : kDone;
-  };
+  const auto options = std::make_shared<InfoCommandOptions>();
+  verb.add_option("INPUT", options->input, "Recording, of any known format")->required();
+  verb.add_option("--share", options->share,
+                  "Write a small anonymous excerpt that can be sent to the developers (.nc): at "
+                  "most a second of the best-covered part, without serial numbers, date, "
+                  "intensities and ranges")
+      ->type_name("OUT");
+  verb.add_flag("--share-ranges", options->share_ranges,
+                "Let the excerpt hold ranges, too. They are left out otherwise because they show "
+                "the place where it was recorded; only calibrations on walls need them");
+  add_reading_options(verb, options->reading);
+  return [options](const CommonOptions& common) { return run_info(*options, common); };
 }
 
 }  // namespace risley::app

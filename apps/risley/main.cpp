@@ -27,7 +27,9 @@ struct Verb {
 
 constexpr Verb kVerbs[] = {
     {"info", "What a recording holds, with an audit of its times",
-     "  risley info recording.lvx\n  risley info recording.lvx --json", declare_info},
+     "  risley info recording.lvx\n  risley info recording.lvx --json\n"
+     "  risley info recording.lvx --share excerpt.nc",
+     declare_info},
     {"convert", "One recording format into another, by the ending of the output",
      "  risley convert recording.lvx -o recording.csv", declare_convert},
     {"simulate", "A recording whose truth is known",

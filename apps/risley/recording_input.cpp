@@ -12,10 +12,14 @@ void add_reading_options(CLI::App& verb, ReadingWishes& wishes) {
                   "counted, shots without return keep their places");
 }
 
+recordings::ReadOptions read_options(const ReadingWishes& wishes) {
+  if (wishes.shot_rate_hz) check_positive(*wishes.shot_rate_hz, "--shot-rate-hz", "Hz");
+  return {.shot_rate = wishes.shot_rate_hz};
+}
+
 std::unique_ptr<recordings::Reader> open_input(const std::string& path,
                                                const ReadingWishes& wishes) {
-  if (wishes.shot_rate_hz) check_positive(*wishes.shot_rate_hz, "--shot-rate-hz", "Hz");
-  auto reader = recordings::open_recording(path, {.shot_rate = wishes.shot_rate_hz});
+  auto reader = recordings::open_recording(path, read_options(wishes));
   spdlog::debug("{} is {}", path, reader->header().format);
   return reader;
 }

@@ -20,6 +20,9 @@ struct ReadingWishes {
 /// Declares --shot-rate-hz.
 void add_reading_options(CLI::App& verb, ReadingWishes& wishes);
 
+/// @throws InvalidArgument naming the option
+recordings::ReadOptions read_options(const ReadingWishes& wishes);
+
 /// What a reading verb does first. @throws FileError, InvalidArgument naming the option
 std::unique_ptr<recordings::Reader> open_input(const std::string& path,
                                                const ReadingWishes& wishes);

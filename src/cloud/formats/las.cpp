@@ -23,17 +23,27 @@
 namespace risley::cloud::las {
 namespace {
 
+using recordings::las::kAdjustedGpsTime;
+using recordings::las::kBeamField;
+using recordings::las::kDescriptorBytes;
+using recordings::las::kExtraBytesNumber;
+using recordings::las::kGpsOrigin;
+using recordings::las::kIntensityFactor;
+using recordings::las::kRecordHeaderBytes;
+using recordings::las::kSecond;
+using recordings::las::kSpecificationUser;
+using recordings::las::kTagField;
+using recordings::las::leap_seconds;
+
 static_assert(std::endian::native == std::endian::little,
               "numbers are copied to files as they stand in memory");
 
-constexpr std::int64_t kSecond = 1'000'000'000;  // ns
 /// Greatest X, Y or Z in steps of the scale.
 constexpr double kMaxSteps = std::numeric_limits<std::int32_t>::max();
 /// Added to a number of steps, it rounds it to the nearest integer, whose 32 bits are then the
 /// low half of the sum.
 constexpr double kRoundingShift = 0x1.8p52;
 constexpr std::size_t kMaxRecordBytes = std::numeric_limits<std::uint16_t>::max();
-constexpr std::size_t kExtraBytesDescriptor = 192;
 
 template <class T>
 std::uint8_t* put(std::uint8_t* out, std::type_identity_t<T> value) {
@@ -76,7 +86,7 @@ std::string generating_software(const CloudHeader& header) {
 }
 
 void append_descriptor(std::string& data, const PointField& field) {
-  std::array<std::uint8_t, kExtraBytesDescriptor> bytes{};
+  std::array<std::uint8_t, kDescriptorBytes> bytes{};
   bytes[2] = field.type == FieldType::uint8 ? 1 : 9;
   put_text(bytes.data() + 4, field.name, 32);
   put_text(bytes.data() + 160, field.description, 32);
@@ -101,19 +111,6 @@ VariableLengthRecord coordinate_system(Version version, const CloudHeader& heade
   std::memcpy(data.data(), kKeys, sizeof kKeys);
   return {"LASF_Projection", 34735, "GeoTIFF GeoKeyDirectoryTag", std::move(data)};
 }
-
-/// How much GPS time is ahead of UTC, s. Earlier than July 2012 none of these sensors measured.
-constexpr std::int64_t leap_seconds(std::int64_t utc_ns) {
-  constexpr std::int64_t k2017 = 1'483'228'800 * kSecond;  // 2017-01-01
-  constexpr std::int64_t k2015 = 1'435'708'800 * kSecond;  // 2015-07-01
-  constexpr std::int64_t k2012 = 1'341'100'800 * kSecond;  // 2012-07-01
-  if (utc_ns >= k2017) return 18;
-  if (utc_ns >= k2015) return 17;
-  return utc_ns >= k2012 ? 16 : 15;
-}
-
-/// Seconds between 1970-01-01 and the origin of adjusted GPS time, 1e9 s after 1980-01-06.
-constexpr std::int64_t kGpsOrigin = 315'964'800 + 1'000'000'000;
 
 double seconds(std::int64_t time_ns, std::int64_t shift) {
   const std::int64_t whole = time_ns / kSecond;
@@ -142,15 +139,16 @@ Layout::Layout(Version version, const CloudHeader& header, const CloudWriterOpti
   std::string descriptors;
   for (const PointField& field : floats_) append_descriptor(descriptors, field);
   for (const PointField& field : sensor_fields()) {
-    if (field.name == "Tag" || field.name == "Beam") append_descriptor(descriptors, field);
+    if (field.name == kTagField || field.name == kBeamField) append_descriptor(descriptors, field);
   }
   if (descriptors.size() > kMaxRecordBytes) {
     const std::size_t others = floats_.size() + 2 - loadings.size();
     throw InvalidArgument(fmt::format("factors = {}, allowed up to {} in a LAS file",
                                       header.factors.size(),
-                                      (kMaxRecordBytes / kExtraBytesDescriptor - others) / 3));
+                                      (kMaxRecordBytes / kDescriptorBytes - others) / 3));
   }
-  records_.push_back({"LASF_Spec", 4, "Extra bytes", std::move(descriptors)});
+  records_.push_back(
+      {kSpecificationUser, kExtraBytesNumber, "Extra bytes", std::move(descriptors)});
   records_.push_back(coordinate_system(version_, header));
   std::string text;
   for (const auto& [name, value] : header.provenance) text += fmt::format("{} = {}\n", name, value);
@@ -161,12 +159,12 @@ Layout::Layout(Version version, const CloudHeader& header, const CloudWriterOpti
         fmt::format("provenance = {} bytes of text, allowed up to {} in a LAS file",
                     text.size() - 1, kMaxRecordBytes - 1));
   }
-  records_.push_back({"LASF_Spec", 3, "How the cloud was made", std::move(text)});
+  records_.push_back({kSpecificationUser, 3, "How the cloud was made", std::move(text)});
 }
 
 std::uint16_t Layout::global_encoding() const {
   const unsigned wkt = version_ == Version::las_1_4 ? 1U << 4 : 0U;
-  return static_cast<std::uint16_t>(wkt | (gps_time_ ? 1U : 0U));
+  return static_cast<std::uint16_t>(wkt | (gps_time_ ? kAdjustedGpsTime : 0U));
 }
 
 HeaderNumbers Layout::numbers(const Summary& summary) const {
@@ -190,7 +188,8 @@ HeaderNumbers Layout::numbers(const Summary& summary) const {
 
 std::vector<std::uint8_t> Layout::head(const Summary& summary) const {
   std::size_t length = header_bytes();
-  for (const VariableLengthRecord& record : records_) length += 54 + record.data.size();
+  for (const VariableLengthRecord& record : records_)
+    length += kRecordHeaderBytes + record.data.size();
   std::vector<std::uint8_t> bytes(length, 0);
   const HeaderNumbers numbers = this->numbers(summary);
   const bool modern = version_ == Version::las_1_4;
@@ -351,7 +350,7 @@ void Layout::pack_returns(const Points& points, std::size_t first, std::size_t r
   const int shift = modern ? 4 : 3;
   for (std::size_t i = 0; i < rows; ++i) {
     const std::uint32_t bits = std::uint32_t{number[i]} | (std::uint32_t{total[i]} << shift);
-    returns_[i] = (std::uint32_t{intensity[i]} << 8) | (bits << 16);
+    returns_[i] = (std::uint32_t{intensity[i]} * kIntensityFactor) | (bits << 16);
   }
   // Two tables, because a count must not wait for the one just before it.
   std::array<std::array<std::uint32_t, 16>, 2> counts{};

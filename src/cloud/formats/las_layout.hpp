@@ -12,6 +12,7 @@
 #include "risley/cloud/cloud_writer.hpp"
 
 #include "cloud/formats/point_fields.hpp"
+#include "recordings/formats/las_header.hpp"
 
 namespace risley::cloud::las {
 
@@ -65,8 +66,10 @@ class Layout {
 
   Version version() const { return version_; }
   double scale() const { return scale_; }
-  std::size_t header_bytes() const { return version_ == Version::las_1_4 ? 375 : 227; }
-  std::size_t base_record_bytes() const { return version_ == Version::las_1_4 ? 30 : 28; }
+  std::size_t header_bytes() const {
+    return recordings::las::header_bytes(version_ == Version::las_1_4 ? 4 : 2);
+  }
+  std::size_t base_record_bytes() const { return recordings::las::kRecordBytes[point_format()]; }
   std::size_t record_bytes() const { return record_bytes_; }
   std::uint8_t point_format() const { return version_ == Version::las_1_4 ? 6 : 1; }
   std::uint16_t global_encoding() const;

@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -35,11 +37,17 @@ extern const Format kViewerCsvFormat;        // viewer_csv.cpp
 extern const Format kNetcdfFormat;           // netcdf.cpp
 extern const Format kRos1BagFormat;          // ros1_bag.cpp
 extern const Format kRos2BagFormat;          // ros2_bag.cpp
+extern const Format kLasFormat;              // las.cpp
+extern const Format kLazFormat;              // las.cpp, laz.cpp
 extern const Format kPcdFormat;              // pcd.cpp
 extern const Format kPlyFormat;              // ply.cpp
 extern const Format kNpyFormat;              // numpy.cpp
 extern const Format kNpzFormat;              // numpy.cpp
 extern const Format kNamedCsvFormat;         // named_csv.cpp
+
+/// Shots that share a time on average where it is that of their packet or frame: packets hold 96
+/// points and more.
+inline constexpr std::size_t kShotsOfOneTime = 32;
 
 /// Detail by which a NetCDF file remembers the format its rows first came from.
 inline constexpr const char* kSourceFormat = "source_format";

@@ -26,8 +26,6 @@ constexpr int kFinestDecimals = 6;
 constexpr double kFloat32Precision = 0x1p-22, kFloat64Precision = 0x1p-50;
 constexpr double kFarthest = 1e9;         // m
 constexpr double kAngleSlack_deg = 1e-4;  // of float32 at 360
-/// Rows that share a time on average: packets hold 96 points and more.
-constexpr std::size_t kRowsOfOneTime = 32;
 /// Times of 2001 to 2099 as seconds since 1970.
 constexpr double kEarliestEpoch = 1e9, kLatestEpoch = 4.1e9;
 
@@ -328,7 +326,7 @@ bool NamedColumns::is_shared_by_many(const Source& time) const {
     most_returns = std::fmax(most_returns, extent(returns->samples).second + 1.0);
   }
   if (times == 1) return static_cast<double>(rows) > most_returns;
-  return times > 0 && rows / times >= kRowsOfOneTime;
+  return times > 0 && rows / times >= kShotsOfOneTime;
 }
 
 int NamedColumns::time_shift(const Source& time, RecordingHeader& header,

@@ -15,6 +15,8 @@ const std::vector<const Format*>& all_formats() {
       &kScanSequenceCsvFormat,
       &kRos1BagFormat,
       &kRos2BagFormat,
+      &kLasFormat,
+      &kLazFormat,
       &kPcdFormat,
       &kPlyFormat,
       &kNpyFormat,

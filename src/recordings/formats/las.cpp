@@ -1,0 +1,424 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+// LAS and LAZ files as recordings: clouds whose points stand in the frame of the sensor. What a
+// file leaves open is told by its first points: how coarse its coordinates are, whether GPS times
+// are those of single shots, and what intensities are multiplied by.
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "risley/core/error.hpp"
+
+#include "recordings/formats/cartesian.hpp"
+#include "recordings/formats/format.hpp"
+#include "recordings/formats/las_points.hpp"
+#include "recordings/formats/little_endian.hpp"
+#include "recordings/formats/seconds.hpp"
+
+namespace risley::recordings {
+namespace las {
+namespace {
+
+constexpr std::size_t kPointsLookedAt = 8192;
+/// So many different coordinates that all are multiples of a coarser step are so on purpose.
+constexpr std::size_t kChangesForStep = 16;
+constexpr double kFarthest = 10e3;  // none of these sensors sees a twentieth of it
+constexpr std::string_view kAxes = "xyz";
+
+/// Points without compression.
+class PlainPoints final : public PointSource {
+ public:
+  PlainPoints(BlockInput input, const PublicHeader& header, std::vector<ReadWarning>& warnings)
+      : input_(std::move(input)), header_(header) {
+    const std::uint64_t room = (header_.points_end - header_.points_at) / header_.record_bytes;
+    points_ = std::min(header_.points, room);
+    if (header_.points == 0 && room > 0) {
+      // A program that fills in its counter last was interrupted.
+      points_ = header_.points = room;
+      warnings.push_back(
+          {{.byte_offset = header_.points_at, .line = {}},
+           fmt::format("the header counts no points; the {} that follow it were read", room),
+           0});
+    }
+    if (header_.points < room) {
+      warnings.push_back({{.byte_offset = place_of(header_.points), .line = {}},
+                          fmt::format("the header counts {} points; those that follow were left "
+                                      "out",
+                                      header_.points),
+                          room - header_.points});
+    }
+  }
+
+  std::size_t read(std::span<Point> points) override {
+    if (next_ == points_ && points_ < header_.points) {
+      throw FileError(
+          input_.path(), {.byte_offset = place_of(points_), .line = {}},
+          fmt::format(
+              "expected {} points of {} bytes, as the header counts them, found room for "
+              "{} up to byte {}, where {}",
+              header_.points, header_.record_bytes, points_, header_.points_end,
+              header_.points_end < input_.size() ? "other records begin" : "the file ends"));
+    }
+    std::size_t done = 0;
+    for (; done < points.size() && next_ < points_; ++done, ++next_) {
+      const std::uint8_t* record = nullptr;
+      try {
+        record = input_.at(place_of(next_), header_.record_bytes);
+      } catch (const FileError&) {
+        if (done == 0) throw;
+        break;  // the next call meets it again
+      }
+      points[done] = decode(record);
+    }
+    return done;
+  }
+
+  FilePlace gps_time_place(std::uint64_t point) const override {
+    return {.byte_offset = place_of(point) + gps_time_at(header_.point_format).value_or(0),
+            .line = {}};
+  }
+
+  double fraction_read() const override {
+    return points_ == 0 ? 1.0 : static_cast<double>(next_) / static_cast<double>(points_);
+  }
+
+ private:
+  std::uint64_t place_of(std::uint64_t point) const {
+    return header_.points_at + point * header_.record_bytes;
+  }
+
+  Point decode(const std::uint8_t* record) const {
+    Point point;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      point.steps[axis] = load<std::int32_t>(record + 4 * axis);
+    }
+    point.intensity = load<std::uint16_t>(record + 12);
+    const std::uint8_t returns = record[14];
+    if (is_modern(header_.point_format)) {
+      point.return_number = returns & 15U;
+      point.number_of_returns = returns >> 4U;
+      point.beam = (record[15] >> 4U) & 3U;
+    } else {
+      point.return_number = returns & 7U;
+      point.number_of_returns = (returns >> 3U) & 7U;
+    }
+    if (const auto at = gps_time_at(header_.point_format)) {
+      point.gps_time = load<double>(record + *at);
+    }
+    if (header_.tag_at) point.tag = record[*header_.tag_at];
+    if (header_.beam_at) point.beam = record[*header_.beam_at];
+    return point;
+  }
+
+  BlockInput input_;
+  PublicHeader header_;
+  std::uint64_t points_ = 0;  ///< that the file holds
+  std::uint64_t next_ = 0;
+};
+
+/// Whether a point is a further return of the shot of the point before it.
+bool is_further_return(const Point& point, const Point& before) {
+  return point.return_number > 1 && point.return_number > before.return_number &&
+         point.gps_time == before.gps_time;
+}
+
+/// The file's scale, or 10, 100, ... times that where all coordinates are multiples of it: what was
+/// measured in millimetres may stand in tenths of them.
+double step_of(std::span<const Point> points, std::size_t axis, double scale) {
+  std::int64_t multiple = 1, before = 0;
+  std::size_t changes = 0;  // a plane at a round distance has none
+  for (const Point& point : points) {
+    if (point.steps[axis] != 0 && point.steps[axis] != before) ++changes;
+    before = point.steps[axis];
+  }
+  if (changes < kChangesForStep) return scale;
+  const auto all_multiples = [&](std::int64_t of) {
+    return std::all_of(points.begin(), points.end(),
+                       [&](const Point& point) { return point.steps[axis] % of == 0; });
+  };
+  while (all_multiples(10 * multiple)) multiple *= 10;
+  return scale * static_cast<double>(multiple);
+}
+
+class LasReader final : public Reader {
+ public:
+  LasReader(const std::string& path, std::string_view format) : path_(path) {
+    BlockInput input(path);
+    file_ = read_header(input, warnings_);
+    source_ = file_.compressed ? open_compressed_points(std::move(input), file_, warnings_)
+                               : open_points(std::move(input), file_, warnings_);
+    header_.format = format;
+    header_.cartesian = true;
+    header_.devices.push_back(device());
+    look_ahead();
+    learn_step();
+    learn_times();
+    learn_intensity();
+    for (const Point& point : ahead_) {
+      const std::uint8_t returns = std::max(point.return_number, point.number_of_returns);
+      header_.returns_per_shot = std::max<int>(header_.returns_per_shot, returns);
+    }
+    warn_of_maps();
+  }
+
+  bool read(Chunk& chunk, std::size_t max_rows) override {
+    chunk.clear();
+    Observations& rows = chunk.observations;
+    rows.resize(std::min(max_rows, kDefaultChunkRows));
+    std::size_t done = 0;
+    try {
+      for (; done < rows.size() && fill(); ++done) set_row(rows, done, ahead_[taken_++]);
+    } catch (const FileError& error) {
+      pending_.emplace(error);
+      // Points behind one that makes no sense are not looked at.
+      ahead_.clear();
+      taken_ = 0;
+    }
+    rows.resize(done);
+    if (done == 0 && pending_) throw FileError(*pending_);
+    return done > 0;
+  }
+
+  double fraction_read() const override { return source_->fraction_read(); }
+
+ private:
+  /// As our own clouds tell it: maker and model, then the serial number.
+  Device device() const {
+    Device device;
+    device.type = kUnknownDeviceType;
+    for (const std::uint8_t type : std::array<std::uint8_t, 5>{1, 2, 3, 6, 7}) {
+      const std::string name = device_type_name(type);
+      if (!file_.system_identifier.starts_with(name)) continue;
+      const std::string rest = file_.system_identifier.substr(name.size());
+      if (!rest.empty() && !rest.starts_with(' ')) continue;
+      device.type = type;
+      if (file_.generating_software.starts_with("risley") && !rest.empty()) {
+        device.serial = rest.substr(1);
+      }
+    }
+    return device;
+  }
+
+  void look_ahead() {
+    ahead_.resize(kPointsLookedAt);
+    std::size_t count = 0;
+    try {
+      while (count < ahead_.size()) {
+        const std::size_t more = source_->read(std::span(ahead_).subspan(count));
+        if (more == 0) break;
+        count += more;
+      }
+    } catch (const FileError& error) {
+      pending_.emplace(error);
+    }
+    ahead_.resize(count);
+  }
+
+  /// Makes sure that there is a next point. @return false at the end @throws FileError
+  bool fill() {
+    if (taken_ < ahead_.size()) return true;
+    if (pending_) throw FileError(*pending_);
+    ahead_.resize(kPointsLookedAt);
+    taken_ = 0;
+    try {
+      ahead_.resize(source_->read(ahead_));
+    } catch (...) {
+      ahead_.clear();
+      throw;
+    }
+    return !ahead_.empty();
+  }
+
+  void warn(FilePlace place, std::string message) {
+    warnings_.push_back({place, std::move(message), 0});
+  }
+
+  Vector3<double> position(const Point& point) const {
+    const auto coordinate = [&](std::size_t axis) {
+      return point.steps[axis] * file_.scale[axis] + file_.offset[axis];
+    };
+    const Vector3<double> position{coordinate(0), coordinate(1), coordinate(2)};
+    // An offset that is no multiple of the scale must not turn a null point into a direction.
+    const bool null = std::abs(position.x) < 0.5 * file_.scale[0] &&
+                      std::abs(position.y) < 0.5 * file_.scale[1] &&
+                      std::abs(position.z) < 0.5 * file_.scale[2];
+    return null ? Vector3<double>{} : position;
+  }
+
+  void learn_step() {
+    std::array<double, 3> steps{};
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      steps[axis] = step_of(ahead_, axis, file_.scale[axis]);
+    }
+    const auto [least, most] = std::minmax_element(steps.begin(), steps.end());
+    step_ = *most;
+    // Equal but for the rounding of decimal fractions is equal.
+    if (*most <= *least * (1 + 1e-9)) return;
+    warn({}, fmt::format("coordinates are multiples of {:g}, {:g} and {:g} m in x, y and z; {:g} m "
+                         "is taken for all",
+                         steps[0], steps[1], steps[2], step_));
+  }
+
+  /// Decides what GPS times are.
+  void learn_times() {
+    const bool adjusted = (file_.global_encoding & kAdjustedGpsTime) != 0;
+    if (!gps_time_at(file_.point_format)) {
+      header_.has_times = false;
+      warn({}, fmt::format("points of format {} have no times; rows are taken in their order as "
+                           "that of firing",
+                           file_.point_format));
+      return;
+    }
+    std::size_t shots = 0, times = 0, backwards = 0;
+    double first = 0, last = 0;
+    for (std::size_t i = 0; i < ahead_.size(); ++i) {
+      const double time = ahead_[i].gps_time;
+      if (i > 0 && is_further_return(ahead_[i], ahead_[i - 1])) continue;
+      ++shots;
+      if (times == 0 || time != last) ++times;
+      if (times > 1 && time < last) ++backwards;
+      if (i == 0) first = time;
+      last = time;
+    }
+    if ((times == 1 && shots > 1) || (times > 0 && shots / times >= kShotsOfOneTime)) {
+      header_.has_times = false;
+      warn({}, fmt::format("GPS times are no times of single shots: {} of the first {} shots {}; "
+                           "rows are taken in their order as that of firing",
+                           times == 1 ? "all" : fmt::format("{} on average", shots / times), shots,
+                           times == 1 ? fmt::format("have {} s", first) : "share one"));
+      return;
+    }
+    if (adjusted) header_.time_reference = TimeReference::utc;
+    if (backwards > 0) {
+      warn({}, fmt::format("GPS times go back {} times in the first {} shots: the points are not "
+                           "in the order of firing, which an estimation needs",
+                           backwards, shots));
+    }
+  }
+
+  void learn_intensity() {
+    unsigned greatest = 0;
+    bool all_256 = true, all_257 = true;
+    for (const Point& point : ahead_) {
+      greatest = std::max<unsigned>(greatest, point.intensity);
+      all_256 = all_256 && point.intensity % kIntensityFactor == 0;
+      all_257 = all_257 && point.intensity % (kIntensityFactor + 1) == 0;
+    }
+    header_.has_intensity = greatest > 0;
+    if (greatest <= UINT8_MAX) return;
+    // 65535 / 255 is 257.
+    intensity_divisor_ = all_257 && !all_256 ? kIntensityFactor + 1 : kIntensityFactor;
+  }
+
+  void warn_of_maps() {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      if (std::abs(file_.offset[axis]) > kFarthest) {
+        warn_of_map(fmt::format("the offset of {} is {} m", kAxes[axis], file_.offset[axis]));
+        return;
+      }
+    }
+  }
+
+  void warn_of_map(const std::string& reason) {
+    map_reported_ = true;
+    warn({}, fmt::format("points must be in the frame of the sensor, with the sensor at the "
+                         "origin; these look like coordinates of a map: {}. Export them without "
+                         "georeference",
+                         reason));
+  }
+
+  void set_row(Observations& rows, std::size_t row, const Point& point) {
+    const bool further = row_ > 0 && is_further_return(point, last_);
+    rows.time_ns[row] = header_.has_times ? time_ns(point) : next_shot_ - (further ? 1 : 0);
+    if (!further) ++next_shot_;
+    set_cartesian(rows, row, position(point), step_);
+    rows.intensity[row] = intensity(point);
+    rows.return_number[row] = std::max<std::uint8_t>(point.return_number, 1);
+    rows.tag[row] = point.tag;
+    rows.beam[row] = point.beam;
+    rows.device[row] = 0;
+    if (rows.range[row] > kFarthest && !map_reported_) {
+      warn_of_map(fmt::format("point {} is {:.0f} m from the origin", row_ + 1, rows.range[row]));
+    }
+    last_ = point;
+    ++row_;
+  }
+
+  std::int64_t time_ns(const Point& point) const {
+    const bool utc = header_.time_reference == TimeReference::utc;
+    const auto time =
+        utc ? utc_of_adjusted_gps(point.gps_time) : nanoseconds_from_seconds(point.gps_time);
+    if (time) return *time;
+    throw FileError(path_, source_->gps_time_place(row_),
+                    fmt::format("expected a GPS time of point {} within +-{:g} s, found {}",
+                                row_ + 1, utc ? 7e9 : 9.2e9, point.gps_time));
+  }
+
+  std::uint8_t intensity(const Point& point) {
+    const unsigned value = point.intensity / intensity_divisor_;
+    if (value <= UINT8_MAX) return static_cast<std::uint8_t>(value);
+    if (!intensity_reported_) {
+      intensity_reported_ = true;
+      warn({}, fmt::format("the intensity of point {} is {}, while the first {} points have none "
+                           "above 255; what is above is given as 255",
+                           row_ + 1, point.intensity, kPointsLookedAt));
+    }
+    return UINT8_MAX;
+  }
+
+  std::string path_;
+  PublicHeader file_;
+  std::unique_ptr<PointSource> source_;
+  std::vector<Point> ahead_;  ///< read and not all given yet
+  std::size_t taken_ = 0;     ///< of these
+  std::optional<FileError> pending_;
+  double step_ = 0;  ///< m
+  unsigned intensity_divisor_ = 1;
+  bool map_reported_ = false, intensity_reported_ = false;
+  Point last_;
+  std::uint64_t row_ = 0;
+  std::int64_t next_shot_ = 0;
+};
+
+bool is_las(std::string_view head) { return head.starts_with("LASF"); }
+
+bool is_compressed(std::string_view head) {
+  return head.size() > kPointFormatAt &&
+         (static_cast<unsigned char>(head[kPointFormatAt]) & kCompressionMark) != 0;
+}
+
+}  // namespace
+
+std::unique_ptr<PointSource> open_points(BlockInput input, const PublicHeader& header,
+                                         std::vector<ReadWarning>& warnings) {
+  return std::make_unique<PlainPoints>(std::move(input), header, warnings);
+}
+
+}  // namespace las
+
+const Format kLasFormat = {
+    "las",
+    "",
+    "LAS 1.0 to 1.4: points in the frame of the sensor (read only)",
+    [](std::string_view head) { return las::is_las(head) && !las::is_compressed(head); },
+    [](const std::string& path) -> std::unique_ptr<Reader> {
+      return std::make_unique<las::LasReader>(path, "las");
+    },
+    nullptr,
+};
+
+const Format kLazFormat = {
+    "laz",
+    "",
+    "LAS compressed by LASzip: points in the frame of the sensor (read only)",
+    [](std::string_view head) { return las::is_las(head) && las::is_compressed(head); },
+    [](const std::string& path) -> std::unique_ptr<Reader> {
+      return std::make_unique<las::LasReader>(path, "laz");
+    },
+    nullptr,
+};
+
+}  // namespace risley::recordings
