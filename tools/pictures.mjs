@@ -13,6 +13,7 @@ const root = resolve(fileURLToPath(import.meta.url), '../..');
 const command = process.env.RISLEY_COMMAND;
 const folder = join(root, 'out/pictures'); // the commands run here, as those of the tutorials
 const images = join(root, 'docs/images');
+const recordings = process.env.RISLEY_VENDOR_DATA; // real ones; their pictures are left out without
 
 // ---- what is computed, each once ----
 
@@ -36,6 +37,8 @@ const steps = {
     need('calibrate');
     run('risley cloud out/hall.lvx --calibration out/calibration/calibration.yaml -o out/hall.npy');
   },
+  real: () => run(`risley estimate ${resolve(recordings, 'real/mid-40-hub-frame.csv')} ` +
+    '--shot-rate-hz 100000 -o out/real/'),
   reproduce: () => run('risley reproduce -o out/reproduction/'),
 };
 
@@ -78,6 +81,12 @@ const pictures = [
     file: 'reproduce.png', needs: ['reproduce'], page: 'out/reproduction/report.html', width: 1160,
     keep: [{ css: '.verdict' }, { section: /^Table 3: a simulated/, without: 'figure', rows: 10, columns: 6 },
            { figure: /^\([ab]\) prism [AB]$/ }],
+  },
+  {
+    file: 'real-mid-40.png', needs: ['real'], page: 'out/real/report.html', width: 1160,
+    skip: !recordings && 'RISLEY_VENDOR_DATA does not name a folder of real recordings',
+    keep: [{ css: '.verdict' }, { figure: /residuals over (time|the field of view)/i },
+           { figure: /^Scan pattern/ }],
   },
   { file: 'info.png', needs: ['unit'], terminal: infoLines },
   { file: 'convert.png', needs: ['unit'], terminal: convertLines },
@@ -304,7 +313,12 @@ if (!again) {
 const browser = await launch();
 try {
   for (const picture of pictures) {
-    if (wanted.length === 0 || wanted.includes(picture.file)) await take(browser, picture);
+    if (wanted.length > 0 && !wanted.includes(picture.file)) continue;
+    if (picture.skip) {
+      console.log(`${picture.file}: SKIPPED, ${picture.skip}`);
+    } else {
+      await take(browser, picture);
+    }
   }
 } finally {
   await browser.close();

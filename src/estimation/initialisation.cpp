@@ -41,8 +41,12 @@ constexpr double kDecisive = 25.0;
 /// How far outside the sensor's field of view a shot is noise or a unit's own error, rad, and how
 /// many shots may lie there.
 constexpr double kFieldMargin = radians_from_degrees(1.5);
-constexpr double kFewOutside = 0.15;
+constexpr double kFewOutside = 0.03;
 constexpr double kFrameSigma = radians_from_degrees(1.0);
+/// A turn that leaves all shots in the field of view is believed from this angle on, rad, where it
+/// takes this share of the residuals away.
+constexpr double kLeastTurn = radians_from_degrees(0.3);
+constexpr double kTurnGain = 0.1;
 
 /// A fit of parameters and one parabola per rotor to a few shots.
 struct WindowFit {
@@ -239,24 +243,29 @@ struct Trial {
 struct Answer {
   Trial trial;
   WindowFit fit;
+  bool frame_is_free = false;
 };
 
 /// The shots of a window, ready to be fitted under any hypothesis.
 class StartWindow {
  public:
+  /// @param frame  of the recording, roughly
   StartWindow(const AngleSeries& head, const sensors::Sensor& sensor, const StartOptions& options,
-              const Eigen::Matrix3d& frame, bool frame_is_free)
-      : options_(options), frame_(frame), series_(head), noise_(least_noise(options)) {
+              const Eigen::Matrix3d& frame)
+      : options_(options),
+        frame_(frame),
+        series_(head),
+        noise_(least_noise(options)),
+        frame_parameters_(frame_parameters(sensor.prisms(), kFrameSigma)) {
     if (!frame.isIdentity()) turn(series_, frame.transpose());
     search_.emplace(series_);
-    if (frame_is_free) frame_parameters_ = frame_parameters(sensor.prisms(), kFrameSigma);
   }
 
   const LineSearch& search() const { return *search_; }
-  const Eigen::Matrix3d& frame() const { return frame_; }
 
-  /// @param most  shots to take part
-  WindowFit fit(const Trial& trial, std::size_t most) const {
+  /// @param most           shots to take part
+  /// @param frame_is_free  whether the frame's turn is fitted too
+  Answer answer(const Trial& trial, std::size_t most, bool frame_is_free) const {
     const Hypothesis& h = *trial.hypothesis;
     const AngleSeries shots = chosen(h.mirrored, most);
     const ShotRange all{0, shots.size()};
@@ -269,8 +278,11 @@ class StartWindow {
       fit.knot.state[3 * k] = sign * line.phase + kPi / 2;
       fit.knot.state[3 * k + 1] = sign * line.angular_velocity;
     }
-    WindowFitter(shots, h.sensor.train, options_.free, frame_parameters_, noise_).run(fit);
-    return fit;
+    const std::vector<FreeParameter> none;
+    WindowFitter(shots, h.sensor.train, options_.free, frame_is_free ? frame_parameters_ : none,
+                 noise_)
+        .run(fit);
+    return {trial, std::move(fit), frame_is_free};
   }
 
   std::size_t size(std::size_t most) const { return chosen(false, most).size(); }
@@ -291,7 +303,7 @@ class StartWindow {
       start.rotation_angle.push_back(wrap_to_pi(answer.fit.knot.state[3 * k]));
       start.angular_velocity.push_back(answer.fit.knot.state[3 * k + 1]);
     }
-    if (frame_parameters_.empty()) return start;
+    if (!answer.frame_is_free) return start;
     // The mirror of the mirrored recording: its frame turns the other way in elevation.
     Eigen::Matrix3d total = frame_;
     if (h.mirrored) {
@@ -337,13 +349,14 @@ RotorLines exchanged(RotorLines lines) {
 }
 
 /// Best answers of all trials, best first; answers that differ in nothing but the last digits once.
-std::vector<Answer> answers_of(const StartWindow& window, const std::vector<Trial>& trials) {
+std::vector<Answer> answers_of(const StartWindow& window, const std::vector<Trial>& trials,
+                               bool frame_is_free) {
   double least = std::numeric_limits<double>::infinity();
   for (const Trial& trial : trials) least = std::min(least, trial.lines.unexplained);
   std::vector<Answer> answers;
   for (const Trial& trial : trials) {
     if (trial.lines.unexplained > kHopeless * least) continue;
-    answers.push_back({trial, window.fit(trial, kEnoughShots)});
+    answers.push_back(window.answer(trial, kEnoughShots, frame_is_free));
   }
   std::stable_sort(answers.begin(), answers.end(),
                    [](const Answer& a, const Answer& b) { return a.fit.rms < b.fit.rms; });
@@ -393,9 +406,8 @@ EstimationError unknown_speeds(const RotorLines& found, const sensors::Sensor& s
 }
 
 /// Looks for the best answer in one window.
-Start find_in_window(const StartWindow& window, const sensors::Sensor& sensor,
-                     const StartOptions& options) {
-  const std::vector<Hypothesis> hypotheses = hypotheses_of(sensor, options.mirrored);
+Answer find_in_window(const StartWindow& window, const sensors::Sensor& sensor,
+                      const std::vector<Hypothesis>& hypotheses, bool frame_is_free) {
   const LineSearch& search = window.search();
   std::vector<Trial> trials;
   for (const Hypothesis& h : hypotheses) {
@@ -403,7 +415,7 @@ Start find_in_window(const StartWindow& window, const sensors::Sensor& sensor,
       trials.push_back({&h, std::move(lines)});
     }
   }
-  std::vector<Answer> answers = answers_of(window, trials);
+  std::vector<Answer> answers = answers_of(window, trials, frame_is_free);
   if (answers.empty() || answers.front().fit.rms > kGoodResidual) {
     double fastest = 0;
     for (const double speed : sensor.angular_velocity) fastest = std::max(fastest, std::abs(speed));
@@ -416,7 +428,7 @@ Start find_in_window(const StartWindow& window, const sensors::Sensor& sensor,
         }
       }
     }
-    const std::vector<Answer> more = answers_of(window, farther);
+    const std::vector<Answer> more = answers_of(window, farther, frame_is_free);
     answers.insert(answers.end(), more.begin(), more.end());
     std::stable_sort(answers.begin(), answers.end(),
                      [](const Answer& a, const Answer& b) { return a.fit.rms < b.fit.rms; });
@@ -436,8 +448,8 @@ Start find_in_window(const StartWindow& window, const sensors::Sensor& sensor,
   });
   if (rival != answers.end() &&
       chi2_lead(answers.front(), *rival, window.size(kEnoughShots)) < kDecisive) {
-    Answer one = answers.front(), other = *rival;
-    for (Answer* answer : {&one, &other}) answer->fit = window.fit(answer->trial, kManyShots);
+    Answer one = window.answer(answers.front().trial, kManyShots, frame_is_free);
+    Answer other = window.answer(rival->trial, kManyShots, frame_is_free);
     if (other.fit.rms < one.fit.rms) std::swap(one, other);
     if (!same_answer(one, other, resolved)) {
       if (chi2_lead(one, other, window.size(kManyShots)) < kDecisive) {
@@ -448,9 +460,9 @@ Start find_in_window(const StartWindow& window, const sensors::Sensor& sensor,
             other.trial.hypothesis->words(), degrees_from_radians(other.fit.rms)));
       }
     }
-    return window.start_of(one);
+    return one;
   }
-  return window.start_of(answers.front());
+  return answers.front();
 }
 
 /// Share of the shots outside the cone that a sensor reaches about an axis.
@@ -483,7 +495,7 @@ Eigen::Matrix3d turned_frame(const AngleSeries& head, const sensors::Sensor& sen
        std::atan2(-middle.z(), std::hypot(middle.x(), middle.y()))});
   constexpr int kRounds = 6;
   for (int round = 0; round < kRounds; ++round) {
-    const StartWindow window(head, sensor, options, frame, false);
+    const StartWindow window(head, sensor, options, frame);
     std::optional<RotorLines> best;
     for (const Hypothesis& h : hypotheses_of(sensor, options.mirrored)) {
       for (const RotorLines& lines : window.search().near(h.recorded_speeds(), kUsualShare, 1)) {
@@ -526,12 +538,18 @@ Start find_start(const AngleSeries& head, const sensors::Sensor& sensor,
   const bool turned = options.turned.value_or(
       sensor.field_of_view > 0 &&
       share_outside(head, Eigen::Vector3d::UnitX(), half_field) > kFewOutside);
-  if (!turned) {
-    return find_in_window(StartWindow(head, sensor, options, Eigen::Matrix3d::Identity(), false),
-                          sensor, options);
-  }
-  const Eigen::Matrix3d frame = turned_frame(head, sensor, options);
-  return find_in_window(StartWindow(head, sensor, options, frame, true), sensor, options);
+  const std::vector<Hypothesis> hypotheses = hypotheses_of(sensor, options.mirrored);
+  const StartWindow window(head, sensor, options,
+                           turned ? turned_frame(head, sensor, options)
+                                  : Eigen::Matrix3d(Eigen::Matrix3d::Identity()));
+  const Answer found = find_in_window(window, sensor, hypotheses, turned);
+  const Start start = window.start_of(found);
+  if (turned || options.turned || options.free.empty()) return start;
+  // A small turn leaves the shots in the field of view and shows in the residuals alone.
+  const Start free = window.start_of(window.answer(found.trial, kManyShots, true));
+  const Start held = window.start_of(window.answer(found.trial, kManyShots, false));
+  const bool far = std::hypot(free.frame->yaw, free.frame->pitch) > kLeastTurn;
+  return far && free.residual_rms < (1.0 - kTurnGain) * held.residual_rms ? free : start;
 }
 
 void prepare_shots(AngleSeries& series, const Start& start) {

@@ -1,0 +1,102 @@
+#!/usr/bin/env python3
+# SPDX-FileCopyrightText: 2026 The risley authors
+# SPDX-License-Identifier: MIT
+"""Fills in docs/real-units.md: runs `risley estimate` on real recordings and writes what was found
+between the marks of the page. The recordings are not part of this repository; the page says where
+they come from.
+
+Usage: real_units.py RISLEY FOLDER
+  RISLEY  the built command
+  FOLDER  holds the recordings under the names below; those that are missing keep their old text
+"""
+import hashlib
+import json
+import pathlib
+import subprocess
+import sys
+import tempfile
+
+PAGE = pathlib.Path(__file__).resolve().parent.parent / "docs" / "real-units.md"
+
+# Mark in the page: file, and how it has to be read.
+RECORDINGS = {
+    "mid-40-hub-frame": ("real/mid-40-hub-frame.csv", ["--shot-rate-hz", "100000"]),
+    "mid-40-sequence": ("livox-mid-40-sequence.csv", []),
+}
+
+
+def number(value, sigma):
+    """Value and sigma to the second digit of the sigma."""
+    if not sigma > 0:
+        return f"{value:.6g}", ""
+    digits = max(0, 1 - int(f"{sigma:e}".split("e")[1]))
+    return f"{value:.{digits}f}", f"{sigma:.{digits}f}"
+
+
+def unit_of(name):
+    for ending, unit in (("_deg_per_s", "deg/s"), ("_deg", "deg")):
+        if name.endswith(ending):
+            return unit
+    return "1"
+
+
+def table(rows):
+    lines = ["| quantity | value | sigma | unit |", "|---|---|---|---|"]
+    for name, value, sigma, unit in rows:
+        text, spread = number(value, sigma)
+        lines.append(f"| {name} | {text} | {spread} | {unit} |")
+    return lines
+
+
+def text_of(command, path, options):
+    with tempfile.TemporaryDirectory() as folder:
+        words = [command, "estimate", path, *options, "--json"]
+        done = subprocess.run(words + ["-o", folder], capture_output=True, text=True, check=False)
+    if done.returncode != 0:
+        raise SystemExit(f"{path}: exit status {done.returncode}\n{done.stderr}")
+    found = json.loads(done.stdout)
+    digest = hashlib.sha256(path.read_bytes()).hexdigest()
+    rows = [(name.replace("_", " ").removesuffix(" deg per s").removesuffix(" deg"), one["value"],
+             one["sigma"], unit_of(name)) for name, one in found["parameters"].items()]
+    if found["frame"]["estimated"]:
+        rows += [(f"{axis} of the frame", found["frame"][f"{axis}_deg"]["value"],
+                  found["frame"][f"{axis}_deg"]["sigma"], "deg") for axis in ("yaw", "pitch")]
+    for axis in ("azimuth", "zenith"):
+        noise = found["noise"][f"{axis}_deg"]
+        rows.append((f"noise of the {axis}, rounding apart", noise["value"], noise["sigma"], "deg"))
+    residual = {axis: found["residuals"][f"{axis}_deg"]["rms"] for axis in ("azimuth", "zenith")}
+    lines = [
+        "```sh",
+        " ".join(["risley estimate", path.name, *options]),
+        "```",
+        "",
+        f"`{path.name}`, SHA-256 `{digest}`, {found['observations_used']} directions used, "
+        f"{found['outliers']} of them left out. Speed combination {found['combination']}, "
+        f"{'mirrored' if found['mirrored'] else 'not mirrored'}; residuals (root mean square) "
+        f"{residual['azimuth']:.2g} degree in azimuth and {residual['zenith']:.2g} in zenith.",
+        "",
+        *table(rows),
+    ]
+    return "\n".join(lines)
+
+
+def main():
+    if len(sys.argv) != 3:
+        print(__doc__, file=sys.stderr)
+        return 2
+    command, folder = pathlib.Path(sys.argv[1]).resolve(), pathlib.Path(sys.argv[2])
+    page = PAGE.read_text(encoding="utf-8")
+    for mark, (name, options) in RECORDINGS.items():
+        if not (folder / name).exists():
+            print(f"{folder / name} is not there: its text stays as it is")
+            continue
+        begin, end = f"<!-- begin {mark} -->\n", f"<!-- end {mark} -->"
+        before, rest = page.split(begin)
+        page = before + begin + text_of(command, folder / name, options) + "\n" + end + rest.split(end)[1]
+        print(f"{mark}: written")
+    PAGE.write_text(page, encoding="utf-8")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
