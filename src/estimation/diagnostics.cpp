@@ -70,6 +70,7 @@ double robust_scale(std::span<const double> azimuth, std::span<const double> zen
 Autocorrelation autocorrelation(std::span<const std::int64_t> time_ns,
                                 std::span<const double> azimuth, std::span<const double> zenith,
                                 std::span<const unsigned char> skip) {
+  constexpr double kSignificant = 3.0;  // sigmas
   constexpr std::size_t kBlocks = 8, kBlockShots = 50000, kMostLags = 4000;
   Autocorrelation result;
   if (time_ns.size() < 100) return result;
@@ -132,7 +133,7 @@ Autocorrelation autocorrelation(std::span<const std::int64_t> time_ns,
     // variance of the sum of many is that of white residuals times the squared factor.
     const double count = static_cast<double>(group);
     const double spread = std::min(scatter * count * count, result.factor * result.factor * count);
-    if (!(sum > 2.5 * std::sqrt(spread / (2.0 * fewest_pairs)))) break;
+    if (!(sum > kSignificant * std::sqrt(spread / (2.0 * fewest_pairs)))) break;
     for (const double one : rho) scatter += 2.0 * one * one;
     result.factor += 2.0 * sum;
     result.rho.insert(result.rho.end(), rho.begin(), rho.end());

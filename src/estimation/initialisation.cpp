@@ -31,8 +31,9 @@ constexpr std::size_t kEnoughShots = 1000, kManyShots = 20000;
 /// clock or rotors are further off are found among all pairs.
 constexpr double kUsualShare = 0.06, kFarthestShare = 0.2;
 constexpr std::size_t kMostCandidates = 4;
-/// A pair of lines that leaves so many times as much as the best need not be tried.
-constexpr double kHopeless = 4.0;
+/// A pair of lines that leaves so many times as much as the best need not be tried, unless it leaves no
+/// more than what two lines cannot describe anyway, as a mean square.
+constexpr double kHopeless = 4.0, kSecondOrder = 3e-5;
 /// Residual of a fit that no other pair of speeds needs to compete with, rad: rotors that wander
 /// and noise of any usual size leave less, a wrong pair more.
 constexpr double kGoodResidual = radians_from_degrees(0.08);
@@ -54,6 +55,7 @@ struct WindowFit {
   RotorTrajectory knot;  // a single one
   Eigen::Matrix3d frame = Eigen::Matrix3d::Identity();  // of the shots, from the sensor's
   double rms = std::numeric_limits<double>::infinity();
+  double prior_chi2 = 0;  // of the parameters: how unusual a sensor it would be
 };
 
 /// Robust least squares with Levenberg's damping: first the motion, then the parameters too.
@@ -68,6 +70,27 @@ class WindowFitter {
     weights_.angle_noise = equal_noise(noise);
     azimuth_.resize(shots.size());
     zenith_.resize(shots.size());
+  }
+
+  /// Moves the rotation angles to the best of a grid over whole turns, with the fit's speeds and
+  /// parameters: where shots in a corner of the field told little of the lines' phases.
+  void look_around(WindowFit& fit) {
+    constexpr int kSteps = 24;
+    constexpr double kMiss = radians_from_degrees(2.0);  // of a grid's angles
+    weights_.softening = softening_at(kMiss / weights_.angle_noise.azimuth);
+    WindowFit best = fit, trial = fit;
+    double least = std::numeric_limits<double>::infinity();
+    for (int a = 0; a < kSteps; ++a) {
+      for (int b = 0; b < kSteps; ++b) {
+        trial.knot.state[0] = kTwoPi * a / kSteps;
+        trial.knot.state[3] = kTwoPi * b / kSteps;
+        const double cost = evaluate(trial);
+        if (cost >= least) continue;
+        least = cost;
+        best = trial;
+      }
+    }
+    fit = std::move(best);
   }
 
   void run(WindowFit& fit) {
@@ -102,6 +125,7 @@ class WindowFitter {
     }
     fit.rms = robust_scale(azimuth_, zenith_);
     if (!std::isfinite(fit.rms)) fit.rms = std::numeric_limits<double>::infinity();
+    fit.prior_chi2 = prior_chi2(fit);
   }
 
  private:
@@ -131,6 +155,15 @@ class WindowFitter {
     return offset;
   }
 
+  double prior_chi2(const WindowFit& fit) const {
+    const Eigen::VectorXd offset = offsets(fit);
+    double chi2 = 0;
+    for (Eigen::Index i = 0; i < offset.size(); ++i) {
+      chi2 += std::pow(offset[i] / all_[static_cast<std::size_t>(i)].prior_sigma, 2);
+    }
+    return chi2;
+  }
+
   double evaluate(const WindowFit& fit) {
     const AngleSeries* series = &shots_;
     if (turns()) {
@@ -139,11 +172,7 @@ class WindowFitter {
       series = &turned_;
     }
     accumulate(*series, fit.knot, fit.train, all_, weights_, equations_, {azimuth_, zenith_, {}});
-    double cost = equations_.cost;
-    const Eigen::VectorXd offset = offsets(fit);
-    for (Eigen::Index i = 0; i < offset.size(); ++i) {
-      cost += std::pow(offset[i] / all_[static_cast<std::size_t>(i)].prior_sigma, 2);
-    }
+    double cost = equations_.cost + prior_chi2(fit);
     for (int k = 0; k < fit.knot.prisms; ++k) {
       cost += std::pow(fit.knot.state[static_cast<std::size_t>(3 * k + 2)] / kAccelerationSigma, 2);
     }
@@ -188,8 +217,7 @@ class WindowFitter {
   }
 
   const AngleSeries& shots_;
-  const std::vector<FreeParameter>& free_;
-  std::vector<FreeParameter> all_;
+  std::vector<FreeParameter> free_, all_;
   Eigen::VectorXd prior_;
   ShotWeights weights_;
   NormalEquations equations_;
@@ -278,10 +306,23 @@ class StartWindow {
       fit.knot.state[3 * k] = sign * line.phase + kPi / 2;
       fit.knot.state[3 * k + 1] = sign * line.angular_velocity;
     }
-    const std::vector<FreeParameter> none;
-    WindowFitter(shots, h.sensor.train, options_.free, frame_is_free ? frame_parameters_ : none,
-                 noise_)
-        .run(fit);
+    const std::vector<FreeParameter> frame =
+        frame_is_free ? frame_parameters_ : std::vector<FreeParameter>();
+    const WindowFit from_lines = fit;
+    WindowFitter fitter(shots, h.sensor.train, options_.free, frame, noise_);
+    fitter.run(fit);
+    // Where the lines explain next to nothing more than others would, their phases mean little.
+    if (!(fit.rms < kGoodResidual) &&
+        (trial.lines.unexplained < kSecondOrder || !std::isfinite(fit.rms))) {
+      constexpr std::size_t kGridShots = 150;
+      const AngleSeries few = chosen(h.mirrored, kGridShots);
+      WindowFit around = from_lines;
+      around.knot.last_shot[0] = few.size();
+      WindowFitter(few, h.sensor.train, {}, {}, noise_).look_around(around);
+      around.knot.last_shot[0] = shots.size();
+      fitter.run(around);
+      if (around.rms < fit.rms) fit = std::move(around);
+    }
     return {trial, std::move(fit), frame_is_free};
   }
 
@@ -348,6 +389,20 @@ RotorLines exchanged(RotorLines lines) {
   return lines;
 }
 
+/// Twice the logarithm of how much likelier an answer is than a rival: residuals of unknown noise, two
+/// per shot, and parameters about the sensor's.
+double chi2_lead(const Answer& answer, const Answer& rival, std::size_t shots) {
+  return 4.0 * static_cast<double>(shots) * std::log(rival.fit.rms / answer.fit.rms) +
+         rival.fit.prior_chi2 - answer.fit.prior_chi2;
+}
+
+void sort_by_likelihood(std::vector<Answer>& answers, std::size_t shots) {
+  std::erase_if(answers, [](const Answer& answer) { return !std::isfinite(answer.fit.rms); });
+  std::stable_sort(answers.begin(), answers.end(), [shots](const Answer& a, const Answer& b) {
+    return chi2_lead(a, b, shots) > 0;
+  });
+}
+
 /// Best answers of all trials, best first; answers that differ in nothing but the last digits once.
 std::vector<Answer> answers_of(const StartWindow& window, const std::vector<Trial>& trials,
                                bool frame_is_free) {
@@ -355,11 +410,10 @@ std::vector<Answer> answers_of(const StartWindow& window, const std::vector<Tria
   for (const Trial& trial : trials) least = std::min(least, trial.lines.unexplained);
   std::vector<Answer> answers;
   for (const Trial& trial : trials) {
-    if (trial.lines.unexplained > kHopeless * least) continue;
+    if (trial.lines.unexplained > std::max(kHopeless * least, kSecondOrder)) continue;
     answers.push_back(window.answer(trial, kEnoughShots, frame_is_free));
   }
-  std::stable_sort(answers.begin(), answers.end(),
-                   [](const Answer& a, const Answer& b) { return a.fit.rms < b.fit.rms; });
+  sort_by_likelihood(answers, window.size(kEnoughShots));
   return answers;
 }
 
@@ -372,12 +426,6 @@ bool same_answer(const Answer& a, const Answer& b, double resolved) {
     }
   }
   return true;
-}
-
-/// By how much the chi2 of a rival exceeds the best one's.
-double chi2_lead(const Answer& best, const Answer& rival, std::size_t shots) {
-  const double ratio = rival.fit.rms / best.fit.rms;
-  return 2.0 * static_cast<double>(shots) * (ratio * ratio - 1.0);
 }
 
 /// What to say of lines that are no combination of the sensor's speeds.
@@ -411,7 +459,20 @@ Answer find_in_window(const StartWindow& window, const sensors::Sensor& sensor,
   const LineSearch& search = window.search();
   std::vector<Trial> trials;
   for (const Hypothesis& h : hypotheses) {
-    for (RotorLines& lines : search.near(h.recorded_speeds(), kUsualShare, kMostCandidates)) {
+    const auto [a, b] = h.recorded_speeds();
+    // A combination and the mirror image of the other have the same lines, the other way round.
+    const auto twin = std::find_if(trials.begin(), trials.end(), [&](const Trial& trial) {
+      return trial.hypothesis->recorded_speeds() == std::pair(b, a);
+    });
+    if (twin != trials.end()) {
+      const Hypothesis* other = twin->hypothesis;
+      const std::size_t count = trials.size();
+      for (std::size_t i = 0; i < count; ++i) {
+        if (trials[i].hypothesis == other) trials.push_back({&h, exchanged(trials[i].lines)});
+      }
+      continue;
+    }
+    for (RotorLines& lines : search.near({a, b}, kUsualShare, kMostCandidates)) {
       trials.push_back({&h, std::move(lines)});
     }
   }
@@ -430,8 +491,7 @@ Answer find_in_window(const StartWindow& window, const sensors::Sensor& sensor,
     }
     const std::vector<Answer> more = answers_of(window, farther, frame_is_free);
     answers.insert(answers.end(), more.begin(), more.end());
-    std::stable_sort(answers.begin(), answers.end(),
-                     [](const Answer& a, const Answer& b) { return a.fit.rms < b.fit.rms; });
+    sort_by_likelihood(answers, window.size(kEnoughShots));
     const bool better_elsewhere =
         !everywhere.empty() &&
         (answers.empty() ||
@@ -450,7 +510,7 @@ Answer find_in_window(const StartWindow& window, const sensors::Sensor& sensor,
       chi2_lead(answers.front(), *rival, window.size(kEnoughShots)) < kDecisive) {
     Answer one = window.answer(answers.front().trial, kManyShots, frame_is_free);
     Answer other = window.answer(rival->trial, kManyShots, frame_is_free);
-    if (other.fit.rms < one.fit.rms) std::swap(one, other);
+    if (chi2_lead(one, other, window.size(kManyShots)) < 0) std::swap(one, other);
     if (!same_answer(one, other, resolved)) {
       if (chi2_lead(one, other, window.size(kManyShots)) < kDecisive) {
         throw EstimationError(fmt::format(
@@ -546,10 +606,9 @@ Start find_start(const AngleSeries& head, const sensors::Sensor& sensor,
   const Start start = window.start_of(found);
   if (turned || options.turned || options.free.empty()) return start;
   // A small turn leaves the shots in the field of view and shows in the residuals alone.
-  const Start free = window.start_of(window.answer(found.trial, kManyShots, true));
-  const Start held = window.start_of(window.answer(found.trial, kManyShots, false));
+  const Start free = window.start_of(window.answer(found.trial, kEnoughShots, true));
   const bool far = std::hypot(free.frame->yaw, free.frame->pitch) > kLeastTurn;
-  return far && free.residual_rms < (1.0 - kTurnGain) * held.residual_rms ? free : start;
+  return far && free.residual_rms < (1.0 - kTurnGain) * start.residual_rms ? free : start;
 }
 
 void prepare_shots(AngleSeries& series, const Start& start) {

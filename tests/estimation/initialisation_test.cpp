@@ -146,11 +146,11 @@ TEST(Initialisation, ATurnedFrameIsFoundAboutItsOpticalAxis) {
 TEST(Initialisation, WhatTwoAnswersDescribeEquallyWellIsRefused) {
   // A patch of the field so small that the optics leave no mark in it.
   const auto sensor = sensors::load_sensor("mid-40");
-  const auto whole = testing::constant_speed_series(sensor, 0.5, 2.5, 0.1, 100000.0, 0.05, 5);
+  const auto whole = testing::constant_speed_series(sensor, 0.5, 2.5, 0.1, 100000.0, 0.1, 5);
   AngleSeries head;
   for (std::size_t i = 0; i < whole.size(); ++i) {
-    if (std::abs(whole.azimuth[i]) < 2.5 * kDegree &&
-        std::abs(whole.zenith[i] - kPi / 2) < 2.5 * kDegree) {
+    if (std::abs(whole.azimuth[i]) < 2 * kDegree &&
+        std::abs(whole.zenith[i] - kPi / 2) < 2 * kDegree) {
       head.append(whole, i);
     }
   }

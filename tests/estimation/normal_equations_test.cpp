@@ -402,7 +402,7 @@ TEST(NormalEquations, ScalingScalesAllInformation) {
        {&half.series.azimuth_rounding_variance, &half.series.zenith_rounding_variance}) {
     for (float& variance : *column) variance *= 4.0F;
   }
-  accumulate(half.series, half.knots, train, free, {2 * kNoise}, wide);
+  accumulate(half.series, half.knots, train, free, {equal_noise(2 * kNoise)}, wide);
   const auto expect_scaled = [](const auto& found, const auto& expected) {
     ASSERT_EQ(found.size(), expected.size());
     for (std::size_t i = 0; i < static_cast<std::size_t>(found.size()); ++i) {
