@@ -334,7 +334,8 @@ ExitStatus run_estimate(const EstimateCommandOptions& options, const CommonOptio
   check_options(options);
   std::optional<double> rate;
   if (options.rate() != "full") rate = positive_number(options.rate(), "--rate-hz", "Hz");
-  RecordingInput input = read_recording(options.input, options.reading, {rate}, common);
+  RecordingInput input =
+      read_recording(options.input, options.reading, options.sensor, {rate}, common);
   const estimation::EstimateOptions settings = estimate_options(options, input.reader->header());
   const estimation::SelectionCounts& counts = input.selector.counts();
   spdlog::debug(
@@ -343,7 +344,7 @@ ExitStatus run_estimate(const EstimateCommandOptions& options, const CommonOptio
       counts.rows, input.reader->header().format, counts.invalid, counts.out_of_order,
       input.selector.series().size(), settings.sensor.name);
   Outcome outcome;
-  outcome.warnings = warning_texts(input.reader->warnings());
+  outcome.warnings = input.warnings;
   if (counts.clock_resets > 0) {
     outcome.warnings.push_back(
         fmt::format("the clock of the recording jumps back {} times: the pieces share the "

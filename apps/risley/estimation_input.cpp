@@ -8,6 +8,8 @@
 #include "risley/core/error.hpp"
 #include "risley/sensors/preset.hpp"
 
+#include "recording_text.hpp"
+
 namespace risley::app {
 namespace {
 
@@ -30,14 +32,23 @@ sensors::Sensor sensor_of_recording(const recordings::RecordingHeader& header) {
   return *found;
 }
 
+/// @param wished  as EstimationWishes::sensor
+sensors::Sensor chosen_sensor(const std::string& wished,
+                              const recordings::RecordingHeader& header) {
+  return wished.empty() ? sensor_of_recording(header) : sensors::load_sensor(wished);
+}
+
 }  // namespace
 
 RecordingInput read_recording(const std::string& path, const ReadingWishes& reading,
+                              const std::string& sensor,
                               const estimation::SelectionOptions& selection,
                               const CommonOptions& common) {
   const double started = now();
-  RecordingInput result{open_input(path, reading), {}, estimation::ShotSelector(selection)};
-  recordings::require_times(result.reader->header());
+  SensorFrameInput input = open_in_sensor_frame(path, reading, [&sensor](const auto& header) {
+    return chosen_sensor(sensor, header).field_of_view;
+  });
+  RecordingInput result{std::move(input.reader), {}, estimation::ShotSelector(selection), {}, 0};
   if (result.reader->header().devices.size() > 1) {
     throw InvalidArgument(
         fmt::format("{} holds {} sensors, an estimation takes the recording of one", path,
@@ -52,6 +63,8 @@ RecordingInput read_recording(const std::string& path, const ReadingWishes& read
     bar.show(result.reader->fraction_read());
   }
   result.audit = audit.result();
+  result.warnings = warning_texts(result.reader->warnings());
+  result.warnings.insert(result.warnings.end(), input.warnings.begin(), input.warnings.end());
   result.seconds = now() - started;
   return result;
 }
@@ -61,7 +74,7 @@ estimation::EstimateOptions estimate_options(
   estimation::EstimateOptions result;
   if (wishes.sensor.empty() && !header) throw InvalidArgument("--sensor is missing");
   result.sensor =
-      wishes.sensor.empty() ? sensor_of_recording(*header) : sensors::load_sensor(wishes.sensor);
+      header ? chosen_sensor(wishes.sensor, *header) : sensors::load_sensor(wishes.sensor);
   const int prisms = result.sensor.prisms();
   if (wishes.noise_angle_deg) {
     check_positive(*wishes.noise_angle_deg, "--noise-angle-deg", "deg");

@@ -22,11 +22,14 @@ struct RecordingInput {
   std::unique_ptr<recordings::Reader> reader;
   recordings::TimeAuditResult audit;
   estimation::ShotSelector selector;
+  std::vector<std::string> warnings;  ///< of the reader, and about the recording's frame
   double seconds = 0;
 };
 
-/// Reads all of a recording of one sensor, which must have times.
+/// Reads all of a recording of one sensor, which must have times, in the sensor's frame.
+/// @param sensor  as EstimationWishes::sensor
 RecordingInput read_recording(const std::string& path, const ReadingWishes& reading,
+                              const std::string& sensor,
                               const estimation::SelectionOptions& selection,
                               const CommonOptions& common);
 

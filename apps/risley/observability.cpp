@@ -115,7 +115,9 @@ ExitStatus run_observability(const ObservabilityCommandOptions& options,
     if (!options.rate_hz.empty() && options.rate_hz != "full") {
       rate = positive_number(options.rate_hz, "--rate-hz", "Hz");
     }
-    RecordingInput input = read_recording(options.input, options.reading, {rate}, common);
+    RecordingInput input =
+        read_recording(options.input, options.reading, wishes.sensor, {rate}, common);
+    for (const std::string& warning : input.warnings) spdlog::warn(warning);
     const estimation::EstimateOptions settings = estimate_options(wishes, input.reader->header());
     prisms = settings.sensor.prisms();
     ProgressBar bar("estimating", common);
