@@ -56,12 +56,12 @@ recordings::ReadOptions read_options(const ReadingWishes& wishes) {
 
 std::unique_ptr<recordings::Reader> open_with(const std::string& path,
                                               const recordings::ReadOptions& options) {
-  auto reader = recordings::open_recording(path, options);
-  if (options.extrinsics && reader->header().devices.size() > 1) {
-    throw InvalidArgument(fmt::format("--extrinsics is the pose of one sensor, {} holds {}", path,
-                                      reader->header().devices.size()));
+  if (!options.extrinsics) return recordings::open_recording(path, options);
+  try {
+    return recordings::open_recording(path, options);
+  } catch (const InvalidArgument& error) {  // several sensors
+    throw InvalidArgument(fmt::format("--extrinsics, {}: {}", path, error.what()));
   }
-  return reader;
 }
 
 /// Shots of the first second.

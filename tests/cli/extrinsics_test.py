@@ -129,7 +129,7 @@ class ExtrinsicsTest(CommandTest):
 
     def test_cloud_does_not_mix_frames(self):
         cloud = ("--calibration", "mid-40", "--directions", "reported", "-o")
-        refused = self.expect(1, "cloud", "hub.lvx", *cloud, "no.csv", "--extrinsics", "0,0,0")
+        refused = self.expect(1, "cloud", "turned.csv", *cloud, "no.csv")
         self.assertIn("--extrinsics YAW,PITCH,ROLL", refused.stderr)
         self.assertIn("deg in yaw", refused.stderr)
         self.assertNotIn("no.csv", self.names())
