@@ -51,28 +51,28 @@ _risley() {
   if [[ $current == -* ]]; then
     case $verb in
       "") choices="--help --version" ;;
-      info) choices="$common --shot-rate-hz --share --share-ranges" ;;
+      info) choices="$common --shot-rate-hz --extrinsics --share --share-ranges" ;;
       report) choices="$common --output" ;;
-      convert) choices="$common --output --format --sensor-type --shot-rate-hz" ;;
+      convert) choices="$common --output --format --sensor-type --shot-rate-hz --extrinsics" ;;
       simulate)
         choices="$common --output --sensor --duration-s --rate-hz --noise-angle-deg
           --noise-range-m --quantize --beam-origin --rotor --set --reported --scene --station
           --start-angles-deg" ;;
       estimate)
         choices="$common --output --method --rate-hz --noise-angle-deg --sensor --fix --free
-          --states --mirror --process-noise --truth --shot-rate-hz" ;;
+          --states --mirror --process-noise --truth --shot-rate-hz --extrinsics" ;;
       observability)
         choices="$common --sensor --duration-s --rate-hz --noise-angle-deg --no-rounding
-          --fix --free --shot-rate-hz" ;;
+          --fix --free --shot-rate-hz --extrinsics" ;;
       calibrate)
         choices="$common --output --method --planes --stations --station --plan --duration-s
           --rate-hz --noise-angle-deg --noise-range-m --sensor --fix --free --prior-sigma-deg
-          --range-offset-sigma-m --beam-origin --states --mirror --truth --shot-rate-hz" ;;
+          --range-offset-sigma-m --beam-origin --states --mirror --truth --shot-rate-hz --extrinsics" ;;
       cloud)
         choices="$common --output --calibration --format --directions --beam-origin --covariance
           --beam-divergence --common-factors --rate-hz --noise-angle-deg --las-scale-m --time
-          --beam-origin-map --shot-rate-hz" ;;
-      reproduce) choices="$common --output --full --recording --shot-rate-hz" ;;
+          --beam-origin-map --shot-rate-hz --extrinsics" ;;
+      reproduce) choices="$common --output --full --recording --shot-rate-hz --extrinsics" ;;
     esac
     mapfile -t COMPREPLY < <(compgen -W "$choices" -- "$current")
     return

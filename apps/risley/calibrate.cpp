@@ -111,7 +111,7 @@ RangedRecording read_and_estimate(const CalibrateCommandOptions& options,
   if (options.rate_hz != "full") {
     selection.rate = positive_number(options.rate_hz, "--rate-hz", "Hz");
   }
-  RecordingInput input = read_recording(path, options.reading, selection, common);
+  RecordingInput input = read_recording(path, options.reading, options.sensor, selection, common);
   outcome.read_s += input.seconds;
   outcome.observations += input.audit.observations;
   outcome.reported.push_back(reported_recording(path, input));
@@ -123,7 +123,7 @@ RangedRecording read_and_estimate(const CalibrateCommandOptions& options,
       EstimationWishes{options.sensor, options.noise_angle_deg, {}, {}}, input.reader->header());
   if (options.mirror != "auto") settings.mirrored = options.mirror == "yes";
   if (number == 0) outcome.nominal = settings.sensor;
-  for (const std::string& text : input_warnings(input, options.sensor)) {
+  for (const std::string& text : input.warnings) {
     outcome.warnings.push_back(fmt::format("{}: {}", path, text));
   }
   const double started = now();

@@ -140,9 +140,11 @@ report::Provenance calibration_provenance(const std::string& calibration) {
 FileOutcome make_one(const FileJob& job, const ReadingWishes& reading,
                      const cloud::CloudOptions& settings, const sensors::Sensor& calibration,
                      const Progress& progress) {
-  const auto reader = open_input(job.input, reading);
-  const cloud::CloudSummary s =
-      cloud::make_cloud(*reader, calibration, job.output, settings, progress);
+  const SensorFrameInput input = open_in_sensor_frame(
+      job.input, reading, [&calibration](const auto&) { return calibration.field_of_view; });
+  cloud::CloudSummary s =
+      cloud::make_cloud(*input.reader, calibration, job.output, settings, progress);
+  s.warnings.insert(s.warnings.begin(), input.warnings.begin(), input.warnings.end());
   log_warnings(job.input, s.read_warnings);
   for (const std::string& warning : s.warnings) spdlog::warn("{}: {}", job.input, warning);
   if (s.damage) {

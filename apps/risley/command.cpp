@@ -12,6 +12,7 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include "risley/cloud/rotor_tracking.hpp"
 #include "risley/core/error.hpp"
 #include "risley/recordings/reader.hpp"
 
@@ -92,6 +93,10 @@ Failure current_failure() {
     if (error.place().byte_offset) details["byte_offset"] = *error.place().byte_offset;
     if (error.place().line) details["line"] = *error.place().line;
     return {kBadFile, error.what(), details};
+  } catch (const cloud::TurnedFrame& error) {
+    const std::string text =
+        fmt::format("{}: say it with --extrinsics YAW,PITCH,ROLL", error.what());
+    return {kNumbersFailed, text, {{"converged", false}, {"reason", text}}};
   } catch (const EstimationError& error) {
     return {kNumbersFailed, error.what(), {{"converged", false}, {"reason", error.what()}}};
   } catch (const Interrupted& error) {

@@ -355,7 +355,8 @@ ExitStatus run_estimate(const EstimateCommandOptions& options, const CommonOptio
   std::optional<double> rate;
   if (options.rate() != "full") rate = positive_number(options.rate(), "--rate-hz", "Hz");
   RecordingInput input =
-      read_recording(options.input, options.reading, {.rate = rate, .ranges = true}, common);
+      read_recording(options.input, options.reading, options.sensor,
+                     {.rate = rate, .ranges = true, .rows = false}, common);
   const estimation::EstimateOptions settings = estimate_options(options, input.reader->header());
   const estimation::SelectionCounts& counts = input.selector.counts();
   spdlog::debug(
@@ -364,7 +365,7 @@ ExitStatus run_estimate(const EstimateCommandOptions& options, const CommonOptio
       counts.rows, input.reader->header().format, counts.invalid, counts.out_of_order,
       input.selector.series().size(), settings.sensor.name);
   Outcome outcome;
-  outcome.warnings = input_warnings(input, options.sensor);
+  outcome.warnings = input.warnings;
   outcome.read_s = input.seconds;
   const double solving = now();
   {

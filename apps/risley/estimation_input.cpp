@@ -40,14 +40,23 @@ sensors::Sensor sensor_of_recording(const recordings::RecordingHeader& header) {
   return *found;
 }
 
+/// @param wished  as EstimationWishes::sensor
+sensors::Sensor chosen_sensor(const std::string& wished,
+                              const recordings::RecordingHeader& header) {
+  return wished.empty() ? sensor_of_recording(header) : sensors::load_sensor(wished);
+}
+
 }  // namespace
 
 RecordingInput read_recording(const std::string& path, const ReadingWishes& reading,
+                              const std::string& sensor,
                               const estimation::SelectionOptions& selection,
                               const CommonOptions& common) {
   const double started = now();
-  RecordingInput result{open_input(path, reading), {}, estimation::ShotSelector(selection)};
-  recordings::require_times(result.reader->header());
+  SensorFrameInput input = open_in_sensor_frame(path, reading, [&sensor](const auto& header) {
+    return chosen_sensor(sensor, header).field_of_view;
+  });
+  RecordingInput result{std::move(input.reader), {}, estimation::ShotSelector(selection), {}, 0};
   if (result.reader->header().devices.size() > 1) {
     throw InvalidArgument(
         fmt::format("{} holds {} sensors, an estimation takes the recording of one", path,
@@ -62,6 +71,19 @@ RecordingInput read_recording(const std::string& path, const ReadingWishes& read
     bar.show(result.reader->fraction_read());
   }
   result.audit = audit.result();
+  result.warnings = warning_texts(result.reader->warnings());
+  result.warnings.insert(result.warnings.end(), input.warnings.begin(), input.warnings.end());
+  if (sensor.empty() && !names_its_sensor(result.reader->header())) {
+    result.warnings.push_back(
+        "the file does not say which sensor recorded it: a Mid-40 was assumed; --sensor says which");
+  }
+  const std::uint64_t resets = result.selector.counts().clock_resets;
+  if (resets > 0) {
+    result.warnings.push_back(fmt::format("the clock of the recording jumps back {} times: the "
+                                          "pieces share the parameters, and their rotors are found "
+                                          "anew",
+                                          resets));
+  }
   result.seconds = now() - started;
   return result;
 }
@@ -71,7 +93,7 @@ estimation::EstimateOptions estimate_options(
   estimation::EstimateOptions result;
   if (wishes.sensor.empty() && !header) throw InvalidArgument("--sensor is missing");
   result.sensor =
-      wishes.sensor.empty() ? sensor_of_recording(*header) : sensors::load_sensor(wishes.sensor);
+      header ? chosen_sensor(wishes.sensor, *header) : sensors::load_sensor(wishes.sensor);
   result.cartesian = header && header->cartesian;
   const int prisms = result.sensor.prisms();
   if (wishes.noise_angle_deg) {
@@ -94,21 +116,6 @@ estimation::EstimateOptions estimate_options(
   }
   result.additional = wishes.freed;
   return result;
-}
-
-std::vector<std::string> input_warnings(const RecordingInput& input, const std::string& sensor) {
-  std::vector<std::string> warnings = warning_texts(input.reader->warnings());
-  if (sensor.empty() && !names_its_sensor(input.reader->header())) {
-    warnings.push_back(
-        "the file does not say which sensor recorded it: a Mid-40 was assumed; --sensor says which");
-  }
-  const std::uint64_t resets = input.selector.counts().clock_resets;
-  if (resets > 0) {
-    warnings.push_back(fmt::format("the clock of the recording jumps back {} times: the pieces "
-                                   "share the parameters, and their rotors are found anew",
-                                   resets));
-  }
-  return warnings;
 }
 
 void add_parameter_choice(CLI::App& verb, std::vector<std::string>& fixed,

@@ -22,11 +22,14 @@ struct RecordingInput {
   std::unique_ptr<recordings::Reader> reader;
   recordings::TimeAuditResult audit;
   estimation::ShotSelector selector;
+  std::vector<std::string> warnings;  ///< of the reader, about frame, sensor and clock
   double seconds = 0;
 };
 
-/// Reads all of a recording of one sensor, which must have times.
+/// Reads all of a recording of one sensor, which must have times, in the sensor's frame.
+/// @param sensor  as EstimationWishes::sensor
 RecordingInput read_recording(const std::string& path, const ReadingWishes& reading,
+                              const std::string& sensor,
                               const estimation::SelectionOptions& selection,
                               const CommonOptions& common);
 
@@ -40,9 +43,6 @@ struct EstimationWishes {
 /// @param header  of the recording; without one the wishes must name a sensor
 estimation::EstimateOptions estimate_options(
     const EstimationWishes& wishes, const std::optional<recordings::RecordingHeader>& header);
-
-/// What to say of a recording beside its numbers. @param sensor  as typed; empty: not at all
-std::vector<std::string> input_warnings(const RecordingInput& input, const std::string& sensor);
 
 /// Declares --fix and --free.
 void add_parameter_choice(CLI::App& verb, std::vector<std::string>& fixed,

@@ -1,5 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
+#include <array>
 #include <memory>
 #include <optional>
 #include <string>
@@ -43,14 +44,24 @@ std::string range_text(const std::optional<ValueRange>& range, double scale, int
                      decimals, unit);
 }
 
+/// YAW,PITCH,ROLL as --extrinsics takes them.
+std::array<double, 3> yaw_pitch_roll_deg(const recordings::Extrinsics& pose) {
+  return {degrees_from_radians(pose.yaw), degrees_from_radians(pose.pitch),
+          degrees_from_radians(pose.roll)};
+}
+
 Json devices_json(const recordings::RecordingHeader& header, const TimeAuditResult& audit) {
   Json devices = Json::array();
   for (std::size_t i = 0; i < header.devices.size(); ++i) {
     const recordings::Device& device = header.devices[i];
+    const auto pose = recordings::stored_extrinsics(device);
     devices.push_back(
         {{"type", recordings::device_type_name(device.type)},
          {"serial", device.serial},
          {"hub_serial", device.hub_serial},
+         {"extrinsics_deg", pose ? Json(yaw_pitch_roll_deg(*pose)) : Json()},
+         {"translation_m",
+          pose ? Json({pose->translation.x, pose->translation.y, pose->translation.z}) : Json()},
          {"observations", i < audit.rows_by_device.size() ? audit.rows_by_device[i] : 0}});
   }
   return devices;
@@ -131,6 +142,10 @@ void print_audit(const recordings::Reader& reader, const TimeAuditResult& audit)
   if (audit.imu > 0) table.add({"inertial samples", grouped(audit.imu)});
   for (const recordings::Device& device : header.devices) {
     if (!device.serial.empty()) table.add({"serial", device.serial});
+    if (!device.hub_serial.empty()) table.add({"through the hub", device.hub_serial});
+    if (const auto pose = recordings::stored_extrinsics(device)) {
+      table.add({"states a pose", pose_text(*pose)});
+    }
   }
   table.add({"warnings", grouped(reader.warnings().size())});
   table.print();

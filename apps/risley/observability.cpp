@@ -116,7 +116,9 @@ ExitStatus run_observability(const ObservabilityCommandOptions& options,
       rate = positive_number(options.rate_hz, "--rate-hz", "Hz");
     }
     RecordingInput input =
-        read_recording(options.input, options.reading, {.rate = rate, .ranges = true}, common);
+        read_recording(options.input, options.reading, wishes.sensor,
+                       {.rate = rate, .ranges = true, .rows = false}, common);
+    for (const std::string& warning : input.warnings) spdlog::warn(warning);
     const estimation::EstimateOptions settings = estimate_options(wishes, input.reader->header());
     prisms = settings.sensor.prisms();
     ProgressBar bar("estimating", common);

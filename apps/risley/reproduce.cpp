@@ -100,8 +100,8 @@ void print_reproduction(const Reproduction& found) {
 /// The recording of a real unit, read as estimate reads one.
 reproduction::RealRecording real_recording(const std::string& path, const ReadingWishes& reading,
                                            const CommonOptions& common) {
-  RecordingInput input = read_recording(path, reading, {}, common);
-  log_warnings(path, input.reader->warnings());
+  RecordingInput input = read_recording(path, reading, {}, {}, common);
+  for (const std::string& warning : input.warnings) spdlog::warn("{}: {}", path, warning);
   reproduction::RealRecording recording;
   recording.name = std::filesystem::path(path).filename().string();
   recording.sensor = estimate_options(EstimationWishes{}, input.reader->header()).sensor;

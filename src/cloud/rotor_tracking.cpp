@@ -87,6 +87,18 @@ void check_same_sensor(const estimation::Estimate& estimate, const sensors::Sens
                   std::abs(off[worst]) / std::sqrt(covariance(worst, worst))));
 }
 
+/// Ranges and the beam's origin need the sensor's frame, and a roll cannot be found.
+[[noreturn]] void refuse_frame(const estimation::Estimate& estimate) {
+  const estimation::FrameTurn& turn = estimate.frame->turn;
+  throw TurnedFrame(fmt::format(
+      "the recording's frame is not the sensor's: shots lie outside the field of view, and its "
+      "axis "
+      "is found turned by {:.3f} deg in yaw and {:.3f} deg in pitch (a roll cannot be found){}; "
+      "points need the whole turn to be stated",
+      degrees_from_radians(turn.yaw), degrees_from_radians(turn.pitch),
+      estimate.converged ? "" : ", though the estimate failed: " + estimate.reason));
+}
+
 }  // namespace
 
 SensorBelief sensor_belief(const estimation::AngleSeries& beginning,
@@ -103,6 +115,7 @@ SensorBelief sensor_belief(const estimation::AngleSeries& beginning,
       throw EstimationError(fmt::format("the rotation angles were not found: {}", error.what()));
     }
   }();
+  if (estimate.frame) refuse_frame(estimate);
   if (!estimate.converged) {
     throw EstimationError(fmt::format(
         "the rotation angles were not found, or the calibration is of another sensor: {}",

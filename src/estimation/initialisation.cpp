@@ -17,6 +17,7 @@
 #include "risley/estimation/normal_equations.hpp"
 #include "risley/estimation/spectral_lines.hpp"
 
+#include "estimation/field_of_view.hpp"
 #include "estimation/knot_model.hpp"
 #include "estimation/residual_model.hpp"
 
@@ -39,10 +40,6 @@ constexpr double kHopeless = 4.0, kSecondOrder = 3e-5;
 constexpr double kGoodResidual = radians_from_degrees(0.08);
 /// Two answers are told apart when their chi2 differ by this.
 constexpr double kDecisive = 25.0;
-/// How far outside the sensor's field of view a shot is noise or a unit's own error, rad, and how
-/// many shots may lie there.
-constexpr double kFieldMargin = radians_from_degrees(1.5);
-constexpr double kFewOutside = 0.03;
 constexpr double kFrameSigma = radians_from_degrees(1.0);
 /// A turn that leaves all shots in the field of view is believed from this angle on, rad, where it
 /// takes this share of the residuals away.
@@ -525,17 +522,6 @@ Answer find_in_window(const StartWindow& window, const sensors::Sensor& sensor,
   return answers.front();
 }
 
-/// Share of the shots outside the cone that a sensor reaches about an axis.
-double share_outside(const AngleSeries& series, const Eigen::Vector3d& axis, double half_angle) {
-  std::size_t outside = 0;
-  const double limit = std::cos(half_angle);
-  for (std::size_t i = 0; i < series.size(); ++i) {
-    const auto v = direction_from_angles<double>({series.azimuth[i], series.zenith[i]});
-    outside += axis.dot(Eigen::Vector3d(v.x, v.y, v.z)) < limit;
-  }
-  return static_cast<double>(outside) / static_cast<double>(std::max<std::size_t>(1, series.size()));
-}
-
 Eigen::Vector3d mean_direction(const AngleSeries& series) {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   for (std::size_t i = 0; i < series.size(); ++i) {
@@ -594,10 +580,8 @@ Start find_start(const AngleSeries& head, const sensors::Sensor& sensor,
           1.0 / step, degrees_from_radians(fastest), fastest / (0.9 * kPi)));
     }
   }
-  const double half_field = 0.5 * sensor.field_of_view + kFieldMargin;
-  const bool turned = options.turned.value_or(
-      sensor.field_of_view > 0 &&
-      share_outside(head, Eigen::Vector3d::UnitX(), half_field) > kFewOutside);
+  const bool turned =
+      options.turned.value_or(share_outside(head, sensor.field_of_view) > kFewOutside);
   const std::vector<Hypothesis> hypotheses = hypotheses_of(sensor, options.mirrored);
   const StartWindow window(head, sensor, options,
                            turned ? turned_frame(head, sensor, options)

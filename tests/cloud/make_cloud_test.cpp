@@ -252,6 +252,21 @@ TEST_F(MakeCloud, SaysThatExtrinsicsAreNotApplied) {
   EXPECT_THAT(summary.warnings, ::testing::Contains(HasSubstr("extrinsics")));
 }
 
+TEST_F(MakeCloud, ATurnedFrameIsRefusedByNameAndLeavesNothing) {
+  const double yaw = radians_from_degrees(40.0);
+  SimulatedReader reader(wall_settings(1.0, 5000.0), [yaw](recordings::Observations& rows) {
+    for (double& azimuth : rows.azimuth) azimuth += yaw;
+  });
+  try {
+    make_cloud(reader, type_, path(), {});
+    ADD_FAILURE() << "points in two frames";
+  } catch (const TurnedFrame& error) {
+    EXPECT_THAT(error.what(), ::testing::ContainsRegex("(39\\.9|40\\.0)[0-9]* deg in yaw"));
+    EXPECT_THAT(error.what(), ::testing::ContainsRegex("-?0\\.0[0-9]* deg in pitch"));
+  }
+  EXPECT_EQ(files(), 0U);
+}
+
 TEST_F(MakeCloud, ACoordinateThatLasCannotHoldLeavesNothing) {
   SimulatedReader reader(wall_settings(1.0, 2000.0));
   CloudOptions options;

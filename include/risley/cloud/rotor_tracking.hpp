@@ -10,6 +10,7 @@
 
 #include <Eigen/Core>
 
+#include "risley/core/error.hpp"
 #include "risley/estimation/batch_map.hpp"
 #include "risley/estimation/estimate.hpp"
 #include "risley/recordings/observations.hpp"
@@ -20,6 +21,13 @@ namespace risley::cloud {
 /// Mean chi2 per parameter above which a recording does not have the parameters that a calibration
 /// states.
 inline constexpr double kMostDisagreement = 9.0;
+
+/// A recording's directions do not stand in its sensor's frame: its points would be put together
+/// from two frames.
+class TurnedFrame : public EstimationError {
+ public:
+  using EstimationError::EstimationError;
+};
 
 /// What a recording says of the sensor that made it.
 struct SensorBelief {
@@ -39,7 +47,8 @@ struct SensorBelief {
 /// Finds out from the beginning of a recording.
 /// @param calibration  start values, and which parameters are free
 /// @param angle_noise  rad; empty: the calibration's
-/// @throws EstimationError when its directions do not fit the calibration's sensor
+/// @throws TurnedFrame naming yaw and pitch when shots lie outside the sensor's field of view;
+///         EstimationError when its directions do not fit the calibration's sensor
 SensorBelief sensor_belief(const estimation::AngleSeries& beginning,
                            const estimation::AngleSeries& head, const sensors::Sensor& calibration,
                            std::optional<double> angle_noise);

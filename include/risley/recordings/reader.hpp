@@ -10,6 +10,7 @@
 
 #include "risley/core/error.hpp"
 #include "risley/core/progress.hpp"
+#include "risley/recordings/extrinsics.hpp"
 #include "risley/recordings/observations.hpp"
 
 namespace risley::recordings {
@@ -53,12 +54,22 @@ struct ReadOptions {
   /// Shots of one device per second, Hz. Times are then counted: shot i is fired at i / shot_rate,
   /// whatever times the file holds. Rows of a further return belong to the shot before them.
   /// Packet headers and inertial samples, which have the file's times, are left out.
-  std::optional<double> shot_rate;
+  std::optional<double> shot_rate = {};
+  /// Pose of the sensor in the frame that the recording stands in: every row is turned back into
+  /// the sensor's frame, direction and range. Directions without a range are only turned, a
+  /// translation is left out with a warning. Rows without a return keep their place, angles that
+  /// they hold are turned; a point within its range's rounding of the sensor is such a row that
+  /// was moved. Rounding steps go along: along and across the beam they mix as the
+  /// translation turns the line of sight, and across it the larger of the two steps is taken.
+  /// Packet headers are left out, inertial samples stay as they are, and the header states no pose
+  /// any more. A pose of zeros changes nothing.
+  std::optional<Extrinsics> extrinsics = {};
 };
 
 /// Opens a recording of any known format, recognised by its content and not by its name.
 /// @throws FileError when it is missing, empty, of no known format, or its header is damaged;
-///         InvalidArgument when shot_rate is not a finite number above 0
+///         InvalidArgument when shot_rate is not a finite number above 0, when extrinsics are not
+///         finite, or when they are given for a recording of several sensors
 std::unique_ptr<Reader> open_recording(const std::string& path, const ReadOptions& options = {});
 
 /// A recording without times was given to something that needs them.

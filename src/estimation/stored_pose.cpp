@@ -1,0 +1,28 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "risley/estimation/stored_pose.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "estimation/field_of_view.hpp"
+
+namespace risley::estimation {
+
+StoredPoseVerdict judge_stored_pose(const AngleSeries& as_recorded, const AngleSeries& turned_back,
+                                    double field_of_view) {
+  constexpr double kClearShare = 0.01, kClearShots = 10.0;
+  StoredPoseVerdict verdict;
+  verdict.outside_as_recorded = share_outside(as_recorded, field_of_view);
+  verdict.outside_turned_back = share_outside(turned_back, field_of_view);
+  const double difference = verdict.outside_as_recorded - verdict.outside_turned_back;
+  const auto shots = static_cast<double>(std::min(as_recorded.size(), turned_back.size()));
+  if (std::min(verdict.outside_as_recorded, verdict.outside_turned_back) > kFewOutside ||
+      std::abs(difference) < kClearShare || std::abs(difference) * shots < kClearShots) {
+    return verdict;
+  }
+  verdict.use = difference > 0 ? StoredPoseUse::applied : StoredPoseUse::not_applied;
+  return verdict;
+}
+
+}  // namespace risley::estimation
