@@ -125,7 +125,6 @@ ExitStatus run_observability(const ObservabilityCommandOptions& options,
     const estimation::Estimate estimate =
         estimation::estimate(estimation::Method::map, input.selector.take_series(),
                              input.selector.head(), settings, bar.callback());
-    for (const std::string& warning : input_warnings(input, options.sensor)) spdlog::warn(warning);
     for (const std::string& warning : estimate.warnings) spdlog::warn(warning);
     if (!estimate.converged) {
       spdlog::warn("the estimate did not converge: {}", estimate.reason);
