@@ -254,9 +254,8 @@ Run run_map(const Recording& data) {
 Run run_peer(const Recording& data) {
   const estimation::EstimateOptions options = map_options();
   const auto free = estimation::free_parameters(estimation::default_free_names(2), 2);
-  const estimation::Start start =
-      estimation::find_start(data.head, options.sensor,
-                             {free, kAngleNoise, options.mirrored, options.turned});
+  const estimation::Start start = estimation::find_start(
+      data.head, options.sensor, {free, kAngleNoise, options.mirrored, options.turned});
   const estimation::AngleSeries& series = data.series;
   Run run;
   const Stopwatch stopwatch;

@@ -121,6 +121,7 @@ RangedRecording read_and_estimate(const CalibrateCommandOptions& options,
   }
   estimation::EstimateOptions settings = estimate_options(
       EstimationWishes{options.sensor, options.noise_angle_deg, {}, {}}, input.reader->header());
+  settings.cartesian = input.whole_steps;
   if (options.mirror != "auto") settings.mirrored = options.mirror == "yes";
   if (number == 0) outcome.nominal = settings.sensor;
   for (const std::string& text : input.warnings) {

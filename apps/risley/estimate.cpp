@@ -245,11 +245,11 @@ void print_noise(const Estimate& e) {
         report::number_text(degrees_from_radians(value), degrees_from_radians(sigma));
     return fmt::format("{} +- {}", text.value, text.sigma);
   };
-  fmt::print("\nnoise before rounding, {}: azimuth {} deg, zenith {} deg; a healthy unit: {:.3g} "
-             "deg\n",
-             e.noise_held ? "held" : "found", angle(e.noise.value.azimuth, e.noise.sigma.azimuth),
-             angle(e.noise.value.zenith, e.noise.sigma.zenith),
-             degrees_from_radians(e.usual_noise));
+  fmt::print(
+      "\nnoise before rounding, {}: azimuth {} deg, zenith {} deg; a healthy unit: {:.3g} "
+      "deg\n",
+      e.noise_held ? "held" : "found", angle(e.noise.value.azimuth, e.noise.sigma.azimuth),
+      angle(e.noise.value.zenith, e.noise.sigma.zenith), degrees_from_radians(e.usual_noise));
 }
 
 void print_outcome(const Outcome& outcome) {
@@ -354,10 +354,10 @@ ExitStatus run_estimate(const EstimateCommandOptions& options, const CommonOptio
   check_options(options);
   std::optional<double> rate;
   if (options.rate() != "full") rate = positive_number(options.rate(), "--rate-hz", "Hz");
-  RecordingInput input =
-      read_recording(options.input, options.reading, options.sensor,
-                     {.rate = rate, .ranges = true, .rows = false}, common);
-  const estimation::EstimateOptions settings = estimate_options(options, input.reader->header());
+  RecordingInput input = read_recording(options.input, options.reading, options.sensor,
+                                        {.rate = rate, .ranges = true, .rows = false}, common);
+  estimation::EstimateOptions settings = estimate_options(options, input.reader->header());
+  settings.cartesian = input.whole_steps;
   const estimation::SelectionCounts& counts = input.selector.counts();
   spdlog::debug(
       "{} observations of format {}, {} without a direction, {} out of order; {} shots used "
@@ -408,9 +408,10 @@ Run declare_estimate(CLI::App& verb) {
   verb.add_option(
       "--rate-hz", o.rate_hz,
       "Shots per second to use, or 'full' for all (default: full with map, 1000 with ekf)");
-  verb.add_option("--noise-angle-deg", o.noise_angle_deg,
-                  "Hold the noise of azimuth and zenith before rounding, 1 sigma, at this (default: "
-                  "found in the data; ekf: the sensor's)");
+  verb.add_option(
+      "--noise-angle-deg", o.noise_angle_deg,
+      "Hold the noise of azimuth and zenith before rounding, 1 sigma, at this (default: "
+      "found in the data; ekf: the sensor's)");
   verb.add_option("--sensor", o.sensor,
                   "Preset by name, or a preset or calibration file (default: from the recording)");
   add_reading_options(verb, o.reading);

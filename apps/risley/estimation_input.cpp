@@ -22,8 +22,7 @@ bool names_its_sensor(const recordings::RecordingHeader& header) {
 
 /// The built-in preset of the instrument that made a recording.
 sensors::Sensor sensor_of_recording(const recordings::RecordingHeader& header) {
-  const std::uint8_t type =
-      names_its_sensor(header) ? header.devices.front().type : kAssumedType;
+  const std::uint8_t type = names_its_sensor(header) ? header.devices.front().type : kAssumedType;
   std::optional<sensors::Sensor> found;
   for (const std::string& name : sensors::builtin_preset_names()) {
     sensors::Sensor sensor = sensors::load_sensor(name);
@@ -56,7 +55,9 @@ RecordingInput read_recording(const std::string& path, const ReadingWishes& read
   SensorFrameInput input = open_in_sensor_frame(path, reading, [&sensor](const auto& header) {
     return chosen_sensor(sensor, header).field_of_view;
   });
-  RecordingInput result{std::move(input.reader), {}, estimation::ShotSelector(selection), {}, 0};
+  RecordingInput result{
+      std::move(input.reader), {}, estimation::ShotSelector(selection), {}, false, 0};
+  result.whole_steps = result.reader->header().cartesian && !input.turned_back;
   if (result.reader->header().devices.size() > 1) {
     throw InvalidArgument(
         fmt::format("{} holds {} sensors, an estimation takes the recording of one", path,
@@ -75,14 +76,16 @@ RecordingInput read_recording(const std::string& path, const ReadingWishes& read
   result.warnings.insert(result.warnings.end(), input.warnings.begin(), input.warnings.end());
   if (sensor.empty() && !names_its_sensor(result.reader->header())) {
     result.warnings.push_back(
-        "the file does not say which sensor recorded it: a Mid-40 was assumed; --sensor says which");
+        "the file does not say which sensor recorded it: a Mid-40 was assumed; --sensor says "
+        "which");
   }
   const std::uint64_t resets = result.selector.counts().clock_resets;
   if (resets > 0) {
-    result.warnings.push_back(fmt::format("the clock of the recording jumps back {} times: the "
-                                          "pieces share the parameters, and their rotors are found "
-                                          "anew",
-                                          resets));
+    result.warnings.push_back(
+        fmt::format("the clock of the recording jumps back {} times: the "
+                    "pieces share the parameters, and their rotors are found "
+                    "anew",
+                    resets));
   }
   result.seconds = now() - started;
   return result;
@@ -94,7 +97,6 @@ estimation::EstimateOptions estimate_options(
   if (wishes.sensor.empty() && !header) throw InvalidArgument("--sensor is missing");
   result.sensor =
       header ? chosen_sensor(wishes.sensor, *header) : sensors::load_sensor(wishes.sensor);
-  result.cartesian = header && header->cartesian;
   const int prisms = result.sensor.prisms();
   if (wishes.noise_angle_deg) {
     check_positive(*wishes.noise_angle_deg, "--noise-angle-deg", "deg");

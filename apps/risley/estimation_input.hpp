@@ -23,6 +23,8 @@ struct RecordingInput {
   recordings::TimeAuditResult audit;
   estimation::ShotSelector selector;
   std::vector<std::string> warnings;  ///< of the reader, about frame, sensor and clock
+  /// Rows come from coordinates in whole steps along the axes of their frame.
+  bool whole_steps = false;
   double seconds = 0;
 };
 

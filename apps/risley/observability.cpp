@@ -115,11 +115,11 @@ ExitStatus run_observability(const ObservabilityCommandOptions& options,
     if (!options.rate_hz.empty() && options.rate_hz != "full") {
       rate = positive_number(options.rate_hz, "--rate-hz", "Hz");
     }
-    RecordingInput input =
-        read_recording(options.input, options.reading, wishes.sensor,
-                       {.rate = rate, .ranges = true, .rows = false}, common);
+    RecordingInput input = read_recording(options.input, options.reading, wishes.sensor,
+                                          {.rate = rate, .ranges = true, .rows = false}, common);
     for (const std::string& warning : input.warnings) spdlog::warn(warning);
-    const estimation::EstimateOptions settings = estimate_options(wishes, input.reader->header());
+    estimation::EstimateOptions settings = estimate_options(wishes, input.reader->header());
+    settings.cartesian = input.whole_steps;
     prisms = settings.sensor.prisms();
     ProgressBar bar("estimating", common);
     const estimation::Estimate estimate =

@@ -105,7 +105,7 @@ std::unique_ptr<recordings::Reader> open_input(const std::string& path,
 SensorFrameInput open_in_sensor_frame(
     const std::string& path, const ReadingWishes& wishes,
     const std::function<double(const recordings::RecordingHeader&)>& field_of_view) {
-  SensorFrameInput result{open_input(path, wishes), {}};
+  SensorFrameInput result{open_input(path, wishes), {}, !wishes.extrinsics_deg.empty()};
   const recordings::RecordingHeader& header = result.reader->header();
   recordings::require_times(header);
   if (!wishes.extrinsics_deg.empty() || header.devices.size() != 1) return result;
@@ -128,6 +128,7 @@ SensorFrameInput open_in_sensor_frame(
   const bool decided = verdict.use != StoredPoseUse::undecided;
   const bool turn_back = decided ? verdict.use == StoredPoseUse::applied : by_hub;
   if (turn_back) result.reader = open_with(path, options);
+  result.turned_back = turn_back;
   if (decided && turn_back) {
     result.warnings.push_back(found + ": the shots were turned back into the sensor's frame");
   } else if (!decided) {

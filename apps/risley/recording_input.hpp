@@ -36,6 +36,7 @@ std::unique_ptr<recordings::Reader> open_input(const std::string& path,
 struct SensorFrameInput {
   std::unique_ptr<recordings::Reader> reader;
   std::vector<std::string> warnings;  ///< what was done about a pose that the recording states
+  bool turned_back = false;           ///< by a pose, stated or given
 };
 
 /// As open_input, and decides what a pose in the recording's header means where --extrinsics does

@@ -7,6 +7,7 @@
 #include <string>
 
 #include <fmt/format.h>
+#include <spdlog/spdlog.h>
 
 #include "risley/core/output_file.hpp"
 #include "risley/reproduction/reproduction_page.hpp"

@@ -58,7 +58,8 @@ Component component(std::span<const double> residual, std::span<const float> rou
                     double square_factor) {
   const double scale = 1.0 / (1.0 - used_share);
   double variance = 0;
-  // Weights that are right for a first guess of nothing but the scatter itself, then Fisher scoring.
+  // Weights that are right for a first guess of nothing but the scatter itself, then Fisher
+  // scoring.
   double count = 0;
   for (std::size_t i = 0; i < residual.size(); ++i) {
     if (outlier[i] != 0) continue;
@@ -116,8 +117,8 @@ NoiseEstimate noise_components(const AngleSeries& series, std::span<const double
                                std::span<const double> zenith,
                                std::span<const unsigned char> outlier, double used_share,
                                double square_factor) {
-  const Component a = component(azimuth, series.azimuth_rounding_variance, outlier, used_share,
-                                square_factor);
+  const Component a =
+      component(azimuth, series.azimuth_rounding_variance, outlier, used_share, square_factor);
   const Component z =
       component(zenith, series.zenith_rounding_variance, outlier, used_share, square_factor);
   return {{a.value, z.value}, {a.sigma, z.sigma}};

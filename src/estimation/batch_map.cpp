@@ -271,8 +271,8 @@ double square_factor(const Autocorrelation& autocorrelation) {
 double coarse_rate(const AngleSeries& series, const std::vector<ShotRange>& ranges) {
   double duration = 0;
   for (const ShotRange& range : ranges) {
-    duration += 1e-9 * static_cast<double>(series.time_ns[range.end - 1] -
-                                           series.time_ns[range.begin]);
+    duration +=
+        1e-9 * static_cast<double>(series.time_ns[range.end - 1] - series.time_ns[range.begin]);
   }
   return std::max(kCoarseRate, kFewestCoarseShots / std::max(duration, 1e-3));
 }
@@ -336,8 +336,8 @@ BatchMapResult run_batch_map(const AngleSeries& series, const Start& start,
   std::vector<ShotRange> coarse_stretches = all_stretches;
   const AngleSeries coarse_series =
       thinned(series, coarse_rate(series, all_stretches), coarse_stretches);
-  const AngleNoise first_noise = options.angle_noise.value_or(
-      equal_noise(std::max(start.residual_rms, kLeastAngleNoise)));
+  const AngleNoise first_noise =
+      options.angle_noise.value_or(equal_noise(std::max(start.residual_rms, kLeastAngleNoise)));
   const auto starts =
       find_stretch_starts(coarse_series, coarse_stretches, start, sensor, first_noise.rms());
   std::vector<ShotRange> coarse_used, used;
@@ -407,9 +407,8 @@ BatchMapResult run_batch_map(const AngleSeries& series, const Start& start,
     if (noise_is_held) {
       result.noise.value = assumed;
     } else {
-      result.noise =
-          noise_components(full.series(), full.azimuth(), full.zenith(), full.outlier(), used_share,
-                           square_factor(result.autocorrelation));
+      result.noise = noise_components(full.series(), full.azimuth(), full.zenith(), full.outlier(),
+                                      used_share, square_factor(result.autocorrelation));
       full.weights().angle_noise = usable_noise(result.noise.value);
       noise_is_found = std::abs(assumed.rms() / full.weights().angle_noise.rms() - 1.0) < 0.01;
     }
@@ -433,8 +432,8 @@ BatchMapResult run_batch_map(const AngleSeries& series, const Start& start,
     ++result.iterations;
     report_progress(progress, 0.4 + 0.6 * (pass + 1) / kMostFullPasses);
     // Two passes know how much the estimate used up; where that is much, noise needs a third.
-    const bool goes_on = moved > kSmallStep || !noise_is_found ||
-                         (pass < 2 && !noise_is_held && used_share > 1e-3);
+    const bool goes_on =
+        moved > kSmallStep || !noise_is_found || (pass < 2 && !noise_is_held && used_share > 1e-3);
     if (pass == 0 || (goes_on && pass + 1 < kMostFullPasses)) continue;
     result.settled = moved <= kSmallStep;
     const Eigen::Index n = constants.count();

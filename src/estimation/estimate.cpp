@@ -181,11 +181,12 @@ void judge(Estimate& estimate, const PrismTrain& nominal) {
   } else if (ratio > kFarAbove) {
     fail(residuals + ": the model does not describe these data, or their noise is larger");
   } else if (!estimate.noise_held && misfit > kFarAbove * estimate.usual_residual) {
-    fail(fmt::format("residuals of {:.3g} deg, of which neighbouring shots share {:.3g} deg, where "
-                     "noise and rounding of a healthy unit amount to {:.3g} deg: the model does not "
-                     "describe these data",
-                     degrees_from_radians(rms), degrees_from_radians(misfit),
-                     degrees_from_radians(estimate.usual_residual)));
+    fail(
+        fmt::format("residuals of {:.3g} deg, of which neighbouring shots share {:.3g} deg, where "
+                    "noise and rounding of a healthy unit amount to {:.3g} deg: the model does not "
+                    "describe these data",
+                    degrees_from_radians(rms), degrees_from_radians(misfit),
+                    degrees_from_radians(estimate.usual_residual)));
   } else if (!estimate.unobservable.empty()) {
     const WeakDirection& worst = estimate.unobservable.front();
     fail(
@@ -207,11 +208,13 @@ void judge(Estimate& estimate, const PrismTrain& nominal) {
                                 "the stated noise is too large");
   }
   if (!estimate.noise_held && estimate.noise.value.rms() > kNoisy * estimate.usual_noise) {
-    estimate.warnings.push_back(fmt::format(
-        "the directions are {:.3g} times as noisy ({:.3g} deg) as the preset says of a healthy unit "
-        "({:.3g} deg)",
-        estimate.noise.value.rms() / estimate.usual_noise, degrees_from_radians(estimate.noise.value.rms()),
-        degrees_from_radians(estimate.usual_noise)));
+    estimate.warnings.push_back(
+        fmt::format("the directions are {:.3g} times as noisy ({:.3g} deg) as the preset says of a "
+                    "healthy unit "
+                    "({:.3g} deg)",
+                    estimate.noise.value.rms() / estimate.usual_noise,
+                    degrees_from_radians(estimate.noise.value.rms()),
+                    degrees_from_radians(estimate.usual_noise)));
   }
   double unevenness = 1.0;
   std::size_t uneven = 0;
@@ -264,7 +267,8 @@ void take_frame(Estimate& estimate) {
   turn(estimate.series, result.frame.transpose());
   const Eigen::Matrix3d total = recording_from_sensor(estimate.frame->turn) * result.frame;
   estimate.frame->turn = turn_of(total);
-  // Turns about the sensor's Z and Y axes; a yaw about the recording's Z moves the axis by its cosine.
+  // Turns about the sensor's Z and Y axes; a yaw about the recording's Z moves the axis by its
+  // cosine.
   const Eigen::DiagonalMatrix<double, 2> scale(
       1.0 / std::max(std::cos(estimate.frame->turn.pitch), 1e-9), 1.0);
   estimate.frame->covariance = scale * result.frame_covariance * scale;
@@ -304,7 +308,8 @@ std::vector<ShotRange> take_map(Estimate& estimate, const EstimateOptions& optio
 }
 
 /// Logarithm of the likelihood of residuals under the noise that was found in them, over the shots
-/// that neither of two results leaves out; correlated residuals count for as many as they are worth.
+/// that neither of two results leaves out; correlated residuals count for as many as they are
+/// worth.
 double log_likelihood(const BatchMapResult& result, const AngleSeries& series,
                       const std::vector<unsigned char>& also_out) {
   const AngleNoise noise = usable_noise(result.noise.value);
@@ -335,8 +340,7 @@ CoordinateRounding rounding_of(const Estimate& estimate, const EstimateOptions& 
   add_half_steps(cut, recording_from_sensor(estimate.start.frame.value_or(FrameTurn{})));
   const BatchMapOptions settings = map_options(estimate, options);
   try {
-    const BatchMapResult rounded =
-        run_batch_map(nearest, estimate.start, options.sensor, settings);
+    const BatchMapResult rounded = run_batch_map(nearest, estimate.start, options.sensor, settings);
     const BatchMapResult mended = run_batch_map(cut, estimate.start, options.sensor, settings);
     const double lead = log_likelihood(mended, cut, rounded.outlier) -
                         log_likelihood(rounded, nearest, mended.outlier);
@@ -370,10 +374,9 @@ std::vector<ShotRange> take_ekf(Estimate& estimate, const EstimateOptions& optio
 Start start_anywhere(const AngleSeries& series, const AngleSeries& head,
                      const EstimateOptions& options, const Estimate& estimate) {
   const auto start_of = [&](const AngleSeries& shots) {
-    return find_start(
-        shots, options.sensor,
-        {estimate.free, options.angle_noise.value_or(options.sensor.angle_noise), options.mirrored,
-         options.turned});
+    return find_start(shots, options.sensor,
+                      {estimate.free, options.angle_noise.value_or(options.sensor.angle_noise),
+                       options.mirrored, options.turned});
   };
   try {
     return start_of(head);

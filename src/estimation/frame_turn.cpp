@@ -42,14 +42,14 @@ void turn(AngleSeries& series, const Eigen::Matrix3d& rotation) {
     // Where azimuth grew before, seen from where it grows now: the two variances mix by that angle.
     const Eigen::Vector3d along =
         rotation * Eigen::Vector3d(-std::sin(series.azimuth[i]), std::cos(series.azimuth[i]), 0.0);
-    const double cosine = -std::sin(angles.azimuth) * along.x() + std::cos(angles.azimuth) * along.y();
+    const double cosine =
+        -std::sin(angles.azimuth) * along.x() + std::cos(angles.azimuth) * along.y();
     const double share = cosine * cosine;
     const double across = static_cast<double>(series.azimuth_rounding_variance[i]) * sine * sine;
     const double down = static_cast<double>(series.zenith_rounding_variance[i]);
     series.azimuth_rounding_variance[i] =
         static_cast<float>((share * across + (1.0 - share) * down) / (new_sine * new_sine));
-    series.zenith_rounding_variance[i] =
-        static_cast<float>(share * down + (1.0 - share) * across);
+    series.zenith_rounding_variance[i] = static_cast<float>(share * down + (1.0 - share) * across);
     series.azimuth[i] = angles.azimuth;
     series.zenith[i] = angles.zenith;
   }

@@ -32,8 +32,8 @@ constexpr std::size_t kEnoughShots = 1000, kManyShots = 20000;
 /// clock or rotors are further off are found among all pairs.
 constexpr double kUsualShare = 0.06, kFarthestShare = 0.2;
 constexpr std::size_t kMostCandidates = 4;
-/// A pair of lines that leaves so many times as much as the best need not be tried, unless it leaves no
-/// more than what two lines cannot describe anyway, as a mean square.
+/// A pair of lines that leaves so many times as much as the best need not be tried, unless it
+/// leaves no more than what two lines cannot describe anyway, as a mean square.
 constexpr double kHopeless = 4.0, kSecondOrder = 3e-5;
 /// Residual of a fit that no other pair of speeds needs to compete with, rad: rotors that wander
 /// and noise of any usual size leave less, a wrong pair more.
@@ -49,7 +49,7 @@ constexpr double kTurnGain = 0.1;
 /// A fit of parameters and one parabola per rotor to a few shots.
 struct WindowFit {
   PrismTrain train;
-  RotorTrajectory knot;  // a single one
+  RotorTrajectory knot;                                 // a single one
   Eigen::Matrix3d frame = Eigen::Matrix3d::Identity();  // of the shots, from the sensor's
   double rms = std::numeric_limits<double>::infinity();
   double prior_chi2 = 0;  // of the parameters: how unusual a sensor it would be
@@ -133,8 +133,8 @@ class WindowFitter {
     std::vector<double> azimuth(azimuth_.size()), zenith(azimuth_.size());
     const double noise = weights_.angle_noise.azimuth * weights_.angle_noise.azimuth;
     for (std::size_t i = 0; i < azimuth.size(); ++i) {
-      azimuth[i] = azimuth_[i] / std::sqrt(noise + static_cast<double>(
-                                                       shots_.azimuth_rounding_variance[i]));
+      azimuth[i] =
+          azimuth_[i] / std::sqrt(noise + static_cast<double>(shots_.azimuth_rounding_variance[i]));
       zenith[i] =
           zenith_[i] / std::sqrt(noise + static_cast<double>(shots_.zenith_rounding_variance[i]));
     }
@@ -234,10 +234,9 @@ struct Hypothesis {
   }
   std::string words() const {
     return fmt::format("{}{}",
-                       sensor.combination
-                           ? fmt::format("speed combination {}",
-                                         static_cast<int>(*sensor.combination))
-                           : std::string("the sensor's speeds"),
+                       sensor.combination ? fmt::format("speed combination {}",
+                                                        static_cast<int>(*sensor.combination))
+                                          : std::string("the sensor's speeds"),
                        mirrored ? " mirrored" : " as recorded");
   }
 };
@@ -299,7 +298,8 @@ class StartWindow {
     const double sign = h.mirrored ? -1.0 : 1.0;
     for (std::size_t k = 0; k < trial.lines.lines.size(); ++k) {
       const SpectralLine& line = trial.lines.lines[k];
-      // At rotation angle zero the beam leans to -Z, so a line's phase is the angle less 90 degrees.
+      // At rotation angle zero the beam leans to -Z, so a line's phase is the angle less 90
+      // degrees.
       fit.knot.state[3 * k] = sign * line.phase + kPi / 2;
       fit.knot.state[3 * k + 1] = sign * line.angular_velocity;
     }
@@ -330,9 +330,9 @@ class StartWindow {
     const ShotRange rows = search_->shots();
     Start start;
     start.time_ns = search_->time_ns();
-    start.reach = 1e-9 * static_cast<double>(
-                             std::max(start.time_ns - series_.time_ns[rows.begin],
-                                      series_.time_ns[rows.end - 1] - start.time_ns));
+    start.reach =
+        1e-9 * static_cast<double>(std::max(start.time_ns - series_.time_ns[rows.begin],
+                                            series_.time_ns[rows.end - 1] - start.time_ns));
     start.train = answer.fit.train;
     start.combination = h.sensor.combination;
     start.mirrored = h.mirrored;
@@ -386,8 +386,8 @@ RotorLines exchanged(RotorLines lines) {
   return lines;
 }
 
-/// Twice the logarithm of how much likelier an answer is than a rival: residuals of unknown noise, two
-/// per shot, and parameters about the sensor's.
+/// Twice the logarithm of how much likelier an answer is than a rival: residuals of unknown noise,
+/// two per shot, and parameters about the sensor's.
 double chi2_lead(const Answer& answer, const Answer& rival, std::size_t shots) {
   return 4.0 * static_cast<double>(shots) * std::log(rival.fit.rms / answer.fit.rms) +
          rival.fit.prior_chi2 - answer.fit.prior_chi2;
@@ -430,7 +430,8 @@ EstimationError unknown_speeds(const RotorLines& found, const sensors::Sensor& s
                                const std::vector<Hypothesis>& hypotheses) {
   const double a = found.lines[0].angular_velocity, b = found.lines[1].angular_velocity;
   const std::string words = fmt::format(
-      "the beam turns at {:.0f} and {:.0f} deg/s, which is no combination of {}'s {:.0f} and {:.0f} "
+      "the beam turns at {:.0f} and {:.0f} deg/s, which is no combination of {}'s {:.0f} and "
+      "{:.0f} "
       "deg/s",
       degrees_from_radians(a), degrees_from_radians(b), sensor.name,
       degrees_from_radians(sensor.angular_velocity[0]),
@@ -536,9 +537,9 @@ Eigen::Vector3d mean_direction(const AngleSeries& series) {
 Eigen::Matrix3d turned_frame(const AngleSeries& head, const sensors::Sensor& sensor,
                              const StartOptions& options) {
   const Eigen::Vector3d middle = mean_direction(head);
-  Eigen::Matrix3d frame = recording_from_sensor(
-      {std::atan2(middle.y(), middle.x()),
-       std::atan2(-middle.z(), std::hypot(middle.x(), middle.y()))});
+  Eigen::Matrix3d frame =
+      recording_from_sensor({std::atan2(middle.y(), middle.x()),
+                             std::atan2(-middle.z(), std::hypot(middle.x(), middle.y()))});
   constexpr int kRounds = 6;
   for (int round = 0; round < kRounds; ++round) {
     const StartWindow window(head, sensor, options, frame);
@@ -554,8 +555,8 @@ Eigen::Matrix3d turned_frame(const AngleSeries& head, const sensors::Sensor& sen
     if (size > 0.5) break;  // no axis: the shots say nothing of it
     const Eigen::Vector3d axis =
         frame * Eigen::Vector3d(std::sqrt(1.0 - size * size), c.real(), c.imag());
-    frame = recording_from_sensor({std::atan2(axis.y(), axis.x()),
-                                   std::atan2(-axis.z(), std::hypot(axis.x(), axis.y()))});
+    frame = recording_from_sensor(
+        {std::atan2(axis.y(), axis.x()), std::atan2(-axis.z(), std::hypot(axis.x(), axis.y()))});
     if (size < radians_from_degrees(0.05)) break;
   }
   return frame;
@@ -583,9 +584,9 @@ Start find_start(const AngleSeries& head, const sensors::Sensor& sensor,
   const bool turned =
       options.turned.value_or(share_outside(head, sensor.field_of_view) > kFewOutside);
   const std::vector<Hypothesis> hypotheses = hypotheses_of(sensor, options.mirrored);
-  const StartWindow window(head, sensor, options,
-                           turned ? turned_frame(head, sensor, options)
-                                  : Eigen::Matrix3d(Eigen::Matrix3d::Identity()));
+  const StartWindow window(
+      head, sensor, options,
+      turned ? turned_frame(head, sensor, options) : Eigen::Matrix3d(Eigen::Matrix3d::Identity()));
   const Answer found = find_in_window(window, sensor, hypotheses, turned);
   const Start start = window.start_of(found);
   if (turned || options.turned || options.free.empty()) return start;

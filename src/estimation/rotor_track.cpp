@@ -101,8 +101,7 @@ class Tracker {
       const Vector pull = normal * (predicted.mean - state.mean);
       normal += knot_curvature<N>(equations_, 0);
       const Eigen::LDLT<Square> solver(normal);
-      const Vector step =
-          solver.solve(Eigen::Map<const Vector>(equations_.gradient.data()) + pull);
+      const Vector step = solver.solve(Eigen::Map<const Vector>(equations_.gradient.data()) + pull);
       if (!step.allFinite()) {
         state = predicted;
         return false;
@@ -123,7 +122,9 @@ class Tracker {
     rows_ = rows;
     residuals_.resize(2 * series_.size());
     accumulate(series_, knot_, start_.train, {}, weights_, equations_,
-               {{residuals_.data(), series_.size()}, {residuals_.data() + series_.size(), series_.size()}, {}});
+               {{residuals_.data(), series_.size()},
+                {residuals_.data() + series_.size(), series_.size()},
+                {}});
   }
 
   /// Scale of the residuals over the noise; that of the start where few shots tell.
@@ -140,7 +141,8 @@ class Tracker {
   /// Moves the angles to the best of a grid about the prediction.
   void look_around(State& state, ShotRange rows, double uncertain) {
     const double softening = std::exchange(weights_.softening, softening_at(10.0 * usual_level_));
-    const int half = std::clamp(static_cast<int>(std::ceil(3.0 * uncertain / kGridStep)), 1, kGridHalf);
+    const int half =
+        std::clamp(static_cast<int>(std::ceil(3.0 * uncertain / kGridStep)), 1, kGridHalf);
     std::vector<int> offset(N, -half);
     State best = state;
     double least = std::numeric_limits<double>::infinity();
@@ -207,8 +209,8 @@ void track(const AngleSeries& series, ShotRange shots, const Start& start, const
   std::size_t near = 0;
   for (std::size_t knot = first; knot < last; ++knot) {
     const std::int64_t time = knots.time_ns[knot];
-    while (near + 1 < points.size() && std::llabs(points[near + 1].time_ns - time) <
-                                           std::llabs(points[near].time_ns - time)) {
+    while (near + 1 < points.size() &&
+           std::llabs(points[near + 1].time_ns - time) < std::llabs(points[near].time_ns - time)) {
       ++near;
     }
     const double seconds = 1e-9 * static_cast<double>(time - points[near].time_ns);
@@ -227,9 +229,8 @@ void track(const AngleSeries& series, ShotRange shots, const Start& start, const
 void track_rotors(const AngleSeries& series, ShotRange shots, const Start& start,
                   const AngleNoise& noise, RotorTrajectory& knots, std::size_t first,
                   std::size_t last) {
-  with_prism_count(knots.prisms, [&]<int N>() {
-    track<N>(series, shots, start, noise, knots, first, last);
-  });
+  with_prism_count(knots.prisms,
+                   [&]<int N>() { track<N>(series, shots, start, noise, knots, first, last); });
 }
 
 }  // namespace risley::estimation

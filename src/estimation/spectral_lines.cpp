@@ -50,15 +50,15 @@ Complex transverse(const AngleSeries& series, std::size_t i) {
 /// Least squares of a constant and two lines from the sums of their products.
 struct Sums {
   double count;
-  Complex first, second, difference;                 // sums of exp(i w t)
+  Complex first, second, difference;                  // sums of exp(i w t)
   Complex constant_value, first_value, second_value;  // of the value times exp(-i w t)
 };
 
 std::array<Complex, 3> solve(const Sums& s, double& explained) {
   Eigen::Matrix3cd normal;
   const double n = s.count;
-  normal << n * (1.0 + kConstantRidge), s.first, s.second,           //
-      std::conj(s.first), n * (1.0 + kLineRidge), s.difference,      //
+  normal << n * (1.0 + kConstantRidge), s.first, s.second,       //
+      std::conj(s.first), n * (1.0 + kLineRidge), s.difference,  //
       std::conj(s.second), std::conj(s.difference), n * (1.0 + kLineRidge);
   const Eigen::Vector3cd right(s.constant_value, s.first_value, s.second_value);
   const Eigen::Vector3cd amplitude = normal.llt().solve(right);
@@ -205,11 +205,10 @@ std::vector<RotorLines> LineSearch::best_of(Bins first, Bins second, bool ordere
     const Candidate* next = nullptr;
     for (const Candidate& candidate : all) {
       if (next != nullptr && candidate.unexplained >= next->unexplained) continue;
-      const bool known =
-          std::any_of(taken.begin(), taken.end(), [&](const Candidate& other) {
-            return std::abs(candidate.first - other.first) <= kApart &&
-                   std::abs(candidate.second - other.second) <= kApart;
-          });
+      const bool known = std::any_of(taken.begin(), taken.end(), [&](const Candidate& other) {
+        return std::abs(candidate.first - other.first) <= kApart &&
+               std::abs(candidate.second - other.second) <= kApart;
+      });
       if (!known) next = &candidate;
     }
     if (next == nullptr) break;

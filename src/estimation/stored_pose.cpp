@@ -12,12 +12,13 @@ namespace risley::estimation {
 StoredPoseVerdict judge_stored_pose(const AngleSeries& as_recorded, const AngleSeries& turned_back,
                                     double field_of_view) {
   constexpr double kClearShare = 0.01, kClearShots = 10.0;
+  constexpr double kMostOutside = 0.15;  // gross errors lie anywhere
   StoredPoseVerdict verdict;
   verdict.outside_as_recorded = share_outside(as_recorded, field_of_view);
   verdict.outside_turned_back = share_outside(turned_back, field_of_view);
   const double difference = verdict.outside_as_recorded - verdict.outside_turned_back;
   const auto shots = static_cast<double>(std::min(as_recorded.size(), turned_back.size()));
-  if (std::min(verdict.outside_as_recorded, verdict.outside_turned_back) > kFewOutside ||
+  if (std::min(verdict.outside_as_recorded, verdict.outside_turned_back) > kMostOutside ||
       std::abs(difference) < kClearShare || std::abs(difference) * shots < kClearShots) {
     return verdict;
   }

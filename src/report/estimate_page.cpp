@@ -24,15 +24,14 @@ std::string noise_words(const EstimateReport& r) {
     return fmt::format("The stated noise and rounding alone would leave {:.3g}°. ", expected);
   }
   const auto angle = [](double value, double sigma) {
-    const NumberText text =
-        number_text(degrees_from_radians(value), degrees_from_radians(sigma));
+    const NumberText text = number_text(degrees_from_radians(value), degrees_from_radians(sigma));
     return fmt::format("{}° ± {}°", text.value, text.sigma);
   };
   return fmt::format(
       "Beside rounding the directions have a noise of {} in azimuth and {} in zenith, found in the "
       "data; a healthy unit of this kind has {:.3g}°. ",
-      angle(r.noise->azimuth, r.noise->azimuth_sigma), angle(r.noise->zenith, r.noise->zenith_sigma),
-      degrees_from_radians(r.noise->usual));
+      angle(r.noise->azimuth, r.noise->azimuth_sigma),
+      angle(r.noise->zenith, r.noise->zenith_sigma), degrees_from_radians(r.noise->usual));
 }
 
 Verdict verdict_of(const EstimateReport& r) {
@@ -41,13 +40,15 @@ Verdict verdict_of(const EstimateReport& r) {
   verdict.reason = r.reason;
   verdict.warnings = r.warnings;
   verdict.facts = fmt::format(
-      "What is left unexplained is {:.3g}° in azimuth and {:.3g}° in zenith (root mean square). {}{} "
+      "What is left unexplained is {:.3g}° in azimuth and {:.3g}° in zenith (root mean square). "
+      "{}{} "
       "of {} shots were left out as outliers.",
       degrees_from_radians(r.azimuth_residuals.rms), degrees_from_radians(r.zenith_residuals.rms),
       noise_words(r), count_text(r.outliers), count_text(r.shots));
   verdict.healthy = "Healthy: the model describes this recording.";
   verdict.mend_html =
-      "check that --sensor is the instrument that recorded, that its times are right, and whether the file has the sign of the elevation turned (--mirror yes); a longer "
+      "check that --sensor is the instrument that recorded, that its times are right, and whether "
+      "the file has the sign of the elevation turned (--mirror yes); a longer "
       "recording or --rate-hz full gives the estimation more to hold on to.";
   verdict.use_html =
       "nothing. Any command takes <code>calibration.yaml</code> with <code>--sensor</code>.";

@@ -432,12 +432,11 @@ EstimateReport estimate_report(const EstimateReportInput& input) {
   report.azimuth_residuals = e.azimuth_residuals;
   report.zenith_residuals = e.zenith_residuals;
   report.expected_residual = e.expected_residual;
-  report.noise = {e.noise_held,           e.noise.value.azimuth, e.noise.sigma.azimuth,
+  report.noise = {e.noise_held,         e.noise.value.azimuth, e.noise.sigma.azimuth,
                   e.noise.value.zenith, e.noise.sigma.zenith,  e.usual_noise};
   if (e.frame) {
     const Eigen::Matrix2d& c = e.frame->covariance;
-    report.frame = {e.frame->turn.yaw, std::sqrt(c(0, 0)), e.frame->turn.pitch,
-                    std::sqrt(c(1, 1))};
+    report.frame = {e.frame->turn.yaw, std::sqrt(c(0, 0)), e.frame->turn.pitch, std::sqrt(c(1, 1))};
   }
   for (const estimation::AngleProfile& profile : e.residuals_over_angle) {
     report.unevenness.push_back(profile.chi2_per_bin);

@@ -76,8 +76,7 @@ constexpr double kRoundingShare = 1.0 / 3.0;
 
 Row converged_row(const std::string& how, const Estimate& estimate) {
   Row row{with(how, "shots used"), "1", {}, static_cast<double>(estimate.series.size())};
-  row.checks = {
-holds("the estimate converged", estimate.converged, estimate.reason)};
+  row.checks = {holds("the estimate converged", estimate.converged, estimate.reason)};
   return row;
 }
 
@@ -270,8 +269,7 @@ Reproduction real(const RealRecording& recording) {
       estimate_run(Method::map, run, recording.sensor, recording.sensor.angle_noise);
   const Estimate filtered =
       estimate_run(Method::ekf, thin, recording.sensor, recording.sensor.angle_noise);
-  const bool only_rounding =
-      all.azimuth_residuals.rms < kRoundingShare * all.expected_residual;
+  const bool only_rounding = all.azimuth_residuals.rms < kRoundingShare * all.expected_residual;
   for (const auto& [name, estimate] :
        {std::pair<std::string, const Estimate*>("all shots", &all),
         std::pair<std::string, const Estimate*>("filter at 1 kHz", &filtered)}) {

@@ -44,8 +44,8 @@ struct Residuals {
 
 TEST(NoiseComponents, AreThoseOfTheDataAndTheirSigmasAreTrue) {
   const AngleNoise truth{7e-5, 3e-5};
-  for (const auto& [fine, coarse] : {std::pair(0.0F, 0.0F), std::pair(1e-4F, 1e-4F),
-                                     std::pair(2e-5F, 1e-3F)}) {
+  for (const auto& [fine, coarse] :
+       {std::pair(0.0F, 0.0F), std::pair(1e-4F, 1e-4F), std::pair(2e-5F, 1e-3F)}) {
     double squares = 0, largest = 0;
     constexpr int kSeeds = 100;
     for (unsigned seed = 0; seed < kSeeds; ++seed) {

@@ -291,7 +291,8 @@ TEST(BatchMap, PoliteRefusals) {
   BatchMapOptions options;
   options.angle_noise = equal_noise(kNoise);
   options.knot_interval = 0;
-  EXPECT_THROW(run_batch_map(series, find_start(series, sensor, {{}, kNoise, false, false}), sensor, options),
+  EXPECT_THROW(run_batch_map(series, find_start(series, sensor, {{}, kNoise, false, false}), sensor,
+                             options),
                InvalidArgument);
 }
 

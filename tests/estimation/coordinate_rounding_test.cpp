@@ -47,7 +47,8 @@ Estimate estimate_of(const AngleSeries& series) {
 
 TEST(CoordinateRounding, IsReadOffTheData) {
   const auto sensor = sensors::load_sensor("mid-40-table3");
-  const AngleSeries exact = testing::constant_speed_series(sensor, 0.5, 2.5, 0.2, 50000.0, 0.001, 2);
+  const AngleSeries exact =
+      testing::constant_speed_series(sensor, 0.5, 2.5, 0.2, 50000.0, 0.001, 2);
   for (const FrameTurn& frame : {FrameTurn{}, FrameTurn{0.6, 0.1}}) {
     const Eigen::Matrix3d rotation = recording_from_sensor(frame);
     const Estimate to_nearest = estimate_of(recorded(exact, rounded, rotation));
@@ -89,7 +90,7 @@ TEST(CoordinateRounding, HalfStepsAreAddedAwayFromZero) {
       series.range[0] * direction_from_angles<double>({series.azimuth[0], series.zenith[0]});
   EXPECT_NEAR(moved.x, 2.0005, 1e-7);
   EXPECT_NEAR(moved.y, -0.0035, 1e-7);
-  EXPECT_NEAR(moved.z, 0.0, 1e-7);  // may have been either sign
+  EXPECT_NEAR(moved.z, 0.0, 1e-7);    // may have been either sign
   EXPECT_EQ(series.azimuth[1], 0.1);  // no range: nothing is known of its coordinates
 }
 

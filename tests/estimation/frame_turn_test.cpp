@@ -34,7 +34,8 @@ TEST(FrameTurn, ShotsTurnedThereAndBackAreTheSame) {
   const auto sensor = sensors::load_sensor("mid-40");
   AngleSeries series = testing::constant_speed_series(sensor, 0.3, 1.0, 0.1, 10000.0);
   for (std::size_t i = 0; i < series.size(); ++i) {
-    series.azimuth_rounding_variance[i] = 1e-8F / static_cast<float>(std::pow(std::sin(series.zenith[i]), 2));
+    series.azimuth_rounding_variance[i] =
+        1e-8F / static_cast<float>(std::pow(std::sin(series.zenith[i]), 2));
     series.zenith_rounding_variance[i] = 1e-8F;
   }
   const AngleSeries before = series;

@@ -54,7 +54,8 @@ TEST_P(StartOfRandomSensors, AlwaysFindsCombinationSpeedsAndAngles) {
       EXPECT_LT(degrees_from_radians(std::abs(wrap_to_pi(start.rotation_angle[k] - truth))), 1.0);
     }
     const auto found_mirrored = [&](const AngleSeries& shots) {
-      return find_start(shots, nominal, {free, radians_from_degrees(0.01), std::nullopt, {}}).mirrored;
+      return find_start(shots, nominal, {free, radians_from_degrees(0.01), std::nullopt, {}})
+          .mirrored;
     };
     EXPECT_FALSE(found_mirrored(head));
     AngleSeries turned = head;
@@ -73,7 +74,8 @@ struct Coverage {
 
 constexpr double kDegree = radians_from_degrees(1.0);
 constexpr Coverage kCoverages[] = {
-    {"below", [](const SphericalAngles<double>& s, std::size_t) { return s.zenith > kPi / 2 + 2 * kDegree; }},
+    {"below", [](const SphericalAngles<double>& s,
+                 std::size_t) { return s.zenith > kPi / 2 + 2 * kDegree; }},
     {"above", [](const SphericalAngles<double>& s, std::size_t) { return s.zenith < kPi / 2; }},
     {"left", [](const SphericalAngles<double>& s, std::size_t) { return s.azimuth > 0; }},
     {"window",
@@ -81,7 +83,8 @@ constexpr Coverage kCoverages[] = {
        return std::abs(s.azimuth - 5 * kDegree) < 6 * kDegree &&
               std::abs(s.zenith - kPi / 2 - 4 * kDegree) < 6 * kDegree;
      }},
-    {"fifth", [](const SphericalAngles<double>&, std::size_t number) { return number * 7919 % 10 < 2; }},
+    {"fifth",
+     [](const SphericalAngles<double>&, std::size_t number) { return number * 7919 % 10 < 2; }},
 };
 
 class StartUnderTheSky : public ::testing::TestWithParam<Coverage> {};
@@ -122,9 +125,9 @@ TEST(Initialisation, ATurnedFrameIsFoundAboutItsOpticalAxis) {
   const auto sensor = sensors::load_sensor("mid-40-table3");
   const auto whole = testing::constant_speed_series(sensor, 2.0, -1.0, 0.1, 100000.0, 0.002, 3);
   for (const bool sky : {false, true}) {
-    for (const FrameTurn& turned : {FrameTurn{0.45, 0.0}, FrameTurn{-2.8, 0.3},
-                                    FrameTurn{0.0, radians_from_degrees(60.0)},
-                                    FrameTurn{radians_from_degrees(5.0), 0.0}}) {
+    for (const FrameTurn& turned :
+         {FrameTurn{0.45, 0.0}, FrameTurn{-2.8, 0.3}, FrameTurn{0.0, radians_from_degrees(60.0)},
+          FrameTurn{radians_from_degrees(5.0), 0.0}}) {
       AngleSeries head;
       for (std::size_t i = 0; i < whole.size(); ++i) {
         if (!sky || whole.zenith[i] > kPi / 2) head.append(whole, i);
@@ -166,9 +169,10 @@ TEST(Initialisation, LinesCarryTheSpeedsOfTheRotors) {
   const auto sensor = sensors::load_sensor("mid-40");
   const auto series = testing::constant_speed_series(sensor, 0.3, 1.0, 0.1, 100000.0);
   const LineSearch search(series);
-  for (const auto& found : {search.near({sensor.angular_velocity[0] * 1.02,
-                                         sensor.angular_velocity[1] * 0.98}, 0.06, 3),
-                            search.anywhere(2.1 * sensor.angular_velocity[1], 3)}) {
+  for (const auto& found :
+       {search.near({sensor.angular_velocity[0] * 1.02, sensor.angular_velocity[1] * 0.98}, 0.06,
+                    3),
+        search.anywhere(2.1 * sensor.angular_velocity[1], 3)}) {
     ASSERT_FALSE(found.empty());
     const auto& lines = found.front().lines;
     ASSERT_EQ(lines.size(), 2u);
@@ -193,7 +197,8 @@ TEST(Initialisation, FiftyMillisecondsWithAGapAreEnough) {
     for (std::size_t i = 0; i < whole.size(); ++i) {
       if (whole.time(i) < 0.018 || whole.time(i) > 0.028) holed.append(whole, i);
     }
-    const Start start = find_start(holed, nominal, {free, radians_from_degrees(0.01), false, false});
+    const Start start =
+        find_start(holed, nominal, {free, radians_from_degrees(0.01), false, false});
     EXPECT_EQ(start.combination, SpeedCombination::second);
     const double t = 1e-9 * static_cast<double>(start.time_ns - whole.time_ns[0]);
     for (std::size_t k = 0; k < 2; ++k) {
@@ -254,9 +259,8 @@ TEST(Initialisation, AClockInAnotherUnitIsNamed) {
 TEST(Initialisation, TooFewShotsASecondToFollowTheRotorsAreRefused) {
   const auto sensor = sensors::load_sensor("mid-40");
   const auto head = testing::constant_speed_series(sensor, 0.5, 2.5, 1.0, 200.0);
-  EXPECT_THROW(
-      find_start(head, sensor, {free_parameters(default_free_names(2), 2), 1e-4, {}, {}}),
-      EstimationError);
+  EXPECT_THROW(find_start(head, sensor, {free_parameters(default_free_names(2), 2), 1e-4, {}, {}}),
+               EstimationError);
 }
 
 TEST(Initialisation, TrackedPhasesFollowAWanderingRotorOverAGap) {

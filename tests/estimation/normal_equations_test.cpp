@@ -379,7 +379,8 @@ TEST(NormalEquations, ShotsThatNoKnotServesAreLeftAlone) {
   for (const InstructionSet set : available_instruction_sets()) {
     NormalEquations equations;
     Columns columns(r.series.size());
-    accumulate(r.series, r.knots, train, {}, {equal_noise(kNoise)}, equations, columns.spans(), set);
+    accumulate(r.series, r.knots, train, {}, {equal_noise(kNoise)}, equations, columns.spans(),
+               set);
     EXPECT_EQ(equations.shots, 18u);
     for (std::size_t i = 0; i < r.series.size(); ++i) {
       const bool served = i < 5 || i >= 25;

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-// Recordings as people bring them: whole millimetres, returns from a part of the field only, tenths of
-// a second, unknown noise. Random units, uneven rotors; the answer must be right or refused, and its
-// sigmas and its noise must be true.
+// Recordings as people bring them: whole millimetres, returns from a part of the field only, tenths
+// of a second, unknown noise. Random units, uneven rotors; the answer must be right or refused, and
+// its sigmas and its noise must be true.
 #include <cmath>
 
 #include <gtest/gtest.h>

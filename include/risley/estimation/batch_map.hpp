@@ -24,8 +24,8 @@ namespace risley::estimation {
 struct BatchMapOptions {
   std::optional<AngleNoise> angle_noise;  ///< held; empty: found, one variance for each angle
   std::vector<FreeParameter> free;        ///< constants to estimate; may be empty
-  /// 1 sigma of the turn that the series' frame may have against the sensor's about both axes across
-  /// the beam, rad; 0: none
+  /// 1 sigma of the turn that the series' frame may have against the sensor's about both axes
+  /// across the beam, rad; 0: none
   double frame_sigma = 0;
   /// Motion model of the rotors [prisms]; empty chooses it by maximum likelihood.
   std::vector<RotorProcess> rotor_process;
@@ -37,18 +37,18 @@ struct BatchMapOptions {
 
 /// The most probable parameters and trajectory.
 struct BatchMapResult {
-  Eigen::VectorXd parameters;                   ///< [free], SI units
-  Eigen::MatrixXd covariance;                   ///< [free, free], variance factor included
+  Eigen::VectorXd parameters;   ///< [free], SI units
+  Eigen::MatrixXd covariance;   ///< [free, free], variance factor included
   Eigen::MatrixXd information;  ///< [constants], of the data alone, variance factor included
   PrismTrain train{parse_face_order("PA-AP")};  ///< with the estimated parameters
   /// Turn of the series' frame against the sensor's: residuals and angles are those of the series
   /// turned back by it. Identity unless a frame_sigma was given.
   Eigen::Matrix3d frame = Eigen::Matrix3d::Identity();
   Eigen::Matrix2d frame_covariance = Eigen::Matrix2d::Zero();  ///< turns about Z and Y, rad^2
-  NoiseEstimate noise;      ///< sigma 0 where it was held
+  NoiseEstimate noise;                                         ///< sigma 0 where it was held
   /// Parameters, frame: what the data alone tell of both together [free + 2 or 0].
   std::vector<FreeParameter> constants;
-  RotorTrajectory trajectory;                   ///< with covariances
+  RotorTrajectory trajectory;  ///< with covariances
   /// How the rotation angles follow the parameters, mean over the recording [prisms, free]: an
   /// error of the parameters moves all angles of a rotor by nearly the same.
   Eigen::MatrixXd angle_sensitivity;

@@ -23,16 +23,16 @@ enum class Method {
 
 /// What the user asks for.
 struct EstimateOptions {
-  sensors::Sensor sensor;               ///< start values; its combination is read off the data
+  sensors::Sensor sensor;  ///< start values; its combination is read off the data
   /// 1 sigma of both angles before rounding, held, rad; empty: the batch estimator finds it, the
   /// filter takes the sensor's
   std::optional<double> angle_noise;
   std::vector<std::string> fixed;       ///< default free parameters to hold at the sensor's value
   std::vector<std::string> additional;  ///< further parameters to free
   std::vector<RotorProcess> rotor_process;  ///< empty: maximum likelihood
-  std::optional<bool> mirrored;  ///< the elevation's sign is turned; empty: find out
-  /// Directions come from coordinates in whole steps, such as millimetres, and the series has ranges:
-  /// finds out whether these were rounded or cut off.
+  std::optional<bool> mirrored;             ///< the elevation's sign is turned; empty: find out
+  /// Directions come from coordinates in whole steps, such as millimetres, and the series has
+  /// ranges: finds out whether these were rounded or cut off.
   bool cartesian = false;
   /// The recording's frame is turned against the sensor's; empty: it is where shots lie outside the
   /// sensor's field of view.
@@ -54,7 +54,7 @@ struct EstimatedValue {
 struct Estimate {
   Method method = Method::map;
   bool converged = false;
-  std::string reason;  ///< why not converged; empty when converged
+  std::string reason;                 ///< why not converged; empty when converged
   std::vector<std::string> warnings;  ///< what the user should know all the same
   sensors::Sensor sensor;             ///< the calibrated sensor with its covariance
   bool mirrored = false;

@@ -25,8 +25,8 @@ Eigen::Matrix3d recording_from_sensor(const FrameTurn& turn);
 /// The turn whose optical axis is that of a rotation, which may roll.
 FrameTurn turn_of(const Eigen::Matrix3d& recording_from_sensor);
 
-/// A rotation followed by small turns about the sensor's Z axis (yaw) and Y axis (pitch), without the
-/// roll that this leaves. @param step  yaw and pitch, rad
+/// A rotation followed by small turns about the sensor's Z axis (yaw) and Y axis (pitch), without
+/// the roll that this leaves. @param step  yaw and pitch, rad
 Eigen::Matrix3d turned_further(const Eigen::Matrix3d& recording_from_sensor,
                                const Eigen::Vector2d& step);
 

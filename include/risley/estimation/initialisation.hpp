@@ -19,8 +19,8 @@ struct StartOptions {
   double angle_noise = 0;           ///< 1 sigma of azimuth and zenith, roughly, rad
   /// Whether the recording is a mirror image; empty finds out.
   std::optional<bool> mirrored = false;
-  /// Whether the recording's frame is turned against the sensor's; empty finds out: it is when shots
-  /// lie outside the sensor's field of view.
+  /// Whether the recording's frame is turned against the sensor's; empty finds out: it is when
+  /// shots lie outside the sensor's field of view.
   std::optional<bool> turned;
 };
 

@@ -31,9 +31,9 @@ struct RotorLines {
 };
 
 /// Finds the speeds of two rotors by fitting lines to the shots of a window, at the times that have
-/// shots: half of the field may be missing, because sky returns nothing. A spectrum would be smeared
-/// by such gaps; the fit of all lines together is not. The sums that every pair of speeds needs come
-/// from two Fourier transforms. docs/theory/start.md
+/// shots: half of the field may be missing, because sky returns nothing. A spectrum would be
+/// smeared by such gaps; the fit of all lines together is not. The sums that every pair of speeds
+/// needs come from two Fourier transforms. docs/theory/start.md
 class LineSearch {
  public:
   /// Takes the best covered stretch of about 100 ms (more where shots are rare).
