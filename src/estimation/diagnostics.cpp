@@ -70,7 +70,7 @@ double robust_scale(std::span<const double> azimuth, std::span<const double> zen
 Autocorrelation autocorrelation(std::span<const std::int64_t> time_ns,
                                 std::span<const double> azimuth, std::span<const double> zenith,
                                 std::span<const unsigned char> skip) {
-  constexpr double kSignificant = 3.0;  // sigmas
+  constexpr double kSignificant = 2.5;  // sigmas
   constexpr std::size_t kBlocks = 8, kBlockShots = 50000, kMostLags = 4000;
   Autocorrelation result;
   if (time_ns.size() < 100) return result;

@@ -37,7 +37,7 @@ struct Autocorrelation {
 
 /// Autocorrelation of residual columns, both axes together. Pairs count only where no shot is
 /// missing between them. The sum goes on in groups of 1, 1, 2, 4, 8, ... lags and ends before the
-/// first group whose mean is not significant (3 sigma).
+/// first group whose mean is not significant (2.5 sigma).
 /// @param time_ns  of the shots  @param skip  where not zero the shot is left out
 Autocorrelation autocorrelation(std::span<const std::int64_t> time_ns,
                                 std::span<const double> azimuth, std::span<const double> zenith,
