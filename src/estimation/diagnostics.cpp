@@ -70,7 +70,7 @@ double robust_scale(std::span<const double> azimuth, std::span<const double> zen
 Autocorrelation autocorrelation(std::span<const std::int64_t> time_ns,
                                 std::span<const double> azimuth, std::span<const double> zenith,
                                 std::span<const unsigned char> skip) {
-  constexpr double kSignificant = 2.5;  // sigmas
+  constexpr double kSignificant = 2.0;  // sigmas: a group too many costs less than one too few
   constexpr std::size_t kBlocks = 8, kBlockShots = 50000, kMostLags = 4000;
   Autocorrelation result;
   if (time_ns.size() < 100) return result;
@@ -108,7 +108,7 @@ Autocorrelation autocorrelation(std::span<const std::int64_t> time_ns,
   }
   if (!(used > 0) || !(variance > 0)) return result;
   variance /= used;
-  double scatter = 1.0;
+  double scatter = 1.0, all_pairs = 0;
   // Lags are judged in groups of 1, 1, 2, 4, 8, ...: a weak correlation over many lags is worth as
   // much as a strong one over few, and shows only in their mean.
   for (std::size_t first = 1, group = 1; first + group <= kMostLags + 1; first += group) {
@@ -137,6 +137,12 @@ Autocorrelation autocorrelation(std::span<const std::int64_t> time_ns,
     for (const double one : rho) scatter += 2.0 * one * one;
     result.factor += 2.0 * sum;
     result.rho.insert(result.rho.end(), rho.begin(), rho.end());
+    all_pairs = fewest_pairs;
+  }
+  // Few shots do not tell the factor well; its own standard deviation goes on top.
+  if (!result.rho.empty()) {
+    const double lags = static_cast<double>(result.rho.size());
+    result.factor += 2.0 * result.factor * std::sqrt(lags / (2.0 * all_pairs));
   }
   return result;
 }

@@ -35,9 +35,9 @@ struct Autocorrelation {
   std::vector<double> rho;  ///< at lags 1, 2, ... until it cannot be told from zero
 };
 
-/// Autocorrelation of residual columns, both axes together. Pairs count only where no shot is
-/// missing between them. The sum goes on in groups of 1, 1, 2, 4, 8, ... lags and ends before the
-/// first group whose mean is not significant (2.5 sigma).
+/// Autocorrelation of residual columns, both axes together; pairs with a shot missing between them
+/// do not count. The sum ends before the first group of 1, 1, 2, 4, ... lags whose mean is below 2
+/// sigma; the factor is one standard deviation of itself above what the sum says.
 /// @param time_ns  of the shots  @param skip  where not zero the shot is left out
 Autocorrelation autocorrelation(std::span<const std::int64_t> time_ns,
                                 std::span<const double> azimuth, std::span<const double> zenith,
