@@ -5,6 +5,7 @@
 // its sigmas and its noise must be true.
 #include <cmath>
 
+#include <Eigen/Cholesky>
 #include <gtest/gtest.h>
 
 #include "risley/core/random.hpp"
