@@ -28,8 +28,11 @@ constexpr double kStartSpeedSigma = radians_from_degrees(100.0);
 constexpr double kStraightSigma = 1e-3;
 /// A prediction this uncertain may lie in a neighbouring minimum: then a grid of angles is tried.
 constexpr double kLostSigma = radians_from_degrees(8.0);
-constexpr int kGridHalf = 4;
+constexpr int kGridHalf = 12;  // steps to half a turn
 constexpr double kGridStep = radians_from_degrees(15.0);
+
+/// Shots of a window that tell a scale of residuals.
+constexpr std::size_t kFewestShots = 12;
 
 template <int N>
 class Tracker {
@@ -91,7 +94,34 @@ class Tracker {
     for (int k = 0; k < N; ++k) {
       uncertain = std::max(uncertain, std::sqrt(state.covariance(3 * k, 3 * k)));
     }
-    if (uncertain > kLostSigma) look_around(state, rows, uncertain);
+    if (uncertain > kLostSigma) look_around(state, rows, 3.0 * uncertain);
+    if (!improve(state, predicted, rows)) return false;
+    if (!lost(rows)) return true;
+    // Nothing of the prediction is true, such as that of a piece whose times came again.
+    State anew = predicted;
+    for (int k = 0; k < N; ++k) anew.covariance(3 * k, 3 * k) = kPi * kPi;
+    const State loose = anew;
+    look_around(anew, rows, kPi);
+    if (improve(anew, loose, rows) && !lost(rows)) state = anew;
+    return true;
+  }
+
+ private:
+  void accumulate_at(const State& state, ShotRange rows) {
+    knot_.time_ns = {state.time_ns};
+    knot_.first_shot = {rows.begin};
+    knot_.last_shot = {rows.end};
+    std::copy_n(state.mean.data(), kD, knot_.state.begin());
+    rows_ = rows;
+    residuals_.resize(2 * series_.size());
+    accumulate(series_, knot_, start_.train, {}, weights_, equations_,
+               {{residuals_.data(), series_.size()},
+                {residuals_.data() + series_.size(), series_.size()},
+                {}});
+  }
+
+  /// Gauss-Newton steps from a state to the shots and the prediction together.
+  bool improve(State& state, const State& predicted, ShotRange rows) {
     constexpr int kRounds = 4;
     for (int round = 0; round < kRounds; ++round) {
       accumulate_at(state, rows);
@@ -113,36 +143,28 @@ class Tracker {
     return true;
   }
 
- private:
-  void accumulate_at(const State& state, ShotRange rows) {
-    knot_.time_ns = {state.time_ns};
-    knot_.first_shot = {rows.begin};
-    knot_.last_shot = {rows.end};
-    std::copy_n(state.mean.data(), kD, knot_.state.begin());
-    rows_ = rows;
-    residuals_.resize(2 * series_.size());
-    accumulate(series_, knot_, start_.train, {}, weights_, equations_,
-               {{residuals_.data(), series_.size()},
-                {residuals_.data() + series_.size(), series_.size()},
-                {}});
+  /// Residuals that no noise and no wander of the rotors explain.
+  bool lost(ShotRange rows) const {
+    constexpr double kLostResidual = radians_from_degrees(1.0);
+    return rows.size() >= kFewestShots && !(scale() < kLostResidual);
+  }
+
+  /// Scale of the residuals of the rows, rad.
+  double scale() const {
+    return robust_scale({residuals_.data() + rows_.begin, rows_.size()},
+                        {residuals_.data() + series_.size() + rows_.begin, rows_.size()});
   }
 
   /// Scale of the residuals over the noise; that of the start where few shots tell.
   double level() const {
-    constexpr std::size_t kFewestShots = 12;
     if (rows_.size() < kFewestShots) return usual_level_;
-    const double noise = weights_.angle_noise.rms();
-    const double scale =
-        robust_scale({residuals_.data() + rows_.begin, rows_.size()},
-                     {residuals_.data() + series_.size() + rows_.begin, rows_.size()});
-    return std::clamp(scale / noise, 1.0, 1e6);
+    return std::clamp(scale() / weights_.angle_noise.rms(), 1.0, 1e6);
   }
 
   /// Moves the angles to the best of a grid about the prediction.
-  void look_around(State& state, ShotRange rows, double uncertain) {
+  void look_around(State& state, ShotRange rows, double reach) {
     const double softening = std::exchange(weights_.softening, softening_at(10.0 * usual_level_));
-    const int half =
-        std::clamp(static_cast<int>(std::ceil(3.0 * uncertain / kGridStep)), 1, kGridHalf);
+    const int half = std::clamp(static_cast<int>(std::ceil(reach / kGridStep)), 1, kGridHalf);
     std::vector<int> offset(N, -half);
     State best = state;
     double least = std::numeric_limits<double>::infinity();

@@ -32,6 +32,7 @@ inspect('cloud', () => {
 inspect('not-converged', () => {
   risley(folder, 0, 'simulate', '-o', 'short.nc', '--sensor', 'mid-40-table3', '--rotor',
          'sinusoidal', '--duration-s', '2', '--seed', '1');
-  risley(folder, 1, 'estimate', 'short.nc', '--noise-angle-deg', '0.0001', '--sensor', 'mid-40-reversed', '--fix', 'refractive_index=1.55', '-o', 'not-converged');
+  risley(folder, 1, 'estimate', 'short.nc', '--free', 'wedge_angle_deg',
+         '--free', 'refractive_index_air', '-o', 'not-converged');
   return join(folder, 'not-converged/report.html');
 }, /Not converged: do not use these numbers/, false);

@@ -199,7 +199,7 @@ class ChainTest(CommandTest):
         self.assertNotEqual(outputs[0][0], outputs[2][0])
 
     def test_recordings_that_cannot_answer(self):
-        self.expect(0, "simulate", "-o", "short.csv", "--duration-s", "0.03")
+        self.expect(0, "simulate", "-o", "short.csv", "--duration-s", "0.015")
         invalid = ["//Distance,Zenith,Azimuth,Inten-sity,Time\n"]
         invalid += [f"0.000,90.00,0.00,0,{0.00001 * i:.6f}\n" for i in range(100)]
         (self.folder / "blind.csv").write_text("".join(invalid))

@@ -73,7 +73,8 @@ class ReportTest(CommandTest):
         self.assertEqual((folder / "report.html").read_text(), "old")
 
     def test_what_did_not_converge_has_a_page_too(self):
-        done = self.expect(1, "estimate", "unit.lvx", "-o", "wrong", "--noise-angle-deg", "0.0001",
+        done = self.expect(1, "estimate", "unit.lvx", "-o", "wrong", "--free", "wedge_angle_deg",
+                           "--free", "refractive_index_air",
                            "--quiet")
         self.assertIn("not converged", done.stderr)
         self.assertIn("do not use these numbers", (self.folder / "wrong/report.html").read_text())
