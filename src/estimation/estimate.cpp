@@ -12,6 +12,7 @@
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
 
+#include "estimation/frame_prior.hpp"
 #include "estimation/residual_model.hpp"
 #include "estimation/used_shots.hpp"
 
@@ -119,8 +120,6 @@ std::string implausible_parameter(const Estimate& estimate, const PrismTrain& no
 constexpr double kFarAbove = 3.0;
 /// Noise that was found above the preset's by this factor is worth a word.
 constexpr double kNoisy = 2.0;
-/// Of the frame's turn about what the start found, rad.
-constexpr double kFrameSigma = radians_from_degrees(1.0);
 /// A parameter combination that keeps more of its prior sigma than this was not measured.
 constexpr double kUnmeasured = 0.3;
 

@@ -18,6 +18,7 @@
 #include "risley/estimation/spectral_lines.hpp"
 
 #include "estimation/field_of_view.hpp"
+#include "estimation/frame_prior.hpp"
 #include "estimation/knot_model.hpp"
 #include "estimation/residual_model.hpp"
 
@@ -40,7 +41,6 @@ constexpr double kHopeless = 4.0, kSecondOrder = 3e-5;
 constexpr double kGoodResidual = radians_from_degrees(0.08);
 /// Two answers are told apart when their chi2 differ by this.
 constexpr double kDecisive = 25.0;
-constexpr double kFrameSigma = radians_from_degrees(1.0);
 /// A turn that leaves all shots in the field of view is believed from this angle on, rad, where it
 /// takes this share of the residuals away.
 constexpr double kLeastTurn = radians_from_degrees(0.3);
@@ -457,10 +457,10 @@ Answer find_in_window(const StartWindow& window, const sensors::Sensor& sensor,
   const LineSearch& search = window.search();
   std::vector<Trial> trials;
   for (const Hypothesis& h : hypotheses) {
-    const auto [a, b] = h.recorded_speeds();
+    const std::pair<double, double> speeds = h.recorded_speeds();
     // A combination and the mirror image of the other have the same lines, the other way round.
     const auto twin = std::find_if(trials.begin(), trials.end(), [&](const Trial& trial) {
-      return trial.hypothesis->recorded_speeds() == std::pair(b, a);
+      return trial.hypothesis->recorded_speeds() == std::pair(speeds.second, speeds.first);
     });
     if (twin != trials.end()) {
       const Hypothesis* other = twin->hypothesis;
@@ -470,7 +470,7 @@ Answer find_in_window(const StartWindow& window, const sensors::Sensor& sensor,
       }
       continue;
     }
-    for (RotorLines& lines : search.near({a, b}, kUsualShare, kMostCandidates)) {
+    for (RotorLines& lines : search.near(speeds, kUsualShare, kMostCandidates)) {
       trials.push_back({&h, std::move(lines)});
     }
   }
@@ -588,12 +588,13 @@ Start find_start(const AngleSeries& head, const sensors::Sensor& sensor,
       head, sensor, options,
       turned ? turned_frame(head, sensor, options) : Eigen::Matrix3d(Eigen::Matrix3d::Identity()));
   const Answer found = find_in_window(window, sensor, hypotheses, turned);
-  const Start start = window.start_of(found);
+  Start start = window.start_of(found);
   if (turned || options.turned || options.free.empty()) return start;
   // A small turn leaves the shots in the field of view and shows in the residuals alone.
-  const Start free = window.start_of(window.answer(found.trial, kEnoughShots, true));
+  Start free = window.start_of(window.answer(found.trial, kEnoughShots, true));
   const bool far = std::hypot(free.frame->yaw, free.frame->pitch) > kLeastTurn;
-  return far && free.residual_rms < (1.0 - kTurnGain) * start.residual_rms ? free : start;
+  if (far && free.residual_rms < (1.0 - kTurnGain) * start.residual_rms) return free;
+  return start;
 }
 
 void prepare_shots(AngleSeries& series, const Start& start) {

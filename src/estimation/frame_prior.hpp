@@ -1,0 +1,13 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include "risley/core/angle.hpp"
+
+namespace risley::estimation {
+
+/// 1 sigma of the frame's turn about where the lines of the start see the optical axis, rad: as
+/// wide as the priors of the parameters.
+inline constexpr double kFrameSigma = radians_from_degrees(1.0);
+
+}  // namespace risley::estimation
