@@ -3,6 +3,7 @@
 #include "risley/estimation/angle_noise.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <vector>
 
@@ -10,6 +11,7 @@
 
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
+#include "risley/estimation/diagnostics.hpp"
 
 namespace risley::estimation {
 namespace {
@@ -111,6 +113,22 @@ AngleNoise robust_noise(const AngleSeries& series, std::span<const double> azimu
                         std::span<const double> zenith) {
   return {robust_sigma(azimuth, series.azimuth_rounding_variance),
           robust_sigma(zenith, series.zenith_rounding_variance)};
+}
+
+double robust_level(const AngleSeries& series, const AngleNoise& noise,
+                    std::span<const double> azimuth, std::span<const double> zenith) {
+  constexpr std::size_t kEnough = 20000;
+  const std::size_t stride = std::max<std::size_t>(1, azimuth.size() / kEnough);
+  const auto over_sigma = [stride](std::span<const double> residual, double sigma,
+                                   std::span<const float> rounding) {
+    std::vector<double> scaled;
+    for (std::size_t i = 0; i < residual.size(); i += stride) {
+      scaled.push_back(residual[i] / std::sqrt(sigma * sigma + static_cast<double>(rounding[i])));
+    }
+    return scaled;
+  };
+  return robust_scale(over_sigma(azimuth, noise.azimuth, series.azimuth_rounding_variance),
+                      over_sigma(zenith, noise.zenith, series.zenith_rounding_variance));
 }
 
 NoiseEstimate noise_components(const AngleSeries& series, std::span<const double> azimuth,

@@ -91,19 +91,7 @@ class Iteration {
       weights_.angle_noise = robust_noise(series(), azimuth_, zenith_);
       return 1.0;
     }
-    constexpr std::size_t kEnough = 20000;
-    const double azimuth_noise = weights_.angle_noise.azimuth * weights_.angle_noise.azimuth;
-    const double zenith_noise = weights_.angle_noise.zenith * weights_.angle_noise.zenith;
-    const std::size_t stride = std::max<std::size_t>(1, recorded_.size() / kEnough);
-    std::vector<double> azimuth, zenith;
-    for (std::size_t i = 0; i < recorded_.size(); i += stride) {
-      const auto scale = [i](double noise, const std::vector<float>& rounding) {
-        return 1.0 / std::sqrt(noise + static_cast<double>(rounding[i]));
-      };
-      azimuth.push_back(azimuth_[i] * scale(azimuth_noise, series().azimuth_rounding_variance));
-      zenith.push_back(zenith_[i] * scale(zenith_noise, series().zenith_rounding_variance));
-    }
-    return std::max(1.0, robust_scale(azimuth, zenith));
+    return std::max(1.0, robust_level(series(), weights_.angle_noise, azimuth_, zenith_));
   }
 
   SmootherSolution solve(std::span<const RotorProcess> process, bool covariances) const {

@@ -103,7 +103,8 @@ class WindowFitter {
     for (const bool move_parameters : {false, true}) {
       double damping = 1e-4;
       for (int iteration = 0; iteration < 25; ++iteration) {
-        weights_.softening = softening_at(std::max(level(), 1.0));
+        weights_.softening = softening_at(
+            std::max(1.0, robust_level(shots_, weights_.angle_noise, azimuth_, zenith_)));
         const double cost = evaluate(fit);
         const auto [normal, gradient] = normal_equations(fit);
         bool moved = false, done = false;
@@ -133,19 +134,6 @@ class WindowFitter {
 
  private:
   bool turns() const { return all_.size() > free_.size(); }
-
-  /// Residual scale that half of the shots keep over the noise, rounding of each shot included.
-  double level() const {
-    std::vector<double> azimuth(azimuth_.size()), zenith(azimuth_.size());
-    const double noise = weights_.angle_noise.azimuth * weights_.angle_noise.azimuth;
-    for (std::size_t i = 0; i < azimuth.size(); ++i) {
-      azimuth[i] =
-          azimuth_[i] / std::sqrt(noise + static_cast<double>(shots_.azimuth_rounding_variance[i]));
-      zenith[i] =
-          zenith_[i] / std::sqrt(noise + static_cast<double>(shots_.zenith_rounding_variance[i]));
-    }
-    return robust_scale(azimuth, zenith);
-  }
 
   /// Offsets of the free values from their priors, the frame's turn last.
   Eigen::VectorXd offsets(const WindowFit& fit) const {

@@ -40,6 +40,12 @@ struct NoiseEstimate {
 AngleNoise robust_noise(const AngleSeries& series, std::span<const double> azimuth,
                         std::span<const double> zenith);
 
+/// Scale of the residuals over noise and rounding of each shot, 1 where these explain them; half of
+/// the residuals may be gross errors.
+/// @param azimuth, zenith  as robust_noise
+double robust_level(const AngleSeries& series, const AngleNoise& noise,
+                    std::span<const double> azimuth, std::span<const double> zenith);
+
 /// Most likely noise of normal residuals beside the known rounding of each shot: one variance
 /// component per angle, its sigma from the scatter of the squares. docs/theory/map.md
 /// @param outlier        [shots], shots that are not 0 are left out
