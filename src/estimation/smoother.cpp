@@ -15,7 +15,7 @@
 namespace risley::estimation {
 namespace {
 
-constexpr int kMostFree = parameter_count(kMaxPrisms);
+constexpr int kMostFree = kMaxParameters;
 
 template <int N>
 class Smoother {

@@ -17,6 +17,7 @@ struct AngleSeries {
   /// As recorded, increasing; a step back means that the sensor's clock was reset.
   std::vector<std::int64_t> time_ns;
   std::vector<double> azimuth, zenith;  ///< rad
+  std::vector<std::uint8_t> beam;       ///< emitter that fired, from 0
   /// Variance of the format's rounding, (step^2) / 12, rad^2.
   std::vector<float> azimuth_rounding_variance, zenith_rounding_variance;
   /// Ranges of the shots, m, NaN where there is none; empty unless they were asked for. No
