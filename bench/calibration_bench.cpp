@@ -65,7 +65,7 @@ std::shared_ptr<const RangedShots> simulated_shots() {
       angles[k] = wrap_to_pi(truth.angular_velocity[k] * kShotInterval * static_cast<double>(i));
       shots->rotation_angle[k][i] = angles[k];
     }
-    const Ray ray = emergent_ray(truth.train, truth.prism_geometry(), angles);
+    const Ray ray = emergent_ray(truth.train, truth.geometry, angles);
     shots->range[i] = hit_distance(wall, ray.origin, ray.direction) + noise(generator);
   }
   return shots;
@@ -78,8 +78,8 @@ const PlanarProblem& problem() {
     const Plane start = plane(10.3, 79.8, 30.1);
     PlanarProblem p;
     p.train = sensor.train.without_errors();
-    p.geometry = sensor.prism_geometry();
-    p.free = estimation::free_parameters(kFree, 2);
+    p.geometry = sensor.geometry;
+    p.free = estimation::free_parameters(kFree, {2});
     p.stations.resize(1);
     p.walls.resize(1);
     p.walls[0].normal = start.normal;

@@ -141,7 +141,7 @@ BENCHMARK(bytes_only)->Unit(benchmark::kMillisecond)->MinTime(2.0);
 void points(benchmark::State& state, bool covariance) {
   cloud::SensorBelief belief;
   belief.sensor = sensors::load_sensor("mid-40-table3");
-  belief.free = estimation::free_parameters({"refractive_index"}, 2);
+  belief.free = estimation::free_parameters({"refractive_index"}, {2});
   belief.covariance = Eigen::MatrixXd::Constant(1, 1, 1e-12);
   belief.angle_sensitivity = Eigen::MatrixXd::Ones(2, 1);
   belief.angle_noise = radians_from_degrees(0.004);

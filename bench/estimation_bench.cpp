@@ -61,7 +61,7 @@ double error_over_bound(const Eigen::VectorXd& parameters, int seconds) {
   const sensors::Sensor truth = sensors::load_sensor("mid-40-table3");
   double sum = 0;
   for (std::size_t i = 0; i < kBounds.size(); ++i) {
-    const ParameterInfo& info = find_parameter(kBounds[i].name, 2);
+    const ParameterInfo& info = find_parameter(kBounds[i].name, {2});
     const double bound = kBounds[i].bound * info.si_per_unit * std::sqrt(30.0 / seconds);
     const double error = parameters[static_cast<Eigen::Index>(i)] - truth.get(kBounds[i].name);
     sum += error * error / (bound * bound);
@@ -253,7 +253,7 @@ Run run_map(const Recording& data) {
 /// Forwards through all shots, not back and without outputs; the time of the start does not count.
 Run run_peer(const Recording& data) {
   const estimation::EstimateOptions options = map_options();
-  const auto free = estimation::free_parameters(estimation::default_free_names(2), 2);
+  const auto free = estimation::free_parameters(estimation::default_free_names({2}), {2});
   const estimation::Start start = estimation::find_start(
       data.head, options.sensor, {free, kAngleNoise, options.mirrored, options.turned});
   const estimation::AngleSeries& series = data.series;

@@ -101,7 +101,7 @@ void batch_model(benchmark::State& state, InstructionSet set) {
   Shots shots;
   const auto angles = shots.angles();
   for (auto _ : state) {
-    observe_batch(shots.train, angles, {{}, {}, {}, shots.azimuth, shots.zenith}, set);
+    observe_batch(shots.train, angles, {{}, {}, {}, shots.azimuth, shots.zenith}, {}, set);
     benchmark::ClobberMemory();
   }
   set_rate(state);
@@ -157,7 +157,7 @@ void batch_adjoint(benchmark::State& state, InstructionSet set) {
                                  {d_azimuth.begin(), d_azimuth.end()},
                                  {d_zenith.begin(), d_zenith.end()}};
   for (auto _ : state) {
-    linearise_batch(shots.train, angles, out, set);
+    linearise_batch(shots.train, angles, out, {}, set);
     benchmark::ClobberMemory();
   }
   set_rate(state);
@@ -177,8 +177,9 @@ BENCHMARK(inverse);
 
 const bool registered = [] {
   for (const InstructionSet set : available_instruction_sets()) {
-    benchmark::RegisterBenchmark(("batch_model/" + to_string(set)).c_str(), batch_model, set);
-    benchmark::RegisterBenchmark(("batch_adjoint/" + to_string(set)).c_str(), batch_adjoint, set);
+    benchmark::RegisterBenchmark(("batch_model/" + to_string(set)).c_str(), batch_model, {}, set);
+    benchmark::RegisterBenchmark(("batch_adjoint/" + to_string(set)).c_str(), batch_adjoint, {},
+                                 set);
   }
   return true;
 }();

@@ -37,6 +37,11 @@ function(risley_add_kernels layer)
   endif()
 endfunction()
 
+# The one choice among them.
+if("avx2" IN_LIST RISLEY_INSTRUCTION_SETS)
+  target_compile_definitions(risley_core PRIVATE RISLEY_HAS_X86_KERNELS)
+endif()
+
 risley_add_kernels(optics)
 risley_add_kernels(estimation)
 risley_add_kernels(calibration)

@@ -267,7 +267,7 @@ ExitStatus run_calibration(const CalibrateCommandOptions& options, const CommonO
     if (text.find('=') == std::string::npos) {
       settings.fixed.emplace_back(text, std::nullopt);
     } else {
-      settings.fixed.emplace_back(parameter_assignment(text, settings.sensor.prisms()));
+      settings.fixed.emplace_back(parameter_assignment(text, settings.sensor.shape()));
     }
   }
   const double solving = now();
@@ -313,9 +313,9 @@ ExitStatus run_plan(const CalibrateCommandOptions& options, const CommonOptions&
   plan.beam_origin = options.beam_origin == "yes";
   const calibration::CalibrationForecast forecast = calibration::forecast(plan);
   if (common.json) {
-    print_json(forecast_json(forecast, plan.sensor.prisms()));
+    print_json(forecast_json(forecast, plan.sensor.shape()));
   } else {
-    print_forecast(forecast, plan.sensor.prisms());
+    print_forecast(forecast, plan.sensor.shape());
   }
   return kDone;
 }

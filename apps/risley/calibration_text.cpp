@@ -64,15 +64,15 @@ void print_datum(calibration::DatumKind kind, const FormalDatum& datum) {
 
 Json calibration_json(const CalibrationOutcome& outcome) {
   const Calibration& c = outcome.calibration;
-  const int prisms = c.sensor.prisms();
+  const TrainShape shape = c.sensor.shape();
   Json parameters = Json::object(), planes = Json::array(), steps = Json::array(),
        tests = Json::array(), profiles = Json::object();
   for (std::size_t j = 0; j < c.free.size(); ++j) {
     const auto at = static_cast<Eigen::Index>(j);
     parameters[c.free[j].name] = {
-        {"value", in_file_unit(c.free[j].name, c.parameters[at], prisms)},
+        {"value", in_file_unit(c.free[j].name, c.parameters[at], shape)},
         {"sigma",
-         finite_or_null(in_file_unit(c.free[j].name, std::sqrt(c.covariance(at, at)), prisms))}};
+         finite_or_null(in_file_unit(c.free[j].name, std::sqrt(c.covariance(at, at)), shape))}};
   }
   for (const calibration::CalibratedPlane& plane : c.planes) {
     planes.push_back({{"name", plane.name},
@@ -151,7 +151,7 @@ Json calibration_json(const CalibrationOutcome& outcome) {
 
 void print_calibration(const CalibrationOutcome& outcome) {
   const Calibration& c = outcome.calibration;
-  const int prisms = c.sensor.prisms();
+  const TrainShape shape = c.sensor.shape();
   fmt::print("{}\n", c.converged ? "converged" : "NOT CONVERGED: " + c.reason);
   fmt::print(
       "{} points on {} planes, {:.2f} mm thick before, {:.2f} mm after; read {:.2f} s, rotation "
@@ -164,14 +164,14 @@ void print_calibration(const CalibrationOutcome& outcome) {
   for (std::size_t j = 0; j < c.free.size(); ++j) {
     const std::string& name = c.free[j].name;
     const auto at = static_cast<Eigen::Index>(j);
-    const double sigma = in_file_unit(name, std::sqrt(c.covariance(at, at)), prisms);
-    const double value = in_file_unit(name, c.parameters[at], prisms);
+    const double sigma = in_file_unit(name, std::sqrt(c.covariance(at, at)), shape);
+    const double value = in_file_unit(name, c.parameters[at], shape);
     const report::NumberText text = report::number_text(value, sigma);
     std::vector<std::string> row = {
-        name, text.value, text.sigma, find_parameter(name, prisms).unit,
-        report::text_to_place_of(in_file_unit(name, c.believed.get(name), prisms), sigma)};
+        name, text.value, text.sigma, find_parameter(name, shape).unit,
+        report::text_to_place_of(in_file_unit(name, c.believed.get(name), shape), sigma)};
     if (outcome.truth) {
-      const double truth = in_file_unit(name, outcome.truth->sensor->get(name), prisms);
+      const double truth = in_file_unit(name, outcome.truth->sensor->get(name), shape);
       row.push_back(report::text_to_place_of(truth, sigma));
       row.push_back(fmt::format("{:.2f}", (value - truth) / sigma));
     }
@@ -219,13 +219,13 @@ void print_calibration(const CalibrationOutcome& outcome) {
   }
 }
 
-Json forecast_json(const CalibrationForecast& f, int prisms) {
+Json forecast_json(const CalibrationForecast& f, const TrainShape& shape) {
   Json parameters = Json::object(), walls = Json::array();
   for (std::size_t j = 0; j < f.free.size(); ++j) {
     const auto at = static_cast<Eigen::Index>(j);
     parameters[f.free[j].name] = {
         {"sigma",
-         finite_or_null(in_file_unit(f.free[j].name, std::sqrt(f.covariance(at, at)), prisms))}};
+         finite_or_null(in_file_unit(f.free[j].name, std::sqrt(f.covariance(at, at)), shape))}};
   }
   for (const calibration::PlannedWall& wall : f.walls) {
     walls.push_back({{"name", wall.name},
@@ -243,7 +243,7 @@ Json forecast_json(const CalibrationForecast& f, int prisms) {
           {"advice", f.advice}};
 }
 
-void print_forecast(const CalibrationForecast& f, int prisms) {
+void print_forecast(const CalibrationForecast& f, const TrainShape& shape) {
   fmt::print("{:.3g} shots meet a wall\n\n", f.shots);
   Table walls({"wall", "station", "share %", "incidence deg", "range m"});
   for (const calibration::PlannedWall& wall : f.walls) {
@@ -258,8 +258,8 @@ void print_forecast(const CalibrationForecast& f, int prisms) {
     const auto at = static_cast<Eigen::Index>(j);
     const std::string& name = f.free[j].name;
     table.add({name,
-               fmt::format("{:.2g}", in_file_unit(name, std::sqrt(f.covariance(at, at)), prisms)),
-               find_parameter(name, prisms).unit});
+               fmt::format("{:.2g}", in_file_unit(name, std::sqrt(f.covariance(at, at)), shape)),
+               find_parameter(name, shape).unit});
   }
   table.print();
   fmt::print("\n");

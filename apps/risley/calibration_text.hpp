@@ -30,7 +30,7 @@ struct CalibrationOutcome {
 Json calibration_json(const CalibrationOutcome& outcome);
 void print_calibration(const CalibrationOutcome& outcome);
 
-Json forecast_json(const calibration::CalibrationForecast& forecast, int prisms);
-void print_forecast(const calibration::CalibrationForecast& forecast, int prisms);
+Json forecast_json(const calibration::CalibrationForecast& forecast, const TrainShape& shape);
+void print_forecast(const calibration::CalibrationForecast& forecast, const TrainShape& shape);
 
 }  // namespace risley::app

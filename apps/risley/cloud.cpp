@@ -101,7 +101,7 @@ ExitStatus write_beam_origin_map(const CloudCommandOptions& options,
                                  const sensors::Sensor& calibration, const CommonOptions& common) {
   constexpr std::size_t kSteps = 1081;  // every third of a degree, as in the paper's Fig. A1
   constexpr double kCellDeg = 0.5;
-  const BeamOriginMap map = beam_origin_map(calibration.train, calibration.prism_geometry(), kSteps,
+  const BeamOriginMap map = beam_origin_map(calibration.train, calibration.geometry, kSteps,
                                             radians_from_degrees(kCellDeg));
   if (map.size() == 0) throw EstimationError("no beam gets through the prisms");
   write_text_file(options.beam_origin_map,

@@ -115,16 +115,17 @@ std::pair<std::string, double> split_assignment(const std::string& text) {
   return {name, number_from(text.substr(equals + 1), name)};
 }
 
-std::pair<std::string, double> parameter_assignment(const std::string& text, int prisms) {
+std::pair<std::string, double> parameter_assignment(const std::string& text,
+                                                    const TrainShape& shape) {
   auto [name, value] = split_assignment(text);
-  const ParameterInfo& parameter = find_parameter(name, prisms);
+  const ParameterInfo& parameter = find_parameter(name, shape);
   value *= parameter.si_per_unit;
   check_bounds(parameter, value);
   return {name, value};
 }
 
-double in_file_unit(const std::string& name, double value, int prisms) {
-  return value / find_parameter(name, prisms).si_per_unit;
+double in_file_unit(const std::string& name, double value, const TrainShape& shape) {
+  return value / find_parameter(name, shape).si_per_unit;
 }
 
 double positive_number(const std::string& text, std::string_view option, std::string_view unit) {

@@ -96,11 +96,11 @@ Json moments_json(const estimation::Moments& moments) {
           {"kurtosis", moments.kurtosis}};
 }
 
-Json evaluation_json(const Evaluation& evaluation, int prisms) {
+Json evaluation_json(const Evaluation& evaluation, const TrainShape& shape) {
   Json parameters = Json::object();
   for (const estimation::TruthComparison& one : evaluation.parameters) {
-    parameters[one.name] = {{"true", in_file_unit(one.name, one.truth, prisms)},
-                            {"error", in_file_unit(one.name, one.error, prisms)},
+    parameters[one.name] = {{"true", in_file_unit(one.name, one.truth, shape)},
+                            {"error", in_file_unit(one.name, one.error, shape)},
                             {"error_over_sigma", one.error_over_sigma}};
   }
   const auto by_prism = [](const std::vector<double>& values, double scale) {
@@ -155,7 +155,7 @@ Json fixed_json(const Estimate& estimate) {
     free_places.insert(free_places.end(), free.places.begin(), free.places.end());
   }
   Json object = Json::object();
-  for (const ParameterInfo& info : parameter_list(estimate.sensor.prisms())) {
+  for (const ParameterInfo& info : parameter_list(estimate.sensor.shape())) {
     if (info.kind != ParameterKind::train || info.places.size() > 1) continue;
     if (std::find(free_places.begin(), free_places.end(), info.places.front()) !=
         free_places.end()) {
@@ -176,11 +176,11 @@ struct Outcome {
 
 Json outcome_json(const Outcome& outcome) {
   const Estimate& e = outcome.estimate;
-  const int prisms = e.sensor.prisms();
+  const TrainShape shape = e.sensor.shape();
   Json parameters = Json::object();
   for (const estimation::EstimatedValue& value : e.values) {
-    parameters[value.name] = {{"value", in_file_unit(value.name, value.value, prisms)},
-                              {"sigma", in_file_unit(value.name, value.sigma, prisms)}};
+    parameters[value.name] = {{"value", in_file_unit(value.name, value.value, shape)},
+                              {"sigma", in_file_unit(value.name, value.sigma, shape)}};
   }
   Json rotors = Json::array(), jerks = Json::array(), unobservable = Json::array();
   for (const estimation::RotorProcess& process : e.rotor_process) {
@@ -233,8 +233,8 @@ Json outcome_json(const Outcome& outcome) {
     object["residuals"]["unit_variance"] = e.map->unit_variance;
     object["residuals"]["variance_factor"] = e.map->variance_factor;
   }
-  if (e.sensor.combination) object["combination"] = static_cast<int>(*e.sensor.combination);
-  if (outcome.evaluation) object["truth"] = evaluation_json(*outcome.evaluation, prisms);
+  if (e.sensor.combination) object["combination"] = *e.sensor.combination;
+  if (outcome.evaluation) object["truth"] = evaluation_json(*outcome.evaluation, shape);
   return object;
 }
 
@@ -254,29 +254,28 @@ void print_noise(const Estimate& e) {
 
 void print_outcome(const Outcome& outcome) {
   const Estimate& e = outcome.estimate;
-  const int prisms = e.sensor.prisms();
+  const TrainShape shape = e.sensor.shape();
   fmt::print("{}\n", e.converged ? "converged" : "NOT CONVERGED: " + e.reason);
   fmt::print("{} shots used, {} of them outliers{}; read {:.2f} s, solved {:.2f} s\n\n",
              grouped(e.series.size()), grouped(e.outliers),
-             (e.sensor.combination
-                  ? fmt::format(", speed combination {}", static_cast<int>(*e.sensor.combination))
-                  : std::string()) +
+             (e.sensor.combination ? fmt::format(", speed combination {}", *e.sensor.combination)
+                                   : std::string()) +
                  (e.mirrored ? ", mirrored" : ""),
              outcome.read_s, outcome.solve_s);
   std::vector<std::string> head = {"parameter", "value", "+- sigma", "unit"};
   if (outcome.evaluation) head.insert(head.end(), {"truth", "error", "error/sigma"});
   Table table(head);
   for (const estimation::EstimatedValue& value : e.values) {
-    const double sigma = in_file_unit(value.name, value.sigma, prisms);
+    const double sigma = in_file_unit(value.name, value.sigma, shape);
     const report::NumberText text =
-        report::number_text(in_file_unit(value.name, value.value, prisms), sigma);
+        report::number_text(in_file_unit(value.name, value.value, shape), sigma);
     std::vector<std::string> row = {value.name, text.value, text.sigma,
-                                    find_parameter(value.name, prisms).unit};
+                                    find_parameter(value.name, shape).unit};
     if (outcome.evaluation) {
       for (const estimation::TruthComparison& one : outcome.evaluation->parameters) {
         if (one.name != value.name) continue;
-        row.push_back(report::text_to_place_of(in_file_unit(one.name, one.truth, prisms), sigma));
-        row.push_back(report::text_to_place_of(in_file_unit(one.name, one.error, prisms), sigma));
+        row.push_back(report::text_to_place_of(in_file_unit(one.name, one.truth, shape), sigma));
+        row.push_back(report::text_to_place_of(in_file_unit(one.name, one.error, shape), sigma));
         row.push_back(fmt::format("{:.2f}", one.error_over_sigma));
       }
     }

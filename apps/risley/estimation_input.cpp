@@ -97,19 +97,19 @@ estimation::EstimateOptions estimate_options(
   if (wishes.sensor.empty() && !header) throw InvalidArgument("--sensor is missing");
   result.sensor =
       header ? chosen_sensor(wishes.sensor, *header) : sensors::load_sensor(wishes.sensor);
-  const int prisms = result.sensor.prisms();
+  const TrainShape shape = result.sensor.shape();
   if (wishes.noise_angle_deg) {
     check_positive(*wishes.noise_angle_deg, "--noise-angle-deg", "deg");
     result.angle_noise = radians_from_degrees(*wishes.noise_angle_deg);
   }
   for (const std::string& text : wishes.fixed) {
     if (text.find('=') == std::string::npos) {
-      find_parameter(text, prisms);
+      find_parameter(text, shape);
       result.fixed.push_back(text);
       continue;
     }
-    const auto [name, value] = parameter_assignment(text, prisms);
-    if (find_parameter(name, prisms).kind != ParameterKind::train) {
+    const auto [name, value] = parameter_assignment(text, shape);
+    if (find_parameter(name, shape).kind != ParameterKind::train) {
       throw InvalidArgument(
           fmt::format("--fix {}: only parameters of the prisms can be held", name));
     }

@@ -34,10 +34,10 @@ struct ObservabilityCommandOptions {
   ReadingWishes reading;
 };
 
-Json observability_json(const Observability& o, int prisms) {
+Json observability_json(const Observability& o, const TrainShape& shape) {
   Json parameters = Json::object(), matrix = Json::array(), unobservable = Json::array();
   for (const auto& quantity : o.quantities) {
-    const double unit = find_parameter(quantity.name, prisms).si_per_unit;
+    const double unit = find_parameter(quantity.name, shape).si_per_unit;
     Json one = {{"sigma", nullptr},
                 {"sensitivity", degrees_from_radians(quantity.sensitivity) * unit},
                 {"free", quantity.free},
@@ -58,15 +58,15 @@ Json observability_json(const Observability& o, int prisms) {
           {"observations", o.shots},
           {"duration_s", o.duration},
           {"rate_hz", o.rate},
-          {"words", estimation::observability_words(o, prisms)}};
+          {"words", estimation::observability_words(o, shape)}};
 }
 
-void print_observability(const Observability& o, int prisms) {
+void print_observability(const Observability& o, const TrainShape& shape) {
   fmt::print("{:.4g} s at {:.6g} Hz, {} shots\n\n", o.duration, o.rate,
              grouped(static_cast<std::uint64_t>(std::llround(o.shots))));
   Table table({"quantity", "sigma", "unit", "deg per unit", "most correlated with", "rho"});
   for (const auto& quantity : o.quantities) {
-    const ParameterInfo& info = find_parameter(quantity.name, prisms);
+    const ParameterInfo& info = find_parameter(quantity.name, shape);
     const std::string sigma = std::isfinite(quantity.sigma)
                                   ? fmt::format("{:.2g}", quantity.sigma / info.si_per_unit)
                                   : "never";
@@ -81,7 +81,7 @@ void print_observability(const Observability& o, int prisms) {
   for (const auto& weak : o.unobservable) {
     fmt::print("not told by such data: {}\n", direction_text(weak));
   }
-  for (const std::string& words : estimation::observability_words(o, prisms)) {
+  for (const std::string& words : estimation::observability_words(o, shape)) {
     fmt::print("{}.\n", words);
   }
 }
@@ -104,11 +104,11 @@ ExitStatus run_observability(const ObservabilityCommandOptions& options,
   check_positive(options.duration_s, "--duration-s", "s");
   EstimationWishes wishes{options.sensor, options.noise_angle_deg, options.fixed, options.freed};
   Observability result;
-  int prisms = 0;
+  TrainShape shape;
   if (options.input.empty()) {
     if (wishes.sensor.empty()) wishes.sensor = "mid-40";
     const estimation::EstimateOptions settings = estimate_options(wishes, std::nullopt);
-    prisms = settings.sensor.prisms();
+    shape = settings.sensor.shape();
     result = observe_plan(options, settings);
   } else {
     std::optional<double> rate;
@@ -120,7 +120,7 @@ ExitStatus run_observability(const ObservabilityCommandOptions& options,
     for (const std::string& warning : input.warnings) spdlog::warn(warning);
     estimation::EstimateOptions settings = estimate_options(wishes, input.reader->header());
     settings.cartesian = input.whole_steps;
-    prisms = settings.sensor.prisms();
+    shape = settings.sensor.shape();
     ProgressBar bar("estimating", common);
     const estimation::Estimate estimate =
         estimation::estimate(estimation::Method::map, input.selector.take_series(),
@@ -132,9 +132,9 @@ ExitStatus run_observability(const ObservabilityCommandOptions& options,
     result = estimation::observability_of_estimate(estimate);
   }
   if (common.json) {
-    print_json(observability_json(result, prisms));
+    print_json(observability_json(result, shape));
   } else {
-    print_observability(result, prisms);
+    print_observability(result, shape);
   }
   return kDone;
 }

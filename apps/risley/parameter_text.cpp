@@ -8,7 +8,7 @@ namespace risley::app {
 
 std::vector<NamedValue> sensor_values(const sensors::Sensor& sensor) {
   std::vector<NamedValue> values;
-  for (const ParameterInfo& parameter : parameter_list(sensor.prisms())) {
+  for (const ParameterInfo& parameter : parameter_list(sensor.shape())) {
     if (parameter.kind == ParameterKind::rotation_angle) continue;
     if (parameter.kind == ParameterKind::train) {
       const double first = sensor.train[parameter.places.front()];

@@ -29,8 +29,8 @@ struct SimulateOptions {
 };
 
 void assign(sensors::Sensor& sensor, const std::string& text) {
-  const auto [name, value] = parameter_assignment(text, sensor.prisms());
-  if (find_parameter(name, sensor.prisms()).kind == ParameterKind::rotation_angle) {
+  const auto [name, value] = parameter_assignment(text, sensor.shape());
+  if (find_parameter(name, sensor.shape()).kind == ParameterKind::rotation_angle) {
     throw InvalidArgument(
         fmt::format("{}: the rotation angles at the start are set by --start-angles-deg", name));
   }

@@ -66,7 +66,7 @@ Belief pooled_belief(const std::vector<RangedRecording>& recordings) {
         Index worst = 0;
         off.cwiseAbs().cwiseQuotient(recording.covariance.diagonal().cwiseSqrt()).maxCoeff(&worst);
         const ParameterInfo& info = find_parameter(
-            belief.free[static_cast<std::size_t>(worst)].name, belief.sensor.prisms());
+            belief.free[static_cast<std::size_t>(worst)].name, belief.sensor.shape());
         throw EstimationError(fmt::format(
             "the recordings are of different sensors, or of one whose stored calibration changed: "
             "{} differs from the others' {} by {:.4g} {}",

@@ -130,18 +130,18 @@ class Work {
   void set_up() {
     PlanarProblem& p = problem_;
     p.train = belief_.sensor.train;
-    if (options_.beam_origin) p.geometry = options_.sensor.prism_geometry();
+    if (options_.beam_origin) p.geometry = options_.sensor.geometry;
     std::vector<std::string> held;
     for (const auto& [name, value] : options_.fixed) held.push_back(name);
-    p.free = calibration_parameters(p.train.prisms(), held, options_.additional);
+    p.free = calibration_parameters(p.train.shape(), held, options_.additional);
     for (const auto& [name, value] : options_.fixed) {
       if (!value) continue;
-      for (const int place : find_parameter(name, p.train.prisms()).places) {
+      for (const int place : find_parameter(name, p.train.shape()).places) {
         p.train.set_place(place, *value);
       }
     }
     p.prior = p.train;
-    p.prior_sigma = prior_sigmas(p.free, p.train.prisms(), options_.prior_sigma);
+    p.prior_sigma = prior_sigmas(p.free, p.train.shape(), options_.prior_sigma);
     p.range_offset_sigma = options_.range_offset_sigma;
     p.considered = belief_.free;
     p.considered_covariance = belief_.covariance;
@@ -558,16 +558,18 @@ void Work::fill_result(const PlanarSolution& solution) {
   fill_planes(solution);
   fill_sensor(solution);
   std::vector<std::vector<double>> beams(static_cast<std::size_t>(p.train.prisms()));
+  std::vector<std::uint8_t> emitter;
   for (std::size_t r = 0; r < recordings_.size(); ++r) {
     for (const std::size_t row : spread_rows(shots_[r].size(), kBundleBeams / recordings_.size())) {
       for (std::size_t k = 0; k < beams.size(); ++k) {
         beams[k].push_back(shots_[r].rotation_angle[k][row]);
       }
+      emitter.push_back(shots_[r].beam.empty() ? std::uint8_t{0} : shots_[r].beam[row]);
     }
   }
-  result_.datum = formal_datum(p.train, p.free, result_.covariance, beams);
-  result_.datum_without_common =
-      formal_datum(p.train, p.free, solution.noise_covariance * result_.variance_factor, beams);
+  result_.datum = formal_datum(p.train, p.free, result_.covariance, beams, emitter);
+  result_.datum_without_common = formal_datum(
+      p.train, p.free, solution.noise_covariance * result_.variance_factor, beams, emitter);
 }
 
 void Work::judge(const PlanarSolution& solution) {

@@ -85,13 +85,14 @@ std::vector<std::string> advice_for(const CalibrationForecast& f, const Calibrat
 }  // namespace
 
 std::vector<estimation::FreeParameter> calibration_parameters(
-    int prisms, const std::vector<std::string>& fixed, const std::vector<std::string>& additional) {
+    const TrainShape& shape, const std::vector<std::string>& fixed,
+    const std::vector<std::string>& additional) {
   std::vector<std::string> names;
-  for (const std::string& name : estimation::default_free_names(prisms)) {
+  for (const std::string& name : estimation::default_free_names(shape)) {
     if (name != "refractive_index") names.push_back(name);
   }
   for (const std::string& name : fixed) {
-    if (find_parameter(name, prisms).kind != ParameterKind::train) {
+    if (find_parameter(name, shape).kind != ParameterKind::train) {
       throw InvalidArgument(
           fmt::format("{} cannot be held, choose among the prisms' parameters", name));
     }
@@ -103,7 +104,7 @@ std::vector<estimation::FreeParameter> calibration_parameters(
   for (const std::string& name : additional) {
     if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
   }
-  return estimation::free_parameters(names, prisms);
+  return estimation::free_parameters(names, shape);
 }
 
 CalibrationForecast forecast(const CalibrationPlan& plan) {
@@ -118,9 +119,9 @@ CalibrationForecast forecast(const CalibrationPlan& plan) {
   CalibrationForecast result;
   PlanarProblem problem;
   problem.train = problem.prior = sensor.train;
-  if (plan.beam_origin) problem.geometry = sensor.prism_geometry();
-  problem.free = calibration_parameters(sensor.prisms(), plan.fixed, plan.additional);
-  problem.prior_sigma = prior_sigmas(problem.free, sensor.prisms(), plan.prior_sigma);
+  if (plan.beam_origin) problem.geometry = sensor.geometry;
+  problem.free = calibration_parameters(sensor.shape(), plan.fixed, plan.additional);
+  problem.prior_sigma = prior_sigmas(problem.free, sensor.shape(), plan.prior_sigma);
   problem.range_offset_sigma = plan.range_offset_sigma;
   // One shot of the sample stands for several: its variance is divided by their number.
   const double weight = plan.duration * rate / static_cast<double>(kSampleShots);
@@ -133,16 +134,22 @@ CalibrationForecast forecast(const CalibrationPlan& plan) {
   std::vector<FoundPlane> found;
   std::vector<std::string> names;
   std::vector<std::vector<double>> bundle(static_cast<std::size_t>(sensor.prisms()));
+  std::vector<std::uint8_t> bundle_beam;
   for (std::size_t r = 0; r < stations.size(); ++r) {
     const scenes::Station& station = stations[r];
     names.push_back(station.name.empty() ? "the sensor" : station.name);
     RangedShots all;
     all.resize(sensor.prisms(), kSampleShots);
     all.rotation_angle = sample_angles(plan, r);
-    for (std::size_t k = 0; k < bundle.size(); ++k) {
-      for (const std::size_t row : spread_rows(kSampleShots, 2000)) {
+    for (std::size_t i = 0; i < kSampleShots; ++i) {
+      all.beam[i] =
+          static_cast<std::uint8_t>(i % static_cast<std::size_t>(sensor.train.emitters()));
+    }
+    for (const std::size_t row : spread_rows(kSampleShots, 2000)) {
+      for (std::size_t k = 0; k < bundle.size(); ++k) {
         bundle[k].push_back(all.rotation_angle[k][row]);
       }
+      bundle_beam.push_back(all.beam[row]);
     }
     Seen seen;
     seen.rows.resize(plan.scene.planes.size());
@@ -151,7 +158,7 @@ CalibrationForecast forecast(const CalibrationPlan& plan) {
     for (std::size_t i = 0; i < kSampleShots; ++i) {
       std::vector<double> angles;
       for (const auto& column : all.rotation_angle) angles.push_back(column[i]);
-      const Ray ray = emergent_ray(problem.train, problem.geometry, angles);
+      const Ray ray = emergent_ray(problem.train, problem.geometry, angles, all.beam[i]);
       if (!ray.valid) continue;
       const auto hit =
           nearest_hit(plan.scene, station.position + station.scene_from_sensor(ray.origin),
@@ -211,7 +218,7 @@ CalibrationForecast forecast(const CalibrationPlan& plan) {
   result.range_offset_sigma = solution.range_offset_sigma;
   result.unobservable = estimation::weak_directions(
       solution.information + prior_information(problem), problem.free, kWidestDirection);
-  result.datum = formal_datum(problem.train, problem.free, result.covariance, bundle);
+  result.datum = formal_datum(problem.train, problem.free, result.covariance, bundle, bundle_beam);
   result.advice = advice_for(result, plan);
   return result;
 }

@@ -8,9 +8,11 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Geometry>
+#include <fmt/format.h>
 
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
+#include "risley/optics/batch.hpp"
 #include "risley/optics/observation_adjoint.hpp"
 
 #include "calibration/eigen_vectors.hpp"
@@ -37,26 +39,31 @@ struct BundleBeam {
 template <int N>
 std::vector<BundleBeam> bundle(const PrismTrain& train,
                                const std::vector<estimation::FreeParameter>& free,
-                               const std::vector<std::vector<double>>& rotation_angles) {
-  const auto parameters = parameter_array<N>(train);
+                               const std::vector<std::vector<double>>& rotation_angles,
+                               std::span<const std::uint8_t> emitter) {
   const auto order = face_order_array<N>(train);
-  const auto prepared = prepare<double, N>(parameters, order);
-  const auto derivatives = prepare_derivatives<double, N>(parameters, order);
+  std::vector<PreparedTrain<double, N>> prepared;
+  std::vector<PreparedDerivatives<double, N>> derivatives;
+  for (int j = 0; j < train.emitters(); ++j) {
+    prepared.push_back(prepare<double, N>(parameter_array<N>(train, j), order));
+    derivatives.push_back(prepare_derivatives<double, N>(parameter_array<N>(train, j), order));
+  }
   const auto n = static_cast<Index>(free.size());
   std::vector<BundleBeam> beams;
   for (std::size_t i = 0; i < rotation_angles.front().size(); ++i) {
     std::array<double, N> angles;
     for (std::size_t k = 0; k < N; ++k) angles[k] = rotation_angles[k][i];
-    const auto linear = linearise_direction(prepared, derivatives, angles);
+    const std::size_t own = emitter.empty() ? 0 : emitter[i];
+    const auto linear = linearise_direction(prepared[own], derivatives[own], angles);
     if (!linear.valid) continue;
     BundleBeam beam{eigen(linear.direction), {}, {}};
     beam.jacobian.resize(3, n);
     for (Index row = 0; row < 3; ++row) {
-      const auto& gradient = linear.components[static_cast<std::size_t>(row)].parameters;
+      const auto& gradient = linear.components[static_cast<std::size_t>(row)];
       for (Index j = 0; j < n; ++j) {
         double sum = 0;
         for (const int place : free[static_cast<std::size_t>(j)].places) {
-          sum += gradient[static_cast<std::size_t>(place)];
+          sum += derivative_by(gradient, place, static_cast<int>(own));
         }
         beam.jacobian(row, j) = sum;
       }
@@ -119,9 +126,16 @@ DirectionErrors direction_errors(std::span<const Vector3<double>> computed,
 FormalDatum formal_datum(const PrismTrain& train,
                          const std::vector<estimation::FreeParameter>& free,
                          const Eigen::MatrixXd& covariance,
-                         const std::vector<std::vector<double>>& rotation_angles) {
-  const auto beams = with_prism_count(
-      train.prisms(), [&]<int N>() { return bundle<N>(train, free, rotation_angles); });
+                         const std::vector<std::vector<double>>& rotation_angles,
+                         std::span<const std::uint8_t> emitter) {
+  if (rotation_angles.size() != static_cast<std::size_t>(train.prisms())) {
+    throw InvalidArgument(fmt::format("{} columns of rotation angles given for {} prisms",
+                                      rotation_angles.size(), train.prisms()));
+  }
+  const auto beams = with_prism_count(train.prisms(), [&]<int N>() {
+    check_beams(train, emitter, rotation_angles.front().size());
+    return bundle<N>(train, free, rotation_angles, emitter);
+  });
   if (beams.empty()) throw InvalidArgument("no beam gets through the prisms");
   Matrix3d normal = Matrix3d::Zero();
   Eigen::MatrixXd right = Eigen::MatrixXd::Zero(3, static_cast<Index>(free.size()));

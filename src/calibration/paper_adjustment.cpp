@@ -12,6 +12,7 @@
 
 #include "risley/calibration/plane_segmentation.hpp"
 #include "risley/core/error.hpp"
+#include "risley/optics/batch.hpp"
 #include "risley/optics/beam_origin.hpp"
 
 namespace risley::calibration {
@@ -38,12 +39,14 @@ struct Sums {
 template <int N>
 class View {
  public:
-  View(const PlanarProblem& p, const RangedShots& shots)
-      : p_(p),
-        shots_(shots),
-        prepared_(prepare<double, N>(parameter_array<N>(p.train), face_order_array<N>(p.train))),
-        derivatives_(prepare_derivatives<double, N>(parameter_array<N>(p.train),
-                                                    face_order_array<N>(p.train))) {
+  View(const PlanarProblem& p, const RangedShots& shots) : p_(p), shots_(shots) {
+    check_beams(p.train, shots.beam, shots.size());
+    const auto order = face_order_array<N>(p.train);
+    for (int emitter = 0; emitter < p.train.emitters(); ++emitter) {
+      const auto parameters = parameter_array<N>(p.train, emitter);
+      prepared_.push_back(prepare<double, N>(parameters, order));
+      derivatives_.push_back(prepare_derivatives<double, N>(parameters, order));
+    }
     const auto positions = face_positions(p.train.face_order(), p.geometry);
     std::copy(positions.begin(), positions.end(), face_position_.begin());
   }
@@ -53,7 +56,7 @@ class View {
     cloud.points.resize(shots_.size());
     tbb::parallel_for(std::size_t{0}, blocks(), [&](std::size_t block) {
       for (std::size_t i = begin(block); i < end(block); ++i) {
-        const auto trace = trace_forward(prepared_, angles(i));
+        const auto trace = trace_forward(prepared_[beam(i)], angles(i));
         cloud.points[i] = beam_origin(trace, face_position_) + shots_.range[i] * trace.direction();
       }
     });
@@ -73,14 +76,15 @@ class View {
       part.gradient = Eigen::VectorXd::Zero(size);
       Eigen::VectorXd row(size);
       for (std::size_t i = begin(block); i < end(block); ++i) {
-        const auto trace = trace_forward(prepared_, angles(i));
+        const std::size_t emitter = beam(i);
+        const auto trace = trace_forward(prepared_[emitter], angles(i));
         const auto gradient =
-            trace_adjoint(prepared_, derivatives_, trace,
+            trace_adjoint(prepared_[emitter], derivatives_[emitter], trace,
                           std::array<Vector3<double>, 1>{shots_.range[i] * cloud.plane.normal});
         for (Index j = 0; j < free; ++j) {
           row[j] = 0;
           for (const int place : p_.free[static_cast<std::size_t>(j)].places) {
-            row[j] += gradient[0].parameters[static_cast<std::size_t>(place)];
+            row[j] += derivative_by(gradient[0], place, static_cast<int>(emitter));
           }
         }
         const double distance = signed_distance(cloud.plane, cloud.points[i]);
@@ -114,10 +118,12 @@ class View {
     return result;
   }
 
+  std::size_t beam(std::size_t i) const { return shots_.beam.empty() ? 0 : shots_.beam[i]; }
+
   const PlanarProblem& p_;
   const RangedShots& shots_;
-  PreparedTrain<double, N> prepared_;
-  PreparedDerivatives<double, N> derivatives_;
+  std::vector<PreparedTrain<double, N>> prepared_;           // [emitters]
+  std::vector<PreparedDerivatives<double, N>> derivatives_;  // [emitters]
   std::array<double, 2 * N> face_position_{};
 };
 

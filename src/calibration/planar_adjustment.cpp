@@ -398,11 +398,11 @@ std::pair<Vector3<double>, Vector3<double>> tangents_of(const Vector3<double>& n
   return {first, cross(normal, first)};
 }
 
-std::vector<double> prior_sigmas(const std::vector<estimation::FreeParameter>& free, int prisms,
-                                 std::optional<double> angle_sigma) {
+std::vector<double> prior_sigmas(const std::vector<estimation::FreeParameter>& free,
+                                 const TrainShape& shape, std::optional<double> angle_sigma) {
   std::vector<double> sigmas;
   for (const estimation::FreeParameter& parameter : free) {
-    const bool angle = find_parameter(parameter.name, prisms).unit == "deg";
+    const bool angle = find_parameter(parameter.name, shape).unit == "deg";
     sigmas.push_back(angle && angle_sigma ? *angle_sigma : std::numeric_limits<double>::infinity());
   }
   return sigmas;

@@ -19,15 +19,6 @@ namespace {
 /// Shots that one task sums up: fixed, so that sums do not depend on the number of threads.
 constexpr std::size_t kChunkShots = 8192;
 
-std::size_t run_kernel(const PlaneArguments& arguments, InstructionSet set) {
-#ifdef RISLEY_HAS_X86_KERNELS
-  if (set == InstructionSet::avx512) return kernel_avx512::accumulate_plane(arguments);
-  if (set == InstructionSet::avx2) return kernel_avx2::accumulate_plane(arguments);
-#endif
-  static_cast<void>(set);
-  return kernel_baseline::accumulate_plane(arguments);
-}
-
 void check_count(std::string_view columns, std::size_t count, std::size_t expected) {
   if (count != expected) {
     throw InvalidArgument(fmt::format("{} has {} columns, expected {}", columns, count, expected));
@@ -41,13 +32,8 @@ void check_length(std::string_view column, std::size_t length, std::size_t shots
   }
 }
 
-void check(const RangedShots& shots, const PlaneView& view, const ResidualColumns& columns,
-           InstructionSet set) {
-  const auto& sets = available_instruction_sets();
-  if (std::find(sets.begin(), sets.end(), set) == sets.end()) {
-    throw InvalidArgument(
-        fmt::format("this processor or binary has no {} instructions", to_string(set)));
-  }
+void check(const RangedShots& shots, const PlaneView& view, const ResidualColumns& columns) {
+  check_shape(view.train.shape());
   const auto prisms = static_cast<std::size_t>(view.train.prisms());
   check_count("rotation_angle", shots.rotation_angle.size(), prisms);
   check_count("angle_covariance", shots.angle_covariance.size(), prisms * (prisms + 1) / 2);
@@ -57,9 +43,10 @@ void check(const RangedShots& shots, const PlaneView& view, const ResidualColumn
   for (const auto& column : shots.angle_covariance) {
     check_length("angle_covariance", column.size(), shots.size());
   }
+  check_beams(view.train, shots.beam, shots.size());
   if (!columns.residual.empty()) check_length("residual", columns.residual.size(), shots.size());
   if (!columns.variance.empty()) check_length("variance", columns.variance.size(), shots.size());
-  const int all_places = parameter_count(view.train.prisms());
+  const int all_places = parameter_count(view.train.shape());
   if (view.places.size() > static_cast<std::size_t>(all_places)) {
     throw InvalidArgument(fmt::format("{} places given, a train of {} prisms has {}",
                                       view.places.size(), prisms, all_places));
@@ -85,7 +72,7 @@ void copy(const Vector3<double>& from, double* to) {
 
 PlaneEquations plane_equations(const RangedShots& shots, const PlaneView& view,
                                const ResidualColumns& columns, InstructionSet set) {
-  check(shots, view, columns, set);
+  check(shots, view, columns);
   const PlaneColumns layout{static_cast<int>(view.places.size()), view.train.prisms()};
   const std::vector<double> face_position = face_positions(view.train.face_order(), view.geometry);
   std::vector<const double*> rotation_angle;
@@ -97,6 +84,8 @@ PlaneEquations plane_equations(const RangedShots& shots, const PlaneView& view,
   all.parameters = view.train.parameters().data();
   all.face_order = view.train.face_order().data();
   all.prisms = layout.prisms;
+  all.emitters = view.train.emitters();
+  if (!shots.beam.empty()) all.beam = shots.beam.data();
   all.face_position = face_position.data();
   all.places = view.places.data();
   all.place_count = layout.places;
@@ -112,6 +101,7 @@ PlaneEquations plane_equations(const RangedShots& shots, const PlaneView& view,
   if (!columns.residual.empty()) all.residual = columns.residual.data();
   if (!columns.variance.empty()) all.variance = columns.variance.data();
 
+  const auto& kernel = RISLEY_KERNEL_COPIES(accumulate_plane).at(set);
   const int size = layout.size();
   const auto triangle = static_cast<std::size_t>((size + 1) * (size + 2) / 2);
   const std::size_t chunks = (shots.size() + kChunkShots - 1) / kChunkShots;
@@ -122,7 +112,7 @@ PlaneEquations plane_equations(const RangedShots& shots, const PlaneView& view,
     mine.begin = chunk * kChunkShots;
     mine.end = std::min(mine.begin + kChunkShots, shots.size());
     mine.products = products.data() + chunk * triangle;
-    lost[chunk] = run_kernel(mine, set);
+    lost[chunk] = kernel(mine);
   });
 
   PlaneEquations equations;

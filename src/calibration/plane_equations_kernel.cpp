@@ -1,18 +1,14 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-// Compiled once per instruction set with RISLEY_KERNEL = baseline, avx2, avx512, under the rules of
-// optics/batch_kernel.cpp.
+// Compiled once per instruction set under the rules of risley/core/simd.hpp.
 #include "calibration/plane_equations_kernel.hpp"
 
 #include <array>
 
 #include "risley/core/simd.hpp"
 #include "risley/optics/beam_origin.hpp"
+#include "risley/optics/emitter_lanes.hpp"
 #include "risley/optics/observation_adjoint.hpp"
-
-#define RISLEY_JOIN2(a, b) a##b
-#define RISLEY_JOIN(a, b) RISLEY_JOIN2(a, b)
-#define RISLEY_KERNEL_NAMESPACE RISLEY_JOIN(kernel_, RISLEY_KERNEL)
 
 namespace risley::calibration::RISLEY_KERNEL_NAMESPACE {
 namespace {
@@ -30,14 +26,6 @@ constexpr std::size_t kBlock = kGroups * kLanes;
 constexpr std::size_t kTile = kLanes == 8 ? 4 : 3;
 
 constexpr std::size_t tiles_of(std::size_t columns) { return (columns + kTile - 1) / kTile; }
-
-double sum_of_lanes(const Batch& value) {
-  alignas(64) double lanes[kLanes];
-  value.store_aligned(lanes);
-  double sum = 0;
-  for (std::size_t i = 0; i < kLanes; ++i) sum += lanes[i];
-  return sum;
-}
 
 /// Sums of the products of all pairs of columns.
 template <int N>
@@ -77,7 +65,7 @@ class Products {
   }
 
  private:
-  static constexpr std::size_t kMost = tiles_of(parameter_count(N) + N + 5);
+  static constexpr std::size_t kMost = tiles_of(EmitterLanes<Batch, N>::kPlaces + N + 5);
 
   std::size_t stride() const { return tiles_ * kTile; }
 
@@ -102,9 +90,10 @@ class Products {
   Batch sums_[kMost * (kMost + 1) / 2 * kTile * kTile];
 };
 
-/// Everything of a call that is the same for all shots.
+/// Everything of a call that is the same for all shots, but for the emitters of a group.
 template <int N>
 struct Constants {
+  EmitterLanes<Batch, N> emitters;
   PreparedTrain<Batch, N> train;
   PreparedDerivatives<Batch, N> derivatives;
   std::array<Batch, 2 * N> face_position;
@@ -112,7 +101,8 @@ struct Constants {
   Batch distance, range_offset, range_variance;
 
   explicit Constants(const PlaneArguments& a)
-      : normal(vector(a.normal)),
+      : emitters(a.parameters, a.emitters, a.beam),
+        normal(vector(a.normal)),
         tangent_1(vector(a.tangent[0])),
         tangent_2(vector(a.tangent[1])),
         distance(a.distance),
@@ -125,6 +115,13 @@ struct Constants {
     train = prepare<Batch, N>(parameters, order);
     derivatives = prepare_derivatives<Batch, N>(parameters, order);
     for (std::size_t i = 0; i < 2 * N; ++i) face_position[i] = Batch(a.face_position[i]);
+  }
+
+  /// The emitters of shots [shot, shot + kLanes).
+  void turn_to(std::size_t shot, std::size_t end) {
+    emitters.select(shot, end);
+    emitters.apply(train);
+    emitters.apply(derivatives);
   }
 
  private:
@@ -217,10 +214,10 @@ std::size_t fill_row(const PlaneArguments& a, const Constants<N>& c, const Block
   }
 
   const Batch scale = one / xsimd::sqrt(variance);
+  Batch storage[EmitterLanes<Batch, N>::kPlaces];
+  const Batch* by_place = c.emitters.by_place(gradient, storage);
   Batch* column = row;
-  for (int i = 0; i < a.place_count; ++i) {
-    *column++ = scale * gradient.parameters[static_cast<std::size_t>(a.places[i])];
-  }
+  for (int i = 0; i < a.place_count; ++i) *column++ = scale * by_place[a.places[i]];
   for (std::size_t k = 0; k < N; ++k) *column++ = scale * gradient.rotation_angles[k];
   *column++ = scale;
   const Batch slope = scale * over_approach;
@@ -249,7 +246,7 @@ std::size_t fill_row(const PlaneArguments& a, const Constants<N>& c, const Block
 
 template <int N>
 std::size_t accumulate_shots(const PlaneArguments& a) {
-  const Constants<N> constants(a);
+  Constants<N> constants(a);
   Products<N> products(static_cast<std::size_t>(a.place_count) + N + 5);
   Block<N> block;
   BlockResiduals residuals;
@@ -257,6 +254,7 @@ std::size_t accumulate_shots(const PlaneArguments& a) {
   for (std::size_t shot = a.begin; shot < a.end; shot += kBlock) {
     block.load(a, shot, a.end - shot < kBlock ? a.end - shot : kBlock);
     for (std::size_t group = 0; group < block.groups(); ++group) {
+      constants.turn_to(shot + group * kLanes, a.end);
       lost += fill_row(a, constants, block, group, products.row(group), residuals);
     }
     lost -= block.groups() * kLanes - block.shots();
@@ -275,16 +273,7 @@ std::size_t accumulate_shots(const PlaneArguments& a) {
 }  // namespace
 
 std::size_t accumulate_plane(const PlaneArguments& a) {
-  switch (a.prisms) {
-    case 1:
-      return accumulate_shots<1>(a);
-    case 2:
-      return accumulate_shots<2>(a);
-    case 3:
-      return accumulate_shots<3>(a);
-    default:
-      return accumulate_shots<4>(a);
-  }
+  return with_prism_count(a.prisms, [&]<int N>() { return accumulate_shots<N>(a); });
 }
 
 }  // namespace risley::calibration::RISLEY_KERNEL_NAMESPACE

@@ -3,7 +3,9 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 
+#include "risley/core/instruction_set.hpp"
 #include "risley/optics/prism.hpp"
 
 namespace risley::calibration {
@@ -15,9 +17,9 @@ inline constexpr double kLeastApproach = 1e-3;
 /// Plain arguments of one call, see optics/batch_kernel.hpp for why they are plain. Columns are
 /// those of all shots; the call works on shots [begin, end).
 struct PlaneArguments {
-  const double* parameters = nullptr;     ///< flat vector
+  const double* parameters = nullptr;     ///< whole flat vector
   const FaceOrder* face_order = nullptr;  ///< [prisms]
-  int prisms = 0;
+  int prisms = 0, emitters = 1;
   const double* face_position = nullptr;  ///< [2 prisms]
   const int* places = nullptr;            ///< of the flat vector, at most all of them
   int place_count = 0;
@@ -30,6 +32,7 @@ struct PlaneArguments {
   const double* const* rotation_angle = nullptr;   ///< [prisms][shots]
   const float* const* angle_covariance = nullptr;  ///< [prisms (prisms+1)/2][shots]
   const double* range = nullptr;                   ///< [shots]
+  const std::uint8_t* beam = nullptr;  ///< [shots], each below emitters, or nullptr: all the first
   std::size_t begin = 0, end = 0;
 
   /// Weighted products of the columns of PlaneColumns and, behind them, the residual: upper
@@ -40,14 +43,6 @@ struct PlaneArguments {
 };
 
 /// @return number of lost shots
-namespace kernel_baseline {
-std::size_t accumulate_plane(const PlaneArguments& arguments);
-}
-namespace kernel_avx2 {
-std::size_t accumulate_plane(const PlaneArguments& arguments);
-}
-namespace kernel_avx512 {
-std::size_t accumulate_plane(const PlaneArguments& arguments);
-}
+RISLEY_DECLARE_KERNEL(std::size_t accumulate_plane(const PlaneArguments& arguments))
 
 }  // namespace risley::calibration

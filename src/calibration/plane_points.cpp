@@ -26,6 +26,7 @@ void RangedShots::resize(int prisms, std::size_t shots) {
   for (auto& column : rotation_angle) column.resize(shots);
   for (auto& column : angle_covariance) column.resize(shots);
   range.resize(shots);
+  beam.resize(shots);
 }
 
 void RangedShots::set_row(std::size_t row, const RangedShots& from, std::size_t from_row) {
@@ -36,6 +37,7 @@ void RangedShots::set_row(std::size_t row, const RangedShots& from, std::size_t 
     angle_covariance[k][row] = from.angle_covariance[k][from_row];
   }
   range[row] = from.range[from_row];
+  beam[row] = from.beam.empty() ? std::uint8_t{0} : from.beam[from_row];
 }
 
 RangedRecording ranged_recording(const estimation::Estimate& estimate, std::string name,
@@ -81,6 +83,8 @@ RangedRecording ranged_recording(const estimation::Estimate& estimate, std::stri
         shots.angle_covariance[k][row] = static_cast<float>(states.rotation_angle_covariance[k][i]);
       }
       shots.range[row] = range;
+      shots.beam[row] =
+          estimate.series.beam.empty() ? std::uint8_t{0} : estimate.series.beam[begin + i];
       recording.time_ns[row] = states.time_ns[i];
       ++row;
     }

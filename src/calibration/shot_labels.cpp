@@ -24,24 +24,25 @@ constexpr double kAngleLever = 0.17;
 Rays::Rays(const PrismTrain& train, const PrismGeometry& geometry, const RangedShots& shots) {
   for (auto* column : {&x_, &y_, &z_, &origin_x_, &origin_y_, &origin_z_})
     column->resize(shots.size());
-  tbb::parallel_for(std::size_t{0}, (shots.size() + kBlockShots - 1) / kBlockShots,
-                    [&](std::size_t block) {
-                      const std::size_t begin = block * kBlockShots;
-                      const std::size_t count = std::min(kBlockShots, shots.size() - begin);
-                      std::vector<std::span<const double>> angles;
-                      for (const auto& column : shots.rotation_angle) {
-                        angles.emplace_back(std::span(column).subspan(begin, count));
-                      }
-                      const auto part = [&](std::vector<double>& column) {
-                        return std::span(column).subspan(begin, count);
-                      };
-                      DirectionColumns out{part(x_), part(y_), part(z_), {}, {}};
-                      out.origin_x = part(origin_x_);
-                      out.origin_y = part(origin_y_);
-                      out.origin_z = part(origin_z_);
-                      out.geometry = geometry;
-                      observe_batch(train, angles, out);
-                    });
+  tbb::parallel_for(
+      std::size_t{0}, (shots.size() + kBlockShots - 1) / kBlockShots, [&](std::size_t block) {
+        const std::size_t begin = block * kBlockShots;
+        const std::size_t count = std::min(kBlockShots, shots.size() - begin);
+        std::vector<std::span<const double>> angles;
+        for (const auto& column : shots.rotation_angle) {
+          angles.emplace_back(std::span(column).subspan(begin, count));
+        }
+        const auto part = [&](std::vector<double>& column) {
+          return std::span(column).subspan(begin, count);
+        };
+        DirectionColumns out{part(x_), part(y_), part(z_), {}, {}};
+        out.origin_x = part(origin_x_);
+        out.origin_y = part(origin_y_);
+        out.origin_z = part(origin_z_);
+        out.geometry = geometry;
+        const auto beam = std::span(shots.beam);
+        observe_batch(train, angles, out, beam.empty() ? beam : beam.subspan(begin, count));
+      });
 }
 
 RangedShots rows_of(const RangedShots& shots, const std::vector<std::size_t>& rows) {

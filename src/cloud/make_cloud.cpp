@@ -333,6 +333,7 @@ class Work {
     points.number_of_returns = block.returns;
     take(piece_.tag, points.tag, same);
     take(piece_.beam, points.beam, same);
+    take(piece_.beam, shots.beam, same);
     take(piece_.azimuth, shots.azimuth, same);
     take(piece_.zenith, shots.zenith, same);
     take(piece_.range, shots.range, same);
@@ -402,8 +403,8 @@ class Work {
     std::vector<double> angles(shots.rotation_angle.size());
     for (std::size_t i = 0; i < rows.size(); ++i) {
       for (std::size_t k = 0; k < angles.size(); ++k) angles[k] = shots.rotation_angle[k][i];
-      const Observation to = observe(model_.train, angles);
-      const Observation from = observe(model_.believed, angles);
+      const Observation to = observe(model_.train, angles, piece_.beam[rows[i]]);
+      const Observation from = observe(model_.believed, angles, piece_.beam[rows[i]]);
       if (!to.valid || !from.valid) continue;
       squares += square(norm(to.direction - from.direction));
       count += 1;

@@ -48,8 +48,7 @@ Uncertain calibrated(const sensors::Sensor& sensor) {
   std::vector<Index> rows;
   for (std::size_t i = 0; i < sensor.covariance_names.size(); ++i) {
     const std::string& name = sensor.covariance_names[i];
-    if (name != kRangeOffset &&
-        find_parameter(name, sensor.prisms()).kind != ParameterKind::train) {
+    if (name != kRangeOffset && find_parameter(name, sensor.shape()).kind != ParameterKind::train) {
       continue;
     }
     result.names.push_back(name);
@@ -102,7 +101,7 @@ sensors::CalibrationReference meaning_of(const sensors::Sensor& calibration,
 class Factors {
  public:
   Factors(PointingModel& model, const SensorBelief& belief) : model_(model), belief_(belief) {
-    for (int place = 0; place < parameter_count(prisms()); ++place) model_.places.push_back(place);
+    for (int place = 0; place < all_places(); ++place) model_.places.push_back(place);
   }
 
   /// @param moves_beam    errors of the parameters move the beam at given rotation angles
@@ -118,7 +117,7 @@ class Factors {
           continue;
         }
         if (moves_beam) {
-          for (const int place : find_parameter(name, prisms()).places) {
+          for (const int place : find_parameter(name, model_.train.shape()).places) {
             common.weights[place] += factor(i, j);
           }
         }
@@ -134,22 +133,21 @@ class Factors {
                                                 belief_.angle_sensitivity.transpose());
     for (int j = 0; j < prisms(); ++j) {
       CommonFactor common = nothing(fmt::format("rotation_angle_{}_deg", prism_letter(j)));
-      common.weights.segment(parameter_count(prisms()), prisms()) = factor.col(j);
+      common.weights.segment(all_places(), prisms()) = factor.col(j);
       keep(std::move(common));
     }
   }
 
   void add_geometry(const sensors::Sensor& sensor) {
-    const auto sigma = [&sensor](const char* name) {
+    const auto sigma = [&sensor](const std::string& name) {
       const sensors::Knowledge* known = sensor.find_knowledge(name);
       return known == nullptr ? 0.0 : known->sigma;
     };
-    const Index size = parameter_count(prisms()) + prisms();
     if (model_.options.beam_origin) {
-      Index row = size;
-      for (const char* name : {"prism_thickness_m", "prism_spacing_m"}) {
-        CommonFactor common = nothing(name);
-        common.weights[row++] = sigma(name);
+      Index row = all_places() + prisms();
+      for (const PrismSize& size : model_.sizes) {
+        CommonFactor common = nothing(size.name);
+        common.weights[row++] = sigma(size.name);
         keep(std::move(common));
       }
     }
@@ -171,8 +169,8 @@ class Factors {
       rows.push_back(place);
       places.push_back(place);
     }
-    const Index others = prisms() + 2;
-    for (Index i = 0; i < others; ++i) rows.push_back(parameter_count(prisms()) + i);
+    const Index others = prisms() + static_cast<Index>(model_.sizes.size());
+    for (Index i = 0; i < others; ++i) rows.push_back(all_places() + i);
     for (CommonFactor& factor : model_.factors) {
       factor.weights = Eigen::VectorXd(factor.weights(rows));
     }
@@ -181,16 +179,21 @@ class Factors {
 
  private:
   int prisms() const { return model_.train.prisms(); }
+  /// Length of the flat parameter vector.
+  int all_places() const { return parameter_count(model_.train.shape()); }
 
   CommonFactor nothing(std::string name) const {
-    return {std::move(name), Eigen::VectorXd::Zero(parameter_count(prisms()) + prisms() + 2), 0.0};
+    return {
+        std::move(name),
+        Eigen::VectorXd::Zero(all_places() + prisms() + static_cast<Index>(model_.sizes.size())),
+        0.0};
   }
 
   void move_angles(const std::string& name, double value, CommonFactor& common) const {
     for (std::size_t j = 0; j < belief_.free.size(); ++j) {
       if (belief_.free[j].name != name) continue;
       for (int k = 0; k < prisms(); ++k) {
-        common.weights[parameter_count(prisms()) + k] +=
+        common.weights[all_places() + k] +=
             belief_.angle_sensitivity(k, static_cast<Index>(j)) * value;
       }
     }
@@ -207,22 +210,16 @@ class Factors {
 
 /// Face positions and their derivatives as the kernel wants them.
 struct Faces {
-  std::vector<double> position, over_thickness, over_spacing;
+  std::vector<double> position, over_size;
 
   explicit Faces(const PointingModel& model)
-      : position(face_positions(model.train.face_order(), model.geometry)),
-        over_thickness(face_positions(model.train.face_order(), {1.0, 0.0})),
-        over_spacing(face_positions(model.train.face_order(), {0.0, 1.0})) {}
+      : position(face_positions(model.train.face_order(), model.geometry)) {
+    for (const PrismSize& size : model.sizes) {
+      const auto over = face_positions(model.train.face_order(), size.rate);
+      over_size.insert(over_size.end(), over.begin(), over.end());
+    }
+  }
 };
-
-void run_kernel(const PointArguments& arguments, InstructionSet set) {
-#ifdef RISLEY_HAS_X86_KERNELS
-  if (set == InstructionSet::avx512) return kernel_avx512::compute_points(arguments);
-  if (set == InstructionSet::avx2) return kernel_avx2::compute_points(arguments);
-#endif
-  (void)set;
-  kernel_baseline::compute_points(arguments);
-}
 
 /// Calls function(from column, to column) for every column of shots.
 template <class Function>
@@ -240,6 +237,7 @@ void for_each_column(const PointedShots& from, PointedShots& to, const Function&
         &PointedShots::intensity}) {
     function(from.*column, to.*column);
   }
+  function(from.beam, to.beam);
 }
 
 /// The same for the columns of points that the kernel fills.
@@ -274,6 +272,7 @@ class Columns {
     a.range = shots.range.data();
     a.rounding_variance = shots.range_rounding.data();
     a.intensity = shots.intensity.data();
+    a.beam = shots.beam.data();
     a.point[0] = points.x.data();
     a.point[1] = points.y.data();
     a.point[2] = points.z.data();
@@ -320,9 +319,12 @@ PointingModel pointing_model(const sensors::Sensor& calibration, const SensorBel
   model.options = options;
   model.believed = belief.sensor.train;
   model.train = planes ? calibration.train : belief.sensor.train;
-  if (options.beam_origin) model.geometry = calibration.prism_geometry();
+  if (options.beam_origin) model.geometry = calibration.geometry;
   model.range_offset = calibration.range_offset;
   model.angle_noise = belief.angle_noise;
+  for (const PrismSize& size : own_prism_sizes(calibration.prisms())) {
+    if (calibration.find_knowledge(size.name) != nullptr) model.sizes.push_back(size);
+  }
   Factors factors(model, belief);
   if (planes) {
     factors.add(type ? assumed(calibration, belief) : calibrated(calibration), true, false);
@@ -372,21 +374,34 @@ void PointedShots::resize(int prisms, std::size_t shots) {
     column->resize(shots);
   }
   for (auto& column : surface_normal) column.resize(shots);
+  beam.resize(shots);
 }
 
 void compute_points(const PointingModel& model, const CloudHeader& header,
                     const PointedShots& shots, Points& points, InstructionSet set) {
   const Faces faces(model);
   const int prisms = model.train.prisms();
+  if (model.sizes.size() > static_cast<std::size_t>(kMostSizes)) {
+    throw InvalidArgument(
+        fmt::format("{} sizes of prisms, allowed {}", model.sizes.size(), kMostSizes));
+  }
+  if (model.believed.shape() != model.train.shape()) {
+    throw InvalidArgument(fmt::format(
+        "believed train: {} prisms and {} emitters, expected {} and {} as the true one",
+        model.believed.prisms(), model.believed.emitters(), prisms, model.train.emitters()));
+  }
+  check_beams(model.train, shots.beam, shots.size());
+  const auto& kernel = RISLEY_KERNEL_COPIES(compute_points).at(set);
   const auto square = [](double x) { return x * x; };
   PointArguments a;
   a.prisms = prisms;
+  a.emitters = model.train.emitters();
   a.face_order = model.train.face_order().data();
   a.parameters = model.train.parameters().data();
   a.believed_parameters = model.believed.parameters().data();
   a.face_position = faces.position.data();
-  a.face_over_thickness = faces.over_thickness.data();
-  a.face_over_spacing = faces.over_spacing.data();
+  a.sizes = static_cast<int>(model.sizes.size());
+  a.face_over_size = faces.over_size.data();
   a.reported_directions = model.options.reported_directions;
   a.angle_noise_variance = square(model.angle_noise);
   a.range_offset = model.range_offset;
@@ -400,7 +415,8 @@ void compute_points(const PointingModel& model, const CloudHeader& header,
     a.divergence_variance_vertical = square(kDivergenceSigma * sensor.beam_divergence_vertical);
   }
   const std::size_t factors = model.factors.size();
-  const std::size_t rows = model.places.size() + static_cast<std::size_t>(prisms) + 2;
+  const std::size_t rows =
+      model.places.size() + static_cast<std::size_t>(prisms) + model.sizes.size();
   std::vector<int> factor_begin{0}, factor_row;
   std::vector<double> factor_weight, range_factor(factors);
   for (std::size_t j = 0; j < factors; ++j) {
@@ -425,7 +441,7 @@ void compute_points(const PointingModel& model, const CloudHeader& header,
   {
     const Columns columns(header, shots, points, a);
     a.shots = whole;
-    run_kernel(a, set);
+    kernel(a);
   }
   if (whole < shots.size()) {  // the last group, filled up
     const std::size_t rest = shots.size() - whole;
@@ -433,8 +449,8 @@ void compute_points(const PointingModel& model, const CloudHeader& header,
     last_shots.resize(prisms, kPointPadding);
     Points last_points;
     header.resize(last_points, kPointPadding);
-    const auto copy = [](const std::vector<double>& from, std::size_t first, std::size_t count,
-                         std::vector<double>& to, std::size_t at) {
+    const auto copy = [](const auto& from, std::size_t first, std::size_t count, auto& to,
+                         std::size_t at) {
       if (from.empty()) return;
       std::copy_n(from.begin() + static_cast<std::ptrdiff_t>(first), count,
                   to.begin() + static_cast<std::ptrdiff_t>(at));
@@ -443,7 +459,7 @@ void compute_points(const PointingModel& model, const CloudHeader& header,
                     [&](const auto& from, auto& to) { copy(from, whole, rest, to, 0); });
     const Columns columns(header, last_shots, last_points, a);
     a.shots = kPointPadding;
-    run_kernel(a, set);
+    kernel(a);
     for_each_computed_column(last_points, points,
                              [&](const auto& from, auto& to) { copy(from, 0, rest, to, whole); });
   }

@@ -1,18 +1,14 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-// Compiled once per instruction set with RISLEY_KERNEL = baseline, avx2, avx512, under the rules of
-// optics/batch_kernel.cpp.
+// Compiled once per instruction set under the rules of risley/core/simd.hpp.
 #include "cloud/pointing_kernel.hpp"
 
 #include <array>
 
 #include "risley/core/simd.hpp"
 #include "risley/optics/beam_origin.hpp"
+#include "risley/optics/emitter_lanes.hpp"
 #include "risley/optics/observation_adjoint.hpp"
-
-#define RISLEY_JOIN2(a, b) a##b
-#define RISLEY_JOIN(a, b) RISLEY_JOIN2(a, b)
-#define RISLEY_KERNEL_NAMESPACE RISLEY_JOIN(kernel_, RISLEY_KERNEL)
 
 namespace risley::cloud::RISLEY_KERNEL_NAMESPACE {
 namespace {
@@ -51,25 +47,29 @@ struct BeamCovariance {
   Batch uu, uv, vv, ud, vd, dd;
 };
 
-/// Everything of a call that is the same for all shots.
+/// Everything of a call that is the same for all shots, but for the emitters of a group.
 template <int N>
 class Kernel {
  public:
   static constexpr std::size_t kFaces = 2 * N;
 
-  explicit Kernel(const PointArguments& a) : a_(a) {
+  explicit Kernel(const PointArguments& a)
+      : a_(a),
+        emitters_(a.parameters, a.emitters, a.beam),
+        believed_emitters_(a.believed_parameters, a.emitters, a.beam) {
     std::array<FaceOrder, N> order;
     __builtin_memcpy(&order, a.face_order, sizeof(order));
     train_ = prepared<N>(a.parameters, order, &derivatives_);
     believed_ = prepared<N>(a.believed_parameters, order, nullptr);
-    for (std::size_t i = 0; i < parameter_count(N); ++i) {
+    for (int i = 0; i < parameter_count(TrainShape{N, a.emitters}); ++i) {
       same_ = same_ && a.parameters[i] == a.believed_parameters[i];
     }
     for (std::size_t i = 0; i < kFaces; ++i) face_position_[i] = Batch(a.face_position[i]);
   }
 
   /// Shots [at, at + kLanes).
-  [[gnu::flatten]] void compute(std::size_t at) const {
+  [[gnu::flatten]] void compute(std::size_t at) {
+    if (emitters_.several()) turn_to(at);
     std::array<Batch, N> angles;
     for (std::size_t k = 0; k < N; ++k) angles[k] = load(a_.rotation_angle[k], at);
     const auto forward = trace_forward(train_, angles);
@@ -121,6 +121,16 @@ class Kernel {
   }
 
  private:
+  /// The emitters of shots [at, at + kLanes).
+  void turn_to(std::size_t at) {
+    emitters_.select(at, a_.shots);
+    emitters_.apply(train_);
+    emitters_.apply(derivatives_);
+    if (same_) return;
+    believed_emitters_.select(at, a_.shots);
+    believed_emitters_.apply(believed_);
+  }
+
   /// Sine and cosine of one reported angle.
   struct Sines {
     Batch sine, cosine;
@@ -259,18 +269,23 @@ class Kernel {
   /// Adds the common factors' covariance and stores their loadings.
   void add_factors(std::size_t at, const PointLinearisation<Batch, N>& jacobian, const Ray& ray,
                    BeamCovariance& c) const {
-    constexpr std::size_t kMostRows = parameter_count(N) + N + 2;
+    constexpr std::size_t kPlaces = EmitterLanes<Batch, N>::kPlaces;
+    constexpr std::size_t kMostRows = kPlaces + N + kMostSizes;
     Batch u[kMostRows], v[kMostRows];
     std::size_t rows = 0;
+    Batch u_storage[kPlaces], v_storage[kPlaces];
+    const Batch* u_by_place = emitters_.by_place(jacobian.across[0], u_storage);
+    const Batch* v_by_place = emitters_.by_place(jacobian.across[1], v_storage);
     for (int i = 0; i < a_.place_count; ++i, ++rows) {
-      u[rows] = jacobian.across[0].parameters[static_cast<std::size_t>(a_.places[i])];
-      v[rows] = jacobian.across[1].parameters[static_cast<std::size_t>(a_.places[i])];
+      u[rows] = u_by_place[a_.places[i]];
+      v[rows] = v_by_place[a_.places[i]];
     }
     for (std::size_t k = 0; k < N; ++k, ++rows) {
       u[rows] = jacobian.across[0].rotation_angles[k];
       v[rows] = jacobian.across[1].rotation_angles[k];
     }
-    for (const double* over : {a_.face_over_thickness, a_.face_over_spacing}) {
+    for (int size = 0; size < a_.sizes; ++size) {
+      const double* over = a_.face_over_size + static_cast<std::size_t>(size) * kFaces;
       u[rows] = v[rows] = Batch(0.0);
       for (std::size_t i = 0; i < kFaces; ++i) {
         u[rows] = u[rows] + jacobian.face_position[0][i] * Batch(over[i]);
@@ -317,6 +332,7 @@ class Kernel {
   }
 
   const PointArguments& a_;
+  EmitterLanes<Batch, N> emitters_, believed_emitters_;
   PreparedTrain<Batch, N> train_, believed_;
   PreparedDerivatives<Batch, N> derivatives_;
   std::array<Batch, kFaces> face_position_;
@@ -325,7 +341,7 @@ class Kernel {
 
 template <int N>
 void compute_all(const PointArguments& a) {
-  const Kernel<N> kernel(a);
+  Kernel<N> kernel(a);
   for (std::size_t at = 0; at < a.shots; at += kLanes) {
     a.rotation_angle ? kernel.compute(at) : kernel.compute_reported(at);
   }
@@ -334,16 +350,7 @@ void compute_all(const PointArguments& a) {
 }  // namespace
 
 void compute_points(const PointArguments& a) {
-  switch (a.prisms) {
-    case 1:
-      return compute_all<1>(a);
-    case 2:
-      return compute_all<2>(a);
-    case 3:
-      return compute_all<3>(a);
-    default:
-      return compute_all<4>(a);
-  }
+  with_prism_count(a.prisms, [&]<int N>() { compute_all<N>(a); });
 }
 
 }  // namespace risley::cloud::RISLEY_KERNEL_NAMESPACE

@@ -3,27 +3,31 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 
+#include "risley/core/instruction_set.hpp"
 #include "risley/optics/prism.hpp"
 
 namespace risley::cloud {
 
 /// Most common factors that a call can take.
 inline constexpr int kMostFactors = 64;
+/// Most sizes of prisms that a call can take: those that all share, and the thickness of every
+/// prism and the spacing behind every one but the last.
+inline constexpr int kMostSizes = 2 + 2 * kMaxPrisms - 1;
 
 /// Plain arguments of one call, see optics/batch_kernel.hpp for why they are plain. Every column
 /// has one entry per shot and room for whole groups: a multiple of kPointPadding.
 inline constexpr std::size_t kPointPadding = 8;
 
 struct PointArguments {
-  int prisms = 0;
+  int prisms = 0, emitters = 1;
   const FaceOrder* face_order = nullptr;        ///< [prisms]
-  const double* parameters = nullptr;           ///< flat vector: where the beam truly goes
+  const double* parameters = nullptr;           ///< whole flat vector: where the beam truly goes
   const double* believed_parameters = nullptr;  ///< what directions are reported with; may be equal
   const double* face_position = nullptr;        ///< [2 prisms], m
-  /// d face position / d thickness and / d spacing [2 prisms].
-  const double* face_over_thickness = nullptr;
-  const double* face_over_spacing = nullptr;
+  int sizes = 0;                                ///< of prisms that may have a factor
+  const double* face_over_size = nullptr;       ///< d face position / d size [sizes][2 prisms]
   bool reported_directions = false;  ///< points go where the sensor says, not where the model does
 
   double angle_noise_variance = 0;  ///< of reported angles before rounding, rad^2
@@ -35,8 +39,8 @@ struct PointArguments {
   double divergence_variance_horizontal = 0, divergence_variance_vertical = 0;
 
   /// Common factors: what one standard deviation of each does to the flat vector's places, to the
-  /// rotation angles, to thickness and spacing, in rows of that order [place_count + prisms + 2],
-  /// and to the range offset. Entries [factor_begin[k], factor_begin[k + 1]) are factor k's.
+  /// rotation angles and to the sizes, in rows of that order [place_count + prisms + sizes], and to
+  /// the range offset. Entries [factor_begin[k], factor_begin[k + 1]) are factor k's.
   const int* places = nullptr;
   int place_count = 0;
   int factors = 0;
@@ -49,6 +53,7 @@ struct PointArguments {
   /// [prisms][shots], rad, or nullptr: then directions are as reported and start at the origin.
   const double* const* rotation_angle = nullptr;
   const double* const* angle_covariance = nullptr;  ///< [prisms (prisms+1)/2][shots], rad^2
+  const std::uint8_t* beam = nullptr;               ///< [shots], each below emitters
   const double* azimuth = nullptr;                  ///< [shots], as reported, rad
   const double* zenith = nullptr;
   const double* azimuth_variance = nullptr;  ///< [shots], of the rounding, rad^2
@@ -69,14 +74,6 @@ struct PointArguments {
   double* const* loading = nullptr;  ///< [factors * 3][shots], m, or nullptr
 };
 
-namespace kernel_baseline {
-void compute_points(const PointArguments& arguments);
-}
-namespace kernel_avx2 {
-void compute_points(const PointArguments& arguments);
-}
-namespace kernel_avx512 {
-void compute_points(const PointArguments& arguments);
-}
+RISLEY_DECLARE_KERNEL(void compute_points(const PointArguments& arguments))
 
 }  // namespace risley::cloud

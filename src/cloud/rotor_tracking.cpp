@@ -43,14 +43,14 @@ double knot_interval(const std::vector<estimation::RotorProcess>& process) {
 /// one against directions, otherwise the default ones.
 void choose_parameters(const sensors::Sensor& calibration, estimation::EstimateOptions& options) {
   if (calibration.reference != CalibrationReference::directions) return;
-  const auto defaults = estimation::default_free_names(calibration.prisms());
+  const auto defaults = estimation::default_free_names(calibration.shape());
   const auto& names = calibration.covariance_names;
   for (const std::string& name : defaults) {
     if (std::find(names.begin(), names.end(), name) == names.end()) options.fixed.push_back(name);
   }
   for (const std::string& name : names) {
     if (name == "range_offset_m") continue;
-    if (find_parameter(name, calibration.prisms()).kind != ParameterKind::train) continue;
+    if (find_parameter(name, calibration.shape()).kind != ParameterKind::train) continue;
     if (std::find(defaults.begin(), defaults.end(), name) == defaults.end()) {
       options.additional.push_back(name);
     }
@@ -78,7 +78,7 @@ void check_same_sensor(const estimation::Estimate& estimate, const sensors::Sens
   Index worst = 0;
   off.cwiseAbs().cwiseQuotient(covariance.diagonal().cwiseSqrt()).maxCoeff(&worst);
   const ParameterInfo& info =
-      find_parameter(estimate.free[static_cast<std::size_t>(worst)].name, calibration.prisms());
+      find_parameter(estimate.free[static_cast<std::size_t>(worst)].name, calibration.shape());
   throw EstimationError(
       fmt::format("a calibration of another sensor: by the recording's directions {} is {:.4g} {} "
                   "away from the "

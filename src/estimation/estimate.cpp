@@ -105,7 +105,7 @@ std::string implausible_parameter(const Estimate& estimate, const PrismTrain& no
     const double change =
         estimate.parameters[static_cast<Eigen::Index>(i)] - nominal[parameter.places[0]];
     if (std::abs(change) <= kLargest * parameter.prior_sigma) continue;
-    const ParameterInfo& info = find_parameter(parameter.name, nominal.prisms());
+    const ParameterInfo& info = find_parameter(parameter.name, nominal.shape());
     return fmt::format(
         "{} came out {:.4g}{} away from the sensor's value, more than any such sensor can be: "
         "wrong "
@@ -401,16 +401,16 @@ Start start_anywhere(const AngleSeries& series, const AngleSeries& head,
 }  // namespace
 
 std::vector<FreeParameter> chosen_parameters(const EstimateOptions& options) {
-  const int prisms = options.sensor.prisms();
-  std::vector<std::string> names = default_free_names(prisms);
+  const TrainShape shape = options.sensor.shape();
+  std::vector<std::string> names = default_free_names(shape);
   for (const std::string& name : options.fixed) {
-    find_parameter(name, prisms);  // an unknown name is an error; one that is not free is no harm
+    find_parameter(name, shape);  // an unknown name is an error; one that is not free is no harm
     std::erase(names, name);
   }
   for (const std::string& name : options.additional) {
     if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
   }
-  return free_parameters(names, prisms);
+  return free_parameters(names, shape);
 }
 
 Estimate estimate(Method method, AngleSeries series, const AngleSeries& head,

@@ -41,8 +41,9 @@ Evaluation evaluate(const Estimate& estimate, const sensors::Sensor& truth_senso
                     const recordings::TruthColumns& truth) {
   const RotorStates& states = estimate.states;
   const int prisms = estimate.sensor.prisms();
-  if (truth_sensor.prisms() != prisms || truth.prisms() != prisms) {
-    throw InvalidArgument("the truth belongs to a sensor with another number of prisms");
+  if (truth_sensor.shape() != estimate.sensor.shape() || truth.prisms() != prisms) {
+    throw InvalidArgument(
+        "the truth belongs to a sensor with another number of prisms or of emitters");
   }
   const auto rows = matching_rows(states.time_ns, truth.time_ns);
   const auto rotor_count = static_cast<std::size_t>(prisms);
@@ -55,7 +56,7 @@ Evaluation evaluate(const Estimate& estimate, const sensors::Sensor& truth_senso
         {value.name, true_value, error, value.sigma > 0 ? error / value.sigma : 0.0});
   };
   for (const EstimatedValue& value : estimate.values) {
-    const ParameterInfo& info = find_parameter(value.name, prisms);
+    const ParameterInfo& info = find_parameter(value.name, estimate.sensor.shape());
     const auto rotor = static_cast<std::size_t>(info.places.front());
     if (info.kind == ParameterKind::train) {
       const double true_value = truth_sensor.train[info.places.front()];

@@ -11,9 +11,12 @@
 
 namespace risley::estimation {
 
-std::vector<std::string> default_free_names(int prisms) {
-  std::vector<std::string> names{"refractive_index", "incident_beam_horizontal_deg",
-                                 "incident_beam_vertical_deg"};
+std::vector<std::string> default_free_names(const TrainShape& shape) {
+  const int prisms = shape.prisms;
+  std::vector<std::string> names{"refractive_index"};
+  for (const ParameterInfo& info : parameter_list(shape)) {
+    if (info.name.starts_with("incident_beam")) names.push_back(info.name);
+  }
   for (int i = 0; i + 1 < prisms; ++i) {
     names.push_back(fmt::format("bearing_tilt_{}_horizontal_deg", prism_letter(i)));
     names.push_back(fmt::format("bearing_tilt_{}_vertical_deg", prism_letter(i)));
@@ -26,13 +29,14 @@ std::vector<std::string> default_free_names(int prisms) {
   return names;
 }
 
-std::vector<FreeParameter> free_parameters(const std::vector<std::string>& names, int prisms) {
+std::vector<FreeParameter> free_parameters(const std::vector<std::string>& names,
+                                           const TrainShape& shape) {
   constexpr double kIndexSigma = 0.01;
   constexpr double kAngleSigma = radians_from_degrees(1.0);
   std::vector<FreeParameter> free;
   std::vector<int> taken;
   for (const std::string& name : names) {
-    const ParameterInfo& info = find_parameter(name, prisms);
+    const ParameterInfo& info = find_parameter(name, shape);
     if (info.kind != ParameterKind::train) {
       throw InvalidArgument(fmt::format(
           "{} is always estimated and cannot be chosen, choose among the prisms' parameters",

@@ -229,25 +229,19 @@ struct Hypothesis {
   }
   std::string words() const {
     return fmt::format("{}{}",
-                       sensor.combination ? fmt::format("speed combination {}",
-                                                        static_cast<int>(*sensor.combination))
+                       sensor.combination ? fmt::format("speed combination {}", *sensor.combination)
                                           : std::string("the sensor's speeds"),
                        mirrored ? " mirrored" : " as recorded");
   }
 };
 
 std::vector<Hypothesis> hypotheses_of(const sensors::Sensor& sensor, std::optional<bool> mirrored) {
-  std::vector<sensors::Sensor> combinations{sensor};
-  if (sensor.combination) {
-    using sensors::SpeedCombination;
-    const bool is_first = *sensor.combination == SpeedCombination::first;
-    combinations.push_back(
-        with_combination(sensor, is_first ? SpeedCombination::second : SpeedCombination::first));
-  }
   std::vector<Hypothesis> all;
   for (const bool image : {false, true}) {
     if (mirrored && image != *mirrored) continue;
-    for (const sensors::Sensor& candidate : combinations) all.push_back({image, candidate});
+    for (const sensors::Sensor& candidate : in_all_combinations(sensor)) {
+      all.push_back({image, candidate});
+    }
   }
   return all;
 }

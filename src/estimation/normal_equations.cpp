@@ -16,15 +16,6 @@ static_assert(kRotorStates == kStatesPerRotor);
 /// Knots that one task sums up: fixed, so that sums do not depend on the number of threads.
 constexpr std::size_t kBlockKnots = 1000;
 
-NormalEquationCounts run_kernel(const NormalEquationArguments& arguments, InstructionSet set) {
-#ifdef RISLEY_HAS_X86_KERNELS
-  if (set == InstructionSet::avx512) return kernel_avx512::accumulate(arguments);
-  if (set == InstructionSet::avx2) return kernel_avx2::accumulate(arguments);
-#endif
-  static_cast<void>(set);
-  return kernel_baseline::accumulate(arguments);
-}
-
 }  // namespace
 
 void NormalEquations::scale(double factor) {
@@ -55,6 +46,9 @@ void accumulate(const AngleSeries& series, const RotorTrajectory& knots, const P
   all.parameters = train.parameters().data();
   all.face_order = train.face_order().data();
   all.prisms = knots.prisms;
+  all.emitters = train.emitters();
+  check_beams(train, series.beam, series.size());
+  if (!series.beam.empty()) all.beam = series.beam.data();
   all.free = n;
   all.place_begin = place_begin.data();
   all.places = places.data();
@@ -83,6 +77,7 @@ void accumulate(const AngleSeries& series, const RotorTrajectory& knots, const P
   }
   if (!columns.outlier.empty()) all.outlier = columns.outlier.data();
 
+  const auto& kernel = RISLEY_KERNEL_COPIES(accumulate).at(set);
   const std::size_t blocks = (knots.size() + kBlockKnots - 1) / kBlockKnots;
   const std::size_t triangle = free.size() * (free.size() + 1) / 2;
   std::vector<double> hessians(blocks * triangle), gradients(blocks * free.size());
@@ -93,7 +88,7 @@ void accumulate(const AngleSeries& series, const RotorTrajectory& knots, const P
     mine.knot_end = std::min(mine.knot_begin + kBlockKnots, knots.size());
     mine.static_hessian = hessians.data() + block * triangle;
     mine.static_gradient = gradients.data() + block * free.size();
-    counts[block] = run_kernel(mine, set);
+    counts[block] = kernel(mine);
   });
 
   equations.static_hessian = Eigen::MatrixXd::Zero(n, n);

@@ -1,17 +1,13 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-// Compiled once per instruction set with RISLEY_KERNEL = baseline, avx2, avx512, under the rules of
-// optics/batch_kernel.cpp.
+// Compiled once per instruction set under the rules of risley/core/simd.hpp.
 #include "estimation/normal_equations_kernel.hpp"
 
 #include <array>
 
 #include "risley/core/simd.hpp"
+#include "risley/optics/emitter_lanes.hpp"
 #include "risley/optics/observation_adjoint.hpp"
-
-#define RISLEY_JOIN2(a, b) a##b
-#define RISLEY_JOIN(a, b) RISLEY_JOIN2(a, b)
-#define RISLEY_KERNEL_NAMESPACE RISLEY_JOIN(kernel_, RISLEY_KERNEL)
 
 namespace risley::estimation::RISLEY_KERNEL_NAMESPACE {
 namespace {
@@ -19,14 +15,6 @@ namespace {
 using Batch = xsimd::batch<double>;
 constexpr std::size_t kLanes = Batch::size;
 constexpr double kTurn = 6.283185307179586;
-
-double sum_of_lanes(const Batch& value) {
-  alignas(64) double lanes[kLanes];
-  value.store_aligned(lanes);
-  double sum = 0;
-  for (std::size_t i = 0; i < kLanes; ++i) sum += lanes[i];
-  return sum;
-}
 
 /// The same angle within half a turn, as a difference or for an accurate sine.
 Batch wrapped(const Batch& angle) { return angle - kTurn * xsimd::nearbyint(angle / kTurn); }
@@ -101,23 +89,30 @@ class Weights {
   Batch azimuth_noise_, zenith_noise_, azimuth_rounding_, zenith_rounding_;
 };
 
+/// Most free parameters: one per place.
+template <int N>
+constexpr std::size_t kMostFree = EmitterLanes<Batch, N>::kPlaces;
+
 /// One observed angle of a group: residual and derivatives, all divided by its sigma.
 template <int N>
 struct Row {
   Batch residual;
   std::array<Batch, N> angles;
-  std::array<Batch, parameter_count(N)> free;
+  std::array<Batch, kMostFree<N>> free;
 };
 
 template <int N>
-void fill_row(const NormalEquationArguments& a, const Gradient<Batch, N>& gradient,
-              const Batch& residual, const Batch& scale, Row<N>& row) {
+void fill_row(const NormalEquationArguments& a, const EmitterLanes<Batch, N>& emitters,
+              const Gradient<Batch, N>& gradient, const Batch& residual, const Batch& scale,
+              Row<N>& row) {
+  Batch storage[EmitterLanes<Batch, N>::kPlaces];
+  const Batch* by_place = emitters.by_place(gradient, storage);
   row.residual = scale * residual;
   for (std::size_t k = 0; k < N; ++k) row.angles[k] = scale * gradient.rotation_angles[k];
   for (int j = 0; j < a.free; ++j) {
     Batch sum(0.0);
     for (int p = a.place_begin[j]; p < a.place_begin[j + 1]; ++p) {
-      sum = sum + gradient.parameters[static_cast<std::size_t>(a.places[p])];
+      sum = sum + by_place[a.places[p]];
     }
     row.free[static_cast<std::size_t>(j)] = scale * sum;
   }
@@ -142,7 +137,7 @@ struct KnotSums {
   static constexpr std::size_t kPairs = N * (N + 1) / 2;
   Batch curvature[kPairs][kTimePowers];
   Batch gradient[N][kRotorStates];
-  Batch coupling[N][kRotorStates][parameter_count(N)];
+  Batch coupling[N][kRotorStates][kMostFree<N>];
 
   void clear(int free) {
     const Batch zero(0.0);
@@ -183,7 +178,7 @@ struct KnotSums {
         const auto i = static_cast<std::size_t>(j);
         spread(&coupling[k][0][j],
                xsimd::fma(first.angles[k], first.free[i], second.angles[k] * second.free[i]),
-               parameter_count(N));
+               kMostFree<N>);
       }
     }
   }
@@ -209,8 +204,8 @@ struct KnotSums {
 /// Sums over all shots.
 template <int N>
 struct StaticSums {
-  Batch hessian[parameter_count(N) * (parameter_count(N) + 1) / 2];
-  Batch gradient[parameter_count(N)];
+  Batch hessian[kMostFree<N> * (kMostFree<N> + 1) / 2];
+  Batch gradient[kMostFree<N>];
 
   explicit StaticSums(int free) {
     for (int i = 0; i < free * (free + 1) / 2; ++i) hessian[i] = Batch(0.0);
@@ -237,8 +232,9 @@ NormalEquationCounts accumulate_knots(const NormalEquationArguments& a) {
   for (std::size_t i = 0; i < parameter_count(N); ++i) parameters[i] = Batch(a.parameters[i]);
   std::array<FaceOrder, N> order;
   __builtin_memcpy(&order, a.face_order, sizeof(order));
-  const auto train = prepare<Batch, N>(parameters, order);
-  const auto derivatives = prepare_derivatives<Batch, N>(parameters, order);
+  EmitterLanes<Batch, N> emitters(a.parameters, a.emitters, a.beam);
+  auto train = prepare<Batch, N>(parameters, order);
+  auto derivatives = prepare_derivatives<Batch, N>(parameters, order);
 
   NormalEquationCounts counts;
   Batch cost(0.0);
@@ -265,6 +261,9 @@ NormalEquationCounts accumulate_knots(const NormalEquationArguments& a) {
         angles[k] = xsimd::fma(group.time, xsimd::fma(group.time, half_acceleration[k], speed[k]),
                                angle[k]);
       }
+      emitters.select(shot, a.last_shot[knot]);
+      emitters.apply(train);
+      emitters.apply(derivatives);
       auto shots = linearise_angles(train, derivatives, angles);
       if (a.turned) add_turn_derivatives(shots);
       const Batch azimuth_residual = wrapped(group.azimuth - shots.angles.azimuth);
@@ -275,8 +274,9 @@ NormalEquationCounts accumulate_knots(const NormalEquationArguments& a) {
       const Batch chi2 =
           xsimd::fma(normalised_azimuth, normalised_azimuth, normalised_zenith * normalised_zenith);
       const Batch share = a.softening > 0 ? one / (one + a.softening * chi2) : one;
-      fill_row(a, shots.azimuth, azimuth_residual, share * weights.azimuth_root, azimuth_row);
-      fill_row(a, shots.zenith, zenith_residual, share * weights.zenith_root, zenith_row);
+      fill_row(a, emitters, shots.azimuth, azimuth_residual, share * weights.azimuth_root,
+               azimuth_row);
+      fill_row(a, emitters, shots.zenith, zenith_residual, share * weights.zenith_root, zenith_row);
       // Comparison with NaN is false: a beam that does not get through counts as an outlier.
       auto good = chi2 <= Batch(a.cut);
       Batch loss = xsimd::select(good, chi2 * share, lost);
@@ -327,16 +327,7 @@ NormalEquationCounts accumulate_knots(const NormalEquationArguments& a) {
 }  // namespace
 
 NormalEquationCounts accumulate(const NormalEquationArguments& a) {
-  switch (a.prisms) {
-    case 1:
-      return accumulate_knots<1>(a);
-    case 2:
-      return accumulate_knots<2>(a);
-    case 3:
-      return accumulate_knots<3>(a);
-    default:
-      return accumulate_knots<4>(a);
-  }
+  return with_prism_count(a.prisms, [&]<int N>() { return accumulate_knots<N>(a); });
 }
 
 }  // namespace risley::estimation::RISLEY_KERNEL_NAMESPACE

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "risley/core/instruction_set.hpp"
 #include "risley/optics/prism.hpp"
 
 namespace risley::estimation {
@@ -18,10 +19,10 @@ inline constexpr int kRotorStates = 3;
 /// Plain arguments of one call, see optics/batch_kernel.hpp for why they are plain. Columns are
 /// those of the whole series; the call works on knots [knot_begin, knot_end).
 struct NormalEquationArguments {
-  const double* parameters = nullptr;     ///< flat vector
+  const double* parameters = nullptr;     ///< whole flat vector
   const FaceOrder* face_order = nullptr;  ///< [prisms]
-  int prisms = 0;
-  int free = 0;                      ///< number of free parameters
+  int prisms = 0, emitters = 1;
+  int free = 0;                      ///< number of free parameters, at most one per place
   const int* place_begin = nullptr;  ///< [free + 1], into places
   const int* places = nullptr;       ///< of the flat vector
   std::size_t knot_begin = 0, knot_end = 0;
@@ -30,6 +31,7 @@ struct NormalEquationArguments {
   const std::int64_t* knot_time_ns = nullptr;
   const double* state = nullptr;  ///< [knots][prisms][3]; angles of any number of turns
   const std::int64_t* time_ns = nullptr;
+  const std::uint8_t* beam = nullptr;  ///< [shots], each below emitters, or nullptr: all the first
   const double* azimuth = nullptr;
   const double* zenith = nullptr;
   const float* azimuth_rounding_variance = nullptr;
@@ -56,14 +58,6 @@ struct NormalEquationCounts {
   std::size_t outliers = 0;  ///< shots beyond the cut, or without a modelled direction
 };
 
-namespace kernel_baseline {
-NormalEquationCounts accumulate(const NormalEquationArguments& arguments);
-}
-namespace kernel_avx2 {
-NormalEquationCounts accumulate(const NormalEquationArguments& arguments);
-}
-namespace kernel_avx512 {
-NormalEquationCounts accumulate(const NormalEquationArguments& arguments);
-}
+RISLEY_DECLARE_KERNEL(NormalEquationCounts accumulate(const NormalEquationArguments& arguments))
 
 }  // namespace risley::estimation

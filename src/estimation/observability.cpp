@@ -29,16 +29,16 @@ constexpr double kStrong = 0.9;
 constexpr double kTwin = 0.98;
 
 /// Every parameter of the prisms that exists, shared ones under their shared names.
-std::vector<FreeParameter> all_parameters(int prisms) {
+std::vector<FreeParameter> all_parameters(const TrainShape& shape) {
   std::vector<std::string> names{"refractive_index_air", "refractive_index", "wedge_angle_deg"};
-  for (const ParameterInfo& info : parameter_list(prisms)) {
+  for (const ParameterInfo& info : parameter_list(shape)) {
     const bool error = info.name.find("tilt") != std::string::npos ||
                        info.name.find("incident_beam") != std::string::npos;
     if (info.kind == ParameterKind::train && error && info.places.size() == 1) {
       names.push_back(info.name);
     }
   }
-  return free_parameters(names, prisms);
+  return free_parameters(names, shape);
 }
 
 /// Inverse of some rows of an information matrix; regular tells whether there is one.
@@ -270,7 +270,7 @@ Observability observability_of_plan(const ObservabilityPlan& plan) {
   }
   std::vector<RotorProcess> process = plan.rotor_process;
   if (process.empty()) process.assign(angles.size(), kTypicalRotor);
-  const std::vector<FreeParameter> all = all_parameters(train.prisms());
+  const std::vector<FreeParameter> all = all_parameters(train.shape());
   NormalEquations equations;
   // Fewer shots count for all of them.
   const double share = shots / static_cast<double>(count);
@@ -283,7 +283,7 @@ Observability observability_of_estimate(const Estimate& estimate) {
     throw InvalidArgument("observability needs an estimate of the batch estimator (method map)");
   }
   const BatchMapResult& map = *estimate.map;
-  const std::vector<FreeParameter> all = all_parameters(estimate.sensor.prisms());
+  const std::vector<FreeParameter> all = all_parameters(estimate.sensor.shape());
   NormalEquations equations;
   ShotWeights weights;
   weights.angle_noise = usable_noise(estimate.noise.value);
@@ -302,10 +302,11 @@ Observability observability_of_estimate(const Estimate& estimate) {
                  shots / variance);
 }
 
-std::vector<std::string> observability_words(const Observability& observability, int prisms) {
+std::vector<std::string> observability_words(const Observability& observability,
+                                             const TrainShape& shape) {
   std::vector<std::string> words;
   for (const QuantityObservability& quantity : observability.quantities) {
-    const ParameterInfo& info = find_parameter(quantity.name, prisms);
+    const ParameterInfo& info = find_parameter(quantity.name, shape);
     if (info.kind != ParameterKind::train) continue;
     const std::string unit = info.unit == "1" ? "" : " " + info.unit;
     const double sigma = quantity.sigma / info.si_per_unit;

@@ -15,7 +15,7 @@
 namespace risley::estimation {
 namespace {
 
-constexpr int kMostFree = parameter_count(kMaxPrisms);
+constexpr int kMostFree = kMaxParameters;
 
 /// Of N rotors, which may be Eigen::Dynamic.
 template <int N>

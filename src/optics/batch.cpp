@@ -25,7 +25,9 @@ struct Call {
   std::vector<double*> d_azimuth, d_zenith;
   std::vector<double> face_position;
 
-  Call(const PrismTrain& train, std::span<const std::span<const double>> rotation_angles) {
+  Call(const PrismTrain& train, std::span<const std::span<const double>> rotation_angles,
+       std::span<const std::uint8_t> beam) {
+    check_shape(train.shape());
     if (rotation_angles.size() != static_cast<std::size_t>(train.prisms())) {
       throw InvalidArgument(fmt::format("{} columns of rotation angles given for {} prisms",
                                         rotation_angles.size(), train.prisms()));
@@ -39,6 +41,9 @@ struct Call {
     arguments.parameters = train.parameters().data();
     arguments.face_order = train.face_order().data();
     arguments.prisms = train.prisms();
+    arguments.emitters = train.emitters();
+    check_beams(train, beam, arguments.shots);
+    if (!beam.empty()) arguments.beam = beam.data();
   }
 
   double* column(std::string_view name, std::span<double> values, bool required) const {
@@ -48,52 +53,25 @@ struct Call {
   }
 };
 
-void check_available(InstructionSet set) {
-  const auto& sets = available_instruction_sets();
-  if (std::find(sets.begin(), sets.end(), set) == sets.end()) {
-    throw InvalidArgument(
-        fmt::format("this processor or binary has no {} instructions", to_string(set)));
-  }
-}
-
 }  // namespace
 
-std::string to_string(InstructionSet set) {
-  switch (set) {
-    case InstructionSet::baseline:
-      return "baseline";
-    case InstructionSet::avx2:
-      return "avx2";
-    case InstructionSet::avx512:
-      return "avx512";
+void check_beams(const PrismTrain& train, std::span<const std::uint8_t> beam, std::size_t shots) {
+  if (beam.empty()) return;
+  if (beam.size() != shots) {
+    throw InvalidArgument(
+        fmt::format("column beam has {} values, expected {}", beam.size(), shots));
   }
-  return "baseline";
-}
-
-const std::vector<InstructionSet>& available_instruction_sets() {
-  static const std::vector<InstructionSet> sets = [] {
-    std::vector<InstructionSet> found{InstructionSet::baseline};
-#ifdef RISLEY_HAS_X86_KERNELS
-    __builtin_cpu_init();
-    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) {
-      found.push_back(InstructionSet::avx2);
-      if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&
-          __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512cd") &&
-          __builtin_cpu_supports("avx512vl")) {
-        found.push_back(InstructionSet::avx512);
-      }
-    }
-#endif
-    return found;
-  }();
-  return sets;
+  const auto most = std::max_element(beam.begin(), beam.end());
+  if (*most < train.emitters()) return;
+  throw InvalidArgument(fmt::format("beam = {} in row {}, allowed 0 to {}", *most,
+                                    most - beam.begin(), train.emitters() - 1));
 }
 
 std::size_t observe_batch(const PrismTrain& train,
                           std::span<const std::span<const double>> rotation_angles,
-                          const DirectionColumns& out, InstructionSet set) {
-  check_available(set);
-  Call call(train, rotation_angles);
+                          const DirectionColumns& out, std::span<const std::uint8_t> beam,
+                          InstructionSet set) {
+  Call call(train, rotation_angles, beam);
   BatchArguments& a = call.arguments;
   a.direction[0] = call.column("x", out.x, false);
   a.direction[1] = call.column("y", out.y, false);
@@ -107,29 +85,18 @@ std::size_t observe_batch(const PrismTrain& train,
     a.origin[1] = call.column("origin_y", out.origin_y, true);
     a.origin[2] = call.column("origin_z", out.origin_z, true);
   }
-#ifdef RISLEY_HAS_X86_KERNELS
-  if (set == InstructionSet::avx512) return kernel_avx512::observe(a);
-  if (set == InstructionSet::avx2) return kernel_avx2::observe(a);
-#endif
-  return kernel_baseline::observe(a);
-}
-
-std::size_t observe_batch(const PrismTrain& train,
-                          std::span<const std::span<const double>> rotation_angles,
-                          const DirectionColumns& out) {
-  return observe_batch(train, rotation_angles, out, available_instruction_sets().back());
+  return RISLEY_KERNEL_COPIES(observe).at(set)(a);
 }
 
 std::size_t linearise_batch(const PrismTrain& train,
                             std::span<const std::span<const double>> rotation_angles,
-                            const LinearisationColumns& out, InstructionSet set) {
-  check_available(set);
-  Call call(train, rotation_angles);
+                            const LinearisationColumns& out, std::span<const std::uint8_t> beam,
+                            InstructionSet set) {
+  Call call(train, rotation_angles, beam);
   BatchArguments& a = call.arguments;
   const auto gradient = [&](std::string_view name, const std::vector<std::span<double>>& columns,
                             std::vector<double*>& pointers) {
-    const auto expected =
-        static_cast<std::size_t>(parameter_count(train.prisms()) + train.prisms());
+    const auto expected = static_cast<std::size_t>(parameter_count(train.shape()) + train.prisms());
     if (columns.size() != expected) {
       throw InvalidArgument(
           fmt::format("{} has {} columns, expected {}", name, columns.size(), expected));
@@ -141,17 +108,7 @@ std::size_t linearise_batch(const PrismTrain& train,
   a.zenith = call.column("zenith", out.zenith, true);
   a.d_azimuth = gradient("d_azimuth", out.d_azimuth, call.d_azimuth);
   a.d_zenith = gradient("d_zenith", out.d_zenith, call.d_zenith);
-#ifdef RISLEY_HAS_X86_KERNELS
-  if (set == InstructionSet::avx512) return kernel_avx512::linearise(a);
-  if (set == InstructionSet::avx2) return kernel_avx2::linearise(a);
-#endif
-  return kernel_baseline::linearise(a);
-}
-
-std::size_t linearise_batch(const PrismTrain& train,
-                            std::span<const std::span<const double>> rotation_angles,
-                            const LinearisationColumns& out) {
-  return linearise_batch(train, rotation_angles, out, available_instruction_sets().back());
+  return RISLEY_KERNEL_COPIES(linearise).at(set)(a);
 }
 
 }  // namespace risley

@@ -1,19 +1,14 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-// Compiled once per instruction set with RISLEY_KERNEL = baseline, avx2, avx512. Every template
-// instantiated here carries the batch type of that instruction set in its name, so the linker
-// cannot take a wide copy for the rest of the program (tests/architecture checks it).
+// Compiled once per instruction set under the rules of risley/core/simd.hpp.
 #include "optics/batch_kernel.hpp"
 
 #include <array>
 
 #include "risley/core/simd.hpp"
 #include "risley/optics/beam_origin.hpp"
+#include "risley/optics/emitter_lanes.hpp"
 #include "risley/optics/observation_adjoint.hpp"
-
-#define RISLEY_JOIN2(a, b) a##b
-#define RISLEY_JOIN(a, b) RISLEY_JOIN2(a, b)
-#define RISLEY_KERNEL_NAMESPACE RISLEY_JOIN(kernel_, RISLEY_KERNEL)
 
 namespace risley::RISLEY_KERNEL_NAMESPACE {
 namespace {
@@ -78,13 +73,16 @@ std::array<FaceOrder, N> face_orders(const FaceOrder* order) {
 template <int N>
 std::size_t observe_shots(const BatchArguments& a) {
   const Inputs<N> inputs(a);
-  const auto train = prepare<Batch, N>(inputs.parameters, face_orders<N>(a.face_order));
+  EmitterLanes<Batch, N> emitters(a.parameters, a.emitters, a.beam);
+  auto train = prepare<Batch, N>(inputs.parameters, face_orders<N>(a.face_order));
   std::array<Batch, 2 * N> face_position;
   for (std::size_t i = 0; i < 2 * N; ++i) {
     face_position[i] = Batch(a.face_position ? a.face_position[i] : 0.0);
   }
   std::size_t invalid = 0;
   for (std::size_t shot = 0; shot < a.shots; shot += kLanes) {
+    emitters.select(shot, a.shots);
+    emitters.apply(train);
     Vector3<Batch> direction;
     if (a.face_position) {
       const auto forward = trace_forward(train, inputs.angles(shot));
@@ -110,13 +108,14 @@ std::size_t observe_shots(const BatchArguments& a) {
 }
 
 template <int N>
-void store_gradient(const Gradient<Batch, N>& gradient, double* const* columns, std::size_t shot,
-                    std::size_t shots) {
-  for (std::size_t i = 0; i < parameter_count(N); ++i) {
-    store(gradient.parameters[i], columns[i], shot, shots);
-  }
+void store_gradient(const BatchArguments& a, const EmitterLanes<Batch, N>& emitters,
+                    const Gradient<Batch, N>& gradient, double* const* columns, std::size_t shot) {
+  Batch storage[EmitterLanes<Batch, N>::kPlaces];
+  const Batch* by_place = emitters.by_place(gradient, storage);
+  const auto places = static_cast<std::size_t>(parameter_count(TrainShape{N, a.emitters}));
+  for (std::size_t i = 0; i < places; ++i) store(by_place[i], columns[i], shot, a.shots);
   for (std::size_t i = 0; i < N; ++i) {
-    store(gradient.rotation_angles[i], columns[parameter_count(N) + i], shot, shots);
+    store(gradient.rotation_angles[i], columns[places + i], shot, a.shots);
   }
 }
 
@@ -124,16 +123,20 @@ template <int N>
 std::size_t linearise_shots(const BatchArguments& a) {
   const Inputs<N> inputs(a);
   const auto order = face_orders<N>(a.face_order);
-  const auto train = prepare<Batch, N>(inputs.parameters, order);
-  const auto derivatives = prepare_derivatives<Batch, N>(inputs.parameters, order);
+  EmitterLanes<Batch, N> emitters(a.parameters, a.emitters, a.beam);
+  auto train = prepare<Batch, N>(inputs.parameters, order);
+  auto derivatives = prepare_derivatives<Batch, N>(inputs.parameters, order);
   std::size_t invalid = 0;
   for (std::size_t shot = 0; shot < a.shots; shot += kLanes) {
+    emitters.select(shot, a.shots);
+    emitters.apply(train);
+    emitters.apply(derivatives);
     const auto result = linearise_angles(train, derivatives, inputs.angles(shot));
     invalid += count_invalid(result.direction.x, shot, a.shots);
     store(result.angles.azimuth, a.azimuth, shot, a.shots);
     store(result.angles.zenith, a.zenith, shot, a.shots);
-    store_gradient<N>(result.azimuth, a.d_azimuth, shot, a.shots);
-    store_gradient<N>(result.zenith, a.d_zenith, shot, a.shots);
+    store_gradient<N>(a, emitters, result.azimuth, a.d_azimuth, shot);
+    store_gradient<N>(a, emitters, result.zenith, a.d_zenith, shot);
   }
   return invalid;
 }
@@ -141,29 +144,11 @@ std::size_t linearise_shots(const BatchArguments& a) {
 }  // namespace
 
 std::size_t observe(const BatchArguments& a) {
-  switch (a.prisms) {
-    case 1:
-      return observe_shots<1>(a);
-    case 2:
-      return observe_shots<2>(a);
-    case 3:
-      return observe_shots<3>(a);
-    default:
-      return observe_shots<4>(a);
-  }
+  return with_prism_count(a.prisms, [&]<int N>() { return observe_shots<N>(a); });
 }
 
 std::size_t linearise(const BatchArguments& a) {
-  switch (a.prisms) {
-    case 1:
-      return linearise_shots<1>(a);
-    case 2:
-      return linearise_shots<2>(a);
-    case 3:
-      return linearise_shots<3>(a);
-    default:
-      return linearise_shots<4>(a);
-  }
+  return with_prism_count(a.prisms, [&]<int N>() { return linearise_shots<N>(a); });
 }
 
 }  // namespace risley::RISLEY_KERNEL_NAMESPACE

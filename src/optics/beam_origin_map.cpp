@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <map>
 #include <span>
 #include <utility>
@@ -55,6 +56,19 @@ BeamOriginMap beam_origin_map(const PrismTrain& train, const PrismGeometry& geom
   out.origin_y = y;
   out.origin_z = z;
   out.geometry = geometry;
+  const auto add_beams = [&] {
+    for (std::size_t i = 0; i < steps; ++i) {
+      if (std::isnan(azimuth[i])) continue;
+      ++map.beams;
+      Extremes& e = cells[{std::lround(std::floor(azimuth[i] / cell)),
+                           std::lround(std::floor(zenith[i] / cell))}];
+      e.least_y = std::min(e.least_y, y[i]);
+      e.greatest_y = std::max(e.greatest_y, y[i]);
+      e.least_z = std::min(e.least_z, z[i]);
+      e.greatest_z = std::max(e.greatest_z, z[i]);
+    }
+  };
+  check_shape(train.shape());
   const std::vector<double> sequence = sequence_steps(prisms);
   const std::size_t rows = prisms == 1 ? 1 : steps;
   for (std::size_t row = 0; row < rows; ++row) {
@@ -73,16 +87,10 @@ BeamOriginMap beam_origin_map(const PrismTrain& train, const PrismGeometry& geom
       }
     }
     const std::vector<std::span<const double>> columns(angles.begin(), angles.end());
-    observe_batch(train, columns, out);
-    for (std::size_t i = 0; i < steps; ++i) {
-      if (std::isnan(azimuth[i])) continue;
-      ++map.beams;
-      Extremes& e = cells[{std::lround(std::floor(azimuth[i] / cell)),
-                           std::lround(std::floor(zenith[i] / cell))}];
-      e.least_y = std::min(e.least_y, y[i]);
-      e.greatest_y = std::max(e.greatest_y, y[i]);
-      e.least_z = std::min(e.least_z, z[i]);
-      e.greatest_z = std::max(e.greatest_z, z[i]);
+    for (int emitter = 0; emitter < train.emitters(); ++emitter) {
+      const std::vector<std::uint8_t> beam(steps, static_cast<std::uint8_t>(emitter));
+      observe_batch(train, columns, out, beam);
+      add_beams();
     }
   }
   for (const auto& [place, e] : cells) {

@@ -11,6 +11,7 @@
 #include <fmt/format.h>
 
 #include "risley/core/angle.hpp"
+#include "risley/core/error.hpp"
 #include "risley/core/golden_section.hpp"
 #include "risley/optics/observation_model.hpp"
 
@@ -29,8 +30,9 @@ constexpr int kSamples = 144;
 template <int N>
 class Gap {
  public:
-  Gap(const PrismTrain& train, std::span<const double> fixed_angles, const Vector& direction)
-      : train_(prepare<double, N>(parameter_array<N>(train), face_order_array<N>(train))),
+  Gap(const PrismTrain& train, int beam, std::span<const double> fixed_angles,
+      const Vector& direction)
+      : train_(prepare<double, N>(parameter_array<N>(train, beam), face_order_array<N>(train))),
         entering_(train_.incident),
         direction_(direction) {
     for (std::size_t prism = 0; prism + 2 < N; ++prism) {
@@ -126,9 +128,9 @@ double root_between(const Miss& miss, double a, double miss_a, double b, double 
 }
 
 template <int N>
-InverseSolution solve(const PrismTrain& train, const Vector& direction,
+InverseSolution solve(const PrismTrain& train, int beam, const Vector& direction,
                       std::span<const double> fixed_angles) {
-  const Gap<N> gap(train, fixed_angles, direction);
+  const Gap<N> gap(train, beam, fixed_angles, direction);
   if (!(gap.radius() > 1e-9)) {
     throw InvalidArgument(fmt::format(
         "prism {} does not deviate the beam, so every rotation angle of it is an answer", N - 1));
@@ -190,28 +192,26 @@ InverseSolution solve(const PrismTrain& train, const Vector& direction,
 }  // namespace
 
 InverseSolution rotation_angles_for(const PrismTrain& train, const Vector3<double>& direction,
-                                    std::span<const double> fixed_angles) {
+                                    std::span<const double> fixed_angles, int beam) {
   if (train.prisms() < 2) {
-    throw InvalidArgument("the inverse needs at least 2 prisms, the train has 1");
+    throw InvalidArgument(
+        fmt::format("the inverse needs at least 2 prisms, the train has {}", train.prisms()));
   }
   if (fixed_angles.size() != static_cast<std::size_t>(train.prisms() - 2)) {
     throw InvalidArgument(
         fmt::format("{} fixed rotation angles given, a train of {} prisms needs {}",
                     fixed_angles.size(), train.prisms(), train.prisms() - 2));
   }
+  check_beam(train, beam);
   const double length = norm(direction);
   if (!(std::abs(length - 1.0) < 1e-6)) {
     throw InvalidArgument(fmt::format("direction has length {}, expected a unit vector", length));
   }
   const Vector3<double> unit = normalized(direction);
-  switch (train.prisms()) {
-    case 2:
-      return solve<2>(train, unit, fixed_angles);
-    case 3:
-      return solve<3>(train, unit, fixed_angles);
-    default:
-      return solve<4>(train, unit, fixed_angles);
-  }
+  return with_prism_count(train.prisms(), [&]<int N>() -> InverseSolution {
+    if constexpr (N < 2) return {};  // refused above
+    if constexpr (N >= 2) return solve<N>(train, beam, unit, fixed_angles);
+  });
 }
 
 }  // namespace risley

@@ -7,20 +7,24 @@
 
 #include <fmt/format.h>
 
+#include "risley/core/error.hpp"
+
 namespace risley {
 
-Observation observe(const PrismTrain& train, std::span<const double> rotation_angles) {
+Observation observe(const PrismTrain& train, std::span<const double> rotation_angles, int beam) {
   if (rotation_angles.size() != static_cast<std::size_t>(train.prisms())) {
     throw InvalidArgument(fmt::format("{} rotation angles given for {} prisms",
                                       rotation_angles.size(), train.prisms()));
   }
+  check_beam(train, beam);
   return with_prism_count(train.prisms(), [&]<int N>() -> Observation {
-    const auto prepared = prepare<double, N>(parameter_array<N>(train), face_order_array<N>(train));
+    const auto prepared =
+        prepare<double, N>(parameter_array<N>(train, beam), face_order_array<N>(train));
     std::array<double, N> angles;
     std::copy_n(rotation_angles.begin(), N, angles.begin());
-    const Beam<double> beam = trace(prepared, angles);
-    const auto [azimuth, zenith] = angles_from_direction(beam.direction);
-    return {beam.direction, azimuth, zenith, beam.valid};
+    const Beam<double> emergent = trace(prepared, angles);
+    const auto [azimuth, zenith] = angles_from_direction(emergent.direction);
+    return {emergent.direction, azimuth, zenith, emergent.valid};
   });
 }
 

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cmath>
+#include <mutex>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -21,7 +22,8 @@ constexpr double kLargestError = radians_from_degrees(10.0);
 constexpr double kLargestWedge = radians_from_degrees(60.0);
 constexpr double kFastest = radians_from_degrees(1e6);
 
-std::vector<ParameterInfo> build_list(int prisms) {
+std::vector<ParameterInfo> build_list(const TrainShape& shape) {
+  const int prisms = shape.prisms;
   std::vector<ParameterInfo> list;
   const auto add = [&](std::string name, std::string words, std::string symbol, const char* unit,
                        double si, double lower, double upper, std::vector<int> places) {
@@ -44,10 +46,21 @@ std::vector<ParameterInfo> build_list(int prisms) {
       every_index);
   add("wedge_angle_deg", "wedge angle of all prisms", "α", "deg", kRadiansPerDegree, 0.0,
       kLargestWedge, every_wedge);
-  add_error("incident_beam_horizontal", "horizontal incident beam direction error", "Δφ_L0",
-            place::incident_beam_horizontal());
-  add_error("incident_beam_vertical", "vertical incident beam direction error", "Δθ_L0",
-            place::incident_beam_vertical());
+  if (shape.emitters == 1) {
+    add_error("incident_beam_horizontal", "horizontal incident beam direction error", "Δφ_L0",
+              place::incident_beam_horizontal());
+    add_error("incident_beam_vertical", "vertical incident beam direction error", "Δθ_L0",
+              place::incident_beam_vertical());
+  } else {
+    for (int i = 0; i < shape.emitters; ++i) {
+      add_error(fmt::format("incident_beam_{}_horizontal", i + 1),
+                fmt::format("horizontal beam direction of emitter {}", i + 1),
+                fmt::format("φ_L{}", i + 1), place::incident_beam_horizontal(i, prisms));
+      add_error(fmt::format("incident_beam_{}_vertical", i + 1),
+                fmt::format("vertical beam direction of emitter {}", i + 1),
+                fmt::format("θ_L{}", i + 1), place::incident_beam_vertical(i, prisms));
+    }
+  }
   for (int i = 0; i < prisms; ++i) {
     const char letter = prism_letter(i);
     const char capital = static_cast<char>(letter - 'a' + 'A');
@@ -104,21 +117,29 @@ std::vector<ParameterInfo> build_list(int prisms) {
 
 }  // namespace
 
-const std::vector<ParameterInfo>& parameter_list(int prisms) {
-  static const std::array<std::vector<ParameterInfo>, kMaxPrisms> lists = [] {
-    std::array<std::vector<ParameterInfo>, kMaxPrisms> built;
-    for (int n = 1; n <= kMaxPrisms; ++n) built[static_cast<std::size_t>(n - 1)] = build_list(n);
-    return built;
-  }();
-  if (prisms < 1 || prisms > kMaxPrisms) {
+void check_shape(const TrainShape& shape) {
+  if (shape.prisms < 1 || shape.prisms > kMaxPrisms) refuse_prism_count(shape.prisms);
+  if (shape.emitters < 1 || shape.emitters > kMaxEmitters) {
     throw InvalidArgument(
-        fmt::format("number of prisms = {}, allowed 1 to {}", prisms, kMaxPrisms));
+        fmt::format("number of emitters = {}, allowed 1 to {}", shape.emitters, kMaxEmitters));
   }
-  return lists[static_cast<std::size_t>(prisms - 1)];
 }
 
-const ParameterInfo& find_parameter(std::string_view name, int prisms) {
-  const auto& list = parameter_list(prisms);
+const std::vector<ParameterInfo>& parameter_list(const TrainShape& shape) {
+  struct Entry {
+    std::once_flag built;
+    std::vector<ParameterInfo> list;
+  };
+  static std::array<Entry, std::size_t{kMaxPrisms} * kMaxEmitters> entries;
+  check_shape(shape);
+  Entry& entry =
+      entries[static_cast<std::size_t>((shape.prisms - 1) * kMaxEmitters + shape.emitters - 1)];
+  std::call_once(entry.built, [&] { entry.list = build_list(shape); });
+  return entry.list;
+}
+
+const ParameterInfo& find_parameter(std::string_view name, const TrainShape& shape) {
+  const auto& list = parameter_list(shape);
   for (const auto& parameter : list) {
     if (parameter.name == name) return parameter;
   }

@@ -8,6 +8,10 @@
 
 namespace risley {
 
+void refuse_prism_count(int prisms) {
+  throw InvalidArgument(fmt::format("number of prisms = {}, allowed 1 to {}", prisms, kMaxPrisms));
+}
+
 std::vector<FaceOrder> parse_face_order(std::string_view text) {
   const auto fail = [&] {
     return InvalidArgument(fmt::format(

@@ -5,12 +5,13 @@
 #include <fmt/format.h>
 
 #include "risley/core/angle.hpp"
+#include "risley/core/error.hpp"
 
 namespace risley {
 namespace {
 
-const ParameterInfo& find_train_parameter(std::string_view name, int prisms) {
-  const ParameterInfo& parameter = find_parameter(name, prisms);
+const ParameterInfo& find_train_parameter(std::string_view name, const TrainShape& shape) {
+  const ParameterInfo& parameter = find_parameter(name, shape);
   if (parameter.kind != ParameterKind::train) {
     throw InvalidArgument(fmt::format("{} is not a parameter of the prisms", name));
   }
@@ -19,32 +20,46 @@ const ParameterInfo& find_train_parameter(std::string_view name, int prisms) {
 
 }  // namespace
 
-PrismTrain::PrismTrain(std::vector<FaceOrder> face_order) : face_order_(std::move(face_order)) {
-  parameter_list(prisms());  // checks the number of prisms
-  parameters_.assign(static_cast<std::size_t>(parameter_count(prisms())), 0.0);
+PrismTrain::PrismTrain(std::vector<FaceOrder> face_order, int emitters)
+    : face_order_(std::move(face_order)), emitters_(emitters) {
+  check_shape(shape());
+  parameters_.assign(static_cast<std::size_t>(parameter_count(shape())), 0.0);
   set("refractive_index_air", 1.0);
   set("refractive_index", 1.51);
   set("wedge_angle_deg", radians_from_degrees(18.0));
 }
 
 double PrismTrain::get(std::string_view name) const {
-  return (*this)[find_train_parameter(name, prisms()).places.front()];
+  return (*this)[find_train_parameter(name, shape()).places.front()];
 }
 
 void PrismTrain::set(std::string_view name, double value) {
-  const ParameterInfo& parameter = find_train_parameter(name, prisms());
+  const ParameterInfo& parameter = find_train_parameter(name, shape());
   check_bounds(parameter, value);
   for (const int at : parameter.places) set_place(at, value);
 }
 
 PrismTrain PrismTrain::without_errors() const {
-  PrismTrain ideal(face_order_);
+  PrismTrain ideal(face_order_, emitters_);
   ideal.set_place(place::refractive_index_air(), (*this)[place::refractive_index_air()]);
   for (int i = 0; i < prisms(); ++i) {
     ideal.set_place(place::refractive_index(i), (*this)[place::refractive_index(i)]);
     ideal.set_place(place::wedge_angle(i), (*this)[place::wedge_angle(i)]);
   }
+  if (emitters_ > 1) {
+    for (int i = 0; i < emitters_; ++i) {
+      for (const int at : {place::incident_beam_horizontal(i, prisms()),
+                           place::incident_beam_vertical(i, prisms())}) {
+        ideal.set_place(at, (*this)[at]);
+      }
+    }
+  }
   return ideal;
+}
+
+void check_beam(const PrismTrain& train, int beam) {
+  if (beam >= 0 && beam < train.emitters()) return;
+  throw InvalidArgument(fmt::format("beam = {}, allowed 0 to {}", beam, train.emitters() - 1));
 }
 
 }  // namespace risley

@@ -48,6 +48,16 @@ std::vector<double> difference(const std::vector<double>& greatest,
   return result;
 }
 
+/// Sizes of prisms in beam order.
+std::string millimetres_text(const std::vector<double>& sizes) {
+  if (sizes.empty()) return "0";
+  std::string text;
+  for (const double size : sizes) {
+    text += fmt::format("{}{}", text.empty() ? "" : ", ", kMillimetres * size);
+  }
+  return text;
+}
+
 }  // namespace
 
 std::string beam_origin_page(const BeamOriginMap& map, const sensors::Sensor& sensor,
@@ -56,8 +66,8 @@ std::string beam_origin_page(const BeamOriginMap& map, const sensors::Sensor& se
   std::string body = fmt::format(
       "<p>Prisms {} mm thick with perpendicular faces {} mm apart shift the beam sideways. {} "
       "beams, cells of {} degree.</p>\n",
-      kMillimetres * sensor.prism_thickness, kMillimetres * sensor.prism_spacing, map.beams,
-      degrees_from_radians(map.cell));
+      millimetres_text(sensor.geometry.thickness), millimetres_text(sensor.geometry.spacing),
+      map.beams, degrees_from_radians(map.cell));
   if (map.size() > 0) {
     body += "<h2>Horizontal (Y)</h2>\n";
     body += charts_html(

@@ -126,7 +126,7 @@ std::string to_place_of(double value, double sigma) {
 }
 
 std::string parameter_row(const CalibrationReport& r, const ReportedParameter& row) {
-  const ParameterInfo& info = find_parameter(row.name, r.prisms);
+  const ParameterInfo& info = find_parameter(row.name, r.shape());
   const double scale = 1.0 / info.si_per_unit;
   const double value = scale * row.value, sigma = scale * row.sigma;
   std::string html = fmt::format(
@@ -327,7 +327,7 @@ std::string calibration_page(const CalibrationReport& r) {
   body += r.thickness_charts.empty() ? kNothingToDraw : charts_html(r.thickness_charts, figures);
   body += "<h2>What was taken for a wall</h2>\n";
   body += r.view_charts.empty() ? kNothingToDraw : charts_html(r.view_charts, figures);
-  body += correlation_html(r.free, r.covariance, r.prisms);
+  body += correlation_html(r.free, r.covariance, r.shape());
   body += time_audit_html(r.recordings);
   body += provenance_html(r.provenance);
   std::string title = "risley calibrate";

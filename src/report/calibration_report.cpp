@@ -485,6 +485,7 @@ CalibrationReport calibration_report(const CalibrationReportInput& input) {
   report.serial = c.sensor.serial;
   report.preset = input.nominal.name;
   report.prisms = c.sensor.prisms();
+  report.emitters = c.sensor.train.emitters();
   report.method = c.method;
   report.converged = c.converged;
   report.reason = c.reason;

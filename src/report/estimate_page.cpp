@@ -80,7 +80,7 @@ std::string parameters_html(const EstimateReport& r) {
   if (r.truth) html += "<th>truth</th><th>error</th><th>error / σ</th>";
   html += "</tr></thead><tbody>\n";
   for (const ReportedParameter& row : r.parameters) {
-    const ParameterInfo& info = find_parameter(row.name, r.prisms);
+    const ParameterInfo& info = find_parameter(row.name, r.shape());
     const double scale = 1.0 / info.si_per_unit, sigma = row.sigma * scale;
     const NumberText shown = number_text(row.value * scale, sigma);
     html += fmt::format("<tr>{}<td>{}</td><td>{}</td><td>{}</td>", parameter_head(info),
@@ -207,7 +207,7 @@ std::string estimate_page(const EstimateReport& r) {
   body += "<h2>Residuals</h2>\n" + moments_html(r) + variance_html(r) +
           charts_html(r.residual_charts, figures);
   body += "<h2>Scan pattern</h2>\n" + charts_html(r.pattern_charts, figures);
-  body += correlation_html(r.free, r.covariance, r.prisms);
+  body += correlation_html(r.free, r.covariance, r.shape());
   body += time_audit_html({r.recording});
   body += provenance_html(r.provenance);
   return page_html("risley estimate: " + r.recording.name, subject_text(r), body, figures);

@@ -57,7 +57,7 @@ std::vector<ReportedParameter> parameters_of(const EstimateReportInput& input) {
     row.name = value.name;
     row.value = value.value;
     row.sigma = value.sigma;
-    row.nominal = nominal_value(input, find_parameter(value.name, e.sensor.prisms()));
+    row.nominal = nominal_value(input, find_parameter(value.name, e.sensor.shape()));
     if (input.evaluation) {
       const auto& all = input.evaluation->parameters;
       const auto found = std::find_if(all.begin(), all.end(),
@@ -87,7 +87,7 @@ class EstimateCharts {
     const Estimate& e = input_.estimate;
     std::vector<Chart> charts;
     for (std::size_t k = 0; k < e.free.size() && pieces.size() > 0; ++k) {
-      const ParameterInfo& info = find_parameter(e.free[k].name, e.sensor.prisms());
+      const ParameterInfo& info = find_parameter(e.free[k].name, e.sensor.shape());
       const double scale = 1.0 / info.si_per_unit;
       const double all = e.parameters[static_cast<Eigen::Index>(k)];
       Series points{"pieces", "a", SeriesKind::points, {}, {}};
@@ -416,7 +416,8 @@ EstimateReport estimate_report(const EstimateReportInput& input) {
   report.recording = input.recording;
   report.sensor = e.sensor.name;
   report.prisms = e.sensor.prisms();
-  report.combination = e.sensor.combination ? static_cast<int>(*e.sensor.combination) : 0;
+  report.emitters = e.sensor.train.emitters();
+  report.combination = e.sensor.combination.value_or(0);
   report.mirrored = e.mirrored;
   report.method = e.map ? "map" : "ekf";
   report.converged = e.converged;
@@ -451,7 +452,7 @@ EstimateReport estimate_report(const EstimateReportInput& input) {
     report.variance = {e.map->unit_variance, e.map->autocorrelation.factor, e.map->variance_factor};
     if (e.converged) {
       report.advice =
-          estimation::observability_words(estimation::observability_of_estimate(e), report.prisms);
+          estimation::observability_words(estimation::observability_of_estimate(e), report.shape());
       const auto pieces = estimation::estimate_piecewise(e, input.nominal, kPieces);
       report.pieces = {pieces.size(), pieces.failed, pieces.duration, pieces.chi2,
                        pieces.degrees_of_freedom};

@@ -59,14 +59,14 @@ std::string verdict_html(const Verdict& verdict) {
 }
 
 std::string correlation_html(const std::vector<std::string>& free,
-                             const Eigen::MatrixXd& covariance, int prisms) {
+                             const Eigen::MatrixXd& covariance, const TrainShape& shape) {
   if (free.empty()) return "";
   std::string html =
       "<h2>Correlations of the parameters</h2>\n<div class=\"wide\">"
       "<table class=\"heat\"><thead><tr><th></th>";
   std::vector<const ParameterInfo*> infos;
   for (const std::string& name : free) {
-    infos.push_back(&find_parameter(name, prisms));
+    infos.push_back(&find_parameter(name, shape));
     html += fmt::format("<th scope=\"col\">{}</th>", symbol_html(infos.back()->symbol));
   }
   html += "</tr></thead><tbody>\n";

@@ -225,6 +225,7 @@ void fields(Archive& archive, T& report) {
   archive("recording", report.recording);
   archive("sensor", report.sensor);
   archive("prisms", report.prisms);
+  archive("emitters", report.emitters);
   archive("combination", report.combination);
   archive("mirrored", report.mirrored);
   archive("method", report.method);
@@ -268,6 +269,7 @@ void fields(Archive& archive, T& report) {
   archive("serial", report.serial);
   archive("preset", report.preset);
   archive("prisms", report.prisms);
+  archive("emitters", report.emitters);
   archive("method", report.method);
   archive("converged", report.converged);
   archive("reason", report.reason);

@@ -46,7 +46,7 @@ Table table_a1(const ReproduceOptions& options) {
   for (const PapersBeam& beam : kBeams) {
     const std::array angles{radians_from_degrees(printed(beam.rotation_angle_a).value),
                             radians_from_degrees(printed(beam.rotation_angle_b).value)};
-    const Ray ray = emergent_ray(ideal, options.type.prism_geometry(), angles);
+    const Ray ray = emergent_ray(ideal, options.type.geometry, angles);
     const SphericalAngles<double> direction = angles_from_direction(ray.direction);
     const std::string name = beam.name;
     table.rows.push_back(at_digits(name + ", azimuth", "deg", beam.azimuth,
@@ -123,8 +123,8 @@ Table figure_a1(const BeamOriginMap& map) {
 }  // namespace
 
 Reproduction beam_origin_errors(const ReproduceOptions& options) {
-  const BeamOriginMap map = beam_origin_map(options.type.train.without_errors(),
-                                            options.type.prism_geometry(), kSteps, kMapCell);
+  const BeamOriginMap map =
+      beam_origin_map(options.type.train.without_errors(), options.type.geometry, kSteps, kMapCell);
   Figure figure{"figure_a1", "figure_a1", "Fig. A1: corrections over the field of view", {}};
   figure.charts = {map_chart(map, "(a) least Y", map.least_y),
                    map_chart(map, "(b) greatest Y", map.greatest_y),

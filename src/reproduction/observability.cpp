@@ -114,7 +114,7 @@ Reproduction observability(const ReproduceOptions& options, const Progress& prog
   plan.duration = 30;
   plan.rate = 1000;
   plan.angle_noise = options.angle_noise;
-  plan.free = estimation::free_parameters(estimation::default_free_names(2), 2);
+  plan.free = estimation::free_parameters(estimation::default_free_names({2}), {2});
   const Observability all = estimation::observability_of_plan(plan);
 
   Row angle{"correlation of A's horizontal tilt with A's rotation angle", "1", printed("-0.99"),
@@ -190,7 +190,7 @@ Reproduction observability(const ReproduceOptions& options, const Progress& prog
 
   for (const PapersParameter& papers : kPapersUnit) {
     const Printed stated = printed(papers.sigma);
-    const ParameterInfo& info = find_parameter(papers.name, 2);
+    const ParameterInfo& info = find_parameter(papers.name, {2});
     Row row{"sigma that 30 s at 1 kHz allow: " + info.long_name, info.unit, stated,
             quantity(all, papers.name).sigma / info.si_per_unit};
     row.checks = {

@@ -94,7 +94,7 @@ const estimation::EstimatedValue& value_of(const estimation::Estimate& estimate,
   return *found;
 }
 
-double si_per_unit(const std::string& name) { return find_parameter(name, 2).si_per_unit; }
+double si_per_unit(const std::string& name) { return find_parameter(name, {2}).si_per_unit; }
 
 double mean_of(const std::vector<double>& values) {
   double sum = 0;

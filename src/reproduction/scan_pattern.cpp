@@ -219,7 +219,7 @@ Reproduction specifications(const ReproduceOptions& options) {
                               "prism_tilt_b_horizontal_deg",
                               "prism_tilt_b_vertical_deg"};
   double known = 0;
-  for (const ParameterInfo& info : parameter_list(2)) {
+  for (const ParameterInfo& info : parameter_list({2})) {
     known += std::find(kNames.begin(), kNames.end(), info.name) != kNames.end();
   }
   Row count{"parameters of the model that the library knows by name", "1", printed("13"), known};

@@ -95,7 +95,7 @@ std::map<std::string, double> bounds(const ReproduceOptions& options, double rat
   plan.duration = 30.0;
   plan.rate = rate;
   plan.angle_noise = radians_from_degrees(printed(kPapersNoise).value);
-  plan.free = estimation::free_parameters(estimation::default_free_names(2), 2);
+  plan.free = estimation::free_parameters(estimation::default_free_names({2}), {2});
   std::map<std::string, double> result;
   for (const auto& quantity : estimation::observability_of_plan(plan).quantities) {
     result[quantity.name] = quantity.sigma / si_per_unit(quantity.name);
@@ -111,7 +111,7 @@ Table table_of(const ReproduceOptions& options, const std::vector<UnitDraw>& dra
   const auto count = static_cast<double>(draws.size());
   for (const PapersParameter& papers : kPapersUnit) {
     const std::string key = papers.name;
-    const ParameterInfo& info = find_parameter(key, 2);
+    const ParameterInfo& info = find_parameter(key, {2});
     const Printed known = printed(papers.known), papers_sigma = printed(papers.sigma);
     Row row{info.long_name, info.unit, printed(papers.estimated),
             mean_of(column(draws, [&](const UnitDraw& draw) { return draw.value.at(key); }))};
@@ -136,7 +136,7 @@ Table table_of(const ReproduceOptions& options, const std::vector<UnitDraw>& dra
   for (std::size_t k = 0; k < 2; ++k) {
     const std::string key = kPapersSpeeds[k].name;
     const Printed paper = printed(kPapersSpeeds[k].estimated);
-    Row row{find_parameter(key, 2).long_name, "deg/s", paper,
+    Row row{find_parameter(key, {2}).long_name, "deg/s", paper,
             mean_of(column(draws, [&](const UnitDraw& draw) { return draw.value.at(key); }))};
     row.sigma =
         root_mean_square(column(draws, [&](const UnitDraw& draw) { return draw.sigma.at(key); }));

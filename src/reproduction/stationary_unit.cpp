@@ -147,8 +147,8 @@ void add_parameters(Table& table, const Estimate& estimate,
     const PapersParameter& papers = kPapersUnit[j];
     const std::string name = papers.name;
     const auto& value = value_of(estimate, name);
-    Row row{fmt::format("all shots: mean of the {} (Fig. 7)", find_parameter(name, 2).long_name),
-            find_parameter(name, 2).unit, printed(papers.known), value.value / si_per_unit(name)};
+    Row row{fmt::format("all shots: mean of the {} (Fig. 7)", find_parameter(name, {2}).long_name),
+            find_parameter(name, {2}).unit, printed(papers.known), value.value / si_per_unit(name)};
     row.sigma = value.sigma / si_per_unit(name);
     row.checks = {at_printed_digits(*row.paper, row.ours)};
     row.note = fmt::format("Estimated from every second alone: standard deviation {:.2g}.",
@@ -236,7 +236,7 @@ Reproduction simulated(const ReproduceOptions& options, const Progress& progress
                     "Fig. 7: sample distributions of the parameters, each second estimated alone",
                     {}};
   for (std::size_t j = 0; j < std::size(kPapersUnit); ++j) {
-    const ParameterInfo& info = find_parameter(kPapersUnit[j].name, 2);
+    const ParameterInfo& info = find_parameter(kPapersUnit[j].name, {2});
     parameters.charts.push_back(
         histogram_chart(info.long_name, info.unit == "1" ? "value" : info.unit, pieces[j]));
   }

@@ -18,8 +18,6 @@
 namespace risley::reproduction {
 namespace {
 
-using sensors::SpeedCombination;
-
 /// Zenith where the ideal beam is bent most, over all pairs of rotation angles.
 double largest_zenith(const PrismTrain& train) {
   constexpr int kSteps = 721;
@@ -41,14 +39,13 @@ Row at_digits(const char* term, const char* unit, const char* paper, double ours
 }
 
 /// One second of a sensor in a combination, estimated from a sensor in the other one.
-Row recognised(const ReproduceOptions& options, SpeedCombination combination, std::uint64_t draw) {
+Row recognised(const ReproduceOptions& options, int combination, std::uint64_t draw) {
   simulation::SimulationSettings settings = unit_settings(options, draw);
   settings.truth = sensors::with_combination(options.unit, combination);
   settings.duration = 1.0;
   settings.rate = 10000.0;
-  const bool first = combination == SpeedCombination::first;
-  const sensors::Sensor other = sensors::with_combination(
-      options.type, first ? SpeedCombination::second : SpeedCombination::first);
+  const bool first = combination == 1;
+  const sensors::Sensor other = sensors::with_combination(options.type, first ? 2 : 1);
   const estimation::Estimate estimate =
       estimate_run(estimation::Method::map, simulate(settings), other, options.angle_noise);
   Row row{fmt::format("combination {} recognised from 1 s of directions", first ? 1 : 2), "1",
@@ -94,8 +91,8 @@ Reproduction zero_position(const ReproduceOptions& options) {
   const auto speed = [&](const sensors::Sensor& sensor, int prism) {
     return degrees_from_radians(sensor.angular_velocity[static_cast<std::size_t>(prism)]);
   };
-  const sensors::Sensor first = sensors::with_combination(options.type, SpeedCombination::first);
-  const sensors::Sensor second = sensors::with_combination(options.type, SpeedCombination::second);
+  const sensors::Sensor first = sensors::with_combination(options.type, 1);
+  const sensors::Sensor second = sensors::with_combination(options.type, 2);
   constexpr double kPerRpm = 6.0;  // deg/s
   table.rows.push_back(
       at_digits("speed of prism A, combination 1", "rpm", "-4,664", speed(first, 0) / kPerRpm));
@@ -113,8 +110,8 @@ Reproduction zero_position(const ReproduceOptions& options) {
                                  options.type.get("refractive_index")));
   table.rows.push_back(at_digits("wedge angle (section 2.3)", "deg", "18",
                                  degrees_from_radians(options.type.get("wedge_angle_deg"))));
-  table.rows.push_back(recognised(options, SpeedCombination::first, 900001));
-  table.rows.push_back(recognised(options, SpeedCombination::second, 900002));
+  table.rows.push_back(recognised(options, 1, 900001));
+  table.rows.push_back(recognised(options, 2, 900002));
   return {{table}, {}};
 }
 

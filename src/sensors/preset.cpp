@@ -110,8 +110,6 @@ constexpr std::array kSpecifications{
                   &Sensor::beam_divergence_horizontal, 0, 90},
     Specification{"beam", "beam_divergence_vertical_deg", "deg", &Sensor::beam_divergence_vertical,
                   0, 90},
-    Specification{"geometry", "prism_thickness_m", "m", &Sensor::prism_thickness, 0, 1},
-    Specification{"geometry", "prism_spacing_m", "m", &Sensor::prism_spacing, 0, 10},
 };
 
 /// Section names in file order.
@@ -124,8 +122,8 @@ std::vector<std::string_view> section_names() {
 }
 
 /// The unit of a value that a covariance can name. @throws InvalidArgument for other names
-std::string_view unit_of(const std::string& name, int prisms) {
-  return name == "range_offset_m" ? "m" : std::string_view(find_parameter(name, prisms).unit);
+std::string_view unit_of(const std::string& name, const TrainShape& shape) {
+  return name == "range_offset_m" ? "m" : std::string_view(find_parameter(name, shape).unit);
 }
 
 /// A value of the file with its line.
@@ -158,8 +156,8 @@ Quantity read_quantity(const YamlMap& parent, std::string_view name, std::string
 }
 
 void read_parameters(const YamlMap& map, Sensor& sensor) {
-  const auto& list = parameter_list(sensor.prisms());
-  std::vector<const std::string*> owner(static_cast<std::size_t>(parameter_count(sensor.prisms())),
+  const auto& list = parameter_list(sensor.shape());
+  std::vector<const std::string*> owner(static_cast<std::size_t>(parameter_count(sensor.shape())),
                                         nullptr);
   std::vector<bool> has_speed(static_cast<std::size_t>(sensor.prisms()), false);
   for (const YamlMap::Entry& entry : map.entries()) {
@@ -167,10 +165,11 @@ void read_parameters(const YamlMap& map, Sensor& sensor) {
       return info.name == entry.key && info.kind != ParameterKind::rotation_angle;
     });
     if (found == list.end()) {
-      fail_at(
-          map.path(), entry.line,
-          fmt::format("unknown parameter {} of a sensor with {} prisms (face_order {})",
-                      map.field(entry.key), sensor.prisms(), to_string(sensor.train.face_order())));
+      fail_at(map.path(), entry.line,
+              fmt::format(
+                  "unknown parameter {} of a sensor with {} prisms (face_order {}) and {} emitters",
+                  map.field(entry.key), sensor.prisms(), to_string(sensor.train.face_order()),
+                  sensor.train.emitters()));
     }
     const Quantity quantity = read_quantity(map, entry.key, found->unit, sensor);
     double value = si_from_file(quantity.value, scale_of(found->unit));
@@ -242,6 +241,119 @@ void read_specifications(const YamlMap& root, Sensor& sensor) {
   }
 }
 
+/// Largest thickness and spacing of prisms, m.
+constexpr long double kThickest = 1, kWidest = 10;
+
+/// Sizes of the prisms, each kind under its shared name or under the prisms' own.
+void read_geometry(const YamlMap& root, Sensor& sensor) {
+  const YamlMap map(root.at("geometry").value, root.path(), "geometry");
+  const auto own = own_prism_sizes(sensor.prisms());
+  std::vector<std::string> read;
+  for (const PrismSize& shared : shared_prism_sizes()) {
+    const bool is_thickness = !shared.rate.thickness.empty();
+    std::vector<double>& values =
+        is_thickness ? sensor.geometry.thickness : sensor.geometry.spacing;
+    const auto take = [&](const std::string& name) {
+      const Quantity quantity = read_quantity(map, name, "m", sensor);
+      const long double upper = is_thickness ? kThickest : kWidest;
+      if (!(quantity.value >= 0 && quantity.value <= upper)) {
+        fail_at(
+            map.path(), quantity.line,
+            fmt::format("{} = {:g} m, allowed 0 to {:g}", map.field(name), quantity.value, upper));
+      }
+      values.push_back(static_cast<double>(quantity.value));
+      read.push_back(name);
+    };
+    const bool own_names =
+        map.find(shared.name) == nullptr &&
+        std::any_of(own.begin(), own.end(), [&](const PrismSize& size) {
+          return size.rate.thickness.empty() != is_thickness && map.find(size.name) != nullptr;
+        });
+    if (!own_names) {
+      take(shared.name);
+      continue;
+    }
+    for (const PrismSize& size : own) {
+      if (size.rate.thickness.empty() != is_thickness) take(size.name);
+    }
+  }
+  for (const YamlMap::Entry& entry : map.entries()) {
+    if (std::find(read.begin(), read.end(), entry.key) == read.end()) {
+      fail_at(map.path(), entry.line,
+              fmt::format("{}: unknown, or said again by the value of all prisms",
+                          map.field(entry.key)));
+    }
+  }
+}
+
+/// combination, the number of the one that the sensor is in, and combinations, a list of
+/// {angular_velocity_deg_per_s: [one per prism], face_order}; the latter may be missing.
+void read_combinations(const YamlMap& root, Sensor& sensor) {
+  if (root.find("combination") == nullptr) {
+    if (root.find("combinations") != nullptr) {
+      fail_at(root.path(), root.at("combinations").line,
+              "combinations: combination must say which of them the parameters are of");
+    }
+    return;
+  }
+  if (root.find("combinations") == nullptr) {
+    if (sensor.prisms() != 2) {
+      fail_at(root.path(), root.at("combination").line,
+              fmt::format("combination without a list of combinations is for sensors with 2 "
+                          "prisms, this one has {}",
+                          sensor.prisms()));
+    }
+    sensor.combination = root.integer("combination", 1, 2);
+    return;
+  }
+  const YamlMap::Entry& list = root.at("combinations");
+  constexpr std::size_t kMost = 16;
+  if (!list.value.IsSequence() || list.value.size() < 1 || list.value.size() > kMost) {
+    fail_at(root.path(), list.line,
+            fmt::format("combinations: expected a list of 1 to {} combinations", kMost));
+  }
+  for (const auto& node : list.value) {
+    const std::string field = fmt::format("combinations[{}]", sensor.combinations.size());
+    const YamlMap map(node, root.path(), field);
+    map.allow_only({"angular_velocity_deg_per_s", "face_order"});
+    const YamlMap::Entry& speeds = map.at("angular_velocity_deg_per_s");
+    const auto prisms = static_cast<std::size_t>(sensor.prisms());
+    if (!speeds.value.IsSequence() || speeds.value.size() != prisms) {
+      fail_at(map.path(), speeds.line,
+              fmt::format("{}: expected {} numbers, one per prism",
+                          map.field("angular_velocity_deg_per_s"), prisms));
+    }
+    SpeedCombination combination;
+    for (std::size_t k = 0; k < prisms; ++k) {
+      const std::string name =
+          fmt::format("angular_velocity_{}_deg_per_s", prism_letter(static_cast<int>(k)));
+      const ParameterInfo& info = find_parameter(name, sensor.shape());
+      const double speed = si_from_file(
+          yaml_number(speeds.value[k], map.path(), map.field("angular_velocity_deg_per_s")),
+          scale_of(info.unit));
+      try {
+        check_bounds(info, speed);
+      } catch (const InvalidArgument& error) {
+        fail_at(map.path(), speeds.line, fmt::format("{}: {}", field, error.what()));
+      }
+      combination.angular_velocity.push_back(speed);
+    }
+    if (map.find("face_order") != nullptr) {
+      try {
+        combination.face_order = parse_face_order(map.text("face_order"));
+      } catch (const InvalidArgument& error) {
+        fail_at(map.path(), map.at("face_order").line, fmt::format("{}: {}", field, error.what()));
+      }
+      if (combination.face_order.size() != prisms) {
+        fail_at(map.path(), map.at("face_order").line,
+                fmt::format("{}: expected {} prisms", map.field("face_order"), prisms));
+      }
+    }
+    sensor.combinations.push_back(std::move(combination));
+  }
+  sensor.combination = root.integer("combination", 1, static_cast<int>(sensor.combinations.size()));
+}
+
 void read_covariance(const YamlMap& root, Sensor& sensor) {
   const YamlMap map(root.at("covariance").value, root.path(), "covariance");
   map.allow_only({"names", "matrix"});
@@ -253,7 +365,7 @@ void read_covariance(const YamlMap& root, Sensor& sensor) {
   for (const auto& node : names.value) {
     const std::string name = yaml_text(node, map.path(), "covariance.names");
     try {
-      scale.push_back(scale_of(unit_of(name, sensor.prisms())));
+      scale.push_back(scale_of(unit_of(name, sensor.shape())));
     } catch (const InvalidArgument& error) {
       fail_at(map.path(), yaml_line(node), fmt::format("covariance.names: {}", error.what()));
     }
@@ -332,7 +444,7 @@ std::string quantity_text(const Sensor& sensor, std::string_view name, double va
 
 std::string parameters_text(const Sensor& sensor) {
   std::string text = "parameters:\n";
-  const auto& list = parameter_list(sensor.prisms());
+  const auto& list = parameter_list(sensor.shape());
   const auto own_of = [&](const ParameterInfo& shared) {
     std::vector<const ParameterInfo*> own;
     if (shared.kind != ParameterKind::train) return own;
@@ -372,6 +484,45 @@ std::string parameters_text(const Sensor& sensor) {
   return text;
 }
 
+std::string combinations_text(const Sensor& sensor) {
+  std::string text = "combinations:\n";
+  const long double scale = scale_of("deg/s");
+  for (const SpeedCombination& combination : sensor.combinations) {
+    std::vector<std::string> speeds;
+    for (const double speed : combination.angular_velocity) {
+      speeds.push_back(file_number(speed, scale, "combinations"));
+    }
+    text += fmt::format("  - {{angular_velocity_deg_per_s: [{}]", fmt::join(speeds, ", "));
+    if (!combination.face_order.empty()) {
+      text += fmt::format(", face_order: {}", to_string(combination.face_order));
+    }
+    text += "}\n";
+  }
+  return text;
+}
+
+std::string geometry_text(const Sensor& sensor) {
+  std::string text = "geometry:\n";
+  const auto own = own_prism_sizes(sensor.prisms());
+  face_positions(sensor.train.face_order(), sensor.geometry);  // refuses other numbers of values
+  for (const PrismSize& shared : shared_prism_sizes()) {
+    const bool is_thickness = !shared.rate.thickness.empty();
+    const std::vector<double>& values =
+        is_thickness ? sensor.geometry.thickness : sensor.geometry.spacing;
+    if (values.size() <= 1) {
+      text +=
+          quantity_text(sensor, shared.name, values.empty() ? 0.0 : values.front(), "m", nullptr);
+      continue;
+    }
+    std::size_t at = 0;
+    for (const PrismSize& size : own) {
+      if (size.rate.thickness.empty() == is_thickness) continue;
+      text += quantity_text(sensor, size.name, values[at++], "m", nullptr);
+    }
+  }
+  return text;
+}
+
 std::string covariance_text(const Sensor& sensor) {
   const auto n = static_cast<Eigen::Index>(sensor.covariance_names.size());
   if (sensor.covariance.rows() != n || sensor.covariance.cols() != n) {
@@ -380,7 +531,7 @@ std::string covariance_text(const Sensor& sensor) {
   }
   std::vector<long double> scale;
   for (const std::string& name : sensor.covariance_names) {
-    scale.push_back(scale_of(unit_of(name, sensor.prisms())));
+    scale.push_back(scale_of(unit_of(name, sensor.shape())));
   }
   std::string text = "# Element [i][j] is in the unit of names[i] times the unit of names[j].\n";
   text += fmt::format("covariance:\n  names: [{}]\n  matrix:\n",
@@ -426,32 +577,31 @@ Sensor parse_preset(const std::string& text, const std::string& path) {
     fail_at(path, root.line(), "is no sensor preset: risley_preset is missing");
   }
   root.integer("risley_preset", kSchemaVersion, kSchemaVersion);
-  root.allow_only({"risley_preset", "name", "manufacturer", "model", "serial", "face_order",
-                   "combination", "device_type", "parameters", "noise", "resolution", "limits",
-                   "range", "rates", "beam", "geometry", "calibrated_against", "covariance",
-                   "provenance"});
+  root.allow_only({"risley_preset", "name",        "manufacturer",
+                   "model",         "serial",      "face_order",
+                   "emitters",      "combination", "device_type",
+                   "parameters",    "noise",       "resolution",
+                   "limits",        "range",       "rates",
+                   "beam",          "geometry",    "calibrated_against",
+                   "covariance",    "provenance"});
   Sensor sensor;
   sensor.name = root.text("name");
   sensor.manufacturer = root.text("manufacturer");
   sensor.model = root.text("model");
   if (root.find("serial") != nullptr) sensor.serial = root.text("serial");
   try {
-    sensor.train = PrismTrain(parse_face_order(root.text("face_order")));
+    const int emitters =
+        root.find("emitters") == nullptr ? 1 : root.integer("emitters", 1, kMaxEmitters);
+    sensor.train = PrismTrain(parse_face_order(root.text("face_order")), emitters);
   } catch (const InvalidArgument& error) {
     fail_at(path, root.at("face_order").line, fmt::format("face_order: {}", error.what()));
   }
   sensor.angular_velocity.assign(static_cast<std::size_t>(sensor.prisms()), 0.0);
-  if (root.find("combination") != nullptr) {
-    if (sensor.prisms() != 2) {
-      fail_at(path, root.at("combination").line,
-              fmt::format("combination is for sensors with 2 prisms, this one has {}",
-                          sensor.prisms()));
-    }
-    sensor.combination = static_cast<SpeedCombination>(root.integer("combination", 1, 2));
-  }
+  read_combinations(root, sensor);
   sensor.device_type = root.integer("device_type", 0, 255);
   read_parameters(YamlMap(root.at("parameters").value, path, "parameters"), sensor);
   read_specifications(root, sensor);
+  read_geometry(root, sensor);
   if (root.find("calibrated_against") != nullptr) {
     const std::string against = root.text("calibrated_against");
     if (against == to_string(CalibrationReference::directions)) {
@@ -479,9 +629,11 @@ std::string preset_text(const Sensor& sensor) {
                                  yaml_quoted(sensor.manufacturer), yaml_quoted(sensor.model));
   if (!sensor.serial.empty()) text += fmt::format("serial: {}\n", yaml_quoted(sensor.serial));
   text += fmt::format("face_order: {}\n", to_string(sensor.train.face_order()));
+  if (sensor.train.emitters() > 1) text += fmt::format("emitters: {}\n", sensor.train.emitters());
   if (sensor.combination) {
-    text += fmt::format("combination: {}\n", static_cast<int>(*sensor.combination));
+    text += fmt::format("combination: {}\n", *sensor.combination);
   }
+  if (!sensor.combinations.empty()) text += combinations_text(sensor);
   text += fmt::format("device_type: {}\n", sensor.device_type);
   text += parameters_text(sensor);
   for (const std::string_view section : section_names()) {
@@ -495,6 +647,7 @@ std::string preset_text(const Sensor& sensor) {
     }
     if (!fields.empty()) text += fmt::format("{}:\n{}", section, fields);
   }
+  text += geometry_text(sensor);
   if (sensor.reference != CalibrationReference::none) {
     text += fmt::format("calibrated_against: {}\n", to_string(sensor.reference));
   }

@@ -3,15 +3,18 @@
 #include "risley/sensors/sensor.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 #include <fmt/format.h>
+
+#include "risley/core/error.hpp"
 
 namespace risley::sensors {
 namespace {
 
 /// The parameter of that name, which must be one a sensor has.
-const ParameterInfo& find_sensor_parameter(std::string_view name, int prisms) {
-  const ParameterInfo& parameter = find_parameter(name, prisms);
+const ParameterInfo& find_sensor_parameter(std::string_view name, const TrainShape& shape) {
+  const ParameterInfo& parameter = find_parameter(name, shape);
   if (parameter.kind == ParameterKind::rotation_angle) {
     throw InvalidArgument(
         fmt::format("{} belongs to a recording and is no property of a sensor", name));
@@ -45,7 +48,7 @@ double Sensor::range_variance(double range, double tan_incidence, double intensi
 }
 
 double Sensor::get(std::string_view parameter) const {
-  const ParameterInfo& info = find_sensor_parameter(parameter, prisms());
+  const ParameterInfo& info = find_sensor_parameter(parameter, shape());
   if (info.kind == ParameterKind::train) return train.get(parameter);
   const std::size_t rotor = rotor_of(info);
   if (rotor >= angular_velocity.size()) {
@@ -55,7 +58,7 @@ double Sensor::get(std::string_view parameter) const {
 }
 
 void Sensor::set(std::string_view parameter, double value) {
-  const ParameterInfo& info = find_sensor_parameter(parameter, prisms());
+  const ParameterInfo& info = find_sensor_parameter(parameter, shape());
   check_bounds(info, value);
   if (info.kind == ParameterKind::angular_velocity) {
     angular_velocity.resize(static_cast<std::size_t>(prisms()), 0.0);
@@ -65,7 +68,7 @@ void Sensor::set(std::string_view parameter, double value) {
   train.set(parameter, value);
   if (info.places.size() > 1) return;
   // Prisms that stop being alike: what was known of all is now known of each.
-  for (const ParameterInfo& shared : parameter_list(prisms())) {
+  for (const ParameterInfo& shared : parameter_list(shape())) {
     if (shared.kind != ParameterKind::train || shared.places.size() < 2) continue;
     if (std::find(shared.places.begin(), shared.places.end(), info.places.front()) ==
         shared.places.end()) {
@@ -75,7 +78,7 @@ void Sensor::set(std::string_view parameter, double value) {
     if (known_of_all == nullptr) return;
     const Knowledge all = *known_of_all;
     std::erase_if(knowledge, [&](const Knowledge& entry) { return entry.name == all.name; });
-    for (const ParameterInfo& own : parameter_list(prisms())) {
+    for (const ParameterInfo& own : parameter_list(shape())) {
       if (own.kind == ParameterKind::train && own.places.size() == 1 &&
           std::find(shared.places.begin(), shared.places.end(), own.places.front()) !=
               shared.places.end()) {
@@ -86,11 +89,10 @@ void Sensor::set(std::string_view parameter, double value) {
   }
 }
 
-void Sensor::set_prism_geometry(const PrismGeometry& geometry) {
-  prism_thickness = geometry.thickness;
-  prism_spacing = geometry.spacing;
+void Sensor::set_prism_geometry(const PrismGeometry& sizes) {
+  geometry = sizes;
   std::erase_if(knowledge, [](const Knowledge& entry) {
-    return entry.name == "prism_thickness_m" || entry.name == "prism_spacing_m";
+    return entry.name.starts_with("prism_thickness_") || entry.name.starts_with("prism_spacing_");
   });
 }
 
@@ -111,35 +113,108 @@ void Sensor::set_knowledge(Knowledge entry) {
   knowledge.push_back(std::move(entry));
 }
 
-Sensor with_combination(const Sensor& sensor, SpeedCombination combination) {
-  if (!sensor.combination || sensor.prisms() != 2 || sensor.angular_velocity.size() != 2) {
+namespace {
+
+std::vector<SpeedCombination> combinations_of(const Sensor& sensor) {
+  if (!sensor.combination || !sensor.combinations.empty()) return sensor.combinations;
+  if (sensor.prisms() != 2 || sensor.angular_velocity.size() != 2) return {};
+  const std::vector<double>& own = sensor.angular_velocity;
+  std::vector<SpeedCombination> two{{own, {}}, {{-own[1], -own[0]}, {}}};
+  if (*sensor.combination == 2) std::swap(two[0], two[1]);
+  return two;
+}
+
+/// Which rotor of one combination turns in another's place, and whether it changes its sense.
+struct Place {
+  std::size_t rotor = 0;
+  double sign = 1;
+};
+
+/// [rotors of `to`]; empty where these are other speeds.
+std::vector<Place> places_of(const std::vector<double>& from, const std::vector<double>& to) {
+  std::vector<Place> places;
+  std::vector<bool> taken(from.size(), false);
+  for (const double speed : to) {
+    std::size_t best = from.size();
+    for (std::size_t k = from.size(); k-- > 0;) {
+      const bool same_size =
+          !taken[k] && std::abs(std::abs(from[k]) - std::abs(speed)) <= 1e-9 * std::abs(speed);
+      // One that also keeps its sense is the likelier.
+      if (same_size && (best == from.size() || from[k] * speed >= 0)) best = k;
+    }
+    if (best == from.size()) return {};
+    taken[best] = true;
+    places.push_back({best, from[best] * speed < 0 ? -1.0 : 1.0});
+  }
+  return places;
+}
+
+std::string speed_name(std::size_t rotor) {
+  return fmt::format("angular_velocity_{}_deg_per_s", prism_letter(static_cast<int>(rotor)));
+}
+
+}  // namespace
+
+Sensor with_combination(const Sensor& sensor, int combination) {
+  const std::vector<SpeedCombination> all = combinations_of(sensor);
+  const auto count = static_cast<int>(all.size());
+  if (count == 0) {
     throw InvalidArgument(
         fmt::format("sensor \"{}\" has only one combination of speeds", sensor.name));
   }
+  for (const int number : {combination, *sensor.combination}) {
+    if (number < 1 || number > count) {
+      throw InvalidArgument(fmt::format("combination = {} of sensor \"{}\", allowed 1 to {}",
+                                        number, sensor.name, count));
+    }
+  }
   Sensor other = sensor;
   if (*sensor.combination == combination) return other;
+  const SpeedCombination& from = all[static_cast<std::size_t>(*sensor.combination - 1)];
+  const SpeedCombination& to = all[static_cast<std::size_t>(combination - 1)];
   other.combination = combination;
-  other.angular_velocity = {-sensor.angular_velocity[1], -sensor.angular_velocity[0]};
-  // The two names change places, and a covariance with a negated quantity changes sign.
-  const std::string first = "angular_velocity_a_deg_per_s", second = "angular_velocity_b_deg_per_s";
-  const auto exchange = [&](std::string& name) {
-    if (name == first) {
-      name = second;
-    } else if (name == second) {
-      name = first;
-    } else {
-      return false;
+  if (!to.face_order.empty() && to.face_order != sensor.train.face_order()) {
+    other.train = PrismTrain(to.face_order, sensor.train.emitters());
+    for (int at = 0; at < parameter_count(sensor.shape()); ++at) {
+      other.train.set_place(at, sensor.train[at]);
     }
-    return true;
+  }
+  const std::vector<Place> places = places_of(from.angular_velocity, to.angular_velocity);
+  if (places.empty()) {
+    other.angular_velocity = to.angular_velocity;
+    return other;
+  }
+  // The names change places, and a covariance with a negated quantity changes sign.
+  const auto moved = [&](const std::string& name) -> std::optional<std::size_t> {
+    for (std::size_t k = 0; k < places.size(); ++k) {
+      if (speed_name(places[k].rotor) == name) return k;
+    }
+    return std::nullopt;
   };
-  for (Knowledge& entry : other.knowledge) exchange(entry.name);
+  for (std::size_t k = 0; k < places.size(); ++k) {
+    other.angular_velocity[k] = places[k].sign * sensor.angular_velocity[places[k].rotor];
+  }
+  for (Knowledge& entry : other.knowledge) {
+    if (const auto rotor = moved(entry.name)) entry.name = speed_name(*rotor);
+  }
   for (std::size_t i = 0; i < other.covariance_names.size(); ++i) {
-    if (!exchange(other.covariance_names[i])) continue;
+    const auto rotor = moved(other.covariance_names[i]);
+    if (!rotor) continue;
+    other.covariance_names[i] = speed_name(*rotor);
     const auto at = static_cast<Eigen::Index>(i);
-    other.covariance.row(at) *= -1.0;
-    other.covariance.col(at) *= -1.0;
+    other.covariance.row(at) *= places[*rotor].sign;
+    other.covariance.col(at) *= places[*rotor].sign;
   }
   return other;
+}
+
+std::vector<Sensor> in_all_combinations(const Sensor& sensor) {
+  std::vector<Sensor> sensors{sensor};
+  const auto count = static_cast<int>(combinations_of(sensor).size());
+  for (int number = 1; number <= count; ++number) {
+    if (number != sensor.combination) sensors.push_back(with_combination(sensor, number));
+  }
+  return sensors;
 }
 
 }  // namespace risley::sensors

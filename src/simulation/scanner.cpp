@@ -50,9 +50,12 @@ SimulationSettings checked(SimulationSettings settings) {
                                       settings.truth.name, settings.truth.angular_velocity.size(),
                                       prisms));
   }
-  if (settings.reported && settings.reported->prisms() != settings.truth.prisms()) {
-    throw InvalidArgument(fmt::format("the reported sensor has {} prisms, the true one {}",
-                                      settings.reported->prisms(), prisms));
+  check_shape(settings.truth.shape());
+  if (settings.reported && settings.reported->shape() != settings.truth.shape()) {
+    throw InvalidArgument(
+        fmt::format("the reported sensor has {} prisms and {} emitters, the true one {} and {}",
+                    settings.reported->prisms(), settings.reported->train.emitters(), prisms,
+                    settings.truth.train.emitters()));
   }
   if (settings.start_angles.empty()) {
     const RandomStream random(settings.seed, stream::kStartAngles);
@@ -184,11 +187,16 @@ class Scanner::Work {
     DirectionColumns beam;
     if (settings.scene) {
       for (auto* column : {&x, &y, &z, &origin_x, &origin_y, &origin_z}) column->resize(count);
-      beam = {x, y, z, {}, {}, origin_x, origin_y, origin_z, settings.truth.prism_geometry()};
+      beam = {x, y, z, {}, {}, origin_x, origin_y, origin_z, settings.truth.geometry};
     }
     beam.azimuth = part(truth.azimuth, first, count);
     beam.zenith = part(truth.zenith, first, count);
-    observe_batch(settings.truth.train, angles, beam);
+    const auto emitters = static_cast<std::uint64_t>(settings.truth.train.emitters());
+    std::vector<std::uint8_t> emitter(count);
+    for (std::size_t i = 0; i < count; ++i) {
+      emitter[i] = static_cast<std::uint8_t>((first_shot + i) % emitters);
+    }
+    observe_batch(settings.truth.train, angles, beam, emitter);
 
     const auto azimuth = part(rows.azimuth, first, count);
     const auto zenith = part(rows.zenith, first, count);
@@ -196,7 +204,7 @@ class Scanner::Work {
       DirectionColumns reported;
       reported.azimuth = azimuth;
       reported.zenith = zenith;
-      observe_batch(settings.reported->train, angles, reported);
+      observe_batch(settings.reported->train, angles, reported, emitter);
     } else {
       std::copy(beam.azimuth.begin(), beam.azimuth.end(), azimuth.begin());
       std::copy(beam.zenith.begin(), beam.zenith.end(), zenith.begin());
@@ -241,7 +249,7 @@ class Scanner::Work {
       if (!valid) rows.intensity[row] = 0;
       rows.return_number[row] = 1;
       rows.tag[row] = 0;
-      rows.beam[row] = 0;
+      rows.beam[row] = emitter[row - first];
       rows.device[row] = 0;
       rows.valid[row] = valid ? 1 : 0;
     }

@@ -36,7 +36,7 @@ sensors::Sensor truth_preset(const Scanner& scanner,
         degrees_from_radians(scanner.start_angles()[i]));
   }
   if (settings.reported) {
-    for (const ParameterInfo& info : parameter_list(truth.prisms())) {
+    for (const ParameterInfo& info : parameter_list(truth.shape())) {
       if (info.kind != ParameterKind::train || info.places.size() > 1) continue;
       const double reported = settings.reported->train.get(info.name);
       if (reported != truth.train.get(info.name)) {

@@ -64,10 +64,10 @@ void expect_adjustment(const CalibrationPlan& plan) {
   const sensors::Sensor& sensor = plan.sensor;
   const double noise = plan.range_noise.value_or(sensor.range_noise);
   const double sigma = std::hypot(noise, sensor.range_resolution / std::sqrt(12.0));
-  PlanarProblem p = testing::planar_problem(
-      sensor.train, plan.beam_origin ? sensor.prism_geometry() : PrismGeometry{}, plan.scene, sigma,
-      {shots});
-  p.free = calibration_parameters(2, plan.fixed, plan.additional);
+  PlanarProblem p =
+      testing::planar_problem(sensor.train, plan.beam_origin ? sensor.geometry : PrismGeometry{},
+                              plan.scene, sigma, {shots});
+  p.free = calibration_parameters({2}, plan.fixed, plan.additional);
   if (plan.prior_sigma) {
     for (const auto& free : p.free) {
       p.prior_sigma.push_back(free.name == "refractive_index" ? HUGE_VAL : *plan.prior_sigma);
@@ -317,17 +317,17 @@ TEST(CalibrationParameters, AreTheTiltsThatWallsTell) {
     for (const auto& parameter : free) all.push_back(parameter.name);
     return all;
   };
-  EXPECT_EQ(names(calibration_parameters(2, {}, {})), testing::kTiltNames);
-  EXPECT_EQ(calibration_parameters(3, {}, {}).size(), 10u);
-  EXPECT_EQ(names(calibration_parameters(2, {"prism_tilt_a_vertical_deg"},
+  EXPECT_EQ(names(calibration_parameters({2}, {}, {})), testing::kTiltNames);
+  EXPECT_EQ(calibration_parameters({3}, {}, {}).size(), 10u);
+  EXPECT_EQ(names(calibration_parameters({2}, {"prism_tilt_a_vertical_deg"},
                                          {"refractive_index", "incident_beam_vertical_deg"})),
             (std::vector<std::string>{"incident_beam_horizontal_deg", "incident_beam_vertical_deg",
                                       "bearing_tilt_a_horizontal_deg",
                                       "bearing_tilt_a_vertical_deg", "prism_tilt_b_horizontal_deg",
                                       "prism_tilt_b_vertical_deg", "refractive_index"}));
   // Fixing what is held anyway is no mistake.
-  EXPECT_EQ(names(calibration_parameters(2, {"refractive_index"}, {})), testing::kTiltNames);
-  EXPECT_THROW(calibration_parameters(2, {"bearing_tilt_c_vertical_deg"}, {}), InvalidArgument);
+  EXPECT_EQ(names(calibration_parameters({2}, {"refractive_index"}, {})), testing::kTiltNames);
+  EXPECT_THROW(calibration_parameters({2}, {"bearing_tilt_c_vertical_deg"}, {}), InvalidArgument);
 }
 
 }  // namespace

@@ -172,7 +172,7 @@ TEST(FormalDatum, EqualsDrawsOfTheCovariance) {
   PrismTrain shared = train;
   shared.set("refractive_index", 1.51);
   names.push_back("refractive_index");  // of two places
-  const auto free = estimation::free_parameters(names, 2);
+  const auto free = estimation::free_parameters(names, {2});
   const auto n = static_cast<Index>(free.size());
   // Some correlation, of the size of a calibration.
   Eigen::MatrixXd root(n, n);
@@ -220,7 +220,7 @@ TEST(FormalDatum, EqualsDrawsOfTheCovariance) {
 
 TEST(FormalDatum, OfNoBeamIsRefused) {
   const PrismTrain train(parse_face_order("PA-AP"));
-  const auto free = estimation::free_parameters({"incident_beam_vertical_deg"}, 2);
+  const auto free = estimation::free_parameters({"incident_beam_vertical_deg"}, {2});
   EXPECT_THROW(formal_datum(train, free, Eigen::MatrixXd::Identity(1, 1), {{}, {}}),
                InvalidArgument);
 }

@@ -155,7 +155,7 @@ TEST(PaperAdjustment, FindsItAlmostWithBeamsThatStartBesideTheAxis) {
 TEST(PaperAdjustment, ParametersOfSeveralPlacesMoveTogether) {
   PlanarProblem p = problem_of(corner(), {}, 800);
   p.train.set("refractive_index", 1.508);
-  p.free.push_back(estimation::free_parameters({"refractive_index"}, 2).front());
+  p.free.push_back(estimation::free_parameters({"refractive_index"}, {2}).front());
   expect_brute_force(p, 1e-5);
   const PlanarSolution solution = adjust_as_paper(p);
   EXPECT_EQ(solution.problem.train[place::refractive_index(0)],

@@ -43,7 +43,7 @@ using testing::wall;
 constexpr double kDegree = kRadiansPerDegree;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kRangeNoise = 0.02;
-constexpr PrismGeometry kGeometry{0.007, 0.03};
+const PrismGeometry kGeometry{{0.007}, {0.03}};
 
 /// The wall of section 3.3 of the paper.
 scenes::Scene one_wall() { return {{wall("wall", 10, 80, 30)}, {}}; }
@@ -319,7 +319,7 @@ PlanarProblem everything(const PrismGeometry& geometry) {
   std::vector<std::string> names = testing::kTiltNames;
   names.push_back("refractive_index");  // of both prisms: two places
   p.train.set("refractive_index", 1.509);
-  p.free = estimation::free_parameters(names, 2);
+  p.free = estimation::free_parameters(names, {2});
   p.prior = p.train;
   p.prior_sigma = {0.3 * kDegree, 0.3 * kDegree, 0.2 * kDegree, 0.3 * kDegree,
                    0.3 * kDegree, 1.0 * kDegree, kInfinity,     1e-3};
@@ -418,7 +418,7 @@ TEST(PlanarAdjustment, ConvergesFromZeroForAnySensor) {
   for (unsigned seed = 0; seed < kSeeds; ++seed) {
     PrismTrain truth(parse_face_order("PA-AP"));
     PlanarProblem p;
-    p.free = estimation::free_parameters(testing::kTiltNames, 2);
+    p.free = estimation::free_parameters(testing::kTiltNames, {2});
     add_errors(truth, p.free, normal_vector(p.free.size(), 1.0 * kDegree, seed));
     p = planar_problem(truth, kGeometry, one_wall(), kRangeNoise, {5000, kRangeNoise, 0, 0, seed});
     p.train = truth.without_errors();
@@ -656,7 +656,7 @@ TEST(CommonErrors, OfBelievedParametersReachTheResult) {
   for (const bool index_free : {false, true}) {
     SCOPED_TRACE(index_free);
     PlanarProblem p = exact_corner();
-    p.considered = estimation::free_parameters(names, 2);
+    p.considered = estimation::free_parameters(names, {2});
     p.considered_covariance = Eigen::MatrixXd::Constant(4, 4, 3e-9);
     p.considered_covariance += Eigen::Vector4d{1e-8, 4e-8, 3e-8, 2e-8}.asDiagonal();
     Eigen::MatrixXd upright(2, 4), flipped(2, 4);
@@ -664,7 +664,7 @@ TEST(CommonErrors, OfBelievedParametersReachTheResult) {
     flipped << 0.5, -0.6, 0.7, 0.4, 0.7, 0.2, 0.2, 0.3;
     p.angle_sensitivity = {upright, flipped};
     if (index_free) {
-      p.free.push_back(estimation::free_parameters({"refractive_index"}, 2).front());
+      p.free.push_back(estimation::free_parameters({"refractive_index"}, {2}).front());
       p.prior_sigma.push_back(1e-4);
     }
     Eigen::MatrixXd responses(static_cast<Index>(p.free.size() + 1 + p.views.size()), 4);
@@ -686,7 +686,7 @@ TEST(CommonErrors, OfBelievedParametersReachTheResult) {
 /// Both kinds together, and materials without any effect on the angles.
 TEST(CommonErrors, AddUp) {
   PlanarProblem p = exact_corner();
-  p.considered = estimation::free_parameters({"refractive_index_a"}, 2);
+  p.considered = estimation::free_parameters({"refractive_index_a"}, {2});
   p.considered_covariance = Eigen::MatrixXd::Constant(1, 1, 1e-8);
   const Eigen::Index size = static_cast<Index>(p.free.size() + 1 + p.views.size());
   Eigen::MatrixXd responses(size, 1);

@@ -74,7 +74,7 @@ estimation::Estimate some_estimate() {
   estimation::Estimate estimate;
   estimate.converged = true;
   estimate.sensor = sensors::load_sensor("mid-40");
-  estimate.free = estimation::free_parameters({"refractive_index"}, 2);
+  estimate.free = estimation::free_parameters({"refractive_index"}, {2});
   estimate.covariance = Eigen::MatrixXd::Constant(1, 1, 4e-8);
   for (std::size_t i = 0; i < kShots; ++i) {
     estimate.series.time_ns.push_back(static_cast<std::int64_t>(1'000'000'000 + 200'000 * i));

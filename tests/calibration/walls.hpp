@@ -124,7 +124,7 @@ inline calibration::PlanarProblem planar_problem(const PrismTrain& train,
   calibration::PlanarProblem problem;
   problem.train = problem.prior = train;
   problem.geometry = geometry;
-  problem.free = estimation::free_parameters(kTiltNames, train.prisms());
+  problem.free = estimation::free_parameters(kTiltNames, train.shape());
   problem.range_offset = settings.range_offset;
   for (const scenes::ScenePlane& plane : scene.planes) {
     const Vector3<double>& normal = plane.plane.normal;

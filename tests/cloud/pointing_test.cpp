@@ -657,9 +657,9 @@ struct Case {
     belief.sensor = sensors::load_sensor("mid-40-table3");
     belief.sensor.train = testing::imperfect_train("PA-AP", 0.2, 8);
     belief.angle_noise = 6e-5;
-    set_free(estimation::default_free_names(2), seed);
+    set_free(estimation::default_free_names({2}), seed);
     if (reference == CalibrationReference::none) return;
-    calibration.covariance_names = estimation::default_free_names(2);
+    calibration.covariance_names = estimation::default_free_names({2});
     if (reference == CalibrationReference::planes) {
       calibration.covariance_names.insert(calibration.covariance_names.begin() + 2,
                                           "range_offset_m");
@@ -671,7 +671,7 @@ struct Case {
 
   void set_free(const std::vector<std::string>& names, std::uint64_t seed) {
     const int prisms = belief.sensor.prisms();
-    belief.free = estimation::free_parameters(names, prisms);
+    belief.free = estimation::free_parameters(names, belief.sensor.shape());
     belief.covariance = correlated(typical_sigmas(names, 0.5), seed + 2);
     belief.angle_sensitivity.resize(prisms, static_cast<Index>(names.size()));
     Dice dice(seed + 3);
@@ -690,7 +690,7 @@ struct Case {
         continue;
       }
       if (beam) {
-        for (const int place : find_parameter(name, prisms).places) m(place, j) = 1.0;
+        for (const int place : find_parameter(name, calibration.shape()).places) m(place, j) = 1.0;
       }
       for (std::size_t f = 0; angles && f < belief.free.size(); ++f) {
         if (belief.free[f].name != name) continue;
@@ -895,8 +895,8 @@ TEST(PointingModel, OfFourPrismsGivesPoints) {
   const char* order = "PA-AP-PA-AP";
   one.calibration.train = testing::imperfect_train(order, 0.3, 21);
   one.belief.sensor.train = testing::imperfect_train(order, 0.3, 22);
-  one.set_free(estimation::default_free_names(4), 23);
-  one.calibration.covariance_names = estimation::default_free_names(4);
+  one.set_free(estimation::default_free_names({4}), 23);
+  one.calibration.covariance_names = estimation::default_free_names({4});
   one.calibration.covariance = correlated(typical_sigmas(one.calibration.covariance_names), 24);
   const PointingModel model = pointing_model(one.calibration, one.belief, {});
   EXPECT_EQ(model.factors.size(), one.belief.free.size() + 4 + 2);
@@ -1005,12 +1005,12 @@ struct Draws {
           offset += p[j];
           continue;
         }
-        for (const int place : find_parameter(name, 2).places) {
+        for (const int place : find_parameter(name, {2}).places) {
           train.set_place(place, train[place] + p[j]);
         }
       }
-      const PrismGeometry geometry{model.geometry.thickness + thickness * dice.normal(),
-                                   model.geometry.spacing + spacing * dice.normal()};
+      const PrismGeometry geometry{{model.geometry.thickness.front() + thickness * dice.normal()},
+                                   {model.geometry.spacing.front() + spacing * dice.normal()}};
       std::vector<Vector3d> row;
       for (std::size_t i = 0; i < shots.size(); ++i) {
         const Eigen::Vector2d noise = angle_root[i] * normals(2) + shift;

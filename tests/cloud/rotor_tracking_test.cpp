@@ -38,7 +38,7 @@ sensors::Sensor calibration() {
   sensors::Sensor sensor = sensors::load_sensor("mid-40-table3");
   sensor.reference = CalibrationReference::directions;
   sensor.angle_noise = radians_from_degrees(0.01);
-  sensor.covariance_names = estimation::default_free_names(2);
+  sensor.covariance_names = estimation::default_free_names({2});
   const auto n = static_cast<Eigen::Index>(sensor.covariance_names.size());
   const double sigma = radians_from_degrees(0.002);
   sensor.covariance = sigma * sigma * Eigen::MatrixXd::Identity(n, n);
@@ -232,10 +232,10 @@ TEST(SensorBelief, RefusesAnotherFaceOrder) {
 TEST(SensorBelief, TakesACalibrationMadeInTheOtherSpeedCombination) {
   const Simulated data = record(2.0, 10000, 6);
   const sensors::Sensor sensor = calibration();
-  const sensors::Sensor other = sensors::with_combination(sensor, sensors::SpeedCombination::first);
+  const sensors::Sensor other = sensors::with_combination(sensor, 1);
   const SensorBelief belief = belief_of(data.observations, other);
   EXPECT_EQ(belief.sensor.train.parameters(), sensor.train.parameters());
-  EXPECT_EQ(belief.sensor.combination, sensors::SpeedCombination::second);
+  EXPECT_EQ(belief.sensor.combination, 2);
   EXPECT_NEAR(belief.sensor.angular_velocity[0], sensor.angular_velocity[0],
               radians_from_degrees(10.0));
   EXPECT_NEAR(belief.sensor.angular_velocity[1], sensor.angular_velocity[1],

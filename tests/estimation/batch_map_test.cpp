@@ -71,7 +71,7 @@ TEST(BatchMap, TellsWhatAllAnglesOfARotorHaveInCommon) {
                                                      2.5, 2.0, 2000.0, 0.01, 6);
   BatchMapOptions options;
   options.angle_noise = equal_noise(kNoise);
-  options.free = free_parameters(default_free_names(2), 2);
+  options.free = free_parameters(default_free_names({2}), {2});
   options.rotor_process.assign(2, {1e-9, 0.0, 0.0});
   const Start start = find_start(series, sensor, {options.free, kNoise, false, false});
   const BatchMapResult map = run_batch_map(series, start, sensor, options);
@@ -92,7 +92,7 @@ TEST(BatchMap, AgreesWithTheFilterOnTheSameMotionModel) {
                                                      2.5, 3.0, 1000.0, 0.01, 3);
   BatchMapOptions batch;
   batch.angle_noise = equal_noise(kNoise);
-  batch.free = free_parameters(default_free_names(2), 2);
+  batch.free = free_parameters(default_free_names({2}), {2});
   batch.rotor_process.assign(2, {radians_from_degrees(1.5), 0.0, 0.0});
   batch.outlier_chi2 = 1e6;
   EkfOptions filter;
@@ -117,7 +117,7 @@ TEST(BatchMap, TheLengthOfTheKnotsDoesNotMatter) {
   const auto sensor = sensors::load_sensor("mid-40");
   BatchMapOptions options;
   options.angle_noise = equal_noise(kNoise);
-  options.free = free_parameters(default_free_names(2), 2);
+  options.free = free_parameters(default_free_names({2}), {2});
   options.rotor_process.assign(2, {0.0, 0.0, radians_from_degrees(4.0)});
   const Start start = find_start(series, sensor, {options.free, kNoise, false, false});
   const BatchMapResult fine = [&] {
@@ -143,7 +143,7 @@ TEST(BatchMap, AnySubsetOfParametersCanBeHeldOrFreed) {
   ASSERT_TRUE(held.converged) << held.reason;
   EXPECT_EQ(held.free.size(), 6u);
   EXPECT_LT(worst_error(held, sensor), 4.5);
-  options.fixed = default_free_names(2);  // nothing free: the rotors alone
+  options.fixed = default_free_names({2});  // nothing free: the rotors alone
   const Estimate rotors = estimate_map(series, options);
   ASSERT_TRUE(rotors.converged) << rotors.reason;
   EXPECT_EQ(rotors.free.size(), 0u);

@@ -28,7 +28,7 @@ sensors::Sensor bent_sensor() {
 EkfResult run(const AngleSeries& series, EkfOptions options) {
   const auto nominal = sensors::load_sensor("mid-40");
   options.angle_noise = options.angle_noise > 0 ? options.angle_noise : kNoise;
-  if (options.free.empty()) options.free = free_parameters(default_free_names(2), 2);
+  if (options.free.empty()) options.free = free_parameters(default_free_names({2}), {2});
   const Start start =
       find_start(series, nominal, {options.free, options.angle_noise, false, false});
   return run_ekf(series, start, options);
@@ -133,8 +133,8 @@ TEST(Ekf, PoliteRefusals) {
   const auto series = testing::constant_speed_series(bent_sensor(), 0, 0, 0.2, 1000.0);
   options.rotor_process = {{1, 0, 0}};
   EXPECT_THROW(run(series, options), InvalidArgument);
-  EXPECT_THROW(free_parameters({"refractive_index", "refractive_index_a"}, 2), InvalidArgument);
-  EXPECT_THROW(free_parameters({"angular_velocity_a_deg_per_s"}, 2), InvalidArgument);
+  EXPECT_THROW(free_parameters({"refractive_index", "refractive_index_a"}, {2}), InvalidArgument);
+  EXPECT_THROW(free_parameters({"angular_velocity_a_deg_per_s"}, {2}), InvalidArgument);
 }
 
 TEST(AngleSeries, SelectsFirstReturnsInOrderOnAFixedGrid) {

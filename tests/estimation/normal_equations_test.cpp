@@ -216,17 +216,17 @@ struct Columns {
 };
 
 /// None, one that all prisms share, the paper's choice, and every single place.
-std::vector<std::vector<FreeParameter>> parameter_sets(int prisms) {
+std::vector<std::vector<FreeParameter>> parameter_sets(const TrainShape& shape) {
   std::vector<std::string> every;
-  for (const ParameterInfo& parameter : parameter_list(prisms)) {
+  for (const ParameterInfo& parameter : parameter_list(shape)) {
     if (parameter.kind != ParameterKind::train) continue;
     const bool shared = parameter.name == "refractive_index" || parameter.name == "wedge_angle_deg";
     if (!shared) every.push_back(parameter.name);
   }
   return {{},
-          free_parameters({"wedge_angle_deg", "refractive_index"}, prisms),
-          free_parameters(default_free_names(prisms), prisms),
-          free_parameters(every, prisms)};
+          free_parameters({"wedge_angle_deg", "refractive_index"}, shape),
+          free_parameters(default_free_names(shape), shape),
+          free_parameters(every, shape)};
 }
 
 class NormalEquationsOfATrain : public ::testing::TestWithParam<std::string> {};
@@ -243,7 +243,7 @@ TEST_P(NormalEquationsOfATrain, EqualTheScalarModel) {
                                          {{kNoise, 1.7 * kNoise}, 0.05, 20.0},
                                          {{kNoise, 1.7 * kNoise}, 0.0, 1.5}};
   NormalEquations equations;  // keeps its memory, not its values
-  for (const auto& free : parameter_sets(train.prisms())) {
+  for (const auto& free : parameter_sets(train.shape())) {
     for (const ShotWeights& weight : weights) {
       const Reference expected(r, train, free, weight);
       EXPECT_EQ(expected.outliers > 0, std::isfinite(weight.cut));
@@ -284,7 +284,7 @@ TEST(NormalEquations, ABeamThatDoesNotGetThroughIsAnOutlierAndCountsNothing) {
       train.set_place(place::wedge_angle(k), radians_from_degrees(wedge_deg));
     }
     const Recording r = record(train, {1, 9, 100, 1, 8, 30, 1, 60, 40, 1, 1, 7, 2, 50, 33, 17}, 4);
-    const auto free = free_parameters(default_free_names(train.prisms()), train.prisms());
+    const auto free = free_parameters(default_free_names(train.shape()), train.shape());
     const ShotWeights weights{{kNoise, 1.7 * kNoise}, 0.0, 1e9};  // so only those
     const Reference expected(r, train, free, weights);
     EXPECT_GT(expected.outliers, 50u);
@@ -307,7 +307,7 @@ TEST(NormalEquations, ABeamThatDoesNotGetThroughIsAnOutlierAndCountsNothing) {
 
 TEST(NormalEquations, ManyTurnsDoNotCostAccuracy) {
   const PrismTrain train = testing::imperfect_train("PA-AP", 0.5, 5);
-  const auto free = free_parameters(default_free_names(2), 2);
+  const auto free = free_parameters(default_free_names({2}), {2});
   const ShotWeights weights{{kNoise, 1.7 * kNoise}, 0.01, 30.0};
   Recording r = record(train, {1, 7, 100}, 6);
   const Recording few = r;
@@ -340,7 +340,7 @@ TEST(NormalEquations, ManyTurnsDoNotCostAccuracy) {
 
 TEST(NormalEquations, TheNumberOfThreadsChangesNoBit) {
   const PrismTrain train = testing::imperfect_train("PA-AP", 0.5, 7);
-  const auto free = free_parameters(default_free_names(2), 2);
+  const auto free = free_parameters(default_free_names({2}), {2});
   const Recording r = record(train, std::vector<std::size_t>(3500, 3), 8);
   const ShotWeights weights{{kNoise, 1.7 * kNoise}, 0.02, 50.0};
   NormalEquations one, two;
@@ -390,7 +390,7 @@ TEST(NormalEquations, ShotsThatNoKnotServesAreLeftAlone) {
 
 TEST(NormalEquations, ScalingScalesAllInformation) {
   const PrismTrain train = testing::imperfect_train("PA-AP", 0.5, 11);
-  const auto free = free_parameters(default_free_names(2), 2);
+  const auto free = free_parameters(default_free_names({2}), {2});
   const Recording r = record(train, {5, 20}, 12);
   NormalEquations wide, scaled;
   accumulate(r.series, r.knots, train, free, {equal_noise(kNoise)}, scaled);

@@ -21,7 +21,7 @@ ObservabilityPlan plan_of(const char* sensor, double duration, double rate) {
   plan.duration = duration;
   plan.rate = rate;
   plan.angle_noise = radians_from_degrees(0.01);
-  plan.free = free_parameters(default_free_names(2), 2);
+  plan.free = free_parameters(default_free_names({2}), {2});
   return plan;
 }
 
@@ -117,7 +117,7 @@ TEST(Observability, Section23OfThePaper) {
   EXPECT_GT(std::abs(wedge.twins.front().second), 0.999);
   ASSERT_FALSE(all.unobservable.empty());
   EXPECT_EQ(all.unobservable.front().weights.size(), 2u);
-  const auto words = observability_words(all, 2);
+  const auto words = observability_words(all, {2});
   const auto says = [&](const std::string& text) {
     return std::any_of(words.begin(), words.end(),
                        [&](const std::string& one) { return one.find(text) != std::string::npos; });
@@ -128,7 +128,8 @@ TEST(Observability, Section23OfThePaper) {
 
 TEST(Observability, WeakDirectionsAreThoseOfTheMatrix) {
   // Two parameters of which only the sum is known.
-  const auto free = free_parameters({"prism_tilt_a_vertical_deg", "prism_tilt_b_vertical_deg"}, 2);
+  const auto free =
+      free_parameters({"prism_tilt_a_vertical_deg", "prism_tilt_b_vertical_deg"}, {2});
   const double prior = free[0].prior_sigma;
   Eigen::Matrix2d information;
   information << 1, 1, 1, 1;

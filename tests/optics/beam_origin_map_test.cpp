@@ -15,7 +15,7 @@
 namespace risley {
 namespace {
 
-constexpr PrismGeometry kMid40{0.007, 0.030};
+const PrismGeometry kMid40{{0.007}, {0.030}};
 constexpr double kCell = radians_from_degrees(0.5);
 
 PrismTrain ideal_mid_40() { return PrismTrain(parse_face_order("PA-AP")); }

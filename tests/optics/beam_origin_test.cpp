@@ -22,7 +22,7 @@
 namespace risley {
 namespace {
 
-constexpr PrismGeometry kMid40{0.007, 0.030};
+const PrismGeometry kMid40{{0.007}, {0.030}};
 
 PrismTrain ideal_mid_40() { return PrismTrain(parse_face_order("PA-AP")); }
 
@@ -124,7 +124,7 @@ TEST(BeamOrigin, EveryInstructionSetAgreesWithPlainNumbers) {
     out.origin_y = y;
     out.origin_z = z;
     out.geometry = kMid40;
-    observe_batch(train, angles, out, set);
+    observe_batch(train, angles, out, {}, set);
     for (std::size_t i = 0; i < kShots; ++i) {
       const Ray ray = emergent_ray(train, kMid40, std::array<double, 2>{a[i], b[i]});
       EXPECT_LT(norm(ray.origin - Vector3<double>{x[i], y[i], z[i]}), 1e-16) << to_string(set);
@@ -293,7 +293,7 @@ TEST(BeamOrigin, DerivativesByThicknessAndSpacingEqualCentralDifferences) {
       std::copy_n(positions.begin(), 2 * N, position.begin());
       const auto path = beam_path(forward, position);
       constexpr double kStep = 1e-4;  // the origin is linear in both
-      const std::array<PrismGeometry, 2> units{PrismGeometry{1, 0}, PrismGeometry{0, 1}};
+      const std::array<PrismGeometry, 2> units{PrismGeometry{{1.0}, {}}, PrismGeometry{{}, {1.0}}};
       for (const PrismGeometry& unit : units) {
         const auto moved = [&](double step) {
           return emergent_ray(train,

@@ -163,7 +163,7 @@ TEST_P(AdjointOfEveryTrain, BatchesOfEveryInstructionSetEqualTheScalarModel) {
   for (const InstructionSet set : available_instruction_sets()) {
     SCOPED_TRACE(to_string(set));
     std::vector<double> x(kShots), y(kShots), z(kShots), azimuth(kShots), zenith(kShots);
-    EXPECT_EQ(observe_batch(train, angles, {x, y, z, azimuth, zenith}, set), 0u);
+    EXPECT_EQ(observe_batch(train, angles, {x, y, z, azimuth, zenith}, {}, set), 0u);
     std::vector<std::vector<double>> d_azimuth(gradient_columns, std::vector<double>(kShots));
     auto d_zenith = d_azimuth;
     std::vector<double> azimuth2(kShots), zenith2(kShots);
@@ -171,7 +171,7 @@ TEST_P(AdjointOfEveryTrain, BatchesOfEveryInstructionSetEqualTheScalarModel) {
                              zenith2,
                              {d_azimuth.begin(), d_azimuth.end()},
                              {d_zenith.begin(), d_zenith.end()}};
-    EXPECT_EQ(linearise_batch(train, angles, out, set), 0u);
+    EXPECT_EQ(linearise_batch(train, angles, out, {}, set), 0u);
     for (std::size_t i = 0; i < kShots; ++i) {
       std::vector<double> shot_angles;
       for (const auto& column : columns) shot_angles.push_back(column[i]);

@@ -151,7 +151,8 @@ TEST(ObservationModel, TotalReflectionIsAnInvalidShotInEveryScalar) {
   const std::vector<std::span<const double>> angles{column, column};
   for (const InstructionSet set : available_instruction_sets()) {
     std::vector<double> azimuth(11, 1.0), x(11, 1.0);
-    EXPECT_EQ(observe_batch(train, angles, {x, {}, {}, azimuth, {}}, set), 11u) << to_string(set);
+    EXPECT_EQ(observe_batch(train, angles, {x, {}, {}, azimuth, {}}, {}, set), 11u)
+        << to_string(set);
     for (std::size_t i = 0; i < 11; ++i) {
       EXPECT_TRUE(std::isnan(azimuth[i]) && std::isnan(x[i]));
     }

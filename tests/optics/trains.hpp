@@ -25,7 +25,7 @@ inline PrismTrain imperfect_train(const std::string& face_order, double error_si
   std::normal_distribution<double> normal;
   PrismTrain train(parse_face_order(face_order));
   const bool three = train.prisms() > 2;
-  for (const ParameterInfo& parameter : parameter_list(train.prisms())) {
+  for (const ParameterInfo& parameter : parameter_list(train.shape())) {
     if (parameter.kind != ParameterKind::train || parameter.places.size() > 1) continue;
     double value = train.get(parameter.name);
     if (parameter.name == "refractive_index_air") {

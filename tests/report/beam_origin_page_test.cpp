@@ -14,7 +14,7 @@ namespace {
 TEST(BeamOriginPage, ShowsSixMapsWithTheirExtremes) {
   const sensors::Sensor sensor = sensors::load_sensor("mid-40");
   const BeamOriginMap map =
-      beam_origin_map(sensor.train, sensor.prism_geometry(), 361, radians_from_degrees(1.0));
+      beam_origin_map(sensor.train, sensor.geometry, 361, radians_from_degrees(1.0));
   const std::string page = beam_origin_page(map, sensor, {{"command", "risley cloud <x>"}});
   std::size_t maps = 0;
   for (std::size_t at = page.find("<figure"); at != std::string::npos;

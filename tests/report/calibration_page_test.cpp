@@ -102,7 +102,7 @@ Calibration example(std::size_t points = 2000) {
   c.sensor = sensors::load_sensor("mid-40");
   c.sensor.serial = "1PQD&7";
   c.believed = c.sensor.train;
-  c.free = estimation::free_parameters(estimation::default_free_names(2), 2);
+  c.free = estimation::free_parameters(estimation::default_free_names({2}), {2});
   const auto n = static_cast<Eigen::Index>(c.free.size());
   c.parameters.resize(n);
   c.covariance = Eigen::MatrixXd::Zero(n, n);
@@ -331,7 +331,7 @@ TEST(CalibrationPage, AFailureSaysWhyAndWhatToDo) {
   page.calibration.reason = "the walls do not tell pitch & yaw";
   page.calibration.warnings = {"a single wall"};
   page.calibration.rms_after = kNaN;
-  page.calibration.free = estimation::free_parameters(estimation::default_free_names(2), 2);
+  page.calibration.free = estimation::free_parameters(estimation::default_free_names({2}), {2});
   page.calibration.datum.sigma_pitch = std::numeric_limits<double>::infinity();
   page.calibration.unobservable = {
       {{{"prism_tilt_a_vertical_deg", 0.8}, {"incident_beam_vertical_deg", -0.6}}, 1e-9, 40}};
@@ -369,7 +369,7 @@ TEST(CalibrationPage, ParametersStandBesideWhatWasBelievedAndTrue) {
   Page page;
   page.truth = example_truth();
   Calibration& c = page.calibration;
-  c.free = estimation::free_parameters({"prism_tilt_a_vertical_deg"}, 2);
+  c.free = estimation::free_parameters({"prism_tilt_a_vertical_deg"}, {2});
   c.parameters = Eigen::VectorXd::Constant(1, deg(0.3));
   c.covariance = Eigen::MatrixXd::Constant(1, 1, deg(0.02) * deg(0.02));
   c.believed.set("prism_tilt_a_vertical_deg", deg(0.11));

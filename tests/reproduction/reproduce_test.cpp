@@ -91,11 +91,11 @@ TEST(Reproduce, ZeroPositionPassesAndAWrongIndexFails) {
 TEST(Reproduce, TableA1PassesAndAWrongThicknessFails) {
   ReproduceOptions options = small_options();
   expect_all_pass(beam_origin_errors(options));
-  options.type.set_prism_geometry({0.008, 0.030});
+  options.type.set_prism_geometry({{0.008}, {0.030}});
   const Reproduction thick = beam_origin_errors(options);
   EXPECT_FALSE(passes(row_of(table_of(thick, "table_a1"), "beam 1, Y")));
   EXPECT_TRUE(passes(row_of(table_of(thick, "table_a1"), "beam 1, azimuth")));
-  options.type.set_prism_geometry({0.007, 0.035});
+  options.type.set_prism_geometry({{0.007}, {0.035}});
   const Reproduction wide = beam_origin_errors(options);
   EXPECT_FALSE(passes(row_of(table_of(wide, "figure_a1"), "towards -Y")));
 }

@@ -15,7 +15,7 @@ using ::testing::HasSubstr;
 
 TEST(Sensor, SetsAndGetsEveryParameterInSiUnits) {
   Sensor sensor = load_sensor("mid-40");
-  for (const ParameterInfo& info : parameter_list(2)) {
+  for (const ParameterInfo& info : parameter_list({2})) {
     if (info.kind == ParameterKind::rotation_angle) continue;
     const double value = 0.75 * info.lower + 0.25 * info.upper;
     sensor.set(info.name, value);
@@ -64,7 +64,7 @@ TEST(Sensor, CombinationsSwapSpeedsAndKeepTheirDirections) {
                              "angular_velocity_b_deg_per_s"};
   sensor.covariance.resize(3, 3);
   sensor.covariance << 1.0, 0.1, 0.2, 0.1, 3.0, 0.3, 0.2, 0.3, 4.0;
-  const Sensor other = with_combination(sensor, SpeedCombination::second);
+  const Sensor other = with_combination(sensor, 2);
   EXPECT_EQ(other.angular_velocity[0], -sensor.angular_velocity[1]);
   EXPECT_EQ(other.angular_velocity[1], -sensor.angular_velocity[0]);
   EXPECT_LT(other.angular_velocity[0], 0.0);
@@ -74,18 +74,17 @@ TEST(Sensor, CombinationsSwapSpeedsAndKeepTheirDirections) {
   EXPECT_EQ(other.covariance(0, 0), 1.0);
   EXPECT_EQ(other.covariance(0, 1), -0.1);
   EXPECT_EQ(other.covariance(0, 2), 0.2);
-  const Sensor back = with_combination(other, SpeedCombination::first);
+  const Sensor back = with_combination(other, 1);
   EXPECT_EQ(back.angular_velocity, sensor.angular_velocity);
   EXPECT_EQ(back.covariance, sensor.covariance);
   EXPECT_EQ(back.covariance_names, sensor.covariance_names);
-  EXPECT_EQ(with_combination(sensor, SpeedCombination::first).angular_velocity,
-            sensor.angular_velocity);
+  EXPECT_EQ(with_combination(sensor, 1).angular_velocity, sensor.angular_velocity);
 }
 
 TEST(Sensor, OneCombinationOnlyIsSaid) {
   Sensor sensor = load_sensor("mid-40");
   sensor.combination.reset();
-  EXPECT_THROW(with_combination(sensor, SpeedCombination::second), InvalidArgument);
+  EXPECT_THROW(with_combination(sensor, 2), InvalidArgument);
 }
 
 }  // namespace

@@ -206,7 +206,7 @@ TEST(Scanner, RangesEndOnThePlane) {
     for (std::size_t i = 0; i < whole.rows.size(); ++i) {
       const std::array<double, 2> angles{whole.truth.rotation_angle[0][i],
                                          whole.truth.rotation_angle[1][i]};
-      const Ray ray = emergent_ray(settings.truth.train, settings.truth.prism_geometry(), angles);
+      const Ray ray = emergent_ray(settings.truth.train, settings.truth.geometry, angles);
       const Vector3<double> point = station.position + station.scene_from_sensor(ray.origin) +
                                     whole.rows.range[i] * station.scene_from_sensor(ray.direction);
       ASSERT_NEAR(signed_distance(settings.scene->planes[0].plane, point), 0.0, 1e-12);

@@ -130,8 +130,7 @@ TEST(Calibration, RecordingsInBothSpeedCombinationsTellOfOneSensor) {
   WallMonteCarlo result;
   for (int seed = 0; seed < seeds; ++seed) {
     std::vector<WallRecording> walls;
-    for (const auto combination :
-         {sensors::SpeedCombination::second, sensors::SpeedCombination::first}) {
+    for (const auto combination : {2, 1}) {
       auto settings = wall_settings(hall(), 1000 * walls.size() + static_cast<std::uint64_t>(seed),
                                     1000.0, 5.0);
       settings.truth = sensors::with_combination(settings.truth, combination);
@@ -236,8 +235,8 @@ PrismTrain adjusted_with_true_labels(const WallRecording& walls) {
   const calibration::CalibrationOptions options = wall_options();
   calibration::PlanarProblem problem;
   problem.train = problem.prior = recording.believed.train;
-  problem.geometry = options.sensor.prism_geometry();
-  problem.free = calibration::calibration_parameters(recording.believed.prisms(), {}, {});
+  problem.geometry = options.sensor.geometry;
+  problem.free = calibration::calibration_parameters(recording.believed.shape(), {}, {});
   problem.range_offset_sigma = options.range_offset_sigma;
   problem.stations.resize(1);
   problem.considered = recording.free;

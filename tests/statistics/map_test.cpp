@@ -194,7 +194,7 @@ sensors::Sensor random_sensor(std::uint64_t seed, double error_deg, double speed
   const RandomStream errors(seed, 81), speeds(seed, 82);
   auto sensor = sensors::load_sensor(speeds.uniform(0) < 0.5 ? "mid-40" : "mid-40-reversed");
   std::uint64_t number = 0;
-  for (const std::string& name : estimation::default_free_names(2)) {
+  for (const std::string& name : estimation::default_free_names({2})) {
     if (name == "refractive_index") continue;
     sensor.set(name, radians_from_degrees(error_deg) * errors.normal(number++));
   }

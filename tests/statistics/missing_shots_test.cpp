@@ -22,7 +22,7 @@ simulation::SimulationSettings random_unit(std::uint64_t seed, double duration) 
   const RandomStream stream(seed, 5);
   settings.truth = sensors::load_sensor(stream.uniform(0) < 0.5 ? "mid-40" : "mid-40-reversed");
   std::uint64_t number = 1;
-  for (const std::string& name : estimation::default_free_names(2)) {
+  for (const std::string& name : estimation::default_free_names({2})) {
     const double sigma = name == "refractive_index" ? 0.001 : radians_from_degrees(0.3);
     settings.truth.set(name, settings.truth.get(name) + sigma * stream.normal(number++));
   }

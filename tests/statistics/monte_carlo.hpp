@@ -29,7 +29,7 @@ struct MonteCarlo {
 };
 
 inline bool is_prism_parameter(const std::string& name) {
-  return find_parameter(name, 2).kind == ParameterKind::train;
+  return find_parameter(name, {2}).kind == ParameterKind::train;
 }
 
 /// Simulates and estimates for every seed and gathers the errors; expects each run to converge in
@@ -57,7 +57,7 @@ inline MonteCarlo monte_carlo(
     const auto evaluation = evaluate(estimate, settings.truth, data.truth);
     for (std::size_t i = 0; i < evaluation.parameters.size(); ++i) {
       const auto& row = evaluation.parameters[i];
-      const double unit = find_parameter(row.name, 2).si_per_unit;
+      const double unit = find_parameter(row.name, {2}).si_per_unit;
       sum.rmse[row.name] += std::pow(row.error / unit, 2);
       sum.sigma[row.name] += std::pow(estimate.values[i].sigma / unit, 2);
       covered += std::abs(row.error_over_sigma) < 2.0;

@@ -49,7 +49,7 @@ struct WallRecording {
     const scenes::Station station = settings.scene->station(settings.station);
     std::vector<double> angles;
     for (const auto& column : truth.rotation_angle) angles.push_back(column[truth_row[shot]]);
-    const Ray ray = emergent_ray(settings.truth.train, settings.truth.prism_geometry(), angles);
+    const Ray ray = emergent_ray(settings.truth.train, settings.truth.geometry, angles);
     return scenes::nearest_hit(*settings.scene,
                                station.position + station.scene_from_sensor(ray.origin),
                                station.scene_from_sensor(ray.direction))

@@ -96,8 +96,8 @@ struct Calibration {
   std::string reason;  ///< why not; empty when converged
   std::vector<std::string> warnings;
   CalibrationMethod method = CalibrationMethod::adjustment;
-  sensors::Sensor sensor;                          ///< calibrated, with covariance
-  PrismTrain believed{parse_face_order("PA-AP")};  ///< what the sensor computed directions with
+  sensors::Sensor sensor;  ///< calibrated, with covariance
+  PrismTrain believed;     ///< what the sensor computed directions with
   std::vector<estimation::FreeParameter> free;
   Eigen::VectorXd parameters;                       ///< [free], SI
   Eigen::MatrixXd covariance;                       ///< [free, free], everything included

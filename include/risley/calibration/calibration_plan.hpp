@@ -62,6 +62,7 @@ CalibrationForecast forecast(const CalibrationPlan& plan);
 /// Free parameters of a calibration: what walls can tell, less the fixed ones plus the others. The
 /// refractive index is held unless asked for, since the recording itself tells it better.
 std::vector<estimation::FreeParameter> calibration_parameters(
-    int prisms, const std::vector<std::string>& fixed, const std::vector<std::string>& additional);
+    const TrainShape& shape, const std::vector<std::string>& fixed,
+    const std::vector<std::string>& additional);
 
 }  // namespace risley::calibration

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -37,10 +38,12 @@ struct FormalDatum {
 
 /// Propagates a covariance to a bundle of beams.
 /// @param rotation_angles  [prisms][beams], rad
+/// @param emitter          of every beam, from 0; empty: all the first
 FormalDatum formal_datum(const PrismTrain& train,
                          const std::vector<estimation::FreeParameter>& free,
                          const Eigen::MatrixXd& covariance,
-                         const std::vector<std::vector<double>>& rotation_angles);
+                         const std::vector<std::vector<double>>& rotation_angles,
+                         std::span<const std::uint8_t> emitter = {});
 
 /// What ties the frame of the calibrated beams to the outside.
 enum class DatumKind {

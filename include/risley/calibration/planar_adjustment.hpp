@@ -48,10 +48,10 @@ struct WallView {
 
 /// Least squares of all recordings together: ranges against explicit planes.
 struct PlanarProblem {
-  PrismTrain train{parse_face_order("PA-AP")};  ///< start values
+  PrismTrain train;  ///< start values
   PrismGeometry geometry;
   std::vector<estimation::FreeParameter> free;  ///< to estimate
-  PrismTrain prior{parse_face_order("PA-AP")};  ///< where the priors of the parameters stand
+  PrismTrain prior;                             ///< where the priors of the parameters stand
   /// Prior sigma of every free parameter [free], SI; empty or infinite: none.
   std::vector<double> prior_sigma;
   double range_offset = 0;            ///< start value, m
@@ -109,7 +109,7 @@ struct AdjustmentOptions {
   int most_iterations = 50;
   /// Done when a step would lower the cost by less than this (in the unit of one squared sigma).
   double tolerance = 1e-10;
-  InstructionSet set = available_instruction_sets().back();
+  InstructionSet set = best_instruction_set();
 };
 
 /// Levenberg-Marquardt on normal equations that every view accumulates by itself.
@@ -120,8 +120,8 @@ PlanarSolution adjust(PlanarProblem problem, const AdjustmentOptions& options = 
 /// Prior sigmas of free parameters when every angle has the same [free], SI; infinite for others,
 /// and for all without one.
 /// @param angle_sigma  rad
-std::vector<double> prior_sigmas(const std::vector<estimation::FreeParameter>& free, int prisms,
-                                 std::optional<double> angle_sigma);
+std::vector<double> prior_sigmas(const std::vector<estimation::FreeParameter>& free,
+                                 const TrainShape& shape, std::optional<double> angle_sigma);
 
 /// Information of the priors on the free parameters [free, free].
 Eigen::MatrixXd prior_information(const PlanarProblem& problem);

@@ -16,7 +16,7 @@ namespace risley::calibration {
 
 /// Where the range of every shot is predicted from: the sensor's optics and one plane.
 struct PlaneView {
-  PrismTrain train{parse_face_order("PA-AP")};
+  PrismTrain train;
   PrismGeometry geometry;
   std::vector<int> places;    ///< of the flat parameter vector: those to differentiate by
   double range_offset = 0;    ///< what the sensor adds to a true range, m
@@ -68,6 +68,6 @@ struct ResidualColumns {
 /// @param set  instruction set, for tests and benchmarks
 PlaneEquations plane_equations(const RangedShots& shots, const PlaneView& view,
                                const ResidualColumns& columns = {},
-                               InstructionSet set = available_instruction_sets().back());
+                               InstructionSet set = best_instruction_set());
 
 }  // namespace risley::calibration

@@ -22,7 +22,8 @@ struct RangedShots {
   /// Covariance of the rotation angles, upper triangle row by row [prisms (prisms+1)/2][shots],
   /// rad^2.
   std::vector<std::vector<float>> angle_covariance;
-  std::vector<double> range;  ///< m, as measured
+  std::vector<double> range;       ///< m, as measured
+  std::vector<std::uint8_t> beam;  ///< emitter that fired, from 0; empty: all the first
 
   std::size_t size() const { return range.size(); }
   int prisms() const { return static_cast<int>(rotation_angle.size()); }

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
@@ -32,17 +33,19 @@ struct PointingOptions {
 struct CommonFactor {
   std::string name;
   Eigen::VectorXd
-      weights;  ///< [places + prisms + 2]: flat vector, rotation angles, thickness, spacing
+      weights;  ///< [places + prisms + sizes]: flat vector, rotation angles, sizes of prisms
   double range_offset = 0;  ///< m
 };
 
 /// Where the beam of a sensor goes, and how wrong that may be. Derivation: docs/theory/cloud.md
 struct PointingModel {
-  PrismTrain train{parse_face_order("PA-AP")};     ///< where it truly goes
-  PrismTrain believed{parse_face_order("PA-AP")};  ///< what the sensor computes directions with
+  PrismTrain train;     ///< where it truly goes
+  PrismTrain believed;  ///< what the sensor computes directions with
   /// What the parameters were held against, or count as: never none.
   sensors::CalibrationReference reference = sensors::CalibrationReference::directions;
-  PrismGeometry geometry;   ///< all zero without a beam origin
+  PrismGeometry geometry;  ///< all zero without a beam origin
+  /// Sizes of the prisms that factors have a weight for.
+  std::vector<PrismSize> sizes = shared_prism_sizes();
   double range_offset = 0;  ///< m
   double angle_noise = 0;   ///< of reported directions, rad
   sensors::Sensor sensor;   ///< range noise and rounding are taken from here
@@ -89,6 +92,7 @@ struct PointedShots {
   std::vector<double> azimuth_rounding, zenith_rounding, range_rounding;
   std::vector<double> range;                          ///< as reported, m
   std::vector<double> intensity;                      ///< as reported
+  std::vector<std::uint8_t> beam;                     ///< emitter that fired, from 0
   std::array<std::vector<double>, 3> surface_normal;  ///< NaN where not known
 
   std::size_t size() const { return range.size(); }
@@ -103,6 +107,6 @@ struct PointedShots {
 /// factor name per factor of the model or none
 void compute_points(const PointingModel& model, const CloudHeader& header,
                     const PointedShots& shots, Points& points,
-                    InstructionSet set = available_instruction_sets().back());
+                    InstructionSet set = best_instruction_set());
 
 }  // namespace risley::cloud

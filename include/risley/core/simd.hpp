@@ -2,9 +2,19 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <cstddef>
+
 #include <xsimd/xsimd.hpp>
 
 #include "risley/core/scalar.hpp"
+
+// What kernels share. A kernel is compiled once per instruction set, with RISLEY_KERNEL = baseline,
+// avx2, avx512, and puts its functions into RISLEY_KERNEL_NAMESPACE. Every template instantiated
+// there carries the batch type of that instruction set in its name, so the linker cannot take a
+// wide copy for the rest of the program (tests/architecture checks it).
+#define RISLEY_JOIN2(a, b) a##b
+#define RISLEY_JOIN(a, b) RISLEY_JOIN2(a, b)
+#define RISLEY_KERNEL_NAMESPACE RISLEY_JOIN(kernel_, RISLEY_KERNEL)
 
 namespace risley {
 
@@ -13,5 +23,16 @@ struct SineCosine<xsimd::batch<Number, Arch>> {
   using Batch = xsimd::batch<Number, Arch>;
   static std::pair<Batch, Batch> of(const Batch& angle) { return xsimd::sincos(angle); }
 };
+
+/// Sum of the lanes of a batch.
+template <class Arch>
+double sum_of_lanes(const xsimd::batch<double, Arch>& value) {
+  constexpr std::size_t kLanes = xsimd::batch<double, Arch>::size;
+  alignas(64) double lanes[kLanes];
+  value.store_aligned(lanes);
+  double sum = 0;
+  for (std::size_t i = 0; i < kLanes; ++i) sum += lanes[i];
+  return sum;
+}
 
 }  // namespace risley

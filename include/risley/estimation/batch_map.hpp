@@ -40,7 +40,7 @@ struct BatchMapResult {
   Eigen::VectorXd parameters;   ///< [free], SI units
   Eigen::MatrixXd covariance;   ///< [free, free], variance factor included
   Eigen::MatrixXd information;  ///< [constants], of the data alone, variance factor included
-  PrismTrain train{parse_face_order("PA-AP")};  ///< with the estimated parameters
+  PrismTrain train;             ///< with the estimated parameters
   /// Turn of the series' frame against the sensor's: residuals and angles are those of the series
   /// turned back by it. Identity unless a frame_sigma was given.
   Eigen::Matrix3d frame = Eigen::Matrix3d::Identity();

@@ -39,7 +39,7 @@ struct EkfResult {
   std::vector<FreeParameter> free;
   Eigen::VectorXd parameters;  ///< mean over the smoothed estimates, SI units
   Eigen::MatrixXd covariance;  ///< of parameters, mean over the smoothed covariances
-  PrismTrain train{parse_face_order("PA-AP")};  ///< with the estimated parameters
+  PrismTrain train;            ///< with the estimated parameters
   RotorStates states;
   std::vector<RotorProcess> rotor_process;
   std::size_t outliers = 0;

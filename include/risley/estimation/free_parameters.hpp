@@ -16,16 +16,17 @@ struct FreeParameter {
   double prior_sigma = 0;   ///< SI units
 };
 
-/// The paper's choice for any number of prisms: the common refractive index, the incident beam,
+/// The paper's choice for any number of prisms: the common refractive index, all incident beams,
 /// every bearing tilt, the vertical tilt of every prism and the horizontal tilt of the last. Air,
 /// wedge angles and the other horizontal tilts cannot be told from the rest and stay fixed.
 /// [B21 section 2.3]
-std::vector<std::string> default_free_names(int prisms);
+std::vector<std::string> default_free_names(const TrainShape& shape);
 
 /// Free parameters by name. The priors are wide on purpose (1 degree, 0.01 in the index): they keep
 /// the first updates inside the range of the linearisation and weigh nothing against a recording.
 /// @throws InvalidArgument for a name that is unknown, not a train parameter, or given twice (also
 ///         as shared and own, such as refractive_index with refractive_index_a)
-std::vector<FreeParameter> free_parameters(const std::vector<std::string>& names, int prisms);
+std::vector<FreeParameter> free_parameters(const std::vector<std::string>& names,
+                                           const TrainShape& shape);
 
 }  // namespace risley::estimation

@@ -27,12 +27,12 @@ struct StartOptions {
 /// What an estimation starts from. All of the recording as it is to be used: turned if mirrored,
 /// and turned into the sensor's frame.
 struct Start {
-  std::int64_t time_ns = 0;                     ///< of the angles
-  double reach = 0;                             ///< it was fitted to shots so far around, s
-  std::vector<double> rotation_angle;           ///< [prisms], rad
-  std::vector<double> angular_velocity;         ///< [prisms], rad/s
-  PrismTrain train{parse_face_order("PA-AP")};  ///< free parameters fitted to the first shots
-  std::optional<sensors::SpeedCombination> combination;
+  std::int64_t time_ns = 0;              ///< of the angles
+  double reach = 0;                      ///< it was fitted to shots so far around, s
+  std::vector<double> rotation_angle;    ///< [prisms], rad
+  std::vector<double> angular_velocity;  ///< [prisms], rad/s
+  PrismTrain train;                      ///< free parameters fitted to the first shots
+  std::optional<int> combination;
   bool mirrored = false;           ///< the recording is a mirror image and has to be turned
   std::optional<FrameTurn> frame;  ///< of the recording, where it is not the sensor's
   double residual_rms = 0;         ///< of the fit, rad; robust, so that outliers do not count

@@ -65,6 +65,6 @@ struct NormalEquations {
 void accumulate(const AngleSeries& series, const RotorTrajectory& knots, const PrismTrain& train,
                 const std::vector<FreeParameter>& free, const ShotWeights& weights,
                 NormalEquations& equations, const ShotColumns& columns = {},
-                InstructionSet set = available_instruction_sets().back());
+                InstructionSet set = best_instruction_set());
 
 }  // namespace risley::estimation

@@ -67,6 +67,7 @@ Observability observability_of_estimate(const Estimate& estimate);
 
 /// What a user should know, in sentences: which parameters to hold fixed, what each is mixed up
 /// with, and how long a recording would have to be to tell them after all.
-std::vector<std::string> observability_words(const Observability& observability, int prisms);
+std::vector<std::string> observability_words(const Observability& observability,
+                                             const TrainShape& shape);
 
 }  // namespace risley::estimation

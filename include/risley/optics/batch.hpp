@@ -2,22 +2,15 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <cstdint>
 #include <span>
-#include <string>
 #include <vector>
 
+#include "risley/core/instruction_set.hpp"
 #include "risley/optics/beam_origin.hpp"
 #include "risley/optics/prism_train.hpp"
 
 namespace risley {
-
-/// Instruction sets the batch kernels exist in; baseline is what the compiler targets by default.
-enum class InstructionSet { baseline, avx2, avx512 };
-
-std::string to_string(InstructionSet set);
-
-/// The instruction sets this binary holds and this processor runs, best last.
-const std::vector<InstructionSet>& available_instruction_sets();
 
 /// Columns that a batch evaluation fills. Every non-empty span must hold one value per shot; an
 /// empty one is not computed.
@@ -32,29 +25,34 @@ struct DirectionColumns {
 /// Where many shots of one train point. A shot that does not get through is NaN in every column.
 /// @param rotation_angles  one column per prism in beam order, rad, all of the same length. The
 ///                         sines are most accurate below a few thousand turns: pass wrapped angles
+/// @param beam             number of the emitter of every shot, counted from 0; empty: all the
+///                         first
 /// @param set              instruction set, for tests and benchmarks; default the best available
 /// @return number of shots that are not valid
-/// @throws InvalidArgument when column counts or lengths differ
+/// @throws InvalidArgument when column counts or lengths differ, for a beam that the train does not
+///         have, and as check_available()
 std::size_t observe_batch(const PrismTrain& train,
                           std::span<const std::span<const double>> rotation_angles,
-                          const DirectionColumns& out);
-std::size_t observe_batch(const PrismTrain& train,
-                          std::span<const std::span<const double>> rotation_angles,
-                          const DirectionColumns& out, InstructionSet set);
+                          const DirectionColumns& out, std::span<const std::uint8_t> beam = {},
+                          InstructionSet set = best_instruction_set());
 
-/// Azimuth, zenith and their gradients for many shots, columns as in Gradient: first the flat
-/// parameters, then the rotation angles.
+/// @param beam   empty, or one number per shot, counted from 0
+/// @throws InvalidArgument for another length or a beam that the train does not have, naming its
+/// row
+void check_beams(const PrismTrain& train, std::span<const std::uint8_t> beam, std::size_t shots);
+
+/// Azimuth, zenith and their gradients for many shots: first by the flat parameters, those of all
+/// emitters included, then by the rotation angles.
 struct LinearisationColumns {
   std::span<double> azimuth, zenith;                   ///< [shots], rad
-  std::vector<std::span<double>> d_azimuth, d_zenith;  ///< [parameter_count + prisms][shots]
+  std::vector<std::span<double>> d_azimuth, d_zenith;  ///< [parameter_count(shape) + prisms][shots]
 };
 
 /// As observe_batch, with derivatives.
 std::size_t linearise_batch(const PrismTrain& train,
                             std::span<const std::span<const double>> rotation_angles,
-                            const LinearisationColumns& out);
-std::size_t linearise_batch(const PrismTrain& train,
-                            std::span<const std::span<const double>> rotation_angles,
-                            const LinearisationColumns& out, InstructionSet set);
+                            const LinearisationColumns& out,
+                            std::span<const std::uint8_t> beam = {},
+                            InstructionSet set = best_instruction_set());
 
 }  // namespace risley

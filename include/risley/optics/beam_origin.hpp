@@ -5,6 +5,7 @@
 #include <array>
 #include <cstddef>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "risley/optics/observation_adjoint.hpp"
@@ -13,15 +14,30 @@
 /// does not start at the frame's origin.                                          [B21 App. A]
 namespace risley {
 
-/// Size and place of the prisms, the same for all of a train. All zero: thin prisms at one place,
-/// every beam starts at the frame's origin.
+/// Size and place of the prisms, in beam order: no value for 0, or one for all of a train, or one
+/// each. All zero: thin prisms at one place, every beam starts at the frame's origin.
 struct PrismGeometry {
-  double thickness = 0;  ///< of a prism on the axis, m
-  double spacing = 0;    ///< between the perpendicular faces of neighbouring prisms, m
+  std::vector<double> thickness;  ///< of a prism on the axis, m [prisms]
+  /// Between the perpendicular faces of a prism and of the next, m [prisms - 1].
+  std::vector<double> spacing;
+
+  friend bool operator==(const PrismGeometry&, const PrismGeometry&) = default;
 };
+
+/// One number of a PrismGeometry by its name.
+struct PrismSize {
+  std::string name;    ///< with its unit, e.g. "prism_thickness_m"
+  PrismGeometry rate;  ///< d geometry / d number: ones and zeros
+};
+
+/// The sizes that all prisms share, prism_thickness_m and prism_spacing_m.
+std::vector<PrismSize> shared_prism_sizes();
+/// The prisms' own: prism_thickness_a_m ..., then prism_spacing_a_m (from prism A to B) ...
+std::vector<PrismSize> own_prism_sizes(int prisms);
 
 /// X of the points where the faces, in beam order, cross the axis, m [2 prisms]. The perpendicular
 /// face of the last prism stands at 0, where the frame has its origin.
+/// @throws InvalidArgument for a geometry of another number of prisms
 std::vector<double> face_positions(const std::vector<FaceOrder>& face_order,
                                    const PrismGeometry& geometry);
 
@@ -137,8 +153,9 @@ struct Ray {
 
 /// The ray of one shot.
 /// @param rotation_angles  [prisms], rad, beam order
-/// @throws InvalidArgument when their number is not that of the prisms
+/// @param beam             number of the emitter, counted from 0
+/// @throws InvalidArgument when there are not as many angles as prisms, and as check_beam()
 Ray emergent_ray(const PrismTrain& train, const PrismGeometry& geometry,
-                 std::span<const double> rotation_angles);
+                 std::span<const double> rotation_angles, int beam = 0);
 
 }  // namespace risley

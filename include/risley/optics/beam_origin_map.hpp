@@ -23,8 +23,9 @@ struct BeamOriginMap {
   std::size_t size() const { return azimuth.size(); }
 };
 
-/// Sends beams at all combinations of `steps` rotation angles of two prisms through the train;
-/// with more prisms as many beams, their angles spread evenly by a low-discrepancy sequence.
+/// Sends beams of every emitter at all combinations of `steps` rotation angles of two prisms
+/// through the train; with more prisms as many beams, their angles spread evenly by a
+/// low-discrepancy sequence.
 /// @param steps  per turn; the paper's grid of 0.333 degree has 1,081, both ends included
 /// @throws InvalidArgument for steps below 2 or a cell that is not above 0
 BeamOriginMap beam_origin_map(const PrismTrain& train, const PrismGeometry& geometry,

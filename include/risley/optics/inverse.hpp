@@ -30,10 +30,12 @@ struct InverseSolution {
 /// practical model. The forward model is followed backwards through the last prism, which leaves
 /// one unknown angle; docs/theory/inverse.md derives the method.
 /// @param direction      unit vector, sensor frame
-/// @param fixed_angles   rotation angles, rad, of all prisms before the last two
+/// @param fixed_angles   rotation angles, rad, of all prisms before the last two: more than two
+///                       prisms reach a direction in infinitely many ways, and the caller chooses
+/// @param beam           number of the emitter, counted from 0
 /// @throws InvalidArgument for fewer than two prisms, a wrong number of fixed angles, or a
-///         direction that is not a unit vector
+///         direction that is not a unit vector, and as check_beam()
 InverseSolution rotation_angles_for(const PrismTrain& train, const Vector3<double>& direction,
-                                    std::span<const double> fixed_angles = {});
+                                    std::span<const double> fixed_angles = {}, int beam = 0);
 
 }  // namespace risley

@@ -16,6 +16,16 @@ struct Gradient {
   std::array<T, N> rotation_angles;
 };
 
+/// The derivative by one place of the whole flat vector, for a shot of one emitter.
+template <ModelScalar T, int N>
+T derivative_by(const Gradient<T, N>& gradient, int at, int beam) {
+  const int emitter = place::emitter(at, N);
+  if (emitter < 0) return gradient.parameters[static_cast<std::size_t>(at)];
+  if (emitter != beam) return T(0.0);
+  const int first = at - place::incident_beam_horizontal(emitter, N);  // 0 horizontal, 1 vertical
+  return gradient.parameters[static_cast<std::size_t>(place::incident_beam_horizontal() + first)];
+}
+
 /// What the derivatives need of a train, computed once for all shots.
 template <ModelScalar T, int N>
 struct PreparedDerivatives {
@@ -25,7 +35,7 @@ struct PreparedDerivatives {
     TurningVector<T> tilt_horizontal, tilt_vertical, bearing_horizontal, bearing_vertical;
     T wedge_sign;
   };
-  Vector3<T> incident_horizontal, incident_vertical;
+  Vector3<T> incident_horizontal, incident_vertical;  ///< of the emitter that fires
   std::array<Face, 2 * N> faces;
   T air;
   std::array<T, N> glass;
@@ -36,22 +46,11 @@ template <ModelScalar T, int N>
 PreparedDerivatives<T, N> prepare_derivatives(const std::array<T, parameter_count(N)>& parameters,
                                               const std::array<FaceOrder, N>& face_order) {
   const auto p = [&](int at) -> const T& { return parameters[static_cast<std::size_t>(at)]; };
-  // Derivatives of leaning_direction with respect to its two angles.
-  const auto horizontal_rate = [](const T& h, const T& v) {
-    const auto [sin_h, cos_h] = sin_cos(h);
-    const auto [sin_v, cos_v] = sin_cos(v);
-    return Vector3<T>{-sin_h * cos_v, -cos_h * cos_v, T(0.0)};
-  };
-  const auto vertical_rate = [](const T& h, const T& v) {
-    const auto [sin_h, cos_h] = sin_cos(h);
-    const auto [sin_v, cos_v] = sin_cos(v);
-    return Vector3<T>{-cos_h * sin_v, sin_h * sin_v, cos_v};
-  };
   PreparedDerivatives<T, N> d;
   const T& beam_h = p(place::incident_beam_horizontal());
   const T& beam_v = p(place::incident_beam_vertical());
-  d.incident_horizontal = horizontal_rate(beam_h, beam_v);
-  d.incident_vertical = vertical_rate(beam_h, beam_v);
+  d.incident_horizontal = leaning_horizontal_rate(beam_h, beam_v);
+  d.incident_vertical = leaning_vertical_rate(beam_h, beam_v);
   d.air = p(place::refractive_index_air());
   for (int prism = 0; prism < N; ++prism) {
     const bool last = prism == N - 1;
@@ -75,10 +74,12 @@ PreparedDerivatives<T, N> prepare_derivatives(const std::array<T, parameter_coun
       const Vector3<T> still{T(0.0), T(0.0), T(0.0)};
       auto& face = d.faces[static_cast<std::size_t>(2 * prism + side)];
       face.wedge_sign = sign;
-      face.tilt_horizontal = moved(horizontal_rate(h, v), still);
-      face.tilt_vertical = moved(vertical_rate(h, v), still);
-      face.bearing_horizontal = moved(horizontal_rate(h, v), horizontal_rate(bearing_h, bearing_v));
-      face.bearing_vertical = moved(vertical_rate(h, v), vertical_rate(bearing_h, bearing_v));
+      face.tilt_horizontal = moved(leaning_horizontal_rate(h, v), still);
+      face.tilt_vertical = moved(leaning_vertical_rate(h, v), still);
+      face.bearing_horizontal =
+          moved(leaning_horizontal_rate(h, v), leaning_horizontal_rate(bearing_h, bearing_v));
+      face.bearing_vertical =
+          moved(leaning_vertical_rate(h, v), leaning_vertical_rate(bearing_h, bearing_v));
     }
   }
   return d;

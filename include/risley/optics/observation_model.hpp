@@ -30,6 +30,20 @@ Vector3<T> leaning_direction(const T& horizontal, const T& vertical) {
   return {cos_h * cos_v, -sin_h * cos_v, sin_v};
 }
 
+/// Derivatives of leaning_direction by its two angles.
+template <ModelScalar T>
+Vector3<T> leaning_horizontal_rate(const T& horizontal, const T& vertical) {
+  const auto [sin_h, cos_h] = sin_cos(horizontal);
+  const auto [sin_v, cos_v] = sin_cos(vertical);
+  return {-sin_h * cos_v, -cos_h * cos_v, T(0.0)};
+}
+template <ModelScalar T>
+Vector3<T> leaning_vertical_rate(const T& horizontal, const T& vertical) {
+  const auto [sin_h, cos_h] = sin_cos(horizontal);
+  const auto [sin_v, cos_v] = sin_cos(vertical);
+  return {-cos_h * sin_v, sin_h * sin_v, cos_v};
+}
+
 /// Part of the wedge angle that a face's vertical angle contains: 0 for a perpendicular face,
 /// +1 for an angled second face, -1 for an angled first face.                  [B21 Eq. (15-18)]
 constexpr double wedge_sign(FaceOrder order, int face_of_prism) {
@@ -59,7 +73,7 @@ struct PreparedTrain {
     TurningVector<T> normal;
     T index_ratio;  ///< index before the face over index behind it
   };
-  Vector3<T> incident;
+  Vector3<T> incident;  ///< of the emitter that fires
   std::array<Face, 2 * N> faces;
 };
 
@@ -128,8 +142,9 @@ struct Observation {
 
 /// Where one shot of a train points.
 /// @param rotation_angles  [prisms], rad, beam order
-/// @throws InvalidArgument when their number is not that of the prisms
-Observation observe(const PrismTrain& train, std::span<const double> rotation_angles);
+/// @param beam             number of the emitter, counted from 0
+/// @throws InvalidArgument when there are not as many angles as prisms, and as check_beam()
+Observation observe(const PrismTrain& train, std::span<const double> rotation_angles, int beam = 0);
 
 /// Ideal rotation angles at constant speed.                                     [B21 Eq. (1-2)]
 inline double rotation_angle_at(double start_angle, double angular_velocity, double time) {

@@ -6,15 +6,44 @@
 #include <string_view>
 #include <vector>
 
+#include "risley/optics/prism.hpp"
+
 namespace risley {
 
-/// Places in the flat parameter vector of a train of N prisms: air, incident beam, then six per
-/// prism in beam order. The last prism's axis is the X axis of the sensor, so its two
-/// bearing-tilt places exist only to keep the stride and always hold zero.
+/// Largest number of emitters behind one train (Livox builds one and six).
+inline constexpr int kMaxEmitters = 8;
+
+/// How many prisms and emitters a train has: what its parameters depend on.
+struct TrainShape {
+  int prisms = 0;
+  int emitters = 1;
+
+  friend bool operator==(const TrainShape&, const TrainShape&) = default;
+};
+
+/// @throws InvalidArgument unless there are 1 to kMaxPrisms prisms and 1 to kMaxEmitters emitters
+void check_shape(const TrainShape& shape);
+
+/// Places in the flat parameter vector of a train: air, incident beam of the first emitter, then
+/// six per prism in beam order, then two per further emitter. A shot sees the part that a train
+/// with one emitter has, with its own emitter's beam. The last prism's axis is the X axis of the
+/// sensor, so its two bearing-tilt places exist only to keep the stride and always hold zero.
 namespace place {
 constexpr int refractive_index_air() { return 0; }
 constexpr int incident_beam_horizontal() { return 1; }
 constexpr int incident_beam_vertical() { return 2; }
+/// Of an emitter, counted from 0.
+constexpr int incident_beam_horizontal(int emitter, int prisms) {
+  return emitter == 0 ? 1 : 1 + 6 * prisms + 2 * emitter;
+}
+constexpr int incident_beam_vertical(int emitter, int prisms) {
+  return incident_beam_horizontal(emitter, prisms) + 1;
+}
+/// The emitter that a place belongs to, or -1.
+constexpr int emitter(int at, int prisms) {
+  if (at == incident_beam_horizontal() || at == incident_beam_vertical()) return 0;
+  return at < 3 + 6 * prisms ? -1 : (at - 1 - 6 * prisms) / 2;
+}
 constexpr int refractive_index(int prism) { return 3 + 6 * prism; }
 constexpr int wedge_angle(int prism) { return 4 + 6 * prism; }
 constexpr int prism_tilt_horizontal(int prism) { return 5 + 6 * prism; }
@@ -27,8 +56,14 @@ constexpr int frame_yaw(int prisms) { return bearing_tilt_horizontal(prisms - 1)
 constexpr int frame_pitch(int prisms) { return bearing_tilt_vertical(prisms - 1); }
 }  // namespace place
 
-/// Length of the flat parameter vector.
+/// Length of the flat parameter vector with one emitter: what one shot depends on.
 constexpr int parameter_count(int prisms) { return 3 + 6 * prisms; }
+/// Length of the whole flat parameter vector.
+constexpr int parameter_count(const TrainShape& shape) {
+  return parameter_count(shape.prisms) + 2 * (shape.emitters - 1);
+}
+/// Of the largest train.
+inline constexpr int kMaxParameters = parameter_count(TrainShape{kMaxPrisms, kMaxEmitters});
 
 /// What a named quantity describes.
 enum class ParameterKind {
@@ -49,13 +84,15 @@ struct ParameterInfo {
   std::vector<int> places;      ///< of the flat vector, or the rotor's number
 };
 
-/// THE list of parameters for a train of so many prisms: those shared by all prisms first
-/// ("refractive_index"), then the prisms' own ("refractive_index_a"), then speeds and angles.
-/// @param prisms  1 to kMaxPrisms
-const std::vector<ParameterInfo>& parameter_list(int prisms);
+/// THE list of parameters of a train: those shared by all prisms first ("refractive_index"), then
+/// the emitters' ("incident_beam_horizontal_deg" of the only one, otherwise numbered from 1,
+/// "incident_beam_1_horizontal_deg"), then the prisms' own ("refractive_index_a"), then speeds and
+/// angles.
+/// @throws InvalidArgument as check_shape()
+const std::vector<ParameterInfo>& parameter_list(const TrainShape& shape);
 
 /// The entry of that name. @throws InvalidArgument that lists the known names
-const ParameterInfo& find_parameter(std::string_view name, int prisms);
+const ParameterInfo& find_parameter(std::string_view name, const TrainShape& shape);
 
 /// @param value  SI units
 /// @throws InvalidArgument naming the parameter, value, unit and range, also when it is not finite

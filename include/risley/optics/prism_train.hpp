@@ -13,17 +13,23 @@
 
 namespace risley {
 
-/// Some prisms in beam order with all their parameters: what the optics know of a sensor.
+/// Some prisms in beam order, the emitters in front of them, and all their parameters: what the
+/// optics know of a sensor.
 class PrismTrain {
  public:
+  /// No prisms at all, to assign a train to: whatever needs a train refuses this one.
+  PrismTrain() = default;
   /// Ideal train: every error zero, air 1.0, glass 1.51, wedges 18 deg.           [B21 Eq. (30)]
-  /// @throws InvalidArgument unless there are 1 to kMaxPrisms prisms
-  explicit PrismTrain(std::vector<FaceOrder> face_order);
+  /// The beams of all emitters run along the X axis.
+  /// @throws InvalidArgument as check_shape()
+  explicit PrismTrain(std::vector<FaceOrder> face_order, int emitters = 1);
 
   int prisms() const { return static_cast<int>(face_order_.size()); }
+  int emitters() const { return emitters_; }
+  TrainShape shape() const { return {prisms(), emitters_}; }
   const std::vector<FaceOrder>& face_order() const { return face_order_; }
 
-  /// The flat vector, SI units, length parameter_count(prisms()); see namespace place.
+  /// The flat vector, SI units, length parameter_count(shape()); see namespace place.
   const std::vector<double>& parameters() const { return parameters_; }
 
   /// Value at one place of the flat vector, SI units.
@@ -35,22 +41,32 @@ class PrismTrain {
   /// Sets a named train parameter, SI units. @throws InvalidArgument (unknown name, bounds)
   void set(std::string_view name, double value);
 
-  /// Sets one place without a bounds check, for solvers that step through the parameter space.
+  /// Sets one place of any value, for solvers that step through the parameter space.
   void set_place(int place, double value) { parameters_[static_cast<std::size_t>(place)] = value; }
 
-  /// The same glass and wedges with every error parameter zero.
+  /// The same glass and wedges with every error parameter zero. The directions of several emitters
+  /// are no errors and stay.
   PrismTrain without_errors() const;
 
  private:
   std::vector<FaceOrder> face_order_;
+  int emitters_ = 1;
   std::vector<double> parameters_;
 };
 
-/// The parameters of a train as a fixed-size array, for the templates of the observation model.
+/// @param beam  number of the emitter, counted from 0, as in recordings
+/// @throws InvalidArgument naming the number and what is allowed
+void check_beam(const PrismTrain& train, int beam);
+
+/// What a shot of one emitter sees of a train's parameters, as a fixed-size array, for the
+/// templates of the observation model.
+/// @param beam  as check_beam(), which the caller has asked
 template <int N>
-std::array<double, parameter_count(N)> parameter_array(const PrismTrain& train) {
+std::array<double, parameter_count(N)> parameter_array(const PrismTrain& train, int beam = 0) {
   std::array<double, parameter_count(N)> values{};
   for (int i = 0; i < parameter_count(N); ++i) values[static_cast<std::size_t>(i)] = train[i];
+  values[place::incident_beam_horizontal()] = train[place::incident_beam_horizontal(beam, N)];
+  values[place::incident_beam_vertical()] = train[place::incident_beam_vertical(beam, N)];
   return values;
 }
 
@@ -59,24 +75,6 @@ std::array<FaceOrder, N> face_order_array(const PrismTrain& train) {
   std::array<FaceOrder, N> values{};
   for (std::size_t i = 0; i < N; ++i) values[i] = train.face_order()[i];
   return values;
-}
-
-/// Calls function.template operator()<N>() for the run-time number of prisms: the one place where
-/// run-time and compile-time sizes meet. @throws InvalidArgument unless 1 <= prisms <= kMaxPrisms
-template <class Function>
-decltype(auto) with_prism_count(int prisms, Function&& function) {
-  switch (prisms) {
-    case 1:
-      return function.template operator()<1>();
-    case 2:
-      return function.template operator()<2>();
-    case 3:
-      return function.template operator()<3>();
-    case 4:
-      return function.template operator()<4>();
-    default:
-      throw InvalidArgument("number of prisms = " + std::to_string(prisms) + ", allowed 1 to 4");
-  }
 }
 
 }  // namespace risley

@@ -26,6 +26,7 @@ struct CalibrationReport {
   std::uint64_t observations = 0;  ///< rows of all recordings
   std::string sensor, serial, preset;
   int prisms = 0;
+  std::optional<int> emitters;  ///< not in files of older versions, which know one alone
   calibration::CalibrationMethod method = calibration::CalibrationMethod::adjustment;
 
   bool converged = false;
@@ -55,6 +56,8 @@ struct CalibrationReport {
 
   std::vector<Chart> truth_charts, thickness_charts, wall_charts, view_charts;
   Provenance provenance;
+
+  TrainShape shape() const { return {prisms, emitters.value_or(1)}; }
 };
 
 /// What a report is made of. References must live until it is made.

@@ -25,7 +25,8 @@ struct EstimateReport {
   ReportedRecording recording;
   std::string sensor;
   int prisms = 0;
-  int combination = 0;  ///< speed combination 1 or 2; 0: the sensor has none
+  std::optional<int> emitters;  ///< not in files of older versions, which know one alone
+  int combination = 0;          ///< speed combination 1 or 2; 0: the sensor has none
   bool mirrored = false;
   std::string method;  ///< "map" or "ekf"
 
@@ -80,6 +81,8 @@ struct EstimateReport {
 
   std::vector<Chart> parameter_charts, rotor_charts, residual_charts, pattern_charts;
   Provenance provenance;
+
+  TrainShape shape() const { return {prisms, emitters.value_or(1)}; }
 };
 
 /// What a report is made of. References must live until it is made.

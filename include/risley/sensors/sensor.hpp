@@ -22,8 +22,11 @@ struct Knowledge {
   std::string source;  ///< data sheet page, paper table, or the calibration that found it
 };
 
-/// Which nominal direction of rotation the rotors run in.            [B21 section 2.4]
-enum class SpeedCombination : int { first = 1, second = 2 };
+/// One way in which the rotors of a sensor can run.
+struct SpeedCombination {
+  std::vector<double> angular_velocity;  ///< nominal [prisms], rad/s
+  std::vector<FaceOrder> face_order;     ///< of the train that runs so; empty: always the same
+};
 
 /// What a calibration holds a sensor's parameters against.
 enum class CalibrationReference {
@@ -36,15 +39,18 @@ std::string to_string(CalibrationReference reference);
 
 /// A named instrument: its optics, its rotors, its noise and its limits. SI units.
 struct Sensor {
-  std::string name;          ///< "mid-40"
-  std::string manufacturer;  ///< "Livox"
-  std::string model;         ///< "Mid-40"
-  std::string serial;        ///< empty for a type rather than a unit
-  PrismTrain train{parse_face_order("PA-AP")};
+  std::string name;                      ///< "mid-40"
+  std::string manufacturer;              ///< "Livox"
+  std::string model;                     ///< "Mid-40"
+  std::string serial;                    ///< empty for a type rather than a unit
+  PrismTrain train;                      ///< without prisms until it is set
   std::vector<double> angular_velocity;  ///< [prisms], rad/s
-  /// Which of two speed combinations this is, for sensors that have two. In the second one the
-  /// fast rotor comes first and both directions are kept: (wA, wB) becomes (-wB, -wA).
-  std::optional<SpeedCombination> combination;
+  /// Which speed combination this is, from 1, for sensors that have several.
+  std::optional<int> combination;
+  /// All of them. Empty with a combination: the two of a sensor with two prisms, where the second
+  /// has the fast rotor first and both directions kept, (wA, wB) becomes (-wB, -wA).
+  /// [B21 section 2.4]
+  std::vector<SpeedCombination> combinations;
   std::vector<Knowledge> knowledge;  ///< of parameters, speeds and the numbers below, any order
 
   CalibrationReference reference = CalibrationReference::none;
@@ -67,22 +73,20 @@ struct Sensor {
   double shot_rate = 0;                ///< shots per second
   int device_type = 1;                 ///< Livox device type of recordings
   double beam_divergence_horizontal = 0, beam_divergence_vertical = 0;  ///< full angle, rad
-  double prism_thickness = 0;  ///< on the axis, m                        [B21 App. A]
-  double prism_spacing = 0;    ///< between perpendicular faces, m        [B21 App. A]
+  PrismGeometry geometry;  ///< sizes of the prisms                       [B21 App. A]
 
   /// Where the numbers come from when they were computed: name and value pairs such as command,
   /// version, seed, input_sha256.
   std::vector<std::pair<std::string, std::string>> provenance;
 
   int prisms() const { return train.prisms(); }
+  TrainShape shape() const { return train.shape(); }
   /// Variance of one range by its parts, which are independent of each other; rounding not
   /// included.
   /// @param range          m
   /// @param tan_incidence  of the angle between beam and surface normal; 0 where it is not known
   /// @param intensity      as the sensor reports it; 0 counts as 1
   double range_variance(double range, double tan_incidence, double intensity) const;
-
-  PrismGeometry prism_geometry() const { return {prism_thickness, prism_spacing}; }
 
   /// Value of a train parameter or angular velocity, SI units. @throws InvalidArgument
   double get(std::string_view parameter) const;
@@ -98,8 +102,13 @@ struct Sensor {
   void set_knowledge(Knowledge entry);
 };
 
-/// The same sensor in that speed combination; what is known of the speeds goes with them.
-/// @throws InvalidArgument when the sensor has only one
-Sensor with_combination(const Sensor& sensor, SpeedCombination combination);
+/// The same sensor in that speed combination. Where its speeds are those of the one it is in, but
+/// for order and sign, they keep their exact values, and what is known of them goes along.
+/// @param combination  from 1
+/// @throws InvalidArgument when the sensor has no such combination
+Sensor with_combination(const Sensor& sensor, int combination);
+
+/// The sensor in each of its speed combinations, its own first; itself when it has only one.
+std::vector<Sensor> in_all_combinations(const Sensor& sensor);
 
 }  // namespace risley::sensors

@@ -46,7 +46,8 @@ struct SimulationSettings {
 /// the number of shots. The numbers depend on the settings without threads alone, not on the size
 /// of the pieces.
 ///
-/// Shot i is fired at round(i 1e9 / rate) ns, and the truth is that of this rounded time. Beams
+/// Shot i is fired at round(i 1e9 / rate) ns by emitter i modulo their number, and the truth is
+/// that of this rounded time. Beams
 /// start where they leave the last prism [B21 App. A], and ranges count from there; a sensor whose
 /// prism sizes are 0 sends all of them from its origin. A beam that hits nothing, or beyond the
 /// sensor's limits of range, has no return: range 0 and valid 0, with the direction it was reported

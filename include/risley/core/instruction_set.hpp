@@ -1,0 +1,67 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace risley {
+
+/// Instruction sets that kernels exist in; baseline is what the compiler targets by default.
+enum class InstructionSet { baseline, avx2, avx512 };
+
+std::string to_string(InstructionSet set);
+
+/// The instruction sets this binary holds and this processor runs, best last.
+const std::vector<InstructionSet>& available_instruction_sets();
+
+/// The last of available_instruction_sets().
+InstructionSet best_instruction_set();
+
+/// @throws InvalidArgument when this binary does not hold it or this processor does not run it
+void check_available(InstructionSet set);
+
+/// The copies of one kernel, a function of plain arguments: nullptr where the binary has none. A
+/// kernel for another device would be one more copy.
+template <class Function>
+struct KernelCopies {
+  Function* baseline;
+  Function* avx2;
+  Function* avx512;
+
+  /// The copy to call. @throws InvalidArgument as check_available()
+  Function& at(InstructionSet set) const {
+    check_available(set);
+    if (set == InstructionSet::avx512 && avx512 != nullptr) return *avx512;
+    if (set == InstructionSet::avx2 && avx2 != nullptr) return *avx2;
+    return *baseline;
+  }
+};
+
+/// Declares the copies of a kernel within its layer's namespace: RISLEY_DECLARE_KERNEL(void
+/// add(const AddArguments&)). Its source is compiled once per set: cmake/RisleySimdKernels.cmake.
+#define RISLEY_DECLARE_KERNEL(...) \
+  namespace kernel_baseline {      \
+  __VA_ARGS__;                     \
+  }                                \
+  namespace kernel_avx2 {          \
+  __VA_ARGS__;                     \
+  }                                \
+  namespace kernel_avx512 {        \
+  __VA_ARGS__;                     \
+  }
+
+/// The copies of a declared kernel, by its name.
+#ifdef RISLEY_HAS_X86_KERNELS
+#define RISLEY_KERNEL_COPIES(function)                                           \
+  risley::KernelCopies<decltype(kernel_baseline::function)> {                    \
+    &kernel_baseline::function, &kernel_avx2::function, &kernel_avx512::function \
+  }
+#else
+#define RISLEY_KERNEL_COPIES(function)                        \
+  risley::KernelCopies<decltype(kernel_baseline::function)> { \
+    &kernel_baseline::function, nullptr, nullptr              \
+  }
+#endif
+
+}  // namespace risley

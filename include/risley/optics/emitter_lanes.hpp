@@ -1,0 +1,104 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+#include "risley/core/simd.hpp"
+#include "risley/optics/observation_adjoint.hpp"
+
+namespace risley {
+
+/// The emitters of a kernel's shots. With several, every lane has an emitter of its own: incident
+/// beam and its derivatives are taken from a small table, lane by lane. With one, nothing is done
+/// at all, and everything stays as prepare() made it.
+template <class Batch, int N>
+class EmitterLanes {
+ public:
+  static constexpr std::size_t kLanes = Batch::size;
+  /// Places of the flat vector, with those of all emitters.
+  static constexpr std::size_t kPlaces =
+      static_cast<std::size_t>(parameter_count(TrainShape{N, kMaxEmitters}));
+
+  /// @param parameters  whole flat vector
+  /// @param beam        emitter of every shot, each below emitters, or nullptr: all the first
+  EmitterLanes(const double* parameters, int emitters, const std::uint8_t* beam)
+      : emitters_(emitters), beam_(beam), number_(0.0) {
+    for (int j = 0; several() && j < emitters_; ++j) {
+      const Batch h(parameters[place::incident_beam_horizontal(j, N)]);
+      const Batch v(parameters[place::incident_beam_vertical(j, N)]);
+      set_row(j, 0, leaning_direction(h, v));
+      set_row(j, 3, leaning_horizontal_rate(h, v));
+      set_row(j, 6, leaning_vertical_rate(h, v));
+    }
+  }
+
+  bool several() const { return emitters_ > 1; }
+
+  /// Turns to shots [shot, shot + kLanes); beyond `end` the last one is repeated.
+  void select(std::size_t shot, std::size_t end) {
+    if (!several()) return;
+    alignas(64) double lanes[kLanes];
+    for (std::size_t i = 0; i < kLanes; ++i) {
+      index_[i] = beam_ == nullptr ? 0 : beam_[shot + i < end ? shot + i : end - 1];
+      lanes[i] = static_cast<double>(index_[i]);
+    }
+    number_ = Batch::load_aligned(lanes);
+  }
+
+  /// Puts the selected shots' beams into a train.
+  void apply(PreparedTrain<Batch, N>& train) const {
+    if (several()) train.incident = vector(0);
+  }
+  void apply(PreparedDerivatives<Batch, N>& derivatives) const {
+    if (!several()) return;
+    derivatives.incident_horizontal = vector(3);
+    derivatives.incident_vertical = vector(6);
+  }
+
+  /// The derivatives of the selected shots by the places of the whole flat vector: those of an
+  /// emitter are zero in the lanes of the others.
+  /// @param storage  [kPlaces], used with several emitters
+  const Batch* by_place(const Gradient<Batch, N>& gradient, Batch* storage) const {
+    if (!several()) return gradient.parameters.data();
+    for (std::size_t i = 0; i < parameter_count(N); ++i) storage[i] = gradient.parameters[i];
+    const Batch zero(0.0);
+    for (int j = emitters_ - 1; j >= 0; --j) {
+      const auto mine = number_ == Batch(static_cast<double>(j));
+      storage[place::incident_beam_horizontal(j, N)] =
+          xsimd::select(mine, gradient.parameters[place::incident_beam_horizontal()], zero);
+      storage[place::incident_beam_vertical(j, N)] =
+          xsimd::select(mine, gradient.parameters[place::incident_beam_vertical()], zero);
+    }
+    return storage;
+  }
+
+ private:
+  void set_row(int emitter, std::size_t first, const Vector3<Batch>& value) {
+    const Batch* const components[3] = {&value.x, &value.y, &value.z};
+    for (std::size_t i = 0; i < 3; ++i) {
+      alignas(64) double lanes[kLanes];
+      components[i]->store_aligned(lanes);
+      table_[first + i][emitter] = lanes[0];
+    }
+  }
+
+  Vector3<Batch> vector(std::size_t first) const {
+    return {component(first), component(first + 1), component(first + 2)};
+  }
+  Batch component(std::size_t row) const {
+    alignas(64) double lanes[kLanes];
+    for (std::size_t i = 0; i < kLanes; ++i) lanes[i] = table_[row][index_[i]];
+    return Batch::load_aligned(lanes);
+  }
+
+  int emitters_;
+  const std::uint8_t* beam_;
+  Batch number_;
+  std::size_t index_[kLanes] = {};
+  double table_[9][kMaxEmitters] = {};
+};
+
+}  // namespace risley
