@@ -43,7 +43,8 @@ double knot_interval(const std::vector<estimation::RotorProcess>& process) {
 /// one against directions, otherwise the default ones.
 void choose_parameters(const sensors::Sensor& calibration, estimation::EstimateOptions& options) {
   if (calibration.reference != CalibrationReference::directions) return;
-  const auto defaults = estimation::default_free_names(calibration.shape());
+  const auto defaults =
+      estimation::default_free_names(calibration.shape(), estimation::one_glass(calibration.train));
   const auto& names = calibration.covariance_names;
   for (const std::string& name : defaults) {
     if (std::find(names.begin(), names.end(), name) == names.end()) options.fixed.push_back(name);

@@ -13,6 +13,7 @@
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
 #include "risley/core/golden_section.hpp"
+#include "risley/optics/batch.hpp"
 
 #include "estimation/residual_model.hpp"
 
@@ -132,7 +133,7 @@ class Filter {
   /// Observed minus modelled at a state, rad; NaN when the beam does not get through.
   Eigen::Vector2d residual_at(const Eigen::VectorXd& mean, std::size_t row) {
     model_.set(mean.head(statics_));
-    model_.linearise(angles(mean));
+    model_.linearise(angles(mean), series_.beam[row]);
     Eigen::Vector2d residual = model_.residual(series_.azimuth[row], series_.zenith[row]);
     if (reference_) model_.set(reference_->parameters);
     return residual;
@@ -156,7 +157,8 @@ class Filter {
       model_.set(state.mean.head(statics_));
       at = angles(state.mean);
     }
-    model_.linearise(at);  // an invalid beam makes the innovation NaN, which no gate lets through
+    // An invalid beam makes the innovation NaN, which no gate lets through.
+    model_.linearise(at, series_.beam[row]);
     innovation_ = model_.residual(series_.azimuth[row], series_.zenith[row]);
     jacobian_.setZero();
     jacobian_.leftCols(statics_) = model_.d_parameters();
@@ -242,7 +244,7 @@ std::vector<unsigned char> screen(const AngleSeries& series, const Start& start,
       angle[k] = reference ? reference->states->rotation_angle[k][i]
                            : start.rotation_angle[k] + t * start.angular_velocity[k];
     }
-    model.linearise(angle);
+    model.linearise(angle, series.beam[i]);
     const double variance = options.angle_noise * options.angle_noise +
                             static_cast<double>(series.azimuth_rounding_variance[i] +
                                                 series.zenith_rounding_variance[i]);
@@ -453,6 +455,7 @@ EkfResult run_ekf(const AngleSeries& series, const Start& start, const EkfOption
   if (options.passes < 1) {
     throw InvalidArgument(fmt::format("passes = {}, allowed 1 or more", options.passes));
   }
+  check_beams(start.train, series.beam, series.size());
   return with_prism_count(start.train.prisms(),
                           [&]<int N>() { return run<N>(series, start, options, progress); });
 }

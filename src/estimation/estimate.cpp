@@ -402,7 +402,7 @@ Start start_anywhere(const AngleSeries& series, const AngleSeries& head,
 
 std::vector<FreeParameter> chosen_parameters(const EstimateOptions& options) {
   const TrainShape shape = options.sensor.shape();
-  std::vector<std::string> names = default_free_names(shape);
+  std::vector<std::string> names = default_free_names(shape, one_glass(options.sensor.train));
   for (const std::string& name : options.fixed) {
     find_parameter(name, shape);  // an unknown name is an error; one that is not free is no harm
     std::erase(names, name);

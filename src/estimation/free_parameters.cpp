@@ -11,9 +11,20 @@
 
 namespace risley::estimation {
 
-std::vector<std::string> default_free_names(const TrainShape& shape) {
+bool one_glass(const PrismTrain& train) {
+  for (int i = 1; i < train.prisms(); ++i) {
+    if (train[place::refractive_index(i)] != train[place::refractive_index(0)]) return false;
+  }
+  return true;
+}
+
+std::vector<std::string> default_free_names(const TrainShape& shape, bool one_glass) {
   const int prisms = shape.prisms;
-  std::vector<std::string> names{"refractive_index"};
+  std::vector<std::string> names;
+  if (one_glass) names.emplace_back("refractive_index");
+  for (int i = 0; !one_glass && i < prisms; ++i) {
+    names.push_back(fmt::format("refractive_index_{}", prism_letter(i)));
+  }
   for (const ParameterInfo& info : parameter_list(shape)) {
     if (info.name.starts_with("incident_beam")) names.push_back(info.name);
   }
@@ -22,6 +33,9 @@ std::vector<std::string> default_free_names(const TrainShape& shape) {
     names.push_back(fmt::format("bearing_tilt_{}_vertical_deg", prism_letter(i)));
   }
   for (int i = 0; i + 1 < prisms; ++i) {
+    if (shape.emitters > 1) {
+      names.push_back(fmt::format("prism_tilt_{}_horizontal_deg", prism_letter(i)));
+    }
     names.push_back(fmt::format("prism_tilt_{}_vertical_deg", prism_letter(i)));
   }
   names.push_back(fmt::format("prism_tilt_{}_horizontal_deg", prism_letter(prisms - 1)));

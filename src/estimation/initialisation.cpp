@@ -18,6 +18,7 @@
 #include "risley/estimation/diagnostics.hpp"
 #include "risley/estimation/normal_equations.hpp"
 #include "risley/estimation/spectral_lines.hpp"
+#include "risley/optics/batch.hpp"
 
 #include "estimation/field_of_view.hpp"
 #include "estimation/frame_prior.hpp"
@@ -601,6 +602,7 @@ Start find_start(const AngleSeries& head, const sensors::Sensor& sensor,
     throw InvalidArgument(fmt::format(
         "{}: the speeds of all rotors are 0 deg/s, at least one must turn", sensor.name));
   }
+  check_beams(sensor.train, head.beam, head.size());
   if (head.size() > 1) {
     const double step = 1e-9 * static_cast<double>(median_step_ns(head.time_ns));
     double fastest = 0;

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <vector>
 
@@ -19,7 +20,7 @@ template <int N>
 class ResidualModel {
  public:
   ResidualModel(const PrismTrain& train, const std::vector<FreeParameter>& free)
-      : parameters_(parameter_array<N>(train)),
+      : all_(train.parameters()),
         face_order_(face_order_array<N>(train)),
         free_(free),
         d_parameters_(2, static_cast<Eigen::Index>(free.size())) {}
@@ -28,23 +29,27 @@ class ResidualModel {
   void set(const Eigen::Ref<const Eigen::VectorXd>& values) {
     for (std::size_t i = 0; i < free_.size(); ++i) {
       for (const int at : free_[i].places) {
-        parameters_[static_cast<std::size_t>(at)] = values[static_cast<Eigen::Index>(i)];
+        all_[static_cast<std::size_t>(at)] = values[static_cast<Eigen::Index>(i)];
       }
     }
-    train_ = prepare<double, N>(parameters_, face_order_);
-    derivatives_ = prepare_derivatives<double, N>(parameters_, face_order_);
+    std::array<double, parameter_count(N)> parameters;
+    std::copy_n(all_.begin(), parameters.size(), parameters.begin());
+    train_ = prepare<double, N>(parameters, face_order_);
+    derivatives_ = prepare_derivatives<double, N>(parameters, face_order_);
   }
 
   /// Evaluates one shot. @return false when the beam does not get through
-  bool linearise(const std::array<double, N>& rotation_angle) {
+  /// @param beam  emitter that fired, of those that the train has
+  bool linearise(const std::array<double, N>& rotation_angle, int beam) {
+    if (all_.size() > parameter_count(N)) turn_to(beam);
     const auto result = linearise_angles(train_, derivatives_, rotation_angle);
     azimuth_ = result.angles.azimuth;
     zenith_ = result.angles.zenith;
     for (std::size_t i = 0; i < free_.size(); ++i) {
       double azimuth = 0, zenith = 0;
       for (const int at : free_[i].places) {
-        azimuth += result.azimuth.parameters[static_cast<std::size_t>(at)];
-        zenith += result.zenith.parameters[static_cast<std::size_t>(at)];
+        azimuth += derivative_by(result.azimuth, at, beam);
+        zenith += derivative_by(result.zenith, at, beam);
       }
       d_parameters_(0, static_cast<Eigen::Index>(i)) = azimuth;
       d_parameters_(1, static_cast<Eigen::Index>(i)) = zenith;
@@ -66,7 +71,15 @@ class ResidualModel {
   const Eigen::Matrix<double, 2, N>& d_angles() const { return d_angles_; }
 
  private:
-  std::array<double, parameter_count(N)> parameters_;
+  /// Takes the beam of one of several emitters.
+  void turn_to(int beam) {
+    const auto at = static_cast<std::size_t>(place::incident_beam_horizontal(beam, N));
+    train_.incident = leaning_direction(all_[at], all_[at + 1]);
+    derivatives_.incident_horizontal = leaning_horizontal_rate(all_[at], all_[at + 1]);
+    derivatives_.incident_vertical = leaning_vertical_rate(all_[at], all_[at + 1]);
+  }
+
+  std::vector<double> all_;  // flat vector
   std::array<FaceOrder, N> face_order_;
   const std::vector<FreeParameter>& free_;
   PreparedTrain<double, N> train_;

@@ -16,11 +16,15 @@ struct FreeParameter {
   double prior_sigma = 0;   ///< SI units
 };
 
-/// The paper's choice for any number of prisms: the common refractive index, all incident beams,
-/// every bearing tilt, the vertical tilt of every prism and the horizontal tilt of the last. Air,
-/// wedge angles and the other horizontal tilts cannot be told from the rest and stay fixed.
-/// [B21 section 2.3]
-std::vector<std::string> default_free_names(const TrainShape& shape);
+/// Whether all prisms of a train are of one glass.
+bool one_glass(const PrismTrain& train);
+
+/// The paper's choice for any number of prisms: the refractive index, all incident beams, every
+/// bearing tilt, the vertical tilt of every prism and the horizontal tilt of the last. Air, wedge
+/// angles and the other horizontal tilts cannot be told from the rest and stay fixed.
+/// [B21 section 2.3] Several emitters do tell the other horizontal tilts: they are free then.
+/// @param one_glass  one index for all prisms; otherwise each has its own
+std::vector<std::string> default_free_names(const TrainShape& shape, bool one_glass = true);
 
 /// Free parameters by name. The priors are wide on purpose (1 degree, 0.01 in the index): they keep
 /// the first updates inside the range of the linearisation and weigh nothing against a recording.
