@@ -35,7 +35,7 @@ constexpr double kAngleNoise = radians_from_degrees(0.03);
 PlaneView wall_view(const std::string& face_order, std::vector<int> places, unsigned seed) {
   PlaneView view;
   view.train = testing::imperfect_train(face_order, 0.5, seed);
-  view.geometry = {0.007, 0.03};
+  view.geometry = {{0.007}, {0.03}};
   view.places = std::move(places);
   view.range_offset = 0.013;
   view.range_variance = kRangeNoise * kRangeNoise;
@@ -243,6 +243,87 @@ TEST_P(PlaneEquationsOfATrain, EqualTheScalarModel) {
 INSTANTIATE_TEST_SUITE_P(FaceOrders, PlaneEquationsOfATrain,
                          ::testing::Values("PA", "AP", "PA-AP", "AP-PA", "PA-AP-PA", "AP-AP-PA",
                                            "PA-AP-PA-AP"),
+                         [](const auto& order) {
+                           std::string name = order.param;
+                           std::erase(name, '-');
+                           return name;
+                         });
+
+/// The shots of one emitter, as its own.
+RangedShots shots_of_emitter(const RangedShots& shots, int beam) {
+  RangedShots own;
+  own.resize(shots.prisms(), 0);
+  for (std::size_t i = 0; i < shots.size(); ++i) {
+    if (shots.beam[i] != beam) continue;
+    const std::size_t row = own.size();
+    own.resize(shots.prisms(), row + 1);
+    own.set_row(row, shots, i);
+    own.beam[row] = 0;
+  }
+  return own;
+}
+
+class PlaneEquationsOfEmitters : public ::testing::TestWithParam<std::string> {};
+
+TEST_P(PlaneEquationsOfEmitters, AreTheSumOfThoseOfEach) {
+  constexpr int kEmitters = 6;
+  PlaneView view = wall_view(GetParam(), {}, 1);
+  view.train = testing::imperfect_train(GetParam(), 0.5, 1, kEmitters);
+  for (int at = 0; at < parameter_count(view.train.shape()); ++at) view.places.push_back(at);
+  RangedShots shots = shoot(view, 301, kRangeNoise, 2);
+  for (std::size_t i = 0; i < shots.size(); ++i) {
+    shots.beam.push_back(static_cast<std::uint8_t>(i * i % kEmitters));
+  }
+  view.plane.distance += 0.01;
+  const int prisms = view.train.prisms();
+  const PlaneColumns columns{static_cast<int>(view.places.size()), prisms};
+  Eigen::MatrixXd hessian = Eigen::MatrixXd::Zero(columns.size(), columns.size());
+  Eigen::VectorXd gradient = Eigen::VectorXd::Zero(columns.size());
+  double cost = 0;
+  std::size_t lost = 0;
+  for (int beam = 0; beam < kEmitters; ++beam) {
+    PlaneView own = view;
+    own.train = testing::train_of_emitter(view.train, beam);
+    own.places.clear();
+    std::vector<int> places_of_columns;
+    for (const int at : view.places) {
+      const int mine = testing::place_of_emitter(at, beam, prisms);
+      if (mine < 0) continue;
+      own.places.push_back(mine);
+      places_of_columns.push_back(at);
+    }
+    for (int c = columns.places; c < columns.size(); ++c) places_of_columns.push_back(c);
+    const PlaneEquations part =
+        plane_equations(shots_of_emitter(shots, beam), own, {}, InstructionSet::baseline);
+    for (std::size_t a = 0; a < places_of_columns.size(); ++a) {
+      const auto from = static_cast<Eigen::Index>(a);
+      gradient[places_of_columns[a]] += part.gradient[from];
+      for (std::size_t b = 0; b < places_of_columns.size(); ++b) {
+        hessian(places_of_columns[a], places_of_columns[b]) +=
+            part.hessian(from, static_cast<Eigen::Index>(b));
+      }
+    }
+    cost += part.cost;
+    lost += part.lost;
+  }
+  for (const InstructionSet set : available_instruction_sets()) {
+    SCOPED_TRACE(to_string(set));
+    const PlaneEquations found = plane_equations(shots, view, {}, set);
+    EXPECT_EQ(found.lost, lost);
+    EXPECT_NEAR(found.cost, cost, 1e-10 * cost);
+    EXPECT_LT((found.hessian - hessian).cwiseAbs().maxCoeff(),
+              1e-11 * hessian.cwiseAbs().maxCoeff());
+    EXPECT_LT((found.gradient - gradient).cwiseAbs().maxCoeff(),
+              1e-10 * gradient.cwiseAbs().maxCoeff());
+  }
+  shots.beam[3] = kEmitters;
+  EXPECT_THROW(plane_equations(shots, view), InvalidArgument);
+  shots.beam.pop_back();
+  EXPECT_THROW(plane_equations(shots, view), InvalidArgument);
+}
+
+INSTANTIATE_TEST_SUITE_P(FaceOrders, PlaneEquationsOfEmitters,
+                         ::testing::Values("AP", "PA-AP", "AP-PA", "AP-PA-AP", "PA-AP-AP-PA"),
                          [](const auto& order) {
                            std::string name = order.param;
                            std::erase(name, '-');

@@ -222,7 +222,7 @@ PointingModel imperfect_model(const std::string& order, unsigned seed,
   PointingModel model;
   model.train = testing::imperfect_train(order, 0.5, seed);
   model.believed = testing::imperfect_train(order, 0.5, seed + 1000);
-  if (options.beam_origin) model.geometry = {0.007, 0.030};
+  if (options.beam_origin) model.geometry = {{0.007}, {0.030}};
   model.range_offset = 0.031;
   model.angle_noise = 7e-5;
   model.options = options;
@@ -394,6 +394,75 @@ INSTANTIATE_TEST_SUITE_P(Trains, PointsOfEveryTrain, ::testing::ValuesIn(point_c
                            name += one.param.reported ? "Reported" : "Smoothed";
                            return name + (one.param.origin ? "WithOrigin" : "FromZero");
                          });
+
+// A point is the same whether its emitter has the train for itself or shares it.
+TEST(ComputePoints, EveryEmitterIsItself) {
+  constexpr int kEmitters = 6;
+  for (const char* order : {"PA", "PA-AP", "AP-PA-AP", "PA-AP-AP-PA"}) {
+    for (const bool same : {true, false}) {
+      SCOPED_TRACE(fmt::format("{} {}", order, same));
+      PointingModel model = imperfect_model(order, 11);
+      model.train = testing::imperfect_train(order, 0.5, 11, kEmitters);
+      model.believed = same ? model.train : testing::imperfect_train(order, 0.5, 12, kEmitters);
+      const int prisms = model.train.prisms();
+      // A factor of everything, of all emitters too.
+      model.places.clear();
+      for (int at = 0; at < parameter_count(model.train.shape()); ++at) model.places.push_back(at);
+      Dice dice(13);
+      const auto rest = prisms + static_cast<Index>(model.sizes.size());
+      for (CommonFactor& factor : model.factors) {
+        factor.weights.resize(static_cast<Index>(model.places.size()) + rest);
+        for (double& weight : factor.weights) weight = 1e-4 * dice.normal();
+      }
+      PointingModel first = model;
+      first.train = testing::train_of_emitter(model.train, 0);
+      PointedShots shots = random_shots(first, 43, 14);
+      for (std::size_t i = 0; i < shots.size(); ++i) {
+        shots.beam[i] = static_cast<std::uint8_t>((i * i + i / 2) % kEmitters);
+      }
+      const CloudHeader header = header_of(model);
+      for (const InstructionSet set : available_instruction_sets()) {
+        SCOPED_TRACE(to_string(set));
+        const Points found = points_of(model, header, shots, set);
+        for (int beam = 0; beam < kEmitters; ++beam) {
+          PointingModel own = model;
+          own.train = testing::train_of_emitter(model.train, beam);
+          own.believed = testing::train_of_emitter(model.believed, beam);
+          own.places.clear();
+          std::vector<Index> rows;
+          for (const int at : model.places) {
+            const int mine = testing::place_of_emitter(at, beam, prisms);
+            if (mine < 0) continue;
+            own.places.push_back(mine);
+            rows.push_back(at);
+          }
+          for (Index i = 0; i < rest; ++i) {
+            rows.push_back(static_cast<Index>(model.places.size()) + i);
+          }
+          for (CommonFactor& factor : own.factors) {
+            factor.weights = VectorXd(factor.weights(rows));
+          }
+          PointedShots alone = shots;
+          std::fill(alone.beam.begin(), alone.beam.end(), std::uint8_t{0});
+          const Points expected = points_of(own, header, alone, set);
+          for (std::size_t i = 0; i < shots.size(); ++i) {
+            if (shots.beam[i] != beam) continue;
+            EXPECT_LT((point_of(found, i) - point_of(expected, i)).norm(), 1e-12);
+            EXPECT_NEAR(found.azimuth_residual[i], expected.azimuth_residual[i], 1e-14);
+            EXPECT_NEAR(found.zenith_residual[i], expected.zenith_residual[i], 1e-14);
+            EXPECT_LT(relative_difference(covariance_of(found, i), covariance_of(expected, i)),
+                      1e-12);
+            for (std::size_t j = 0; j < model.factors.size(); ++j) {
+              EXPECT_LT((loading_of(found, j, i) - loading_of(expected, j, i)).norm(), 1e-13);
+            }
+          }
+        }
+      }
+      shots.beam[5] = kEmitters;
+      EXPECT_THROW(points_of(model, header, shots), InvalidArgument);
+    }
+  }
+}
 
 // A covariance or loadings less do not change what is left.
 TEST(ComputePoints, ColumnsDoNotDependOnWhichOthersAreThere) {

@@ -18,12 +18,12 @@ inline std::vector<std::string> all_face_orders() {
 }
 
 /// A train with every parameter off its ideal value: errors N(0, sigma), and each prism its own
-/// glass and wedge.
+/// glass and wedge. Several emitters stand 0.9 degrees apart.
 inline PrismTrain imperfect_train(const std::string& face_order, double error_sigma_deg,
-                                  unsigned seed) {
+                                  unsigned seed, int emitters = 1) {
   std::mt19937 generator(seed);
   std::normal_distribution<double> normal;
-  PrismTrain train(parse_face_order(face_order));
+  PrismTrain train(parse_face_order(face_order), emitters);
   const bool three = train.prisms() > 2;
   for (const ParameterInfo& parameter : parameter_list(train.shape())) {
     if (parameter.kind != ParameterKind::train || parameter.places.size() > 1) continue;
@@ -39,7 +39,30 @@ inline PrismTrain imperfect_train(const std::string& face_order, double error_si
     }
     train.set(parameter.name, value);
   }
+  for (int j = 1; j < emitters; ++j) {
+    const int at = place::incident_beam_vertical(j, train.prisms());
+    train.set_place(at, train[at] + radians_from_degrees(0.9 * j));
+  }
   return train;
+}
+
+/// The train that one emitter sees.
+inline PrismTrain train_of_emitter(const PrismTrain& train, int beam) {
+  PrismTrain own(train.face_order());
+  for (int at = 0; at < parameter_count(train.prisms()); ++at) own.set_place(at, train[at]);
+  own.set_place(place::incident_beam_horizontal(),
+                train[place::incident_beam_horizontal(beam, train.prisms())]);
+  own.set_place(place::incident_beam_vertical(),
+                train[place::incident_beam_vertical(beam, train.prisms())]);
+  return own;
+}
+
+/// Where a place of the whole flat vector is in the vector that one emitter sees, or -1.
+inline int place_of_emitter(int at, int beam, int prisms) {
+  const int emitter = place::emitter(at, prisms);
+  if (emitter < 0) return at;
+  if (emitter != beam) return -1;
+  return at - place::incident_beam_horizontal(beam, prisms) + place::incident_beam_horizontal();
 }
 
 /// Rotation angles uniform over the circle.
