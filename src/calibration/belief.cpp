@@ -6,14 +6,12 @@
 #include <fmt/format.h>
 
 #include "risley/core/error.hpp"
+#include "risley/estimation/parameter_agreement.hpp"
 
 namespace risley::calibration {
 namespace {
 
 using Eigen::Index;
-
-/// Mean chi2 per parameter above which recordings are of different sensors.
-constexpr double kMostDisagreement = 6.0;
 
 void check_same_sensor(const std::vector<RangedRecording>& recordings) {
   const RangedRecording& first = recordings.front();
@@ -60,17 +58,15 @@ Belief pooled_belief(const std::vector<RangedRecording>& recordings) {
     mean = belief.covariance * weighted;
     for (const RangedRecording& recording : recordings) {
       const Eigen::VectorXd off = values(recording) - mean;
-      const double chi2 = off.dot((recording.covariance - belief.covariance).ldlt().solve(off)) /
-                          static_cast<double>(n);
-      if (chi2 > kMostDisagreement) {
-        Index worst = 0;
-        off.cwiseAbs().cwiseQuotient(recording.covariance.diagonal().cwiseSqrt()).maxCoeff(&worst);
+      const estimation::Disagreement apart =
+          estimation::disagreement(off, recording.covariance - belief.covariance);
+      if (!apart.same_sensor()) {
         const ParameterInfo& info = find_parameter(
-            belief.free[static_cast<std::size_t>(worst)].name, belief.sensor.shape());
+            belief.free[static_cast<std::size_t>(apart.worst)].name, belief.sensor.shape());
         throw EstimationError(fmt::format(
             "the recordings are of different sensors, or of one whose stored calibration changed: "
             "{} differs from the others' {} by {:.4g} {}",
-            recording.name, info.name, off[worst] / info.si_per_unit, info.unit));
+            recording.name, info.name, off[apart.worst] / info.si_per_unit, info.unit));
       }
     }
   }

@@ -12,6 +12,7 @@
 
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
+#include "risley/estimation/parameter_agreement.hpp"
 
 #include "cloud/pointing_kernel.hpp"
 
@@ -92,9 +93,8 @@ sensors::CalibrationReference meaning_of(const sensors::Sensor& calibration,
     off[j] = belief.sensor.train[place] - calibration.train[place];
   }
   const Eigen::MatrixXd covariance = belief.covariance + assumed(calibration, belief).covariance;
-  const double chi2 = off.dot(covariance.ldlt().solve(off)) / static_cast<double>(n);
-  return chi2 <= kMostDisagreement ? CalibrationReference::directions
-                                   : CalibrationReference::planes;
+  return estimation::disagreement(off, covariance).same_sensor() ? CalibrationReference::directions
+                                                                 : CalibrationReference::planes;
 }
 
 /// Builds the common factors of a model.

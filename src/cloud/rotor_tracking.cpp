@@ -14,6 +14,7 @@
 #include <fmt/format.h>
 
 #include "risley/core/error.hpp"
+#include "risley/estimation/parameter_agreement.hpp"
 
 namespace risley::cloud {
 namespace {
@@ -74,18 +75,15 @@ void check_same_sensor(const estimation::Estimate& estimate, const sensors::Sens
     off[j] = estimate.parameters[j] - calibration.train[free.places.front()];
   }
   covariance += Eigen::MatrixXd(calibration.covariance(rows, rows));
-  const double chi2 = off.dot(covariance.ldlt().solve(off)) / static_cast<double>(n);
-  if (chi2 <= kMostDisagreement) return;
-  Index worst = 0;
-  off.cwiseAbs().cwiseQuotient(covariance.diagonal().cwiseSqrt()).maxCoeff(&worst);
-  const ParameterInfo& info =
-      find_parameter(estimate.free[static_cast<std::size_t>(worst)].name, calibration.shape());
-  throw EstimationError(
-      fmt::format("a calibration of another sensor: by the recording's directions {} is {:.4g} {} "
-                  "away from the "
-                  "calibration's, {:.3g} sigma",
-                  info.name, off[worst] / info.si_per_unit, info.unit,
-                  std::abs(off[worst]) / std::sqrt(covariance(worst, worst))));
+  const estimation::Disagreement apart = estimation::disagreement(off, covariance);
+  if (apart.same_sensor()) return;
+  const ParameterInfo& info = find_parameter(
+      estimate.free[static_cast<std::size_t>(apart.worst)].name, calibration.shape());
+  throw EstimationError(fmt::format(
+      "a calibration of another sensor: by the recording's directions {} is {:.4g} {} "
+      "away from the "
+      "calibration's, {:.3g} sigma",
+      info.name, off[apart.worst] / info.si_per_unit, info.unit, apart.worst_over_sigma));
 }
 
 /// Ranges and the beam's origin need the sensor's frame, and a roll cannot be found.

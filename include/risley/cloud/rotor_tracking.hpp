@@ -18,10 +18,6 @@
 
 namespace risley::cloud {
 
-/// Mean chi2 per parameter above which a recording does not have the parameters that a calibration
-/// states.
-inline constexpr double kMostDisagreement = 9.0;
-
 /// A recording's directions do not stand in its sensor's frame: its points would be put together
 /// from two frames.
 class TurnedFrame : public EstimationError {
