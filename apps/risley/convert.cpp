@@ -91,7 +91,7 @@ FileOutcome convert(const FileJob& job, const ConvertOptions& options, const Pro
   while (read_next()) {
     writer->write(chunk);
     observations += chunk.observations.size();
-    report_progress(progress, reader->fraction_read());
+    progress.report(reader->fraction_read());
   }
   writer->close();
   log_warnings(job.input, reader->warnings());

@@ -51,8 +51,8 @@ class SharedProgress {
     return [this, job](double fraction) {
       const std::scoped_lock lock(mutex_);
       fraction_[job] = fraction;
-      report_progress(shown_, std::accumulate(fraction_.begin(), fraction_.end(), 0.0) /
-                                  static_cast<double>(fraction_.size()));
+      shown_.report(std::accumulate(fraction_.begin(), fraction_.end(), 0.0) /
+                    static_cast<double>(fraction_.size()));
     };
   }
 

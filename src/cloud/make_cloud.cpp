@@ -139,7 +139,7 @@ class Work {
       if (belief_ && belief_->mirrored) mirror(chunk.observations);
       piece_.append(chunk.observations);
       summary_.observations += chunk.observations.size();
-      report_progress(progress_, reader_.fraction_read());
+      progress_.report(reader_.fraction_read());
     }
     return true;
   }

@@ -311,7 +311,7 @@ Reproduction incorrect_calibration(const ReproduceOptions& options, const Progre
           draw.reported.zenith.push_back(wall.run.series.zenith[s] - wall.run.truth.zenith[s]);
         }
       },
-      part_of(progress, 0.0, 0.6));
+      progress.part(0.0, 0.6));
   std::vector<Judged> full(effort.wall_full_rate_seeds);
   for_each_draw(
       full.size(),
@@ -319,7 +319,7 @@ Reproduction incorrect_calibration(const ReproduceOptions& options, const Progre
         const WallRun wall = record_wall(options, i, kFullRate, true);
         full[i] = judge(wall, options, CalibrationMethod::adjustment, true, false);
       },
-      part_of(progress, 0.6, 1.0));
+      progress.part(0.6, 1.0));
   Table table = papers_rows(draws);
   add_ours(table, draws);
   if (!full.empty()) add_full_rate(table, full);

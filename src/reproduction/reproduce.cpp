@@ -42,15 +42,15 @@ Reproduction reproduce(const ReproduceOptions& options, const Progress& progress
   Reproduction result;
   add(result, specifications(options));
   add(result, scan_pattern(options));
-  report_progress(progress, 0.01);
-  add(result, observability(options, part_of(progress, 0.01, 0.12)));
+  progress.report(0.01);
+  add(result, observability(options, progress.part(0.01, 0.12)));
   add(result, zero_position(options));
-  report_progress(progress, 0.14);
-  add(result, stationary_unit(options, part_of(progress, 0.14, 0.3)));
-  add(result, simulated_unit(options, part_of(progress, 0.3, 0.6)));
-  add(result, incorrect_calibration(options, part_of(progress, 0.6, 0.98)));
+  progress.report(0.14);
+  add(result, stationary_unit(options, progress.part(0.14, 0.3)));
+  add(result, simulated_unit(options, progress.part(0.3, 0.6)));
+  add(result, incorrect_calibration(options, progress.part(0.6, 0.98)));
   add(result, beam_origin_errors(options));
-  report_progress(progress, 1.0);
+  progress.report(1.0);
   return result;
 }
 

@@ -74,14 +74,9 @@ void for_each_draw(std::size_t draws, const std::function<void(std::size_t)>& wo
       [&](std::size_t i) {
         tbb::this_task_arena::isolate([&] { work(i); });
         const std::lock_guard lock(mutex);
-        report_progress(progress, static_cast<double>(++done) / static_cast<double>(draws));
+        progress.report(static_cast<double>(++done) / static_cast<double>(draws));
       },
       tbb::simple_partitioner());
-}
-
-Progress part_of(const Progress& progress, double from, double to) {
-  if (!progress) return {};
-  return [progress, from, to](double fraction) { progress(from + (to - from) * fraction); };
 }
 
 const estimation::EstimatedValue& value_of(const estimation::Estimate& estimate,

@@ -48,9 +48,6 @@ std::uint64_t run_seed(const ReproduceOptions& options, std::size_t i);
 void for_each_draw(std::size_t draws, const std::function<void(std::size_t)>& work,
                    const Progress& progress);
 
-/// The part [from, to] of a longer progress.
-Progress part_of(const Progress& progress, double from, double to);
-
 /// The value of an estimate under a name, in the unit of files. @throws InvalidArgument
 const estimation::EstimatedValue& value_of(const estimation::Estimate& estimate,
                                            const std::string& name);

@@ -284,7 +284,7 @@ Reproduction simulated_unit(const ReproduceOptions& options, const Progress& pro
   const double split = effort.table3_full_rate_seeds > 0 ? 0.5 : 1.0;
   Reproduction result;
   const auto draws = draw_all(options, Method::map, effort.table3_seeds, kPapersRate, {},
-                              part_of(progress, 0.0, 0.3 * split));
+                              progress.part(0.0, 0.3 * split));
   result.tables.push_back(table_of(
       options, draws, kPapersRate, "table_3", "Table 3: a simulated unit, 30 s at 1 kHz",
       fmt::format("Rotors that swing as in Fig. 9, 0.01 degree noise, no rounding, {} seeds with "
@@ -293,14 +293,14 @@ Reproduction simulated_unit(const ReproduceOptions& options, const Progress& pro
                   draws.size())));
   const std::vector<estimation::RotorProcess> heavy(2, estimation::kPaperProcess);
   const auto speed_noise = draw_all(options, Method::ekf, effort.filter_seeds, kPapersRate, heavy,
-                                    part_of(progress, 0.3 * split, 0.65 * split));
+                                    progress.part(0.3 * split, 0.65 * split));
   const auto angle_noise = draw_all(options, Method::ekf, effort.filter_seeds, kPapersRate,
-                                    papers_angle_walk(), part_of(progress, 0.65 * split, split));
+                                    papers_angle_walk(), progress.part(0.65 * split, split));
   result.tables.push_back(filter_table(speed_noise, angle_noise));
   result.figures.push_back(angle_figure(draws, angle_noise));
   if (effort.table3_full_rate_seeds > 0) {
     const auto full = draw_all(options, Method::map, effort.table3_full_rate_seeds, kFullRate, {},
-                               part_of(progress, split, 1.0));
+                               progress.part(split, 1.0));
     result.tables.push_back(table_of(
         options, full, kFullRate, "table_3_full_rate",
         "Table 3 from all shots: a simulated unit, 30 s at 100 kHz",

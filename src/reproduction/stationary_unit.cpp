@@ -176,15 +176,15 @@ Reproduction simulated(const ReproduceOptions& options, const Progress& progress
   const double told = std::sqrt(residual * residual - rounding);
   settings.angle_noise = scale * told;
   SimulatedRun run = simulate(settings);
-  report_progress(progress, 0.2);
+  progress.report(0.2);
 
   const Estimate all = estimate_run(Method::map, run, options.type, told);
-  report_progress(progress, 0.45);
+  progress.report(0.45);
   SimulatedRun thin;
   thin.series = thinned_to(run.series, kFilterRate);
   thin.head = run.head;
   const Estimate filtered = estimate_run(Method::ekf, thin, options.type, told);
-  report_progress(progress, 0.6);
+  progress.report(0.6);
 
   const std::string map_name = "all shots", filter_name = "filter at 1 kHz";
   for (const auto& [name, estimate] :
@@ -194,7 +194,7 @@ Reproduction simulated(const ReproduceOptions& options, const Progress& progress
     add_residuals(table, name, "zenith", estimate->zenith_residuals, "0.01", "0.59", false);
   }
   const auto pieces = estimates_of_pieces(all, options);
-  report_progress(progress, 1.0);
+  progress.report(1.0);
   add_parameters(table, all, pieces);
 
   const estimation::Evaluation evaluation =
@@ -307,12 +307,12 @@ Reproduction real(const RealRecording& recording) {
 }  // namespace
 
 Reproduction stationary_unit(const ReproduceOptions& options, const Progress& progress) {
-  Reproduction result = simulated(options, part_of(progress, 0.0, options.recording ? 0.7 : 1.0));
+  Reproduction result = simulated(options, progress.part(0.0, options.recording ? 0.7 : 1.0));
   if (options.recording) {
     Reproduction more = real(*options.recording);
     for (Table& table : more.tables) result.tables.push_back(std::move(table));
     for (Figure& figure : more.figures) result.figures.push_back(std::move(figure));
-    report_progress(progress, 1.0);
+    progress.report(1.0);
   }
   return result;
 }
