@@ -578,7 +578,7 @@ void Work::judge(const PlanarSolution& solution) {
     c.converged = false;
     c.reason = fmt::format(
         "the walls do not tell {}, only to {:.2g} degrees: walls tilted by 30 degrees and more "
-        "against the axis do, or a prior (--prior-sigma-deg)",
+        "against the axis do, or a prior (option prior_sigma)",
         estimation::direction_text(c.unobservable.front()), c.unobservable.front().sigma);
   }
   const PriorTest* worst = nullptr;

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-#include "risley/report/states_file.hpp"
+#include "risley/jobs/states_file.hpp"
 
 #include <cmath>
 #include <filesystem>
@@ -16,7 +16,7 @@
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
 
-namespace risley::report {
+namespace risley::jobs {
 namespace {
 
 namespace fs = std::filesystem;
@@ -293,4 +293,4 @@ TEST_F(StatesFile, AMissingFolderIsSaid) {
 }
 
 }  // namespace
-}  // namespace risley::report
+}  // namespace risley::jobs

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-#include "risley/report/states_file.hpp"
+#include "risley/jobs/states_file.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -11,10 +11,9 @@
 
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
-#include "risley/core/output_file.hpp"
 #include "risley/optics/parameters.hpp"
 
-namespace risley::report {
+namespace risley::jobs {
 namespace {
 
 constexpr std::size_t kBlockRows = 16384;
@@ -153,6 +152,12 @@ std::vector<StateColumn> columns_of(const estimation::RotorStates& states) {
 void write_states(const std::string& path, const StatesContent& content,
                   const std::vector<std::pair<std::string, std::string>>& attributes) {
   OutputFile output(path);
+  write_states(output, content, attributes);
+  output.commit();
+}
+
+void write_states(const OutputFile& output, const StatesContent& content,
+                  const std::vector<std::pair<std::string, std::string>>& attributes) {
   NcFile file(output);
   file.put_text(NC_GLOBAL, "Conventions", "CF-1.9");
   file.put_text(NC_GLOBAL, "title", "Estimated rotor states of a Risley-prism lidar");
@@ -236,7 +241,6 @@ void write_states(const std::string& path, const StatesContent& content,
         [&](std::size_t i) { return degrees_from_radians(residuals[k].mean_zenith[i]); });
   }
   file.close();
-  output.commit();
 }
 
-}  // namespace risley::report
+}  // namespace risley::jobs

@@ -8,11 +8,12 @@
 #include <utility>
 #include <vector>
 
+#include "risley/core/output_file.hpp"
 #include "risley/estimation/angle_series.hpp"
 #include "risley/estimation/diagnostics.hpp"
 #include "risley/estimation/rotor_states.hpp"
 
-namespace risley::report {
+namespace risley::jobs {
 
 /// What a file of rotor states holds.
 struct StatesContent {
@@ -35,5 +36,8 @@ struct StatesContent {
 /// @throws FileError
 void write_states(const std::string& path, const StatesContent& content,
                   const std::vector<std::pair<std::string, std::string>>& attributes);
+/// The same, left for the caller to commit.
+void write_states(const OutputFile& output, const StatesContent& content,
+                  const std::vector<std::pair<std::string, std::string>>& attributes);
 
-}  // namespace risley::report
+}  // namespace risley::jobs
