@@ -9,7 +9,7 @@
 
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
-#include "risley/core/output_file.hpp"
+#include "risley/io/text_file.hpp"
 #include "risley/jobs/beam_origins.hpp"
 #include "risley/jobs/cloud_of_recording.hpp"
 #include "risley/jobs/recording_input.hpp"
@@ -97,8 +97,8 @@ Json summary_json(const FileJob& job, const cloud::CloudSummary& s) {
 ExitStatus write_beam_origin_map(const CloudCommandOptions& options,
                                  const sensors::Sensor& calibration, const CommonOptions& common) {
   const jobs::BeamOrigins found = jobs::beam_origins(calibration);
-  write_text_file(options.beam_origin_map,
-                  report::beam_origin_page(found.map, calibration, provenance_of(common)));
+  io::write_text_file(options.beam_origin_map,
+                      report::beam_origin_page(found.map, calibration, provenance_of(common)));
   if (common.json) {
     print_json({{"html", options.beam_origin_map},
                 {"beams", found.map.beams},

@@ -7,7 +7,7 @@
 #include <fmt/format.h>
 
 #include "risley/core/error.hpp"
-#include "risley/core/output_file.hpp"
+#include "risley/io/text_file.hpp"
 
 #include "option_names.hpp"
 
@@ -40,7 +40,7 @@ void make_result_folder(const std::string& folder) {
 void write_report_of(const report::Report& report, const std::string& folder) {
   const std::filesystem::path place(folder);
   report::write_report((place / "report.json").string(), report);
-  write_text_file((place / "report.html").string(), page_of(report));
+  io::write_text_file((place / "report.html").string(), page_of(report));
 }
 
 std::string page_of(const report::Report& report) {

@@ -5,7 +5,7 @@
 #include <filesystem>
 
 #include "risley/core/error.hpp"
-#include "risley/core/output_file.hpp"
+#include "risley/io/sha256.hpp"
 #include "risley/jobs/provenance.hpp"
 #include "risley/jobs/recording_input.hpp"
 #include "risley/sensors/preset.hpp"
@@ -28,7 +28,7 @@ cloud::CloudSummary cloud_of_recording(const CloudOfRecordingOptions& options,
   settings.provenance = with_inputs(settings.provenance, {options.recording});
   settings.provenance.emplace_back("calibration", options.calibration);
   if (std::filesystem::exists(options.calibration)) {
-    settings.provenance.emplace_back("calibration_sha256", sha256_of_file(options.calibration));
+    settings.provenance.emplace_back("calibration_sha256", io::sha256_of_file(options.calibration));
   }
   const SensorFrameRecording input = open_in_sensor_frame(
       options.recording, options.reading,

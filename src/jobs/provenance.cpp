@@ -4,7 +4,7 @@
 
 #include <fmt/format.h>
 
-#include "risley/core/output_file.hpp"
+#include "risley/io/sha256.hpp"
 
 namespace risley::jobs {
 
@@ -12,7 +12,7 @@ Provenance with_inputs(Provenance provenance, const std::vector<std::string>& in
   for (std::size_t i = 0; i < inputs.size(); ++i) {
     const std::string name = i == 0 ? "input" : fmt::format("input_{}", i + 1);
     provenance.emplace_back(name, inputs[i]);
-    provenance.emplace_back(name + "_sha256", sha256_of_file(inputs[i]));
+    provenance.emplace_back(name + "_sha256", io::sha256_of_file(inputs[i]));
   }
   return provenance;
 }

@@ -51,7 +51,7 @@ void ResultFolder::add_states(const std::string& name, const estimation::Estimat
 
 void ResultFolder::add_calibration(const sensors::Sensor& sensor) {
   if (folder_.empty()) return;
-  const OutputFile& file = files_.emplace_back(path("calibration.yaml"));
+  const io::OutputFile& file = files_.emplace_back(path("calibration.yaml"));
   std::ofstream stream(file.temporary_path(), std::ios::binary);
   stream << sensors::preset_text(sensor);
   stream.close();
@@ -65,7 +65,7 @@ void ResultFolder::remove_calibration() const {
 
 void ResultFolder::commit() {
   committed_ = true;
-  for (OutputFile& file : files_) file.commit();
+  for (io::OutputFile& file : files_) file.commit();
 }
 
 std::string ResultFolder::path(const std::string& name) const {

@@ -5,9 +5,9 @@
 #include <list>
 #include <string>
 
-#include "risley/core/output_file.hpp"
 #include "risley/core/progress.hpp"
 #include "risley/estimation/estimate.hpp"
+#include "risley/io/output_file.hpp"
 #include "risley/jobs/result_files.hpp"
 #include "risley/sensors/sensor.hpp"
 
@@ -40,7 +40,7 @@ class ResultFolder {
 
   std::string folder_;
   bool made_ = false, committed_ = false;
-  std::list<OutputFile> files_;
+  std::list<io::OutputFile> files_;
 };
 
 }  // namespace risley::jobs

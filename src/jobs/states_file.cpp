@@ -21,7 +21,7 @@ constexpr std::size_t kBlockRows = 16384;
 /// A NetCDF file, closed whatever happens.
 class NcFile {
  public:
-  explicit NcFile(const OutputFile& output) : path_(output.path()) {
+  explicit NcFile(const io::OutputFile& output) : path_(output.path()) {
     int id = 0;
     check(nc_create(output.temporary_path().c_str(), NC_NETCDF4 | NC_CLOBBER, &id));
     id_ = id;
@@ -151,12 +151,12 @@ std::vector<StateColumn> columns_of(const estimation::RotorStates& states) {
 
 void write_states(const std::string& path, const StatesContent& content,
                   const std::vector<std::pair<std::string, std::string>>& attributes) {
-  OutputFile output(path);
+  io::OutputFile output(path);
   write_states(output, content, attributes);
   output.commit();
 }
 
-void write_states(const OutputFile& output, const StatesContent& content,
+void write_states(const io::OutputFile& output, const StatesContent& content,
                   const std::vector<std::pair<std::string, std::string>>& attributes) {
   NcFile file(output);
   file.put_text(NC_GLOBAL, "Conventions", "CF-1.9");

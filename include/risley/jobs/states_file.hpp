@@ -8,10 +8,10 @@
 #include <utility>
 #include <vector>
 
-#include "risley/core/output_file.hpp"
 #include "risley/estimation/angle_series.hpp"
 #include "risley/estimation/diagnostics.hpp"
 #include "risley/estimation/rotor_states.hpp"
+#include "risley/io/output_file.hpp"
 
 namespace risley::jobs {
 
@@ -37,7 +37,7 @@ struct StatesContent {
 void write_states(const std::string& path, const StatesContent& content,
                   const std::vector<std::pair<std::string, std::string>>& attributes);
 /// The same, left for the caller to commit.
-void write_states(const OutputFile& output, const StatesContent& content,
+void write_states(const io::OutputFile& output, const StatesContent& content,
                   const std::vector<std::pair<std::string, std::string>>& attributes);
 
 }  // namespace risley::jobs
