@@ -79,7 +79,7 @@ def check_file(path, shown, own, allowed, layers):
             errors.append(f"{shown}:{number}: {include} is in no declared layer")
         elif layer not in allowed:
             errors.append(f"{shown}:{number}: may not include the layer {layer} ({include})")
-        elif private and layer != own:
+        elif private and (layer != own or shown.parts[0] == "include"):
             errors.append(f"{shown}:{number}: {include} is a private header of the layer {layer}")
     return errors
 

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <mutex>
 #include <numeric>
+#include <string_view>
 
 #include <fmt/format.h>
 #include <glob.h>
@@ -48,12 +49,12 @@ class SharedProgress {
   SharedProgress(std::size_t jobs, Progress shown) : fraction_(jobs), shown_(std::move(shown)) {}
 
   Progress of(std::size_t job) {
-    return [this, job](double fraction) {
+    return shown_.with([this, job](double fraction, std::string_view) {
       const std::scoped_lock lock(mutex_);
       fraction_[job] = fraction;
       shown_.report(std::accumulate(fraction_.begin(), fraction_.end(), 0.0) /
                     static_cast<double>(fraction_.size()));
-    };
+    });
   }
 
  private:

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-#include "risley/reproduction/reproduce.hpp"
+#include "reproduction/reproduce.hpp"
 
 #include <filesystem>
 #include <memory>
@@ -12,12 +12,12 @@
 #include "risley/io/text_file.hpp"
 #include "risley/jobs/recording_input.hpp"
 #include "risley/jobs/sensor_choice.hpp"
-#include "risley/reproduction/reproduction_page.hpp"
 
 #include "command.hpp"
 #include "option_names.hpp"
 #include "reading_options.hpp"
 #include "recording_text.hpp"
+#include "reproduction/reproduction_page.hpp"
 #include "result_folder.hpp"
 #include "table.hpp"
 

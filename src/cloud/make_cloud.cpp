@@ -163,7 +163,8 @@ class Work {
       estimation::ShotSelector selector({beginning_rate()});
       selector.add(piece_);
       belief_ =
-          sensor_belief(selector.series(), selector.head(), calibration_, options_.angle_noise);
+          sensor_belief(selector.series(), selector.head(), calibration_, options_.angle_noise,
+                        progress_.silent());
       if (belief_->mirrored) mirror(piece_);
       summary_.mirrored = belief_->mirrored;
       summary_.warnings = belief_->warnings;

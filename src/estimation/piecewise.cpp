@@ -39,7 +39,7 @@ std::optional<std::size_t> knot_of(const RotorTrajectory& trajectory, std::size_
 }
 
 std::optional<Piece> estimate_piece(const Estimate& estimate, const sensors::Sensor& sensor,
-                                    ShotRange shots) {
+                                    ShotRange shots, const Progress& progress) {
   const RotorTrajectory& trajectory = estimate.map->trajectory;
   const auto knot = knot_of(trajectory, shots.begin);
   shots.end = std::min(shots.end, shots.begin + kMostPieceShots);
@@ -58,7 +58,7 @@ std::optional<Piece> estimate_piece(const Estimate& estimate, const sensors::Sen
   options.rotor_process = estimate.rotor_process;
   const AngleSeries series = rows_of(estimate.series, shots.begin, shots.end);
   try {
-    const BatchMapResult result = run_batch_map(series, start, sensor, options);
+    const BatchMapResult result = run_batch_map(series, start, sensor, options, progress);
     if (!result.settled) return std::nullopt;
     Piece piece{0, series.duration(), result.parameters, result.covariance};
     piece.time = estimate.series.time(shots.begin) + 0.5 * piece.duration;
@@ -104,7 +104,8 @@ PiecewiseEstimate estimate_piecewise(const Estimate& estimate, const sensors::Se
   tbb::parallel_for(std::size_t{0}, pieces, [&](std::size_t i) {
     // A thread that waits within one piece must not begin another and then wait for the mutex.
     tbb::this_task_arena::isolate([&] {
-      all[i] = estimate_piece(estimate, sensor, {i * shots / pieces, (i + 1) * shots / pieces});
+      all[i] = estimate_piece(estimate, sensor, {i * shots / pieces, (i + 1) * shots / pieces},
+                              progress.silent());
     });
     const std::lock_guard lock(mutex);
     progress.report(static_cast<double>(++done) / static_cast<double>(pieces));

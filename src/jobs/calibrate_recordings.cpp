@@ -109,7 +109,7 @@ RangedRecording read_and_estimate(const CalibrateRecordingsOptions& options, std
       calibration::ranged_recording(estimate, path, input.recording.serial());
   if (folder && options.files.states != StatesRows::none) {
     folder.add_states(states_name(options, number), estimate, options.files.states,
-                      with_inputs(options.files.provenance, {path}), angles);
+                      with_inputs(options.files.provenance, {path}, angles), angles);
   }
   result.recordings.push_back(std::move(input.recording));
   result.angles_time += watch.seconds();
@@ -118,8 +118,8 @@ RangedRecording read_and_estimate(const CalibrateRecordingsOptions& options, std
 
 /// calibration.yaml; what did not converge is no calibration.
 void write_files(const CalibrateRecordingsOptions& options, CalibratedRecordings& result,
-                 ResultFolder& folder) {
-  result.provenance = with_inputs(options.files.provenance, options.recordings);
+                 ResultFolder& folder, const Progress& progress) {
+  result.provenance = with_inputs(options.files.provenance, options.recordings, progress);
   result.provenance.emplace_back("datum", calibration::to_string(result.calibration.datum_kind));
   if (result.calibration.converged) {
     sensors::Sensor calibrated = result.calibration.sensor;
@@ -162,7 +162,7 @@ CalibratedRecordings calibrate_recordings(const CalibrateRecordingsOptions& opti
     folder.remove_calibration();
     throw;
   }
-  if (folder) write_files(options, result, folder);
+  if (folder) write_files(options, result, folder, progress.silent());
   return result;
 }
 

@@ -112,7 +112,7 @@ EstimatedRecording estimate_recording(const EstimateRecordingOptions& options,
         estimate_details(result.estimate, result.nominal, result.head, result.evaluation, judging);
   }
   if (folder) {
-    result.provenance = with_inputs(options.files.provenance, {options.recording});
+    result.provenance = with_inputs(options.files.provenance, {options.recording}, judging);
     write_files(options, result, folder, judging);
   }
   return result;

@@ -8,10 +8,9 @@
 
 #include "risley/core/angle.hpp"
 #include "risley/core/direction.hpp"
+#include "risley/report/html.hpp"
 #include "risley/report/number_text.hpp"
-
-#include "report/html.hpp"
-#include "report/page_parts.hpp"
+#include "risley/report/page_parts.hpp"
 
 namespace risley::report {
 namespace {

@@ -15,9 +15,8 @@
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
 #include "risley/estimation/diagnostics.hpp"
-
-#include "report/charts.hpp"
-#include "report/html.hpp"
+#include "risley/report/charts.hpp"
+#include "risley/report/html.hpp"
 
 namespace risley::report {
 namespace {

@@ -7,10 +7,9 @@
 #include <fmt/format.h>
 
 #include "risley/core/angle.hpp"
+#include "risley/report/html.hpp"
 #include "risley/report/number_text.hpp"
-
-#include "report/html.hpp"
-#include "report/page_parts.hpp"
+#include "risley/report/page_parts.hpp"
 
 namespace risley::report {
 namespace {

@@ -54,10 +54,13 @@ class CheckLayersTest(unittest.TestCase):
     def test_a_private_header_belongs_to_its_layer(self):
         self.assertEqual(self.errors({
             "src/estimation/ekf.cpp": '#include "estimation/knots.hpp"\n',
+            "include/risley/estimation/ekf.hpp": '#include "estimation/knots.hpp"\n',
             "src/report/html.cpp": '#include "estimation/knots.hpp"\n',
             "apps/risley/main.cpp": '#include "report/charts.hpp"\n',
             "studies/paper/run.cpp": '#include "report/charts.hpp"\n',
         }), [
+            "include/risley/estimation/ekf.hpp:1: estimation/knots.hpp is a private header of the layer"
+            " estimation",
             "src/report/html.cpp:1: estimation/knots.hpp is a private header of the layer estimation",
             "apps/risley/main.cpp:1: report/charts.hpp is a private header of the layer report",
             "studies/paper/run.cpp:1: report/charts.hpp is a private header of the layer report",

@@ -60,6 +60,14 @@ class Progress {
     if (cancel_ != nullptr && cancel_->is_set()) throw Cancelled();
   }
 
+  /// Another callback, the same flag.
+  Progress with(Callback callback) const {
+    Progress result = *this;
+    result.callback_ = std::move(callback);
+    return result;
+  }
+  /// For work whose share is not known: it can be cancelled by the flag and tells nothing.
+  Progress silent() const { return with({}); }
   /// For a stage of a job: the same, its fractions from 0 to 1 again.
   Progress stage(std::string name) const {
     Progress result = *this;
@@ -69,11 +77,9 @@ class Progress {
   /// For a part of the work: its 0 is told as `from`, its 1 as `to`.
   Progress part(double from, double to) const {
     if (!callback_) return *this;
-    Progress result = *this;
-    result.callback_ = [callback = callback_, from, to](double fraction, std::string_view stage) {
+    return with([callback = callback_, from, to](double fraction, std::string_view stage) {
       callback(from + (to - from) * fraction, stage);
-    };
-    return result;
+    });
   }
 
  private:

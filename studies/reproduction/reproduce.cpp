@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-#include "risley/reproduction/reproduce.hpp"
+#include "reproduction/reproduce.hpp"
 
 #include <algorithm>
 #include <iterator>

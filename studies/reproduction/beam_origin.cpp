@@ -13,7 +13,8 @@
 #include "risley/core/angle.hpp"
 #include "risley/core/direction.hpp"
 #include "risley/optics/beam_origin_map.hpp"
-#include "risley/reproduction/reproduce.hpp"
+
+#include "reproduction/reproduce.hpp"
 
 namespace risley::reproduction {
 namespace {

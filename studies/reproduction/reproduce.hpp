@@ -11,9 +11,10 @@
 #include "risley/core/angle.hpp"
 #include "risley/core/progress.hpp"
 #include "risley/estimation/angle_series.hpp"
-#include "risley/reproduction/figure.hpp"
-#include "risley/reproduction/paper_table.hpp"
 #include "risley/sensors/sensor.hpp"
+
+#include "reproduction/figure.hpp"
+#include "reproduction/paper_table.hpp"
 
 /// Brazeal, Wilkinson & Hochmair 2021 [B21] again: every table and figure that holds numbers, ours
 /// beside the paper's. The one place outside the tests where simulation and estimation meet.

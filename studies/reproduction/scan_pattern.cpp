@@ -14,8 +14,8 @@
 
 #include "risley/core/angle.hpp"
 #include "risley/core/direction.hpp"
+#include "risley/report/charts.hpp"
 
-#include "report/charts.hpp"
 #include "reproduction/runs.hpp"
 
 namespace risley::reproduction {

@@ -12,8 +12,8 @@
 
 #include "risley/core/error.hpp"
 #include "risley/estimation/piecewise.hpp"
+#include "risley/report/charts.hpp"
 
-#include "report/charts.hpp"
 #include "reproduction/papers_unit.hpp"
 #include "reproduction/runs.hpp"
 

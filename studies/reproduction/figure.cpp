@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-#include "risley/reproduction/figure.hpp"
+#include "reproduction/figure.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -11,10 +11,9 @@
 #include <fmt/format.h>
 
 #include "risley/estimation/diagnostics.hpp"
+#include "risley/report/charts.hpp"
+#include "risley/report/html.hpp"
 #include "risley/report/number_text.hpp"
-
-#include "report/charts.hpp"
-#include "report/html.hpp"
 
 namespace risley::reproduction {
 report::Chart histogram_chart(std::string title, std::string x_label,

@@ -1,14 +1,14 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-#include "risley/reproduction/reproduction_page.hpp"
+#include "reproduction/reproduction_page.hpp"
 
 #include <algorithm>
 #include <cmath>
 
 #include <fmt/format.h>
 
-#include "report/html.hpp"
-#include "report/page_parts.hpp"
+#include "risley/report/html.hpp"
+#include "risley/report/page_parts.hpp"
 
 namespace risley::reproduction {
 namespace {

@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "risley/reproduction/reproduce.hpp"
+#include "reproduction/reproduce.hpp"
 
 namespace risley::reproduction {
 

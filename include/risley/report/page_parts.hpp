@@ -10,9 +10,8 @@
 #include <Eigen/Core>
 
 #include "risley/optics/parameters.hpp"
+#include "risley/report/charts.hpp"
 #include "risley/report/report_facts.hpp"
-
-#include "report/charts.hpp"
 
 namespace risley::report {
 

@@ -11,8 +11,9 @@
 #include "risley/estimation/estimate.hpp"
 #include "risley/estimation/evaluation.hpp"
 #include "risley/recordings/truth.hpp"
-#include "risley/reproduction/reproduce.hpp"
 #include "risley/simulation/scanner.hpp"
+
+#include "reproduction/reproduce.hpp"
 
 namespace risley::reproduction {
 
