@@ -162,9 +162,8 @@ class Work {
     if (rotors_) {
       estimation::ShotSelector selector({beginning_rate()});
       selector.add(piece_);
-      belief_ =
-          sensor_belief(selector.series(), selector.head(), calibration_, options_.angle_noise,
-                        progress_.silent());
+      belief_ = sensor_belief(selector.series(), selector.head(), calibration_,
+                              options_.angle_noise, progress_.silent());
       if (belief_->mirrored) mirror(piece_);
       summary_.mirrored = belief_->mirrored;
       summary_.warnings = belief_->warnings;

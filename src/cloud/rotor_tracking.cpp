@@ -110,8 +110,7 @@ SensorBelief sensor_belief(const estimation::AngleSeries& beginning,
   choose_parameters(calibration, options);
   const estimation::Estimate estimate = [&] {
     try {
-      return estimation::estimate(estimation::Method::map, beginning, head, options,
-                                  progress);
+      return estimation::estimate(estimation::Method::map, beginning, head, options, progress);
     } catch (const EstimationError& error) {
       throw EstimationError(fmt::format("the rotation angles were not found: {}", error.what()));
     }

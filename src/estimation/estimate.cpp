@@ -340,8 +340,10 @@ CoordinateRounding rounding_of(const Estimate& estimate, const EstimateOptions& 
   add_half_steps(cut, recording_from_sensor(estimate.start.frame.value_or(FrameTurn{})));
   const BatchMapOptions settings = map_options(estimate, options);
   try {
-    const BatchMapResult rounded = run_batch_map(nearest, estimate.start, options.sensor, settings, progress);
-    const BatchMapResult mended = run_batch_map(cut, estimate.start, options.sensor, settings, progress);
+    const BatchMapResult rounded =
+        run_batch_map(nearest, estimate.start, options.sensor, settings, progress);
+    const BatchMapResult mended =
+        run_batch_map(cut, estimate.start, options.sensor, settings, progress);
     const double lead = log_likelihood(mended, cut, rounded.outlier) -
                         log_likelihood(rounded, nearest, mended.outlier);
     if (std::abs(lead) < kDecisive) return CoordinateRounding::unknown;

@@ -6,7 +6,7 @@
 
 #include "risley/recordings/writer.hpp"
 
-#include "jobs/open_recording.hpp"
+#include "jobs/open_input.hpp"
 
 namespace risley::jobs {
 namespace {
@@ -33,7 +33,7 @@ recordings::RecordingHeader header_of(const recordings::Reader& reader,
 ConvertedRecording convert_recording(const ConvertRecordingOptions& options,
                                      const Progress& progress) {
   ConvertedRecording result;
-  const auto reader = open_recording(options.recording, options.reading);
+  const auto reader = open_input(options.recording, options.reading);
   const auto writer = recordings::create_recording(
       options.output, header_of(*reader, options.sensor_type), options.format);
   recordings::Chunk chunk;

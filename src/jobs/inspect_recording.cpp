@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: MIT
 #include "risley/jobs/inspect_recording.hpp"
 
-#include "jobs/open_recording.hpp"
+#include "jobs/open_input.hpp"
 
 namespace risley::jobs {
 
@@ -15,7 +15,7 @@ InspectedRecording inspect_recording(const InspectRecordingOptions& options,
                                   options.reading, progress.stage("sharing"));
   }
   const Progress reading = progress.stage("reading");
-  const auto reader = open_recording(options.recording, options.reading);
+  const auto reader = open_input(options.recording, options.reading);
   recordings::TimeAudit audit;
   recordings::Chunk chunk;
   try {

@@ -12,7 +12,7 @@
 #include "risley/estimation/stored_pose.hpp"
 #include "risley/jobs/sensor_choice.hpp"
 
-#include "jobs/open_recording.hpp"
+#include "jobs/open_input.hpp"
 #include "jobs/stopwatch.hpp"
 
 namespace risley::jobs {
@@ -47,7 +47,7 @@ SensorFrameRecording open_in_sensor_frame(
     const std::function<double(const recordings::RecordingHeader&)>& field_of_view,
     const Progress& progress) {
   progress.check();
-  SensorFrameRecording result{open_recording(path, reading), {}, reading.extrinsics.has_value()};
+  SensorFrameRecording result{open_input(path, reading), {}, reading.extrinsics.has_value()};
   const recordings::RecordingHeader& header = result.reader->header();
   recordings::require_times(header);
   if (reading.extrinsics || header.devices.size() != 1) return result;
@@ -68,7 +68,7 @@ SensorFrameRecording open_in_sensor_frame(
       !device.hub_serial.empty() && verdict.outside_turned_back <= verdict.outside_as_recorded;
   const bool decided = verdict.use != StoredPoseUse::undecided;
   result.turned_back = decided ? verdict.use == StoredPoseUse::applied : by_hub;
-  if (result.turned_back) result.reader = open_recording(path, turned_back);
+  if (result.turned_back) result.reader = open_input(path, turned_back);
   if (decided && result.turned_back) {
     result.warnings.push_back(found + ": the shots were turned back into the sensor's frame");
   } else if (!decided) {

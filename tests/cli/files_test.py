@@ -2,7 +2,9 @@
 # SPDX-FileCopyrightText: 2026 The risley authors
 # SPDX-License-Identifier: MIT
 """Missing, unknown and damaged files."""
+import json
 import os
+import resource
 import signal
 import struct
 import subprocess

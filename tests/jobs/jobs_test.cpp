@@ -144,10 +144,9 @@ TEST_F(JobsTest, LeadFromARecordingToACloud) {
 
   EXPECT_EQ(stages, (std::set<std::string>{"", "calibrating", "estimating", "judging", "reading",
                                            "rotation angles 1/1"}));
-  EXPECT_EQ(names(),
-            (std::set<std::string>{"calibration", "calibration/calibration.yaml",
-                                   "calibration/states.nc", "cloud.las", "estimate",
-                                   "estimate/calibration.yaml", "estimate/states.nc"}));
+  EXPECT_EQ(names(), (std::set<std::string>{"calibration", "calibration/calibration.yaml",
+                                            "calibration/states.nc", "cloud.las", "estimate",
+                                            "estimate/calibration.yaml", "estimate/states.nc"}));
   const sensors::Sensor written = sensors::load_sensor(path("calibration/calibration.yaml"));
   EXPECT_EQ(written.provenance.front(), (std::pair<std::string, std::string>{"command", "test"}));
 }
@@ -307,9 +306,12 @@ TEST_F(JobsTest, SayWhichOptionIsWrongByItsField) {
     messages.push_back(message([&] { job(options); }));
   };
   const auto estimate = [](const auto& o) { estimate_recording(o); };
-  refused(estimation(), [](auto& o) { o.rate = 0.0; }, estimate);
-  refused(estimation(), [](auto& o) { o.angle_noise = -1.0; }, estimate);
-  refused(estimation(), [](auto& o) { o.truth = "truth.nc"; }, estimate);
+  refused(
+      estimation(), [](auto& o) { o.rate = 0.0; }, estimate);
+  refused(
+      estimation(), [](auto& o) { o.angle_noise = -1.0; }, estimate);
+  refused(
+      estimation(), [](auto& o) { o.truth = "truth.nc"; }, estimate);
   refused(
       estimation(),
       [](auto& o) {
@@ -324,8 +326,10 @@ TEST_F(JobsTest, SayWhichOptionIsWrongByItsField) {
       },
       estimate);
   const auto calibrate = [](const auto& o) { calibrate_recordings(o); };
-  refused(calibration(), [](auto& o) { o.range_offset_sigma = -1.0; }, calibrate);
-  refused(calibration(), [](auto& o) { o.truths.push_back(o.truths.front()); }, calibrate);
+  refused(
+      calibration(), [](auto& o) { o.range_offset_sigma = -1.0; }, calibrate);
+  refused(
+      calibration(), [](auto& o) { o.truths.push_back(o.truths.front()); }, calibrate);
   refused(
       calibration(),
       [](auto& o) {
@@ -333,8 +337,9 @@ TEST_F(JobsTest, SayWhichOptionIsWrongByItsField) {
         o.prior_sigma = 0.1;
       },
       calibrate);
-  refused(cloud("mid-40"), [](auto& o) { o.cloud.rate = -1.0; },
-          [](const auto& o) { cloud_of_recording(o); });
+  refused(
+      cloud("mid-40"), [](auto& o) { o.cloud.rate = -1.0; },
+      [](const auto& o) { cloud_of_recording(o); });
   EXPECT_THAT(messages, Each(HasSubstr("option ")));
   EXPECT_THAT(messages, Each(Not(HasSubstr("--"))));
   EXPECT_TRUE(names().empty());

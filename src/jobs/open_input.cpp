@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-#include "jobs/open_recording.hpp"
+#include "jobs/open_input.hpp"
 
 #include <fmt/format.h>
 
@@ -8,7 +8,7 @@
 
 namespace risley::jobs {
 
-std::unique_ptr<recordings::Reader> open_recording(const std::string& path,
+std::unique_ptr<recordings::Reader> open_input(const std::string& path,
                                                    const recordings::ReadOptions& options) {
   if (!options.extrinsics) return recordings::open_recording(path, options);
   try {
