@@ -152,7 +152,8 @@ CalibratedRecordings calibrate_recordings(const CalibrateRecordingsOptions& opti
     result.calibration = calibration::calibrate(recordings, settings, calibrating);
     result.solving_time = watch.seconds();
     if (!options.truths.empty()) {
-      result.truth = compare_beams(recordings, result.calibration, options.truths, calibrating);
+      result.truth =
+          compare_beams(recordings, result.calibration, options.truths, calibrating.silent());
     }
     if (options.details) {
       result.details =

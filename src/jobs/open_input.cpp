@@ -9,7 +9,7 @@
 namespace risley::jobs {
 
 std::unique_ptr<recordings::Reader> open_input(const std::string& path,
-                                                   const recordings::ReadOptions& options) {
+                                               const recordings::ReadOptions& options) {
   if (!options.extrinsics) return recordings::open_recording(path, options);
   try {
     return recordings::open_recording(path, options);
