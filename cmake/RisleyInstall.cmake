@@ -6,8 +6,6 @@
 include(CMakePackageConfigHelpers)
 set(package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/risley)
 set(pkg_config_dir ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
-set(public_layers ${RISLEY_LAYERS})
-list(REMOVE_ITEM public_layers ${RISLEY_PRIVATE_LAYERS})
 
 # risley<suffix>.pc; a static library hands on all that it is linked with.
 function(risley_install_pkg_config suffix description requires requires_private libs libs_private)
@@ -54,7 +52,7 @@ function(risley_pkg_config_of modules flags)
 endfunction()
 
 set(layer_facts "")
-foreach(layer IN LISTS public_layers)
+foreach(layer IN LISTS RISLEY_LAYERS)
   install(TARGETS risley_${layer} EXPORT risley-${layer}
           ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR}
           LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}
@@ -77,7 +75,7 @@ foreach(layer IN LISTS public_layers)
   risley_install_pkg_config(-${layer} "The layer ${layer} of risley" "${below};${modules}"
     "${modules_private}" "-L\${libdir};-lrisley_${layer};${flags}" "${flags_private}")
 endforeach()
-list(TRANSFORM public_layers PREPEND risley- OUTPUT_VARIABLE modules)
+list(TRANSFORM RISLEY_LAYERS PREPEND risley- OUTPUT_VARIABLE modules)
 list(REVERSE modules)
 risley_install_pkg_config("" "${PROJECT_DESCRIPTION}" "${modules}" "" "" "")
 

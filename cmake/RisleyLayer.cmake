@@ -3,7 +3,6 @@
 # Layers are declared lowest first with risley_add_layer, told what they need with risley_layer_needs,
 # and made by risley_make_layers: the components that are asked for, with the layers below them.
 set(RISLEY_LAYERS "")
-set(RISLEY_PRIVATE_LAYERS "")
 
 # Compiler settings that every target of ours shares, never a consumer.
 function(risley_target_defaults target)
@@ -85,11 +84,6 @@ function(risley_layer_needs name)
   endforeach()
 endfunction()
 
-# Layers that are built and tested but not installed, and are no part of risley::risley.
-macro(risley_keep_private)
-  list(APPEND RISLEY_PRIVATE_LAYERS ${ARGN})
-endmacro()
-
 function(risley_make_layer name)
   file(GLOB_RECURSE headers CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/include/risley/${name}/*.hpp)
   file(GLOB_RECURSE sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/src/${name}/*.cpp)
@@ -135,7 +129,7 @@ function(risley_make_layer name)
 endfunction()
 
 # Makes the layers of the components that are asked for (all when none is), after their packages are found.
-# Afterwards RISLEY_LAYERS lists those that were made, RISLEY_PUBLIC_LAYER_TARGETS what risley::risley links.
+# Afterwards RISLEY_LAYERS lists those that were made, RISLEY_LAYER_TARGETS what risley::risley links.
 macro(risley_make_layers)
   set(wanted "")
   foreach(layer ${ARGN})
@@ -173,11 +167,9 @@ macro(risley_make_layers)
     risley_add_headers(risley_eigen_headers HEADERS ${RISLEY_EIGEN_HEADERS}
                        LINK fmt::fmt Eigen3::Eigen)
   endif()
-  set(RISLEY_PUBLIC_LAYER_TARGETS "")
+  set(RISLEY_LAYER_TARGETS "")
   foreach(layer IN LISTS RISLEY_LAYERS)
     risley_make_layer(${layer})
-    if(NOT layer IN_LIST RISLEY_PRIVATE_LAYERS)
-      list(APPEND RISLEY_PUBLIC_LAYER_TARGETS risley_${layer})
-    endif()
+    list(APPEND RISLEY_LAYER_TARGETS risley_${layer})
   endforeach()
 endmacro()

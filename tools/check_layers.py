@@ -1,7 +1,9 @@
 #!/usr/bin/env python3
 # SPDX-FileCopyrightText: 2026 The risley authors
 # SPDX-License-Identifier: MIT
-"""Checks that no file includes a layer which its own layer does not declare in CMakeLists.txt.
+"""Checks that no file includes a layer which its own layer does not declare in CMakeLists.txt, nor
+a private header (one under src/) of another layer, and that no library knows an option of the
+command: no string in src/ and include/ has "--word" in it.
 
 Usage: tools/check_layers.py [ROOT]
 Exit status: 0 all well, 1 a rule is broken (one line each: file:line: what is wrong).
@@ -12,6 +14,9 @@ import sys
 
 LAYER = re.compile(r"^\s*risley_add_layer\(\s*(\w+)(?:\s+LAYERS\s+([\w\s]*))?\)", re.MULTILINE)
 INCLUDE = re.compile(r'^\s*#\s*include\s*["<]([^">]+)[">]')
+STRING = re.compile(r'"((?:[^"\\]|\\.)*)"')
+FLAG = re.compile(r"(?<![\w-])--[a-z][a-z0-9-]*")
+PROGRAMS = ("apps", "studies", "bench")  # may use every layer
 STRANGERS = ("simulation", "estimation")  # they meet only in tests, so their agreement counts
 
 
@@ -35,30 +40,47 @@ def check_declarations(layers):
 
 
 def included_layer(include, layers):
-    """The layer that an #include names, or None for a library or a neighbour."""
+    """The layer that an #include names, and whether it names a private header of it; None for a
+    library or a neighbour."""
     parts = include.split("/")
     if parts[0] == "risley" and len(parts) > 2:
-        return parts[1]
-    return parts[0] if len(parts) > 1 and parts[0] in layers else None
+        return parts[1], False
+    return (parts[0], True) if len(parts) > 1 and parts[0] in layers else (None, False)
 
 
-def check_file(path, shown, allowed, layers):
+def flags_in(line):
+    """Options of a command that the strings of a line of C++ name; comments do not count."""
+    flags = []
+    for match in STRING.finditer(line):
+        if "//" in STRING.sub('""', line[:match.start()]):
+            break
+        flags += FLAG.findall(match.group(1))
+    return flags
+
+
+def check_file(path, shown, own, allowed, layers):
+    """@param own  the file's layer; None in programs, which may know options"""
     errors = []
     for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1):
         match = INCLUDE.match(line)
         if not match:
+            if own is not None:
+                errors += [f"{shown}:{number}: a library knows no {flag}, say \"option NAME\""
+                           for flag in flags_in(line)]
             continue
         include = match.group(1)
         if ".." in include.split("/"):
             errors.append(f'{shown}:{number}: "{include}" hides its layer, name it from the root')
             continue
-        layer = included_layer(include, layers)
+        layer, private = included_layer(include, layers)
         if layer is None:
             continue
         if layer not in layers:
             errors.append(f"{shown}:{number}: {include} is in no declared layer")
         elif layer not in allowed:
             errors.append(f"{shown}:{number}: may not include the layer {layer} ({include})")
+        elif private and (layer != own or shown.parts[0] == "include"):
+            errors.append(f"{shown}:{number}: {include} is a private header of the layer {layer}")
     return errors
 
 
@@ -72,17 +94,17 @@ def check(root):
         for folder in sorted(entry for entry in top.glob("*") if entry.is_dir()):
             if folder.name not in layers:
                 errors.append(f"{folder.relative_to(root)}: the folder is no declared layer")
-    for folder in ("include/risley", "src", "apps"):
+    for folder in ("include/risley", "src", *PROGRAMS):
         for path in sorted((root / folder).rglob("*.[ch]pp")):
             shown = path.relative_to(root)
-            if folder == "apps":
+            layer = None if folder in PROGRAMS else path.relative_to(root / folder).parts[0]
+            if layer is None:
                 allowed = layers.keys()
-            else:
-                layer = path.relative_to(root / folder).parts[0]
-                if layer not in layers:
-                    continue
+            elif layer in layers:
                 allowed = layers[layer] | {layer}
-            errors += check_file(path, shown, allowed, layers)
+            else:
+                continue
+            errors += check_file(path, shown, layer, allowed, layers)
     return errors
 
 

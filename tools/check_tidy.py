@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-FileCopyrightText: 2026 The risley authors
 # SPDX-License-Identifier: MIT
-"""Runs clang-tidy with the checks of .clang-tidy on the sources in src/ and apps/.
+"""Runs clang-tidy with the checks of .clang-tidy on the sources in src/, studies/ and apps/.
 
 Most of its time goes into the headers of libraries, so the sources of a layer are looked at in one
 piece, as one file that includes them all. That also finds a name which stands for two things, or
@@ -44,7 +44,7 @@ def commands_of(build):
 
 def changed_sources():
     def git(*words):
-        return subprocess.run(['git', *words, '--', 'src', 'apps'], cwd=ROOT, check=True,
+        return subprocess.run(['git', *words, '--', 'src', 'studies', 'apps'], cwd=ROOT, check=True,
                               capture_output=True, text=True).stdout.splitlines()
     names = git('diff', '--name-only', '--diff-filter=d', 'HEAD')
     names += git('ls-files', '--others', '--exclude-standard')
@@ -75,7 +75,7 @@ def look_at(sources, number, folder, commands):
         [{'directory': directory, 'command': f'{command} -c {piece}', 'file': str(piece)}]))
     done = subprocess.run(
         ['clang-tidy', '-p', str(place), f'--config-file={ROOT / ".clang-tidy"}', '--quiet',
-         r'--header-filter=(include/risley|src|apps)/.*\.[hc]pp$',
+         r'--header-filter=(include/risley|src|studies|apps)/.*\.[hc]pp$',
          '--extra-arg=-Wno-unknown-warning-option',
          '--extra-arg=-Wno-shadow',  # of a name in another file; the compiler looks for real ones
          str(piece)],
@@ -96,7 +96,7 @@ def main(arguments):
     commands = commands_of(build)
     changed = arguments[1:] == ['--changed']
     sources = changed_sources() if changed else sorted(
-        source for folder in ('src', 'apps') for source in (ROOT / folder).rglob('*.cpp'))
+        source for folder in ('src', 'studies', 'apps') for source in (ROOT / folder).rglob('*.cpp'))
     folder = build / 'tidy'
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir()

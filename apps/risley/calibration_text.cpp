@@ -21,6 +21,7 @@ using calibration::Calibration;
 using calibration::CalibrationForecast;
 using calibration::DirectionErrors;
 using calibration::FormalDatum;
+using jobs::CalibratedRecordings;
 
 double deg(double radians) { return degrees_from_radians(radians); }
 
@@ -62,7 +63,7 @@ void print_datum(calibration::DatumKind kind, const FormalDatum& datum) {
 
 }  // namespace
 
-Json calibration_json(const CalibrationOutcome& outcome) {
+Json calibration_json(const CalibratedRecordings& outcome, double total_time) {
   const Calibration& c = outcome.calibration;
   const TrainShape shape = c.sensor.shape();
   Json parameters = Json::object(), planes = Json::array(), steps = Json::array(),
@@ -76,7 +77,7 @@ Json calibration_json(const CalibrationOutcome& outcome) {
   }
   for (const calibration::CalibratedPlane& plane : c.planes) {
     planes.push_back({{"name", plane.name},
-                      {"recording", outcome.recordings[plane.recording]},
+                      {"recording", outcome.recordings[plane.recording].path},
                       {"normal", vector_json(plane.normal)},
                       {"offset_m", plane.distance},
                       {"points", plane.points},
@@ -86,7 +87,7 @@ Json calibration_json(const CalibrationOutcome& outcome) {
                       {"range_sigma_m", plane.range_sigma}});
   }
   for (const calibration::SurfaceStep& step : c.steps) {
-    steps.push_back({{"recording", outcome.recordings[step.recording]},
+    steps.push_back({{"recording", outcome.recordings[step.recording].path},
                      {"plane", c.planes[step.plane].name},
                      {"height_m", step.height},
                      {"azimuth_deg", deg(step.azimuth)},
@@ -138,10 +139,10 @@ Json calibration_json(const CalibrationOutcome& outcome) {
       {"thickness", profiles},
       {"warnings", warnings},
       {"seconds",
-       {{"read", outcome.read_s},
-        {"rotation_angles", outcome.angles_s},
-        {"solve", outcome.solve_s},
-        {"total", outcome.total_s}}}};
+       {{"read", outcome.reading_time},
+        {"rotation_angles", outcome.angles_time},
+        {"solve", outcome.solving_time},
+        {"total", total_time}}}};
   if (outcome.truth) {
     object["truth"] = {{"before", errors_json(outcome.truth->before)},
                        {"after", errors_json(outcome.truth->after)}};
@@ -149,15 +150,15 @@ Json calibration_json(const CalibrationOutcome& outcome) {
   return object;
 }
 
-void print_calibration(const CalibrationOutcome& outcome) {
+void print_calibration(const CalibratedRecordings& outcome) {
   const Calibration& c = outcome.calibration;
   const TrainShape shape = c.sensor.shape();
   fmt::print("{}\n", c.converged ? "converged" : "NOT CONVERGED: " + c.reason);
   fmt::print(
       "{} points on {} planes, {:.2f} mm thick before, {:.2f} mm after; read {:.2f} s, rotation "
       "angles {:.2f} s, solved {:.2f} s\n\n",
-      grouped(c.points), c.planes.size(), 1e3 * c.rms_before, 1e3 * c.rms_after, outcome.read_s,
-      outcome.angles_s, outcome.solve_s);
+      grouped(c.points), c.planes.size(), 1e3 * c.rms_before, 1e3 * c.rms_after,
+      outcome.reading_time, outcome.angles_time, outcome.solving_time);
   std::vector<std::string> head = {"parameter", "value", "+- sigma", "unit", "before"};
   if (outcome.truth) head.insert(head.end(), {"truth", "error/sigma"});
   Table table(head);
@@ -171,7 +172,7 @@ void print_calibration(const CalibrationOutcome& outcome) {
         name, text.value, text.sigma, find_parameter(name, shape).unit,
         report::text_to_place_of(in_file_unit(name, c.believed.get(name), shape), sigma)};
     if (outcome.truth) {
-      const double truth = in_file_unit(name, outcome.truth->sensor->get(name), shape);
+      const double truth = in_file_unit(name, outcome.truth->truth.get(name), shape);
       row.push_back(report::text_to_place_of(truth, sigma));
       row.push_back(fmt::format("{:.2f}", (value - truth) / sigma));
     }
@@ -186,10 +187,11 @@ void print_calibration(const CalibrationOutcome& outcome) {
   fmt::print("\n");
   Table planes({"plane", "recording", "distance m", "points", "outliers", "before mm", "after mm"});
   for (const calibration::CalibratedPlane& plane : c.planes) {
-    planes.add(
-        {plane.name, std::filesystem::path(outcome.recordings[plane.recording]).filename().string(),
-         fmt::format("{:.3f}", plane.distance), grouped(plane.points), grouped(plane.outliers),
-         fmt::format("{:.2f}", 1e3 * plane.rms_before), fmt::format("{:.2f}", 1e3 * plane.rms)});
+    planes.add({plane.name,
+                std::filesystem::path(outcome.recordings[plane.recording].path).filename().string(),
+                fmt::format("{:.3f}", plane.distance), grouped(plane.points),
+                grouped(plane.outliers), fmt::format("{:.2f}", 1e3 * plane.rms_before),
+                fmt::format("{:.2f}", 1e3 * plane.rms)});
   }
   planes.print();
   fmt::print("\n");

@@ -2,33 +2,16 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <cstdint>
-#include <optional>
-#include <string>
-#include <vector>
-
-#include "risley/calibration/calibrate.hpp"
 #include "risley/calibration/calibration_plan.hpp"
-#include "risley/report/calibration_report.hpp"
+#include "risley/jobs/calibrate_recordings.hpp"
 
 #include "command.hpp"
 
 namespace risley::app {
 
-/// Everything one calibration found.
-struct CalibrationOutcome {
-  calibration::Calibration calibration;
-  std::vector<std::string> recordings;  ///< as typed
-  std::vector<report::ReportedRecording> reported;
-  sensors::Sensor nominal;
-  std::optional<report::CalibrationReportInput::Truth> truth;
-  std::vector<std::string> warnings;  ///< of the recordings
-  std::uint64_t observations = 0;
-  double read_s = 0, angles_s = 0, solve_s = 0, total_s = 0;
-};
-
-Json calibration_json(const CalibrationOutcome& outcome);
-void print_calibration(const CalibrationOutcome& outcome);
+/// @param total_time  that the verb took, s
+Json calibration_json(const jobs::CalibratedRecordings& outcome, double total_time);
+void print_calibration(const jobs::CalibratedRecordings& outcome);
 
 Json forecast_json(const calibration::CalibrationForecast& forecast, const TrainShape& shape);
 void print_forecast(const calibration::CalibrationForecast& forecast, const TrainShape& shape);

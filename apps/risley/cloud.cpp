@@ -1,23 +1,25 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-#include <algorithm>
-#include <filesystem>
 #include <memory>
+#include <optional>
+#include <set>
 
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
-#include "risley/cloud/make_cloud.hpp"
 #include "risley/core/angle.hpp"
-#include "risley/io/sha256.hpp"
+#include "risley/core/error.hpp"
 #include "risley/io/text_file.hpp"
-#include "risley/optics/beam_origin_map.hpp"
+#include "risley/jobs/beam_origins.hpp"
+#include "risley/jobs/cloud_of_recording.hpp"
+#include "risley/jobs/recording_input.hpp"
 #include "risley/report/beam_origin_page.hpp"
 #include "risley/sensors/preset.hpp"
 
 #include "command.hpp"
 #include "many_files.hpp"
-#include "recording_input.hpp"
+#include "option_names.hpp"
+#include "reading_options.hpp"
 #include "recording_text.hpp"
 #include "result_folder.hpp"
 
@@ -56,17 +58,11 @@ cloud::CloudOptions cloud_options(const CloudCommandOptions& options) {
   result.pointing.beam_divergence = options.beam_divergence == "yes";
   result.pointing.covariance = options.covariance == "yes";
   result.loadings = options.common_factors == "yes";
-  if (result.loadings && !result.pointing.covariance) {
-    throw InvalidArgument("--common-factors yes and --covariance no do not go together");
-  }
   result.rate.reset();
   if (options.rate_hz != "full") {
     result.rate = positive_number(options.rate_hz, "--rate-hz", "Hz");
   }
-  if (options.noise_angle_deg) {
-    check_positive(*options.noise_angle_deg, "--noise-angle-deg", "deg");
-    result.angle_noise = radians_from_degrees(*options.noise_angle_deg);
-  }
+  result.angle_noise = noise_angle(options.noise_angle_deg);
   check_positive(options.las_scale_m, "--las-scale-m", "m");
   result.writer.las_scale = options.las_scale_m;
   result.writer.gps_time = options.time == "gps";
@@ -75,7 +71,7 @@ cloud::CloudOptions cloud_options(const CloudCommandOptions& options) {
 
 Json summary_json(const FileJob& job, const cloud::CloudSummary& s) {
   std::vector<std::string> warnings = s.warnings;
-  for (std::string& text : warning_texts(s.read_warnings)) warnings.push_back(std::move(text));
+  for (const auto& warning : s.read_warnings) warnings.push_back(jobs::warning_text(warning));
   Json json = {
       {"points", s.points},
       {"format", s.format},
@@ -100,52 +96,30 @@ Json summary_json(const FileJob& job, const cloud::CloudSummary& s) {
 /// The maps of where beams start.
 ExitStatus write_beam_origin_map(const CloudCommandOptions& options,
                                  const sensors::Sensor& calibration, const CommonOptions& common) {
-  constexpr std::size_t kSteps = 1081;  // every third of a degree, as in the paper's Fig. A1
-  constexpr double kCellDeg = 0.5;
-  const BeamOriginMap map = beam_origin_map(calibration.train, calibration.geometry, kSteps,
-                                            radians_from_degrees(kCellDeg));
-  if (map.size() == 0) throw EstimationError("no beam gets through the prisms");
+  const jobs::BeamOrigins found = jobs::beam_origins(calibration);
   io::write_text_file(options.beam_origin_map,
-                      report::beam_origin_page(map, calibration, provenance_of(common, {})));
-  const auto least = [](const auto& column) {
-    return *std::min_element(column.begin(), column.end());
-  };
-  const auto greatest = [](const auto& column) {
-    return *std::max_element(column.begin(), column.end());
-  };
-  const double y0 = least(map.least_y), y1 = greatest(map.greatest_y);
-  const double z0 = least(map.least_z), z1 = greatest(map.greatest_z);
+                      report::beam_origin_page(found.map, calibration, provenance_of(common)));
   if (common.json) {
     print_json({{"html", options.beam_origin_map},
-                {"beams", map.beams},
-                {"cells", map.size()},
-                {"y_m", {{"min", y0}, {"max", y1}}},
-                {"z_m", {{"min", z0}, {"max", z1}}}});
+                {"beams", found.map.beams},
+                {"cells", found.map.size()},
+                {"y_m", {{"min", found.least_y}, {"max", found.greatest_y}}},
+                {"z_m", {{"min", found.least_z}, {"max", found.greatest_z}}}});
   } else {
     fmt::print(
         "{}: beams start {:.1f} to {:.1f} mm beside the origin in Y, {:.1f} to {:.1f} mm in Z\n",
-        options.beam_origin_map, 1e3 * y0, 1e3 * y1, 1e3 * z0, 1e3 * z1);
+        options.beam_origin_map, 1e3 * found.least_y, 1e3 * found.greatest_y, 1e3 * found.least_z,
+        1e3 * found.greatest_z);
   }
   return kDone;
 }
 
-/// The calibration that all clouds of a command are made with.
-report::Provenance calibration_provenance(const std::string& calibration) {
-  report::Provenance result = {{"calibration", calibration}};
-  if (std::filesystem::exists(calibration)) {
-    result.emplace_back("calibration_sha256", io::sha256_of_file(calibration));
-  }
-  return result;
-}
-
-FileOutcome make_one(const FileJob& job, const ReadingWishes& reading,
-                     const cloud::CloudOptions& settings, const sensors::Sensor& calibration,
-                     const Progress& progress) {
-  const SensorFrameInput input = open_in_sensor_frame(
-      job.input, reading, [&calibration](const auto&) { return calibration.field_of_view; });
-  cloud::CloudSummary s =
-      cloud::make_cloud(*input.reader, calibration, job.output, settings, progress);
-  s.warnings.insert(s.warnings.begin(), input.warnings.begin(), input.warnings.end());
+FileOutcome make_one(const FileJob& job, const CloudCommandOptions& options,
+                     const cloud::CloudOptions& settings, const Progress& progress) {
+  cloud::CloudSummary s = jobs::cloud_of_recording(
+      {job.input, read_options(options.reading), options.calibration, job.output, settings},
+      progress);
+  put_flags(s.warnings);
   log_warnings(job.input, s.read_warnings);
   for (const std::string& warning : s.warnings) spdlog::warn("{}: {}", job.input, warning);
   if (s.damage) {
@@ -224,20 +198,14 @@ Run declare_cloud(CLI::App& verb) {
     if (output_is_folder(options->inputs, options->output)) {
       if (options->format.empty()) options->format = cloud::cloud_formats().front().name;
       ending = cloud::find_cloud_format("", options->format).ending;
-    } else {
-      cloud::find_cloud_format(options->output, options->format);  // before anything is read
     }
-    const std::vector<FileJob> jobs = file_jobs(options->inputs, options->output, ending);
+    const std::vector<FileJob> files = file_jobs(options->inputs, options->output, ending);
     settings.writer.format = options->format;
-    const report::Provenance of_calibration = calibration_provenance(options->calibration);
+    settings.provenance = provenance_of(common);
     return run_file_jobs(
-        jobs, "making points", "points",
+        files, "making points", "points",
         [&](const FileJob& job, const Progress& progress) {
-          cloud::CloudOptions mine = settings;
-          mine.provenance = provenance_of(common, {job.input});
-          mine.provenance.insert(mine.provenance.end(), of_calibration.begin(),
-                                 of_calibration.end());
-          return make_one(job, options->reading, mine, calibration, progress);
+          return make_one(job, *options, settings, progress);
         },
         common);
   };

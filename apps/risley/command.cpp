@@ -8,20 +8,25 @@
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
+#include <new>
 
 #include <fmt/format.h>
 #include <unistd.h>
 
 #include "risley/cloud/rotor_tracking.hpp"
+#include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
 #include "risley/recordings/reader.hpp"
+
+#include "option_names.hpp"
 
 namespace risley::app {
 namespace {
 
-volatile std::sig_atomic_t interrupted = 0;
+CancelFlag
+    interrupted;  // NOLINT(*-avoid-non-const-global-variables): of the process, as signals are
 
-void note_signal(int) { interrupted = 1; }
+void note_signal(int) { interrupted.set(); }
 
 double number_from(const std::string& text, std::string_view name) {
   char* end = nullptr;
@@ -46,10 +51,6 @@ void watch_signals() {
   std::signal(SIGTERM, note_signal);
 }
 
-void check_interrupt() {
-  if (interrupted != 0) throw Interrupted();
-}
-
 double now() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
@@ -61,13 +62,16 @@ ProgressBar::~ProgressBar() {
   if (visible_ && shown_ >= 0) std::fputs("\r\033[K", stderr);
 }
 
-Progress ProgressBar::callback() {
-  return [this](double fraction) { show(fraction); };
+Progress ProgressBar::progress() {
+  return {[this](double fraction, std::string_view stage) { show(fraction, stage); }, &interrupted};
 }
 
-void ProgressBar::show(double fraction) {
-  check_interrupt();
+void ProgressBar::show(double fraction, std::string_view stage) {
   const double time = now();
+  if (!stage.empty() && stage != label_) {
+    label_ = stage;
+    started_ = time;
+  }
   if (!visible_ || time - shown_ < 0.1) return;  // ten times a second is smooth enough
   shown_ = time;
   constexpr int kWidth = 30;
@@ -87,7 +91,7 @@ Failure current_failure() {
   } catch (const recordings::MissingTimes& error) {
     return {kWrongUsage, fmt::format("{}: say it with --shot-rate-hz", error.what()), {}};
   } catch (const InvalidArgument& error) {
-    return {kWrongUsage, error.what(), {}};
+    return {kWrongUsage, with_flags(error.what()), {}};
   } catch (const FileError& error) {
     Json details = {{"file", error.path()}};
     if (error.place().byte_offset) details["byte_offset"] = *error.place().byte_offset;
@@ -98,11 +102,16 @@ Failure current_failure() {
         fmt::format("{}: say it with --extrinsics YAW,PITCH,ROLL", error.what());
     return {kNumbersFailed, text, {{"converged", false}, {"reason", text}}};
   } catch (const EstimationError& error) {
-    return {kNumbersFailed, error.what(), {{"converged", false}, {"reason", error.what()}}};
-  } catch (const Interrupted& error) {
-    return {kInterrupted, error.what(), {}};
-  } catch (const std::exception& error) {  // out of memory, a bug: nothing the user did
-    return {kNumbersFailed, fmt::format("internal error: {}", error.what()), {}};
+    const std::string text = with_flags(error.what());
+    return {kNumbersFailed, text, {{"converged", false}, {"reason", text}}};
+  } catch (const Cancelled&) {
+    return {kInterrupted, "interrupted", {}};
+  } catch (const std::bad_alloc&) {
+    return {kFault, "there is not enough memory", {}};
+  } catch (const std::exception& error) {  // a bug: nothing the user did
+    return {kFault, fmt::format("internal error: {}", error.what()), {}};
+  } catch (...) {
+    return {kFault, "internal error of an unknown kind", {}};
   }
 }
 
@@ -144,6 +153,12 @@ void check_not_negative(double value, std::string_view option, std::string_view 
   if (!(value >= 0) || !std::isfinite(value)) {
     throw InvalidArgument(fmt::format("{} = {} {}, allowed 0 and above", option, value, unit));
   }
+}
+
+std::optional<double> noise_angle(const std::optional<double>& noise_angle_deg) {
+  if (!noise_angle_deg) return std::nullopt;
+  check_positive(*noise_angle_deg, "--noise-angle-deg", "deg");
+  return radians_from_degrees(*noise_angle_deg);
 }
 
 void print_json(const Json& object) {

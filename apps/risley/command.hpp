@@ -4,7 +4,7 @@
 
 #include <cstdint>
 #include <functional>
-#include <stdexcept>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -25,6 +25,7 @@ enum ExitStatus : int {
   kNumbersFailed = 1,
   kWrongUsage = 2,
   kBadFile = 3,
+  kFault = 4,          ///< of the program or of the machine: a bug, no memory
   kInterrupted = 130,  ///< 128 + SIGINT, as shells have it
 };
 
@@ -62,32 +63,26 @@ Run declare_cloud(CLI::App& verb);
 Run declare_report(CLI::App& verb);
 Run declare_reproduce(CLI::App& verb);
 
-/// The user pressed Ctrl-C, or the system asked to end.
-class Interrupted : public std::runtime_error {
- public:
-  Interrupted() : std::runtime_error("interrupted") {}
-};
-
-/// From now on SIGINT and SIGTERM are noticed by check_interrupt, so that every output in the
-/// making is removed by its owner.
+/// From now on SIGINT and SIGTERM cancel what is being computed, so that every output in the making
+/// is removed by its owner.
 void watch_signals();
-/// @throws Interrupted
-void check_interrupt();
 
 /// A bar with the remaining time on stderr, only on a terminal and not with --quiet. The bar is
 /// gone when the object is.
 class ProgressBar {
  public:
+  /// @param label  for work that does not name its stages
   ProgressBar(std::string_view label, const CommonOptions& common);
   ~ProgressBar();
   ProgressBar(const ProgressBar&) = delete;
   ProgressBar& operator=(const ProgressBar&) = delete;
 
-  /// For a library function; also the place where an interrupt is noticed.
-  Progress callback();
-  void show(double fraction);
+  /// For a library function; a signal cancels it.
+  Progress progress();
 
  private:
+  void show(double fraction, std::string_view stage);
+
   std::string label_;
   bool visible_;
   double started_, shown_ = -1.0;
@@ -109,6 +104,9 @@ double positive_number(const std::string& text, std::string_view option, std::st
 /// @throws InvalidArgument unless the value is finite and above (or at) zero
 void check_positive(double value, std::string_view option, std::string_view unit);
 void check_not_negative(double value, std::string_view option, std::string_view unit);
+
+/// The value of --noise-angle-deg, rad. @throws InvalidArgument naming the option
+std::optional<double> noise_angle(const std::optional<double>& noise_angle_deg);
 
 /// Prints one JSON object and a line feed on stdout.
 void print_json(const Json& object);

@@ -10,12 +10,12 @@
 #include <spdlog/spdlog.h>
 
 #include "risley/core/error.hpp"
-#include "risley/recordings/reader.hpp"
+#include "risley/jobs/convert_recording.hpp"
 #include "risley/recordings/writer.hpp"
 
 #include "command.hpp"
 #include "many_files.hpp"
-#include "recording_input.hpp"
+#include "reading_options.hpp"
 #include "recording_text.hpp"
 
 namespace risley::app {
@@ -48,23 +48,6 @@ const std::map<std::string, std::uint8_t>& sensor_types() {
   return types;
 }
 
-/// The header to write, with the type of sensor where the recording does not tell it.
-recordings::RecordingHeader header_of(const recordings::Reader& reader,
-                                      const std::string& sensor_type) {
-  recordings::RecordingHeader header = reader.header();
-  if (sensor_type.empty()) return header;
-  const std::uint8_t type = sensor_types().at(sensor_type);
-  for (recordings::Device& device : header.devices) {
-    const std::string told = recordings::device_type_name(device.type);
-    if (told != "unknown" && device.type != type) {
-      throw InvalidArgument(fmt::format("--sensor-type {}: the recording tells that it is of a {}",
-                                        sensor_type, told));
-    }
-    device.type = type;
-  }
-  return header;
-}
-
 /// Ending of a format's files in a folder.
 std::string ending_of(const std::string& format) {
   for (const auto& known : recordings::writable_formats()) {
@@ -74,44 +57,28 @@ std::string ending_of(const std::string& format) {
 }
 
 FileOutcome convert(const FileJob& job, const ConvertOptions& options, const Progress& progress) {
-  const auto reader = open_input(job.input, options.reading);
-  const auto writer = recordings::create_recording(
-      job.output, header_of(*reader, options.sensor_type), options.format);
-  std::uint64_t observations = 0;
-  std::optional<FileError> damage;
-  recordings::Chunk chunk;
-  const auto read_next = [&] {
-    try {
-      return reader->read(chunk);
-    } catch (const FileError& error) {
-      damage = error;  // the sound part is worth keeping
-      return false;
-    }
-  };
-  while (read_next()) {
-    writer->write(chunk);
-    observations += chunk.observations.size();
-    report_progress(progress, reader->fraction_read());
-  }
-  writer->close();
-  log_warnings(job.input, reader->warnings());
-  const std::uint64_t written = observations - writer->left_out();
-  if (writer->left_out() > 0) {
+  jobs::ConvertRecordingOptions wanted{job.input, read_options(options.reading), job.output,
+                                       options.format, std::nullopt};
+  if (!options.sensor_type.empty()) wanted.sensor_type = sensor_types().at(options.sensor_type);
+  const jobs::ConvertedRecording done = jobs::convert_recording(wanted, progress);
+  log_warnings(job.input, done.warnings);
+  const std::uint64_t written = done.observations - done.left_out;
+  if (done.left_out > 0) {
     spdlog::warn("{}: {} of {} observations have no place in this format and were left out",
-                 job.output, writer->left_out(), observations);
+                 job.output, done.left_out, done.observations);
   }
   Json json = {{"observations", written},
-               {"left_out", writer->left_out()},
-               {"input_format", reader->header().format},
+               {"left_out", done.left_out},
+               {"input_format", done.input_format},
                {"input", job.input},
                {"output", job.output},
-               {"warnings", warnings_json(reader->warnings())}};
-  if (damage) {
-    spdlog::error("{}; the {} observations before it are saved in {}", damage->what(), written,
+               {"warnings", warnings_json(done.warnings)}};
+  if (done.damage) {
+    spdlog::error("{}; the {} observations before it are saved in {}", done.damage->what(), written,
                   job.output);
-    json.update(damage_json(*damage));
+    json.update(damage_json(*done.damage));
   }
-  return {damage ? kBadFile : kDone, json,
+  return {done.damage ? kBadFile : kDone, json,
           fmt::format("{}: {} observations", job.output, grouped(written))};
 }
 

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
 #include <algorithm>
-#include <filesystem>
+#include <cmath>
 #include <memory>
 #include <optional>
 
@@ -9,17 +9,15 @@
 #include <spdlog/spdlog.h>
 
 #include "risley/core/angle.hpp"
-#include "risley/core/error.hpp"
-#include "risley/estimation/evaluation.hpp"
-#include "risley/io/text_file.hpp"
-#include "risley/recordings/time_audit.hpp"
+#include "risley/jobs/estimate_recording.hpp"
 #include "risley/report/estimate_report.hpp"
 #include "risley/report/number_text.hpp"
-#include "risley/sensors/preset.hpp"
 
 #include "command.hpp"
-#include "estimation_input.hpp"
 #include "observability_text.hpp"
+#include "option_names.hpp"
+#include "parameter_choice.hpp"
+#include "reading_options.hpp"
 #include "recording_text.hpp"
 #include "result_folder.hpp"
 #include "table.hpp"
@@ -29,63 +27,48 @@ namespace {
 
 using estimation::Estimate;
 using estimation::Evaluation;
-
-/// What the paper's filter can do in a time that one waits for.
-constexpr const char* kFilterRate = "1000";
+using jobs::EstimatedRecording;
 
 struct EstimateCommandOptions {
   std::string input, folder, method = "map", rate_hz, sensor, states = "knots", mirror = "auto",
                              process_noise = "auto", truth;
   std::optional<double> noise_angle_deg;
-  std::vector<std::string> fixed, freed;
+  ParameterWishes parameters;
   ReadingWishes reading;
-
-  estimation::Method chosen_method() const {
-    return method == "ekf" ? estimation::Method::ekf : estimation::Method::map;
-  }
-  std::string rate() const {
-    if (!rate_hz.empty()) return rate_hz;
-    return chosen_method() == estimation::Method::ekf ? kFilterRate : "full";
-  }
 };
 
-std::vector<estimation::RotorProcess> rotor_process(const std::string& text, int prisms) {
-  if (text == "auto") return {};
-  if (text == "none") {
-    return std::vector<estimation::RotorProcess>(static_cast<std::size_t>(prisms),
-                                                 estimation::kConstantAcceleration);
-  }
+std::optional<estimation::RotorProcess> rotor_process(const std::string& text) {
+  if (text == "auto") return std::nullopt;
+  if (text == "none") return estimation::kConstantAcceleration;
   estimation::RotorProcess process = estimation::kPaperProcess;
   if (text != "paper") {
     process.acceleration =
         radians_from_degrees(positive_number(text, "--process-noise", "deg/s per sqrt(s)"));
   }
-  return std::vector<estimation::RotorProcess>(static_cast<std::size_t>(prisms), process);
+  return process;
 }
 
-estimation::EstimateOptions estimate_options(const EstimateCommandOptions& options,
-                                             const recordings::RecordingHeader& header) {
-  estimation::EstimateOptions result = estimate_options(
-      EstimationWishes{options.sensor, options.noise_angle_deg, options.fixed, options.freed},
-      header);
-  result.rotor_process = rotor_process(options.process_noise, result.sensor.prisms());
-  if (options.mirror != "auto") result.mirrored = options.mirror == "yes";
-  return result;
-}
-
-/// Truth files by the name of the YAML one; the columns stand beside it.
-Evaluation evaluate_with(const std::string& truth_path, const Estimate& estimate) {
-  const std::filesystem::path preset(truth_path);
-  if (preset.extension() != ".yaml") {
-    throw InvalidArgument(fmt::format("--truth = {}, expected OUT.truth.yaml", truth_path));
+jobs::EstimateRecordingOptions job_of(const EstimateCommandOptions& options,
+                                      const CommonOptions& common) {
+  jobs::EstimateRecordingOptions job;
+  job.recording = options.input;
+  job.reading = read_options(options.reading);
+  job.sensor = options.sensor;
+  job.method = options.method == "ekf" ? estimation::Method::ekf : estimation::Method::map;
+  if (options.rate_hz.empty()) {
+    job.rate = jobs::usual_rate(job.method);
+  } else if (options.rate_hz != "full") {
+    job.rate = positive_number(options.rate_hz, "--rate-hz", "Hz");
   }
-  const sensors::Sensor sensor = sensors::load_sensor(truth_path);
-  // One row per state: the truth of a full-rate recording is larger than the recording.
-  std::vector<std::int64_t> times = estimate.states.time_ns;
-  std::sort(times.begin(), times.end());
-  const recordings::TruthColumns columns = recordings::load_truth(
-      std::filesystem::path(preset).replace_extension(".nc").string(), times);
-  return estimation::evaluate(estimate, sensor, columns);
+  job.angle_noise = noise_angle(options.noise_angle_deg);
+  job.fixed = held_parameters(options.parameters.fixed);
+  job.additional = options.parameters.freed;
+  job.rotor_process = rotor_process(options.process_noise);
+  if (options.mirror != "auto") job.mirrored = options.mirror == "yes";
+  job.truth = options.truth;
+  job.details = !options.folder.empty();
+  job.files = result_files(options.folder, options.states, common);
+  return job;
 }
 
 Json moments_json(const estimation::Moments& moments) {
@@ -166,15 +149,7 @@ Json fixed_json(const Estimate& estimate) {
   return object;
 }
 
-/// Everything one run of the verb found.
-struct Outcome {
-  Estimate estimate;
-  std::optional<Evaluation> evaluation;
-  std::vector<std::string> warnings;  ///< of the recording
-  double read_s = 0, solve_s = 0, total_s = 0;
-};
-
-Json outcome_json(const Outcome& outcome) {
+Json outcome_json(const EstimatedRecording& outcome, double total_time) {
   const Estimate& e = outcome.estimate;
   const TrainShape shape = e.sensor.shape();
   Json parameters = Json::object();
@@ -224,7 +199,7 @@ Json outcome_json(const Outcome& outcome) {
       {"start", start_json(e.start)},
       {"warnings", warnings},
       {"seconds",
-       {{"read", outcome.read_s}, {"solve", outcome.solve_s}, {"total", outcome.total_s}}}};
+       {{"read", outcome.reading_time}, {"solve", outcome.solving_time}, {"total", total_time}}}};
   if (e.map) {
     object["iterations"] = e.map->iterations;
     object["residuals"]["autocorrelation"] =
@@ -252,7 +227,7 @@ void print_noise(const Estimate& e) {
       angle(e.noise.value.zenith, e.noise.sigma.zenith), degrees_from_radians(e.usual_noise));
 }
 
-void print_outcome(const Outcome& outcome) {
+void print_outcome(const EstimatedRecording& outcome) {
   const Estimate& e = outcome.estimate;
   const TrainShape shape = e.sensor.shape();
   fmt::print("{}\n", e.converged ? "converged" : "NOT CONVERGED: " + e.reason);
@@ -261,7 +236,7 @@ void print_outcome(const Outcome& outcome) {
              (e.sensor.combination ? fmt::format(", speed combination {}", *e.sensor.combination)
                                    : std::string()) +
                  (e.mirrored ? ", mirrored" : ""),
-             outcome.read_s, outcome.solve_s);
+             outcome.reading_time, outcome.solving_time);
   std::vector<std::string> head = {"parameter", "value", "+- sigma", "unit"};
   if (outcome.evaluation) head.insert(head.end(), {"truth", "error", "error/sigma"});
   Table table(head);
@@ -313,79 +288,27 @@ void print_outcome(const Outcome& outcome) {
   }
 }
 
-/// calibration.yaml, states.nc, report.json and report.html. An estimate that did not converge is
-/// no calibration: there is none then, not even an older one of the same name.
-void write_folder(const EstimateCommandOptions& options, const CommonOptions& common,
-                  const RecordingInput& input, const sensors::Sensor& nominal,
-                  const Outcome& outcome) {
-  namespace fs = std::filesystem;
-  const auto provenance = provenance_of(common, {options.input});
-  const auto path = [&](const char* name) { return (fs::path(options.folder) / name).string(); };
-  if (outcome.estimate.converged) {
-    sensors::Sensor calibrated = outcome.estimate.sensor;
-    calibrated.provenance = provenance;
-    calibrated.serial = input.reader->header().devices.front().serial;
-    io::write_text_file(path("calibration.yaml"), sensors::preset_text(calibrated));
-  } else {
-    remove_calibration(options.folder);
-  }
-  if (options.states != "none") {
-    write_states_of(outcome.estimate, options.states, path("states.nc"), provenance);
-  }
-  write_report_of(report::estimate_report(
-                      {outcome.estimate, nominal, outcome.evaluation, input.selector.head(),
-                       reported_recording(options.input, input), provenance, outcome.warnings}),
-                  options.folder);
-}
-
-/// Wrong wishes are told before an hour of reading.
-void check_options(const EstimateCommandOptions& options) {
-  if (options.states == "all" && options.chosen_method() == estimation::Method::ekf &&
-      options.rate() != "full") {
-    throw InvalidArgument(
-        "--states all needs --rate-hz full: the filter has states at the shots it uses only");
-  }
-  if (!options.folder.empty()) make_result_folder(options.folder);
-}
-
 ExitStatus run_estimate(const EstimateCommandOptions& options, const CommonOptions& common) {
   const double started = now();
-  check_options(options);
-  std::optional<double> rate;
-  if (options.rate() != "full") rate = positive_number(options.rate(), "--rate-hz", "Hz");
-  RecordingInput input = read_recording(options.input, options.reading, options.sensor,
-                                        {.rate = rate, .ranges = true, .rows = false}, common);
-  estimation::EstimateOptions settings = estimate_options(options, input.reader->header());
-  settings.cartesian = input.whole_steps;
-  const estimation::SelectionCounts& counts = input.selector.counts();
-  spdlog::debug(
-      "{} observations of format {}, {} without a direction, {} out of order; {} shots used "
-      "with sensor {}",
-      counts.rows, input.reader->header().format, counts.invalid, counts.out_of_order,
-      input.selector.series().size(), settings.sensor.name);
-  Outcome outcome;
-  outcome.warnings = input.warnings;
-  outcome.read_s = input.seconds;
-  const double solving = now();
+  EstimatedRecording outcome;
   {
     ProgressBar bar("estimating", common);
-    outcome.estimate = estimation::estimate(options.chosen_method(), input.selector.take_series(),
-                                            input.selector.head(), settings, bar.callback());
+    outcome = jobs::estimate_recording(job_of(options, common), bar.progress());
   }
-  outcome.solve_s = now() - solving;
-  const estimation::Start& start = outcome.estimate.start;
-  spdlog::debug("start: residuals of {:.3g} deg", degrees_from_radians(start.residual_rms));
-  if (!options.truth.empty()) outcome.evaluation = evaluate_with(options.truth, outcome.estimate);
-  if (!options.folder.empty()) {
-    write_folder(options, common, input, settings.sensor, outcome);
-  }
-  outcome.total_s = now() - started;
+  put_flags(outcome.warnings);
+  if (!options.folder.empty()) write_report_of(report::estimate_report(outcome), options.folder);
   const Estimate& e = outcome.estimate;
+  spdlog::debug(
+      "{} observations of format {}, {} without a direction, {} out of order; {} shots used "
+      "with sensor {}; start: residuals of {:.3g} deg",
+      outcome.counts.rows, outcome.recording.header.format, outcome.counts.invalid,
+      outcome.counts.out_of_order, e.series.size(), outcome.nominal.name,
+      degrees_from_radians(e.start.residual_rms));
   for (const std::string& warning : outcome.warnings) spdlog::warn(warning);
   for (const std::string& warning : e.warnings) spdlog::warn(warning);
   if (!e.converged) spdlog::error("not converged: {}", e.reason);
   if (common.json) {
-    print_json(outcome_json(outcome));
+    print_json(outcome_json(outcome, now() - started));
   } else {
     print_outcome(outcome);
   }
@@ -414,7 +337,7 @@ Run declare_estimate(CLI::App& verb) {
   verb.add_option("--sensor", o.sensor,
                   "Preset by name, or a preset or calibration file (default: from the recording)");
   add_reading_options(verb, o.reading);
-  add_parameter_choice(verb, o.fixed, o.freed);
+  add_parameter_choice(verb, o.parameters);
   verb.add_option(
           "--states", o.states,
           "Which rotor states to write: at one shot every 2 ms (ekf: at the shots used), at "
@@ -432,14 +355,7 @@ Run declare_estimate(CLI::App& verb) {
                   "speed in deg/s per sqrt(s)")
       ->capture_default_str();
   verb.add_option("--truth", o.truth, "OUT.truth.yaml of a simulation, to judge the estimate by");
-  return [options](const CommonOptions& common) {
-    try {
-      return run_estimate(*options, common);
-    } catch (const EstimationError&) {
-      remove_calibration(options->folder);
-      throw;
-    }
-  };
+  return [options](const CommonOptions& common) { return run_estimate(*options, common); };
 }
 
 }  // namespace risley::app

@@ -11,17 +11,19 @@
 #include <spdlog/spdlog.h>
 
 #include "risley/core/angle.hpp"
-#include "risley/recordings/excerpt.hpp"
-#include "risley/recordings/time_audit.hpp"
+#include "risley/core/error.hpp"
+#include "risley/jobs/inspect_recording.hpp"
+#include "risley/jobs/recording_input.hpp"
 
 #include "command.hpp"
-#include "recording_input.hpp"
+#include "reading_options.hpp"
 #include "recording_text.hpp"
 #include "table.hpp"
 
 namespace risley::app {
 namespace {
 
+using jobs::InspectedRecording;
 using recordings::Excerpt;
 using recordings::TimeAuditResult;
 using recordings::ValueRange;
@@ -77,8 +79,9 @@ Json counts_json(const Counts& counts) {
   return object;
 }
 
-Json audit_json(const recordings::Reader& reader, const TimeAuditResult& audit) {
-  const recordings::RecordingHeader& header = reader.header();
+Json audit_json(const InspectedRecording& found) {
+  const recordings::RecordingHeader& header = found.header;
+  const TimeAuditResult& audit = found.audit;
   const auto if_times = [&header](auto value) { return header.has_times ? Json(value) : Json(); };
   return {{"format", header.format},
           {"sensor", sensor_name(header)},
@@ -108,11 +111,12 @@ Json audit_json(const recordings::Reader& reader, const TimeAuditResult& audit) 
           {"packets_by_data_type", counts_json(audit.packets_by_data_type)},
           {"imu_samples", audit.imu},
           {"devices", devices_json(header, audit)},
-          {"warnings", warnings_json(reader.warnings())}};
+          {"warnings", warnings_json(found.warnings)}};
 }
 
-void print_audit(const recordings::Reader& reader, const TimeAuditResult& audit) {
-  const recordings::RecordingHeader& header = reader.header();
+void print_audit(const InspectedRecording& found) {
+  const recordings::RecordingHeader& header = found.header;
+  const TimeAuditResult& audit = found.audit;
   Table table;
   table.add({"format", header.format});
   table.add({"sensor", sensor_name(header)});
@@ -144,10 +148,10 @@ void print_audit(const recordings::Reader& reader, const TimeAuditResult& audit)
     if (!device.serial.empty()) table.add({"serial", device.serial});
     if (!device.hub_serial.empty()) table.add({"through the hub", device.hub_serial});
     if (const auto pose = recordings::stored_extrinsics(device)) {
-      table.add({"states a pose", pose_text(*pose)});
+      table.add({"states a pose", jobs::pose_text(*pose)});
     }
   }
-  table.add({"warnings", grouped(reader.warnings().size())});
+  table.add({"warnings", grouped(found.warnings.size())});
   table.print();
 }
 
@@ -201,42 +205,27 @@ ExitStatus run_info(const InfoCommandOptions& options, const CommonOptions& comm
   if (options.share_ranges && options.share.empty()) {
     throw InvalidArgument("--share-ranges needs --share: it says what an excerpt holds");
   }
-  std::optional<Excerpt> excerpt;
-  if (!options.share.empty()) {  // first, because it may have to be refused
-    ProgressBar bar("sharing", common);
-    excerpt =
-        recordings::write_excerpt(options.input, options.share, {.ranges = options.share_ranges},
-                                  read_options(options.reading), bar.callback());
-  }
-  const auto reader = open_input(options.input, options.reading);
-  recordings::TimeAudit audit;
-  std::optional<FileError> damage;
+  InspectedRecording found;
   {
     ProgressBar bar("reading", common);
-    recordings::Chunk chunk;
-    try {
-      while (reader->read(chunk)) {
-        audit.add(chunk);
-        bar.show(reader->fraction_read());
-      }
-    } catch (const FileError& error) {
-      damage = error;  // what was sound before is still told
-    }
+    found = jobs::inspect_recording({options.input,
+                                     read_options(options.reading),
+                                     options.share,
+                                     {.ranges = options.share_ranges}},
+                                    bar.progress());
   }
-  TimeAuditResult result = audit.result();
-  result.pps_wraps = reader->clock_wraps();
-  log_warnings(options.input, reader->warnings());
-  if (damage) spdlog::error(damage->what());
+  log_warnings(options.input, found.warnings);
+  if (found.damage) spdlog::error(found.damage->what());
   if (common.json) {
-    Json object = audit_json(*reader, result);
-    if (excerpt) object["excerpt"] = excerpt_json(options.share, *excerpt);
-    if (damage) object.update(damage_json(*damage));
+    Json object = audit_json(found);
+    if (found.excerpt) object["excerpt"] = excerpt_json(options.share, *found.excerpt);
+    if (found.damage) object.update(damage_json(*found.damage));
     print_json(object);
   } else {
-    print_audit(*reader, result);
-    if (excerpt) print_excerpt(options.share, *excerpt);
+    print_audit(found);
+    if (found.excerpt) print_excerpt(options.share, *found.excerpt);
   }
-  return damage ? kBadFile : kDone;
+  return found.damage ? kBadFile : kDone;
 }
 
 }  // namespace

@@ -130,7 +130,9 @@ ExitStatus run_command(int argc, char** argv) {
   app.set_version_flag("--version", "risley " RISLEY_VERSION);
   app.require_subcommand(1);
   app.footer(
-      "Exit status: 0 done, 1 the numbers failed, 2 wrong usage, 3 a file is bad.\n"
+      "Exit status: 0 done, 1 the numbers failed, 2 wrong usage, 3 a file is bad, 4 a fault of "
+      "the\n"
+      "program or of the machine, 130 interrupted.\n"
       "risley VERB --help tells more.");
   CommonOptions common;
   common.command = shell_text(argc, argv);

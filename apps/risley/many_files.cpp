@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <mutex>
 #include <numeric>
+#include <string_view>
 
 #include <fmt/format.h>
 #include <glob.h>
@@ -48,12 +49,12 @@ class SharedProgress {
   SharedProgress(std::size_t jobs, Progress shown) : fraction_(jobs), shown_(std::move(shown)) {}
 
   Progress of(std::size_t job) {
-    return [this, job](double fraction) {
+    return shown_.with([this, job](double fraction, std::string_view) {
       const std::scoped_lock lock(mutex_);
       fraction_[job] = fraction;
-      report_progress(shown_, std::accumulate(fraction_.begin(), fraction_.end(), 0.0) /
-                                  static_cast<double>(fraction_.size()));
-    };
+      shown_.report(std::accumulate(fraction_.begin(), fraction_.end(), 0.0) /
+                    static_cast<double>(fraction_.size()));
+    });
   }
 
  private:
@@ -114,7 +115,7 @@ ExitStatus run_file_jobs(const std::vector<FileJob>& jobs, const std::string& la
     FileOutcome outcome;
     {
       ProgressBar bar(label, common);
-      outcome = work(jobs.front(), bar.callback());
+      outcome = work(jobs.front(), bar.progress());
     }
     common.json ? print_json(outcome.json) : fmt::print("{}\n", outcome.text);
     return outcome.status;
@@ -122,12 +123,12 @@ ExitStatus run_file_jobs(const std::vector<FileJob>& jobs, const std::string& la
   std::vector<FileOutcome> outcomes(jobs.size());
   {
     ProgressBar bar(label, common);
-    SharedProgress progress(jobs.size(), bar.callback());
+    SharedProgress progress(jobs.size(), bar.progress());
     const auto run_one = [&](std::size_t i) {
       try {
         // A thread that waits within one file must not begin another.
         tbb::this_task_arena::isolate([&] { outcomes[i] = work(jobs[i], progress.of(i)); });
-      } catch (const Interrupted&) {
+      } catch (const Cancelled&) {
         throw;
       } catch (...) {
         outcomes[i] = failed(jobs[i], current_failure());
@@ -146,8 +147,8 @@ ExitStatus run_file_jobs(const std::vector<FileJob>& jobs, const std::string& la
   for (const FileOutcome& outcome : outcomes) {
     if (outcome.status == kDone) {
       ++sound;
-    } else if (status == kDone) {
-      status = outcome.status;
+    } else {
+      status = std::max(status, outcome.status);
     }
     total += outcome.json.value(counted, std::uint64_t{0});
     files.push_back(outcome.json);

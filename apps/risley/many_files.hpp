@@ -41,7 +41,7 @@ bool output_is_folder(const std::vector<std::string>& inputs, const std::string&
 /// and prints what came of them. One alone is as if there were no others: its JSON is
 /// the object, its errors leave by throwing. Of several, one that fails does not stop the rest; the
 /// JSON has an entry per file under "files" and the sum of `counted`.
-/// @return kDone when all went well, otherwise the status of the first that did not
+/// @return kDone when all went well, otherwise the highest status of those that did not
 ExitStatus run_file_jobs(const std::vector<FileJob>& jobs, const std::string& label,
                          const char* counted,
                          const std::function<FileOutcome(const FileJob&, const Progress&)>& work,

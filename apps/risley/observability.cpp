@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-#include "risley/estimation/observability.hpp"
+#include "risley/jobs/observability.hpp"
 
 #include <cmath>
 #include <memory>
@@ -10,19 +10,19 @@
 #include <spdlog/spdlog.h>
 
 #include "risley/core/angle.hpp"
-#include "risley/core/error.hpp"
-#include "risley/sensors/preset.hpp"
 
 #include "command.hpp"
-#include "estimation_input.hpp"
 #include "observability_text.hpp"
+#include "option_names.hpp"
+#include "parameter_choice.hpp"
+#include "reading_options.hpp"
 #include "recording_text.hpp"
 #include "table.hpp"
 
 namespace risley::app {
 namespace {
 
-using estimation::Observability;
+using jobs::JudgedObservability;
 
 struct ObservabilityCommandOptions {
   std::string input, sensor;
@@ -30,11 +30,13 @@ struct ObservabilityCommandOptions {
   std::string rate_hz;
   std::optional<double> noise_angle_deg;
   bool rounding = true;
-  std::vector<std::string> fixed, freed;
+  ParameterWishes parameters;
   ReadingWishes reading;
 };
 
-Json observability_json(const Observability& o, const TrainShape& shape) {
+Json observability_json(const JudgedObservability& judged) {
+  const estimation::Observability& o = judged.observability;
+  const TrainShape shape = judged.shape;
   Json parameters = Json::object(), matrix = Json::array(), unobservable = Json::array();
   for (const auto& quantity : o.quantities) {
     const double unit = find_parameter(quantity.name, shape).si_per_unit;
@@ -58,10 +60,12 @@ Json observability_json(const Observability& o, const TrainShape& shape) {
           {"observations", o.shots},
           {"duration_s", o.duration},
           {"rate_hz", o.rate},
-          {"words", estimation::observability_words(o, shape)}};
+          {"words", judged.words}};
 }
 
-void print_observability(const Observability& o, const TrainShape& shape) {
+void print_observability(const JudgedObservability& judged) {
+  const estimation::Observability& o = judged.observability;
+  const TrainShape shape = judged.shape;
   fmt::print("{:.4g} s at {:.6g} Hz, {} shots\n\n", o.duration, o.rate,
              grouped(static_cast<std::uint64_t>(std::llround(o.shots))));
   Table table({"quantity", "sigma", "unit", "deg per unit", "most correlated with", "rho"});
@@ -81,60 +85,38 @@ void print_observability(const Observability& o, const TrainShape& shape) {
   for (const auto& weak : o.unobservable) {
     fmt::print("not told by such data: {}\n", direction_text(weak));
   }
-  for (const std::string& words : estimation::observability_words(o, shape)) {
+  for (const std::string& words : judged.words) {
     fmt::print("{}.\n", words);
   }
-}
-
-Observability observe_plan(const ObservabilityCommandOptions& options,
-                           const estimation::EstimateOptions& settings) {
-  estimation::ObservabilityPlan plan;
-  plan.sensor = settings.sensor;
-  plan.duration = options.duration_s;
-  plan.rate = options.rate_hz.empty() ? plan.sensor.shot_rate
-                                      : positive_number(options.rate_hz, "--rate-hz", "Hz");
-  plan.angle_noise = settings.angle_noise.value_or(plan.sensor.angle_noise);
-  if (options.rounding) plan.angle_resolution = plan.sensor.angle_resolution;
-  plan.free = estimation::chosen_parameters(settings);
-  return estimation::observability_of_plan(plan);
 }
 
 ExitStatus run_observability(const ObservabilityCommandOptions& options,
                              const CommonOptions& common) {
   check_positive(options.duration_s, "--duration-s", "s");
-  EstimationWishes wishes{options.sensor, options.noise_angle_deg, options.fixed, options.freed};
-  Observability result;
-  TrainShape shape;
-  if (options.input.empty()) {
-    if (wishes.sensor.empty()) wishes.sensor = "mid-40";
-    const estimation::EstimateOptions settings = estimate_options(wishes, std::nullopt);
-    shape = settings.sensor.shape();
-    result = observe_plan(options, settings);
-  } else {
-    std::optional<double> rate;
-    if (!options.rate_hz.empty() && options.rate_hz != "full") {
-      rate = positive_number(options.rate_hz, "--rate-hz", "Hz");
-    }
-    RecordingInput input = read_recording(options.input, options.reading, wishes.sensor,
-                                          {.rate = rate, .ranges = true, .rows = false}, common);
-    for (const std::string& warning : input.warnings) spdlog::warn(warning);
-    estimation::EstimateOptions settings = estimate_options(wishes, input.reader->header());
-    settings.cartesian = input.whole_steps;
-    shape = settings.sensor.shape();
-    ProgressBar bar("estimating", common);
-    const estimation::Estimate estimate =
-        estimation::estimate(estimation::Method::map, input.selector.take_series(),
-                             input.selector.head(), settings, bar.callback());
-    for (const std::string& warning : estimate.warnings) spdlog::warn(warning);
-    if (!estimate.converged) {
-      spdlog::warn("the estimate did not converge: {}", estimate.reason);
-    }
-    result = estimation::observability_of_estimate(estimate);
+  jobs::ObservabilityOptions job;
+  job.recording = options.input;
+  job.reading = read_options(options.reading);
+  job.sensor = options.sensor;
+  job.duration = options.duration_s;
+  if (!options.rate_hz.empty() && (options.input.empty() || options.rate_hz != "full")) {
+    job.rate = positive_number(options.rate_hz, "--rate-hz", "Hz");
   }
+  job.angle_noise = noise_angle(options.noise_angle_deg);
+  job.rounding = options.rounding;
+  job.fixed = held_parameters(options.parameters.fixed);
+  job.additional = options.parameters.freed;
+  JudgedObservability judged;
+  {
+    ProgressBar bar("estimating", common);
+    judged = jobs::judge_observability(job, bar.progress());
+  }
+  put_flags(judged.warnings);
+  for (const std::string& warning : judged.warnings) spdlog::warn(warning);
+  if (!judged.converged) spdlog::warn("the estimate did not converge: {}", judged.reason);
   if (common.json) {
-    print_json(observability_json(result, shape));
+    print_json(observability_json(judged));
   } else {
-    print_observability(result, shape);
+    print_observability(judged);
   }
   return kDone;
 }
@@ -159,7 +141,7 @@ Run declare_observability(CLI::App& verb) {
   verb.add_flag("!--no-rounding", o.rounding,
                 "Plan a recording whose angles are not rounded to the sensor's resolution");
   add_reading_options(verb, o.reading);
-  add_parameter_choice(verb, o.fixed, o.freed);
+  add_parameter_choice(verb, o.parameters);
   return [options](const CommonOptions& common) { return run_observability(*options, common); };
 }
 

@@ -7,6 +7,8 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include "risley/jobs/recording_input.hpp"
+
 namespace risley::app {
 
 std::string sensor_name(const recordings::RecordingHeader& header) {
@@ -20,28 +22,19 @@ std::string sensor_name(const recordings::RecordingHeader& header) {
   return text;
 }
 
-std::vector<std::string> warning_texts(const std::vector<recordings::ReadWarning>& warnings) {
-  std::vector<std::string> texts;
-  for (const recordings::ReadWarning& warning : warnings) {
-    std::string text = warning.message;
-    if (warning.place.byte_offset) text += fmt::format(" (at byte {})", *warning.place.byte_offset);
-    if (warning.place.line) text += fmt::format(" (line {})", *warning.place.line);
-    texts.push_back(std::move(text));
-  }
-  return texts;
-}
-
 Json warnings_json(const std::vector<recordings::ReadWarning>& warnings) {
   Json list = Json::array();
-  const std::vector<std::string> texts = warning_texts(warnings);
-  for (std::size_t i = 0; i < texts.size(); ++i) {
-    list.push_back({{"message", texts[i]}, {"lost_records", warnings[i].lost_records}});
+  for (const recordings::ReadWarning& warning : warnings) {
+    list.push_back(
+        {{"message", jobs::warning_text(warning)}, {"lost_records", warning.lost_records}});
   }
   return list;
 }
 
 void log_warnings(const std::string& file, const std::vector<recordings::ReadWarning>& warnings) {
-  for (const std::string& text : warning_texts(warnings)) spdlog::warn("{}: {}", file, text);
+  for (const recordings::ReadWarning& warning : warnings) {
+    spdlog::warn("{}: {}", file, jobs::warning_text(warning));
+  }
 }
 
 Json damage_json(const FileError& damage) {

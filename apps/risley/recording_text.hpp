@@ -16,8 +16,6 @@ namespace risley::app {
 /// Commercial name of the sensor that made a recording; of several, each once.
 std::string sensor_name(const recordings::RecordingHeader& header);
 
-/// What a reader warned of, as "message (place)".
-std::vector<std::string> warning_texts(const std::vector<recordings::ReadWarning>& warnings);
 Json warnings_json(const std::vector<recordings::ReadWarning>& warnings);
 /// The same on stderr, each with the name of the file.
 void log_warnings(const std::string& file, const std::vector<recordings::ReadWarning>& warnings);

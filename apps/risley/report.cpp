@@ -10,6 +10,7 @@
 #include "risley/report/report_file.hpp"
 
 #include "command.hpp"
+#include "result_folder.hpp"
 
 namespace risley::app {
 namespace {
@@ -30,7 +31,7 @@ ExitStatus run_report(const ReportCommandOptions& options, const CommonOptions& 
   }
   const report::Report report = report::read_report(data.string());
   const std::string page = options.page.empty() ? (folder / "report.html").string() : options.page;
-  const std::string html = report::report_page(report);
+  const std::string html = page_of(report);
   io::write_text_file(page, html);
   if (common.json) {
     print_json({{"html", page}, {"bytes", html.size()}, {"verb", report::verb_of(report)}});

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-#include "risley/reproduction/reproduce.hpp"
+#include "reproduction/reproduce.hpp"
 
 #include <filesystem>
 #include <memory>
@@ -10,11 +10,14 @@
 #include <spdlog/spdlog.h>
 
 #include "risley/io/text_file.hpp"
-#include "risley/reproduction/reproduction_page.hpp"
+#include "risley/jobs/recording_input.hpp"
+#include "risley/jobs/sensor_choice.hpp"
 
 #include "command.hpp"
-#include "estimation_input.hpp"
+#include "option_names.hpp"
+#include "reading_options.hpp"
 #include "recording_text.hpp"
+#include "reproduction/reproduction_page.hpp"
 #include "result_folder.hpp"
 #include "table.hpp"
 
@@ -72,7 +75,8 @@ Json reproduction_json(const Reproduction& found, const CommonOptions& common,
     tables[table.name] = {{"title", table.title}, {"method", table.method}, {"rows", rows}};
   }
   Json provenance = Json::object();
-  for (const auto& [name, value] : provenance_of(common, inputs)) provenance[name] = value;
+  for (const auto& [name, value] : jobs::with_inputs(provenance_of(common), inputs))
+    provenance[name] = value;
   return {{"rows", row_count(found)},
           {"passed", passed_count(found)},
           {"tables", tables},
@@ -101,14 +105,15 @@ void print_reproduction(const Reproduction& found) {
 /// The recording of a real unit, read as estimate reads one.
 reproduction::RealRecording real_recording(const std::string& path, const ReadingWishes& reading,
                                            const CommonOptions& common) {
-  RecordingInput input = read_recording(path, reading, {}, {}, common);
-  for (const std::string& warning : input.warnings) spdlog::warn("{}: {}", path, warning);
-  reproduction::RealRecording recording;
-  recording.name = std::filesystem::path(path).filename().string();
-  recording.sensor = estimate_options(EstimationWishes{}, input.reader->header()).sensor;
-  recording.head = input.selector.head();
-  recording.series = input.selector.take_series();
-  return recording;
+  ProgressBar bar("reading", common);
+  jobs::EstimationInput input =
+      jobs::read_for_estimation({path, read_options(reading), {}, {}}, bar.progress());
+  for (const std::string& warning : input.warnings) {
+    spdlog::warn("{}: {}", path, with_flags(warning));
+  }
+  return {std::filesystem::path(path).filename().string(),
+          jobs::chosen_sensor({}, input.recording.header), std::move(input.series),
+          std::move(input.head)};
 }
 
 ExitStatus run_reproduce(const ReproduceCommandOptions& options, const CommonOptions& common) {
@@ -124,14 +129,15 @@ ExitStatus run_reproduce(const ReproduceCommandOptions& options, const CommonOpt
   Reproduction found;
   {
     ProgressBar bar("reproducing", common);
-    found = reproduction::reproduce(settings, bar.callback());
+    found = reproduction::reproduce(settings, bar.progress());
   }
   const Json object = reproduction_json(found, common, inputs);
   const auto path = [&](const char* name) {
     return (std::filesystem::path(options.folder) / name).string();
   };
-  io::write_text_file(path("report.html"),
-                      reproduction::reproduction_page(found, provenance_of(common, inputs)));
+  io::write_text_file(
+      path("report.html"),
+      reproduction::reproduction_page(found, jobs::with_inputs(provenance_of(common), inputs)));
   io::write_text_file(path("reproduction.json"),
                       object.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
   if (common.json) {

@@ -7,23 +7,24 @@
 #include <fmt/format.h>
 
 #include "risley/core/error.hpp"
-#include "risley/io/sha256.hpp"
 #include "risley/io/text_file.hpp"
-#include "risley/report/states_file.hpp"
+
+#include "option_names.hpp"
 
 namespace risley::app {
 
-report::Provenance provenance_of(const CommonOptions& common,
-                                 const std::vector<std::string>& inputs) {
-  report::Provenance result = {{"command", common.command},
-                               {"version", RISLEY_VERSION},
-                               {"seed", std::to_string(common.seed)}};
-  for (std::size_t i = 0; i < inputs.size(); ++i) {
-    const std::string name = i == 0 ? "input" : fmt::format("input_{}", i + 1);
-    result.emplace_back(name, inputs[i]);
-    result.emplace_back(name + "_sha256", io::sha256_of_file(inputs[i]));
-  }
-  return result;
+jobs::Provenance provenance_of(const CommonOptions& common) {
+  return {{"command", common.command},
+          {"version", RISLEY_VERSION},
+          {"seed", std::to_string(common.seed)}};
+}
+
+jobs::ResultFiles result_files(const std::string& folder, const std::string& states,
+                               const CommonOptions& common) {
+  jobs::ResultFiles files{folder, jobs::StatesRows::knots, provenance_of(common)};
+  if (states == "all") files.states = jobs::StatesRows::all;
+  if (states == "none") files.states = jobs::StatesRows::none;
+  return files;
 }
 
 void make_result_folder(const std::string& folder) {
@@ -36,36 +37,14 @@ void make_result_folder(const std::string& folder) {
   }
 }
 
-void remove_calibration(const std::string& folder) {
-  if (folder.empty()) return;
-  std::error_code ignored;
-  std::filesystem::remove(std::filesystem::path(folder) / "calibration.yaml", ignored);
-}
-
-void write_states_of(const estimation::Estimate& estimate, const std::string& which,
-                     const std::string& path, const report::Provenance& provenance) {
-  const bool all = which == "all";
-  report::StatesContent content;
-  content.prisms = estimate.sensor.prisms();
-  content.rows = all ? estimate.series.size() : estimate.states.size();
-  content.block = [&](estimation::ShotRange rows) {
-    return all ? estimation::states_of_shots(estimate, rows)
-               : estimation::rows_of(estimate.states, rows);
-  };
-  content.residuals_over_angle = estimate.residuals_over_angle;
-  report::write_states(path, content, provenance);
-}
-
-report::ReportedRecording reported_recording(const std::string& path, const RecordingInput& input) {
-  const recordings::RecordingHeader& header = input.reader->header();
-  return {std::filesystem::path(path).filename().string(), header.format,
-          to_string(header.time_reference), input.audit};
-}
-
 void write_report_of(const report::Report& report, const std::string& folder) {
   const std::filesystem::path place(folder);
   report::write_report((place / "report.json").string(), report);
-  io::write_text_file((place / "report.html").string(), report::report_page(report));
+  io::write_text_file((place / "report.html").string(), page_of(report));
+}
+
+std::string page_of(const report::Report& report) {
+  return with_flags(report::report_page(report));
 }
 
 }  // namespace risley::app

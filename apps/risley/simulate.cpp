@@ -149,7 +149,7 @@ Run declare_simulate(CLI::App& verb) {
       ProgressBar bar("simulating", common);
       result = simulation::simulate_to_file(
           settings, options->output, {{"command", common.command}, {"version", RISLEY_VERSION}},
-          bar.callback());
+          bar.progress());
     }
     if (!common.json) {
       print_result(*options, result);

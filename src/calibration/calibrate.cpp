@@ -113,14 +113,14 @@ class Work {
   Calibration run() {
     set_up();
     find_walls();
-    report_progress(progress_, 0.3);
+    progress_.report(0.3);
     adjust_coarsely();
-    report_progress(progress_, 0.5);
+    progress_.report(0.5);
     PlanarSolution solution = adjust_fully();
-    report_progress(progress_, 0.9);
+    progress_.report(0.9);
     fill_result(solution);
     judge(solution);
-    report_progress(progress_, 1.0);
+    progress_.report(1.0);
     return std::move(result_);
   }
 
@@ -271,7 +271,7 @@ class Work {
       solution = solve(problem_);
       update_range_variances(solution);
       problem_ = solution.problem;
-      report_progress(progress_, 0.5 + 0.08 * (round + 1));
+      progress_.report(0.5 + 0.08 * (round + 1));
       if (settled || round + 1 == kMostFullRounds) break;
       label_all();
       const std::size_t before = std::exchange(left_out, leave_out_steps());
@@ -580,7 +580,7 @@ void Work::judge(const PlanarSolution& solution) {
     c.converged = false;
     c.reason = fmt::format(
         "the walls do not tell {}, only to {:.2g} degrees: walls tilted by 30 degrees and more "
-        "against the axis do, or a prior (--prior-sigma-deg)",
+        "against the axis do, or a prior (option prior_sigma)",
         estimation::direction_text(c.unobservable.front()), c.unobservable.front().sigma);
   }
   const PriorTest* worst = nullptr;

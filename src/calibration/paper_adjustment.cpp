@@ -185,7 +185,7 @@ PlanarSolution adjust_as_paper(PlanarProblem problem, int most_iterations,
       }
     }
     ++solution.iterations;
-    report_progress(progress, static_cast<double>(solution.iterations) / most_iterations);
+    progress.report(static_cast<double>(solution.iterations) / most_iterations);
   }
   solution.noise_covariance = solution.covariance;
   solution.parameters.resize(free);

@@ -460,7 +460,7 @@ PlanarSolution adjust(PlanarProblem problem, const AdjustmentOptions& options,
     move(trial, at, step);
     System next = build_system(trial, at, places, options.set);
     ++solution.iterations;
-    report_progress(progress, static_cast<double>(solution.iterations) / options.most_iterations);
+    progress.report(static_cast<double>(solution.iterations) / options.most_iterations);
     // Shots that lose their plane would make any step look good.
     const bool better =
         next.lost <= system.lost && (next.cost <= system.cost || promised < kSmallPromise);

@@ -139,7 +139,7 @@ class Work {
       if (belief_ && belief_->mirrored) mirror(chunk.observations);
       piece_.append(chunk.observations);
       summary_.observations += chunk.observations.size();
-      report_progress(progress_, reader_.fraction_read());
+      progress_.report(reader_.fraction_read());
     }
     return true;
   }
@@ -162,8 +162,8 @@ class Work {
     if (rotors_) {
       estimation::ShotSelector selector({beginning_rate()});
       selector.add(piece_);
-      belief_ =
-          sensor_belief(selector.series(), selector.head(), calibration_, options_.angle_noise);
+      belief_ = sensor_belief(selector.series(), selector.head(), calibration_,
+                              options_.angle_noise, progress_.silent());
       if (belief_->mirrored) mirror(piece_);
       summary_.mirrored = belief_->mirrored;
       summary_.warnings = belief_->warnings;

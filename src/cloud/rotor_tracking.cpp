@@ -102,14 +102,14 @@ void check_same_sensor(const estimation::Estimate& estimate, const sensors::Sens
 
 SensorBelief sensor_belief(const estimation::AngleSeries& beginning,
                            const estimation::AngleSeries& head, const sensors::Sensor& calibration,
-                           std::optional<double> angle_noise) {
+                           std::optional<double> angle_noise, const Progress& progress) {
   estimation::EstimateOptions options;
   options.sensor = calibration;
   options.angle_noise = angle_noise;
   choose_parameters(calibration, options);
   const estimation::Estimate estimate = [&] {
     try {
-      return estimation::estimate(estimation::Method::map, beginning, head, options);
+      return estimation::estimate(estimation::Method::map, beginning, head, options, progress);
     } catch (const EstimationError& error) {
       throw EstimationError(fmt::format("the rotation angles were not found: {}", error.what()));
     }

@@ -348,7 +348,7 @@ BatchMapResult run_batch_map(const AngleSeries& series, const Start& start,
                  coarse.knots().stretch_begin[stretch], stretch_end(coarse.knots(), stretch));
     ++stretch;
   }
-  report_progress(progress, 0.05);
+  progress.report(0.05);
   bool chosen = !choose;
   double level = 0, scale = 0, moved = std::numeric_limits<double>::infinity();
   const auto rescale = [&] {
@@ -364,7 +364,7 @@ BatchMapResult run_batch_map(const AngleSeries& series, const Start& start,
     coarse.evaluate();
     const double before = scale;
     rescale();
-    report_progress(progress, 0.05 + 0.35 * (i + 1) / options.most_iterations);
+    progress.report(0.05 + 0.35 * (i + 1) / options.most_iterations);
     if (moved < kSmallStep && std::abs(scale / before - 1.0) < 0.02) {
       if (chosen) break;
       process = likeliest_process(coarse.equations(), coarse.knots());
@@ -373,7 +373,7 @@ BatchMapResult run_batch_map(const AngleSeries& series, const Start& start,
     moved = coarse.move(coarse.solve(process, false));
     ++result.iterations;
   }
-  report_progress(progress, 0.4);
+  progress.report(0.4);
 
   // All shots: the same stretches, starting where the coarse pass ended.
   Iteration full(series, options, constants, sensor.train, coarse.train(),
@@ -418,7 +418,7 @@ BatchMapResult run_batch_map(const AngleSeries& series, const Start& start,
     }
     moved = full.move(solution);
     ++result.iterations;
-    report_progress(progress, 0.4 + 0.6 * (pass + 1) / kMostFullPasses);
+    progress.report(0.4 + 0.6 * (pass + 1) / kMostFullPasses);
     // Two passes know how much the estimate used up; where that is much, noise needs a third.
     const bool goes_on =
         moved > kSmallStep || !noise_is_found || (pass < 2 && !noise_is_held && used_share > 1e-3);
@@ -447,7 +447,7 @@ BatchMapResult run_batch_map(const AngleSeries& series, const Start& start,
   result.zenith_residual = std::move(full.zenith());
   result.outlier = std::move(full.outlier());
   result.outliers = full.equations().outliers;
-  report_progress(progress, 1.0);
+  progress.report(1.0);
   return result;
 }
 

@@ -350,7 +350,7 @@ EkfResult run_pass(const AngleSeries& series, const State& first, const PrismTra
   for (std::size_t i = 0; i < shots; ++i) {
     if (i % kBlock == 0) {
       before_block.push_back(state);
-      report_progress(progress, 0.3 * static_cast<double>(i) / static_cast<double>(shots));
+      progress.report(0.3 * static_cast<double>(i) / static_cast<double>(shots));
     }
     forward_step(state, i, true);
     if (!state.mean.allFinite()) {
@@ -399,8 +399,7 @@ EkfResult run_pass(const AngleSeries& series, const State& first, const PrismTra
         filter.update(backward, i, std::numeric_limits<double>::infinity());
       }
     }
-    report_progress(progress,
-                    0.3 + 0.7 * static_cast<double>(shots - begin) / static_cast<double>(shots));
+    progress.report(0.3 + 0.7 * static_cast<double>(shots - begin) / static_cast<double>(shots));
   }
   result.parameters = mean_parameters / static_cast<double>(shots);
   result.covariance = mean_covariance / static_cast<double>(shots);
@@ -427,17 +426,17 @@ EkfResult run(const AngleSeries& series, const Start& start, const EkfOptions& o
                             start, options.free);
   EkfResult result = run_pass<N>(series, first, start.train, options, process, nullptr,
                                  screen<N>(series, start, options, nullptr),
-                                 [&](double f) { report_progress(progress, f / options.passes); });
+                                 progress.part(0.0, 1.0 / options.passes));
   for (int pass = 1; pass < options.passes; ++pass) {
     const Reference reference{result.parameters, &result.states};
     if (choose && pass == 1) {
       process = likeliest_process<N>(series, start.train, options, reference);
     }
     first = first_state(Filter<N>(series, start.train, options, process, &reference), reference);
-    EkfResult next = run_pass<N>(series, first, start.train, options, process, &reference,
-                                 screen<N>(series, start, options, &reference), [&](double f) {
-                                   report_progress(progress, (pass + f) / options.passes);
-                                 });
+    EkfResult next =
+        run_pass<N>(series, first, start.train, options, process, &reference,
+                    screen<N>(series, start, options, &reference),
+                    progress.part(double(pass) / options.passes, (pass + 1.0) / options.passes));
     result = std::move(next);
   }
   return result;

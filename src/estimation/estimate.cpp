@@ -327,7 +327,8 @@ double log_likelihood(const BatchMapResult& result, const AngleSeries& series,
 
 /// Whether the coordinates of a Cartesian recording were rounded or cut off: its beginning is
 /// estimated both ways, and the likelier one counts where it is likelier beyond doubt.
-CoordinateRounding rounding_of(const Estimate& estimate, const EstimateOptions& options) {
+CoordinateRounding rounding_of(const Estimate& estimate, const EstimateOptions& options,
+                               const Progress& progress) {
   constexpr std::size_t kEnoughShots = 50000;
   constexpr double kVisible = 5.0, kDecisive = 12.5;  // sigmas, and a logarithm of a likelihood
   const AngleSeries nearest =
@@ -339,8 +340,10 @@ CoordinateRounding rounding_of(const Estimate& estimate, const EstimateOptions& 
   add_half_steps(cut, recording_from_sensor(estimate.start.frame.value_or(FrameTurn{})));
   const BatchMapOptions settings = map_options(estimate, options);
   try {
-    const BatchMapResult rounded = run_batch_map(nearest, estimate.start, options.sensor, settings);
-    const BatchMapResult mended = run_batch_map(cut, estimate.start, options.sensor, settings);
+    const BatchMapResult rounded =
+        run_batch_map(nearest, estimate.start, options.sensor, settings, progress);
+    const BatchMapResult mended =
+        run_batch_map(cut, estimate.start, options.sensor, settings, progress);
     const double lead = log_likelihood(mended, cut, rounded.outlier) -
                         log_likelihood(rounded, nearest, mended.outlier);
     if (std::abs(lead) < kDecisive) return CoordinateRounding::unknown;
@@ -371,8 +374,10 @@ std::vector<ShotRange> take_ekf(Estimate& estimate, const EstimateOptions& optio
 /// A start from the first second, or, where that holds too little, from the first place in the
 /// series that has enough.
 Start start_anywhere(const AngleSeries& series, const AngleSeries& head,
-                     const EstimateOptions& options, const Estimate& estimate) {
+                     const EstimateOptions& options, const Estimate& estimate,
+                     const Progress& progress) {
   const auto start_of = [&](const AngleSeries& shots) {
+    progress.check();
     return find_start(shots, options.sensor,
                       {estimate.free, options.angle_noise.value_or(options.sensor.angle_noise),
                        options.mirrored, options.turned});
@@ -445,12 +450,12 @@ Estimate estimate(Method method, AngleSeries series, const AngleSeries& head,
       estimate.series,
       head_is_used ? head
                    : rows_of(estimate.series, 0, std::min(kHeadRows, estimate.series.size())),
-      options, estimate);
+      options, estimate, progress);
   estimate.mirrored = estimate.start.mirrored;
   prepare_shots(estimate.series, estimate.start);
   if (estimate.start.frame) estimate.frame.emplace().turn = *estimate.start.frame;
   if (options.cartesian && method == Method::map) {
-    estimate.coordinates = rounding_of(estimate, options);
+    estimate.coordinates = rounding_of(estimate, options, progress.silent());
     if (estimate.coordinates == CoordinateRounding::toward_zero) {
       add_half_steps(estimate.series,
                      recording_from_sensor(estimate.start.frame.value_or(FrameTurn{})));

@@ -5,12 +5,14 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <mutex>
 #include <optional>
 
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
 
 #include "risley/core/error.hpp"
 
@@ -37,7 +39,7 @@ std::optional<std::size_t> knot_of(const RotorTrajectory& trajectory, std::size_
 }
 
 std::optional<Piece> estimate_piece(const Estimate& estimate, const sensors::Sensor& sensor,
-                                    ShotRange shots) {
+                                    ShotRange shots, const Progress& progress) {
   const RotorTrajectory& trajectory = estimate.map->trajectory;
   const auto knot = knot_of(trajectory, shots.begin);
   shots.end = std::min(shots.end, shots.begin + kMostPieceShots);
@@ -56,7 +58,7 @@ std::optional<Piece> estimate_piece(const Estimate& estimate, const sensors::Sen
   options.rotor_process = estimate.rotor_process;
   const AngleSeries series = rows_of(estimate.series, shots.begin, shots.end);
   try {
-    const BatchMapResult result = run_batch_map(series, start, sensor, options);
+    const BatchMapResult result = run_batch_map(series, start, sensor, options, progress);
     if (!result.settled) return std::nullopt;
     Piece piece{0, series.duration(), result.parameters, result.covariance};
     piece.time = estimate.series.time(shots.begin) + 0.5 * piece.duration;
@@ -92,13 +94,21 @@ void fill_chi2(const std::vector<Piece>& pieces, PiecewiseEstimate& result) {
 }  // namespace
 
 PiecewiseEstimate estimate_piecewise(const Estimate& estimate, const sensors::Sensor& sensor,
-                                     std::size_t pieces) {
+                                     std::size_t pieces, const Progress& progress) {
   if (pieces < 1) throw InvalidArgument(fmt::format("pieces = {}, allowed 1 or more", pieces));
   if (!estimate.map) throw InvalidArgument("pieces are made of estimates of method map only");
   std::vector<std::optional<Piece>> all(pieces);
   const std::size_t shots = estimate.series.size();
+  std::mutex mutex;
+  std::size_t done = 0;
   tbb::parallel_for(std::size_t{0}, pieces, [&](std::size_t i) {
-    all[i] = estimate_piece(estimate, sensor, {i * shots / pieces, (i + 1) * shots / pieces});
+    // A thread that waits within one piece must not begin another and then wait for the mutex.
+    tbb::this_task_arena::isolate([&] {
+      all[i] = estimate_piece(estimate, sensor, {i * shots / pieces, (i + 1) * shots / pieces},
+                              progress.silent());
+    });
+    const std::lock_guard lock(mutex);
+    progress.report(static_cast<double>(++done) / static_cast<double>(pieces));
   });
   std::vector<Piece> sound;
   PiecewiseEstimate result;

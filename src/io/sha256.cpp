@@ -13,7 +13,7 @@
 
 namespace risley::io {
 
-std::string sha256_of_file(const std::string& path) {
+std::string sha256_of_file(const std::string& path, const Progress& progress) {
   std::ifstream stream(path, std::ios::binary);
   if (!stream) throw FileError(path, {}, "cannot be read");
   const std::unique_ptr<EVP_MD_CTX, void (*)(EVP_MD_CTX*)> context(EVP_MD_CTX_new(),
@@ -22,6 +22,7 @@ std::string sha256_of_file(const std::string& path) {
   std::vector<char> buffer(1 << 20);
   while (stream.read(buffer.data(), static_cast<std::streamsize>(buffer.size())) ||
          stream.gcount() > 0) {
+    progress.check();
     EVP_DigestUpdate(context.get(), buffer.data(), static_cast<std::size_t>(stream.gcount()));
   }
   unsigned char digest[EVP_MAX_MD_SIZE];

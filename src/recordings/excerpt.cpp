@@ -286,7 +286,7 @@ Stretch best_stretch(Reader& reader, const ExcerptOptions& options, const Progre
         }
         searches[rows.device[row]].add(rows, row);
       }
-      report_progress(progress, 0.5 * reader.fraction_read());
+      progress.report(0.5 * reader.fraction_read());
     }
   } catch (const FileError& error) {
     damage.emplace(error);
@@ -317,7 +317,7 @@ Excerpt write_excerpt(const std::string& recording, const std::string& path,
   ExcerptWriter writer(path, reader->header(), stretch, options);
   Chunk chunk;
   while (reader->read(chunk)) {
-    report_progress(progress, 0.5 + 0.5 * reader->fraction_read());
+    progress.report(0.5 + 0.5 * reader->fraction_read());
     if (!writer.take(chunk.observations)) break;
   }
   Excerpt excerpt = writer.close();

@@ -104,7 +104,7 @@ Recording load_recording(const std::string& path, const Progress& progress,
     recording.data.packets.insert(recording.data.packets.end(), chunk.packets.begin(),
                                   chunk.packets.end());
     recording.data.imu.insert(recording.data.imu.end(), chunk.imu.begin(), chunk.imu.end());
-    report_progress(progress, reader->fraction_read());
+    progress.report(reader->fraction_read());
   }
   recording.header = reader->header();
   recording.warnings = reader->warnings();

@@ -177,7 +177,7 @@ TimeAuditResult audit_recording(Reader& reader, const Progress& progress) {
   Chunk chunk;
   while (reader.read(chunk)) {
     audit.add(chunk);
-    report_progress(progress, reader.fraction_read());
+    progress.report(reader.fraction_read());
   }
   TimeAuditResult result = audit.result();
   result.pps_wraps = reader.clock_wraps();

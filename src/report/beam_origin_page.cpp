@@ -8,9 +8,8 @@
 #include <fmt/format.h>
 
 #include "risley/core/angle.hpp"
-
-#include "report/html.hpp"
-#include "report/page_parts.hpp"
+#include "risley/report/html.hpp"
+#include "risley/report/page_parts.hpp"
 
 namespace risley::report {
 namespace {

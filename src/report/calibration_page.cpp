@@ -8,10 +8,9 @@
 
 #include "risley/core/angle.hpp"
 #include "risley/core/direction.hpp"
+#include "risley/report/html.hpp"
 #include "risley/report/number_text.hpp"
-
-#include "report/html.hpp"
-#include "report/page_parts.hpp"
+#include "risley/report/page_parts.hpp"
 
 namespace risley::report {
 namespace {
@@ -74,8 +73,8 @@ std::string boresight_advice_html(const CalibrationReport& r) {
            "fills the whole field of view",
            "a longer range to the walls",
            "the body flipped by 180 degrees against a stop between two recordings, given with "
-           "--stations",
-           "walls whose normals are known in the sensor's frame, given with --planes"}));
+           "option stations",
+           "walls whose normals are known in the sensor's frame, given with option planes"}));
 }
 
 Verdict verdict_of(const CalibrationReport& r) {
@@ -98,10 +97,11 @@ Verdict verdict_of(const CalibrationReport& r) {
   verdict.mend_html =
       "look at the views below whether what was taken for walls are walls; record walls that fill "
       "the field of view, more of them, from nearer and farther and steeply tilted; hold "
-      "parameters that these walls do not tell (<code>--fix</code>); and check known normals and "
+      "parameters that these walls do not tell (<code>option fixed</code>); and check known "
+      "normals and "
       "stations, if any were given.";
   verdict.use_html =
-      "nothing. Any command takes <code>calibration.yaml</code> with <code>--sensor</code>.";
+      "nothing. Any command takes <code>calibration.yaml</code> with <code>option sensor</code>.";
   if (r.converged && has_poor_datum(r)) verdict.care_html = boresight_advice_html(r);
   return verdict;
 }

@@ -12,12 +12,11 @@
 
 #include <fmt/format.h>
 
-#include "risley/calibration/surface_steps.hpp"
 #include "risley/core/angle.hpp"
+#include "risley/core/error.hpp"
 #include "risley/estimation/diagnostics.hpp"
-
-#include "report/charts.hpp"
-#include "report/html.hpp"
+#include "risley/report/charts.hpp"
+#include "risley/report/html.hpp"
 
 namespace risley::report {
 namespace {
@@ -29,9 +28,7 @@ using calibration::ThicknessProfile;
 constexpr std::size_t kMostWallPoints = 3000;   // per scatter diagram
 constexpr std::size_t kMostViewPoints = 8000;   // of all recordings in one kind of view
 constexpr std::size_t kFewestViewPoints = 800;  // of one recording in it
-constexpr int kFewestPointsInCell = 5;  // points that make a mean over a cell of the field of view
-constexpr std::size_t kMostSpaces = 3;  // recordings drawn in three dimensions
-constexpr double kShownThickness = 0.03;  // of walls in three dimensions, share of the range
+constexpr double kShownThickness = 0.03;        // of walls in three dimensions, share of the range
 constexpr std::array<const char*, 5> kPlaneColours = {"a", "b", "c", "d", "bad"};
 constexpr const char* kClutterColour = "ink";
 
@@ -58,8 +55,8 @@ std::vector<ReportedParameter> parameters_of(const CalibrationReportInput& input
     row.sigma = sigma_at(c.covariance, i);
     row.nominal = input.nominal.get(row.name);
     row.believed = c.believed.get(row.name);
-    if (input.truth && input.truth->sensor) {
-      row.truth = input.truth->sensor->get(row.name);
+    if (input.truth) {
+      row.truth = input.truth->truth.get(row.name);
       row.error = row.value - row.truth;
       if (row.sigma > 0) row.error_over_sigma = row.error / row.sigma;
     }
@@ -137,21 +134,21 @@ class CalibrationCharts {
   /// The walls in space, before and after, with their thickness enlarged.
   std::vector<Chart> walls() const {
     std::vector<Chart> charts;
-    const std::size_t recordings = std::min(recording_count(input_), kMostSpaces);
-    for (std::size_t recording = 0; recording < recordings; ++recording) {
-      for (Chart& chart : walls_in_space(recording)) charts.push_back(std::move(chart));
+    for (const jobs::WallsInSpace& walls : input_.details.walls) {
+      for (Chart& chart : walls_in_space(walls)) charts.push_back(std::move(chart));
     }
     return charts;
   }
 
   /// Errors of beams whose truth is known.                                          [B21 Fig. 12]
   std::vector<Chart> truth() const {
-    if (!input_.truth) return {};
-    const CalibrationReportInput::Truth& t = *input_.truth;
+    if (!input_.truth || !input_.details.beam_errors) return {};
+    const jobs::BeamComparison& t = *input_.truth;
+    const jobs::BeamErrorMoments& moments = *input_.details.beam_errors;
     std::vector<Chart> charts;
-    const auto add = [&](const char* title, const char* colour, const std::vector<double>& errors) {
+    const auto add = [&](const char* title, const char* colour, const std::vector<double>& errors,
+                         const estimation::Moments& m) {
       if (errors.empty()) return;
-      const estimation::Moments m = estimation::moments(errors);
       charts.push_back({title, "computed minus true, deg", "beams",
                         histogram("errors", colour, errors, {}, m, kDegreesPerRadian),
                         fmt::format("{} beams: mean {:.3g}°, standard deviation {:.3g}°, root mean "
@@ -160,10 +157,10 @@ class CalibrationCharts {
                                     count_text(m.count), degrees_from_radians(m.mean),
                                     degrees_from_radians(m.std), degrees_from_radians(m.rms))});
     };
-    add("Errors of the azimuth before", "b", t.azimuth_before);
-    add("Errors of the zenith angle before", "b", t.zenith_before);
-    add("Errors of the azimuth after", "a", t.azimuth_after);
-    add("Errors of the zenith angle after", "a", t.zenith_after);
+    add("Errors of the azimuth before", "b", t.azimuth_before, moments.azimuth_before);
+    add("Errors of the zenith angle before", "b", t.zenith_before, moments.zenith_before);
+    add("Errors of the azimuth after", "a", t.azimuth_after, moments.azimuth_after);
+    add("Errors of the zenith angle after", "a", t.zenith_after, moments.zenith_after);
     return charts;
   }
 
@@ -284,7 +281,7 @@ class CalibrationCharts {
 
   std::string sample_note() const {
     return fmt::format("Of the {} used points the {} that stand in an evenly spread sample. ",
-                       count_text(c_.points), count_text(on_walls_.size()));
+                       count_text(c_.points), count_text(input_.details.points_on_planes));
   }
 
   Chart distances() const {
@@ -294,8 +291,8 @@ class CalibrationCharts {
       after.push_back(point->after);
     }
     // Both share their bins, or their heights could not be compared.
-    const estimation::Moments moments_before = estimation::moments(before);
-    const estimation::Moments moments_after = estimation::moments(after);
+    const estimation::Moments& moments_before = input_.details.distances_before;
+    const estimation::Moments& moments_after = input_.details.distances_after;
     estimation::Moments both;
     both.std = std::fmax(moments_before.rms, moments_after.rms);
     Chart chart{"Histogram of the distances from the planes",
@@ -332,139 +329,79 @@ class CalibrationCharts {
 
   /// Where in the field of view points lie beyond their planes, and where before them.
   std::vector<Chart> cell_means() const {
-    struct Cell {
-      int count = 0;
-      double before = 0, after = 0;
-    };
-    std::map<std::pair<long, long>, Cell> cells;
-    double squares = 0;
-    std::size_t points = 0;
-    for (const SamplePoint* point : on_walls_) {
-      if (!std::isfinite(point->before + point->after + point->azimuth + point->zenith)) continue;
-      Cell& cell = cells[{std::lround(std::floor(point->azimuth / calibration::kSurfaceCell)),
-                          std::lround(std::floor(point->zenith / calibration::kSurfaceCell))}];
-      ++cell.count;
-      cell.before += point->before;
-      cell.after += point->after;
-      squares += point->after * point->after;
-      ++points;
-    }
-    const double width = degrees_from_radians(calibration::kSurfaceCell);
-    Series before{"", "ink", SeriesKind::cells, {}, {}}, after = before;
-    double largest = 0, before_squares = 0, after_squares = 0, noise_squares = 0;
-    for (const auto& [place, cell] : cells) {
-      if (cell.count < kFewestPointsInCell) continue;
-      const double mean_before = cell.before / cell.count, mean_after = cell.after / cell.count;
-      for (Series* series : {&before, &after}) {
-        series->x.push_back(width * (static_cast<double>(place.first) + 0.5));
-        series->y.push_back(width * (static_cast<double>(place.second) + 0.5));
-        series->cell_width = series->cell_height = width;
+    if (!input_.details.field) return {};
+    const jobs::WallField& field = *input_.details.field;
+    const double width = degrees_from_radians(field.cell);
+    const auto chart = [&](const char* when, const std::vector<double>& means, double rms) {
+      Series series{"", "ink", SeriesKind::cells, {}, {}};
+      series.cell_width = series.cell_height = width;
+      for (std::size_t i = 0; i < means.size(); ++i) {
+        series.x.push_back(degrees_from_radians(field.azimuth[i]));
+        series.y.push_back(degrees_from_radians(field.zenith[i]));
+        series.value.push_back(kMillimetres * means[i]);
       }
-      before.value.push_back(kMillimetres * mean_before);
-      after.value.push_back(kMillimetres * mean_after);
-      largest = std::max({largest, std::abs(mean_before), std::abs(mean_after)});
-      before_squares += mean_before * mean_before;
-      after_squares += mean_after * mean_after;
-      noise_squares += squares / static_cast<double>(points) / cell.count;
-    }
-    if (after.x.empty()) return {};
-    const auto count = static_cast<double>(after.x.size());
-    const auto chart = [&](const char* when, const Series& series, double sum) {
-      Chart result{fmt::format("Mean distance from the planes over the field of view, {}", when),
-                   "azimuth, deg",
-                   "zenith, deg",
-                   {series},
-                   fmt::format("Means of {} sample points over cells of {:.3g} degree, all "
-                               "recordings together; cells with fewer than {} points are left out. "
-                               "The {} means have a root mean square of {:.2f} mm, where noise "
-                               "alone would leave about {:.2f} mm. Patches of one colour are walls "
-                               "that are not flat, or beams that are bent.",
-                               count_text(points), width, kFewestPointsInCell,
-                               count_text(series.x.size()), kMillimetres * std::sqrt(sum / count),
-                               kMillimetres * std::sqrt(noise_squares / count)),
-                   ChartKind::map};
+      Chart result{
+          fmt::format("Mean distance from the planes over the field of view, {}", when),
+          "azimuth, deg",
+          "zenith, deg",
+          {series},
+          fmt::format("Means of {} sample points over cells of {:.3g} degree, all "
+                      "recordings together; cells with fewer than {} points are left out. "
+                      "The {} means have a root mean square of {:.2f} mm, where noise "
+                      "alone would leave about {:.2f} mm. Patches of one colour are walls "
+                      "that are not flat, or beams that are bent.",
+                      count_text(field.points), width, field.fewest_points,
+                      count_text(means.size()), kMillimetres * rms, kMillimetres * field.noise),
+          ChartKind::map};
       result.value_label = "mean distance, mm";
       result.palette = Palette::diverging;
+      double largest = 0;
+      for (const auto* both : {&field.mean_before, &field.mean_after}) {
+        for (const double mean : *both) largest = std::max(largest, std::abs(mean));
+      }
       result.value_range = {-kMillimetres * largest, kMillimetres * largest};
       return result;
     };
-    return {chart("before", before, before_squares), chart("after", after, after_squares)};
+    return {chart("before", field.mean_before, field.rms_before),
+            chart("after", field.mean_after, field.rms_after)};
   }
 
-  /// Means of the points of one wall in a cell of the field of view: single points would show
-  /// nothing but the noise of ranges.
-  struct WallPatch {
-    int count = 0;
-    Vector3<double> foot;  ///< on the plane
-    double before = 0, after = 0;
-  };
-
-  std::vector<Chart> walls_in_space(std::size_t recording) const {
-    std::map<std::array<long, 3>, WallPatch> cells;
-    std::size_t points = 0;
-    for (const SamplePoint* point : on_walls_) {
-      if (point->recording != recording) continue;
-      if (!std::isfinite(point->before + point->after + point->azimuth + point->zenith)) continue;
-      WallPatch& patch =
-          cells[{point->plane, std::lround(std::floor(point->azimuth / calibration::kSurfaceCell)),
-                 std::lround(std::floor(point->zenith / calibration::kSurfaceCell))}];
-      const auto& plane = c_.planes[static_cast<std::size_t>(point->plane)];
-      patch.foot = patch.foot + point->point - point->after * plane.normal;
-      patch.before += point->before;
-      patch.after += point->after;
-      ++patch.count;
-      ++points;
-    }
-    Series before{"", "a", SeriesKind::points, {}, {}}, after = before;
-    double largest = 0, squares = 0, farthest = 0;
-    for (auto& [place, patch] : cells) {
-      if (patch.count < kFewestPointsInCell) continue;
-      patch.foot = (1.0 / patch.count) * patch.foot;
-      patch.before /= patch.count;
-      patch.after /= patch.count;
-      largest = std::max({largest, std::abs(patch.before), std::abs(patch.after)});
-      farthest = std::max(farthest, norm(patch.foot));
-      squares += patch.before * patch.before;
-      before.value.push_back(kMillimetres * patch.before);
-      after.value.push_back(kMillimetres * patch.after);
-    }
-    if (before.value.empty()) return {};
-    const double rms = std::sqrt(squares / static_cast<double>(before.value.size()));
+  std::vector<Chart> walls_in_space(const jobs::WallsInSpace& walls) const {
+    if (walls.patches.empty()) return {};
     const double enlarged =
-        rms > 0 ? std::pow(10.0, std::floor(std::log10(kShownThickness * farthest / rms))) : 1.0;
-    for (const auto& cell : cells) {
-      const WallPatch& patch = cell.second;
-      if (patch.count < kFewestPointsInCell) continue;
-      const Vector3<double>& normal = c_.planes[static_cast<std::size_t>(cell.first[0])].normal;
-      const auto add = [&](Series& series, double distance) {
-        const Vector3<double> at = patch.foot + enlarged * distance * normal;
+        walls.rms_before > 0
+            ? std::pow(10.0,
+                       std::floor(std::log10(kShownThickness * walls.farthest / walls.rms_before)))
+            : 1.0;
+    const auto chart = [&](const char* when, double jobs::WallPatch::*distance) {
+      Series series{"", "a", SeriesKind::points, {}, {}};
+      for (const jobs::WallPatch& patch : walls.patches) {
+        const Vector3<double> at =
+            patch.foot + enlarged * (patch.*distance) * c_.planes[patch.plane].normal;
         series.x.push_back(at.x);
         series.y.push_back(at.y);
         series.z.push_back(at.z);
-      };
-      add(before, patch.before);
-      add(after, patch.after);
-    }
-    const auto chart = [&](const char* when, const Series& series) {
-      Chart result{
-          fmt::format("Walls {} the calibration: {}", when, recording_name(input_, recording)),
-          "X (forward), m",
-          "Y (left), m",
-          {series},
-          fmt::format("Each dot is the mean of the {} sample points of a wall within one "
-                      "degree, {} dots; cells with fewer than {} points are left out. "
-                      "Distances from the planes are drawn {:.0f} times as large. Drag to "
-                      "rotate.",
-                      count_text(points), count_text(series.x.size()), kFewestPointsInCell,
-                      enlarged),
-          ChartKind::space};
+        series.value.push_back(kMillimetres * (patch.*distance));
+      }
+      Chart result{fmt::format("Walls {} the calibration: {}", when,
+                               recording_name(input_, walls.recording)),
+                   "X (forward), m",
+                   "Y (left), m",
+                   {series},
+                   fmt::format("Each dot is the mean of the {} sample points of a wall within one "
+                               "degree, {} dots; cells with fewer than {} points are left out. "
+                               "Distances from the planes are drawn {:.0f} times as large. Drag to "
+                               "rotate.",
+                               count_text(walls.points), count_text(series.x.size()),
+                               walls.fewest_points, enlarged),
+                   ChartKind::space};
       result.z_label = "Z (up), m";
       result.value_label = "mean distance from the plane, mm";
       result.palette = Palette::diverging;
-      result.value_range = {-kMillimetres * largest, kMillimetres * largest};
+      result.value_range = {-kMillimetres * walls.largest, kMillimetres * walls.largest};
       return result;
     };
-    return {chart("before", before), chart("after", after)};
+    return {chart("before", &jobs::WallPatch::before), chart("after", &jobs::WallPatch::after)};
   }
 
   const CalibrationReportInput& input_;
@@ -517,6 +454,15 @@ CalibrationReport calibration_report(const CalibrationReportInput& input) {
   report.wall_charts = charts.walls();
   report.view_charts = charts.views();
   return report;
+}
+
+CalibrationReport calibration_report(const jobs::CalibratedRecordings& calibrated) {
+  if (!calibrated.details) throw InvalidArgument("a report needs a result with details");
+  std::vector<ReportedRecording> recordings;
+  for (const jobs::ReadRecording& one : calibrated.recordings) recordings.push_back(reported(one));
+  return calibration_report({calibrated.calibration, calibrated.nominal, *calibrated.details,
+                             calibrated.truth, recordings, calibrated.provenance,
+                             calibrated.warnings});
 }
 
 }  // namespace risley::report

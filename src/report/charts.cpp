@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-#include "report/charts.hpp"
+#include "risley/report/charts.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -8,9 +8,9 @@
 #include <fmt/format.h>
 
 #include "risley/core/angle.hpp"
+#include "risley/report/html.hpp"
 
 #include "report/chart_fields.hpp"
-#include "report/html.hpp"
 
 namespace risley::report {
 namespace {

@@ -7,10 +7,9 @@
 #include <fmt/format.h>
 
 #include "risley/core/angle.hpp"
+#include "risley/report/html.hpp"
 #include "risley/report/number_text.hpp"
-
-#include "report/html.hpp"
-#include "report/page_parts.hpp"
+#include "risley/report/page_parts.hpp"
 
 namespace risley::report {
 namespace {
@@ -47,11 +46,12 @@ Verdict verdict_of(const EstimateReport& r) {
       noise_words(r), count_text(r.outliers), count_text(r.shots));
   verdict.healthy = "Healthy: the model describes this recording.";
   verdict.mend_html =
-      "check that --sensor is the instrument that recorded, that its times are right, and whether "
-      "the file has the sign of the elevation turned (--mirror yes); a longer "
-      "recording or --rate-hz full gives the estimation more to hold on to.";
+      "check that option sensor is the instrument that recorded, that its times are right, and "
+      "whether "
+      "the file has the sign of the elevation turned (option mirrored yes); a longer "
+      "recording or option rate full gives the estimation more to hold on to.";
   verdict.use_html =
-      "nothing. Any command takes <code>calibration.yaml</code> with <code>--sensor</code>.";
+      "nothing. Any command takes <code>calibration.yaml</code> with <code>option sensor</code>.";
   return verdict;
 }
 
@@ -130,7 +130,7 @@ std::string unobservable_html(const EstimateReport& r) {
     }
     html +=
         "<p>These combinations of the free parameters were not measured (in units of 1 degree, "
-        "or 0.01 of an index). Hold one of each with <code>--fix</code>.</p>\n" +
+        "or 0.01 of an index). Hold one of each with <code>option fixed</code>.</p>\n" +
         list_html(items);
   } else {
     html += "<p>All free parameters were measured.</p>\n";

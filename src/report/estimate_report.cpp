@@ -4,36 +4,24 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 
 #include <fmt/format.h>
 
 #include "risley/core/angle.hpp"
-#include "risley/estimation/observability.hpp"
-#include "risley/estimation/piecewise.hpp"
-#include "risley/estimation/residual_maps.hpp"
-
-#include "report/charts.hpp"
-#include "report/html.hpp"
+#include "risley/core/error.hpp"
+#include "risley/report/charts.hpp"
+#include "risley/report/html.hpp"
 
 namespace risley::report {
 namespace {
 
 using estimation::Estimate;
 using estimation::Moments;
-using estimation::ResidualMap;
 using estimation::RotorStates;
 
 constexpr std::size_t kMostShotPoints = 4000;  // per scatter diagram
 constexpr std::size_t kMostMapPoints = 9000;   // of the scan pattern
-constexpr std::size_t kPieces = 20;
-constexpr double kPatternDuration = 0.09;  // s, as in [B21 Fig. 2a]
-constexpr double kDensityDuration = 0.5;   // s, as in [B21 Fig. 2b]
-constexpr double kDensityCell = 0.5;       // deg
-constexpr double kFieldCell = radians_from_degrees(1.0);
-constexpr double kAngleCell = radians_from_degrees(10.0);
-constexpr double kFewestShotsInCell = 5;  // shots that make a mean
-constexpr double kFewestOfTypical = 0.1;  // and of a typical cell's shots
+constexpr double kPatternDuration = 0.09;      // s, as in [B21 Fig. 2a]
 
 std::string letter(std::size_t rotor) {
   return std::string(1, prism_letter(static_cast<int>(rotor)));
@@ -120,19 +108,18 @@ class EstimateCharts {
     std::vector<Chart> charts;
     std::vector<Chart> distributions;
     for (std::size_t rotor = 0; rotor < states_.angular_velocity.size(); ++rotor) {
-      const Moments speed = estimation::moments(states_.angular_velocity[rotor], states_.outlier);
-      const std::vector<double> change = about(states_.angular_velocity[rotor], speed.mean);
+      const jobs::RotorSpeed& speed = input_.details.speeds[rotor];
       const std::string label =
           fmt::format("angular velocity less {:.5f}, deg/s", degrees_from_radians(speed.mean));
       charts.push_back({fmt::format("Angular velocity of prism {}", letter(rotor)),
                         "time, s",
                         label,
-                        {line(rotor, change)},
+                        {line(rotor, speed.change)},
                         peak_line_note(states_.size())});
-      if (!(estimation::moments(change, states_.outlier).std > 0)) continue;  // it stood still
+      if (!(speed.moments.std > 0)) continue;  // it stood still
       distributions.push_back(distribution(
           fmt::format("Distribution of the angular velocity of prism {}", letter(rotor)), label,
-          letter(rotor), change, "velocity"));
+          letter(rotor), speed.change, speed.moments, "velocity"));
     }
     charts.insert(charts.end(), distributions.begin(), distributions.end());
     if (!input_.evaluation) return charts;
@@ -147,7 +134,8 @@ class EstimateCharts {
     for (std::size_t rotor = 0; rotor < errors.size(); ++rotor) {
       charts.push_back(distribution(
           fmt::format("Distribution of the error of the rotation angle of prism {}", letter(rotor)),
-          "estimate minus truth, deg", letter(rotor), errors[rotor], "error"));
+          "estimate minus truth, deg", letter(rotor), errors[rotor],
+          input_.details.rotation_angle_errors[rotor], "error"));
     }
     return charts;
   }
@@ -160,27 +148,24 @@ class EstimateCharts {
                                                  residuals_.azimuth, e.azimuth_residuals, "a"),
                               residual_histogram("Histogram of the zenith residuals",
                                                  residuals_.zenith, e.zenith_residuals, "b")};
-    const ResidualMap field = estimation::residuals_over_field(e, kFieldCell);
-    for (Chart& chart : maps(field, "the field of view", "azimuth, deg", "zenith, deg")) {
+    for (Chart& chart : maps(input_.details.residuals_over_field, "the field of view",
+                             "azimuth, deg", "zenith, deg")) {
       chart.kind = ChartKind::map;
       charts.push_back(std::move(chart));
     }
     for (std::size_t rotor = 0; rotor < states_.rotation_angle.size(); ++rotor) {
       charts.push_back(over_angle(rotor));
     }
-    for (int x = 0; x < states_.prisms(); ++x) {
-      for (int y = x + 1; y < states_.prisms(); ++y) {
-        const ResidualMap map = estimation::residuals_over_angles(e, x, y, kAngleCell);
-        const auto axis = [](int prism) {
-          return fmt::format("rotation angle of prism {}, deg", prism_letter(prism));
-        };
-        for (Chart& chart :
-             maps(map,
-                  fmt::format("the angles of prisms {} and {}", prism_letter(x), prism_letter(y)),
-                  axis(x), axis(y))) {
-          chart.kind = ChartKind::two_turns;
-          charts.push_back(std::move(chart));
-        }
+    for (const jobs::PrismPairResiduals& pair : input_.details.residuals_over_angles) {
+      const auto axis = [](int prism) {
+        return fmt::format("rotation angle of prism {}, deg", prism_letter(prism));
+      };
+      for (Chart& chart : maps(pair.residuals,
+                               fmt::format("the angles of prisms {} and {}",
+                                           prism_letter(pair.prism_x), prism_letter(pair.prism_y)),
+                               axis(pair.prism_x), axis(pair.prism_y))) {
+        chart.kind = ChartKind::two_turns;
+        charts.push_back(std::move(chart));
       }
     }
     return charts;
@@ -209,18 +194,6 @@ class EstimateCharts {
     return {label, colour, SeriesKind::line, {0.0, end}, {value, value}};
   }
 
-  /// Values less their mean; what is rounding beside it is zero.
-  static std::vector<double> about(const std::vector<double>& values, double mean) {
-    constexpr double kRounding = 1e-9;
-    std::vector<double> result;
-    result.reserve(values.size());
-    for (const double value : values) {
-      const double difference = value - mean;
-      result.push_back(std::abs(difference) < kRounding * std::abs(mean) ? 0.0 : difference);
-    }
-    return result;
-  }
-
   double time(std::size_t row) const {
     return 1e-9 * static_cast<double>(states_.time_ns[row] - states_.time_ns[0]);
   }
@@ -240,8 +213,7 @@ class EstimateCharts {
 
   Chart distribution(const std::string& title, const std::string& x_label,
                      const std::string& colour, const std::vector<double>& values,
-                     const std::string& what) const {
-    const Moments moments = estimation::moments(values, states_.outlier);
+                     const Moments& moments, const std::string& what) const {
     return {title, x_label, "shots",
             histogram(what, colour, values, states_.outlier, moments, kDegreesPerRadian),
             fmt::format("At {} shots: mean {:.7g}, standard deviation {:.3g} deg{}. The outermost "
@@ -288,43 +260,37 @@ class EstimateCharts {
   }
 
   /// Mean azimuth and zenith residuals over the cells of a plane.
-  static std::vector<Chart> maps(const ResidualMap& map, const std::string& over,
+  static std::vector<Chart> maps(const jobs::ResidualPlane& plane, const std::string& over,
                                  const std::string& x_label, const std::string& y_label) {
-    std::vector<std::uint64_t> counts = map.count;
-    const auto middle = counts.begin() + static_cast<std::ptrdiff_t>(counts.size() / 2);
-    std::nth_element(counts.begin(), middle, counts.end());
-    const double typical = counts.empty() ? 1.0 : static_cast<double>(*middle);
-    // A rim cell that few beams graze would decide the colours of all others.
-    const double fewest = std::max(kFewestShotsInCell, std::ceil(kFewestOfTypical * typical));
+    const estimation::ResidualMap& map = plane.map;
     std::vector<Chart> charts;
-    const auto add = [&](const char* what, const std::vector<double>& mean, double sigma) {
-      const double noise = degrees_from_radians(sigma / std::sqrt(typical));
+    const auto add = [&](const char* what, const std::vector<double>& mean, double noise) {
       Series cells{"", "ink", SeriesKind::cells, {}, {}};
       cells.cell_width = cells.cell_height = degrees_from_radians(map.cell);
-      double largest = 3.0 * noise;  // a map of noise alone should look calm
+      double largest = 3.0 * degrees_from_radians(noise);  // a map of noise alone should look calm
       for (std::size_t i = 0; i < map.size(); ++i) {
-        if (static_cast<double>(map.count[i]) < fewest) continue;
+        if (static_cast<double>(map.count[i]) < plane.fewest_shots) continue;
         cells.x.push_back(degrees_from_radians(map.x[i]));
         cells.y.push_back(degrees_from_radians(map.y[i]));
         cells.value.push_back(degrees_from_radians(mean[i]));
         largest = std::max(largest, std::abs(cells.value.back()));
       }
-      Chart chart{
-          fmt::format("Mean {} residuals over {}", what, over),
-          x_label,
-          y_label,
-          {cells},
-          fmt::format("Means of all {} used shots over cells of {:.3g}°; cells with fewer "
-                      "than {} shots are left out. Noise alone leaves about {:.2g}° in a "
-                      "cell.",
-                      count_text(map.shots), degrees_from_radians(map.cell), fewest, noise)};
+      Chart chart{fmt::format("Mean {} residuals over {}", what, over),
+                  x_label,
+                  y_label,
+                  {cells},
+                  fmt::format("Means of all {} used shots over cells of {:.3g}°; cells with fewer "
+                              "than {} shots are left out. Noise alone leaves about {:.2g}° in a "
+                              "cell.",
+                              count_text(map.shots), degrees_from_radians(map.cell),
+                              plane.fewest_shots, degrees_from_radians(noise))};
       chart.value_label = "mean residual, deg";
       chart.palette = Palette::diverging;
       chart.value_range = {-largest, largest};
       charts.push_back(chart);
     };
-    add("azimuth", map.mean_azimuth, map.sigma_azimuth);
-    add("zenith", map.mean_zenith, map.sigma_zenith);
+    add("azimuth", map.mean_azimuth, plane.azimuth_noise);
+    add("zenith", map.mean_zenith, plane.zenith_noise);
     return charts;
   }
 
@@ -370,36 +336,26 @@ class EstimateCharts {
 
   /// Shots per square degree.                                                      [B21 Fig. 2b]
   Chart density() const {
-    const estimation::AngleSeries& head = input_.head;
-    const std::size_t rows = rows_until(kDensityDuration);
-    std::map<std::pair<long, long>, double> count;
-    for (std::size_t i = 0; i < rows; ++i) {
-      const auto cell = [](double angle) {
-        return std::lround(std::floor(degrees_from_radians(angle) / kDensityCell));
-      };
-      count[{cell(head.azimuth[i]), cell(head.zenith[i])}] += 1.0;
-    }
+    const jobs::ShotDensity& density = input_.details.density;
+    const double cell = degrees_from_radians(density.cell);
     Series cells{"", "ink", SeriesKind::cells, {}, {}};
-    cells.cell_width = cells.cell_height = kDensityCell;
-    for (const auto& [place, shots] : count) {
-      cells.x.push_back(kDensityCell * (static_cast<double>(place.first) + 0.5));
-      cells.y.push_back(kDensityCell * (static_cast<double>(place.second) + 0.5));
-      cells.value.push_back(shots / (kDensityCell * kDensityCell));
+    cells.cell_width = cells.cell_height = cell;
+    for (std::size_t i = 0; i < density.x.size(); ++i) {
+      cells.x.push_back(degrees_from_radians(density.x[i]));
+      cells.y.push_back(degrees_from_radians(density.y[i]));
+      cells.value.push_back(density.shots[i] / (cell * cell));
     }
-    Chart chart{fmt::format("Density after {} s, as recorded", kDensityDuration),
-                "azimuth, deg",
-                "zenith, deg",
-                {cells},
-                fmt::format("All {} shots, counted over cells of {}°. Colours end at ten times the "
-                            "mean density.",
-                            count_text(rows), kDensityCell),
-                ChartKind::map};
+    Chart chart{
+        fmt::format("Density after {} s, as recorded", density.duration),
+        "azimuth, deg",
+        "zenith, deg",
+        {cells},
+        fmt::format("All {} shots, counted over cells of {:.3g}°. Colours end at ten times the "
+                    "mean density.",
+                    count_text(density.total), cell),
+        ChartKind::map};
     chart.value_label = "shots per square degree";
-    const double mean = count.empty()
-                            ? 1.0
-                            : static_cast<double>(rows) /
-                                  (static_cast<double>(count.size()) * kDensityCell * kDensityCell);
-    chart.value_range = {0.0, 10.0 * mean};
+    chart.value_range = {0.0, 10.0 * density.mean_per_cell / (cell * cell)};
     return chart;
   }
 
@@ -450,19 +406,25 @@ EstimateReport estimate_report(const EstimateReportInput& input) {
   const EstimateCharts charts(input);
   if (e.map) {
     report.variance = {e.map->unit_variance, e.map->autocorrelation.factor, e.map->variance_factor};
-    if (e.converged) {
-      report.advice =
-          estimation::observability_words(estimation::observability_of_estimate(e), report.shape());
-      const auto pieces = estimation::estimate_piecewise(e, input.nominal, kPieces);
-      report.pieces = {pieces.size(), pieces.failed, pieces.duration, pieces.chi2,
-                       pieces.degrees_of_freedom};
-      report.parameter_charts = charts.pieces(pieces, report.parameters);
-    }
+  }
+  report.advice = input.details.advice;
+  if (input.details.pieces) {
+    const estimation::PiecewiseEstimate& pieces = *input.details.pieces;
+    report.pieces = {pieces.size(), pieces.failed, pieces.duration, pieces.chi2,
+                     pieces.degrees_of_freedom};
+    report.parameter_charts = charts.pieces(pieces, report.parameters);
   }
   report.rotor_charts = charts.rotors();
   report.residual_charts = charts.residuals();
   report.pattern_charts = charts.pattern();
   return report;
+}
+
+EstimateReport estimate_report(const jobs::EstimatedRecording& estimated) {
+  if (!estimated.details) throw InvalidArgument("a report needs a result with details");
+  return estimate_report({estimated.estimate, estimated.nominal, estimated.evaluation,
+                          estimated.head, *estimated.details, reported(estimated.recording),
+                          estimated.provenance, estimated.warnings});
 }
 
 }  // namespace risley::report

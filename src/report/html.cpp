@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-#include "report/html.hpp"
+#include "risley/report/html.hpp"
 
 #include <cmath>
 

@@ -1,13 +1,14 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-#include "report/page_parts.hpp"
+#include "risley/report/page_parts.hpp"
 
 #include <algorithm>
 #include <cmath>
 
 #include <fmt/format.h>
 
-#include "report/html.hpp"
+#include "risley/report/html.hpp"
+
 #include "report/page_assets.hpp"
 
 namespace risley::report {

@@ -58,8 +58,8 @@ SimulationResult simulate_to_file(
   while (scanner.read(chunk, truth)) {
     recording->write(chunk);
     truth_columns.write(truth);
-    report_progress(
-        progress, static_cast<double>(scanner.shots_done()) / static_cast<double>(scanner.shots()));
+    progress.report(static_cast<double>(scanner.shots_done()) /
+                    static_cast<double>(scanner.shots()));
   }
   recording->close();
   truth_columns.close();

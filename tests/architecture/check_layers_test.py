@@ -51,6 +51,37 @@ class CheckLayersTest(unittest.TestCase):
                 self.assertEqual(len(errors), 1, errors)
                 self.assertTrue(errors[0].startswith(expected), errors[0])
 
+    def test_a_private_header_belongs_to_its_layer(self):
+        self.assertEqual(self.errors({
+            "src/estimation/ekf.cpp": '#include "estimation/knots.hpp"\n',
+            "include/risley/estimation/ekf.hpp": '#include "estimation/knots.hpp"\n',
+            "src/report/html.cpp": '#include "estimation/knots.hpp"\n',
+            "apps/risley/main.cpp": '#include "report/charts.hpp"\n',
+            "studies/paper/run.cpp": '#include "report/charts.hpp"\n',
+        }), [
+            "include/risley/estimation/ekf.hpp:1: estimation/knots.hpp is a private header of the layer"
+            " estimation",
+            "src/report/html.cpp:1: estimation/knots.hpp is a private header of the layer estimation",
+            "apps/risley/main.cpp:1: report/charts.hpp is a private header of the layer report",
+            "studies/paper/run.cpp:1: report/charts.hpp is a private header of the layer report",
+        ])
+
+    def test_libraries_know_no_option_of_the_command(self):
+        self.assertEqual(self.errors({
+            "src/core/a.cpp": 'throw Error("say \\"which\\" with --sensor");\n'
+                              '// "--sensor" in a comment\n'
+                              'f("x"); // "--sensor"\n'
+                              'int i = 3; --i; puts("a -- b, ---");\n'
+                              'link("https://a.b/c--d", "<code>--shot-rate-hz</code>");\n',
+            "include/risley/report/b.hpp": 'f("--fix", "--free");\n',
+            "apps/risley/main.cpp": 'verb.add_option("--sensor");\n',
+        }), [
+            'include/risley/report/b.hpp:1: a library knows no --fix, say "option NAME"',
+            'include/risley/report/b.hpp:1: a library knows no --free, say "option NAME"',
+            'src/core/a.cpp:1: a library knows no --sensor, say "option NAME"',
+            'src/core/a.cpp:5: a library knows no --shot-rate-hz, say "option NAME"',
+        ])
+
     def test_an_undeclared_folder_is_found(self):
         self.assertEqual(self.errors({"src/clouds/cloud.cpp": ""}),
                          ["src/clouds: the folder is no declared layer"])

@@ -2,7 +2,9 @@
 # SPDX-FileCopyrightText: 2026 The risley authors
 # SPDX-License-Identifier: MIT
 """Missing, unknown and damaged files."""
+import json
 import os
+import resource
 import signal
 import struct
 import subprocess
@@ -80,6 +82,37 @@ class FilesTest(CommandTest):
             process.send_signal(signal.SIGINT)
             self.assertEqual(process.wait(30), 130)
         self.assertEqual(self.names(), before)
+
+    def test_a_run_without_a_bar_can_be_interrupted(self):
+        # Reading, estimating and judging; a plan has nothing that tells how far it is.
+        self.expect(0, "simulate", "-o", "unit.nc", "--duration-s", "5")
+        before = self.names()
+        for wait in (0.2, 0.5, 1.0):
+            with subprocess.Popen([COMMAND, "estimate", "unit.nc", "-o", "stopped", "--json",
+                                   "--method", "ekf", "--rate-hz", "full"],
+                                  cwd=self.folder, stdout=subprocess.PIPE,
+                                  stderr=subprocess.DEVNULL) as process:
+                time.sleep(wait)
+                process.send_signal(signal.SIGINT)
+                text = process.communicate(timeout=60)[0]
+            self.assertEqual(process.returncode, 130)
+            self.assertEqual(json.loads(text), {"error": "interrupted", "exit_status": 130})
+            self.assertEqual(self.names(), before)
+
+    def test_no_memory_is_a_fault_and_not_a_failed_estimate(self):
+        self.expect(0, "simulate", "-o", "large.nc", "--duration-s", "5")
+
+        def limited(megabytes, *arguments):
+            def limit():
+                resource.setrlimit(resource.RLIMIT_AS, (megabytes << 20, megabytes << 20))
+            return subprocess.run([COMMAND, *arguments], cwd=self.folder, preexec_fn=limit,
+                                  capture_output=True, text=True, timeout=300, check=False)
+
+        enough = next(size for size in range(32, 4096, 16)
+                      if limited(size, "--version").returncode == 0)
+        done = limited(enough + 64, "estimate", "large.nc", "--threads", "1", "--json")
+        self.assertEqual(done.returncode, 4, done.stderr)
+        self.assertEqual(json.loads(done.stdout)["exit_status"], 4)
 
     @unittest.skipUnless(os.path.exists("/dev/full"), "no /dev/full")
     def test_full_disk_is_an_error(self):

@@ -142,7 +142,7 @@ Calibration example(std::size_t points = 2000) {
 struct Page {
   sensors::Sensor nominal = sensors::load_sensor("mid-40");
   Calibration calibration = example();
-  std::optional<CalibrationReportInput::Truth> truth;
+  std::optional<jobs::BeamComparison> truth;
   std::vector<std::string> warnings;
 
   CalibrationReport report() const {
@@ -153,6 +153,7 @@ struct Page {
     return calibration_report(
         {calibration,
          nominal,
+         jobs::calibration_details(calibration, recordings.size(), truth),
          truth,
          recordings,
          {{"command", "risley calibrate \"room <1>.lvx\" hall.lvx"}, {"version", "0.1.0"}},
@@ -161,13 +162,13 @@ struct Page {
   std::string html() const { return calibration_page(report()); }
 };
 
-CalibrationReportInput::Truth example_truth() {
-  CalibrationReportInput::Truth truth;
+jobs::BeamComparison example_truth() {
+  jobs::BeamComparison truth;
   truth.before = {deg(0.10), deg(0.11), deg(0.05), deg(-0.06),
                   deg(0.15), deg(0.12), deg(0.09), {deg(0.01), deg(0.06), deg(-0.05)}};
   truth.after = {deg(0.01),   deg(0.012), deg(0.005),  deg(-0.006),
                  deg(0.0156), deg(0.015), deg(0.0043), {deg(0.001), deg(0.006), deg(-0.005)}};
-  truth.sensor = sensors::load_sensor("mid-40");
+  truth.truth = sensors::load_sensor("mid-40");
   for (int i = 0; i < 1000; ++i) {
     truth.azimuth_before.push_back(deg(0.05 + 0.01 * std::sin(i)));
     truth.zenith_before.push_back(deg(-0.06 + 0.01 * std::cos(i)));
@@ -316,8 +317,8 @@ TEST(CalibrationPage, APoorDatumSaysWhatHelps) {
   std::string shown = visible(page.html());
   EXPECT_THAT(shown, HasSubstr("class=\"verdict care\""));
   EXPECT_THAT(shown, HasSubstr("must not be trusted"));
-  EXPECT_THAT(shown, HasSubstr("--stations"));
-  EXPECT_THAT(shown, HasSubstr("--planes"));
+  EXPECT_THAT(shown, HasSubstr("option stations"));
+  EXPECT_THAT(shown, HasSubstr("option planes"));
   page.calibration.datum.sigma_yaw = kNaN;  // an unknown one is no better
   shown = visible(page.html());
   EXPECT_THAT(shown, HasSubstr("must not be trusted"));
@@ -373,7 +374,7 @@ TEST(CalibrationPage, ParametersStandBesideWhatWasBelievedAndTrue) {
   c.parameters = Eigen::VectorXd::Constant(1, deg(0.3));
   c.covariance = Eigen::MatrixXd::Constant(1, 1, deg(0.02) * deg(0.02));
   c.believed.set("prism_tilt_a_vertical_deg", deg(0.11));
-  page.truth->sensor->set("prism_tilt_a_vertical_deg", deg(0.22));
+  page.truth->truth.set("prism_tilt_a_vertical_deg", deg(0.22));
   const std::string shown = visible(page.html());
   EXPECT_THAT(shown, HasSubstr("<td>0.300</td><td>0.020</td><td>deg</td><td>0</td><td>0.110</td>"
                                "<td>0.190</td><td>0.220</td><td>0.080</td>"

@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-#include "report/charts.hpp"
+#include "risley/report/charts.hpp"
 
 namespace risley::report {
 namespace {

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-#include "report/charts.hpp"
+#include "risley/report/charts.hpp"
 
 #include <algorithm>
 #include <numeric>

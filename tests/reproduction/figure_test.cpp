@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-#include "risley/reproduction/figure.hpp"
+#include "reproduction/figure.hpp"
 
 #include <algorithm>
 #include <numeric>

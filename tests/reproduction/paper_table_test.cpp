@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-#include "risley/reproduction/paper_table.hpp"
+#include "reproduction/paper_table.hpp"
 
 #include <cmath>
 #include <limits>

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
 // Tables pass with few draws, and fail when what is reproduced is made wrong.
-#include "risley/reproduction/reproduce.hpp"
+#include "reproduction/reproduce.hpp"
 
 #include <algorithm>
 #include <string>
@@ -11,7 +11,8 @@
 #include <tbb/global_control.h>
 
 #include "risley/core/error.hpp"
-#include "risley/reproduction/reproduction_page.hpp"
+
+#include "reproduction/reproduction_page.hpp"
 
 namespace risley::reproduction {
 namespace {

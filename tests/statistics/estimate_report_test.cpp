@@ -172,7 +172,14 @@ report::EstimateReport report_of(const Case& one, bool truth = true) {
   const report::ReportedRecording recording{"unit <1>.lvx", "lvx-1.1", "sensor", {}};
   const report::Provenance provenance{{"command", "risley estimate"}, {"seed", "5"}};
   return report::estimate_report(
-      {one.estimate, nominal, evaluation, one.head, recording, provenance, {"a gap"}});
+      {one.estimate,
+       nominal,
+       evaluation,
+       one.head,
+       jobs::estimate_details(one.estimate, nominal, one.head, evaluation),
+       recording,
+       provenance,
+       {"a gap"}});
 }
 
 TEST(EstimatePage, HasEverySectionInItsOrder) {

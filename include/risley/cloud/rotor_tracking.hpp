@@ -11,6 +11,7 @@
 #include <Eigen/Core>
 
 #include "risley/core/error.hpp"
+#include "risley/core/progress.hpp"
 #include "risley/estimation/batch_map.hpp"
 #include "risley/estimation/estimate.hpp"
 #include "risley/recordings/observations.hpp"
@@ -47,7 +48,7 @@ struct SensorBelief {
 ///         EstimationError when its directions do not fit the calibration's sensor
 SensorBelief sensor_belief(const estimation::AngleSeries& beginning,
                            const estimation::AngleSeries& head, const sensors::Sensor& calibration,
-                           std::optional<double> angle_noise);
+                           std::optional<double> angle_noise, const Progress& progress = {});
 
 /// Rotation angles of a long recording piece by piece, with parameters held at the belief's.
 class RotorTracker {

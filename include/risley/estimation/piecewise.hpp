@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <vector>
 
+#include "risley/core/progress.hpp"
 #include "risley/estimation/estimate.hpp"
 #include "risley/sensors/sensor.hpp"
 
@@ -32,6 +33,6 @@ struct PiecewiseEstimate {
 /// @param sensor  what the estimation started from
 /// @throws InvalidArgument for less than one piece, or an estimate of the filter
 PiecewiseEstimate estimate_piecewise(const Estimate& estimate, const sensors::Sensor& sensor,
-                                     std::size_t pieces);
+                                     std::size_t pieces, const Progress& progress = {});
 
 }  // namespace risley::estimation

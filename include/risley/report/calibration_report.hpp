@@ -13,6 +13,7 @@
 #include "risley/calibration/calibrate.hpp"
 #include "risley/calibration/datum.hpp"
 #include "risley/estimation/weak_directions.hpp"
+#include "risley/jobs/calibrate_recordings.hpp"
 #include "risley/report/chart.hpp"
 #include "risley/report/report_facts.hpp"
 #include "risley/sensors/sensor.hpp"
@@ -64,20 +65,16 @@ struct CalibrationReport {
 struct CalibrationReportInput {
   const calibration::Calibration& calibration;
   const sensors::Sensor& nominal;  ///< preset the calibration started from
-  /// What is known of the truth.
-  struct Truth {
-    calibration::DirectionErrors before, after;
-    std::optional<sensors::Sensor> sensor;
-    /// Computed minus true angles of some beams, rad; may be empty.
-    std::vector<double> azimuth_before, zenith_before, azimuth_after, zenith_after;
-  };
-  std::optional<Truth> truth;
+  const jobs::CalibrationDetails& details;
+  const std::optional<jobs::BeamComparison>& truth;  ///< where it is known
   std::vector<ReportedRecording> recordings;
   Provenance provenance;
   std::vector<std::string> warnings;  ///< beside those of the calibration
 };
 
-/// Thins, bins and counts what the page draws. What is not finite stays so.
+/// Thins and bins what the page draws. What is not finite stays so.
 CalibrationReport calibration_report(const CalibrationReportInput& input);
+/// Of a job's result. @throws InvalidArgument when it was not asked for details
+CalibrationReport calibration_report(const jobs::CalibratedRecordings& calibrated);
 
 }  // namespace risley::report

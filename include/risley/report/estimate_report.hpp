@@ -13,6 +13,8 @@
 #include "risley/estimation/estimate.hpp"
 #include "risley/estimation/evaluation.hpp"
 #include "risley/estimation/weak_directions.hpp"
+#include "risley/jobs/estimate_details.hpp"
+#include "risley/jobs/estimate_recording.hpp"
 #include "risley/report/chart.hpp"
 #include "risley/report/report_facts.hpp"
 #include "risley/sensors/sensor.hpp"
@@ -91,12 +93,15 @@ struct EstimateReportInput {
   const sensors::Sensor& nominal;                           ///< what the estimation started from
   const std::optional<estimation::Evaluation>& evaluation;  ///< when the truth is known
   const estimation::AngleSeries& head;                      ///< every shot of the beginning
+  const jobs::EstimateDetails& details;
   ReportedRecording recording;
   Provenance provenance;
   std::vector<std::string> warnings;  ///< beside those of the estimate
 };
 
-/// Thins, bins and counts what the page draws; estimates pieces of the recording alone.
+/// Thins and bins what the page draws.
 EstimateReport estimate_report(const EstimateReportInput& input);
+/// Of a job's result. @throws InvalidArgument when it was not asked for details
+EstimateReport estimate_report(const jobs::EstimatedRecording& estimated);
 
 }  // namespace risley::report

@@ -4,17 +4,16 @@
 
 #include <limits>
 #include <string>
-#include <utility>
-#include <vector>
 
+#include "risley/jobs/provenance.hpp"
+#include "risley/jobs/recording_input.hpp"
 #include "risley/recordings/time_audit.hpp"
 
 namespace risley::report {
 
 // What reports of every kind hold. SI units.
 
-/// Name and value pairs such as command, version, seed, input_sha256: how to make a result again.
-using Provenance = std::vector<std::pair<std::string, std::string>>;
+using jobs::Provenance;
 
 /// A quantity that is not known, such as the truth of a real sensor.
 inline constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
@@ -35,5 +34,8 @@ struct ReportedRecording {
   std::string time_from;
   recordings::TimeAuditResult audit;
 };
+
+/// As reports tell of it.
+ReportedRecording reported(const jobs::ReadRecording& recording);
 
 }  // namespace risley::report

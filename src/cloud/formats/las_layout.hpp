@@ -10,9 +10,9 @@
 #include <vector>
 
 #include "risley/cloud/cloud_writer.hpp"
+#include "risley/recordings/las_numbers.hpp"
 
 #include "cloud/formats/point_fields.hpp"
-#include "recordings/formats/las_header.hpp"
 
 namespace risley::cloud::las {
 

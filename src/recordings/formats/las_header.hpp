@@ -5,70 +5,17 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "risley/recordings/las_numbers.hpp"
 #include "risley/recordings/reader.hpp"
 
 #include "recordings/formats/block_file.hpp"
 
-/// The layout of LAS files, for those who read and those who write them [ASPRS LAS 1.0 to 1.4-R15].
+/// How LAS files begin [ASPRS LAS 1.0 to 1.4-R15].
 namespace risley::recordings::las {
-
-/// Bytes of the public header of LAS 1.`minor`; a file's own may have more.
-constexpr std::size_t header_bytes(int minor) {
-  if (minor >= 4) return 375;
-  return minor == 3 ? 235 : 227;
-}
-
-/// Bytes of a point record by point format, without extra bytes.
-inline constexpr std::array<std::uint8_t, 11> kRecordBytes{20, 28, 26, 34, 57, 63,
-                                                           30, 36, 38, 59, 67};
-
-/// Whether a point format is one of LAS 1.4's own: wider return numbers, a scanner channel.
-constexpr bool is_modern(int point_format) { return point_format >= 6; }
-
-/// Byte of a point record at which its GPS time stands; empty for the formats without one.
-constexpr std::optional<std::size_t> gps_time_at(int point_format) {
-  if (point_format == 0 || point_format == 2) return std::nullopt;
-  return is_modern(point_format) ? 22 : 20;
-}
-
-/// Byte of the public header that holds the point format, and the bit by which LASzip marks it.
-inline constexpr std::size_t kPointFormatAt = 104;
-inline constexpr std::uint8_t kCompressionMark = 0x80;
-
-inline constexpr std::size_t kRecordHeaderBytes = 54;  ///< of a variable length record
-inline constexpr std::size_t kExtendedRecordHeaderBytes = 60;
-/// User and number of the record that describes extra bytes, and the length of one description.
-inline constexpr const char* kSpecificationUser = "LASF_Spec";
-inline constexpr std::uint16_t kExtraBytesNumber = 4;
-inline constexpr std::size_t kDescriptorBytes = 192;
-/// Extra bytes by which clouds keep what LAS has no field for, each a uint8.
-inline constexpr const char* kTagField = "Tag";
-inline constexpr const char* kBeamField = "Beam";
-
-/// Bit of the global encoding: GPS times are adjusted standard GPS time.
-inline constexpr unsigned kAdjustedGpsTime = 1;
-/// What sensors report from 0 to 255 stands in the 16 bits of the intensity times so much, which
-/// the specification asks of a range of 256.
-inline constexpr unsigned kIntensityFactor = 256;
-
-inline constexpr std::int64_t kSecond = 1'000'000'000;  ///< ns
-/// Seconds between 1970-01-01 and the origin of adjusted GPS time, 1e9 s after 1980-01-06.
-inline constexpr std::int64_t kGpsOrigin = 315'964'800 + 1'000'000'000;
-
-/// How much GPS time is ahead of UTC, s. Earlier than July 2012 none of these sensors measured.
-constexpr std::int64_t leap_seconds(std::int64_t utc_ns) {
-  constexpr std::int64_t k2017 = 1'483'228'800 * kSecond;  // 2017-01-01
-  constexpr std::int64_t k2015 = 1'435'708'800 * kSecond;  // 2015-07-01
-  constexpr std::int64_t k2012 = 1'341'100'800 * kSecond;  // 2012-07-01
-  if (utc_ns >= k2017) return 18;
-  if (utc_ns >= k2015) return 17;
-  return utc_ns >= k2012 ? 16 : 15;
-}
 
 /// UTC since 1970, ns, of adjusted standard GPS time, s; empty when it does not fit 64 bits.
 std::optional<std::int64_t> utc_of_adjusted_gps(double seconds);

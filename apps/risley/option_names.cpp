@@ -1,0 +1,68 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "option_names.hpp"
+
+#include <algorithm>
+#include <string_view>
+
+namespace risley::app {
+namespace {
+
+struct OptionName {
+  std::string_view field, flag;
+};
+
+constexpr OptionName kNames[] = {
+    {"additional", "--free"},
+    {"angle_noise", "--noise-angle-deg"},
+    {"common_factors", "--common-factors"},
+    {"covariance", "--covariance"},
+    {"duration", "--duration-s"},
+    {"extrinsics", "--extrinsics"},
+    {"fixed", "--fix"},
+    {"las_scale", "--las-scale-m"},
+    {"method", "--method"},
+    {"mirrored", "--mirror"},
+    {"planes", "--planes"},
+    {"prior_sigma", "--prior-sigma-deg"},
+    {"range_noise", "--noise-range-m"},
+    {"range_offset_sigma", "--range-offset-sigma-m"},
+    {"rate", "--rate-hz"},
+    {"recordings", "INPUT"},
+    {"rotor_process", "--process-noise"},
+    {"sensor", "--sensor"},
+    {"sensor_type", "--sensor-type"},
+    {"shot_rate", "--shot-rate-hz"},
+    {"states", "--states"},
+    {"stations", "--stations"},
+    {"truth", "--truth"},
+};
+
+constexpr std::string_view kWord = "ption ";  // after "o" or "O"
+
+}  // namespace
+
+std::string with_flags(const std::string& text) {
+  std::string result;
+  std::size_t done = 0;
+  for (std::size_t at = text.find(kWord); at != std::string::npos; at = text.find(kWord, at + 1)) {
+    if (at == 0 || (text[at - 1] != 'o' && text[at - 1] != 'O') || at - 1 < done) continue;
+    const std::size_t begin = at + kWord.size();
+    const std::size_t end =
+        std::min(text.find_first_not_of("abcdefghijklmnopqrstuvwxyz_", begin), text.size());
+    const std::string_view field = std::string_view(text).substr(begin, end - begin);
+    const auto* const found =
+        std::find_if(std::begin(kNames), std::end(kNames),
+                     [field](const OptionName& name) { return name.field == field; });
+    if (found == std::end(kNames)) continue;
+    result.append(text, done, at - 1 - done).append(found->flag);
+    done = end;
+  }
+  return result.append(text, done);
+}
+
+void put_flags(std::vector<std::string>& texts) {
+  for (std::string& text : texts) text = with_flags(text);
+}
+
+}  // namespace risley::app

@@ -1,0 +1,14 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace risley::app {
+
+/// Libraries name an option by its field, as in "option shot_rate"; users know --shot-rate-hz.
+std::string with_flags(const std::string& text);
+void put_flags(std::vector<std::string>& texts);
+
+}  // namespace risley::app

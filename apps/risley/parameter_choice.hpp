@@ -1,0 +1,25 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "risley/jobs/sensor_choice.hpp"
+
+#include "command.hpp"
+
+namespace risley::app {
+
+/// What the user says of parameters, as typed.
+struct ParameterWishes {
+  std::vector<std::string> fixed, freed;
+};
+
+/// Declares --fix and --free.
+void add_parameter_choice(CLI::App& verb, ParameterWishes& wishes);
+
+/// NAME and NAME=VALUE as jobs take them; they refuse unknown names. @throws InvalidArgument
+jobs::HeldParameters held_parameters(const std::vector<std::string>& fixed);
+
+}  // namespace risley::app

@@ -1,0 +1,65 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "reading_options.hpp"
+
+#include <cmath>
+#include <cstdlib>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "risley/core/angle.hpp"
+#include "risley/core/error.hpp"
+
+namespace risley::app {
+namespace {
+
+/// Of YAW,PITCH,ROLL in degrees.
+recordings::Extrinsics extrinsics_from(const std::string& text) {
+  constexpr double kFullTurn = 360.0;
+  std::vector<double> angles;
+  std::size_t begin = 0;
+  for (bool more = true; more;) {
+    const std::size_t comma = text.find(',', begin);
+    more = comma != std::string::npos;
+    const std::string number = text.substr(begin, more ? comma - begin : comma);
+    char* end = nullptr;
+    const double value = std::strtod(number.c_str(), &end);
+    if (number.empty() || *end != '\0' || !(std::abs(value) <= kFullTurn)) {
+      throw InvalidArgument(
+          fmt::format("--extrinsics = '{}', '{}' is no angle; expected YAW,PITCH,ROLL in deg, each "
+                      "-360 to 360",
+                      text, number));
+    }
+    angles.push_back(radians_from_degrees(value));
+    begin = comma + 1;
+  }
+  if (angles.size() != 3) {
+    throw InvalidArgument(fmt::format(
+        "--extrinsics = '{}' has {} angles, expected YAW,PITCH,ROLL in deg", text, angles.size()));
+  }
+  return {angles[0], angles[1], angles[2], {}};
+}
+
+}  // namespace
+
+void add_reading_options(CLI::App& verb, ReadingWishes& wishes) {
+  verb.add_option("--shot-rate-hz", wishes.shot_rate_hz,
+                  "Shots per second of a recording without times, or with bad ones: times are "
+                  "counted, shots without return keep their places");
+  verb.add_option("--extrinsics", wishes.extrinsics_deg,
+                  "Pose of the sensor in the frame that the recording stands in, deg: recorded = "
+                  "Rz(yaw) Ry(pitch) Rx(roll) sensor. Shots are turned back; 0,0,0 leaves them as "
+                  "they are, whatever pose the recording states")
+      ->type_name("YAW,PITCH,ROLL");
+}
+
+recordings::ReadOptions read_options(const ReadingWishes& wishes) {
+  recordings::ReadOptions options;
+  if (wishes.shot_rate_hz) check_positive(*wishes.shot_rate_hz, "--shot-rate-hz", "Hz");
+  options.shot_rate = wishes.shot_rate_hz;
+  if (!wishes.extrinsics_deg.empty()) options.extrinsics = extrinsics_from(wishes.extrinsics_deg);
+  return options;
+}
+
+}  // namespace risley::app

@@ -1,0 +1,31 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "risley/calibration/calibrate.hpp"
+#include "risley/calibration/datum.hpp"
+#include "risley/calibration/plane_points.hpp"
+#include "risley/core/progress.hpp"
+#include "risley/sensors/sensor.hpp"
+
+namespace risley::jobs {
+
+/// Where beams were thought to go before and after a calibration, against where they truly went.
+struct BeamComparison {
+  calibration::DirectionErrors before, after;
+  sensors::Sensor truth;  ///< of the first recording
+  /// Computed minus true angles of some beams, rad.
+  std::vector<double> azimuth_before, zenith_before, azimuth_after, zenith_after;
+};
+
+/// Compares an evenly spread sample of the beams of all recordings.
+/// @param truths  OUT.truth.yaml of each recording's simulation, beside which OUT.truth.nc stands
+/// @throws InvalidArgument unless there is one of each recording; FileError; Cancelled
+BeamComparison compare_beams(const std::vector<calibration::RangedRecording>& recordings,
+                             const calibration::Calibration& calibration,
+                             const std::vector<std::string>& truths, const Progress& progress = {});
+
+}  // namespace risley::jobs

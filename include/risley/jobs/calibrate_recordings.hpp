@@ -1,0 +1,65 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "risley/calibration/calibrate.hpp"
+#include "risley/core/progress.hpp"
+#include "risley/jobs/beam_comparison.hpp"
+#include "risley/jobs/calibration_details.hpp"
+#include "risley/jobs/recording_input.hpp"
+#include "risley/jobs/result_files.hpp"
+#include "risley/jobs/sensor_choice.hpp"
+
+namespace risley::jobs {
+
+/// What to calibrate on, and how. SI units.
+struct CalibrateRecordingsOptions {
+  std::vector<std::string> recordings;  ///< paths; of one sensor, each with ranges to plane walls
+  recordings::ReadOptions reading;      ///< see open_in_sensor_frame()
+  std::string sensor;                   ///< as chosen_sensor()
+  std::optional<double> rate;           ///< shots per second to use; empty: all
+  std::optional<double> angle_noise;    ///< as estimation::EstimateOptions
+  std::optional<bool> mirrored;         ///< the elevation's sign is turned; empty: find out
+  HeldParameters fixed;
+  std::vector<std::string> additional;  ///< further parameters to free
+  /// As calibration::CalibrationOptions has them.
+  calibration::CalibrationMethod method = calibration::CalibrationMethod::adjustment;
+  std::optional<double> range_noise, prior_sigma;
+  double range_offset_sigma = calibration::CalibrationOptions{}.range_offset_sigma;
+  bool beam_origin = true;
+  std::optional<scenes::Scene> planes;
+  std::vector<scenes::Station> stations;  ///< one per recording, or none
+  std::uint64_t seed = 0;
+  std::vector<std::string> truths;  ///< OUT.truth.yaml of each recording to judge by, or none
+  bool details = false;             ///< wanted in the result
+  /// Names the outputs; without them nothing is written. States of several recordings are
+  /// states_1.nc, states_2.nc, ...
+  ResultFiles files;
+};
+
+/// What came of it.
+struct CalibratedRecordings {
+  std::vector<ReadRecording> recordings;
+  std::uint64_t observations = 0;     ///< rows of all recordings
+  std::vector<std::string> warnings;  ///< of the recordings; the calibration has its own
+  sensors::Sensor nominal;            ///< preset that all started from
+  calibration::Calibration calibration;
+  std::optional<BeamComparison> truth;        ///< where it is known
+  std::optional<CalibrationDetails> details;  ///< where they were asked for
+  Provenance provenance;  ///< of the options, with the inputs; empty where nothing was written
+  double reading_time = 0, angles_time = 0, solving_time = 0;  ///< s
+};
+
+/// Finds the rotation angles of every recording and calibrates the sensor on the walls that they
+/// saw. Stages, for each recording: reading, rotation angles; then calibrating.
+/// @throws EstimationError when there is nothing to calibrate on; InvalidArgument, also for a
+///         recording that is given twice; FileError; Cancelled
+CalibratedRecordings calibrate_recordings(const CalibrateRecordingsOptions& options,
+                                          const Progress& progress = {});
+
+}  // namespace risley::jobs

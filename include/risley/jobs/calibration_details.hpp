@@ -1,0 +1,67 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <vector>
+
+#include "risley/calibration/calibrate.hpp"
+#include "risley/core/vector3.hpp"
+#include "risley/estimation/diagnostics.hpp"
+#include "risley/jobs/beam_comparison.hpp"
+
+namespace risley::jobs {
+
+/// Mean distances from the planes over cells of the field of view, of all recordings together.
+/// Cells with few points are left out.
+struct WallField {
+  double cell = 0;                              ///< side, rad
+  std::vector<double> azimuth, zenith;          ///< middle of the cells, rad
+  std::vector<double> mean_before, mean_after;  ///< [cells], m
+  std::size_t fewest_points = 0;                ///< that a cell must hold
+  std::size_t points = 0;                       ///< of all cells, those left out too
+  double rms_before = 0, rms_after = 0;         ///< of the means, m
+  double noise = 0;                             ///< what noise alone would leave of that, m
+};
+
+/// Mean of the points of one wall in one cell of the field of view: single points would show
+/// nothing but the noise of ranges.
+struct WallPatch {
+  std::size_t plane = 0;         ///< row of Calibration::planes
+  Vector3<double> foot;          ///< on the plane, sensor frame, m
+  double before = 0, after = 0;  ///< mean distance from the plane, m
+};
+
+/// The walls that one recording saw, in space.
+struct WallsInSpace {
+  std::size_t recording = 0;
+  std::vector<WallPatch> patches;
+  std::size_t fewest_points = 0;  ///< that a patch must hold
+  std::size_t points = 0;         ///< of all patches, those left out too
+  double rms_before = 0;          ///< of the patches, m
+  double largest = 0;             ///< distance from a plane, before or after, m
+  double farthest = 0;            ///< patch from the sensor, m
+};
+
+/// Errors of beams whose truth is known, rad.
+struct BeamErrorMoments {
+  estimation::Moments azimuth_before, zenith_before, azimuth_after, zenith_after;
+};
+
+/// What there is to say of a calibration beside the numbers that it found; all of its sample.
+struct CalibrationDetails {
+  std::size_t points_on_planes = 0;                       ///< of the sample
+  estimation::Moments distances_before, distances_after;  ///< from the planes, m
+  std::optional<WallField> field;                         ///< where a cell holds points enough
+  std::vector<WallsInSpace> walls;                        ///< of the first recordings
+  std::optional<BeamErrorMoments> beam_errors;
+};
+
+/// @param recordings  how many there were
+/// @param truth       where it is known
+CalibrationDetails calibration_details(const calibration::Calibration& calibration,
+                                       std::size_t recordings,
+                                       const std::optional<BeamComparison>& truth = {});
+
+}  // namespace risley::jobs

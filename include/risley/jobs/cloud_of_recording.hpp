@@ -1,0 +1,28 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <string>
+
+#include "risley/cloud/make_cloud.hpp"
+#include "risley/core/progress.hpp"
+#include "risley/recordings/reader.hpp"
+
+namespace risley::jobs {
+
+/// Which points to make.
+struct CloudOfRecordingOptions {
+  std::string recording;            ///< path; of one sensor, with ranges
+  recordings::ReadOptions reading;  ///< see open_in_sensor_frame() where it holds no extrinsics
+  std::string calibration;          ///< preset by name, or a preset or calibration file
+  std::string output;               ///< path; its ending chooses the format unless one is named
+  /// Provenance goes into the cloud, with input's and calibration's SHA-256.
+  cloud::CloudOptions cloud;
+};
+
+/// Turns a recording into points with covariance; the output appears when it is whole.
+/// @throws cloud::TurnedFrame, EstimationError, InvalidArgument, FileError, Cancelled
+cloud::CloudSummary cloud_of_recording(const CloudOfRecordingOptions& options,
+                                       const Progress& progress = {});
+
+}  // namespace risley::jobs

@@ -1,0 +1,41 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "risley/core/error.hpp"
+#include "risley/core/progress.hpp"
+#include "risley/recordings/reader.hpp"
+
+namespace risley::jobs {
+
+/// What to write in which format.
+struct ConvertRecordingOptions {
+  std::string recording;  ///< path
+  recordings::ReadOptions reading;
+  std::string output;  ///< path
+  std::string format;  ///< as recordings::create_recording(); empty: as the output's name ends
+  /// Livox device type of the sensor, where the recording does not tell it.
+  std::optional<std::uint8_t> sensor_type;
+};
+
+/// What came of it.
+struct ConvertedRecording {
+  std::uint64_t observations = 0;  ///< read
+  std::uint64_t left_out = 0;      ///< of them, because the format has no place for them
+  std::string input_format;
+  std::vector<recordings::ReadWarning> warnings;
+  std::optional<FileError> damage;  ///< of the recording's body; what came before it was written
+};
+
+/// Writes a recording in another format; the output appears when it is whole.
+/// @throws InvalidArgument, also when the recording names another type of sensor; FileError;
+///         Cancelled
+ConvertedRecording convert_recording(const ConvertRecordingOptions& options,
+                                     const Progress& progress = {});
+
+}  // namespace risley::jobs

@@ -1,0 +1,39 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "risley/core/error.hpp"
+#include "risley/core/progress.hpp"
+#include "risley/recordings/excerpt.hpp"
+#include "risley/recordings/reader.hpp"
+#include "risley/recordings/time_audit.hpp"
+
+namespace risley::jobs {
+
+/// What to look at.
+struct InspectRecordingOptions {
+  std::string recording;  ///< path
+  recordings::ReadOptions reading;
+  std::string excerpt;                         ///< file to write one to (.nc); empty: none
+  recordings::ExcerptOptions excerpt_options;  ///< what it may hold
+};
+
+/// What a recording holds.
+struct InspectedRecording {
+  recordings::RecordingHeader header;
+  recordings::TimeAuditResult audit;
+  std::vector<recordings::ReadWarning> warnings;
+  std::optional<FileError> damage;  ///< of its body; what came before it is in the audit
+  std::optional<recordings::Excerpt> excerpt;
+};
+
+/// Reads a recording to its end and audits its times. Stages: sharing, reading.
+/// @throws FileError when it cannot be opened; InvalidArgument; Cancelled
+InspectedRecording inspect_recording(const InspectRecordingOptions& options,
+                                     const Progress& progress = {});
+
+}  // namespace risley::jobs

@@ -1,0 +1,44 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "risley/core/progress.hpp"
+#include "risley/estimation/observability.hpp"
+#include "risley/jobs/sensor_choice.hpp"
+#include "risley/recordings/reader.hpp"
+
+namespace risley::jobs {
+
+/// Which recording to judge, planned or made. SI units.
+struct ObservabilityOptions {
+  std::string recording;              ///< path; empty: a plan is judged
+  recordings::ReadOptions reading;    ///< of the recording
+  std::string sensor;                 ///< as chosen_sensor(); a plan takes kUsualSensor
+  double duration = 30;               ///< of the plan, s
+  std::optional<double> rate;         ///< shots per second; of a plan the sensor's, otherwise all
+  std::optional<double> angle_noise;  ///< before rounding, rad; of a plan the sensor's
+  bool rounding = true;               ///< a plan's angles are rounded to the sensor's resolution
+  HeldParameters fixed;
+  std::vector<std::string> additional;  ///< further parameters to free
+};
+
+/// What it can tell.
+struct JudgedObservability {
+  estimation::Observability observability;
+  TrainShape shape;
+  std::vector<std::string> words;  ///< the same in sentences
+  std::vector<std::string> warnings;
+  bool converged = true;  ///< the estimate of a recording
+  std::string reason;     ///< why not
+};
+
+/// Judges what a recording can tell of every parameter. Stages: reading, estimating.
+/// @throws EstimationError, InvalidArgument, FileError, Cancelled
+JudgedObservability judge_observability(const ObservabilityOptions& options,
+                                        const Progress& progress = {});
+
+}  // namespace risley::jobs

@@ -1,0 +1,80 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "risley/core/progress.hpp"
+#include "risley/estimation/angle_series.hpp"
+#include "risley/recordings/extrinsics.hpp"
+#include "risley/recordings/reader.hpp"
+#include "risley/recordings/time_audit.hpp"
+
+namespace risley::jobs {
+
+/// A recording of single shots with times whose rows stand in its sensor's frame, as far as that is
+/// known.
+struct SensorFrameRecording {
+  std::unique_ptr<recordings::Reader> reader;
+  std::vector<std::string> warnings;  ///< what was done about a pose that the recording states
+  bool turned_back = false;           ///< by a pose, stated or given
+};
+
+/// Opens a recording and decides what a pose in its header means where the options do not give one:
+/// the first second of the shots tells whether the points were moved by it (see
+/// estimation/stored_pose.hpp), and where they do not tell, a recording made through a hub counts
+/// as moved, because hubs move points, and any other one does not, because LVX keeps points as they
+/// are. Moved points are turned back.
+/// @param field_of_view  of a sensor that could have made a recording with this header, full cone,
+///                       rad; asked only where there is a pose to decide on
+/// @throws recordings::MissingTimes, Cancelled, and as recordings::open_recording
+SensorFrameRecording open_in_sensor_frame(
+    const std::string& path, const recordings::ReadOptions& reading,
+    const std::function<double(const recordings::RecordingHeader&)>& field_of_view,
+    const Progress& progress = {});
+
+/// One recording that was read to its end.
+struct ReadRecording {
+  std::string path;
+  recordings::RecordingHeader header;
+  recordings::TimeAuditResult audit;
+
+  /// Of the sensor; empty when unknown.
+  const std::string& serial() const { return header.devices.front().serial; }
+};
+
+/// What is to be read for an estimation.
+struct EstimationInputOptions {
+  std::string recording;            ///< path; of one sensor, with times
+  recordings::ReadOptions reading;  ///< see open_in_sensor_frame() where it holds no extrinsics
+  std::string sensor;               ///< as chosen_sensor()
+  estimation::SelectionOptions selection;
+};
+
+/// What reading a recording leaves for an estimation.
+struct EstimationInput {
+  ReadRecording recording;
+  estimation::AngleSeries series;  ///< the chosen shots, in the sensor's frame
+  estimation::AngleSeries head;    ///< every shot of the first second
+  estimation::SelectionCounts counts;
+  std::vector<std::string> warnings;  ///< of the reader, about frame, sensor and clock
+  bool whole_steps = false;           ///< directions come from coordinates in whole steps
+  double reading_time = 0;            ///< s
+};
+
+/// Reads all of a recording of one sensor in the sensor's frame.
+/// @throws InvalidArgument for a recording of several sensors; as open_in_sensor_frame(); FileError
+///         at damage
+EstimationInput read_for_estimation(const EstimationInputOptions& options,
+                                    const Progress& progress = {});
+
+/// A warning of a reader with its place: "... (at byte 17)", "... (line 3)".
+std::string warning_text(const recordings::ReadWarning& warning);
+
+/// "yaw 90 pitch -2.25 roll 1.5 deg, translation 0.1 0.2 -0.3 m"
+std::string pose_text(const recordings::Extrinsics& pose);
+
+}  // namespace risley::jobs

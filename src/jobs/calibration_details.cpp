@@ -1,0 +1,136 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "risley/jobs/calibration_details.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <utility>
+
+#include "risley/calibration/surface_steps.hpp"
+
+namespace risley::jobs {
+namespace {
+
+using calibration::Calibration;
+using calibration::kSurfaceCell;
+using calibration::SamplePoint;
+
+constexpr int kFewestPointsInCell = 5;  // points that make a mean over a cell of the field of view
+constexpr std::size_t kMostSpaces = 3;  // recordings shown in space
+
+bool is_complete(const SamplePoint& point) {
+  return std::isfinite(point.before + point.after + point.azimuth + point.zenith);
+}
+
+long cell_of(double angle) { return std::lround(std::floor(angle / kSurfaceCell)); }
+
+/// Where in the field of view points lie beyond their planes, and where before them.
+std::optional<WallField> wall_field(const std::vector<const SamplePoint*>& points) {
+  struct Cell {
+    int count = 0;
+    double before = 0, after = 0;
+  };
+  WallField result;
+  result.cell = kSurfaceCell;
+  result.fewest_points = kFewestPointsInCell;
+  std::map<std::pair<long, long>, Cell> cells;
+  double squares = 0;
+  for (const SamplePoint* point : points) {
+    if (!is_complete(*point)) continue;
+    Cell& cell = cells[{cell_of(point->azimuth), cell_of(point->zenith)}];
+    ++cell.count;
+    cell.before += point->before;
+    cell.after += point->after;
+    squares += point->after * point->after;
+    ++result.points;
+  }
+  double before_squares = 0, after_squares = 0, noise_squares = 0;
+  for (const auto& [place, cell] : cells) {
+    if (cell.count < kFewestPointsInCell) continue;
+    result.azimuth.push_back(kSurfaceCell * (static_cast<double>(place.first) + 0.5));
+    result.zenith.push_back(kSurfaceCell * (static_cast<double>(place.second) + 0.5));
+    result.mean_before.push_back(cell.before / cell.count);
+    result.mean_after.push_back(cell.after / cell.count);
+    before_squares += result.mean_before.back() * result.mean_before.back();
+    after_squares += result.mean_after.back() * result.mean_after.back();
+    noise_squares += squares / static_cast<double>(result.points) / cell.count;
+  }
+  if (result.azimuth.empty()) return std::nullopt;
+  const auto count = static_cast<double>(result.azimuth.size());
+  result.rms_before = std::sqrt(before_squares / count);
+  result.rms_after = std::sqrt(after_squares / count);
+  result.noise = std::sqrt(noise_squares / count);
+  return result;
+}
+
+/// The walls of one recording in patches.
+WallsInSpace walls_in_space(const Calibration& c, const std::vector<const SamplePoint*>& points,
+                            std::size_t recording) {
+  struct Sum {
+    int count = 0;
+    WallPatch patch;
+  };
+  WallsInSpace result;
+  result.recording = recording;
+  result.fewest_points = kFewestPointsInCell;
+  std::map<std::array<long, 3>, Sum> cells;
+  for (const SamplePoint* point : points) {
+    if (point->recording != recording || !is_complete(*point)) continue;
+    Sum& sum = cells[{point->plane, cell_of(point->azimuth), cell_of(point->zenith)}];
+    sum.patch.plane = static_cast<std::size_t>(point->plane);
+    sum.patch.foot =
+        sum.patch.foot + point->point - point->after * c.planes[sum.patch.plane].normal;
+    sum.patch.before += point->before;
+    sum.patch.after += point->after;
+    ++sum.count;
+    ++result.points;
+  }
+  double squares = 0;
+  for (auto& [place, sum] : cells) {
+    if (sum.count < kFewestPointsInCell) continue;
+    WallPatch& patch = sum.patch;
+    patch.foot = (1.0 / sum.count) * patch.foot;
+    patch.before /= sum.count;
+    patch.after /= sum.count;
+    result.largest = std::max({result.largest, std::abs(patch.before), std::abs(patch.after)});
+    result.farthest = std::max(result.farthest, norm(patch.foot));
+    squares += patch.before * patch.before;
+    result.patches.push_back(patch);
+  }
+  if (!result.patches.empty()) {
+    result.rms_before = std::sqrt(squares / static_cast<double>(result.patches.size()));
+  }
+  return result;
+}
+
+}  // namespace
+
+CalibrationDetails calibration_details(const Calibration& calibration, std::size_t recordings,
+                                       const std::optional<BeamComparison>& truth) {
+  CalibrationDetails result;
+  std::vector<const SamplePoint*> on_planes;
+  std::vector<double> before, after;
+  for (const SamplePoint& point : calibration.sample) {
+    if (point.plane < 0) continue;
+    on_planes.push_back(&point);
+    before.push_back(point.before);
+    after.push_back(point.after);
+  }
+  result.points_on_planes = on_planes.size();
+  result.distances_before = estimation::moments(before);
+  result.distances_after = estimation::moments(after);
+  result.field = wall_field(on_planes);
+  for (std::size_t r = 0; r < std::min(recordings, kMostSpaces); ++r) {
+    result.walls.push_back(walls_in_space(calibration, on_planes, r));
+  }
+  if (truth) {
+    result.beam_errors = {
+        estimation::moments(truth->azimuth_before), estimation::moments(truth->zenith_before),
+        estimation::moments(truth->azimuth_after), estimation::moments(truth->zenith_after)};
+  }
+  return result;
+}
+
+}  // namespace risley::jobs

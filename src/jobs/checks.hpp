@@ -1,0 +1,24 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace risley::jobs {
+
+/// @throws InvalidArgument naming the option unless the value is finite and above 0
+void check_positive(double value, std::string_view option, std::string_view unit);
+/// The same for 0 and above.
+void check_not_negative(double value, std::string_view option, std::string_view unit);
+
+/// @throws InvalidArgument unless the file is named as a simulation names its truth
+void check_truth_name(const std::string& truth);
+/// The same of many. @throws InvalidArgument unless there is one of each recording
+void check_truths(const std::vector<std::string>& truths, std::size_t recordings);
+/// OUT.truth.nc of OUT.truth.yaml.
+std::string truth_columns(const std::string& truth);
+
+}  // namespace risley::jobs

@@ -1,0 +1,42 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "risley/jobs/cloud_of_recording.hpp"
+
+#include <filesystem>
+
+#include "risley/core/error.hpp"
+#include "risley/io/sha256.hpp"
+#include "risley/jobs/provenance.hpp"
+#include "risley/jobs/recording_input.hpp"
+#include "risley/sensors/preset.hpp"
+
+#include "jobs/checks.hpp"
+
+namespace risley::jobs {
+
+cloud::CloudSummary cloud_of_recording(const CloudOfRecordingOptions& options,
+                                       const Progress& progress) {
+  cloud::CloudOptions settings = options.cloud;
+  if (settings.rate) check_positive(*settings.rate, "rate", "Hz");
+  if (settings.angle_noise) check_positive(*settings.angle_noise, "angle_noise", "rad");
+  check_positive(settings.writer.las_scale, "las_scale", "m");
+  if (settings.loadings && !settings.pointing.covariance) {
+    throw InvalidArgument("option common_factors yes and option covariance no do not go together");
+  }
+  const sensors::Sensor calibration = sensors::load_sensor(options.calibration);
+  cloud::find_cloud_format(options.output, settings.writer.format);  // before anything is read
+  settings.provenance = with_inputs(settings.provenance, {options.recording}, progress);
+  settings.provenance.emplace_back("calibration", options.calibration);
+  if (std::filesystem::exists(options.calibration)) {
+    settings.provenance.emplace_back("calibration_sha256", io::sha256_of_file(options.calibration));
+  }
+  const SensorFrameRecording input = open_in_sensor_frame(
+      options.recording, options.reading,
+      [&calibration](const auto&) { return calibration.field_of_view; }, progress);
+  cloud::CloudSummary result =
+      cloud::make_cloud(*input.reader, calibration, options.output, settings, progress);
+  result.warnings.insert(result.warnings.begin(), input.warnings.begin(), input.warnings.end());
+  return result;
+}
+
+}  // namespace risley::jobs

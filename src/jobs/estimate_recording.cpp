@@ -1,0 +1,121 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "risley/jobs/estimate_recording.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "risley/core/error.hpp"
+#include "risley/sensors/preset.hpp"
+
+#include "jobs/checks.hpp"
+#include "jobs/result_folder.hpp"
+#include "jobs/stopwatch.hpp"
+
+namespace risley::jobs {
+namespace {
+
+constexpr double kFilterRate = 1000.0;
+
+/// Wrong wishes are told before an hour of reading.
+void check(const EstimateRecordingOptions& options) {
+  if (options.rate) check_positive(*options.rate, "rate", "Hz");
+  if (options.angle_noise) check_positive(*options.angle_noise, "angle_noise", "rad");
+  if (options.files.states == StatesRows::all && options.method == estimation::Method::ekf &&
+      options.rate) {
+    throw InvalidArgument(
+        "option states all needs option rate full: the filter has states at the shots it uses "
+        "only");
+  }
+  if (!options.truth.empty()) check_truth_name(options.truth);
+}
+
+void write_files(const EstimateRecordingOptions& options, const EstimatedRecording& result,
+                 ResultFolder& folder, const Progress& progress) {
+  if (result.estimate.converged) {
+    sensors::Sensor calibrated = result.estimate.sensor;
+    calibrated.provenance = result.provenance;
+    calibrated.serial = result.recording.serial();
+    folder.add_calibration(calibrated);
+  } else {
+    folder.remove_calibration();
+  }
+  folder.add_states("states.nc", result.estimate, options.files.states, result.provenance,
+                    progress);
+  folder.commit();
+}
+
+}  // namespace
+
+std::optional<double> usual_rate(estimation::Method method) {
+  if (method == estimation::Method::ekf) return kFilterRate;
+  return std::nullopt;
+}
+
+estimation::Evaluation evaluate_by_file(const estimation::Estimate& estimate,
+                                        const std::string& truth) {
+  check_truth_name(truth);
+  const sensors::Sensor sensor = sensors::load_sensor(truth);
+  // One row per state: the truth of a full-rate recording is larger than the recording.
+  std::vector<std::int64_t> times = estimate.states.time_ns;
+  std::sort(times.begin(), times.end());
+  return estimation::evaluate(estimate, sensor,
+                              recordings::load_truth(truth_columns(truth), times));
+}
+
+EstimatedRecording estimate_recording(const EstimateRecordingOptions& options,
+                                      const Progress& progress) {
+  check(options);
+  ResultFolder folder(options.files.folder);
+  EstimationInput input =
+      read_for_estimation({options.recording,
+                           options.reading,
+                           options.sensor,
+                           {.rate = options.rate, .ranges = true, .rows = false}},
+                          progress.stage("reading"));
+  EstimatedRecording result;
+  estimation::EstimateOptions settings;
+  settings.sensor = chosen_sensor(options.sensor, input.recording.header);
+  settings.angle_noise = options.angle_noise;
+  settings.fixed = hold(options.fixed, settings.sensor);
+  settings.additional = options.additional;
+  if (options.rotor_process) {
+    settings.rotor_process.assign(static_cast<std::size_t>(settings.sensor.prisms()),
+                                  *options.rotor_process);
+  }
+  settings.mirrored = options.mirrored;
+  settings.cartesian = input.whole_steps;
+  result.nominal = settings.sensor;
+  result.recording = std::move(input.recording);
+  result.counts = input.counts;
+  result.warnings = std::move(input.warnings);
+  result.head = std::move(input.head);
+  result.reading_time = input.reading_time;
+  const Stopwatch watch;
+  try {
+    result.estimate = estimation::estimate(options.method, std::move(input.series), result.head,
+                                           settings, progress.stage("estimating"));
+  } catch (const EstimationError&) {
+    folder.remove_calibration();
+    throw;
+  }
+  result.solving_time = watch.seconds();
+  const Progress judging = progress.stage("judging");
+  judging.check();
+  if (!options.truth.empty()) {
+    result.evaluation = evaluate_by_file(result.estimate, options.truth);
+  }
+  if (options.details) {
+    result.details =
+        estimate_details(result.estimate, result.nominal, result.head, result.evaluation, judging);
+  }
+  if (folder) {
+    result.provenance = with_inputs(options.files.provenance, {options.recording}, judging);
+    write_files(options, result, folder, judging);
+  }
+  return result;
+}
+
+}  // namespace risley::jobs

@@ -1,0 +1,36 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "risley/jobs/inspect_recording.hpp"
+
+#include "jobs/open_input.hpp"
+
+namespace risley::jobs {
+
+InspectedRecording inspect_recording(const InspectRecordingOptions& options,
+                                     const Progress& progress) {
+  InspectedRecording result;
+  if (!options.excerpt.empty()) {  // first, because it may have to be refused
+    result.excerpt =
+        recordings::write_excerpt(options.recording, options.excerpt, options.excerpt_options,
+                                  options.reading, progress.stage("sharing"));
+  }
+  const Progress reading = progress.stage("reading");
+  const auto reader = open_input(options.recording, options.reading);
+  recordings::TimeAudit audit;
+  recordings::Chunk chunk;
+  try {
+    while (reader->read(chunk)) {
+      audit.add(chunk);
+      reading.report(reader->fraction_read());
+    }
+  } catch (const FileError& error) {
+    result.damage = error;  // what was sound before is still told
+  }
+  result.header = reader->header();
+  result.audit = audit.result();
+  result.audit.pps_wraps = reader->clock_wraps();
+  result.warnings = reader->warnings();
+  return result;
+}
+
+}  // namespace risley::jobs

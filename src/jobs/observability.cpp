@@ -1,0 +1,79 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "risley/jobs/observability.hpp"
+
+#include <utility>
+
+#include "risley/core/error.hpp"
+#include "risley/jobs/recording_input.hpp"
+#include "risley/sensors/preset.hpp"
+
+#include "jobs/checks.hpp"
+
+namespace risley::jobs {
+namespace {
+
+/// What both kinds have in common.
+estimation::EstimateOptions settings_of(const ObservabilityOptions& options,
+                                        sensors::Sensor sensor) {
+  estimation::EstimateOptions result;
+  result.sensor = std::move(sensor);
+  result.angle_noise = options.angle_noise;
+  result.fixed = hold(options.fixed, result.sensor);
+  result.additional = options.additional;
+  return result;
+}
+
+estimation::Observability of_plan(const ObservabilityOptions& options,
+                                  const estimation::EstimateOptions& settings) {
+  estimation::ObservabilityPlan plan;
+  plan.sensor = settings.sensor;
+  plan.duration = options.duration;
+  plan.rate = options.rate.value_or(plan.sensor.shot_rate);
+  plan.angle_noise = settings.angle_noise.value_or(plan.sensor.angle_noise);
+  if (options.rounding) plan.angle_resolution = plan.sensor.angle_resolution;
+  plan.free = estimation::chosen_parameters(settings);
+  return estimation::observability_of_plan(plan);
+}
+
+}  // namespace
+
+JudgedObservability judge_observability(const ObservabilityOptions& options,
+                                        const Progress& progress) {
+  check_positive(options.duration, "duration", "s");
+  if (options.rate) check_positive(*options.rate, "rate", "Hz");
+  if (options.angle_noise) check_positive(*options.angle_noise, "angle_noise", "rad");
+  progress.check();
+  JudgedObservability result;
+  if (options.recording.empty()) {
+    const estimation::EstimateOptions settings = settings_of(
+        options, sensors::load_sensor(options.sensor.empty() ? kUsualSensor : options.sensor));
+    result.shape = settings.sensor.shape();
+    result.observability = of_plan(options, settings);
+  } else {
+    EstimationInput input =
+        read_for_estimation({options.recording,
+                             options.reading,
+                             options.sensor,
+                             {.rate = options.rate, .ranges = true, .rows = false}},
+                            progress.stage("reading"));
+    estimation::EstimateOptions settings =
+        settings_of(options, chosen_sensor(options.sensor, input.recording.header));
+    settings.cartesian = input.whole_steps;
+    result.shape = settings.sensor.shape();
+    const Progress estimating = progress.stage("estimating");
+    const estimation::Estimate estimate = estimation::estimate(
+        estimation::Method::map, std::move(input.series), input.head, settings, estimating);
+    result.warnings = std::move(input.warnings);
+    result.warnings.insert(result.warnings.end(), estimate.warnings.begin(),
+                           estimate.warnings.end());
+    result.converged = estimate.converged;
+    result.reason = estimate.reason;
+    estimating.check();
+    result.observability = estimation::observability_of_estimate(estimate);
+  }
+  result.words = estimation::observability_words(result.observability, result.shape);
+  return result;
+}
+
+}  // namespace risley::jobs

@@ -1,0 +1,33 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "risley/jobs/plan_calibration.hpp"
+
+#include "risley/sensors/preset.hpp"
+
+#include "jobs/checks.hpp"
+
+namespace risley::jobs {
+
+PlannedCalibration plan_calibration(const PlanCalibrationOptions& options,
+                                    const Progress& progress) {
+  check_positive(options.duration, "duration", "s");
+  if (options.rate) check_positive(*options.rate, "rate", "Hz");
+  if (options.range_noise) check_positive(*options.range_noise, "range_noise", "m");
+  if (options.prior_sigma) check_positive(*options.prior_sigma, "prior_sigma", "rad");
+  check_not_negative(options.range_offset_sigma, "range_offset_sigma", "m");
+  calibration::CalibrationPlan plan;
+  plan.scene = options.scene;
+  plan.sensor = sensors::load_sensor(options.sensor.empty() ? kUsualSensor : options.sensor);
+  plan.fixed = hold(options.fixed, plan.sensor);
+  plan.additional = options.additional;
+  plan.duration = options.duration;
+  plan.rate = options.rate;
+  plan.range_noise = options.range_noise;
+  plan.prior_sigma = options.prior_sigma;
+  plan.range_offset_sigma = options.range_offset_sigma;
+  plan.beam_origin = options.beam_origin;
+  progress.check();
+  return {plan.sensor.shape(), calibration::forecast(plan)};
+}
+
+}  // namespace risley::jobs

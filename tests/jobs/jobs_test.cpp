@@ -1,0 +1,346 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+// Everything from a recording to a cloud through the jobs alone, as another front end would do it,
+// and what cancelling them leaves behind: nothing.
+#include <chrono>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <set>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include "risley/core/angle.hpp"
+#include "risley/core/error.hpp"
+#include "risley/jobs/calibrate_recordings.hpp"
+#include "risley/jobs/cloud_of_recording.hpp"
+#include "risley/jobs/convert_recording.hpp"
+#include "risley/jobs/estimate_recording.hpp"
+#include "risley/jobs/inspect_recording.hpp"
+#include "risley/jobs/observability.hpp"
+#include "risley/jobs/plan_calibration.hpp"
+#include "risley/sensors/preset.hpp"
+#include "risley/simulation/truth_file.hpp"
+
+namespace risley::jobs {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::Each;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+/// One recording of a hall for all tests, and a folder of each test's own.
+class JobsTest : public ::testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    root_ = fs::temp_directory_path() / ("risley-jobs-" + std::to_string(::getpid()));
+    fs::create_directories(root_);
+    simulation::SimulationSettings settings;
+    settings.truth = sensors::load_sensor("mid-40-table3");
+    settings.reported = settings.truth;
+    settings.reported->train = settings.reported->train.without_errors();
+    settings.scene = scenes::load_scene(RISLEY_SOURCE_DIR "/data/hall.yaml");
+    settings.duration = 2.0;
+    settings.rate = 50000.0;
+    settings.seed = 7;
+    simulation::simulate_to_file(settings, hall(), {});
+  }
+  static void TearDownTestSuite() { fs::remove_all(root_); }
+
+  void SetUp() override {
+    folder_ = root_ / ::testing::UnitTest::GetInstance()->current_test_info()->name();
+    fs::create_directories(folder_);
+  }
+
+  static std::string hall() { return (root_ / "hall.nc").string(); }
+  static std::string truth() { return hall() + ".truth.yaml"; }
+  std::string path(const std::string& name) const { return (folder_ / name).string(); }
+
+  /// Every file and folder below the test's.
+  std::set<std::string> names() const {
+    std::set<std::string> result;
+    for (const auto& entry : fs::recursive_directory_iterator(folder_)) {
+      result.insert(fs::relative(entry.path(), folder_).string());
+    }
+    return result;
+  }
+
+  EstimateRecordingOptions estimation() const {
+    EstimateRecordingOptions options;
+    options.recording = hall();
+    options.truth = truth();
+    options.details = true;
+    options.files = {path("estimate"), StatesRows::all, {{"command", "test"}}};
+    return options;
+  }
+  CalibrateRecordingsOptions calibration() const {
+    CalibrateRecordingsOptions options;
+    options.recordings = {hall()};
+    options.truths = {truth()};
+    options.details = true;
+    options.files = {path("calibration"), StatesRows::knots, {{"command", "test"}}};
+    return options;
+  }
+  CloudOfRecordingOptions cloud(const std::string& calibrated) const {
+    CloudOfRecordingOptions options;
+    options.recording = hall();
+    options.calibration = calibrated;
+    options.output = path("cloud.las");
+    return options;
+  }
+
+  fs::path folder_;
+  static inline fs::path root_;
+};
+
+std::size_t open_files() {
+  return static_cast<std::size_t>(
+      std::distance(fs::directory_iterator("/proc/self/fd"), fs::directory_iterator()));
+}
+
+std::size_t threads() {
+  return static_cast<std::size_t>(
+      std::distance(fs::directory_iterator("/proc/self/task"), fs::directory_iterator()));
+}
+
+TEST_F(JobsTest, LeadFromARecordingToACloud) {
+  std::set<std::string> stages;
+  const Progress progress = [&](double fraction, std::string_view stage) {
+    stages.insert(std::string(stage));
+    EXPECT_GE(fraction, 0.0);
+    EXPECT_LE(fraction, 1.0);
+  };
+  const EstimatedRecording estimated = estimate_recording(estimation(), progress);
+  EXPECT_TRUE(estimated.estimate.converged) << estimated.estimate.reason;
+  EXPECT_EQ(estimated.recording.audit.shots, 100000u);
+  EXPECT_EQ(estimated.nominal.name, "mid-40");
+  ASSERT_TRUE(estimated.details && estimated.details->pieces);
+  EXPECT_EQ(estimated.details->pieces->size() + estimated.details->pieces->failed, 20u);
+  EXPECT_EQ(estimated.details->speeds.size(), 2u);
+  EXPECT_EQ(estimated.details->residuals_over_angles.size(), 1u);
+  EXPECT_FALSE(estimated.details->advice.empty());
+
+  const CalibratedRecordings calibrated = calibrate_recordings(calibration(), progress);
+  EXPECT_TRUE(calibrated.calibration.converged) << calibrated.calibration.reason;
+  ASSERT_TRUE(calibrated.truth && calibrated.details && calibrated.details->field);
+  EXPECT_LT(calibrated.truth->after.total, 0.1 * calibrated.truth->before.total);
+  EXPECT_EQ(calibrated.details->walls.size(), 1u);
+
+  const cloud::CloudSummary made =
+      cloud_of_recording(cloud(path("calibration/calibration.yaml")), progress);
+  EXPECT_GT(made.points, 90000u);
+  EXPECT_FALSE(made.damage);
+
+  EXPECT_EQ(stages, (std::set<std::string>{"", "calibrating", "estimating", "judging", "reading",
+                                           "rotation angles 1/1"}));
+  EXPECT_EQ(names(), (std::set<std::string>{"calibration", "calibration/calibration.yaml",
+                                            "calibration/states.nc", "cloud.las", "estimate",
+                                            "estimate/calibration.yaml", "estimate/states.nc"}));
+  const sensors::Sensor written = sensors::load_sensor(path("calibration/calibration.yaml"));
+  EXPECT_EQ(written.provenance.front(), (std::pair<std::string, std::string>{"command", "test"}));
+}
+
+TEST_F(JobsTest, WriteNothingThatNoOptionNames) {
+  EstimateRecordingOptions options = estimation();
+  options.files = {};
+  EXPECT_TRUE(estimate_recording(options).provenance.empty());
+  CalibrateRecordingsOptions calibrate = calibration();
+  calibrate.files = {};
+  calibrate_recordings(calibrate);
+  EXPECT_TRUE(names().empty());
+}
+
+/// Cancels `job` at ten moments, half of them by throwing and half by the flag, and expects that
+/// nothing is left of it.
+void cancel_at_ten_moments(const std::function<void(const Progress&)>& job,
+                           const std::function<std::set<std::string>()>& names) {
+  std::size_t calls = 0;
+  const std::set<std::string> before = names();
+  {
+    CancelFlag never;
+    job({[&](double) { ++calls; }, &never});
+  }
+  const std::set<std::string> whole = names();
+  ASSERT_GE(calls, 10u);
+  for (std::size_t moment = 0; moment < 10; ++moment) {
+    for (const std::string& name : whole) {
+      if (!before.contains(name)) fs::remove_all(name);
+    }
+    ASSERT_EQ(names(), before);
+    const std::size_t files = open_files(), most_threads = threads();
+    const std::size_t stop_at = 1 + moment * calls / 10;
+    CancelFlag flag;
+    std::size_t call = 0;
+    const Progress progress(
+        [&](double) {
+          if (++call != stop_at) return;
+          if (moment % 2 == 0) throw Cancelled();
+          flag.set();
+        },
+        &flag);
+    if (moment % 2 == 1 && stop_at == calls) continue;  // nothing looks at the flag any more
+    EXPECT_THROW(job(progress), Cancelled) << moment;
+    EXPECT_LE(call, stop_at + std::thread::hardware_concurrency()) << "it went on";
+    EXPECT_EQ(names(), before) << moment;
+    EXPECT_EQ(open_files(), files) << moment;
+    EXPECT_LE(threads(), most_threads) << moment;
+  }
+}
+
+TEST_F(JobsTest, ACancelledEstimateLeavesNothing) {
+  const auto here = [this] {
+    std::set<std::string> result;
+    for (const std::string& name : names()) result.insert(path(name));
+    return result;
+  };
+  cancel_at_ten_moments(
+      [this](const Progress& progress) { estimate_recording(estimation(), progress); }, here);
+}
+
+TEST_F(JobsTest, ACancelledCalibrationLeavesNothing) {
+  const auto here = [this] {
+    std::set<std::string> result;
+    for (const std::string& name : names()) result.insert(path(name));
+    return result;
+  };
+  cancel_at_ten_moments(
+      [this](const Progress& progress) { calibrate_recordings(calibration(), progress); }, here);
+}
+
+TEST_F(JobsTest, ACancelledCloudLeavesNothing) {
+  // Two pieces of reading make few calls: the recording is read as often as it takes.
+  const auto here = [this] {
+    std::set<std::string> result;
+    for (const std::string& name : names()) result.insert(path(name));
+    return result;
+  };
+  std::size_t calls = 0;
+  cloud_of_recording(cloud("mid-40-table3"), [&](double) { ++calls; });
+  fs::remove(path("cloud.las"));
+  ASSERT_GT(calls, 0u);
+  for (std::size_t stop_at = 1; stop_at <= calls; ++stop_at) {
+    const std::size_t files = open_files();
+    std::size_t call = 0;
+    EXPECT_THROW(cloud_of_recording(cloud("mid-40-table3"),
+                                    [&](double) {
+                                      if (++call == stop_at) throw Cancelled();
+                                    }),
+                 Cancelled);
+    EXPECT_TRUE(here().empty());
+    EXPECT_EQ(open_files(), files);
+  }
+}
+
+TEST_F(JobsTest, ASetFlagStopsWhatTellsNothing) {
+  // No callback at all: a flag that another thread or a signal handler sets is enough.
+  CancelFlag flag;
+  const Progress silent(Progress::Callback(), &flag);
+  flag.set();
+  EXPECT_THROW(estimate_recording(estimation(), silent), Cancelled);
+  EXPECT_THROW(calibrate_recordings(calibration(), silent), Cancelled);
+  EXPECT_THROW(cloud_of_recording(cloud("mid-40"), silent), Cancelled);
+  EXPECT_THROW(inspect_recording({hall(), {}, {}, {}}, silent), Cancelled);
+  EXPECT_THROW(convert_recording({hall(), {}, path("again.nc"), {}, {}}, silent), Cancelled);
+  EXPECT_THROW(judge_observability({}, silent), Cancelled);
+  PlanCalibrationOptions plan;
+  plan.scene = scenes::load_scene(RISLEY_SOURCE_DIR "/data/hall.yaml");
+  EXPECT_THROW(plan_calibration(plan, silent), Cancelled);
+  EXPECT_TRUE(names().empty());
+}
+
+TEST_F(JobsTest, AnotherThreadStopsAnEstimate) {
+  CancelFlag flag;
+  std::thread other([&flag] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+    flag.set();
+  });
+  const auto estimate_for_ever = [&] {
+    for (;;) estimate_recording(estimation(), {Progress::Callback(), &flag});
+  };
+  EXPECT_THROW(estimate_for_ever(), Cancelled);
+  other.join();
+}
+
+TEST_F(JobsTest, FailedNumbersTakeAnOlderCalibrationWithThem) {
+  fs::create_directories(path("estimate"));
+  std::ofstream(path("estimate/calibration.yaml")) << "older";
+  EstimateRecordingOptions options = estimation();
+  options.truth.clear();
+  options.additional = {"refractive_index_air", "wedge_angle_deg"};  // no data tell them apart
+  const EstimatedRecording estimated = estimate_recording(options);
+  EXPECT_FALSE(estimated.estimate.converged);
+  EXPECT_EQ(names(), (std::set<std::string>{"estimate", "estimate/states.nc"}));
+  EXPECT_TRUE(estimated.details->advice.empty());
+}
+
+TEST_F(JobsTest, SayWhichOptionIsWrongByItsField) {
+  const auto message = [](const auto& job) {
+    try {
+      job();
+    } catch (const InvalidArgument& error) {
+      return std::string(error.what());
+    }
+    return std::string("nothing was thrown");
+  };
+  std::vector<std::string> messages;
+  const auto refused = [&](auto options, const auto& spoil, const auto& job) {
+    spoil(options);
+    messages.push_back(message([&] { job(options); }));
+  };
+  const auto estimate = [](const auto& o) { estimate_recording(o); };
+  refused(
+      estimation(), [](auto& o) { o.rate = 0.0; }, estimate);
+  refused(
+      estimation(), [](auto& o) { o.angle_noise = -1.0; }, estimate);
+  refused(
+      estimation(), [](auto& o) { o.truth = "truth.nc"; }, estimate);
+  refused(
+      estimation(),
+      [](auto& o) {
+        o.method = estimation::Method::ekf;
+        o.rate = 1000.0;
+      },
+      estimate);
+  refused(
+      estimation(),
+      [](auto& o) {
+        o.fixed = {{"angular_velocity_a_deg_per_s", 1.0}};
+      },
+      estimate);
+  const auto calibrate = [](const auto& o) { calibrate_recordings(o); };
+  refused(
+      calibration(), [](auto& o) { o.range_offset_sigma = -1.0; }, calibrate);
+  refused(
+      calibration(), [](auto& o) { o.truths.push_back(o.truths.front()); }, calibrate);
+  refused(
+      calibration(),
+      [](auto& o) {
+        o.method = calibration::CalibrationMethod::paper;
+        o.prior_sigma = 0.1;
+      },
+      calibrate);
+  refused(
+      cloud("mid-40"), [](auto& o) { o.cloud.rate = -1.0; },
+      [](const auto& o) { cloud_of_recording(o); });
+  EXPECT_THAT(messages, Each(HasSubstr("option ")));
+  EXPECT_THAT(messages, Each(Not(HasSubstr("--"))));
+  EXPECT_TRUE(names().empty());
+}
+
+TEST_F(JobsTest, RefuseTheSameRecordingTwice) {
+  CalibrateRecordingsOptions options = calibration();
+  options.recordings = {hall(), hall()};
+  options.truths.clear();
+  EXPECT_THROW(calibrate_recordings(options), InvalidArgument);
+  options.recordings.clear();
+  EXPECT_THROW(calibrate_recordings(options), InvalidArgument);
+}
+
+}  // namespace
+}  // namespace risley::jobs
