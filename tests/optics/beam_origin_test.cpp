@@ -24,6 +24,10 @@ namespace {
 
 const PrismGeometry kMid40{{0.007}, {0.030}};
 
+double first_or_zero(const std::vector<double>& values) {
+  return values.empty() ? 0.0 : values.front();
+}
+
 PrismTrain ideal_mid_40() { return PrismTrain(parse_face_order("PA-AP")); }
 
 /// Y and Z where the beam leaves, mm.
@@ -297,8 +301,8 @@ TEST(BeamOrigin, DerivativesByThicknessAndSpacingEqualCentralDifferences) {
       for (const PrismGeometry& unit : units) {
         const auto moved = [&](double step) {
           return emergent_ray(train,
-                              {kMid40.thickness + step * unit.thickness,
-                               kMid40.spacing + step * unit.spacing},
+                              {{kMid40.thickness[0] + step * first_or_zero(unit.thickness)},
+                               {kMid40.spacing[0] + step * first_or_zero(unit.spacing)}},
                               angles)
               .origin;
         };

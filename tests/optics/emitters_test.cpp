@@ -232,7 +232,9 @@ TEST_P(EveryEmitter, IsItselfInBatchesOfEveryInstructionSet) {
           };
           EXPECT_NEAR(d_azimuth[at][i], value(expected.azimuth), 1e-12) << at;
           EXPECT_NEAR(d_zenith[at][i], value(expected.zenith), 1e-12) << at;
-          if (mine < 0) EXPECT_EQ(d_zenith[at][i], 0.0);
+          if (mine < 0) {
+            EXPECT_EQ(d_zenith[at][i], 0.0);
+          }
         }
         for (std::size_t k = 0; k < rotors; ++k) {
           EXPECT_NEAR(d_zenith[places + k][i], expected.zenith.rotation_angles[k], 1e-12);
