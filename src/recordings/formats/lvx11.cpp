@@ -15,9 +15,12 @@
 #include "recordings/formats/format.hpp"
 #include "recordings/formats/little_endian.hpp"
 #include "recordings/formats/lvx_reader.hpp"
-#include "recordings/formats/packet.hpp"
+#include "recordings/livox/packet_encoder.hpp"
 
 namespace risley::recordings {
+
+using namespace livox;
+
 namespace {
 
 constexpr std::size_t kFrameDurationAt = kLvxPublicHeaderBytes, kDeviceCountAt = 28;
