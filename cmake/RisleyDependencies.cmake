@@ -1,23 +1,31 @@
 # SPDX-FileCopyrightText: 2026 The risley authors
 # SPDX-License-Identifier: MIT
 # Every C++ library comes from the distribution; scripts/install-dependencies names the packages.
-find_package(Eigen3 3.4 REQUIRED NO_MODULE)
-find_package(fmt REQUIRED)
-find_package(TBB REQUIRED)
-find_package(yaml-cpp REQUIRED)
-find_package(nlohmann_json REQUIRED)
-find_package(OpenSSL REQUIRED COMPONENTS Crypto)
-find_package(xsimd REQUIRED)
-find_package(PkgConfig REQUIRED)
-pkg_check_modules(NETCDF REQUIRED IMPORTED_TARGET GLOBAL netcdf)
-include(RisleyRosbag)
-find_package(SQLite3 REQUIRED)
-find_package(ZLIB REQUIRED)
-find_package(fastcdr REQUIRED)
-find_library(RISLEY_LASZIP_LIBRARY laszip) # optional: Debian 13 has it, Debian 12 does not
-find_path(RISLEY_RANDOM123_INCLUDE_DIR Random123/philox.h REQUIRED)
+# What only building needs is named here, what users of the installed library need in RisleyPackages.
+include(RisleyPackages)
+risley_package(nlohmann-json TARGET nlohmann_json::nlohmann_json DEBIAN nlohmann-json3-dev
+               FIND nlohmann_json)
+risley_package(xsimd TARGET xsimd DEBIAN libxsimd-dev FIND xsimd)
+risley_package(random123 TARGET risley_random123 DEBIAN librandom123-dev)
+risley_package(cli11 TARGET CLI11::CLI11 DEBIAN libcli11-dev FIND CLI11)
+risley_package(spdlog TARGET spdlog::spdlog DEBIAN libspdlog-dev FIND spdlog)
+risley_package(gtest TARGET GTest::gmock DEBIAN libgmock-dev FIND GTest)
+risley_package(ceres TARGET Ceres::ceres DEBIAN libceres-dev FIND Ceres)
+risley_package(benchmark TARGET benchmark::benchmark DEBIAN libbenchmark-dev FIND benchmark)
 
-# yaml-cpp calls its target yaml-cpp up to 0.7 and yaml-cpp::yaml-cpp from 0.8 on.
-if(NOT TARGET yaml-cpp::yaml-cpp)
-  add_library(yaml-cpp::yaml-cpp ALIAS yaml-cpp)
+find_path(RISLEY_RANDOM123_INCLUDE_DIR Random123/philox.h)
+mark_as_advanced(RISLEY_RANDOM123_INCLUDE_DIR)
+if(RISLEY_RANDOM123_INCLUDE_DIR AND NOT TARGET risley_random123)
+  add_library(risley_random123 INTERFACE IMPORTED)
+  target_include_directories(risley_random123 INTERFACE ${RISLEY_RANDOM123_INCLUDE_DIR})
 endif()
+
+# Looks for all packages of the list, or ends with the names of those that are missing.
+macro(risley_require_packages) # a macro: variables of find_package are for the caller
+  risley_find_packages(missing ${ARGN})
+  if(missing)
+    list(JOIN missing " " missing)
+    message(FATAL_ERROR "Packages are missing. On Debian: apt-get install ${missing}\n"
+                        "scripts/install-dependencies installs all that is needed.")
+  endif()
+endmacro()

@@ -1,15 +1,85 @@
 # SPDX-FileCopyrightText: 2026 The risley authors
 # SPDX-License-Identifier: MIT
-# What `cmake --install` gives: headers, libraries, a package that find_package(risley) finds with
-# the same target names as in the tree (risley::risley and one risley::<layer> each), the command
-# and the completion of its verbs.
+# What `cmake --install` gives: headers, libraries, a package for find_package(risley) whose components
+# are the layers, with the same target names as in the tree (risley::risley is all of them), pkg-config
+# files (risley, risley-<layer>), the command and the completion of its verbs.
 include(CMakePackageConfigHelpers)
 set(package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/risley)
+set(pkg_config_dir ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
+set(public_layers ${RISLEY_LAYERS})
+list(REMOVE_ITEM public_layers ${RISLEY_PRIVATE_LAYERS})
 
-install(TARGETS ${RISLEY_LAYER_TARGETS} risley_all EXPORT risleyTargets
-        ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR}
-        FILE_SET HEADERS DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})
-install(EXPORT risleyTargets NAMESPACE risley:: DESTINATION ${package_dir})
+# risley<suffix>.pc; a static library hands on all that it is linked with.
+function(risley_install_pkg_config suffix description requires requires_private libs libs_private)
+  if(NOT BUILD_SHARED_LIBS)
+    list(APPEND requires ${requires_private})
+    list(APPEND libs ${libs_private})
+    set(requires_private "")
+    set(libs_private "")
+  endif()
+  foreach(field requires requires_private libs libs_private)
+    list(REMOVE_ITEM ${field} "")
+    list(JOIN ${field} " " ${field})
+  endforeach()
+  string(REGEX REPLACE "[^/]+" ".." up ${pkg_config_dir})
+  file(CONFIGURE OUTPUT ${PROJECT_BINARY_DIR}/risley${suffix}.pc @ONLY CONTENT
+[[prefix=${pcfiledir}/@up@
+libdir=${prefix}/@CMAKE_INSTALL_LIBDIR@
+includedir=${prefix}/@CMAKE_INSTALL_INCLUDEDIR@
+
+Name: risley@suffix@
+Description: @description@
+Version: @PROJECT_VERSION@
+Requires: @requires@
+Requires.private: @requires_private@
+Libs: @libs@
+Libs.private: @libs_private@
+Cflags: -I${includedir}
+]])
+  install(FILES ${PROJECT_BINARY_DIR}/risley${suffix}.pc DESTINATION ${pkg_config_dir})
+endfunction()
+
+# Splits package keys into modules of pkg-config and flags of the linker.
+function(risley_pkg_config_of modules flags)
+  set(found_modules "")
+  set(found_flags "")
+  foreach(key IN LISTS ARGN)
+    get_property(module GLOBAL PROPERTY RISLEY_PACKAGE_${key}_PKG_CONFIG)
+    get_property(libs GLOBAL PROPERTY RISLEY_PACKAGE_${key}_LIBS)
+    list(APPEND found_modules ${module})
+    list(APPEND found_flags ${libs})
+  endforeach()
+  set(${modules} "${found_modules}" PARENT_SCOPE)
+  set(${flags} "${found_flags}" PARENT_SCOPE)
+endfunction()
+
+set(layer_facts "")
+foreach(layer IN LISTS public_layers)
+  install(TARGETS risley_${layer} EXPORT risley-${layer}
+          ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR}
+          LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}
+          FILE_SET HEADERS DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})
+  install(EXPORT risley-${layer} NAMESPACE risley:: DESTINATION ${package_dir})
+
+  set(packages ${RISLEY_${layer}_PUBLIC})
+  if(NOT BUILD_SHARED_LIBS)
+    list(APPEND packages ${RISLEY_${layer}_PRIVATE})
+  endif()
+  list(JOIN RISLEY_${layer}_CLOSURE " " closure)
+  list(JOIN packages " " packages)
+  string(APPEND layer_facts "set(risley_${layer}_LAYERS ${closure})\n"
+                            "set(risley_${layer}_PACKAGES ${packages})\n")
+
+  risley_pkg_config_of(modules flags ${RISLEY_${layer}_PUBLIC})
+  risley_pkg_config_of(modules_private flags_private ${RISLEY_${layer}_PRIVATE})
+  list(TRANSFORM RISLEY_${layer}_LAYERS PREPEND risley- OUTPUT_VARIABLE below)
+  list(REVERSE below) # a linker reads users first
+  risley_install_pkg_config(-${layer} "The layer ${layer} of risley" "${below};${modules}"
+    "${modules_private}" "-L\${libdir};-lrisley_${layer};${flags}" "${flags_private}")
+endforeach()
+list(TRANSFORM public_layers PREPEND risley- OUTPUT_VARIABLE modules)
+list(REVERSE modules)
+risley_install_pkg_config("" "${PROJECT_DESCRIPTION}" "${modules}" "" "" "")
 
 configure_package_config_file(${CMAKE_CURRENT_LIST_DIR}/risleyConfig.cmake.in
                               ${PROJECT_BINARY_DIR}/risleyConfig.cmake
@@ -18,6 +88,7 @@ write_basic_package_version_file(${PROJECT_BINARY_DIR}/risleyConfigVersion.cmake
                                  COMPATIBILITY SameMinorVersion)
 install(FILES ${PROJECT_BINARY_DIR}/risleyConfig.cmake
               ${PROJECT_BINARY_DIR}/risleyConfigVersion.cmake
+              ${CMAKE_CURRENT_LIST_DIR}/RisleyPackages.cmake
               ${CMAKE_CURRENT_LIST_DIR}/RisleyRosbag.cmake
         DESTINATION ${package_dir})
 

@@ -1,6 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The risley authors
 # SPDX-License-Identifier: MIT
-set(RISLEY_LAYER_TARGETS "")
+# Layers are declared lowest first with risley_add_layer, told what they need with risley_layer_needs,
+# and made by risley_make_layers: the components that are asked for, with the layers below them.
+set(RISLEY_LAYERS "")
+set(RISLEY_PRIVATE_LAYERS "")
 
 # Compiler settings that every target of ours shares, never a consumer.
 function(risley_target_defaults target)
@@ -13,23 +16,147 @@ function(risley_target_defaults target)
                          $<$<BOOL:${RISLEY_WARNINGS_AS_ERRORS}>:-Werror>)
 endfunction()
 
+# Headers of other libraries that most sources of ours include, parsed once for all of them: those of
+# the first target that uses a list, which lends them to the next.
+# ccache cannot look into parsed headers (only with settings of its user), so it excludes them.
+set(precompile ON)
+if(CMAKE_CXX_COMPILER_LAUNCHER)
+  set(precompile OFF)
+endif()
+option(RISLEY_PRECOMPILE_HEADERS "Parse common headers once" ${precompile})
+set(RISLEY_STANDARD_HEADERS <algorithm> <array> <cmath> <cstdint> <filesystem> <functional> <map> <memory>
+    <optional> <span> <string> <string_view> <vector> <fmt/format.h>)
+set(RISLEY_EIGEN_HEADERS ${RISLEY_STANDARD_HEADERS} <Eigen/Dense>)
+function(risley_precompile target list)
+  get_property(lender GLOBAL PROPERTY RISLEY_LENDER_OF_${list})
+  if(NOT RISLEY_PRECOMPILE_HEADERS)
+    return()
+  elseif(lender)
+    target_precompile_headers(${target} REUSE_FROM ${lender})
+  else()
+    target_precompile_headers(${target} PRIVATE ${${list}})
+    set_property(GLOBAL PROPERTY RISLEY_LENDER_OF_${list} ${target})
+  endif()
+endfunction()
+
 # One layer: a library risley_<name> (alias risley::<name>) of include/risley/<name> and
 # src/<name>, linked to the layers it may include and to no other.
 function(risley_add_layer name)
   cmake_parse_arguments(arg "" "" "LAYERS" ${ARGN})
+  set(closure "")
+  foreach(layer IN LISTS arg_LAYERS)
+    list(APPEND closure ${RISLEY_${layer}_CLOSURE})
+  endforeach()
+  list(APPEND closure ${name})
+  list(REMOVE_DUPLICATES closure)
+  set(RISLEY_LAYERS ${RISLEY_LAYERS} ${name} PARENT_SCOPE)
+  set(RISLEY_${name}_LAYERS "${arg_LAYERS}" PARENT_SCOPE)
+  set(RISLEY_${name}_CLOSURE ${closure} PARENT_SCOPE) # with itself, lowest first
+endfunction()
+
+# Packages of RisleyPackages and RisleyDependencies that a layer needs. PUBLIC: seen in its headers;
+# PRIVATE: linked; OPTIONAL: linked if found; BUILD: headers only, so that users of the layer never need them.
+function(risley_layer_needs name)
+  cmake_parse_arguments(arg "" "" "PUBLIC;PRIVATE;OPTIONAL;BUILD" ${ARGN})
+  foreach(key IN LISTS arg_OPTIONAL)
+    risley_find_packages(missing ${key})
+    if(NOT missing)
+      list(APPEND arg_PRIVATE ${key})
+    endif()
+  endforeach()
+  foreach(kind PUBLIC PRIVATE BUILD)
+    set(RISLEY_${name}_${kind} "${arg_${kind}}" PARENT_SCOPE)
+  endforeach()
+endfunction()
+
+# Layers that are built and tested but not installed, and are no part of risley::risley.
+macro(risley_keep_private)
+  list(APPEND RISLEY_PRIVATE_LAYERS ${ARGN})
+endmacro()
+
+function(risley_make_layer name)
   file(GLOB_RECURSE headers CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/include/risley/${name}/*.hpp)
   file(GLOB_RECURSE sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/src/${name}/*.cpp)
   list(FILTER sources EXCLUDE REGEX "_kernel\\.cpp$") # built once per instruction set
   set(target risley_${name})
-  add_library(${target} STATIC ${sources})
+  add_library(${target} ${sources})
   add_library(risley::${name} ALIAS ${target})
-  set_target_properties(${target} PROPERTIES EXPORT_NAME ${name})
+  set_target_properties(${target} PROPERTIES EXPORT_NAME ${name}
+                        VERSION ${PROJECT_VERSION} INSTALL_RPATH $ORIGIN
+                        SOVERSION ${PROJECT_VERSION_MAJOR}.${PROJECT_VERSION_MINOR})
+  if(BUILD_SHARED_LIBS) # what is ours is exported, templates of other libraries stay inside
+    set(script ${PROJECT_SOURCE_DIR}/cmake/exports.map)
+    target_link_options(${target} PRIVATE -Wl,--version-script=${script})
+    set_target_properties(${target} PROPERTIES LINK_DEPENDS ${script})
+  endif()
   target_sources(${target} PUBLIC FILE_SET HEADERS BASE_DIRS ${PROJECT_SOURCE_DIR}/include
                  FILES ${headers})
   target_include_directories(${target} PRIVATE ${PROJECT_SOURCE_DIR}/src) # "<layer>/private.hpp"
   risley_target_defaults(${target})
-  foreach(layer IN LISTS arg_LAYERS)
+  if(eigen IN_LIST RISLEY_${name}_PUBLIC)
+    risley_precompile(${target} RISLEY_EIGEN_HEADERS)
+  else()
+    risley_precompile(${target} RISLEY_STANDARD_HEADERS)
+  endif()
+  # Formats share names such as "recognises", which collide when sources are compiled together.
+  set(formats ${sources})
+  list(FILTER formats INCLUDE REGEX "/formats/")
+  set_source_files_properties(${formats} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
+  foreach(layer IN LISTS RISLEY_${name}_LAYERS)
     target_link_libraries(${target} PUBLIC risley_${layer})
   endforeach()
-  set(RISLEY_LAYER_TARGETS ${RISLEY_LAYER_TARGETS} ${target} PARENT_SCOPE)
+  foreach(kind PUBLIC PRIVATE BUILD)
+    foreach(key IN LISTS RISLEY_${name}_${kind})
+      get_property(package GLOBAL PROPERTY RISLEY_PACKAGE_${key}_TARGET)
+      if(kind STREQUAL "BUILD") # linking would hand the package on to users
+        target_include_directories(${target} SYSTEM PRIVATE
+                                   $<TARGET_PROPERTY:${package},INTERFACE_INCLUDE_DIRECTORIES>)
+      else()
+        target_link_libraries(${target} ${kind} ${package})
+      endif()
+    endforeach()
+  endforeach()
 endfunction()
+
+# Makes the layers of the components that are asked for (all when none is), after their packages are found.
+# Afterwards RISLEY_LAYERS lists those that were made, RISLEY_PUBLIC_LAYER_TARGETS what risley::risley links.
+macro(risley_make_layers)
+  set(wanted "")
+  foreach(layer ${ARGN})
+    if(NOT layer IN_LIST RISLEY_LAYERS)
+      list(JOIN RISLEY_LAYERS ", " known)
+      message(FATAL_ERROR "RISLEY_COMPONENTS = ${layer}, allowed: ${known}")
+    endif()
+    list(APPEND wanted ${RISLEY_${layer}_CLOSURE})
+  endforeach()
+  if(wanted)
+    foreach(layer IN LISTS RISLEY_LAYERS)
+      if(NOT layer IN_LIST wanted)
+        list(REMOVE_ITEM RISLEY_LAYERS ${layer})
+      endif()
+    endforeach()
+  endif()
+  set(packages "")
+  foreach(layer IN LISTS RISLEY_LAYERS)
+    list(APPEND packages ${RISLEY_${layer}_PUBLIC} ${RISLEY_${layer}_PRIVATE}
+                         ${RISLEY_${layer}_BUILD})
+  endforeach()
+  if(RISLEY_BUILD_APPS)
+    list(APPEND packages cli11 spdlog tbb nlohmann-json)
+  endif()
+  if(RISLEY_BUILD_TESTS)
+    list(APPEND packages gtest ceres)
+  endif()
+  if(RISLEY_BUILD_BENCHMARKS)
+    list(APPEND packages benchmark ceres)
+  endif()
+  list(REMOVE_DUPLICATES packages)
+  risley_require_packages(${packages})
+  set(RISLEY_PUBLIC_LAYER_TARGETS "")
+  foreach(layer IN LISTS RISLEY_LAYERS)
+    risley_make_layer(${layer})
+    if(NOT layer IN_LIST RISLEY_PRIVATE_LAYERS)
+      list(APPEND RISLEY_PUBLIC_LAYER_TARGETS risley_${layer})
+    endif()
+  endforeach()
+endmacro()

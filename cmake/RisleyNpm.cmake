@@ -5,7 +5,7 @@
 set(RISLEY_NPM_FOLDER ${PROJECT_BINARY_DIR}/npm CACHE PATH "Where packages of npm are kept")
 
 # Downloads one package, once, and sets <out> to its folder.
-# The hash alone decides that what came is what was asked for, so a bare system needs no certificates.
+# Both the server's certificate and the hash must be right.
 function(risley_npm_package out name version sha512)
   set(folder ${RISLEY_NPM_FOLDER}/${name}-${version})
   set(${out} ${folder}/package PARENT_SCOPE)
@@ -15,7 +15,7 @@ function(risley_npm_package out name version sha512)
   set(url https://registry.npmjs.org/${name}/-/${name}-${version}.tgz)
   set(archive ${RISLEY_NPM_FOLDER}/${name}-${version}.tgz)
   foreach(attempt RANGE 1 3)
-    file(DOWNLOAD ${url} ${archive} TLS_VERIFY OFF INACTIVITY_TIMEOUT 30 STATUS status)
+    file(DOWNLOAD ${url} ${archive} TLS_VERIFY ON INACTIVITY_TIMEOUT 30 STATUS status)
     list(GET status 0 code)
     if(code EQUAL 0)
       break()
@@ -24,8 +24,9 @@ function(risley_npm_package out name version sha512)
   if(NOT code EQUAL 0)
     list(GET status 1 reason)
     file(REMOVE ${archive})
-    message(FATAL_ERROR "${url} cannot be downloaded: ${reason}. Without a network, unpack the "
-                        "package on another machine and copy it to ${folder}/package.")
+    message(FATAL_ERROR "${url} cannot be downloaded: ${reason}. Certificates of servers are in the "
+                        "Debian package ca-certificates. Without a network, unpack the archive on "
+                        "another machine and copy its folder \"package\" to ${folder}/package.")
   endif()
   file(SHA512 ${archive} found)
   if(NOT found STREQUAL sha512)

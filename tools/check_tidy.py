@@ -37,6 +37,7 @@ def commands_of(build):
     for entry in json.loads(file.read_text()):
         source = Path(entry['directory'], entry['file']).resolve()
         command = re.sub(r' -o \S+ -c \S+$', '', entry['command'])
+        command = re.sub(r' -Winvalid-pch -include \S+', '', command)  # headers parsed by gcc
         commands.setdefault(source, (entry['directory'], command))  # kernels: the first set
     return commands
 

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include <fmt/format.h>
 
@@ -16,34 +17,22 @@ namespace {
 constexpr std::int64_t kHeadNs = 1'000'000'000;
 constexpr std::int64_t kResetNs = static_cast<std::int64_t>(kClockReset * 1e9);
 
-/// Picks shots on a fixed grid of ticks, so that gaps and jitter do not move them.
-class Ticks {
- public:
-  Ticks(double rate, std::int64_t& origin, std::int64_t& next)
-      : rate_(rate), origin_(origin), next_(next) {}
-
-  void restart(std::int64_t time_ns) { origin_ = next_ = time_ns; }
-  bool take(std::int64_t time_ns) {
-    if (time_ns < next_) return false;
-    const double since = 1e-9 * static_cast<double>(time_ns - origin_);
-    const double tick = std::floor(since * rate_ + 1e-6) + 1.0;
-    next_ = origin_ + std::llround(tick / rate_ * 1e9);
-    return true;
-  }
-
- private:
-  double rate_;
-  std::int64_t &origin_, &next_;
-};
-
 }  // namespace
 
+void AngleSeries::append(std::int64_t shot_time_ns, double shot_azimuth, double shot_zenith,
+                         std::uint8_t shot_beam, float shot_azimuth_variance,
+                         float shot_zenith_variance) {
+  time_ns.push_back(shot_time_ns);
+  azimuth.push_back(shot_azimuth);
+  zenith.push_back(shot_zenith);
+  beam.push_back(shot_beam);
+  azimuth_rounding_variance.push_back(shot_azimuth_variance);
+  zenith_rounding_variance.push_back(shot_zenith_variance);
+}
+
 void AngleSeries::append(const AngleSeries& other, std::size_t row) {
-  time_ns.push_back(other.time_ns[row]);
-  azimuth.push_back(other.azimuth[row]);
-  zenith.push_back(other.zenith[row]);
-  azimuth_rounding_variance.push_back(other.azimuth_rounding_variance[row]);
-  zenith_rounding_variance.push_back(other.zenith_rounding_variance[row]);
+  append(other.time_ns[row], other.azimuth[row], other.zenith[row], other.beam[row],
+         other.azimuth_rounding_variance[row], other.zenith_rounding_variance[row]);
   if (!other.range.empty()) range.push_back(other.range[row]);
 }
 
@@ -64,19 +53,43 @@ std::vector<ShotRange> stretches(const AngleSeries& series, double longest_gap) 
   return ranges;
 }
 
+bool TickSampler::take(std::int64_t time_ns, std::uint8_t beam) {
+  beams_ = std::max(beams_, beam + 1);
+  if (time_ns < next_ns_) return false;
+  if (to_skip_ > 0) {
+    --to_skip_;
+    return false;
+  }
+  const double since = 1e-9 * static_cast<double>(time_ns - origin_ns_);
+  const double tick = std::floor(since * rate_ + 1e-6) + 1.0;
+  next_ns_ = origin_ns_ + std::llround(tick / rate_ * 1e9);
+  turn_ = (turn_ + 1) % beams_;
+  to_skip_ = turn_;
+  return true;
+}
+
 AngleSeries thinned(const AngleSeries& series, double rate, std::vector<ShotRange>& ranges) {
   AngleSeries rows;
-  std::int64_t origin = 0, next = 0;
-  Ticks ticks(rate, origin, next);
+  TickSampler ticks(rate);
   for (ShotRange& range : ranges) {
     const std::size_t begin = rows.size();
     ticks.restart(series.time_ns[range.begin]);
     for (std::size_t i = range.begin; i < range.end; ++i) {
-      if (ticks.take(series.time_ns[i])) rows.append(series, i);
+      if (ticks.take(series.time_ns[i], series.beam[i])) rows.append(series, i);
     }
     range = {begin, rows.size()};
   }
   return rows;
+}
+
+std::size_t thinning_stride(const AngleSeries& series, ShotRange rows, std::size_t most) {
+  std::size_t beams = 1;
+  for (std::size_t i = rows.begin; i < rows.end; ++i) {
+    beams = std::max<std::size_t>(beams, series.beam[i] + std::size_t{1});
+  }
+  std::size_t stride = std::max<std::size_t>(1, rows.size() / most);
+  while (std::gcd(stride, beams) != 1) ++stride;
+  return stride;
 }
 
 std::int64_t median_step_ns(std::span<const std::int64_t> time_ns) {
@@ -94,7 +107,8 @@ void mirror(AngleSeries& series) {
   for (double& zenith : series.zenith) zenith = kPi - zenith;
 }
 
-ShotSelector::ShotSelector(const SelectionOptions& options) : options_(options) {
+ShotSelector::ShotSelector(const SelectionOptions& options)
+    : options_(options), ticks_(options.rate.value_or(1.0)) {
   if (options_.rate && !(*options_.rate > 0)) {
     throw InvalidArgument(fmt::format("rate = {} Hz, allowed above 0", *options_.rate));
   }
@@ -103,14 +117,10 @@ ShotSelector::ShotSelector(const SelectionOptions& options) : options_(options) 
 void ShotSelector::add(const recordings::Observations& o) {
   const auto append = [&](AngleSeries& series, std::size_t i) {
     const auto variance = [](float step) { return step * step / 12.0F; };
-    series.time_ns.push_back(o.time_ns[i]);
-    series.azimuth.push_back(o.azimuth[i]);
-    series.zenith.push_back(o.zenith[i]);
-    series.azimuth_rounding_variance.push_back(variance(o.azimuth_resolution[i]));
-    series.zenith_rounding_variance.push_back(variance(o.zenith_resolution[i]));
+    series.append(o.time_ns[i], o.azimuth[i], o.zenith[i], o.beam[i],
+                  variance(o.azimuth_resolution[i]), variance(o.zenith_resolution[i]));
     if (options_.ranges) series.range.push_back(o.range[i]);
   };
-  Ticks ticks(options_.rate.value_or(1.0), tick_origin_, next_tick_);
   for (std::size_t i = 0; i < o.size(); ++i) {
     ++counts_.rows;
     if (!o.valid[i] || !std::isfinite(o.azimuth[i]) || !std::isfinite(o.zenith[i])) {
@@ -124,13 +134,13 @@ void ShotSelector::add(const recordings::Observations& o) {
       continue;
     }
     if (step < 0) ++counts_.clock_resets;
-    if (first || step < 0) ticks.restart(o.time_ns[i]);
+    if (first || step < 0) ticks_.restart(o.time_ns[i]);
     last_time_ns_ = o.time_ns[i];
     // The head ends at the first reset.
     if (first || (counts_.clock_resets == 0 && o.time_ns[i] - head_.time_ns.front() <= kHeadNs)) {
       append(head_, i);
     }
-    if (!options_.rate || ticks.take(o.time_ns[i])) {
+    if (!options_.rate || ticks_.take(o.time_ns[i], o.beam[i])) {
       append(series_, i);
       if (options_.rows) rows_.push_back(static_cast<std::size_t>(counts_.rows - 1));
     }

@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
+#include <numeric>
 #include <utility>
 
 #include <Eigen/Cholesky>
@@ -77,16 +79,20 @@ class WindowFitter {
     weights_.softening = softening_at(kMiss / weights_.angle_noise.azimuth);
     WindowFit best = fit, trial = fit;
     double least = std::numeric_limits<double>::infinity();
-    for (int a = 0; a < kSteps; ++a) {
-      for (int b = 0; b < kSteps; ++b) {
-        trial.knot.state[0] = kTwoPi * a / kSteps;
-        trial.knot.state[3] = kTwoPi * b / kSteps;
-        const double cost = evaluate(trial);
-        if (cost >= least) continue;
-        least = cost;
-        best = trial;
+    const auto choose = [&](const auto& self, int rotor) -> void {
+      if (rotor < fit.knot.prisms) {
+        for (int step = 0; step < kSteps; ++step) {
+          trial.knot.state[static_cast<std::size_t>(3 * rotor)] = kTwoPi * step / kSteps;
+          self(self, rotor + 1);
+        }
+        return;
       }
-    }
+      const double cost = evaluate(trial);
+      if (cost >= least) return;
+      least = cost;
+      best = trial;
+    };
+    choose(choose, 0);
     fit = std::move(best);
   }
 
@@ -228,9 +234,10 @@ struct Hypothesis {
   sensors::Sensor sensor;  // in one of its speed combinations
 
   /// Speeds of the lines of y + iz as recorded: a mirror image turns the other way.
-  std::pair<double, double> recorded_speeds() const {
-    const double sign = mirrored ? -1.0 : 1.0;
-    return {sign * sensor.angular_velocity[0], sign * sensor.angular_velocity[1]};
+  std::vector<double> recorded_speeds() const {
+    std::vector<double> speeds = sensor.angular_velocity;
+    if (mirrored) std::transform(speeds.begin(), speeds.end(), speeds.begin(), std::negate<>());
+    return speeds;
   }
   std::string words() const {
     return fmt::format("{}{}",
@@ -360,7 +367,7 @@ class StartWindow {
   AngleSeries chosen(bool mirrored, std::size_t most) const {
     AngleSeries shots;
     const ShotRange rows = search_->shots();
-    const std::size_t stride = std::max<std::size_t>(1, rows.size() / most);
+    const std::size_t stride = thinning_stride(series_, rows, most);
     for (std::size_t i = rows.begin; i < rows.end; i += stride) shots.append(series_, i);
     if (mirrored) mirror(shots);
     return shots;
@@ -374,16 +381,40 @@ class StartWindow {
   std::vector<FreeParameter> frame_parameters_;
 };
 
-/// Whether speeds of two lines are those of a hypothesis, in the order given.
+/// Whether speeds of lines are those of a hypothesis, in the order given.
 bool speeds_fit(const Hypothesis& hypothesis, const RotorLines& lines, double share) {
-  const auto [a, b] = hypothesis.recorded_speeds();
-  return std::abs(lines.lines[0].angular_velocity / a - 1.0) < share &&
-         std::abs(lines.lines[1].angular_velocity / b - 1.0) < share;
+  const std::vector<double> speeds = hypothesis.recorded_speeds();
+  for (std::size_t k = 0; k < speeds.size(); ++k) {
+    if (!(std::abs(lines.lines[k].angular_velocity - speeds[k]) < share * std::abs(speeds[k]))) {
+      return false;
+    }
+  }
+  return true;
 }
 
-RotorLines exchanged(RotorLines lines) {
-  std::swap(lines.lines[0], lines.lines[1]);
-  return lines;
+/// The lines whose speeds were looked for as `from`, in the order of `to`; none where these are not
+/// the same speeds.
+std::optional<RotorLines> reordered(const RotorLines& lines, const std::vector<double>& from,
+                                    const std::vector<double>& to) {
+  RotorLines result = lines;
+  std::vector<bool> taken(from.size(), false);
+  for (std::size_t k = 0; k < to.size(); ++k) {
+    std::size_t at = 0;
+    while (at < from.size() && (taken[at] || from[at] != to[k])) ++at;
+    if (at == from.size()) return std::nullopt;
+    taken[at] = true;
+    result.lines[k] = lines.lines[at];
+  }
+  return result;
+}
+
+std::string speeds_text(const std::vector<double>& speeds) {
+  std::string text;
+  for (std::size_t k = 0; k < speeds.size(); ++k) {
+    const char* before = k == 0 ? "" : k + 1 == speeds.size() ? " and " : ", ";
+    text += fmt::format("{}{:.0f}", before, degrees_from_radians(speeds[k]));
+  }
+  return text;
 }
 
 /// Twice the logarithm of how much likelier an answer is than a rival: residuals of unknown noise,
@@ -425,28 +456,38 @@ bool same_answer(const Answer& a, const Answer& b, double resolved) {
   return true;
 }
 
+int turning_rotors(const sensors::Sensor& sensor) {
+  return static_cast<int>(std::count_if(sensor.angular_velocity.begin(),
+                                        sensor.angular_velocity.end(),
+                                        [](double speed) { return speed != 0; }));
+}
+
 /// What to say of lines that are no combination of the sensor's speeds.
 EstimationError unknown_speeds(const RotorLines& found, const sensors::Sensor& sensor,
                                const std::vector<Hypothesis>& hypotheses) {
-  const double a = found.lines[0].angular_velocity, b = found.lines[1].angular_velocity;
-  const std::string words = fmt::format(
-      "the beam turns at {:.0f} and {:.0f} deg/s, which is no combination of {}'s {:.0f} and "
-      "{:.0f} "
-      "deg/s",
-      degrees_from_radians(a), degrees_from_radians(b), sensor.name,
-      degrees_from_radians(sensor.angular_velocity[0]),
-      degrees_from_radians(sensor.angular_velocity[1]));
+  std::vector<double> speeds;
+  for (const SpectralLine& line : found.lines) speeds.push_back(line.angular_velocity);
+  const std::string words =
+      fmt::format("the beam turns at {} deg/s, which is no combination of {}'s {} deg/s",
+                  speeds_text(speeds), sensor.name, speeds_text(sensor.angular_velocity));
   for (const Hypothesis& hypothesis : hypotheses) {
-    for (const auto& [first, second] : {std::pair(a, b), std::pair(b, a)}) {
-      const auto [expected_a, expected_b] = hypothesis.recorded_speeds();
-      const double ratio_a = first / expected_a, ratio_b = second / expected_b;
-      if (ratio_a > 0 && std::abs(ratio_a / ratio_b - 1.0) < 0.01) {
-        return EstimationError(
-            fmt::format("{}: both are {:.4g} times as fast, so the time stamps are in another unit "
-                        "or their clock is wrong",
-                        words, ratio_a));
+    const std::vector<double> expected = hypothesis.recorded_speeds();
+    std::vector<std::size_t> order(speeds.size());
+    std::iota(order.begin(), order.end(), std::size_t{0});
+    do {
+      double low = std::numeric_limits<double>::infinity(), high = -low;
+      for (std::size_t k = 0; k < order.size(); ++k) {
+        const double ratio = speeds[order[k]] / expected[k];
+        low = std::min(low, ratio);
+        high = std::max(high, ratio);
       }
-    }
+      if (low > 0 && high < 1.01 * low) {
+        return EstimationError(fmt::format(
+            "{}: {} are {:.4g} times as fast, so the time stamps are in another unit or their "
+            "clock is wrong",
+            words, speeds.size() == 2 ? "both" : "all", low));
+      }
+    } while (std::next_permutation(order.begin(), order.end()));
   }
   return EstimationError(words + ": wrong sensor, a moving sensor, or a mirrored recording");
 }
@@ -457,19 +498,19 @@ Answer find_in_window(const StartWindow& window, const sensors::Sensor& sensor,
   const LineSearch& search = window.search();
   std::vector<Trial> trials;
   for (const Hypothesis& h : hypotheses) {
-    const std::pair<double, double> speeds = h.recorded_speeds();
+    const std::vector<double> speeds = h.recorded_speeds();
     // A combination and the mirror image of the other have the same lines, the other way round.
-    const auto twin = std::find_if(trials.begin(), trials.end(), [&](const Trial& trial) {
-      return trial.hypothesis->recorded_speeds() == std::pair(speeds.second, speeds.first);
-    });
-    if (twin != trials.end()) {
-      const Hypothesis* other = twin->hypothesis;
-      const std::size_t count = trials.size();
-      for (std::size_t i = 0; i < count; ++i) {
-        if (trials[i].hypothesis == other) trials.push_back({&h, exchanged(trials[i].lines)});
-      }
-      continue;
+    std::vector<Trial> twins;
+    const Hypothesis* twin = nullptr;
+    for (const Trial& trial : trials) {
+      if (twin != nullptr && trial.hypothesis != twin) continue;
+      auto lines = reordered(trial.lines, trial.hypothesis->recorded_speeds(), speeds);
+      if (!lines) continue;
+      twin = trial.hypothesis;
+      twins.push_back({&h, *std::move(lines)});
     }
+    trials.insert(trials.end(), twins.begin(), twins.end());
+    if (twin != nullptr) continue;
     for (RotorLines& lines : search.near(speeds, kUsualShare, kMostCandidates)) {
       trials.push_back({&h, std::move(lines)});
     }
@@ -478,11 +519,16 @@ Answer find_in_window(const StartWindow& window, const sensors::Sensor& sensor,
   if (answers.empty() || answers.front().fit.rms > kGoodResidual) {
     double fastest = 0;
     for (const double speed : sensor.angular_velocity) fastest = std::max(fastest, std::abs(speed));
-    const std::vector<RotorLines> everywhere = search.anywhere(2.1 * fastest, kMostCandidates);
+    std::vector<RotorLines> everywhere;
+    if (turning_rotors(sensor) == 2 && sensor.prisms() == 2) {
+      everywhere = search.anywhere(2.1 * fastest, kMostCandidates);
+    }
     std::vector<Trial> farther;
     for (const RotorLines& lines : everywhere) {
+      RotorLines exchanged = lines;
+      std::swap(exchanged.lines[0], exchanged.lines[1]);
       for (const Hypothesis& h : hypotheses) {
-        for (const RotorLines& order : {lines, exchanged(lines)}) {
+        for (const RotorLines& order : {lines, exchanged}) {
           if (speeds_fit(h, order, kFarthestShare)) farther.push_back({&h, order});
         }
       }
@@ -496,7 +542,10 @@ Answer find_in_window(const StartWindow& window, const sensors::Sensor& sensor,
          everywhere.front().unexplained < 0.25 * answers.front().trial.lines.unexplained);
     if (better_elsewhere) throw unknown_speeds(everywhere.front(), sensor, hypotheses);
     if (answers.empty()) {
-      throw EstimationError("no pair of turning lines describes the directions of the beam");
+      throw EstimationError(
+          fmt::format("no {} turning lines about the speeds of {}, {} deg/s, describe the "
+                      "directions of the beam",
+                      turning_rotors(sensor), sensor.name, speeds_text(sensor.angular_velocity)));
     }
   }
   // The best answer against the best one that says something else; more shots where it is close.
@@ -566,9 +615,9 @@ Eigen::Matrix3d turned_frame(const AngleSeries& head, const sensors::Sensor& sen
 
 Start find_start(const AngleSeries& head, const sensors::Sensor& sensor,
                  const StartOptions& options) {
-  if (sensor.prisms() != 2) {
-    throw InvalidArgument(fmt::format("{} has {} prisms; the start knows sensors with 2",
-                                      sensor.name, sensor.prisms()));
+  if (turning_rotors(sensor) == 0) {
+    throw InvalidArgument(fmt::format(
+        "{}: the speeds of all rotors are 0 deg/s, at least one must turn", sensor.name));
   }
   if (head.size() > 1) {
     const double step = 1e-9 * static_cast<double>(median_step_ns(head.time_ns));

@@ -36,14 +36,27 @@ inline Eigen::Matrix3d rotor_curvature(const double* powers) {
   return h;
 }
 
+/// Of the states of N rotors at a knot; N = Eigen::Dynamic stands for any number up to kMaxPrisms
+/// that is only known when running, still without memory from the heap.
+template <int N>
+inline constexpr int kKnotStates = N == Eigen::Dynamic ? Eigen::Dynamic : 3 * N;
+template <int N>
+inline constexpr int kMostKnotStates = 3 * (N == Eigen::Dynamic ? kMaxPrisms : N);
+template <int N>
+using KnotSquare = Eigen::Matrix<double, kKnotStates<N>, kKnotStates<N>, Eigen::ColMajor,
+                                 kMostKnotStates<N>, kMostKnotStates<N>>;
+template <int N>
+using KnotVector = Eigen::Matrix<double, kKnotStates<N>, 1, Eigen::ColMajor, kMostKnotStates<N>, 1>;
+
 /// Curvature of all states of a knot.
 template <int N>
-Eigen::Matrix<double, 3 * N, 3 * N> knot_curvature(const NormalEquations& equations,
-                                                   std::size_t knot) {
-  Eigen::Matrix<double, 3 * N, 3 * N> h;
-  const double* powers = equations.curvature.data() + knot * (N * (N + 1) / 2) * 5;
-  for (int k = 0; k < N; ++k) {
-    for (int l = k; l < N; ++l, powers += 5) {
+KnotSquare<N> knot_curvature(const NormalEquations& equations, std::size_t knot) {
+  const int prisms = N == Eigen::Dynamic ? equations.prisms : N;
+  KnotSquare<N> h(3 * prisms, 3 * prisms);
+  const auto pairs = static_cast<std::size_t>(prisms * (prisms + 1) / 2);
+  const double* powers = equations.curvature.data() + knot * pairs * 5;
+  for (int k = 0; k < prisms; ++k) {
+    for (int l = k; l < prisms; ++l, powers += 5) {
       h.template block<3, 3>(3 * k, 3 * l) = rotor_curvature(powers);
       if (l != k) h.template block<3, 3>(3 * l, 3 * k) = rotor_curvature(powers);
     }
@@ -75,17 +88,18 @@ inline Eigen::Matrix3d step_noise(const RotorProcess& process, double dt) {
   return noise;
 }
 
-/// Lower Cholesky factor, in place; unrolled for the few sizes there are.
+/// Lower Cholesky factor, in place; unrolled where the size is fixed.
 /// @return false when the matrix is not positive definite
-template <int D>
-bool cholesky(Eigen::Matrix<double, D, D>& a) {
-  for (int j = 0; j < D; ++j) {
+template <class Square>
+bool cholesky(Square& a) {
+  const auto d = static_cast<int>(a.rows());
+  for (int j = 0; j < d; ++j) {
     for (int k = 0; k < j; ++k) {
-      for (int i = j; i < D; ++i) a(i, j) -= a(i, k) * a(j, k);
+      for (int i = j; i < d; ++i) a(i, j) -= a(i, k) * a(j, k);
     }
     if (!(a(j, j) > 0)) return false;
     const double scale = 1.0 / std::sqrt(a(j, j));
-    for (int i = j; i < D; ++i) a(i, j) *= scale;
+    for (int i = j; i < d; ++i) a(i, j) *= scale;
     for (int i = 0; i < j; ++i) a(i, j) = 0;
   }
   return true;
@@ -95,25 +109,24 @@ bool cholesky(Eigen::Matrix<double, D, D>& a) {
 /// (P^-1 + H)^-1 = W W^T with P = L L^T, I + L^T H L = R R^T, W^T = R^-1 L^T.
 /// @param[out] log_determinant  of I + P H, when wanted
 /// @return false when P is not positive definite
-template <int D>
-bool add_information(Eigen::Matrix<double, D, D>& covariance,
-                     const Eigen::Matrix<double, D, D>& information,
+template <class Square>
+bool add_information(Square& covariance, const Square& information,
                      double* log_determinant = nullptr) {
-  using Square = Eigen::Matrix<double, D, D>;
+  const auto d = static_cast<int>(covariance.rows());
   Square lower = covariance;
-  if (!cholesky<D>(lower)) return false;
+  if (!cholesky(lower)) return false;
   Square inner = lower.transpose() * (information * lower);
   inner.diagonal().array() += 1.0;
-  if (!cholesky<D>(inner)) return false;
+  if (!cholesky(inner)) return false;
   Square root = lower.transpose();
-  for (int i = 0; i < D; ++i) {
+  for (int i = 0; i < d; ++i) {
     for (int k = 0; k < i; ++k) root.row(i) -= inner(i, k) * root.row(k);
     root.row(i) *= 1.0 / inner(i, i);
   }
   covariance.noalias() = root.transpose() * root;
   if (log_determinant) {
     double product = 1.0;
-    for (int i = 0; i < D; ++i) product *= inner(i, i);
+    for (int i = 0; i < d; ++i) product *= inner(i, i);
     *log_determinant = 2.0 * std::log(product);
   }
   return true;

@@ -250,16 +250,13 @@ Observability observability_of_plan(const ObservabilityPlan& plan) {
   std::vector<double> angles(static_cast<std::size_t>(train.prisms()));
   for (std::size_t i = 0; i < count; ++i) {
     const double t = static_cast<double>(i) / rate;
-    series.time_ns.push_back(std::llround(1e9 * t));
+    const std::int64_t time_ns = std::llround(1e9 * t);
     for (std::size_t k = 0; k < angles.size(); ++k) {
-      angles[k] = wrap_to_pi(plan.sensor.angular_velocity[k] *
-                             (1e-9 * static_cast<double>(series.time_ns.back())));
+      angles[k] =
+          wrap_to_pi(plan.sensor.angular_velocity[k] * (1e-9 * static_cast<double>(time_ns)));
     }
     const Observation shot = observe(train, angles);
-    series.azimuth.push_back(shot.azimuth);
-    series.zenith.push_back(shot.zenith);
-    series.azimuth_rounding_variance.push_back(0);
-    series.zenith_rounding_variance.push_back(0);
+    series.append(time_ns, shot.azimuth, shot.zenith);
   }
   const ShotRange range{0, series.size()};
   RotorTrajectory knots = make_knots(series, {&range, 1}, train.prisms());

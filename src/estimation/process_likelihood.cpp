@@ -160,7 +160,7 @@ double RotorWindows::log_likelihood(const RotorProcess& process) const {
     }
     const Eigen::Vector3d gradient = window.gradient - window.curvature * mean;
     double log_determinant = 0;
-    if (!add_information<3>(p, window.curvature, &log_determinant)) {
+    if (!add_information(p, window.curvature, &log_determinant)) {
       return -std::numeric_limits<double>::infinity();
     }
     const Eigen::Vector3d step = p * gradient;

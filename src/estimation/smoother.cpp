@@ -17,13 +17,15 @@ namespace {
 
 constexpr int kMostFree = parameter_count(kMaxPrisms);
 
+/// Of N rotors, which may be Eigen::Dynamic.
 template <int N>
 class Smoother {
-  static constexpr int kD = 3 * N;
-  using Square = Eigen::Matrix<double, kD, kD>;
-  using Vector = Eigen::Matrix<double, kD, 1>;
+  static constexpr int kD = kKnotStates<N>;
+  using Square = KnotSquare<N>;
+  using Vector = KnotVector<N>;
   /// Mean in the first column, derivatives by the parameters in the others.
-  using Affine = Eigen::Matrix<double, kD, Eigen::Dynamic, Eigen::ColMajor, kD, kMostFree + 1>;
+  using Affine =
+      Eigen::Matrix<double, kD, Eigen::Dynamic, Eigen::ColMajor, kMostKnotStates<N>, kMostFree + 1>;
   using AffineMap = Eigen::Map<Eigen::Matrix<double, kD, Eigen::Dynamic>>;
   using SquareMap = Eigen::Map<Square>;
   using Coupling = Eigen::Map<const Eigen::Matrix<double, kD, Eigen::Dynamic, Eigen::RowMajor>>;
@@ -51,7 +53,7 @@ class Smoother {
     if (!out.parameter_step.allFinite()) {
       throw EstimationError("the normal equations of the parameters have no finite solution");
     }
-    out.state_step.resize(at_.size() * kD);
+    out.state_step.resize(at_.size() * states());
     if (covariances) {
       backward_with_covariance(out);
     } else {
@@ -61,19 +63,25 @@ class Smoother {
   }
 
  private:
+  int prisms() const { return N == Eigen::Dynamic ? at_.prisms : N; }
+  int d() const { return 3 * prisms(); }
+  std::size_t states() const { return static_cast<std::size_t>(d()); }
   AffineMap affine(std::size_t knot) {
     const auto columns = static_cast<std::size_t>(free_ + 1);
-    return {filtered_.data() + knot * kD * columns, kD, free_ + 1};
+    return {filtered_.data() + knot * states() * columns, d(), free_ + 1};
   }
-  SquareMap covariance(std::size_t knot) { return SquareMap(covariances_.data() + knot * kD * kD); }
+  SquareMap covariance(std::size_t knot) {
+    return SquareMap(covariances_.data() + knot * states() * states(), d(), d());
+  }
   Coupling coupling(std::size_t knot) const {
-    return {equations_.coupling.data() + knot * kD * static_cast<std::size_t>(free_), kD, free_};
+    return {equations_.coupling.data() + knot * states() * static_cast<std::size_t>(free_), d(),
+            free_};
   }
   Vector gradient(std::size_t knot) const {
-    return Eigen::Map<const Vector>(equations_.gradient.data() + knot * kD);
+    return Eigen::Map<const Vector>(equations_.gradient.data() + knot * states(), d());
   }
   Vector state(std::size_t knot) const {
-    return Eigen::Map<const Vector>(at_.state.data() + knot * kD);
+    return Eigen::Map<const Vector>(at_.state.data() + knot * states(), d());
   }
   double step_before(std::size_t knot) const {
     return 1e-9 * static_cast<double>(at_.time_ns[knot] - at_.time_ns[knot - 1]);
@@ -81,7 +89,7 @@ class Smoother {
 
   /// Gradient of the shots of a knot at affine states: (g, 0) - H x - (0, C).
   Affine gradient_at(std::size_t knot, const Square& curvature, const Affine& x) const {
-    Affine gradient_there(kD, free_ + 1);
+    Affine gradient_there(d(), free_ + 1);
     gradient_there.noalias() = curvature * x;
     gradient_there = -gradient_there;
     gradient_there.col(0) += gradient(knot);
@@ -91,12 +99,12 @@ class Smoother {
 
   void forward() {
     const std::size_t knots = at_.size();
-    filtered_.resize(knots * kD * static_cast<std::size_t>(free_ + 1));
-    covariances_.resize(knots * kD * kD);
+    filtered_.resize(knots * states() * static_cast<std::size_t>(free_ + 1));
+    covariances_.resize(knots * states() * states());
     information_ = equations_.static_hessian;
     gradient_ = equations_.static_gradient;
-    Affine x = Affine::Zero(kD, free_ + 1), e, moved(kD, free_ + 1);
-    Square p;
+    Affine x = Affine::Zero(d(), free_ + 1), e, moved(d(), free_ + 1);
+    Square p(d(), d());
     std::size_t stretch = 0;
     for (std::size_t knot = 0; knot < knots; ++knot) {
       if (stretch < at_.stretch_begin.size() && at_.stretch_begin[stretch] == knot) {
@@ -106,7 +114,7 @@ class Smoother {
         predict(knot, x, p);
       }
       const Square h = knot_curvature<N>(equations_, knot);
-      if (!add_information<kD>(p, h)) throw not_definite(knot);
+      if (!add_information(p, h)) throw not_definite(knot);
       e = gradient_at(knot, h, x);
       moved.noalias() = p * e;
       if (free_ > 0) {
@@ -127,7 +135,7 @@ class Smoother {
   void begin(std::size_t knot, Affine& x, Square& p) const {
     x.setZero();
     p.setZero();
-    for (int k = 0; k < N; ++k) {
+    for (int k = 0; k < prisms(); ++k) {
       const RotorProcess& process = process_[static_cast<std::size_t>(k)];
       const double sigma[] = {kFirstAngleSigma, kFirstSpeedSigma,
                               first_acceleration_sigma(process)};
@@ -140,18 +148,19 @@ class Smoother {
   /// from the linearisation, which need not follow the motion itself.
   Vector step_offset(std::size_t knot) const {
     Vector offset = state(knot - 1);
-    for (int k = 0; k < N; ++k) advance(offset.template middleRows<3>(3 * k), step_before(knot));
+    for (int k = 0; k < prisms(); ++k)
+      advance(offset.template middleRows<3>(3 * k), step_before(knot));
     return offset - state(knot);
   }
 
   void predict(std::size_t knot, Affine& x, Square& p) const {
     const double dt = step_before(knot);
-    for (int k = 0; k < N; ++k) {
+    for (int k = 0; k < prisms(); ++k) {
       advance(x.template middleRows<3>(3 * k), dt);
       advance(p.template middleRows<3>(3 * k), dt);
     }
     x.col(0) += step_offset(knot);
-    for (int k = 0; k < N; ++k) {
+    for (int k = 0; k < prisms(); ++k) {
       advance(p.template middleCols<3>(3 * k).transpose(), dt);
       p.template block<3, 3>(3 * k, 3 * k) += step_noise(process_[static_cast<std::size_t>(k)], dt);
     }
@@ -167,12 +176,12 @@ class Smoother {
   void backward(SmootherSolution& out) {
     Eigen::VectorXd one(free_ + 1);
     one << 1.0, out.parameter_step;
-    Vector lambda = Vector::Zero();
+    Vector lambda = Vector::Zero(d());
     std::size_t stretch = at_.stretch_begin.size();
     for (std::size_t knot = at_.size(); knot-- > 0;) {
       const Vector x = affine(knot) * one;
       const Vector back = covariance(knot) * lambda;
-      Eigen::Map<Vector>(out.state_step.data() + knot * kD) = x - back;
+      Eigen::Map<Vector>(out.state_step.data() + knot * states(), d()) = x - back;
       if (is_stretch_begin(knot, stretch)) {
         lambda.setZero();
         continue;
@@ -182,34 +191,34 @@ class Smoother {
       gradient_there -= coupling(knot) * out.parameter_step;
       lambda = lambda - h * back - gradient_there;
       const double dt = step_before(knot);
-      for (int k = 0; k < N; ++k) retreat(lambda.template middleRows<3>(3 * k), dt);
+      for (int k = 0; k < prisms(); ++k) retreat(lambda.template middleRows<3>(3 * k), dt);
     }
   }
 
   /// As backward, with covariances: what the later knots say of a state as information Y and vector
   /// y, so that nothing is ever a small difference of large numbers.
   void backward_with_covariance(SmootherSolution& out) {
-    constexpr std::size_t kTriangle = kD * (kD + 1) / 2;
-    out.state_covariance.resize(at_.size() * kTriangle);
-    out.sensitivity.resize(at_.size() * kD * static_cast<std::size_t>(free_));
-    Affine later = Affine::Zero(kD, free_ + 1), smoothed(kD, free_ + 1), x;
-    Square information = Square::Zero();
+    const std::size_t triangle = states() * (states() + 1) / 2;
+    out.state_covariance.resize(at_.size() * triangle);
+    out.sensitivity.resize(at_.size() * states() * static_cast<std::size_t>(free_));
+    Affine later = Affine::Zero(d(), free_ + 1), smoothed(d(), free_ + 1), x;
+    Square information = Square::Zero(d(), d());
     std::size_t stretch = at_.stretch_begin.size();
     for (std::size_t knot = at_.size(); knot-- > 0;) {
       Square p = covariance(knot);
       x = affine(knot);
-      if (!add_information<kD>(p, information)) throw not_definite(knot);
+      if (!add_information(p, information)) throw not_definite(knot);
       smoothed = x + p * (later - information * x);
       const auto sensitivity = smoothed.rightCols(free_);
-      Eigen::Map<Vector>(out.state_step.data() + knot * kD) =
+      Eigen::Map<Vector>(out.state_step.data() + knot * states(), d()) =
           smoothed.col(0) + sensitivity * out.parameter_step;
       Eigen::Map<Eigen::Matrix<double, kD, Eigen::Dynamic, Eigen::RowMajor>>(
-          out.sensitivity.data() + knot * kD * static_cast<std::size_t>(free_), kD, free_) =
+          out.sensitivity.data() + knot * states() * static_cast<std::size_t>(free_), d(), free_) =
           sensitivity;
       const Square total = p + sensitivity * out.parameter_covariance * sensitivity.transpose();
-      double* entry = out.state_covariance.data() + knot * kTriangle;
-      for (int i = 0; i < kD; ++i) {
-        for (int j = i; j < kD; ++j) *entry++ = 0.5 * (total(i, j) + total(j, i));
+      double* entry = out.state_covariance.data() + knot * triangle;
+      for (int i = 0; i < d(); ++i) {
+        for (int j = i; j < d(); ++j) *entry++ = 0.5 * (total(i, j) + total(j, i));
       }
       if (is_stretch_begin(knot, stretch)) {
         later.setZero();
@@ -221,8 +230,8 @@ class Smoother {
       information += knot_curvature<N>(equations_, knot);
       later.col(0) += gradient(knot);
       later.rightCols(free_) -= coupling(knot);
-      Square spread = Square::Identity();
-      for (int k = 0; k < N; ++k) {
+      Square spread = Square::Identity(d(), d());
+      for (int k = 0; k < prisms(); ++k) {
         spread.template middleCols<3>(3 * k) +=
             information.template middleCols<3>(3 * k) *
             step_noise(process_[static_cast<std::size_t>(k)], dt);
@@ -232,11 +241,11 @@ class Smoother {
       information = (0.5 * (information + information.transpose())).eval();
       later = solver.solve(later).eval();
       later.col(0) -= information * step_offset(knot);
-      for (int k = 0; k < N; ++k) {
+      for (int k = 0; k < prisms(); ++k) {
         retreat(later.template middleRows<3>(3 * k), dt);
         retreat(information.template middleRows<3>(3 * k), dt);
       }
-      for (int k = 0; k < N; ++k)
+      for (int k = 0; k < prisms(); ++k)
         retreat(information.template middleCols<3>(3 * k).transpose(), dt);
     }
   }
@@ -261,13 +270,19 @@ class Smoother {
 SmootherSolution smooth(const NormalEquations& equations, const RotorTrajectory& linearisation,
                         std::span<const RotorProcess> process, const ParameterPrior& prior,
                         bool covariances) {
+  if (linearisation.prisms < 1 || linearisation.prisms > kMaxPrisms) {
+    throw InvalidArgument(
+        fmt::format("number of prisms = {}, allowed 1 to {}", linearisation.prisms, kMaxPrisms));
+  }
   if (process.size() != static_cast<std::size_t>(linearisation.prisms)) {
     throw InvalidArgument(fmt::format("process noise for {} rotors given, the train has {}",
                                       process.size(), linearisation.prisms));
   }
-  return with_prism_count(linearisation.prisms, [&]<int N>() {
-    return Smoother<N>(equations, linearisation, process).run(prior, covariances);
-  });
+  // Compiling one for every number takes minutes; nearly every sensor has two.
+  if (linearisation.prisms == 2) {
+    return Smoother<2>(equations, linearisation, process).run(prior, covariances);
+  }
+  return Smoother<Eigen::Dynamic>(equations, linearisation, process).run(prior, covariances);
 }
 
 }  // namespace risley::estimation

@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
@@ -16,6 +17,7 @@
 #include "risley/core/direction.hpp"
 #include "risley/core/error.hpp"
 #include "risley/core/golden_section.hpp"
+#include "risley/optics/prism_train.hpp"
 
 namespace risley::estimation {
 namespace {
@@ -47,23 +49,48 @@ Complex transverse(const AngleSeries& series, std::size_t i) {
   return {v.y, v.z};
 }
 
-/// Least squares of a constant and two lines from the sums of their products.
-struct Sums {
-  double count;
-  Complex first, second, difference;                  // sums of exp(i w t)
-  Complex constant_value, first_value, second_value;  // of the value times exp(-i w t)
+/// Least squares of a constant for each emitter and some lines, the constants eliminated: they do
+/// not overlap each other, so that takes one division each.
+template <int Lines>
+class LineFit {
+ public:
+  explicit LineFit(double count) {
+    normal_.setZero();
+    normal_.diagonal().setConstant(count * kLineRidge);
+    right_.setZero();
+  }
+
+  /// @param overlap  sum of exp(i (w_b - w_a) t) over all shots
+  void set_overlap(int a, int b, Complex overlap) { normal_(a, b) += overlap; }
+  /// @param sum  of the value times exp(-i w t) over all shots
+  void set_value(int a, Complex sum) { right_[a] += sum; }
+  /// @param sums  of exp(i w t) over the emitter's shots, of every line
+  void eliminate(double count, Complex value, const std::array<Complex, Lines>& sums) {
+    const double weight = 1.0 / (count * (1.0 + kConstantRidge));
+    explained_ += weight * std::norm(value);
+    for (int a = 0; a < Lines; ++a) {
+      const Complex scaled = weight * std::conj(sums[static_cast<std::size_t>(a)]);
+      right_[a] -= scaled * value;
+      for (int b = 0; b < Lines; ++b) normal_(a, b) -= scaled * sums[static_cast<std::size_t>(b)];
+    }
+  }
+  void solve() {
+    amplitude_ = normal_.llt().solve(right_);
+    explained_ += amplitude_.dot(right_).real();
+  }
+
+  Complex amplitude(int line) const { return amplitude_[line]; }
+  double explained() const { return explained_; }
+
+ private:
+  Eigen::Matrix<Complex, Lines, Lines> normal_;
+  Eigen::Matrix<Complex, Lines, 1> right_, amplitude_;
+  double explained_ = 0;
 };
 
-std::array<Complex, 3> solve(const Sums& s, double& explained) {
-  Eigen::Matrix3cd normal;
-  const double n = s.count;
-  normal << n * (1.0 + kConstantRidge), s.first, s.second,       //
-      std::conj(s.first), n * (1.0 + kLineRidge), s.difference,  //
-      std::conj(s.second), std::conj(s.difference), n * (1.0 + kLineRidge);
-  const Eigen::Vector3cd right(s.constant_value, s.first_value, s.second_value);
-  const Eigen::Vector3cd amplitude = normal.llt().solve(right);
-  explained = amplitude.dot(right).real();
-  return {amplitude[0], amplitude[1], amplitude[2]};
+Complex sum_at(const std::vector<Complex>& spectrum, std::ptrdiff_t bin) {
+  const auto bins = static_cast<std::ptrdiff_t>(spectrum.size());
+  return spectrum[static_cast<std::size_t>(((bin % bins) + bins) % bins)];
 }
 
 }  // namespace
@@ -92,83 +119,135 @@ LineSearch::LineSearch(const AngleSeries& series) {
   std::size_t bins = 1;
   while (static_cast<double>(bins) < kOversampling * duration_ / step) bins *= 2;
   bin_speed_ = kTwoPi / (static_cast<double>(bins) * step);
-  std::vector<Complex> shot_grid(bins), value_grid(bins);
-  const std::size_t stride = std::max<std::size_t>(1, shots_.size() / kEnoughLineShots);
+  std::vector<Complex> value_grid(bins);
+  std::vector<std::vector<Complex>> shot_grids;
+  std::array<std::size_t, 256> place_of_beam;
+  place_of_beam.fill(shots_.size());
+  const std::size_t stride = thinning_stride(series, shots_, kEnoughLineShots);
   for (std::size_t i = shots_.begin; i < shots_.end; ++i) {
+    std::size_t& place = place_of_beam[series.beam[i]];
+    if (place == shots_.size()) {
+      place = emitters_.size();
+      emitters_.emplace_back();
+      shot_grids.emplace_back(bins);
+    }
     const Complex value = transverse(series, i);
-    const auto slot = static_cast<std::size_t>((series.time_ns[i] - first + step_ns / 2) / step_ns);
-    shot_grid[slot % bins] += 1.0;
-    value_grid[slot % bins] += value;
+    const auto slot =
+        static_cast<std::size_t>((series.time_ns[i] - first + step_ns / 2) / step_ns) % bins;
+    shot_grids[place][slot] += 1.0;
+    value_grid[slot] += value;
+    emitters_[place].count += 1.0;
+    emitters_[place].value += value;
     count_ += 1.0;
     power_ += std::norm(value);
     if ((i - shots_.begin) % stride != 0) continue;
     time_.push_back(1e-9 * static_cast<double>(series.time_ns[i] - time_ns_));
+    emitter_.push_back(place);
     value_.push_back(value);
   }
   Eigen::FFT<double> fft;
-  fft.fwd(shot_spectrum_, shot_grid);
+  for (std::size_t j = 0; j < emitters_.size(); ++j) fft.fwd(emitters_[j].spectrum, shot_grids[j]);
   fft.fwd(value_spectrum_, value_grid);
 }
 
-Complex LineSearch::sum_at(const std::vector<Complex>& spectrum, std::ptrdiff_t bin) const {
-  const auto bins = static_cast<std::ptrdiff_t>(spectrum.size());
-  return spectrum[static_cast<std::size_t>(((bin % bins) + bins) % bins)];
-}
-
 /// Times count from the first shot here, which turns amplitudes but changes no sum of squares.
-double LineSearch::unexplained(std::ptrdiff_t first, std::ptrdiff_t second) const {
-  const Sums sums{count_,
-                  std::conj(sum_at(shot_spectrum_, first)),
-                  std::conj(sum_at(shot_spectrum_, second)),
-                  std::conj(sum_at(shot_spectrum_, second - first)),
-                  sum_at(value_spectrum_, 0),
-                  sum_at(value_spectrum_, first),
-                  sum_at(value_spectrum_, second)};
-  double explained = 0;
-  solve(sums, explained);
-  return (power_ - explained) / count_;
+template <int Lines>
+double LineSearch::unexplained(std::span<const std::ptrdiff_t> bins) const {
+  LineFit<Lines> fit(count_);
+  for (int a = 0; a < Lines; ++a) {
+    const auto bin = bins[static_cast<std::size_t>(a)];
+    fit.set_value(a, sum_at(value_spectrum_, bin));
+    fit.set_overlap(a, a, count_);
+    for (int b = 0; b < a; ++b) {  // the lower triangle is all that the solution reads
+      Complex overlap = 0;
+      for (const Emitter& emitter : emitters_) {
+        overlap += sum_at(emitter.spectrum, bins[static_cast<std::size_t>(b)] - bin);
+      }
+      fit.set_overlap(a, b, std::conj(overlap));
+    }
+  }
+  for (const Emitter& emitter : emitters_) {
+    std::array<Complex, Lines> sums;
+    for (std::size_t a = 0; a < Lines; ++a) sums[a] = std::conj(sum_at(emitter.spectrum, bins[a]));
+    fit.eliminate(emitter.count, emitter.value, sums);
+  }
+  fit.solve();
+  return (power_ - fit.explained()) / count_;
 }
 
-RotorLines LineSearch::fit(double first, double second) const {
-  Sums sums{static_cast<double>(time_.size()), 0, 0, 0, 0, 0, 0};
+template <int Lines>
+RotorLines LineSearch::fit(std::span<const double> speeds) const {
+  struct Sums {
+    double count = 0;
+    Complex value;
+    std::array<Complex, Lines> lines{};
+  };
+  const auto count = static_cast<double>(time_.size());
+  LineFit<Lines> fit(count);
+  std::vector<Sums> emitters(emitters_.size());
+  std::array<Complex, Lines> value_sums{};
+  std::array<std::array<Complex, Lines>, Lines> overlaps{};
   double power = 0;
   for (std::size_t i = 0; i < time_.size(); ++i) {
-    const Complex a = std::polar(1.0, first * time_[i]), b = std::polar(1.0, second * time_[i]);
-    sums.first += a;
-    sums.second += b;
-    sums.difference += std::conj(a) * b;
-    sums.constant_value += value_[i];
-    sums.first_value += std::conj(a) * value_[i];
-    sums.second_value += std::conj(b) * value_[i];
+    Sums& emitter = emitters[emitter_[i]];
+    emitter.count += 1.0;
+    emitter.value += value_[i];
+    std::array<Complex, Lines> turns;
+    for (std::size_t a = 0; a < Lines; ++a) {
+      turns[a] = std::polar(1.0, speeds[a] * time_[i]);
+      emitter.lines[a] += turns[a];
+      value_sums[a] += std::conj(turns[a]) * value_[i];
+      for (std::size_t b = 0; b < a; ++b) overlaps[a][b] += std::conj(turns[a]) * turns[b];
+    }
     power += std::norm(value_[i]);
   }
-  double explained = 0;
-  const auto amplitude = solve(sums, explained);
+  for (int a = 0; a < Lines; ++a) {
+    const auto at = static_cast<std::size_t>(a);
+    fit.set_value(a, value_sums[at]);
+    fit.set_overlap(a, a, count);
+    for (int b = 0; b < a; ++b) fit.set_overlap(a, b, overlaps[at][static_cast<std::size_t>(b)]);
+  }
+  for (const Sums& emitter : emitters) {
+    if (emitter.count > 0) fit.eliminate(emitter.count, emitter.value, emitter.lines);
+  }
+  fit.solve();
   RotorLines result;
-  result.constant = amplitude[0];
-  result.lines = {{first, std::abs(amplitude[1]), std::arg(amplitude[1])},
-                  {second, std::abs(amplitude[2]), std::arg(amplitude[2])}};
-  result.unexplained = (power - explained) / static_cast<double>(time_.size());
+  for (int a = 0; a < Lines; ++a) {
+    const Complex amplitude = fit.amplitude(a);
+    result.lines.push_back(
+        {speeds[static_cast<std::size_t>(a)], std::abs(amplitude), std::arg(amplitude)});
+  }
+  // What the lines leave of the mean is the constants', by their shots.
+  for (const Sums& emitter : emitters) {
+    result.constant += emitter.value / count;
+    for (int a = 0; a < Lines; ++a) {
+      result.constant -= emitter.lines[static_cast<std::size_t>(a)] * fit.amplitude(a) / count;
+    }
+  }
+  result.unexplained = (power - fit.explained()) / count;
   return result;
 }
 
+template <int Lines>
 RotorLines LineSearch::refined(const Candidate& candidate) const {
-  std::array<double, 2> speeds = {bin_speed_ * static_cast<double>(candidate.first),
-                                  bin_speed_ * static_cast<double>(candidate.second)};
+  std::array<double, Lines> speeds;
+  for (std::size_t a = 0; a < Lines; ++a) {
+    speeds[a] = bin_speed_ * static_cast<double>(candidate.bin[a]);
+  }
   double width = bin_speed_;
   for (int round = 0; round < 3; ++round, width *= 0.3) {
     for (double& speed : speeds) {
       speed = golden_section_minimum(
           [&](double trial) {
             const double before = std::exchange(speed, trial);
-            const double left = fit(speeds[0], speeds[1]).unexplained;
+            const double left = fit<Lines>(speeds).unexplained;
             speed = before;
             return left;
           },
           speed - width, speed + width, 0.02 * width);
     }
   }
-  return fit(speeds[0], speeds[1]);
+  return fit<Lines>(speeds);
 }
 
 LineSearch::Bins LineSearch::bins_about(double speed, double share) const {
@@ -178,47 +257,78 @@ LineSearch::Bins LineSearch::bins_about(double speed, double share) const {
           static_cast<std::ptrdiff_t>(std::ceil(high / bin_speed_))};
 }
 
-std::vector<RotorLines> LineSearch::near(const std::pair<double, double>& speeds, double share,
+std::vector<RotorLines> LineSearch::near(std::span<const double> speeds, double share,
                                          std::size_t most) const {
-  return best_of(bins_about(speeds.first, share), bins_about(speeds.second, share), false, most);
+  std::vector<Bins> bins;
+  for (const double speed : speeds) {
+    if (speed != 0) bins.push_back(bins_about(speed, share));
+  }
+  std::vector<RotorLines> best = best_of(bins, false, most);
+  for (RotorLines& found : best) {  // rotors that stand still get their place back
+    for (std::size_t k = 0; k < speeds.size(); ++k) {
+      if (speeds[k] == 0)
+        found.lines.insert(found.lines.begin() + static_cast<int>(k), SpectralLine{});
+    }
+  }
+  return best;
 }
 
 std::vector<RotorLines> LineSearch::anywhere(double fastest, std::size_t most) const {
   const auto edge = static_cast<std::ptrdiff_t>(std::ceil(fastest / bin_speed_));
-  return best_of({-edge, edge}, {-edge, edge}, true, most);
+  const std::array<Bins, 2> bins{{{-edge, edge}, {-edge, edge}}};
+  return best_of(bins, true, most);
 }
 
-std::vector<RotorLines> LineSearch::best_of(Bins first, Bins second, bool ordered,
+std::vector<RotorLines> LineSearch::best_of(std::span<const Bins> bins, bool ordered,
                                             std::size_t most) const {
   constexpr std::ptrdiff_t kApart = 4;  // bins: lines nearer to each other or to 0 are one line
-  std::vector<Candidate> all;
-  for (std::ptrdiff_t a = first.first; a <= first.last; ++a) {
-    if (std::abs(a) < kApart) continue;
-    for (std::ptrdiff_t b = ordered ? a + kApart : second.first; b <= second.last; ++b) {
-      if (std::abs(b) < kApart || std::abs(a - b) < kApart) continue;
-      all.push_back({a, b, unexplained(a, b)});
+  if (bins.empty()) return {};
+  return with_prism_count(static_cast<int>(bins.size()), [&]<int Lines>() {
+    std::vector<Candidate> all;
+    Candidate candidate;
+    // Every choice of bins, one loop inside the other.
+    const auto choose = [&](const auto& self, std::size_t line) -> void {
+      if (line == Lines) {
+        candidate.unexplained = unexplained<Lines>({candidate.bin.data(), Lines});
+        all.push_back(candidate);
+        return;
+      }
+      const std::ptrdiff_t first =
+          ordered && line > 0 ? candidate.bin[line - 1] + kApart : bins[line].first;
+      for (std::ptrdiff_t bin = first; bin <= bins[line].last; ++bin) {
+        bool apart = std::abs(bin) >= kApart;
+        for (std::size_t other = 0; other < line; ++other) {
+          apart = apart && std::abs(bin - candidate.bin[other]) >= kApart;
+        }
+        if (!apart) continue;
+        candidate.bin[line] = bin;
+        self(self, line + 1);
+      }
+    };
+    choose(choose, 0);
+    std::vector<RotorLines> best;
+    std::vector<Candidate> taken;
+    while (best.size() < most) {
+      const Candidate* next = nullptr;
+      for (const Candidate& one : all) {
+        if (next != nullptr && one.unexplained >= next->unexplained) continue;
+        const bool known = std::any_of(taken.begin(), taken.end(), [&](const Candidate& other) {
+          for (std::size_t line = 0; line < Lines; ++line) {
+            if (std::abs(one.bin[line] - other.bin[line]) > kApart) return false;
+          }
+          return true;
+        });
+        if (!known) next = &one;
+      }
+      if (next == nullptr) break;
+      taken.push_back(*next);
+      best.push_back(refined<Lines>(*next));
     }
-  }
-  std::vector<RotorLines> best;
-  std::vector<Candidate> taken;
-  while (best.size() < most) {
-    const Candidate* next = nullptr;
-    for (const Candidate& candidate : all) {
-      if (next != nullptr && candidate.unexplained >= next->unexplained) continue;
-      const bool known = std::any_of(taken.begin(), taken.end(), [&](const Candidate& other) {
-        return std::abs(candidate.first - other.first) <= kApart &&
-               std::abs(candidate.second - other.second) <= kApart;
-      });
-      if (!known) next = &candidate;
-    }
-    if (next == nullptr) break;
-    taken.push_back(*next);
-    best.push_back(refined(*next));
-  }
-  std::stable_sort(best.begin(), best.end(), [](const RotorLines& a, const RotorLines& b) {
-    return a.unexplained < b.unexplained;
+    std::stable_sort(best.begin(), best.end(), [](const RotorLines& a, const RotorLines& b) {
+      return a.unexplained < b.unexplained;
+    });
+    return best;
   });
-  return best;
 }
 
 }  // namespace risley::estimation

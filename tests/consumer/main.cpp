@@ -1,10 +1,12 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-// Points one beam through two prisms, and through air where there is nothing to deviate it.
+// Points one beam through two prisms, through air where there is nothing to deviate it, and catches
+// an error.
 #include <cmath>
 #include <cstdio>
 
 #include "risley/core/angle.hpp"
+#include "risley/core/error.hpp"
 #include "risley/optics/observation_model.hpp"
 
 int main() {
@@ -18,5 +20,11 @@ int main() {
               glass.zenith / kRadiansPerDegree);
   const bool deviated = glass.valid && std::hypot(glass.direction.y, glass.direction.z) > 0.01;
   const bool straight = air.valid && std::hypot(air.direction.y, air.direction.z) < 1e-12;
-  return deviated && straight ? 0 : 1;
+  bool caught = false;
+  try {
+    train.set("no_such_parameter", 1.0);
+  } catch (const InvalidArgument& error) {  // thrown in the library, caught here by its type
+    caught = true;
+  }
+  return deviated && straight && caught ? 0 : 1;
 }

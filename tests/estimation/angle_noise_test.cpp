@@ -25,11 +25,8 @@ struct Residuals {
     std::uniform_real_distribution<double> uniform(-0.5, 0.5);
     for (std::size_t i = 0; i < shots; ++i) {
       const float step = i % 2 == 0 ? fine_step : coarse_step;
-      series.time_ns.push_back(static_cast<std::int64_t>(i));
-      series.azimuth.push_back(0);
-      series.zenith.push_back(0);
-      series.azimuth_rounding_variance.push_back(step * step / 12.0F);
-      series.zenith_rounding_variance.push_back(step * step / 12.0F);
+      const float variance = step * step / 12.0F;
+      series.append(static_cast<std::int64_t>(i), 0, 0, 0, variance, variance);
       azimuth.push_back(noise.azimuth * normal(generator) +
                         static_cast<double>(step) * uniform(generator));
       zenith.push_back(noise.zenith * normal(generator) +

@@ -79,11 +79,9 @@ TEST(CoordinateRounding, HalfStepsAreAddedAwayFromZero) {
   AngleSeries series;
   const Vector3<double> point{2.0, -0.003, 0.0};
   const auto angles = angles_from_direction(point);
-  series.time_ns = {0, 1};
-  series.azimuth = {angles.azimuth, 0.1};
-  series.zenith = {angles.zenith, 1.5};
   const auto variance = static_cast<float>(std::pow(kStep / norm(point), 2) / 12.0);
-  series.azimuth_rounding_variance = series.zenith_rounding_variance = {variance, variance};
+  series.append(0, angles.azimuth, angles.zenith, 0, variance, variance);
+  series.append(1, 0.1, 1.5, 0, variance, variance);
   series.range = {norm(point), std::nan("")};
   add_half_steps(series, Eigen::Matrix3d::Identity());
   const Vector3<double> moved =

@@ -117,6 +117,7 @@ TEST(Ekf, AGapIsBridgedAndItsUncertaintyShown) {
   cut(series.zenith);
   cut(series.azimuth_rounding_variance);
   cut(series.zenith_rounding_variance);
+  cut(series.beam);
   EkfOptions options;
   options.rotor_process.assign(2, {radians_from_degrees(1.5), 0.0, 0.0});
   const EkfResult result = run(series, options);

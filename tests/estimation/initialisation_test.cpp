@@ -169,10 +169,10 @@ TEST(Initialisation, LinesCarryTheSpeedsOfTheRotors) {
   const auto sensor = sensors::load_sensor("mid-40");
   const auto series = testing::constant_speed_series(sensor, 0.3, 1.0, 0.1, 100000.0);
   const LineSearch search(series);
+  const std::vector<double> nearly{sensor.angular_velocity[0] * 1.02,
+                                   sensor.angular_velocity[1] * 0.98};
   for (const auto& found :
-       {search.near({sensor.angular_velocity[0] * 1.02, sensor.angular_velocity[1] * 0.98}, 0.06,
-                    3),
-        search.anywhere(2.1 * sensor.angular_velocity[1], 3)}) {
+       {search.near(nearly, 0.06, 3), search.anywhere(2.1 * sensor.angular_velocity[1], 3)}) {
     ASSERT_FALSE(found.empty());
     const auto& lines = found.front().lines;
     ASSERT_EQ(lines.size(), 2u);
@@ -185,6 +185,40 @@ TEST(Initialisation, LinesCarryTheSpeedsOfTheRotors) {
     EXPECT_NEAR(wrap_to_pi(lines[0].phase + kPi / 2 - angles[0]), 0.0, 0.02);
     EXPECT_NEAR(wrap_to_pi(lines[1].phase + kPi / 2 - angles[1]), 0.0, 0.02);
   }
+}
+
+TEST(Initialisation, LinesOfThreeRotorsAndSixEmittersAreToldApart) {
+  const std::vector<double> speeds{radians_from_degrees(44112.0), radians_from_degrees(-44112.0),
+                                   radians_from_degrees(3714.0)};
+  const Complex amplitudes[] = {{0.2, 0.05}, {0.15, -0.1}, {0.0, 0.12}};
+  AngleSeries series;
+  for (int i = 0; i < 24000; ++i) {
+    const double t = i / 240000.0;
+    Complex w(0.01, -0.004 + 0.0157 * ((i % 6) - 2.5));
+    for (std::size_t k = 0; k < speeds.size(); ++k) {
+      w += amplitudes[k] * std::polar(1.0, speeds[k] * t);
+    }
+    if (w.imag() > 0.05) continue;  // sky
+    const Vector3<double> v{std::sqrt(1.0 - std::norm(w)), w.real(), w.imag()};
+    const auto angles = angles_from_direction(v);
+    series.append(std::llround(1e9 * t), angles.azimuth, angles.zenith,
+                  static_cast<std::uint8_t>(i % 6));
+  }
+  const LineSearch search(series);
+  const std::vector<double> nearly{speeds[0] * 1.02, speeds[1] * 0.985, speeds[2] * 1.03};
+  const auto found = search.near(nearly, 0.06, 3);
+  ASSERT_FALSE(found.empty());
+  const RotorLines& best = found.front();
+  ASSERT_EQ(best.lines.size(), 3u);
+  const double t = 1e-9 * static_cast<double>(search.time_ns());
+  for (std::size_t k = 0; k < speeds.size(); ++k) {
+    EXPECT_NEAR(best.lines[k].angular_velocity, speeds[k], radians_from_degrees(2.0));
+    EXPECT_NEAR(best.lines[k].amplitude, std::abs(amplitudes[k]), 1e-3);
+    EXPECT_NEAR(wrap_to_pi(best.lines[k].phase - std::arg(amplitudes[k]) - speeds[k] * t), 0.0,
+                1e-2);
+  }
+  EXPECT_NEAR(best.constant.real(), 0.01, 1e-3);
+  EXPECT_LT(best.unexplained, 1e-6);
 }
 
 TEST(Initialisation, FiftyMillisecondsWithAGapAreEnough) {
@@ -278,11 +312,7 @@ TEST(Initialisation, TrackedPhasesFollowAWanderingRotorOverAGap) {
     if (i > 2500 && i < 3700) continue;
     const double t = 1e-3 * i;
     const auto angles = angles_from_direction(trace(train, {motion(t, 0), motion(t, 1)}).direction);
-    series.time_ns.push_back(1'000'000LL * i);
-    series.azimuth.push_back(angles.azimuth);
-    series.zenith.push_back(angles.zenith);
-    series.azimuth_rounding_variance.push_back(0);
-    series.zenith_rounding_variance.push_back(0);
+    series.append(1'000'000LL * i, angles.azimuth, angles.zenith);
   }
   const Start start = find_start(series, sensor, {{}, 1e-4, false, false});
   const ShotRange all{0, series.size()};

@@ -61,12 +61,9 @@ Recording record(const PrismTrain& train, const std::vector<std::size_t>& shots,
       const double size = uniform(generator) > 0.8 ? 30.0 * kNoise : kNoise;
       const double turn = uniform(generator) > 0.9 ? kTwoPi : 0.0;
       const auto step = static_cast<float>(uniform(generator) > 0.0 ? kNoise : 0.0);
-      r.series.time_ns.push_back(time);
-      r.series.azimuth.push_back((shot.valid ? shot.azimuth : 0.0) + size * normal(generator) +
-                                 turn);
-      r.series.zenith.push_back((shot.valid ? shot.zenith : 1.5) + size * normal(generator));
-      r.series.azimuth_rounding_variance.push_back(step * step / 12.0F);
-      r.series.zenith_rounding_variance.push_back(step * step / 3.0F);
+      const double azimuth = (shot.valid ? shot.azimuth : 0.0) + size * normal(generator) + turn;
+      const double zenith = (shot.valid ? shot.zenith : 1.5) + size * normal(generator);
+      r.series.append(time, azimuth, zenith, 0, step * step / 12.0F, step * step / 3.0F);
     }
     time += 1'000'000;
   }

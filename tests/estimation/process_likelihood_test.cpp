@@ -254,11 +254,8 @@ struct Simulation {
       if (i % kShotSteps != 0) continue;
       const double* now = history.data() + 6 * i;
       const auto shot = angles_from_direction(trace(train, {now[0], now[3]}).direction);
-      series.time_ns.push_back(i * kStep);
-      series.azimuth.push_back(shot.azimuth + kNoise * normal(generator));
-      series.zenith.push_back(shot.zenith + kNoise * normal(generator));
-      series.azimuth_rounding_variance.push_back(0);
-      series.zenith_rounding_variance.push_back(0);
+      const double azimuth = shot.azimuth + kNoise * normal(generator);
+      series.append(i * kStep, azimuth, shot.zenith + kNoise * normal(generator));
     }
     const ShotRange all{0, series.size()};
     truth = make_knots(series, {&all, 1}, 2);

@@ -23,11 +23,7 @@ using Sizes = std::vector<std::size_t>;
 AngleSeries series_at(const std::vector<std::int64_t>& time_ns) {
   AngleSeries series;
   for (const std::int64_t time : time_ns) {
-    series.time_ns.push_back(time);
-    series.azimuth.push_back(static_cast<double>(series.azimuth.size()));
-    series.zenith.push_back(0);
-    series.azimuth_rounding_variance.push_back(0);
-    series.zenith_rounding_variance.push_back(0);
+    series.append(time, static_cast<double>(series.size()), 0);
   }
   return series;
 }

@@ -28,11 +28,9 @@ inline estimation::AngleSeries constant_speed_series(const sensors::Sensor& sens
     const auto beam = trace(train, {start_a + t * sensor.angular_velocity[0],
                                     start_b + t * sensor.angular_velocity[1]});
     const auto angles = angles_from_direction(beam.direction);
-    series.time_ns.push_back(ns);
-    series.azimuth.push_back(angles.azimuth + radians_from_degrees(noise_deg) * normal(generator));
-    series.zenith.push_back(angles.zenith + radians_from_degrees(noise_deg) * normal(generator));
-    series.azimuth_rounding_variance.push_back(0);
-    series.zenith_rounding_variance.push_back(0);
+    const double noise = radians_from_degrees(noise_deg);
+    const double azimuth = angles.azimuth + noise * normal(generator);
+    series.append(ns, azimuth, angles.zenith + noise * normal(generator));
   }
   return series;
 }

@@ -17,6 +17,7 @@ struct AngleSeries {
   /// As recorded, increasing; a step back means that the sensor's clock was reset.
   std::vector<std::int64_t> time_ns;
   std::vector<double> azimuth, zenith;  ///< rad
+  std::vector<std::uint8_t> beam;       ///< emitter that fired, from 0
   /// Variance of the format's rounding, (step^2) / 12, rad^2.
   std::vector<float> azimuth_rounding_variance, zenith_rounding_variance;
   /// Ranges of the shots, m, NaN where there is none; empty unless they were asked for. No
@@ -28,6 +29,9 @@ struct AngleSeries {
   double time(std::size_t i) const { return 1e-9 * static_cast<double>(time_ns[i] - time_ns[0]); }
   /// Of a series without resets, s.
   double duration() const { return size() == 0 ? 0.0 : time(size() - 1); }
+  /// Appends a shot without a range.
+  void append(std::int64_t time_ns, double azimuth, double zenith, std::uint8_t beam = 0,
+              float azimuth_rounding_variance = 0, float zenith_rounding_variance = 0);
   /// Appends one row of another series.
   void append(const AngleSeries& other, std::size_t row);
 };
@@ -45,9 +49,13 @@ struct ShotRange {
 /// of a rotor could not be counted (longer than longest_gap, s).
 std::vector<ShotRange> stretches(const AngleSeries& series, double longest_gap = 5.0);
 
-/// At most so many shots per second, evenly spread, of every given stretch.
+/// At most so many shots per second, evenly spread over time and beams, of every given stretch.
 /// @param[in,out] ranges  rows of the series, on return those of the result
 AngleSeries thinned(const AngleSeries& series, double rate, std::vector<ShotRange>& ranges);
+
+/// Step through rows that leaves about so many of them and meets every beam in turn, where shot i
+/// is one of beam i mod beams.
+std::size_t thinning_stride(const AngleSeries& series, ShotRange rows, std::size_t most);
 
 /// Typical time between shots, ns: the median of the first 20,000 steps, which gaps do not move.
 /// @param time_ns  of at least two shots
@@ -55,6 +63,25 @@ std::int64_t median_step_ns(std::span<const std::int64_t> time_ns);
 
 /// The same shots with the sign of the elevation turned.
 void mirror(AngleSeries& series);
+
+/// Picks shots on a fixed grid of ticks, so that gaps and jitter do not move them, and from one
+/// tick to the next one shot further on, so that every beam has its turn.
+class TickSampler {
+ public:
+  explicit TickSampler(double rate) : rate_(rate) {}
+
+  void restart(std::int64_t time_ns) {
+    origin_ns_ = next_ns_ = time_ns;
+    to_skip_ = turn_ = 0;
+  }
+  /// Whether to take the next shot. @param beam  that fired it
+  bool take(std::int64_t time_ns, std::uint8_t beam);
+
+ private:
+  double rate_;  // Hz
+  std::int64_t origin_ns_ = 0, next_ns_ = 0;
+  int beams_ = 1, turn_ = 0, to_skip_ = 0;
+};
 
 /// How shots are chosen.
 struct SelectionOptions {
@@ -102,7 +129,7 @@ class ShotSelector {
   SelectionCounts counts_;
   std::vector<std::size_t> rows_;
   std::int64_t last_time_ns_ = 0;
-  std::int64_t tick_origin_ = 0, next_tick_ = 0;
+  TickSampler ticks_;
 };
 
 }  // namespace risley::estimation

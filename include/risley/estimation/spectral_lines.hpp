@@ -2,14 +2,15 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <array>
 #include <complex>
 #include <cstddef>
 #include <cstdint>
-#include <optional>
-#include <utility>
+#include <span>
 #include <vector>
 
 #include "risley/estimation/angle_series.hpp"
+#include "risley/optics/prism.hpp"
 
 namespace risley::estimation {
 
@@ -22,18 +23,20 @@ struct SpectralLine {
   double phase = 0;             ///< rad, at the reference time
 };
 
-/// A constant and two lines, fitted together. To first order a prism adds a vector that turns with
-/// it, so each rotor owns one line.
+/// A constant for each emitter and a line for each turning rotor, fitted together. To first order a
+/// prism adds a vector that turns with it, so each rotor owns one line.
 struct RotorLines {
-  std::vector<SpectralLine> lines;  ///< in the order of the speeds they were looked for with
-  Complex constant;                 ///< where the optical axis stands: y + iz
-  double unexplained = 0;           ///< mean square of what the fit leaves, of the unit vector
+  /// In the order of the speeds they were looked for with; all zero for a rotor that stands still.
+  std::vector<SpectralLine> lines;
+  Complex constant;        ///< where the optical axis stands: y + iz, mean of the shots' emitters
+  double unexplained = 0;  ///< mean square of what the fit leaves, of the unit vector
 };
 
-/// Finds the speeds of two rotors by fitting lines to the shots of a window, at the times that have
+/// Finds the speeds of the rotors by fitting lines to the shots of a window, at the times that have
 /// shots: half of the field may be missing, because sky returns nothing. A spectrum would be
-/// smeared by such gaps; the fit of all lines together is not. The sums that every pair of speeds
-/// needs come from two Fourier transforms. docs/theory/start.md
+/// smeared by such gaps; the fit of all lines together is not. The sums that every choice of speeds
+/// needs come from one Fourier transform of the values and one of each emitter's shots.
+/// docs/theory/start.md
 class LineSearch {
  public:
   /// Takes the best covered stretch of about 100 ms (more where shots are rare).
@@ -45,25 +48,34 @@ class LineSearch {
   std::int64_t time_ns() const { return time_ns_; }  ///< of the phases: the middle of the shots
 
   /// The best minima with speeds within a share of the given ones, rad/s, best first.
-  std::vector<RotorLines> near(const std::pair<double, double>& speeds, double share,
+  /// @param speeds  one per rotor, 1 to kMaxPrisms; two of them may be equal and opposite
+  std::vector<RotorLines> near(std::span<const double> speeds, double share,
                                std::size_t most) const;
   /// The best minima among all pairs of speeds up to the fastest, rad/s, best first.
   std::vector<RotorLines> anywhere(double fastest, std::size_t most) const;
 
  private:
   struct Candidate {
-    std::ptrdiff_t first = 0, second = 0;  // places of the frequency grid
+    std::array<std::ptrdiff_t, kMaxPrisms> bin{};  // of each turning rotor's speed
     double unexplained = 0;
   };
   struct Bins {
     std::ptrdiff_t first = 0, last = 0;  // both included
   };
+  /// The shots of one emitter.
+  struct Emitter {
+    double count = 0;
+    std::vector<Complex> spectrum;  // sum of exp(-i w t)
+    Complex value;                  // sum of the values
+  };
 
-  std::vector<RotorLines> best_of(Bins first, Bins second, bool ordered, std::size_t most) const;
-  double unexplained(std::ptrdiff_t first, std::ptrdiff_t second) const;
+  std::vector<RotorLines> best_of(std::span<const Bins> bins, bool ordered, std::size_t most) const;
+  template <int Lines>
+  double unexplained(std::span<const std::ptrdiff_t> bins) const;
+  template <int Lines>
+  RotorLines fit(std::span<const double> speeds) const;
+  template <int Lines>
   RotorLines refined(const Candidate& candidate) const;
-  RotorLines fit(double first, double second) const;
-  Complex sum_at(const std::vector<Complex>& spectrum, std::ptrdiff_t bin) const;
   Bins bins_about(double speed, double share) const;
 
   ShotRange shots_;
@@ -71,8 +83,10 @@ class LineSearch {
   double duration_ = 0;  // of the window, s
   double bin_speed_ = 0;
   double count_ = 0, power_ = 0;
-  std::vector<Complex> shot_spectrum_, value_spectrum_;  // sum of exp(-i w t), of value times it
-  std::vector<double> time_;                             // thinned, s from time_ns_
+  std::vector<Emitter> emitters_;        // those that have shots
+  std::vector<Complex> value_spectrum_;  // sum of the values times exp(-i w t)
+  std::vector<double> time_;             // thinned, s from time_ns_
+  std::vector<std::size_t> emitter_;     // of the thinned shots, place in emitters_
   std::vector<Complex> value_;
 };
 
