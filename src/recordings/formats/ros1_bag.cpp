@@ -19,7 +19,7 @@
 #include <rosbag/view.h>
 
 #include "risley/core/error.hpp"
-#include "risley/io/rosbag_lock.hpp"
+#include "risley/core/rosbag_lock.hpp"
 
 #include "recordings/formats/format.hpp"
 #include "recordings/formats/little_endian.hpp"
@@ -59,7 +59,7 @@ class RosbagCall {
   RosbagCall& operator=(const RosbagCall&) = delete;
 
  private:
-  std::unique_lock<std::recursive_mutex> lock_ = io::lock_rosbag();  // before the handler is asked
+  std::unique_lock<std::recursive_mutex> lock_ = lock_rosbag();  // before the handler is asked
   console_bridge::OutputHandler* handler_;
 };
 
