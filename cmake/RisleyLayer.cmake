@@ -16,8 +16,8 @@ function(risley_target_defaults target)
                          $<$<BOOL:${RISLEY_WARNINGS_AS_ERRORS}>:-Werror>)
 endfunction()
 
-# Headers of other libraries that most sources of ours include, parsed once for all of them: those of
-# the first target that uses a list, which lends them to the next.
+# Headers of other libraries that most sources include, parsed once: by a target that lends them to others,
+# which must have all its definitions and the same flags.
 # ccache cannot look into parsed headers (only with settings of its user), so it excludes them.
 set(precompile ON)
 if(CMAKE_CXX_COMPILER_LAUNCHER)
@@ -27,16 +27,32 @@ option(RISLEY_PRECOMPILE_HEADERS "Parse common headers once" ${precompile})
 set(RISLEY_STANDARD_HEADERS <algorithm> <array> <cmath> <cstdint> <filesystem> <functional> <map> <memory>
     <optional> <span> <string> <string_view> <vector> <fmt/format.h>)
 set(RISLEY_EIGEN_HEADERS ${RISLEY_STANDARD_HEADERS} <Eigen/Dense>)
-function(risley_precompile target list)
-  get_property(lender GLOBAL PROPERTY RISLEY_LENDER_OF_${list})
-  if(NOT RISLEY_PRECOMPILE_HEADERS)
-    return()
-  elseif(lender)
-    target_precompile_headers(${target} REUSE_FROM ${lender})
-  else()
-    target_precompile_headers(${target} PRIVATE ${${list}})
-    set_property(GLOBAL PROPERTY RISLEY_LENDER_OF_${list} ${target})
+function(risley_parse_headers target)
+  if(RISLEY_PRECOMPILE_HEADERS)
+    target_precompile_headers(${target} PRIVATE ${ARGN})
   endif()
+endfunction()
+function(risley_borrow_headers target lender)
+  if(RISLEY_PRECOMPILE_HEADERS)
+    target_precompile_headers(${target} REUSE_FROM ${lender})
+  endif()
+endfunction()
+
+# An object library without code that lends layers parsed headers.
+function(risley_add_headers target)
+  if(RISLEY_PRECOMPILE_HEADERS)
+    cmake_parse_arguments(arg "" "" "HEADERS;LINK" ${ARGN})
+    file(CONFIGURE OUTPUT ${PROJECT_BINARY_DIR}/generated/${target}.cpp CONTENT "// no code\n")
+    add_library(${target} OBJECT ${PROJECT_BINARY_DIR}/generated/${target}.cpp)
+    risley_target_defaults(${target})
+    target_link_libraries(${target} PRIVATE ${arg_LINK})
+    risley_parse_headers(${target} ${arg_HEADERS})
+  endif()
+endfunction()
+
+# For targets of which nothing takes long to run: half the time of building them is optimisation.
+function(risley_optimise_little target)
+  target_compile_options(${target} PRIVATE $<$<CONFIG:Release,RelWithDebInfo>:-O1>)
 endfunction()
 
 # One layer: a library risley_<name> (alias risley::<name>) of include/risley/<name> and
@@ -94,9 +110,9 @@ function(risley_make_layer name)
   target_include_directories(${target} PRIVATE ${PROJECT_SOURCE_DIR}/src) # "<layer>/private.hpp"
   risley_target_defaults(${target})
   if(eigen IN_LIST RISLEY_${name}_PUBLIC)
-    risley_precompile(${target} RISLEY_EIGEN_HEADERS)
+    risley_borrow_headers(${target} risley_eigen_headers)
   else()
-    risley_precompile(${target} RISLEY_STANDARD_HEADERS)
+    risley_borrow_headers(${target} risley_standard_headers)
   endif()
   # Formats share names such as "recognises", which collide when sources are compiled together.
   set(formats ${sources})
@@ -152,6 +168,11 @@ macro(risley_make_layers)
   endif()
   list(REMOVE_DUPLICATES packages)
   risley_require_packages(${packages})
+  risley_add_headers(risley_standard_headers HEADERS ${RISLEY_STANDARD_HEADERS} LINK fmt::fmt)
+  if(TARGET Eigen3::Eigen)
+    risley_add_headers(risley_eigen_headers HEADERS ${RISLEY_EIGEN_HEADERS}
+                       LINK fmt::fmt Eigen3::Eigen)
+  endif()
   set(RISLEY_PUBLIC_LAYER_TARGETS "")
   foreach(layer IN LISTS RISLEY_LAYERS)
     risley_make_layer(${layer})

@@ -13,8 +13,8 @@
 #include <rosbag/bag.h>
 
 #include "risley/core/error.hpp"
-#include "risley/core/output_file.hpp"
-#include "risley/core/rosbag_lock.hpp"
+#include "risley/io/output_file.hpp"
+#include "risley/io/rosbag_lock.hpp"
 
 #include "cloud/formats/cloud_format.hpp"
 #include "cloud/formats/record_file.hpp"
@@ -255,7 +255,7 @@ class RosbagWriter final : public CloudWriter {
   /// destructor would try and end the process), so it is kept, and its file open, to the end.
   template <class Function>
   void call(Function&& function) {
-    const auto lock = lock_rosbag();
+    const auto lock = io::lock_rosbag();
     try {
       function();
     } catch (const std::exception& error) {
@@ -266,7 +266,7 @@ class RosbagWriter final : public CloudWriter {
   }
 
   RecordPacker packer_;
-  OutputFile output_;
+  io::OutputFile output_;
   std::unique_ptr<rosbag::Bag> bag_;
   std::vector<std::uint8_t> records_;
   PointCloudMessage message_;

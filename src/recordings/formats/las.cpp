@@ -19,6 +19,7 @@
 #include "recordings/formats/seconds.hpp"
 
 namespace risley::recordings {
+using io::load;
 namespace las {
 namespace {
 

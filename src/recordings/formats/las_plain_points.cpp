@@ -7,12 +7,14 @@
 #include <fmt/format.h>
 
 #include "risley/core/error.hpp"
+#include "risley/io/little_endian.hpp"
 
 #include "recordings/formats/las_points.hpp"
-#include "recordings/formats/little_endian.hpp"
 
 namespace risley::recordings::las {
 namespace {
+
+using io::load;
 
 class PlainPoints final : public PointSource {
  public:

@@ -11,9 +11,10 @@
 
 #include <fmt/format.h>
 
+#include "risley/io/little_endian.hpp"
+
 #include "recordings/formats/block_file.hpp"
 #include "recordings/formats/format.hpp"
-#include "recordings/formats/little_endian.hpp"
 #include "recordings/formats/lvx_reader.hpp"
 #include "recordings/livox/packet_encoder.hpp"
 
@@ -22,6 +23,9 @@ namespace risley::recordings {
 using namespace livox;
 
 namespace {
+
+using io::load;
+using io::store;
 
 constexpr std::size_t kFrameDurationAt = kLvxPublicHeaderBytes, kDeviceCountAt = 28;
 constexpr std::size_t kDeviceTableAt = 29, kDeviceBytes = 59;

@@ -10,13 +10,15 @@
 
 #include <fmt/format.h>
 
-#include "recordings/formats/little_endian.hpp"
+#include "risley/io/little_endian.hpp"
 
 namespace risley::recordings {
 
 using namespace livox;
 
 namespace {
+
+using io::load;
 
 /// Text of a field that is filled up with NUL.
 std::string text_field(const std::uint8_t* bytes, std::size_t count) {

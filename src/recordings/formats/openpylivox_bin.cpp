@@ -13,11 +13,11 @@
 #include <fmt/format.h>
 
 #include "risley/core/error.hpp"
+#include "risley/io/little_endian.hpp"
 #include "risley/recordings/livox/packet_decoder.hpp"
 
 #include "recordings/formats/block_file.hpp"
 #include "recordings/formats/format.hpp"
-#include "recordings/formats/little_endian.hpp"
 #include "recordings/formats/openpylivox.hpp"
 #include "recordings/formats/seconds.hpp"
 #include "recordings/livox/packet_encoder.hpp"
@@ -27,6 +27,9 @@ namespace risley::recordings {
 using namespace livox;
 
 namespace {
+
+using io::load;
+using io::store;
 
 constexpr std::string_view kSignature = "OPENPYLIVOX";
 constexpr std::string_view kImuSignature = "OPENPYLIVOX_IMU";

@@ -19,14 +19,16 @@
 #include <rosbag/view.h>
 
 #include "risley/core/error.hpp"
-#include "risley/core/rosbag_lock.hpp"
+#include "risley/io/little_endian.hpp"
+#include "risley/io/rosbag_lock.hpp"
 
 #include "recordings/formats/format.hpp"
-#include "recordings/formats/little_endian.hpp"
 #include "recordings/formats/livox_messages.hpp"
 
 namespace risley::recordings {
 namespace {
+
+using io::load;
 
 constexpr std::string_view kName = "ros1-bag";
 constexpr std::string_view kSignature = "#ROSBAG V2.0";
@@ -59,7 +61,7 @@ class RosbagCall {
   RosbagCall& operator=(const RosbagCall&) = delete;
 
  private:
-  std::unique_lock<std::recursive_mutex> lock_ = lock_rosbag();  // before the handler is asked
+  std::unique_lock<std::recursive_mutex> lock_ = io::lock_rosbag();  // before the handler is asked
   console_bridge::OutputHandler* handler_;
 };
 

@@ -10,11 +10,12 @@
 #include <fmt/format.h>
 
 #include "risley/core/error.hpp"
-
-#include "recordings/formats/little_endian.hpp"
+#include "risley/io/little_endian.hpp"
 
 namespace risley::recordings::livox {
 namespace {
+
+using io::load;
 
 constexpr std::array<RecordLayout, 9> kLayouts{{
     {true, false, 1, 100, 13},

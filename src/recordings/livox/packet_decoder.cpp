@@ -9,13 +9,15 @@
 #include <fmt/format.h>
 
 #include "risley/core/saturating.hpp"
+#include "risley/io/little_endian.hpp"
 
 #include "recordings/formats/cartesian.hpp"
-#include "recordings/formats/little_endian.hpp"
 #include "recordings/livox/spherical_record.hpp"
 
 namespace risley::recordings::livox {
 namespace {
+
+using io::load;
 
 /// @return number of the first record that no sensor can have sent
 template <int kReturns, bool kTagged>

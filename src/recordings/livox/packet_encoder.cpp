@@ -10,13 +10,15 @@
 #include <fmt/format.h>
 
 #include "risley/core/error.hpp"
+#include "risley/io/little_endian.hpp"
 
 #include "recordings/formats/cartesian.hpp"
-#include "recordings/formats/little_endian.hpp"
 #include "recordings/livox/spherical_record.hpp"
 
 namespace risley::recordings::livox {
 namespace {
+
+using io::store;
 
 constexpr std::int64_t kSecond = 1'000'000'000;
 

@@ -4,7 +4,7 @@
 
 #include <mutex>
 
-namespace risley {
+namespace risley::io {
 
 /// To be held around every call of rosbag_storage, its constructors and destructors included: the
 /// library sets up its logging and its plugins in variables of the process that nothing guards.
@@ -13,4 +13,4 @@ inline std::unique_lock<std::recursive_mutex> lock_rosbag() {
   return std::unique_lock(mutex);
 }
 
-}  // namespace risley
+}  // namespace risley::io
