@@ -19,7 +19,6 @@
 #include "recordings/formats/seconds.hpp"
 
 namespace risley::recordings {
-using io::load;
 namespace las {
 namespace {
 

@@ -230,6 +230,14 @@ void LvxReader::fail(std::uint64_t offset, std::string problem) {
 
 bool LvxReader::read(Chunk& chunk, std::size_t max_rows) {
   chunk.clear();
+  // Room for all rows at once. No record has less than 7 bytes per row, so a huge max_rows costs no
+  // memory.
+  const std::uint64_t left = file_.size() - std::min(position_, file_.size());
+  const auto room = static_cast<std::size_t>(std::min<std::uint64_t>(max_rows, left / 7));
+  if (chunk.observations.time_ns.capacity() < room) {
+    chunk.observations.resize(room);
+    chunk.observations.clear();
+  }
   while (!ended_) {
     if (!in_frame_) {
       open_frame();

@@ -20,8 +20,6 @@ namespace {
 
 using io::store;
 
-constexpr std::int64_t kSecond = 1'000'000'000;
-
 [[noreturn]] void refuse(std::uint64_t row, const char* column, double value, const char* unit,
                          const char* allowed) {
   throw InvalidArgument(
@@ -180,7 +178,7 @@ std::array<std::uint8_t, 8> encode_timestamp(std::uint8_t timestamp_type, std::i
   }
   std::array<std::uint8_t, 8> bytes{};
   if (timestamp_type == 4) {
-    store<std::uint64_t>(bytes.data(), static_cast<std::uint64_t>(time_ns % kSecond));
+    store<std::uint64_t>(bytes.data(), static_cast<std::uint64_t>(time_ns % 1'000'000'000));
     return bytes;
   }
   if (timestamp_type != 3) {
