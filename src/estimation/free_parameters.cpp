@@ -8,10 +8,12 @@
 
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
+#include "risley/core/require.hpp"
 
 namespace risley::estimation {
 
 std::vector<std::string> default_free_names(int prisms) {
+  require_between("number of prisms", prisms, 1, kMaxPrisms);
   std::vector<std::string> names{"refractive_index", "incident_beam_horizontal_deg",
                                  "incident_beam_vertical_deg"};
   for (int i = 0; i + 1 < prisms; ++i) {

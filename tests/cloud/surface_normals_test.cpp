@@ -16,6 +16,8 @@
 #include "risley/core/plane.hpp"
 #include "risley/core/random.hpp"
 
+#include "refusal.hpp"
+
 namespace risley::cloud {
 namespace {
 
@@ -331,6 +333,18 @@ TEST(SurfaceNormals, FittingTwiceChangesNothing) {
 TEST(SurfaceNormals, RefuseANoiseThatIsNone) {
   for (const double noise : {0.0, -0.01, kNaN, std::numeric_limits<double>::infinity()}) {
     EXPECT_THROW(SurfaceNormals{noise}, InvalidArgument);
+  }
+}
+
+TEST(SurfaceNormals, AsksForARange) {
+  SurfaceNormals normals(0.02);
+  for (const double range : {0.0, -1.0, std::numeric_limits<double>::quiet_NaN()}) {
+    EXPECT_NE(refusal([&] {
+                normals.add(0.0, 1.5, range);
+                return 0;
+              }),
+              "")
+        << range;
   }
 }
 
