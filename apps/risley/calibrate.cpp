@@ -15,7 +15,7 @@
 #include "risley/core/angle.hpp"
 #include "risley/core/direction.hpp"
 #include "risley/core/error.hpp"
-#include "risley/core/output_file.hpp"
+#include "risley/io/text_file.hpp"
 #include "risley/recordings/truth.hpp"
 #include "risley/report/calibration_report.hpp"
 #include "risley/sensors/preset.hpp"
@@ -226,7 +226,7 @@ void write_folder(const CalibrateCommandOptions& options, const CommonOptions& c
   if (c.converged) {
     sensors::Sensor calibrated = c.sensor;
     calibrated.provenance = provenance;
-    write_text_file(path("calibration.yaml"), sensors::preset_text(calibrated));
+    io::write_text_file(path("calibration.yaml"), sensors::preset_text(calibrated));
   } else {
     remove_calibration(options.folder);
   }

@@ -9,7 +9,8 @@
 
 #include "risley/cloud/make_cloud.hpp"
 #include "risley/core/angle.hpp"
-#include "risley/core/output_file.hpp"
+#include "risley/io/sha256.hpp"
+#include "risley/io/text_file.hpp"
 #include "risley/optics/beam_origin_map.hpp"
 #include "risley/report/beam_origin_page.hpp"
 #include "risley/sensors/preset.hpp"
@@ -104,8 +105,8 @@ ExitStatus write_beam_origin_map(const CloudCommandOptions& options,
   const BeamOriginMap map = beam_origin_map(calibration.train, calibration.prism_geometry(), kSteps,
                                             radians_from_degrees(kCellDeg));
   if (map.size() == 0) throw EstimationError("no beam gets through the prisms");
-  write_text_file(options.beam_origin_map,
-                  report::beam_origin_page(map, calibration, provenance_of(common, {})));
+  io::write_text_file(options.beam_origin_map,
+                      report::beam_origin_page(map, calibration, provenance_of(common, {})));
   const auto least = [](const auto& column) {
     return *std::min_element(column.begin(), column.end());
   };
@@ -132,7 +133,7 @@ ExitStatus write_beam_origin_map(const CloudCommandOptions& options,
 report::Provenance calibration_provenance(const std::string& calibration) {
   report::Provenance result = {{"calibration", calibration}};
   if (std::filesystem::exists(calibration)) {
-    result.emplace_back("calibration_sha256", sha256_of_file(calibration));
+    result.emplace_back("calibration_sha256", io::sha256_of_file(calibration));
   }
   return result;
 }

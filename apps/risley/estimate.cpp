@@ -10,8 +10,8 @@
 
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
-#include "risley/core/output_file.hpp"
 #include "risley/estimation/evaluation.hpp"
+#include "risley/io/text_file.hpp"
 #include "risley/recordings/time_audit.hpp"
 #include "risley/report/estimate_report.hpp"
 #include "risley/report/number_text.hpp"
@@ -326,7 +326,7 @@ void write_folder(const EstimateCommandOptions& options, const CommonOptions& co
     sensors::Sensor calibrated = outcome.estimate.sensor;
     calibrated.provenance = provenance;
     calibrated.serial = input.reader->header().devices.front().serial;
-    write_text_file(path("calibration.yaml"), sensors::preset_text(calibrated));
+    io::write_text_file(path("calibration.yaml"), sensors::preset_text(calibrated));
   } else {
     remove_calibration(options.folder);
   }

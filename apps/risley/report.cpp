@@ -6,7 +6,7 @@
 #include <fmt/format.h>
 
 #include "risley/core/error.hpp"
-#include "risley/core/output_file.hpp"
+#include "risley/io/text_file.hpp"
 #include "risley/report/report_file.hpp"
 
 #include "command.hpp"
@@ -31,7 +31,7 @@ ExitStatus run_report(const ReportCommandOptions& options, const CommonOptions& 
   const report::Report report = report::read_report(data.string());
   const std::string page = options.page.empty() ? (folder / "report.html").string() : options.page;
   const std::string html = report::report_page(report);
-  write_text_file(page, html);
+  io::write_text_file(page, html);
   if (common.json) {
     print_json({{"html", page}, {"bytes", html.size()}, {"verb", report::verb_of(report)}});
   } else {

@@ -9,7 +9,7 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
-#include "risley/core/output_file.hpp"
+#include "risley/io/text_file.hpp"
 #include "risley/reproduction/reproduction_page.hpp"
 
 #include "command.hpp"
@@ -130,10 +130,10 @@ ExitStatus run_reproduce(const ReproduceCommandOptions& options, const CommonOpt
   const auto path = [&](const char* name) {
     return (std::filesystem::path(options.folder) / name).string();
   };
-  write_text_file(path("report.html"),
-                  reproduction::reproduction_page(found, provenance_of(common, inputs)));
-  write_text_file(path("reproduction.json"),
-                  object.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
+  io::write_text_file(path("report.html"),
+                      reproduction::reproduction_page(found, provenance_of(common, inputs)));
+  io::write_text_file(path("reproduction.json"),
+                      object.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
   if (common.json) {
     print_json(object);
   } else {

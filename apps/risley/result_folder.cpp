@@ -7,7 +7,8 @@
 #include <fmt/format.h>
 
 #include "risley/core/error.hpp"
-#include "risley/core/output_file.hpp"
+#include "risley/io/sha256.hpp"
+#include "risley/io/text_file.hpp"
 #include "risley/report/states_file.hpp"
 
 namespace risley::app {
@@ -20,7 +21,7 @@ report::Provenance provenance_of(const CommonOptions& common,
   for (std::size_t i = 0; i < inputs.size(); ++i) {
     const std::string name = i == 0 ? "input" : fmt::format("input_{}", i + 1);
     result.emplace_back(name, inputs[i]);
-    result.emplace_back(name + "_sha256", sha256_of_file(inputs[i]));
+    result.emplace_back(name + "_sha256", io::sha256_of_file(inputs[i]));
   }
   return result;
 }
@@ -64,7 +65,7 @@ report::ReportedRecording reported_recording(const std::string& path, const Reco
 void write_report_of(const report::Report& report, const std::string& folder) {
   const std::filesystem::path place(folder);
   report::write_report((place / "report.json").string(), report);
-  write_text_file((place / "report.html").string(), report::report_page(report));
+  io::write_text_file((place / "report.html").string(), report::report_page(report));
 }
 
 }  // namespace risley::app

@@ -11,7 +11,7 @@
 
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
-#include "risley/core/output_file.hpp"
+#include "risley/io/output_file.hpp"
 
 namespace risley::recordings {
 namespace {
@@ -178,7 +178,7 @@ class TruthWriter::File {
         fmt::format("write variable {}", variables_[variable].name));
   }
 
-  OutputFile output_;  ///< before the handle: a file is closed before it is removed
+  io::OutputFile output_;  ///< before the handle: a file is closed before it is removed
   Handle handle_;
   std::vector<Variable> variables_;
   int prisms_;

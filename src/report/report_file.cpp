@@ -5,7 +5,7 @@
 #include <fmt/format.h>
 
 #include "risley/core/error.hpp"
-#include "risley/core/output_file.hpp"
+#include "risley/io/text_file.hpp"
 #include "risley/report/calibration_page.hpp"
 #include "risley/report/estimate_page.hpp"
 
@@ -307,11 +307,11 @@ void write_report(const std::string& path, const Report& report) {
   Json object = {
       {"format", kFormat}, {"format_version", kFormatVersion}, {"verb", verb_of(report)}};
   object.update(body);
-  write_text_file(path, object.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n");
+  io::write_text_file(path, object.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n");
 }
 
 Report read_report(const std::string& path) {
-  const std::string text = read_text_file(path);
+  const std::string text = io::read_text_file(path);
   Json object;
   try {
     object = Json::parse(text);

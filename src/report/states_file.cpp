@@ -11,7 +11,7 @@
 
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
-#include "risley/core/output_file.hpp"
+#include "risley/io/output_file.hpp"
 #include "risley/optics/parameters.hpp"
 
 namespace risley::report {
@@ -22,7 +22,7 @@ constexpr std::size_t kBlockRows = 16384;
 /// A NetCDF file, closed whatever happens.
 class NcFile {
  public:
-  explicit NcFile(const OutputFile& output) : path_(output.path()) {
+  explicit NcFile(const io::OutputFile& output) : path_(output.path()) {
     int id = 0;
     check(nc_create(output.temporary_path().c_str(), NC_NETCDF4 | NC_CLOBBER, &id));
     id_ = id;
@@ -152,7 +152,7 @@ std::vector<StateColumn> columns_of(const estimation::RotorStates& states) {
 
 void write_states(const std::string& path, const StatesContent& content,
                   const std::vector<std::pair<std::string, std::string>>& attributes) {
-  OutputFile output(path);
+  io::OutputFile output(path);
   NcFile file(output);
   file.put_text(NC_GLOBAL, "Conventions", "CF-1.9");
   file.put_text(NC_GLOBAL, "title", "Estimated rotor states of a Risley-prism lidar");

@@ -12,15 +12,14 @@
 
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
-#include "risley/core/output_file.hpp"
-
-#include "sensors/yaml_map.hpp"
+#include "risley/io/text_file.hpp"
+#include "risley/io/yaml_map.hpp"
 
 namespace risley::scenes {
 namespace {
 
-using sensors::fail_at;
-using sensors::YamlMap;
+using io::fail_at;
+using io::YamlMap;
 
 constexpr double kFarthest = 1e6;  // m
 
@@ -37,14 +36,14 @@ template <std::size_t N>
 std::array<double, N> numbers(const YamlMap& map, std::string_view key, double lower,
                               double upper) {
   const YamlMap::Entry& entry = map.at(key);
-  if (!entry.value.IsSequence() || entry.value.size() != N) {
+  if (!entry.value.is_list() || entry.value.items.size() != N) {
     fail_at(map.path(), entry.line,
             fmt::format("{}: expected a list of {} numbers in m", map.field(key), N));
   }
   std::array<double, N> values{};
   for (std::size_t i = 0; i < N; ++i) {
     const std::string field = fmt::format("{}[{}]", map.field(key), i);
-    values[i] = static_cast<double>(sensors::yaml_number(entry.value[i], map.path(), field));
+    values[i] = static_cast<double>(io::yaml_number(entry.value.items[i], map.path(), field));
     if (values[i] < lower || values[i] > upper) {
       fail_at(map.path(), entry.line,
               fmt::format("{} = {:g} m, allowed {:g} to {:g}", field, values[i], lower, upper));
@@ -155,17 +154,17 @@ std::optional<Hit> nearest_hit(const Scene& scene, const Vector3<double>& origin
 }
 
 Scene parse_scene(const std::string& text, const std::string& path) {
-  const YamlMap root(sensors::parse_yaml(text, path), path, "");
+  const YamlMap root(io::parse_yaml(text, path), path, "");
   root.allow_only({"planes", "stations"});
   Scene scene;
   const auto for_each_map = [&](std::string_view key, auto&& read) {
     const YamlMap::Entry* entry = root.find(key);
     if (entry == nullptr) return;
-    if (!entry->value.IsSequence()) {
+    if (!entry->value.is_list()) {
       fail_at(path, entry->line, fmt::format("{}: expected a list", key));
     }
-    for (std::size_t i = 0; i < entry->value.size(); ++i) {
-      read(YamlMap(entry->value[i], path, fmt::format("{}[{}]", key, i)));
+    for (std::size_t i = 0; i < entry->value.items.size(); ++i) {
+      read(YamlMap(entry->value.items[i], path, fmt::format("{}[{}]", key, i)));
     }
   };
   for_each_map("planes",
@@ -176,6 +175,6 @@ Scene parse_scene(const std::string& text, const std::string& path) {
   return scene;
 }
 
-Scene load_scene(const std::string& path) { return parse_scene(read_text_file(path), path); }
+Scene load_scene(const std::string& path) { return parse_scene(io::read_text_file(path), path); }
 
 }  // namespace risley::scenes

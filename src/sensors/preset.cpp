@@ -13,13 +13,19 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "risley/core/output_file.hpp"
+#include "risley/io/text_file.hpp"
+#include "risley/io/yaml_map.hpp"
 
 #include "sensors/builtin_presets.hpp"
-#include "sensors/yaml_map.hpp"
 
 namespace risley::sensors {
 namespace {
+
+using io::fail_at;
+using io::yaml_number;
+using io::yaml_text;
+using io::YamlMap;
+using io::YamlNode;
 
 constexpr int kSchemaVersion = 1;
 
@@ -246,45 +252,45 @@ void read_covariance(const YamlMap& root, Sensor& sensor) {
   const YamlMap map(root.at("covariance").value, root.path(), "covariance");
   map.allow_only({"names", "matrix"});
   const YamlMap::Entry& names = map.at("names");
-  if (!names.value.IsSequence() || names.value.size() == 0) {
+  if (!names.value.is_list() || names.value.items.size() == 0) {
     fail_at(map.path(), names.line, "covariance.names: expected a list of parameter names");
   }
   std::vector<long double> scale;
-  for (const auto& node : names.value) {
+  for (const YamlNode& node : names.value.items) {
     const std::string name = yaml_text(node, map.path(), "covariance.names");
     try {
       scale.push_back(scale_of(unit_of(name, sensor.prisms())));
     } catch (const InvalidArgument& error) {
-      fail_at(map.path(), yaml_line(node), fmt::format("covariance.names: {}", error.what()));
+      fail_at(map.path(), node.line, fmt::format("covariance.names: {}", error.what()));
     }
     auto& known = sensor.covariance_names;
     if (std::find(known.begin(), known.end(), name) != known.end()) {
-      fail_at(map.path(), yaml_line(node), fmt::format("covariance.names: {} stands twice", name));
+      fail_at(map.path(), node.line, fmt::format("covariance.names: {} stands twice", name));
     }
     known.push_back(name);
   }
   const YamlMap::Entry& matrix = map.at("matrix");
   const std::size_t n = scale.size();
-  if (!matrix.value.IsSequence() || matrix.value.size() != n) {
+  if (!matrix.value.is_list() || matrix.value.items.size() != n) {
     fail_at(map.path(), matrix.line,
             fmt::format("covariance.matrix: expected {} rows, one per name, found {}", n,
-                        matrix.value.size()));
+                        matrix.value.items.size()));
   }
   const auto size = static_cast<Eigen::Index>(n);
   sensor.covariance.resize(size, size);
   std::vector<std::size_t> line(n);
   for (std::size_t i = 0; i < n; ++i) {
-    const YAML::Node row = matrix.value[i];
-    line[i] = yaml_line(row);
-    if (!row.IsSequence() || row.size() != n) {
-      fail_at(
-          map.path(), line[i],
-          fmt::format("covariance.matrix[{}]: expected {} numbers, found {}", i, n, row.size()));
+    const YamlNode& row = matrix.value.items[i];
+    line[i] = row.line;
+    if (!row.is_list() || row.items.size() != n) {
+      fail_at(map.path(), line[i],
+              fmt::format("covariance.matrix[{}]: expected {} numbers, found {}", i, n,
+                          row.items.size()));
     }
     for (std::size_t j = 0; j < n; ++j) {
       const auto field = fmt::format("covariance.matrix[{}][{}]", i, j);
       sensor.covariance(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) =
-          si_from_file(yaml_number(row[j], map.path(), field), scale[i] * scale[j]);
+          si_from_file(yaml_number(row.items[j], map.path(), field), scale[i] * scale[j]);
     }
   }
   const Eigen::MatrixXd& c = sensor.covariance;
@@ -413,7 +419,7 @@ Sensor load_sensor(const std::string& name_or_path) {
   }
   const std::filesystem::path path(name_or_path);
   if (path.extension() == ".yaml" || path.extension() == ".yml" || std::filesystem::exists(path)) {
-    return parse_preset(read_text_file(name_or_path), name_or_path);
+    return parse_preset(io::read_text_file(name_or_path), name_or_path);
   }
   throw InvalidArgument(
       fmt::format("sensor \"{}\" is neither a file nor a known preset; known presets: {}",
@@ -421,7 +427,7 @@ Sensor load_sensor(const std::string& name_or_path) {
 }
 
 Sensor parse_preset(const std::string& text, const std::string& path) {
-  const YamlMap root(parse_yaml(text, path), path, "");
+  const YamlMap root(io::parse_yaml(text, path), path, "");
   if (root.find("risley_preset") == nullptr) {
     fail_at(path, root.line(), "is no sensor preset: risley_preset is missing");
   }

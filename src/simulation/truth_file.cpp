@@ -5,7 +5,7 @@
 #include <fmt/format.h>
 
 #include "risley/core/angle.hpp"
-#include "risley/core/output_file.hpp"
+#include "risley/io/text_file.hpp"
 #include "risley/recordings/writer.hpp"
 #include "risley/sensors/preset.hpp"
 
@@ -65,7 +65,7 @@ SimulationResult simulate_to_file(
   truth_columns.close();
   SimulationResult result{scanner.shots(), scanner.no_return(), truth_preset(scanner, provenance),
                           scanner.start_angles()};
-  write_text_file(truth_preset_path(path), sensors::preset_text(result.truth));
+  io::write_text_file(truth_preset_path(path), sensors::preset_text(result.truth));
   return result;
 }
 

@@ -14,7 +14,7 @@
 #endif
 
 #include "risley/cloud/cloud_writer.hpp"
-#include "risley/core/output_file.hpp"
+#include "risley/io/text_file.hpp"
 
 #include "cloud/cloud_samples.hpp"
 
@@ -50,7 +50,7 @@ TEST_P(LazTest, HoldsWhatTheLasFileHolds) {
     writer->write(points);
     writer->close();
   }
-  const std::string las = read_text_file((folder / "cloud.las").string());
+  const std::string las = io::read_text_file((folder / "cloud.las").string());
   const auto data = at<std::uint32_t>(las, 96);
   const auto record = at<std::uint16_t>(las, 105);
   constexpr std::size_t kBase = 30;  // bytes of point format 6

@@ -9,7 +9,7 @@
 
 #include <gtest/gtest.h>
 
-#include "risley/core/output_file.hpp"
+#include "risley/io/text_file.hpp"
 
 #include "cloud/cloud_samples.hpp"
 
@@ -82,7 +82,7 @@ TEST_P(RecordFiles, PlyHoldsEveryField) {
   const std::string path = folder_ / "cloud.ply";
   write_uneven(path, "ply", header(), points_);
   std::vector<std::string> comments;
-  const TestTable found = read_ply(read_text_file(path), comments);
+  const TestTable found = read_ply(io::read_text_file(path), comments);
   for (TestColumn& one : expected_) {
     one.name =
         one.name.size() == 1 ? std::string(1, "xyz"[one.name[0] - 'X']) : "scalar_" + one.name;
@@ -93,7 +93,7 @@ TEST_P(RecordFiles, PlyHoldsEveryField) {
 TEST_P(RecordFiles, PcdHoldsEveryField) {
   const std::string path = folder_ / "cloud.pcd";
   write_uneven(path, "pcd", header(), points_);
-  std::string bytes = read_text_file(path);
+  std::string bytes = io::read_text_file(path);
   std::map<std::string, std::vector<std::string>> entries;
   std::vector<std::string> order;
   for (const std::string& line : take_lines(bytes, "DATA binary")) {
@@ -130,17 +130,17 @@ TEST_P(RecordFiles, PcdHoldsEveryField) {
 TEST_P(RecordFiles, NumpyReadsEveryField) {
   const std::string path = folder_ / "cloud.npy", answer = folder_ / "answer";
   write_uneven(path, "npy", header(), points_);
-  const std::string head = read_text_file(path).substr(0, 10);
+  const std::string head = io::read_text_file(path).substr(0, 10);
   EXPECT_EQ(head.substr(0, 8), std::string("\x93NUMPY\x01\0", 8));
   const std::size_t length =
       static_cast<unsigned char>(head[8]) + std::size_t{256} * static_cast<unsigned char>(head[9]);
   EXPECT_EQ((10 + length) % 64, 0U);
-  EXPECT_EQ(read_text_file(path).substr(10 + length).size(),
+  EXPECT_EQ(io::read_text_file(path).substr(10 + length).size(),
             points_.size() * record_bytes(expected_));
   const std::string python = find_python("numpy");
   if (python.empty()) GTEST_SKIP() << "no Python with numpy";
   const std::string script = folder_ / "read.py";
-  write_text_file(script, R"(
+  io::write_text_file(script, R"(
 import sys
 import numpy
 array = numpy.load(sys.argv[1])
@@ -154,7 +154,7 @@ with open(sys.argv[2], 'wb') as answer:
 )");
   const std::string call = python + " '" + script + "' '" + path + "' '" + answer + "'";
   ASSERT_EQ(std::system(call.c_str()), 0);
-  std::string bytes = read_text_file(answer);
+  std::string bytes = io::read_text_file(answer);
   const std::map<std::string, char> types{{"|u1", 'u'}, {"<f4", 'f'}, {"<f8", 'd'}};
   TestTable found;
   std::vector<std::string> lines = take_lines(bytes, "values");
@@ -184,7 +184,7 @@ TEST(PlyComments, TellTheProvenanceInLinesThatEveryReaderTakes) {
   one.header.provenance.emplace_back("long", letters);
   write_uneven(folder / "cloud.ply", "ply", one.header, make_points(one));
   std::vector<std::string> comments;
-  read_ply(read_text_file(folder / "cloud.ply"), comments);
+  read_ply(io::read_text_file(folder / "cloud.ply"), comments);
   const auto has = [&comments](const std::string& text) {
     return std::find(comments.begin(), comments.end(), text) != comments.end();
   };

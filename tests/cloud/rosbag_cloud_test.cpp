@@ -12,7 +12,7 @@
 #include <rosbag/view.h>
 
 #include "risley/core/error.hpp"
-#include "risley/core/output_file.hpp"
+#include "risley/io/text_file.hpp"
 
 #include "cloud/cloud_samples.hpp"
 
@@ -176,7 +176,7 @@ TEST_P(RosbagCloud, IsReadByPython) {
   if (python.empty()) GTEST_SKIP() << "no Python with rosbag";
   const std::string path = write(), script = folder_ / "read.py", answer = folder_ / "answer";
   // The classes of the messages come from the definition in the bag, so that is read too.
-  write_text_file(script, R"(
+  io::write_text_file(script, R"(
 import sys
 import rosbag
 with rosbag.Bag(sys.argv[1]) as bag, open(sys.argv[2], 'wb') as answer:

@@ -8,7 +8,7 @@
 
 #include <gtest/gtest.h>
 
-#include "risley/core/output_file.hpp"
+#include "risley/io/text_file.hpp"
 
 #include "cloud/cloud_samples.hpp"
 
@@ -80,7 +80,7 @@ std::string unit_of(const std::string& name) {
 TEST_P(TextClouds, CsvLosesNothing) {
   write_uneven(folder_ / "cloud.csv", "csv", header(), points_);
   for (TestColumn& one : expected_) one.name += unit_of(one.name);
-  expect_same(read_text(read_text_file(folder_ / "cloud.csv"), ',', expected_), expected_);
+  expect_same(read_text(io::read_text_file(folder_ / "cloud.csv"), ',', expected_), expected_);
 }
 
 TEST_P(TextClouds, XyzLosesNothing) {
@@ -88,7 +88,7 @@ TEST_P(TextClouds, XyzLosesNothing) {
   std::rotate(expected_.begin() + 3, expected_.begin() + 4, expected_.begin() + 5);
   ASSERT_EQ(expected_[3].name, "Intensity");
   expected_[0].name = "//X";
-  expect_same(read_text(read_text_file(folder_ / "cloud.xyz"), ' ', expected_), expected_);
+  expect_same(read_text(io::read_text_file(folder_ / "cloud.xyz"), ' ', expected_), expected_);
 }
 
 TEST(TextCloud, UnknownNumbersHaveNoSign) {
@@ -97,7 +97,7 @@ TEST(TextCloud, UnknownNumbersHaveNoSign) {
   Points points = make_points(one);
   points.incidence[0] = -std::numeric_limits<double>::quiet_NaN();
   write_uneven(folder / "cloud.csv", "csv", one.header, points);
-  const std::string text = read_text_file(folder / "cloud.csv");
+  const std::string text = io::read_text_file(folder / "cloud.csv");
   EXPECT_NE(text.find(",nan,"), std::string::npos);
   EXPECT_EQ(text.find("-nan"), std::string::npos);
 }

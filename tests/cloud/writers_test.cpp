@@ -9,7 +9,7 @@
 #include <sys/resource.h>
 
 #include "risley/core/error.hpp"
-#include "risley/core/output_file.hpp"
+#include "risley/io/text_file.hpp"
 
 #include "cloud/cloud_samples.hpp"
 
@@ -73,9 +73,9 @@ TEST_P(CloudWriters, GiveTheSameBytesInWhateverPieces) {
     writer->write(points_);
     writer->close();
   }
-  const std::string whole = read_text_file(path_);
+  const std::string whole = io::read_text_file(path_);
   write_uneven(path_, options_.format, many_.header, points_);
-  EXPECT_TRUE(whole == read_text_file(path_));
+  EXPECT_TRUE(whole == io::read_text_file(path_));
 }
 
 TEST_P(CloudWriters, RefuseAFolderThatIsNotThere) {

@@ -8,9 +8,9 @@
 #include <gtest/gtest.h>
 
 #include "risley/core/angle.hpp"
+#include "risley/io/little_endian.hpp"
 
 #include "recordings/format_tests.hpp"
-#include "recordings/formats/little_endian.hpp"
 #include "recordings/formats/packet.hpp"
 
 namespace risley::recordings {
@@ -22,7 +22,7 @@ using ::testing::HasSubstr;
 template <class T>
 void append(std::string& bytes, std::type_identity_t<T> value) {
   std::uint8_t raw[sizeof(T)];
-  store<T>(raw, value);
+  io::store<T>(raw, value);
   bytes.append(reinterpret_cast<const char*>(raw), sizeof(T));
 }
 

@@ -16,7 +16,7 @@
 
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
-#include "risley/core/output_file.hpp"
+#include "risley/io/text_file.hpp"
 
 namespace risley::recordings {
 namespace {
@@ -159,7 +159,7 @@ TEST_F(Truth, WrongColumnsAreRefused) {
 
 TEST_F(Truth, OtherFilesAreRefused) {
   EXPECT_THROW(load_truth(path()), FileError);  // missing
-  write_text_file(path(), "no NetCDF at all");
+  io::write_text_file(path(), "no NetCDF at all");
   EXPECT_THROW(load_truth(path()), FileError);
   int id = 0;
   ASSERT_EQ(nc_create(path().c_str(), NC_NETCDF4 | NC_CLOBBER, &id), NC_NOERR);

@@ -11,7 +11,7 @@
 #include <gtest/gtest.h>
 
 #include "risley/core/error.hpp"
-#include "risley/core/output_file.hpp"
+#include "risley/io/text_file.hpp"
 
 namespace risley::report {
 namespace {
@@ -142,9 +142,9 @@ TEST_F(ReportFile, AnEstimateComesBackAsItWas) {
   EXPECT_EQ(r.pieces->failed, 1u);
   EXPECT_TRUE(std::isnan(r.residual_charts[0].series[0].y[1]));
   // Writing what was read gives the same bytes.
-  const std::string first = read_text_file(path());
+  const std::string first = io::read_text_file(path());
   write_report(path(), again);
-  EXPECT_EQ(read_text_file(path()), first);
+  EXPECT_EQ(io::read_text_file(path()), first);
 }
 
 TEST_F(ReportFile, ACalibrationComesBackAsItWas) {
@@ -160,9 +160,9 @@ TEST_F(ReportFile, ACalibrationComesBackAsItWas) {
   EXPECT_TRUE(std::isnan(r.planes[0].rms));
   EXPECT_EQ(r.truth->after.rotation.y, 10);
   EXPECT_EQ(r.wall_charts[0].series[0].z[0], 3);
-  const std::string first = read_text_file(path());
+  const std::string first = io::read_text_file(path());
   write_report(path(), again);
-  EXPECT_EQ(read_text_file(path()), first);
+  EXPECT_EQ(io::read_text_file(path()), first);
 }
 
 TEST_F(ReportFile, DiagramsKeepTheDigitsThatCanBeSeen) {
@@ -178,7 +178,7 @@ TEST_F(ReportFile, DiagramsKeepTheDigitsThatCanBeSeen) {
 
 TEST_F(ReportFile, ACutFileNamesTheByteWhereItBreaksOff) {
   write_report(path(), estimate_example());
-  const std::string text = read_text_file(path());
+  const std::string text = io::read_text_file(path());
   write(text.substr(0, text.size() / 2));
   EXPECT_THAT(error(), HasSubstr(path()));
   EXPECT_THAT(error(), HasSubstr("byte"));
@@ -186,7 +186,7 @@ TEST_F(ReportFile, ACutFileNamesTheByteWhereItBreaksOff) {
 
 TEST_F(ReportFile, EveryMissingFieldIsNamed) {
   write_report(path(), estimate_example());
-  const std::string text = read_text_file(path());
+  const std::string text = io::read_text_file(path());
   for (const char* field : {"recording", "converged", "parameters", "covariance", "provenance",
                             "residual_charts", "verb"}) {
     std::string cut = text;
@@ -199,12 +199,12 @@ TEST_F(ReportFile, EveryMissingFieldIsNamed) {
 
 TEST_F(ReportFile, AFieldOfAnotherKindIsNamedWithWhatWasFound) {
   write_report(path(), estimate_example());
-  std::string text = read_text_file(path());
+  std::string text = io::read_text_file(path());
   text.replace(text.find("\"outliers\":17"), 13, "\"outliers\":\"many\"");
   write(text);
   EXPECT_THAT(error(), HasSubstr("outliers: expected a whole number, found string"));
   write_report(path(), estimate_example());
-  text = read_text_file(path());
+  text = io::read_text_file(path());
   const std::string kind = "\"kind\":\"cells\"";
   text.replace(text.find(kind), kind.size(), "\"kind\":\"clouds\"");
   write(text);

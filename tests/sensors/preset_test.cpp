@@ -12,7 +12,7 @@
 #include <gtest/gtest.h>
 
 #include "risley/core/angle.hpp"
-#include "risley/core/output_file.hpp"
+#include "risley/io/text_file.hpp"
 
 namespace risley::sensors {
 namespace {
@@ -21,7 +21,7 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
 std::string preset_file(const std::string& name) {
-  return read_text_file(std::string(RISLEY_SOURCE_DIR) + "/presets/" + name + ".yaml");
+  return io::read_text_file(std::string(RISLEY_SOURCE_DIR) + "/presets/" + name + ".yaml");
 }
 
 /// The text with its first occurrence of a piece replaced.
@@ -214,7 +214,7 @@ TEST(Preset, ThreePrismsWithOwnGlass) {
 
 TEST(Preset, FileWithAPathIsRead) {
   const std::string path = ::testing::TempDir() + "risley_preset_test.yaml";
-  write_text_file(path, preset_text(calibrated_unit()));
+  io::write_text_file(path, preset_text(calibrated_unit()));
   expect_same(load_sensor(path), calibrated_unit());
   std::filesystem::remove(path);
   EXPECT_THROW(load_sensor(path), FileError);

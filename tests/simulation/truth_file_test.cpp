@@ -9,7 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "risley/core/angle.hpp"
-#include "risley/core/output_file.hpp"
+#include "risley/io/sha256.hpp"
 #include "risley/recordings/reader.hpp"
 #include "risley/recordings/truth.hpp"
 #include "risley/sensors/preset.hpp"
@@ -100,12 +100,13 @@ TEST_F(TruthFile, SameSeedGivesTheSameBytes) {
   s.threads = 2;
   simulate_to_file(s, path("two.nc"), {});
   for (const char* ending : {".nc", ".nc.truth.nc", ".nc.truth.yaml"}) {
-    EXPECT_EQ(sha256_of_file(path("one") + ending), sha256_of_file(path("two") + ending)) << ending;
+    EXPECT_EQ(io::sha256_of_file(path("one") + ending), io::sha256_of_file(path("two") + ending))
+        << ending;
   }
   s.seed = 78;
   simulate_to_file(s, path("three.nc"), {});
   for (const char* ending : {".nc", ".nc.truth.nc", ".nc.truth.yaml"}) {
-    EXPECT_NE(sha256_of_file(path("one") + ending), sha256_of_file(path("three") + ending));
+    EXPECT_NE(io::sha256_of_file(path("one") + ending), io::sha256_of_file(path("three") + ending));
   }
 }
 

@@ -4,11 +4,12 @@
 // type again (of 32 bits but for time and coordinates); what is not known is nan.
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <iterator>
 
 #include <fmt/compile.h>
 #include <fmt/format.h>
+
+#include "risley/io/little_endian.hpp"
 
 #include "cloud/formats/cloud_format.hpp"
 #include "cloud/formats/record_file.hpp"
@@ -20,8 +21,7 @@ constexpr std::size_t kBufferBytes = 1 << 20;
 
 template <class T>
 void print(fmt::memory_buffer& text, const std::uint8_t* bytes) {
-  T value;
-  std::memcpy(&value, bytes, sizeof value);
+  T value = io::load<T>(bytes);
   if constexpr (std::is_floating_point_v<T>) {
     if (std::isnan(value)) value = std::abs(value);  // never "-nan"
   }

@@ -1,7 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
 #include <algorithm>
-#include <bit>
 #include <cerrno>
 #include <chrono>
 #include <cmath>
@@ -15,7 +14,8 @@
 #include <xsimd/xsimd.hpp>
 
 #include "risley/core/error.hpp"
-#include "risley/core/output_file.hpp"
+#include "risley/io/little_endian.hpp"
+#include "risley/io/output_file.hpp"
 
 #include "cloud/formats/cloud_format.hpp"
 #include "cloud/formats/las_layout.hpp"
@@ -35,9 +35,6 @@ using recordings::las::kSpecificationUser;
 using recordings::las::kTagField;
 using recordings::las::leap_seconds;
 
-static_assert(std::endian::native == std::endian::little,
-              "numbers are copied to files as they stand in memory");
-
 /// Greatest X, Y or Z in steps of the scale.
 constexpr double kMaxSteps = std::numeric_limits<std::int32_t>::max();
 /// Added to a number of steps, it rounds it to the nearest integer, whose 32 bits are then the
@@ -47,7 +44,7 @@ constexpr std::size_t kMaxRecordBytes = std::numeric_limits<std::uint16_t>::max(
 
 template <class T>
 std::uint8_t* put(std::uint8_t* out, std::type_identity_t<T> value) {
-  std::memcpy(out, &value, sizeof(T));
+  io::store<T>(out, value);
   return out + sizeof(T);
 }
 
@@ -501,7 +498,7 @@ class LasWriter final : public CloudWriter {
 
   las::Layout layout_;
   las::Summary summary_;
-  OutputFile output_;
+  io::OutputFile output_;
   int file_;
   bool sound_ = true;
   std::vector<std::uint8_t> buffer_;

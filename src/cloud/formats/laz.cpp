@@ -14,7 +14,8 @@
 #include <laszip/laszip_api.h>
 
 #include "risley/core/error.hpp"
-#include "risley/core/output_file.hpp"
+#include "risley/io/little_endian.hpp"
+#include "risley/io/output_file.hpp"
 
 #include "cloud/formats/cloud_format.hpp"
 #include "cloud/formats/las_layout.hpp"
@@ -22,12 +23,7 @@
 namespace risley::cloud {
 namespace {
 
-template <class T>
-T load(const std::uint8_t* bytes) {
-  T value;
-  std::memcpy(&value, bytes, sizeof value);
-  return value;
-}
+using io::load;
 
 /// LAS 1.4 compressed by LASzip. The records are those of the uncompressed format; LASzip takes
 /// them apart again, which costs little beside its compression.
@@ -164,10 +160,10 @@ class LazWriter final : public CloudWriter {
 
   template <class T>
   void put_at(std::size_t offset, T number) {
-    char bytes[sizeof(T)];
-    std::memcpy(bytes, &number, sizeof(T));
+    std::uint8_t bytes[sizeof(T)];
+    io::store<T>(bytes, number);
     stream_.seekp(static_cast<std::streamoff>(offset));
-    stream_.write(bytes, sizeof(T));
+    stream_.write(reinterpret_cast<const char*>(bytes), sizeof(T));
   }
 
   void check(laszip_I32 failed) const {
@@ -190,7 +186,7 @@ class LazWriter final : public CloudWriter {
 
   las::Layout layout_;
   las::Summary summary_;
-  OutputFile output_;
+  io::OutputFile output_;
   std::ofstream stream_;
   std::vector<std::uint8_t> block_;
   laszip_POINTER laszip_ = nullptr;

@@ -19,7 +19,7 @@
 
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
-#include "risley/core/output_file.hpp"
+#include "risley/io/output_file.hpp"
 #include "risley/optics/parameters.hpp"
 
 #include "cloud/formats/cloud_format.hpp"
@@ -301,7 +301,7 @@ class NetcdfWriter final : public CloudWriter {
     rows_ = 0;
   }
 
-  OutputFile output_;
+  io::OutputFile output_;
   NcHandle id_;    // after output_: closed before the temporary is removed
   int point_ = 0;  ///< the dimension
   std::vector<Variable> variables_;

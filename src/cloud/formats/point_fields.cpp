@@ -4,13 +4,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <utility>
 
 #include <fmt/format.h>
 #include <xsimd/xsimd.hpp>
 
 #include "risley/core/angle.hpp"
+#include "risley/io/little_endian.hpp"
 
 namespace risley::cloud {
 namespace {
@@ -69,8 +69,7 @@ constexpr double kDegrees = 1.0 / kRadiansPerDegree;
 template <class T>
 void put(std::span<const double> values, std::uint8_t* out, std::size_t stride) {
   for (const double value : values) {
-    const T number = static_cast<T>(value);
-    std::memcpy(out, &number, sizeof number);
+    io::store<T>(out, static_cast<T>(value));
     out += stride;
   }
 }

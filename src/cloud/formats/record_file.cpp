@@ -3,7 +3,6 @@
 #include "cloud/formats/record_file.hpp"
 
 #include <algorithm>
-#include <bit>
 #include <cerrno>
 #include <cstring>
 #include <limits>
@@ -15,9 +14,6 @@
 
 namespace risley::cloud {
 namespace {
-
-static_assert(std::endian::native == std::endian::little,
-              "numbers are copied to files as they stand in memory");
 
 /// Longest line of comment: the common PLY reader rply takes 1024 bytes.
 constexpr std::size_t kNoteBytes = 900;

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "risley/cloud/cloud_writer.hpp"
-#include "risley/core/output_file.hpp"
+#include "risley/io/output_file.hpp"
 
 #include "cloud/formats/point_fields.hpp"
 
@@ -35,7 +35,7 @@ class SequentialFile {
  private:
   void check();
 
-  OutputFile output_;
+  io::OutputFile output_;
   std::ofstream stream_;  // after output_: closed before the temporary is removed
 };
 

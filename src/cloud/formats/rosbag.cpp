@@ -13,7 +13,7 @@
 #include <rosbag/bag.h>
 
 #include "risley/core/error.hpp"
-#include "risley/core/output_file.hpp"
+#include "risley/io/output_file.hpp"
 
 #include "cloud/formats/cloud_format.hpp"
 #include "cloud/formats/record_file.hpp"
@@ -261,7 +261,7 @@ class RosbagWriter final : public CloudWriter {
   }
 
   RecordPacker packer_;
-  OutputFile output_;
+  io::OutputFile output_;
   std::unique_ptr<rosbag::Bag> bag_;
   std::vector<std::uint8_t> records_;
   PointCloudMessage message_;

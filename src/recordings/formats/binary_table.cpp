@@ -10,11 +10,12 @@
 #include <fmt/format.h>
 
 #include "risley/core/error.hpp"
-
-#include "recordings/formats/little_endian.hpp"
+#include "risley/io/little_endian.hpp"
 
 namespace risley::recordings {
 namespace {
+
+using io::load;
 
 template <class T>
 Decimal cell_of(const std::uint8_t* bytes) {

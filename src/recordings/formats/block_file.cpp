@@ -12,8 +12,7 @@
 #include <unistd.h>
 
 #include "risley/core/error.hpp"
-
-#include "recordings/formats/little_endian.hpp"
+#include "risley/io/little_endian.hpp"
 
 namespace risley::recordings {
 
@@ -77,7 +76,7 @@ std::uint8_t* BlockOutput::append(std::size_t count) {
 void BlockOutput::patch_u64(std::uint64_t offset, std::uint64_t value) {
   // A number may stand across the border of what was written already.
   std::uint8_t bytes[8];
-  store<std::uint64_t>(bytes, value);
+  io::store<std::uint64_t>(bytes, value);
   if (offset >= written_) {
     std::copy_n(bytes, 8, block_.data() + (offset - written_));
     return;

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "risley/core/output_file.hpp"
+#include "risley/io/output_file.hpp"
 
 namespace risley::recordings {
 
@@ -75,7 +75,7 @@ class BlockOutput {
   void flush();
   void write_at(const std::uint8_t* bytes, std::size_t count, std::uint64_t offset);
 
-  OutputFile output_;
+  io::OutputFile output_;
   FileDescriptor file_;
   std::vector<std::uint8_t> block_;
   std::uint64_t written_ = 0;

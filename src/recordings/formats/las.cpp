@@ -11,14 +11,15 @@
 #include <fmt/format.h>
 
 #include "risley/core/error.hpp"
+#include "risley/io/little_endian.hpp"
 
 #include "recordings/formats/cartesian.hpp"
 #include "recordings/formats/format.hpp"
 #include "recordings/formats/las_points.hpp"
-#include "recordings/formats/little_endian.hpp"
 #include "recordings/formats/seconds.hpp"
 
 namespace risley::recordings {
+using io::load;
 namespace las {
 namespace {
 

@@ -9,12 +9,14 @@
 #include <fmt/format.h>
 
 #include "risley/core/error.hpp"
+#include "risley/io/little_endian.hpp"
 
-#include "recordings/formats/little_endian.hpp"
 #include "recordings/formats/seconds.hpp"
 
 namespace risley::recordings::las {
 namespace {
+
+using io::load;
 
 constexpr double kFinestScale = 1e-9, kCoarsestScale = 1.0, kLargestOffset = 1e9;
 /// Bytes of the public header.

@@ -13,10 +13,12 @@
 
 #include <laszip/laszip_api.h>
 
-#include "recordings/formats/little_endian.hpp"
+#include "risley/io/little_endian.hpp"
 
 namespace risley::recordings::las {
 namespace {
+
+using io::load;
 
 /// Points that LASzip unpacks one by one. It reads the header again, which has been checked.
 class LazPoints final : public PointSource {

@@ -9,13 +9,15 @@
 #include <fmt/format.h>
 
 #include "risley/core/error.hpp"
+#include "risley/io/little_endian.hpp"
 
 #include "recordings/formats/cartesian.hpp"
 #include "recordings/formats/format.hpp"
-#include "recordings/formats/little_endian.hpp"
 
 namespace risley::recordings {
 namespace {
+
+using io::load;
 
 constexpr std::int64_t kSecond = 1'000'000'000;
 constexpr std::int64_t kLatestTime = 230LL * 31'557'600 * kSecond;  // the year 2200

@@ -2,12 +2,15 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
 
+#include "risley/io/little_endian.hpp"
+
 #include "recordings/formats/format.hpp"
-#include "recordings/formats/little_endian.hpp"
 #include "recordings/formats/lvx_reader.hpp"
 
 namespace risley::recordings {
 namespace {
+
+using io::load;
 
 constexpr std::size_t kDeviceCountAt = kLvxPublicHeaderBytes;
 constexpr std::size_t kDeviceBytes = 58;

@@ -11,14 +11,18 @@
 
 #include <fmt/format.h>
 
+#include "risley/io/little_endian.hpp"
+
 #include "recordings/formats/block_file.hpp"
 #include "recordings/formats/format.hpp"
-#include "recordings/formats/little_endian.hpp"
 #include "recordings/formats/lvx_reader.hpp"
 #include "recordings/formats/packet.hpp"
 
 namespace risley::recordings {
 namespace {
+
+using io::load;
+using io::store;
 
 constexpr std::size_t kFrameDurationAt = kLvxPublicHeaderBytes, kDeviceCountAt = 28;
 constexpr std::size_t kDeviceTableAt = 29, kDeviceBytes = 59;

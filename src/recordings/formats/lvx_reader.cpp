@@ -8,11 +8,14 @@
 
 #include <fmt/format.h>
 
+#include "risley/io/little_endian.hpp"
+
 #include "recordings/formats/cartesian.hpp"
-#include "recordings/formats/little_endian.hpp"
 
 namespace risley::recordings {
 namespace {
+
+using io::load;
 
 /// Text of a field that is filled up with NUL.
 std::string text_field(const std::uint8_t* bytes, std::size_t count) {

@@ -14,7 +14,7 @@
 #include <netcdf.h>
 
 #include "risley/core/error.hpp"
-#include "risley/core/output_file.hpp"
+#include "risley/io/output_file.hpp"
 
 #include "recordings/formats/format.hpp"
 #include "recordings/formats/packet.hpp"
@@ -545,7 +545,7 @@ class NetcdfWriter final : public Writer {
     });
   }
 
-  OutputFile output_;
+  io::OutputFile output_;
   NcFile file_;  // after output_: closed before the temporary is removed
   Observations rows_;
   std::vector<Packet> packets_;

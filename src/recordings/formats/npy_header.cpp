@@ -8,10 +8,12 @@
 
 #include <fmt/format.h>
 
-#include "recordings/formats/little_endian.hpp"
+#include "risley/io/little_endian.hpp"
 
 namespace risley::recordings {
 namespace {
+
+using io::load;
 
 constexpr std::size_t kMostHeaderBytes = std::size_t{1} << 16;
 constexpr int kDeepest = 8;

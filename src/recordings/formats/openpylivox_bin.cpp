@@ -12,16 +12,19 @@
 #include <fmt/format.h>
 
 #include "risley/core/error.hpp"
+#include "risley/io/little_endian.hpp"
 
 #include "recordings/formats/block_file.hpp"
 #include "recordings/formats/format.hpp"
-#include "recordings/formats/little_endian.hpp"
 #include "recordings/formats/openpylivox.hpp"
 #include "recordings/formats/packet.hpp"
 #include "recordings/formats/seconds.hpp"
 
 namespace risley::recordings {
 namespace {
+
+using io::load;
+using io::store;
 
 constexpr std::string_view kSignature = "OPENPYLIVOX";
 constexpr std::string_view kImuSignature = "OPENPYLIVOX_IMU";

@@ -10,12 +10,15 @@
 #include <fmt/format.h>
 
 #include "risley/core/error.hpp"
+#include "risley/io/little_endian.hpp"
 
 #include "recordings/formats/cartesian.hpp"
-#include "recordings/formats/little_endian.hpp"
 
 namespace risley::recordings {
 namespace {
+
+using io::load;
+using io::store;
 
 constexpr std::array<RecordLayout, 9> kLayouts{{
     {true, false, 1, 100, 13},

@@ -10,14 +10,16 @@
 #include <fmt/format.h>
 
 #include "risley/core/error.hpp"
+#include "risley/io/little_endian.hpp"
 
 #include "recordings/formats/binary_table.hpp"
 #include "recordings/formats/format.hpp"
-#include "recordings/formats/little_endian.hpp"
 #include "recordings/formats/named_text.hpp"
 
 namespace risley::recordings {
 namespace {
+
+using io::load;
 
 constexpr std::string_view kName = "pcd";
 

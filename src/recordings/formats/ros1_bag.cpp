@@ -16,13 +16,15 @@
 #include <rosbag/view.h>
 
 #include "risley/core/error.hpp"
+#include "risley/io/little_endian.hpp"
 
 #include "recordings/formats/format.hpp"
-#include "recordings/formats/little_endian.hpp"
 #include "recordings/formats/livox_messages.hpp"
 
 namespace risley::recordings {
 namespace {
+
+using io::load;
 
 constexpr std::string_view kName = "ros1-bag";
 constexpr std::string_view kSignature = "#ROSBAG V2.0";

@@ -14,7 +14,7 @@
 
 #include <fmt/format.h>
 
-#include "risley/core/output_file.hpp"
+#include "risley/io/output_file.hpp"
 #include "risley/recordings/observations.hpp"
 #include "risley/recordings/reader.hpp"
 
@@ -196,7 +196,7 @@ class TextOutput {
   void flush();
   [[noreturn]] void fail() const;
 
-  OutputFile output_;
+  io::OutputFile output_;
   std::unique_ptr<std::FILE, int (*)(std::FILE*)> file_;
   fmt::memory_buffer buffer_;
 };

@@ -13,15 +13,17 @@
 #include <fmt/format.h>
 
 #include "risley/core/error.hpp"
+#include "risley/io/little_endian.hpp"
 
 #include "recordings/formats/cartesian.hpp"
 #include "recordings/formats/format.hpp"
-#include "recordings/formats/little_endian.hpp"
 #include "recordings/formats/packet.hpp"
 #include "recordings/formats/text_table.hpp"
 
 namespace risley::recordings {
 namespace {
+
+using io::store;
 
 constexpr std::string_view kName = "livox-viewer-csv";
 constexpr std::string_view kHeader =  // without blanks, as normalized_header() gives it

@@ -11,12 +11,14 @@
 #include <zlib.h>
 
 #include "risley/core/error.hpp"
+#include "risley/io/little_endian.hpp"
 
-#include "recordings/formats/little_endian.hpp"
 #include "recordings/formats/text_table.hpp"
 
 namespace risley::recordings {
 namespace {
+
+using io::load;
 
 constexpr std::uint32_t kEndSignature = 0x06054b50, kEnd64LocatorSignature = 0x07064b50,
                         kEnd64Signature = 0x06064b50, kEntrySignature = 0x02014b50,

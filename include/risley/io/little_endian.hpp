@@ -7,7 +7,7 @@
 #include <cstring>
 #include <type_traits>
 
-namespace risley::recordings {
+namespace risley::io {
 
 static_assert(std::endian::native == std::endian::little,
               "numbers are copied from and to files as they stand in memory");
@@ -27,4 +27,4 @@ void store(std::uint8_t* bytes, std::type_identity_t<T> value) {
   std::memcpy(bytes, &value, sizeof(T));
 }
 
-}  // namespace risley::recordings
+}  // namespace risley::io

@@ -7,25 +7,33 @@
 #include <string_view>
 #include <vector>
 
-#include <yaml-cpp/yaml.h>
-
 /// Strict reading of YAML: every mistake becomes a FileError with its line.
-namespace risley::sensors {
+namespace risley::io {
 
-/// @throws FileError where the text is not YAML
-YAML::Node parse_yaml(const std::string& text, const std::string& path);
+/// A value of a YAML text with everything below it.
+struct YamlNode {
+  enum class Kind { nothing, scalar, list, map };
 
-/// Line of a node from 1, 0 when unknown.
-std::size_t yaml_line(const YAML::Node& node);
+  Kind kind = Kind::nothing;
+  std::size_t line = 0;         ///< from 1, 0 when unknown
+  std::string scalar;           ///< of a scalar, as it is written
+  std::vector<YamlNode> items;  ///< of a list; of a map: each key before its value
+
+  bool is_list() const { return kind == Kind::list; }
+};
+
+/// @throws FileError where the text is not YAML, or has more than a million values, those that
+/// its aliases repeat included
+YamlNode parse_yaml(const std::string& text, const std::string& path);
 
 /// @throws FileError always
 [[noreturn]] void fail_at(const std::string& path, std::size_t line, const std::string& problem);
 
 /// The node's finite number. @param field  for the message
-long double yaml_number(const YAML::Node& node, const std::string& path, const std::string& field);
+long double yaml_number(const YamlNode& node, const std::string& path, const std::string& field);
 
 /// The node's plain text.
-std::string yaml_text(const YAML::Node& node, const std::string& path, const std::string& field);
+std::string yaml_text(const YamlNode& node, const std::string& path, const std::string& field);
 
 /// A map whose keys are all known: unknown, repeated and missing keys are errors.
 class YamlMap {
@@ -33,11 +41,11 @@ class YamlMap {
   struct Entry {
     std::string key;
     std::size_t line;
-    YAML::Node value;
+    YamlNode value;
   };
 
   /// @param field  how messages call this map, e.g. "planes[2]"; empty for the whole file
-  YamlMap(const YAML::Node& node, std::string path, std::string field);
+  YamlMap(const YamlNode& node, std::string path, std::string field);
 
   /// @throws FileError for a key that is not among these
   void allow_only(std::initializer_list<std::string_view> keys) const;
@@ -65,4 +73,4 @@ class YamlMap {
   std::vector<Entry> entries_;
 };
 
-}  // namespace risley::sensors
+}  // namespace risley::io

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-#include "sensors/yaml_map.hpp"
+#include "risley/io/yaml_map.hpp"
 
 #include <algorithm>
 #include <charconv>
@@ -8,34 +8,73 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <yaml-cpp/yaml.h>
 
 #include "risley/core/error.hpp"
 
-namespace risley::sensors {
+namespace risley::io {
 namespace {
+
+constexpr std::size_t kMostNodes = 1'000'000;
 
 std::size_t line_of(const YAML::Mark& mark) {
   return mark.is_null() ? 0 : static_cast<std::size_t>(mark.line) + 1;
 }
 
-std::string kind_of(const YAML::Node& node) {
-  if (node.IsMap()) return "a map";
-  if (node.IsSequence()) return "a list";
-  if (node.IsScalar()) return fmt::format("\"{}\"", node.Scalar());
+/// The tree of a parsed text without its library. @param nodes  how many there are so far
+YamlNode copied(const YAML::Node& node, const std::string& path, std::size_t& nodes) {
+  YamlNode copy;
+  copy.line = line_of(node.Mark());
+  if (++nodes > kMostNodes) {
+    fail_at(path, copy.line,
+            fmt::format("has more values than {}, aliases (*name) included", kMostNodes));
+  }
+  switch (node.Type()) {
+    case YAML::NodeType::Scalar:
+      copy.kind = YamlNode::Kind::scalar;
+      copy.scalar = node.Scalar();
+      break;
+    case YAML::NodeType::Sequence:
+      copy.kind = YamlNode::Kind::list;
+      for (const auto& item : node) copy.items.push_back(copied(item, path, nodes));
+      break;
+    case YAML::NodeType::Map:
+      copy.kind = YamlNode::Kind::map;
+      for (const auto& item : node) {
+        copy.items.push_back(copied(item.first, path, nodes));
+        copy.items.push_back(copied(item.second, path, nodes));
+      }
+      break;
+    default:
+      break;
+  }
+  return copy;
+}
+
+std::string kind_of(const YamlNode& node) {
+  switch (node.kind) {
+    case YamlNode::Kind::map:
+      return "a map";
+    case YamlNode::Kind::list:
+      return "a list";
+    case YamlNode::Kind::scalar:
+      return fmt::format("\"{}\"", node.scalar);
+    case YamlNode::Kind::nothing:
+      break;
+  }
   return "nothing";
 }
 
 }  // namespace
 
-YAML::Node parse_yaml(const std::string& text, const std::string& path) {
+YamlNode parse_yaml(const std::string& text, const std::string& path) {
   try {
-    return YAML::Load(text);
+    std::size_t nodes = 0;
+    return copied(YAML::Load(text), path, nodes);
   } catch (const YAML::Exception& error) {
     fail_at(path, line_of(error.mark), fmt::format("is not YAML: {}", error.msg));
   }
 }
-
-std::size_t yaml_line(const YAML::Node& node) { return line_of(node.Mark()); }
 
 void fail_at(const std::string& path, std::size_t line, const std::string& problem) {
   FilePlace place;
@@ -43,40 +82,39 @@ void fail_at(const std::string& path, std::size_t line, const std::string& probl
   throw FileError(path, place, problem);
 }
 
-long double yaml_number(const YAML::Node& node, const std::string& path, const std::string& field) {
+long double yaml_number(const YamlNode& node, const std::string& path, const std::string& field) {
   long double value = 0;
   const auto expected = [&] {
-    fail_at(path, yaml_line(node),
+    fail_at(path, node.line,
             fmt::format("{}: expected a finite number, found {}", field, kind_of(node)));
   };
-  if (!node.IsScalar()) expected();
-  std::string_view text = node.Scalar();
+  if (node.kind != YamlNode::Kind::scalar) expected();
+  std::string_view text = node.scalar;
   if (text.starts_with('+')) text.remove_prefix(1);
   const auto [end, code] = std::from_chars(text.data(), text.data() + text.size(), value);
   if (code != std::errc() || end != text.data() + text.size() || !std::isfinite(value)) expected();
   return value;
 }
 
-std::string yaml_text(const YAML::Node& node, const std::string& path, const std::string& field) {
-  if (!node.IsScalar()) {
-    fail_at(path, yaml_line(node),
-            fmt::format("{}: expected text, found {}", field, kind_of(node)));
+std::string yaml_text(const YamlNode& node, const std::string& path, const std::string& field) {
+  if (node.kind != YamlNode::Kind::scalar) {
+    fail_at(path, node.line, fmt::format("{}: expected text, found {}", field, kind_of(node)));
   }
-  return node.Scalar();
+  return node.scalar;
 }
 
-YamlMap::YamlMap(const YAML::Node& node, std::string path, std::string field)
-    : path_(std::move(path)), field_(std::move(field)), line_(yaml_line(node)) {
+YamlMap::YamlMap(const YamlNode& node, std::string path, std::string field)
+    : path_(std::move(path)), field_(std::move(field)), line_(node.line) {
   const std::string called = field_.empty() ? "the file" : field_;
-  if (!node.IsMap()) {
+  if (node.kind != YamlNode::Kind::map) {
     fail_at(path_, line_, fmt::format("{}: expected a map, found {}", called, kind_of(node)));
   }
-  for (const auto& item : node) {
-    const std::size_t line = yaml_line(item.first);
-    const std::string key = yaml_text(item.first, path_, fmt::format("a key of {}", called));
+  for (std::size_t i = 0; i < node.items.size(); i += 2) {
+    const std::size_t line = node.items[i].line;
+    const std::string key = yaml_text(node.items[i], path_, fmt::format("a key of {}", called));
     if (find(key) != nullptr)
       fail_at(path_, line, fmt::format("{} stands twice", this->field(key)));
-    entries_.push_back({key, line, item.second});
+    entries_.push_back({key, line, node.items[i + 1]});
   }
 }
 
@@ -111,7 +149,7 @@ long double YamlMap::number(std::string_view key, long double lower, long double
   const long double value = yaml_number(entry.value, path_, field(key));
   if (value < lower || value > upper) {
     fail_at(path_, entry.line,
-            fmt::format("{} = {} {}, allowed {:g} to {:g}", field(key), entry.value.Scalar(), unit,
+            fmt::format("{} = {} {}, allowed {:g} to {:g}", field(key), entry.value.scalar, unit,
                         lower, upper));
   }
   return value;
@@ -122,7 +160,7 @@ int YamlMap::integer(std::string_view key, int lower, int upper) const {
   const long double value = yaml_number(entry.value, path_, field(key));
   if (value < lower || value > upper || value != std::floor(value)) {
     fail_at(path_, entry.line,
-            fmt::format("{} = {}, allowed whole numbers {} to {}", field(key), entry.value.Scalar(),
+            fmt::format("{} = {}, allowed whole numbers {} to {}", field(key), entry.value.scalar,
                         lower, upper));
   }
   return static_cast<int>(value);
@@ -132,4 +170,4 @@ std::string YamlMap::field(std::string_view key) const {
   return field_.empty() ? std::string(key) : fmt::format("{}.{}", field_, key);
 }
 
-}  // namespace risley::sensors
+}  // namespace risley::io

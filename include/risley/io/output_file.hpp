@@ -4,7 +4,7 @@
 
 #include <string>
 
-namespace risley {
+namespace risley::io {
 
 /// An output that appears under its final name only when it is whole: it is written under a
 /// temporary name in the same folder and renamed by commit(). Without commit() the destructor
@@ -28,13 +28,4 @@ class OutputFile {
   std::string temporary_path_;
 };
 
-/// Writes a whole text file through OutputFile. @throws FileError
-void write_text_file(const std::string& path, const std::string& text);
-
-/// Reads a whole file. @throws FileError when it is missing or cannot be read
-std::string read_text_file(const std::string& path);
-
-/// SHA-256 of a file's bytes as 64 hexadecimal digits. @throws FileError
-std::string sha256_of_file(const std::string& path);
-
-}  // namespace risley
+}  // namespace risley::io
