@@ -42,7 +42,7 @@ void SurfaceNormals::clear() {
 void SurfaceNormals::add(double azimuth, double zenith, double range) {
   const std::size_t cell = cell_of(azimuth, zenith);
   if (cell == kNowhere) return;
-  require_above("range", range, 0, "m");
+  if (!(range > 0)) return;
   const Vector3<double> d = direction_from_angles<double>({azimuth, zenith});
   if (!(d.x > kLeastForward)) return;
   Moments& m = moments_[cell];
