@@ -12,7 +12,7 @@ namespace risley {
 template <class Call>
 std::string refusal(Call&& call) {
   try {
-    static_cast<void>(call());
+    call();
   } catch (const InvalidArgument& error) {
     return error.what();
   }

@@ -53,6 +53,11 @@ void require_above(std::string_view name, double value, double limit, std::strin
   refuse(name, value, unit, fmt::format("above {}", limit));
 }
 
+void require_threshold(std::string_view name, double value) {
+  if (value > 0) return;
+  refuse(name, value, "", "above 0");
+}
+
 void require_not_below(std::string_view name, double value, double limit, std::string_view unit) {
   if (value >= limit && std::isfinite(value)) return;
   refuse(name, value, unit, fmt::format("{} and above", limit));

@@ -4,10 +4,8 @@
 
 #include <algorithm>
 
-#include <fmt/format.h>
 #include <tbb/parallel_for.h>
 
-#include "risley/core/error.hpp"
 #include "risley/core/require.hpp"
 
 #include "estimation/normal_equations_kernel.hpp"
@@ -67,9 +65,7 @@ void accumulate(const AngleSeries& series, const RotorTrajectory& knots, const P
   require_between("number of prisms of the knots", knots.prisms, train.prisms(), train.prisms());
   check_noise(weights.angle_noise);
   require_not_below("softening", weights.softening, 0);
-  if (!(weights.cut > 0)) {  // may be infinite
-    throw InvalidArgument(fmt::format("cut = {}, allowed above 0", weights.cut));
-  }
+  require_threshold("cut", weights.cut);
   const auto n = static_cast<int>(free.size());
   const auto prisms = static_cast<std::size_t>(knots.prisms);
   std::vector<int> place_begin{0}, places;

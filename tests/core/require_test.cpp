@@ -46,6 +46,12 @@ TEST(Require, NamesValuesUnitsAndRanges) {
   EXPECT_EQ(refusal([] { require_between("share", 2, 0, 1); }), "share = 2, allowed 0 to 1");
 }
 
+TEST(Require, AThresholdMayBeInfinite) {
+  EXPECT_EQ(refusal([] { require_threshold("gate", kInfinite); }), "");
+  EXPECT_EQ(refusal([] { require_threshold("gate", 0); }), "gate = 0, allowed above 0");
+  EXPECT_EQ(refusal([] { require_threshold("gate", kNan); }), "gate = nan, allowed above 0");
+}
+
 TEST(Require, NeverAllowsWhatIsNoNumber) {
   for (const double value : {kNan, kInfinite, -kInfinite}) {
     EXPECT_NE(refusal([=] { require_above("x", value, 0); }), "") << value;

@@ -9,12 +9,15 @@
 
 #include "risley/estimation/angle_noise.hpp"
 #include "risley/estimation/angle_series.hpp"
+#include "risley/estimation/batch_map.hpp"
 #include "risley/estimation/coordinate_rounding.hpp"
 #include "risley/estimation/diagnostics.hpp"
+#include "risley/estimation/ekf.hpp"
 #include "risley/estimation/free_parameters.hpp"
 #include "risley/estimation/normal_equations.hpp"
 #include "risley/estimation/process_likelihood.hpp"
 #include "risley/estimation/rotor_states.hpp"
+#include "risley/estimation/rotor_track.hpp"
 #include "risley/estimation/rotor_trajectory.hpp"
 #include "risley/estimation/smoother.hpp"
 #include "risley/estimation/stored_pose.hpp"
@@ -294,6 +297,75 @@ TEST(Entries, RotorWindowsAskForARotorOfTheTrain) {
   linear.run();
   EXPECT_EQ(refusal([&] { return RotorWindows(linear.equations, linear.knots, 2); }),
             "rotor = 2, allowed 0 to 1");
+}
+
+/// A start of two rotors that fits the shots of Linear.
+Start two_rotors() {
+  Start start;
+  start.rotation_angle = {0.0, 0.0};
+  start.angular_velocity = {-700.0, 500.0};
+  return start;
+}
+
+sensors::Sensor two_prisms() {
+  sensors::Sensor sensor;
+  sensor.angular_velocity = {-700.0, 500.0};
+  return sensor;
+}
+
+TEST(Entries, TheBatchEstimatorAsksForAStartOfEveryRotorAndSoundOptions) {
+  const AngleSeries series = shots(4);
+  const auto run = [&](const Start& start, const BatchMapOptions& options) {
+    return refusal([&] { return run_batch_map(series, start, two_prisms(), options); });
+  };
+  Start start = two_rotors();
+  start.rotation_angle.pop_back();
+  EXPECT_EQ(run(start, {}), "rotation_angle of the start has 1 values, expected 2");
+  start = two_rotors();
+  start.angular_velocity[1] = kNan;
+  EXPECT_EQ(run(start, {}), "angular_velocity of the start = nan rad/s, allowed finite");
+  start = two_rotors();
+  EXPECT_THAT(run(start, {.knot_interval = kNan}),
+              testing::StartsWith("knot interval = nan s, allowed 1e-09 to "));
+  EXPECT_EQ(run(start, {.frame_sigma = -1}), "frame sigma = -1 rad, allowed 0 and above");
+  EXPECT_EQ(run(start, {.outlier_chi2 = 0}), "outlier chi2 = 0, allowed above 0");
+  EXPECT_EQ(run(start, {.most_iterations = 0}), "most iterations = 0, allowed 1 or more");
+  EXPECT_EQ(run(start, {.rotor_process = {kTypicalRotor}}),
+            "process noise for 1 rotors given, the train has 2");
+  EXPECT_EQ(run(start, {.rotor_process = {kTypicalRotor, {kNan, 0, 0}}}),
+            "acceleration = nan rad/s/sqrt(s), allowed 0 and above");
+}
+
+TEST(Entries, TheFilterAsksForAStartOfEveryRotorAndSoundOptions) {
+  const AngleSeries series = shots(4);
+  const auto run = [&](const Start& start, const EkfOptions& options) {
+    return refusal([&] { return run_ekf(series, start, options); });
+  };
+  EXPECT_EQ(run(two_rotors(), {.angle_noise = kNan}), "angle noise = nan deg, allowed above 0");
+  EXPECT_EQ(run(two_rotors(), {.angle_noise = 1e-4, .parameter_walk = -1}),
+            "parameter walk = -1 rad/sqrt(s), allowed 0 and above");
+  EXPECT_EQ(run(two_rotors(), {.angle_noise = 1e-4, .gate_chi_square = kNan}),
+            "gate = nan, allowed above 0");
+  EXPECT_EQ(run(two_rotors(), {.angle_noise = 1e-4, .passes = 0}), "passes = 0, allowed 1 or more");
+  Start start = two_rotors();
+  start.angular_velocity.clear();
+  EXPECT_EQ(run(start, {.angle_noise = 1e-4}),
+            "angular_velocity of the start has 0 values, expected 2");
+  EXPECT_EQ(run(two_rotors(), {.angle_noise = 1e-4, .rotor_process = {kTypicalRotor}}),
+            "process noise for 1 rotors given, the train has 2");
+}
+
+TEST(Entries, TrackingAsksForKnotsAndShotsThatAreThere) {
+  Linear linear;
+  const auto run = [&](ShotRange rows, std::size_t last, const Start& start) {
+    return refusal([&] {
+      track_rotors(linear.series, rows, start, equal_noise(1e-4), linear.knots, 0, last);
+      return 0;
+    });
+  };
+  EXPECT_EQ(run({0, 5}, 1, two_rotors()), "shots = [0, 5), allowed within [0, 4)");
+  EXPECT_EQ(run({0, 4}, 2, two_rotors()), "knots = [0, 2), allowed within [0, 1)");
+  EXPECT_EQ(run({0, 4}, 1, Start{}), "rotation_angle of the start has 0 values, expected 2");
 }
 
 }  // namespace

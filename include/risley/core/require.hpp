@@ -25,6 +25,8 @@ void require_at_least(std::string_view name, long long value, long long least);
 /// "noise = nan rad, allowed above 0"; infinite numbers are not allowed either.
 /// @param unit  as it is written behind the value; may be empty
 void require_above(std::string_view name, double value, double limit, std::string_view unit = {});
+/// A limit above 0 that may be infinite: "gate = nan, allowed above 0"
+void require_threshold(std::string_view name, double value);
 /// As require_above, with the limit itself.
 void require_not_below(std::string_view name, double value, double limit,
                        std::string_view unit = {});
