@@ -12,6 +12,7 @@
 
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
+#include "risley/core/require.hpp"
 #include "risley/optics/batch.hpp"
 #include "risley/optics/observation_adjoint.hpp"
 
@@ -81,9 +82,7 @@ std::vector<BundleBeam> bundle(const PrismTrain& train,
 
 DirectionErrors direction_errors(std::span<const Vector3<double>> computed,
                                  std::span<const Vector3<double>> truth) {
-  if (computed.size() != truth.size()) {
-    throw InvalidArgument("computed and true directions differ in number");
-  }
+  require_length("computed", computed.size(), truth.size());
   Matrix3d normal = Matrix3d::Zero();
   Eigen::Vector3d right = Eigen::Vector3d::Zero();
   DirectionErrors errors;
@@ -128,9 +127,14 @@ FormalDatum formal_datum(const PrismTrain& train,
                          const Eigen::MatrixXd& covariance,
                          const std::vector<std::vector<double>>& rotation_angles,
                          std::span<const std::uint8_t> emitter) {
-  if (rotation_angles.size() != static_cast<std::size_t>(train.prisms())) {
-    throw InvalidArgument(fmt::format("{} columns of rotation angles given for {} prisms",
-                                      rotation_angles.size(), train.prisms()));
+  require_length("rows of the covariance", static_cast<std::size_t>(covariance.rows()),
+                 free.size());
+  require_length("columns of the covariance", static_cast<std::size_t>(covariance.cols()),
+                 free.size());
+  require_length("rotation_angles", rotation_angles.size(),
+                 static_cast<std::size_t>(train.prisms()));
+  for (const auto& column : rotation_angles) {
+    require_length("rotation angles of a prism", column.size(), rotation_angles.front().size());
   }
   const auto beams = with_prism_count(train.prisms(), [&]<int N>() {
     check_beams(train, emitter, rotation_angles.front().size());

@@ -14,6 +14,7 @@
 #include <fmt/format.h>
 
 #include "risley/core/error.hpp"
+#include "risley/core/require.hpp"
 
 #include "calibration/eigen_vectors.hpp"
 
@@ -339,6 +340,8 @@ void check(const PlanarProblem& p) {
     throw InvalidArgument(fmt::format("{} prior sigmas given for {} free parameters",
                                       p.prior_sigma.size(), p.free.size()));
   }
+  require_finite("range offset", p.range_offset, "m");
+  require_not_below("sigma of the range offset", p.range_offset_sigma, 0, "m");
   for (const double sigma : p.prior_sigma) {
     if (!(sigma > 0)) {
       throw InvalidArgument(fmt::format("prior sigma = {}, allowed above 0", sigma));
@@ -370,13 +373,10 @@ void check(const PlanarProblem& p) {
     if (!view.shots || view.shots->size() == 0) {
       throw InvalidArgument("a view of a wall has no shots");
     }
-    if (view.recording >= p.stations.size() || view.wall >= p.walls.size()) {
-      throw InvalidArgument("a view names a recording or a wall that is not there");
-    }
-    if (!(view.range_variance > 0)) {
-      throw InvalidArgument(
-          fmt::format("range variance = {} m^2, allowed above 0", view.range_variance));
-    }
+    require_place("recording of a view", view.recording, p.stations.size());
+    require_place("wall of a view", view.wall, p.walls.size());
+    require_above("range variance", view.range_variance, 0, "m^2");
+    require_finite("distance", view.distance, "m");
   }
 }
 

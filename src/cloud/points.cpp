@@ -2,6 +2,11 @@
 // SPDX-License-Identifier: MIT
 #include "risley/cloud/points.hpp"
 
+#include <fmt/format.h>
+
+#include "risley/core/error.hpp"
+#include "risley/core/require.hpp"
+
 namespace risley::cloud {
 namespace {
 
@@ -26,6 +31,13 @@ void for_each_column(Points& p, const Function& function) {
 }  // namespace
 
 void Points::keep(std::span<const std::size_t> rows) {
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    require_place("row", rows[i], size());
+    if (i > 0 && rows[i] <= rows[i - 1]) {
+      throw InvalidArgument(
+          fmt::format("row = {} after row {}, allowed ascending", rows[i], rows[i - 1]));
+    }
+  }
   for_each_column(*this, [rows](auto& column) {
     if (column.empty()) return;
     for (std::size_t i = 0; i < rows.size(); ++i) column[i] = column[rows[i]];

@@ -6,10 +6,8 @@
 #include <cmath>
 #include <limits>
 
-#include <fmt/format.h>
-
 #include "risley/core/direction.hpp"
-#include "risley/core/error.hpp"
+#include "risley/core/require.hpp"
 
 namespace risley::cloud {
 namespace {
@@ -31,9 +29,7 @@ void SurfaceNormals::Moments::add(const Moments& other) {
 }
 
 SurfaceNormals::SurfaceNormals(double range_noise) : range_noise_(range_noise) {
-  if (!(range_noise > 0) || !std::isfinite(range_noise)) {
-    throw InvalidArgument(fmt::format("range noise = {} m, allowed above 0", range_noise));
-  }
+  require_above("range noise", range_noise, 0, "m");
   moments_.resize(static_cast<std::size_t>(kSide) * kSide);
   normals_.assign(moments_.size(), {kNoNormal, kNoNormal, kNoNormal});
 }
@@ -46,6 +42,7 @@ void SurfaceNormals::clear() {
 void SurfaceNormals::add(double azimuth, double zenith, double range) {
   const std::size_t cell = cell_of(azimuth, zenith);
   if (cell == kNowhere) return;
+  if (!(range > 0)) return;
   const Vector3<double> d = direction_from_angles<double>({azimuth, zenith});
   if (!(d.x > kLeastForward)) return;
   Moments& m = moments_[cell];

@@ -11,6 +11,7 @@
 
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
+#include "risley/core/require.hpp"
 #include "risley/estimation/diagnostics.hpp"
 
 namespace risley::estimation {
@@ -106,11 +107,15 @@ void check_noise(const AngleNoise& noise) {
 }
 
 AngleNoise usable_noise(const AngleNoise& noise) {
+  require_not_below("azimuth noise", noise.azimuth, 0, "rad");
+  require_not_below("zenith noise", noise.zenith, 0, "rad");
   return {std::max(noise.azimuth, kLeastAngleNoise), std::max(noise.zenith, kLeastAngleNoise)};
 }
 
 AngleNoise robust_noise(const AngleSeries& series, std::span<const double> azimuth,
                         std::span<const double> zenith) {
+  require_length("azimuth", azimuth.size(), series.size());
+  require_length("zenith", zenith.size(), series.size());
   return {robust_sigma(azimuth, series.azimuth_rounding_variance),
           robust_sigma(zenith, series.zenith_rounding_variance)};
 }
@@ -135,6 +140,11 @@ NoiseEstimate noise_components(const AngleSeries& series, std::span<const double
                                std::span<const double> zenith,
                                std::span<const unsigned char> outlier, double used_share,
                                double square_factor) {
+  require_length("azimuth", azimuth.size(), series.size());
+  require_length("zenith", zenith.size(), series.size());
+  require_length("outlier", outlier.size(), series.size());
+  require_between("used share", used_share, 0, 1.0 - 1e-9);
+  require_above("square factor", square_factor, 0);
   const Component a =
       component(azimuth, series.azimuth_rounding_variance, outlier, used_share, square_factor);
   const Component z =

@@ -6,10 +6,8 @@
 #include <cmath>
 #include <numeric>
 
-#include <fmt/format.h>
-
 #include "risley/core/angle.hpp"
-#include "risley/core/error.hpp"
+#include "risley/core/require.hpp"
 
 namespace risley::estimation {
 namespace {
@@ -31,18 +29,21 @@ void AngleSeries::append(std::int64_t shot_time_ns, double shot_azimuth, double 
 }
 
 void AngleSeries::append(const AngleSeries& other, std::size_t row) {
+  require_place("row", row, other.size());
   append(other.time_ns[row], other.azimuth[row], other.zenith[row], other.beam[row],
          other.azimuth_rounding_variance[row], other.zenith_rounding_variance[row]);
   if (!other.range.empty()) range.push_back(other.range[row]);
 }
 
 AngleSeries rows_of(const AngleSeries& series, std::size_t begin, std::size_t end) {
+  require_rows("rows", begin, end, series.size());
   AngleSeries rows;
   for (std::size_t i = begin; i < end; ++i) rows.append(series, i);
   return rows;
 }
 
 std::vector<ShotRange> stretches(const AngleSeries& series, double longest_gap) {
+  require_between("longest gap", longest_gap, 0, kMostSeconds, "s");
   std::vector<ShotRange> ranges;
   const auto longest_ns = static_cast<std::int64_t>(longest_gap * 1e9);
   for (std::size_t i = 0; i < series.size(); ++i) {
@@ -52,6 +53,8 @@ std::vector<ShotRange> stretches(const AngleSeries& series, double longest_gap) 
   }
   return ranges;
 }
+
+TickSampler::TickSampler(double rate) : rate_(rate) { require_above("rate", rate, 0, "Hz"); }
 
 bool TickSampler::take(std::int64_t time_ns, std::uint8_t beam) {
   beams_ = std::max(beams_, beam + 1);
@@ -72,8 +75,9 @@ AngleSeries thinned(const AngleSeries& series, double rate, std::vector<ShotRang
   AngleSeries rows;
   TickSampler ticks(rate);
   for (ShotRange& range : ranges) {
+    require_rows("range", range.begin, range.end, series.size());
     const std::size_t begin = rows.size();
-    ticks.restart(series.time_ns[range.begin]);
+    if (range.size() > 0) ticks.restart(series.time_ns[range.begin]);
     for (std::size_t i = range.begin; i < range.end; ++i) {
       if (ticks.take(series.time_ns[i], series.beam[i])) rows.append(series, i);
     }
@@ -83,6 +87,8 @@ AngleSeries thinned(const AngleSeries& series, double rate, std::vector<ShotRang
 }
 
 std::size_t thinning_stride(const AngleSeries& series, ShotRange rows, std::size_t most) {
+  require_rows("rows", rows.begin, rows.end, series.size());
+  require_at_least("most", static_cast<long long>(most), 1);
   std::size_t beams = 1;
   for (std::size_t i = rows.begin; i < rows.end; ++i) {
     beams = std::max<std::size_t>(beams, series.beam[i] + std::size_t{1});
@@ -93,6 +99,7 @@ std::size_t thinning_stride(const AngleSeries& series, ShotRange rows, std::size
 }
 
 std::int64_t median_step_ns(std::span<const std::int64_t> time_ns) {
+  require_at_least("number of times", static_cast<long long>(time_ns.size()), 2);
   constexpr std::size_t kEnough = 20000;
   std::vector<std::int64_t> steps;
   for (std::size_t i = 1; i < std::min(time_ns.size(), kEnough); ++i) {
@@ -108,11 +115,7 @@ void mirror(AngleSeries& series) {
 }
 
 ShotSelector::ShotSelector(const SelectionOptions& options)
-    : options_(options), ticks_(options.rate.value_or(1.0)) {
-  if (options_.rate && !(*options_.rate > 0)) {
-    throw InvalidArgument(fmt::format("rate = {} Hz, allowed above 0", *options_.rate));
-  }
-}
+    : options_(options), ticks_(options.rate.value_or(1.0)) {}
 
 void ShotSelector::add(const recordings::Observations& o) {
   const auto append = [&](AngleSeries& series, std::size_t i) {

@@ -17,6 +17,7 @@
 #include "risley/estimation/rotor_track.hpp"
 #include "risley/estimation/smoother.hpp"
 
+#include "estimation/entry_checks.hpp"
 #include "estimation/knot_model.hpp"
 #include "estimation/normal_equations_kernel.hpp"
 #include "estimation/residual_model.hpp"
@@ -303,17 +304,15 @@ BatchMapResult run_batch_map(const AngleSeries& series, const Start& start,
                              const Progress& progress) {
   if (series.size() == 0) throw EstimationError("no valid shot to estimate from");
   if (options.angle_noise) check_noise(*options.angle_noise);
-  if (!(options.knot_interval > 0)) {
-    throw InvalidArgument(
-        fmt::format("knot interval = {} s, allowed above 0", options.knot_interval));
-  }
+  require_between("knot interval", options.knot_interval, 1e-9, kMostSeconds, "s");
+  require_not_below("frame sigma", options.frame_sigma, 0, "rad");
+  require_threshold("outlier chi2", options.outlier_chi2);
+  require_at_least("most iterations", options.most_iterations, 1);
   const int prisms = sensor.prisms();
+  require_start(start, prisms);
+  require_process(options.rotor_process, prisms);
   const auto rotors = static_cast<std::size_t>(prisms);
   const bool choose = options.rotor_process.empty();
-  if (!choose && options.rotor_process.size() != rotors) {
-    throw InvalidArgument(fmt::format("process noise for {} rotors given, the train has {}",
-                                      options.rotor_process.size(), prisms));
-  }
   BatchMapResult result;
   std::vector<RotorProcess> process =
       choose ? std::vector<RotorProcess>(rotors, kSettlingProcess) : options.rotor_process;

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "risley/core/direction.hpp"
+#include "risley/core/require.hpp"
 
 namespace risley::estimation {
 namespace {
@@ -31,6 +32,7 @@ std::string to_string(CoordinateRounding rounding) {
 }
 
 void add_half_steps(AngleSeries& series, const Eigen::Matrix3d& recording_from_sensor) {
+  require_length_or_none("range", series.range.size(), series.size());
   for (std::size_t i = 0; i < series.range.size(); ++i) {
     const double half = 0.5 * step_of(series, i);
     if (!(half > 0)) continue;
@@ -49,6 +51,8 @@ void add_half_steps(AngleSeries& series, const Eigen::Matrix3d& recording_from_s
 }
 
 double half_step_signal(const AngleSeries& series, double noise) {
+  require_length_or_none("range", series.range.size(), series.size());
+  require_not_below("noise", noise, 0, "rad");
   double sum = 0;
   for (std::size_t i = 0; i < series.range.size(); ++i) {
     const double step = step_of(series, i);

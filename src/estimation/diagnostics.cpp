@@ -8,11 +8,13 @@
 #include <utility>
 
 #include "risley/core/angle.hpp"
+#include "risley/core/require.hpp"
 #include "risley/estimation/angle_series.hpp"
 
 namespace risley::estimation {
 
 Moments moments(std::span<const double> values, std::span<const unsigned char> skip) {
+  require_length_or_none("skip", skip.size(), values.size());
   const auto used = [&](std::size_t i) {
     return std::isfinite(values[i]) && (skip.empty() || skip[i] == 0);
   };
@@ -52,6 +54,7 @@ Moments moments(std::span<const double> values, std::span<const unsigned char> s
 }
 
 double robust_scale(std::span<const double> azimuth, std::span<const double> zenith) {
+  require_length("zenith", zenith.size(), azimuth.size());
   // Half of the lengths of normal pairs are below sigma sqrt(2 ln 2).
   constexpr double kMedian = 1.1774100225154747;
   constexpr std::size_t kEnough = 20000;
@@ -72,6 +75,9 @@ Autocorrelation autocorrelation(std::span<const std::int64_t> time_ns,
                                 std::span<const unsigned char> skip) {
   constexpr double kSignificant = 2.0;  // sigmas: a group too many costs less than one too few
   constexpr std::size_t kBlocks = 8, kBlockShots = 50000, kMostLags = 4000;
+  require_length("azimuth", azimuth.size(), time_ns.size());
+  require_length("zenith", zenith.size(), time_ns.size());
+  require_length_or_none("skip", skip.size(), time_ns.size());
   Autocorrelation result;
   if (time_ns.size() < 100) return result;
   const std::int64_t step = median_step_ns(time_ns);
@@ -98,7 +104,8 @@ Autocorrelation autocorrelation(std::span<const std::int64_t> time_ns,
           }
         }
       }
-      const bool good = skip[i] == 0 && std::isfinite(azimuth[i]) && std::isfinite(zenith[i]);
+      const bool good =
+          (skip.empty() || skip[i] == 0) && std::isfinite(azimuth[i]) && std::isfinite(zenith[i]);
       block.azimuth.push_back(good ? azimuth[i] : 0.0);
       block.zenith.push_back(good ? zenith[i] : 0.0);
       block.weight.push_back(good ? 1.0 : 0.0);
@@ -148,9 +155,12 @@ Autocorrelation autocorrelation(std::span<const std::int64_t> time_ns,
   return result;
 }
 
-AngleProfiler::AngleProfiler(std::size_t bins) : bins_(bins) {}
+AngleProfiler::AngleProfiler(std::size_t bins) : bins_(bins) {
+  require_at_least("bins", static_cast<long long>(bins), 1);
+}
 
 void AngleProfiler::add(double angle, double azimuth_residual, double zenith_residual) {
+  if (!std::isfinite(angle + azimuth_residual + zenith_residual)) return;
   const double turns = angle * (1.0 / kTwoPi);
   const double bins = static_cast<double>(bins_.size());
   const auto at = static_cast<std::size_t>((turns - std::floor(turns)) * bins);

@@ -15,6 +15,7 @@
 #include "risley/core/golden_section.hpp"
 #include "risley/optics/batch.hpp"
 
+#include "estimation/entry_checks.hpp"
 #include "estimation/residual_model.hpp"
 
 namespace risley::estimation {
@@ -414,10 +415,6 @@ EkfResult run(const AngleSeries& series, const Start& start, const EkfOptions& o
   const bool choose = options.rotor_process.empty();
   std::vector<RotorProcess> process =
       choose ? std::vector<RotorProcess>(N, kSettlingProcess) : options.rotor_process;
-  if (process.size() != N) {
-    throw InvalidArgument(
-        fmt::format("process noise for {} rotors given, the train has {}", process.size(), N));
-  }
   for (const RotorProcess& rotor : process) {
     if (rotor.jerk != 0)
       throw InvalidArgument("white jerk is a motion model of the batch estimator");
@@ -447,13 +444,12 @@ EkfResult run(const AngleSeries& series, const Start& start, const EkfOptions& o
 EkfResult run_ekf(const AngleSeries& series, const Start& start, const EkfOptions& options,
                   const Progress& progress) {
   if (series.size() == 0) throw EstimationError("no valid shot to estimate from");
-  if (!(options.angle_noise > 0) || !std::isfinite(options.angle_noise)) {
-    throw InvalidArgument(fmt::format("angle noise = {} deg, allowed above 0",
-                                      degrees_from_radians(options.angle_noise)));
-  }
-  if (options.passes < 1) {
-    throw InvalidArgument(fmt::format("passes = {}, allowed 1 or more", options.passes));
-  }
+  check_noise(equal_noise(options.angle_noise));
+  require_at_least("passes", options.passes, 1);
+  require_not_below("parameter walk", options.parameter_walk, 0, "rad/sqrt(s)");
+  require_threshold("gate", options.gate_chi_square);
+  require_start(start, start.train.prisms());
+  require_process(options.rotor_process, start.train.prisms());
   check_beams(start.train, series.beam, series.size());
   return with_prism_count(start.train.prisms(),
                           [&]<int N>() { return run<N>(series, start, options, progress); });

@@ -10,6 +10,7 @@
 
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
+#include "risley/core/require.hpp"
 
 namespace risley::estimation {
 namespace {
@@ -45,6 +46,7 @@ Evaluation evaluate(const Estimate& estimate, const sensors::Sensor& truth_senso
     throw InvalidArgument(
         "the truth belongs to a sensor with another number of prisms or of emitters");
   }
+  require_at_least("shots of the estimate", static_cast<long long>(states.size()), 1);
   const auto rows = matching_rows(states.time_ns, truth.time_ns);
   const auto rotor_count = static_cast<std::size_t>(prisms);
   const double duration =

@@ -8,6 +8,7 @@
 
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
+#include "risley/core/require.hpp"
 
 namespace risley::estimation {
 

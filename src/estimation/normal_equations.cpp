@@ -6,6 +6,8 @@
 
 #include <tbb/parallel_for.h>
 
+#include "risley/core/require.hpp"
+
 #include "estimation/normal_equations_kernel.hpp"
 
 namespace risley::estimation {
@@ -16,9 +18,30 @@ static_assert(kRotorStates == kStatesPerRotor);
 /// Knots that one task sums up: fixed, so that sums do not depend on the number of threads.
 constexpr std::size_t kBlockKnots = 1000;
 
+void require_shots(const AngleSeries& series, const RotorTrajectory& knots,
+                   const ShotColumns& columns) {
+  const std::size_t shots = series.size();
+  require_length("azimuth", series.azimuth.size(), shots);
+  require_length("zenith", series.zenith.size(), shots);
+  require_length("azimuth_rounding_variance", series.azimuth_rounding_variance.size(), shots);
+  require_length("zenith_rounding_variance", series.zenith_rounding_variance.size(), shots);
+  require_length("first_shot", knots.first_shot.size(), knots.size());
+  require_length("last_shot", knots.last_shot.size(), knots.size());
+  require_length("state", knots.state.size(),
+                 knots.size() * static_cast<std::size_t>(knots.states()));
+  for (std::size_t knot = 0; knot < knots.size(); ++knot) {
+    require_rows("shots of a knot", knots.first_shot[knot], knots.last_shot[knot], shots);
+  }
+  require_length_or_none("azimuth_residual", columns.azimuth_residual.size(), shots);
+  require_length("zenith_residual", columns.zenith_residual.size(),
+                 columns.azimuth_residual.size());
+  require_length_or_none("outlier", columns.outlier.size(), shots);
+}
+
 }  // namespace
 
 void NormalEquations::scale(double factor) {
+  require_above("factor", factor, 0);
   for (auto* column : {&curvature, &coupling, &gradient}) {
     for (double& value : *column) value *= factor;
   }
@@ -29,6 +52,11 @@ void NormalEquations::scale(double factor) {
 void accumulate(const AngleSeries& series, const RotorTrajectory& knots, const PrismTrain& train,
                 const std::vector<FreeParameter>& free, const ShotWeights& weights,
                 NormalEquations& equations, const ShotColumns& columns, InstructionSet set) {
+  require_shots(series, knots, columns);
+  require_between("number of prisms of the knots", knots.prisms, train.prisms(), train.prisms());
+  check_noise(weights.angle_noise);
+  require_not_below("softening", weights.softening, 0);
+  require_threshold("cut", weights.cut);
   const auto n = static_cast<int>(free.size());
   const auto prisms = static_cast<std::size_t>(knots.prisms);
   std::vector<int> place_begin{0}, places;

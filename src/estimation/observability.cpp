@@ -11,6 +11,7 @@
 
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
+#include "risley/core/require.hpp"
 #include "risley/estimation/normal_equations.hpp"
 #include "risley/estimation/smoother.hpp"
 #include "risley/optics/observation_model.hpp"
@@ -241,6 +242,8 @@ Observability observability_of_plan(const ObservabilityPlan& plan) {
       plan.angle_noise * plan.angle_noise + plan.angle_resolution * plan.angle_resolution / 12.0;
   positive(variance, "noise and rounding", "rad^2");
   const PrismTrain& train = plan.sensor.train;
+  require_length("angular_velocity of the sensor", plan.sensor.angular_velocity.size(),
+                 static_cast<std::size_t>(train.prisms()));
   const double duration = std::min(plan.duration, kMostDuration);
   const double shots = plan.duration * plan.rate;
   const double rate = std::min(plan.rate, static_cast<double>(kMostPlannedShots) / duration);

@@ -10,6 +10,7 @@
 #include <Eigen/Cholesky>
 
 #include "risley/core/golden_section.hpp"
+#include "risley/core/require.hpp"
 #include "risley/optics/prism_train.hpp"
 
 #include "estimation/knot_model.hpp"
@@ -57,6 +58,8 @@ double best_decade(const Cost& cost, double lowest, double highest) {
 
 RotorWindows::RotorWindows(const NormalEquations& equations, const RotorTrajectory& at, int rotor,
                            std::size_t most_windows) {
+  require_between("rotor", rotor, 0, at.prisms - 1);
+  require_length("gradient", equations.gradient.size(), at.state.size());
   with_prism_count(at.prisms, [&]<int N>() {
     constexpr int kD = 3 * N;
     using Square = Eigen::Matrix<double, kD, kD>;

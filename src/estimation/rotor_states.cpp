@@ -2,9 +2,12 @@
 // SPDX-License-Identifier: MIT
 #include "risley/estimation/rotor_states.hpp"
 
+#include "risley/core/require.hpp"
+
 namespace risley::estimation {
 
 RotorStates rows_of(const RotorStates& all, ShotRange shots) {
+  require_rows("shots", shots.begin, shots.end, all.size());
   RotorStates rows;
   const auto cut = [&](const auto& from, auto& to) {
     to.assign(from.begin() + static_cast<std::ptrdiff_t>(shots.begin),

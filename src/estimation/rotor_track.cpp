@@ -15,6 +15,7 @@
 #include "risley/estimation/diagnostics.hpp"
 #include "risley/estimation/normal_equations.hpp"
 
+#include "estimation/entry_checks.hpp"
 #include "estimation/knot_model.hpp"
 
 namespace risley::estimation {
@@ -251,6 +252,12 @@ void track(const AngleSeries& series, ShotRange shots, const Start& start, const
 void track_rotors(const AngleSeries& series, ShotRange shots, const Start& start,
                   const AngleNoise& noise, RotorTrajectory& knots, std::size_t first,
                   std::size_t last) {
+  require_rows("shots", shots.begin, shots.end, series.size());
+  require_rows("knots", first, last, knots.size());
+  require_length("state", knots.state.size(),
+                 knots.size() * static_cast<std::size_t>(knots.states()));
+  require_start(start, knots.prisms);
+  check_noise(noise);
   with_prism_count(knots.prisms,
                    [&]<int N>() { track<N>(series, shots, start, noise, knots, first, last); });
 }

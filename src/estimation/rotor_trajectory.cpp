@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 #include "risley/estimation/rotor_trajectory.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <utility>
@@ -9,8 +10,18 @@
 #include <fmt/format.h>
 
 #include "risley/core/error.hpp"
+#include "risley/core/require.hpp"
+#include "risley/optics/prism.hpp"
 
 namespace risley::estimation {
+namespace {
+
+void require_entry(const RotorTrajectory& trajectory, std::size_t knot, std::size_t rotor) {
+  require_place("knot", knot, trajectory.covariance.empty() ? 0 : trajectory.size());
+  require_place("rotor", rotor, static_cast<std::size_t>(trajectory.prisms));
+}
+
+}  // namespace
 
 double RotorTrajectory::covariance_entry(std::size_t knot, std::size_t row,
                                          std::size_t column) const {
@@ -21,6 +32,7 @@ double RotorTrajectory::covariance_entry(std::size_t knot, std::size_t row,
 
 std::array<double, 5> RotorTrajectory::angle_covariance_terms(std::size_t knot, std::size_t a,
                                                               std::size_t b) const {
+  require_entry(*this, knot, std::max(a, b));
   constexpr double kWeight[] = {1.0, 1.0, 0.5};  // of time^0, time^1, time^2 in an angle
   std::array<double, 5> terms{};
   for (std::size_t i = 0; i < kStatesPerRotor; ++i) {
@@ -39,6 +51,7 @@ double RotorTrajectory::angle_covariance(std::size_t knot, std::size_t a, std::s
 }
 
 double RotorTrajectory::speed_variance(std::size_t knot, std::size_t rotor, double seconds) const {
+  require_entry(*this, knot, rotor);
   const std::size_t speed = kStatesPerRotor * rotor + 1;
   return covariance_entry(knot, speed, speed) +
          seconds * (2.0 * covariance_entry(knot, speed, speed + 1) +
@@ -47,10 +60,13 @@ double RotorTrajectory::speed_variance(std::size_t knot, std::size_t rotor, doub
 
 RotorTrajectory make_knots(const AngleSeries& series, std::span<const ShotRange> ranges, int prisms,
                            double interval) {
+  require_between("number of prisms", prisms, 1, kMaxPrisms);
+  require_between("interval", interval, 1e-9, kMostSeconds, "s");
   RotorTrajectory knots;
   knots.prisms = prisms;
   const auto interval_ns = static_cast<std::int64_t>(std::llround(interval * 1e9));
   for (const ShotRange& range : ranges) {
+    require_rows("range", range.begin, range.end, series.size());
     if (range.size() == 0) continue;
     knots.stretch_begin.push_back(knots.size());
     const std::int64_t origin = series.time_ns[range.begin];
@@ -70,8 +86,9 @@ RotorTrajectory make_knots(const AngleSeries& series, std::span<const ShotRange>
 
 void interpolate(const RotorTrajectory& from, RotorTrajectory& to) {
   if (from.stretch_begin.size() != to.stretch_begin.size() || from.prisms != to.prisms) {
-    throw InvalidArgument(fmt::format("trajectories of {} and {} stretches, expected the same",
-                                      from.stretch_begin.size(), to.stretch_begin.size()));
+    throw InvalidArgument(fmt::format(
+        "trajectories of {} and {} stretches and of {} and {} rotors, expected the same",
+        from.stretch_begin.size(), to.stretch_begin.size(), from.prisms, to.prisms));
   }
   const auto end_of = [](const RotorTrajectory& t, std::size_t stretch) {
     return stretch + 1 < t.stretch_begin.size() ? t.stretch_begin[stretch + 1] : t.size();

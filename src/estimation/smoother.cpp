@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "risley/core/error.hpp"
+#include "risley/core/require.hpp"
 
 #include "estimation/knot_model.hpp"
 
@@ -270,14 +271,18 @@ class Smoother {
 SmootherSolution smooth(const NormalEquations& equations, const RotorTrajectory& linearisation,
                         std::span<const RotorProcess> process, const ParameterPrior& prior,
                         bool covariances) {
-  if (linearisation.prisms < 1 || linearisation.prisms > kMaxPrisms) {
-    throw InvalidArgument(
-        fmt::format("number of prisms = {}, allowed 1 to {}", linearisation.prisms, kMaxPrisms));
-  }
+  require_between("number of prisms", linearisation.prisms, 1, kMaxPrisms);
   if (process.size() != static_cast<std::size_t>(linearisation.prisms)) {
     throw InvalidArgument(fmt::format("process noise for {} rotors given, the train has {}",
                                       process.size(), linearisation.prisms));
   }
+  const std::size_t states = linearisation.size() * 3 * process.size();
+  require_length("gradient", equations.gradient.size(), states);
+  require_length("state", linearisation.state.size(), states);
+  require_length("prior information", static_cast<std::size_t>(prior.information.size()),
+                 static_cast<std::size_t>(equations.free));
+  require_length("prior gradient", static_cast<std::size_t>(prior.gradient.size()),
+                 static_cast<std::size_t>(equations.free));
   // Compiling one for every number takes minutes; nearly every sensor has two.
   if (linearisation.prisms == 2) {
     return Smoother<2>(equations, linearisation, process).run(prior, covariances);

@@ -5,12 +5,15 @@
 #include <algorithm>
 #include <cmath>
 
+#include "risley/core/require.hpp"
+
 #include "estimation/field_of_view.hpp"
 
 namespace risley::estimation {
 
 StoredPoseVerdict judge_stored_pose(const AngleSeries& as_recorded, const AngleSeries& turned_back,
                                     double field_of_view) {
+  require_not_below("field of view", field_of_view, 0, "rad");
   constexpr double kClearShare = 0.01, kClearShots = 10.0;
   constexpr double kMostOutside = 0.15;  // gross errors lie anywhere
   StoredPoseVerdict verdict;

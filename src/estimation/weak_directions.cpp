@@ -8,11 +8,21 @@
 #include <Eigen/Eigenvalues>
 #include <fmt/format.h>
 
+#include "risley/core/require.hpp"
+
 namespace risley::estimation {
 
 std::vector<WeakDirection> weak_directions(const Eigen::MatrixXd& information,
                                            const std::vector<FreeParameter>& free,
                                            double most_sigma) {
+  require_length("rows of the information", static_cast<std::size_t>(information.rows()),
+                 free.size());
+  require_length("columns of the information", static_cast<std::size_t>(information.cols()),
+                 free.size());
+  require_above("most sigma", most_sigma, 0);
+  for (const FreeParameter& parameter : free) {
+    require_above("prior sigma of " + parameter.name, parameter.prior_sigma, 0);
+  }
   const auto n = static_cast<Eigen::Index>(free.size());
   std::vector<WeakDirection> weak;
   if (n == 0) return weak;

@@ -4,13 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <string_view>
 #include <vector>
 
-#include <fmt/format.h>
-
 #include "risley/core/angle.hpp"
-#include "risley/core/error.hpp"
+#include "risley/core/require.hpp"
 
 #include "simulation/streams.hpp"
 
@@ -36,18 +33,15 @@ ObservationNoise::ObservationNoise(const NoiseSettings& settings, std::uint64_t 
       azimuth_(seed, stream::kAzimuthNoise),
       zenith_(seed, stream::kZenithNoise),
       range_(seed, stream::kRangeNoise) {
-  const auto check = [](std::string_view name, double value, std::string_view unit) {
-    if (std::isfinite(value) && value >= 0.0) return;
-    throw InvalidArgument(fmt::format("{} = {:g} {}, allowed 0 and above", name, value, unit));
-  };
-  check("angle noise", degrees_from_radians(settings.angle), "deg");
-  check("range noise", settings.range, "m");
-  check("angle resolution", degrees_from_radians(settings.angle_resolution), "deg");
-  check("range resolution", settings.range_resolution, "m");
+  require_not_below("angle noise", degrees_from_radians(settings.angle), 0, "deg");
+  require_not_below("range noise", settings.range, 0, "m");
+  require_not_below("angle resolution", degrees_from_radians(settings.angle_resolution), 0, "deg");
+  require_not_below("range resolution", settings.range_resolution, 0, "m");
 }
 
 void ObservationNoise::apply_to_angles(std::uint64_t first_shot, std::span<double> azimuth,
                                        std::span<double> zenith) const {
+  require_length("zenith", zenith.size(), azimuth.size());
   std::vector<double> buffer;
   add_noise(azimuth_, first_shot, settings_.angle, azimuth, buffer);
   add_noise(zenith_, first_shot, settings_.angle, zenith, buffer);

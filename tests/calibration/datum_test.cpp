@@ -20,6 +20,7 @@
 
 #include "calibration/walls.hpp"
 #include "optics/trains.hpp"
+#include "refusal.hpp"
 
 namespace risley::calibration {
 namespace {
@@ -230,6 +231,20 @@ TEST(Datum, KindsHaveNames) {
   EXPECT_STREQ(to_string(DatumKind::planes), "known planes");
   EXPECT_STREQ(to_string(DatumKind::stations), "known stations");
   EXPECT_STREQ(to_string(DatumKind::both), "known planes and stations");
+}
+
+TEST(FormalDatum, AsksForACovarianceOfTheFreeParametersAndAnglesOfEveryPrism) {
+  const PrismTrain train(parse_face_order("PA-AP"));
+  const auto free = estimation::free_parameters({"refractive_index"}, 2);
+  const Eigen::MatrixXd one = Eigen::MatrixXd::Identity(1, 1);
+  const auto run = [&](const Eigen::MatrixXd& covariance,
+                       const std::vector<std::vector<double>>& angles) {
+    return refusal([&] { return formal_datum(train, free, covariance, angles); });
+  };
+  EXPECT_EQ(run(Eigen::MatrixXd::Identity(2, 2), {{1, 2}, {3, 4}}),
+            "rows of the covariance has 2 values, expected 1");
+  EXPECT_EQ(run(one, {{1, 2}}), "rotation_angles has 1 values, expected 2");
+  EXPECT_EQ(run(one, {{1, 2}, {3}}), "rotation angles of a prism has 1 values, expected 2");
 }
 
 }  // namespace

@@ -10,6 +10,8 @@
 
 #include "risley/recordings/observations.hpp"
 
+#include "refusal.hpp"
+
 namespace risley::cloud {
 namespace {
 
@@ -150,6 +152,20 @@ TEST(Observations, DropFrontTakesTheSameRowsOffEveryColumn) {
       }
     });
   }
+}
+
+TEST(Points, KeepsOnlyRowsThatAreThereInTheirOrder) {
+  Points points;
+  CloudHeader{}.resize(points, 4);
+  const auto keep = [&](const std::vector<std::size_t>& rows) {
+    return refusal([&] {
+      points.keep(rows);
+      return 0;
+    });
+  };
+  EXPECT_EQ(keep({1, 4}), "row = 4, allowed 0 to 3");
+  EXPECT_EQ(keep({2, 1}), "row = 1 after row 2, allowed ascending");
+  EXPECT_EQ(points.size(), 4U);
 }
 
 }  // namespace

@@ -12,6 +12,7 @@
 #include <gtest/gtest.h>
 
 #include "risley/core/angle.hpp"
+#include "risley/core/direction.hpp"
 #include "risley/core/error.hpp"
 #include "risley/core/plane.hpp"
 #include "risley/core/random.hpp"
@@ -332,6 +333,20 @@ TEST(SurfaceNormals, RefuseANoiseThatIsNone) {
   for (const double noise : {0.0, -0.01, kNaN, std::numeric_limits<double>::infinity()}) {
     EXPECT_THROW(SurfaceNormals{noise}, InvalidArgument);
   }
+}
+
+TEST(SurfaceNormals, AShotWithoutARangeTellsNothing) {
+  SurfaceNormals normals(0.02);
+  for (int i = 0; i < 400; ++i) {  // a wall across the X axis at 10 m
+    const double azimuth = 1e-4 * (i % 20), zenith = kPi / 2 + 1e-4 * (i / 20);
+    const auto d = direction_from_angles<double>({azimuth, zenith});
+    normals.add(azimuth, zenith, 10.0 / d.x);
+    for (const double range : {0.0, -1.0, std::numeric_limits<double>::quiet_NaN()}) {
+      normals.add(azimuth, zenith, range);
+    }
+  }
+  normals.fit();
+  EXPECT_NEAR(std::abs(normals.normal(1e-3, kPi / 2 + 1e-3).x), 1.0, 1e-6);
 }
 
 }  // namespace

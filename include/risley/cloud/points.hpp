@@ -38,7 +38,7 @@ struct Points {
   std::vector<std::array<std::vector<double>, 3>> loading;
 
   std::size_t size() const { return time_ns.size(); }
-  /// Keeps only these rows. @param rows  ascending
+  /// Keeps only these rows. @param rows  ascending @throws InvalidArgument
   void keep(std::span<const std::size_t> rows);
 };
 

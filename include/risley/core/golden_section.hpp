@@ -2,13 +2,19 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include "risley/core/require.hpp"
+
 namespace risley {
 
 /// Where a function of one variable that has a single minimum in [a, b] takes it, by golden-section
 /// search: each step costs one evaluation and leaves 0.618 of the interval.
 /// @param tolerance  width of the interval at which the search ends, > 0
+/// @throws InvalidArgument
 template <class Function>
 double golden_section_minimum(Function&& f, double a, double b, double tolerance) {
+  require_finite("a", a);
+  require_finite("b", b);
+  require_above("tolerance", tolerance, 0);
   constexpr double kShare = 0.6180339887498949;  // (sqrt(5) - 1) / 2
   double left = b - kShare * (b - a), right = a + kShare * (b - a);
   double at_left = f(left), at_right = f(right);

@@ -39,6 +39,9 @@ struct AngleSeries {
 /// Rows [begin, end) of a series.
 AngleSeries rows_of(const AngleSeries& series, std::size_t begin, std::size_t end);
 
+/// Spans of time up to this fit into 64 bits of nanoseconds, s.
+inline constexpr double kMostSeconds = 9.2e9;
+
 /// Rows [begin, end) of a series.
 struct ShotRange {
   std::size_t begin = 0, end = 0;
@@ -68,7 +71,8 @@ void mirror(AngleSeries& series);
 /// tick to the next one shot further on, so that every beam has its turn.
 class TickSampler {
  public:
-  explicit TickSampler(double rate) : rate_(rate) {}
+  /// @param rate  Hz, > 0
+  explicit TickSampler(double rate);
 
   void restart(std::int64_t time_ns) {
     origin_ns_ = next_ns_ = time_ns;

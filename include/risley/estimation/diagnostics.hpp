@@ -57,6 +57,7 @@ struct AngleProfile {
 class AngleProfiler {
  public:
   explicit AngleProfiler(std::size_t bins = 72);
+  /// A shot of which any number is not finite does not count.
   /// @param angle  rotation angle of the prism, rad, any number of turns
   void add(double angle, double azimuth_residual, double zenith_residual);
   AngleProfile result() const;

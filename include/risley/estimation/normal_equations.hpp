@@ -50,7 +50,9 @@ struct NormalEquations {
   double cost = 0;                  ///< sum of the shots' losses
   std::size_t shots = 0, outliers = 0;
 
-  std::size_t knots() const { return gradient.size() / static_cast<std::size_t>(3 * prisms); }
+  std::size_t knots() const {
+    return prisms < 1 ? 0 : gradient.size() / static_cast<std::size_t>(3 * prisms);
+  }
 
   /// Multiplies all information: 1/f says that every variance is f times as large.
   void scale(double factor);
@@ -62,6 +64,9 @@ struct NormalEquations {
 /// @param knots  linearisation point of the rotors
 /// @param set    instruction set, for tests and benchmarks
 /// @param[out] equations  keeps its memory between calls
+/// @throws InvalidArgument for columns of other lengths, knots beyond the series or of another
+/// train,
+///         and noise that is none
 void accumulate(const AngleSeries& series, const RotorTrajectory& knots, const PrismTrain& train,
                 const std::vector<FreeParameter>& free, const ShotWeights& weights,
                 NormalEquations& equations, const ShotColumns& columns = {},

@@ -26,7 +26,7 @@ class ObservationNoise {
   ObservationNoise(const NoiseSettings& settings, std::uint64_t seed);
 
   /// Changes the columns of consecutive shots in place; azimuth stays in (-pi, pi] and zenith in
-  /// [0, pi], and NaN stays NaN.
+  /// [0, pi], and NaN stays NaN. @throws InvalidArgument for columns of different lengths
   void apply_to_angles(std::uint64_t first_shot, std::span<double> azimuth,
                        std::span<double> zenith) const;
   /// The same for ranges, m. A range of 0, which stands for no return, stays 0; another range does

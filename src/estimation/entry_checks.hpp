@@ -1,0 +1,42 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstddef>
+#include <span>
+
+#include <fmt/format.h>
+
+#include "risley/core/error.hpp"
+#include "risley/core/require.hpp"
+#include "risley/estimation/initialisation.hpp"
+#include "risley/estimation/rotor_process.hpp"
+
+namespace risley::estimation {
+
+/// A start with an angle and a speed for every prism of a train.
+inline void require_start(const Start& start, int prisms) {
+  const auto rotors = static_cast<std::size_t>(prisms);
+  require_length("rotation_angle of the start", start.rotation_angle.size(), rotors);
+  require_length("angular_velocity of the start", start.angular_velocity.size(), rotors);
+  require_between("number of prisms of the start", start.train.prisms(), prisms, prisms);
+  for (std::size_t k = 0; k < rotors; ++k) {
+    require_finite("rotation_angle of the start", start.rotation_angle[k], "rad");
+    require_finite("angular_velocity of the start", start.angular_velocity[k], "rad/s");
+  }
+}
+
+/// Process noise for every rotor, or none at all where it is found from the data.
+inline void require_process(std::span<const RotorProcess> process, int prisms) {
+  if (!process.empty() && process.size() != static_cast<std::size_t>(prisms)) {
+    throw InvalidArgument(
+        fmt::format("process noise for {} rotors given, the train has {}", process.size(), prisms));
+  }
+  for (const RotorProcess& rotor : process) {
+    require_not_below("acceleration", rotor.acceleration, 0, "rad/s/sqrt(s)");
+    require_not_below("angle walk", rotor.angle_walk, 0, "rad/sqrt(s)");
+    require_not_below("jerk", rotor.jerk, 0, "rad/s^2/sqrt(s)");
+  }
+}
+
+}  // namespace risley::estimation
