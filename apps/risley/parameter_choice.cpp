@@ -30,11 +30,16 @@ jobs::HeldParameters held_parameters(const std::vector<std::string>& fixed) {
       continue;
     }
     auto [name, value] = split_assignment(text);
-    // How many prisms there are is not known yet; a name means the same for any number.
-    const auto& known = parameter_list(kMaxPrisms);
-    const auto found = std::find_if(known.begin(), known.end(),
-                                    [&](const ParameterInfo& one) { return one.name == name; });
-    held.emplace_back(name, found == known.end() ? value : value * found->si_per_unit);
+    // The train is not known yet; a name means the same in any, and only emitters' names differ.
+    for (const TrainShape& shape : {TrainShape{kMaxPrisms, 1}, {kMaxPrisms, kMaxEmitters}}) {
+      const auto& known = parameter_list(shape);
+      const auto found = std::find_if(known.begin(), known.end(),
+                                      [&](const ParameterInfo& one) { return one.name == name; });
+      if (found == known.end()) continue;
+      value *= found->si_per_unit;
+      break;
+    }
+    held.emplace_back(name, value);
   }
   return held;
 }

@@ -196,7 +196,7 @@ TEST(Entries, HalfStepsAskForRangesOfAllShotsAndNoise) {
 }
 
 TEST(Entries, DefaultParametersAskForPrisms) {
-  EXPECT_EQ(refusal([] { return default_free_names(0); }), "number of prisms = 0, allowed 1 to 4");
+  EXPECT_EQ(refusal([] { return default_free_names({0}); }), "number of prisms = 0, allowed 1 to 4");
 }
 
 TEST(Entries, AStoredPoseAsksForAFieldOfView) {
