@@ -13,6 +13,7 @@
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
 #include "risley/core/golden_section.hpp"
+#include "risley/estimation/angle_noise.hpp"
 
 #include "estimation/entry_checks.hpp"
 #include "estimation/residual_model.hpp"
