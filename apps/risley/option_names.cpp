@@ -40,6 +40,8 @@ constexpr OptionName kNames[] = {
 
 constexpr std::string_view kWord = "ption ";  // after "o" or "O"
 
+bool is_letter(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z'); }
+
 }  // namespace
 
 std::string with_flags(const std::string& text) {
@@ -47,6 +49,7 @@ std::string with_flags(const std::string& text) {
   std::size_t done = 0;
   for (std::size_t at = text.find(kWord); at != std::string::npos; at = text.find(kWord, at + 1)) {
     if (at == 0 || (text[at - 1] != 'o' && text[at - 1] != 'O') || at - 1 < done) continue;
+    if (at > 1 && is_letter(text[at - 2])) continue;  // "adoption"
     const std::size_t begin = at + kWord.size();
     const std::size_t end =
         std::min(text.find_first_not_of("abcdefghijklmnopqrstuvwxyz_", begin), text.size());
