@@ -314,17 +314,17 @@ void read_combinations(const YamlMap& root, Sensor& sensor) {
   }
   const YamlMap::Entry& list = root.at("combinations");
   constexpr std::size_t kMost = 16;
-  if (!list.value.IsSequence() || list.value.size() < 1 || list.value.size() > kMost) {
+  if (!list.value.is_list() || list.value.items.size() < 1 || list.value.items.size() > kMost) {
     fail_at(root.path(), list.line,
             fmt::format("combinations: expected a list of 1 to {} combinations", kMost));
   }
-  for (const auto& node : list.value) {
+  for (const YamlNode& node : list.value.items) {
     const std::string field = fmt::format("combinations[{}]", sensor.combinations.size());
     const YamlMap map(node, root.path(), field);
     map.allow_only({"angular_velocity_deg_per_s", "face_order"});
     const YamlMap::Entry& speeds = map.at("angular_velocity_deg_per_s");
     const auto prisms = static_cast<std::size_t>(sensor.prisms());
-    if (!speeds.value.IsSequence() || speeds.value.size() != prisms) {
+    if (!speeds.value.is_list() || speeds.value.items.size() != prisms) {
       fail_at(map.path(), speeds.line,
               fmt::format("{}: expected {} numbers, one per prism",
                           map.field("angular_velocity_deg_per_s"), prisms));
@@ -335,7 +335,7 @@ void read_combinations(const YamlMap& root, Sensor& sensor) {
           fmt::format("angular_velocity_{}_deg_per_s", prism_letter(static_cast<int>(k)));
       const ParameterInfo& info = find_parameter(name, sensor.shape());
       const double speed = si_from_file(
-          yaml_number(speeds.value[k], map.path(), map.field("angular_velocity_deg_per_s")),
+          yaml_number(speeds.value.items[k], map.path(), map.field("angular_velocity_deg_per_s")),
           scale_of(info.unit));
       try {
         check_bounds(info, speed);
@@ -583,13 +583,27 @@ Sensor parse_preset(const std::string& text, const std::string& path) {
     fail_at(path, root.line(), "is no sensor preset: risley_preset is missing");
   }
   root.integer("risley_preset", kSchemaVersion, kSchemaVersion);
-  root.allow_only({"risley_preset", "name",        "manufacturer",
-                   "model",         "serial",      "face_order",
-                   "emitters",      "combination", "device_type",
-                   "parameters",    "noise",       "resolution",
-                   "limits",        "range",       "rates",
-                   "beam",          "geometry",    "calibrated_against",
-                   "covariance",    "provenance"});
+  root.allow_only({"risley_preset",
+                   "name",
+                   "manufacturer",
+                   "model",
+                   "serial",
+                   "face_order",
+                   "emitters",
+                   "combination",
+                   "combinations",
+                   "device_type",
+                   "parameters",
+                   "noise",
+                   "resolution",
+                   "limits",
+                   "range",
+                   "rates",
+                   "beam",
+                   "geometry",
+                   "calibrated_against",
+                   "covariance",
+                   "provenance"});
   Sensor sensor;
   sensor.name = root.text("name");
   sensor.manufacturer = root.text("manufacturer");

@@ -22,8 +22,10 @@ Sensor load_sensor(const std::string& name_or_path);
 /// Reads preset text: one YAML map, version first (risley_preset: 1). A physical value reads
 /// {value, unit, sigma, source}, where sigma, in the same unit, and source come together or not at
 /// all; 0 stands for an unknown divergence or size. A value of all prisms stands under its shared
-/// name or under the prisms' own names. covariance: {names, matrix}, element [i][j] in the unit of
-/// names[i] times that of names[j], so degrees as everywhere in files.
+/// name or under the prisms' own names. combination says which of combinations, a list of
+/// {angular_velocity_deg_per_s: [prisms], face_order}, the parameters are of. covariance: {names,
+/// matrix}, element [i][j] in the unit of names[i] times that of names[j], so degrees as everywhere
+/// in files.
 /// @param path  for messages only
 /// @throws FileError with the line
 Sensor parse_preset(const std::string& text, const std::string& path);
