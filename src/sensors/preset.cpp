@@ -583,13 +583,27 @@ Sensor parse_preset(const std::string& text, const std::string& path) {
     fail_at(path, root.line(), "is no sensor preset: risley_preset is missing");
   }
   root.integer("risley_preset", kSchemaVersion, kSchemaVersion);
-  root.allow_only({"risley_preset", "name",        "manufacturer",
-                   "model",         "serial",      "face_order",
-                   "emitters",      "combination", "device_type",
-                   "parameters",    "noise",       "resolution",
-                   "limits",        "range",       "rates",
-                   "beam",          "geometry",    "calibrated_against",
-                   "covariance",    "provenance"});
+  root.allow_only({"risley_preset",
+                   "name",
+                   "manufacturer",
+                   "model",
+                   "serial",
+                   "face_order",
+                   "emitters",
+                   "combination",
+                   "combinations",
+                   "device_type",
+                   "parameters",
+                   "noise",
+                   "resolution",
+                   "limits",
+                   "range",
+                   "rates",
+                   "beam",
+                   "geometry",
+                   "calibrated_against",
+                   "covariance",
+                   "provenance"});
   Sensor sensor;
   sensor.name = root.text("name");
   sensor.manufacturer = root.text("manufacturer");

@@ -87,5 +87,81 @@ TEST(Sensor, OneCombinationOnlyIsSaid) {
   EXPECT_THROW(with_combination(sensor, 2), InvalidArgument);
 }
 
+TEST(Combinations, MayBeAListOfAnyLength) {
+  Sensor sensor = load_sensor("horizon");
+  const std::vector<double> own = sensor.angular_velocity;  // (-a, a, -c)
+  const double slow = own[2];
+  sensor.combination = 2;
+  sensor.combinations = {{{own[0], 0.0, slow}, {}},
+                         {own, {}},
+                         {{-slow, own[0], own[1]}, parse_face_order("PA-AP-PA")}};
+  sensor.set("angular_velocity_a_deg_per_s", own[0] + 1.0);  // a unit's own speed
+  sensor.covariance_names = {"angular_velocity_c_deg_per_s", "refractive_index_a"};
+  sensor.covariance = (Eigen::MatrixXd(2, 2) << 4.0, 0.5, 0.5, 1.0).finished();
+  const Sensor third = with_combination(sensor, 3);
+  EXPECT_EQ(third.combination, 3);
+  EXPECT_EQ(third.train.face_order(), parse_face_order("PA-AP-PA"));
+  EXPECT_EQ(third.train.parameters(), sensor.train.parameters());
+  EXPECT_EQ(third.angular_velocity, (std::vector{-slow, own[0] + 1.0, own[1]}));
+  EXPECT_EQ(third.covariance_names.front(), "angular_velocity_a_deg_per_s");
+  EXPECT_EQ(third.covariance(0, 1), -0.5);
+  EXPECT_EQ(third.covariance(0, 0), 4.0);
+  // One with a prism that does not turn has other speeds: those of the list.
+  const Sensor first = with_combination(sensor, 1);
+  EXPECT_EQ(first.angular_velocity, (std::vector{own[0], 0.0, slow}));
+  EXPECT_THROW(with_combination(sensor, 4), InvalidArgument);
+  EXPECT_THROW(with_combination(sensor, 0), InvalidArgument);
+  const auto all = in_all_combinations(sensor);
+  ASSERT_EQ(all.size(), 3u);
+  EXPECT_EQ(all[0].combination, 2);
+  EXPECT_EQ(all[1].combination, 1);
+  EXPECT_EQ(all[2].combination, 3);
+  // The list travels in the preset.
+  const Sensor again = parse_preset(preset_text(sensor), "again");
+  ASSERT_EQ(again.combinations.size(), 3u);
+  EXPECT_EQ(again.combination, 2);
+  EXPECT_EQ(again.combinations[2].angular_velocity, sensor.combinations[2].angular_velocity);
+  EXPECT_EQ(again.combinations[2].face_order, sensor.combinations[2].face_order);
+  EXPECT_EQ(preset_text(again), preset_text(sensor));
+}
+
+TEST(Combinations, OfTwoRotorsNeedNoList) {
+  const Sensor sensor = load_sensor("mid-40");
+  const auto all = in_all_combinations(sensor);
+  ASSERT_EQ(all.size(), 2u);
+  EXPECT_EQ(all[1].combination, 2);
+  EXPECT_EQ(all[1].angular_velocity,
+            (std::vector{-sensor.angular_velocity[1], -sensor.angular_velocity[0]}));
+  EXPECT_EQ(in_all_combinations(load_sensor("horizon")).size(), 1u);
+}
+
+TEST(PrismSizes, MayBeThePrismsOwnInAPreset) {
+  Sensor sensor = load_sensor("horizon");
+  sensor.geometry = {{0.007, 0.008, 0.009}, {0.03, 0.02}};
+  sensor.set_knowledge({"prism_thickness_b_m", 0.001, "measured"});
+  const std::string text = preset_text(sensor);
+  const Sensor again = parse_preset(text, "again");
+  EXPECT_EQ(again.geometry, sensor.geometry);
+  EXPECT_EQ(again.find_knowledge("prism_thickness_b_m")->sigma, 0.001);
+  EXPECT_EQ(preset_text(again), text);
+  const auto with = [&](const std::string& from, const std::string& to) {
+    std::string changed = text;
+    changed.replace(changed.find(from), from.size(), to);
+    return changed;
+  };
+  EXPECT_THROW(parse_preset(with("prism_thickness_c_m", "prism_thickness_m"), "x"), FileError);
+  EXPECT_THROW(parse_preset(with("prism_spacing_b_m", "prism_spacing_c_m"), "x"), FileError);
+  EXPECT_THROW(parse_preset(with("value: 0.008", "value: -0.008"), "x"), FileError);
+  sensor.geometry.thickness.pop_back();
+  EXPECT_THROW(preset_text(sensor), InvalidArgument);
+}
+
+TEST(Sensor, OneThatWasNotSetHasNoPrisms) {
+  const Sensor sensor;
+  EXPECT_EQ(sensor.prisms(), 0);
+  EXPECT_THROW(sensor.get("refractive_index"), InvalidArgument);
+  EXPECT_THROW(preset_text(sensor), InvalidArgument);
+}
+
 }  // namespace
 }  // namespace risley::sensors

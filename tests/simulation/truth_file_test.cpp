@@ -10,6 +10,7 @@
 
 #include "risley/core/angle.hpp"
 #include "risley/io/sha256.hpp"
+#include "risley/optics/observation_model.hpp"
 #include "risley/recordings/reader.hpp"
 #include "risley/recordings/truth.hpp"
 #include "risley/sensors/preset.hpp"
@@ -73,6 +74,40 @@ TEST_F(TruthFile, RecordingAndTruthComeBack) {
   EXPECT_EQ(recording.data.observations.time_ns, truth.time_ns);
   EXPECT_EQ(recording.data.observations.azimuth, chunk.observations.azimuth);
   EXPECT_EQ(recording.data.observations.range, chunk.observations.range);
+}
+
+// Three prisms, six emitters in turn, packets of 96 shots at 240 kHz.
+TEST_F(TruthFile, AHorizonKeepsItsBeamsAndTimesInLvx) {
+  SimulationSettings s = settings();
+  s.truth = sensors::load_sensor("horizon");
+  s.duration = 0.02;
+  s.rate.reset();
+  Scanner scanner(s);
+  recordings::Chunk chunk;
+  recordings::TruthColumns truth;
+  ASSERT_TRUE(scanner.read(chunk, truth));
+  ASSERT_EQ(chunk.observations.size(), 4800u);
+  ASSERT_EQ(truth.prisms(), 3);
+  EXPECT_EQ(scanner.header().devices.front().type, 3);
+  for (std::size_t i = 0; i < truth.size(); i += 7) {
+    EXPECT_EQ(chunk.observations.beam[i], i % 6);
+    std::vector<double> angles;
+    for (const auto& column : truth.rotation_angle) angles.push_back(wrap_to_two_pi(column[i]));
+    const Observation shot = observe(s.truth.train, angles, static_cast<int>(i % 6));
+    EXPECT_NEAR(truth.azimuth[i], shot.azimuth, 1e-14);
+    EXPECT_NEAR(truth.zenith[i], shot.zenith, 1e-14);
+  }
+
+  const SimulationResult result = simulate_to_file(s, path("out.lvx"), {});
+  EXPECT_EQ(result.truth.train.emitters(), 6);
+  const recordings::Recording read = recordings::load_recording(path("out.lvx"));
+  EXPECT_EQ(read.header.devices.front().type, 3);
+  EXPECT_EQ(read.data.observations.time_ns, chunk.observations.time_ns);
+  EXPECT_EQ(read.data.observations.beam, chunk.observations.beam);
+  EXPECT_EQ(read.data.observations.valid, chunk.observations.valid);
+  EXPECT_EQ(read.data.packets.size(), 4800u / 96u);
+  EXPECT_EQ(sensors::load_sensor(truth_preset_path(path("out.lvx"))).train.parameters(),
+            s.truth.train.parameters());
 }
 
 TEST_F(TruthFile, PresetIsTheTrueSensorWithAllThatMakesItAgain) {
