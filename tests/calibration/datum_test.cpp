@@ -235,7 +235,7 @@ TEST(Datum, KindsHaveNames) {
 
 TEST(FormalDatum, AsksForACovarianceOfTheFreeParametersAndAnglesOfEveryPrism) {
   const PrismTrain train(parse_face_order("PA-AP"));
-  const auto free = estimation::free_parameters({"refractive_index"}, 2);
+  const auto free = estimation::free_parameters({"refractive_index"}, {2});
   const Eigen::MatrixXd one = Eigen::MatrixXd::Identity(1, 1);
   const auto run = [&](const Eigen::MatrixXd& covariance,
                        const std::vector<std::vector<double>>& angles) {

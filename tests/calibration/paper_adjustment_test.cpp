@@ -149,7 +149,7 @@ TEST(PaperAdjustment, FindsTheMinimumOfSeveralWalls) {
 
 /// Beams that start beside the axis: their derivative is left out.
 TEST(PaperAdjustment, FindsItAlmostWithBeamsThatStartBesideTheAxis) {
-  expect_brute_force(problem_of(corner(), {0.007, 0.03}, 800), 5e-2);
+  expect_brute_force(problem_of(corner(), {{0.007, 0.007}, {0.03}}, 800), 5e-2);
 }
 
 TEST(PaperAdjustment, ParametersOfSeveralPlacesMoveTogether) {
@@ -163,7 +163,7 @@ TEST(PaperAdjustment, ParametersOfSeveralPlacesMoveTogether) {
 }
 
 TEST(PaperAdjustment, LeavesThePlanesItFitted) {
-  const PlanarProblem p = problem_of(corner(), {0.007, 0.03}, 800);
+  const PlanarProblem p = problem_of(corner(), {{0.007, 0.007}, {0.03}}, 800);
   const PlanarSolution solution = adjust_as_paper(p);
   EXPECT_GT(solution.iterations, 1);
   EXPECT_LT(solution.iterations, 15);

@@ -179,7 +179,7 @@ TEST(Entries, TrajectoriesAskForCovariancesThatAreThere) {
 }
 
 TEST(Entries, WeakDirectionsAskForInformationOfTheFreeParameters) {
-  const auto free = free_parameters({"refractive_index"}, 2);
+  const auto free = free_parameters({"refractive_index"}, {2});
   EXPECT_EQ(refusal([&] { return weak_directions(Eigen::MatrixXd::Identity(2, 2), free, 0.5); }),
             "rows of the information has 2 values, expected 1");
   EXPECT_EQ(refusal([&] { return weak_directions(Eigen::MatrixXd::Identity(1, 1), free, kNan); }),
@@ -201,7 +201,8 @@ TEST(Entries, HalfStepsAskForRangesOfAllShotsAndNoise) {
 }
 
 TEST(Entries, DefaultParametersAskForPrisms) {
-  EXPECT_EQ(refusal([] { return default_free_names({0}); }), "number of prisms = 0, allowed 1 to 4");
+  EXPECT_EQ(refusal([] { return default_free_names({0}); }),
+            "number of prisms = 0, allowed 1 to 4");
 }
 
 TEST(Entries, AStoredPoseAsksForAFieldOfView) {
@@ -215,7 +216,7 @@ struct Linear {
   std::vector<ShotRange> all{{0, 4}};
   RotorTrajectory knots = make_knots(series, all, 2);
   PrismTrain train{parse_face_order("PA-AP")};
-  std::vector<FreeParameter> free = free_parameters({"refractive_index"}, 2);
+  std::vector<FreeParameter> free = free_parameters({"refractive_index"}, {2});
   ShotWeights weights{.angle_noise = equal_noise(1e-4)};
   NormalEquations equations;
 
