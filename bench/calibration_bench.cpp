@@ -152,7 +152,8 @@ class RangeResidual {
                                   T(shots.rotation_angle[1][shot_])};
     const auto forward = trace_forward(train, angles);
     if (!forward.valid()) return false;
-    const double thickness = problem_.geometry.thickness, spacing = problem_.geometry.spacing;
+    const double thickness = problem_.geometry.thickness.front();
+    const double spacing = problem_.geometry.spacing.front();
     const Vector3<T> origin =
         beam_origin(forward, {T(-spacing), T(-spacing + thickness), T(-thickness), T(0.0)});
     const Vector3<T> normal =

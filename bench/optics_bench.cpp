@@ -177,9 +177,8 @@ BENCHMARK(inverse);
 
 const bool registered = [] {
   for (const InstructionSet set : available_instruction_sets()) {
-    benchmark::RegisterBenchmark(("batch_model/" + to_string(set)).c_str(), batch_model, {}, set);
-    benchmark::RegisterBenchmark(("batch_adjoint/" + to_string(set)).c_str(), batch_adjoint, {},
-                                 set);
+    benchmark::RegisterBenchmark(("batch_model/" + to_string(set)).c_str(), batch_model, set);
+    benchmark::RegisterBenchmark(("batch_adjoint/" + to_string(set)).c_str(), batch_adjoint, set);
   }
   return true;
 }();
