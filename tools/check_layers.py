@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-FileCopyrightText: 2026 The risley authors
 # SPDX-License-Identifier: MIT
-"""Checks that no file includes a layer which its own layer does not declare in CMakeLists.txt.
+"""Checks that no file includes a layer which its own layer does not declare in CMakeLists.txt, nor
+a library that only one layer may know.
 
 Usage: tools/check_layers.py [ROOT]
 Exit status: 0 all well, 1 a rule is broken (one line each: file:line: what is wrong).
@@ -12,6 +13,8 @@ import sys
 
 LAYER = re.compile(r"^\s*risley_add_layer\(\s*(\w+)(?:\s+LAYERS\s+([\w\s]*))?\)", re.MULTILINE)
 INCLUDE = re.compile(r'^\s*#\s*include\s*["<]([^">]+)[">]')
+# Libraries with one home: what others need of them, they ask that layer for.
+HOMES = {"netcdf": "io", "hdf5": "io", "yaml-cpp": "io", "openssl": "io"}
 STRANGERS = ("simulation", "estimation")  # they meet only in tests, so their agreement counts
 
 
@@ -42,7 +45,13 @@ def included_layer(include, layers):
     return parts[0] if len(parts) > 1 and parts[0] in layers else None
 
 
-def check_file(path, shown, allowed, layers):
+def library_of(include):
+    """The library among HOMES that an #include names, or None."""
+    name = include.split("/")[0].removesuffix(".h")
+    return name if name in HOMES else None
+
+
+def check_file(path, shown, allowed, layers, own):
     errors = []
     for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1):
         match = INCLUDE.match(line)
@@ -52,6 +61,9 @@ def check_file(path, shown, allowed, layers):
         if ".." in include.split("/"):
             errors.append(f'{shown}:{number}: "{include}" hides its layer, name it from the root')
             continue
+        library = library_of(include)
+        if library and own != HOMES[library]:
+            errors.append(f"{shown}:{number}: only the layer {HOMES[library]} may include {include}")
         layer = included_layer(include, layers)
         if layer is None:
             continue
@@ -75,6 +87,7 @@ def check(root):
     for folder in ("include/risley", "src", "apps"):
         for path in sorted((root / folder).rglob("*.[ch]pp")):
             shown = path.relative_to(root)
+            layer = None
             if folder == "apps":
                 allowed = layers.keys()
             else:
@@ -82,7 +95,7 @@ def check(root):
                 if layer not in layers:
                     continue
                 allowed = layers[layer] | {layer}
-            errors += check_file(path, shown, allowed, layers)
+            errors += check_file(path, shown, allowed, layers, layer)
     return errors
 
 
