@@ -100,14 +100,16 @@ class OutputTest(CommandTest):
             (cls.folder / "made.nc").rename(cls.folder / name)
 
     def test_netcdf_files_of_any_name_are_converted_in_parallel(self):
-        for ending, names in (("nc", []), ("sequence.csv", [])):
+        formats = {"nc": "netcdf", "sequence.csv": "scan-sequence-csv"}
+        for ending in formats:
+            names = []
             for name in "ABC":
                 one = f"{name}.one.{ending}"
                 self.expect(0, "convert", f"{name}.NC", "-o", one)
                 names.append(one)
             for _ in range(5):
                 done = self.expect(0, "convert", "A.NC", "B.NC", "C.NC", "-o", "together/",
-                                   "--to", ending)
+                                   "--format", formats[ending])
                 self.assertNotIn("HDF5", done.stderr)
                 for name, one in zip("ABC", names):
                     made = list((self.folder / "together").glob(f"{name}.*"))
