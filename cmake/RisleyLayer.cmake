@@ -13,6 +13,9 @@ function(risley_target_defaults target)
                          -Wno-sign-conversion
                          # gcc 12 sees overlaps in std::string (gcc.gnu.org/PR105651)
                          $<$<AND:$<CXX_COMPILER_ID:GNU>,$<VERSION_LESS:$<CXX_COMPILER_VERSION>,13>>:-Wno-restrict>
+                         # sources compiled together look to gcc like headers with types of their own, and
+                         # see each other's names
+                         $<$<AND:$<CXX_COMPILER_ID:GNU>,$<BOOL:${CMAKE_UNITY_BUILD}>>:-Wno-subobject-linkage$<SEMICOLON>-Wno-shadow>
                          $<$<BOOL:${RISLEY_WARNINGS_AS_ERRORS}>:-Werror>)
 endfunction()
 

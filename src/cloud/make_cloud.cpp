@@ -16,6 +16,8 @@
 #include "risley/core/angle.hpp"
 #include "risley/optics/observation_model.hpp"
 
+#include "cloud/piece_overlap.hpp"
+
 namespace risley::cloud {
 namespace {
 
@@ -30,8 +32,6 @@ constexpr std::size_t kBeliefShots = std::size_t{1} << 18;
 constexpr std::size_t kPieceRows = std::size_t{1} << 18;
 /// The same where no rotation angles are needed: a surface's worth.
 constexpr std::size_t kReportedRows = std::size_t{1} << 16;
-/// Pieces overlap by so much, because rotation angles are less certain at the end of one.
-constexpr std::int64_t kOverlapNs = 100'000'000;
 /// Surfaces are taken to stand still for so long.
 constexpr std::int64_t kSurfaceNs = 1'000'000'000;
 constexpr std::size_t kSurfaceShots = 16000;
@@ -51,16 +51,6 @@ struct Block {
   std::uint64_t outliers = 0, without_rotation_angle = 0;
   double azimuth_squares = 0, zenith_squares = 0;
 };
-
-/// First row of those at the end of a piece that belong to the last kOverlapNs of its clock.
-std::size_t overlap_begin(const Observations& piece, std::size_t end) {
-  std::size_t row = end;
-  while (row > 0 && piece.time_ns[row - 1] > piece.time_ns[end - 1] - kOverlapNs &&
-         piece.time_ns[row - 1] <= piece.time_ns[end - 1] + kOverlapNs) {
-    --row;
-  }
-  return row;
-}
 
 /// All returns of a shot stand together.
 bool same_shot(const Observations& o, std::size_t a, std::size_t b) {
@@ -86,12 +76,13 @@ class Work {
       more = fill_piece();
       if (piece_.size() == 0) break;
       if (!writer_) set_up();
-      std::size_t end = more && rotors_ ? overlap_begin(piece_, piece_.size()) : piece_.size();
+      std::size_t end =
+          more && rotors_ ? overlap_begin(piece_.time_ns, piece_.size()) : piece_.size();
       if (end <= done_) end = piece_.size();  // times that make no sense
       if (end > done_) emit(end);
       if (!more) break;
       const std::size_t keep =
-          rotors_ ? overlap_begin(piece_, std::max(done_, std::size_t{1})) : done_;
+          rotors_ ? overlap_begin(piece_.time_ns, std::max(done_, std::size_t{1})) : done_;
       piece_.drop_front(keep);
       first_row_ += keep;
       done_ -= keep;

@@ -75,6 +75,7 @@ Autocorrelation autocorrelation(std::span<const std::int64_t> time_ns,
   Autocorrelation result;
   if (time_ns.size() < 100) return result;
   const std::int64_t step = median_step_ns(time_ns);
+  if (step <= 0) return result;  // a clock that stands still tells no lags
   // Blocks spread over the recording, left-out shots as zeros with weight zero.
   struct Block {
     std::vector<double> azimuth, zenith, weight;

@@ -14,52 +14,18 @@ namespace risley::recordings {
 namespace {
 
 /// Gives every row the time that counting its shot gives.
-class CountingReader final : public Reader {
+class CountingReader final : public DecoratingReader {
  public:
   CountingReader(std::unique_ptr<Reader> inner, std::string path, double shot_rate)
-      : inner_(std::move(inner)), path_(std::move(path)), shot_rate_(shot_rate) {
+      : DecoratingReader(std::move(inner)), path_(std::move(path)), shot_rate_(shot_rate) {
     take_over();
   }
-
-  bool read(Chunk& chunk, std::size_t max_rows) override {
-    if (failure_) throw FileError(*failure_);
-    bool more = false;
-    try {
-      more = inner_->read(chunk, max_rows);
-    } catch (const FileError&) {
-      take_over();
-      throw;
-    }
-    lost_samples_ += chunk.imu.size();
-    take_over();
-    chunk.packets.clear();
-    chunk.imu.clear();
-    Observations& rows = chunk.observations;
-    for (std::size_t row = 0; row < rows.size(); ++row) {
-      const std::optional<std::int64_t> time_ns = time_of(shot_number(rows, row));
-      if (!time_ns) {
-        failure_.emplace(path_, FilePlace{},
-                         fmt::format("shot number {} at {} Hz is beyond 9.2e9 s, the latest time; "
-                                     "expected smaller numbers or a higher shot rate",
-                                     rows.time_ns[row], shot_rate_));
-        rows.resize(row);
-        if (row == 0) throw FileError(*failure_);
-        break;
-      }
-      rows.time_ns[row] = *time_ns;
-    }
-    return more;
-  }
-
-  double fraction_read() const override { return inner_->fraction_read(); }
 
  private:
-  /// What the inner reader knows by now.
-  void take_over() {
-    header_ = inner_->header();
+  void describe() override {
     header_.has_times = true;
     header_.time_reference = TimeReference::relative;
-    warnings_ = inner_->warnings();
+    clock_wraps_ = 0;
     if (lost_samples_ == 0) return;
     warnings_.push_back({{},
                          "inertial samples were left out: their times are not those of counted "
@@ -67,8 +33,28 @@ class CountingReader final : public Reader {
                          lost_samples_});
   }
 
+  std::optional<FileError> change(Chunk& chunk) override {
+    lost_samples_ += chunk.imu.size();
+    chunk.packets.clear();
+    chunk.imu.clear();
+    Observations& rows = chunk.observations;
+    for (std::size_t row = 0; row < rows.size(); ++row) {
+      const std::optional<std::int64_t> time_ns = time_of(shot_number(rows, row));
+      if (!time_ns) {
+        FileError error(path_, FilePlace{},
+                        fmt::format("shot number {} at {} Hz is beyond 9.2e9 s, the latest time; "
+                                    "expected smaller numbers or a higher shot rate",
+                                    rows.time_ns[row], shot_rate_));
+        rows.resize(row);
+        return error;
+      }
+      rows.time_ns[row] = *time_ns;
+    }
+    return std::nullopt;
+  }
+
   std::int64_t shot_number(const Observations& rows, std::size_t row) {
-    if (!inner_->header().has_times) return rows.time_ns[row];
+    if (!inner().header().has_times) return rows.time_ns[row];
     std::int64_t& next = next_shot_[rows.device[row]];
     if (rows.return_number[row] <= 1 || next == 0) ++next;
     return next - 1;
@@ -81,12 +67,10 @@ class CountingReader final : public Reader {
     return std::llround(time_ns);
   }
 
-  std::unique_ptr<Reader> inner_;
   std::string path_;
   double shot_rate_;
   std::array<std::int64_t, 256> next_shot_{};  ///< by device
   std::uint64_t lost_samples_ = 0;
-  std::optional<FileError> failure_;
 };
 
 }  // namespace

@@ -32,37 +32,18 @@ void check_finite(const Extrinsics& pose) {
   check("translation.z", pose.translation.z, "m");
 }
 
-class SensorFrameReader final : public Reader {
+class SensorFrameReader final : public DecoratingReader {
  public:
   SensorFrameReader(std::unique_ptr<Reader> inner, const Extrinsics& pose)
-      : inner_(std::move(inner)),
+      : DecoratingReader(std::move(inner)),
         axes_(sensor_axes(pose)),
         translation_(pose.translation),
         moves_(norm(pose.translation) > 0.0) {
     take_over();
   }
 
-  bool read(Chunk& chunk, std::size_t max_rows) override {
-    bool more = false;
-    try {
-      more = inner_->read(chunk, max_rows);
-    } catch (const FileError&) {
-      take_over();
-      throw;
-    }
-    chunk.packets.clear();
-    Observations& rows = chunk.observations;
-    for (std::size_t row = 0; row < rows.size(); ++row) turn_back(rows, row);
-    take_over();
-    return more;
-  }
-
-  double fraction_read() const override { return inner_->fraction_read(); }
-
  private:
-  /// What the inner reader knows by now.
-  void take_over() {
-    header_ = inner_->header();
+  void describe() override {
     if (header_.devices.size() > 1) {
       throw InvalidArgument(
           fmt::format("ReadOptions::extrinsics for a recording of {} sensors, expected one sensor: "
@@ -73,8 +54,6 @@ class SensorFrameReader final : public Reader {
       device.extrinsic_enabled = false;
       device.roll_pitch_yaw_deg = device.translation_m = {};
     }
-    clock_wraps_ = inner_->clock_wraps();
-    warnings_ = inner_->warnings();
     if (not_moved_ == 0) return;
     warnings_.push_back(
         {{},
@@ -82,6 +61,13 @@ class SensorFrameReader final : public Reader {
                      "moved: the translation of {:.6g} {:.6g} {:.6g} m is left out",
                      not_moved_, translation_.x, translation_.y, translation_.z),
          0});
+  }
+
+  std::optional<FileError> change(Chunk& chunk) override {
+    chunk.packets.clear();
+    Observations& rows = chunk.observations;
+    for (std::size_t row = 0; row < rows.size(); ++row) turn_back(rows, row);
+    return std::nullopt;
   }
 
   void turn_back(Observations& rows, std::size_t row) {
@@ -134,7 +120,6 @@ class SensorFrameReader final : public Reader {
     rows.valid[row] = 0;
   }
 
-  std::unique_ptr<Reader> inner_;
   std::array<Vector3<double>, 3> axes_;  ///< of the sensor in the recorded frame
   Vector3<double> translation_;
   bool moves_;

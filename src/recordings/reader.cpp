@@ -83,7 +83,7 @@ std::unique_ptr<Reader> open_recording(const std::string& path, const ReadOption
   std::unique_ptr<Reader> reader = open_as_it_is(path);
   if (options.shot_rate) reader = with_counted_times(std::move(reader), path, *options.shot_rate);
   if (options.extrinsics) reader = in_sensor_frame(std::move(reader), *options.extrinsics);
-  return reader;
+  return within_time_span(std::move(reader), path);
 }
 
 void require_times(const RecordingHeader& header) {

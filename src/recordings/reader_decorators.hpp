@@ -3,12 +3,40 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 
+#include "risley/core/error.hpp"
 #include "risley/recordings/extrinsics.hpp"
 #include "risley/recordings/reader.hpp"
 
 namespace risley::recordings {
+
+/// A reader that changes what another one reads.
+class DecoratingReader : public Reader {
+ public:
+  bool read(Chunk& chunk, std::size_t max_rows) final;
+  double fraction_read() const final { return inner_->fraction_read(); }
+
+ protected:
+  explicit DecoratingReader(std::unique_ptr<Reader> inner) : inner_(std::move(inner)) {}
+
+  const Reader& inner() const { return *inner_; }
+
+  /// Takes over what the inner reader knows by now; also the last step of a constructor.
+  void take_over();
+
+  /// Changes header, warnings and clock wraps, which were just taken over.
+  virtual void describe() = 0;
+
+  /// Changes a chunk.
+  /// @return what stops the reading: the chunk then has only what stood before it
+  virtual std::optional<FileError> change(Chunk& chunk) = 0;
+
+ private:
+  std::unique_ptr<Reader> inner_;
+  std::optional<FileError> failure_;
+};
 
 /// Gives every row the time that counting its shot gives, see ReadOptions::shot_rate.
 /// @param path       for errors
@@ -20,5 +48,10 @@ std::unique_ptr<Reader> with_counted_times(std::unique_ptr<Reader> reader, const
 /// Turns every row back into the frame of its sensor, see ReadOptions::extrinsics.
 /// @throws InvalidArgument when a number of the pose is not finite, or for several sensors
 std::unique_ptr<Reader> in_sensor_frame(std::unique_ptr<Reader> reader, const Extrinsics& pose);
+
+/// Refuses times further than kLongestTimeSpan_ns from the first one as damage, so that nobody
+/// behind it has to fear that the difference of two times does not fit 64 bits.
+/// @param path  for errors
+std::unique_ptr<Reader> within_time_span(std::unique_ptr<Reader> reader, const std::string& path);
 
 }  // namespace risley::recordings

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "risley/core/saturating.hpp"
+
 namespace risley::recordings {
 namespace {
 
@@ -51,7 +53,7 @@ void TimeAudit::add_packet(const Packet& packet, std::uint8_t device, std::int64
   state.late_packet = false;
   if (state.last_packet_ns && time_ns <= *state.last_packet_ns && !state.source_changed) {
     ++totals_.non_monotonic_packets;
-    state.late_packet = *state.last_packet_ns - time_ns < kLatePacket_ns;
+    state.late_packet = saturating_difference(*state.last_packet_ns, time_ns) < kLatePacket_ns;
   }
   if (!state.late_packet) state.last_packet_ns = time_ns;
 }
@@ -87,8 +89,8 @@ void TimeAudit::add_row(const Observations& o, std::size_t row) {
   // Shots of a late packet fill a hole that was passed already.
   if (state.late_packet && time <= state.last_shot_ns) return;
   if (state.started) {
-    add_step(state,
-             {time - state.last_shot_ns, state.last_shot_ns, row_number, state.source_changed});
+    add_step(state, {saturating_difference(time, state.last_shot_ns), state.last_shot_ns,
+                     row_number, state.source_changed});
   }
   state.source_changed = false;
   state.started = true;
@@ -110,9 +112,9 @@ void TimeAudit::add_step(DeviceState& state, const TimeStep& step) {
     ++state.resets;
     return;
   }
-  state.covered_ns += step.step_ns;
+  state.covered_ns = saturating_sum(state.covered_ns, step.step_ns);
   if (!gap) {
-    state.regular_ns += step.step_ns;
+    state.regular_ns = saturating_sum(state.regular_ns, step.step_ns);
     ++state.regular_steps;
     return;
   }
@@ -158,7 +160,7 @@ TimeAuditResult TimeAudit::result() const {
       result.gaps.largest_at_row = state.gaps.largest_at_row;
     }
     covered_ns = std::max(covered_ns, state.covered_ns);
-    regular_ns += state.regular_ns;
+    regular_ns = saturating_sum(regular_ns, state.regular_ns);
     regular_steps += state.regular_steps;
     if (result.nominal_step_s == 0) {
       result.nominal_step_s = static_cast<double>(state.nominal_ns) * kSecondsPerNanosecond;

@@ -246,5 +246,14 @@ TEST(AngleProfile, BinsWithoutShotsAreNan) {
   EXPECT_TRUE(std::isfinite(profile.chi2_per_bin));
 }
 
+TEST(Autocorrelation, AClockThatStandsStillTellsNothing) {
+  const std::vector<std::int64_t> times(1000, 5);
+  const std::vector<double> residuals(1000, 1e-4);
+  const std::vector<unsigned char> skip(1000, 0);
+  const Autocorrelation found = autocorrelation(times, residuals, residuals, skip);
+  EXPECT_EQ(found.factor, 1.0);
+  EXPECT_TRUE(found.rho.empty());
+}
+
 }  // namespace
 }  // namespace risley::estimation

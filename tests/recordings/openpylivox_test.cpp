@@ -11,7 +11,6 @@
 #include "risley/io/little_endian.hpp"
 
 #include "recordings/format_tests.hpp"
-#include "recordings/formats/packet.hpp"
 
 namespace risley::recordings {
 namespace {
@@ -423,6 +422,39 @@ TEST(Openpylivox, LargeTimesComeBack) {
                                   chunk.observations.time_ns[0]),
               0.0, 240.0);
   EXPECT_TRUE(copy_of(kOpenpylivoxBinFormat, first, 1) == get_bytes(first));
+}
+
+TEST(OpenpylivoxCsv, PointsCloserThanTheStepAreCounted) {
+  for (const bool cartesian : {false, true}) {
+    RecordingHeader header;
+    header.devices.resize(1);
+    header.cartesian = cartesian;
+    Chunk chunk;
+    chunk.observations.resize(3);
+    for (std::size_t row = 0; row < 3; ++row) {
+      chunk.observations.zenith[row] = 1.5;
+      chunk.observations.valid[row] = 1;
+      chunk.observations.return_number[row] = 1;
+    }
+    chunk.observations.range = {5.0, 0.0001, 6.0};
+    const TemporaryFolder folder;
+    const auto writer = kOpenpylivoxCsvFormat.create(folder.file("out.openpylivox.csv"), header);
+    writer->write(chunk);
+    writer->close();
+    EXPECT_EQ(writer->left_out(), 1U);
+    EXPECT_EQ(read_all(kOpenpylivoxCsvFormat, folder.file("out.openpylivox.csv")).rows().size(),
+              2U);
+  }
+}
+
+TEST(OpenpylivoxCsv, ReadsTheLastCoordinateOf32Bits) {
+  const Outcome outcome = read_text(
+      kOpenpylivoxCsvFormat, "//X,Y,Z,Inten-sity,Time\n-2147483.648,0.000,0.000,4,0.000010\n");
+  ASSERT_FALSE(outcome.error) << outcome.error->what();
+  EXPECT_EQ(outcome.rows().size(), 1U);
+  EXPECT_TRUE(read_text(kOpenpylivoxCsvFormat,
+                        "//X,Y,Z,Inten-sity,Time\n2147483.648,0.000,0.000,4,0.000010\n")
+                  .error);
 }
 
 }  // namespace

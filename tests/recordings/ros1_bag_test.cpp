@@ -1,15 +1,19 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <cstdint>
 #include <map>
 #include <string>
+#include <thread>
 #include <vector>
 
+#include <console_bridge/console.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <rosbag/bag.h>
+#include <sys/resource.h>
 
 #include "recordings/format_tests.hpp"
 
@@ -695,6 +699,48 @@ TEST(Ros1Bag, DamagedCloudsAreNamed) {
   check("4294967295 x 4 points of 18 bytes", [](Cloud& c) { c.height = c.row_step = ~0U; });
   check("rows of at least 36 bytes in the point cloud, found 0",
         [](Cloud& c) { c.height = c.width = 2; });
+}
+
+TEST(Ros1Bag, AClaimedChunkCostsNoMemory) {
+  Bag bag;
+  bag.compression = rosbag::compression::BZ2;
+  bag.add(kTopic, custom(kPowerOn, shots(20)));
+  const TemporaryFolder folder;
+  const std::string path = folder.file("input.bag");
+  bag.write(path);
+  std::string bytes = get_bytes(path);
+  // The header of the chunk: "compression=bz2", then the field "size".
+  const std::size_t at = bytes.find("size=", bytes.find("compression=bz2") - 64) + 5;
+  bytes.replace(at, 4, std::string("\0\0\0\x40", 4));  // 1 GiB
+  put_bytes(path, bytes);
+  const auto peak_kib = [] {
+    rusage usage{};
+    getrusage(RUSAGE_SELF, &usage);
+    return usage.ru_maxrss;
+  };
+  const auto before = peak_kib();
+  const Outcome outcome = read_all(kRos1BagFormat, path);
+  ASSERT_TRUE(outcome.error);
+  EXPECT_THAT(outcome.error->problem(), HasSubstr("of the unpacked chunk"));
+  EXPECT_LT(peak_kib() - before, 200 << 10);
+}
+
+TEST(Ros1Bag, ReadersOfSeveralThreadsLeaveTheLoggingAsItWas) {
+  const TemporaryFolder folder;
+  const std::string path = folder.file("input.bag");
+  small_bag().write(path);
+  console_bridge::OutputHandler* const handler = console_bridge::getOutputHandler();
+  ASSERT_NE(handler, nullptr);
+  std::atomic<std::size_t> rows = 0;
+  std::vector<std::thread> threads;
+  for (int thread = 0; thread < 8; ++thread) {
+    threads.emplace_back([&] {
+      for (int i = 0; i < 20; ++i) rows += read_all(kRos1BagFormat, path).rows().size();
+    });
+  }
+  for (std::thread& thread : threads) thread.join();
+  EXPECT_EQ(rows, 160 * read_all(kRos1BagFormat, path).rows().size());
+  EXPECT_EQ(console_bridge::getOutputHandler(), handler);
 }
 
 }  // namespace

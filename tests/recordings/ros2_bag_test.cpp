@@ -446,5 +446,50 @@ TEST(Ros2Bag, SurvivesAnyChangedByte) {
   }
 }
 
+/// A bag whose tables are changed by hand before it is read.
+Outcome read_changed(const std::string& sql, const Bag& bag = small_bag()) {
+  const TemporaryFolder folder;
+  const std::string path = folder.file("input.db3");
+  const auto database = bag.write(path);
+  char* message = nullptr;
+  EXPECT_EQ(sqlite3_exec(database.get(), sql.c_str(), nullptr, nullptr, &message), SQLITE_OK)
+      << message;
+  return read_all(kRos2BagFormat, path);
+}
+
+TEST(Ros2Bag, OnlyStoredTablesAreRead) {
+  const Outcome endless = read_changed(
+      "ALTER TABLE messages RENAME TO m;"
+      "CREATE VIEW messages AS WITH RECURSIVE c(id) AS (SELECT 1 UNION ALL SELECT id + 1 FROM c)"
+      " SELECT id, 10 AS topic_id, 0 AS timestamp, (SELECT data FROM m WHERE m.id = 2) AS data"
+      " FROM c");
+  ASSERT_TRUE(endless.error);
+  EXPECT_FALSE(endless.opened);
+  EXPECT_THAT(endless.error->problem(), HasSubstr("expected a table messages"));
+  EXPECT_THAT(endless.error->problem(), HasSubstr("found a view"));
+
+  const Outcome topics =
+      read_changed("ALTER TABLE topics RENAME TO t; CREATE VIEW Topics AS SELECT * FROM t");
+  ASSERT_TRUE(topics.error);
+  EXPECT_THAT(topics.error->problem(), HasSubstr("expected a table topics"));
+
+  const Outcome computed = read_changed(
+      "ALTER TABLE messages RENAME TO m; CREATE TABLE messages(id INTEGER PRIMARY KEY,"
+      " topic_id INTEGER, data BLOB AS (zeroblob(1000000)) VIRTUAL);"
+      "INSERT INTO messages(topic_id) SELECT topic_id FROM m");
+  ASSERT_TRUE(computed.error);
+  EXPECT_THAT(computed.error->problem(), HasSubstr("the column data of the table messages"));
+}
+
+TEST(Ros2Bag, MessagesOutOfOrderAreDamage) {
+  // Numbers that are no key can stand twice, as those of a page that stands twice in its table do.
+  const Outcome outcome = read_changed(
+      "ALTER TABLE messages RENAME TO m; CREATE TABLE messages(id, topic_id, timestamp, data);"
+      "INSERT INTO messages SELECT * FROM m; INSERT INTO messages SELECT * FROM m WHERE id > 4");
+  ASSERT_TRUE(outcome.error);
+  EXPECT_THAT(outcome.error->problem(), HasSubstr("message row 5 follows row 5"));
+  EXPECT_EQ(outcome.rows().size(), 40U);
+}
+
 }  // namespace
 }  // namespace risley::recordings

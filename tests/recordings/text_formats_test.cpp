@@ -9,9 +9,9 @@
 #include <gtest/gtest.h>
 
 #include "risley/core/angle.hpp"
+#include "risley/recordings/livox/packet.hpp"
 
 #include "recordings/format_tests.hpp"
-#include "recordings/formats/packet.hpp"
 #include "recordings/formats/text_table.hpp"
 
 namespace risley::recordings {
@@ -364,7 +364,7 @@ std::string viewer_packet(int lidar, int timestamp_type, int data_type, std::int
   std::string text;
   for (int i = 0; i < rows; ++i) {
     text += fmt::format("5,1,{},0,0x00008200,{},{},{},", lidar, timestamp_type, data_type, time_ns);
-    text += record_layout(static_cast<std::uint8_t>(data_type))->cartesian
+    text += livox::record_layout(static_cast<std::uint8_t>(data_type))->cartesian
                 ? fmt::format("0.42,-1.5,{},7,16,420,-1500,{},0,0,0\n", i, 1000 * i)
                 : fmt::format("0,0,0,7,16,0,0,0,{},9000,{}\n", 1000 * i, 35'000 + i);
   }
@@ -411,7 +411,7 @@ TEST(ViewerCsv, FindsTheShotRateFromThePackets) {
     const auto last = static_cast<std::size_t>(c.rows - 1);
     EXPECT_EQ(outcome.rows().time_ns[last], 1000 + c.last_offset_ns);
     EXPECT_EQ(outcome.rows().time_ns[last + 1], 1000 + c.period_ns);
-    const int returns = record_layout(static_cast<std::uint8_t>(c.data_type))->returns;
+    const int returns = livox::record_layout(static_cast<std::uint8_t>(c.data_type))->returns;
     EXPECT_EQ(outcome.rows().return_number[last], returns);
     EXPECT_EQ(outcome.recording.header.returns_per_shot, returns);
     EXPECT_NEAR(outcome.rows().azimuth[1], radians_from_degrees(-9.99), 1e-15);
@@ -465,6 +465,30 @@ TEST(ViewerCsv, NamesTheDamagedLine) {
        {"fields", sound + "5,1,1,0\n", 4, 2, "found 4"}});
   EXPECT_FALSE(kViewerCsvFormat.recognises("Version,Slot ID,LiDAR Index\n"));
   EXPECT_EQ(kViewerCsvFormat.create, nullptr);
+}
+
+TEST(ViewerCsv, MoreSensorsThanCanBeNumberedAreDamage) {
+  std::string text =
+      "Version,Slot ID,LiDAR Index,Rsvd,Error Code,Timestamp Type,Data Type,Timestamp,X,Y,Z,"
+      "Reflectivity,Tag,Ori_x,Ori_y,Ori_z,Ori_radius,Ori_theta,Ori_phi\n";
+  for (int sensor = 0; sensor <= 256; ++sensor) {
+    text += fmt::format("5,{},{},0,0x00000000,0,1,1000,0,0,0,7,0,0,0,0,2000,9000,0\n", sensor / 128,
+                        sensor % 128);
+  }
+  const Outcome outcome = read_text(kViewerCsvFormat, text);
+  EXPECT_EQ(outcome.rows().size(), 256U);
+  ASSERT_TRUE(outcome.error);
+  EXPECT_EQ(outcome.error->place().line, 258U);
+  EXPECT_THAT(outcome.error->problem(), HasSubstr("at most 256 sensors"));
+}
+
+TEST(TextTable, TimesAtTheEndOf64BitsAreRounded) {
+  EXPECT_EQ(nanoseconds_field("9.223372036854775799", "t"), 9'223'372'037);
+  EXPECT_EQ(nanoseconds_field("-9.223372036854775799", "t"), -9'223'372'037);
+  EXPECT_EQ(nanoseconds_field("0.0000000005", "t"), 1);
+  EXPECT_EQ(nanoseconds_field("0.00000000049", "t"), 0);
+  EXPECT_EQ(nanoseconds_field("-0.0000000005", "t"), -1);
+  EXPECT_EQ(nanoseconds_field("-0.00000000149", "t"), -1);
 }
 
 }  // namespace

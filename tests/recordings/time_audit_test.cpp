@@ -5,9 +5,14 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <random>
+#include <string>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+
+#include "risley/core/error.hpp"
+#include "risley/recordings/reader.hpp"
 
 #include "recordings/lvx_bytes.hpp"
 
@@ -251,6 +256,66 @@ TEST(TimeAudit, AFileIsAuditedWithItsWrapsAndSamples) {
   EXPECT_EQ(result.shots, 144U);
   EXPECT_EQ(result.gaps.count, 0U);
   EXPECT_NEAR(result.rate_hz, 240'000, 1);
+}
+
+TEST(TimeAudit, TimesOfAnySizeDoNotOverflow) {
+  constexpr std::int64_t kLatest = std::numeric_limits<std::int64_t>::max(),
+                         kEarliest = std::numeric_limits<std::int64_t>::min();
+  const TimeAuditResult result =
+      audit(rows_at({kEarliest, kLatest, kEarliest + 1, kLatest - 1, kEarliest, kLatest}));
+  EXPECT_EQ(result.time_resets, 2U);
+  EXPECT_NEAR(result.duration_s, 9.22e9, 1e7);
+  TimeAudit audit;
+  for (const std::int64_t time : {kLatest, kEarliest}) {
+    Chunk chunk = rows_at({time});
+    chunk.packets.emplace_back().rows = 1;
+    audit.add(chunk);
+  }
+  EXPECT_EQ(audit.result().non_monotonic_packets, 1U);
+}
+
+TEST(TimeAudit, TimesTooFarApartAreDamage) {
+  const lvx_bytes::TemporaryFolder folder;
+  const std::string path = folder.file("far.csv");
+  lvx_bytes::save(path,
+                  "Time/s,Azimuth/deg,Zenith/deg\n-9100000000.0,1.0,90.0\n-9099999999.0,1.0,90.0\n"
+                  "9100000000.0,1.1,90.0\n9100000001.0,1.1,90.0\n");
+  const auto reader = open_recording(path);
+  Chunk chunk;
+  ASSERT_TRUE(reader->read(chunk));
+  EXPECT_EQ(chunk.observations.size(), 2U);
+  for (int i = 0; i < 2; ++i) {
+    try {
+      reader->read(chunk);
+      FAIL() << "a time further away than 146 years was accepted";
+    } catch (const FileError& error) {
+      EXPECT_EQ(error.path(), path);
+      EXPECT_THAT(error.problem(), testing::HasSubstr("observation 2 (from 0)"));
+      EXPECT_THAT(error.problem(), testing::HasSubstr("within 146 years"));
+    }
+  }
+}
+
+TEST(TimeAudit, PacketsStayWholeInFrontOfATimeTooFarAway) {
+  const lvx_bytes::TemporaryFolder folder;
+  const std::string path = folder.file("far.lvx");
+  std::mt19937 random(1);
+  std::string file = lvx_bytes::header_lvx11({{"0TFDG3B006H2Z11", 0, 7}});
+  constexpr std::uint64_t kFar = std::uint64_t{1} << 62;
+  lvx_bytes::put_frame(
+      file,
+      {lvx_bytes::package(0, 1, 3, 1000, random), lvx_bytes::package(0, 1, 6, 2000, random),
+       lvx_bytes::package(0, 1, 3, kFar, random)},
+      0);
+  lvx_bytes::save(path, file);
+  const auto reader = open_recording(path);
+  Chunk chunk;
+  ASSERT_TRUE(reader->read(chunk));
+  // The far packet begins within the span and ends behind it.
+  EXPECT_EQ(chunk.observations.size(), 96U);
+  EXPECT_EQ(chunk.packets.size(), 2U);
+  EXPECT_EQ(chunk.imu.size(), 1U);
+  EXPECT_THROW(reader->read(chunk), FileError);
 }
 
 }  // namespace

@@ -16,13 +16,13 @@ inline constexpr double kDegreesPerRadian = 180.0 / std::numbers::pi;
 constexpr double radians_from_degrees(double degrees) { return degrees * kRadiansPerDegree; }
 constexpr double degrees_from_radians(double radians) { return radians * kDegreesPerRadian; }
 
-/// The same angle in [-pi, pi].
+/// The same angle in [-pi, pi]; NaN for what is no angle.
 inline double wrap_to_pi(double angle) { return std::remainder(angle, kTwoPi); }
 
-/// The same angle in [0, 2 pi).
+/// The same angle in [0, 2 pi); NaN for what is no angle.
 inline double wrap_to_two_pi(double angle) {
   const double wrapped = angle - kTwoPi * std::floor(angle / kTwoPi);
-  return wrapped < kTwoPi ? wrapped : 0.0;
+  return wrapped >= kTwoPi ? 0.0 : wrapped;
 }
 
 }  // namespace risley

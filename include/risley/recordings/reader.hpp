@@ -37,7 +37,8 @@ class Reader {
 
   /// Replaces the chunk by the next rows, about max_rows (packets stay whole).
   /// @return false when there is nothing more
-  /// @throws FileError at damage in the body, after every sound row before it was returned
+  /// @throws FileError at damage in the body, after every sound row before it was returned; from
+  ///         open_recording() also at a time further than kLongestTimeSpan_ns from the first
   virtual bool read(Chunk& chunk, std::size_t max_rows = kDefaultChunkRows) = 0;
 
   /// Part of the file already read, [0, 1].
@@ -48,6 +49,10 @@ class Reader {
   std::vector<ReadWarning> warnings_;
   std::uint64_t clock_wraps_ = 0;
 };
+
+/// No time of a recording is further from the first one: 146 years, half of what 64 bits hold, so
+/// that the difference of any two times is a number of 64 bits.
+inline constexpr std::int64_t kLongestTimeSpan_ns = (std::int64_t{1} << 62) - 1;
 
 /// How a recording is to be read.
 struct ReadOptions {

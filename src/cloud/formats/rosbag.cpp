@@ -14,6 +14,7 @@
 
 #include "risley/core/error.hpp"
 #include "risley/io/output_file.hpp"
+#include "risley/io/rosbag_lock.hpp"
 
 #include "cloud/formats/cloud_format.hpp"
 #include "cloud/formats/record_file.hpp"
@@ -147,7 +148,10 @@ class RosbagWriter final : public CloudWriter {
   ~RosbagWriter() override {
     if (!bag_) return;
     try {
-      call([this] { bag_->close(); });
+      call([this] {
+        bag_->close();
+        bag_.reset();
+      });
     } catch (const FileError&) {
       // The file is going to be removed.
     }
@@ -251,6 +255,7 @@ class RosbagWriter final : public CloudWriter {
   /// destructor would try and end the process), so it is kept, and its file open, to the end.
   template <class Function>
   void call(Function&& function) {
+    const auto lock = io::lock_rosbag();
     try {
       function();
     } catch (const std::exception& error) {

@@ -110,7 +110,7 @@ BinaryTableReader::BinaryTableReader(std::string path, std::string_view format, 
   try {
     columns_.settle(header_, table_.warnings);
   } catch (const BadColumns& bad) {
-    throw FileError(path_, {table_.columns_offset, {}}, bad.problem);
+    throw FileError(path_, {table_.columns_offset, {}}, bad.what());
   }
   for (std::string& warning : table_.warnings) {
     warnings_.push_back({{table_.columns_offset, {}}, std::move(warning), 0});
@@ -126,7 +126,7 @@ NamedColumns BinaryTableReader::find_columns() const {
   try {
     return NamedColumns(std::move(columns));
   } catch (const BadColumns& bad) {
-    throw FileError(path_, {table_.columns_offset, {}}, bad.problem);
+    throw FileError(path_, {table_.columns_offset, {}}, bad.what());
   }
 }
 
@@ -218,7 +218,7 @@ bool BinaryTableReader::read(Chunk& chunk, std::size_t max_rows) {
       const Lane& lane = lanes_[used_lanes_.front()];
       const std::size_t into_block = lane.source->is_plain() ? next_ * lane.record_bytes : 0;
       pending_.emplace(path_, FilePlace{lane.block_offset + into_block, {}},
-                       fmt::format("point {} (from 0): {}", number, bad.problem));
+                       fmt::format("point {} (from 0): {}", number, bad.what()));
       break;
     }
     ++next_;

@@ -389,15 +389,15 @@ void MessageReader::describe_device(std::size_t topic, const FirstMessages& firs
 void MessageReader::settle_cloud_grid(std::size_t topic, const FirstMessages& first) {
   struct Candidate {
     double rate_hz;  ///< points per second
-    ShotGrid grid;
+    livox::ShotGrid grid;
     int returns;
   };
   static constexpr std::array<Candidate, 5> kCandidates{{
-      {100'000, kGrid100kHz, 1},
-      {200'000, kGrid100kHz, 2},
-      {240'000, kGrid240kHz, 1},
-      {480'000, kGrid240kHz, 2},
-      {720'000, kGrid240kHz, 3},
+      {100'000, livox::kGrid100kHz, 1},
+      {200'000, livox::kGrid100kHz, 2},
+      {240'000, livox::kGrid240kHz, 1},
+      {480'000, livox::kGrid240kHz, 2},
+      {720'000, livox::kGrid240kHz, 3},
   }};
   const bool is_known = !first.rates.empty();
   const double rate = is_known ? median(first.rates) : first.several_lines ? 240'000 : 100'000;
@@ -497,14 +497,11 @@ void MessageReader::append_points(const BagMessage& message, std::uint8_t device
 void MessageReader::append_cloud(const BagMessage& message, std::uint8_t device,
                                  Observations& rows) const {
   const CloudGrid& cloud = clouds_[message.topic];
-  const std::int64_t numerator = cloud.grid.interval_numerator_ns;
-  const std::int64_t denominator = cloud.grid.interval_denominator;
   const auto returns = static_cast<std::size_t>(cloud.returns);
   const std::size_t first_row = rows.size();
   rows.resize(first_row + message.points.size());
   for (std::size_t i = 0; i < message.points.size(); ++i) {
-    const auto shot = static_cast<std::int64_t>(i / returns);
-    const std::int64_t offset_ns = (shot * numerator + denominator / 2) / denominator;
+    const std::int64_t offset_ns = cloud.grid.offset_ns(static_cast<std::uint32_t>(i / returns));
     set_row(rows, first_row + i, message.points[i], message.time_ns + offset_ns, i % returns + 1,
             device);
   }

@@ -21,15 +21,16 @@
 #include <string_view>
 #include <vector>
 
+#include "risley/core/error.hpp"
+#include "risley/recordings/livox/packet.hpp"
 #include "risley/recordings/reader.hpp"
-
-#include "recordings/formats/packet.hpp"
 
 namespace risley::recordings {
 
 /// A message that is not as its type says; the reader adds where it stands.
-struct BadMessage {
-  std::string problem;
+class BadMessage : public Error {
+ public:
+  using Error::Error;
 };
 
 /// The messages that are read.
@@ -124,7 +125,7 @@ class MessageReader : public Reader {
  private:
   /// How the points of a cloud topic lie in time.
   struct CloudGrid {
-    ShotGrid grid = kGrid100kHz;
+    livox::ShotGrid grid = livox::kGrid100kHz;
     int returns = 1;
   };
   struct FirstMessages;

@@ -16,9 +16,12 @@
 #include "recordings/formats/block_file.hpp"
 #include "recordings/formats/format.hpp"
 #include "recordings/formats/lvx_reader.hpp"
-#include "recordings/formats/packet.hpp"
+#include "recordings/livox/packet_encoder.hpp"
 
 namespace risley::recordings {
+
+using namespace livox;
+
 namespace {
 
 using io::load;

@@ -5,14 +5,17 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <span>
+#include <utility>
 
 #include <fmt/format.h>
 
 #include "risley/io/little_endian.hpp"
 
-#include "recordings/formats/cartesian.hpp"
-
 namespace risley::recordings {
+
+using namespace livox;
+
 namespace {
 
 using io::load;
@@ -20,27 +23,6 @@ using io::load;
 /// Text of a field that is filled up with NUL.
 std::string text_field(const std::uint8_t* bytes, std::size_t count) {
   return {bytes, std::find(bytes, bytes + count, std::uint8_t{0})};
-}
-
-/// The points of an LVX 1.0 package: as data type 0, but floats in metres.
-/// @return number of the first record that is no point
-std::optional<std::size_t> decode_float_points(const std::uint8_t* bytes, std::size_t points,
-                                               std::int64_t time_ns, std::uint8_t device,
-                                               Observations& o, std::size_t first_row) {
-  for (std::size_t point = 0; point < points; ++point, bytes += 13) {
-    const std::size_t row = first_row + point;
-    const Vector3<double> position{load<float>(bytes), load<float>(bytes + 4),
-                                   load<float>(bytes + 8)};
-    if (!std::isfinite(position.x + position.y + position.z)) return point;
-    set_cartesian(o, row, position, kMillimetre);
-    o.intensity[row] = bytes[12];
-    o.tag[row] = 0;
-    o.time_ns[row] = time_ns + kGrid100kHz.offset_ns(static_cast<std::uint32_t>(point));
-    o.beam[row] = 0;
-    o.return_number[row] = 1;
-    o.device[row] = device;
-  }
-  return std::nullopt;
 }
 
 /// What the first packets of one device say.
@@ -146,10 +128,24 @@ void LvxReader::rewind() {
   in_frame_ = open_ended_ = ended_ = false;
   failure_.reset();
   warnings_.clear();
-  clocks_.assign(header_.devices.size(), {});
+  decoders_.clear();
+  for (std::size_t row = 0; row < header_.devices.size(); ++row) make_decoder(row);
   clock_wraps_ = 0;
   stepped_over_.clear();
   frames_stepped_over_.clear();
+}
+
+/// A new decoder of a device's packets.
+void LvxReader::make_decoder(std::size_t device_row) {
+  const PacketDecoder decoder({.device_type = header_.devices[device_row].type,
+                               .device = static_cast<std::uint8_t>(device_row),
+                               .grid = grids_[device_row],
+                               .float_points = version_.float_points});
+  if (device_row == decoders_.size()) {
+    decoders_.push_back(decoder);
+  } else {
+    decoders_[device_row] = decoder;
+  }
 }
 
 /// Completes the header from the first packets: what they hold, from when their times count, and
@@ -189,8 +185,8 @@ void LvxReader::describe() {
   if (!described) {
     header_.cartesian = version_.float_points;
   }
-  rewind();
 
+  std::vector<ReadWarning> unknown;
   for (std::size_t i = 0; i < first.size(); ++i) {
     const FirstPackets& device = first[i];
     if (!device.last_time_ns || version_.float_points) continue;
@@ -198,7 +194,7 @@ void LvxReader::describe() {
       const RecordLayout& layout = *record_layout(device.data_type);
       const double interval_ns = static_cast<double>(device.shortest_period_ns) / layout.records;
       grids_[i] = interval_ns < 7000 ? kGrid240kHz : kGrid100kHz;
-      warnings_.push_back(
+      unknown.push_back(
           {{},
            fmt::format("device {} has the unknown type {}; by the distance of its packets it "
                        "measures at {} kHz",
@@ -219,6 +215,8 @@ void LvxReader::describe() {
       }
     }
   }
+  rewind();
+  warnings_ = std::move(unknown);
 }
 
 double LvxReader::fraction_read() const {
@@ -231,20 +229,22 @@ void LvxReader::fail(std::uint64_t offset, std::string problem) {
 }
 
 bool LvxReader::read(Chunk& chunk, std::size_t max_rows) {
-  chunk.packets.clear();
-  chunk.imu.clear();
-  // No record has less than 7 bytes per row, so a huge max_rows costs no memory.
+  chunk.clear();
+  // Room for all rows at once. No record has less than 7 bytes per row, so a huge max_rows costs no
+  // memory.
   const std::uint64_t left = file_.size() - std::min(position_, file_.size());
-  chunk.observations.resize(static_cast<std::size_t>(std::min<std::uint64_t>(max_rows, left / 7)));
-  std::size_t rows = 0;
+  const auto room = static_cast<std::size_t>(std::min<std::uint64_t>(max_rows, left / 7));
+  if (chunk.observations.time_ns.capacity() < room) {
+    chunk.observations.resize(room);
+    chunk.observations.clear();
+  }
   while (!ended_) {
     if (!in_frame_) {
       open_frame();
-    } else if (!next_package(chunk, rows, max_rows)) {
+    } else if (!next_package(chunk, max_rows)) {
       break;
     }
   }
-  chunk.observations.resize(rows);
   if (!chunk.packets.empty()) return true;
   if (failure_) throw FileError(*failure_);
   return false;
@@ -317,7 +317,7 @@ void LvxReader::step_over(std::uint8_t data_type) {
   ended_ = open_ended_;
 }
 
-bool LvxReader::next_package(Chunk& chunk, std::size_t& rows, std::size_t max_rows) {
+bool LvxReader::next_package(Chunk& chunk, std::size_t max_rows) {
   const std::uint64_t left = frame_end_ - position_;
   if (left == 0) {
     in_frame_ = false;
@@ -350,10 +350,9 @@ bool LvxReader::next_package(Chunk& chunk, std::size_t& rows, std::size_t max_ro
     fail(position_ + 1, fmt::format("packet version = {}, expected {}", bytes[1], kPacketVersion));
     return true;
   }
-  constexpr std::size_t kDataTypeAt = 10;
   const RecordLayout* layout = nullptr;
-  if (known > kDataTypeAt) {
-    const std::uint8_t data_type = bytes[kDataTypeAt];
+  if (known > 1 + kDataTypeAt) {
+    const std::uint8_t data_type = bytes[1 + kDataTypeAt];
     layout = version_.float_points && data_type != 0 ? nullptr : record_layout(data_type);
     if (!layout) {
       if (known < kLvxPackageHeaderBytes && !at_file_end) {
@@ -378,54 +377,29 @@ bool LvxReader::next_package(Chunk& chunk, std::size_t& rows, std::size_t max_ro
 
   // Packets stay whole; one alone is delivered however small the chunk is to be.
   if (!chunk.packets.empty() &&
-      (rows + layout->rows() > max_rows || chunk.packets.size() >= max_rows)) {
+      (chunk.observations.size() + layout->rows() > max_rows || chunk.packets.size() >= max_rows)) {
     return false;
   }
-  bytes = file_.at(position_, kLvxPackageHeaderBytes + layout->bytes());
-  Packet packet = decode_packet_header(bytes + 1);
-  packet.device_index = bytes[0];
-  packet.frame = frames_ - 1;
-  packet.rows = static_cast<std::uint32_t>(layout->rows());
   const auto device_row = static_cast<std::size_t>(device);
-  PacketClock& clock = clocks_[device_row];
-  const std::uint64_t wraps_before = clock.wraps();
-  const std::optional<std::int64_t> time = clock.time_ns(packet);
-  if (!time) {
-    fail(position_ + 9, fmt::format("timestamp of type {} with the bytes {:02X} is no time",
-                                    packet.timestamp_type, fmt::join(packet.timestamp, " ")));
+  const std::uint8_t device_type = header_.devices[device_row].type,
+                     data_type = bytes[1 + kDataTypeAt];
+  if (!grids_[device_row] && !shot_grid(device_type, data_type)) {
+    grids_[device_row] = kGrid100kHz;  // the first packets did not tell, either
+    make_decoder(device_row);
+  }
+  PacketDecoder& decoder = decoders_[device_row];
+  const std::uint64_t wraps_before = decoder.clock_wraps();
+  const std::span package(file_.at(position_, kLvxPackageHeaderBytes + layout->bytes()),
+                          kLvxPackageHeaderBytes + layout->bytes());
+  try {
+    decoder.decode(package.subspan(1), chunk);
+  } catch (const BadPacket& bad) {
+    fail(position_ + 1 + bad.byte_offset(), bad.problem());
     return true;
   }
-  clock_wraps_ += clock.wraps() - wraps_before;
-
-  const std::uint8_t* records = bytes + kLvxPackageHeaderBytes;
-  const auto device_number = static_cast<std::uint8_t>(device);
-  if (packet.data_type == kImuDataType) {
-    ImuSample sample = decode_imu(records);
-    sample.time_ns = *time;
-    sample.device = device_number;
-    chunk.imu.push_back(sample);
-  } else {
-    Observations& o = chunk.observations;
-    if (o.size() < rows + layout->rows()) o.resize(rows + layout->rows());
-    const ShotGrid grid =
-        grids_[device_row]
-            ? *grids_[device_row]
-            : shot_grid(header_.devices[device_row].type, packet.data_type).value_or(kGrid100kHz);
-    const std::optional<std::size_t> impossible =
-        version_.float_points
-            ? decode_float_points(records, layout->records, *time, device_number, o, rows)
-            : decode_records(*layout, records, *time, grid, device_number, o, rows);
-    if (impossible) {
-      fail(position_ + kLvxPackageHeaderBytes + *impossible * layout->bytes_per_record,
-           version_.float_points
-               ? std::string("a point has a coordinate that is no number")
-               : std::string("a return has an angle outside zenith [0, 18000] or azimuth "
-                             "[0, 36000] x 0.01 deg"));
-      return true;
-    }
-    rows += layout->rows();
-  }
-  chunk.packets.push_back(packet);
+  clock_wraps_ += decoder.clock_wraps() - wraps_before;
+  chunk.packets.back().device_index = package[0];
+  chunk.packets.back().frame = frames_ - 1;
   position_ += kLvxPackageHeaderBytes + layout->bytes();
   return true;
 }

@@ -12,10 +12,10 @@
 #include <vector>
 
 #include "risley/core/error.hpp"
+#include "risley/recordings/livox/packet_decoder.hpp"
 #include "risley/recordings/reader.hpp"
 
 #include "recordings/formats/block_file.hpp"
-#include "recordings/formats/packet.hpp"
 
 namespace risley::recordings {
 
@@ -25,7 +25,7 @@ inline constexpr std::uint32_t kLvxMagicCode = 0xAC0EA767;
 inline constexpr std::size_t kLvxPublicHeaderBytes = 24;
 
 /// In front of each package's records: the device index and the packet header.
-inline constexpr std::size_t kLvxPackageHeaderBytes = 1 + kPacketHeaderBytes;
+inline constexpr std::size_t kLvxPackageHeaderBytes = 1 + livox::kPacketHeaderBytes;
 
 /// Where a frame header holds the positions of itself and of the next frame, and its number.
 inline constexpr std::size_t kLvxFrameNextAt = 8, kLvxFrameIndexAt = 16;
@@ -61,17 +61,18 @@ class LvxReader final : public Reader {
   void rewind();
   void open_frame();
   /// @return false when the next packet has to wait for the next chunk
-  bool next_package(Chunk& chunk, std::size_t& rows, std::size_t max_rows);
+  bool next_package(Chunk& chunk, std::size_t max_rows);
+  void make_decoder(std::size_t device_row);
   void stop_at_cut(std::optional<std::size_t> records);
   void step_over(std::uint8_t data_type);
   void fail(std::uint64_t offset, std::string problem);
 
   BlockInput file_;
   LvxVersion version_;
-  std::array<int, 256> device_rows_{};                // by device index, -1 for none
-  std::vector<std::optional<ShotGrid>> grids_;        // by device row; empty: as the types say
-  std::vector<PacketClock> clocks_;                   // by device row
-  std::map<std::uint8_t, std::size_t> stepped_over_;  // data type -> its warning
+  std::array<int, 256> device_rows_{};                 // by device index, -1 for none
+  std::vector<std::optional<livox::ShotGrid>> grids_;  // by device row; empty: as the types say
+  std::vector<livox::PacketDecoder> decoders_;         // by device row
+  std::map<std::uint8_t, std::size_t> stepped_over_;   // data type -> its warning
   std::map<std::uint8_t, std::uint64_t> frames_stepped_over_;
 
   std::uint64_t position_ = 0;  // of the next package, or of the next frame

@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "risley/core/saturating.hpp"
 #include "risley/core/text.hpp"
 
 #include "recordings/formats/cartesian.hpp"
@@ -18,33 +19,12 @@ namespace risley::recordings {
 namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-/// One in so many numbers that are rounded to a step is a multiple of the next coarser one.
-constexpr double kChanceOfCoarser = 0.1;
-constexpr double kLeastChance = 1e-9;
-constexpr int kFinestDecimals = 6;
-/// How exactly arithmetic and the type itself keep a decimal fraction, relative.
-constexpr double kFloat32Precision = 0x1p-22, kFloat64Precision = 0x1p-50;
 constexpr double kFarthest = 1e9;         // m
 constexpr double kAngleSlack_deg = 1e-4;  // of float32 at 360
 /// Times of 2001 to 2099 as seconds since 1970.
 constexpr double kEarliestEpoch = 1e9, kLatestEpoch = 4.1e9;
 
 bool is_whole(double value) { return value == std::floor(value); }
-
-bool are_multiples(std::span<const std::vector<Decimal>* const> columns, double per_unit,
-                   double precision) {
-  double log_chance = 0.0;  // that they are so by accident
-  for (const auto* const column : columns) {
-    for (const Decimal& cell : *column) {
-      if (!std::isfinite(cell.value) || cell.value == 0.0) continue;
-      const double scaled = std::abs(cell.value) * per_unit;
-      const double tolerance = scaled * precision;
-      if (std::abs(scaled - std::round(scaled)) > tolerance) return false;
-      log_chance += std::log(std::clamp(2.0 * tolerance, kChanceOfCoarser, 1.0));
-    }
-  }
-  return log_chance < std::log(kLeastChance);
-}
 
 /// Smallest and largest number of a column; NaN without any.
 std::pair<double, double> extent(const std::vector<Decimal>& samples) {
@@ -67,8 +47,9 @@ double median_step(const std::vector<Decimal>& samples) {
   std::vector<double> steps;
   for (std::size_t i = 1; i < samples.size(); ++i) {
     const bool exact = samples[i].decimals == 0 && samples[i - 1].decimals == 0;
-    const double step = exact ? static_cast<double>(samples[i].digits - samples[i - 1].digits)
-                              : samples[i].value - samples[i - 1].value;
+    const double step =
+        exact ? static_cast<double>(saturating_difference(samples[i].digits, samples[i - 1].digits))
+              : samples[i].value - samples[i - 1].value;
     if (step > 0.0) steps.push_back(step);
   }
   if (steps.empty()) return 0.0;
@@ -78,31 +59,6 @@ double median_step(const std::vector<Decimal>& samples) {
 }
 
 }  // namespace
-
-Rounding rounding_of(std::span<const std::vector<Decimal>* const> columns, CellType type) {
-  Rounding rounding;
-  rounding.decimals = type == CellType::text ? -1 : std::numeric_limits<int>::max();
-  if (type == CellType::integer) {
-    rounding.step = 1.0;
-    return rounding;
-  }
-  if (type == CellType::text) {
-    for (const auto* const column : columns) {
-      for (const Decimal& cell : *column) rounding.notice(cell);
-    }
-  }
-  // Numbers that once were float32 are known by being as inexact as these.
-  for (const double precision : {kFloat64Precision, kFloat32Precision}) {
-    if (type == CellType::float32 && precision == kFloat64Precision) continue;
-    for (int decimals = 0; decimals <= kFinestDecimals; ++decimals) {
-      if (!are_multiples(columns, std::pow(10.0, decimals), precision)) continue;
-      rounding.step = std::pow(10.0, -decimals);
-      return rounding;
-    }
-  }
-  if (type == CellType::float32) rounding.relative = 0x1p-23;
-  return rounding;
-}
 
 std::optional<NamedColumns::Unit> NamedColumns::unit_of(std::string_view text) {
   struct Named {

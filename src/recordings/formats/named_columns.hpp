@@ -24,12 +24,10 @@
 #include "risley/core/direction.hpp"
 #include "risley/recordings/observations.hpp"
 
+#include "recordings/formats/rounding.hpp"
 #include "recordings/formats/text_table.hpp"
 
 namespace risley::recordings {
-
-/// What the cells of a column are stored as.
-enum class CellType : std::uint8_t { text, integer, float32, float64 };
 
 struct NamedColumn {
   std::string name;
@@ -37,30 +35,10 @@ struct NamedColumn {
 };
 
 /// Columns that cannot be rows; the reader adds the file and the place.
-struct BadColumns {
-  std::string problem;
+class BadColumns : public Error {
+ public:
+  using Error::Error;
 };
-
-/// How values are rounded: to multiples of a step, or to so many digits that each value has a step
-/// of its own. Both 0 where they are not rounded, or it is not known.
-struct Rounding {
-  double step = 0.0;      ///< in the unit of the values
-  double relative = 0.0;  ///< of the value
-  int decimals = -1;      ///< of texts: of the longest number seen; of others beyond any
-
-  double step_at(double value) const { return step > 0.0 ? step : relative * std::abs(value); }
-  /// Later numbers of a text may be longer than those looked at.
-  void notice(const Decimal& cell) {
-    if (cell.decimals <= decimals) return;
-    decimals = cell.decimals;
-    step = std::pow(10.0, -decimals);
-  }
-};
-
-/// Finds out how the values of one or several columns are rounded: whether all are whole multiples
-/// of 1, 0.1, ... 10^-6 as exactly as their type can hold these; if not, texts have the step of
-/// their last decimal and float32 its own precision.
-Rounding rounding_of(std::span<const std::vector<Decimal>* const> columns, CellType type);
 
 /// How many rows a reader shows to NamedColumns before the first is made.
 inline constexpr std::size_t kNamedRowsLookedAt = 8192;

@@ -29,7 +29,7 @@ NamedTextReader::NamedTextReader(const std::string& path, std::string_view forma
   try {
     columns_.settle(header_, layout_.warnings);
   } catch (const BadColumns& bad) {
-    fail(layout_.names_line, bad.problem);
+    fail(layout_.names_line, bad.what());
   }
   for (std::string& warning : layout_.warnings) {
     warnings_.push_back({{.byte_offset = {}, .line = layout_.names_line}, std::move(warning), 0});
@@ -42,7 +42,7 @@ NamedColumns NamedTextReader::find_columns() const {
   try {
     return NamedColumns(std::move(columns));
   } catch (const BadColumns& bad) {
-    fail(layout_.names_line, bad.problem);
+    fail(layout_.names_line, bad.what());
   }
 }
 

@@ -10,10 +10,10 @@
 
 #include "risley/core/error.hpp"
 #include "risley/io/netcdf.hpp"
+#include "risley/recordings/livox/packet.hpp"
 
 #include "recordings/formats/format.hpp"
 #include "recordings/formats/netcdf_layout.hpp"
-#include "recordings/formats/packet.hpp"
 
 namespace risley::recordings::netcdf {
 namespace {
@@ -206,7 +206,7 @@ class NetcdfReader final : public Reader {
       }
       packets.push_back(packet_of(known_packets_, next_packet_++));
       rows += packets.back().rows;
-      if (packets.back().data_type == kImuDataType) ++samples;
+      if (packets.back().data_type == livox::kImuDataType) ++samples;
     }
     const bool last = packets_read_ == packet_count_ && next_packet_ == known_packets_.rows.size();
     const std::size_t rows_left = row_count_ - row_, samples_left = imu_count_ - imu_sample_;
@@ -250,10 +250,10 @@ class NetcdfReader final : public Reader {
     std::size_t rows = 0, samples = 0, whole = 0;
     for (const auto& packet : chunk.packets) {
       rows += packet.rows;
-      samples += packet.data_type == kImuDataType ? 1 : 0;
+      samples += packet.data_type == livox::kImuDataType ? 1 : 0;
       if (rows > chunk.observations.size() || samples > chunk.imu.size()) {
         rows -= packet.rows;
-        samples -= packet.data_type == kImuDataType ? 1 : 0;
+        samples -= packet.data_type == livox::kImuDataType ? 1 : 0;
         break;
       }
       ++whole;

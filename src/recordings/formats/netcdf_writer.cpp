@@ -13,10 +13,10 @@
 
 #include "risley/core/error.hpp"
 #include "risley/io/netcdf.hpp"
+#include "risley/recordings/livox/packet.hpp"
 
 #include "recordings/formats/format.hpp"
 #include "recordings/formats/netcdf_layout.hpp"
-#include "recordings/formats/packet.hpp"
 
 namespace risley::recordings::netcdf {
 namespace {
@@ -178,7 +178,7 @@ class NetcdfWriter final : public Writer {
     std::size_t rows = 0, samples = 0;
     for (const auto& packet : chunk.packets) {
       rows += packet.rows;
-      if (packet.data_type == kImuDataType) ++samples;
+      if (packet.data_type == livox::kImuDataType) ++samples;
     }
     if (*with_packets_ ? rows == chunk.observations.size() && samples == chunk.imu.size()
                        : chunk.packets.empty()) {

@@ -6,14 +6,17 @@
 #include <string>
 #include <vector>
 
+#include "risley/core/error.hpp"
+
 #include "recordings/formats/binary_table.hpp"
 #include "recordings/formats/byte_source.hpp"
 
 namespace risley::recordings {
 
 /// What is wrong with the header of an array; the reader adds file and place.
-struct BadArray {
-  std::string problem;
+class BadArray : public Error {
+ public:
+  using Error::Error;
 };
 
 /// One number of an array's elements.

@@ -40,7 +40,7 @@ BinaryTable npy_table(const std::string& path) {
     }
     return table;
   } catch (const BadArray& bad) {
-    throw FileError(path, {0, {}}, bad.problem);
+    throw FileError(path, {0, {}}, bad.what());
   }
 }
 
@@ -89,7 +89,7 @@ std::vector<Member> npz_members(const std::string& path, std::vector<std::string
       member.header = read_array_header(*source);
     } catch (const BadArray& bad) {
       throw FileError(path, {zipped.begin, {}},
-                      fmt::format("member {}: {}", printable(zipped.name), bad.problem));
+                      fmt::format("member {}: {}", printable(zipped.name), bad.what()));
     }
     const std::uint64_t expected =
         member.header.data_offset + member.header.elements() * member.header.element_bytes;

@@ -8,19 +8,24 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <span>
 
 #include <fmt/format.h>
 
 #include "risley/core/error.hpp"
 #include "risley/io/little_endian.hpp"
+#include "risley/recordings/livox/packet_decoder.hpp"
 
 #include "recordings/formats/block_file.hpp"
 #include "recordings/formats/format.hpp"
 #include "recordings/formats/openpylivox.hpp"
-#include "recordings/formats/packet.hpp"
 #include "recordings/formats/seconds.hpp"
+#include "recordings/livox/packet_encoder.hpp"
 
 namespace risley::recordings {
+
+using namespace livox;
+
 namespace {
 
 using io::load;
@@ -111,6 +116,15 @@ class OpenpylivoxBinReader final : public Reader {
   }
 
   void append_record(const std::uint8_t* bytes, Chunk& chunk) const {
+    try {
+      decode_record(bytes, chunk);
+    } catch (const BadPacket& bad) {
+      fail(offset_ + bad.byte_offset(), bad.problem());
+    }
+  }
+
+  void decode_record(const std::uint8_t* bytes, Chunk& chunk) const {
+    const std::span record(bytes, parts_.points.bytes_per_record);
     const double seconds = load<double>(bytes + parts_.time_at);
     const auto time_ns = nanoseconds_from_seconds(seconds);
     if (!time_ns) {
@@ -118,7 +132,7 @@ class OpenpylivoxBinReader final : public Reader {
            fmt::format("expected a time within +-9.2e9 s, found {}", seconds));
     }
     if (layout_.imu) {
-      chunk.imu.push_back(decode_imu(bytes));
+      chunk.imu.push_back(decode_imu(record));
       chunk.imu.back().time_ns = *time_ns;
       return;
     }
@@ -129,15 +143,10 @@ class OpenpylivoxBinReader final : public Reader {
                        layout_.returns_per_shot(), bytes[parts_.bytes() - 1]));
     }
     auto& rows = chunk.observations;
-    const std::size_t row = rows.size();
-    rows.resize(row + parts_.points.rows());
-    if (decode_records(parts_.points, bytes, *time_ns, kGrid100kHz, 0, rows, row)) {
-      rows.resize(row);
-      fail(offset_,
-           "expected a zenith in [0, 180] deg and an azimuth in [0, 360] deg, found a "
-           "return beyond");
+    decode_records(parts_.points, record, *time_ns, kGrid100kHz, 0, rows);
+    if (parts_.return_digit) {
+      rows.return_number.back() = static_cast<std::uint8_t>(return_number);
     }
-    if (parts_.return_digit) rows.return_number[row] = static_cast<std::uint8_t>(return_number);
   }
 
   void report_tail() {

@@ -101,12 +101,7 @@ class OpenpylivoxCsvReader final : public TextTableReader {
   }
 
   static double coordinate(std::string_view field, std::string_view column) {
-    constexpr double kLimit = 2147483.647;  // 32 bits of mm
-    const double value = decimal_field(field, column).value;
-    if (std::abs(value) > kLimit) {
-      throw BadRow{fmt::format("expected {} within +-{} m, found {}", column, kLimit, value)};
-    }
-    return value;
+    return value_within(field, column, -2147483.648, 2147483.647, "m");  // 32 bits of mm
   }
 
   static double value_within(std::string_view field, std::string_view column, double low,
@@ -170,11 +165,7 @@ class OpenpylivoxCsvWriter final : public Writer {
     const auto& rows = chunk.observations;
     time_.look_at(rows.time_ns);
     for (std::size_t i = 0; i < rows.size(); ++i) {
-      if (filter_.accepts(rows, i)) {
-        write_point(rows, i);
-      } else {
-        ++left_out_;
-      }
+      if (!filter_.accepts(rows, i) || !write_point(rows, i)) ++left_out_;
     }
   }
 
@@ -217,20 +208,21 @@ class OpenpylivoxCsvWriter final : public Writer {
     }
   }
 
-  void write_point(const Observations& rows, std::size_t i) {
+  /// @return false for a point closer than the format's step, which it would show as no return
+  bool write_point(const Observations& rows, std::size_t i) {
     if (variant_.cartesian) {
       const auto point = cartesian_point(rows, i);
       const std::array<std::int64_t, 3> steps = {whole_steps(point.x, kMillimetre),
                                                  whole_steps(point.y, kMillimetre),
                                                  whole_steps(point.z, kMillimetre)};
-      if (steps == std::array<std::int64_t, 3>{}) return;  // closer than the step: no return
+      if (steps == std::array<std::int64_t, 3>{}) return false;
       for (const auto step : steps) {
         output_.append_decimal(step, kMetreDecimals);
         comma();
       }
     } else {
       const auto depth = whole_steps(rows.range[i], kMillimetre);
-      if (depth == 0) return;
+      if (depth == 0) return false;
       output_.append_decimal(depth, kMetreDecimals);
       comma();
       output_.append_fixed(degrees_from_radians(rows.zenith[i]), kDegreeDecimals);
@@ -253,6 +245,7 @@ class OpenpylivoxCsvWriter final : public Writer {
       }
     }
     output_.end_row();
+    return true;
   }
 
   Variant variant_;

@@ -112,7 +112,7 @@ PcdHeader read_header(const std::string& path) {
       }
     }
   } catch (const BadRow& bad) {
-    lines.fail(bad.problem);
+    lines.fail(bad.what());
   }
   header.data_line = lines.line() + 1;
   header.data_offset = lines.offset();

@@ -110,7 +110,7 @@ PlyHeader read_header(const std::string& path) {
         header.elements.push_back(
             {std::string(words[1]), count_field(words[2], "element"), lines.line(), offset, {}});
       } catch (const BadRow& bad) {
-        lines.fail(bad.problem);
+        lines.fail(bad.what());
       }
     } else if (words[0] == "property") {
       read_property(lines, words, header);

@@ -4,9 +4,12 @@
 // positions in a file, so the structure is checked before the file is given to it. For that, chunks
 // that are compressed are unpacked once more than for reading.
 #include <algorithm>
+#include <cstdlib>
 #include <cstring>
 #include <fstream>
 #include <memory>
+#include <mutex>
+#include <new>
 #include <utility>
 
 #include <console_bridge/console.h>
@@ -17,6 +20,7 @@
 
 #include "risley/core/error.hpp"
 #include "risley/io/little_endian.hpp"
+#include "risley/io/rosbag_lock.hpp"
 
 #include "recordings/formats/format.hpp"
 #include "recordings/formats/livox_messages.hpp"
@@ -47,16 +51,48 @@ std::string shown_type(const std::string& type, const std::string& md5) {
   return named_alike && !kind_of(md5) ? fmt::format("{} with the unknown md5 {}", type, md5) : type;
 }
 
-/// While it lives, rosbag_storage and its like print nothing: they log what they throw.
-class Silence {
+/// Holds rosbag_storage for one thread. While it lives, the library prints nothing: it logs what it
+/// throws.
+class RosbagCall {
  public:
-  Silence() : handler_(console_bridge::getOutputHandler()) { console_bridge::noOutputHandler(); }
-  ~Silence() { console_bridge::useOutputHandler(handler_); }
-  Silence(const Silence&) = delete;
-  Silence& operator=(const Silence&) = delete;
+  RosbagCall() : handler_(console_bridge::getOutputHandler()) { console_bridge::noOutputHandler(); }
+  ~RosbagCall() { console_bridge::useOutputHandler(handler_); }
+  RosbagCall(const RosbagCall&) = delete;
+  RosbagCall& operator=(const RosbagCall&) = delete;
 
  private:
+  std::unique_lock<std::recursive_mutex> lock_ = io::lock_rosbag();  // before the handler is asked
   console_bridge::OutputHandler* handler_;
+};
+
+/// Deletes an object of rosbag_storage.
+struct DeleteInRosbag {
+  template <class T>
+  void operator()(T* object) const {
+    const RosbagCall call;
+    delete object;
+  }
+};
+
+/// Zeroed memory that costs nothing until it is written to, however much a file asks for.
+class UntouchedBytes {
+ public:
+  UntouchedBytes() = default;
+  explicit UntouchedBytes(std::size_t count)
+      : bytes_(static_cast<std::uint8_t*>(std::calloc(count, 1))), size_(count) {
+    if (bytes_ == nullptr && count > 0) throw std::bad_alloc();
+  }
+
+  bool empty() const { return size_ == 0; }
+  std::uint8_t* data() { return bytes_.get(); }
+  const std::uint8_t* data() const { return bytes_.get(); }
+
+ private:
+  struct Free {
+    void operator()(std::uint8_t* bytes) const { std::free(bytes); }
+  };
+  std::unique_ptr<std::uint8_t, Free> bytes_;
+  std::size_t size_ = 0;
 };
 
 /// Checks that every record of a bag lies where the file and its index say.
@@ -101,7 +137,7 @@ class BagStructure {
   /// Reads from the file, or from the chunk that was unpacked.
   void read(std::uint64_t offset, char* bytes, std::size_t count) {
     if (!unpacked_.empty()) {
-      std::copy_n(unpacked_.begin() + static_cast<std::ptrdiff_t>(offset), count, bytes);
+      std::copy_n(unpacked_.data() + offset, count, bytes);
       return;
     }
     stream_.seekg(static_cast<std::streamoff>(offset));
@@ -254,7 +290,7 @@ class BagStructure {
     }
     unpack(record, compression, bytes);
     if (bytes > 0) check_messages(0, bytes);
-    unpacked_.clear();
+    unpacked_ = {};
   }
 
   void unpack(const Record& record, std::string_view compression, std::uint32_t bytes) {
@@ -271,9 +307,9 @@ class BagStructure {
     std::vector<std::uint8_t> packed(record.data_bytes());
     read(record.data, reinterpret_cast<char*>(packed.data()), packed.size());
     // What the compressed bytes do not fill stays zero and is no record.
-    std::vector<std::uint8_t> unpacked(bytes);
+    UntouchedBytes unpacked(bytes);
     try {
-      const Silence silence;
+      const RosbagCall call;
       rosbag::ChunkedFile().decompress(
           compression == "bz2" ? rosbag::compression::BZ2 : rosbag::compression::LZ4,
           unpacked.data(), bytes, packed.data(), static_cast<unsigned>(packed.size()));
@@ -327,7 +363,7 @@ class BagStructure {
   std::uint64_t size_ = 0;
   std::vector<std::uint64_t> chunks_;
   std::vector<std::uint32_t> messages_;  ///< where those of the last chunk begin in it
-  std::vector<std::uint8_t> unpacked_;   ///< a compressed chunk while it is looked at
+  UntouchedBytes unpacked_;              ///< a compressed chunk while it is looked at
 };
 
 /// The bytes of one serialised message, taken from the front.
@@ -442,7 +478,8 @@ class Ros1BagReader final : public MessageReader {
     header_.format = kName;
     BagStructure::check(path);
     guarded("be opened", [&] {
-      bag_.open(path, rosbag::bagmode::Read);
+      bag_.reset(new rosbag::Bag);
+      bag_->open(path, rosbag::bagmode::Read);
       set_topics(find_topics());
     });
     rewind();
@@ -459,7 +496,7 @@ class Ros1BagReader final : public MessageReader {
   /// Calls a function of rosbag_storage, whose errors are of many types.
   template <class Function>
   void guarded(const char* what, Function&& function) const {
-    const Silence silence;
+    const RosbagCall call;
     try {
       function();
     } catch (const FileError&) {
@@ -472,7 +509,7 @@ class Ros1BagReader final : public MessageReader {
   }
 
   std::vector<BagTopic> find_topics() {
-    rosbag::View all(bag_);
+    rosbag::View all(*bag_);
     std::vector<std::pair<Key, std::string>> connections;
     for (const rosbag::ConnectionInfo* connection : all.getConnections()) {
       connections.emplace_back(Key(connection->topic, connection->md5sum), connection->datatype);
@@ -495,10 +532,9 @@ class Ros1BagReader final : public MessageReader {
 
   void rewind() override {
     guarded("be read", [this] {
-      view_ =
-          std::make_unique<rosbag::View>(bag_, [this](const rosbag::ConnectionInfo* connection) {
-            return is_wanted(topic_of(connection->topic, connection->md5sum));
-          });
+      view_.reset(new rosbag::View(*bag_, [this](const rosbag::ConnectionInfo* connection) {
+        return is_wanted(topic_of(connection->topic, connection->md5sum));
+      }));
       message_count_ = view_->size();
       position_ = view_->begin();
     });
@@ -539,13 +575,13 @@ class Ros1BagReader final : public MessageReader {
       }
     } catch (const BadMessage& bad) {
       fail(fmt::format("message {} of topic {} ({}): {}", number, topic.name, topic.type,
-                       bad.problem));
+                       bad.what()));
     }
     return true;
   }
 
-  rosbag::Bag bag_;
-  std::unique_ptr<rosbag::View> view_;
+  std::unique_ptr<rosbag::Bag, DeleteInRosbag> bag_;
+  std::unique_ptr<rosbag::View, DeleteInRosbag> view_;
   rosbag::View::iterator position_;
   std::vector<Key> known_;  ///< by topic, ascending
   std::uint32_t message_count_ = 0, messages_read_ = 0;

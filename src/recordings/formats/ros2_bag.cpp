@@ -2,13 +2,16 @@
 // SPDX-License-Identifier: MIT
 // Bags of ROS 2 as rosbag2 stores them by default: a SQLite database whose messages are in CDR.
 // Messages come in the order of their ids, which is that of recording. The database is opened so
-// that nothing is written beside it, unless SQLite's own files there hold a part of it.
+// that nothing is written beside it, unless SQLite's own files there hold a part of it. It comes
+// from anywhere: only plain tables are read, and no step may take longer than a table of the file's
+// size can need.
 #include <algorithm>
 #include <array>
 #include <filesystem>
 #include <fstream>
 #include <memory>
 #include <system_error>
+#include <utility>
 
 #include <fastcdr/Cdr.h>
 #include <fastcdr/FastBuffer.h>
@@ -229,6 +232,9 @@ class Ros2BagReader final : public MessageReader {
   explicit Ros2BagReader(const std::string& path) : MessageReader(path) {
     header_.format = kName;
     open_database();
+    restrict_database();
+    require_plain_table("topics");
+    require_plain_table("messages");
     set_topics(find_topics());
     find_ids();
     messages_ = prepare("SELECT id, topic_id, data FROM messages ORDER BY id");
@@ -272,7 +278,68 @@ class Ros2BagReader final : public MessageReader {
                                 expected, found));
   }
 
+  /// Nothing that the file brings along is run, and nothing takes more than a bag needs.
+  void restrict_database() {
+    sqlite3* const database = database_.get();
+    for (const auto& [setting, value] : {std::pair{SQLITE_DBCONFIG_DEFENSIVE, 1},
+                                         {SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0},
+                                         {SQLITE_DBCONFIG_ENABLE_VIEW, 0},
+                                         {SQLITE_DBCONFIG_ENABLE_TRIGGER, 0}}) {
+      sqlite3_db_config(database, setting, value, nullptr);
+    }
+    for (const auto& [limit, value] :
+         {std::pair{SQLITE_LIMIT_LENGTH, 1 << 28},  // bytes of a message
+          {SQLITE_LIMIT_SQL_LENGTH, 1 << 16},
+          {SQLITE_LIMIT_COLUMN, 100},
+          {SQLITE_LIMIT_EXPR_DEPTH, 20},
+          {SQLITE_LIMIT_COMPOUND_SELECT, 2},
+          {SQLITE_LIMIT_VDBE_OP, 10'000},
+          {SQLITE_LIMIT_FUNCTION_ARG, 8},
+          {SQLITE_LIMIT_ATTACHED, 0},
+          {SQLITE_LIMIT_TRIGGER_DEPTH, 1},
+          {SQLITE_LIMIT_WORKER_THREADS, 0}}) {
+      sqlite3_limit(database, limit, value);
+    }
+    sqlite3_exec(database, "PRAGMA cell_size_check=ON; PRAGMA mmap_size=0", nullptr, nullptr,
+                 nullptr);
+    for (const char* ending : {"", "-wal"}) {
+      std::error_code code;
+      const std::uint64_t bytes = std::filesystem::file_size(path() + ending, code);
+      if (!code) file_bytes_ += bytes;
+    }
+    // A row of a table takes some ten instructions of SQLite and at least five bytes.
+    constexpr std::uint64_t kLooksWithoutFile = 100;
+    most_looks_ = kLooksWithoutFile + 4 * file_bytes_ / kInstructionsPerLook;
+    sqlite3_progress_handler(
+        database, kInstructionsPerLook,
+        [](void* reader) {
+          auto* const self = static_cast<Ros2BagReader*>(reader);
+          return ++self->looks_ > self->most_looks_ ? 1 : 0;
+        },
+        this);
+  }
+
+  /// A view, a virtual table or a generated column could make more of the file than it holds.
+  void require_plain_table(const char* name) const {
+    const Statement table = prepare(
+        fmt::format("SELECT type, rootpage FROM sqlite_master WHERE lower(name) = '{}'", name));
+    while (step(table.get(), "give its tables")) {
+      const std::string type = text_column(table.get(), 0);
+      if (type == "table" && sqlite3_column_int64(table.get(), 1) > 0) continue;
+      fail(fmt::format("expected a table {} in the database, found a {}", name,
+                       type == "table" ? "virtual table" : type));
+    }
+    constexpr int kNameColumn = 1, kHiddenColumn = 6;
+    const Statement columns = prepare(fmt::format("PRAGMA table_xinfo({})", name));
+    while (step(columns.get(), "give its columns")) {
+      if (sqlite3_column_int(columns.get(), kHiddenColumn) == 0) continue;
+      fail(fmt::format("the column {} of the table {} is computed, expected stored ones",
+                       text_column(columns.get(), kNameColumn), name));
+    }
+  }
+
   Statement prepare(const std::string& query) const {
+    looks_ = 0;
     sqlite3_stmt* statement = nullptr;
     if (sqlite3_prepare_v2(database_.get(), query.c_str(), -1, &statement, nullptr) != SQLITE_OK) {
       fail_database("be read as a bag of ROS 2");
@@ -281,8 +348,13 @@ class Ros2BagReader final : public MessageReader {
   }
 
   bool step(sqlite3_stmt* statement, const char* what) const {
+    looks_ = 0;
     const int result = sqlite3_step(statement);
     if (result == SQLITE_ROW) return true;
+    if (result == SQLITE_INTERRUPT) {
+      fail(fmt::format("the database cannot {}: it takes more steps than a bag of its size needs",
+                       what));
+    }
     if (result != SQLITE_DONE) fail_database(what);
     return false;
   }
@@ -318,6 +390,7 @@ class Ros2BagReader final : public MessageReader {
     const Statement first = prepare("SELECT MIN(id) FROM messages");
     const Statement last = prepare("SELECT MAX(id) FROM messages");
     // A damaged end is no reason to keep back what stands in front of it.
+    looks_ = 0;
     if (sqlite3_step(first.get()) == SQLITE_ROW) first_id_ = sqlite3_column_int64(first.get(), 0);
     if (sqlite3_step(last.get()) == SQLITE_ROW) last_id_ = sqlite3_column_int64(last.get(), 0);
     id_ = first_id_;
@@ -326,6 +399,8 @@ class Ros2BagReader final : public MessageReader {
   void rewind() override {
     sqlite3_reset(messages_.get());  // returns the last error again, which was reported
     id_ = first_id_;
+    any_read_ = false;
+    blob_bytes_ = 0;
     ended_ = false;
   }
 
@@ -339,10 +414,21 @@ class Ros2BagReader final : public MessageReader {
   bool next(BagMessage& message) override {
     if (ended_) return false;  // stepping again would begin anew
     while (step(messages_.get(), "be read to its end")) {
-      id_ = sqlite3_column_int64(messages_.get(), 0);
+      const sqlite3_int64 id = sqlite3_column_int64(messages_.get(), 0);
+      if (any_read_ && id <= id_) {  // pages that stand in the table again and again
+        fail(fmt::format("message row {} follows row {}, expected ascending numbers", id, id_));
+      }
+      id_ = id;
+      any_read_ = true;
       const auto topic = topic_of(sqlite3_column_int64(messages_.get(), 1));
       if (!topic) continue;
       message.topic = *topic;
+      sqlite3_column_blob(messages_.get(), 2);
+      blob_bytes_ += static_cast<std::uint64_t>(sqlite3_column_bytes(messages_.get(), 2));
+      if (blob_bytes_ > file_bytes_) {  // pages that stand in several messages
+        fail(fmt::format("the messages up to row {} have {} bytes, the database only {}", id_,
+                         blob_bytes_, file_bytes_));
+      }
       decode(message);
       return true;
     }
@@ -374,14 +460,21 @@ class Ros2BagReader final : public MessageReader {
           break;
       }
     } catch (const BadMessage& bad) {
-      fail_here(bad.problem);
+      fail_here(bad.what());
     } catch (const eprosima::fastcdr::exception::Exception& error) {
       fail_here(
           fmt::format("expected more than its {} bytes of CDR ({})", blob_bytes, error.what()));
     }
   }
 
+  static constexpr int kInstructionsPerLook = 10'000;  ///< of SQLite's machine
+
   Database database_;
+  mutable std::uint64_t looks_ = 0;  ///< of SQLite's progress, in this step
+  std::uint64_t most_looks_ = 0;
+  std::uint64_t file_bytes_ = 0;
+  std::uint64_t blob_bytes_ = 0;    ///< of the messages read so far
+  bool any_read_ = false;           ///< and id_ is that of the last message
   std::vector<sqlite3_int64> ids_;  ///< by topic
   sqlite3_int64 first_id_ = 0, last_id_ = 0, id_ = 0;
   bool ended_ = false;

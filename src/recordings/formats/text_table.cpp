@@ -249,8 +249,8 @@ std::int64_t nanoseconds_of(const Decimal& seconds, std::string_view column) {
     if (!__builtin_mul_overflow(seconds.digits, scale, &time_ns)) return time_ns;
   } else if (seconds.decimals > 9) {
     const auto scale = kPowersOfTen[static_cast<std::size_t>(seconds.decimals - 9)];
-    const auto half = seconds.digits < 0 ? -scale / 2 : scale / 2;
-    return (seconds.digits + half) / scale;
+    const std::int64_t rest = seconds.digits % scale, half = scale / 2;
+    return seconds.digits / scale + (rest >= half ? 1 : 0) - (rest <= -half ? 1 : 0);
   } else if (const auto rounded = nanoseconds_from_seconds(seconds.value)) {
     return *rounded;
   }
@@ -353,7 +353,7 @@ bool TextTableReader::read(Chunk& chunk, std::size_t max_rows) {
       if (rows_left_) --*rows_left_;
     }
   } catch (const BadRow& bad) {
-    stop(FileError(path_, {.byte_offset = {}, .line = lines_.line_number()}, bad.problem));
+    stop(FileError(path_, {.byte_offset = {}, .line = lines_.line_number()}, bad.what()));
   } catch (const FileError& error) {
     stop(error);
   }

@@ -14,6 +14,7 @@
 
 #include <fmt/format.h>
 
+#include "risley/core/error.hpp"
 #include "risley/io/output_file.hpp"
 #include "risley/recordings/observations.hpp"
 #include "risley/recordings/reader.hpp"
@@ -52,8 +53,9 @@ class LineReader {
 };
 
 /// What is wrong with one line; TextTableReader adds the file and the line.
-struct BadRow {
-  std::string problem;
+class BadRow : public Error {
+ public:
+  using Error::Error;
 };
 
 /// A number as it stands in a text: digits * 10^-decimals, exact.

@@ -14,13 +14,16 @@
 
 #include "risley/core/error.hpp"
 #include "risley/io/little_endian.hpp"
+#include "risley/recordings/livox/packet.hpp"
 
 #include "recordings/formats/cartesian.hpp"
 #include "recordings/formats/format.hpp"
-#include "recordings/formats/packet.hpp"
 #include "recordings/formats/text_table.hpp"
 
 namespace risley::recordings {
+
+using namespace livox;
+
 namespace {
 
 using io::store;
@@ -31,6 +34,7 @@ constexpr std::string_view kHeader =  // without blanks, as normalized_header() 
     "Tag,Ori_x,Ori_y,Ori_z,Ori_radius,Ori_theta,Ori_phi";
 constexpr std::size_t kColumnCount = 19;
 constexpr std::size_t kRowsLookedAt = 16384;
+constexpr std::size_t kMostSensors = 256;  // as Observations::device can number
 constexpr std::uint8_t kMid40 = 1, kMid70 = 6, kAvia = 7;
 constexpr std::uint8_t kGpsTimestamp = 3, kPtpTimestamp = 1;
 
@@ -142,6 +146,8 @@ class ViewerCsvReader final : public TextTableReader {
         return s.slot == row.slot && s.lidar == row.lidar;
       });
       if (found == seen.end()) {
+        if (seen.size() == kMostSensors)
+          return false;  // read() refuses the next when it gets there
         seen.push_back({row.slot, row.lidar, row.data_type, row.timestamp_ns, INT64_MAX});
       } else if (row.timestamp_ns > found->timestamp_ns) {
         found->shortest_period_ns =
@@ -165,7 +171,9 @@ class ViewerCsvReader final : public TextTableReader {
 
   std::size_t add_sensor(int slot, int lidar, std::uint8_t type, std::uint8_t data_type) {
     const std::size_t device = sensors_.size();
-    if (device > UINT8_MAX) throw BadRow{"expected at most 256 sensors, found more"};
+    if (device == kMostSensors) {
+      throw BadRow{fmt::format("expected at most {} sensors, found more", kMostSensors)};
+    }
     Sensor sensor;
     sensor.slot = slot;
     sensor.lidar = lidar;

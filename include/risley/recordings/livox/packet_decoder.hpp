@@ -1,0 +1,86 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+
+#include "risley/core/error.hpp"
+#include "risley/recordings/livox/packet.hpp"
+#include "risley/recordings/observations.hpp"
+
+namespace risley::recordings::livox {
+
+/// Bytes that no sensor sends.
+class BadPacket : public Error {
+ public:
+  /// @param byte_offset  of what is wrong, from the first byte that was given
+  /// @param problem      what was expected and what was found
+  BadPacket(std::size_t byte_offset, std::string problem);
+
+  std::size_t byte_offset() const { return byte_offset_; }
+  const std::string& problem() const { return problem_; }
+
+ private:
+  std::size_t byte_offset_;
+  std::string problem_;
+};
+
+/// What packets do not say of the sensor that sends them.
+struct PacketDecoderOptions {
+  std::uint8_t device_type = 1;  ///< as Device::type
+  std::uint8_t device = 0;       ///< Observations::device of all rows
+  /// Instead of what device type and data type say: for special firmware and unknown devices.
+  std::optional<ShotGrid> grid = {};
+  /// As LVX 1.0 keeps packets: any version but 0, and data type 0 in metres as floats.
+  bool float_points = false;
+};
+
+/// Turns the packets of one sensor into rows, one by one as they come, without looking ahead. What
+/// it keeps from packet to packet is the clock.
+class PacketDecoder {
+ public:
+  /// @throws InvalidArgument for a grid whose interval_denominator, beams or records_per_shot is 0
+  explicit PacketDecoder(const PacketDecoderOptions& options);
+
+  /// Appends the rows of a packet, or its inertial sample, and its header to a chunk. Memory is
+  /// asked for only where the chunk's columns have to grow. Records without a return are rows
+  /// with range 0, valid 0.
+  /// @param bytes  header and all records, nothing behind them
+  /// @throws BadPacket for a wrong length, version, data type or time, for angles beyond a turn of
+  ///         a return, for coordinates and inertial values that are no finite numbers;
+  ///         InvalidArgument when neither the types nor the options tell the grid. Chunk and clock
+  ///         are then as before.
+  void decode(std::span<const std::uint8_t> bytes, Chunk& chunk);
+
+  /// New seconds seen in PPS times.
+  std::uint64_t clock_wraps() const { return clock_.wraps(); }
+
+ private:
+  PacketDecoderOptions options_;
+  PacketClock clock_;
+};
+
+/// The fields of a packet header. rows, frame and device_index are not in it.
+/// @param bytes  [at least kPacketHeaderBytes] @throws BadPacket when there are fewer
+Packet decode_packet_header(std::span<const std::uint8_t> bytes);
+
+/// Appends the rows of records that stand without a packet header.
+/// @param layout   of a data type with points, any number of records
+/// @param bytes    [layout.bytes()]
+/// @param time_ns  of the first shot
+/// @param device   Observations::device
+/// @throws BadPacket for a wrong length and for a return with angles beyond a turn; no row is then
+///         appended
+void decode_records(const RecordLayout& layout, std::span<const std::uint8_t> bytes,
+                    std::int64_t time_ns, const ShotGrid& grid, std::uint8_t device,
+                    Observations& rows);
+
+/// The inertial sample of data type 6; its time and device stand elsewhere.
+/// @param bytes  [24] @throws BadPacket for another length and values that are no finite numbers
+ImuSample decode_imu(std::span<const std::uint8_t> bytes);
+
+}  // namespace risley::recordings::livox

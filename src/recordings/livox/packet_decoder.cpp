@@ -1,0 +1,275 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "risley/recordings/livox/packet_decoder.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "risley/core/saturating.hpp"
+#include "risley/io/little_endian.hpp"
+
+#include "recordings/formats/cartesian.hpp"
+#include "recordings/livox/spherical_record.hpp"
+
+namespace risley::recordings::livox {
+namespace {
+
+using io::load;
+
+/// @return number of the first record that no sensor can have sent
+template <int kReturns, bool kTagged>
+std::optional<std::size_t> decode_spherical(std::size_t records, const std::uint8_t* bytes,
+                                            Observations& o, std::size_t row) {
+  constexpr std::size_t kBytes = kReturns == 1 ? (kTagged ? 10 : 9) : 4 + 6 * kReturns;
+  for (std::size_t record = 0; record < records; ++record, bytes += kBytes) {
+    const int zenith = load<std::uint16_t>(bytes + zenith_at(kReturns));
+    const int azimuth = load<std::uint16_t>(bytes + zenith_at(kReturns) + 2);
+    const bool possible = zenith <= kHalfTurn && azimuth <= kFullTurn;
+    // Beyond a full turn stand only angles that nobody trusts; they are kept as they are.
+    const bool over_half = azimuth > kHalfTurn && azimuth <= kFullTurn;
+    const double azimuth_rad =
+        azimuth == kHalfTurn
+            ? kPi
+            : radians_from_degrees((over_half ? azimuth - kFullTurn : azimuth) / 100.0);
+    const double zenith_rad =
+        std::min(radians_from_degrees(zenith / 100.0), zenith <= kHalfTurn ? kPi : 1e3);
+    for (int number = 0; number < kReturns; ++number, ++row) {
+      const auto depth = load<std::uint32_t>(bytes + depth_at(kReturns, number));
+      if (depth > 0 && !possible) return record;
+      set_spherical(o, row, azimuth_rad, zenith_rad, depth * kMillimetre);
+      o.intensity[row] = bytes[intensity_at(kReturns, number)];
+      o.tag[row] = kTagged ? bytes[intensity_at(kReturns, number) + 1] : 0;
+    }
+  }
+  return std::nullopt;
+}
+
+template <bool kTagged>
+void decode_cartesian(std::size_t points, const std::uint8_t* bytes, Observations& o,
+                      std::size_t row) {
+  constexpr std::size_t kBytes = kTagged ? 14 : 13;
+  for (const std::size_t end = row + points; row < end; ++row, bytes += kBytes) {
+    set_cartesian(
+        o, row,
+        {load<std::int32_t>(bytes) * kMillimetre, load<std::int32_t>(bytes + 4) * kMillimetre,
+         load<std::int32_t>(bytes + 8) * kMillimetre},
+        kMillimetre);
+    o.intensity[row] = bytes[12];
+    o.tag[row] = kTagged ? bytes[13] : 0;
+  }
+}
+
+/// As data type 0, but in metres.
+/// @return number of the first record that is no point
+std::optional<std::size_t> decode_float_points(std::size_t points, const std::uint8_t* bytes,
+                                               Observations& o, std::size_t row) {
+  for (std::size_t point = 0; point < points; ++point, ++row, bytes += 13) {
+    const Vector3<double> position{load<float>(bytes), load<float>(bytes + 4),
+                                   load<float>(bytes + 8)};
+    if (!std::isfinite(position.x + position.y + position.z)) return point;
+    set_cartesian(o, row, position, kMillimetre);
+    o.intensity[row] = bytes[12];
+    o.tag[row] = 0;
+  }
+  return std::nullopt;
+}
+
+void check_grid(const ShotGrid& grid) {
+  const auto check = [](const char* field, std::uint32_t value) {
+    if (value > 0) return;
+    throw InvalidArgument(fmt::format("ShotGrid::{} = 0, allowed 1 or more", field));
+  };
+  check("interval_denominator", grid.interval_denominator);
+  check("beams", grid.beams);
+  check("records_per_shot", grid.records_per_shot);
+}
+
+void check_layout(const RecordLayout& layout) {
+  const std::size_t returns = layout.returns;
+  std::size_t bytes = 4 + 6 * returns;
+  if (layout.cartesian) {
+    bytes = returns * (layout.tagged ? 14 : 13);
+  } else if (returns == 1) {
+    bytes = layout.tagged ? 10 : 9;
+  }
+  const bool is_known = returns >= 1 && returns <= 3 && (layout.tagged || returns == 1);
+  if (is_known && layout.bytes_per_record == bytes) return;
+  throw InvalidArgument(
+      fmt::format("a layout of {} {} returns and {} bytes per record, allowed those of the data "
+                  "types 0 to 5, 7 "
+                  "and 8",
+                  layout.returns, layout.tagged ? "tagged" : "untagged", layout.bytes_per_record));
+}
+
+void require_bytes(std::size_t found, std::size_t expected, const char* what) {
+  if (found == expected) return;
+  throw BadPacket(std::min(found, expected),
+                  fmt::format("expected {} bytes of {}, found {}", expected, what, found));
+}
+
+/// Rows of one shot follow each other, whether one record holds them or several.
+void set_shots(const RecordLayout& layout, std::int64_t time_ns, const ShotGrid& grid,
+               std::uint8_t device, Observations& o, std::size_t first_row) {
+  const std::uint32_t rows_per_shot = std::uint32_t{layout.returns} * grid.records_per_shot;
+  std::uint32_t shot = 0;
+  for (std::size_t row = first_row, end = first_row + layout.rows(); row < end; ++shot) {
+    const std::int64_t shot_time = saturating_sum(time_ns, grid.offset_ns(shot));
+    const auto beam = static_cast<std::uint8_t>(grid.beams == 1 ? 0 : shot % grid.beams);
+    for (std::uint32_t number = 1; number <= rows_per_shot && row < end; ++number, ++row) {
+      o.time_ns[row] = shot_time;
+      o.beam[row] = beam;
+      o.return_number[row] = static_cast<std::uint8_t>(number);
+    }
+  }
+  std::fill_n(o.device.begin() + static_cast<std::ptrdiff_t>(first_row),
+              static_cast<std::ptrdiff_t>(layout.rows()), device);
+}
+
+/// @return number of the first record that no sensor can have sent
+std::optional<std::size_t> decode_points(const RecordLayout& layout, const std::uint8_t* bytes,
+                                         Observations& o, std::size_t first_row) {
+  const std::size_t records = layout.records;
+  if (layout.cartesian) {
+    if (layout.tagged) {
+      decode_cartesian<true>(layout.rows(), bytes, o, first_row);
+    } else {
+      decode_cartesian<false>(layout.rows(), bytes, o, first_row);
+    }
+    return std::nullopt;
+  }
+  if (layout.returns == 1) {
+    return layout.tagged ? decode_spherical<1, true>(records, bytes, o, first_row)
+                         : decode_spherical<1, false>(records, bytes, o, first_row);
+  }
+  return layout.returns == 2 ? decode_spherical<2, true>(records, bytes, o, first_row)
+                             : decode_spherical<3, true>(records, bytes, o, first_row);
+}
+
+/// Appends the rows of records. @param float_points  of data type 0, in metres
+void append_records(const RecordLayout& layout, const std::uint8_t* bytes, bool float_points,
+                    std::int64_t time_ns, const ShotGrid& grid, std::uint8_t device,
+                    Observations& rows) {
+  const std::size_t first_row = rows.size();
+  rows.resize(first_row + layout.rows());
+  const std::optional<std::size_t> impossible =
+      float_points ? decode_float_points(layout.records, bytes, rows, first_row)
+                   : decode_points(layout, bytes, rows, first_row);
+  if (impossible) {
+    rows.resize(first_row);
+    throw BadPacket(*impossible * layout.bytes_per_record,
+                    float_points ? "a point has a coordinate that is no finite number"
+                                 : "a return has an angle outside zenith [0, 18000] or azimuth "
+                                   "[0, 36000] x 0.01 deg");
+  }
+  set_shots(layout, time_ns, grid, device, rows, first_row);
+}
+
+/// Runs a function on what stands behind the header, whose places are counted from the records on.
+template <class Function>
+void behind_header(Function&& function) {
+  try {
+    function();
+  } catch (const BadPacket& bad) {
+    throw BadPacket(kPacketHeaderBytes + bad.byte_offset(), bad.problem());
+  }
+}
+
+}  // namespace
+
+BadPacket::BadPacket(std::size_t byte_offset, std::string problem)
+    : Error(fmt::format("byte {} of a packet: {}", byte_offset, problem)),
+      byte_offset_(byte_offset),
+      problem_(std::move(problem)) {}
+
+PacketDecoder::PacketDecoder(const PacketDecoderOptions& options) : options_(options) {
+  if (options_.grid) check_grid(*options_.grid);
+}
+
+void PacketDecoder::decode(std::span<const std::uint8_t> bytes, Chunk& chunk) {
+  Packet packet = decode_packet_header(bytes);
+  if (options_.float_points ? packet.version == 0 : packet.version != kPacketVersion) {
+    throw BadPacket(kVersionAt, fmt::format("packet version = {}, expected {}", packet.version,
+                                            kPacketVersion));
+  }
+  const RecordLayout* layout = record_layout(packet.data_type);
+  if (layout == nullptr || (options_.float_points && packet.data_type != 0)) {
+    throw BadPacket(kDataTypeAt, fmt::format("data type = {}, expected {}", packet.data_type,
+                                             options_.float_points ? "0" : "0 to 8"));
+  }
+  const auto records = bytes.subspan(kPacketHeaderBytes);
+  behind_header([&] { require_bytes(records.size(), layout->bytes(), "records"); });
+  PacketClock clock = clock_;
+  const std::optional<std::int64_t> time_ns = clock.time_ns(packet);
+  if (!time_ns) {
+    throw BadPacket(kTimestampTypeAt,
+                    fmt::format("timestamp of type {} with the bytes {:02X} is no time",
+                                packet.timestamp_type, fmt::join(packet.timestamp, " ")));
+  }
+  packet.rows = static_cast<std::uint32_t>(layout->rows());
+  packet.device_index = options_.device;
+  if (packet.data_type == kImuDataType) {
+    behind_header([&] { chunk.imu.push_back(decode_imu(records)); });
+    chunk.imu.back().time_ns = *time_ns;
+    chunk.imu.back().device = options_.device;
+  } else {
+    const std::optional<ShotGrid> grid =
+        options_.grid ? options_.grid : shot_grid(options_.device_type, packet.data_type);
+    if (!grid) {
+      throw InvalidArgument(
+          fmt::format("device type = {} does not tell the shot rate of data type {}, allowed 1, 2, "
+                      "3, 6 and 7, or any with PacketDecoderOptions::grid",
+                      options_.device_type, packet.data_type));
+    }
+    behind_header([&] {
+      append_records(*layout, records.data(), options_.float_points, *time_ns, *grid,
+                     options_.device, chunk.observations);
+    });
+  }
+  chunk.packets.push_back(packet);
+  clock_ = clock;
+}
+
+Packet decode_packet_header(std::span<const std::uint8_t> bytes) {
+  if (bytes.size() < kPacketHeaderBytes) {
+    throw BadPacket(bytes.size(), fmt::format("expected {} bytes of header and more, found {}",
+                                              kPacketHeaderBytes, bytes.size()));
+  }
+  Packet packet;
+  packet.version = bytes[kVersionAt];
+  packet.slot = bytes[1];
+  packet.lidar_id = bytes[2];
+  packet.reserved = bytes[3];
+  packet.status = load<std::uint32_t>(bytes.data() + 4);
+  packet.timestamp_type = bytes[kTimestampTypeAt];
+  packet.data_type = bytes[kDataTypeAt];
+  std::copy_n(bytes.begin() + kTimestampAt, packet.timestamp.size(), packet.timestamp.begin());
+  return packet;
+}
+
+void decode_records(const RecordLayout& layout, std::span<const std::uint8_t> bytes,
+                    std::int64_t time_ns, const ShotGrid& grid, std::uint8_t device,
+                    Observations& rows) {
+  check_layout(layout);
+  check_grid(grid);
+  require_bytes(bytes.size(), layout.bytes(), "records");
+  append_records(layout, bytes.data(), false, time_ns, grid, device, rows);
+}
+
+ImuSample decode_imu(std::span<const std::uint8_t> bytes) {
+  constexpr std::size_t kValues = 6;
+  require_bytes(bytes.size(), kValues * sizeof(float), "an inertial sample");
+  ImuSample sample;
+  for (std::size_t i = 0; i < kValues; ++i) {
+    const auto value = load<float>(bytes.data() + i * sizeof(float));
+    if (!std::isfinite(value)) {
+      throw BadPacket(i * sizeof(float), fmt::format("expected a finite number, found {}", value));
+    }
+    (i < 3 ? sample.angular_velocity[i] : sample.acceleration_g[i - 3]) = value;
+  }
+  return sample;
+}
+
+}  // namespace risley::recordings::livox
