@@ -4,10 +4,10 @@
 # Installed as well, so that a project that uses risley looks for them the same way.
 include_guard(GLOBAL)
 
-# risley_package(<key> TARGET <target> DEBIAN <package> [PKG_CONFIG <module> | LIBS <flags>]
+# risley_package(<key> TARGET <target> DEBIAN <package> [PKG_CONFIG <modules> | LIBS <flags>]
 #                [FIND <arguments of find_package>])
 function(risley_package key)
-  cmake_parse_arguments(arg "" "TARGET;DEBIAN;PKG_CONFIG" "LIBS;FIND" ${ARGN})
+  cmake_parse_arguments(arg "" "TARGET;DEBIAN" "PKG_CONFIG;LIBS;FIND" ${ARGN})
   foreach(field TARGET DEBIAN PKG_CONFIG LIBS FIND)
     set_property(GLOBAL PROPERTY RISLEY_PACKAGE_${key}_${field} "${arg_${field}}")
   endforeach()
@@ -21,7 +21,7 @@ risley_package(yaml-cpp TARGET yaml-cpp::yaml-cpp DEBIAN libyaml-cpp-dev PKG_CON
                FIND yaml-cpp)
 risley_package(crypto TARGET OpenSSL::Crypto DEBIAN libssl-dev PKG_CONFIG libcrypto
                FIND OpenSSL COMPONENTS Crypto)
-risley_package(netcdf TARGET PkgConfig::NETCDF DEBIAN libnetcdf-dev PKG_CONFIG netcdf)
+risley_package(netcdf TARGET PkgConfig::NETCDF DEBIAN libnetcdf-dev PKG_CONFIG netcdf hdf5)
 risley_package(rosbag TARGET risley_rosbag DEBIAN librosbag-storage-dev
                LIBS -lrosbag_storage -lroscpp_serialization -lrostime -lcpp_common
                     -lconsole_bridge -lclass_loader)
@@ -40,7 +40,7 @@ function(risley_find_package key)
   elseif(key STREQUAL "netcdf") # its CMake files name libraries that need not be there
     find_package(PkgConfig QUIET)
     if(PKG_CONFIG_FOUND)
-      pkg_check_modules(NETCDF QUIET IMPORTED_TARGET GLOBAL netcdf)
+      pkg_check_modules(NETCDF QUIET IMPORTED_TARGET GLOBAL netcdf hdf5)
     endif()
   elseif(key STREQUAL "rosbag")
     include(${CMAKE_CURRENT_FUNCTION_LIST_DIR}/RisleyRosbag.cmake)

@@ -2,8 +2,8 @@
 # SPDX-FileCopyrightText: 2026 The risley authors
 # SPDX-License-Identifier: MIT
 """Checks that no file includes a layer which its own layer does not declare in CMakeLists.txt, nor
-a private header (one under src/) of another layer, and that no library knows an option of the
-command: no string in src/ and include/ has "--word" in it.
+a private header (one under src/) of another layer, nor a library that only one layer may know; and
+that no library knows an option of the command: no string in src/ and include/ has "--word" in it.
 
 Usage: tools/check_layers.py [ROOT]
 Exit status: 0 all well, 1 a rule is broken (one line each: file:line: what is wrong).
@@ -17,6 +17,8 @@ INCLUDE = re.compile(r'^\s*#\s*include\s*["<]([^">]+)[">]')
 STRING = re.compile(r'"((?:[^"\\]|\\.)*)"')
 FLAG = re.compile(r"(?<![\w-])--[a-z][a-z0-9-]*")
 PROGRAMS = ("apps", "studies", "bench")  # may use every layer
+# Libraries with one home: what others need of them, they ask that layer for.
+HOMES = {"netcdf": "io", "hdf5": "io", "yaml-cpp": "io", "openssl": "io"}
 STRANGERS = ("simulation", "estimation")  # they meet only in tests, so their agreement counts
 
 
@@ -58,6 +60,12 @@ def flags_in(line):
     return flags
 
 
+def library_of(include):
+    """The library among HOMES that an #include names, or None."""
+    name = include.split("/")[0].removesuffix(".h")
+    return name if name in HOMES else None
+
+
 def check_file(path, shown, own, allowed, layers):
     """@param own  the file's layer; None in programs, which may know options"""
     errors = []
@@ -72,6 +80,9 @@ def check_file(path, shown, own, allowed, layers):
         if ".." in include.split("/"):
             errors.append(f'{shown}:{number}: "{include}" hides its layer, name it from the root')
             continue
+        library = library_of(include)
+        if library and own != HOMES[library]:
+            errors.append(f"{shown}:{number}: only the layer {HOMES[library]} may include {include}")
         layer, private = included_layer(include, layers)
         if layer is None:
             continue

@@ -63,10 +63,6 @@ class SharedProgress {
   Progress shown_;
 };
 
-bool is_netcdf(const FileJob& job) {
-  return job.input.ends_with(".nc") || job.output.ends_with(".nc");
-}
-
 FileOutcome failed(const FileJob& job, const Failure& failure) {
   Json json = {{"input", job.input},
                {"error", failure.message},
@@ -134,11 +130,7 @@ ExitStatus run_file_jobs(const std::vector<FileJob>& jobs, const std::string& la
         outcomes[i] = failed(jobs[i], current_failure());
       }
     };
-    if (std::none_of(jobs.begin(), jobs.end(), is_netcdf)) {
-      tbb::parallel_for(std::size_t{0}, jobs.size(), run_one, tbb::simple_partitioner());
-    } else {
-      for (std::size_t i = 0; i < jobs.size(); ++i) run_one(i);
-    }
+    tbb::parallel_for(std::size_t{0}, jobs.size(), run_one, tbb::simple_partitioner());
   }
   ExitStatus status = kDone;
   std::size_t sound = 0;

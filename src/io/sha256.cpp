@@ -2,32 +2,31 @@
 // SPDX-License-Identifier: MIT
 #include "risley/io/sha256.hpp"
 
-#include <fstream>
 #include <memory>
-#include <vector>
 
 #include <fmt/format.h>
 #include <openssl/evp.h>
 
 #include "risley/core/error.hpp"
 
+#include "io/read_bytes.hpp"
+
 namespace risley::io {
 
 std::string sha256_of_file(const std::string& path, const Progress& progress) {
-  std::ifstream stream(path, std::ios::binary);
-  if (!stream) throw FileError(path, {}, "cannot be read");
   const std::unique_ptr<EVP_MD_CTX, void (*)(EVP_MD_CTX*)> context(EVP_MD_CTX_new(),
                                                                    EVP_MD_CTX_free);
-  EVP_DigestInit_ex(context.get(), EVP_sha256(), nullptr);
-  std::vector<char> buffer(1 << 20);
-  while (stream.read(buffer.data(), static_cast<std::streamsize>(buffer.size())) ||
-         stream.gcount() > 0) {
+  const auto require = [](bool done) {
+    if (!done) throw Error("SHA-256: the cryptographic library refuses it");
+  };
+  require(context && EVP_DigestInit_ex(context.get(), EVP_sha256(), nullptr) == 1);
+  read_bytes(path, [&](std::span<const char> bytes) {
     progress.check();
-    EVP_DigestUpdate(context.get(), buffer.data(), static_cast<std::size_t>(stream.gcount()));
-  }
+    require(EVP_DigestUpdate(context.get(), bytes.data(), bytes.size()) == 1);
+  });
   unsigned char digest[EVP_MAX_MD_SIZE];
   unsigned int length = 0;
-  EVP_DigestFinal_ex(context.get(), digest, &length);
+  require(EVP_DigestFinal_ex(context.get(), digest, &length) == 1);
   std::string text;
   for (unsigned int i = 0; i < length; ++i) text += fmt::format("{:02x}", digest[i]);
   return text;

@@ -4,26 +4,22 @@
 
 #include <cerrno>
 #include <cstring>
-#include <filesystem>
 #include <fstream>
-#include <sstream>
 
 #include <fmt/format.h>
 
 #include "risley/core/error.hpp"
 #include "risley/io/output_file.hpp"
 
+#include "io/read_bytes.hpp"
+
 namespace risley::io {
-namespace fs = std::filesystem;
 
 std::string read_text_file(const std::string& path) {
-  std::ifstream stream(path, std::ios::binary);
-  if (!stream || fs::is_directory(path)) {
-    throw FileError(path, {}, fs::exists(path) ? "cannot be read" : "no such file");
-  }
-  std::ostringstream text;
-  text << stream.rdbuf();
-  return std::move(text).str();
+  std::string text;
+  read_bytes(path,
+             [&text](std::span<const char> bytes) { text.append(bytes.data(), bytes.size()); });
+  return text;
 }
 
 void write_text_file(const std::string& path, const std::string& text) {
@@ -31,8 +27,9 @@ void write_text_file(const std::string& path, const std::string& text) {
   std::ofstream stream(output.temporary_path(), std::ios::binary);
   stream.write(text.data(), static_cast<std::streamsize>(text.size()));
   stream.close();
-  if (!stream)
+  if (!stream) {
     throw FileError(path, {}, fmt::format("cannot be written: {}", std::strerror(errno)));
+  }
   output.commit();
 }
 

@@ -3,14 +3,15 @@
 #include "risley/jobs/states_file.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <optional>
 
 #include <fmt/format.h>
-#include <netcdf.h>
 
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
+#include "risley/io/netcdf.hpp"
+#include "risley/io/output_file.hpp"
 #include "risley/optics/parameters.hpp"
 
 namespace risley::jobs {
@@ -18,90 +19,17 @@ namespace {
 
 constexpr std::size_t kBlockRows = 16384;
 
-/// A NetCDF file, closed whatever happens.
-class NcFile {
- public:
-  explicit NcFile(const io::OutputFile& output) : path_(output.path()) {
-    int id = 0;
-    check(nc_create(output.temporary_path().c_str(), NC_NETCDF4 | NC_CLOBBER, &id));
-    id_ = id;
-  }
-  ~NcFile() {
-    if (id_) nc_close(*id_);
-  }
-  NcFile(const NcFile&) = delete;
-  NcFile& operator=(const NcFile&) = delete;
-
-  struct Dimension {
-    int id = 0;
-    std::size_t length = 0;
-  };
-  Dimension dimension(const std::string& name, std::size_t length) {
-    Dimension result{0, length};
-    check(nc_def_dim(*id_, name.c_str(), length, &result.id));
-    return result;
-  }
-
-  void put_text(int variable, const std::string& name, const std::string& text) {
-    check(nc_put_att_text(*id_, variable, name.c_str(), text.size(), text.data()));
-  }
-
-  int define(const Dimension& along, const std::string& name, nc_type type,
-             const std::string& units, const std::string& long_name) {
-    int variable = 0;
-    check(nc_def_var(*id_, name.c_str(), type, 1, &along.id, &variable));
-    if (along.length > 0) {
-      const std::size_t chunk = std::min(along.length, kBlockRows);
-      check(nc_def_var_chunking(*id_, variable, NC_CHUNKED, &chunk));
-      check(nc_def_var_deflate(*id_, variable, 1, 1, 1));
-      // Rows come in order: one chunk at a time is all that needs keeping, not megabytes each.
-      check(nc_set_var_chunk_cache(*id_, variable, chunk * sizeof(double), 3, 1.0F));
-    }
-    if (!units.empty()) put_text(variable, "units", units);
-    put_text(variable, "long_name", long_name);
-    return variable;
-  }
-
-  void put_flags(int variable) {
-    const unsigned char values[] = {0, 1};
-    check(nc_put_att_uchar(*id_, variable, "flag_values", NC_UBYTE, 2, values));
-    put_text(variable, "flag_meanings", "used left_out");
-  }
-
-  void end_definitions() { check(nc_enddef(*id_)); }
-
-  /// Writes rows from first on.
-  void write(int variable, std::size_t first, const std::vector<double>& values) {
-    const std::size_t count = values.size();
-    check(nc_put_vara_double(*id_, variable, &first, &count, values.data()));
-  }
-  void write(int variable, std::size_t first, const std::vector<std::int64_t>& values) {
-    static_assert(sizeof(long long) == sizeof(std::int64_t));
-    const std::vector<long long> wide(values.begin(), values.end());
-    const std::size_t count = wide.size();
-    check(nc_put_vara_longlong(*id_, variable, &first, &count, wide.data()));
-  }
-  void write(int variable, std::size_t first, const std::vector<unsigned char>& values) {
-    const std::size_t count = values.size();
-    check(nc_put_vara_uchar(*id_, variable, &first, &count, values.data()));
-  }
-
-  void close() {
-    const int status = nc_close(*id_);
-    id_.reset();
-    check(status);
-  }
-
- private:
-  void check(int status) const {
-    if (status != NC_NOERR) {
-      throw FileError(path_, {}, fmt::format("cannot be written: {}", nc_strerror(status)));
-    }
-  }
-
-  std::string path_;
-  std::optional<int> id_;
-};
+/// A variable of one value per entry, in compressed blocks.
+template <class T>
+io::NetcdfVariable define(io::NetcdfOutput& file, const io::NetcdfDimension& along,
+                          const std::string& name, const std::string& units,
+                          const std::string& long_name) {
+  const auto variable =
+      file.define<T>(name, {&along}, {std::min(along.length, kBlockRows), true, false});
+  if (!units.empty()) file.put_text(variable, "units", units);
+  file.put_text(variable, "long_name", long_name);
+  return variable;
+}
 
 /// One variable of doubles in file units.
 struct StateColumn {
@@ -158,47 +86,52 @@ void write_states(const std::string& path, const StatesContent& content,
 
 void write_states(const io::OutputFile& output, const StatesContent& content,
                   const std::vector<std::pair<std::string, std::string>>& attributes) {
-  NcFile file(output);
-  file.put_text(NC_GLOBAL, "Conventions", "CF-1.9");
-  file.put_text(NC_GLOBAL, "title", "Estimated rotor states of a Risley-prism lidar");
-  for (const auto& [name, value] : attributes) file.put_text(NC_GLOBAL, name, value);
-  const auto shots = file.dimension("time", content.rows);
+  io::NetcdfOutput file(output);
+  file.put_text("Conventions", "CF-1.9");
+  file.put_text("title", "Estimated rotor states of a Risley-prism lidar");
+  for (const auto& [name, value] : attributes) file.put_text(name, value);
+  const auto shots = content.rows > 0 ? file.define_dimension("time", content.rows)
+                                      : file.define_growing_dimension("time");
   // No "since": the origin is the recording's, which need not be a date.
-  const int time =
-      file.define(shots, "time", NC_DOUBLE, "s", "time of the shot, as in the recording");
-  const int time_ns = file.define(shots, "time_ns", NC_INT64, "ns", "the same without rounding");
+  const auto time =
+      define<double>(file, shots, "time", "s", "time of the shot, as in the recording");
+  const auto time_ns =
+      define<std::int64_t>(file, shots, "time_ns", "ns", "the same without rounding");
   estimation::RotorStates block;
   block.resize(content.prisms, 0);
-  std::vector<int> variables;
+  std::vector<io::NetcdfVariable> variables;
   for (const StateColumn& column : columns_of(block)) {
-    variables.push_back(file.define(shots, column.name, NC_DOUBLE, column.units, column.long_name));
+    variables.push_back(define<double>(file, shots, column.name, column.units, column.long_name));
   }
-  const int outlier = file.define(shots, "outlier", NC_UBYTE, "", "shot left out as an outlier");
-  file.put_flags(outlier);
+  const auto outlier =
+      define<std::uint8_t>(file, shots, "outlier", "", "shot left out as an outlier");
+  file.put_numbers(outlier, "flag_values", std::array<std::uint8_t, 2>{0, 1});
+  file.put_text(outlier, "flag_meanings", "used left_out");
 
   struct Profile {
-    int count, azimuth, zenith;
+    io::NetcdfVariable count, azimuth, zenith;
   };
   std::vector<Profile> profiles;
   const auto& residuals = content.residuals_over_angle;
   const std::size_t bins = residuals.empty() ? 0 : residuals.front().count.size();
-  int middle = 0;
+  io::NetcdfVariable middle;
   if (bins > 0) {
-    const auto angles = file.dimension("prism_angle", bins);
-    middle = file.define(angles, "prism_angle", NC_DOUBLE, "degree",
-                         "rotation angle of a prism, middle of the bin");
+    const auto angles = file.define_dimension("prism_angle", bins);
+    middle = define<double>(file, angles, "prism_angle", "degree",
+                            "rotation angle of a prism, middle of the bin");
     for (std::size_t i = 0; i < residuals.size(); ++i) {
       const char letter = prism_letter(static_cast<int>(i));
-      const auto define = [&](const std::string& name, const char* units, const std::string& what) {
-        return file.define(angles, name, NC_DOUBLE, units,
-                           fmt::format("{} by rotation angle of prism {}", what, letter));
+      const auto profile = [&](const std::string& name, const char* units,
+                               const std::string& what) {
+        return define<double>(file, angles, name, units,
+                              fmt::format("{} by rotation angle of prism {}", what, letter));
       };
       profiles.push_back(
-          {define(fmt::format("residual_shots_by_angle_{}", letter), "1", "shots used"),
-           define(fmt::format("azimuth_residual_by_angle_{}_deg", letter), "degree",
-                  "mean azimuth residual"),
-           define(fmt::format("zenith_residual_by_angle_{}_deg", letter), "degree",
-                  "mean zenith residual")});
+          {profile(fmt::format("residual_shots_by_angle_{}", letter), "1", "shots used"),
+           profile(fmt::format("azimuth_residual_by_angle_{}_deg", letter), "degree",
+                   "mean azimuth residual"),
+           profile(fmt::format("zenith_residual_by_angle_{}_deg", letter), "degree",
+                   "mean zenith residual")});
     }
   }
   file.end_definitions();
@@ -210,22 +143,22 @@ void write_states(const io::OutputFile& output, const StatesContent& content,
     for (std::size_t i = 0; i < values.size(); ++i) {
       values[i] = 1e-9 * static_cast<double>(block.time_ns[i]);
     }
-    file.write(time, first, values);
-    file.write(time_ns, first, block.time_ns);
+    file.put(time, first, values);
+    file.put(time_ns, first, block.time_ns);
     const std::vector<StateColumn> columns = columns_of(block);
     for (std::size_t c = 0; c < columns.size(); ++c) {
       for (std::size_t i = 0; i < values.size(); ++i) {
         const double value = (*columns[c].values)[i];
         values[i] = columns[c].scale * (columns[c].root ? std::sqrt(value) : value);
       }
-      file.write(variables[c], first, values);
+      file.put(variables[c], first, values);
     }
-    file.write(outlier, first, block.outlier);
+    file.put(outlier, first, block.outlier);
   }
   values.resize(bins);
-  const auto put = [&](int variable, const auto& value_of) {
+  const auto put = [&](const io::NetcdfVariable& variable, const auto& value_of) {
     for (std::size_t i = 0; i < bins; ++i) values[i] = value_of(i);
-    file.write(variable, 0, values);
+    file.put(variable, 0, values);
   };
   if (bins > 0) {
     put(middle, [&](std::size_t i) {

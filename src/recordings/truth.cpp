@@ -4,14 +4,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
 
 #include <fmt/format.h>
-#include <netcdf.h>
 
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
-#include "risley/io/output_file.hpp"
+#include "risley/io/netcdf.hpp"
 
 namespace risley::recordings {
 namespace {
@@ -58,36 +56,6 @@ auto columns_of(Truth& rows) {
   return columns;
 }
 
-/// A NetCDF handle that is closed whatever happens.
-class Handle {
- public:
-  explicit Handle(std::string path) : path_(std::move(path)) {}
-  ~Handle() {
-    if (id_) nc_close(*id_);
-  }
-  Handle(const Handle&) = delete;
-  Handle& operator=(const Handle&) = delete;
-
-  int id() const { return *id_; }
-  void opened(int status, int id, const char* action) {
-    check(status, action);
-    id_ = id;
-  }
-  void close() {
-    const int status = nc_close(*id_);
-    id_.reset();
-    check(status, "be completed");
-  }
-  void check(int status, std::string_view action) const {
-    if (status != NC_NOERR) fail(fmt::format("cannot {}: {}", action, nc_strerror(status)));
-  }
-  [[noreturn]] void fail(const std::string& problem) const { throw FileError(path_, {}, problem); }
-
- private:
-  std::string path_;
-  std::optional<int> id_;
-};
-
 }  // namespace
 
 void TruthColumns::resize(int prisms, std::size_t rows) {
@@ -114,34 +82,22 @@ void TruthColumns::append(const TruthColumns& others) {
 class TruthWriter::File {
  public:
   File(const std::string& path, int prisms)
-      : output_(path), handle_(path), variables_(variables(prisms)), prisms_(prisms) {
-    int id = 0;
-    const int status = nc_create(output_.temporary_path().c_str(), NC_NETCDF4 | NC_CLOBBER, &id);
-    handle_.opened(status, id, "be created");
-    int dimension = 0;
-    handle_.check(nc_def_dim(id, kDimension, NC_UNLIMITED, &dimension), "define its dimension");
-    handle_.check(nc_put_att_int(id, NC_GLOBAL, kMarker, NC_INT, 1, &kLayoutVersion), "be marked");
+      : file_(path), variables_(variables(prisms)), prisms_(prisms) {
+    const auto shot = file_.define_growing_dimension(kDimension);
+    file_.put_number(kMarker, kLayoutVersion);
     for (const Variable& variable : variables_) {
-      const std::string action = fmt::format("define variable {}", variable.name);
-      int number = 0;
-      handle_.check(nc_def_var(id, variable.name.c_str(), NC_DOUBLE, 1, &dimension, &number),
-                    action);
-      handle_.check(nc_def_var_chunking(id, number, NC_CHUNKED, &kBlockRows), action);
-      handle_.check(
-          nc_put_att_text(id, number, "units", variable.units.size(), variable.units.data()),
-          action);
-      handle_.check(nc_put_att_text(id, number, "long_name", variable.long_name.size(),
-                                    variable.long_name.data()),
-                    action);
-      numbers_.push_back(number);
+      const auto column = file_.define<double>(variable.name, {&shot}, {kBlockRows, false, false});
+      file_.put_text(column, "units", variable.units);
+      file_.put_text(column, "long_name", variable.long_name);
+      columns_.push_back(column);
     }
-    handle_.check(nc_enddef(id), "finish its definitions");
+    file_.end_definitions();
   }
 
   void write(const TruthColumns& rows) {
     const std::size_t count = rows.size();
     const auto columns = columns_of(rows);
-    if (columns.size() + 1 != numbers_.size() || rows.prisms() != prisms_) {
+    if (columns.size() + 1 != columns_.size() || rows.prisms() != prisms_) {
       throw InvalidArgument(
           fmt::format("truth columns of {} prisms, expected {}", rows.prisms(), prisms_));
     }
@@ -156,33 +112,22 @@ class TruthWriter::File {
     for (std::size_t row = 0; row < count; ++row) {
       buffer_[row] = static_cast<double>(rows.time_ns[row]) / 1e9;
     }
-    put(0);
+    file_.put(columns_.front(), written_, buffer_);
     for (std::size_t i = 0; i < columns.size(); ++i) {
       const double si_per_unit = variables_[i + 1].si_per_unit;
       for (std::size_t row = 0; row < count; ++row) buffer_[row] = (*columns[i])[row] / si_per_unit;
-      put(i + 1);
+      file_.put(columns_[i + 1], written_, buffer_);
     }
     written_ += count;
   }
 
-  void close() {
-    handle_.close();
-    output_.commit();
-  }
+  void close() { file_.close(); }
 
  private:
-  void put(std::size_t variable) {
-    const std::size_t count = buffer_.size();
-    handle_.check(
-        nc_put_vara_double(handle_.id(), numbers_[variable], &written_, &count, buffer_.data()),
-        fmt::format("write variable {}", variables_[variable].name));
-  }
-
-  io::OutputFile output_;  ///< before the handle: a file is closed before it is removed
-  Handle handle_;
+  io::NetcdfOutput file_;
   std::vector<Variable> variables_;
   int prisms_;
-  std::vector<int> numbers_;
+  std::vector<io::NetcdfVariable> columns_;
   std::vector<double> buffer_;
   std::size_t written_ = 0;
 };
@@ -203,55 +148,42 @@ namespace {
 /// An open truth file whose columns are read in blocks.
 class TruthFile {
  public:
-  explicit TruthFile(const std::string& path) : handle_(path) {
-    int id = 0;
-    const int status = nc_open(path.c_str(), NC_NOWRITE, &id);
-    handle_.opened(status, id, "be opened as NetCDF");
-    int version = 0;
-    if (nc_get_att_int(id, NC_GLOBAL, kMarker, &version) != NC_NOERR || version != kLayoutVersion) {
-      handle_.fail(
+  explicit TruthFile(const std::string& path) : file_(path) {
+    if (!file_.has_attribute(kMarker) || file_.number(kMarker) != kLayoutVersion) {
+      file_.fail(
           fmt::format("is no truth file: attribute {} = {} is missing", kMarker, kLayoutVersion));
     }
-    handle_.check(nc_inq_dimid(id, kDimension, &dimension_), "find dimension shot");
-    handle_.check(nc_inq_dimlen(id, dimension_, &count_), "read dimension shot");
-    for (int number = 0;
-         nc_inq_varid(id, variables(prisms_ + 1)[1 + prisms_].name.c_str(), &number) == NC_NOERR;) {
+    shot_ = file_.dimension(kDimension);
+    while (prisms_ < kMostPrisms &&
+           file_.has_variable(variables(prisms_ + 1)[1 + static_cast<std::size_t>(prisms_)].name)) {
       ++prisms_;
     }
-    if (prisms_ == 0) handle_.fail("expected variable rotation_angle_a_deg, found none");
+    if (prisms_ == 0) file_.fail("expected variable rotation_angle_a_deg, found none");
   }
 
   int prisms() const { return prisms_; }
-  std::size_t rows() const { return count_; }
+  /// @throws FileError where the file cannot hold as many as it says
+  std::size_t rows() const {
+    file_.variable<double>(variables(prisms_).front().name, {&shot_});
+    return shot_.length;
+  }
 
   /// Calls take(row, value) for every value of a variable, SI units, in order.
   template <class Take>
   void for_each(const Variable& variable, const Take& take) {
-    int number = 0;
-    nc_type type = NC_NAT;
-    int rank = 0, along = 0;
-    const int id = handle_.id();
-    handle_.check(nc_inq_varid(id, variable.name.c_str(), &number),
-                  fmt::format("find variable {}", variable.name));
-    if (nc_inq_var(id, number, nullptr, &type, &rank, nullptr, nullptr) != NC_NOERR ||
-        type != NC_DOUBLE || rank != 1 || nc_inq_vardimid(id, number, &along) != NC_NOERR ||
-        along != dimension_) {
-      handle_.fail(fmt::format("variable {}: expected numbers along dimension {}", variable.name,
-                               kDimension));
-    }
-    for (std::size_t first = 0; first < count_; first += kBlockRows) {
-      block_.resize(std::min(kBlockRows, count_ - first));
-      const std::size_t count = block_.size();
-      handle_.check(nc_get_vara_double(id, number, &first, &count, block_.data()),
-                    fmt::format("read variable {}", variable.name));
-      for (std::size_t i = 0; i < count; ++i) take(first + i, block_[i] * variable.si_per_unit);
+    const auto column = file_.variable<double>(variable.name, {&shot_}, kBlockRows);
+    for (std::size_t first = 0; first < shot_.length; first += kBlockRows) {
+      file_.get(column, first, std::min(kBlockRows, shot_.length - first), block_);
+      for (std::size_t i = 0; i < block_.size(); ++i) {
+        take(first + i, block_[i] * variable.si_per_unit);
+      }
     }
   }
 
  private:
-  Handle handle_;
-  int dimension_ = 0, prisms_ = 0;
-  std::size_t count_ = 0;
+  io::NetcdfInput file_;
+  io::NetcdfDimension shot_;
+  int prisms_ = 0;
   std::vector<double> block_;
 };
 

@@ -10,6 +10,7 @@ sys.path.insert(0, str(pathlib.Path(__file__).parents[2] / "tools"))
 import check_layers  # noqa: E402
 
 LAYERS = """risley_add_layer(core)
+risley_add_layer(io LAYERS core)
 risley_add_layer(simulation LAYERS core)
 risley_add_layer(estimation   LAYERS core)
 risley_add_layer(report LAYERS core estimation)
@@ -29,6 +30,7 @@ class CheckLayersTest(unittest.TestCase):
         self.assertEqual(self.errors({
             "include/risley/core/angle.hpp": "#include <cmath>\n",
             "include/risley/estimation/ekf.hpp": '#include "risley/core/angle.hpp"\n',
+            "src/io/netcdf.cpp": "#include <netcdf.h>\n#include <openssl/evp.h>\n",
             "src/report/html.cpp": '#include "risley/estimation/ekf.hpp"\n#include "report/page.hpp"\n',
             "apps/risley/main.cpp": '#include "risley/simulation/a.hpp"\n#include "verb.hpp"\n',
         }), [])
@@ -45,6 +47,12 @@ class CheckLayersTest(unittest.TestCase):
              "src/core/angle.cpp:2: \"../report/page.hpp\" hides its layer"),
             ("apps/risley/main.cpp", '#include "risley/clouds/cloud.hpp"',
              "apps/risley/main.cpp:2: risley/clouds/cloud.hpp is in no declared layer"),
+            ("src/report/states.cpp", "#include <netcdf.h>",
+             "src/report/states.cpp:2: only the layer io may include netcdf.h"),
+            ("apps/risley/main.cpp", "#include <yaml-cpp/yaml.h>",
+             "apps/risley/main.cpp:2: only the layer io may include yaml-cpp/yaml.h"),
+            ("include/risley/core/hash.hpp", "#include <openssl/evp.h>",
+             "include/risley/core/hash.hpp:2: only the layer io may include openssl/evp.h"),
         ):
             with self.subTest(include=include):
                 errors = self.errors({name: f"// first line\n{include}\n"})

@@ -1,17 +1,16 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
 // What all formats of a cloud promise.
-#include <csignal>
 #include <filesystem>
 #include <memory>
 
 #include <gtest/gtest.h>
-#include <sys/resource.h>
 
 #include "risley/core/error.hpp"
 #include "risley/io/text_file.hpp"
 
 #include "cloud/cloud_samples.hpp"
+#include "cloud/file_size_limit.hpp"
 
 namespace risley::cloud {
 namespace {
@@ -81,26 +80,6 @@ TEST_P(CloudWriters, GiveTheSameBytesInWhateverPieces) {
 TEST_P(CloudWriters, RefuseAFolderThatIsNotThere) {
   EXPECT_THROW(create_cloud(folder_ / "none/cloud", many_.header, options_), FileError);
 }
-
-/// No file of this process may be longer than so many bytes.
-class FileSizeLimit {
- public:
-  explicit FileSizeLimit(rlim_t bytes) : handler_(std::signal(SIGXFSZ, SIG_IGN)) {
-    getrlimit(RLIMIT_FSIZE, &before_);
-    const rlimit limit{bytes, before_.rlim_max};
-    setrlimit(RLIMIT_FSIZE, &limit);
-  }
-  ~FileSizeLimit() {
-    setrlimit(RLIMIT_FSIZE, &before_);
-    std::signal(SIGXFSZ, handler_);
-  }
-  FileSizeLimit(const FileSizeLimit&) = delete;
-  FileSizeLimit& operator=(const FileSizeLimit&) = delete;
-
- private:
-  rlimit before_{};
-  void (*handler_)(int);
-};
 
 TEST_P(CloudWriters, SayWhenTheDiskRefuses) {
   many_.points = 50'000;

@@ -295,6 +295,94 @@ TEST(Netcdf, RefusesForeignFiles) {
   EXPECT_THROW(kNetcdfFormat.open(folder.file("missing.nc")), FileError);
 }
 
+/// A sound recording that another program spoilt.
+class SpoiltRecording {
+ public:
+  SpoiltRecording() : path_(folder_.file("spoilt.nc")) {
+    write_all(kNetcdfFormat, path_, rich_header(), packet_chunk(6));
+    EXPECT_EQ(nc_open(path_.c_str(), NC_WRITE, &id_), NC_NOERR);
+  }
+  int id() const { return id_; }
+  int variable(const char* name) const {
+    int variable = 0;
+    EXPECT_EQ(nc_inq_varid(id_, name, &variable), NC_NOERR) << name;
+    return variable;
+  }
+  /// Gives a dimension's name to a new one, along which nothing runs.
+  void replace_dimension(const char* name, std::size_t length) const {
+    int dimension = 0;
+    EXPECT_EQ(nc_redef(id_), NC_NOERR);
+    EXPECT_EQ(nc_inq_dimid(id_, name, &dimension), NC_NOERR);
+    EXPECT_EQ(nc_rename_dim(id_, dimension, "renamed"), NC_NOERR);
+    EXPECT_EQ(nc_def_dim(id_, name, length, &dimension), NC_NOERR);
+  }
+  /// What reading it ends with.
+  std::string problem() {
+    EXPECT_EQ(nc_close(id_), NC_NOERR);
+    const Outcome outcome = read_all(kNetcdfFormat, path_);
+    return outcome.error ? outcome.error->problem() : "none";
+  }
+
+ private:
+  const TemporaryFolder folder_;
+  std::string path_;
+  int id_ = 0;
+};
+
+TEST(HostileNetcdf, DevicesThatAreNotThere) {
+  SpoiltRecording none;
+  none.replace_dimension("device_entry", NC_UNLIMITED);
+  EXPECT_THAT(none.problem(), HasSubstr("dimension device_entry has length 0, allowed 1 to 256"));
+  SpoiltRecording many;
+  many.replace_dimension("device_entry", 257);
+  EXPECT_THAT(many.problem(), HasSubstr("dimension device_entry has length 257"));
+  SpoiltRecording other;
+  other.replace_dimension("device_entry", 2);
+  EXPECT_THAT(other.problem(),
+              HasSubstr("variable device_serial: expected dimension device_entry"));
+  const std::size_t place = 3;
+  const unsigned char third = 2;
+  SpoiltRecording rows;
+  ASSERT_EQ(nc_put_var1_uchar(rows.id(), rows.variable("device"), &place, &third), NC_NOERR);
+  EXPECT_EQ(rows.problem(), "entry 3 of variable device is 2, allowed below device_entry = 2");
+  const std::size_t sample = 1;
+  SpoiltRecording samples;
+  ASSERT_EQ(nc_put_var1_uchar(samples.id(), samples.variable("imu_device"), &sample, &third),
+            NC_NOERR);
+  EXPECT_EQ(samples.problem(),
+            "entry 1 of variable imu_device is 2, allowed below device_entry = 2");
+}
+
+TEST(HostileNetcdf, NumbersThatCannotBe) {
+  const unsigned int zero = 0, most = 4294967295U;
+  for (const unsigned int returns : {zero, most}) {
+    SpoiltRecording recording;
+    ASSERT_EQ(nc_put_att_uint(recording.id(), NC_GLOBAL, "returns_per_shot", NC_UINT, 1, &returns),
+              NC_NOERR);
+    EXPECT_THAT(recording.problem(), HasSubstr("returns_per_shot = "));
+  }
+  const std::size_t place = 2;
+  SpoiltRecording packets;
+  ASSERT_EQ(nc_put_var1_uint(packets.id(), packets.variable("packet_rows"), &place, &most),
+            NC_NOERR);
+  EXPECT_THAT(packets.problem(), HasSubstr("the packets hold"));
+  SpoiltRecording serials;
+  serials.replace_dimension("serial_length", std::size_t{1} << 50);
+  EXPECT_THAT(serials.problem(), HasSubstr("serial_length"));
+  SpoiltRecording axes;
+  axes.replace_dimension("axis", 4);
+  EXPECT_THAT(axes.problem(), HasSubstr("dimension axis has length 4, expected 3"));
+}
+
+TEST(HostileNetcdf, VariablesThatAreNotThere) {
+  for (const char* name : {"time", "device", "packet_rows", "imu_time", "device_serial"}) {
+    SpoiltRecording recording;
+    ASSERT_EQ(nc_redef(recording.id()), NC_NOERR);
+    ASSERT_EQ(nc_rename_var(recording.id(), recording.variable(name), "renamed"), NC_NOERR);
+    EXPECT_THAT(recording.problem(), HasSubstr(fmt::format("expected variable {} along", name)));
+  }
+}
+
 TEST(Netcdf, RefusesPacketsThatDoNotFit) {
   const TemporaryFolder folder;
   Chunk short_packet = packet_chunk(2);

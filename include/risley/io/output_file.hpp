@@ -6,9 +6,12 @@
 
 namespace risley::io {
 
-/// An output that appears under its final name only when it is whole: it is written under a
-/// temporary name in the same folder and renamed by commit(). Without commit() the destructor
-/// removes the temporary, so an interrupted run leaves no half file.
+/// An output that appears under its final name only when it is whole and on the disk: it is
+/// written under a temporary name that nobody can foresee, in the same folder, and renamed by
+/// commit(). Without commit() the destructor removes the temporary, so an interrupted run leaves
+/// no half file and never costs the file that was there before. A file that is replaced keeps its
+/// mode, and a symbolic link to it stays one. A device, FIFO or socket, such as /dev/null or
+/// /dev/stdout, is never replaced: commit() copies the bytes into it.
 class OutputFile {
  public:
   /// @throws FileError when the folder does not exist or cannot be written
@@ -18,14 +21,19 @@ class OutputFile {
   OutputFile& operator=(OutputFile&&) = delete;
 
   const std::string& path() const { return path_; }
+  /// An empty file, to be opened and written by this name; never a link or a device.
   const std::string& temporary_path() const { return temporary_path_; }
 
-  /// Gives the file its final name. @throws FileError
+  /// Gives the file its final name, once its bytes are on the disk. All streams to the temporary
+  /// must have been closed or flushed. @throws FileError
   void commit();
 
  private:
-  std::string path_;
-  std::string temporary_path_;
+  std::string path_;            ///< as the caller calls it
+  std::string target_;          ///< what is replaced, behind symbolic links
+  std::string temporary_path_;  ///< empty when there is nothing to remove
+  int temporary_ = -1;          ///< keeps hold of the file that was created, whatever its name
+  bool copied_ = false;         ///< the target is no regular file
 };
 
 }  // namespace risley::io

@@ -31,7 +31,6 @@ struct StatesContent {
 /// rotation_angle_covariance_ab_deg2 for every pair, azimuth_residual_deg, zenith_residual_deg and
 /// outlier; and along the dimension "prism_angle", the middle of each bin: for every prism
 /// residual_shots_by_angle_a, azimuth_residual_by_angle_a_deg and zenith_residual_by_angle_a_deg.
-/// The NetCDF library is not thread-safe: one NetCDF file of a process at a time.
 /// @param attributes  global ones, e.g. {"command", ...}
 /// @throws FileError
 void write_states(const std::string& path, const StatesContent& content,

@@ -3,23 +3,19 @@
 // NetCDF-4 after the CF conventions: one variable per field along the dimension "point", loadings
 // along "point" and "factor". Equal points give equal bytes, in whatever pieces they are written:
 // only whole blocks go to the file.
-// The NetCDF library is not thread-safe: one NetCDF file of a process at a time.
+#include "risley/io/netcdf.hpp"
+
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <filesystem>
 #include <functional>
 #include <limits>
 #include <memory>
-#include <optional>
-#include <type_traits>
+#include <span>
 
 #include <fmt/format.h>
-#include <netcdf.h>
 
 #include "risley/core/angle.hpp"
-#include "risley/core/error.hpp"
-#include "risley/io/output_file.hpp"
 #include "risley/optics/parameters.hpp"
 
 #include "cloud/formats/cloud_format.hpp"
@@ -30,55 +26,10 @@ namespace {
 
 constexpr std::size_t kBlockRows = 32768;
 
-template <class T>
-constexpr nc_type nc_type_of() {
-  if constexpr (std::is_same_v<T, double>) return NC_DOUBLE;
-  if constexpr (std::is_same_v<T, float>) return NC_FLOAT;
-  if constexpr (std::is_same_v<T, std::int64_t>) return NC_INT64;
-  if constexpr (std::is_same_v<T, std::uint8_t>) return NC_UBYTE;
-}
-
 /// Names of the terms of Points::covariance.
 constexpr std::array<const char*, kCovarianceTerms> kTermNames{"xx", "xy", "xz", "yy", "yz", "zz"};
 constexpr std::array<char, 3> kAxes{'x', 'y', 'z'};
 constexpr std::array<CovarianceTerm, 3> kVariances{kXX, kYY, kZZ};
-
-/// A NetCDF file, closed whatever happens.
-class NcHandle {
- public:
-  NcHandle() = default;
-  NcHandle(const NcHandle&) = delete;
-  NcHandle& operator=(const NcHandle&) = delete;
-  ~NcHandle() {
-    if (!id_) return;
-    // After a close that the disk refused, HDF5 ends the process with a fault at its exit. What is
-    // left here is going to be removed, so on a full disk its room serves to close it.
-    std::error_code ignored;
-    if (nc_sync(*id_) != NC_NOERR) std::filesystem::resize_file(path_, 0, ignored);
-    nc_close(*id_);
-  }
-
-  int operator*() const { return *id_; }
-  /// Both return the library's status.
-  int create(const std::string& path) {
-    path_ = path;
-    int id = 0;
-    const int status = nc_create(path.c_str(), NC_NETCDF4 | NC_CLOBBER, &id);
-    if (status == NC_NOERR) id_ = id;
-    return status;
-  }
-  int close() {
-    // What a full disk refuses is refused now, when the destructor can still help.
-    if (const int status = nc_sync(*id_); status != NC_NOERR) return status;
-    const int status = nc_close(*id_);
-    id_.reset();
-    return status;
-  }
-
- private:
-  std::string path_;
-  std::optional<int> id_;
-};
 
 /// What a variable is called and what it means.
 struct Description {
@@ -87,20 +38,14 @@ struct Description {
 
 class NetcdfWriter final : public CloudWriter {
  public:
-  NetcdfWriter(const std::string& path, const CloudHeader& header) : output_(path) {
-    check(id_.create(output_.temporary_path()));
+  NetcdfWriter(const std::string& path, const CloudHeader& header) : file_(path) {
     put_attributes(header);
-    check(nc_def_dim(*id_, "point", NC_UNLIMITED, &point_));
+    point_ = file_.define_growing_dimension("point");
     define_sensor_variables(header);
     if (header.has_covariance) define_covariance();
     define_geometry(header);
-    const std::optional<int> names = define_loadings(header.factors.size());
-    check(nc_enddef(*id_));
-    if (names) {
-      std::vector<const char*> texts;
-      for (const std::string& factor : header.factors) texts.push_back(factor.c_str());
-      check(nc_put_var_string(*id_, *names, texts.data()));
-    }
+    define_loadings(header.factors);
+    file_.end_definitions();
   }
 
   void write(const Points& points) override {
@@ -115,61 +60,43 @@ class NetcdfWriter final : public CloudWriter {
 
   void close() override {
     if (rows_ > 0) put_block();
-    check(id_.close());
-    output_.commit();
+    file_.close();
   }
 
  private:
   /// One variable with its rows that are not in the file yet.
   struct Variable {
-    int id;
-    std::size_t width;
     /// Stores points [first, first + count) as rows from `row` of the block on.
     std::function<void(const Points& points, std::size_t first, std::size_t count, std::size_t row)>
         fill;
-    std::function<const void*()> block;
+    /// Writes the block's first rows at row `first` of the file.
+    std::function<void(std::size_t first, std::size_t rows)> put;
   };
 
-  void check(int status) const {
-    if (status != NC_NOERR) {
-      throw FileError(output_.path(), {},
-                      fmt::format("cannot be written: {}", nc_strerror(status)));
-    }
-  }
-
-  void put_text(int variable, const std::string& name, std::string_view text) {
-    check(nc_put_att_text(*id_, variable, name.c_str(), text.size(), text.data()));
-  }
-
   void put_attributes(const CloudHeader& header) {
-    for (const auto& [name, value] : header.provenance) put_text(NC_GLOBAL, name, value);
-    put_text(NC_GLOBAL, "Conventions", "CF-1.9");
-    put_text(NC_GLOBAL, "featureType", "point");
-    put_text(NC_GLOBAL, "title", "Points of a Risley-prism lidar with their uncertainty");
-    put_text(NC_GLOBAL, "sensor", header.sensor);
-    put_text(NC_GLOBAL, "serial", header.serial);
-    put_text(NC_GLOBAL, "frame", kFrameText);
-    put_text(NC_GLOBAL, "time_reference", recordings::to_string(header.time_reference));
+    for (const auto& [name, value] : header.provenance) file_.put_text(name, value);
+    file_.put_text("Conventions", "CF-1.9");
+    file_.put_text("featureType", "point");
+    file_.put_text("title", "Points of a Risley-prism lidar with their uncertainty");
+    file_.put_text("sensor", header.sensor);
+    file_.put_text("serial", header.serial);
+    file_.put_text("frame", kFrameText);
+    file_.put_text("time_reference", recordings::to_string(header.time_reference));
   }
 
   /// @param value  of one entry: value(points, point, column), column in [0, width)
+  /// @param inner  dimension of the columns, if there are several
   template <class T, class Value>
-  int define(const Description& what, Value value, std::optional<int> inner_dimension = {},
-             std::size_t width = 1) {
-    const std::array<int, 2> dimensions{point_, inner_dimension.value_or(0)};
-    const std::array<std::size_t, 2> chunk{kBlockRows, width};
-    int id = 0;
-    check(nc_def_var(*id_, what.name.c_str(), nc_type_of<T>(), inner_dimension ? 2 : 1,
-                     dimensions.data(), &id));
-    check(nc_def_var_chunking(*id_, id, NC_CHUNKED, chunk.data()));
-    check(nc_def_var_deflate(*id_, id, NC_SHUFFLE, 1, 1));
-    // Whole blocks come in order: more of them would only cost memory.
-    check(nc_set_var_chunk_cache(*id_, id, kBlockRows * width * sizeof(T), 3, 1.0F));
-    put_text(id, "units", what.units);
-    put_text(id, "long_name", what.long_name);
+  io::NetcdfVariable define(const Description& what, Value value,
+                            const io::NetcdfDimension* inner = nullptr) {
+    const io::NetcdfStorage storage{kBlockRows, true, false};
+    const auto variable = inner == nullptr ? file_.define<T>(what.name, {&point_}, storage)
+                                           : file_.define<T>(what.name, {&point_, inner}, storage);
+    file_.put_text(variable, "units", what.units);
+    file_.put_text(variable, "long_name", what.long_name);
+    const std::size_t width = variable.width;
     auto block = std::make_shared<std::vector<T>>(kBlockRows * width);
-    variables_.push_back({id, width,
-                          [block, value, width](const Points& points, std::size_t first,
+    variables_.push_back({[block, value, width](const Points& points, std::size_t first,
                                                 std::size_t count, std::size_t row) {
                             T* to = block->data() + row * width;
                             for (std::size_t i = first; i < first + count; ++i) {
@@ -177,39 +104,44 @@ class NetcdfWriter final : public CloudWriter {
                                 *to++ = static_cast<T>(value(points, i, k));
                             }
                           },
-                          [block]() -> const void* { return block->data(); }});
-    return id;
+                          [this, block, variable](std::size_t first, std::size_t rows) {
+                            file_.put(variable, first,
+                                      std::span<const T>(*block).first(rows * variable.width));
+                          }});
+    return variable;
   }
 
   /// As define, with the attribute that leads to the coordinates.
   template <class T, class Value>
-  int define_data(const Description& what, Value value, std::optional<int> inner_dimension = {},
-                  std::size_t width = 1) {
-    const int id = define<T>(what, value, inner_dimension, width);
-    put_text(id, "coordinates", "time x_m y_m z_m");
-    return id;
+  io::NetcdfVariable define_data(const Description& what, Value value,
+                                 const io::NetcdfDimension* inner = nullptr) {
+    const auto variable = define<T>(what, value, inner);
+    file_.put_text(variable, "coordinates", "time x_m y_m z_m");
+    return variable;
   }
 
   void define_sensor_variables(const CloudHeader& header) {
     const bool utc = header.time_reference == recordings::TimeReference::utc;
     const auto time_ns = [](const Points& p, std::size_t i, std::size_t) { return p.time_ns[i]; };
-    const int time = define<double>({"time", utc ? "seconds since 1970-01-01 00:00:00" : "s",
-                                     "time of the shot, as in the recording"},
-                                    [](const Points& p, std::size_t i, std::size_t) {
-                                      return 1e-9 * static_cast<double>(p.time_ns[i]);
-                                    });
-    put_text(time, "axis", "T");
+    const auto time = define<double>({"time", utc ? "seconds since 1970-01-01 00:00:00" : "s",
+                                      "time of the shot, as in the recording"},
+                                     [](const Points& p, std::size_t i, std::size_t) {
+                                       return 1e-9 * static_cast<double>(p.time_ns[i]);
+                                     });
+    file_.put_text(time, "axis", "T");
     if (utc) {
-      put_text(time, "standard_name", "time");
-      put_text(time, "calendar", "standard");
+      file_.put_text(time, "standard_name", "time");
+      file_.put_text(time, "calendar", "standard");
     }
     const auto coordinate = [this, &header](const char* name, const char* axis, const char* meaning,
                                             std::vector<double> Points::*column) {
-      const int id = define<double>(
+      const auto variable = define<double>(
           {name, "m", meaning},
           [column](const Points& p, std::size_t i, std::size_t) { return (p.*column)[i]; });
-      put_text(id, "axis", axis);
-      if (header.has_covariance) put_text(id, "ancillary_variables", fmt::format("std_{}", name));
+      file_.put_text(variable, "axis", axis);
+      if (header.has_covariance) {
+        file_.put_text(variable, "ancillary_variables", fmt::format("std_{}", name));
+      }
     };
     coordinate("x_m", "X", "forward", &Points::x);
     coordinate("y_m", "Y", "left", &Points::y);
@@ -248,13 +180,12 @@ class NetcdfWriter final : public CloudWriter {
   void define_geometry(const CloudHeader& header) {
     define_data<float>({"range_m", "m", "range from where the beam leaves the sensor"},
                        [](const Points& p, std::size_t i, std::size_t) { return p.range[i]; });
-    const int incidence = define_data<float>(
+    const auto incidence = define_data<float>(
         {"incidence_angle_deg", "degree", "angle between beam and surface normal"},
         [](const Points& p, std::size_t i, std::size_t) {
           return degrees_from_radians(p.incidence[i]);
         });
-    const float unknown = std::numeric_limits<float>::quiet_NaN();
-    check(nc_def_var_fill(*id_, incidence, NC_FILL, &unknown));
+    file_.set_fill(incidence, std::numeric_limits<float>::quiet_NaN());  // unknown
     if (!header.has_rotation_angles) return;
     for (int k = 0; k < header.prisms; ++k) {
       define_data<float>(
@@ -274,36 +205,28 @@ class NetcdfWriter final : public CloudWriter {
                        });
   }
 
-  /// The variable of the factors' names, if there are factors.
-  std::optional<int> define_loadings(std::size_t factors) {
-    if (factors == 0) return std::nullopt;
-    int factor = 0, names = 0;
-    check(nc_def_dim(*id_, "factor", factors, &factor));
-    check(nc_def_var(*id_, "factor_name", NC_STRING, 1, &factor, &names));
-    put_text(names, "long_name",
-             "common factor, one standard deviation of which the loadings tell");
+  void define_loadings(const std::vector<std::string>& factors) {
+    if (factors.empty()) return;
+    const auto factor = file_.define_dimension("factor", factors.size());
+    file_.define_texts("factor_name", factor,
+                       "common factor, one standard deviation of which the loadings tell", factors);
     for (std::size_t axis = 0; axis < 3; ++axis) {
       define_data<float>(
           {fmt::format("loading_{}_m", kAxes[axis]), "m",
            fmt::format("change of {}_m by one standard deviation of a common factor", kAxes[axis])},
           [axis](const Points& p, std::size_t i, std::size_t k) { return p.loading[k][axis][i]; },
-          factor, factors);
+          &factor);
     }
-    return names;
   }
 
   void put_block() {
-    for (const Variable& variable : variables_) {
-      const std::array<std::size_t, 2> start{written_, 0}, count{rows_, variable.width};
-      check(nc_put_vara(*id_, variable.id, start.data(), count.data(), variable.block()));
-    }
+    for (const Variable& variable : variables_) variable.put(written_, rows_);
     written_ += rows_;
     rows_ = 0;
   }
 
-  io::OutputFile output_;
-  NcHandle id_;    // after output_: closed before the temporary is removed
-  int point_ = 0;  ///< the dimension
+  io::NetcdfOutput file_;
+  io::NetcdfDimension point_;
   std::vector<Variable> variables_;
   std::size_t rows_ = 0;     ///< in the block
   std::size_t written_ = 0;  ///< in the file

@@ -1,0 +1,30 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstddef>
+#include <mutex>
+#include <string>
+
+#include "risley/io/netcdf.hpp"
+
+namespace risley::io {
+
+/// Held around every call of the NetCDF library, of the whole process.
+class NetcdfLock {
+ public:
+  NetcdfLock();
+
+ private:
+  std::lock_guard<std::mutex> lock_;
+};
+
+/// The library's number of a type.
+int nc_type_of(NetcdfType type);
+std::size_t bytes_of(NetcdfType type);
+std::string_view name_of(NetcdfType type);
+
+/// What the library says of a status; of a refusal by the disk what the system says.
+std::string netcdf_reason(int status);
+
+}  // namespace risley::io

@@ -1,0 +1,15 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <functional>
+#include <span>
+#include <string>
+
+namespace risley::io {
+
+/// Gives a function every byte of a file, in pieces and in order.
+/// @throws FileError when the file is missing, a folder, or cannot be read to its end
+void read_bytes(const std::string& path, const std::function<void(std::span<const char>)>& take);
+
+}  // namespace risley::io

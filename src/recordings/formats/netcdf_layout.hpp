@@ -1,0 +1,143 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "risley/recordings/observations.hpp"
+#include "risley/recordings/reader.hpp"
+#include "risley/recordings/writer.hpp"
+
+/// The lossless format: every column, packet header, inertial sample and header field as NetCDF-4.
+/// Angles stay in radians here, because a conversion to degrees and back would change their last
+/// bits.
+namespace risley::recordings::netcdf {
+
+inline constexpr std::string_view kName = "netcdf";
+inline constexpr const char* kMarker = "risley_recording";  ///< attribute: version of this layout
+inline constexpr std::uint32_t kLayoutVersion = 1;
+inline constexpr const char* kHasTimes = "has_times";  ///< attribute; 0: times are shot numbers
+inline constexpr const char* kDetailsGroup = "details";
+
+/// The dimensions along which the tables run, and the entries per block of their variables.
+inline constexpr const char* kRowDimension = "row";
+inline constexpr const char* kPacketDimension = "packet";
+inline constexpr const char* kImuDimension = "imu_sample";
+inline constexpr const char* kDeviceDimension = "device_entry";
+inline constexpr std::size_t kRowBlock = 32768, kPacketBlock = 1024, kImuBlock = 1024;
+
+/// The inner dimensions.
+inline constexpr const char* kByteDimension = "timestamp_byte";
+inline constexpr const char* kAxisDimension = "axis";
+inline constexpr const char* kSerialDimension = "serial_length";
+inline constexpr std::size_t kShortestSerial = 16;
+
+/// One variable: its name, unit and meaning, and the values per entry of its table.
+struct NetcdfColumn {
+  const char* name;
+  const char* units;  ///< nullptr for texts
+  const char* long_name;
+  const char* inner_dimension = nullptr;  ///< of tables with several values per entry
+  std::size_t width = 1;
+};
+
+/// Calls a function with every column of the row table.
+template <class Rows, class Function>
+void for_each_column(Rows&& rows, Function&& f) {
+  f(NetcdfColumn{"time", "ns", "time of the shot"}, rows.time_ns);
+  f(NetcdfColumn{"azimuth", "radian", "azimuth from X towards Y"}, rows.azimuth);
+  f(NetcdfColumn{"zenith", "radian", "zenith angle from Z"}, rows.zenith);
+  f(NetcdfColumn{"range", "m", "range, 0 where the shot had no return"}, rows.range);
+  f(NetcdfColumn{"azimuth_resolution", "radian", "rounding step of the azimuth, 0 where unknown"},
+    rows.azimuth_resolution);
+  f(NetcdfColumn{"zenith_resolution", "radian",
+                 "rounding step of the zenith angle, 0 where unknown"},
+    rows.zenith_resolution);
+  f(NetcdfColumn{"range_resolution", "m", "rounding step of the range, 0 where unknown"},
+    rows.range_resolution);
+  f(NetcdfColumn{"intensity", "1", "intensity as the sensor reports it"}, rows.intensity);
+  f(NetcdfColumn{"return_number", "1", "number of the return within its shot, from 1"},
+    rows.return_number);
+  f(NetcdfColumn{"tag", "1", "tag byte of the sensor"}, rows.tag);
+  f(NetcdfColumn{"beam", "1", "firing beam, from 0"}, rows.beam);
+  f(NetcdfColumn{"device", "1", "row of the device table"}, rows.device);
+  f(NetcdfColumn{"valid", "1", "1 where the direction can be trusted"}, rows.valid);
+}
+
+/// The packet table as columns.
+struct PacketColumns {
+  std::vector<std::uint32_t> rows, status;
+  std::vector<std::uint64_t> frame;
+  std::vector<std::uint8_t> device_index, version, slot, lidar_id, reserved, timestamp_type,
+      data_type, timestamp;
+};
+
+template <class Packets, class Function>
+void for_each_packet_column(Packets&& p, Function&& f) {
+  f(NetcdfColumn{"packet_rows", "1", "number of rows of the packet"}, p.rows);
+  f(NetcdfColumn{"packet_frame", "1", "number of the frame that holds the packet"}, p.frame);
+  f(NetcdfColumn{"packet_device_index", "1", "index by which the packet names its device"},
+    p.device_index);
+  f(NetcdfColumn{"packet_version", "1", "version of the packet"}, p.version);
+  f(NetcdfColumn{"packet_slot", "1", "hub port"}, p.slot);
+  f(NetcdfColumn{"packet_lidar_id", "1", "lidar number at the hub port"}, p.lidar_id);
+  f(NetcdfColumn{"packet_reserved", "1", "reserved byte"}, p.reserved);
+  f(NetcdfColumn{"packet_status", "1", "status code of the sensor"}, p.status);
+  f(NetcdfColumn{"packet_timestamp_type", "1", "kind of the time stamp"}, p.timestamp_type);
+  f(NetcdfColumn{"packet_data_type", "1", "kind of the records"}, p.data_type);
+  f(NetcdfColumn{"packet_timestamp", "1", "time stamp as sent", kByteDimension, 8}, p.timestamp);
+}
+
+/// The inertial samples as columns.
+struct ImuColumns {
+  std::vector<std::int64_t> time_ns;
+  std::vector<std::uint8_t> device;
+  std::vector<float> angular_velocity, acceleration_g;
+};
+
+template <class Imu, class Function>
+void for_each_imu_column(Imu&& imu, Function&& f) {
+  f(NetcdfColumn{"imu_time", "ns", "time of the inertial sample"}, imu.time_ns);
+  f(NetcdfColumn{"imu_device", "1", "row of the device table"}, imu.device);
+  f(NetcdfColumn{"imu_angular_velocity", "radian s-1", "angular velocity", kAxisDimension, 3},
+    imu.angular_velocity);
+  f(NetcdfColumn{"imu_acceleration_g", "9.80665 m s-2", "acceleration", kAxisDimension, 3},
+    imu.acceleration_g);
+}
+
+/// The device table as columns; serials are padded with NUL.
+struct DeviceColumns {
+  std::size_t serial_length = kShortestSerial;
+  std::vector<char> serial, hub_serial;
+  std::vector<std::uint8_t> index, type, extrinsic_enabled;
+  std::vector<float> roll_pitch_yaw_deg, translation_m;
+};
+
+template <class Devices, class Function>
+void for_each_device_column(Devices&& d, Function&& f) {
+  f(NetcdfColumn{"device_serial", nullptr, "broadcast code", kSerialDimension, d.serial_length},
+    d.serial);
+  f(NetcdfColumn{"device_hub_serial", nullptr, "broadcast code of the hub", kSerialDimension,
+                 d.serial_length},
+    d.hub_serial);
+  f(NetcdfColumn{"device_index", "1", "index by which packets name the device"}, d.index);
+  f(NetcdfColumn{"device_type", "1", "device type of the sensor"}, d.type);
+  f(NetcdfColumn{"device_extrinsic_enabled", "1", "1 where the pose is to be applied"},
+    d.extrinsic_enabled);
+  f(NetcdfColumn{"device_roll_pitch_yaw", "degree", "attitude", kAxisDimension, 3},
+    d.roll_pitch_yaw_deg);
+  f(NetcdfColumn{"device_translation", "m", "position", kAxisDimension, 3}, d.translation_m);
+}
+
+/// @throws FileError where the file is damaged or of another layout
+std::unique_ptr<Reader> open_recording(const std::string& path);
+
+/// @throws FileError where the file cannot be written, InvalidArgument for a header without device
+std::unique_ptr<Writer> create_recording(const std::string& path, const RecordingHeader& header);
+
+}  // namespace risley::recordings::netcdf

@@ -1,0 +1,280 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include <algorithm>
+#include <limits>
+#include <map>
+#include <optional>
+#include <span>
+
+#include <fmt/format.h>
+
+#include "risley/core/error.hpp"
+#include "risley/io/netcdf.hpp"
+#include "risley/recordings/livox/packet.hpp"
+
+#include "recordings/formats/format.hpp"
+#include "recordings/formats/netcdf_layout.hpp"
+
+namespace risley::recordings::netcdf {
+namespace {
+
+using Variables = std::map<std::string_view, io::NetcdfVariable>;
+
+/// As many as the columns of rows can name.
+constexpr std::size_t kMostDevices = std::size_t{std::numeric_limits<std::uint8_t>::max()} + 1;
+constexpr std::uint32_t kMostReturns = std::numeric_limits<std::uint8_t>::max();
+
+/// Finds the variables of one table, and refuses a file whose variables are not of this layout.
+struct RequireColumns {
+  const io::NetcdfInput& file;
+  Variables& variables;
+  const io::NetcdfDimension& dimension;
+  std::size_t block;  ///< entries that are read together
+
+  template <class T>
+  void operator()(const NetcdfColumn& column, const std::vector<T>&) const {
+    if (column.inner_dimension == nullptr) {
+      variables.emplace(column.name, file.variable<T>(column.name, {&dimension}, block));
+    } else {
+      const auto inner = file.dimension(column.inner_dimension, column.width);
+      variables.emplace(column.name, file.variable<T>(column.name, {&dimension, &inner}, block));
+    }
+  }
+};
+
+/// Reads entries [start, start + count) into the columns.
+struct GetColumns {
+  const io::NetcdfInput& file;
+  const Variables& variables;
+  std::size_t start, count;
+
+  template <class T>
+  void operator()(const NetcdfColumn& column, std::vector<T>& values) const {
+    file.get(variables.at(column.name), start, count, values);
+  }
+};
+
+Packet packet_of(const PacketColumns& columns, std::size_t i) {
+  Packet p;
+  p.rows = columns.rows[i];
+  p.frame = columns.frame[i];
+  p.device_index = columns.device_index[i];
+  p.version = columns.version[i];
+  p.slot = columns.slot[i];
+  p.lidar_id = columns.lidar_id[i];
+  p.reserved = columns.reserved[i];
+  p.status = columns.status[i];
+  p.timestamp_type = columns.timestamp_type[i];
+  p.data_type = columns.data_type[i];
+  std::copy_n(columns.timestamp.data() + i * p.timestamp.size(), p.timestamp.size(),
+              p.timestamp.begin());
+  return p;
+}
+
+Device device_of(const DeviceColumns& columns, std::size_t i) {
+  const auto text = [&](const std::vector<char>& source) {
+    std::string padded(source.data() + i * columns.serial_length, columns.serial_length);
+    return padded.substr(0, padded.find_last_not_of('\0') + 1);
+  };
+  Device device;
+  device.serial = text(columns.serial);
+  device.hub_serial = text(columns.hub_serial);
+  device.index = columns.index[i];
+  device.type = columns.type[i];
+  device.extrinsic_enabled = columns.extrinsic_enabled[i] != 0;
+  std::copy_n(columns.roll_pitch_yaw_deg.data() + 3 * i, 3, device.roll_pitch_yaw_deg.begin());
+  std::copy_n(columns.translation_m.data() + 3 * i, 3, device.translation_m.begin());
+  return device;
+}
+
+class NetcdfReader final : public Reader {
+ public:
+  explicit NetcdfReader(const std::string& path) : file_(path) {
+    read_header();
+    const auto row = file_.dimension(kRowDimension);
+    const auto packet = file_.dimension(kPacketDimension);
+    const auto sample = file_.dimension(kImuDimension);
+    row_count_ = row.length;
+    packet_count_ = packet.length;
+    imu_count_ = sample.length;
+    for_each_column(Observations{}, RequireColumns{file_, variables_, row, kRowBlock});
+    for_each_packet_column(PacketColumns{},
+                           RequireColumns{file_, variables_, packet, kPacketBlock});
+    for_each_imu_column(ImuColumns{}, RequireColumns{file_, variables_, sample, kImuBlock});
+  }
+
+  bool read(Chunk& chunk, std::size_t max_rows) override {
+    chunk.clear();
+    if (pending_) throw FileError(*pending_);
+    try {
+      std::size_t rows = std::min(max_rows, row_count_ - row_);
+      std::size_t samples = std::min(max_rows, imu_count_ - imu_sample_);
+      if (packet_count_ > 0) take_packets(chunk.packets, max_rows, rows, samples);
+      read_rows(chunk.observations, rows);
+      read_imu(chunk.imu, samples);
+    } catch (const FileError& error) {
+      pending_.emplace(error);
+      keep_whole_packets(chunk);
+    }
+    row_ += chunk.observations.size();
+    imu_sample_ += chunk.imu.size();
+    const bool some = chunk.observations.size() > 0 || !chunk.packets.empty() || !chunk.imu.empty();
+    if (!some && pending_) throw FileError(*pending_);
+    return some;
+  }
+
+  double fraction_read() const override {
+    const std::size_t total = row_count_ + imu_count_;
+    return total == 0 ? 1.0 : static_cast<double>(row_ + imu_sample_) / static_cast<double>(total);
+  }
+
+ private:
+  void read_header() {
+    if (!file_.has_attribute(kMarker)) {
+      file_.fail(fmt::format(
+          "a NetCDF file, but not of a recording: its global attribute {} is missing", kMarker));
+    }
+    if (const auto version = file_.number(kMarker); version != kLayoutVersion) {
+      file_.fail(fmt::format("expected {} = {}, found {}", kMarker, kLayoutVersion, version));
+    }
+    header_.format = kName;
+    header_.time_reference = read_time_reference();
+    // Files of earlier versions have times and do not say so.
+    if (file_.has_attribute(kHasTimes)) header_.has_times = file_.number(kHasTimes) != 0;
+    header_.has_range = file_.number("has_range") != 0;
+    header_.has_intensity = file_.number("has_intensity") != 0;
+    header_.cartesian = file_.number("cartesian") != 0;
+    const std::uint32_t returns = file_.number("returns_per_shot");
+    if (returns < 1 || returns > kMostReturns) {
+      file_.fail(fmt::format("returns_per_shot = {}, allowed 1 to {}", returns, kMostReturns));
+    }
+    header_.returns_per_shot = static_cast<int>(returns);
+    header_.frame_duration_ms = file_.number("frame_duration_ms");
+    header_.details = file_.text_group(kDetailsGroup);
+    const std::string source = file_.text(kSourceFormat);
+    if (!source.empty()) header_.set_detail(kSourceFormat, source);
+    read_devices();
+  }
+
+  void read_devices() {
+    const auto device = file_.dimension(kDeviceDimension);
+    if (device.length < 1 || device.length > kMostDevices) {
+      file_.fail(fmt::format("dimension {} has length {}, allowed 1 to {}", kDeviceDimension,
+                             device.length, kMostDevices));
+    }
+    DeviceColumns devices;
+    devices.serial_length = file_.dimension(kSerialDimension).length;
+    for_each_device_column(devices, RequireColumns{file_, variables_, device, 0});
+    for_each_device_column(devices, GetColumns{file_, variables_, 0, device.length});
+    for (std::size_t i = 0; i < device.length; ++i) {
+      header_.devices.push_back(device_of(devices, i));
+    }
+  }
+
+  TimeReference read_time_reference() const {
+    const std::string found = file_.text("time_reference");
+    for (const auto reference : {TimeReference::relative, TimeReference::power_on,
+                                 TimeReference::ptp, TimeReference::utc, TimeReference::pps}) {
+      if (to_string(reference) == found) return reference;
+    }
+    file_.fail(fmt::format("expected a known time_reference, found \"{}\"", found));
+  }
+
+  /// Refuses entries that belong to no device of the table.
+  void require_known_devices(const char* variable, std::span<const std::uint8_t> devices,
+                             std::size_t first) const {
+    const auto found = std::find_if(devices.begin(), devices.end(), [this](std::uint8_t device) {
+      return device >= header_.devices.size();
+    });
+    if (found == devices.end()) return;
+    file_.fail(fmt::format("entry {} of variable {} is {}, allowed below {} = {}",
+                           first + static_cast<std::size_t>(found - devices.begin()), variable,
+                           *found, kDeviceDimension, header_.devices.size()));
+  }
+
+  /// Takes the next packets of about max_rows rows, and says what they own.
+  void take_packets(std::vector<Packet>& packets, std::size_t max_rows, std::size_t& rows,
+                    std::size_t& samples) {
+    rows = samples = 0;
+    while (rows + samples < max_rows && packets.size() < max_rows) {
+      if (next_packet_ == known_packets_.rows.size()) {
+        const std::size_t count = std::min(kPacketBlock, packet_count_ - packets_read_);
+        if (count == 0) break;
+        for_each_packet_column(known_packets_, GetColumns{file_, variables_, packets_read_, count});
+        packets_read_ += count;
+        next_packet_ = 0;
+      }
+      packets.push_back(packet_of(known_packets_, next_packet_++));
+      rows += packets.back().rows;
+      if (packets.back().data_type == livox::kImuDataType) ++samples;
+    }
+    const bool last = packets_read_ == packet_count_ && next_packet_ == known_packets_.rows.size();
+    const std::size_t rows_left = row_count_ - row_, samples_left = imu_count_ - imu_sample_;
+    if (rows > rows_left || samples > samples_left ||
+        (last && (rows < rows_left || samples < samples_left))) {
+      file_.fail(fmt::format("the packets hold {} rows and {} inertial samples, expected {} and {}",
+                             row_ + rows, imu_sample_ + samples, row_count_, imu_count_));
+    }
+  }
+
+  /// Reads rows block by block, so that a damaged block costs no row before it.
+  void read_rows(Observations& rows, std::size_t count) {
+    Observations block;
+    while (rows.size() < count) {
+      const std::size_t start = row_ + rows.size();
+      const std::size_t length = std::min(kRowBlock - start % kRowBlock, count - rows.size());
+      for_each_column(block, GetColumns{file_, variables_, start, length});
+      require_known_devices("device", block.device, start);
+      rows.append(block);
+    }
+  }
+
+  void read_imu(std::vector<ImuSample>& samples, std::size_t count) {
+    ImuColumns columns;
+    for_each_imu_column(columns, GetColumns{file_, variables_, imu_sample_, count});
+    require_known_devices("imu_device", columns.device, imu_sample_);
+    for (std::size_t i = 0; i < count; ++i) {
+      ImuSample sample;
+      sample.time_ns = columns.time_ns[i];
+      sample.device = columns.device[i];
+      std::copy_n(columns.angular_velocity.data() + 3 * i, 3, sample.angular_velocity.begin());
+      std::copy_n(columns.acceleration_g.data() + 3 * i, 3, sample.acceleration_g.begin());
+      samples.push_back(sample);
+    }
+  }
+
+  /// After damage: drops the packets that did not get all their rows and samples, and the rows of
+  /// a packet that is not whole.
+  void keep_whole_packets(Chunk& chunk) const {
+    if (packet_count_ == 0) return;
+    std::size_t rows = 0, samples = 0, whole = 0;
+    for (const auto& packet : chunk.packets) {
+      rows += packet.rows;
+      samples += packet.data_type == livox::kImuDataType ? 1 : 0;
+      if (rows > chunk.observations.size() || samples > chunk.imu.size()) {
+        rows -= packet.rows;
+        samples -= packet.data_type == livox::kImuDataType ? 1 : 0;
+        break;
+      }
+      ++whole;
+    }
+    chunk.packets.resize(whole);
+    chunk.observations.resize(rows);
+    chunk.imu.resize(samples);
+  }
+
+  io::NetcdfInput file_;
+  Variables variables_;
+  std::size_t row_count_ = 0, packet_count_ = 0, imu_count_ = 0;
+  std::size_t row_ = 0, imu_sample_ = 0, packets_read_ = 0, next_packet_ = 0;
+  PacketColumns known_packets_;
+  std::optional<FileError> pending_;
+};
+
+}  // namespace
+
+std::unique_ptr<Reader> open_recording(const std::string& path) {
+  return std::make_unique<NetcdfReader>(path);
+}
+
+}  // namespace risley::recordings::netcdf

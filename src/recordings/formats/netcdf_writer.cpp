@@ -1,0 +1,252 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+// Equal recordings give equal bytes, in whatever pieces they are written: blocks of rows and of
+// packet headers go to the file in an order that depends on their content alone.
+#include <algorithm>
+#include <map>
+#include <optional>
+#include <span>
+#include <tuple>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "risley/core/error.hpp"
+#include "risley/io/netcdf.hpp"
+#include "risley/recordings/livox/packet.hpp"
+
+#include "recordings/formats/format.hpp"
+#include "recordings/formats/netcdf_layout.hpp"
+
+namespace risley::recordings::netcdf {
+namespace {
+
+using Variables = std::map<std::string_view, io::NetcdfVariable>;
+using Dimensions = std::map<std::string_view, io::NetcdfDimension>;
+
+/// Defines variables of one table, whose entries run along `dimension`.
+/// @param block  entries per compressed block; 0 for a table of fixed length, kept in one piece
+struct DefineColumns {
+  io::NetcdfOutput& file;
+  Variables& variables;
+  const Dimensions& inner;
+  const io::NetcdfDimension& dimension;
+  std::size_t block;
+
+  template <class T>
+  void operator()(const NetcdfColumn& column, const std::vector<T>&) const {
+    const io::NetcdfStorage storage{block, block > 0, block > 0};
+    const auto variable =
+        column.inner_dimension == nullptr
+            ? file.define<T>(column.name, {&dimension}, storage)
+            : file.define<T>(column.name, {&dimension, &inner.at(column.inner_dimension)}, storage);
+    if (column.units != nullptr) file.put_text(variable, "units", column.units);
+    file.put_text(variable, "long_name", column.long_name);
+    variables.emplace(column.name, variable);
+  }
+};
+
+/// Writes entries [offset, offset + count) of the given columns at entry `start` of the file.
+struct PutColumns {
+  io::NetcdfOutput& file;
+  const Variables& variables;
+  std::size_t start, offset, count;
+
+  template <class T>
+  void operator()(const NetcdfColumn& column, const std::vector<T>& values) const {
+    file.put(variables.at(column.name), start,
+             std::span<const T>(values).subspan(offset * column.width, count * column.width));
+  }
+};
+
+PacketColumns columns_of(const std::vector<Packet>& packets, std::size_t count) {
+  PacketColumns columns;
+  for (std::size_t i = 0; i < count; ++i) {
+    const Packet& p = packets[i];
+    columns.rows.push_back(p.rows);
+    columns.frame.push_back(p.frame);
+    columns.device_index.push_back(p.device_index);
+    columns.version.push_back(p.version);
+    columns.slot.push_back(p.slot);
+    columns.lidar_id.push_back(p.lidar_id);
+    columns.reserved.push_back(p.reserved);
+    columns.status.push_back(p.status);
+    columns.timestamp_type.push_back(p.timestamp_type);
+    columns.data_type.push_back(p.data_type);
+    columns.timestamp.insert(columns.timestamp.end(), p.timestamp.begin(), p.timestamp.end());
+  }
+  return columns;
+}
+
+DeviceColumns columns_of(const std::vector<Device>& devices) {
+  DeviceColumns columns;
+  for (const auto& device : devices) {
+    columns.serial_length =
+        std::max({columns.serial_length, device.serial.size(), device.hub_serial.size()});
+  }
+  const auto append_padded = [&](std::vector<char>& target, const std::string& text) {
+    target.insert(target.end(), text.begin(), text.end());
+    target.resize(target.size() + columns.serial_length - text.size(), '\0');
+  };
+  for (const auto& device : devices) {
+    append_padded(columns.serial, device.serial);
+    append_padded(columns.hub_serial, device.hub_serial);
+    columns.index.push_back(device.index);
+    columns.type.push_back(device.type);
+    columns.extrinsic_enabled.push_back(device.extrinsic_enabled ? 1 : 0);
+    columns.roll_pitch_yaw_deg.insert(columns.roll_pitch_yaw_deg.end(),
+                                      device.roll_pitch_yaw_deg.begin(),
+                                      device.roll_pitch_yaw_deg.end());
+    columns.translation_m.insert(columns.translation_m.end(), device.translation_m.begin(),
+                                 device.translation_m.end());
+  }
+  return columns;
+}
+
+class NetcdfWriter final : public Writer {
+ public:
+  NetcdfWriter(const std::string& path, const RecordingHeader& header) : file_(path) {
+    if (header.devices.empty()) {
+      throw InvalidArgument("RecordingHeader::devices is empty, expected at least one device");
+    }
+    write_header(header);
+  }
+
+  void write(const Chunk& chunk) override {
+    require_whole_packets(chunk);
+    rows_.append(chunk.observations);
+    packets_.insert(packets_.end(), chunk.packets.begin(), chunk.packets.end());
+    append_imu(chunk.imu);
+    flush(false);
+  }
+
+  void close() override {
+    flush(true);
+    const std::size_t samples = imu_.time_ns.size();
+    for (std::size_t start = 0; start < samples; start += kImuBlock) {
+      for_each_imu_column(
+          imu_, PutColumns{file_, variables_, start, start, std::min(kImuBlock, samples - start)});
+    }
+    file_.close();
+  }
+
+ private:
+  void write_header(const RecordingHeader& header) {
+    file_.put_text("Conventions", "CF-1.9");
+    file_.put_text("title", "Recording of a scanning lidar");
+    file_.put_number(kMarker, kLayoutVersion);
+    const bool unknown_source = header.format == kName && source_format(header) == kName;
+    file_.put_text(kSourceFormat, unknown_source ? "" : source_format(header));
+    file_.put_text("time_reference", to_string(header.time_reference));
+    const auto put_number = [this](const char* name, std::uint32_t value) {
+      file_.put_number(name, value);
+    };
+    put_number(kHasTimes, header.has_times ? 1 : 0);
+    put_number("has_range", header.has_range ? 1 : 0);
+    put_number("has_intensity", header.has_intensity ? 1 : 0);
+    put_number("cartesian", header.cartesian ? 1 : 0);
+    put_number("returns_per_shot", static_cast<std::uint32_t>(header.returns_per_shot));
+    put_number("frame_duration_ms", header.frame_duration_ms);
+    auto details = header.details;
+    std::erase_if(details, [](const auto& detail) { return detail.first == kSourceFormat; });
+    file_.put_text_group(kDetailsGroup, details);
+    const DeviceColumns devices = columns_of(header.devices);
+    Dimensions inner;
+    for (const auto& [name, length] :
+         {std::pair{kByteDimension, std::tuple_size_v<decltype(Packet::timestamp)>},
+          std::pair{kAxisDimension, std::size_t{3}},
+          std::pair{kSerialDimension, devices.serial_length}}) {
+      inner.emplace(name, file_.define_dimension(name, length));
+    }
+    const auto device = file_.define_dimension(kDeviceDimension, header.devices.size());
+    const auto row = file_.define_growing_dimension(kRowDimension);
+    for_each_column(rows_, DefineColumns{file_, variables_, inner, row, kRowBlock});
+    const auto packet = file_.define_growing_dimension(kPacketDimension);
+    for_each_packet_column(PacketColumns{},
+                           DefineColumns{file_, variables_, inner, packet, kPacketBlock});
+    const auto sample = file_.define_growing_dimension(kImuDimension);
+    for_each_imu_column(imu_, DefineColumns{file_, variables_, inner, sample, kImuBlock});
+    for_each_device_column(devices, DefineColumns{file_, variables_, inner, device, 0});
+    file_.end_definitions();
+    for_each_device_column(devices, PutColumns{file_, variables_, 0, 0, header.devices.size()});
+  }
+
+  /// Packets, where there are any, must account for all rows and inertial samples.
+  void require_whole_packets(const Chunk& chunk) {
+    if (chunk.observations.size() == 0 && chunk.imu.empty() && chunk.packets.empty()) return;
+    if (!with_packets_) with_packets_ = !chunk.packets.empty();
+    std::size_t rows = 0, samples = 0;
+    for (const auto& packet : chunk.packets) {
+      rows += packet.rows;
+      if (packet.data_type == livox::kImuDataType) ++samples;
+    }
+    if (*with_packets_ ? rows == chunk.observations.size() && samples == chunk.imu.size()
+                       : chunk.packets.empty()) {
+      return;
+    }
+    throw InvalidArgument(fmt::format(
+        "a chunk of {} rows and {} inertial samples has packets of {} rows and {} samples; "
+        "expected the same, or no packets in the whole recording",
+        chunk.observations.size(), chunk.imu.size(), rows, samples));
+  }
+
+  void append_imu(const std::vector<ImuSample>& samples) {
+    for (const auto& sample : samples) {
+      imu_.time_ns.push_back(sample.time_ns);
+      imu_.device.push_back(sample.device);
+      imu_.angular_velocity.insert(imu_.angular_velocity.end(), sample.angular_velocity.begin(),
+                                   sample.angular_velocity.end());
+      imu_.acceleration_g.insert(imu_.acceleration_g.end(), sample.acceleration_g.begin(),
+                                 sample.acceleration_g.end());
+    }
+  }
+
+  /// Writes the blocks that are full, and at the end the rest: those of rows and of packets in
+  /// the order in which the recording completes them, rows first.
+  void flush(bool at_end) {
+    const auto block_of = [at_end](std::size_t available, std::size_t block) {
+      return available >= block ? block : at_end ? available : 0;
+    };
+    std::size_t done = 0;
+    while (true) {
+      const std::size_t rows = block_of(rows_.size() - done, kRowBlock);
+      const std::size_t packets = block_of(packets_.size(), kPacketBlock);
+      std::uint64_t packets_end = rows_of_written_packets_;
+      for (std::size_t i = 0; i < packets; ++i) packets_end += packets_[i].rows;
+      if (rows > 0 && (packets == 0 || rows_written_ + rows <= packets_end)) {
+        for_each_column(rows_, PutColumns{file_, variables_, rows_written_, done, rows});
+        rows_written_ += rows;
+        done += rows;
+      } else if (packets > 0) {
+        for_each_packet_column(columns_of(packets_, packets),
+                               PutColumns{file_, variables_, packets_written_, 0, packets});
+        packets_.erase(packets_.begin(), packets_.begin() + static_cast<std::ptrdiff_t>(packets));
+        packets_written_ += packets;
+        rows_of_written_packets_ = packets_end;
+      } else {
+        break;
+      }
+    }
+    if (done == 0) return;
+    for_each_column(rows_, [done](const NetcdfColumn&, auto& column) {
+      column.erase(column.begin(), column.begin() + static_cast<std::ptrdiff_t>(done));
+    });
+  }
+
+  io::NetcdfOutput file_;
+  Variables variables_;
+  Observations rows_;
+  std::vector<Packet> packets_;
+  ImuColumns imu_;  ///< to the end: a sample takes 33 bytes and there are 200 per second
+  std::optional<bool> with_packets_;
+  std::size_t rows_written_ = 0, packets_written_ = 0;
+  std::uint64_t rows_of_written_packets_ = 0;
+};
+
+}  // namespace
+
+std::unique_ptr<Writer> create_recording(const std::string& path, const RecordingHeader& header) {
+  return std::make_unique<NetcdfWriter>(path, header);
+}
+
+}  // namespace risley::recordings::netcdf

@@ -1,0 +1,211 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "risley/io/output_file.hpp"
+
+#include <fstream>
+#include <regex>
+#include <thread>
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "risley/core/error.hpp"
+#include "risley/io/sha256.hpp"
+#include "risley/io/text_file.hpp"
+
+#include "io/temporary_folder.hpp"
+
+namespace risley::io {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+void put(const std::string& path, const std::string& text) {
+  std::ofstream stream(path, std::ios::binary | std::ios::trunc);
+  stream << text;
+  stream.close();
+  ASSERT_TRUE(stream) << path;
+}
+
+mode_t mode_of(const std::string& path) {
+  struct stat status {};
+  EXPECT_EQ(::lstat(path.c_str(), &status), 0) << path;
+  return status.st_mode;
+}
+
+TEST(OutputFile, AppearsWhole) {
+  const TemporaryFolder folder;
+  const std::string path = folder.file("out");
+  put(path, "before");
+  {
+    OutputFile output(path);
+    put(output.temporary_path(), "after");
+    EXPECT_EQ(read_text_file(path), "before");
+    EXPECT_EQ(fs::path(output.temporary_path()).parent_path(), folder.path());
+    output.commit();
+    EXPECT_EQ(read_text_file(path), "after");
+  }
+  {
+    OutputFile given_up(path);
+    put(given_up.temporary_path(), "half");
+    const OutputFile moved(std::move(given_up));
+    EXPECT_EQ(folder.names().size(), 2U);
+  }
+  EXPECT_THAT(folder.names(), ElementsAre("out"));
+  EXPECT_EQ(read_text_file(path), "after");
+}
+
+TEST(OutputFile, NobodyForeseesItsTemporaryName) {
+  const TemporaryFolder folder;
+  const std::string path = folder.file("out");
+  std::set<std::string> names;
+  for (int i = 0; i < 20; ++i) {
+    const OutputFile output(path);
+    EXPECT_TRUE(std::regex_match(output.temporary_path().substr(path.size()),
+                                 std::regex("\\.part-[a-z2-7]{12}")))
+        << output.temporary_path();
+    names.insert(output.temporary_path());
+  }
+  EXPECT_EQ(names.size(), 20U);
+}
+
+TEST(OutputFile, PlantedLinksAreNotFollowed) {
+  // The name that earlier versions would have used, and a link in the place of the temporary.
+  const TemporaryFolder folder;
+  const std::string path = folder.file("out"), victim = folder.file("victim");
+  put(victim, "precious");
+  fs::create_symlink(victim, fmt::format("{}.part-{}", path, ::getpid()));
+  write_text_file(path, "new");
+  EXPECT_EQ(read_text_file(victim), "precious");
+  EXPECT_EQ(read_text_file(path), "new");
+
+  OutputFile output(path);
+  fs::remove(output.temporary_path());
+  fs::create_symlink(victim, output.temporary_path());
+  try {
+    output.commit();
+    FAIL() << "a file that another put there became the output";
+  } catch (const FileError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("replaced"));
+  }
+  EXPECT_EQ(read_text_file(path), "new");
+  EXPECT_EQ(read_text_file(victim), "precious");
+}
+
+TEST(OutputFile, KeepsTheModeOfWhatItReplaces) {
+  const TemporaryFolder folder;
+  const std::string path = folder.file("out");
+  const mode_t mask = ::umask(022);
+  write_text_file(path, "new");
+  EXPECT_EQ(mode_of(path), S_IFREG | 0644U);
+  for (const mode_t mode : {0600U, 0664U, 0755U}) {
+    ASSERT_EQ(::chmod(path.c_str(), mode), 0);
+    OutputFile output(path);
+    EXPECT_EQ(mode_of(output.temporary_path()) & 0077U & ~mode, 0U) << "open to more meanwhile";
+    put(output.temporary_path(), "again");
+    output.commit();
+    EXPECT_EQ(mode_of(path), S_IFREG | mode);
+  }
+  ::umask(mask);
+}
+
+TEST(OutputFile, WritesBehindLinks) {
+  const TemporaryFolder folder;
+  const std::string path = folder.file("out");
+  fs::create_directory(folder.file("elsewhere"));
+  put(folder.file("elsewhere/real"), "old");
+  fs::create_symlink("elsewhere/link", path);
+  fs::create_symlink("real", folder.file("elsewhere/link"));
+  write_text_file(path, "new");
+  EXPECT_TRUE(fs::is_symlink(path));
+  EXPECT_EQ(read_text_file(folder.file("elsewhere/real")), "new");
+
+  fs::create_symlink("to be made", folder.file("dangling"));
+  write_text_file(folder.file("dangling"), "made");
+  EXPECT_EQ(read_text_file(folder.file("to be made")), "made");
+
+  fs::create_symlink("circle", folder.file("circle"));
+  EXPECT_THROW(OutputFile(folder.file("circle")), FileError);
+}
+
+TEST(OutputFile, DevicesAreWrittenAndSurvive) {
+  write_text_file("/dev/null", "nothing");
+  EXPECT_TRUE(S_ISCHR(mode_of("/dev/null")));
+  EXPECT_THROW(write_text_file("/dev/full", "too much"), FileError);
+  EXPECT_TRUE(S_ISCHR(mode_of("/dev/full")));
+}
+
+TEST(OutputFile, FifosGetTheBytes) {
+  const TemporaryFolder folder;
+  const std::string path = folder.file("fifo");
+  ASSERT_EQ(::mkfifo(path.c_str(), 0600), 0);
+  const std::string text(300'000, 'x');  // more than a pipe holds
+  std::string found;
+  std::thread reader([&] { found = read_text_file(path); });
+  write_text_file(path, text);
+  reader.join();
+  EXPECT_TRUE(found == text);
+  EXPECT_TRUE(S_ISFIFO(mode_of(path)));
+  EXPECT_THAT(folder.names(), ElementsAre("fifo"));
+}
+
+TEST(OutputFile, OpenFilesAreWrittenByTheirNames) {
+  const TemporaryFolder folder;
+  const std::string path = folder.file("log");
+  const int descriptor = ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600);
+  ASSERT_GE(descriptor, 0);
+  write_text_file(fmt::format("/proc/self/fd/{}", descriptor), "through its number");
+  char start[8] = {};
+  EXPECT_EQ(::pread(descriptor, start, 7, 0), 7);
+  EXPECT_STREQ(start, "through") << "the open file was replaced";
+  ::close(descriptor);
+}
+
+TEST(OutputFile, SaysAtOnceWhatCannotBeWritten) {
+  const TemporaryFolder folder;
+  EXPECT_THROW(OutputFile(folder.path().string()), FileError);
+  EXPECT_THROW(OutputFile(folder.file("no/such/folder")), FileError);
+  EXPECT_THROW(OutputFile(""), FileError);
+  put(folder.file("file"), "");
+  EXPECT_THROW(OutputFile(folder.file("file/below")), FileError);
+}
+
+TEST(Reading, ErrorsNeverGiveATextOrAHash) {
+  const TemporaryFolder folder;
+  EXPECT_THROW(sha256_of_file(folder.path().string()), FileError);
+  EXPECT_THROW(read_text_file(folder.path().string()), FileError);
+  EXPECT_THROW(sha256_of_file(folder.file("missing")), FileError);
+  EXPECT_THROW(read_text_file(folder.file("missing")), FileError);
+  // Opens, and then every read of it fails with EIO: address 0 is mapped nowhere.
+  EXPECT_THROW(sha256_of_file("/proc/self/mem"), FileError);
+  EXPECT_THROW(read_text_file("/proc/self/mem"), FileError);
+  if (::geteuid() != 0) {
+    put(folder.file("secret"), "");
+    fs::permissions(folder.file("secret"), fs::perms::none);
+    EXPECT_THROW(sha256_of_file(folder.file("secret")), FileError);
+  }
+}
+
+TEST(Sha256, KnownAnswers) {
+  // FIPS 180-2, appendix B, and the empty message.
+  const TemporaryFolder folder;
+  const std::string path = folder.file("message");
+  put(path, "");
+  EXPECT_EQ(sha256_of_file(path),
+            "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855");
+  put(path, "abc");
+  EXPECT_EQ(sha256_of_file(path),
+            "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
+  put(path, std::string(1'000'000, 'a'));
+  EXPECT_EQ(sha256_of_file(path),
+            "cdc76e5c9914fb9281a1c7e284d73e67f1809a48a497200e046d39ccc7112cd0");
+}
+
+}  // namespace
+}  // namespace risley::io

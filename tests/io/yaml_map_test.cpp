@@ -1,0 +1,63 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "risley/io/yaml_map.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "risley/core/error.hpp"
+
+namespace risley::io {
+namespace {
+
+using ::testing::HasSubstr;
+
+std::string refusal(const std::string& text) {
+  try {
+    const YamlMap map(parse_yaml(text, "a.yaml"), "a.yaml", "");
+    map.allow_only({"number", "list", "map"});
+    if (map.find("number") != nullptr) map.number("number", 0.0L, 10.0L, "m");
+  } catch (const FileError& error) {
+    return error.what();
+  }
+  return "accepted";
+}
+
+TEST(Yaml, ValuesKeepTheirLines) {
+  const YamlMap map(parse_yaml("number: 2.5\nlist:\n  - 1\n  - [2, 3]\nmap: {a: b}\n", "a.yaml"),
+                    "a.yaml", "");
+  EXPECT_EQ(map.number("number", 0.0L, 10.0L, "m"), 2.5L);
+  const YamlNode& list = map.at("list").value;
+  ASSERT_TRUE(list.is_list());
+  ASSERT_EQ(list.items.size(), 2U);
+  EXPECT_EQ(list.items[0].scalar, "1");
+  EXPECT_EQ(list.items[0].line, 3U);
+  EXPECT_EQ(list.items[1].line, 4U);
+  EXPECT_EQ(yaml_number(list.items[1].items.at(1), "a.yaml", "list"), 3.0L);
+  EXPECT_EQ(YamlMap(map.at("map").value, "a.yaml", "map").text("a"), "b");
+}
+
+TEST(Yaml, MistakesAreFoundWithTheirLine) {
+  EXPECT_THAT(refusal("number: [1\n"), HasSubstr("is not YAML"));
+  EXPECT_THAT(refusal("- 1\n"), HasSubstr("expected a map, found a list"));
+  EXPECT_THAT(refusal(""), HasSubstr("found nothing"));
+  EXPECT_THAT(refusal("number: 1\nlist: 2\nnumber: 1\n"), HasSubstr("line 3: number stands twice"));
+  EXPECT_THAT(refusal("number: 1\nother: 2\n"), HasSubstr("line 2: unknown field other"));
+  EXPECT_THAT(refusal("number: 11\n"), HasSubstr("allowed 0 to 10"));
+  EXPECT_THAT(refusal("number: .nan\n"), HasSubstr("expected a finite number"));
+  EXPECT_EQ(refusal("number: 1\n"), "accepted");
+}
+
+TEST(Yaml, AliasesThatRepeatAliasesAreBounded) {
+  // Nine levels of nine aliases each would be 387 million values.
+  std::string text = "a: &a [x, x, x, x, x, x, x, x, x]\n";
+  for (char name = 'b'; name <= 'i'; ++name) {
+    text += std::string(1, name) + ": &" + name + " [";
+    for (int i = 0; i < 9; ++i) text += std::string(i > 0 ? ", *" : "*") + char(name - 1);
+    text += "]\n";
+  }
+  EXPECT_THAT(refusal(text), HasSubstr("more values than 1000000"));
+}
+
+}  // namespace
+}  // namespace risley::io
