@@ -226,6 +226,7 @@ PointingModel imperfect_model(const std::string& order, unsigned seed,
   PointingModel model;
   model.train = testing::imperfect_train(order, 0.5, seed);
   model.believed = testing::imperfect_train(order, 0.5, seed + 1000);
+  model.geometry = {{0.0}, {0.0}};
   if (options.beam_origin) model.geometry = {{0.007}, {0.030}};
   model.range_offset = 0.031;
   model.angle_noise = 7e-5;

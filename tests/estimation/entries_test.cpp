@@ -310,6 +310,7 @@ TEST(Entries, RotorWindowsAskForARotorOfTheTrain) {
 /// A start of two rotors that fits the shots of Linear.
 Start two_rotors() {
   Start start;
+  start.train = PrismTrain(parse_face_order("PA-AP"));
   start.rotation_angle = {0.0, 0.0};
   start.angular_velocity = {-700.0, 500.0};
   return start;
@@ -317,6 +318,7 @@ Start two_rotors() {
 
 sensors::Sensor two_prisms() {
   sensors::Sensor sensor;
+  sensor.train = PrismTrain(parse_face_order("PA-AP"));
   sensor.angular_velocity = {-700.0, 500.0};
   return sensor;
 }

@@ -239,7 +239,7 @@ TEST_P(NormalEquationsOfATrain, EqualTheScalarModel) {
     train.set_place(place, truth[place] + 3e-4);
   }
   const std::vector<ShotWeights> weights{{{kNoise, 1.7 * kNoise}, 0.0, kInfinity},
-                                         {2 * kNoise, 0.05, kInfinity},
+                                         {{2 * kNoise, 2 * kNoise}, 0.05, kInfinity},
                                          {{kNoise, 1.7 * kNoise}, 0.05, 20.0},
                                          {{kNoise, 1.7 * kNoise}, 0.0, 1.5}};
   NormalEquations equations;  // keeps its memory, not its values

@@ -329,6 +329,7 @@ TEST(CalibrationPage, AFailureSaysWhyAndWhatToDo) {
   Page page;
   page.calibration = Calibration();
   page.calibration.sensor = sensors::load_sensor("mid-40");
+  page.calibration.believed = page.calibration.sensor.train;
   page.calibration.reason = "the walls do not tell pitch & yaw";
   page.calibration.warnings = {"a single wall"};
   page.calibration.rms_after = kNaN;
