@@ -41,9 +41,10 @@ void add_beams(const RangedRecording& recording, const PrismTrain& calibrated,
     const auto at = static_cast<std::size_t>(found - truth.time_ns.begin());
     std::vector<double> angles;
     for (const auto& column : recording.shots.rotation_angle) angles.push_back(column[row]);
-    beams.before.push_back(observe(recording.believed.train, angles).direction);
+    const int beam = recording.shots.beam[row];
+    beams.before.push_back(observe(recording.believed.train, angles, beam).direction);
     for (std::size_t k = 0; k < angles.size(); ++k) angles[k] += shift[k];
-    beams.after.push_back(observe(calibrated, angles).direction);
+    beams.after.push_back(observe(calibrated, angles, beam).direction);
     beams.truth.push_back(direction_from_angles<double>({truth.azimuth[at], truth.zenith[at]}));
   }
 }

@@ -100,7 +100,7 @@ class FilesTest(CommandTest):
             self.assertEqual(self.names(), before)
 
     def test_no_memory_is_a_fault_and_not_a_failed_estimate(self):
-        self.expect(0, "simulate", "-o", "large.nc", "--duration-s", "5")
+        self.expect(0, "simulate", "-o", "large.nc", "--duration-s", "20")
 
         def limited(megabytes, *arguments):
             def limit():
