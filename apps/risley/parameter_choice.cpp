@@ -29,7 +29,9 @@ jobs::HeldParameters held_parameters(const std::vector<std::string>& fixed) {
       held.emplace_back(text, std::nullopt);
       continue;
     }
-    auto [name, value] = split_assignment(text);
+    const auto assignment = split_assignment(text);
+    const std::string& name = assignment.first;
+    double value = assignment.second;
     // The train is not known yet; a name means the same in any, and only emitters' names differ.
     for (const TrainShape& shape : {TrainShape{kMaxPrisms, 1}, {kMaxPrisms, kMaxEmitters}}) {
       const auto& known = parameter_list(shape);

@@ -48,6 +48,7 @@ void check_available(InstructionSet set) {
   const auto& sets = available_instruction_sets();
   if (std::find(sets.begin(), sets.end(), set) != sets.end()) return;
   std::vector<std::string> names;
+  names.reserve(sets.size());
   for (const InstructionSet each : sets) names.push_back(to_string(each));
   throw InvalidArgument(fmt::format("instruction set = {}, this processor and binary allow {}",
                                     to_string(set), fmt::join(names, ", ")));

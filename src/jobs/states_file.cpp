@@ -24,8 +24,7 @@ template <class T>
 io::NetcdfVariable define(io::NetcdfOutput& file, const io::NetcdfDimension& along,
                           const std::string& name, const std::string& units,
                           const std::string& long_name) {
-  const auto variable =
-      file.define<T>(name, {&along}, {std::min(along.length, kBlockRows), true, false});
+  auto variable = file.define<T>(name, {&along}, {std::min(along.length, kBlockRows), true, false});
   if (!units.empty()) file.put_text(variable, "units", units);
   file.put_text(variable, "long_name", long_name);
   return variable;

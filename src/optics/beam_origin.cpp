@@ -18,6 +18,7 @@ std::vector<PrismSize> shared_prism_sizes() {
 std::vector<PrismSize> own_prism_sizes(int prisms) {
   if (prisms < 1 || prisms > kMaxPrisms) refuse_prism_count(prisms);
   std::vector<PrismSize> sizes;
+  sizes.reserve(2 * static_cast<std::size_t>(prisms));
   const auto unit = [](int count, int at) {
     std::vector<double> values(static_cast<std::size_t>(count), 0.0);
     values[static_cast<std::size_t>(at)] = 1.0;

@@ -90,8 +90,8 @@ class NetcdfWriter final : public CloudWriter {
   io::NetcdfVariable define(const Description& what, Value value,
                             const io::NetcdfDimension* inner = nullptr) {
     const io::NetcdfStorage storage{kBlockRows, true, false};
-    const auto variable = inner == nullptr ? file_.define<T>(what.name, {&point_}, storage)
-                                           : file_.define<T>(what.name, {&point_, inner}, storage);
+    auto variable = inner == nullptr ? file_.define<T>(what.name, {&point_}, storage)
+                                     : file_.define<T>(what.name, {&point_, inner}, storage);
     file_.put_text(variable, "units", what.units);
     file_.put_text(variable, "long_name", what.long_name);
     const std::size_t width = variable.width;
@@ -115,7 +115,7 @@ class NetcdfWriter final : public CloudWriter {
   template <class T, class Value>
   io::NetcdfVariable define_data(const Description& what, Value value,
                                  const io::NetcdfDimension* inner = nullptr) {
-    const auto variable = define<T>(what, value, inner);
+    auto variable = define<T>(what, value, inner);
     file_.put_text(variable, "coordinates", "time x_m y_m z_m");
     return variable;
   }
