@@ -76,16 +76,5 @@ class OutputTest(CommandTest):
                 self.assertEqual(done.stdout, "")
 
 
-def damaged_lvx(lvx):
-    """The same file with a wrong packet version in its last frame."""
-    data = bytearray(lvx)
-    frame, last = 29 + 59 * data[28], 0
-    while frame < len(data):
-        last = frame
-        frame = struct.unpack_from("<Q", data, frame + 8)[0]
-    data[last + 24 + 1] = 99
-    return bytes(data)
-
-
 if __name__ == "__main__":
     unittest.main()
