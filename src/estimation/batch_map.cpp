@@ -12,6 +12,7 @@
 #include <fmt/format.h>
 
 #include "risley/core/error.hpp"
+#include "risley/estimation/free_parameters.hpp"
 #include "risley/estimation/normal_equations.hpp"
 #include "risley/estimation/process_likelihood.hpp"
 #include "risley/estimation/rotor_track.hpp"
@@ -20,7 +21,6 @@
 #include "estimation/entry_checks.hpp"
 #include "estimation/knot_model.hpp"
 #include "estimation/normal_equations_kernel.hpp"
-#include "estimation/residual_model.hpp"
 
 namespace risley::estimation {
 namespace {
@@ -226,27 +226,27 @@ double unit_variance(const AngleSeries& series, const AngleNoise& noise,
 /// How many of the observed angles the estimate itself used up: the trace of curvature times
 /// covariance, states and constants together.
 double used_observations(const NormalEquations& equations, const SmootherSolution& solution) {
-  return with_prism_count(equations.prisms, [&]<int N>() {
-    constexpr Eigen::Index kD = 3 * N;
-    using RowMajor = Eigen::Matrix<double, kD, Eigen::Dynamic, Eigen::RowMajor>;
-    const auto n = static_cast<Eigen::Index>(equations.free);
-    double used = equations.static_hessian.cwiseProduct(solution.parameter_covariance).sum();
-    for (std::size_t knot = 0; knot < equations.knots(); ++knot) {
-      const auto curvature = knot_curvature<N>(equations, knot);
-      const double* entry = solution.state_covariance.data() + knot * (kD * (kD + 1) / 2);
-      for (Eigen::Index i = 0; i < kD; ++i) {
-        for (Eigen::Index j = i; j < kD; ++j) {
-          used += (i == j ? 1.0 : 2.0) * curvature(i, j) * *entry++;
-        }
+  using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+  const auto n = static_cast<Eigen::Index>(equations.free);
+  const Eigen::Index states = kStatesPerRotor * equations.prisms;
+  double used = equations.static_hessian.cwiseProduct(solution.parameter_covariance).sum();
+  const double* entry = solution.state_covariance.data();
+  // Sum over the knots of coupling^T sensitivity.
+  Eigen::MatrixXd shared = Eigen::MatrixXd::Zero(n, n);
+  for (std::size_t knot = 0; knot < equations.knots(); ++knot) {
+    const auto curvature = knot_curvature<Eigen::Dynamic>(equations, knot);
+    for (Eigen::Index i = 0; i < states; ++i) {
+      for (Eigen::Index j = i; j < states; ++j) {
+        used += (i == j ? 1.0 : 2.0) * curvature(i, j) * *entry++;
       }
-      if (n == 0) continue;
-      const auto at = static_cast<std::size_t>(kD * n) * knot;
-      const Eigen::Map<const RowMajor> coupling(equations.coupling.data() + at, kD, n);
-      const Eigen::Map<const RowMajor> sensitivity(solution.sensitivity.data() + at, kD, n);
-      used += 2.0 * coupling.cwiseProduct(sensitivity * solution.parameter_covariance).sum();
     }
-    return used;
-  });
+    if (n == 0) continue;
+    const auto at = static_cast<std::size_t>(states * n) * knot;
+    const Eigen::Map<const RowMajor> coupling(equations.coupling.data() + at, states, n);
+    const Eigen::Map<const RowMajor> sensitivity(solution.sensitivity.data() + at, states, n);
+    shared.noalias() += coupling.transpose() * sensitivity;
+  }
+  return used + 2.0 * shared.cwiseProduct(solution.parameter_covariance).sum();
 }
 
 /// 1 + 2 (rho_1^2 + ...): how far squares of correlated residuals hang together.

@@ -45,7 +45,6 @@ struct Reference {
   const RotorStates* states = nullptr;
 };
 
-template <int N>
 class Filter {
  public:
   Filter(const AngleSeries& series, const PrismTrain& train, const EkfOptions& options,
@@ -55,14 +54,17 @@ class Filter {
         process_(process),
         reference_(reference),
         model_(train, options.free),
+        prisms_(train.prisms()),
         statics_(static_cast<Eigen::Index>(options.free.size())),
-        size_(statics_ + 2 * N),
+        size_(statics_ + 2 * prisms_),
+        angles_(static_cast<std::size_t>(prisms_)),
         jacobian_(2, size_),
         cross_(size_, 2),
         gain_(size_, 2) {
     if (reference_) model_.set(reference_->parameters);
   }
 
+  Eigen::Index prisms() const { return prisms_; }
   Eigen::Index statics() const { return statics_; }
   Eigen::Index size() const { return size_; }
 
@@ -72,7 +74,7 @@ class Filter {
     for (Eigen::Index i = 0; i < statics_; ++i) {
       sigma[i] = options_.free[static_cast<std::size_t>(i)].prior_sigma;
     }
-    for (Eigen::Index k = 0; k < N; ++k) {
+    for (Eigen::Index k = 0; k < prisms_; ++k) {
       sigma[statics_ + 2 * k] = kAngleSigma;
       sigma[statics_ + 2 * k + 1] = kSpeedSigma;
     }
@@ -82,7 +84,7 @@ class Filter {
   /// Moves a state by dt seconds, forwards or backwards.                     [B21 Eq. (27)]
   void predict(State& state, double dt) const {
     Eigen::MatrixXd& p = state.covariance;
-    for (Eigen::Index k = 0; k < N; ++k) {
+    for (Eigen::Index k = 0; k < prisms_; ++k) {
       const Eigen::Index angle = statics_ + 2 * k, speed = angle + 1;
       state.mean[angle] += dt * state.mean[speed];
       p.row(angle) += dt * p.row(speed);
@@ -128,50 +130,50 @@ class Filter {
     state.mean.noalias() += gain_ * innovation_;
     p.noalias() -= gain_ * cross_.transpose();
     // Rounding would otherwise let the two halves drift apart.
-    p.template triangularView<Eigen::StrictlyLower>() = p.transpose();
+    p.triangularView<Eigen::StrictlyLower>() = p.transpose();
     return result;
   }
 
   /// Observed minus modelled at a state, rad; NaN when the beam does not get through.
   Eigen::Vector2d residual_at(const Eigen::VectorXd& mean, std::size_t row) {
     model_.set(mean.head(statics_));
-    model_.linearise(angles(mean), series_.beam[row]);
+    take_angles(mean);
+    model_.linearise(angles_, series_.beam[row]);
     Eigen::Vector2d residual = model_.residual(series_.azimuth[row], series_.zenith[row]);
     if (reference_) model_.set(reference_->parameters);
     return residual;
   }
 
  private:
-  std::array<double, N> angles(const Eigen::VectorXd& mean) const {
-    std::array<double, N> result;
-    for (Eigen::Index k = 0; k < N; ++k) {
-      result[static_cast<std::size_t>(k)] = mean[statics_ + 2 * k];
+  void take_angles(const Eigen::VectorXd& mean) {
+    for (Eigen::Index k = 0; k < prisms_; ++k) {
+      angles_[static_cast<std::size_t>(k)] = mean[statics_ + 2 * k];
     }
-    return result;
   }
 
   /// Sets innovation_ and jacobian_.
   void linearise(const State& state, std::size_t row) {
-    std::array<double, N> at;
     if (reference_) {
-      for (std::size_t k = 0; k < N; ++k) at[k] = reference_->states->rotation_angle[k][row];
+      for (std::size_t k = 0; k < angles_.size(); ++k) {
+        angles_[k] = reference_->states->rotation_angle[k][row];
+      }
     } else {
       model_.set(state.mean.head(statics_));
-      at = angles(state.mean);
+      take_angles(state.mean);
     }
     // An invalid beam makes the innovation NaN, which no gate lets through.
-    model_.linearise(at, series_.beam[row]);
+    model_.linearise(angles_, series_.beam[row]);
     innovation_ = model_.residual(series_.azimuth[row], series_.zenith[row]);
     jacobian_.setZero();
     jacobian_.leftCols(statics_) = model_.d_parameters();
-    for (Eigen::Index k = 0; k < N; ++k) {
+    for (Eigen::Index k = 0; k < prisms_; ++k) {
       jacobian_.col(statics_ + 2 * k) = model_.d_angles().col(k);
     }
     if (reference_) {
       innovation_ -= model_.d_parameters() * (state.mean.head(statics_) - reference_->parameters);
-      for (Eigen::Index k = 0; k < N; ++k) {
+      for (Eigen::Index k = 0; k < prisms_; ++k) {
         innovation_ -= model_.d_angles().col(k) *
-                       (state.mean[statics_ + 2 * k] - at[static_cast<std::size_t>(k)]);
+                       (state.mean[statics_ + 2 * k] - angles_[static_cast<std::size_t>(k)]);
       }
     }
   }
@@ -180,22 +182,22 @@ class Filter {
   const EkfOptions& options_;
   const std::vector<RotorProcess>& process_;
   const Reference* reference_;
-  ResidualModel<N> model_;
-  Eigen::Index statics_, size_;
+  ResidualModel model_;
+  Eigen::Index prisms_, statics_, size_;
+  std::vector<double> angles_;  ///< of the shot at hand
   Eigen::Vector2d innovation_;
   Eigen::Matrix2Xd jacobian_;
   Eigen::MatrixX2d cross_, gain_;
 };
 
 /// State at the first shot of a series, from a start at some other time.
-template <int N>
-State first_state(const Filter<N>& filter, const AngleSeries& series, const Start& start,
+State first_state(const Filter& filter, const AngleSeries& series, const Start& start,
                   const std::vector<FreeParameter>& free) {
   State state;
   state.mean.resize(filter.size());
   state.mean.head(filter.statics()) = free_values(start.train, free);
   const double ahead = 1e-9 * static_cast<double>(series.time_ns[0] - start.time_ns);
-  for (Eigen::Index k = 0; k < N; ++k) {
+  for (Eigen::Index k = 0; k < filter.prisms(); ++k) {
     const double speed = start.angular_velocity[static_cast<std::size_t>(k)];
     const double angle = start.rotation_angle[static_cast<std::size_t>(k)] + ahead * speed;
     state.mean[filter.statics() + 2 * k] = wrap_to_pi(angle);
@@ -206,11 +208,10 @@ State first_state(const Filter<N>& filter, const AngleSeries& series, const Star
 }
 
 /// State at the first shot, from a reference.
-template <int N>
-State first_state(const Filter<N>& filter, const Reference& reference) {
+State first_state(const Filter& filter, const Reference& reference) {
   State state{Eigen::VectorXd(filter.size()), filter.wide_covariance()};
   state.mean.head(filter.statics()) = reference.parameters;
-  for (Eigen::Index k = 0; k < N; ++k) {
+  for (Eigen::Index k = 0; k < filter.prisms(); ++k) {
     const auto rotor = static_cast<std::size_t>(k);
     state.mean[filter.statics() + 2 * k] = reference.states->rotation_angle[rotor][0];
     state.mean[filter.statics() + 2 * k + 1] = reference.states->angular_velocity[rotor][0];
@@ -219,10 +220,9 @@ State first_state(const Filter<N>& filter, const Reference& reference) {
 }
 
 /// White accelerations from decimal logarithms of (deg/s) / sqrt(s).
-template <int N>
-std::vector<RotorProcess> processes(const std::array<double, N>& decades) {
+std::vector<RotorProcess> processes(const std::vector<double>& decades) {
   std::vector<RotorProcess> result;
-  result.reserve(N);
+  result.reserve(decades.size());
   for (const double d : decades)
     result.push_back({radians_from_degrees(std::pow(10.0, d)), 0.0, 0.0});
   return result;
@@ -230,19 +230,18 @@ std::vector<RotorProcess> processes(const std::array<double, N>& decades) {
 
 /// Shots that no filter may take although its prior is still wide enough to swallow them: those
 /// among the first that lie far from what the start, or the pass before, expects.
-template <int N>
 std::vector<unsigned char> screen(const AngleSeries& series, const Start& start,
                                   const EkfOptions& options, const Reference* reference) {
   std::vector<unsigned char> outlier(series.size(), 0);
   const PrismTrain& start_train = start.train;
-  ResidualModel<N> model(start_train, options.free);
+  ResidualModel model(start_train, options.free);
   model.set(reference ? reference->parameters : free_values(start_train, options.free));
+  std::vector<double> angle(static_cast<std::size_t>(start_train.prisms()));
   const double start_limit = std::max(radians_from_degrees(0.1), 8.0 * start.residual_rms);
   for (std::size_t i = 0; i < std::min(options.gate_after, series.size()); ++i) {
     const double t = 1e-9 * static_cast<double>(series.time_ns[i] - start.time_ns);
     if (!reference && std::abs(t) > start.reach) continue;
-    std::array<double, N> angle;
-    for (std::size_t k = 0; k < N; ++k) {
+    for (std::size_t k = 0; k < angle.size(); ++k) {
       angle[k] = reference ? reference->states->rotation_angle[k][i]
                            : start.rotation_angle[k] + t * start.angular_velocity[k];
     }
@@ -258,10 +257,9 @@ std::vector<unsigned char> screen(const AngleSeries& series, const Start& start,
 
 /// Log likelihood of the innovations over the first shots for a choice of process noise, linearised
 /// at a reference so that it is that of a linear filter, whatever the noise.
-template <int N>
 double likelihood(const AngleSeries& series, const PrismTrain& train, const EkfOptions& options,
                   const std::vector<RotorProcess>& process, const Reference& reference) {
-  Filter<N> filter(series, train, options, process, &reference);
+  Filter filter(series, train, options, process, &reference);
   State state = first_state(filter, reference);
   double sum = 0;
   const std::size_t shots = std::min(series.size(), kLikelihoodShots);
@@ -277,54 +275,52 @@ double likelihood(const AngleSeries& series, const PrismTrain& train, const EkfO
 
 /// White acceleration of every rotor that makes the innovations likeliest: one value for all on a
 /// coarse grid, then each rotor's own.
-template <int N>
 std::vector<RotorProcess> likeliest_process(const AngleSeries& series, const PrismTrain& train,
                                             const EkfOptions& options, const Reference& reference) {
-  const auto likelihood_of = [&](const std::array<double, N>& decades) {
-    return likelihood<N>(series, train, options, processes<N>(decades), reference);
+  const auto likelihood_of = [&](const std::vector<double>& decades) {
+    return likelihood(series, train, options, processes(decades), reference);
   };
-  std::array<double, N> decades;
-  decades.fill(0.0);
+  std::vector<double> decades(static_cast<std::size_t>(train.prisms()));
   double best = -std::numeric_limits<double>::infinity();
   for (double trial = 3.0; trial >= -3.0; trial -= 0.5) {
-    std::array<double, N> all;
-    all.fill(trial);
+    const std::vector<double> all(decades.size(), trial);
     const double value = likelihood_of(all);
     if (value > best) {
       best = value;
       decades = all;
     }
   }
-  for (std::size_t k = 0; k < N; ++k) {
+  for (std::size_t k = 0; k < decades.size(); ++k) {
     const double middle = decades[k];
     decades[k] = golden_section_minimum(
         [&](double trial) {
-          std::array<double, N> changed = decades;
+          std::vector<double> changed = decades;
           changed[k] = trial;
           return -likelihood_of(changed);
         },
         middle - 0.75, middle + 0.75, 0.1);
   }
-  return processes<N>(decades);
+  return processes(decades);
 }
 
 /// One forward and one backward filter and their combination.
-template <int N>
 EkfResult run_pass(const AngleSeries& series, const State& first, const PrismTrain& train,
                    const EkfOptions& options, const std::vector<RotorProcess>& process,
                    const Reference* reference, std::vector<unsigned char> screened,
                    const Progress& progress) {
-  Filter<N> filter(series, train, options, process, reference);
+  Filter filter(series, train, options, process, reference);
   const std::size_t shots = series.size();
   const Eigen::Index statics = filter.statics();
+  const Eigen::Index prisms = filter.prisms();
+  const auto rotors = static_cast<std::size_t>(prisms);
   EkfResult result{options.free, {}, {}, train, {}, process, 0, 0};
   RotorStates& out = result.states;
   out.time_ns = series.time_ns;
   out.outlier = std::move(screened);
   result.outliers = static_cast<std::size_t>(std::count(out.outlier.begin(), out.outlier.end(), 1));
-  out.rotation_angle.assign(N, std::vector<double>(shots));
+  out.rotation_angle.assign(rotors, std::vector<double>(shots));
   out.angular_velocity = out.angular_velocity_sigma = out.rotation_angle;
-  out.rotation_angle_covariance.assign(N * (N + 1) / 2, std::vector<double>(shots));
+  out.rotation_angle_covariance.assign(rotors * (rotors + 1) / 2, std::vector<double>(shots));
   out.azimuth_residual.resize(shots);
   out.zenith_residual.resize(shots);
 
@@ -384,13 +380,13 @@ EkfResult run_pass(const AngleSeries& series, const State& first, const PrismTra
       mean_parameters += mean.head(statics);
       mean_covariance += covariance.topLeftCorner(statics, statics);
       std::size_t entry = 0;
-      for (Eigen::Index k = 0; k < N; ++k) {
+      for (Eigen::Index k = 0; k < prisms; ++k) {
         const Eigen::Index angle = statics + 2 * k;
         const auto rotor = static_cast<std::size_t>(k);
         out.rotation_angle[rotor][i] = mean[angle];
         out.angular_velocity[rotor][i] = mean[angle + 1];
         out.angular_velocity_sigma[rotor][i] = std::sqrt(covariance(angle + 1, angle + 1));
-        for (Eigen::Index l = k; l < N; ++l) {
+        for (Eigen::Index l = k; l < prisms; ++l) {
           out.rotation_angle_covariance[entry++][i] = covariance(angle, statics + 2 * l);
         }
       }
@@ -410,36 +406,6 @@ EkfResult run_pass(const AngleSeries& series, const State& first, const PrismTra
   return result;
 }
 
-template <int N>
-EkfResult run(const AngleSeries& series, const Start& start, const EkfOptions& options,
-              const Progress& progress) {
-  const bool choose = options.rotor_process.empty();
-  std::vector<RotorProcess> process =
-      choose ? std::vector<RotorProcess>(N, kSettlingProcess) : options.rotor_process;
-  for (const RotorProcess& rotor : process) {
-    if (rotor.jerk != 0)
-      throw InvalidArgument("white jerk is a motion model of the batch estimator");
-  }
-  State first = first_state(Filter<N>(series, start.train, options, process, nullptr), series,
-                            start, options.free);
-  EkfResult result = run_pass<N>(series, first, start.train, options, process, nullptr,
-                                 screen<N>(series, start, options, nullptr),
-                                 progress.part(0.0, 1.0 / options.passes));
-  for (int pass = 1; pass < options.passes; ++pass) {
-    const Reference reference{result.parameters, &result.states};
-    if (choose && pass == 1) {
-      process = likeliest_process<N>(series, start.train, options, reference);
-    }
-    first = first_state(Filter<N>(series, start.train, options, process, &reference), reference);
-    EkfResult next =
-        run_pass<N>(series, first, start.train, options, process, &reference,
-                    screen<N>(series, start, options, &reference),
-                    progress.part(double(pass) / options.passes, (pass + 1.0) / options.passes));
-    result = std::move(next);
-  }
-  return result;
-}
-
 }  // namespace
 
 EkfResult run_ekf(const AngleSeries& series, const Start& start, const EkfOptions& options,
@@ -452,8 +418,33 @@ EkfResult run_ekf(const AngleSeries& series, const Start& start, const EkfOption
   require_start(start, start.train.prisms());
   require_process(options.rotor_process, start.train.prisms());
   check_beams(start.train, series.beam, series.size());
-  return with_prism_count(start.train.prisms(),
-                          [&]<int N>() { return run<N>(series, start, options, progress); });
+  const bool choose = options.rotor_process.empty();
+  std::vector<RotorProcess> process =
+      choose ? std::vector<RotorProcess>(static_cast<std::size_t>(start.train.prisms()),
+                                         kSettlingProcess)
+             : options.rotor_process;
+  for (const RotorProcess& rotor : process) {
+    if (rotor.jerk != 0)
+      throw InvalidArgument("white jerk is a motion model of the batch estimator");
+  }
+  State first = first_state(Filter(series, start.train, options, process, nullptr), series, start,
+                            options.free);
+  EkfResult result =
+      run_pass(series, first, start.train, options, process, nullptr,
+               screen(series, start, options, nullptr), progress.part(0.0, 1.0 / options.passes));
+  for (int pass = 1; pass < options.passes; ++pass) {
+    const Reference reference{result.parameters, &result.states};
+    if (choose && pass == 1) {
+      process = likeliest_process(series, start.train, options, reference);
+    }
+    first = first_state(Filter(series, start.train, options, process, &reference), reference);
+    EkfResult next =
+        run_pass(series, first, start.train, options, process, &reference,
+                 screen(series, start, options, &reference),
+                 progress.part(double(pass) / options.passes, (pass + 1.0) / options.passes));
+    result = std::move(next);
+  }
+  return result;
 }
 
 }  // namespace risley::estimation

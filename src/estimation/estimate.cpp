@@ -11,9 +11,9 @@
 
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
+#include "risley/estimation/free_parameters.hpp"
 
 #include "estimation/frame_prior.hpp"
-#include "estimation/residual_model.hpp"
 #include "estimation/used_shots.hpp"
 
 namespace risley::estimation {

@@ -68,4 +68,21 @@ std::vector<FreeParameter> free_parameters(const std::vector<std::string>& names
   return free;
 }
 
+Eigen::VectorXd free_values(const PrismTrain& train, const std::vector<FreeParameter>& free) {
+  Eigen::VectorXd values(static_cast<Eigen::Index>(free.size()));
+  for (std::size_t i = 0; i < free.size(); ++i) {
+    values[static_cast<Eigen::Index>(i)] = train[free[i].places.front()];
+  }
+  return values;
+}
+
+PrismTrain with_free_values(PrismTrain train, const std::vector<FreeParameter>& free,
+                            const Eigen::VectorXd& values) {
+  require_length("values", static_cast<std::size_t>(values.size()), free.size());
+  for (std::size_t i = 0; i < free.size(); ++i) {
+    for (const int at : free[i].places) train.set_place(at, values[static_cast<Eigen::Index>(i)]);
+  }
+  return train;
+}
+
 }  // namespace risley::estimation

@@ -16,6 +16,7 @@
 #include "risley/core/direction.hpp"
 #include "risley/core/error.hpp"
 #include "risley/estimation/diagnostics.hpp"
+#include "risley/estimation/free_parameters.hpp"
 #include "risley/estimation/normal_equations.hpp"
 #include "risley/estimation/spectral_lines.hpp"
 #include "risley/optics/batch.hpp"
@@ -23,7 +24,6 @@
 #include "estimation/field_of_view.hpp"
 #include "estimation/frame_prior.hpp"
 #include "estimation/knot_model.hpp"
-#include "estimation/residual_model.hpp"
 
 namespace risley::estimation {
 namespace {
@@ -177,9 +177,7 @@ class WindowFitter {
     const Eigen::Index d = 3 * fit.knot.prisms;
     Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(d + n, d + n);
     Eigen::VectorXd gradient(d + n);
-    with_prism_count(fit.knot.prisms, [&]<int N>() {
-      normal.topLeftCorner(d, d) = knot_curvature<N>(equations_, 0);
-    });
+    normal.topLeftCorner(d, d) = knot_curvature<Eigen::Dynamic>(equations_, 0);
     normal.topRightCorner(d, n) = Eigen::Map<const RowMajor>(equations_.coupling.data(), d, n);
     normal.bottomLeftCorner(n, d) = normal.topRightCorner(d, n).transpose();
     normal.bottomRightCorner(n, n) = equations_.static_hessian;

@@ -64,18 +64,37 @@ KnotSquare<N> knot_curvature(const NormalEquations& equations, std::size_t knot)
   return h;
 }
 
-/// rows := F rows for one rotor's three rows (or columns, given transposed): the state dt later.
-template <class Rows>
-void advance(Rows&& rows, double dt) {
-  rows.row(0) += dt * rows.row(1) + (0.5 * dt * dt) * rows.row(2);
-  rows.row(1) += dt * rows.row(2);
+/// One rotor's three rows, from `first` on, moved on by dt: rows := F rows.
+template <class Matrix>
+void advance_rows(Matrix& m, Eigen::Index first, double dt) {
+  for (Eigen::Index j = 0; j < m.cols(); ++j) {
+    m(first, j) += dt * m(first + 1, j) + (0.5 * dt * dt) * m(first + 2, j);
+    m(first + 1, j) += dt * m(first + 2, j);
+  }
 }
-
-/// rows := F^T rows.
-template <class Rows>
-void retreat(Rows&& rows, double dt) {
-  rows.row(2) += dt * rows.row(1) + (0.5 * dt * dt) * rows.row(0);
-  rows.row(1) += dt * rows.row(0);
+/// columns := columns F^T
+template <class Matrix>
+void advance_columns(Matrix& m, Eigen::Index first, double dt) {
+  for (Eigen::Index i = 0; i < m.rows(); ++i) {
+    m(i, first) += dt * m(i, first + 1) + (0.5 * dt * dt) * m(i, first + 2);
+    m(i, first + 1) += dt * m(i, first + 2);
+  }
+}
+/// rows := F^T rows
+template <class Matrix>
+void retreat_rows(Matrix& m, Eigen::Index first, double dt) {
+  for (Eigen::Index j = 0; j < m.cols(); ++j) {
+    m(first + 2, j) += dt * m(first + 1, j) + (0.5 * dt * dt) * m(first, j);
+    m(first + 1, j) += dt * m(first, j);
+  }
+}
+/// columns := columns F
+template <class Matrix>
+void retreat_columns(Matrix& m, Eigen::Index first, double dt) {
+  for (Eigen::Index i = 0; i < m.rows(); ++i) {
+    m(i, first + 2) += dt * m(i, first + 1) + (0.5 * dt * dt) * m(i, first);
+    m(i, first + 1) += dt * m(i, first);
+  }
 }
 
 /// Process noise of one rotor over dt.
@@ -86,6 +105,28 @@ inline Eigen::Matrix3d step_noise(const RotorProcess& process, double dt) {
       q.angle_speed, q.speed_speed, q.speed_acceleration,       //
       q.angle_acceleration, q.speed_acceleration, q.acceleration_acceleration;
   return noise;
+}
+
+/// out += a b, column by column; out is neither a nor b. Eigen's own product of matrices this small
+/// is no faster and takes seconds of compilation for every expression.
+template <class A, class B, class Out>
+void add_product(const A& a, const B& b, Out& out) {
+  for (Eigen::Index j = 0; j < b.cols(); ++j) {
+    for (Eigen::Index k = 0; k < a.cols(); ++k) {
+      const double factor = b(k, j);
+      for (Eigen::Index i = 0; i < a.rows(); ++i) out(i, j) += a(i, k) * factor;
+    }
+  }
+}
+/// out -= a b
+template <class A, class B, class Out>
+void subtract_product(const A& a, const B& b, Out& out) {
+  for (Eigen::Index j = 0; j < b.cols(); ++j) {
+    for (Eigen::Index k = 0; k < a.cols(); ++k) {
+      const double factor = b(k, j);
+      for (Eigen::Index i = 0; i < a.rows(); ++i) out(i, j) -= a(i, k) * factor;
+    }
+  }
 }
 
 /// Lower Cholesky factor, in place; unrolled where the size is fixed.
@@ -115,15 +156,31 @@ bool add_information(Square& covariance, const Square& information,
   const auto d = static_cast<int>(covariance.rows());
   Square lower = covariance;
   if (!cholesky(lower)) return false;
-  Square inner = lower.transpose() * (information * lower);
-  inner.diagonal().array() += 1.0;
-  if (!cholesky(inner)) return false;
-  Square root = lower.transpose();
-  for (int i = 0; i < d; ++i) {
-    for (int k = 0; k < i; ++k) root.row(i) -= inner(i, k) * root.row(k);
-    root.row(i) *= 1.0 / inner(i, i);
+  Square half(d, d), inner(d, d), root(d, d);
+  half.setZero();
+  inner.setIdentity();
+  add_product(information, lower, half);
+  for (int j = 0; j < d; ++j) {  // the lower triangle of I + L^T half
+    for (int i = j; i < d; ++i) {
+      for (int k = i; k < d; ++k) inner(i, j) += lower(k, i) * half(k, j);
+    }
   }
-  covariance.noalias() = root.transpose() * root;
+  if (!cholesky(inner)) return false;
+  // W, column by column: R W^T = L^T read as rows.
+  for (int j = 0; j < d; ++j) {
+    for (int i = 0; i < d; ++i) {
+      double sum = lower(j, i);
+      for (int k = 0; k < i; ++k) sum -= inner(i, k) * root(j, k);
+      root(j, i) = sum / inner(i, i);
+    }
+  }
+  for (int j = 0; j < d; ++j) {
+    for (int i = 0; i <= j; ++i) {
+      double sum = 0;
+      for (int k = 0; k < d; ++k) sum += root(i, k) * root(j, k);
+      covariance(i, j) = covariance(j, i) = sum;
+    }
+  }
   if (log_determinant) {
     double product = 1.0;
     for (int i = 0; i < d; ++i) product *= inner(i, i);

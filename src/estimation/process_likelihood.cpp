@@ -3,7 +3,6 @@
 #include "risley/estimation/process_likelihood.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 
@@ -11,7 +10,6 @@
 
 #include "risley/core/golden_section.hpp"
 #include "risley/core/require.hpp"
-#include "risley/optics/prism_train.hpp"
 
 #include "estimation/knot_model.hpp"
 
@@ -60,87 +58,84 @@ RotorWindows::RotorWindows(const NormalEquations& equations, const RotorTrajecto
                            std::size_t most_windows) {
   require_between("rotor", rotor, 0, at.prisms - 1);
   require_length("gradient", equations.gradient.size(), at.state.size());
-  with_prism_count(at.prisms, [&]<int N>() {
-    constexpr int kD = 3 * N;
-    using Square = Eigen::Matrix<double, kD, kD>;
-    using Vector = Eigen::Matrix<double, kD, 1>;
-    // Own states first, the others behind them.
-    std::array<int, N> order{rotor};
-    for (int k = 0, next = 1; k < N && next < N; ++k) {
-      if (k != rotor) order[static_cast<std::size_t>(next++)] = k;
+  using Square = KnotSquare<Eigen::Dynamic>;
+  using Vector = KnotVector<Eigen::Dynamic>;
+  const int prisms = at.prisms;
+  const Eigen::Index states = at.states();
+  // Own states first, the others behind them.
+  std::vector<int> order{rotor};
+  for (int k = 0; k < prisms; ++k) {
+    if (k != rotor) order.push_back(k);
+  }
+  std::size_t stretch = 0, before = 0;
+  for (std::size_t knot = 0; knot < at.size() && windows_.size() < most_windows;) {
+    const bool fresh = stretch < at.stretch_begin.size() && at.stretch_begin[stretch] == knot;
+    if (fresh) ++stretch;
+    const std::size_t end =
+        stretch < at.stretch_begin.size() ? at.stretch_begin[stretch] : at.size();
+    const std::size_t first = knot;
+    std::size_t shots = 0;
+    while (knot < end) {
+      const double span = 1e-9 * static_cast<double>(at.time_ns[knot] - at.time_ns[first]);
+      if (span >= 0.95 * kWindow && shots >= kFewestWindowShots) break;
+      shots += at.last_shot[knot] - at.first_shot[knot];
+      ++knot;
     }
-    std::size_t stretch = 0, before = 0;
-    for (std::size_t knot = 0; knot < at.size() && windows_.size() < most_windows;) {
-      const bool fresh = stretch < at.stretch_begin.size() && at.stretch_begin[stretch] == knot;
-      if (fresh) ++stretch;
-      const std::size_t end =
-          stretch < at.stretch_begin.size() ? at.stretch_begin[stretch] : at.size();
-      const std::size_t first = knot;
-      std::size_t shots = 0;
-      while (knot < end) {
-        const double span = 1e-9 * static_cast<double>(at.time_ns[knot] - at.time_ns[first]);
-        if (span >= 0.95 * kWindow && shots >= kFewestWindowShots) break;
-        shots += at.last_shot[knot] - at.first_shot[knot];
-        ++knot;
+    const std::size_t middle = first + (knot - first) / 2;
+    Square curvature = Square::Zero(states, states);
+    Vector gradient = Vector::Zero(states);
+    const Vector center = Eigen::Map<const Vector>(at.state_of(middle).data(), states);
+    for (std::size_t i = first; i < knot; ++i) {
+      const double dt = 1e-9 * static_cast<double>(at.time_ns[i] - at.time_ns[middle]);
+      // The knot's deviation as a function of the window's: T u + e.
+      Square h = knot_curvature<Eigen::Dynamic>(equations, i);
+      Vector e = center;
+      for (int k = 0; k < prisms; ++k) advance_rows(e, 3 * k, dt);
+      e -= Eigen::Map<const Vector>(at.state_of(i).data(), states);
+      const double* own = equations.gradient.data() + i * static_cast<std::size_t>(states);
+      Vector g = Eigen::Map<const Vector>(own, states) - h * e;
+      for (int k = 0; k < prisms; ++k) {
+        retreat_rows(g, 3 * k, dt);
+        retreat_rows(h, 3 * k, dt);
       }
-      const std::size_t middle = first + (knot - first) / 2;
-      Square curvature = Square::Zero();
-      Vector gradient = Vector::Zero();
-      const Vector center = Eigen::Map<const Vector>(at.state.data() + middle * kD);
-      for (std::size_t i = first; i < knot; ++i) {
-        const double dt = 1e-9 * static_cast<double>(at.time_ns[i] - at.time_ns[middle]);
-        // The knot's deviation as a function of the window's: T u + e.
-        Square h = knot_curvature<N>(equations, i);
-        Vector e = center;
-        for (int k = 0; k < N; ++k) advance(e.template middleRows<3>(3 * k), dt);
-        e -= Eigen::Map<const Vector>(at.state.data() + i * kD);
-        Vector g = Eigen::Map<const Vector>(equations.gradient.data() + i * kD) - h * e;
-        for (int k = 0; k < N; ++k) {
-          retreat(g.template middleRows<3>(3 * k), dt);
-          retreat(h.template middleRows<3>(3 * k), dt);
-        }
-        for (int k = 0; k < N; ++k) retreat(h.template middleCols<3>(3 * k).transpose(), dt);
-        curvature += h;
-        gradient += g;
-      }
-      Square sorted;
-      Vector sorted_gradient;
-      for (int i = 0; i < N; ++i) {
-        const int k = 3 * order[static_cast<std::size_t>(i)];
-        sorted_gradient.template segment<3>(3 * i) = gradient.template segment<3>(k);
-        for (int j = 0; j < N; ++j) {
-          const int l = 3 * order[static_cast<std::size_t>(j)];
-          sorted.template block<3, 3>(3 * i, 3 * j) = curvature.template block<3, 3>(k, l);
-        }
-      }
-      Window window;
-      window.curvature = sorted.template topLeftCorner<3, 3>();
-      window.gradient = sorted_gradient.template head<3>();
-      if constexpr (N > 1) {
-        constexpr int kOthers = kD - 3;
-        Eigen::Matrix<double, kOthers, kOthers> others =
-            sorted.template bottomRightCorner<kOthers, kOthers>();
-        for (int i = 0; i < kOthers; ++i) {
-          others(i, i) += 1.0 / (kOtherSigma[i % 3] * kOtherSigma[i % 3]);
-        }
-        const Eigen::Matrix<double, kOthers, 3> cross =
-            sorted.template bottomLeftCorner<kOthers, 3>();
-        const Eigen::LDLT<Eigen::Matrix<double, kOthers, kOthers>> solver(others);
-        window.curvature -= cross.transpose() * solver.solve(cross);
-        window.gradient -=
-            cross.transpose() * solver.solve(sorted_gradient.template tail<kOthers>());
-      }
-      window.state = center.template segment<3>(3 * rotor);
-      if (!fresh && !windows_.empty()) {
-        window.step = 1e-9 * static_cast<double>(at.time_ns[middle] - at.time_ns[before]);
-        Eigen::Vector3d moved = windows_.back().state;
-        advance(moved, window.step);
-        window.offset = moved - window.state;
-      }
-      before = middle;
-      windows_.push_back(window);
+      for (int k = 0; k < prisms; ++k) retreat_columns(h, 3 * k, dt);
+      curvature += h;
+      gradient += g;
     }
-  });
+    Square sorted(states, states);
+    Vector sorted_gradient(states);
+    for (int i = 0; i < prisms; ++i) {
+      const int k = 3 * order[static_cast<std::size_t>(i)];
+      sorted_gradient.segment<3>(3 * i) = gradient.segment<3>(k);
+      for (int j = 0; j < prisms; ++j) {
+        const int l = 3 * order[static_cast<std::size_t>(j)];
+        sorted.block<3, 3>(3 * i, 3 * j) = curvature.block<3, 3>(k, l);
+      }
+    }
+    Window window;
+    window.curvature = sorted.topLeftCorner<3, 3>();
+    window.gradient = sorted_gradient.head<3>();
+    if (prisms > 1) {
+      const Eigen::Index others = states - 3;
+      for (Eigen::Index i = 0; i < others; ++i) {
+        sorted(3 + i, 3 + i) += 1.0 / (kOtherSigma[i % 3] * kOtherSigma[i % 3]);
+      }
+      const Eigen::Matrix<double, Eigen::Dynamic, 3> cross = sorted.bottomLeftCorner(others, 3);
+      const Eigen::LDLT<Eigen::MatrixXd> solver(sorted.bottomRightCorner(others, others));
+      const Eigen::Matrix<double, Eigen::Dynamic, 3> share = solver.solve(cross);
+      window.curvature -= cross.transpose() * share;
+      window.gradient -= share.transpose() * sorted_gradient.tail(others);
+    }
+    window.state = center.segment<3>(3 * rotor);
+    if (!fresh && !windows_.empty()) {
+      window.step = 1e-9 * static_cast<double>(at.time_ns[middle] - at.time_ns[before]);
+      Eigen::Vector3d moved = windows_.back().state;
+      advance_rows(moved, 0, window.step);
+      window.offset = moved - window.state;
+    }
+    before = middle;
+    windows_.push_back(window);
+  }
 }
 
 double RotorWindows::log_likelihood(const RotorProcess& process) const {
@@ -149,10 +144,10 @@ double RotorWindows::log_likelihood(const RotorProcess& process) const {
   double sum = 0;
   for (const Window& window : windows_) {
     if (window.step > 0) {
-      advance(mean, window.step);
+      advance_rows(mean, 0, window.step);
       mean += window.offset;
-      advance(p, window.step);
-      advance(p.transpose(), window.step);
+      advance_rows(p, 0, window.step);
+      advance_columns(p, 0, window.step);
       p += step_noise(process, window.step);
     } else {
       const Eigen::Vector3d sigma(kFirstAngleSigma, kFirstSpeedSigma,

@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include <Eigen/Cholesky>
+#include <Eigen/Core>
 
 #include "risley/core/angle.hpp"
 #include "risley/estimation/diagnostics.hpp"
@@ -35,11 +35,9 @@ constexpr double kGridStep = radians_from_degrees(15.0);
 /// Shots of a window that tell a scale of residuals.
 constexpr std::size_t kFewestShots = 12;
 
-template <int N>
 class Tracker {
-  static constexpr int kD = 3 * N;
-  using Square = Eigen::Matrix<double, kD, kD>;
-  using Vector = Eigen::Matrix<double, kD, 1>;
+  using Square = KnotSquare<Eigen::Dynamic>;
+  using Vector = KnotVector<Eigen::Dynamic>;
 
  public:
   struct State {
@@ -49,22 +47,23 @@ class Tracker {
   };
 
   Tracker(const AngleSeries& series, const Start& start, const AngleNoise& noise)
-      : series_(series), start_(start) {
+      : series_(series), start_(start), prisms_(start.train.prisms()) {
     weights_.angle_noise = noise;
-    knot_.prisms = N;
+    knot_.prisms = prisms_;
     knot_.stretch_begin = {0};
-    knot_.state.resize(kD);
+    knot_.state.resize(static_cast<std::size_t>(knot_.states()));
     usual_level_ = std::max(1.0, start.residual_rms / noise.rms());
   }
 
   State first() const {
     State state;
     state.time_ns = start_.time_ns;
-    state.covariance.setZero();
-    for (std::size_t k = 0; k < N; ++k) {
-      const auto at = static_cast<Eigen::Index>(3 * k);
-      state.mean[at] = start_.rotation_angle[k];
-      state.mean[at + 1] = start_.angular_velocity[k];
+    state.mean.resize(3 * prisms_);
+    state.covariance.setZero(3 * prisms_, 3 * prisms_);
+    for (Eigen::Index k = 0; k < prisms_; ++k) {
+      const Eigen::Index at = 3 * k;
+      state.mean[at] = start_.rotation_angle[static_cast<std::size_t>(k)];
+      state.mean[at + 1] = start_.angular_velocity[static_cast<std::size_t>(k)];
       state.mean[at + 2] = 0;
       state.covariance(at, at) = kStartAngleSigma * kStartAngleSigma;
       state.covariance(at + 1, at + 1) = kStartSpeedSigma * kStartSpeedSigma;
@@ -77,13 +76,13 @@ class Tracker {
     const double dt = 1e-9 * static_cast<double>(time_ns - state.time_ns);
     state.time_ns = time_ns;
     Square& p = state.covariance;
-    for (int k = 0; k < N; ++k) {
-      advance(state.mean.template middleRows<3>(3 * k), dt);
-      advance(p.template middleRows<3>(3 * k), dt);
+    for (int k = 0; k < prisms_; ++k) {
+      advance_rows(state.mean, 3 * k, dt);
+      advance_rows(p, 3 * k, dt);
     }
-    for (int k = 0; k < N; ++k) advance(p.template middleCols<3>(3 * k).transpose(), dt);
-    for (int k = 0; k < N; ++k) {
-      p.template block<3, 3>(3 * k, 3 * k) += step_noise(kSettlingProcess, dt);
+    for (int k = 0; k < prisms_; ++k) advance_columns(p, 3 * k, dt);
+    for (int k = 0; k < prisms_; ++k) {
+      p.block<3, 3>(3 * k, 3 * k) += step_noise(kSettlingProcess, dt);
     }
   }
 
@@ -92,7 +91,7 @@ class Tracker {
     if (rows.size() == 0) return false;
     const State predicted = state;
     double uncertain = 0;
-    for (int k = 0; k < N; ++k) {
+    for (int k = 0; k < prisms_; ++k) {
       uncertain = std::max(uncertain, std::sqrt(state.covariance(3 * k, 3 * k)));
     }
     if (uncertain > kLostSigma) look_around(state, rows, 3.0 * uncertain);
@@ -100,7 +99,7 @@ class Tracker {
     if (!lost(rows)) return true;
     // Nothing of the prediction is true, such as that of a piece whose times came again.
     State anew = predicted;
-    for (int k = 0; k < N; ++k) anew.covariance(3 * k, 3 * k) = kPi * kPi;
+    for (int k = 0; k < prisms_; ++k) anew.covariance(3 * k, 3 * k) = kPi * kPi;
     const State loose = anew;
     look_around(anew, rows, kPi);
     if (improve(anew, loose, rows) && !lost(rows)) state = anew;
@@ -112,7 +111,7 @@ class Tracker {
     knot_.time_ns = {state.time_ns};
     knot_.first_shot = {rows.begin};
     knot_.last_shot = {rows.end};
-    std::copy_n(state.mean.data(), kD, knot_.state.begin());
+    std::copy_n(state.mean.data(), knot_.state.size(), knot_.state.begin());
     rows_ = rows;
     residuals_.resize(2 * series_.size());
     accumulate(series_, knot_, start_.train, {}, weights_, equations_,
@@ -128,19 +127,22 @@ class Tracker {
       accumulate_at(state, rows);
       weights_.softening = softening_at(level());
       accumulate_at(state, rows);
-      Square normal = predicted.covariance.ldlt().solve(Square::Identity());
-      const Vector pull = normal * (predicted.mean - state.mean);
-      normal += knot_curvature<N>(equations_, 0);
-      const Eigen::LDLT<Square> solver(normal);
-      const Vector step = solver.solve(Eigen::Map<const Vector>(equations_.gradient.data()) + pull);
+      const Square curvature = knot_curvature<Eigen::Dynamic>(equations_, 0);
+      const Vector pull = predicted.mean - state.mean;
+      Square covariance = predicted.covariance;
+      Vector step = Vector::Constant(pull.size(), std::numeric_limits<double>::quiet_NaN());
+      if (add_information(covariance, curvature)) {
+        // (P^-1 + H)^-1 (g + P^-1 pull), without P^-1.
+        const Eigen::Map<const Vector> gradient(equations_.gradient.data(), pull.size());
+        step = pull + covariance * (gradient - curvature * pull);
+      }
       if (!step.allFinite()) {
         state = predicted;
         return false;
       }
       state.mean += step;
-      state.covariance = solver.solve(Square::Identity());
+      state.covariance = covariance;
     }
-    state.covariance = (0.5 * (state.covariance + state.covariance.transpose())).eval();
     return true;
   }
 
@@ -166,12 +168,12 @@ class Tracker {
   void look_around(State& state, ShotRange rows, double reach) {
     const double softening = std::exchange(weights_.softening, softening_at(10.0 * usual_level_));
     const int half = std::clamp(static_cast<int>(std::ceil(reach / kGridStep)), 1, kGridHalf);
-    std::vector<int> offset(N, -half);
+    std::vector<int> offset(static_cast<std::size_t>(prisms_), -half);
     State best = state;
     double least = std::numeric_limits<double>::infinity();
     for (;;) {
       State trial = state;
-      for (int k = 0; k < N; ++k) {
+      for (int k = 0; k < prisms_; ++k) {
         trial.mean[3 * k] += kGridStep * offset[static_cast<std::size_t>(k)];
       }
       accumulate_at(trial, rows);
@@ -189,6 +191,7 @@ class Tracker {
 
   const AngleSeries& series_;
   const Start& start_;
+  int prisms_;
   ShotWeights weights_;
   RotorTrajectory knot_;
   NormalEquations equations_;
@@ -197,11 +200,19 @@ class Tracker {
   double usual_level_;
 };
 
-template <int N>
-void track(const AngleSeries& series, ShotRange shots, const Start& start, const AngleNoise& noise,
-           RotorTrajectory& knots, std::size_t first, std::size_t last) {
-  Tracker<N> tracker(series, start, noise);
-  using State = typename Tracker<N>::State;
+}  // namespace
+
+void track_rotors(const AngleSeries& series, ShotRange shots, const Start& start,
+                  const AngleNoise& noise, RotorTrajectory& knots, std::size_t first,
+                  std::size_t last) {
+  require_rows("shots", shots.begin, shots.end, series.size());
+  require_rows("knots", first, last, knots.size());
+  require_length("state", knots.state.size(),
+                 knots.size() * static_cast<std::size_t>(knots.states()));
+  require_start(start, knots.prisms);
+  check_noise(noise);
+  Tracker tracker(series, start, noise);
+  using State = Tracker::State;
   const auto step_ns = static_cast<std::int64_t>(kTrackStep * 1e9);
   const auto rows_about = [&](std::int64_t middle) {
     const auto begin = series.time_ns.begin();
@@ -238,28 +249,13 @@ void track(const AngleSeries& series, ShotRange shots, const Start& start, const
     }
     const double seconds = 1e-9 * static_cast<double>(time - points[near].time_ns);
     const auto state = knots.state_of(knot);
-    for (std::size_t k = 0; k < N; ++k) {
+    for (std::size_t k = 0; k < static_cast<std::size_t>(knots.prisms); ++k) {
       const auto at = static_cast<Eigen::Index>(3 * k);
       state[3 * k] = points[near].mean[at] + seconds * points[near].mean[at + 1];
       state[3 * k + 1] = points[near].mean[at + 1];
       state[3 * k + 2] = 0;
     }
   }
-}
-
-}  // namespace
-
-void track_rotors(const AngleSeries& series, ShotRange shots, const Start& start,
-                  const AngleNoise& noise, RotorTrajectory& knots, std::size_t first,
-                  std::size_t last) {
-  require_rows("shots", shots.begin, shots.end, series.size());
-  require_rows("knots", first, last, knots.size());
-  require_length("state", knots.state.size(),
-                 knots.size() * static_cast<std::size_t>(knots.states()));
-  require_start(start, knots.prisms);
-  check_noise(noise);
-  with_prism_count(knots.prisms,
-                   [&]<int N>() { track<N>(series, shots, start, noise, knots, first, last); });
 }
 
 }  // namespace risley::estimation

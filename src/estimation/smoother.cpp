@@ -17,6 +17,8 @@ namespace risley::estimation {
 namespace {
 
 constexpr int kMostFree = kMaxParameters;
+/// Knots whose rows are multiplied at once.
+constexpr Eigen::Index kStackedKnots = 16;
 
 /// Of N rotors, which may be Eigen::Dynamic.
 template <int N>
@@ -89,22 +91,23 @@ class Smoother {
   }
 
   /// Gradient of the shots of a knot at affine states: (g, 0) - H x - (0, C).
-  Affine gradient_at(std::size_t knot, const Square& curvature, const Affine& x) const {
-    Affine gradient_there(d(), free_ + 1);
-    gradient_there.noalias() = curvature * x;
-    gradient_there = -gradient_there;
-    gradient_there.col(0) += gradient(knot);
-    gradient_there.rightCols(free_) -= coupling(knot);
-    return gradient_there;
+  void take_gradient(std::size_t knot, const Square& curvature, const Affine& x,
+                     Affine& gradient_there) const {
+    const auto c = coupling(knot);
+    gradient_there.col(0) = gradient(knot);
+    gradient_there.rightCols(free_) = -c;
+    subtract_product(curvature, x, gradient_there);
   }
 
   void forward() {
     const std::size_t knots = at_.size();
     filtered_.resize(knots * states() * static_cast<std::size_t>(free_ + 1));
     covariances_.resize(knots * states() * states());
-    information_ = equations_.static_hessian;
-    gradient_ = equations_.static_gradient;
-    Affine x = Affine::Zero(d(), free_ + 1), e, moved(d(), free_ + 1);
+    shared_ = Eigen::MatrixXd::Zero(free_, free_ + 1);
+    left_.resize(kStackedKnots * 3 * d(), free_);
+    right_.resize(kStackedKnots * 3 * d(), free_ + 1);
+    stacked_ = 0;
+    Affine x = Affine::Zero(d(), free_ + 1), e(d(), free_ + 1), moved(d(), free_ + 1);
     Square p(d(), d());
     std::size_t stretch = 0;
     for (std::size_t knot = 0; knot < knots; ++knot) {
@@ -116,21 +119,45 @@ class Smoother {
       }
       const Square h = knot_curvature<N>(equations_, knot);
       if (!add_information(p, h)) throw not_definite(knot);
-      e = gradient_at(knot, h, x);
-      moved.noalias() = p * e;
-      if (free_ > 0) {
-        const auto c = coupling(knot);
-        information_.noalias() -= x.rightCols(free_).transpose() * e.rightCols(free_);
-        information_.noalias() += c.transpose() * x.rightCols(free_);
-        information_.noalias() -= e.rightCols(free_).transpose() * moved.rightCols(free_);
-        gradient_.noalias() += x.rightCols(free_).transpose() * e.col(0);
-        gradient_.noalias() -= c.transpose() * x.col(0);
-        gradient_.noalias() += e.rightCols(free_).transpose() * moved.col(0);
-      }
+      take_gradient(knot, h, x, e);
+      moved.setZero();
+      add_product(p, e, moved);
+      if (free_ > 0) share(knot, x, e, moved);
       x += moved;
       affine(knot) = x;
       covariance(knot) = p;
     }
+    add_shared();
+    information_ = equations_.static_hessian + shared_.rightCols(free_);
+    gradient_ = equations_.static_gradient - shared_.col(0);
+  }
+
+  /// What a knot tells of the parameters: (gradient, information) -= X^T (E, e) - C^T (X, x) +
+  /// E^T P (E, e), as one product of many knots' rows.
+  void share(std::size_t knot, const Affine& x, const Affine& e, const Affine& moved) {
+    const auto c = coupling(knot);
+    for (Eigen::Index j = 0; j < free_; ++j) {
+      double* left = &left_(stacked_, j);
+      for (Eigen::Index i = 0; i < d(); ++i) {
+        left[i] = -x(i, j + 1);
+        left[d() + i] = c(i, j);
+        left[2 * d() + i] = -e(i, j + 1);
+      }
+    }
+    for (Eigen::Index j = 0; j <= free_; ++j) {
+      double* right = &right_(stacked_, j);
+      for (Eigen::Index i = 0; i < d(); ++i) {
+        right[i] = e(i, j);
+        right[d() + i] = x(i, j);
+        right[2 * d() + i] = moved(i, j);
+      }
+    }
+    stacked_ += 3 * d();
+    if (stacked_ == left_.rows()) add_shared();
+  }
+  void add_shared() {
+    shared_.noalias() += left_.topRows(stacked_).transpose() * right_.topRows(stacked_);
+    stacked_ = 0;
   }
 
   void begin(std::size_t knot, Affine& x, Square& p) const {
@@ -149,20 +176,19 @@ class Smoother {
   /// from the linearisation, which need not follow the motion itself.
   Vector step_offset(std::size_t knot) const {
     Vector offset = state(knot - 1);
-    for (int k = 0; k < prisms(); ++k)
-      advance(offset.template middleRows<3>(3 * k), step_before(knot));
+    for (int k = 0; k < prisms(); ++k) advance_rows(offset, 3 * k, step_before(knot));
     return offset - state(knot);
   }
 
   void predict(std::size_t knot, Affine& x, Square& p) const {
     const double dt = step_before(knot);
     for (int k = 0; k < prisms(); ++k) {
-      advance(x.template middleRows<3>(3 * k), dt);
-      advance(p.template middleRows<3>(3 * k), dt);
+      advance_rows(x, 3 * k, dt);
+      advance_rows(p, 3 * k, dt);
     }
     x.col(0) += step_offset(knot);
     for (int k = 0; k < prisms(); ++k) {
-      advance(p.template middleCols<3>(3 * k).transpose(), dt);
+      advance_columns(p, 3 * k, dt);
       p.template block<3, 3>(3 * k, 3 * k) += step_noise(process_[static_cast<std::size_t>(k)], dt);
     }
   }
@@ -177,22 +203,25 @@ class Smoother {
   void backward(SmootherSolution& out) {
     Eigen::VectorXd one(free_ + 1);
     one << 1.0, out.parameter_step;
-    Vector lambda = Vector::Zero(d());
+    Vector lambda = Vector::Zero(d()), x(d()), back(d());
     std::size_t stretch = at_.stretch_begin.size();
     for (std::size_t knot = at_.size(); knot-- > 0;) {
-      const Vector x = affine(knot) * one;
-      const Vector back = covariance(knot) * lambda;
+      x.setZero();
+      back.setZero();
+      add_product(affine(knot), one, x);
+      add_product(covariance(knot), lambda, back);
       Eigen::Map<Vector>(out.state_step.data() + knot * states(), d()) = x - back;
       if (is_stretch_begin(knot, stretch)) {
         lambda.setZero();
         continue;
       }
-      const Square h = knot_curvature<N>(equations_, knot);
-      Vector gradient_there = gradient(knot) - h * x;
-      gradient_there -= coupling(knot) * out.parameter_step;
-      lambda = lambda - h * back - gradient_there;
+      // lambda -= H back + (g - H x - C step)
+      x -= back;
+      add_product(knot_curvature<N>(equations_, knot), x, lambda);
+      lambda -= gradient(knot);
+      add_product(coupling(knot), out.parameter_step, lambda);
       const double dt = step_before(knot);
-      for (int k = 0; k < prisms(); ++k) retreat(lambda.template middleRows<3>(3 * k), dt);
+      for (int k = 0; k < prisms(); ++k) retreat_rows(lambda, 3 * k, dt);
     }
   }
 
@@ -202,21 +231,28 @@ class Smoother {
     const std::size_t triangle = states() * (states() + 1) / 2;
     out.state_covariance.resize(at_.size() * triangle);
     out.sensitivity.resize(at_.size() * states() * static_cast<std::size_t>(free_));
-    Affine later = Affine::Zero(d(), free_ + 1), smoothed(d(), free_ + 1), x;
+    Affine later = Affine::Zero(d(), free_ + 1), smoothed(d(), free_ + 1), rest(d(), free_ + 1);
+    Affine spread_parameters(d(), free_);
     Square information = Square::Zero(d(), d());
     std::size_t stretch = at_.stretch_begin.size();
     for (std::size_t knot = at_.size(); knot-- > 0;) {
       Square p = covariance(knot);
-      x = affine(knot);
       if (!add_information(p, information)) throw not_definite(knot);
-      smoothed = x + p * (later - information * x);
+      smoothed = affine(knot);
+      rest = later;
+      subtract_product(information, smoothed, rest);
+      add_product(p, rest, smoothed);
       const auto sensitivity = smoothed.rightCols(free_);
-      Eigen::Map<Vector>(out.state_step.data() + knot * states(), d()) =
-          smoothed.col(0) + sensitivity * out.parameter_step;
+      Vector step = smoothed.col(0);
+      add_product(sensitivity, out.parameter_step, step);
+      Eigen::Map<Vector>(out.state_step.data() + knot * states(), d()) = step;
       Eigen::Map<Eigen::Matrix<double, kD, Eigen::Dynamic, Eigen::RowMajor>>(
           out.sensitivity.data() + knot * states() * static_cast<std::size_t>(free_), d(), free_) =
           sensitivity;
-      const Square total = p + sensitivity * out.parameter_covariance * sensitivity.transpose();
+      spread_parameters.setZero();
+      add_product(sensitivity, out.parameter_covariance, spread_parameters);
+      Square total = p;
+      add_product(spread_parameters, sensitivity.transpose(), total);
       double* entry = out.state_covariance.data() + knot * triangle;
       for (int i = 0; i < d(); ++i) {
         for (int j = i; j < d(); ++j) *entry++ = 0.5 * (total(i, j) + total(j, i));
@@ -233,21 +269,25 @@ class Smoother {
       later.rightCols(free_) -= coupling(knot);
       Square spread = Square::Identity(d(), d());
       for (int k = 0; k < prisms(); ++k) {
-        spread.template middleCols<3>(3 * k) +=
-            information.template middleCols<3>(3 * k) *
-            step_noise(process_[static_cast<std::size_t>(k)], dt);
+        auto columns = spread.template middleCols<3>(3 * k);
+        add_product(information.template middleCols<3>(3 * k),
+                    step_noise(process_[static_cast<std::size_t>(k)], dt), columns);
       }
       const Eigen::PartialPivLU<Square> solver(spread);
-      information = solver.solve(information).eval();
-      information = (0.5 * (information + information.transpose())).eval();
-      later = solver.solve(later).eval();
-      later.col(0) -= information * step_offset(knot);
-      for (int k = 0; k < prisms(); ++k) {
-        retreat(later.template middleRows<3>(3 * k), dt);
-        retreat(information.template middleRows<3>(3 * k), dt);
+      const Square solved = solver.solve(information);
+      for (int i = 0; i < d(); ++i) {
+        for (int j = 0; j < d(); ++j) information(i, j) = 0.5 * (solved(i, j) + solved(j, i));
       }
-      for (int k = 0; k < prisms(); ++k)
-        retreat(information.template middleCols<3>(3 * k).transpose(), dt);
+      rest = solver.solve(later);
+      later = rest;
+      Vector moved = Vector::Zero(d());
+      add_product(information, step_offset(knot), moved);
+      later.col(0) -= moved;
+      for (int k = 0; k < prisms(); ++k) {
+        retreat_rows(later, 3 * k, dt);
+        retreat_rows(information, 3 * k, dt);
+      }
+      for (int k = 0; k < prisms(); ++k) retreat_columns(information, 3 * k, dt);
     }
   }
 
@@ -262,6 +302,9 @@ class Smoother {
   std::span<const RotorProcess> process_;
   Eigen::Index free_;
   std::vector<double> filtered_, covariances_;  ///< after each knot's shots
+  Eigen::MatrixXd shared_;                      ///< what the knots tell of the parameters
+  Eigen::MatrixXd left_, right_;                ///< rows of knots that wait to be added to it
+  Eigen::Index stacked_ = 0;
   Eigen::MatrixXd information_;
   Eigen::VectorXd gradient_;
 };

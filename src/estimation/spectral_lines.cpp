@@ -8,8 +8,6 @@
 #include <limits>
 #include <utility>
 
-#include <Eigen/Cholesky>
-#include <Eigen/Core>
 #include <fmt/format.h>
 #include <unsupported/Eigen/FFT>
 
@@ -55,36 +53,50 @@ template <int Lines>
 class LineFit {
  public:
   explicit LineFit(double count) {
-    normal_.setZero();
-    normal_.diagonal().setConstant(count * kLineRidge);
-    right_.setZero();
+    for (std::size_t a = 0; a < Lines; ++a) normal_[a][a] = count * kLineRidge;
   }
 
   /// @param overlap  sum of exp(i (w_b - w_a) t) over all shots
-  void set_overlap(int a, int b, Complex overlap) { normal_(a, b) += overlap; }
+  /// Of b <= a.
+  void set_overlap(std::size_t a, std::size_t b, Complex overlap) { normal_[a][b] += overlap; }
   /// @param sum  of the value times exp(-i w t) over all shots
-  void set_value(int a, Complex sum) { right_[a] += sum; }
+  void set_value(std::size_t a, Complex sum) { right_[a] += sum; }
   /// @param sums  of exp(i w t) over the emitter's shots, of every line
   void eliminate(double count, Complex value, const std::array<Complex, Lines>& sums) {
     const double weight = 1.0 / (count * (1.0 + kConstantRidge));
     explained_ += weight * std::norm(value);
-    for (int a = 0; a < Lines; ++a) {
-      const Complex scaled = weight * std::conj(sums[static_cast<std::size_t>(a)]);
+    for (std::size_t a = 0; a < Lines; ++a) {
+      const Complex scaled = weight * std::conj(sums[a]);
       right_[a] -= scaled * value;
-      for (int b = 0; b < Lines; ++b) normal_(a, b) -= scaled * sums[static_cast<std::size_t>(b)];
+      for (std::size_t b = 0; b <= a; ++b) normal_[a][b] -= scaled * sums[b];
     }
   }
+  /// By Cholesky's factors.
   void solve() {
-    amplitude_ = normal_.llt().solve(right_);
-    explained_ += amplitude_.dot(right_).real();
+    auto& l = normal_;
+    amplitude_ = right_;
+    for (std::size_t a = 0; a < Lines; ++a) {
+      for (std::size_t b = 0; b <= a; ++b) {
+        for (std::size_t c = 0; c < b; ++c) l[a][b] -= l[a][c] * std::conj(l[b][c]);
+        l[a][b] = b < a ? l[a][b] / l[b][b].real() : std::sqrt(l[a][a].real());
+      }
+      for (std::size_t b = 0; b < a; ++b) amplitude_[a] -= l[a][b] * amplitude_[b];
+      amplitude_[a] /= l[a][a].real();
+      explained_ += std::norm(amplitude_[a]);
+    }
+    for (std::size_t a = Lines; a-- > 0;) {
+      for (std::size_t b = a + 1; b < Lines; ++b)
+        amplitude_[a] -= std::conj(l[b][a]) * amplitude_[b];
+      amplitude_[a] /= l[a][a].real();
+    }
   }
 
-  Complex amplitude(int line) const { return amplitude_[line]; }
+  Complex amplitude(std::size_t line) const { return amplitude_[line]; }
   double explained() const { return explained_; }
 
  private:
-  Eigen::Matrix<Complex, Lines, Lines> normal_;
-  Eigen::Matrix<Complex, Lines, 1> right_, amplitude_;
+  std::array<std::array<Complex, Lines>, Lines> normal_{};  ///< lower triangle
+  std::array<Complex, Lines> right_{}, amplitude_{};
   double explained_ = 0;
 };
 
@@ -154,14 +166,14 @@ LineSearch::LineSearch(const AngleSeries& series) {
 template <int Lines>
 double LineSearch::unexplained(std::span<const std::ptrdiff_t> bins) const {
   LineFit<Lines> fit(count_);
-  for (int a = 0; a < Lines; ++a) {
-    const auto bin = bins[static_cast<std::size_t>(a)];
+  for (std::size_t a = 0; a < Lines; ++a) {
+    const auto bin = bins[a];
     fit.set_value(a, sum_at(value_spectrum_, bin));
     fit.set_overlap(a, a, count_);
-    for (int b = 0; b < a; ++b) {  // the lower triangle is all that the solution reads
+    for (std::size_t b = 0; b < a; ++b) {
       Complex overlap = 0;
       for (const Emitter& emitter : emitters_) {
-        overlap += sum_at(emitter.spectrum, bins[static_cast<std::size_t>(b)] - bin);
+        overlap += sum_at(emitter.spectrum, bins[b] - bin);
       }
       fit.set_overlap(a, b, std::conj(overlap));
     }
@@ -201,27 +213,25 @@ RotorLines LineSearch::fit(std::span<const double> speeds) const {
     }
     power += std::norm(value_[i]);
   }
-  for (int a = 0; a < Lines; ++a) {
-    const auto at = static_cast<std::size_t>(a);
-    fit.set_value(a, value_sums[at]);
+  for (std::size_t a = 0; a < Lines; ++a) {
+    fit.set_value(a, value_sums[a]);
     fit.set_overlap(a, a, count);
-    for (int b = 0; b < a; ++b) fit.set_overlap(a, b, overlaps[at][static_cast<std::size_t>(b)]);
+    for (std::size_t b = 0; b < a; ++b) fit.set_overlap(a, b, overlaps[a][b]);
   }
   for (const Sums& emitter : emitters) {
     if (emitter.count > 0) fit.eliminate(emitter.count, emitter.value, emitter.lines);
   }
   fit.solve();
   RotorLines result;
-  for (int a = 0; a < Lines; ++a) {
+  for (std::size_t a = 0; a < Lines; ++a) {
     const Complex amplitude = fit.amplitude(a);
-    result.lines.push_back(
-        {speeds[static_cast<std::size_t>(a)], std::abs(amplitude), std::arg(amplitude)});
+    result.lines.push_back({speeds[a], std::abs(amplitude), std::arg(amplitude)});
   }
   // What the lines leave of the mean is the constants', by their shots.
   for (const Sums& emitter : emitters) {
     result.constant += emitter.value / count;
-    for (int a = 0; a < Lines; ++a) {
-      result.constant -= emitter.lines[static_cast<std::size_t>(a)] * fit.amplitude(a) / count;
+    for (std::size_t a = 0; a < Lines; ++a) {
+      result.constant -= emitter.lines[a] * fit.amplitude(a) / count;
     }
   }
   result.unexplained = (power - fit.explained()) / count;

@@ -5,6 +5,8 @@
 #include <string>
 #include <vector>
 
+#include <Eigen/Core>
+
 #include "risley/sensors/sensor.hpp"
 
 namespace risley::estimation {
@@ -32,5 +34,11 @@ std::vector<std::string> default_free_names(const TrainShape& shape, bool one_gl
 ///         as shared and own, such as refractive_index with refractive_index_a)
 std::vector<FreeParameter> free_parameters(const std::vector<std::string>& names,
                                            const TrainShape& shape);
+
+/// Values of free parameters in a train [free], SI units.
+Eigen::VectorXd free_values(const PrismTrain& train, const std::vector<FreeParameter>& free);
+/// A train with the free parameters replaced. @param values  [free], SI units
+PrismTrain with_free_values(PrismTrain train, const std::vector<FreeParameter>& free,
+                            const Eigen::VectorXd& values);
 
 }  // namespace risley::estimation
