@@ -310,8 +310,8 @@ void accumulate(benchmark::State& state, InstructionSet set) {
   const estimation::ShotWeights weights{kAngleNoise, 0.0, 20.0};
   estimation::NormalEquations equations;
   for (auto _ : state) {
-    estimation::accumulate(answer.series, answer.map->trajectory, answer.map->train, answer.free,
-                           weights, equations, {azimuth, zenith, outlier}, set);
+    estimation::accumulate(answer.series, answer.trajectory, answer.train, answer.free, weights,
+                           equations, {azimuth, zenith, outlier}, set);
     benchmark::ClobberMemory();
   }
   state.counters["per_shot"] =

@@ -125,10 +125,10 @@ Json value_json(double value, double sigma) {
 
 /// How the recording's frame is turned; zeros without sigma where it is the sensor's.
 Json frame_json(const Estimate& e) {
-  const estimation::FrameEstimate frame = e.frame.value_or(estimation::FrameEstimate{});
+  const estimation::FrameEstimate frame = e.frame_turn.value_or(estimation::FrameEstimate{});
   return {{"yaw_deg", value_json(frame.turn.yaw, std::sqrt(frame.covariance(0, 0)))},
           {"pitch_deg", value_json(frame.turn.pitch, std::sqrt(frame.covariance(1, 1)))},
-          {"estimated", e.frame.has_value()}};
+          {"estimated", e.frame_turn.has_value()}};
 }
 
 /// Parameters of the prisms that the estimation did not touch.
@@ -175,16 +175,16 @@ Json outcome_json(const EstimatedRecording& outcome, double total_time) {
   Json object = {
       {"converged", e.converged},
       {"reason", e.reason},
-      {"method", e.method == estimation::Method::map ? "map" : "ekf"},
-      {"observations_used", e.series.size() - (e.map ? e.map->unused_shots : 0)},
+      {"method", to_string(e.method)},
+      {"observations_used", e.series.size() - e.unused_shots},
       {"outliers", e.outliers},
       {"combination", nullptr},
       {"mirrored", e.mirrored},
       {"parameters", parameters},
       {"fixed", fixed_json(e)},
       {"residuals",
-       {{"azimuth_deg", moments_json(e.azimuth_residuals)},
-        {"zenith_deg", moments_json(e.zenith_residuals)},
+       {{"azimuth_deg", moments_json(e.azimuth_moments)},
+        {"zenith_deg", moments_json(e.zenith_moments)},
         {"expected_rms_deg", degrees_from_radians(e.expected_residual)}}},
       {"noise",
        {{"azimuth_deg", value_json(e.noise.value.azimuth, e.noise.sigma.azimuth)},
@@ -200,14 +200,12 @@ Json outcome_json(const EstimatedRecording& outcome, double total_time) {
       {"warnings", warnings},
       {"seconds",
        {{"read", outcome.reading_time}, {"solve", outcome.solving_time}, {"total", total_time}}}};
-  if (e.map) {
-    object["iterations"] = e.map->iterations;
-    object["residuals"]["autocorrelation"] =
-        e.map->autocorrelation.rho.empty() ? 0.0 : e.map->autocorrelation.rho.front();
-    object["residuals"]["autocorrelation_factor"] = e.map->autocorrelation.factor;
-    object["residuals"]["unit_variance"] = e.map->unit_variance;
-    object["residuals"]["variance_factor"] = e.map->variance_factor;
-  }
+  object["iterations"] = e.iterations;
+  object["residuals"]["autocorrelation"] =
+      e.autocorrelation.rho.empty() ? 0.0 : e.autocorrelation.rho.front();
+  object["residuals"]["autocorrelation_factor"] = e.autocorrelation.factor;
+  object["residuals"]["unit_variance"] = e.unit_variance;
+  object["residuals"]["variance_factor"] = e.variance_factor;
   if (e.sensor.combination) object["combination"] = *e.sensor.combination;
   if (outcome.evaluation) object["truth"] = evaluation_json(*outcome.evaluation, shape);
   return object;
@@ -265,17 +263,14 @@ void print_outcome(const EstimatedRecording& outcome) {
                    fmt::format("{:.6f}", degrees_from_radians(m.rms)),
                    fmt::format("{:.3f}", m.skewness), fmt::format("{:.3f}", m.kurtosis)});
   };
-  add("azimuth", e.azimuth_residuals);
-  add("zenith", e.zenith_residuals);
+  add("azimuth", e.azimuth_moments);
+  add("zenith", e.zenith_moments);
   residuals.print();
   print_noise(e);
-  if (e.map) {
-    fmt::print(
-        "\nresiduals: {:.3f} times the stated variance, autocorrelation factor {:.3f}; variances "
-        "of "
-        "single shots multiplied by {:.3f}\n",
-        e.map->unit_variance, e.map->autocorrelation.factor, e.map->variance_factor);
-  }
+  fmt::print(
+      "\nresiduals: {:.3f} times the stated variance, autocorrelation factor {:.3f}; variances of "
+      "single shots multiplied by {:.3f}\n",
+      e.unit_variance, e.autocorrelation.factor, e.variance_factor);
   if (outcome.evaluation) {
     fmt::print("\nrotation angle rmse:");
     for (std::size_t i = 0; i < outcome.evaluation->rotation_angle_rmse.size(); ++i) {

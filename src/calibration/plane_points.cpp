@@ -46,17 +46,17 @@ RangedRecording ranged_recording(const estimation::Estimate& estimate, std::stri
     throw EstimationError(
         fmt::format("{}: the rotation angles were not found: {}", name, estimate.reason));
   }
-  if (!estimate.map || estimate.series.range.size() != estimate.series.size()) {
-    throw EstimationError(
-        fmt::format("{}: calibration needs ranges and an estimate of all shots", name));
+  if (!estimate.common_angles || estimate.series.range.size() != estimate.series.size()) {
+    throw EstimationError(fmt::format(
+        "{}: calibration needs ranges, and an estimate of all shots at once (method map)", name));
   }
   const int prisms = estimate.sensor.prisms();
   RangedRecording recording;
   recording.believed = estimate.sensor;
   recording.free = estimate.free;
   recording.covariance = estimate.covariance;
-  recording.angle_sensitivity = estimate.map->angle_sensitivity;
-  recording.mean_angle_covariance = estimate.map->angle_information.inverse();
+  recording.angle_sensitivity = estimate.common_angles->sensitivity;
+  recording.mean_angle_covariance = estimate.common_angles->information.inverse();
   recording.serial = std::move(serial);
   RangedShots& shots = recording.shots;
   shots.resize(prisms, estimate.series.size());
@@ -64,8 +64,7 @@ RangedRecording ranged_recording(const estimation::Estimate& estimate, std::stri
   std::size_t row = 0;
   for (std::size_t begin = 0; begin < estimate.series.size(); begin += kStatesBlock) {
     const std::size_t end = std::min(begin + kStatesBlock, estimate.series.size());
-    const estimation::RotorStates states =
-        states_of_shots(*estimate.map, estimate.series, {begin, end});
+    const estimation::RotorStates states = states_of_shots(estimate, {begin, end});
     for (std::size_t i = 0; i < states.size(); ++i) {
       const double range = estimate.series.range[begin + i];
       if (!(range > 0.0)) {

@@ -88,7 +88,7 @@ void check_same_sensor(const estimation::Estimate& estimate, const sensors::Sens
 
 /// Ranges and the beam's origin need the sensor's frame, and a roll cannot be found.
 [[noreturn]] void refuse_frame(const estimation::Estimate& estimate) {
-  const estimation::FrameTurn& turn = estimate.frame->turn;
+  const estimation::FrameTurn& turn = estimate.frame_turn->turn;
   throw TurnedFrame(fmt::format(
       "the recording's frame is not the sensor's: shots lie outside the field of view, and its "
       "axis "
@@ -114,7 +114,7 @@ SensorBelief sensor_belief(const estimation::AngleSeries& beginning,
       throw EstimationError(fmt::format("the rotation angles were not found: {}", error.what()));
     }
   }();
-  if (estimate.frame) refuse_frame(estimate);
+  if (estimate.frame_turn) refuse_frame(estimate);
   if (!estimate.converged) {
     throw EstimationError(fmt::format(
         "the rotation angles were not found, or the calibration is of another sensor: {}",
@@ -124,11 +124,11 @@ SensorBelief sensor_belief(const estimation::AngleSeries& beginning,
   belief.sensor = estimate.sensor;
   belief.free = estimate.free;
   belief.covariance = estimate.covariance;
-  belief.angle_sensitivity = estimate.map->angle_sensitivity;
+  belief.angle_sensitivity = estimate.common_angles->sensitivity;
   belief.rotor_process = estimate.rotor_process;
   belief.start = estimate.start;
   belief.angle_noise = usable_noise(estimate.noise.value).rms();
-  belief.residual_variance_factor = std::max(1.0, estimate.map->unit_variance);
+  belief.residual_variance_factor = std::max(1.0, estimate.unit_variance);
   belief.mirrored = estimate.mirrored;
   belief.warnings = estimate.warnings;
   if (calibration.reference == CalibrationReference::directions) {
@@ -145,7 +145,7 @@ RotorTracker::RotorTracker(const SensorBelief& belief, std::optional<double> rat
 estimation::Start RotorTracker::start_of(const estimation::AngleSeries& series,
                                          const estimation::AngleSeries& head) const {
   const std::int64_t time = series.time_ns.front();
-  const auto& knots = result_.trajectory;
+  const auto& knots = solution_.trajectory;
   if (knots.size() == 0 && belief_.start.time_ns >= time &&
       belief_.start.time_ns <= series.time_ns.back()) {
     return belief_.start;
@@ -177,10 +177,10 @@ void RotorTracker::track(const recordings::Observations& rows) {
   options.rotor_process = belief_.rotor_process;
   options.knot_interval = knot_interval_;
   const estimation::Start start = start_of(series, selector.head());
-  result_ = {};
-  result_ = run_batch_map(series, start, belief_.sensor, options);
+  solution_ = {};
+  solution_ = run_batch_map(series, start, belief_.sensor, options);
   first_row_.clear();
-  for (const std::size_t shot : result_.trajectory.first_shot) {
+  for (const std::size_t shot : solution_.trajectory.first_shot) {
     first_row_.push_back(selector.rows()[shot]);
   }
 }
@@ -188,7 +188,7 @@ void RotorTracker::track(const recordings::Observations& rows) {
 void RotorTracker::angles(const recordings::Observations& piece, std::span<const std::size_t> rows,
                           std::vector<std::vector<double>>& angle,
                           std::vector<std::vector<double>>& covariance) const {
-  const estimation::RotorTrajectory& knots = result_.trajectory;
+  const estimation::RotorTrajectory& knots = solution_.trajectory;
   const auto prisms = static_cast<std::size_t>(knots.prisms);
   const double farthest = reach();
   constexpr std::size_t kTerms = 5;  // a covariance of angles is a polynomial of 4th degree in time

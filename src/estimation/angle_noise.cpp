@@ -152,4 +152,24 @@ NoiseEstimate noise_components(const AngleSeries& series, std::span<const double
   return {{a.value, z.value}, {a.sigma, z.sigma}};
 }
 
+double unit_variance(const AngleSeries& series, const AngleNoise& noise,
+                     std::span<const double> azimuth, std::span<const double> zenith,
+                     std::span<const unsigned char> outlier) {
+  require_length("azimuth residuals", azimuth.size(), series.size());
+  require_length("zenith residuals", zenith.size(), series.size());
+  require_length("outlier", outlier.size(), series.size());
+  double sum = 0, count = 0;
+  const double azimuth_noise = noise.azimuth * noise.azimuth;
+  const double zenith_noise = noise.zenith * noise.zenith;
+  for (std::size_t i = 0; i < series.size(); ++i) {
+    if (outlier[i]) continue;
+    sum += azimuth[i] * azimuth[i] /
+               (azimuth_noise + static_cast<double>(series.azimuth_rounding_variance[i])) +
+           zenith[i] * zenith[i] /
+               (zenith_noise + static_cast<double>(series.zenith_rounding_variance[i]));
+    count += 2.0;
+  }
+  return count > 0 ? sum / count : std::numeric_limits<double>::quiet_NaN();
+}
+
 }  // namespace risley::estimation

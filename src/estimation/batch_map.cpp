@@ -200,29 +200,6 @@ std::vector<StretchStart> find_stretch_starts(const AngleSeries& series,
   return result;
 }
 
-/// First knot of the stretch after one given by its number.
-std::size_t stretch_end(const RotorTrajectory& knots, std::size_t stretch) {
-  return stretch + 1 < knots.stretch_begin.size() ? knots.stretch_begin[stretch + 1] : knots.size();
-}
-
-/// Mean square of residuals over their stated variances, outliers left out.
-double unit_variance(const AngleSeries& series, const AngleNoise& noise,
-                     std::span<const double> azimuth, std::span<const double> zenith,
-                     std::span<const unsigned char> outlier) {
-  double sum = 0, count = 0;
-  const double azimuth_noise = noise.azimuth * noise.azimuth;
-  const double zenith_noise = noise.zenith * noise.zenith;
-  for (std::size_t i = 0; i < series.size(); ++i) {
-    if (outlier[i]) continue;
-    sum += azimuth[i] * azimuth[i] /
-               (azimuth_noise + static_cast<double>(series.azimuth_rounding_variance[i])) +
-           zenith[i] * zenith[i] /
-               (zenith_noise + static_cast<double>(series.zenith_rounding_variance[i]));
-    count += 2.0;
-  }
-  return count > 0 ? sum / count : std::numeric_limits<double>::quiet_NaN();
-}
-
 /// How many of the observed angles the estimate itself used up: the trace of curvature times
 /// covariance, states and constants together.
 double used_observations(const NormalEquations& equations, const SmootherSolution& solution) {
@@ -299,9 +276,8 @@ Eigen::MatrixXd mean_angle_sensitivity(const std::vector<double>& sensitivity,
 
 }  // namespace
 
-BatchMapResult run_batch_map(const AngleSeries& series, const Start& start,
-                             const sensors::Sensor& sensor, const BatchMapOptions& options,
-                             const Progress& progress) {
+Solution run_batch_map(const AngleSeries& series, const Start& start, const sensors::Sensor& sensor,
+                       const BatchMapOptions& options, const Progress& progress) {
   if (series.size() == 0) throw EstimationError("no valid shot to estimate from");
   if (options.angle_noise) check_noise(*options.angle_noise);
   require_between("knot interval", options.knot_interval, 1e-9, kMostSeconds, "s");
@@ -313,7 +289,7 @@ BatchMapResult run_batch_map(const AngleSeries& series, const Start& start,
   require_process(options.rotor_process, prisms);
   const auto rotors = static_cast<std::size_t>(prisms);
   const bool choose = options.rotor_process.empty();
-  BatchMapResult result;
+  Solution result;
   std::vector<RotorProcess> process =
       choose ? std::vector<RotorProcess>(rotors, kSettlingProcess) : options.rotor_process;
 
@@ -344,7 +320,7 @@ BatchMapResult run_batch_map(const AngleSeries& series, const Start& start,
   for (std::size_t s = 0, stretch = 0; s < starts.size(); ++s) {
     if (!starts[s].start) continue;
     track_rotors(coarse_series, starts[s].shots, *starts[s].start, first_noise, coarse.knots(),
-                 coarse.knots().stretch_begin[stretch], stretch_end(coarse.knots(), stretch));
+                 coarse.knots().stretch_begin[stretch], coarse.knots().stretch_end(stretch));
     ++stretch;
   }
   progress.report(0.05);
@@ -430,10 +406,10 @@ BatchMapResult run_batch_map(const AngleSeries& series, const Start& start,
     }
     result.information = std::move(solution.parameter_information);
     full.knots().covariance = std::move(solution.state_covariance);
-    result.angle_sensitivity =
+    result.common_angles = {
         mean_angle_sensitivity(solution.sensitivity, full.knots(), constants.all.size())
-            .leftCols(n);
-    result.angle_information = shared_angle_information(full.equations());
+            .leftCols(n),
+        shared_angle_information(full.equations())};
     break;
   }
   result.train = full.train();
@@ -448,64 +424,6 @@ BatchMapResult run_batch_map(const AngleSeries& series, const Start& start,
   result.outliers = full.equations().outliers;
   progress.report(1.0);
   return result;
-}
-
-namespace {
-
-/// Fills row of the states from a shot and the knot that serves it.
-void fill_state(const BatchMapResult& result, const AngleSeries& series, std::size_t knot,
-                std::size_t shot, std::size_t row, RotorStates& states) {
-  const RotorTrajectory& t = result.trajectory;
-  double seconds = 1e-9 * static_cast<double>(series.time_ns[shot] - t.time_ns[knot]);
-  if (shot < t.first_shot[knot] || shot >= t.last_shot[knot]) {  // of a stretch that was not used
-    seconds = std::numeric_limits<double>::quiet_NaN();
-  }
-  std::size_t entry = 0;
-  for (std::size_t k = 0; k < static_cast<std::size_t>(t.prisms); ++k) {
-    states.rotation_angle[k][row] = t.angle(knot, k, seconds);
-    states.angular_velocity[k][row] = t.speed(knot, k, seconds);
-    states.angular_velocity_sigma[k][row] = std::sqrt(t.speed_variance(knot, k, seconds));
-    for (std::size_t l = k; l < static_cast<std::size_t>(t.prisms); ++l) {
-      states.rotation_angle_covariance[entry++][row] = t.angle_covariance(knot, k, l, seconds);
-    }
-  }
-  states.time_ns[row] = series.time_ns[shot];
-  states.azimuth_residual[row] = result.azimuth_residual[shot];
-  states.zenith_residual[row] = result.zenith_residual[shot];
-  states.outlier[row] = result.outlier[shot];
-}
-
-}  // namespace
-
-RotorStates states_of_shots(const BatchMapResult& result, const AngleSeries& series,
-                            ShotRange shots) {
-  const RotorTrajectory& t = result.trajectory;
-  RotorStates states;
-  states.resize(t.prisms, shots.size());
-  auto knot = static_cast<std::size_t>(
-      std::upper_bound(t.first_shot.begin(), t.first_shot.end(), shots.begin) -
-      t.first_shot.begin());
-  knot = knot > 0 ? knot - 1 : 0;
-  for (std::size_t shot = shots.begin; shot < shots.end; ++shot) {
-    while (knot + 1 < t.size() && t.first_shot[knot + 1] <= shot) ++knot;
-    fill_state(result, series, knot, shot, shot - shots.begin, states);
-  }
-  return states;
-}
-
-RotorStates states_of_knots(const BatchMapResult& result, const AngleSeries& series) {
-  const RotorTrajectory& t = result.trajectory;
-  RotorStates states;
-  states.resize(t.prisms, t.size());
-  for (std::size_t knot = 0; knot < t.size(); ++knot) {
-    const auto begin = series.time_ns.begin();
-    const auto first = begin + static_cast<std::ptrdiff_t>(t.first_shot[knot]);
-    const auto last = begin + static_cast<std::ptrdiff_t>(t.last_shot[knot]);
-    auto shot = static_cast<std::size_t>(std::lower_bound(first, last, t.time_ns[knot]) - begin);
-    shot = std::min(shot, t.last_shot[knot] - 1);
-    fill_state(result, series, knot, shot, knot, states);
-  }
-  return states;
 }
 
 }  // namespace risley::estimation

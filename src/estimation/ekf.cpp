@@ -41,8 +41,12 @@ struct State {
 /// Where the model is linearised when not at the filter's own state: the smoothed answer of the
 /// pass before. With it a forward-backward pass is one Gauss-Newton step of the whole trajectory.
 struct Reference {
-  Eigen::VectorXd parameters;
-  const RotorStates* states = nullptr;
+  const Solution& before;
+
+  const Eigen::VectorXd& parameters() const { return before.parameters; }
+  double angle(std::size_t shot, std::size_t rotor) const {
+    return before.trajectory.angle(shot, rotor, 0.0);
+  }
 };
 
 class Filter {
@@ -61,7 +65,7 @@ class Filter {
         jacobian_(2, size_),
         cross_(size_, 2),
         gain_(size_, 2) {
-    if (reference_) model_.set(reference_->parameters);
+    if (reference_) model_.set(reference_->parameters());
   }
 
   Eigen::Index prisms() const { return prisms_; }
@@ -140,7 +144,7 @@ class Filter {
     take_angles(mean);
     model_.linearise(angles_, series_.beam[row]);
     Eigen::Vector2d residual = model_.residual(series_.azimuth[row], series_.zenith[row]);
-    if (reference_) model_.set(reference_->parameters);
+    if (reference_) model_.set(reference_->parameters());
     return residual;
   }
 
@@ -155,7 +159,7 @@ class Filter {
   void linearise(const State& state, std::size_t row) {
     if (reference_) {
       for (std::size_t k = 0; k < angles_.size(); ++k) {
-        angles_[k] = reference_->states->rotation_angle[k][row];
+        angles_[k] = reference_->angle(row, k);
       }
     } else {
       model_.set(state.mean.head(statics_));
@@ -170,7 +174,7 @@ class Filter {
       jacobian_.col(statics_ + 2 * k) = model_.d_angles().col(k);
     }
     if (reference_) {
-      innovation_ -= model_.d_parameters() * (state.mean.head(statics_) - reference_->parameters);
+      innovation_ -= model_.d_parameters() * (state.mean.head(statics_) - reference_->parameters());
       for (Eigen::Index k = 0; k < prisms_; ++k) {
         innovation_ -= model_.d_angles().col(k) *
                        (state.mean[statics_ + 2 * k] - angles_[static_cast<std::size_t>(k)]);
@@ -210,11 +214,11 @@ State first_state(const Filter& filter, const AngleSeries& series, const Start& 
 /// State at the first shot, from a reference.
 State first_state(const Filter& filter, const Reference& reference) {
   State state{Eigen::VectorXd(filter.size()), filter.wide_covariance()};
-  state.mean.head(filter.statics()) = reference.parameters;
+  state.mean.head(filter.statics()) = reference.parameters();
   for (Eigen::Index k = 0; k < filter.prisms(); ++k) {
     const auto rotor = static_cast<std::size_t>(k);
-    state.mean[filter.statics() + 2 * k] = reference.states->rotation_angle[rotor][0];
-    state.mean[filter.statics() + 2 * k + 1] = reference.states->angular_velocity[rotor][0];
+    state.mean[filter.statics() + 2 * k] = reference.angle(0, rotor);
+    state.mean[filter.statics() + 2 * k + 1] = reference.before.trajectory.speed(0, rotor, 0.0);
   }
   return state;
 }
@@ -235,14 +239,14 @@ std::vector<unsigned char> screen(const AngleSeries& series, const Start& start,
   std::vector<unsigned char> outlier(series.size(), 0);
   const PrismTrain& start_train = start.train;
   ResidualModel model(start_train, options.free);
-  model.set(reference ? reference->parameters : free_values(start_train, options.free));
+  model.set(reference ? reference->parameters() : free_values(start_train, options.free));
   std::vector<double> angle(static_cast<std::size_t>(start_train.prisms()));
   const double start_limit = std::max(radians_from_degrees(0.1), 8.0 * start.residual_rms);
   for (std::size_t i = 0; i < std::min(options.gate_after, series.size()); ++i) {
     const double t = 1e-9 * static_cast<double>(series.time_ns[i] - start.time_ns);
     if (!reference && std::abs(t) > start.reach) continue;
     for (std::size_t k = 0; k < angle.size(); ++k) {
-      angle[k] = reference ? reference->states->rotation_angle[k][i]
+      angle[k] = reference ? reference->angle(i, k)
                            : start.rotation_angle[k] + t * start.angular_velocity[k];
     }
     model.linearise(angle, series.beam[i]);
@@ -265,7 +269,7 @@ double likelihood(const AngleSeries& series, const PrismTrain& train, const EkfO
   const std::size_t shots = std::min(series.size(), kLikelihoodShots);
   for (std::size_t i = 0; i < shots; ++i) {
     if (i > 0) filter.predict(state, series.time(i) - series.time(i - 1));
-    if (reference.states->outlier[i]) continue;
+    if (reference.before.outlier[i]) continue;
     const double gain =
         filter.update(state, i, std::numeric_limits<double>::infinity()).log_likelihood;
     if (i >= options.gate_after) sum += gain;  // before, the wide prior speaks
@@ -303,41 +307,66 @@ std::vector<RotorProcess> likeliest_process(const AngleSeries& series, const Pri
   return processes(decades);
 }
 
+/// Writes the rotors of a combined state into the motion's knot of a shot; their acceleration is 0.
+void take_motion(const Eigen::VectorXd& mean, const Eigen::MatrixXd& covariance,
+                 Eigen::Index statics, RotorTrajectory& motion, std::size_t shot) {
+  const int states = motion.states();
+  const auto place = [statics](int state) {
+    return statics + 2 * (state / kStatesPerRotor) + state % kStatesPerRotor;
+  };
+  const auto is_acceleration = [](int state) { return state % kStatesPerRotor == 2; };
+  const auto triangle = static_cast<std::size_t>(states * (states + 1) / 2);
+  double* entry = motion.covariance.data() + shot * triangle;
+  for (int a = 0; a < states; ++a) {
+    if (!is_acceleration(a)) {
+      motion.state_of(shot)[static_cast<std::size_t>(a)] = mean[place(a)];
+    }
+    for (int b = a; b < states; ++b, ++entry) {
+      if (!is_acceleration(a) && !is_acceleration(b)) *entry = covariance(place(a), place(b));
+    }
+  }
+}
+
 /// One forward and one backward filter and their combination.
-EkfResult run_pass(const AngleSeries& series, const State& first, const PrismTrain& train,
-                   const EkfOptions& options, const std::vector<RotorProcess>& process,
-                   const Reference* reference, std::vector<unsigned char> screened,
-                   const Progress& progress) {
+Solution run_pass(const AngleSeries& series, const State& first, const PrismTrain& train,
+                  const EkfOptions& options, const std::vector<RotorProcess>& process,
+                  const Reference* reference, std::vector<unsigned char> screened,
+                  const Progress& progress) {
   Filter filter(series, train, options, process, reference);
   const std::size_t shots = series.size();
   const Eigen::Index statics = filter.statics();
   const Eigen::Index prisms = filter.prisms();
-  const auto rotors = static_cast<std::size_t>(prisms);
-  EkfResult result{options.free, {}, {}, train, {}, process, 0, 0};
-  RotorStates& out = result.states;
-  out.time_ns = series.time_ns;
-  out.outlier = std::move(screened);
-  result.outliers = static_cast<std::size_t>(std::count(out.outlier.begin(), out.outlier.end(), 1));
-  out.rotation_angle.assign(rotors, std::vector<double>(shots));
-  out.angular_velocity = out.angular_velocity_sigma = out.rotation_angle;
-  out.rotation_angle_covariance.assign(rotors * (rotors + 1) / 2, std::vector<double>(shots));
-  out.azimuth_residual.resize(shots);
-  out.zenith_residual.resize(shots);
+  Solution result;
+  result.rotor_process = process;
+  result.outlier = std::move(screened);
+  result.outliers =
+      static_cast<std::size_t>(std::count(result.outlier.begin(), result.outlier.end(), 1));
+  result.azimuth_residual.resize(shots);
+  result.zenith_residual.resize(shots);
+  RotorTrajectory& motion = result.trajectory;  // every shot is a knot
+  motion.prisms = static_cast<int>(prisms);
+  motion.time_ns = series.time_ns;
+  motion.stretch_begin = {0};
+  for (std::size_t i = 0; i < shots; ++i) {
+    motion.first_shot.push_back(i);
+    motion.last_shot.push_back(i + 1);
+  }
+  const auto states = static_cast<std::size_t>(motion.states());
+  motion.state.resize(shots * states);
+  motion.covariance.resize(shots * states * (states + 1) / 2);
 
   const auto gap_before = [&](std::size_t i) { return series.time(i) - series.time(i - 1); };
   const auto forward_step = [&](State& state, std::size_t i, bool decide) {
     if (i > 0) filter.predict(state, gap_before(i));
-    if (out.outlier[i]) return;
+    if (result.outlier[i]) return;
     if (!decide) {
       filter.update(state, i, std::numeric_limits<double>::infinity());
       return;
     }
     const auto update =
         filter.update(state, i, i < options.gate_after ? kOpenGate : options.gate_chi_square);
-    if (update.accepted) {
-      result.log_likelihood += update.log_likelihood;
-    } else {
-      out.outlier[i] = 1;
+    if (!update.accepted) {
+      result.outlier[i] = 1;
       ++result.outliers;
     }
   };
@@ -379,21 +408,11 @@ EkfResult run_pass(const AngleSeries& series, const State& first, const PrismTra
       const Eigen::MatrixXd covariance = f.covariance - share * f.covariance;
       mean_parameters += mean.head(statics);
       mean_covariance += covariance.topLeftCorner(statics, statics);
-      std::size_t entry = 0;
-      for (Eigen::Index k = 0; k < prisms; ++k) {
-        const Eigen::Index angle = statics + 2 * k;
-        const auto rotor = static_cast<std::size_t>(k);
-        out.rotation_angle[rotor][i] = mean[angle];
-        out.angular_velocity[rotor][i] = mean[angle + 1];
-        out.angular_velocity_sigma[rotor][i] = std::sqrt(covariance(angle + 1, angle + 1));
-        for (Eigen::Index l = k; l < prisms; ++l) {
-          out.rotation_angle_covariance[entry++][i] = covariance(angle, statics + 2 * l);
-        }
-      }
+      take_motion(mean, covariance, statics, motion, i);
       const Eigen::Vector2d residual = filter.residual_at(mean, i);
-      out.azimuth_residual[i] = residual[0];
-      out.zenith_residual[i] = residual[1];
-      if (!out.outlier[i]) {
+      result.azimuth_residual[i] = residual[0];
+      result.zenith_residual[i] = residual[1];
+      if (!result.outlier[i]) {
         filter.update(backward, i, std::numeric_limits<double>::infinity());
       }
     }
@@ -408,8 +427,8 @@ EkfResult run_pass(const AngleSeries& series, const State& first, const PrismTra
 
 }  // namespace
 
-EkfResult run_ekf(const AngleSeries& series, const Start& start, const EkfOptions& options,
-                  const Progress& progress) {
+Solution run_ekf(const AngleSeries& series, const Start& start, const EkfOptions& options,
+                 const Progress& progress) {
   if (series.size() == 0) throw EstimationError("no valid shot to estimate from");
   check_noise(equal_noise(options.angle_noise));
   require_at_least("passes", options.passes, 1);
@@ -429,21 +448,26 @@ EkfResult run_ekf(const AngleSeries& series, const Start& start, const EkfOption
   }
   State first = first_state(Filter(series, start.train, options, process, nullptr), series, start,
                             options.free);
-  EkfResult result =
+  Solution result =
       run_pass(series, first, start.train, options, process, nullptr,
                screen(series, start, options, nullptr), progress.part(0.0, 1.0 / options.passes));
   for (int pass = 1; pass < options.passes; ++pass) {
-    const Reference reference{result.parameters, &result.states};
+    const Reference reference{result};
     if (choose && pass == 1) {
       process = likeliest_process(series, start.train, options, reference);
     }
     first = first_state(Filter(series, start.train, options, process, &reference), reference);
-    EkfResult next =
+    Solution next =
         run_pass(series, first, start.train, options, process, &reference,
                  screen(series, start, options, &reference),
                  progress.part(double(pass) / options.passes, (pass + 1.0) / options.passes));
     result = std::move(next);
   }
+  result.noise.value = equal_noise(options.angle_noise);
+  result.unit_variance = unit_variance(series, result.noise.value, result.azimuth_residual,
+                                       result.zenith_residual, result.outlier);
+  result.iterations = static_cast<std::size_t>(options.passes);
+  result.settled = true;
   return result;
 }
 

@@ -11,6 +11,8 @@
 
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
+#include "risley/estimation/batch_map.hpp"
+#include "risley/estimation/ekf.hpp"
 #include "risley/estimation/free_parameters.hpp"
 
 #include "estimation/frame_prior.hpp"
@@ -20,9 +22,7 @@ namespace risley::estimation {
 namespace {
 
 /// Parameters, mean speeds and first rotation angles as named values.
-/// @param stretches  rows of the states that are tied together
-std::vector<EstimatedValue> named_values(const Estimate& estimate,
-                                         const std::vector<ShotRange>& stretches) {
+std::vector<EstimatedValue> named_values(const Estimate& estimate) {
   std::vector<EstimatedValue> values;
   for (std::size_t i = 0; i < estimate.free.size(); ++i) {
     const auto at = static_cast<Eigen::Index>(i);
@@ -30,6 +30,7 @@ std::vector<EstimatedValue> named_values(const Estimate& estimate,
         {estimate.free[i].name, estimate.parameters[at], std::sqrt(estimate.covariance(at, at))});
   }
   const RotorStates& states = estimate.states;
+  const RotorTrajectory& motion = estimate.trajectory;
   const int prisms = states.prisms();
   std::size_t diagonal = 0;
   std::vector<EstimatedValue> angles;
@@ -41,8 +42,9 @@ std::vector<EstimatedValue> named_values(const Estimate& estimate,
     // The mean speed is the angle turned over the time it took; the ends are far apart and so
     // independent.
     double turned = 0, time = 0, turned_variance = 0;
-    for (const ShotRange& rows : stretches) {
-      const std::size_t first = rows.begin, last = rows.end - 1;
+    for (std::size_t stretch = 0; stretch < motion.stretch_begin.size(); ++stretch) {
+      const std::size_t first = motion.stretch_begin[stretch];
+      const std::size_t last = motion.stretch_end(stretch) - 1;
       turned += angle[last] - angle[first];
       turned_variance += variance[first] + variance[last];
       time += 1e-9 * static_cast<double>(states.time_ns[last] - states.time_ns[first]);
@@ -128,10 +130,12 @@ constexpr double kUnmeasured = 0.3;
 constexpr double kUneven = 1.6;
 /// Residual variances above the stated one by more than this are worth a word.
 constexpr double kEnlarged = 1.1;
+/// As are residuals above their stated sigma by this factor, where no variance was enlarged.
+constexpr double kNoticed = 1.3;
 
 /// Says how the recording's frame is turned.
 std::string frame_words(const Estimate& estimate) {
-  const FrameEstimate& frame = *estimate.frame;
+  const FrameEstimate& frame = *estimate.frame_turn;
   const bool has_sigma = frame.covariance(0, 0) > 0;
   const auto angle = [&](double value, double variance) {
     return has_sigma ? fmt::format("{:.3f} ± {:.3f} deg", degrees_from_radians(value),
@@ -149,19 +153,16 @@ std::string frame_words(const Estimate& estimate) {
 
 /// Says whether the result can be believed.
 void judge(Estimate& estimate, const PrismTrain& nominal) {
-  const double rms =
-      std::sqrt(0.5 * (estimate.azimuth_residuals.rms * estimate.azimuth_residuals.rms +
-                       estimate.zenith_residuals.rms * estimate.zenith_residuals.rms));
-  const bool map = estimate.method == Method::map;
+  const double rms = std::sqrt(0.5 * (estimate.azimuth_moments.rms * estimate.azimuth_moments.rms +
+                                      estimate.zenith_moments.rms * estimate.zenith_moments.rms));
   // Rounding may differ from shot to shot; the unit variance weighs each by its own.
-  const double ratio =
-      map ? std::sqrt(estimate.map->unit_variance) : rms / estimate.expected_residual;
+  const double ratio = std::sqrt(estimate.unit_variance);
   const auto shots = static_cast<double>(estimate.series.size());
   const double outlier_share = static_cast<double>(estimate.outliers) / shots;
   // What chance does not make: neighbouring residuals share it.
-  const double misfit = map && !estimate.map->autocorrelation.rho.empty()
-                            ? rms * std::sqrt(estimate.map->autocorrelation.rho.front())
-                            : 0.0;
+  const double misfit = estimate.autocorrelation.rho.empty()
+                            ? 0.0
+                            : rms * std::sqrt(estimate.autocorrelation.rho.front());
   const std::string residuals =
       fmt::format("residuals of {:.3g} deg where noise and rounding amount to {:.3g} deg",
                   degrees_from_radians(rms), degrees_from_radians(estimate.expected_residual));
@@ -195,11 +196,11 @@ void judge(Estimate& estimate, const PrismTrain& nominal) {
                     direction_text(worst), worst.sigma));
   } else if (std::string words = implausible_parameter(estimate, nominal); !words.empty()) {
     fail(std::move(words));
-  } else if (map && !estimate.map->settled) {
+  } else if (!estimate.settled) {
     fail("the last steps still moved parameters by more than a tenth of their sigma");
-  } else if (map && estimate.map->unit_variance > kEnlarged) {
+  } else if (estimate.unit_variance > kEnlarged && estimate.variance_factor > 1.0) {
     estimate.warnings.push_back(residuals + ": the sigmas were enlarged by that factor");
-  } else if (!map && ratio > 1.3) {
+  } else if (ratio > kNoticed) {
     estimate.warnings.push_back(residuals + ": the sigmas are too small by about that factor");
   } else if (ratio < 0.93) {
     estimate.warnings.push_back(residuals +
@@ -222,7 +223,7 @@ void judge(Estimate& estimate, const PrismTrain& nominal) {
     unevenness = estimate.residuals_over_angle[k].chi2_per_bin;
     uneven = k;
   }
-  if (unevenness > kUneven * (map ? estimate.map->autocorrelation.factor : 1.0)) {
+  if (unevenness > kUneven * estimate.autocorrelation.factor) {
     estimate.warnings.push_back(fmt::format(
         "residuals depend on the rotation angle of prism {} ({:.3g} times what chance would make "
         "of "
@@ -230,17 +231,17 @@ void judge(Estimate& estimate, const PrismTrain& nominal) {
         "value; the sigmas do not cover that",
         prism_letter(static_cast<int>(uneven)), unevenness));
   }
-  if (map && estimate.map->autocorrelation.factor > 1.05) {
+  if (estimate.autocorrelation.factor > 1.05) {
     estimate.warnings.push_back(fmt::format(
         "residuals of neighbouring shots are correlated ({:.2f} from one to the next): every "
         "variance was multiplied by {:.3g}",
-        estimate.map->autocorrelation.rho.front(), estimate.map->autocorrelation.factor));
+        estimate.autocorrelation.rho.front(), estimate.autocorrelation.factor));
   }
-  if (map && estimate.map->unused_shots > 0) {
+  if (estimate.unused_shots > 0) {
     estimate.warnings.push_back(fmt::format(
         "{} shots lie in pieces between clock resets or long gaps that are too short to find the "
         "rotors' phases, or run in the other speed combination; they were not used",
-        estimate.map->unused_shots));
+        estimate.unused_shots));
   }
   if (estimate.converged && outlier_share > 0.02) {
     estimate.warnings.push_back(
@@ -260,17 +261,16 @@ std::vector<AngleProfile> profiles(const Estimate& estimate) {
   return result;
 }
 
-/// Turns the shots on by what the batch estimator found of their frame, and states the whole turn.
+/// Turns the shots on by what the solution found of their frame, and states the whole turn.
 void take_frame(Estimate& estimate) {
-  const BatchMapResult& result = *estimate.map;
-  turn(estimate.series, result.frame.transpose());
-  const Eigen::Matrix3d total = recording_from_sensor(estimate.frame->turn) * result.frame;
-  estimate.frame->turn = turn_of(total);
+  turn(estimate.series, estimate.frame.transpose());
+  FrameEstimate& whole = *estimate.frame_turn;
+  whole.turn = turn_of(recording_from_sensor(whole.turn) * estimate.frame);
   // Turns about the sensor's Z and Y axes; a yaw about the recording's Z moves the axis by its
   // cosine.
-  const Eigen::DiagonalMatrix<double, 2> scale(
-      1.0 / std::max(std::cos(estimate.frame->turn.pitch), 1e-9), 1.0);
-  estimate.frame->covariance = scale * result.frame_covariance * scale;
+  const Eigen::DiagonalMatrix<double, 2> scale(1.0 / std::max(std::cos(whole.turn.pitch), 1e-9),
+                                               1.0);
+  whole.covariance = scale * estimate.frame_covariance * scale;
 }
 
 BatchMapOptions map_options(const Estimate& estimate, const EstimateOptions& options) {
@@ -282,34 +282,10 @@ BatchMapOptions map_options(const Estimate& estimate, const EstimateOptions& opt
   return settings;
 }
 
-/// Runs the batch estimator and takes over what it found. @return rows of the states per stretch
-std::vector<ShotRange> take_map(Estimate& estimate, const EstimateOptions& options,
-                                const Progress& progress) {
-  estimate.map = run_batch_map(estimate.series, estimate.start, options.sensor,
-                               map_options(estimate, options), progress);
-  const BatchMapResult& result = *estimate.map;
-  estimate.parameters = result.parameters;
-  estimate.covariance = result.covariance;
-  estimate.rotor_process = result.rotor_process;
-  estimate.outliers = result.outliers;
-  estimate.states = states_of_knots(result, estimate.series);
-  estimate.azimuth_residuals = moments(result.azimuth_residual, result.outlier);
-  estimate.zenith_residuals = moments(result.zenith_residual, result.outlier);
-  estimate.unobservable = weak_directions(result.information, result.constants, kUnmeasured);
-  estimate.noise = result.noise;
-  if (estimate.frame) take_frame(estimate);
-  std::vector<ShotRange> ranges;
-  const auto& begins = result.trajectory.stretch_begin;
-  for (std::size_t i = 0; i < begins.size(); ++i) {
-    ranges.push_back({begins[i], i + 1 < begins.size() ? begins[i + 1] : result.trajectory.size()});
-  }
-  return ranges;
-}
-
 /// Logarithm of the likelihood of residuals under the noise that was found in them, over the shots
 /// that neither of two results leaves out; correlated residuals count for as many as they are
 /// worth.
-double log_likelihood(const BatchMapResult& result, const AngleSeries& series,
+double log_likelihood(const Solution& result, const AngleSeries& series,
                       const std::vector<unsigned char>& also_out) {
   const AngleNoise noise = usable_noise(result.noise.value);
   const auto term = [](double residual, double sigma, float rounding) {
@@ -340,10 +316,9 @@ CoordinateRounding rounding_of(const Estimate& estimate, const EstimateOptions& 
   add_half_steps(cut, recording_from_sensor(estimate.start.frame.value_or(FrameTurn{})));
   const BatchMapOptions settings = map_options(estimate, options);
   try {
-    const BatchMapResult rounded =
+    const Solution rounded =
         run_batch_map(nearest, estimate.start, options.sensor, settings, progress);
-    const BatchMapResult mended =
-        run_batch_map(cut, estimate.start, options.sensor, settings, progress);
+    const Solution mended = run_batch_map(cut, estimate.start, options.sensor, settings, progress);
     const double lead = log_likelihood(mended, cut, rounded.outlier) -
                         log_likelihood(rounded, nearest, mended.outlier);
     if (std::abs(lead) < kDecisive) return CoordinateRounding::unknown;
@@ -353,22 +328,16 @@ CoordinateRounding rounding_of(const Estimate& estimate, const EstimateOptions& 
   }
 }
 
-/// As take_map, for the paper's filter.
-std::vector<ShotRange> take_ekf(Estimate& estimate, const EstimateOptions& options,
-                                const Progress& progress) {
+Solution solve(const Estimate& estimate, const EstimateOptions& options, const Progress& progress) {
+  if (estimate.method == Method::map) {
+    return run_batch_map(estimate.series, estimate.start, options.sensor,
+                         map_options(estimate, options), progress);
+  }
   EkfOptions settings;
   settings.angle_noise = estimate.noise.value.rms();
   settings.free = estimate.free;
   settings.rotor_process = options.rotor_process;
-  EkfResult result = run_ekf(estimate.series, estimate.start, settings, progress);
-  estimate.parameters = std::move(result.parameters);
-  estimate.covariance = std::move(result.covariance);
-  estimate.rotor_process = std::move(result.rotor_process);
-  estimate.outliers = result.outliers;
-  estimate.states = std::move(result.states);
-  estimate.azimuth_residuals = moments(estimate.states.azimuth_residual, estimate.states.outlier);
-  estimate.zenith_residuals = moments(estimate.states.zenith_residual, estimate.states.outlier);
-  return {{0, estimate.states.size()}};
+  return run_ekf(estimate.series, estimate.start, settings, progress);
 }
 
 /// A start from the first second, or, where that holds too little, from the first place in the
@@ -404,6 +373,8 @@ Start start_anywhere(const AngleSeries& series, const AngleSeries& head,
 }
 
 }  // namespace
+
+const char* to_string(Method method) { return method == Method::map ? "map" : "ekf"; }
 
 std::vector<FreeParameter> chosen_parameters(const EstimateOptions& options) {
   const TrainShape shape = options.sensor.shape();
@@ -453,7 +424,7 @@ Estimate estimate(Method method, AngleSeries series, const AngleSeries& head,
       options, estimate, progress);
   estimate.mirrored = estimate.start.mirrored;
   prepare_shots(estimate.series, estimate.start);
-  if (estimate.start.frame) estimate.frame.emplace().turn = *estimate.start.frame;
+  if (estimate.start.frame) estimate.frame_turn.emplace().turn = *estimate.start.frame;
   if (options.cartesian && method == Method::map) {
     estimate.coordinates = rounding_of(estimate, options, progress.silent());
     if (estimate.coordinates == CoordinateRounding::toward_zero) {
@@ -468,14 +439,21 @@ Estimate estimate(Method method, AngleSeries series, const AngleSeries& head,
     estimate.warnings.push_back(
         "the recording is a mirror image (its elevation has the other sign) and was turned");
   }
-  const std::vector<ShotRange> ranges = method == Method::map
-                                            ? take_map(estimate, options, progress)
-                                            : take_ekf(estimate, options, progress);
-  if (estimate.frame) estimate.warnings.push_back(frame_words(estimate));
+  static_cast<Solution&>(estimate) = solve(estimate, options, progress);
+  if (estimate.frame_turn) {
+    take_frame(estimate);
+    estimate.warnings.push_back(frame_words(estimate));
+  }
+  estimate.states = states_of_knots(estimate, estimate.series);
+  estimate.azimuth_moments = moments(estimate.azimuth_residual, estimate.outlier);
+  estimate.zenith_moments = moments(estimate.zenith_residual, estimate.outlier);
+  if (!estimate.constants.empty()) {
+    estimate.unobservable = weak_directions(estimate.information, estimate.constants, kUnmeasured);
+  }
   estimate.expected_residual = expected_residual(estimate.series, estimate.noise.value);
   estimate.usual_noise = options.sensor.angle_noise;
   estimate.usual_residual = expected_residual(estimate.series, equal_noise(estimate.usual_noise));
-  estimate.values = named_values(estimate, ranges);
+  estimate.values = named_values(estimate);
   estimate.sensor = calibrated_sensor(
       options.sensor, with_free_values(options.sensor.train, estimate.free, estimate.parameters),
       estimate);
@@ -484,16 +462,8 @@ Estimate estimate(Method method, AngleSeries series, const AngleSeries& head,
   return estimate;
 }
 
-ShotResiduals shot_residuals(const Estimate& estimate) {
-  const auto of = [](const auto& holder) {
-    return ShotResiduals{holder.azimuth_residual, holder.zenith_residual, holder.outlier};
-  };
-  return estimate.map ? of(*estimate.map) : of(estimate.states);
-}
-
 RotorStates states_of_shots(const Estimate& estimate, ShotRange shots) {
-  return estimate.map ? states_of_shots(*estimate.map, estimate.series, shots)
-                      : rows_of(estimate.states, shots);
+  return states_of_shots(estimate, estimate.series, shots);
 }
 
 }  // namespace risley::estimation

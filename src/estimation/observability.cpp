@@ -12,6 +12,7 @@
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
 #include "risley/core/require.hpp"
+#include "risley/estimation/batch_map.hpp"
 #include "risley/estimation/normal_equations.hpp"
 #include "risley/estimation/smoother.hpp"
 #include "risley/optics/observation_model.hpp"
@@ -282,27 +283,23 @@ Observability observability_of_plan(const ObservabilityPlan& plan) {
 }
 
 Observability observability_of_estimate(const Estimate& estimate) {
-  if (!estimate.map) {
-    throw InvalidArgument("observability needs an estimate of the batch estimator (method map)");
-  }
-  const BatchMapResult& map = *estimate.map;
   const std::vector<FreeParameter> all = all_parameters(estimate.sensor.shape());
   NormalEquations equations;
   ShotWeights weights;
   weights.angle_noise = usable_noise(estimate.noise.value);
-  weights.cut = BatchMapOptions{}.outlier_chi2 * std::max(1.0, map.unit_variance);
-  accumulate(estimate.series, map.trajectory, map.train, all, weights, equations);
-  equations.scale(1.0 / map.variance_factor);
+  weights.cut = BatchMapOptions{}.outlier_chi2 * std::max(1.0, estimate.unit_variance);
+  accumulate(estimate.series, estimate.trajectory, estimate.train, all, weights, equations);
+  equations.scale(1.0 / estimate.variance_factor);
   const double shots = static_cast<double>(equations.shots - equations.outliers);
   const double variance =
-      estimate.expected_residual * estimate.expected_residual * map.variance_factor;
+      estimate.expected_residual * estimate.expected_residual * estimate.variance_factor;
   double duration = 0;
   for (const ShotRange& range : stretches(estimate.series)) {
     duration += 1e-9 * static_cast<double>(estimate.series.time_ns[range.end - 1] -
                                            estimate.series.time_ns[range.begin]);
   }
-  return analyse(equations, map.trajectory, map.rotor_process, all, estimate.free, duration, shots,
-                 shots / variance);
+  return analyse(equations, estimate.trajectory, estimate.rotor_process, all, estimate.free,
+                 duration, shots, shots / variance);
 }
 
 std::vector<std::string> observability_words(const Observability& observability,

@@ -15,6 +15,7 @@
 #include <tbb/task_arena.h>
 
 #include "risley/core/error.hpp"
+#include "risley/estimation/batch_map.hpp"
 
 namespace risley::estimation {
 namespace {
@@ -28,25 +29,15 @@ struct Piece {
   Eigen::MatrixXd covariance;
 };
 
-/// The knot that serves a shot, or none in an unused stretch.
-std::optional<std::size_t> knot_of(const RotorTrajectory& trajectory, std::size_t shot) {
-  const auto after =
-      std::upper_bound(trajectory.first_shot.begin(), trajectory.first_shot.end(), shot);
-  if (after == trajectory.first_shot.begin()) return std::nullopt;
-  const auto knot = static_cast<std::size_t>(after - trajectory.first_shot.begin()) - 1;
-  if (shot >= trajectory.last_shot[knot]) return std::nullopt;
-  return knot;
-}
-
 std::optional<Piece> estimate_piece(const Estimate& estimate, const sensors::Sensor& sensor,
                                     ShotRange shots, const Progress& progress) {
-  const RotorTrajectory& trajectory = estimate.map->trajectory;
-  const auto knot = knot_of(trajectory, shots.begin);
+  const RotorTrajectory& trajectory = estimate.trajectory;
+  const auto knot = trajectory.knot_of_shot(shots.begin);
   shots.end = std::min(shots.end, shots.begin + kMostPieceShots);
   if (!knot || shots.size() < kFewestPieceShots) return std::nullopt;
   Start start = estimate.start;
   start.time_ns = estimate.series.time_ns[shots.begin];
-  start.train = estimate.map->train;
+  start.train = estimate.train;
   const double seconds = 1e-9 * static_cast<double>(start.time_ns - trajectory.time_ns[*knot]);
   for (std::size_t k = 0; k < start.rotation_angle.size(); ++k) {
     start.rotation_angle[k] = trajectory.angle(*knot, k, seconds);
@@ -58,7 +49,7 @@ std::optional<Piece> estimate_piece(const Estimate& estimate, const sensors::Sen
   options.rotor_process = estimate.rotor_process;
   const AngleSeries series = rows_of(estimate.series, shots.begin, shots.end);
   try {
-    const BatchMapResult result = run_batch_map(series, start, sensor, options, progress);
+    const Solution result = run_batch_map(series, start, sensor, options, progress);
     if (!result.settled) return std::nullopt;
     Piece piece{0, series.duration(), result.parameters, result.covariance};
     piece.time = estimate.series.time(shots.begin) + 0.5 * piece.duration;
@@ -96,7 +87,6 @@ void fill_chi2(const std::vector<Piece>& pieces, PiecewiseEstimate& result) {
 PiecewiseEstimate estimate_piecewise(const Estimate& estimate, const sensors::Sensor& sensor,
                                      std::size_t pieces, const Progress& progress) {
   if (pieces < 1) throw InvalidArgument(fmt::format("pieces = {}, allowed 1 or more", pieces));
-  if (!estimate.map) throw InvalidArgument("pieces are made of estimates of method map only");
   std::vector<std::optional<Piece>> all(pieces);
   const std::size_t shots = estimate.series.size();
   std::mutex mutex;

@@ -69,11 +69,10 @@ class MapMaker {
 
 ResidualMap residuals_over_field(const Estimate& estimate, double cell) {
   MapMaker maker(cell);
-  const ShotResiduals residuals = shot_residuals(estimate);
   const AngleSeries& shots = estimate.series;
   for (std::size_t i = 0; i < shots.size(); ++i) {
-    if (residuals.outlier[i] != 0) continue;
-    const double azimuth = residuals.azimuth[i], zenith = residuals.zenith[i];
+    if (estimate.outlier[i] != 0) continue;
+    const double azimuth = estimate.azimuth_residual[i], zenith = estimate.zenith_residual[i];
     maker.add(shots.azimuth[i] - azimuth, shots.zenith[i] - zenith, azimuth, zenith);
   }
   return maker.result();

@@ -30,6 +30,14 @@ double RotorTrajectory::covariance_entry(std::size_t knot, std::size_t row,
   return covariance[knot * (d * (d + 1) / 2) + row * d - row * (row + 1) / 2 + column];
 }
 
+std::optional<std::size_t> RotorTrajectory::knot_of_shot(std::size_t shot) const {
+  const auto after = std::upper_bound(first_shot.begin(), first_shot.end(), shot);
+  if (after == first_shot.begin()) return std::nullopt;
+  const auto knot = static_cast<std::size_t>(after - first_shot.begin()) - 1;
+  if (shot >= last_shot[knot]) return std::nullopt;
+  return knot;
+}
+
 std::array<double, 5> RotorTrajectory::angle_covariance_terms(std::size_t knot, std::size_t a,
                                                               std::size_t b) const {
   require_entry(*this, knot, std::max(a, b));

@@ -13,25 +13,15 @@ namespace risley::estimation {
 /// angle(k) is the rotation angle of prism k there, rad, any number of turns.
 template <class Visit>
 void for_each_used_shot(const Estimate& estimate, const Visit& visit) {
-  if (estimate.map) {
-    const BatchMapResult& map = *estimate.map;
-    const RotorTrajectory& t = map.trajectory;
-    for (std::size_t knot = 0; knot < t.size(); ++knot) {
-      for (std::size_t i = t.first_shot[knot]; i < t.last_shot[knot]; ++i) {
-        if (map.outlier[i] != 0) continue;
-        const double seconds =
-            1e-9 * static_cast<double>(estimate.series.time_ns[i] - t.time_ns[knot]);
-        visit([&](std::size_t k) { return t.angle(knot, k, seconds); }, map.azimuth_residual[i],
-              map.zenith_residual[i]);
-      }
+  const RotorTrajectory& t = estimate.trajectory;
+  for (std::size_t knot = 0; knot < t.size(); ++knot) {
+    for (std::size_t i = t.first_shot[knot]; i < t.last_shot[knot]; ++i) {
+      if (estimate.outlier[i] != 0 || !std::isfinite(estimate.azimuth_residual[i])) continue;
+      const double seconds =
+          1e-9 * static_cast<double>(estimate.series.time_ns[i] - t.time_ns[knot]);
+      visit([&](std::size_t k) { return t.angle(knot, k, seconds); }, estimate.azimuth_residual[i],
+            estimate.zenith_residual[i]);
     }
-    return;
-  }
-  const RotorStates& states = estimate.states;
-  for (std::size_t i = 0; i < states.size(); ++i) {
-    if (states.outlier[i] != 0 || !std::isfinite(states.azimuth_residual[i])) continue;
-    visit([&](std::size_t k) { return states.rotation_angle[k][i]; }, states.azimuth_residual[i],
-          states.zenith_residual[i]);
   }
 }
 

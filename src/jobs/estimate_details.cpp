@@ -84,7 +84,7 @@ EstimateDetails estimate_details(const Estimate& estimate, const sensors::Sensor
                                  const Progress& progress) {
   EstimateDetails result;
   progress.report(0.0);
-  if (estimate.map && estimate.converged) {
+  if (estimate.converged) {
     result.advice = estimation::observability_words(estimation::observability_of_estimate(estimate),
                                                     estimate.sensor.shape());
     progress.report(0.2);

@@ -65,9 +65,7 @@ std::vector<ReportedParameter> parameters_of(const EstimateReportInput& input) {
 class EstimateCharts {
  public:
   explicit EstimateCharts(const EstimateReportInput& input)
-      : input_(input),
-        states_(input.estimate.states),
-        residuals_(estimation::shot_residuals(input.estimate)) {}
+      : input_(input), states_(input.estimate.states) {}
 
   /// Every parameter from pieces of the recording alone, about the estimate of all.
   std::vector<Chart> pieces(const estimation::PiecewiseEstimate& pieces,
@@ -142,12 +140,13 @@ class EstimateCharts {
 
   std::vector<Chart> residuals() const {
     const Estimate& e = input_.estimate;
-    std::vector<Chart> charts{over_time("Azimuth residuals over time", residuals_.azimuth, "a"),
-                              over_time("Zenith residuals over time", residuals_.zenith, "b"),
-                              residual_histogram("Histogram of the azimuth residuals",
-                                                 residuals_.azimuth, e.azimuth_residuals, "a"),
-                              residual_histogram("Histogram of the zenith residuals",
-                                                 residuals_.zenith, e.zenith_residuals, "b")};
+    std::vector<Chart> charts{
+        over_time("Azimuth residuals over time", input_.estimate.azimuth_residual, "a"),
+        over_time("Zenith residuals over time", input_.estimate.zenith_residual, "b"),
+        residual_histogram("Histogram of the azimuth residuals", input_.estimate.azimuth_residual,
+                           e.azimuth_moments, "a"),
+        residual_histogram("Histogram of the zenith residuals", input_.estimate.zenith_residual,
+                           e.zenith_moments, "b")};
     for (Chart& chart : maps(input_.details.residuals_over_field, "the field of view",
                              "azimuth, deg", "zenith, deg")) {
       chart.kind = ChartKind::map;
@@ -228,14 +227,14 @@ class EstimateCharts {
     Series outliers{"outliers", "bad", SeriesKind::points, {}, {}};
     const std::size_t shots = residual.size();
     for (const std::size_t i : every_nth(shots, kMostShotPoints)) {
-      if (residuals_.outlier[i] != 0) continue;
+      if (input_.estimate.outlier[i] != 0) continue;
       used.x.push_back(shot_time(i));
       used.y.push_back(degrees_from_radians(residual[i]));
     }
     // Outliers are few and matter: each is drawn as long as that is possible.
     std::vector<std::size_t> rows;
     for (std::size_t i = 0; i < shots; ++i) {
-      if (residuals_.outlier[i] != 0 && std::isfinite(residual[i])) rows.push_back(i);
+      if (input_.estimate.outlier[i] != 0 && std::isfinite(residual[i])) rows.push_back(i);
     }
     for (const std::size_t k : every_nth(rows.size(), kMostShotPoints)) {
       outliers.x.push_back(shot_time(rows[k]));
@@ -252,11 +251,11 @@ class EstimateCharts {
 
   Chart residual_histogram(const std::string& title, const std::vector<double>& residual,
                            const Moments& moments, const std::string& colour) const {
-    return {
-        title, "observed minus estimated, deg", "shots",
-        histogram("residuals", colour, residual, residuals_.outlier, moments, kDegreesPerRadian),
-        "All shots but the outliers. The outermost bins hold everything beyond 4.5 standard "
-        "deviations."};
+    return {title, "observed minus estimated, deg", "shots",
+            histogram("residuals", colour, residual, input_.estimate.outlier, moments,
+                      kDegreesPerRadian),
+            "All shots but the outliers. The outermost bins hold everything beyond 4.5 standard "
+            "deviations."};
   }
 
   /// Mean azimuth and zenith residuals over the cells of a plane.
@@ -302,8 +301,7 @@ class EstimateCharts {
                 "rotation angle, deg",
                 "observed minus estimated, deg",
                 {},
-                every_nth_note(states_.size(), kMostShotPoints / 2,
-                               input_.estimate.map ? "knots" : "shots") +
+                every_nth_note(states_.size(), kMostShotPoints / 2, "knots") +
                     " Lines: means over 5° of all shots that were used.",
                 ChartKind::full_turn};
     const estimation::AngleProfile& profile = input_.estimate.residuals_over_angle[rotor];
@@ -361,7 +359,6 @@ class EstimateCharts {
 
   const EstimateReportInput& input_;
   const RotorStates& states_;
-  estimation::ShotResiduals residuals_;
 };
 
 }  // namespace
@@ -375,7 +372,7 @@ EstimateReport estimate_report(const EstimateReportInput& input) {
   report.emitters = e.sensor.train.emitters();
   report.combination = e.sensor.combination.value_or(0);
   report.mirrored = e.mirrored;
-  report.method = e.map ? "map" : "ekf";
+  report.method = to_string(e.method);
   report.converged = e.converged;
   report.reason = e.reason;
   report.warnings = e.warnings;
@@ -386,14 +383,15 @@ EstimateReport estimate_report(const EstimateReportInput& input) {
   for (const estimation::FreeParameter& free : e.free) report.free.push_back(free.name);
   report.covariance = e.covariance;
   report.unobservable = e.unobservable;
-  report.azimuth_residuals = e.azimuth_residuals;
-  report.zenith_residuals = e.zenith_residuals;
+  report.azimuth_residuals = e.azimuth_moments;
+  report.zenith_residuals = e.zenith_moments;
   report.expected_residual = e.expected_residual;
   report.noise = {e.noise_held,         e.noise.value.azimuth, e.noise.sigma.azimuth,
                   e.noise.value.zenith, e.noise.sigma.zenith,  e.usual_noise};
-  if (e.frame) {
-    const Eigen::Matrix2d& c = e.frame->covariance;
-    report.frame = {e.frame->turn.yaw, std::sqrt(c(0, 0)), e.frame->turn.pitch, std::sqrt(c(1, 1))};
+  if (e.frame_turn) {
+    const Eigen::Matrix2d& c = e.frame_turn->covariance;
+    report.frame = {e.frame_turn->turn.yaw, std::sqrt(c(0, 0)), e.frame_turn->turn.pitch,
+                    std::sqrt(c(1, 1))};
   }
   for (const estimation::AngleProfile& profile : e.residuals_over_angle) {
     report.unevenness.push_back(profile.chi2_per_bin);
@@ -404,9 +402,7 @@ EstimateReport estimate_report(const EstimateReportInput& input) {
   }
   report.provenance = input.provenance;
   const EstimateCharts charts(input);
-  if (e.map) {
-    report.variance = {e.map->unit_variance, e.map->autocorrelation.factor, e.map->variance_factor};
-  }
+  report.variance = {e.unit_variance, e.autocorrelation.factor, e.variance_factor};
   report.advice = input.details.advice;
   if (input.details.pieces) {
     const estimation::PiecewiseEstimate& pieces = *input.details.pieces;

@@ -55,8 +55,8 @@ UnitDraw draw_of(const Estimate& estimate, const SimulatedRun& run, bool keep) {
     draw.speed_std[k] =
         degrees_from_radians(standard_deviation(estimate.states.angular_velocity[k]));
   }
-  draw.azimuth = estimate.azimuth_residuals;
-  draw.zenith = estimate.zenith_residuals;
+  draw.azimuth = estimate.azimuth_moments;
+  draw.zenith = estimate.zenith_moments;
   draw.nees_parameters = evaluation.nees_parameters;
   draw.nees_angles = evaluation.nees_rotation_angles;
   if (keep) draw.angle_error = std::move(evaluation.rotation_angle_error);

@@ -109,12 +109,11 @@ Figure residual_figure(const Estimate& estimate, const std::string& table, const
                 table,
                 "Fig. 10: sample distribution of the residuals",
                 {}};
-  const estimation::ShotResiduals residuals = estimation::shot_residuals(estimate);
-  const char* rate = estimate.map ? ", all shots" : ", filter at 1 kHz";
-  figure.charts = {histogram_chart(fmt::format("(a) azimuth{}", rate), "deg", residuals.azimuth,
-                                   kDegreesPerRadian),
-                   histogram_chart(fmt::format("(b) zenith{}", rate), "deg", residuals.zenith,
-                                   kDegreesPerRadian)};
+  const char* rate = estimate.method == Method::map ? ", all shots" : ", filter at 1 kHz";
+  figure.charts = {histogram_chart(fmt::format("(a) azimuth{}", rate), "deg",
+                                   estimate.azimuth_residual, kDegreesPerRadian),
+                   histogram_chart(fmt::format("(b) zenith{}", rate), "deg",
+                                   estimate.zenith_residual, kDegreesPerRadian)};
   return figure;
 }
 
@@ -190,8 +189,8 @@ Reproduction simulated(const ReproduceOptions& options, const Progress& progress
   for (const auto& [name, estimate] :
        {std::pair(map_name, &all), std::pair(filter_name, &filtered)}) {
     table.rows.push_back(converged_row(name, *estimate));
-    add_residuals(table, name, "azimuth", estimate->azimuth_residuals, "0.00", "0.64", false);
-    add_residuals(table, name, "zenith", estimate->zenith_residuals, "0.01", "0.59", false);
+    add_residuals(table, name, "azimuth", estimate->azimuth_moments, "0.00", "0.64", false);
+    add_residuals(table, name, "zenith", estimate->zenith_moments, "0.01", "0.59", false);
   }
   const auto pieces = estimates_of_pieces(all, options);
   progress.report(1.0);
@@ -269,14 +268,14 @@ Reproduction real(const RealRecording& recording) {
       estimate_run(Method::map, run, recording.sensor, recording.sensor.angle_noise);
   const Estimate filtered =
       estimate_run(Method::ekf, thin, recording.sensor, recording.sensor.angle_noise);
-  const bool only_rounding = all.azimuth_residuals.rms < kRoundingShare * all.expected_residual;
+  const bool only_rounding = all.azimuth_moments.rms < kRoundingShare * all.expected_residual;
   for (const auto& [name, estimate] :
        {std::pair<std::string, const Estimate*>("all shots", &all),
         std::pair<std::string, const Estimate*>("filter at 1 kHz", &filtered)}) {
     table.rows.push_back(converged_row(name, *estimate));
-    add_residuals(table, name, "azimuth", estimate->azimuth_residuals, "0.00", "0.64", true,
+    add_residuals(table, name, "azimuth", estimate->azimuth_moments, "0.00", "0.64", true,
                   only_rounding);
-    add_residuals(table, name, "zenith", estimate->zenith_residuals, "0.01", "0.59", true,
+    add_residuals(table, name, "zenith", estimate->zenith_moments, "0.01", "0.59", true,
                   only_rounding);
   }
   Row index{"all shots: refractive index of the prisms", "1", printed("1.5090"),

@@ -82,28 +82,26 @@ estimation::Estimate some_estimate() {
     estimate.series.zenith.push_back(0.5 * kPi);
     estimate.series.range.push_back(10.0 + 0.01 * static_cast<double>(i));
   }
-  estimation::BatchMapResult map;
   const std::vector<estimation::ShotRange> all{{0, kShots}};
-  map.trajectory = estimation::make_knots(estimate.series, all, 2);
-  for (std::size_t knot = 0; knot < map.trajectory.size(); ++knot) {
-    const double time = 1e-9 * static_cast<double>(map.trajectory.time_ns[knot]) - 1.0;
-    const auto state = map.trajectory.state_of(knot);
+  estimate.trajectory = estimation::make_knots(estimate.series, all, 2);
+  for (std::size_t knot = 0; knot < estimate.trajectory.size(); ++knot) {
+    const double time = 1e-9 * static_cast<double>(estimate.trajectory.time_ns[knot]) - 1.0;
+    const auto state = estimate.trajectory.state_of(knot);
     for (std::size_t k = 0; k < 2; ++k) {
       state[3 * k] = 1.0 + estimate.sensor.angular_velocity[k] * time;
       state[3 * k + 1] = estimate.sensor.angular_velocity[k];
     }
-    for (int i = 0; i < 21; ++i) map.trajectory.covariance.push_back(0.0);
-    double* covariance = map.trajectory.covariance.data() + 21 * knot;
+    for (int i = 0; i < 21; ++i) estimate.trajectory.covariance.push_back(0.0);
+    double* covariance = estimate.trajectory.covariance.data() + 21 * knot;
     covariance[0] = 1e-8 * static_cast<double>(knot + 1);  // of the angles of both rotors
     covariance[3] = -2e-9;
     covariance[15] = 3e-8;
   }
-  map.azimuth_residual.assign(kShots, 0.0);
-  map.zenith_residual.assign(kShots, 0.0);
-  map.outlier.assign(kShots, 0);
-  map.angle_sensitivity = Eigen::Vector2d{0.25, -0.75};
-  map.angle_information = Eigen::Vector2d{1e8, 4e8}.asDiagonal();
-  estimate.map = map;
+  estimate.azimuth_residual.assign(kShots, 0.0);
+  estimate.zenith_residual.assign(kShots, 0.0);
+  estimate.outlier.assign(kShots, 0);
+  estimate.common_angles = {Eigen::Vector2d{0.25, -0.75},
+                            Eigen::Vector2d{1e8, 4e8}.asDiagonal().toDenseMatrix()};
   return estimate;
 }
 
@@ -115,7 +113,7 @@ TEST(RangedRecording, HoldsRangesAndRotationAngles) {
   EXPECT_EQ(recording.believed.name, "mid-40");
   ASSERT_EQ(recording.free.size(), 1u);
   EXPECT_EQ(recording.covariance(0, 0), 4e-8);
-  EXPECT_EQ(recording.angle_sensitivity, estimate.map->angle_sensitivity);
+  EXPECT_EQ(recording.angle_sensitivity, estimate.common_angles->sensitivity);
   EXPECT_NEAR(recording.mean_angle_covariance(0, 0), 1e-8, 1e-20);
   EXPECT_NEAR(recording.mean_angle_covariance(1, 1), 0.25e-8, 1e-20);
   EXPECT_EQ(recording.without_range, 0u);
@@ -143,10 +141,10 @@ TEST(RangedRecording, LeavesOutWhatHasNoRangeOrNoDirection) {
   estimate.series.range[3] = kNaN;
   estimate.series.range[4] = 0.0;
   estimate.series.range[199] = -1.0;
-  estimate.map->outlier[3] = 1;  // counted as one without range
-  estimate.map->outlier[10] = 1;
-  estimate.map->outlier[11] = 1;
-  estimate.map->trajectory.last_shot[5] -= 4;  // four shots of the sixth knot were not used
+  estimate.outlier[3] = 1;  // counted as one without range
+  estimate.outlier[10] = 1;
+  estimate.outlier[11] = 1;
+  estimate.trajectory.last_shot[5] -= 4;  // four shots of the sixth knot were not used
   const RangedRecording recording = ranged_recording(estimate, "one.lvx", "");
   EXPECT_EQ(recording.without_range, 3u);
   EXPECT_EQ(recording.outliers, 6u);
@@ -184,7 +182,7 @@ TEST(RangedRecording, RefusesWhatIsNoEstimateWithRanges) {
   estimate.series.range.clear();
   EXPECT_THAT(error_of(estimate), AllOf(HasSubstr("one.lvx"), HasSubstr("ranges")));
   estimate = some_estimate();
-  estimate.map.reset();
+  estimate.common_angles.reset();
   EXPECT_THAT(error_of(estimate), HasSubstr("one.lvx"));
   estimate = some_estimate();
   estimate.series.range.assign(kShots, 0.0);

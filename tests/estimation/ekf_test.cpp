@@ -25,10 +25,14 @@ sensors::Sensor bent_sensor() {
   return sensor;
 }
 
-EkfResult run(const AngleSeries& series, EkfOptions options) {
+std::vector<FreeParameter> default_parameters() {
+  return free_parameters(default_free_names({2}), {2});
+}
+
+Solution run(const AngleSeries& series, EkfOptions options) {
   const auto nominal = sensors::load_sensor("mid-40");
   options.angle_noise = options.angle_noise > 0 ? options.angle_noise : kNoise;
-  if (options.free.empty()) options.free = free_parameters(default_free_names({2}), {2});
+  if (options.free.empty()) options.free = default_parameters();
   const Start start =
       find_start(series, nominal, {options.free, options.angle_noise, false, false});
   return run_ekf(series, start, options);
@@ -37,14 +41,14 @@ EkfResult run(const AngleSeries& series, EkfOptions options) {
 TEST(Ekf, NoiseFreeConstantSpeedIsRecoveredFarBelowTheStatedNoise) {
   const auto sensor = bent_sensor();
   const auto series = testing::constant_speed_series(sensor, 0.5, 2.5, 1.0, 2000.0);
-  const EkfResult result = run(series, {});
+  const Solution result = run(series, {});
   EXPECT_EQ(result.outliers, 0u);
-  for (std::size_t i = 0; i < result.free.size(); ++i) {
-    const double truth = sensor.train.get(result.free[i].name);
-    EXPECT_NEAR(result.parameters[static_cast<Eigen::Index>(i)], truth, 2e-6)
-        << result.free[i].name;
+  const std::vector<FreeParameter> free = default_parameters();
+  for (std::size_t i = 0; i < free.size(); ++i) {
+    const double truth = sensor.train.get(free[i].name);
+    EXPECT_NEAR(result.parameters[static_cast<Eigen::Index>(i)], truth, 2e-6) << free[i].name;
   }
-  EXPECT_LT(degrees_from_radians(moments(result.states.azimuth_residual).rms), 1e-4);
+  EXPECT_LT(degrees_from_radians(moments(result.azimuth_residual).rms), 1e-4);
 }
 
 TEST(Ekf, MeanAndCovarianceEqualTheWeightedLeastSquaresOfTheWholeTrajectory) {
@@ -56,15 +60,15 @@ TEST(Ekf, MeanAndCovarianceEqualTheWeightedLeastSquaresOfTheWholeTrajectory) {
   options.rotor_process = {{1e-9, 0, 0}, {1e-9, 0, 0}};
   options.gate_chi_square = std::numeric_limits<double>::infinity();
   options.passes = 4;
-  const EkfResult result = run(series, options);
-  const auto statics = static_cast<Eigen::Index>(result.free.size());
+  const Solution result = run(series, options);
+  const std::vector<FreeParameter> free = default_parameters();
+  const auto statics = result.parameters.size();
   Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(statics + 4, statics + 4);
   Eigen::VectorXd gradient = Eigen::VectorXd::Zero(statics + 4);
   for (std::size_t i = 0; i < series.size(); ++i) {
-    std::array<double, 2> angle{result.states.rotation_angle[0][i],
-                                result.states.rotation_angle[1][i]};
-    const Eigen::Vector2d residual(result.states.azimuth_residual[i],
-                                   result.states.zenith_residual[i]);
+    std::array<double, 2> angle{result.trajectory.angle(i, 0, 0.0),
+                                result.trajectory.angle(i, 1, 0.0)};
+    const Eigen::Vector2d residual(result.azimuth_residual[i], result.zenith_residual[i]);
     Eigen::MatrixXd row(2, statics + 4);
     const double h = 1e-6;
     const auto at = [&](const PrismTrain& train, double a, double b) {
@@ -73,7 +77,7 @@ TEST(Ekf, MeanAndCovarianceEqualTheWeightedLeastSquaresOfTheWholeTrajectory) {
     };
     for (Eigen::Index j = 0; j < statics; ++j) {
       PrismTrain up = result.train, down = result.train;
-      for (const int p : result.free[static_cast<std::size_t>(j)].places) {
+      for (const int p : free[static_cast<std::size_t>(j)].places) {
         up.set_place(p, up[p] + h);
         down.set_place(p, down[p] - h);
       }
@@ -101,8 +105,8 @@ TEST(Ekf, MeanAndCovarianceEqualTheWeightedLeastSquaresOfTheWholeTrajectory) {
 
 TEST(Ekf, SmoothingNeverWidensAndKnowsLeastAtTheEnds) {
   const auto series = testing::constant_speed_series(bent_sensor(), 0.5, 2.5, 2.0, 1000.0, 0.01, 5);
-  const EkfResult result = run(series, {});
-  const auto& variance = result.states.rotation_angle_covariance[0];
+  const Solution result = run(series, {});
+  const auto variance = states_of_knots(result, series).rotation_angle_covariance[0];
   const double middle = variance[variance.size() / 2];
   EXPECT_LT(middle, variance.front());
   EXPECT_LT(middle, variance.back());
@@ -120,9 +124,9 @@ TEST(Ekf, AGapIsBridgedAndItsUncertaintyShown) {
   cut(series.beam);
   EkfOptions options;
   options.rotor_process.assign(2, {radians_from_degrees(1.5), 0.0, 0.0});
-  const EkfResult result = run(series, options);
+  const Solution result = run(series, options);
   EXPECT_LT(result.outliers, 15u);
-  const auto& variance = result.states.rotation_angle_covariance[0];
+  const auto variance = states_of_knots(result, series).rotation_angle_covariance[0];
   EXPECT_GT(variance[1200], 1.2 * variance[600]);
 }
 

@@ -249,11 +249,15 @@ TEST(EstimateReport, WithoutTruthHasNoErrors) {
   EXPECT_THAT(report::estimate_page(r), Not(HasSubstr("error / σ")));
 }
 
-TEST(EstimateReport, TheFilterHasNoPieces) {
+TEST(EstimateReport, TheFiltersPageTellsTheSameThings) {
   const report::EstimateReport r = report_of(make_case(5, Method::ekf));
-  EXPECT_FALSE(r.pieces);
-  EXPECT_TRUE(r.parameter_charts.empty());
-  EXPECT_THAT(report::estimate_page(r), Not(HasSubstr("stand still")));
+  EXPECT_EQ(r.method, "ekf");
+  ASSERT_TRUE(r.pieces);
+  EXPECT_EQ(r.pieces->failed, 0u);
+  EXPECT_LT(r.pieces->chi2, 1.5);
+  EXPECT_EQ(r.parameter_charts.size(), r.free.size());
+  EXPECT_FALSE(r.advice.empty());
+  EXPECT_THAT(report::estimate_page(r), HasSubstr("stand still"));
 }
 
 }  // namespace

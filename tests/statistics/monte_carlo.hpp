@@ -71,7 +71,7 @@ inline MonteCarlo monte_carlo(
     }
     sum.nees_parameters += evaluation.nees_parameters;
     sum.nees_angles += evaluation.nees_rotation_angles;
-    sum.residual_std_deg += degrees_from_radians(estimate.azimuth_residuals.std);
+    sum.residual_std_deg += degrees_from_radians(estimate.azimuth_moments.std);
   }
   double squares = 0, parameters = 0;
   for (auto& [name, value] : sum.rmse) {

@@ -42,7 +42,7 @@ struct RangedRecording {
   /// What the estimate says of the believed parameters.
   std::vector<estimation::FreeParameter> free;
   Eigen::MatrixXd covariance;             ///< [free, free], SI units
-  Eigen::MatrixXd angle_sensitivity;      ///< [prisms, free], see BatchMapResult
+  Eigen::MatrixXd angle_sensitivity;      ///< [prisms, free], see CommonAngleErrors
   Eigen::MatrixXd mean_angle_covariance;  ///< [prisms, prisms], rad^2, at given parameters
   std::size_t without_range = 0;          ///< shots that had a direction and no range
   std::size_t outliers = 0;               ///< shots whose reported direction was an outlier

@@ -31,7 +31,7 @@ struct SensorBelief {
   sensors::Sensor sensor;  ///< with the parameters that its reported directions are computed with
   std::vector<estimation::FreeParameter> free;
   Eigen::MatrixXd covariance;         ///< of the free parameters, SI [free, free]
-  Eigen::MatrixXd angle_sensitivity;  ///< [prisms, free], see estimation::BatchMapResult
+  Eigen::MatrixXd angle_sensitivity;  ///< [prisms, free], see estimation::CommonAngleErrors
   std::vector<estimation::RotorProcess> rotor_process;
   estimation::Start start;
   double angle_noise = 0;  ///< rad
@@ -78,7 +78,7 @@ class RotorTracker {
   const SensorBelief& belief_;
   std::optional<double> rate_;
   double knot_interval_;  ///< s
-  estimation::BatchMapResult result_;
+  estimation::Solution solution_;
   std::vector<std::size_t> first_row_;  ///< of the piece, of each knot's first shot
 };
 

@@ -56,4 +56,10 @@ NoiseEstimate noise_components(const AngleSeries& series, std::span<const double
                                std::span<const unsigned char> outlier, double used_share,
                                double square_factor);
 
+/// Mean square of residuals over their stated variances [shots], outliers left out; NaN when all
+/// are.
+double unit_variance(const AngleSeries& series, const AngleNoise& noise,
+                     std::span<const double> azimuth, std::span<const double> zenith,
+                     std::span<const unsigned char> outlier);
+
 }  // namespace risley::estimation

@@ -2,18 +2,15 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <cstdint>
-#include <optional>
+#include <cstddef>
 #include <vector>
-
-#include <Eigen/Core>
 
 #include "risley/core/progress.hpp"
 #include "risley/estimation/angle_series.hpp"
 #include "risley/estimation/free_parameters.hpp"
 #include "risley/estimation/initialisation.hpp"
 #include "risley/estimation/rotor_process.hpp"
-#include "risley/estimation/rotor_states.hpp"
+#include "risley/estimation/solution.hpp"
 
 namespace risley::estimation {
 
@@ -34,26 +31,17 @@ struct EkfOptions {
   int passes = 2;
 };
 
-/// Result of the two filters and their optimal combination.
-struct EkfResult {
-  std::vector<FreeParameter> free;
-  Eigen::VectorXd parameters;  ///< mean over the smoothed estimates, SI units
-  Eigen::MatrixXd covariance;  ///< of parameters, mean over the smoothed covariances
-  PrismTrain train;            ///< with the estimated parameters
-  RotorStates states;
-  std::vector<RotorProcess> rotor_process;
-  std::size_t outliers = 0;
-  double log_likelihood = 0;  ///< of the forward filter's innovations
-};
-
 /// Forward filter, backward filter, and their combination weighted by inverse covariance, with the
 /// free parameters, and angle and speed of every rotor as states.        [B21 section 2.4]
 /// Departures from the paper: constants have no process noise unless asked for; the backward filter
 /// starts from a wide prior at the forward filter's last state, so no observation counts twice;
 /// process noise is continuous and found by maximum likelihood. docs/theory/ekf.md
-/// Memory is that of the result: filtered covariances live for one block of shots at a time.
+/// Parameters and their covariance are means over the smoothed ones; the trajectory has a knot for
+/// every shot, without acceleration. Data and prior are not told apart, nor common errors of the
+/// angles. Memory is that of the result: filtered covariances live for one block of shots at a
+/// time.
 /// @throws EstimationError when the series is empty or the filter diverges (message says where)
-EkfResult run_ekf(const AngleSeries& series, const Start& start, const EkfOptions& options,
-                  const Progress& progress = {});
+Solution run_ekf(const AngleSeries& series, const Start& start, const EkfOptions& options,
+                 const Progress& progress = {});
 
 }  // namespace risley::estimation

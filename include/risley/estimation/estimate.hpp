@@ -7,10 +7,10 @@
 #include <vector>
 
 #include "risley/core/progress.hpp"
-#include "risley/estimation/batch_map.hpp"
 #include "risley/estimation/coordinate_rounding.hpp"
 #include "risley/estimation/diagnostics.hpp"
-#include "risley/estimation/ekf.hpp"
+#include "risley/estimation/initialisation.hpp"
+#include "risley/estimation/solution.hpp"
 #include "risley/estimation/weak_directions.hpp"
 
 namespace risley::estimation {
@@ -20,6 +20,8 @@ enum class Method {
   map,  ///< all shots at once: run_batch_map
   ekf,  ///< the paper's filter: run_ekf
 };
+/// "map" or "ekf"
+const char* to_string(Method method);
 
 /// What the user asks for.
 struct EstimateOptions {
@@ -50,46 +52,35 @@ struct EstimatedValue {
   double sigma = 0;
 };
 
-/// Everything one estimation found.
-struct Estimate {
-  Method method = Method::map;
+/// Everything one estimation found: the solution, what it was found from, and whether to believe
+/// it.
+struct Estimate : Solution {
+  Method method = Method::map;  ///< to be told, not to be asked: every method answers alike
   bool converged = false;
   std::string reason;                 ///< why not converged; empty when converged
   std::vector<std::string> warnings;  ///< what the user should know all the same
   sensors::Sensor sensor;             ///< the calibrated sensor with its covariance
   bool mirrored = false;
-  std::optional<FrameEstimate> frame;  ///< of the recording, where it is not the sensor's
+  /// Whole turn of the recording's frame, where it is not the sensor's; the series is turned back.
+  std::optional<FrameEstimate> frame_turn;
   CoordinateRounding coordinates = CoordinateRounding::unknown;
   Start start;
   std::vector<FreeParameter> free;
-  Eigen::VectorXd parameters;          ///< [free], SI units
-  Eigen::MatrixXd covariance;          ///< [free, free]
   std::vector<EstimatedValue> values;  ///< parameters, mean speeds, first rotation angles
-  std::vector<RotorProcess> rotor_process;
   /// Parameter combinations that the data do not tell; any makes the estimate not converged.
   std::vector<WeakDirection> unobservable;
 
-  AngleSeries series;                 ///< the shots in the sensor's frame, see prepare_shots()
-  std::size_t outliers = 0;           ///< of the series
-  RotorStates states;                 ///< at every shot (ekf), or at one shot per knot (map)
-  std::optional<BatchMapResult> map;  ///< all that the batch estimator knows
+  AngleSeries series;  ///< the shots in the sensor's frame, see prepare_shots()
+  RotorStates states;  ///< at one shot per knot of the trajectory
 
-  Moments azimuth_residuals, zenith_residuals;     ///< rad, of all shots, outliers left out
+  Moments azimuth_moments, zenith_moments;         ///< of all residuals, rad, outliers left out
   std::vector<AngleProfile> residuals_over_angle;  ///< [prisms], of all shots
-  NoiseEstimate noise;                             ///< sigma 0 where it was held
   bool noise_held = false;
   double expected_residual = 0;  ///< rms of noise and rounding together, rad
   /// The same with the noise that the sensor's preset states: what a healthy unit leaves, rad.
   double usual_residual = 0;
   double usual_noise = 0;  ///< that noise, rad
 };
-
-/// Residuals at every shot of an estimate's series: references into the estimate.
-struct ShotResiduals {
-  const std::vector<double>&azimuth, &zenith;  ///< observed minus estimated, rad; NaN: not used
-  const std::vector<unsigned char>& outlier;   ///< not 0: left out
-};
-ShotResiduals shot_residuals(const Estimate& estimate);
 
 /// Rotor states of shots [begin, end) of an estimate's series.
 RotorStates states_of_shots(const Estimate& estimate, ShotRange shots);

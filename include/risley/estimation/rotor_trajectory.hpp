@@ -5,6 +5,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -36,6 +37,12 @@ struct RotorTrajectory {
 
   std::size_t size() const { return time_ns.size(); }
   int states() const { return kStatesPerRotor * prisms; }
+  /// Knot behind the last one of a stretch.
+  std::size_t stretch_end(std::size_t stretch) const {
+    return stretch + 1 < stretch_begin.size() ? stretch_begin[stretch + 1] : size();
+  }
+  /// The knot that serves a shot; none in an unused stretch.
+  std::optional<std::size_t> knot_of_shot(std::size_t shot) const;
   std::span<double> state_of(std::size_t knot) {
     const auto d = static_cast<std::size_t>(states());
     return {state.data() + knot * d, d};
