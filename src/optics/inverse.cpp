@@ -201,10 +201,7 @@ InverseSolution rotation_angles_for(const PrismTrain& train, const Vector3<doubl
   require_length("fixed_angles", fixed_angles.size(), static_cast<std::size_t>(train.prisms() - 2));
   for (const double angle : fixed_angles) require_finite("fixed_angles", angle, "rad");
   check_beam(train, beam);
-  const double length = norm(direction);
-  if (!(std::abs(length - 1.0) < 1e-6)) {
-    throw InvalidArgument(fmt::format("direction has length {}, expected a unit vector", length));
-  }
+  require_unit_length("direction", norm(direction));
   const Vector3<double> unit = normalized(direction);
   return with_prism_count(train.prisms(), [&]<int N>() -> InverseSolution {
     if constexpr (N < 2) return {};  // refused above
