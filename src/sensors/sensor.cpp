@@ -180,10 +180,8 @@ Sensor with_combination(const Sensor& sensor, int combination) {
         fmt::format("sensor \"{}\" has only one combination of speeds", sensor.name));
   }
   if (!sensor.combination) {
-    throw InvalidArgument(
-        fmt::format("sensor \"{}\" does not say in which of its {} combinations "
-                    "it is",
-                    sensor.name, count));
+    throw InvalidArgument(fmt::format(
+        "sensor \"{}\" does not say which of its {} combinations it is in", sensor.name, count));
   }
   require_combinations(sensor, all);
   for (const int number : {combination, *sensor.combination}) {

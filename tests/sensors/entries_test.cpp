@@ -58,7 +58,7 @@ TEST(Entries, CombinationsAskForOneThatIsThere) {
   EXPECT_EQ(refusal([&] { return with_combination(sensor, 1); }),
             "combination = 5 of sensor \"mid-40\", allowed 1 to 3");
   sensor.combination.reset();
-  const char* unsaid = "sensor \"mid-40\" does not say in which of its 3 combinations it is";
+  const char* unsaid = "sensor \"mid-40\" does not say which of its 3 combinations it is in";
   EXPECT_EQ(refusal([&] { return with_combination(sensor, 1); }), unsaid);
   EXPECT_EQ(refusal([&] { return in_all_combinations(sensor); }), unsaid);
   sensor.combinations.clear();

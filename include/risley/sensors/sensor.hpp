@@ -106,7 +106,7 @@ struct Sensor {
 /// The same sensor in that speed combination. Where its speeds are those of the one it is in, but
 /// for order and sign, they keep their exact values, and what is known of them goes along.
 /// @param combination  from 1
-/// @throws InvalidArgument when the sensor has no such combination, does not say in which it is, or
+/// @throws InvalidArgument when the sensor has no such combination, does not say which it is in, or
 ///         has speeds, face orders or a covariance of another length
 Sensor with_combination(const Sensor& sensor, int combination);
 
