@@ -74,4 +74,9 @@ void require_finite(std::string_view name, double value, std::string_view unit) 
   refuse(name, value, unit, "finite");
 }
 
+void require_unit_length(std::string_view name, double length) {
+  if (std::abs(length - 1.0) < 1e-6) return;
+  throw InvalidArgument(fmt::format("{} has length {}, expected a unit vector", name, length));
+}
+
 }  // namespace risley

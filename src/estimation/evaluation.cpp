@@ -15,6 +15,32 @@
 namespace risley::estimation {
 namespace {
 
+/// Columns of the estimate that are read here.
+void require_estimate(const Estimate& estimate) {
+  const RotorStates& states = estimate.states;
+  const auto prisms = static_cast<std::size_t>(estimate.sensor.prisms());
+  require_at_least("shots of the estimate", static_cast<long long>(states.size()), 1);
+  const auto require_all = [&](const std::string& name,
+                               const std::vector<std::vector<double>>& columns, std::size_t count) {
+    require_length(name, columns.size(), count);
+    for (const auto& column : columns) {
+      require_length("a column of " + name, column.size(), states.size());
+    }
+  };
+  require_all("rotation_angle", states.rotation_angle, prisms);
+  require_all("angular_velocity", states.angular_velocity, prisms);
+  require_all("angular_velocity_sigma", states.angular_velocity_sigma, prisms);
+  require_all("rotation_angle_covariance", states.rotation_angle_covariance,
+              prisms * (prisms + 1) / 2);
+  const std::size_t free = estimate.free.size();
+  require_at_least("number of values of the estimate",
+                   static_cast<long long>(estimate.values.size()), static_cast<long long>(free));
+  require_length("a column of the covariance", static_cast<std::size_t>(estimate.covariance.rows()),
+                 free);
+  require_length("a row of the covariance", static_cast<std::size_t>(estimate.covariance.cols()),
+                 free);
+}
+
 /// Row of the truth for every shot of the estimate, by time.
 std::vector<std::size_t> matching_rows(const std::vector<std::int64_t>& shots,
                                        const std::vector<std::int64_t>& truth) {
@@ -42,11 +68,13 @@ Evaluation evaluate(const Estimate& estimate, const sensors::Sensor& truth_senso
                     const recordings::TruthColumns& truth) {
   const RotorStates& states = estimate.states;
   const int prisms = estimate.sensor.prisms();
-  if (truth_sensor.shape() != estimate.sensor.shape() || truth.prisms() != prisms) {
-    throw InvalidArgument(
-        "the truth belongs to a sensor with another number of prisms or of emitters");
-  }
-  require_at_least("shots of the estimate", static_cast<long long>(states.size()), 1);
+  check_shape(estimate.sensor.shape());
+  require_estimate(estimate);
+  require_between("number of prisms of the true sensor", truth_sensor.prisms(), prisms, prisms);
+  const int emitters = estimate.sensor.train.emitters();
+  require_between("number of emitters of the true sensor", truth_sensor.train.emitters(), emitters,
+                  emitters);
+  recordings::require_columns(truth, prisms);
   const auto rows = matching_rows(states.time_ns, truth.time_ns);
   const auto rotor_count = static_cast<std::size_t>(prisms);
   const double duration =

@@ -18,6 +18,18 @@ static_assert(kRotorStates == kStatesPerRotor);
 /// Knots that one task sums up: fixed, so that sums do not depend on the number of threads.
 constexpr std::size_t kBlockKnots = 1000;
 
+/// Places of the flat vector, and no more parameters than places: the kernels have room for those.
+void require_free(const std::vector<FreeParameter>& free, const PrismTrain& train) {
+  const std::size_t places = train.parameters().size();
+  require_between("number of free parameters", static_cast<double>(free.size()), 0,
+                  static_cast<double>(places));
+  for (const FreeParameter& parameter : free) {
+    for (const int place : parameter.places) {
+      require_between("place of " + parameter.name, place, 0, static_cast<double>(places - 1));
+    }
+  }
+}
+
 void require_shots(const AngleSeries& series, const RotorTrajectory& knots,
                    const ShotColumns& columns) {
   const std::size_t shots = series.size();
@@ -52,11 +64,15 @@ void NormalEquations::scale(double factor) {
 void accumulate(const AngleSeries& series, const RotorTrajectory& knots, const PrismTrain& train,
                 const std::vector<FreeParameter>& free, const ShotWeights& weights,
                 NormalEquations& equations, const ShotColumns& columns, InstructionSet set) {
+  check_available(set);
+  check_shape(train.shape());
   require_shots(series, knots, columns);
+  require_free(free, train);
   require_between("number of prisms of the knots", knots.prisms, train.prisms(), train.prisms());
   check_noise(weights.angle_noise);
   require_not_below("softening", weights.softening, 0);
   require_threshold("cut", weights.cut);
+  check_beams(train, series.beam, series.size());
   const auto n = static_cast<int>(free.size());
   const auto prisms = static_cast<std::size_t>(knots.prisms);
   std::vector<int> place_begin{0}, places;
@@ -75,7 +91,6 @@ void accumulate(const AngleSeries& series, const RotorTrajectory& knots, const P
   all.face_order = train.face_order().data();
   all.prisms = knots.prisms;
   all.emitters = train.emitters();
-  check_beams(train, series.beam, series.size());
   if (!series.beam.empty()) all.beam = series.beam.data();
   all.free = n;
   all.place_begin = place_begin.data();

@@ -138,6 +138,7 @@ bool NetcdfInput::has_variable(const std::string& name) const {
 NetcdfVariable NetcdfInput::variable(const std::string& name, NetcdfType type,
                                      std::span<const NetcdfDimension* const> dimensions,
                                      std::size_t block) const {
+  require_dimensions(name, dimensions);
   const NetcdfLock lock;
   NetcdfVariable variable{name, type, 1, 0};
   if (nc_inq_varid(id_, name.c_str(), &variable.id) != NC_NOERR) {

@@ -6,7 +6,10 @@
 #include <cstring>
 
 #include <H5Epublic.h>
+#include <fmt/format.h>
 #include <netcdf.h>
+
+#include "risley/core/require.hpp"
 
 namespace risley::io {
 namespace {
@@ -61,6 +64,12 @@ NetcdfLock::NetcdfLock() : lock_(library_mutex()) {
 int nc_type_of(NetcdfType type) { return entry_of(type).number; }
 std::size_t bytes_of(NetcdfType type) { return entry_of(type).bytes; }
 std::string_view name_of(NetcdfType type) { return entry_of(type).name; }
+
+void require_dimensions(const std::string& variable,
+                        std::span<const NetcdfDimension* const> dimensions) {
+  require_between(fmt::format("number of dimensions of variable {}", variable),
+                  static_cast<double>(dimensions.size()), 1, 2);
+}
 
 std::string netcdf_reason(int status) {
   switch (errno) {

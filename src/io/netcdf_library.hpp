@@ -24,6 +24,10 @@ int nc_type_of(NetcdfType type);
 std::size_t bytes_of(NetcdfType type);
 std::string_view name_of(NetcdfType type);
 
+/// All variables have one or two dimensions. @throws InvalidArgument
+void require_dimensions(const std::string& variable,
+                        std::span<const NetcdfDimension* const> dimensions);
+
 /// What the library says of a status; of a refusal by the disk what the system says.
 std::string netcdf_reason(int status);
 

@@ -8,6 +8,7 @@
 #include <netcdf.h>
 
 #include "risley/core/error.hpp"
+#include "risley/core/require.hpp"
 #include "risley/io/netcdf.hpp"
 #include "risley/io/output_file.hpp"
 
@@ -97,9 +98,7 @@ NetcdfOutput::~NetcdfOutput() = default;
 const std::string& NetcdfOutput::path() const { return file_->path(); }
 
 NetcdfDimension NetcdfOutput::define_dimension(const std::string& name, std::size_t length) {
-  if (length == 0) {
-    throw InvalidArgument(fmt::format("dimension {} has length 0, allowed from 1", name));
-  }
+  require_at_least(fmt::format("length of dimension {}", name), static_cast<long long>(length), 1);
   const NetcdfLock lock;
   NetcdfDimension dimension{name, length, 0};
   file_->check(nc_def_dim(file_->id(), name.c_str(), length, &dimension.id),
@@ -118,6 +117,11 @@ NetcdfDimension NetcdfOutput::define_growing_dimension(const std::string& name) 
 NetcdfVariable NetcdfOutput::define(const std::string& name, NetcdfType type,
                                     std::span<const NetcdfDimension* const> dimensions,
                                     const NetcdfStorage& storage) {
+  require_dimensions(name, dimensions);
+  for (const NetcdfDimension* inner : dimensions.subspan(1)) {
+    require_at_least(fmt::format("length of the inner dimension {}", inner->name),
+                     static_cast<long long>(inner->length), 1);
+  }
   const NetcdfLock lock;
   const std::string part = fmt::format("variable {}", name);
   NetcdfVariable variable{name, type, 1, 0};
@@ -149,10 +153,7 @@ NetcdfVariable NetcdfOutput::define(const std::string& name, NetcdfType type,
 
 void NetcdfOutput::define_texts(const std::string& name, const NetcdfDimension& along,
                                 std::string_view long_name, std::vector<std::string> texts) {
-  if (texts.size() != along.length) {
-    throw InvalidArgument(fmt::format("variable {} has {} texts, dimension {} has length {}", name,
-                                      texts.size(), along.name, along.length));
-  }
+  require_length(fmt::format("variable {}", name), texts.size(), along.length);
   const NetcdfLock lock;
   int variable = 0;
   file_->check(nc_def_var(file_->id(), name.c_str(), NC_STRING, 1, &along.id, &variable),

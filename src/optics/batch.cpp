@@ -6,17 +6,12 @@
 
 #include <fmt/format.h>
 
+#include "risley/core/require.hpp"
+
 #include "optics/batch_kernel.hpp"
 
 namespace risley {
 namespace {
-
-void check_length(std::string_view column, std::size_t length, std::size_t shots) {
-  if (length != shots) {
-    throw InvalidArgument(
-        fmt::format("column {} has {} values, the rotation angles have {}", column, length, shots));
-  }
-}
 
 /// What all kernels need, checked.
 struct Call {
@@ -28,13 +23,11 @@ struct Call {
   Call(const PrismTrain& train, std::span<const std::span<const double>> rotation_angles,
        std::span<const std::uint8_t> beam) {
     check_shape(train.shape());
-    if (rotation_angles.size() != static_cast<std::size_t>(train.prisms())) {
-      throw InvalidArgument(fmt::format("{} columns of rotation angles given for {} prisms",
-                                        rotation_angles.size(), train.prisms()));
-    }
+    require_length("rotation_angles", rotation_angles.size(),
+                   static_cast<std::size_t>(train.prisms()));
     arguments.shots = rotation_angles.front().size();
     for (const auto column : rotation_angles) {
-      check_length("rotation_angle", column.size(), arguments.shots);
+      require_length("a column of rotation_angles", column.size(), arguments.shots);
       angle_columns.push_back(column.data());
     }
     arguments.rotation_angles = angle_columns.data();
@@ -48,7 +41,7 @@ struct Call {
 
   double* column(std::string_view name, std::span<double> values, bool required) const {
     if (values.empty() && !required) return nullptr;
-    check_length(name, values.size(), arguments.shots);
+    require_length(name, values.size(), arguments.shots);
     return values.data();
   }
 };
@@ -57,10 +50,7 @@ struct Call {
 
 void check_beams(const PrismTrain& train, std::span<const std::uint8_t> beam, std::size_t shots) {
   if (beam.empty()) return;
-  if (beam.size() != shots) {
-    throw InvalidArgument(
-        fmt::format("column beam has {} values, expected {}", beam.size(), shots));
-  }
+  require_length("beam", beam.size(), shots);
   const auto most = std::max_element(beam.begin(), beam.end());
   if (*most < train.emitters()) return;
   throw InvalidArgument(fmt::format("beam = {} in row {}, allowed 0 to {}", *most,
@@ -78,7 +68,7 @@ std::size_t observe_batch(const PrismTrain& train,
   a.direction[2] = call.column("z", out.z, false);
   a.azimuth = call.column("azimuth", out.azimuth, false);
   a.zenith = call.column("zenith", out.zenith, false);
-  if (!out.origin_x.empty()) {
+  if (!out.origin_x.empty() || !out.origin_y.empty() || !out.origin_z.empty()) {
     call.face_position = face_positions(train.face_order(), out.geometry);
     a.face_position = call.face_position.data();
     a.origin[0] = call.column("origin_x", out.origin_x, true);
@@ -97,11 +87,9 @@ std::size_t linearise_batch(const PrismTrain& train,
   const auto gradient = [&](std::string_view name, const std::vector<std::span<double>>& columns,
                             std::vector<double*>& pointers) {
     const auto expected = static_cast<std::size_t>(parameter_count(train.shape()) + train.prisms());
-    if (columns.size() != expected) {
-      throw InvalidArgument(
-          fmt::format("{} has {} columns, expected {}", name, columns.size(), expected));
-    }
-    for (const auto column : columns) pointers.push_back(call.column(name, column, true));
+    require_length(name, columns.size(), expected);
+    const std::string one = fmt::format("a column of {}", name);
+    for (const auto column : columns) pointers.push_back(call.column(one, column, true));
     return pointers.data();
   };
   a.azimuth = call.column("azimuth", out.azimuth, true);

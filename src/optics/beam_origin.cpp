@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "risley/core/error.hpp"
+#include "risley/core/require.hpp"
 
 namespace risley {
 
@@ -38,6 +39,7 @@ std::vector<double> face_positions(const std::vector<FaceOrder>& face_order,
                                    const PrismGeometry& geometry) {
   const auto one_each = [](const char* name, const std::vector<double>& values,
                            std::size_t count) -> std::vector<double> {
+    for (const double value : values) require_finite(name, value, "m");
     if (values.empty()) return std::vector<double>(count, 0.0);
     if (values.size() == 1) return std::vector<double>(count, values.front());
     if (values.size() == count) return values;
@@ -45,8 +47,9 @@ std::vector<double> face_positions(const std::vector<FaceOrder>& face_order,
         fmt::format("{} has {} values, allowed none, 1 or {}", name, values.size(), count));
   };
   const std::size_t prisms = face_order.size();
+  check_shape({static_cast<int>(prisms)});
   const auto thickness = one_each("thickness", geometry.thickness, prisms);
-  const auto spacing = one_each("spacing", geometry.spacing, prisms == 0 ? 0 : prisms - 1);
+  const auto spacing = one_each("spacing", geometry.spacing, prisms - 1);
   std::vector<double> positions(2 * prisms);
   double perpendicular = 0;
   for (std::size_t prism = prisms; prism-- > 0;) {
@@ -62,10 +65,7 @@ Ray emergent_ray(const PrismTrain& train, const PrismGeometry& geometry,
                  std::span<const double> rotation_angles, int beam) {
   check_beam(train, beam);
   return with_prism_count(train.prisms(), [&]<int N>() -> Ray {
-    if (rotation_angles.size() != N) {
-      throw InvalidArgument(
-          fmt::format("{} rotation angles given for {} prisms", rotation_angles.size(), N));
-    }
+    require_length("rotation_angles", rotation_angles.size(), N);
     std::array<double, N> angles;
     std::copy_n(rotation_angles.begin(), N, angles.begin());
     std::array<double, 2 * N> positions;

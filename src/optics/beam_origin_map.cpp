@@ -9,10 +9,8 @@
 #include <span>
 #include <utility>
 
-#include <fmt/format.h>
-
 #include "risley/core/angle.hpp"
-#include "risley/core/error.hpp"
+#include "risley/core/require.hpp"
 #include "risley/optics/batch.hpp"
 
 namespace risley {
@@ -35,11 +33,9 @@ std::vector<double> sequence_steps(std::size_t dimensions) {
 
 BeamOriginMap beam_origin_map(const PrismTrain& train, const PrismGeometry& geometry,
                               std::size_t steps, double cell) {
-  if (steps < 2) throw InvalidArgument(fmt::format("steps = {}, allowed 2 and more", steps));
-  if (!(cell > 0)) {
-    throw InvalidArgument(
-        fmt::format("cell = {} deg, allowed above 0", degrees_from_radians(cell)));
-  }
+  check_shape(train.shape());
+  require_at_least("steps", static_cast<long long>(steps), 2);
+  require_above("cell", degrees_from_radians(cell), 0, "deg");
   const auto prisms = static_cast<std::size_t>(train.prisms());
   struct Extremes {
     double least_y = HUGE_VAL, greatest_y = -HUGE_VAL, least_z = HUGE_VAL, greatest_z = -HUGE_VAL;
@@ -68,7 +64,6 @@ BeamOriginMap beam_origin_map(const PrismTrain& train, const PrismGeometry& geom
       e.greatest_z = std::max(e.greatest_z, z[i]);
     }
   };
-  check_shape(train.shape());
   const std::vector<double> sequence = sequence_steps(prisms);
   const std::size_t rows = prisms == 1 ? 1 : steps;
   for (std::size_t row = 0; row < rows; ++row) {

@@ -13,6 +13,7 @@
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
 #include "risley/core/golden_section.hpp"
+#include "risley/core/require.hpp"
 #include "risley/optics/observation_model.hpp"
 
 namespace risley {
@@ -197,16 +198,10 @@ InverseSolution rotation_angles_for(const PrismTrain& train, const Vector3<doubl
     throw InvalidArgument(
         fmt::format("the inverse needs at least 2 prisms, the train has {}", train.prisms()));
   }
-  if (fixed_angles.size() != static_cast<std::size_t>(train.prisms() - 2)) {
-    throw InvalidArgument(
-        fmt::format("{} fixed rotation angles given, a train of {} prisms needs {}",
-                    fixed_angles.size(), train.prisms(), train.prisms() - 2));
-  }
+  require_length("fixed_angles", fixed_angles.size(), static_cast<std::size_t>(train.prisms() - 2));
+  for (const double angle : fixed_angles) require_finite("fixed_angles", angle, "rad");
   check_beam(train, beam);
-  const double length = norm(direction);
-  if (!(std::abs(length - 1.0) < 1e-6)) {
-    throw InvalidArgument(fmt::format("direction has length {}, expected a unit vector", length));
-  }
+  require_unit_length("direction", norm(direction));
   const Vector3<double> unit = normalized(direction);
   return with_prism_count(train.prisms(), [&]<int N>() -> InverseSolution {
     if constexpr (N < 2) return {};  // refused above

@@ -5,17 +5,13 @@
 #include <algorithm>
 #include <limits>
 
-#include <fmt/format.h>
-
-#include "risley/core/error.hpp"
+#include "risley/core/require.hpp"
 
 namespace risley {
 
 Observation observe(const PrismTrain& train, std::span<const double> rotation_angles, int beam) {
-  if (rotation_angles.size() != static_cast<std::size_t>(train.prisms())) {
-    throw InvalidArgument(fmt::format("{} rotation angles given for {} prisms",
-                                      rotation_angles.size(), train.prisms()));
-  }
+  require_length("rotation_angles", rotation_angles.size(),
+                 static_cast<std::size_t>(train.prisms()));
   check_beam(train, beam);
   return with_prism_count(train.prisms(), [&]<int N>() -> Observation {
     const auto prepared =

@@ -57,6 +57,11 @@ PrismTrain PrismTrain::without_errors() const {
   return ideal;
 }
 
+void PrismTrain::refuse_place(int place) const {
+  check_shape(shape());
+  throw InvalidArgument(fmt::format("place = {}, allowed 0 to {}", place, parameters_.size() - 1));
+}
+
 void check_beam(const PrismTrain& train, int beam) {
   if (beam >= 0 && beam < train.emitters()) return;
   throw InvalidArgument(fmt::format("beam = {}, allowed 0 to {}", beam, train.emitters() - 1));

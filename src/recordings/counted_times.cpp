@@ -8,6 +8,8 @@
 
 #include <fmt/format.h>
 
+#include "risley/core/require.hpp"
+
 #include "recordings/reader_decorators.hpp"
 
 namespace risley::recordings {
@@ -77,10 +79,7 @@ class CountingReader final : public DecoratingReader {
 
 std::unique_ptr<Reader> with_counted_times(std::unique_ptr<Reader> reader, const std::string& path,
                                            double shot_rate) {
-  if (!(shot_rate > 0.0) || !std::isfinite(shot_rate)) {
-    throw InvalidArgument(
-        fmt::format("ReadOptions::shot_rate = {} Hz, expected a finite number above 0", shot_rate));
-  }
+  require_above("ReadOptions::shot_rate", shot_rate, 0, "Hz");
   return std::make_unique<CountingReader>(std::move(reader), path, shot_rate);
 }
 

@@ -12,6 +12,7 @@
 #include <fmt/format.h>
 
 #include "risley/core/angle.hpp"
+#include "risley/core/require.hpp"
 #include "risley/core/text.hpp"
 #include "risley/recordings/writer.hpp"
 
@@ -252,16 +253,12 @@ void check(const std::string& recording, const std::string& path, const ExcerptO
     throw InvalidArgument(
         fmt::format("{}: the excerpt would replace the recording; name another file", path));
   }
-  if (!(options.longest > 0.0) || !std::isfinite(options.longest)) {
-    throw InvalidArgument(
-        fmt::format("ExcerptOptions::longest = {} s, allowed above 0", options.longest));
-  }
-  if (options.most_shots == 0 || options.most_shots_without_times == 0) {
-    throw InvalidArgument(
-        fmt::format("ExcerptOptions::most_shots = {}, most_shots_without_times = {}, allowed 1 "
-                    "and above",
-                    options.most_shots, options.most_shots_without_times));
-  }
+  require_above("ExcerptOptions::longest", options.longest, 0, "s");
+  const auto require_shots = [](const char* name, std::uint64_t shots) {
+    require_not_below(name, static_cast<double>(shots), 1);
+  };
+  require_shots("ExcerptOptions::most_shots", options.most_shots);
+  require_shots("ExcerptOptions::most_shots_without_times", options.most_shots_without_times);
 }
 
 /// Searches all sound rows. @param damage  gets what ends them before the file's end

@@ -12,24 +12,24 @@
 #include "risley/core/angle.hpp"
 #include "risley/core/direction.hpp"
 #include "risley/core/error.hpp"
+#include "risley/core/require.hpp"
 
 #include "recordings/reader_decorators.hpp"
 
 namespace risley::recordings {
 namespace {
 
-void check_finite(const Extrinsics& pose) {
-  const auto check = [](const char* field, double value, const char* unit) {
-    if (std::isfinite(value)) return;
-    throw InvalidArgument(fmt::format(
-        "ReadOptions::extrinsics.{} = {} {}, expected a finite number", field, value, unit));
-  };
-  check("yaw", pose.yaw, "rad");
-  check("pitch", pose.pitch, "rad");
-  check("roll", pose.roll, "rad");
-  check("translation.x", pose.translation.x, "m");
-  check("translation.y", pose.translation.y, "m");
-  check("translation.z", pose.translation.z, "m");
+void require_turn(const Extrinsics& pose) {
+  require_finite("extrinsics.yaw", pose.yaw, "rad");
+  require_finite("extrinsics.pitch", pose.pitch, "rad");
+  require_finite("extrinsics.roll", pose.roll, "rad");
+}
+
+void require_pose(const Extrinsics& pose) {
+  require_turn(pose);
+  require_finite("extrinsics.translation.x", pose.translation.x, "m");
+  require_finite("extrinsics.translation.y", pose.translation.y, "m");
+  require_finite("extrinsics.translation.z", pose.translation.z, "m");
 }
 
 class SensorFrameReader final : public DecoratingReader {
@@ -134,6 +134,7 @@ bool is_identity(const Extrinsics& pose) {
 }
 
 std::array<Vector3<double>, 3> sensor_axes(const Extrinsics& pose) {
+  require_turn(pose);
   const double cy = std::cos(pose.yaw), sy = std::sin(pose.yaw);
   const double cp = std::cos(pose.pitch), sp = std::sin(pose.pitch);
   const double cr = std::cos(pose.roll), sr = std::sin(pose.roll);
@@ -155,7 +156,7 @@ std::optional<Extrinsics> stored_extrinsics(const Device& device) {
 }
 
 std::unique_ptr<Reader> in_sensor_frame(std::unique_ptr<Reader> reader, const Extrinsics& pose) {
-  check_finite(pose);
+  require_pose(pose);
   if (is_identity(pose)) return reader;
   return std::make_unique<SensorFrameReader>(std::move(reader), pose);
 }

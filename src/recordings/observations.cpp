@@ -2,51 +2,62 @@
 // SPDX-License-Identifier: MIT
 #include "risley/recordings/observations.hpp"
 
-#include <tuple>
+#include <string_view>
+
+#include "risley/core/require.hpp"
 
 namespace risley::recordings {
 namespace {
 
-/// Applies a function to every column; the one place that lists them all.
+/// Applies a function to every column with its name; the one place that lists them all.
 template <class Function, class... Columns>
 void for_each_column(Function&& function, Columns&... o) {
-  function(o.time_ns...);
-  function(o.azimuth...);
-  function(o.zenith...);
-  function(o.range...);
-  function(o.azimuth_resolution...);
-  function(o.zenith_resolution...);
-  function(o.range_resolution...);
-  function(o.intensity...);
-  function(o.return_number...);
-  function(o.tag...);
-  function(o.beam...);
-  function(o.device...);
-  function(o.valid...);
+  function("time_ns", o.time_ns...);
+  function("azimuth", o.azimuth...);
+  function("zenith", o.zenith...);
+  function("range", o.range...);
+  function("azimuth_resolution", o.azimuth_resolution...);
+  function("zenith_resolution", o.zenith_resolution...);
+  function("range_resolution", o.range_resolution...);
+  function("intensity", o.intensity...);
+  function("return_number", o.return_number...);
+  function("tag", o.tag...);
+  function("beam", o.beam...);
+  function("device", o.device...);
+  function("valid", o.valid...);
 }
 
 }  // namespace
 
 void Observations::clear() {
-  for_each_column([](auto& column) { column.clear(); }, *this);
+  for_each_column([](std::string_view, auto& column) { column.clear(); }, *this);
 }
 
 void Observations::resize(std::size_t rows) {
-  for_each_column([rows](auto& column) { column.resize(rows); }, *this);
+  for_each_column([rows](std::string_view, auto& column) { column.resize(rows); }, *this);
 }
 
 void Observations::append(const Observations& other) {
-  for_each_column(
-      [](auto& column, const auto& more) { column.insert(column.end(), more.begin(), more.end()); },
-      *this, other);
+  require_columns(other);
+  for_each_column([](std::string_view, auto& column,
+                     const auto& more) { column.insert(column.end(), more.begin(), more.end()); },
+                  *this, other);
 }
 
 void Observations::drop_front(std::size_t rows) {
+  require_columns(*this);
+  require_rows("rows", 0, rows, size());
   for_each_column(
-      [rows](auto& column) {
+      [rows](std::string_view, auto& column) {
         column.erase(column.begin(), column.begin() + static_cast<std::ptrdiff_t>(rows));
       },
       *this);
+}
+
+void require_columns(const Observations& rows) {
+  for_each_column([&rows](std::string_view name,
+                          const auto& column) { require_length(name, column.size(), rows.size()); },
+                  rows);
 }
 
 void Chunk::clear() {

@@ -4,6 +4,8 @@
 
 #include <utility>
 
+#include "risley/core/require.hpp"
+
 namespace risley::recordings {
 
 void DecoratingReader::take_over() {
@@ -14,6 +16,7 @@ void DecoratingReader::take_over() {
 }
 
 bool DecoratingReader::read(Chunk& chunk, std::size_t max_rows) {
+  require_at_least("max_rows", static_cast<long long>(max_rows), 1);
   if (failure_) throw FileError(*failure_);
   bool more = false;
   try {

@@ -32,6 +32,7 @@ bool is_gap(std::int64_t step_ns, std::int64_t nominal_ns) {
 
 void TimeAudit::add(const Chunk& chunk) {
   const Observations& o = chunk.observations;
+  require_columns(o);
   totals_.imu += chunk.imu.size();
   std::size_t row = 0;
   for (const Packet& packet : chunk.packets) {

@@ -9,6 +9,7 @@
 
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
+#include "risley/core/require.hpp"
 #include "risley/io/netcdf.hpp"
 
 namespace risley::recordings {
@@ -46,6 +47,10 @@ std::vector<Variable> variables(int prisms) {
   return list;
 }
 
+void require_prisms(int prisms, int least) {
+  require_between("number of prisms", prisms, least, kMostPrisms);
+}
+
 /// The columns beside the time in the order of variables().
 template <class Truth>
 auto columns_of(Truth& rows) {
@@ -59,6 +64,7 @@ auto columns_of(Truth& rows) {
 }  // namespace
 
 void TruthColumns::resize(int prisms, std::size_t rows) {
+  require_prisms(prisms, 0);
   time_ns.resize(rows);
   rotation_angle.resize(static_cast<std::size_t>(prisms));
   angular_velocity.resize(static_cast<std::size_t>(prisms));
@@ -67,15 +73,23 @@ void TruthColumns::resize(int prisms, std::size_t rows) {
 
 void TruthColumns::append(const TruthColumns& others) {
   if (size() == 0) resize(others.prisms(), 0);
-  if (prisms() != others.prisms()) {
-    throw InvalidArgument(
-        fmt::format("truth columns of {} prisms, expected {}", others.prisms(), prisms()));
-  }
+  require_columns(others, prisms());
   time_ns.insert(time_ns.end(), others.time_ns.begin(), others.time_ns.end());
   const auto from = columns_of(others);
   const auto to = columns_of(*this);
   for (std::size_t i = 0; i < to.size(); ++i) {
     to[i]->insert(to[i]->end(), from[i]->begin(), from[i]->end());
+  }
+}
+
+void require_columns(const TruthColumns& rows, int prisms) {
+  const auto count = static_cast<std::size_t>(prisms);
+  require_length("rotation_angle", rows.rotation_angle.size(), count);
+  require_length("angular_velocity", rows.angular_velocity.size(), count);
+  const auto columns = columns_of(rows);
+  const auto list = variables(prisms);
+  for (std::size_t i = 0; i < columns.size(); ++i) {
+    require_length(list[i + 1].name, columns[i]->size(), rows.size());
   }
 }
 
@@ -96,17 +110,8 @@ class TruthWriter::File {
 
   void write(const TruthColumns& rows) {
     const std::size_t count = rows.size();
+    require_columns(rows, prisms_);
     const auto columns = columns_of(rows);
-    if (columns.size() + 1 != columns_.size() || rows.prisms() != prisms_) {
-      throw InvalidArgument(
-          fmt::format("truth columns of {} prisms, expected {}", rows.prisms(), prisms_));
-    }
-    for (std::size_t i = 0; i < columns.size(); ++i) {
-      if (columns[i]->size() != count) {
-        throw InvalidArgument(fmt::format("truth column {} has {} rows, time has {}",
-                                          variables_[i + 1].name, columns[i]->size(), count));
-      }
-    }
     if (count == 0) return;
     buffer_.resize(count);
     for (std::size_t row = 0; row < count; ++row) {
@@ -133,10 +138,7 @@ class TruthWriter::File {
 };
 
 TruthWriter::TruthWriter(const std::string& path, int prisms) {
-  if (prisms < 1 || prisms > kMostPrisms) {
-    throw InvalidArgument(
-        fmt::format("number of prisms = {}, allowed 1 to {}", prisms, kMostPrisms));
-  }
+  require_prisms(prisms, 1);
   file_ = std::make_unique<File>(path, prisms);
 }
 TruthWriter::~TruthWriter() = default;
@@ -206,6 +208,11 @@ TruthColumns load_truth(const std::string& path) {
 }
 
 TruthColumns load_truth(const std::string& path, std::span<const std::int64_t> time_ns) {
+  const auto late = std::is_sorted_until(time_ns.begin(), time_ns.end());
+  if (late != time_ns.end()) {
+    throw InvalidArgument(fmt::format("time_ns[{}] = {} ns, allowed ascending from {}",
+                                      late - time_ns.begin(), *late, *(late - 1)));
+  }
   TruthFile file(path);
   TruthColumns rows;
   rows.resize(file.prisms(), 0);

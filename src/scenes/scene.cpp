@@ -12,6 +12,7 @@
 
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
+#include "risley/core/require.hpp"
 #include "risley/io/text_file.hpp"
 #include "risley/io/yaml_map.hpp"
 
@@ -134,6 +135,10 @@ Station Scene::station(std::string_view name) const {
 
 std::optional<Hit> nearest_hit(const Scene& scene, const Vector3<double>& origin,
                                const Vector3<double>& direction) {
+  require_finite("origin.x", origin.x, "m");
+  require_finite("origin.y", origin.y, "m");
+  require_finite("origin.z", origin.z, "m");
+  require_unit_length("direction", norm(direction));
   std::optional<Hit> nearest;
   for (std::size_t i = 0; i < scene.planes.size(); ++i) {
     const ScenePlane& each = scene.planes[i];

@@ -13,6 +13,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "risley/core/require.hpp"
 #include "risley/io/text_file.hpp"
 #include "risley/io/yaml_map.hpp"
 
@@ -117,6 +118,15 @@ constexpr std::array kSpecifications{
     Specification{"beam", "beam_divergence_vertical_deg", "deg", &Sensor::beam_divergence_vertical,
                   0, 90},
 };
+
+/// A preset with such a number could not be read again.
+void require_specification(const Specification& s, double value) {
+  const long double scale = scale_of(s.unit);
+  if (value >= si_from_file(s.lower, scale) && value <= si_from_file(s.upper, scale)) return;
+  throw InvalidArgument(fmt::format("{} = {:.10g} {}, allowed {:g} to {:g}", s.name,
+                                    static_cast<double>(static_cast<long double>(value) / scale),
+                                    s.unit, s.lower, s.upper));
+}
 
 /// Section names in file order.
 std::vector<std::string_view> section_names() {
@@ -490,6 +500,16 @@ std::string parameters_text(const Sensor& sensor) {
   return text;
 }
 
+/// A number of combination that stands for one of the sensor's.
+void require_combination(const Sensor& sensor) {
+  if (!sensor.combination) {
+    require_length("combinations of a sensor without combination", sensor.combinations.size(), 0);
+    return;
+  }
+  const std::size_t count = sensor.combinations.empty() ? 2 : sensor.combinations.size();
+  require_between("combination", *sensor.combination, 1, static_cast<double>(count));
+}
+
 std::string combinations_text(const Sensor& sensor) {
   std::string text = "combinations:\n";
   const long double scale = scale_of("deg/s");
@@ -644,6 +664,7 @@ Sensor parse_preset(const std::string& text, const std::string& path) {
 }
 
 std::string preset_text(const Sensor& sensor) {
+  require_combination(sensor);
   std::string text = fmt::format("risley_preset: {}\nname: {}\nmanufacturer: {}\nmodel: {}\n",
                                  kSchemaVersion, yaml_quoted(sensor.name),
                                  yaml_quoted(sensor.manufacturer), yaml_quoted(sensor.model));
@@ -663,6 +684,7 @@ std::string preset_text(const Sensor& sensor) {
       if (s.optional && sensor.*s.member == 0.0 && sensor.find_knowledge(s.name) == nullptr) {
         continue;
       }
+      require_specification(s, sensor.*s.member);
       fields += quantity_text(sensor, s.name, sensor.*s.member, s.unit, nullptr);
     }
     if (!fields.empty()) text += fmt::format("{}:\n{}", section, fields);

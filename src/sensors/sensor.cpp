@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "risley/core/error.hpp"
+#include "risley/core/require.hpp"
 
 namespace risley::sensors {
 namespace {
@@ -90,6 +91,7 @@ void Sensor::set(std::string_view parameter, double value) {
 }
 
 void Sensor::set_prism_geometry(const PrismGeometry& sizes) {
+  face_positions(train.face_order(), sizes);  // refuses sizes that do not fit
   geometry = sizes;
   std::erase_if(knowledge, [](const Knowledge& entry) {
     return entry.name.starts_with("prism_thickness_") || entry.name.starts_with("prism_spacing_");
@@ -153,6 +155,21 @@ std::string speed_name(std::size_t rotor) {
   return fmt::format("angular_velocity_{}_deg_per_s", prism_letter(static_cast<int>(rotor)));
 }
 
+/// A sensor whose speeds, face orders and covariance can be taken to other rotors.
+void require_combinations(const Sensor& sensor, const std::vector<SpeedCombination>& all) {
+  const auto prisms = static_cast<std::size_t>(sensor.prisms());
+  require_length("angular_velocity of the sensor", sensor.angular_velocity.size(), prisms);
+  for (const SpeedCombination& one : all) {
+    require_length("angular_velocity of a combination", one.angular_velocity.size(), prisms);
+    require_length_or_none("face_order of a combination", one.face_order.size(), prisms);
+  }
+  const std::size_t names = sensor.covariance_names.size();
+  require_length("a row of the covariance", static_cast<std::size_t>(sensor.covariance.cols()),
+                 names);
+  require_length("a column of the covariance", static_cast<std::size_t>(sensor.covariance.rows()),
+                 names);
+}
+
 }  // namespace
 
 Sensor with_combination(const Sensor& sensor, int combination) {
@@ -162,6 +179,11 @@ Sensor with_combination(const Sensor& sensor, int combination) {
     throw InvalidArgument(
         fmt::format("sensor \"{}\" has only one combination of speeds", sensor.name));
   }
+  if (!sensor.combination) {
+    throw InvalidArgument(fmt::format(
+        "sensor \"{}\" does not say which of its {} combinations it is in", sensor.name, count));
+  }
+  require_combinations(sensor, all);
   for (const int number : {combination, *sensor.combination}) {
     if (number < 1 || number > count) {
       throw InvalidArgument(fmt::format("combination = {} of sensor \"{}\", allowed 1 to {}",

@@ -12,6 +12,7 @@
 
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
+#include "risley/core/require.hpp"
 #include "risley/optics/prism.hpp"
 
 #include "simulation/streams.hpp"
@@ -30,11 +31,6 @@ const std::vector<std::pair<RotorKind, std::string>>& kinds() {
       {RotorKind::hunting, "hunting"},
       {RotorKind::random_walk, "random-walk"}};
   return list;
-}
-
-void check_not_negative(std::string_view name, double value, std::string_view unit) {
-  if (std::isfinite(value) && value >= 0.0) return;
-  throw InvalidArgument(fmt::format("{} = {:g} {}, allowed 0 and above", name, value, unit));
 }
 
 }  // namespace
@@ -64,10 +60,7 @@ const std::vector<std::string>& rotor_kind_names() {
 }
 
 RotorSettings rotor_settings(RotorKind kind, int prisms) {
-  if (prisms < 1 || prisms > kMaxPrisms) {
-    throw InvalidArgument(
-        fmt::format("number of prisms = {}, allowed 1 to {}", prisms, kMaxPrisms));
-  }
+  if (prisms < 1 || prisms > kMaxPrisms) refuse_prism_count(prisms);
   RotorSettings settings;
   switch (kind) {
     case RotorKind::constant:
@@ -98,21 +91,18 @@ RotorMotion::RotorMotion(const RotorSettings& settings, int prism, double start_
       acceleration_noise_(settings.acceleration_noise),
       last_time_ns_(last_time_ns),
       walk_(seed, stream::random_walk(prism)) {
-  check_not_negative("oscillation_speed_std", settings.oscillation_speed_std, "rad/s");
-  check_not_negative("acceleration_noise", settings.acceleration_noise, "rad/s/sqrt(s)");
-  if (!std::isfinite(start_angle) || !std::isfinite(angular_velocity)) {
-    throw InvalidArgument(fmt::format("start angle = {:g} rad, speed = {:g} rad/s, allowed finite",
-                                      start_angle, angular_velocity));
-  }
-  if (last_time_ns < 0) {
-    throw InvalidArgument(fmt::format("last time = {} ns, allowed 0 and above", last_time_ns));
-  }
+  require_between("prism", prism, 0, kMaxPrisms - 1);
+  require_not_below("oscillation_speed_std", settings.oscillation_speed_std, 0, "rad/s");
+  require_not_below("acceleration_noise", settings.acceleration_noise, 0, "rad/s/sqrt(s)");
+  require_finite("start_angle", start_angle, "rad");
+  require_finite("angular_velocity", angular_velocity, "rad/s");
+  require_at_least("last_time_ns", last_time_ns, 0);
   if (settings.oscillation_speed_std > 0.0) {
     const auto at = static_cast<std::size_t>(prism);
-    if (at >= settings.oscillation_period.size() || !(settings.oscillation_period[at] > 0.0)) {
-      throw InvalidArgument(
-          fmt::format("oscillation_period[{}] is missing or not above 0 s", prism));
-    }
+    require_at_least("values of oscillation_period",
+                     static_cast<long long>(settings.oscillation_period.size()), prism + 1);
+    require_above(fmt::format("oscillation_period[{}]", prism), settings.oscillation_period[at], 0,
+                  "s");
     amplitude_ = std::numbers::sqrt2 * settings.oscillation_speed_std;
     frequency_ = kTwoPi / settings.oscillation_period[at];
     phase_ = kTwoPi * RandomStream(seed, stream::kOscillationPhases).uniform(at);
@@ -141,10 +131,8 @@ RotorMotion::Knot RotorMotion::next_knot(const Knot& knot, std::uint64_t number)
 
 void RotorMotion::evaluate(std::span<const std::int64_t> time_ns, std::span<double> angle,
                            std::span<double> speed) const {
-  if (angle.size() != time_ns.size() || speed.size() != time_ns.size()) {
-    throw InvalidArgument(fmt::format("{} times, {} angles and {} speeds must be equally many",
-                                      time_ns.size(), angle.size(), speed.size()));
-  }
+  require_length("angle", angle.size(), time_ns.size());
+  require_length("speed", speed.size(), time_ns.size());
   Knot before, after;
   std::uint64_t number = 0;  // of the knot before
   bool located = false;

@@ -6,7 +6,6 @@
 #include <cmath>
 #include <limits>
 #include <span>
-#include <string_view>
 #include <utility>
 
 #include <fmt/format.h>
@@ -16,6 +15,7 @@
 #include <oneapi/tbb/task_arena.h>
 
 #include "risley/core/angle.hpp"
+#include "risley/core/require.hpp"
 #include "risley/optics/batch.hpp"
 #include "risley/simulation/noise.hpp"
 
@@ -28,29 +28,28 @@ constexpr std::size_t kBlockRows = 4096;
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kMattIntensity = 120.0;
 
-void check_range(std::string_view name, double value, std::string_view unit, double lower,
-                 double upper) {
-  if (value >= lower && value <= upper) return;
-  throw InvalidArgument(
-      fmt::format("{} = {:g} {}, allowed {:g} to {:g}", name, value, unit, lower, upper));
+/// What a simulation needs of the true sensor.
+void require_sensor(const sensors::Sensor& sensor) {
+  require_between("device_type", sensor.device_type, 0, 255);
+  require_length("angular_velocity of the sensor", sensor.angular_velocity.size(),
+                 static_cast<std::size_t>(sensor.prisms()));
+  face_positions(sensor.train.face_order(), sensor.geometry);  // refuses sizes that do not fit
+  require_not_below("range_minimum", sensor.range_minimum, 0, "m");
+  require_not_below("range_maximum", sensor.range_maximum, 0, "m");
+  require_finite("range_offset", sensor.range_offset, "m");
 }
 
 SimulationSettings checked(SimulationSettings settings) {
   const auto prisms = static_cast<std::size_t>(settings.truth.prisms());
-  check_range("duration", settings.duration, "s", 1e-9, 1e7);
+  require_between("duration", settings.duration, 1e-9, 1e7, "s");
   if (!settings.rate) settings.rate = settings.truth.shot_rate;
-  check_range("rate", *settings.rate, "Hz", 1e-3, 1e9);
-  check_range("duration times rate", settings.duration * *settings.rate, "shots", 0.5, 1e12);
+  require_between("rate", *settings.rate, 1e-3, 1e9, "Hz");
+  require_between("duration times rate", settings.duration * *settings.rate, 0.5, 1e12, "shots");
   if (!settings.angle_noise) settings.angle_noise = settings.truth.angle_noise;
   if (!settings.range_noise) settings.range_noise = settings.truth.range_noise;
-  check_range("threads", settings.threads, "", 0, 4096);
-  check_range("device type", settings.truth.device_type, "", 0, 255);
-  if (settings.truth.angular_velocity.size() != prisms) {
-    throw InvalidArgument(fmt::format("sensor \"{}\" has {} speeds for {} prisms",
-                                      settings.truth.name, settings.truth.angular_velocity.size(),
-                                      prisms));
-  }
+  require_between("threads", settings.threads, 0, 4096);
   check_shape(settings.truth.shape());
+  require_sensor(settings.truth);
   if (settings.reported && settings.reported->shape() != settings.truth.shape()) {
     throw InvalidArgument(
         fmt::format("the reported sensor has {} prisms and {} emitters, the true one {} and {}",
@@ -63,15 +62,16 @@ SimulationSettings checked(SimulationSettings settings) {
       settings.start_angles.push_back(kTwoPi * random.uniform(i));
     }
   }
-  if (settings.start_angles.size() != prisms) {
-    throw InvalidArgument(
-        fmt::format("{} start angles given for {} prisms", settings.start_angles.size(), prisms));
-  }
+  require_length("start_angles", settings.start_angles.size(), prisms);
   if (!settings.rotor_settings) {
     settings.rotor_settings = rotor_settings(settings.rotor, settings.truth.prisms());
   }
   if (!settings.station.empty() && !settings.scene) {
     throw InvalidArgument(fmt::format("station \"{}\" needs a scene", settings.station));
+  }
+  if (settings.scene) {
+    require_at_least("planes of the scene", static_cast<long long>(settings.scene->planes.size()),
+                     1);
   }
   return settings;
 }
@@ -274,6 +274,7 @@ const std::vector<double>& Scanner::start_angles() const { return work_->setting
 
 bool Scanner::read(recordings::Chunk& chunk, recordings::TruthColumns& truth,
                    std::size_t max_rows) {
+  require_at_least("max_rows", static_cast<long long>(max_rows), 1);
   return work_->read(chunk, truth, max_rows);
 }
 

@@ -4,9 +4,8 @@
 
 #include <limits>
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
-
-#include "risley/core/golden_section.hpp"
 
 #include "refusal.hpp"
 
@@ -61,13 +60,14 @@ TEST(Require, NeverAllowsWhatIsNoNumber) {
   }
 }
 
-TEST(GoldenSection, AsksForAnIntervalAndATolerance) {  // without one it would never end
-  const auto f = [](double x) { return x * x; };
-  EXPECT_EQ(refusal([&] { golden_section_minimum(f, -1.0, 1.0, 0.0); }),
-            "tolerance = 0, allowed above 0");
-  EXPECT_EQ(refusal([&] { golden_section_minimum(f, kNan, 1.0, 0.1); }), "a = nan, allowed finite");
-  EXPECT_EQ(refusal([&] { golden_section_minimum(f, -1.0, kInfinite, 0.1); }),
-            "b = inf, allowed finite");
+TEST(Require, UnitVectors) {
+  EXPECT_EQ(refusal([] { require_unit_length("direction", 1 - 1e-7); }), "");
+  for (const double length : {0.0, 2.0, 1 - 1e-5}) {
+    EXPECT_EQ(refusal([=] { require_unit_length("direction", length); }),
+              fmt::format("direction has length {}, expected a unit vector", length));
+  }
+  EXPECT_EQ(refusal([] { require_unit_length("direction", kNan); }),
+            "direction has length nan, expected a unit vector");
 }
 
 }  // namespace

@@ -13,6 +13,7 @@
 #include "risley/estimation/coordinate_rounding.hpp"
 #include "risley/estimation/diagnostics.hpp"
 #include "risley/estimation/ekf.hpp"
+#include "risley/estimation/evaluation.hpp"
 #include "risley/estimation/free_parameters.hpp"
 #include "risley/estimation/normal_equations.hpp"
 #include "risley/estimation/process_likelihood.hpp"
@@ -267,6 +268,28 @@ TEST(Entries, NormalEquationsAskForShotsKnotsAndNoiseThatFit) {
     EXPECT_EQ(refusal([&] { return linear.run(columns); }),
               "zenith_residual has 0 values, expected 4");
   }
+  {
+    Linear linear;
+    linear.train = {};
+    EXPECT_EQ(refusal([&] { return linear.run(); }), "number of prisms = 0, allowed 1 to 4");
+  }
+  {
+    Linear linear;
+    linear.series.beam = {0, 0, 1, 0};
+    EXPECT_EQ(refusal([&] { return linear.run(); }), "beam = 1 in row 2, allowed 0 to 0");
+  }
+  {
+    Linear linear;
+    linear.free.front().places = {15};
+    EXPECT_EQ(refusal([&] { return linear.run(); }),
+              "place of refractive_index = 15, allowed 0 to 14");
+    linear.free.front().places = {-1};
+    EXPECT_EQ(refusal([&] { return linear.run(); }),
+              "place of refractive_index = -1, allowed 0 to 14");
+    linear.free = std::vector<FreeParameter>(16);
+    EXPECT_EQ(refusal([&] { return linear.run(); }),
+              "number of free parameters = 16, allowed 0 to 15");
+  }
   Linear linear;
   EXPECT_EQ(refusal([&] { return linear.run(); }), "");
   EXPECT_EQ(refusal([&] {
@@ -275,6 +298,17 @@ TEST(Entries, NormalEquationsAskForShotsKnotsAndNoiseThatFit) {
             }),
             "factor = 0, allowed above 0");
   EXPECT_EQ(NormalEquations{}.knots(), 0U);
+}
+
+TEST(Entries, NormalEquationsAskForAnInstructionSetOfTheProcessor) {
+  Linear linear;
+  EXPECT_THAT(
+      refusal([&] {
+        accumulate(linear.series, linear.knots, linear.train, linear.free, linear.weights,
+                   linear.equations, {}, static_cast<InstructionSet>(3));
+      }),
+      testing::StartsWith("instruction set = unknown, this processor and binary allow baseline"));
+  EXPECT_EQ(linear.equations.knots(), 0U);
 }
 
 TEST(Entries, SmootherAsksForOneProcessPerRotorAndAPriorOfTheFreeParameters) {
@@ -394,6 +428,92 @@ TEST(Entries, TrackingAsksForKnotsAndShotsThatAreThere) {
   EXPECT_EQ(run({0, 5}, 1, two_rotors()), "shots = [0, 5), allowed within [0, 4)");
   EXPECT_EQ(run({0, 4}, 2, two_rotors()), "knots = [0, 2), allowed within [0, 1)");
   EXPECT_EQ(run({0, 4}, 1, Start{}), "rotation_angle of the start has 0 values, expected 2");
+}
+
+/// An estimate of four shots of two prisms that hits the truth.
+struct Judged {
+  Estimate estimate;
+  sensors::Sensor sensor = two_prisms();
+  recordings::TruthColumns truth;
+
+  Judged() {
+    estimate.sensor = sensor;
+    estimate.states.resize(2, 4);
+    truth.resize(2, 4);
+    for (std::size_t i = 0; i < 4; ++i) {
+      estimate.states.time_ns[i] = truth.time_ns[i] = static_cast<std::int64_t>(i) * 10'000;
+    }
+  }
+  std::string run() const {
+    return refusal([&] { return evaluate(estimate, sensor, truth); });
+  }
+};
+
+TEST(Entries, EvaluationAsksForShotsAndColumnsOfTheEstimate) {
+  EXPECT_EQ(Judged().run(), "");
+  {
+    Judged judged;
+    judged.estimate.sensor.train = {};
+    EXPECT_EQ(judged.run(), "number of prisms = 0, allowed 1 to 4");
+  }
+  {
+    Judged judged;
+    judged.estimate.states.resize(2, 0);
+    EXPECT_EQ(judged.run(), "shots of the estimate = 0, allowed 1 or more");
+  }
+  {
+    Judged judged;
+    judged.estimate.states.rotation_angle.pop_back();
+    EXPECT_EQ(judged.run(), "rotation_angle has 1 values, expected 2");
+  }
+  {
+    Judged judged;
+    judged.estimate.states.angular_velocity[1].pop_back();
+    EXPECT_EQ(judged.run(), "a column of angular_velocity has 3 values, expected 4");
+  }
+  {
+    Judged judged;
+    judged.estimate.states.angular_velocity_sigma.clear();
+    EXPECT_EQ(judged.run(), "angular_velocity_sigma has 0 values, expected 2");
+  }
+  {
+    Judged judged;
+    judged.estimate.states.rotation_angle_covariance.pop_back();
+    EXPECT_EQ(judged.run(), "rotation_angle_covariance has 2 values, expected 3");
+  }
+  Judged judged;
+  judged.estimate.free = free_parameters({"refractive_index"}, {2});
+  EXPECT_EQ(judged.run(), "number of values of the estimate = 0, allowed 1 or more");
+  judged.estimate.values.resize(1);
+  EXPECT_EQ(judged.run(), "a column of the covariance has 0 values, expected 1");
+  judged.estimate.covariance.resize(1, 2);
+  EXPECT_EQ(judged.run(), "a row of the covariance has 2 values, expected 1");
+}
+
+TEST(Entries, EvaluationAsksForTheTruthOfTheRecording) {
+  {
+    Judged judged;
+    judged.sensor.train = PrismTrain(parse_face_order("PA-AP-PA"));
+    EXPECT_EQ(judged.run(), "number of prisms of the true sensor = 3, allowed 2 to 2");
+  }
+  {
+    Judged judged;
+    judged.sensor.train = PrismTrain(parse_face_order("PA-AP"), 6);
+    EXPECT_EQ(judged.run(), "number of emitters of the true sensor = 6, allowed 1 to 1");
+  }
+  {
+    Judged judged;
+    judged.truth.resize(3, 4);
+    EXPECT_EQ(judged.run(), "rotation_angle has 3 values, expected 2");
+  }
+  {
+    Judged judged;
+    judged.truth.zenith.pop_back();
+    EXPECT_EQ(judged.run(), "zenith_deg has 3 values, expected 4");
+  }
+  Judged judged;
+  judged.truth.time_ns = {0, 10'000, 20'001, 30'000};
+  EXPECT_EQ(judged.run(), "the truth belongs to another recording: 1 of 4 shots have no row in it");
 }
 
 }  // namespace

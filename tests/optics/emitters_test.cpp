@@ -15,6 +15,7 @@
 #include "risley/optics/observation_adjoint.hpp"
 
 #include "optics/trains.hpp"
+#include "refusal.hpp"
 
 namespace risley {
 namespace {
@@ -22,17 +23,6 @@ namespace {
 using ::testing::HasSubstr;
 using testing::imperfect_train;
 using testing::train_of_emitter;
-
-/// What an InvalidArgument of a call says.
-template <class Call>
-std::string refusal(const Call& call) {
-  try {
-    call();
-  } catch (const InvalidArgument& error) {
-    return error.what();
-  }
-  return "accepted";
-}
 
 TEST(TrainShape, EveryPlaceOfEveryShapeHasOneNameOfItsOwn) {
   for (int prisms = 1; prisms <= kMaxPrisms; ++prisms) {
@@ -303,7 +293,7 @@ TEST(Beams, WrongColumnsAreRefused) {
   out.zenith = zenith;
   using Column = std::vector<std::uint8_t>;
   EXPECT_THAT(refusal([&] { observe_batch(train, angles, out, Column(4)); }),
-              HasSubstr("column beam has 4 values, expected 5"));
+              HasSubstr("beam has 4 values, expected 5"));
   EXPECT_THAT(refusal([&] {
                 observe_batch(train, angles, out, Column{0, 1, 5, 6, 0});
               }),

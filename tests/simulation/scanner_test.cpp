@@ -372,7 +372,7 @@ TEST(Scanner, RefusesSettingsThatMakeNoSense) {
   refused([](auto& s) { s.rate = -5.0; }, "rate = -5 Hz");
   refused([](auto& s) { s.angle_noise = -1.0; }, "angle noise");
   refused([](auto& s) { s.threads = -1; }, "threads = -1");
-  refused([](auto& s) { s.start_angles = {0.0}; }, "1 start angles given for 2 prisms");
+  refused([](auto& s) { s.start_angles = {0.0}; }, "start_angles has 1 values, expected 2");
   refused([](auto& s) { s.station = "roof"; }, "roof");
   refused(
       [](auto& s) {

@@ -9,11 +9,12 @@ namespace risley {
 /// Where a function of one variable that has a single minimum in [a, b] takes it, by golden-section
 /// search: each step costs one evaluation and leaves 0.618 of the interval.
 /// @param tolerance  width of the interval at which the search ends, > 0
-/// @throws InvalidArgument
+/// @throws InvalidArgument for an end that is not finite, b below a, and a tolerance that is not
+///         above 0
 template <class Function>
 double golden_section_minimum(Function&& f, double a, double b, double tolerance) {
   require_finite("a", a);
-  require_finite("b", b);
+  require_not_below("b", b, a);
   require_above("tolerance", tolerance, 0);
   constexpr double kShare = 0.6180339887498949;  // (sqrt(5) - 1) / 2
   double left = b - kShare * (b - a), right = a + kShare * (b - a);

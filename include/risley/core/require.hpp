@@ -35,5 +35,7 @@ void require_between(std::string_view name, double value, double lowest, double 
                      std::string_view unit = {});
 /// "angle = inf rad, allowed finite"
 void require_finite(std::string_view name, double value, std::string_view unit = {});
+/// The length of a vector, up to a millionth: "direction has length 2, expected a unit vector"
+void require_unit_length(std::string_view name, double length);
 
 }  // namespace risley

@@ -32,7 +32,8 @@ struct Evaluation {
 
 /// @param truth_sensor  the simulated sensor
 /// @param truth         its rotation angles at every shot
-/// @throws InvalidArgument when no shot of the estimate is in the truth
+/// @throws InvalidArgument when a shot of the estimate is not in the truth, for a true sensor of
+///         another shape and for columns of other lengths
 Evaluation evaluate(const Estimate& estimate, const sensors::Sensor& truth_sensor,
                     const recordings::TruthColumns& truth);
 

@@ -55,6 +55,7 @@ struct NormalEquations {
   }
 
   /// Multiplies all information: 1/f says that every variance is f times as large.
+  /// @throws InvalidArgument for a factor that is not above 0
   void scale(double factor);
 };
 
@@ -65,8 +66,8 @@ struct NormalEquations {
 /// @param set    instruction set, for tests and benchmarks
 /// @param[out] equations  keeps its memory between calls
 /// @throws InvalidArgument for columns of other lengths, knots beyond the series or of another
-/// train,
-///         and noise that is none
+///         train, free parameters beyond the flat vector, noise that is none, and as check_beams()
+///         and check_available()
 void accumulate(const AngleSeries& series, const RotorTrajectory& knots, const PrismTrain& train,
                 const std::vector<FreeParameter>& free, const ShotWeights& weights,
                 NormalEquations& equations, const ShotColumns& columns = {},

@@ -57,7 +57,8 @@ struct NetcdfStorage {
 
 /// A NetCDF-4 file that is written. It appears under its name with close(), whole; without it
 /// nothing is left. First everything is defined, then end_definitions(), then values.
-/// Everything throws FileError where the disk or the library refuses.
+/// Everything throws FileError where the disk or the library refuses, and InvalidArgument for
+/// dimensions, values and texts that do not fit each other.
 class NetcdfOutput {
  public:
   explicit NetcdfOutput(const std::string& path);
@@ -74,6 +75,7 @@ class NetcdfOutput {
   /// A dimension that grows with what is written.
   NetcdfDimension define_growing_dimension(const std::string& name);
 
+  /// @param dimensions  one or two, of which only the first may grow
   template <class T>
   NetcdfVariable define(const std::string& name,
                         std::initializer_list<const NetcdfDimension*> dimensions,
@@ -126,7 +128,8 @@ class NetcdfOutput {
 
 /// A NetCDF file that is read. What it says of itself is believed only as far as the bytes that
 /// it has: everything throws FileError, naming variable, dimension or attribute, where something
-/// is missing, of another kind, or larger than the file can hold.
+/// is missing, of another kind, or larger than the file can hold. Calls that ask for no or for more
+/// than two dimensions, or for values of another type than their variable's, throw InvalidArgument.
 class NetcdfInput {
  public:
   explicit NetcdfInput(const std::string& path);

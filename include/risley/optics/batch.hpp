@@ -30,7 +30,7 @@ struct DirectionColumns {
 /// @param set              instruction set, for tests and benchmarks; default the best available
 /// @return number of shots that are not valid
 /// @throws InvalidArgument when column counts or lengths differ, for a beam that the train does not
-///         have, and as check_available()
+///         have, and as check_shape(), face_positions() and check_available()
 std::size_t observe_batch(const PrismTrain& train,
                           std::span<const std::span<const double>> rotation_angles,
                           const DirectionColumns& out, std::span<const std::uint8_t> beam = {},
@@ -38,7 +38,7 @@ std::size_t observe_batch(const PrismTrain& train,
 
 /// @param beam   empty, or one number per shot, counted from 0
 /// @throws InvalidArgument for another length or a beam that the train does not have, naming its
-/// row
+///         row
 void check_beams(const PrismTrain& train, std::span<const std::uint8_t> beam, std::size_t shots);
 
 /// Azimuth, zenith and their gradients for many shots: first by the flat parameters, those of all
@@ -49,6 +49,7 @@ struct LinearisationColumns {
 };
 
 /// As observe_batch, with derivatives.
+/// @throws InvalidArgument as observe_batch(), and for a column that is missing
 std::size_t linearise_batch(const PrismTrain& train,
                             std::span<const std::span<const double>> rotation_angles,
                             const LinearisationColumns& out,

@@ -33,11 +33,13 @@ struct PrismSize {
 /// The sizes that all prisms share, prism_thickness_m and prism_spacing_m.
 std::vector<PrismSize> shared_prism_sizes();
 /// The prisms' own: prism_thickness_a_m ..., then prism_spacing_a_m (from prism A to B) ...
+/// @throws InvalidArgument for a number of prisms that no train has
 std::vector<PrismSize> own_prism_sizes(int prisms);
 
 /// X of the points where the faces, in beam order, cross the axis, m [2 prisms]. The perpendicular
 /// face of the last prism stands at 0, where the frame has its origin.
-/// @throws InvalidArgument for a geometry of another number of prisms
+/// @throws InvalidArgument for a number of prisms that no train has, and for a geometry of another
+///         number of prisms or with sizes that are not finite
 std::vector<double> face_positions(const std::vector<FaceOrder>& face_order,
                                    const PrismGeometry& geometry);
 
@@ -154,7 +156,8 @@ struct Ray {
 /// The ray of one shot.
 /// @param rotation_angles  [prisms], rad, beam order
 /// @param beam             number of the emitter, counted from 0
-/// @throws InvalidArgument when there are not as many angles as prisms, and as check_beam()
+/// @throws InvalidArgument when there are not as many angles as prisms, and as check_beam() and
+///         face_positions()
 Ray emergent_ray(const PrismTrain& train, const PrismGeometry& geometry,
                  std::span<const double> rotation_angles, int beam = 0);
 

@@ -33,8 +33,8 @@ struct InverseSolution {
 /// @param fixed_angles   rotation angles, rad, of all prisms before the last two: more than two
 ///                       prisms reach a direction in infinitely many ways, and the caller chooses
 /// @param beam           number of the emitter, counted from 0
-/// @throws InvalidArgument for fewer than two prisms, a wrong number of fixed angles, or a
-///         direction that is not a unit vector, and as check_beam()
+/// @throws InvalidArgument for fewer than two prisms, a wrong number of fixed angles or one that is
+///         not finite, or a direction that is not a unit vector, and as check_beam()
 InverseSolution rotation_angles_for(const PrismTrain& train, const Vector3<double>& direction,
                                     std::span<const double> fixed_angles = {}, int beam = 0);
 

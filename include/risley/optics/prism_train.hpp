@@ -33,22 +33,31 @@ class PrismTrain {
   const std::vector<double>& parameters() const { return parameters_; }
 
   /// Value at one place of the flat vector, SI units.
-  double operator[](int place) const { return parameters_[static_cast<std::size_t>(place)]; }
+  /// @throws InvalidArgument for a place beyond it
+  double operator[](int place) const { return parameters_[index(place)]; }
 
   /// Value of a named train parameter, SI units. A name shared by all prisms reads the first's.
+  /// @throws InvalidArgument (unknown name)
   double get(std::string_view name) const;
 
   /// Sets a named train parameter, SI units. @throws InvalidArgument (unknown name, bounds)
   void set(std::string_view name, double value);
 
-  /// Sets one place of any value, for solvers that step through the parameter space.
-  void set_place(int place, double value) { parameters_[static_cast<std::size_t>(place)] = value; }
+  /// Sets one place to any value, for solvers that step through the parameter space.
+  /// @throws InvalidArgument for a place beyond the flat vector
+  void set_place(int place, double value) { parameters_[index(place)] = value; }
 
   /// The same glass and wedges with every error parameter zero. The directions of several emitters
-  /// are no errors and stay.
+  /// are no errors and stay. @throws InvalidArgument as check_shape()
   PrismTrain without_errors() const;
 
  private:
+  std::size_t index(int place) const {
+    if (place < 0 || place >= static_cast<int>(parameters_.size())) refuse_place(place);
+    return static_cast<std::size_t>(place);
+  }
+  [[noreturn]] void refuse_place(int place) const;
+
   std::vector<FaceOrder> face_order_;
   int emitters_ = 1;
   std::vector<double> parameters_;

@@ -21,6 +21,7 @@ struct Extrinsics {
 bool is_identity(const Extrinsics& pose);
 
 /// X, Y and Z of the sensor as unit vectors of the frame it is posed in: the columns of R.
+/// @throws InvalidArgument for an angle that is not finite
 std::array<Vector3<double>, 3> sensor_axes(const Extrinsics& pose);
 
 /// The pose that a recording's header holds of a sensor; empty when all its numbers are 0, or when

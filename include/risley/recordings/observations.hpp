@@ -36,10 +36,15 @@ struct Observations {
   std::size_t size() const { return time_ns.size(); }
   void clear();
   void resize(std::size_t rows);
+  /// @throws InvalidArgument as require_columns()
   void append(const Observations& other);
   /// Removes rows from the beginning.
+  /// @throws InvalidArgument when there are fewer, and as require_columns()
   void drop_front(std::size_t rows);
 };
+
+/// @throws InvalidArgument when a column has another length than time_ns
+void require_columns(const Observations& rows);
 
 /// Header of one sensor data packet as it was recorded, kept so that a packet format can be
 /// written again byte by byte.

@@ -38,7 +38,8 @@ class Reader {
   /// Replaces the chunk by the next rows, about max_rows (packets stay whole).
   /// @return false when there is nothing more
   /// @throws FileError at damage in the body, after every sound row before it was returned; from
-  ///         open_recording() also at a time further than kLongestTimeSpan_ns from the first
+  ///         open_recording() also at a time further than kLongestTimeSpan_ns from the first, and
+  ///         InvalidArgument for max_rows = 0
   virtual bool read(Chunk& chunk, std::size_t max_rows = kDefaultChunkRows) = 0;
 
   /// Part of the file already read, [0, 1].

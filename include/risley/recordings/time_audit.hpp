@@ -64,6 +64,7 @@ struct TimeAuditResult {
 /// Audits a recording chunk by chunk; its memory does not grow with the recording.
 class TimeAudit {
  public:
+  /// @throws InvalidArgument as require_columns()
   void add(const Chunk& chunk);
 
   /// What was seen so far.

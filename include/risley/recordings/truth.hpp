@@ -22,24 +22,27 @@ struct TruthColumns {
 
   std::size_t size() const { return time_ns.size(); }
   int prisms() const { return static_cast<int>(rotation_angle.size()); }
+  /// @throws InvalidArgument for a negative number of prisms or more than 26
   void resize(int prisms, std::size_t rows);
   /// Appends all rows of others; columns without rows take on their number of prisms.
-  /// @throws InvalidArgument for another number of prisms
+  /// @throws InvalidArgument as require_columns()
   void append(const TruthColumns& others);
 };
 
+/// @throws InvalidArgument when the rows are of another number of prisms, or a column has another
+///         length than time_ns
+void require_columns(const TruthColumns& rows, int prisms);
+
 /// Writes truth columns piece by piece as NetCDF-4: time (s), rotation_angle_a_deg,
 /// angular_velocity_a_deg_per_s, ..., azimuth_deg, zenith_deg, range_m along the dimension "shot".
-/// The file appears under its name only at close(); a writer destroyed before leaves nothing. The
-/// NetCDF library is not thread-safe: one NetCDF file of a process at a time.
+/// The file appears under its name only at close(); a writer destroyed before leaves nothing.
 class TruthWriter {
  public:
-  /// @throws FileError
+  /// @throws InvalidArgument unless there are 1 to 26 prisms, FileError
   TruthWriter(const std::string& path, int prisms);
   ~TruthWriter();
 
-  /// Appends rows. @throws InvalidArgument when the columns differ in length or in prisms,
-  /// FileError
+  /// Appends rows. @throws InvalidArgument as require_columns(), FileError
   void write(const TruthColumns& rows);
   /// Completes the file. @throws FileError
   void close();
@@ -53,7 +56,8 @@ class TruthWriter {
 TruthColumns load_truth(const std::string& path);
 
 /// Reads the rows of some times, as many as the file has of them; memory does not grow with the
-/// length of the file. @param time_ns  ascending @throws FileError
+/// length of the file. @param time_ns  ascending
+/// @throws InvalidArgument for times that descend, FileError
 TruthColumns load_truth(const std::string& path, std::span<const std::int64_t> time_ns);
 
 }  // namespace risley::recordings

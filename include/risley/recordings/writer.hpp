@@ -17,9 +17,13 @@ class Writer {
  public:
   virtual ~Writer() = default;
 
-  /// Appends rows. @throws FileError when the disk refuses, InvalidArgument when the format cannot
-  /// hold a value (the message names the column, the row and the allowed range)
-  virtual void write(const Chunk& chunk) = 0;
+  /// Appends rows. @throws FileError when the disk refuses, InvalidArgument for columns of
+  /// different lengths and when the format cannot hold a value (the message names the column, the
+  /// row and the allowed range)
+  void write(const Chunk& chunk) {
+    require_columns(chunk.observations);
+    append(chunk);
+  }
 
   /// Completes the file and gives it its name. @throws FileError
   virtual void close() = 0;
@@ -29,6 +33,9 @@ class Writer {
   std::uint64_t left_out() const { return left_out_; }
 
  protected:
+  /// Appends rows whose columns have one length.
+  virtual void append(const Chunk& chunk) = 0;
+
   std::uint64_t left_out_ = 0;
 };
 

@@ -56,6 +56,7 @@ struct Hit {
 /// The nearest plane in front of a ray within 1000 km, or nothing.
 /// @param origin     scene frame, m
 /// @param direction  unit vector, scene frame
+/// @throws InvalidArgument for an origin that is not finite or a direction that is no unit vector
 std::optional<Hit> nearest_hit(const Scene& scene, const Vector3<double>& origin,
                                const Vector3<double>& direction);
 

@@ -32,7 +32,8 @@ Sensor parse_preset(const std::string& text, const std::string& path);
 
 /// Writes the schema that parse_preset reads. Numbers keep all their digits, so reading the text
 /// gives the same sensor and writing it again gives the same text.
-/// @throws InvalidArgument for numbers that are not finite or a covariance of the wrong size
+/// @throws InvalidArgument for numbers that are not finite, noise, limits and rates that the schema
+///         does not allow, a combination that is not there or a covariance of the wrong size
 std::string preset_text(const Sensor& sensor);
 
 }  // namespace risley::sensors

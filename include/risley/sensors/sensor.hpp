@@ -95,6 +95,7 @@ struct Sensor {
   /// @throws InvalidArgument naming the parameter, value, unit and range
   void set(std::string_view parameter, double value);
   /// Sets the prisms' sizes and forgets who said otherwise.
+  /// @throws InvalidArgument as face_positions()
   void set_prism_geometry(const PrismGeometry& geometry);
   /// Knowledge of a parameter, or nullptr when nothing is recorded.
   const Knowledge* find_knowledge(std::string_view parameter) const;
@@ -105,10 +106,12 @@ struct Sensor {
 /// The same sensor in that speed combination. Where its speeds are those of the one it is in, but
 /// for order and sign, they keep their exact values, and what is known of them goes along.
 /// @param combination  from 1
-/// @throws InvalidArgument when the sensor has no such combination
+/// @throws InvalidArgument when the sensor has no such combination, does not say which it is in, or
+///         has speeds, face orders or a covariance of another length
 Sensor with_combination(const Sensor& sensor, int combination);
 
 /// The sensor in each of its speed combinations, its own first; itself when it has only one.
+/// @throws InvalidArgument as with_combination()
 std::vector<Sensor> in_all_combinations(const Sensor& sensor);
 
 }  // namespace risley::sensors

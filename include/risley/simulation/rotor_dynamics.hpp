@@ -53,7 +53,8 @@ class RotorMotion {
   /// @param start_angle       at time zero, rad
   /// @param angular_velocity  nominal, rad/s
   /// @param last_time_ns      largest time that will be asked for
-  /// @throws InvalidArgument for settings that are negative, not finite or lack a period
+  /// @throws InvalidArgument for a prism that no train has, a last time below 0, settings that are
+  ///         negative, not finite or lack a period, and an angle or speed that is not finite
   RotorMotion(const RotorSettings& settings, int prism, double start_angle, double angular_velocity,
               std::int64_t last_time_ns, std::uint64_t seed);
 

@@ -72,6 +72,7 @@ class Scanner {
   const std::vector<double>& start_angles() const;
 
   /// Replaces both by the next rows, at most max_rows. @return false when there is nothing more
+  /// @throws InvalidArgument for max_rows = 0
   bool read(recordings::Chunk& chunk, recordings::TruthColumns& truth,
             std::size_t max_rows = recordings::kDefaultChunkRows);
 

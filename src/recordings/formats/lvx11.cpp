@@ -88,7 +88,7 @@ class Lvx11Writer final : public Writer {
  public:
   Lvx11Writer(const std::string& path, const RecordingHeader& header);
 
-  void write(const Chunk& chunk) override;
+  void append(const Chunk& chunk) override;
   void close() override;
 
  private:
@@ -230,7 +230,7 @@ std::size_t Lvx11Writer::device_row(std::uint8_t device, std::uint64_t row_numbe
   return device;
 }
 
-void Lvx11Writer::write(const Chunk& chunk) {
+void Lvx11Writer::append(const Chunk& chunk) {
   if (chunk.packets.empty()) {
     write_rows(chunk);
   } else {

@@ -112,7 +112,7 @@ class NetcdfWriter final : public Writer {
     write_header(header);
   }
 
-  void write(const Chunk& chunk) override {
+  void append(const Chunk& chunk) override {
     require_whole_packets(chunk);
     rows_.append(chunk.observations);
     packets_.insert(packets_.end(), chunk.packets.begin(), chunk.packets.end());

@@ -178,7 +178,7 @@ class OpenpylivoxBinWriter final : public Writer {
     store<std::int16_t>(bytes + 13, static_cast<std::int16_t>(layout_.data_type));
   }
 
-  void write(const Chunk& chunk) override {
+  void append(const Chunk& chunk) override {
     if (layout_.imu) {
       for (const auto& sample : chunk.imu) {
         std::uint8_t* const bytes = append_record(sample.time_ns);

@@ -157,7 +157,7 @@ class OpenpylivoxCsvWriter final : public Writer {
     output_.end_row();
   }
 
-  void write(const Chunk& chunk) override {
+  void append(const Chunk& chunk) override {
     if (variant_.imu) {
       write_imu(chunk.imu);
       return;

@@ -146,7 +146,7 @@ class ScanSequenceWriter final : public Writer {
     output_.end_row();
   }
 
-  void write(const Chunk& chunk) override {
+  void append(const Chunk& chunk) override {
     const auto& rows = chunk.observations;
     time_.look_at(rows.time_ns);
     for (std::size_t i = 0; i < rows.size(); ++i, ++rows_seen_) {

@@ -7,9 +7,7 @@
 #include <chrono>
 #include <limits>
 
-#include <fmt/format.h>
-
-#include "risley/core/error.hpp"
+#include "risley/core/require.hpp"
 #include "risley/io/little_endian.hpp"
 
 namespace risley::recordings::livox {
@@ -41,14 +39,13 @@ const RecordLayout* record_layout(std::uint8_t data_type) {
 }
 
 std::uint8_t data_type_of(bool cartesian, bool tagged, int returns) {
-  for (std::size_t type = 0; type < kLayouts.size(); ++type) {
-    const RecordLayout& layout = kLayouts[type];
-    if (layout.cartesian == cartesian && layout.returns == returns &&
-        layout.tagged == (tagged || returns > 1)) {
-      return static_cast<std::uint8_t>(type);
-    }
-  }
-  throw InvalidArgument(fmt::format("returns per shot = {}, allowed 1 to 3", returns));
+  require_between("returns per shot", returns, 1, 3);
+  const auto found =
+      std::find_if(kLayouts.begin(), kLayouts.end(), [&](const RecordLayout& layout) {
+        return layout.cartesian == cartesian && layout.returns == returns &&
+               layout.tagged == (tagged || returns > 1);
+      });
+  return static_cast<std::uint8_t>(found - kLayouts.begin());
 }
 
 std::optional<ShotGrid> shot_grid(std::uint8_t device_type, std::uint8_t data_type) {

@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "risley/core/require.hpp"
 #include "risley/core/saturating.hpp"
 #include "risley/io/little_endian.hpp"
 
@@ -78,13 +79,9 @@ std::optional<std::size_t> decode_float_points(std::size_t points, const std::ui
 }
 
 void check_grid(const ShotGrid& grid) {
-  const auto check = [](const char* field, std::uint32_t value) {
-    if (value > 0) return;
-    throw InvalidArgument(fmt::format("ShotGrid::{} = 0, allowed 1 or more", field));
-  };
-  check("interval_denominator", grid.interval_denominator);
-  check("beams", grid.beams);
-  check("records_per_shot", grid.records_per_shot);
+  require_at_least("ShotGrid::interval_denominator", grid.interval_denominator, 1);
+  require_at_least("ShotGrid::beams", grid.beams, 1);
+  require_at_least("ShotGrid::records_per_shot", grid.records_per_shot, 1);
 }
 
 void check_layout(const RecordLayout& layout) {
