@@ -13,6 +13,7 @@
 #include "risley/core/error.hpp"
 #include "risley/optics/batch.hpp"
 
+#include "calibration/shot_labels.hpp"
 #include "calibration/wall_matching.hpp"
 
 namespace risley::calibration {
@@ -171,7 +172,7 @@ CalibrationForecast forecast(const CalibrationPlan& plan) {
     }
     for (std::size_t w = 0; w < seen.rows.size(); ++w) {
       const auto n = static_cast<double>(seen.rows[w].size());
-      if (seen.rows[w].size() < 30) continue;
+      if (seen.rows[w].size() < kLeastViewShots) continue;
       const scenes::ScenePlane& plane = plan.scene.planes[w];
       result.walls.push_back({plane.name, names.back(), n / static_cast<double>(kSampleShots),
                               seen.incidence[w] / n, seen.range[w] / n});

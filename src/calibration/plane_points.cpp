@@ -40,6 +40,13 @@ void RangedShots::set_row(std::size_t row, const RangedShots& from, std::size_t 
   beam[row] = from.beam.empty() ? std::uint8_t{0} : from.beam[from_row];
 }
 
+RangedShots rows_of(const RangedShots& shots, const std::vector<std::size_t>& rows) {
+  RangedShots result;
+  result.resize(shots.prisms(), rows.size());
+  for (std::size_t i = 0; i < rows.size(); ++i) result.set_row(i, shots, rows[i]);
+  return result;
+}
+
 RangedRecording ranged_recording(const estimation::Estimate& estimate, std::string name,
                                  std::string serial) {
   if (!estimate.converged) {

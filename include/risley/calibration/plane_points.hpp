@@ -32,6 +32,9 @@ struct RangedShots {
   void set_row(std::size_t row, const RangedShots& from, std::size_t from_row);
 };
 
+/// Some shots by their rows.
+RangedShots rows_of(const RangedShots& shots, const std::vector<std::size_t>& rows);
+
 /// One recording, ready to be calibrated with.
 struct RangedRecording {
   std::string name;    ///< for messages: its file
