@@ -10,7 +10,7 @@
 
 #include <fmt/format.h>
 
-#include "risley/calibration/plane_segmentation.hpp"
+#include "risley/calibration/fitted_plane.hpp"
 #include "risley/calibration/rays.hpp"
 #include "risley/core/angle.hpp"
 

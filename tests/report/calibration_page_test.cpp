@@ -328,6 +328,7 @@ TEST(CalibrationPage, APoorDatumSaysWhatHelps) {
 TEST(CalibrationPage, AFailureSaysWhyAndWhatToDo) {
   Page page;
   page.calibration = Calibration();
+  page.sample.clear();
   page.calibration.sensor = sensors::load_sensor("mid-40");
   page.calibration.believed = page.calibration.sensor.train;
   page.calibration.reason = "the walls do not tell pitch & yaw";
