@@ -45,7 +45,7 @@ struct HeaderNumbers {
   std::array<double, 3> low{}, high{};                ///< m; 0 without points
 };
 
-/// Header and point records of one LAS file.
+/// Header (las_header.cpp) and point records (las_records.cpp) of one LAS file.
 ///
 /// - X, Y, Z: multiples of the scale, offset 0. The bounding box is that of the stored numbers.
 /// - Intensity: the sensor's 0-255 times 256, which the specification asks of a range of 256.
