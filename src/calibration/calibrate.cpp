@@ -11,9 +11,11 @@
 #include "risley/calibration/calibration_plan.hpp"
 #include "risley/calibration/paper_adjustment.hpp"
 #include "risley/core/error.hpp"
+#include "risley/core/require.hpp"
 
 #include "calibration/belief.hpp"
 #include "calibration/calibrated_sensor.hpp"
+#include "calibration/entry_checks.hpp"
 #include "calibration/labelled_shots.hpp"
 #include "calibration/verdict.hpp"
 #include "calibration/wall_flatness.hpp"
@@ -24,13 +26,19 @@
 namespace risley::calibration {
 namespace {
 
-constexpr std::size_t kCoarseShots = 40000;  // of all recordings together, to find the planes with
-constexpr std::size_t kBundleBeams = 4000;   // for formal sigmas of the beams
-constexpr int kCoarseRounds = 5;
-constexpr int kMostFullRounds = 5;
-/// Variance of a normal distribution cut off at the gate.
+/// Shots to find the planes with, of all recordings together and of each at least, and rounds of
+/// labels and adjustment on these and on all shots: docs/theory/calibration.md
+constexpr std::size_t kCoarseShots = 40000, kLeastCoarseShots = 5000;
+constexpr int kCoarseRounds = 5, kMostFullRounds = 5;
+/// Beams of all recordings that formal sigmas are the mean of: beams are smooth in two rotation
+/// angles, which so many sample every 6 degrees, 360 / sqrt(4000).
+constexpr std::size_t kBundleBeams = 4000;
+/// Variance of a normal distribution cut off at the gate g: 1 - 2 g phi(g) / (2 Phi(g) - 1).
 constexpr double kVarianceWithinGate = 0.97334;
-constexpr double kLeastRangeSigma = 1e-7;  // m
+/// Keeps the variance of ranges without noise above 0; sensors step by 1 mm. M.
+constexpr double kLeastRangeSigma = 1e-7;
+/// Steps stand still when what is left out changes by less than one shot in a hundred.
+constexpr std::size_t kSettledPart = 100;
 
 /// Variance component of every view: what its residuals say of the range noise.
 void update_range_variances(PlanarSolution& solution) {
@@ -42,22 +50,33 @@ void update_range_variances(PlanarSolution& solution) {
   }
 }
 
+/// Columns and matrices of one recording that belong together.
+void require_recording(const RangedRecording& recording) {
+  require_at_least("number of shots", static_cast<long long>(recording.shots.size()), 1);
+  require_shots(recording.shots, recording.believed.train);
+  const auto prisms = static_cast<std::size_t>(recording.believed.prisms());
+  const auto matrix = [](const char* rows, const char* columns, const Eigen::MatrixXd& m,
+                         std::size_t expected_rows, std::size_t expected_columns) {
+    require_length(rows, static_cast<std::size_t>(m.rows()), expected_rows);
+    require_length(columns, static_cast<std::size_t>(m.cols()), expected_columns);
+  };
+  const std::size_t free = recording.free.size();
+  matrix("rows of the covariance", "columns of the covariance", recording.covariance, free, free);
+  matrix("rows of angle_sensitivity", "columns of angle_sensitivity", recording.angle_sensitivity,
+         prisms, free);
+  matrix("rows of mean_angle_covariance", "columns of mean_angle_covariance",
+         recording.mean_angle_covariance, prisms, prisms);
+}
+
 /// One run, from recordings to results.
 class Work {
  public:
   Work(const std::vector<RangedRecording>& recordings, const CalibrationOptions& options,
        const Progress& progress)
       : recordings_(recordings), options_(options), progress_(progress) {
-    if (recordings.empty()) throw InvalidArgument("no recording to calibrate on");
-    if (!options.stations.empty() && options.stations.size() != recordings.size()) {
-      throw InvalidArgument(fmt::format("{} stations given for {} recordings",
-                                        options.stations.size(), recordings.size()));
-    }
-    belief_ = pooled_belief(recordings);
     range_noise_ = options.range_noise.value_or(options.sensor.range_noise);
-    if (!(range_noise_ > 0)) {
-      throw InvalidArgument(fmt::format("range noise = {} m, allowed above 0", range_noise_));
-    }
+    require_entries();
+    belief_ = pooled_belief(recordings);
     // Rounding adds its own variance.
     range_noise_ = std::hypot(range_noise_, options.sensor.range_resolution / std::sqrt(12.0));
     for (std::size_t r = 0; r < recordings.size(); ++r) {
@@ -84,6 +103,19 @@ class Work {
   }
 
  private:
+  void require_entries() const {
+    require_at_least("number of recordings", static_cast<long long>(recordings_.size()), 1);
+    require_length_or_none("stations", options_.stations.size(), recordings_.size());
+    require_above("range noise", range_noise_, 0, "m");
+    require_not_below("range resolution", options_.sensor.range_resolution, 0, "m");
+    if (options_.prior_sigma) require_above("prior sigma", *options_.prior_sigma, 0, "rad");
+    require_not_below("sigma of the range offset", options_.range_offset_sigma, 0, "m");
+    for (const auto& [name, value] : options_.fixed) {
+      if (value) require_finite(name, *value);
+    }
+    for (const RangedRecording& recording : recordings_) require_recording(recording);
+  }
+
   bool paper() const { return options_.method == CalibrationMethod::paper; }
 
   void set_up() {
@@ -112,7 +144,8 @@ class Work {
 
   /// Planes in every recording by itself, then which of them are the same wall.
   void find_walls() {
-    const std::size_t most = std::max<std::size_t>(kCoarseShots / recordings_.size(), 5000);
+    const std::size_t most =
+        std::max<std::size_t>(kCoarseShots / recordings_.size(), kLeastCoarseShots);
     std::vector<FoundPlane> found;
     std::vector<std::vector<int>> labels;
     for (std::size_t r = 0; r < recordings_.size(); ++r) {
@@ -227,7 +260,7 @@ class Work {
       if (!paper()) result_.steps = leave_out_steps(problem_, all_);
       const std::size_t before = std::exchange(left_out, 0);
       for (const SurfaceStep& step : result_.steps) left_out += step.points;
-      settled = std::max(before, left_out) - std::min(before, left_out) <= left_out / 100;
+      settled = std::max(before, left_out) - std::min(before, left_out) <= left_out / kSettledPart;
       hand_out_all();
     }
     const Evenness evenness = evenness_of(problem_, all_);

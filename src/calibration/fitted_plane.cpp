@@ -11,6 +11,12 @@
 #include "risley/core/require.hpp"
 
 namespace risley::calibration {
+namespace {
+
+/// Square of the least width over length of the points: 1 mm at 100 m, and far above rounding.
+constexpr double kLeastWidthSquare = 1e-10;
+
+}  // namespace
 
 Plane fitted_plane(std::span<const Vector3<double>> points, std::span<const std::size_t> use) {
   if (use.size() < 3) {
@@ -28,7 +34,7 @@ Plane fitted_plane(std::span<const Vector3<double>> points, std::span<const std:
   if (!moments.allFinite()) throw EstimationError("a plane of points that are not finite");
   // Squares of the singular values, smallest first.
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(moments);
-  if (!(axes.eigenvalues()[1] > 1e-10 * axes.eigenvalues()[2])) {
+  if (!(axes.eigenvalues()[1] > kLeastWidthSquare * axes.eigenvalues()[2])) {
     throw EstimationError("a plane of points that lie on one line");
   }
   const Eigen::Vector3d normal = axes.eigenvectors().col(0).normalized();

@@ -11,12 +11,21 @@
 namespace risley::calibration {
 namespace {
 
-constexpr int kMostLabelRounds = 10;        ///< of labels and fits
-constexpr double kLeastShare = 0.1;         ///< of the points around: a plane is there
-constexpr std::size_t kLeastNear = 3;       ///< points around: a plane is there
-constexpr double kLeastFill = 0.5;          ///< of the points in a plane's own cells
-constexpr double kNearlyParallel = 0.0087;  ///< rad, half a degree
-constexpr double kCrossing = 0.087;         ///< rad, 5 degrees: planes that have an edge
+/// Of labels and fits: ends an exchange of a few points to and fro.
+constexpr int kMostLabelRounds = 10;
+/// A plane is there where it has this share of the points around, see docs/theory/calibration.md,
+/// and as many as fix a plane.
+constexpr double kLeastShare = 0.1;
+constexpr std::size_t kLeastNear = 3;
+/// Of the points in a plane's own cells: a slice of a body has less than half of them
+/// (PlaneSegmentation.ScatteredPointsAreNoPlane). A cell is its own where it holds a quarter.
+constexpr double kLeastFill = 0.5, kOwnCell = 0.25;
+/// Planes at a smaller angle (half a degree) are parallel but for noise; one is then the other
+/// where it has half of its points (PlaneSegmentation.OneSurfaceIsOnePlane). Rad.
+constexpr double kNearlyParallel = 0.0087, kParallelShare = 0.5;
+/// Planes at a smaller angle (5 degrees) differ so slowly in range that the strip in which noise
+/// decides between them would be most of both. Rad.
+constexpr double kCrossing = 0.087;
 
 class Labeller {
  public:
@@ -154,7 +163,8 @@ class Labeller {
     double own = 0, all = 0;
     for (std::size_t c = 0; c < counts.size(); ++c) {
       const std::size_t inside = points_.grid.beams_in(c).size();
-      if (counts[c] == 0 || 4 * counts[c] < inside) continue;
+      if (counts[c] == 0 || static_cast<double>(counts[c]) < kOwnCell * static_cast<double>(inside))
+        continue;
       own += static_cast<double>(counts[c]);
       all += static_cast<double>(inside);
     }
@@ -173,7 +183,7 @@ class Labeller {
                   points_.noise.gate_square;
         }
         const double angle = angle_between(planes_[smaller].normal, planes_[larger].normal);
-        const double needed = angle < kNearlyParallel ? 0.5 : 0.9;
+        const double needed = angle < kNearlyParallel ? kParallelShare : kOneSurfaceShare;
         if (static_cast<double>(both) < needed * static_cast<double>(rows[smaller].size())) {
           continue;
         }

@@ -8,6 +8,10 @@
 
 namespace risley::calibration {
 
+/// Part of a smaller plane's points that lies near a larger one where both are one surface: some of
+/// the rest are outliers. PlaneSegmentation.OneSurfaceIsOnePlane
+inline constexpr double kOneSurfaceShare = 0.9;
+
 /// Planes and the points that are theirs.
 struct LabelledPlanes {
   std::vector<Plane> planes;

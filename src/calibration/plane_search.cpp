@@ -18,11 +18,23 @@ namespace {
 /// What each stream of random numbers is for.
 constexpr std::uint64_t kOrderStream = 1, kSampleStream = 2;
 
-constexpr std::size_t kScored = 2000;  ///< points that candidates are scored on
+/// Points that candidates are scored on: shares are then known to 1 %, sqrt(0.25 / 2000).
+constexpr std::size_t kScored = 2000;
+/// Probability that no trial hit the largest plane thrice. That takes log(kMissed) / log(1 -
+/// share^3) trials: 52 for half of the points, 860 for a fifth; the bounds lie beyond. Smaller
+/// planes are left to triples of near points.
+constexpr double kMissed = 1e-3;
 constexpr int kFewestTrials = 60, kMostTrials = 1000;
-constexpr int kMostPolished = 40;  ///< candidates that are refitted before they are judged
-constexpr double kMissed = 1e-3;   ///< probability that no trial hit the largest plane
-constexpr int kMostRejected = 4;   ///< candidates set aside for filling no area
+/// How far the near points of a triple lie apart, rad (six and two degrees):
+/// docs/theory/calibration.md
+constexpr double kFartherTriple = 0.105, kNearTriple = 0.035;
+/// Near triples with this part of the best score are refitted before they are judged. Each costs
+/// four fits, so their number is bounded.
+constexpr double kWorthPolishing = 0.4;
+constexpr int kMostPolished = 40;
+/// Candidates set aside for filling no area: each takes its points out of the search, and what is
+/// left of a scan after so many rows of points is no wall either.
+constexpr int kMostRejected = 4;
 
 /// Support of a candidate among the points it was scored on.
 struct Score {
@@ -108,7 +120,7 @@ class Search {
   std::optional<Candidate> largest_plane(const std::vector<std::size_t>& rest) {
     const std::vector<std::size_t> scored(
         rest.begin(), rest.begin() + static_cast<std::ptrdiff_t>(std::min(kScored, rest.size())));
-    const std::array<int, 3> reach{0, cells_in(0.105), cells_in(0.035)};
+    const std::array<int, 3> reach{0, cells_in(kFartherTriple), cells_in(kNearTriple)};
     std::optional<Candidate> best;
     int trials = kMostTrials, polished_ones = 0;
     for (int trial = 0; trial < trials; ++trial) {
@@ -121,7 +133,8 @@ class Search {
       if (!through) continue;
       Candidate candidate{*through, score(*through, scored)};
       // Noise tilts a plane through near points: it deserves a fit before it is judged.
-      const double bar = best ? (near > 0 && polished_ones < kMostPolished ? 0.4 : 1.0) : 0.0;
+      const double bar =
+          best ? (near > 0 && polished_ones < kMostPolished ? kWorthPolishing : 1.0) : 0.0;
       if (best && candidate.score.value <= bar * best->score.value) continue;
       ++polished_ones;
       candidate.plane = polished(candidate.plane, scored);

@@ -7,9 +7,7 @@
 #include <numeric>
 #include <utility>
 
-#include <fmt/format.h>
-
-#include "risley/core/error.hpp"
+#include "risley/core/require.hpp"
 
 #include "calibration/plane_labels.hpp"
 #include "calibration/plane_search.hpp"
@@ -19,17 +17,11 @@ namespace risley::calibration {
 namespace {
 
 void check(const SegmentationOptions& options) {
-  const auto require = [](bool good, const char* name, double value, const char* allowed) {
-    if (!good) throw InvalidArgument(fmt::format("{} = {}, allowed {}", name, value, allowed));
-  };
-  require(options.range_noise > 0 && std::isfinite(options.range_noise), "range_noise, m,",
-          options.range_noise, "above 0");
-  require(options.pointing_noise >= 0 && std::isfinite(options.pointing_noise),
-          "pointing_noise, rad,", options.pointing_noise, "0 and above");
-  require(options.gate > 0 && std::isfinite(options.gate), "gate", options.gate, "above 0");
-  require(options.least_fraction >= 0 && options.least_fraction <= 1, "least_fraction",
-          options.least_fraction, "0 to 1");
-  require(options.least_extent >= 0, "least_extent, rad,", options.least_extent, "0 and above");
+  require_above("range noise", options.range_noise, 0, "m");
+  require_not_below("pointing noise", options.pointing_noise, 0, "rad");
+  require_above("gate", options.gate, 0);
+  require_between("least fraction", options.least_fraction, 0, 1);
+  require_not_below("least extent", options.least_extent, 0, "rad");
 }
 
 }  // namespace

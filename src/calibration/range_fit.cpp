@@ -7,6 +7,18 @@
 #include <Eigen/Cholesky>
 
 namespace risley::calibration {
+namespace {
+
+/// Sines of the least angles (0.06 degree) that three points make with each other and their plane
+/// with a beam: flatter ones fix no normal, since directions are no better known.
+constexpr double kLeastSine = 1e-3;
+/// Cosine of the flattest incidence: the predicted range of a flatter one is 10,000 times the
+/// distance of the plane.
+constexpr double kLeastCosine = 1e-4;
+/// Reciprocal condition at which a solution has three digits left of sixteen.
+constexpr double kLeastCondition = 1e-13;
+
+}  // namespace
 
 std::optional<Plane> plane_through(const Beam& a, const Beam& b, const Beam& c) {
   const Vector3<double> corner = a.range * a.direction;
@@ -14,17 +26,17 @@ std::optional<Plane> plane_through(const Beam& a, const Beam& b, const Beam& c) 
   const Vector3<double> to_c = c.range * c.direction - corner;
   const Vector3<double> normal = cross(to_b, to_c);
   const double length = norm(normal);
-  if (!(length > 1e-3 * norm(to_b) * norm(to_c))) return std::nullopt;
+  if (!(length > kLeastSine * norm(to_b) * norm(to_c))) return std::nullopt;
   Plane plane{(1.0 / length) * normal, 0.0};
   plane.distance = dot(plane.normal, corner);
   if (plane.distance < 0) plane = {-plane.normal, -plane.distance};
-  if (!(plane.distance > 1e-3 * a.range)) return std::nullopt;
+  if (!(plane.distance > kLeastSine * a.range)) return std::nullopt;
   return plane;
 }
 
 void RangeFit::add(const Beam& beam, double factor) {
   const double cosine = dot(plane_.normal, beam.direction);
-  if (!(cosine > 1e-4)) return;
+  if (!(cosine > kLeastCosine)) return;
   const double predicted = plane_.distance / cosine;
   // Derivative of the range by m is -predicted^2 u; its variance that of the distance / cosine^2.
   const double weight = factor * cosine * cosine / noise_.variance(cosine, beam.range);
@@ -38,7 +50,7 @@ void RangeFit::add(const Beam& beam, double factor) {
 std::optional<Plane> RangeFit::step() const {
   if (count_ < 3) return std::nullopt;
   const Eigen::LDLT<Eigen::Matrix3d> solver(normal_equations_);
-  if (!(solver.rcond() > 1e-13)) return std::nullopt;
+  if (!(solver.rcond() > kLeastCondition)) return std::nullopt;
   const Eigen::Vector3d change = solver.solve(right_side_);
   const Vector3<double> m =
       (1.0 / plane_.distance) * plane_.normal + Vector3<double>{change.x(), change.y(), change.z()};

@@ -6,11 +6,13 @@
 
 #include "risley/optics/batch.hpp"
 
+#include "calibration/entry_checks.hpp"
 #include "calibration/shot_blocks.hpp"
 
 namespace risley::calibration {
 
 Rays::Rays(const PrismTrain& train, const PrismGeometry& geometry, const RangedShots& shots) {
+  require_angles(shots, train);
   for (auto* column : {&x_, &y_, &z_, &origin_x_, &origin_y_, &origin_z_})
     column->resize(shots.size());
   for_each_block(shots.size(), [&](std::size_t begin, std::size_t end) {

@@ -14,7 +14,8 @@
 namespace risley::calibration {
 namespace {
 
-/// Part of the rotation angles' sigma that a direction has: the sine of a prism's deflection.
+/// Part of the rotation angles' sigma that a direction has: the sine of a prism's deflection. Two
+/// of a Mid-40 reach 19.2 degrees, one half of it.
 constexpr double kAngleLever = 0.17;
 
 }  // namespace

@@ -9,6 +9,9 @@
 namespace risley::calibration {
 namespace {
 
+/// Sigmas of a mean chi2, sqrt(2 / cells), beyond which it is more than chance.
+constexpr double kBeyondChance = 4.0;
+
 SurfaceReport inspect(const ViewDistances& d) {
   return inspect_surface({d.azimuth, d.zenith, d.distance, d.sigma});
 }
@@ -43,7 +46,7 @@ Evenness evenness_of(const PlanarProblem& problem, const std::vector<LabelledSho
   Evenness result;
   if (cells == 0) return result;
   result.unevenness = squares / cells;
-  const double significant = 1.0 + 4.0 * std::sqrt(2.0 / cells);
+  const double significant = 1.0 + kBeyondChance * std::sqrt(2.0 / cells);
   if (result.unevenness > significant) result.variance_factor = result.unevenness;
   return result;
 }

@@ -8,14 +8,13 @@
 #include "risley/calibration/rays.hpp"
 #include "risley/core/angle.hpp"
 
+#include "calibration/plane_labels.hpp"
 #include "calibration/shot_labels.hpp"
 
 namespace risley::calibration {
 namespace {
 
-/// A plane is a step of a larger one when this part of its points lies near that.
-constexpr double kStepShare = 0.9;
-/// How far directions may be bent before the first adjustment, 1 sigma.
+/// How far directions may be bent before the first adjustment, 1 sigma: docs/theory/calibration.md
 constexpr double kStartPointing = radians_from_degrees(0.1);
 
 /// A smaller plane a few sigmas off a larger one is a step of it: two planes that nearly coincide
@@ -35,7 +34,7 @@ void absorb_steps(const std::vector<Vector3<double>>& points, const Segmentation
                     ? 1.0
                     : 0.0;
       }
-      step = near >= kStepShare * all;
+      step = near >= kOneSurfaceShare * all;
     }
     if (!step) continue;
     const auto at = static_cast<std::ptrdiff_t>(k);

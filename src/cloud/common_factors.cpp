@@ -13,13 +13,16 @@ namespace {
 
 using Eigen::Index;
 
+/// Part of a variance that is rounding: what is left of one that others determine.
+constexpr double kRoundedPivot = 1e-12;
+
 /// Lower triangle L with L L^T = C. A quantity that the ones before determine gets a zero column.
 Eigen::MatrixXd lower_factor(const Eigen::MatrixXd& c) {
   const Index n = c.rows();
   Eigen::MatrixXd factor = Eigen::MatrixXd::Zero(n, n);
   for (Index j = 0; j < n; ++j) {
     const double pivot = c(j, j) - factor.row(j).head(j).squaredNorm();
-    if (!(pivot > 1e-12 * c(j, j))) continue;
+    if (!(pivot > kRoundedPivot * c(j, j))) continue;
     factor(j, j) = std::sqrt(pivot);
     for (Index i = j + 1; i < n; ++i) {
       factor(i, j) = (c(i, j) - factor.row(i).head(j).dot(factor.row(j).head(j))) / factor(j, j);

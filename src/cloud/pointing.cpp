@@ -11,10 +11,66 @@
 #include "risley/core/error.hpp"
 #include "risley/optics/batch.hpp"
 
+#include "cloud/entry_checks.hpp"
 #include "cloud/pointing_kernel.hpp"
 
 namespace risley::cloud {
 namespace {
+
+void require_model(const PointingModel& model) {
+  require_between("number of sizes of prisms", static_cast<double>(model.sizes.size()), 0,
+                  kMostSizes);
+  require_between("number of common factors", static_cast<double>(model.factors.size()), 0,
+                  kMostFactors);
+  if (model.believed.shape() != model.train.shape()) {
+    throw InvalidArgument(
+        fmt::format("believed train: {} prisms and {} emitters, expected {} and {} as the true one",
+                    model.believed.prisms(), model.believed.emitters(), model.train.prisms(),
+                    model.train.emitters()));
+  }
+  require_not_below("angle noise", model.angle_noise, 0, "rad");
+  require_finite("range offset", model.range_offset, "m");
+  const auto all_places = static_cast<std::size_t>(parameter_count(model.train.shape()));
+  for (const int place : model.places) {
+    require_place("place", static_cast<std::size_t>(place), all_places);
+  }
+  const std::size_t rows =
+      model.places.size() + static_cast<std::size_t>(model.train.prisms()) + model.sizes.size();
+  for (const CommonFactor& factor : model.factors) {
+    require_length("weights of a factor", static_cast<std::size_t>(factor.weights.size()), rows);
+  }
+}
+
+void require_shots(const PointingModel& model, const CloudHeader& header,
+                   const PointedShots& shots) {
+  const int prisms = model.train.prisms();
+  require_between("number of prisms of the cloud", header.prisms, prisms, prisms);
+  require_length_or_none("factors of the cloud", header.factors.size(), model.factors.size());
+  const std::size_t n = shots.size();
+  if (header.has_rotation_angles) {
+    const auto rotors = static_cast<std::size_t>(prisms);
+    require_length("rotation_angle", shots.rotation_angle.size(), rotors);
+    require_length("angle_covariance", shots.angle_covariance.size(), rotors * (rotors + 1) / 2);
+    for (const auto& column : shots.rotation_angle) {
+      require_length("rotation_angle of a prism", column.size(), n);
+    }
+    for (const auto& column : shots.angle_covariance) {
+      require_length("angle_covariance of two prisms", column.size(), n);
+    }
+  } else if (needs_rotation_angles(model.sensor, model.options)) {
+    throw InvalidArgument("the cloud has no rotation angles, which the model needs");
+  }
+  require_length("azimuth", shots.azimuth.size(), n);
+  require_length("zenith", shots.zenith.size(), n);
+  require_length("azimuth_rounding", shots.azimuth_rounding.size(), n);
+  require_length("zenith_rounding", shots.zenith_rounding.size(), n);
+  require_length("range_rounding", shots.range_rounding.size(), n);
+  require_length("intensity", shots.intensity.size(), n);
+  for (const auto& column : shots.surface_normal) {
+    require_length("surface_normal", column.size(), n);
+  }
+  check_beams(model.train, shots.beam, n);
+}
 
 /// Face positions and their derivatives as the kernel wants them.
 struct Faces {
@@ -111,6 +167,7 @@ class Columns {
 }  // namespace
 
 void PointedShots::resize(int prisms, std::size_t shots) {
+  require_between("number of prisms", prisms, 1, kMaxPrisms);
   const auto n = static_cast<std::size_t>(prisms);
   rotation_angle.resize(n);
   angle_covariance.resize(n * (n + 1) / 2);
@@ -127,18 +184,11 @@ void PointedShots::resize(int prisms, std::size_t shots) {
 
 void compute_points(const PointingModel& model, const CloudHeader& header,
                     const PointedShots& shots, Points& points, InstructionSet set) {
+  require_model(model);
+  require_shots(model, header, shots);
+  require_computed_columns(points, header, shots.size());
   const Faces faces(model);
   const int prisms = model.train.prisms();
-  if (model.sizes.size() > static_cast<std::size_t>(kMostSizes)) {
-    throw InvalidArgument(
-        fmt::format("{} sizes of prisms, allowed {}", model.sizes.size(), kMostSizes));
-  }
-  if (model.believed.shape() != model.train.shape()) {
-    throw InvalidArgument(fmt::format(
-        "believed train: {} prisms and {} emitters, expected {} and {} as the true one",
-        model.believed.prisms(), model.believed.emitters(), prisms, model.train.emitters()));
-  }
-  check_beams(model.train, shots.beam, shots.size());
   const auto& kernel = RISLEY_KERNEL_COPIES(compute_points).at(set);
   const auto square = [](double x) { return x * x; };
   PointArguments a;

@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include "risley/core/error.hpp"
+#include "risley/core/require.hpp"
 #include "risley/estimation/parameter_agreement.hpp"
 
 #include "cloud/common_factors.hpp"
@@ -50,6 +51,21 @@ Uncertain assumed(const sensors::Sensor& sensor, const SensorBelief& belief) {
   return result;
 }
 
+void require_belief(const SensorBelief& belief) {
+  const std::size_t free = belief.free.size();
+  const auto length = [](const char* name, Index size, std::size_t expected) {
+    require_length(name, static_cast<std::size_t>(size), expected);
+  };
+  length("rows of the belief's covariance", belief.covariance.rows(), free);
+  length("columns of the belief's covariance", belief.covariance.cols(), free);
+  if (free > 0) {
+    length("rows of angle_sensitivity", belief.angle_sensitivity.rows(),
+           static_cast<std::size_t>(belief.sensor.prisms()));
+    length("columns of angle_sensitivity", belief.angle_sensitivity.cols(), free);
+  }
+  require_not_below("angle noise", belief.angle_noise, 0, "rad");
+}
+
 /// What a calibration's parameters mean. Those of a sensor that was not calibrated are as good as
 /// their sigmas: where the reported directions agree with them these are the better knowledge,
 /// otherwise the sensor reports directions that it does not have.
@@ -75,12 +91,16 @@ PointingModel pointing_model(const sensors::Sensor& calibration, const SensorBel
                              const PointingOptions& options) {
   using sensors::CalibrationReference;
   PointingModel model;
+  require_belief(belief);
   if (calibration.train.face_order() != belief.sensor.train.face_order()) {
     throw InvalidArgument(fmt::format(
         "a calibration of another sensor: its face order is {}, the "
         "recording's {}",
         to_string(calibration.train.face_order()), to_string(belief.sensor.train.face_order())));
   }
+  const int emitters = belief.sensor.train.emitters();
+  require_between("number of emitters of the calibration", calibration.train.emitters(), emitters,
+                  emitters);
   model.reference = meaning_of(calibration, belief);
   const bool type = calibration.reference == CalibrationReference::none;
   const bool planes = model.reference == CalibrationReference::planes;

@@ -118,7 +118,9 @@ struct Calibration {
 /// Calibrates a sensor on the walls that its recordings saw.
 /// @throws EstimationError when there is nothing to calibrate on: no plane, points on one line,
 ///         recordings of different sensors, stations or planes that contradict the data
-/// @throws InvalidArgument for unknown parameters or stations that do not match the recordings
+/// @throws InvalidArgument for unknown parameters, stations that do not match the recordings, noise
+///         or sigmas out of their ranges, columns or matrices that do not belong to a recording's
+///         prisms, shots and free parameters
 Calibration calibrate(const std::vector<RangedRecording>& recordings,
                       const CalibrationOptions& options, const Progress& progress = {});
 

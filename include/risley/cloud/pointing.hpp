@@ -26,6 +26,7 @@ struct PointedShots {
   std::array<std::vector<double>, 3> surface_normal;  ///< NaN where not known
 
   std::size_t size() const { return range.size(); }
+  /// @throws InvalidArgument for a number of prisms that no sensor has
   void resize(int prisms, std::size_t shots);
 };
 
@@ -35,6 +36,8 @@ struct PointedShots {
 /// Residuals are exact to 1e-8 of them up to 0.1 rad; larger ones are only large.
 /// @param header  of the points: without rotation angles only where the model needs none; with one
 /// factor name per factor of the model or none
+/// @throws InvalidArgument for columns, factors or prisms that are not as model and header announce
+///         them, emitters that the model does not have, and as check_available()
 void compute_points(const PointingModel& model, const CloudHeader& header,
                     const PointedShots& shots, Points& points,
                     InstructionSet set = best_instruction_set());

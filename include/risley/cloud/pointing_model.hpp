@@ -62,7 +62,8 @@ inline constexpr double kDivergenceSigma = 0.25;
 ///   sensor believes; both have errors of their own.
 /// - Not calibrated, as a type or a unit of the simulator: as directions where the recording agrees
 ///   with the parameters within their sigmas, otherwise as planes with these sigmas.
-/// @throws InvalidArgument for a calibration of another sensor (face order)
+/// @throws InvalidArgument for a calibration of another sensor (face order, emitters), matrices
+///         that do not belong to the free parameters, angle noise below 0
 PointingModel pointing_model(const sensors::Sensor& calibration, const SensorBelief& belief,
                              const PointingOptions& options);
 
@@ -73,7 +74,7 @@ bool needs_rotation_angles(const sensors::Sensor& calibration, const PointingOpt
 /// A model without rotation angles. The footprint is then taken to keep the orientation that it has
 /// before the prisms.
 /// @param angle_noise  rad; empty: the calibration's
-/// @throws InvalidArgument where needs_rotation_angles()
+/// @throws InvalidArgument where needs_rotation_angles(), for angle noise below 0
 PointingModel reported_pointing_model(const sensors::Sensor& calibration,
                                       const PointingOptions& options,
                                       std::optional<double> angle_noise);

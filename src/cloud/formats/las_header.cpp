@@ -11,6 +11,7 @@
 #include <fmt/format.h>
 
 #include "risley/core/error.hpp"
+#include "risley/core/require.hpp"
 
 #include "cloud/formats/las_bytes.hpp"
 #include "cloud/formats/las_layout.hpp"
@@ -97,13 +98,10 @@ Layout::Layout(Version version, const CloudHeader& header, const CloudWriterOpti
       scale_(options.las_scale),
       utc_(header.time_reference == recordings::TimeReference::utc),
       gps_time_(utc_ && options.gps_time),
-      header_(header),
       system_identifier_(las::system_identifier(header)),
       generating_software_(las::generating_software(header)),
       floats_(uncertainty_fields(header)) {
-  if (!(std::isfinite(scale_) && scale_ > 0)) {
-    throw InvalidArgument(fmt::format("las_scale = {} m, allowed greater than 0 m", scale_));
-  }
+  require_above("las_scale", scale_, 0, "m");
   const std::vector<PointField> loadings = loading_fields(header);
   floats_.insert(floats_.end(), loadings.begin(), loadings.end());
   record_bytes_ = base_record_bytes() + 4 * floats_.size() + 2;

@@ -34,45 +34,6 @@ double seconds(std::int64_t time_ns, std::int64_t shift) {
 
 }  // namespace
 
-void Layout::check_columns(const Points& points) const {
-  const std::size_t rows = points.size();
-  const auto check = [rows](const char* name, const auto& column) {
-    if (column.size() == rows) return;
-    throw InvalidArgument(
-        fmt::format("{} has {} rows, time_ns has {}; columns of points have one length", name,
-                    column.size(), rows));
-  };
-  const auto check_count = [](const char* name, std::size_t count, std::size_t announced) {
-    if (count == announced) return;
-    throw InvalidArgument(
-        fmt::format("{} has {} columns, the cloud's header announces {}", name, count, announced));
-  };
-  check("x", points.x);
-  check("y", points.y);
-  check("z", points.z);
-  check("range", points.range);
-  check("incidence", points.incidence);
-  check("intensity", points.intensity);
-  check("return_number", points.return_number);
-  check("number_of_returns", points.number_of_returns);
-  check("tag", points.tag);
-  check("beam", points.beam);
-  if (header_.has_covariance) {
-    for (const auto& column : points.covariance) check("covariance", column);
-  }
-  if (header_.has_rotation_angles) {
-    check_count("rotation_angle", points.rotation_angle.size(),
-                static_cast<std::size_t>(header_.prisms));
-    for (const auto& column : points.rotation_angle) check("rotation_angle", column);
-    check("azimuth_residual", points.azimuth_residual);
-    check("zenith_residual", points.zenith_residual);
-  }
-  check_count("loading", points.loading.size(), header_.factors.size());
-  for (const auto& factor : points.loading) {
-    for (const auto& column : factor) check("loading", column);
-  }
-}
-
 void Layout::pack_coordinates(const Points& points, std::size_t first, std::size_t rows,
                               Summary& summary) {
   using Batch = xsimd::batch<double>;
