@@ -4,83 +4,68 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
-#include <numeric>
 #include <utility>
 
 #include <fmt/format.h>
 
 #include "risley/calibration/calibration_plan.hpp"
 #include "risley/calibration/paper_adjustment.hpp"
-#include "risley/calibration/plane_segmentation.hpp"
-#include "risley/calibration/surface_steps.hpp"
-#include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
+#include "risley/core/require.hpp"
 
 #include "calibration/belief.hpp"
-#include "calibration/shot_labels.hpp"
+#include "calibration/calibrated_sensor.hpp"
+#include "calibration/entry_checks.hpp"
+#include "calibration/labelled_shots.hpp"
+#include "calibration/verdict.hpp"
+#include "calibration/wall_flatness.hpp"
 #include "calibration/wall_matching.hpp"
+#include "calibration/wall_search.hpp"
+#include "calibration/wall_thickness.hpp"
 
 namespace risley::calibration {
 namespace {
 
-using Eigen::Index;
-
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-constexpr std::size_t kCoarseShots = 40000;   // of all recordings together, to find the planes with
-constexpr std::size_t kBundleBeams = 4000;    // for formal sigmas of the beams
-constexpr std::size_t kPictureShots = 20000;  // for pictures
-constexpr int kCoarseRounds = 5;
-constexpr int kMostFullRounds = 5;
-/// A plane is a step of a larger one when this part of its points lies near that.
-constexpr double kStepShare = 0.9;
-/// Variance of a normal distribution cut off at the gate.
+/// Shots to find the planes with, of all recordings together and of each at least, and rounds of
+/// labels and adjustment on these and on all shots: docs/theory/calibration.md
+constexpr std::size_t kCoarseShots = 40000, kLeastCoarseShots = 5000;
+constexpr int kCoarseRounds = 5, kMostFullRounds = 5;
+/// Beams of all recordings that formal sigmas are the mean of: beams are smooth in two rotation
+/// angles, which so many sample every 6 degrees, 360 / sqrt(4000).
+constexpr std::size_t kBundleBeams = 4000;
+/// Variance of a normal distribution cut off at the gate g: 1 - 2 g phi(g) / (2 Phi(g) - 1).
 constexpr double kVarianceWithinGate = 0.97334;
-/// How far directions may be bent before the first adjustment, 1 sigma.
-constexpr double kStartPointing = radians_from_degrees(0.1);
-constexpr double kLeastRangeSigma = 1e-7;  // m
+/// Keeps the variance of ranges without noise above 0; sensors step by 1 mm. M.
+constexpr double kLeastRangeSigma = 1e-7;
+/// Steps stand still when what is left out changes by less than one shot in a hundred.
+constexpr std::size_t kSettledPart = 100;
 
 /// Variance component of every view: what its residuals say of the range noise.
 void update_range_variances(PlanarSolution& solution) {
   for (std::size_t v = 0; v < solution.chi2.size(); ++v) {
-    if (solution.redundancy[v] < 30) continue;
+    if (solution.redundancy[v] < kLeastViewShots) continue;
     const double factor = solution.chi2[v] / solution.redundancy[v] / kVarianceWithinGate;
     double& variance = solution.problem.views[v].range_variance;
     variance = std::max(variance * factor, kLeastRangeSigma * kLeastRangeSigma);
   }
 }
 
-/// A smaller plane a few sigmas off a larger one is a step of it: two planes that nearly coincide
-/// could not share out their shots.
-void absorb_steps(const std::vector<Vector3<double>>& points, const SegmentationOptions& settings,
-                  Segmentation& segmentation) {
-  for (std::size_t k = segmentation.planes.size(); k-- > 1;) {
-    bool step = false;
-    for (std::size_t larger = 0; larger < k && !step; ++larger) {
-      const Plane& plane = segmentation.planes[larger];
-      double near = 0, all = 0;
-      for (std::size_t i = 0; i < points.size(); ++i) {
-        if (segmentation.label[i] != static_cast<int>(k)) continue;
-        all += 1.0;
-        near += std::abs(signed_distance(plane, points[i])) <=
-                        kNearby * distance_sigma(plane, points[i], settings)
-                    ? 1.0
-                    : 0.0;
-      }
-      step = near >= kStepShare * all;
-    }
-    if (!step) continue;
-    const auto at = static_cast<std::ptrdiff_t>(k);
-    segmentation.planes.erase(segmentation.planes.begin() + at);
-    segmentation.points.erase(segmentation.points.begin() + at);
-    for (int& label : segmentation.label) {
-      if (label == static_cast<int>(k)) {
-        label = -1;
-      } else if (label > static_cast<int>(k)) {
-        --label;
-      }
-    }
-  }
+/// Columns and matrices of one recording that belong together.
+void require_recording(const RangedRecording& recording) {
+  require_at_least("number of shots", static_cast<long long>(recording.shots.size()), 1);
+  require_shots(recording.shots, recording.believed.train);
+  const auto prisms = static_cast<std::size_t>(recording.believed.prisms());
+  const auto matrix = [](const char* rows, const char* columns, const Eigen::MatrixXd& m,
+                         std::size_t expected_rows, std::size_t expected_columns) {
+    require_length(rows, static_cast<std::size_t>(m.rows()), expected_rows);
+    require_length(columns, static_cast<std::size_t>(m.cols()), expected_columns);
+  };
+  const std::size_t free = recording.free.size();
+  matrix("rows of the covariance", "columns of the covariance", recording.covariance, free, free);
+  matrix("rows of angle_sensitivity", "columns of angle_sensitivity", recording.angle_sensitivity,
+         prisms, free);
+  matrix("rows of mean_angle_covariance", "columns of mean_angle_covariance",
+         recording.mean_angle_covariance, prisms, prisms);
 }
 
 /// One run, from recordings to results.
@@ -89,24 +74,18 @@ class Work {
   Work(const std::vector<RangedRecording>& recordings, const CalibrationOptions& options,
        const Progress& progress)
       : recordings_(recordings), options_(options), progress_(progress) {
-    if (recordings.empty()) throw InvalidArgument("no recording to calibrate on");
-    if (!options.stations.empty() && options.stations.size() != recordings.size()) {
-      throw InvalidArgument(fmt::format("{} stations given for {} recordings",
-                                        options.stations.size(), recordings.size()));
-    }
-    belief_ = pooled_belief(recordings);
     range_noise_ = options.range_noise.value_or(options.sensor.range_noise);
-    if (!(range_noise_ > 0)) {
-      throw InvalidArgument(fmt::format("range noise = {} m, allowed above 0", range_noise_));
-    }
+    require_entries();
+    belief_ = pooled_belief(recordings);
     // Rounding adds its own variance.
     range_noise_ = std::hypot(range_noise_, options.sensor.range_resolution / std::sqrt(12.0));
     for (std::size_t r = 0; r < recordings.size(); ++r) {
-      shots_.push_back(recordings[r].shots);
+      LabelledShots& own = all_.emplace_back();
+      own.shots = recordings[r].shots;
       for (std::size_t k = 0; k < belief_.angle_shift[r].size(); ++k) {
-        for (double& angle : shots_[r].rotation_angle[k]) angle += belief_.angle_shift[r][k];
+        for (double& angle : own.shots.rotation_angle[k]) angle += belief_.angle_shift[r][k];
       }
-      pointing_.push_back(pointing_of_angles(shots_[r]));
+      own.pointing = pointing_of_angles(own.shots);
     }
   }
 
@@ -119,12 +98,24 @@ class Work {
     PlanarSolution solution = adjust_fully();
     progress_.report(0.9);
     fill_result(solution);
-    judge(solution);
     progress_.report(1.0);
     return std::move(result_);
   }
 
  private:
+  void require_entries() const {
+    require_at_least("number of recordings", static_cast<long long>(recordings_.size()), 1);
+    require_length_or_none("stations", options_.stations.size(), recordings_.size());
+    require_above("range noise", range_noise_, 0, "m");
+    require_not_below("range resolution", options_.sensor.range_resolution, 0, "m");
+    if (options_.prior_sigma) require_above("prior sigma", *options_.prior_sigma, 0, "rad");
+    require_not_below("sigma of the range offset", options_.range_offset_sigma, 0, "m");
+    for (const auto& [name, value] : options_.fixed) {
+      if (value) require_finite(name, *value);
+    }
+    for (const RangedRecording& recording : recordings_) require_recording(recording);
+  }
+
   bool paper() const { return options_.method == CalibrationMethod::paper; }
 
   void set_up() {
@@ -153,30 +144,22 @@ class Work {
 
   /// Planes in every recording by itself, then which of them are the same wall.
   void find_walls() {
-    const std::size_t most = std::max<std::size_t>(kCoarseShots / recordings_.size(), 5000);
+    const std::size_t most =
+        std::max<std::size_t>(kCoarseShots / recordings_.size(), kLeastCoarseShots);
     std::vector<FoundPlane> found;
+    std::vector<std::vector<int>> labels;
     for (std::size_t r = 0; r < recordings_.size(); ++r) {
-      coarse_.push_back(rows_of(shots_[r], spread_rows(shots_[r].size(), most)));
-      const Rays rays(problem_.train, problem_.geometry, coarse_[r]);
-      std::vector<Vector3<double>> points;
-      for (std::size_t i = 0; i < coarse_[r].size(); ++i) {
-        points.push_back(rays.point(i, coarse_[r].range[i]));
-      }
-      SegmentationOptions settings;
-      settings.range_noise = range_noise_;
-      settings.pointing_noise = std::hypot(kStartPointing, pointing_[r]);
-      settings.gate = kGate;
-      settings.leave_out_edges = true;
-      settings.seed = options_.seed + r;
-      Segmentation segmentation = segment_planes(points, settings);
-      absorb_steps(points, settings, segmentation);
+      const RangedShots& shots = all_[r].shots;
+      coarse_.push_back(rows_of(shots, spread_rows(shots.size(), most)));
+      Segmentation segmentation = search_walls(coarse_[r], problem_.train, problem_.geometry,
+                                               {range_noise_, all_[r].pointing}, options_.seed + r);
       for (std::size_t i = 0; i < segmentation.planes.size(); ++i) {
         found.push_back({r, segmentation.planes[i], segmentation.points[i], 0});
       }
-      start_labels_.push_back(segmentation.label);
+      labels.push_back(std::move(segmentation.label));
       if (segmentation.planes.empty()) {
         const std::string why = fmt::format(
-            "{}: no plane found among {} points{}", recordings_[r].name, points.size(),
+            "{}: no plane found among {} points{}", recordings_[r].name, coarse_[r].size(),
             segmentation.on_one_line
                 ? ": what is flat in them lies on one line, and a wall has to fill an area"
                 : "");
@@ -209,10 +192,10 @@ class Work {
                                 range_noise_ * range_noise_, nullptr, found[i].side});
     }
     for (std::size_t r = 0; r < recordings_.size(); ++r) {
-      for (int& label : start_labels_[r]) {
+      for (int& label : labels[r]) {
         if (label >= 0) label += static_cast<int>(first_view[r]);
       }
-      hand_out(coarse_[r], start_labels_[r], r, problem_);
+      hand_out(coarse_[r], labels[r], r, problem_);
     }
   }
 
@@ -224,7 +207,8 @@ class Work {
 
   /// Views that lost their shots when labels changed are no views any more.
   void drop_empty_views(PlanarProblem& problem) const {
-    std::erase_if(problem.views, [](const WallView& view) { return view.shots->size() < 30; });
+    std::erase_if(problem.views,
+                  [](const WallView& view) { return view.shots->size() < kLeastViewShots; });
     if (problem.views.empty()) {
       throw EstimationError("no plane is left once every shot went to the plane it fits best");
     }
@@ -239,29 +223,28 @@ class Work {
       update_range_variances(solution);
       problem_ = std::move(solution.problem);
       for (std::size_t r = 0; r < recordings_.size(); ++r) {
-        hand_out(coarse_[r], label_shots(problem_, r, coarse_[r], pointing_[r]).view, r, problem_);
+        hand_out(coarse_[r], label_shots(problem_, r, coarse_[r], all_[r].pointing).view, r,
+                 problem_);
       }
       drop_empty_views(problem_);
     }
   }
 
   void label_all() {
-    near_.assign(problem_.views.size(), 0);
-    labels_.clear();
-    nearby_.clear();
-    for (std::size_t r = 0; r < recordings_.size(); ++r) {
-      Labels labels = label_shots(problem_, r, shots_[r], pointing_[r]);
-      for (std::size_t v = 0; v < near_.size(); ++v) near_[v] += labels.near[v];
-      labels_.push_back(std::move(labels.view));
-      nearby_.push_back(std::move(labels.nearby));
+    for (std::size_t r = 0; r < all_.size(); ++r) {
+      all_[r].labels = label_shots(problem_, r, all_[r].shots, all_[r].pointing);
+    }
+  }
+
+  void hand_out_all() {
+    for (std::size_t r = 0; r < all_.size(); ++r) {
+      hand_out(all_[r].shots, all_[r].labels.view, r, problem_);
     }
   }
 
   PlanarSolution adjust_fully() {
     label_all();
-    for (std::size_t r = 0; r < recordings_.size(); ++r) {
-      hand_out(shots_[r], labels_[r], r, problem_);
-    }
+    hand_out_all();
     // The first solution bends towards steps and hides their rims: labels and solution take turns
     // until what is left out stays the same.
     PlanarSolution solution;
@@ -274,266 +257,32 @@ class Work {
       progress_.report(0.5 + 0.08 * (round + 1));
       if (settled || round + 1 == kMostFullRounds) break;
       label_all();
-      const std::size_t before = std::exchange(left_out, leave_out_steps());
-      settled = std::max(before, left_out) - std::min(before, left_out) <= left_out / 100;
-      for (std::size_t r = 0; r < recordings_.size(); ++r) {
-        hand_out(shots_[r], labels_[r], r, problem_);
-      }
+      if (!paper()) result_.steps = leave_out_steps(problem_, all_);
+      const std::size_t before = std::exchange(left_out, 0);
+      for (const SurfaceStep& step : result_.steps) left_out += step.points;
+      settled = std::max(before, left_out) - std::min(before, left_out) <= left_out / kSettledPart;
+      hand_out_all();
     }
-    judge_evenness();
+    const Evenness evenness = evenness_of(problem_, all_);
+    result_.unevenness = evenness.unevenness;
+    result_.variance_factor = evenness.variance_factor;
     return solution;
   }
 
-  /// Residuals of one view's shots as distances from its plane.
-  struct Distances {
-    std::vector<double> azimuth, zenith, distance, sigma, incidence;
-    std::vector<std::size_t> rows;  ///< of the recording
-  };
-
-  /// @param labels  labels_ or nearby_
-  Distances distances_of(const PlanarProblem& problem, std::size_t view,
-                         const std::vector<std::vector<int>>& labels) const {
-    const std::size_t r = problem.views[view].recording;
-    Distances d;
-    for (std::size_t i = 0; i < labels[r].size(); ++i) {
-      if (labels[r][i] == static_cast<int>(view)) d.rows.push_back(i);
-    }
-    const RangedShots shots = rows_of(shots_[r], d.rows);
-    const PlaneView plane = plane_view(problem, view);
-    const Rays rays(problem.train, problem.geometry, shots);
-    const double pointing = pointing_[r];
-    for (std::size_t i = 0; i < shots.size(); ++i) {
-      const Vector3<double> direction = rays.direction(i);
-      const auto angles = angles_from_direction(direction);
-      const double cosine = dot(plane.plane.normal, direction);
-      const double range = shots.range[i] - plane.range_offset;
-      const double across = pointing * range * std::sqrt(std::max(0.0, 1.0 - cosine * cosine));
-      d.azimuth.push_back(angles.azimuth);
-      d.zenith.push_back(angles.zenith);
-      d.distance.push_back(signed_distance(plane.plane, rays.point(i, range)));
-      d.sigma.push_back(std::sqrt(plane.range_variance * cosine * cosine + across * across));
-      d.incidence.push_back(std::acos(std::clamp(cosine, -1.0, 1.0)));
-    }
-    return d;
-  }
-
-  /// Takes regions that stand off their wall out of the labels. They are looked for among the
-  /// outliers too, where most shots of a larger step are. @return number of their shots
-  std::size_t leave_out_steps() {
-    result_.steps.clear();
-    std::size_t shots = 0;
-    if (paper()) return shots;
-    for (std::size_t v = 0; v < problem_.views.size(); ++v) {
-      const std::size_t r = problem_.views[v].recording;
-      const Distances d = distances_of(problem_, v, nearby_);
-      for (const StepRegion& step :
-           inspect_surface({d.azimuth, d.zenith, d.distance, d.sigma}).steps) {
-        for (const std::size_t row : step.rows) labels_[r][d.rows[row]] = -1;
-        shots += step.rows.size();
-        result_.steps.push_back({r, v, step.height, step.azimuth, step.zenith,
-                                 std::sqrt(step.solid_angle), step.points});
-      }
-    }
-    return shots;
-  }
-
-  /// How far means over the walls scatter beyond noise.
-  void judge_evenness() {
-    double squares = 0, cells = 0;
-    for (std::size_t v = 0; v < problem_.views.size(); ++v) {
-      const Distances d = distances_of(problem_, v, labels_);
-      const SurfaceReport report = inspect_surface({d.azimuth, d.zenith, d.distance, d.sigma});
-      squares += report.unevenness * static_cast<double>(report.cells);
-      cells += static_cast<double>(report.cells);
-    }
-    if (cells == 0) return;
-    result_.unevenness = squares / cells;
-    const double significant = 1.0 + 4.0 * std::sqrt(2.0 / cells);
-    result_.variance_factor = result_.unevenness > significant ? result_.unevenness : 1.0;
-  }
-
-  /// RMS of point-to-plane distances of a view with other optics, and the distances; the plane is
-  /// fitted to them.
-  std::pair<double, std::vector<double>> thickness(const PrismTrain& train,
-                                                   const RangedShots& shots) const {
-    const Rays rays(train, problem_.geometry, shots);
-    std::vector<Vector3<double>> points;
-    for (std::size_t i = 0; i < shots.size(); ++i) points.push_back(rays.point(i, shots.range[i]));
-    std::vector<std::size_t> all(points.size());
-    std::iota(all.begin(), all.end(), std::size_t{0});
-    const Plane plane = fitted_plane(points, all);
-    std::vector<double> distance;
-    double squares = 0;
-    for (const Vector3<double>& point : points) {
-      distance.push_back(signed_distance(plane, point));
-      squares += distance.back() * distance.back();
-    }
-    return {std::sqrt(squares / static_cast<double>(points.size())), std::move(distance)};
-  }
-
   void fill_result(const PlanarSolution& solution);
-  void fill_planes(const PlanarSolution& solution);
-  void fill_sensor(const PlanarSolution& solution);
-  void judge(const PlanarSolution& solution);
+  void fill_datum(const PlanarSolution& solution);
 
   const std::vector<RangedRecording>& recordings_;
   const CalibrationOptions& options_;
   const Progress& progress_;
   Belief belief_;
   double range_noise_ = 0;
-  std::vector<RangedShots> shots_, coarse_;                       // [recordings]
-  std::vector<double> pointing_;                                  // [recordings]
-  std::vector<std::vector<int>> start_labels_, labels_, nearby_;  // [recordings][shots]
-  std::vector<std::size_t> near_;
+  std::vector<LabelledShots> all_;       // [recordings]
+  std::vector<RangedShots> coarse_;      // [recordings], some of them
   std::vector<double> solved_variance_;  // [views] of the last solve, m^2
   PlanarProblem problem_;
   Calibration result_;
 };
-
-/// Root mean squares and means over bins of a variable.
-class ProfileBuilder {
- public:
-  ProfileBuilder(std::string variable, double from, double to, std::size_t bins)
-      : from_(from), width_((to - from) / static_cast<double>(bins)), sums_(bins) {
-    profile_.variable = std::move(variable);
-  }
-  void add(double at, double before, double after) {
-    const double bin = std::floor((at - from_) / width_);
-    if (!(bin >= 0) || bin >= static_cast<double>(sums_.size())) return;
-    Sums& s = sums_[static_cast<std::size_t>(bin)];
-    ++s.count;
-    s.before += before;
-    s.after += after;
-    s.before2 += before * before;
-    s.after2 += after * after;
-  }
-  ThicknessProfile result() && {
-    for (std::size_t i = 0; i < sums_.size(); ++i) {
-      const Sums& s = sums_[i];
-      const double n = s.count > 0 ? static_cast<double>(s.count) : kNaN;
-      profile_.from.push_back(from_ + width_ * static_cast<double>(i));
-      profile_.to.push_back(from_ + width_ * static_cast<double>(i + 1));
-      profile_.count.push_back(s.count);
-      profile_.rms_before.push_back(std::sqrt(s.before2 / n));
-      profile_.rms_after.push_back(std::sqrt(s.after2 / n));
-      profile_.mean_before.push_back(s.before / n);
-      profile_.mean_after.push_back(s.after / n);
-    }
-    return std::move(profile_);
-  }
-
- private:
-  struct Sums {
-    std::size_t count = 0;
-    double before = 0, after = 0, before2 = 0, after2 = 0;
-  };
-  double from_, width_;
-  std::vector<Sums> sums_;
-  ThicknessProfile profile_;
-};
-
-void Work::fill_planes(const PlanarSolution& solution) {
-  const PlanarProblem& p = solution.problem;
-  const auto prisms = static_cast<std::size_t>(p.train.prisms());
-  std::vector<ProfileBuilder> builders;
-  builders.emplace_back("incidence", 0.0, kPi / 2, 45);
-  for (std::size_t k = 0; k < prisms; ++k) {
-    builders.emplace_back(fmt::format("rotation_angle_{}", prism_letter(static_cast<int>(k))), 0.0,
-                          kTwoPi, 72);
-  }
-  double before2 = 0, after2 = 0;
-  std::vector<std::vector<double>> before_of(recordings_.size()), after_of(recordings_.size());
-  for (std::size_t r = 0; r < recordings_.size(); ++r) {
-    before_of[r].assign(shots_[r].size(), kNaN);
-    after_of[r].assign(shots_[r].size(), kNaN);
-  }
-  for (std::size_t v = 0; v < p.views.size(); ++v) {
-    const std::size_t r = p.views[v].recording;
-    const Distances d = distances_of(p, v, labels_);
-    const RangedShots shots = rows_of(shots_[r], d.rows);
-    const auto [rms_before, before] = thickness(belief_.sensor.train, shots);
-    CalibratedPlane plane;
-    plane.name = p.walls[p.views[v].wall].name;
-    plane.recording = r;
-    const PlaneView view = plane_view(p, v);
-    plane.normal = view.plane.normal;
-    plane.distance = view.plane.distance;
-    plane.points = d.rows.size();
-    plane.outliers = near_[v];
-    plane.rms_before = rms_before;
-    plane.range_sigma = std::sqrt(p.views[v].range_variance);
-    double squares = 0;
-    for (std::size_t i = 0; i < d.rows.size(); ++i) {
-      squares += d.distance[i] * d.distance[i];
-      before_of[r][d.rows[i]] = before[i];
-      after_of[r][d.rows[i]] = d.distance[i];
-      builders[0].add(d.incidence[i], before[i], d.distance[i]);
-      for (std::size_t k = 0; k < prisms; ++k) {
-        builders[k + 1].add(wrap_to_two_pi(shots.rotation_angle[k][i]), before[i], d.distance[i]);
-      }
-    }
-    const auto n = static_cast<double>(d.rows.size());
-    plane.rms = std::sqrt(squares / n);
-    before2 += n * rms_before * rms_before;
-    after2 += squares;
-    result_.points += d.rows.size();
-    result_.planes.push_back(std::move(plane));
-  }
-  result_.rms_before = std::sqrt(before2 / static_cast<double>(result_.points));
-  result_.rms_after = std::sqrt(after2 / static_cast<double>(result_.points));
-  for (ProfileBuilder& builder : builders) {
-    result_.profiles.push_back(std::move(builder).result());
-  }
-  for (std::size_t r = 0; r < recordings_.size(); ++r) {
-    const std::vector<std::size_t> rows =
-        spread_rows(shots_[r].size(), kPictureShots / recordings_.size());
-    const RangedShots shots = rows_of(shots_[r], rows);
-    const Rays rays(p.train, p.geometry, shots);
-    for (std::size_t i = 0; i < rows.size(); ++i) {
-      const auto angles = angles_from_direction(rays.direction(i));
-      result_.sample.push_back(
-          {r, labels_[r][rows[i]], rays.point(i, shots.range[i] - p.range_offset),
-           before_of[r][rows[i]], after_of[r][rows[i]], angles.azimuth, angles.zenith});
-    }
-  }
-}
-
-void Work::fill_sensor(const PlanarSolution& solution) {
-  sensors::Sensor& sensor = result_.sensor;
-  sensor = options_.sensor;
-  sensor.serial = recordings_.front().serial;
-  sensor.train = solution.problem.train;
-  sensor.angular_velocity = belief_.sensor.angular_velocity;
-  sensor.combination = belief_.sensor.combination;
-  sensor.provenance.clear();
-  sensor.covariance_names.clear();
-  if (!options_.beam_origin) sensor.set_prism_geometry({});
-  for (const sensors::Knowledge& known : belief_.sensor.knowledge) {
-    const bool speed = known.name.starts_with("angular_velocity");
-    const bool material = known.name.starts_with("refractive_index");
-    if (speed || material) sensor.set_knowledge(known);
-  }
-  for (std::size_t j = 0; j < result_.free.size(); ++j) {
-    const auto at = static_cast<Index>(j);
-    sensor.covariance_names.push_back(result_.free[j].name);
-    sensor.set_knowledge({result_.free[j].name, std::sqrt(result_.covariance(at, at)),
-                          "calibrated on plane walls by risley calibrate"});
-  }
-  sensor.reference = sensors::CalibrationReference::planes;
-  sensor.covariance = result_.covariance;
-  sensor.range_offset = solution.problem.range_offset;
-  std::erase_if(sensor.knowledge,
-                [](const sensors::Knowledge& entry) { return entry.name == "range_offset_m"; });
-  if (!(result_.range_offset_sigma > 0)) return;
-  const Index n = result_.covariance.rows();
-  sensor.covariance_names.emplace_back("range_offset_m");
-  sensor.set_knowledge({"range_offset_m", result_.range_offset_sigma,
-                        "calibrated on plane walls by risley calibrate"});
-  sensor.covariance.conservativeResize(n + 1, n + 1);
-  sensor.covariance.col(n).head(n) = solution.range_offset_covariance * result_.variance_factor;
-  sensor.covariance.row(n).head(n) = sensor.covariance.col(n).head(n).transpose();
-  sensor.covariance(n, n) = result_.range_offset_sigma * result_.range_offset_sigma;
-}
 
 void Work::fill_result(const PlanarSolution& solution) {
   const PlanarProblem& p = solution.problem;
@@ -555,81 +304,39 @@ void Work::fill_result(const PlanarSolution& solution) {
     redundancy += solution.redundancy[v];
   }
   result_.sigma0 = std::sqrt(stated / redundancy / kVarianceWithinGate) / range_noise_;
-  fill_planes(solution);
-  fill_sensor(solution);
+  WallThickness walls = wall_thickness(p, belief_.sensor.train, all_);
+  result_.planes = std::move(walls.planes);
+  result_.profiles = std::move(walls.profiles);
+  result_.rms_before = walls.rms_before;
+  result_.rms_after = walls.rms_after;
+  result_.points = walls.points;
+  result_.sensor = calibrated_sensor(options_, belief_, solution, result_);
+  result_.sensor.serial = recordings_.front().serial;
+  fill_datum(solution);
+  result_.reason = reason_of_failure(result_, solution);
+  result_.converged = result_.reason.empty();
+  for (std::string& warning : warnings_of(result_, solution, recordings_)) {
+    result_.warnings.push_back(std::move(warning));
+  }
+  for (LabelledShots& own : all_) result_.plane_of_shot.push_back(std::move(own.labels.view));
+}
+
+void Work::fill_datum(const PlanarSolution& solution) {
+  const PlanarProblem& p = solution.problem;
   std::vector<std::vector<double>> beams(static_cast<std::size_t>(p.train.prisms()));
   std::vector<std::uint8_t> emitter;
   for (std::size_t r = 0; r < recordings_.size(); ++r) {
-    for (const std::size_t row : spread_rows(shots_[r].size(), kBundleBeams / recordings_.size())) {
+    for (const std::size_t row :
+         spread_rows(all_[r].shots.size(), kBundleBeams / recordings_.size())) {
       for (std::size_t k = 0; k < beams.size(); ++k) {
-        beams[k].push_back(shots_[r].rotation_angle[k][row]);
+        beams[k].push_back(all_[r].shots.rotation_angle[k][row]);
       }
-      emitter.push_back(shots_[r].beam.empty() ? std::uint8_t{0} : shots_[r].beam[row]);
+      emitter.push_back(all_[r].shots.beam.empty() ? std::uint8_t{0} : all_[r].shots.beam[row]);
     }
   }
   result_.datum = formal_datum(p.train, p.free, result_.covariance, beams, emitter);
   result_.datum_without_common = formal_datum(
       p.train, p.free, solution.noise_covariance * result_.variance_factor, beams, emitter);
-}
-
-void Work::judge(const PlanarSolution& solution) {
-  Calibration& c = result_;
-  c.converged = solution.converged && c.covariance.allFinite();
-  if (!c.converged) c.reason = "the adjustment did not converge";
-  if (!c.unobservable.empty()) {
-    c.converged = false;
-    c.reason = fmt::format(
-        "the walls do not tell {}, only to {:.2g} degrees: walls tilted by 30 degrees and more "
-        "against the axis do, or a prior (option prior_sigma)",
-        estimation::direction_text(c.unobservable.front()), c.unobservable.front().sigma);
-  }
-  const PriorTest* worst = nullptr;
-  for (const PriorTest& test : c.prior_tests) {
-    if (test.degrees_of_freedom == 0 || test.chi2 <= test.critical) continue;
-    if (worst == nullptr || test.chi2 > worst->chi2) worst = &test;
-  }
-  if (worst != nullptr) {
-    c.converged = false;
-    c.reason = fmt::format(
-        "{} {} contradicts the data: what is stated of it is off by {:.3g} degrees, chi2 {:.3g} "
-        "where {:.3g} is the limit",
-        worst->station ? "station" : "plane", worst->name, degrees_from_radians(worst->misfit),
-        worst->chi2, worst->critical);
-    std::string others;
-    for (const PriorTest& test : c.prior_tests) {
-      if (&test == worst || test.degrees_of_freedom == 0 || test.chi2 <= test.critical) continue;
-      others += (others.empty() ? "" : ", ") + test.name;
-    }
-    if (!others.empty()) {
-      c.reason += fmt::format("; so do {}: they contradict each other", others);
-    }
-  }
-  const double boresight = std::hypot(c.datum.sigma_pitch, c.datum.sigma_yaw);
-  if (boresight > kPoorDatum) {
-    c.warnings.push_back(fmt::format(
-        "the direction that all beams share is only known to {:.2g} degrees (pitch {:.2g}, yaw "
-        "{:.2g}); their directions against each other to {:.2g}",
-        degrees_from_radians(boresight), degrees_from_radians(c.datum.sigma_pitch),
-        degrees_from_radians(c.datum.sigma_yaw), degrees_from_radians(c.datum.shape)));
-  }
-  for (const SurfaceStep& step : c.steps) {
-    c.warnings.push_back(fmt::format(
-        "{}: a region of {:.2g} degrees stands {:.0f} mm off plane {} (azimuth {:.1f}, zenith "
-        "{:.1f}); its {} shots are left out",
-        recordings_[step.recording].name, degrees_from_radians(step.size), 1e3 * step.height,
-        c.planes[step.plane].name, degrees_from_radians(step.azimuth),
-        degrees_from_radians(step.zenith), step.points));
-  }
-  if (c.variance_factor > 1.0) {
-    c.warnings.push_back(
-        fmt::format("the walls are uneven: means over a square degree scatter {:.2g} times as much "
-                    "as the noise "
-                    "allows; variances are enlarged by that, and boresight may be off by more",
-                    c.unevenness));
-  }
-  if (solution.lost > 0) {
-    c.warnings.push_back(fmt::format("{} shots do not meet their plane", solution.lost));
-  }
 }
 
 }  // namespace

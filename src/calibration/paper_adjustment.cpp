@@ -10,7 +10,7 @@
 #include <Eigen/Cholesky>
 #include <tbb/parallel_for.h>
 
-#include "risley/calibration/plane_segmentation.hpp"
+#include "risley/calibration/fitted_plane.hpp"
 #include "risley/core/error.hpp"
 #include "risley/optics/batch.hpp"
 #include "risley/optics/beam_origin.hpp"

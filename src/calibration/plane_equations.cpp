@@ -3,14 +3,13 @@
 #include "risley/calibration/plane_equations.hpp"
 
 #include <algorithm>
-#include <cmath>
-#include <string_view>
 
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
 
 #include "risley/core/error.hpp"
 
+#include "calibration/entry_checks.hpp"
 #include "calibration/plane_equations_kernel.hpp"
 
 namespace risley::calibration {
@@ -19,47 +18,23 @@ namespace {
 /// Shots that one task sums up: fixed, so that sums do not depend on the number of threads.
 constexpr std::size_t kChunkShots = 8192;
 
-void check_count(std::string_view columns, std::size_t count, std::size_t expected) {
-  if (count != expected) {
-    throw InvalidArgument(fmt::format("{} has {} columns, expected {}", columns, count, expected));
-  }
-}
-
-void check_length(std::string_view column, std::size_t length, std::size_t shots) {
-  if (length != shots) {
-    throw InvalidArgument(
-        fmt::format("column {} has {} values, the ranges have {}", column, length, shots));
-  }
-}
-
 void check(const RangedShots& shots, const PlaneView& view, const ResidualColumns& columns) {
-  check_shape(view.train.shape());
-  const auto prisms = static_cast<std::size_t>(view.train.prisms());
-  check_count("rotation_angle", shots.rotation_angle.size(), prisms);
-  check_count("angle_covariance", shots.angle_covariance.size(), prisms * (prisms + 1) / 2);
-  for (const auto& column : shots.rotation_angle) {
-    check_length("rotation_angle", column.size(), shots.size());
-  }
-  for (const auto& column : shots.angle_covariance) {
-    check_length("angle_covariance", column.size(), shots.size());
-  }
-  check_beams(view.train, shots.beam, shots.size());
-  if (!columns.residual.empty()) check_length("residual", columns.residual.size(), shots.size());
-  if (!columns.variance.empty()) check_length("variance", columns.variance.size(), shots.size());
-  const int all_places = parameter_count(view.train.shape());
-  if (view.places.size() > static_cast<std::size_t>(all_places)) {
+  require_shots(shots, view.train);
+  require_length_or_none("residual", columns.residual.size(), shots.size());
+  require_length_or_none("variance", columns.variance.size(), shots.size());
+  const auto all_places = static_cast<std::size_t>(parameter_count(view.train.shape()));
+  if (view.places.size() > all_places) {
     throw InvalidArgument(fmt::format("{} places given, a train of {} prisms has {}",
-                                      view.places.size(), prisms, all_places));
+                                      view.places.size(), view.train.prisms(), all_places));
   }
   for (const int place : view.places) {
-    if (place < 0 || place >= all_places) {
+    if (place < 0 || static_cast<std::size_t>(place) >= all_places) {
       throw InvalidArgument(fmt::format("place = {}, allowed 0 to {}", place, all_places - 1));
     }
   }
-  if (!(view.range_variance > 0) || !std::isfinite(view.range_variance)) {
-    throw InvalidArgument(
-        fmt::format("range_variance = {} m^2, must be positive", view.range_variance));
-  }
+  require_finite("range offset", view.range_offset, "m");
+  require_above("range variance", view.range_variance, 0, "m^2");
+  require_finite("distance", view.plane.distance, "m");
 }
 
 void copy(const Vector3<double>& from, double* to) {

@@ -11,15 +11,19 @@
 
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
+#include "risley/core/require.hpp"
+#include "risley/optics/prism.hpp"
 
 namespace risley::calibration {
 namespace {
 
+/// Shots whose rotor states are in memory at a time: some megabytes.
 constexpr std::size_t kStatesBlock = 65536;
 
 }  // namespace
 
 void RangedShots::resize(int prisms, std::size_t shots) {
+  require_between("number of prisms", prisms, 1, kMaxPrisms);
   const auto n = static_cast<std::size_t>(prisms);
   rotation_angle.resize(n);
   angle_covariance.resize(n * (n + 1) / 2);
@@ -40,6 +44,15 @@ void RangedShots::set_row(std::size_t row, const RangedShots& from, std::size_t 
   beam[row] = from.beam.empty() ? std::uint8_t{0} : from.beam[from_row];
 }
 
+RangedShots rows_of(const RangedShots& shots, const std::vector<std::size_t>& rows) {
+  if (!rows.empty())
+    require_place("row", *std::max_element(rows.begin(), rows.end()), shots.size());
+  RangedShots result;
+  result.resize(shots.prisms(), rows.size());
+  for (std::size_t i = 0; i < rows.size(); ++i) result.set_row(i, shots, rows[i]);
+  return result;
+}
+
 RangedRecording ranged_recording(const estimation::Estimate& estimate, std::string name,
                                  std::string serial) {
   if (!estimate.converged) {
@@ -50,6 +63,7 @@ RangedRecording ranged_recording(const estimation::Estimate& estimate, std::stri
     throw EstimationError(fmt::format(
         "{}: calibration needs ranges, and an estimate of all shots at once (method map)", name));
   }
+  require_length_or_none("beam", estimate.series.beam.size(), estimate.series.size());
   const int prisms = estimate.sensor.prisms();
   RangedRecording recording;
   recording.believed = estimate.sensor;

@@ -10,28 +10,15 @@
 
 namespace risley::calibration {
 
-/// A shot belongs to a plane within so many sigmas.
+/// A shot belongs to a plane within so many sigmas: 3 of 1000 with normal noise do not.
 inline constexpr double kGate = 3.0;
-/// What lies beyond the gate and within so many sigmas is an outlier of its plane.
+/// What lies beyond the gate and within so many sigmas is an outlier of its plane. Steps of it are
+/// looked for as far: docs/theory/calibration.md
 inline constexpr double kNearby = 10.0;
 
-/// Lines of sight of shots.
-class Rays {
- public:
-  Rays(const PrismTrain& train, const PrismGeometry& geometry, const RangedShots& shots);
-
-  Vector3<double> direction(std::size_t i) const { return {x_[i], y_[i], z_[i]}; }
-  Vector3<double> origin(std::size_t i) const { return {origin_x_[i], origin_y_[i], origin_z_[i]}; }
-  Vector3<double> point(std::size_t i, double range) const {
-    return origin(i) + range * direction(i);
-  }
-
- private:
-  std::vector<double> x_, y_, z_, origin_x_, origin_y_, origin_z_;
-};
-
-/// Some shots by their rows.
-RangedShots rows_of(const RangedShots& shots, const std::vector<std::size_t>& rows);
+/// A view of fewer shots is none: its range variance would be known to no better than a quarter,
+/// sqrt(2 / 30).
+inline constexpr std::size_t kLeastViewShots = 30;
 
 /// Typical sigma of a direction that comes from the rotation angles' covariance, rad.
 double pointing_of_angles(const RangedShots& shots);

@@ -15,6 +15,7 @@ namespace risley::calibration {
 namespace {
 
 /// Found planes are off by the calibration errors that the adjustment will find: a degree or two.
+/// WallMatching.AsFarAsUncalibratedPlanesMayBeOff
 constexpr double kSameDirection = radians_from_degrees(5.0);
 constexpr double kSameDistance = 0.05;        // of the distance
 constexpr double kSameDistanceAtLeast = 0.3;  // m

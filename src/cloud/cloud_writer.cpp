@@ -3,15 +3,38 @@
 #include "risley/cloud/cloud_writer.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include <fmt/format.h>
 
 #include "risley/core/error.hpp"
 #include "risley/core/text.hpp"
+#include "risley/optics/prism.hpp"
 
+#include "cloud/entry_checks.hpp"
 #include "cloud/formats/cloud_format.hpp"
 
 namespace risley::cloud {
+namespace {
+
+/// A writer of any format that gets points as the cloud's header announces them.
+class CheckedWriter final : public CloudWriter {
+ public:
+  CheckedWriter(std::unique_ptr<CloudWriter> writer, CloudHeader header)
+      : writer_(std::move(writer)), header_(std::move(header)) {}
+
+  void write(const Points& points) override {
+    require_columns(points, header_);
+    writer_->write(points);
+  }
+  void close() override { writer_->close(); }
+
+ private:
+  std::unique_ptr<CloudWriter> writer_;
+  CloudHeader header_;
+};
+
+}  // namespace
 
 const std::vector<CloudFormat>& cloud_formats() {
   static const std::vector<CloudFormat> formats = [] {
@@ -45,11 +68,12 @@ const CloudFormat& find_cloud_format(const std::string& path, const std::string&
 
 std::unique_ptr<CloudWriter> create_cloud(const std::string& path, const CloudHeader& header,
                                           const CloudWriterOptions& options) {
+  require_between("number of prisms", header.prisms, 1, kMaxPrisms);
   const CloudFormat& found = find_cloud_format(path, options.format);
   const auto& formats = all_cloud_formats();
   const auto it = std::find_if(formats.begin(), formats.end(),
                                [&found](const auto* format) { return format->name == found.name; });
-  return (*it)->create(path, header, options);
+  return std::make_unique<CheckedWriter>((*it)->create(path, header, options), header);
 }
 
 }  // namespace risley::cloud

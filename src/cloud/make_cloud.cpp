@@ -14,6 +14,7 @@
 
 #include "risley/cloud/surface_normals.hpp"
 #include "risley/core/angle.hpp"
+#include "risley/core/require.hpp"
 #include "risley/optics/observation_model.hpp"
 
 #include "cloud/piece_overlap.hpp"
@@ -23,7 +24,8 @@ namespace {
 
 using recordings::Observations;
 
-/// Rows at the beginning that the sensor's belief is found from: ten seconds of a Mid-40.
+/// Rows at the beginning that the sensor's belief is found from: ten seconds of a Mid-40, see
+/// docs/theory/cloud.md.
 constexpr std::size_t kBeginningRows = std::size_t{1} << 20;
 /// Shots of it that are enough: the believed parameters move points by far less than the
 /// calibration.
@@ -32,13 +34,17 @@ constexpr std::size_t kBeliefShots = std::size_t{1} << 18;
 constexpr std::size_t kPieceRows = std::size_t{1} << 18;
 /// The same where no rotation angles are needed: a surface's worth.
 constexpr std::size_t kReportedRows = std::size_t{1} << 16;
-/// Surfaces are taken to stand still for so long.
+/// Surfaces are taken to stand still for so long: docs/theory/cloud.md
 constexpr std::int64_t kSurfaceNs = 1'000'000'000;
+/// Shots of it that tell a surface: on the 1160 cells of a Mid-40's field of view, a circle of 38.4
+/// degrees, 14 each and 120 in a block of nine.
 constexpr std::size_t kSurfaceShots = 16000;
+/// Rows that one task works on: some thirty columns of them are 1 MB.
 constexpr std::size_t kBlockRows = 4096;
-/// As BatchMapOptions::outlier_chi2.
-constexpr double kOutlierChi2 = 20.0;
-constexpr double kLeastRangeNoise = 1e-3;  // m, for telling surfaces
+/// Directions beyond are damaged records: the rotors' motion is found without them, too.
+const double kOutlierChi2 = estimation::BatchMapOptions{}.outlier_chi2;
+/// For telling surfaces: the step in which these sensors give ranges, m.
+constexpr double kLeastRangeNoise = 1e-3;
 
 double square(double x) { return x * x; }
 
@@ -383,7 +389,7 @@ class Work {
 
   /// How far the calibration moves the beams, seen on shots of the first piece.
   void find_repointing() {
-    constexpr std::size_t kBeams = 2000;
+    constexpr std::size_t kBeams = 2000;  // tell a root mean square to 2 %, 1 / sqrt(2 * 2000)
     std::vector<std::size_t> rows;
     const std::size_t stride = std::max<std::size_t>(1, piece_.size() / kBeams);
     for (std::size_t row = 0; row < piece_.size(); row += stride) rows.push_back(row);
@@ -446,6 +452,8 @@ class Work {
 CloudSummary make_cloud(recordings::Reader& reader, const sensors::Sensor& calibration,
                         const std::string& path, const CloudOptions& options,
                         const Progress& progress) {
+  if (options.rate) require_above("rate", *options.rate, 0, "Hz");
+  if (options.angle_noise) require_above("angle noise", *options.angle_noise, 0, "rad");
   return Work(reader, calibration, path, options, progress).run();
 }
 

@@ -6,6 +6,7 @@
 
 #include "risley/core/error.hpp"
 #include "risley/core/require.hpp"
+#include "risley/optics/prism.hpp"
 
 namespace risley::cloud {
 namespace {
@@ -46,6 +47,7 @@ void Points::keep(std::span<const std::size_t> rows) {
 }
 
 void CloudHeader::resize(Points& points, std::size_t rows) const {
+  require_between("number of prisms", prisms, 1, kMaxPrisms);
   points.time_ns.resize(rows);
   for (auto* column : {&points.x, &points.y, &points.z, &points.range, &points.incidence}) {
     column->resize(rows);

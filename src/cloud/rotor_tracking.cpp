@@ -14,6 +14,7 @@
 #include <fmt/format.h>
 
 #include "risley/core/error.hpp"
+#include "risley/core/require.hpp"
 #include "risley/estimation/parameter_agreement.hpp"
 
 namespace risley::cloud {
@@ -24,7 +25,8 @@ using estimation::kStatesPerRotor;
 using sensors::CalibrationReference;
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-/// How far a rotor may leave the parabola of a knot until the next, 1 sigma, rad.
+/// How far a rotor may leave the parabola of a knot until the next, 1 sigma, rad: a hundredth of
+/// what angles are known to, see kTrackingRate.
 constexpr double kParabola = radians_from_degrees(2e-5);
 
 /// Fewer knots are faster: the longest interval over which these rotors move along parabolas.
@@ -103,6 +105,7 @@ void check_same_sensor(const estimation::Estimate& estimate, const sensors::Sens
 SensorBelief sensor_belief(const estimation::AngleSeries& beginning,
                            const estimation::AngleSeries& head, const sensors::Sensor& calibration,
                            std::optional<double> angle_noise, const Progress& progress) {
+  if (angle_noise) require_above("angle noise", *angle_noise, 0, "rad");
   estimation::EstimateOptions options;
   options.sensor = calibration;
   options.angle_noise = angle_noise;
@@ -140,7 +143,12 @@ SensorBelief sensor_belief(const estimation::AngleSeries& beginning,
 }
 
 RotorTracker::RotorTracker(const SensorBelief& belief, std::optional<double> rate)
-    : belief_(belief), rate_(rate), knot_interval_(knot_interval(belief.rotor_process)) {}
+    : belief_(belief), rate_(rate), knot_interval_(knot_interval(belief.rotor_process)) {
+  if (rate) require_above("rate", *rate, 0, "Hz");
+  require_length("rotor_process", belief.rotor_process.size(),
+                 static_cast<std::size_t>(belief.sensor.prisms()));
+  require_above("angle noise", belief.angle_noise, 0, "rad");
+}
 
 estimation::Start RotorTracker::start_of(const estimation::AngleSeries& series,
                                          const estimation::AngleSeries& head) const {
@@ -188,8 +196,15 @@ void RotorTracker::track(const recordings::Observations& rows) {
 void RotorTracker::angles(const recordings::Observations& piece, std::span<const std::size_t> rows,
                           std::vector<std::vector<double>>& angle,
                           std::vector<std::vector<double>>& covariance) const {
+  const auto prisms = static_cast<std::size_t>(belief_.sensor.prisms());
+  if (!rows.empty()) require_place("row", rows.back(), piece.size());
+  require_length("angle", angle.size(), prisms);
+  require_length("covariance", covariance.size(), prisms * (prisms + 1) / 2);
+  for (const auto& column : angle) require_length("angle of a prism", column.size(), rows.size());
+  for (const auto& column : covariance) {
+    require_length("covariance of two prisms", column.size(), rows.size());
+  }
   const estimation::RotorTrajectory& knots = solution_.trajectory;
-  const auto prisms = static_cast<std::size_t>(knots.prisms);
   const double farthest = reach();
   constexpr std::size_t kTerms = 5;  // a covariance of angles is a polynomial of 4th degree in time
   std::vector<std::array<double, kTerms>> terms(covariance.size());

@@ -13,8 +13,13 @@ namespace risley::cloud {
 namespace {
 
 constexpr float kNoNormal = std::numeric_limits<float>::quiet_NaN();
+/// Of a fit: nine degrees of freedom tell its roughness to a quarter, 1 / sqrt(2 * 9).
 constexpr double kLeastShots = 12;
-constexpr double kLeastForward = 0.1;  // X of the directions that are looked at
+/// X of the directions that are looked at: sine of the six degrees that SurfaceNormals tells of.
+constexpr double kLeastForward = 0.1;
+/// Part of the squared spread across that shots along one line lack: 1 - correlation^2.
+/// SurfaceNormals.ShotsAlongALineHaveNone
+constexpr double kLeastSpread = 1e-3;
 
 }  // namespace
 
@@ -87,7 +92,7 @@ std::array<float, 3> SurfaceNormals::fitted(const Moments& m) const {
   const double qu = m.qu - m.n * q * u, qv = m.qv - m.n * q * v;
   const double determinant = uu * vv - uv * uv;
   // Shots along one line tell a slope in one direction only.
-  if (!(determinant > 1e-3 * uu * vv)) return {kNoNormal, kNoNormal, kNoNormal};
+  if (!(determinant > kLeastSpread * uu * vv)) return {kNoNormal, kNoNormal, kNoNormal};
   const double slope_u = (qu * vv - qv * uv) / determinant;
   const double slope_v = (qv * uu - qu * uv) / determinant;
   const double misfit = m.qq - m.n * q * q - slope_u * qu - slope_v * qv;

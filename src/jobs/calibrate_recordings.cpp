@@ -157,7 +157,8 @@ CalibratedRecordings calibrate_recordings(const CalibrateRecordingsOptions& opti
     }
     if (options.details) {
       result.details =
-          calibration_details(result.calibration, options.recordings.size(), result.truth);
+          calibration_details(result.calibration, options.recordings.size(),
+                              wall_sample(recordings, result.calibration), result.truth);
     }
   } catch (const EstimationError&) {
     folder.remove_calibration();

@@ -15,7 +15,6 @@ namespace {
 
 using calibration::Calibration;
 using calibration::kSurfaceCell;
-using calibration::SamplePoint;
 
 constexpr int kFewestPointsInCell = 5;  // points that make a mean over a cell of the field of view
 constexpr std::size_t kMostSpaces = 3;  // recordings shown in space
@@ -108,11 +107,13 @@ WallsInSpace walls_in_space(const Calibration& c, const std::vector<const Sample
 }  // namespace
 
 CalibrationDetails calibration_details(const Calibration& calibration, std::size_t recordings,
+                                       std::vector<SamplePoint> sample,
                                        const std::optional<BeamComparison>& truth) {
   CalibrationDetails result;
+  result.sample = std::move(sample);
   std::vector<const SamplePoint*> on_planes;
   std::vector<double> before, after;
-  for (const SamplePoint& point : calibration.sample) {
+  for (const SamplePoint& point : result.sample) {
     if (point.plane < 0) continue;
     on_planes.push_back(&point);
     before.push_back(point.before);

@@ -22,8 +22,8 @@ namespace risley::report {
 namespace {
 
 using calibration::Calibration;
-using calibration::SamplePoint;
 using calibration::ThicknessProfile;
+using jobs::SamplePoint;
 
 constexpr std::size_t kMostWallPoints = 3000;   // per scatter diagram
 constexpr std::size_t kMostViewPoints = 8000;   // of all recordings in one kind of view
@@ -72,7 +72,7 @@ std::string recording_name(const CalibrationReportInput& input, std::size_t reco
 
 std::size_t recording_count(const CalibrationReportInput& input) {
   std::size_t count = input.recordings.size();
-  for (const SamplePoint& point : input.calibration.sample) {
+  for (const SamplePoint& point : input.details.sample) {
     count = std::max(count, point.recording + 1);
   }
   return count;
@@ -95,7 +95,7 @@ class CalibrationCharts {
  public:
   explicit CalibrationCharts(const CalibrationReportInput& input)
       : input_(input), c_(input.calibration) {
-    for (const SamplePoint& point : c_.sample) {
+    for (const SamplePoint& point : input_.details.sample) {
       if (point.plane >= 0) on_walls_.push_back(&point);
     }
   }
@@ -114,7 +114,7 @@ class CalibrationCharts {
     std::vector<Chart> charts;
     const std::size_t recordings = recording_count(input_);
     for (std::size_t i = 0; i < recordings; ++i) {
-      const View view(c_, i, recordings);
+      const View view(input_, i, recordings);
       if (view.empty()) continue;
       const std::string name = recording_name(input_, i);
       charts.push_back(view.chart("Field of view: " + name, "azimuth, deg", azimuth_degrees,
@@ -168,9 +168,9 @@ class CalibrationCharts {
   /// The sample points of one recording, thinned and split by plane.
   class View {
    public:
-    View(const Calibration& c, std::size_t recording, std::size_t recordings) {
+    View(const CalibrationReportInput& input, std::size_t recording, std::size_t recordings) {
       std::vector<const SamplePoint*> points;
-      for (const SamplePoint& point : c.sample) {
+      for (const SamplePoint& point : input.details.sample) {
         if (point.recording == recording) points.push_back(&point);
       }
       const std::size_t most = std::max(kMostViewPoints / recordings, kFewestViewPoints);
@@ -182,7 +182,7 @@ class CalibrationCharts {
       std::size_t colour = 0;
       for (const auto& [plane, members] : by_plane) {
         if (plane < 0) continue;
-        groups_.push_back({plane_name(c, static_cast<std::size_t>(plane)),
+        groups_.push_back({plane_name(input.calibration, static_cast<std::size_t>(plane)),
                            kPlaneColours[colour++ % kPlaneColours.size()], members});
       }
       if (clutter != by_plane.end())

@@ -13,6 +13,7 @@
 
 #include <gtest/gtest.h>
 
+#include "risley/calibration/fitted_plane.hpp"
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
 #include "risley/core/random.hpp"

@@ -13,8 +13,8 @@
 
 #include <Eigen/Core>
 
+#include "risley/calibration/fitted_plane.hpp"
 #include "risley/calibration/planar_adjustment.hpp"
-#include "risley/calibration/plane_segmentation.hpp"
 #include "risley/core/angle.hpp"
 #include "risley/core/random.hpp"
 #include "risley/scenes/scene.hpp"

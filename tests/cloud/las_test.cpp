@@ -429,10 +429,11 @@ TEST_F(LasTest, AllReturnsThatLas14Counts) {
 TEST_F(LasTest, RefusesColumnsOfOtherLengths) {
   Points points = random_points(header_, 10);
   points.beam.pop_back();
-  EXPECT_THAT(refusal<InvalidArgument>(points), HasSubstr("beam has 9 rows, time_ns has 10"));
+  EXPECT_THAT(refusal<InvalidArgument>(points), HasSubstr("beam has 9 values, expected 10"));
   points = random_points(header_, 10);
   points.rotation_angle.pop_back();
-  EXPECT_THAT(refusal<InvalidArgument>(points), HasSubstr("rotation_angle has 1 columns"));
+  EXPECT_THAT(refusal<InvalidArgument>(points),
+              HasSubstr("rotation_angle has 1 values, expected 2"));
 }
 
 TEST_F(LasTest, RefusesMoreFactorsAndProvenanceThanThereIsRoomFor) {

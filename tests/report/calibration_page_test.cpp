@@ -63,13 +63,12 @@ calibration::ThicknessProfile profile(const std::string& variable, double from, 
 }
 
 /// Shots of a rosette on the nearest plane of their recording; one in 20 hits none.
-std::vector<calibration::SamplePoint> sample_on(
-    const std::vector<calibration::CalibratedPlane>& planes, std::size_t recordings,
-    std::size_t points) {
+std::vector<jobs::SamplePoint> sample_on(const std::vector<calibration::CalibratedPlane>& planes,
+                                         std::size_t recordings, std::size_t points) {
   const RandomStream noise(1, 0);
-  std::vector<calibration::SamplePoint> sample;
+  std::vector<jobs::SamplePoint> sample;
   for (std::size_t i = 0; i < points; ++i) {
-    calibration::SamplePoint one;
+    jobs::SamplePoint one;
     one.recording = i % recordings;
     const double turn = 0.0137 * double(i);
     one.azimuth = deg(19.2) * std::cos(turn) * std::cos(3.11 * turn);
@@ -96,7 +95,7 @@ std::vector<calibration::SamplePoint> sample_on(
 }
 
 /// A calibration as two recordings of rooms would give it.
-Calibration example(std::size_t points = 2000) {
+Calibration example() {
   Calibration c;
   c.converged = true;
   c.sensor = sensors::load_sensor("mid-40");
@@ -134,7 +133,6 @@ Calibration example(std::size_t points = 2000) {
   c.points = 80000;
   c.profiles = {profile("incidence", 0, deg(80), 16), profile("rotation_angle_a", -kPi, kPi, 36),
                 profile("rotation_angle_b", -kPi, kPi, 36)};
-  c.sample = sample_on(c.planes, 2, points);
   return c;
 }
 
@@ -142,8 +140,11 @@ Calibration example(std::size_t points = 2000) {
 struct Page {
   sensors::Sensor nominal = sensors::load_sensor("mid-40");
   Calibration calibration = example();
+  std::vector<jobs::SamplePoint> sample;
   std::optional<jobs::BeamComparison> truth;
   std::vector<std::string> warnings;
+
+  explicit Page(std::size_t points = 2000) : sample(sample_on(calibration.planes, 2, points)) {}
 
   CalibrationReport report() const {
     std::vector<ReportedRecording> recordings{{"room <1>.lvx", "lvx-1.1", "sensor", {}},
@@ -153,7 +154,7 @@ struct Page {
     return calibration_report(
         {calibration,
          nominal,
-         jobs::calibration_details(calibration, recordings.size(), truth),
+         jobs::calibration_details(calibration, recordings.size(), sample, truth),
          truth,
          recordings,
          {{"command", "risley calibrate \"room <1>.lvx\" hall.lvx"}, {"version", "0.1.0"}},
@@ -256,8 +257,7 @@ TEST(CalibrationPage, SaysFirstThatAGoodCalibrationIsHealthy) {
 }
 
 TEST(CalibrationPage, HasEverySection) {
-  Page page;
-  page.calibration = example(20000);
+  Page page(20000);
   page.truth = example_truth();
   const std::string shown = visible(page.html());
   for (const char* text :
@@ -328,6 +328,7 @@ TEST(CalibrationPage, APoorDatumSaysWhatHelps) {
 TEST(CalibrationPage, AFailureSaysWhyAndWhatToDo) {
   Page page;
   page.calibration = Calibration();
+  page.sample.clear();
   page.calibration.sensor = sensors::load_sensor("mid-40");
   page.calibration.believed = page.calibration.sensor.train;
   page.calibration.reason = "the walls do not tell pitch & yaw";
@@ -361,7 +362,8 @@ TEST(CalibrationPage, NumbersThatAreNotFiniteAreDashes) {
   c.range_offset = kNaN;
   c.unevenness = std::numeric_limits<double>::infinity();
   c.steps[0].height = kNaN;
-  c.sample[1].azimuth = c.sample[2].point.x = c.sample[3].after = c.sample[4].before = kNaN;
+  auto& sample = page.sample;
+  sample[1].azimuth = sample[2].point.x = sample[3].after = sample[4].before = kNaN;
   c.profiles[0].from[1] = kNaN;
   c.profiles[1].rms_before.assign(36, kNaN);
   expect_sound(page.html());
@@ -432,9 +434,8 @@ TEST(CalibrationPage, TheHistogramCountsEverySamplePointOnAPlane) {
 }
 
 TEST(CalibrationPage, CellMeansShowAPlaneThatIsBent) {
-  Page page;
-  page.calibration = example(20000);
-  for (auto& point : page.calibration.sample) {
+  Page page(20000);
+  for (auto& point : page.sample) {
     if (point.plane >= 0) point.after = point.azimuth > 0 ? 0.001 : -0.001;
   }
   const std::string html = page.html();
@@ -454,12 +455,11 @@ TEST(CalibrationPage, CellMeansShowAPlaneThatIsBent) {
 }
 
 TEST(CalibrationPage, WallsInSpaceStandOffTheirPlanesByTheirEnlargedMeans) {
-  Page page;
-  page.calibration = example(20000);
+  Page page(20000);
   Calibration& c = page.calibration;
   c.planes = {wall("front", 0, 0, 90, 8.0)};
-  c.sample = sample_on(c.planes, 1, 20000);
-  for (auto& point : c.sample) {
+  page.sample = sample_on(c.planes, 1, 20000);
+  for (auto& point : page.sample) {
     if (point.plane < 0) continue;
     point.after = 0;
     point.point = (8.0 / point.point.x) * point.point;
@@ -495,8 +495,7 @@ TEST(CalibrationPage, ErrorsOfBeamsWithKnownTruthAreCountedBeforeAndAfter) {
 }
 
 TEST(CalibrationPage, ViewsAreThinnedAndSayHow) {
-  Page page;
-  page.calibration = example(20000);
+  Page page(20000);
   const std::string html = page.html();
   const auto drawn = chart(html, "From above: room &lt;1&gt;.lvx");
   std::size_t points = 0;

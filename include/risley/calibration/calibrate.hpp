@@ -55,11 +55,12 @@ struct CalibratedPlane {
   std::size_t recording = 0;
   Vector3<double> normal;  ///< sensor frame
   double distance = 0;     ///< from the sensor's origin, m
+  Plane believed;          ///< fitted to the points of the believed parameters, sensor frame
   std::size_t points = 0;
   /// Shots that lie near the plane (within ten sigmas) and were not used.
   std::size_t outliers = 0;
   double rms = 0;          ///< of point-to-plane distances after the calibration, m
-  double rms_before = 0;   ///< the same with the believed parameters and a plane fitted to them, m
+  double rms_before = 0;   ///< the same with the believed parameters, of the believed plane, m
   double range_sigma = 0;  ///< of one range, found by variance components, m
 };
 
@@ -79,15 +80,6 @@ struct ThicknessProfile {
   std::vector<std::size_t> count;               ///< [bins]
   std::vector<double> rms_before, rms_after;    ///< [bins], m; NaN in an empty bin
   std::vector<double> mean_before, mean_after;  ///< [bins], m; NaN in an empty bin
-};
-
-/// One point of a cloud for pictures.
-struct SamplePoint {
-  std::size_t recording = 0;
-  int plane = -1;                  ///< row of Calibration::planes, -1: none
-  Vector3<double> point;           ///< sensor frame, m, after the calibration
-  double before = 0, after = 0;    ///< distance from the plane, m; NaN without a plane
-  double azimuth = 0, zenith = 0;  ///< of the beam after the calibration, rad
 };
 
 /// Everything one calibration found.
@@ -119,13 +111,16 @@ struct Calibration {
   double rms_before = 0, rms_after = 0;  ///< over all planes, m
   std::size_t points = 0;                ///< used
   std::vector<ThicknessProfile> profiles;
-  std::vector<SamplePoint> sample;  ///< at most 20,000 shots, evenly spread
+  /// Row of planes that each shot was used for, -1: none [recordings][shots].
+  std::vector<std::vector<int>> plane_of_shot;
 };
 
 /// Calibrates a sensor on the walls that its recordings saw.
 /// @throws EstimationError when there is nothing to calibrate on: no plane, points on one line,
 ///         recordings of different sensors, stations or planes that contradict the data
-/// @throws InvalidArgument for unknown parameters or stations that do not match the recordings
+/// @throws InvalidArgument for unknown parameters, stations that do not match the recordings, noise
+///         or sigmas out of their ranges, columns or matrices that do not belong to a recording's
+///         prisms, shots and free parameters
 Calibration calibrate(const std::vector<RangedRecording>& recordings,
                       const CalibrationOptions& options, const Progress& progress = {});
 

@@ -56,11 +56,14 @@ struct CalibrationForecast {
 /// Cramer-Rao bound of the calibration: the normal equations of the default method at the sensor's
 /// parameters for shots that meet the scene, noise alone. Uneven walls and wrong indices come on
 /// top. A sample of the shots stands for all.
-/// @throws EstimationError when no shot meets a wall; InvalidArgument
+/// @throws EstimationError when no shot meets a wall; InvalidArgument for a duration, rate, noise
+/// or
+///         sigma out of its range, and as calibration_parameters()
 CalibrationForecast forecast(const CalibrationPlan& plan);
 
 /// Free parameters of a calibration: what walls can tell, less the fixed ones plus the others. The
 /// refractive index is held unless asked for, since the recording itself tells it better.
+/// @throws InvalidArgument for a name that is no parameter of the prisms, or is in both lists
 std::vector<estimation::FreeParameter> calibration_parameters(
     const TrainShape& shape, const std::vector<std::string>& fixed,
     const std::vector<std::string>& additional);

@@ -66,6 +66,8 @@ struct ResidualColumns {
 /// rest, and the residuals themselves are exact. docs/theory/calibration.md The sums do not depend
 /// on the number of threads.
 /// @param set  instruction set, for tests and benchmarks
+/// @throws InvalidArgument for columns of other lengths, places or emitters that the train does not
+///         have, numbers that are not finite, and as check_available()
 PlaneEquations plane_equations(const RangedShots& shots, const PlaneView& view,
                                const ResidualColumns& columns = {},
                                InstructionSet set = best_instruction_set());

@@ -27,10 +27,14 @@ struct RangedShots {
 
   std::size_t size() const { return range.size(); }
   int prisms() const { return static_cast<int>(rotation_angle.size()); }
+  /// @throws InvalidArgument for a number of prisms that no sensor has
   void resize(int prisms, std::size_t shots);
   /// Copies one row of other shots to a row of these.
   void set_row(std::size_t row, const RangedShots& from, std::size_t from_row);
 };
+
+/// Some shots by their rows. @throws InvalidArgument for a row that is not there
+RangedShots rows_of(const RangedShots& shots, const std::vector<std::size_t>& rows);
 
 /// One recording, ready to be calibrated with.
 struct RangedRecording {
@@ -52,7 +56,8 @@ struct RangedRecording {
 /// @param estimate  converged (or with its noise overstated: angles of a recording without noise
 /// are
 ///                  good enough), by the batch estimator, of a series with ranges
-/// @throws EstimationError when it did not converge or has no ranges
+/// @throws EstimationError when it did not converge or has no ranges, InvalidArgument for emitters
+///         of another number of shots
 RangedRecording ranged_recording(const estimation::Estimate& estimate, std::string name,
                                  std::string serial);
 

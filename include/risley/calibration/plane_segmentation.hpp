@@ -61,9 +61,4 @@ double distance_sigma(const Plane& plane, const Vector3<double>& point,
 Segmentation segment_planes(std::span<const Vector3<double>> points,
                             const SegmentationOptions& options);
 
-/// Plane that fits points best (smallest singular value), its normal away from the origin.
-/// @param use  rows of the points
-/// @throws EstimationError when there are fewer than three points or they lie on one line
-Plane fitted_plane(std::span<const Vector3<double>> points, std::span<const std::size_t> use);
-
 }  // namespace risley::calibration

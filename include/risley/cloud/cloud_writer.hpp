@@ -17,8 +17,9 @@ class CloudWriter {
  public:
   virtual ~CloudWriter() = default;
 
-  /// Appends points. @throws FileError when the disk refuses, InvalidArgument when the format
-  /// cannot hold a value (the message names the field, the point and the allowed range)
+  /// Appends points. @throws FileError when the disk refuses, InvalidArgument for columns that are
+  /// not as the cloud's header announces them, and when the format cannot hold a value (the message
+  /// names the field, the point and the allowed range)
   virtual void write(const Points& points) = 0;
 
   /// Completes the file and gives it its name. @throws FileError
@@ -48,7 +49,8 @@ const std::vector<CloudFormat>& cloud_formats();
 /// @throws InvalidArgument for an unknown ending or format (the message lists the known ones)
 const CloudFormat& find_cloud_format(const std::string& path, const std::string& format);
 
-/// Creates a cloud file. @throws InvalidArgument as find_cloud_format, FileError
+/// Creates a cloud file. @throws InvalidArgument as find_cloud_format, and for a number of prisms
+/// or an option that makes no sense; FileError
 std::unique_ptr<CloudWriter> create_cloud(const std::string& path, const CloudHeader& header,
                                           const CloudWriterOptions& options = {});
 

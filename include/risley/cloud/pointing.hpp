@@ -5,83 +5,13 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <optional>
-#include <string>
 #include <vector>
 
-#include <Eigen/Core>
-
+#include "risley/cloud/pointing_model.hpp"
 #include "risley/cloud/points.hpp"
-#include "risley/cloud/rotor_tracking.hpp"
-#include "risley/optics/batch.hpp"
-#include "risley/optics/beam_origin.hpp"
-#include "risley/sensors/sensor.hpp"
+#include "risley/core/instruction_set.hpp"
 
 namespace risley::cloud {
-
-/// How points are made from shots.
-struct PointingOptions {
-  /// Points go where the sensor says; otherwise where the calibration sends the beam at the
-  /// smoothed rotation angles.
-  bool reported_directions = false;
-  bool beam_origin = true;      ///< the beam starts at the last prism, not at the frame's origin
-  bool beam_divergence = true;  ///< the footprint's size is part of the covariance
-  bool covariance = true;
-};
-
-/// One quantity that all points of a cloud share an error of, times one standard deviation.
-struct CommonFactor {
-  std::string name;
-  Eigen::VectorXd
-      weights;  ///< [places + prisms + sizes]: flat vector, rotation angles, sizes of prisms
-  double range_offset = 0;  ///< m
-};
-
-/// Where the beam of a sensor goes, and how wrong that may be. Derivation: docs/theory/cloud.md
-struct PointingModel {
-  PrismTrain train;     ///< where it truly goes
-  PrismTrain believed;  ///< what the sensor computes directions with
-  /// What the parameters were held against, or count as: never none.
-  sensors::CalibrationReference reference = sensors::CalibrationReference::directions;
-  PrismGeometry geometry;  ///< all zero without a beam origin
-  /// Sizes of the prisms that factors have a weight for.
-  std::vector<PrismSize> sizes = shared_prism_sizes();
-  double range_offset = 0;  ///< m
-  double angle_noise = 0;   ///< of reported directions, rad
-  sensors::Sensor sensor;   ///< range noise and rounding are taken from here
-  PointingOptions options;
-  std::vector<int> places;  ///< of the flat vector that have a common factor
-  std::vector<CommonFactor> factors;
-};
-
-/// Standard deviation of a direction within a beam of a full divergence angle: a quarter of it.
-/// [Lichti and Gordon 2004, error propagation in directly georeferenced terrestrial laser scanner
-/// point clouds: the uncertainty of a uniformly lit beam]
-inline constexpr double kDivergenceSigma = 0.25;
-
-/// A model from a calibration and what the beginning of a recording says of the sensor.
-/// - Calibrated against directions: the reported directions are taken as true but for their noise.
-///   Rotation angles were found with the same parameters, so an error of the parameters moves them
-///   too and most of it cancels.
-/// - Calibrated against planes: directions come from the calibration, rotation angles from what the
-///   sensor believes; both have errors of their own.
-/// - Not calibrated, as a type or a unit of the simulator: as directions where the recording agrees
-///   with the parameters within their sigmas, otherwise as planes with these sigmas.
-/// @throws InvalidArgument for a calibration of another sensor (face order)
-PointingModel pointing_model(const sensors::Sensor& calibration, const SensorBelief& belief,
-                             const PointingOptions& options);
-
-/// Whether points depend on the rotation angles at all: not where they go where the sensor says,
-/// start at the frame's origin, and the sensor's own directions are taken as true.
-bool needs_rotation_angles(const sensors::Sensor& calibration, const PointingOptions& options);
-
-/// A model without rotation angles. The footprint is then taken to keep the orientation that it has
-/// before the prisms.
-/// @param angle_noise  rad; empty: the calibration's
-/// @throws InvalidArgument where needs_rotation_angles()
-PointingModel reported_pointing_model(const sensors::Sensor& calibration,
-                                      const PointingOptions& options,
-                                      std::optional<double> angle_noise);
 
 /// Some shots with a range, as columns of one length.
 struct PointedShots {
@@ -96,6 +26,7 @@ struct PointedShots {
   std::array<std::vector<double>, 3> surface_normal;  ///< NaN where not known
 
   std::size_t size() const { return range.size(); }
+  /// @throws InvalidArgument for a number of prisms that no sensor has
   void resize(int prisms, std::size_t shots);
 };
 
@@ -105,6 +36,8 @@ struct PointedShots {
 /// Residuals are exact to 1e-8 of them up to 0.1 rad; larger ones are only large.
 /// @param header  of the points: without rotation angles only where the model needs none; with one
 /// factor name per factor of the model or none
+/// @throws InvalidArgument for columns, factors or prisms that are not as model and header announce
+///         them, emitters that the model does not have, and as check_available()
 void compute_points(const PointingModel& model, const CloudHeader& header,
                     const PointedShots& shots, Points& points,
                     InstructionSet set = best_instruction_set());

@@ -57,6 +57,7 @@ struct CloudHeader {
   std::vector<std::pair<std::string, std::string>> provenance;
 
   /// Gives every column that this header announces so many rows, and empties the others.
+  /// @throws InvalidArgument for a number of prisms that no sensor has
   void resize(Points& points, std::size_t rows) const;
 };
 

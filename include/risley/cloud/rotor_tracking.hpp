@@ -45,7 +45,8 @@ struct SensorBelief {
 /// @param calibration  start values, and which parameters are free
 /// @param angle_noise  rad; empty: the calibration's
 /// @throws TurnedFrame naming yaw and pitch when shots lie outside the sensor's field of view;
-///         EstimationError when its directions do not fit the calibration's sensor
+///         EstimationError when its directions do not fit the calibration's sensor;
+///         InvalidArgument for angle noise that is not above 0
 SensorBelief sensor_belief(const estimation::AngleSeries& beginning,
                            const estimation::AngleSeries& head, const sensors::Sensor& calibration,
                            std::optional<double> angle_noise, const Progress& progress = {});
@@ -54,6 +55,8 @@ SensorBelief sensor_belief(const estimation::AngleSeries& beginning,
 class RotorTracker {
  public:
   /// @param rate  directions per second that the angles are found from; empty: all
+  /// @throws InvalidArgument for a rate or angle noise that is not above 0, or process noise of
+  ///         another number of rotors
   RotorTracker(const SensorBelief& belief, std::optional<double> rate);
 
   /// Finds the motion over a piece of a recording that overlaps the piece before.
@@ -64,6 +67,7 @@ class RotorTracker {
   /// Rotation angles and their covariance at given parameters, of rows of the last piece in
   /// ascending order; NaN where they are not known.
   /// @param[out] angle, covariance  [prisms], [prisms (prisms + 1) / 2], of so many rows
+  /// @throws InvalidArgument for columns of other lengths, or rows beyond the piece
   void angles(const recordings::Observations& piece, std::span<const std::size_t> rows,
               std::vector<std::vector<double>>& angle,
               std::vector<std::vector<double>>& covariance) const;

@@ -20,6 +20,7 @@ class SurfaceNormals {
  public:
   /// @param range_noise  1 sigma, m: surfaces whose ranges scatter more than kRoughest times as
   ///                     much are edges, leaves or several surfaces, and get no normal
+  /// @throws InvalidArgument for range noise that is not above 0
   explicit SurfaceNormals(double range_noise);
 
   /// How much more than the noise ranges may scatter about a surface.

@@ -10,6 +10,7 @@
 #include "risley/core/vector3.hpp"
 #include "risley/estimation/diagnostics.hpp"
 #include "risley/jobs/beam_comparison.hpp"
+#include "risley/jobs/wall_sample.hpp"
 
 namespace risley::jobs {
 
@@ -49,8 +50,9 @@ struct BeamErrorMoments {
   estimation::Moments azimuth_before, zenith_before, azimuth_after, zenith_after;
 };
 
-/// What there is to say of a calibration beside the numbers that it found; all of its sample.
+/// What there is to say of a calibration beside the numbers that it found; all of a sample.
 struct CalibrationDetails {
+  std::vector<SamplePoint> sample;
   std::size_t points_on_planes = 0;                       ///< of the sample
   estimation::Moments distances_before, distances_after;  ///< from the planes, m
   std::optional<WallField> field;                         ///< where a cell holds points enough
@@ -59,9 +61,10 @@ struct CalibrationDetails {
 };
 
 /// @param recordings  how many there were
+/// @param sample      wall_sample() of them
 /// @param truth       where it is known
 CalibrationDetails calibration_details(const calibration::Calibration& calibration,
-                                       std::size_t recordings,
+                                       std::size_t recordings, std::vector<SamplePoint> sample,
                                        const std::optional<BeamComparison>& truth = {});
 
 }  // namespace risley::jobs

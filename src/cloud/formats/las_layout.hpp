@@ -45,7 +45,7 @@ struct HeaderNumbers {
   std::array<double, 3> low{}, high{};                ///< m; 0 without points
 };
 
-/// Header and point records of one LAS file.
+/// Header (las_header.cpp) and point records (las_records.cpp) of one LAS file.
 ///
 /// - X, Y, Z: multiples of the scale, offset 0. The bounding box is that of the stored numbers.
 /// - Intensity: the sensor's 0-255 times 256, which the specification asks of a range of 256.
@@ -81,9 +81,6 @@ class Layout {
   /// All that stands before the first point; its length does not depend on the points.
   std::vector<std::uint8_t> head(const Summary& summary) const;
 
-  /// @throws InvalidArgument when a column that the header announces has another length
-  void check_columns(const Points& points) const;
-
   /// Points per call of pack: what it writes stays in the cache, and so do its columns.
   static constexpr std::size_t kBlock = 256;
 
@@ -104,7 +101,6 @@ class Layout {
   double scale_;
   bool utc_;       ///< times are UTC
   bool gps_time_;  ///< and stored as GPS time
-  CloudHeader header_;
   std::string system_identifier_, generating_software_;
   std::vector<VariableLengthRecord> records_;
   std::vector<PointField> floats_;  ///< float32 extra bytes

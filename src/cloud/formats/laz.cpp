@@ -56,7 +56,6 @@ class LazWriter final : public CloudWriter {
   void write(const Points& points) override {
     check_sound();
     sound_ = false;  // unless all goes well
-    layout_.check_columns(points);
     for (std::size_t first = 0; first < points.size();) {
       const std::size_t rows = std::min(las::Layout::kBlock, points.size() - first);
       layout_.pack(points, first, rows, block_.data(), summary_);

@@ -1,0 +1,32 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "risley/calibration/plane_points.hpp"
+#include "risley/optics/beam_origin.hpp"
+#include "risley/optics/prism_train.hpp"
+
+namespace risley::calibration {
+
+/// Lines of sight of shots. Those that do not get through the prisms are NaN.
+class Rays {
+ public:
+  /// @throws InvalidArgument for shots of another number of prisms, columns of different lengths,
+  ///         or emitters that the train does not have
+  Rays(const PrismTrain& train, const PrismGeometry& geometry, const RangedShots& shots);
+
+  std::size_t size() const { return x_.size(); }
+  Vector3<double> direction(std::size_t i) const { return {x_[i], y_[i], z_[i]}; }
+  Vector3<double> origin(std::size_t i) const { return {origin_x_[i], origin_y_[i], origin_z_[i]}; }
+  Vector3<double> point(std::size_t i, double range) const {
+    return origin(i) + range * direction(i);
+  }
+
+ private:
+  std::vector<double> x_, y_, z_, origin_x_, origin_y_, origin_z_;
+};
+
+}  // namespace risley::calibration

@@ -1,0 +1,48 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "calibration/calibrated_sensor.hpp"
+
+#include <cmath>
+
+namespace risley::calibration {
+
+using Eigen::Index;
+
+sensors::Sensor calibrated_sensor(const CalibrationOptions& options, const Belief& belief,
+                                  const PlanarSolution& solution, const Calibration& result) {
+  sensors::Sensor sensor = options.sensor;
+  sensor.train = solution.problem.train;
+  sensor.angular_velocity = belief.sensor.angular_velocity;
+  sensor.combination = belief.sensor.combination;
+  sensor.provenance.clear();
+  sensor.covariance_names.clear();
+  if (!options.beam_origin) sensor.set_prism_geometry({});
+  for (const sensors::Knowledge& known : belief.sensor.knowledge) {
+    const bool speed = known.name.starts_with("angular_velocity");
+    const bool material = known.name.starts_with("refractive_index");
+    if (speed || material) sensor.set_knowledge(known);
+  }
+  for (std::size_t j = 0; j < result.free.size(); ++j) {
+    const auto at = static_cast<Index>(j);
+    sensor.covariance_names.push_back(result.free[j].name);
+    sensor.set_knowledge({result.free[j].name, std::sqrt(result.covariance(at, at)),
+                          "calibrated on plane walls by risley calibrate"});
+  }
+  sensor.reference = sensors::CalibrationReference::planes;
+  sensor.covariance = result.covariance;
+  sensor.range_offset = solution.problem.range_offset;
+  std::erase_if(sensor.knowledge,
+                [](const sensors::Knowledge& entry) { return entry.name == "range_offset_m"; });
+  if (!(result.range_offset_sigma > 0)) return sensor;
+  const Index n = result.covariance.rows();
+  sensor.covariance_names.emplace_back("range_offset_m");
+  sensor.set_knowledge({"range_offset_m", result.range_offset_sigma,
+                        "calibrated on plane walls by risley calibrate"});
+  sensor.covariance.conservativeResize(n + 1, n + 1);
+  sensor.covariance.col(n).head(n) = solution.range_offset_covariance * result.variance_factor;
+  sensor.covariance.row(n).head(n) = sensor.covariance.col(n).head(n).transpose();
+  sensor.covariance(n, n) = result.range_offset_sigma * result.range_offset_sigma;
+  return sensor;
+}
+
+}  // namespace risley::calibration

@@ -1,0 +1,34 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstddef>
+
+#include "risley/calibration/plane_points.hpp"
+#include "risley/core/require.hpp"
+#include "risley/optics/batch.hpp"
+
+namespace risley::calibration {
+
+/// Rotation angles of every prism of a train and emitters that it has, for every range.
+inline void require_angles(const RangedShots& shots, const PrismTrain& train) {
+  check_shape(train.shape());
+  require_length("rotation_angle", shots.rotation_angle.size(),
+                 static_cast<std::size_t>(train.prisms()));
+  for (const auto& column : shots.rotation_angle) {
+    require_length("rotation_angle of a prism", column.size(), shots.size());
+  }
+  check_beams(train, shots.beam, shots.size());
+}
+
+/// The same with the covariance of the rotation angles.
+inline void require_shots(const RangedShots& shots, const PrismTrain& train) {
+  require_angles(shots, train);
+  const auto prisms = static_cast<std::size_t>(train.prisms());
+  require_length("angle_covariance", shots.angle_covariance.size(), prisms * (prisms + 1) / 2);
+  for (const auto& column : shots.angle_covariance) {
+    require_length("angle_covariance of two prisms", column.size(), shots.size());
+  }
+}
+
+}  // namespace risley::calibration

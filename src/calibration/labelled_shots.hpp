@@ -1,0 +1,31 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include "risley/calibration/plane_points.hpp"
+
+#include "calibration/shot_labels.hpp"
+
+namespace risley::calibration {
+
+/// All shots of one recording and where the adjustment has them.
+struct LabelledShots {
+  RangedShots shots;    ///< at rotation angles that all recordings together tell
+  double pointing = 0;  ///< pointing_of_angles()
+  Labels labels;
+};
+
+/// Shots of one view of a problem against its plane.
+struct ViewDistances {
+  std::vector<double> azimuth, zenith;  ///< of the beams, rad
+  std::vector<double> distance, sigma;  ///< from the plane, m
+  std::vector<double> incidence;        ///< rad
+  std::vector<std::size_t> rows;        ///< of the recording
+};
+
+/// @param recording  that the view is of
+/// @param labels     of its shots: those to take have the view's row
+ViewDistances view_distances(const PlanarProblem& problem, std::size_t view,
+                             const LabelledShots& recording, const std::vector<int>& labels);
+
+}  // namespace risley::calibration

@@ -1,0 +1,26 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+
+#include <tbb/parallel_for.h>
+
+namespace risley::calibration {
+
+/// Shots that one task works on: some milliseconds. What is done shot by shot does not depend on
+/// it.
+inline constexpr std::size_t kBlockShots = 65536;
+
+/// Calls function(begin, end) for blocks of so many shots, in parallel.
+template <class Function>
+void for_each_block(std::size_t shots, const Function& function) {
+  tbb::parallel_for(std::size_t{0}, (shots + kBlockShots - 1) / kBlockShots,
+                    [&](std::size_t block) {
+                      const std::size_t begin = block * kBlockShots;
+                      function(begin, std::min(begin + kBlockShots, shots));
+                    });
+}
+
+}  // namespace risley::calibration

@@ -1,0 +1,20 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "risley/calibration/calibrate.hpp"
+
+namespace risley::calibration {
+
+/// Why a calibration is none, in words: the adjustment failed, a direction of the parameter space
+/// that the walls do not tell, a station or plane that contradicts the data. Empty for a sound one.
+std::string reason_of_failure(const Calibration& c, const PlanarSolution& solution);
+
+/// What a user should know of a calibration beside its numbers.
+std::vector<std::string> warnings_of(const Calibration& c, const PlanarSolution& solution,
+                                     const std::vector<RangedRecording>& recordings);
+
+}  // namespace risley::calibration

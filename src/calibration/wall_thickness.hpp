@@ -1,0 +1,28 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "risley/calibration/calibrate.hpp"
+
+#include "calibration/labelled_shots.hpp"
+
+namespace risley::calibration {
+
+/// How thick the walls' points are with the believed parameters and with the adjusted ones.
+struct WallThickness {
+  std::vector<CalibratedPlane> planes;  ///< [views]
+  std::vector<ThicknessProfile> profiles;
+  double rms_before = 0, rms_after = 0;  ///< over all planes, m
+  std::size_t points = 0;
+};
+
+/// @param problem     as adjusted
+/// @param believed    what the sensor computed directions with
+/// @param recordings  [recordings], with labels
+WallThickness wall_thickness(const PlanarProblem& problem, const PrismTrain& believed,
+                             const std::vector<LabelledShots>& recordings);
+
+}  // namespace risley::calibration

@@ -1,0 +1,131 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "cloud/common_factors.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include <fmt/format.h>
+
+namespace risley::cloud {
+namespace {
+
+using Eigen::Index;
+
+/// Part of a variance that is rounding: what is left of one that others determine.
+constexpr double kRoundedPivot = 1e-12;
+
+/// Lower triangle L with L L^T = C. A quantity that the ones before determine gets a zero column.
+Eigen::MatrixXd lower_factor(const Eigen::MatrixXd& c) {
+  const Index n = c.rows();
+  Eigen::MatrixXd factor = Eigen::MatrixXd::Zero(n, n);
+  for (Index j = 0; j < n; ++j) {
+    const double pivot = c(j, j) - factor.row(j).head(j).squaredNorm();
+    if (!(pivot > kRoundedPivot * c(j, j))) continue;
+    factor(j, j) = std::sqrt(pivot);
+    for (Index i = j + 1; i < n; ++i) {
+      factor(i, j) = (c(i, j) - factor.row(i).head(j).dot(factor.row(j).head(j))) / factor(j, j);
+    }
+  }
+  return factor;
+}
+
+}  // namespace
+
+Factors::Factors(PointingModel& model, const SensorBelief& belief)
+    : model_(model), belief_(belief) {
+  for (int place = 0; place < all_places(); ++place) model_.places.push_back(place);
+}
+
+void Factors::add(const Uncertain& uncertain, bool moves_beam, bool moves_angles) {
+  const Eigen::MatrixXd factor = lower_factor(uncertain.covariance);
+  for (Index j = 0; j < factor.cols(); ++j) {
+    CommonFactor common = nothing(uncertain.names[static_cast<std::size_t>(j)]);
+    for (Index i = j; i < factor.rows(); ++i) {
+      const std::string& name = uncertain.names[static_cast<std::size_t>(i)];
+      if (name == kRangeOffset) {
+        common.range_offset = factor(i, j);
+        continue;
+      }
+      if (moves_beam) {
+        for (const int place : find_parameter(name, model_.train.shape()).places) {
+          common.weights[place] += factor(i, j);
+        }
+      }
+      if (moves_angles) move_angles(name, factor(i, j), common);
+    }
+    keep(std::move(common));
+  }
+}
+
+void Factors::add_angles(const Uncertain& uncertain) {
+  const Eigen::MatrixXd factor = lower_factor(belief_.angle_sensitivity * uncertain.covariance *
+                                              belief_.angle_sensitivity.transpose());
+  for (int j = 0; j < prisms(); ++j) {
+    CommonFactor common = nothing(fmt::format("rotation_angle_{}_deg", prism_letter(j)));
+    common.weights.segment(all_places(), prisms()) = factor.col(j);
+    keep(std::move(common));
+  }
+}
+
+void Factors::add_geometry(const sensors::Sensor& sensor) {
+  const auto sigma = [&sensor](const std::string& name) {
+    const sensors::Knowledge* known = sensor.find_knowledge(name);
+    return known == nullptr ? 0.0 : known->sigma;
+  };
+  if (model_.options.beam_origin) {
+    Index row = all_places() + prisms();
+    for (const PrismSize& size : model_.sizes) {
+      CommonFactor common = nothing(size.name);
+      common.weights[row++] = sigma(size.name);
+      keep(std::move(common));
+    }
+  }
+  const auto& names = sensor.covariance_names;
+  if (std::find(names.begin(), names.end(), kRangeOffset) != names.end()) return;
+  CommonFactor common = nothing(kRangeOffset);
+  common.range_offset = sigma(kRangeOffset);
+  keep(std::move(common));
+}
+
+void Factors::finish() {
+  std::vector<Index> rows;
+  std::vector<int> places;
+  for (const int place : model_.places) {
+    const bool used = std::any_of(model_.factors.begin(), model_.factors.end(),
+                                  [place](const auto& f) { return f.weights[place] != 0; });
+    if (!used) continue;
+    rows.push_back(place);
+    places.push_back(place);
+  }
+  const Index others = prisms() + static_cast<Index>(model_.sizes.size());
+  for (Index i = 0; i < others; ++i) rows.push_back(all_places() + i);
+  for (CommonFactor& factor : model_.factors) {
+    factor.weights = Eigen::VectorXd(factor.weights(rows));
+  }
+  model_.places = std::move(places);
+}
+
+CommonFactor Factors::nothing(std::string name) const {
+  return {std::move(name),
+          Eigen::VectorXd::Zero(all_places() + prisms() + static_cast<Index>(model_.sizes.size())),
+          0.0};
+}
+
+void Factors::move_angles(const std::string& name, double value, CommonFactor& common) const {
+  for (std::size_t j = 0; j < belief_.free.size(); ++j) {
+    if (belief_.free[j].name != name) continue;
+    for (int k = 0; k < prisms(); ++k) {
+      common.weights[all_places() + k] +=
+          belief_.angle_sensitivity(k, static_cast<Index>(j)) * value;
+    }
+  }
+}
+
+void Factors::keep(CommonFactor common) {
+  if (common.range_offset == 0 && common.weights.isZero(0.0)) return;
+  model_.factors.push_back(std::move(common));
+}
+
+}  // namespace risley::cloud

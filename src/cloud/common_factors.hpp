@@ -1,0 +1,54 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "risley/cloud/pointing_model.hpp"
+
+namespace risley::cloud {
+
+/// The range offset among the names of a calibration's quantities.
+inline constexpr const char* kRangeOffset = "range_offset_m";
+
+/// Some quantities with a joint covariance.
+struct Uncertain {
+  std::vector<std::string> names;
+  Eigen::MatrixXd covariance;
+};
+
+/// Builds the common factors of a model.
+class Factors {
+ public:
+  Factors(PointingModel& model, const SensorBelief& belief);
+
+  /// @param moves_beam    errors of the parameters move the beam at given rotation angles
+  /// @param moves_angles  they also move the rotation angles that were found
+  void add(const Uncertain& uncertain, bool moves_beam, bool moves_angles);
+
+  /// What errors of the believed parameters do to the rotation angles, as one factor per prism.
+  void add_angles(const Uncertain& uncertain);
+
+  /// Those of the prisms' sizes and, where the calibration's covariance has none, the range offset.
+  void add_geometry(const sensors::Sensor& sensor);
+
+  /// Leaves only the places that some factor has.
+  void finish();
+
+ private:
+  int prisms() const { return model_.train.prisms(); }
+  /// Length of the flat parameter vector.
+  int all_places() const { return parameter_count(model_.train.shape()); }
+
+  CommonFactor nothing(std::string name) const;
+  void move_angles(const std::string& name, double value, CommonFactor& common) const;
+  void keep(CommonFactor common);
+
+  PointingModel& model_;
+  const SensorBelief& belief_;
+};
+
+}  // namespace risley::cloud

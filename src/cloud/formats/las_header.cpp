@@ -1,0 +1,214 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+// What stands before the first point: public header and variable length records.
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstring>
+#include <string_view>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "risley/core/error.hpp"
+#include "risley/core/require.hpp"
+
+#include "cloud/formats/las_bytes.hpp"
+#include "cloud/formats/las_layout.hpp"
+
+namespace risley::cloud::las {
+namespace {
+
+using recordings::las::kAdjustedGpsTime;
+using recordings::las::kBeamField;
+using recordings::las::kDescriptorBytes;
+using recordings::las::kExtraBytesNumber;
+using recordings::las::kRecordHeaderBytes;
+using recordings::las::kSpecificationUser;
+using recordings::las::kTagField;
+
+/// The 16 bits that a variable length record tells its length in.
+constexpr std::size_t kMaxRecordBytes = std::numeric_limits<std::uint16_t>::max();
+
+/// Text in a field of fixed length, filled up with zeros.
+std::uint8_t* put_text(std::uint8_t* out, std::string_view text, std::size_t length) {
+  std::memset(out, 0, length);
+  std::memcpy(out, text.data(), std::min(text.size(), length));
+  return out + length;
+}
+
+/// What header fields may hold: printable ASCII.
+std::string plain(std::string text) {
+  std::replace_if(
+      text.begin(), text.end(), [](unsigned char c) { return c < 0x20 || c > 0x7e; }, '?');
+  return text;
+}
+
+std::string system_identifier(const CloudHeader& header) {
+  std::string text = header.sensor.empty() ? "OTHER" : header.sensor;
+  for (const std::string_view model : {"mid-40", "mid-70", "avia", "horizon", "tele-15"}) {
+    if (!text.starts_with(model)) continue;
+    text[0] = static_cast<char>(text[0] - 'a' + 'A');
+    text.insert(0, "Livox ");
+    break;
+  }
+  if (!header.serial.empty()) text += " " + header.serial;
+  return plain(text.substr(0, 32));
+}
+
+std::string generating_software(const CloudHeader& header) {
+  std::string text = "risley";
+  for (const auto& [name, value] : header.provenance) {
+    if (name == "version") text += " " + value;
+  }
+  return plain(text.substr(0, 32));
+}
+
+void append_descriptor(std::string& data, const PointField& field) {
+  std::array<std::uint8_t, kDescriptorBytes> bytes{};
+  bytes[2] = field.type == FieldType::uint8 ? 1 : 9;
+  put_text(bytes.data() + 4, field.name, 32);
+  put_text(bytes.data() + 160, field.description, 32);
+  data.append(bytes.begin(), bytes.end());
+}
+
+/// The coordinate system of the points: the sensor's own, and metres.
+VariableLengthRecord coordinate_system(Version version, const CloudHeader& header) {
+  if (version == Version::las_1_4) {
+    std::string name = plain(header.sensor.empty() ? "sensor" : header.sensor + " sensor");
+    std::replace(name.begin(), name.end(), '"', '\'');
+    std::string text = fmt::format(
+        "LOCAL_CS[\"{} frame\",LOCAL_DATUM[\"sensor origin\",32767],UNIT[\"metre\",1],"
+        "AXIS[\"X (forward)\",OTHER],AXIS[\"Y (left)\",OTHER],AXIS[\"Z (up)\",UP]]",
+        name);
+    text.push_back('\0');
+    return {"LASF_Projection", 2112, "OGC WKT coordinate system", std::move(text)};
+  }
+  // GeoTIFF: version 1.1.0 with two keys, a user-defined model and linear units of metres.
+  constexpr std::uint16_t kKeys[] = {1, 1, 0, 2, 1024, 0, 1, 32767, 3076, 0, 1, 9001};
+  std::string data(sizeof kKeys, '\0');
+  std::memcpy(data.data(), kKeys, sizeof kKeys);
+  return {"LASF_Projection", 34735, "GeoTIFF GeoKeyDirectoryTag", std::move(data)};
+}
+
+}  // namespace
+
+Layout::Layout(Version version, const CloudHeader& header, const CloudWriterOptions& options)
+    : version_(version),
+      scale_(options.las_scale),
+      utc_(header.time_reference == recordings::TimeReference::utc),
+      gps_time_(utc_ && options.gps_time),
+      system_identifier_(las::system_identifier(header)),
+      generating_software_(las::generating_software(header)),
+      floats_(uncertainty_fields(header)) {
+  require_above("las_scale", scale_, 0, "m");
+  const std::vector<PointField> loadings = loading_fields(header);
+  floats_.insert(floats_.end(), loadings.begin(), loadings.end());
+  record_bytes_ = base_record_bytes() + 4 * floats_.size() + 2;
+  values_.resize(floats_.size() * kBlock);
+
+  std::string descriptors;
+  for (const PointField& field : floats_) append_descriptor(descriptors, field);
+  for (const PointField& field : sensor_fields()) {
+    if (field.name == kTagField || field.name == kBeamField) append_descriptor(descriptors, field);
+  }
+  if (descriptors.size() > kMaxRecordBytes) {
+    const std::size_t others = floats_.size() + 2 - loadings.size();
+    throw InvalidArgument(fmt::format("factors = {}, allowed up to {} in a LAS file",
+                                      header.factors.size(),
+                                      (kMaxRecordBytes / kDescriptorBytes - others) / 3));
+  }
+  records_.push_back(
+      {kSpecificationUser, kExtraBytesNumber, "Extra bytes", std::move(descriptors)});
+  records_.push_back(coordinate_system(version_, header));
+  std::string text;
+  for (const auto& [name, value] : header.provenance) text += fmt::format("{} = {}\n", name, value);
+  if (text.empty()) return;
+  text.push_back('\0');
+  if (text.size() > kMaxRecordBytes) {
+    throw InvalidArgument(
+        fmt::format("provenance = {} bytes of text, allowed up to {} in a LAS file",
+                    text.size() - 1, kMaxRecordBytes - 1));
+  }
+  records_.push_back({kSpecificationUser, 3, "How the cloud was made", std::move(text)});
+}
+
+std::uint16_t Layout::global_encoding() const {
+  const unsigned wkt = version_ == Version::las_1_4 ? 1U << 4 : 0U;
+  return static_cast<std::uint16_t>(wkt | (gps_time_ ? kAdjustedGpsTime : 0U));
+}
+
+HeaderNumbers Layout::numbers(const Summary& summary) const {
+  HeaderNumbers numbers;
+  if (summary.points == 0) return numbers;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    // A negative zero would be another byte pattern for the same box.
+    numbers.low[axis] = std::nearbyint(summary.low[axis]) * scale_ + 0.0;
+    numbers.high[axis] = std::nearbyint(summary.high[axis]) * scale_ + 0.0;
+  }
+  if (utc_) {
+    using namespace std::chrono;
+    const auto day = floor<days>(sys_time<nanoseconds>{nanoseconds{summary.first_time_ns}});
+    const year_month_day date{day};
+    const sys_days new_year{date.year() / January / 1};
+    numbers.creation_day = static_cast<std::uint16_t>((day - new_year).count() + 1);
+    numbers.creation_year = static_cast<std::uint16_t>(static_cast<int>(date.year()));
+  }
+  return numbers;
+}
+
+std::vector<std::uint8_t> Layout::head(const Summary& summary) const {
+  std::size_t length = header_bytes();
+  for (const VariableLengthRecord& record : records_)
+    length += kRecordHeaderBytes + record.data.size();
+  std::vector<std::uint8_t> bytes(length, 0);
+  const HeaderNumbers numbers = this->numbers(summary);
+  const bool modern = version_ == Version::las_1_4;
+
+  std::uint8_t* out = put_text(bytes.data(), "LASF", 4);
+  out = put<std::uint16_t>(out, 1);  // file source
+  out = put<std::uint16_t>(out, global_encoding());
+  out += 16;  // project: none
+  out = put<std::uint8_t>(out, 1);
+  out = put<std::uint8_t>(out, modern ? 4 : 2);
+  out = put_text(out, system_identifier_, 32);
+  out = put_text(out, generating_software_, 32);
+  out = put<std::uint16_t>(out, numbers.creation_day);
+  out = put<std::uint16_t>(out, numbers.creation_year);
+  out = put<std::uint16_t>(out, static_cast<std::uint16_t>(header_bytes()));
+  out = put<std::uint32_t>(out, static_cast<std::uint32_t>(length));
+  out = put<std::uint32_t>(out, static_cast<std::uint32_t>(records_.size()));
+  out = put<std::uint8_t>(out, point_format());
+  out = put<std::uint16_t>(out, static_cast<std::uint16_t>(record_bytes_));
+  // The counters of old; point formats from 6 on leave them 0.
+  out = put<std::uint32_t>(out, modern ? 0 : static_cast<std::uint32_t>(summary.points));
+  for (std::size_t k = 0; k < 5; ++k) {
+    const std::uint64_t count = modern ? 0 : summary.points_by_return[k];
+    out = put<std::uint32_t>(out, static_cast<std::uint32_t>(count));
+  }
+  for (int axis = 0; axis < 3; ++axis) out = put<double>(out, scale_);
+  for (int axis = 0; axis < 3; ++axis) out = put<double>(out, 0.0);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    out = put<double>(out, numbers.high[axis]);
+    out = put<double>(out, numbers.low[axis]);
+  }
+  if (modern) {
+    out += 8 + 8 + 4;  // no waveforms, no extended variable length records
+    out = put<std::uint64_t>(out, summary.points);
+    for (const std::uint64_t count : summary.points_by_return) {
+      out = put<std::uint64_t>(out, count);
+    }
+  }
+  for (const VariableLengthRecord& record : records_) {
+    out += 2;  // reserved
+    out = put_text(out, record.user, 16);
+    out = put<std::uint16_t>(out, record.number);
+    out = put<std::uint16_t>(out, static_cast<std::uint16_t>(record.data.size()));
+    out = put_text(out, record.description, 32);
+    std::memcpy(out, record.data.data(), record.data.size());
+    out += record.data.size();
+  }
+  return bytes;
+}
+
+}  // namespace risley::cloud::las

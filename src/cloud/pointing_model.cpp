@@ -1,0 +1,154 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "risley/cloud/pointing_model.hpp"
+
+#include <fmt/format.h>
+
+#include "risley/core/error.hpp"
+#include "risley/core/require.hpp"
+#include "risley/estimation/parameter_agreement.hpp"
+
+#include "cloud/common_factors.hpp"
+#include "cloud/pointing_kernel.hpp"
+
+namespace risley::cloud {
+namespace {
+
+using Eigen::Index;
+
+/// Those of a calibration that a point depends on: not its speeds and rotation angles.
+Uncertain calibrated(const sensors::Sensor& sensor) {
+  Uncertain result;
+  std::vector<Index> rows;
+  for (std::size_t i = 0; i < sensor.covariance_names.size(); ++i) {
+    const std::string& name = sensor.covariance_names[i];
+    if (name != kRangeOffset && find_parameter(name, sensor.shape()).kind != ParameterKind::train) {
+      continue;
+    }
+    result.names.push_back(name);
+    rows.push_back(static_cast<Index>(i));
+  }
+  result.covariance = sensor.covariance(rows, rows);
+  return result;
+}
+
+Uncertain believed(const SensorBelief& belief) {
+  Uncertain result;
+  for (const auto& free : belief.free) result.names.push_back(free.name);
+  result.covariance = belief.covariance;
+  return result;
+}
+
+/// What a sensor that was not calibrated says of the parameters that a belief has.
+Uncertain assumed(const sensors::Sensor& sensor, const SensorBelief& belief) {
+  Uncertain result = believed(belief);
+  result.covariance.setZero();
+  for (std::size_t j = 0; j < belief.free.size(); ++j) {
+    const sensors::Knowledge* known = sensor.find_knowledge(belief.free[j].name);
+    const auto at = static_cast<Index>(j);
+    if (known != nullptr) result.covariance(at, at) = known->sigma * known->sigma;
+  }
+  return result;
+}
+
+void require_belief(const SensorBelief& belief) {
+  const std::size_t free = belief.free.size();
+  const auto length = [](const char* name, Index size, std::size_t expected) {
+    require_length(name, static_cast<std::size_t>(size), expected);
+  };
+  length("rows of the belief's covariance", belief.covariance.rows(), free);
+  length("columns of the belief's covariance", belief.covariance.cols(), free);
+  if (free > 0) {
+    length("rows of angle_sensitivity", belief.angle_sensitivity.rows(),
+           static_cast<std::size_t>(belief.sensor.prisms()));
+    length("columns of angle_sensitivity", belief.angle_sensitivity.cols(), free);
+  }
+  require_not_below("angle noise", belief.angle_noise, 0, "rad");
+}
+
+/// What a calibration's parameters mean. Those of a sensor that was not calibrated are as good as
+/// their sigmas: where the reported directions agree with them these are the better knowledge,
+/// otherwise the sensor reports directions that it does not have.
+sensors::CalibrationReference meaning_of(const sensors::Sensor& calibration,
+                                         const SensorBelief& belief) {
+  using sensors::CalibrationReference;
+  if (calibration.reference != CalibrationReference::none) return calibration.reference;
+  const auto n = static_cast<Index>(belief.free.size());
+  if (n == 0) return CalibrationReference::directions;
+  Eigen::VectorXd off(n);
+  for (Index j = 0; j < n; ++j) {
+    const int place = belief.free[static_cast<std::size_t>(j)].places.front();
+    off[j] = belief.sensor.train[place] - calibration.train[place];
+  }
+  const Eigen::MatrixXd covariance = belief.covariance + assumed(calibration, belief).covariance;
+  return estimation::disagreement(off, covariance).same_sensor() ? CalibrationReference::directions
+                                                                 : CalibrationReference::planes;
+}
+
+}  // namespace
+
+PointingModel pointing_model(const sensors::Sensor& calibration, const SensorBelief& belief,
+                             const PointingOptions& options) {
+  using sensors::CalibrationReference;
+  PointingModel model;
+  require_belief(belief);
+  if (calibration.train.face_order() != belief.sensor.train.face_order()) {
+    throw InvalidArgument(fmt::format(
+        "a calibration of another sensor: its face order is {}, the "
+        "recording's {}",
+        to_string(calibration.train.face_order()), to_string(belief.sensor.train.face_order())));
+  }
+  const int emitters = belief.sensor.train.emitters();
+  require_between("number of emitters of the calibration", calibration.train.emitters(), emitters,
+                  emitters);
+  model.reference = meaning_of(calibration, belief);
+  const bool type = calibration.reference == CalibrationReference::none;
+  const bool planes = model.reference == CalibrationReference::planes;
+  model.sensor = calibration;
+  model.options = options;
+  model.believed = belief.sensor.train;
+  model.train = planes ? calibration.train : belief.sensor.train;
+  if (options.beam_origin) model.geometry = calibration.geometry;
+  model.range_offset = calibration.range_offset;
+  model.angle_noise = belief.angle_noise;
+  for (const PrismSize& size : own_prism_sizes(calibration.prisms())) {
+    if (calibration.find_knowledge(size.name) != nullptr) model.sizes.push_back(size);
+  }
+  Factors factors(model, belief);
+  if (planes) {
+    factors.add(type ? assumed(calibration, belief) : calibrated(calibration), true, false);
+    factors.add_angles(believed(belief));
+  } else {
+    const bool smoothed = !options.reported_directions;
+    factors.add(type ? believed(belief) : calibrated(calibration), smoothed, smoothed);
+  }
+  factors.add_geometry(calibration);
+  factors.finish();
+  if (model.factors.size() > static_cast<std::size_t>(kMostFactors)) {
+    throw InvalidArgument(fmt::format("the calibration's covariance has {} quantities, allowed {}",
+                                      model.factors.size(), kMostFactors));
+  }
+  return model;
+}
+
+bool needs_rotation_angles(const sensors::Sensor& calibration, const PointingOptions& options) {
+  return !options.reported_directions || options.beam_origin ||
+         calibration.reference == sensors::CalibrationReference::planes;
+}
+
+PointingModel reported_pointing_model(const sensors::Sensor& calibration,
+                                      const PointingOptions& options,
+                                      std::optional<double> angle_noise) {
+  if (needs_rotation_angles(calibration, options)) {
+    throw InvalidArgument(
+        "points of reported directions need rotation angles for the beam's origin "
+        "and for a calibration against planes");
+  }
+  SensorBelief belief;
+  belief.sensor = calibration;
+  belief.covariance.resize(0, 0);
+  belief.angle_noise = angle_noise.value_or(calibration.angle_noise);
+  return pointing_model(calibration, belief, options);
+}
+
+}  // namespace risley::cloud
