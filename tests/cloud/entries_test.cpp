@@ -51,6 +51,8 @@ TEST(Entries, EveryFormatAsksForTheColumnsOfItsHeader) {
     const auto writer = create_cloud(folder / name, header);
     const auto run = [&](const auto& spoil) {
       Points points = make_points({"", 3, header});
+      points.return_number.assign(3, 1);
+      points.number_of_returns.assign(3, 1);
       spoil(points);
       return refusal([&] { writer->write(points); });
     };
@@ -68,7 +70,9 @@ TEST(Entries, EveryFormatAsksForTheColumnsOfItsHeader) {
 }
 
 TEST(Entries, LasAsksForAScale) {
-  EXPECT_EQ(refusal([] { return create_cloud("cloud.las", {}, {.las_scale = kNan}); }),
+  EXPECT_EQ(refusal([] {
+              return create_cloud("cloud.las", {}, {"", kNan, true});
+            }),
             "las_scale = nan m, allowed above 0");
 }
 
