@@ -51,6 +51,8 @@ TEST(Entries, EveryFormatAsksForTheColumnsOfItsHeader) {
     const auto writer = create_cloud(folder / name, header);
     const auto run = [&](const auto& spoil) {
       Points points = make_points({"", 3, header});
+      points.return_number.assign(3, 1);
+      points.number_of_returns.assign(3, 1);
       spoil(points);
       return refusal([&] { writer->write(points); });
     };
