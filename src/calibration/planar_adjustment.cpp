@@ -276,11 +276,16 @@ void move(PlanarProblem& p, const Unknowns& at, const Eigen::VectorXd& step) {
   for (std::size_t v = 0; v < p.views.size(); ++v) p.views[v].distance += step[at.distance(v)];
 }
 
+/// Scales a matrix to a diagonal of ones; 1 for an unknown that nothing tells.
+Eigen::VectorXd unit_scale(const Eigen::VectorXd& diagonal) {
+  return diagonal.unaryExpr([](double d) { return d > 0 ? 1.0 / std::sqrt(d) : 1.0; });
+}
+
 /// Unknowns differ by many orders of magnitude, so the matrix is scaled before it is factorised.
 class ScaledSolver {
  public:
   ScaledSolver(const Eigen::MatrixXd& matrix, double damping)
-      : scale_(matrix.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse()),
+      : scale_(unit_scale(matrix.diagonal())),
         solver_((Eigen::MatrixXd(scale_.asDiagonal() * matrix * scale_.asDiagonal()) +
                  damping * Eigen::MatrixXd::Identity(matrix.rows(), matrix.cols()))) {}
   bool ok() const { return solver_.info() == Eigen::Success; }
@@ -298,8 +303,7 @@ class ScaledSolver {
 Eigen::MatrixXd eliminated(const Eigen::MatrixXd& hessian, Index free) {
   const Index rest = hessian.rows() - free;
   if (rest <= 0) return hessian;
-  const Eigen::VectorXd scale =
-      hessian.diagonal().tail(rest).cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+  const Eigen::VectorXd scale = unit_scale(hessian.diagonal().tail(rest));
   const Eigen::MatrixXd scaled =
       scale.asDiagonal() * hessian.bottomRightCorner(rest, rest) * scale.asDiagonal();
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(scaled);

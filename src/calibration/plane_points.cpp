@@ -112,11 +112,15 @@ RangedRecording ranged_recording(const estimation::Estimate& estimate, std::stri
 }
 
 std::vector<std::size_t> spread_rows(std::size_t shots, std::size_t most) {
+  // Places within equal parts by the golden ratio, which falls into step with nothing periodic.
+  constexpr double kGolden = 0.6180339887498949;
   const std::size_t count = std::min(shots, most);
   std::vector<std::size_t> rows(count);
+  const double part =
+      static_cast<double>(shots) / static_cast<double>(std::max<std::size_t>(count, 1));
   for (std::size_t i = 0; i < count; ++i) {
-    rows[i] = static_cast<std::size_t>((static_cast<double>(i) + 0.5) * static_cast<double>(shots) /
-                                       static_cast<double>(count));
+    const double place = std::fmod(0.5 + kGolden * static_cast<double>(i), 1.0);
+    rows[i] = static_cast<std::size_t>((static_cast<double>(i) + place) * part);
   }
   return rows;
 }

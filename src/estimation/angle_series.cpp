@@ -57,17 +57,19 @@ std::vector<ShotRange> stretches(const AngleSeries& series, double longest_gap) 
 TickSampler::TickSampler(double rate) : rate_(rate) { require_above("rate", rate, 0, "Hz"); }
 
 bool TickSampler::take(std::int64_t time_ns, std::uint8_t beam) {
-  beams_ = std::max(beams_, beam + 1);
+  seen_.set(beam);
   if (time_ns < next_ns_) return false;
-  if (to_skip_ > 0) {
-    --to_skip_;
-    return false;
+  if (had_turn_ == seen_) had_turn_.reset();
+  if (had_turn_[beam]) {
+    // A beam that stays away holds the others up for one round only.
+    if (++waited_ < seen_.count()) return false;
+    had_turn_.reset();
   }
+  had_turn_.set(beam);
+  waited_ = 0;
   const double since = 1e-9 * static_cast<double>(time_ns - origin_ns_);
   const double tick = std::floor(since * rate_ + 1e-6) + 1.0;
   next_ns_ = origin_ns_ + std::llround(tick / rate_ * 1e9);
-  turn_ = (turn_ + 1) % beams_;
-  to_skip_ = turn_;
   return true;
 }
 

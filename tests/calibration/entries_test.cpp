@@ -54,7 +54,7 @@ TEST(Entries, RaysAskForAnglesOfEveryPrismAndShot) {
   EXPECT_EQ(run(shots), "rotation_angle of a prism has 3 values, expected 4");
   shots = some_shots(4);
   shots.beam.pop_back();
-  EXPECT_EQ(run(shots), "column beam has 3 values, expected 4");
+  EXPECT_EQ(run(shots), "beam has 3 values, expected 4");
   shots = some_shots(4);
   shots.beam[2] = 1;
   EXPECT_EQ(run(shots), "beam = 1 in row 2, allowed 0 to 0");

@@ -30,17 +30,28 @@ TEST(SpreadRows, AreEvenlySpread) {
   EXPECT_THAT(spread_rows(3, 3), ElementsAre(0, 1, 2));
   EXPECT_THAT(spread_rows(3, 100), ElementsAre(0, 1, 2));
   EXPECT_THAT(spread_rows(10, 1), ElementsAre(5));
-  EXPECT_THAT(spread_rows(10, 2), ElementsAre(2, 7));
-  EXPECT_THAT(spread_rows(9, 3), ElementsAre(1, 4, 7));
   const std::vector<std::size_t> rows = spread_rows(1234567, 20000);
   ASSERT_EQ(rows.size(), 20000u);
-  for (std::size_t i = 1; i < rows.size(); ++i) {
-    const std::size_t step = rows[i] - rows[i - 1];
-    ASSERT_TRUE(step == 61 || step == 62) << i;
+  const double part = 1234567.0 / 20000.0;
+  for (std::size_t i = 0; i < rows.size(); ++i) {  // one of each of 20,000 equal parts
+    ASSERT_GE(rows[i], static_cast<std::size_t>(part * static_cast<double>(i))) << i;
+    ASSERT_LT(static_cast<double>(rows[i]), part * static_cast<double>(i + 1)) << i;
+    ASSERT_TRUE(i == 0 || rows[i] > rows[i - 1]) << i;
   }
-  EXPECT_LT(rows.front(), 62u);
-  EXPECT_GT(rows.back(), 1234567u - 62u);
-  EXPECT_LT(rows.back(), 1234567u);
+}
+
+TEST(SpreadRows, FallIntoStepWithNoNumberOfBeams) {
+  // Every ninth shot would meet two beams of six.
+  for (const std::size_t beams : {2u, 3u, 4u, 5u, 6u, 8u}) {
+    for (const std::size_t part : {6u, 8u, 9u, 12u, 60u}) {
+      std::vector<std::size_t> count(beams);
+      for (const std::size_t row : spread_rows(10000 * part, 10000)) ++count[row % beams];
+      for (const std::size_t one : count) {
+        EXPECT_NEAR(static_cast<double>(one) * static_cast<double>(beams), 10000.0, 700.0)
+            << beams << " beams, one shot of " << part;
+      }
+    }
+  }
 }
 
 TEST(RangedShots, RowsAreCopiedWhole) {

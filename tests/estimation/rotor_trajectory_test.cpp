@@ -11,6 +11,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
 
 namespace risley::estimation {
@@ -59,6 +60,42 @@ TEST(Thinned, TakesTheFirstShotOfEveryTickOfEachStretch) {
     EXPECT_EQ(thin.azimuth[i], static_cast<double>(100 * i));
     EXPECT_EQ(thin.time_ns[i], times[100 * i]);
   }
+}
+
+TEST(Thinned, EveryBeamHasItsTurnAtEveryRate) {
+  constexpr std::size_t kBeams = 6, kShots = 60000;
+  for (const std::size_t every : {1u, 2u, 3u, 4u, 5u, 6u, 8u, 9u, 12u, 24u, 240u}) {
+    AngleSeries series;
+    for (std::size_t i = 0; i < kShots; ++i) {
+      series.append(static_cast<std::int64_t>(i) * 4000, 0.0, 0.5 * kPi,
+                    static_cast<std::uint8_t>(i % kBeams));
+    }
+    std::vector<ShotRange> ranges{{0, kShots}};
+    const AngleSeries thin = thinned(series, 250000.0 / static_cast<double>(every), ranges);
+    std::vector<std::size_t> count(kBeams);
+    for (const std::uint8_t beam : thin.beam) ++count[beam];
+    const double expected = static_cast<double>(kShots / every);
+    EXPECT_NEAR(static_cast<double>(thin.size()), expected, 0.02 * expected) << every;
+    for (const std::size_t one : count) {
+      EXPECT_NEAR(static_cast<double>(one * kBeams), static_cast<double>(thin.size()), 12.0)
+          << every;
+    }
+  }
+}
+
+TEST(Thinned, ABeamThatStaysAwayHoldsNobodyUp) {
+  AngleSeries series;
+  for (std::size_t i = 0; i < 60000; ++i) {
+    if (i % 6 == 2) continue;  // no return
+    series.append(static_cast<std::int64_t>(i) * 4000, 0.0, 0.5 * kPi,
+                  static_cast<std::uint8_t>(i % 6));
+  }
+  std::vector<ShotRange> ranges{{0, series.size()}};
+  const AngleSeries thin = thinned(series, 25000.0, ranges);
+  std::vector<std::size_t> count(6);
+  for (const std::uint8_t beam : thin.beam) ++count[beam];
+  EXPECT_NEAR(static_cast<double>(thin.size()), 6000.0, 300.0);
+  for (const std::size_t beam : {0u, 1u, 3u, 4u, 5u}) EXPECT_GT(count[beam], 700u) << beam;
 }
 
 TEST(Thinned, TicksStayWhereTheyAreOverGapsAndJitter) {

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <bitset>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -67,8 +68,9 @@ std::int64_t median_step_ns(std::span<const std::int64_t> time_ns);
 /// The same shots with the sign of the elevation turned.
 void mirror(AngleSeries& series);
 
-/// Picks shots on a fixed grid of ticks, so that gaps and jitter do not move them, and from one
-/// tick to the next one shot further on, so that every beam has its turn.
+/// Picks shots on a fixed grid of ticks, so that gaps and jitter do not move them: at each tick the
+/// next shot of a beam that has not had its turn in this round, so that rates and the order of the
+/// beams never fall into step.
 class TickSampler {
  public:
   /// @param rate  Hz, > 0
@@ -76,7 +78,8 @@ class TickSampler {
 
   void restart(std::int64_t time_ns) {
     origin_ns_ = next_ns_ = time_ns;
-    to_skip_ = turn_ = 0;
+    had_turn_.reset();
+    waited_ = 0;
   }
   /// Whether to take the next shot. @param beam  that fired it
   bool take(std::int64_t time_ns, std::uint8_t beam);
@@ -84,7 +87,8 @@ class TickSampler {
  private:
   double rate_;  // Hz
   std::int64_t origin_ns_ = 0, next_ns_ = 0;
-  int beams_ = 1, turn_ = 0, to_skip_ = 0;
+  std::bitset<256> seen_, had_turn_;  // beams, ever and in this round
+  std::size_t waited_ = 0;            // shots since the tick of beams that had their turn
 };
 
 /// How shots are chosen.
