@@ -521,6 +521,34 @@ TEST(PlanarAdjustment, EveryUnknownTakesAShot) {
               static_cast<double>(solution.shots) - 7 - 4 - 2, 1e-6);
 }
 
+/// An emitter whose shots met no wall is not known, and nobody else is the worse for it.
+TEST(PlanarAdjustment, AParameterThatNoShotTellsLeavesTheOthersAlone) {
+  const scenes::Scene scene = corner();
+  PlanarProblem one =
+      planar_problem(some_train(), kGeometry, scene, kRangeNoise, {1000, kRangeNoise, 0, 0, 14});
+  PlanarProblem two = one;
+  two.train = PrismTrain(one.train.face_order(), 2);
+  for (int place = 0; place < static_cast<int>(one.train.parameters().size()); ++place) {
+    two.train.set_place(place, one.train[place]);
+  }
+  two.prior = two.train;
+  two.free.push_back(
+      estimation::free_parameters({"incident_beam_2_vertical_deg"}, two.train.shape()).front());
+  const PlanarSolution all = adjust(one), mute = adjust(two);
+  const Index n = all.parameters.size();
+  ASSERT_EQ(mute.parameters.size(), n + 1);
+  for (Index j = 0; j < n; ++j) {
+    const double sigma = std::sqrt(all.covariance(j, j));
+    EXPECT_NEAR(mute.parameters[j], all.parameters[j], 1e-6 * sigma);
+    EXPECT_NEAR(std::sqrt(mute.covariance(j, j)), sigma, 1e-6 * sigma);
+  }
+  EXPECT_GT(mute.covariance(n, n), 1e6);
+  EXPECT_EQ(mute.information.row(n).norm(), 0.0);
+  for (std::size_t v = 0; v < all.redundancy.size(); ++v) {
+    EXPECT_NEAR(mute.redundancy[v], all.redundancy[v], 1e-6);
+  }
+}
+
 /// Walls and stations that are known count, what is known of the parameters themselves does not.
 TEST(PlanarAdjustment, InformationLeavesOutThePriorsOfParameters) {
   scenes::Scene upright = corner();
