@@ -67,8 +67,9 @@ bool TickSampler::take(std::int64_t time_ns, std::uint8_t beam) {
   }
   had_turn_.set(beam);
   waited_ = 0;
-  const double since = 1e-9 * static_cast<double>(time_ns - origin_ns_);
-  const double tick = std::floor(since * rate_ + 1e-6) + 1.0;
+  // Times are rounded to 1 ns: a shot at a tick may seem to come before it.
+  const double since = 1e-9 * (static_cast<double>(time_ns - origin_ns_) + 0.6);
+  const double tick = std::floor(since * rate_) + 1.0;
   next_ns_ = origin_ns_ + std::llround(tick / rate_ * 1e9);
   return true;
 }

@@ -83,6 +83,15 @@ TEST(Thinned, EveryBeamHasItsTurnAtEveryRate) {
   }
 }
 
+TEST(Thinned, RoundedTimesTakeNoTickTwice) {
+  AngleSeries series;
+  for (std::size_t i = 0; i < 240000; ++i) {  // 240 kHz
+    series.append(static_cast<std::int64_t>(i * 12500 / 3), 0.0, 0.5 * kPi);
+  }
+  std::vector<ShotRange> ranges{{0, series.size()}};
+  EXPECT_EQ(thinned(series, 30000.0, ranges).size(), 30000u);
+}
+
 TEST(Thinned, ABeamThatStaysAwayHoldsNobodyUp) {
   AngleSeries series;
   for (std::size_t i = 0; i < 60000; ++i) {
