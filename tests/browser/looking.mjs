@@ -184,16 +184,18 @@ function install() {
     const text = visible ? tip.textContent : '';
     const numbers = (text.match(/: ?(-?[\d.]+(e[+-]?\d+)?)/g) ?? [])
       .map((match) => Number(match.replace(/: ?/, '')));
-    // As far as a value can be told from the others.
-    const says = (value, all) => {
-      const known = all.filter((v) => v !== null);
-      const size = known.reduce((a, v) => Math.max(a, Math.abs(v - known[0])), Math.abs(value) * 1e-9);
-      return numbers.some((number) => Math.abs(number - value) <= 1e-5 * size);
+    // As far as a value can be told from the others along its axis, whichever series they are of.
+    const spread = (axis) => {
+      const known = one.data.series.flatMap((series) => series[axis]).filter((v) => v !== null);
+      return known.reduce((a, v) => Math.max(a, Math.abs(v - known[0])), 0);
     };
+    const spreads = { x: spread('x'), y: spread('y') };
+    const says = (value, axis) => numbers.some(
+      (number) => Math.abs(number - value) <= 1e-5 * Math.max(spreads[axis], Math.abs(value) * 1e-9));
     const lines = one.data.series.some(({ kind }) => kind === 'line' || kind === 'steps');
     const right = one.data.series.some((series) => series.x.some((value, i) => {
       if (value === null || series.y[i] === null) return false;
-      if (!says(value, series.x) || !says(series.y[i], series.y)) return false;
+      if (!says(value, 'x') || !says(series.y[i], 'y')) return false;
       const [px, py] = one.chart.convertToPixel({ gridIndex: 0 }, [value, series.y[i]]);
       const reach = series.kind === 'cells' ? 60 : 8;
       return Math.abs(px - x) < reach && (lines || Math.abs(py - y) < reach);
