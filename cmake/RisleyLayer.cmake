@@ -28,7 +28,7 @@ endif()
 option(RISLEY_PRECOMPILE_HEADERS "Parse common headers once" ${precompile})
 set(RISLEY_STANDARD_HEADERS <algorithm> <array> <cmath> <cstdint> <filesystem> <functional> <map> <memory>
     <optional> <span> <string> <string_view> <vector> <fmt/format.h>)
-set(RISLEY_EIGEN_HEADERS ${RISLEY_STANDARD_HEADERS} <Eigen/Dense>)
+set(RISLEY_EIGEN_HEADERS ${RISLEY_STANDARD_HEADERS} <Eigen/Core> <Eigen/Geometry>)
 function(risley_parse_headers target)
   if(RISLEY_PRECOMPILE_HEADERS)
     target_precompile_headers(${target} PRIVATE ${ARGN})

@@ -2,9 +2,10 @@
 // SPDX-License-Identifier: MIT
 #include "calibration/belief.hpp"
 
-#include <Eigen/Cholesky>
 #include <fmt/format.h>
 
+#include "risley/algebra/products.hpp"
+#include "risley/algebra/symmetric.hpp"
 #include "risley/core/error.hpp"
 #include "risley/estimation/parameter_agreement.hpp"
 
@@ -50,12 +51,12 @@ Belief pooled_belief(const std::vector<RangedRecording>& recordings) {
     Eigen::MatrixXd information = Eigen::MatrixXd::Zero(n, n);
     Eigen::VectorXd weighted = Eigen::VectorXd::Zero(n);
     for (const RangedRecording& recording : recordings) {
-      const Eigen::MatrixXd own = recording.covariance.llt().solve(Eigen::MatrixXd::Identity(n, n));
+      const Eigen::MatrixXd own = algebra::SymmetricSolver(recording.covariance).inverse();
       information += own;
-      weighted += own * values(recording);
+      weighted += algebra::times(own, values(recording));
     }
-    belief.covariance = information.llt().solve(Eigen::MatrixXd::Identity(n, n));
-    mean = belief.covariance * weighted;
+    belief.covariance = algebra::SymmetricSolver(information).inverse();
+    mean = algebra::times(belief.covariance, weighted);
     for (const RangedRecording& recording : recordings) {
       const Eigen::VectorXd off = values(recording) - mean;
       const estimation::Disagreement apart =
@@ -76,7 +77,8 @@ Belief pooled_belief(const std::vector<RangedRecording>& recordings) {
     }
   }
   for (const RangedRecording& recording : recordings) {
-    const Eigen::VectorXd shift = recording.angle_sensitivity * (mean - values(recording));
+    const Eigen::VectorXd shift =
+        algebra::times(recording.angle_sensitivity, mean - values(recording));
     belief.angle_shift.emplace_back(shift.data(), shift.data() + shift.size());
   }
   return belief;

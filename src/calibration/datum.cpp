@@ -6,10 +6,11 @@
 #include <array>
 #include <cmath>
 
-#include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 #include <fmt/format.h>
 
+#include "risley/algebra/products.hpp"
+#include "risley/algebra/symmetric.hpp"
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
 #include "risley/core/require.hpp"
@@ -23,12 +24,6 @@ namespace {
 
 using Eigen::Index;
 using Eigen::Matrix3d;
-
-Matrix3d cross_matrix(const Eigen::Vector3d& v) {
-  Matrix3d m;
-  m << 0, -v[2], v[1], v[2], 0, -v[0], -v[1], v[0], 0;
-  return m;
-}
 
 /// One beam of a bundle and how it follows the parameters.
 struct BundleBeam {
@@ -71,8 +66,10 @@ std::vector<BundleBeam> bundle(const PrismTrain& train,
     }
     const AngleSeeds<double> seeds = angle_seeds(linear.direction);
     beam.of_angles.resize(2, n);
-    beam.of_angles.row(0) = eigen(seeds.azimuth).transpose() * beam.jacobian;
-    beam.of_angles.row(1) = eigen(seeds.zenith).transpose() * beam.jacobian;
+    for (Index j = 0; j < n; ++j) {
+      beam.of_angles(0, j) = eigen(seeds.azimuth).dot(beam.jacobian.col(j));
+      beam.of_angles(1, j) = eigen(seeds.zenith).dot(beam.jacobian.col(j));
+    }
     beams.push_back(std::move(beam));
   }
   return beams;
@@ -105,7 +102,7 @@ DirectionErrors direction_errors(std::span<const Vector3<double>> computed,
     errors.zenith_rmse += zenith * zenith;
   }
   if (count < 3) throw InvalidArgument("fewer than three directions to compare");
-  const Eigen::Vector3d turn = normal.ldlt().solve(right);
+  const Eigen::Vector3d turn = algebra::SymmetricSolver(normal).solve(right);
   for (std::size_t i = 0; i < truth.size(); ++i) {
     if (!sound(i)) continue;
     const Eigen::Vector3d beam = eigen(truth[i]), rigid = turn.cross(beam);
@@ -145,24 +142,33 @@ FormalDatum formal_datum(const PrismTrain& train,
   Eigen::MatrixXd right = Eigen::MatrixXd::Zero(3, static_cast<Index>(free.size()));
   for (const BundleBeam& beam : beams) {
     normal += Matrix3d::Identity() - beam.direction * beam.direction.transpose();
-    right += cross_matrix(beam.direction) * beam.jacobian;
+    for (Index j = 0; j < right.cols(); ++j) {
+      right.col(j) += beam.direction.cross(beam.jacobian.col(j));
+    }
   }
   // The shared rotation as a linear function of the parameters.
-  const Eigen::MatrixXd turn = normal.ldlt().solve(right);
-  const Matrix3d turn_covariance = turn * covariance * turn.transpose();
+  const Eigen::MatrixXd turn = algebra::SymmetricSolver(normal).solve_columns(right);
+  const Matrix3d turn_covariance = algebra::propagated(turn, covariance);
   FormalDatum datum;
   datum.sigma_roll = std::sqrt(turn_covariance(0, 0));
   datum.sigma_pitch = std::sqrt(turn_covariance(1, 1));
   datum.sigma_yaw = std::sqrt(turn_covariance(2, 2));
   const auto count = static_cast<double>(beams.size());
   datum.gauge = std::sqrt(turn_covariance.cwiseProduct(normal).sum() / count);
+  // Sums of J^T J over the beams: their products with the covariance sum up the variances.
+  Eigen::MatrixXd shape = Eigen::MatrixXd::Zero(covariance.rows(), covariance.cols());
+  Eigen::MatrixXd total = shape;
   for (const BundleBeam& beam : beams) {
-    const Eigen::MatrixXd rest = beam.jacobian + cross_matrix(beam.direction) * turn;
-    datum.shape += (rest * covariance * rest.transpose()).trace();
-    datum.total += (beam.of_angles * covariance * beam.of_angles.transpose()).trace();
+    Eigen::MatrixXd rest = beam.jacobian;
+    for (Index j = 0; j < rest.cols(); ++j) {
+      const Eigen::Vector3d shared = turn.col(j);
+      rest.col(j) += beam.direction.cross(shared);
+    }
+    algebra::add_transposed_product(rest, rest, rest.rows(), shape);
+    algebra::add_transposed_product(beam.of_angles, beam.of_angles, 2, total);
   }
-  datum.shape = std::sqrt(std::max(0.0, datum.shape) / count);
-  datum.total = std::sqrt(std::max(0.0, datum.total) / count);
+  datum.shape = std::sqrt(std::max(0.0, shape.cwiseProduct(covariance).sum()) / count);
+  datum.total = std::sqrt(std::max(0.0, total.cwiseProduct(covariance).sum()) / count);
   return datum;
 }
 

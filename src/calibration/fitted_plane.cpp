@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include <Eigen/Dense>
+#include <Eigen/Eigenvalues>
 #include <fmt/format.h>
 
 #include "risley/core/error.hpp"

@@ -7,9 +7,10 @@
 #include <cmath>
 #include <numeric>
 
-#include <Eigen/Cholesky>
 #include <tbb/parallel_for.h>
 
+#include "risley/algebra/products.hpp"
+#include "risley/algebra/symmetric.hpp"
 #include "risley/calibration/fitted_plane.hpp"
 #include "risley/core/error.hpp"
 #include "risley/optics/batch.hpp"
@@ -34,6 +35,23 @@ struct Sums {
   Eigen::MatrixXd hessian;
   Eigen::VectorXd gradient;
   double squares = 0;
+
+  explicit Sums(Index size = 0)
+      : hessian(Eigen::MatrixXd::Zero(size, size)), gradient(Eigen::VectorXd::Zero(size)) {}
+
+  /// @param row  derivatives of a point's residual, its negated distance
+  void add(const Eigen::VectorXd& row, double distance) {
+    for (Index j = 0; j < row.size(); ++j) {
+      for (Index i = 0; i < row.size(); ++i) hessian(i, j) += row[i] * row[j];
+      gradient[j] -= distance * row[j];
+    }
+    squares += distance * distance;
+  }
+  void add(const Sums& other) {
+    hessian += other.hessian;
+    gradient += other.gradient;
+    squares += other.squares;
+  }
 };
 
 template <int N>
@@ -72,8 +90,7 @@ class View {
     std::vector<Sums> parts(blocks());
     tbb::parallel_for(std::size_t{0}, blocks(), [&, t1 = t1, t2 = t2](std::size_t block) {
       Sums& part = parts[block];
-      part.hessian = Eigen::MatrixXd::Zero(size, size);
-      part.gradient = Eigen::VectorXd::Zero(size);
+      part = Sums(size);
       Eigen::VectorXd row(size);
       for (std::size_t i = begin(block); i < end(block); ++i) {
         const std::size_t emitter = beam(i);
@@ -91,18 +108,11 @@ class View {
         row[free] = -1.0;
         row[free + 1] = dot(cloud.points[i], t1);
         row[free + 2] = dot(cloud.points[i], t2);
-        part.hessian.selfadjointView<Eigen::Upper>().rankUpdate(row);
-        part.gradient -= distance * row;  // the residuals are the negated distances
-        part.squares += distance * distance;
+        part.add(row, distance);
       }
     });
-    Sums sum{Eigen::MatrixXd::Zero(size, size), Eigen::VectorXd::Zero(size), 0.0};
-    for (const Sums& part : parts) {
-      sum.hessian += part.hessian;
-      sum.gradient += part.gradient;
-      sum.squares += part.squares;
-    }
-    sum.hessian.triangularView<Eigen::StrictlyLower>() = sum.hessian.transpose();
+    Sums sum(size);
+    for (const Sums& part : parts) sum.add(part);
     return sum;
   }
 
@@ -158,10 +168,12 @@ PlanarSolution adjust_as_paper(PlanarProblem problem, int most_iterations,
         const Cloud cloud = one.cloud();
         return std::pair{cloud.plane, one.sums(cloud)};
       });
-      const Eigen::LLT<Eigen::MatrixXd> own(sums.hessian.bottomRightCorner(3, 3));
+      const algebra::SymmetricSolver own(sums.hessian.bottomRightCorner(3, 3));
       const Eigen::MatrixXd cross = sums.hessian.bottomLeftCorner(3, free);
-      hessian += sums.hessian.topLeftCorner(free, free) - cross.transpose() * own.solve(cross);
-      gradient += sums.gradient.head(free) - cross.transpose() * own.solve(sums.gradient.tail(3));
+      hessian += sums.hessian.topLeftCorner(free, free) -
+                 algebra::transposed_product(cross, own.solve_columns(cross));
+      gradient += sums.gradient.head(free) -
+                  algebra::transposed_times(cross, own.solve(sums.gradient.tail(3)));
       squares += sums.squares;
       problem.walls[view.wall].normal = plane.normal;
       view.distance = plane.distance;
@@ -169,9 +181,8 @@ PlanarSolution adjust_as_paper(PlanarProblem problem, int most_iterations,
     const double before = std::exchange(unit_weight, std::sqrt(squares / redundancy));
     solution.cost = squares;
     solution.information = hessian / (unit_weight * unit_weight);
-    const Eigen::LDLT<Eigen::MatrixXd> solver(hessian);
-    solution.covariance =
-        solver.solve(Eigen::MatrixXd::Identity(free, free)) * unit_weight * unit_weight;
+    const algebra::SymmetricSolver solver(hessian);
+    solution.covariance = solver.inverse() * (unit_weight * unit_weight);
     if (std::abs(before - unit_weight) <= kStandsStill * unit_weight) {
       solution.converged = true;
       break;

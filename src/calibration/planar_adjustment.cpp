@@ -8,11 +8,11 @@
 #include <string_view>
 #include <utility>
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <fmt/format.h>
 
+#include "risley/algebra/products.hpp"
+#include "risley/algebra/symmetric.hpp"
 #include "risley/core/error.hpp"
 #include "risley/core/require.hpp"
 
@@ -241,12 +241,13 @@ System build_system(const PlanarProblem& p, const Unknowns& at, const Places& pl
     plane.places = places.all;
     const PlaneEquations equations = plane_equations(*p.views[view].shots, plane, {}, set);
     const Chain chain = chain_of(p, at, places, view);
-    system.view_hessian.push_back(chain.unknowns.transpose() * equations.hessian * chain.unknowns);
+    system.view_hessian.push_back(algebra::pulled_back(chain.unknowns, equations.hessian));
     system.view_cost.push_back(equations.cost);
     system.view_shots.push_back(equations.shots);
     system.hessian += system.view_hessian.back();
-    system.gradient += chain.unknowns.transpose() * equations.gradient;
-    system.considered += chain.unknowns.transpose() * equations.hessian * chain.considered;
+    system.gradient += algebra::transposed_times(chain.unknowns, equations.gradient);
+    system.considered += algebra::transposed_product(
+        chain.unknowns, algebra::product(equations.hessian, chain.considered));
     system.cost += equations.cost;
     system.shots += equations.shots;
     system.lost += equations.lost;
@@ -276,44 +277,14 @@ void move(PlanarProblem& p, const Unknowns& at, const Eigen::VectorXd& step) {
   for (std::size_t v = 0; v < p.views.size(); ++v) p.views[v].distance += step[at.distance(v)];
 }
 
-/// Scales a matrix to a diagonal of ones; 1 for an unknown that nothing tells.
-Eigen::VectorXd unit_scale(const Eigen::VectorXd& diagonal) {
-  return diagonal.unaryExpr([](double d) { return d > 0 ? 1.0 / std::sqrt(d) : 1.0; });
-}
-
-/// Unknowns differ by many orders of magnitude, so the matrix is scaled before it is factorised.
-class ScaledSolver {
- public:
-  ScaledSolver(const Eigen::MatrixXd& matrix, double damping)
-      : scale_(unit_scale(matrix.diagonal())),
-        solver_((Eigen::MatrixXd(scale_.asDiagonal() * matrix * scale_.asDiagonal()) +
-                 damping * Eigen::MatrixXd::Identity(matrix.rows(), matrix.cols()))) {}
-  bool ok() const { return solver_.info() == Eigen::Success; }
-  Eigen::MatrixXd solve(const Eigen::MatrixXd& right) const {
-    return scale_.asDiagonal() * solver_.solve(scale_.asDiagonal() * right);
-  }
-
- private:
-  Eigen::VectorXd scale_;
-  Eigen::LLT<Eigen::MatrixXd> solver_;
-};
-
 /// Information on the free parameters when everything else is unknown. Directions without any
 /// information come out as zero, also where the others cannot be told apart.
 Eigen::MatrixXd eliminated(const Eigen::MatrixXd& hessian, Index free) {
   const Index rest = hessian.rows() - free;
   if (rest <= 0) return hessian;
-  const Eigen::VectorXd scale = unit_scale(hessian.diagonal().tail(rest));
-  const Eigen::MatrixXd scaled =
-      scale.asDiagonal() * hessian.bottomRightCorner(rest, rest) * scale.asDiagonal();
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(scaled);
-  Eigen::VectorXd inverse = solver.eigenvalues();
-  for (double& value : inverse)
-    value = value > 1e-13 * static_cast<double>(rest) ? 1.0 / value : 0.0;
-  const Eigen::MatrixXd half = inverse.cwiseSqrt().asDiagonal() *
-                               solver.eigenvectors().transpose() * scale.asDiagonal() *
-                               hessian.bottomLeftCorner(rest, free);
-  return hessian.topLeftCorner(free, free) - half.transpose() * half;
+  const Eigen::MatrixXd inverse = algebra::pseudo_inverse(hessian.bottomRightCorner(rest, rest));
+  return hessian.topLeftCorner(free, free) -
+         algebra::pulled_back(hessian.bottomLeftCorner(rest, free), inverse);
 }
 
 PriorTest test_of(std::string name, bool station, const Eigen::VectorXd& misfit, double sigma,
@@ -326,11 +297,11 @@ PriorTest test_of(std::string name, bool station, const Eigen::VectorXd& misfit,
   // nothing have no misfit and are no degrees of freedom.
   const Eigen::MatrixXd covariance =
       sigma * sigma * Eigen::MatrixXd::Identity(misfit.size(), misfit.size()) - posterior;
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(covariance);
+  const algebra::PrincipalAxes axes = algebra::principal_axes(covariance);
   for (Index i = 0; i < misfit.size(); ++i) {
-    if (solver.eigenvalues()[i] < 1e-3 * sigma * sigma) continue;
-    const double part = solver.eigenvectors().col(i).dot(misfit);
-    test.chi2 += part * part / solver.eigenvalues()[i];
+    if (axes.values[i] < 1e-3 * sigma * sigma) continue;
+    const double part = axes.vectors.col(i).dot(misfit);
+    test.chi2 += part * part / axes.values[i];
     ++test.degrees_of_freedom;
   }
   test.critical = critical_chi2(test.degrees_of_freedom);
@@ -446,8 +417,8 @@ PlanarSolution adjust(PlanarProblem problem, const AdjustmentOptions& options,
   System system = build_system(problem, at, places, options.set);
   double damping = 1e-8;
   while (solution.iterations < options.most_iterations) {
-    const ScaledSolver solver(system.hessian, damping);
-    if (!solver.ok()) {  // flat in some direction
+    const algebra::SymmetricSolver solver(system.hessian, damping);
+    if (!solver.positive()) {  // flat in some direction
       damping = std::max(10.0 * damping, 1e-8);
       if (damping > kMostDamping) break;
       continue;
@@ -491,11 +462,11 @@ PlanarSolution adjust(PlanarProblem problem, const AdjustmentOptions& options,
   Eigen::MatrixXd hessian = system.hessian;
   hessian.topLeftCorner(free, free) -= prior_information(problem);
   solution.information = eliminated(hessian, free);
-  const ScaledSolver solver(system.hessian, kLeastDamping);
+  const algebra::SymmetricSolver solver(system.hessian, kLeastDamping);
   Eigen::MatrixXd covariance =
       Eigen::MatrixXd::Constant(n, n, std::numeric_limits<double>::infinity());
-  if (solver.ok()) {
-    covariance = solver.solve(Eigen::MatrixXd::Identity(n, n));
+  if (solver.positive()) {
+    covariance = solver.inverse();
     for (std::size_t view = 0; view < problem.views.size(); ++view) {
       const double share = covariance.cwiseProduct(system.view_hessian[view]).sum();
       solution.redundancy.push_back(static_cast<double>(system.view_shots[view]) - share);
@@ -505,7 +476,7 @@ PlanarSolution adjust(PlanarProblem problem, const AdjustmentOptions& options,
     solution.redundancy.assign(problem.views.size(), 0.0);
   }
   solution.chi2 = system.view_cost;
-  if (solver.ok()) {
+  if (solver.positive()) {
     for (std::size_t w = 0; w < problem.walls.size(); ++w) {
       const Wall& wall = problem.walls[w];
       if (!(wall.normal_sigma > 0)) continue;
@@ -521,10 +492,10 @@ PlanarSolution adjust(PlanarProblem problem, const AdjustmentOptions& options,
     }
   }
   solution.noise_covariance = covariance.topLeftCorner(free, free);
-  if (considered_size(problem) > 0 && solver.ok()) {
+  if (considered_size(problem) > 0 && solver.positive()) {
     // Errors of the considered parameters shift the solution by -N^-1 J^T W K.
-    const Eigen::MatrixXd shift = covariance * system.considered;
-    covariance += shift * considered_covariance(problem) * shift.transpose();
+    const Eigen::MatrixXd shift = algebra::product(covariance, system.considered);
+    covariance += algebra::propagated(shift, considered_covariance(problem));
   }
   solution.covariance = covariance.topLeftCorner(free, free);
   const auto sigma = [&](Index i) { return i < 0 ? 0.0 : std::sqrt(covariance(i, i)); };

@@ -6,9 +6,9 @@
 #include <cmath>
 #include <utility>
 
-#include <Eigen/LU>
 #include <fmt/format.h>
 
+#include "risley/algebra/symmetric.hpp"
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
 #include "risley/core/require.hpp"
@@ -70,7 +70,8 @@ RangedRecording ranged_recording(const estimation::Estimate& estimate, std::stri
   recording.free = estimate.free;
   recording.covariance = estimate.covariance;
   recording.angle_sensitivity = estimate.common_angles->sensitivity;
-  recording.mean_angle_covariance = estimate.common_angles->information.inverse();
+  recording.mean_angle_covariance =
+      algebra::SymmetricSolver(estimate.common_angles->information).inverse();
   recording.serial = std::move(serial);
   RangedShots& shots = recording.shots;
   shots.resize(prisms, estimate.series.size());

@@ -7,9 +7,11 @@
 #include <cmath>
 #include <limits>
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <fmt/format.h>
 
+#include "risley/algebra/products.hpp"
+#include "risley/algebra/symmetric.hpp"
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
 
@@ -109,21 +111,24 @@ class SmoothSurface {
 
   void fit(std::vector<Cell>& cells, std::size_t terms) {
     const auto size = static_cast<Eigen::Index>(terms);
-    Eigen::MatrixXd design(static_cast<Eigen::Index>(cells.size()), size);
-    Eigen::VectorXd values(design.rows());
     for (int round = 0; round < kMostWeightRounds; ++round) {
-      for (Eigen::Index i = 0; i < design.rows(); ++i) {
-        const Cell& cell = cells[static_cast<std::size_t>(i)];
+      Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(size, size);
+      Eigen::VectorXd right = Eigen::VectorXd::Zero(size);
+      for (const Cell& cell : cells) {
         const double part = cell.z / (kTukey * spread_);
         // The square root of Tukey's weight over the variance.
         const double root = cell.full ? std::max(0.0, 1.0 - part * part) / cell.centre_sigma : 0.0;
         const auto row = terms_of(cell.x, cell.y);
-        for (Eigen::Index j = 0; j < size; ++j)
-          design(i, j) = root * row[static_cast<std::size_t>(j)];
-        values[i] = root * cell.centre;
+        for (std::size_t i = 0; i < terms; ++i) {
+          const double weighted = root * root * row[i];
+          right[static_cast<Eigen::Index>(i)] += weighted * cell.centre;
+          for (std::size_t j = 0; j < terms; ++j) {
+            normal(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) += weighted * row[j];
+          }
+        }
       }
-      // Of all solutions the smallest one where cells in one row do not tell them apart.
-      const Eigen::VectorXd solution = design.completeOrthogonalDecomposition().solve(values);
+      // What cells in one row do not tell is zero.
+      const Eigen::VectorXd solution = algebra::times(algebra::pseudo_inverse(normal), right);
       double change = 0;
       for (std::size_t j = 0; j < terms; ++j) {
         const double next = solution[static_cast<Eigen::Index>(j)];

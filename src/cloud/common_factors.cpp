@@ -8,6 +8,8 @@
 
 #include <fmt/format.h>
 
+#include "risley/algebra/products.hpp"
+
 namespace risley::cloud {
 namespace {
 
@@ -60,8 +62,8 @@ void Factors::add(const Uncertain& uncertain, bool moves_beam, bool moves_angles
 }
 
 void Factors::add_angles(const Uncertain& uncertain) {
-  const Eigen::MatrixXd factor = lower_factor(belief_.angle_sensitivity * uncertain.covariance *
-                                              belief_.angle_sensitivity.transpose());
+  const Eigen::MatrixXd factor =
+      lower_factor(algebra::propagated(belief_.angle_sensitivity, uncertain.covariance));
   for (int j = 0; j < prisms(); ++j) {
     CommonFactor common = nothing(fmt::format("rotation_angle_{}_deg", prism_letter(j)));
     common.weights.segment(all_places(), prisms()) = factor.col(j);

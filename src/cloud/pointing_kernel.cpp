@@ -47,58 +47,14 @@ struct BeamCovariance {
   Batch uu, uv, vv, ud, vd, dd;
 };
 
-/// Everything of a call that is the same for all shots, but for the emitters of a group.
-template <int N>
-class Kernel {
+/// What no prism has a part in.
+class Points {
  public:
-  static constexpr std::size_t kFaces = 2 * N;
+  explicit Points(const PointArguments& a) : a_(a) {}
 
-  explicit Kernel(const PointArguments& a)
-      : a_(a),
-        emitters_(a.parameters, a.emitters, a.beam),
-        believed_emitters_(a.believed_parameters, a.emitters, a.beam) {
-    std::array<FaceOrder, N> order;
-    __builtin_memcpy(&order, a.face_order, sizeof(order));
-    train_ = prepared<N>(a.parameters, order, &derivatives_);
-    believed_ = prepared<N>(a.believed_parameters, order, nullptr);
-    for (int i = 0; i < parameter_count(TrainShape{N, a.emitters}); ++i) {
-      same_ = same_ && a.parameters[i] == a.believed_parameters[i];
-    }
-    for (std::size_t i = 0; i < kFaces; ++i) face_position_[i] = Batch(a.face_position[i]);
-  }
-
-  /// Shots [at, at + kLanes).
-  [[gnu::flatten]] void compute(std::size_t at) {
-    if (emitters_.several()) turn_to(at);
-    std::array<Batch, N> angles;
-    for (std::size_t k = 0; k < N; ++k) angles[k] = load(a_.rotation_angle[k], at);
-    const auto forward = trace_forward(train_, angles);
-    const auto path = beam_path(forward, face_position_);
-    const Sines azimuth = sines(a_.azimuth, at), zenith = sines(a_.zenith, at);
-    Ray ray{path.origin(), forward.direction(), {}};
-    if (a_.reported_directions) {
-      set_reported(azimuth, zenith, ray);
-      // The last face can stop a beam that has an origin.
-      ray.direction =
-          xsimd::select(forward.valid(), Batch(1.0), Batch(__builtin_nan(""))) * ray.direction;
-    } else {
-      ray.across = vectors_across(ray.direction);
-    }
-    const Batch range = load(a_.range, at) - Batch(a_.range_offset);
-    const Batch cosine = store_point(at, ray, range);
-    if (a_.azimuth_residual) store_residuals(at, forward, azimuth, zenith);
-    if (!a_.covariance[0]) return;
-
-    const auto jacobian =
-        linearise_point(train_, derivatives_, forward, path, face_position_, ray.across, range);
-    BeamCovariance own = own_covariance(at, jacobian, zenith, range);
-    own.dd = own.dd + range_noise(at, range, cosine);
-    add_factors(at, jacobian, ray, own);
-    store_covariance(at, ray, own);
-  }
-
-  /// The same where no rotation angles are known: directions as reported, beams from the frame's
-  /// origin, a footprint along azimuth and zenith. Of the common factors the range offset remains.
+  /// Shots [at, at + kLanes) of which no rotation angles are known: directions as reported, beams
+  /// from the frame's origin, a footprint along azimuth and zenith. Of the common factors the range
+  /// offset remains.
   [[gnu::flatten]] void compute_reported(std::size_t at) const {
     const Sines azimuth = sines(a_.azimuth, at), zenith = sines(a_.zenith, at);
     const Batch zero(0.0);
@@ -120,17 +76,7 @@ class Kernel {
     store_covariance(at, ray, own);
   }
 
- private:
-  /// The emitters of shots [at, at + kLanes).
-  void turn_to(std::size_t at) {
-    emitters_.select(at, a_.shots);
-    emitters_.apply(train_);
-    emitters_.apply(derivatives_);
-    if (same_) return;
-    believed_emitters_.select(at, a_.shots);
-    believed_emitters_.apply(believed_);
-  }
-
+ protected:
   /// Sine and cosine of one reported angle.
   struct Sines {
     Batch sine, cosine;
@@ -183,6 +129,102 @@ class Kernel {
     const Batch across = range * zenith.sine;
     c.uu = c.uu + across * across * (noise + load(a_.azimuth_variance, at));
     c.vv = c.vv + range * range * (noise + load(a_.zenith_variance, at));
+  }
+
+  Batch range_noise(std::size_t at, const Batch& range, const Batch& cosine) const {
+    Batch variance = Batch(a_.range_variance) + load(a_.rounding_variance, at) +
+                     range * range * Batch(a_.range_variance_per_range2);
+    if (a_.range_variance_incidence != 0) {
+      const Batch squared = cosine * cosine;
+      const Batch part = (Batch(1.0) - squared) / squared * Batch(a_.range_variance_incidence);
+      variance = variance + xsimd::select(part == part, part, Batch(0.0));
+    }
+    if (a_.range_variance_weak_return != 0) {
+      variance = variance + Batch(a_.range_variance_weak_return) /
+                                xsimd::max(load(a_.intensity, at), Batch(1.0));
+    }
+    return variance;
+  }
+
+  /// From the frame of the beam into that of the sensor.
+  void store_covariance(std::size_t at, const Ray& ray, const BeamCovariance& c) const {
+    const Vector3<Batch>&u = ray.across[0], &v = ray.across[1], &d = ray.direction;
+    const Vector3<Batch> cu = c.uu * u + c.uv * v + c.ud * d;
+    const Vector3<Batch> cv = c.uv * u + c.vv * v + c.vd * d;
+    const Vector3<Batch> cd = c.ud * u + c.vd * v + c.dd * d;
+    const auto entry = [&](const Batch& ui, const Batch& vi, const Batch& di, const Batch& uj,
+                           const Batch& vj,
+                           const Batch& dj) { return uj * ui + vj * vi + dj * di; };
+    entry(u.x, v.x, d.x, cu.x, cv.x, cd.x).store_unaligned(a_.covariance[0] + at);
+    entry(u.x, v.x, d.x, cu.y, cv.y, cd.y).store_unaligned(a_.covariance[1] + at);
+    entry(u.x, v.x, d.x, cu.z, cv.z, cd.z).store_unaligned(a_.covariance[2] + at);
+    entry(u.y, v.y, d.y, cu.y, cv.y, cd.y).store_unaligned(a_.covariance[3] + at);
+    entry(u.y, v.y, d.y, cu.z, cv.z, cd.z).store_unaligned(a_.covariance[4] + at);
+    entry(u.z, v.z, d.z, cu.z, cv.z, cd.z).store_unaligned(a_.covariance[5] + at);
+  }
+
+  const PointArguments& a_;
+};
+
+/// Everything of a call that is the same for all shots, but for the emitters of a group.
+template <int N>
+class Kernel : public Points {
+ public:
+  static constexpr std::size_t kFaces = 2 * N;
+
+  explicit Kernel(const PointArguments& a)
+      : Points(a),
+        emitters_(a.parameters, a.emitters, a.beam),
+        believed_emitters_(a.believed_parameters, a.emitters, a.beam) {
+    std::array<FaceOrder, N> order;
+    __builtin_memcpy(&order, a.face_order, sizeof(order));
+    train_ = prepared<N>(a.parameters, order, &derivatives_);
+    believed_ = prepared<N>(a.believed_parameters, order, nullptr);
+    for (int i = 0; i < parameter_count(TrainShape{N, a.emitters}); ++i) {
+      same_ = same_ && a.parameters[i] == a.believed_parameters[i];
+    }
+    for (std::size_t i = 0; i < kFaces; ++i) face_position_[i] = Batch(a.face_position[i]);
+  }
+
+  /// Shots [at, at + kLanes).
+  [[gnu::flatten]] void compute(std::size_t at) {
+    if (emitters_.several()) turn_to(at);
+    std::array<Batch, N> angles;
+    for (std::size_t k = 0; k < N; ++k) angles[k] = load(a_.rotation_angle[k], at);
+    const auto forward = trace_forward(train_, angles);
+    const auto path = beam_path(forward, face_position_);
+    const Sines azimuth = sines(a_.azimuth, at), zenith = sines(a_.zenith, at);
+    Ray ray{path.origin(), forward.direction(), {}};
+    if (a_.reported_directions) {
+      set_reported(azimuth, zenith, ray);
+      // The last face can stop a beam that has an origin.
+      ray.direction =
+          xsimd::select(forward.valid(), Batch(1.0), Batch(__builtin_nan(""))) * ray.direction;
+    } else {
+      ray.across = vectors_across(ray.direction);
+    }
+    const Batch range = load(a_.range, at) - Batch(a_.range_offset);
+    const Batch cosine = store_point(at, ray, range);
+    if (a_.azimuth_residual) store_residuals(at, forward, azimuth, zenith);
+    if (!a_.covariance[0]) return;
+
+    const auto jacobian =
+        linearise_point(train_, derivatives_, forward, path, face_position_, ray.across, range);
+    BeamCovariance own = own_covariance(at, jacobian, zenith, range);
+    own.dd = own.dd + range_noise(at, range, cosine);
+    add_factors(at, jacobian, ray, own);
+    store_covariance(at, ray, own);
+  }
+
+ private:
+  /// The emitters of shots [at, at + kLanes).
+  void turn_to(std::size_t at) {
+    emitters_.select(at, a_.shots);
+    emitters_.apply(train_);
+    emitters_.apply(derivatives_);
+    if (same_) return;
+    believed_emitters_.select(at, a_.shots);
+    believed_emitters_.apply(believed_);
   }
 
   /// Reported direction minus that of the believed parameters. The series of the two angles are
@@ -251,21 +293,6 @@ class Kernel {
     return c;
   }
 
-  Batch range_noise(std::size_t at, const Batch& range, const Batch& cosine) const {
-    Batch variance = Batch(a_.range_variance) + load(a_.rounding_variance, at) +
-                     range * range * Batch(a_.range_variance_per_range2);
-    if (a_.range_variance_incidence != 0) {
-      const Batch squared = cosine * cosine;
-      const Batch part = (Batch(1.0) - squared) / squared * Batch(a_.range_variance_incidence);
-      variance = variance + xsimd::select(part == part, part, Batch(0.0));
-    }
-    if (a_.range_variance_weak_return != 0) {
-      variance = variance + Batch(a_.range_variance_weak_return) /
-                                xsimd::max(load(a_.intensity, at), Batch(1.0));
-    }
-    return variance;
-  }
-
   /// Adds the common factors' covariance and stores their loadings.
   void add_factors(std::size_t at, const PointLinearisation<Batch, N>& jacobian, const Ray& ray,
                    BeamCovariance& c) const {
@@ -314,24 +341,6 @@ class Kernel {
     }
   }
 
-  /// From the frame of the beam into that of the sensor.
-  void store_covariance(std::size_t at, const Ray& ray, const BeamCovariance& c) const {
-    const Vector3<Batch>&u = ray.across[0], &v = ray.across[1], &d = ray.direction;
-    const Vector3<Batch> cu = c.uu * u + c.uv * v + c.ud * d;
-    const Vector3<Batch> cv = c.uv * u + c.vv * v + c.vd * d;
-    const Vector3<Batch> cd = c.ud * u + c.vd * v + c.dd * d;
-    const auto entry = [&](const Batch& ui, const Batch& vi, const Batch& di, const Batch& uj,
-                           const Batch& vj,
-                           const Batch& dj) { return uj * ui + vj * vi + dj * di; };
-    entry(u.x, v.x, d.x, cu.x, cv.x, cd.x).store_unaligned(a_.covariance[0] + at);
-    entry(u.x, v.x, d.x, cu.y, cv.y, cd.y).store_unaligned(a_.covariance[1] + at);
-    entry(u.x, v.x, d.x, cu.z, cv.z, cd.z).store_unaligned(a_.covariance[2] + at);
-    entry(u.y, v.y, d.y, cu.y, cv.y, cd.y).store_unaligned(a_.covariance[3] + at);
-    entry(u.y, v.y, d.y, cu.z, cv.z, cd.z).store_unaligned(a_.covariance[4] + at);
-    entry(u.z, v.z, d.z, cu.z, cv.z, cd.z).store_unaligned(a_.covariance[5] + at);
-  }
-
-  const PointArguments& a_;
   EmitterLanes<Batch, N> emitters_, believed_emitters_;
   PreparedTrain<Batch, N> train_, believed_;
   PreparedDerivatives<Batch, N> derivatives_;
@@ -339,18 +348,18 @@ class Kernel {
   bool same_ = true;
 };
 
-template <int N>
-void compute_all(const PointArguments& a) {
-  Kernel<N> kernel(a);
-  for (std::size_t at = 0; at < a.shots; at += kLanes) {
-    a.rotation_angle ? kernel.compute(at) : kernel.compute_reported(at);
-  }
-}
-
 }  // namespace
 
 void compute_points(const PointArguments& a) {
-  with_prism_count(a.prisms, [&]<int N>() { compute_all<N>(a); });
+  if (!a.rotation_angle) {
+    const Points points(a);
+    for (std::size_t at = 0; at < a.shots; at += kLanes) points.compute_reported(at);
+    return;
+  }
+  with_prism_count(a.prisms, [&]<int N>() {
+    Kernel<N> kernel(a);
+    for (std::size_t at = 0; at < a.shots; at += kLanes) kernel.compute(at);
+  });
 }
 
 }  // namespace risley::cloud::RISLEY_KERNEL_NAMESPACE

@@ -221,7 +221,7 @@ double used_observations(const NormalEquations& equations, const SmootherSolutio
     const auto at = static_cast<std::size_t>(states * n) * knot;
     const Eigen::Map<const RowMajor> coupling(equations.coupling.data() + at, states, n);
     const Eigen::Map<const RowMajor> sensitivity(solution.sensitivity.data() + at, states, n);
-    shared.noalias() += coupling.transpose() * sensitivity;
+    add_product(coupling.transpose(), sensitivity, shared);
   }
   return used + 2.0 * shared.cwiseProduct(solution.parameter_covariance).sum();
 }

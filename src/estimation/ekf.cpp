@@ -6,10 +6,11 @@
 #include <cmath>
 #include <limits>
 
-#include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <fmt/format.h>
 
+#include "risley/algebra/products.hpp"
+#include "risley/algebra/symmetric.hpp"
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
 #include "risley/core/golden_section.hpp"
@@ -17,6 +18,7 @@
 #include "risley/optics/batch.hpp"
 
 #include "estimation/entry_checks.hpp"
+#include "estimation/knot_model.hpp"
 #include "estimation/residual_model.hpp"
 
 namespace risley::estimation {
@@ -116,7 +118,8 @@ class Filter {
   Update update(State& state, std::size_t row, double gate) {
     linearise(state, row);
     Eigen::MatrixXd& p = state.covariance;
-    cross_.noalias() = p * jacobian_.transpose();
+    cross_.setZero();
+    add_product(p, jacobian_.transpose(), cross_);
     Eigen::Matrix2d innovation_covariance = jacobian_ * cross_;
     const double noise = options_.angle_noise * options_.angle_noise;
     innovation_covariance(0, 0) +=
@@ -132,7 +135,7 @@ class Filter {
     result.log_likelihood = -0.5 * (result.chi_square + std::log(determinant));
     gain_.noalias() = cross_ * inverse;
     state.mean.noalias() += gain_ * innovation_;
-    p.noalias() -= gain_ * cross_.transpose();
+    subtract_product(gain_, cross_.transpose(), p);
     // Rounding would otherwise let the two halves drift apart.
     p.triangularView<Eigen::StrictlyLower>() = p.transpose();
     return result;
@@ -402,10 +405,12 @@ Solution run_pass(const AngleSeries& series, const State& first, const PrismTrai
     for (std::size_t i = end; i-- > begin;) {
       if (i + 1 < shots) filter.predict(backward, -gap_before(i + 1));
       const State& f = filtered[i - begin];
-      const Eigen::MatrixXd share =
-          (f.covariance + backward.covariance).ldlt().solve(f.covariance).transpose();
-      const Eigen::VectorXd mean = f.mean + share * (backward.mean - f.mean);
-      const Eigen::MatrixXd covariance = f.covariance - share * f.covariance;
+      const algebra::SymmetricSolver both(f.covariance + backward.covariance);
+      const Eigen::MatrixXd share = both.solve_columns(f.covariance);  // transposed
+      const Eigen::VectorXd mean =
+          f.mean + algebra::transposed_times(share, backward.mean - f.mean);
+      const Eigen::MatrixXd covariance =
+          f.covariance - algebra::transposed_product(share, f.covariance);
       mean_parameters += mean.head(statics);
       mean_covariance += covariance.topLeftCorner(statics, statics);
       take_motion(mean, covariance, statics, motion, i);

@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include <Eigen/Cholesky>
 #include <Eigen/Core>
 
+#include "risley/algebra/symmetric.hpp"
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
 #include "risley/core/require.hpp"
@@ -110,7 +110,7 @@ Evaluation evaluate(const Estimate& estimate, const sensors::Sensor& truth_senso
       error[i] = result.parameters[static_cast<std::size_t>(i)].error;
     }
     result.nees_parameters =
-        error.dot(estimate.covariance.ldlt().solve(error)) / static_cast<double>(statics);
+        algebra::SymmetricSolver(estimate.covariance).chi2(error) / static_cast<double>(statics);
   }
 
   std::vector<double> squares(rotor_count, 0.0), variances = squares, speed_squares = squares,

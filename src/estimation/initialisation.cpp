@@ -9,10 +9,10 @@
 #include <numeric>
 #include <utility>
 
-#include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 #include <fmt/format.h>
 
+#include "risley/algebra/symmetric.hpp"
 #include "risley/core/direction.hpp"
 #include "risley/core/error.hpp"
 #include "risley/estimation/diagnostics.hpp"
@@ -113,7 +113,7 @@ class WindowFitter {
           Eigen::MatrixXd damped = normal;
           damped.diagonal() *= 1.0 + damping;
           if (!move_parameters) damped.diagonal().tail(n).array() *= 1e12;
-          WindowFit trial = stepped(fit, damped.ldlt().solve(gradient), d);
+          WindowFit trial = stepped(fit, algebra::SymmetricSolver(damped).solve(gradient), d);
           const double trial_cost = evaluate(trial);
           if (trial_cost < cost) {
             done = cost - trial_cost < 1e-6 * cost;

@@ -6,9 +6,10 @@
 #include <cmath>
 #include <limits>
 
-#include <Eigen/Eigenvalues>
 #include <fmt/format.h>
 
+#include "risley/algebra/products.hpp"
+#include "risley/algebra/symmetric.hpp"
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
 #include "risley/core/require.hpp"
@@ -56,17 +57,14 @@ Eigen::MatrixXd restricted_covariance(const Eigen::MatrixXd& information,
       scaled(i, j) = scale[a] * information(a, b) * scale[b];
     }
   }
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(scaled);
-  regular = n == 0 || solver.eigenvalues()[0] > kNoInformation * solver.eigenvalues()[n - 1];
+  algebra::PrincipalAxes axes = algebra::principal_axes(scaled);
+  regular = n == 0 || axes.values[0] > kNoInformation * axes.values[n - 1];
   if (!regular) return {};
-  Eigen::MatrixXd covariance = solver.eigenvectors() *
-                               solver.eigenvalues().cwiseInverse().asDiagonal() *
-                               solver.eigenvectors().transpose();
   for (Eigen::Index i = 0; i < n; ++i) {
-    covariance.row(i) *= scale[rows[static_cast<std::size_t>(i)]];
-    covariance.col(i) *= scale[rows[static_cast<std::size_t>(i)]];
+    axes.vectors.row(i) *= scale[rows[static_cast<std::size_t>(i)]];
   }
-  return covariance;
+  const Eigen::MatrixXd variances = axes.values.cwiseInverse().asDiagonal();
+  return algebra::propagated(axes.vectors, variances);
 }
 
 /// Parameters and the rotors' states in the middle of a recording, as one linear model: the states
@@ -88,7 +86,7 @@ Middle middle_of(const SmootherSolution& solution, const RotorTrajectory& knots)
   for (Eigen::Index i = 0; i < d; ++i) {
     for (Eigen::Index j = i; j < d; ++j) total(i, j) = total(j, i) = *entry++;
   }
-  total -= all * solution.parameter_covariance * all.transpose();
+  total -= algebra::propagated(all, solution.parameter_covariance);
   Middle middle{Eigen::MatrixXd(2 * knots.prisms, n),
                 Eigen::MatrixXd(2 * knots.prisms, 2 * knots.prisms)};
   const auto row_of = [&](Eigen::Index i) {
@@ -113,9 +111,9 @@ Eigen::MatrixXd joint_covariance(const Eigen::MatrixXd& parameters, const Middle
   }
   Eigen::MatrixXd joint(n + m, n + m);
   joint.topLeftCorner(n, n) = parameters;
-  joint.bottomLeftCorner(m, n) = sensitivity * parameters;
+  joint.bottomLeftCorner(m, n) = algebra::product(sensitivity, parameters);
   joint.topRightCorner(n, m) = joint.bottomLeftCorner(m, n).transpose();
-  joint.bottomRightCorner(m, m) = middle.rest + sensitivity * parameters * sensitivity.transpose();
+  joint.bottomRightCorner(m, m) = middle.rest + algebra::propagated(sensitivity, parameters);
   return joint;
 }
 
@@ -161,7 +159,7 @@ Observability analyse(const NormalEquations& equations, const RotorTrajectory& k
   for (std::size_t i = 0; i < every.size(); ++i) every[i] = static_cast<Eigen::Index>(i);
   const Eigen::MatrixXd joint = joint_covariance(solution.parameter_covariance, middle, every);
   const Eigen::VectorXd inverse_sigma = joint.diagonal().array().rsqrt();
-  result.correlation = inverse_sigma.asDiagonal() * joint * inverse_sigma.asDiagonal();
+  result.correlation = algebra::scaled(joint, inverse_sigma);
 
   std::vector<Eigen::Index> chosen;
   for (const FreeParameter& parameter : free) {

@@ -2,9 +2,9 @@
 // SPDX-License-Identifier: MIT
 #include "risley/estimation/parameter_agreement.hpp"
 
-#include <Eigen/Cholesky>
 #include <fmt/format.h>
 
+#include "risley/algebra/symmetric.hpp"
 #include "risley/core/error.hpp"
 
 namespace risley::estimation {
@@ -19,7 +19,7 @@ Disagreement disagreement(const Eigen::VectorXd& difference, const Eigen::Matrix
   }
   Disagreement result;
   result.chi2_per_parameter =
-      difference.dot(covariance.ldlt().solve(difference)) / static_cast<double>(n);
+      algebra::SymmetricSolver(covariance).chi2(difference) / static_cast<double>(n);
   result.worst_over_sigma = difference.cwiseAbs()
                                 .cwiseQuotient(covariance.diagonal().cwiseSqrt())
                                 .maxCoeff(&result.worst);

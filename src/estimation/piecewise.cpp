@@ -8,12 +8,12 @@
 #include <mutex>
 #include <optional>
 
-#include <Eigen/Cholesky>
-#include <Eigen/LU>
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
+#include "risley/algebra/products.hpp"
+#include "risley/algebra/symmetric.hpp"
 #include "risley/core/error.hpp"
 #include "risley/estimation/batch_map.hpp"
 
@@ -68,15 +68,14 @@ void fill_chi2(const std::vector<Piece>& pieces, PiecewiseEstimate& result) {
   Eigen::MatrixXd information = Eigen::MatrixXd::Zero(n, n);
   Eigen::VectorXd sum = Eigen::VectorXd::Zero(n);
   for (const Piece& piece : pieces) {
-    const Eigen::MatrixXd weight = piece.covariance.inverse();
+    const Eigen::MatrixXd weight = algebra::SymmetricSolver(piece.covariance).inverse();
     information += weight;
-    sum += weight * piece.parameters;
+    sum += algebra::times(weight, piece.parameters);
   }
-  const Eigen::VectorXd mean = information.ldlt().solve(sum);
+  const Eigen::VectorXd mean = algebra::SymmetricSolver(information).solve(sum);
   double chi2 = 0;
   for (const Piece& piece : pieces) {
-    const Eigen::VectorXd difference = piece.parameters - mean;
-    chi2 += difference.dot(piece.covariance.ldlt().solve(difference));
+    chi2 += algebra::SymmetricSolver(piece.covariance).chi2(piece.parameters - mean);
   }
   result.degrees_of_freedom = static_cast<double>(n) * static_cast<double>(pieces.size() - 1);
   result.chi2 = chi2 / result.degrees_of_freedom;

@@ -6,8 +6,7 @@
 #include <cmath>
 #include <limits>
 
-#include <Eigen/Cholesky>
-
+#include "risley/algebra/symmetric.hpp"
 #include "risley/core/golden_section.hpp"
 #include "risley/core/require.hpp"
 
@@ -121,8 +120,8 @@ RotorWindows::RotorWindows(const NormalEquations& equations, const RotorTrajecto
         sorted(3 + i, 3 + i) += 1.0 / (kOtherSigma[i % 3] * kOtherSigma[i % 3]);
       }
       const Eigen::Matrix<double, Eigen::Dynamic, 3> cross = sorted.bottomLeftCorner(others, 3);
-      const Eigen::LDLT<Eigen::MatrixXd> solver(sorted.bottomRightCorner(others, others));
-      const Eigen::Matrix<double, Eigen::Dynamic, 3> share = solver.solve(cross);
+      const algebra::SymmetricSolver solver(sorted.bottomRightCorner(others, others));
+      const Eigen::Matrix<double, Eigen::Dynamic, 3> share = solver.solve_columns(cross);
       window.curvature -= cross.transpose() * share;
       window.gradient -= share.transpose() * sorted_gradient.tail(others);
     }

@@ -4,10 +4,11 @@
 
 #include <cmath>
 
-#include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <fmt/format.h>
 
+#include "risley/algebra/products.hpp"
+#include "risley/algebra/symmetric.hpp"
 #include "risley/core/error.hpp"
 #include "risley/core/require.hpp"
 
@@ -44,15 +45,9 @@ class Smoother {
     out.parameter_information = 0.5 * (information_ + information_.transpose());
     Eigen::MatrixXd total = out.parameter_information;
     total.diagonal() += prior.information;
-    // Scaled to unit diagonal before it is inverted: units of the parameters differ by far.
-    const Eigen::VectorXd scale = total.diagonal().array().rsqrt();
-    const Eigen::MatrixXd scaled = scale.asDiagonal() * total * scale.asDiagonal();
-    const Eigen::LDLT<Eigen::MatrixXd> solver(scaled);
-    out.parameter_covariance = scale.asDiagonal() *
-                               solver.solve(Eigen::MatrixXd::Identity(free_, free_)) *
-                               scale.asDiagonal();
-    out.parameter_step =
-        scale.asDiagonal() * solver.solve(scale.asDiagonal() * (gradient_ + prior.gradient));
+    const algebra::SymmetricSolver solver(total);
+    out.parameter_covariance = solver.inverse();
+    out.parameter_step = solver.solve(gradient_ + prior.gradient);
     if (!out.parameter_step.allFinite()) {
       throw EstimationError("the normal equations of the parameters have no finite solution");
     }
@@ -156,7 +151,7 @@ class Smoother {
     if (stacked_ == left_.rows()) add_shared();
   }
   void add_shared() {
-    shared_.noalias() += left_.topRows(stacked_).transpose() * right_.topRows(stacked_);
+    algebra::add_transposed_product(left_, right_, stacked_, shared_);
     stacked_ = 0;
   }
 

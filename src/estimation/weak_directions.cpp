@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include <Eigen/Eigenvalues>
 #include <fmt/format.h>
 
+#include "risley/algebra/symmetric.hpp"
 #include "risley/core/require.hpp"
 
 namespace risley::estimation {
@@ -28,18 +28,17 @@ std::vector<WeakDirection> weak_directions(const Eigen::MatrixXd& information,
   if (n == 0) return weak;
   Eigen::VectorXd scale(n);
   for (Eigen::Index i = 0; i < n; ++i) scale[i] = free[static_cast<std::size_t>(i)].prior_sigma;
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(scale.asDiagonal() * information *
-                                                              scale.asDiagonal());
-  const double largest = solver.eigenvalues()[n - 1];
+  const algebra::PrincipalAxes axes = algebra::principal_axes(algebra::scaled(information, scale));
+  const double largest = axes.values[n - 1];
   for (Eigen::Index i = 0; i < n; ++i) {  // weakest first
     // Below this, eigenvalues are rounding of the largest.
-    const double value = std::max(solver.eigenvalues()[i], 1e-15 * largest);
+    const double value = std::max(axes.values[i], 1e-15 * largest);
     const double sigma = 1.0 / std::sqrt(value);
     if (!(sigma > most_sigma)) break;
     WeakDirection direction;
     direction.sigma = sigma;
     direction.ratio = std::sqrt(value / largest);
-    Eigen::VectorXd weight = solver.eigenvectors().col(i);
+    Eigen::VectorXd weight = axes.vectors.col(i);
     Eigen::Index strongest = 0;
     weight.cwiseAbs().maxCoeff(&strongest);
     if (weight[strongest] < 0) weight = -weight;

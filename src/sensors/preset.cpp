@@ -9,10 +9,10 @@
 #include <filesystem>
 #include <numbers>
 
-#include <Eigen/Eigenvalues>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "risley/algebra/symmetric.hpp"
 #include "risley/core/require.hpp"
 #include "risley/io/text_file.hpp"
 #include "risley/io/yaml_map.hpp"
@@ -431,11 +431,7 @@ void read_covariance(const YamlMap& root, Sensor& sensor) {
     }
   }
   const Eigen::VectorXd over_sigma = c.diagonal().cwiseSqrt().cwiseInverse();
-  const Eigen::MatrixXd correlation = over_sigma.asDiagonal() * c * over_sigma.asDiagonal();
-  const double smallest =
-      Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(correlation, Eigen::EigenvaluesOnly)
-          .eigenvalues()
-          .minCoeff();
+  const double smallest = algebra::principal_axes(algebra::scaled(c, over_sigma)).values.minCoeff();
   if (smallest < -1e-9) {
     fail_at(map.path(), matrix.line,
             fmt::format("covariance.matrix is not positive: the smallest eigenvalue of its "
