@@ -70,15 +70,15 @@ std::string device_type_name(std::uint8_t type) {
   switch (type) {
     case 0:
       return "Livox Hub";
-    case 1:
+    case kMid40:
       return "Livox Mid-40";
-    case 2:
+    case kTele15:
       return "Livox Tele-15";
-    case 3:
+    case kHorizon:
       return "Livox Horizon";
-    case 6:
+    case kMid70:
       return "Livox Mid-70";
-    case 7:
+    case kAvia:
       return "Livox Avia";
     default:
       return "unknown";

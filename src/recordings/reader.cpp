@@ -18,8 +18,6 @@
 namespace risley::recordings {
 namespace {
 
-constexpr std::size_t kHeadBytes = 4096;
-
 std::string known_formats() {
   std::string names;
   for (const Format* format : all_formats()) {

@@ -27,7 +27,7 @@ struct Excerpt {
   std::uint64_t observations = 0;  ///< rows, those without return included
   std::uint64_t shots = 0;
   std::uint64_t no_return = 0;  ///< rows that are not valid
-  std::uint8_t device_type = 1;
+  std::uint8_t device_type = kMid40;
   bool has_times = true;
   bool has_ranges = false;
   /// Directions and resolutions that came from coordinates were rounded, see write_excerpt().

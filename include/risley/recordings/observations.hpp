@@ -74,6 +74,8 @@ struct Chunk {
   void clear();
 };
 
+/// Device::type of Livox's sensors.
+inline constexpr std::uint8_t kMid40 = 1, kTele15 = 2, kHorizon = 3, kMid70 = 6, kAvia = 7;
 /// Device::type of a sensor about which a format tells nothing, or only that it is no Mid-40.
 inline constexpr std::uint8_t kUnknownDeviceType = 255;
 
@@ -82,7 +84,7 @@ struct Device {
   std::string serial;      ///< broadcast code, e.g. "0TFDG3B006H2Z11"; empty when unknown
   std::string hub_serial;  ///< broadcast code of the hub, empty without one
   std::uint8_t index = 0;  ///< the key by which packets name it
-  std::uint8_t type = 1;   ///< Livox device type (1 Mid-40, 2 Tele-15, 3 Horizon, 6 Mid-70, 7 Avia)
+  std::uint8_t type = kMid40;
   bool extrinsic_enabled = false;
   std::array<float, 3> roll_pitch_yaw_deg{};
   std::array<float, 3> translation_m{};

@@ -104,8 +104,8 @@ class LasWriter final : public CloudWriter {
 };
 
 template <las::Version kVersion>
-std::unique_ptr<CloudWriter> create(const std::string& path, const CloudHeader& header,
-                                    const CloudWriterOptions& options) {
+std::unique_ptr<CloudWriter> create_las(const std::string& path, const CloudHeader& header,
+                                        const CloudWriterOptions& options) {
   return std::make_unique<LasWriter>(path, las::Layout(kVersion, header, options));
 }
 
@@ -113,9 +113,9 @@ std::unique_ptr<CloudWriter> create(const std::string& path, const CloudHeader& 
 
 const CloudWriterFormat kLas14Format{"las-1.4", ".las",
                                      "LAS 1.4, point format 6, uncertainty as extra bytes",
-                                     create<las::Version::las_1_4>};
+                                     create_las<las::Version::las_1_4>};
 const CloudWriterFormat kLas12Format{"las-1.2", ".las",
                                      "LAS 1.2, point format 1, uncertainty as extra bytes",
-                                     create<las::Version::las_1_2>};
+                                     create_las<las::Version::las_1_2>};
 
 }  // namespace risley::cloud

@@ -24,7 +24,7 @@
 namespace risley::cloud {
 namespace {
 
-constexpr std::size_t kBlockRows = 32768;
+constexpr std::size_t kChunkRows = 32768;
 
 /// Names of the terms of Points::covariance.
 constexpr std::array<const char*, kCovarianceTerms> kTermNames{"xx", "xy", "xz", "yy", "yz", "zz"};
@@ -50,11 +50,11 @@ class NetcdfWriter final : public CloudWriter {
 
   void write(const Points& points) override {
     for (std::size_t first = 0; first < points.size();) {
-      const std::size_t count = std::min(points.size() - first, kBlockRows - rows_);
+      const std::size_t count = std::min(points.size() - first, kChunkRows - rows_);
       for (Variable& variable : variables_) variable.fill(points, first, count, rows_);
       rows_ += count;
       first += count;
-      if (rows_ == kBlockRows) put_block();
+      if (rows_ == kChunkRows) put_block();
     }
   }
 
@@ -89,13 +89,13 @@ class NetcdfWriter final : public CloudWriter {
   template <class T, class Value>
   io::NetcdfVariable define(const Description& what, Value value,
                             const io::NetcdfDimension* inner = nullptr) {
-    const io::NetcdfStorage storage{kBlockRows, true, false};
+    const io::NetcdfStorage storage{kChunkRows, true, false};
     auto variable = inner == nullptr ? file_.define<T>(what.name, {&point_}, storage)
                                      : file_.define<T>(what.name, {&point_, inner}, storage);
     file_.put_text(variable, "units", what.units);
     file_.put_text(variable, "long_name", what.long_name);
     const std::size_t width = variable.width;
-    auto block = std::make_shared<std::vector<T>>(kBlockRows * width);
+    auto block = std::make_shared<std::vector<T>>(kChunkRows * width);
     variables_.push_back({[block, value, width](const Points& points, std::size_t first,
                                                 std::size_t count, std::size_t row) {
                             T* to = block->data() + row * width;

@@ -19,7 +19,7 @@ constexpr std::string_view kMagic = "\x93NUMPY\x01\x00"sv;
 constexpr std::size_t kAlignment = 64;      ///< of the first record, as numpy has it
 constexpr std::size_t kTextLimit = 0xFFFF;  ///< its length is a 16-bit number
 
-const char* type_name(FieldType type) {
+const char* npy_type(FieldType type) {
   switch (type) {
     case FieldType::uint8:
       return "|u1";
@@ -50,13 +50,13 @@ std::string header_text(const std::string& types, std::uint64_t points) {
   return std::string(kMagic) + std::string(length, sizeof length) + text;
 }
 
-std::unique_ptr<CloudWriter> create(const std::string& path, const CloudHeader& header,
-                                    const CloudWriterOptions&) {
+std::unique_ptr<CloudWriter> create_npy(const std::string& path, const CloudHeader& header,
+                                        const CloudWriterOptions&) {
   std::vector<PointField> fields = all_fields(header);
   std::string types;
   for (const PointField& field : fields) {
     types +=
-        fmt::format("{}('{}', '{}')", types.empty() ? "" : ", ", field.name, type_name(field.type));
+        fmt::format("{}('{}', '{}')", types.empty() ? "" : ", ", field.name, npy_type(field.type));
   }
   return std::make_unique<RecordFile>(path, std::move(fields), [types](std::uint64_t points) {
     return header_text(types, points);
@@ -65,6 +65,6 @@ std::unique_ptr<CloudWriter> create(const std::string& path, const CloudHeader& 
 
 }  // namespace
 
-const CloudWriterFormat kNpyFormat = {"npy", ".npy", "structured array of numpy", create};
+const CloudWriterFormat kNpyFormat = {"npy", ".npy", "structured array of numpy", create_npy};
 
 }  // namespace risley::cloud

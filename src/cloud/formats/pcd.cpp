@@ -10,8 +10,8 @@
 namespace risley::cloud {
 namespace {
 
-std::unique_ptr<CloudWriter> create(const std::string& path, const CloudHeader& header,
-                                    const CloudWriterOptions&) {
+std::unique_ptr<CloudWriter> create_pcd(const std::string& path, const CloudHeader& header,
+                                        const CloudWriterOptions&) {
   std::vector<PointField> fields = pcl_fields(header);
   std::string notes, names, sizes, types, counts;
   for (const std::string& note : header_notes(header, fields)) {
@@ -38,6 +38,6 @@ std::unique_ptr<CloudWriter> create(const std::string& path, const CloudHeader& 
 }  // namespace
 
 const CloudWriterFormat kPcdFormat = {"pcd", ".pcd", "PCD of the Point Cloud Library, binary",
-                                      create};
+                                      create_pcd};
 
 }  // namespace risley::cloud

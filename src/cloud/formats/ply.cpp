@@ -10,7 +10,7 @@
 namespace risley::cloud {
 namespace {
 
-const char* type_name(FieldType type) {
+const char* ply_type(FieldType type) {
   switch (type) {
     case FieldType::uint8:
       return "uchar";
@@ -32,15 +32,15 @@ std::vector<PointField> ply_fields(const CloudHeader& header) {
   return fields;
 }
 
-std::unique_ptr<CloudWriter> create(const std::string& path, const CloudHeader& header,
-                                    const CloudWriterOptions&) {
+std::unique_ptr<CloudWriter> create_ply(const std::string& path, const CloudHeader& header,
+                                        const CloudWriterOptions&) {
   std::vector<PointField> fields = ply_fields(header);
   std::string notes, properties;
   for (const std::string& note : header_notes(header, fields)) {
     notes += fmt::format("comment {}\n", note);
   }
   for (const PointField& field : fields) {
-    properties += fmt::format("property {} {}\n", type_name(field.type), field.name);
+    properties += fmt::format("property {} {}\n", ply_type(field.type), field.name);
   }
   const auto text = [notes, properties](std::uint64_t points) {
     return fmt::format(
@@ -54,6 +54,6 @@ std::unique_ptr<CloudWriter> create(const std::string& path, const CloudHeader& 
 }  // namespace
 
 const CloudWriterFormat kPlyFormat = {
-    "ply", ".ply", "PLY, binary, all fields with the names of CloudCompare", create};
+    "ply", ".ply", "PLY, binary, all fields with the names of CloudCompare", create_ply};
 
 }  // namespace risley::cloud

@@ -14,13 +14,16 @@
 
 namespace risley::recordings {
 
+/// So much of a file's beginning tells its format.
+inline constexpr std::size_t kHeadBytes = 4096;
+
 /// One recording format. Adding a format means one pair of files in this folder that defines one
 /// of these, and one line in formats/registry.cpp.
 struct Format {
   std::string_view name;         ///< RecordingHeader::format
   std::string_view ending;       ///< file name ending for writing; empty when it is only read
   std::string_view description;  ///< one line for the help
-  /// Whether a file that starts with these bytes (up to 4096) is of this format.
+  /// Whether a file that starts with these bytes (up to kHeadBytes) is of this format.
   bool (*recognises)(std::string_view head);
   std::unique_ptr<Reader> (*open)(const std::string& path);
   /// nullptr when the format is only read.

@@ -23,7 +23,6 @@ constexpr std::int64_t kSecond = 1'000'000'000;
 constexpr std::int64_t kLatestTime = 230LL * 31'557'600 * kSecond;  // the year 2200
 constexpr std::int64_t kYear2000 = 946'684'800 * kSecond;
 constexpr std::size_t kMostReturns = 3;
-constexpr std::uint8_t kMid40 = 1, kMid70 = 6, kAvia = 7;
 /// How much describe() looks at, of all topics together.
 constexpr std::size_t kPointsLookedAt = 1'000'000, kMessagesLookedAt = 4096;
 constexpr std::size_t kPointMessagesLookedAt = 24;

@@ -12,11 +12,11 @@ namespace {
 
 using io::load;
 
-constexpr std::size_t kDeviceCountAt = kLvxPublicHeaderBytes;
-constexpr std::size_t kDeviceBytes = 58;
+constexpr std::size_t kLvx10DeviceCountAt = kLvxPublicHeaderBytes;
+constexpr std::size_t kLvx10DeviceBytes = 58;
 constexpr std::size_t kPackageBytes = kLvxPackageHeaderBytes + 1300;
 
-bool recognises(std::string_view head) {
+bool recognises_lvx10(std::string_view head) {
   return head.starts_with(kLvxName) &&
          head.substr(kLvxName.size(), 4) == std::string_view("\1\0\0\0", 4);
 }
@@ -54,16 +54,16 @@ std::size_t probe_frame_header(BlockInput& file, std::uint64_t first_frame,
   return kLong;
 }
 
-std::unique_ptr<Reader> open(const std::string& path) {
+std::unique_ptr<Reader> open_lvx10(const std::string& path) {
   BlockInput file(path);
   lvx_version(file);
-  const std::size_t count = *lvx_header_bytes(file, kDeviceCountAt, 1, "number of devices");
+  const std::size_t count = *lvx_header_bytes(file, kLvx10DeviceCountAt, 1, "number of devices");
   RecordingHeader header;
   header.format = kLvx10Format.name;
-  header.devices = read_lvx_devices(file, kDeviceCountAt + 1, count, false);
+  header.devices = read_lvx_devices(file, kLvx10DeviceCountAt + 1, count, false);
   LvxVersion version;
   version.float_points = true;
-  version.first_frame = kDeviceCountAt + 1 + count * kDeviceBytes;
+  version.first_frame = kLvx10DeviceCountAt + 1 + count * kLvx10DeviceBytes;
   version.frame_header_bytes = probe_frame_header(file, version.first_frame, header.devices);
   return std::make_unique<LvxReader>(std::move(file), std::move(header), version);
 }
@@ -71,7 +71,8 @@ std::unique_ptr<Reader> open(const std::string& path) {
 }  // namespace
 
 const Format kLvx10Format = {
-    "lvx-1.0", "", "Livox LVX 1.0, early Mid-40 and Mid-100 recordings", recognises, open, nullptr,
+    "lvx-1.0",        "",         "Livox LVX 1.0, early Mid-40 and Mid-100 recordings",
+    recognises_lvx10, open_lvx10, nullptr,
 };
 
 }  // namespace risley::recordings

@@ -27,18 +27,18 @@ namespace {
 using io::load;
 using io::store;
 
-constexpr std::size_t kFrameDurationAt = kLvxPublicHeaderBytes, kDeviceCountAt = 28;
-constexpr std::size_t kDeviceTableAt = 29, kDeviceBytes = 59;
+constexpr std::size_t kFrameDurationAt = kLvxPublicHeaderBytes, kLvx11DeviceCountAt = 28;
+constexpr std::size_t kDeviceTableAt = 29, kLvx11DeviceBytes = 59;
 constexpr std::size_t kFrameHeaderBytes = 24;
 constexpr std::size_t kSerialBytes = 16;
 constexpr std::uint32_t kUsualFrameDurationMs = 50;
 
 /// Every LVX file but 1.0, so that unknown versions get a message of their own.
-bool recognises(std::string_view head) {
+bool recognises_lvx11(std::string_view head) {
   return head.starts_with(kLvxName) && !kLvx10Format.recognises(head);
 }
 
-std::unique_ptr<Reader> open(const std::string& path) {
+std::unique_ptr<Reader> open_lvx11(const std::string& path) {
   BlockInput file(path);
   const auto version_bytes = lvx_version(file);
   if (version_bytes[0] == 2) {
@@ -55,10 +55,10 @@ std::unique_ptr<Reader> open(const std::string& path) {
   RecordingHeader header;
   header.format = kLvx11Format.name;
   header.frame_duration_ms = load<std::uint32_t>(bytes);
-  const std::size_t count = bytes[kDeviceCountAt - kFrameDurationAt];
+  const std::size_t count = bytes[kLvx11DeviceCountAt - kFrameDurationAt];
   header.devices = read_lvx_devices(file, kDeviceTableAt, count, true);
   LvxVersion version;
-  version.first_frame = kDeviceTableAt + count * kDeviceBytes;
+  version.first_frame = kDeviceTableAt + count * kLvx11DeviceBytes;
   version.frame_header_bytes = kFrameHeaderBytes;
   return std::make_unique<LvxReader>(std::move(file), std::move(header), version);
 }
@@ -138,7 +138,6 @@ Lvx11Writer::Lvx11Writer(const std::string& path, const RecordingHeader& header)
   }
   devices_.resize(header_.devices.size());
   for (std::size_t i = 0; i < devices_.size(); ++i) {
-    constexpr std::uint8_t kMid40 = 1;
     devices_[i].tagged = header_.devices[i].type != kMid40 || header_.returns_per_shot > 1;
     devices_[i].returns = header_.returns_per_shot;
   }
@@ -154,7 +153,7 @@ void Lvx11Writer::write_header() {
   std::copy(kVersion.begin(), kVersion.end(), bytes + kLvxName.size());
   store<std::uint32_t>(bytes + 20, kLvxMagicCode);
   store<std::uint32_t>(bytes + kFrameDurationAt, header_.frame_duration_ms);
-  bytes[kDeviceCountAt] = static_cast<std::uint8_t>(header_.devices.size());
+  bytes[kLvx11DeviceCountAt] = static_cast<std::uint8_t>(header_.devices.size());
   std::array<bool, 256> taken{};
   for (const Device& device : header_.devices) {
     if (taken[device.index]) {
@@ -164,8 +163,8 @@ void Lvx11Writer::write_header() {
                       device.index));
     }
     taken[device.index] = true;
-    bytes = output_.append(kDeviceBytes);
-    std::fill_n(bytes, kDeviceBytes, std::uint8_t{0});
+    bytes = output_.append(kLvx11DeviceBytes);
+    std::fill_n(bytes, kLvx11DeviceBytes, std::uint8_t{0});
     const auto put_text = [](const std::string& text, std::uint8_t* field) {
       if (text.size() > kSerialBytes) {
         throw InvalidArgument(
@@ -498,8 +497,8 @@ std::unique_ptr<Writer> create(const std::string& path, const RecordingHeader& h
 }  // namespace
 
 const Format kLvx11Format = {
-    "lvx-1.1",  ".lvx", "Livox LVX 1.1, as written by Livox Viewer and the Livox SDK",
-    recognises, open,   create,
+    "lvx-1.1",        ".lvx",     "Livox LVX 1.1, as written by Livox Viewer and the Livox SDK",
+    recognises_lvx11, open_lvx11, create,
 };
 
 }  // namespace risley::recordings

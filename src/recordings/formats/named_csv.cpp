@@ -18,8 +18,7 @@
 namespace risley::recordings {
 namespace {
 
-constexpr std::string_view kName = "named-csv";
-constexpr std::size_t kHeadBytes = 4096;  // as open_recording() shows them
+constexpr std::string_view kNamedCsv = "named-csv";
 
 /// The beginning of a table: how its rows stand in the file, without names where there are none.
 struct TableHead {
@@ -173,7 +172,7 @@ NamedTextLayout read_layout(const std::string& path) {
 }  // namespace
 
 const Format kNamedCsvFormat = {
-    kName,
+    kNamedCsv,
     "",
     "text table with named columns: x, y, z or azimuth, zenith, range (read only)",
     [](std::string_view bytes) {
@@ -181,7 +180,7 @@ const Format kNamedCsvFormat = {
       return head && (head->has_row || has_directions(*head));
     },
     [](const std::string& path) -> std::unique_ptr<Reader> {
-      return std::make_unique<NamedTextReader>(path, kName, read_layout(path));
+      return std::make_unique<NamedTextReader>(path, kNamedCsv, read_layout(path));
     },
     nullptr,
 };

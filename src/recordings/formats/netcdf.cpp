@@ -8,7 +8,7 @@
 namespace risley::recordings {
 namespace {
 
-constexpr std::string_view kSignature = "\x89HDF\r\n\x1a\n";
+constexpr std::string_view kNetcdf4Signature = "\x89HDF\r\n\x1a\n";
 
 }  // namespace
 
@@ -16,7 +16,7 @@ const Format kNetcdfFormat = {
     netcdf::kName,
     ".nc",
     "NetCDF-4, the lossless format: everything a recording holds",
-    [](std::string_view head) { return head.starts_with(kSignature); },
+    [](std::string_view head) { return head.starts_with(kNetcdf4Signature); },
     netcdf::open_recording,
     netcdf::create_recording,
     true,

@@ -18,7 +18,6 @@ namespace {
 constexpr const char* kContent = "content";  ///< "imu" for inertial samples
 constexpr const char* kFirmwareType = "firmware_type";
 constexpr const char* kDataType = "data_type";
-constexpr std::uint8_t kMid40 = 1;
 
 std::optional<int> whole_number(const std::string& text, int low, int high) {
   int value = 0;

@@ -31,7 +31,7 @@ namespace {
 using io::load;
 using io::store;
 
-constexpr std::string_view kSignature = "OPENPYLIVOX";
+constexpr std::string_view kBinSignature = "OPENPYLIVOX";
 constexpr std::string_view kImuSignature = "OPENPYLIVOX_IMU";
 constexpr std::uint64_t kHeaderBytes = 15;  // of both kinds
 constexpr std::size_t kTimeBytes = 8;
@@ -98,7 +98,7 @@ class OpenpylivoxBinReader final : public Reader {
     }
     const std::uint8_t* const bytes = input_.at(0, kHeaderBytes);
     const std::string_view head(reinterpret_cast<const char*>(bytes), kHeaderBytes);
-    if (!head.starts_with(kSignature)) fail(0, fmt::format("expected {}", kSignature));
+    if (!head.starts_with(kBinSignature)) fail(0, fmt::format("expected {}", kBinSignature));
     OpenpylivoxLayout layout;
     layout.imu = head == kImuSignature;
     if (layout.imu) return layout;
@@ -171,7 +171,7 @@ class OpenpylivoxBinWriter final : public Writer {
   OpenpylivoxBinWriter(const std::string& path, const RecordingHeader& header)
       : layout_(openpylivox_layout(header)), parts_(parts_of(layout_)), output_(path) {
     std::uint8_t* const bytes = output_.append(kHeaderBytes);
-    const auto signature = layout_.imu ? kImuSignature : kSignature;
+    const auto signature = layout_.imu ? kImuSignature : kBinSignature;
     std::copy(signature.begin(), signature.end(), bytes);
     if (layout_.imu) return;
     store<std::int16_t>(bytes + 11, static_cast<std::int16_t>(layout_.firmware_type));
@@ -276,7 +276,7 @@ const Format kOpenpylivoxBinFormat = {
     kOpenpylivoxBinName,
     ".bin",
     "openpylivox binary capture: points with intensity and time",
-    [](std::string_view head) { return head.starts_with(kSignature); },
+    [](std::string_view head) { return head.starts_with(kBinSignature); },
     [](const std::string& path) -> std::unique_ptr<Reader> {
       return std::make_unique<OpenpylivoxBinReader>(path);
     },

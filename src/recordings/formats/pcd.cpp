@@ -21,7 +21,7 @@ namespace {
 
 using io::load;
 
-constexpr std::string_view kName = "pcd";
+constexpr std::string_view kPcd = "pcd";
 
 struct PcdField {
   std::string name;
@@ -49,7 +49,7 @@ std::vector<std::string_view> per_field(const HeaderLines& lines, const PcdHeade
   return words;
 }
 
-PcdHeader read_header(const std::string& path) {
+PcdHeader read_pcd_header(const std::string& path) {
   HeaderLines lines(path);
   PcdHeader header;
   std::optional<std::uint64_t> width, height, points;
@@ -245,22 +245,21 @@ bool is_pcd(std::string_view head) {
 }  // namespace
 
 const Format kPcdFormat = {
-    kName,
+    kPcd,
     "",
     "PCD point cloud, as text, bytes or packed bytes (read only)",
     is_pcd,
     [](const std::string& path) -> std::unique_ptr<Reader> {
-      PcdHeader header = read_header(path);
+      PcdHeader header = read_pcd_header(path);
       if (header.data == "ascii") {
-        return std::make_unique<NamedTextReader>(path, kName, text_layout(std::move(header)));
+        return std::make_unique<NamedTextReader>(path, kPcd, text_layout(std::move(header)));
       }
       if (header.data != "binary" && header.data != "binary_compressed") {
         throw FileError(path, {.byte_offset = {}, .line = header.data_line - 1},
                         fmt::format("expected DATA ascii, binary or binary_compressed, found {}",
                                     printable(header.data)));
       }
-      return std::make_unique<BinaryTableReader>(path, kName,
-                                                 binary_table(path, std::move(header)));
+      return std::make_unique<BinaryTableReader>(path, kPcd, binary_table(path, std::move(header)));
     },
     nullptr,
 };

@@ -16,7 +16,7 @@
 namespace risley::recordings {
 namespace {
 
-constexpr std::string_view kName = "ply";
+constexpr std::string_view kPly = "ply";
 constexpr std::string_view kScalarPrefix = "scalar_";  // CloudCompare's additional columns
 
 struct PlyProperty {
@@ -85,7 +85,7 @@ void read_property(const HeaderLines& lines, const std::vector<std::string_view>
   header.elements.back().properties.push_back({std::string(name), *type, length});
 }
 
-PlyHeader read_header(const std::string& path) {
+PlyHeader read_ply_header(const std::string& path) {
   HeaderLines lines(path);
   PlyHeader header;
   bool has_format = false;
@@ -201,16 +201,16 @@ BinaryTable binary_table(const std::string& path, const PlyHeader& header) {
 }  // namespace
 
 const Format kPlyFormat = {
-    kName,
+    kPly,
     "",
     "PLY point cloud, as text or bytes (read only)",
     [](std::string_view head) { return head.starts_with("ply\n") || head.starts_with("ply\r\n"); },
     [](const std::string& path) -> std::unique_ptr<Reader> {
-      const PlyHeader header = read_header(path);
+      const PlyHeader header = read_ply_header(path);
       if (header.text) {
-        return std::make_unique<NamedTextReader>(path, kName, text_layout(header));
+        return std::make_unique<NamedTextReader>(path, kPly, text_layout(header));
       }
-      return std::make_unique<BinaryTableReader>(path, kName, binary_table(path, header));
+      return std::make_unique<BinaryTableReader>(path, kPly, binary_table(path, header));
     },
     nullptr,
 };

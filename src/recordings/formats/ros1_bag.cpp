@@ -30,15 +30,15 @@ namespace {
 
 using io::load;
 
-constexpr std::string_view kName = "ros1-bag";
-constexpr std::string_view kSignature = "#ROSBAG V2.0";
+constexpr std::string_view kRos1Bag = "ros1-bag";
+constexpr std::string_view kRos1Signature = "#ROSBAG V2.0";
 constexpr std::string_view kMend = "; the command `rosbag reindex` mends it";
 
 constexpr std::string_view kCustomMd5 = "e4d6829bdfe657cb6c21a746c86b21a6";
 constexpr std::string_view kCloudMd5 = "1158d486dd51d683ce2f1be655c3c181";
 constexpr std::string_view kImuMd5 = "6a62c6daae103f4ff57a132d6f95cec2";
 
-std::optional<MessageKind> kind_of(std::string_view md5) {
+std::optional<MessageKind> ros1_kind(std::string_view md5) {
   if (md5 == kCustomMd5) return MessageKind::points;
   if (md5 == kCloudMd5) return MessageKind::cloud;
   if (md5 == kImuMd5) return MessageKind::imu;
@@ -48,7 +48,8 @@ std::optional<MessageKind> kind_of(std::string_view md5) {
 /// What a topic's type is called in messages: md5 sums matter where the name alone would fit.
 std::string shown_type(const std::string& type, const std::string& md5) {
   const bool named_alike = type.ends_with("/CustomMsg") || type == "sensor_msgs/PointCloud2";
-  return named_alike && !kind_of(md5) ? fmt::format("{} with the unknown md5 {}", type, md5) : type;
+  return named_alike && !ros1_kind(md5) ? fmt::format("{} with the unknown md5 {}", type, md5)
+                                        : type;
 }
 
 /// Holds rosbag_storage for one thread. While it lives, the library prints nothing: it logs what it
@@ -214,7 +215,7 @@ class BagStructure {
   }
 
   void check_records() {
-    const std::uint64_t first = kSignature.size() + 1;
+    const std::uint64_t first = kRos1Signature.size() + 1;
     if (size_ < first) fail_cut(0);
     const Record header = record_at(first, size_);
     if (header.op != kFileHeader) {
@@ -404,13 +405,13 @@ class MessageBytes {
 };
 
 /// std_msgs/Header: its stamp, not yet checked.
-struct Stamp {
+struct Ros1Stamp {
   std::uint32_t seconds = 0, nanoseconds = 0;
 };
 
-Stamp take_header(MessageBytes& bytes) {
+Ros1Stamp take_header(MessageBytes& bytes) {
   bytes.number<std::uint32_t>("the sequence number");
-  Stamp stamp;
+  Ros1Stamp stamp;
   stamp.seconds = bytes.number<std::uint32_t>("the stamp");
   stamp.nanoseconds = bytes.number<std::uint32_t>("the stamp");
   bytes.text("characters of the frame name");
@@ -434,7 +435,7 @@ void decode_points(MessageBytes bytes, BagMessage& message) {
 }
 
 void decode_cloud_message(MessageBytes bytes, BagMessage& message) {
-  const Stamp stamp = take_header(bytes);
+  const Ros1Stamp stamp = take_header(bytes);
   message.time_ns = message_time(std::int64_t{stamp.seconds}, stamp.nanoseconds);
   CloudLayout layout;
   layout.height = bytes.number<std::uint32_t>("the height");
@@ -462,7 +463,7 @@ void decode_cloud_message(MessageBytes bytes, BagMessage& message) {
 
 void decode_imu_message(MessageBytes bytes, BagMessage& message) {
   constexpr std::size_t kOrientation = 13 * sizeof(double), kCovariance = 9 * sizeof(double);
-  const Stamp stamp = take_header(bytes);
+  const Ros1Stamp stamp = take_header(bytes);
   message.time_ns = message_time(std::int64_t{stamp.seconds}, stamp.nanoseconds);
   bytes.take(kOrientation, "bytes of the orientation");
   for (double& value : message.angular_velocity) value = bytes.number<double>("angular velocity");
@@ -475,7 +476,7 @@ void decode_imu_message(MessageBytes bytes, BagMessage& message) {
 class Ros1BagReader final : public MessageReader {
  public:
   explicit Ros1BagReader(const std::string& path) : MessageReader(path) {
-    header_.format = kName;
+    header_.format = kRos1Bag;
     BagStructure::check(path);
     guarded("be opened", [&] {
       bag_.reset(new rosbag::Bag);
@@ -520,7 +521,7 @@ class Ros1BagReader final : public MessageReader {
       // A topic has a connection for every node that sends to it.
       if (!known_.empty() && known_.back() == key) continue;
       known_.push_back(key);
-      topics.push_back({key.first, shown_type(type, key.second), kind_of(key.second)});
+      topics.push_back({key.first, shown_type(type, key.second), ros1_kind(key.second)});
     }
     return topics;
   }
@@ -592,10 +593,10 @@ class Ros1BagReader final : public MessageReader {
 }  // namespace
 
 const Format kRos1BagFormat = {
-    kName,
+    kRos1Bag,
     "",
     "bag of ROS 1: messages of Livox drivers, point clouds (read only)",
-    [](std::string_view head) { return head.starts_with(kSignature); },
+    [](std::string_view head) { return head.starts_with(kRos1Signature); },
     [](const std::string& path) -> std::unique_ptr<Reader> {
       return std::make_unique<Ros1BagReader>(path);
     },

@@ -32,10 +32,10 @@ namespace {
 
 using namespace std::string_view_literals;
 
-constexpr std::string_view kName = "ros2-bag";
-constexpr std::string_view kSignature = "SQLite format 3\0"sv;
+constexpr std::string_view kRos2Bag = "ros2-bag";
+constexpr std::string_view kRos2Signature = "SQLite format 3\0"sv;
 
-std::optional<MessageKind> kind_of(std::string_view type) {
+std::optional<MessageKind> ros2_kind(std::string_view type) {
   if (type == "livox_interfaces/msg/CustomMsg" || type == "livox_ros_driver2/msg/CustomMsg") {
     return MessageKind::points;
   }
@@ -114,13 +114,13 @@ class CdrMessage {
 };
 
 /// std_msgs/msg/Header: its stamp, not yet checked.
-struct Stamp {
+struct Ros2Stamp {
   std::int32_t seconds = 0;
   std::uint32_t nanoseconds = 0;
 };
 
-Stamp take_header(CdrMessage& cdr) {
-  Stamp stamp;
+Ros2Stamp take_header(CdrMessage& cdr) {
+  Ros2Stamp stamp;
   stamp.seconds = cdr.number<std::int32_t>();
   stamp.nanoseconds = cdr.number<std::uint32_t>();
   cdr.text();
@@ -148,7 +148,7 @@ void decode_points(CdrMessage& cdr, BagMessage& message) {
 }
 
 void decode_cloud_message(CdrMessage& cdr, BagMessage& message) {
-  const Stamp stamp = take_header(cdr);
+  const Ros2Stamp stamp = take_header(cdr);
   message.time_ns = message_time(std::int64_t{stamp.seconds}, stamp.nanoseconds);
   CloudLayout layout;
   layout.height = cdr.number<std::uint32_t>();
@@ -171,7 +171,7 @@ void decode_cloud_message(CdrMessage& cdr, BagMessage& message) {
 
 void decode_imu_message(CdrMessage& cdr, BagMessage& message) {
   constexpr int kOrientation = 13, kCovariance = 9;
-  const Stamp stamp = take_header(cdr);
+  const Ros2Stamp stamp = take_header(cdr);
   message.time_ns = message_time(std::int64_t{stamp.seconds}, stamp.nanoseconds);
   cdr.skip_doubles(kOrientation);
   for (double& value : message.angular_velocity) value = cdr.number<double>();
@@ -230,7 +230,7 @@ std::uint64_t bytes_by_header(const std::string& path, std::uint64_t file_bytes)
 class Ros2BagReader final : public MessageReader {
  public:
   explicit Ros2BagReader(const std::string& path) : MessageReader(path) {
-    header_.format = kName;
+    header_.format = kRos2Bag;
     open_database();
     restrict_database();
     require_plain_table("topics");
@@ -373,7 +373,7 @@ class Ros2BagReader final : public MessageReader {
       BagTopic topic;
       topic.name = text_column(query.get(), 1);
       topic.type = text_column(query.get(), 2);
-      topic.kind = kind_of(topic.type);
+      topic.kind = ros2_kind(topic.type);
       const std::string serialization = text_column(query.get(), 3);
       if (topic.kind && serialization != "cdr") {
         topic.kind.reset();
@@ -484,10 +484,10 @@ class Ros2BagReader final : public MessageReader {
 }  // namespace
 
 const Format kRos2BagFormat = {
-    kName,
+    kRos2Bag,
     "",
     "bag of ROS 2 in SQLite (.db3): messages of Livox drivers, point clouds (read only)",
-    [](std::string_view head) { return head.starts_with(kSignature); },
+    [](std::string_view head) { return head.starts_with(kRos2Signature); },
     [](const std::string& path) -> std::unique_ptr<Reader> {
       return std::make_unique<Ros2BagReader>(path);
     },

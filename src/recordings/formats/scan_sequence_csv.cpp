@@ -16,16 +16,16 @@
 namespace risley::recordings {
 namespace {
 
-constexpr std::string_view kName = "scan-sequence-csv";
-constexpr std::string_view kHeader = "Time/s,Azimuth/deg,Zenith/deg";
+constexpr std::string_view kScanSequenceCsv = "scan-sequence-csv";
+constexpr std::string_view kSequenceHeader = "Time/s,Azimuth/deg,Zenith/deg";
 constexpr std::string_view kTimeColumn = "Time/s", kAzimuthColumn = "Azimuth/deg",
                            kZenithColumn = "Zenith/deg";
 constexpr int kDefaultDecimals = 5;
 constexpr int kMostDecimals = 17;
-constexpr std::size_t kRowsLookedAt = 16384;
+constexpr std::size_t kSequenceRowsLookedAt = 16384;
 
 /// Details of the header: how the numbers were written.
-constexpr const char* kTimeDecimals = "time_decimals";
+constexpr const char* kTimeDecimalsNote = "time_decimals";
 constexpr const char* kAzimuthDecimals = "azimuth_decimals";
 constexpr const char* kZenithDecimals = "zenith_decimals";
 constexpr const char* kAzimuthSense = "azimuth_range";  ///< "0-360" or "-180-180"
@@ -36,8 +36,9 @@ float resolution_of(int decimals) {
 
 class ScanSequenceReader final : public TextTableReader {
  public:
-  explicit ScanSequenceReader(const std::string& path) : TextTableReader(path, std::string(kName)) {
-    if (table_header() != kHeader) refuse_header(std::string(kHeader));
+  explicit ScanSequenceReader(const std::string& path)
+      : TextTableReader(path, std::string(kScanSequenceCsv)) {
+    if (table_header() != kSequenceHeader) refuse_header(std::string(kSequenceHeader));
     set_column_count(3);
     header_.has_range = header_.has_intensity = false;
     learn_number_style();
@@ -65,7 +66,7 @@ class ScanSequenceReader final : public TextTableReader {
     int time_decimals = -1, azimuth_decimals = -1, zenith_decimals = -1;
     bool beyond_180 = false, all_shot_numbers = true;
     std::int64_t rows = 0, first_time = 0;
-    look_ahead(kRowsLookedAt, [&](Fields fields) {
+    look_ahead(kSequenceRowsLookedAt, [&](Fields fields) {
       const Row row = parse(fields);
       if (rows == 0) first_time = row.time.digits;
       all_shot_numbers = all_shot_numbers && row.time.decimals == 0 &&
@@ -82,7 +83,7 @@ class ScanSequenceReader final : public TextTableReader {
     zenith_decimals_ = zenith_decimals;
     if (rows == 0) return;
     if (time_decimals >= 0 && !all_shot_numbers) {
-      header_.set_detail(kTimeDecimals, std::to_string(time_decimals));
+      header_.set_detail(kTimeDecimalsNote, std::to_string(time_decimals));
     }
     if (azimuth_decimals >= 0) {
       header_.set_detail(kAzimuthDecimals, std::to_string(azimuth_decimals));
@@ -140,9 +141,9 @@ class ScanSequenceWriter final : public Writer {
         from_zero_(detail_of(header, kAzimuthSense) == "0-360"),
         azimuth_decimals_(decimals_detail(header, kAzimuthDecimals)),
         zenith_decimals_(decimals_detail(header, kZenithDecimals)),
-        time_(decimals_detail(header, kTimeDecimals)),
+        time_(decimals_detail(header, kTimeDecimalsNote)),
         output_(path) {
-    output_.append(kHeader);
+    output_.append(kSequenceHeader);
     output_.end_row();
   }
 
@@ -175,7 +176,7 @@ class ScanSequenceWriter final : public Writer {
 
  private:
   static std::string detail_of(const RecordingHeader& header, const char* name) {
-    return source_format(header) == kName ? header.detail(name) : std::string();
+    return source_format(header) == kScanSequenceCsv ? header.detail(name) : std::string();
   }
 
   static int decimals_detail(const RecordingHeader& header, const char* name) {
@@ -220,10 +221,10 @@ class ScanSequenceWriter final : public Writer {
 }  // namespace
 
 const Format kScanSequenceCsvFormat = {
-    kName,
+    kScanSequenceCsv,
     ".csv",
     "Livox scan sequence: time, azimuth and zenith as text, no ranges",
-    [](std::string_view head) { return normalized_header(head) == kHeader; },
+    [](std::string_view head) { return normalized_header(head) == kSequenceHeader; },
     [](const std::string& path) -> std::unique_ptr<Reader> {
       return std::make_unique<ScanSequenceReader>(path);
     },

@@ -28,14 +28,13 @@ namespace {
 
 using io::store;
 
-constexpr std::string_view kName = "livox-viewer-csv";
-constexpr std::string_view kHeader =  // without blanks, as normalized_header() gives it
+constexpr std::string_view kViewerCsv = "livox-viewer-csv";
+constexpr std::string_view kViewerHeader =  // without blanks, as normalized_header() gives it
     "Version,SlotID,LiDARIndex,Rsvd,ErrorCode,TimestampType,DataType,Timestamp,X,Y,Z,Reflectivity,"
     "Tag,Ori_x,Ori_y,Ori_z,Ori_radius,Ori_theta,Ori_phi";
 constexpr std::size_t kColumnCount = 19;
-constexpr std::size_t kRowsLookedAt = 16384;
+constexpr std::size_t kViewerRowsLookedAt = 16384;
 constexpr std::size_t kMostSensors = 256;  // as Observations::device can number
-constexpr std::uint8_t kMid40 = 1, kMid70 = 6, kAvia = 7;
 constexpr std::uint8_t kGpsTimestamp = 3, kPtpTimestamp = 1;
 
 /// One row as it stands.
@@ -116,8 +115,9 @@ struct Sensor {
 
 class ViewerCsvReader final : public TextTableReader {
  public:
-  explicit ViewerCsvReader(const std::string& path) : TextTableReader(path, std::string(kName)) {
-    if (table_header() != kHeader) refuse_header("of a Livox Viewer table (19 columns)");
+  explicit ViewerCsvReader(const std::string& path)
+      : TextTableReader(path, std::string(kViewerCsv)) {
+    if (table_header() != kViewerHeader) refuse_header("of a Livox Viewer table (19 columns)");
     set_column_count(kColumnCount);
     header_.devices.clear();
     learn_sensors();
@@ -134,7 +134,7 @@ class ViewerCsvReader final : public TextTableReader {
     };
     std::vector<Seen> seen;
     bool first = true;
-    look_ahead(kRowsLookedAt, [&](Fields fields) {
+    look_ahead(kViewerRowsLookedAt, [&](Fields fields) {
       const Row row = parse(fields);
       if (first) {
         header_.time_reference = time_reference_of(row.timestamp_type);
@@ -253,10 +253,10 @@ class ViewerCsvReader final : public TextTableReader {
 }  // namespace
 
 const Format kViewerCsvFormat = {
-    kName,
+    kViewerCsv,
     "",
     "Livox Viewer table: points with the headers of their packets (read only)",
-    [](std::string_view head) { return normalized_header(head) == kHeader; },
+    [](std::string_view head) { return normalized_header(head) == kViewerHeader; },
     [](const std::string& path) -> std::unique_ptr<Reader> {
       return std::make_unique<ViewerCsvReader>(path);
     },

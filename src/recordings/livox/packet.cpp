@@ -51,12 +51,12 @@ std::uint8_t data_type_of(bool cartesian, bool tagged, int returns) {
 std::optional<ShotGrid> shot_grid(std::uint8_t device_type, std::uint8_t data_type) {
   if (data_type < 2) return kGrid100kHz;
   switch (device_type) {
-    case 1:
-    case 6:
+    case kMid40:
+    case kMid70:
       return kGrid100kHz;
-    case 2:
-    case 3:
-    case 7:
+    case kTele15:
+    case kHorizon:
+    case kAvia:
       return kGrid240kHz;
     default:
       break;

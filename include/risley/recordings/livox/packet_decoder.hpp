@@ -31,8 +31,8 @@ class BadPacket : public Error {
 
 /// What packets do not say of the sensor that sends them.
 struct PacketDecoderOptions {
-  std::uint8_t device_type = 1;  ///< as Device::type
-  std::uint8_t device = 0;       ///< Observations::device of all rows
+  std::uint8_t device_type = kMid40;  ///< as Device::type
+  std::uint8_t device = 0;            ///< Observations::device of all rows
   /// Instead of what device type and data type say: for special firmware and unknown devices.
   std::optional<ShotGrid> grid = {};
   /// As LVX 1.0 keeps packets: any version but 0, and data type 0 in metres as floats.
