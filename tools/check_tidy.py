@@ -3,10 +3,10 @@
 # SPDX-License-Identifier: MIT
 """Runs clang-tidy with the checks of .clang-tidy on the sources in src/, studies/ and apps/.
 
-Most of its time goes into the headers of libraries, so the sources of a layer are looked at in one
+Most of its time goes into the headers of libraries, so the sources of a folder are looked at in one
 piece, as one file that includes them all. That also finds a name which stands for two things, or
-twice for the same, within a layer. Kernels, which have a compiler command of their own, and
-formats, of which each has a recognises and an open, are looked at alone.
+twice for the same, within a folder. Kernels, which have a compiler command of their own, are looked
+at alone.
 
 Usage: tools/check_tidy.py BUILD_FOLDER [--changed]
   BUILD_FOLDER  holds compile_commands.json, as the preset dev writes it
@@ -57,10 +57,9 @@ def pieces_of(sources, commands, together):
     for source in sources:
         if source not in commands:
             sys.exit(f'check_tidy: {source} is not in compile_commands.json; configure anew')
-        layer = source.relative_to(ROOT).parts[:2]
-        alone = (not together or source.stem.endswith('_kernel')
-                 or source.parent.name == 'formats')
-        groups[layer + ((source.name,) if alone else ())].append(source)
+        folder = source.parent.relative_to(ROOT).parts
+        alone = not together or source.stem.endswith('_kernel')
+        groups[folder + ((source.name,) if alone else ())].append(source)
     return sorted(groups.values(), key=len, reverse=True)
 
 
