@@ -15,12 +15,14 @@ function(risley_target_defaults target)
                          # sources compiled together look to gcc like headers with types of their own, and
                          # see each other's names
                          $<$<AND:$<CXX_COMPILER_ID:GNU>,$<BOOL:${CMAKE_UNITY_BUILD}>>:-Wno-subobject-linkage$<SEMICOLON>-Wno-shadow>
+                         # ccache reads from the preprocessor which parsed headers were used
+                         $<$<AND:$<CXX_COMPILER_ID:GNU>,$<BOOL:${CMAKE_CXX_COMPILER_LAUNCHER}>>:-fpch-preprocess>
                          $<$<BOOL:${RISLEY_WARNINGS_AS_ERRORS}>:-Werror>)
 endfunction()
 
 # Headers of other libraries that most sources include, parsed once: by a target that lends them to others,
 # which must have all its definitions and the same flags.
-# ccache cannot look into parsed headers (only with settings of its user), so it excludes them.
+# ccache must be told of them (CCACHE_SLOPPINESS, as in scripts/build); who does not, leaves them out.
 set(precompile ON)
 if(CMAKE_CXX_COMPILER_LAUNCHER)
   set(precompile OFF)

@@ -113,7 +113,7 @@ std::vector<estimation::FreeParameter> calibration_parameters(
   return estimation::free_parameters(names, shape);
 }
 
-CalibrationForecast forecast(const CalibrationPlan& plan) {
+CalibrationForecast forecast(const CalibrationPlan& plan, const Progress& progress) {
   const sensors::Sensor& sensor = plan.sensor;
   const double rate = plan.rate.value_or(sensor.shot_rate);
   const double noise = plan.range_noise.value_or(sensor.range_noise);
@@ -142,6 +142,7 @@ CalibrationForecast forecast(const CalibrationPlan& plan) {
   std::vector<std::vector<double>> bundle(static_cast<std::size_t>(sensor.prisms()));
   std::vector<std::uint8_t> bundle_beam;
   for (std::size_t r = 0; r < stations.size(); ++r) {
+    progress.report(static_cast<double>(r) / static_cast<double>(stations.size() + 1));
     const scenes::Station& station = stations[r];
     names.push_back(station.name.empty() ? "the sensor" : station.name);
     RangedShots all;
@@ -218,7 +219,8 @@ CalibrationForecast forecast(const CalibrationPlan& plan) {
 
   AdjustmentOptions options;
   options.most_iterations = 0;  // ranges are exact: the plan is its own solution
-  const PlanarSolution solution = adjust(problem, options);
+  const PlanarSolution solution = adjust(problem, options, progress.silent());
+  progress.check();
   result.free = problem.free;
   result.covariance = solution.covariance;
   result.range_offset_sigma = solution.range_offset_sigma;
@@ -226,6 +228,7 @@ CalibrationForecast forecast(const CalibrationPlan& plan) {
       solution.information + prior_information(problem), problem.free, kWidestDirection);
   result.datum = formal_datum(problem.train, problem.free, result.covariance, bundle, bundle_beam);
   result.advice = advice_for(result, plan);
+  progress.report(1.0);
   return result;
 }
 

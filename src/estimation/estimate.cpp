@@ -14,6 +14,7 @@
 #include "risley/estimation/batch_map.hpp"
 #include "risley/estimation/ekf.hpp"
 #include "risley/estimation/free_parameters.hpp"
+#include "risley/optics/batch.hpp"
 
 #include "estimation/frame_prior.hpp"
 #include "estimation/used_shots.hpp"
@@ -273,6 +274,23 @@ void take_frame(Estimate& estimate) {
   whole.covariance = scale * estimate.frame_covariance * scale;
 }
 
+/// Holds the directions of emitters of which the series has no shot: it cannot tell them.
+void hold_mute_emitters(const PrismTrain& train, Estimate& estimate) {
+  if (train.emitters() < 2) return;
+  check_beams(train, estimate.series.beam, estimate.series.size());
+  std::vector<std::size_t> shots(static_cast<std::size_t>(train.emitters()), 0);
+  for (const std::uint8_t beam : estimate.series.beam) ++shots[beam];
+  if (estimate.series.beam.empty()) shots.front() = estimate.series.size();
+  for (int emitter = 0; emitter < train.emitters(); ++emitter) {
+    if (shots[static_cast<std::size_t>(emitter)] > 0) continue;
+    std::erase_if(estimate.free, [&](const FreeParameter& parameter) {
+      return place::emitter(parameter.places.front(), train.prisms()) == emitter;
+    });
+    estimate.warnings.push_back(fmt::format(
+        "no shot is of emitter {}: its direction was held at the preset's", emitter + 1));
+  }
+}
+
 BatchMapOptions map_options(const Estimate& estimate, const EstimateOptions& options) {
   BatchMapOptions settings;
   if (estimate.noise_held) settings.angle_noise = estimate.noise.value;
@@ -416,6 +434,7 @@ Estimate estimate(Method method, AngleSeries series, const AngleSeries& head,
       estimate.series = rows_of(estimate.series, longest->begin, longest->end);
     }
   }
+  hold_mute_emitters(options.sensor.train, estimate);
   constexpr std::size_t kHeadRows = 2000;
   estimate.start = start_anywhere(
       estimate.series,

@@ -24,6 +24,8 @@ namespace {
 
 /// Below this share of the largest, an eigenvalue of the scaled information is its rounding.
 constexpr double kNoInformation = 1e-12;
+/// Of the work, that the shots' equations and the smoother take.
+constexpr double kShotsShare = 0.5;
 constexpr std::size_t kMostPlannedShots = 600000;
 constexpr double kMostDuration = 2000.0;
 /// Correlations from here on make two quantities hard to tell apart.
@@ -132,7 +134,8 @@ void keep_strongest(std::vector<std::pair<std::string, double>>& twins) {
 Observability analyse(const NormalEquations& equations, const RotorTrajectory& knots,
                       const std::vector<RotorProcess>& process,
                       const std::vector<FreeParameter>& all, const std::vector<FreeParameter>& free,
-                      double duration, double shots, double information_per_square) {
+                      double duration, double shots, double information_per_square,
+                      const Progress& progress) {
   const auto n = static_cast<Eigen::Index>(all.size());
   const Eigen::Index prisms = knots.prisms;
   ParameterPrior prior{Eigen::VectorXd(n), Eigen::VectorXd::Zero(n)};
@@ -141,6 +144,7 @@ Observability analyse(const NormalEquations& equations, const RotorTrajectory& k
     scale[i] = all[static_cast<std::size_t>(i)].prior_sigma;
     prior.information[i] = 1.0 / (scale[i] * scale[i]);
   }
+  progress.check();
   const SmootherSolution solution = smooth(equations, knots, process, prior, true);
   const Middle middle = middle_of(solution, knots);
 
@@ -205,6 +209,8 @@ Observability analyse(const NormalEquations& equations, const RotorTrajectory& k
     return found;
   };
   for (Eigen::Index i = 0; i < n + 2 * prisms; ++i) {
+    progress.report(kShotsShare + (1.0 - kShotsShare) * static_cast<double>(i) /
+                                      static_cast<double>(n + 2 * prisms));
     QuantityObservability quantity = describe(i, chosen);
     double squares = 0;
     if (i < n) {
@@ -229,7 +235,7 @@ Observability analyse(const NormalEquations& equations, const RotorTrajectory& k
 
 }  // namespace
 
-Observability observability_of_plan(const ObservabilityPlan& plan) {
+Observability observability_of_plan(const ObservabilityPlan& plan, const Progress& progress) {
   const auto positive = [](double value, const char* name, const char* unit) {
     if (!(value > 0) || !std::isfinite(value)) {
       throw InvalidArgument(fmt::format("{} = {} {}, allowed above 0", name, value, unit));
@@ -251,6 +257,7 @@ Observability observability_of_plan(const ObservabilityPlan& plan) {
   AngleSeries series;
   std::vector<double> angles(static_cast<std::size_t>(train.prisms()));
   for (std::size_t i = 0; i < count; ++i) {
+    if (i % 65536 == 0) progress.check();
     const double t = static_cast<double>(i) / rate;
     const std::int64_t time_ns = std::llround(1e9 * t);
     for (std::size_t k = 0; k < angles.size(); ++k) {
@@ -277,10 +284,11 @@ Observability observability_of_plan(const ObservabilityPlan& plan) {
   // Fewer shots count for all of them.
   const double share = shots / static_cast<double>(count);
   accumulate(series, knots, train, all, {equal_noise(std::sqrt(variance / share)), 0.0}, equations);
-  return analyse(equations, knots, process, all, plan.free, plan.duration, shots, shots / variance);
+  return analyse(equations, knots, process, all, plan.free, plan.duration, shots, shots / variance,
+                 progress);
 }
 
-Observability observability_of_estimate(const Estimate& estimate) {
+Observability observability_of_estimate(const Estimate& estimate, const Progress& progress) {
   const std::vector<FreeParameter> all = all_parameters(estimate.sensor.shape());
   NormalEquations equations;
   ShotWeights weights;
@@ -297,7 +305,7 @@ Observability observability_of_estimate(const Estimate& estimate) {
                                            estimate.series.time_ns[range.begin]);
   }
   return analyse(equations, estimate.trajectory, estimate.rotor_process, all, estimate.free,
-                 duration, shots, shots / variance);
+                 duration, shots, shots / variance, progress);
 }
 
 std::vector<std::string> observability_words(const Observability& observability,

@@ -85,8 +85,9 @@ EstimateDetails estimate_details(const Estimate& estimate, const sensors::Sensor
   EstimateDetails result;
   progress.report(0.0);
   if (estimate.converged) {
-    result.advice = estimation::observability_words(estimation::observability_of_estimate(estimate),
-                                                    estimate.sensor.shape());
+    result.advice = estimation::observability_words(
+        estimation::observability_of_estimate(estimate, progress.part(0.0, 0.2)),
+        estimate.sensor.shape());
     progress.report(0.2);
     result.pieces =
         estimation::estimate_piecewise(estimate, nominal, kPieces, progress.part(0.2, 0.8));

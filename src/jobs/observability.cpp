@@ -25,7 +25,8 @@ estimation::EstimateOptions settings_of(const ObservabilityOptions& options,
 }
 
 estimation::Observability of_plan(const ObservabilityOptions& options,
-                                  const estimation::EstimateOptions& settings) {
+                                  const estimation::EstimateOptions& settings,
+                                  const Progress& progress) {
   estimation::ObservabilityPlan plan;
   plan.sensor = settings.sensor;
   plan.duration = options.duration;
@@ -33,7 +34,7 @@ estimation::Observability of_plan(const ObservabilityOptions& options,
   plan.angle_noise = settings.angle_noise.value_or(plan.sensor.angle_noise);
   if (options.rounding) plan.angle_resolution = plan.sensor.angle_resolution;
   plan.free = estimation::chosen_parameters(settings);
-  return estimation::observability_of_plan(plan);
+  return estimation::observability_of_plan(plan, progress);
 }
 
 }  // namespace
@@ -49,7 +50,7 @@ JudgedObservability judge_observability(const ObservabilityOptions& options,
     const estimation::EstimateOptions settings = settings_of(
         options, sensors::load_sensor(options.sensor.empty() ? kUsualSensor : options.sensor));
     result.shape = settings.sensor.shape();
-    result.observability = of_plan(options, settings);
+    result.observability = of_plan(options, settings, progress.silent());
   } else {
     EstimationInput input =
         read_for_estimation({options.recording,
@@ -69,8 +70,7 @@ JudgedObservability judge_observability(const ObservabilityOptions& options,
                            estimate.warnings.end());
     result.converged = estimate.converged;
     result.reason = estimate.reason;
-    estimating.check();
-    result.observability = estimation::observability_of_estimate(estimate);
+    result.observability = estimation::observability_of_estimate(estimate, progress.silent());
   }
   result.words = estimation::observability_words(result.observability, result.shape);
   return result;

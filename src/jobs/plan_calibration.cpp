@@ -26,8 +26,7 @@ PlannedCalibration plan_calibration(const PlanCalibrationOptions& options,
   plan.prior_sigma = options.prior_sigma;
   plan.range_offset_sigma = options.range_offset_sigma;
   plan.beam_origin = options.beam_origin;
-  progress.check();
-  return {plan.sensor.shape(), calibration::forecast(plan)};
+  return {plan.sensor.shape(), calibration::forecast(plan, progress)};
 }
 
 }  // namespace risley::jobs

@@ -3,6 +3,7 @@
 #include "risley/estimation/batch_map.hpp"
 
 #include <cmath>
+#include <random>
 
 #include <Eigen/LU>
 #include <gtest/gtest.h>
@@ -11,6 +12,7 @@
 #include "risley/core/error.hpp"
 #include "risley/estimation/ekf.hpp"
 #include "risley/estimation/estimate.hpp"
+#include "risley/optics/observation_model.hpp"
 
 #include "estimation/series.hpp"
 
@@ -61,6 +63,41 @@ TEST(BatchMap, NoiseFreeConstantSpeedIsRecoveredFarBelowTheStatedNoise) {
   ASSERT_FALSE(result.warnings.empty());
   EXPECT_NE(result.warnings.front().find("the stated noise is too large"), std::string::npos)
       << result.warnings.front();
+}
+
+TEST(BatchMap, TheDirectionOfAnEmitterWithoutShotsIsHeldAndNamed) {
+  const sensors::Sensor sensor = sensors::load_sensor("horizon");
+  std::mt19937_64 generator(3);
+  std::normal_distribution<double> noise(0.0, kNoise);
+  AngleSeries series;
+  for (int i = 0; i < 120'000; ++i) {
+    const int beam = i % 6;
+    if (beam == 3) continue;
+    const std::int64_t time_ns = i * 12'500LL / 3;
+    std::vector<double> angles;
+    for (const double speed : sensor.angular_velocity) {
+      angles.push_back(wrap_to_pi(1.0 + speed * 1e-9 * static_cast<double>(time_ns)));
+    }
+    const Observation shot = observe(sensor.train, angles, beam);
+    series.append(time_ns, shot.azimuth + noise(generator), shot.zenith + noise(generator),
+                  static_cast<std::uint8_t>(beam));
+  }
+  EstimateOptions options;
+  options.sensor = sensor;
+  const Estimate result = estimate(Method::map, series, series, options);
+  EXPECT_TRUE(result.converged) << result.reason;
+  for (const FreeParameter& parameter : result.free) {
+    EXPECT_EQ(parameter.name.find("incident_beam_4"), std::string::npos) << parameter.name;
+  }
+  const PrismTrain& train = result.sensor.train;
+  for (const int at :
+       {place::incident_beam_horizontal(3, 3), place::incident_beam_vertical(3, 3)}) {
+    EXPECT_EQ(train[at], sensor.train[at]);
+  }
+  EXPECT_LT(worst_error(result, sensor), 4.5);
+  ASSERT_FALSE(result.warnings.empty());
+  EXPECT_EQ(result.warnings.front(),
+            "no shot is of emitter 4: its direction was held at the preset's");
 }
 
 TEST(BatchMap, TellsWhatAllAnglesOfARotorHaveInCommon) {

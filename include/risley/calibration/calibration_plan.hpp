@@ -10,6 +10,7 @@
 #include <Eigen/Core>
 
 #include "risley/calibration/datum.hpp"
+#include "risley/core/progress.hpp"
 #include "risley/estimation/weak_directions.hpp"
 #include "risley/scenes/scene.hpp"
 #include "risley/sensors/sensor.hpp"
@@ -56,10 +57,9 @@ struct CalibrationForecast {
 /// Cramer-Rao bound of the calibration: the normal equations of the default method at the sensor's
 /// parameters for shots that meet the scene, noise alone. Uneven walls and wrong indices come on
 /// top. A sample of the shots stands for all.
-/// @throws EstimationError when no shot meets a wall; InvalidArgument for a duration, rate, noise
-/// or
-///         sigma out of its range, and as calibration_parameters()
-CalibrationForecast forecast(const CalibrationPlan& plan);
+/// @throws EstimationError when no shot meets a wall; Cancelled; InvalidArgument for a duration,
+///         rate, noise or sigma out of its range, and as calibration_parameters()
+CalibrationForecast forecast(const CalibrationPlan& plan, const Progress& progress = {});
 
 /// Free parameters of a calibration: what walls can tell, less the fixed ones plus the others. The
 /// refractive index is held unless asked for, since the recording itself tells it better.

@@ -58,12 +58,12 @@ struct Observability {
 /// Cramer-Rao bounds of a plan: the information of prisms that turn at the sensor's speeds under
 /// the plan's motion model. Information grows with the number of shots, so large plans are
 /// evaluated with fewer shots of higher weight, and beyond 2,000 s with less time.
-/// @throws InvalidArgument for a plan without duration, rate or noise
-Observability observability_of_plan(const ObservabilityPlan& plan);
+/// @throws InvalidArgument for a plan without duration, rate or noise; Cancelled
+Observability observability_of_plan(const ObservabilityPlan& plan, const Progress& progress = {});
 
 /// The same for a recording that was estimated: its own shots, gaps, outliers and rotors.
-/// @throws InvalidArgument when the estimate is not one of the batch estimator
-Observability observability_of_estimate(const Estimate& estimate);
+/// @throws Cancelled
+Observability observability_of_estimate(const Estimate& estimate, const Progress& progress = {});
 
 /// What a user should know, in sentences: which parameters to hold fixed, what each is mixed up
 /// with, and how long a recording would have to be to tell them after all.

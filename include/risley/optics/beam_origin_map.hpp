@@ -27,8 +27,7 @@ struct BeamOriginMap {
 /// through the train; with more prisms as many beams, their angles spread evenly by a
 /// low-discrepancy sequence.
 /// @param steps  per turn; the paper's grid of 0.333 degree has 1,081, both ends included
-/// @throws InvalidArgument for steps below 2 or a cell that is not above 0, and as check_shape()
-/// and
+/// @throws InvalidArgument for steps below 2 or a cell that is not above 0; as check_shape() and
 ///         face_positions()
 BeamOriginMap beam_origin_map(const PrismTrain& train, const PrismGeometry& geometry,
                               std::size_t steps, double cell);
