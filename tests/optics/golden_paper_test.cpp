@@ -27,7 +27,7 @@ double half_last_digit(const std::string& printed) {
 PrismTrain nominal() { return PrismTrain(parse_face_order("PA-AP")); }
 
 TEST(GoldenPaper, EveryRowOfTheDirectionTable) {
-  std::ifstream table(std::string(RISLEY_TEST_DATA) + "/directions.txt");
+  std::ifstream table(RISLEY_TEST_DATA "/directions.txt");
   ASSERT_TRUE(table) << "tests/golden/directions.txt is missing";
   std::string line;
   int rows = 0;

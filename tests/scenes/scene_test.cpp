@@ -59,7 +59,7 @@ TEST(Scene, ReadsPlanesAndStations) {
 }
 
 TEST(Scene, BundledRoomIsClosedTowardsTheFront) {
-  const Scene room = load_scene(std::string(RISLEY_SOURCE_DIR) + "/data/room.yaml");
+  const Scene room = load_scene(RISLEY_SOURCE_DIR "/data/room.yaml");
   for (int azimuth = -19; azimuth <= 19; ++azimuth) {
     for (int zenith = 71; zenith <= 109; ++zenith) {
       EXPECT_TRUE(nearest_hit(room, {0, 0, 0}, towards(azimuth, zenith)).has_value());

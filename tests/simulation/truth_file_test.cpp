@@ -41,7 +41,7 @@ class TruthFile : public ::testing::Test {
     s.rate = 2000;
     s.rotor = RotorKind::sinusoidal;
     s.seed = 77;
-    s.scene = scenes::load_scene(std::string(RISLEY_SOURCE_DIR) + "/data/room.yaml");
+    s.scene = scenes::load_scene(RISLEY_SOURCE_DIR "/data/room.yaml");
     return s;
   }
 
