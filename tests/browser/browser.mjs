@@ -8,6 +8,7 @@ import { delimiter, join, resolve } from 'node:path';
 import { pathToFileURL } from 'node:url';
 
 export const longestDrawing = 60_000; // ms
+export const usualView = { width: 1300, height: 900 };
 
 function findChromium() {
   if (process.env.RISLEY_CHROMIUM) return process.env.RISLEY_CHROMIUM;
@@ -39,17 +40,20 @@ export async function launch() {
   const { chromium } = await import(pathToFileURL(index).href);
   return chromium.launch({
     executablePath: findChromium(),
-    // WebGL without a graphics card, and only WebGL: the rest is drawn faster without OpenGL.
+    // WebGL without a graphics card, and only WebGL: the rest is drawn faster without OpenGL. Pages
+    // close before what the slowest compiler of JavaScript does has paid.
     args: ['--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--ignore-gpu-blocklist',
            '--disable-gpu-compositing', '--disable-gpu-rasterization',
-           '--disable-accelerated-2d-canvas'],
+           '--disable-accelerated-2d-canvas', '--js-flags=--no-turbofan'],
   });
 }
 
-// A new tab. complaints: what the page says or asks for and should not.
+// A new tab. open: opens a file in it. draw: also waits until all its diagrams are drawn, and returns
+// the milliseconds from the start of the navigation until then. complaints: what the page opened
+// last says or asks for and should not.
 export async function newTab(browser, options = {}) {
   const context = await browser.newContext({
-    viewport: { width: 1300, height: 900 }, colorScheme: 'light', reducedMotion: 'reduce',
+    viewport: usualView, colorScheme: 'light', reducedMotion: 'reduce',
     ...options,
   });
   const tab = await context.newPage();
@@ -68,19 +72,21 @@ export async function newTab(browser, options = {}) {
     if (url !== own && !/^(data|blob):/.test(url)) complaints.push('request: ' + url);
   });
   const open = async (file) => {
+    complaints.length = 0;
     own = pathToFileURL(resolve(file)).href;
     await tab.goto(own);
   };
-  return { tab, context, complaints, open };
+  const draw = async (file) => {
+    await open(file);
+    await tab.waitForFunction(() => document.documentElement.dataset.drawn, null,
+                              { timeout: longestDrawing, polling: 10 });
+    return tab.evaluate(() => performance.now());
+  };
+  return { tab, context, complaints, open, draw };
 }
 
-// A new tab in which all diagrams of a page are drawn. milliseconds: from the start of the
-// navigation until then.
+// A new tab in which all diagrams of a page are drawn, after so many milliseconds.
 export async function openPage(browser, file, options = {}) {
   const opened = await newTab(browser, options);
-  await opened.open(file);
-  await opened.tab.waitForFunction(() => document.documentElement.dataset.drawn, null,
-                                   { timeout: longestDrawing, polling: 10 });
-  opened.milliseconds = await opened.tab.evaluate(() => performance.now());
-  return opened;
+  return { ...opened, milliseconds: await opened.draw(file) };
 }

@@ -9,6 +9,7 @@ const largestFile = 4 * 1024 * 1024;
 const noise = 0.02; // of an axis: a pixel or two of a drawn box
 
 const otherPixels = 0.002; // of a picture: by so much it may differ from itself
+const longestReaction = 5000; // ms, of a page to a hand; a good one is not waited for
 
 const width = ([from, to]) => to - from;
 const near = (a, b, span) => Math.abs(a - b) <= noise * span;
@@ -32,21 +33,58 @@ const oneOfEachSort = (figures) => figures.filter(({ sort }, i) =>
 const flatOnes = async (tab) => (await figuresOf(tab)).filter(({ kind }) => kind !== 'space');
 const spaceOnes = async (tab) => (await figuresOf(tab)).filter(({ kind }) => kind === 'space');
 
-async function boxOf(tab, { id, index }) {
-  const place = tab.locator('#' + id);
-  await place.evaluate((element) => element.scrollIntoView({ block: 'center' }));
-  const { x, y } = await place.boundingBox();
-  const area = await tab.evaluate((k) => window.looking.area(k), index);
+// Brings a diagram to the middle of the window. place: its corner, in pixels of the window.
+const boxOf = (tab, { index }) => tab.evaluate((k) => {
+  const { place } = window.risley.charts[k];
+  place.scrollIntoView({ block: 'center' });
+  const { x, y } = place.getBoundingClientRect();
+  const area = window.looking.area(k);
   return { x: x + area.x, y: y + area.y, width: area.width, height: area.height, place: { x, y } };
-}
+}, index);
 
 const extents = (tab, { index }) => tab.evaluate((k) => window.looking.extents(k), index);
-// Tooltips and repaints come with the next frames.
-const frames = (tab) => tab.evaluate(() => new Promise((done) =>
-  requestAnimationFrame(() => requestAnimationFrame(() => setTimeout(done, 30)))));
 
-const differ = async (tab, one, other) => one !== other &&
-  await tab.evaluate(([a, b]) => window.looking.difference(a, b), [one, other]) > otherPixels;
+// Repaints come with the next frames.
+const frames = (tab) => tab.evaluate(() => new Promise((done) =>
+  requestAnimationFrame(() => requestAnimationFrame(done))));
+
+// What is read when it is good, or at last, for those who tell why it is not.
+async function whenGood(tab, read, good, patience = longestReaction) {
+  const last = performance.now() + patience;
+  for (;;) {
+    const found = await read();
+    if (good(found) || performance.now() > last) return found;
+    await frames(tab);
+  }
+}
+
+// Keys one after another, as quickly.
+const press = (tab, ...keys) => Promise.all(keys.map((key) => tab.keyboard.press(key)));
+
+// A mouse in a quick hand: it does not wait for the page to be drawn between its events.
+async function gesture(tab, events) {
+  const session = await tab.context().newCDPSession(tab);
+  await Promise.all(events.map(([type, [x, y], more]) =>
+    session.send('Input.dispatchMouseEvent', { type, x, y, ...more })));
+  await session.detach();
+}
+
+function drag(tab, from, to, { shiftKey = false } = {}) {
+  const middle = from.map((v, i) => 0.5 * (v + to[i]));
+  const modifiers = shiftKey ? 8 : 0, left = { modifiers, button: 'left', clickCount: 1 };
+  return gesture(tab, [
+    ['mouseMoved', from, { modifiers }], ['mousePressed', from, { ...left, buttons: 1 }],
+    ['mouseMoved', middle, { modifiers, buttons: 1 }],
+    ['mouseMoved', to, { modifiers, buttons: 1 }], ['mouseReleased', to, left],
+  ]);
+}
+
+const doubleClick = (tab, at) => gesture(tab, [['mouseMoved', at], ...[1, 2].flatMap((clickCount) =>
+  ['mousePressed', 'mouseReleased'].map((type) => [type, at, { button: 'left', clickCount }]))]);
+
+const remember = (tab, album) => tab.evaluate((name) => window.looking.remember(name), album);
+const differences = (tab, one, other) =>
+  tab.evaluate(([a, b]) => window.looking.differences(a, b), [one, other]);
 
 export function checkFile(file) {
   const { size } = statSync(file);
@@ -81,7 +119,8 @@ export async function checkDrawn(tab) {
 }
 
 // Pointing at a value shows it.
-export async function checkHover(tab) {
+// patience: ms to wait for it, for pages that will not do it
+export async function checkHover(tab, { patience } = {}) {
   await look(tab);
   const complaints = [];
   for (const figure of await flatOnes(tab)) {
@@ -93,9 +132,9 @@ export async function checkHover(tab) {
     }
     await tab.mouse.move(place.x + point.x - 3, place.y + point.y);
     await tab.mouse.move(place.x + point.x, place.y + point.y);
-    await frames(tab);
-    const tip = await tab.evaluate(([k, x, y]) => window.looking.tooltip(k, x, y),
-                                   [figure.index, point.x, point.y]);
+    const tip = await whenGood(tab, () => tab.evaluate(
+      ([k, x, y]) => window.looking.tooltip(k, x, y), [figure.index, point.x, point.y]),
+                               ({ visible, right }) => visible && right, patience);
     if (!tip.visible) complaints.push(`${figure.title}: no tooltip at ${JSON.stringify(point)}`);
     else if (!tip.right) complaints.push(`${figure.title}: the tooltip says ${tip.text}`);
     await tab.mouse.move(2, 2);
@@ -104,8 +143,8 @@ export async function checkHover(tab) {
 }
 
 // Boxes thick and thin, double click, wheel, Shift and dragging.
-// most: so many diagrams at most, where one that fails is enough
-export async function checkMouse(tab, most = Infinity) {
+// most: so many diagrams at most, where one that fails is enough. patience: as for checkHover
+export async function checkMouse(tab, { most = Infinity, patience = longestReaction } = {}) {
   await look(tab);
   const complaints = [];
   for (const figure of oneOfEachSort(await flatOnes(tab)).slice(0, most)) {
@@ -114,14 +153,7 @@ export async function checkMouse(tab, most = Infinity) {
     const whole = await extents(tab, figure);
     const at = (x, y) => [box.x + x * box.width, box.y + y * box.height];
     const middle = at(0.5, 0.5);
-    const drag = async (from, to) => {
-      await tab.mouse.move(...from);
-      await tab.mouse.down();
-      await tab.mouse.move(0.5 * (from[0] + to[0]), 0.5 * (from[1] + to[1]));
-      await tab.mouse.move(...to);
-      await tab.mouse.up();
-      await frames(tab);
-    };
+    const reach = (good) => whenGood(tab, () => extents(tab, figure), good, patience);
     const corners = [at(0.3, 0.25), at(0.6, 0.7)];
     const wanted = await tab.evaluate(([k, points]) => {
       const { chart } = window.risley.charts[k];
@@ -129,51 +161,56 @@ export async function checkMouse(tab, most = Infinity) {
       return [0, 1].map((i) => values.map((v) => v[i]).sort((a, b) => a - b));
     }, [figure.index, corners.map(([x, y]) => [x - box.place.x, y - box.place.y])]);
 
-    await drag(...corners);
-    const zoomed = await extents(tab, figure);
-    if (!zoomed.every((axis, i) => axis.every((end, j) => near(end, wanted[i][j], width(whole[i]))))) {
+    await drag(tab, ...corners);
+    const isWanted = (found) => found.every((axis, i) =>
+      axis.every((end, j) => near(end, wanted[i][j], width(whole[i]))));
+    const zoomed = await reach(isWanted);
+    if (!isWanted(zoomed)) {
       say(`a box ${JSON.stringify(wanted)} zooms to ${JSON.stringify(zoomed)}`);
     }
 
     await tab.keyboard.down('Shift');
-    await drag(at(0.3, 0.5), at(0.5, 0.5));
+    await drag(tab, at(0.3, 0.5), at(0.5, 0.5), { shiftKey: true });
     await tab.keyboard.up('Shift');
-    const moved = await extents(tab, figure);
-    const way = Math.abs(moved[0][0] - zoomed[0][0]);
-    if (Math.abs(way - 0.2 * width(zoomed[0])) > 0.05 * width(zoomed[0]) ||
-        !near(width(moved[0]), width(zoomed[0]), width(whole[0]))) {
+    const isMoved = ([found]) =>
+      Math.abs(Math.abs(found[0] - zoomed[0][0]) - 0.2 * width(zoomed[0])) <=
+        0.05 * width(zoomed[0]) && near(width(found), width(zoomed[0]), width(whole[0]));
+    const moved = await reach(isMoved);
+    if (!isMoved(moved)) {
       say(`Shift and dragging moves ${JSON.stringify(zoomed)} to ${JSON.stringify(moved)}`);
     }
 
-    await tab.mouse.dblclick(...middle);
-    await frames(tab);
-    const restored = await extents(tab, figure);
-    if (!sameExtents(restored, whole)) say('a double click leaves ' + JSON.stringify(restored));
+    const isWhole = (found) => sameExtents(found, whole);
+    await doubleClick(tab, middle);
+    const restored = await reach(isWhole);
+    if (!isWhole(restored)) say('a double click leaves ' + JSON.stringify(restored));
 
-    await drag(at(0.3, 0.5), [at(0.6, 0)[0], at(0, 0.5)[1] + 2]);
-    const thin = await extents(tab, figure);
-    if (!thin[0].every((end, j) => near(end, wanted[0][j], width(whole[0]))) ||
-        !near(width(thin[1]), width(whole[1]), width(whole[1]))) {
-      say('a box that is hardly a line zooms to ' + JSON.stringify(thin));
-    }
-    await tab.mouse.dblclick(...middle);
-    await frames(tab);
+    await drag(tab, at(0.3, 0.5), [at(0.6, 0)[0], at(0, 0.5)[1] + 2]);
+    const isThin = (found) =>
+      found[0].every((end, j) => near(end, wanted[0][j], width(whole[0]))) &&
+      near(width(found[1]), width(whole[1]), width(whole[1]));
+    const thin = await reach(isThin);
+    if (!isThin(thin)) say('a box that is hardly a line zooms to ' + JSON.stringify(thin));
+    await doubleClick(tab, middle);
+    await reach(isWhole);
 
     const scrolled = () => tab.evaluate(() => window.scrollY);
     const before = await scrolled();
+    await tab.mouse.move(...middle);
     await tab.keyboard.down('Control');
     await tab.mouse.wheel(0, -240);
-    await tab.waitForTimeout(120);
+    const isNearer = (found) => found.every((axis, i) => width(axis) < 0.98 * width(whole[i]));
+    const wheeled = await reach(isNearer);
     await tab.keyboard.up('Control');
-    const wheeled = await extents(tab, figure);
-    if (!wheeled.every((axis, i) => width(axis) < 0.98 * width(whole[i]))) {
+    if (!isNearer(wheeled)) {
       say('Ctrl and the wheel do not zoom: ' + JSON.stringify(wheeled));
     }
+    await frames(tab); // in which it would scroll
     if (Math.abs((await scrolled()) - before) > 1) say('Ctrl and the wheel scroll the page');
 
     await tab.mouse.wheel(0, before > 200 ? -150 : 150);
     await tab.waitForFunction((from) => Math.abs(window.scrollY - from) > 50, before,
-                              { timeout: 5000 })
+                              { timeout: patience })
       .catch(() => say('the wheel does not scroll the page'));
     if (!sameExtents(await extents(tab, figure), wheeled)) say('the wheel alone zooms');
     await tab.mouse.move(2, 2);
@@ -188,11 +225,17 @@ export async function checkKeyboard(tab) {
   await look(tab);
   const complaints = [];
   const figures = await figuresOf(tab);
-  const reached = new Set();
-  await tab.evaluate(() => { document.activeElement.blur(); window.scrollTo(0, 0); });
-  for (let i = 0; i < 4 * figures.length + 20; ++i) {
-    await tab.keyboard.press('Tab');
-    reached.add(await tab.evaluate(() => document.activeElement.id));
+  const wanted = ['theme', ...figures.map(({ id }) => id)];
+  let reached = new Set();
+  await tab.evaluate(() => {
+    document.activeElement.blur();
+    window.scrollTo(0, 0);
+    window.reached = [];
+    document.addEventListener('focusin', ({ target }) => window.reached.push(target.id));
+  });
+  for (let i = 0; i < 4 * figures.length + 20 && !wanted.every((id) => reached.has(id)); i += 10) {
+    await press(tab, ...Array(10).fill('Tab'));
+    reached = new Set(await tab.evaluate(() => window.reached));
   }
   if (!reached.has('theme')) complaints.push('Tab does not reach the button #theme');
   for (const figure of figures) {
@@ -201,25 +244,17 @@ export async function checkKeyboard(tab) {
     if (figure.kind === 'space') continue;
     await tab.focus('#' + figure.id);
     const whole = await extents(tab, figure);
-    await tab.keyboard.press('+');
-    await tab.keyboard.press('+');
-    const zoomed = await extents(tab, figure);
+    await tab.evaluate((k) => window.looking.followKeys(k), figure.index);
+    await press(tab, '+', '+', 'ArrowRight', 'ArrowUp', '-', '0', 'n', 'n', 'p');
+    const notes = await tab.evaluate(() => window.looking.keyNotes());
+    const [, zoomed, , moved, out, all] = notes.map((note) => note.extents);
     if (!zoomed.every((axis, i) => width(axis) < 0.8 * width(whole[i]))) say('+ does not zoom');
-    await tab.keyboard.press('ArrowRight');
-    await tab.keyboard.press('ArrowUp');
-    const moved = await extents(tab, figure);
     if (!moved.every((axis, i) => Math.abs(axis[0] - zoomed[i][0]) > 0.02 * width(zoomed[i]))) {
       say('arrows do not move it');
     }
-    await tab.keyboard.press('-');
-    if (!(width((await extents(tab, figure))[0]) > width(moved[0]))) say('- does not zoom out');
-    await tab.keyboard.press('0');
-    if (!sameExtents(await extents(tab, figure), whole)) say('0 does not show all');
-    const spoken = [];
-    for (const key of ['n', 'n', 'p']) {
-      await tab.keyboard.press(key);
-      spoken.push(await tab.locator('#spoken').textContent());
-    }
+    if (!(width(out[0]) > width(moved[0]))) say('- does not zoom out');
+    if (!sameExtents(all, whole)) say('0 does not show all');
+    const spoken = notes.slice(6).map((note) => note.spoken);
     const labels = await tab.evaluate((k) => {
       const { data } = window.risley.charts[k];
       return { x: data.x_label, y: data.y_label, points: data.series[0].x.length };
@@ -229,7 +264,6 @@ export async function checkKeyboard(tab) {
     if (labels.points > 1 && (spoken[0] === spoken[1] || spoken[0] !== spoken[2])) {
       say('n and p do not go through the points: ' + JSON.stringify(spoken));
     }
-    await tab.keyboard.press('0');
   }
   return complaints;
 }
@@ -243,25 +277,31 @@ export async function checkRotation(tab) {
     const box = await boxOf(tab, figure);
     const picture = () => tab.evaluate((k) => window.risley.charts[k].chart.getDataURL(),
                                        figure.index);
+    // The picture once two in a row are the same: a push goes on for some frames.
+    const quiet = async (good) => {
+      let last = await picture();
+      return whenGood(tab, async () => {
+        const before = last;
+        last = await picture();
+        return before === last ? last : undefined;
+      }, (found) => found !== undefined && good(found));
+    };
     const still = await picture();
     if (still !== await picture()) say('it does not stand still');
-    await tab.mouse.move(box.x + 0.5 * box.width, box.y + 0.5 * box.height);
-    await tab.mouse.down();
-    await tab.mouse.move(box.x + 0.6 * box.width, box.y + 0.5 * box.height, { steps: 4 });
-    await tab.mouse.up();
-    await tab.waitForTimeout(200);
-    const turned = await picture();
-    if (turned === still) say('dragging does not rotate it');
+    await drag(tab, [box.x + 0.5 * box.width, box.y + 0.5 * box.height],
+               [box.x + 0.6 * box.width, box.y + 0.5 * box.height]);
+    let now = await quiet((found) => found !== still);
+    if (now === still) say('dragging does not rotate it');
     await tab.focus('#' + figure.id);
     for (const key of ['ArrowRight', 'ArrowUp', '+']) {
-      const before = await picture();
+      const before = now;
       await tab.keyboard.press(key);
-      await tab.waitForTimeout(200);
-      if (await picture() === before) say(key + ' changes nothing');
+      now = await quiet((found) => found !== before);
+      if (now === before) say(key + ' changes nothing');
     }
     await tab.keyboard.press('0');
-    await tab.waitForTimeout(200);
-    if (await picture() !== still) say('0 does not turn it back');
+    if (await quiet((found) => found === still) !== still) say('0 does not turn it back');
+    await tab.mouse.move(2, 2);
   }
   return complaints;
 }
@@ -272,17 +312,17 @@ export async function checkTheme(tab) {
   const complaints = [];
   const theme = () => tab.evaluate(() => document.documentElement.dataset.theme);
   const paper = () => tab.evaluate(() => getComputedStyle(document.body).backgroundColor);
-  const pictures = () => tab.evaluate(() => window.risley.charts.map(({ chart }) =>
-    chart.getDataURL()));
-  const first = { theme: await theme(), paper: await paper(), pictures: await pictures() };
+  const first = { theme: await theme(), paper: await paper() };
+  await remember(tab, 'first');
   await tab.click('#theme');
   await tab.mouse.move(2, 2);
   await frames(tab);
   if (await theme() === first.theme) complaints.push('the button leaves the theme');
   if (await paper() === first.paper) complaints.push('the button leaves the paper');
   const titles = (await figuresOf(tab)).map(({ title }) => title);
-  (await pictures()).forEach((picture, i) => {
-    if (picture === first.pictures[i]) complaints.push(titles[i] + ': is not drawn anew');
+  await remember(tab, 'other');
+  (await differences(tab, 'first', 'other')).forEach(({ same }, i) => {
+    if (same) complaints.push(titles[i] + ': is not drawn anew');
   });
   for (const complaint of await checkDrawn(tab)) {
     complaints.push(`${complaint} (theme ${await theme()})`);
@@ -290,11 +330,10 @@ export async function checkTheme(tab) {
   await tab.click('#theme');
   await tab.mouse.move(2, 2);
   await frames(tab);
-  for (const [i, picture] of (await pictures()).entries()) {
-    if (await differ(tab, picture, first.pictures[i])) {
-      complaints.push(titles[i] + ': looks different afterwards');
-    }
-  }
+  await remember(tab, 'again');
+  (await differences(tab, 'first', 'again')).forEach(({ share }, i) => {
+    if (share > otherPixels) complaints.push(titles[i] + ': looks different afterwards');
+  });
   return complaints;
 }
 
@@ -318,21 +357,17 @@ export async function checkPrint(tab, file) {
       }));
     }, { once: true });
   });
-  const before = await tab.evaluate(() => window.risley.charts.map(({ chart }) =>
-    chart.getDataURL()));
+  await remember(tab, 'before');
   const pdf = await tab.pdf({ path: file, format: 'A4', margin: {
     top: '12mm', bottom: '12mm', left: '12mm', right: '12mm',
   } });
-  const printed = await tab.evaluate(async () => Promise.all((window.printed ?? []).map(
-    async (one) => {
-      const image = new Image();
-      image.src = one.url;
-      await image.decode();
-      return {
-        alt: one.alt, busy: await window.looking.busyShare(one.url),
-        size: [image.naturalWidth, image.naturalHeight],
-      };
-    })));
+  const printed = await tab.evaluate(async () => {
+    const found = [];
+    for (const one of window.printed ?? []) {
+      found.push({ alt: one.alt, ...await window.looking.seen(one.url) });
+    }
+    return found;
+  });
   const pages = (pdf.toString('latin1').match(/\/Type \/Page\b(?!s)/g) ?? []).length;
   if (pages === 0) complaints.push('the PDF has no pages');
   if (printed.length !== titles.length) {
@@ -348,13 +383,10 @@ export async function checkPrint(tab, file) {
   });
   await frames(tab);
   if (await tab.locator('img.printed').count() > 0) complaints.push('printed pictures stay');
-  const after = await tab.evaluate(() => window.risley.charts.map(({ chart }) =>
-    chart.getDataURL()));
-  for (const [i, picture] of after.entries()) {
-    if (await differ(tab, picture, before[i])) {
-      complaints.push(`${titles[i]}: looks different after printing`);
-    }
-  }
+  await remember(tab, 'after');
+  (await differences(tab, 'before', 'after')).forEach(({ share }, i) => {
+    if (share > otherPixels) complaints.push(`${titles[i]}: looks different after printing`);
+  });
   return complaints;
 }
 

@@ -3,21 +3,45 @@
 // What is in the pixels of a page, read back inside of it: window.looking.
 
 function install() {
+  if (window.looking) return; // and all that is remembered
   const besides = ['toolbox', 'legend', 'visualMap', 'tooltip', 'axisPointer'];
   const tolerance = 28; // of colours, of 255
   const entry = (k) => window.risley.charts[k];
   const model = (k) => entry(k).chart.getModel();
 
-  async function pixelsOf(url) {
-    const image = new Image();
-    image.src = url;
-    await image.decode();
-    const canvas = document.createElement('canvas');
-    canvas.width = image.naturalWidth;
-    canvas.height = image.naturalHeight;
-    const pen = canvas.getContext('2d', { willReadFrequently: true });
-    pen.drawImage(image, 0, 0);
-    return pen.getImageData(0, 0, canvas.width, canvas.height);
+  const sketch = document.createElement('canvas').getContext('2d', { willReadFrequently: true });
+
+  // Every pixel as one number: alpha, blue, green and red, from the highest byte to the lowest.
+  function pixelsOf(image, width, height) {
+    Object.assign(sketch.canvas, { width, height }); // clears it, too
+    sketch.drawImage(image, 0, 0);
+    const { data } = sketch.getImageData(0, 0, width, height);
+    return { width, height, words: new Uint32Array(data.buffer) };
+  }
+
+  const colourOf = (word) => [word & 255, (word >> 8) & 255, (word >> 16) & 255];
+
+  // How often each number is there.
+  function census(words) {
+    const counts = new Map();
+    for (let from = 0, to = 0; from < words.length; from = to) {
+      while (to < words.length && words[to] === words[from]) ++to; // neighbours are mostly alike
+      counts.set(words[from], (counts.get(words[from]) ?? 0) + to - from);
+    }
+    return counts;
+  }
+
+  // A diagram as it is now. As getDataURL() of ECharts, but PNG takes long to write and to read.
+  function picture(k, { without = [], ...options } = {}) {
+    const { chart } = entry(k);
+    const views = without.flatMap((mainType) => chart.getModel().queryComponents({ mainType }))
+      .map((component) => chart.getViewOfComponentModel(component))
+      .filter((view) => !view.group.ignore);
+    const ignore = (whether) => views.forEach(({ group }) => { group.ignore = whether; });
+    ignore(true);
+    const canvas = chart.renderToCanvas(options);
+    ignore(false);
+    return pixelsOf(canvas, canvas.width, canvas.height);
   }
 
   // As red, green and blue, of any colour that CSS knows.
@@ -35,11 +59,9 @@ function install() {
   const panelOf = (k) => parts(getComputedStyle(entry(k).place.closest('figure')).backgroundColor);
 
   // The diagram without what stands around it, on its panel.
-  function picture(k) {
-    return pixelsOf(entry(k).chart.getDataURL({
-      pixelRatio: 1, backgroundColor: 'rgb(' + panelOf(k) + ')', excludeComponents: besides,
-    }));
-  }
+  const bare = (k) => picture(k, {
+    pixelRatio: 1, backgroundColor: 'rgb(' + panelOf(k) + ')', without: besides,
+  });
 
   // Where the data of a flat diagram are, in pixels of its place.
   function area(k) {
@@ -54,6 +76,20 @@ function install() {
 
   const extents = (k) =>
     ['xAxis', 'yAxis'].map((name) => model(k).getComponent(name).axis.scale.getExtent().slice());
+
+  let followed, notes;
+  document.addEventListener('keydown', () => {
+    if (followed === undefined) return;
+    notes.push({ extents: extents(followed), spoken: document.getElementById('spoken').textContent });
+  });
+
+  // From now on, notes what every key does to a diagram.
+  function followKeys(k) {
+    followed = k;
+    notes = [];
+  }
+
+  const keyNotes = () => notes;
 
   // Whether a colour is a tone laid over the panel, at least so thickly.
   function isTone(pixel, panel, tone, thinnest) {
@@ -83,26 +119,28 @@ function install() {
   // Of every series: how many points were looked for, how many of them lie on a pixel of the
   // series' own colour and of any colour that is not the panel's, and how much of the diagram has
   // the series' colour.
-  async function drawn(k) {
-    const one = entry(k), image = await picture(k), panel = panelOf(k), box = area(k);
-    const at = (x, y) => {
-      const i = 4 * (Math.round(y) * image.width + Math.round(x));
-      return [image.data[i], image.data[i + 1], image.data[i + 2]];
-    };
+  function drawn(k) {
+    const one = entry(k), image = bare(k), panel = panelOf(k), box = area(k);
+    const at = (x, y) => image.words[Math.round(y) * image.width + Math.round(x)];
     const near = [[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1], [1, 1], [-1, -1], [1, -1], [-1, 1]];
+    const onceEach = (judge) => {
+      const memory = new Map();
+      return (word) => {
+        if (!memory.has(word)) memory.set(word, judge(colourOf(word)));
+        return memory.get(word);
+      };
+    };
     const quiet = [panel, named('grid')];
-    const isQuiet = (pixel) =>
-      quiet.some((colour) => Math.hypot(...colour.map((v, i) => v - pixel[i])) < 12);
+    const isQuiet = onceEach((pixel) =>
+      quiet.some((colour) => Math.hypot(...colour.map((v, i) => v - pixel[i])) < 12));
+    const left = Math.ceil(box.x), right = Math.ceil(box.x + box.width);
+    const inside = [];
+    for (let y = Math.ceil(box.y); y < box.y + box.height; ++y) {
+      inside.push(...census(image.words.subarray(y * image.width + left, y * image.width + right)));
+    }
     return one.data.series.map((series) => {
       const tones = tonesOf(k, series);
-      const memory = new Map();
-      const isOwn = (pixel) => {
-        const key = (pixel[0] << 16) | (pixel[1] << 8) | pixel[2];
-        if (!memory.has(key)) {
-          memory.set(key, tones.some((tone) => isTone(pixel, panel, tone, 0.3)));
-        }
-        return memory.get(key);
-      };
+      const isOwn = onceEach((pixel) => tones.some((tone) => isTone(pixel, panel, tone, 0.3)));
       const found = {
         label: series.label, hidden: isHidden(k, series), values: 0, looked: 0, own: 0, any: 0,
         pixels: 0,
@@ -111,11 +149,7 @@ function install() {
         if (Number.isFinite(series.x[i]) && Number.isFinite(series.y[i]) && series.x[i] !== null &&
             series.y[i] !== null) ++found.values;
       }
-      for (let y = Math.ceil(box.y); y < box.y + box.height; ++y) {
-        for (let x = Math.ceil(box.x); x < box.x + box.width; ++x) {
-          if (isOwn(at(x, y))) ++found.pixels;
-        }
-      }
+      for (const [word, count] of inside) found.pixels += isOwn(word) ? count : 0;
       if (one.data.kind === 'space') return found;
       const stride = Math.ceil(series.x.length / 2000);
       for (let i = 0; i < series.x.length; i += stride) {
@@ -133,26 +167,37 @@ function install() {
     });
   }
 
-  // Share of pixels that are clearly of another colour: lines may shift by a part of a pixel.
-  async function difference(one, other) {
-    const [a, b] = [await pixelsOf(one), await pixelsOf(other)];
-    if (a.width !== b.width || a.height !== b.height) return 1;
-    let count = 0;
-    for (let i = 0; i < a.data.length; i += 4) {
-      if (Math.hypot(...[0, 1, 2, 3].map((k) => a.data[i + k] - b.data[i + k])) > 100) ++count;
+  const albums = new Map();
+
+  // Keeps how all diagrams look now.
+  const remember = (album) => { albums.set(album, window.risley.charts.map((_, k) => picture(k))); };
+
+  // Whether two pictures are the same, and the share of pixels that are clearly of another colour:
+  // lines may shift by a part of a pixel.
+  function difference(a, b) {
+    if (a.width !== b.width || a.height !== b.height) return { same: false, share: 1 };
+    let same = true, count = 0;
+    for (let i = 0; i < a.words.length; ++i) {
+      if (a.words[i] === b.words[i]) continue;
+      same = false;
+      const apart = [0, 8, 16, 24].map((bit) =>
+        ((a.words[i] >>> bit) & 255) - ((b.words[i] >>> bit) & 255));
+      if (Math.hypot(...apart) > 100) ++count;
     }
-    return count / (a.data.length / 4);
+    return { same, share: count / a.words.length };
   }
 
-  // Share of pixels that are not of the commonest colour.
-  async function busyShare(url) {
-    const { data } = await pixelsOf(url);
-    const counts = new Map();
-    for (let i = 0; i < data.length; i += 4) {
-      const key = (data[i] << 16) | (data[i + 1] << 8) | data[i + 2];
-      counts.set(key, (counts.get(key) ?? 0) + 1);
-    }
-    return 1 - Math.max(...counts.values()) / (data.length / 4);
+  // Of every diagram, between two albums.
+  const differences = (one, other) =>
+    albums.get(one).map((picture, k) => difference(picture, albums.get(other)[k]));
+
+  // The size of a picture, and the share of its pixels that are not of the commonest colour.
+  async function seen(url) {
+    const image = new Image();
+    image.src = url;
+    await image.decode();
+    const { width, height, words } = pixelsOf(image, image.naturalWidth, image.naturalHeight);
+    return { size: [width, height], busy: 1 - Math.max(...census(words).values()) / words.length };
   }
 
   // A point of a flat diagram that can be pointed at: well inside, in the middle of its series.
@@ -203,7 +248,8 @@ function install() {
     return { visible, text, right };
   }
 
-  window.looking = { area, extents, drawn, busyShare, difference, pointToHover, tooltip, parts };
+  window.looking = { area, extents, drawn, seen, remember, differences, pointToHover, tooltip,
+    followKeys, keyNotes };
 }
 
 export const look = (tab) => tab.evaluate(install);

@@ -16,9 +16,9 @@ if (spawnSync(process.env.RISLEY_COMMAND, ['reproduce', '--help'], { encoding: '
 }
 const folder = ownFolder();
 
-inspect('reproduce', () => {
+inspect('reproduce', async () => {
   const kept = process.env.RISLEY_REPRODUCED;
   if (kept) return join(kept, 'report.html');
-  risley(folder, 0, 'reproduce', '-o', 'reproduce');
+  await risley(folder, 0, 'reproduce', '-o', 'reproduce');
   return join(folder, 'reproduce/report.html');
 }, /Table 3/, false);
