@@ -9,7 +9,7 @@ twice for the same, within a folder. Kernels, which have a compiler command of t
 at alone.
 
 Usage: tools/check_tidy.py BUILD_FOLDER [--changed]
-  BUILD_FOLDER  holds compile_commands.json, as the preset dev writes it
+  BUILD_FOLDER  holds compile_commands.json, as the presets dev and test write it
   --changed     only the sources that differ from the last commit, one by one
 RISLEY_JOBS limits the number of processes. Exit status: 0 all well, 1 a check fails, 77 skipped for
 want of clang-tidy.
@@ -25,21 +25,7 @@ from collections import defaultdict
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parent.parent
-
-
-def commands_of(build):
-    """The compiler's command for every source, without what it reads and writes."""
-    file = build / 'compile_commands.json'
-    if not file.exists():
-        sys.exit(f'check_tidy: {file} is missing; configure with --preset dev')
-    commands = {}
-    for entry in json.loads(file.read_text()):
-        source = Path(entry['directory'], entry['file']).resolve()
-        command = re.sub(r' -o \S+ -c \S+$', '', entry['command'])
-        command = re.sub(r' -Winvalid-pch -include \S+', '', command)  # headers parsed by gcc
-        commands.setdefault(source, (entry['directory'], command))  # kernels: the first set
-    return commands
+from compile_commands import ROOT, commands_of
 
 
 def changed_sources():
@@ -70,6 +56,7 @@ def look_at(sources, number, folder, commands):
     place = folder / f'piece_{number}'
     place.mkdir()
     directory, command = commands[sources[0]]
+    command = re.sub(r' -Winvalid-pch -include \S+', '', command)  # for gcc alone
     (place / 'compile_commands.json').write_text(json.dumps(
         [{'directory': directory, 'command': f'{command} -c {piece}', 'file': str(piece)}]))
     done = subprocess.run(

@@ -8,8 +8,7 @@
 
 #include "refusal.hpp"
 
-namespace risley::algebra {
-namespace {
+namespace risley::algebra::entries_test {
 
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
@@ -42,5 +41,4 @@ TEST(AlgebraEntries, SizesThatDoNotFitAreRefused) {
           "rows = [0, 3), allowed within [0, 2)");
 }
 
-}  // namespace
-}  // namespace risley::algebra
+}  // namespace risley::algebra::entries_test

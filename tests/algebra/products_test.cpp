@@ -4,8 +4,7 @@
 
 #include <gtest/gtest.h>
 
-namespace risley::algebra {
-namespace {
+namespace risley::algebra::products_test {
 
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
@@ -26,5 +25,4 @@ TEST(Products, AreThoseOfTheirNames) {
   EXPECT_EQ(sum, (MatrixXd(3, 2) << 3, 2, 5, 3, 7, 4).finished());
 }
 
-}  // namespace
-}  // namespace risley::algebra
+}  // namespace risley::algebra::products_test

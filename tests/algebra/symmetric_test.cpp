@@ -9,8 +9,7 @@
 
 #include "risley/algebra/products.hpp"
 
-namespace risley::algebra {
-namespace {
+namespace risley::algebra::symmetric_test {
 
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
@@ -81,5 +80,4 @@ TEST(PseudoInverse, IsTheInverseWhereThereIsOneAndZeroAlongTheRest) {
   EXPECT_EQ(pseudo_inverse(MatrixXd::Zero(2, 2)), MatrixXd(MatrixXd::Zero(2, 2)));
 }
 
-}  // namespace
-}  // namespace risley::algebra
+}  // namespace risley::algebra::symmetric_test

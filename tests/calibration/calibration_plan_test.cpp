@@ -18,8 +18,7 @@
 
 #include "calibration/walls.hpp"
 
-namespace risley::calibration {
-namespace {
+namespace risley::calibration::calibration_plan_test {
 
 using Eigen::Index;
 using ::testing::Contains;
@@ -330,5 +329,4 @@ TEST(CalibrationParameters, AreTheTiltsThatWallsTell) {
   EXPECT_THROW(calibration_parameters({2}, {"bearing_tilt_c_vertical_deg"}, {}), InvalidArgument);
 }
 
-}  // namespace
-}  // namespace risley::calibration
+}  // namespace risley::calibration::calibration_plan_test

@@ -22,8 +22,7 @@
 #include "optics/trains.hpp"
 #include "refusal.hpp"
 
-namespace risley::calibration {
-namespace {
+namespace risley::calibration::datum_test {
 
 using Eigen::Index;
 using testing::add_errors;
@@ -247,5 +246,4 @@ TEST(FormalDatum, AsksForACovarianceOfTheFreeParametersAndAnglesOfEveryPrism) {
   EXPECT_EQ(run(one, {{1, 2}, {3}}), "rotation angles of a prism has 1 values, expected 2");
 }
 
-}  // namespace
-}  // namespace risley::calibration
+}  // namespace risley::calibration::datum_test

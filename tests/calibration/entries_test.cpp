@@ -16,8 +16,7 @@
 
 #include "refusal.hpp"
 
-namespace risley::calibration {
-namespace {
+namespace risley::calibration::entries_test {
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
@@ -80,7 +79,7 @@ TEST(Entries, PlaneEquationsAskForColumnsPlacesAndNumbers) {
   EXPECT_EQ(run(shots, sound, {{}, three}), "variance has 3 values, expected 4 or none");
   PlaneView view = sound;
   view.places = {-1};
-  EXPECT_THAT(run(shots, view), testing::StartsWith("place = -1, allowed 0 to "));
+  EXPECT_THAT(run(shots, view), ::testing::StartsWith("place = -1, allowed 0 to "));
   view = sound;
   view.range_variance = 0;
   EXPECT_EQ(run(shots, view), "range variance = 0 m^2, allowed above 0");
@@ -190,5 +189,4 @@ TEST(Entries, ACalibrationAsksForColumnsAndMatricesThatBelongTogether) {
   EXPECT_EQ(one.run(), "rows of mean_angle_covariance has 0 values, expected 2");
 }
 
-}  // namespace
-}  // namespace risley::calibration
+}  // namespace risley::calibration::entries_test

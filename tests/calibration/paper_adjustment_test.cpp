@@ -20,8 +20,7 @@
 #include "calibration/walls.hpp"
 #include "optics/trains.hpp"
 
-namespace risley::calibration {
-namespace {
+namespace risley::calibration::paper_adjustment_test {
 
 using Eigen::Index;
 using testing::add_errors;
@@ -209,5 +208,4 @@ TEST(PaperAdjustment, RefusesALineAndNothing) {
   EXPECT_THROW(adjust_as_paper(p), EstimationError);
 }
 
-}  // namespace
-}  // namespace risley::calibration
+}  // namespace risley::calibration::paper_adjustment_test

@@ -28,8 +28,7 @@
 #include "calibration/walls.hpp"
 #include "optics/trains.hpp"
 
-namespace risley::calibration {
-namespace {
+namespace risley::calibration::planar_adjustment_test {
 
 using Eigen::Index;
 using testing::add_errors;
@@ -953,5 +952,4 @@ TEST(PlanarAdjustment, LostShotsAddNoRedundancy) {
   EXPECT_NEAR(solution.redundancy[0], whole - 50.0, 1.0);
 }
 
-}  // namespace
-}  // namespace risley::calibration
+}  // namespace risley::calibration::planar_adjustment_test

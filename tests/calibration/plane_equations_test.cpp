@@ -23,8 +23,7 @@
 
 #include "optics/trains.hpp"
 
-namespace risley::calibration {
-namespace {
+namespace risley::calibration::plane_equations_test {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
@@ -506,5 +505,4 @@ TEST(PlaneEquations, WrongLengthsAndPlacesAreRefused) {
   EXPECT_THROW(plane_equations(shots, view, {{}, column}), InvalidArgument);
 }
 
-}  // namespace
-}  // namespace risley::calibration
+}  // namespace risley::calibration::plane_equations_test

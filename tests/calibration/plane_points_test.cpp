@@ -15,8 +15,7 @@
 #include "risley/core/error.hpp"
 #include "risley/sensors/preset.hpp"
 
-namespace risley::calibration {
-namespace {
+namespace risley::calibration::plane_points_test {
 
 using ::testing::AllOf;
 using ::testing::ElementsAre;
@@ -200,5 +199,4 @@ TEST(RangedRecording, RefusesWhatIsNoEstimateWithRanges) {
   EXPECT_THAT(error_of(estimate), HasSubstr("no shot has both"));
 }
 
-}  // namespace
-}  // namespace risley::calibration
+}  // namespace risley::calibration::plane_points_test

@@ -20,8 +20,7 @@
 #include "risley/optics/batch.hpp"
 #include "risley/sensors/preset.hpp"
 
-namespace risley::calibration {
-namespace {
+namespace risley::calibration::plane_segmentation_test {
 
 constexpr double kNoise = 0.02;
 constexpr int kClutter = -1, kDoubtful = -2;  // true labels that are no row of the planes
@@ -476,5 +475,4 @@ TEST(FittedPlane, RefusesWhatDoesNotFixAPlane) {
   EXPECT_NO_THROW(fitted_plane(points, std::vector<std::size_t>{0, 1, 4}));
 }
 
-}  // namespace
-}  // namespace risley::calibration
+}  // namespace risley::calibration::plane_segmentation_test

@@ -18,8 +18,7 @@
 #include "risley/optics/batch.hpp"
 #include "risley/sensors/preset.hpp"
 
-namespace risley::calibration {
-namespace {
+namespace risley::calibration::surface_steps_test {
 
 constexpr double kNoise = 0.02;
 constexpr double kHalfField = 19.2 * kRadiansPerDegree;
@@ -253,5 +252,4 @@ TEST(SurfaceSteps, RefusesColumnsOfDifferentLength) {
   EXPECT_THROW(inspect_surface({two, three, two, two}), InvalidArgument);
 }
 
-}  // namespace
-}  // namespace risley::calibration
+}  // namespace risley::calibration::surface_steps_test

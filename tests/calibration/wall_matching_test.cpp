@@ -14,8 +14,7 @@
 
 #include "calibration/walls.hpp"
 
-namespace risley::calibration {
-namespace {
+namespace risley::calibration::wall_matching_test {
 
 using ::testing::AllOf;
 using ::testing::ElementsAre;
@@ -259,5 +258,4 @@ TEST(WallMatching, NamesAStationThatSharesNothing) {
   EXPECT_NO_THROW(match_walls(found, {"one"}, std::nullopt, {kFlipped}));
 }
 
-}  // namespace
-}  // namespace risley::calibration
+}  // namespace risley::calibration::wall_matching_test

@@ -11,12 +11,11 @@
 
 #include "risley/core/error.hpp"
 
-namespace risley::cloud {
-namespace {
+namespace risley::cloud::cloud_writer_test {
 
-using testing::AllOf;
-using testing::HasSubstr;
-using testing::ThrowsMessage;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::ThrowsMessage;
 
 TEST(CloudFormats, HaveNamesEndingsAndDescriptions) {
   std::set<std::string> names;
@@ -90,5 +89,4 @@ TEST(CreateCloud, RefusesMissingFolders) {
   EXPECT_THROW(create_cloud((folder / "cloud.las").string(), {}), FileError);
 }
 
-}  // namespace
-}  // namespace risley::cloud
+}  // namespace risley::cloud::cloud_writer_test

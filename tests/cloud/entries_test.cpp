@@ -15,8 +15,7 @@
 #include "cloud/cloud_samples.hpp"
 #include "refusal.hpp"
 
-namespace risley::cloud {
-namespace {
+namespace risley::cloud::entries_test {
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
@@ -146,7 +145,7 @@ TEST(Entries, PointsAskForAHeaderAndAModelThatFit) {
   EXPECT_EQ(one.run(), "number of prisms of the cloud = 3, allowed 2 to 2");
   one = {};
   one.header.factors.assign(one.model.factors.size() + 1, "factor");
-  EXPECT_THAT(one.run(), testing::StartsWith("factors of the cloud has "));
+  EXPECT_THAT(one.run(), ::testing::StartsWith("factors of the cloud has "));
   one = {};
   one.header.has_rotation_angles = false;
   EXPECT_EQ(one.run(), "the cloud has no rotation angles, which the model needs");
@@ -158,15 +157,15 @@ TEST(Entries, PointsAskForAHeaderAndAModelThatFit) {
   EXPECT_EQ(one.run(), "angle noise = -1 rad, allowed 0 and above");
   one = {};
   one.model.factors.push_back({"empty", {}, 0});
-  EXPECT_THAT(one.run(), testing::StartsWith("weights of a factor has 0 values, expected "));
+  EXPECT_THAT(one.run(), ::testing::StartsWith("weights of a factor has 0 values, expected "));
 }
 
 TEST(Entries, TrackingAsksForARateProcessesAndColumns) {
   const SensorBelief belief = some_belief();
   for (const double rate : {0.0, kNan}) {
-    EXPECT_THAT(
-        refusal([&] { return RotorTracker(belief, rate); }),
-        testing::AllOf(testing::StartsWith("rate = "), testing::EndsWith(" Hz, allowed above 0")));
+    EXPECT_THAT(refusal([&] { return RotorTracker(belief, rate); }),
+                ::testing::AllOf(::testing::StartsWith("rate = "),
+                                 ::testing::EndsWith(" Hz, allowed above 0")));
   }
   SensorBelief spoilt = belief;
   spoilt.rotor_process.pop_back();
@@ -200,5 +199,4 @@ TEST(Entries, SurfacesAskForNoise) {
   EXPECT_EQ(refusal([] { return SurfaceNormals(kNan); }), "range noise = nan m, allowed above 0");
 }
 
-}  // namespace
-}  // namespace risley::cloud
+}  // namespace risley::cloud::entries_test

@@ -17,8 +17,7 @@
 
 #include "cloud/cloud_samples.hpp"
 
-namespace risley::cloud {
-namespace {
+namespace risley::cloud::las_recording_test {
 
 using recordings::Observations;
 
@@ -30,7 +29,7 @@ std::vector<std::string> formats_of_this_build() {
   return formats;
 }
 
-class LasRecordingTest : public testing::TestWithParam<std::string> {
+class LasRecordingTest : public ::testing::TestWithParam<std::string> {
  protected:
   LasRecordingTest() {
     one_.header.sensor = "Livox Mid-40";
@@ -112,7 +111,7 @@ TEST_P(LasRecordingTest, ACutFileGivesThePointsBeforeAndThenThePlace) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Formats, LasRecordingTest, testing::ValuesIn(formats_of_this_build()),
+INSTANTIATE_TEST_SUITE_P(Formats, LasRecordingTest, ::testing::ValuesIn(formats_of_this_build()),
                          [](const auto& test) {
                            std::string name = test.param;
                            std::erase_if(name, [](char c) { return c == '-' || c == '.'; });
@@ -162,12 +161,11 @@ TEST(LazRecordingTest, ChunkTablesThatCannotBeAreRefused) {
   stream.read(reinterpret_cast<char*>(&table), 8);
   stream.close();
   EXPECT_THAT(laz_error(path, static_cast<std::uint64_t>(table) + 4, "\xff\xff\xff\x7f"),
-              testing::HasSubstr("chunks in a file of"));
+              ::testing::HasSubstr("chunks in a file of"));
   EXPECT_THAT(laz_error(path, points_at, std::string("\xff\xff\xff\xff\xff\xff\xff\x7f", 8)),
-              testing::HasSubstr("expected the chunk table between"));
+              ::testing::HasSubstr("expected the chunk table between"));
 }
 
 #endif
 
-}  // namespace
-}  // namespace risley::cloud
+}  // namespace risley::cloud::las_recording_test

@@ -21,13 +21,12 @@
 #include "cloud/formats/las_layout.hpp"
 #include "cloud/las_checker.hpp"
 
-namespace risley::cloud {
-namespace {
+namespace risley::cloud::las_test {
 
 using recordings::TimeReference;
-using testing::AllOf;
-using testing::ElementsAre;
-using testing::HasSubstr;
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
 
 constexpr double kPi = 3.14159265358979323846;
 
@@ -136,7 +135,7 @@ Points slice(const Points& points, std::size_t first, std::size_t rows) {
   return piece;
 }
 
-class LasTest : public testing::Test {
+class LasTest : public ::testing::Test {
  protected:
   LasTest() {
     static int count = 0;
@@ -242,7 +241,7 @@ struct Variant {
   std::size_t factors;
 };
 
-class LasVariants : public LasTest, public testing::WithParamInterface<Variant> {
+class LasVariants : public LasTest, public ::testing::WithParamInterface<Variant> {
  protected:
   LasVariants() {
     options_.format = GetParam().format;
@@ -275,11 +274,13 @@ TEST_P(LasVariants, PiecesMakeNoDifference) {
   EXPECT_TRUE(bytes() == whole);
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    All, LasVariants,
-    testing::Values(Variant{"las-1.4", true, true, 2, 0}, Variant{"las-1.4", false, true, 3, 0},
-                    Variant{"las-1.4", true, false, 2, 4}, Variant{"las-1.4", false, false, 2, 0},
-                    Variant{"las-1.2", true, true, 3, 2}, Variant{"las-1.2", false, false, 2, 0}));
+INSTANTIATE_TEST_SUITE_P(All, LasVariants,
+                         ::testing::Values(Variant{"las-1.4", true, true, 2, 0},
+                                           Variant{"las-1.4", false, true, 3, 0},
+                                           Variant{"las-1.4", true, false, 2, 4},
+                                           Variant{"las-1.4", false, false, 2, 0},
+                                           Variant{"las-1.2", true, true, 3, 2},
+                                           Variant{"las-1.2", false, false, 2, 0}));
 
 TEST_F(LasTest, ManyBlocksOfTheBuffer) {
   const Points points = random_points(header_, 40'000);  // several MB
@@ -306,7 +307,7 @@ TEST_F(LasTest, HeaderOfAnUnknownSensor) {
   write(random_points(header_, 1));
   las_checker::File file = las_checker::read(path());
   EXPECT_EQ(file.system_identifier.size(), 32U);
-  EXPECT_THAT(file.system_identifier, testing::StartsWith("Ger"));
+  EXPECT_THAT(file.system_identifier, ::testing::StartsWith("Ger"));
   EXPECT_EQ(file.generating_software, "risley");
   EXPECT_EQ(file.record("LASF_Spec", 3), nullptr);
 
@@ -422,7 +423,7 @@ TEST_F(LasTest, AllReturnsThatLas14Counts) {
   }
   write(points);
   const las_checker::File file = las_checker::read(path());
-  EXPECT_THAT(file.points_by_return, testing::Each(1U));
+  EXPECT_THAT(file.points_by_return, ::testing::Each(1U));
   expect_equal(file, points);
 }
 
@@ -529,5 +530,4 @@ TEST_F(LasTest, CreationDayOfLeapYears) {
   EXPECT_EQ(las_checker::read(path()).creation_year, 2024);
 }
 
-}  // namespace
-}  // namespace risley::cloud
+}  // namespace risley::cloud::las_test

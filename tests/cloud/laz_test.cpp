@@ -18,8 +18,7 @@
 
 #include "cloud/cloud_samples.hpp"
 
-namespace risley::cloud {
-namespace {
+namespace risley::cloud::laz_test {
 
 #ifdef RISLEY_HAS_LASZIP
 
@@ -101,5 +100,4 @@ TEST(LazTest, HoldsWhatTheLasFileHolds) {
 
 #endif
 
-}  // namespace
-}  // namespace risley::cloud
+}  // namespace risley::cloud::laz_test

@@ -19,8 +19,7 @@
 #include "risley/sensors/preset.hpp"
 #include "risley/simulation/scanner.hpp"
 
-namespace risley::cloud {
-namespace {
+namespace risley::cloud::make_cloud_test {
 
 namespace fs = std::filesystem;
 using ::testing::HasSubstr;
@@ -275,5 +274,4 @@ TEST_F(MakeCloud, ACoordinateThatLasCannotHoldLeavesNothing) {
   EXPECT_EQ(files(), 0U);
 }
 
-}  // namespace
-}  // namespace risley::cloud
+}  // namespace risley::cloud::make_cloud_test

@@ -8,8 +8,7 @@
 
 #include "cloud/cloud_samples.hpp"
 
-namespace risley::cloud {
-namespace {
+namespace risley::cloud::netcdf_cloud_test {
 
 /// A NetCDF file as others read it.
 class Reader {
@@ -83,7 +82,7 @@ class Reader {
   int id_ = 0;
 };
 
-class NetcdfCloud : public testing::TestWithParam<CloudCase> {
+class NetcdfCloud : public ::testing::TestWithParam<CloudCase> {
  protected:
   const CloudHeader& header() const { return GetParam().header; }
   std::string write() {
@@ -96,7 +95,7 @@ class NetcdfCloud : public testing::TestWithParam<CloudCase> {
   Points points_ = make_points(GetParam());
 };
 
-INSTANTIATE_TEST_SUITE_P(Clouds, NetcdfCloud, testing::ValuesIn(cloud_cases()),
+INSTANTIATE_TEST_SUITE_P(Clouds, NetcdfCloud, ::testing::ValuesIn(cloud_cases()),
                          [](const auto& one) { return one.param.name; });
 
 TEST_P(NetcdfCloud, HoldsEveryField) {
@@ -220,5 +219,4 @@ TEST(NetcdfClouds, GoOverManyBlocks) {
               {column(expected, "X"), column(expected, "LidarRange")});
 }
 
-}  // namespace
-}  // namespace risley::cloud
+}  // namespace risley::cloud::netcdf_cloud_test

@@ -7,8 +7,7 @@
 
 #include <gtest/gtest.h>
 
-namespace risley::cloud {
-namespace {
+namespace risley::cloud::piece_overlap_test {
 
 TEST(PieceOverlap, IsATenthOfASecondOfTheClock) {
   std::vector<std::int64_t> times;
@@ -33,5 +32,4 @@ TEST(PieceOverlap, TakesTimesOfAnySize) {
   EXPECT_EQ(overlap_begin(times, 2), 1U);
 }
 
-}  // namespace
-}  // namespace risley::cloud
+}  // namespace risley::cloud::piece_overlap_test

@@ -26,8 +26,7 @@
 
 #include "optics/trains.hpp"
 
-namespace risley::cloud {
-namespace {
+namespace risley::cloud::pointing_test {
 
 using Eigen::Index;
 using Eigen::Matrix3d;
@@ -1273,5 +1272,4 @@ INSTANTIATE_TEST_SUITE_P(Errors, PointMonteCarlo, ::testing::Bool(), [](const au
   return common.param ? "CommonOnesLead" : "OfAMid40";
 });
 
-}  // namespace
-}  // namespace risley::cloud
+}  // namespace risley::cloud::pointing_test

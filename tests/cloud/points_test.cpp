@@ -12,8 +12,7 @@
 
 #include "refusal.hpp"
 
-namespace risley::cloud {
-namespace {
+namespace risley::cloud::points_test {
 
 /// Number of each column, a different one for each, so that mixed-up columns differ.
 template <class Function>
@@ -168,5 +167,4 @@ TEST(Points, KeepsOnlyRowsThatAreThereInTheirOrder) {
   EXPECT_EQ(points.size(), 4U);
 }
 
-}  // namespace
-}  // namespace risley::cloud
+}  // namespace risley::cloud::points_test

@@ -13,10 +13,9 @@
 
 #include "cloud/cloud_samples.hpp"
 
-namespace risley::cloud {
-namespace {
+namespace risley::cloud::record_files_test {
 
-class RecordFiles : public testing::TestWithParam<CloudCase> {
+class RecordFiles : public ::testing::TestWithParam<CloudCase> {
  protected:
   const CloudHeader& header() const { return GetParam().header; }
 
@@ -25,7 +24,7 @@ class RecordFiles : public testing::TestWithParam<CloudCase> {
   TestTable expected_ = expected_table(header(), points_);
 };
 
-INSTANTIATE_TEST_SUITE_P(Clouds, RecordFiles, testing::ValuesIn(cloud_cases()),
+INSTANTIATE_TEST_SUITE_P(Clouds, RecordFiles, ::testing::ValuesIn(cloud_cases()),
                          [](const auto& one) { return one.param.name; });
 
 /// Takes the text up to and including a line away from a file's bytes.
@@ -201,5 +200,4 @@ TEST(PlyComments, TellTheProvenanceInLinesThatEveryReaderTakes) {
   EXPECT_EQ(joined, "long: " + letters);
 }
 
-}  // namespace
-}  // namespace risley::cloud
+}  // namespace risley::cloud::record_files_test

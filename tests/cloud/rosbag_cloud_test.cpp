@@ -16,8 +16,7 @@
 
 #include "cloud/cloud_samples.hpp"
 
-namespace risley::cloud {
-namespace {
+namespace risley::cloud::rosbag_cloud_test {
 
 /// A PointCloud2 message, and when the bag has it.
 struct Message {
@@ -117,7 +116,7 @@ TestTable join(const std::vector<Message>& messages) {
   return table;
 }
 
-class RosbagCloud : public testing::TestWithParam<CloudCase> {
+class RosbagCloud : public ::testing::TestWithParam<CloudCase> {
  protected:
   std::string write() {
     std::string path = folder_ / "cloud.bag";
@@ -134,7 +133,7 @@ class RosbagCloud : public testing::TestWithParam<CloudCase> {
   }();
 };
 
-INSTANTIATE_TEST_SUITE_P(Clouds, RosbagCloud, testing::ValuesIn(cloud_cases()),
+INSTANTIATE_TEST_SUITE_P(Clouds, RosbagCloud, ::testing::ValuesIn(cloud_cases()),
                          [](const auto& one) { return one.param.name; });
 
 TEST_P(RosbagCloud, HoldsEveryField) {
@@ -293,5 +292,4 @@ TEST(RosbagClouds, DivideLongMessages) {
   EXPECT_EQ(found, one.points);
 }
 
-}  // namespace
-}  // namespace risley::cloud
+}  // namespace risley::cloud::rosbag_cloud_test

@@ -17,8 +17,7 @@
 
 #include "statistics/simulated.hpp"
 
-namespace risley::cloud {
-namespace {
+namespace risley::cloud::rotor_tracking_test {
 
 using recordings::Observations;
 using sensors::CalibrationReference;
@@ -426,5 +425,4 @@ TEST(RotorTracker, WithoutAShotThereIsNothingToFind) {
   EXPECT_THROW(tracker.track({}), EstimationError);
 }
 
-}  // namespace
-}  // namespace risley::cloud
+}  // namespace risley::cloud::rotor_tracking_test

@@ -17,8 +17,7 @@
 #include "risley/core/plane.hpp"
 #include "risley/core/random.hpp"
 
-namespace risley::cloud {
-namespace {
+namespace risley::cloud::surface_normals_test {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 const double kFieldRadius = radians_from_degrees(19.2);  // of a Mid-40
@@ -349,5 +348,4 @@ TEST(SurfaceNormals, AShotWithoutARangeTellsNothing) {
   EXPECT_NEAR(std::abs(normals.normal(1e-3, kPi / 2 + 1e-3).x), 1.0, 1e-6);
 }
 
-}  // namespace
-}  // namespace risley::cloud
+}  // namespace risley::cloud::surface_normals_test

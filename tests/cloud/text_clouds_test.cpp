@@ -12,10 +12,9 @@
 
 #include "cloud/cloud_samples.hpp"
 
-namespace risley::cloud {
-namespace {
+namespace risley::cloud::text_clouds_test {
 
-class TextClouds : public testing::TestWithParam<CloudCase> {
+class TextClouds : public ::testing::TestWithParam<CloudCase> {
  protected:
   const CloudHeader& header() const { return GetParam().header; }
 
@@ -24,7 +23,7 @@ class TextClouds : public testing::TestWithParam<CloudCase> {
   TestTable expected_ = expected_table(header(), points_);
 };
 
-INSTANTIATE_TEST_SUITE_P(Clouds, TextClouds, testing::ValuesIn(cloud_cases()),
+INSTANTIATE_TEST_SUITE_P(Clouds, TextClouds, ::testing::ValuesIn(cloud_cases()),
                          [](const auto& one) { return one.param.name; });
 
 std::vector<std::string> split(const std::string& line, char separator) {
@@ -102,5 +101,4 @@ TEST(TextCloud, UnknownNumbersHaveNoSign) {
   EXPECT_EQ(text.find("-nan"), std::string::npos);
 }
 
-}  // namespace
-}  // namespace risley::cloud
+}  // namespace risley::cloud::text_clouds_test

@@ -12,12 +12,11 @@
 #include "cloud/cloud_samples.hpp"
 #include "cloud/file_size_limit.hpp"
 
-namespace risley::cloud {
-namespace {
+namespace risley::cloud::writers_test {
 
 namespace fs = std::filesystem;
 
-class CloudWriters : public testing::TestWithParam<std::string> {
+class CloudWriters : public ::testing::TestWithParam<std::string> {
  protected:
   CloudWriters() {
     for (const CloudCase& one : cloud_cases()) {
@@ -44,7 +43,7 @@ std::vector<std::string> formats_of_this_test() {
   return formats;
 }
 
-INSTANTIATE_TEST_SUITE_P(Formats, CloudWriters, testing::ValuesIn(formats_of_this_test()),
+INSTANTIATE_TEST_SUITE_P(Formats, CloudWriters, ::testing::ValuesIn(formats_of_this_test()),
                          [](const auto& one) {
                            return one.param == "ros1-bag" ? "ros1_bag" : one.param;
                          });
@@ -102,5 +101,4 @@ TEST_P(CloudWriters, SayWhenTheDiskRefuses) {
   }
 }
 
-}  // namespace
-}  // namespace risley::cloud
+}  // namespace risley::cloud::writers_test

@@ -6,8 +6,7 @@
 
 #include <gtest/gtest.h>
 
-namespace risley {
-namespace {
+namespace risley::angle_test {
 
 TEST(Angle, WrapsIntoOneTurn) {
   EXPECT_EQ(wrap_to_two_pi(0.0), 0.0);
@@ -26,5 +25,4 @@ TEST(Angle, WhatIsNoAngleStaysNoAngle) {
   }
 }
 
-}  // namespace
-}  // namespace risley
+}  // namespace risley::angle_test

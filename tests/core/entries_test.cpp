@@ -10,8 +10,7 @@
 
 #include "refusal.hpp"
 
-namespace risley {
-namespace {
+namespace risley::entries_test {
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
@@ -34,12 +33,11 @@ int one() { return 1; }
 TEST(Entries, KernelsAskForAnInstructionSetOfTheProcessor) {
   const auto unknown = static_cast<InstructionSet>(3);  // one that no processor runs
   const auto begins =
-      testing::StartsWith("instruction set = unknown, this processor and binary allow baseline");
+      ::testing::StartsWith("instruction set = unknown, this processor and binary allow baseline");
   EXPECT_THAT(refusal([&] { check_available(unknown); }), begins);
   const KernelCopies<int()> kernel{&one, nullptr, nullptr};
   EXPECT_THAT(refusal([&] { kernel.at(unknown); }), begins);
   for (const InstructionSet set : available_instruction_sets()) EXPECT_EQ(kernel.at(set)(), 1);
 }
 
-}  // namespace
-}  // namespace risley
+}  // namespace risley::entries_test

@@ -6,8 +6,7 @@
 
 #include <gtest/gtest.h>
 
-namespace risley {
-namespace {
+namespace risley::golden_section_test {
 
 TEST(GoldenSection, FindsTheMinimumToHalfTheTolerance) {
   for (const double tolerance : {1e-2, 1e-4, 1e-6}) {
@@ -46,5 +45,4 @@ TEST(GoldenSection, StaysInsideAndEvaluatesOncePerStep) {
             2 + static_cast<int>(std::ceil(std::log(tolerance / width) / std::log(share))));
 }
 
-}  // namespace
-}  // namespace risley
+}  // namespace risley::golden_section_test

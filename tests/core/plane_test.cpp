@@ -8,8 +8,7 @@
 
 #include "risley/core/angle.hpp"
 
-namespace risley {
-namespace {
+namespace risley::plane_test {
 
 Plane tilted_wall() {
   return plane_from_angles({radians_from_degrees(10.0), radians_from_degrees(80.0)}, 30.0);
@@ -47,5 +46,4 @@ TEST(Plane, ParallelRayNeverMeetsIt) {
   EXPECT_EQ(hit_distance(floor, {0, 0, 0}, {0.0, 0.0, -1.0}), 1.4);
 }
 
-}  // namespace
-}  // namespace risley
+}  // namespace risley::plane_test

@@ -9,8 +9,7 @@
 
 #include <gtest/gtest.h>
 
-namespace risley {
-namespace {
+namespace risley::random_test {
 
 struct Moments {
   double mean = 0, variance = 0, skewness = 0, kurtosis = 0;
@@ -108,5 +107,4 @@ TEST(RandomStream, SeedsMeanTheSameInEveryRelease) {
   EXPECT_DOUBLE_EQ(stream.normal(1000000007), -1.4653963713153733);
 }
 
-}  // namespace
-}  // namespace risley
+}  // namespace risley::random_test

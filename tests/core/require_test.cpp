@@ -9,8 +9,7 @@
 
 #include "refusal.hpp"
 
-namespace risley {
-namespace {
+namespace risley::require_test {
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
@@ -70,5 +69,4 @@ TEST(Require, UnitVectors) {
             "direction has length nan, expected a unit vector");
 }
 
-}  // namespace
-}  // namespace risley
+}  // namespace risley::require_test

@@ -9,8 +9,7 @@
 
 #include "risley/core/error.hpp"
 
-namespace risley::estimation {
-namespace {
+namespace risley::estimation::angle_noise_test {
 
 /// Residuals of noise and of rounding, which half of the shots have coarsely.
 struct Residuals {
@@ -111,5 +110,4 @@ TEST(AngleNoise, MustBePositive) {
   EXPECT_THROW(check_noise({1e-5, std::numeric_limits<double>::quiet_NaN()}), InvalidArgument);
 }
 
-}  // namespace
-}  // namespace risley::estimation
+}  // namespace risley::estimation::angle_noise_test

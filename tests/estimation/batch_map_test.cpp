@@ -16,8 +16,7 @@
 
 #include "estimation/series.hpp"
 
-namespace risley::estimation {
-namespace {
+namespace risley::estimation::batch_map_test {
 
 constexpr double kNoise = radians_from_degrees(0.01);
 
@@ -334,5 +333,4 @@ TEST(BatchMap, PoliteRefusals) {
                InvalidArgument);
 }
 
-}  // namespace
-}  // namespace risley::estimation
+}  // namespace risley::estimation::batch_map_test

@@ -11,8 +11,7 @@
 
 #include "estimation/series.hpp"
 
-namespace risley::estimation {
-namespace {
+namespace risley::estimation::coordinate_rounding_test {
 
 constexpr double kStep = 0.001;  // m
 
@@ -92,5 +91,4 @@ TEST(CoordinateRounding, HalfStepsAreAddedAwayFromZero) {
   EXPECT_EQ(series.azimuth[1], 0.1);  // no range: nothing is known of its coordinates
 }
 
-}  // namespace
-}  // namespace risley::estimation
+}  // namespace risley::estimation::coordinate_rounding_test

@@ -12,8 +12,7 @@
 
 #include "risley/core/angle.hpp"
 
-namespace risley::estimation {
-namespace {
+namespace risley::estimation::diagnostics_test {
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
@@ -255,5 +254,4 @@ TEST(Autocorrelation, AClockThatStandsStillTellsNothing) {
   EXPECT_TRUE(found.rho.empty());
 }
 
-}  // namespace
-}  // namespace risley::estimation
+}  // namespace risley::estimation::diagnostics_test

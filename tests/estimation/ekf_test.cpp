@@ -15,8 +15,7 @@
 
 #include "estimation/series.hpp"
 
-namespace risley::estimation {
-namespace {
+namespace risley::estimation::ekf_test {
 
 constexpr double kNoise = radians_from_degrees(0.01);
 
@@ -175,5 +174,4 @@ TEST(Diagnostics, MomentsOfAKnownSample) {
   EXPECT_TRUE(std::isnan(moments({}).mean));
 }
 
-}  // namespace
-}  // namespace risley::estimation
+}  // namespace risley::estimation::ekf_test

@@ -17,8 +17,7 @@
 
 #include "optics/trains.hpp"
 
-namespace risley::estimation {
-namespace {
+namespace risley::estimation::emitters_test {
 
 constexpr double kNoise = radians_from_degrees(0.01);
 
@@ -214,5 +213,4 @@ TEST(NormalEquations, RefuseABeamThatTheTrainDoesNotHave) {
                InvalidArgument);
 }
 
-}  // namespace
-}  // namespace risley::estimation
+}  // namespace risley::estimation::emitters_test

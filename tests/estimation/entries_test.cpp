@@ -26,8 +26,7 @@
 
 #include "refusal.hpp"
 
-namespace risley::estimation {
-namespace {
+namespace risley::estimation::entries_test {
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
@@ -79,7 +78,7 @@ TEST(Entries, AngleProfilerAsksForABinAndCountsNoNan) {
   profiler.add(kNan, 1.0, 1.0);
   profiler.add(0.1, kNan, 1.0);
   profiler.add(0.1, 2.0, 1.0);
-  EXPECT_THAT(profiler.result().count, testing::ElementsAre(1, 0, 0, 0));
+  EXPECT_THAT(profiler.result().count, ::testing::ElementsAre(1, 0, 0, 0));
   EXPECT_EQ(profiler.result().mean_azimuth[0], 2.0);
 }
 
@@ -98,7 +97,7 @@ TEST(Entries, NoiseAsksForNumbersAndColumnsOfTheSeries) {
   EXPECT_EQ(refusal([&] { return noise_components(series, four, four, few, 0, 1); }),
             "outlier has 3 values, expected 4");
   EXPECT_THAT(refusal([&] { return noise_components(series, four, four, outlier, 1, 1); }),
-              testing::StartsWith("used share = 1, allowed 0 to "));
+              ::testing::StartsWith("used share = 1, allowed 0 to "));
   EXPECT_EQ(refusal([&] { return noise_components(series, four, four, outlier, 0, kNan); }),
             "square factor = nan, allowed above 0");
 }
@@ -141,14 +140,14 @@ TEST(Entries, RatesAndGapsAreNumbers) {
   const AngleSeries series = shots(4);
   std::vector<ShotRange> ranges{{0, 4}};
   for (const double rate : {0.0, -1.0, kNan}) {
-    EXPECT_THAT(
-        refusal([&] { return thinned(series, rate, ranges); }),
-        testing::AllOf(testing::StartsWith("rate = "), testing::EndsWith(" Hz, allowed above 0")));
+    EXPECT_THAT(refusal([&] { return thinned(series, rate, ranges); }),
+                ::testing::AllOf(::testing::StartsWith("rate = "),
+                                 ::testing::EndsWith(" Hz, allowed above 0")));
     EXPECT_THAT(refusal([&] { return ShotSelector({.rate = rate}); }),
-                testing::StartsWith("rate = "));
+                ::testing::StartsWith("rate = "));
   }
   EXPECT_THAT(refusal([&] { return stretches(series, kNan); }),
-              testing::StartsWith("longest gap = nan s, allowed 0 to "));
+              ::testing::StartsWith("longest gap = nan s, allowed 0 to "));
 }
 
 TEST(Entries, AStepNeedsTwoTimes) {
@@ -162,7 +161,7 @@ TEST(Entries, KnotsAskForRotorsAnIntervalAndRows) {
   EXPECT_EQ(refusal([&] { return make_knots(series, all, 0); }),
             "number of prisms = 0, allowed 1 to 4");
   EXPECT_THAT(refusal([&] { return make_knots(series, all, 2, 0.0); }),
-              testing::StartsWith("interval = 0 s, allowed 1e-09 to "));
+              ::testing::StartsWith("interval = 0 s, allowed 1e-09 to "));
   EXPECT_EQ(refusal([&] { return make_knots(series, beyond, 2); }),
             "range = [0, 5), allowed within [0, 4)");
 }
@@ -307,7 +306,7 @@ TEST(Entries, NormalEquationsAskForAnInstructionSetOfTheProcessor) {
         accumulate(linear.series, linear.knots, linear.train, linear.free, linear.weights,
                    linear.equations, {}, static_cast<InstructionSet>(3));
       }),
-      testing::StartsWith("instruction set = unknown, this processor and binary allow baseline"));
+      ::testing::StartsWith("instruction set = unknown, this processor and binary allow baseline"));
   EXPECT_EQ(linear.equations.knots(), 0U);
 }
 
@@ -381,7 +380,7 @@ TEST(Entries, TheBatchEstimatorAsksForAStartOfEveryRotorAndSoundOptions) {
   EXPECT_EQ(run(start, {}), "angular_velocity of the start = nan rad/s, allowed finite");
   start = two_rotors();
   EXPECT_THAT(run(start, with(BatchMapOptions{}, &BatchMapOptions::knot_interval, kNan)),
-              testing::StartsWith("knot interval = nan s, allowed 1e-09 to "));
+              ::testing::StartsWith("knot interval = nan s, allowed 1e-09 to "));
   EXPECT_EQ(run(start, with(BatchMapOptions{}, &BatchMapOptions::frame_sigma, -1)),
             "frame sigma = -1 rad, allowed 0 and above");
   EXPECT_EQ(run(start, with(BatchMapOptions{}, &BatchMapOptions::outlier_chi2, 0)),
@@ -516,5 +515,4 @@ TEST(Entries, EvaluationAsksForTheTruthOfTheRecording) {
   EXPECT_EQ(judged.run(), "the truth belongs to another recording: 1 of 4 shots have no row in it");
 }
 
-}  // namespace
-}  // namespace risley::estimation
+}  // namespace risley::estimation::entries_test

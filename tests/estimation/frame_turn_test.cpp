@@ -9,8 +9,7 @@
 
 #include "estimation/series.hpp"
 
-namespace risley::estimation {
-namespace {
+namespace risley::estimation::frame_turn_test {
 
 TEST(FrameTurn, ItsOpticalAxisPointsToYawAndMinusPitch) {
   for (const double yaw : {-3.0, -0.5, 0.0, 1.2, 3.1}) {
@@ -69,5 +68,4 @@ TEST(FrameTurn, SmallFurtherTurnsMoveTheAxisAsTheyShould) {
   EXPECT_EQ(turned_further(first, {0.0, 0.0}), first);
 }
 
-}  // namespace
-}  // namespace risley::estimation
+}  // namespace risley::estimation::frame_turn_test

@@ -12,8 +12,7 @@
 
 #include "estimation/series.hpp"
 
-namespace risley::estimation {
-namespace {
+namespace risley::estimation::initialisation_test {
 
 /// A Mid-40 with random errors, speeds and combination.
 sensors::Sensor random_sensor(std::mt19937_64& generator, double error_deg, double speed_share) {
@@ -350,5 +349,4 @@ TEST(Initialisation, SpeedsOfAnotherSensorAreRefused) {
                EstimationError);
 }
 
-}  // namespace
-}  // namespace risley::estimation
+}  // namespace risley::estimation::initialisation_test

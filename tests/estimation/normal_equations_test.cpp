@@ -20,8 +20,7 @@
 #include "estimation/knot_model.hpp"
 #include "optics/trains.hpp"
 
-namespace risley::estimation {
-namespace {
+namespace risley::estimation::normal_equations_test {
 
 constexpr double kNoise = radians_from_degrees(0.01);
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
@@ -414,5 +413,4 @@ TEST(NormalEquations, ScalingScalesAllInformation) {
   expect_scaled(scaled.static_gradient, wide.static_gradient);
 }
 
-}  // namespace
-}  // namespace risley::estimation
+}  // namespace risley::estimation::normal_equations_test

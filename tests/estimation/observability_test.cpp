@@ -12,8 +12,7 @@
 
 #include "estimation/series.hpp"
 
-namespace risley::estimation {
-namespace {
+namespace risley::estimation::observability_test {
 
 ObservabilityPlan plan_of(const char* sensor, double duration, double rate) {
   ObservabilityPlan plan;
@@ -158,5 +157,4 @@ TEST(Observability, PlansThatMakeNoSenseAreRefused) {
   EXPECT_THROW(observability_of_plan(plan), InvalidArgument);
 }
 
-}  // namespace
-}  // namespace risley::estimation
+}  // namespace risley::estimation::observability_test

@@ -6,8 +6,7 @@
 
 #include "risley/core/error.hpp"
 
-namespace risley::estimation {
-namespace {
+namespace risley::estimation::parameter_agreement_test {
 
 TEST(ParameterAgreement, CountsSigmasAlongTheCovariance) {
   Eigen::Matrix2d covariance;
@@ -31,5 +30,4 @@ TEST(ParameterAgreement, SizesMustMatch) {
                InvalidArgument);
 }
 
-}  // namespace
-}  // namespace risley::estimation
+}  // namespace risley::estimation::parameter_agreement_test

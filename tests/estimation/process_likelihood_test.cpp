@@ -17,8 +17,7 @@
 
 #include "estimation/knot_model.hpp"
 
-namespace risley::estimation {
-namespace {
+namespace risley::estimation::process_likelihood_test {
 
 using Real = long double;
 using Matrix = Eigen::Matrix<Real, Eigen::Dynamic, Eigen::Dynamic>;
@@ -323,5 +322,4 @@ TEST(LikeliestProcess, FindsWalkAndJerkTogether) {
   }
 }
 
-}  // namespace
-}  // namespace risley::estimation
+}  // namespace risley::estimation::process_likelihood_test

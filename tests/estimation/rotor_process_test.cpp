@@ -9,8 +9,7 @@
 #include <Eigen/Eigenvalues>
 #include <gtest/gtest.h>
 
-namespace risley::estimation {
-namespace {
+namespace risley::estimation::rotor_process_test {
 
 Eigen::Matrix3d matrix(const RotorProcess& process, double dt) {
   const RotorStepCovariance q = step_covariance(process, dt);
@@ -135,5 +134,4 @@ TEST(RotorProcess, NoTimeAddsNothing) {
   }
 }
 
-}  // namespace
-}  // namespace risley::estimation
+}  // namespace risley::estimation::rotor_process_test

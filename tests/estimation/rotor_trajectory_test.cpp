@@ -14,8 +14,7 @@
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
 
-namespace risley::estimation {
-namespace {
+namespace risley::estimation::rotor_trajectory_test {
 
 using ::testing::ElementsAre;
 using Sizes = std::vector<std::size_t>;
@@ -261,5 +260,4 @@ TEST(Interpolate, RefusesOtherStretchesAndOtherRotors) {
   EXPECT_THROW(interpolate(make_knots(series, one, 3), to), InvalidArgument);
 }
 
-}  // namespace
-}  // namespace risley::estimation
+}  // namespace risley::estimation::rotor_trajectory_test

@@ -16,8 +16,7 @@
 
 #include "estimation/knot_model.hpp"
 
-namespace risley::estimation {
-namespace {
+namespace risley::estimation::smoother_test {
 
 using Real = long double;
 using Matrix = Eigen::Matrix<Real, Eigen::Dynamic, Eigen::Dynamic>;
@@ -335,5 +334,4 @@ TEST(Smoother, SaysWhereACovarianceIsNotPositiveDefinite) {
   }
 }
 
-}  // namespace
-}  // namespace risley::estimation
+}  // namespace risley::estimation::smoother_test

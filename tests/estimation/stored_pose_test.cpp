@@ -13,8 +13,7 @@
 
 #include "estimation/series.hpp"
 
-namespace risley::estimation {
-namespace {
+namespace risley::estimation::stored_pose_test {
 
 const sensors::Sensor& sensor() {
   static const sensors::Sensor mid_40 = sensors::load_sensor("mid-40");
@@ -97,5 +96,4 @@ TEST(StoredPose, GrossErrorsDoNotTurnTheVerdict) {
   EXPECT_EQ(verdict_of(shots, stored, rotation(0, 0, 0)).use, StoredPoseUse::not_applied);
 }
 
-}  // namespace
-}  // namespace risley::estimation
+}  // namespace risley::estimation::stored_pose_test

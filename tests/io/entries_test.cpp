@@ -12,8 +12,7 @@
 #include "io/temporary_folder.hpp"
 #include "refusal.hpp"
 
-namespace risley::io {
-namespace {
+namespace risley::io::entries_test {
 
 TEST(Entries, NetcdfDimensionsAskForALength) {
   const TemporaryFolder folder;
@@ -81,5 +80,4 @@ TEST(Entries, NetcdfIsReadByDimensionsAndTypesThatItHas) {
             "variable time has the type double, asked for float");
 }
 
-}  // namespace
-}  // namespace risley::io
+}  // namespace risley::io::entries_test

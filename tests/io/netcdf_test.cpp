@@ -16,8 +16,7 @@
 
 #include "io/temporary_folder.hpp"
 
-namespace risley::io {
-namespace {
+namespace risley::io::netcdf_test {
 
 using ::testing::AllOf;
 using ::testing::HasSubstr;
@@ -304,5 +303,4 @@ TEST(Netcdf, DevicesSurvive) {
   EXPECT_TRUE(std::filesystem::is_character_file("/dev/full"));
 }
 
-}  // namespace
-}  // namespace risley::io
+}  // namespace risley::io::netcdf_test

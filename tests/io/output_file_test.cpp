@@ -19,8 +19,7 @@
 
 #include "io/temporary_folder.hpp"
 
-namespace risley::io {
-namespace {
+namespace risley::io::output_file_test {
 
 namespace fs = std::filesystem;
 using ::testing::ElementsAre;
@@ -207,5 +206,4 @@ TEST(Sha256, KnownAnswers) {
             "cdc76e5c9914fb9281a1c7e284d73e67f1809a48a497200e046d39ccc7112cd0");
 }
 
-}  // namespace
-}  // namespace risley::io
+}  // namespace risley::io::output_file_test

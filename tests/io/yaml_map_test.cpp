@@ -7,8 +7,7 @@
 
 #include "risley/core/error.hpp"
 
-namespace risley::io {
-namespace {
+namespace risley::io::yaml_map_test {
 
 using ::testing::HasSubstr;
 
@@ -59,5 +58,4 @@ TEST(Yaml, AliasesThatRepeatAliasesAreBounded) {
   EXPECT_THAT(refusal(text), HasSubstr("more values than 1000000"));
 }
 
-}  // namespace
-}  // namespace risley::io
+}  // namespace risley::io::yaml_map_test

@@ -27,8 +27,7 @@
 #include "risley/sensors/preset.hpp"
 #include "risley/simulation/truth_file.hpp"
 
-namespace risley::jobs {
-namespace {
+namespace risley::jobs::jobs_test {
 
 namespace fs = std::filesystem;
 using ::testing::Each;
@@ -342,5 +341,4 @@ TEST_F(JobsTest, RefuseTheSameRecordingTwice) {
   EXPECT_THROW(calibrate_recordings(options), InvalidArgument);
 }
 
-}  // namespace
-}  // namespace risley::jobs
+}  // namespace risley::jobs::jobs_test

@@ -16,8 +16,7 @@
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
 
-namespace risley::jobs {
-namespace {
+namespace risley::jobs::states_file_test {
 
 namespace fs = std::filesystem;
 
@@ -292,5 +291,4 @@ TEST_F(StatesFile, AMissingFolderIsSaid) {
   EXPECT_TRUE(fs::is_empty(folder_));
 }
 
-}  // namespace
-}  // namespace risley::jobs
+}  // namespace risley::jobs::states_file_test

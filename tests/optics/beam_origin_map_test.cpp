@@ -12,8 +12,7 @@
 
 #include "optics/trains.hpp"
 
-namespace risley {
-namespace {
+namespace risley::beam_origin_map_test {
 
 const PrismGeometry kMid40{{0.007}, {0.030}};
 constexpr double kCell = radians_from_degrees(0.5);
@@ -78,5 +77,4 @@ TEST(BeamOriginMap, RefusesWhatMakesNoMap) {
   EXPECT_THROW(beam_origin_map(ideal_mid_40(), kMid40, 10, 0.0), InvalidArgument);
 }
 
-}  // namespace
-}  // namespace risley
+}  // namespace risley::beam_origin_map_test

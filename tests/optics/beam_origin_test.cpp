@@ -19,8 +19,7 @@
 
 #include "optics/trains.hpp"
 
-namespace risley {
-namespace {
+namespace risley::beam_origin_test {
 
 const PrismGeometry kMid40{{0.007}, {0.030}};
 
@@ -327,5 +326,4 @@ TEST(BeamOrigin, ABeamThatDoesNotGetThroughHasNoRay) {
   EXPECT_THROW(emergent_ray(train, kMid40, std::array<double, 1>{0.0}), InvalidArgument);
 }
 
-}  // namespace
-}  // namespace risley
+}  // namespace risley::beam_origin_test

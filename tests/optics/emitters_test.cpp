@@ -17,8 +17,7 @@
 #include "optics/trains.hpp"
 #include "refusal.hpp"
 
-namespace risley {
-namespace {
+namespace risley::emitters_test {
 
 using ::testing::HasSubstr;
 using testing::imperfect_train;
@@ -349,5 +348,4 @@ TEST(PrismGeometry, SizesMayBePerPrism) {
   for (std::size_t i = 0; i < 6; ++i) EXPECT_NEAR(sum[i], own[i], 1e-15);
 }
 
-}  // namespace
-}  // namespace risley
+}  // namespace risley::emitters_test

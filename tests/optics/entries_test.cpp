@@ -17,8 +17,7 @@
 
 #include "refusal.hpp"
 
-namespace risley {
-namespace {
+namespace risley::entries_test {
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
@@ -179,7 +178,7 @@ TEST(Entries, LinearisedBatchesAskForEveryColumn) {
 TEST(Entries, BatchesAskForAnInstructionSetOfTheProcessor) {
   Shots shots;
   const auto begins =
-      testing::StartsWith("instruction set = unknown, this processor and binary allow baseline");
+      ::testing::StartsWith("instruction set = unknown, this processor and binary allow baseline");
   EXPECT_THAT(refusal([&] { observe_batch(shots.train, shots.angles(), {}, {}, kUnknownSet); }),
               begins);
   EXPECT_THAT(refusal([&] {
@@ -190,5 +189,4 @@ TEST(Entries, BatchesAskForAnInstructionSetOfTheProcessor) {
               begins);
 }
 
-}  // namespace
-}  // namespace risley
+}  // namespace risley::entries_test

@@ -14,8 +14,7 @@
 #include "risley/optics/inverse.hpp"
 #include "risley/optics/observation_model.hpp"
 
-namespace risley {
-namespace {
+namespace risley::golden_paper_test {
 
 /// Half a unit in the last printed digit.
 double half_last_digit(const std::string& printed) {
@@ -65,5 +64,4 @@ TEST(GoldenPaper, InverseOfBeamOneOfTableA1GivesItsAnglesAndTheirPartner) {
   }
 }
 
-}  // namespace
-}  // namespace risley
+}  // namespace risley::golden_paper_test

@@ -12,8 +12,7 @@
 
 #include "optics/trains.hpp"
 
-namespace risley {
-namespace {
+namespace risley::inverse_test {
 
 constexpr double kTolerance = radians_from_degrees(1e-10);
 
@@ -138,5 +137,4 @@ TEST(Inverse, RefusesWhatItCannotAnswer) {
   EXPECT_TRUE(rotation_angles_for(two, {-1, 0, 0}).pairs.empty());
 }
 
-}  // namespace
-}  // namespace risley
+}  // namespace risley::inverse_test

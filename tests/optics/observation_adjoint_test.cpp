@@ -12,8 +12,7 @@
 
 #include "optics/trains.hpp"
 
-namespace risley {
-namespace {
+namespace risley::observation_adjoint_test {
 
 template <int N>
 constexpr int kColumns = parameter_count(N) + N;
@@ -233,5 +232,4 @@ INSTANTIATE_TEST_SUITE_P(FaceOrders, AdjointOfEveryTrain,
                            return name;
                          });
 
-}  // namespace
-}  // namespace risley
+}  // namespace risley::observation_adjoint_test

@@ -13,8 +13,7 @@
 
 #include "optics/trains.hpp"
 
-namespace risley {
-namespace {
+namespace risley::observation_model_test {
 
 class LawsOfEveryTrain : public ::testing::TestWithParam<std::string> {
  protected:
@@ -198,5 +197,4 @@ TEST(Parameters, NamesBoundsAndUnitsAreChecked) {
   EXPECT_EQ(to_string(parse_face_order("AP-PA-PA")), "AP-PA-PA");
 }
 
-}  // namespace
-}  // namespace risley
+}  // namespace risley::observation_model_test

@@ -16,8 +16,7 @@
 #include "recordings/format_tests.hpp"
 #include "refusal.hpp"
 
-namespace risley::recordings {
-namespace {
+namespace risley::recordings::entries_test {
 
 using format_tests::TemporaryFolder;
 
@@ -219,12 +218,11 @@ TEST(Entries, DecodersAskForAllBytes) {
   };
   Chunk chunk;
   EXPECT_THAT(problem([&] { livox::PacketDecoder({}).decode(few, chunk); }),
-              testing::HasSubstr("found 17"));
-  EXPECT_THAT(problem([&] { livox::decode_packet_header(few); }), testing::HasSubstr("found 17"));
+              ::testing::HasSubstr("found 17"));
+  EXPECT_THAT(problem([&] { livox::decode_packet_header(few); }), ::testing::HasSubstr("found 17"));
   EXPECT_THAT(problem([&] { livox::decode_imu(few); }),
-              testing::HasSubstr("expected 24 bytes of an inertial sample, found 17"));
+              ::testing::HasSubstr("expected 24 bytes of an inertial sample, found 17"));
   EXPECT_EQ(chunk.observations.size(), 0U);
 }
 
-}  // namespace
-}  // namespace risley::recordings
+}  // namespace risley::recordings::entries_test

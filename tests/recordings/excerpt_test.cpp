@@ -18,8 +18,7 @@
 #include "recordings/formats/cartesian.hpp"
 #include "recordings/las_bytes.hpp"
 
-namespace risley::recordings {
-namespace {
+namespace risley::recordings::excerpt_test {
 
 using namespace format_tests;
 using ::testing::HasSubstr;
@@ -84,7 +83,7 @@ struct Source {
   }
 };
 
-class ExcerptTest : public testing::Test {
+class ExcerptTest : public ::testing::Test {
  protected:
   std::string save(const Source& source, const std::string& name = "recording.nc") const {
     write_all(kNetcdfFormat, folder_.file(name), source.header, source.chunk);
@@ -452,5 +451,4 @@ TEST_F(ExcerptTest, AnInterruptedOneLeavesNothing) {
   EXPECT_EQ(folder_.count(), 1U);
 }
 
-}  // namespace
-}  // namespace risley::recordings
+}  // namespace risley::recordings::excerpt_test

@@ -22,11 +22,10 @@
 #include "recordings/formats/cartesian.hpp"
 #include "recordings/lvx_bytes.hpp"
 
-namespace risley::recordings {
-namespace {
+namespace risley::recordings::extrinsics_test {
 
 using format_tests::TemporaryFolder;
-using testing::HasSubstr;
+using ::testing::HasSubstr;
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
@@ -317,5 +316,4 @@ TEST(Extrinsics, AStoredPoseOfZerosOrOfNoNumberIsNone) {
   EXPECT_FALSE(stored_extrinsics(device));
 }
 
-}  // namespace
-}  // namespace risley::recordings
+}  // namespace risley::recordings::extrinsics_test

@@ -12,8 +12,7 @@
 #include "recordings/format_tests.hpp"
 #include "recordings/las_bytes.hpp"
 
-namespace risley::recordings {
-namespace {
+namespace risley::recordings::las_test {
 
 using namespace format_tests;
 using las_bytes::descriptor;
@@ -82,7 +81,7 @@ void expect_refused(const std::string& bytes, std::uint64_t byte, const std::str
   EXPECT_THAT(outcome.error->problem(), HasSubstr(words));
 }
 
-class PointFormatTest : public testing::TestWithParam<int> {};
+class PointFormatTest : public ::testing::TestWithParam<int> {};
 
 TEST_P(PointFormatTest, GivesEveryField) {
   const int format = GetParam();
@@ -134,7 +133,7 @@ TEST_P(PointFormatTest, GivesEveryField) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(All, PointFormatTest, testing::Range(0, 11));
+INSTANTIATE_TEST_SUITE_P(All, PointFormatTest, ::testing::Range(0, 11));
 
 TEST(LasTest, TakesTheScannerChannelAsBeam) {
   LasFile file = some_file(8, 4, 6);
@@ -553,5 +552,4 @@ TEST(LasTest, WithoutLaszipCompressedFilesAreRefusedWithWords) {
 #endif
 }
 
-}  // namespace
-}  // namespace risley::recordings
+}  // namespace risley::recordings::las_test

@@ -15,8 +15,7 @@
 
 #include "recordings/lvx_bytes.hpp"
 
-namespace risley::recordings {
-namespace {
+namespace risley::recordings::lvx_test {
 
 using namespace lvx_bytes;
 
@@ -53,7 +52,7 @@ void expect_prefix(const Observations& part, const Observations& whole) {
   EXPECT_TRUE(same_bits(part.valid, whole.valid));
 }
 
-class LvxTest : public testing::Test {
+class LvxTest : public ::testing::Test {
  protected:
   ReadResult read(const std::string& bytes, std::size_t max_rows = kDefaultChunkRows) {
     ReadResult result;
@@ -202,8 +201,8 @@ TEST_F(LvxTest, TheDeviceTableAndPacketsAreRead) {
   EXPECT_EQ(header.devices[0].index, 9);
   EXPECT_EQ(header.devices[1].type, kMid40);
   EXPECT_TRUE(header.devices[0].extrinsic_enabled);
-  EXPECT_THAT(header.devices[1].roll_pitch_yaw_deg, testing::ElementsAre(1.5F, -2.25F, 90.0F));
-  EXPECT_THAT(header.devices[1].translation_m, testing::ElementsAre(0.1F, 0.2F, -0.3F));
+  EXPECT_THAT(header.devices[1].roll_pitch_yaw_deg, ::testing::ElementsAre(1.5F, -2.25F, 90.0F));
+  EXPECT_THAT(header.devices[1].translation_m, ::testing::ElementsAre(0.1F, 0.2F, -0.3F));
   EXPECT_EQ(header.time_reference, TimeReference::ptp);
   EXPECT_EQ(header.returns_per_shot, 3);
   EXPECT_FALSE(header.cartesian);
@@ -215,9 +214,9 @@ TEST_F(LvxTest, TheDeviceTableAndPacketsAreRead) {
     devices.push_back(packet.device_index);
     frames.push_back(packet.frame);
   }
-  EXPECT_THAT(types, testing::ElementsAre(8, 6, 1, 5, 7, 0, 6));
-  EXPECT_THAT(devices, testing::ElementsAre(9, 9, 2, 9, 9, 2, 9));
-  EXPECT_THAT(frames, testing::ElementsAre(0, 0, 0, 0, 1, 2, 2));
+  EXPECT_THAT(types, ::testing::ElementsAre(8, 6, 1, 5, 7, 0, 6));
+  EXPECT_THAT(devices, ::testing::ElementsAre(9, 9, 2, 9, 9, 2, 9));
+  EXPECT_THAT(frames, ::testing::ElementsAre(0, 0, 0, 0, 1, 2, 2));
   const Observations& o = result.data.observations;
   ASSERT_EQ(o.size(), 90U + 100 + 96 + 90 + 100);
   EXPECT_EQ(o.device[0], 0);  // row of the table, not the index
@@ -362,7 +361,7 @@ TEST_F(LvxTest, FormedPacketsGoIntoFramesOfTheirDuration) {
   const ReadResult result = read(bytes);
   std::vector<int> packets_of_frame(6);
   for (const Packet& packet : result.data.packets) ++packets_of_frame.at(packet.frame);
-  EXPECT_THAT(packets_of_frame, testing::ElementsAre(20, 20, 20, 20, 20, 1));
+  EXPECT_THAT(packets_of_frame, ::testing::ElementsAre(20, 20, 20, 20, 20, 1));
   // The last frame ends with the file.
   std::uint64_t next = 0;
   std::memcpy(&next, bytes.data() + bytes.size() - 919 - 24 + 8, 8);
@@ -473,8 +472,8 @@ TEST_F(LvxTest, WhatLvxCannotHoldIsRefused) {
     }
     return "was written";
   };
-  using testing::AllOf;
-  using testing::HasSubstr;
+  using ::testing::AllOf;
+  using ::testing::HasSubstr;
   const Chunk good = rows_at(grid_times(3, 1e5));
   EXPECT_EQ(message(header_for(kMid40), good), "was written");
 
@@ -597,7 +596,7 @@ TEST_F(LvxTest, ACutAtAnyByteLosesOnlyTheTail) {
     if (in_package && left >= 11) {
       const std::size_t records[] = {30, 1, 100, 48, 30, 100, 1};
       EXPECT_EQ(warning.lost_records, records[packets]);
-      EXPECT_THAT(warning.message, testing::HasSubstr("cut off"));
+      EXPECT_THAT(warning.message, ::testing::HasSubstr("cut off"));
     } else {
       EXPECT_EQ(warning.lost_records, 0U);
     }
@@ -617,7 +616,7 @@ TEST_F(LvxTest, AFlippedHeaderBitInventsNoPoint) {
   for (const std::size_t i : {0, 1}) bytes.push_back(frames[1] + 24 + static_cast<std::size_t>(i));
   for (const std::size_t at : bytes) {
     for (int bit = 0; bit < 8; ++bit) {
-      SCOPED_TRACE(testing::Message() << "byte " << at << " bit " << bit);
+      SCOPED_TRACE(::testing::Message() << "byte " << at << " bit " << bit);
       std::string damaged = file;
       damaged[at] = static_cast<char>(damaged[at] ^ (1 << bit));
       const ReadResult result = read(damaged);
@@ -645,8 +644,8 @@ TEST_F(LvxTest, DamagedHeadersAreNamed) {
     const ReadResult result = read(bytes);
     return result.open_error ? result.open_error->what() : "was opened";
   };
-  using testing::AllOf;
-  using testing::HasSubstr;
+  using ::testing::AllOf;
+  using ::testing::HasSubstr;
   std::string bytes = file;
   bytes[16] = 2, bytes[17] = 0;
   EXPECT_THAT(message(bytes), AllOf(HasSubstr("LVX 2"), HasSubstr("not supported")));
@@ -693,7 +692,7 @@ TEST_F(LvxTest, DamageInTheBodyIsReportedAfterTheSoundRows) {
       ASSERT_FALSE(result.open_error);
       ASSERT_TRUE(result.read_error);
       EXPECT_EQ(result.read_error->place().byte_offset, c.offset);
-      EXPECT_THAT(result.read_error->what(), testing::HasSubstr(c.message));
+      EXPECT_THAT(result.read_error->what(), ::testing::HasSubstr(c.message));
       EXPECT_EQ(result.data.packets.size(), c.packets);
       expect_prefix(result.data.observations, whole.data.observations);
     }
@@ -709,14 +708,14 @@ TEST_F(LvxTest, UnknownDataTypesAreSteppedOverToTheNextFrame) {
   ASSERT_FALSE(result.read_error);
   std::vector<int> types;
   for (const Packet& packet : result.data.packets) types.push_back(packet.data_type);
-  EXPECT_THAT(types, testing::ElementsAre(8, 7, 0, 6));
+  EXPECT_THAT(types, ::testing::ElementsAre(8, 7, 0, 6));
   ASSERT_EQ(result.warnings.size(), 1U);
   EXPECT_EQ(result.warnings[0].place.byte_offset, second);
-  EXPECT_THAT(result.warnings[0].message, testing::HasSubstr("data type 9"));
+  EXPECT_THAT(result.warnings[0].message, ::testing::HasSubstr("data type 9"));
   file[frames[1] + 24 + 10] = 9;
   result = read(file);
   EXPECT_EQ(result.warnings.size(), 1U);
-  EXPECT_THAT(result.warnings[0].message, testing::HasSubstr("1 more frame"));
+  EXPECT_THAT(result.warnings[0].message, ::testing::HasSubstr("1 more frame"));
 }
 
 TEST_F(LvxTest, TheLastFrameMayBeLeftOpen) {
@@ -773,7 +772,7 @@ TEST_F(LvxTest, TheRateOfAnUnknownDeviceIsTakenFromItsPackets) {
     const ReadResult result = read(file);
     EXPECT_EQ(result.data.observations.time_ns[95], last);
     ASSERT_EQ(result.warnings.size(), 1U);
-    EXPECT_THAT(result.warnings[0].message, testing::HasSubstr("type 99"));
+    EXPECT_THAT(result.warnings[0].message, ::testing::HasSubstr("type 99"));
     EXPECT_TRUE(copy(file) == file);
   }
 }
@@ -793,7 +792,7 @@ TEST_F(LvxTest, SeveralReturnsInSingleReturnRecordsAreToldByPeriodAndIntensity) 
       {2, 1'000'000, 990'000, true, 1},  // ordinary period
   };
   for (const Case& c : cases) {
-    SCOPED_TRACE(testing::Message() << c.interleaved << " " << c.period_ns);
+    SCOPED_TRACE(::testing::Message() << c.interleaved << " " << c.period_ns);
     std::string file = header_lvx11({{"A", 0, kMid40}});
     std::vector<std::string> packages;
     for (std::uint64_t i = 0; i < 10; ++i) {
@@ -842,7 +841,7 @@ std::string lvx10_file(std::size_t header_bytes, bool empty_first) {
 TEST_F(LvxTest, Lvx10IsReadWithBothSizesOfFrameHeaders) {
   for (const std::size_t header_bytes : {24U, 32U}) {
     for (const bool empty_first : {false, true}) {
-      SCOPED_TRACE(testing::Message() << header_bytes << " " << empty_first);
+      SCOPED_TRACE(::testing::Message() << header_bytes << " " << empty_first);
       const std::string file = lvx10_file(header_bytes, empty_first);
       const ReadResult result = read(file);
       ASSERT_FALSE(result.open_error || result.read_error);
@@ -851,7 +850,7 @@ TEST_F(LvxTest, Lvx10IsReadWithBothSizesOfFrameHeaders) {
       EXPECT_EQ(header.format, "lvx-1.0");
       EXPECT_TRUE(header.cartesian);
       ASSERT_EQ(header.devices.size(), 2U);
-      EXPECT_THAT(header.devices[1].translation_m, testing::ElementsAre(0.1F, 0.2F, -0.3F));
+      EXPECT_THAT(header.devices[1].translation_m, ::testing::ElementsAre(0.1F, 0.2F, -0.3F));
       const Observations& o = result.data.observations;
       ASSERT_EQ(o.size(), 300U);
       EXPECT_NEAR(o.range[0], std::sqrt(4 + 1.5625 + 0.25), 1e-7);
@@ -897,5 +896,4 @@ TEST_F(LvxTest, Lvx10CutsAndDamageLoseOnlyTheTail) {
   }
 }
 
-}  // namespace
-}  // namespace risley::recordings
+}  // namespace risley::recordings::lvx_test

@@ -15,8 +15,7 @@
 #include "recordings/format_tests.hpp"
 #include "recordings/formats/named_columns.hpp"
 
-namespace risley::recordings {
-namespace {
+namespace risley::recordings::named_formats_test {
 
 using namespace format_tests;
 using ::testing::AllOf;
@@ -729,5 +728,4 @@ TEST(ShotRate, ScanSequencesOfShotNumbers) {
   EXPECT_THAT(get_bytes(folder.file("b.csv")), HasSubstr("\n0.00001,19.17241,90.03013\n0.00002,"));
 }
 
-}  // namespace
-}  // namespace risley::recordings
+}  // namespace risley::recordings::named_formats_test

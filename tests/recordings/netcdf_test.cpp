@@ -11,8 +11,7 @@
 
 #include "recordings/format_tests.hpp"
 
-namespace risley::recordings {
-namespace {
+namespace risley::recordings::netcdf_test {
 
 using namespace format_tests;
 using ::testing::HasSubstr;
@@ -406,5 +405,4 @@ TEST(Netcdf, RefusesPacketsThatDoNotFit) {
   EXPECT_THROW(kNetcdfFormat.create(folder.file("no/such/folder.nc"), rich_header()), FileError);
 }
 
-}  // namespace
-}  // namespace risley::recordings
+}  // namespace risley::recordings::netcdf_test

@@ -12,8 +12,7 @@
 
 #include "recordings/format_tests.hpp"
 
-namespace risley::recordings {
-namespace {
+namespace risley::recordings::openpylivox_test {
 
 using namespace format_tests;
 using ::testing::HasSubstr;
@@ -457,5 +456,4 @@ TEST(OpenpylivoxCsv, ReadsTheLastCoordinateOf32Bits) {
                   .error);
 }
 
-}  // namespace
-}  // namespace risley::recordings
+}  // namespace risley::recordings::openpylivox_test

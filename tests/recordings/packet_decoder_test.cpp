@@ -19,8 +19,7 @@
 
 // Which rows come out of which bytes is tested in packet_test.cpp, through files; here, what a live
 // receiver relies on.
-namespace risley::recordings::livox {
-namespace {
+namespace risley::recordings::livox::packet_decoder_test {
 
 using namespace lvx_bytes;
 using ::testing::HasSubstr;
@@ -224,7 +223,7 @@ TEST(PacketClock, PpsStampsOfAnySizeDoNotOverflow) {
   constexpr std::uint64_t kHuge = 9'223'000'000'000'000'000;
   const auto seconds = pps_seconds({0, 500'000'000, 0, kHuge, 0, kHuge, 0, kHuge, 0});
   EXPECT_THAT(std::vector<double>(seconds.begin(), seconds.begin() + 3),
-              testing::ElementsAre(0.0, 0.5, 1.0));
+              ::testing::ElementsAre(0.0, 0.5, 1.0));
   EXPECT_DOUBLE_EQ(seconds[3], 9'223'000'001.0);
   EXPECT_DOUBLE_EQ(seconds[4], 9'223'000'001.0);  // the edge that ends that second
   EXPECT_EQ(seconds[5], -1.0);
@@ -236,5 +235,4 @@ TEST(ShotGrid, CountsFurtherThan32Bits) {
   EXPECT_EQ(kGrid100kHz.offset_ns(1'000'000), 10'000'000'000);
 }
 
-}  // namespace
-}  // namespace risley::recordings::livox
+}  // namespace risley::recordings::livox::packet_decoder_test

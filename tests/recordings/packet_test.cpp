@@ -16,8 +16,7 @@
 
 // Packets are tested through the files that hold them: what counts is which rows come out of which
 // bytes and which bytes out of which rows.
-namespace risley::recordings {
-namespace {
+namespace risley::recordings::packet_test {
 
 using namespace lvx_bytes;
 
@@ -32,7 +31,7 @@ std::string one_package_file(std::uint8_t device_type, std::uint8_t data_type, s
   return file;
 }
 
-class PacketTest : public testing::Test {
+class PacketTest : public ::testing::Test {
  protected:
   Recording load(const std::string& bytes) {
     save(folder_.file("in.lvx"), bytes);
@@ -78,7 +77,7 @@ TEST_F(PacketTest, SphericalRecordsGiveAzimuthZenithAndRange) {
   EXPECT_FLOAT_EQ(o.zenith_resolution[0], static_cast<float>(0.01 * kRadiansPerDegree));
   EXPECT_FLOAT_EQ(o.range_resolution[0], 0.001F);
   EXPECT_THAT(std::vector<int>(o.intensity.begin(), o.intensity.begin() + 5),
-              testing::ElementsAre(7, 255, 0, 150, 3));
+              ::testing::ElementsAre(7, 255, 0, 150, 3));
 }
 
 TEST_F(PacketTest, CartesianRecordsGiveAnglesOfTheirAxes) {
@@ -160,7 +159,7 @@ TEST_F(PacketTest, TheTimesOfSixBeamsAreRoundedAndDoNotDrift) {
   const Recording recording = load(one_package_file(kHorizon, 3, records(3, random)));
   const auto& time = recording.data.observations.time_ns;
   EXPECT_THAT(std::vector<std::int64_t>(time.begin(), time.begin() + 5),
-              testing::ElementsAre(0, 4167, 8333, 12500, 16667));
+              ::testing::ElementsAre(0, 4167, 8333, 12500, 16667));
   EXPECT_EQ(time[95], 395'833);
 }
 
@@ -175,9 +174,9 @@ TEST_F(PacketTest, SeveralReturnsShareTheirAnglesAndKeepTheirTags) {
     EXPECT_EQ(o.tag[row], 0x1A);
   }
   EXPECT_THAT(std::vector<double>(o.range.begin(), o.range.begin() + 6),
-              testing::ElementsAre(5.0, 0.0, 7.0, 0.0, 0.0, 0.0));
+              ::testing::ElementsAre(5.0, 0.0, 7.0, 0.0, 0.0, 0.0));
   EXPECT_THAT(std::vector<int>(o.valid.begin(), o.valid.begin() + 6),
-              testing::ElementsAre(1, 0, 1, 0, 0, 0));
+              ::testing::ElementsAre(1, 0, 1, 0, 0, 0));
   EXPECT_NEAR(degrees_from_radians(o.zenith[3]), 92.0, 1e-12);  // kept, not trusted
 }
 
@@ -244,7 +243,7 @@ TEST_F(PacketTest, AnglesThatNoSensorSendsAreDamage) {
       FAIL() << "an impossible angle was accepted";
     } catch (const FileError& error) {
       EXPECT_EQ(error.place().byte_offset, 88U + 24 + 19 + 9);
-      EXPECT_THAT(error.what(), testing::HasSubstr("18000"));
+      EXPECT_THAT(error.what(), ::testing::HasSubstr("18000"));
     }
   }
 }
@@ -256,8 +255,8 @@ TEST_F(PacketTest, ImuSamplesKeepTheirBits) {
   ASSERT_EQ(recording.data.imu.size(), 1U);
   const ImuSample& sample = recording.data.imu[0];
   EXPECT_EQ(sample.time_ns, 123'456'789);
-  EXPECT_THAT(sample.angular_velocity, testing::ElementsAre(0.25F, -1.5F, 3.0F));
-  EXPECT_THAT(sample.acceleration_g, testing::ElementsAre(0.01F, -0.02F, 1.003F));
+  EXPECT_THAT(sample.angular_velocity, ::testing::ElementsAre(0.25F, -1.5F, 3.0F));
+  EXPECT_THAT(sample.acceleration_g, ::testing::ElementsAre(0.01F, -0.02F, 1.003F));
 }
 
 // --- times ---------------------------------------------------------------------------------------
@@ -295,7 +294,7 @@ class ClockTest : public PacketTest {
 TEST_F(ClockTest, CountersArePassedAsTheyAre) {
   for (const int type : {0, 1, 2, 5}) {
     EXPECT_THAT(times(static_cast<std::uint8_t>(type), {7, 1'000'007, 1'234'567'890'123'456'789}),
-                testing::ElementsAre(7, 1'000'007, 1'234'567'890'123'456'789));
+                ::testing::ElementsAre(7, 1'000'007, 1'234'567'890'123'456'789));
     EXPECT_EQ(reference_, type == 1 ? TimeReference::ptp : TimeReference::power_on);
   }
 }
@@ -304,13 +303,13 @@ TEST_F(ClockTest, GpsTimesAreUtcAndRollOverTheHour) {
   // 15 08 1A 07 60 E3 16 00 is 2021-08-26 07:00:01.5
   std::uint64_t example = 0;
   std::memcpy(&example, "\x15\x08\x1A\x07\x60\xE3\x16\x00", 8);
-  EXPECT_THAT(times(3, {example}), testing::ElementsAre(1'629'961'201'500'000'000));
+  EXPECT_THAT(times(3, {example}), ::testing::ElementsAre(1'629'961'201'500'000'000));
   EXPECT_EQ(reference_, TimeReference::utc);
   EXPECT_THAT(times(3, {gps_bytes(2023, 12, 31, 23, 3'599'999'000), gps_bytes(2024, 1, 1, 0, 0)}),
-              testing::ElementsAre(1'704'067'199'999'000'000, 1'704'067'200'000'000'000));
+              ::testing::ElementsAre(1'704'067'199'999'000'000, 1'704'067'200'000'000'000));
   EXPECT_THAT(
       times(3, {gps_bytes(2024, 2, 28, 23, 3'599'999'999), gps_bytes(2024, 2, 29, 0, 1000)}),
-      testing::ElementsAre(1'709'164'799'999'999'000, 1'709'164'800'001'000'000));
+      ::testing::ElementsAre(1'709'164'799'999'999'000, 1'709'164'800'001'000'000));
 }
 
 TEST_F(ClockTest, BytesThatAreNoTimeAreDamage) {
@@ -336,34 +335,35 @@ TEST_F(ClockTest, BytesThatAreNoTimeAreDamage) {
 
 TEST_F(ClockTest, PpsTimesGainASecondAtEveryEdge) {
   EXPECT_THAT(times(4, {998'000'000, 999'000'000, 0, 1'000'000, 999'500'000, 500'000}),
-              testing::ElementsAre(998'000'000, 999'000'000, 1'000'000'000, 1'001'000'000,
-                                   1'999'500'000, 2'000'500'000));
+              ::testing::ElementsAre(998'000'000, 999'000'000, 1'000'000'000, 1'001'000'000,
+                                     1'999'500'000, 2'000'500'000));
   EXPECT_EQ(wraps_, 2U);
   EXPECT_EQ(reference_, TimeReference::pps);
 }
 
 TEST_F(ClockTest, PpsEdgesAreSeenWhenPacketsAroundThemAreLost) {
-  EXPECT_THAT(times(4, {999'000'000, 5'000'000}), testing::ElementsAre(999'000'000, 1'005'000'000));
+  EXPECT_THAT(times(4, {999'000'000, 5'000'000}),
+              ::testing::ElementsAre(999'000'000, 1'005'000'000));
   EXPECT_THAT(times(4, {700'000'000, 400'000'000}),
-              testing::ElementsAre(700'000'000, 1'400'000'000));
+              ::testing::ElementsAre(700'000'000, 1'400'000'000));
   EXPECT_EQ(wraps_, 1U);
 }
 
 TEST_F(ClockTest, PpsPacketsThatOvertakeEachOtherMakeNoSecond) {
   EXPECT_THAT(times(4, {500'000'000, 502'000'000, 501'000'000, 503'000'000}),
-              testing::ElementsAre(500'000'000, 502'000'000, 501'000'000, 503'000'000));
+              ::testing::ElementsAre(500'000'000, 502'000'000, 501'000'000, 503'000'000));
   EXPECT_EQ(wraps_, 0U);
   EXPECT_THAT(times(4, {998'000'000, 0, 999'000'000, 1'000'000}),
-              testing::ElementsAre(998'000'000, 1'000'000'000, 999'000'000, 1'001'000'000));
+              ::testing::ElementsAre(998'000'000, 1'000'000'000, 999'000'000, 1'001'000'000));
   EXPECT_EQ(wraps_, 1U);
 }
 
 TEST_F(ClockTest, PpsTimesGoOnWithoutEdges) {
   EXPECT_THAT(times(4, {999'000'000, 1'800'000'000, 2'300'000'000, 100'000}),
-              testing::ElementsAre(999'000'000, 1'800'000'000, 2'300'000'000, 3'000'100'000));
+              ::testing::ElementsAre(999'000'000, 1'800'000'000, 2'300'000'000, 3'000'100'000));
   // A sensor second that is slightly longer than the master's adds one second, not two.
   EXPECT_THAT(times(4, {1'000'050'000, 40'000}),
-              testing::ElementsAre(1'000'050'000, 1'000'040'000));
+              ::testing::ElementsAre(1'000'050'000, 1'000'040'000));
 }
 
 // --- values that a record cannot hold ------------------------------------------------------------
@@ -423,14 +423,13 @@ TEST_F(PacketTest, ValuesThatDoNotFitAreRefusedWithRowAndRange) {
       write(recording);
       ADD_FAILURE() << "was written";
     } catch (const InvalidArgument& error) {
-      EXPECT_THAT(error.what(), testing::HasSubstr("row 17"));
+      EXPECT_THAT(error.what(), ::testing::HasSubstr("row 17"));
       for (const std::string& part : c.message) {
-        EXPECT_THAT(error.what(), testing::HasSubstr(part));
+        EXPECT_THAT(error.what(), ::testing::HasSubstr(part));
       }
     }
     EXPECT_FALSE(std::filesystem::exists(folder_.file("out.lvx")));
   }
 }
 
-}  // namespace
-}  // namespace risley::recordings
+}  // namespace risley::recordings::packet_test

@@ -13,13 +13,12 @@
 
 #include "recordings/lvx_bytes.hpp"
 
-namespace risley::recordings {
-namespace {
+namespace risley::recordings::registry_test {
 
 using lvx_bytes::save;
-using testing::HasSubstr;
+using ::testing::HasSubstr;
 
-class RegistryTest : public testing::Test {
+class RegistryTest : public ::testing::Test {
  protected:
   std::string open_error(const std::string& path) {
     try {
@@ -71,8 +70,8 @@ TEST_F(RegistryTest, FilesThatCannotBeARecordingAreNamed) {
   EXPECT_THAT(open_error(folder_.file("empty.lvx")), HasSubstr("empty"));
   save(folder_.file("text.lvx"), "hello, world");
   EXPECT_THAT(open_error(folder_.file("text.lvx")),
-              testing::AllOf(HasSubstr("lvx-1.1"), HasSubstr("scan-sequence-csv"),
-                             HasSubstr("'hello, world'")));
+              ::testing::AllOf(HasSubstr("lvx-1.1"), HasSubstr("scan-sequence-csv"),
+                               HasSubstr("'hello, world'")));
   save(folder_.file("binary.lvx"), std::string("\x7F"
                                                "ELF\0\1",
                                                6));
@@ -119,8 +118,9 @@ TEST_F(RegistryTest, TheListOfWritableFormatsIsComplete) {
     endings.insert(format.ending);
     EXPECT_FALSE(format.name.empty() || format.description.empty());
   }
-  EXPECT_THAT(endings, testing::UnorderedElementsAre(".lvx", ".nc", ".bin", ".openpylivox.bin",
-                                                     ".csv", ".sequence.csv", ".openpylivox.csv"));
+  EXPECT_THAT(endings,
+              ::testing::UnorderedElementsAre(".lvx", ".nc", ".bin", ".openpylivox.bin", ".csv",
+                                              ".sequence.csv", ".openpylivox.csv"));
 }
 
 TEST_F(RegistryTest, AWholeRecordingIsLoadedWithItsWarnings) {
@@ -146,5 +146,4 @@ TEST_F(RegistryTest, AWholeRecordingIsLoadedWithItsWarnings) {
   EXPECT_EQ(progress.back(), 1.0);
 }
 
-}  // namespace
-}  // namespace risley::recordings
+}  // namespace risley::recordings::registry_test

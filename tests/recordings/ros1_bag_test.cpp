@@ -17,45 +17,49 @@
 
 #include "recordings/format_tests.hpp"
 
-namespace risley::recordings {
-namespace {
+namespace risley::recordings::ros1_bag_test {
 
 /// A serialised message of any type.
 struct RawMessage {
   std::string type, md5, definition, bytes;
 };
 
-}  // namespace
-}  // namespace risley::recordings
+}  // namespace risley::recordings::ros1_bag_test
 
 namespace ros {
 namespace message_traits {
 
 template <>
-struct DataType<risley::recordings::RawMessage> {
-  static const char* value(const risley::recordings::RawMessage& m) { return m.type.c_str(); }
+struct DataType<risley::recordings::ros1_bag_test::RawMessage> {
+  static const char* value(const risley::recordings::ros1_bag_test::RawMessage& m) {
+    return m.type.c_str();
+  }
 };
 template <>
-struct MD5Sum<risley::recordings::RawMessage> {
-  static const char* value(const risley::recordings::RawMessage& m) { return m.md5.c_str(); }
+struct MD5Sum<risley::recordings::ros1_bag_test::RawMessage> {
+  static const char* value(const risley::recordings::ros1_bag_test::RawMessage& m) {
+    return m.md5.c_str();
+  }
 };
 template <>
-struct Definition<risley::recordings::RawMessage> {
-  static const char* value(const risley::recordings::RawMessage& m) { return m.definition.c_str(); }
+struct Definition<risley::recordings::ros1_bag_test::RawMessage> {
+  static const char* value(const risley::recordings::ros1_bag_test::RawMessage& m) {
+    return m.definition.c_str();
+  }
 };
 
 }  // namespace message_traits
 namespace serialization {
 
 template <>
-struct Serializer<risley::recordings::RawMessage> {
+struct Serializer<risley::recordings::ros1_bag_test::RawMessage> {
   template <class Stream>
-  static void write(Stream& stream, const risley::recordings::RawMessage& m) {
+  static void write(Stream& stream, const risley::recordings::ros1_bag_test::RawMessage& m) {
     const auto bytes = static_cast<std::uint32_t>(m.bytes.size());
     std::copy(m.bytes.begin(), m.bytes.end(), stream.advance(bytes));
   }
   // NOLINTNEXTLINE(readability-identifier-naming): the name that ROS calls
-  static std::uint32_t serializedLength(const risley::recordings::RawMessage& m) {
+  static std::uint32_t serializedLength(const risley::recordings::ros1_bag_test::RawMessage& m) {
     return static_cast<std::uint32_t>(m.bytes.size());
   }
 };
@@ -63,8 +67,7 @@ struct Serializer<risley::recordings::RawMessage> {
 }  // namespace serialization
 }  // namespace ros
 
-namespace risley::recordings {
-namespace {
+namespace risley::recordings::ros1_bag_test {
 
 using namespace format_tests;
 using ::testing::ElementsAre;
@@ -743,5 +746,4 @@ TEST(Ros1Bag, ReadersOfSeveralThreadsLeaveTheLoggingAsItWas) {
   EXPECT_EQ(console_bridge::getOutputHandler(), handler);
 }
 
-}  // namespace
-}  // namespace risley::recordings
+}  // namespace risley::recordings::ros1_bag_test

@@ -13,8 +13,7 @@
 
 #include "recordings/format_tests.hpp"
 
-namespace risley::recordings {
-namespace {
+namespace risley::recordings::ros2_bag_test {
 
 using namespace format_tests;
 using ::testing::ElementsAre;
@@ -491,5 +490,4 @@ TEST(Ros2Bag, MessagesOutOfOrderAreDamage) {
   EXPECT_EQ(outcome.rows().size(), 40U);
 }
 
-}  // namespace
-}  // namespace risley::recordings
+}  // namespace risley::recordings::ros2_bag_test

@@ -14,8 +14,7 @@
 #include "recordings/format_tests.hpp"
 #include "recordings/formats/text_table.hpp"
 
-namespace risley::recordings {
-namespace {
+namespace risley::recordings::text_formats_test {
 
 using namespace format_tests;
 using ::testing::HasSubstr;
@@ -491,5 +490,4 @@ TEST(TextTable, TimesAtTheEndOf64BitsAreRounded) {
   EXPECT_EQ(nanoseconds_field("-0.00000000149", "t"), -1);
 }
 
-}  // namespace
-}  // namespace risley::recordings
+}  // namespace risley::recordings::text_formats_test

@@ -16,8 +16,7 @@
 
 #include "recordings/lvx_bytes.hpp"
 
-namespace risley::recordings {
-namespace {
+namespace risley::recordings::time_audit_test {
 
 constexpr std::int64_t kStep = 10'000;
 
@@ -148,10 +147,10 @@ TEST(TimeAudit, ReturnsOfOneShotAreOneShot) {
   EXPECT_EQ(result.rows_by_return_number[1], 3U);
   EXPECT_EQ(result.rows_by_return_number[2], 3U);
   EXPECT_EQ(result.rows_by_return_number[3], 2U);
-  EXPECT_THAT(result.tags.position, testing::ElementsAre(5, 1, 1, 1));
-  EXPECT_THAT(result.tags.intensity, testing::ElementsAre(6, 2, 0, 0));
-  EXPECT_THAT(result.tags.echo, testing::ElementsAre(4, 2, 1, 1));
-  EXPECT_THAT(result.tags.reserved, testing::ElementsAre(7, 0, 0, 1));
+  EXPECT_THAT(result.tags.position, ::testing::ElementsAre(5, 1, 1, 1));
+  EXPECT_THAT(result.tags.intensity, ::testing::ElementsAre(6, 2, 0, 0));
+  EXPECT_THAT(result.tags.echo, ::testing::ElementsAre(4, 2, 1, 1));
+  EXPECT_THAT(result.tags.reserved, ::testing::ElementsAre(7, 0, 0, 1));
 }
 
 TEST(TimeAudit, ExtremesAreThoseOfValidRows) {
@@ -180,7 +179,7 @@ TEST(TimeAudit, DevicesAreComparedWithThemselves) {
   EXPECT_EQ(result.time_resets, 0U);
   EXPECT_EQ(result.gaps.count, 0U);
   EXPECT_DOUBLE_EQ(result.rate_hz, 1e5);
-  EXPECT_THAT(result.rows_by_device, testing::ElementsAre(1000, 0, 1000));
+  EXPECT_THAT(result.rows_by_device, ::testing::ElementsAre(1000, 0, 1000));
 }
 
 // --- packets -------------------------------------------------------------------------------------
@@ -290,8 +289,8 @@ TEST(TimeAudit, TimesTooFarApartAreDamage) {
       FAIL() << "a time further away than 146 years was accepted";
     } catch (const FileError& error) {
       EXPECT_EQ(error.path(), path);
-      EXPECT_THAT(error.problem(), testing::HasSubstr("observation 2 (from 0)"));
-      EXPECT_THAT(error.problem(), testing::HasSubstr("within 146 years"));
+      EXPECT_THAT(error.problem(), ::testing::HasSubstr("observation 2 (from 0)"));
+      EXPECT_THAT(error.problem(), ::testing::HasSubstr("within 146 years"));
     }
   }
 }
@@ -318,5 +317,4 @@ TEST(TimeAudit, PacketsStayWholeInFrontOfATimeTooFarAway) {
   EXPECT_THROW(reader->read(chunk), FileError);
 }
 
-}  // namespace
-}  // namespace risley::recordings
+}  // namespace risley::recordings::time_audit_test

@@ -18,8 +18,7 @@
 #include "risley/core/error.hpp"
 #include "risley/io/text_file.hpp"
 
-namespace risley::recordings {
-namespace {
+namespace risley::recordings::truth_test {
 
 namespace fs = std::filesystem;
 
@@ -172,5 +171,4 @@ TEST_F(Truth, OtherFilesAreRefused) {
   }
 }
 
-}  // namespace
-}  // namespace risley::recordings
+}  // namespace risley::recordings::truth_test

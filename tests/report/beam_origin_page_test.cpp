@@ -8,8 +8,7 @@
 #include "risley/core/angle.hpp"
 #include "risley/sensors/preset.hpp"
 
-namespace risley::report {
-namespace {
+namespace risley::report::beam_origin_page_test {
 
 TEST(BeamOriginPage, ShowsSixMapsWithTheirExtremes) {
   const sensors::Sensor sensor = sensors::load_sensor("mid-40");
@@ -27,5 +26,4 @@ TEST(BeamOriginPage, ShowsSixMapsWithTheirExtremes) {
   EXPECT_THAT(page, ::testing::HasSubstr("risley cloud &lt;x&gt;"));
 }
 
-}  // namespace
-}  // namespace risley::report
+}  // namespace risley::report::beam_origin_page_test

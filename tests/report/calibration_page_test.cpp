@@ -17,12 +17,11 @@
 #include "risley/core/random.hpp"
 #include "risley/sensors/preset.hpp"
 
-namespace risley::report {
-namespace {
+namespace risley::report::calibration_page_test {
 
 using calibration::Calibration;
-using testing::HasSubstr;
-using testing::Not;
+using ::testing::HasSubstr;
+using ::testing::Not;
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kNoise = 0.015;  // of the distances, m
@@ -269,7 +268,7 @@ TEST(CalibrationPage, HasEverySection) {
   }
   EXPECT_THAT(
       titles(shown),
-      testing::ElementsAre(
+      ::testing::ElementsAre(
           "Errors of the azimuth before", "Errors of the zenith angle before",
           "Errors of the azimuth after", "Errors of the zenith angle after",
           "Walls before the calibration: room &lt;1&gt;.lvx",
@@ -514,5 +513,4 @@ TEST(CalibrationPage, ViewsAreThinnedAndSayHow) {
   }
 }
 
-}  // namespace
-}  // namespace risley::report
+}  // namespace risley::report::calibration_page_test

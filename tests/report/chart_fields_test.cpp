@@ -8,8 +8,7 @@
 
 #include "risley/report/charts.hpp"
 
-namespace risley::report {
-namespace {
+namespace risley::report::chart_fields_test {
 
 std::string drawn(std::vector<double> x) {
   return chart_json({"a \"title\" </script>", "x", "y", {{"", "a", SeriesKind::line, x, {}}}, {}},
@@ -42,5 +41,4 @@ TEST(ChartFields, NumbersThatDifferLittleKeepWhatTellsThemApart) {
   EXPECT_EQ(digits_of({}), 7);
 }
 
-}  // namespace
-}  // namespace risley::report
+}  // namespace risley::report::chart_fields_test

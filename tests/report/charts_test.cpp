@@ -7,8 +7,7 @@
 
 #include <gtest/gtest.h>
 
-namespace risley::report {
-namespace {
+namespace risley::report::charts_test {
 
 TEST(Charts, APeakSurvivesThinning) {
   constexpr std::size_t kRows = 100000, kPeak = 54321, kDip = 77777;
@@ -60,5 +59,4 @@ TEST(Charts, AHistogramHasBinsForItsValues) {
   EXPECT_EQ(bins(3000000), 61u);
 }
 
-}  // namespace
-}  // namespace risley::report
+}  // namespace risley::report::charts_test

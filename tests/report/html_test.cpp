@@ -4,8 +4,7 @@
 
 #include <gtest/gtest.h>
 
-namespace risley::report {
-namespace {
+namespace risley::report::html_test {
 
 TEST(Html, EscapesWhatHtmlReads) {
   EXPECT_EQ(escape_html("<a href=\"x\">&'</a>"),
@@ -19,5 +18,4 @@ TEST(Html, CountsStandInGroupsOfThree) {
   EXPECT_EQ(count_text(12345678), "12\u202f345\u202f678");
 }
 
-}  // namespace
-}  // namespace risley::report
+}  // namespace risley::report::html_test

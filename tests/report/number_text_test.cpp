@@ -6,8 +6,7 @@
 
 #include <gtest/gtest.h>
 
-namespace risley::report {
-namespace {
+namespace risley::report::number_text_test {
 
 TEST(NumberText, ShowsTwoDigitsOfTheSigmaAndTheValueToTheSamePlace) {
   struct Case {
@@ -31,5 +30,4 @@ TEST(NumberText, ShowsTwoDigitsOfTheSigmaAndTheValueToTheSamePlace) {
   }
 }
 
-}  // namespace
-}  // namespace risley::report
+}  // namespace risley::report::number_text_test

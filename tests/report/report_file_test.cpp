@@ -13,10 +13,9 @@
 #include "risley/core/error.hpp"
 #include "risley/io/text_file.hpp"
 
-namespace risley::report {
-namespace {
+namespace risley::report::report_file_test {
 
-using testing::HasSubstr;
+using ::testing::HasSubstr;
 
 /// Every field with a value that tells it from the others.
 EstimateReport estimate_example() {
@@ -104,12 +103,12 @@ CalibrationReport calibration_example() {
   return r;
 }
 
-class ReportFile : public testing::Test {
+class ReportFile : public ::testing::Test {
  protected:
   std::string path() const {
-    const auto folder = std::filesystem::path(testing::TempDir()) / "report_file";
+    const auto folder = std::filesystem::path(::testing::TempDir()) / "report_file";
     std::filesystem::create_directories(folder);
-    const auto* info = testing::UnitTest::GetInstance()->current_test_info();
+    const auto* info = ::testing::UnitTest::GetInstance()->current_test_info();
     return (folder / (std::string(info->name()) + ".json")).string();
   }
   void write(const std::string& text) const { std::ofstream(path()) << text; }
@@ -220,5 +219,4 @@ TEST_F(ReportFile, SomethingElseIsRefused) {
   EXPECT_THAT(error(), HasSubstr("format_version: expected 1, found 99"));
 }
 
-}  // namespace
-}  // namespace risley::report
+}  // namespace risley::report::report_file_test

@@ -11,8 +11,7 @@
 
 #include "risley/core/random.hpp"
 
-namespace risley::reproduction {
-namespace {
+namespace risley::reproduction::figure_test {
 
 TEST(HistogramChart, CountsEveryValueAndDrawsTheNormalCurve) {
   const RandomStream random(1, 2);
@@ -93,5 +92,4 @@ TEST(FieldOfViewChart, PointsWithoutValuesHaveNoColours) {
   EXPECT_FALSE(chart.value_range.has_value());
 }
 
-}  // namespace
-}  // namespace risley::reproduction
+}  // namespace risley::reproduction::figure_test

@@ -9,8 +9,7 @@
 
 #include "risley/core/error.hpp"
 
-namespace risley::reproduction {
-namespace {
+namespace risley::reproduction::paper_table_test {
 
 TEST(Printed, KeepsDigits) {
   EXPECT_DOUBLE_EQ(printed("-43,789.8").value, -43789.8);
@@ -92,5 +91,4 @@ TEST(Distribution, SaysWhereADrawFalls) {
   EXPECT_EQ(distribution_of({1.0}, 1.0).draws, 1u);
 }
 
-}  // namespace
-}  // namespace risley::reproduction
+}  // namespace risley::reproduction::paper_table_test

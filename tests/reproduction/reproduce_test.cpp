@@ -14,8 +14,7 @@
 
 #include "reproduction/reproduction_page.hpp"
 
-namespace risley::reproduction {
-namespace {
+namespace risley::reproduction::reproduce_test {
 
 constexpr Effort kSmall{3, 3, 1, 0, 12, 1};
 
@@ -138,7 +137,7 @@ TEST(Reproduce, Section33PassesAndAnotherUnitFails) {
 
 TEST(Reproduce, SameSeedSameNumbersWhateverTheThreads) {
   ReproduceOptions options = small_options();
-  options.effort.wall_seeds = 5;
+  options.effort.wall_seeds = 3;
   const auto both = [&] {
     return text_of(incorrect_calibration(options)) + text_of(simulated_unit(options));
   };
@@ -153,7 +152,7 @@ TEST(Reproduce, SameSeedSameNumbersWhateverTheThreads) {
   }
   EXPECT_EQ(one, two);
   options.seed = 1;
-  EXPECT_NE(one, both());
+  EXPECT_EQ(one.find(text_of(simulated_unit(options))), std::string::npos);
 }
 
 TEST(ReproductionPage, SaysTheVerdictInWords) {
@@ -180,5 +179,4 @@ TEST(ReproductionPage, SaysTheVerdictInWords) {
   EXPECT_THAT(page, ::testing::HasSubstr("\"cell_width\":0.5"));
 }
 
-}  // namespace
-}  // namespace risley::reproduction
+}  // namespace risley::reproduction::reproduce_test

@@ -9,8 +9,7 @@
 
 #include "refusal.hpp"
 
-namespace risley::scenes {
-namespace {
+namespace risley::scenes::entries_test {
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
@@ -42,5 +41,4 @@ TEST(Entries, StationsAskForAKnownName) {
             "unknown station \"roof\", the scene has: cellar, attic");
 }
 
-}  // namespace
-}  // namespace risley::scenes
+}  // namespace risley::scenes::entries_test

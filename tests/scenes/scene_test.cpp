@@ -11,8 +11,7 @@
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
 
-namespace risley::scenes {
-namespace {
+namespace risley::scenes::scene_test {
 
 using ::testing::HasSubstr;
 
@@ -206,5 +205,4 @@ INSTANTIATE_TEST_SUITE_P(
         Mistake{"NotYaml", "planes: [\n", 2, "YAML"}),
     [](const auto& each) { return std::string(each.param.name); });
 
-}  // namespace
-}  // namespace risley::scenes
+}  // namespace risley::scenes::scene_test

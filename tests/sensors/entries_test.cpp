@@ -10,8 +10,7 @@
 
 #include "refusal.hpp"
 
-namespace risley::sensors {
-namespace {
+namespace risley::sensors::entries_test {
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
@@ -117,5 +116,4 @@ TEST(Entries, SpecificationsMayStandOnTheirBounds) {
   EXPECT_EQ(refusal([&] { return preset_text(sensor); }), "");
 }
 
-}  // namespace
-}  // namespace risley::sensors
+}  // namespace risley::sensors::entries_test

@@ -12,8 +12,7 @@
 #include "risley/optics/observation_model.hpp"
 #include "risley/sensors/preset.hpp"
 
-namespace risley::sensors {
-namespace {
+namespace risley::sensors::horizon_test {
 
 TEST(Horizon, IsThreePrismsAndSixEmitters) {
   const Sensor sensor = load_sensor("horizon");
@@ -66,5 +65,4 @@ TEST(Horizon, RepeatsTheMakersSequence) {
   EXPECT_LT(degrees_from_radians(worst), 1e-6);
 }
 
-}  // namespace
-}  // namespace risley::sensors
+}  // namespace risley::sensors::horizon_test

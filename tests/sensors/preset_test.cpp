@@ -14,8 +14,7 @@
 #include "risley/core/angle.hpp"
 #include "risley/io/text_file.hpp"
 
-namespace risley::sensors {
-namespace {
+namespace risley::sensors::preset_test {
 
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
@@ -450,5 +449,4 @@ TEST(SensorRangeVariance, AddsItsParts) {
   EXPECT_EQ(sensor.range_variance(0.0, 0.0, 0.0), sensor.range_variance(0.0, 0.0, 1.0));
 }
 
-}  // namespace
-}  // namespace risley::sensors
+}  // namespace risley::sensors::preset_test

@@ -8,8 +8,7 @@
 #include "risley/core/angle.hpp"
 #include "risley/sensors/preset.hpp"
 
-namespace risley::sensors {
-namespace {
+namespace risley::sensors::sensor_test {
 
 using ::testing::HasSubstr;
 
@@ -163,5 +162,4 @@ TEST(Sensor, OneThatWasNotSetHasNoPrisms) {
   EXPECT_THROW(preset_text(sensor), InvalidArgument);
 }
 
-}  // namespace
-}  // namespace risley::sensors
+}  // namespace risley::sensors::sensor_test

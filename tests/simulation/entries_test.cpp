@@ -14,8 +14,7 @@
 
 #include "refusal.hpp"
 
-namespace risley::simulation {
-namespace {
+namespace risley::simulation::entries_test {
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
@@ -149,5 +148,4 @@ TEST(Entries, ScannersAskForRowsToRead) {
   EXPECT_EQ(scanner.shots_done(), 0U);
 }
 
-}  // namespace
-}  // namespace risley::simulation
+}  // namespace risley::simulation::entries_test

@@ -14,8 +14,7 @@
 
 #include "refusal.hpp"
 
-namespace risley::simulation {
-namespace {
+namespace risley::simulation::noise_test {
 
 constexpr std::size_t kMany = 100000;
 
@@ -141,5 +140,4 @@ TEST(ObservationNoise, AsksForColumnsOfOneLength) {
             "zenith has 3 values, expected 4");
 }
 
-}  // namespace
-}  // namespace risley::simulation
+}  // namespace risley::simulation::noise_test

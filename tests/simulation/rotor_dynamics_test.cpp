@@ -11,8 +11,7 @@
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
 
-namespace risley::simulation {
-namespace {
+namespace risley::simulation::rotor_dynamics_test {
 
 constexpr std::int64_t kSecond_ns = 1'000'000'000;
 const double kNominal = radians_from_degrees(-27984.0);
@@ -241,5 +240,4 @@ TEST(RotorMotion, RefusesWhatMakesNoSense) {
   }
 }
 
-}  // namespace
-}  // namespace risley::simulation
+}  // namespace risley::simulation::rotor_dynamics_test

@@ -18,8 +18,7 @@
 #include "risley/optics/observation_model.hpp"
 #include "risley/sensors/preset.hpp"
 
-namespace risley::simulation {
-namespace {
+namespace risley::simulation::scanner_test {
 
 using ::testing::HasSubstr;
 
@@ -382,5 +381,4 @@ TEST(Scanner, RefusesSettingsThatMakeNoSense) {
       "3 prisms");
 }
 
-}  // namespace
-}  // namespace risley::simulation
+}  // namespace risley::simulation::scanner_test

@@ -15,8 +15,7 @@
 #include "risley/recordings/truth.hpp"
 #include "risley/sensors/preset.hpp"
 
-namespace risley::simulation {
-namespace {
+namespace risley::simulation::truth_file_test {
 
 using ::testing::Contains;
 using ::testing::Pair;
@@ -151,5 +150,4 @@ TEST_F(TruthFile, NothingIsLeftWhenTheOutputCannotBeWritten) {
   EXPECT_TRUE(fs::is_empty(folder_));
 }
 
-}  // namespace
-}  // namespace risley::simulation
+}  // namespace risley::simulation::truth_file_test

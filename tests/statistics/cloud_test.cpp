@@ -15,8 +15,7 @@
 
 #include "statistics/simulated_walls.hpp"
 
-namespace risley::testing {
-namespace {
+namespace risley::testing::cloud_test {
 
 /// One part of one wall: mean distance of its points from where the wall truly is, what the common
 /// factors move that by, and the variance that independent noise leaves.
@@ -159,5 +158,4 @@ TEST(CloudStatistics, CovariancesOfPointsAndOfTheirDifferencesAreTrue) {
   EXPECT_NEAR(mean.differences, 1.0, 2.8 / root);
 }
 
-}  // namespace
-}  // namespace risley::testing
+}  // namespace risley::testing::cloud_test

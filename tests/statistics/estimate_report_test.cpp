@@ -17,8 +17,7 @@
 
 #include "statistics/simulated.hpp"
 
-namespace risley {
-namespace {
+namespace risley::estimate_report_test {
 
 using estimation::Estimate;
 using estimation::Method;
@@ -258,5 +257,4 @@ TEST(EstimateReport, TheFiltersPageTellsTheSameThings) {
   EXPECT_THAT(report::estimate_page(r), HasSubstr("stand still"));
 }
 
-}  // namespace
-}  // namespace risley
+}  // namespace risley::estimate_report_test

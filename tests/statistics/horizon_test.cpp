@@ -19,8 +19,7 @@
 
 #include "statistics/simulated_walls.hpp"
 
-namespace risley {
-namespace {
+namespace risley::horizon_test {
 
 namespace fs = std::filesystem;
 
@@ -128,5 +127,4 @@ TEST(Horizon, FromAFileToACloudEveryParameterIsAsGoodAsItsSigma) {
   EXPECT_LT(degrees_from_radians(largest_total), 0.05);
 }
 
-}  // namespace
-}  // namespace risley
+}  // namespace risley::horizon_test

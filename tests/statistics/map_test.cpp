@@ -11,8 +11,7 @@
 
 #include "statistics/monte_carlo.hpp"
 
-namespace risley {
-namespace {
+namespace risley::map_test {
 
 using estimation::Method;
 using testing::monte_carlo;
@@ -263,5 +262,4 @@ TEST(Map, AParameterHeldAtAWrongValueShowsOverThePrismsAngle) {
   EXPECT_TRUE(right.warnings.empty());
 }
 
-}  // namespace
-}  // namespace risley
+}  // namespace risley::map_test

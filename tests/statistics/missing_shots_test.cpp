@@ -12,8 +12,7 @@
 
 #include "statistics/simulated.hpp"
 
-namespace risley {
-namespace {
+namespace risley::missing_shots_test {
 
 using recordings::Observations;
 
@@ -159,5 +158,4 @@ TEST(FoundNoise, IsTrueOverTwoDecadesAndSoAreTheSigmas) {
   RecordProperty("nees_parameters", std::to_string(sum / kSeeds));
 }
 
-}  // namespace
-}  // namespace risley
+}  // namespace risley::missing_shots_test

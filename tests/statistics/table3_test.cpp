@@ -9,8 +9,7 @@
 
 #include "statistics/monte_carlo.hpp"
 
-namespace risley {
-namespace {
+namespace risley::table3_test {
 
 using estimation::Estimate;
 using estimation::Evaluation;
@@ -144,5 +143,4 @@ TEST(Table3, WedgeAndIndexActAsOneQuantity) {
   EXPECT_NEAR((estimate.sensor.get("refractive_index") - 1.0) * 18.0, 0.509 * 17.5, 0.01);
 }
 
-}  // namespace
-}  // namespace risley
+}  // namespace risley::table3_test

@@ -9,6 +9,8 @@
 #include <utility>
 #include <vector>
 
+#include <Eigen/Core>
+
 #include "risley/calibration/datum.hpp"
 #include "risley/calibration/planar_adjustment.hpp"
 #include "risley/calibration/plane_points.hpp"

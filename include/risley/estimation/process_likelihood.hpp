@@ -4,6 +4,8 @@
 
 #include <vector>
 
+#include <Eigen/Core>
+
 #include "risley/estimation/normal_equations.hpp"
 #include "risley/estimation/rotor_process.hpp"
 #include "risley/estimation/rotor_trajectory.hpp"

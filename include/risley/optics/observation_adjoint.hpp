@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <tuple>
 
 #include "risley/optics/observation_model.hpp"
