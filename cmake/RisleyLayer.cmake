@@ -54,8 +54,13 @@ function(risley_add_headers target)
   endif()
 endfunction()
 
-# For targets of which nothing takes long to run: half the time of building them is optimisation.
+# For targets of which nothing takes long to run: half the time of building them is optimisation. Headers
+# that another target has parsed were parsed for its own optimisation.
 function(risley_optimise_little target)
+  get_target_property(lender ${target} PRECOMPILE_HEADERS_REUSE_FROM)
+  if(lender)
+    set_target_properties(${target} PROPERTIES DISABLE_PRECOMPILE_HEADERS ON)
+  endif()
   target_compile_options(${target} PRIVATE $<$<CONFIG:Release,RelWithDebInfo>:-O1>)
 endfunction()
 

@@ -221,7 +221,7 @@ void print_calibration(const CalibratedRecordings& outcome) {
   }
 }
 
-Json forecast_json(const CalibrationForecast& f, const TrainShape& shape) {
+Json forecast_json(const CalibrationForecast& f, TrainShape shape) {
   Json parameters = Json::object(), walls = Json::array();
   for (std::size_t j = 0; j < f.free.size(); ++j) {
     const auto at = static_cast<Eigen::Index>(j);
@@ -245,7 +245,7 @@ Json forecast_json(const CalibrationForecast& f, const TrainShape& shape) {
           {"advice", f.advice}};
 }
 
-void print_forecast(const CalibrationForecast& f, const TrainShape& shape) {
+void print_forecast(const CalibrationForecast& f, TrainShape shape) {
   fmt::print("{:.3g} shots meet a wall\n\n", f.shots);
   Table walls({"wall", "station", "share %", "incidence deg", "range m"});
   for (const calibration::PlannedWall& wall : f.walls) {

@@ -13,7 +13,7 @@ namespace risley::app {
 Json calibration_json(const jobs::CalibratedRecordings& outcome, double total_time);
 void print_calibration(const jobs::CalibratedRecordings& outcome);
 
-Json forecast_json(const calibration::CalibrationForecast& forecast, const TrainShape& shape);
-void print_forecast(const calibration::CalibrationForecast& forecast, const TrainShape& shape);
+Json forecast_json(const calibration::CalibrationForecast& forecast, TrainShape shape);
+void print_forecast(const calibration::CalibrationForecast& forecast, TrainShape shape);
 
 }  // namespace risley::app

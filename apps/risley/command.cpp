@@ -124,8 +124,7 @@ std::pair<std::string, double> split_assignment(const std::string& text) {
   return {name, number_from(text.substr(equals + 1), name)};
 }
 
-std::pair<std::string, double> parameter_assignment(const std::string& text,
-                                                    const TrainShape& shape) {
+std::pair<std::string, double> parameter_assignment(const std::string& text, TrainShape shape) {
   auto [name, value] = split_assignment(text);
   const ParameterInfo& parameter = find_parameter(name, shape);
   value *= parameter.si_per_unit;
@@ -133,7 +132,7 @@ std::pair<std::string, double> parameter_assignment(const std::string& text,
   return {name, value};
 }
 
-double in_file_unit(const std::string& name, double value, const TrainShape& shape) {
+double in_file_unit(const std::string& name, double value, TrainShape shape) {
   return value / find_parameter(name, shape).si_per_unit;
 }
 

@@ -94,10 +94,9 @@ double now();
 /// "NAME=VALUE" with a value in the unit of the name. @throws InvalidArgument
 std::pair<std::string, double> split_assignment(const std::string& text);
 /// As split_assignment, as SI. @throws InvalidArgument also for unknown names and out of bounds
-std::pair<std::string, double> parameter_assignment(const std::string& text,
-                                                    const TrainShape& shape);
+std::pair<std::string, double> parameter_assignment(const std::string& text, TrainShape shape);
 /// An SI value in the unit of the name of a parameter.
-double in_file_unit(const std::string& name, double value, const TrainShape& shape);
+double in_file_unit(const std::string& name, double value, TrainShape shape);
 
 /// A value of --rate-hz and the like. @throws InvalidArgument naming the option
 double positive_number(const std::string& text, std::string_view option, std::string_view unit);

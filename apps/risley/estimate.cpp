@@ -79,7 +79,7 @@ Json moments_json(const estimation::Moments& moments) {
           {"kurtosis", moments.kurtosis}};
 }
 
-Json evaluation_json(const Evaluation& evaluation, const TrainShape& shape) {
+Json evaluation_json(const Evaluation& evaluation, TrainShape shape) {
   Json parameters = Json::object();
   for (const estimation::TruthComparison& one : evaluation.parameters) {
     parameters[one.name] = {{"true", in_file_unit(one.name, one.truth, shape)},

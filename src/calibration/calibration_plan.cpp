@@ -91,7 +91,7 @@ std::vector<std::string> advice_for(const CalibrationForecast& f, const Calibrat
 }  // namespace
 
 std::vector<estimation::FreeParameter> calibration_parameters(
-    const TrainShape& shape, const std::vector<std::string>& fixed,
+    TrainShape shape, const std::vector<std::string>& fixed,
     const std::vector<std::string>& additional) {
   std::vector<std::string> names;
   for (const std::string& name : estimation::default_free_names(shape)) {

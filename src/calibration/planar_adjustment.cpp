@@ -374,7 +374,7 @@ std::pair<Vector3<double>, Vector3<double>> tangents_of(const Vector3<double>& n
 }
 
 std::vector<double> prior_sigmas(const std::vector<estimation::FreeParameter>& free,
-                                 const TrainShape& shape, std::optional<double> angle_sigma) {
+                                 TrainShape shape, std::optional<double> angle_sigma) {
   std::vector<double> sigmas;
   for (const estimation::FreeParameter& parameter : free) {
     const bool angle = find_parameter(parameter.name, shape).unit == "deg";

@@ -19,7 +19,7 @@ bool one_glass(const PrismTrain& train) {
   return true;
 }
 
-std::vector<std::string> default_free_names(const TrainShape& shape, bool one_glass) {
+std::vector<std::string> default_free_names(TrainShape shape, bool one_glass) {
   const int prisms = shape.prisms;
   std::vector<std::string> names;
   if (one_glass) names.emplace_back("refractive_index");
@@ -45,7 +45,7 @@ std::vector<std::string> default_free_names(const TrainShape& shape, bool one_gl
 }
 
 std::vector<FreeParameter> free_parameters(const std::vector<std::string>& names,
-                                           const TrainShape& shape) {
+                                           TrainShape shape) {
   constexpr double kIndexSigma = 0.01;
   constexpr double kAngleSigma = radians_from_degrees(1.0);
   std::vector<FreeParameter> free;

@@ -34,7 +34,7 @@ constexpr double kStrong = 0.9;
 constexpr double kTwin = 0.98;
 
 /// Every parameter of the prisms that exists, shared ones under their shared names.
-std::vector<FreeParameter> all_parameters(const TrainShape& shape) {
+std::vector<FreeParameter> all_parameters(TrainShape shape) {
   std::vector<std::string> names{"refractive_index_air", "refractive_index", "wedge_angle_deg"};
   for (const ParameterInfo& info : parameter_list(shape)) {
     const bool error = info.name.find("tilt") != std::string::npos ||
@@ -308,8 +308,7 @@ Observability observability_of_estimate(const Estimate& estimate, const Progress
                  duration, shots, shots / variance, progress);
 }
 
-std::vector<std::string> observability_words(const Observability& observability,
-                                             const TrainShape& shape) {
+std::vector<std::string> observability_words(const Observability& observability, TrainShape shape) {
   std::vector<std::string> words;
   for (const QuantityObservability& quantity : observability.quantities) {
     const ParameterInfo& info = find_parameter(quantity.name, shape);

@@ -22,7 +22,7 @@ constexpr double kLargestError = radians_from_degrees(10.0);
 constexpr double kLargestWedge = radians_from_degrees(60.0);
 constexpr double kFastest = radians_from_degrees(1e6);
 
-std::vector<ParameterInfo> build_list(const TrainShape& shape) {
+std::vector<ParameterInfo> build_list(TrainShape shape) {
   const int prisms = shape.prisms;
   std::vector<ParameterInfo> list;
   const auto add = [&](std::string name, std::string words, std::string symbol, const char* unit,
@@ -117,7 +117,7 @@ std::vector<ParameterInfo> build_list(const TrainShape& shape) {
 
 }  // namespace
 
-void check_shape(const TrainShape& shape) {
+void check_shape(TrainShape shape) {
   if (shape.prisms < 1 || shape.prisms > kMaxPrisms) refuse_prism_count(shape.prisms);
   if (shape.emitters < 1 || shape.emitters > kMaxEmitters) {
     throw InvalidArgument(
@@ -125,7 +125,7 @@ void check_shape(const TrainShape& shape) {
   }
 }
 
-const std::vector<ParameterInfo>& parameter_list(const TrainShape& shape) {
+const std::vector<ParameterInfo>& parameter_list(TrainShape shape) {
   struct Entry {
     std::once_flag built;
     std::vector<ParameterInfo> list;
@@ -138,7 +138,7 @@ const std::vector<ParameterInfo>& parameter_list(const TrainShape& shape) {
   return entry.list;
 }
 
-const ParameterInfo& find_parameter(std::string_view name, const TrainShape& shape) {
+const ParameterInfo& find_parameter(std::string_view name, TrainShape shape) {
   const auto& list = parameter_list(shape);
   for (const auto& parameter : list) {
     if (parameter.name == name) return parameter;

@@ -10,7 +10,7 @@
 namespace risley {
 namespace {
 
-const ParameterInfo& find_train_parameter(std::string_view name, const TrainShape& shape) {
+const ParameterInfo& find_train_parameter(std::string_view name, TrainShape shape) {
   const ParameterInfo& parameter = find_parameter(name, shape);
   if (parameter.kind != ParameterKind::train) {
     throw InvalidArgument(fmt::format("{} is not a parameter of the prisms", name));

@@ -60,7 +60,7 @@ std::string verdict_html(const Verdict& verdict) {
 }
 
 std::string correlation_html(const std::vector<std::string>& free,
-                             const Eigen::MatrixXd& covariance, const TrainShape& shape) {
+                             const Eigen::MatrixXd& covariance, TrainShape shape) {
   if (free.empty()) return "";
   std::string html =
       "<h2>Correlations of the parameters</h2>\n<div class=\"wide\">"

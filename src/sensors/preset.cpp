@@ -138,7 +138,7 @@ std::vector<std::string_view> section_names() {
 }
 
 /// The unit of a value that a covariance can name. @throws InvalidArgument for other names
-std::string_view unit_of(const std::string& name, const TrainShape& shape) {
+std::string_view unit_of(const std::string& name, TrainShape shape) {
   return name == "range_offset_m" ? "m" : std::string_view(find_parameter(name, shape).unit);
 }
 

@@ -14,7 +14,7 @@ namespace risley::sensors {
 namespace {
 
 /// The parameter of that name, which must be one a sensor has.
-const ParameterInfo& find_sensor_parameter(std::string_view name, const TrainShape& shape) {
+const ParameterInfo& find_sensor_parameter(std::string_view name, TrainShape shape) {
   const ParameterInfo& parameter = find_parameter(name, shape);
   if (parameter.kind == ParameterKind::rotation_angle) {
     throw InvalidArgument(

@@ -215,7 +215,7 @@ struct Columns {
 };
 
 /// None, one that all prisms share, the paper's choice, and every single place.
-std::vector<std::vector<FreeParameter>> parameter_sets(const TrainShape& shape) {
+std::vector<std::vector<FreeParameter>> parameter_sets(TrainShape shape) {
   std::vector<std::string> every;
   for (const ParameterInfo& parameter : parameter_list(shape)) {
     if (parameter.kind != ParameterKind::train) continue;

@@ -65,7 +65,7 @@ CalibrationForecast forecast(const CalibrationPlan& plan, const Progress& progre
 /// refractive index is held unless asked for, since the recording itself tells it better.
 /// @throws InvalidArgument for a name that is no parameter of the prisms, or is in both lists
 std::vector<estimation::FreeParameter> calibration_parameters(
-    const TrainShape& shape, const std::vector<std::string>& fixed,
+    TrainShape shape, const std::vector<std::string>& fixed,
     const std::vector<std::string>& additional);
 
 }  // namespace risley::calibration

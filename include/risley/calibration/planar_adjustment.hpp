@@ -121,7 +121,7 @@ PlanarSolution adjust(PlanarProblem problem, const AdjustmentOptions& options = 
 /// and for all without one.
 /// @param angle_sigma  rad
 std::vector<double> prior_sigmas(const std::vector<estimation::FreeParameter>& free,
-                                 const TrainShape& shape, std::optional<double> angle_sigma);
+                                 TrainShape shape, std::optional<double> angle_sigma);
 
 /// Information of the priors on the free parameters [free, free].
 Eigen::MatrixXd prior_information(const PlanarProblem& problem);

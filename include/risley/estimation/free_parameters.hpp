@@ -26,14 +26,13 @@ bool one_glass(const PrismTrain& train);
 /// angles and the other horizontal tilts cannot be told from the rest and stay fixed.
 /// [B21 section 2.3] Several emitters do tell the other horizontal tilts: they are free then.
 /// @param one_glass  one index for all prisms; otherwise each has its own
-std::vector<std::string> default_free_names(const TrainShape& shape, bool one_glass = true);
+std::vector<std::string> default_free_names(TrainShape shape, bool one_glass = true);
 
 /// Free parameters by name. The priors are wide on purpose (1 degree, 0.01 in the index): they keep
 /// the first updates inside the range of the linearisation and weigh nothing against a recording.
 /// @throws InvalidArgument for a name that is unknown, not a train parameter, or given twice (also
 ///         as shared and own, such as refractive_index with refractive_index_a)
-std::vector<FreeParameter> free_parameters(const std::vector<std::string>& names,
-                                           const TrainShape& shape);
+std::vector<FreeParameter> free_parameters(const std::vector<std::string>& names, TrainShape shape);
 
 /// Values of free parameters in a train [free], SI units.
 Eigen::VectorXd free_values(const PrismTrain& train, const std::vector<FreeParameter>& free);

@@ -67,7 +67,6 @@ Observability observability_of_estimate(const Estimate& estimate, const Progress
 
 /// What a user should know, in sentences: which parameters to hold fixed, what each is mixed up
 /// with, and how long a recording would have to be to tell them after all.
-std::vector<std::string> observability_words(const Observability& observability,
-                                             const TrainShape& shape);
+std::vector<std::string> observability_words(const Observability& observability, TrainShape shape);
 
 }  // namespace risley::estimation

@@ -22,7 +22,7 @@ struct TrainShape {
 };
 
 /// @throws InvalidArgument unless there are 1 to kMaxPrisms prisms and 1 to kMaxEmitters emitters
-void check_shape(const TrainShape& shape);
+void check_shape(TrainShape shape);
 
 /// Places in the flat parameter vector of a train: air, incident beam of the first emitter, then
 /// six per prism in beam order, then two per further emitter. A shot sees the part that a train
@@ -59,7 +59,7 @@ constexpr int frame_pitch(int prisms) { return bearing_tilt_vertical(prisms - 1)
 /// Length of the flat parameter vector with one emitter: what one shot depends on.
 constexpr int parameter_count(int prisms) { return 3 + 6 * prisms; }
 /// Length of the whole flat parameter vector.
-constexpr int parameter_count(const TrainShape& shape) {
+constexpr int parameter_count(TrainShape shape) {
   return parameter_count(shape.prisms) + 2 * (shape.emitters - 1);
 }
 /// Of the largest train.
@@ -89,10 +89,10 @@ struct ParameterInfo {
 /// "incident_beam_1_horizontal_deg"), then the prisms' own ("refractive_index_a"), then speeds and
 /// angles.
 /// @throws InvalidArgument as check_shape()
-const std::vector<ParameterInfo>& parameter_list(const TrainShape& shape);
+const std::vector<ParameterInfo>& parameter_list(TrainShape shape);
 
 /// The entry of that name. @throws InvalidArgument that lists the known names
-const ParameterInfo& find_parameter(std::string_view name, const TrainShape& shape);
+const ParameterInfo& find_parameter(std::string_view name, TrainShape shape);
 
 /// @param value  SI units
 /// @throws InvalidArgument naming the parameter, value, unit and range, also when it is not finite

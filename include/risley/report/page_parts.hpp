@@ -44,7 +44,7 @@ std::string verdict_html(const Verdict& verdict);
 /// @param free        names
 /// @param covariance  [free, free]
 std::string correlation_html(const std::vector<std::string>& free,
-                             const Eigen::MatrixXd& covariance, const TrainShape& shape);
+                             const Eigen::MatrixXd& covariance, TrainShape shape);
 
 /// How sound the times of recordings are, as a table.
 std::string time_audit_html(const std::vector<ReportedRecording>& recordings);
