@@ -5,6 +5,8 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <string>
+#include <vector>
 
 #include <fmt/format.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
@@ -12,6 +14,7 @@
 #include <tbb/global_control.h>
 
 #include "risley/core/error.hpp"
+#include "risley/core/text.hpp"
 
 #include "command.hpp"
 
@@ -53,6 +56,14 @@ constexpr Verb kVerbs[] = {
      "  risley cloud recording.lvx --calibration calibration/calibration.yaml -o cloud.las\n"
      "  risley cloud 'flight/*.lvx' --calibration mid-40 --format ply -o clouds/",
      declare_cloud},
+    {"pattern", "The scan pattern of a sensor, for simulators",
+     "  risley pattern --sensor avia --format npy --duration-s 4 -o avia.npy\n"
+     "  risley pattern --sensor horizon-sequence --format livox-csv --every 40 -o -",
+     declare_pattern},
+    {"preset", "The presets of sensors: list, show, check, new",
+     "  risley preset list\n  risley preset show avia\n"
+     "  risley preset new unit-17 --from avia -o unit-17.yaml\n  risley preset check unit-17.yaml",
+     declare_preset},
     {"report", "The page of a result folder, drawn again from its report.json",
      "  risley report result/\n  risley report result/ -o sensor-17.html", declare_report},
     {"reproduce", "Every table and figure of the paper, ours beside the paper's",
@@ -122,7 +133,11 @@ std::string usage_error(const CLI::ParseError& error, int argc, char** argv) {
     known += fmt::format("{}{}", known.empty() ? "" : ", ", verb.name);
   }
   if (first.starts_with('-')) return fmt::format("{} (see risley --help)", error.what());
-  return fmt::format("unknown verb '{}', known: {}", first, known);
+  std::vector<std::string> names;
+  for (const Verb& verb : kVerbs) names.emplace_back(verb.name);
+  const std::string meant = near_miss(first, names);
+  return fmt::format("unknown verb '{}'{}, known: {}", first,
+                     meant.empty() ? "" : fmt::format(", did you mean {}?", meant), known);
 }
 
 ExitStatus run_command(int argc, char** argv) {

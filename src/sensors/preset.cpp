@@ -14,6 +14,7 @@
 
 #include "risley/algebra/symmetric.hpp"
 #include "risley/core/require.hpp"
+#include "risley/core/text.hpp"
 #include "risley/io/text_file.hpp"
 #include "risley/io/yaml_map.hpp"
 
@@ -169,6 +170,10 @@ Quantity read_quantity(const YamlMap& parent, std::string_view name, std::string
         {std::string(name), si_from_file(sigma, scale_of(unit)), std::move(source)});
   }
   return {yaml_number(value.value, map.path(), map.field("value")), value.line};
+}
+
+std::string rotation_angle_name(int prism) {
+  return fmt::format("rotation_angle_{}_deg", prism_letter(prism));
 }
 
 void read_parameters(const YamlMap& map, Sensor& sensor) {
@@ -370,6 +375,37 @@ void read_combinations(const YamlMap& root, Sensor& sensor) {
   sensor.combination = root.integer("combination", 1, static_cast<int>(sensor.combinations.size()));
 }
 
+/// The start of the scan: rotation angles, first_shot and firing.
+void read_sequence(const YamlMap& root, Sensor& sensor) {
+  const YamlMap map(root.at("sequence").value, root.path(), "sequence");
+  ScanSequence sequence;
+  std::vector<std::string> known{"first_shot", "firing"};
+  for (int i = 0; i < sensor.prisms(); ++i) {
+    known.push_back(rotation_angle_name(i));
+    const Quantity quantity = read_quantity(map, known.back(), "deg", sensor);
+    if (!(quantity.value >= -360 && quantity.value <= 360)) {
+      fail_at(map.path(), quantity.line,
+              fmt::format("{} = {:g} deg, allowed -360 to 360", map.field(known.back()),
+                          quantity.value));
+    }
+    sequence.rotation_angle.push_back(si_from_file(quantity.value, scale_of("deg")));
+  }
+  for (const YamlMap::Entry& entry : map.entries()) {
+    if (std::find(known.begin(), known.end(), entry.key) == known.end()) {
+      fail_at(map.path(), entry.line, fmt::format("unknown field {}", map.field(entry.key)));
+    }
+  }
+  sequence.first_shot = map.integer("first_shot", 0, 1);
+  const std::string firing = map.text("firing");
+  if (firing == to_string(Firing::together)) {
+    sequence.firing = Firing::together;
+  } else if (firing != to_string(Firing::in_turn)) {
+    fail_at(map.path(), map.at("firing").line,
+            fmt::format("sequence.firing = \"{}\", allowed in_turn, together", firing));
+  }
+  sensor.sequence = std::move(sequence);
+}
+
 void read_covariance(const YamlMap& root, Sensor& sensor) {
   const YamlMap map(root.at("covariance").value, root.path(), "covariance");
   map.allow_only({"names", "matrix"});
@@ -545,6 +581,19 @@ std::string geometry_text(const Sensor& sensor) {
   return text;
 }
 
+std::string sequence_text(const Sensor& sensor, const ScanSequence& sequence) {
+  require_length("rotation_angle of the sequence", sequence.rotation_angle.size(),
+                 static_cast<std::size_t>(sensor.prisms()));
+  require_between("first_shot", sequence.first_shot, 0, 1);
+  std::string text = "sequence:\n";
+  for (int i = 0; i < sensor.prisms(); ++i) {
+    text += quantity_text(sensor, rotation_angle_name(i),
+                          sequence.rotation_angle[static_cast<std::size_t>(i)], "deg", nullptr);
+  }
+  return text + fmt::format("  first_shot: {}\n  firing: {}\n", sequence.first_shot,
+                            to_string(sequence.firing));
+}
+
 std::string covariance_text(const Sensor& sensor) {
   const auto n = static_cast<Eigen::Index>(sensor.covariance_names.size());
   if (sensor.covariance.rows() != n || sensor.covariance.cols() != n) {
@@ -578,19 +627,75 @@ std::vector<std::string> builtin_preset_names() {
   return names;
 }
 
-Sensor load_sensor(const std::string& name_or_path) {
-  for (const BuiltinPreset& preset : builtin_presets()) {
-    if (preset.name == name_or_path) {
-      return parse_preset(preset.text, fmt::format("built-in preset {}", preset.name));
-    }
+namespace {
+
+/// Text of a preset and how messages call it.
+struct PresetSource {
+  std::string text, path;
+};
+
+[[noreturn]] void fail_unknown(const std::string& name, const char* is_neither) {
+  const std::vector<std::string> known = builtin_preset_names();
+  const std::string meant = near_miss(name, known);
+  throw InvalidArgument(fmt::format("sensor \"{}\" {}{}; known presets: {}", name, is_neither,
+                                    meant.empty() ? "" : fmt::format("; did you mean {}?", meant),
+                                    fmt::join(known, ", ")));
+}
+
+const BuiltinPreset* find_builtin(const std::string& name) {
+  const auto& presets = builtin_presets();
+  const auto found = std::find_if(presets.begin(), presets.end(),
+                                  [&](const BuiltinPreset& preset) { return preset.name == name; });
+  return found == presets.end() ? nullptr : &*found;
+}
+
+PresetSource source_of(const std::string& name_or_path) {
+  if (const BuiltinPreset* preset = find_builtin(name_or_path)) {
+    return {preset->text, fmt::format("built-in preset {}", preset->name)};
   }
   const std::filesystem::path path(name_or_path);
   if (path.extension() == ".yaml" || path.extension() == ".yml" || std::filesystem::exists(path)) {
-    return parse_preset(io::read_text_file(name_or_path), name_or_path);
+    return {io::read_text_file(name_or_path), name_or_path};
   }
-  throw InvalidArgument(
-      fmt::format("sensor \"{}\" is neither a file nor a known preset; known presets: {}",
-                  name_or_path, fmt::join(builtin_preset_names(), ", ")));
+  fail_unknown(name_or_path, "is neither a file nor a known preset");
+}
+
+}  // namespace
+
+std::string builtin_preset_text(const std::string& name) {
+  const BuiltinPreset* preset = find_builtin(name);
+  if (preset == nullptr) fail_unknown(name, "is no known preset");
+  return preset->text;
+}
+
+std::string copied_preset_text(const std::string& name_or_path, const std::string& new_name) {
+  constexpr std::string_view kAllowed =
+      "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-_.";
+  constexpr std::size_t kLongest = 64;
+  if (new_name.empty() || new_name.size() > kLongest ||
+      new_name.find_first_not_of(kAllowed) != std::string::npos) {
+    throw InvalidArgument(fmt::format(
+        "name \"{}\" of a preset, allowed 1 to {} letters, digits, hyphens, underscores and points",
+        new_name, kLongest));
+  }
+  PresetSource source = source_of(name_or_path);
+  parse_preset(source.text, source.path);
+  const std::string& text = source.text;
+  std::size_t line = 0;
+  while (line < text.size() && text.compare(line, 5, "name:") != 0) {
+    const std::size_t end = text.find('\n', line);
+    line = end == std::string::npos ? text.size() : end + 1;
+  }
+  if (line >= text.size()) {
+    fail_at(source.path, 0, "expected a line that begins with name:");
+  }
+  const std::size_t end = std::min(text.find('\n', line), text.size());
+  return text.substr(0, line) + "name: " + yaml_quoted(new_name) + text.substr(end);
+}
+
+Sensor load_sensor(const std::string& name_or_path) {
+  const PresetSource source = source_of(name_or_path);
+  return parse_preset(source.text, source.path);
 }
 
 Sensor parse_preset(const std::string& text, const std::string& path) {
@@ -599,27 +704,12 @@ Sensor parse_preset(const std::string& text, const std::string& path) {
     fail_at(path, root.line(), "is no sensor preset: risley_preset is missing");
   }
   root.integer("risley_preset", kSchemaVersion, kSchemaVersion);
-  root.allow_only({"risley_preset",
-                   "name",
-                   "manufacturer",
-                   "model",
-                   "serial",
-                   "face_order",
-                   "emitters",
-                   "combination",
-                   "combinations",
-                   "device_type",
-                   "parameters",
-                   "noise",
-                   "resolution",
-                   "limits",
-                   "range",
-                   "rates",
-                   "beam",
-                   "geometry",
-                   "calibrated_against",
-                   "covariance",
-                   "provenance"});
+  root.allow_only({"risley_preset", "name",        "manufacturer", "model",
+                   "serial",        "face_order",  "emitters",     "combination",
+                   "combinations",  "device_type", "parameters",   "noise",
+                   "resolution",    "limits",      "range",        "rates",
+                   "beam",          "geometry",    "sequence",     "calibrated_against",
+                   "covariance",    "provenance"});
   Sensor sensor;
   sensor.name = root.text("name");
   sensor.manufacturer = root.text("manufacturer");
@@ -638,6 +728,7 @@ Sensor parse_preset(const std::string& text, const std::string& path) {
   read_parameters(YamlMap(root.at("parameters").value, path, "parameters"), sensor);
   read_specifications(root, sensor);
   read_geometry(root, sensor);
+  if (root.find("sequence") != nullptr) read_sequence(root, sensor);
   if (root.find("calibrated_against") != nullptr) {
     const std::string against = root.text("calibrated_against");
     if (against == to_string(CalibrationReference::directions)) {
@@ -686,6 +777,7 @@ std::string preset_text(const Sensor& sensor) {
     if (!fields.empty()) text += fmt::format("{}:\n{}", section, fields);
   }
   text += geometry_text(sensor);
+  if (sensor.sequence) text += sequence_text(sensor, *sensor.sequence);
   if (sensor.reference != CalibrationReference::none) {
     text += fmt::format("calibrated_against: {}\n", to_string(sensor.reference));
   }

@@ -41,6 +41,8 @@ std::string to_string(CalibrationReference reference) {
   return {};
 }
 
+std::string to_string(Firing firing) { return firing == Firing::together ? "together" : "in_turn"; }
+
 double Sensor::range_variance(double range, double tan_incidence, double intensity) const {
   const auto square = [](double x) { return x * x; };
   return square(range_noise) + square(range_noise_per_range * range) +

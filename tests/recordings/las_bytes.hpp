@@ -2,7 +2,9 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <cstring>
 #include <optional>
@@ -17,6 +19,11 @@ template <class T>
 void put(std::string& bytes, std::size_t at, std::type_identity_t<T> value) {
   if (bytes.size() < at + sizeof(T)) bytes.resize(at + sizeof(T));
   std::memcpy(bytes.data() + at, &value, sizeof(T));
+}
+
+/// @param bytes  long enough for it
+inline void put_text(std::string& bytes, std::size_t at, const std::string& text) {
+  std::copy(text.begin(), text.end(), bytes.begin() + static_cast<std::ptrdiff_t>(at));
 }
 
 struct LasPoint {
@@ -40,7 +47,7 @@ inline std::string descriptor(const std::string& name, std::uint8_t type,
   std::string bytes(192, '\0');
   bytes[2] = static_cast<char>(type);
   bytes[3] = static_cast<char>(options);
-  bytes.replace(4, name.size(), name);
+  put_text(bytes, 4, name);
   return bytes;
 }
 
@@ -73,12 +80,12 @@ struct LasFile {
 
   std::string bytes() const {
     std::string out(header_bytes(), '\0');
-    out.replace(0, 4, "LASF");
+    put_text(out, 0, "LASF");
     put<std::uint16_t>(out, 6, static_cast<std::uint16_t>(encoding));
     put<std::uint8_t>(out, 24, 1);
     put<std::uint8_t>(out, 25, static_cast<std::uint8_t>(minor));
-    out.replace(26, system.size(), system);
-    out.replace(58, software.size(), software);
+    put_text(out, 26, system);
+    put_text(out, 58, software);
     put<std::uint16_t>(out, 94, static_cast<std::uint16_t>(header_bytes()));
     put<std::uint32_t>(out, 96, static_cast<std::uint32_t>(points_at()));
     put<std::uint32_t>(out, 100, static_cast<std::uint32_t>(records.size()));
@@ -93,7 +100,7 @@ struct LasFile {
     }
     for (const Record& record : records) {
       std::string head(54, '\0');
-      head.replace(2, record.user.size(), record.user);
+      put_text(head, 2, record.user);
       put<std::uint16_t>(head, 18, record.number);
       put<std::uint16_t>(head, 20, static_cast<std::uint16_t>(record.data.size()));
       out += head + record.data;
@@ -107,7 +114,7 @@ struct LasFile {
     }
     for (const Record& record : extended) {
       std::string head(60, '\0');
-      head.replace(2, record.user.size(), record.user);
+      put_text(head, 2, record.user);
       put<std::uint16_t>(head, 18, record.number);
       put<std::uint64_t>(head, 20, record.data.size());
       out += head + record.data;
@@ -129,7 +136,7 @@ struct LasFile {
                         static_cast<std::uint8_t>(0xC0 | point.return_number | point.returns << 3));
       if (format != 0 && format != 2) put<double>(out, 20, point.gps_time);
     }
-    out.replace(base_bytes(format), point.extra.size(), point.extra);
+    put_text(out, base_bytes(format), point.extra);
     return out;
   }
 };

@@ -59,6 +59,12 @@ void expect_same(const Sensor& a, const Sensor& b) {
   EXPECT_EQ(a.train.parameters(), b.train.parameters());
   EXPECT_EQ(a.angular_velocity, b.angular_velocity);
   EXPECT_EQ(a.combination, b.combination);
+  ASSERT_EQ(a.sequence.has_value(), b.sequence.has_value());
+  if (a.sequence) {
+    EXPECT_EQ(a.sequence->rotation_angle, b.sequence->rotation_angle);
+    EXPECT_EQ(a.sequence->first_shot, b.sequence->first_shot);
+    EXPECT_EQ(a.sequence->firing, b.sequence->firing);
+  }
   expect_same_knowledge(a, b);
   EXPECT_EQ(a.covariance_names, b.covariance_names);
   EXPECT_EQ(a.covariance, b.covariance);
@@ -223,8 +229,47 @@ TEST(Preset, UnknownNameListsTheKnownOnes) {
     load_sensor("mid-4o");
     FAIL();
   } catch (const InvalidArgument& error) {
-    EXPECT_THAT(error.what(), HasSubstr("mid-40, mid-40-reversed, mid-40-table3"));
+    EXPECT_THAT(error.what(),
+                HasSubstr("neither a file nor a known preset; did you mean mid-40?; known presets: "
+                          "avia, avia-sequence, horizon"));
   }
+  EXPECT_THROW(load_sensor("velodyne"), InvalidArgument);
+}
+
+TEST(Preset, ACopyKeepsTheCommentsAndHasItsOwnName) {
+  const std::string original = builtin_preset_text("horizon");
+  EXPECT_EQ(original, preset_file("horizon"));
+  const std::string copy = copied_preset_text("horizon", "number-17");
+  EXPECT_EQ(copy, replaced(original, "\nname: horizon\n", "\nname: \"number-17\"\n"));
+  Sensor sensor = parse_preset(copy, "copy");
+  EXPECT_EQ(sensor.name, "number-17");
+  sensor.name = "horizon";
+  expect_same(sensor, load_sensor("horizon"));
+  for (const char* name : {"", "a b", "a/b", "x:y"}) {
+    EXPECT_THROW(copied_preset_text("horizon", name), InvalidArgument) << name;
+  }
+  EXPECT_THROW(copied_preset_text("horizont", "a"), InvalidArgument);
+  EXPECT_THROW(builtin_preset_text("mid40"), InvalidArgument);
+}
+
+TEST(Preset, ASequenceIsRefusedWithItsLine) {
+  const std::string good = builtin_preset_text("avia");
+  const auto refused = [&](const std::string& from, const std::string& to,
+                           const std::string& says) {
+    const std::string bad = replaced(good, from, to);
+    try {
+      parse_preset(bad, "bad.yaml");
+      ADD_FAILURE() << says;
+    } catch (const FileError& error) {
+      EXPECT_THAT(error.what(), HasSubstr(says));
+    }
+  };
+  refused("firing: in_turn", "firing: at_once",
+          "sequence.firing = \"at_once\", allowed in_turn, together");
+  refused("first_shot: 0", "first_shot: 2", "sequence.first_shot");
+  refused("firing: in_turn", "firing: in_turn\n  phase: 3", "unknown field sequence.phase");
+  refused("rotation_angle_b_deg: {value: 270", "rotation_angle_b_deg: {value: 1000",
+          "sequence.rotation_angle_b_deg = 1000 deg, allowed -360 to 360");
 }
 
 TEST(Preset, ASensorThatCannotBeWrittenIsRefused) {

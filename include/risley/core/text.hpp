@@ -2,11 +2,18 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <span>
 #include <string>
+#include <string_view>
 
 namespace risley {
 
 /// The same with the letters A to Z in lower case, for endings of file names.
 std::string lower_case(std::string text);
+
+/// The name that somebody may have meant who wrote another word: the one that fewest changed,
+/// missing, added or swapped letters separate from it, where capitals and hyphens, underscores and
+/// spaces do not count. Empty when every name is further than a third of its letters away.
+std::string near_miss(std::string_view word, std::span<const std::string> names);
 
 }  // namespace risley

@@ -12,11 +12,24 @@ namespace risley::sensors {
 /// Names of the presets that travel inside the library, sorted.
 std::vector<std::string> builtin_preset_names();
 
+/// The file of a built-in preset, comments included.
+/// @throws InvalidArgument for an unknown name; as load_sensor()
+std::string builtin_preset_text(const std::string& name);
+
+/// The text of a preset under another name, to start one's own from: all else stays as it is,
+/// comments included.
+/// @param name_or_path  of what is copied, as load_sensor()
+/// @throws as load_sensor(), and InvalidArgument for a name that is empty, longer than 64 letters
+/// or
+///         has others than letters, digits, hyphens, underscores and points
+std::string copied_preset_text(const std::string& name_or_path, const std::string& new_name);
+
 /// A sensor from a built-in name ("mid-40") or from a preset file (a path that exists, or ends in
 /// .yaml). A calibration result is a preset with a covariance: the same schema.
 /// @throws FileError (with the line) for a file that breaks the schema: unknown or missing field,
 ///         wrong unit, value out of bounds, covariance that is not symmetric and positive
-/// @throws InvalidArgument for an unknown name; the message lists the known ones
+/// @throws InvalidArgument for an unknown name; the message lists the known ones and the one that
+///         may have been meant
 Sensor load_sensor(const std::string& name_or_path);
 
 /// Reads preset text: one YAML map, version first (risley_preset: 1). A physical value reads

@@ -28,6 +28,23 @@ struct SpeedCombination {
   std::vector<FaceOrder> face_order;     ///< of the train that runs so; empty: always the same
 };
 
+/// When the emitters of a train fire.
+enum class Firing {
+  in_turn,   ///< one after another, at equal intervals, as real sensors do
+  together,  ///< all at once, as in the scan sequences of the maker
+};
+
+std::string to_string(Firing firing);
+
+/// The scan that a sensor of this type makes from its start. Shot i, counted from 0, is of emitter
+/// i modulo their number and has the time (first_shot + i) / shot_rate; its rotors are where they
+/// are then, or, where E emitters fire together, at (first_shot + floor(i / E)) E / shot_rate.
+struct ScanSequence {
+  std::vector<double> rotation_angle;  ///< [prisms] at time 0, rad
+  int first_shot = 0;                  ///< 0 or 1
+  Firing firing = Firing::in_turn;
+};
+
 /// What a calibration holds a sensor's parameters against.
 enum class CalibrationReference {
   none,        ///< a type or an assumption, no calibration
@@ -51,6 +68,8 @@ struct Sensor {
   /// has the fast rotor first and both directions kept, (wA, wB) becomes (-wB, -wA).
   /// [B21 section 2.4]
   std::vector<SpeedCombination> combinations;
+  /// Empty where nobody knows at which angles the rotors start.
+  std::optional<ScanSequence> sequence;
   std::vector<Knowledge> knowledge;  ///< of parameters, speeds and the numbers below, any order
 
   CalibrationReference reference = CalibrationReference::none;

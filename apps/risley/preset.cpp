@@ -1,0 +1,134 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "risley/sensors/preset.hpp"
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include "risley/core/error.hpp"
+#include "risley/io/text_file.hpp"
+
+#include "command.hpp"
+#include "table.hpp"
+
+namespace risley::app {
+namespace {
+
+struct PresetOptions {
+  std::string name, from, output;
+  std::vector<std::string> files;
+  Run run;  ///< of the action that was chosen
+};
+
+Json facts_json(const sensors::Sensor& sensor) {
+  return {{"name", sensor.name},
+          {"model", sensor.model},
+          {"face_order", to_string(sensor.train.face_order())},
+          {"prisms", sensor.prisms()},
+          {"emitters", sensor.train.emitters()}};
+}
+
+ExitStatus list_presets(const CommonOptions& common) {
+  Json presets = Json::array();
+  Table table({"preset", "model", "faces", "emitters"});
+  for (const std::string& name : sensors::builtin_preset_names()) {
+    const sensors::Sensor sensor = sensors::load_sensor(name);
+    presets.push_back(facts_json(sensor));
+    table.add({name, sensor.model, to_string(sensor.train.face_order()),
+               fmt::format("{}", sensor.train.emitters())});
+  }
+  if (common.json) {
+    print_json({{"presets", presets}});
+  } else {
+    table.print();
+  }
+  return kDone;
+}
+
+/// Prints a preset's text or writes it to a file.
+ExitStatus hand_out(const std::string& text, const PresetOptions& options,
+                    const CommonOptions& common) {
+  if (!options.output.empty()) io::write_text_file(options.output, text);
+  if (common.json) {
+    Json json = facts_json(sensors::parse_preset(text, options.name));
+    json["text"] = text;
+    if (!options.output.empty()) json["output"] = options.output;
+    print_json(json);
+  } else if (options.output.empty()) {
+    fmt::print("{}", text);
+  } else {
+    fmt::print("{}\n", options.output);
+  }
+  return kDone;
+}
+
+ExitStatus check_presets(const PresetOptions& options, const CommonOptions& common) {
+  ExitStatus status = kDone;
+  Json results = Json::array();
+  for (const std::string& file : options.files) {
+    try {
+      const sensors::Sensor sensor = sensors::parse_preset(io::read_text_file(file), file);
+      Json json = facts_json(sensor);
+      json.update({{"input", file}, {"status", kDone}, {"message", ""}});
+      results.push_back(json);
+      if (!common.json) {
+        fmt::print("{}: sound: {}, {} {}, faces {}, {} emitter{}\n", file, sensor.name,
+                   sensor.manufacturer, sensor.model, to_string(sensor.train.face_order()),
+                   sensor.train.emitters(), sensor.train.emitters() == 1 ? "" : "s");
+      }
+    } catch (const FileError& error) {
+      status = kBadFile;
+      results.push_back({{"input", file}, {"status", kBadFile}, {"message", error.what()}});
+      spdlog::error(error.what());
+    }
+  }
+  if (common.json) print_json({{"results", results}});
+  return status;
+}
+
+}  // namespace
+
+Run declare_preset(CLI::App& verb) {
+  const auto options = std::make_shared<PresetOptions>();
+  PresetOptions& o = *options;
+  verb.require_subcommand(1);
+  const auto action = [&](const char* name, const char* description, Run run) {
+    CLI::App* sub = verb.add_subcommand(name, description);
+    sub->fallthrough();  // --json and the like may come last
+    sub->callback([options, run] { options->run = run; });
+    return sub;
+  };
+  const auto output = [&](CLI::App* sub) {
+    sub->add_option("-o,--output", o.output, "File to write (default: standard output)");
+  };
+  action("list", "The built-in presets",
+         [](const CommonOptions& common) { return list_presets(common); });
+  CLI::App* show =
+      action("show", "The file of a built-in preset, with the source of every value",
+             [options](const CommonOptions& common) {
+               return hand_out(sensors::builtin_preset_text(options->name), *options, common);
+             });
+  show->add_option("NAME", o.name, "Built-in preset")->required();
+  output(show);
+  CLI::App* check =
+      action("check", "Whether files are sound presets, and where they are not",
+             [options](const CommonOptions& common) { return check_presets(*options, common); });
+  check->add_option("FILE", o.files, "Preset or calibration files")->required();
+  CLI::App* fresh =
+      action("new", "A copy under a name of its own, to start a preset from",
+             [options](const CommonOptions& common) {
+               return hand_out(sensors::copied_preset_text(options->from, options->name), *options,
+                               common);
+             });
+  fresh->add_option("NAME", o.name, "Name of the new preset")->required();
+  fresh->add_option("--from", o.from, "Preset to copy: by name, or a file")->required();
+  output(fresh);
+  return [options](const CommonOptions& common) { return options->run(common); };
+}
+
+}  // namespace risley::app

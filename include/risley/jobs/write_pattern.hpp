@@ -1,0 +1,50 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstdint>
+#include <iosfwd>
+#include <string>
+#include <vector>
+
+#include "risley/core/progress.hpp"
+#include "risley/sensors/scan_pattern.hpp"
+
+namespace risley::jobs {
+
+/// A way to write a scan pattern.
+struct PatternFormat {
+  std::string name;         ///< "livox-csv"
+  std::string description;  ///< columns, units, who reads it
+};
+
+/// Those that write_pattern() knows.
+const std::vector<PatternFormat>& pattern_formats();
+
+/// What to write where.
+struct WritePatternOptions {
+  std::string sensor;     ///< as sensors::load_sensor()
+  std::string format;     ///< a name of pattern_formats()
+  std::string output;     ///< path
+  double duration = 1.0;  ///< s, of the scan
+  sensors::ScanPatternOptions scan;
+};
+
+/// What came of it.
+struct WrittenPattern {
+  std::string sensor;  ///< name
+  std::uint64_t rows = 0;
+  std::uint64_t blocked = 0;  ///< of them, NaN: shots that do not get through the prisms
+  std::string firing;         ///< "in_turn" or "together"
+};
+
+/// Writes the scan pattern of a sensor for a simulator; the output appears when it is whole.
+/// @throws InvalidArgument for an unknown sensor or format and for numbers out of range; FileError;
+///         Cancelled
+WrittenPattern write_pattern(const WritePatternOptions& options, const Progress& progress = {});
+
+/// The same into an open stream; output of the options is not used.
+WrittenPattern write_pattern(const WritePatternOptions& options, std::ostream& stream,
+                             const Progress& progress = {});
+
+}  // namespace risley::jobs

@@ -1,0 +1,40 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "risley/sensors/sensor.hpp"
+
+namespace risley::sensors {
+
+/// Which shots of a scan sequence, and when they are fired.
+struct ScanPatternOptions {
+  std::optional<double> shot_rate;     ///< shots per second; empty: the sensor's
+  std::optional<Firing> firing;        ///< empty: as the sensor's sequence says
+  std::vector<double> rotation_angle;  ///< [prisms] at time 0, rad; empty: the sequence's
+  std::uint64_t every = 1;             ///< keeps the last of so many shots
+};
+
+/// Directions that a sensor sends its shots to, free of noise.
+struct ScanPattern {
+  std::vector<double> time;           ///< of the shots, s
+  std::vector<double> azimuth;        ///< rad
+  std::vector<double> zenith;         ///< rad; NaN, like the azimuth, where no beam gets through
+  std::vector<std::uint8_t> emitter;  ///< counted from 0
+
+  std::size_t size() const { return time.size(); }
+};
+
+/// Rows [first_row, first_row + rows) of the scan sequence with rotors at constant speed: row r is
+/// shot every (r + 1) - 1.
+/// @throws InvalidArgument for a sensor without sequence where no rotation angles are given, angles
+///         or speeds that are not one per prism, a rate that is not positive, every = 0, and for a
+///         time beyond 1e7 s
+ScanPattern scan_pattern(const Sensor& sensor, std::uint64_t first_row, std::size_t rows,
+                         const ScanPatternOptions& options = {});
+
+}  // namespace risley::sensors

@@ -1,0 +1,64 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "risley/sensors/scan_pattern.hpp"
+
+#include <span>
+
+#include <fmt/format.h>
+
+#include "risley/core/angle.hpp"
+#include "risley/core/error.hpp"
+#include "risley/core/require.hpp"
+#include "risley/optics/batch.hpp"
+
+namespace risley::sensors {
+
+ScanPattern scan_pattern(const Sensor& sensor, std::uint64_t first_row, std::size_t rows,
+                         const ScanPatternOptions& options) {
+  const auto prisms = static_cast<std::size_t>(sensor.prisms());
+  const ScanSequence sequence = sensor.sequence.value_or(ScanSequence{});
+  const std::vector<double>& start =
+      options.rotation_angle.empty() ? sequence.rotation_angle : options.rotation_angle;
+  if (start.empty()) {
+    throw InvalidArgument(fmt::format(
+        "sensor \"{}\" has no scan sequence: give the rotation angles at its start", sensor.name));
+  }
+  require_length("rotation_angle", start.size(), prisms);
+  require_length("angular_velocity of the sensor", sensor.angular_velocity.size(), prisms);
+  const double rate = options.shot_rate.value_or(sensor.shot_rate);
+  require_between("shot_rate", rate, 1e-3, 1e9, "Hz");
+  require_between("every", static_cast<double>(options.every), 1, 1e9);
+  constexpr double kLongest = 1e7;
+  require_between("end of the pattern",
+                  static_cast<double>(first_row + rows) * static_cast<double>(options.every) / rate,
+                  0, kLongest, "s");
+
+  const auto emitters = static_cast<std::uint64_t>(sensor.train.emitters());
+  const auto first_shot = static_cast<std::uint64_t>(sequence.first_shot);
+  const bool together = options.firing.value_or(sequence.firing) == Firing::together;
+  ScanPattern pattern;
+  pattern.time.resize(rows);
+  pattern.azimuth.resize(rows);
+  pattern.zenith.resize(rows);
+  pattern.emitter.resize(rows);
+  std::vector<std::vector<double>> angles(prisms, std::vector<double>(rows));
+  for (std::size_t i = 0; i < rows; ++i) {
+    const std::uint64_t shot = options.every * (first_row + i + 1) - 1;
+    pattern.time[i] = static_cast<double>(first_shot + shot) / rate;
+    pattern.emitter[i] = static_cast<std::uint8_t>(shot % emitters);
+    const std::uint64_t of_rotors =
+        together ? (first_shot + shot / emitters) * emitters : first_shot + shot;
+    const double time = static_cast<double>(of_rotors) / rate;
+    for (std::size_t k = 0; k < prisms; ++k) {
+      angles[k][i] = wrap_to_two_pi(start[k] + sensor.angular_velocity[k] * time);
+    }
+  }
+  const std::vector<std::span<const double>> columns(angles.begin(), angles.end());
+  DirectionColumns out;
+  out.azimuth = pattern.azimuth;
+  out.zenith = pattern.zenith;
+  observe_batch(sensor.train, columns, out, pattern.emitter);
+  return pattern;
+}
+
+}  // namespace risley::sensors
