@@ -4,7 +4,7 @@
 # the command is missing here.
 _risley() {
   local current=${COMP_WORDS[COMP_CWORD]} previous=${COMP_WORDS[COMP_CWORD-1]}
-  local verbs="info convert simulate estimate observability calibrate cloud report reproduce"
+  local verbs="info convert simulate estimate observability calibrate cloud pattern preset report reproduce"
   local common="--help --json --threads --seed --quiet --verbose"
   local names="refractive_index_air refractive_index refractive_index_a refractive_index_b
     wedge_angle_deg wedge_angle_a_deg wedge_angle_b_deg
@@ -12,6 +12,8 @@ _risley() {
     bearing_tilt_a_horizontal_deg bearing_tilt_a_vertical_deg
     prism_tilt_a_horizontal_deg prism_tilt_a_vertical_deg
     prism_tilt_b_horizontal_deg prism_tilt_b_vertical_deg"
+  local presets="avia avia-sequence horizon horizon-sequence mid-40 mid-40-reversed mid-40-sequence
+    mid-40-table3 mid-70 tele-15 tele-15-sequence"
   local speeds="angular_velocity_a_deg_per_s angular_velocity_b_deg_per_s"
   local verb="" word
   for word in "${COMP_WORDS[@]:1:COMP_CWORD-1}"; do
@@ -34,17 +36,19 @@ _risley() {
     --fix | --free) choices=$names ;;
     --set) choices="$names $speeds" ;;
     --reported) choices="nominal $names" ;;
-    --sensor | --calibration) choices="mid-40 mid-40-reversed mid-40-table3" ;;
+    --sensor | --calibration | --from) choices=$presets ;;
+    --firing) choices="in-turn together" ;;
     --format)
       case $verb in
         cloud) choices="las-1.4 las-1.2 ply pcd npy csv xyz netcdf ros1-bag" ;;
+        pattern) choices="livox-csv npy" ;;
         *) choices="lvx-1.1 netcdf openpylivox-bin openpylivox-csv scan-sequence-csv" ;;
       esac ;;
   esac
   if [ -n "$choices" ]; then
     mapfile -t COMPREPLY < <(compgen -W "$choices" -- "$current")
     case $previous in --set) compopt -o nospace ;; esac
-    [[ $previous == --sensor || $previous == --calibration ]] && mapfile -t -O "${#COMPREPLY[@]}" COMPREPLY \
+    [[ $previous == --sensor || $previous == --calibration || $previous == --from ]] && mapfile -t -O "${#COMPREPLY[@]}" COMPREPLY \
       < <(compgen -f -- "$current")
     return
   fi
@@ -52,6 +56,15 @@ _risley() {
     case $verb in
       "") choices="--help --version" ;;
       info) choices="$common --shot-rate-hz --extrinsics --share --share-ranges" ;;
+      pattern)
+        choices="$common --output --format --sensor --duration-s --rate-hz --every --firing
+          --start-angles-deg" ;;
+      preset)
+        choices=$common
+        case " ${COMP_WORDS[*]} " in
+          *" show "*) choices="$common --output" ;;
+          *" new "*) choices="$common --output --from" ;;
+        esac ;;
       report) choices="$common --output" ;;
       convert) choices="$common --output --format --sensor-type --shot-rate-hz --extrinsics" ;;
       simulate)
@@ -79,6 +92,10 @@ _risley() {
   fi
   if [ -z "$verb" ]; then
     mapfile -t COMPREPLY < <(compgen -W "$verbs" -- "$current")
+  elif [ "$verb $previous" = "preset preset" ]; then
+    mapfile -t COMPREPLY < <(compgen -W "list show check new" -- "$current")
+  elif [ "$verb $previous" = "preset show" ]; then
+    mapfile -t COMPREPLY < <(compgen -W "$presets" -- "$current")
   else
     compopt -o default
     COMPREPLY=()

@@ -2,16 +2,22 @@
 // SPDX-License-Identifier: MIT
 #include "risley/sensors/scan_pattern.hpp"
 
+#include <cmath>
+#include <numbers>
 #include <span>
 
 #include <fmt/format.h>
 
-#include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
 #include "risley/core/require.hpp"
 #include "risley/optics/batch.hpp"
 
 namespace risley::sensors {
+namespace {
+
+constexpr long double kTurn = 2.0L * std::numbers::pi_v<long double>;
+
+}  // namespace
 
 ScanPattern scan_pattern(const Sensor& sensor, std::uint64_t first_row, std::size_t rows,
                          const ScanPatternOptions& options) {
@@ -48,9 +54,11 @@ ScanPattern scan_pattern(const Sensor& sensor, std::uint64_t first_row, std::siz
     pattern.emitter[i] = static_cast<std::uint8_t>(shot % emitters);
     const std::uint64_t of_rotors =
         together ? (first_shot + shot / emitters) * emitters : first_shot + shot;
-    const double time = static_cast<double>(of_rotors) / rate;
+    // Hundreds of turns in, double precision would cost the last printed digit.
+    const long double time = static_cast<long double>(of_rotors) / static_cast<long double>(rate);
     for (std::size_t k = 0; k < prisms; ++k) {
-      angles[k][i] = wrap_to_two_pi(start[k] + sensor.angular_velocity[k] * time);
+      const long double angle = start[k] + sensor.angular_velocity[k] * time;
+      angles[k][i] = static_cast<double>(angle - kTurn * std::floor(angle / kTurn));
     }
   }
   const std::vector<std::span<const double>> columns(angles.begin(), angles.end());

@@ -42,10 +42,21 @@ class CompletionTest(CommandTest):
     def test_choices(self):
         for verb, option in (("simulate", "--rotor"), ("simulate", "--quantize"),
                              ("estimate", "--states"), ("estimate", "--mirror"),
-                             ("convert", "--format"), ("convert", "--sensor-type")):
+                             ("convert", "--format"), ("convert", "--sensor-type"),
+                             ("pattern", "--format"), ("pattern", "--firing")):
             text = self.expect(0, verb, "--help").stdout
             shown = re.search(option + r" TEXT:\{([^}]+)\}", text).group(1)
             self.assertEqual(complete("risley", verb, option, ""), set(shown.split(",")), option)
+
+    def test_presets(self):
+        names = {one["name"] for one in self.expect_json(0, "preset", "list")["presets"]}
+        self.assertLessEqual(names, complete("risley", "simulate", "--sensor", ""))  # and files
+        self.assertEqual(complete("risley", "preset", "show", ""), names)
+        self.assertEqual(complete("risley", "preset", ""), {"list", "show", "check", "new"})
+        for action in ("show", "new"):
+            text = self.expect(0, "preset", action, "--help").stdout
+            declared = set(re.findall(r"^\s+(?:-\w,\s*)?(--[a-z][a-z-]+)", text, re.MULTILINE))
+            self.assertLess(declared, complete("risley", "preset", action, "--"))
 
 
 if __name__ == "__main__":

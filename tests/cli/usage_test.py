@@ -8,7 +8,7 @@ import unittest
 from command import CommandTest
 
 VERBS = ("info", "convert", "simulate", "estimate", "observability", "calibrate", "cloud",
-         "report", "reproduce")
+         "pattern", "preset", "report", "reproduce")
 
 # Arguments that are wrong, and what the message must name.
 WRONG = [
@@ -51,6 +51,18 @@ WRONG = [
     (["cloud", "a.lvx", "--calibration", "mid-40", "-o", "a.las", "--covariance", "no",
       "--common-factors", "yes"], "--common-factors"),
     (["cloud", "none*.lvx", "--calibration", "mid-40", "-o", "folder/"], "none*.lvx"),
+    (["simulat", "-o", "a.csv"], "did you mean simulate?"),
+    (["simulate", "-o", "a.csv", "--sensor", "mid40"], "did you mean mid-40?"),
+    (["pattern", "--format", "npy"], "--output"),
+    (["pattern", "-o", "a.npy"], "--format"),
+    (["pattern", "-o", "a.npy", "--format", "pdf"], "pdf"),
+    (["pattern", "-o", "a.npy", "--format", "npy", "--duration-s", "0"], "--duration-s"),
+    (["pattern", "-o", "a.npy", "--format", "npy", "--every", "0"], "--every"),
+    (["pattern", "-o", "a.npy", "--format", "npy", "--sensor", "mid-40"], "no scan sequence"),
+    (["preset"], "subcommand"),
+    (["preset", "show", "avai"], "did you mean avia?"),
+    (["preset", "new", "a/b", "--from", "avia"], "a/b"),
+    (["preset", "new", "mine"], "--from"),
     (["report"], "DIR"),
     (["reproduce"], "--output"),
     (["estimate", "a.csv", "--rate-hz", "fast"], "--rate-hz"),
