@@ -43,11 +43,16 @@ std::string share_text(double share) { return fmt::format("{:.1f} %", 100.0 * sh
 }  // namespace
 
 SensorFrameRecording open_in_sensor_frame(
-    const std::string& path, const recordings::ReadOptions& reading,
-    const std::function<double(const recordings::RecordingHeader&)>& field_of_view,
+    const std::string& path, const recordings::ReadOptions& options,
+    const std::function<sensors::Sensor(const recordings::RecordingHeader&)>& sensor_of,
     const Progress& progress) {
   progress.check();
+  recordings::ReadOptions reading = options;
   SensorFrameRecording result{open_input(path, reading), {}, reading.extrinsics.has_value()};
+  if (reading.shot_rate) {
+    reading.emitters = sensor_of(result.reader->header()).train.emitters();
+    if (reading.emitters > 1) result.reader = open_input(path, reading);
+  }
   const recordings::RecordingHeader& header = result.reader->header();
   recordings::require_times(header);
   if (reading.extrinsics || header.devices.size() != 1) return result;
@@ -58,7 +63,7 @@ SensorFrameRecording open_in_sensor_frame(
   turned_back.extrinsics = pose;
   const estimation::StoredPoseVerdict verdict = estimation::judge_stored_pose(
       first_second(path, reading, progress), first_second(path, turned_back, progress),
-      field_of_view(header));
+      sensor_of(header).field_of_view);
   const std::string found = fmt::format(
       "the recording states a pose of its sensor ({}); outside the sensor's field of "
       "view lie {} of the shots as recorded and {} after turning back",
@@ -88,10 +93,7 @@ EstimationInput read_for_estimation(const EstimationInputOptions& options,
   const std::string& path = options.recording;
   SensorFrameRecording input = open_in_sensor_frame(
       path, options.reading,
-      [&options](const auto& header) {
-        return chosen_sensor(options.sensor, header).field_of_view;
-      },
-      progress);
+      [&options](const auto& header) { return chosen_sensor(options.sensor, header); }, progress);
   recordings::Reader& reader = *input.reader;
   if (reader.header().devices.size() > 1) {
     throw InvalidArgument(

@@ -1,5 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
@@ -18,8 +19,11 @@ namespace {
 /// Gives every row the time that counting its shot gives.
 class CountingReader final : public DecoratingReader {
  public:
-  CountingReader(std::unique_ptr<Reader> inner, std::string path, double shot_rate)
-      : DecoratingReader(std::move(inner)), path_(std::move(path)), shot_rate_(shot_rate) {
+  CountingReader(std::unique_ptr<Reader> inner, std::string path, double shot_rate, int emitters)
+      : DecoratingReader(std::move(inner)),
+        path_(std::move(path)),
+        shot_rate_(shot_rate),
+        emitters_(emitters) {
     take_over();
   }
 
@@ -40,17 +44,22 @@ class CountingReader final : public DecoratingReader {
     chunk.packets.clear();
     chunk.imu.clear();
     Observations& rows = chunk.observations;
+    file_has_beams_ = file_has_beams_ || std::any_of(rows.beam.begin(), rows.beam.end(),
+                                                     [](std::uint8_t beam) { return beam != 0; });
+    const bool in_turn = emitters_ > 1 && !file_has_beams_;
     for (std::size_t row = 0; row < rows.size(); ++row) {
-      const std::optional<std::int64_t> time_ns = time_of(shot_number(rows, row));
+      const std::int64_t shot = shot_number(rows, row);
+      const std::optional<std::int64_t> time_ns = time_of(shot);
       if (!time_ns) {
         FileError error(path_, FilePlace{},
                         fmt::format("shot number {} at {} Hz is beyond 9.2e9 s, the latest time; "
                                     "expected smaller numbers or a higher shot rate",
-                                    rows.time_ns[row], shot_rate_));
+                                    shot, shot_rate_));
         rows.resize(row);
         return error;
       }
       rows.time_ns[row] = *time_ns;
+      if (in_turn) rows.beam[row] = static_cast<std::uint8_t>(shot % emitters_);
     }
     return std::nullopt;
   }
@@ -71,6 +80,8 @@ class CountingReader final : public DecoratingReader {
 
   std::string path_;
   double shot_rate_;
+  int emitters_;
+  bool file_has_beams_ = false;
   std::array<std::int64_t, 256> next_shot_{};  ///< by device
   std::uint64_t lost_samples_ = 0;
 };
@@ -78,9 +89,10 @@ class CountingReader final : public DecoratingReader {
 }  // namespace
 
 std::unique_ptr<Reader> with_counted_times(std::unique_ptr<Reader> reader, const std::string& path,
-                                           double shot_rate) {
+                                           double shot_rate, int emitters) {
   require_above("ReadOptions::shot_rate", shot_rate, 0, "Hz");
-  return std::make_unique<CountingReader>(std::move(reader), path, shot_rate);
+  require_between("ReadOptions::emitters", emitters, 0, 255);
+  return std::make_unique<CountingReader>(std::move(reader), path, shot_rate, emitters);
 }
 
 }  // namespace risley::recordings

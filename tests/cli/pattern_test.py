@@ -100,6 +100,18 @@ class PatternTest(CommandTest):
             other = sum(a != b for a, b in zip(ours, lines))
             self.assertLess(other, 0.001 * len(lines), sensor)  # in their last digit
 
+    def test_emitters_that_a_file_does_not_name_fire_in_turn(self):
+        self.expect(0, "simulate", "-o", "avia.nc", "--sensor", "avia", "--duration-s", "0.2")
+        self.expect(0, "convert", "avia.nc", "-o", "avia.sequence.csv")
+        arguments = ("estimate", "avia.sequence.csv", "--sensor", "avia",
+                     "--truth", "avia.nc.truth.yaml")
+        lost = self.expect_json(1, *arguments)
+        self.assertTrue(any("no shot is of emitter 2" in one for one in lost["warnings"]))
+        found = self.expect_json(0, *arguments, "--shot-rate-hz", "240000")
+        self.assertTrue(found["converged"])
+        self.assertFalse(any("emitter" in one for one in found["warnings"]))
+        self.assertLess(found["truth"]["nees_parameters"], 2.2)
+
 
 if __name__ == "__main__":
     unittest.main()

@@ -81,6 +81,21 @@ class VendorTest(CommandTest):
         # Without times nothing is made up.
         self.assertIn("--shot-rate-hz", self.expect(2, "estimate", recording).stderr)
 
+    def test_a_real_tele_15_whose_file_names_no_emitters(self):
+        recording = pathlib.Path(FOLDER) / "real" / "tele-15.pcd"
+        arguments = ("estimate", recording, "--sensor", "tele-15", "--shot-rate-hz", "240385")
+        result = self.expect_json(0, *arguments)
+        self.assertTrue(result["converged"])
+        value = {name: one["value"] for name, one in result["parameters"].items()}
+        self.assertAlmostEqual(value["refractive_index"], 1.5089, delta=5e-4)
+        self.assertAlmostEqual(value["angular_velocity_a_deg_per_s"], -59022, delta=0.0005 * 59022)
+        self.assertAlmostEqual(value["angular_velocity_b_deg_per_s"], 18522, delta=0.0005 * 18522)
+        for axis in ("azimuth_deg", "zenith_deg"):
+            self.assertLess(result["residuals"][axis]["rms"], 0.002)
+        elevations = [value[f"incident_beam_{i}_vertical_deg"] for i in range(1, 7)]
+        for found, nominal in zip(sorted(elevations), (-0.792, -0.475, -0.158, 0.158, 0.475, 0.792)):
+            self.assertAlmostEqual(found, nominal, delta=0.01)
+
     def test_public_copies_have_the_elevation_the_other_way(self):
         lines = (pathlib.Path(FOLDER) / "livox-mid-40-sequence.csv").read_text().splitlines()
         with open(self.folder / "mirrored.csv", "w", encoding="ascii") as file:

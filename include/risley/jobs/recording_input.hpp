@@ -12,6 +12,7 @@
 #include "risley/recordings/extrinsics.hpp"
 #include "risley/recordings/reader.hpp"
 #include "risley/recordings/time_audit.hpp"
+#include "risley/sensors/sensor.hpp"
 
 namespace risley::jobs {
 
@@ -28,12 +29,15 @@ struct SensorFrameRecording {
 /// estimation/stored_pose.hpp), and where they do not tell, a recording made through a hub counts
 /// as moved, because hubs move points, and any other one does not, because LVX keeps points as they
 /// are. Moved points are turned back.
-/// @param field_of_view  of a sensor that could have made a recording with this header, full cone,
-///                       rad; asked only where there is a pose to decide on
+///
+/// Where times are counted and the file does not tell which of a sensor's emitters fired, they are
+/// taken to fire in turn.
+/// @param sensor_of  a sensor that could have made a recording with this header; asked only where
+///                   there is a pose to decide on, or times are counted
 /// @throws recordings::MissingTimes, Cancelled, and as recordings::open_recording
 SensorFrameRecording open_in_sensor_frame(
     const std::string& path, const recordings::ReadOptions& reading,
-    const std::function<double(const recordings::RecordingHeader&)>& field_of_view,
+    const std::function<sensors::Sensor(const recordings::RecordingHeader&)>& sensor_of,
     const Progress& progress = {});
 
 /// One recording that was read to its end.
