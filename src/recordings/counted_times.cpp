@@ -59,7 +59,9 @@ class CountingReader final : public DecoratingReader {
         return error;
       }
       rows.time_ns[row] = *time_ns;
-      if (in_turn) rows.beam[row] = static_cast<std::uint8_t>(shot % emitters_);
+      if (in_turn) {
+        rows.beam[row] = static_cast<std::uint8_t>((shot % emitters_ + emitters_) % emitters_);
+      }
     }
     return std::nullopt;
   }

@@ -697,6 +697,25 @@ TEST(ShotRate, CountsTimes) {
   EXPECT_THROW(load_recording(path, {}, {.shot_rate = 1e-12}), FileError);
 }
 
+TEST(ShotRate, EmittersThatTheFileDoesNotNameFireInTurn) {
+  const TemporaryFolder folder;
+  const std::string path = folder.file("a.csv");
+  const ReadOptions six{.shot_rate = 240'000.0, .emitters = 6};
+  put_bytes(path, "index,x_m,y_m,z_m\n0,1,2,3\n1,0,0,0\n7,1,2,3\n12,1,2,3\n");
+  EXPECT_EQ(load_recording(path, {}, six).data.observations.beam,
+            (std::vector<std::uint8_t>{0, 1, 1, 0}));
+  EXPECT_EQ(load_recording(path, {}, {.shot_rate = 240'000.0}).data.observations.beam,
+            std::vector<std::uint8_t>(4, 0));
+  // A further return is of the shot's emitter.
+  put_bytes(path, "time_s,x_m,y_m,z_m,return\n5,1,2,3,1\n5,1,2,4,2\n5.1,1,2,3,1\n");
+  EXPECT_EQ(load_recording(path, {}, six).data.observations.beam,
+            (std::vector<std::uint8_t>{0, 0, 1}));
+  // Those that it names stay.
+  put_bytes(path, "index,x_m,y_m,z_m,line\n0,1,2,3,0\n1,1,2,3,4\n2,1,2,3,2\n");
+  EXPECT_EQ(load_recording(path, {}, six).data.observations.beam,
+            (std::vector<std::uint8_t>{0, 4, 2}));
+}
+
 TEST(ShotRate, WritersOfTimesNeedThem) {
   const TemporaryFolder folder;
   const std::string path = folder.file("a.csv");
