@@ -21,6 +21,7 @@ PAGE = pathlib.Path(__file__).resolve().parent.parent / "docs" / "real-units.md"
 # Mark in the page: file, and how it has to be read.
 RECORDINGS = {
     "mid-40-hub-frame": ("real/mid-40-hub-frame.csv", ["--shot-rate-hz", "100000"]),
+    "tele-15": ("real/tele-15.pcd", ["--sensor", "tele-15", "--shot-rate-hz", "240385"]),
     "mid-40-sequence": ("livox-mid-40-sequence.csv", []),
 }
 
@@ -65,14 +66,16 @@ def text_of(command, path, options):
         noise = found["noise"][f"{axis}_deg"]
         rows.append((f"noise of the {axis}, rounding apart", noise["value"], noise["sigma"], "deg"))
     residual = {axis: found["residuals"][f"{axis}_deg"]["rms"] for axis in ("azimuth", "zenith")}
+    image = "mirrored" if found["mirrored"] else "not mirrored"
+    if found["combination"] is not None:
+        image = f"speed combination {found['combination']}, {image}"
     lines = [
         "```sh",
         " ".join(["risley estimate", path.name, *options]),
         "```",
         "",
         f"`{path.name}`, SHA-256 `{digest}`, {found['observations_used']} directions used, "
-        f"{found['outliers']} of them left out. Speed combination {found['combination']}, "
-        f"{'mirrored' if found['mirrored'] else 'not mirrored'}; residuals (root mean square) "
+        f"{found['outliers']} of them left out. {image[0].upper()}{image[1:]}; residuals (root mean square) "
         f"{residual['azimuth']:.2g} degree in azimuth and {residual['zenith']:.2g} in zenith.",
         "",
         *table(rows),
