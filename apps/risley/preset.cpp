@@ -97,7 +97,7 @@ Run declare_preset(CLI::App& verb) {
   const auto options = std::make_shared<PresetOptions>();
   PresetOptions& o = *options;
   verb.require_subcommand(1);
-  const auto action = [&](const char* name, const char* description, Run run) {
+  const auto action = [&](const char* name, const char* description, const Run& run) {
     CLI::App* sub = verb.add_subcommand(name, description);
     sub->fallthrough();  // --json and the like may come last
     sub->callback([options, run] { options->run = run; });

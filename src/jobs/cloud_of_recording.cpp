@@ -31,8 +31,8 @@ cloud::CloudSummary cloud_of_recording(const CloudOfRecordingOptions& options,
     settings.provenance.emplace_back("calibration_sha256", io::sha256_of_file(options.calibration));
   }
   const SensorFrameRecording input = open_in_sensor_frame(
-      options.recording, options.reading, [&calibration](const auto&) { return calibration; },
-      progress);
+      options.recording, options.reading,
+      [&calibration](const auto&) { return sensors::Sensor(calibration); }, progress);
   cloud::CloudSummary result =
       cloud::make_cloud(*input.reader, calibration, options.output, settings, progress);
   result.warnings.insert(result.warnings.begin(), input.warnings.begin(), input.warnings.end());

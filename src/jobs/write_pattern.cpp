@@ -146,7 +146,7 @@ WrittenPattern write_pattern(const WritePatternOptions& options, std::ostream& s
 WrittenPattern write_pattern(const WritePatternOptions& options, const Progress& progress) {
   io::OutputFile file(options.output);
   std::ofstream stream(file.temporary_path(), std::ios::binary);
-  const WrittenPattern result = write_pattern(options, stream, progress);
+  WrittenPattern result = write_pattern(options, stream, progress);
   stream.close();
   if (!stream) throw FileError(options.output, {}, "cannot be written");
   file.commit();
