@@ -11,15 +11,12 @@ Usage: tools/check_headers.py BUILD_FOLDER
 RISLEY_JOBS limits the number of compilers. Exit status: 0 all well, 1 a header fails.
 """
 
-import os
 import re
 import subprocess
 import sys
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-from compile_commands import ROOT, commands_of
-
+from compile_commands import ROOT, at_once, commands_of
 
 # What stands in the parsed headers (RISLEY_EIGEN_HEADERS) by the names that headers of ours use.
 NAMES_OF = {
@@ -57,10 +54,8 @@ def main(arguments):
                 if source.is_relative_to(ROOT / 'src') and not source.stem.endswith('_kernel')}
     include = ROOT / 'include'
     headers = sorted(path.relative_to(include) for path in include.rglob('*.hpp'))
-    jobs = int(os.environ.get('RISLEY_JOBS') or os.cpu_count())
-    with ThreadPoolExecutor(jobs) as pool:
-        said = list(pool.map(lambda header: missing_includes(header) +
-                             compile_alone(header, *of_layer[header.parts[1]]), headers))
+    said = at_once(lambda header: missing_includes(header) +
+                   compile_alone(header, *of_layer[header.parts[1]]), headers)
     for words in filter(None, said):
         print(words)
     if any(said):

@@ -16,16 +16,14 @@ want of clang-tidy.
 """
 
 import json
-import os
 import re
 import shutil
 import subprocess
 import sys
 from collections import defaultdict
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-from compile_commands import ROOT, commands_of
+from compile_commands import ROOT, at_once, commands_of
 
 
 def changed_sources():
@@ -87,10 +85,8 @@ def main(arguments):
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir()
     pieces = pieces_of(sources, commands, not changed)
-    jobs = int(os.environ.get('RISLEY_JOBS') or os.cpu_count())
-    with ThreadPoolExecutor(jobs) as pool:
-        results = list(pool.map(lambda piece: look_at(piece[1], piece[0], folder, commands),
-                                enumerate(pieces)))
+    results = at_once(lambda piece: look_at(piece[1], piece[0], folder, commands),
+                      enumerate(pieces))
     for passed, said in results:
         if said:
             print(said)

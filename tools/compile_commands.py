@@ -3,8 +3,10 @@
 """How CMake has the sources compiled, for the checks in this folder."""
 
 import json
+import os
 import re
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -27,3 +29,9 @@ def commands_of(build):
         for each in re.findall(r'^#include "(.*)"$', source.read_text(), re.M) if together else [source]:
             commands.setdefault(Path(each), (entry['directory'], command))
     return commands
+
+
+def at_once(work, items):
+    """Results of work for every item; RISLEY_JOBS limits how many are under way."""
+    with ThreadPoolExecutor(int(os.environ.get('RISLEY_JOBS') or os.cpu_count())) as pool:
+        return list(pool.map(work, items))

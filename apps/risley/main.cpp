@@ -9,6 +9,7 @@
 #include <vector>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 #include <tbb/global_control.h>
@@ -127,17 +128,16 @@ ExitStatus run_verb(const Run& run, const CommonOptions& common) {
 /// What was wrong, in words; CLI11 would not name an unknown verb.
 std::string usage_error(const CLI::ParseError& error, int argc, char** argv) {
   const std::string_view first = argc > 1 ? argv[1] : "-";
-  std::string known;
+  std::vector<std::string> names;
   for (const Verb& verb : kVerbs) {
     if (first == verb.name) return fmt::format("{} (see risley {} --help)", error.what(), first);
-    known += fmt::format("{}{}", known.empty() ? "" : ", ", verb.name);
+    names.emplace_back(verb.name);
   }
   if (first.starts_with('-')) return fmt::format("{} (see risley --help)", error.what());
-  std::vector<std::string> names;
-  for (const Verb& verb : kVerbs) names.emplace_back(verb.name);
   const std::string meant = near_miss(first, names);
   return fmt::format("unknown verb '{}'{}, known: {}", first,
-                     meant.empty() ? "" : fmt::format(", did you mean {}?", meant), known);
+                     meant.empty() ? "" : fmt::format(", did you mean {}?", meant),
+                     fmt::join(names, ", "));
 }
 
 ExitStatus run_command(int argc, char** argv) {

@@ -3,7 +3,6 @@
 #include "risley/jobs/write_pattern.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <fstream>
 #include <iterator>
@@ -16,6 +15,7 @@
 #include "risley/core/error.hpp"
 #include "risley/core/require.hpp"
 #include "risley/io/little_endian.hpp"
+#include "risley/io/npy_head.hpp"
 #include "risley/io/output_file.hpp"
 #include "risley/sensors/preset.hpp"
 
@@ -48,18 +48,9 @@ std::string csv_rows(const sensors::ScanPattern& pattern) {
   return text;
 }
 
-/// The head of version 1.0 for an array of pairs in single precision.
 std::string npy_head(std::uint64_t rows) {
-  std::string description =
-      fmt::format("{{'descr': '<f4', 'fortran_order': False, 'shape': ({}, 2), }}", rows);
-  constexpr std::size_t kBefore = 10, kMultiple = 64;
-  const std::size_t length = kBefore + description.size() + 1;
-  description.append((kMultiple - length % kMultiple) % kMultiple, ' ');
-  description += '\n';
-  std::string head("\x93NUMPY\x01\x00", 8);
-  head += static_cast<char>(description.size() % 256);
-  head += static_cast<char>(description.size() / 256);
-  return head + description;
+  return io::npy_head(
+      fmt::format("{{'descr': '<f4', 'fortran_order': False, 'shape': ({}, 2), }}", rows));
 }
 
 std::string npy_rows(const sensors::ScanPattern& pattern) {

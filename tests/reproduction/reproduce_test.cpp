@@ -129,7 +129,7 @@ TEST(Reproduce, Section33PassesAndAnotherUnitFails) {
   const Reproduction all = incorrect_calibration(options);
   EXPECT_TRUE(passes(row_of(table_of(all, "section_3_3"), "RMSE of the reported azimuth")));
   EXPECT_TRUE(passes(row_of(table_of(all, "section_3_3"), "all 100 kHz: total error")));
-  options.effort.wall_seeds = 3;
+  options.effort.wall_seeds = 5;
   options.unit.set("incident_beam_vertical_deg", radians_from_degrees(-0.3));
   const Reproduction other = incorrect_calibration(options);
   EXPECT_FALSE(passes(row_of(table_of(other, "section_3_3"), "RMSE of the reported zenith")));
@@ -152,7 +152,7 @@ TEST(Reproduce, SameSeedSameNumbersWhateverTheThreads) {
   }
   EXPECT_EQ(one, two);
   options.seed = 1;
-  EXPECT_EQ(one.find(text_of(simulated_unit(options))), std::string::npos);
+  EXPECT_NE(one, both());
 }
 
 TEST(ReproductionPage, SaysTheVerdictInWords) {

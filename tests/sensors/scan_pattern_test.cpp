@@ -4,11 +4,13 @@
 // out, and against the optics shot by shot.
 #include "risley/sensors/scan_pattern.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <fstream>
 #include <ostream>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -34,6 +36,7 @@ TEST(SixEmitters, AreARowOfEqualSteps) {
   }
   const Sensor horizon = load_sensor("horizon");
   EXPECT_EQ(to_string(horizon.train.face_order()), "AP-PA-AP");
+  EXPECT_EQ(horizon.device_type, 3);
   EXPECT_EQ(horizon.angular_velocity[0], -horizon.angular_velocity[1]);
 }
 
@@ -80,7 +83,7 @@ TEST_P(MakersSequence, IsPredictedToThePrintedDigit) {
   options.every = sequence.every;
   const ScanPattern own = scan_pattern(load_sensor(sequence.preset), 0, time.size(), options);
   std::size_t equal = 0;
-  double squares = 0;
+  double squares = 0, worst = 0;
   for (std::size_t i = 0; i < time.size(); ++i) {
     ASSERT_NEAR(own.time[i], time[i], 0.6e-9);
     const double azimuth = degrees_from_radians(own.azimuth[i]) - azimuth_deg[i];
@@ -92,11 +95,13 @@ TEST_P(MakersSequence, IsPredictedToThePrintedDigit) {
              std::abs(zenith) <=
                  (1 + slack) * (exact ? half_digit(zenith_deg[i]) : sequence.rounding_deg);
     squares += azimuth * azimuth + zenith * zenith;
+    worst = std::max({worst, std::abs(azimuth), std::abs(zenith)});
   }
   const double share = static_cast<double>(equal) / static_cast<double>(time.size());
   RecordProperty("rows", std::to_string(time.size()));
   RecordProperty("equal", std::to_string(share));
   EXPECT_GE(share, 0.999);
+  EXPECT_LT(worst, sequence.rounding_deg == 0 ? 1e-6 : 2.0 * sequence.rounding_deg);
   EXPECT_LT(std::sqrt(squares / static_cast<double>(time.size())),
             sequence.rounding_deg == 0 ? 2e-8 : sequence.rounding_deg);
 }
@@ -107,6 +112,21 @@ INSTANTIATE_TEST_SUITE_P(
                       Sequence{"avia-sequence", "livox-avia-sequence-every-40th.csv", 40, 0},
                       Sequence{"horizon-sequence", "livox-horizon-sequence-every-40th.csv", 40,
                                0}));
+
+// Real units as the maker's files have them: an Avia the same, a Horizon as its mirror image.
+TEST(ScanPattern, RealUnitsThatFireTogetherAreTheSequence) {
+  ScanPatternOptions together;
+  together.firing = Firing::together;
+  for (const auto& [type, sign] : {std::pair{"avia", 1.0}, {"horizon", -1.0}}) {
+    SCOPED_TRACE(type);
+    const ScanPattern unit = scan_pattern(load_sensor(type), 0, 100'000, together);
+    const ScanPattern file = scan_pattern(load_sensor(std::string(type) + "-sequence"), 0, 100'000);
+    for (std::size_t i = 0; i < unit.size(); ++i) {
+      ASSERT_NEAR(unit.azimuth[i], sign * file.azimuth[i], 1e-11) << i;
+      ASSERT_NEAR(unit.zenith[i], file.zenith[i], 1e-11) << i;
+    }
+  }
+}
 
 TEST(ScanPattern, IsTheBeamOfEveryShotsTime) {
   for (const char* name : {"mid-70", "avia", "avia-sequence", "tele-15", "horizon"}) {

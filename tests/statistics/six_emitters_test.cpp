@@ -67,10 +67,11 @@ struct Nees {
   double band() const { return 3.3 * std::sqrt(2.0 / count); }
 };
 
-/// A preset and the number of its parameters that are free.
+/// A preset, the number of its parameters that are free, and of units that are drawn.
 struct Type {
   const char* preset;
   std::size_t free;
+  int seeds;
 };
 
 std::ostream& operator<<(std::ostream& out, const Type& type) { return out << type.preset; }
@@ -78,7 +79,7 @@ std::ostream& operator<<(std::ostream& out, const Type& type) { return out << ty
 class SixEmitters : public ::testing::TestWithParam<Type> {};
 
 TEST_P(SixEmitters, FromAFileToACloudEveryParameterIsAsGoodAsItsSigma) {
-  const int seeds = testing::seeds_or(3);
+  const int seeds = testing::seeds_or(GetParam().seeds);
   const fs::path folder =
       fs::temp_directory_path() / ("risley-six-emitters-" + std::to_string(::getpid()));
   fs::create_directories(folder);
@@ -140,7 +141,7 @@ TEST_P(SixEmitters, FromAFileToACloudEveryParameterIsAsGoodAsItsSigma) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Presets, SixEmitters,
-                         ::testing::Values(Type{"horizon", 25}, Type{"avia", 19},
-                                           Type{"tele-15", 19}));
+                         ::testing::Values(Type{"horizon", 25, 6}, Type{"avia", 19, 3},
+                                           Type{"tele-15", 19, 3}));
 
 }  // namespace risley::six_emitters_test

@@ -1,23 +1,15 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
 // npy 1.0: a one-dimensional structured array, which numpy.load reads or maps into memory.
-#include <algorithm>
-
 #include <fmt/format.h>
 
-#include "risley/core/error.hpp"
+#include "risley/io/npy_head.hpp"
 
 #include "cloud/formats/cloud_format.hpp"
 #include "cloud/formats/record_file.hpp"
 
 namespace risley::cloud {
 namespace {
-
-using namespace std::string_view_literals;
-
-constexpr std::string_view kMagic = "\x93NUMPY\x01\x00"sv;
-constexpr std::size_t kAlignment = 64;      ///< of the first record, as numpy has it
-constexpr std::size_t kTextLimit = 0xFFFF;  ///< its length is a 16-bit number
 
 const char* npy_type(FieldType type) {
   switch (type) {
@@ -31,25 +23,6 @@ const char* npy_type(FieldType type) {
   return "";
 }
 
-/// The array's description, with all that stands before it.
-std::string header_text(const std::string& types, std::uint64_t points) {
-  std::string text = fmt::format("{{'descr': [{}], 'fortran_order': False, 'shape': ({},), }}{}",
-                                 types, points, header_padding(points, ' '));
-  const std::size_t before = kMagic.size() + sizeof(std::uint16_t);
-  const std::size_t size = before + text.size() + 1;
-  text.append((kAlignment - size % kAlignment) % kAlignment, ' ');
-  text += '\n';
-  if (text.size() > kTextLimit) {
-    throw InvalidArgument(
-        fmt::format("npy: a header of {} bytes, allowed up to {}: too many "
-                    "common factors",
-                    text.size(), kTextLimit));
-  }
-  const char length[] = {static_cast<char>(text.size() & 0xFF),
-                         static_cast<char>(text.size() >> 8)};
-  return std::string(kMagic) + std::string(length, sizeof length) + text;
-}
-
 std::unique_ptr<CloudWriter> create_npy(const std::string& path, const CloudHeader& header,
                                         const CloudWriterOptions&) {
   std::vector<PointField> fields = all_fields(header);
@@ -59,7 +32,8 @@ std::unique_ptr<CloudWriter> create_npy(const std::string& path, const CloudHead
         fmt::format("{}('{}', '{}')", types.empty() ? "" : ", ", field.name, npy_type(field.type));
   }
   return std::make_unique<RecordFile>(path, std::move(fields), [types](std::uint64_t points) {
-    return header_text(types, points);
+    return io::npy_head(fmt::format("{{'descr': [{}], 'fortran_order': False, 'shape': ({},), }}{}",
+                                    types, points, header_padding(points, ' ')));
   });
 }
 
