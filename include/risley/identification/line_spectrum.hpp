@@ -1,0 +1,48 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <complex>
+#include <cstddef>
+#include <vector>
+
+#include "risley/identification/shot_grid.hpp"
+
+namespace risley::identification {
+
+using Complex = std::complex<double>;
+
+/// One line of the spectrum of y + iz: a vector of the unit sphere's tangent plane that turns.
+struct Line {
+  double angular_velocity = 0;  ///< rad/s, signed: right-handed about X is positive
+  Complex amplitude;            ///< at the grid's time 0
+};
+
+/// The spectrum of a scan: what stays, what turns, and how what stays changes from shot to shot.
+struct LineSpectrum {
+  std::vector<Line> lines;        ///< strongest first
+  std::vector<Complex> constant;  ///< of every emitter: where its beams stand on average
+  double unexplained = 0;         ///< mean square of what is left, of the unit vector
+};
+
+/// What to look for.
+struct LineSpectrumOptions {
+  double fastest = 0;    ///< no line turns faster, rad/s
+  std::size_t most = 8;  ///< lines
+};
+
+/// y + iz of every shot.
+std::vector<Complex> transverse(const ShotGrid& grid);
+
+/// Emitters that fire in turn show as constants that repeat every so many slots: the shortest such
+/// period, 1 where there is none. The lines are taken off before, since a few of them would show as
+/// a weak pattern of any period.
+/// @param grid  one emitter, as the recording names them
+int emitter_period(const ShotGrid& grid, const std::vector<Line>& lines);
+
+/// The strongest lines, one after another, each time all of them fitted anew together at the times
+/// that have shots. docs/theory/identify.md
+/// @param grid  with the emitter of every shot
+LineSpectrum line_spectrum(const ShotGrid& grid, const LineSpectrumOptions& options);
+
+}  // namespace risley::identification

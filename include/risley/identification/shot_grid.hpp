@@ -1,0 +1,37 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "risley/estimation/angle_series.hpp"
+
+namespace risley::identification {
+
+/// Shots on the grid of the clock that fired them: shot i stands `slot[i]` steps after the first.
+/// Slots of shots that are missing stay empty.
+struct ShotGrid {
+  std::int64_t origin_ns = 0;  ///< time of slot 0
+  double step = 0;             ///< s
+  bool regular = false;        ///< times are whole steps; otherwise those recorded are used
+  std::vector<std::int64_t> slot;
+  std::vector<double> time;             ///< s after slot 0
+  std::vector<double> azimuth, zenith;  ///< rad
+  std::vector<std::uint8_t> emitter;    ///< place among those that the recording names, from 0
+  int emitters = 1;                     ///< that the recording names
+
+  std::size_t size() const { return slot.size(); }
+  double duration() const { return size() == 0 ? 0.0 : time.back(); }
+};
+
+/// Finds the step of the clock from all times together, so that rounded times do not limit it.
+/// @param series  in the order of time, without resets
+/// @throws EstimationError for fewer than 40 shots, or more than half of the times equal
+ShotGrid shot_grid(const estimation::AngleSeries& series, estimation::ShotRange rows);
+
+/// Rows [begin, end) of a grid, each `stride`-th of them; origin and step stay.
+ShotGrid rows_of(const ShotGrid& grid, std::size_t begin, std::size_t end, std::size_t stride = 1);
+
+}  // namespace risley::identification

@@ -1,0 +1,113 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "risley/core/progress.hpp"
+#include "risley/estimation/frame_turn.hpp"
+#include "risley/identification/shot_grid.hpp"
+#include "risley/optics/prism_train.hpp"
+
+namespace risley::identification {
+
+/// Rotation angles of all rotors over a stretch of time, cut into segments of equal length. A
+/// smooth curve is a uniform B-spline (one segment of degree 1: constant speed), any other a
+/// polynomial of its own in every segment, so that angles may jump where a recording lost shots.
+struct RotorCurves {
+  double begin = 0, end = 0;  ///< s
+  int segments = 1, degree = 1;
+  bool smooth = true;
+  Eigen::MatrixXd coefficient;  ///< [prisms, coefficients()], rad
+
+  RotorCurves() = default;
+  /// All coefficients zero.
+  RotorCurves(int prisms, double begin, double end, int segments, int degree, bool smooth);
+
+  int coefficients() const { return smooth ? segments + degree : segments * (degree + 1); }
+  double segment_length() const { return (end - begin) / segments; }
+  /// The segment of that time, the first or last one beyond them.
+  int segment_of(double time) const;
+  /// The first of the degree + 1 coefficients that act in a segment.
+  int first_coefficient(int segment) const { return smooth ? segment : segment * (degree + 1); }
+  double angle(int rotor, double time) const;
+  double angular_velocity(int rotor, double time) const;  ///< rad/s
+};
+
+/// Highest degree of a curve.
+inline constexpr int kMaxCurveDegree = 4;
+
+/// What each coefficient that acts in a segment weighs at a time, and the derivative of that, 1/s.
+/// Times a little outside of the segment follow its polynomial.
+struct CurveWeights {
+  std::array<double, kMaxCurveDegree + 1> value{}, rate{};
+};
+CurveWeights curve_weights(const RotorCurves& curves, int segment, double time);
+
+/// The curves of that shape nearest to others, by least squares at many times.
+RotorCurves resampled(const RotorCurves& curves, RotorCurves shape);
+
+/// Optics and motion that predict every shot of a grid.
+struct TrainModel {
+  PrismTrain train;             ///< one emitter for each of the grid's
+  std::vector<double> lag;      ///< [emitters], s: its shots see the rotors so much later
+  estimation::FrameTurn frame;  ///< of the recording
+  RotorCurves rotors;
+};
+
+/// What is fitted besides the rotors' motion.
+struct TrainFreedom {
+  bool glass = false;       ///< indices and deviations of the prisms
+  bool one_glass = false;   ///< all indices are the same
+  bool first_glass = true;  ///< false: the first index is held, only its deviation is fitted
+  bool emitters = false;    ///< directions of all emitters
+  bool lags = false;        ///< of all emitters but the first
+  bool frame = false;       ///< yaw and pitch
+  bool tilts = false;       ///< of prisms and bearings, with a prior of 0.3 degree
+
+  friend bool operator==(const TrainFreedom&, const TrainFreedom&) = default;
+};
+
+struct TrainFit {
+  TrainModel model;
+  double rms = 0;         ///< of azimuth and zenith together, rad; infinite where nothing fits
+  std::size_t shots = 0;  ///< that count
+  std::size_t outliers = 0;
+  std::size_t unknowns = 0;
+  /// Of the values below, variance of the shots from their rms; independent shots.
+  std::vector<std::string> names;  ///< as in parameter_list(), and "lag_2_s", "frame_yaw_deg"
+  /// SI units: what is free of optics, lags and frame; rotation angles where the curves begin, and
+  /// their mean speeds.
+  Eigen::MatrixXd covariance;
+  std::vector<double> azimuth_residual, zenith_residual;  ///< [shots], observed minus predicted
+};
+
+struct TrainFitOptions {
+  int iterations = 30;
+  bool without_outliers = false;  ///< they are left out once the fit stands: outlier_limit()
+  bool covariance = false;
+};
+
+/// Least squares of azimuths and zeniths: Gauss and Newton's steps, damped by Levenberg and
+/// Marquardt. Indices move at a held deviation (n - 1) wedge, which data tell much better than
+/// either, and stay within 1.3 and 2.3. docs/theory/identify.md
+/// @param start  with as many emitters as the grid
+TrainFit fit_train(const ShotGrid& grid, const TrainModel& start, const TrainFreedom& freedom,
+                   const TrainFitOptions& options = {}, const Progress& progress = {});
+
+/// Beyond which a residual is no noise, rad: 6 robust sigmas, by what half of the shots and 95 % of
+/// them stay within.
+double outlier_limit(const TrainFit& fit);
+
+/// Of all residuals, outliers too, none counted as larger than the limit, rad^2.
+double mean_square(const TrainFit& fit, double limit);
+
+/// What a model predicts for every shot of a grid, in place of what was seen.
+ShotGrid predicted(const ShotGrid& grid, const TrainModel& model);
+
+}  // namespace risley::identification

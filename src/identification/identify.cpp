@@ -1,0 +1,757 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "risley/identification/identify.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <optional>
+#include <utility>
+
+#include <tbb/parallel_for.h>
+
+#include "risley/core/error.hpp"
+#include "risley/core/require.hpp"
+#include "risley/optics/parameters.hpp"
+
+namespace risley::identification {
+namespace {
+
+/// Lines are looked for in so much of a scan, s, or in so many shots if that is longer.
+constexpr double kLineWindow = 1.0;
+constexpr double kLineShots = 4096;
+/// Trains are tried on a window of about so long, s, with so many shots.
+constexpr double kTrialWindow = 0.15;
+constexpr std::size_t kTrialShots = 600;
+/// Before that, all arrangements are tried roughly; so many of them go on, and of those so many.
+constexpr std::size_t kRoughShots = 150;
+constexpr std::size_t kPromising = 96, kTriedInFull = 16;
+/// Arrangements that leave so many times as much as the best one are not compared any further, but
+/// for a few.
+constexpr double kHopeless = 10;
+constexpr std::size_t kFewestRivals = 3;
+/// A further prism must bring what is left down to this share: one that moves the beam does.
+constexpr double kFurtherPrism = 0.5;
+/// No more than so much of a recording is looked at, s.
+constexpr double kLongest = 10;
+/// Trains are compared on so many shots of the whole stretch.
+constexpr std::size_t kComparedShots = 12'000;
+/// The best and its close rivals are fitted to so many.
+constexpr std::size_t kMostShots = 1'500'000;
+/// The strongest lines, of which some are the rotors' own.
+constexpr std::size_t kOwnLines = 5;
+/// Wedges and indices from which a fit starts: the deviation is that of the line.
+constexpr std::array<double, 3> kStartIndex{1.45, 1.6, 1.85};
+/// A frame that is turned by more than an emitter can lean is a turned frame.
+constexpr double kTurnedFrame = 0.03;
+/// Segments of the curves that rotors may follow, s.
+constexpr std::array<double, 9> kSegmentLengths{1.6,  0.8,   0.4,    0.2,    0.1,
+                                                0.05, 0.025, 0.0125, 0.00625};
+constexpr double kFewestSegmentShots = 30, kMostSegments = 250;
+/// A rival that leaves less than this share of the noise in a scan free of noise is equivalent.
+constexpr double kEquivalentShare = 1e-3;
+constexpr double kEquivalentRms = 1e-10;
+
+/// Rotors in beam order, by the place of their lines, and the faces of their prisms.
+struct Arrangement {
+  std::vector<std::size_t> lines;
+  std::vector<FaceOrder> faces;
+};
+
+struct Trial {
+  Arrangement arrangement;
+  TrainFit fit;
+};
+
+std::vector<std::vector<FaceOrder>> all_face_orders(std::size_t prisms) {
+  std::vector<std::vector<FaceOrder>> all;
+  for (unsigned bits = 0; bits < (1U << prisms); ++bits) {
+    std::vector<FaceOrder> faces;
+    for (std::size_t k = 0; k < prisms; ++k) {
+      faces.push_back(((bits >> k) & 1U) != 0 ? FaceOrder::angled_perpendicular
+                                              : FaceOrder::perpendicular_angled);
+    }
+    all.push_back(faces);
+  }
+  return all;
+}
+
+/// Every order of a set of lines with all faces.
+std::vector<Arrangement> arrangements(std::vector<std::size_t> lines) {
+  std::vector<Arrangement> all;
+  std::sort(lines.begin(), lines.end());
+  do {
+    for (auto& faces : all_face_orders(lines.size())) all.push_back({lines, faces});
+  } while (std::next_permutation(lines.begin(), lines.end()));
+  return all;
+}
+
+/// Sets of so many of the first lines, those of the strongest lines first.
+std::vector<std::vector<std::size_t>> line_sets(std::size_t lines, std::size_t size) {
+  std::vector<std::vector<std::size_t>> sets;
+  for (unsigned bits = 0; bits < (1U << lines); ++bits) {
+    std::vector<std::size_t> set;
+    for (std::size_t k = 0; k < lines; ++k) {
+      if (((bits >> k) & 1U) != 0) set.push_back(k);
+    }
+    if (set.size() == size) sets.push_back(set);
+  }
+  std::sort(sets.begin(), sets.end(), [](const auto& a, const auto& b) {
+    return std::accumulate(a.begin(), a.end(), std::size_t{0}) <
+           std::accumulate(b.begin(), b.end(), std::size_t{0});
+  });
+  return sets;
+}
+
+/// About so many shots, such that all emitters of a period keep their turn.
+ShotGrid thinned(const ShotGrid& grid, std::size_t begin, std::size_t end, std::size_t most) {
+  std::size_t stride = std::max<std::size_t>(1, (end - begin + most - 1) / most);
+  while (std::gcd(stride, static_cast<std::size_t>(grid.emitters)) != 1) ++stride;
+  return rows_of(grid, begin, end, stride);
+}
+
+std::size_t row_at(const ShotGrid& grid, double time) {
+  const auto at = std::lower_bound(grid.time.begin(), grid.time.end(), time);
+  return static_cast<std::size_t>(at - grid.time.begin());
+}
+
+class Search {
+ public:
+  Search(const ShotGrid& grid, LineSpectrum spectrum, const IdentifyOptions& options,
+         const Progress& progress)
+      : grid_(grid), spectrum_(std::move(spectrum)), options_(options), progress_(progress) {
+    start_freedom_.glass = start_freedom_.one_glass = true;
+    start_freedom_.emitters = start_freedom_.lags = grid.emitters > 1;
+    Complex mean;
+    for (const Complex& constant : spectrum_.constant) {
+      mean += constant / static_cast<double>(spectrum_.constant.size());
+    }
+    if (std::abs(mean) > kTurnedFrame && std::abs(mean) < 1) {
+      start_freedom_.frame = true;
+      const double forward = std::sqrt(1 - std::norm(mean));
+      frame_ = {std::atan2(mean.real(), forward),
+                std::atan2(-mean.imag(), std::hypot(forward, mean.real()))};
+    }
+    choose_trial_window();
+    compared_ = thinned(grid, 0, grid.size(), kComparedShots);
+  }
+
+  Identification run() {
+    std::vector<Trial> trials;
+    for (int prisms = 1; prisms <= options_.most_prisms; ++prisms) {
+      if (static_cast<std::size_t>(prisms) > spectrum_.lines.size()) break;
+      std::vector<Trial> more = try_all(static_cast<std::size_t>(prisms));
+      progress_.report(0.15 * prisms);
+      if (more.empty() || !std::isfinite(more.front().fit.rms)) continue;
+      if (!trials.empty() && !explains_more(more.front().fit, trials.front().fit)) continue;
+      trials = std::move(more);
+      if (prisms > 1 && nothing_left(trials.front().fit)) break;
+    }
+    if (trials.empty()) {
+      throw EstimationError(
+          "no train of prisms sends beams where this recording has them: none of the arrangements "
+          "that were tried lets its beams through");
+    }
+    return compare(std::move(trials));
+  }
+
+ private:
+  void choose_trial_window() {
+    double slowest = options_.fastest;
+    const std::size_t own = std::min(kOwnLines, spectrum_.lines.size());
+    for (std::size_t a = 0; a < own && a < 3; ++a) {
+      slowest = std::min(slowest, std::abs(spectrum_.lines[a].angular_velocity));
+    }
+    double length = std::max(kTrialWindow, 2.5 * kTwoPi / slowest);
+    length = std::max(length, 300 * grid_.step);
+    length = std::min({length, spectrum_end(), grid_.duration()});
+    const double begin = 0.5 * (spectrum_end() - length);
+    const std::size_t first = row_at(grid_, begin);
+    const std::size_t last = row_at(grid_, begin + length);
+    trial_grid_ = thinned(grid_, first, last, kTrialShots);
+    trial_begin_ = grid_.time[first];
+    trial_end_ = grid_.time[last - 1];
+  }
+  double spectrum_end() const {
+    return std::min(grid_.duration(), std::max(kLineWindow, kLineShots * grid_.step));
+  }
+
+  TrainModel start(const Arrangement& arrangement, double index) const {
+    TrainModel model;
+    model.train = PrismTrain(arrangement.faces, grid_.emitters);
+    model.frame = frame_;
+    model.lag.assign(static_cast<std::size_t>(grid_.emitters), 0.0);
+    const int prisms = model.train.prisms();
+    // A quartic follows a rotor that hunts over a window.
+    RotorCurves line(prisms, trial_begin_, trial_end_, 1, 1, true);
+    for (int k = 0; k < prisms; ++k) {
+      const Line& own = spectrum_.lines[arrangement.lines[static_cast<std::size_t>(k)]];
+      model.train.set_place(place::refractive_index(k), index);
+      // A beam that meets the perpendicular face upright leaves the other one so much aside.
+      const double aside = std::asin(std::min(0.95, std::abs(own.amplitude)));
+      model.train.set_place(place::wedge_angle(k),
+                            std::atan2(std::sin(aside), index - std::cos(aside)));
+      // A prism sends the beam towards its thick end, down at rotation angle 0.
+      const double zero = std::arg(own.amplitude) + 0.5 * kPi;
+      line.coefficient(k, 0) = zero + own.angular_velocity * trial_begin_;
+      line.coefficient(k, 1) = zero + own.angular_velocity * trial_end_;
+    }
+    model.rotors = resampled(line, RotorCurves(prisms, trial_begin_, trial_end_, 1, 4, false));
+    if (grid_.emitters > 1) {
+      const Complex off =
+          start_freedom_.frame ? Complex(std::sin(frame_.yaw), -std::sin(frame_.pitch)) : Complex{};
+      for (int j = 0; j < grid_.emitters; ++j) {
+        const Complex constant = spectrum_.constant[static_cast<std::size_t>(j)] - off;
+        model.train.set_place(place::incident_beam_horizontal(j, prisms), -constant.real());
+        model.train.set_place(place::incident_beam_vertical(j, prisms), constant.imag());
+      }
+    }
+    return model;
+  }
+
+  /// The best fits of arrangements of sets of lines, on the trial window: of all of them roughly,
+  /// then of the sets that come nearest, then of the best arrangements in full.
+  std::vector<Trial> try_all(std::size_t prisms) const {
+    struct LineSet {
+      std::vector<Trial> trials;
+      double least = std::numeric_limits<double>::infinity();
+    };
+    std::vector<LineSet> sets;
+    const std::size_t own = std::min(kOwnLines, spectrum_.lines.size());
+    for (const auto& set : line_sets(own, prisms)) {
+      sets.emplace_back();
+      for (Arrangement& one : arrangements(set)) sets.back().trials.push_back({std::move(one), {}});
+    }
+    const ShotGrid rough = thinned(trial_grid_, 0, trial_grid_.size(), kRoughShots);
+    tbb::parallel_for(std::size_t{0}, sets.size(), [&](std::size_t s) {
+      for (const Trial& trial : sets[s].trials) {
+        const TrainFit fit = rough_fit(rough, trial.arrangement, 6);
+        sets[s].least = std::min(sets[s].least, fit.rms);
+      }
+    });
+    std::stable_sort(sets.begin(), sets.end(),
+                     [](const LineSet& a, const LineSet& b) { return a.least < b.least; });
+    std::vector<Trial> trials;
+    for (LineSet& set : sets) {
+      if (trials.size() > 0 && trials.size() + set.trials.size() > kPromising) break;
+      trials.insert(trials.end(), std::make_move_iterator(set.trials.begin()),
+                    std::make_move_iterator(set.trials.end()));
+    }
+    TrainFreedom free_glass = start_freedom_;
+    free_glass.one_glass = prisms == 1;
+    const ShotGrid fewer = thinned(trial_grid_, 0, trial_grid_.size(), trial_grid_.size() / 2);
+    tbb::parallel_for(std::size_t{0}, trials.size(), [&](std::size_t t) {
+      TrainFit fit = rough_fit(fewer, trials[t].arrangement, 12);
+      if (std::isfinite(fit.rms)) {
+        fit = fit_train(fewer, fit.model, free_glass, {.iterations = 8}, progress_.silent());
+      }
+      trials[t].fit = std::move(fit);
+    });
+    std::stable_sort(trials.begin(), trials.end(), better);
+    if (trials.size() > kTriedInFull) trials.resize(kTriedInFull);
+    tbb::parallel_for(std::size_t{0}, trials.size(), [&](std::size_t t) {
+      Trial& trial = trials[t];
+      std::vector<TrainModel> starts{trial.fit.model};
+      trial.fit = {};
+      trial.fit.rms = std::numeric_limits<double>::infinity();
+      for (const double index : kStartIndex) starts.push_back(start(trial.arrangement, index));
+      for (std::size_t from = 0; from < starts.size(); ++from) {
+        TrainFit fit = fit_train(trial_grid_, starts[from], from == 0 ? free_glass : start_freedom_,
+                                 {.iterations = 20}, progress_.silent());
+        if (fit.rms < trial.fit.rms) trial.fit = std::move(fit);
+      }
+      if (!std::isfinite(trial.fit.rms)) return;
+      TrainFit fit = fit_train(trial_grid_, trial.fit.model, free_glass, {.iterations = 15},
+                               progress_.silent());
+      if (fit.rms < trial.fit.rms) trial.fit = std::move(fit);
+    });
+    std::stable_sort(trials.begin(), trials.end(), better);
+    return trials;
+  }
+  /// From a middle index, or from a high one where the beam does not get out otherwise.
+  TrainFit rough_fit(const ShotGrid& grid, const Arrangement& arrangement, int iterations) const {
+    TrainFit fit;
+    for (const double index : {1.6, 1.85}) {
+      fit = fit_train(grid, start(arrangement, index), start_freedom_, {.iterations = iterations},
+                      progress_.silent());
+      if (std::isfinite(fit.rms)) break;
+    }
+    return fit;
+  }
+  static bool better(const Trial& a, const Trial& b) { return a.fit.rms < b.fit.rms; }
+
+  /// Whether the residuals of a fit hold no line any more.
+  bool nothing_left(const TrainFit& fit) const {
+    double power = 0;
+    const std::size_t n = trial_grid_.size();
+    for (std::size_t i = 0; i < n; ++i) {
+      power += fit.azimuth_residual[i] * fit.azimuth_residual[i] +
+               fit.zenith_residual[i] * fit.zenith_residual[i];
+    }
+    double largest = 0;
+    const double length = trial_end_ - trial_begin_;
+    const auto edge = static_cast<int>(options_.fastest * length / kTwoPi * 2);
+    for (int bin = -edge; bin <= edge; ++bin) {
+      const double speed = 0.5 * kTwoPi * bin / length;
+      Complex sum;
+      for (std::size_t i = 0; i < n; ++i) {
+        sum += Complex(fit.azimuth_residual[i], fit.zenith_residual[i]) *
+               std::polar(1.0, -speed * trial_grid_.time[i]);
+      }
+      largest = std::max(largest, std::norm(sum));
+    }
+    return largest < 20 * power;
+  }
+
+  /// Of Bayes and Schwarz: smaller is better.
+  static double evidence(const TrainFit& fit, double limit) {
+    const double angles = 2.0 * static_cast<double>(fit.azimuth_residual.size());
+    return angles * std::log(mean_square(fit, limit)) +
+           static_cast<double>(fit.unknowns) * std::log(angles);
+  }
+
+  /// A model of the trial window carried on over all of a grid, in segments of about that length.
+  std::optional<RotorCurves> carried(const ShotGrid& grid, const TrainModel& model,
+                                     double length) const {
+    const double whole = grid.duration() + grid.step;
+    const int count = std::max(1, static_cast<int>(std::lround(whole / length)));
+    const int prisms = model.train.prisms();
+    RotorCurves all(prisms, 0, whole, count, 2, false);
+    // A segment starts as the tangent to its neighbour and is fitted to its own shots.
+    const auto follow = [&](int segment, const RotorCurves& from, double at) {
+      const double begin = all.segment_length() * segment, end = begin + all.segment_length();
+      RotorCurves own(prisms, begin, end, 1, 2, false);
+      for (int k = 0; k < prisms; ++k) {
+        const double speed = from.angular_velocity(k, at);
+        own.coefficient(k, 0) = from.angle(k, at) + speed * (0.5 * (begin + end) - at);
+        own.coefficient(k, 1) = 0.5 * speed * (end - begin);
+      }
+      const std::size_t first = row_at(grid, begin), last = row_at(grid, end);
+      if (last >= first + kFewestSegmentShots / 2) {
+        TrainModel part = model;
+        part.rotors = own;
+        const TrainFit fit =
+            fit_train(rows_of(grid, first, last), part, {}, {.iterations = 8}, progress_.silent());
+        if (!std::isfinite(fit.rms)) return false;
+        own = fit.model.rotors;
+      }
+      all.coefficient.middleCols(all.first_coefficient(segment), 3) = own.coefficient;
+      return true;
+    };
+    const double middle = 0.5 * (model.rotors.begin + model.rotors.end);
+    const int first = all.segment_of(middle);
+    if (!follow(first, model.rotors, middle)) return {};
+    const double tiny = 1e-9 * all.segment_length();  // to this side of a border
+    for (int s = first + 1; s < count; ++s) {
+      if (!follow(s, all, all.segment_length() * s - tiny)) return {};
+    }
+    for (int s = first; s-- > 0;) {
+      if (!follow(s, all, all.segment_length() * (s + 1) + tiny)) return {};
+    }
+    return all;
+  }
+
+  /// A model fitted to a grid with that description of the rotors' motion.
+  std::optional<TrainFit> fit_whole(const ShotGrid& grid, const TrainModel& model,
+                                    const TrainFreedom& freedom, const Motion& motion,
+                                    int iterations) const {
+    const double shots = static_cast<double>(grid.size());
+    const double spacing = grid.duration() / shots;
+    double length = std::min(std::max(0.05, kFewestSegmentShots * spacing), grid.duration() / 3);
+    if (motion.length > 0 && !motion.smooth) length = motion.length;
+    const std::optional<RotorCurves> followed = carried(grid, model, length);
+    if (!followed) return {};
+    TrainModel start = model;
+    start.rotors = *followed;
+    const int prisms = model.train.prisms();
+    const double end = followed->end;
+    if (motion.length == 0) {
+      start.rotors = resampled(*followed, RotorCurves(prisms, 0, end, 1, 1, true));
+    } else if (motion.smooth) {
+      const int segments = std::max(1, static_cast<int>(std::lround(end / motion.length)));
+      start.rotors = resampled(*followed, RotorCurves(prisms, 0, end, segments, 3, true));
+    }
+    TrainFit fit =
+        fit_train(grid, start, freedom, {.iterations = iterations, .without_outliers = true},
+                  progress_.silent());
+    if (!std::isfinite(fit.rms)) return {};
+    return fit;
+  }
+
+  /// Chooses how the rotors' motion is described, by evidence: from long segments to short ones,
+  /// until two in a row are worse; then the same with jumps between them.
+  Motion choose_motion(const TrainModel& model, const TrainFreedom& freedom) const {
+    Motion chosen;
+    std::optional<TrainFit> best;
+    const auto judge = [&](const Motion& motion) {
+      progress_.check();
+      auto fit = fit_whole(compared_, model, freedom, motion, 10);
+      if (!fit) return false;
+      const double limit = best ? std::min(outlier_limit(*best), outlier_limit(*fit)) : 0;
+      if (best && evidence(*fit, limit) >= evidence(*best, limit)) return false;
+      best = std::move(fit);
+      chosen = motion;
+      return true;
+    };
+    judge({});
+    for (const bool smooth : {true, false}) {
+      int worse = 0;
+      for (const double length : kSegmentLengths) {
+        const double share = length / compared_.duration();
+        if (share > (smooth ? 0.6 : 0.3) || 1 / share > kMostSegments ||
+            share * static_cast<double>(compared_.size()) < kFewestSegmentShots) {
+          continue;
+        }
+        worse = judge({length, smooth}) ? 0 : worse + 1;
+        if (worse == 2) break;
+      }
+      if (chosen.length == 0) break;  // rotors that turn evenly do not jump either
+    }
+    return chosen;
+  }
+
+  /// Frees what makes the fit better by more than chance would.
+  TrainFreedom choose_freedom(const TrainModel& model, const Motion& motion, TrainFit& best) const {
+    TrainFreedom freedom = start_freedom_;
+    const auto first = fit_whole(compared_, model, freedom, motion, 25);
+    if (!first) return freedom;
+    best = *first;
+    const int prisms = model.train.prisms();
+    for (;;) {
+      std::vector<TrainFreedom> wider;
+      const auto offer = [&](bool TrainFreedom::*what, bool value) {
+        if (freedom.*what == value) return;
+        wider.push_back(freedom);
+        wider.back().*what = value;
+      };
+      if (prisms > 1) offer(&TrainFreedom::one_glass, false);
+      offer(&TrainFreedom::frame, true);
+      if (grid_.emitters == 1) offer(&TrainFreedom::emitters, true);
+      offer(&TrainFreedom::tilts, true);
+      const TrainFreedom* chosen = nullptr;
+      TrainFit chosen_fit;
+      double most = 0;
+      for (const TrainFreedom& one : wider) {
+        TrainFit fit = fit_train(compared_, best.model, one,
+                                 {.iterations = 25, .without_outliers = true}, progress_.silent());
+        if (!std::isfinite(fit.rms)) continue;
+        const double gained =
+            chi2_excess(best, fit) - 2.0 * static_cast<double>(fit.unknowns - best.unknowns);
+        if (gained > kFairLead && gained > most) {
+          most = gained;
+          chosen = &one;
+          chosen_fit = std::move(fit);
+        }
+      }
+      if (chosen == nullptr) return freedom;
+      freedom = *chosen;
+      best = std::move(chosen_fit);
+    }
+  }
+
+  /// Shots that count as one: neighbouring residuals that hang together.
+  static double correlation_factor(const TrainFit& fit) {
+    double product = 0, square = 0;
+    const double limit = outlier_limit(fit);
+    const auto add = [&](const std::vector<double>& residual) {
+      for (std::size_t i = 1; i < residual.size(); ++i) {
+        if (std::abs(residual[i]) > limit || std::abs(residual[i - 1]) > limit) continue;
+        product += residual[i] * residual[i - 1];
+        square += residual[i] * residual[i];
+      }
+    };
+    add(fit.azimuth_residual);
+    add(fit.zenith_residual);
+    const double rho = square > 0 ? std::clamp(product / square, 0.0, 0.99) : 0.0;
+    return (1 + rho) / (1 - rho);
+  }
+
+  /// Chi squared by which the worse fit is worse, in units of what the better one leaves.
+  static double chi2_excess(const TrainFit& worse, const TrainFit& better) {
+    const double limit = outlier_limit(better);
+    const double shots = static_cast<double>(better.shots) / correlation_factor(better);
+    return 2.0 * shots * (mean_square(worse, limit) / mean_square(better, limit) - 1);
+  }
+
+  /// Whether a further prism is worth its unknowns.
+  static bool explains_more(const TrainFit& more, const TrainFit& fewer) {
+    return more.rms < kFurtherPrism * fewer.rms &&
+           chi2_excess(fewer, more) >
+               kFairLead + 2.0 * static_cast<double>(more.unknowns - fewer.unknowns);
+  }
+
+  Identification compare(std::vector<Trial> trials) {
+    Identification result;
+    std::vector<Trial> chosen = one_of_each(std::move(trials));
+    // What the best one asks for is granted to all; then another may be the best.
+    TrainFreedom freedom;
+    Motion motion;
+    std::vector<TrainFit> fits;
+    std::size_t leader = 0;
+    for (int round = 0; round < 3; ++round) {
+      const TrainModel& model = chosen[leader].fit.model;
+      TrainFit best;
+      TrainFreedom wide = start_freedom_;
+      wide.one_glass = chosen[leader].fit.model.train.prisms() < 2;
+      motion = choose_motion(model, wide);
+      freedom = choose_freedom(model, motion, best);
+      fits.assign(chosen.size(), {});
+      tbb::parallel_for(std::size_t{0}, chosen.size(), [&](std::size_t c) {
+        auto fit = fit_whole(compared_, chosen[c].fit.model, freedom, motion, 25);
+        fits[c].rms = std::numeric_limits<double>::infinity();
+        if (fit) fits[c] = std::move(*fit);
+        if (c == leader && best.rms < fits[c].rms) fits[c] = best;
+      });
+      const auto least = std::min_element(
+          fits.begin(), fits.end(), [](const auto& a, const auto& b) { return a.rms < b.rms; });
+      const auto now = static_cast<std::size_t>(least - fits.begin());
+      progress_.report(0.6 + 0.1 * round);
+      if (now == leader) break;
+      leader = now;
+    }
+    if (grid_.emitters > 1) freedom = settle_timing(fits[leader], freedom, result);
+    result.freedom = freedom;
+    result.motion = motion;
+    rank(std::move(fits), leader, result);
+    return result;
+  }
+
+  /// The best trial of every arrangement of its faces and rotors, best first.
+  std::vector<Trial> one_of_each(std::vector<Trial> trials) const {
+    std::vector<Trial> chosen;
+    const std::size_t prisms = trials.front().arrangement.lines.size();
+    std::vector<std::size_t> lines = trials.front().arrangement.lines;
+    std::sort(lines.begin(), lines.end());
+    for (Trial& trial : trials) {
+      if (trial.arrangement.lines.size() != prisms || !std::isfinite(trial.fit.rms)) continue;
+      std::vector<std::size_t> own = trial.arrangement.lines;
+      std::sort(own.begin(), own.end());
+      if (own != lines) continue;
+      if (chosen.size() > kFewestRivals && trial.fit.rms > kHopeless * chosen.front().fit.rms)
+        break;
+      chosen.push_back(std::move(trial));
+    }
+    return chosen;
+  }
+
+  /// Whether the emitters' lags are none, those of shots that share a time, or others.
+  TrainFreedom settle_timing(TrainFit& best, TrainFreedom freedom, Identification& result) const {
+    TrainFreedom without = freedom;
+    without.lags = false;
+    TrainModel model = best.model;
+    std::fill(model.lag.begin(), model.lag.end(), 0.0);
+    const TrainFit even =
+        fit_train(compared_, model, without, {.iterations = 25, .without_outliers = true},
+                  progress_.silent());
+    if (std::isfinite(even.rms) && chi2_excess(even, best) < kFairLead + 2.0 * grid_.emitters) {
+      result.timing = EmitterTiming::in_turn;
+      best = even;
+      return without;
+    }
+    // Shots of a round that share a time lag by their places in it, in equal steps.
+    const TrainFit fit = fit_train(compared_, best.model, freedom,
+                                   {.iterations = 3, .covariance = true}, progress_.silent());
+    std::vector<double> lag = fit.model.lag;
+    std::sort(lag.begin(), lag.end());
+    const double each = (lag.back() - lag.front()) / static_cast<double>(lag.size() - 1);
+    bool equal = true;
+    for (std::size_t j = 0; j < lag.size(); ++j) {
+      const double off = lag[j] - lag.front() - each * static_cast<double>(j);
+      equal = equal && std::abs(off) < 0.1 * each;
+    }
+    result.timing = equal ? EmitterTiming::together : EmitterTiming::uneven;
+    return freedom;
+  }
+
+  void rank(std::vector<TrainFit> fits, std::size_t leader, Identification& result) {
+    result.spectrum = spectrum_;
+    result.step = grid_.step;
+    result.emitters = grid_.emitters;
+    result.rows = grid_.size();
+    const TrainFit few = fits[leader];
+    for (std::size_t f = 0; f < fits.size(); ++f) {
+      if (!std::isfinite(fits[f].rms)) continue;
+      if (f != leader && !result.freedom.lags) {
+        std::fill(fits[f].model.lag.begin(), fits[f].model.lag.end(), 0.0);
+      }
+      const double excess = f == leader ? 0.0 : std::max(0.0, chi2_excess(fits[f], few));
+      result.hypotheses.push_back({std::move(fits[f]), excess, {}});
+    }
+    const auto sort = [&] {
+      std::stable_sort(result.hypotheses.begin(), result.hypotheses.end(),
+                       [](const Hypothesis& a, const Hypothesis& b) {
+                         return a.excess != b.excess ? a.excess < b.excess : a.fit.rms < b.fit.rms;
+                       });
+    };
+    sort();
+    find_equivalents(result);
+    choose_representative(result);
+    // All rows for the best one, and for rivals that the thinned ones do not dismiss.
+    const ShotGrid all = thinned(grid_, 0, grid_.size(), kMostShots);
+    const double share = static_cast<double>(all.size()) / static_cast<double>(compared_.size());
+    TrainFit reference;
+    for (std::size_t h = 0; h < result.hypotheses.size(); ++h) {
+      Hypothesis& one = result.hypotheses[h];
+      const bool same = std::find(one.equivalent_to.begin(), one.equivalent_to.end(),
+                                  std::size_t{0}) != one.equivalent_to.end();
+      if (h > 0 && (same || one.excess > 4 * kFairLead)) {
+        one.excess *= share;
+        continue;
+      }
+      one.fit = fit_train(all, one.fit.model, result.freedom,
+                          {.iterations = 12, .without_outliers = true, .covariance = true},
+                          progress_.silent());
+      progress_.report(0.95);
+      if (h == 0) {
+        reference = one.fit;
+        one.total_covariance = with_glass_free(all, one.fit, result.freedom);
+      } else {
+        one.excess = chi2_excess(one.fit, reference);
+      }
+    }
+    result.grid = compared_;
+    result.correlation_time_factor = correlation_factor(reference);
+    result.decided = true;
+    for (std::size_t h = 1; h < result.hypotheses.size(); ++h) {
+      const Hypothesis& rival = result.hypotheses[h];
+      const bool same = std::find(rival.equivalent_to.begin(), rival.equivalent_to.end(),
+                                  std::size_t{0}) != rival.equivalent_to.end();
+      if (!same && rival.excess < kFairLead) result.decided = false;
+    }
+    result.fits = reference.rms < radians_from_degrees(0.1) ||
+                  (result.correlation_time_factor < 3 && reference.rms < radians_from_degrees(1));
+  }
+
+  /// The covariance without the assumption of one glass; the first prism of a single emitter on the
+  /// axis shows its deviation alone, so its index stays held.
+  Eigen::MatrixXd with_glass_free(const ShotGrid& grid, const TrainFit& fit,
+                                  TrainFreedom freedom) const {
+    if (!freedom.one_glass || fit.model.train.prisms() == 1) return fit.covariance;
+    freedom.one_glass = false;
+    freedom.first_glass = grid_.emitters > 1;
+    return fit_train(grid, fit.model, freedom,
+                     {.iterations = 0, .without_outliers = true, .covariance = true},
+                     progress_.silent())
+        .covariance;
+  }
+
+  /// Rivals that repeat the best one's scan, free of noise.
+  void find_equivalents(Identification& result) const {
+    const TrainFit& reference = result.hypotheses.front().fit;
+    const ShotGrid scan = predicted(compared_, reference.model);
+    const double most = std::max(kEquivalentRms, kEquivalentShare * reference.rms);
+    std::vector<std::size_t> same{0};
+    for (std::size_t h = 1; h < result.hypotheses.size(); ++h) {
+      const Hypothesis& rival = result.hypotheses[h];
+      if (rival.excess > kFairLead) break;
+      const TrainFit fit =
+          fit_train(scan, rival.fit.model, result.freedom, {.iterations = 25}, progress_.silent());
+      if (fit.rms < most) same.push_back(h);
+    }
+    for (const std::size_t a : same) {
+      for (const std::size_t b : same) {
+        if (a != b) result.hypotheses[a].equivalent_to.push_back(b);
+      }
+    }
+  }
+
+  /// Of equivalent trains, the one that somebody would build: wedges alike, then round ones.
+  static void choose_representative(Identification& result) {
+    const auto oddness = [](const Hypothesis& h) {
+      const PrismTrain& train = h.train();
+      double apart = 0, from_round = 0;
+      for (int k = 0; k < train.prisms(); ++k) {
+        const double wedge = train[place::wedge_angle(k)];
+        apart = std::max(apart, std::abs(wedge - train[place::wedge_angle(0)]));
+        const double tenths = 10 * degrees_from_radians(wedge);
+        from_round += std::abs(tenths - std::round(tenths));
+      }
+      const bool alike = apart < radians_from_degrees(0.05);
+      return std::pair(alike ? 0 : 1, from_round);
+    };
+    auto& all = result.hypotheses;
+    std::size_t chosen = 0;
+    for (const std::size_t h : all.front().equivalent_to) {
+      if (oddness(all[h]) < oddness(all[chosen])) chosen = h;
+    }
+    if (chosen == 0) return;
+    std::swap(all[0], all[chosen]);
+    std::swap(all[0].excess, all[chosen].excess);
+    // Places changed: all of the class name each other anew.
+    for (Hypothesis& one : all) {
+      for (std::size_t& place : one.equivalent_to) {
+        if (place == 0) {
+          place = chosen;
+        } else if (place == chosen) {
+          place = 0;
+        }
+      }
+    }
+  }
+
+  const ShotGrid& grid_;
+  LineSpectrum spectrum_;
+  IdentifyOptions options_;
+  const Progress& progress_;
+  TrainFreedom start_freedom_;
+  estimation::FrameTurn frame_;
+  ShotGrid trial_grid_, compared_;
+  double trial_begin_ = 0, trial_end_ = 0;
+};
+
+}  // namespace
+
+std::string to_string(EmitterTiming timing) {
+  switch (timing) {
+    case EmitterTiming::one_emitter:
+      return "one_emitter";
+    case EmitterTiming::in_turn:
+      return "in_turn";
+    case EmitterTiming::together:
+      return "together";
+    case EmitterTiming::uneven:
+      return "uneven";
+  }
+  return {};
+}
+
+Identification identify(const estimation::AngleSeries& series, const IdentifyOptions& options,
+                        const Progress& progress) {
+  require_above("options.fastest", options.fastest, 0, "rad/s");
+  require_between("options.most_prisms", options.most_prisms, 1, 3);
+  const std::vector<estimation::ShotRange> stretches = estimation::stretches(series, 1.0);
+  if (stretches.empty()) throw EstimationError("the recording holds no valid shots");
+  const auto longest =
+      std::max_element(stretches.begin(), stretches.end(),
+                       [](const auto& a, const auto& b) { return a.size() < b.size(); });
+  ShotGrid grid = shot_grid(series, *longest);
+  if (grid.duration() > kLongest) grid = rows_of(grid, 0, row_at(grid, kLongest));
+  const double window = std::max(kLineWindow, kLineShots * grid.step);
+  ShotGrid head = rows_of(grid, 0, row_at(grid, window));
+  const LineSpectrumOptions lines{.fastest = options.fastest};
+  LineSpectrum spectrum = line_spectrum(head, lines);
+  const bool named = grid.emitters > 1;
+  if (!named) {
+    const int period = emitter_period(head, spectrum.lines);
+    if (period > 1) {
+      for (ShotGrid* one : {&grid, &head}) {
+        one->emitters = period;
+        for (std::size_t i = 0; i < one->size(); ++i) {
+          one->emitter[i] = static_cast<std::uint8_t>(one->slot[i] % period);
+        }
+      }
+      spectrum = line_spectrum(head, lines);
+    }
+  }
+  if (spectrum.lines.empty()) {
+    throw EstimationError(
+        "the directions of this recording hold no line that turns evenly: no prism can be told");
+  }
+  progress.report(0.1);
+  Identification result = Search(grid, std::move(spectrum), options, progress).run();
+  result.emitters_named = named;
+  return result;
+}
+
+}  // namespace risley::identification
