@@ -60,6 +60,7 @@ Run declare_estimate(CLI::App& verb);
 Run declare_observability(CLI::App& verb);
 Run declare_calibrate(CLI::App& verb);
 Run declare_cloud(CLI::App& verb);
+Run declare_identify(CLI::App& verb);
 Run declare_pattern(CLI::App& verb);
 Run declare_preset(CLI::App& verb);
 Run declare_report(CLI::App& verb);

@@ -57,6 +57,10 @@ constexpr Verb kVerbs[] = {
      "  risley cloud recording.lvx --calibration calibration/calibration.yaml -o cloud.las\n"
      "  risley cloud 'flight/*.lvx' --calibration mid-40 --format ply -o clouds/",
      declare_cloud},
+    {"identify", "Which prisms made a scan, from its directions alone",
+     "  risley identify sequence.csv -o mine.yaml\n"
+     "  risley identify frame.pcd --shot-rate-hz 240385 --json",
+     declare_identify},
     {"pattern", "The scan pattern of a sensor, for simulators",
      "  risley pattern --sensor avia --format npy --duration-s 4 -o avia.npy\n"
      "  risley pattern --sensor horizon-sequence --format livox-csv --every 40 -o -",

@@ -328,7 +328,7 @@ class Search {
         own.coefficient(k, 1) = 0.5 * speed * (end - begin);
       }
       const std::size_t first = row_at(grid, begin), last = row_at(grid, end);
-      if (last >= first + kFewestSegmentShots / 2) {
+      if (static_cast<double>(last - first) >= 0.5 * kFewestSegmentShots && last > first) {
         TrainModel part = model;
         part.rotors = own;
         const TrainFit fit =
@@ -576,7 +576,7 @@ class Search {
         std::fill(fits[f].model.lag.begin(), fits[f].model.lag.end(), 0.0);
       }
       const double excess = f == leader ? 0.0 : std::max(0.0, chi2_excess(fits[f], few));
-      result.hypotheses.push_back({std::move(fits[f]), excess, {}});
+      result.hypotheses.push_back({std::move(fits[f]), excess, {}, {}});
     }
     const auto sort = [&] {
       std::stable_sort(result.hypotheses.begin(), result.hypotheses.end(),

@@ -537,6 +537,10 @@ double RotorCurves::angular_velocity(int rotor, double time) const {
   return speed;
 }
 
+double RotorCurves::mean_angular_velocity(int rotor) const {
+  return (angle(rotor, end) - angle(rotor, begin)) / (end - begin);
+}
+
 CurveWeights curve_weights(const RotorCurves& curves, int segment, double time) {
   CurveWeights weights;
   const double length = curves.segment_length();

@@ -37,6 +37,7 @@ struct RotorCurves {
   int first_coefficient(int segment) const { return smooth ? segment : segment * (degree + 1); }
   double angle(int rotor, double time) const;
   double angular_velocity(int rotor, double time) const;  ///< rad/s
+  double mean_angular_velocity(int rotor) const;          ///< from begin to end, rad/s
 };
 
 /// Highest degree of a curve.

@@ -1,0 +1,40 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "risley/identification/identify.hpp"
+#include "risley/sensors/sensor.hpp"
+
+namespace risley::identification {
+
+/// A sensor from what a scan told of it.
+struct IdentifiedSensor {
+  sensors::Sensor sensor;
+  /// Shots of the sensor for each row of the recording, 1 where nothing tells that some are left
+  /// out. Only shots that share a time show what the sensor's own shots are.
+  int decimation = 1;
+};
+
+/// The best hypothesis as a preset: optics, mean speeds, and the scan from the first shot, so that
+/// its row r is the recording's; the frame's turn is no part of it. What directions do not tell,
+/// such as limits of range, is taken from `rest` and said to be assumed.
+/// @param rest  any sensor
+IdentifiedSensor identified_sensor(const Identification& identification, const std::string& name,
+                                   const sensors::Sensor& rest);
+
+/// A known sensor that an identified train may be.
+struct Likeness {
+  bool mirrored = false;  ///< the known one seen in a mirror, or the recording is
+  double worst = 0;       ///< largest difference, as a share of what is allowed
+};
+
+/// Whether a hypothesis or one of its equivalents is a sensor's train: the same faces, speeds
+/// within 3 %, deviations of the prisms within 3 %.
+std::optional<Likeness> likeness(const Identification& identification,
+                                 const sensors::Sensor& known);
+
+}  // namespace risley::identification

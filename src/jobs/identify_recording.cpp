@@ -1,0 +1,171 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "risley/jobs/identify_recording.hpp"
+
+#include <filesystem>
+#include <fstream>
+#include <limits>
+
+#include <fmt/format.h>
+
+#include "risley/core/angle.hpp"
+#include "risley/core/error.hpp"
+#include "risley/io/output_file.hpp"
+#include "risley/jobs/recording_input.hpp"
+#include "risley/jobs/sensor_choice.hpp"
+#include "risley/sensors/preset.hpp"
+
+#include "jobs/open_input.hpp"
+#include "jobs/stopwatch.hpp"
+
+namespace risley::jobs {
+namespace {
+
+using identification::EmitterTiming;
+using identification::Identification;
+
+estimation::AngleSeries read(const IdentifyRecordingOptions& options, IdentifiedRecording& result,
+                             const Progress& progress) {
+  const auto reader = open_input(options.recording, options.reading);
+  const recordings::RecordingHeader& header = reader->header();
+  recordings::require_times(header);
+  if (header.devices.size() > 1) {
+    throw InvalidArgument(fmt::format("{} holds {} sensors, identify takes the recording of one",
+                                      options.recording, header.devices.size()));
+  }
+  estimation::ShotSelector selector({});
+  recordings::Chunk chunk;
+  while (reader->read(chunk)) {
+    selector.add(chunk.observations);
+    progress.report(reader->fraction_read());
+  }
+  for (const auto& warning : reader->warnings()) result.warnings.push_back(warning_text(warning));
+  return selector.take_series();
+}
+
+/// The built-in preset that has the identified train.
+void find_like(IdentifiedRecording& result) {
+  const bool together = result.identification.timing == EmitterTiming::together;
+  double least = std::numeric_limits<double>::infinity();
+  for (const std::string& name : sensors::builtin_preset_names()) {
+    const sensors::Sensor type = sensors::load_sensor(name);
+    for (const sensors::Sensor& sensor : sensors::in_all_combinations(type)) {
+      const auto like = identification::likeness(result.identification, sensor);
+      if (!like) continue;
+      // Presets that share a train: first those that are no mirror image, then those whose
+      // emitters fire alike.
+      const bool fires_together =
+          sensor.sequence && sensor.sequence->firing == sensors::Firing::together;
+      const double distance =
+          like->worst + (like->mirrored ? 4 : 0) + (fires_together != together ? 2 : 0);
+      if (distance >= least) continue;
+      least = distance;
+      result.like = name;
+      result.like_mirrored = like->mirrored;
+    }
+  }
+}
+
+void judge(IdentifiedRecording& result) {
+  const Identification& found = result.identification;
+  const std::string rms = fmt::format("{:.2g} degree", degrees_from_radians(found.best().fit.rms));
+  if (!found.fits) {
+    result.verdict = IdentificationVerdict::inconsistent;
+    result.words = fmt::format(
+        "no train of up to three prisms that was tried describes this scan: the best one leaves {}",
+        rms);
+    result.to_do =
+        "check the times (option shot_rate gives the rate of shots that are counted) and that the "
+        "recording is of one sensor at rest";
+    return;
+  }
+  if (!found.decided) {
+    result.verdict = IdentificationVerdict::undecided;
+    result.words = fmt::format(
+        "several trains describe this scan: the best one leaves {}, and the chi squared of another "
+        "is larger by {:.3g}, where {:.0f} would be fair to decide by",
+        rms, found.hypotheses.size() > 1 ? found.hypotheses[1].excess : 0.0,
+        identification::kFairLead);
+    result.to_do = "record for longer, or with less of the field of view without returns";
+    return;
+  }
+  result.verdict = IdentificationVerdict::identified;
+  result.words =
+      fmt::format("one train{} describes this scan and leaves {}",
+                  found.best().equivalent_to.empty() ? "" : ", or its equivalents,", rms);
+}
+
+void say_what_is_never_told(IdentifiedRecording& result) {
+  const Identification& found = result.identification;
+  std::vector<std::string>& words = result.unobservable;
+  if (found.emitters == 1) {
+    words.emplace_back(
+        "one emitter on the axis shows only by how much the first prism turns its beam aside: its "
+        "face order, wedge and refractive index cannot be told apart, and it is taken to be of the "
+        "others' glass");
+  } else if (found.freedom.one_glass) {
+    words.emplace_back(
+        "the prisms are taken to be of one glass, which the data allow; the sigmas hold without "
+        "that");
+  }
+  words.emplace_back(
+      "a wedge of the opposite sign is one turned by half a turn, and the mirror image of a scan "
+      "is that of the same prisms turning the other way");
+  words.emplace_back(
+      "refractive indices are relative to the air's; windows, and wedges that stand still before "
+      "the first prism, cannot be seen");
+}
+
+void write(const IdentifyRecordingOptions& options, IdentifiedRecording& result,
+           const Progress& progress) {
+  if (options.output.empty()) return;
+  if (result.verdict != IdentificationVerdict::identified && !options.undecided) return;
+  sensors::Sensor sensor = result.sensor.sensor;
+  sensor.provenance = with_inputs(options.provenance, {options.recording}, progress);
+  io::OutputFile file(options.output);
+  std::ofstream stream(file.temporary_path(), std::ios::binary);
+  stream << sensors::preset_text(sensor);
+  stream.close();
+  if (!stream) throw FileError(file.path(), {}, "cannot be written");
+  file.commit();
+  result.written = true;
+}
+
+}  // namespace
+
+std::string to_string(IdentificationVerdict verdict) {
+  switch (verdict) {
+    case IdentificationVerdict::identified:
+      return "identified";
+    case IdentificationVerdict::undecided:
+      return "undecided";
+    case IdentificationVerdict::inconsistent:
+      return "inconsistent";
+  }
+  return {};
+}
+
+IdentifiedRecording identify_recording(const IdentifyRecordingOptions& options,
+                                       const Progress& progress) {
+  progress.check();
+  IdentifiedRecording result;
+  const Stopwatch reading;
+  const estimation::AngleSeries series = read(options, result, progress.stage("reading"));
+  result.reading_time = reading.seconds();
+  const Stopwatch solving;
+  result.identification =
+      identification::identify(series, options.identify, progress.stage("identifying"));
+  result.solving_time = solving.seconds();
+  find_like(result);
+  const std::string name =
+      options.output.empty() ? "identified" : std::filesystem::path(options.output).stem().string();
+  result.sensor = identification::identified_sensor(
+      result.identification, name,
+      sensors::load_sensor(result.like.empty() ? kUsualSensor : result.like));
+  judge(result);
+  say_what_is_never_told(result);
+  write(options, result, progress.silent());
+  return result;
+}
+
+}  // namespace risley::jobs
