@@ -48,6 +48,8 @@ constexpr double kTurnedFrame = 0.03;
 /// Segments of the curves that rotors may follow, s.
 constexpr std::array<double, 9> kSegmentLengths{1.6,  0.8,   0.4,    0.2,    0.1,
                                                 0.05, 0.025, 0.0125, 0.00625};
+constexpr double kOneGlassLead = 9;
+constexpr double kUnknownPrice = 1.5;
 constexpr double kFewestSegmentShots = 30, kMostSegments = 250;
 /// A rival that leaves less than this share of the noise in a scan free of noise is equivalent.
 constexpr double kEquivalentShare = 1e-3;
@@ -104,11 +106,15 @@ std::vector<std::vector<std::size_t>> line_sets(std::size_t lines, std::size_t s
   return sets;
 }
 
-/// About so many shots, such that all emitters of a period keep their turn.
+/// About so many shots, in whole rounds of the emitters.
 ShotGrid thinned(const ShotGrid& grid, std::size_t begin, std::size_t end, std::size_t most) {
-  std::size_t stride = std::max<std::size_t>(1, (end - begin + most - 1) / most);
-  while (std::gcd(stride, static_cast<std::size_t>(grid.emitters)) != 1) ++stride;
-  return rows_of(grid, begin, end, stride);
+  const std::size_t every = std::max<std::size_t>(1, (end - begin + most - 1) / most);
+  const auto round = static_cast<std::size_t>(grid.emitters);
+  std::vector<std::size_t> rows;
+  for (std::size_t i = begin; i < end; ++i) {
+    if ((i - begin) / round % every == 0) rows.push_back(i);
+  }
+  return rows_of(grid, rows);
 }
 
 std::size_t row_at(const ShotGrid& grid, double time) {
@@ -177,7 +183,7 @@ class Search {
     return std::min(grid_.duration(), std::max(kLineWindow, kLineShots * grid_.step));
   }
 
-  TrainModel start(const Arrangement& arrangement, double index) const {
+  TrainModel start(const Arrangement& arrangement, double index, double thinner = 1) const {
     TrainModel model;
     model.train = PrismTrain(arrangement.faces, grid_.emitters);
     model.frame = frame_;
@@ -191,7 +197,7 @@ class Search {
       // A beam that meets the perpendicular face upright leaves the other one so much aside.
       const double aside = std::asin(std::min(0.95, std::abs(own.amplitude)));
       model.train.set_place(place::wedge_angle(k),
-                            std::atan2(std::sin(aside), index - std::cos(aside)));
+                            thinner * std::atan2(std::sin(aside), index - std::cos(aside)));
       // A prism sends the beam towards its thick end, down at rotation angle 0.
       const double zero = std::arg(own.amplitude) + 0.5 * kPi;
       line.coefficient(k, 0) = zero + own.angular_velocity * trial_begin_;
@@ -269,13 +275,15 @@ class Search {
     std::stable_sort(trials.begin(), trials.end(), better);
     return trials;
   }
-  /// From a middle index, or from a high one where the beam does not get out otherwise.
+  /// From a middle index, or from higher ones and thinner wedges where beams do not get out.
   TrainFit rough_fit(const ShotGrid& grid, const Arrangement& arrangement, int iterations) const {
     TrainFit fit;
-    for (const double index : {1.6, 1.85}) {
-      fit = fit_train(grid, start(arrangement, index), start_freedom_, {.iterations = iterations},
-                      progress_.silent());
-      if (std::isfinite(fit.rms)) break;
+    for (const double thinner : {1.0, 0.92, 0.85}) {
+      for (const double index : {1.6, 1.85}) {
+        fit = fit_train(grid, start(arrangement, index, thinner), start_freedom_,
+                        {.iterations = iterations}, progress_.silent());
+        if (std::isfinite(fit.rms)) return fit;
+      }
     }
     return fit;
   }
@@ -304,11 +312,12 @@ class Search {
     return largest < 20 * power;
   }
 
-  /// Of Bayes and Schwarz: smaller is better.
+  /// Smaller is better. An unknown that chance alone fits gains 1. Motion that is not followed
+  /// bends the optics, while an unknown of a curve too many costs little.
   static double evidence(const TrainFit& fit, double limit) {
     const double angles = 2.0 * static_cast<double>(fit.azimuth_residual.size());
     return angles * std::log(mean_square(fit, limit)) +
-           static_cast<double>(fit.unknowns) * std::log(angles);
+           kUnknownPrice * static_cast<double>(fit.unknowns);
   }
 
   /// A model of the trial window carried on over all of a grid, in segments of about that length.
@@ -438,7 +447,10 @@ class Search {
         if (!std::isfinite(fit.rms)) continue;
         const double gained =
             chi2_excess(best, fit) - 2.0 * static_cast<double>(fit.unknowns - best.unknowns);
-        if (gained > kFairLead && gained > most) {
+        // One glass is an assumption that little is needed to give up, a turned frame or tilted
+        // prisms are a finding.
+        const double needed = one.one_glass ? kFairLead : kOneGlassLead;
+        if (gained > needed && gained > most) {
           most = gained;
           chosen = &one;
           chosen_fit = std::move(fit);
@@ -493,7 +505,7 @@ class Search {
       const TrainModel& model = chosen[leader].fit.model;
       TrainFit best;
       TrainFreedom wide = start_freedom_;
-      wide.one_glass = chosen[leader].fit.model.train.prisms() < 2;
+      wide.one_glass = chosen[leader].fit.model.train.prisms() < 2 || grid_.emitters == 1;
       motion = choose_motion(model, wide);
       freedom = choose_freedom(model, motion, best);
       fits.assign(chosen.size(), {});
@@ -578,49 +590,66 @@ class Search {
       const double excess = f == leader ? 0.0 : std::max(0.0, chi2_excess(fits[f], few));
       result.hypotheses.push_back({std::move(fits[f]), excess, {}, {}});
     }
-    const auto sort = [&] {
-      std::stable_sort(result.hypotheses.begin(), result.hypotheses.end(),
-                       [](const Hypothesis& a, const Hypothesis& b) {
-                         return a.excess != b.excess ? a.excess < b.excess : a.fit.rms < b.fit.rms;
-                       });
-    };
-    sort();
+    sort_by_excess(result);
     find_equivalents(result);
-    choose_representative(result);
     // All rows for the best one, and for rivals that the thinned ones do not dismiss.
     const ShotGrid all = thinned(grid_, 0, grid_.size(), kMostShots);
     const double share = static_cast<double>(all.size()) / static_cast<double>(compared_.size());
-    TrainFit reference;
-    for (std::size_t h = 0; h < result.hypotheses.size(); ++h) {
-      Hypothesis& one = result.hypotheses[h];
-      const bool same = std::find(one.equivalent_to.begin(), one.equivalent_to.end(),
-                                  std::size_t{0}) != one.equivalent_to.end();
-      if (h > 0 && (same || one.excess > 4 * kFairLead)) {
-        one.excess *= share;
-        continue;
-      }
+    const auto fit_all = [&](Hypothesis& one) {
       one.fit = fit_train(all, one.fit.model, result.freedom,
                           {.iterations = 12, .without_outliers = true, .covariance = true},
                           progress_.silent());
-      progress_.report(0.95);
-      if (h == 0) {
-        reference = one.fit;
-        one.total_covariance = with_glass_free(all, one.fit, result.freedom);
+    };
+    std::vector<std::size_t> in_full;
+    for (std::size_t h = 0; h < result.hypotheses.size(); ++h) {
+      Hypothesis& one = result.hypotheses[h];
+      if (h == 0 || (one.excess <= 4 * kFairLead && !is_best_or_equivalent(result, h))) {
+        fit_all(one);
+        in_full.push_back(h);
+        progress_.report(0.95);
       } else {
-        one.excess = chi2_excess(one.fit, reference);
+        one.excess *= share;
       }
     }
+    std::size_t best = 0;
+    for (const std::size_t h : in_full) {
+      if (result.hypotheses[h].fit.rms < result.hypotheses[best].fit.rms) best = h;
+    }
+    const TrainFit reference = result.hypotheses[best].fit;
+    for (const std::size_t h : in_full) {
+      result.hypotheses[h].excess =
+          h == best ? 0 : std::max(0.0, chi2_excess(result.hypotheses[h].fit, reference));
+    }
+    if (best != 0) {
+      for (Hypothesis& one : result.hypotheses) one.equivalent_to.clear();
+      std::swap(result.hypotheses[0], result.hypotheses[best]);
+      std::stable_sort(result.hypotheses.begin() + 1, result.hypotheses.end(), smaller_excess);
+      find_equivalents(result);
+    }
+    if (choose_representative(result)) fit_all(result.hypotheses.front());
+    Hypothesis& front = result.hypotheses.front();
+    front.total_covariance = with_glass_free(all, front.fit, result.freedom);
     result.grid = compared_;
     result.correlation_time_factor = correlation_factor(reference);
     result.decided = true;
     for (std::size_t h = 1; h < result.hypotheses.size(); ++h) {
-      const Hypothesis& rival = result.hypotheses[h];
-      const bool same = std::find(rival.equivalent_to.begin(), rival.equivalent_to.end(),
-                                  std::size_t{0}) != rival.equivalent_to.end();
-      if (!same && rival.excess < kFairLead) result.decided = false;
+      if (!is_best_or_equivalent(result, h) && result.hypotheses[h].excess < kFairLead) {
+        result.decided = false;
+      }
     }
     result.fits = reference.rms < radians_from_degrees(0.1) ||
                   (result.correlation_time_factor < 3 && reference.rms < radians_from_degrees(1));
+  }
+
+  static bool smaller_excess(const Hypothesis& a, const Hypothesis& b) {
+    return a.excess != b.excess ? a.excess < b.excess : a.fit.rms < b.fit.rms;
+  }
+  static void sort_by_excess(Identification& result) {
+    std::stable_sort(result.hypotheses.begin(), result.hypotheses.end(), smaller_excess);
+  }
+  static bool is_best_or_equivalent(const Identification& result, std::size_t h) {
+    const auto& same = result.hypotheses[h].equivalent_to;
+    return h == 0 || std::find(same.begin(), same.end(), std::size_t{0}) != same.end();
   }
 
   /// The covariance without the assumption of one glass; the first prism of a single emitter on the
@@ -657,7 +686,8 @@ class Search {
   }
 
   /// Of equivalent trains, the one that somebody would build: wedges alike, then round ones.
-  static void choose_representative(Identification& result) {
+  /// @return whether that is another one
+  static bool choose_representative(Identification& result) {
     const auto oddness = [](const Hypothesis& h) {
       const PrismTrain& train = h.train();
       double apart = 0, from_round = 0;
@@ -675,7 +705,7 @@ class Search {
     for (const std::size_t h : all.front().equivalent_to) {
       if (oddness(all[h]) < oddness(all[chosen])) chosen = h;
     }
-    if (chosen == 0) return;
+    if (chosen == 0) return false;
     std::swap(all[0], all[chosen]);
     std::swap(all[0].excess, all[chosen].excess);
     // Places changed: all of the class name each other anew.
@@ -688,6 +718,7 @@ class Search {
         }
       }
     }
+    return true;
   }
 
   const ShotGrid& grid_;

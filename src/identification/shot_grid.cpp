@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
 
 #include <fmt/format.h>
 
@@ -94,15 +95,14 @@ ShotGrid shot_grid(const estimation::AngleSeries& series, estimation::ShotRange 
   return grid;
 }
 
-ShotGrid rows_of(const ShotGrid& grid, std::size_t begin, std::size_t end, std::size_t stride) {
-  require_rows("rows", begin, end, grid.size());
-  require_at_least("stride", static_cast<long long>(stride), 1);
+ShotGrid rows_of(const ShotGrid& grid, std::span<const std::size_t> rows) {
   ShotGrid part;
   part.origin_ns = grid.origin_ns;
   part.step = grid.step;
   part.regular = grid.regular;
   part.emitters = grid.emitters;
-  for (std::size_t i = begin; i < end; i += stride) {
+  for (const std::size_t i : rows) {
+    require_place("rows", i, grid.size());
     part.slot.push_back(grid.slot[i]);
     part.time.push_back(grid.time[i]);
     part.azimuth.push_back(grid.azimuth[i]);
@@ -110,6 +110,13 @@ ShotGrid rows_of(const ShotGrid& grid, std::size_t begin, std::size_t end, std::
     part.emitter.push_back(grid.emitter[i]);
   }
   return part;
+}
+
+ShotGrid rows_of(const ShotGrid& grid, std::size_t begin, std::size_t end) {
+  require_rows("rows", begin, end, grid.size());
+  std::vector<std::size_t> rows(end - begin);
+  std::iota(rows.begin(), rows.end(), begin);
+  return rows_of(grid, rows);
 }
 
 }  // namespace risley::identification

@@ -637,7 +637,7 @@ TrainFit fit_train(const ShotGrid& grid, const TrainModel& start, const TrainFre
       if (result.outliers == 0) break;
       cost = fit.cost(result.model);
     }
-    double damping = 1e-3;
+    double damping = 1e-4;
     bool fresh = false;
     for (int iteration = 0; iteration < options.iterations; ++iteration) {
       progress.check();
@@ -663,8 +663,9 @@ TrainFit fit_train(const ShotGrid& grid, const TrainModel& start, const TrainFre
       result.model = std::move(trial);
       cost = trial_cost;
       fresh = false;
-      const bool flat = gained < 1e-7 && damping <= 1e-3;
-      damping = std::max(damping * 0.1, 1e-12);
+      // A damped step along a narrow valley gains little too.
+      const bool flat = gained < 1e-7 && damping <= 1e-8;
+      damping = std::max(damping * 0.03, 1e-12);
       if (flat) break;
     }
   }

@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "risley/estimation/angle_series.hpp"
@@ -31,7 +32,9 @@ struct ShotGrid {
 /// @throws EstimationError for fewer than 40 shots, or more than half of the times equal
 ShotGrid shot_grid(const estimation::AngleSeries& series, estimation::ShotRange rows);
 
-/// Rows [begin, end) of a grid, each `stride`-th of them; origin and step stay.
-ShotGrid rows_of(const ShotGrid& grid, std::size_t begin, std::size_t end, std::size_t stride = 1);
+/// Some rows of a grid, ascending; origin and step stay.
+ShotGrid rows_of(const ShotGrid& grid, std::span<const std::size_t> rows);
+/// Rows [begin, end).
+ShotGrid rows_of(const ShotGrid& grid, std::size_t begin, std::size_t end);
 
 }  // namespace risley::identification
