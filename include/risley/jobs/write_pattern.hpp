@@ -4,10 +4,12 @@
 
 #include <cstdint>
 #include <iosfwd>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "risley/core/progress.hpp"
+#include "risley/sensors/helios_scanner.hpp"
 #include "risley/sensors/scan_pattern.hpp"
 
 namespace risley::jobs {
@@ -16,6 +18,7 @@ namespace risley::jobs {
 struct PatternFormat {
   std::string name;         ///< "livox-csv"
   std::string description;  ///< columns, units, who reads it
+  std::string ending;       ///< of files, ".csv"
 };
 
 /// Those that write_pattern() knows.
@@ -24,7 +27,7 @@ const std::vector<PatternFormat>& pattern_formats();
 /// What to write where.
 struct WritePatternOptions {
   std::string sensor;     ///< as sensors::load_sensor()
-  std::string format;     ///< a name of pattern_formats()
+  std::string format;     ///< a name of pattern_formats(); empty: by the ending of the output
   std::string output;     ///< path
   double duration = 1.0;  ///< s, of the scan
   sensors::ScanPatternOptions scan;
@@ -33,17 +36,21 @@ struct WritePatternOptions {
 /// What came of it.
 struct WrittenPattern {
   std::string sensor;  ///< name
+  std::string format;
   std::uint64_t rows = 0;
-  std::uint64_t blocked = 0;  ///< of them, NaN: shots that do not get through the prisms
+  std::uint64_t blocked = 0;  ///< of them, shots that do not get through the prisms
   std::string firing;         ///< "in_turn" or "together"
+  /// What the pattern has and the format cannot hold, one sentence each.
+  std::vector<std::string> not_carried;
+  std::optional<sensors::HeliosScanner> helios;  ///< where the format is that of HELIOS++
 };
 
 /// Writes the scan pattern of a sensor for a simulator; the output appears when it is whole.
-/// @throws InvalidArgument for an unknown sensor or format and for numbers out of range; FileError;
-///         Cancelled
+/// @throws InvalidArgument for an unknown sensor, format or ending and for numbers out of range;
+///         FileError; Cancelled
 WrittenPattern write_pattern(const WritePatternOptions& options, const Progress& progress = {});
 
-/// The same into an open stream; output of the options is not used.
+/// The same into an open stream; output of the options is not used but for its ending.
 WrittenPattern write_pattern(const WritePatternOptions& options, std::ostream& stream,
                              const Progress& progress = {});
 
