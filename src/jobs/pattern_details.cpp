@@ -10,7 +10,7 @@
 namespace risley::jobs {
 namespace {
 
-constexpr double kMostDrawn = 20'000;
+constexpr double kMostDrawn = 25'000;
 
 }  // namespace
 

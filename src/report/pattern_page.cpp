@@ -3,6 +3,7 @@
 #include "risley/report/pattern_page.hpp"
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <map>
 #include <utility>
@@ -122,9 +123,9 @@ std::string prisms_html(const sensors::Sensor& sensor) {
   for (int i = 0; i < sensor.prisms(); ++i) {
     const auto k = static_cast<std::size_t>(i);
     html += fmt::format(
-        "<tr><th scope=\"row\">{}</th><td class=\"text\">{}</td><td>{:.6g}</td><td>{:.6g}</td>"
+        "<tr><th scope=\"row\">{}</th><td>{}</td><td>{:.6g}</td><td>{:.6g}</td>"
         "<td>{:.8g}</td></tr>\n",
-        prism_letter(i),
+        static_cast<char>(std::toupper(prism_letter(i))),
         sensor.train.face_order()[k] == FaceOrder::angled_perpendicular ? "angled"
                                                                         : "perpendicular",
         degrees_from_radians(sensor.train[place::wedge_angle(i)]),

@@ -17,6 +17,7 @@ namespace {
 
 constexpr double kFieldTime = 30.0;  // s
 constexpr double kMostShots = 1e7;
+constexpr double kFinest = radians_from_degrees(0.1);
 constexpr std::uint64_t kChunk = 65'536;
 
 /// A place in the map.
@@ -41,6 +42,7 @@ class Grid {
   explicit Grid(double cell)
       : cell_(cell), half_(static_cast<long>(std::ceil(2.0 / cell)) + 1), width_(2 * half_) {}
 
+  double cell() const { return cell_; }
   std::size_t size() const { return static_cast<std::size_t>(width_ * width_); }
   std::size_t width() const { return static_cast<std::size_t>(width_); }
   std::size_t of(const MapPoint& point) const {
@@ -87,16 +89,15 @@ class Neighbours {
   }
 
   /// Angle to the nearest of them, rad; stops looking as soon as it is less than `enough`.
-  double nearest(const MapPoint& from, double enough, double cell) const {
-    const Vector3<double> own = direction_at(from);
-    const std::size_t centre = grid_.of(from);
+  double nearest(const Vector3<double>& own, double enough) const {
+    const std::size_t centre = grid_.of(mapped(own));
     const auto width = static_cast<long>(grid_.width());
     const long x = static_cast<long>(centre) % width, y = static_cast<long>(centre) / width;
     double best = std::numeric_limits<double>::infinity();  // square of a chord
     const double enough_chord = 4 * std::pow(std::sin(0.5 * enough), 2);
     for (long ring = 0; ring < width; ++ring) {
       // A cell of the map is nowhere narrower than half its edge within the half sphere.
-      const double within = 0.5 * static_cast<double>(ring - 1) * cell;
+      const double within = 0.5 * static_cast<double>(ring - 1) * grid_.cell();
       if (ring > 1 && best < std::pow(within, 2)) break;
       for (long j = std::max(0L, y - ring); j <= std::min(width - 1, y + ring); ++j) {
         const bool whole = std::abs(j - y) == ring;
@@ -120,38 +121,18 @@ class Neighbours {
   std::vector<Vector3<double>> sorted_;
 };
 
-/// The largest empty circle about a direction of the field of view.
-void find_gap(CoverageAfter& result, const Grid& grid, const std::vector<std::size_t>& field,
-              const std::vector<char>& in_field, const Neighbours& shots, double cell) {
-  MapPoint best;
+/// The largest empty circle about one of the directions.
+void find_gap(CoverageAfter& result, const std::vector<Vector3<double>>& field,
+              const Neighbours& shots) {
+  const Vector3<double>* best = &field.front();
   double radius = 0;
-  const auto try_at = [&](const MapPoint& point) {
-    if (in_field[grid.of(point)] == 0) return false;
-    const double here = shots.nearest(point, radius, cell);
-    if (here <= radius) return false;
+  for (const Vector3<double>& centre : field) {
+    const double here = shots.nearest(centre, radius);
+    if (here <= radius) continue;
     radius = here;
-    best = point;
-    return true;
-  };
-  for (const std::size_t at : field) {
-    const MapPoint centre = grid.centre(at);
-    const double inner = 0.25 * cell;  // four places in every cell
-    for (const double a : {-inner, inner}) {
-      for (const double b : {-inner, inner}) try_at({centre.left + a, centre.up + b});
-    }
+    best = &centre;
   }
-  constexpr double kFinest = 1e-4;  // of a cell
-  for (double step = 0.25 * cell; step > kFinest * cell; step *= 0.5) {
-    for (bool better = true; better;) {
-      better = false;
-      const MapPoint from = best;
-      for (const auto& [a, b] : {std::pair{1.0, 0.0}, {-1.0, 0.0}, {0.0, 1.0}, {0.0, -1.0},
-                                 {0.7, 0.7}, {-0.7, 0.7}, {0.7, -0.7}, {-0.7, -0.7}}) {
-        better = try_at({from.left + a * step, from.up + b * step}) || better;
-      }
-    }
-  }
-  const SphericalAngles<double> angles = angles_from_direction(direction_at(best));
+  const SphericalAngles<double> angles = angles_from_direction(*best);
   result.gap = 2 * radius;
   result.gap_azimuth = angles.azimuth;
   result.gap_zenith = angles.zenith;
@@ -187,12 +168,17 @@ PatternCoverage pattern_coverage(const Sensor& sensor, const ScanPatternOptions&
       std::max(options.after.back(), std::min(kFieldTime, kMostShots / rows_per_second));
   const Grid grid(options.cell);
 
-  std::vector<char> in_field(grid.size());
+  // One direction of every small cell: where circles without a shot may have their centre.
+  const Grid fine(std::max(0.25 * options.cell, kFinest));
+  std::vector<char> in_field(grid.size()), seen(fine.size());
+  std::vector<Vector3<double>> centres;
   double least_x = 1;
   each_direction(sensor, scan, 0, rows_after(result.field_after), progress.part(0, 0.6),
                  [&](const Vector3<double>& direction) {
-                   in_field[grid.of(mapped(direction))] = 1;
+                   const MapPoint place = mapped(direction);
+                   in_field[grid.of(place)] = 1;
                    least_x = std::min(least_x, direction.x);
+                   if (std::exchange(seen[fine.of(place)], 1) == 0) centres.push_back(direction);
                  });
   std::vector<std::size_t> field;
   for (std::size_t at = 0; at < grid.size(); ++at) {
@@ -257,7 +243,7 @@ PatternCoverage pattern_coverage(const Sensor& sensor, const ScanPatternOptions&
     if (directions.empty()) {
       now.gap = now.gap_azimuth = now.gap_zenith = std::numeric_limits<double>::quiet_NaN();
     } else {
-      find_gap(now, grid, field, in_field, Neighbours(grid, directions, counts), options.cell);
+      find_gap(now, centres, Neighbours(grid, directions, counts));
     }
     progress.report(share(1));
     result.after.push_back(std::move(now));

@@ -26,8 +26,10 @@ struct CoverageAfter {
   double mean_density = 0;    ///< shots per steradian of the field of view
   double least_density = 0;   ///< of the cell with the fewest, shots per steradian
   double greatest_density = 0;
-  /// Diameter of the largest circle about a direction of the field of view with no shot in it, rad.
-  double gap = 0;                          ///< NaN without shots
+  /// Diameter of the largest circle with no shot in it whose centre is a direction that the scan
+  /// reaches in the end, rad; of these one is tried in every quarter of a cell (0.1 degree at
+  /// least). NaN without shots.
+  double gap = 0;
   double gap_azimuth = 0, gap_zenith = 0;  ///< of its centre, rad
   std::vector<std::uint32_t> cell_shots;   ///< [cells]
   std::vector<double> ring_density;        ///< [rings], shots per steradian of field of view; NaN
