@@ -76,7 +76,8 @@ class Risley:
 def picture(risley, preset, emitters):
     """The scan's first tenth of a second, as one looks out: left is left. One line per emitter."""
     path = risley.folder / "pattern.npy"
-    risley("pattern", "--sensor", preset, "-o", path, "--duration-s", DURATION, *risley.start(preset))
+    risley("pattern", "--sensor", preset, "--format", "npy", "-o", path, "--duration-s", DURATION,
+           *risley.start(preset))
     azimuth, elevation = np.load(path).T.astype(float)
     x = np.cos(elevation) * np.cos(azimuth)
     scale = np.sqrt(2 / (1 + x))  # Lambert's equal-area map
@@ -169,8 +170,8 @@ def coverage(risley, presets):
 def carried(risley, presets):
     rows = []
     for preset in presets:
-        made = risley.json("pattern", "--sensor", preset, "-o", risley.folder / "scanner.xml",
-                           *risley.start(preset))
+        made = risley.json("pattern", "--sensor", preset, "--format", "helios-xml", "-o",
+                           risley.folder / "scanner.xml", *risley.start(preset))
         residual = made["residual"]
         lost = [one.split(":")[0].rstrip(".") for one in made["not_carried"]
                 if not one.startswith("A beam divergence")]
@@ -273,7 +274,7 @@ def simulators(risley):
     rows = []
     for name, entry in HELIOS.items():
         path = risley.folder / "scanner.xml"
-        risley("pattern", "--sensor", entry["ours"], "-o", path)
+        risley("pattern", "--sensor", entry["ours"], "--format", "helios-xml", "-o", path)
         ours = of_xml(path)
         theirs = dict(entry)
         theirs["incident"] = [[x, np.sqrt(1 - x * x), 0.0] for x in entry.get("beams", (0.0,))]

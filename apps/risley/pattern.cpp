@@ -41,7 +41,7 @@ struct PatternOptions {
 std::string format_list() {
   std::string text;
   for (const jobs::PatternFormat& format : jobs::pattern_formats()) {
-    text += fmt::format("\n  {:<10} {} ({})", format.name, format.description, format.ending);
+    text += fmt::format("\n  {:<10} {}", format.name, format.description);
   }
   return text;
 }
@@ -74,8 +74,9 @@ Json coverage_json(const sensors::PatternCoverage& coverage) {
                        {"max", one.greatest_density * kSquareDegree}}},
                      {"density_per_sr", {{"mean", one.mean_density}}},
                      {"gap_deg", degrees_from_radians(one.gap)},
-                     {"gap_at", {{"azimuth_deg", degrees_from_radians(one.gap_azimuth)},
-                                 {"zenith_deg", degrees_from_radians(one.gap_zenith)}}},
+                     {"gap_at",
+                      {{"azimuth_deg", degrees_from_radians(one.gap_azimuth)},
+                       {"zenith_deg", degrees_from_radians(one.gap_zenith)}}},
                      {"ring_density_per_deg2", rings}});
   }
   return {{"cell_deg", degrees_from_radians(coverage.cell)},
@@ -92,8 +93,8 @@ void print_coverage(const sensors::PatternCoverage& coverage) {
   fmt::print("field of view {:.5g} square degrees within {:.2f} degree of the axis\n",
              coverage.field_solid_angle / kSquareDegree,
              degrees_from_radians(coverage.field_half_angle));
-  Table table({"after, s", "shots", "covered, %", "mean, 1/deg2", "least", "greatest",
-               "largest gap, deg"});
+  Table table(
+      {"after, s", "shots", "covered, %", "mean, 1/deg2", "least", "greatest", "largest gap, deg"});
   for (const sensors::CoverageAfter& one : coverage.after) {
     table.add({fmt::format("{:g}", one.time), grouped(one.shots),
                fmt::format("{:.1f}", 100 * one.covered),
@@ -103,9 +104,10 @@ void print_coverage(const sensors::PatternCoverage& coverage) {
                fmt::format("{:.3f}", degrees_from_radians(one.gap))});
   }
   table.print();
-  fmt::print("covered: cells of {:g} degree with a shot, of those that {:g} s reach; gap: diameter "
-             "of the largest empty circle\n",
-             degrees_from_radians(coverage.cell), coverage.field_after);
+  fmt::print(
+      "covered: cells of {:g} degree with a shot, of those that {:g} s reach; gap: diameter "
+      "of the largest empty circle\n",
+      degrees_from_radians(coverage.cell), coverage.field_after);
 }
 
 void print_written(const jobs::WrittenPattern& written, const std::string& output) {
@@ -115,19 +117,23 @@ void print_written(const jobs::WrittenPattern& written, const std::string& outpu
                written.format == "livox-csv" || written.format == "npy" ? " and are NaN" : "");
   }
   if (written.helios) {
-    fmt::print("against the pattern itself {:.3g} degree (root mean square), {:.3g} at most, over {} "
-               "shots; a shot at time t is at t {} {:.6g} s there\n",
-               degrees_from_radians(written.helios->rms),
-               degrees_from_radians(written.helios->worst), grouped(written.helios->compared),
-               written.helios->time_lag < 0 ? '-' : '+', std::abs(written.helios->time_lag));
+    fmt::print(
+        "against the pattern itself {:.3g} degree (root mean square), {:.3g} at most, over {} "
+        "shots; a shot at time t is at t {} {:.6g} s there\n",
+        degrees_from_radians(written.helios->rms), degrees_from_radians(written.helios->worst),
+        grouped(written.helios->compared), written.helios->time_lag < 0 ? '-' : '+',
+        std::abs(written.helios->time_lag));
   }
   for (const std::string& one : written.not_carried) fmt::print("not carried: {}\n", one);
 }
 
 Json written_json(const jobs::WrittenPattern& written, const std::string& output) {
-  Json json = {{"rows", written.rows},     {"blocked", written.blocked},
-               {"sensor", written.sensor}, {"format", written.format},
-               {"firing", written.firing}, {"output", output},
+  Json json = {{"rows", written.rows},
+               {"blocked", written.blocked},
+               {"sensor", written.sensor},
+               {"format", written.format},
+               {"firing", written.firing},
+               {"output", output},
                {"not_carried", written.not_carried}};
   if (written.helios) {
     json["residual"] = {{"rms_deg", degrees_from_radians(written.helios->rms)},
@@ -146,7 +152,10 @@ ExitStatus run_pattern(const PatternOptions& options, const CommonOptions& commo
   const bool to_stdout = options.output == "-";
   const bool looks = options.coverage || !options.report.empty();
   if (options.output.empty() && !looks) {
-    throw InvalidArgument("nothing to do: give -o FILE, --coverage or --report PAGE");
+    throw InvalidArgument("nothing to do: give --output FILE, --coverage or --report PAGE");
+  }
+  if (!options.output.empty() && options.format.empty()) {
+    throw InvalidArgument(fmt::format("--output {} needs --format", options.output));
   }
   if (to_stdout && common.json) {
     throw InvalidArgument("--json needs a file: with -o - the pattern itself goes to stdout");
@@ -154,7 +163,6 @@ ExitStatus run_pattern(const PatternOptions& options, const CommonOptions& commo
   if (to_stdout && options.coverage) {
     throw InvalidArgument("--coverage prints on stdout, where -o - puts the pattern itself");
   }
-  if (to_stdout && options.format.empty()) throw InvalidArgument("-o - needs --format");
   check_positive(options.duration_s, "--duration-s", "s");
   const sensors::ScanPatternOptions scan = scan_options(options);
   Json json = Json::object();
@@ -207,8 +215,7 @@ Run declare_pattern(CLI::App& verb) {
   verb.add_option("-o,--output", o.output, "File to write; - is standard output");
   std::set<std::string> names;
   for (const jobs::PatternFormat& format : jobs::pattern_formats()) names.insert(format.name);
-  verb.add_option("--format", o.format,
-                  "What to write (default: by the ending of the file):" + format_list())
+  verb.add_option("--format", o.format, "What to write:" + format_list())
       ->check(CLI::IsMember(names));
   verb.add_option("--sensor", o.sensor, "Preset by name, or a preset or calibration file")
       ->capture_default_str();

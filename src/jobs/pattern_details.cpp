@@ -15,8 +15,7 @@ constexpr double kMostDrawn = 25'000;
 }  // namespace
 
 PatternDetails pattern_details(const std::string& sensor, const sensors::ScanPatternOptions& scan,
-                               const sensors::CoverageOptions& coverage,
-                               const Progress& progress) {
+                               const sensors::CoverageOptions& coverage, const Progress& progress) {
   PatternDetails result;
   result.sensor = sensors::load_sensor(sensor);
   result.coverage = sensors::pattern_coverage(result.sensor, scan, coverage, progress);

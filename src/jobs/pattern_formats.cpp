@@ -81,8 +81,8 @@ void put_livox_csv(PatternStream& out) {
 }
 
 void put_npy(PatternStream& out) {
-  out.put(io::npy_head(fmt::format(
-      "{{'descr': '<f4', 'fortran_order': False, 'shape': ({}, 2), }}", out.result().rows)));
+  out.put(io::npy_head(fmt::format("{{'descr': '<f4', 'fortran_order': False, 'shape': ({}, 2), }}",
+                                   out.result().rows)));
   out.put_rows(npy_rows);
 }
 

@@ -19,11 +19,20 @@ std::string escaped(const std::string& text) {
   std::string result;
   for (const char c : text) {
     switch (c) {
-      case '&': result += "&amp;"; break;
-      case '<': result += "&lt;"; break;
-      case '>': result += "&gt;"; break;
-      case '"': result += "&quot;"; break;
-      default: result += c;
+      case '&':
+        result += "&amp;";
+        break;
+      case '<':
+        result += "&lt;";
+        break;
+      case '>':
+        result += "&gt;";
+        break;
+      case '"':
+        result += "&quot;";
+        break;
+      default:
+        result += c;
     }
   }
   return result;
@@ -38,13 +47,16 @@ std::string commented(std::string text) {
 }
 
 /// Fifteen digits, and zero for what is nothing beside 1.
-std::string number(double value) { return fmt::format("{:.15g}", std::abs(value) < 1e-15 ? 0.0 : value); }
+std::string number(double value) {
+  return fmt::format("{:.15g}", std::abs(value) < 1e-15 ? 0.0 : value);
+}
 
 std::string comment_of(const sensors::HeliosScanner& scanner, const sensors::Sensor& sensor) {
   std::string text = fmt::format(
       "<!-- The scan pattern of {} by risley. Axes: x right, y forward, z up. The sign of an angle "
       "chooses the face\n       that is inclined: positive the first, negative the second. Against "
-      "the pattern itself {:.3g} degree (root mean\n       square), {:.3g} at most, over {} shots; a "
+      "the pattern itself {:.3g} degree (root mean\n       square), {:.3g} at most, over {} shots; "
+      "a "
       "shot of the pattern at time t is at t {} {:.10g} s here.\n",
       commented(sensor.name), degrees_from_radians(scanner.rms),
       degrees_from_radians(scanner.worst), scanner.compared, scanner.time_lag < 0 ? '-' : '+',
@@ -63,8 +75,8 @@ std::string comment_of(const sensors::HeliosScanner& scanner, const sensors::Sen
 
 void put_helios_xml(PatternStream& out) {
   const sensors::Sensor& sensor = out.sensor();
-  sensors::HeliosScanner scanner = sensors::helios_scanner(
-      sensor, out.result().rows, out.options().scan, out.progress());
+  sensors::HeliosScanner scanner =
+      sensors::helios_scanner(sensor, out.result().rows, out.options().scan, out.progress());
   if (sensor.beam_divergence_horizontal != sensor.beam_divergence_vertical) {
     scanner.not_carried.push_back(
         fmt::format("A beam divergence of {:.4g} x {:.4g} degree: the smaller one is written.",
@@ -94,15 +106,15 @@ void put_helios_xml(PatternStream& out) {
   attribute("wavelength_nm", fmt::format("{}", kWavelengthNm));
   for (std::size_t k = 0; k < scanner.angle.size(); ++k) {
     attribute(fmt::format("rotorFreq{}_Hz", k + 1), number(scanner.rotor_frequency[k]));
-    attribute(fmt::format("angle{}_deg", k + 1),
-              number(degrees_from_radians(scanner.angle[k])));
+    attribute(fmt::format("angle{}_deg", k + 1), number(degrees_from_radians(scanner.angle[k])));
     attribute(fmt::format("refrIndex{}", k + 1), number(scanner.refractive_index[k]));
   }
   attribute("refrIndex_air", number(scanner.refractive_index_air));
 
   std::string turns;
-  for (const auto& [axis, angle] : {std::pair{'y', scanner.turn[0]}, std::pair{'x', scanner.turn[1]},
-                                    std::pair{'z', scanner.turn[2]}}) {
+  for (const auto& [axis, angle] :
+       {std::pair{'y', scanner.turn[0]}, std::pair{'x', scanner.turn[1]},
+        std::pair{'z', scanner.turn[2]}}) {
     turns += fmt::format("      <rot axis=\"{}\" angle_deg=\"{}\"/>\n", axis,
                          number(degrees_from_radians(angle)));
   }

@@ -118,7 +118,8 @@ std::string prim_name(const std::string& text) {
   for (const char c : text) {
     name += std::isalnum(static_cast<unsigned char>(c)) != 0 ? c : '_';
   }
-  if (name.empty() || std::isdigit(static_cast<unsigned char>(name.front())) != 0) name = "_" + name;
+  if (name.empty() || std::isdigit(static_cast<unsigned char>(name.front())) != 0)
+    name = "_" + name;
   return name;
 }
 
@@ -148,10 +149,10 @@ void put_isaac_json(PatternStream& out) {
   end(out);
   const std::uint64_t emitters = out.result().rows - out.result().blocked;
   nlohmann::json limits(out.result().not_carried);
-  out.put(fmt::format(
-      "}}],\n\"numberOfEmitters\":{0},\"numberOfChannels\":{1},\"numLines\":1,"
-      "\"numRaysPerLine\":[{0}]}},\n\"_not_carried\":{2}}}\n",
-      emitters, sensor.train.emitters(), limits.dump()));
+  out.put(
+      fmt::format("}}],\n\"numberOfEmitters\":{0},\"numberOfChannels\":{1},\"numLines\":1,"
+                  "\"numRaysPerLine\":[{0}]}},\n\"_not_carried\":{2}}}\n",
+                  emitters, sensor.train.emitters(), limits.dump()));
 }
 
 void put_isaac_usda(PatternStream& out) {

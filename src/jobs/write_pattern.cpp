@@ -27,39 +27,26 @@ struct Format {
 
 const std::vector<Format>& formats() {
   static const std::vector<Format> all = {
-      {{"livox-csv", "time (s), azimuth and zenith (degrees), as the maker's scan sequences",
-        ".csv"},
+      {{"livox-csv", "time (s), azimuth and zenith (degrees), as the maker's scan sequences"},
        put_livox_csv},
-      {{"npy", "float32 pairs of azimuth and elevation (radians), for MuJoCo-LiDAR, OmniPerception",
-        ".npy"},
+      {{"npy",
+        "float32 pairs of azimuth and elevation (radians), for MuJoCo-LiDAR, OmniPerception"},
        put_npy},
-      {{"helios-xml", "the prisms as a scanner of HELIOS++, with what that costs", ".xml"},
-       put_helios_xml},
-      {{"json", "a lidar profile of Isaac Sim up to 4.5, one emitter per shot", ".json"},
-       put_isaac_json},
-      {{"usda", "an OmniLidar in USD for Isaac Sim 5 and later, one emitter per shot", ".usda"},
+      {{"helios-xml", "the prisms as a scanner of HELIOS++, with what that costs"}, put_helios_xml},
+      {{"json", "a lidar profile of Isaac Sim up to 4.5, one emitter per shot"}, put_isaac_json},
+      {{"usda", "an OmniLidar in USD for Isaac Sim 5 and later, one emitter per shot"},
        put_isaac_usda}};
   return all;
 }
 
-const Format& format_of(const WritePatternOptions& options) {
-  std::vector<std::string> known, endings;
+const Format& format_of(const std::string& name) {
+  std::vector<std::string> known;
   for (const Format& format : formats()) {
-    if (options.format.empty() ? options.output.ends_with(format.shown.ending)
-                               : options.format == format.shown.name) {
-      return format;
-    }
+    if (format.shown.name == name) return format;
     known.push_back(format.shown.name);
-    endings.push_back(format.shown.ending);
   }
-  if (options.format.empty()) {
-    throw InvalidArgument(
-        fmt::format("\"{}\" does not say which format a scan pattern is to have: it ends in none of "
-                    "{}; formats are {}",
-                    options.output, fmt::join(endings, ", "), fmt::join(known, ", ")));
-  }
-  throw InvalidArgument(fmt::format("format \"{}\" of a scan pattern, allowed {}", options.format,
-                                    fmt::join(known, ", ")));
+  throw InvalidArgument(
+      fmt::format("format \"{}\" of a scan pattern, allowed {}", name, fmt::join(known, ", ")));
 }
 
 }  // namespace
@@ -75,7 +62,7 @@ const std::vector<PatternFormat>& pattern_formats() {
 
 WrittenPattern write_pattern(const WritePatternOptions& options, std::ostream& stream,
                              const Progress& progress) {
-  const Format& format = format_of(options);
+  const Format& format = format_of(options.format);
   const sensors::Sensor sensor = sensors::load_sensor(options.sensor);
   const double rate = options.scan.shot_rate.value_or(sensor.shot_rate);
   require_between("duration", options.duration, 0, 1e7, "s");

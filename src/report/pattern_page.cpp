@@ -43,8 +43,7 @@ Chart rosette_chart(const jobs::PatternDetails& details) {
 /// Density in cells of the map, larger ones where there are too many to draw.
 Chart density_chart(const sensors::PatternCoverage& coverage, const sensors::CoverageAfter& after) {
   constexpr double kMostCells = 12'000;
-  const double merged =
-      std::ceil(std::sqrt(static_cast<double>(coverage.cells()) / kMostCells));
+  const double merged = std::ceil(std::sqrt(static_cast<double>(coverage.cells()) / kMostCells));
   const double edge = merged * coverage.cell;
   std::map<std::pair<long, long>, std::pair<double, double>> sums;  // shots, cells
   for (std::size_t i = 0; i < coverage.cells(); ++i) {
@@ -75,12 +74,18 @@ Chart density_chart(const sensors::PatternCoverage& coverage, const sensors::Cov
 
 Chart ring_chart(const sensors::PatternCoverage& coverage) {
   static constexpr const char* kColours[] = {"a", "b", "c", "d", "ink", "bad"};
-  Chart chart{"Density by the angle from the axis", "angle from the X axis, deg",
-              "shots per square degree", {}, "Of the part of every ring that lies in the field of view."};
+  Chart chart{"Density by the angle from the axis",
+              "angle from the X axis, deg",
+              "shots per square degree",
+              {},
+              "Of the part of every ring that lies in the field of view."};
   for (std::size_t k = 0; k < coverage.after.size(); ++k) {
     const sensors::CoverageAfter& after = coverage.after[k];
-    Series line{fmt::format("{:g} s", after.time), kColours[k % std::size(kColours)],
-                SeriesKind::line, {}, {}};
+    Series line{fmt::format("{:g} s", after.time),
+                kColours[k % std::size(kColours)],
+                SeriesKind::line,
+                {},
+                {}};
     for (std::size_t i = 0; i < after.ring_density.size(); ++i) {
       line.x.push_back(degrees_from_radians(coverage.ring) * (static_cast<double>(i) + 0.5));
       line.y.push_back(after.ring_density[i] * kSquareDegree);
@@ -106,14 +111,15 @@ std::string coverage_html(const sensors::PatternCoverage& coverage) {
         finite_text("{:.2f}", degrees_from_radians(after.gap_azimuth)),
         finite_text("{:.2f}", degrees_from_radians(after.gap_zenith)));
   }
-  return html + fmt::format(
-                    "</tbody></table></div>\n<p class=\"note\">Covered: the share of cells of {:.3g} "
-                    "degree that hold a shot, of those that {:.3g} s reach: {:.5g} square degrees. "
-                    "Gap: the diameter of the largest circle about a direction of this field of view "
-                    "that holds no shot. Cells are squares of Lambert's equal-area map about the X "
-                    "axis.</p>\n",
-                    degrees_from_radians(coverage.cell), coverage.field_after,
-                    coverage.field_solid_angle / kSquareDegree);
+  return html +
+         fmt::format(
+             "</tbody></table></div>\n<p class=\"note\">Covered: the share of cells of {:.3g} "
+             "degree that hold a shot, of those that {:.3g} s reach: {:.5g} square degrees. "
+             "Gap: the diameter of the largest circle about a direction of this field of view "
+             "that holds no shot. Cells are squares of Lambert's equal-area map about the X "
+             "axis.</p>\n",
+             degrees_from_radians(coverage.cell), coverage.field_after,
+             coverage.field_solid_angle / kSquareDegree);
 }
 
 std::string prisms_html(const sensors::Sensor& sensor) {
@@ -131,10 +137,11 @@ std::string prisms_html(const sensors::Sensor& sensor) {
         degrees_from_radians(sensor.train[place::wedge_angle(i)]),
         sensor.train[place::refractive_index(i)], 60 * sensor.angular_velocity[k] / kTwoPi);
   }
-  return html + fmt::format("</tbody></table></div>\n<p class=\"note\">In the order of the beam; {} "
-                            "emitter{}, {:.10g} shots a second.</p>\n",
-                            sensor.train.emitters(), sensor.train.emitters() == 1 ? "" : "s",
-                            sensor.shot_rate);
+  return html + fmt::format(
+                    "</tbody></table></div>\n<p class=\"note\">In the order of the beam; {} "
+                    "emitter{}, {:.10g} shots a second.</p>\n",
+                    sensor.train.emitters(), sensor.train.emitters() == 1 ? "" : "s",
+                    sensor.shot_rate);
 }
 
 }  // namespace
@@ -152,10 +159,11 @@ std::string pattern_page(const jobs::PatternDetails& details, const Provenance& 
   body += charts_html(charts, figures);
   body += prisms_html(details.sensor);
   body += provenance_html(provenance);
-  return page_html("Scan pattern: " + details.sensor.name,
-                   "Where the sensor sends its shots, free of noise, with rotors at constant speed, "
-                   "and how they fill its field of view.",
-                   body, figures);
+  return page_html(
+      "Scan pattern: " + details.sensor.name,
+      "Where the sensor sends its shots, free of noise, with rotors at constant speed, "
+      "and how they fill its field of view.",
+      body, figures);
 }
 
 }  // namespace risley::report

@@ -162,9 +162,8 @@ HeliosScanner helios_scanner(const Sensor& sensor, std::uint64_t rows,
                     prisms, kHeliosPrisms));
   }
   if (options.every != 1) {
-    throw InvalidArgument(
-        fmt::format("every = {}, allowed 1: a scanner of HELIOS++ has prisms instead of rows",
-                    options.every));
+    throw InvalidArgument(fmt::format(
+        "every = {}, allowed 1: a scanner of HELIOS++ has prisms instead of rows", options.every));
   }
   rows = std::min(rows, kMostCompared);
   scan_pattern(sensor, 0, 1, options);  // says what is wrong with the rest
@@ -179,8 +178,7 @@ HeliosScanner helios_scanner(const Sensor& sensor, std::uint64_t rows,
     const double index = sensor.train[place::refractive_index(i)];
     const bool angled_first =
         sensor.train.face_order()[static_cast<std::size_t>(i)] == FaceOrder::angled_perpendicular;
-    result.rotor_frequency.push_back(sensor.angular_velocity[static_cast<std::size_t>(i)] /
-                                     kTwoPi);
+    result.rotor_frequency.push_back(sensor.angular_velocity[static_cast<std::size_t>(i)] / kTwoPi);
     result.angle.push_back(angled_first ? wedge : -wedge);
     result.refractive_index.push_back(index);
     weights.push_back(std::abs((index - 1) * wedge));
@@ -203,8 +201,7 @@ HeliosScanner helios_scanner(const Sensor& sensor, std::uint64_t rows,
 
   const double pulses = rate / emitters;
   result.pulse_frequency = std::max(1L, std::lround(pulses));
-  const bool in_turn =
-      emitters > 1 && options.firing.value_or(sequence.firing) == Firing::in_turn;
+  const bool in_turn = emitters > 1 && options.firing.value_or(sequence.firing) == Firing::in_turn;
   // Where they fire in turn, the middle of a group stands for it.
   result.time_lag = start.lag + (in_turn ? 0.5 * (emitters - 1) / rate : 0.0);
 

@@ -85,7 +85,8 @@ class Neighbours {
       : grid_(grid), first_(counts.size() + 1), sorted_(directions.size()) {
     std::partial_sum(counts.begin(), counts.end(), first_.begin() + 1);
     std::vector<std::uint32_t> next(first_.begin(), first_.end() - 1);
-    for (const auto& direction : directions) sorted_[next[grid.of(mapped(direction))]++] = direction;
+    for (const auto& direction : directions)
+      sorted_[next[grid.of(mapped(direction))]++] = direction;
   }
 
   /// Angle to the nearest of them, rad; stops looking as soon as it is less than `enough`.

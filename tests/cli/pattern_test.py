@@ -84,30 +84,24 @@ class PatternTest(CommandTest):
             self.assertAlmostEqual(array[i, 0], math.radians(rows[i][1]), delta=1e-6)
             self.assertAlmostEqual(array[i, 1], math.radians(90 - rows[i][2]), delta=1e-6)
 
-    def test_the_ending_chooses_the_format(self):
-        for ending, name in ((".csv", "livox-csv"), (".npy", "npy"), (".xml", "helios-xml"),
-                             (".json", "json"), (".usda", "usda")):
-            arguments = ("pattern", "--sensor", "avia", "--duration-s", "0.01")
-            made = self.expect_json(0, *arguments, "-o", "by-ending" + ending)
-            self.assertEqual((made["format"], made["rows"]), (name, 2400))
-            named = self.expect_json(0, *arguments, "--format", name, "-o", "named" + ending)
-            self.assertEqual((self.folder / ("named" + ending)).read_bytes(),
-                             (self.folder / ("by-ending" + ending)).read_bytes())
-            self.assertEqual(named["not_carried"], made["not_carried"])
-        endings = {".csv", ".npy", ".xml", ".json", ".usda"}
-        self.assertEqual({path.suffix for path in self.folder.glob("named*")}, endings)
-        self.assertEqual(len(list(self.folder.glob("named*"))), 5)  # nothing beside them
-        unknown = self.expect(2, "pattern", "--sensor", "avia", "-o", "avia.txt")
-        self.assertIn("avia.txt", unknown.stderr)
-        self.assertIn(".usda", unknown.stderr)
+    def test_every_format_is_one_file_and_the_same_on_stdout(self):
+        for name in ("livox-csv", "npy", "helios-xml", "json", "usda"):
+            arguments = ("pattern", "--sensor", "avia", "--duration-s", "0.01", "--format", name)
+            made = self.expect_json(0, *arguments, "-o", "one." + name)
+            self.assertEqual((made["format"], made["rows"], made["blocked"]), (name, 2400, 0))
+            if name != "npy":  # bytes
+                self.assertEqual((self.folder / ("one." + name)).read_text(),
+                                 self.expect(0, *arguments, "-o", "-").stdout)
+            # Nothing beside it.
+            self.assertEqual([path.name for path in self.folder.glob(f"*{name}*")], ["one." + name])
         self.assertIn("--format", self.expect(2, "pattern", "-o", "-").stderr)
         self.assertIn("nothing to do", self.expect(2, "pattern").stderr)
 
     def test_isaac_gets_every_shot_with_its_time(self):
         arguments = ("pattern", "--sensor", "horizon", "--duration-s", "0.05")
-        self.expect(0, *arguments, "-o", "horizon.csv")
+        self.expect(0, *arguments, "--format", "livox-csv", "-o", "horizon.csv")
         rows = self.rows((self.folder / "horizon.csv").read_text())
-        made = self.expect_json(0, *arguments, "-o", "horizon.json")
+        made = self.expect_json(0, *arguments, "--format", "json", "-o", "horizon.json")
         whole = json.loads((self.folder / "horizon.json").read_text())
         profile = whole["profile"]
         self.assertEqual((whole["type"], profile["scanType"]), ("lidar", "solidState"))
@@ -124,7 +118,7 @@ class PatternTest(CommandTest):
             self.assertEqual(state["fireTimeNs"][i], round(1e9 * i / 240_000))
             self.assertEqual(state["channelId"][i], i % 6 + 1)
         # USD has the same arrays.
-        self.expect(0, *arguments, "-o", "horizon.usda")
+        self.expect(0, *arguments, "--format", "usda", "-o", "horizon.usda")
         text = (self.folder / "horizon.usda").read_text()
         self.assertTrue(text.startswith("#usda 1.0\n"))
         self.assertEqual(text.count("{"), text.count("}"))
@@ -135,15 +129,17 @@ class PatternTest(CommandTest):
             self.assertEqual(json.loads(found), state[name], name)
         self.assertIn("uint omni:sensor:Core:numberOfEmitters = 12000", text)
         # More than 32 bits of nanoseconds.
-        long = self.expect(2, "pattern", "--sensor", "horizon", "--duration-s", "5", "-o", "a.usda")
+        long = self.expect(2, "pattern", "--sensor", "horizon", "--duration-s", "5",
+                           "--format", "usda", "-o", "a.usda")
         self.assertIn("duration = 5 s", long.stderr)
         self.assertFalse((self.folder / "a.usda").exists())
 
     def test_helios_says_what_it_costs(self):
-        exact = self.expect_json(0, "pattern", "--sensor", "horizon-sequence", "-o", "exact.xml")
+        helios = ("pattern", "--format", "helios-xml", "--sensor")
+        exact = self.expect_json(0, *helios, "horizon-sequence", "-o", "exact.xml")
         self.assertLess(exact["residual"]["worst_deg"], 1e-9)
         self.assertEqual(exact["residual"]["turn_deg"]["y"], -90)
-        lost = self.expect_json(0, "pattern", "--sensor", "horizon", "-o", "lost.xml")
+        lost = self.expect_json(0, *helios, "horizon", "-o", "lost.xml")
         self.assertGreater(lost["residual"]["rms_deg"], 0.05)
         self.assertEqual(lost["rows"], 240_000)
         root = ElementTree.parse(self.folder / "lost.xml").getroot()
@@ -155,7 +151,7 @@ class PatternTest(CommandTest):
         self.assertNotIn("--", comment)
         for one in lost["not_carried"]:
             self.assertIn(one, comment)
-        said = self.expect(0, "pattern", "--sensor", "horizon", "-o", "lost.xml").stdout
+        said = self.expect(0, *helios, "horizon", "-o", "lost.xml").stdout
         self.assertIn("not carried: Emitters that fire one after another", said)
 
     def test_coverage_and_page(self):

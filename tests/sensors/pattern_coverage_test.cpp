@@ -37,8 +37,8 @@ TEST(PatternCoverage, CountsEveryShotOnce) {
       ASSERT_EQ(after.cell_shots.size(), coverage.cells());
       EXPECT_EQ(std::accumulate(after.cell_shots.begin(), after.cell_shots.end(), std::uint64_t{0}),
                 after.shots);
-      EXPECT_NEAR(after.mean_density * coverage.field_solid_angle,
-                  static_cast<double>(after.shots), 1e-6);
+      EXPECT_NEAR(after.mean_density * coverage.field_solid_angle, static_cast<double>(after.shots),
+                  1e-6);
       const auto empty = std::count(after.cell_shots.begin(), after.cell_shots.end(), 0U);
       EXPECT_NEAR(after.covered,
                   1 - static_cast<double>(empty) / static_cast<double>(coverage.cells()), 1e-12);
@@ -124,9 +124,7 @@ TEST(PatternCoverage, OneDirectionIsOneCell) {
 TEST(PatternCoverage, RefusesWhatIsNoTime) {
   const Sensor sensor = load_sensor("avia");
   const auto refused = [&](const std::vector<double>& after, double cell_deg) {
-    return refusal([&] {
-      pattern_coverage(sensor, {}, {after, radians_from_degrees(cell_deg)});
-    });
+    return refusal([&] { pattern_coverage(sensor, {}, {after, radians_from_degrees(cell_deg)}); });
   };
   EXPECT_EQ(refused({}, 1), "integration times = 0, allowed 1 or more");
   EXPECT_EQ(refused({0.2, 0.1}, 1), "integration time = 0.1 s, allowed above 0.2");

@@ -18,7 +18,6 @@ namespace risley::jobs {
 struct PatternFormat {
   std::string name;         ///< "livox-csv"
   std::string description;  ///< columns, units, who reads it
-  std::string ending;       ///< of files, ".csv"
 };
 
 /// Those that write_pattern() knows.
@@ -27,7 +26,7 @@ const std::vector<PatternFormat>& pattern_formats();
 /// What to write where.
 struct WritePatternOptions {
   std::string sensor;     ///< as sensors::load_sensor()
-  std::string format;     ///< a name of pattern_formats(); empty: by the ending of the output
+  std::string format;     ///< a name of pattern_formats()
   std::string output;     ///< path
   double duration = 1.0;  ///< s, of the scan
   sensors::ScanPatternOptions scan;
@@ -46,11 +45,11 @@ struct WrittenPattern {
 };
 
 /// Writes the scan pattern of a sensor for a simulator; the output appears when it is whole.
-/// @throws InvalidArgument for an unknown sensor, format or ending and for numbers out of range;
-///         FileError; Cancelled
+/// @throws InvalidArgument for an unknown sensor or format and for numbers out of range; FileError;
+///         Cancelled
 WrittenPattern write_pattern(const WritePatternOptions& options, const Progress& progress = {});
 
-/// The same into an open stream; output of the options is not used but for its ending.
+/// The same into an open stream; output of the options is not used.
 WrittenPattern write_pattern(const WritePatternOptions& options, std::ostream& stream,
                              const Progress& progress = {});
 

@@ -42,7 +42,8 @@ struct HeliosScanner {
 /// lag as far as it can, and where prisms or bearings are tilted the scanner is turned as fits the
 /// pattern best.
 /// @param rows  of the pattern are compared, at most a million
-/// @throws InvalidArgument as scan_pattern(), for more than kHeliosPrisms prisms and for every other
+/// @throws InvalidArgument as scan_pattern(), for more than kHeliosPrisms prisms and for every
+/// other
 ///         than 1; Cancelled
 HeliosScanner helios_scanner(const Sensor& sensor, std::uint64_t rows,
                              const ScanPatternOptions& options = {}, const Progress& progress = {});

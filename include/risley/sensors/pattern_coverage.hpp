@@ -20,11 +20,11 @@ struct CoverageOptions {
 
 /// What a scan has reached after a time.
 struct CoverageAfter {
-  double time = 0;            ///< s
-  std::uint64_t shots = 0;    ///< that got through the prisms
-  double covered = 0;         ///< share of the field of view whose cells hold a shot, [0, 1]
-  double mean_density = 0;    ///< shots per steradian of the field of view
-  double least_density = 0;   ///< of the cell with the fewest, shots per steradian
+  double time = 0;           ///< s
+  std::uint64_t shots = 0;   ///< that got through the prisms
+  double covered = 0;        ///< share of the field of view whose cells hold a shot, [0, 1]
+  double mean_density = 0;   ///< shots per steradian of the field of view
+  double least_density = 0;  ///< of the cell with the fewest, shots per steradian
   double greatest_density = 0;
   /// Diameter of the largest circle with no shot in it whose centre is a direction that the scan
   /// reaches in the end, rad; of these one is tried in every quarter of a cell (0.1 degree at
@@ -42,11 +42,11 @@ struct PatternCoverage {
   double cell = 0, ring = 0;  ///< rad
   /// The field of view is every cell that a scan of so many seconds reaches.
   double field_after = 0;
-  double field_solid_angle = 0;          ///< sr
-  double field_half_angle = 0;           ///< of the cone about X that holds every shot, rad
-  std::vector<double> left, up;          ///< [cells], centres in the map, rad
-  std::vector<double> azimuth, zenith;   ///< [cells], the same as directions, rad
-  std::vector<CoverageAfter> after;      ///< [options.after]
+  double field_solid_angle = 0;         ///< sr
+  double field_half_angle = 0;          ///< of the cone about X that holds every shot, rad
+  std::vector<double> left, up;         ///< [cells], centres in the map, rad
+  std::vector<double> azimuth, zenith;  ///< [cells], the same as directions, rad
+  std::vector<CoverageAfter> after;     ///< [options.after]
 
   std::size_t cells() const { return left.size(); }
 };
