@@ -162,9 +162,10 @@ def coverage(risley, presets):
         rows.append((f"`{preset}`", f"{field['half_angle_deg']:.2f}", f"{field['deg2']:.0f}",
                      *(f"{100 * one['covered']:.1f} %, {one['gap_deg']:.2f}°"
                        for one in found["after"]),
+                     f"{found['time_to_cover_s']['90']:.2f}",
                      f"{found['after'][-1]['density_per_deg2']['mean']:.1f}"))
     return table(("preset", "half angle, deg", "field of view, deg²", "0.1 s", "0.2 s", "0.5 s",
-                  "1 s", "shots per deg² after 1 s"), rows)
+                  "1 s", "90 % covered after, s", "shots per deg² after 1 s"), rows)
 
 
 def carried(risley, presets):

@@ -19,12 +19,14 @@
 #include "risley/report/pattern_page.hpp"
 
 #include "command.hpp"
+#include "recording_text.hpp"
 #include "result_folder.hpp"
 #include "table.hpp"
 
 namespace risley::app {
 namespace {
 
+constexpr int kShares[] = {50, 90, 99};  // of the field of view, percent
 constexpr double kSquareDegree = kRadiansPerDegree * kRadiansPerDegree;  // sr
 
 struct PatternOptions {
@@ -79,6 +81,10 @@ Json coverage_json(const sensors::PatternCoverage& coverage) {
                        {"zenith_deg", degrees_from_radians(one.gap_zenith)}}},
                      {"ring_density_per_deg2", rings}});
   }
+  Json covers = Json::object();
+  for (const int percent : kShares) {
+    covers[fmt::format("{}", percent)] = coverage.time_to_cover(0.01 * percent);
+  }
   return {{"cell_deg", degrees_from_radians(coverage.cell)},
           {"ring_deg", degrees_from_radians(coverage.ring)},
           {"field_of_view",
@@ -86,6 +92,7 @@ Json coverage_json(const sensors::PatternCoverage& coverage) {
             {"deg2", coverage.field_solid_angle / kSquareDegree},
             {"sr", coverage.field_solid_angle},
             {"half_angle_deg", degrees_from_radians(coverage.field_half_angle)}}},
+          {"time_to_cover_s", covers},
           {"after", after}};
 }
 
@@ -104,6 +111,10 @@ void print_coverage(const sensors::PatternCoverage& coverage) {
                fmt::format("{:.3f}", degrees_from_radians(one.gap))});
   }
   table.print();
+  for (const int percent : kShares) {
+    const double time = coverage.time_to_cover(0.01 * percent);
+    if (std::isfinite(time)) fmt::print("{} % covered after {:.3g} s\n", percent, time);
+  }
   fmt::print(
       "covered: cells of {:g} degree with a shot, of those that {:g} s reach; gap: diameter "
       "of the largest empty circle\n",

@@ -95,6 +95,28 @@ Chart ring_chart(const sensors::PatternCoverage& coverage) {
   return chart;
 }
 
+/// Share of the field of view against time.
+Chart growth_chart(const sensors::PatternCoverage& coverage) {
+  constexpr std::size_t kMostPoints = 500;
+  std::vector<double> times = coverage.first_shot;
+  std::sort(times.begin(), times.end());
+  Chart chart{
+      "Covered against time",
+      "time, s",
+      "covered, %",
+      {{"", "a", SeriesKind::line, {0.0}, {0.0}}},
+      fmt::format("Cells of {:.3g} degree that hold a shot.", degrees_from_radians(coverage.cell))};
+  const std::size_t step = (times.size() + kMostPoints - 1) / kMostPoints;
+  for (std::size_t i = step - 1; i < times.size() && std::isfinite(times[i]); i += step) {
+    chart.series[0].x.push_back(times[i]);
+    chart.series[0].y.push_back(100 * static_cast<double>(i + 1) /
+                                static_cast<double>(times.size()));
+  }
+  chart.series[0].x.push_back(coverage.after.back().time);
+  chart.series[0].y.push_back(100 * coverage.after.back().covered);
+  return chart;
+}
+
 std::string coverage_html(const sensors::PatternCoverage& coverage) {
   std::string html =
       "<h2>Coverage and gaps</h2>\n<div class=\"wide\"><table><thead><tr><th>after, s</th>"
@@ -155,6 +177,7 @@ std::string pattern_page(const jobs::PatternDetails& details, const Provenance& 
   for (const sensors::CoverageAfter& after : coverage.after) {
     charts.push_back(density_chart(coverage, after));
   }
+  charts.push_back(growth_chart(coverage));
   charts.push_back(ring_chart(coverage));
   body += charts_html(charts, figures);
   body += prisms_html(details.sensor);

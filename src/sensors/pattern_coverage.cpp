@@ -15,7 +15,6 @@
 namespace risley::sensors {
 namespace {
 
-constexpr double kFieldTime = 30.0;  // s
 constexpr double kMostShots = 1e7;
 constexpr double kFinest = radians_from_degrees(0.1);
 constexpr std::uint64_t kChunk = 65'536;
@@ -49,9 +48,9 @@ class Grid {
     return static_cast<std::size_t>((row(point.up) * width_) + row(point.left));
   }
   MapPoint centre(std::size_t cell) const {
-    const auto at = static_cast<long>(cell);
-    return {cell_ * (static_cast<double>(at % width_ - half_) + 0.5),
-            cell_ * (static_cast<double>(at / width_ - half_) + 0.5)};
+    const long row = static_cast<long>(cell) / width_, column = static_cast<long>(cell) % width_;
+    return {cell_ * (static_cast<double>(column - half_) + 0.5),
+            cell_ * (static_cast<double>(row - half_) + 0.5)};
   }
 
  private:
@@ -62,7 +61,7 @@ class Grid {
   long half_, width_;
 };
 
-/// Calls visit(direction) for rows [first, last) of the pattern that get through the prisms.
+/// Calls visit(direction, row) for rows [first, last) of the pattern that get through the prisms.
 template <class Visit>
 void each_direction(const Sensor& sensor, const ScanPatternOptions& scan, std::uint64_t first,
                     std::uint64_t last, const Progress& progress, Visit visit) {
@@ -72,7 +71,8 @@ void each_direction(const Sensor& sensor, const ScanPatternOptions& scan, std::u
         scan_pattern(sensor, row, static_cast<std::size_t>(std::min(kChunk, last - row)), scan);
     for (std::size_t i = 0; i < pattern.size(); ++i) {
       if (std::isnan(pattern.azimuth[i])) continue;
-      visit(direction_from_angles(SphericalAngles<double>{pattern.azimuth[i], pattern.zenith[i]}));
+      visit(direction_from_angles(SphericalAngles<double>{pattern.azimuth[i], pattern.zenith[i]}),
+            row + i);
     }
   }
 }
@@ -147,11 +147,23 @@ void check(const CoverageOptions& options, double rows_per_second) {
     require_between("integration time", time, 0, kMostShots / rows_per_second, "s");
     before = time;
   }
+  require_above("field_after", options.field_after, 0, "s");
   require_between("cell", degrees_from_radians(options.cell), 0.1, 30, "deg");
   require_between("ring", degrees_from_radians(options.ring), 0.1, 30, "deg");
 }
 
 }  // namespace
+
+double PatternCoverage::time_to_cover(double share) const {
+  require_between("share", share, 0, 1);
+  std::vector<double> times = first_shot;
+  const auto wanted =
+      static_cast<std::size_t>(std::ceil(share * static_cast<double>(times.size()) * (1 - 1e-12)));
+  if (wanted == 0) return 0;
+  const auto last = times.begin() + static_cast<std::ptrdiff_t>(wanted - 1);
+  std::nth_element(times.begin(), last, times.end());
+  return *last;
+}
 
 PatternCoverage pattern_coverage(const Sensor& sensor, const ScanPatternOptions& scan,
                                  const CoverageOptions& options, const Progress& progress) {
@@ -166,7 +178,7 @@ PatternCoverage pattern_coverage(const Sensor& sensor, const ScanPatternOptions&
   result.cell = options.cell;
   result.ring = options.ring;
   result.field_after =
-      std::max(options.after.back(), std::min(kFieldTime, kMostShots / rows_per_second));
+      std::max(options.after.back(), std::min(options.field_after, kMostShots / rows_per_second));
   const Grid grid(options.cell);
 
   // One direction of every small cell: where circles without a shot may have their centre.
@@ -175,7 +187,7 @@ PatternCoverage pattern_coverage(const Sensor& sensor, const ScanPatternOptions&
   std::vector<Vector3<double>> centres;
   double least_x = 1;
   each_direction(sensor, scan, 0, rows_after(result.field_after), progress.part(0, 0.6),
-                 [&](const Vector3<double>& direction) {
+                 [&](const Vector3<double>& direction, std::uint64_t) {
                    const MapPoint place = mapped(direction);
                    in_field[grid.of(place)] = 1;
                    least_x = std::min(least_x, direction.x);
@@ -207,6 +219,7 @@ PatternCoverage pattern_coverage(const Sensor& sensor, const ScanPatternOptions&
 
   std::vector<Vector3<double>> directions;
   std::vector<std::uint32_t> counts(grid.size());
+  std::vector<double> first_shot(grid.size(), std::numeric_limits<double>::infinity());
   std::uint64_t done = 0;
   for (std::size_t k = 0; k < options.after.size(); ++k) {
     const std::uint64_t rows = rows_after(options.after[k]);
@@ -214,9 +227,12 @@ PatternCoverage pattern_coverage(const Sensor& sensor, const ScanPatternOptions&
       return 0.6 + 0.4 * (static_cast<double>(k) + part) / double(options.after.size());
     };
     each_direction(sensor, scan, done, std::max(rows, done), progress.part(share(0), share(0.5)),
-                   [&](const Vector3<double>& direction) {
+                   [&](const Vector3<double>& direction, std::uint64_t row) {
                      directions.push_back(direction);
-                     ++counts[grid.of(mapped(direction))];
+                     const std::size_t at = grid.of(mapped(direction));
+                     if (counts[at]++ == 0) {
+                       first_shot[at] = static_cast<double>(row + 1) / rows_per_second;
+                     }
                    });
     done = rows;
     CoverageAfter now;
@@ -249,6 +265,7 @@ PatternCoverage pattern_coverage(const Sensor& sensor, const ScanPatternOptions&
     progress.report(share(1));
     result.after.push_back(std::move(now));
   }
+  for (const std::size_t at : field) result.first_shot.push_back(first_shot[at]);
   return result;
 }
 

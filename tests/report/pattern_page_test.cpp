@@ -2,8 +2,9 @@
 // SPDX-License-Identifier: MIT
 #include "risley/report/pattern_page.hpp"
 
-#include <regex>
+#include <algorithm>
 #include <string>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -24,13 +25,17 @@ nlohmann::json charts_of(const std::string& page) {
 TEST(PatternPage, DrawsTheRosetteTheDensitiesAndTheirNumbers) {
   sensors::CoverageOptions options;
   options.after = {0.02, 0.1};
+  options.field_after = 3;
   options.cell = radians_from_degrees(1.0);
   const jobs::PatternDetails details = jobs::pattern_details("mid-70", {}, options);
   const std::string page = pattern_page(details, {{"command", "risley pattern <x>"}});
   EXPECT_THAT(page, HasSubstr("risley pattern &lt;x&gt;"));
   EXPECT_THAT(page, HasSubstr("<td>1.8144</td><td>-7294</td>"));
   const nlohmann::json charts = charts_of(page);
-  ASSERT_EQ(charts.size(), 4U);  // rosette, two times, rings
+  ASSERT_EQ(charts.size(), 5U);  // rosette, two times, share against time, rings
+  const std::vector<double> covered = charts[3]["series"][0]["y"];
+  EXPECT_NEAR(covered.back(), 100 * details.coverage.after[1].covered, 1e-4);
+  EXPECT_TRUE(std::is_sorted(covered.begin(), covered.end()));
   EXPECT_EQ(charts[0]["grows_for"], 0.1);
   EXPECT_EQ(charts[0]["series"][0]["x"].size(), 10'000U);
   EXPECT_TRUE(charts[1]["grows_for"].is_null());
@@ -44,6 +49,7 @@ TEST(PatternPage, DrawsTheRosetteTheDensitiesAndTheirNumbers) {
 TEST(PatternPage, StaysSmallWithSmallCells) {
   sensors::CoverageOptions options;
   options.after = {0.05, 0.1, 0.15, 0.2};
+  options.field_after = 3;
   options.cell = radians_from_degrees(0.2);
   const jobs::PatternDetails details = jobs::pattern_details("avia", {}, options);
   EXPECT_GT(details.coverage.cells(), 90'000U);
@@ -55,6 +61,7 @@ TEST(PatternPage, StaysSmallWithSmallCells) {
 TEST(PatternDetails, KeepShotsOfAllEmitters) {
   sensors::CoverageOptions options;
   options.after = {0.4};
+  options.field_after = 3;
   options.cell = radians_from_degrees(2.0);
   const jobs::PatternDetails details = jobs::pattern_details("tele-15", {}, options);
   EXPECT_EQ(details.rosette_every, 5U);

@@ -25,6 +25,7 @@ TEST(PatternCoverage, CountsEveryShotOnce) {
     CoverageOptions options;
     options.cell = radians_from_degrees(1.0);
     options.after = {0.05, 0.1, 0.4};
+    options.field_after = 2;
     const Sensor sensor = load_sensor(name);
     const PatternCoverage coverage = pattern_coverage(sensor, {}, options);
     ASSERT_EQ(coverage.after.size(), 3U);
@@ -39,6 +40,14 @@ TEST(PatternCoverage, CountsEveryShotOnce) {
                 after.shots);
       EXPECT_NEAR(after.mean_density * coverage.field_solid_angle, static_cast<double>(after.shots),
                   1e-6);
+      const auto reached =
+          std::count_if(coverage.first_shot.begin(), coverage.first_shot.end(),
+                        [&](double time) { return time <= after.time * (1 + 1e-12); });
+      EXPECT_NEAR(after.covered,
+                  static_cast<double>(reached) / static_cast<double>(coverage.cells()), 1e-12);
+      const double when = coverage.time_to_cover(after.covered);
+      EXPECT_LE(when, after.time * (1 + 1e-12));
+      EXPECT_GT(when, 0.5 * after.time);
       const auto empty = std::count(after.cell_shots.begin(), after.cell_shots.end(), 0U);
       EXPECT_NEAR(after.covered,
                   1 - static_cast<double>(empty) / static_cast<double>(coverage.cells()), 1e-12);
@@ -48,11 +57,17 @@ TEST(PatternCoverage, CountsEveryShotOnce) {
       }
       before = &after;
     }
+    EXPECT_EQ(coverage.time_to_cover(0), 0);
+    EXPECT_LT(coverage.time_to_cover(0.3), coverage.time_to_cover(0.6));
+    EXPECT_EQ(refusal([&] { coverage.time_to_cover(2); }), "share = 2, allowed 0 to 1");
   }
 }
 
 TEST(PatternCoverage, TheFieldOfAMid40IsItsCone) {
-  const PatternCoverage coverage = pattern_coverage(load_sensor("mid-40-sequence"));
+  CoverageOptions options;
+  options.after = {0.1};
+  const PatternCoverage coverage = pattern_coverage(load_sensor("mid-40-sequence"), {}, options);
+  EXPECT_EQ(coverage.field_after, 30.0);
   EXPECT_NEAR(degrees_from_radians(coverage.field_half_angle), 19.17, 0.01);
   const double cone = kTwoPi * (1 - std::cos(coverage.field_half_angle));
   EXPECT_GT(coverage.field_solid_angle, cone);
@@ -66,6 +81,7 @@ TEST(PatternCoverage, TheGapIsTheLargestEmptyCircle) {
     const Sensor sensor = load_sensor(name);
     CoverageOptions options;
     options.after = {time};
+    options.field_after = 5;
     const PatternCoverage coverage = pattern_coverage(sensor, {}, options);
     const CoverageAfter& after = coverage.after.front();
     const ScanPattern pattern = scan_pattern(sensor, 0, after.shots);
@@ -86,7 +102,7 @@ TEST(PatternCoverage, TheGapIsTheLargestEmptyCircle) {
     };
     EXPECT_NEAR(radius(after.gap_azimuth, after.gap_zenith), 0.5 * after.gap, 1e-9);
     // Directions that the scan reaches later.
-    const ScanPattern later = scan_pattern(sensor, 1'000'000, 300);
+    const ScanPattern later = scan_pattern(sensor, 100'000, 300);
     double widest = 0;
     for (std::size_t i = 0; i < later.size(); ++i) {
       widest = std::max(widest, radius(later.azimuth[i], later.zenith[i]));
@@ -101,6 +117,7 @@ TEST(PatternCoverage, ASingleRingHasNoGapInTheEnd) {
   sensor.angular_velocity = {kTwoPi * 100, 0};
   CoverageOptions options;
   options.after = {0.0025, 0.01};  // a quarter of a turn, and a whole one
+  options.field_after = 1;
   const PatternCoverage coverage = pattern_coverage(sensor, {}, options);
   const double ring = coverage.field_half_angle;
   EXPECT_NEAR(coverage.after[0].covered, 0.25, 0.05);
@@ -115,10 +132,12 @@ TEST(PatternCoverage, OneDirectionIsOneCell) {
   sensor.angular_velocity = {0, 0};
   CoverageOptions options;
   options.after = {0.01};
+  options.field_after = 1;
   const PatternCoverage coverage = pattern_coverage(sensor, {}, options);
   EXPECT_EQ(coverage.cells(), 1U);
   EXPECT_EQ(coverage.after.front().covered, 1.0);
   EXPECT_EQ(coverage.after.front().gap, 0.0);
+  EXPECT_NEAR(coverage.time_to_cover(1), 1 / sensor.shot_rate, 1e-15);
 }
 
 TEST(PatternCoverage, RefusesWhatIsNoTime) {

@@ -16,6 +16,9 @@ struct CoverageOptions {
   std::vector<double> after = {0.1, 0.2, 0.5, 1.0};  ///< integration times, s, rising
   double cell = radians_from_degrees(0.5);           ///< edge of a cell, rad
   double ring = radians_from_degrees(1.0);           ///< width of a ring about the X axis, rad
+  /// The field of view is what a scan of so many seconds reaches, if not more than ten million
+  /// shots, and not less than the last of `after`.
+  double field_after = 30.0;
 };
 
 /// What a scan has reached after a time.
@@ -48,13 +51,19 @@ struct PatternCoverage {
   std::vector<double> azimuth, zenith;  ///< [cells], the same as directions, rad
   std::vector<CoverageAfter> after;     ///< [options.after]
 
+  /// [cells], when the first shot came, s; infinite where none did within the last of `after`
+  std::vector<double> first_shot;
+
   std::size_t cells() const { return left.size(); }
+  /// After which time that share of the field of view holds a shot, s; infinite where the last of
+  /// `after` is too short. @throws InvalidArgument for a share outside of 0 to 1
+  double time_to_cover(double share) const;
 };
 
 /// @param sensor   with a sequence, or rotation angles in the options of the scan
 /// @throws InvalidArgument as scan_pattern(), for times that do not rise from above 0 or lie beyond
-///         ten million shots, and for cells and rings outside of 0.1 to 30 degree; EstimationError
-///         when no beam gets through; Cancelled
+///         ten million shots, for cells and rings outside of 0.1 to 30 degree and a field_after
+///         that is not above 0; EstimationError when no beam gets through; Cancelled
 PatternCoverage pattern_coverage(const Sensor& sensor, const ScanPatternOptions& scan = {},
                                  const CoverageOptions& options = {},
                                  const Progress& progress = {});
