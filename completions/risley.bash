@@ -41,7 +41,7 @@ _risley() {
     --format)
       case $verb in
         cloud) choices="las-1.4 las-1.2 ply pcd npy csv xyz netcdf ros1-bag" ;;
-        pattern) choices="livox-csv npy" ;;
+        pattern) choices="livox-csv npy helios-xml json usda" ;;
         *) choices="lvx-1.1 netcdf openpylivox-bin openpylivox-csv scan-sequence-csv" ;;
       esac ;;
   esac
@@ -58,7 +58,7 @@ _risley() {
       info) choices="$common --shot-rate-hz --extrinsics --share --share-ranges" ;;
       pattern)
         choices="$common --output --format --sensor --duration-s --rate-hz --every --firing
-          --start-angles-deg" ;;
+          --start-angles-deg --coverage --integration-s --cell-deg --report" ;;
       preset)
         choices=$common
         case " ${COMP_WORDS[*]} " in

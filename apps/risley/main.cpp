@@ -63,7 +63,9 @@ constexpr Verb kVerbs[] = {
      declare_identify},
     {"pattern", "The scan pattern of a sensor, for simulators",
      "  risley pattern --sensor avia --format npy --duration-s 4 -o avia.npy\n"
-     "  risley pattern --sensor horizon-sequence --format livox-csv --every 40 -o -",
+     "  risley pattern --sensor horizon-sequence --format livox-csv --every 40 -o -\n"
+     "  risley pattern --sensor horizon --format helios-xml -o horizon.xml\n"
+     "  risley pattern --sensor tele-15 --coverage --report tele-15.html",
      declare_pattern},
     {"preset", "The presets of sensors: list, show, check, new",
      "  risley preset list\n  risley preset show avia\n"

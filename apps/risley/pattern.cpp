@@ -1,5 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
+#include <cmath>
 #include <cstdint>
 #include <iostream>
 #include <memory>
@@ -12,20 +13,31 @@
 
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
+#include "risley/io/text_file.hpp"
+#include "risley/jobs/pattern_details.hpp"
 #include "risley/jobs/write_pattern.hpp"
+#include "risley/report/pattern_page.hpp"
 
 #include "command.hpp"
+#include "recording_text.hpp"
+#include "result_folder.hpp"
 #include "table.hpp"
 
 namespace risley::app {
 namespace {
 
+constexpr int kShares[] = {50, 90, 99};  // of the field of view, percent
+constexpr double kSquareDegree = kRadiansPerDegree * kRadiansPerDegree;  // sr
+
 struct PatternOptions {
-  std::string sensor = "mid-40-sequence", format, output, firing;
+  std::string sensor = "mid-40-sequence", format, output, firing, report;
   double duration_s = 1.0;
   std::optional<double> rate_hz;
   std::uint64_t every = 1;
   std::vector<double> start_angles_deg;
+  bool coverage = false;
+  std::vector<double> integration_s = sensors::CoverageOptions{}.after;
+  double cell_deg = degrees_from_radians(sensors::CoverageOptions{}.cell);
 };
 
 std::string format_list() {
@@ -36,31 +48,153 @@ std::string format_list() {
   return text;
 }
 
-ExitStatus run_pattern(const PatternOptions& options, const CommonOptions& common) {
-  check_positive(options.duration_s, "--duration-s", "s");
-  jobs::WritePatternOptions wanted;
-  wanted.sensor = options.sensor;
-  wanted.format = options.format;
-  wanted.output = options.output;
-  wanted.duration = options.duration_s;
-  wanted.scan.shot_rate = options.rate_hz;
-  wanted.scan.every = options.every;
+sensors::ScanPatternOptions scan_options(const PatternOptions& options) {
+  sensors::ScanPatternOptions scan;
+  scan.shot_rate = options.rate_hz;
+  scan.every = options.every;
   if (!options.firing.empty()) {
-    wanted.scan.firing =
+    scan.firing =
         options.firing == "together" ? sensors::Firing::together : sensors::Firing::in_turn;
   }
   for (const double angle_deg : options.start_angles_deg) {
-    wanted.scan.rotation_angle.push_back(radians_from_degrees(angle_deg));
+    scan.rotation_angle.push_back(radians_from_degrees(angle_deg));
   }
+  return scan;
+}
+
+Json coverage_json(const sensors::PatternCoverage& coverage) {
+  Json after = Json::array();
+  for (const sensors::CoverageAfter& one : coverage.after) {
+    Json rings = Json::array();
+    for (const double density : one.ring_density) rings.push_back(density * kSquareDegree);
+    after.push_back({{"time_s", one.time},
+                     {"shots", one.shots},
+                     {"covered", one.covered},
+                     {"density_per_deg2",
+                      {{"mean", one.mean_density * kSquareDegree},
+                       {"min", one.least_density * kSquareDegree},
+                       {"max", one.greatest_density * kSquareDegree}}},
+                     {"density_per_sr", {{"mean", one.mean_density}}},
+                     {"gap_deg", degrees_from_radians(one.gap)},
+                     {"gap_at",
+                      {{"azimuth_deg", degrees_from_radians(one.gap_azimuth)},
+                       {"zenith_deg", degrees_from_radians(one.gap_zenith)}}},
+                     {"ring_density_per_deg2", rings}});
+  }
+  Json covers = Json::object();
+  for (const int percent : kShares) {
+    covers[fmt::format("{}", percent)] = coverage.time_to_cover(0.01 * percent);
+  }
+  return {{"cell_deg", degrees_from_radians(coverage.cell)},
+          {"ring_deg", degrees_from_radians(coverage.ring)},
+          {"field_of_view",
+           {{"after_s", coverage.field_after},
+            {"deg2", coverage.field_solid_angle / kSquareDegree},
+            {"sr", coverage.field_solid_angle},
+            {"half_angle_deg", degrees_from_radians(coverage.field_half_angle)}}},
+          {"time_to_cover_s", covers},
+          {"after", after}};
+}
+
+void print_coverage(const sensors::PatternCoverage& coverage) {
+  fmt::print("field of view {:.5g} square degrees within {:.2f} degree of the axis\n",
+             coverage.field_solid_angle / kSquareDegree,
+             degrees_from_radians(coverage.field_half_angle));
+  Table table(
+      {"after, s", "shots", "covered, %", "mean, 1/deg2", "least", "greatest", "largest gap, deg"});
+  for (const sensors::CoverageAfter& one : coverage.after) {
+    table.add({fmt::format("{:g}", one.time), grouped(one.shots),
+               fmt::format("{:.1f}", 100 * one.covered),
+               fmt::format("{:.4g}", one.mean_density * kSquareDegree),
+               fmt::format("{:.4g}", one.least_density * kSquareDegree),
+               fmt::format("{:.4g}", one.greatest_density * kSquareDegree),
+               fmt::format("{:.3f}", degrees_from_radians(one.gap))});
+  }
+  table.print();
+  for (const int percent : kShares) {
+    const double time = coverage.time_to_cover(0.01 * percent);
+    if (std::isfinite(time)) fmt::print("{} % covered after {:.3g} s\n", percent, time);
+  }
+  fmt::print(
+      "covered: cells of {:g} degree with a shot, of those that {:g} s reach; gap: diameter "
+      "of the largest empty circle\n",
+      degrees_from_radians(coverage.cell), coverage.field_after);
+}
+
+void print_written(const jobs::WrittenPattern& written, const std::string& output) {
+  fmt::print("{}: {} shots of sensor {}\n", output, grouped(written.rows), written.sensor);
+  if (written.blocked > 0) {
+    fmt::print("{} of them do not get through the prisms{}\n", grouped(written.blocked),
+               written.format == "livox-csv" || written.format == "npy" ? " and are NaN" : "");
+  }
+  if (written.helios) {
+    fmt::print(
+        "against the pattern itself {:.3g} degree (root mean square), {:.3g} at most, over {} "
+        "shots; a shot at time t is at t {} {:.6g} s there\n",
+        degrees_from_radians(written.helios->rms), degrees_from_radians(written.helios->worst),
+        grouped(written.helios->compared), written.helios->time_lag < 0 ? '-' : '+',
+        std::abs(written.helios->time_lag));
+  }
+  for (const std::string& one : written.not_carried) fmt::print("not carried: {}\n", one);
+}
+
+Json written_json(const jobs::WrittenPattern& written, const std::string& output) {
+  Json json = {{"rows", written.rows},
+               {"blocked", written.blocked},
+               {"sensor", written.sensor},
+               {"format", written.format},
+               {"firing", written.firing},
+               {"output", output},
+               {"not_carried", written.not_carried}};
+  if (written.helios) {
+    json["residual"] = {{"rms_deg", degrees_from_radians(written.helios->rms)},
+                        {"worst_deg", degrees_from_radians(written.helios->worst)},
+                        {"shots", written.helios->compared},
+                        {"time_lag_s", written.helios->time_lag},
+                        {"turn_deg",
+                         {{"y", degrees_from_radians(written.helios->turn[0])},
+                          {"x", degrees_from_radians(written.helios->turn[1])},
+                          {"z", degrees_from_radians(written.helios->turn[2])}}}};
+  }
+  return json;
+}
+
+ExitStatus run_pattern(const PatternOptions& options, const CommonOptions& common) {
   const bool to_stdout = options.output == "-";
+  const bool looks = options.coverage || !options.report.empty();
+  if (options.output.empty() && !looks) {
+    throw InvalidArgument("nothing to do: give --output FILE, --coverage or --report PAGE");
+  }
+  if (!options.output.empty() && options.format.empty()) {
+    throw InvalidArgument(fmt::format("--output {} needs --format", options.output));
+  }
   if (to_stdout && common.json) {
     throw InvalidArgument("--json needs a file: with -o - the pattern itself goes to stdout");
   }
-  jobs::WrittenPattern written;
-  {
+  if (to_stdout && options.coverage) {
+    throw InvalidArgument("--coverage prints on stdout, where -o - puts the pattern itself");
+  }
+  check_positive(options.duration_s, "--duration-s", "s");
+  const sensors::ScanPatternOptions scan = scan_options(options);
+  Json json = Json::object();
+  std::optional<jobs::WrittenPattern> written;
+  if (!options.output.empty()) {
+    const jobs::WritePatternOptions wanted{options.sensor, options.format, options.output,
+                                           options.duration_s, scan};
     ProgressBar bar("writing", common);
     written = to_stdout ? jobs::write_pattern(wanted, std::cout, bar.progress())
                         : jobs::write_pattern(wanted, bar.progress());
+  }
+  std::optional<jobs::PatternDetails> details;
+  if (looks) {
+    sensors::CoverageOptions coverage;
+    coverage.after = options.integration_s;
+    coverage.cell = radians_from_degrees(options.cell_deg);
+    ProgressBar bar("counting", common);
+    details = jobs::pattern_details(options.sensor, scan, coverage, bar.progress());
+  }
+  if (!options.report.empty()) {
+    io::write_text_file(options.report, report::pattern_page(*details, provenance_of(common)));
   }
   if (to_stdout) {
     std::cout.flush();
@@ -68,18 +202,19 @@ ExitStatus run_pattern(const PatternOptions& options, const CommonOptions& commo
     return kDone;
   }
   if (common.json) {
-    print_json({{"rows", written.rows},
-                {"blocked", written.blocked},
-                {"sensor", written.sensor},
-                {"format", options.format},
-                {"firing", written.firing},
-                {"output", options.output}});
+    if (written) {
+      json = written_json(*written, options.output);
+    } else {
+      json = {{"rows", details->coverage.after.back().shots}, {"sensor", details->sensor.name}};
+    }
+    if (details) json["coverage"] = coverage_json(details->coverage);
+    if (!options.report.empty()) json["html"] = options.report;
+    print_json(json);
     return kDone;
   }
-  fmt::print("{}: {} shots of sensor {}\n", options.output, grouped(written.rows), written.sensor);
-  if (written.blocked > 0) {
-    fmt::print("{} of them do not get through the prisms and are NaN\n", grouped(written.blocked));
-  }
+  if (written) print_written(*written, options.output);
+  if (options.coverage) print_coverage(details->coverage);
+  if (!options.report.empty()) fmt::print("page: {}\n", options.report);
   return kDone;
 }
 
@@ -88,12 +223,11 @@ ExitStatus run_pattern(const PatternOptions& options, const CommonOptions& commo
 Run declare_pattern(CLI::App& verb) {
   const auto options = std::make_shared<PatternOptions>();
   PatternOptions& o = *options;
-  verb.add_option("-o,--output", o.output, "File to write; - is standard output")->required();
+  verb.add_option("-o,--output", o.output, "File to write; - is standard output");
   std::set<std::string> names;
   for (const jobs::PatternFormat& format : jobs::pattern_formats()) names.insert(format.name);
   verb.add_option("--format", o.format, "What to write:" + format_list())
-      ->check(CLI::IsMember(names))
-      ->required();
+      ->check(CLI::IsMember(names));
   verb.add_option("--sensor", o.sensor, "Preset by name, or a preset or calibration file")
       ->capture_default_str();
   verb.add_option("--duration-s", o.duration_s, "Length of the scan")->capture_default_str();
@@ -109,6 +243,13 @@ Run declare_pattern(CLI::App& verb) {
   verb.add_option("--start-angles-deg", o.start_angles_deg,
                   "Rotation angles of the prisms at time 0, A,B (default: the preset's)")
       ->delimiter(',');
+  verb.add_flag("--coverage", o.coverage,
+                "Print how the scan fills the field of view: share of cells, density, gaps");
+  verb.add_option("--integration-s", o.integration_s, "After which times")
+      ->delimiter(',')
+      ->capture_default_str();
+  verb.add_option("--cell-deg", o.cell_deg, "Edge of a cell")->capture_default_str();
+  verb.add_option("--report", o.report, "Page to write (HTML) with the pattern as it grows");
   return [options](const CommonOptions& common) { return run_pattern(*options, common); };
 }
 

@@ -449,7 +449,7 @@ class Search {
             chi2_excess(best, fit) - 2.0 * static_cast<double>(fit.unknowns - best.unknowns);
         // One glass is an assumption that little is needed to give up, a turned frame or tilted
         // prisms are a finding.
-        const double needed = one.one_glass ? kFairLead : kOneGlassLead;
+        const double needed = one.one_glass == freedom.one_glass ? kFairLead : kOneGlassLead;
         if (gained > needed && gained > most) {
           most = gained;
           chosen = &one;

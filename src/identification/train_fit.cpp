@@ -87,6 +87,15 @@ void set_glass(PrismTrain& train, int prism, double index, double deviation) {
   train.set_place(place::wedge_angle(prism), deviation / (index - 1.0));
 }
 
+/// All prisms of the mean index, their deviations as they were.
+void make_one_glass(PrismTrain& train) {
+  double index = 0;
+  for (int k = 0; k < train.prisms(); ++k) {
+    index += train[place::refractive_index(k)] / train.prisms();
+  }
+  for (int k = 0; k < train.prisms(); ++k) set_glass(train, k, index, deviation(train, k));
+}
+
 /// @return whether the values stay within what a sensor can be
 bool apply(const std::vector<Unknown>& unknowns, const Eigen::VectorXd& step, TrainModel& model) {
   using Kind = Unknown::Kind;
@@ -621,6 +630,7 @@ TrainFit fit_train(const ShotGrid& grid, const TrainModel& start, const TrainFre
   Fit fit(grid, start, freedom);
   TrainFit result;
   result.model = start;
+  if (freedom.glass && freedom.one_glass) make_one_glass(result.model.train);
   const auto angles_of = [&] { return 2.0 * static_cast<double>(fit.count_used()); };
   double cost = fit.cost(result.model);
   if (!std::isfinite(cost)) {

@@ -5,80 +5,37 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
-#include <iterator>
 #include <ostream>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
 #include "risley/core/require.hpp"
-#include "risley/io/little_endian.hpp"
-#include "risley/io/npy_head.hpp"
 #include "risley/io/output_file.hpp"
 #include "risley/sensors/preset.hpp"
+
+#include "jobs/pattern_formats.hpp"
 
 namespace risley::jobs {
 namespace {
 
-constexpr std::uint64_t kPieceRows = 65536;
-
-/// A number as the maker's scan sequences print it: ten digits, nine of them after the point at
-/// most, no zeros at the end.
-void append_number(std::string& text, double value) {
-  const double whole = std::floor(std::log10(std::max(std::abs(value), 1.0)));
-  const int decimals = 9 - static_cast<int>(std::min(whole, 9.0));
-  fmt::format_to(std::back_inserter(text), "{:.{}f}", value, decimals);
-  if (decimals == 0 || !std::isfinite(value)) return;
-  text.erase(text.find_last_not_of('0') + 1);
-  if (text.back() == '.') text.pop_back();
-}
-
-std::string csv_rows(const sensors::ScanPattern& pattern) {
-  std::string text;
-  for (std::size_t i = 0; i < pattern.size(); ++i) {
-    append_number(text, pattern.time[i]);
-    text += ',';
-    append_number(text, degrees_from_radians(pattern.azimuth[i]));
-    text += ',';
-    append_number(text, degrees_from_radians(pattern.zenith[i]));
-    text += '\n';
-  }
-  return text;
-}
-
-std::string npy_head(std::uint64_t rows) {
-  return io::npy_head(
-      fmt::format("{{'descr': '<f4', 'fortran_order': False, 'shape': ({}, 2), }}", rows));
-}
-
-std::string npy_rows(const sensors::ScanPattern& pattern) {
-  std::vector<std::uint8_t> bytes(8 * pattern.size());
-  for (std::size_t i = 0; i < pattern.size(); ++i) {
-    io::store<float>(&bytes[8 * i], static_cast<float>(pattern.azimuth[i]));
-    io::store<float>(&bytes[8 * i + 4], static_cast<float>(0.5 * kPi - pattern.zenith[i]));
-  }
-  return {bytes.begin(), bytes.end()};
-}
-
-std::string csv_head(std::uint64_t) { return "Time,Azimuth,Zenith\n"; }
-
 struct Format {
   PatternFormat shown;
-  std::string (*head)(std::uint64_t rows);
-  std::string (*rows)(const sensors::ScanPattern& pattern);
+  void (*put)(PatternStream& out);
 };
 
 const std::vector<Format>& formats() {
   static const std::vector<Format> all = {
       {{"livox-csv", "time (s), azimuth and zenith (degrees), as the maker's scan sequences"},
-       csv_head,
-       csv_rows},
+       put_livox_csv},
       {{"npy",
         "float32 pairs of azimuth and elevation (radians), for MuJoCo-LiDAR, OmniPerception"},
-       npy_head,
-       npy_rows}};
+       put_npy},
+      {{"helios-xml", "the prisms as a scanner of HELIOS++, with what that costs"}, put_helios_xml},
+      {{"json", "a lidar profile of Isaac Sim up to 4.5, one emitter per shot"}, put_isaac_json},
+      {{"usda", "an OmniLidar in USD for Isaac Sim 5 and later, one emitter per shot"},
+       put_isaac_usda}};
   return all;
 }
 
@@ -114,23 +71,13 @@ WrittenPattern write_pattern(const WritePatternOptions& options, std::ostream& s
   const auto shots = static_cast<std::uint64_t>(std::llround(options.duration * rate));
   WrittenPattern result;
   result.sensor = sensor.name;
+  result.format = format.shown.name;
   result.rows = shots / options.scan.every;
   require_at_least("rows of the pattern", static_cast<long long>(result.rows), 1);
   result.firing = to_string(options.scan.firing.value_or(
       sensor.sequence ? sensor.sequence->firing : sensors::Firing::in_turn));
-  std::string text = format.head(result.rows);
-  for (std::uint64_t row = 0; row < result.rows; row += kPieceRows) {
-    const auto count =
-        static_cast<std::size_t>(std::min<std::uint64_t>(kPieceRows, result.rows - row));
-    const sensors::ScanPattern pattern = sensors::scan_pattern(sensor, row, count, options.scan);
-    result.blocked += static_cast<std::uint64_t>(std::count_if(
-        pattern.azimuth.begin(), pattern.azimuth.end(), [](double a) { return std::isnan(a); }));
-    text += format.rows(pattern);
-    stream.write(text.data(), static_cast<std::streamsize>(text.size()));
-    if (!stream) throw FileError(options.output, {}, "cannot be written");
-    text.clear();
-    progress.report(static_cast<double>(row + count) / static_cast<double>(result.rows));
-  }
+  PatternStream out(sensor, options, stream, progress, result);
+  format.put(out);
   return result;
 }
 

@@ -57,6 +57,7 @@ void fields(Archive& archive, T& chart) {
   archive("value_label", chart.value_label);
   archive("palette", chart.palette);
   archive("value_range", chart.value_range);
+  archive("grows_for", chart.grows_for);
   archive("note", chart.note);
   archive("series", chart.series);
 }

@@ -12,6 +12,7 @@
   const zoomStep = 0.8, panStep = 0.1, turnStep = 10;
   const thinnestBox = 8; // pixels
   const longestPause = 200; // ms
+  const growth = 10_000; // ms, of what is shown as it came
   let drawn = [];
 
   // ECharts takes the height of a line from the width of this character, which is nearly nothing
@@ -389,6 +390,7 @@
     if (boxes) setBoxes(entry, false); // or the old toolbox goes on drawing beside the new
     entry.chart.setOption(flatOption(one), true);
     if (boxes) setBoxes(entry, true);
+    if (entry.grown && !page.dataset.printing) entry.grown.show(); // paper gets all
     if (limits && limits.some(([from, to]) => to - from < 100)) show(entry.chart, limits);
   }
 
@@ -422,6 +424,54 @@
     chart.getZr().on('dblclick', () => showAll(chart));
   }
 
+  // A button and a slider that show the points of the first series as they came. It starts slowly,
+  // so that the first turns can be followed.
+  function addGrowth(entry) {
+    const { chart, data: one, place } = entry;
+    const all = flatSeries(one.series[0]).data;
+    const bar = document.createElement('div');
+    const button = document.createElement('button');
+    const slider = document.createElement('input');
+    const time = document.createElement('output');
+    bar.className = 'growth';
+    button.type = 'button';
+    Object.assign(slider, { type: 'range', min: 0, max: 1000, value: 1000 });
+    slider.setAttribute('aria-label', one.title);
+    bar.append(button, slider, time);
+    place.after(bar);
+    let started = null;
+    const show = () => {
+      const share = Math.pow(slider.value / 1000, 2);
+      chart.setOption({ series: [{ data: all.slice(0, Math.ceil(share * all.length)) }] });
+      time.textContent = rounded(share * one.grows_for, 3) + ' s';
+      slider.setAttribute('aria-valuetext', time.textContent);
+    };
+    const stop = () => {
+      started = null;
+      button.textContent = 'Watch it grow';
+    };
+    const step = (now) => {
+      if (started === null) return;
+      slider.value = Math.min(1000, 1000 * (now - started) / growth);
+      show();
+      if (slider.value >= 1000) stop();
+      else requestAnimationFrame(step);
+    };
+    button.addEventListener('click', () => {
+      if (started !== null) return stop();
+      started = performance.now();
+      button.textContent = 'Stop';
+      requestAnimationFrame(step);
+    });
+    slider.addEventListener('input', () => {
+      stop();
+      show();
+    });
+    time.textContent = rounded(one.grows_for, 3) + ' s';
+    stop();
+    entry.grown = { show };
+  }
+
   function make(one) {
     const place = document.getElementById(one.id);
     const entry = { data: one, place: place };
@@ -429,6 +479,7 @@
     entry.chart = echarts.init(place);
     draw(entry);
     if (one.kind !== 'space') guideMouse(entry);
+    if (one.grows_for && one.kind !== 'space') addGrowth(entry);
     place.addEventListener('keydown', (event) => onKey(event, entry));
     return entry;
   }

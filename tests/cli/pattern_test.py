@@ -2,10 +2,13 @@
 # SPDX-FileCopyrightText: 2026 The risley authors
 # SPDX-License-Identifier: MIT
 """risley preset and risley pattern: what simulators and makers of presets are given."""
+import json
 import math
 import os
 import pathlib
+import re
 import unittest
+from xml.etree import ElementTree
 
 from command import SOURCE, CommandTest, run
 
@@ -80,6 +83,100 @@ class PatternTest(CommandTest):
         for i in (0, 1, 65_535, 65_536, 71_999):
             self.assertAlmostEqual(array[i, 0], math.radians(rows[i][1]), delta=1e-6)
             self.assertAlmostEqual(array[i, 1], math.radians(90 - rows[i][2]), delta=1e-6)
+
+    def test_every_format_is_one_file_and_the_same_on_stdout(self):
+        for name in ("livox-csv", "npy", "helios-xml", "json", "usda"):
+            arguments = ("pattern", "--sensor", "avia", "--duration-s", "0.01", "--format", name)
+            made = self.expect_json(0, *arguments, "-o", "one." + name)
+            self.assertEqual((made["format"], made["rows"], made["blocked"]), (name, 2400, 0))
+            if name != "npy":  # bytes
+                self.assertEqual((self.folder / ("one." + name)).read_text(),
+                                 self.expect(0, *arguments, "-o", "-").stdout)
+            # Nothing beside it.
+            self.assertEqual([path.name for path in self.folder.glob(f"*{name}*")], ["one." + name])
+        self.assertIn("--format", self.expect(2, "pattern", "-o", "-").stderr)
+        self.assertIn("nothing to do", self.expect(2, "pattern").stderr)
+
+    def test_isaac_gets_every_shot_with_its_time(self):
+        arguments = ("pattern", "--sensor", "horizon", "--duration-s", "0.05")
+        self.expect(0, *arguments, "--format", "livox-csv", "-o", "horizon.csv")
+        rows = self.rows((self.folder / "horizon.csv").read_text())
+        made = self.expect_json(0, *arguments, "--format", "json", "-o", "horizon.json")
+        whole = json.loads((self.folder / "horizon.json").read_text())
+        profile = whole["profile"]
+        self.assertEqual((whole["type"], profile["scanType"]), ("lidar", "solidState"))
+        self.assertEqual(whole["_not_carried"], made["not_carried"])
+        self.assertEqual(profile["scanRateBaseHz"], 20)
+        state, = profile["emitterStates"]
+        emitters = profile["numberOfEmitters"]
+        self.assertEqual((emitters, sum(profile["numRaysPerLine"])), (12_000, 12_000))
+        for name in ("azimuthDeg", "elevationDeg", "fireTimeNs", "channelId"):
+            self.assertEqual(len(state[name]), emitters, name)
+        for i in range(0, emitters, 97):
+            self.assertAlmostEqual(state["azimuthDeg"][i], rows[i][1], delta=6e-7)
+            self.assertAlmostEqual(state["elevationDeg"][i], 90 - rows[i][2], delta=6e-7)
+            self.assertEqual(state["fireTimeNs"][i], round(1e9 * i / 240_000))
+            self.assertEqual(state["channelId"][i], i % 6 + 1)
+        # USD has the same arrays.
+        self.expect(0, *arguments, "--format", "usda", "-o", "horizon.usda")
+        text = (self.folder / "horizon.usda").read_text()
+        self.assertTrue(text.startswith("#usda 1.0\n"))
+        self.assertEqual(text.count("{"), text.count("}"))
+        for name, kind in (("azimuthDeg", "float"), ("elevationDeg", "float"),
+                           ("fireTimeNs", "uint"), ("channelId", "uint")):
+            found = re.search(rf"{kind}\[\] omni:sensor:Core:emitterState:s001:{name} = (\[.*\])",
+                              text).group(1)
+            self.assertEqual(json.loads(found), state[name], name)
+        self.assertIn("uint omni:sensor:Core:numberOfEmitters = 12000", text)
+        # More than 32 bits of nanoseconds.
+        long = self.expect(2, "pattern", "--sensor", "horizon", "--duration-s", "5",
+                           "--format", "usda", "-o", "a.usda")
+        self.assertIn("duration = 5 s", long.stderr)
+        self.assertFalse((self.folder / "a.usda").exists())
+
+    def test_helios_says_what_it_costs(self):
+        helios = ("pattern", "--format", "helios-xml", "--sensor")
+        exact = self.expect_json(0, *helios, "horizon-sequence", "-o", "exact.xml")
+        self.assertLess(exact["residual"]["worst_deg"], 1e-9)
+        self.assertEqual(exact["residual"]["turn_deg"]["y"], -90)
+        lost = self.expect_json(0, *helios, "horizon", "-o", "lost.xml")
+        self.assertGreater(lost["residual"]["rms_deg"], 0.05)
+        self.assertEqual(lost["rows"], 240_000)
+        root = ElementTree.parse(self.folder / "lost.xml").getroot()
+        scanner, = root.findall("scanner")
+        self.assertEqual((root.tag, scanner.get("optics")), ("document", "risley"))
+        self.assertEqual([scanner.get(f"angle{k}_deg") for k in (1, 2, 3)], ["20", "-20", "17.5"])
+        self.assertEqual(len(scanner.findall("channels/channel/incidentBeam")), 6)
+        comment = (self.folder / "lost.xml").read_text().split("<!--")[1].split("-->")[0]
+        self.assertNotIn("--", comment)
+        for one in lost["not_carried"]:
+            self.assertIn(one, comment)
+        said = self.expect(0, *helios, "horizon", "-o", "lost.xml").stdout
+        self.assertIn("not carried: Emitters that fire one after another", said)
+
+    def test_coverage_and_page(self):
+        made = self.expect_json(0, "pattern", "--sensor", "mid-70", "--coverage",
+                                "--integration-s", "0.1,0.4", "--cell-deg", "1", "--report", "a.html")
+        coverage = made["coverage"]
+        self.assertEqual(made["rows"], 40_000)
+        self.assertEqual([one["time_s"] for one in coverage["after"]], [0.1, 0.4])
+        first, last = coverage["after"]
+        self.assertEqual((first["shots"], last["shots"]), (10_000, 40_000))
+        self.assertLess(first["covered"], last["covered"])
+        self.assertGreater(first["gap_deg"], last["gap_deg"])
+        self.assertAlmostEqual(last["density_per_deg2"]["mean"],
+                               40_000 / coverage["field_of_view"]["deg2"], places=9)
+        self.assertAlmostEqual(coverage["field_of_view"]["half_angle_deg"], 35.2, delta=0.3)
+        covers = coverage["time_to_cover_s"]
+        self.assertLess(covers["50"], 0.4)
+        self.assertIsNone(covers["99"])  # not in so short a time
+        self.assertIn("<title>Scan pattern: mid-70</title>", (self.folder / "a.html").read_text())
+        table = self.expect(0, "pattern", "--sensor", "mid-70", "--coverage",
+                            "--integration-s", "0.1").stdout
+        self.assertIn("largest gap, deg", table)
+        self.assertIn("10 000", table)
+        refused = self.expect(2, "pattern", "--coverage", "-o", "-", "--format", "npy")
+        self.assertIn("--coverage prints on stdout", refused.stderr)
 
     def test_a_full_disk_is_said(self):
         if not os.path.exists("/dev/full"):

@@ -4,10 +4,12 @@
 
 #include <cstdint>
 #include <iosfwd>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "risley/core/progress.hpp"
+#include "risley/sensors/helios_scanner.hpp"
 #include "risley/sensors/scan_pattern.hpp"
 
 namespace risley::jobs {
@@ -33,9 +35,13 @@ struct WritePatternOptions {
 /// What came of it.
 struct WrittenPattern {
   std::string sensor;  ///< name
+  std::string format;
   std::uint64_t rows = 0;
-  std::uint64_t blocked = 0;  ///< of them, NaN: shots that do not get through the prisms
+  std::uint64_t blocked = 0;  ///< of them, shots that do not get through the prisms
   std::string firing;         ///< "in_turn" or "together"
+  /// What the pattern has and the format cannot hold, one sentence each.
+  std::vector<std::string> not_carried;
+  std::optional<sensors::HeliosScanner> helios;  ///< where the format is that of HELIOS++
 };
 
 /// Writes the scan pattern of a sensor for a simulator; the output appears when it is whole.

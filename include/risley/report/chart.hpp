@@ -54,6 +54,9 @@ struct Chart {
   Palette palette = Palette::sequential;
   /// Values that the ends of the colours stand for; without it the least and the greatest.
   std::optional<std::pair<double, double>> value_range = {};
+  /// The points of the first series came one after another in so many seconds, and the page can
+  /// show how.
+  std::optional<double> grows_for = {};
 };
 
 }  // namespace risley::report

@@ -1,0 +1,71 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "risley/core/angle.hpp"
+#include "risley/core/progress.hpp"
+#include "risley/sensors/scan_pattern.hpp"
+
+namespace risley::sensors {
+
+/// What of a pattern is counted.
+struct CoverageOptions {
+  std::vector<double> after = {0.1, 0.2, 0.5, 1.0};  ///< integration times, s, rising
+  double cell = radians_from_degrees(0.5);           ///< edge of a cell, rad
+  double ring = radians_from_degrees(1.0);           ///< width of a ring about the X axis, rad
+  /// The field of view is what a scan of so many seconds reaches, if not more than ten million
+  /// shots, and not less than the last of `after`.
+  double field_after = 30.0;
+};
+
+/// What a scan has reached after a time.
+struct CoverageAfter {
+  double time = 0;           ///< s
+  std::uint64_t shots = 0;   ///< that got through the prisms
+  double covered = 0;        ///< share of the field of view whose cells hold a shot, [0, 1]
+  double mean_density = 0;   ///< shots per steradian of the field of view
+  double least_density = 0;  ///< of the cell with the fewest, shots per steradian
+  double greatest_density = 0;
+  /// Diameter of the largest circle with no shot in it whose centre is a direction that the scan
+  /// reaches in the end, rad; of these one is tried in every quarter of a cell (0.1 degree at
+  /// least). NaN without shots.
+  double gap = 0;
+  double gap_azimuth = 0, gap_zenith = 0;  ///< of its centre, rad
+  std::vector<std::uint32_t> cell_shots;   ///< [cells]
+  std::vector<double> ring_density;        ///< [rings], shots per steradian of field of view; NaN
+                                           ///< where a ring has none
+};
+
+/// How a scan fills the field of view. Cells are squares of the equal-area map of Lambert about the
+/// X axis: they all have the same solid angle, and near the axis the map is in radians from it.
+struct PatternCoverage {
+  double cell = 0, ring = 0;  ///< rad
+  /// The field of view is every cell that a scan of so many seconds reaches.
+  double field_after = 0;
+  double field_solid_angle = 0;         ///< sr
+  double field_half_angle = 0;          ///< of the cone about X that holds every shot, rad
+  std::vector<double> left, up;         ///< [cells], centres in the map, rad
+  std::vector<double> azimuth, zenith;  ///< [cells], the same as directions, rad
+  std::vector<CoverageAfter> after;     ///< [options.after]
+
+  /// [cells], when the first shot came, s; infinite where none did within the last of `after`
+  std::vector<double> first_shot;
+
+  std::size_t cells() const { return left.size(); }
+  /// After which time that share of the field of view holds a shot, s; infinite where the last of
+  /// `after` is too short. @throws InvalidArgument for a share outside of 0 to 1
+  double time_to_cover(double share) const;
+};
+
+/// @param sensor   with a sequence, or rotation angles in the options of the scan
+/// @throws InvalidArgument as scan_pattern(), for times that do not rise from above 0 or lie beyond
+///         ten million shots, for cells and rings outside of 0.1 to 30 degree and a field_after
+///         that is not above 0; EstimationError when no beam gets through; Cancelled
+PatternCoverage pattern_coverage(const Sensor& sensor, const ScanPatternOptions& scan = {},
+                                 const CoverageOptions& options = {},
+                                 const Progress& progress = {});
+
+}  // namespace risley::sensors

@@ -1,0 +1,192 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "risley/report/pattern_page.hpp"
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <map>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "risley/core/angle.hpp"
+#include "risley/report/html.hpp"
+#include "risley/report/page_parts.hpp"
+
+namespace risley::report {
+namespace {
+
+constexpr double kSquareDegree = kRadiansPerDegree * kRadiansPerDegree;  // sr
+
+Chart rosette_chart(const jobs::PatternDetails& details) {
+  const sensors::ScanPattern& rosette = details.rosette;
+  Series dots{"", "a", SeriesKind::points, {}, {}};
+  for (std::size_t i = 0; i < rosette.size(); ++i) {
+    if (std::isnan(rosette.azimuth[i])) continue;
+    dots.x.push_back(degrees_from_radians(rosette.azimuth[i]));
+    dots.y.push_back(degrees_from_radians(rosette.zenith[i]));
+  }
+  const double duration = details.coverage.after.back().time;
+  Chart chart{fmt::format("The first {:g} s as they grow", duration),
+              "azimuth, deg",
+              "zenith, deg",
+              {dots},
+              details.rosette_every == 1
+                  ? "Every shot is drawn."
+                  : fmt::format("Of every {} shots one is drawn.", details.rosette_every),
+              ChartKind::map};
+  chart.grows_for = duration;
+  return chart;
+}
+
+/// Density in cells of the map, larger ones where there are too many to draw.
+Chart density_chart(const sensors::PatternCoverage& coverage, const sensors::CoverageAfter& after) {
+  constexpr double kMostCells = 12'000;
+  const double merged = std::ceil(std::sqrt(static_cast<double>(coverage.cells()) / kMostCells));
+  const double edge = merged * coverage.cell;
+  std::map<std::pair<long, long>, std::pair<double, double>> sums;  // shots, cells
+  for (std::size_t i = 0; i < coverage.cells(); ++i) {
+    auto& [shots, cells] = sums[{std::lround(std::floor(coverage.left[i] / edge)),
+                                 std::lround(std::floor(coverage.up[i] / edge))}];
+    shots += after.cell_shots[i];
+    cells += 1;
+  }
+  const double cell = degrees_from_radians(coverage.cell);
+  Series cells{"", "ink", SeriesKind::cells, {}, {}};
+  cells.cell_width = cells.cell_height = degrees_from_radians(edge);
+  for (const auto& [place, sum] : sums) {
+    cells.x.push_back(degrees_from_radians(edge) * (static_cast<double>(place.first) + 0.5));
+    cells.y.push_back(-degrees_from_radians(edge) * (static_cast<double>(place.second) + 0.5));
+    cells.value.push_back(sum.first / (sum.second * cell * cell));
+  }
+  Chart chart{fmt::format("Density after {:g} s", after.time),
+              "left of the axis, deg",
+              "below the axis, deg",
+              {cells},
+              fmt::format("{} shots, cells of {:.3g} degree. Colours end at four times the mean.",
+                          count_text(after.shots), degrees_from_radians(edge)),
+              ChartKind::map};
+  chart.value_label = "shots per square degree";
+  chart.value_range = {0.0, std::max(4 * after.mean_density * kSquareDegree, 1e-9)};
+  return chart;
+}
+
+Chart ring_chart(const sensors::PatternCoverage& coverage) {
+  static constexpr const char* kColours[] = {"a", "b", "c", "d", "ink", "bad"};
+  Chart chart{"Density by the angle from the axis",
+              "angle from the X axis, deg",
+              "shots per square degree",
+              {},
+              "Of the part of every ring that lies in the field of view."};
+  for (std::size_t k = 0; k < coverage.after.size(); ++k) {
+    const sensors::CoverageAfter& after = coverage.after[k];
+    Series line{fmt::format("{:g} s", after.time),
+                kColours[k % std::size(kColours)],
+                SeriesKind::line,
+                {},
+                {}};
+    for (std::size_t i = 0; i < after.ring_density.size(); ++i) {
+      line.x.push_back(degrees_from_radians(coverage.ring) * (static_cast<double>(i) + 0.5));
+      line.y.push_back(after.ring_density[i] * kSquareDegree);
+    }
+    chart.series.push_back(std::move(line));
+  }
+  return chart;
+}
+
+/// Share of the field of view against time.
+Chart growth_chart(const sensors::PatternCoverage& coverage) {
+  constexpr std::size_t kMostPoints = 500;
+  std::vector<double> times = coverage.first_shot;
+  std::sort(times.begin(), times.end());
+  Chart chart{
+      "Covered against time",
+      "time, s",
+      "covered, %",
+      {{"", "a", SeriesKind::line, {0.0}, {0.0}}},
+      fmt::format("Cells of {:.3g} degree that hold a shot.", degrees_from_radians(coverage.cell))};
+  const std::size_t step = (times.size() + kMostPoints - 1) / kMostPoints;
+  for (std::size_t i = step - 1; i < times.size() && std::isfinite(times[i]); i += step) {
+    chart.series[0].x.push_back(times[i]);
+    chart.series[0].y.push_back(100 * static_cast<double>(i + 1) /
+                                static_cast<double>(times.size()));
+  }
+  chart.series[0].x.push_back(coverage.after.back().time);
+  chart.series[0].y.push_back(100 * coverage.after.back().covered);
+  return chart;
+}
+
+std::string coverage_html(const sensors::PatternCoverage& coverage) {
+  std::string html =
+      "<h2>Coverage and gaps</h2>\n<div class=\"wide\"><table><thead><tr><th>after, s</th>"
+      "<th>shots</th><th>covered</th><th>mean density, 1/deg²</th><th>least</th><th>greatest</th>"
+      "<th>largest gap, deg</th><th>at azimuth, deg</th><th>zenith, deg</th></tr></thead><tbody>\n";
+  for (const sensors::CoverageAfter& after : coverage.after) {
+    html += fmt::format(
+        "<tr><th scope=\"row\">{:g}</th><td>{}</td><td>{:.1f} %</td><td>{:.4g}</td><td>{:.4g}</td>"
+        "<td>{:.4g}</td><td>{}</td><td>{}</td><td>{}</td></tr>\n",
+        after.time, count_text(after.shots), 100 * after.covered,
+        after.mean_density * kSquareDegree, after.least_density * kSquareDegree,
+        after.greatest_density * kSquareDegree,
+        finite_text("{:.3f}", degrees_from_radians(after.gap)),
+        finite_text("{:.2f}", degrees_from_radians(after.gap_azimuth)),
+        finite_text("{:.2f}", degrees_from_radians(after.gap_zenith)));
+  }
+  return html +
+         fmt::format(
+             "</tbody></table></div>\n<p class=\"note\">Covered: the share of cells of {:.3g} "
+             "degree that hold a shot, of those that {:.3g} s reach: {:.5g} square degrees. "
+             "Gap: the diameter of the largest circle about a direction of this field of view "
+             "that holds no shot. Cells are squares of Lambert's equal-area map about the X "
+             "axis.</p>\n",
+             degrees_from_radians(coverage.cell), coverage.field_after,
+             coverage.field_solid_angle / kSquareDegree);
+}
+
+std::string prisms_html(const sensors::Sensor& sensor) {
+  std::string html =
+      "<h2>Prisms</h2>\n<div class=\"wide\"><table><thead><tr><th>prism</th><th>first face</th>"
+      "<th>wedge angle, deg</th><th>refractive index</th><th>speed, rpm</th></tr></thead><tbody>\n";
+  for (int i = 0; i < sensor.prisms(); ++i) {
+    const auto k = static_cast<std::size_t>(i);
+    html += fmt::format(
+        "<tr><th scope=\"row\">{}</th><td>{}</td><td>{:.6g}</td><td>{:.6g}</td>"
+        "<td>{:.8g}</td></tr>\n",
+        static_cast<char>(std::toupper(prism_letter(i))),
+        sensor.train.face_order()[k] == FaceOrder::angled_perpendicular ? "angled"
+                                                                        : "perpendicular",
+        degrees_from_radians(sensor.train[place::wedge_angle(i)]),
+        sensor.train[place::refractive_index(i)], 60 * sensor.angular_velocity[k] / kTwoPi);
+  }
+  return html + fmt::format(
+                    "</tbody></table></div>\n<p class=\"note\">In the order of the beam; {} "
+                    "emitter{}, {:.10g} shots a second.</p>\n",
+                    sensor.train.emitters(), sensor.train.emitters() == 1 ? "" : "s",
+                    sensor.shot_rate);
+}
+
+}  // namespace
+
+std::string pattern_page(const jobs::PatternDetails& details, const Provenance& provenance) {
+  Figures figures;
+  const sensors::PatternCoverage& coverage = details.coverage;
+  std::string body = charts_html({rosette_chart(details)}, figures);
+  body += coverage_html(coverage);
+  std::vector<Chart> charts;
+  for (const sensors::CoverageAfter& after : coverage.after) {
+    charts.push_back(density_chart(coverage, after));
+  }
+  charts.push_back(growth_chart(coverage));
+  charts.push_back(ring_chart(coverage));
+  body += charts_html(charts, figures);
+  body += prisms_html(details.sensor);
+  body += provenance_html(provenance);
+  return page_html(
+      "Scan pattern: " + details.sensor.name,
+      "Where the sensor sends its shots, free of noise, with rotors at constant speed, "
+      "and how they fill its field of view.",
+      body, figures);
+}
+
+}  // namespace risley::report

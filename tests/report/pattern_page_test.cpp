@@ -1,0 +1,73 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "risley/report/pattern_page.hpp"
+
+#include <algorithm>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "risley/core/angle.hpp"
+
+namespace risley::report::pattern_page_test {
+
+using ::testing::HasSubstr;
+
+nlohmann::json charts_of(const std::string& page) {
+  const std::string head = "id=\"page-data\">\n";
+  const std::size_t begin = page.find(head) + head.size();
+  return nlohmann::json::parse(page.substr(begin, page.find("\n</script>", begin) - begin));
+}
+
+TEST(PatternPage, DrawsTheRosetteTheDensitiesAndTheirNumbers) {
+  sensors::CoverageOptions options;
+  options.after = {0.02, 0.1};
+  options.field_after = 3;
+  options.cell = radians_from_degrees(1.0);
+  const jobs::PatternDetails details = jobs::pattern_details("mid-70", {}, options);
+  const std::string page = pattern_page(details, {{"command", "risley pattern <x>"}});
+  EXPECT_THAT(page, HasSubstr("risley pattern &lt;x&gt;"));
+  EXPECT_THAT(page, HasSubstr("<td>1.8144</td><td>-7294</td>"));
+  const nlohmann::json charts = charts_of(page);
+  ASSERT_EQ(charts.size(), 5U);  // rosette, two times, share against time, rings
+  const std::vector<double> covered = charts[3]["series"][0]["y"];
+  EXPECT_NEAR(covered.back(), 100 * details.coverage.after[1].covered, 1e-4);
+  EXPECT_TRUE(std::is_sorted(covered.begin(), covered.end()));
+  EXPECT_EQ(charts[0]["grows_for"], 0.1);
+  EXPECT_EQ(charts[0]["series"][0]["x"].size(), 10'000U);
+  EXPECT_TRUE(charts[1]["grows_for"].is_null());
+  for (const std::size_t k : {1UL, 2UL}) {
+    double shots = 0;  // density times solid angle, in square degrees
+    for (const double density : charts[k]["series"][0]["value"]) shots += density;
+    EXPECT_NEAR(shots, static_cast<double>(details.coverage.after[k - 1].shots), 1e-3 * shots);
+  }
+}
+
+TEST(PatternPage, StaysSmallWithSmallCells) {
+  sensors::CoverageOptions options;
+  options.after = {0.05, 0.1, 0.15, 0.2};
+  options.field_after = 3;
+  options.cell = radians_from_degrees(0.2);
+  const jobs::PatternDetails details = jobs::pattern_details("avia", {}, options);
+  EXPECT_GT(details.coverage.cells(), 90'000U);
+  EXPECT_LE(details.rosette.size(), 25'000U);
+  EXPECT_LT(pattern_page(details, {}).size(), 4U << 20);
+}
+
+// Thinned so that every emitter is still seen.
+TEST(PatternDetails, KeepShotsOfAllEmitters) {
+  sensors::CoverageOptions options;
+  options.after = {0.4};
+  options.field_after = 3;
+  options.cell = radians_from_degrees(2.0);
+  const jobs::PatternDetails details = jobs::pattern_details("tele-15", {}, options);
+  EXPECT_EQ(details.rosette_every, 5U);
+  std::vector<std::size_t> of(6);
+  for (const std::uint8_t emitter : details.rosette.emitter) ++of.at(emitter);
+  for (const std::size_t count : of) EXPECT_NEAR(static_cast<double>(count), 3200.0, 1.0);
+}
+
+}  // namespace risley::report::pattern_page_test
