@@ -26,6 +26,7 @@ constexpr double kTrialWindow = 0.15;
 constexpr std::size_t kTrialShots = 600;
 /// Before that, all arrangements are tried roughly; so many of them go on, and of those so many.
 constexpr std::size_t kRoughShots = 150;
+constexpr double kRoughTolerance = 1e-3, kHopelessSet = 4;
 constexpr std::size_t kPromising = 96, kTriedInFull = 16;
 /// Arrangements that leave so many times as much as the best one are not compared any further, but
 /// for a few.
@@ -240,7 +241,10 @@ class Search {
                      [](const LineSet& a, const LineSet& b) { return a.least < b.least; });
     std::vector<Trial> trials;
     for (LineSet& set : sets) {
-      if (trials.size() > 0 && trials.size() + set.trials.size() > kPromising) break;
+      if (trials.size() > 0 && (trials.size() + set.trials.size() > kPromising ||
+                                set.least > kHopelessSet * sets.front().least)) {
+        break;
+      }
       trials.insert(trials.end(), std::make_move_iterator(set.trials.begin()),
                     std::make_move_iterator(set.trials.end()));
     }
@@ -250,7 +254,8 @@ class Search {
     tbb::parallel_for(std::size_t{0}, trials.size(), [&](std::size_t t) {
       TrainFit fit = rough_fit(fewer, trials[t].arrangement, 12);
       if (std::isfinite(fit.rms)) {
-        fit = fit_train(fewer, fit.model, free_glass, {.iterations = 8}, progress_.silent());
+        fit = fit_train(fewer, fit.model, free_glass,
+                        {.iterations = 8, .tolerance = kRoughTolerance}, progress_.silent());
       }
       trials[t].fit = std::move(fit);
     });
@@ -280,8 +285,9 @@ class Search {
     TrainFit fit;
     for (const double thinner : {1.0, 0.92, 0.85}) {
       for (const double index : {1.6, 1.85}) {
-        fit = fit_train(grid, start(arrangement, index, thinner), start_freedom_,
-                        {.iterations = iterations}, progress_.silent());
+        fit =
+            fit_train(grid, start(arrangement, index, thinner), start_freedom_,
+                      {.iterations = iterations, .tolerance = kRoughTolerance}, progress_.silent());
         if (std::isfinite(fit.rms)) return fit;
       }
     }
@@ -398,7 +404,9 @@ class Search {
       auto fit = fit_whole(compared_, model, freedom, motion, 10);
       if (!fit) return false;
       const double limit = best ? std::min(outlier_limit(*best), outlier_limit(*fit)) : 0;
-      if (best && evidence(*fit, limit) >= evidence(*best, limit)) return false;
+      // Constant speed is no worse a description than a curve that fits by chance.
+      const double lead = best && chosen.length == 0 ? kFairLead : 0;
+      if (best && evidence(*fit, limit) + lead >= evidence(*best, limit)) return false;
       best = std::move(fit);
       chosen = motion;
       return true;

@@ -674,7 +674,7 @@ TrainFit fit_train(const ShotGrid& grid, const TrainModel& start, const TrainFre
       cost = trial_cost;
       fresh = false;
       // A damped step along a narrow valley gains little too.
-      const bool flat = gained < 1e-7 && damping <= 1e-8;
+      const bool flat = gained < options.tolerance && damping <= 1e-8;
       damping = std::max(damping * 0.03, 1e-12);
       if (flat) break;
     }

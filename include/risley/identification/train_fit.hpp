@@ -90,6 +90,7 @@ struct TrainFit {
 
 struct TrainFitOptions {
   int iterations = 30;
+  double tolerance = 1e-7;  ///< a step that gains a smaller share of the sum of squares is the last
   bool without_outliers = false;  ///< they are left out once the fit stands: outlier_limit()
   bool covariance = false;
 };
