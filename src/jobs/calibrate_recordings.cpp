@@ -83,11 +83,14 @@ RangedRecording read_and_estimate(const CalibrateRecordingsOptions& options, std
         fmt::format("{} holds no ranges: there is nothing to calibrate on", path));
   }
   estimation::EstimateOptions settings;
-  settings.sensor = chosen_sensor(options.sensor, input.recording.header);
+  settings.sensor = input.choice.sensor;
   settings.angle_noise = options.angle_noise;
   settings.cartesian = input.whole_steps;
   settings.mirrored = options.mirrored;
-  if (number == 0) result.nominal = settings.sensor;
+  if (number == 0) {
+    result.nominal = settings.sensor;
+    result.choice = input.choice;
+  }
   for (const std::string& text : input.warnings) {
     result.warnings.push_back(fmt::format("{}: {}", path, text));
   }
