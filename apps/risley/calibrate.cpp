@@ -105,7 +105,7 @@ ExitStatus run_calibration(const CalibrateCommandOptions& options, const CommonO
   for (const std::string& warning : c.warnings) spdlog::warn(warning);
   if (!c.converged) spdlog::error("not converged: {}", c.reason);
   if (common.json) {
-    print_json(calibration_json(outcome, now() - started));
+    print_json(common, calibration_json(outcome, now() - started), outcome.provenance);
   } else {
     print_calibration(outcome);
   }
@@ -125,7 +125,7 @@ ExitStatus run_plan(const CalibrateCommandOptions& options, const CommonOptions&
     planned = jobs::plan_calibration(job, bar.progress());
   }
   if (common.json) {
-    print_json(forecast_json(planned.forecast, planned.shape));
+    print_json(common, forecast_json(planned.forecast, planned.shape));
   } else {
     print_forecast(planned.forecast, planned.shape);
   }

@@ -68,12 +68,12 @@ ExitStatus run_pattern(const PatternOptions& options, const CommonOptions& commo
     return kDone;
   }
   if (common.json) {
-    print_json({{"rows", written.rows},
-                {"blocked", written.blocked},
-                {"sensor", written.sensor},
-                {"format", options.format},
-                {"firing", written.firing},
-                {"output", options.output}});
+    print_json(common, {{"rows", written.rows},
+                        {"blocked", written.blocked},
+                        {"sensor", written.sensor},
+                        {"format", options.format},
+                        {"firing", written.firing},
+                        {"output", options.output}});
     return kDone;
   }
   fmt::print("{}: {} shots of sensor {}\n", options.output, grouped(written.rows), written.sensor);

@@ -134,6 +134,41 @@ constexpr double kEnlarged = 1.1;
 /// As are residuals above their stated sigma by this factor, where no variance was enlarged.
 constexpr double kNoticed = 1.3;
 
+/// Parameters and speeds further from the preset's than this, in its sigmas, are unusual.
+constexpr double kUnusual = 3.0;
+
+/// What lies far from the preset, as words; empty when nothing does.
+std::string unusual_values(const Estimate& estimate, const sensors::Sensor& nominal) {
+  std::string words;
+  const auto add = [&words](const std::string& name, double sigmas) {
+    words += fmt::format("{}{} lies {:.1f} sigma from the preset's", words.empty() ? "" : ", ",
+                         name, sigmas);
+  };
+  for (std::size_t i = 0; i < estimate.free.size(); ++i) {
+    const FreeParameter& parameter = estimate.free[i];
+    const sensors::Knowledge* known = nominal.find_knowledge(parameter.name);
+    const double sigma =
+        known != nullptr && known->sigma > 0 ? known->sigma : parameter.prior_sigma;
+    const auto at = static_cast<Eigen::Index>(i);
+    const double change = estimate.parameters[at] - nominal.train[parameter.places[0]];
+    const double sigmas =
+        std::abs(change) / std::hypot(sigma, std::sqrt(estimate.covariance(at, at)));
+    if (sigmas > kUnusual) add(parameter.name, sigmas);
+  }
+  for (const EstimatedValue& value : estimate.values) {
+    if (!value.name.starts_with("angular_velocity")) continue;
+    const sensors::Sensor turning = estimate.sensor.combination && nominal.combination
+                                        ? with_combination(nominal, *estimate.sensor.combination)
+                                        : nominal;
+    const sensors::Knowledge* known = turning.find_knowledge(value.name);
+    if (known == nullptr || !(known->sigma > 0)) continue;
+    const double sigmas =
+        std::abs(value.value - turning.get(value.name)) / std::hypot(known->sigma, value.sigma);
+    if (sigmas > kUnusual) add(value.name, sigmas);
+  }
+  return words;
+}
+
 /// Says how the recording's frame is turned.
 std::string frame_words(const Estimate& estimate) {
   const FrameEstimate& frame = *estimate.frame_turn;
@@ -152,8 +187,41 @@ std::string frame_words(const Estimate& estimate) {
       has_sigma ? "" : " (held at what the start found)");
 }
 
+/// Completes the verdict: its code where the estimate converged, and its words.
+void say_verdict(Estimate& estimate, const std::vector<std::string>& oddities) {
+  EstimateVerdict& verdict = estimate.verdict;
+  if (estimate.converged) {
+    verdict.code = oddities.empty() ? EstimateCode::consistent : EstimateCode::unusual;
+  }
+  switch (verdict.code) {
+    case EstimateCode::consistent:
+      verdict.words =
+          "the directions agree with the sensor's own belief; walls have not been asked";
+      verdict.to_do = "nothing; calibrating on walls tells where the beam truly goes";
+      break;
+    case EstimateCode::unusual:
+      verdict.words = "the model describes the directions, but " + oddities.front();
+      for (std::size_t i = 1; i < oddities.size(); ++i) verdict.words += "; " + oddities[i];
+      verdict.to_do =
+          "compare it with an earlier recording of the unit, and calibrate it on walls before its "
+          "points are relied on";
+      break;
+    case EstimateCode::inconsistent:
+      verdict.words = estimate.reason;
+      verdict.to_do =
+          "see whether sensor, times, frame and elevation are those of the recording (option "
+          "sensor, option shot_rate, option extrinsics, option mirrored), and whether the sensor "
+          "stood still";
+      break;
+    case EstimateCode::undecided:
+      verdict.words = estimate.reason;
+      verdict.to_do = "record longer or with more of the field of view, or hold what is not told";
+      break;
+  }
+}
+
 /// Says whether the result can be believed.
-void judge(Estimate& estimate, const PrismTrain& nominal) {
+void judge(Estimate& estimate, const sensors::Sensor& nominal) {
   const double rms = std::sqrt(0.5 * (estimate.azimuth_moments.rms * estimate.azimuth_moments.rms +
                                       estimate.zenith_moments.rms * estimate.zenith_moments.rms));
   // Rounding may differ from shot to shot; the unit variance weighs each by its own.
@@ -168,12 +236,14 @@ void judge(Estimate& estimate, const PrismTrain& nominal) {
       fmt::format("residuals of {:.3g} deg where noise and rounding amount to {:.3g} deg",
                   degrees_from_radians(rms), degrees_from_radians(estimate.expected_residual));
   estimate.converged = true;
-  const auto fail = [&](std::string reason) {
+  std::vector<std::string> oddities;  // of the unit
+  const auto fail = [&](std::string reason, EstimateCode code = EstimateCode::inconsistent) {
     estimate.converged = false;
     estimate.reason = std::move(reason);
+    estimate.verdict.code = code;
   };
   if (!std::isfinite(ratio)) {
-    fail("no residual could be formed");
+    fail("no residual could be formed", EstimateCode::undecided);
   } else if (outlier_share > 0.3) {
     fail(
         fmt::format("{:.0f} % of the shots do not fit the model: wrong sensor, speed combination "
@@ -190,15 +260,16 @@ void judge(Estimate& estimate, const PrismTrain& nominal) {
                     degrees_from_radians(estimate.usual_residual)));
   } else if (!estimate.unobservable.empty()) {
     const WeakDirection& worst = estimate.unobservable.front();
-    fail(
-        fmt::format("the data do not tell the combination {} (in units of 1 deg, or 0.01 of an "
-                    "index; its sigma "
-                    "is {:.2g} of them): hold one of these fixed, or record longer",
-                    direction_text(worst), worst.sigma));
-  } else if (std::string words = implausible_parameter(estimate, nominal); !words.empty()) {
+    fail(fmt::format("the data do not tell the combination {} (in units of 1 deg, or 0.01 of an "
+                     "index; its sigma "
+                     "is {:.2g} of them): hold one of these fixed, or record longer",
+                     direction_text(worst), worst.sigma),
+         EstimateCode::undecided);
+  } else if (std::string words = implausible_parameter(estimate, nominal.train); !words.empty()) {
     fail(std::move(words));
   } else if (!estimate.settled) {
-    fail("the last steps still moved parameters by more than a tenth of their sigma");
+    fail("the last steps still moved parameters by more than a tenth of their sigma",
+         EstimateCode::undecided);
   } else if (estimate.unit_variance > kEnlarged && estimate.variance_factor > 1.0) {
     estimate.warnings.push_back(residuals + ": the sigmas were enlarged by that factor");
   } else if (ratio > kNoticed) {
@@ -216,6 +287,7 @@ void judge(Estimate& estimate, const PrismTrain& nominal) {
                     estimate.noise.value.rms() / estimate.usual_noise,
                     degrees_from_radians(estimate.noise.value.rms()),
                     degrees_from_radians(estimate.usual_noise)));
+    oddities.push_back(estimate.warnings.back());
   }
   double unevenness = 1.0;
   std::size_t uneven = 0;
@@ -231,6 +303,7 @@ void judge(Estimate& estimate, const PrismTrain& nominal) {
         "them): the model lacks something that this sensor has, or a parameter is held at a wrong "
         "value; the sigmas do not cover that",
         prism_letter(static_cast<int>(uneven)), unevenness));
+    oddities.push_back(estimate.warnings.back());
   }
   if (estimate.autocorrelation.factor > 1.05) {
     estimate.warnings.push_back(fmt::format(
@@ -247,7 +320,12 @@ void judge(Estimate& estimate, const PrismTrain& nominal) {
   if (estimate.converged && outlier_share > 0.02) {
     estimate.warnings.push_back(
         fmt::format("{:.1f} % of the shots were left out as outliers", 100 * outlier_share));
+    oddities.push_back(estimate.warnings.back());
   }
+  if (std::string words = unusual_values(estimate, nominal); !words.empty()) {
+    oddities.push_back(std::move(words));
+  }
+  say_verdict(estimate, oddities);
 }
 
 /// Mean residuals over every prism's angle, of all shots that were used.
@@ -392,6 +470,20 @@ Start start_anywhere(const AngleSeries& series, const AngleSeries& head,
 
 }  // namespace
 
+const char* to_string(EstimateCode code) {
+  switch (code) {
+    case EstimateCode::consistent:
+      return "consistent";
+    case EstimateCode::unusual:
+      return "unusual";
+    case EstimateCode::inconsistent:
+      return "inconsistent";
+    case EstimateCode::undecided:
+      break;
+  }
+  return "undecided";
+}
+
 const char* to_string(Method method) { return method == Method::map ? "map" : "ekf"; }
 
 std::vector<FreeParameter> chosen_parameters(const EstimateOptions& options) {
@@ -477,7 +569,7 @@ Estimate estimate(Method method, AngleSeries series, const AngleSeries& head,
       options.sensor, with_free_values(options.sensor.train, estimate.free, estimate.parameters),
       estimate);
   estimate.residuals_over_angle = profiles(estimate);
-  judge(estimate, options.sensor.train);
+  judge(estimate, options.sensor);
   return estimate;
 }
 

@@ -120,10 +120,11 @@ EmitterFit fit_of(const RotorLines& found, const std::vector<Complex>& expected,
 }
 
 /// @param expected  [emitters], as the recording has them: mirrored where it is
-EmitterFit emitter_fit(const RotorLines& found, const std::vector<Complex>& expected, Beams beams) {
+EmitterFit emitter_fit(const RotorLines& found, const std::vector<Complex>& expected,
+                       BeamSource beams) {
   const std::size_t count = expected.size();
   EmitterFit best;
-  if (beams == Beams::recorded) {
+  if (beams == BeamSource::recorded) {
     const bool known = std::all_of(found.emitters.begin(), found.emitters.end(),
                                    [&](const EmitterConstant& one) { return one.beam < count; });
     return known ? fit_of(found, expected, {}) : best;
@@ -168,12 +169,12 @@ AngleSeries in_frame(const AngleSeries& shots, const Eigen::Matrix3d& frame) {
 /// Matches lines of sensors with shots, in one frame of the recording after the other.
 class LineMatcher {
  public:
-  LineMatcher(std::span<const sensors::Sensor> candidates, Beams beams)
+  LineMatcher(std::span<const sensors::Sensor> candidates, BeamSource beams)
       : beams_(beams), matches_(candidates.size()) {
     for (std::size_t i = 0; i < candidates.size(); ++i) {
       matches_[i].candidate = i;
-      candidates_.push_back({sensors::in_all_combinations(candidates[i]),
-                             nominal_lines(candidates[i].train)});
+      candidates_.push_back(
+          {sensors::in_all_combinations(candidates[i]), nominal_lines(candidates[i].train)});
     }
   }
 
@@ -229,9 +230,9 @@ class LineMatcher {
   /// Best first.
   std::vector<SensorMatch> sorted() const {
     std::vector<SensorMatch> result = matches_;
-    std::stable_sort(
-        result.begin(), result.end(),
-        [](const SensorMatch& a, const SensorMatch& b) { return a.misfit < b.misfit; });
+    std::stable_sort(result.begin(), result.end(), [](const SensorMatch& a, const SensorMatch& b) {
+      return a.misfit < b.misfit;
+    });
     return result;
   }
 
@@ -241,7 +242,7 @@ class LineMatcher {
     NominalLines lines;
   };
 
-  Beams beams_;
+  BeamSource beams_;
   std::vector<Candidate> candidates_;
   std::vector<SensorMatch> matches_;
 };
@@ -254,7 +255,7 @@ bool lines_decide(const std::vector<SensorMatch>& matches) {
 }  // namespace
 
 SensorRecognition recognise_sensor(const AngleSeries& head,
-                                   std::span<const sensors::Sensor> candidates, Beams beams) {
+                                   std::span<const sensors::Sensor> candidates, BeamSource beams) {
   SensorRecognition result;
   if (candidates.empty()) return result;
   const ShotRange window = LineSearch(head).shots();
@@ -264,8 +265,8 @@ SensorRecognition recognise_sensor(const AngleSeries& head,
   result.matches = matcher.sorted();
   if (!lines_decide(result.matches) || std::abs(axis) > kAxisFound) {
     const bool near = lines_decide(result.matches);
-    Eigen::Matrix3d frame = near ? frame_with_axis(Eigen::Matrix3d::Identity(), axis)
-                                 : frame_about_mean(shots);
+    Eigen::Matrix3d frame =
+        near ? frame_with_axis(Eigen::Matrix3d::Identity(), axis) : frame_about_mean(shots);
     for (int round = 0; round < kMostFrames; ++round) {
       axis = matcher.try_frame(shots, frame);
       if (std::abs(axis) < kAxisFound || std::abs(axis) > kAxisLost) break;
@@ -295,9 +296,9 @@ SensorRecognition recognise_sensor(const AngleSeries& head,
 }
 
 std::optional<double> start_residual(const AngleSeries& head, const sensors::Sensor& sensor,
-                                     const FiringOrder& order, Beams beams) {
+                                     const FiringOrder& order, BeamSource beams) {
   AngleSeries shots = head;
-  if (beams == Beams::counted) number_beams(shots, sensor, order);
+  if (beams == BeamSource::counted) number_beams(shots, sensor, order);
   StartOptions options;
   EstimateOptions usual;
   usual.sensor = sensor;
@@ -322,11 +323,10 @@ void number_beams(AngleSeries& series, const sensors::Sensor& sensor, const Firi
 
 std::optional<std::size_t> smallest_field(const AngleSeries& head,
                                           std::span<const sensors::Sensor> candidates,
-                                          Beams beams) {
+                                          BeamSource beams) {
   if (head.size() == 0) return std::nullopt;
-  const int last_beam = beams == Beams::counted
-                            ? 0
-                            : *std::max_element(head.beam.begin(), head.beam.end());
+  const int last_beam =
+      beams == BeamSource::counted ? 0 : *std::max_element(head.beam.begin(), head.beam.end());
   std::optional<std::size_t> best;
   for (const AngleSeries& shots : {head, in_frame(head, frame_about_mean(head))}) {
     for (std::size_t i = 0; i < candidates.size(); ++i) {

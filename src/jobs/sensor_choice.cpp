@@ -21,7 +21,7 @@ namespace risley::jobs {
 namespace {
 
 using estimation::AngleSeries;
-using estimation::Beams;
+using estimation::BeamSource;
 using estimation::SensorMatch;
 using estimation::SensorRecognition;
 using sensors::Sensor;
@@ -64,7 +64,7 @@ std::vector<Sensor> variants_of(const Sensor& sensor) {
 /// The first shots of a recording and what their beams are.
 struct FirstShots {
   AngleSeries head;
-  Beams beams = Beams::recorded;
+  BeamSource beams = BeamSource::recorded;
 };
 
 FirstShots first_shots(const std::string& path, const recordings::ReadOptions& reading,
@@ -77,7 +77,7 @@ FirstShots first_shots(const std::string& path, const recordings::ReadOptions& r
   }
   int emitters = 1;
   for (const Sensor& sensor : candidates) emitters = std::max(emitters, sensor.train.emitters());
-  shots.beams = Beams::counted;
+  shots.beams = BeamSource::counted;
   for (std::size_t i = 0; i < shots.head.size(); ++i) {
     const double shot = 1e-9 * static_cast<double>(shots.head.time_ns[i]) * *reading.shot_rate;
     shots.head.beam[i] = static_cast<std::uint8_t>(std::llround(shot) % emitters);
@@ -118,11 +118,10 @@ void take(const SensorRecognition& found, std::span<const Sensor> candidates,
 }
 
 std::string comparison(const std::vector<PresetMisfit>& misfits) {
-  std::string text =
-      fmt::format("{} leaves {}", misfits[0].preset, misfit_text(misfits[0].misfit));
+  std::string text = fmt::format("{} leaves {}", misfits[0].preset, misfit_text(misfits[0].misfit));
   if (misfits.size() > 1) {
-    text += fmt::format(", the next one, {}, {}", misfits[1].preset,
-                        misfit_text(misfits[1].misfit));
+    text +=
+        fmt::format(", the next one, {}, {}", misfits[1].preset, misfit_text(misfits[1].misfit));
   }
   return text;
 }
@@ -131,10 +130,8 @@ std::string comparison(const std::vector<PresetMisfit>& misfits) {
 void try_variants(const FirstShots& shots, SensorChoice& choice) {
   const std::vector<Sensor> variants = variants_of(choice.sensor);
   if (variants.empty()) return;
-  const auto own =
-      estimation::start_residual(shots.head, choice.sensor, choice.order, shots.beams);
-  const double rounding =
-      std::sqrt(shots.head.zenith_rounding_variance[shots.head.size() / 2]);
+  const auto own = estimation::start_residual(shots.head, choice.sensor, choice.order, shots.beams);
+  const double rounding = std::sqrt(shots.head.zenith_rounding_variance[shots.head.size() / 2]);
   if (!own || *own < kPoorOptics * std::hypot(choice.sensor.angle_noise, rounding)) return;
   for (const Sensor& variant : variants) {
     const auto other = estimation::start_residual(shots.head, variant, choice.order, shots.beams);
@@ -159,8 +156,8 @@ void guess(const FirstShots& shots, const std::optional<SensorRecognition>& foun
            std::span<const Sensor> candidates, SensorChoice& choice) {
   if (found && found->fits) {
     take(*found, candidates, choice);
-    call_it_a_guess(choice, "others describe the shots nearly as well: " +
-                                comparison(choice.misfits));
+    call_it_a_guess(choice,
+                    "others describe the shots nearly as well: " + comparison(choice.misfits));
     return;
   }
   std::optional<std::size_t> place;
@@ -236,13 +233,11 @@ SensorChoice choose_by_name(const FirstShots& shots, const Sensor& named,
   const auto found = recognised(shots, candidates);
   if (!found || !found->decided || candidates[found->matches.front().candidate].name == named.name)
     return choice;
-  choice.misfits.insert(choice.misfits.begin(),
-                        {candidates[found->matches.front().candidate].name,
-                         misfit_of(found->matches.front())});
+  choice.misfits.insert(choice.misfits.begin(), {candidates[found->matches.front().candidate].name,
+                                                 misfit_of(found->matches.front())});
   choice.warnings.push_back(fmt::format(
       "the file names a {}, but its scan is that of a {}: {}; option sensor says which it was",
-      named.model, candidates[found->matches.front().candidate].model,
-      comparison(choice.misfits)));
+      named.model, candidates[found->matches.front().candidate].model, comparison(choice.misfits)));
   return choice;
 }
 
@@ -317,8 +312,8 @@ SensorChoice choose_sensor(const std::string& path, const recordings::ReadOption
     return choice;
   }
   if (!has_times) return choose_without_times(path, reading, candidates, progress);
-  const FirstShots shots = one_sensor ? first_shots(path, reading, candidates, progress)
-                                      : FirstShots{};
+  const FirstShots shots =
+      one_sensor ? first_shots(path, reading, candidates, progress) : FirstShots{};
   if (named != nullptr && !device.type_inferred) {
     return choose_by_name(shots, *named, candidates);
   }

@@ -11,6 +11,7 @@
 #include "risley/estimation/diagnostics.hpp"
 #include "risley/estimation/initialisation.hpp"
 #include "risley/estimation/solution.hpp"
+#include "risley/estimation/verdict.hpp"
 #include "risley/estimation/weak_directions.hpp"
 
 namespace risley::estimation {
@@ -57,7 +58,8 @@ struct EstimatedValue {
 struct Estimate : Solution {
   Method method = Method::map;  ///< to be told, not to be asked: every method answers alike
   bool converged = false;
-  std::string reason;                 ///< why not converged; empty when converged
+  std::string reason;  ///< why not converged; empty when converged
+  EstimateVerdict verdict;
   std::vector<std::string> warnings;  ///< what the user should know all the same
   sensors::Sensor sensor;             ///< the calibrated sensor with its covariance
   bool mirrored = false;

@@ -15,7 +15,7 @@
 namespace risley::estimation {
 
 /// How the beams of a recording's shots are known.
-enum class Beams {
+enum class BeamSource {
   recorded,  ///< the file names them
   counted,   ///< in turn from the first shot, which may be of any emitter
 };
@@ -46,7 +46,7 @@ struct SensorMatch {
 /// What the shots say of the sensor that fired them.
 struct SensorRecognition {
   std::vector<SensorMatch> matches;  ///< of every candidate, best first
-  bool fits = false;     ///< the best one describes the shots, as far as lines can
+  bool fits = false;                 ///< the best one describes the shots, as far as lines can
   bool decided = false;  ///< and every other one leaves at least kClearlyWorse times as much
 };
 
@@ -60,11 +60,11 @@ inline constexpr double kClearlyWorse = 1.5;
 /// @param head  every shot of about the first second, as recorded
 /// @throws EstimationError as LineSearch
 SensorRecognition recognise_sensor(const AngleSeries& head,
-                                   std::span<const sensors::Sensor> candidates, Beams beams);
+                                   std::span<const sensors::Sensor> candidates, BeamSource beams);
 
 /// Residuals of a start with a sensor's optics, rad; empty where there is no start.
 std::optional<double> start_residual(const AngleSeries& head, const sensors::Sensor& sensor,
-                                     const FiringOrder& order, Beams beams);
+                                     const FiringOrder& order, BeamSource beams);
 
 /// The beams of a sensor instead of those that were counted; one emitter fires all.
 void number_beams(AngleSeries& series, const sensors::Sensor& sensor, const FiringOrder& order);
@@ -73,6 +73,7 @@ void number_beams(AngleSeries& series, const sensors::Sensor& sensor, const Firi
 /// shots without times, or too few, tell.
 /// @return its place; empty when no field holds them
 std::optional<std::size_t> smallest_field(const AngleSeries& head,
-                                          std::span<const sensors::Sensor> candidates, Beams beams);
+                                          std::span<const sensors::Sensor> candidates,
+                                          BeamSource beams);
 
 }  // namespace risley::estimation

@@ -37,7 +37,7 @@ struct EmitterConstant {
 struct RotorLines {
   /// In the order of the speeds they were looked for with; all zero for a rotor that stands still.
   std::vector<SpectralLine> lines;
-  Complex constant;        ///< where the optical axis stands: y + iz, mean of the shots' emitters
+  Complex constant;  ///< where the optical axis stands: y + iz, mean of the shots' emitters
   std::vector<EmitterConstant> emitters;  ///< those that have shots
   double unexplained = 0;  ///< mean square of what the fit leaves, of the unit vector
   /// How that grows with a change of the lines' complex amplitudes, as change^H normal change,

@@ -33,7 +33,8 @@ std::string to_string(ChosenBy chosen_by);
 /// How well a preset describes the shots of a recording.
 struct PresetMisfit {
   std::string preset;
-  double misfit = 0;  ///< rms of what its lines leave, or its optics where lines did not decide, rad
+  double misfit =
+      0;  ///< rms of what its lines leave, or its optics where lines did not decide, rad
 };
 
 /// The sensor that made a recording, as far as it is known.
