@@ -183,7 +183,7 @@ void note_files(const CLI::App& verb, CommonOptions& common) {
   for (const CLI::App* sub : verb.get_subcommands()) note_files(*sub, common);
 }
 
-Json json_head(const CommonOptions& common, const jobs::Provenance& known) {
+Json with_head(const CommonOptions& common, const Json& object, const jobs::Provenance& known) {
   constexpr int kFormatVersion = 1;
   Json inputs = Json::array();
   const auto add = [&](const std::string& path) {
@@ -197,8 +197,7 @@ Json json_head(const CommonOptions& common, const jobs::Provenance& known) {
     if (one["sha256"].is_null() && !interrupted.is_set() &&
         std::filesystem::is_regular_file(path, ignored)) {
       try {
-        one["sha256"] = io::sha256_of_file(
-            path, {[](double, std::string_view) {}, &interrupted});
+        one["sha256"] = io::sha256_of_file(path, {[](double, std::string_view) {}, &interrupted});
       } catch (const FileError&) {  // the verb says what is wrong with it
       } catch (const Cancelled&) {
       }
@@ -207,15 +206,16 @@ Json json_head(const CommonOptions& common, const jobs::Provenance& known) {
   };
   for (const std::string& path : common.inputs) add(path);
   for (const std::string& path : common.files) add(path);
-  return {{"format_version", kFormatVersion},
-          {"version", RISLEY_VERSION},
-          {"command", common.command},
-          {"inputs", inputs}};
+  Json whole = {{"format_version", kFormatVersion},
+                {"version", RISLEY_VERSION},
+                {"command", common.command},
+                {"inputs", inputs}};
+  whole.update(object);
+  return whole;
 }
 
 void print_json(const CommonOptions& common, const Json& object, const jobs::Provenance& known) {
-  Json whole = json_head(common, known);
-  whole.update(object);
+  const Json whole = with_head(common, object, known);
   // Serial numbers come from files and may hold bytes that are no UTF-8.
   const std::string text = whole.dump(2, ' ', false, Json::error_handler_t::replace);
   fmt::print("{}\n", text);

@@ -119,12 +119,12 @@ std::optional<double> noise_angle(const std::optional<double>& noise_angle_deg);
 /// Fills inputs and files from what was typed for a verb.
 void note_files(const CLI::App& verb, CommonOptions& common);
 
-/// What every object begins with: format_version, version, command, inputs with their SHA-256, null
-/// where a file cannot be read.
+/// An object behind what every one begins with: format_version, version, command, inputs with their
+/// SHA-256, null where a file cannot be read.
 /// @param known  hashes that were computed before, as jobs::with_inputs() has them
-Json json_head(const CommonOptions& common, const jobs::Provenance& known = {});
+Json with_head(const CommonOptions& common, const Json& object, const jobs::Provenance& known = {});
 
-/// Prints one JSON object, behind json_head(), and a line feed on stdout.
+/// Prints one JSON object, with_head(), and a line feed on stdout.
 void print_json(const CommonOptions& common, const Json& object,
                 const jobs::Provenance& known = {});
 

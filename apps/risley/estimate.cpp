@@ -154,8 +154,10 @@ Json outcome_json(const EstimatedRecording& outcome, double total_time) {
   const TrainShape shape = e.sensor.shape();
   Json parameters = Json::object();
   for (const estimation::EstimatedValue& value : e.values) {
-    parameters[value.name] = {{"value", in_file_unit(value.name, value.value, shape)},
-                              {"sigma", in_file_unit(value.name, value.sigma, shape)}};
+    parameters[value.name] = {
+        {"value", in_file_unit(value.name, value.value, shape)},
+        {"sigma", in_file_unit(value.name, value.sigma, shape)},
+        {"sigma_given_held", in_file_unit(value.name, value.sigma_given_held, shape)}};
   }
   Json rotors = Json::array(), jerks = Json::array(), unobservable = Json::array();
   for (const estimation::RotorProcess& process : e.rotor_process) {

@@ -127,7 +127,6 @@ void print_audit(const InspectedRecording& found) {
                                    ? "a guess "
                                    : "",
                                found.choice->words)});
-    for (const std::string& warning : found.choice->warnings) spdlog::warn(with_flags(warning));
   } else {
     table.add({"sensor", sensor_name(header)});
   }
@@ -226,6 +225,11 @@ ExitStatus run_info(const InfoCommandOptions& options, const CommonOptions& comm
                                     bar.progress());
   }
   log_warnings(options.input, found.warnings);
+  if (found.choice) {
+    for (const std::string& warning : found.choice->warnings) {
+      spdlog::warn("{}: {}", options.input, with_flags(warning));
+    }
+  }
   if (found.damage) spdlog::error(found.damage->what());
   if (common.json) {
     Json object = audit_json(found);

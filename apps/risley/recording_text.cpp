@@ -31,6 +31,8 @@ std::string sensor_name(const jobs::SensorChoice& choice) {
 }
 
 Json choice_json(const jobs::SensorChoice& choice) {
+  std::vector<std::string> warnings = choice.warnings;
+  put_flags(warnings);
   Json misfits = Json::array();
   for (const jobs::PresetMisfit& one : choice.misfits) {
     const bool has_lines = std::isfinite(one.misfit);
@@ -44,7 +46,8 @@ Json choice_json(const jobs::SensorChoice& choice) {
           {"sensor_choice",
            {{"words", choice.words},
             {"fits", choice.fits ? Json(*choice.fits) : Json()},
-            {"misfits", misfits}}}};
+            {"misfits", misfits},
+            {"warnings", warnings}}}};
 }
 
 Json warnings_json(const std::vector<recordings::ReadWarning>& warnings) {

@@ -130,7 +130,7 @@ ExitStatus run_reproduce(const ReproduceCommandOptions& options, const CommonOpt
     ProgressBar bar("reproducing", common);
     found = reproduction::reproduce(settings, bar.progress());
   }
-  const Json object = reproduction_json(found, common, inputs);
+  const Json object = with_head(common, reproduction_json(found, common, inputs));
   const auto path = [&](const char* name) {
     return (std::filesystem::path(options.folder) / name).string();
   };

@@ -27,8 +27,8 @@ std::vector<EstimatedValue> named_values(const Estimate& estimate) {
   std::vector<EstimatedValue> values;
   for (std::size_t i = 0; i < estimate.free.size(); ++i) {
     const auto at = static_cast<Eigen::Index>(i);
-    values.push_back(
-        {estimate.free[i].name, estimate.parameters[at], std::sqrt(estimate.covariance(at, at))});
+    const double sigma = std::sqrt(estimate.covariance(at, at));
+    values.push_back({estimate.free[i].name, estimate.parameters[at], sigma, sigma});
   }
   const RotorStates& states = estimate.states;
   const RotorTrajectory& motion = estimate.trajectory;
@@ -51,14 +51,15 @@ std::vector<EstimatedValue> named_values(const Estimate& estimate) {
       time += 1e-9 * static_cast<double>(states.time_ns[last] - states.time_ns[first]);
     }
     EstimatedValue speed{fmt::format("angular_velocity_{}_deg_per_s", prism_letter(rotor)),
-                         states.angular_velocity[k][0], states.angular_velocity_sigma[k][0]};
+                         states.angular_velocity[k][0], states.angular_velocity_sigma[k][0], 0.0};
     if (time > 0) {
       speed.value = turned / time;
       speed.sigma = std::sqrt(turned_variance) / time;
     }
+    speed.sigma_given_held = speed.sigma;
     values.push_back(speed);
     angles.push_back({fmt::format("rotation_angle_{}_deg", prism_letter(rotor)),
-                      wrap_to_pi(angle[0]), std::sqrt(variance[0])});
+                      wrap_to_pi(angle[0]), std::sqrt(variance[0]), std::sqrt(variance[0])});
   }
   values.insert(values.end(), angles.begin(), angles.end());
   return values;
@@ -424,6 +425,75 @@ CoordinateRounding rounding_of(const Estimate& estimate, const EstimateOptions& 
   }
 }
 
+/// Parameters of the train that are held and that the sensor says may be off.
+std::vector<const sensors::Knowledge*> uncertain_held(const Estimate& estimate,
+                                                      const sensors::Sensor& nominal) {
+  std::vector<const sensors::Knowledge*> held;
+  const int prisms = nominal.prisms();
+  const auto fires = [&](int emitter) {
+    if (estimate.series.beam.empty()) return emitter == 0;
+    return std::find(estimate.series.beam.begin(), estimate.series.beam.end(), emitter) !=
+           estimate.series.beam.end();
+  };
+  const auto is_free = [&](int place) {
+    return std::any_of(estimate.free.begin(), estimate.free.end(), [&](const auto& free) {
+      return std::find(free.places.begin(), free.places.end(), place) != free.places.end();
+    });
+  };
+  for (const ParameterInfo& info : parameter_list(nominal.shape())) {
+    if (info.kind != ParameterKind::train) continue;
+    const sensors::Knowledge* known = nominal.find_knowledge(info.name);
+    if (known == nullptr || known->name != info.name || !(known->sigma > 0)) continue;
+    if (std::any_of(info.places.begin(), info.places.end(), is_free)) continue;
+    const int emitter = place::emitter(info.places.front(), prisms);
+    if (emitter >= 0 && !fires(emitter)) continue;  // no answer depends on it
+    held.push_back(known);
+  }
+  return held;
+}
+
+/// Widens the sigmas by what held parameters may be off by: each is moved by its sigma, and what
+/// that moves the answers by is theirs. Some of the shots do for that.
+void count_held_parameters(Estimate& estimate, const EstimateOptions& options,
+                           const Progress& progress) {
+  const auto held = uncertain_held(estimate, options.sensor);
+  if (held.empty()) return;
+  constexpr double kEnoughShots = 20000;
+  const double share = kEnoughShots / static_cast<double>(estimate.series.size());
+  Estimate part;
+  part.free = estimate.free;
+  std::vector<ShotRange> ranges = stretches(estimate.series);
+  const double step = 1e-9 * static_cast<double>(std::max<std::int64_t>(
+                                 1, median_step_ns(estimate.series.time_ns)));
+  part.series = share < 1 ? thinned(estimate.series, share / step, ranges) : estimate.series;
+  BatchMapOptions settings = map_options(estimate, options);
+  settings.angle_noise = usable_noise(estimate.noise.value);
+  settings.rotor_process = estimate.rotor_process;
+  const auto answers = [&](const sensors::Knowledge* moved) {
+    sensors::Sensor sensor = options.sensor;
+    Start start = estimate.start;
+    start.train = estimate.train;
+    if (moved != nullptr) {
+      const double value = sensor.train.get(moved->name) + moved->sigma;
+      sensor.train.set(moved->name, value);
+      start.train.set(moved->name, value);
+    }
+    static_cast<Solution&>(part) = run_batch_map(part.series, start, sensor, settings, progress);
+    part.states = states_of_knots(part, part.series);
+    return named_values(part);
+  };
+  const std::vector<EstimatedValue> as_held = answers(nullptr);
+  for (const sensors::Knowledge* parameter : held) {
+    const std::vector<EstimatedValue> moved = answers(parameter);
+    for (std::size_t i = 0; i < estimate.values.size(); ++i) {
+      const double change = moved[i].value - as_held[i].value;
+      const bool angle = estimate.values[i].name.starts_with("rotation_angle");
+      estimate.values[i].sigma =
+          std::hypot(estimate.values[i].sigma, angle ? wrap_to_pi(change) : change);
+    }
+  }
+}
+
 Solution solve(const Estimate& estimate, const EstimateOptions& options, const Progress& progress) {
   if (estimate.method == Method::map) {
     return run_batch_map(estimate.series, estimate.start, options.sensor,
@@ -568,6 +638,7 @@ Estimate estimate(Method method, AngleSeries series, const AngleSeries& head,
   estimate.sensor = calibrated_sensor(
       options.sensor, with_free_values(options.sensor.train, estimate.free, estimate.parameters),
       estimate);
+  count_held_parameters(estimate, options, progress.silent());
   estimate.residuals_over_angle = profiles(estimate);
   judge(estimate, options.sensor);
   return estimate;

@@ -50,7 +50,8 @@ std::vector<FreeParameter> chosen_parameters(const EstimateOptions& options);
 struct EstimatedValue {
   std::string name;
   double value = 0;
-  double sigma = 0;
+  double sigma = 0;             ///< what held parameters may be off by included
+  double sigma_given_held = 0;  ///< if they were exactly as held
 };
 
 /// Everything one estimation found: the solution, what it was found from, and whether to believe
