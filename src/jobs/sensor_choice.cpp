@@ -32,7 +32,7 @@ constexpr double kPoorOptics = 3.0, kBetterOptics = 0.5;
 /// Fewer shots do not fill a field of view.
 constexpr std::size_t kFewestInField = 1000;
 /// The emitters' firing order says the rest; smaller rolls are within what emitters may be off.
-constexpr double kLeastRoll = radians_from_degrees(10.0);
+constexpr double kLeastRoll = radians_from_degrees(20.0);
 
 /// The built-in presets of the types of sensors; those of single units, of reversed rotors and of
 /// the maker's sequences have longer names than that of their type.
@@ -229,12 +229,17 @@ SensorChoice choose_by_name(const FirstShots& shots, const Sensor& named,
   if (alone) take(*alone, {&named, 1}, choice);
   choice.chosen_by = ChosenBy::file;
   choice.words = "named by the file";
-  if (!alone || alone->fits) return choice;
+  if (!alone || !alone->matches.front().residual) return choice;  // lines decided
   const auto found = recognised(shots, candidates);
-  if (!found || !found->decided || candidates[found->matches.front().candidate].name == named.name)
-    return choice;
-  choice.misfits.insert(choice.misfits.begin(), {candidates[found->matches.front().candidate].name,
-                                                 misfit_of(found->matches.front())});
+  if (!found || !found->decided) return choice;
+  const SensorMatch& best = found->matches.front();
+  if (candidates[best.candidate].name == named.name) return choice;
+  choice.fits = false;
+  choice.misfits = {{candidates[best.candidate].name, misfit_of(best)}};
+  for (const SensorMatch& match : found->matches) {
+    if (candidates[match.candidate].name != named.name) continue;
+    choice.misfits.push_back({named.name, misfit_of(match)});
+  }
   choice.warnings.push_back(fmt::format(
       "the file names a {}, but its scan is that of a {}: {}; option sensor says which it was",
       named.model, candidates[found->matches.front().candidate].model, comparison(choice.misfits)));
