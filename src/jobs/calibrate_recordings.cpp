@@ -119,12 +119,13 @@ RangedRecording read_and_estimate(const CalibrateRecordingsOptions& options, std
   return recording;
 }
 
-/// calibration.yaml; what did not converge is no calibration.
+/// calibration.yaml; what did not converge is no calibration, nor what is not better.
 void write_files(const CalibrateRecordingsOptions& options, CalibratedRecordings& result,
                  ResultFolder& folder, const Progress& progress) {
   result.provenance = with_inputs(options.files.provenance, options.recordings, progress);
   result.provenance.emplace_back("datum", calibration::to_string(result.calibration.datum_kind));
-  if (result.calibration.converged) {
+  const bool better = result.calibration.verdict.code != calibration::CalibrationCode::not_better;
+  if (result.calibration.converged && (better || options.force)) {
     sensors::Sensor calibrated = result.calibration.sensor;
     calibrated.provenance = result.provenance;
     folder.add_calibration(calibrated);

@@ -2,9 +2,11 @@
 // SPDX-License-Identifier: MIT
 #include "risley/jobs/recording_input.hpp"
 
+#include <cmath>
 #include <optional>
 #include <utility>
 
+#include <Eigen/Geometry>
 #include <fmt/format.h>
 
 #include "risley/core/angle.hpp"
@@ -20,6 +22,18 @@ namespace {
 
 using estimation::StoredPoseUse;
 using recordings::Extrinsics;
+
+/// The pose that a roll about the optical axis amounts to: recorded = pose unrolled.
+Extrinsics roll_about_axis(double roll, const estimation::FrameTurn& frame) {
+  const Eigen::Matrix3d axis_frame = estimation::recording_from_sensor(frame);
+  const Eigen::Matrix3d turn =
+      axis_frame * Eigen::AngleAxisd(roll, Eigen::Vector3d::UnitX()) * axis_frame.transpose();
+  // Of Rz(yaw) Ry(pitch) Rx(roll).
+  return {std::atan2(turn(1, 0), turn(0, 0)),
+          std::atan2(-turn(2, 0), std::hypot(turn(0, 0), turn(1, 0))),
+          std::atan2(turn(2, 1), turn(2, 2)),
+          {}};
+}
 
 std::string share_text(double share) { return fmt::format("{:.1f} %", 100.0 * share); }
 
@@ -49,12 +63,12 @@ SensorFrameRecording open_in_sensor_frame(const std::string& path,
   recordings::ReadOptions turned_back = reading;
   if (!pose) {
     if (result.choice.roll == 0) return result;
-    turned_back.extrinsics = Extrinsics{0, 0, result.choice.roll, {}};
+    turned_back.extrinsics = roll_about_axis(result.choice.roll, result.choice.frame);
     result.reader = open_input(path, turned_back);
     result.turned_back = true;
     result.warnings.push_back(fmt::format(
         "the recording is rolled about the optical axis by {:.1f} deg, as the sensor's emitters "
-        "show: the shots were turned back into the sensor's frame",
+        "show: the shots were turned back by that",
         degrees_from_radians(result.choice.roll)));
     return result;
   }

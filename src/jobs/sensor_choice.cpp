@@ -109,6 +109,7 @@ void take(const SensorRecognition& found, std::span<const Sensor> candidates,
   choice.sensor = candidates[best.candidate];
   choice.fits = found.fits;
   choice.order = best.order;
+  choice.frame = best.frame;
   if (std::abs(best.roll) > kLeastRoll) choice.roll = best.roll;
   choice.misfits.clear();
   for (const SensorMatch& match : found.matches) {

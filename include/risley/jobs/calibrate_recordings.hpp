@@ -37,6 +37,7 @@ struct CalibrateRecordingsOptions {
   std::uint64_t seed = 0;
   std::vector<std::string> truths;  ///< OUT.truth.yaml of each recording to judge by, or none
   bool details = false;             ///< wanted in the result
+  bool force = false;               ///< write a calibration that is not better, too
   /// Names the outputs; without them nothing is written. States of several recordings are
   /// states_1.nc, states_2.nc, ...
   ResultFiles files;

@@ -47,10 +47,12 @@ struct SensorChoice {
   /// The sensor and the next best one, where the shots were asked.
   std::vector<PresetMisfit> misfits;
   std::vector<std::string> warnings;
-  /// Order in which its emitters fire where beams are counted, and the recording's roll about the
-  /// optical axis, rad; 0 where it is not known or small.
+  /// Order in which its emitters fire where beams are counted.
   estimation::FiringOrder order;
+  /// The recording's roll about the optical axis, rad; 0 where it is not known or small. And where
+  /// that axis stands in the recording, roughly.
   double roll = 0;
+  estimation::FrameTurn frame;
 };
 
 /// Chooses the sensor of a recording: the one that was asked for, that of the type which the file
