@@ -230,7 +230,8 @@ SensorChoice choose_by_name(const FirstShots& shots, const Sensor& named,
   if (alone) take(*alone, {&named, 1}, choice);
   choice.chosen_by = ChosenBy::file;
   choice.words = "named by the file";
-  if (!alone || !alone->matches.front().residual) return choice;  // lines decided
+  const bool by_lines = alone && alone->decided && !alone->matches.front().residual;
+  if (!alone || by_lines) return choice;
   const auto found = recognised(shots, candidates);
   if (!found || !found->decided) return choice;
   const SensorMatch& best = found->matches.front();
