@@ -37,8 +37,6 @@ constexpr double kMostMisfit = radians_from_degrees(4.0);
 constexpr double kFarWorse = 3.0;
 /// Optics are tried of sensors whose lines leave up to so many times as much as the best.
 constexpr double kWorthATrial = 3.0;
-/// A start that bends a parameter further than this, in prior sigmas, is of another sensor.
-constexpr double kBent = 15.0;
 /// Emitters tell the roll when what their constants leave is below this share of how far they
 /// stand apart.
 constexpr double kEmittersFit = 0.25;
@@ -308,14 +306,7 @@ std::optional<double> start_residual(const AngleSeries& head, const sensors::Sen
   options.angle_noise = sensor.angle_noise;
   options.mirrored.reset();
   try {
-    const Start start = find_start(shots, sensor, options);
-    const bool bent =
-        std::any_of(options.free.begin(), options.free.end(), [&](const FreeParameter& parameter) {
-          const int place = parameter.places.front();
-          return std::abs(start.train[place] - sensor.train[place]) > kBent * parameter.prior_sigma;
-        });
-    if (bent) return std::nullopt;
-    return start.residual_rms;
+    return find_start(shots, sensor, options).residual_rms;
   } catch (const EstimationError&) {
     return std::nullopt;
   } catch (const InvalidArgument&) {  // beams that it has not

@@ -97,7 +97,7 @@ class FilesTest(CommandTest):
                 text = process.communicate(timeout=60)[0]
             self.assertEqual(process.returncode, 130)
             told = json.loads(text)
-        self.assertEqual((told["error"], told["exit_status"]), ("interrupted", 130))
+            self.assertEqual((told["error"], told["exit_status"]), ("interrupted", 130))
             self.assertEqual(self.names(), before)
 
     def test_no_memory_is_a_fault_and_not_a_failed_estimate(self):
