@@ -80,7 +80,8 @@ _risley() {
       calibrate)
         choices="$common --output --method --planes --stations --station --plan --duration-s
           --rate-hz --noise-angle-deg --noise-range-m --sensor --fix --free --prior-sigma-deg
-          --range-offset-sigma-m --beam-origin --states --mirror --truth --shot-rate-hz --extrinsics" ;;
+          --range-offset-sigma-m --beam-origin --states --mirror --force --truth --shot-rate-hz
+          --extrinsics" ;;
       cloud)
         choices="$common --output --calibration --format --directions --beam-origin --covariance
           --beam-divergence --common-factors --rate-hz --noise-angle-deg --las-scale-m --time

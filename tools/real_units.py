@@ -21,7 +21,7 @@ PAGE = pathlib.Path(__file__).resolve().parent.parent / "docs" / "real-units.md"
 # Mark in the page: file, and how it has to be read.
 RECORDINGS = {
     "mid-40-hub-frame": ("real/mid-40-hub-frame.csv", ["--shot-rate-hz", "100000"]),
-    "tele-15": ("real/tele-15.pcd", ["--sensor", "tele-15", "--shot-rate-hz", "240385"]),
+    "tele-15": ("real/tele-15.pcd", ["--shot-rate-hz", "240385"]),
     "mid-40-sequence": ("livox-mid-40-sequence.csv", []),
 }
 

@@ -31,6 +31,7 @@ struct CalibrateCommandOptions {
                       beam_origin = "yes", states = "knots", mirror = "auto", plan;
   std::optional<double> noise_angle_deg, noise_range_m, prior_sigma_deg;
   double range_offset_sigma_m = 0.05, duration_s = 10.0;
+  bool force = false;
   ParameterWishes parameters;
   ReadingWishes reading;
 };
@@ -86,6 +87,7 @@ jobs::CalibrateRecordingsOptions job_of(const CalibrateCommandOptions& options,
   job.seed = common.seed;
   job.truths = options.truths;
   job.details = !options.folder.empty();
+  job.force = options.force;
   job.files = result_files(options.folder, options.states, common);
   return job;
 }
@@ -104,8 +106,12 @@ ExitStatus run_calibration(const CalibrateCommandOptions& options, const CommonO
   for (const std::string& warning : outcome.warnings) spdlog::warn(warning);
   for (const std::string& warning : c.warnings) spdlog::warn(warning);
   if (!c.converged) spdlog::error("not converged: {}", c.reason);
+  if (c.verdict.code == calibration::CalibrationCode::not_better && !options.force &&
+      !options.folder.empty()) {
+    spdlog::warn("calibration.yaml was not written, because it is not better: --force writes it");
+  }
   if (common.json) {
-    print_json(calibration_json(outcome, now() - started));
+    print_json(common, calibration_json(outcome, now() - started), outcome.provenance);
   } else {
     print_calibration(outcome);
   }
@@ -125,7 +131,7 @@ ExitStatus run_plan(const CalibrateCommandOptions& options, const CommonOptions&
     planned = jobs::plan_calibration(job, bar.progress());
   }
   if (common.json) {
-    print_json(forecast_json(planned.forecast, planned.shape));
+    print_json(common, forecast_json(planned.forecast, planned.shape));
   } else {
     print_forecast(planned.forecast, planned.shape);
   }
@@ -189,6 +195,9 @@ Run declare_calibrate(CLI::App& verb) {
                   "Whether the elevation in the files has the opposite sign; auto finds out")
       ->check(CLI::IsMember({"auto", "yes", "no"}))
       ->capture_default_str();
+  verb.add_flag("--force", o.force,
+                "Write calibration.yaml also where the verdict is that it is not better")
+      ->excludes("--plan");
   verb.add_option("--truth", o.truths,
                   "OUT.truth.yaml of each recording's simulation, to judge the calibration by")
       ->expected(1)

@@ -118,6 +118,8 @@ Json calibration_json(const CalibratedRecordings& outcome, double total_time) {
   std::vector<std::string> warnings = outcome.warnings;
   warnings.insert(warnings.end(), c.warnings.begin(), c.warnings.end());
   Json object = {
+      {"serial", outcome.recordings.front().serial()},
+      {"verdict", verdict_json(c.verdict)},
       {"converged", c.converged},
       {"reason", c.reason},
       {"method", c.method == calibration::CalibrationMethod::paper ? "paper" : "adjustment"},
@@ -143,6 +145,7 @@ Json calibration_json(const CalibratedRecordings& outcome, double total_time) {
         {"rotation_angles", outcome.angles_time},
         {"solve", outcome.solving_time},
         {"total", total_time}}}};
+  object.update(choice_json(outcome.choice));
   if (outcome.truth) {
     object["truth"] = {{"before", errors_json(outcome.truth->before)},
                        {"after", errors_json(outcome.truth->after)}};
@@ -154,6 +157,8 @@ void print_calibration(const CalibratedRecordings& outcome) {
   const Calibration& c = outcome.calibration;
   const TrainShape shape = c.sensor.shape();
   fmt::print("{}\n", c.converged ? "converged" : "NOT CONVERGED: " + c.reason);
+  fmt::print("{}: {}\n", to_string(c.verdict.code), with_flags(c.verdict.words));
+  fmt::print("sensor {}: {}\n", outcome.choice.sensor.name, outcome.choice.words);
   fmt::print(
       "{} points on {} planes, {:.2f} mm thick before, {:.2f} mm after; read {:.2f} s, rotation "
       "angles {:.2f} s, solved {:.2f} s\n\n",

@@ -100,11 +100,11 @@ ExitStatus write_beam_origin_map(const CloudCommandOptions& options,
   io::write_text_file(options.beam_origin_map,
                       report::beam_origin_page(found.map, calibration, provenance_of(common)));
   if (common.json) {
-    print_json({{"html", options.beam_origin_map},
-                {"beams", found.map.beams},
-                {"cells", found.map.size()},
-                {"y_m", {{"min", found.least_y}, {"max", found.greatest_y}}},
-                {"z_m", {{"min", found.least_z}, {"max", found.greatest_z}}}});
+    print_json(common, {{"html", options.beam_origin_map},
+                        {"beams", found.map.beams},
+                        {"cells", found.map.size()},
+                        {"y_m", {{"min", found.least_y}, {"max", found.greatest_y}}},
+                        {"z_m", {{"min", found.least_z}, {"max", found.greatest_z}}}});
   } else {
     fmt::print(
         "{}: beams start {:.1f} to {:.1f} mm beside the origin in Y, {:.1f} to {:.1f} mm in Z\n",

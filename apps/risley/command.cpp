@@ -3,11 +3,13 @@
 #include "command.hpp"
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
+#include <filesystem>
 #include <new>
 
 #include <fmt/format.h>
@@ -16,9 +18,8 @@
 #include "risley/cloud/rotor_tracking.hpp"
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
+#include "risley/io/sha256.hpp"
 #include "risley/recordings/reader.hpp"
-
-#include "option_names.hpp"
 
 namespace risley::app {
 namespace {
@@ -160,9 +161,63 @@ std::optional<double> noise_angle(const std::optional<double>& noise_angle_deg) 
   return radians_from_degrees(*noise_angle_deg);
 }
 
-void print_json(const Json& object) {
+void note_files(const CLI::App& verb, CommonOptions& common) {
+  namespace fs = std::filesystem;
+  static constexpr std::array<std::string_view, 9> kReading = {
+      "--sensor", "--calibration", "--planes",    "--stations", "--truth",
+      "--scene",  "--plan",        "--recording", "--from"};
+  for (const CLI::Option* option : verb.get_options()) {
+    for (const std::string& value : option->results()) {
+      std::error_code ignored;
+      const std::string name = option->get_name();
+      if (name == "INPUT" || name == "FILE") {
+        common.inputs.push_back(value);
+      } else if (name == "DIR") {
+        common.inputs.push_back((fs::path(value) / "report.json").string());
+      } else if (std::find(kReading.begin(), kReading.end(), name) != kReading.end() &&
+                 fs::is_regular_file(value, ignored)) {
+        common.files.push_back(value);
+      }
+    }
+  }
+  for (const CLI::App* sub : verb.get_subcommands()) note_files(*sub, common);
+}
+
+Json with_head(const CommonOptions& common, const Json& object, const jobs::Provenance& known) {
+  constexpr int kFormatVersion = 1;
+  Json inputs = Json::array();
+  const auto add = [&](const std::string& path) {
+    Json one = {{"path", path}, {"sha256", nullptr}};
+    for (std::size_t i = 0; i + 1 < known.size(); ++i) {
+      if (known[i].second == path && known[i + 1].first == known[i].first + "_sha256") {
+        one["sha256"] = known[i + 1].second;
+      }
+    }
+    std::error_code ignored;
+    if (one["sha256"].is_null() && !interrupted.is_set() &&
+        std::filesystem::is_regular_file(path, ignored)) {
+      try {
+        one["sha256"] = io::sha256_of_file(path, {[](double, std::string_view) {}, &interrupted});
+      } catch (const FileError&) {  // the verb says what is wrong with it
+      } catch (const Cancelled&) {
+      }
+    }
+    inputs.push_back(one);
+  };
+  for (const std::string& path : common.inputs) add(path);
+  for (const std::string& path : common.files) add(path);
+  Json whole = {{"format_version", kFormatVersion},
+                {"version", RISLEY_VERSION},
+                {"command", common.command},
+                {"inputs", inputs}};
+  whole.update(object);
+  return whole;
+}
+
+void print_json(const CommonOptions& common, const Json& object, const jobs::Provenance& known) {
+  const Json whole = with_head(common, object, known);
   // Serial numbers come from files and may hold bytes that are no UTF-8.
-  const std::string text = object.dump(2, ' ', false, Json::error_handler_t::replace);
+  const std::string text = whole.dump(2, ' ', false, Json::error_handler_t::replace);
   fmt::print("{}\n", text);
 }
 

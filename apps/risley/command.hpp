@@ -8,12 +8,16 @@
 #include <string>
 #include <string_view>
 #include <utility>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
 #include "risley/core/progress.hpp"
+#include "risley/jobs/provenance.hpp"
 #include "risley/optics/parameters.hpp"
+
+#include "option_names.hpp"
 
 namespace risley::app {
 
@@ -37,6 +41,9 @@ struct CommonOptions {
   int threads = 0;  ///< 0: all cores
   std::uint64_t seed = 0;
   std::string command;  ///< as typed, quoted for a shell
+  std::string verb;
+  std::vector<std::string> inputs;  ///< INPUT, as typed
+  std::vector<std::string> files;   ///< existing files that options name to be read
 };
 
 /// How an exception ends a command.
@@ -110,7 +117,24 @@ void check_not_negative(double value, std::string_view option, std::string_view 
 /// The value of --noise-angle-deg, rad. @throws InvalidArgument naming the option
 std::optional<double> noise_angle(const std::optional<double>& noise_angle_deg);
 
-/// Prints one JSON object and a line feed on stdout.
-void print_json(const Json& object);
+/// Fills inputs and files from what was typed for a verb.
+void note_files(const CLI::App& verb, CommonOptions& common);
+
+/// An object behind what every one begins with: format_version, version, command, inputs with their
+/// SHA-256, null where a file cannot be read.
+/// @param known  hashes that were computed before, as jobs::with_inputs() has them
+Json with_head(const CommonOptions& common, const Json& object, const jobs::Provenance& known = {});
+
+/// Prints one JSON object, with_head(), and a line feed on stdout.
+void print_json(const CommonOptions& common, const Json& object,
+                const jobs::Provenance& known = {});
+
+/// A verdict: stable code, words, what to do. Words of options become flags.
+template <class Verdict>
+Json verdict_json(const Verdict& verdict) {
+  return {{"code", to_string(verdict.code)},
+          {"words", with_flags(verdict.words)},
+          {"to_do", with_flags(verdict.to_do)}};
+}
 
 }  // namespace risley::app

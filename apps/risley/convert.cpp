@@ -73,6 +73,10 @@ FileOutcome convert(const FileJob& job, const ConvertOptions& options, const Pro
                {"input", job.input},
                {"output", job.output},
                {"warnings", warnings_json(done.warnings)}};
+  if (done.choice) {
+    json["sensor_chosen_by"] = to_string(done.choice->chosen_by);
+    json["sensor"] = sensor_name(*done.choice);
+  }
   if (done.damage) {
     spdlog::error("{}; the {} observations before it are saved in {}", done.damage->what(), written,
                   job.output);

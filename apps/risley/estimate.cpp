@@ -154,8 +154,10 @@ Json outcome_json(const EstimatedRecording& outcome, double total_time) {
   const TrainShape shape = e.sensor.shape();
   Json parameters = Json::object();
   for (const estimation::EstimatedValue& value : e.values) {
-    parameters[value.name] = {{"value", in_file_unit(value.name, value.value, shape)},
-                              {"sigma", in_file_unit(value.name, value.sigma, shape)}};
+    parameters[value.name] = {
+        {"value", in_file_unit(value.name, value.value, shape)},
+        {"sigma", in_file_unit(value.name, value.sigma, shape)},
+        {"sigma_given_held", in_file_unit(value.name, value.sigma_given_held, shape)}};
   }
   Json rotors = Json::array(), jerks = Json::array(), unobservable = Json::array();
   for (const estimation::RotorProcess& process : e.rotor_process) {
@@ -173,6 +175,8 @@ Json outcome_json(const EstimatedRecording& outcome, double total_time) {
   std::vector<std::string> warnings = outcome.warnings;
   warnings.insert(warnings.end(), e.warnings.begin(), e.warnings.end());
   Json object = {
+      {"serial", outcome.recording.serial()},
+      {"verdict", verdict_json(e.verdict)},
       {"converged", e.converged},
       {"reason", e.reason},
       {"method", to_string(e.method)},
@@ -200,6 +204,7 @@ Json outcome_json(const EstimatedRecording& outcome, double total_time) {
       {"warnings", warnings},
       {"seconds",
        {{"read", outcome.reading_time}, {"solve", outcome.solving_time}, {"total", total_time}}}};
+  object.update(choice_json(outcome.choice));
   object["iterations"] = e.iterations;
   object["residuals"]["autocorrelation"] =
       e.autocorrelation.rho.empty() ? 0.0 : e.autocorrelation.rho.front();
@@ -229,6 +234,8 @@ void print_outcome(const EstimatedRecording& outcome) {
   const Estimate& e = outcome.estimate;
   const TrainShape shape = e.sensor.shape();
   fmt::print("{}\n", e.converged ? "converged" : "NOT CONVERGED: " + e.reason);
+  fmt::print("{}: {}\n", to_string(e.verdict.code), with_flags(e.verdict.words));
+  fmt::print("sensor {}: {}\n", outcome.choice.sensor.name, outcome.choice.words);
   fmt::print("{} shots used, {} of them outliers{}; read {:.2f} s, solved {:.2f} s\n\n",
              grouped(e.series.size()), grouped(e.outliers),
              (e.sensor.combination ? fmt::format(", speed combination {}", *e.sensor.combination)
@@ -303,7 +310,7 @@ ExitStatus run_estimate(const EstimateCommandOptions& options, const CommonOptio
   for (const std::string& warning : e.warnings) spdlog::warn(warning);
   if (!e.converged) spdlog::error("not converged: {}", e.reason);
   if (common.json) {
-    print_json(outcome_json(outcome, now() - started));
+    print_json(common, outcome_json(outcome, now() - started), outcome.provenance);
   } else {
     print_outcome(outcome);
   }

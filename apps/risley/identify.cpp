@@ -193,7 +193,7 @@ ExitStatus run_identify(const IdentifyCommandOptions& options, const CommonOptio
                  outcome.words);
   }
   if (common.json) {
-    print_json(outcome_json(outcome));
+    print_json(common, outcome_json(outcome), outcome.sensor.sensor.provenance);
   } else {
     print_outcome(outcome);
   }

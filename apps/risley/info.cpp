@@ -84,7 +84,7 @@ Json audit_json(const InspectedRecording& found) {
   const TimeAuditResult& audit = found.audit;
   const auto if_times = [&header](auto value) { return header.has_times ? Json(value) : Json(); };
   return {{"format", header.format},
-          {"sensor", sensor_name(header)},
+          {"sensor", found.choice ? sensor_name(*found.choice) : sensor_name(header)},
           {"observations", audit.observations},
           {"shots", audit.shots},
           {"no_return", audit.no_return},
@@ -119,7 +119,17 @@ void print_audit(const InspectedRecording& found) {
   const TimeAuditResult& audit = found.audit;
   Table table;
   table.add({"format", header.format});
-  table.add({"sensor", sensor_name(header)});
+  if (found.choice) {
+    const std::string name = sensor_name(*found.choice);
+    table.add(
+        {"sensor", fmt::format("{}, {}{}", name,
+                               found.choice->chosen_by == jobs::ChosenBy::guess && name != "unknown"
+                                   ? "a guess "
+                                   : "",
+                               found.choice->words)});
+  } else {
+    table.add({"sensor", sensor_name(header)});
+  }
   table.add({"observations", grouped(audit.observations)});
   if (audit.shots != audit.observations) table.add({"shots", grouped(audit.shots)});
   table.add({"no return", grouped(audit.no_return)});
@@ -215,12 +225,18 @@ ExitStatus run_info(const InfoCommandOptions& options, const CommonOptions& comm
                                     bar.progress());
   }
   log_warnings(options.input, found.warnings);
+  if (found.choice) {
+    for (const std::string& warning : found.choice->warnings) {
+      spdlog::warn("{}: {}", options.input, with_flags(warning));
+    }
+  }
   if (found.damage) spdlog::error(found.damage->what());
   if (common.json) {
     Json object = audit_json(found);
+    if (found.choice) object.update(choice_json(*found.choice));
     if (found.excerpt) object["excerpt"] = excerpt_json(options.share, *found.excerpt);
     if (found.damage) object.update(damage_json(*found.damage));
-    print_json(object);
+    print_json(common, object);
   } else {
     print_audit(found);
     if (found.excerpt) print_excerpt(options.share, *found.excerpt);

@@ -111,13 +111,21 @@ std::string shell_text(int argc, char** argv) {
 }
 
 /// Tells of an error: words on stderr, and with --json an object on stdout.
-ExitStatus fail(ExitStatus status, const std::string& message, bool json,
+ExitStatus fail(ExitStatus status, const std::string& message, const CommonOptions& common,
                 const Json& details = {}) {
   spdlog::error(message);
-  if (json) {
+  if (common.json) {
     Json object = {{"error", message}, {"exit_status", static_cast<int>(status)}};
     if (details.is_object()) object.update(details);
-    print_json(object);
+    if (status == kNumbersFailed && (common.verb == "estimate" || common.verb == "calibrate")) {
+      object.update({{"serial", nullptr},
+                     {"sensor", nullptr},
+                     {"verdict",
+                      {{"code", "undecided"},
+                       {"words", message},
+                       {"to_do", "mend what the words name, or record again"}}}});
+    }
+    print_json(common, object);
   }
   return status;
 }
@@ -127,7 +135,7 @@ ExitStatus run_verb(const Run& run, const CommonOptions& common) {
     return run(common);
   } catch (...) {
     const Failure failure = current_failure();
-    return fail(failure.status, failure.message, common.json, failure.details);
+    return fail(failure.status, failure.message, common, failure.details);
   }
 }
 
@@ -171,9 +179,9 @@ ExitStatus run_command(int argc, char** argv) {
       app.exit(error);
       return kDone;
     }
-    const bool json = std::any_of(
-        argv + 1, argv + argc, [](const char* word) { return std::strcmp(word, "--json") == 0; });
-    return fail(kWrongUsage, usage_error(error, argc, argv), json);
+    common.json = std::any_of(argv + 1, argv + argc,
+                              [](const char* word) { return std::strcmp(word, "--json") == 0; });
+    return fail(kWrongUsage, usage_error(error, argc, argv), common);
   }
   if (common.quiet) spdlog::set_level(spdlog::level::err);
   if (common.verbose) spdlog::set_level(spdlog::level::debug);
@@ -182,7 +190,10 @@ ExitStatus run_command(int argc, char** argv) {
     limit.emplace(tbb::global_control::max_allowed_parallelism,
                   static_cast<std::size_t>(common.threads));
   }
-  return run_verb(runs.at(app.get_subcommands().front()), common);
+  const CLI::App& verb = *app.get_subcommands().front();
+  common.verb = verb.get_name();
+  note_files(verb, common);
+  return run_verb(runs.at(&verb), common);
 }
 
 }  // namespace

@@ -107,13 +107,16 @@ ExitStatus run_file_jobs(const std::vector<FileJob>& jobs, const std::string& la
                          const char* counted,
                          const std::function<FileOutcome(const FileJob&, const Progress&)>& work,
                          const CommonOptions& common) {
+  CommonOptions told = common;  // patterns are names by now
+  told.inputs.clear();
+  for (const FileJob& job : jobs) told.inputs.push_back(job.input);
   if (jobs.size() == 1) {
     FileOutcome outcome;
     {
       ProgressBar bar(label, common);
       outcome = work(jobs.front(), bar.progress());
     }
-    common.json ? print_json(outcome.json) : fmt::print("{}\n", outcome.text);
+    common.json ? print_json(told, outcome.json) : fmt::print("{}\n", outcome.text);
     return outcome.status;
   }
   std::vector<FileOutcome> outcomes(jobs.size());
@@ -146,10 +149,10 @@ ExitStatus run_file_jobs(const std::vector<FileJob>& jobs, const std::string& la
     files.push_back(outcome.json);
   }
   if (common.json) {
-    print_json({{counted, total},
-                {"files_done", sound},
-                {"files_failed", jobs.size() - sound},
-                {"files", files}});
+    print_json(told, {{counted, total},
+                      {"files_done", sound},
+                      {"files_failed", jobs.size() - sound},
+                      {"files", files}});
   } else {
     for (const FileOutcome& outcome : outcomes) fmt::print("{}\n", outcome.text);
     fmt::print("{} of {} files done, {} {} in all\n", sound, jobs.size(), grouped(total), counted);

@@ -114,7 +114,7 @@ ExitStatus run_observability(const ObservabilityCommandOptions& options,
   for (const std::string& warning : judged.warnings) spdlog::warn(warning);
   if (!judged.converged) spdlog::warn("the estimate did not converge: {}", judged.reason);
   if (common.json) {
-    print_json(observability_json(judged));
+    print_json(common, observability_json(judged));
   } else {
     print_observability(judged);
   }

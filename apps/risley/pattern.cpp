@@ -209,7 +209,7 @@ ExitStatus run_pattern(const PatternOptions& options, const CommonOptions& commo
     }
     if (details) json["coverage"] = coverage_json(details->coverage);
     if (!options.report.empty()) json["html"] = options.report;
-    print_json(json);
+    print_json(common, json);
     return kDone;
   }
   if (written) print_written(*written, options.output);

@@ -43,7 +43,7 @@ ExitStatus list_presets(const CommonOptions& common) {
                fmt::format("{}", sensor.train.emitters())});
   }
   if (common.json) {
-    print_json({{"presets", presets}});
+    print_json(common, {{"presets", presets}});
   } else {
     table.print();
   }
@@ -58,7 +58,7 @@ ExitStatus hand_out(const std::string& text, const PresetOptions& options,
     Json json = facts_json(sensors::parse_preset(text, options.name));
     json["text"] = text;
     if (!options.output.empty()) json["output"] = options.output;
-    print_json(json);
+    print_json(common, json);
   } else if (options.output.empty()) {
     fmt::print("{}", text);
   } else {
@@ -87,7 +87,7 @@ ExitStatus check_presets(const PresetOptions& options, const CommonOptions& comm
       spdlog::error(error.what());
     }
   }
-  if (common.json) print_json({{"results", results}});
+  if (common.json) print_json(common, {{"results", results}});
   return status;
 }
 

@@ -3,10 +3,12 @@
 #include "recording_text.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include "risley/core/angle.hpp"
 #include "risley/jobs/recording_input.hpp"
 
 namespace risley::app {
@@ -20,6 +22,32 @@ std::string sensor_name(const recordings::RecordingHeader& header) {
   std::string text;
   for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
   return text;
+}
+
+std::string sensor_name(const jobs::SensorChoice& choice) {
+  const bool unknown = choice.chosen_by == jobs::ChosenBy::guess && choice.fits == false;
+  return unknown ? "unknown"
+                 : fmt::format("{} {}", choice.sensor.manufacturer, choice.sensor.model);
+}
+
+Json choice_json(const jobs::SensorChoice& choice) {
+  std::vector<std::string> warnings = choice.warnings;
+  put_flags(warnings);
+  Json misfits = Json::array();
+  for (const jobs::PresetMisfit& one : choice.misfits) {
+    const bool has_lines = std::isfinite(one.misfit);
+    misfits.push_back(
+        {{"preset", one.preset},
+         {"misfit_deg", has_lines ? Json(degrees_from_radians(one.misfit)) : Json()}});
+  }
+  return {{"sensor", sensor_name(choice)},
+          {"preset", choice.sensor.name},
+          {"sensor_chosen_by", to_string(choice.chosen_by)},
+          {"sensor_choice",
+           {{"words", choice.words},
+            {"fits", choice.fits ? Json(*choice.fits) : Json()},
+            {"misfits", misfits},
+            {"warnings", warnings}}}};
 }
 
 Json warnings_json(const std::vector<recordings::ReadWarning>& warnings) {

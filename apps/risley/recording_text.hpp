@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "risley/core/error.hpp"
+#include "risley/jobs/sensor_choice.hpp"
 #include "risley/recordings/reader.hpp"
 
 #include "command.hpp"
@@ -15,6 +16,12 @@ namespace risley::app {
 
 /// Commercial name of the sensor that made a recording; of several, each once.
 std::string sensor_name(const recordings::RecordingHeader& header);
+
+/// The same where the scan was asked too: "unknown" where nothing describes it.
+std::string sensor_name(const jobs::SensorChoice& choice);
+
+/// Which sensor it was and who says so: sensor, preset, sensor_chosen_by, sensor_choice.
+Json choice_json(const jobs::SensorChoice& choice);
 
 Json warnings_json(const std::vector<recordings::ReadWarning>& warnings);
 /// The same on stderr, each with the name of the file.

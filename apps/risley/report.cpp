@@ -34,7 +34,7 @@ ExitStatus run_report(const ReportCommandOptions& options, const CommonOptions& 
   const std::string html = page_of(report);
   io::write_text_file(page, html);
   if (common.json) {
-    print_json({{"html", page}, {"bytes", html.size()}, {"verb", report::verb_of(report)}});
+    print_json(common, {{"html", page}, {"bytes", html.size()}, {"verb", report::verb_of(report)}});
   } else {
     fmt::print("{}\n", page);
   }

@@ -111,9 +111,8 @@ reproduction::RealRecording real_recording(const std::string& path, const Readin
   for (const std::string& warning : input.warnings) {
     spdlog::warn("{}: {}", path, with_flags(warning));
   }
-  return {std::filesystem::path(path).filename().string(),
-          jobs::chosen_sensor({}, input.recording.header), std::move(input.series),
-          std::move(input.head)};
+  return {std::filesystem::path(path).filename().string(), std::move(input.choice.sensor),
+          std::move(input.series), std::move(input.head)};
 }
 
 ExitStatus run_reproduce(const ReproduceCommandOptions& options, const CommonOptions& common) {
@@ -131,7 +130,7 @@ ExitStatus run_reproduce(const ReproduceCommandOptions& options, const CommonOpt
     ProgressBar bar("reproducing", common);
     found = reproduction::reproduce(settings, bar.progress());
   }
-  const Json object = reproduction_json(found, common, inputs);
+  const Json object = with_head(common, reproduction_json(found, common, inputs));
   const auto path = [&](const char* name) {
     return (std::filesystem::path(options.folder) / name).string();
   };
@@ -141,7 +140,7 @@ ExitStatus run_reproduce(const ReproduceCommandOptions& options, const CommonOpt
   io::write_text_file(path("reproduction.json"),
                       object.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
   if (common.json) {
-    print_json(object);
+    print_json(common, object);
   } else {
     print_reproduction(found);
   }

@@ -157,13 +157,13 @@ Run declare_simulate(CLI::App& verb) {
     }
     Json truth = Json::object();
     for (const NamedValue& value : true_values(result)) truth[value.name] = value.value;
-    print_json({{"observations", result.observations},
-                {"no_return", result.no_return},
-                {"output", options->output},
-                {"truth_files",
-                 {simulation::truth_preset_path(options->output),
-                  simulation::truth_columns_path(options->output)}},
-                {"truth", truth}});
+    print_json(common, {{"observations", result.observations},
+                        {"no_return", result.no_return},
+                        {"output", options->output},
+                        {"truth_files",
+                         {simulation::truth_preset_path(options->output),
+                          simulation::truth_columns_path(options->output)}},
+                        {"truth", truth}});
     return kDone;
   };
 }

@@ -315,6 +315,7 @@ void Work::fill_result(const PlanarSolution& solution) {
   fill_datum(solution);
   result_.reason = reason_of_failure(result_, solution);
   result_.converged = result_.reason.empty();
+  result_.verdict = verdict_of(result_);
   for (std::string& warning : warnings_of(result_, solution, recordings_)) {
     result_.warnings.push_back(std::move(warning));
   }

@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "risley/algebra/symmetric.hpp"
 #include "risley/core/angle.hpp"
 
 namespace risley::calibration {
@@ -13,6 +14,13 @@ namespace {
 
 bool contradicts(const PriorTest& test) {
   return test.degrees_of_freedom != 0 && !(test.chi2 <= test.critical);
+}
+
+/// Chi2 that chance exceeds once in a thousand times (Wilson and Hilferty 1931).
+double significant_chi2(double degrees_of_freedom) {
+  constexpr double kNormalQuantile = 3.0902;
+  const double share = 2.0 / (9.0 * degrees_of_freedom);
+  return degrees_of_freedom * std::pow(1.0 - share + kNormalQuantile * std::sqrt(share), 3);
 }
 
 }  // namespace
@@ -49,6 +57,52 @@ std::string reason_of_failure(const Calibration& c, const PlanarSolution& soluti
     }
   }
   return reason;
+}
+
+CalibrationVerdict verdict_of(const Calibration& c) {
+  if (!c.converged) {
+    return {CalibrationCode::undecided, c.reason,
+            "scan more walls, tilted ones among them, or give what is known of walls and poses "
+            "(option planes, option stations)"};
+  }
+  Eigen::VectorXd change = c.parameters;
+  for (Eigen::Index i = 0; i < change.size(); ++i) {
+    change[i] -= c.believed.get(c.free[static_cast<std::size_t>(i)].name);
+  }
+  const auto freedom = static_cast<double>(change.size());
+  const double chi2 =
+      change.size() == 0 ? 0.0 : change.dot(algebra::SymmetricSolver(c.covariance).solve(change));
+  if (!(chi2 > significant_chi2(freedom))) {
+    return {CalibrationCode::as_believed,
+            fmt::format("the walls bear out what the sensor believes of itself (chi2 {:.3g} of "
+                        "{:.0f} parameters)",
+                        chi2, freedom),
+            "nothing"};
+  }
+  const std::string moved = fmt::format(
+      "the parameters differ from what the sensor believes (chi2 {:.3g} of {:.0f}), and "
+      "the walls are {:.3g} mm thick after and {:.3g} mm before",
+      chi2, freedom, 1e3 * c.rms_after, 1e3 * c.rms_before);
+  if (c.rms_after >= c.rms_before) {
+    return {CalibrationCode::not_better, moved,
+            "do not use it: see whether the walls are flat and the sensor stood still"};
+  }
+  return {CalibrationCode::bent, moved,
+          "use the calibration for this unit's clouds, and repeat it on other walls"};
+}
+
+const char* to_string(CalibrationCode code) {
+  switch (code) {
+    case CalibrationCode::as_believed:
+      return "as_believed";
+    case CalibrationCode::bent:
+      return "bent";
+    case CalibrationCode::not_better:
+      return "not_better";
+    case CalibrationCode::undecided:
+      break;
+  }
+  return "undecided";
 }
 
 std::vector<std::string> warnings_of(const Calibration& c, const PlanarSolution& solution,

@@ -13,6 +13,10 @@ namespace risley::calibration {
 /// that the walls do not tell, a station or plane that contradicts the data. Empty for a sound one.
 std::string reason_of_failure(const Calibration& c, const PlanarSolution& solution);
 
+/// What a calibration comes to: whether its parameters differ from the believed ones beyond what
+/// chance makes once in a thousand times, and whether the walls got flatter by it.
+CalibrationVerdict verdict_of(const Calibration& c);
+
 /// What a user should know of a calibration beside its numbers.
 std::vector<std::string> warnings_of(const Calibration& c, const PlanarSolution& solution,
                                      const std::vector<RangedRecording>& recordings);

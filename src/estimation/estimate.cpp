@@ -27,8 +27,8 @@ std::vector<EstimatedValue> named_values(const Estimate& estimate) {
   std::vector<EstimatedValue> values;
   for (std::size_t i = 0; i < estimate.free.size(); ++i) {
     const auto at = static_cast<Eigen::Index>(i);
-    values.push_back(
-        {estimate.free[i].name, estimate.parameters[at], std::sqrt(estimate.covariance(at, at))});
+    const double sigma = std::sqrt(estimate.covariance(at, at));
+    values.push_back({estimate.free[i].name, estimate.parameters[at], sigma, sigma});
   }
   const RotorStates& states = estimate.states;
   const RotorTrajectory& motion = estimate.trajectory;
@@ -51,14 +51,15 @@ std::vector<EstimatedValue> named_values(const Estimate& estimate) {
       time += 1e-9 * static_cast<double>(states.time_ns[last] - states.time_ns[first]);
     }
     EstimatedValue speed{fmt::format("angular_velocity_{}_deg_per_s", prism_letter(rotor)),
-                         states.angular_velocity[k][0], states.angular_velocity_sigma[k][0]};
+                         states.angular_velocity[k][0], states.angular_velocity_sigma[k][0], 0.0};
     if (time > 0) {
       speed.value = turned / time;
       speed.sigma = std::sqrt(turned_variance) / time;
     }
+    speed.sigma_given_held = speed.sigma;
     values.push_back(speed);
     angles.push_back({fmt::format("rotation_angle_{}_deg", prism_letter(rotor)),
-                      wrap_to_pi(angle[0]), std::sqrt(variance[0])});
+                      wrap_to_pi(angle[0]), std::sqrt(variance[0]), std::sqrt(variance[0])});
   }
   values.insert(values.end(), angles.begin(), angles.end());
   return values;
@@ -134,6 +135,41 @@ constexpr double kEnlarged = 1.1;
 /// As are residuals above their stated sigma by this factor, where no variance was enlarged.
 constexpr double kNoticed = 1.3;
 
+/// Parameters and speeds further from the preset's than this, in its sigmas, are unusual.
+constexpr double kUnusual = 3.0;
+
+/// What lies far from the preset, as words; empty when nothing does.
+std::string unusual_values(const Estimate& estimate, const sensors::Sensor& nominal) {
+  std::string words;
+  const auto add = [&words](const std::string& name, double sigmas) {
+    words += fmt::format("{}{} lies {:.1f} sigma from the preset's", words.empty() ? "" : ", ",
+                         name, sigmas);
+  };
+  for (std::size_t i = 0; i < estimate.free.size(); ++i) {
+    const FreeParameter& parameter = estimate.free[i];
+    const sensors::Knowledge* known = nominal.find_knowledge(parameter.name);
+    const double sigma =
+        known != nullptr && known->sigma > 0 ? known->sigma : parameter.prior_sigma;
+    const auto at = static_cast<Eigen::Index>(i);
+    const double change = estimate.parameters[at] - nominal.train[parameter.places[0]];
+    const double sigmas =
+        std::abs(change) / std::hypot(sigma, std::sqrt(estimate.covariance(at, at)));
+    if (sigmas > kUnusual) add(parameter.name, sigmas);
+  }
+  for (const EstimatedValue& value : estimate.values) {
+    if (!value.name.starts_with("angular_velocity")) continue;
+    const sensors::Sensor turning = estimate.sensor.combination && nominal.combination
+                                        ? with_combination(nominal, *estimate.sensor.combination)
+                                        : nominal;
+    const sensors::Knowledge* known = turning.find_knowledge(value.name);
+    if (known == nullptr || !(known->sigma > 0)) continue;
+    const double sigmas =
+        std::abs(value.value - turning.get(value.name)) / std::hypot(known->sigma, value.sigma);
+    if (sigmas > kUnusual) add(value.name, sigmas);
+  }
+  return words;
+}
+
 /// Says how the recording's frame is turned.
 std::string frame_words(const Estimate& estimate) {
   const FrameEstimate& frame = *estimate.frame_turn;
@@ -152,8 +188,41 @@ std::string frame_words(const Estimate& estimate) {
       has_sigma ? "" : " (held at what the start found)");
 }
 
+/// Completes the verdict: its code where the estimate converged, and its words.
+void say_verdict(Estimate& estimate, const std::vector<std::string>& oddities) {
+  EstimateVerdict& verdict = estimate.verdict;
+  if (estimate.converged) {
+    verdict.code = oddities.empty() ? EstimateCode::consistent : EstimateCode::unusual;
+  }
+  switch (verdict.code) {
+    case EstimateCode::consistent:
+      verdict.words =
+          "the directions agree with the sensor's own belief; walls have not been asked";
+      verdict.to_do = "nothing; calibrating on walls tells where the beam truly goes";
+      break;
+    case EstimateCode::unusual:
+      verdict.words = "the model describes the directions, but " + oddities.front();
+      for (std::size_t i = 1; i < oddities.size(); ++i) verdict.words += "; " + oddities[i];
+      verdict.to_do =
+          "compare it with an earlier recording of the unit, and calibrate it on walls before its "
+          "points are relied on";
+      break;
+    case EstimateCode::inconsistent:
+      verdict.words = estimate.reason;
+      verdict.to_do =
+          "see whether sensor, times, frame and elevation are those of the recording (option "
+          "sensor, option shot_rate, option extrinsics, option mirrored), and whether the sensor "
+          "stood still";
+      break;
+    case EstimateCode::undecided:
+      verdict.words = estimate.reason;
+      verdict.to_do = "record longer or with more of the field of view, or hold what is not told";
+      break;
+  }
+}
+
 /// Says whether the result can be believed.
-void judge(Estimate& estimate, const PrismTrain& nominal) {
+void judge(Estimate& estimate, const sensors::Sensor& nominal) {
   const double rms = std::sqrt(0.5 * (estimate.azimuth_moments.rms * estimate.azimuth_moments.rms +
                                       estimate.zenith_moments.rms * estimate.zenith_moments.rms));
   // Rounding may differ from shot to shot; the unit variance weighs each by its own.
@@ -168,12 +237,14 @@ void judge(Estimate& estimate, const PrismTrain& nominal) {
       fmt::format("residuals of {:.3g} deg where noise and rounding amount to {:.3g} deg",
                   degrees_from_radians(rms), degrees_from_radians(estimate.expected_residual));
   estimate.converged = true;
-  const auto fail = [&](std::string reason) {
+  std::vector<std::string> oddities;  // of the unit
+  const auto fail = [&](std::string reason, EstimateCode code = EstimateCode::inconsistent) {
     estimate.converged = false;
     estimate.reason = std::move(reason);
+    estimate.verdict.code = code;
   };
   if (!std::isfinite(ratio)) {
-    fail("no residual could be formed");
+    fail("no residual could be formed", EstimateCode::undecided);
   } else if (outlier_share > 0.3) {
     fail(
         fmt::format("{:.0f} % of the shots do not fit the model: wrong sensor, speed combination "
@@ -190,15 +261,16 @@ void judge(Estimate& estimate, const PrismTrain& nominal) {
                     degrees_from_radians(estimate.usual_residual)));
   } else if (!estimate.unobservable.empty()) {
     const WeakDirection& worst = estimate.unobservable.front();
-    fail(
-        fmt::format("the data do not tell the combination {} (in units of 1 deg, or 0.01 of an "
-                    "index; its sigma "
-                    "is {:.2g} of them): hold one of these fixed, or record longer",
-                    direction_text(worst), worst.sigma));
-  } else if (std::string words = implausible_parameter(estimate, nominal); !words.empty()) {
+    fail(fmt::format("the data do not tell the combination {} (in units of 1 deg, or 0.01 of an "
+                     "index; its sigma "
+                     "is {:.2g} of them): hold one of these fixed, or record longer",
+                     direction_text(worst), worst.sigma),
+         EstimateCode::undecided);
+  } else if (std::string words = implausible_parameter(estimate, nominal.train); !words.empty()) {
     fail(std::move(words));
   } else if (!estimate.settled) {
-    fail("the last steps still moved parameters by more than a tenth of their sigma");
+    fail("the last steps still moved parameters by more than a tenth of their sigma",
+         EstimateCode::undecided);
   } else if (estimate.unit_variance > kEnlarged && estimate.variance_factor > 1.0) {
     estimate.warnings.push_back(residuals + ": the sigmas were enlarged by that factor");
   } else if (ratio > kNoticed) {
@@ -216,6 +288,7 @@ void judge(Estimate& estimate, const PrismTrain& nominal) {
                     estimate.noise.value.rms() / estimate.usual_noise,
                     degrees_from_radians(estimate.noise.value.rms()),
                     degrees_from_radians(estimate.usual_noise)));
+    oddities.push_back(estimate.warnings.back());
   }
   double unevenness = 1.0;
   std::size_t uneven = 0;
@@ -231,6 +304,7 @@ void judge(Estimate& estimate, const PrismTrain& nominal) {
         "them): the model lacks something that this sensor has, or a parameter is held at a wrong "
         "value; the sigmas do not cover that",
         prism_letter(static_cast<int>(uneven)), unevenness));
+    oddities.push_back(estimate.warnings.back());
   }
   if (estimate.autocorrelation.factor > 1.05) {
     estimate.warnings.push_back(fmt::format(
@@ -247,7 +321,12 @@ void judge(Estimate& estimate, const PrismTrain& nominal) {
   if (estimate.converged && outlier_share > 0.02) {
     estimate.warnings.push_back(
         fmt::format("{:.1f} % of the shots were left out as outliers", 100 * outlier_share));
+    oddities.push_back(estimate.warnings.back());
   }
+  if (std::string words = unusual_values(estimate, nominal); !words.empty()) {
+    oddities.push_back(std::move(words));
+  }
+  say_verdict(estimate, oddities);
 }
 
 /// Mean residuals over every prism's angle, of all shots that were used.
@@ -346,6 +425,75 @@ CoordinateRounding rounding_of(const Estimate& estimate, const EstimateOptions& 
   }
 }
 
+/// Parameters of the train that are held and that the sensor says may be off.
+std::vector<const sensors::Knowledge*> uncertain_held(const Estimate& estimate,
+                                                      const sensors::Sensor& nominal) {
+  std::vector<const sensors::Knowledge*> held;
+  const int prisms = nominal.prisms();
+  const auto fires = [&](int emitter) {
+    if (estimate.series.beam.empty()) return emitter == 0;
+    return std::find(estimate.series.beam.begin(), estimate.series.beam.end(), emitter) !=
+           estimate.series.beam.end();
+  };
+  const auto is_free = [&](int place) {
+    return std::any_of(estimate.free.begin(), estimate.free.end(), [&](const auto& free) {
+      return std::find(free.places.begin(), free.places.end(), place) != free.places.end();
+    });
+  };
+  for (const ParameterInfo& info : parameter_list(nominal.shape())) {
+    if (info.kind != ParameterKind::train) continue;
+    const sensors::Knowledge* known = nominal.find_knowledge(info.name);
+    if (known == nullptr || known->name != info.name || !(known->sigma > 0)) continue;
+    if (std::any_of(info.places.begin(), info.places.end(), is_free)) continue;
+    const int emitter = place::emitter(info.places.front(), prisms);
+    if (emitter >= 0 && !fires(emitter)) continue;  // no answer depends on it
+    held.push_back(known);
+  }
+  return held;
+}
+
+/// Widens the sigmas by what held parameters may be off by: each is moved by its sigma, and what
+/// that moves the answers by is theirs. Some of the shots do for that.
+void count_held_parameters(Estimate& estimate, const EstimateOptions& options,
+                           const Progress& progress) {
+  const auto held = uncertain_held(estimate, options.sensor);
+  if (held.empty()) return;
+  constexpr double kEnoughShots = 20000;
+  const double share = kEnoughShots / static_cast<double>(estimate.series.size());
+  Estimate part;
+  part.free = estimate.free;
+  std::vector<ShotRange> ranges = stretches(estimate.series);
+  const double step = 1e-9 * static_cast<double>(std::max<std::int64_t>(
+                                 1, median_step_ns(estimate.series.time_ns)));
+  part.series = share < 1 ? thinned(estimate.series, share / step, ranges) : estimate.series;
+  BatchMapOptions settings = map_options(estimate, options);
+  settings.angle_noise = usable_noise(estimate.noise.value);
+  settings.rotor_process = estimate.rotor_process;
+  const auto answers = [&](const sensors::Knowledge* moved) {
+    sensors::Sensor sensor = options.sensor;
+    Start start = estimate.start;
+    start.train = estimate.train;
+    if (moved != nullptr) {
+      const double value = sensor.train.get(moved->name) + moved->sigma;
+      sensor.train.set(moved->name, value);
+      start.train.set(moved->name, value);
+    }
+    static_cast<Solution&>(part) = run_batch_map(part.series, start, sensor, settings, progress);
+    part.states = states_of_knots(part, part.series);
+    return named_values(part);
+  };
+  const std::vector<EstimatedValue> as_held = answers(nullptr);
+  for (const sensors::Knowledge* parameter : held) {
+    const std::vector<EstimatedValue> moved = answers(parameter);
+    for (std::size_t i = 0; i < estimate.values.size(); ++i) {
+      const double change = moved[i].value - as_held[i].value;
+      const bool angle = estimate.values[i].name.starts_with("rotation_angle");
+      estimate.values[i].sigma =
+          std::hypot(estimate.values[i].sigma, angle ? wrap_to_pi(change) : change);
+    }
+  }
+}
+
 Solution solve(const Estimate& estimate, const EstimateOptions& options, const Progress& progress) {
   if (estimate.method == Method::map) {
     return run_batch_map(estimate.series, estimate.start, options.sensor,
@@ -391,6 +539,20 @@ Start start_anywhere(const AngleSeries& series, const AngleSeries& head,
 }
 
 }  // namespace
+
+const char* to_string(EstimateCode code) {
+  switch (code) {
+    case EstimateCode::consistent:
+      return "consistent";
+    case EstimateCode::unusual:
+      return "unusual";
+    case EstimateCode::inconsistent:
+      return "inconsistent";
+    case EstimateCode::undecided:
+      break;
+  }
+  return "undecided";
+}
 
 const char* to_string(Method method) { return method == Method::map ? "map" : "ekf"; }
 
@@ -476,8 +638,9 @@ Estimate estimate(Method method, AngleSeries series, const AngleSeries& head,
   estimate.sensor = calibrated_sensor(
       options.sensor, with_free_values(options.sensor.train, estimate.free, estimate.parameters),
       estimate);
+  count_held_parameters(estimate, options, progress.silent());
   estimate.residuals_over_angle = profiles(estimate);
-  judge(estimate, options.sensor.train);
+  judge(estimate, options.sensor);
   return estimate;
 }
 

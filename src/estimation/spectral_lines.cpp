@@ -92,6 +92,14 @@ class LineFit {
   }
 
   Complex amplitude(std::size_t line) const { return amplitude_[line]; }
+  /// Of the lines, after solve(): how what is left grows with their amplitudes.
+  Eigen::Matrix<Complex, Lines, Lines> normal() const {
+    Eigen::Matrix<Complex, Lines, Lines> factor;
+    for (std::size_t a = 0; a < Lines; ++a) {
+      for (std::size_t b = 0; b < Lines; ++b) factor(a, b) = b <= a ? normal_[a][b] : 0.0;
+    }
+    return factor * factor.adjoint();
+  }
   double explained() const { return explained_; }
 
  private:
@@ -140,7 +148,7 @@ LineSearch::LineSearch(const AngleSeries& series) {
     std::size_t& place = place_of_beam[series.beam[i]];
     if (place == shots_.size()) {
       place = emitters_.size();
-      emitters_.emplace_back();
+      emitters_.emplace_back().beam = series.beam[i];
       shot_grids.emplace_back(bins);
     }
     const Complex value = transverse(series, i);
@@ -228,13 +236,16 @@ RotorLines LineSearch::fit(std::span<const double> speeds) const {
     result.lines.push_back({speeds[a], std::abs(amplitude), std::arg(amplitude)});
   }
   // What the lines leave of the mean is the constants', by their shots.
-  for (const Sums& emitter : emitters) {
-    result.constant += emitter.value / count;
-    for (std::size_t a = 0; a < Lines; ++a) {
-      result.constant -= emitter.lines[a] * fit.amplitude(a) / count;
-    }
+  for (std::size_t j = 0; j < emitters.size(); ++j) {
+    const Sums& emitter = emitters[j];
+    if (emitter.count == 0) continue;
+    Complex left = emitter.value;
+    for (std::size_t a = 0; a < Lines; ++a) left -= emitter.lines[a] * fit.amplitude(a);
+    result.constant += left / count;
+    result.emitters.push_back({emitters_[j].beam, emitter.count / count, left / emitter.count});
   }
   result.unexplained = (power - fit.explained()) / count;
+  result.normal = fit.normal() / count;
   return result;
 }
 
@@ -339,6 +350,29 @@ std::vector<RotorLines> LineSearch::best_of(std::span<const Bins> bins, bool ord
     });
     return best;
   });
+}
+
+double unexplained_with(const RotorLines& lines, std::span<const double> amplitude) {
+  // Amplitudes with the phases that were found, then each phase in turn at its best.
+  const Eigen::Index turning = lines.normal.rows();
+  Eigen::VectorXcd found(turning), wanted(turning);
+  Eigen::Index line = 0;
+  for (std::size_t k = 0; k < lines.lines.size(); ++k) {
+    if (lines.lines[k].angular_velocity == 0) continue;
+    found[line] = std::polar(lines.lines[k].amplitude, lines.lines[k].phase);
+    wanted[line] = std::polar(amplitude[k], lines.lines[k].phase);
+    ++line;
+  }
+  constexpr int kRounds = 50;
+  for (int round = 0; round < kRounds; ++round) {
+    for (Eigen::Index k = 0; k < turning; ++k) {
+      const Complex pull =
+          (lines.normal.row(k) * (found - wanted)).value() + lines.normal(k, k) * wanted[k];
+      if (std::abs(pull) > 0) wanted[k] = std::abs(wanted[k]) * pull / std::abs(pull);
+    }
+  }
+  const Eigen::VectorXcd change = wanted - found;
+  return lines.unexplained + change.dot(lines.normal * change).real();
 }
 
 }  // namespace risley::estimation

@@ -83,11 +83,14 @@ RangedRecording read_and_estimate(const CalibrateRecordingsOptions& options, std
         fmt::format("{} holds no ranges: there is nothing to calibrate on", path));
   }
   estimation::EstimateOptions settings;
-  settings.sensor = chosen_sensor(options.sensor, input.recording.header);
+  settings.sensor = input.choice.sensor;
   settings.angle_noise = options.angle_noise;
   settings.cartesian = input.whole_steps;
   settings.mirrored = options.mirrored;
-  if (number == 0) result.nominal = settings.sensor;
+  if (number == 0) {
+    result.nominal = settings.sensor;
+    result.choice = input.choice;
+  }
   for (const std::string& text : input.warnings) {
     result.warnings.push_back(fmt::format("{}: {}", path, text));
   }
@@ -116,12 +119,13 @@ RangedRecording read_and_estimate(const CalibrateRecordingsOptions& options, std
   return recording;
 }
 
-/// calibration.yaml; what did not converge is no calibration.
+/// calibration.yaml; what did not converge is no calibration, nor what is not better.
 void write_files(const CalibrateRecordingsOptions& options, CalibratedRecordings& result,
                  ResultFolder& folder, const Progress& progress) {
   result.provenance = with_inputs(options.files.provenance, options.recordings, progress);
   result.provenance.emplace_back("datum", calibration::to_string(result.calibration.datum_kind));
-  if (result.calibration.converged) {
+  const bool better = result.calibration.verdict.code != calibration::CalibrationCode::not_better;
+  if (result.calibration.converged && (better || options.force)) {
     sensors::Sensor calibrated = result.calibration.sensor;
     calibrated.provenance = result.provenance;
     folder.add_calibration(calibrated);

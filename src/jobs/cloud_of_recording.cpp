@@ -30,9 +30,8 @@ cloud::CloudSummary cloud_of_recording(const CloudOfRecordingOptions& options,
   if (std::filesystem::exists(options.calibration)) {
     settings.provenance.emplace_back("calibration_sha256", io::sha256_of_file(options.calibration));
   }
-  const SensorFrameRecording input = open_in_sensor_frame(
-      options.recording, options.reading,
-      [&calibration](const auto&) { return sensors::Sensor(calibration); }, progress);
+  const SensorFrameRecording input =
+      open_in_sensor_frame(options.recording, options.reading, calibration, progress);
   cloud::CloudSummary result =
       cloud::make_cloud(*input.reader, calibration, options.output, settings, progress);
   result.warnings.insert(result.warnings.begin(), input.warnings.begin(), input.warnings.end());

@@ -11,19 +11,29 @@
 namespace risley::jobs {
 namespace {
 
-/// The header to write, with the type of sensor where the recording does not tell it.
+/// The header to write, with a type of sensor where the recording does not tell it.
 recordings::RecordingHeader header_of(const recordings::Reader& reader,
-                                      std::optional<std::uint8_t> sensor_type) {
+                                      const ConvertRecordingOptions& options,
+                                      ConvertedRecording& result, const Progress& progress) {
   recordings::RecordingHeader header = reader.header();
-  if (!sensor_type) return header;
-  for (recordings::Device& device : header.devices) {
-    const std::string told = recordings::device_type_name(device.type);
-    if (told != "unknown" && device.type != *sensor_type) {
-      throw InvalidArgument(
-          fmt::format("option sensor_type {}: the recording tells that it is of a {}",
-                      recordings::device_type_name(*sensor_type), told));
+  if (options.sensor_type) {
+    for (recordings::Device& device : header.devices) {
+      const std::string told = recordings::device_type_name(device.type);
+      if (told != "unknown" && device.type != *options.sensor_type && !device.type_inferred) {
+        throw InvalidArgument(
+            fmt::format("option sensor_type {}: the recording tells that it is of a {}",
+                        recordings::device_type_name(*options.sensor_type), told));
+      }
+      device.type = *options.sensor_type;
     }
-    device.type = *sensor_type;
+    return header;
+  }
+  recordings::Device& device = header.devices.front();
+  const bool named = device.type != recordings::kUnknownDeviceType && !device.type_inferred;
+  if (named || header.devices.size() > 1) return header;
+  result.choice = choose_sensor(options.recording, options.reading, header, {}, progress);
+  if (result.choice->chosen_by == ChosenBy::scan) {
+    device.type = static_cast<std::uint8_t>(result.choice->sensor.device_type);
   }
   return header;
 }
@@ -35,7 +45,7 @@ ConvertedRecording convert_recording(const ConvertRecordingOptions& options,
   ConvertedRecording result;
   const auto reader = open_input(options.recording, options.reading);
   const auto writer = recordings::create_recording(
-      options.output, header_of(*reader, options.sensor_type), options.format);
+      options.output, header_of(*reader, options, result, progress.silent()), options.format);
   recordings::Chunk chunk;
   const auto read_next = [&] {
     try {

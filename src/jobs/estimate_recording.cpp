@@ -77,7 +77,7 @@ EstimatedRecording estimate_recording(const EstimateRecordingOptions& options,
                           progress.stage("reading"));
   EstimatedRecording result;
   estimation::EstimateOptions settings;
-  settings.sensor = chosen_sensor(options.sensor, input.recording.header);
+  settings.sensor = input.choice.sensor;
   settings.angle_noise = options.angle_noise;
   settings.fixed = hold(options.fixed, settings.sensor);
   settings.additional = options.additional;
@@ -88,6 +88,7 @@ EstimatedRecording estimate_recording(const EstimateRecordingOptions& options,
   settings.mirrored = options.mirrored;
   settings.cartesian = input.whole_steps;
   result.nominal = settings.sensor;
+  result.choice = std::move(input.choice);
   result.recording = std::move(input.recording);
   result.counts = input.counts;
   result.warnings = std::move(input.warnings);

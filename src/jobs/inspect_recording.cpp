@@ -30,6 +30,12 @@ InspectedRecording inspect_recording(const InspectRecordingOptions& options,
   result.audit = audit.result();
   result.audit.pps_wraps = reader->clock_wraps();
   result.warnings = reader->warnings();
+  if (result.header.devices.size() != 1 || result.audit.shots == 0) return result;
+  try {
+    result.choice = choose_sensor(options.recording, options.reading, result.header, {},
+                                  progress.stage("recognising"));
+  } catch (const InvalidArgument&) {  // no preset of that type: the header names it all the same
+  }
   return result;
 }
 

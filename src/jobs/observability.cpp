@@ -58,8 +58,7 @@ JudgedObservability judge_observability(const ObservabilityOptions& options,
                              options.sensor,
                              {.rate = options.rate, .ranges = true, .rows = false}},
                             progress.stage("reading"));
-    estimation::EstimateOptions settings =
-        settings_of(options, chosen_sensor(options.sensor, input.recording.header));
+    estimation::EstimateOptions settings = settings_of(options, input.choice.sensor);
     settings.cartesian = input.whole_steps;
     result.shape = settings.sensor.shape();
     const Progress estimating = progress.stage("estimating");

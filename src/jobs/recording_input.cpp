@@ -2,9 +2,11 @@
 // SPDX-License-Identifier: MIT
 #include "risley/jobs/recording_input.hpp"
 
+#include <cmath>
 #include <optional>
 #include <utility>
 
+#include <Eigen/Geometry>
 #include <fmt/format.h>
 
 #include "risley/core/angle.hpp"
@@ -21,49 +23,59 @@ namespace {
 using estimation::StoredPoseUse;
 using recordings::Extrinsics;
 
-/// Shots of the first second.
-estimation::AngleSeries first_second(const std::string& path,
-                                     const recordings::ReadOptions& options,
-                                     const Progress& progress) {
-  estimation::ShotSelector selector({1.0, false, false});  // one shot a second, and all of the head
-  try {
-    const auto reader = recordings::open_recording(path, options);
-    recordings::Chunk chunk;
-    while (selector.series().size() < 2 && reader->read(chunk)) {
-      selector.add(chunk.observations);
-      progress.check();
-    }
-  } catch (const FileError&) {  // who reads on is told of it
-  }
-  return selector.head();
+/// The pose that a roll about the optical axis amounts to: recorded = pose unrolled.
+Extrinsics roll_about_axis(double roll, const estimation::FrameTurn& frame) {
+  const Eigen::Matrix3d axis_frame = estimation::recording_from_sensor(frame);
+  const Eigen::Matrix3d turn =
+      axis_frame * Eigen::AngleAxisd(roll, Eigen::Vector3d::UnitX()) * axis_frame.transpose();
+  // Of Rz(yaw) Ry(pitch) Rx(roll).
+  return {std::atan2(turn(1, 0), turn(0, 0)),
+          std::atan2(-turn(2, 0), std::hypot(turn(0, 0), turn(1, 0))),
+          std::atan2(turn(2, 1), turn(2, 2)),
+          {}};
 }
 
 std::string share_text(double share) { return fmt::format("{:.1f} %", 100.0 * share); }
 
 }  // namespace
 
-SensorFrameRecording open_in_sensor_frame(
-    const std::string& path, const recordings::ReadOptions& options,
-    const std::function<sensors::Sensor(const recordings::RecordingHeader&)>& sensor_of,
-    const Progress& progress) {
+SensorFrameRecording open_in_sensor_frame(const std::string& path,
+                                          const recordings::ReadOptions& options,
+                                          const std::optional<sensors::Sensor>& given,
+                                          const Progress& progress) {
   progress.check();
   recordings::ReadOptions reading = options;
-  SensorFrameRecording result{open_input(path, reading), {}, reading.extrinsics.has_value()};
-  if (reading.shot_rate) {
-    reading.emitters = sensor_of(result.reader->header()).train.emitters();
-    if (reading.emitters > 1) result.reader = open_input(path, reading);
+  SensorFrameRecording result{open_input(path, reading), {}, {}, reading.extrinsics.has_value()};
+  recordings::require_times(result.reader->header());
+  result.choice = choose_sensor(path, reading, result.reader->header(), given, progress);
+  result.warnings = result.choice.warnings;
+  const sensors::Sensor& sensor = result.choice.sensor;
+  if (reading.shot_rate && sensor.train.emitters() > 1) {
+    reading.emitters = sensor.train.emitters();
+    reading.first_emitter = result.choice.order.first_emitter;
+    reading.backwards = result.choice.order.backwards;
+    result.reader = open_input(path, reading);
   }
   const recordings::RecordingHeader& header = result.reader->header();
-  recordings::require_times(header);
   if (reading.extrinsics || header.devices.size() != 1) return result;
   const recordings::Device& device = header.devices.front();
   const std::optional<Extrinsics> pose = recordings::stored_extrinsics(device);
-  if (!pose) return result;
   recordings::ReadOptions turned_back = reading;
+  if (!pose) {
+    if (result.choice.roll == 0) return result;
+    turned_back.extrinsics = roll_about_axis(result.choice.roll, result.choice.frame);
+    result.reader = open_input(path, turned_back);
+    result.turned_back = true;
+    result.warnings.push_back(fmt::format(
+        "the recording is rolled about the optical axis by {:.1f} deg, as the sensor's emitters "
+        "show: the shots were turned back by that",
+        degrees_from_radians(result.choice.roll)));
+    return result;
+  }
   turned_back.extrinsics = pose;
   const estimation::StoredPoseVerdict verdict = estimation::judge_stored_pose(
       first_second(path, reading, progress), first_second(path, turned_back, progress),
-      sensor_of(header).field_of_view);
+      sensor.field_of_view);
   const std::string found = fmt::format(
       "the recording states a pose of its sensor ({}); outside the sensor's field of "
       "view lie {} of the shots as recorded and {} after turning back",
@@ -91,9 +103,8 @@ EstimationInput read_for_estimation(const EstimationInputOptions& options,
                                     const Progress& progress) {
   const Stopwatch watch;
   const std::string& path = options.recording;
-  SensorFrameRecording input = open_in_sensor_frame(
-      path, options.reading,
-      [&options](const auto& header) { return chosen_sensor(options.sensor, header); }, progress);
+  SensorFrameRecording input =
+      open_in_sensor_frame(path, options.reading, given_sensor(options.sensor), progress);
   recordings::Reader& reader = *input.reader;
   if (reader.header().devices.size() > 1) {
     throw InvalidArgument(
@@ -113,11 +124,7 @@ EstimationInput read_for_estimation(const EstimationInputOptions& options,
   result.recording = {path, reader.header(), audit.result()};
   for (const auto& warning : reader.warnings()) result.warnings.push_back(warning_text(warning));
   result.warnings.insert(result.warnings.end(), input.warnings.begin(), input.warnings.end());
-  if (options.sensor.empty() && !names_its_sensor(reader.header())) {
-    result.warnings.emplace_back(
-        "the file does not say which sensor recorded it: a Mid-40 was assumed; option sensor says "
-        "which");
-  }
+  result.choice = std::move(input.choice);
   result.counts = selector.counts();
   if (result.counts.clock_resets > 0) {
     result.warnings.push_back(

@@ -2,48 +2,345 @@
 // SPDX-License-Identifier: MIT
 #include "risley/jobs/sensor_choice.hpp"
 
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <iterator>
+#include <limits>
+#include <map>
+#include <set>
+#include <span>
+
 #include <fmt/format.h>
 
+#include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
 #include "risley/sensors/preset.hpp"
 
 namespace risley::jobs {
 namespace {
 
-/// Type of the sensor that is assumed where a file does not name its own.
-constexpr std::uint8_t kAssumedType = 1;  // Mid-40
+using estimation::AngleSeries;
+using estimation::BeamSource;
+using estimation::SensorMatch;
+using estimation::SensorRecognition;
+using sensors::Sensor;
 
-/// The built-in preset of the instrument that made a recording.
-sensors::Sensor sensor_of_recording(const recordings::RecordingHeader& header) {
-  const std::uint8_t type = names_its_sensor(header) ? header.devices.front().type : kAssumedType;
-  std::optional<sensors::Sensor> found;
+/// A variant of a sensor's optics is tried where the residuals of its own are so many times what
+/// its noise and the recording's rounding leave, and taken where it leaves this share of them.
+constexpr double kPoorOptics = 3.0, kBetterOptics = 0.5;
+/// Fewer shots do not fill a field of view.
+constexpr std::size_t kFewestInField = 1000;
+/// The emitters' firing order says the rest; smaller rolls are within what emitters may be off.
+constexpr double kLeastRoll = radians_from_degrees(20.0);
+
+/// The built-in presets of the types of sensors; those of single units, of reversed rotors and of
+/// the maker's sequences have longer names than that of their type.
+std::vector<Sensor> type_presets() {
+  std::map<int, Sensor> by_type;
   for (const std::string& name : sensors::builtin_preset_names()) {
-    sensors::Sensor sensor = sensors::load_sensor(name);
-    // Presets of single units and of reversed rotors have longer names than that of the type.
-    if (sensor.device_type == type && (!found || name.size() < found->name.size())) {
-      found = std::move(sensor);
+    Sensor sensor = sensors::load_sensor(name);
+    const auto [place, is_new] = by_type.try_emplace(sensor.device_type, sensor);
+    if (!is_new && name.size() < place->second.name.size()) place->second = std::move(sensor);
+  }
+  std::vector<Sensor> result;
+  for (auto& [type, sensor] : by_type) result.push_back(std::move(sensor));
+  return result;
+}
+
+/// Built-in presets of the same type whose faces stand otherwise.
+std::vector<Sensor> variants_of(const Sensor& sensor) {
+  std::vector<Sensor> result;
+  for (const std::string& name : sensors::builtin_preset_names()) {
+    Sensor other = sensors::load_sensor(name);
+    if (other.device_type == sensor.device_type &&
+        other.train.face_order() != sensor.train.face_order()) {
+      result.push_back(std::move(other));
     }
   }
-  if (!found) {
-    throw InvalidArgument(fmt::format(
-        "no built-in preset for the recording's sensor ({}): say which with option sensor",
-        recordings::device_type_name(type)));
+  return result;
+}
+
+/// The first shots of a recording and what their beams are.
+struct FirstShots {
+  AngleSeries head;
+  BeamSource beams = BeamSource::recorded;
+};
+
+FirstShots first_shots(const std::string& path, const recordings::ReadOptions& reading,
+                       std::span<const Sensor> candidates, const Progress& progress) {
+  FirstShots shots{first_second(path, reading, progress)};
+  if (!reading.shot_rate) return shots;
+  const std::vector<std::uint8_t>& beam = shots.head.beam;
+  if (std::any_of(beam.begin(), beam.end(), [](std::uint8_t one) { return one != 0; })) {
+    return shots;
   }
-  return *found;
+  int emitters = 1;
+  for (const Sensor& sensor : candidates) emitters = std::max(emitters, sensor.train.emitters());
+  shots.beams = BeamSource::counted;
+  for (std::size_t i = 0; i < shots.head.size(); ++i) {
+    const double shot = 1e-9 * static_cast<double>(shots.head.time_ns[i]) * *reading.shot_rate;
+    shots.head.beam[i] = static_cast<std::uint8_t>(std::llround(shot) % emitters);
+  }
+  return shots;
+}
+
+/// Empty where there are too few shots.
+std::optional<SensorRecognition> recognised(const FirstShots& shots,
+                                            std::span<const Sensor> candidates) {
+  try {
+    return estimation::recognise_sensor(shots.head, candidates, shots.beams);
+  } catch (const EstimationError&) {
+    return std::nullopt;
+  }
+}
+
+double misfit_of(const SensorMatch& match) { return match.residual.value_or(match.misfit); }
+
+std::string misfit_text(double misfit) {
+  return std::isfinite(misfit) ? fmt::format("{:.3g} deg", degrees_from_radians(misfit))
+                               : "no lines at all";
+}
+
+/// What was found of a recognition's best match; its words are the caller's.
+void take(const SensorRecognition& found, std::span<const Sensor> candidates,
+          SensorChoice& choice) {
+  const SensorMatch& best = found.matches.front();
+  choice.sensor = candidates[best.candidate];
+  choice.fits = found.fits;
+  choice.order = best.order;
+  choice.frame = best.frame;
+  if (std::abs(best.roll) > kLeastRoll) choice.roll = best.roll;
+  choice.misfits.clear();
+  for (const SensorMatch& match : found.matches) {
+    choice.misfits.push_back({candidates[match.candidate].name, misfit_of(match)});
+    if (choice.misfits.size() == 2) break;
+  }
+}
+
+std::string comparison(const std::vector<PresetMisfit>& misfits) {
+  std::string text = fmt::format("{} leaves {}", misfits[0].preset, misfit_text(misfits[0].misfit));
+  if (misfits.size() > 1) {
+    text +=
+        fmt::format(", the next one, {}, {}", misfits[1].preset, misfit_text(misfits[1].misfit));
+  }
+  return text;
+}
+
+/// Exchanges the type's preset for a variant where the shots leave no doubt.
+void try_variants(const FirstShots& shots, SensorChoice& choice) {
+  const std::vector<Sensor> variants = variants_of(choice.sensor);
+  if (variants.empty()) return;
+  const auto own = estimation::start_residual(shots.head, choice.sensor, choice.order, shots.beams);
+  const double rounding = std::sqrt(shots.head.zenith_rounding_variance[shots.head.size() / 2]);
+  if (!own || *own < kPoorOptics * std::hypot(choice.sensor.angle_noise, rounding)) return;
+  for (const Sensor& variant : variants) {
+    const auto other = estimation::start_residual(shots.head, variant, choice.order, shots.beams);
+    if (!other || !(*other < kBetterOptics * *own)) continue;
+    choice.misfits = {{variant.name, *other}, {choice.sensor.name, *own}};
+    choice.sensor = variant;
+    choice.words = "recognised from the scan: " + comparison(choice.misfits);
+    return;
+  }
+}
+
+void call_it_a_guess(SensorChoice& choice, const std::string& why) {
+  choice.chosen_by = ChosenBy::guess;
+  choice.words = why;
+  choice.warnings.push_back(fmt::format(
+      "the file does not say which sensor recorded it: {} is a guess, {}; option sensor says which",
+      choice.sensor.name, why));
+}
+
+/// What is left where shots did not decide: the best description, the field of view, or a habit.
+void guess(const FirstShots& shots, const std::optional<SensorRecognition>& found,
+           std::span<const Sensor> candidates, SensorChoice& choice) {
+  if (found && found->fits) {
+    take(*found, candidates, choice);
+    call_it_a_guess(choice,
+                    "others describe the shots nearly as well: " + comparison(choice.misfits));
+    return;
+  }
+  std::optional<std::size_t> place;
+  if (shots.head.size() >= kFewestInField) {
+    place = estimation::smallest_field(shots.head, candidates, shots.beams);
+  }
+  if (place) {
+    choice.sensor = candidates[*place];
+    if (!found) {
+      call_it_a_guess(choice, "by the field of view alone");
+      return;
+    }
+  } else {
+    choice.sensor = sensors::load_sensor(kUsualSensor);
+    if (!found) {
+      choice.fits = false;
+      call_it_a_guess(choice, "because nothing tells");
+      return;
+    }
+  }
+  choice.chosen_by = ChosenBy::guess;
+  choice.fits = false;
+  for (const SensorMatch& match : found->matches) {
+    choice.misfits.push_back({candidates[match.candidate].name, misfit_of(match)});
+    if (choice.misfits.size() == 2) break;
+  }
+  choice.words = "no built-in preset describes the scan: " + comparison(choice.misfits);
+  choice.warnings.push_back(fmt::format(
+      "{}; {} is assumed. Option sensor says which sensor it was, by a preset or a calibration "
+      "file; the prisms of an unknown one are what identify finds",
+      choice.words, choice.sensor.name));
+}
+
+/// Tries the shot rates of the presets, because the recording has no times.
+SensorChoice choose_without_times(const std::string& path, recordings::ReadOptions reading,
+                                  std::span<const Sensor> candidates, const Progress& progress) {
+  SensorChoice choice;
+  std::set<double> rates;
+  for (const Sensor& sensor : candidates) rates.insert(sensor.shot_rate);
+  double least = std::numeric_limits<double>::infinity();
+  FirstShots shots;
+  for (const double rate : rates) {
+    std::vector<Sensor> some;
+    std::copy_if(candidates.begin(), candidates.end(), std::back_inserter(some),
+                 [rate](const Sensor& sensor) { return sensor.shot_rate == rate; });
+    reading.shot_rate = rate;
+    shots = first_shots(path, reading, some, progress);
+    const auto found = recognised(shots, some);
+    if (!found || !found->fits || misfit_of(found->matches.front()) >= least) continue;
+    least = misfit_of(found->matches.front());
+    take(*found, some, choice);
+    choice.words =
+        fmt::format("if it fired {:.6g} shots per second: {}", rate, comparison(choice.misfits));
+  }
+  if (std::isfinite(least)) {
+    call_it_a_guess(choice, choice.words);
+  } else {
+    guess(shots, std::nullopt, candidates, choice);
+  }
+  return choice;
+}
+
+/// What the type that a file names says, and whether the shots contradict it.
+SensorChoice choose_by_name(const FirstShots& shots, const Sensor& named,
+                            std::span<const Sensor> candidates) {
+  SensorChoice choice;
+  choice.sensor = named;
+  const auto alone = recognised(shots, {&named, 1});
+  if (alone) take(*alone, {&named, 1}, choice);
+  choice.chosen_by = ChosenBy::file;
+  choice.words = "named by the file";
+  const bool by_lines = alone && alone->decided && !alone->matches.front().residual;
+  if (!alone || by_lines) return choice;
+  const auto found = recognised(shots, candidates);
+  if (!found || !found->decided) return choice;
+  const SensorMatch& best = found->matches.front();
+  if (candidates[best.candidate].name == named.name) return choice;
+  choice.fits = false;
+  choice.misfits = {{candidates[best.candidate].name, misfit_of(best)}};
+  for (const SensorMatch& match : found->matches) {
+    if (candidates[match.candidate].name != named.name) continue;
+    choice.misfits.push_back({named.name, misfit_of(match)});
+  }
+  choice.warnings.push_back(fmt::format(
+      "the file names a {}, but its scan is that of a {}: {}; option sensor says which it was",
+      named.model, candidates[found->matches.front().candidate].model, comparison(choice.misfits)));
+  return choice;
 }
 
 }  // namespace
 
-bool names_its_sensor(const recordings::RecordingHeader& header) {
-  return header.devices.front().type != recordings::kUnknownDeviceType;
+std::string to_string(ChosenBy chosen_by) {
+  switch (chosen_by) {
+    case ChosenBy::option:
+      return "option";
+    case ChosenBy::file:
+      return "file";
+    case ChosenBy::scan:
+      return "scan";
+    case ChosenBy::guess:
+      break;
+  }
+  return "guess";
 }
 
-sensors::Sensor chosen_sensor(const std::string& name_or_path,
-                              const recordings::RecordingHeader& header) {
-  return name_or_path.empty() ? sensor_of_recording(header) : sensors::load_sensor(name_or_path);
+AngleSeries first_second(const std::string& path, const recordings::ReadOptions& options,
+                         const Progress& progress) {
+  // One shot a second, and all of the head.
+  estimation::ShotSelector selector({.rate = 1.0, .ranges = false, .rows = false});
+  try {
+    const auto reader = recordings::open_recording(path, options);
+    recordings::Chunk chunk;
+    while (selector.series().size() < 2 && reader->read(chunk)) {
+      selector.add(chunk.observations);
+      progress.check();
+    }
+  } catch (const FileError&) {  // who reads on is told of it
+  }
+  return selector.head();
 }
 
-std::vector<std::string> hold(const HeldParameters& held, sensors::Sensor& sensor) {
+std::optional<Sensor> given_sensor(const std::string& name_or_path) {
+  if (name_or_path.empty()) return std::nullopt;
+  return sensors::load_sensor(name_or_path);
+}
+
+SensorChoice choose_sensor(const std::string& path, const recordings::ReadOptions& reading,
+                           const recordings::RecordingHeader& header,
+                           const std::optional<Sensor>& given, const Progress& progress) {
+  SensorChoice choice;
+  const bool has_times = header.has_times || reading.shot_rate;
+  const bool one_sensor = header.devices.size() == 1;
+  if (given) {
+    choice.sensor = *given;
+    choice.words = "as asked for";
+    if (given->train.emitters() == 1 || !has_times || !one_sensor) return choice;
+    const FirstShots shots = first_shots(path, reading, {&*given, 1}, progress);
+    if (const auto found = recognised(shots, {&*given, 1})) take(*found, {&*given, 1}, choice);
+    return choice;
+  }
+  const std::vector<Sensor> candidates = type_presets();
+  const recordings::Device& device = header.devices.front();
+  const Sensor* named = nullptr;
+  if (device.type != recordings::kUnknownDeviceType) {
+    for (const Sensor& sensor : candidates) {
+      if (sensor.device_type == device.type) named = &sensor;
+    }
+    if (named == nullptr) {
+      throw InvalidArgument(fmt::format(
+          "no built-in preset for the recording's sensor ({}): say which with option sensor",
+          recordings::device_type_name(device.type)));
+    }
+  }
+  if (named != nullptr && (!has_times || !one_sensor)) {
+    choice.sensor = *named;
+    choice.chosen_by = ChosenBy::file;
+    choice.words = "named by the file";
+    return choice;
+  }
+  if (!has_times) return choose_without_times(path, reading, candidates, progress);
+  const FirstShots shots =
+      one_sensor ? first_shots(path, reading, candidates, progress) : FirstShots{};
+  if (named != nullptr && !device.type_inferred) {
+    return choose_by_name(shots, *named, candidates);
+  }
+  const auto found = recognised(shots, candidates);
+  if (found && found->decided) {
+    take(*found, candidates, choice);
+    choice.chosen_by = ChosenBy::scan;
+    choice.words = "recognised from the scan: " + comparison(choice.misfits);
+    try_variants(shots, choice);
+  } else if (named != nullptr) {
+    choice.sensor = *named;
+    choice.chosen_by = ChosenBy::file;
+    choice.words = "by the rates, tags and returns of the file";
+  } else {
+    guess(shots, found, candidates, choice);
+  }
+  return choice;
+}
+
+std::vector<std::string> hold(const HeldParameters& held, Sensor& sensor) {
   std::vector<std::string> names;
   for (const auto& [name, value] : held) {
     const ParameterInfo& parameter = find_parameter(name, sensor.shape());

@@ -19,11 +19,13 @@ namespace {
 /// Gives every row the time that counting its shot gives.
 class CountingReader final : public DecoratingReader {
  public:
-  CountingReader(std::unique_ptr<Reader> inner, std::string path, double shot_rate, int emitters)
+  CountingReader(std::unique_ptr<Reader> inner, std::string path, const ReadOptions& options)
       : DecoratingReader(std::move(inner)),
         path_(std::move(path)),
-        shot_rate_(shot_rate),
-        emitters_(emitters) {
+        shot_rate_(*options.shot_rate),
+        emitters_(options.emitters),
+        first_emitter_(options.first_emitter),
+        backwards_(options.backwards) {
     take_over();
   }
 
@@ -59,11 +61,15 @@ class CountingReader final : public DecoratingReader {
         return error;
       }
       rows.time_ns[row] = *time_ns;
-      if (in_turn) {
-        rows.beam[row] = static_cast<std::uint8_t>((shot % emitters_ + emitters_) % emitters_);
-      }
+      if (in_turn) rows.beam[row] = beam_of(shot);
     }
     return std::nullopt;
+  }
+
+  std::uint8_t beam_of(std::int64_t shot) const {
+    const std::int64_t steps = backwards_ ? -(shot % emitters_) : shot % emitters_;
+    return static_cast<std::uint8_t>(((first_emitter_ + steps) % emitters_ + emitters_) %
+                                     emitters_);
   }
 
   std::int64_t shot_number(const Observations& rows, std::size_t row) {
@@ -82,7 +88,8 @@ class CountingReader final : public DecoratingReader {
 
   std::string path_;
   double shot_rate_;
-  int emitters_;
+  int emitters_, first_emitter_;
+  bool backwards_;
   bool file_has_beams_ = false;
   std::array<std::int64_t, 256> next_shot_{};  ///< by device
   std::uint64_t lost_samples_ = 0;
@@ -91,10 +98,11 @@ class CountingReader final : public DecoratingReader {
 }  // namespace
 
 std::unique_ptr<Reader> with_counted_times(std::unique_ptr<Reader> reader, const std::string& path,
-                                           double shot_rate, int emitters) {
-  require_above("ReadOptions::shot_rate", shot_rate, 0, "Hz");
-  require_between("ReadOptions::emitters", emitters, 0, 255);
-  return std::make_unique<CountingReader>(std::move(reader), path, shot_rate, emitters);
+                                           const ReadOptions& options) {
+  require_above("ReadOptions::shot_rate", *options.shot_rate, 0, "Hz");
+  require_between("ReadOptions::emitters", options.emitters, 0, 255);
+  require_between("ReadOptions::first_emitter", options.first_emitter, 0, 255);
+  return std::make_unique<CountingReader>(std::move(reader), path, options);
 }
 
 }  // namespace risley::recordings

@@ -43,7 +43,8 @@ class ChainTest(CommandTest):
         self.assertFalse(result["mirrored"])
         self.assertLessEqual(ESTIMATED, result["parameters"].keys())
         for value in result["parameters"].values():
-            self.assertEqual(value.keys(), {"value", "sigma"})
+            self.assertEqual(value.keys(), {"value", "sigma", "sigma_given_held"})
+            self.assertGreaterEqual(value["sigma"], value["sigma_given_held"])
         for axis in ("azimuth_deg", "zenith_deg"):
             self.assertLessEqual(MOMENTS, result["residuals"][axis].keys())
         self.assertLessEqual({"read", "solve", "total"}, result["seconds"].keys())

@@ -73,7 +73,8 @@ class VendorTest(CommandTest):
         self.assertAlmostEqual(result["frame"]["pitch_deg"]["value"], -0.03, delta=0.1)
         for axis in ("azimuth_deg", "zenith_deg"):
             self.assertLess(result["residuals"][axis]["rms"], 0.005)
-        self.assertTrue(any("Mid-40 was assumed" in one for one in result["warnings"]))
+        self.assertEqual(result["sensor"], "Livox Mid-40")
+        self.assertEqual(result["sensor_chosen_by"], "scan")
         smooth = self.expect_json(0, "estimate", recording, "--shot-rate-hz", "100000",
                                   "--process-noise", "none")
         squares = [smooth["residuals"][axis]["rms"] ** 2 for axis in ("azimuth_deg", "zenith_deg")]
@@ -95,6 +96,36 @@ class VendorTest(CommandTest):
         elevations = [value[f"incident_beam_{i}_vertical_deg"] for i in range(1, 7)]
         for found, nominal in zip(sorted(elevations), (-0.792, -0.475, -0.158, 0.158, 0.475, 0.792)):
             self.assertAlmostEqual(found, nominal, delta=0.01)
+
+    def test_real_units_are_recognised_as_they_are(self):
+        real = pathlib.Path(FOLDER) / "real"
+        for name, rate, sensor in (("tele-15.pcd", "240385", "Tele-15"),
+                                   ("horizon-1.pcd", "240385", "Horizon"),
+                                   ("mid-40-hub-frame.csv", "100000", "Mid-40"),
+                                   ("avia-viewer-1.csv", None, "Avia"),
+                                   ("avia-viewer-13.csv", None, "Avia")):
+            with self.subTest(name):
+                rates = ("--shot-rate-hz", rate) if rate else ()
+                info = self.expect_json(0, "info", real / name, *rates)
+                self.assertEqual(info["sensor"], f"Livox {sensor}")
+                self.assertEqual(info["sensor_chosen_by"], "scan")
+                best, following = info["sensor_choice"]["misfits"]
+                self.assertEqual(best["preset"], sensor.lower())
+                self.assertGreater(following["misfit_deg"], 3 * best["misfit_deg"])
+                if rate:  # without times and rate it is a guess, and called one
+                    info = self.expect_json(0, "info", real / name)
+                    self.assertEqual(info["sensor"], f"Livox {sensor}")
+                    self.assertEqual(info["sensor_chosen_by"], "guess")
+
+    def test_emitters_of_a_real_tele_15_are_numbered_as_the_preset_has_them(self):
+        recording = pathlib.Path(FOLDER) / "real" / "tele-15.pcd"
+        result = self.expect_json(0, "estimate", recording, "--shot-rate-hz", "240385")
+        self.assertEqual(result["preset"], "tele-15")
+        self.assertFalse(result["mirrored"])
+        self.assertEqual(result["verdict"]["code"], "consistent")
+        for i in range(1, 7):
+            value = result["parameters"][f"incident_beam_{i}_vertical_deg"]["value"]
+            self.assertAlmostEqual(value, (i - 3.5) * 0.3168, delta=0.01)
 
     def test_public_copies_have_the_elevation_the_other_way(self):
         lines = (pathlib.Path(FOLDER) / "livox-mid-40-sequence.csv").read_text().splitlines()

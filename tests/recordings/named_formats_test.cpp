@@ -706,6 +706,14 @@ TEST(ShotRate, EmittersThatTheFileDoesNotNameFireInTurn) {
             (std::vector<std::uint8_t>{0, 1, 1, 0}));
   EXPECT_EQ(load_recording(path, {}, {.shot_rate = 240'000.0}).data.observations.beam,
             std::vector<std::uint8_t>(4, 0));
+  // They may begin with any of them and go backwards.
+  ReadOptions other = six;
+  other.first_emitter = 4;
+  EXPECT_EQ(load_recording(path, {}, other).data.observations.beam,
+            (std::vector<std::uint8_t>{4, 5, 5, 4}));
+  other.backwards = true;
+  EXPECT_EQ(load_recording(path, {}, other).data.observations.beam,
+            (std::vector<std::uint8_t>{4, 3, 3, 4}));
   // A further return is of the shot's emitter.
   put_bytes(path, "time_s,x_m,y_m,z_m,return\n5,1,2,3,1\n5,1,2,4,2\n5.1,1,2,3,1\n");
   EXPECT_EQ(load_recording(path, {}, six).data.observations.beam,

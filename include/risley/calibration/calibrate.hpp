@@ -84,10 +84,29 @@ struct ThicknessProfile {
   std::vector<double> mean_before, mean_after;  ///< [bins], m; NaN in an empty bin
 };
 
+/// What a calibration comes to. The codes are stable: scripts read them.
+enum class CalibrationCode {
+  as_believed,  ///< the walls bear out what the sensor believes of itself
+  bent,         ///< the beam goes elsewhere, significantly
+  not_better,   ///< parameters moved, and the walls are no flatter for it
+  undecided,    ///< the walls do not tell, or contradict what is stated of them
+};
+
+/// "as_believed", ...
+const char* to_string(CalibrationCode code);
+
+/// The same for people.
+struct CalibrationVerdict {
+  CalibrationCode code = CalibrationCode::undecided;
+  std::string words;  ///< what was found
+  std::string to_do;  ///< what follows from it
+};
+
 /// Everything one calibration found.
 struct Calibration {
   bool converged = false;
   std::string reason;  ///< why not; empty when converged
+  CalibrationVerdict verdict;
   std::vector<std::string> warnings;
   CalibrationMethod method = CalibrationMethod::adjustment;
   sensors::Sensor sensor;  ///< calibrated, with covariance

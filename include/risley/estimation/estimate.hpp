@@ -11,6 +11,7 @@
 #include "risley/estimation/diagnostics.hpp"
 #include "risley/estimation/initialisation.hpp"
 #include "risley/estimation/solution.hpp"
+#include "risley/estimation/verdict.hpp"
 #include "risley/estimation/weak_directions.hpp"
 
 namespace risley::estimation {
@@ -49,7 +50,8 @@ std::vector<FreeParameter> chosen_parameters(const EstimateOptions& options);
 struct EstimatedValue {
   std::string name;
   double value = 0;
-  double sigma = 0;
+  double sigma = 0;             ///< what held parameters may be off by included
+  double sigma_given_held = 0;  ///< if they were exactly as held
 };
 
 /// Everything one estimation found: the solution, what it was found from, and whether to believe
@@ -57,7 +59,8 @@ struct EstimatedValue {
 struct Estimate : Solution {
   Method method = Method::map;  ///< to be told, not to be asked: every method answers alike
   bool converged = false;
-  std::string reason;                 ///< why not converged; empty when converged
+  std::string reason;  ///< why not converged; empty when converged
+  EstimateVerdict verdict;
   std::vector<std::string> warnings;  ///< what the user should know all the same
   sensors::Sensor sensor;             ///< the calibrated sensor with its covariance
   bool mirrored = false;

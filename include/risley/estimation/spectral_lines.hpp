@@ -9,6 +9,8 @@
 #include <span>
 #include <vector>
 
+#include <Eigen/Core>
+
 #include "risley/estimation/angle_series.hpp"
 #include "risley/optics/prism.hpp"
 
@@ -23,14 +25,30 @@ struct SpectralLine {
   double phase = 0;             ///< rad, at the reference time
 };
 
+/// Where the shots of one emitter stand on average, the rotors' lines taken off.
+struct EmitterConstant {
+  std::uint8_t beam = 0;
+  double share = 0;  ///< of the shots
+  Complex constant;  ///< y + iz
+};
+
 /// A constant for each emitter and a line for each turning rotor, fitted together. To first order a
 /// prism adds a vector that turns with it, so each rotor owns one line.
 struct RotorLines {
   /// In the order of the speeds they were looked for with; all zero for a rotor that stands still.
   std::vector<SpectralLine> lines;
-  Complex constant;        ///< where the optical axis stands: y + iz, mean of the shots' emitters
+  Complex constant;  ///< where the optical axis stands: y + iz, mean of the shots' emitters
+  std::vector<EmitterConstant> emitters;  ///< those that have shots
   double unexplained = 0;  ///< mean square of what the fit leaves, of the unit vector
+  /// How that grows with a change of the lines' complex amplitudes, as change^H normal change,
+  /// [turning rotors squared]. Small where the shots tell little of them.
+  Eigen::MatrixXcd normal;
 };
+
+/// What stays unexplained, a mean square, when the lines must have these amplitudes and only their
+/// phases are free.
+/// @param amplitude  [lines]; those of rotors that stand still are not looked at
+double unexplained_with(const RotorLines& lines, std::span<const double> amplitude);
 
 /// Finds the speeds of the rotors by fitting lines to the shots of a window, at the times that have
 /// shots: half of the field may be missing, because sky returns nothing. A spectrum would be
@@ -64,6 +82,7 @@ class LineSearch {
   };
   /// The shots of one emitter.
   struct Emitter {
+    std::uint8_t beam = 0;
     double count = 0;
     std::vector<Complex> spectrum;  // sum of exp(-i w t)
     Complex value;                  // sum of the values

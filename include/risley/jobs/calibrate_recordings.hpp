@@ -21,7 +21,7 @@ namespace risley::jobs {
 struct CalibrateRecordingsOptions {
   std::vector<std::string> recordings;  ///< paths; of one sensor, each with ranges to plane walls
   recordings::ReadOptions reading;      ///< see open_in_sensor_frame()
-  std::string sensor;                   ///< as chosen_sensor()
+  std::string sensor;                   ///< as given_sensor()
   std::optional<double> rate;           ///< shots per second to use; empty: all
   std::optional<double> angle_noise;    ///< as estimation::EstimateOptions
   std::optional<bool> mirrored;         ///< the elevation's sign is turned; empty: find out
@@ -37,6 +37,7 @@ struct CalibrateRecordingsOptions {
   std::uint64_t seed = 0;
   std::vector<std::string> truths;  ///< OUT.truth.yaml of each recording to judge by, or none
   bool details = false;             ///< wanted in the result
+  bool force = false;               ///< write a calibration that is not better, too
   /// Names the outputs; without them nothing is written. States of several recordings are
   /// states_1.nc, states_2.nc, ...
   ResultFiles files;
@@ -47,6 +48,7 @@ struct CalibratedRecordings {
   std::vector<ReadRecording> recordings;
   std::uint64_t observations = 0;     ///< rows of all recordings
   std::vector<std::string> warnings;  ///< of the recordings; the calibration has its own
+  SensorChoice choice;                ///< who says which sensor the first one was
   sensors::Sensor nominal;            ///< preset that all started from
   calibration::Calibration calibration;
   std::optional<BeamComparison> truth;        ///< where it is known

@@ -9,6 +9,7 @@
 
 #include "risley/core/error.hpp"
 #include "risley/core/progress.hpp"
+#include "risley/jobs/sensor_choice.hpp"
 #include "risley/recordings/reader.hpp"
 
 namespace risley::jobs {
@@ -19,7 +20,8 @@ struct ConvertRecordingOptions {
   recordings::ReadOptions reading;
   std::string output;  ///< path
   std::string format;  ///< as recordings::create_recording(); empty: as the output's name ends
-  /// Livox device type of the sensor, where the recording does not tell it.
+  /// Livox device type of the sensor, where the recording does not tell it; empty: what its scan
+  /// tells.
   std::optional<std::uint8_t> sensor_type;
 };
 
@@ -28,6 +30,7 @@ struct ConvertedRecording {
   std::uint64_t observations = 0;  ///< read
   std::uint64_t left_out = 0;      ///< of them, because the format has no place for them
   std::string input_format;
+  std::optional<SensorChoice> choice;  ///< where the file does not name the sensor
   std::vector<recordings::ReadWarning> warnings;
   std::optional<FileError> damage;  ///< of the recording's body; what came before it was written
 };

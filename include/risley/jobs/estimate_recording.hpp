@@ -24,7 +24,7 @@ std::optional<double> usual_rate(estimation::Method method);
 struct EstimateRecordingOptions {
   std::string recording;            ///< path; of one sensor
   recordings::ReadOptions reading;  ///< see open_in_sensor_frame()
-  std::string sensor;               ///< as chosen_sensor()
+  std::string sensor;               ///< as given_sensor()
   estimation::Method method = estimation::Method::map;
   std::optional<double> rate;         ///< shots per second to use; empty: all. See usual_rate()
   std::optional<double> angle_noise;  ///< as estimation::EstimateOptions
@@ -44,6 +44,7 @@ struct EstimatedRecording {
   estimation::AngleSeries head;  ///< every shot of the first second, as recorded
   estimation::SelectionCounts counts;
   std::vector<std::string> warnings;  ///< of the recording; the estimate has its own
+  SensorChoice choice;                ///< who says which sensor it was
   sensors::Sensor nominal;            ///< what the estimation started from
   estimation::Estimate estimate;
   std::optional<estimation::Evaluation> evaluation;  ///< where the truth is known

@@ -8,6 +8,7 @@
 
 #include "risley/core/error.hpp"
 #include "risley/core/progress.hpp"
+#include "risley/jobs/sensor_choice.hpp"
 #include "risley/recordings/excerpt.hpp"
 #include "risley/recordings/reader.hpp"
 #include "risley/recordings/time_audit.hpp"
@@ -25,13 +26,16 @@ struct InspectRecordingOptions {
 /// What a recording holds.
 struct InspectedRecording {
   recordings::RecordingHeader header;
+  /// The sensor; empty for a recording of several, or of a type without a built-in preset.
+  std::optional<SensorChoice> choice;
   recordings::TimeAuditResult audit;
   std::vector<recordings::ReadWarning> warnings;
   std::optional<FileError> damage;  ///< of its body; what came before it is in the audit
   std::optional<recordings::Excerpt> excerpt;
 };
 
-/// Reads a recording to its end and audits its times. Stages: sharing, reading.
+/// Reads a recording to its end, audits its times and tells its sensor. Stages: sharing, reading,
+/// recognising.
 /// @throws FileError when it cannot be opened; InvalidArgument; Cancelled
 InspectedRecording inspect_recording(const InspectRecordingOptions& options,
                                      const Progress& progress = {});

@@ -17,7 +17,7 @@ namespace risley::jobs {
 struct ObservabilityOptions {
   std::string recording;              ///< path; empty: a plan is judged
   recordings::ReadOptions reading;    ///< of the recording
-  std::string sensor;                 ///< as chosen_sensor(); a plan takes kUsualSensor
+  std::string sensor;                 ///< as given_sensor(); a plan takes kUsualSensor
   double duration = 30;               ///< of the plan, s
   std::optional<double> rate;         ///< shots per second; of a plan the sensor's, otherwise all
   std::optional<double> angle_noise;  ///< before rounding, rad; of a plan the sensor's

@@ -2,13 +2,14 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "risley/core/progress.hpp"
 #include "risley/estimation/angle_series.hpp"
+#include "risley/jobs/sensor_choice.hpp"
 #include "risley/recordings/extrinsics.hpp"
 #include "risley/recordings/reader.hpp"
 #include "risley/recordings/time_audit.hpp"
@@ -20,8 +21,9 @@ namespace risley::jobs {
 /// known.
 struct SensorFrameRecording {
   std::unique_ptr<recordings::Reader> reader;
-  std::vector<std::string> warnings;  ///< what was done about a pose that the recording states
-  bool turned_back = false;           ///< by a pose, stated or given
+  SensorChoice choice;                ///< its warnings are among these:
+  std::vector<std::string> warnings;  ///< of the sensor, and what was done about poses and rolls
+  bool turned_back = false;           ///< by a pose, stated or given, or a roll that was found
 };
 
 /// Opens a recording and decides what a pose in its header means where the options do not give one:
@@ -30,15 +32,15 @@ struct SensorFrameRecording {
 /// as moved, because hubs move points, and any other one does not, because LVX keeps points as they
 /// are. Moved points are turned back.
 ///
-/// Where times are counted and the file does not tell which of a sensor's emitters fired, they are
-/// taken to fire in turn.
-/// @param sensor_of  a sensor that could have made a recording with this header; asked only where
-///                   there is a pose to decide on, or times are counted
-/// @throws recordings::MissingTimes, Cancelled, and as recordings::open_recording
-SensorFrameRecording open_in_sensor_frame(
-    const std::string& path, const recordings::ReadOptions& reading,
-    const std::function<sensors::Sensor(const recordings::RecordingHeader&)>& sensor_of,
-    const Progress& progress = {});
+/// Chooses the sensor, too, and with it which of its emitters fired which shot where times are
+/// counted and the file does not tell. Where emitters show that the recording is rolled about the
+/// optical axis, and no pose says so, it is turned back by that.
+/// @param given  sensor that was asked for, see choose_sensor()
+/// @throws recordings::MissingTimes, Cancelled, and as recordings::open_recording, choose_sensor()
+SensorFrameRecording open_in_sensor_frame(const std::string& path,
+                                          const recordings::ReadOptions& reading,
+                                          const std::optional<sensors::Sensor>& given,
+                                          const Progress& progress = {});
 
 /// One recording that was read to its end.
 struct ReadRecording {
@@ -54,13 +56,14 @@ struct ReadRecording {
 struct EstimationInputOptions {
   std::string recording;            ///< path; of one sensor, with times
   recordings::ReadOptions reading;  ///< see open_in_sensor_frame() where it holds no extrinsics
-  std::string sensor;               ///< as chosen_sensor()
+  std::string sensor;               ///< as given_sensor()
   estimation::SelectionOptions selection;
 };
 
 /// What reading a recording leaves for an estimation.
 struct EstimationInput {
   ReadRecording recording;
+  SensorChoice choice;
   estimation::AngleSeries series;  ///< the chosen shots, in the sensor's frame
   estimation::AngleSeries head;    ///< every shot of the first second
   estimation::SelectionCounts counts;

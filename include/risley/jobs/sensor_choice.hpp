@@ -7,7 +7,9 @@
 #include <utility>
 #include <vector>
 
-#include "risley/recordings/observations.hpp"
+#include "risley/core/progress.hpp"
+#include "risley/estimation/sensor_recognition.hpp"
+#include "risley/recordings/reader.hpp"
 #include "risley/sensors/sensor.hpp"
 
 namespace risley::jobs {
@@ -17,15 +19,63 @@ namespace risley::jobs {
 /// The preset of a calibration or plan where nothing names another.
 inline constexpr const char* kUsualSensor = "mid-40";
 
-/// Whether a recording tells which type of sensor made it.
-bool names_its_sensor(const recordings::RecordingHeader& header);
+/// Who says which sensor made a recording.
+enum class ChosenBy {
+  option,  ///< whoever asked
+  file,    ///< the recording names it
+  scan,    ///< no other built-in preset describes the shots as well
+  guess,   ///< not enough was there to tell
+};
 
-/// The sensor to start from.
-/// @param name_or_path  as sensors::load_sensor; empty takes the built-in preset of the type that
-///                      the recording names, a Mid-40's where it names none
-/// @throws InvalidArgument when there is no preset of that type; as sensors::load_sensor
-sensors::Sensor chosen_sensor(const std::string& name_or_path,
-                              const recordings::RecordingHeader& header);
+/// "option", "file", "scan", "guess"
+std::string to_string(ChosenBy chosen_by);
+
+/// How well a preset describes the shots of a recording.
+struct PresetMisfit {
+  std::string preset;
+  double misfit =
+      0;  ///< rms of what its lines leave, or its optics where lines did not decide, rad
+};
+
+/// The sensor that made a recording, as far as it is known.
+struct SensorChoice {
+  sensors::Sensor sensor;
+  ChosenBy chosen_by = ChosenBy::option;
+  std::string words;  ///< why this one
+  /// Whether the sensor describes the shots; empty where they are too few to tell, or nobody asked.
+  std::optional<bool> fits;
+  /// The sensor and the next best one, where the shots were asked.
+  std::vector<PresetMisfit> misfits;
+  std::vector<std::string> warnings;
+  /// Order in which its emitters fire where beams are counted.
+  estimation::FiringOrder order;
+  /// The recording's roll about the optical axis, rad; 0 where it is not known or small. And where
+  /// that axis stands in the recording, roughly.
+  double roll = 0;
+  estimation::FrameTurn frame;
+};
+
+/// Chooses the sensor of a recording: the one that was asked for, that of the type which the file
+/// names, or the built-in preset that describes the shots of the first second best, by speeds of
+/// the rotors, how far the prisms bend and emitters together. Where times are missing, those of
+/// the presets' shot rates are tried, and the answer is a guess; so is the preset with the smallest
+/// field of view that holds the shots, where that is all there is. A type that the file names and
+/// the shots contradict is kept, with a warning.
+/// @param header  of the recording
+/// @param given   sensor that was asked for
+/// @throws FileError, InvalidArgument, Cancelled
+SensorChoice choose_sensor(const std::string& path, const recordings::ReadOptions& reading,
+                           const recordings::RecordingHeader& header,
+                           const std::optional<sensors::Sensor>& given,
+                           const Progress& progress = {});
+
+/// Every shot of a recording's first second, up to damage.
+estimation::AngleSeries first_second(const std::string& path,
+                                     const recordings::ReadOptions& options,
+                                     const Progress& progress = {});
+
+/// A sensor by name or path; empty for an empty text. @throws as sensors::load_sensor
+std::optional<sensors::Sensor> given_sensor(const std::string& name_or_path);
 
 /// Parameters to hold: by name, at a value if there is one (SI units), at the sensor's otherwise.
 using HeldParameters = std::vector<std::pair<std::string, std::optional<double>>>;

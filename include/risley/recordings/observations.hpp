@@ -85,6 +85,8 @@ struct Device {
   std::string hub_serial;  ///< broadcast code of the hub, empty without one
   std::uint8_t index = 0;  ///< the key by which packets name it
   std::uint8_t type = kMid40;
+  /// The file does not name the type: it is what rates, tags and numbers of returns leave.
+  bool type_inferred = false;
   bool extrinsic_enabled = false;
   std::array<float, 3> roll_pitch_yaw_deg{};
   std::array<float, 3> translation_m{};

@@ -375,10 +375,12 @@ void MessageReader::describe_device(std::size_t topic, const FirstMessages& firs
   const int returns = is_cloud ? clouds_[topic].returns : static_cast<int>(first.most_returns);
   header_.returns_per_shot = std::max(header_.returns_per_shot, returns);
   Device& device = header_.devices[*devices_[topic]];
+  device.type_inferred = true;
   if (returns == 3) {
     device.type = kAvia;
   } else if (!is_cloud && !first.intervals.empty() && is_close(median(first.intervals), 1e4) &&
              !first.several_lines) {
+    // Drivers and tools that know no tags write 0, too.
     device.type = first.tagged || returns > 1 ? kMid70 : kMid40;
   }
 }

@@ -41,6 +41,7 @@ class ScanSequenceReader final : public TextTableReader {
     if (table_header() != kSequenceHeader) refuse_header(std::string(kSequenceHeader));
     set_column_count(3);
     header_.has_range = header_.has_intensity = false;
+    header_.devices.front().type = kUnknownDeviceType;
     learn_number_style();
   }
 

@@ -183,6 +183,7 @@ class ViewerCsvReader final : public TextTableReader {
     Device entry;
     entry.index = static_cast<std::uint8_t>(device);
     entry.type = type;
+    entry.type_inferred = true;
     header_.devices.resize(device);
     header_.devices.push_back(entry);
     return device;

@@ -1,0 +1,342 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "risley/estimation/sensor_recognition.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <complex>
+#include <functional>
+#include <map>
+#include <utility>
+
+#include <Eigen/Core>
+
+#include "risley/core/angle.hpp"
+#include "risley/core/direction.hpp"
+#include "risley/core/error.hpp"
+#include "risley/estimation/estimate.hpp"
+#include "risley/estimation/initialisation.hpp"
+#include "risley/estimation/spectral_lines.hpp"
+#include "risley/optics/observation_model.hpp"
+
+#include "estimation/field_of_view.hpp"
+
+namespace risley::estimation {
+namespace {
+
+/// How far the clock of a recording may be off, and rotors from their nominal speeds.
+constexpr double kSpeedShare = 0.06;
+constexpr std::size_t kMostMinima = 4;
+constexpr int kMostFrames = 5;
+/// The axis has been found when it moves by less, and is lost when by more, as a sine.
+constexpr double kAxisFound = 0.01, kAxisLost = 0.5;
+/// What the lines of the right sensor leave at most, rad: lines of higher order, lost shots and
+/// times that are not those of the shots.
+constexpr double kMostMisfit = radians_from_degrees(4.0);
+/// Lines alone decide when all others leave so many times as much.
+constexpr double kFarWorse = 3.0;
+/// Optics are tried of sensors whose lines leave up to so many times as much as the best.
+constexpr double kWorthATrial = 3.0;
+/// Emitters tell the roll when what their constants leave is below this share of how far they
+/// stand apart.
+constexpr double kEmittersFit = 0.25;
+
+/// The lines of a sensor's scan when all of its field is seen.
+struct NominalLines {
+  std::vector<double> amplitude;  ///< [prisms]
+  std::vector<Complex> constant;  ///< [emitters]
+};
+
+NominalLines nominal_lines(const PrismTrain& train) {
+  const int steps = train.prisms() <= 2 ? 24 : 12;
+  const auto prisms = static_cast<std::size_t>(train.prisms());
+  NominalLines result;
+  result.amplitude.assign(prisms, 0.0);
+  for (int beam = 0; beam < train.emitters(); ++beam) {
+    std::vector<Complex> sums(prisms);
+    Complex constant = 0;
+    double count = 0;
+    std::vector<double> angles(prisms, 0.0);
+    const auto visit = [&](const auto& self, std::size_t prism) -> void {
+      if (prism < prisms) {
+        for (int step = 0; step < steps; ++step) {
+          angles[prism] = kTwoPi * step / steps;
+          self(self, prism + 1);
+        }
+        return;
+      }
+      const Observation shot = observe(train, angles, beam);
+      if (!shot.valid) return;
+      const Complex value(shot.direction.y, shot.direction.z);
+      count += 1.0;
+      constant += value;
+      for (std::size_t k = 0; k < prisms; ++k) sums[k] += value * std::polar(1.0, -angles[k]);
+    };
+    visit(visit, 0);
+    count = std::max(count, 1.0);
+    for (std::size_t k = 0; k < prisms; ++k) {
+      result.amplitude[k] += std::abs(sums[k]) / count / train.emitters();
+    }
+    result.constant.push_back(constant / count);
+  }
+  return result;
+}
+
+/// The emitter that fired the shots of a beam.
+std::size_t emitter_of(std::uint8_t beam, std::size_t emitters, const FiringOrder& order) {
+  const auto count = static_cast<int>(emitters);
+  const int steps = order.backwards ? -(beam % count) : beam % count;
+  return static_cast<std::size_t>(((order.first_emitter + steps) % count + count) % count);
+}
+
+/// How the constants of a recording's beams fit the emitters of a sensor.
+struct EmitterFit {
+  double miss = std::numeric_limits<double>::infinity();  ///< mean square
+  FiringOrder order;
+  double roll = 0;
+};
+
+/// The fit of one order: the mean is the axis's, and the rest turns with the sensor's roll.
+EmitterFit fit_of(const RotorLines& found, const std::vector<Complex>& expected,
+                  const FiringOrder& order) {
+  const auto expected_of = [&](const EmitterConstant& one) {
+    return expected[emitter_of(one.beam, expected.size(), order)];
+  };
+  Complex mean_found = 0, mean_expected = 0, product = 0;
+  for (const EmitterConstant& one : found.emitters) {
+    mean_found += one.share * one.constant;
+    mean_expected += one.share * expected_of(one);
+  }
+  double power_found = 0, power_expected = 0;
+  for (const EmitterConstant& one : found.emitters) {
+    const Complex a = one.constant - mean_found, b = expected_of(one) - mean_expected;
+    product += one.share * a * std::conj(b);
+    power_found += one.share * std::norm(a);
+    power_expected += one.share * std::norm(b);
+  }
+  EmitterFit fit{power_found + power_expected - 2.0 * std::abs(product), order, 0.0};
+  if (fit.miss < kEmittersFit * kEmittersFit * power_expected) fit.roll = std::arg(product);
+  return fit;
+}
+
+/// @param expected  [emitters], as the recording has them: mirrored where it is
+EmitterFit emitter_fit(const RotorLines& found, const std::vector<Complex>& expected,
+                       BeamSource beams) {
+  const std::size_t count = expected.size();
+  EmitterFit best;
+  if (beams == BeamSource::recorded) {
+    const bool known = std::all_of(found.emitters.begin(), found.emitters.end(),
+                                   [&](const EmitterConstant& one) { return one.beam < count; });
+    return known ? fit_of(found, expected, {}) : best;
+  }
+  for (const bool backwards : {false, true}) {
+    for (std::size_t first = 0; first < count; ++first) {
+      EmitterFit fit = fit_of(found, expected, {static_cast<int>(first), backwards});
+      // The other order is the same with half a turn of roll.
+      if (count > 1 && std::abs(fit.roll) > 0.5 * kPi) continue;
+      if (fit.miss < best.miss) best = fit;
+    }
+    if (count == 1) break;
+  }
+  return best;
+}
+
+/// The rotation whose X axis leans by the sine of a constant.
+Eigen::Matrix3d frame_with_axis(const Eigen::Matrix3d& frame, Complex constant) {
+  const double size = std::min(std::abs(constant), 1.0);
+  const Eigen::Vector3d axis =
+      frame * Eigen::Vector3d(std::sqrt(1.0 - size * size), constant.real(), constant.imag());
+  return recording_from_sensor(
+      {std::atan2(axis.y(), axis.x()), std::atan2(-axis.z(), std::hypot(axis.x(), axis.y()))});
+}
+
+Eigen::Matrix3d frame_about_mean(const AngleSeries& series) {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (std::size_t i = 0; i < series.size(); ++i) {
+    const auto v = direction_from_angles<double>({series.azimuth[i], series.zenith[i]});
+    sum += Eigen::Vector3d(v.x, v.y, v.z);
+  }
+  return recording_from_sensor(
+      {std::atan2(sum.y(), sum.x()), std::atan2(-sum.z(), std::hypot(sum.x(), sum.y()))});
+}
+
+AngleSeries in_frame(const AngleSeries& shots, const Eigen::Matrix3d& frame) {
+  AngleSeries turned = shots;
+  turn(turned, frame.transpose());
+  return turned;
+}
+
+/// Matches lines of sensors with shots, in one frame of the recording after the other.
+class LineMatcher {
+ public:
+  LineMatcher(std::span<const sensors::Sensor> candidates, BeamSource beams)
+      : beams_(beams), matches_(candidates.size()) {
+    for (std::size_t i = 0; i < candidates.size(); ++i) {
+      matches_[i].candidate = i;
+      candidates_.push_back(
+          {sensors::in_all_combinations(candidates[i]), nominal_lines(candidates[i].train)});
+    }
+  }
+
+  /// Tries every candidate in a frame. @return the optical axis of the best one there
+  Complex try_frame(const AngleSeries& shots, const Eigen::Matrix3d& frame) {
+    const LineSearch search(in_frame(shots, frame));
+    std::map<std::vector<double>, std::vector<RotorLines>> known;  // by ascending speeds
+    double least = std::numeric_limits<double>::infinity();
+    Complex axis = 0;
+    for (SensorMatch& match : matches_) {
+      const Candidate& candidate = candidates_[match.candidate];
+      for (const bool mirrored : {false, true}) {
+        std::vector<Complex> emitters = candidate.lines.constant;
+        if (mirrored) {
+          for (Complex& one : emitters) one = std::conj(one);
+        }
+        for (const sensors::Sensor& sensor : candidate.combinations) {
+          // Ascending speeds, so that all ways to say the same are looked for once.
+          std::vector<std::pair<double, double>> rotors;  // speed, amplitude
+          for (std::size_t k = 0; k < sensor.angular_velocity.size(); ++k) {
+            rotors.emplace_back(mirrored ? -sensor.angular_velocity[k] : sensor.angular_velocity[k],
+                                candidate.lines.amplitude[k]);
+          }
+          std::sort(rotors.begin(), rotors.end());
+          std::vector<double> speeds, amplitudes;
+          for (const auto& [speed, amplitude] : rotors) {
+            speeds.push_back(speed);
+            amplitudes.push_back(amplitude);
+          }
+          const auto [place, is_new] = known.try_emplace(speeds);
+          if (is_new) place->second = search.near(speeds, kSpeedShare, kMostMinima);
+          for (const RotorLines& lines : place->second) {
+            const EmitterFit fit = emitter_fit(lines, emitters, beams_);
+            const double misfit =
+                std::sqrt(std::max(0.0, unexplained_with(lines, amplitudes) + fit.miss));
+            if (misfit < least) {
+              least = misfit;
+              axis = lines.constant;
+            }
+            if (!(misfit < match.misfit)) continue;
+            match.misfit = misfit;
+            match.mirrored = mirrored;
+            match.frame = turn_of(frame_with_axis(frame, lines.constant));
+            match.order = fit.order;
+            match.roll = fit.roll;
+          }
+        }
+      }
+    }
+    return axis;
+  }
+
+  /// Best first.
+  std::vector<SensorMatch> sorted() const {
+    std::vector<SensorMatch> result = matches_;
+    std::stable_sort(result.begin(), result.end(), [](const SensorMatch& a, const SensorMatch& b) {
+      return a.misfit < b.misfit;
+    });
+    return result;
+  }
+
+ private:
+  struct Candidate {
+    std::vector<sensors::Sensor> combinations;
+    NominalLines lines;
+  };
+
+  BeamSource beams_;
+  std::vector<Candidate> candidates_;
+  std::vector<SensorMatch> matches_;
+};
+
+bool lines_decide(const std::vector<SensorMatch>& matches) {
+  return matches.front().misfit < kMostMisfit &&
+         (matches.size() == 1 || matches[1].misfit > kFarWorse * matches.front().misfit);
+}
+
+}  // namespace
+
+SensorRecognition recognise_sensor(const AngleSeries& head,
+                                   std::span<const sensors::Sensor> candidates, BeamSource beams) {
+  SensorRecognition result;
+  if (candidates.empty()) return result;
+  const ShotRange window = LineSearch(head).shots();
+  const AngleSeries shots = rows_of(head, window.begin, window.end);
+  LineMatcher matcher(candidates, beams);
+  Complex axis = matcher.try_frame(shots, Eigen::Matrix3d::Identity());
+  result.matches = matcher.sorted();
+  if (!lines_decide(result.matches) || std::abs(axis) > kAxisFound) {
+    const bool near = lines_decide(result.matches);
+    Eigen::Matrix3d frame =
+        near ? frame_with_axis(Eigen::Matrix3d::Identity(), axis) : frame_about_mean(shots);
+    for (int round = 0; round < kMostFrames; ++round) {
+      axis = matcher.try_frame(shots, frame);
+      if (std::abs(axis) < kAxisFound || std::abs(axis) > kAxisLost) break;
+      frame = frame_with_axis(frame, axis);
+    }
+    result.matches = matcher.sorted();
+  }
+  result.fits = result.matches.front().misfit < kMostMisfit;
+  result.decided = lines_decide(result.matches);
+  if (result.decided) return result;
+  const double worth = kWorthATrial * result.matches.front().misfit;
+  for (SensorMatch& match : result.matches) {
+    if (!(match.misfit <= worth)) continue;
+    match.residual = start_residual(head, candidates[match.candidate], match.order, beams);
+  }
+  std::stable_sort(result.matches.begin(), result.matches.end(),
+                   [](const SensorMatch& a, const SensorMatch& b) {
+                     constexpr double kNone = std::numeric_limits<double>::infinity();
+                     return a.residual.value_or(kNone) < b.residual.value_or(kNone);
+                   });
+  const std::optional<double> best = result.matches.front().residual;
+  if (!best) return result;
+  result.fits = *best < kMostMisfit;
+  result.decided = result.fits && (result.matches.size() == 1 || !result.matches[1].residual ||
+                                   *result.matches[1].residual > kClearlyWorse * *best);
+  return result;
+}
+
+std::optional<double> start_residual(const AngleSeries& head, const sensors::Sensor& sensor,
+                                     const FiringOrder& order, BeamSource beams) {
+  AngleSeries shots = head;
+  if (beams == BeamSource::counted) number_beams(shots, sensor, order);
+  StartOptions options;
+  EstimateOptions usual;
+  usual.sensor = sensor;
+  options.free = chosen_parameters(usual);
+  options.angle_noise = sensor.angle_noise;
+  options.mirrored.reset();
+  try {
+    return find_start(shots, sensor, options).residual_rms;
+  } catch (const EstimationError&) {
+    return std::nullopt;
+  } catch (const InvalidArgument&) {  // beams that it has not
+    return std::nullopt;
+  }
+}
+
+void number_beams(AngleSeries& series, const sensors::Sensor& sensor, const FiringOrder& order) {
+  const auto emitters = static_cast<std::size_t>(sensor.train.emitters());
+  for (std::uint8_t& beam : series.beam) {
+    beam = static_cast<std::uint8_t>(emitter_of(beam, emitters, order));
+  }
+}
+
+std::optional<std::size_t> smallest_field(const AngleSeries& head,
+                                          std::span<const sensors::Sensor> candidates,
+                                          BeamSource beams) {
+  if (head.size() == 0) return std::nullopt;
+  const int last_beam =
+      beams == BeamSource::counted ? 0 : *std::max_element(head.beam.begin(), head.beam.end());
+  std::optional<std::size_t> best;
+  for (const AngleSeries& shots : {head, in_frame(head, frame_about_mean(head))}) {
+    for (std::size_t i = 0; i < candidates.size(); ++i) {
+      if (last_beam >= candidates[i].train.emitters()) continue;
+      if (share_outside(shots, candidates[i].field_of_view) > kFewOutside) continue;
+      if (!best || candidates[i].field_of_view < candidates[*best].field_of_view) best = i;
+    }
+    if (best) break;
+  }
+  return best;
+}
+
+}  // namespace risley::estimation
