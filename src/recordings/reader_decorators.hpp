@@ -39,12 +39,10 @@ class DecoratingReader : public Reader {
 };
 
 /// Gives every row the time that counting its shot gives, see ReadOptions::shot_rate.
-/// @param path       for errors
-/// @param shot_rate  Hz
-/// @param emitters   that fire in turn where the file names no beams; 0 or 1: one
-/// @throws InvalidArgument when shot_rate is not a finite number above 0, emitters not 0 to 255
+/// @param path  for errors
+/// @throws InvalidArgument as open_recording()
 std::unique_ptr<Reader> with_counted_times(std::unique_ptr<Reader> reader, const std::string& path,
-                                           double shot_rate, int emitters);
+                                           const ReadOptions& options);
 
 /// Turns every row back into the frame of its sensor, see ReadOptions::extrinsics.
 /// @throws InvalidArgument when a number of the pose is not finite, or for several sensors

@@ -55,6 +55,19 @@ class Reader {
 /// that the difference of any two times is a number of 64 bits.
 inline constexpr std::int64_t kLongestTimeSpan_ns = (std::int64_t{1} << 62) - 1;
 
+/// A place where the count of a recording's shots is wrong.
+struct ShotSlip {
+  std::uint64_t row = 0;   ///< first observation behind it, counted from 0
+  std::int64_t shots = 0;  ///< that are missing before that row; below 0: that are there twice
+  /// Their number is known; otherwise only which emitters fire behind it (shots modulo their
+  /// number), and times go on after kUnknownGap_s.
+  bool counted = true;
+};
+
+/// Time that is put where an unknown number of shots is missing, s: longer than anybody counts the
+/// turns of a rotor over.
+inline constexpr double kUnknownGap_s = 10.0;
+
 /// How a recording is to be read.
 struct ReadOptions {
   /// Shots of one device per second, Hz. Times are then counted: shot i is fired at i / shot_rate,
@@ -64,6 +77,11 @@ struct ReadOptions {
   /// Emitters of the sensor, which fire in turn: where times are counted and the file has no other
   /// beam than 0, shot i is of beam i modulo emitters. 0 or 1: beams are those of the file.
   int emitters = 0;
+  /// Where they fire in another order: emitter of shots 0, 1, ...; one entry per emitter.
+  std::vector<std::uint8_t> firing_order = {};
+  /// Where times are counted: what is wrong with the count, rows ascending. For recordings of one
+  /// sensor.
+  std::vector<ShotSlip> slips = {};
   /// Pose of the sensor in the frame that the recording stands in: every row is turned back into
   /// the sensor's frame, direction and range. Directions without a range are only turned, a
   /// translation is left out with a warning. Rows without a return keep their place, angles that
@@ -78,7 +96,7 @@ struct ReadOptions {
 /// Opens a recording of any known format, recognised by its content and not by its name.
 /// @throws FileError when it is missing, empty, of no known format, or its header is damaged;
 ///         InvalidArgument when shot_rate is not a finite number above 0, emitters are not 0 to
-///         255, extrinsics are not finite, or when they are given for a recording of several
+///         255 or not as many as the firing order has, slips do not ascend, extrinsics are not finite, or when they are given for a recording of several
 ///         sensors
 std::unique_ptr<Reader> open_recording(const std::string& path, const ReadOptions& options = {});
 
