@@ -12,6 +12,7 @@
 
 #include <Eigen/Core>
 
+#include "risley/algebra/symmetric.hpp"
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
 #include "risley/core/require.hpp"
@@ -341,6 +342,12 @@ class Follower {
                                                               4.0 * noise * noise)))));
   }
 
+  /// Squared distance of a state from a prediction, in sigmas of that.
+  static double distance(const State& state, const State& predicted) {
+    const Eigen::VectorXd off = state.mean - predicted.mean;
+    return off.dot(algebra::SymmetricSolver(predicted.covariance).solve(off));
+  }
+
   /// One Gauss-Newton step from a state to the loaded shots and a prior together.
   void improve(State& state, const State& prior) {
     evaluate(state);
@@ -386,6 +393,12 @@ class Follower {
   struct LossTable {
     std::vector<std::int64_t> change;       // the first is 0
     std::vector<std::vector<double>> loss;  // [changes][shots]
+    std::vector<double> pull;               // squared distance from the prediction, in sigmas
+    double total(std::size_t row) const {
+      double sum = pull[row];
+      for (const double one : loss[row]) sum += one;
+      return sum;
+    }
   };
   /// The likeliest course of the lag: a change at every place costs a penalty.
   struct Course {
@@ -478,6 +491,7 @@ class Follower {
         evaluate(state);
         table.change.push_back(change);
         losses(table.loss.emplace_back());
+        table.pull.push_back(loose ? distance(state, predicted) : 0.0);
         double mean = 0;
         for (const double one : table.loss.back()) mean += one / static_cast<double>(shots);
         return mean;
@@ -492,29 +506,47 @@ class Follower {
           break;
         }
         for (const std::int64_t change : changes_of(tier)) try_change(change);
-        // Of a loose prediction each change was fitted alone: they cannot follow each other.
-        const std::size_t earliest = loose ? shots : from.place == last_slip_ ? 1 : 0;
-        course = likeliest_course(table, earliest, penalty());
+        if (loose) {  // each change was fitted alone, and happened in the gap before these shots
+          std::size_t best = 0, second = 1;
+          for (std::size_t row = 1; row < table.change.size(); ++row) {
+            if (table.total(row) < table.total(best)) {
+              second = std::exchange(best, row);
+            } else if (second == best || table.total(row) < table.total(second)) {
+              second = row;
+            }
+          }
+          course.loss = table.total(best) - table.pull[best];
+          if (course.loss > fair * static_cast<double>(shots)) continue;
+          if (best != 0 && from.place != last_slip_ &&
+              table.total(second) - table.total(best) > kSure) {
+            verdict.kind = Verdict::slip;
+            verdict.place = from.place;
+            verdict.change = table.change[best];
+            return verdict;
+          }
+          if (last && best != 0) verdict.kind = Verdict::lost;
+          break;
+        }
+        course = likeliest_course(table, from.place == last_slip_ ? 1 : 0, penalty());
         if (course.stretches.size() == 1) {
           if (!none_fits) continue;
           verdict.sure_until = window;
           return verdict;
         }
-        const auto& before = course.stretches[0];
         const auto& behind = course.stretches[1];
         const auto loss_of = [&](std::size_t row) {
           double sum = 0;
           for (std::size_t i = behind.begin; i < behind.end; ++i) sum += table.loss[row][i];
           return sum;
         };
-        double fitted = loss_of(behind.row);
+        const auto count = static_cast<double>(behind.end - behind.begin);
+        const double fitted = loss_of(behind.row);
         double second = std::numeric_limits<double>::infinity();
         for (std::size_t row = 0; row < table.change.size(); ++row) {
           if (row != behind.row) second = std::min(second, loss_of(row));
         }
         const bool sized = second - fitted > penalty();
-        for (std::size_t i = 0; i < before.end; ++i) fitted += table.loss[0][i];
-        const bool fits = fitted < fair * static_cast<double>(behind.end);
+        const bool fits = fitted < (2.0 * usual_loss_ + 0.5) * count + 8.0 * std::sqrt(count);
         const bool enough = behind.end - behind.begin >= kFewestBehind || window >= count_;
         if (fits && sized && enough) {
           verdict.kind = Verdict::slip;
@@ -829,6 +861,17 @@ Followed follow(const NumberedShots& shots, const Anchor& anchor, ShotRange rang
   }
   std::sort(result.slips.begin(), result.slips.end(),
             [](const FoundSlip& a, const FoundSlip& b) { return a.after < b.after; });
+  // A slip that was found in two steps.
+  constexpr std::size_t kOnePlace = 6;
+  for (std::size_t i = 1; i < result.slips.size();) {
+    if (result.slips[i].after - result.slips[i - 1].after < kOnePlace) {
+      result.slips[i - 1].shots += result.slips[i].shots;
+      result.slips.erase(result.slips.begin() + static_cast<std::ptrdiff_t>(i));
+    } else {
+      ++i;
+    }
+  }
+  std::erase_if(result.slips, [](const FoundSlip& slip) { return slip.shots == 0; });
   result.residual_rms = std::max(ahead.residual_rms(), back.residual_rms());
   return result;
 }
