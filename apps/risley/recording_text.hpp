@@ -16,6 +16,9 @@ namespace risley::app {
 /// Commercial name of the sensor that made a recording; of several, each once.
 std::string sensor_name(const recordings::RecordingHeader& header);
 
+/// Where the count of shots was wrong: [{row, shots}], shots null where they could not be counted.
+Json slips_json(const std::vector<recordings::ShotSlip>& slips);
+
 Json warnings_json(const std::vector<recordings::ReadWarning>& warnings);
 /// The same on stderr, each with the name of the file.
 void log_warnings(const std::string& file, const std::vector<recordings::ReadWarning>& warnings);

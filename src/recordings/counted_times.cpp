@@ -36,6 +36,8 @@ class CountingReader final : public DecoratingReader {
  private:
   void describe() override {
     header_.has_times = true;
+    header_.counted_rate = shot_rate_;
+    header_.slips = slips_;
     header_.time_reference = TimeReference::relative;
     clock_wraps_ = 0;
     if (lost_samples_ == 0) return;

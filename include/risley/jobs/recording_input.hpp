@@ -20,7 +20,8 @@ namespace risley::jobs {
 /// known.
 struct SensorFrameRecording {
   std::unique_ptr<recordings::Reader> reader;
-  std::vector<std::string> warnings;  ///< what was done about a pose that the recording states
+  /// What was done about a pose that the recording states, and about the count of its shots.
+  std::vector<std::string> warnings;
   bool turned_back = false;           ///< by a pose, stated or given
 };
 
@@ -30,10 +31,12 @@ struct SensorFrameRecording {
 /// as moved, because hubs move points, and any other one does not, because LVX keeps points as they
 /// are. Moved points are turned back.
 ///
-/// Where times are counted and the file does not tell which of a sensor's emitters fired, they are
-/// taken to fire in turn.
-/// @param sensor_of  a sensor that could have made a recording with this header; asked only where
-///                   there is a pose to decide on, or times are counted
+/// Where times are counted, here or evidently by who wrote the file (each row of a file without
+/// packets follows the one before it by the same time), the rotors are followed to find slips of the
+/// count and, where the file does not tell which of a sensor's emitters fired, the order in which
+/// they do: see estimation/shot_slips.hpp. Both are mended. Such a recording is read twice, and all
+/// of its directions are held in memory meanwhile.
+/// @param sensor_of  a sensor that could have made a recording with this header
 /// @throws recordings::MissingTimes, Cancelled, and as recordings::open_recording
 SensorFrameRecording open_in_sensor_frame(
     const std::string& path, const recordings::ReadOptions& reading,

@@ -55,15 +55,6 @@ class Reader {
 /// that the difference of any two times is a number of 64 bits.
 inline constexpr std::int64_t kLongestTimeSpan_ns = (std::int64_t{1} << 62) - 1;
 
-/// A place where the count of a recording's shots is wrong.
-struct ShotSlip {
-  std::uint64_t row = 0;   ///< first observation behind it, counted from 0
-  std::int64_t shots = 0;  ///< that are missing before that row; below 0: that are there twice
-  /// Their number is known; otherwise only which emitters fire behind it (shots modulo their
-  /// number), and times go on after kUnknownGap_s.
-  bool counted = true;
-};
-
 /// Time that is put where an unknown number of shots is missing, s: longer than anybody counts the
 /// turns of a rotor over.
 inline constexpr double kUnknownGap_s = 10.0;
