@@ -15,7 +15,8 @@
 namespace risley::estimation {
 namespace {
 
-constexpr double kWindow = 0.010;  // s
+/// Longest window, s; short recordings are cut into so many that their rotors' wander shows.
+constexpr double kWindow = 0.010, kFewestWindows = 50.0;
 constexpr std::size_t kFewestWindowShots = 8;
 /// How far the other rotors may be from the linearisation within a window, before its data.
 constexpr double kOtherSigma[] = {radians_from_degrees(1.0), radians_from_degrees(300.0),
@@ -51,6 +52,16 @@ double best_decade(const Cost& cost, double lowest, double highest) {
   return golden_section_minimum(cost, best - 1.0, best + 1.0, kTolerance);
 }
 
+/// Length of the windows of a trajectory, s.
+double window_length(const RotorTrajectory& at) {
+  double covered = 0;
+  for (std::size_t stretch = 0; stretch < at.stretch_begin.size(); ++stretch) {
+    const std::size_t first = at.stretch_begin[stretch], last = at.stretch_end(stretch) - 1;
+    covered += 1e-9 * static_cast<double>(at.time_ns[last] - at.time_ns[first]);
+  }
+  return std::clamp(covered / kFewestWindows, kKnotInterval, kWindow);
+}
+
 }  // namespace
 
 RotorWindows::RotorWindows(const NormalEquations& equations, const RotorTrajectory& at, int rotor,
@@ -66,6 +77,7 @@ RotorWindows::RotorWindows(const NormalEquations& equations, const RotorTrajecto
   for (int k = 0; k < prisms; ++k) {
     if (k != rotor) order.push_back(k);
   }
+  const double length = window_length(at);
   std::size_t stretch = 0, before = 0;
   for (std::size_t knot = 0; knot < at.size() && windows_.size() < most_windows;) {
     const bool fresh = stretch < at.stretch_begin.size() && at.stretch_begin[stretch] == knot;
@@ -76,7 +88,7 @@ RotorWindows::RotorWindows(const NormalEquations& equations, const RotorTrajecto
     std::size_t shots = 0;
     while (knot < end) {
       const double span = 1e-9 * static_cast<double>(at.time_ns[knot] - at.time_ns[first]);
-      if (span >= 0.95 * kWindow && shots >= kFewestWindowShots) break;
+      if (span >= 0.95 * length && shots >= kFewestWindowShots) break;
       shots += at.last_shot[knot] - at.first_shot[knot];
       ++knot;
     }
