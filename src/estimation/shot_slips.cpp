@@ -106,7 +106,8 @@ struct FoundSlip {
 struct Followed {
   std::size_t begin = 0, end = 0;  // valid shots that were reached
   std::vector<FoundSlip> slips;    // ascending
-  double residual_rms = 0;         // typical, rad
+  double residual_rms = 0;         // of predictions, typical, rad
+  std::size_t size() const { return end > begin ? end - begin : 0; }
 };
 
 /// Follows the rotors from a start in one direction. Places are steps from the start.
@@ -209,6 +210,7 @@ class Follower {
       } else if (test.loss < kLostLoss) {
         learn(test);
       }
+      missed_ += std::min(test.scale, kLostSteps * step_) * static_cast<double>(end - place);
       last = {place, state};
       state = predicted;
       const int rounds = is_loose(predicted) ? 3 : 1;
@@ -223,7 +225,8 @@ class Follower {
     std::int64_t change = 0;  // of the lag
   };
   const std::vector<Change>& slips() const { return slips_; }
-  double residual_rms() const { return weights_.angle_noise.rms(); }
+  /// By how much predictions missed, summed over all shots, rad.
+  double missed() const { return missed_; }
 
   std::size_t shot_at(std::size_t place) const {
     return static_cast<std::size_t>(static_cast<std::ptrdiff_t>(first_) +
@@ -574,6 +577,7 @@ class Follower {
   std::size_t last_slip_ = std::numeric_limits<std::size_t>::max();  // place
   std::vector<Change> slips_;
   ShotWeights weights_;
+  double missed_ = 0;
   double step_ = 0;  // rad
   double usual_loss_ = 1.7, correlation_ = 4.0;
   RotorTrajectory knot_;
@@ -586,6 +590,7 @@ class Follower {
 struct Anchor {
   Start start;
   std::size_t shot = 0;  // valid shot next to it
+  std::vector<std::uint8_t> firing_order;
 };
 
 /// Which emitter fired which shot, from the steps between neighbouring shots: all are equal, but
@@ -743,16 +748,18 @@ enum class Priors { of_the_type, wide };
 bool refit(NumberedShots& shots, Anchor& anchor, const Followed& followed,
            const sensors::Sensor& sensor, Priors priors);
 
-/// The best of short windows about a start, each fitted alone: a slip within it spoils a window.
-std::optional<Anchor> find_anchor(NumberedShots& shots, ShotRange range, const Start& start,
-                                  const sensors::Sensor& sensor, bool in_turn,
-                                  const Progress& progress) {
+/// Short windows about a start, each fitted alone, best first: a slip within it spoils a window.
+std::vector<Anchor> find_anchors(NumberedShots& shots, ShotRange range, const Start& start,
+                                 const sensors::Sensor& sensor, bool in_turn,
+                                 const Progress& progress) {
   constexpr double kWindow = 0.02, kAround = 0.08;  // s
+  // A slip within a gap that long is only a change of speed.
+  constexpr double kLongGap = 0.15 * kWindow;
   constexpr std::size_t kMostWindows = 24, kMostFitted = 5, kFewestShots = 400;
   struct Window {
+    bool has_gap = false;
     Anchor anchor;
     ShotRange rows;
-    std::vector<std::uint8_t> order;
   };
   const double middle =
       1e-9 * static_cast<double>(start.time_ns) -
@@ -769,7 +776,11 @@ std::optional<Anchor> find_anchor(NumberedShots& shots, ShotRange range, const S
         !find_firing_order(shots, window.rows, sensor.train, false, shots.firing_order)) {
       continue;
     }
-    window.order = shots.firing_order;
+    window.anchor.firing_order = shots.firing_order;
+    for (std::size_t i = window.rows.begin + 1; i < window.rows.end; ++i) {
+      const auto gap = static_cast<double>(shots.number[i] - shots.number[i - 1]) / shots.rate;
+      window.has_gap = window.has_gap || gap > kLongGap;
+    }
     constexpr double kAngleSigma = radians_from_degrees(20.0), kSpeedShare = 0.005;
     Follower::State state = Follower::loose_state(start, kAngleSigma, kSpeedShare);
     Follower follower(shots, start.train, 0, usual_step(start, shots.rate), 1, window.rows.begin,
@@ -790,24 +801,24 @@ std::optional<Anchor> find_anchor(NumberedShots& shots, ShotRange range, const S
         range.end - 1);
     windows.push_back(std::move(window));
   }
-  std::stable_sort(windows.begin(), windows.end(), [](const Window& a, const Window& b) {
+  const auto better = [](const Window& a, const Window& b) {
+    if (a.has_gap != b.has_gap) return b.has_gap;
     return a.anchor.start.residual_rms < b.anchor.start.residual_rms;
-  });
+  };
+  std::stable_sort(windows.begin(), windows.end(), better);
   if (windows.size() > kMostFitted) windows.resize(kMostFitted);
-  const Window* best = nullptr;
+  std::vector<Window> fitted;
   for (Window& window : windows) {
     progress.check();
-    shots.firing_order = window.order;
+    shots.firing_order = window.anchor.firing_order;
     const Followed alone{
         window.rows.begin, window.rows.end, {}, window.anchor.start.residual_rms};
-    if (!refit(shots, window.anchor, alone, sensor, Priors::of_the_type)) continue;
-    if (best == nullptr || window.anchor.start.residual_rms < best->anchor.start.residual_rms) {
-      best = &window;
-    }
+    if (refit(shots, window.anchor, alone, sensor, Priors::of_the_type)) fitted.push_back(window);
   }
-  if (best == nullptr) return std::nullopt;
-  shots.firing_order = best->order;
-  return best->anchor;
+  std::stable_sort(fitted.begin(), fitted.end(), better);
+  std::vector<Anchor> anchors;
+  for (Window& window : fitted) anchors.push_back(std::move(window.anchor));
+  return anchors;
 }
 
 /// Missing shots before each valid shot of a stretch, against the one of its start.
@@ -872,7 +883,8 @@ Followed follow(const NumberedShots& shots, const Anchor& anchor, ShotRange rang
     }
   }
   std::erase_if(result.slips, [](const FoundSlip& slip) { return slip.shots == 0; });
-  result.residual_rms = std::max(ahead.residual_rms(), back.residual_rms());
+  result.residual_rms = (ahead.missed() + back.missed()) /
+                        static_cast<double>(std::max<std::size_t>(1, result.end - result.begin));
   return result;
 }
 
@@ -893,6 +905,8 @@ bool refit(NumberedShots& shots, Anchor& anchor, const Followed& followed,
   AngleSeries mended;
   for (std::size_t i = begin; i < end; ++i) shots.append_to(mended, i, lags.of(i));
   BatchMapOptions options;
+  // Rotors that may go where they want would follow a slip.
+  options.rotor_process.assign(static_cast<std::size_t>(sensor.prisms()), kSettlingProcess);
   options.free = free_parameters(default_free_names(sensor.shape(), one_glass(sensor.train)),
                                  sensor.shape());
   for (FreeParameter& parameter : options.free) {
@@ -904,7 +918,7 @@ bool refit(NumberedShots& shots, Anchor& anchor, const Followed& followed,
   try {
     const Solution solution = run_batch_map(mended, anchor.start, sensor, options);
     const double residual = robust_scale(solution.azimuth_residual, solution.zenith_residual);
-    if (!(residual < 2.0 * followed.residual_rms)) return false;
+    if (!(residual < 3.0 * followed.residual_rms)) return false;
     const RotorTrajectory& motion = solution.trajectory;
     std::size_t knot = 0;
     for (std::size_t i = 0; i < motion.size(); ++i) {
@@ -945,9 +959,30 @@ void follow_all(NumberedShots& shots, ShotRange range, const sensors::Sensor& se
     start->mirrored = false;
     start->frame.reset();
   }
-  const std::optional<Anchor> found = find_anchor(shots, range, *start, sensor, in_turn, progress);
-  if (!found) return;
-  Anchor anchor = *found;
+  // An anchor is as good as what comes of following the rotors from it.
+  std::optional<Anchor> best;
+  std::size_t least_lost = std::numeric_limits<std::size_t>::max();
+  double least_missed = std::numeric_limits<double>::infinity();
+  for (const Anchor& one : find_anchors(shots, range, *start, sensor, in_turn, progress)) {
+    progress.check();
+    shots.firing_order = one.firing_order;
+    const ShotRange near{
+        std::max(range.begin, one.shot - std::min(one.shot, kFittedShots / 2)),
+        std::min(range.end, one.shot + kFittedShots / 2)};
+    const Followed trial = follow(shots, one, near);
+    const std::size_t lost = near.size() - trial.size();
+    if (lost < least_lost || (lost == least_lost && trial.residual_rms < least_missed)) {
+      best = one;
+      least_lost = lost;
+      least_missed = trial.residual_rms;
+    }
+    const double fine = std::max(kLeastNoiseSteps * usual_step(one.start, shots.rate),
+                                 1.5 * one.start.residual_rms);
+    if (lost == 0 && trial.residual_rms < fine) break;
+  }
+  if (!best) return;
+  Anchor anchor = *std::move(best);
+  shots.firing_order = anchor.firing_order;
   Followed followed = follow(shots, anchor, range);
   for (int round = 0; round < kMostRounds; ++round) {
     progress.check();
