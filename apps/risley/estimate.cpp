@@ -135,9 +135,8 @@ Json frame_json(const Estimate& e) {
 Json shot_clock_json(const EstimatedRecording& outcome) {
   if (!outcome.estimate.speed_factor) return nullptr;
   const estimation::SpeedFactor& factor = *outcome.estimate.speed_factor;
-  Json clock = {
-      {"speed_factor", {{"value", factor.value}, {"sigma", factor.sigma}}},
-      {"shot_rate_hz", nullptr}};
+  Json clock = {{"speed_factor", {{"value", factor.value}, {"sigma", factor.sigma}}},
+                {"shot_rate_hz", nullptr}};
   const double rate = outcome.recording.header.counted_rate;
   if (rate > 0) clock["shot_rate_hz"] = rate / factor.value;
   return clock;

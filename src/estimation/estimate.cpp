@@ -75,8 +75,8 @@ std::optional<SpeedFactor> speed_factor(const sensors::Sensor& sensor, const Est
   for (int rotor = 0; rotor < nominal.prisms(); ++rotor) {
     const double speed = nominal.angular_velocity[static_cast<std::size_t>(rotor)];
     if (speed == 0) continue;
-    const EstimatedValue& found = estimate.values[estimate.free.size() +
-                                                  static_cast<std::size_t>(rotor)];
+    const EstimatedValue& found =
+        estimate.values[estimate.free.size() + static_cast<std::size_t>(rotor)];
     const double sigma = std::hypot(found.sigma / speed, 0.5 * kSame);
     factors.emplace_back(found.value / speed, sigma);
     sum += found.value / speed / (sigma * sigma);

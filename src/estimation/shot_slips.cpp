@@ -44,8 +44,8 @@ constexpr double kMostCorrelation = 10.0;
 /// Losses of single shots end at 1 / softening: mean losses near it say that nothing fits.
 constexpr double kSoftening = softening_at(1.0);
 constexpr double kLostLoss = 0.5 / kSoftening;
-/// Residuals of so many steps from shot to shot, and no number of missing shots that mends them: the
-/// rotors are lost.
+/// Residuals of so many steps from shot to shot, and no number of missing shots that mends them:
+/// the rotors are lost.
 constexpr double kLostSteps = 8.0;
 /// A prediction that is less certain than this is no measure of single shots, in shots.
 constexpr double kLooseShots = 0.15;
@@ -183,9 +183,8 @@ class Follower {
       predict(predicted, middle());
       const Test test = tested(predicted);
       if (place >= quiet_until && suspicious(test, predicted)) {
-        const Checkpoint from = last.place < place && !is_loose(predicted)
-                                    ? last
-                                    : Checkpoint{place, state};
+        const Checkpoint from =
+            last.place < place && !is_loose(predicted) ? last : Checkpoint{place, state};
         const Verdict verdict = examine(from, end);
         if (verdict.kind == Verdict::lost) return place;
         if (verdict.kind == Verdict::slip) {
@@ -221,7 +220,7 @@ class Follower {
   }
 
   struct Change {
-    std::size_t place = 0;   // first with the new lag
+    std::size_t place = 0;    // first with the new lag
     std::int64_t change = 0;  // of the lag
   };
   const std::vector<Change>& slips() const { return slips_; }
@@ -240,8 +239,8 @@ class Follower {
   };
   /// How shots agree with a prediction.
   struct Test {
-    double loss = 0;   // mean of the shots
-    double scale = 0;  // of the residuals, rad
+    double loss = 0;                          // mean of the shots
+    double scale = 0;                         // of the residuals, rad
     double delay = 0, delay_information = 0;  // s, s^-2: time by which all rotors are late
     double delay_chi2() const { return delay * delay * delay_information; }
   };
@@ -341,8 +340,8 @@ class Follower {
     if (block_.size() < kTestedShots / 4) return;
     const double noise = weights_.angle_noise.azimuth;
     weights_.angle_noise = equal_noise(std::max(
-        kLeastNoiseSteps * step_, std::sqrt(toward(noise * noise, std::min(test.scale * test.scale,
-                                                              4.0 * noise * noise)))));
+        kLeastNoiseSteps * step_,
+        std::sqrt(toward(noise * noise, std::min(test.scale * test.scale, 4.0 * noise * noise)))));
   }
 
   /// Squared distance of a state from a prediction, in sigmas of that.
@@ -432,8 +431,7 @@ class Follower {
       }
     }
     Course course;
-    auto row =
-        static_cast<std::size_t>(std::min_element(cost.begin(), cost.end()) - cost.begin());
+    auto row = static_cast<std::size_t>(std::min_element(cost.begin(), cost.end()) - cost.begin());
     std::size_t end = shots;
     for (std::size_t i = shots; i-- > 0;) {
       course.loss += table.loss[row][i];
@@ -452,7 +450,8 @@ class Follower {
   enum class Tier { usual, near, far };
 
   std::vector<std::int64_t> changes_of(Tier tier) const {
-    const auto round = static_cast<std::int64_t>(std::max<std::size_t>(1, shots_.firing_order.size()));
+    const auto round =
+        static_cast<std::int64_t>(std::max<std::size_t>(1, shots_.firing_order.size()));
     std::vector<std::int64_t> changes;
     for (std::int64_t missing = -kDoubledShots; missing <= kFarSlip; ++missing) {
       const bool is_usual = missing <= kUsualSlip && missing % round == 0;
@@ -504,8 +503,8 @@ class Follower {
       Course course;
       for (const Tier tier : {Tier::usual, Tier::near, Tier::far}) {
         // Packets are looked for only where next to nothing fits.
-        if (tier == Tier::far && (blocks != 1 || loose ||
-                                  course.loss < 0.5 * kLostLoss * static_cast<double>(shots))) {
+        if (tier == Tier::far &&
+            (blocks != 1 || loose || course.loss < 0.5 * kLostLoss * static_cast<double>(shots))) {
           break;
         }
         for (const std::int64_t change : changes_of(tier)) try_change(change);
@@ -604,8 +603,7 @@ bool find_firing_order(const NumberedShots& shots, ShotRange range, const PrismT
     if (shots.number[i] != shots.number[i - 1] + 1) continue;
     const double step = shots.series.zenith[i - 1] - shots.series.zenith[i];
     const auto count = static_cast<std::int64_t>(emitters);
-    const auto phase =
-        static_cast<std::size_t>((shots.number[i] % count + count) % count);
+    const auto phase = static_cast<std::size_t>((shots.number[i] % count + count) % count);
     steps[phase].push_back(mirrored ? -step : step);
   }
   std::vector<double> median;
@@ -761,9 +759,8 @@ std::vector<Anchor> find_anchors(NumberedShots& shots, ShotRange range, const St
     Anchor anchor;
     ShotRange rows;
   };
-  const double middle =
-      1e-9 * static_cast<double>(start.time_ns) -
-      static_cast<double>(shots.number[range.begin]) / shots.rate;
+  const double middle = 1e-9 * static_cast<double>(start.time_ns) -
+                        static_cast<double>(shots.number[range.begin]) / shots.rate;
   const double first = std::max(0.0, middle - kAround);
   const double last = std::min(length_of(shots, range), middle + kAround);
   std::vector<Window> windows;
@@ -793,12 +790,12 @@ std::vector<Anchor> find_anchors(NumberedShots& shots, ShotRange range, const St
       window.anchor.start.rotation_angle[k] = wrap_to_pi(state.mean[at]);
       window.anchor.start.angular_velocity[k] = state.mean[at + 1];
     }
-    window.anchor.shot = std::min(
-        shots_within(shots, range, 0, 1e-9 * static_cast<double>(state.time_ns) -
-                                          static_cast<double>(shots.number[range.begin]) /
-                                              shots.rate)
-            .end,
-        range.end - 1);
+    window.anchor.shot =
+        std::min(shots_within(shots, range, 0,
+                              1e-9 * static_cast<double>(state.time_ns) -
+                                  static_cast<double>(shots.number[range.begin]) / shots.rate)
+                     .end,
+                 range.end - 1);
     windows.push_back(std::move(window));
   }
   const auto better = [](const Window& a, const Window& b) {
@@ -811,8 +808,7 @@ std::vector<Anchor> find_anchors(NumberedShots& shots, ShotRange range, const St
   for (Window& window : windows) {
     progress.check();
     shots.firing_order = window.anchor.firing_order;
-    const Followed alone{
-        window.rows.begin, window.rows.end, {}, window.anchor.start.residual_rms};
+    const Followed alone{window.rows.begin, window.rows.end, {}, window.anchor.start.residual_rms};
     if (refit(shots, window.anchor, alone, sensor, Priors::of_the_type)) fitted.push_back(window);
   }
   std::stable_sort(fitted.begin(), fitted.end(), better);
@@ -851,8 +847,7 @@ Followed follow(const NumberedShots& shots, const Anchor& anchor, ShotRange rang
     return Follower(shots, anchor.start.train, anchor.start.residual_rms, step, direction, first,
                     count);
   };
-  Follower::State state =
-      Follower::loose_state(anchor.start, kAnchorAngleSigma, kAnchorSpeedShare);
+  Follower::State state = Follower::loose_state(anchor.start, kAnchorAngleSigma, kAnchorSpeedShare);
   const std::size_t near = anchor.shot - std::min(kSettled, anchor.shot - range.begin);
   const std::size_t far = std::min(range.end, anchor.shot + kSettled);
   follower(1, near, far - near).settle(state, radians_from_degrees(0.1));
@@ -899,16 +894,16 @@ bool same_slips(const std::vector<FoundSlip>& a, const std::vector<FoundSlip>& b
 bool refit(NumberedShots& shots, Anchor& anchor, const Followed& followed,
            const sensors::Sensor& sensor, Priors priors) {
   const Lags lags(followed.slips, anchor.shot);
-  const std::size_t begin = std::max(
-      followed.begin, anchor.shot - std::min(anchor.shot, kFittedShots / 2));
+  const std::size_t begin =
+      std::max(followed.begin, anchor.shot - std::min(anchor.shot, kFittedShots / 2));
   const std::size_t end = std::min(followed.end, anchor.shot + kFittedShots / 2);
   AngleSeries mended;
   for (std::size_t i = begin; i < end; ++i) shots.append_to(mended, i, lags.of(i));
   BatchMapOptions options;
   // Rotors that may go where they want would follow a slip.
   options.rotor_process.assign(static_cast<std::size_t>(sensor.prisms()), kSettlingProcess);
-  options.free = free_parameters(default_free_names(sensor.shape(), one_glass(sensor.train)),
-                                 sensor.shape());
+  options.free =
+      free_parameters(default_free_names(sensor.shape(), one_glass(sensor.train)), sensor.shape());
   for (FreeParameter& parameter : options.free) {
     const sensors::Knowledge* known = sensor.find_knowledge(parameter.name);
     if (priors == Priors::of_the_type && known != nullptr && known->sigma > 0) {
@@ -966,9 +961,8 @@ void follow_all(NumberedShots& shots, ShotRange range, const sensors::Sensor& se
   for (const Anchor& one : find_anchors(shots, range, *start, sensor, in_turn, progress)) {
     progress.check();
     shots.firing_order = one.firing_order;
-    const ShotRange near{
-        std::max(range.begin, one.shot - std::min(one.shot, kFittedShots / 2)),
-        std::min(range.end, one.shot + kFittedShots / 2)};
+    const ShotRange near{std::max(range.begin, one.shot - std::min(one.shot, kFittedShots / 2)),
+                         std::min(range.end, one.shot + kFittedShots / 2)};
     const Followed trial = follow(shots, one, near);
     const std::size_t lost = near.size() - trial.size();
     if (lost < least_lost || (lost == least_lost && trial.residual_rms < least_missed)) {
@@ -1038,8 +1032,8 @@ ShotCount find_slips(const CountedShots& counted, const sensors::Sensor& sensor,
   const auto shifted = [&](const std::vector<std::uint8_t>& order, std::int64_t shift) {
     std::vector<std::uint8_t> moved;
     for (std::int64_t i = 0; i < emitters; ++i) {
-      moved.push_back(order[static_cast<std::size_t>(((i + shift) % emitters + emitters) %
-                                                     emitters)]);
+      moved.push_back(
+          order[static_cast<std::size_t>(((i + shift) % emitters + emitters) % emitters)]);
     }
     return moved;
   };

@@ -126,14 +126,16 @@ std::vector<std::string> count_words(const estimation::ShotCount& count, double 
   }
   if (mended > 0) {
     words.push_back(fmt::format(
-        "{} slip{} of the shot count {} found ({} shots lost) and the times behind {} mended", mended,
-        mended == 1 ? "" : "s", mended == 1 ? "was" : "were", lost, mended == 1 ? "it" : "them"));
+        "{} slip{} of the shot count {} found ({} shots lost) and the times behind {} mended",
+        mended, mended == 1 ? "" : "s", mended == 1 ? "was" : "were", lost,
+        mended == 1 ? "it" : "them"));
   }
   if (!words.empty() && !given) {
-    words.push_back(fmt::format(
-        "the times of the recording are evidently counted: they were counted anew, {:.6g} shots per "
-        "second",
-        rate));
+    words.push_back(
+        fmt::format("the times of the recording are evidently counted: they were counted anew, "
+                    "{:.6g} shots per "
+                    "second",
+                    rate));
   }
   bool in_turn = true;
   std::string order;
@@ -150,7 +152,8 @@ std::vector<std::string> count_words(const estimation::ShotCount& count, double 
 
 std::string share_text(double share) { return fmt::format("{:.1f} %", 100.0 * share); }
 
-/// Opens a recording and turns it back by the pose that it states where its points were moved by it.
+/// Opens a recording and turns it back by the pose that it states where its points were moved by
+/// it.
 /// @param[in,out] reading  as asked for; on return with the pose
 SensorFrameRecording open_by_stated_pose(
     const std::string& path, recordings::ReadOptions& reading,

@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: MIT
 // Shots are lost on purpose and counted as if they were not: all places and numbers come back, and
 // none is found where none was lost.
+#include "risley/estimation/shot_slips.hpp"
+
 #include <cmath>
 #include <cstdint>
 #include <random>
@@ -12,7 +14,6 @@
 
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
-#include "risley/estimation/shot_slips.hpp"
 #include "risley/optics/observation_model.hpp"
 #include "risley/sensors/preset.hpp"
 
@@ -30,8 +31,8 @@ struct Scan {
   bool sky = false;       // nothing returns from above
 };
 
-/// Directions rounded to 0.01 degree with 0.004 degree of noise, of rotors that swing by 0.1 degree,
-/// in 0.15 s; numbered as they would be counted.
+/// Directions rounded to 0.01 degree with 0.004 degree of noise, of rotors that swing by 0.1
+/// degree, in 0.15 s; numbered as they would be counted.
 CountedShots record(const Scan& scan) {
   const sensors::Sensor sensor = sensors::load_sensor(scan.sensor);
   constexpr double kStep = radians_from_degrees(0.01), kNoise = radians_from_degrees(0.004);
@@ -64,8 +65,8 @@ CountedShots record(const Scan& scan) {
     const auto now = static_cast<double>(row);
     if (!scan.sky || zenith > kPi / 2) {
       constexpr auto kVariance = static_cast<float>(kStep * kStep / 12.0);
-      result.series.append(std::llround(now * 1e9 / sensor.shot_rate), azimuth, zenith, 0, kVariance,
-                           kVariance);
+      result.series.append(std::llround(now * 1e9 / sensor.shot_rate), azimuth, zenith, 0,
+                           kVariance, kVariance);
       result.rows.push_back(row);
     }
     ++row;
@@ -99,10 +100,9 @@ INSTANTIATE_TEST_SUITE_P(
     Sensors, LostShots,
     ::testing::Values(Scan{"mid-40", {{5000, 1}, {5200, 40}, {11000, 96}}},
                       Scan{"horizon", {{4100, 6}, {20000, 6}, {20096 + 6, 6}, {30000, 7}}, 4},
-                      Scan{"tele-15", {{9000, 66}, {25000, 3}}, 2},
-                      Scan{"avia", {{15000, 1}}}),
-    [](const auto& info) {
-      std::string name = info.param.sensor;
+                      Scan{"tele-15", {{9000, 66}, {25000, 3}}, 2}, Scan{"avia", {{15000, 1}}}),
+    [](const auto& scan) {
+      std::string name = scan.param.sensor;
       std::erase(name, '-');
       return name;
     });

@@ -74,7 +74,7 @@ struct Estimate : Solution {
   Start start;
   std::vector<FreeParameter> free;
   std::optional<SpeedFactor> speed_factor;  ///< where the rotors tell one that is not 1
-  std::vector<EstimatedValue> values;  ///< parameters, mean speeds, first rotation angles
+  std::vector<EstimatedValue> values;       ///< parameters, mean speeds, first rotation angles
   /// Parameter combinations that the data do not tell; any makes the estimate not converged.
   std::vector<WeakDirection> unobservable;
 

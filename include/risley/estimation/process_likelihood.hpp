@@ -17,8 +17,8 @@ namespace risley::estimation {
 /// needs: the parameters stay at the linearisation.
 class RotorWindows {
  public:
-  /// Joins the knots of a linearisation to windows of about 10 ms (less in short recordings), or of eight shots where shots
-  /// are rare, up to the first most_windows.
+  /// Joins the knots of a linearisation to windows of about 10 ms (less in short recordings), or of
+  /// eight shots where shots are rare, up to the first most_windows.
   RotorWindows(const NormalEquations& equations, const RotorTrajectory& linearisation, int rotor,
                std::size_t most_windows = 3000);
 

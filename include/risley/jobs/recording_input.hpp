@@ -22,7 +22,7 @@ struct SensorFrameRecording {
   std::unique_ptr<recordings::Reader> reader;
   /// What was done about a pose that the recording states, and about the count of its shots.
   std::vector<std::string> warnings;
-  bool turned_back = false;           ///< by a pose, stated or given
+  bool turned_back = false;  ///< by a pose, stated or given
 };
 
 /// Opens a recording and decides what a pose in its header means where the options do not give one:
@@ -32,10 +32,10 @@ struct SensorFrameRecording {
 /// are. Moved points are turned back.
 ///
 /// Where times are counted, here or evidently by who wrote the file (each row of a file without
-/// packets follows the one before it by the same time), the rotors are followed to find slips of the
-/// count and, where the file does not tell which of a sensor's emitters fired, the order in which
-/// they do: see estimation/shot_slips.hpp. Both are mended. Such a recording is read twice, and all
-/// of its directions are held in memory meanwhile.
+/// packets follows the one before it by the same time), the rotors are followed to find slips of
+/// the count and, where the file does not tell which of a sensor's emitters fired, the order in
+/// which they do: see estimation/shot_slips.hpp. Both are mended. Such a recording is read twice,
+/// and all of its directions are held in memory meanwhile.
 /// @param sensor_of  a sensor that could have made a recording with this header
 /// @throws recordings::MissingTimes, Cancelled, and as recordings::open_recording
 SensorFrameRecording open_in_sensor_frame(

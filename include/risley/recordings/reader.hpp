@@ -87,8 +87,8 @@ struct ReadOptions {
 /// Opens a recording of any known format, recognised by its content and not by its name.
 /// @throws FileError when it is missing, empty, of no known format, or its header is damaged;
 ///         InvalidArgument when shot_rate is not a finite number above 0, emitters are not 0 to
-///         255 or not as many as the firing order has, slips do not ascend, extrinsics are not finite, or when they are given for a recording of several
-///         sensors
+///         255 or not as many as the firing order has, slips do not ascend, extrinsics are not
+///         finite, or when they are given for a recording of several sensors
 std::unique_ptr<Reader> open_recording(const std::string& path, const ReadOptions& options = {});
 
 /// A recording without times was given to something that needs them.
