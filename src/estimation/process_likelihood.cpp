@@ -15,8 +15,8 @@
 namespace risley::estimation {
 namespace {
 
-/// Longest window, s; short recordings are cut into so many that their rotors' wander shows.
-constexpr double kWindow = 0.010, kFewestWindows = 50.0;
+/// Short recordings are cut into so many windows that their rotors' wander shows.
+constexpr double kFewestWindows = 50.0;
 constexpr std::size_t kFewestWindowShots = 8;
 /// How far the other rotors may be from the linearisation within a window, before its data.
 constexpr double kOtherSigma[] = {radians_from_degrees(1.0), radians_from_degrees(300.0),
@@ -59,13 +59,13 @@ double window_length(const RotorTrajectory& at) {
     const std::size_t first = at.stretch_begin[stretch], last = at.stretch_end(stretch) - 1;
     covered += 1e-9 * static_cast<double>(at.time_ns[last] - at.time_ns[first]);
   }
-  return std::clamp(covered / kFewestWindows, kKnotInterval, kWindow);
+  return std::clamp(covered / kFewestWindows, kKnotInterval, kRotorWindow);
 }
 
 }  // namespace
 
 RotorWindows::RotorWindows(const NormalEquations& equations, const RotorTrajectory& at, int rotor,
-                           std::size_t most_windows) {
+                           std::size_t most_windows, double length) {
   require_between("rotor", rotor, 0, at.prisms - 1);
   require_length("gradient", equations.gradient.size(), at.state.size());
   using Square = KnotSquare<Eigen::Dynamic>;
@@ -77,7 +77,6 @@ RotorWindows::RotorWindows(const NormalEquations& equations, const RotorTrajecto
   for (int k = 0; k < prisms; ++k) {
     if (k != rotor) order.push_back(k);
   }
-  const double length = window_length(at);
   std::size_t stretch = 0, before = 0;
   for (std::size_t knot = 0; knot < at.size() && windows_.size() < most_windows;) {
     const bool fresh = stretch < at.stretch_begin.size() && at.stretch_begin[stretch] == knot;
@@ -182,9 +181,11 @@ double RotorWindows::log_likelihood(const RotorProcess& process) const {
 
 std::vector<RotorProcess> likeliest_process(const NormalEquations& equations,
                                             const RotorTrajectory& linearisation) {
+  constexpr std::size_t kMostWindows = 3000;
+  const double length = window_length(linearisation);
   std::vector<RotorProcess> result;
   for (int rotor = 0; rotor < linearisation.prisms; ++rotor) {
-    const RotorWindows windows(equations, linearisation, rotor);
+    const RotorWindows windows(equations, linearisation, rotor, kMostWindows, length);
     const auto cost = [&](double acceleration, double jerk) {
       return -windows.log_likelihood(process_of(acceleration, jerk));
     };
