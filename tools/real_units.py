@@ -22,6 +22,7 @@ PAGE = pathlib.Path(__file__).resolve().parent.parent / "docs" / "real-units.md"
 RECORDINGS = {
     "mid-40-hub-frame": ("real/mid-40-hub-frame.csv", ["--shot-rate-hz", "100000"]),
     "tele-15": ("real/tele-15.pcd", ["--shot-rate-hz", "240385"]),
+    "horizon": ("real/horizon-1.pcd", ["--shot-rate-hz", "240385"]),
     "mid-40-sequence": ("livox-mid-40-sequence.csv", []),
 }
 
@@ -56,6 +57,8 @@ def text_of(command, path, options):
     if done.returncode != 0:
         raise SystemExit(f"{path}: exit status {done.returncode}\n{done.stderr}")
     found = json.loads(done.stdout)
+    slips = found["slips"]
+    lost = f" {sum(one['shots'] or 0 for one in slips)} shots are missing at {len(slips)} places." if slips else ""
     digest = hashlib.sha256(path.read_bytes()).hexdigest()
     rows = [(name.replace("_", " ").removesuffix(" deg per s").removesuffix(" deg"), one["value"],
              one["sigma"], unit_of(name)) for name, one in found["parameters"].items()]
@@ -76,7 +79,7 @@ def text_of(command, path, options):
         "",
         f"`{path.name}`, SHA-256 `{digest}`, {found['observations_used']} directions used, "
         f"{found['outliers']} of them left out. {image[0].upper()}{image[1:]}; residuals (root mean square) "
-        f"{residual['azimuth']:.2g} degree in azimuth and {residual['zenith']:.2g} in zenith.",
+        f"{residual['azimuth']:.2g} degree in azimuth and {residual['zenith']:.2g} in zenith.{lost}",
         "",
         *table(rows),
     ]

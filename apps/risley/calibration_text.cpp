@@ -25,6 +25,18 @@ using jobs::CalibratedRecordings;
 
 double deg(double radians) { return degrees_from_radians(radians); }
 
+/// Slips of all recordings, each with the name of its own.
+Json slips_of_all(const std::vector<jobs::ReadRecording>& recordings) {
+  Json all = Json::array();
+  for (const jobs::ReadRecording& recording : recordings) {
+    for (Json& slip : slips_json(recording.header.slips)) {
+      slip["recording"] = recording.path;
+      all.push_back(std::move(slip));
+    }
+  }
+  return all;
+}
+
 Json errors_json(const DirectionErrors& e) {
   return {{"azimuth_rmse_deg", deg(e.azimuth_rmse)},
           {"zenith_rmse_deg", deg(e.zenith_rmse)},
@@ -139,6 +151,7 @@ Json calibration_json(const CalibratedRecordings& outcome, double total_time) {
       {"unevenness", c.unevenness},
       {"variance_factor", c.variance_factor},
       {"thickness", profiles},
+      {"slips", slips_of_all(outcome.recordings)},
       {"warnings", warnings},
       {"seconds",
        {{"read", outcome.reading_time},

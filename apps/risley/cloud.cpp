@@ -87,6 +87,7 @@ Json summary_json(const FileJob& job, const cloud::CloudSummary& s) {
         {"zenith_deg", {{"rms", degrees_from_radians(s.zenith_residual_rms)}}}}},
       {"repointing_deg", {{"rms", degrees_from_radians(s.repointing_rms)}}},
       {"common_factors", s.factors},
+      {"slips", slips_json(s.slips)},
       {"warnings", warnings},
   };
   if (s.damage) json.update(damage_json(*s.damage));

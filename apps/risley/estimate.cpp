@@ -131,6 +131,17 @@ Json frame_json(const Estimate& e) {
           {"estimated", e.frame_turn.has_value()}};
 }
 
+/// What rotors say of the clock, and the shot rate with which they would turn as usual.
+Json shot_clock_json(const EstimatedRecording& outcome) {
+  if (!outcome.estimate.speed_factor) return nullptr;
+  const estimation::SpeedFactor& factor = *outcome.estimate.speed_factor;
+  Json clock = {{"speed_factor", {{"value", factor.value}, {"sigma", factor.sigma}}},
+                {"shot_rate_hz", nullptr}};
+  const double rate = outcome.recording.header.counted_rate;
+  if (rate > 0) clock["shot_rate_hz"] = rate / factor.value;
+  return clock;
+}
+
 /// Parameters of the prisms that the estimation did not touch.
 Json fixed_json(const Estimate& estimate) {
   std::vector<int> free_places;
@@ -195,6 +206,8 @@ Json outcome_json(const EstimatedRecording& outcome, double total_time) {
         {"zenith_deg", value_json(e.noise.value.zenith, e.noise.sigma.zenith)},
         {"held", e.noise_held}}},
       {"frame", frame_json(e)},
+      {"slips", slips_json(outcome.recording.header.slips)},
+      {"shot_clock", shot_clock_json(outcome)},
       {"coordinates", to_string(e.coordinates)},
       {"process_noise_deg_per_s_per_sqrt_s", rotors},
       {"process_jerk_deg_per_s2_per_sqrt_s", jerks},

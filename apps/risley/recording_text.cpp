@@ -50,6 +50,15 @@ Json choice_json(const jobs::SensorChoice& choice) {
             {"warnings", warnings}}}};
 }
 
+Json slips_json(const std::vector<recordings::ShotSlip>& slips) {
+  Json list = Json::array();
+  for (const recordings::ShotSlip& slip : slips) {
+    list.push_back({{"row", slip.row}, {"shots", nullptr}});
+    if (slip.counted) list.back()["shots"] = slip.shots;
+  }
+  return list;
+}
+
 Json warnings_json(const std::vector<recordings::ReadWarning>& warnings) {
   Json list = Json::array();
   for (const recordings::ReadWarning& warning : warnings) {

@@ -23,6 +23,9 @@ std::string sensor_name(const jobs::SensorChoice& choice);
 /// Which sensor it was and who says so: sensor, preset, sensor_chosen_by, sensor_choice.
 Json choice_json(const jobs::SensorChoice& choice);
 
+/// Where the count of shots was wrong: [{row, shots}], shots null where they could not be counted.
+Json slips_json(const std::vector<recordings::ShotSlip>& slips);
+
 Json warnings_json(const std::vector<recordings::ReadWarning>& warnings);
 /// The same on stderr, each with the name of the file.
 void log_warnings(const std::string& file, const std::vector<recordings::ReadWarning>& warnings);

@@ -76,6 +76,7 @@ class Work {
 
   CloudSummary run() {
     check_sensor();
+    summary_.slips = reader_.header().slips;
     summary_.format = find_cloud_format(path_, options_.writer.format).name;
     bool more = true;
     while (more) {

@@ -65,6 +65,33 @@ std::vector<EstimatedValue> named_values(const Estimate& estimate) {
   return values;
 }
 
+/// The factor that the speeds of all rotors have in common, where it is not 1.
+std::optional<SpeedFactor> speed_factor(const sensors::Sensor& sensor, const Estimate& estimate) {
+  // Controllers of real rotors hold their speeds to 1e-4 of the type's.
+  constexpr double kSame = 2e-4, kOther = 3e-4;
+  sensors::Sensor nominal = sensor;
+  if (estimate.start.combination) nominal = with_combination(sensor, *estimate.start.combination);
+  double weights = 0, sum = 0;
+  std::vector<std::pair<double, double>> factors;  // and their sigmas
+  for (int rotor = 0; rotor < nominal.prisms(); ++rotor) {
+    const double speed = nominal.angular_velocity[static_cast<std::size_t>(rotor)];
+    if (speed == 0) continue;
+    const EstimatedValue& found =
+        estimate.values[estimate.free.size() + static_cast<std::size_t>(rotor)];
+    const double sigma = std::hypot(found.sigma / speed, 0.5 * kSame);
+    factors.emplace_back(found.value / speed, sigma);
+    sum += found.value / speed / (sigma * sigma);
+    weights += 1.0 / (sigma * sigma);
+  }
+  if (factors.size() < 2) return std::nullopt;
+  const SpeedFactor common{sum / weights, 1.0 / std::sqrt(weights)};
+  for (const auto& [factor, sigma] : factors) {
+    if (!(std::abs(factor - common.value) < std::max(kSame, 3.0 * sigma))) return std::nullopt;
+  }
+  if (!(std::abs(common.value - 1.0) > std::max(kOther, 3.0 * common.sigma))) return std::nullopt;
+  return common;
+}
+
 /// The sensor preset that the estimate amounts to.
 sensors::Sensor calibrated_sensor(const sensors::Sensor& nominal, const PrismTrain& train,
                                   const Estimate& estimate) {
@@ -635,6 +662,7 @@ Estimate estimate(Method method, AngleSeries series, const AngleSeries& head,
   estimate.usual_noise = options.sensor.angle_noise;
   estimate.usual_residual = expected_residual(estimate.series, equal_noise(estimate.usual_noise));
   estimate.values = named_values(estimate);
+  estimate.speed_factor = speed_factor(options.sensor, estimate);
   estimate.sensor = calibrated_sensor(
       options.sensor, with_free_values(options.sensor.train, estimate.free, estimate.parameters),
       estimate);

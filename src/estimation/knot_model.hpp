@@ -107,6 +107,20 @@ inline Eigen::Matrix3d step_noise(const RotorProcess& process, double dt) {
   return noise;
 }
 
+/// States of all rotors and their covariance, moved on by dt.
+template <class Vector, class Square>
+void predict_rotors(Vector& mean, Square& covariance, const RotorProcess& process, double dt) {
+  const Eigen::Index states = mean.size();
+  for (Eigen::Index k = 0; k < states; k += 3) {
+    advance_rows(mean, k, dt);
+    advance_rows(covariance, k, dt);
+  }
+  for (Eigen::Index k = 0; k < states; k += 3) advance_columns(covariance, k, dt);
+  for (Eigen::Index k = 0; k < states; k += 3) {
+    covariance.template block<3, 3>(k, k) += step_noise(process, dt);
+  }
+}
+
 /// out += a b, column by column; out is neither a nor b. Eigen's own product of matrices this small
 /// is no faster and takes seconds of compilation for every expression.
 template <class A, class B, class Out>

@@ -15,7 +15,8 @@
 namespace risley::estimation {
 namespace {
 
-constexpr double kWindow = 0.010;  // s
+/// Short recordings are cut into so many windows that their rotors' wander shows.
+constexpr double kFewestWindows = 50.0;
 constexpr std::size_t kFewestWindowShots = 8;
 /// How far the other rotors may be from the linearisation within a window, before its data.
 constexpr double kOtherSigma[] = {radians_from_degrees(1.0), radians_from_degrees(300.0),
@@ -51,10 +52,20 @@ double best_decade(const Cost& cost, double lowest, double highest) {
   return golden_section_minimum(cost, best - 1.0, best + 1.0, kTolerance);
 }
 
+/// Length of the windows of a trajectory, s.
+double window_length(const RotorTrajectory& at) {
+  double covered = 0;
+  for (std::size_t stretch = 0; stretch < at.stretch_begin.size(); ++stretch) {
+    const std::size_t first = at.stretch_begin[stretch], last = at.stretch_end(stretch) - 1;
+    covered += 1e-9 * static_cast<double>(at.time_ns[last] - at.time_ns[first]);
+  }
+  return std::clamp(covered / kFewestWindows, kKnotInterval, kRotorWindow);
+}
+
 }  // namespace
 
 RotorWindows::RotorWindows(const NormalEquations& equations, const RotorTrajectory& at, int rotor,
-                           std::size_t most_windows) {
+                           std::size_t most_windows, double length) {
   require_between("rotor", rotor, 0, at.prisms - 1);
   require_length("gradient", equations.gradient.size(), at.state.size());
   using Square = KnotSquare<Eigen::Dynamic>;
@@ -76,7 +87,7 @@ RotorWindows::RotorWindows(const NormalEquations& equations, const RotorTrajecto
     std::size_t shots = 0;
     while (knot < end) {
       const double span = 1e-9 * static_cast<double>(at.time_ns[knot] - at.time_ns[first]);
-      if (span >= 0.95 * kWindow && shots >= kFewestWindowShots) break;
+      if (span >= 0.95 * length && shots >= kFewestWindowShots) break;
       shots += at.last_shot[knot] - at.first_shot[knot];
       ++knot;
     }
@@ -170,9 +181,11 @@ double RotorWindows::log_likelihood(const RotorProcess& process) const {
 
 std::vector<RotorProcess> likeliest_process(const NormalEquations& equations,
                                             const RotorTrajectory& linearisation) {
+  constexpr std::size_t kMostWindows = 3000;
+  const double length = window_length(linearisation);
   std::vector<RotorProcess> result;
   for (int rotor = 0; rotor < linearisation.prisms; ++rotor) {
-    const RotorWindows windows(equations, linearisation, rotor);
+    const RotorWindows windows(equations, linearisation, rotor, kMostWindows, length);
     const auto cost = [&](double acceleration, double jerk) {
       return -windows.log_likelihood(process_of(acceleration, jerk));
     };

@@ -75,15 +75,7 @@ class Tracker {
   void predict(State& state, std::int64_t time_ns) const {
     const double dt = 1e-9 * static_cast<double>(time_ns - state.time_ns);
     state.time_ns = time_ns;
-    Square& p = state.covariance;
-    for (int k = 0; k < prisms_; ++k) {
-      advance_rows(state.mean, 3 * k, dt);
-      advance_rows(p, 3 * k, dt);
-    }
-    for (int k = 0; k < prisms_; ++k) advance_columns(p, 3 * k, dt);
-    for (int k = 0; k < prisms_; ++k) {
-      p.block<3, 3>(3 * k, 3 * k) += step_noise(kSettlingProcess, dt);
-    }
+    predict_rotors(state.mean, state.covariance, kSettlingProcess, dt);
   }
 
   /// Takes the shots of some rows into a state. @return whether there were any

@@ -14,6 +14,7 @@
 #include "risley/core/angle.hpp"
 #include "risley/core/direction.hpp"
 #include "risley/core/error.hpp"
+#include "risley/core/require.hpp"
 #include "risley/estimation/estimate.hpp"
 #include "risley/estimation/initialisation.hpp"
 #include "risley/estimation/spectral_lines.hpp"
@@ -253,6 +254,16 @@ bool lines_decide(const std::vector<SensorMatch>& matches) {
 }
 
 }  // namespace
+
+std::vector<std::uint8_t> emitters_in_order(const FiringOrder& order, int emitters) {
+  require_between("emitters", emitters, 1, 255);
+  std::vector<std::uint8_t> list;
+  for (int shot = 0; shot < emitters; ++shot) {
+    list.push_back(static_cast<std::uint8_t>(
+        emitter_of(static_cast<std::uint8_t>(shot), static_cast<std::size_t>(emitters), order)));
+  }
+  return list;
+}
 
 SensorRecognition recognise_sensor(const AngleSeries& head,
                                    std::span<const sensors::Sensor> candidates, BeamSource beams) {

@@ -47,6 +47,21 @@ void write_files(const EstimateRecordingOptions& options, const EstimatedRecordi
   folder.commit();
 }
 
+/// What rotors say of the clock that turn too fast or too slowly all by the same factor.
+std::string clock_words(const estimation::SpeedFactor& factor, double counted_rate) {
+  std::string words = fmt::format(
+      "all rotors turn {:.5f} ± {:.5f} times as fast as the type's, as they would if the clock of "
+      "the recording were wrong",
+      factor.value, factor.sigma);
+  if (counted_rate > 0) {
+    words += fmt::format(
+        ": with a shot rate of {:.0f} Hz instead of {:.10g} they would turn as usual; nothing was "
+        "changed",
+        counted_rate / factor.value, counted_rate);
+  }
+  return words;
+}
+
 }  // namespace
 
 std::optional<double> usual_rate(estimation::Method method) {
@@ -103,6 +118,9 @@ EstimatedRecording estimate_recording(const EstimateRecordingOptions& options,
     throw;
   }
   result.solving_time = watch.seconds();
+  if (const auto& factor = result.estimate.speed_factor) {
+    result.warnings.push_back(clock_words(*factor, result.recording.header.counted_rate));
+  }
   const Progress judging = progress.stage("judging");
   judging.check();
   if (!options.truth.empty()) {

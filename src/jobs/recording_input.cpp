@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 #include "risley/jobs/recording_input.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <optional>
 #include <utility>
@@ -11,6 +12,7 @@
 
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
+#include "risley/estimation/shot_slips.hpp"
 #include "risley/estimation/stored_pose.hpp"
 #include "risley/jobs/sensor_choice.hpp"
 
@@ -35,27 +37,128 @@ Extrinsics roll_about_axis(double roll, const estimation::FrameTurn& frame) {
           {}};
 }
 
+/// Shots per second of a recording whose times are evidently counted with the sensor's rate: each
+/// shot follows the one before it by the same time, from the first row to the last.
+std::optional<double> evident_rate(const std::string& path, const recordings::ReadOptions& options,
+                                   double shot_rate, const Progress& progress) {
+  constexpr double kOtherRate = 0.05, kSameStep = 0.15;  // shares
+  const double usual_step = 1e9 / shot_rate;
+  std::int64_t first = 0, last = 0, shots = 0;
+  double step = 0;
+  recordings::Chunk chunk;
+  const auto reader = recordings::open_recording(path, options);
+  const auto next = [&] {
+    try {
+      return reader->read(chunk);
+    } catch (const FileError&) {  // who reads on is told of it
+      return false;
+    }
+  };
+  while (next()) {
+    progress.check();
+    if (!chunk.packets.empty()) return std::nullopt;
+    const recordings::Observations& rows = chunk.observations;
+    for (std::size_t row = 0; row < rows.size(); ++row) {
+      if (shots > 0 && rows.return_number[row] > 1) continue;
+      if (shots == 0) first = last = rows.time_ns[row];
+      // Rounded to microseconds a step may be half a microsecond off.
+      const double off = static_cast<double>(rows.time_ns[row] - last) - usual_step;
+      if (shots > 0 && std::abs(off) > kOtherRate * usual_step + 1000.0) return std::nullopt;
+      last = rows.time_ns[row];
+      if (step > 0 && std::abs(static_cast<double>(last - first) -
+                               step * static_cast<double>(shots)) > kSameStep * usual_step) {
+        return std::nullopt;
+      }
+      ++shots;
+    }
+    if (shots > 1 && step == 0) {
+      step = static_cast<double>(last - first) / static_cast<double>(shots - 1);
+    }
+  }
+  if (shots < 2 || std::abs(step / usual_step - 1.0) > kOtherRate) return std::nullopt;
+  return 1e9 * static_cast<double>(shots - 1) / static_cast<double>(last - first);
+}
+
+/// What the count of a recording's shots is worth.
+estimation::ShotCount count_of(const std::string& path, recordings::ReadOptions options,
+                               const sensors::Sensor& sensor, const Progress& progress) {
+  options.emitters = 0;  // beams as the file has them
+  const auto reader = recordings::open_recording(path, options);
+  estimation::ShotSelector selector({.rate = std::nullopt, .ranges = false, .rows = true});
+  recordings::Chunk chunk;
+  bool named = false;
+  try {
+    while (reader->read(chunk)) {
+      selector.add(chunk.observations);
+      const auto& beam = chunk.observations.beam;
+      named = named || std::any_of(beam.begin(), beam.end(), [](auto one) { return one != 0; });
+      progress.check();
+    }
+  } catch (const FileError&) {  // who reads on is told of it
+  }
+  for (const std::uint8_t beam : selector.series().beam) {
+    if (beam >= sensor.train.emitters()) return {};  // who reads on is told of it
+  }
+  estimation::CountedShots shots{selector.take_series(), selector.rows(), *options.shot_rate,
+                                 !named && sensor.train.emitters() > 1};
+  return estimation::find_slips(shots, sensor, progress);
+}
+
+/// What was found wrong with a count, in words.
+std::vector<std::string> count_words(const estimation::ShotCount& count, double rate, bool given) {
+  std::vector<std::string> words;
+  std::int64_t lost = 0;
+  std::size_t mended = 0;
+  for (const recordings::ShotSlip& slip : count.slips) {
+    if (!slip.counted) {
+      words.push_back(fmt::format(
+          "shots are missing before row {}, and the rotors do not tell how many: the recording was "
+          "cut there",
+          slip.row));
+      continue;
+    }
+    ++mended;
+    lost += slip.shots;
+  }
+  if (mended > 0) {
+    words.push_back(fmt::format(
+        "{} slip{} of the shot count {} found ({} shots lost) and the times behind {} mended",
+        mended, mended == 1 ? "" : "s", mended == 1 ? "was" : "were", lost,
+        mended == 1 ? "it" : "them"));
+  }
+  if (!words.empty() && !given) {
+    words.push_back(
+        fmt::format("the times of the recording are evidently counted: they were counted anew, "
+                    "{:.6g} shots per "
+                    "second",
+                    rate));
+  }
+  bool in_turn = true;
+  std::string order;
+  for (std::size_t i = 0; i < count.firing_order.size(); ++i) {
+    in_turn = in_turn && count.firing_order[i] == i;
+    order += fmt::format("{}{}", order.empty() ? "" : ", ", count.firing_order[i] + 1);
+  }
+  if (!in_turn) {
+    words.push_back(fmt::format(
+        "the file names no emitters: from its first shot on they fire in the order {}", order));
+  }
+  return words;
+}
+
 std::string share_text(double share) { return fmt::format("{:.1f} %", 100.0 * share); }
 
-}  // namespace
-
-SensorFrameRecording open_in_sensor_frame(const std::string& path,
-                                          const recordings::ReadOptions& options,
-                                          const std::optional<sensors::Sensor>& given,
-                                          const Progress& progress) {
+/// Opens a recording, chooses its sensor, and turns it back by the pose that it states where its
+/// points were moved by it.
+/// @param[in,out] reading  as asked for; on return with the pose
+SensorFrameRecording open_by_stated_pose(const std::string& path, recordings::ReadOptions& reading,
+                                         const std::optional<sensors::Sensor>& given,
+                                         const Progress& progress) {
   progress.check();
-  recordings::ReadOptions reading = options;
   SensorFrameRecording result{open_input(path, reading), {}, {}, reading.extrinsics.has_value()};
   recordings::require_times(result.reader->header());
   result.choice = choose_sensor(path, reading, result.reader->header(), given, progress);
   result.warnings = result.choice.warnings;
-  const sensors::Sensor& sensor = result.choice.sensor;
-  if (reading.shot_rate && sensor.train.emitters() > 1) {
-    reading.emitters = sensor.train.emitters();
-    reading.first_emitter = result.choice.order.first_emitter;
-    reading.backwards = result.choice.order.backwards;
-    result.reader = open_input(path, reading);
-  }
   const recordings::RecordingHeader& header = result.reader->header();
   if (reading.extrinsics || header.devices.size() != 1) return result;
   const recordings::Device& device = header.devices.front();
@@ -63,8 +166,8 @@ SensorFrameRecording open_in_sensor_frame(const std::string& path,
   recordings::ReadOptions turned_back = reading;
   if (!pose) {
     if (result.choice.roll == 0) return result;
-    turned_back.extrinsics = roll_about_axis(result.choice.roll, result.choice.frame);
-    result.reader = open_input(path, turned_back);
+    reading.extrinsics = roll_about_axis(result.choice.roll, result.choice.frame);
+    result.reader = open_input(path, reading);
     result.turned_back = true;
     result.warnings.push_back(fmt::format(
         "the recording is rolled about the optical axis by {:.1f} deg, as the sensor's emitters "
@@ -75,7 +178,7 @@ SensorFrameRecording open_in_sensor_frame(const std::string& path,
   turned_back.extrinsics = pose;
   const estimation::StoredPoseVerdict verdict = estimation::judge_stored_pose(
       first_second(path, reading, progress), first_second(path, turned_back, progress),
-      sensor.field_of_view);
+      result.choice.sensor.field_of_view);
   const std::string found = fmt::format(
       "the recording states a pose of its sensor ({}); outside the sensor's field of "
       "view lie {} of the shots as recorded and {} after turning back",
@@ -85,7 +188,10 @@ SensorFrameRecording open_in_sensor_frame(const std::string& path,
       !device.hub_serial.empty() && verdict.outside_turned_back <= verdict.outside_as_recorded;
   const bool decided = verdict.use != StoredPoseUse::undecided;
   result.turned_back = decided ? verdict.use == StoredPoseUse::applied : by_hub;
-  if (result.turned_back) result.reader = open_input(path, turned_back);
+  if (result.turned_back) {
+    reading = turned_back;
+    result.reader = open_input(path, reading);
+  }
   if (decided && result.turned_back) {
     result.warnings.push_back(found + ": the shots were turned back into the sensor's frame");
   } else if (!decided) {
@@ -96,6 +202,40 @@ SensorFrameRecording open_in_sensor_frame(const std::string& path,
         result.turned_back ? "they were turned back, because a hub recorded them"
                            : "they were taken as they are"));
   }
+  return result;
+}
+
+}  // namespace
+
+SensorFrameRecording open_in_sensor_frame(const std::string& path,
+                                          const recordings::ReadOptions& options,
+                                          const std::optional<sensors::Sensor>& asked_for,
+                                          const Progress& progress) {
+  recordings::ReadOptions reading = options;
+  SensorFrameRecording result = open_by_stated_pose(path, reading, asked_for, progress);
+  const sensors::Sensor& sensor = result.choice.sensor;
+  const bool given = reading.shot_rate.has_value();
+  if (result.reader->header().devices.size() != 1) {  // nobody knows whose shots are missing
+    if (given && sensor.train.emitters() > 1) {
+      reading.emitters = sensor.train.emitters();
+      reading.firing_order = estimation::emitters_in_order(result.choice.order, reading.emitters);
+      result.reader = open_input(path, reading);
+    }
+    return result;
+  }
+  if (!given) reading.shot_rate = evident_rate(path, reading, sensor.shot_rate, progress);
+  if (!reading.shot_rate) return result;
+  reading.emitters = sensor.train.emitters();
+  estimation::ShotCount count = count_of(path, reading, sensor, progress);
+  if (!given && count.slips.empty() && count.firing_order.empty()) return result;
+  const auto words = count_words(count, *reading.shot_rate, given);
+  result.warnings.insert(result.warnings.end(), words.begin(), words.end());
+  reading.slips = std::move(count.slips);
+  reading.firing_order =
+      count.firing_order.empty() && sensor.train.emitters() > 1
+          ? estimation::emitters_in_order(result.choice.order, sensor.train.emitters())
+          : std::move(count.firing_order);
+  result.reader = open_input(path, reading);
   return result;
 }
 

@@ -39,10 +39,8 @@ class DecoratingReader : public Reader {
 };
 
 /// Gives every row the time that counting its shot gives, see ReadOptions::shot_rate.
-/// @param path     for errors
-/// @param options  with a shot_rate
-/// @throws InvalidArgument when shot_rate is not a finite number above 0, emitters or first_emitter
-///         not 0 to 255
+/// @param path  for errors
+/// @throws InvalidArgument as open_recording()
 std::unique_ptr<Reader> with_counted_times(std::unique_ptr<Reader> reader, const std::string& path,
                                            const ReadOptions& options);
 

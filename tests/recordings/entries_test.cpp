@@ -114,8 +114,6 @@ TEST(Entries, ReadersAskForRowsARateAndAPose) {
             "ReadOptions::shot_rate = -1 Hz, allowed above 0");
   EXPECT_EQ(refusal([&] { open_recording(path, {.shot_rate = 1.0, .emitters = -1}); }),
             "ReadOptions::emitters = -1, allowed 0 to 255");
-  EXPECT_EQ(refusal([&] { open_recording(path, {.shot_rate = 1.0, .first_emitter = 256}); }),
-            "ReadOptions::first_emitter = 256, allowed 0 to 255");
   Extrinsics pose;
   pose.translation.y = kInfinite;
   EXPECT_EQ(refusal([&] { open_recording(path, {.extrinsics = pose}); }),

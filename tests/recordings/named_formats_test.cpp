@@ -708,10 +708,10 @@ TEST(ShotRate, EmittersThatTheFileDoesNotNameFireInTurn) {
             std::vector<std::uint8_t>(4, 0));
   // They may begin with any of them and go backwards.
   ReadOptions other = six;
-  other.first_emitter = 4;
+  other.firing_order = {4, 5, 0, 1, 2, 3};
   EXPECT_EQ(load_recording(path, {}, other).data.observations.beam,
             (std::vector<std::uint8_t>{4, 5, 5, 4}));
-  other.backwards = true;
+  other.firing_order = {4, 3, 2, 1, 0, 5};
   EXPECT_EQ(load_recording(path, {}, other).data.observations.beam,
             (std::vector<std::uint8_t>{4, 3, 3, 4}));
   // A further return is of the shot's emitter.

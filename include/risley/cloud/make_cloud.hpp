@@ -46,6 +46,7 @@ struct CloudSummary {
   double azimuth_residual_rms = 0, zenith_residual_rms = 0;  ///< rad, of the points
   /// How far points were moved from where the sensor says, rms over some beams, rad.
   double repointing_rms = 0;
+  std::vector<recordings::ShotSlip> slips;  ///< of the recording's count, mended
   std::vector<std::string> warnings;
   std::vector<recordings::ReadWarning> read_warnings;
   /// Damage in the recording's body; what came before it is in the cloud.

@@ -54,6 +54,13 @@ struct EstimatedValue {
   double sigma_given_held = 0;  ///< if they were exactly as held
 };
 
+/// All rotors turn faster or slower than the sensor's by one factor: so they do where the clock of
+/// the recording is wrong, and rarely otherwise.
+struct SpeedFactor {
+  double value = 1;  ///< speed found over the sensor's
+  double sigma = 0;
+};
+
 /// Everything one estimation found: the solution, what it was found from, and whether to believe
 /// it.
 struct Estimate : Solution {
@@ -69,7 +76,8 @@ struct Estimate : Solution {
   CoordinateRounding coordinates = CoordinateRounding::unknown;
   Start start;
   std::vector<FreeParameter> free;
-  std::vector<EstimatedValue> values;  ///< parameters, mean speeds, first rotation angles
+  std::optional<SpeedFactor> speed_factor;  ///< where the rotors tell one that is not 1
+  std::vector<EstimatedValue> values;       ///< parameters, mean speeds, first rotation angles
   /// Parameter combinations that the data do not tell; any makes the estimate not converged.
   std::vector<WeakDirection> unobservable;
 

@@ -12,15 +12,18 @@
 
 namespace risley::estimation {
 
+/// Usual length of the windows, s.
+inline constexpr double kRotorWindow = 0.010;
+
 /// What the data say of one rotor alone, window by window: the other rotors' parts are eliminated,
 /// so that each rotor's noise can be judged by itself. Only what a likelihood of the process noise
 /// needs: the parameters stay at the linearisation.
 class RotorWindows {
  public:
-  /// Joins the knots of a linearisation to windows of about 10 ms, or of eight shots where shots
-  /// are rare, up to the first most_windows.
+  /// Joins the knots of a linearisation to windows of about that length (s), or of eight shots
+  /// where shots are rare, up to the first most_windows.
   RotorWindows(const NormalEquations& equations, const RotorTrajectory& linearisation, int rotor,
-               std::size_t most_windows = 3000);
+               std::size_t most_windows = 3000, double window = kRotorWindow);
 
   /// Logarithm of the likelihood of the windows for a motion model, up to a constant.
   double log_likelihood(const RotorProcess& process) const;

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <limits>
 #include <optional>
 #include <span>
@@ -25,6 +26,9 @@ struct FiringOrder {
   int first_emitter = 0;   ///< that fired the shots of counted beam 0
   bool backwards = false;  ///< from the last emitter to the first
 };
+
+/// Emitter of shots 0, 1, ... up to as many as there are.
+std::vector<std::uint8_t> emitters_in_order(const FiringOrder& order, int emitters);
 
 /// How well one sensor describes the shots of a recording.
 struct SensorMatch {

@@ -21,9 +21,10 @@ namespace risley::jobs {
 /// known.
 struct SensorFrameRecording {
   std::unique_ptr<recordings::Reader> reader;
-  SensorChoice choice;                ///< its warnings are among these:
-  std::vector<std::string> warnings;  ///< of the sensor, and what was done about poses and rolls
-  bool turned_back = false;           ///< by a pose, stated or given, or a roll that was found
+  SensorChoice choice;  ///< its warnings are among these:
+  /// Of the sensor, and what was done about poses, rolls and the count of shots.
+  std::vector<std::string> warnings;
+  bool turned_back = false;  ///< by a pose, stated or given, or a roll that was found
 };
 
 /// Opens a recording and decides what a pose in its header means where the options do not give one:
@@ -32,9 +33,14 @@ struct SensorFrameRecording {
 /// as moved, because hubs move points, and any other one does not, because LVX keeps points as they
 /// are. Moved points are turned back.
 ///
-/// Chooses the sensor, too, and with it which of its emitters fired which shot where times are
-/// counted and the file does not tell. Where emitters show that the recording is rolled about the
-/// optical axis, and no pose says so, it is turned back by that.
+/// Chooses the sensor, too. Where emitters show that the recording is rolled about the optical
+/// axis, and no pose says so, it is turned back by that.
+///
+/// Where times are counted, here or evidently by who wrote the file (each row of a file without
+/// packets follows the one before it by the same time), the rotors are followed to find slips of
+/// the count and, where the file does not tell which of a sensor's emitters fired, the order in
+/// which they do: see estimation/shot_slips.hpp. Both are mended. Such a recording is read twice,
+/// and all of its directions are held in memory meanwhile.
 /// @param given  sensor that was asked for, see choose_sensor()
 /// @throws recordings::MissingTimes, Cancelled, and as recordings::open_recording, choose_sensor()
 SensorFrameRecording open_in_sensor_frame(const std::string& path,

@@ -100,6 +100,15 @@ enum class TimeReference : std::uint8_t { relative, power_on, ptp, utc, pps };
 
 std::string to_string(TimeReference reference);
 
+/// A place where the count of a recording's shots is wrong.
+struct ShotSlip {
+  std::uint64_t row = 0;   ///< first observation behind it, counted from 0
+  std::int64_t shots = 0;  ///< that are missing before that row; below 0: that are there twice
+  /// Their number is known; otherwise only which emitters fire behind it (shots modulo their
+  /// number), and times go on after kUnknownGap_s.
+  bool counted = true;
+};
+
 /// What is known about a recording before its first row is read.
 struct RecordingHeader {
   std::string format;           ///< short name, e.g. "lvx-1.1", "scan-sequence-csv"
@@ -108,6 +117,9 @@ struct RecordingHeader {
   /// false when the file holds no times of single shots: Observations::time_ns then has shot
   /// numbers 0, 1, 2, ..., in which shots without return and lost ones keep their places.
   bool has_times = true;
+  /// Shots per second that the times were counted with, Hz; 0 where they are the recording's own.
+  double counted_rate = 0;
+  std::vector<ShotSlip> slips;  ///< of the count that were mended
   bool has_range = true;
   bool has_intensity = true;
   bool cartesian = false;  ///< records hold x, y, z and not angles

@@ -55,6 +55,10 @@ class Reader {
 /// that the difference of any two times is a number of 64 bits.
 inline constexpr std::int64_t kLongestTimeSpan_ns = (std::int64_t{1} << 62) - 1;
 
+/// Time that is put where an unknown number of shots is missing, s: longer than anybody counts the
+/// turns of a rotor over.
+inline constexpr double kUnknownGap_s = 10.0;
+
 /// How a recording is to be read.
 struct ReadOptions {
   /// Shots of one device per second, Hz. Times are then counted: shot i is fired at i / shot_rate,
@@ -62,11 +66,13 @@ struct ReadOptions {
   /// Packet headers and inertial samples, which have the file's times, are left out.
   std::optional<double> shot_rate = {};
   /// Emitters of the sensor, which fire in turn: where times are counted and the file has no other
-  /// beam than 0, shot i is of beam (first_emitter + i) modulo emitters, or (first_emitter - i)
-  /// where they fire backwards. 0 or 1: beams are those of the file.
+  /// beam than 0, shot i is of beam i modulo emitters. 0 or 1: beams are those of the file.
   int emitters = 0;
-  int first_emitter = 0;
-  bool backwards = false;
+  /// Where they fire in another order: emitter of shots 0, 1, ...; one entry per emitter.
+  std::vector<std::uint8_t> firing_order = {};
+  /// Where times are counted: what is wrong with the count, rows ascending. For recordings of one
+  /// sensor.
+  std::vector<ShotSlip> slips = {};
   /// Pose of the sensor in the frame that the recording stands in: every row is turned back into
   /// the sensor's frame, direction and range. Directions without a range are only turned, a
   /// translation is left out with a warning. Rows without a return keep their place, angles that
@@ -80,9 +86,9 @@ struct ReadOptions {
 
 /// Opens a recording of any known format, recognised by its content and not by its name.
 /// @throws FileError when it is missing, empty, of no known format, or its header is damaged;
-///         InvalidArgument when shot_rate is not a finite number above 0, emitters or first_emitter
-///         are not 0 to 255, extrinsics are not finite, or when they are given for a recording of
-///         several sensors
+///         InvalidArgument when shot_rate is not a finite number above 0, emitters are not 0 to
+///         255 or not as many as the firing order has, slips do not ascend, extrinsics are not
+///         finite, or when they are given for a recording of several sensors
 std::unique_ptr<Reader> open_recording(const std::string& path, const ReadOptions& options = {});
 
 /// A recording without times was given to something that needs them.

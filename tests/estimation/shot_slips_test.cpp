@@ -1,0 +1,130 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+// Shots are lost on purpose and counted as if they were not: all places and numbers come back, and
+// none is found where none was lost.
+#include "risley/estimation/shot_slips.hpp"
+
+#include <cmath>
+#include <cstdint>
+#include <random>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "risley/core/angle.hpp"
+#include "risley/core/error.hpp"
+#include "risley/optics/observation_model.hpp"
+#include "risley/sensors/preset.hpp"
+
+namespace risley::estimation::shot_slips_test {
+
+struct Loss {
+  std::int64_t shot;   // first that is missing
+  std::int64_t count;  // of missing ones
+};
+
+struct Scan {
+  std::string sensor;
+  std::vector<Loss> losses;
+  int first_emitter = 0;  // that fired shot 0
+  bool sky = false;       // nothing returns from above
+};
+
+/// Directions rounded to 0.01 degree with 0.004 degree of noise, of rotors that swing by 0.1
+/// degree, in 0.15 s; numbered as they would be counted.
+CountedShots record(const Scan& scan) {
+  const sensors::Sensor sensor = sensors::load_sensor(scan.sensor);
+  constexpr double kStep = radians_from_degrees(0.01), kNoise = radians_from_degrees(0.004);
+  constexpr double kSwing = radians_from_degrees(0.1), kSwingSpeed = kTwoPi * 3.0;
+  std::mt19937_64 generator(5);
+  std::normal_distribution<double> normal;
+  CountedShots result;
+  result.shot_rate = sensor.shot_rate;
+  const int emitters = sensor.train.emitters();
+  result.in_turn = emitters > 1;
+  const auto shots = static_cast<std::int64_t>(0.15 * sensor.shot_rate);
+  std::size_t row = 0;
+  auto loss = scan.losses.begin();
+  for (std::int64_t shot = 0; shot < shots; ++shot) {
+    if (loss != scan.losses.end() && shot >= loss->shot + loss->count) ++loss;
+    if (loss != scan.losses.end() && shot >= loss->shot) continue;
+    const double time = static_cast<double>(shot) / sensor.shot_rate;
+    std::vector<double> angles;
+    for (std::size_t k = 0; k < sensor.angular_velocity.size(); ++k) {
+      const auto number = static_cast<double>(k);
+      angles.push_back(1.0 + number + time * sensor.angular_velocity[k] +
+                       kSwing * std::sin(kSwingSpeed * time + number));
+    }
+    const int beam = static_cast<int>((shot + scan.first_emitter) % emitters);
+    const Observation seen = observe(sensor.train, angles, beam);
+    const auto rounded = [&](double angle) {
+      return kStep * std::round((angle + kNoise * normal(generator)) / kStep);
+    };
+    const double azimuth = rounded(seen.azimuth), zenith = rounded(seen.zenith);
+    const auto now = static_cast<double>(row);
+    if (!scan.sky || zenith > kPi / 2) {
+      constexpr auto kVariance = static_cast<float>(kStep * kStep / 12.0);
+      result.series.append(std::llround(now * 1e9 / sensor.shot_rate), azimuth, zenith, 0,
+                           kVariance, kVariance);
+      result.rows.push_back(row);
+    }
+    ++row;
+  }
+  return result;
+}
+
+class LostShots : public ::testing::TestWithParam<Scan> {};
+
+TEST_P(LostShots, AreFoundWhereTheyWereAndAsMany) {
+  const CountedShots shots = record(GetParam());
+  const ShotCount count = find_slips(shots, sensors::load_sensor(GetParam().sensor));
+  ASSERT_TRUE(count.followed);
+  ASSERT_EQ(count.slips.size(), GetParam().losses.size());
+  std::int64_t lost = 0;
+  for (std::size_t i = 0; i < count.slips.size(); ++i) {
+    const recordings::ShotSlip& slip = count.slips[i];
+    const Loss& loss = GetParam().losses[i];
+    EXPECT_TRUE(slip.counted);
+    EXPECT_EQ(slip.shots, loss.count) << "row " << slip.row;
+    EXPECT_NEAR(static_cast<double>(slip.row), static_cast<double>(loss.shot - lost), 4.0);
+    lost += loss.count;
+  }
+  for (std::size_t i = 0; i < count.firing_order.size(); ++i) {
+    EXPECT_EQ(count.firing_order[i],
+              (i + static_cast<std::size_t>(GetParam().first_emitter)) % count.firing_order.size());
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Sensors, LostShots,
+    ::testing::Values(Scan{"mid-40", {{5000, 1}, {5200, 40}, {11000, 96}}},
+                      Scan{"horizon", {{4100, 6}, {20000, 6}, {20096 + 6, 6}, {30000, 7}}, 4},
+                      Scan{"tele-15", {{9000, 66}, {25000, 3}}, 2}, Scan{"avia", {{15000, 1}}}),
+    [](const auto& scan) {
+      std::string name = scan.param.sensor;
+      std::erase(name, '-');
+      return name;
+    });
+
+class NoLostShots : public ::testing::TestWithParam<const char*> {};
+
+TEST_P(NoLostShots, AreInventedUnderTheSky) {
+  const ShotCount count =
+      find_slips(record({GetParam(), {}, 0, true}), sensors::load_sensor(GetParam()));
+  EXPECT_TRUE(count.followed);
+  EXPECT_TRUE(count.slips.empty());
+}
+
+INSTANTIATE_TEST_SUITE_P(Sensors, NoLostShots,
+                         ::testing::Values("mid-40", "horizon", "tele-15", "avia"));
+
+TEST(ShotSlips, AreNotLookedForInAThinnedRecording) {
+  CountedShots shots = record({"mid-40", {}});
+  shots.shot_rate = 1000.0;
+  EXPECT_FALSE(find_slips(shots, sensors::load_sensor("mid-40")).followed);
+  shots.rows.pop_back();
+  EXPECT_THROW(find_slips(shots, sensors::load_sensor("mid-40")), InvalidArgument);
+}
+
+}  // namespace risley::estimation::shot_slips_test
