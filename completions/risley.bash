@@ -4,7 +4,7 @@
 # the command is missing here.
 _risley() {
   local current=${COMP_WORDS[COMP_CWORD]} previous=${COMP_WORDS[COMP_CWORD-1]}
-  local verbs="info convert simulate estimate observability calibrate cloud pattern preset report reproduce"
+  local verbs="info convert simulate estimate observability calibrate cloud identify pattern preset report reproduce"
   local common="--help --json --threads --seed --quiet --verbose"
   local names="refractive_index_air refractive_index refractive_index_a refractive_index_b
     wedge_angle_deg wedge_angle_a_deg wedge_angle_b_deg
@@ -56,6 +56,7 @@ _risley() {
     case $verb in
       "") choices="--help --version" ;;
       info) choices="$common --shot-rate-hz --extrinsics --share --share-ranges" ;;
+      identify) choices="$common --output --force --most-prisms --fastest-hz --shot-rate-hz --extrinsics" ;;
       pattern)
         choices="$common --output --format --sensor --duration-s --rate-hz --every --firing
           --start-angles-deg --coverage --integration-s --cell-deg --report" ;;

@@ -649,6 +649,18 @@ class Search {
                   (result.correlation_time_factor < 3 && reference.rms < radians_from_degrees(1));
   }
 
+  static bool only_first_faces_differ(const Hypothesis& a, const Hypothesis& b) {
+    const auto &one = a.train().face_order(), &other = b.train().face_order();
+    if (one.size() != other.size() || !std::equal(one.begin() + 1, one.end(), other.begin() + 1)) {
+      return false;
+    }
+    for (int k = 0; k < a.train().prisms(); ++k) {
+      const double speed = a.fit.model.rotors.mean_angular_velocity(k);
+      const double rival = b.fit.model.rotors.mean_angular_velocity(k);
+      if (std::abs(speed - rival) > 0.01 * std::abs(speed)) return false;
+    }
+    return true;
+  }
   static bool smaller_excess(const Hypothesis& a, const Hypothesis& b) {
     return a.excess != b.excess ? a.excess < b.excess : a.fit.rms < b.fit.rms;
   }
@@ -684,7 +696,11 @@ class Search {
       if (rival.excess > kFairLead) break;
       const TrainFit fit =
           fit_train(scan, rival.fit.model, result.freedom, {.iterations = 25}, progress_.silent());
-      if (fit.rms < most) same.push_back(h);
+      // Of a single emitter's first prism only tilts tell the faces, and barely.
+      if (fit.rms < most ||
+          (grid_.emitters == 1 && only_first_faces_differ(rival, result.hypotheses.front()))) {
+        same.push_back(h);
+      }
     }
     for (const std::size_t a : same) {
       for (const std::size_t b : same) {

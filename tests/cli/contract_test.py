@@ -10,7 +10,7 @@ from command import SOURCE, CommandTest, run
 
 HALL = SOURCE / "data" / "hall.yaml"
 VERBS = ("info", "convert", "simulate", "estimate", "observability", "calibrate", "cloud",
-         "pattern", "preset", "report")
+         "identify", "pattern", "preset", "report")
 RATES = {"mid-40": 100000, "mid-70": 100000, "avia": 240000, "horizon": 240000, "tele-15": 240000}
 
 
@@ -48,6 +48,7 @@ class ContractTest(CommandTest):
             "calibrate": ((recording,), (recording,)),
             "cloud": ((recording, "--calibration", "out/calibration.yaml", "-o", "cloud.las"),
                       (recording, "out/calibration.yaml")),
+            "identify": ((recording,), (recording,)),
             "pattern": (("--sensor", "avia", "--format", "npy", "--duration-s", "0.01", "-o",
                          "avia.npy"), ()),
             "preset": (("check", "out/calibration.yaml"), ("out/calibration.yaml",)),

@@ -8,7 +8,7 @@ import unittest
 from command import CommandTest
 
 VERBS = ("info", "convert", "simulate", "estimate", "observability", "calibrate", "cloud",
-         "pattern", "preset", "report", "reproduce")
+         "identify", "pattern", "preset", "report", "reproduce")
 
 # Arguments that are wrong, and what the message must name.
 WRONG = [
@@ -53,6 +53,9 @@ WRONG = [
     (["cloud", "none*.lvx", "--calibration", "mid-40", "-o", "folder/"], "none*.lvx"),
     (["simulat", "-o", "a.csv"], "did you mean simulate?"),
     (["simulate", "-o", "a.csv", "--sensor", "mid40"], "did you mean mid-40?"),
+    (["identify"], "INPUT"),
+    (["identify", "a.csv", "--most-prisms", "4"], "--most-prisms"),
+    (["identify", "a.csv", "--fastest-hz", "0"], "--fastest-hz"),
     (["pattern", "--format", "npy"], "--output"),
     (["pattern", "-o", "a.npy"], "--format"),
     (["pattern", "-o", "a.npy", "--format", "pdf"], "pdf"),
