@@ -16,7 +16,7 @@
 namespace risley::recordings {
 namespace {
 
-constexpr auto kUnknownGap_ns = static_cast<std::int64_t>(kUnknownGap_s * 1e9);
+constexpr auto kUnknownGap_ns = static_cast<std::int64_t>(kUnknownGap * 1e9);
 
 /// Gives every row the time that counting its shot gives.
 class CountingReader final : public DecoratingReader {

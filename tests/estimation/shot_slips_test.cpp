@@ -6,6 +6,7 @@
 
 #include <cmath>
 #include <cstdint>
+#include <ostream>
 #include <random>
 #include <string>
 #include <vector>
@@ -30,6 +31,8 @@ struct Scan {
   int first_emitter = 0;  // that fired shot 0
   bool sky = false;       // nothing returns from above
 };
+
+void PrintTo(const Scan& scan, std::ostream* stream) { *stream << scan.sensor; }
 
 /// Directions rounded to 0.01 degree with 0.004 degree of noise, of rotors that swing by 0.1
 /// degree, in 0.15 s; numbered as they would be counted.

@@ -105,7 +105,7 @@ struct ShotSlip {
   std::uint64_t row = 0;   ///< first observation behind it, counted from 0
   std::int64_t shots = 0;  ///< that are missing before that row; below 0: that are there twice
   /// Their number is known; otherwise only which emitters fire behind it (shots modulo their
-  /// number), and times go on after kUnknownGap_s.
+  /// number), and times go on after kUnknownGap.
   bool counted = true;
 };
 

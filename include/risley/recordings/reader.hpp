@@ -57,7 +57,7 @@ inline constexpr std::int64_t kLongestTimeSpan_ns = (std::int64_t{1} << 62) - 1;
 
 /// Time that is put where an unknown number of shots is missing, s: longer than anybody counts the
 /// turns of a rotor over.
-inline constexpr double kUnknownGap_s = 10.0;
+inline constexpr double kUnknownGap = 10.0;
 
 /// How a recording is to be read.
 struct ReadOptions {
