@@ -108,7 +108,7 @@ Json outcome_json(const IdentifiedRecording& outcome) {
       {"hypotheses", hypotheses},
       {"verdict",
        {{"code", to_string(outcome.verdict)}, {"words", outcome.words}, {"to_do", outcome.to_do}}},
-      {"sensor", nullptr},
+      {"preset", nullptr},
       {"mirrored", outcome.like_mirrored},
       {"emitters", found.emitters},
       {"emitters_named", found.emitters_named},
@@ -120,7 +120,7 @@ Json outcome_json(const IdentifiedRecording& outcome) {
       {"unobservable", outcome.unobservable},
       {"warnings", outcome.warnings},
       {"seconds", {{"read", outcome.reading_time}, {"solve", outcome.solving_time}}}};
-  if (!outcome.like.empty()) object["sensor"] = outcome.like;
+  if (!outcome.like.empty()) object["preset"] = outcome.like;
   return object;
 }
 

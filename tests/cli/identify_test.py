@@ -30,7 +30,7 @@ class IdentifyTest(CommandTest):
         self.expect(0, "pattern", "--sensor", "tele-15", *arguments, "-o", "scan.csv")
         result = self.expect_json(0, "identify", "scan.csv", "-o", "mine.yaml")
         self.assertEqual(result["verdict"]["code"], "identified")
-        self.assertEqual(result["sensor"], "tele-15")
+        self.assertEqual(result["preset"], "tele-15")
         self.assertFalse(result["mirrored"])
         self.assertEqual((result["emitters"], result["timing"]), (6, "in_turn"))
         best = result["hypotheses"][0]
@@ -61,7 +61,7 @@ class IdentifyTest(CommandTest):
             with self.subTest(name):
                 recording = pathlib.Path(FOLDER) / f"livox-{name}.csv"
                 result = self.expect_json(0, "identify", recording)
-                self.assertEqual(result["sensor"], name.replace("-every-40th", ""))
+                self.assertEqual(result["preset"], name.replace("-every-40th", ""))
                 best = result["hypotheses"][0]
                 self.assertEqual(best["faces"], faces)
                 six_beams = len(prisms) == 3 or "avia" in name
