@@ -28,7 +28,7 @@ Chart rosette_chart(const jobs::PatternDetails& details) {
     dots.y.push_back(degrees_from_radians(rosette.zenith[i]));
   }
   const double duration = details.coverage.after.back().time;
-  Chart chart{fmt::format("The first {:g} s as they grow", duration),
+  Chart chart{fmt::format("The first {:g} s as it grows", duration),
               "azimuth, deg",
               "zenith, deg",
               {dots},
