@@ -258,6 +258,7 @@ bool lines_decide(const std::vector<SensorMatch>& matches) {
 std::vector<std::uint8_t> emitters_in_order(const FiringOrder& order, int emitters) {
   require_between("emitters", emitters, 1, 255);
   std::vector<std::uint8_t> list;
+  list.reserve(static_cast<std::size_t>(emitters));
   for (int shot = 0; shot < emitters; ++shot) {
     list.push_back(static_cast<std::uint8_t>(
         emitter_of(static_cast<std::uint8_t>(shot), static_cast<std::size_t>(emitters), order)));

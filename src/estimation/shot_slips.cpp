@@ -813,6 +813,7 @@ std::vector<Anchor> find_anchors(NumberedShots& shots, ShotRange range, const St
   }
   std::stable_sort(fitted.begin(), fitted.end(), better);
   std::vector<Anchor> anchors;
+  anchors.reserve(fitted.size());
   for (Window& window : fitted) anchors.push_back(std::move(window.anchor));
   return anchors;
 }

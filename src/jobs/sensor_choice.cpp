@@ -44,6 +44,7 @@ std::vector<Sensor> type_presets() {
     if (!is_new && name.size() < place->second.name.size()) place->second = std::move(sensor);
   }
   std::vector<Sensor> result;
+  result.reserve(by_type.size());
   for (auto& [type, sensor] : by_type) result.push_back(std::move(sensor));
   return result;
 }
