@@ -123,6 +123,9 @@ std::size_t row_at(const ShotGrid& grid, double time) {
   return static_cast<std::size_t>(at - grid.time.begin());
 }
 
+/// How much of a scan lines are looked for in, s.
+double line_window(const ShotGrid& grid) { return std::max(kLineWindow, kLineShots * grid.step); }
+
 class Search {
  public:
   Search(const ShotGrid& grid, LineSpectrum spectrum, const IdentifyOptions& options,
@@ -166,22 +169,19 @@ class Search {
  private:
   void choose_trial_window() {
     double slowest = options_.fastest;
-    const std::size_t own = std::min(kOwnLines, spectrum_.lines.size());
-    for (std::size_t a = 0; a < own && a < 3; ++a) {
+    for (std::size_t a = 0; a < std::min<std::size_t>(3, spectrum_.lines.size()); ++a) {
       slowest = std::min(slowest, std::abs(spectrum_.lines[a].angular_velocity));
     }
     double length = std::max(kTrialWindow, 2.5 * kTwoPi / slowest);
     length = std::max(length, 300 * grid_.step);
-    length = std::min({length, spectrum_end(), grid_.duration()});
-    const double begin = 0.5 * (spectrum_end() - length);
+    const double looked_at = std::min(grid_.duration(), line_window(grid_));
+    length = std::min(length, looked_at);
+    const double begin = 0.5 * (looked_at - length);
     const std::size_t first = row_at(grid_, begin);
     const std::size_t last = row_at(grid_, begin + length);
     trial_grid_ = thinned(grid_, first, last, kTrialShots);
     trial_begin_ = grid_.time[first];
     trial_end_ = grid_.time[last - 1];
-  }
-  double spectrum_end() const {
-    return std::min(grid_.duration(), std::max(kLineWindow, kLineShots * grid_.step));
   }
 
   TrainModel start(const Arrangement& arrangement, double index, double thinner = 1) const {
@@ -540,16 +540,16 @@ class Search {
   /// The best trial of every arrangement of its faces and rotors, best first.
   std::vector<Trial> one_of_each(std::vector<Trial> trials) const {
     std::vector<Trial> chosen;
-    const std::size_t prisms = trials.front().arrangement.lines.size();
     std::vector<std::size_t> lines = trials.front().arrangement.lines;
     std::sort(lines.begin(), lines.end());
     for (Trial& trial : trials) {
-      if (trial.arrangement.lines.size() != prisms || !std::isfinite(trial.fit.rms)) continue;
+      if (!std::isfinite(trial.fit.rms)) continue;
       std::vector<std::size_t> own = trial.arrangement.lines;
       std::sort(own.begin(), own.end());
       if (own != lines) continue;
-      if (chosen.size() > kFewestRivals && trial.fit.rms > kHopeless * chosen.front().fit.rms)
+      if (chosen.size() > kFewestRivals && trial.fit.rms > kHopeless * chosen.front().fit.rms) {
         break;
+      }
       chosen.push_back(std::move(trial));
     }
     return chosen;
@@ -570,9 +570,7 @@ class Search {
       return without;
     }
     // Shots of a round that share a time lag by their places in it, in equal steps.
-    const TrainFit fit = fit_train(compared_, best.model, freedom,
-                                   {.iterations = 3, .covariance = true}, progress_.silent());
-    std::vector<double> lag = fit.model.lag;
+    std::vector<double> lag = best.model.lag;
     std::sort(lag.begin(), lag.end());
     const double each = (lag.back() - lag.front()) / static_cast<double>(lag.size() - 1);
     bool equal = true;
@@ -598,7 +596,7 @@ class Search {
       const double excess = f == leader ? 0.0 : std::max(0.0, chi2_excess(fits[f], few));
       result.hypotheses.push_back({std::move(fits[f]), excess, {}, {}});
     }
-    sort_by_excess(result);
+    std::stable_sort(result.hypotheses.begin(), result.hypotheses.end(), smaller_excess);
     find_equivalents(result);
     // All rows for the best one, and for rivals that the thinned ones do not dismiss.
     const ShotGrid all = thinned(grid_, 0, grid_.size(), kMostShots);
@@ -663,9 +661,6 @@ class Search {
   }
   static bool smaller_excess(const Hypothesis& a, const Hypothesis& b) {
     return a.excess != b.excess ? a.excess < b.excess : a.fit.rms < b.fit.rms;
-  }
-  static void sort_by_excess(Identification& result) {
-    std::stable_sort(result.hypotheses.begin(), result.hypotheses.end(), smaller_excess);
   }
   static bool is_best_or_equivalent(const Identification& result, std::size_t h) {
     const auto& same = result.hypotheses[h].equivalent_to;
@@ -782,8 +777,7 @@ Identification identify(const estimation::AngleSeries& series, const IdentifyOpt
                        [](const auto& a, const auto& b) { return a.size() < b.size(); });
   ShotGrid grid = shot_grid(series, *longest);
   if (grid.duration() > kLongest) grid = rows_of(grid, 0, row_at(grid, kLongest));
-  const double window = std::max(kLineWindow, kLineShots * grid.step);
-  ShotGrid head = rows_of(grid, 0, row_at(grid, window));
+  ShotGrid head = rows_of(grid, 0, row_at(grid, line_window(grid)));
   const LineSpectrumOptions lines{.fastest = options.fastest};
   LineSpectrum spectrum = line_spectrum(head, lines);
   const bool named = grid.emitters > 1;

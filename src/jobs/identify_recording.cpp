@@ -3,14 +3,13 @@
 #include "risley/jobs/identify_recording.hpp"
 
 #include <filesystem>
-#include <fstream>
 #include <limits>
 
 #include <fmt/format.h>
 
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
-#include "risley/io/output_file.hpp"
+#include "risley/io/text_file.hpp"
 #include "risley/jobs/recording_input.hpp"
 #include "risley/jobs/sensor_choice.hpp"
 #include "risley/sensors/preset.hpp"
@@ -122,12 +121,7 @@ void write(const IdentifyRecordingOptions& options, IdentifiedRecording& result,
   if (result.verdict != IdentificationVerdict::identified && !options.undecided) return;
   sensors::Sensor sensor = result.sensor.sensor;
   sensor.provenance = with_inputs(options.provenance, {options.recording}, progress);
-  io::OutputFile file(options.output);
-  std::ofstream stream(file.temporary_path(), std::ios::binary);
-  stream << sensors::preset_text(sensor);
-  stream.close();
-  if (!stream) throw FileError(file.path(), {}, "cannot be written");
-  file.commit();
+  io::write_text_file(options.output, sensors::preset_text(sensor));
   result.written = true;
 }
 

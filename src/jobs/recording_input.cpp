@@ -37,58 +37,69 @@ Extrinsics roll_about_axis(double roll, const estimation::FrameTurn& frame) {
           {}};
 }
 
-/// Shots per second of a recording whose times are evidently counted with the sensor's rate: each
-/// shot follows the one before it by the same time, from the first row to the last.
-std::optional<double> evident_rate(const std::string& path, const recordings::ReadOptions& options,
-                                   double shot_rate, const Progress& progress) {
-  constexpr double kOtherRate = 0.05, kSameStep = 0.15;  // shares
-  const double usual_step = 1e9 / shot_rate;
-  std::int64_t first = 0, last = 0, shots = 0;
-  double step = 0;
-  recordings::Chunk chunk;
-  const auto reader = recordings::open_recording(path, options);
-  const auto next = [&] {
-    try {
-      return reader->read(chunk);
-    } catch (const FileError&) {  // who reads on is told of it
-      return false;
-    }
-  };
-  while (next()) {
-    progress.check();
-    if (!chunk.packets.empty()) return std::nullopt;
+/// Whether times are evidently counted with a sensor's rate: each shot follows the one before it by
+/// the same time, from the first row to the last.
+class EvenTimes {
+ public:
+  explicit EvenTimes(double shot_rate) : usual_step_(1e9 / shot_rate) {}
+
+  /// @return whether they still are
+  bool add(const recordings::Chunk& chunk) {
+    if (!chunk.packets.empty()) return false;
     const recordings::Observations& rows = chunk.observations;
     for (std::size_t row = 0; row < rows.size(); ++row) {
-      if (shots > 0 && rows.return_number[row] > 1) continue;
-      if (shots == 0) first = last = rows.time_ns[row];
+      if (shots_ > 0 && rows.return_number[row] > 1) continue;
+      if (shots_ == 0) first_ = last_ = rows.time_ns[row];
       // Rounded to microseconds a step may be half a microsecond off.
-      const double off = static_cast<double>(rows.time_ns[row] - last) - usual_step;
-      if (shots > 0 && std::abs(off) > kOtherRate * usual_step + 1000.0) return std::nullopt;
-      last = rows.time_ns[row];
-      if (step > 0 && std::abs(static_cast<double>(last - first) -
-                               step * static_cast<double>(shots)) > kSameStep * usual_step) {
-        return std::nullopt;
+      const double off = static_cast<double>(rows.time_ns[row] - last_) - usual_step_;
+      if (shots_ > 0 && std::abs(off) > kOtherRate * usual_step_ + 1000.0) return false;
+      last_ = rows.time_ns[row];
+      if (step_ > 0 && std::abs(static_cast<double>(last_ - first_) -
+                                step_ * static_cast<double>(shots_)) > kSameStep * usual_step_) {
+        return false;
       }
-      ++shots;
+      ++shots_;
     }
-    if (shots > 1 && step == 0) {
-      step = static_cast<double>(last - first) / static_cast<double>(shots - 1);
+    if (shots_ > 1 && step_ == 0) step_ = mean_step();
+    return true;
+  }
+  /// Shots per second, if their rate is the sensor's.
+  std::optional<double> rate() const {
+    if (shots_ < 2 || std::abs(step_ / usual_step_ - 1.0) > kOtherRate) return std::nullopt;
+    return 1e9 / mean_step();
+  }
+  /// The times as they are counted with the rate, from 0.
+  void count(std::vector<std::int64_t>& time_ns) const {
+    const double step = mean_step();
+    for (std::int64_t& time : time_ns) {
+      time = std::llround(std::round(static_cast<double>(time - first_) / step) * step);
     }
   }
-  if (shots < 2 || std::abs(step / usual_step - 1.0) > kOtherRate) return std::nullopt;
-  return 1e9 * static_cast<double>(shots - 1) / static_cast<double>(last - first);
-}
 
-/// What the count of a recording's shots is worth.
-estimation::ShotCount count_of(const std::string& path, recordings::ReadOptions options,
-                               const sensors::Sensor& sensor, const Progress& progress) {
+ private:
+  static constexpr double kOtherRate = 0.05, kSameStep = 0.15;  // shares of a step
+  double mean_step() const {
+    return static_cast<double>(last_ - first_) / static_cast<double>(shots_ - 1);
+  }
+  double usual_step_, step_ = 0;
+  std::int64_t first_ = 0, last_ = 0, shots_ = 0;
+};
+
+/// All valid shots of a recording whose times are counted, because a rate was asked for or because
+/// they evidently are.
+std::optional<estimation::CountedShots> counted_shots(const std::string& path,
+                                                      recordings::ReadOptions options,
+                                                      const sensors::Sensor& sensor,
+                                                      const Progress& progress) {
   options.emitters = 0;  // beams as the file has them
   const auto reader = recordings::open_recording(path, options);
   estimation::ShotSelector selector({.rate = std::nullopt, .ranges = false, .rows = true});
+  EvenTimes even(sensor.shot_rate);
   recordings::Chunk chunk;
   bool named = false;
   try {
     while (reader->read(chunk)) {
+      if (!options.shot_rate && !even.add(chunk)) return std::nullopt;
       selector.add(chunk.observations);
       const auto& beam = chunk.observations.beam;
       named = named || std::any_of(beam.begin(), beam.end(), [](auto one) { return one != 0; });
@@ -96,11 +107,20 @@ estimation::ShotCount count_of(const std::string& path, recordings::ReadOptions 
     }
   } catch (const FileError&) {  // who reads on is told of it
   }
-  for (const std::uint8_t beam : selector.series().beam) {
+  const std::optional<double> rate = options.shot_rate ? options.shot_rate : even.rate();
+  if (!rate) return std::nullopt;
+  estimation::CountedShots shots{selector.take_series(), selector.rows(), *rate,
+                                 !named && sensor.train.emitters() > 1};
+  if (!options.shot_rate) even.count(shots.series.time_ns);
+  return shots;
+}
+
+/// What the count of a recording's shots is worth.
+estimation::ShotCount count_of(const estimation::CountedShots& shots, const sensors::Sensor& sensor,
+                               const Progress& progress) {
+  for (const std::uint8_t beam : shots.series.beam) {
     if (beam >= sensor.train.emitters()) return {};  // who reads on is told of it
   }
-  estimation::CountedShots shots{selector.take_series(), selector.rows(), *options.shot_rate,
-                                 !named && sensor.train.emitters() > 1};
   return estimation::find_slips(shots, sensor, progress);
 }
 
@@ -223,10 +243,11 @@ SensorFrameRecording open_in_sensor_frame(const std::string& path,
     }
     return result;
   }
-  if (!given) reading.shot_rate = evident_rate(path, reading, sensor.shot_rate, progress);
-  if (!reading.shot_rate) return result;
+  const auto shots = counted_shots(path, reading, sensor, progress);
+  if (!shots) return result;
+  reading.shot_rate = shots->shot_rate;
   reading.emitters = sensor.train.emitters();
-  estimation::ShotCount count = count_of(path, reading, sensor, progress);
+  estimation::ShotCount count = count_of(*shots, sensor, progress);
   if (!given && count.slips.empty() && count.firing_order.empty()) return result;
   const auto words = count_words(count, *reading.shot_rate, given);
   result.warnings.insert(result.warnings.end(), words.begin(), words.end());
