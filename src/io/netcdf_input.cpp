@@ -1,124 +1,261 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-#include <array>
-#include <cerrno>
-#include <filesystem>
-#include <limits>
+#include <cstring>
+#include <optional>
+#include <string_view>
+#include <type_traits>
 
 #include <fmt/format.h>
-#include <netcdf.h>
 
 #include "risley/core/error.hpp"
 #include "risley/io/netcdf.hpp"
 
+#include "io/confined_process.hpp"
+#include "io/netcdf_file.hpp"
 #include "io/netcdf_library.hpp"
 
 namespace risley::io {
 namespace {
 
-/// Deflate shrinks nothing by more than 1032 (zlib.net/zlib_tech.html), so a file can hold no more
-/// than this many times its bytes.
-constexpr std::uint64_t kMostCompression = 1040;
-/// Of one block, which the library reads as a whole. Ours have 256 KiB.
-constexpr std::uint64_t kMostBlockBytes = std::uint64_t{64} << 20;
+enum class Request : std::uint8_t {
+  open,
+  has_attribute,
+  text,
+  number,
+  text_group,
+  dimension,
+  has_variable,
+  variable,
+  get,
+};
+enum class Outcome : std::uint8_t { done, file_error };
 
-/// a * b, or the largest number where the product is larger.
-std::uint64_t product(std::uint64_t a, std::uint64_t b) {
-  constexpr std::uint64_t kMost = std::numeric_limits<std::uint64_t>::max();
-  return b != 0 && a > kMost / b ? kMost : a * b;
+/// Numbers and texts one after another, for a process that is a copy of this one.
+class Parcel {
+ public:
+  template <class T>
+  Parcel& put(const T& value) {
+    static_assert(std::is_trivially_copyable_v<T> && !std::is_pointer_v<T>);
+    bytes_.append(reinterpret_cast<const char*>(&value), sizeof value);
+    return *this;
+  }
+  Parcel& put_text(std::string_view text) {
+    put(text.size());
+    bytes_.append(text);
+    return *this;
+  }
+  /// Room for so many bytes at the end.
+  char* extend(std::size_t size) {
+    bytes_.resize(bytes_.size() + size);
+    return bytes_.data() + bytes_.size() - size;
+  }
+  std::string& bytes() { return bytes_; }
+
+ private:
+  std::string bytes_;
+};
+
+/// Takes a parcel apart. What a process whose library misbehaved sends is not trusted.
+class Unpacker {
+ public:
+  explicit Unpacker(std::string_view bytes) : left_(bytes) {}
+
+  template <class T>
+  T take() {
+    T value{};
+    const std::string_view own = take_bytes(sizeof value);
+    std::memcpy(&value, own.data(), sizeof value);
+    return value;
+  }
+  std::string take_text() { return std::string(take_bytes(take<std::size_t>())); }
+  std::string_view take_bytes(std::size_t size) {
+    if (size > left_.size()) throw ProcessEnded("the library's process sent nonsense");
+    const std::string_view taken = left_.substr(0, size);
+    left_.remove_prefix(size);
+    return taken;
+  }
+
+ private:
+  std::string_view left_;
+};
+
+void put(Parcel& parcel, const NetcdfVariable& variable) {
+  parcel.put_text(variable.name).put(variable.type).put(variable.width).put(variable.id);
+}
+NetcdfVariable take_variable(Unpacker& parcel) {
+  NetcdfVariable variable;
+  variable.name = parcel.take_text();
+  variable.type = parcel.take<NetcdfType>();
+  variable.width = parcel.take<std::size_t>();
+  variable.id = parcel.take<int>();
+  return variable;
+}
+void put(Parcel& parcel, const NetcdfDimension& dimension) {
+  parcel.put_text(dimension.name).put(dimension.length).put(dimension.id);
+}
+NetcdfDimension take_dimension(Unpacker& parcel) {
+  NetcdfDimension dimension;
+  dimension.name = parcel.take_text();
+  dimension.length = parcel.take<std::size_t>();
+  dimension.id = parcel.take<int>();
+  return dimension;
 }
 
-std::string shape_of(std::span<const NetcdfDimension* const> dimensions) {
-  std::string text;
-  for (const NetcdfDimension* dimension : dimensions) {
-    text += fmt::format("{}{} = {}", text.empty() ? "" : ", ", dimension->name, dimension->length);
+/// Answers requests about one file, in the process of its own.
+class Service {
+ public:
+  explicit Service(std::string path) : path_(std::move(path)) {}
+
+  std::string operator()(std::string_view request) {
+    Parcel answer;
+    try {
+      answer.put(Outcome::done);
+      Unpacker asked(request);
+      serve(asked, answer);
+    } catch (const FileError& error) {
+      answer.bytes().clear();
+      answer.put(Outcome::file_error).put_text(error.problem());
+    }
+    return std::move(answer.bytes());
   }
-  return text;
+
+ private:
+  void serve(Unpacker& asked, Parcel& answer) {
+    switch (asked.take<Request>()) {
+      case Request::open:
+        file_ = std::make_shared<NetcdfFile>(path_);
+        break;
+      case Request::has_attribute:
+        answer.put(file_->has_attribute(asked.take_text()));
+        break;
+      case Request::text:
+        answer.put_text(file_->text(asked.take_text()));
+        break;
+      case Request::number:
+        answer.put(file_->number(asked.take_text()));
+        break;
+      case Request::text_group: {
+        const auto texts = file_->text_group(asked.take_text());
+        answer.put(texts.size());
+        for (const auto& [name, text] : texts) answer.put_text(name).put_text(text);
+        break;
+      }
+      case Request::dimension:
+        put(answer, file_->dimension(asked.take_text()));
+        break;
+      case Request::has_variable:
+        answer.put(file_->has_variable(asked.take_text()));
+        break;
+      case Request::variable: {
+        const std::string name = asked.take_text();
+        const auto type = asked.take<NetcdfType>();
+        std::vector<NetcdfDimension> dimensions(asked.take<std::size_t>());
+        for (NetcdfDimension& one : dimensions) one = take_dimension(asked);
+        put(answer, file_->variable(name, type, dimensions, asked.take<std::size_t>()));
+        break;
+      }
+      case Request::get: {
+        const NetcdfVariable variable = take_variable(asked);
+        const auto first = asked.take<std::size_t>(), count = asked.take<std::size_t>();
+        file_->get(variable, first, count,
+                   answer.extend(count * variable.width * bytes_of(variable.type)));
+        break;
+      }
+    }
+  }
+
+  std::string path_;
+  std::shared_ptr<NetcdfFile> file_;  // shared: a service is copied, an open file cannot be
+};
+
+Parcel request(Request kind) {
+  Parcel parcel;
+  parcel.put(kind);
+  return parcel;
+}
+Parcel request(Request kind, const std::string& name) {
+  Parcel parcel = request(kind);
+  parcel.put_text(name);
+  return parcel;
 }
 
 }  // namespace
 
-NetcdfInput::NetcdfInput(const std::string& path) : path_(path) {
-  std::error_code code;
-  bytes_ = std::filesystem::file_size(path, code);
-  if (code) fail(fmt::format("cannot be opened as NetCDF: {}", code.message()));
-  const NetcdfLock lock;
-  check(nc_open(path.c_str(), NC_NOWRITE, &id_), "be opened as NetCDF");
+/// The process that reads the file.
+class NetcdfInput::Process {
+ public:
+  Process(const NetcdfInput& owner, const std::string& path) : owner_(owner) {
+    try {
+      const NetcdfLock lock;  // the copy of this process finds the library at rest
+      process_.emplace(Service(path));
+    } catch (const ProcessEnded& error) {
+      owner_.fail(error.what());
+    }
+  }
+
+  /// @return the answer without its outcome
+  std::string ask(Parcel request, const std::string& about) {
+    try {
+      std::string answer = process_->ask(request.bytes());
+      Unpacker parcel(answer);
+      if (parcel.take<Outcome>() == Outcome::file_error) owner_.fail(parcel.take_text());
+      answer.erase(0, sizeof(Outcome));
+      return answer;
+    } catch (const ProcessEnded& error) {
+      owner_.fail(fmt::format("{} cannot be read by the NetCDF library: {}", about, error.what()));
+    }
+  }
+
+ private:
+  const NetcdfInput& owner_;
+  std::optional<ConfinedProcess> process_;
+};
+
+NetcdfInput::NetcdfInput(const std::string& path)
+    : path_(path), process_(std::make_unique<Process>(*this, path)) {
+  process_->ask(request(Request::open), "the file");
 }
 
-NetcdfInput::~NetcdfInput() {
-  const NetcdfLock lock;
-  nc_close(id_);
-}
-
-void NetcdfInput::check(int status, const std::string& action) const {
-  if (status != NC_NOERR) fail(fmt::format("cannot {}: {}", action, netcdf_reason(status)));
-}
+NetcdfInput::~NetcdfInput() = default;
 
 void NetcdfInput::fail(const std::string& problem) const { throw FileError(path_, {}, problem); }
 
 bool NetcdfInput::has_attribute(const std::string& name) const {
-  const NetcdfLock lock;
-  int number = 0;
-  return nc_inq_attid(id_, NC_GLOBAL, name.c_str(), &number) == NC_NOERR;
-}
-
-std::string NetcdfInput::text_of(int group, const std::string& name) const {
-  nc_type type = NC_NAT;
-  std::size_t length = 0;
-  if (nc_inq_att(group, NC_GLOBAL, name.c_str(), &type, &length) != NC_NOERR || type != NC_CHAR) {
-    fail(fmt::format("expected the text attribute {}, found none", name));
-  }
-  if (length > bytes_) {
-    fail(fmt::format("attribute {}: {} characters do not fit in {} bytes", name, length, bytes_));
-  }
-  std::string text(length, '\0');
-  check(nc_get_att_text(group, NC_GLOBAL, name.c_str(), text.data()),
-        fmt::format("read attribute {}", name));
-  return text;
+  const std::string answer =
+      process_->ask(request(Request::has_attribute, name), fmt::format("attribute {}", name));
+  return Unpacker(answer).take<bool>();
 }
 
 std::string NetcdfInput::text(const std::string& name) const {
-  const NetcdfLock lock;
-  return text_of(id_, name);
+  const std::string answer =
+      process_->ask(request(Request::text, name), fmt::format("attribute {}", name));
+  return Unpacker(answer).take_text();
 }
 
 std::uint32_t NetcdfInput::number(const std::string& name) const {
-  const NetcdfLock lock;
-  nc_type type = NC_NAT;
-  std::size_t length = 0;
-  std::uint32_t value = 0;
-  if (nc_inq_att(id_, NC_GLOBAL, name.c_str(), &type, &length) != NC_NOERR || length != 1 ||
-      nc_get_att_uint(id_, NC_GLOBAL, name.c_str(), &value) != NC_NOERR) {
-    fail(fmt::format("expected the number attribute {}, found none", name));
-  }
-  return value;
+  const std::string answer =
+      process_->ask(request(Request::number, name), fmt::format("attribute {}", name));
+  return Unpacker(answer).take<std::uint32_t>();
 }
 
 std::vector<std::pair<std::string, std::string>> NetcdfInput::text_group(
     const std::string& group) const {
-  const NetcdfLock lock;
-  const std::string action = fmt::format("read the group {}", group);
-  int id = 0, count = 0;
-  check(nc_inq_grp_ncid(id_, group.c_str(), &id), action);
-  check(nc_inq_natts(id, &count), action);
-  std::vector<std::pair<std::string, std::string>> attributes;
-  for (int i = 0; i < count; ++i) {
-    std::array<char, NC_MAX_NAME + 1> name{};
-    check(nc_inq_attname(id, NC_GLOBAL, i, name.data()), action);
-    attributes.emplace_back(name.data(), text_of(id, name.data()));
+  const std::string answer =
+      process_->ask(request(Request::text_group, group), fmt::format("group {}", group));
+  Unpacker parcel(answer);
+  std::vector<std::pair<std::string, std::string>> texts;
+  for (auto left = parcel.take<std::size_t>(); left > 0; --left) {
+    std::string name = parcel.take_text();
+    texts.emplace_back(std::move(name), parcel.take_text());
   }
-  return attributes;
+  return texts;
 }
 
 NetcdfDimension NetcdfInput::dimension(const std::string& name) const {
-  const NetcdfLock lock;
-  NetcdfDimension dimension{name, 0, 0};
-  if (nc_inq_dimid(id_, name.c_str(), &dimension.id) != NC_NOERR ||
-      nc_inq_dimlen(id_, dimension.id, &dimension.length) != NC_NOERR) {
-    fail(fmt::format("expected the dimension {}, found none", name));
-  }
-  return dimension;
+  const std::string answer =
+      process_->ask(request(Request::dimension, name), fmt::format("dimension {}", name));
+  Unpacker parcel(answer);
+  return take_dimension(parcel);
 }
 
 NetcdfDimension NetcdfInput::dimension(const std::string& name, std::size_t length) const {
@@ -130,72 +267,22 @@ NetcdfDimension NetcdfInput::dimension(const std::string& name, std::size_t leng
 }
 
 bool NetcdfInput::has_variable(const std::string& name) const {
-  const NetcdfLock lock;
-  int number = 0;
-  return nc_inq_varid(id_, name.c_str(), &number) == NC_NOERR;
+  const std::string answer =
+      process_->ask(request(Request::has_variable, name), fmt::format("variable {}", name));
+  return Unpacker(answer).take<bool>();
 }
 
 NetcdfVariable NetcdfInput::variable(const std::string& name, NetcdfType type,
                                      std::span<const NetcdfDimension* const> dimensions,
                                      std::size_t block) const {
   require_dimensions(name, dimensions);
-  const NetcdfLock lock;
-  NetcdfVariable variable{name, type, 1, 0};
-  if (nc_inq_varid(id_, name.c_str(), &variable.id) != NC_NOERR) {
-    fail(fmt::format("expected variable {} along {}, found none", name, shape_of(dimensions)));
-  }
-  const std::string action = fmt::format("read what variable {} is", name);
-  nc_type found_type = NC_NAT;
-  int rank = 0;
-  check(nc_inq_vartype(id_, variable.id, &found_type), action);
-  check(nc_inq_varndims(id_, variable.id, &rank), action);
-  if (found_type != nc_type_of(type)) {
-    std::array<char, NC_MAX_NAME + 1> found{};
-    check(nc_inq_type(id_, found_type, found.data(), nullptr), action);
-    fail(fmt::format("variable {}: expected values of type {}, found {}", name, name_of(type),
-                     found.data()));
-  }
-  if (rank != static_cast<int>(dimensions.size())) {
-    fail(fmt::format("variable {}: expected the dimensions {}, found {} dimensions", name,
-                     shape_of(dimensions), rank));
-  }
-  std::vector<int> ids(dimensions.size());
-  check(nc_inq_vardimid(id_, variable.id, ids.data()), action);
-  std::uint64_t bytes = bytes_of(type);
-  for (std::size_t i = 0; i < ids.size(); ++i) {
-    const NetcdfDimension& expected = *dimensions[i];
-    if (ids[i] != expected.id) {
-      std::array<char, NC_MAX_NAME + 1> found{};
-      std::size_t length = 0;
-      check(nc_inq_dim(id_, ids[i], found.data(), &length), action);
-      fail(fmt::format("variable {}: expected dimension {} = {}, found {} = {}", name,
-                       expected.name, expected.length, found.data(), length));
-    }
-    bytes = product(bytes, expected.length);
-    if (i > 0) variable.width = product(variable.width, expected.length);
-  }
-  int storage = NC_CONTIGUOUS;
-  std::vector<std::size_t> blocks(dimensions.size());
-  check(nc_inq_var_chunking(id_, variable.id, &storage, blocks.data()), action);
-  const bool in_blocks = storage == NC_CHUNKED;
-  if (bytes > (in_blocks ? product(bytes_, kMostCompression) : bytes_)) {
-    fail(fmt::format("variable {}: values along {} do not fit in a file of {} bytes", name,
-                     shape_of(dimensions), bytes_));
-  }
-  if (in_blocks) {
-    std::uint64_t block_bytes = bytes_of(type);
-    for (const std::size_t length : blocks) block_bytes = product(block_bytes, length);
-    if (block_bytes > kMostBlockBytes) {
-      fail(fmt::format("variable {}: is stored in blocks of {} bytes, allowed up to {}", name,
-                       block_bytes, kMostBlockBytes));
-    }
-  }
-  if (block > 0) {
-    check(nc_set_var_chunk_cache(id_, variable.id, 2 * block * variable.width * bytes_of(type), 7,
-                                 1.0F),
-          fmt::format("set the cache of variable {}", name));
-  }
-  return variable;
+  Parcel asked = request(Request::variable, name);
+  asked.put(type).put(dimensions.size());
+  for (const NetcdfDimension* one : dimensions) put(asked, *one);
+  asked.put(block);
+  const std::string answer = process_->ask(std::move(asked), fmt::format("variable {}", name));
+  Unpacker parcel(answer);
+  return take_variable(parcel);
 }
 
 void NetcdfInput::get(const NetcdfVariable& variable, NetcdfType type, std::size_t first,
@@ -205,12 +292,15 @@ void NetcdfInput::get(const NetcdfVariable& variable, NetcdfType type, std::size
                                       name_of(variable.type), name_of(type)));
   }
   if (count == 0 || variable.width == 0) return;
-  const NetcdfLock lock;
-  // One or two dimensions, the second of which is read whole.
-  const std::array<std::size_t, 2> start{first, 0}, counts{count, variable.width};
-  check(
-      nc_get_vara(id_, variable.id, start.data(), counts.data(), values),
-      fmt::format("read entries {} to {} of variable {}", first, first + count - 1, variable.name));
+  Parcel asked = request(Request::get);
+  put(asked, variable);
+  asked.put(first).put(count);
+  const std::string answer = process_->ask(
+      std::move(asked),
+      fmt::format("entries {} to {} of variable {}", first, first + count - 1, variable.name));
+  const std::string_view bytes =
+      Unpacker(answer).take_bytes(count * variable.width * bytes_of(type));
+  std::memcpy(values, bytes.data(), bytes.size());
 }
 
 }  // namespace risley::io

@@ -51,10 +51,12 @@ struct Call {
 void check_beams(const PrismTrain& train, std::span<const std::uint8_t> beam, std::size_t shots) {
   if (beam.empty()) return;
   require_length("beam", beam.size(), shots);
-  const auto most = std::max_element(beam.begin(), beam.end());
-  if (*most < train.emitters()) return;
-  throw InvalidArgument(fmt::format("beam = {} in row {}, allowed 0 to {}", *most,
-                                    most - beam.begin(), train.emitters() - 1));
+  std::uint8_t most = 0;  // a plain loop is vectorised
+  for (const std::uint8_t one : beam) most = std::max(most, one);
+  if (most < train.emitters()) return;
+  throw InvalidArgument(fmt::format("beam = {} in row {}, allowed 0 to {}", most,
+                                    std::find(beam.begin(), beam.end(), most) - beam.begin(),
+                                    train.emitters() - 1));
 }
 
 std::size_t observe_batch(const PrismTrain& train,

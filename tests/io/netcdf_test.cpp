@@ -3,6 +3,7 @@
 #include "risley/io/netcdf.hpp"
 
 #include <atomic>
+#include <cstdlib>
 #include <fstream>
 #include <memory>
 #include <thread>
@@ -10,6 +11,7 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <hdf5.h>
 #include <netcdf.h>
 
 #include "risley/core/error.hpp"
@@ -293,6 +295,57 @@ TEST(HostileNetcdf, OtherFiles) {
   std::ofstream(folder.file("head")) << "\x89HDF\r\n\x1a\n and nothing else";
   EXPECT_THAT(refusal([&] { NetcdfInput{folder.file("head")}; }), HasSubstr("cannot be opened"));
   EXPECT_THAT(refusal([&] { NetcdfInput{"/dev/null"}; }), HasSubstr("cannot be opened"));
+}
+
+/// What reading all of a file's named variables comes to; a crash or an endless loop of the
+/// library would end or hold this process.
+std::string reading(const std::string& name) {
+  return refusal([&] {
+    const NetcdfInput file(std::string(RISLEY_TEST_DATA "/hostile/") + name);
+    for (const char* dimension : {"row", "knot", "shot"}) {
+      try {
+        file.dimension(dimension);
+      } catch (const FileError&) {  // of another kind
+        continue;
+      }
+      const auto rows = file.dimension(dimension);
+      std::vector<std::int64_t> times;
+      file.get(file.variable<std::int64_t>("time", {&rows}), 0, rows.length, times);
+    }
+  });
+}
+
+TEST(HostileNetcdf, ACrashOfTheLibraryIsAFileError) {
+  ::setenv("MALLOC_PERTURB_", "190", 1);
+  EXPECT_THAT(reading("hdf5-link-table.nc"), HasSubstr("cannot be"));
+  ::unsetenv("MALLOC_PERTURB_");
+}
+
+TEST(HostileNetcdf, AnEndlessLoopOfTheLibraryIsAFileError) {
+  EXPECT_THAT(reading("truth-hang.nc"), HasSubstr("processor time"));
+}
+
+TEST(HostileNetcdf, NothingIsReadFromOtherFiles) {
+  const TemporaryFolder folder;
+  write_file(folder.file("secret.nc"), numbers(1, 10), 1);
+  const hid_t linked = H5Fcreate(folder.file("linked.nc").c_str(), H5F_ACC_TRUNC, 0, 0);
+  EXPECT_GE(H5Lcreate_external("secret.nc", "/time", linked, "time", 0, 0), 0);
+  H5Fclose(linked);
+  EXPECT_THAT(refusal([&] { NetcdfInput{folder.file("linked.nc")}; }),
+              HasSubstr("time leads to another file"));
+  const hid_t stored = H5Fcreate(folder.file("stored.nc").c_str(), H5F_ACC_TRUNC, 0, 0);
+  const hid_t properties = H5Pcreate(H5P_DATASET_CREATE);
+  H5Pset_external(properties, "/etc/hostname", 0, 4);
+  const hsize_t length = 4;
+  const hid_t space = H5Screate_simple(1, &length, nullptr);
+  const hid_t data = H5Dcreate2(stored, "flag", H5T_NATIVE_UINT8, space, 0, properties, 0);
+  EXPECT_GE(data, 0);
+  H5Dclose(data);
+  H5Sclose(space);
+  H5Pclose(properties);
+  H5Fclose(stored);
+  EXPECT_THAT(refusal([&] { NetcdfInput{folder.file("stored.nc")}; }),
+              HasSubstr("flag leads to another file"));
 }
 
 TEST(Netcdf, DevicesSurvive) {

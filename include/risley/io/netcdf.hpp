@@ -15,9 +15,10 @@
 
 #include "risley/io/output_file.hpp"
 
-/// NetCDF-4 files. The library behind them, HDF5 included, is not thread-safe: every call here
-/// holds one lock of the whole process, so that any number of threads may each have files open.
-/// A single file belongs to one thread at a time.
+/// NetCDF-4 files. The library behind them, HDF5 included, is not thread-safe: what is written here
+/// holds one lock of the whole process, and every file that is read has a process of its own, so
+/// that any number of threads may each have files open. A single file belongs to one thread at a
+/// time.
 namespace risley::io {
 
 enum class NetcdfType { text, uint8, int32, uint32, int64, uint64, float32, float64 };
@@ -128,8 +129,11 @@ class NetcdfOutput {
 
 /// A NetCDF file that is read. What it says of itself is believed only as far as the bytes that
 /// it has: everything throws FileError, naming variable, dimension or attribute, where something
-/// is missing, of another kind, or larger than the file can hold. Calls that ask for no or for more
-/// than two dimensions, or for values of another type than their variable's, throw InvalidArgument.
+/// is missing, of another kind, larger than the file can hold, or in another file. The library runs
+/// in a child process: a file on which it crashes, runs for ever or asks for too much memory is a
+/// FileError, too. Calls that ask for no or for more than two dimensions, or for values of another
+/// type than their variable's, throw InvalidArgument.
+/// docs/decisions/0008-netcdf-in-a-child-process.md
 class NetcdfInput {
  public:
   explicit NetcdfInput(const std::string& path);
@@ -178,12 +182,10 @@ class NetcdfInput {
                           std::size_t block) const;
   void get(const NetcdfVariable& variable, NetcdfType type, std::size_t first, std::size_t count,
            void* values) const;
-  void check(int status, const std::string& action) const;
-  std::string text_of(int group, const std::string& name) const;
 
   std::string path_;
-  std::uint64_t bytes_ = 0;  ///< of the file
-  int id_ = 0;
+  class Process;
+  std::unique_ptr<Process> process_;
 };
 
 }  // namespace risley::io

@@ -1,0 +1,72 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "io/confined_process.hpp"
+
+#include <atomic>
+#include <csignal>
+#include <cstdlib>
+#include <numeric>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+namespace risley::io::confined_process_test {
+
+using ::testing::HasSubstr;
+
+/// What is said where a request has this end.
+std::string end_of(ConfinedProcess& process, std::string_view request) {
+  try {
+    process.ask(request);
+  } catch (const ProcessEnded& error) {
+    return error.what();
+  }
+  return "answered";
+}
+
+TEST(ConfinedProcess, AnswersRequestAfterRequest) {
+  int asked = 0;  // of the child's copy
+  ConfinedProcess process([&](std::string_view request) {
+    return std::to_string(++asked) + ": " + std::string(request);
+  });
+  EXPECT_EQ(process.ask("one"), "1: one");
+  EXPECT_EQ(process.ask(""), "2: ");
+  std::string long_one(3'000'001, 'x');  // more than a socket holds
+  std::iota(long_one.begin(), long_one.end(), '\0');
+  EXPECT_EQ(process.ask(long_one), "3: " + long_one);
+  EXPECT_EQ(asked, 0);
+}
+
+TEST(ConfinedProcess, ACrashEndsTheChildAlone) {
+  ConfinedProcess process([](std::string_view) -> std::string {
+    std::signal(SIGSEGV, SIG_DFL);  // sanitizers have their own way
+    ::raise(SIGSEGV);
+    return {};
+  });
+  EXPECT_THAT(end_of(process, "crash"), HasSubstr("Segmentation fault"));
+  EXPECT_THAT(end_of(process, "again"), HasSubstr("has ended"));
+}
+
+TEST(ConfinedProcess, AnEndlessLoopIsEnded) {
+  ConfinedProcess process([](std::string_view) -> std::string {
+    for (;;) std::atomic_signal_fence(std::memory_order_seq_cst);
+  });
+  EXPECT_THAT(end_of(process, "loop"), HasSubstr("2 s of processor time"));
+}
+
+TEST(ConfinedProcess, MemoryIsLimited) {
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+  GTEST_SKIP() << "sanitizers reserve terabytes";
+#endif
+  ConfinedProcess process([](std::string_view) { return std::string(std::size_t{3} << 30, 'x'); });
+  EXPECT_THAT(end_of(process, "much"), HasSubstr("1024 MiB"));
+}
+
+TEST(ConfinedProcess, AnEndBetweenRequestsIsSeen) {
+  ConfinedProcess process([](std::string_view) { return std::to_string(::getpid()); });
+  ::kill(std::stoi(process.ask("who")), SIGKILL);
+  EXPECT_THAT(end_of(process, "there?"), HasSubstr("Killed"));
+}
+
+}  // namespace risley::io::confined_process_test
