@@ -17,6 +17,7 @@
 #include "risley/optics/batch.hpp"
 
 #include "estimation/frame_prior.hpp"
+#include "estimation/held_parameters.hpp"
 #include "estimation/used_shots.hpp"
 
 namespace risley::estimation {
@@ -78,7 +79,7 @@ std::optional<SpeedFactor> speed_factor(const sensors::Sensor& sensor, const Est
     if (speed == 0) continue;
     const EstimatedValue& found =
         estimate.values[estimate.free.size() + static_cast<std::size_t>(rotor)];
-    const double sigma = std::hypot(found.sigma / speed, 0.5 * kSame);
+    const double sigma = std::hypot(found.sigma_given_held / speed, 0.5 * kSame);
     factors.emplace_back(found.value / speed, sigma);
     sum += found.value / speed / (sigma * sigma);
     weights += 1.0 / (sigma * sigma);
@@ -109,9 +110,10 @@ sensors::Sensor calibrated_sensor(const sensors::Sensor& nominal, const PrismTra
     sensor.covariance_names.push_back(value.name);
     if (i >= statics) {
       sensor.angular_velocity[static_cast<std::size_t>(i - statics)] = value.value;
-      sensor.covariance(i, i) = value.sigma * value.sigma;
+      sensor.covariance(i, i) = value.sigma_given_held * value.sigma_given_held;
     }
-    sensor.set_knowledge({value.name, value.sigma, "estimated from a recording"});
+    sensor.set_knowledge(
+        {value.name, value.sigma_given_held, "estimated from a recording", value.sigma});
   }
   return sensor;
 }
@@ -190,8 +192,8 @@ std::string unusual_values(const Estimate& estimate, const sensors::Sensor& nomi
                                         : nominal;
     const sensors::Knowledge* known = turning.find_knowledge(value.name);
     if (known == nullptr || !(known->sigma > 0)) continue;
-    const double sigmas =
-        std::abs(value.value - turning.get(value.name)) / std::hypot(known->sigma, value.sigma);
+    const double sigmas = std::abs(value.value - turning.get(value.name)) /
+                          std::hypot(known->sigma, value.sigma_given_held);
     if (sigmas > kUnusual) add(value.name, sigmas);
   }
   return words;
@@ -452,72 +454,12 @@ CoordinateRounding rounding_of(const Estimate& estimate, const EstimateOptions& 
   }
 }
 
-/// Parameters of the train that are held and that the sensor says may be off.
-std::vector<const sensors::Knowledge*> uncertain_held(const Estimate& estimate,
-                                                      const sensors::Sensor& nominal) {
-  std::vector<const sensors::Knowledge*> held;
-  const int prisms = nominal.prisms();
-  const auto fires = [&](int emitter) {
-    if (estimate.series.beam.empty()) return emitter == 0;
-    return std::find(estimate.series.beam.begin(), estimate.series.beam.end(), emitter) !=
-           estimate.series.beam.end();
-  };
-  const auto is_free = [&](int place) {
-    return std::any_of(estimate.free.begin(), estimate.free.end(), [&](const auto& free) {
-      return std::find(free.places.begin(), free.places.end(), place) != free.places.end();
-    });
-  };
-  for (const ParameterInfo& info : parameter_list(nominal.shape())) {
-    if (info.kind != ParameterKind::train) continue;
-    const sensors::Knowledge* known = nominal.find_knowledge(info.name);
-    if (known == nullptr || known->name != info.name || !(known->sigma > 0)) continue;
-    if (std::any_of(info.places.begin(), info.places.end(), is_free)) continue;
-    const int emitter = place::emitter(info.places.front(), prisms);
-    if (emitter >= 0 && !fires(emitter)) continue;  // no answer depends on it
-    held.push_back(known);
-  }
-  return held;
-}
-
-/// Widens the sigmas by what held parameters may be off by: each is moved by its sigma, and what
-/// that moves the answers by is theirs. Some of the shots do for that.
-void count_held_parameters(Estimate& estimate, const EstimateOptions& options,
-                           const Progress& progress) {
-  const auto held = uncertain_held(estimate, options.sensor);
-  if (held.empty()) return;
-  constexpr double kEnoughShots = 20000;
-  const double share = kEnoughShots / static_cast<double>(estimate.series.size());
-  Estimate part;
-  part.free = estimate.free;
-  std::vector<ShotRange> ranges = stretches(estimate.series);
-  const double step = 1e-9 * static_cast<double>(std::max<std::int64_t>(
-                                 1, median_step_ns(estimate.series.time_ns)));
-  part.series = share < 1 ? thinned(estimate.series, share / step, ranges) : estimate.series;
-  BatchMapOptions settings = map_options(estimate, options);
-  settings.angle_noise = usable_noise(estimate.noise.value);
-  settings.rotor_process = estimate.rotor_process;
-  const auto answers = [&](const sensors::Knowledge* moved) {
-    sensors::Sensor sensor = options.sensor;
-    Start start = estimate.start;
-    start.train = estimate.train;
-    if (moved != nullptr) {
-      const double value = sensor.train.get(moved->name) + moved->sigma;
-      sensor.train.set(moved->name, value);
-      start.train.set(moved->name, value);
-    }
-    static_cast<Solution&>(part) = run_batch_map(part.series, start, sensor, settings, progress);
-    part.states = states_of_knots(part, part.series);
-    return named_values(part);
-  };
-  const std::vector<EstimatedValue> as_held = answers(nullptr);
-  for (const sensors::Knowledge* parameter : held) {
-    const std::vector<EstimatedValue> moved = answers(parameter);
-    for (std::size_t i = 0; i < estimate.values.size(); ++i) {
-      const double change = moved[i].value - as_held[i].value;
-      const bool angle = estimate.values[i].name.starts_with("rotation_angle");
-      estimate.values[i].sigma =
-          std::hypot(estimate.values[i].sigma, angle ? wrap_to_pi(change) : change);
-    }
+/// Widens the sigmas by what held parameters may be off by.
+void count_held_parameters(Estimate& estimate, const sensors::Sensor& nominal) {
+  const Eigen::VectorXd changes = changes_by_held_parameters(estimate, nominal).rowwise().norm();
+  for (std::size_t i = 0; i < estimate.values.size(); ++i) {
+    EstimatedValue& value = estimate.values[i];
+    value.sigma = std::hypot(value.sigma_given_held, changes[static_cast<Eigen::Index>(i)]);
   }
 }
 
@@ -662,11 +604,11 @@ Estimate estimate(Method method, AngleSeries series, const AngleSeries& head,
   estimate.usual_noise = options.sensor.angle_noise;
   estimate.usual_residual = expected_residual(estimate.series, equal_noise(estimate.usual_noise));
   estimate.values = named_values(estimate);
+  count_held_parameters(estimate, options.sensor);
   estimate.speed_factor = speed_factor(options.sensor, estimate);
   estimate.sensor = calibrated_sensor(
       options.sensor, with_free_values(options.sensor.train, estimate.free, estimate.parameters),
       estimate);
-  count_held_parameters(estimate, options, progress.silent());
   estimate.residuals_over_angle = profiles(estimate);
   judge(estimate, options.sensor);
   return estimate;

@@ -18,9 +18,11 @@
 namespace risley::identification {
 namespace {
 
-/// Lines are looked for in so much of a scan, s, or in so many shots if that is longer.
+/// Lines are looked for in so much of a scan, s, or in so many shots if that is longer; where no
+/// train fits, rotors may turn nearly alike, and longer windows tell their lines apart.
 constexpr double kLineWindow = 1.0;
 constexpr double kLineShots = 4096;
+constexpr double kLongerWindow = 4;
 /// Trains are tried on a window of about so long, s, with so many shots.
 constexpr double kTrialWindow = 0.15;
 constexpr std::size_t kTrialShots = 600;
@@ -123,14 +125,16 @@ std::size_t row_at(const ShotGrid& grid, double time) {
   return static_cast<std::size_t>(at - grid.time.begin());
 }
 
-/// How much of a scan lines are looked for in, s.
-double line_window(const ShotGrid& grid) { return std::max(kLineWindow, kLineShots * grid.step); }
-
 class Search {
  public:
-  Search(const ShotGrid& grid, LineSpectrum spectrum, const IdentifyOptions& options,
+  /// @param window  in which the lines were looked for, s
+  Search(const ShotGrid& grid, LineSpectrum spectrum, double window, const IdentifyOptions& options,
          const Progress& progress)
-      : grid_(grid), spectrum_(std::move(spectrum)), options_(options), progress_(progress) {
+      : grid_(grid),
+        spectrum_(std::move(spectrum)),
+        window_(std::min(window, grid.duration())),
+        options_(options),
+        progress_(progress) {
     start_freedom_.glass = start_freedom_.one_glass = true;
     start_freedom_.emitters = start_freedom_.lags = grid.emitters > 1;
     Complex mean;
@@ -168,15 +172,19 @@ class Search {
 
  private:
   void choose_trial_window() {
-    double slowest = options_.fastest;
+    double slowest = options_.fastest, closest = options_.fastest;
     for (std::size_t a = 0; a < std::min<std::size_t>(3, spectrum_.lines.size()); ++a) {
-      slowest = std::min(slowest, std::abs(spectrum_.lines[a].angular_velocity));
+      const double speed = spectrum_.lines[a].angular_velocity;
+      slowest = std::min(slowest, std::abs(speed));
+      for (std::size_t b = 0; b < a; ++b) {
+        closest = std::min(closest, std::abs(speed - spectrum_.lines[b].angular_velocity));
+      }
     }
-    double length = std::max(kTrialWindow, 2.5 * kTwoPi / slowest);
+    // Several turns of a rotor, and one of two against each other.
+    double length = std::max({kTrialWindow, 2.5 * kTwoPi / slowest, kTwoPi / closest});
     length = std::max(length, 300 * grid_.step);
-    const double looked_at = std::min(grid_.duration(), line_window(grid_));
-    length = std::min(length, looked_at);
-    const double begin = 0.5 * (looked_at - length);
+    length = std::min(length, window_);
+    const double begin = 0.5 * (window_ - length);
     const std::size_t first = row_at(grid_, begin);
     const std::size_t last = row_at(grid_, begin + length);
     trial_grid_ = thinned(grid_, first, last, kTrialShots);
@@ -742,6 +750,7 @@ class Search {
 
   const ShotGrid& grid_;
   LineSpectrum spectrum_;
+  double window_;
   IdentifyOptions options_;
   const Progress& progress_;
   TrainFreedom start_freedom_;
@@ -766,6 +775,32 @@ std::string to_string(EmitterTiming timing) {
   return {};
 }
 
+namespace {
+
+/// The lines of the beginning of a scan, and its emitters where they are not named.
+LineSpectrum lines_of(ShotGrid& grid, bool named, double window, const IdentifyOptions& options) {
+  ShotGrid head = rows_of(grid, 0, row_at(grid, window));
+  const LineSpectrumOptions lines{.fastest = options.fastest};
+  LineSpectrum spectrum = line_spectrum(head, lines);
+  const int period = named ? grid.emitters : emitter_period(head, spectrum.lines);
+  if (!named && period > 1) {
+    for (ShotGrid* one : {&grid, &head}) {
+      one->emitters = period;
+      for (std::size_t i = 0; i < one->size(); ++i) {
+        one->emitter[i] = static_cast<std::uint8_t>(one->slot[i] % period);
+      }
+    }
+    spectrum = line_spectrum(head, lines);
+  }
+  if (spectrum.lines.empty()) {
+    throw EstimationError(
+        "the directions of this recording hold no line that turns evenly: no prism can be told");
+  }
+  return spectrum;
+}
+
+}  // namespace
+
 Identification identify(const estimation::AngleSeries& series, const IdentifyOptions& options,
                         const Progress& progress) {
   require_above("options.fastest", options.fastest, 0, "rad/s");
@@ -777,28 +812,14 @@ Identification identify(const estimation::AngleSeries& series, const IdentifyOpt
                        [](const auto& a, const auto& b) { return a.size() < b.size(); });
   ShotGrid grid = shot_grid(series, *longest);
   if (grid.duration() > kLongest) grid = rows_of(grid, 0, row_at(grid, kLongest));
-  ShotGrid head = rows_of(grid, 0, row_at(grid, line_window(grid)));
-  const LineSpectrumOptions lines{.fastest = options.fastest};
-  LineSpectrum spectrum = line_spectrum(head, lines);
   const bool named = grid.emitters > 1;
-  if (!named) {
-    const int period = emitter_period(head, spectrum.lines);
-    if (period > 1) {
-      for (ShotGrid* one : {&grid, &head}) {
-        one->emitters = period;
-        for (std::size_t i = 0; i < one->size(); ++i) {
-          one->emitter[i] = static_cast<std::uint8_t>(one->slot[i] % period);
-        }
-      }
-      spectrum = line_spectrum(head, lines);
-    }
+  Identification result;
+  for (double window = std::max(kLineWindow, kLineShots * grid.step);; window *= kLongerWindow) {
+    LineSpectrum spectrum = lines_of(grid, named, window, options);
+    progress.report(0.1);
+    result = Search(grid, std::move(spectrum), window, options, progress).run();
+    if (result.fits || window >= grid.duration()) break;
   }
-  if (spectrum.lines.empty()) {
-    throw EstimationError(
-        "the directions of this recording hold no line that turns evenly: no prism can be told");
-  }
-  progress.report(0.1);
-  Identification result = Search(grid, std::move(spectrum), options, progress).run();
   result.emitters_named = named;
   return result;
 }

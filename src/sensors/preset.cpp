@@ -149,25 +149,29 @@ struct Quantity {
   std::size_t line = 0;
 };
 
-/// Reads one {value, unit, sigma, source}; sigma and source come together or not at all.
+/// Reads one {value, unit, sigma, total_sigma, source}; sigma and source come together or not at
+/// all, a total sigma only with them.
 Quantity read_quantity(const YamlMap& parent, std::string_view name, std::string_view unit,
                        Sensor& sensor) {
   const YamlMap::Entry& entry = parent.at(name);
   const YamlMap map(entry.value, parent.path(), parent.field(name));
-  map.allow_only({"value", "unit", "sigma", "source"});
+  map.allow_only({"value", "unit", "sigma", "total_sigma", "source"});
   const std::string found_unit = map.text("unit");
   if (found_unit != unit) {
     fail_at(map.path(), map.at("unit").line,
             fmt::format("{} = \"{}\", expected \"{}\"", map.field("unit"), found_unit, unit));
   }
   const YamlMap::Entry& value = map.at("value");
-  if (map.find("sigma") != nullptr || map.find("source") != nullptr) {
+  if (map.find("sigma") != nullptr || map.find("source") != nullptr ||
+      map.find("total_sigma") != nullptr) {
     const long double sigma = map.number("sigma", 0.0L, 1e9L, unit);
+    const long double total =
+        map.find("total_sigma") != nullptr ? map.number("total_sigma", sigma, 1e9L, unit) : 0.0L;
     std::string source = map.text("source");
     if (source.empty())
       fail_at(map.path(), map.at("source").line, map.field("source") + " is empty");
-    sensor.set_knowledge(
-        {std::string(name), si_from_file(sigma, scale_of(unit)), std::move(source)});
+    sensor.set_knowledge({std::string(name), si_from_file(sigma, scale_of(unit)), std::move(source),
+                          si_from_file(total, scale_of(unit))});
   }
   return {yaml_number(value.value, map.path(), map.field("value")), value.line};
 }
@@ -484,8 +488,11 @@ std::string quantity_text(const Sensor& sensor, std::string_view name, double va
                                  file_number(value, scale, name), yaml_quoted(unit));
   if (known == nullptr) known = sensor.find_knowledge(name);
   if (known != nullptr) {
-    text += fmt::format(", sigma: {}, source: {}", file_number(known->sigma, scale, name),
-                        yaml_quoted(known->source));
+    text += fmt::format(", sigma: {}", file_number(known->sigma, scale, name));
+    if (known->total_sigma > known->sigma) {
+      text += fmt::format(", total_sigma: {}", file_number(known->total_sigma, scale, name));
+    }
+    text += fmt::format(", source: {}", yaml_quoted(known->source));
   }
   return text + "}\n";
 }

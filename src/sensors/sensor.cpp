@@ -85,7 +85,7 @@ void Sensor::set(std::string_view parameter, double value) {
       if (own.kind == ParameterKind::train && own.places.size() == 1 &&
           std::find(shared.places.begin(), shared.places.end(), own.places.front()) !=
               shared.places.end()) {
-        set_knowledge({own.name, all.sigma, all.source});
+        set_knowledge({own.name, all.sigma, all.source, all.total_sigma});
       }
     }
     return;

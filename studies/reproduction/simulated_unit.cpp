@@ -46,7 +46,7 @@ UnitDraw draw_of(const Estimate& estimate, const SimulatedRun& run, bool keep) {
     const std::string& name = evaluation.parameters[i].name;
     const double unit = si_per_unit(name);
     draw.value[name] = estimate.values[i].value / unit;
-    draw.sigma[name] = estimate.values[i].sigma / unit;
+    draw.sigma[name] = estimate.values[i].sigma_given_held / unit;
     draw.error[name] = evaluation.parameters[i].error / unit;
   }
   for (std::size_t k = 0; k < 2; ++k) {

@@ -148,7 +148,7 @@ void add_parameters(Table& table, const Estimate& estimate,
     const auto& value = value_of(estimate, name);
     Row row{fmt::format("all shots: mean of the {} (Fig. 7)", find_parameter(name, {2}).long_name),
             find_parameter(name, {2}).unit, printed(papers.known), value.value / si_per_unit(name)};
-    row.sigma = value.sigma / si_per_unit(name);
+    row.sigma = value.sigma_given_held / si_per_unit(name);
     row.checks = {at_printed_digits(*row.paper, row.ours)};
     row.note = fmt::format("Estimated from every second alone: standard deviation {:.2g}.",
                            standard_deviation(pieces[j]));

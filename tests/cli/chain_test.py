@@ -109,7 +109,7 @@ class ChainTest(CommandTest):
             if name.startswith("rotation_angle"):
                 continue
             self.assertAlmostEqual(value["value"], filtered["parameters"][name]["value"],
-                                   delta=2 * value["sigma"], msg=name)
+                                   delta=2 * value["sigma_given_held"], msg=name)
 
     def test_fixed_and_freed(self):
         self.expect(0, "simulate", "-o", "fix.csv", "--duration-s", "2", "--rate-hz", "1000",

@@ -110,14 +110,27 @@ class ContractTest(CommandTest):
         self.check_verdict(self.expect_json(1, "calibrate", "wall.nc"), "undecided")
 
     def test_sigmas_hold_what_held_parameters_may_be_off_by(self):
-        free = self.expect_json(0, "estimate", "believed.nc")["parameters"]
-        for name, one in free.items():
-            self.assertEqual(one["sigma"], one["sigma_given_held"], name)
-        held = self.expect_json(0, "estimate", "believed.nc", "--fix", "prism_tilt_b_vertical_deg",
-                                "--fix", "incident_beam_vertical_deg")["parameters"]
-        self.assertTrue(any(one["sigma"] > 3 * one["sigma_given_held"] for one in held.values()))
-        for name, one in held.items():
+        usual = self.expect_json(0, "estimate", "believed.nc", "-o", "usual")["parameters"]
+        for name, one in usual.items():
             self.assertGreaterEqual(one["sigma"], one["sigma_given_held"], name)
+        index = usual["refractive_index"]
+        self.assertGreater(index["sigma"], 20 * index["sigma_given_held"])
+        # A wedge of 18 degrees that is off by 0.05 is made up for by (n - 1) * 0.05 / 18.
+        self.assertAlmostEqual(index["sigma"] / (0.51 * 0.05 / 18), 1, delta=0.3)
+        kept = (self.folder / "usual/calibration.yaml").read_text(encoding="utf-8")
+        self.assertRegex(kept, r"refractive_index: \{[^}]*total_sigma: ")
+        # The next estimate of the unit takes it for its start.
+        again = self.expect_json(0, "estimate", "believed.nc", "--sensor",
+                                 "usual/calibration.yaml")["parameters"]
+        self.assertAlmostEqual(again["refractive_index"]["value"], index["value"],
+                               delta=index["sigma_given_held"])
+        exact = self.expect_json(0, "estimate", "believed.nc", "--sensor",
+                                 "mid-40-table3")["parameters"]
+        for name, one in exact.items():
+            self.assertEqual(one["sigma"], one["sigma_given_held"], name)
+        held = self.expect_json(0, "estimate", "believed.nc", "--sensor", "mid-40-table3", "--fix",
+                                "prism_tilt_b_vertical_deg")["parameters"]
+        self.assertTrue(any(one["sigma"] > 3 * one["sigma_given_held"] for one in held.values()))
 
     def test_sensors_are_recognised_where_the_file_does_not_name_them(self):
         for sensor, rate in RATES.items():

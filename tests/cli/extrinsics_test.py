@@ -71,7 +71,7 @@ class ExtrinsicsTest(CommandTest):
         for name, value in one["parameters"].items():
             again = other["parameters"][name]
             self.assertAlmostEqual(value["value"], again["value"],
-                                   delta=6 * math.hypot(value["sigma"], again["sigma"]), msg=name)
+                                   delta=6 * math.hypot(value["sigma_given_held"], again["sigma_given_held"]), msg=name)
 
     def test_info_lists_the_stored_pose(self):
         device = self.expect_json(0, "info", "hub.lvx")["devices"][0]

@@ -73,7 +73,7 @@ class NamedFormatsTest(CommandTest):
         for name, one in with_times["parameters"].items():
             other = counted["parameters"][name]
             self.assertAlmostEqual(one["value"], other["value"],
-                                   delta=0.1 * one["sigma"] + 1e-9, msg=name)
+                                   delta=0.1 * one["sigma_given_held"] + 1e-9, msg=name)
 
     def test_convert_keeps_places(self):
         (self.folder / "few.csv").write_text(

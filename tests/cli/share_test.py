@@ -98,8 +98,8 @@ class ShareTest(CommandTest):
         excerpt = self.expect_json(0, "estimate", "reported.nc")
         for name, one in whole["parameters"].items():
             other = excerpt["parameters"][name]
-            self.assertLess(abs(one["value"] - other["value"]), 0.5 * one["sigma"], name)
-            self.assertAlmostEqual(one["sigma"] / other["sigma"], 1, delta=0.1, msg=name)
+            self.assertLess(abs(one["value"] - other["value"]), 0.5 * one["sigma_given_held"], name)
+            self.assertAlmostEqual(one["sigma_given_held"] / other["sigma_given_held"], 1, delta=0.1, msg=name)
 
     def test_a_cut_cloud_gives_its_sound_part(self):
         self.make("cloud", "short.lvx", "--calibration", SENSOR, "-o", "whole.las")

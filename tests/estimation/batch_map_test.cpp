@@ -40,7 +40,7 @@ double worst_error(const Estimate& estimate, const sensors::Sensor& truth) {
   double worst = 0;
   for (std::size_t i = 0; i < estimate.free.size(); ++i) {
     const double error = estimate.values[i].value - truth.train.get(estimate.free[i].name);
-    worst = std::max(worst, std::abs(error) / estimate.values[i].sigma);
+    worst = std::max(worst, std::abs(error) / estimate.values[i].sigma_given_held);
   }
   return worst;
 }
@@ -305,7 +305,7 @@ TEST(BatchMap, MoreNoiseThanStatedWidensTheSigmasAndALotMoreFails) {
   EXPECT_NEAR(doubled.variance_factor, 4.0, 0.25);
   EXPECT_FALSE(doubled.warnings.empty());
   const Estimate right = estimate_map(series, nominal_options(radians_from_degrees(0.02)));
-  EXPECT_NEAR(doubled.values[0].sigma / right.values[0].sigma, 1.0, 0.03);
+  EXPECT_NEAR(doubled.values[0].sigma_given_held / right.values[0].sigma_given_held, 1.0, 0.03);
   const Estimate far_above = estimate_map(series, nominal_options(radians_from_degrees(0.004)));
   EXPECT_FALSE(far_above.converged);
   const Estimate far_below = estimate_map(series, nominal_options(radians_from_degrees(0.1)));

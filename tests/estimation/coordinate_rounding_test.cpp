@@ -60,7 +60,8 @@ TEST(CoordinateRounding, IsReadOffTheData) {
     for (const Estimate* estimate : {&to_nearest, &to_zero}) {
       for (std::size_t i = 0; i < estimate->free.size(); ++i) {
         const EstimatedValue& value = estimate->values[i];
-        EXPECT_LT(std::abs(value.value - sensor.get(value.name)), 4.5 * value.sigma) << value.name;
+        EXPECT_LT(std::abs(value.value - sensor.get(value.name)), 4.5 * value.sigma_given_held)
+            << value.name;
       }
     }
   }

@@ -69,7 +69,8 @@ TEST(Observability, ABoundIsTheEstimatesSigma) {
     const Estimate result = estimate(method, series, series, options);
     const Observability all = observability_of_estimate(result);
     for (std::size_t i = 0; i < result.free.size(); ++i) {
-      EXPECT_NEAR(quantity(all, result.free[i].name).sigma / result.values[i].sigma, 1.0, 0.01)
+      EXPECT_NEAR(quantity(all, result.free[i].name).sigma / result.values[i].sigma_given_held, 1.0,
+                  0.01)
           << to_string(method) << " " << result.free[i].name;
     }
     EXPECT_NEAR(all.shots, 2001, 4);

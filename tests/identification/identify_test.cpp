@@ -112,6 +112,18 @@ TEST(Identify, ThreePrismsOfWhichTwoTurnEquallyFast) {
   expect_glass(found, scan, 1e-6, 1e-4);
 }
 
+TEST(Identify, RotorsThatTurnNearlyAlikeAreToldApartInALongerWindow) {
+  Scan scan;
+  scan.faces = "PA-PA";
+  scan.index = {1.677, 1.677};
+  scan.wedge_deg = {17.333, 17.344};
+  scan.speed_hz = {-158.82, -157.58};
+  scan.duration_s = 3;
+  const Identification found = identify(scan.series());
+  EXPECT_TRUE(class_holds(found, scan));
+  EXPECT_TRUE(found.decided && found.fits);
+}
+
 // A beam along the axis shows of the first prism only by how much it turns the beam aside.
 TEST(Identify, OneEmitterLeavesTheFacesOfTheFirstPrismOpen) {
   Scan scan;

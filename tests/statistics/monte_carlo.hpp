@@ -59,7 +59,7 @@ inline MonteCarlo monte_carlo(
       const auto& row = evaluation.parameters[i];
       const double unit = find_parameter(row.name, {2}).si_per_unit;
       sum.rmse[row.name] += std::pow(row.error / unit, 2);
-      sum.sigma[row.name] += std::pow(estimate.values[i].sigma / unit, 2);
+      sum.sigma[row.name] += std::pow(estimate.values[i].sigma_given_held / unit, 2);
       covered += std::abs(row.error_over_sigma) < 2.0;
       counted += 1.0;
     }

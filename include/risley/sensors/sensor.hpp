@@ -20,6 +20,9 @@ struct Knowledge {
   std::string name;    ///< as in parameter_list(), or a preset's field such as "range_noise_m"
   double sigma = 0;    ///< one standard deviation, SI units; 0 when taken as exact
   std::string source;  ///< data sheet page, paper table, or the calibration that found it
+  /// With what parameters that were held may be off by, which sigma and covariance leave out; 0
+  /// where that is nothing.
+  double total_sigma = 0;
 };
 
 /// One way in which the rotors of a sensor can run.

@@ -1,0 +1,135 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "estimation/held_parameters.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "risley/algebra/symmetric.hpp"
+#include "risley/estimation/batch_map.hpp"
+#include "risley/estimation/normal_equations.hpp"
+#include "risley/estimation/smoother.hpp"
+
+namespace risley::estimation {
+namespace {
+
+using Eigen::Index;
+
+/// So many shots tell how answers hang on held parameters: shares of them do, not sigmas.
+constexpr double kSampleShots = 20000;
+
+/// Parameters of the train that are held and that the sensor says may be off.
+std::vector<FreeParameter> uncertain_held(const Estimate& estimate, const sensors::Sensor& sensor) {
+  std::vector<FreeParameter> held;
+  const int prisms = sensor.prisms();
+  const auto fires = [&](int emitter) {
+    if (estimate.series.beam.empty()) return emitter == 0;
+    return std::find(estimate.series.beam.begin(), estimate.series.beam.end(), emitter) !=
+           estimate.series.beam.end();
+  };
+  const auto is_free = [&](int place) {
+    return std::any_of(estimate.free.begin(), estimate.free.end(), [&](const auto& free) {
+      return std::find(free.places.begin(), free.places.end(), place) != free.places.end();
+    });
+  };
+  for (const ParameterInfo& info : parameter_list(sensor.shape())) {
+    if (info.kind != ParameterKind::train) continue;
+    const sensors::Knowledge* known = sensor.find_knowledge(info.name);
+    if (known == nullptr || known->name != info.name || !(known->sigma > 0)) continue;
+    if (std::any_of(info.places.begin(), info.places.end(), is_free)) continue;
+    const int emitter = place::emitter(info.places.front(), prisms);
+    if (emitter >= 0 && !fires(emitter)) continue;  // no answer depends on it
+    held.push_back({info.name, info.places, known->sigma});
+  }
+  return held;
+}
+
+/// Some of the shots that an estimate used, with knots of their own on its trajectory.
+struct Sample {
+  AngleSeries series;
+  RotorTrajectory knots;
+  double share = 1;  // of the shots
+
+  explicit Sample(const Estimate& estimate) {
+    const RotorTrajectory& motion = estimate.trajectory;
+    std::vector<ShotRange> ranges;
+    for (std::size_t s = 0; s < motion.stretch_begin.size(); ++s) {
+      ranges.push_back({motion.first_shot[motion.stretch_begin[s]],
+                        motion.last_shot[motion.stretch_end(s) - 1]});
+    }
+    const auto all = static_cast<double>(estimate.series.size());
+    const double step = 1e-9 * static_cast<double>(std::max<std::int64_t>(
+                                   1, median_step_ns(estimate.series.time_ns)));
+    series = kSampleShots < all ? thinned(estimate.series, kSampleShots / all / step, ranges)
+                                : estimate.series;
+    share = static_cast<double>(series.size()) / all;
+    knots = make_knots(series, ranges, motion.prisms);
+    interpolate(motion, knots);
+  }
+};
+
+}  // namespace
+
+Eigen::MatrixXd changes_by_held_parameters(const Estimate& estimate,
+                                           const sensors::Sensor& sensor) {
+  const std::vector<FreeParameter> held = uncertain_held(estimate, sensor);
+  std::vector<FreeParameter> all = estimate.constants.empty() ? estimate.free : estimate.constants;
+  const auto free = static_cast<Index>(all.size());
+  const auto parameters = static_cast<Index>(estimate.free.size());
+  const Index prisms = sensor.prisms();
+  const auto count = static_cast<Index>(held.size());
+  Eigen::MatrixXd changes = Eigen::MatrixXd::Zero(parameters + 2 * prisms, count);
+  if (count == 0) return changes;
+  all.insert(all.end(), held.begin(), held.end());
+
+  const Sample sample(estimate);
+  ShotWeights weights;
+  weights.angle_noise = usable_noise(estimate.noise.value);
+  weights.cut = BatchMapOptions{}.outlier_chi2 * std::max(1.0, estimate.unit_variance);
+  NormalEquations equations;
+  accumulate(sample.series, sample.knots, estimate.train, all, weights, equations);
+  equations.scale(1.0 / sample.share / estimate.variance_factor);
+  ParameterPrior prior;
+  prior.information.resize(free + count);
+  prior.gradient = Eigen::VectorXd::Zero(free + count);
+  for (Index j = 0; j < free + count; ++j) {
+    const double sigma = all[static_cast<std::size_t>(j)].prior_sigma;
+    prior.information[j] = 1.0 / (sigma * sigma);
+  }
+  const SmootherSolution solution =
+      smooth(equations, sample.knots, estimate.rotor_process, prior, true);
+  Eigen::MatrixXd information = solution.parameter_information.topLeftCorner(free, free);
+  information.diagonal() += prior.information.head(free);
+  Eigen::MatrixXd constants(free + count, count);  // d constants / d held
+  constants.topRows(free) =
+      -algebra::SymmetricSolver(information)
+           .solve_columns(solution.parameter_information.topRightCorner(free, count));
+  constants.bottomRows(count).setIdentity();
+  for (Index j = 0; j < count; ++j) {
+    constants.col(j) *= held[static_cast<std::size_t>(j)].prior_sigma;
+  }
+
+  using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+  const RotorTrajectory& knots = sample.knots;
+  const auto angles_of = [&](std::size_t knot) -> Eigen::MatrixXd {
+    const Index states = knots.states();
+    const Eigen::Map<const RowMajor> own(
+        solution.sensitivity.data() + knot * static_cast<std::size_t>(states * (free + count)),
+        states, free + count);
+    Eigen::MatrixXd result(prisms, count);
+    for (Index k = 0; k < prisms; ++k) result.row(k) = own.row(kStatesPerRotor * k) * constants;
+    return result;
+  };
+  changes.topRows(parameters) = constants.topRows(parameters);
+  double time = 0;
+  for (std::size_t s = 0; s < knots.stretch_begin.size(); ++s) {
+    const std::size_t first = knots.stretch_begin[s], last = knots.stretch_end(s) - 1;
+    changes.middleRows(parameters, prisms) += angles_of(last) - angles_of(first);
+    time += 1e-9 * static_cast<double>(knots.time_ns[last] - knots.time_ns[first]);
+  }
+  if (time > 0) changes.middleRows(parameters, prisms) /= time;
+  changes.bottomRows(prisms) = angles_of(0);
+  return changes;
+}
+
+}  // namespace risley::estimation
