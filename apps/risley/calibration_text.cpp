@@ -66,8 +66,7 @@ Json unobservable_json(const std::vector<estimation::WeakDirection>& directions)
 Json finite_or_null(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
 
 void print_datum(calibration::DatumKind kind, const FormalDatum& datum) {
-  say(
-      "datum: {}; 1 sigma of roll {:.2g}, pitch {:.2g}, yaw {:.2g} deg; of the beams against each "
+  say("datum: {}; 1 sigma of roll {:.2g}, pitch {:.2g}, yaw {:.2g} deg; of the beams against each "
       "other {:.2g} deg\n",
       calibration::to_string(kind), deg(datum.sigma_roll), deg(datum.sigma_pitch),
       deg(datum.sigma_yaw), deg(datum.shape));
@@ -172,8 +171,7 @@ void print_calibration(const CalibratedRecordings& outcome) {
   say("{}\n", c.converged ? "converged" : "NOT CONVERGED: " + c.reason);
   say("{}: {}\n", to_string(c.verdict.code), with_flags(c.verdict.words));
   say("sensor {}: {}\n", outcome.choice.sensor.name, outcome.choice.words);
-  say(
-      "{} points on {} planes, {:.2f} mm thick before, {:.2f} mm after; read {:.2f} s, rotation "
+  say("{} points on {} planes, {:.2f} mm thick before, {:.2f} mm after; read {:.2f} s, rotation "
       "angles {:.2f} s, solved {:.2f} s\n\n",
       grouped(c.points), c.planes.size(), 1e3 * c.rms_before, 1e3 * c.rms_after,
       outcome.reading_time, outcome.angles_time, outcome.solving_time);
@@ -216,13 +214,11 @@ void print_calibration(const CalibratedRecordings& outcome) {
   print_datum(c.datum_kind, c.datum);
   for (const calibration::PriorTest& test : c.prior_tests) {
     if (test.degrees_of_freedom == 0) {
-      say("{} {}: not tested by these data\n", test.station ? "station" : "plane",
-                 test.name);
+      say("{} {}: not tested by these data\n", test.station ? "station" : "plane", test.name);
       continue;
     }
-    say("{} {}: misfit {:.3g} deg, chi2 {:.3g}, limit {:.3g}\n",
-               test.station ? "station" : "plane", test.name, deg(test.misfit), test.chi2,
-               test.critical);
+    say("{} {}: misfit {:.3g} deg, chi2 {:.3g}, limit {:.3g}\n", test.station ? "station" : "plane",
+        test.name, deg(test.misfit), test.chi2, test.critical);
   }
   if (outcome.truth) {
     say("\n");

@@ -74,8 +74,8 @@ Run declare_preset(CLI::App& verb);
 Run declare_report(CLI::App& verb);
 Run declare_reproduce(CLI::App& verb);
 
-/// From now on SIGINT, SIGTERM and SIGHUP cancel what is being computed, so that every output in the
-/// making is removed by its owner.
+/// From now on SIGINT, SIGTERM and SIGHUP cancel what is being computed, so that every output in
+/// the making is removed by its owner.
 void watch_signals();
 
 /// Standard streams that the caller closed are taken, so that no file gets their numbers and what

@@ -240,8 +240,7 @@ void print_noise(const Estimate& e) {
         report::number_text(degrees_from_radians(value), degrees_from_radians(sigma));
     return fmt::format("{} +- {}", text.value, text.sigma);
   };
-  say(
-      "\nnoise before rounding, {}: azimuth {} deg, zenith {} deg; a healthy unit: {:.3g} "
+  say("\nnoise before rounding, {}: azimuth {} deg, zenith {} deg; a healthy unit: {:.3g} "
       "deg\n",
       e.noise_held ? "held" : "found", angle(e.noise.value.azimuth, e.noise.sigma.azimuth),
       angle(e.noise.value.zenith, e.noise.sigma.zenith), degrees_from_radians(e.usual_noise));
@@ -254,11 +253,11 @@ void print_outcome(const EstimatedRecording& outcome) {
   say("{}: {}\n", to_string(e.verdict.code), with_flags(e.verdict.words));
   say("sensor {}: {}\n", outcome.choice.sensor.name, outcome.choice.words);
   say("{} shots used, {} of them outliers{}; read {:.2f} s, solved {:.2f} s\n\n",
-             grouped(e.series.size()), grouped(e.outliers),
-             (e.sensor.combination ? fmt::format(", speed combination {}", *e.sensor.combination)
-                                   : std::string()) +
-                 (e.mirrored ? ", mirrored" : ""),
-             outcome.reading_time, outcome.solving_time);
+      grouped(e.series.size()), grouped(e.outliers),
+      (e.sensor.combination ? fmt::format(", speed combination {}", *e.sensor.combination)
+                            : std::string()) +
+          (e.mirrored ? ", mirrored" : ""),
+      outcome.reading_time, outcome.solving_time);
   std::vector<std::string> head = {"parameter", "value", "+- sigma", "unit"};
   if (outcome.evaluation) head.insert(head.end(), {"truth", "error", "error/sigma"});
   Table table(head);
@@ -291,18 +290,16 @@ void print_outcome(const EstimatedRecording& outcome) {
   add("zenith", e.zenith_moments);
   residuals.print();
   print_noise(e);
-  say(
-      "\nresiduals: {:.3f} times the stated variance, autocorrelation factor {:.3f}; variances of "
+  say("\nresiduals: {:.3f} times the stated variance, autocorrelation factor {:.3f}; variances of "
       "single shots multiplied by {:.3f}\n",
       e.unit_variance, e.autocorrelation.factor, e.variance_factor);
   if (outcome.evaluation) {
     say("\nrotation angle rmse:");
     for (std::size_t i = 0; i < outcome.evaluation->rotation_angle_rmse.size(); ++i) {
       say(" {} {:.5f} deg", prism_letter(static_cast<int>(i)),
-                 degrees_from_radians(outcome.evaluation->rotation_angle_rmse[i]));
+          degrees_from_radians(outcome.evaluation->rotation_angle_rmse[i]));
     }
-    say(
-        "\nNEES per degree of freedom (1 is honest): parameters {:.3g}, rotation angles {:.3g}\n",
+    say("\nNEES per degree of freedom (1 is honest): parameters {:.3g}, rotation angles {:.3g}\n",
         outcome.evaluation->nees_parameters, outcome.evaluation->nees_rotation_angles);
   }
 }

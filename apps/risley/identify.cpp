@@ -129,15 +129,15 @@ void print_outcome(const IdentifiedRecording& outcome) {
   say("{}: {}\n", to_string(outcome.verdict), outcome.words);
   if (!outcome.like.empty()) {
     say("this is the train of {}{}\n", outcome.like,
-               outcome.like_mirrored ? ", as its mirror image" : "");
+        outcome.like_mirrored ? ", as its mirror image" : "");
   }
   say("{} shots at {:.6g} Hz, {} emitter{}{}\n\n", grouped(found.rows), 1 / found.step,
-             found.emitters, found.emitters == 1 ? "" : "s",
-             found.emitters == 1                                      ? ""
-             : found.timing == identification::EmitterTiming::in_turn ? ", one after another"
-             : found.timing == identification::EmitterTiming::together
-                 ? ", the shots of a round share the rotors' position"
-                 : ", at uneven times");
+      found.emitters, found.emitters == 1 ? "" : "s",
+      found.emitters == 1                                      ? ""
+      : found.timing == identification::EmitterTiming::in_turn ? ", one after another"
+      : found.timing == identification::EmitterTiming::together
+          ? ", the shots of a round share the rotors' position"
+          : ", at uneven times");
   Table parameters({"parameter", "value", "+- sigma", "unit"});
   for (const FittedValue& one : values_of(found.best())) {
     if (std::isfinite(one.sigma) && one.sigma > 0) {

@@ -200,13 +200,12 @@ void print_excerpt(const std::string& path, const Excerpt& excerpt) {
   const ExcerptContents contents = contents_of(excerpt);
   const std::string duration =
       excerpt.has_times ? fmt::format(" in {:.6g} s", excerpt.duration) : "";
-  say("\n{}: {} shots{}, {} observations without return\n", path, grouped(excerpt.shots),
-             duration, grouped(excerpt.no_return));
+  say("\n{}: {} shots{}, {} observations without return\n", path, grouped(excerpt.shots), duration,
+      grouped(excerpt.no_return));
   say("  holds: {}\n  does not hold: {}\n", fmt::join(contents.holds, "; "),
-             fmt::join(contents.lacks, "; "));
+      fmt::join(contents.lacks, "; "));
   if (excerpt.rounded) {
-    say(
-        "  Directions are rounded because coordinates in whole steps give away their range; "
+    say("  Directions are rounded because coordinates in whole steps give away their range; "
         "it is left\n  known to a factor of two.\n");
   }
 }

@@ -67,7 +67,7 @@ void print_observability(const JudgedObservability& judged) {
   const estimation::Observability& o = judged.observability;
   const TrainShape shape = judged.shape;
   say("{:.4g} s at {:.6g} Hz, {} shots\n\n", o.duration, o.rate,
-             grouped(static_cast<std::uint64_t>(std::llround(o.shots))));
+      grouped(static_cast<std::uint64_t>(std::llround(o.shots))));
   Table table({"quantity", "sigma", "unit", "deg per unit", "most correlated with", "rho"});
   for (const auto& quantity : o.quantities) {
     const ParameterInfo& info = find_parameter(quantity.name, shape);
@@ -79,8 +79,7 @@ void print_observability(const JudgedObservability& judged) {
                quantity.twins.front().first, fmt::format("{:.4f}", quantity.twins.front().second)});
   }
   table.print();
-  say(
-      "\nsigma: Cramer-Rao bound. In brackets: held fixed by default; the bound if it were "
+  say("\nsigma: Cramer-Rao bound. In brackets: held fixed by default; the bound if it were "
       "freed.\n");
   for (const auto& weak : o.unobservable) {
     say("not told by such data: {}\n", direction_text(weak));

@@ -98,8 +98,7 @@ Json coverage_json(const sensors::PatternCoverage& coverage) {
 
 void print_coverage(const sensors::PatternCoverage& coverage) {
   say("field of view {:.5g} square degrees within {:.2f} degree of the axis\n",
-             coverage.field_solid_angle / kSquareDegree,
-             degrees_from_radians(coverage.field_half_angle));
+      coverage.field_solid_angle / kSquareDegree, degrees_from_radians(coverage.field_half_angle));
   Table table(
       {"after, s", "shots", "covered, %", "mean, 1/deg2", "least", "greatest", "largest gap, deg"});
   for (const sensors::CoverageAfter& one : coverage.after) {
@@ -115,8 +114,7 @@ void print_coverage(const sensors::PatternCoverage& coverage) {
     const double time = coverage.time_to_cover(0.01 * percent);
     if (std::isfinite(time)) say("{} % covered after {:.3g} s\n", percent, time);
   }
-  say(
-      "covered: cells of {:g} degree with a shot, of those that {:g} s reach; gap: diameter "
+  say("covered: cells of {:g} degree with a shot, of those that {:g} s reach; gap: diameter "
       "of the largest empty circle\n",
       degrees_from_radians(coverage.cell), coverage.field_after);
 }
@@ -125,11 +123,10 @@ void print_written(const jobs::WrittenPattern& written, const std::string& outpu
   say("{}: {} shots of sensor {}\n", output, grouped(written.rows), written.sensor);
   if (written.blocked > 0) {
     say("{} of them do not get through the prisms{}\n", grouped(written.blocked),
-               written.format == "livox-csv" || written.format == "npy" ? " and are NaN" : "");
+        written.format == "livox-csv" || written.format == "npy" ? " and are NaN" : "");
   }
   if (written.helios) {
-    say(
-        "against the pattern itself {:.3g} degree (root mean square), {:.3g} at most, over {} "
+    say("against the pattern itself {:.3g} degree (root mean square), {:.3g} at most, over {} "
         "shots; a shot at time t is at t {} {:.6g} s there\n",
         degrees_from_radians(written.helios->rms), degrees_from_radians(written.helios->worst),
         grouped(written.helios->compared), written.helios->time_lag < 0 ? '-' : '+',

@@ -79,8 +79,8 @@ ExitStatus check_presets(const PresetOptions& options, const CommonOptions& comm
       results.push_back(json);
       if (!common.json) {
         say("{}: sound: {}, {} {}, faces {}, {} emitter{}\n", file, sensor.name,
-                   sensor.manufacturer, sensor.model, to_string(sensor.train.face_order()),
-                   sensor.train.emitters(), sensor.train.emitters() == 1 ? "" : "s");
+            sensor.manufacturer, sensor.model, to_string(sensor.train.face_order()),
+            sensor.train.emitters(), sensor.train.emitters() == 1 ? "" : "s");
       }
     } catch (const FileError& error) {
       status = kBadFile;

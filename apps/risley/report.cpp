@@ -33,9 +33,10 @@ ExitStatus run_report(const ReportCommandOptions& options, const CommonOptions& 
   const std::string page = options.page.empty() ? (folder / "report.html").string() : options.page;
   require_apart(common, {page});
   if (fs::exists(folder / jobs::kIncomplete)) {
-    spdlog::warn("{}: the files beside it may be of different runs, because the last one was "
-                 "stopped: run it again",
-                 (folder / jobs::kIncomplete).string());
+    spdlog::warn(
+        "{}: the files beside it may be of different runs, because the last one was "
+        "stopped: run it again",
+        (folder / jobs::kIncomplete).string());
   }
   const report::Report report = report::read_report(data.string());
   const std::string html = page_of(report);

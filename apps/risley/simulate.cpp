@@ -88,10 +88,10 @@ std::vector<NamedValue> true_values(const simulation::SimulationResult& result) 
 }
 
 void print_result(const SimulateOptions& options, const simulation::SimulationResult& result) {
-  say("{}: {} observations, {} without a return\n", options.output,
-             grouped(result.observations), grouped(result.no_return));
+  say("{}: {} observations, {} without a return\n", options.output, grouped(result.observations),
+      grouped(result.no_return));
   say("truth: {}, {}\n\n", simulation::truth_preset_path(options.output),
-             simulation::truth_columns_path(options.output));
+      simulation::truth_columns_path(options.output));
   Table table({"parameter", "truth", "unit"});
   for (const NamedValue& value : true_values(result)) {
     table.add({value.name, fmt::format("{:.8g}", value.value), value.unit});

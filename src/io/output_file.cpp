@@ -136,8 +136,8 @@ void remove_orphans(const fs::path& output) {
   }
   const std::string beginning = marked(output.filename().string());
   std::erase_if(found->second, [&](const std::string& name) {
-    const bool of_this = name.size() == beginning.size() + kMarkBytes - kMark.size() &&
-                         name.starts_with(beginning);
+    const bool of_this =
+        name.size() == beginning.size() + kMarkBytes - kMark.size() && name.starts_with(beginning);
     if (of_this) remove_orphan((fs::path(folder) / name).string());
     return of_this;
   });

@@ -73,9 +73,9 @@ YamlNode parse_yaml(const std::string& text, const std::string& path) {
     const std::vector<YAML::Node> documents = YAML::LoadAll(text);
     if (documents.empty()) return {};
     if (documents.size() > 1) {
-      fail_at(path, line_of(documents[1].Mark()),
-              fmt::format("a second document (after ---), expected one: {} of them",
-                          documents.size()));
+      fail_at(
+          path, line_of(documents[1].Mark()),
+          fmt::format("a second document (after ---), expected one: {} of them", documents.size()));
     }
     return copied(documents.front(), path, nodes);
   } catch (const YAML::Exception& error) {

@@ -161,9 +161,8 @@ CalibratedRecordings calibrate_recordings(const CalibrateRecordingsOptions& opti
         compare_beams(recordings, result.calibration, options.truths, calibrating.silent());
   }
   if (options.details) {
-    result.details =
-        calibration_details(result.calibration, options.recordings.size(),
-                            wall_sample(recordings, result.calibration), result.truth);
+    result.details = calibration_details(result.calibration, options.recordings.size(),
+                                         wall_sample(recordings, result.calibration), result.truth);
   }
   if (folder) write_files(options, result, folder, progress.silent());
   return result;

@@ -28,9 +28,8 @@ namespace {
 std::string set_aside(const fs::path& file) {
   for (int number = 1;; ++number) {
     fs::path aside = file;
-    aside.replace_extension(
-        fmt::format(".earlier{}{}", number == 1 ? "" : fmt::format("-{}", number),
-                    file.extension().string()));
+    aside.replace_extension(fmt::format(
+        ".earlier{}{}", number == 1 ? "" : fmt::format("-{}", number), file.extension().string()));
     if (fs::exists(fs::symlink_status(aside))) continue;
     if (::renameat2(AT_FDCWD, file.c_str(), AT_FDCWD, aside.c_str(), RENAME_NOREPLACE) == 0) {
       return aside.string();
@@ -123,13 +122,14 @@ void ResultFolder::write(const std::string& name, const std::string& text) {
 }
 
 std::vector<std::string> ResultFolder::left_over() const {
-  static const std::regex results("(calibration\\.yaml|states(_[0-9]+)?\\.nc|report\\.(json|html))");
+  static const std::regex results(
+      "(calibration\\.yaml|states(_[0-9]+)?\\.nc|report\\.(json|html))");
   std::vector<std::string> names;
   for (const fs::directory_entry& entry : fs::directory_iterator(folder_)) {
     const std::string name = entry.path().filename().string();
-    const bool replaced = std::any_of(files_.begin(), files_.end(), [&](const io::OutputFile& file) {
-      return file.path() == path(name);
-    });
+    const bool replaced =
+        std::any_of(files_.begin(), files_.end(),
+                    [&](const io::OutputFile& file) { return file.path() == path(name); });
     if (!replaced && std::regex_match(name, results)) names.push_back(name);
   }
   std::sort(names.begin(), names.end());

@@ -20,6 +20,31 @@ constexpr std::string_view kFirstScript =
     "document.documentElement.dataset.theme = "
     "matchMedia('(prefers-color-scheme: dark)').matches ? 'dark' : 'light';";
 
+/// ECharts GL makes functions of texts such as "[width * 1.0 / 2, height / 2]", the sizes of its
+/// textures, which a page whose policy forbids to run texts must understand itself.
+constexpr std::string_view kSizesScript = R"js(
+(function () {
+  'use strict';
+  const term = /^(width|height)(?: \* 1\.0)?(?: \/ (\d+))?$/;
+  const sizes = (text) => {
+    const list = /^\[(.*)\]$/.exec(text);
+    const terms = (list ? list[1] : text).split(',').map((one) => {
+      const found = term.exec(one.trim());
+      if (!found) throw new Error('no size of a texture: ' + one);
+      return [found[1], Number(found[2] || 1)];
+    });
+    return (width, height) => {
+      const values = terms.map(([side, parts]) => (side === 'width' ? width : height) / parts);
+      return list ? values : values[0];
+    };
+  };
+  window.Function = new Proxy(window.Function, {
+    construct: (target, words) => (words[0] === 'width' && words.length === 4
+      ? sizes(words[3].replace('return', '').trim()) : Reflect.construct(target, words)),
+  });
+})();
+)js";
+
 /// What the browser may do with a page: run the scripts and use the style sheet that are written in
 /// it, and nothing that a name in its texts could smuggle in. Widths and colours of cells are
 /// attributes; pictures are those that diagrams save.
@@ -167,7 +192,7 @@ std::string charts_html(const std::vector<Chart>& charts, Figures& figures) {
 std::string page_html(const std::string& title, const std::string& lead,
                       const std::string& body_html, const Figures& figures) {
   std::vector<std::string_view> scripts = {kFirstScript, echarts_script()};
-  if (figures.has_space()) scripts.push_back(echarts_gl_script());
+  if (figures.has_space()) scripts.insert(scripts.end(), {kSizesScript, echarts_gl_script()});
   scripts.push_back(page_script());
   std::string page = fmt::format(
       "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
@@ -179,7 +204,8 @@ std::string page_html(const std::string& title, const std::string& lead,
       "<p class=\"lead\">{}</p>\n"
       "<noscript><p class=\"verdict care\">The diagrams need JavaScript, which is off here. "
       "Texts and tables are complete.</p></noscript>\n",
-      policy(page_style(), scripts), escape_html(title), page_style(), kFirstScript, escape_html(title), escape_html(lead));
+      policy(page_style(), scripts), escape_html(title), page_style(), kFirstScript,
+      escape_html(title), escape_html(lead));
   page += body_html;
   page +=
       "<p class=\"note help\">Diagrams: point at them for values; draw a box to zoom, double-click "

@@ -29,7 +29,8 @@ TEST(NearMiss, IsSilentWhereNothingIsNear) {
 
 TEST(Printable, ShowsWhatATerminalWouldObey) {
   EXPECT_EQ(printable("\033[31mred\033]0;title\a", true), "\\u001b[31mred\\u001b]0;title\\u0007");
-  EXPECT_EQ(printable("C1 \xc2\x9b as UTF-8, \x9b alone", true), "C1 \\u009b as UTF-8, \\x9b alone");
+  EXPECT_EQ(printable("C1 \xc2\x9b as UTF-8, \x9b alone", true),
+            "C1 \\u009b as UTF-8, \\x9b alone");
   EXPECT_EQ(printable("a\tb\nc\rd\x7f", true), "a\tb\nc\\u000dd\\u007f");
   EXPECT_EQ(printable("a\nb", false), "a\\u000ab");
   EXPECT_EQ(printable("turned \xe2\x80\xae back", true), "turned \\u202e back");
@@ -43,8 +44,8 @@ TEST(Printable, LeavesOtherTextsAlone) {
 
 TEST(Printable, ShowsBytesThatAreNoText) {
   EXPECT_EQ(printable("\xff\xc3", true), "\\xff\\xc3");
-  EXPECT_EQ(printable("\xe2\x82", true), "\\xe2\\x82");              // cut off
-  EXPECT_EQ(printable("\xc0\x9b", true), "\\xc0\\x9b");              // longer than need be
+  EXPECT_EQ(printable("\xe2\x82", true), "\\xe2\\x82");           // cut off
+  EXPECT_EQ(printable("\xc0\x9b", true), "\\xc0\\x9b");           // longer than need be
   EXPECT_EQ(printable("\xed\xa0\x80", true), "\\xed\\xa0\\x80");  // half a pair of UTF-16
 }
 

@@ -25,8 +25,8 @@ struct YamlNode {
   bool is_list() const { return kind == Kind::list; }
 };
 
-/// @throws FileError where the text is not YAML, holds more than one document, or has more than a million values, those that
-/// its aliases repeat included
+/// @throws FileError where the text is not YAML, holds more than one document, or has more than a
+/// million values, those that its aliases repeat included
 YamlNode parse_yaml(const std::string& text, const std::string& path);
 
 /// @throws FileError always
