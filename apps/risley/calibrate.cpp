@@ -88,7 +88,15 @@ jobs::CalibrateRecordingsOptions job_of(const CalibrateCommandOptions& options,
   job.truths = options.truths;
   job.details = !options.folder.empty();
   job.force = options.force;
+  std::vector<std::string> states = {"states.nc"};
+  for (std::size_t i = 1; i <= options.inputs.size(); ++i) {
+    states.push_back(fmt::format("states_{}.nc", i));
+  }
+  require_folder_apart(common, options.folder, states);
   job.files = result_files(options.folder, options.states, common);
+  job.texts = [](const CalibratedRecordings& outcome) {
+    return report_texts(report::calibration_report(outcome));
+  };
   return job;
 }
 
@@ -102,7 +110,6 @@ ExitStatus run_calibration(const CalibrateCommandOptions& options, const CommonO
   calibration::Calibration& c = outcome.calibration;
   c.reason = with_flags(c.reason);
   put_flags(outcome.warnings);
-  if (!options.folder.empty()) write_report_of(report::calibration_report(outcome), options.folder);
   for (const std::string& warning : outcome.warnings) spdlog::warn(warning);
   for (const std::string& warning : c.warnings) spdlog::warn(warning);
   if (!c.converged) spdlog::error("not converged: {}", c.reason);

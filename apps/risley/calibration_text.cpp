@@ -66,8 +66,7 @@ Json unobservable_json(const std::vector<estimation::WeakDirection>& directions)
 Json finite_or_null(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
 
 void print_datum(calibration::DatumKind kind, const FormalDatum& datum) {
-  fmt::print(
-      "datum: {}; 1 sigma of roll {:.2g}, pitch {:.2g}, yaw {:.2g} deg; of the beams against each "
+  say("datum: {}; 1 sigma of roll {:.2g}, pitch {:.2g}, yaw {:.2g} deg; of the beams against each "
       "other {:.2g} deg\n",
       calibration::to_string(kind), deg(datum.sigma_roll), deg(datum.sigma_pitch),
       deg(datum.sigma_yaw), deg(datum.shape));
@@ -169,11 +168,10 @@ Json calibration_json(const CalibratedRecordings& outcome, double total_time) {
 void print_calibration(const CalibratedRecordings& outcome) {
   const Calibration& c = outcome.calibration;
   const TrainShape shape = c.sensor.shape();
-  fmt::print("{}\n", c.converged ? "converged" : "NOT CONVERGED: " + c.reason);
-  fmt::print("{}: {}\n", to_string(c.verdict.code), with_flags(c.verdict.words));
-  fmt::print("sensor {}: {}\n", outcome.choice.sensor.name, outcome.choice.words);
-  fmt::print(
-      "{} points on {} planes, {:.2f} mm thick before, {:.2f} mm after; read {:.2f} s, rotation "
+  say("{}\n", c.converged ? "converged" : "NOT CONVERGED: " + c.reason);
+  say("{}: {}\n", to_string(c.verdict.code), with_flags(c.verdict.words));
+  say("sensor {}: {}\n", outcome.choice.sensor.name, outcome.choice.words);
+  say("{} points on {} planes, {:.2f} mm thick before, {:.2f} mm after; read {:.2f} s, rotation "
       "angles {:.2f} s, solved {:.2f} s\n\n",
       grouped(c.points), c.planes.size(), 1e3 * c.rms_before, 1e3 * c.rms_after,
       outcome.reading_time, outcome.angles_time, outcome.solving_time);
@@ -202,7 +200,7 @@ void print_calibration(const CalibratedRecordings& outcome) {
     table.add({"range offset", text.value, text.sigma, "mm", "0"});
   }
   table.print();
-  fmt::print("\n");
+  say("\n");
   Table planes({"plane", "recording", "distance m", "points", "outliers", "before mm", "after mm"});
   for (const calibration::CalibratedPlane& plane : c.planes) {
     planes.add({plane.name,
@@ -212,20 +210,18 @@ void print_calibration(const CalibratedRecordings& outcome) {
                 fmt::format("{:.2f}", 1e3 * plane.rms)});
   }
   planes.print();
-  fmt::print("\n");
+  say("\n");
   print_datum(c.datum_kind, c.datum);
   for (const calibration::PriorTest& test : c.prior_tests) {
     if (test.degrees_of_freedom == 0) {
-      fmt::print("{} {}: not tested by these data\n", test.station ? "station" : "plane",
-                 test.name);
+      say("{} {}: not tested by these data\n", test.station ? "station" : "plane", test.name);
       continue;
     }
-    fmt::print("{} {}: misfit {:.3g} deg, chi2 {:.3g}, limit {:.3g}\n",
-               test.station ? "station" : "plane", test.name, deg(test.misfit), test.chi2,
-               test.critical);
+    say("{} {}: misfit {:.3g} deg, chi2 {:.3g}, limit {:.3g}\n", test.station ? "station" : "plane",
+        test.name, deg(test.misfit), test.chi2, test.critical);
   }
   if (outcome.truth) {
-    fmt::print("\n");
+    say("\n");
     Table errors(
         {"error, deg", "azimuth rmse", "zenith rmse", "total", "shared rotation", "shape"});
     const auto add = [&errors](const char* name, const DirectionErrors& e) {
@@ -264,7 +260,7 @@ Json forecast_json(const CalibrationForecast& f, TrainShape shape) {
 }
 
 void print_forecast(const CalibrationForecast& f, TrainShape shape) {
-  fmt::print("{:.3g} shots meet a wall\n\n", f.shots);
+  say("{:.3g} shots meet a wall\n\n", f.shots);
   Table walls({"wall", "station", "share %", "incidence deg", "range m"});
   for (const calibration::PlannedWall& wall : f.walls) {
     walls.add({wall.name, wall.station, fmt::format("{:.1f}", 100 * wall.share),
@@ -272,7 +268,7 @@ void print_forecast(const CalibrationForecast& f, TrainShape shape) {
                fmt::format("{:.1f}", wall.mean_range)});
   }
   walls.print();
-  fmt::print("\n");
+  say("\n");
   Table table({"parameter", "sigma", "unit"});
   for (std::size_t j = 0; j < f.free.size(); ++j) {
     const auto at = static_cast<Eigen::Index>(j);
@@ -282,13 +278,13 @@ void print_forecast(const CalibrationForecast& f, TrainShape shape) {
                find_parameter(name, shape).unit});
   }
   table.print();
-  fmt::print("\n");
+  say("\n");
   print_datum(f.datum_kind, f.datum);
-  fmt::print("expected error of a direction: {:.2g} deg\n", deg(f.datum.total));
+  say("expected error of a direction: {:.2g} deg\n", deg(f.datum.total));
   for (const auto& weak : f.unobservable) {
-    fmt::print("not told by these walls: {}\n", direction_text(weak));
+    say("not told by these walls: {}\n", direction_text(weak));
   }
-  for (const std::string& words : f.advice) fmt::print("advice: {}\n", words);
+  for (const std::string& words : f.advice) say("advice: {}\n", words);
 }
 
 }  // namespace risley::app

@@ -107,8 +107,7 @@ ExitStatus write_beam_origin_map(const CloudCommandOptions& options,
                         {"y_m", {{"min", found.least_y}, {"max", found.greatest_y}}},
                         {"z_m", {{"min", found.least_z}, {"max", found.greatest_z}}}});
   } else {
-    fmt::print(
-        "{}: beams start {:.1f} to {:.1f} mm beside the origin in Y, {:.1f} to {:.1f} mm in Z\n",
+    say("{}: beams start {:.1f} to {:.1f} mm beside the origin in Y, {:.1f} to {:.1f} mm in Z\n",
         options.beam_origin_map, 1e3 * found.least_y, 1e3 * found.greatest_y, 1e3 * found.least_z,
         1e3 * found.greatest_z);
   }
@@ -191,6 +190,7 @@ Run declare_cloud(CLI::App& verb) {
     cloud::CloudOptions settings = cloud_options(*options);
     const sensors::Sensor calibration = sensors::load_sensor(options->calibration);
     if (!options->beam_origin_map.empty()) {
+      require_apart(common, {options->beam_origin_map});
       return write_beam_origin_map(*options, calibration, common);
     }
     if (options->inputs.empty()) throw InvalidArgument("INPUT is missing: a recording");

@@ -4,20 +4,26 @@
 
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <chrono>
 #include <cmath>
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
+#include <cstring>
 #include <filesystem>
+#include <iostream>
 #include <new>
 
+#include <fcntl.h>
 #include <fmt/format.h>
+#include <spdlog/spdlog.h>
 #include <unistd.h>
 
 #include "risley/cloud/rotor_tracking.hpp"
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
+#include "risley/core/text.hpp"
 #include "risley/io/sha256.hpp"
 #include "risley/recordings/reader.hpp"
 
@@ -50,6 +56,16 @@ std::string duration_text(double seconds) {
 void watch_signals() {
   std::signal(SIGINT, note_signal);
   std::signal(SIGTERM, note_signal);
+  // nohup and the like want it ignored.
+  if (std::signal(SIGHUP, note_signal) == SIG_IGN) std::signal(SIGHUP, SIG_IGN);
+}
+
+void hold_standard_streams() {
+  for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
+    if (::fcntl(stream, F_GETFD) >= 0 || errno != EBADF) continue;
+    // Gets the lowest free number, which is this one. What is written to stdout fails there.
+    ::open("/dev/null", stream == STDERR_FILENO ? O_WRONLY : O_RDONLY);
+  }
 }
 
 double now() {
@@ -217,8 +233,51 @@ Json with_head(const CommonOptions& common, const Json& object, const jobs::Prov
 void print_json(const CommonOptions& common, const Json& object, const jobs::Provenance& known) {
   const Json whole = with_head(common, object, known);
   // Serial numbers come from files and may hold bytes that are no UTF-8.
-  const std::string text = whole.dump(2, ' ', false, Json::error_handler_t::replace);
-  fmt::print("{}\n", text);
+  say("{}\n", whole.dump(2, ' ', false, Json::error_handler_t::replace));
+}
+
+void print_text(std::string_view text) {
+  const std::string shown = printable(text, true);
+  std::fwrite(shown.data(), 1, shown.size(), stdout);
+}
+
+ExitStatus close_stdout(ExitStatus status) {
+  std::cout.flush();
+  errno = 0;
+  std::fflush(stdout);
+  const int error = errno;
+  if (std::cout && std::ferror(stdout) == 0) return status;
+  spdlog::error("stdout: cannot be written{}{}", error != 0 ? ": " : "",
+                error != 0 ? std::strerror(error) : "");
+  return std::max(status, kBadFile);
+}
+
+void require_apart(const CommonOptions& common, const std::vector<std::string>& outputs) {
+  namespace fs = std::filesystem;
+  std::vector<std::string> inputs = common.inputs;
+  inputs.insert(inputs.end(), common.files.begin(), common.files.end());
+  for (std::size_t i = 0, count = inputs.size(); i < count; ++i) {
+    if (!inputs[i].ends_with(".truth.yaml")) continue;
+    inputs.push_back(fs::path(inputs[i]).replace_extension(".nc").string());  // read with it
+  }
+  const auto same = [](const std::string& a, const std::string& b) {
+    std::error_code ignored;
+    return fs::is_regular_file(a, ignored) && fs::equivalent(a, b, ignored);
+  };
+  for (std::size_t i = 0; i < outputs.size(); ++i) {
+    if (outputs[i].empty() || outputs[i] == "-") continue;
+    for (const std::string& input : inputs) {
+      if (!same(input, outputs[i])) continue;
+      throw InvalidArgument(
+          fmt::format("the output {} would replace {}, which this command reads: give another name",
+                      outputs[i], input == outputs[i] ? "the input of that name" : input));
+    }
+    for (std::size_t j = 0; j < i; ++j) {
+      if (outputs[j] != outputs[i] && !same(outputs[j], outputs[i])) continue;
+      throw InvalidArgument(
+          fmt::format("the outputs {} and {} are one file", outputs[j], outputs[i]));
+    }
+  }
 }
 
 }  // namespace risley::app

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include <CLI/CLI.hpp>
+#include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include "risley/core/progress.hpp"
@@ -73,9 +74,13 @@ Run declare_preset(CLI::App& verb);
 Run declare_report(CLI::App& verb);
 Run declare_reproduce(CLI::App& verb);
 
-/// From now on SIGINT and SIGTERM cancel what is being computed, so that every output in the making
-/// is removed by its owner.
+/// From now on SIGINT, SIGTERM and SIGHUP cancel what is being computed, so that every output in
+/// the making is removed by its owner.
 void watch_signals();
+
+/// Standard streams that the caller closed are taken, so that no file gets their numbers and what
+/// is meant for a terminal.
+void hold_standard_streams();
 
 /// A bar with the remaining time on stderr, only on a terminal and not with --quiet. The bar is
 /// gone when the object is.
@@ -124,6 +129,23 @@ void note_files(const CLI::App& verb, CommonOptions& common);
 /// SHA-256, null where a file cannot be read.
 /// @param known  hashes that were computed before, as jobs::with_inputs() has them
 Json with_head(const CommonOptions& common, const Json& object, const jobs::Provenance& known = {});
+
+/// Prints on stdout what a terminal shows and does not obey, see printable(). Whether it arrived is
+/// asked once, by close_stdout().
+void print_text(std::string_view text);
+template <class... Values>
+void say(fmt::format_string<Values...> format, Values&&... values) {
+  print_text(fmt::format(format, std::forward<Values>(values)...));
+}
+
+/// Writes what stdout still holds.
+/// @return the status, at least kBadFile where not all that was printed arrived
+ExitStatus close_stdout(ExitStatus status);
+
+/// No output may be a file that the command reads, by whatever name or link, nor another output.
+/// @param outputs  names; those that are empty, or - for stdout, do not count
+/// @throws InvalidArgument
+void require_apart(const CommonOptions& common, const std::vector<std::string>& outputs);
 
 /// Prints one JSON object, with_head(), and a line feed on stdout.
 void print_json(const CommonOptions& common, const Json& object,

@@ -67,7 +67,11 @@ jobs::EstimateRecordingOptions job_of(const EstimateCommandOptions& options,
   if (options.mirror != "auto") job.mirrored = options.mirror == "yes";
   job.truth = options.truth;
   job.details = !options.folder.empty();
+  require_folder_apart(common, options.folder, {"states.nc"});
   job.files = result_files(options.folder, options.states, common);
+  job.texts = [](const EstimatedRecording& outcome) {
+    return report_texts(report::estimate_report(outcome));
+  };
   return job;
 }
 
@@ -236,8 +240,7 @@ void print_noise(const Estimate& e) {
         report::number_text(degrees_from_radians(value), degrees_from_radians(sigma));
     return fmt::format("{} +- {}", text.value, text.sigma);
   };
-  fmt::print(
-      "\nnoise before rounding, {}: azimuth {} deg, zenith {} deg; a healthy unit: {:.3g} "
+  say("\nnoise before rounding, {}: azimuth {} deg, zenith {} deg; a healthy unit: {:.3g} "
       "deg\n",
       e.noise_held ? "held" : "found", angle(e.noise.value.azimuth, e.noise.sigma.azimuth),
       angle(e.noise.value.zenith, e.noise.sigma.zenith), degrees_from_radians(e.usual_noise));
@@ -246,15 +249,15 @@ void print_noise(const Estimate& e) {
 void print_outcome(const EstimatedRecording& outcome) {
   const Estimate& e = outcome.estimate;
   const TrainShape shape = e.sensor.shape();
-  fmt::print("{}\n", e.converged ? "converged" : "NOT CONVERGED: " + e.reason);
-  fmt::print("{}: {}\n", to_string(e.verdict.code), with_flags(e.verdict.words));
-  fmt::print("sensor {}: {}\n", outcome.choice.sensor.name, outcome.choice.words);
-  fmt::print("{} shots used, {} of them outliers{}; read {:.2f} s, solved {:.2f} s\n\n",
-             grouped(e.series.size()), grouped(e.outliers),
-             (e.sensor.combination ? fmt::format(", speed combination {}", *e.sensor.combination)
-                                   : std::string()) +
-                 (e.mirrored ? ", mirrored" : ""),
-             outcome.reading_time, outcome.solving_time);
+  say("{}\n", e.converged ? "converged" : "NOT CONVERGED: " + e.reason);
+  say("{}: {}\n", to_string(e.verdict.code), with_flags(e.verdict.words));
+  say("sensor {}: {}\n", outcome.choice.sensor.name, outcome.choice.words);
+  say("{} shots used, {} of them outliers{}; read {:.2f} s, solved {:.2f} s\n\n",
+      grouped(e.series.size()), grouped(e.outliers),
+      (e.sensor.combination ? fmt::format(", speed combination {}", *e.sensor.combination)
+                            : std::string()) +
+          (e.mirrored ? ", mirrored" : ""),
+      outcome.reading_time, outcome.solving_time);
   std::vector<std::string> head = {"parameter", "value", "+- sigma", "unit"};
   if (outcome.evaluation) head.insert(head.end(), {"truth", "error", "error/sigma"});
   Table table(head);
@@ -275,7 +278,7 @@ void print_outcome(const EstimatedRecording& outcome) {
     table.add(row);
   }
   table.print();
-  fmt::print("\n");
+  say("\n");
   Table residuals({"residual", "mean deg", "std deg", "rms deg", "skewness", "excess kurtosis"});
   const auto add = [&residuals](const char* name, const estimation::Moments& m) {
     residuals.add({name, fmt::format("{:.6f}", degrees_from_radians(m.mean)),
@@ -287,18 +290,16 @@ void print_outcome(const EstimatedRecording& outcome) {
   add("zenith", e.zenith_moments);
   residuals.print();
   print_noise(e);
-  fmt::print(
-      "\nresiduals: {:.3f} times the stated variance, autocorrelation factor {:.3f}; variances of "
+  say("\nresiduals: {:.3f} times the stated variance, autocorrelation factor {:.3f}; variances of "
       "single shots multiplied by {:.3f}\n",
       e.unit_variance, e.autocorrelation.factor, e.variance_factor);
   if (outcome.evaluation) {
-    fmt::print("\nrotation angle rmse:");
+    say("\nrotation angle rmse:");
     for (std::size_t i = 0; i < outcome.evaluation->rotation_angle_rmse.size(); ++i) {
-      fmt::print(" {} {:.5f} deg", prism_letter(static_cast<int>(i)),
-                 degrees_from_radians(outcome.evaluation->rotation_angle_rmse[i]));
+      say(" {} {:.5f} deg", prism_letter(static_cast<int>(i)),
+          degrees_from_radians(outcome.evaluation->rotation_angle_rmse[i]));
     }
-    fmt::print(
-        "\nNEES per degree of freedom (1 is honest): parameters {:.3g}, rotation angles {:.3g}\n",
+    say("\nNEES per degree of freedom (1 is honest): parameters {:.3g}, rotation angles {:.3g}\n",
         outcome.evaluation->nees_parameters, outcome.evaluation->nees_rotation_angles);
   }
 }
@@ -311,7 +312,6 @@ ExitStatus run_estimate(const EstimateCommandOptions& options, const CommonOptio
     outcome = jobs::estimate_recording(job_of(options, common), bar.progress());
   }
   put_flags(outcome.warnings);
-  if (!options.folder.empty()) write_report_of(report::estimate_report(outcome), options.folder);
   const Estimate& e = outcome.estimate;
   spdlog::debug(
       "{} observations of format {}, {} without a direction, {} out of order; {} shots used "

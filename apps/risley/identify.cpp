@@ -126,18 +126,18 @@ Json outcome_json(const IdentifiedRecording& outcome) {
 
 void print_outcome(const IdentifiedRecording& outcome) {
   const identification::Identification& found = outcome.identification;
-  fmt::print("{}: {}\n", to_string(outcome.verdict), outcome.words);
+  say("{}: {}\n", to_string(outcome.verdict), outcome.words);
   if (!outcome.like.empty()) {
-    fmt::print("this is the train of {}{}\n", outcome.like,
-               outcome.like_mirrored ? ", as its mirror image" : "");
+    say("this is the train of {}{}\n", outcome.like,
+        outcome.like_mirrored ? ", as its mirror image" : "");
   }
-  fmt::print("{} shots at {:.6g} Hz, {} emitter{}{}\n\n", grouped(found.rows), 1 / found.step,
-             found.emitters, found.emitters == 1 ? "" : "s",
-             found.emitters == 1                                      ? ""
-             : found.timing == identification::EmitterTiming::in_turn ? ", one after another"
-             : found.timing == identification::EmitterTiming::together
-                 ? ", the shots of a round share the rotors' position"
-                 : ", at uneven times");
+  say("{} shots at {:.6g} Hz, {} emitter{}{}\n\n", grouped(found.rows), 1 / found.step,
+      found.emitters, found.emitters == 1 ? "" : "s",
+      found.emitters == 1                                      ? ""
+      : found.timing == identification::EmitterTiming::in_turn ? ", one after another"
+      : found.timing == identification::EmitterTiming::together
+          ? ", the shots of a round share the rotors' position"
+          : ", at uneven times");
   Table parameters({"parameter", "value", "+- sigma", "unit"});
   for (const FittedValue& one : values_of(found.best())) {
     if (std::isfinite(one.sigma) && one.sigma > 0) {
@@ -148,7 +148,7 @@ void print_outcome(const IdentifiedRecording& outcome) {
     }
   }
   parameters.print();
-  fmt::print("\n");
+  say("\n");
   Table ranking({"faces", "speeds Hz", "rms deg", "chi2 more than the best", "equivalent to"});
   std::size_t rows = 0;
   for (const Hypothesis& one : found.hypotheses) {
@@ -166,13 +166,14 @@ void print_outcome(const IdentifiedRecording& outcome) {
                  fmt::format("{:.3g}", one.excess), same});
   }
   ranking.print();
-  fmt::print("\n");
-  for (const std::string& words : outcome.unobservable) fmt::print("never told: {}.\n", words);
-  if (!outcome.to_do.empty()) fmt::print("what to do: {}.\n", outcome.to_do);
+  say("\n");
+  for (const std::string& words : outcome.unobservable) say("never told: {}.\n", words);
+  if (!outcome.to_do.empty()) say("what to do: {}.\n", outcome.to_do);
 }
 
 ExitStatus run_identify(const IdentifyCommandOptions& options, const CommonOptions& common) {
   check_positive(options.fastest_hz, "--fastest-hz", "Hz");
+  require_apart(common, {options.output});
   jobs::IdentifyRecordingOptions job;
   job.recording = options.input;
   job.reading = read_options(options.reading);

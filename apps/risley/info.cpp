@@ -200,13 +200,12 @@ void print_excerpt(const std::string& path, const Excerpt& excerpt) {
   const ExcerptContents contents = contents_of(excerpt);
   const std::string duration =
       excerpt.has_times ? fmt::format(" in {:.6g} s", excerpt.duration) : "";
-  fmt::print("\n{}: {} shots{}, {} observations without return\n", path, grouped(excerpt.shots),
-             duration, grouped(excerpt.no_return));
-  fmt::print("  holds: {}\n  does not hold: {}\n", fmt::join(contents.holds, "; "),
-             fmt::join(contents.lacks, "; "));
+  say("\n{}: {} shots{}, {} observations without return\n", path, grouped(excerpt.shots), duration,
+      grouped(excerpt.no_return));
+  say("  holds: {}\n  does not hold: {}\n", fmt::join(contents.holds, "; "),
+      fmt::join(contents.lacks, "; "));
   if (excerpt.rounded) {
-    fmt::print(
-        "  Directions are rounded because coordinates in whole steps give away their range; "
+    say("  Directions are rounded because coordinates in whole steps give away their range; "
         "it is left\n  known to a factor of two.\n");
   }
 }
@@ -258,7 +257,10 @@ Run declare_info(CLI::App& verb) {
                 "Let the excerpt hold ranges, too. They are left out otherwise because they show "
                 "the place where it was recorded; only calibrations on walls need them");
   add_reading_options(verb, options->reading);
-  return [options](const CommonOptions& common) { return run_info(*options, common); };
+  return [options](const CommonOptions& common) {
+    require_apart(common, {options->share});
+    return run_info(*options, common);
+  };
 }
 
 }  // namespace risley::app

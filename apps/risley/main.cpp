@@ -1,18 +1,25 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
 #include <algorithm>
+#include <charconv>
+#include <cstdint>
 #include <cstring>
+#include <exception>
+#include <limits>
 #include <map>
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <spdlog/pattern_formatter.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 #include <tbb/global_control.h>
+#include <unistd.h>
 
 #include "risley/core/error.hpp"
 #include "risley/core/text.hpp"
@@ -79,13 +86,25 @@ constexpr Verb kVerbs[] = {
      declare_reproduce},
 };
 
+/// Text of --seed, which CLI11 would wrap around.
+std::string seed_problem(const std::string& text) {
+  std::uint64_t seed = 0;
+  const char* const end = text.data() + text.size();
+  const auto [last, code] = std::from_chars(text.data(), end, seed);
+  if (code == std::errc() && last == end) return {};
+  return fmt::format("found {}, allowed whole numbers 0 to {}", text,
+                     std::numeric_limits<std::uint64_t>::max());
+}
+
 void add_common_options(CLI::App& verb, CommonOptions& common) {
   const std::string group = "Common options";
   verb.add_flag("--json", common.json, "Print exactly one JSON object on stdout")->group(group);
   verb.add_option("--threads", common.threads, "Number of threads (default: all cores)")
       ->check(CLI::Range(1, 4096))
       ->group(group);
-  verb.add_option("--seed", common.seed, "Seed of everything random (default 0)")->group(group);
+  verb.add_option("--seed", common.seed, "Seed of everything random (default 0)")
+      ->check(CLI::Validator(seed_problem, ""))
+      ->group(group);
   auto* quiet = verb.add_flag("--quiet", common.quiet, "No progress bar and no warnings on stderr")
                     ->group(group);
   verb.add_flag("--verbose", common.verbose, "Say more on stderr")->excludes(quiet)->group(group);
@@ -196,15 +215,45 @@ ExitStatus run_command(int argc, char** argv) {
   return run_verb(runs.at(&verb), common);
 }
 
+/// The message of a log entry on one line that a terminal does not obey.
+class PrintableMessage final : public spdlog::custom_flag_formatter {
+ public:
+  void format(const spdlog::details::log_msg& message, const std::tm&,
+              spdlog::memory_buf_t& line) override {
+    const std::string text = printable({message.payload.data(), message.payload.size()}, false);
+    line.append(text.data(), text.data() + text.size());
+  }
+  std::unique_ptr<custom_flag_formatter> clone() const override {
+    return std::make_unique<PrintableMessage>();
+  }
+};
+
+void start_log() {
+  const auto log = spdlog::stderr_color_mt("risley");
+  auto formatter = std::make_unique<spdlog::pattern_formatter>();
+  formatter->add_flag<PrintableMessage>('*').set_pattern("risley: %^%l%$: %*");
+  log->set_formatter(std::move(formatter));
+  log->set_level(spdlog::level::trace);
+  spdlog::set_default_logger(log);
+  spdlog::set_level(spdlog::level::warn);
+}
+
+/// What no handler caught is a bug, or memory that ran out where nobody could say so.
+[[noreturn]] void end_by_fault() {
+  constexpr std::string_view kWords =
+      "risley: error: internal error or no memory: outputs in the making were given up\n";
+  [[maybe_unused]] const auto written = ::write(STDERR_FILENO, kWords.data(), kWords.size());
+  ::_exit(kFault);
+}
+
 }  // namespace
 }  // namespace risley::app
 
 int main(int argc, char** argv) {
-  const auto log = spdlog::stderr_color_mt("risley");
-  log->set_pattern("risley: %^%l%$: %v");
-  log->set_level(spdlog::level::trace);
-  spdlog::set_default_logger(log);
-  spdlog::set_level(spdlog::level::warn);
-  risley::app::watch_signals();
-  return risley::app::run_command(argc, argv);
+  using namespace risley::app;
+  std::set_terminate(end_by_fault);
+  hold_standard_streams();
+  start_log();
+  watch_signals();
+  return close_stdout(run_command(argc, argv));
 }

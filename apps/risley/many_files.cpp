@@ -92,10 +92,6 @@ std::vector<FileJob> file_jobs(const std::vector<std::string>& inputs, const std
                                             name, made.string()));
         }
       }
-      std::error_code ignored;
-      if (fs::equivalent(name, made, ignored)) {
-        throw InvalidArgument(fmt::format("{} would be overwritten by itself", name));
-      }
       jobs.push_back({name, made.string()});
     }
   }
@@ -110,13 +106,16 @@ ExitStatus run_file_jobs(const std::vector<FileJob>& jobs, const std::string& la
   CommonOptions told = common;  // patterns are names by now
   told.inputs.clear();
   for (const FileJob& job : jobs) told.inputs.push_back(job.input);
+  std::vector<std::string> outputs;
+  for (const FileJob& job : jobs) outputs.push_back(job.output);
+  require_apart(told, outputs);
   if (jobs.size() == 1) {
     FileOutcome outcome;
     {
       ProgressBar bar(label, common);
       outcome = work(jobs.front(), bar.progress());
     }
-    common.json ? print_json(told, outcome.json) : fmt::print("{}\n", outcome.text);
+    common.json ? print_json(told, outcome.json) : say("{}\n", outcome.text);
     return outcome.status;
   }
   std::vector<FileOutcome> outcomes(jobs.size());
@@ -154,8 +153,8 @@ ExitStatus run_file_jobs(const std::vector<FileJob>& jobs, const std::string& la
                       {"files_failed", jobs.size() - sound},
                       {"files", files}});
   } else {
-    for (const FileOutcome& outcome : outcomes) fmt::print("{}\n", outcome.text);
-    fmt::print("{} of {} files done, {} {} in all\n", sound, jobs.size(), grouped(total), counted);
+    for (const FileOutcome& outcome : outcomes) say("{}\n", outcome.text);
+    say("{} of {} files done, {} {} in all\n", sound, jobs.size(), grouped(total), counted);
   }
   for (const FileOutcome& outcome : outcomes) {
     if (outcome.status != kDone) spdlog::error(outcome.text);

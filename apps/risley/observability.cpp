@@ -66,8 +66,8 @@ Json observability_json(const JudgedObservability& judged) {
 void print_observability(const JudgedObservability& judged) {
   const estimation::Observability& o = judged.observability;
   const TrainShape shape = judged.shape;
-  fmt::print("{:.4g} s at {:.6g} Hz, {} shots\n\n", o.duration, o.rate,
-             grouped(static_cast<std::uint64_t>(std::llround(o.shots))));
+  say("{:.4g} s at {:.6g} Hz, {} shots\n\n", o.duration, o.rate,
+      grouped(static_cast<std::uint64_t>(std::llround(o.shots))));
   Table table({"quantity", "sigma", "unit", "deg per unit", "most correlated with", "rho"});
   for (const auto& quantity : o.quantities) {
     const ParameterInfo& info = find_parameter(quantity.name, shape);
@@ -79,14 +79,13 @@ void print_observability(const JudgedObservability& judged) {
                quantity.twins.front().first, fmt::format("{:.4f}", quantity.twins.front().second)});
   }
   table.print();
-  fmt::print(
-      "\nsigma: Cramer-Rao bound. In brackets: held fixed by default; the bound if it were "
+  say("\nsigma: Cramer-Rao bound. In brackets: held fixed by default; the bound if it were "
       "freed.\n");
   for (const auto& weak : o.unobservable) {
-    fmt::print("not told by such data: {}\n", direction_text(weak));
+    say("not told by such data: {}\n", direction_text(weak));
   }
   for (const std::string& words : judged.words) {
-    fmt::print("{}.\n", words);
+    say("{}.\n", words);
   }
 }
 

@@ -97,9 +97,8 @@ Json coverage_json(const sensors::PatternCoverage& coverage) {
 }
 
 void print_coverage(const sensors::PatternCoverage& coverage) {
-  fmt::print("field of view {:.5g} square degrees within {:.2f} degree of the axis\n",
-             coverage.field_solid_angle / kSquareDegree,
-             degrees_from_radians(coverage.field_half_angle));
+  say("field of view {:.5g} square degrees within {:.2f} degree of the axis\n",
+      coverage.field_solid_angle / kSquareDegree, degrees_from_radians(coverage.field_half_angle));
   Table table(
       {"after, s", "shots", "covered, %", "mean, 1/deg2", "least", "greatest", "largest gap, deg"});
   for (const sensors::CoverageAfter& one : coverage.after) {
@@ -113,29 +112,27 @@ void print_coverage(const sensors::PatternCoverage& coverage) {
   table.print();
   for (const int percent : kShares) {
     const double time = coverage.time_to_cover(0.01 * percent);
-    if (std::isfinite(time)) fmt::print("{} % covered after {:.3g} s\n", percent, time);
+    if (std::isfinite(time)) say("{} % covered after {:.3g} s\n", percent, time);
   }
-  fmt::print(
-      "covered: cells of {:g} degree with a shot, of those that {:g} s reach; gap: diameter "
+  say("covered: cells of {:g} degree with a shot, of those that {:g} s reach; gap: diameter "
       "of the largest empty circle\n",
       degrees_from_radians(coverage.cell), coverage.field_after);
 }
 
 void print_written(const jobs::WrittenPattern& written, const std::string& output) {
-  fmt::print("{}: {} shots of sensor {}\n", output, grouped(written.rows), written.sensor);
+  say("{}: {} shots of sensor {}\n", output, grouped(written.rows), written.sensor);
   if (written.blocked > 0) {
-    fmt::print("{} of them do not get through the prisms{}\n", grouped(written.blocked),
-               written.format == "livox-csv" || written.format == "npy" ? " and are NaN" : "");
+    say("{} of them do not get through the prisms{}\n", grouped(written.blocked),
+        written.format == "livox-csv" || written.format == "npy" ? " and are NaN" : "");
   }
   if (written.helios) {
-    fmt::print(
-        "against the pattern itself {:.3g} degree (root mean square), {:.3g} at most, over {} "
+    say("against the pattern itself {:.3g} degree (root mean square), {:.3g} at most, over {} "
         "shots; a shot at time t is at t {} {:.6g} s there\n",
         degrees_from_radians(written.helios->rms), degrees_from_radians(written.helios->worst),
         grouped(written.helios->compared), written.helios->time_lag < 0 ? '-' : '+',
         std::abs(written.helios->time_lag));
   }
-  for (const std::string& one : written.not_carried) fmt::print("not carried: {}\n", one);
+  for (const std::string& one : written.not_carried) say("not carried: {}\n", one);
 }
 
 Json written_json(const jobs::WrittenPattern& written, const std::string& output) {
@@ -175,6 +172,7 @@ ExitStatus run_pattern(const PatternOptions& options, const CommonOptions& commo
     throw InvalidArgument("--coverage prints on stdout, where -o - puts the pattern itself");
   }
   check_positive(options.duration_s, "--duration-s", "s");
+  require_apart(common, {options.output, options.report});
   const sensors::ScanPatternOptions scan = scan_options(options);
   Json json = Json::object();
   std::optional<jobs::WrittenPattern> written;
@@ -214,7 +212,7 @@ ExitStatus run_pattern(const PatternOptions& options, const CommonOptions& commo
   }
   if (written) print_written(*written, options.output);
   if (options.coverage) print_coverage(details->coverage);
-  if (!options.report.empty()) fmt::print("page: {}\n", options.report);
+  if (!options.report.empty()) say("page: {}\n", options.report);
   return kDone;
 }
 

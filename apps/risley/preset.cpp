@@ -53,6 +53,7 @@ ExitStatus list_presets(const CommonOptions& common) {
 /// Prints a preset's text or writes it to a file.
 ExitStatus hand_out(const std::string& text, const PresetOptions& options,
                     const CommonOptions& common) {
+  require_apart(common, {options.output});
   if (!options.output.empty()) io::write_text_file(options.output, text);
   if (common.json) {
     Json json = facts_json(sensors::parse_preset(text, options.name));
@@ -60,9 +61,9 @@ ExitStatus hand_out(const std::string& text, const PresetOptions& options,
     if (!options.output.empty()) json["output"] = options.output;
     print_json(common, json);
   } else if (options.output.empty()) {
-    fmt::print("{}", text);
+    say("{}", text);
   } else {
-    fmt::print("{}\n", options.output);
+    say("{}\n", options.output);
   }
   return kDone;
 }
@@ -77,9 +78,9 @@ ExitStatus check_presets(const PresetOptions& options, const CommonOptions& comm
       json.update({{"input", file}, {"status", kDone}, {"message", ""}});
       results.push_back(json);
       if (!common.json) {
-        fmt::print("{}: sound: {}, {} {}, faces {}, {} emitter{}\n", file, sensor.name,
-                   sensor.manufacturer, sensor.model, to_string(sensor.train.face_order()),
-                   sensor.train.emitters(), sensor.train.emitters() == 1 ? "" : "s");
+        say("{}: sound: {}, {} {}, faces {}, {} emitter{}\n", file, sensor.name,
+            sensor.manufacturer, sensor.model, to_string(sensor.train.face_order()),
+            sensor.train.emitters(), sensor.train.emitters() == 1 ? "" : "s");
       }
     } catch (const FileError& error) {
       status = kBadFile;

@@ -4,6 +4,7 @@
 #include <memory>
 
 #include <fmt/format.h>
+#include <spdlog/spdlog.h>
 
 #include "risley/core/error.hpp"
 #include "risley/io/text_file.hpp"
@@ -29,14 +30,21 @@ ExitStatus run_report(const ReportCommandOptions& options, const CommonOptions& 
     throw FileError(data.string(), {},
                     "is missing: estimate -o and calibrate -o write it beside calibration.yaml");
   }
-  const report::Report report = report::read_report(data.string());
   const std::string page = options.page.empty() ? (folder / "report.html").string() : options.page;
+  require_apart(common, {page});
+  if (fs::exists(folder / jobs::kIncomplete)) {
+    spdlog::warn(
+        "{}: the files beside it may be of different runs, because the last one was "
+        "stopped: run it again",
+        (folder / jobs::kIncomplete).string());
+  }
+  const report::Report report = report::read_report(data.string());
   const std::string html = page_of(report);
   io::write_text_file(page, html);
   if (common.json) {
     print_json(common, {{"html", page}, {"bytes", html.size()}, {"verb", report::verb_of(report)}});
   } else {
-    fmt::print("{}\n", page);
+    say("{}\n", page);
   }
   return kDone;
 }

@@ -85,21 +85,21 @@ Json reproduction_json(const Reproduction& found, const CommonOptions& common,
 
 void print_reproduction(const Reproduction& found) {
   for (const reproduction::Table& table : found.tables) {
-    fmt::print("{}\n", table.title);
+    say("{}\n", table.title);
     Table text({"", "term", "paper", "ours", "unit"});
     for (const Row& row : table.rows) {
       text.add({passes(row) ? "pass" : "FAIL", row.term, row.paper ? row.paper->text : "-",
                 fmt::format("{:.6g}", row.ours), row.unit});
     }
     text.print();
-    fmt::print("\n");
+    say("\n");
   }
   for (const reproduction::Table& table : found.tables) {
     for (const Row& row : table.rows) {
-      if (!passes(row)) fmt::print("{}, {}: {}\n", table.name, row.term, reason_text(row));
+      if (!passes(row)) say("{}, {}: {}\n", table.name, row.term, reason_text(row));
     }
   }
-  fmt::print("{} of {} rows pass\n", passed_count(found), row_count(found));
+  say("{} of {} rows pass\n", passed_count(found), row_count(found));
 }
 
 /// The recording of a real unit, read as estimate reads one.
@@ -116,6 +116,10 @@ reproduction::RealRecording real_recording(const std::string& path, const Readin
 }
 
 ExitStatus run_reproduce(const ReproduceCommandOptions& options, const CommonOptions& common) {
+  const auto path = [&](const char* name) {
+    return (std::filesystem::path(options.folder) / name).string();
+  };
+  require_apart(common, {path("report.html"), path("reproduction.json")});
   make_result_folder(options.folder);
   reproduction::ReproduceOptions settings;
   settings.seed = common.seed;
@@ -131,9 +135,6 @@ ExitStatus run_reproduce(const ReproduceCommandOptions& options, const CommonOpt
     found = reproduction::reproduce(settings, bar.progress());
   }
   const Json object = with_head(common, reproduction_json(found, common, inputs));
-  const auto path = [&](const char* name) {
-    return (std::filesystem::path(options.folder) / name).string();
-  };
   io::write_text_file(
       path("report.html"),
       reproduction::reproduction_page(found, jobs::with_inputs(provenance_of(common), inputs)));

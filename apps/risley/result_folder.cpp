@@ -3,11 +3,12 @@
 #include "result_folder.hpp"
 
 #include <filesystem>
+#include <utility>
+#include <variant>
 
 #include <fmt/format.h>
 
 #include "risley/core/error.hpp"
-#include "risley/io/text_file.hpp"
 
 #include "option_names.hpp"
 
@@ -37,10 +38,23 @@ void make_result_folder(const std::string& folder) {
   }
 }
 
-void write_report_of(const report::Report& report, const std::string& folder) {
-  const std::filesystem::path place(folder);
-  report::write_report((place / "report.json").string(), report);
-  io::write_text_file((place / "report.html").string(), page_of(report));
+void require_folder_apart(const CommonOptions& common, const std::string& folder,
+                          std::vector<std::string> states) {
+  if (folder.empty()) return;
+  std::vector<std::string> outputs = std::move(states);
+  outputs.insert(outputs.end(), {"calibration.yaml", "report.json", "report.html"});
+  for (std::string& name : outputs) name = (std::filesystem::path(folder) / name).string();
+  require_apart(common, outputs);
+}
+
+std::vector<jobs::NamedText> report_texts(report::Report report) {
+  std::visit(
+      [](auto& one) {
+        put_flags(one.warnings);
+        one.reason = with_flags(one.reason);
+      },
+      report);
+  return {{"report.json", report::report_text(report)}, {"report.html", page_of(report)}};
 }
 
 std::string page_of(const report::Report& report) {

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "risley/jobs/result_files.hpp"
 #include "risley/report/report_file.hpp"
@@ -22,8 +23,13 @@ jobs::ResultFiles result_files(const std::string& folder, const std::string& sta
 /// Makes a folder for results, before an hour of computing. @throws FileError
 void make_result_folder(const std::string& folder);
 
-/// report.json and the page report.html in a folder for results.
-void write_report_of(const report::Report& report, const std::string& folder);
+/// As require_apart(), for a verb that writes a folder for results.
+/// @param states  names of files of rotor states
+void require_folder_apart(const CommonOptions& common, const std::string& folder,
+                          std::vector<std::string> states);
+
+/// report.json and the page report.html.
+std::vector<jobs::NamedText> report_texts(report::Report report);
 /// The page; what it says of options is in words of the command.
 std::string page_of(const report::Report& report);
 

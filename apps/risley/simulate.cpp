@@ -88,10 +88,10 @@ std::vector<NamedValue> true_values(const simulation::SimulationResult& result) 
 }
 
 void print_result(const SimulateOptions& options, const simulation::SimulationResult& result) {
-  fmt::print("{}: {} observations, {} without a return\n", options.output,
-             grouped(result.observations), grouped(result.no_return));
-  fmt::print("truth: {}, {}\n\n", simulation::truth_preset_path(options.output),
-             simulation::truth_columns_path(options.output));
+  say("{}: {} observations, {} without a return\n", options.output, grouped(result.observations),
+      grouped(result.no_return));
+  say("truth: {}, {}\n\n", simulation::truth_preset_path(options.output),
+      simulation::truth_columns_path(options.output));
   Table table({"parameter", "truth", "unit"});
   for (const NamedValue& value : true_values(result)) {
     table.add({value.name, fmt::format("{:.8g}", value.value), value.unit});
@@ -141,6 +141,8 @@ Run declare_simulate(CLI::App& verb) {
                   "Rotation angles at the start, A,B (default: random from the seed)")
       ->delimiter(',');
   return [options](const CommonOptions& common) {
+    require_apart(common, {options->output, simulation::truth_preset_path(options->output),
+                           simulation::truth_columns_path(options->output)});
     simulation::SimulationSettings settings = settings_from(*options, common);
     spdlog::debug("{} s of sensor {}, seed {}", settings.duration, settings.truth.name,
                   settings.seed);

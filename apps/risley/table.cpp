@@ -6,6 +6,8 @@
 
 #include <fmt/format.h>
 
+#include "command.hpp"
+
 namespace risley::app {
 
 Table::Table(std::vector<std::string> head) : has_head_(!head.empty()) {
@@ -29,8 +31,8 @@ void Table::print() const {
                                  : fmt::format("{:<{}}", cell, width[i]);
     }
     line.erase(line.find_last_not_of(' ') + 1);
-    fmt::print("{}\n", line);
-    if (r == 0 && has_head_) fmt::print("{}\n", std::string(line.size(), '-'));
+    app::say("{}\n", line);
+    if (r == 0 && has_head_) app::say("{}\n", std::string(line.size(), '-'));
   }
 }
 

@@ -5,7 +5,10 @@
 #include <algorithm>
 #include <cctype>
 #include <cstddef>
+#include <cstdint>
 #include <vector>
+
+#include <fmt/format.h>
 
 namespace risley {
 namespace {
@@ -36,6 +39,36 @@ std::size_t distance(const std::string& a, const std::string& b) {
   return last.back();
 }
 
+/// A character of UTF-8 at the front of a text.
+struct Utf8Character {
+  std::uint32_t code = 0;
+  std::size_t bytes = 0;  ///< 0 where there is none
+};
+
+Utf8Character first_character(std::string_view text) {
+  constexpr std::uint32_t kLeast[] = {0, 0, 0x80, 0x800, 0x10000};  // by the number of bytes
+  constexpr std::uint32_t kGreatest = 0x10ffff, kFirstSurrogate = 0xd800, kLastSurrogate = 0xdfff;
+  const auto byte = [text](std::size_t i) { return static_cast<unsigned char>(text[i]); };
+  const unsigned char lead = byte(0);
+  if (lead < 0x80U) return {lead, 1};
+  const std::size_t bytes = lead >= 0xf0U ? 4 : lead >= 0xe0U ? 3 : 2;
+  if (lead < 0xc0U || lead > 0xf7U || text.size() < bytes) return {};
+  std::uint32_t code = lead & (0x7fU >> bytes);
+  for (std::size_t i = 1; i < bytes; ++i) {
+    if ((byte(i) & 0xc0U) != 0x80U) return {};
+    code = code << 6U | (byte(i) & 0x3fU);
+  }
+  const bool surrogate = code >= kFirstSurrogate && code <= kLastSurrogate;
+  if (code < kLeast[bytes] || code > kGreatest || surrogate) return {};
+  return {code, bytes};
+}
+
+/// Control characters of C0 and C1, line separators, and marks of the direction of writing.
+bool is_obeyed(std::uint32_t code) {
+  return code < 0x20 || (code >= 0x7f && code <= 0x9f) || (code >= 0x2028 && code <= 0x202e) ||
+         (code >= 0x2066 && code <= 0x2069);
+}
+
 }  // namespace
 
 std::string lower_case(std::string text) {
@@ -59,6 +92,24 @@ std::string near_miss(std::string_view word, std::span<const std::string> names)
     }
   }
   return best;
+}
+
+std::string printable(std::string_view text, bool lines) {
+  std::string shown;
+  shown.reserve(text.size());
+  while (!text.empty()) {
+    const Utf8Character first = first_character(text);
+    const bool stays = first.code == '\t' || (lines && first.code == '\n');
+    if (first.bytes == 0) {
+      shown += fmt::format("\\x{:02x}", static_cast<unsigned char>(text.front()));
+    } else if (is_obeyed(first.code) && !stays) {
+      shown += fmt::format("\\u{:04x}", first.code);
+    } else {
+      shown += text.substr(0, first.bytes);
+    }
+    text.remove_prefix(std::max<std::size_t>(first.bytes, 1));
+  }
+  return shown;
 }
 
 }  // namespace risley

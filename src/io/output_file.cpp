@@ -2,18 +2,24 @@
 // SPDX-License-Identifier: MIT
 #include "risley/io/output_file.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
+#include <map>
+#include <mutex>
+#include <string_view>
 #include <system_error>
 #include <utility>
+#include <vector>
 
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <sys/random.h>
 #include <sys/stat.h>
+#include <sys/vfs.h>
 #include <unistd.h>
 
 #include "risley/core/error.hpp"
@@ -26,6 +32,7 @@ namespace fs = std::filesystem;
 constexpr int kMostLinks = 40;   // as the kernel follows
 constexpr int kMostTries = 100;  // of names that all exist already
 constexpr mode_t kModeBits = 0777;
+constexpr std::string_view kLetters = "abcdefghijklmnopqrstuvwxyz234567";
 
 [[noreturn]] void refuse(const std::string& path, int error) {
   throw FileError(path, {}, fmt::format("cannot be written: {}", std::strerror(error)));
@@ -54,8 +61,86 @@ std::string random_name() {
     throw std::system_error(errno, std::generic_category(), "getrandom");
   }
   std::string name;
-  for (const unsigned char byte : bytes) name += "abcdefghijklmnopqrstuvwxyz234567"[byte % 32];
+  for (const unsigned char byte : bytes) name += kLetters[byte % kLetters.size()];
   return name;
+}
+
+constexpr std::string_view kMark = ".part-";
+constexpr std::size_t kMarkBytes = 18;  // with the random name
+constexpr std::size_t kLongestName = 255;
+
+/// The name of a file with what every temporary of it begins with.
+std::string marked(const std::string& name) {
+  return name.substr(0, kLongestName - kMarkBytes).append(kMark);
+}
+
+/// File systems where a lock is of the whole file, so that the temporary's own writers would wait.
+bool locks_are_shared(int file) {
+  constexpr std::array<unsigned, 3> kNetworkTypes = {0x6969, 0xff534d42, 0xfe534d42};  // NFS, SMB
+  struct statfs system {};
+  return ::fstatfs(file, &system) != 0 ||
+         std::find(kNetworkTypes.begin(), kNetworkTypes.end(),
+                   static_cast<unsigned>(system.f_type)) != kNetworkTypes.end();
+}
+
+bool is_named(int file, const std::string& path) {
+  struct stat opened {
+  }, named{};
+  return ::fstat(file, &opened) == 0 && ::lstat(path.c_str(), &named) == 0 &&
+         opened.st_dev == named.st_dev && opened.st_ino == named.st_ino;
+}
+
+/// Marks an open file as one that somebody is writing. The kernel takes the lock back when its
+/// owner ends in whatever way; numbers of processes, which containers share, play no part.
+/// @return whether this is its only owner; nobody is where there are no such locks
+bool lock(int file) {
+  if (locks_are_shared(file)) return false;
+  struct flock whole_file {};
+  whole_file.l_type = F_WRLCK;
+  whole_file.l_whence = SEEK_SET;
+  return ::fcntl(file, F_OFD_SETLK, &whole_file) == 0;
+}
+
+/// Removes a temporary whose owner was killed.
+void remove_orphan(const std::string& path) {
+  const int file =
+      whole([&] { return ::open(path.c_str(), O_RDWR | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC); });
+  if (file < 0) return;
+  struct stat status {};
+  const bool ours = ::fstat(file, &status) == 0 && S_ISREG(status.st_mode) &&
+                    status.st_uid == ::geteuid() && status.st_nlink == 1;
+  // Its owner, if it was about to lock it, finds the name gone and takes another.
+  if (ours && lock(file) && is_named(file, path)) ::unlink(path.c_str());
+  ::close(file);
+}
+
+/// Removes the temporaries of runs that were killed while they wrote this output. A folder is
+/// listed once by a process: those that come later are of its own time.
+void remove_orphans(const fs::path& output) {
+  static std::mutex mutex;
+  static std::map<std::string, std::vector<std::string>> temporaries;  // by their folder
+  const std::string folder = output.has_parent_path() ? output.parent_path().string() : ".";
+  const std::scoped_lock guard(mutex);
+  const auto [found, is_new] = temporaries.try_emplace(folder);
+  if (is_new) {
+    std::error_code code;
+    for (fs::directory_iterator at(folder, code), end; !code && at != end; at.increment(code)) {
+      const std::string name = at->path().filename().string();
+      if (name.size() <= kMarkBytes) continue;
+      const std::string_view ending = std::string_view(name).substr(name.size() - kMarkBytes);
+      if (ending.starts_with(kMark) &&
+          ending.find_first_not_of(kLetters, kMark.size()) == std::string_view::npos) {
+        found->second.push_back(name);
+      }
+    }
+  }
+  const std::string beginning = marked(output.filename().string());
+  std::erase_if(found->second, [&](const std::string& name) {
+    const bool of_this =
+        name.size() == beginning.size() + kMarkBytes - kMark.size() && name.starts_with(beginning);
+    if (of_this) remove_orphan((fs::path(folder) / name).string());
+    return of_this;
+  });
 }
 
 /// Writes all the bytes of a file into an open one.
@@ -112,13 +197,22 @@ OutputFile::OutputFile(std::string path) : path_(std::move(path)) {
       mode = (before.st_mode & kModeBits) | S_IRUSR | S_IWUSR;  // nobody else reads it meanwhile
     }
     const fs::path beside = copied_ ? fs::temp_directory_path() / "risley" : target;
+    remove_orphans(beside);
+    const std::string beginning =
+        (beside.parent_path() / marked(beside.filename().string())).string();
     for (int tries = 0; temporary_ < 0; ++tries) {
-      temporary_path_ = fmt::format("{}.part-{}", beside.string(), random_name());
+      if (tries == kMostTries) refuse(path_, EEXIST);
+      temporary_path_ = beginning + random_name();
       temporary_ = whole([&] {
         return ::open(temporary_path_.c_str(), O_RDWR | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC,
                       mode);
       });
-      if (temporary_ < 0 && (errno != EEXIST || tries == kMostTries)) refuse(path_, errno);
+      if (temporary_ < 0 && errno != EEXIST) refuse(path_, errno);
+      if (temporary_ < 0) continue;
+      lock(temporary_);
+      if (is_named(temporary_, temporary_path_)) continue;  // nobody took it for an orphan
+      ::close(temporary_);
+      temporary_ = -1;
     }
   } catch (const std::system_error& error) {
     throw FileError(path_, {}, fmt::format("cannot be written: {}", error.code().message()));
@@ -138,16 +232,21 @@ OutputFile::~OutputFile() {
   if (!temporary_path_.empty()) ::unlink(temporary_path_.c_str());
 }
 
-void OutputFile::commit() {
-  struct stat written {
-  }, named{}, before{};
-  if (::fstat(temporary_, &written) != 0 || ::lstat(temporary_path_.c_str(), &named) != 0) {
-    refuse(path_, errno);
-  }
-  if (written.st_dev != named.st_dev || written.st_ino != named.st_ino) {
+void OutputFile::sync() {
+  if (!is_named(temporary_, temporary_path_)) {
     throw FileError(path_, {},
                     fmt::format("cannot be written: {} was replaced meanwhile", temporary_path_));
   }
+  struct stat before {};
+  if (!copied_ && ::stat(target_.c_str(), &before) == 0 &&
+      ::fchmod(temporary_, before.st_mode & kModeBits) != 0) {
+    refuse(path_, errno);
+  }
+  if (whole([&] { return ::fsync(temporary_); }) != 0) refuse(path_, errno);
+}
+
+void OutputFile::commit() {
+  sync();
   if (copied_) {
     const int target =
         whole([&] { return ::open(target_.c_str(), O_WRONLY | O_TRUNC | O_CLOEXEC | O_NOCTTY); });
@@ -158,11 +257,6 @@ void OutputFile::commit() {
     temporary_path_.clear();
     return;
   }
-  if (::stat(target_.c_str(), &before) == 0 &&
-      ::fchmod(temporary_, before.st_mode & kModeBits) != 0) {
-    refuse(path_, errno);
-  }
-  if (whole([&] { return ::fsync(temporary_); }) != 0) refuse(path_, errno);
   if (::rename(temporary_path_.c_str(), target_.c_str()) != 0) refuse(path_, errno);
   temporary_path_.clear();
   const fs::path folder = fs::path(target_).parent_path();

@@ -13,23 +13,37 @@
 
 namespace risley::io {
 
+namespace {
+
+void require_done(bool done) {
+  if (!done) throw Error("SHA-256: the cryptographic library refuses it");
+}
+
+}  // namespace
+
 std::string sha256_of_file(const std::string& path, const Progress& progress) {
   const std::unique_ptr<EVP_MD_CTX, void (*)(EVP_MD_CTX*)> context(EVP_MD_CTX_new(),
                                                                    EVP_MD_CTX_free);
-  const auto require = [](bool done) {
-    if (!done) throw Error("SHA-256: the cryptographic library refuses it");
-  };
-  require(context && EVP_DigestInit_ex(context.get(), EVP_sha256(), nullptr) == 1);
+  require_done(context && EVP_DigestInit_ex(context.get(), EVP_sha256(), nullptr) == 1);
   read_bytes(path, [&](std::span<const char> bytes) {
     progress.check();
-    require(EVP_DigestUpdate(context.get(), bytes.data(), bytes.size()) == 1);
+    require_done(EVP_DigestUpdate(context.get(), bytes.data(), bytes.size()) == 1);
   });
   unsigned char digest[EVP_MAX_MD_SIZE];
   unsigned int length = 0;
-  require(EVP_DigestFinal_ex(context.get(), digest, &length) == 1);
+  require_done(EVP_DigestFinal_ex(context.get(), digest, &length) == 1);
   std::string text;
   for (unsigned int i = 0; i < length; ++i) text += fmt::format("{:02x}", digest[i]);
   return text;
+}
+
+std::string sha256_base64(std::string_view text) {
+  unsigned char digest[EVP_MAX_MD_SIZE];
+  unsigned int length = 0;
+  require_done(EVP_Digest(text.data(), text.size(), digest, &length, EVP_sha256(), nullptr) == 1);
+  unsigned char encoded[2 * EVP_MAX_MD_SIZE];
+  const int characters = EVP_EncodeBlock(encoded, digest, static_cast<int>(length));
+  return {encoded, encoded + characters};
 }
 
 }  // namespace risley::io

@@ -70,7 +70,14 @@ std::string kind_of(const YamlNode& node) {
 YamlNode parse_yaml(const std::string& text, const std::string& path) {
   try {
     std::size_t nodes = 0;
-    return copied(YAML::Load(text), path, nodes);
+    const std::vector<YAML::Node> documents = YAML::LoadAll(text);
+    if (documents.empty()) return {};
+    if (documents.size() > 1) {
+      fail_at(
+          path, line_of(documents[1].Mark()),
+          fmt::format("a second document (after ---), expected one: {} of them", documents.size()));
+    }
+    return copied(documents.front(), path, nodes);
   } catch (const YAML::Exception& error) {
     fail_at(path, line_of(error.mark), fmt::format("is not YAML: {}", error.msg));
   }
@@ -112,7 +119,7 @@ YamlMap::YamlMap(const YamlNode& node, std::string path, std::string field)
   for (std::size_t i = 0; i < node.items.size(); i += 2) {
     const std::size_t line = node.items[i].line;
     const std::string key = yaml_text(node.items[i], path_, fmt::format("a key of {}", called));
-    if (find(key) != nullptr)
+    if (!places_.emplace(key, entries_.size()).second)
       fail_at(path_, line, fmt::format("{} stands twice", this->field(key)));
     entries_.push_back({key, line, node.items[i + 1]});
   }
@@ -128,9 +135,8 @@ void YamlMap::allow_only(std::initializer_list<std::string_view> keys) const {
 }
 
 const YamlMap::Entry* YamlMap::find(std::string_view key) const {
-  const auto found = std::find_if(entries_.begin(), entries_.end(),
-                                  [key](const Entry& entry) { return entry.key == key; });
-  return found == entries_.end() ? nullptr : &*found;
+  const auto found = places_.find(key);
+  return found == places_.end() ? nullptr : &entries_[found->second];
 }
 
 const YamlMap::Entry& YamlMap::at(std::string_view key) const {

@@ -129,10 +129,12 @@ void write_files(const CalibrateRecordingsOptions& options, CalibratedRecordings
     sensors::Sensor calibrated = result.calibration.sensor;
     calibrated.provenance = result.provenance;
     folder.add_calibration(calibrated);
-  } else {
-    folder.remove_calibration();
   }
-  folder.commit();
+  if (options.texts) {
+    for (const NamedText& text : options.texts(result)) folder.add_text(text);
+  }
+  progress.check();
+  for (std::string& text : folder.commit()) result.warnings.push_back(std::move(text));
 }
 
 }  // namespace
@@ -142,31 +144,25 @@ CalibratedRecordings calibrate_recordings(const CalibrateRecordingsOptions& opti
   calibration::CalibrationOptions settings = checked_settings(options);
   ResultFolder folder(options.files.folder);
   CalibratedRecordings result;
-  try {
-    std::vector<RangedRecording> recordings;
-    for (std::size_t r = 0; r < options.recordings.size(); ++r) {
-      recordings.push_back(read_and_estimate(options, r, folder, result, progress));
-    }
-    settings.sensor = result.nominal;
-    for (const auto& [name, value] : settings.fixed) {
-      if (value) check_bounds(find_parameter(name, settings.sensor.shape()), *value);
-    }
-    const Stopwatch watch;
-    const Progress calibrating = progress.stage("calibrating");
-    result.calibration = calibration::calibrate(recordings, settings, calibrating);
-    result.solving_time = watch.seconds();
-    if (!options.truths.empty()) {
-      result.truth =
-          compare_beams(recordings, result.calibration, options.truths, calibrating.silent());
-    }
-    if (options.details) {
-      result.details =
-          calibration_details(result.calibration, options.recordings.size(),
-                              wall_sample(recordings, result.calibration), result.truth);
-    }
-  } catch (const EstimationError&) {
-    folder.remove_calibration();
-    throw;
+  std::vector<RangedRecording> recordings;
+  for (std::size_t r = 0; r < options.recordings.size(); ++r) {
+    recordings.push_back(read_and_estimate(options, r, folder, result, progress));
+  }
+  settings.sensor = result.nominal;
+  for (const auto& [name, value] : settings.fixed) {
+    if (value) check_bounds(find_parameter(name, settings.sensor.shape()), *value);
+  }
+  const Stopwatch watch;
+  const Progress calibrating = progress.stage("calibrating");
+  result.calibration = calibration::calibrate(recordings, settings, calibrating);
+  result.solving_time = watch.seconds();
+  if (!options.truths.empty()) {
+    result.truth =
+        compare_beams(recordings, result.calibration, options.truths, calibrating.silent());
+  }
+  if (options.details) {
+    result.details = calibration_details(result.calibration, options.recordings.size(),
+                                         wall_sample(recordings, result.calibration), result.truth);
   }
   if (folder) write_files(options, result, folder, progress.silent());
   return result;

@@ -32,19 +32,21 @@ void check(const EstimateRecordingOptions& options) {
   if (!options.truth.empty()) check_truth_name(options.truth);
 }
 
-void write_files(const EstimateRecordingOptions& options, const EstimatedRecording& result,
+void write_files(const EstimateRecordingOptions& options, EstimatedRecording& result,
                  ResultFolder& folder, const Progress& progress) {
   if (result.estimate.converged) {
     sensors::Sensor calibrated = result.estimate.sensor;
     calibrated.provenance = result.provenance;
     calibrated.serial = result.recording.serial();
     folder.add_calibration(calibrated);
-  } else {
-    folder.remove_calibration();
   }
   folder.add_states("states.nc", result.estimate, options.files.states, result.provenance,
                     progress);
-  folder.commit();
+  if (options.texts) {
+    for (const NamedText& text : options.texts(result)) folder.add_text(text);
+  }
+  progress.check();
+  for (std::string& text : folder.commit()) result.warnings.push_back(std::move(text));
 }
 
 /// What rotors say of the clock that turn too fast or too slowly all by the same factor.
@@ -110,13 +112,8 @@ EstimatedRecording estimate_recording(const EstimateRecordingOptions& options,
   result.head = std::move(input.head);
   result.reading_time = input.reading_time;
   const Stopwatch watch;
-  try {
-    result.estimate = estimation::estimate(options.method, std::move(input.series), result.head,
-                                           settings, progress.stage("estimating"));
-  } catch (const EstimationError&) {
-    folder.remove_calibration();
-    throw;
-  }
+  result.estimate = estimation::estimate(options.method, std::move(input.series), result.head,
+                                         settings, progress.stage("estimating"));
   result.solving_time = watch.seconds();
   if (const auto& factor = result.estimate.speed_factor) {
     result.warnings.push_back(clock_words(*factor, result.recording.header.counted_rate));

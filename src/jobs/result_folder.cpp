@@ -2,18 +2,49 @@
 // SPDX-License-Identifier: MIT
 #include "jobs/result_folder.hpp"
 
+#include <algorithm>
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <regex>
 
+#include <fcntl.h>
 #include <fmt/format.h>
 
 #include "risley/core/error.hpp"
+#include "risley/io/text_file.hpp"
 #include "risley/jobs/states_file.hpp"
 #include "risley/sensors/preset.hpp"
 
 namespace risley::jobs {
 
 namespace fs = std::filesystem;
+
+namespace {
+
+/// Gives a file a name that nothing has: calibration.earlier.yaml, calibration.earlier-2.yaml, ...
+std::string set_aside(const fs::path& file) {
+  for (int number = 1;; ++number) {
+    fs::path aside = file;
+    aside.replace_extension(fmt::format(
+        ".earlier{}{}", number == 1 ? "" : fmt::format("-{}", number), file.extension().string()));
+    if (fs::exists(fs::symlink_status(aside))) continue;
+    if (::renameat2(AT_FDCWD, file.c_str(), AT_FDCWD, aside.c_str(), RENAME_NOREPLACE) == 0) {
+      return aside.string();
+    }
+    if (errno == EEXIST) continue;
+    // A file system that cannot promise it.
+    if (errno != EINVAL || ::rename(file.c_str(), aside.c_str()) != 0) {
+      throw FileError(aside.string(), {},
+                      fmt::format("cannot be written: {}", std::strerror(errno)));
+    }
+    return aside.string();
+  }
+}
+
+}  // namespace
 
 ResultFolder::ResultFolder(const std::string& folder) : folder_(folder) {
   if (folder_.empty()) return;
@@ -51,21 +82,58 @@ void ResultFolder::add_states(const std::string& name, const estimation::Estimat
 
 void ResultFolder::add_calibration(const sensors::Sensor& sensor) {
   if (folder_.empty()) return;
-  const io::OutputFile& file = files_.emplace_back(path("calibration.yaml"));
-  std::ofstream stream(file.temporary_path(), std::ios::binary);
-  stream << sensors::preset_text(sensor);
-  stream.close();
-  if (!stream) throw FileError(file.path(), {}, "cannot be written");
+  write("calibration.yaml", sensors::preset_text(sensor));
 }
 
-void ResultFolder::remove_calibration() const {
-  std::error_code ignored;
-  if (!folder_.empty()) fs::remove(path("calibration.yaml"), ignored);
+void ResultFolder::add_text(const NamedText& text) {
+  if (!folder_.empty()) write(text.name, text.text);
 }
 
-void ResultFolder::commit() {
+std::vector<std::string> ResultFolder::commit() {
+  std::vector<std::string> moves;
+  if (folder_.empty()) return moves;
+  for (io::OutputFile& file : files_) file.sync();
   committed_ = true;
+  // From here on the folder holds files of two runs.
+  io::write_text_file(path(kIncomplete),
+                      "The files beside this one may be of different runs: the last one was "
+                      "stopped while it gave its\nresults their names. Run it again.\n");
+  for (const std::string& name : left_over()) {
+    const std::string aside = set_aside(path(name));
+    moves.push_back(fmt::format("{} is of an earlier run, and this one has none: it is {} now",
+                                path(name), aside));
+  }
   for (io::OutputFile& file : files_) file.commit();
+  std::error_code code;
+  if (!fs::remove(path(kIncomplete), code)) {
+    throw FileError(path(kIncomplete), {}, fmt::format("cannot be removed: {}", code.message()));
+  }
+  return moves;
+}
+
+void ResultFolder::write(const std::string& name, const std::string& text) {
+  const io::OutputFile& file = files_.emplace_back(path(name));
+  std::ofstream stream(file.temporary_path(), std::ios::binary);
+  stream << text;
+  stream.close();
+  if (!stream) {
+    throw FileError(file.path(), {}, fmt::format("cannot be written: {}", std::strerror(errno)));
+  }
+}
+
+std::vector<std::string> ResultFolder::left_over() const {
+  static const std::regex results(
+      "(calibration\\.yaml|states(_[0-9]+)?\\.nc|report\\.(json|html))");
+  std::vector<std::string> names;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder_)) {
+    const std::string name = entry.path().filename().string();
+    const bool replaced =
+        std::any_of(files_.begin(), files_.end(),
+                    [&](const io::OutputFile& file) { return file.path() == path(name); });
+    if (!replaced && std::regex_match(name, results)) names.push_back(name);
+  }
+  std::sort(names.begin(), names.end());
+  return names;
 }
 
 std::string ResultFolder::path(const std::string& name) const {

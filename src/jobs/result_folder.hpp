@@ -4,6 +4,7 @@
 
 #include <list>
 #include <string>
+#include <vector>
 
 #include "risley/core/progress.hpp"
 #include "risley/estimation/estimate.hpp"
@@ -30,13 +31,16 @@ class ResultFolder {
                   const Provenance& provenance, const Progress& progress);
   /// calibration.yaml.
   void add_calibration(const sensors::Sensor& sensor);
-  /// Takes the calibration of an earlier run out of the folder.
-  void remove_calibration() const;
+  void add_text(const NamedText& text);
   /// Gives all files their names.
-  void commit();
+  /// @return what happened to results of an earlier run, in sentences
+  std::vector<std::string> commit();
 
  private:
   std::string path(const std::string& name) const;
+  void write(const std::string& name, const std::string& text);
+  /// Results of an earlier run that this one does not replace, by name.
+  std::vector<std::string> left_over() const;
 
   std::string folder_;
   bool made_ = false, committed_ = false;

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <concepts>
 #include <cstddef>
+#include <cstdint>
 #include <limits>
 #include <optional>
 #include <span>
@@ -152,6 +153,9 @@ void from_json(const Json& json, const std::string& place, T& value) {
     value = json.get<bool>();
   } else if constexpr (std::is_integral_v<T>) {
     expect(json.is_number_integer(), place, "a whole number", json);
+    const bool fits = json.is_number_unsigned() ? std::in_range<T>(json.get<std::uint64_t>())
+                                                : std::in_range<T>(json.get<std::int64_t>());
+    if (!fits) throw FieldError(place + ": " + json.dump() + " is out of range");
     value = json.get<T>();
   } else if constexpr (std::same_as<T, std::string>) {
     expect(json.is_string(), place, "a text", json);

@@ -120,7 +120,8 @@
   }
 
   function tip(one) {
-    const row = (name, value) => name + ': <b>' + value + '</b>';
+    const escaped = echarts.format.encodeHTML; // names come from files
+    const row = (name, value) => escaped(name) + ': <b>' + value + '</b>';
     const digits = { x: digitsOf(every(one, 'x')), y: digitsOf(every(one, 'y')) };
     const text = (item) => {
       const rows = [row(one.x_label, rounded(item.value[0], digits.x)),
@@ -128,7 +129,7 @@
       if (one.z_label) rows.push(row(one.z_label, short(item.value[2])));
       const value = item.value[one.z_label ? 3 : 2];
       if (one.value_label && value !== undefined) rows.push(row(one.value_label, short(value)));
-      return (item.seriesName ? item.seriesName + '<br>' : '') + rows.join('<br>');
+      return (item.seriesName ? escaped(item.seriesName) + '<br>' : '') + rows.join('<br>');
     };
     const lines = one.series.some((series) => series.kind === 'line' || series.kind === 'steps');
     return {

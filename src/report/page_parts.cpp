@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "risley/io/sha256.hpp"
 #include "risley/report/html.hpp"
 
 #include "report/page_assets.hpp"
@@ -18,6 +19,45 @@ namespace {
 constexpr std::string_view kFirstScript =
     "document.documentElement.dataset.theme = "
     "matchMedia('(prefers-color-scheme: dark)').matches ? 'dark' : 'light';";
+
+/// ECharts GL makes functions of texts such as "[width * 1.0 / 2, height / 2]", the sizes of its
+/// textures, which a page whose policy forbids to run texts must understand itself.
+constexpr std::string_view kSizesScript = R"js(
+(function () {
+  'use strict';
+  const term = /^(width|height)(?: \* 1\.0)?(?: \/ (\d+))?$/;
+  const sizes = (text) => {
+    const list = /^\[(.*)\]$/.exec(text);
+    const terms = (list ? list[1] : text).split(',').map((one) => {
+      const found = term.exec(one.trim());
+      if (!found) throw new Error('no size of a texture: ' + one);
+      return [found[1], Number(found[2] || 1)];
+    });
+    return (width, height) => {
+      const values = terms.map(([side, parts]) => (side === 'width' ? width : height) / parts);
+      return list ? values : values[0];
+    };
+  };
+  window.Function = new Proxy(window.Function, {
+    construct: (target, words) => (words[0] === 'width' && words.length === 4
+      ? sizes(words[3].replace('return', '').trim()) : Reflect.construct(target, words)),
+  });
+})();
+)js";
+
+/// What the browser may do with a page: run the scripts and use the style sheet that are written in
+/// it, and nothing that a name in its texts could smuggle in. Widths and colours of cells are
+/// attributes; pictures are those that diagrams save.
+std::string policy(std::string_view style, const std::vector<std::string_view>& scripts) {
+  std::string text = "default-src 'none'; script-src";
+  for (const std::string_view script : scripts) {
+    text += fmt::format(" 'sha256-{}'", io::sha256_base64(script));
+  }
+  return text + fmt::format(
+                    "; style-src-elem 'sha256-{}'; style-src-attr 'unsafe-inline'; "
+                    "img-src data: blob:; base-uri 'none'; form-action 'none'",
+                    io::sha256_base64(style));
+}
 
 }  // namespace
 
@@ -151,16 +191,21 @@ std::string charts_html(const std::vector<Chart>& charts, Figures& figures) {
 
 std::string page_html(const std::string& title, const std::string& lead,
                       const std::string& body_html, const Figures& figures) {
+  std::vector<std::string_view> scripts = {kFirstScript, echarts_script()};
+  if (figures.has_space()) scripts.insert(scripts.end(), {kSizesScript, echarts_gl_script()});
+  scripts.push_back(page_script());
   std::string page = fmt::format(
       "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
+      "<meta http-equiv=\"Content-Security-Policy\" content=\"{}\">\n"
       "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
       "<link rel=\"icon\" "
-      "href=\"data:,\">\n<title>{}</title>\n<style>\n{}</style>\n<script>{}</script>\n</head>\n"
+      "href=\"data:,\">\n<title>{}</title>\n<style>{}</style>\n<script>{}</script>\n</head>\n"
       "<body>\n<main>\n<button id=\"theme\" type=\"button\">Light / dark</button>\n<h1>{}</h1>\n"
       "<p class=\"lead\">{}</p>\n"
       "<noscript><p class=\"verdict care\">The diagrams need JavaScript, which is off here. "
       "Texts and tables are complete.</p></noscript>\n",
-      escape_html(title), page_style(), kFirstScript, escape_html(title), escape_html(lead));
+      policy(page_style(), scripts), escape_html(title), page_style(), kFirstScript,
+      escape_html(title), escape_html(lead));
   page += body_html;
   page +=
       "<p class=\"note help\">Diagrams: point at them for values; draw a box to zoom, double-click "
@@ -172,18 +217,14 @@ std::string page_html(const std::string& title, const std::string& lead,
       "<footer>Diagrams by Apache ECharts (Apache License 2.0)";
   page +=
       figures.has_space() ? " and ECharts GL (BSD 3-Clause License).</footer>\n" : ".</footer>\n";
-  page += "</main>\n<script>";
-  page += echarts_script();
-  page += "</script>\n";
-  if (figures.has_space()) {
+  page += "</main>\n<script type=\"application/json\" id=\"page-data\">\n" + figures.data();
+  page += "\n</script>\n";
+  for (std::size_t i = 1; i < scripts.size(); ++i) {
     page += "<script>";
-    page += echarts_gl_script();
+    page += scripts[i];
     page += "</script>\n";
   }
-  page += "<script type=\"application/json\" id=\"page-data\">\n" + figures.data();
-  page += "\n</script>\n<script>\n";
-  page += page_script();
-  page += "</script>\n</body>\n</html>\n";
+  page += "</body>\n</html>\n";
   return page;
 }
 

@@ -10,6 +10,7 @@
 #include "risley/report/estimate_page.hpp"
 
 #include "report/chart_fields.hpp"
+#include "report/check_report.hpp"
 #include "report/json_archive.hpp"
 
 namespace risley {
@@ -304,12 +305,16 @@ const char* verb_of(const Report& report) {
   return std::holds_alternative<EstimateReport>(report) ? "estimate" : "calibrate";
 }
 
-void write_report(const std::string& path, const Report& report) {
+std::string report_text(const Report& report) {
   const Json body = std::visit([](const auto& one) { return to_json(one); }, report);
   Json object = {
       {"format", kFormat}, {"format_version", kFormatVersion}, {"verb", verb_of(report)}};
   object.update(body);
-  io::write_text_file(path, object.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n");
+  return object.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+void write_report(const std::string& path, const Report& report) {
+  io::write_text_file(path, report_text(report));
 }
 
 Report read_report(const std::string& path) {
@@ -319,6 +324,8 @@ Report read_report(const std::string& path) {
     object = Json::parse(text);
   } catch (const Json::parse_error& error) {
     throw FileError(path, {error.byte, {}}, "the text is no JSON from here on");
+  } catch (const Json::exception& error) {  // a number beyond all that can be stored
+    throw FileError(path, {}, fmt::format("is no JSON that can be read: {}", error.what()));
   }
   try {
     archive::expect(object.is_object(), "the file", "an object", object);
@@ -338,11 +345,13 @@ Report read_report(const std::string& path) {
     if (verb == "estimate") {
       EstimateReport report;
       fields(reader, report);
+      check_report(report);
       return report;
     }
     if (verb == "calibrate") {
       CalibrationReport report;
       fields(reader, report);
+      check_report(report);
       return report;
     }
     throw FieldError(fmt::format("verb: expected estimate or calibrate, found '{}'", verb));

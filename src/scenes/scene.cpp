@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
+#include <string>
 #include <tuple>
 #include <utility>
 
@@ -53,21 +55,20 @@ std::array<double, N> numbers(const YamlMap& map, std::string_view key, double l
   return values;
 }
 
+using Names = std::set<std::string>;
+
 /// The name of an entry that no earlier entry has.
-template <class Entries>
-std::string new_name(const YamlMap& map, const Entries& earlier) {
+std::string new_name(const YamlMap& map, Names& earlier) {
   std::string name = map.text("name");
   if (name.empty()) fail_at(map.path(), map.at("name").line, map.field("name") + " is empty");
-  for (const auto& entry : earlier) {
-    if (entry.name == name) {
-      fail_at(map.path(), map.at("name").line,
-              fmt::format("{} = \"{}\" stands twice", map.field("name"), name));
-    }
+  if (!earlier.insert(name).second) {
+    fail_at(map.path(), map.at("name").line,
+            fmt::format("{} = \"{}\" stands twice", map.field("name"), name));
   }
   return name;
 }
 
-ScenePlane read_plane(const YamlMap& map, const std::vector<ScenePlane>& earlier) {
+ScenePlane read_plane(const YamlMap& map, Names& earlier) {
   map.allow_only({"name", "distance_m", "normal_azimuth_deg", "normal_zenith_deg", "extent_m",
                   "center_m", "sigma_deg"});
   ScenePlane plane;
@@ -90,7 +91,7 @@ ScenePlane read_plane(const YamlMap& map, const std::vector<ScenePlane>& earlier
   return plane;
 }
 
-Station read_station(const YamlMap& map, const std::vector<Station>& earlier) {
+Station read_station(const YamlMap& map, Names& earlier) {
   map.allow_only({"name", "position_m", "roll_deg", "pitch_deg", "yaw_deg", "sigma_deg"});
   Station station;
   station.name = new_name(map, earlier);
@@ -172,11 +173,11 @@ Scene parse_scene(const std::string& text, const std::string& path) {
       read(YamlMap(entry->value.items[i], path, fmt::format("{}[{}]", key, i)));
     }
   };
+  Names planes, stations;
   for_each_map("planes",
-               [&](const YamlMap& map) { scene.planes.push_back(read_plane(map, scene.planes)); });
-  for_each_map("stations", [&](const YamlMap& map) {
-    scene.stations.push_back(read_station(map, scene.stations));
-  });
+               [&](const YamlMap& map) { scene.planes.push_back(read_plane(map, planes)); });
+  for_each_map("stations",
+               [&](const YamlMap& map) { scene.stations.push_back(read_station(map, stations)); });
   return scene;
 }
 

@@ -119,6 +119,66 @@ class FilesTest(CommandTest):
     def test_full_disk_is_an_error(self):
         self.expect(3, "simulate", "-o", "/dev/full/out.csv", "--rate-hz", "1000")
 
+    def test_hostile_files_are_refused_in_no_time(self):
+        # Each once crashed, hung, took a gigabyte or invented points; see tests/cli/hostile.
+        hostile = SOURCE / "tests/cli/hostile"
+        for name, words in (("view-infinite.db3", "found a view"),
+                            ("view-invents-points.db3", "found a view"),
+                            ("bz2-claims-1GB.bag", "byte 4109"),
+                            ("nc-invents-points.nc", "do not fit in a file of 68157 bytes"),
+                            ("time-overflow.csv", "within 146 years")):
+            with self.subTest(name=name):
+                started = time.monotonic()
+                self.assertIn(words, self.expect(3, "info", hostile / name).stderr)
+                self.assertLess(time.monotonic() - started, 5)
+        done = self.expect(3, "report", hostile / "report-covariance", "-o", "page.html")
+        self.assertIn("covariance: 60 rows", done.stderr)
+        self.assertNotIn("page.html", self.names())
+
+    def test_what_is_written_is_read(self):
+        # A coordinate of -2147483.648 m.
+        for ending in ("lvx", "nc", "bin", "openpylivox.csv", "openpylivox.bin", "sequence.csv"):
+            with self.subTest(ending=ending):
+                made = self.expect_json(0, "convert", SOURCE / "tests/cli/hostile/own-csv-unreadable.in",
+                                        "-o", f"own.{ending}")
+                self.assertGreaterEqual(made["observations"], 95)
+                self.assertEqual(self.expect_json(0, "info", f"own.{ending}")["observations"],
+                                 made["observations"])
+
+    def test_escapes_are_shown_and_not_obeyed(self):
+        (self.folder / "keys.yaml").write_text('"\\e[31mred\\e]0;title\\a": 1\n')
+        done = self.expect(3, "simulate", "-o", "out.csv", "--scene", "keys.yaml")
+        self.assertIn("\\u001b[31mred\\u001b]0;title\\u0007", done.stderr)
+        self.assertNotIn("\x1b", done.stderr)
+        (self.folder / "\x1b[31m.csv").write_text("no recording")
+        self.assertNotIn("\x1b", self.expect(3, "info", "\x1b[31m.csv").stderr)
+        self.expect(0, "simulate", "-o", "serial.lvx", "--duration-s", "0.01",
+                    "--scene", SOURCE / "data/room.yaml")
+        data = (self.folder / "serial.lvx").read_bytes()
+        at = data.index(b"SIM")
+        (self.folder / "serial.lvx").write_bytes(
+            data[:at] + b"\x1b[31mA\x9b\xc2\x9bB\rC".ljust(16, b"\0") + data[at + 16:])
+        for words in (("info", "serial.lvx"), ("info", "serial.lvx", "--json")):
+            done = subprocess.run([COMMAND, *words], cwd=self.folder, capture_output=True)
+            self.assertEqual(done.returncode, 0)
+            self.assertIn(b"\\u001b[31mA", done.stdout)
+            for obeyed in (b"\x1b", b"\x9b", b"\r"):
+                self.assertNotIn(obeyed, done.stdout + done.stderr)
+
+    def test_yaml_of_any_size_takes_time_in_proportion(self):
+        plane = "{{name: w{}, distance_m: 30, normal_azimuth_deg: 0, normal_zenith_deg: 90}}"
+        (self.folder / "keys.yaml").write_text("".join(f"key{i}: 1\n" for i in range(100000)))
+        (self.folder / "planes.yaml").write_text(
+            "planes:\n" + "".join(f"  - {plane.format(i)}\n" for i in range(50000)))
+        for status, name in ((3, "keys.yaml"), (0, "planes.yaml")):
+            started = time.monotonic()
+            self.expect(status, "simulate", "-o", "one.csv", "--rate-hz", "1", "--scene", name)
+            self.assertLess(time.monotonic() - started, 15)  # it was 30 s, and 0.6 s now
+        scene = (SOURCE / "data/hall.yaml").read_text()
+        (self.folder / "two.yaml").write_text(scene + "---\nplanes: []\n")
+        done = self.expect(3, "simulate", "-o", "one.csv", "--scene", "two.yaml")
+        self.assertIn("a second document", done.stderr)
+
 
 def damaged_lvx(lvx):
     """The same file with a wrong packet version in its last frame."""

@@ -4,10 +4,13 @@
 """What may stand at the name of an output, and disks that fill up."""
 import os
 import pathlib
+import shutil
+import signal
 import subprocess
+import time
 import unittest
 
-from command import COMMAND, CommandTest, run
+from command import COMMAND, SOURCE, CommandTest, run
 
 
 class OutputTest(CommandTest):
@@ -74,6 +77,148 @@ class OutputTest(CommandTest):
                 self.assertEqual(done.returncode, 3, done.stderr)
                 self.assertIn("No space left on device", done.stderr)
                 self.assertEqual(done.stdout, "")
+
+    def test_what_cannot_be_printed_is_an_error(self):
+        commands = (["info", "A.NC", "--json"], ["info", "A.NC"], ["preset", "list", "--json"],
+                    ["preset", "show", "mid-40"], ["--help"], ["--version"])
+        for command in commands:
+            with self.subTest(command=command), open("/dev/full", "w") as full:
+                done = subprocess.run([COMMAND, *command], cwd=self.folder, stdout=full,
+                                      stderr=subprocess.PIPE, text=True)
+                self.assertEqual(done.returncode, 3, done.stderr)
+                self.assertIn("stdout: cannot be written", done.stderr)
+
+    def test_a_closed_stdout_is_no_place_in_an_output(self):
+        self.expect(0, "convert", "A.NC", "-o", "open.sequence.csv")
+        done = subprocess.run(["sh", "-c", f"{COMMAND} convert A.NC -o closed.sequence.csv >&-"],
+                              cwd=self.folder, stderr=subprocess.PIPE, text=True)
+        self.assertEqual(done.returncode, 3, done.stderr)
+        self.assertEqual((self.folder / "closed.sequence.csv").read_bytes(),
+                         (self.folder / "open.sequence.csv").read_bytes())
+
+    def test_a_hangup_removes_what_was_in_the_making_and_the_next_run_what_a_kill_left(self):
+        before = self.names()
+        for number, status, left in ((signal.SIGHUP, 130, 0), (signal.SIGKILL, -9, 2)):
+            with subprocess.Popen([COMMAND, "simulate", "-o", "long.csv", "--duration-s", "1000"],
+                                  cwd=self.folder, stdout=subprocess.DEVNULL,
+                                  stderr=subprocess.DEVNULL) as process:
+                limit = time.monotonic() + 30
+                while len(self.names() - before) < 2 and time.monotonic() < limit:
+                    time.sleep(0.02)
+                process.send_signal(number)
+                self.assertEqual(process.wait(30), status)
+            self.assertEqual(len(self.names() - before), left, self.names())
+        self.expect(0, "simulate", "-o", "long.csv", "--rate-hz", "1000")
+        self.assertEqual(self.names() - before,
+                         {"long.csv", "long.csv.truth.nc", "long.csv.truth.yaml"})
+
+
+class ResultTest(CommandTest):
+    """Inputs and earlier results survive whatever a run does."""
+
+    NOT_TOLD = ("--free", "wedge_angle_deg", "--free", "refractive_index_air")
+
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        test = cls()
+        test.expect(0, "simulate", "-o", "unit.lvx", "--sensor", "mid-40-table3", "--scene",
+                    SOURCE / "data/hall.yaml", "--reported", "nominal", "--duration-s", "1")
+        test.expect(0, "estimate", "unit.lvx", "-o", "result", "--quiet")
+
+    def contents(self, name):
+        return {path.name: path.read_bytes() for path in (self.folder / name).iterdir()}
+
+    def copy(self, name):
+        shutil.copytree(self.folder / "result", self.folder / name)
+        return self.contents(name)
+
+    def test_a_calibration_that_is_read_is_not_replaced(self):
+        before = self.copy("own")
+        os.link(self.folder / "own/calibration.yaml", self.folder / "linked.yaml")
+        for sensor in ("own/calibration.yaml", "./own/../own/calibration.yaml", "linked.yaml"):
+            for verb in ("estimate", "calibrate"):
+                with self.subTest(verb=verb, sensor=sensor):
+                    done = self.expect(2, verb, "unit.lvx", "--sensor", sensor, "-o", "own",
+                                       *self.NOT_TOLD)
+                    self.assertIn("give another name", done.stderr)
+                    self.assertEqual(self.contents("own"), before)
+
+    def test_no_output_is_an_input(self):
+        text = (self.folder / "result/calibration.yaml").read_text()
+        for name in ("cal.csv", "cal.yaml", "made.csv.truth.yaml", "cal.nc"):
+            (self.folder / name).write_text(text)
+        (self.folder / "scene.csv").write_text((SOURCE / "data/hall.yaml").read_text())
+        shutil.copy(self.folder / "unit.lvx", self.folder / "same.lvx")
+        (self.folder / "soft.lvx").symlink_to("same.lvx")
+        os.link(self.folder / "same.lvx", self.folder / "hard.lvx")
+        self.copy("drawn")
+        damaged = (self.folder / "unit.lvx").read_bytes()[:200000]
+        (self.folder / "cut.lvx").write_bytes(damaged)
+        before = {path: path.read_bytes() for path in self.folder.rglob("*") if path.is_file()}
+        for command in ("convert cut.lvx -o cut.lvx", "convert same.lvx -o hard.lvx",
+                        "convert soft.lvx -o same.lvx", "convert same.lvx -o soft.lvx",
+                        "convert same.lvx cut.lvx -o . --format lvx-1.1",
+                        "cloud unit.lvx --calibration cal.csv -o cal.csv",
+                        "cloud --calibration cal.yaml --beam-origin-map cal.yaml",
+                        "preset new mine --from cal.yaml -o cal.yaml",
+                        "simulate --scene scene.csv -o scene.csv",
+                        "simulate --sensor made.csv.truth.yaml -o made.csv",
+                        "pattern --sensor cal.yaml --report cal.yaml",
+                        "pattern --sensor mid-40 --format npy -o x.npy --report x.npy",
+                        "identify unit.lvx -o unit.lvx",
+                        "info closed.nc --share closed.nc",
+                        "report drawn -o drawn/report.json"):
+            with self.subTest(command=command):
+                if "closed.nc" in command:
+                    self.expect(0, "convert", "unit.lvx", "-o", "closed.nc")
+                    before[self.folder / "closed.nc"] = (self.folder / "closed.nc").read_bytes()
+                self.expect(2, *command.split())
+                self.assertEqual({path: path.read_bytes() for path in self.folder.rglob("*")
+                                  if path.is_file()}, before)
+
+    def test_a_run_that_fails_leaves_the_folder_as_it_was(self):
+        before = self.copy("kept")
+        (self.folder / "short.csv").write_text("Time/s,Azimuth/deg,Zenith/deg\n0.1,1.0,90.0\n")
+        self.expect(1, "estimate", "short.csv", "--sensor", "mid-40", "-o", "kept")
+        self.assertEqual(self.contents("kept"), before)
+        self.expect(1, "calibrate", "short.csv", "--sensor", "mid-40", "-o", "kept")
+        self.assertEqual(self.contents("kept"), before)
+
+    def test_nothing_of_an_earlier_run_passes_for_one_of_the_last(self):
+        before = self.copy("mixed")
+        for states in ("states.earlier.nc", "states.earlier-2.nc"):
+            done = self.expect(0, "estimate", "unit.lvx", "-o", "mixed", "--states", "none")
+            self.assertIn(f"mixed/{states}", done.stderr)
+            now = self.contents("mixed")
+            self.assertNotIn("states.nc", now)
+            self.assertEqual(now[states], before["states.nc"])
+            (self.folder / "mixed/states.nc").write_bytes(before["states.nc"])
+        calibration = (self.folder / "mixed/calibration.yaml").read_bytes()
+        (self.folder / "mixed/notes.txt").write_text("mine")
+        self.expect(1, "estimate", "unit.lvx", "-o", "mixed", *self.NOT_TOLD)
+        now = self.contents("mixed")
+        self.assertEqual(set(now), {"calibration.earlier.yaml", "states.earlier.nc", "notes.txt",
+                                    "states.earlier-2.nc", "states.nc", "report.json",
+                                    "report.html"})
+        self.assertEqual(now["calibration.earlier.yaml"], calibration)
+        self.assertIn(b"do not use these numbers", now["report.html"])
+
+    def test_all_of_a_folder_appears_or_nothing(self):
+        before = self.copy("whole")
+        (self.folder / "whole/report.html").unlink()
+        (self.folder / "whole/report.html").mkdir()  # the last one cannot be written
+        self.expect(3, "estimate", "unit.lvx", "-o", "whole")
+        (self.folder / "whole/report.html").rmdir()
+        del before["report.html"]
+        self.assertEqual(self.contents("whole"), before)
+
+    def test_a_stopped_exchange_is_marked(self):
+        self.copy("stopped")
+        (self.folder / "stopped/INCOMPLETE").write_text("as a killed run leaves it")
+        self.assertIn("INCOMPLETE", self.expect(0, "report", "stopped").stderr)
+        self.expect(0, "estimate", "unit.lvx", "-o", "stopped")
+        self.assertNotIn("INCOMPLETE", self.contents("stopped"))
 
 
 if __name__ == "__main__":

@@ -27,4 +27,26 @@ TEST(NearMiss, IsSilentWhereNothingIsNear) {
   EXPECT_EQ(near_miss("avia", {}), "");
 }
 
+TEST(Printable, ShowsWhatATerminalWouldObey) {
+  EXPECT_EQ(printable("\033[31mred\033]0;title\a", true), "\\u001b[31mred\\u001b]0;title\\u0007");
+  EXPECT_EQ(printable("C1 \xc2\x9b as UTF-8, \x9b alone", true),
+            "C1 \\u009b as UTF-8, \\x9b alone");
+  EXPECT_EQ(printable("a\tb\nc\rd\x7f", true), "a\tb\nc\\u000dd\\u007f");
+  EXPECT_EQ(printable("a\nb", false), "a\\u000ab");
+  EXPECT_EQ(printable("turned \xe2\x80\xae back", true), "turned \\u202e back");
+  EXPECT_EQ(printable(std::string("zero\0", 5), true), "zero\\u0000");
+}
+
+TEST(Printable, LeavesOtherTextsAlone) {
+  const std::string text = "σ ± 0.5°, 国, \xf0\x9f\x98\x80 and plain\n";
+  EXPECT_EQ(printable(text, true), text);
+}
+
+TEST(Printable, ShowsBytesThatAreNoText) {
+  EXPECT_EQ(printable("\xff\xc3", true), "\\xff\\xc3");
+  EXPECT_EQ(printable("\xe2\x82", true), "\\xe2\\x82");           // cut off
+  EXPECT_EQ(printable("\xc0\x9b", true), "\\xc0\\x9b");           // longer than need be
+  EXPECT_EQ(printable("\xed\xa0\x80", true), "\\xed\\xa0\\x80");  // half a pair of UTF-16
+}
+
 }  // namespace risley::text_test

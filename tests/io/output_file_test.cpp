@@ -11,6 +11,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/stat.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include "risley/core/error.hpp"
@@ -166,6 +167,62 @@ TEST(OutputFile, OpenFilesAreWrittenByTheirNames) {
   ::close(descriptor);
 }
 
+TEST(OutputFile, RemovesWhatKilledRunsLeft) {
+  const TemporaryFolder folder;
+  const std::string path = folder.file("out");
+  const pid_t child = ::fork();
+  if (child == 0) {
+    const OutputFile given_up(path);
+    ::_exit(0);  // as a kill ends it: nothing is removed
+  }
+  ASSERT_EQ(::waitpid(child, nullptr, 0), child);
+  ASSERT_EQ(folder.names().size(), 1U);
+  const std::string orphan = folder.file(*folder.names().begin());
+  for (const char* name : {"other.part-aaaaaaaaaaaa", "out.part-AAAAAAAAAAAA", "out.part-aaaa"}) {
+    put(folder.file(name), "of somebody else");
+  }
+  fs::create_symlink(folder.file("other"), folder.file("out.part-bbbbbbbbbbbb"));
+  const OutputFile output(path);
+  EXPECT_FALSE(fs::exists(orphan));
+  EXPECT_EQ(folder.names().size(), 5U);
+}
+
+TEST(OutputFile, LeavesWhatAnotherIsWritingAlone) {
+  const TemporaryFolder folder;
+  const std::string path = folder.file("out");
+  int ready[2], done[2];
+  ASSERT_EQ(::pipe(ready), 0);
+  ASSERT_EQ(::pipe(done), 0);
+  const pid_t child = ::fork();
+  char byte = 0;
+  if (child == 0) {
+    ::close(done[1]);
+    OutputFile output(path);
+    put(output.temporary_path(), "of the other");
+    const bool told = ::write(ready[1], "r", 1) == 1 && ::read(done[0], &byte, 1) == 0;
+    if (told) output.commit();
+    ::_exit(told ? 0 : 1);
+  }
+  ASSERT_EQ(::read(ready[0], &byte, 1), 1);
+  write_text_file(path, "of this process");
+  EXPECT_EQ(folder.names().size(), 2U);
+  for (const int end : {done[1], done[0], ready[0], ready[1]}) ::close(end);
+  int status = 1;
+  ASSERT_EQ(::waitpid(child, &status, 0), child);
+  EXPECT_EQ(status, 0);
+  EXPECT_EQ(read_text_file(path), "of the other");
+  EXPECT_THAT(folder.names(), ElementsAre("out"));
+}
+
+TEST(OutputFile, NamesMayBeAsLongAsTheSystemAllows) {
+  const TemporaryFolder folder;
+  const std::string path = folder.file(std::string(255, 'n'));
+  write_text_file(path, "long");
+  EXPECT_EQ(read_text_file(path), "long");
+  EXPECT_EQ(folder.names().size(), 1U);
+  EXPECT_THROW(OutputFile(path + "n"), FileError);
+}
+
 TEST(OutputFile, SaysAtOnceWhatCannotBeWritten) {
   const TemporaryFolder folder;
   EXPECT_THROW(OutputFile(folder.path().string()), FileError);
@@ -189,6 +246,11 @@ TEST(Reading, ErrorsNeverGiveATextOrAHash) {
     fs::permissions(folder.file("secret"), fs::perms::none);
     EXPECT_THROW(sha256_of_file(folder.file("secret")), FileError);
   }
+}
+
+TEST(Sha256, InBase64AsBrowsersTakeIt) {
+  EXPECT_EQ(sha256_base64(""), "47DEQpj8HBSa+/TImW+5JCeuQeRkm5NMpJWZG3hSuFU=");
+  EXPECT_EQ(sha256_base64("abc"), "ungWv48Bz+pBQUDeXa4iI7ADYaOWF3qctBD/YfIAFa0=");
 }
 
 TEST(Sha256, KnownAnswers) {

@@ -2,6 +2,10 @@
 // SPDX-License-Identifier: MIT
 #include "risley/io/yaml_map.hpp"
 
+#include <chrono>
+#include <string>
+
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -45,6 +49,22 @@ TEST(Yaml, MistakesAreFoundWithTheirLine) {
   EXPECT_THAT(refusal("number: 11\n"), HasSubstr("allowed 0 to 10"));
   EXPECT_THAT(refusal("number: .nan\n"), HasSubstr("expected a finite number"));
   EXPECT_EQ(refusal("number: 1\n"), "accepted");
+}
+
+TEST(Yaml, ASecondDocumentIsRefused) {
+  EXPECT_THAT(refusal("number: 1\n---\nnumber: 2\n"), HasSubstr("line 3: a second document"));
+  EXPECT_THAT(refusal("number: 1\n...\n---\n{}\n"), HasSubstr("a second document"));
+  EXPECT_EQ(refusal("---\nnumber: 1\n...\n"), "accepted");
+}
+
+TEST(Yaml, ManyKeysTakeTimeInProportion) {
+  std::string text;
+  for (int i = 0; i < 100'000; ++i) text += fmt::format("key{}: 1\n", i);
+  const auto start = std::chrono::steady_clock::now();
+  const YamlMap map(parse_yaml(text, "a.yaml"), "a.yaml", "");
+  EXPECT_EQ(map.integer("key99999", 0, 1), 1);
+  EXPECT_EQ(map.find("key100000"), nullptr);
+  EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(15));  // it was 30
 }
 
 TEST(Yaml, AliasesThatRepeatAliasesAreBounded) {

@@ -17,6 +17,7 @@
 
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
+#include "risley/io/text_file.hpp"
 #include "risley/jobs/calibrate_recordings.hpp"
 #include "risley/jobs/cloud_of_recording.hpp"
 #include "risley/jobs/convert_recording.hpp"
@@ -143,6 +144,44 @@ TEST_F(JobsTest, LeadFromARecordingToACloud) {
                                             "estimate/calibration.yaml", "estimate/states.nc"}));
   const sensors::Sensor written = sensors::load_sensor(path("calibration/calibration.yaml"));
   EXPECT_EQ(written.provenance.front(), (std::pair<std::string, std::string>{"command", "test"}));
+}
+
+TEST_F(JobsTest, TextsAppearWithTheOtherFilesAndOlderOnesStepAside) {
+  EstimateRecordingOptions options = estimation();
+  options.details = false;
+  options.texts = [this](const EstimatedRecording& result) {
+    EXPECT_TRUE(names().contains("estimate"));
+    EXPECT_FALSE(names().contains("estimate/calibration.yaml"));  // not before the texts are made
+    return std::vector<NamedText>{{"report.json", result.estimate.sensor.name}};
+  };
+  EXPECT_TRUE(estimate_recording(options).warnings.empty());
+  EXPECT_EQ(io::read_text_file(path("estimate/report.json")), "mid-40");
+  // Of the next run without texts and states none may pass for its own.
+  options.texts = nullptr;
+  options.files.states = StatesRows::none;
+  const EstimatedRecording again = estimate_recording(options);
+  EXPECT_THAT(again.warnings, ::testing::ElementsAre(HasSubstr("report.earlier.json"),
+                                                     HasSubstr("states.earlier.nc")));
+  EXPECT_EQ(names(), (std::set<std::string>{"estimate", "estimate/calibration.yaml",
+                                            "estimate/report.earlier.json",
+                                            "estimate/states.earlier.nc"}));
+}
+
+TEST_F(JobsTest, AStoppedExchangeLeavesItsMark) {
+  EstimateRecordingOptions options = estimation();
+  options.details = false;
+  options.files.states = StatesRows::none;
+  options.texts = [this](const EstimatedRecording&) {
+    // Somebody makes a folder of the name that a file is to get.
+    fs::create_directories(path("estimate/calibration.yaml"));
+    return std::vector<NamedText>{};
+  };
+  EXPECT_THROW(estimate_recording(options), FileError);
+  EXPECT_TRUE(names().contains(std::string("estimate/") + kIncomplete));
+  fs::remove(path("estimate/calibration.yaml"));
+  options.texts = nullptr;
+  estimate_recording(options);
+  EXPECT_EQ(names(), (std::set<std::string>{"estimate", "estimate/calibration.yaml"}));
 }
 
 TEST_F(JobsTest, WriteNothingThatNoOptionNames) {

@@ -5,7 +5,10 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -217,6 +220,64 @@ TEST_F(ReportFile, SomethingElseIsRefused) {
   EXPECT_THAT(error(), HasSubstr("expected 'risley report', found 'a dog'"));
   write("{\"format\": \"risley report\", \"format_version\": 99}");
   EXPECT_THAT(error(), HasSubstr("format_version: expected 1, found 99"));
+}
+
+TEST_F(ReportFile, WhatAPageCannotBeDrawnFromIsRefusedWithItsPlace) {
+  // What is done to a sound report, and what the message says.
+  const std::vector<std::pair<std::function<void(EstimateReport&)>, std::string>> cases = {
+      {[](auto& r) { r.covariance = Eigen::MatrixXd::Ones(60, 60); }, "covariance: 60 rows"},
+      {[](auto& r) { r.covariance = Eigen::MatrixXd::Ones(2, 3); }, "covariance: 2 rows of 3"},
+      {[](auto& r) { r.covariance(1, 0) = kUnknown; }, "covariance[1]: expected numbers"},
+      {[](auto& r) { r.covariance(0, 0) = -1; }, "covariance[0]"},
+      {[](auto& r) { r.free[1] = "<b>"; }, "free[1]: "},
+      {[](auto& r) { r.parameters[0].name = "colour"; }, "parameters[0].name: "},
+      {[](auto& r) { r.parameters[1].value = kUnknown; }, "parameters[1].value: expected a num"},
+      {[](auto& r) { r.prisms = 99; }, "prisms"},
+      {[](auto& r) { r.emitters = -1; }, "emitters"},
+      {[](auto& r) { r.combination = 3; }, "combination: "},
+      {[](auto& r) { r.method = "guess"; }, "method: 'guess' is no known name"},
+      {[](auto& r) { r.unevenness.resize(5); }, "chi2_per_bin: 5 values, expected 2"},
+      {[](auto& r) { r.truth->rotation_angle_rmse.resize(40); }, "truth.rotation_angle_rmse: 40"},
+      {[](auto& r) { r.residual_charts[0].series[0].y.pop_back(); }, "series[0].y: 1 values"},
+      {[](auto& r) { r.residual_charts[0].series[0].value.clear(); }, "series[0].value: 0 val"},
+      {[](auto& r) { r.residual_charts[0].series[0].colour = "x"; }, "colour: 'x' is no known"},
+      {[](auto& r) { r.residual_charts[0].kind = ChartKind::space; }, "series[0].z: 0 values"},
+      {[](auto& r) {
+         r.residual_charts[0].value_range = {1, -1};
+       },
+       "value_range: "},
+      {[](auto& r) { r.rotor_charts[0].grows_for = -1; }, "rotor_charts[0].grows_for: "},
+  };
+  for (const auto& [damage, words] : cases) {
+    EstimateReport report = estimate_example();
+    damage(report);
+    write_report(path(), report);
+    EXPECT_THAT(error(), HasSubstr(words));
+    EXPECT_THAT(error(), HasSubstr(path()));
+  }
+  EstimateReport failed = estimate_example();  // has no numbers to promise
+  failed.converged = false;
+  failed.parameters[0].value = failed.covariance(0, 0) = kUnknown;
+  write_report(path(), failed);
+  EXPECT_EQ(error(), "no error");
+  CalibrationReport calibration = calibration_example();
+  calibration.wall_charts[0].series[0].z.clear();
+  write_report(path(), calibration);
+  EXPECT_THAT(error(), HasSubstr("wall_charts[0].series[0].z: 0 values, expected 1"));
+}
+
+TEST_F(ReportFile, NumbersThatDoNotFitAreRefused) {
+  const std::pair<const char*, const char*> cases[] = {
+      {"\"outliers\":-17", "outliers: -17 is out of range"},
+      {"\"outliers\":1e999", "is no JSON that can be read"},
+      {"\"outliers\":1.5", "outliers: expected a whole number"}};
+  for (const auto& [damage, words] : cases) {
+    write_report(path(), estimate_example());
+    std::string text = io::read_text_file(path());
+    text.replace(text.find("\"outliers\":17"), 13, damage);
+    write(text);
+    EXPECT_THAT(error(), HasSubstr(words));
+  }
 }
 
 }  // namespace risley::report::report_file_test

@@ -9,8 +9,9 @@ namespace risley::io {
 /// An output that appears under its final name only when it is whole and on the disk: it is
 /// written under a temporary name that nobody can foresee, in the same folder, and renamed by
 /// commit(). Without commit() the destructor removes the temporary, so an interrupted run leaves
-/// no half file and never costs the file that was there before. A file that is replaced keeps its
-/// mode, and a symbolic link to it stays one. A device, FIFO or socket, such as /dev/null or
+/// no half file and never costs the file that was there before. What a killed run left of the same
+/// output is removed by the next one, unless somebody is writing it. A file that is replaced keeps
+/// its mode, and a symbolic link to it stays one. A device, FIFO or socket, such as /dev/null or
 /// /dev/stdout, is never replaced: commit() copies the bytes into it.
 class OutputFile {
  public:
@@ -24,6 +25,9 @@ class OutputFile {
   /// An empty file, to be opened and written by this name; never a link or a device.
   const std::string& temporary_path() const { return temporary_path_; }
 
+  /// Puts the bytes on the disk, so that commit() has little left that can fail. All streams to the
+  /// temporary must have been closed or flushed. @throws FileError
+  void sync();
   /// Gives the file its final name, once its bytes are on the disk. All streams to the temporary
   /// must have been closed or flushed. @throws FileError
   void commit();

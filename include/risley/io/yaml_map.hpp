@@ -2,7 +2,10 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <cstddef>
+#include <functional>
 #include <initializer_list>
+#include <map>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -22,8 +25,8 @@ struct YamlNode {
   bool is_list() const { return kind == Kind::list; }
 };
 
-/// @throws FileError where the text is not YAML, or has more than a million values, those that
-/// its aliases repeat included
+/// @throws FileError where the text is not YAML, holds more than one document, or has more than a
+/// million values, those that its aliases repeat included
 YamlNode parse_yaml(const std::string& text, const std::string& path);
 
 /// @throws FileError always
@@ -71,6 +74,7 @@ class YamlMap {
   std::string path_, field_;
   std::size_t line_ = 0;
   std::vector<Entry> entries_;
+  std::map<std::string, std::size_t, std::less<>> places_;  ///< of the keys in entries_
 };
 
 }  // namespace risley::io

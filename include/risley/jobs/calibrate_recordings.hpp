@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -16,6 +17,8 @@
 #include "risley/jobs/sensor_choice.hpp"
 
 namespace risley::jobs {
+
+struct CalibratedRecordings;
 
 /// What to calibrate on, and how. SI units.
 struct CalibrateRecordingsOptions {
@@ -41,6 +44,8 @@ struct CalibrateRecordingsOptions {
   /// Names the outputs; without them nothing is written. States of several recordings are
   /// states_1.nc, states_2.nc, ...
   ResultFiles files;
+  /// Further files of the folder, such as a page, made from the result.
+  std::function<std::vector<NamedText>(const CalibratedRecordings&)> texts;
 };
 
 /// What came of it.

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -20,6 +21,8 @@ namespace risley::jobs {
 /// given what it can do in a time that one waits for.
 std::optional<double> usual_rate(estimation::Method method);
 
+struct EstimatedRecording;
+
 /// What to estimate, and how. SI units.
 struct EstimateRecordingOptions {
   std::string recording;            ///< path; of one sensor
@@ -36,6 +39,8 @@ struct EstimateRecordingOptions {
   std::string truth;             ///< OUT.truth.yaml of a simulation to judge by; may be empty
   bool details = false;          ///< wanted in the result
   ResultFiles files;             ///< names the outputs; without them nothing is written
+  /// Further files of the folder, such as a page, made from the result.
+  std::function<std::vector<NamedText>(const EstimatedRecording&)> texts;
 };
 
 /// What came of it.

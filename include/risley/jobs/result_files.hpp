@@ -16,12 +16,23 @@ enum class StatesRows {
 };
 
 /// Where a job leaves its results. All appear together at its end, or, when it fails or is
-/// cancelled, none; a folder that it made for them is gone then, too. A calibration of an earlier
-/// run goes when this run's numbers failed: what failed is no calibration.
+/// cancelled, none, and what an earlier run left stays as it is; a folder that it made for them is
+/// gone then, too. Results of an earlier run that this one has no successor for, such as the
+/// calibration when the numbers did not converge, would belong to other numbers: they stay under
+/// the names calibration.earlier.yaml and so on. A folder with a file INCOMPLETE was left by a run
+/// that was stopped while it gave the files their names.
 struct ResultFiles {
   std::string folder;  ///< calibration.yaml, states.nc; empty: nothing is written
   StatesRows states = StatesRows::knots;
   Provenance provenance;  ///< goes into the files, together with the inputs' SHA-256
 };
+
+/// A text that is to stand in the folder, too.
+struct NamedText {
+  std::string name, text;
+};
+
+/// The file that marks a folder whose files may be of different runs.
+inline constexpr const char* kIncomplete = "INCOMPLETE";
 
 }  // namespace risley::jobs

@@ -13,6 +13,9 @@ namespace risley::report {
 /// A report of any kind.
 using Report = std::variant<EstimateReport, CalibrationReport>;
 
+/// The text of report.json; numbers that are not finite are null.
+std::string report_text(const Report& report);
+
 /// Writes report.json: everything that the report's page says and draws (docs/files.md).
 /// Diagrams keep the digits that can be seen. @throws FileError
 void write_report(const std::string& path, const Report& report);
