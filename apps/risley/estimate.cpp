@@ -258,15 +258,22 @@ void print_outcome(const EstimatedRecording& outcome) {
                             : std::string()) +
           (e.mirrored ? ", mirrored" : ""),
       outcome.reading_time, outcome.solving_time);
+  const bool any_held = std::any_of(e.values.begin(), e.values.end(), [](const auto& value) {
+    return value.sigma > value.sigma_given_held;
+  });
   std::vector<std::string> head = {"parameter", "value", "+- sigma", "unit"};
+  if (any_held) head.insert(head.begin() + 3, "given held");
   if (outcome.evaluation) head.insert(head.end(), {"truth", "error", "error/sigma"});
   Table table(head);
   for (const estimation::EstimatedValue& value : e.values) {
-    const double sigma = in_file_unit(value.name, value.sigma, shape);
-    const report::NumberText text =
-        report::number_text(in_file_unit(value.name, value.value, shape), sigma);
-    std::vector<std::string> row = {value.name, text.value, text.sigma,
-                                    find_parameter(value.name, shape).unit};
+    const double sigma = in_file_unit(value.name, value.sigma_given_held, shape);
+    const double found = in_file_unit(value.name, value.value, shape);
+    const report::NumberText text = report::number_text(found, sigma);
+    std::vector<std::string> row = {
+        value.name, text.value,
+        report::number_text(found, in_file_unit(value.name, value.sigma, shape)).sigma};
+    if (any_held) row.push_back(text.sigma);
+    row.push_back(find_parameter(value.name, shape).unit);
     if (outcome.evaluation) {
       for (const estimation::TruthComparison& one : outcome.evaluation->parameters) {
         if (one.name != value.name) continue;

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 #include "risley/report/estimate_page.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include <fmt/format.h>
@@ -74,17 +75,24 @@ std::string subject_text(const EstimateReport& r) {
 }
 
 std::string parameters_html(const EstimateReport& r) {
+  const bool any_held = std::any_of(r.parameters.begin(), r.parameters.end(), [](const auto& row) {
+    return row.sigma > row.sigma_given_held;
+  });
   std::string html =
       "<h2>Parameters</h2>\n<div class=\"wide\"><table><thead><tr><th>parameter</th><th>value</th>"
-      "<th>σ</th><th>unit</th><th>nominal</th><th>difference</th>";
+      "<th>σ</th>";
+  if (any_held) html += "<th>σ given held</th>";
+  html += "<th>unit</th><th>nominal</th><th>difference</th>";
   if (r.truth) html += "<th>truth</th><th>error</th><th>error / σ</th>";
   html += "</tr></thead><tbody>\n";
   for (const ReportedParameter& row : r.parameters) {
     const ParameterInfo& info = find_parameter(row.name, r.shape());
-    const double scale = 1.0 / info.si_per_unit, sigma = row.sigma * scale;
+    const double scale = 1.0 / info.si_per_unit, sigma = row.sigma_given_held * scale;
     const NumberText shown = number_text(row.value * scale, sigma);
-    html += fmt::format("<tr>{}<td>{}</td><td>{}</td><td>{}</td>", parameter_head(info),
-                        shown.value, shown.sigma, escape_html(info.unit));
+    html += fmt::format("<tr>{}<td>{}</td><td>{}</td>", parameter_head(info), shown.value,
+                        number_text(row.value * scale, row.sigma * scale).sigma);
+    if (any_held) html += fmt::format("<td>{}</td>", shown.sigma);
+    html += fmt::format("<td>{}</td>", escape_html(info.unit));
     if (std::isfinite(row.nominal)) {
       html += fmt::format("<td>{:.7g}</td><td>{}</td>", row.nominal * scale,
                           text_to_place_of((row.value - row.nominal) * scale, sigma));
@@ -102,9 +110,12 @@ std::string parameters_html(const EstimateReport& r) {
     }
     html += "</tr>\n";
   }
-  html +=
-      "</tbody></table></div>\n<p class=\"note\">σ is one standard deviation. Angular velocities "
-      "are means over the recording, rotation angles are those at the first used shot.</p>\n";
+  html += fmt::format(
+      "</tbody></table></div>\n<p class=\"note\">σ is one standard deviation. {}Angular velocities "
+      "are means over the recording, rotation angles are those at the first used shot.</p>\n",
+      any_held ? "It includes what the parameters that were held may be off by, which the second "
+                 "σ leaves out: that one compares recordings of one unit. "
+               : "");
   if (r.truth) {
     std::string rmse;
     for (std::size_t i = 0; i < r.truth->rotation_angle_rmse.size(); ++i) {

@@ -45,6 +45,7 @@ std::vector<ReportedParameter> parameters_of(const EstimateReportInput& input) {
     row.name = value.name;
     row.value = value.value;
     row.sigma = value.sigma;
+    row.sigma_given_held = value.sigma_given_held;
     row.nominal = nominal_value(input, find_parameter(value.name, e.sensor.shape()));
     if (input.evaluation) {
       const auto& all = input.evaluation->parameters;

@@ -165,6 +165,7 @@ void fields(Archive& archive, T& row) {
   archive("name", row.name);
   archive("value", row.value);
   archive("sigma", row.sigma);
+  archive("sigma_given_held", row.sigma_given_held);
   archive("nominal", row.nominal);
   archive("believed", row.believed);
   archive("truth", row.truth);

@@ -10,7 +10,7 @@ import { ownFolder, risley, source } from './pages.mjs';
 
 skipWithoutBrowser();
 const folder = ownFolder();
-const planes = join(source, 'tests/cli/hostile/xss-planes.yaml');
+const planes = join(source, 'tests/golden/hostile/xss-planes.yaml');
 let browser, page;
 
 before(async () => {

@@ -120,8 +120,8 @@ class FilesTest(CommandTest):
         self.expect(3, "simulate", "-o", "/dev/full/out.csv", "--rate-hz", "1000")
 
     def test_hostile_files_are_refused_in_no_time(self):
-        # Each once crashed, hung, took a gigabyte or invented points; see tests/cli/hostile.
-        hostile = SOURCE / "tests/cli/hostile"
+        # Each once crashed, hung, took a gigabyte or invented points; see tests/golden/hostile.
+        hostile = SOURCE / "tests/golden/hostile"
         for name, words in (("view-infinite.db3", "found a view"),
                             ("view-invents-points.db3", "found a view"),
                             ("bz2-claims-1GB.bag", "byte 4109"),
@@ -139,7 +139,7 @@ class FilesTest(CommandTest):
         # A coordinate of -2147483.648 m.
         for ending in ("lvx", "nc", "bin", "openpylivox.csv", "openpylivox.bin", "sequence.csv"):
             with self.subTest(ending=ending):
-                made = self.expect_json(0, "convert", SOURCE / "tests/cli/hostile/own-csv-unreadable.in",
+                made = self.expect_json(0, "convert", SOURCE / "tests/golden/hostile/own-csv-unreadable.in",
                                         "-o", f"own.{ending}")
                 self.assertGreaterEqual(made["observations"], 95)
                 self.assertEqual(self.expect_json(0, "info", f"own.{ending}")["observations"],
