@@ -162,9 +162,9 @@ TEST_F(JobsTest, TextsAppearWithTheOtherFilesAndOlderOnesStepAside) {
   const EstimatedRecording again = estimate_recording(options);
   EXPECT_THAT(again.warnings, ::testing::Contains(HasSubstr("report.earlier.json")));
   EXPECT_THAT(again.warnings, ::testing::Contains(HasSubstr("states.earlier.nc")));
-  EXPECT_EQ(names(), (std::set<std::string>{"estimate", "estimate/calibration.yaml",
-                                            "estimate/report.earlier.json",
-                                            "estimate/states.earlier.nc"}));
+  EXPECT_EQ(names(),
+            (std::set<std::string>{"estimate", "estimate/calibration.yaml",
+                                   "estimate/report.earlier.json", "estimate/states.earlier.nc"}));
 }
 
 TEST_F(JobsTest, AStoppedExchangeLeavesItsMark) {
