@@ -154,17 +154,17 @@ TEST_F(JobsTest, TextsAppearWithTheOtherFilesAndOlderOnesStepAside) {
     EXPECT_FALSE(names().contains("estimate/calibration.yaml"));  // not before the texts are made
     return std::vector<NamedText>{{"report.json", result.estimate.sensor.name}};
   };
-  EXPECT_TRUE(estimate_recording(options).warnings.empty());
+  EXPECT_THAT(estimate_recording(options).warnings, Each(Not(HasSubstr("earlier"))));
   EXPECT_EQ(io::read_text_file(path("estimate/report.json")), "mid-40");
   // Of the next run without texts and states none may pass for its own.
   options.texts = nullptr;
   options.files.states = StatesRows::none;
   const EstimatedRecording again = estimate_recording(options);
-  EXPECT_THAT(again.warnings, ::testing::ElementsAre(HasSubstr("report.earlier.json"),
-                                                     HasSubstr("states.earlier.nc")));
-  EXPECT_EQ(names(), (std::set<std::string>{"estimate", "estimate/calibration.yaml",
-                                            "estimate/report.earlier.json",
-                                            "estimate/states.earlier.nc"}));
+  EXPECT_THAT(again.warnings, ::testing::Contains(HasSubstr("report.earlier.json")));
+  EXPECT_THAT(again.warnings, ::testing::Contains(HasSubstr("states.earlier.nc")));
+  EXPECT_EQ(names(),
+            (std::set<std::string>{"estimate", "estimate/calibration.yaml",
+                                   "estimate/report.earlier.json", "estimate/states.earlier.nc"}));
 }
 
 TEST_F(JobsTest, AStoppedExchangeLeavesItsMark) {
