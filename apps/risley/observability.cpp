@@ -34,18 +34,39 @@ struct ObservabilityCommandOptions {
   ReadingWishes reading;
 };
 
+/// A sigma that data never tell is null.
+Json sigma_json(double sigma, double unit) {
+  return std::isfinite(sigma) ? Json(sigma / unit) : Json();
+}
+
+/// Null for one emitter.
+Json emitters_json(const estimation::EmitterComparison& emitters, TrainShape shape) {
+  if (emitters.bounds.empty()) return nullptr;
+  Json parameters = Json::object(), untold = Json::array();
+  for (const auto& bounds : emitters.bounds) {
+    const double unit = find_parameter(bounds.name, shape).si_per_unit;
+    parameters[bounds.name] = {{"sigma", sigma_json(bounds.all, unit)},
+                               {"sigma_directions_known", sigma_json(bounds.known, unit)},
+                               {"sigma_alone", sigma_json(bounds.alone, unit)}};
+  }
+  for (const auto& weak : emitters.untold_alone) untold.push_back(weak_direction_json(weak));
+  return {{"count", emitters.emitters},
+          {"alone", emitters.alone + 1},
+          {"parameters", parameters},
+          {"unobservable_alone", untold}};
+}
+
 Json observability_json(const JudgedObservability& judged) {
   const estimation::Observability& o = judged.observability;
   const TrainShape shape = judged.shape;
   Json parameters = Json::object(), matrix = Json::array(), unobservable = Json::array();
   for (const auto& quantity : o.quantities) {
     const double unit = find_parameter(quantity.name, shape).si_per_unit;
-    Json one = {{"sigma", nullptr},
+    Json one = {{"sigma", sigma_json(quantity.sigma, unit)},
                 {"sensitivity", degrees_from_radians(quantity.sensitivity) * unit},
                 {"free", quantity.free},
                 {"most_correlated", quantity.twins.front().first},
                 {"correlation", quantity.twins.front().second}};
-    if (std::isfinite(quantity.sigma)) one["sigma"] = quantity.sigma / unit;
     parameters[quantity.name] = one;
   }
   for (Eigen::Index i = 0; i < o.correlation.rows(); ++i) {
@@ -57,10 +78,33 @@ Json observability_json(const JudgedObservability& judged) {
   return {{"parameters", parameters},
           {"correlation", {{"names", o.correlation_names}, {"matrix", matrix}}},
           {"unobservable", unobservable},
+          {"emitters", emitters_json(o.emitters, shape)},
           {"observations", o.shots},
           {"duration_s", o.duration},
           {"rate_hz", o.rate},
           {"words", judged.words}};
+}
+
+std::string sigma_text(double sigma, const ParameterInfo& info) {
+  return std::isfinite(sigma) ? fmt::format("{:.2g}", sigma / info.si_per_unit) : "never";
+}
+
+void print_emitters(const estimation::EmitterComparison& emitters, TrainShape shape) {
+  const int alone = emitters.alone + 1;
+  Table table({"sigma of one prism's own", fmt::format("{} emitters", emitters.emitters),
+               "directions known", fmt::format("emitter {} alone", alone), "unit"});
+  for (const auto& bounds : emitters.bounds) {
+    const ParameterInfo& info = find_parameter(bounds.name, shape);
+    table.add({bounds.name, sigma_text(bounds.all, info), sigma_text(bounds.known, info),
+               sigma_text(bounds.alone, info), info.unit});
+  }
+  fmt::print("\n");
+  table.print();
+  fmt::print("\nalone: as many shots of emitter {}, with what is free for a single one.\n", alone);
+  for (const auto& weak : emitters.untold_alone) {
+    fmt::print("not told by emitter {} alone: {}\n", alone, direction_text(weak));
+  }
+  fmt::print("\n");
 }
 
 void print_observability(const JudgedObservability& judged) {
@@ -71,9 +115,7 @@ void print_observability(const JudgedObservability& judged) {
   Table table({"quantity", "sigma", "unit", "deg per unit", "most correlated with", "rho"});
   for (const auto& quantity : o.quantities) {
     const ParameterInfo& info = find_parameter(quantity.name, shape);
-    const std::string sigma = std::isfinite(quantity.sigma)
-                                  ? fmt::format("{:.2g}", quantity.sigma / info.si_per_unit)
-                                  : "never";
+    const std::string sigma = sigma_text(quantity.sigma, info);
     table.add({quantity.name, quantity.free ? sigma : fmt::format("({})", sigma), info.unit,
                fmt::format("{:.3g}", degrees_from_radians(quantity.sensitivity) * info.si_per_unit),
                quantity.twins.front().first, fmt::format("{:.4f}", quantity.twins.front().second)});
@@ -81,6 +123,7 @@ void print_observability(const JudgedObservability& judged) {
   table.print();
   say("\nsigma: Cramer-Rao bound. In brackets: held fixed by default; the bound if it were "
       "freed.\n");
+  if (!o.emitters.bounds.empty()) print_emitters(o.emitters, shape);
   for (const auto& weak : o.unobservable) {
     say("not told by such data: {}\n", direction_text(weak));
   }

@@ -5,11 +5,12 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
+#include <utility>
 
 #include <fmt/format.h>
 
 #include "risley/algebra/products.hpp"
-#include "risley/algebra/symmetric.hpp"
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
 #include "risley/core/require.hpp"
@@ -18,12 +19,12 @@
 #include "risley/estimation/smoother.hpp"
 #include "risley/optics/observation_model.hpp"
 
+#include "estimation/bound.hpp"
+
 namespace risley::estimation {
 
 namespace {
 
-/// Below this share of the largest, an eigenvalue of the scaled information is its rounding.
-constexpr double kNoInformation = 1e-12;
 /// Of the work, that the shots' equations and the smoother take.
 constexpr double kShotsShare = 0.5;
 constexpr std::size_t kMostPlannedShots = 600000;
@@ -33,40 +34,47 @@ constexpr double kStrong = 0.9;
 /// From here on one is as good as the other.
 constexpr double kTwin = 0.98;
 
-/// Every parameter of the prisms that exists, shared ones under their shared names.
-std::vector<FreeParameter> all_parameters(TrainShape shape) {
-  std::vector<std::string> names{"refractive_index_air", "refractive_index", "wedge_angle_deg"};
-  for (const ParameterInfo& info : parameter_list(shape)) {
-    const bool error = info.name.find("tilt") != std::string::npos ||
-                       info.name.find("incident_beam") != std::string::npos;
-    if (info.kind == ParameterKind::train && error && info.places.size() == 1) {
-      names.push_back(info.name);
+/// Every parameter of the prisms that exists. Those of all prisms together stand for each prism's
+/// own where the prisms share a value and none of them is free alone.
+std::vector<FreeParameter> all_parameters(const PrismTrain& train,
+                                          const std::vector<FreeParameter>& free) {
+  const TrainShape shape = train.shape();
+  const auto together = [&](const std::vector<int>& places) {
+    bool alone = false, equal = true;
+    for (const FreeParameter& parameter : free) {
+      if (parameter.places == places) return true;
+      alone = alone ||
+              std::find(places.begin(), places.end(), parameter.places.front()) != places.end();
     }
+    for (const int place : places) equal = equal && train[place] == train[places.front()];
+    return equal && !alone;
+  };
+  std::vector<std::string> names;
+  std::vector<int> taken;
+  for (const ParameterInfo& info : parameter_list(shape)) {
+    if (info.kind != ParameterKind::train) continue;
+    const bool shared = info.name == "refractive_index" || info.name == "wedge_angle_deg";
+    if (shared && !together(info.places)) continue;
+    if (std::find(taken.begin(), taken.end(), info.places.front()) != taken.end()) continue;
+    names.push_back(info.name);
+    taken.insert(taken.end(), info.places.begin(), info.places.end());
   }
   return free_parameters(names, shape);
 }
 
-/// Inverse of some rows of an information matrix; regular tells whether there is one.
-Eigen::MatrixXd restricted_covariance(const Eigen::MatrixXd& information,
-                                      const Eigen::VectorXd& scale,
-                                      const std::vector<Eigen::Index>& rows, bool& regular) {
-  const auto n = static_cast<Eigen::Index>(rows.size());
-  Eigen::MatrixXd scaled(n, n);
-  for (Eigen::Index i = 0; i < n; ++i) {
-    for (Eigen::Index j = 0; j < n; ++j) {
-      const Eigen::Index a = rows[static_cast<std::size_t>(i)];
-      const Eigen::Index b = rows[static_cast<std::size_t>(j)];
-      scaled(i, j) = scale[a] * information(a, b) * scale[b];
-    }
-  }
-  algebra::PrincipalAxes axes = algebra::principal_axes(scaled);
-  regular = n == 0 || axes.values[0] > kNoInformation * axes.values[n - 1];
-  if (!regular) return {};
-  for (Eigen::Index i = 0; i < n; ++i) {
-    axes.vectors.row(i) *= scale[rows[static_cast<std::size_t>(i)]];
-  }
-  const Eigen::MatrixXd variances = axes.values.cwiseInverse().asDiagonal();
-  return algebra::propagated(axes.vectors, variances);
+/// The parameter of a list that a free one is; -1: none.
+Eigen::Index row_of(const FreeParameter& parameter, const std::vector<FreeParameter>& all) {
+  const auto found = std::find_if(all.begin(), all.end(), [&](const FreeParameter& one) {
+    return one.places == parameter.places;
+  });
+  return found == all.end() ? -1 : found - all.begin();
+}
+
+/// Rows of an information matrix, inverted; none where they lack information.
+std::optional<Eigen::MatrixXd> restricted_covariance(const Eigen::MatrixXd& information,
+                                                     const Eigen::VectorXd& scale,
+                                                     const std::vector<Eigen::Index>& rows) {
+  return bound_covariance(information(rows, rows), scale(rows));
 }
 
 /// Parameters and the rotors' states in the middle of a recording, as one linear model: the states
@@ -167,9 +175,8 @@ Observability analyse(const NormalEquations& equations, const RotorTrajectory& k
 
   std::vector<Eigen::Index> chosen;
   for (const FreeParameter& parameter : free) {
-    for (Eigen::Index i = 0; i < n; ++i) {
-      if (all[static_cast<std::size_t>(i)].name == parameter.name) chosen.push_back(i);
-    }
+    const Eigen::Index row = row_of(parameter, all);
+    if (row >= 0) chosen.push_back(row);
   }
   // One quantity among parameters and the states in the middle.
   const auto describe = [&](Eigen::Index quantity, std::vector<Eigen::Index> rows) {
@@ -179,10 +186,9 @@ Observability analyse(const NormalEquations& equations, const RotorTrajectory& k
     const auto at = std::find(rows.begin(), rows.end(), quantity);
     found.free = !parameter || at != rows.end();
     if (parameter && at == rows.end()) rows.push_back(quantity);
-    bool regular = false;
-    const Eigen::MatrixXd covariance =
-        restricted_covariance(solution.parameter_information, scale, rows, regular);
-    if (!regular) {
+    const std::optional<Eigen::MatrixXd> covariance =
+        restricted_covariance(solution.parameter_information, scale, rows);
+    if (!covariance) {
       found.sigma = std::numeric_limits<double>::infinity();
       // Whom it cannot be told from shows under the wide priors.
       for (Eigen::Index j = 0; j < result.correlation.rows(); ++j) {
@@ -193,7 +199,7 @@ Observability analyse(const NormalEquations& equations, const RotorTrajectory& k
       keep_strongest(found.twins);
       return found;
     }
-    const Eigen::MatrixXd both = joint_covariance(covariance, middle, rows);
+    const Eigen::MatrixXd both = joint_covariance(*covariance, middle, rows);
     const auto count = static_cast<Eigen::Index>(rows.size());
     const Eigen::Index place = parameter
                                    ? std::find(rows.begin(), rows.end(), quantity) - rows.begin()
@@ -264,8 +270,9 @@ Observability observability_of_plan(const ObservabilityPlan& plan, const Progres
       angles[k] =
           wrap_to_pi(plan.sensor.angular_velocity[k] * (1e-9 * static_cast<double>(time_ns)));
     }
-    const Observation shot = observe(train, angles);
-    series.append(time_ns, shot.azimuth, shot.zenith);
+    const int emitter = static_cast<int>(i % static_cast<std::size_t>(train.emitters()));
+    const Observation shot = observe(train, angles, emitter);
+    series.append(time_ns, shot.azimuth, shot.zenith, static_cast<std::uint8_t>(emitter));
   }
   const ShotRange range{0, series.size()};
   RotorTrajectory knots = make_knots(series, {&range, 1}, train.prisms());
@@ -279,17 +286,21 @@ Observability observability_of_plan(const ObservabilityPlan& plan, const Progres
   }
   std::vector<RotorProcess> process = plan.rotor_process;
   if (process.empty()) process.assign(angles.size(), kTypicalRotor);
-  const std::vector<FreeParameter> all = all_parameters(train.shape());
+  const std::vector<FreeParameter> all = all_parameters(train, plan.free);
   NormalEquations equations;
   // Fewer shots count for all of them.
   const double share = shots / static_cast<double>(count);
-  accumulate(series, knots, train, all, {equal_noise(std::sqrt(variance / share)), 0.0}, equations);
-  return analyse(equations, knots, process, all, plan.free, plan.duration, shots, shots / variance,
-                 progress);
+  const ShotWeights weights{equal_noise(std::sqrt(variance / share)), 0.0};
+  accumulate(series, knots, train, all, weights, equations);
+  Observability result = analyse(equations, knots, process, all, plan.free, plan.duration, shots,
+                                 shots / variance, progress);
+  result.emitters =
+      compare_emitters(series, knots, train, process, plan.free, weights, 1.0, progress);
+  return result;
 }
 
 Observability observability_of_estimate(const Estimate& estimate, const Progress& progress) {
-  const std::vector<FreeParameter> all = all_parameters(estimate.sensor.shape());
+  const std::vector<FreeParameter> all = all_parameters(estimate.train, estimate.free);
   NormalEquations equations;
   ShotWeights weights;
   weights.angle_noise = usable_noise(estimate.noise.value);
@@ -304,8 +315,12 @@ Observability observability_of_estimate(const Estimate& estimate, const Progress
     duration += 1e-9 * static_cast<double>(estimate.series.time_ns[range.end - 1] -
                                            estimate.series.time_ns[range.begin]);
   }
-  return analyse(equations, estimate.trajectory, estimate.rotor_process, all, estimate.free,
-                 duration, shots, shots / variance, progress);
+  Observability result = analyse(equations, estimate.trajectory, estimate.rotor_process, all,
+                                 estimate.free, duration, shots, shots / variance, progress);
+  result.emitters =
+      compare_emitters(estimate.series, estimate.trajectory, estimate.train, estimate.rotor_process,
+                       estimate.free, weights, 1.0 / estimate.variance_factor, progress);
+  return result;
 }
 
 std::vector<std::string> observability_words(const Observability& observability, TrainShape shape) {
@@ -343,6 +358,7 @@ std::vector<std::string> observability_words(const Observability& observability,
           twin, sigma, unit, target, unit, seconds, observability.rate));
     }
   }
+  for (std::string& one : emitter_words(observability.emitters)) words.push_back(std::move(one));
   return words;
 }
 

@@ -9,6 +9,7 @@
 #include "risley/sensors/preset.hpp"
 
 #include "reproduction/runs.hpp"
+#include "reproduction/triple_unit.hpp"
 
 namespace risley::reproduction {
 namespace {
@@ -21,7 +22,15 @@ void add(Reproduction& all, Reproduction more) {
 }  // namespace
 
 ReproduceOptions::ReproduceOptions()
-    : type(sensors::load_sensor("mid-40")), unit(sensors::load_sensor("mid-40-table3")) {}
+    : type(sensors::load_sensor("mid-40")),
+      unit(sensors::load_sensor("mid-40-table3")),
+      triple_type(sensors::load_sensor("horizon")),
+      triple_unit(triple_type) {
+  for (const TripleParameter& one : kTripleUnit) {
+    triple_unit.set(one.name, printed(one.known).value *
+                                  find_parameter(one.name, triple_unit.shape()).si_per_unit);
+  }
+}
 
 std::size_t row_count(const Reproduction& reproduction) {
   std::size_t rows = 0;
@@ -48,8 +57,9 @@ Reproduction reproduce(const ReproduceOptions& options, const Progress& progress
   progress.report(0.14);
   add(result, stationary_unit(options, progress.part(0.14, 0.3)));
   add(result, simulated_unit(options, progress.part(0.3, 0.6)));
-  add(result, incorrect_calibration(options, progress.part(0.6, 0.98)));
+  add(result, incorrect_calibration(options, progress.part(0.6, 0.9)));
   add(result, beam_origin_errors(options));
+  add(result, triple_prism(options, progress.part(0.9, 1.0)));
   progress.report(1.0);
   return result;
 }

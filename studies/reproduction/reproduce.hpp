@@ -28,9 +28,10 @@ struct Effort {
   std::size_t table3_full_rate_seeds = 0;  ///< at 100 kHz; 0 leaves the table out
   std::size_t wall_seeds = 80;             ///< of section 3.3, at 1 kHz
   std::size_t wall_full_rate_seeds = 4;    ///< of section 3.3, at 100 kHz
+  std::size_t triple_seeds = 3;            ///< of the triple-prism sensor, at 240 kHz
 };
 inline constexpr Effort kFastEffort{};
-inline constexpr Effort kFullEffort{40, 20, 20, 6, 200, 20};
+inline constexpr Effort kFullEffort{40, 20, 20, 6, 200, 20, 12};
 
 /// A recording of a real unit for section 3.1.
 struct RealRecording {
@@ -42,6 +43,8 @@ struct RealRecording {
 struct ReproduceOptions {
   /// Nominal type and the unit of Table 3, as the presets have them.
   sensors::Sensor type, unit;
+  /// The same of a sensor with three prisms and several emitters: the Horizon, kTripleUnit.
+  sensors::Sensor triple_type, triple_unit;
   double angle_noise = radians_from_degrees(0.01);  ///< of simulated directions, 1 sigma, rad
   double range_noise = 0.02;                        ///< of simulated ranges, 1 sigma, m
   Effort effort = kFastEffort;
@@ -59,7 +62,8 @@ struct Reproduction {
 std::size_t row_count(const Reproduction& reproduction);
 std::size_t passed_count(const Reproduction& reproduction);
 
-/// Everything, in the order of the paper. @throws EstimationError when an estimation cannot start
+/// Everything, in the order of the paper, and the part of its future work that is done. @throws
+/// EstimationError when an estimation cannot start
 Reproduction reproduce(const ReproduceOptions& options, const Progress& progress = {});
 
 // One piece each, as reproduce() calls them.
@@ -75,5 +79,7 @@ Reproduction stationary_unit(const ReproduceOptions& options, const Progress& pr
 Reproduction simulated_unit(const ReproduceOptions& options, const Progress& progress = {});
 /// Section 3.3.
 Reproduction incorrect_calibration(const ReproduceOptions& options, const Progress& progress = {});
+/// Future work (2): a sensor with three prisms.
+Reproduction triple_prism(const ReproduceOptions& options, const Progress& progress = {});
 
 }  // namespace risley::reproduction

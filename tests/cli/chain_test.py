@@ -178,6 +178,26 @@ class ChainTest(CommandTest):
         text = self.expect(0, "observability", "seen.csv", "--noise-angle-deg", "0.01").stdout
         self.assertIn("keep it fixed", text)
         self.expect(2, "observability", "--duration-s", "0")
+        self.assertIsNone(plan["emitters"])
+
+    def test_observability_of_six_emitters(self):
+        plan = ("observability", "--sensor", "horizon", "--duration-s", "0.5", "--rate-hz", "24000")
+        seen = self.expect_json(0, *plan)
+        emitters = seen["emitters"]
+        self.assertEqual(emitters["count"], 6)
+        self.assertIn(emitters["alone"], (3, 4))
+        glass = emitters["parameters"]["refractive_index_a"]
+        self.assertLess(glass["sigma_directions_known"], glass["sigma"])
+        self.assertIsNone(glass["sigma_alone"])
+        self.assertTrue(emitters["unobservable_alone"])
+        self.assertAlmostEqual(glass["sigma"] / seen["parameters"]["refractive_index_a"]["sigma"],
+                               1, delta=1e-3)
+        for name in seen["parameters"]:
+            if name.startswith("incident_beam"):
+                self.assertLess(seen["parameters"][name]["sigma"], 0.001)
+        text = self.expect(0, *plan).stdout
+        self.assertIn("only the 6 emitters together tell", text)
+        self.assertIn("not told by emitter", text)
 
     def test_reported_nominal(self):
         arguments = ("--sensor", "mid-40-table3", "--rate-hz", "1000", "--duration-s", "0.2",

@@ -12,7 +12,8 @@ import unittest
 from command import COMMAND, CommandTest
 
 TABLES = {"table_1", "table_2", "figure_2", "section_2_3", "zero_position", "section_3_1", "table_3",
-          "table_3_filter", "section_3_3", "table_a1", "figure_a1"}
+          "table_3_filter", "section_3_3", "table_a1", "figure_a1", "triple_prism",
+          "triple_prism_models", "triple_prism_emitters"}
 FIGURES = ("figure_2", "figure_7", "figure_8", "figure_9", "figure_10", "figure_11", "figure_12",
            "figure_a1")
 
@@ -67,6 +68,13 @@ class ReproduceTest(CommandTest):
             self.assertEqual(row["paper"], float(text))
             decimals = len(text.split(".")[1])
             self.assertEqual(f"{row['ours']:.{decimals}f}", text)
+
+    def test_future_work_has_no_numbers_of_the_paper(self):
+        own = [row for name, table in self.tables.items() if name.startswith("triple_prism")
+               for row in table["rows"]]
+        self.assertEqual(len(own), 49)
+        self.assertTrue(all(row["paper"] is None for row in own))
+        self.assertEqual(self.result["rows"] - len(own), 121)
 
     def test_draws_of_the_paper_are_placed_among_ours(self):
         draw = self.row("section_3_3", "RMSE of the adjusted azimuth")["distribution"]

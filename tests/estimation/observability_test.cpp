@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <random>
 
 #include <gtest/gtest.h>
 
@@ -11,6 +12,7 @@
 #include "risley/estimation/estimate.hpp"
 
 #include "estimation/series.hpp"
+#include "optics/trains.hpp"
 
 namespace risley::estimation::observability_test {
 
@@ -124,6 +126,116 @@ TEST(Observability, Section23OfThePaper) {
   };
   EXPECT_TRUE(says("refractive_index_air cannot be told from refractive_index"));
   EXPECT_TRUE(says("rotation_angle_a_deg (rho = -0.99"));
+}
+
+/// A plan as the command makes it for a sensor, 1 s at 24 kHz.
+ObservabilityPlan plan_of_six(const sensors::Sensor& sensor) {
+  ObservabilityPlan plan;
+  plan.sensor = sensor;
+  plan.duration = 1;
+  plan.rate = 24000;
+  plan.angle_noise = radians_from_degrees(0.004);
+  EstimateOptions usual;
+  usual.sensor = sensor;
+  plan.free = chosen_parameters(usual);
+  return plan;
+}
+
+const EmitterBounds& bounds_of(const EmitterComparison& all, const std::string& name) {
+  return *std::find_if(all.bounds.begin(), all.bounds.end(),
+                       [&](const auto& one) { return one.name == name; });
+}
+
+TEST(Observability, OfSixEmittersIsTheEstimatesSigma) {
+  sensors::Sensor unit = sensors::load_sensor("horizon");
+  unit.set("bearing_tilt_a_vertical_deg", radians_from_degrees(0.3));
+  unit.set("prism_tilt_b_vertical_deg", radians_from_degrees(-0.2));
+  ObservabilityPlan plan = plan_of_six(unit);
+  AngleSeries series;
+  std::mt19937_64 generator(1);
+  std::normal_distribution<double> normal;
+  for (int i = 0; i < 12000; ++i) {
+    const double t = i / plan.rate;
+    std::vector<double> angles;
+    for (const double speed : unit.angular_velocity) angles.push_back(speed * t);  // as a plan
+    const Observation shot = observe(unit.train, angles, i % 6);
+    series.append(std::llround(1e9 * t), shot.azimuth + plan.angle_noise * normal(generator),
+                  shot.zenith + plan.angle_noise * normal(generator),
+                  static_cast<std::uint8_t>(i % 6));
+  }
+  EstimateOptions options;
+  options.sensor = sensors::load_sensor("horizon");
+  options.angle_noise = plan.angle_noise;
+  options.rotor_process.assign(3, kTypicalRotor);
+  const Estimate result = estimate(Method::map, series, series, options);
+  ASSERT_TRUE(result.converged) << result.reason;
+  const Observability all = observability_of_estimate(result);
+  plan.duration = 0.5;
+  plan.rotor_process = options.rotor_process;
+  const Observability planned = observability_of_plan(plan);
+  ASSERT_EQ(result.free.size(), 25u);
+  for (std::size_t i = 0; i < result.free.size(); ++i) {
+    const std::string& name = result.free[i].name;
+    EXPECT_TRUE(quantity(all, name).free) << name;
+    EXPECT_NEAR(quantity(all, name).sigma / result.values[i].sigma, 1.0, 0.01) << name;
+    EXPECT_NEAR(quantity(planned, name).sigma / result.values[i].sigma, 1.0, 0.1) << name;
+    if (name.starts_with("incident")) continue;
+    EXPECT_NEAR(bounds_of(all.emitters, name).all / quantity(all, name).sigma, 1.0, 1e-3) << name;
+  }
+}
+
+TEST(Observability, SixEmittersTellTheFirstPrismWhichOneDoesNot) {
+  const Observability all = observability_of_plan(plan_of_six(sensors::load_sensor("horizon")));
+  const EmitterComparison& emitters = all.emitters;
+  EXPECT_EQ(emitters.emitters, 6);
+  EXPECT_TRUE(emitters.alone == 2 || emitters.alone == 3);
+  for (const char* name :
+       {"refractive_index_a", "prism_tilt_a_vertical_deg", "bearing_tilt_a_vertical_deg"}) {
+    EXPECT_TRUE(std::isfinite(bounds_of(emitters, name).all)) << name;
+    EXPECT_TRUE(std::isinf(bounds_of(emitters, name).alone)) << name;
+  }
+  const EmitterBounds& tilt = bounds_of(emitters, "prism_tilt_a_horizontal_deg");
+  EXPECT_GT(tilt.alone / tilt.all, 100.0);
+  // The last prism's glass needs no further emitter.
+  const EmitterBounds& last = bounds_of(emitters, "refractive_index_c");
+  EXPECT_NEAR(last.alone / last.all, 1.0, 0.05);
+  for (const EmitterBounds& one : emitters.bounds) {
+    EXPECT_LE(one.known, one.all * (1 + 1e-6)) << one.name;
+  }
+  ASSERT_EQ(emitters.untold_alone.size(), 1u);
+  EXPECT_EQ(emitters.untold_alone[0].weights.front().first, "prism_tilt_a_vertical_deg");
+  const auto words = observability_words(all, {3, 6});
+  EXPECT_TRUE(std::any_of(words.begin(), words.end(), [](const std::string& one) {
+    return one.starts_with("only the 6 emitters together tell") &&
+           one.find("refractive_index_a") != std::string::npos;
+  }));
+}
+
+TEST(Observability, OneEmitterAloneIsASensorWithThatEmitter) {
+  const sensors::Sensor six = sensors::load_sensor("avia");
+  const ObservabilityPlan plan = plan_of_six(six);
+  const EmitterComparison emitters = observability_of_plan(plan).emitters;
+  ObservabilityPlan own = plan;
+  own.sensor.train = testing::train_of_emitter(six.train, emitters.alone);
+  own.free = free_parameters(default_free_names({2}), {2});
+  const Observability alone = observability_of_plan(own);
+  EXPECT_TRUE(alone.emitters.bounds.empty());
+  for (const char* name : {"bearing_tilt_a_horizontal_deg", "bearing_tilt_a_vertical_deg",
+                           "prism_tilt_a_vertical_deg", "prism_tilt_b_horizontal_deg",
+                           "prism_tilt_b_vertical_deg", "prism_tilt_a_horizontal_deg"}) {
+    EXPECT_NEAR(bounds_of(emitters, name).alone / quantity(alone, name).sigma, 1.0, 0.03) << name;
+  }
+}
+
+TEST(Observability, ParametersOfOnePrismAreNamedWhenTheyAreFree) {
+  ObservabilityPlan plan = plan_of("mid-40-table3", 1, 1000);
+  plan.free = free_parameters({"refractive_index_a", "refractive_index_b"}, {2});
+  const Observability all = observability_of_plan(plan);
+  EXPECT_TRUE(quantity(all, "refractive_index_a").free);
+  EXPECT_TRUE(quantity(all, "refractive_index_b").free);
+  EXPECT_FALSE(quantity(all, "wedge_angle_deg").free);
+  for (const QuantityObservability& one : all.quantities) EXPECT_NE(one.name, "refractive_index");
+  EXPECT_TRUE(all.emitters.bounds.empty());
 }
 
 TEST(Observability, WeakDirectionsAreThoseOfTheMatrix) {

@@ -16,7 +16,7 @@
 
 namespace risley::reproduction::reproduce_test {
 
-constexpr Effort kSmall{3, 3, 1, 0, 12, 1};
+constexpr Effort kSmall{3, 3, 1, 0, 12, 1, 1};
 
 ReproduceOptions small_options() {
   ReproduceOptions options;
@@ -133,6 +133,23 @@ TEST(Reproduce, Section33PassesAndAnotherUnitFails) {
   options.unit.set("incident_beam_vertical_deg", radians_from_degrees(-0.3));
   const Reproduction other = incorrect_calibration(options);
   EXPECT_FALSE(passes(row_of(table_of(other, "section_3_3"), "RMSE of the reported zenith")));
+}
+
+TEST(Reproduce, ThreePrismsPassAndMoreNoiseFails) {
+  ReproduceOptions options = small_options();
+  expect_all_pass(triple_prism(options));
+  options.angle_noise = radians_from_degrees(0.02);
+  const Reproduction noisy = triple_prism(options);
+  EXPECT_FALSE(passes(row_of(table_of(noisy, "triple_prism"), "azimuth observation errors")));
+  EXPECT_FALSE(passes(row_of(table_of(noisy, "triple_prism_models"), "practical model")));
+}
+
+TEST(Reproduce, AnotherUnitFailsThreePrisms) {
+  ReproduceOptions options = small_options();
+  options.triple_unit = options.triple_type;  // without errors
+  const Reproduction other = triple_prism(options);
+  EXPECT_FALSE(passes(row_of(table_of(other, "triple_prism"), "vertical tilt of prism B")));
+  EXPECT_FALSE(passes(row_of(table_of(other, "triple_prism_models"), "ideal model")));
 }
 
 TEST(Reproduce, SameSeedSameNumbersWhateverTheThreads) {

@@ -8,6 +8,7 @@
 
 #include <Eigen/Core>
 
+#include "risley/estimation/emitter_comparison.hpp"
 #include "risley/estimation/estimate.hpp"
 #include "risley/estimation/free_parameters.hpp"
 #include "risley/estimation/rotor_process.hpp"
@@ -53,6 +54,7 @@ struct Observability {
   /// With all of the prisms' parameters free: combinations that keep their prior sigma or more.
   std::vector<WeakDirection> unobservable;
   double shots = 0, duration = 0, rate = 0;
+  EmitterComparison emitters;  ///< without bounds where fewer than two fire
 };
 
 /// Cramer-Rao bounds of a plan: the information of prisms that turn at the sensor's speeds under
