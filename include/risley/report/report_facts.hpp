@@ -23,8 +23,8 @@ struct ReportedParameter {
   std::string name;
   double value = kUnknown, sigma = kUnknown;
   double sigma_given_held = kUnknown;  ///< if held parameters were exactly as held
-  double nominal = kUnknown;   ///< of the preset
-  double believed = kUnknown;  ///< what the sensor computed its directions with
+  double nominal = kUnknown;           ///< of the preset
+  double believed = kUnknown;          ///< what the sensor computed its directions with
   double truth = kUnknown, error = kUnknown, error_over_sigma = kUnknown;
 };
 
