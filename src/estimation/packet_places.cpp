@@ -20,6 +20,7 @@
 #include "risley/estimation/initialisation.hpp"
 #include "risley/estimation/sensor_recognition.hpp"
 #include "risley/optics/observation_model.hpp"
+#include "risley/recordings/cut_coordinates.hpp"
 
 #include "estimation/block_fit.hpp"
 
@@ -165,8 +166,7 @@ class PacketFitter : private BlockFit {
           1e-9 * static_cast<double>(time_ns(packet, static_cast<int>(k)) - state.time_ns);
       for (std::size_t rotor = 0; rotor < angles.size(); ++rotor) {
         const auto at = static_cast<Eigen::Index>(3 * rotor);
-        angles[rotor] =
-            state.mean[at] + dt * (state.mean[at + 1] + 0.5 * dt * state.mean[at + 2]);
+        angles[rotor] = state.mean[at] + dt * (state.mean[at + 1] + 0.5 * dt * state.mean[at + 2]);
       }
       const Observation shot = observe(train_, angles, firing_order_[k % firing_order_.size()]);
       if (!shot.valid) continue;
@@ -186,7 +186,7 @@ class PacketFitter : private BlockFit {
   const AngleSeries& series_;
   double rate_;
   std::vector<std::uint8_t> firing_order_;
-  std::vector<std::size_t> first_;  // shot of each packet
+  std::vector<std::size_t> first_;             // shot of each packet
   std::vector<double> loss_, ahead_, behind_;  // [shots of the packet][places]
   std::vector<std::uint8_t> place_;
   std::vector<double> lead_;
@@ -245,9 +245,8 @@ std::vector<std::size_t> fullest_packets(const PacketShots& shots, const PacketF
     const double off = 1e-9 * static_cast<double>(shots.packets[packet].time_ns - time_ns);
     if (std::abs(off) < kNear && fitter.size(packet) >= kFewestShots) result.push_back(packet);
   }
-  std::stable_sort(result.begin(), result.end(), [&](std::size_t a, std::size_t b) {
-    return fitter.size(a) > fitter.size(b);
-  });
+  std::stable_sort(result.begin(), result.end(),
+                   [&](std::size_t a, std::size_t b) { return fitter.size(a) > fitter.size(b); });
   if (result.size() > kMost) result.resize(kMost);
   return result;
 }
@@ -269,7 +268,6 @@ std::optional<PacketAnchor> find_packet_anchor(const PacketShots& shots, double 
   constexpr double kLooseAngle = radians_from_degrees(3.0), kSpeedShare = 1e-3;
   constexpr std::array<double, 2> kCoarse = {radians_from_degrees(1.0), radians_from_degrees(0.3)};
   constexpr std::size_t kMostRefined = 4;
-  constexpr double kClear = 0.6;  // share of another's residuals
   constexpr int kDelays = 12;  // on either side
   const int emitters = sensor.train.emitters();
   std::vector<std::uint8_t> in_turn = emitters_in_order({}, emitters);
@@ -281,14 +279,13 @@ std::optional<PacketAnchor> find_packet_anchor(const PacketShots& shots, double 
     if (!start) continue;
     AngleSeries series = shots.series;
     prepare_shots(series, *start);
-    const double noise =
-        std::max(sensor.angle_noise, kLeastPlaceNoise * usual_step(*start, rate));
+    const double noise = std::max(sensor.angle_noise, kLeastPlaceNoise * usual_step(*start, rate));
     const std::array<double, 2> fine = {radians_from_degrees(0.1), noise};
-    for (int order = 0; order < (emitters > 1 ? 2 * emitters : 1); ++order) {
-      // Those that a packet begins with the first emitter, or the last one backwards, come first.
-      const bool backwards = order >= emitters;
-      const int first = backwards ? 2 * emitters - 1 - order : order;
-      PacketAnchor anchor{*start, emitters_in_order({first, backwards}, emitters), 0,
+    // Packets of several emitters hold whole rounds of them.
+    for (const bool backwards : {false, true}) {
+      if (backwards && emitters == 1) break;
+      const FiringOrder order{backwards ? emitters - 1 : 0, backwards};
+      PacketAnchor anchor{*start, emitters_in_order(order, emitters), 0,
                           std::numeric_limits<double>::infinity()};
       PacketFitter fitter(shots, series, rate, start->train, anchor.firing_order);
       double sum = 0, least = std::numeric_limits<double>::infinity();
@@ -309,15 +306,13 @@ std::optional<PacketAnchor> find_packet_anchor(const PacketShots& shots, double 
           prior.covariance = loose.covariance;
           fits.push_back(fitter.fit(packet, prior, kCoarse));
         }
-        std::stable_sort(fits.begin(), fits.end(), [](const PacketFit& a, const PacketFit& b) {
-          return a.scale < b.scale;
-        });
+        std::stable_sort(fits.begin(), fits.end(),
+                         [](const PacketFit& a, const PacketFit& b) { return a.scale < b.scale; });
         if (fits.size() > kMostRefined) fits.resize(kMostRefined);
         double best = std::numeric_limits<double>::infinity();
         for (const PacketFit& one : fits) {
           RotorState prior = one.state;
-          prior.covariance =
-              PacketFitter::loose_state(*start, kLooseAngle, kSpeedShare).covariance;
+          prior.covariance = PacketFitter::loose_state(*start, kLooseAngle, kSpeedShare).covariance;
           const PacketFit refined = fitter.fit(packet, prior, fine);
           best = std::min(best, refined.scale);
           if (refined.scale >= least) continue;
@@ -328,20 +323,13 @@ std::optional<PacketAnchor> find_packet_anchor(const PacketShots& shots, double 
         sum += best;
       }
       anchor.scale = sum / static_cast<double>(packets.size());
-      // Packets that lack their first shots and their last ones fit several first emitters: that
-      // is the same as a time by which all shots are late.
-      if (order % emitters == 0 || anchor.scale < kClear * anchors.back().scale) {
-        if (order % emitters != 0) anchors.pop_back();
-        anchors.push_back(std::move(anchor));
-      }
+      anchors.push_back(std::move(anchor));
     }
   }
   if (anchors.empty()) return std::nullopt;
-  std::stable_sort(anchors.begin(), anchors.end(), [](const PacketAnchor& a,
-                                                      const PacketAnchor& b) {
-    return a.scale < b.scale;
-  });
-  constexpr double kMostSteps = 3.0;
+  std::stable_sort(anchors.begin(), anchors.end(),
+                   [](const PacketAnchor& a, const PacketAnchor& b) { return a.scale < b.scale; });
+  constexpr double kClear = 0.6, kMostSteps = 3.0;
   const PacketAnchor& best = anchors.front();
   if (best.scale > kMostSteps * usual_step(best.start, rate)) return std::nullopt;
   if (anchors.size() > 1 && best.scale > kClear * anchors[1].scale) return std::nullopt;
@@ -357,7 +345,7 @@ struct FollowedPackets {
 
 FollowedPackets follow_packets(const PacketShots& shots, const AngleSeries& series, double rate,
                                const PacketAnchor& anchor, const Progress& progress) {
-  constexpr double kAnchorAngle = radians_from_degrees(1.0), kAnchorSpeedShare = 1e-3;
+  constexpr double kAnchorAngle = radians_from_degrees(1.0), kAnchorSpeedShare = 2e-4;
   constexpr double kLearnedShare = 0.03;
   constexpr std::size_t kFewestAnew = 24, kFewestJudged = 4, kFewestLearned = 24;
   const double step = usual_step(anchor.start, rate);
@@ -373,9 +361,9 @@ FollowedPackets follow_packets(const PacketShots& shots, const AngleSeries& seri
   result.place.assign(series.size(), kNoPlace);
   for (const int direction : {1, -1}) {
     double noise = std::max(least_noise, anchor.scale);
-    RotorState state = direction > 0 ? PacketFitter::loose_state(anchor.start, kAnchorAngle,
-                                                                 kAnchorSpeedShare)
-                                     : result.anchor;
+    RotorState state =
+        direction > 0 ? PacketFitter::loose_state(anchor.start, kAnchorAngle, kAnchorSpeedShare)
+                      : result.anchor;
     std::size_t packet = anchor.packet + (direction > 0 ? 0 : 1);
     const std::size_t end = direction > 0 ? shots.packets.size() : 0;
     while (direction > 0 ? packet < end : packet > end) {
@@ -389,14 +377,16 @@ FollowedPackets follow_packets(const PacketShots& shots, const AngleSeries& seri
         unsure = std::max(unsure, leaning * std::sqrt(prior.covariance(k, k)));
       }
       const bool first = present == anchor.packet && direction > 0;
-      if (!first && 6.0 * unsure > spacing && count < kFewestAnew) continue;
+      // Shots of a single emitter fit as well one place further.
+      const bool anew = 6.0 * unsure > spacing;
+      if (!first && anew && (count < kFewestAnew || anchor.firing_order.size() == 1)) continue;
       const std::array<double, 2> levels = {std::max(noise, std::min(unsure, spacing)), noise};
       const PacketFit fit = fitter.fit(present, prior, levels);
       if (!first && count >= kFewestJudged && fit.scale > kPoorPacket * noise) continue;
       if (count >= kFewestLearned) {
-        noise = std::clamp(std::sqrt(noise * noise +
-                                     kLearnedShare * (fit.scale * fit.scale - noise * noise)),
-                           least_noise, step);
+        noise = std::clamp(
+            std::sqrt(noise * noise + kLearnedShare * (fit.scale * fit.scale - noise * noise)),
+            least_noise, step);
       }
       state = fit.state;
       if (first) result.anchor = state;
@@ -408,6 +398,15 @@ FollowedPackets follow_packets(const PacketShots& shots, const AngleSeries& seri
     }
   }
   return result;
+}
+
+/// The shots as they were before their coordinates were cut off.
+AngleSeries before_cut(AngleSeries series) {
+  for (std::size_t i = 0; i < series.size(); ++i) {
+    const double step = std::sqrt(12.0 * static_cast<double>(series.zenith_rounding_variance[i]));
+    recordings::move_to_middle_of_cut(step, series.azimuth[i], series.zenith[i]);
+  }
+  return series;
 }
 
 /// Fits the optics to the placed shots about an anchor. @return whether that went well
@@ -507,28 +506,45 @@ ShotPlaces find_places(const PacketShots& shots, double shot_rate, const sensors
   check_packets(shots);
   require_above("shot rate", shot_rate, 0, "Hz");
   constexpr int kMostRounds = 3;
+  constexpr double kClearlyBetter = 0.95;  // residuals
   ShotPlaces result;
   result.firing_order = emitters_in_order({}, sensor.train.emitters());
   result.place.assign(shots.series.size(), kNoPlace);
   std::optional<PacketAnchor> anchor = find_packet_anchor(shots, shot_rate, sensor, progress);
-  if (!anchor) {
-    for (std::size_t i = 0; i < shots.series.size(); ++i) {
-      if (shots.is_whole(shots.packet[i])) result.place[i] = shots.precedent[i];
-    }
-    return result;
+  for (std::size_t i = 0; i < shots.series.size(); ++i) {
+    if (shots.is_whole(shots.packet[i])) result.place[i] = shots.precedent[i];
   }
+  if (!anchor) return result;
+  const Start frame = anchor->start;
   AngleSeries series = shots.series;
-  prepare_shots(series, anchor->start);
+  prepare_shots(series, frame);
   anchor->start.mirrored = false;
   anchor->start.frame.reset();
   FollowedPackets followed = follow_packets(shots, series, shot_rate, *anchor, progress);
   for (int round = 0; round < kMostRounds; ++round) {
-    if (!fit_optics(shots, series, shot_rate, sensor, followed, *anchor)) break;
+    PacketAnchor refined = *anchor;
+    if (!fit_optics(shots, series, shot_rate, sensor, followed, refined)) break;
+    if (round == 0 && shots.cartesian) {
+      AngleSeries uncut = before_cut(shots.series);
+      prepare_shots(uncut, frame);
+      PacketAnchor other = *anchor;
+      if (fit_optics(shots, uncut, shot_rate, sensor, followed, other) &&
+          other.scale < kClearlyBetter * refined.scale) {
+        result.cut_coordinates = true;
+        series = std::move(uncut);
+        refined = std::move(other);
+      }
+    }
+    *anchor = std::move(refined);
     FollowedPackets again = follow_packets(shots, series, shot_rate, *anchor, progress);
     if (again.placed < followed.placed) break;
     const bool settled = again.place == followed.place;
     followed = std::move(again);
     if (settled) break;
+  }
+  if (2 * followed.placed < shots.series.size()) {  // the rotors were lost
+    result.cut_coordinates = false;
+    return result;
   }
   result.followed = true;
   result.place = std::move(followed.place);

@@ -31,7 +31,6 @@ using recordings::Extrinsics;
 /// Fewer tell nothing of rotors.
 constexpr std::size_t kFewestWholePackets = 10;
 
-
 /// The pose that a roll about the optical axis amounts to: recorded = pose unrolled.
 Extrinsics roll_about_axis(double roll, const estimation::FrameTurn& frame) {
   const Eigen::Matrix3d axis_frame = estimation::recording_from_sensor(frame);
@@ -210,6 +209,7 @@ std::optional<PacketRecording> packet_recording(const std::string& path,
   PacketRecording result;
   estimation::PacketShots& shots = result.shots;
   shots.places = reader->header().packet_shots;
+  shots.cartesian = reader->header().cartesian && !options.extrinsics;
   recordings::Chunk chunk;
   try {
     while (reader->read(chunk)) {
@@ -246,7 +246,7 @@ recordings::PacketPlaces places_of_rows(const PacketRecording& recording,
   const estimation::PacketShots& shots = recording.shots;
   recordings::PacketPlaces result{
       std::vector<std::uint8_t>(recording.index.size(), recordings::kNoPlace), shot_rate,
-      std::move(firing_order)};
+      std::move(firing_order), false};
   std::size_t shot = 0;
   for (std::size_t packet = 0; packet < shots.packets.size(); ++packet) {
     std::array<std::uint8_t, recordings::kNoPlace> of_index{};
@@ -271,9 +271,9 @@ std::string places_words(const PacketRecording& recording, const estimation::Sho
   const std::size_t packets = recording.shots.packets.size(), whole = recording.whole_packets();
   const auto left_out = static_cast<std::size_t>(
       std::count(found.place.begin(), found.place.end(), recordings::kNoPlace));
-  const std::string lacking = fmt::format(
-      "points are missing in {} of {} packets, and the file does not say which", packets - whole,
-      packets);
+  const std::string lacking =
+      fmt::format("points are missing in {} of {} packets, and the file does not say which",
+                  packets - whole, packets);
   if (found.followed) {
     return fmt::format(
         "{}: the rotors were followed and tell when each of {} shots was fired; {} that fit two "
@@ -291,7 +291,8 @@ std::string places_words(const PacketRecording& recording, const estimation::Sho
         lacking, sensor, whole, remedy));
   }
   return fmt::format(
-      "{}: they do not tell the rotors of the sensor {}, and only the {} shots of the {} whole packets are "
+      "{}: they do not tell the rotors of the sensor {}, and only the {} shots of the {} whole "
+      "packets are "
       "used; {}",
       lacking, sensor, found.place.size() - left_out, whole, remedy);
 }
@@ -377,13 +378,20 @@ SensorFrameRecording open_with_places(const std::string& path, recordings::ReadO
   estimation::ShotPlaces found = estimation::find_places(packets.shots, rate, sensor, progress);
   result.warnings.push_back(places_words(packets, found, sensor.name));
   if (given_rate) {
-    result.warnings.push_back(fmt::format(
-        "shots cannot be counted where points are missing: the packets keep their times, and {:.6g} "
-        "shots per second are those within a packet",
-        rate));
+    result.warnings.push_back(
+        fmt::format("shots cannot be counted where points are missing: the packets keep their "
+                    "times, and {:.6g} "
+                    "shots per second are those within a packet",
+                    rate));
   }
-  reading.packet_places =
-      places_of_rows(packets, found.place, rate, std::move(found.firing_order));
+  if (found.cut_coordinates) {
+    result.warnings.push_back(
+        "the shots fit better as points whose coordinates were cut off towards zero than as "
+        "rounded "
+        "ones: half a step was put back");
+  }
+  reading.packet_places = places_of_rows(packets, found.place, rate, std::move(found.firing_order));
+  reading.packet_places->cut_coordinates = result.cut_mended = found.cut_coordinates;
   result.reader = open_input(path, reading);
   return result;
 }
@@ -441,7 +449,7 @@ EstimationInput read_for_estimation(const EstimationInputOptions& options,
                     reader.header().devices.size()));
   }
   EstimationInput result;
-  result.whole_steps = reader.header().cartesian && !input.turned_back;
+  result.whole_steps = reader.header().cartesian && !input.turned_back && !input.cut_mended;
   estimation::ShotSelector selector(options.selection);
   recordings::TimeAudit audit;
   recordings::Chunk chunk;

@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "risley/core/require.hpp"
+#include "risley/recordings/cut_coordinates.hpp"
 
 #include "recordings/reader_decorators.hpp"
 
@@ -42,6 +43,10 @@ class PlacingReader final : public DecoratingReader {
         rows.azimuth[row] = rows.zenith[row] = std::numeric_limits<double>::quiet_NaN();
       } else {
         last_place_ = place;
+        if (places_.cut_coordinates && rows.range[row] > 0) {
+          rows.range[row] *= move_to_middle_of_cut(static_cast<double>(rows.zenith_resolution[row]),
+                                                   rows.azimuth[row], rows.zenith[row]);
+        }
       }
       rows.time_ns[row] = packet_time_ns_ + std::llround(last_place_ * 1e9 / places_.shot_rate);
       rows.beam[row] = places_.firing_order[last_place_ % places_.firing_order.size()];
@@ -61,11 +66,10 @@ std::unique_ptr<Reader> with_packet_places(std::unique_ptr<Reader> reader,
                                            const ReadOptions& options) {
   const RecordingHeader& header = reader->header();
   if (header.packet_shots == 0 || header.devices.size() != 1 || options.shot_rate) {
-    throw InvalidArgument(
-        fmt::format("ReadOptions::packet_places for a recording of format {} and {} sensors{}, "
-                    "allowed for one sensor, with one time for each packet and no shot rate",
-                    header.format, header.devices.size(),
-                    options.shot_rate ? " with a shot rate" : ""));
+    throw InvalidArgument(fmt::format(
+        "ReadOptions::packet_places for a recording of format {} and {} sensors{}, "
+        "allowed for one sensor, with one time for each packet and no shot rate",
+        header.format, header.devices.size(), options.shot_rate ? " with a shot rate" : ""));
   }
   require_above("ReadOptions::packet_places, shot_rate", options.packet_places->shot_rate, 0, "Hz");
   require_at_least("ReadOptions::packet_places, emitters in the firing order",

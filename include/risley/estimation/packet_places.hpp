@@ -20,9 +20,10 @@ struct PacketShots {
     std::int64_t time_ns = 0;  ///< of its first place
     std::uint8_t shots = 0;    ///< that the file has of it
   };
-  int places = 0;                  ///< of a whole packet, up to 254
-  std::vector<OnePacket> packets;  ///< in the order of the recording
-  AngleSeries series;              ///< valid shots; their times and beams are not looked at
+  int places = 0;                       ///< of a whole packet, up to 254
+  bool cartesian = false;               ///< directions come from coordinates in whole steps
+  std::vector<OnePacket> packets;       ///< in the order of the recording
+  AngleSeries series;                   ///< valid shots; their times and beams are not looked at
   std::vector<std::size_t> packet;      ///< of each
   std::vector<std::uint8_t> precedent;  ///< shots of its packet that the file has before each
 
@@ -36,6 +37,9 @@ struct ShotPlaces {
   bool followed = false;
   std::vector<std::uint8_t> place;         ///< of each shot, or recordings::kNoPlace
   std::vector<std::uint8_t> firing_order;  ///< emitter of places 0, 1, ...; one entry per emitter
+  /// The shots fit better as points whose coordinates were cut off towards zero than as rounded
+  /// ones.
+  bool cut_coordinates = false;
 };
 
 /// Shots per second within packets, Hz: places of a packet over the time from one packet to the

@@ -20,7 +20,7 @@ namespace risley::recordings {
 struct ReadWarning {
   FilePlace place;
   std::string message;
-  std::uint64_t lost_records = 0;  ///< records known to be lost, 0 when it cannot be known
+  std::uint64_t lost_records = 0;   ///< records known to be lost, 0 when it cannot be known
   bool answered_by_places = false;  ///< it does not hold where ReadOptions::packet_places are given
 };
 
@@ -71,6 +71,9 @@ struct PacketPlaces {
   double shot_rate = 0;  ///< within packets, Hz
   /// Emitter of places 0, 1, ..., one entry per emitter; not empty.
   std::vector<std::uint8_t> firing_order;
+  /// Coordinates were cut off towards zero, not rounded: points are moved to the middle of where
+  /// they were.
+  bool cut_coordinates = false;
 };
 
 /// How a recording is to be read.
