@@ -23,6 +23,7 @@
 #include "risley/estimation/normal_equations.hpp"
 #include "risley/optics/parameters.hpp"
 
+#include "estimation/block_fit.hpp"
 #include "estimation/knot_model.hpp"
 
 namespace risley::estimation {
@@ -53,15 +54,10 @@ constexpr double kLooseShots = 0.15;
 constexpr double kLeastNoiseSteps = 0.2;
 /// Of the start about the truth.
 constexpr double kAnchorAngleSigma = radians_from_degrees(0.5), kAnchorSpeedShare = 1e-3;
-/// Of speeds and accelerations that are not looked for.
-constexpr double kStraightSpeedSigma = 1e-3;
 /// How often the optics are fitted again to the mended shots.
 constexpr int kMostRounds = 4;
 /// Shots around the start that they are fitted to.
 constexpr std::size_t kFittedShots = 40000;
-
-using RotorSquare = KnotSquare<Eigen::Dynamic>;
-using RotorVector = KnotVector<Eigen::Dynamic>;
 
 /// The valid shots of a recording by their numbers in the count.
 struct NumberedShots {
@@ -87,15 +83,6 @@ struct NumberedShots {
   }
 };
 
-void clear(AngleSeries& series) {
-  series.time_ns.clear();
-  series.azimuth.clear();
-  series.zenith.clear();
-  series.beam.clear();
-  series.azimuth_rounding_variance.clear();
-  series.zenith_rounding_variance.clear();
-}
-
 /// A change of the count somewhere behind valid shot `before` and not behind shot `after`.
 struct FoundSlip {
   std::size_t before = 0, after = 0;
@@ -111,48 +98,22 @@ struct Followed {
 };
 
 /// Follows the rotors from a start in one direction. Places are steps from the start.
-class Follower {
+class Follower : private BlockFit {
  public:
+  using BlockFit::loose_state;
+  using State = RotorState;
+
   /// @param noise  of the shots about the fit of the start, rad
   /// @param step   from shot to shot, typically, rad
   Follower(const NumberedShots& shots, const PrismTrain& train, double noise, double step,
            std::ptrdiff_t direction, std::size_t first, std::size_t count)
-      : shots_(shots), train_(train), direction_(direction), first_(first), count_(count) {
-    step_ = step;
+      : BlockFit(train, kSoftening),
+        shots_(shots),
+        direction_(direction),
+        first_(first),
+        count_(count),
+        step_(step) {
     weights_.angle_noise = equal_noise(std::max(noise, kLeastNoiseSteps * step));
-    weights_.softening = kSoftening;
-    knot_.prisms = train.prisms();
-    knot_.stretch_begin = {0};
-    knot_.time_ns.resize(1);
-    knot_.first_shot = {0};
-    knot_.last_shot.resize(1);
-    knot_.state.resize(static_cast<std::size_t>(knot_.states()));
-  }
-
-  struct State {
-    std::int64_t time_ns = 0;
-    RotorVector mean;
-    RotorSquare covariance;
-  };
-
-  /// A start as a state that may be off by so much, rad and a share of the speeds.
-  static State loose_state(const Start& start, double angle_sigma, double speed_share) {
-    const auto prisms = static_cast<Eigen::Index>(start.rotation_angle.size());
-    State state;
-    state.time_ns = start.time_ns;
-    state.mean.resize(3 * prisms);
-    state.covariance.setZero(3 * prisms, 3 * prisms);
-    for (Eigen::Index k = 0; k < prisms; ++k) {
-      const double speed = start.angular_velocity[static_cast<std::size_t>(k)];
-      state.mean[3 * k] = start.rotation_angle[static_cast<std::size_t>(k)];
-      state.mean[3 * k + 1] = speed;
-      state.mean[3 * k + 2] = 0;
-      state.covariance(3 * k, 3 * k) = angle_sigma * angle_sigma;
-      state.covariance(3 * k + 1, 3 * k + 1) =
-          std::pow(std::max(speed_share * std::abs(speed), kStraightSpeedSigma), 2);
-      state.covariance(3 * k + 2, 3 * k + 2) = kStraightSpeedSigma * kStraightSpeedSigma;
-    }
-    return state;
   }
 
   /// Fits a state to all places, as if they were free of slips.
@@ -281,27 +242,12 @@ class Follower {
     return block_.time_ns.front() + (block_.time_ns.back() - block_.time_ns.front()) / 2;
   }
 
-  static void predict(State& state, std::int64_t time_ns) {
-    const double dt = 1e-9 * static_cast<double>(time_ns - state.time_ns);
-    predict_rotors(state.mean, state.covariance, kSettlingProcess, dt);
-    state.time_ns = time_ns;
-  }
-
-  void evaluate(const State& state) {
-    knot_.time_ns[0] = state.time_ns;
-    knot_.last_shot[0] = block_.size();
-    std::copy_n(state.mean.data(), knot_.state.size(), knot_.state.begin());
-    azimuth_.resize(block_.size());
-    zenith_.resize(block_.size());
-    accumulate(block_, knot_, train_, {}, weights_, equations_, {azimuth_, zenith_, {}});
-  }
-
   Test tested(const State& state) {
     evaluate(state);
     Test test;
     test.loss = equations_.cost / static_cast<double>(block_.size());
     test.scale = robust_scale(azimuth_, zenith_);
-    const RotorSquare curvature = knot_curvature<Eigen::Dynamic>(equations_, 0);
+    const KnotSquare<Eigen::Dynamic> curvature = knot_curvature<Eigen::Dynamic>(equations_, 0);
     double slope = 0, information = 0;
     for (Eigen::Index k = 0; k < state.mean.size(); k += 3) {
       slope += state.mean[k + 1] * equations_.gradient[static_cast<std::size_t>(k)];
@@ -350,19 +296,6 @@ class Follower {
     return off.dot(algebra::SymmetricSolver(predicted.covariance).solve(off));
   }
 
-  /// One Gauss-Newton step from a state to the loaded shots and a prior together.
-  void improve(State& state, const State& prior) {
-    evaluate(state);
-    const RotorSquare curvature = knot_curvature<Eigen::Dynamic>(equations_, 0);
-    const RotorVector pull = prior.mean - state.mean;
-    RotorSquare covariance = prior.covariance;
-    if (!add_information(covariance, curvature)) return;
-    const Eigen::Map<const RotorVector> gradient(equations_.gradient.data(), pull.size());
-    const RotorVector step = pull + covariance * (gradient - curvature * pull);
-    if (!step.allFinite()) return;
-    state.mean += step;
-    state.covariance = covariance;
-  }
   void take(State& state) {
     predict(state, middle());
     const State predicted = state;
@@ -569,20 +502,14 @@ class Follower {
   }
 
   const NumberedShots& shots_;
-  const PrismTrain& train_;
   std::ptrdiff_t direction_;
   std::size_t first_, count_;
+  double step_;  // rad
   std::int64_t lag_ = 0;
   std::size_t last_slip_ = std::numeric_limits<std::size_t>::max();  // place
   std::vector<Change> slips_;
-  ShotWeights weights_;
   double missed_ = 0;
-  double step_ = 0;  // rad
   double usual_loss_ = 1.7, correlation_ = 4.0;
-  RotorTrajectory knot_;
-  AngleSeries block_;
-  NormalEquations equations_;
-  std::vector<double> azimuth_, zenith_;
 };
 
 /// A stretch whose rotors are known at one time.
@@ -725,19 +652,6 @@ std::optional<Start> coarse_start(NumberedShots& shots, ShotRange range,
   }
   shots.firing_order = best_order;
   return best;
-}
-
-/// How far one shot is from the next, typically, rad: the beam's leaning times what the fastest
-/// rotor turns.
-double usual_step(const Start& start, double rate) {
-  double step = 0;
-  for (std::size_t k = 0; k < start.angular_velocity.size(); ++k) {
-    const int prism = static_cast<int>(k);
-    const double leaning = (start.train[place::refractive_index(prism)] - 1.0) *
-                           start.train[place::wedge_angle(prism)];
-    step = std::max(step, std::abs(leaning * start.angular_velocity[k]) / rate);
-  }
-  return step;
 }
 
 /// How well the parameters of a fit are known beforehand.

@@ -64,6 +64,7 @@ void Chunk::clear() {
   observations.clear();
   packets.clear();
   imu.clear();
+  packet_begins.clear();
 }
 
 std::string device_type_name(std::uint8_t type) {

@@ -80,6 +80,7 @@ std::unique_ptr<Reader> open_as_it_is(const std::string& path) {
 std::unique_ptr<Reader> open_recording(const std::string& path, const ReadOptions& options) {
   std::unique_ptr<Reader> reader = open_as_it_is(path);
   if (options.shot_rate) reader = with_counted_times(std::move(reader), path, options);
+  if (options.packet_places) reader = with_packet_places(std::move(reader), options);
   if (options.extrinsics) reader = in_sensor_frame(std::move(reader), *options.extrinsics);
   return within_time_span(std::move(reader), path);
 }

@@ -44,6 +44,11 @@ class DecoratingReader : public Reader {
 std::unique_ptr<Reader> with_counted_times(std::unique_ptr<Reader> reader, const std::string& path,
                                            const ReadOptions& options);
 
+/// Gives every row the time of its place in its packet, see ReadOptions::packet_places.
+/// @throws InvalidArgument as open_recording()
+std::unique_ptr<Reader> with_packet_places(std::unique_ptr<Reader> reader,
+                                           const ReadOptions& options);
+
 /// Turns every row back into the frame of its sensor, see ReadOptions::extrinsics.
 /// @throws InvalidArgument when a number of the pose is not finite, or for several sensors
 std::unique_ptr<Reader> in_sensor_frame(std::unique_ptr<Reader> reader, const Extrinsics& pose);

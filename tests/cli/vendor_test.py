@@ -149,6 +149,25 @@ class VendorTest(CommandTest):
         self.assertAlmostEqual(slow["shot_clock"]["shot_rate_hz"], 240385, delta=50)
         self.assertTrue(any("shot rate" in warning for warning in slow["warnings"]))
 
+    def test_a_real_avia_whose_packets_lack_points(self):
+        for name, rows in (("avia-viewer-1.csv", 17951), ("avia-viewer-13.csv", 20491)):
+            for rate in ((), ("--shot-rate-hz", "240000")):
+                with self.subTest(name, rate=rate):
+                    recording = pathlib.Path(FOLDER) / "real" / name
+                    result = self.expect_json(0, "estimate", recording, *rate)
+                    self.assertEqual(result["sensor_chosen_by"], "scan")
+                    self.assertEqual(result["preset"], "avia")
+                    self.assertFalse(result["mirrored"])
+                    value = {key: one["value"] for key, one in result["parameters"].items()}
+                    self.assertAlmostEqual(value["refractive_index"], 1.8144, delta=5e-4)
+                    for letter, speed in (("a", -47358), ("b", 14688)):
+                        self.assertAlmostEqual(value[f"angular_velocity_{letter}_deg_per_s"], speed,
+                                               delta=0.0005 * abs(speed))
+                    self.assertLess(self.residual_of(result), 0.012)
+                    self.assertGreater(result["observations_used"], 0.998 * rows)
+                    self.assertLess(result["outliers"], 0.001 * rows)
+                    self.assertTrue(any("points are missing" in one for one in result["warnings"]))
+
     @staticmethod
     def residual_of(result):
         """Root mean square of the residuals per axis, degrees."""

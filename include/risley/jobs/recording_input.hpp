@@ -25,6 +25,7 @@ struct SensorFrameRecording {
   /// Of the sensor, and what was done about poses, rolls and the count of shots.
   std::vector<std::string> warnings;
   bool turned_back = false;  ///< by a pose, stated or given, or a roll that was found
+  bool cut_mended = false;   ///< points were moved to the middle of where they were before a cut
 };
 
 /// Opens a recording and decides what a pose in its header means where the options do not give one:

@@ -70,6 +70,9 @@ struct Chunk {
   Observations observations;
   std::vector<Packet> packets;
   std::vector<ImuSample> imu;
+  /// Rows at which packets begin whose rows all have one time in the file; see
+  /// RecordingHeader::packet_shots.
+  std::vector<std::size_t> packet_begins;
 
   void clear();
 };
@@ -120,6 +123,10 @@ struct RecordingHeader {
   /// Shots per second that the times were counted with, Hz; 0 where they are the recording's own.
   double counted_rate = 0;
   std::vector<ShotSlip> slips;  ///< of the count that were mended
+  /// Shots of a whole packet, where the file has one time for all rows of a packet and keeps the
+  /// order of the rows, but not the places of those that are missing; 0 in other formats. Times are
+  /// then right in packets that lack nothing.
+  int packet_shots = 0;
   bool has_range = true;
   bool has_intensity = true;
   bool cartesian = false;  ///< records hold x, y, z and not angles

@@ -20,7 +20,8 @@ namespace risley::recordings {
 struct ReadWarning {
   FilePlace place;
   std::string message;
-  std::uint64_t lost_records = 0;  ///< records known to be lost, 0 when it cannot be known
+  std::uint64_t lost_records = 0;   ///< records known to be lost, 0 when it cannot be known
+  bool answered_by_places = false;  ///< it does not hold where ReadOptions::packet_places are given
 };
 
 /// Rows per chunk unless the caller asks otherwise: large enough to be fast, a few MB small.
@@ -59,6 +60,22 @@ inline constexpr std::int64_t kLongestTimeSpan_ns = (std::int64_t{1} << 62) - 1;
 /// turns of a rotor over.
 inline constexpr double kUnknownGap = 10.0;
 
+/// Place of a row of which nobody knows when in its packet it was fired.
+inline constexpr std::uint8_t kNoPlace = 255;
+
+/// Where in their packets the shots of rows were fired; of formats whose packets may lack points
+/// (RecordingHeader::packet_shots).
+struct PacketPlaces {
+  /// Of every row of the recording, counted from 0, or kNoPlace. The row loses its direction then.
+  std::vector<std::uint8_t> of_row;
+  double shot_rate = 0;  ///< within packets, Hz
+  /// Emitter of places 0, 1, ..., one entry per emitter; not empty.
+  std::vector<std::uint8_t> firing_order;
+  /// Coordinates were cut off towards zero, not rounded: points are moved to the middle of where
+  /// they were.
+  bool cut_coordinates = false;
+};
+
 /// How a recording is to be read.
 struct ReadOptions {
   /// Shots of one device per second, Hz. Times are then counted: shot i is fired at i / shot_rate,
@@ -73,6 +90,9 @@ struct ReadOptions {
   /// Where times are counted: what is wrong with the count, rows ascending. For recordings of one
   /// sensor.
   std::vector<ShotSlip> slips = {};
+  /// Places of rows in their packets, for recordings of one sensor: the time of a row is that of
+  /// its packet and its place further at their shot rate. Not together with shot_rate.
+  std::optional<PacketPlaces> packet_places = {};
   /// Pose of the sensor in the frame that the recording stands in: every row is turned back into
   /// the sensor's frame, direction and range. Directions without a range are only turned, a
   /// translation is left out with a warning. Rows without a return keep their place, angles that
@@ -87,7 +107,8 @@ struct ReadOptions {
 /// Opens a recording of any known format, recognised by its content and not by its name.
 /// @throws FileError when it is missing, empty, of no known format, or its header is damaged;
 ///         InvalidArgument when shot_rate is not a finite number above 0, emitters are not 0 to
-///         255 or not as many as the firing order has, slips do not ascend, extrinsics are not
+///         255 or not as many as the firing order has, slips do not ascend, places come with a shot
+///         rate, without a firing order or for a recording that has none, extrinsics are not
 ///         finite, or when they are given for a recording of several sensors
 std::unique_ptr<Reader> open_recording(const std::string& path, const ReadOptions& options = {});
 

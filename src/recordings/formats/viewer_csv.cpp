@@ -140,6 +140,7 @@ class ViewerCsvReader final : public TextTableReader {
         header_.time_reference = time_reference_of(row.timestamp_type);
         header_.cartesian = row.layout->cartesian;
         header_.returns_per_shot = row.layout->returns;
+        header_.packet_shots = row.layout->records;
         first = false;
       }
       const auto found = std::find_if(seen.begin(), seen.end(), [&](const Seen& s) {
@@ -197,7 +198,8 @@ class ViewerCsvReader final : public TextTableReader {
     return add_sensor(row.slot, row.lidar, type, row.data_type);
   }
 
-  void start_packet(Sensor& sensor, const Row& row) {
+  void start_packet(Sensor& sensor, const Row& row, Chunk& chunk) {
+    chunk.packet_begins.push_back(chunk.observations.size());
     if (sensor.rows < sensor.rows_expected && !short_packet_reported_) {
       short_packet_reported_ = true;
       warnings_.push_back({{.byte_offset = {}, .line = line_number()},
@@ -205,7 +207,8 @@ class ViewerCsvReader final : public TextTableReader {
                                        "missing in a packet, the times of those after them are "
                                        "too early",
                                        sensor.rows, sensor.rows_expected),
-                           sensor.rows_expected - sensor.rows});
+                           sensor.rows_expected - sensor.rows,
+                           true});
     }
     Packet packet;
     // The table has nanoseconds also where the packet had a date.
@@ -227,7 +230,7 @@ class ViewerCsvReader final : public TextTableReader {
     const std::size_t device = device_of(row);
     Sensor& sensor = sensors_[device];
     if (row.timestamp_ns != sensor.timestamp_ns || sensor.rows >= sensor.rows_expected) {
-      start_packet(sensor, row);
+      start_packet(sensor, row, chunk);
     }
     const auto shot = static_cast<std::uint32_t>(sensor.rows / row.layout->returns);
     const auto return_number = sensor.rows % row.layout->returns + 1;

@@ -1,0 +1,64 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "risley/core/progress.hpp"
+#include "risley/estimation/angle_series.hpp"
+#include "risley/recordings/reader.hpp"
+#include "risley/sensors/sensor.hpp"
+
+namespace risley::estimation {
+
+/// The shots of a recording that has one time for each packet and keeps the order of the shots, but
+/// not the places of those that are missing.
+struct PacketShots {
+  struct OnePacket {
+    std::int64_t time_ns = 0;  ///< of its first place
+    std::uint8_t shots = 0;    ///< that the file has of it
+  };
+  int places = 0;                       ///< of a whole packet, up to 254
+  bool cartesian = false;               ///< directions come from coordinates in whole steps
+  std::vector<OnePacket> packets;       ///< in the order of the recording
+  AngleSeries series;                   ///< valid shots; their times and beams are not looked at
+  std::vector<std::size_t> packet;      ///< of each
+  std::vector<std::uint8_t> precedent;  ///< shots of its packet that the file has before each
+
+  /// Whether nothing is missing in a packet.
+  bool is_whole(std::size_t one) const { return packets[one].shots == places; }
+};
+
+/// What was found of the places of shots.
+struct ShotPlaces {
+  /// The rotors could be followed; otherwise only whole packets have places.
+  bool followed = false;
+  std::vector<std::uint8_t> place;         ///< of each shot, or recordings::kNoPlace
+  std::vector<std::uint8_t> firing_order;  ///< emitter of places 0, 1, ...; one entry per emitter
+  /// The shots fit better as points whose coordinates were cut off towards zero than as rounded
+  /// ones.
+  bool cut_coordinates = false;
+};
+
+/// Shots per second within packets, Hz: places of a packet over the time from one packet to the
+/// next, where enough follow each other; the sensor's otherwise.
+double shot_rate_of(const PacketShots& shots, const sensors::Sensor& sensor);
+
+/// Middle of the places that each shot may have: how a recording can be looked at before more is
+/// known.
+std::vector<std::uint8_t> middle_places(const PacketShots& shots);
+
+/// Finds the places of the shots. Packets that lack few shots tell, each by itself, the angles of
+/// the rotors, the order of the emitters and their shots' places, because neighbouring shots are
+/// far apart. From there the rotors are followed from packet to packet in both directions, and in
+/// each the likeliest places in ascending order are taken; a shot that fits another place nearly as
+/// well has none. docs/theory/slips.md
+/// @param shot_rate  within packets, Hz
+/// @throws InvalidArgument for columns of different lengths, more shots than places, a rate that is
+///         not above 0
+ShotPlaces find_places(const PacketShots& shots, double shot_rate, const sensors::Sensor& sensor,
+                       const Progress& progress = {});
+
+}  // namespace risley::estimation

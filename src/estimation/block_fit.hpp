@@ -1,0 +1,126 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "risley/estimation/angle_series.hpp"
+#include "risley/estimation/initialisation.hpp"
+#include "risley/estimation/normal_equations.hpp"
+#include "risley/estimation/rotor_process.hpp"
+#include "risley/estimation/rotor_trajectory.hpp"
+#include "risley/optics/parameters.hpp"
+
+#include "estimation/knot_model.hpp"
+
+namespace risley::estimation {
+
+/// Angle, speed and acceleration of every rotor at a time.
+struct RotorState {
+  std::int64_t time_ns = 0;
+  KnotVector<Eigen::Dynamic> mean;
+  KnotSquare<Eigen::Dynamic> covariance;
+};
+
+/// How far one shot is from the next, typically, rad: the beam's leaning times what the fastest
+/// rotor turns.
+inline double usual_step(const Start& start, double rate) {
+  double step = 0;
+  for (std::size_t k = 0; k < start.angular_velocity.size(); ++k) {
+    const int prism = static_cast<int>(k);
+    const double leaning = (start.train[place::refractive_index(prism)] - 1.0) *
+                           start.train[place::wedge_angle(prism)];
+    step = std::max(step, std::abs(leaning * start.angular_velocity[k]) / rate);
+  }
+  return step;
+}
+
+/// A block of shots so short that the rotors move along one parabola in it, and what it says of
+/// them.
+class BlockFit {
+ protected:
+  BlockFit(const PrismTrain& train, double softening) : train_(train) {
+    weights_.softening = softening;
+    knot_.prisms = train.prisms();
+    knot_.stretch_begin = {0};
+    knot_.time_ns.resize(1);
+    knot_.first_shot = {0};
+    knot_.last_shot.resize(1);
+    knot_.state.resize(static_cast<std::size_t>(knot_.states()));
+  }
+
+  /// A start as a state that may be off by so much, rad and a share of the speeds.
+  static RotorState loose_state(const Start& start, double angle_sigma, double speed_share) {
+    // Of speeds and accelerations that are not looked for.
+    constexpr double kStraightSpeedSigma = 1e-3;
+    const auto prisms = static_cast<Eigen::Index>(start.rotation_angle.size());
+    RotorState state;
+    state.time_ns = start.time_ns;
+    state.mean.resize(3 * prisms);
+    state.covariance.setZero(3 * prisms, 3 * prisms);
+    for (Eigen::Index k = 0; k < prisms; ++k) {
+      const double speed = start.angular_velocity[static_cast<std::size_t>(k)];
+      state.mean[3 * k] = start.rotation_angle[static_cast<std::size_t>(k)];
+      state.mean[3 * k + 1] = speed;
+      state.mean[3 * k + 2] = 0;
+      state.covariance(3 * k, 3 * k) = angle_sigma * angle_sigma;
+      state.covariance(3 * k + 1, 3 * k + 1) =
+          std::pow(std::max(speed_share * std::abs(speed), kStraightSpeedSigma), 2);
+      state.covariance(3 * k + 2, 3 * k + 2) = kStraightSpeedSigma * kStraightSpeedSigma;
+    }
+    return state;
+  }
+
+  static void predict(RotorState& state, std::int64_t time_ns) {
+    const double dt = 1e-9 * static_cast<double>(time_ns - state.time_ns);
+    predict_rotors(state.mean, state.covariance, kSettlingProcess, dt);
+    state.time_ns = time_ns;
+  }
+
+  /// Residuals of the block and its normal equations about a state.
+  void evaluate(const RotorState& state) {
+    knot_.time_ns[0] = state.time_ns;
+    knot_.last_shot[0] = block_.size();
+    std::copy_n(state.mean.data(), knot_.state.size(), knot_.state.begin());
+    azimuth_.resize(block_.size());
+    zenith_.resize(block_.size());
+    accumulate(block_, knot_, train_, {}, weights_, equations_, {azimuth_, zenith_, {}});
+  }
+
+  /// One Gauss-Newton step from a state to the block and a prior together.
+  void improve(RotorState& state, const RotorState& prior) {
+    evaluate(state);
+    const KnotSquare<Eigen::Dynamic> curvature = knot_curvature<Eigen::Dynamic>(equations_, 0);
+    const KnotVector<Eigen::Dynamic> pull = prior.mean - state.mean;
+    KnotSquare<Eigen::Dynamic> covariance = prior.covariance;
+    if (!add_information(covariance, curvature)) return;
+    const Eigen::Map<const KnotVector<Eigen::Dynamic>> gradient(equations_.gradient.data(),
+                                                                pull.size());
+    const KnotVector<Eigen::Dynamic> step = pull + covariance * (gradient - curvature * pull);
+    if (!step.allFinite()) return;
+    state.mean += step;
+    state.covariance = covariance;
+  }
+
+  static void clear(AngleSeries& series) {
+    series.time_ns.clear();
+    series.azimuth.clear();
+    series.zenith.clear();
+    series.beam.clear();
+    series.azimuth_rounding_variance.clear();
+    series.zenith_rounding_variance.clear();
+  }
+
+  const PrismTrain& train_;
+  AngleSeries block_;
+  ShotWeights weights_;
+  RotorTrajectory knot_;
+  NormalEquations equations_;
+  std::vector<double> azimuth_, zenith_;  // residuals of the block, rad
+};
+
+}  // namespace risley::estimation
