@@ -114,7 +114,7 @@ Table estimate_table(const ReproduceOptions& options, const std::vector<TripleDr
       return draw.estimate.values[free(draw)].value / info.si_per_unit;
     };
     const auto sigma = [&](const TripleDraw& draw) {
-      return draw.estimate.values[free(draw)].sigma / info.si_per_unit;
+      return draw.estimate.values[free(draw)].sigma_given_held / info.si_per_unit;
     };
     const auto quantity = std::find_if(bounds.quantities.begin(), bounds.quantities.end(),
                                        [&](const auto& each) { return each.name == one.name; });

@@ -177,8 +177,9 @@ TEST(Observability, OfSixEmittersIsTheEstimatesSigma) {
   for (std::size_t i = 0; i < result.free.size(); ++i) {
     const std::string& name = result.free[i].name;
     EXPECT_TRUE(quantity(all, name).free) << name;
-    EXPECT_NEAR(quantity(all, name).sigma / result.values[i].sigma, 1.0, 0.01) << name;
-    EXPECT_NEAR(quantity(planned, name).sigma / result.values[i].sigma, 1.0, 0.1) << name;
+    EXPECT_NEAR(quantity(all, name).sigma / result.values[i].sigma_given_held, 1.0, 0.01) << name;
+    EXPECT_NEAR(quantity(planned, name).sigma / result.values[i].sigma_given_held, 1.0, 0.1)
+        << name;
     if (name.starts_with("incident")) continue;
     EXPECT_NEAR(bounds_of(all.emitters, name).all / quantity(all, name).sigma, 1.0, 1e-3) << name;
   }

@@ -40,8 +40,8 @@ EstimateReport estimate_example() {
   r.shots = 2999999;
   r.outliers = 17;
   r.parameters = {
-      {"refractive_index", 1.5090001, 2.1e-7, 1.51, kUnknown, 1.509, 1e-7, 0.48},
-      {"rotation_angle_a_deg", 0.1, 1e-5, kUnknown, kUnknown, kUnknown, kUnknown, kUnknown}};
+      {"refractive_index", 1.5090001, 2.1e-7, 1.9e-7, 1.51, kUnknown, 1.509, 1e-7, 0.48},
+      {"rotation_angle_a_deg", 0.1, 1e-5, 1e-5, kUnknown, kUnknown, kUnknown, kUnknown, kUnknown}};
   r.free = {"refractive_index", "wedge_angle_deg"};
   r.covariance.resize(2, 2);
   r.covariance << 4.41e-14, 1e-15, 1e-15, 9e-12;
@@ -77,8 +77,8 @@ CalibrationReport calibration_example() {
   r.method = calibration::CalibrationMethod::paper;
   r.reason = "two walls are not enough";
   r.points = 993551;
-  r.parameters = {
-      {"prism_tilt_a_vertical_deg", 0.0016, 1e-6, 0, 0.001, kUnknown, kUnknown, kUnknown}};
+  r.parameters = {{"prism_tilt_a_vertical_deg", 0.0016, 1e-6, kUnknown, 0, 0.001, kUnknown,
+                   kUnknown, kUnknown}};
   r.range_offset = 0.012;
   r.range_offset_sigma = 0.001;
   r.free = {"prism_tilt_a_vertical_deg"};
@@ -231,6 +231,7 @@ TEST_F(ReportFile, WhatAPageCannotBeDrawnFromIsRefusedWithItsPlace) {
       {[](auto& r) { r.covariance(0, 0) = -1; }, "covariance[0]"},
       {[](auto& r) { r.free[1] = "<b>"; }, "free[1]: "},
       {[](auto& r) { r.parameters[0].name = "colour"; }, "parameters[0].name: "},
+      {[](auto& r) { r.parameters[0].sigma_given_held = 1; }, "[0].sigma_given_held: is larger"},
       {[](auto& r) { r.parameters[1].value = kUnknown; }, "parameters[1].value: expected a num"},
       {[](auto& r) { r.prisms = 99; }, "prisms"},
       {[](auto& r) { r.emitters = -1; }, "emitters"},
