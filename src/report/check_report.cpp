@@ -83,7 +83,7 @@ void check_common(const AnyReport& report) {
     check_known(row.name, shape, place + ".name");
     expect(!report.converged || std::isfinite(row.value), place + ".value", "expected a number");
     expect(!(row.sigma < 0), place + ".sigma", "is negative");
-    expect(!(row.sigma_given_held > row.sigma), place + ".sigma_given_held",
+    expect(!(row.sigma_given_held.value_or(row.sigma) > row.sigma), place + ".sigma_given_held",
            "is larger than sigma, which includes it");
   }
   for (std::size_t i = 0; i < report.free.size(); ++i) {

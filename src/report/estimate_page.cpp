@@ -76,7 +76,7 @@ std::string subject_text(const EstimateReport& r) {
 
 std::string parameters_html(const EstimateReport& r) {
   const bool any_held = std::any_of(r.parameters.begin(), r.parameters.end(), [](const auto& row) {
-    return row.sigma > row.sigma_given_held;
+    return row.sigma > row.sigma_given_held.value_or(row.sigma);
   });
   std::string html =
       "<h2>Parameters</h2>\n<div class=\"wide\"><table><thead><tr><th>parameter</th><th>value</th>"
@@ -87,7 +87,8 @@ std::string parameters_html(const EstimateReport& r) {
   html += "</tr></thead><tbody>\n";
   for (const ReportedParameter& row : r.parameters) {
     const ParameterInfo& info = find_parameter(row.name, r.shape());
-    const double scale = 1.0 / info.si_per_unit, sigma = row.sigma_given_held * scale;
+    const double scale = 1.0 / info.si_per_unit,
+                 sigma = row.sigma_given_held.value_or(row.sigma) * scale;
     const NumberText shown = number_text(row.value * scale, sigma);
     html += fmt::format("<tr>{}<td>{}</td><td>{}</td>", parameter_head(info), shown.value,
                         number_text(row.value * scale, row.sigma * scale).sigma);

@@ -130,7 +130,8 @@ class ContractTest(CommandTest):
             self.assertEqual(one["sigma"], one["sigma_given_held"], name)
         held = self.expect_json(0, "estimate", "believed.nc", "--sensor", "mid-40-table3", "--fix",
                                 "prism_tilt_b_vertical_deg")["parameters"]
-        self.assertTrue(any(one["sigma"] > 3 * one["sigma_given_held"] for one in held.values()))
+        self.assertTrue(any(one["sigma"] > 1.001 * one["sigma_given_held"]
+                            for one in held.values()))
 
     def test_sensors_are_recognised_where_the_file_does_not_name_them(self):
         for sensor, rate in RATES.items():

@@ -77,8 +77,8 @@ CalibrationReport calibration_example() {
   r.method = calibration::CalibrationMethod::paper;
   r.reason = "two walls are not enough";
   r.points = 993551;
-  r.parameters = {{"prism_tilt_a_vertical_deg", 0.0016, 1e-6, kUnknown, 0, 0.001, kUnknown,
-                   kUnknown, kUnknown}};
+  r.parameters = {
+      {"prism_tilt_a_vertical_deg", 0.0016, 1e-6, {}, 0, 0.001, kUnknown, kUnknown, kUnknown}};
   r.range_offset = 0.012;
   r.range_offset_sigma = 0.001;
   r.free = {"prism_tilt_a_vertical_deg"};

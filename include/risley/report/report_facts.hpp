@@ -3,6 +3,7 @@
 #pragma once
 
 #include <limits>
+#include <optional>
 #include <string>
 
 #include "risley/jobs/provenance.hpp"
@@ -22,9 +23,10 @@ inline constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 struct ReportedParameter {
   std::string name;
   double value = kUnknown, sigma = kUnknown;
-  double sigma_given_held = kUnknown;  ///< if held parameters were exactly as held
-  double nominal = kUnknown;           ///< of the preset
-  double believed = kUnknown;          ///< what the sensor computed its directions with
+  /// If held parameters were exactly as held, where the method tells.
+  std::optional<double> sigma_given_held = {};
+  double nominal = kUnknown;   ///< of the preset
+  double believed = kUnknown;  ///< what the sensor computed its directions with
   double truth = kUnknown, error = kUnknown, error_over_sigma = kUnknown;
 };
 
