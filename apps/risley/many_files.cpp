@@ -107,6 +107,7 @@ ExitStatus run_file_jobs(const std::vector<FileJob>& jobs, const std::string& la
   told.inputs.clear();
   for (const FileJob& job : jobs) told.inputs.push_back(job.input);
   std::vector<std::string> outputs;
+  outputs.reserve(jobs.size());
   for (const FileJob& job : jobs) outputs.push_back(job.output);
   require_apart(told, outputs);
   if (jobs.size() == 1) {

@@ -78,10 +78,7 @@ std::string verdict_html(const Reproduction& all) {
 std::string reproduction_page(const Reproduction& reproduction,
                               const std::vector<std::pair<std::string, std::string>>& provenance) {
   report::Figures figures;
-  std::string body =
-      "<style>th.text { text-align: left; } td.says { white-space: normal; min-width: 16rem; "
-      "font-size: 0.8rem; }</style>\n";
-  body += verdict_html(reproduction);
+  std::string body = verdict_html(reproduction);
   body +=
       "<p>Bounds say what must hold for a row to pass. Where the paper shows one random draw, ours "
       "is the median of many and the bound is on where the paper's falls among them. Drawings "
