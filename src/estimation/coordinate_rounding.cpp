@@ -6,6 +6,7 @@
 
 #include "risley/core/direction.hpp"
 #include "risley/core/require.hpp"
+#include "risley/recordings/cut_coordinates.hpp"
 
 namespace risley::estimation {
 namespace {
@@ -34,15 +35,14 @@ std::string to_string(CoordinateRounding rounding) {
 void add_half_steps(AngleSeries& series, const Eigen::Matrix3d& recording_from_sensor) {
   require_length_or_none("range", series.range.size(), series.size());
   for (std::size_t i = 0; i < series.range.size(); ++i) {
-    const double half = 0.5 * step_of(series, i);
-    if (!(half > 0)) continue;
+    const double step = step_of(series, i);
+    if (!(step > 0)) continue;
     const auto v = direction_from_angles<double>({series.azimuth[i], series.zenith[i]});
-    Eigen::Vector3d point =
+    const Eigen::Vector3d point =
         series.range[i] * (recording_from_sensor * Eigen::Vector3d(v.x, v.y, v.z));
-    for (double& coordinate : point) {
-      if (std::abs(coordinate) > half) coordinate += std::copysign(half, coordinate);
-    }
-    const Eigen::Vector3d moved = recording_from_sensor.transpose() * point;
+    const auto middle = recordings::middle_of_cut({point.x(), point.y(), point.z()}, step);
+    const Eigen::Vector3d moved =
+        recording_from_sensor.transpose() * Eigen::Vector3d(middle.x, middle.y, middle.z);
     const auto angles = angles_from_direction(Vector3<double>{moved.x(), moved.y(), moved.z()});
     series.azimuth[i] = angles.azimuth;
     series.zenith[i] = angles.zenith;

@@ -6,9 +6,10 @@
 #include <cmath>
 
 #include "risley/algebra/symmetric.hpp"
-#include "risley/estimation/batch_map.hpp"
 #include "risley/estimation/normal_equations.hpp"
 #include "risley/estimation/smoother.hpp"
+
+#include "estimation/used_shots.hpp"
 
 namespace risley::estimation {
 namespace {
@@ -83,11 +84,8 @@ Eigen::MatrixXd changes_by_held_parameters(const Estimate& estimate,
   all.insert(all.end(), held.begin(), held.end());
 
   const Sample sample(estimate);
-  ShotWeights weights;
-  weights.angle_noise = usable_noise(estimate.noise.value);
-  weights.cut = BatchMapOptions{}.outlier_chi2 * std::max(1.0, estimate.unit_variance);
   NormalEquations equations;
-  accumulate(sample.series, sample.knots, estimate.train, all, weights, equations);
+  accumulate(sample.series, sample.knots, estimate.train, all, weights_of(estimate), equations);
   equations.scale(1.0 / sample.share / estimate.variance_factor);
   ParameterPrior prior;
   prior.information.resize(free + count);

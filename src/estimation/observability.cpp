@@ -14,12 +14,12 @@
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
 #include "risley/core/require.hpp"
-#include "risley/estimation/batch_map.hpp"
 #include "risley/estimation/normal_equations.hpp"
 #include "risley/estimation/smoother.hpp"
 #include "risley/optics/observation_model.hpp"
 
 #include "estimation/bound.hpp"
+#include "estimation/used_shots.hpp"
 
 namespace risley::estimation {
 
@@ -302,9 +302,7 @@ Observability observability_of_plan(const ObservabilityPlan& plan, const Progres
 Observability observability_of_estimate(const Estimate& estimate, const Progress& progress) {
   const std::vector<FreeParameter> all = all_parameters(estimate.train, estimate.free);
   NormalEquations equations;
-  ShotWeights weights;
-  weights.angle_noise = usable_noise(estimate.noise.value);
-  weights.cut = BatchMapOptions{}.outlier_chi2 * std::max(1.0, estimate.unit_variance);
+  const ShotWeights weights = weights_of(estimate);
   accumulate(estimate.series, estimate.trajectory, estimate.train, all, weights, equations);
   equations.scale(1.0 / estimate.variance_factor);
   const double shots = static_cast<double>(equations.shots - equations.outliers);

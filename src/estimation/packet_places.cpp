@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdlib>
 #include <limits>
 #include <optional>
 #include <span>
@@ -14,7 +13,6 @@
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
 #include "risley/core/require.hpp"
-#include "risley/estimation/batch_map.hpp"
 #include "risley/estimation/diagnostics.hpp"
 #include "risley/estimation/free_parameters.hpp"
 #include "risley/estimation/initialisation.hpp"
@@ -23,6 +21,7 @@
 #include "risley/recordings/cut_coordinates.hpp"
 
 #include "estimation/block_fit.hpp"
+#include "estimation/optics_fit.hpp"
 
 namespace risley::estimation {
 namespace {
@@ -194,10 +193,9 @@ class PacketFitter : private BlockFit {
 
 /// A packet that told the rotors by itself.
 struct PacketAnchor {
-  Start start;  // the series is in its frame
+  Start start;  // the series is in its frame; its residuals are those of packets
   std::vector<std::uint8_t> firing_order;
   std::size_t packet = 0;
-  double scale = std::numeric_limits<double>::infinity();
 };
 
 /// The series with times and beams of places.
@@ -285,8 +283,7 @@ std::optional<PacketAnchor> find_packet_anchor(const PacketShots& shots, double 
     for (const bool backwards : {false, true}) {
       if (backwards && emitters == 1) break;
       const FiringOrder order{backwards ? emitters - 1 : 0, backwards};
-      PacketAnchor anchor{*start, emitters_in_order(order, emitters), 0,
-                          std::numeric_limits<double>::infinity()};
+      PacketAnchor anchor{*start, emitters_in_order(order, emitters), 0};
       PacketFitter fitter(shots, series, rate, start->train, anchor.firing_order);
       double sum = 0, least = std::numeric_limits<double>::infinity();
       const std::vector<std::size_t> packets = fullest_packets(shots, fitter, start->time_ns);
@@ -322,17 +319,20 @@ std::optional<PacketAnchor> find_packet_anchor(const PacketShots& shots, double 
         }
         sum += best;
       }
-      anchor.scale = sum / static_cast<double>(packets.size());
+      anchor.start.residual_rms = sum / static_cast<double>(packets.size());
       anchors.push_back(std::move(anchor));
     }
   }
   if (anchors.empty()) return std::nullopt;
   std::stable_sort(anchors.begin(), anchors.end(),
-                   [](const PacketAnchor& a, const PacketAnchor& b) { return a.scale < b.scale; });
+                   [](const PacketAnchor& a, const PacketAnchor& b) {
+                     return a.start.residual_rms < b.start.residual_rms;
+                   });
   constexpr double kClear = 0.6, kMostSteps = 3.0;
   const PacketAnchor& best = anchors.front();
-  if (best.scale > kMostSteps * usual_step(best.start, rate)) return std::nullopt;
-  if (anchors.size() > 1 && best.scale > kClear * anchors[1].scale) return std::nullopt;
+  const double residual = best.start.residual_rms;
+  if (residual > kMostSteps * usual_step(best.start, rate)) return std::nullopt;
+  if (anchors.size() > 1 && residual > kClear * anchors[1].start.residual_rms) return std::nullopt;
   return best;
 }
 
@@ -360,7 +360,7 @@ FollowedPackets follow_packets(const PacketShots& shots, const AngleSeries& seri
   FollowedPackets result;
   result.place.assign(series.size(), kNoPlace);
   for (const int direction : {1, -1}) {
-    double noise = std::max(least_noise, anchor.scale);
+    double noise = std::max(least_noise, anchor.start.residual_rms);
     RotorState state =
         direction > 0 ? PacketFitter::loose_state(anchor.start, kAnchorAngle, kAnchorSpeedShare)
                       : result.anchor;
@@ -410,9 +410,8 @@ AngleSeries before_cut(AngleSeries series) {
 }
 
 /// Fits the optics to the placed shots about an anchor. @return whether that went well
-bool fit_optics(const PacketShots& shots, const AngleSeries& series, double rate,
-                const sensors::Sensor& sensor, const FollowedPackets& followed,
-                PacketAnchor& anchor) {
+bool refit(const PacketShots& shots, const AngleSeries& series, double rate,
+           const sensors::Sensor& sensor, const FollowedPackets& followed, PacketAnchor& anchor) {
   constexpr std::size_t kMostShots = 40000;
   const AngleSeries placed =
       placed_series(shots, series, followed.place, rate, anchor.firing_order);
@@ -422,35 +421,9 @@ bool fit_optics(const PacketShots& shots, const AngleSeries& series, double rate
   const AngleSeries near = rows_of(placed, at - std::min(at, kMostShots / 2),
                                    std::min(placed.size(), at + kMostShots / 2));
   set_rotors(anchor.start, followed.anchor);
-  BatchMapOptions options;
-  options.rotor_process.assign(static_cast<std::size_t>(sensor.prisms()), kSettlingProcess);
-  options.free =
-      free_parameters(default_free_names(sensor.shape(), one_glass(sensor.train)), sensor.shape());
-  for (FreeParameter& parameter : options.free) {
-    const sensors::Knowledge* known = sensor.find_knowledge(parameter.name);
-    if (known != nullptr && known->sigma > 0) parameter.prior_sigma = known->sigma;
-  }
-  try {
-    const Solution solution = run_batch_map(near, anchor.start, sensor, options);
-    const RotorTrajectory& motion = solution.trajectory;
-    std::size_t knot = 0;
-    for (std::size_t i = 0; i < motion.size(); ++i) {
-      if (std::llabs(motion.time_ns[i] - anchor.start.time_ns) <
-          std::llabs(motion.time_ns[knot] - anchor.start.time_ns)) {
-        knot = i;
-      }
-    }
-    const double later = 1e-9 * static_cast<double>(anchor.start.time_ns - motion.time_ns[knot]);
-    for (std::size_t k = 0; k < anchor.start.rotation_angle.size(); ++k) {
-      anchor.start.rotation_angle[k] = wrap_to_pi(motion.angle(knot, k, later));
-      anchor.start.angular_velocity[k] = motion.speed(knot, k, later);
-    }
-    anchor.start.train = solution.train;
-    anchor.scale = robust_scale(solution.azimuth_residual, solution.zenith_residual);
-    return true;
-  } catch (const EstimationError&) {
-    return false;
-  }
+  const std::optional<Start> fitted = fit_optics(near, anchor.start, sensor, Priors::of_the_type);
+  if (fitted) anchor.start = *fitted;
+  return fitted.has_value();
 }
 
 void check_packets(const PacketShots& shots) {
@@ -523,13 +496,13 @@ ShotPlaces find_places(const PacketShots& shots, double shot_rate, const sensors
   FollowedPackets followed = follow_packets(shots, series, shot_rate, *anchor, progress);
   for (int round = 0; round < kMostRounds; ++round) {
     PacketAnchor refined = *anchor;
-    if (!fit_optics(shots, series, shot_rate, sensor, followed, refined)) break;
+    if (!refit(shots, series, shot_rate, sensor, followed, refined)) break;
     if (round == 0 && shots.cartesian) {
       AngleSeries uncut = before_cut(shots.series);
       prepare_shots(uncut, frame);
       PacketAnchor other = *anchor;
-      if (fit_optics(shots, uncut, shot_rate, sensor, followed, other) &&
-          other.scale < kClearlyBetter * refined.scale) {
+      if (refit(shots, uncut, shot_rate, sensor, followed, other) &&
+          other.start.residual_rms < kClearlyBetter * refined.start.residual_rms) {
         result.cut_coordinates = true;
         series = std::move(uncut);
         refined = std::move(other);

@@ -16,7 +16,6 @@
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
 #include "risley/core/require.hpp"
-#include "risley/estimation/batch_map.hpp"
 #include "risley/estimation/diagnostics.hpp"
 #include "risley/estimation/free_parameters.hpp"
 #include "risley/estimation/initialisation.hpp"
@@ -25,6 +24,7 @@
 
 #include "estimation/block_fit.hpp"
 #include "estimation/knot_model.hpp"
+#include "estimation/optics_fit.hpp"
 
 namespace risley::estimation {
 namespace {
@@ -654,10 +654,7 @@ std::optional<Start> coarse_start(NumberedShots& shots, ShotRange range,
   return best;
 }
 
-/// How well the parameters of a fit are known beforehand.
-enum class Priors { of_the_type, wide };
-
-bool refit(NumberedShots& shots, Anchor& anchor, const Followed& followed,
+bool refit(const NumberedShots& shots, Anchor& anchor, const Followed& followed,
            const sensors::Sensor& sensor, Priors priors);
 
 /// Short windows about a start, each fitted alone, best first: a slip within it spoils a window.
@@ -806,7 +803,7 @@ bool same_slips(const std::vector<FoundSlip>& a, const std::vector<FoundSlip>& b
 }
 
 /// Fits the optics again to the mended shots about an anchor. @return whether that went well
-bool refit(NumberedShots& shots, Anchor& anchor, const Followed& followed,
+bool refit(const NumberedShots& shots, Anchor& anchor, const Followed& followed,
            const sensors::Sensor& sensor, Priors priors) {
   const Lags lags(followed.slips, anchor.shot);
   const std::size_t begin =
@@ -814,40 +811,10 @@ bool refit(NumberedShots& shots, Anchor& anchor, const Followed& followed,
   const std::size_t end = std::min(followed.end, anchor.shot + kFittedShots / 2);
   AngleSeries mended;
   for (std::size_t i = begin; i < end; ++i) shots.append_to(mended, i, lags.of(i));
-  BatchMapOptions options;
-  // Rotors that may go where they want would follow a slip.
-  options.rotor_process.assign(static_cast<std::size_t>(sensor.prisms()), kSettlingProcess);
-  options.free =
-      free_parameters(default_free_names(sensor.shape(), one_glass(sensor.train)), sensor.shape());
-  for (FreeParameter& parameter : options.free) {
-    const sensors::Knowledge* known = sensor.find_knowledge(parameter.name);
-    if (priors == Priors::of_the_type && known != nullptr && known->sigma > 0) {
-      parameter.prior_sigma = known->sigma;
-    }
-  }
-  try {
-    const Solution solution = run_batch_map(mended, anchor.start, sensor, options);
-    const double residual = robust_scale(solution.azimuth_residual, solution.zenith_residual);
-    if (!(residual < 3.0 * followed.residual_rms)) return false;
-    const RotorTrajectory& motion = solution.trajectory;
-    std::size_t knot = 0;
-    for (std::size_t i = 0; i < motion.size(); ++i) {
-      if (std::llabs(motion.time_ns[i] - anchor.start.time_ns) <
-          std::llabs(motion.time_ns[knot] - anchor.start.time_ns)) {
-        knot = i;
-      }
-    }
-    const double later = 1e-9 * static_cast<double>(anchor.start.time_ns - motion.time_ns[knot]);
-    for (std::size_t k = 0; k < anchor.start.rotation_angle.size(); ++k) {
-      anchor.start.rotation_angle[k] = wrap_to_pi(motion.angle(knot, k, later));
-      anchor.start.angular_velocity[k] = motion.speed(knot, k, later);
-    }
-    anchor.start.train = solution.train;
-    anchor.start.residual_rms = residual;
-    return true;
-  } catch (const EstimationError&) {
-    return false;
-  }
+  const std::optional<Start> fitted = fit_optics(mended, anchor.start, sensor, priors);
+  if (!fitted || !(fitted->residual_rms < 3.0 * followed.residual_rms)) return false;
+  anchor.start = *fitted;
+  return true;
 }
 
 /// A stretch that was followed, with what is needed to join it to others.

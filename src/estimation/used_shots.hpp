@@ -2,12 +2,24 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 
+#include "risley/estimation/angle_noise.hpp"
+#include "risley/estimation/batch_map.hpp"
 #include "risley/estimation/estimate.hpp"
+#include "risley/estimation/normal_equations.hpp"
 
 namespace risley::estimation {
+
+/// The weights with which the estimate used its shots.
+inline ShotWeights weights_of(const Estimate& estimate) {
+  ShotWeights weights;
+  weights.angle_noise = usable_noise(estimate.noise.value);
+  weights.cut = BatchMapOptions{}.outlier_chi2 * std::max(1.0, estimate.unit_variance);
+  return weights;
+}
 
 /// Calls visit(angle, azimuth_residual, zenith_residual) for every shot that the estimate used;
 /// angle(k) is the rotation angle of prism k there, rad, any number of turns.

@@ -22,14 +22,18 @@ std::string read_text_file(const std::string& path) {
   return text;
 }
 
-void write_text_file(const std::string& path, const std::string& text) {
-  OutputFile output(path);
+void write_text(const OutputFile& output, const std::string& text) {
   std::ofstream stream(output.temporary_path(), std::ios::binary);
   stream.write(text.data(), static_cast<std::streamsize>(text.size()));
   stream.close();
   if (!stream) {
-    throw FileError(path, {}, fmt::format("cannot be written: {}", std::strerror(errno)));
+    throw FileError(output.path(), {}, fmt::format("cannot be written: {}", std::strerror(errno)));
   }
+}
+
+void write_text_file(const std::string& path, const std::string& text) {
+  OutputFile output(path);
+  write_text(output, text);
   output.commit();
 }
 

@@ -7,7 +7,6 @@
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
-#include <fstream>
 #include <regex>
 
 #include <fcntl.h>
@@ -112,13 +111,7 @@ std::vector<std::string> ResultFolder::commit() {
 }
 
 void ResultFolder::write(const std::string& name, const std::string& text) {
-  const io::OutputFile& file = files_.emplace_back(path(name));
-  std::ofstream stream(file.temporary_path(), std::ios::binary);
-  stream << text;
-  stream.close();
-  if (!stream) {
-    throw FileError(file.path(), {}, fmt::format("cannot be written: {}", std::strerror(errno)));
-  }
+  io::write_text(files_.emplace_back(path(name)), text);
 }
 
 std::vector<std::string> ResultFolder::left_over() const {

@@ -3,6 +3,7 @@
 #include "risley/optics/batch.hpp"
 
 #include <algorithm>
+#include <array>
 
 #include <fmt/format.h>
 
@@ -51,8 +52,13 @@ struct Call {
 void check_beams(const PrismTrain& train, std::span<const std::uint8_t> beam, std::size_t shots) {
   if (beam.empty()) return;
   require_length("beam", beam.size(), shots);
-  std::uint8_t most = 0;  // a plain loop is vectorised
-  for (const std::uint8_t one : beam) most = std::max(most, one);
+  std::array<std::uint8_t, 64> mosts{};  // loops of a fixed length are vectorised
+  std::size_t i = 0;
+  for (; i + mosts.size() <= beam.size(); i += mosts.size()) {
+    for (std::size_t k = 0; k < mosts.size(); ++k) mosts[k] = std::max(mosts[k], beam[i + k]);
+  }
+  for (std::size_t k = 0; i + k < beam.size(); ++k) mosts[k] = std::max(mosts[k], beam[i + k]);
+  const std::uint8_t most = *std::max_element(mosts.begin(), mosts.end());
   if (most < train.emitters()) return;
   throw InvalidArgument(fmt::format("beam = {} in row {}, allowed 0 to {}", most,
                                     std::find(beam.begin(), beam.end(), most) - beam.begin(),

@@ -6,8 +6,13 @@
 
 namespace risley::io {
 
+class OutputFile;
+
 /// Reads a whole file. @throws FileError when it is missing or cannot be read
 std::string read_text_file(const std::string& path);
+
+/// Writes what a file is to hold, which is then to be committed. @throws FileError
+void write_text(const OutputFile& output, const std::string& text);
 
 /// Writes a whole file through OutputFile. @throws FileError
 void write_text_file(const std::string& path, const std::string& text);

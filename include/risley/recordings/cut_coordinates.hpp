@@ -10,18 +10,24 @@ namespace risley::recordings {
 
 /// The middle of where a point was whose coordinates were cut off towards zero at whole steps:
 /// every coordinate but 0 is half a step further from zero.
+inline Vector3<double> middle_of_cut(const Vector3<double>& point, double step) {
+  const auto moved = [step](double c) {
+    return std::abs(c) < 0.5 * step ? c : c + std::copysign(0.5 * step, c);
+  };
+  return {moved(point.x), moved(point.y), moved(point.z)};
+}
+
+/// The same of a point at a range of 1.
 /// @param step            of the coordinates over the point's range
 /// @param azimuth,zenith  rad, replaced
 /// @return range of the middle over that of the point
 inline double move_to_middle_of_cut(double step, double& azimuth, double& zenith) {
-  const auto v = direction_from_angles<double>({azimuth, zenith});
-  const auto moved = [step](double c) {
-    return std::abs(c) < 0.5 * step ? c : c + std::copysign(0.5 * step, c);
-  };
-  const double x = moved(v.x), y = moved(v.y), z = moved(v.z);
-  azimuth = std::atan2(y, x);
-  zenith = std::atan2(std::hypot(x, y), z);
-  return std::sqrt(x * x + y * y + z * z);
+  const Vector3<double> middle =
+      middle_of_cut(direction_from_angles<double>({azimuth, zenith}), step);
+  const auto angles = angles_from_direction(middle);
+  azimuth = angles.azimuth;
+  zenith = angles.zenith;
+  return norm(middle);
 }
 
 }  // namespace risley::recordings
