@@ -24,6 +24,7 @@
 
 #include "recordings/formats/format.hpp"
 #include "recordings/formats/livox_messages.hpp"
+#include "recordings/formats/ros1_message.hpp"
 
 namespace risley::recordings {
 namespace {
@@ -367,112 +368,6 @@ class BagStructure {
   UntouchedBytes unpacked_;              ///< a compressed chunk while it is looked at
 };
 
-/// The bytes of one serialised message, taken from the front.
-class MessageBytes {
- public:
-  explicit MessageBytes(std::span<const std::uint8_t> bytes) : left_(bytes) {}
-
-  std::size_t left() const { return left_.size(); }
-
-  std::span<const std::uint8_t> take(std::size_t count, std::string_view what) {
-    require_room(what, count, 1, left());
-    const auto taken = left_.first(count);
-    left_ = left_.subspan(count);
-    return taken;
-  }
-
-  template <class T>
-  T number(std::string_view what) {
-    if (left() < sizeof(T)) {
-      throw BadMessage{fmt::format("expected {} bytes of {}, found {}", sizeof(T), what, left())};
-    }
-    return load<T>(take(sizeof(T), what).data());
-  }
-
-  std::string text(std::string_view what) {
-    const auto bytes = take(number<std::uint32_t>(what), what);
-    return {bytes.begin(), bytes.end()};
-  }
-
-  void require_end() const {
-    if (left() > 0) {
-      throw BadMessage{fmt::format("expected the end of the message, found {} more bytes", left())};
-    }
-  }
-
- private:
-  std::span<const std::uint8_t> left_;
-};
-
-/// std_msgs/Header: its stamp, not yet checked.
-struct Ros1Stamp {
-  std::uint32_t seconds = 0, nanoseconds = 0;
-};
-
-Ros1Stamp take_header(MessageBytes& bytes) {
-  bytes.number<std::uint32_t>("the sequence number");
-  Ros1Stamp stamp;
-  stamp.seconds = bytes.number<std::uint32_t>("the stamp");
-  stamp.nanoseconds = bytes.number<std::uint32_t>("the stamp");
-  bytes.text("characters of the frame name");
-  return stamp;
-}
-
-void decode_points(MessageBytes bytes, BagMessage& message) {
-  take_header(bytes);
-  message.time_ns = message_time(bytes.number<std::uint64_t>("the time base"));
-  bytes.number<std::uint32_t>("the number of points");
-  bytes.take(4, "bytes of lidar number and reserve");
-  const auto count = bytes.number<std::uint32_t>("the length of the points");
-  require_room("points", count, kCustomPointBytes, bytes.left());
-  message.points.reserve(count);
-  for (std::uint32_t i = 0; i < count; ++i) {
-    const std::uint8_t* at = bytes.take(kCustomPointBytes, "bytes of a point").data();
-    append_point(message, {load<std::uint32_t>(at), load<float>(at + 4), load<float>(at + 8),
-                           load<float>(at + 12), at[16], at[17], at[18]});
-  }
-  bytes.require_end();
-}
-
-void decode_cloud_message(MessageBytes bytes, BagMessage& message) {
-  const Ros1Stamp stamp = take_header(bytes);
-  message.time_ns = message_time(std::int64_t{stamp.seconds}, stamp.nanoseconds);
-  CloudLayout layout;
-  layout.height = bytes.number<std::uint32_t>("the height");
-  layout.width = bytes.number<std::uint32_t>("the width");
-  const auto fields = bytes.number<std::uint32_t>("the number of fields");
-  constexpr std::size_t kShortestField = 13;
-  require_room("fields", fields, kShortestField, bytes.left());
-  for (std::uint32_t i = 0; i < fields; ++i) {
-    CloudLayout::Field field;
-    field.name = bytes.text("characters of a field's name");
-    field.offset = bytes.number<std::uint32_t>("a field's offset");
-    field.datatype = bytes.number<std::uint8_t>("a field's datatype");
-    field.count = bytes.number<std::uint32_t>("a field's count");
-    layout.fields.push_back(std::move(field));
-  }
-  layout.big_endian = bytes.number<std::uint8_t>("the byte order") != 0;
-  layout.point_step = bytes.number<std::uint32_t>("the bytes per point");
-  layout.row_step = bytes.number<std::uint32_t>("the bytes per row");
-  const auto data_bytes = bytes.number<std::uint32_t>("the length of the data");
-  const auto data = bytes.take(data_bytes, "bytes of data");
-  bytes.number<std::uint8_t>("the mark of density");
-  bytes.require_end();
-  decode_cloud(layout, data, message);
-}
-
-void decode_imu_message(MessageBytes bytes, BagMessage& message) {
-  constexpr std::size_t kOrientation = 13 * sizeof(double), kCovariance = 9 * sizeof(double);
-  const Ros1Stamp stamp = take_header(bytes);
-  message.time_ns = message_time(std::int64_t{stamp.seconds}, stamp.nanoseconds);
-  bytes.take(kOrientation, "bytes of the orientation");
-  for (double& value : message.angular_velocity) value = bytes.number<double>("angular velocity");
-  bytes.take(kCovariance, "bytes of a covariance");
-  for (double& value : message.acceleration) value = bytes.number<double>("acceleration");
-  bytes.take(kCovariance, "bytes of a covariance");
-  bytes.require_end();
-}
-
 class Ros1BagReader final : public MessageReader {
  public:
   explicit Ros1BagReader(const std::string& path) : MessageReader(path) {
@@ -558,22 +453,9 @@ class Ros1BagReader final : public MessageReader {
       instance.write(stream);
     });
     ++messages_read_;
-    message.points.clear();
-    message.has_intensity = true;
     const BagTopic& topic = topics()[message.topic];
     try {
-      const MessageBytes bytes(bytes_);
-      switch (*topic.kind) {
-        case MessageKind::points:
-          decode_points(bytes, message);
-          break;
-        case MessageKind::cloud:
-          decode_cloud_message(bytes, message);
-          break;
-        case MessageKind::imu:
-          decode_imu_message(bytes, message);
-          break;
-      }
+      decode_ros1_message(*topic.kind, bytes_, message);
     } catch (const BadMessage& bad) {
       fail(fmt::format("message {} of topic {} ({}): {}", number, topic.name, topic.type,
                        bad.what()));

@@ -1,0 +1,17 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+#include "recordings/formats/livox_messages.hpp"
+
+namespace risley::recordings {
+
+/// Decodes a message as ROS 1 serialises it, and replaces all of `message` but its topic.
+/// @throws BadMessage
+void decode_ros1_message(MessageKind kind, std::span<const std::uint8_t> bytes,
+                         BagMessage& message);
+
+}  // namespace risley::recordings
