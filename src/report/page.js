@@ -530,6 +530,9 @@
   }
 
   async function start() {
+    const main = document.querySelector('main');
+    // A window that is not shown yet may have no width, and diagrams cannot be made without one.
+    while (main.clientWidth === 0) await new Promise((done) => setTimeout(done, 20));
     let pause = performance.now();
     for (const one of data) {
       const entry = one.kind === 'space' ? makeOrSay(one) : make(one);
@@ -540,10 +543,9 @@
     }
     window.risley = { charts: drawn };
     page.dataset.drawn = String(drawn.length);
-    const main = document.querySelector('main');
     let width = main.clientWidth;
     new ResizeObserver(() => {
-      if (main.clientWidth === width) return;
+      if (main.clientWidth === width || main.clientWidth === 0) return;
       width = main.clientWidth;
       drawn.forEach((entry) => {
         size(entry);

@@ -1,0 +1,60 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+// Presets, scenes, reports.
+#include <string>
+
+#include "risley/core/error.hpp"
+#include "risley/report/report_file.hpp"
+#include "risley/scenes/scene.hpp"
+#include "risley/sensors/preset.hpp"
+
+#include "fuzz/invariants.hpp"
+#include "fuzz/memory_file.hpp"
+#include "fuzz/targets.hpp"
+
+namespace risley::fuzz {
+namespace {
+
+std::string text_of(std::span<const std::uint8_t> bytes) { return {bytes.begin(), bytes.end()}; }
+
+/// What a preset says can be written and read again, and is then the same.
+void run_preset(std::span<const std::uint8_t> bytes) {
+  std::string once;
+  try {
+    once = sensors::preset_text(sensors::parse_preset(text_of(bytes), "fuzz.yaml"));
+  } catch (const Error&) {
+    return;
+  }
+  try {
+    const std::string twice = sensors::preset_text(sensors::parse_preset(once, "fuzz.yaml"));
+    require(once == twice, "a preset that is written twice is the same");
+  } catch (const Error& error) {
+    std::fprintf(stderr, "%s\n%s\n", error.what(), once.c_str());
+    require(false, "a preset that was written can be read");
+  }
+}
+
+void run_scene(std::span<const std::uint8_t> bytes) {
+  try {
+    scenes::parse_scene(text_of(bytes), "fuzz.yaml");
+  } catch (const Error&) {  // refused
+  }
+}
+
+/// A report that is accepted is drawn without a fault.
+void run_report(std::span<const std::uint8_t> bytes) {
+  const MemoryFile file(bytes);
+  try {
+    const std::string page = report::report_page(report::read_report(file.path()));
+    require(page.find("</html>") != std::string::npos, "a page is whole");
+  } catch (const Error&) {  // refused
+  }
+}
+
+}  // namespace
+
+std::vector<Target> text_targets() {
+  return {{"preset", run_preset}, {"scene", run_scene}, {"report", run_report}};
+}
+
+}  // namespace risley::fuzz
