@@ -68,8 +68,10 @@ class NetcdfOutput::File {
   void close() {
     {
       const NetcdfLock lock;
-      // What a full disk refuses is refused now, when the destructor can still help.
+      // What a disk refuses is refused now, when the destructor can still help: NetCDF ends with a
+      // fault where closing fails.
       check(nc_sync(id()), "");
+      output_.sync();
       const int status = nc_close(id());
       id_.reset();
       check(status, "");

@@ -232,7 +232,7 @@ OutputFile::~OutputFile() {
   if (!temporary_path_.empty()) ::unlink(temporary_path_.c_str());
 }
 
-void OutputFile::sync() {
+void OutputFile::sync() const {
   if (!is_named(temporary_, temporary_path_)) {
     throw FileError(path_, {},
                     fmt::format("cannot be written: {} was replaced meanwhile", temporary_path_));

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <random>
+#include <string_view>
 
 #include <gtest/gtest.h>
 
@@ -141,7 +142,7 @@ ObservabilityPlan plan_of_six(const sensors::Sensor& sensor) {
   return plan;
 }
 
-const EmitterBounds& bounds_of(const EmitterComparison& all, const std::string& name) {
+const EmitterBounds& bounds_of(const EmitterComparison& all, std::string_view name) {
   return *std::find_if(all.bounds.begin(), all.bounds.end(),
                        [&](const auto& one) { return one.name == name; });
 }

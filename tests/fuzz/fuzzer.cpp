@@ -16,8 +16,8 @@ extern "C" std::size_t LLVMFuzzerMutate(std::uint8_t* bytes, std::size_t size, s
 
 namespace {
 
-using risley::fuzz::Target;
 using nlohmann::json;
+using risley::fuzz::Target;
 
 const Target& target() {
   static const Target& chosen = []() -> const Target& {

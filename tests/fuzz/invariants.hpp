@@ -39,7 +39,8 @@ inline void require_sound(const recordings::Observations& rows,
     require(rows.return_number[i] >= 1, "returns count from 1");
     require(rows.valid[i] <= 1, "valid is 0 or 1");
     if (header.has_range) {
-      require(std::isfinite(rows.range[i]) && rows.range[i] >= 0, "ranges are finite and not negative");
+      require(std::isfinite(rows.range[i]) && rows.range[i] >= 0,
+              "ranges are finite and not negative");
     }
     require(rows.azimuth_resolution[i] >= 0 && rows.zenith_resolution[i] >= 0 &&
                 rows.range_resolution[i] >= 0,

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-// NetCDF files whose values, lengths and names were changed through the library: random bytes hardly
-// ever make a file that it opens.
+// NetCDF files whose values, lengths and names were changed through the library: random bytes
+// hardly ever make a file that it opens.
 #include <array>
 #include <cstring>
 #include <string>
@@ -173,8 +173,6 @@ void run_truth(std::span<const std::uint8_t> bytes) {
 
 }  // namespace
 
-std::vector<Target> netcdf_targets() {
-  return {{"netcdf", run_recording}, {"truth", run_truth}};
-}
+std::vector<Target> netcdf_targets() { return {{"netcdf", run_recording}, {"truth", run_truth}}; }
 
 }  // namespace risley::fuzz

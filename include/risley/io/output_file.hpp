@@ -27,7 +27,7 @@ class OutputFile {
 
   /// Puts the bytes on the disk, so that commit() has little left that can fail. All streams to the
   /// temporary must have been closed or flushed. @throws FileError
-  void sync();
+  void sync() const;
   /// Gives the file its final name, once its bytes are on the disk. All streams to the temporary
   /// must have been closed or flushed. @throws FileError
   void commit();

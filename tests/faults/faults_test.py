@@ -1,0 +1,241 @@
+#!/usr/bin/env python3
+# SPDX-FileCopyrightText: 2026 The risley authors
+# SPDX-License-Identifier: MIT
+"""Every verb while calls of the C library fail, one at a time: the old output stays whole or the new
+one is there whole, the exit status says which, and nothing else is left behind.
+
+RISLEY_EVERY_FAULT=1 lets each of the first 200 calls of a kind fail, which takes hours."""
+import concurrent.futures
+import filecmp
+import os
+import pathlib
+import random
+import shutil
+import subprocess
+import tempfile
+import time
+import unittest
+
+COMMAND = os.environ["RISLEY_COMMAND"]
+SOURCE = pathlib.Path(os.environ["RISLEY_SOURCE_DIR"])
+FAULTS = os.environ["RISLEY_FAULTS"]
+EVERY = os.environ.get("RISLEY_EVERY_FAULT")
+
+# Status of a run that met the fault. What is not written is a matter of files; libraries tell a lack
+# of memory as an error of the file that they were at.
+STATUSES = {"write": {3}, "sync": {3}, "rename": {3}, "create": {3}, "close": {3}, "memory": {3, 4}}
+
+# Name, arguments, output; inputs are made by make_inputs().
+FILES = [(f"convert to {ending}", ["convert", "walls.nc", "-o"], f"out.{ending}")
+         for ending in ("nc", "lvx", "bin", "openpylivox.csv", "sequence.csv")]
+FILES += [(f"cloud to {ending}", ["cloud", "walls.nc", "--calibration", "mid-40", "-o"],
+           f"out.{ending}") for ending in ("las", "ply", "pcd", "csv", "npy", "nc", "bag")]
+FILES += [(f"pattern to {name}", ["pattern", "--sensor", "avia", "--duration-s", "0.002", "--format",
+                                  name, "-o"], f"out.{ending}")
+          for name, ending in (("livox-csv", "csv"), ("npy", "npy"), ("helios-xml", "xml"),
+                               ("json", "json"), ("usda", "usda"))]
+FILES += [("simulate", ["simulate", "--duration-s", "0.01", "-o"], "out.nc"),
+          ("preset new", ["preset", "new", "mine", "--from", "mid-40", "-o"], "out.yaml"),
+          ("report", ["report", "result", "-o"], "out.html")]
+FOLDERS = [("estimate", ["estimate", "walls.nc", "-o"], "result"),
+           ("calibrate", ["calibrate", "walls.nc", "-o"],
+            "result")]
+STDOUT = [("info", ["info", "walls.nc", "--json"]), ("estimate", ["estimate", "walls.nc", "--json"])]
+
+
+def run(folder, arguments, fault=None):
+    """The finished process, and whether the fault happened."""
+    environment = dict(os.environ)
+    fired = folder / ".fired"
+    if fault:
+        environment |= {"LD_PRELOAD": FAULTS, "RISLEY_FAULT": f"{fault[0]} {fault[1]}",
+                        "RISLEY_FAULT_FIRED": str(fired)}
+    done = subprocess.run([COMMAND, *arguments, "--threads", "1"], cwd=folder, env=environment,
+                          capture_output=True, timeout=120, check=False)
+    happened = fired.exists()
+    if happened:
+        fired.unlink()
+    return done, happened
+
+
+def state(folder):
+    """Bytes of every file below a folder, by name."""
+    return {str(path.relative_to(folder)): path.read_bytes()
+            for path in sorted(folder.rglob("*")) if path.is_file()}
+
+
+def same_run(one, other):
+    """Whether two outputs are of runs alike: times and random names within them may differ."""
+    return len(one) == len(other) or abs(len(one) - len(other)) < 200 + len(one) // 50
+
+
+class FaultsTest(unittest.TestCase):
+    """Each case in a folder of its own, copied from one with inputs and old outputs."""
+
+    @classmethod
+    def setUpClass(cls):
+        cls.root = pathlib.Path(tempfile.mkdtemp(prefix="risley-faults-"))
+        inputs = cls.root / "inputs"
+        inputs.mkdir()
+        for name, more in (("walls.nc", ["--duration-s", "0.3", "--seed", "1"]),
+                           ("old.nc", ["--duration-s", "0.35", "--seed", "2"])):
+            done, _ = run(inputs, ["simulate", "-o", name, "--rate-hz", "10000", "--scene",
+                                   str(SOURCE / "data/room.yaml"), *more])
+            assert done.returncode == 0, done.stderr
+        done, _ = run(inputs, ["estimate", "old.nc", "-o", "result"])
+        assert done.returncode == 0, done.stderr
+        cls.inputs = inputs
+
+    @classmethod
+    def tearDownClass(cls):
+        shutil.rmtree(cls.root)
+
+    def numbers(self, limit=200):
+        """Which calls fail: each, or some that come closer to each other where runs are short."""
+        if EVERY:
+            return range(1, limit + 1)
+        return [number for number in (1, 2, 3, 5, 9, 21, 60, 150) if number <= limit]
+
+    def each(self, cases, check):
+        """Runs check(case, kind, number) until a kind of call does not happen any more."""
+        wrong = []
+
+        def all_of(case_and_kind):
+            case, kind = case_and_kind
+            seen = 0
+            for number in self.numbers():
+                folder = pathlib.Path(tempfile.mkdtemp(dir=self.root))
+                shutil.copytree(self.inputs, folder, dirs_exist_ok=True)
+                try:
+                    if not check(folder, case, kind, number):
+                        break
+                    seen += 1
+                except AssertionError as error:
+                    seen += 1
+                    wrong.append(str(error))
+                finally:
+                    shutil.rmtree(folder)
+            return seen
+        jobs = [(case, kind) for case in cases for kind in STATUSES]
+        with concurrent.futures.ThreadPoolExecutor(2) as pool:
+            faults = sum(pool.map(all_of, jobs))
+        print(f"{faults} faults in {len(cases)} cases, {len(wrong)} with a wrong end", flush=True)
+        self.assertEqual(wrong, [], "\n".join(wrong))
+        self.assertGreater(faults, 3 * len(cases))
+
+    def expect_status(self, done, kind, where):
+        """A fault is told with its status and in words, or did no harm."""
+        self.assertIn(done.returncode, STATUSES[kind] | {0}, f"{where}: {done.stderr[-600:]}")
+        if done.returncode != 0:
+            self.assertIn(b"error", done.stderr, where)
+
+    def test_a_file_is_the_old_or_the_new_one(self):
+        expected = {}
+        for name, arguments, output in FILES:
+            folder = pathlib.Path(tempfile.mkdtemp(dir=self.root))
+            shutil.copytree(self.inputs, folder, dirs_exist_ok=True)
+            done, _ = run(folder, [*arguments, output])
+            self.assertEqual(done.returncode, 0, f"{name}: {done.stderr}")
+            expected[name] = state(folder)
+
+        def check(folder, case, kind, number):
+            name, arguments, output = case
+            where = f"{name}, {kind} {number}"
+            old = b"of an earlier run"
+            (folder / output).write_bytes(old)
+            done, happened = run(folder, [*arguments, output], (kind, number))
+            if not happened:
+                self.assertEqual(done.returncode, 0, f"{where}: {done.stderr}")
+                return False
+            self.expect_status(done, kind, where)
+            after = state(folder)
+            self.assertEqual(set(after) - set(expected[name]), set(), f"{where}: left behind")
+            if after[output] == old:
+                self.assertNotEqual(done.returncode, 0, f"{where}: nothing was written")
+            else:
+                self.assertTrue(same_run(after[output], expected[name][output]),
+                                f"{where}: half an output, {len(after[output])} bytes")
+            for other, content in expected[name].items():
+                if other in after and other not in (output,):
+                    self.assertTrue(same_run(after[other], content), f"{where}: half of {other}")
+            return True
+        self.each(FILES, check)
+
+    def test_a_folder_is_of_one_run_or_says_that_it_is_not(self):
+        expected = {}
+        for name, arguments, output in FOLDERS:
+            folder = pathlib.Path(tempfile.mkdtemp(dir=self.root))
+            shutil.copytree(self.inputs, folder, dirs_exist_ok=True)
+            done, _ = run(folder, [*arguments, output])
+            self.assertEqual(done.returncode, 0, f"{name}: {done.stderr}")
+            expected[name] = state(folder / output)
+        before = state(self.inputs / "result")
+
+        def check(folder, case, kind, number):
+            name, arguments, output = case
+            where = f"{name}, {kind} {number}"
+            done, happened = run(folder, [*arguments, output], (kind, number))
+            if not happened:
+                self.assertEqual(done.returncode, 0, f"{where}: {done.stderr}")
+                return False
+            self.expect_status(done, kind, where)
+            after = state(folder / output)
+            extra = {one for one in set(after) - set(before) - set(expected[name])
+                     if ".earlier" not in one and one != "INCOMPLETE"}
+            self.assertEqual(extra, set(), f"{where}: left behind")
+            if "INCOMPLETE" in after:
+                self.assertNotEqual(done.returncode, 0, where)
+                return True
+            is_old = all(after.get(one) == content for one, content in before.items())
+            is_new = all(one in after and after[one] != before.get(one) and
+                         same_run(after[one], content) for one, content in expected[name].items())
+            self.assertTrue(is_old or is_new, f"{where}: of two runs")
+            if done.returncode == 0:
+                self.assertTrue(is_new, f"{where}: nothing was written")
+            return True
+        self.each(FOLDERS, check)
+
+    def test_what_cannot_be_printed_is_no_success(self):
+        def check(folder, case, kind, number):
+            name, arguments = case
+            where = f"{name}, {kind} {number}"
+            done, happened = run(folder, arguments, (kind, number))
+            if not happened:
+                return False
+            self.expect_status(done, kind, where)
+            if done.returncode == 0:
+                self.assertTrue(done.stdout.rstrip().endswith(b"}"), where)
+            return True
+        for case in STDOUT:  # which write no files
+            for kind in ("write", "memory"):
+                for number in self.numbers():
+                    if not check(self.inputs, case, kind, number):
+                        break
+
+    def test_a_killed_run_leaves_the_old_or_the_new_file(self):
+        reference = pathlib.Path(tempfile.mkdtemp(dir=self.root))
+        shutil.copytree(self.inputs, reference, dirs_exist_ok=True)
+        arguments = ["convert", "walls.nc", "-o", "out.lvx"]
+        begin = time.monotonic()
+        done, _ = run(reference, arguments)
+        self.assertEqual(done.returncode, 0)
+        length = time.monotonic() - begin
+        moments = random.Random(1)
+        for _ in range(200 if EVERY else 12):
+            folder = pathlib.Path(tempfile.mkdtemp(dir=self.root))
+            shutil.copytree(self.inputs, folder, dirs_exist_ok=True)
+            (folder / "out.lvx").write_bytes(b"old")
+            with subprocess.Popen([COMMAND, *arguments], cwd=folder, stdout=subprocess.DEVNULL,
+                                  stderr=subprocess.DEVNULL) as process:
+                time.sleep(1.2 * length * moments.random())
+                process.kill()
+            if (folder / "out.lvx").read_bytes() != b"old":
+                self.assertTrue(filecmp.cmp(folder / "out.lvx", reference / "out.lvx", False))
+            done, _ = run(folder, arguments)  # and the next one clears up
+            self.assertEqual(done.returncode, 0)
+            self.assertEqual(set(state(folder)), set(state(reference)))
+            shutil.rmtree(folder)
+
+
+if __name__ == "__main__":
+    unittest.main(verbosity=2)
