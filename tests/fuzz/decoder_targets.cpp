@@ -1,6 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
 // What stands inside files and streams, given to its decoder without them.
+#include <algorithm>
 #include <cmath>
 
 #include "risley/recordings/livox/packet_decoder.hpp"

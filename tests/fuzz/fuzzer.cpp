@@ -1,6 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
 // libFuzzer's program: RISLEY_FUZZ_TARGET says which target.
+#include <algorithm>
 #include <cstdio>
 #include <cstdlib>
 #include <exception>

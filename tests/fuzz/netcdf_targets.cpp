@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 // NetCDF files whose values, lengths and names were changed through the library: random bytes
 // hardly ever make a file that it opens.
+#include <algorithm>
 #include <array>
 #include <cstring>
 #include <string>

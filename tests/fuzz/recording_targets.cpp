@@ -1,6 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
 // Files of recordings: read, written in the same format, and read again.
+#include <algorithm>
 #include <cmath>
 #include <memory>
 #include <optional>

@@ -1,6 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
 // Runs every target over its inputs in a corpus, as the fuzzers left it.
+#include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <exception>
