@@ -1,9 +1,12 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-#include <array>
+#include <algorithm>
 #include <filesystem>
 #include <optional>
+#include <string>
+#include <vector>
 
+#include <H5Fpublic.h>
 #include <fmt/format.h>
 #include <netcdf.h>
 
@@ -15,6 +18,24 @@
 #include "io/netcdf_library.hpp"
 
 namespace risley::io {
+
+namespace {
+
+/// One more handle of a file that NetCDF has open, below 0 without one. NetCDF ends the process
+/// with a fault where the system refuses to close a file, so somebody else has to close it last.
+hid_t another_handle(const std::string& path) {
+  std::vector<hid_t> files(
+      static_cast<std::size_t>(std::max<ssize_t>(0, H5Fget_obj_count(H5F_OBJ_ALL, H5F_OBJ_FILE))));
+  if (H5Fget_obj_ids(H5F_OBJ_ALL, H5F_OBJ_FILE, files.size(), files.data()) < 0) return -1;
+  for (const hid_t file : files) {
+    std::string name(path.size() + 2, '\0');
+    const ssize_t length = H5Fget_name(file, name.data(), name.size());
+    if (length >= 0 && name.c_str() == path) return H5Freopen(file);
+  }
+  return -1;
+}
+
+}  // namespace
 
 /// The open file. Its members expect the lock to be held, but for close().
 class NetcdfOutput::File {
@@ -30,7 +51,9 @@ class NetcdfOutput::File {
     if (nc_sync(*id_) != NC_NOERR) {
       std::filesystem::resize_file(output_.temporary_path(), 0, ignored);
     }
+    const hid_t last = another_handle(output_.temporary_path());
     nc_close(*id_);
+    if (last >= 0) H5Fclose(last);
   }
   File(const File&) = delete;
   File& operator=(const File&) = delete;
@@ -68,13 +91,14 @@ class NetcdfOutput::File {
   void close() {
     {
       const NetcdfLock lock;
-      // What a disk refuses is refused now, when the destructor can still help: NetCDF ends with a
-      // fault where closing fails.
+      // What a full disk refuses is refused now, when the destructor can still help.
       check(nc_sync(id()), "");
-      output_.sync();
+      const hid_t last = another_handle(output_.temporary_path());
       const int status = nc_close(id());
       id_.reset();
+      const bool closed = last < 0 || H5Fclose(last) >= 0;
       check(status, "");
+      if (!closed) check(NC_EHDFERR, "");
     }
     if (own_) own_->commit();
   }
