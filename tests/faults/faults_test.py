@@ -37,10 +37,15 @@ FILES += [(f"pattern to {name}", ["pattern", "--sensor", "avia", "--duration-s",
 FILES += [("simulate", ["simulate", "--duration-s", "0.01", "-o"], "out.nc"),
           ("preset new", ["preset", "new", "mine", "--from", "mid-40", "-o"], "out.yaml"),
           ("report", ["report", "result", "-o"], "out.html")]
+FILES += [("page of a pattern", ["pattern", "--sensor", "avia", "--duration-s", "0.002", "--report"],
+           "out.html"),
+          ("map of beam origins", ["cloud", "--calibration", "mid-40", "--beam-origin-map"], "map.html")]
 FOLDERS = [("estimate", ["estimate", "walls.nc", "-o"], "result"),
            ("calibrate", ["calibrate", "walls.nc", "-o"],
             "result")]
-STDOUT = [("info", ["info", "walls.nc", "--json"]), ("estimate", ["estimate", "walls.nc", "--json"])]
+STDOUT = [("info", ["info", "walls.nc", "--json"]), ("estimate", ["estimate", "walls.nc", "--json"]),
+          ("observability", ["observability", "walls.nc", "--json"]),
+          ("plan", ["calibrate", "--plan", str(SOURCE / "data/room.yaml"), "--duration-s", "1", "--json"])]
 
 
 def run(folder, arguments, fault=None):

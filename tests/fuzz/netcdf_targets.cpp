@@ -60,8 +60,9 @@ void write_recording(const std::string& path) {
     rows.device[i] = i % 2;
     rows.return_number[i] = rows.valid[i] = 1;
   }
-  chunk.packets.resize(2);
-  for (recordings::Packet& packet : chunk.packets) packet.rows = kRows / 2;
+  chunk.packets.resize(3);
+  chunk.packets[0].rows = chunk.packets[1].rows = kRows / 2;
+  chunk.packets[2].data_type = 6;
   chunk.imu.resize(1);
   const auto writer = recordings::create_recording(path, header);
   writer->write(chunk);
