@@ -531,8 +531,9 @@
 
   async function start() {
     const main = document.querySelector('main');
-    // A window that is not shown yet may have no width, and diagrams cannot be made without one.
-    while (main.clientWidth === 0) await new Promise((done) => setTimeout(done, 20));
+    // A window that is not shown yet has no room, and diagrams cannot be made without any.
+    const hasRoom = () => data.some(({ id }) => document.getElementById(id).clientWidth > 0);
+    while (data.length > 0 && !hasRoom()) await new Promise((done) => setTimeout(done, 20));
     let pause = performance.now();
     for (const one of data) {
       const entry = one.kind === 'space' ? makeOrSay(one) : make(one);
@@ -545,7 +546,7 @@
     page.dataset.drawn = String(drawn.length);
     let width = main.clientWidth;
     new ResizeObserver(() => {
-      if (main.clientWidth === width || main.clientWidth === 0) return;
+      if (main.clientWidth === width || !hasRoom()) return;
       width = main.clientWidth;
       drawn.forEach((entry) => {
         size(entry);
