@@ -11,6 +11,7 @@
   const barWidth = 64; // of the colour scale
   const zoomStep = 0.8, panStep = 0.1, turnStep = 10;
   const thinnestBox = 8; // pixels
+  const leastWidth = 100; // pixels of a figure, its margins included
   const longestPause = 200; // ms
   const growth = 10_000; // ms, of what is shown as it came
   let drawn = [];
@@ -532,8 +533,9 @@
   async function start() {
     const main = document.querySelector('main');
     // A window that is not shown yet has no room, and diagrams cannot be made without any.
-    const hasRoom = () => data.some(({ id }) => document.getElementById(id).clientWidth > 0);
-    while (data.length > 0 && !hasRoom()) await new Promise((done) => setTimeout(done, 20));
+    const figures = data.map(({ id }) => document.getElementById(id).parentElement);
+    const hasRoom = () => figures.some((figure) => figure.clientWidth > leastWidth);
+    while (figures.length > 0 && !hasRoom()) await new Promise((done) => setTimeout(done, 20));
     let pause = performance.now();
     for (const one of data) {
       const entry = one.kind === 'space' ? makeOrSay(one) : make(one);
