@@ -5,10 +5,18 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <map>
+#include <sstream>
+#include <utility>
+#include <vector>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <yaml-cpp/yaml.h>
+#include <yaml-cpp/anchor.h>
+#include <yaml-cpp/eventhandler.h>
+#include <yaml-cpp/exceptions.h>
+#include <yaml-cpp/mark.h>
+#include <yaml-cpp/parser.h>
 
 #include "risley/core/error.hpp"
 
@@ -21,35 +29,87 @@ std::size_t line_of(const YAML::Mark& mark) {
   return mark.is_null() ? 0 : static_cast<std::size_t>(mark.line) + 1;
 }
 
-/// The tree of a parsed text without its library. @param nodes  how many there are so far
-YamlNode copied(const YAML::Node& node, const std::string& path, std::size_t& nodes) {
-  YamlNode copy;
-  copy.line = line_of(node.Mark());
-  if (++nodes > kMostNodes) {
-    fail_at(path, copy.line,
+/// Makes the tree of one document of what the library's parser finds in it.
+class TreeBuilder final : public YAML::EventHandler {
+ public:
+  explicit TreeBuilder(const std::string& path) : path_(path) {}
+
+  YamlNode take_root() { return std::move(root_); }
+  /// Line on which the document begins.
+  std::size_t line() const { return line_; }
+
+  void OnDocumentStart(const YAML::Mark& mark) override { line_ = line_of(mark); }
+  void OnDocumentEnd() override {}
+  void OnNull(const YAML::Mark& mark, YAML::anchor_t anchor) override {
+    add({node_of(YamlNode::Kind::nothing, mark), anchor, 1});
+  }
+  void OnScalar(const YAML::Mark& mark, const std::string&, YAML::anchor_t anchor,
+                const std::string& value) override {
+    YamlNode node = node_of(YamlNode::Kind::scalar, mark);
+    node.scalar = value;
+    add({std::move(node), anchor, 1});
+  }
+  void OnAlias(const YAML::Mark& mark, YAML::anchor_t anchor) override {
+    const auto known = anchored_.find(anchor);
+    if (known == anchored_.end()) fail_at(path_, line_of(mark), "an alias (*name) within its node");
+    count(line_of(mark), known->second.nodes);
+    add({known->second.node, YAML::NullAnchor, known->second.nodes});
+  }
+  void OnSequenceStart(const YAML::Mark& mark, const std::string&, YAML::anchor_t anchor,
+                       YAML::EmitterStyle::value) override {
+    open_.push_back({node_of(YamlNode::Kind::list, mark), anchor, 1});
+  }
+  void OnSequenceEnd() override { close(); }
+  void OnMapStart(const YAML::Mark& mark, const std::string&, YAML::anchor_t anchor,
+                  YAML::EmitterStyle::value) override {
+    open_.push_back({node_of(YamlNode::Kind::map, mark), anchor, 1});
+  }
+  void OnMapEnd() override { close(); }
+
+ private:
+  struct Subtree {
+    YamlNode node;
+    YAML::anchor_t anchor = YAML::NullAnchor;
+    std::size_t nodes = 0;
+  };
+
+  YamlNode node_of(YamlNode::Kind kind, const YAML::Mark& mark) {
+    YamlNode node;
+    node.kind = kind;
+    node.line = line_of(mark);
+    count(node.line, 1);
+    return node;
+  }
+  void count(std::size_t line, std::size_t more) {
+    nodes_ += more;
+    if (nodes_ <= kMostNodes) return;
+    fail_at(path_, line,
             fmt::format("has more values than {}, aliases (*name) included", kMostNodes));
   }
-  switch (node.Type()) {
-    case YAML::NodeType::Scalar:
-      copy.kind = YamlNode::Kind::scalar;
-      copy.scalar = node.Scalar();
-      break;
-    case YAML::NodeType::Sequence:
-      copy.kind = YamlNode::Kind::list;
-      for (const auto& item : node) copy.items.push_back(copied(item, path, nodes));
-      break;
-    case YAML::NodeType::Map:
-      copy.kind = YamlNode::Kind::map;
-      for (const auto& item : node) {
-        copy.items.push_back(copied(item.first, path, nodes));
-        copy.items.push_back(copied(item.second, path, nodes));
-      }
-      break;
-    default:
-      break;
+  void close() {
+    Subtree whole = std::move(open_.back());
+    open_.pop_back();
+    add(std::move(whole));
   }
-  return copy;
-}
+  void add(Subtree subtree) {
+    if (subtree.anchor != YAML::NullAnchor) {
+      count(subtree.node.line, subtree.nodes);  // anchors within anchors are copies of copies
+      anchored_[subtree.anchor] = subtree;
+    }
+    if (open_.empty()) {
+      root_ = std::move(subtree.node);
+      return;
+    }
+    open_.back().nodes += subtree.nodes;
+    open_.back().node.items.push_back(std::move(subtree.node));
+  }
+
+  const std::string& path_;
+  std::vector<Subtree> open_;
+  std::map<YAML::anchor_t, Subtree> anchored_;
+  YamlNode root_;
+  std::size_t nodes_ = 0, line_ = 0;
+};
 
 std::string kind_of(const YamlNode& node) {
   switch (node.kind) {
@@ -69,15 +129,14 @@ std::string kind_of(const YamlNode& node) {
 
 YamlNode parse_yaml(const std::string& text, const std::string& path) {
   try {
-    std::size_t nodes = 0;
-    const std::vector<YAML::Node> documents = YAML::LoadAll(text);
-    if (documents.empty()) return {};
-    if (documents.size() > 1) {
-      fail_at(
-          path, line_of(documents[1].Mark()),
-          fmt::format("a second document (after ---), expected one: {} of them", documents.size()));
+    std::istringstream stream(text);
+    YAML::Parser parser(stream);
+    TreeBuilder first(path), second(path);
+    if (!parser.HandleNextDocument(first)) return {};
+    if (parser.HandleNextDocument(second)) {
+      fail_at(path, second.line(), "a second document (after ---), expected one");
     }
-    return copied(documents.front(), path, nodes);
+    return first.take_root();
   } catch (const YAML::Exception& error) {
     fail_at(path, line_of(error.mark), fmt::format("is not YAML: {}", error.msg));
   }

@@ -10,6 +10,7 @@
 #include <gtest/gtest.h>
 
 #include "risley/core/error.hpp"
+#include "risley/io/text_file.hpp"
 
 namespace risley::io::yaml_map_test {
 
@@ -52,9 +53,31 @@ TEST(Yaml, MistakesAreFoundWithTheirLine) {
 }
 
 TEST(Yaml, ASecondDocumentIsRefused) {
-  EXPECT_THAT(refusal("number: 1\n---\nnumber: 2\n"), HasSubstr("line 3: a second document"));
+  EXPECT_THAT(refusal("number: 1\n---\nnumber: 2\n"), HasSubstr("line 2: a second document"));
   EXPECT_THAT(refusal("number: 1\n...\n---\n{}\n"), HasSubstr("a second document"));
   EXPECT_EQ(refusal("---\nnumber: 1\n...\n"), "accepted");
+}
+
+TEST(Yaml, ATextThatTheLibraryReadsForEverIsRefused) {
+  const std::string text = read_text_file(RISLEY_TEST_DATA "/hostile/yaml-endless.yaml");
+  EXPECT_THAT(refusal(text), HasSubstr("line "));
+}
+
+TEST(Yaml, AliasesRepeatTheirNode) {
+  const YamlNode tree = parse_yaml("a: &one [1, {b: &two 2}]\nc: *one\nd: *two\n", "alias.yaml");
+  ASSERT_EQ(tree.items.size(), 6U);
+  ASSERT_EQ(tree.items[3].items.size(), 2U);
+  EXPECT_EQ(tree.items[3].items[1].items[1].scalar, "2");
+  EXPECT_EQ(tree.items[5].scalar, "2");
+  EXPECT_THAT(refusal("a: &one [1, *one]\n"), HasSubstr("line 1: an alias"));
+}
+
+TEST(Yaml, AnchorsWithinAnchorsAreBounded) {
+  std::string text;
+  for (int depth = 0; depth < 100; ++depth) text += fmt::format("&a{} [", depth);
+  for (int i = 0; i < 20'000; ++i) text += "1,";
+  text += std::string(100, ']');
+  EXPECT_THAT(refusal(text), HasSubstr("has more values"));
 }
 
 TEST(Yaml, ManyKeysTakeTimeInProportion) {
