@@ -37,7 +37,7 @@ class ThreadsTest(CommandTest):
     """One, two and four threads; more of them than cores are threads all the same."""
 
     def test_bytes_do_not_depend_on_the_number_of_threads(self):
-        self.expect(0, "simulate", "-o", "walls.lvx", "--rotor", "hunting", "--duration-s", "1",
+        self.expect(0, "simulate", "-o", "walls.lvx", "--rotor", "hunting", "--duration-s", "0.4",
                     "--scene", SOURCE / "data/hall.yaml")
         outputs = {}
         for threads in (1, 2, 4):
