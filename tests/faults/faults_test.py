@@ -4,7 +4,7 @@
 """Every verb while calls of the C library fail, one at a time: the old output stays whole or the new
 one is there whole, the exit status says which, and nothing else is left behind.
 
-RISLEY_EVERY_FAULT=1 lets each of the first 200 calls of a kind fail, which takes hours."""
+RISLEY_EVERY_FAULT=1 lets each of the first 200 calls of a kind fail, which takes minutes."""
 import concurrent.futures
 import filecmp
 import os
