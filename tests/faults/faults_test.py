@@ -95,6 +95,14 @@ class FaultsTest(unittest.TestCase):
     def tearDownClass(cls):
         shutil.rmtree(cls.root)
 
+    def whole_run(self, arguments, output):
+        """What a run without a fault leaves, inputs included."""
+        folder = pathlib.Path(tempfile.mkdtemp(dir=self.root))
+        shutil.copytree(self.inputs, folder, dirs_exist_ok=True)
+        done, _ = run(folder, [*arguments, output])
+        self.assertEqual(done.returncode, 0, f"{arguments}: {done.stderr}")
+        return state(folder)
+
     def numbers(self, limit=200):
         """Which calls fail: each, or some that come closer to each other where runs are short."""
         if EVERY:
@@ -135,13 +143,7 @@ class FaultsTest(unittest.TestCase):
             self.assertIn(b"error", done.stderr, where)
 
     def test_a_file_is_the_old_or_the_new_one(self):
-        expected = {}
-        for name, arguments, output in FILES:
-            folder = pathlib.Path(tempfile.mkdtemp(dir=self.root))
-            shutil.copytree(self.inputs, folder, dirs_exist_ok=True)
-            done, _ = run(folder, [*arguments, output])
-            self.assertEqual(done.returncode, 0, f"{name}: {done.stderr}")
-            expected[name] = state(folder)
+        expected = {name: self.whole_run(arguments, output) for name, arguments, output in FILES}
 
         def check(folder, case, kind, number):
             name, arguments, output = case
@@ -167,13 +169,10 @@ class FaultsTest(unittest.TestCase):
         self.each(FILES, check)
 
     def test_a_folder_is_of_one_run_or_says_that_it_is_not(self):
-        expected = {}
-        for name, arguments, output in FOLDERS:
-            folder = pathlib.Path(tempfile.mkdtemp(dir=self.root))
-            shutil.copytree(self.inputs, folder, dirs_exist_ok=True)
-            done, _ = run(folder, [*arguments, output])
-            self.assertEqual(done.returncode, 0, f"{name}: {done.stderr}")
-            expected[name] = state(folder / output)
+        expected = {name: {one.removeprefix(f"{output}/"): content
+                           for one, content in self.whole_run(arguments, output).items()
+                           if one.startswith(f"{output}/")}
+                    for name, arguments, output in FOLDERS}
         before = state(self.inputs / "result")
 
         def check(folder, case, kind, number):
