@@ -186,13 +186,7 @@ int open(const char* path, int flags, ...) {
   va_end(rest);
   return openat(AT_FDCWD, path, flags, mode);
 }
-int open64(const char* path, int flags, ...) {
-  va_list rest;
-  va_start(rest, flags);
-  const mode_t mode = (flags & (O_CREAT | __O_TMPFILE)) != 0 ? va_arg(rest, mode_t) : 0;
-  va_end(rest);
-  return openat(AT_FDCWD, path, flags, mode);
-}
+int open64(const char* path, int flags, ...) __attribute__((alias("open")));
 int close(int file) {
   const bool counts = wanted == close_call && file > STDERR_FILENO && unsynced.has(file);
   const auto result = static_cast<int>(::syscall(SYS_close, file));

@@ -21,6 +21,9 @@ SOURCE = pathlib.Path(os.environ["RISLEY_SOURCE_DIR"])
 FAULTS = os.environ["RISLEY_FAULTS"]
 EVERY = os.environ.get("RISLEY_EVERY_FAULT")
 
+# Which calls of a kind fail: each, or some that come closer to each other where runs are short.
+NUMBERS = range(1, 201) if EVERY else (1, 2, 7, 40)
+
 # Status of a run that met the fault. What is not written is a matter of files; libraries tell a lack
 # of memory as an error of the file that they were at.
 STATUSES = {"write": {3}, "sync": {3}, "rename": {3}, "create": {3}, "close": {3}, "memory": {3, 4}}
@@ -95,19 +98,18 @@ class FaultsTest(unittest.TestCase):
     def tearDownClass(cls):
         shutil.rmtree(cls.root)
 
-    def whole_run(self, arguments, output):
-        """What a run without a fault leaves, inputs included."""
+    def copy_of_inputs(self):
+        """A new folder with the inputs and old outputs."""
         folder = pathlib.Path(tempfile.mkdtemp(dir=self.root))
         shutil.copytree(self.inputs, folder, dirs_exist_ok=True)
+        return folder
+
+    def whole_run(self, arguments, output):
+        """What a run without a fault leaves, inputs included."""
+        folder = self.copy_of_inputs()
         done, _ = run(folder, [*arguments, output])
         self.assertEqual(done.returncode, 0, f"{arguments}: {done.stderr}")
         return state(folder)
-
-    def numbers(self, limit=200):
-        """Which calls fail: each, or some that come closer to each other where runs are short."""
-        if EVERY:
-            return range(1, limit + 1)
-        return [number for number in (1, 2, 7, 40) if number <= limit]
 
     def each(self, cases, check):
         """Runs check(case, kind, number) until a kind of call does not happen any more."""
@@ -116,9 +118,8 @@ class FaultsTest(unittest.TestCase):
         def all_of(case_and_kind):
             case, kind = case_and_kind
             seen = 0
-            for number in self.numbers():
-                folder = pathlib.Path(tempfile.mkdtemp(dir=self.root))
-                shutil.copytree(self.inputs, folder, dirs_exist_ok=True)
+            for number in NUMBERS:
+                folder = self.copy_of_inputs()
                 try:
                     if not check(folder, case, kind, number):
                         break
@@ -212,13 +213,12 @@ class FaultsTest(unittest.TestCase):
             return True
         for case in STDOUT:  # which write no files
             for kind in ("write", "memory"):
-                for number in self.numbers():
+                for number in NUMBERS:
                     if not check(self.inputs, case, kind, number):
                         break
 
     def test_a_killed_run_leaves_the_old_or_the_new_file(self):
-        reference = pathlib.Path(tempfile.mkdtemp(dir=self.root))
-        shutil.copytree(self.inputs, reference, dirs_exist_ok=True)
+        reference = self.copy_of_inputs()
         arguments = ["convert", "walls.nc", "-o", "out.lvx"]
         begin = time.monotonic()
         done, _ = run(reference, arguments)
@@ -226,8 +226,7 @@ class FaultsTest(unittest.TestCase):
         length = time.monotonic() - begin
         moments = random.Random(1)
         for _ in range(200 if EVERY else 12):
-            folder = pathlib.Path(tempfile.mkdtemp(dir=self.root))
-            shutil.copytree(self.inputs, folder, dirs_exist_ok=True)
+            folder = self.copy_of_inputs()
             (folder / "out.lvx").write_bytes(b"old")
             with subprocess.Popen([COMMAND, *arguments], cwd=folder, stdout=subprocess.DEVNULL,
                                   stderr=subprocess.DEVNULL) as process:

@@ -8,7 +8,6 @@
 #include <cstdio>
 #include <cstdlib>
 #include <numbers>
-#include <string>
 
 #include "risley/recordings/reader.hpp"
 

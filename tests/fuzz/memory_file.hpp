@@ -35,17 +35,4 @@ class MemoryFile {
   int descriptor_;
 };
 
-/// A folder in memory for files that are written, empty at first and removed at the end.
-class MemoryFolder {
- public:
-  MemoryFolder();
-  ~MemoryFolder();
-  MemoryFolder(const MemoryFolder&) = delete;
-  MemoryFolder& operator=(const MemoryFolder&) = delete;
-  std::string file(const std::string& name) const { return path_ + "/" + name; }
-
- private:
-  std::string path_;
-};
-
 }  // namespace risley::fuzz

@@ -15,8 +15,8 @@
 #include "risley/recordings/writer.hpp"
 
 #include "fuzz/invariants.hpp"
-#include "fuzz/memory_file.hpp"
 #include "fuzz/targets.hpp"
+#include "io/temporary_folder.hpp"
 
 namespace risley::fuzz {
 namespace {
@@ -139,12 +139,18 @@ void change(const std::string& path, Numbers& numbers) {
   nc_close(file);
 }
 
-void run_recording(std::span<const std::uint8_t> bytes) {
-  static const MemoryFolder folder;
-  const std::string path = folder.file("recording.nc");
-  write_recording(path);
+/// A file that was written and then changed as the bytes say.
+std::string changed_file(void (*write)(const std::string&), std::span<const std::uint8_t> bytes) {
+  static const io::TemporaryFolder folder;
+  const std::string path = folder.file("changed.nc");
+  write(path);
   Numbers numbers(bytes);
   change(path, numbers);
+  return path;
+}
+
+void run_recording(std::span<const std::uint8_t> bytes) {
+  const std::string path = changed_file(write_recording, bytes);
   std::uint64_t rows = 0;
   try {
     const auto reader = recordings::open_recording(path);
@@ -160,11 +166,7 @@ void run_recording(std::span<const std::uint8_t> bytes) {
 }
 
 void run_truth(std::span<const std::uint8_t> bytes) {
-  static const MemoryFolder folder;
-  const std::string path = folder.file("truth.nc");
-  write_truth(path);
-  Numbers numbers(bytes);
-  change(path, numbers);
+  const std::string path = changed_file(write_truth, bytes);
   try {
     const recordings::TruthColumns rows = recordings::load_truth(path);
     recordings::require_columns(rows, rows.prisms());

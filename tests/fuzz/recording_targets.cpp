@@ -13,6 +13,7 @@
 #include "fuzz/invariants.hpp"
 #include "fuzz/memory_file.hpp"
 #include "fuzz/targets.hpp"
+#include "io/temporary_folder.hpp"
 #include "recordings/formats/format.hpp"
 
 namespace risley::fuzz {
@@ -45,7 +46,7 @@ bool read_all(Reader& reader, std::uint64_t most_rows, std::vector<Chunk>* chunk
 /// Rows that a writer of the format was given are those that its file has.
 void write_and_read(const Format& format, const recordings::RecordingHeader& header,
                     const std::vector<Chunk>& chunks) {
-  static const MemoryFolder folder;
+  static const io::TemporaryFolder folder;
   const std::string path = folder.file("again" + std::string(format.ending));
   std::uint64_t written = 0;
   try {
