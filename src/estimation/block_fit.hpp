@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "risley/core/angle.hpp"
 #include "risley/estimation/angle_series.hpp"
 #include "risley/estimation/initialisation.hpp"
 #include "risley/estimation/normal_equations.hpp"
@@ -25,6 +26,16 @@ struct RotorState {
   KnotVector<Eigen::Dynamic> mean;
   KnotSquare<Eigen::Dynamic> covariance;
 };
+
+/// A state as a start of other rotors.
+inline void set_rotors(Start& start, const RotorState& state) {
+  start.time_ns = state.time_ns;
+  for (std::size_t k = 0; k < start.rotation_angle.size(); ++k) {
+    const auto at = static_cast<Eigen::Index>(3 * k);
+    start.rotation_angle[k] = wrap_to_pi(state.mean[at]);
+    start.angular_velocity[k] = state.mean[at + 1];
+  }
+}
 
 /// How far one shot is from the next, typically, rad: the beam's leaning times what the fastest
 /// rotor turns.

@@ -14,7 +14,6 @@
 #include "risley/core/error.hpp"
 #include "risley/core/require.hpp"
 #include "risley/estimation/diagnostics.hpp"
-#include "risley/estimation/free_parameters.hpp"
 #include "risley/estimation/initialisation.hpp"
 #include "risley/estimation/sensor_recognition.hpp"
 #include "risley/optics/observation_model.hpp"
@@ -247,16 +246,6 @@ std::vector<std::size_t> fullest_packets(const PacketShots& shots, const PacketF
                    [&](std::size_t a, std::size_t b) { return fitter.size(a) > fitter.size(b); });
   if (result.size() > kMost) result.resize(kMost);
   return result;
-}
-
-/// A state as a start of other rotors.
-void set_rotors(Start& start, const RotorState& state) {
-  start.time_ns = state.time_ns;
-  for (std::size_t k = 0; k < start.rotation_angle.size(); ++k) {
-    const auto at = static_cast<Eigen::Index>(3 * k);
-    start.rotation_angle[k] = wrap_to_pi(state.mean[at]);
-    start.angular_velocity[k] = state.mean[at + 1];
-  }
 }
 
 /// The order of the emitters and the mirror image that the fullest packets fit.

@@ -654,8 +654,42 @@ std::optional<Start> coarse_start(NumberedShots& shots, ShotRange range,
   return best;
 }
 
+/// Missing shots before each valid shot of a stretch, against the one of its start.
+class Lags {
+ public:
+  Lags(const std::vector<FoundSlip>& slips, std::size_t anchor) : slips_(slips) {
+    for (const FoundSlip& slip : slips) {
+      if (slip.after <= anchor) first_ -= slip.shots;
+    }
+  }
+  std::int64_t of(std::size_t shot) const {
+    std::int64_t lag = first_;
+    for (const FoundSlip& slip : slips_) {
+      if (slip.after <= shot) lag += slip.shots;
+    }
+    return lag;
+  }
+  std::int64_t first() const { return first_; }
+
+ private:
+  const std::vector<FoundSlip>& slips_;
+  std::int64_t first_ = 0;
+};
+
+/// Fits the optics again to the mended shots about an anchor. @return whether that went well
 bool refit(const NumberedShots& shots, Anchor& anchor, const Followed& followed,
-           const sensors::Sensor& sensor, Priors priors);
+           const sensors::Sensor& sensor, Priors priors) {
+  const Lags lags(followed.slips, anchor.shot);
+  const std::size_t begin =
+      std::max(followed.begin, anchor.shot - std::min(anchor.shot, kFittedShots / 2));
+  const std::size_t end = std::min(followed.end, anchor.shot + kFittedShots / 2);
+  AngleSeries mended;
+  for (std::size_t i = begin; i < end; ++i) shots.append_to(mended, i, lags.of(i));
+  const std::optional<Start> fitted = fit_optics(mended, anchor.start, sensor, priors);
+  if (!fitted || !(fitted->residual_rms < 3.0 * followed.residual_rms)) return false;
+  anchor.start = *fitted;
+  return true;
+}
 
 /// Short windows about a start, each fitted alone, best first: a slip within it spoils a window.
 std::vector<Anchor> find_anchors(NumberedShots& shots, ShotRange range, const Start& start,
@@ -695,12 +729,7 @@ std::vector<Anchor> find_anchors(NumberedShots& shots, ShotRange range, const St
                       window.rows.size());
     window.anchor.start = start;
     window.anchor.start.residual_rms = follower.settle(state, radians_from_degrees(3.0));
-    window.anchor.start.time_ns = state.time_ns;
-    for (std::size_t k = 0; k < start.rotation_angle.size(); ++k) {
-      const auto at = static_cast<Eigen::Index>(3 * k);
-      window.anchor.start.rotation_angle[k] = wrap_to_pi(state.mean[at]);
-      window.anchor.start.angular_velocity[k] = state.mean[at + 1];
-    }
+    set_rotors(window.anchor.start, state);
     window.anchor.shot =
         std::min(shots_within(shots, range, 0,
                               1e-9 * static_cast<double>(state.time_ns) -
@@ -728,28 +757,6 @@ std::vector<Anchor> find_anchors(NumberedShots& shots, ShotRange range, const St
   for (Window& window : fitted) anchors.push_back(std::move(window.anchor));
   return anchors;
 }
-
-/// Missing shots before each valid shot of a stretch, against the one of its start.
-class Lags {
- public:
-  Lags(const std::vector<FoundSlip>& slips, std::size_t anchor) : slips_(slips) {
-    for (const FoundSlip& slip : slips) {
-      if (slip.after <= anchor) first_ -= slip.shots;
-    }
-  }
-  std::int64_t of(std::size_t shot) const {
-    std::int64_t lag = first_;
-    for (const FoundSlip& slip : slips_) {
-      if (slip.after <= shot) lag += slip.shots;
-    }
-    return lag;
-  }
-  std::int64_t first() const { return first_; }
-
- private:
-  const std::vector<FoundSlip>& slips_;
-  std::int64_t first_ = 0;
-};
 
 /// Follows the rotors from an anchor to both ends of a stretch, or as far as they can be followed.
 Followed follow(const NumberedShots& shots, const Anchor& anchor, ShotRange range) {
@@ -800,21 +807,6 @@ bool same_slips(const std::vector<FoundSlip>& a, const std::vector<FoundSlip>& b
                     [](const FoundSlip& one, const FoundSlip& other) {
                       return one.after == other.after && one.shots == other.shots;
                     });
-}
-
-/// Fits the optics again to the mended shots about an anchor. @return whether that went well
-bool refit(const NumberedShots& shots, Anchor& anchor, const Followed& followed,
-           const sensors::Sensor& sensor, Priors priors) {
-  const Lags lags(followed.slips, anchor.shot);
-  const std::size_t begin =
-      std::max(followed.begin, anchor.shot - std::min(anchor.shot, kFittedShots / 2));
-  const std::size_t end = std::min(followed.end, anchor.shot + kFittedShots / 2);
-  AngleSeries mended;
-  for (std::size_t i = begin; i < end; ++i) shots.append_to(mended, i, lags.of(i));
-  const std::optional<Start> fitted = fit_optics(mended, anchor.start, sensor, priors);
-  if (!fitted || !(fitted->residual_rms < 3.0 * followed.residual_rms)) return false;
-  anchor.start = *fitted;
-  return true;
 }
 
 /// A stretch that was followed, with what is needed to join it to others.

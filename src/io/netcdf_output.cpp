@@ -52,9 +52,7 @@ class NetcdfOutput::File {
     if (nc_sync(*id_) != NC_NOERR) {
       std::filesystem::resize_file(output_.temporary_path(), 0, ignored);
     }
-    const hid_t last = another_handle(output_.temporary_path());
-    nc_close(*id_);
-    if (last >= 0) H5Fclose(last);
+    close_library();
   }
   File(const File&) = delete;
   File& operator=(const File&) = delete;
@@ -94,17 +92,20 @@ class NetcdfOutput::File {
       const NetcdfLock lock;
       // What a full disk refuses is refused now, when the destructor can still help.
       check(nc_sync(id()), "");
-      const hid_t last = another_handle(output_.temporary_path());
-      const int status = nc_close(id());
-      id_.reset();
-      const bool closed = last < 0 || H5Fclose(last) >= 0;
-      check(status, "");
-      if (!closed) check(NC_EHDFERR, "");
+      check(close_library(), "");
     }
     if (own_) own_->commit();
   }
 
  private:
+  /// @return the library's status
+  int close_library() {
+    const hid_t last = another_handle(output_.temporary_path());
+    const int status = nc_close(id());
+    id_.reset();
+    const bool closed = last < 0 || H5Fclose(last) >= 0;
+    return status == NC_NOERR && !closed ? NC_EHDFERR : status;
+  }
   void create() {
     const NetcdfLock lock;
     int id = 0;

@@ -535,7 +535,14 @@
     // A window that is not shown yet has no room, and diagrams cannot be made without any.
     const figures = data.map(({ id }) => document.getElementById(id).parentElement);
     const hasRoom = () => figures.some((figure) => figure.clientWidth > leastWidth);
-    while (figures.length > 0 && !hasRoom()) await new Promise((done) => setTimeout(done, 20));
+    if (figures.length > 0 && !hasRoom()) await new Promise((done) => {
+      const watch = new ResizeObserver(() => {
+        if (!hasRoom()) return;
+        watch.disconnect();
+        done();
+      });
+      watch.observe(main);
+    });
     let pause = performance.now();
     for (const one of data) {
       const entry = one.kind === 'space' ? makeOrSay(one) : make(one);
