@@ -32,6 +32,10 @@ constexpr double kFewestCoarseShots = 10000.0;
 /// is of second order.
 constexpr double kSmallStep = 0.1;
 constexpr int kMostFullPasses = 8;
+/// Where there are more than this many shots to one of the coarse pass, a step with this share of
+/// them comes between: near the optical axis angles are far from linear in what the coarse pass
+/// does not tell, and a further pass over all shots would cost more.
+constexpr double kStrongThinning = 16.0, kSomeShots = 0.25;
 /// Residual scatter above the stated one by this share enlarges the covariance.
 constexpr double kSignificantExcess = 1.02;
 
@@ -69,6 +73,7 @@ class Iteration {
   }
 
   ShotWeights& weights() { return weights_; }
+  const ShotWeights& weights() const { return weights_; }
   const AngleSeries& series() const { return constants_.frame_is_free() ? turned_ : recorded_; }
   const PrismTrain& train() const { return train_; }
   const Eigen::Matrix3d& frame() const { return frame_; }
@@ -350,12 +355,30 @@ Solution run_batch_map(const AngleSeries& series, const Start& start, const sens
   }
   progress.report(0.4);
 
-  // All shots: the same stretches, starting where the coarse pass ended.
-  Iteration full(series, options, constants, sensor.train, coarse.train(),
-                 make_knots(series, used, prisms, options.knot_interval), coarse.frame());
-  interpolate(coarse.knots(), full.knots());
-  full.weights().angle_noise = coarse.weights().angle_noise;
-  full.weights().cut = options.outlier_chi2 * level * level;
+  // Some of the shots, and then all: the same stretches, starting where the pass before ended.
+  const auto go_on = [&](const Iteration& from, const AngleSeries& shots,
+                         const std::vector<ShotRange>& ranges) {
+    Iteration next(shots, options, constants, sensor.train, from.train(),
+                   make_knots(shots, ranges, prisms, options.knot_interval), from.frame());
+    interpolate(from.knots(), next.knots());
+    next.weights().angle_noise = from.weights().angle_noise;
+    next.weights().cut = options.outlier_chi2 * level * level;
+    return next;
+  };
+  const auto go_on_with_all = [&] {
+    const double thinning =
+        static_cast<double>(series.size()) / static_cast<double>(coarse_series.size());
+    if (thinning < kStrongThinning) return go_on(coarse, series, used);
+    std::vector<ShotRange> ranges = used;
+    const AngleSeries some =
+        thinned(series, coarse_rate(series, all_stretches) * thinning * kSomeShots, ranges);
+    Iteration middle = go_on(coarse, some, ranges);
+    middle.evaluate();
+    level = middle.level();
+    middle.move(middle.solve(process, false));
+    return go_on(middle, series, used);
+  };
+  Iteration full = go_on_with_all();
   const bool noise_is_held = options.angle_noise.has_value();
   double used_share = 0;
   for (int pass = 0; pass < kMostFullPasses; ++pass) {
@@ -384,19 +407,20 @@ Solution run_batch_map(const AngleSeries& series, const Start& start, const sens
     if (choose && pass == 0) process = likeliest_process(full.equations(), full.knots());
     // The first step goes from what the thinned shots tell to what all tell, the second should be
     // one of rounding.
-    SmootherSolution solution = full.solve(process, pass > 0);
-    if (pass > 0) {
-      const std::size_t angles = 2 * (full.equations().shots - full.equations().outliers);
-      used_share = std::clamp(used_observations(full.equations(), solution) /
-                                  static_cast<double>(std::max<std::size_t>(1, angles)),
-                              0.0, 0.9);
-    }
+    SmootherSolution solution = full.solve(process, true);
+    const std::size_t angles = 2 * (full.equations().shots - full.equations().outliers);
+    const double counted_share = std::exchange(
+        used_share, std::clamp(used_observations(full.equations(), solution) /
+                                   static_cast<double>(std::max<std::size_t>(1, angles)),
+                               0.0, 0.9));
     moved = full.move(solution);
     ++result.iterations;
     progress.report(0.4 + 0.6 * (pass + 1) / kMostFullPasses);
-    // Two passes know how much the estimate used up; where that is much, noise needs a third.
+    // The noise was found with what the pass before used up; where that was another share, a third
+    // pass is needed.
     const bool goes_on =
-        moved > kSmallStep || !noise_is_found || (pass < 2 && !noise_is_held && used_share > 1e-3);
+        moved > kSmallStep || !noise_is_found ||
+        (pass < 2 && !noise_is_held && std::abs(used_share - counted_share) > 1e-3);
     if (pass == 0 || (goes_on && pass + 1 < kMostFullPasses)) continue;
     result.settled = moved <= kSmallStep;
     const Eigen::Index n = constants.count();

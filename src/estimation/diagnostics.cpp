@@ -7,6 +7,8 @@
 #include <limits>
 #include <utility>
 
+#include <Eigen/Core>
+
 #include "risley/core/angle.hpp"
 #include "risley/core/require.hpp"
 #include "risley/estimation/angle_series.hpp"
@@ -126,11 +128,14 @@ Autocorrelation autocorrelation(std::span<const std::int64_t> time_ns,
     for (std::size_t lag = first; lag < first + group; ++lag) {
       double products = 0, pairs = 0;
       for (const Block& block : blocks) {
-        for (std::size_t i = 0; i + lag < block.azimuth.size(); ++i) {
-          products +=
-              block.azimuth[i] * block.azimuth[i + lag] + block.zenith[i] * block.zenith[i + lag];
-          pairs += block.weight[i] * block.weight[i + lag];
-        }
+        if (block.azimuth.size() <= lag) continue;
+        const auto shared = static_cast<Eigen::Index>(block.azimuth.size() - lag);
+        const auto product = [&](const std::vector<double>& column) {
+          return Eigen::VectorXd::Map(column.data(), shared)
+              .dot(Eigen::VectorXd::Map(column.data() + lag, shared));
+        };
+        products += product(block.azimuth) + product(block.zenith);
+        pairs += product(block.weight);
       }
       fewest_pairs = std::min(fewest_pairs, pairs);
       rho.push_back(pairs > 0 ? products / pairs / variance : 0.0);

@@ -21,17 +21,25 @@ Batch wrapped(const Batch& angle) { return angle - kTurn * xsimd::nearbyint(angl
 
 double wrapped(double angle) { return angle - kTurn * __builtin_nearbyint(angle / kTurn); }
 
+/// Up to kLanes shots of one emitter.
+struct Shots {
+  std::size_t first, count;
+  const std::uint32_t* places;  ///< behind first, or nullptr: neighbours
+
+  std::size_t operator[](std::size_t lane) const {
+    return first + (places == nullptr ? lane : places[lane]);
+  }
+};
+
 /// One group of shots of a knot, a lane each. Lanes without a shot repeat the last one.
 struct Group {
   Batch time, azimuth, zenith, azimuth_rounding, zenith_rounding;
-  std::size_t count;
 
-  Group(const NormalEquationArguments& a, std::size_t knot, std::size_t first) {
+  Group(const NormalEquationArguments& a, std::size_t knot, const Shots& shots) {
     alignas(64) double lanes[5][kLanes];
-    const std::size_t last = a.last_shot[knot];
     const std::int64_t origin = a.knot_time_ns[knot];
-    if (first + kLanes <= last) {  // the rule, in loops that the compiler can widen
-      count = kLanes;
+    const std::size_t first = shots.first;
+    if (shots.places == nullptr && shots.count == kLanes) {  // loops that the compiler can widen
       for (std::size_t i = 0; i < kLanes; ++i) {
         lanes[0][i] = 1e-9 * static_cast<double>(a.time_ns[first + i] - origin);
       }
@@ -42,9 +50,8 @@ struct Group {
       azimuth = Batch::load_unaligned(a.azimuth + first);
       zenith = Batch::load_unaligned(a.zenith + first);
     } else {
-      count = last - first;
       for (std::size_t i = 0; i < kLanes; ++i) {
-        const std::size_t shot = i < count ? first + i : last - 1;
+        const std::size_t shot = shots[i < shots.count ? i : shots.count - 1];
         lanes[0][i] = 1e-9 * static_cast<double>(a.time_ns[shot] - origin);
         lanes[1][i] = a.azimuth[shot];
         lanes[2][i] = a.zenith[shot];
@@ -58,6 +65,48 @@ struct Group {
     azimuth_rounding = Batch::load_aligned(lanes[3]);
     zenith_rounding = Batch::load_aligned(lanes[4]);
   }
+};
+
+/// The shots of a knot, emitter by emitter: what one emitter's shots do not depend on need not be
+/// summed for them.
+class ShotOrder {
+ public:
+  static constexpr std::size_t kMost = 1024;  ///< shots that are put in order together
+
+  ShotOrder(const std::uint8_t* beam, int emitters) : beam_(beam), emitters_(emitters) {}
+
+  /// @param end  at most kMost behind begin
+  void take(std::size_t begin, std::size_t end) {
+    first_ = begin;
+    if (beam_ == nullptr || emitters_ == 1) {
+      ends_[0] = end - begin;
+      return;
+    }
+    std::size_t next[kMaxEmitters] = {};
+    for (std::size_t shot = begin; shot < end; ++shot) ++next[beam_[shot]];
+    for (std::size_t e = 0, sum = 0; e < static_cast<std::size_t>(emitters_); ++e) {
+      sum += next[e];
+      ends_[e] = sum;
+      next[e] = sum - next[e];
+    }
+    for (std::size_t shot = begin; shot < end; ++shot) {
+      places_[next[beam_[shot]]++] = static_cast<std::uint32_t>(shot - begin);
+    }
+  }
+
+  /// One behind the last place of an emitter; its first is behind those of the one before.
+  std::size_t end(std::size_t emitter) const { return ends_[emitter]; }
+  Shots group(std::size_t place, std::size_t end) const {
+    const std::size_t count = end - place < kLanes ? end - place : kLanes;
+    if (beam_ == nullptr || emitters_ == 1) return {first_ + place, count, nullptr};
+    return {first_, count, places_ + place};
+  }
+
+ private:
+  const std::uint8_t* beam_;
+  int emitters_;
+  std::size_t first_ = 0, ends_[kMaxEmitters] = {};
+  std::uint32_t places_[kMost] = {};
 };
 
 /// Weights of a group's angles. Rounding is mostly the same from shot to shot, and division and
@@ -93,42 +142,64 @@ class Weights {
 template <int N>
 constexpr std::size_t kMostFree = EmitterLanes<Batch, N>::kPlaces;
 
+/// The free parameters that the shots of one emitter depend on.
+template <int N>
+struct OwnParameters {
+  std::size_t count = 0;
+  std::size_t number[kMostFree<N>];   ///< among all free ones, ascending
+  int derivative[kMostFree<N>] = {};  ///< where that by a place stands in a shot's, or -1
+
+  OwnParameters() = default;
+  OwnParameters(const NormalEquationArguments& a, int emitter) {
+    for (int at = 0; at < static_cast<int>(kMostFree<N>); ++at) {
+      const int of = place::emitter(at, N);
+      derivative[at] = of < 0          ? at
+                       : of != emitter ? -1
+                                       : at - place::incident_beam_horizontal(emitter, N) +
+                                             place::incident_beam_horizontal();
+    }
+    for (int j = 0; j < a.free; ++j) {
+      for (int p = a.place_begin[j]; p < a.place_begin[j + 1]; ++p) {
+        if (derivative[a.places[p]] < 0) continue;
+        number[count++] = static_cast<std::size_t>(j);
+        break;
+      }
+    }
+  }
+};
+
 /// One observed angle of a group: residual and derivatives, all divided by its sigma.
 template <int N>
 struct Row {
   Batch residual;
   std::array<Batch, N> angles;
-  std::array<Batch, kMostFree<N>> free;
+  std::array<Batch, kMostFree<N>> free;  ///< by the emitter's own parameters
 };
 
 template <int N>
-void fill_row(const NormalEquationArguments& a, const EmitterLanes<Batch, N>& emitters,
+void fill_row(const NormalEquationArguments& a, const OwnParameters<N>& own,
               const Gradient<Batch, N>& gradient, const Batch& residual, const Batch& scale,
               Row<N>& row) {
-  Batch storage[EmitterLanes<Batch, N>::kPlaces];
-  const Batch* by_place = emitters.by_place(gradient, storage);
   row.residual = scale * residual;
   for (std::size_t k = 0; k < N; ++k) row.angles[k] = scale * gradient.rotation_angles[k];
-  for (int j = 0; j < a.free; ++j) {
+  for (std::size_t i = 0; i < own.count; ++i) {
+    const std::size_t j = own.number[i];
     Batch sum(0.0);
     for (int p = a.place_begin[j]; p < a.place_begin[j + 1]; ++p) {
-      sum = sum + by_place[a.places[p]];
+      const int at = own.derivative[a.places[p]];
+      if (at >= 0) sum = sum + gradient.parameters[static_cast<std::size_t>(at)];
     }
-    row.free[static_cast<std::size_t>(j)] = scale * sum;
+    row.free[i] = scale * sum;
   }
 }
 
 /// Lanes that are not to count become zero in everything that is summed.
 template <int N>
-void clear_lanes(const NormalEquationArguments& a, const xsimd::batch_bool<double>& good,
-                 Row<N>& row) {
+void clear_lanes(std::size_t own, const xsimd::batch_bool<double>& good, Row<N>& row) {
   const Batch zero(0.0);
   row.residual = xsimd::select(good, row.residual, zero);
   for (std::size_t k = 0; k < N; ++k) row.angles[k] = xsimd::select(good, row.angles[k], zero);
-  for (int j = 0; j < a.free; ++j) {
-    const auto i = static_cast<std::size_t>(j);
-    row.free[i] = xsimd::select(good, row.free[i], zero);
-  }
+  for (std::size_t i = 0; i < own; ++i) row.free[i] = xsimd::select(good, row.free[i], zero);
 }
 
 /// Sums over the shots of one knot.
@@ -155,7 +226,8 @@ struct KnotSums {
   }
 
   /// States act on an angle as 1, t and t^2/2.
-  void add(const Row<N>& first, const Row<N>& second, const Batch& time, int free) {
+  void add(const Row<N>& first, const Row<N>& second, const Batch& time,
+           const OwnParameters<N>& own) {
     const Batch half_square = 0.5 * time * time;
     std::size_t pair = 0;
     for (std::size_t k = 0; k < N; ++k) {
@@ -174,9 +246,8 @@ struct KnotSums {
       };
       spread(gradient[k],
              xsimd::fma(first.angles[k], first.residual, second.angles[k] * second.residual), 1);
-      for (int j = 0; j < free; ++j) {
-        const auto i = static_cast<std::size_t>(j);
-        spread(&coupling[k][0][j],
+      for (std::size_t i = 0; i < own.count; ++i) {
+        spread(&coupling[k][0][own.number[i]],
                xsimd::fma(first.angles[k], first.free[i], second.angles[k] * second.free[i]),
                kMostFree<N>);
       }
@@ -206,21 +277,26 @@ template <int N>
 struct StaticSums {
   Batch hessian[kMostFree<N> * (kMostFree<N> + 1) / 2];
   Batch gradient[kMostFree<N>];
+  std::size_t row[kMostFree<N>];  ///< where one of the upper triangle begins, less its number
 
   explicit StaticSums(int free) {
     for (int i = 0; i < free * (free + 1) / 2; ++i) hessian[i] = Batch(0.0);
-    for (int i = 0; i < free; ++i) gradient[i] = Batch(0.0);
+    for (int i = 0; i < free; ++i) {
+      gradient[i] = Batch(0.0);
+      row[i] = static_cast<std::size_t>(i * free - i * (i + 1) / 2);
+    }
   }
 
-  void add(const Row<N>& first, const Row<N>& second, int free) {
-    Batch* entry = hessian;
-    for (int i = 0; i < free; ++i) {
-      const Batch& a = first.free[static_cast<std::size_t>(i)];
-      const Batch& b = second.free[static_cast<std::size_t>(i)];
-      gradient[i] = xsimd::fma(a, first.residual, xsimd::fma(b, second.residual, gradient[i]));
-      for (int j = i; j < free; ++j, ++entry) {
-        *entry = xsimd::fma(a, first.free[static_cast<std::size_t>(j)],
-                            xsimd::fma(b, second.free[static_cast<std::size_t>(j)], *entry));
+  void add(const Row<N>& first, const Row<N>& second, const OwnParameters<N>& own) {
+    for (std::size_t i = 0; i < own.count; ++i) {
+      const Batch& a = first.free[i];
+      const Batch& b = second.free[i];
+      Batch& slope = gradient[own.number[i]];
+      slope = xsimd::fma(a, first.residual, xsimd::fma(b, second.residual, slope));
+      Batch* const entries = hessian + row[own.number[i]];
+      for (std::size_t j = i; j < own.count; ++j) {
+        Batch& entry = entries[own.number[j]];
+        entry = xsimd::fma(a, first.free[j], xsimd::fma(b, second.free[j], entry));
       }
     }
   }
@@ -233,6 +309,10 @@ NormalEquationCounts accumulate_knots(const NormalEquationArguments& a) {
   std::array<FaceOrder, N> order;
   __builtin_memcpy(&order, a.face_order, sizeof(order));
   EmitterLanes<Batch, N> emitters(a.parameters, a.emitters, a.beam);
+  ShotOrder shots_by_emitter(a.beam, a.emitters);
+  const auto firing = static_cast<std::size_t>(a.beam == nullptr ? 1 : a.emitters);
+  OwnParameters<N> owns[kMaxEmitters];
+  for (std::size_t e = 0; e < firing; ++e) owns[e] = OwnParameters<N>(a, static_cast<int>(e));
   auto train = prepare<Batch, N>(parameters, order);
   auto derivatives = prepare_derivatives<Batch, N>(parameters, order);
 
@@ -245,73 +325,86 @@ NormalEquationCounts accumulate_knots(const NormalEquationArguments& a) {
   Weights weights(a.azimuth_noise_variance, a.zenith_noise_variance);
   // A shot that is out costs as much as one can.
   const Batch lost(a.softening * a.cut > 1.0 ? 1.0 / a.softening : a.cut);
-  for (std::size_t knot = a.knot_begin; knot < a.knot_end; ++knot) {
+  std::size_t knot = 0;
+  std::array<Batch, N> angle, speed, half_acceleration;
+  const auto add_group = [&](const Shots& shots, const OwnParameters<N>& own) {
+    const Group group(a, knot, shots);
+    std::array<Batch, N> angles;
+    for (std::size_t k = 0; k < N; ++k) {
+      angles[k] =
+          xsimd::fma(group.time, xsimd::fma(group.time, half_acceleration[k], speed[k]), angle[k]);
+    }
+    auto modelled = linearise_angles(train, derivatives, angles);
+    if (a.turned) add_turn_derivatives(modelled);
+    const Batch azimuth_residual = wrapped(group.azimuth - modelled.angles.azimuth);
+    const Batch zenith_residual = group.zenith - modelled.angles.zenith;
+    weights.set(group);
+    const Batch normalised_azimuth = weights.azimuth_root * azimuth_residual;
+    const Batch normalised_zenith = weights.zenith_root * zenith_residual;
+    const Batch chi2 =
+        xsimd::fma(normalised_azimuth, normalised_azimuth, normalised_zenith * normalised_zenith);
+    const Batch share = a.softening > 0 ? one / (one + a.softening * chi2) : one;
+    fill_row(a, own, modelled.azimuth, azimuth_residual, share * weights.azimuth_root, azimuth_row);
+    fill_row(a, own, modelled.zenith, zenith_residual, share * weights.zenith_root, zenith_row);
+    // Comparison with NaN is false: a beam that does not get through counts as an outlier.
+    auto good = chi2 <= Batch(a.cut);
+    Batch loss = xsimd::select(good, chi2 * share, lost);
+    if (shots.count < kLanes || !xsimd::all(good)) {
+      alignas(64) double number[kLanes];
+      for (std::size_t i = 0; i < kLanes; ++i) number[i] = static_cast<double>(i);
+      const auto present = Batch::load_aligned(number) < Batch(static_cast<double>(shots.count));
+      loss = xsimd::select(present, loss, Batch(0.0));
+      good = good & present;
+      clear_lanes(own.count, good, azimuth_row);
+      clear_lanes(own.count, good, zenith_row);
+      alignas(64) double counted[kLanes];
+      xsimd::select(good, one, Batch(0.0)).store_aligned(counted);
+      for (std::size_t i = 0; i < shots.count; ++i) {
+        const bool out = counted[i] == 0.0;
+        counts.outliers += out;
+        if (a.outlier) a.outlier[shots[i]] = out;
+      }
+    } else if (a.outlier) {
+      for (std::size_t i = 0; i < kLanes; ++i) a.outlier[shots[i]] = 0;
+    }
+    cost = cost + loss;
+    sums.add(azimuth_row, zenith_row, group.time, own);
+    statics.add(azimuth_row, zenith_row, own);
+    if (a.azimuth_residual && shots.places == nullptr && shots.count == kLanes) {
+      azimuth_residual.store_unaligned(a.azimuth_residual + shots.first);
+      zenith_residual.store_unaligned(a.zenith_residual + shots.first);
+    } else if (a.azimuth_residual) {
+      alignas(64) double azimuths[kLanes], zeniths[kLanes];
+      azimuth_residual.store_aligned(azimuths);
+      zenith_residual.store_aligned(zeniths);
+      for (std::size_t i = 0; i < shots.count; ++i) {
+        a.azimuth_residual[shots[i]] = azimuths[i];
+        a.zenith_residual[shots[i]] = zeniths[i];
+      }
+    }
+  };
+  for (knot = a.knot_begin; knot < a.knot_end; ++knot) {
     sums.clear(a.free);
-    std::array<Batch, N> angle, speed, half_acceleration;
     for (std::size_t k = 0; k < N; ++k) {
       const double* state = a.state + (knot * N + k) * kRotorStates;
       angle[k] = Batch(wrapped(state[0]));
       speed[k] = Batch(state[1]);
       half_acceleration[k] = Batch(0.5 * state[2]);
     }
-    for (std::size_t shot = a.first_shot[knot]; shot < a.last_shot[knot]; shot += kLanes) {
-      const Group group(a, knot, shot);
-      std::array<Batch, N> angles;
-      for (std::size_t k = 0; k < N; ++k) {
-        angles[k] = xsimd::fma(group.time, xsimd::fma(group.time, half_acceleration[k], speed[k]),
-                               angle[k]);
-      }
-      emitters.select(shot, a.last_shot[knot]);
-      emitters.apply(train);
-      emitters.apply(derivatives);
-      auto shots = linearise_angles(train, derivatives, angles);
-      if (a.turned) add_turn_derivatives(shots);
-      const Batch azimuth_residual = wrapped(group.azimuth - shots.angles.azimuth);
-      const Batch zenith_residual = group.zenith - shots.angles.zenith;
-      weights.set(group);
-      const Batch normalised_azimuth = weights.azimuth_root * azimuth_residual;
-      const Batch normalised_zenith = weights.zenith_root * zenith_residual;
-      const Batch chi2 =
-          xsimd::fma(normalised_azimuth, normalised_azimuth, normalised_zenith * normalised_zenith);
-      const Batch share = a.softening > 0 ? one / (one + a.softening * chi2) : one;
-      fill_row(a, emitters, shots.azimuth, azimuth_residual, share * weights.azimuth_root,
-               azimuth_row);
-      fill_row(a, emitters, shots.zenith, zenith_residual, share * weights.zenith_root, zenith_row);
-      // Comparison with NaN is false: a beam that does not get through counts as an outlier.
-      auto good = chi2 <= Batch(a.cut);
-      Batch loss = xsimd::select(good, chi2 * share, lost);
-      if (group.count < kLanes || !xsimd::all(good)) {
-        alignas(64) double number[kLanes];
-        for (std::size_t i = 0; i < kLanes; ++i) number[i] = static_cast<double>(i);
-        const auto present = Batch::load_aligned(number) < Batch(static_cast<double>(group.count));
-        loss = xsimd::select(present, loss, Batch(0.0));
-        good = good & present;
-        clear_lanes(a, good, azimuth_row);
-        clear_lanes(a, good, zenith_row);
-        alignas(64) double counted[kLanes];
-        xsimd::select(good, one, Batch(0.0)).store_aligned(counted);
-        for (std::size_t i = 0; i < group.count; ++i) {
-          const bool out = counted[i] == 0.0;
-          counts.outliers += out;
-          if (a.outlier) a.outlier[shot + i] = out;
+    for (std::size_t begin = a.first_shot[knot], end = begin; begin < a.last_shot[knot];
+         begin = end) {
+      end = begin + ShotOrder::kMost < a.last_shot[knot] ? begin + ShotOrder::kMost
+                                                         : a.last_shot[knot];
+      shots_by_emitter.take(begin, end);
+      for (std::size_t e = 0, place = 0; e < firing; ++e) {
+        if (place == shots_by_emitter.end(e)) continue;
+        emitters.select(e);
+        emitters.apply(train);
+        emitters.apply(derivatives);
+        for (; place < shots_by_emitter.end(e); place += kLanes) {
+          add_group(shots_by_emitter.group(place, shots_by_emitter.end(e)), owns[e]);
         }
-      } else if (a.outlier) {
-        for (std::size_t i = 0; i < kLanes; ++i) a.outlier[shot + i] = 0;
-      }
-      cost = cost + loss;
-      sums.add(azimuth_row, zenith_row, group.time, a.free);
-      statics.add(azimuth_row, zenith_row, a.free);
-      if (a.azimuth_residual && group.count == kLanes) {
-        azimuth_residual.store_unaligned(a.azimuth_residual + shot);
-        zenith_residual.store_unaligned(a.zenith_residual + shot);
-      } else if (a.azimuth_residual) {
-        alignas(64) double azimuths[kLanes], zeniths[kLanes];
-        azimuth_residual.store_aligned(azimuths);
-        zenith_residual.store_aligned(zeniths);
-        for (std::size_t i = 0; i < group.count; ++i) {
-          a.azimuth_residual[shot + i] = azimuths[i];
-          a.zenith_residual[shot + i] = zeniths[i];
-        }
+        place = shots_by_emitter.end(e);
       }
     }
     sums.store(a, knot);

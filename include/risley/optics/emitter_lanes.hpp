@@ -48,6 +48,12 @@ class EmitterLanes {
     number_ = Batch::load_aligned(lanes);
   }
 
+  /// Turns to shots of one emitter.
+  void select(std::size_t emitter) {
+    for (std::size_t& index : index_) index = emitter;
+    number_ = Batch(static_cast<double>(emitter));
+  }
+
   /// Puts the selected shots' beams into a train.
   void apply(PreparedTrain<Batch, N>& train) const {
     if (several()) train.incident = vector(0);

@@ -35,11 +35,10 @@ struct PreparedDerivatives {
   struct Face {
     TurningVector<T> tilt_horizontal, tilt_vertical, bearing_horizontal, bearing_vertical;
     T wedge_sign;
+    T ratio_by_glass, ratio_by_air;  ///< d index ratio / d refractive indices
   };
   Vector3<T> incident_horizontal, incident_vertical;  ///< of the emitter that fires
   std::array<Face, 2 * N> faces;
-  T air;
-  std::array<T, N> glass;
 };
 
 /// @copydoc prepare
@@ -52,10 +51,10 @@ PreparedDerivatives<T, N> prepare_derivatives(const std::array<T, parameter_coun
   const T& beam_v = p(place::incident_beam_vertical());
   d.incident_horizontal = leaning_horizontal_rate(beam_h, beam_v);
   d.incident_vertical = leaning_vertical_rate(beam_h, beam_v);
-  d.air = p(place::refractive_index_air());
+  const T& air = p(place::refractive_index_air());
   for (int prism = 0; prism < N; ++prism) {
     const bool last = prism == N - 1;
-    d.glass[static_cast<std::size_t>(prism)] = p(place::refractive_index(prism));
+    const T& glass = p(place::refractive_index(prism));
     const T bearing_h = last ? T(0.0) : p(place::bearing_tilt_horizontal(prism));
     const T bearing_v = last ? T(0.0) : p(place::bearing_tilt_vertical(prism));
     const Vector3<T> axis = leaning_direction(bearing_h, bearing_v);
@@ -75,6 +74,9 @@ PreparedDerivatives<T, N> prepare_derivatives(const std::array<T, parameter_coun
       const Vector3<T> still{T(0.0), T(0.0), T(0.0)};
       auto& face = d.faces[static_cast<std::size_t>(2 * prism + side)];
       face.wedge_sign = sign;
+      // Ratios: air / glass into the prism, glass / air out of it.
+      face.ratio_by_glass = side == 0 ? -air / (glass * glass) : T(1.0) / air;
+      face.ratio_by_air = side == 0 ? T(1.0) / glass : -glass / (air * air);
       face.tilt_horizontal = moved(leaning_horizontal_rate(h, v), still);
       face.tilt_vertical = moved(leaning_vertical_rate(h, v), still);
       face.bearing_horizontal =
@@ -149,9 +151,6 @@ std::array<Gradient<T, N>, Results> trace_adjoint(const PreparedTrain<T, N>& tra
     const bool last = prism == N - 1;
     const T& sine = forward.sine[k];
     const T& cosine = forward.cosine[k];
-    const T& glass = d.glass[k];
-    const T over_glass = T(1.0) / glass;
-    const T over_air = T(1.0) / d.air;
     for (Gradient<T, N>& gradient : gradients) {
       gradient.rotation_angles[k] = T(0.0);
       for (int i = 3 + 6 * prism; i < 9 + 6 * prism; ++i) {
@@ -191,14 +190,8 @@ std::array<Gradient<T, N>, Results> trace_adjoint(const PreparedTrain<T, N>& tra
           add(place::bearing_tilt_horizontal(prism), dot(normal_bar, bearing_horizontal));
           add(place::bearing_tilt_vertical(prism), dot(normal_bar, bearing_vertical));
         }
-        // Ratios: air / glass into the prism, glass / air out of it.
-        if (side == 0) {
-          add(place::refractive_index(prism), -ratio_bar * d.air * over_glass * over_glass);
-          air_bar[r] = air_bar[r] + ratio_bar * over_glass;
-        } else {
-          add(place::refractive_index(prism), ratio_bar * over_air);
-          air_bar[r] = air_bar[r] - ratio_bar * glass * over_air * over_air;
-        }
+        add(place::refractive_index(prism), ratio_bar * face.ratio_by_glass);
+        air_bar[r] = air_bar[r] + ratio_bar * face.ratio_by_air;
       }
     }
   }
