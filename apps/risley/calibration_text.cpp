@@ -83,7 +83,8 @@ Json calibration_json(const CalibratedRecordings& outcome, double total_time) {
     const auto at = static_cast<Eigen::Index>(j);
     parameters[c.free[j].name] = {
         {"value", in_file_unit(c.free[j].name, c.parameters[at], shape)},
-        {"sigma",
+        {"sigma", finite_or_null(in_file_unit(c.free[j].name, c.total_sigma(j), shape))},
+        {"sigma_given_held",
          finite_or_null(in_file_unit(c.free[j].name, std::sqrt(c.covariance(at, at)), shape))}};
   }
   for (const calibration::CalibratedPlane& plane : c.planes) {
@@ -138,7 +139,10 @@ Json calibration_json(const CalibratedRecordings& outcome, double total_time) {
       {"observations", outcome.observations},
       {"points", c.points},
       {"parameters", parameters},
-      {"range_offset_m", {{"value", c.range_offset}, {"sigma", c.range_offset_sigma}}},
+      {"range_offset_m",
+       {{"value", c.range_offset},
+        {"sigma", c.range_offset_total_sigma()},
+        {"sigma_given_held", c.range_offset_sigma}}},
       {"planes", planes},
       {"steps", steps},
       {"datum", datum_json(c.datum_kind, c.datum)},
@@ -175,7 +179,9 @@ void print_calibration(const CalibratedRecordings& outcome) {
       "angles {:.2f} s, solved {:.2f} s\n\n",
       grouped(c.points), c.planes.size(), 1e3 * c.rms_before, 1e3 * c.rms_after,
       outcome.reading_time, outcome.angles_time, outcome.solving_time);
+  const bool any_held = c.held_changes.cols() > 0;
   std::vector<std::string> head = {"parameter", "value", "+- sigma", "unit", "before"};
+  if (any_held) head.insert(head.begin() + 3, "given held");
   if (outcome.truth) head.insert(head.end(), {"truth", "error/sigma"});
   Table table(head);
   for (std::size_t j = 0; j < c.free.size(); ++j) {
@@ -184,20 +190,28 @@ void print_calibration(const CalibratedRecordings& outcome) {
     const double sigma = in_file_unit(name, std::sqrt(c.covariance(at, at)), shape);
     const double value = in_file_unit(name, c.parameters[at], shape);
     const report::NumberText text = report::number_text(value, sigma);
-    std::vector<std::string> row = {
-        name, text.value, text.sigma, find_parameter(name, shape).unit,
-        report::text_to_place_of(in_file_unit(name, c.believed.get(name), shape), sigma)};
+    const double total_sigma = in_file_unit(name, c.total_sigma(j), shape);
+    std::vector<std::string> row = {name, text.value,
+                                    report::number_text(value, total_sigma).sigma};
+    if (any_held) row.push_back(text.sigma);
+    row.push_back(find_parameter(name, shape).unit);
+    row.push_back(report::text_to_place_of(in_file_unit(name, c.believed.get(name), shape), sigma));
     if (outcome.truth) {
       const double truth = in_file_unit(name, outcome.truth->truth.get(name), shape);
       row.push_back(report::text_to_place_of(truth, sigma));
-      row.push_back(fmt::format("{:.2f}", (value - truth) / sigma));
+      row.push_back(fmt::format("{:.2f}", (value - truth) / total_sigma));
     }
     table.add(row);
   }
   if (c.range_offset_sigma > 0) {
     const report::NumberText text =
         report::number_text(1e3 * c.range_offset, 1e3 * c.range_offset_sigma);
-    table.add({"range offset", text.value, text.sigma, "mm", "0"});
+    std::vector<std::string> row = {
+        "range offset", text.value,
+        report::number_text(1e3 * c.range_offset, 1e3 * c.range_offset_total_sigma()).sigma};
+    if (any_held) row.push_back(text.sigma);
+    row.insert(row.end(), {"mm", "0"});
+    table.add(row);
   }
   table.print();
   say("\n");

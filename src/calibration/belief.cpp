@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: MIT
 #include "calibration/belief.hpp"
 
+#include <algorithm>
+
 #include <fmt/format.h>
 
 #include "risley/algebra/products.hpp"
@@ -32,13 +34,60 @@ void check_same_sensor(const std::vector<RangedRecording>& recordings) {
   }
 }
 
+/// Row of a held parameter, entered where it is new.
+Index row_of(const estimation::FreeParameter& parameter,
+             std::vector<estimation::FreeParameter>& held) {
+  const auto at = std::find_if(held.begin(), held.end(),
+                               [&](const auto& known) { return known.name == parameter.name; });
+  const Index row = at - held.begin();
+  if (at == held.end()) held.push_back(parameter);
+  return row;
+}
+
+/// Errors of held parameters are the same in all recordings: it is one sensor.
+void pool_held(const std::vector<RangedRecording>& recordings, Belief& belief) {
+  const auto n = static_cast<Index>(belief.free.size());
+  std::vector<std::vector<Index>> rows;
+  for (const RangedRecording& recording : recordings) {
+    rows.emplace_back();
+    for (const auto& parameter : recording.held_changes.held) {
+      rows.back().push_back(row_of(parameter, belief.held));
+    }
+  }
+  const auto count = static_cast<Index>(belief.held.size());
+  std::vector<Eigen::MatrixXd> own_changes;
+  belief.held_changes = Eigen::MatrixXd::Zero(n, count);
+  for (std::size_t r = 0; r < recordings.size(); ++r) {
+    const estimation::HeldChanges& of = recordings[r].held_changes;
+    Eigen::MatrixXd& values = own_changes.emplace_back(Eigen::MatrixXd::Zero(n, count));
+    Eigen::MatrixXd& angles = belief.held_angle_changes.emplace_back(
+        Eigen::MatrixXd::Zero(belief.sensor.prisms(), count));
+    for (std::size_t h = 0; h < rows[r].size(); ++h) {
+      values.col(rows[r][h]) = of.values.col(static_cast<Index>(h)).head(n);
+      angles.col(rows[r][h]) = of.mean_angles.col(static_cast<Index>(h));
+    }
+    if (count == 0 || n == 0) continue;
+    // As the means of the values: each recording counts by its information.
+    belief.held_changes +=
+        recordings.size() == 1
+            ? values
+            : algebra::product(
+                  belief.covariance,
+                  algebra::SymmetricSolver(recordings[r].covariance).solve_columns(values));
+  }
+  for (std::size_t r = 0; r < recordings.size() && count > 0 && n > 0; ++r) {
+    belief.held_angle_changes[r] += algebra::product(recordings[r].angle_sensitivity,
+                                                     (belief.held_changes - own_changes[r]).eval());
+  }
+}
+
 }  // namespace
 
 Belief pooled_belief(const std::vector<RangedRecording>& recordings) {
   check_same_sensor(recordings);
   const RangedRecording& first = recordings.front();
   const auto n = static_cast<Index>(first.free.size());
-  Belief belief{first.believed, first.free, first.covariance, {}};
+  Belief belief{first.believed, first.free, first.covariance, {}, {}, {}, {}};
   const auto values = [n](const RangedRecording& recording) {
     Eigen::VectorXd v(n);
     for (Index j = 0; j < n; ++j) {
@@ -81,6 +130,7 @@ Belief pooled_belief(const std::vector<RangedRecording>& recordings) {
         algebra::times(recording.angle_sensitivity, mean - values(recording));
     belief.angle_shift.emplace_back(shift.data(), shift.data() + shift.size());
   }
+  pool_held(recordings, belief);
   return belief;
 }
 

@@ -17,6 +17,11 @@ struct Belief {
   std::vector<estimation::FreeParameter> free;
   Eigen::MatrixXd covariance;                    ///< [free, free], SI units
   std::vector<std::vector<double>> angle_shift;  ///< [recordings][prisms], rad
+  /// What the estimates held and what one sigma of it does to the belief and, that of the belief
+  /// included, to the rotation angles.
+  std::vector<estimation::FreeParameter> held;
+  Eigen::MatrixXd held_changes;                     ///< [free, held], SI
+  std::vector<Eigen::MatrixXd> held_angle_changes;  ///< [recordings] of [prisms, held], rad
 };
 
 /// Mean of the recordings' own estimates, weighted by their information, and how far it moves the

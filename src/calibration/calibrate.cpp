@@ -270,6 +270,7 @@ class Work {
   }
 
   void fill_result(const PlanarSolution& solution);
+  void fill_held(const PlanarSolution& solution);
   void fill_datum(const PlanarSolution& solution);
 
   const std::vector<RangedRecording>& recordings_;
@@ -281,6 +282,7 @@ class Work {
   std::vector<RangedShots> coarse_;      // [recordings], some of them
   std::vector<double> solved_variance_;  // [views] of the last solve, m^2
   PlanarProblem problem_;
+  HeldQuantities held_;
   Calibration result_;
 };
 
@@ -304,6 +306,7 @@ void Work::fill_result(const PlanarSolution& solution) {
     redundancy += solution.redundancy[v];
   }
   result_.sigma0 = std::sqrt(stated / redundancy / kVarianceWithinGate) / range_noise_;
+  fill_held(solution);
   WallThickness walls = wall_thickness(p, belief_.sensor.train, all_);
   result_.planes = std::move(walls.planes);
   result_.profiles = std::move(walls.profiles);
@@ -322,6 +325,61 @@ void Work::fill_result(const PlanarSolution& solution) {
   for (LabelledShots& own : all_) result_.plane_of_shot.push_back(std::move(own.labels.view));
 }
 
+/// The sensor's own computations hold what the estimates of the directions hold, wedges before all:
+/// that moves rotation angles and the indices found with them. The true prisms have those indices
+/// and wedges, and tilts of their own that no wall tells.
+void Work::fill_held(const PlanarSolution& solution) {
+  if (paper() || solution.shots == 0 || !result_.covariance.allFinite()) return;
+  const PlanarProblem& p = solution.problem;
+  const TrainShape shape = p.train.shape();
+  const auto is_free = [&](int at) {
+    return std::any_of(p.free.begin(), p.free.end(), [at](const auto& free) {
+      return std::find(free.places.begin(), free.places.end(), at) != free.places.end();
+    });
+  };
+  const auto moves = [&](int at) { return is_material(at, shape.prisms) && !is_free(at); };
+  std::vector<std::pair<const ParameterInfo*, double>> own;  // tilts and the like, and their sigmas
+  for (const ParameterInfo& info : parameter_list(shape)) {
+    if (info.kind != ParameterKind::train) continue;
+    const sensors::Knowledge* known = options_.sensor.find_knowledge(info.name);
+    if (known == nullptr || known->name != info.name || !(known->sigma > 0)) continue;
+    if (is_material(info.places.front(), shape.prisms)) continue;
+    if (std::any_of(info.places.begin(), info.places.end(), is_free)) continue;
+    own.emplace_back(&info, known->sigma);
+  }
+  const auto believed = static_cast<Eigen::Index>(belief_.held.size());
+  const auto count = believed + static_cast<Eigen::Index>(own.size());
+  if (count == 0) return;
+  HeldQuantities& held = held_;
+  held.train = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(p.train.parameters().size()), count);
+  for (Eigen::Index h = 0; h < believed; ++h) {
+    const estimation::FreeParameter& parameter = belief_.held[static_cast<std::size_t>(h)];
+    result_.held.push_back(parameter.name);
+    for (const int at : parameter.places) {
+      if (moves(at)) held.train(at, h) += parameter.prior_sigma;
+    }
+    for (std::size_t j = 0; j < belief_.free.size(); ++j) {
+      for (const int at : belief_.free[j].places) {
+        if (moves(at)) held.train(at, h) += belief_.held_changes(static_cast<Eigen::Index>(j), h);
+      }
+    }
+  }
+  for (std::size_t i = 0; i < own.size(); ++i) {
+    result_.held.push_back(own[i].first->name);
+    for (const int at : own[i].first->places) {
+      held.train(at, believed + static_cast<Eigen::Index>(i)) = own[i].second;
+    }
+  }
+  for (const Eigen::MatrixXd& angles : belief_.held_angle_changes) {
+    Eigen::MatrixXd& mine =
+        held.rotation_angles.emplace_back(Eigen::MatrixXd::Zero(shape.prisms, count));
+    mine.leftCols(believed) = angles;
+  }
+  HeldResponse response = held_response(p, held);
+  result_.held_changes = std::move(response.parameters);
+  result_.range_offset_held_changes = std::move(response.range_offset);
+}
+
 void Work::fill_datum(const PlanarSolution& solution) {
   const PlanarProblem& p = solution.problem;
   std::vector<std::vector<double>> beams(static_cast<std::size_t>(p.train.prisms()));
@@ -335,12 +393,38 @@ void Work::fill_datum(const PlanarSolution& solution) {
       emitter.push_back(all_[r].shots.beam.empty() ? std::uint8_t{0} : all_[r].shots.beam[row]);
     }
   }
-  result_.datum = formal_datum(p.train, p.free, result_.covariance, beams, emitter);
+  result_.datum_given_held = formal_datum(p.train, p.free, result_.covariance, beams, emitter);
+  result_.datum = result_.datum_given_held;
+  if (held_.count() > 0) {
+    HeldMovement held{held_.train, held_.rotation_angles.front()};
+    for (std::size_t r = 1; r < recordings_.size(); ++r) {
+      held.rotation_angles += held_.rotation_angles[r];
+    }
+    held.rotation_angles /= static_cast<double>(recordings_.size());
+    for (std::size_t j = 0; j < p.free.size(); ++j) {
+      for (const int at : p.free[j].places) {
+        held.train.row(at) = result_.held_changes.row(static_cast<Eigen::Index>(j));
+      }
+    }
+    result_.datum = formal_datum(p.train, p.free, result_.covariance, beams, emitter, held);
+  }
   result_.datum_without_common = formal_datum(
       p.train, p.free, solution.noise_covariance * result_.variance_factor, beams, emitter);
 }
 
 }  // namespace
+
+double Calibration::total_sigma(std::size_t parameter) const {
+  const auto at = static_cast<Eigen::Index>(parameter);
+  double variance = covariance(at, at);
+  if (held_changes.cols() > 0) variance += held_changes.row(at).squaredNorm();
+  return std::sqrt(variance);
+}
+
+double Calibration::range_offset_total_sigma() const {
+  if (!(range_offset_sigma > 0)) return 0;
+  return std::hypot(range_offset_sigma, range_offset_held_changes.norm());
+}
 
 Calibration calibrate(const std::vector<RangedRecording>& recordings,
                       const CalibrationOptions& options, const Progress& progress) {

@@ -26,7 +26,7 @@ sensors::Sensor calibrated_sensor(const CalibrationOptions& options, const Belie
     const auto at = static_cast<Index>(j);
     sensor.covariance_names.push_back(result.free[j].name);
     sensor.set_knowledge({result.free[j].name, std::sqrt(result.covariance(at, at)),
-                          "calibrated on plane walls by risley calibrate"});
+                          "calibrated on plane walls by risley calibrate", result.total_sigma(j)});
   }
   sensor.reference = sensors::CalibrationReference::planes;
   sensor.covariance = result.covariance;
@@ -37,7 +37,8 @@ sensors::Sensor calibrated_sensor(const CalibrationOptions& options, const Belie
   const Index n = result.covariance.rows();
   sensor.covariance_names.emplace_back("range_offset_m");
   sensor.set_knowledge({"range_offset_m", result.range_offset_sigma,
-                        "calibrated on plane walls by risley calibrate"});
+                        "calibrated on plane walls by risley calibrate",
+                        result.range_offset_total_sigma()});
   sensor.covariance.conservativeResize(n + 1, n + 1);
   sensor.covariance.col(n).head(n) = solution.range_offset_covariance * result.variance_factor;
   sensor.covariance.row(n).head(n) = sensor.covariance.col(n).head(n).transpose();

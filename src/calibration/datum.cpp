@@ -28,15 +28,15 @@ using Eigen::Matrix3d;
 /// One beam of a bundle and how it follows the parameters.
 struct BundleBeam {
   Eigen::Vector3d direction;
-  Eigen::Matrix<double, 3, Eigen::Dynamic> jacobian;   ///< of the direction [3, free]
-  Eigen::Matrix<double, 2, Eigen::Dynamic> of_angles;  ///< of azimuth and zenith [2, free]
+  Eigen::Matrix<double, 3, Eigen::Dynamic> jacobian;   ///< of the direction [3, free + held]
+  Eigen::Matrix<double, 2, Eigen::Dynamic> of_angles;  ///< of azimuth and zenith [2, free + held]
 };
 
 template <int N>
 std::vector<BundleBeam> bundle(const PrismTrain& train,
                                const std::vector<estimation::FreeParameter>& free,
                                const std::vector<std::vector<double>>& rotation_angles,
-                               std::span<const std::uint8_t> emitter) {
+                               std::span<const std::uint8_t> emitter, const HeldMovement& held) {
   const auto order = face_order_array<N>(train);
   std::vector<PreparedTrain<double, N>> prepared;
   std::vector<PreparedDerivatives<double, N>> derivatives;
@@ -45,6 +45,7 @@ std::vector<BundleBeam> bundle(const PrismTrain& train,
     derivatives.push_back(prepare_derivatives<double, N>(parameter_array<N>(train, j), order));
   }
   const auto n = static_cast<Index>(free.size());
+  const Index all = n + held.train.cols();
   std::vector<BundleBeam> beams;
   for (std::size_t i = 0; i < rotation_angles.front().size(); ++i) {
     std::array<double, N> angles;
@@ -53,7 +54,7 @@ std::vector<BundleBeam> bundle(const PrismTrain& train,
     const auto linear = linearise_direction(prepared[own], derivatives[own], angles);
     if (!linear.valid) continue;
     BundleBeam beam{eigen(linear.direction), {}, {}};
-    beam.jacobian.resize(3, n);
+    beam.jacobian.resize(3, all);
     for (Index row = 0; row < 3; ++row) {
       const auto& gradient = linear.components[static_cast<std::size_t>(row)];
       for (Index j = 0; j < n; ++j) {
@@ -63,10 +64,22 @@ std::vector<BundleBeam> bundle(const PrismTrain& train,
         }
         beam.jacobian(row, j) = sum;
       }
+      for (Index h = 0; h < held.train.cols(); ++h) {
+        double sum = 0;
+        for (Index at = 0; at < held.train.rows(); ++at) {
+          if (held.train(at, h) == 0) continue;
+          sum += held.train(at, h) *
+                 derivative_by(gradient, static_cast<int>(at), static_cast<int>(own));
+        }
+        for (std::size_t k = 0; k < N; ++k) {
+          sum += held.rotation_angles(static_cast<Index>(k), h) * gradient.rotation_angles[k];
+        }
+        beam.jacobian(row, n + h) = sum;
+      }
     }
     const AngleSeeds<double> seeds = angle_seeds(linear.direction);
-    beam.of_angles.resize(2, n);
-    for (Index j = 0; j < n; ++j) {
+    beam.of_angles.resize(2, all);
+    for (Index j = 0; j < all; ++j) {
       beam.of_angles(0, j) = eigen(seeds.azimuth).dot(beam.jacobian.col(j));
       beam.of_angles(1, j) = eigen(seeds.zenith).dot(beam.jacobian.col(j));
     }
@@ -121,13 +134,26 @@ DirectionErrors direction_errors(std::span<const Vector3<double>> computed,
 
 FormalDatum formal_datum(const PrismTrain& train,
                          const std::vector<estimation::FreeParameter>& free,
-                         const Eigen::MatrixXd& covariance,
+                         const Eigen::MatrixXd& free_covariance,
                          const std::vector<std::vector<double>>& rotation_angles,
-                         std::span<const std::uint8_t> emitter) {
-  require_length("rows of the covariance", static_cast<std::size_t>(covariance.rows()),
+                         std::span<const std::uint8_t> emitter, const HeldMovement& held) {
+  require_length("rows of the covariance", static_cast<std::size_t>(free_covariance.rows()),
                  free.size());
-  require_length("columns of the covariance", static_cast<std::size_t>(covariance.cols()),
+  require_length("columns of the covariance", static_cast<std::size_t>(free_covariance.cols()),
                  free.size());
+  const Index n = free_covariance.rows(), all = n + held.train.cols();
+  if (all > n) {
+    require_length("rows of the held quantities", static_cast<std::size_t>(held.train.rows()),
+                   train.parameters().size());
+    require_length("rows of their rotation angles",
+                   static_cast<std::size_t>(held.rotation_angles.rows()),
+                   static_cast<std::size_t>(train.prisms()));
+    require_length("columns of their rotation angles",
+                   static_cast<std::size_t>(held.rotation_angles.cols()),
+                   static_cast<std::size_t>(held.train.cols()));
+  }
+  Eigen::MatrixXd covariance = Eigen::MatrixXd::Identity(all, all);
+  covariance.topLeftCorner(n, n) = free_covariance;
   require_length("rotation_angles", rotation_angles.size(),
                  static_cast<std::size_t>(train.prisms()));
   for (const auto& column : rotation_angles) {
@@ -135,11 +161,11 @@ FormalDatum formal_datum(const PrismTrain& train,
   }
   const auto beams = with_prism_count(train.prisms(), [&]<int N>() {
     check_beams(train, emitter, rotation_angles.front().size());
-    return bundle<N>(train, free, rotation_angles, emitter);
+    return bundle<N>(train, free, rotation_angles, emitter, held);
   });
   if (beams.empty()) throw InvalidArgument("no beam gets through the prisms");
   Matrix3d normal = Matrix3d::Zero();
-  Eigen::MatrixXd right = Eigen::MatrixXd::Zero(3, static_cast<Index>(free.size()));
+  Eigen::MatrixXd right = Eigen::MatrixXd::Zero(3, all);
   for (const BundleBeam& beam : beams) {
     normal += Matrix3d::Identity() - beam.direction * beam.direction.transpose();
     for (Index j = 0; j < right.cols(); ++j) {

@@ -90,16 +90,24 @@ class Unknowns {
 struct Places {
   std::vector<int> all;  ///< places of the flat vector, each once
 
-  explicit Places(const PlanarProblem& p) {
+  Places(const PlanarProblem& p, const HeldQuantities& held) {
     for (const auto* list : {&p.free, &p.considered}) {
       for (const estimation::FreeParameter& parameter : *list) {
         for (const int place : parameter.places) {
-          if (std::find(all.begin(), all.end(), place) == all.end()) all.push_back(place);
+          add(place);
         }
       }
     }
+    for (Index place = 0; place < held.train.rows(); ++place) {
+      if ((held.train.row(place).array() != 0.0).any()) add(static_cast<int>(place));
+    }
   }
   Index column(int place) const { return std::find(all.begin(), all.end(), place) - all.begin(); }
+
+ private:
+  void add(int place) {
+    if (std::find(all.begin(), all.end(), place) == all.end()) all.push_back(place);
+  }
 };
 
 bool is_free(const PlanarProblem& p, int place) {
@@ -109,7 +117,8 @@ bool is_free(const PlanarProblem& p, int place) {
   });
 }
 
-/// Considered quantities: believed parameters, then the mean angles of every recording.
+/// Considered quantities: believed parameters, then the mean angles of every recording. Held ones
+/// have the columns behind them.
 Index considered_size(const PlanarProblem& p) {
   return static_cast<Index>(p.considered.size()) +
          static_cast<Index>(p.mean_angle_covariance.size()) * p.train.prisms();
@@ -127,16 +136,17 @@ Eigen::MatrixXd considered_covariance(const PlanarProblem& p) {
   return covariance;
 }
 
-/// d columns of one view / d unknowns, and d columns / d considered parameters.
+/// d columns of one view / d unknowns, and d columns / d considered and held quantities.
 struct Chain {
   Eigen::MatrixXd unknowns, considered;
 };
 
-Chain chain_of(const PlanarProblem& p, const Unknowns& at, const Places& places, std::size_t view) {
+Chain chain_of(const PlanarProblem& p, const HeldQuantities& held, const Unknowns& at,
+               const Places& places, std::size_t view) {
   const WallView& seen = p.views[view];
   const PlaneColumns columns{static_cast<int>(places.all.size()), p.train.prisms()};
   Chain chain{Eigen::MatrixXd::Zero(columns.size(), at.size()),
-              Eigen::MatrixXd::Zero(columns.size(), considered_size(p))};
+              Eigen::MatrixXd::Zero(columns.size(), considered_size(p) + held.count())};
   for (Index j = 0; j < at.free(); ++j) {
     for (const int place : p.free[static_cast<std::size_t>(j)].places) {
       chain.unknowns(places.column(place), j) = 1.0;
@@ -176,14 +186,22 @@ Chain chain_of(const PlanarProblem& p, const Unknowns& at, const Places& places,
       chain.considered(columns.rotation_angle(k), mine + k) = 1.0;
     }
   }
+  if (held.count() > 0) {
+    auto moved = chain.considered.rightCols(held.count());
+    for (const int place : places.all) moved.row(places.column(place)) = held.train.row(place);
+    for (int k = 0; k < p.train.prisms(); ++k) {
+      moved.row(columns.rotation_angle(k)) = held.rotation_angles[seen.recording].row(k);
+    }
+  }
   return chain;
 }
 
 /// Sum of all normal equations and priors at one point.
 struct System {
-  Eigen::MatrixXd hessian;     ///< [unknowns, unknowns]
-  Eigen::VectorXd gradient;    ///< [unknowns]
-  Eigen::MatrixXd considered;  ///< J^T W d prediction / d considered [unknowns, considered]
+  Eigen::MatrixXd hessian;   ///< [unknowns, unknowns]
+  Eigen::VectorXd gradient;  ///< [unknowns]
+  /// J^T W d prediction / d considered and held quantities [unknowns, considered + held].
+  Eigen::MatrixXd considered;
   double cost = 0;
   std::size_t shots = 0, lost = 0;
   std::vector<Eigen::MatrixXd> view_hessian;  ///< [views] of [unknowns, unknowns]
@@ -229,10 +247,10 @@ void add_priors(const PlanarProblem& p, const Unknowns& at, System& system) {
   }
 }
 
-System build_system(const PlanarProblem& p, const Unknowns& at, const Places& places,
-                    InstructionSet set) {
+System build_system(const PlanarProblem& p, const HeldQuantities& held, const Unknowns& at,
+                    const Places& places, InstructionSet set) {
   System system;
-  const Index n = at.size(), considered = considered_size(p);
+  const Index n = at.size(), considered = considered_size(p) + held.count();
   system.hessian = Eigen::MatrixXd::Zero(n, n);
   system.gradient = Eigen::VectorXd::Zero(n);
   system.considered = Eigen::MatrixXd::Zero(n, considered);
@@ -240,7 +258,7 @@ System build_system(const PlanarProblem& p, const Unknowns& at, const Places& pl
     PlaneView plane = plane_view(p, view);
     plane.places = places.all;
     const PlaneEquations equations = plane_equations(*p.views[view].shots, plane, {}, set);
-    const Chain chain = chain_of(p, at, places, view);
+    const Chain chain = chain_of(p, held, at, places, view);
     system.view_hessian.push_back(algebra::pulled_back(chain.unknowns, equations.hessian));
     system.view_cost.push_back(equations.cost);
     system.view_shots.push_back(equations.shots);
@@ -412,9 +430,10 @@ PlanarSolution adjust(PlanarProblem problem, const AdjustmentOptions& options,
                       const Progress& progress) {
   check(problem);
   const Unknowns at(problem);
-  const Places places(problem);
+  const HeldQuantities none;
+  const Places places(problem, none);
   PlanarSolution solution;
-  System system = build_system(problem, at, places, options.set);
+  System system = build_system(problem, none, at, places, options.set);
   double damping = 1e-8;
   while (solution.iterations < options.most_iterations) {
     const algebra::SymmetricSolver solver(system.hessian, damping);
@@ -433,7 +452,7 @@ PlanarSolution adjust(PlanarProblem problem, const AdjustmentOptions& options,
     }
     PlanarProblem trial = problem;
     move(trial, at, step);
-    System next = build_system(trial, at, places, options.set);
+    System next = build_system(trial, none, at, places, options.set);
     ++solution.iterations;
     progress.report(static_cast<double>(solution.iterations) / options.most_iterations);
     // Shots that lose their plane would make any step look good.
@@ -519,6 +538,32 @@ PlanarSolution adjust(PlanarProblem problem, const AdjustmentOptions& options,
   }
   solution.problem = std::move(problem);
   return solution;
+}
+
+HeldResponse held_response(const PlanarProblem& solved, const HeldQuantities& held,
+                           InstructionSet set) {
+  check(solved);
+  const auto expect = [](const char* what, Index found, Index expected) {
+    require_length(what, static_cast<std::size_t>(found), static_cast<std::size_t>(expected));
+  };
+  expect("places of the held quantities", held.train.rows(),
+         static_cast<Index>(solved.train.parameters().size()));
+  require_length("recordings of the held quantities", held.rotation_angles.size(),
+                 solved.stations.size());
+  for (const Eigen::MatrixXd& own : held.rotation_angles) {
+    expect("prisms of the held quantities", own.rows(), solved.train.prisms());
+    expect("held quantities of the rotation angles", own.cols(), held.count());
+  }
+  const Unknowns at(solved);
+  const Places places(solved, held);
+  const System system = build_system(solved, held, at, places, set);
+  const algebra::SymmetricSolver solver(system.hessian);
+  if (!solver.positive()) throw EstimationError("the walls do not tell all parameters");
+  const Eigen::MatrixXd shift =
+      -solver.solve_columns(system.considered.rightCols(held.count()).eval());
+  HeldResponse response{shift.topRows(at.free()), Eigen::VectorXd::Zero(held.count())};
+  if (at.range_offset() >= 0) response.range_offset = shift.row(at.range_offset()).transpose();
+  return response;
 }
 
 }  // namespace risley::calibration

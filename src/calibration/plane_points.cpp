@@ -72,6 +72,7 @@ RangedRecording ranged_recording(const estimation::Estimate& estimate, std::stri
   recording.angle_sensitivity = estimate.common_angles->sensitivity;
   recording.mean_angle_covariance =
       algebra::SymmetricSolver(estimate.common_angles->information).inverse();
+  recording.held_changes = estimate.held_changes;
   recording.serial = std::move(serial);
   RangedShots& shots = recording.shots;
   shots.resize(prisms, estimate.series.size());

@@ -36,6 +36,9 @@ constexpr int kMostFullPasses = 8;
 /// them comes between: near the optical axis angles are far from linear in what the coarse pass
 /// does not tell, and a further pass over all shots would cost more.
 constexpr double kStrongThinning = 16.0, kSomeShots = 0.25;
+/// Rotors that were let free to follow explain correlated residuals where they leave at most this
+/// share of their correlation, or a factor of variances that is hardly one.
+constexpr double kWhitened = 0.75, kNearlyWhite = 1.2;
 /// Residual scatter above the stated one by this share enlarges the covariance.
 constexpr double kSignificantExcess = 1.02;
 
@@ -380,7 +383,7 @@ Solution run_batch_map(const AngleSeries& series, const Start& start, const sens
   };
   Iteration full = go_on_with_all();
   const bool noise_is_held = options.angle_noise.has_value();
-  double used_share = 0;
+  double used_share = 0, first_factor = 1;
   for (int pass = 0; pass < kMostFullPasses; ++pass) {
     full.evaluate();
     if (noise_is_held) level = full.level();
@@ -400,11 +403,21 @@ Solution run_batch_map(const AngleSeries& series, const Start& start, const sens
     }
     result.unit_variance =
         unit_variance(full.series(), assumed, full.azimuth(), full.zenith(), full.outlier());
-    result.variance_factor =
-        result.autocorrelation.factor *
-        (result.unit_variance > kSignificantExcess ? result.unit_variance : 1.0);
-    full.equations().scale(1.0 / result.variance_factor);
-    if (choose && pass == 0) process = likeliest_process(full.equations(), full.knots());
+    const double excess = result.unit_variance > kSignificantExcess ? result.unit_variance : 1.0;
+    const double factor = result.autocorrelation.factor;
+    result.variance_factor = factor * excess;
+    full.equations().scale(1.0 / excess);
+    if (choose && pass == 0) {
+      process = likeliest_process(full.equations(), full.knots());
+      first_factor = factor;
+    }
+    full.equations().scale(1.0 / factor);
+    // Neighbouring residuals hang together because rotors wander faster than was thought, or
+    // because the noise itself does: rotors that follow leave white residuals in the first case
+    // alone.
+    const bool noise_is_coloured =
+        choose && pass == 1 && factor > std::max(kNearlyWhite, kWhitened * first_factor);
+    if (noise_is_coloured) process = likeliest_process(full.equations(), full.knots());
     // The first step goes from what the thinned shots tell to what all tell, the second should be
     // one of rounding.
     SmootherSolution solution = full.solve(process, true);
@@ -419,7 +432,7 @@ Solution run_batch_map(const AngleSeries& series, const Start& start, const sens
     // The noise was found with what the pass before used up; where that was another share, a third
     // pass is needed.
     const bool goes_on =
-        moved > kSmallStep || !noise_is_found ||
+        noise_is_coloured || moved > kSmallStep || !noise_is_found ||
         (pass < 2 && !noise_is_held && std::abs(used_share - counted_share) > 1e-3);
     if (pass == 0 || (goes_on && pass + 1 < kMostFullPasses)) continue;
     result.settled = moved <= kSmallStep;

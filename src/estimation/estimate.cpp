@@ -456,7 +456,8 @@ CoordinateRounding rounding_of(const Estimate& estimate, const EstimateOptions& 
 
 /// Widens the sigmas by what held parameters may be off by.
 void count_held_parameters(Estimate& estimate, const sensors::Sensor& nominal) {
-  const Eigen::VectorXd changes = changes_by_held_parameters(estimate, nominal).rowwise().norm();
+  estimate.held_changes = changes_by_held_parameters(estimate, nominal);
+  const Eigen::VectorXd changes = estimate.held_changes.values.rowwise().norm();
   for (std::size_t i = 0; i < estimate.values.size(); ++i) {
     EstimatedValue& value = estimate.values[i];
     value.sigma = std::hypot(value.sigma_given_held, changes[static_cast<Eigen::Index>(i)]);

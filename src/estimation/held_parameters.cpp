@@ -71,16 +71,19 @@ struct Sample {
 
 }  // namespace
 
-Eigen::MatrixXd changes_by_held_parameters(const Estimate& estimate,
-                                           const sensors::Sensor& sensor) {
-  const std::vector<FreeParameter> held = uncertain_held(estimate, sensor);
+HeldChanges changes_by_held_parameters(const Estimate& estimate, const sensors::Sensor& sensor) {
+  HeldChanges result;
+  result.held = uncertain_held(estimate, sensor);
+  const std::vector<FreeParameter>& held = result.held;
   std::vector<FreeParameter> all = estimate.constants.empty() ? estimate.free : estimate.constants;
   const auto free = static_cast<Index>(all.size());
   const auto parameters = static_cast<Index>(estimate.free.size());
   const Index prisms = sensor.prisms();
   const auto count = static_cast<Index>(held.size());
-  Eigen::MatrixXd changes = Eigen::MatrixXd::Zero(parameters + 2 * prisms, count);
-  if (count == 0) return changes;
+  Eigen::MatrixXd& changes = result.values;
+  changes = Eigen::MatrixXd::Zero(parameters + 2 * prisms, count);
+  result.mean_angles = Eigen::MatrixXd::Zero(prisms, count);
+  if (count == 0) return result;
   all.insert(all.end(), held.begin(), held.end());
 
   const Sample sample(estimate);
@@ -114,9 +117,9 @@ Eigen::MatrixXd changes_by_held_parameters(const Estimate& estimate,
     const Eigen::Map<const RowMajor> own(
         solution.sensitivity.data() + knot * static_cast<std::size_t>(states * (free + count)),
         states, free + count);
-    Eigen::MatrixXd result(prisms, count);
-    for (Index k = 0; k < prisms; ++k) result.row(k) = own.row(kStatesPerRotor * k) * constants;
-    return result;
+    Eigen::MatrixXd angles(prisms, count);
+    for (Index k = 0; k < prisms; ++k) angles.row(k) = own.row(kStatesPerRotor * k) * constants;
+    return angles;
   };
   changes.topRows(parameters) = constants.topRows(parameters);
   double time = 0;
@@ -127,7 +130,9 @@ Eigen::MatrixXd changes_by_held_parameters(const Estimate& estimate,
   }
   if (time > 0) changes.middleRows(parameters, prisms) /= time;
   changes.bottomRows(prisms) = angles_of(0);
-  return changes;
+  for (std::size_t knot = 0; knot < knots.size(); ++knot) result.mean_angles += angles_of(knot);
+  result.mean_angles /= static_cast<double>(knots.size());
+  return result;
 }
 
 }  // namespace risley::estimation

@@ -10,13 +10,12 @@
 namespace risley::estimation {
 
 /// What held parameters that may be off do to an estimate: the data answer for the values that they
-/// were held at, and change by these amounts where they are off by one of the sensor's sigmas each.
+/// were held at.
 /// With e as error of the held ones the free ones are off by -N_ff^-1 N_fh e, with N the
 /// information of the constants after the rotors were eliminated, and the rotors follow both.
 /// docs/theory/map.md
 /// @param estimate  with solution, series and start; its values need not be there
 /// @param sensor    that it started from, with what is known of the held parameters
-/// @return [values, held], in the order of Estimate::values: parameters, mean speeds, first angles
-Eigen::MatrixXd changes_by_held_parameters(const Estimate& estimate, const sensors::Sensor& sensor);
+HeldChanges changes_by_held_parameters(const Estimate& estimate, const sensors::Sensor& sensor);
 
 }  // namespace risley::estimation

@@ -125,14 +125,18 @@ std::string to_place_of(double value, double sigma) {
   return std::isfinite(value) ? text_to_place_of(value, sigma) : "–";
 }
 
-std::string parameter_row(const CalibrationReport& r, const ReportedParameter& row) {
+std::string sigma_cell(double value, double sigma) {
+  return fmt::format("<td>{}</td>", is_sigma(sigma) ? number_text(value, sigma).sigma : "–");
+}
+
+std::string parameter_row(const CalibrationReport& r, const ReportedParameter& row, bool any_held) {
   const ParameterInfo& info = find_parameter(row.name, r.shape());
   const double scale = 1.0 / info.si_per_unit;
-  const double value = scale * row.value, sigma = scale * row.sigma;
+  const double value = scale * row.value, sigma = scale * row.sigma_given_held.value_or(row.sigma);
   std::string html = fmt::format(
-      "<tr>{}<td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td>",
-      parameter_head(info), to_place_of(value, sigma),
-      is_sigma(sigma) ? number_text(value, sigma).sigma : "–", escape_html(info.unit),
+      "<tr>{}<td>{}</td>{}{}<td>{}</td><td>{}</td><td>{}</td><td>{}</td>", parameter_head(info),
+      to_place_of(value, sigma), sigma_cell(value, scale * row.sigma),
+      any_held ? sigma_cell(value, sigma) : "", escape_html(info.unit),
       finite_text("{:.7g}", scale * row.nominal), to_place_of(scale * row.believed, sigma),
       to_place_of(scale * (row.value - row.believed), sigma));
   if (std::isfinite(row.truth)) {
@@ -147,26 +151,33 @@ std::string parameter_row(const CalibrationReport& r, const ReportedParameter& r
 
 std::string parameters_html(const CalibrationReport& r) {
   const bool truth = !r.parameters.empty() && std::isfinite(r.parameters.front().truth);
+  const bool any_held = any_held_parameter(r.parameters);
   std::string html =
       "<h2>Parameters</h2>\n<div class=\"wide\"><table><thead><tr><th>parameter</th><th>value</th>"
-      "<th>σ</th><th>unit</th><th>nominal</th><th>believed</th><th>difference</th>";
+      "<th>σ</th>";
+  if (any_held) html += "<th>σ given held</th>";
+  html += "<th>unit</th><th>nominal</th><th>believed</th><th>difference</th>";
   if (truth) html += "<th>truth</th><th>error</th><th>error / σ</th>";
   html += "</tr></thead><tbody>\n";
-  for (const ReportedParameter& row : r.parameters) html += parameter_row(r, row);
+  for (const ReportedParameter& row : r.parameters) html += parameter_row(r, row, any_held);
   if (r.range_offset_sigma > 0) {
     const double value = kMillimetres * r.range_offset;
     const double sigma = kMillimetres * r.range_offset_sigma;
     const std::string shown = to_place_of(value, sigma);
     html += fmt::format(
         "<tr><th scope=\"row\">range offset, which the sensor adds to every "
-        "range</th><td>{}</td><td>{}</td><td>mm</td><td>0</td><td>0</td><td>{}</td>{}</"
-        "tr>\n",
-        shown, is_sigma(sigma) ? number_text(value, sigma).sigma : "–", shown,
+        "range</th><td>{}</td>{}{}<td>mm</td><td>0</td><td>0</td><td>{}</td>{}</tr>\n",
+        shown, sigma_cell(value, sigma), any_held ? "<td></td>" : "", shown,
         truth ? "<td></td><td></td><td></td>" : "");
   }
   return html +
          "</tbody></table></div>\n<p class=\"note\">σ is one standard deviation, everything "
-         "included. Nominal: the preset. Believed: what the sensor computed its directions with "
+         "included" +
+         (any_held ? ", also what the parameters that were held may be off by, which the second σ "
+                     "leaves out: a held parameter that is off moves the others so that the beams "
+                     "go where they went. Nominal"
+                   : ". Nominal") +
+         ": the preset. Believed: what the sensor computed its directions with "
          "when it recorded. Difference: value minus believed.</p>\n";
 }
 

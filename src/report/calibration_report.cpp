@@ -52,7 +52,8 @@ std::vector<ReportedParameter> parameters_of(const CalibrationReportInput& input
     ReportedParameter row;
     row.name = c.free[i].name;
     row.value = at(c.parameters, i);
-    row.sigma = sigma_at(c.covariance, i);
+    row.sigma_given_held = sigma_at(c.covariance, i);
+    row.sigma = *row.sigma_given_held > 0 ? c.total_sigma(i) : 0.0;
     row.nominal = input.nominal.get(row.name);
     row.believed = c.believed.get(row.name);
     if (input.truth) {
@@ -431,7 +432,7 @@ CalibrationReport calibration_report(const CalibrationReportInput& input) {
   report.points = c.points;
   report.parameters = parameters_of(input);
   report.range_offset = c.range_offset;
-  report.range_offset_sigma = c.range_offset_sigma;
+  report.range_offset_sigma = c.range_offset_total_sigma();
   for (const estimation::FreeParameter& free : c.free) report.free.push_back(free.name);
   report.covariance = c.covariance;
   report.unobservable = c.unobservable;

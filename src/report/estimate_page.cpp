@@ -75,9 +75,7 @@ std::string subject_text(const EstimateReport& r) {
 }
 
 std::string parameters_html(const EstimateReport& r) {
-  const bool any_held = std::any_of(r.parameters.begin(), r.parameters.end(), [](const auto& row) {
-    return row.sigma > row.sigma_given_held.value_or(row.sigma);
-  });
+  const bool any_held = any_held_parameter(r.parameters);
   std::string html =
       "<h2>Parameters</h2>\n<div class=\"wide\"><table><thead><tr><th>parameter</th><th>value</th>"
       "<th>σ</th>";

@@ -68,6 +68,12 @@ std::string symbol_html(const std::string& symbol) {
                      escape_html(symbol.substr(underscore + 1)));
 }
 
+bool any_held_parameter(std::span<const ReportedParameter> parameters) {
+  return std::any_of(parameters.begin(), parameters.end(), [](const auto& row) {
+    return row.sigma > row.sigma_given_held.value_or(row.sigma);
+  });
+}
+
 std::string parameter_head(const ParameterInfo& parameter) {
   return fmt::format("<th scope=\"row\">{}, {}<span class=\"name\">{}</span></th>",
                      escape_html(parameter.long_name), symbol_html(parameter.symbol),

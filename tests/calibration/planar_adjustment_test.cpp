@@ -710,6 +710,44 @@ TEST(CommonErrors, OfBelievedParametersReachTheResult) {
   }
 }
 
+/// What was held moves parameters and offset as an adjustment that holds something else does.
+TEST(HeldResponse, IsHowTheSolutionFollowsWhatIsHeld) {
+  const PlanarProblem p = exact_corner();
+  const int tilt = place::prism_tilt_horizontal(0), wedge = place::wedge_angle(1);
+  HeldQuantities held;
+  held.train = Eigen::MatrixXd::Zero(static_cast<Index>(p.train.parameters().size()), 3);
+  held.train(tilt, 0) = 1.0;
+  held.train(wedge, 1) = 0.5;
+  held.train(tilt, 1) = -2.0;
+  Eigen::MatrixXd upright = Eigen::MatrixXd::Zero(2, 3), flipped = upright;
+  upright << 0, 0.3, 0.9, 0, -0.2, 0.1;
+  flipped << 0, 0.2, 0.7, 0, 0.4, 0.2;
+  held.rotation_angles = {upright, flipped};
+  const PlanarSolution solution = adjust(p);
+  const HeldResponse found = held_response(solution.problem, held);
+  const Index n = solution.parameters.size();
+  ASSERT_EQ(found.parameters.rows(), n);
+  ASSERT_EQ(found.range_offset.size(), 3);
+  for (Index i = 0; i < 3; ++i) {
+    const Eigen::VectorXd expected = response(p, [&, i](PlanarProblem& changed, double step) {
+      for (Index at = 0; at < held.train.rows(); ++at) {
+        const auto place = static_cast<int>(at);
+        changed.train.set_place(place, changed.train[place] + step * held.train(at, i));
+      }
+      shift_angles(changed, 0, step * upright.col(i));
+      shift_angles(changed, 1, step * flipped.col(i));
+    });
+    EXPECT_LT((found.parameters.col(i) - expected.head(n)).norm(), 0.01 * expected.head(n).norm());
+    EXPECT_NEAR(found.range_offset[i], expected[n], 0.01 * std::abs(expected[n]) + 1e-6);
+  }
+  EXPECT_EQ(held_response(solution.problem, {Eigen::MatrixXd(held.train.rows(), 0),
+                                             {Eigen::MatrixXd(2, 0), Eigen::MatrixXd(2, 0)}})
+                .parameters.cols(),
+            0);
+  held.rotation_angles.pop_back();
+  EXPECT_THROW((void)held_response(solution.problem, held), InvalidArgument);
+}
+
 /// Both kinds together, and materials without any effect on the angles.
 TEST(CommonErrors, AddUp) {
   PlanarProblem p = exact_corner();

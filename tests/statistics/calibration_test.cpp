@@ -145,6 +145,72 @@ TEST(Calibration, RecordingsInBothSpeedCombinationsTellOfOneSensor) {
   expect_honest(result);
 }
 
+/// A unit whose held parameters are off by what its preset allows: wedges alike in the prisms and
+/// in what the sensor computes with, tilts in each by themselves.
+simulation::SimulationSettings settings_of_drawn_unit(std::uint64_t seed) {
+  simulation::SimulationSettings settings = wall_settings(hall(), seed);
+  const sensors::Sensor preset = sensors::load_sensor("mid-40");
+  const TrainShape shape = preset.shape();
+  const auto free = estimation::default_free_names(shape);
+  const RandomStream errors(seed, 95);
+  std::uint64_t number = 0;
+  for (const ParameterInfo& info : parameter_list(shape)) {
+    const sensors::Knowledge* known = preset.find_knowledge(info.name);
+    if (info.kind != ParameterKind::train || known == nullptr || known->name != info.name ||
+        !(known->sigma > 0) || std::find(free.begin(), free.end(), info.name) != free.end()) {
+      continue;
+    }
+    const double common = known->sigma * errors.normal(number++);
+    const double own = known->sigma * errors.normal(number++);
+    for (const int at : info.places) {
+      const bool material = calibration::is_material(at, shape.prisms);
+      settings.truth.train.set_place(at, settings.truth.train[at] + common);
+      settings.reported->train.set_place(at,
+                                         settings.reported->train[at] + (material ? common : own));
+    }
+  }
+  return settings;
+}
+
+TEST(Calibration, TotalSigmasHoldWhatHeldParametersAreOffBy) {
+  const int seeds = seeds_or(16);
+  double squares = 0, squares_given_held = 0, parameters = 0, beyond = 0, joint = 0;
+  WallMonteCarlo beams;
+  beams.held_is_off = true;
+  for (int seed = 0; seed < seeds; ++seed) {
+    const WallRecording walls =
+        record_walls(settings_of_drawn_unit(static_cast<std::uint64_t>(seed)));
+    const JudgedCalibration judged = calibrate_walls({&walls}, wall_options());
+    beams.add(judged, walls.settings.truth);
+    const calibration::Calibration& c = judged.calibration;
+    ASSERT_GE(c.held.size(), 3u);
+    Eigen::VectorXd error(c.parameters.size());
+    for (std::size_t j = 0; j < c.free.size(); ++j) {
+      const auto at = static_cast<Eigen::Index>(j);
+      error[at] = c.parameters[at] - walls.settings.truth.train[c.free[j].places.front()];
+      const double total = std::abs(error[at]) / c.total_sigma(j);
+      squares += total * total;
+      squares_given_held += error[at] * error[at] / c.covariance(at, at);
+      beyond += total > 5.0;
+      parameters += 1.0;
+    }
+    const Eigen::MatrixXd covariance = c.covariance + c.held_changes * c.held_changes.transpose();
+    const Eigen::VectorXd scale = covariance.diagonal().cwiseSqrt().cwiseInverse();
+    joint += scale.cwiseProduct(error).dot((scale.asDiagonal() * covariance * scale.asDiagonal())
+                                               .ldlt()
+                                               .solve(scale.cwiseProduct(error)));
+  }
+  beams.record();
+  ::testing::Test::RecordProperty("total_squares", fmt::format("{:.4g}", squares / parameters));
+  ::testing::Test::RecordProperty("squares_given_held",
+                                  fmt::format("{:.4g}", squares_given_held / parameters));
+  ::testing::Test::RecordProperty("nees_total", fmt::format("{:.4g}", joint / parameters));
+  EXPECT_NEAR(joint / parameters, 1.0, 3.3 * std::sqrt(2.0 / parameters));
+  EXPECT_EQ(beyond, 0.0);
+  EXPECT_GT(squares_given_held / parameters, 4.0);  // what the test is about
+  EXPECT_NEAR(beams.total_ratio(), 1.0, 0.1 * std::sqrt(200.0 / seeds));
+}
+
 TEST(Calibration, StationsStatedWithErrorsGiveWhatTheyPromise) {
   constexpr double kStated = radians_from_degrees(0.02);
   const int seeds = seeds_or(20);

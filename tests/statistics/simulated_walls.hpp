@@ -182,8 +182,10 @@ class WallMonteCarlo {
     shape_ += degrees_from_radians(e.after.shape);
     total2_ += std::pow(e.after.total, 2);
     shape2_ += std::pow(e.after.shape, 2);
-    formal_total2_ += std::pow(c.datum.total, 2);
-    formal_shape2_ += std::pow(c.datum.shape, 2);
+    // The units of these tests are in what is held exactly as held, but for one.
+    const calibration::FormalDatum& datum = held_is_off ? c.datum : c.datum_given_held;
+    formal_total2_ += std::pow(datum.total, 2);
+    formal_shape2_ += std::pow(datum.shape, 2);
     steps += static_cast<int>(c.steps.size());
     iterations = std::max(iterations, c.iterations);
     variance_factor_ += c.variance_factor;
@@ -242,6 +244,7 @@ class WallMonteCarlo {
     one("iterations", iterations);
   }
 
+  bool held_is_off = false;  ///< the units differ from what is held: its sigmas count
   int runs = 0, steps = 0, iterations = 0;
   double largest_total = 0;
 

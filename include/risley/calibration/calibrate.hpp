@@ -112,13 +112,25 @@ struct Calibration {
   sensors::Sensor sensor;  ///< calibrated, with covariance
   PrismTrain believed;     ///< what the sensor computed directions with
   std::vector<estimation::FreeParameter> free;
-  Eigen::VectorXd parameters;                       ///< [free], SI
-  Eigen::MatrixXd covariance;                       ///< [free, free], everything included
+  Eigen::VectorXd parameters;  ///< [free], SI
+  /// [free, free], common errors of the rotation angles and unevenness of the walls included, if
+  /// everything that was held were exactly as held.
+  Eigen::MatrixXd covariance;
   double range_offset = 0, range_offset_sigma = 0;  ///< m; sigma 0 where it was held
+  /// What was held and may be off, and by how much a sigma of each changes parameters and range
+  /// offset [free, held], [held]. An error in one makes up for the other in the beams' directions.
+  std::vector<std::string> held;
+  Eigen::MatrixXd held_changes;
+  Eigen::VectorXd range_offset_held_changes;
+
+  /// Sigma of a free parameter, what was held included.
+  double total_sigma(std::size_t parameter) const;
+  double range_offset_total_sigma() const;
   std::vector<CalibratedPlane> planes;
   std::vector<SurfaceStep> steps;
   DatumKind datum_kind = DatumKind::none;
-  FormalDatum datum;                 ///< after
+  FormalDatum datum;                 ///< after, everything included
+  FormalDatum datum_given_held;      ///< if everything that was held were exactly as held
   FormalDatum datum_without_common;  ///< without the common errors of the rotation angles
   std::vector<estimation::WeakDirection> unobservable;
   std::vector<PriorTest> prior_tests;

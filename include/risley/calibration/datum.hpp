@@ -36,14 +36,22 @@ struct FormalDatum {
   double gauge = 0, shape = 0, total = 0;                 ///< expected RMS over the beams, rad
 };
 
+/// What independent quantities that were held do to the beams, each when it is off by one sigma: to
+/// the train, its free parameters included, and to the rotation angles.
+struct HeldMovement {
+  Eigen::MatrixXd train;            ///< flat vector [places, held], SI
+  Eigen::MatrixXd rotation_angles;  ///< [prisms, held], rad
+};
+
 /// Propagates a covariance to a bundle of beams.
 /// @param rotation_angles  [prisms][beams], rad
 /// @param emitter          of every beam, from 0; empty: all the first
+/// @param held             what goes on top; without columns: nothing
 FormalDatum formal_datum(const PrismTrain& train,
                          const std::vector<estimation::FreeParameter>& free,
                          const Eigen::MatrixXd& covariance,
                          const std::vector<std::vector<double>>& rotation_angles,
-                         std::span<const std::uint8_t> emitter = {});
+                         std::span<const std::uint8_t> emitter = {}, const HeldMovement& held = {});
 
 /// What ties the frame of the calibrated beams to the outside.
 enum class DatumKind {

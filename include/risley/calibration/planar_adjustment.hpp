@@ -117,6 +117,26 @@ struct AdjustmentOptions {
 PlanarSolution adjust(PlanarProblem problem, const AdjustmentOptions& options = {},
                       const Progress& progress = {});
 
+/// Quantities that an adjustment held and that may be off: what moves with one unit of each.
+struct HeldQuantities {
+  Eigen::MatrixXd train;  ///< flat vector [places, held], SI; 0 in the places of free parameters
+  std::vector<Eigen::MatrixXd> rotation_angles;  ///< [recordings] of [prisms, held], rad
+
+  Eigen::Index count() const { return train.cols(); }
+};
+
+/// By how much a solution is off where a held quantity is off by one unit, SI.
+struct HeldResponse {
+  Eigen::MatrixXd parameters;    ///< [free, held]
+  Eigen::VectorXd range_offset;  ///< [held]; 0 where it is held, too
+};
+
+/// -N^-1 J^T W K with N the normal equations at the solution and K what moves the predicted ranges.
+/// @throws InvalidArgument for matrices that do not belong to train, recordings or each other,
+///         EstimationError when the normal equations are singular
+HeldResponse held_response(const PlanarProblem& solved, const HeldQuantities& held,
+                           InstructionSet set = best_instruction_set());
+
 /// Prior sigmas of free parameters when every angle has the same [free], SI; infinite for others,
 /// and for all without one.
 /// @param angle_sigma  rad

@@ -48,8 +48,10 @@ struct RangedRecording {
   Eigen::MatrixXd covariance;             ///< [free, free], SI units
   Eigen::MatrixXd angle_sensitivity;      ///< [prisms, free], see CommonAngleErrors
   Eigen::MatrixXd mean_angle_covariance;  ///< [prisms, prisms], rad^2, at given parameters
-  std::size_t without_range = 0;          ///< shots that had a direction and no range
-  std::size_t outliers = 0;               ///< shots whose reported direction was an outlier
+  /// What parameters that the estimate held may be off by does to it; empty: nothing.
+  estimation::HeldChanges held_changes;
+  std::size_t without_range = 0;  ///< shots that had a direction and no range
+  std::size_t outliers = 0;       ///< shots whose reported direction was an outlier
 };
 
 /// Takes the shots that have a range and a sound direction out of an estimate.

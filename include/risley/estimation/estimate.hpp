@@ -54,6 +54,14 @@ struct EstimatedValue {
   double sigma_given_held = 0;  ///< if they were exactly as held
 };
 
+/// How an estimate changes where parameters that it held are off: by these amounts for one sigma of
+/// each, the first order of which is all there is.
+struct HeldChanges {
+  std::vector<FreeParameter> held;  ///< with the sigma that the sensor states as prior_sigma
+  Eigen::MatrixXd values;           ///< [values, held], in the order of Estimate::values
+  Eigen::MatrixXd mean_angles;  ///< of the rotation angles, mean over the recording [prisms, held]
+};
+
 /// All rotors turn faster or slower than the sensor's by one factor: so they do where the clock of
 /// the recording is wrong, and rarely otherwise.
 struct SpeedFactor {
@@ -78,6 +86,7 @@ struct Estimate : Solution {
   std::vector<FreeParameter> free;
   std::optional<SpeedFactor> speed_factor;  ///< where the rotors tell one that is not 1
   std::vector<EstimatedValue> values;       ///< parameters, mean speeds, first rotation angles
+  HeldChanges held_changes;
   /// Parameter combinations that the data do not tell; any makes the estimate not converged.
   std::vector<WeakDirection> unobservable;
 

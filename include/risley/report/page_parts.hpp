@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstddef>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -23,6 +24,9 @@ std::string symbol_html(const std::string& symbol);
 
 /// Head of a parameter's row: its name in words, its symbol and its name in files.
 std::string parameter_head(const ParameterInfo& parameter);
+
+/// Whether held parameters make the sigma of some parameter larger.
+bool any_held_parameter(std::span<const ReportedParameter> parameters);
 
 std::string list_html(const std::vector<std::string>& items);
 
