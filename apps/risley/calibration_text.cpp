@@ -294,7 +294,7 @@ void print_forecast(const CalibrationForecast& f, TrainShape shape) {
   table.print();
   say("\n");
   print_datum(f.datum_kind, f.datum);
-  say("expected error of a direction: {:.2g} deg\n", deg(f.datum.total));
+  say("error of a direction by noise alone: {:.2g} deg\n", deg(f.datum.total));
   for (const auto& weak : f.unobservable) {
     say("not told by these walls: {}\n", direction_text(weak));
   }

@@ -16,6 +16,7 @@
 #include "calibration/belief.hpp"
 #include "calibration/calibrated_sensor.hpp"
 #include "calibration/entry_checks.hpp"
+#include "calibration/held.hpp"
 #include "calibration/labelled_shots.hpp"
 #include "calibration/verdict.hpp"
 #include "calibration/wall_flatness.hpp"
@@ -282,7 +283,7 @@ class Work {
   std::vector<RangedShots> coarse_;      // [recordings], some of them
   std::vector<double> solved_variance_;  // [views] of the last solve, m^2
   PlanarProblem problem_;
-  HeldQuantities held_;
+  Held held_;
   Calibration result_;
 };
 
@@ -313,7 +314,7 @@ void Work::fill_result(const PlanarSolution& solution) {
   result_.rms_before = walls.rms_before;
   result_.rms_after = walls.rms_after;
   result_.points = walls.points;
-  result_.sensor = calibrated_sensor(options_, belief_, solution, result_);
+  result_.sensor = calibrated_sensor(options_, belief_, solution, result_, held_.moved);
   result_.sensor.serial = recordings_.front().serial;
   fill_datum(solution);
   result_.reason = reason_of_failure(result_, solution);
@@ -325,57 +326,12 @@ void Work::fill_result(const PlanarSolution& solution) {
   for (LabelledShots& own : all_) result_.plane_of_shot.push_back(std::move(own.labels.view));
 }
 
-/// The sensor's own computations hold what the estimates of the directions hold, wedges before all:
-/// that moves rotation angles and the indices found with them. The true prisms have those indices
-/// and wedges, and tilts of their own that no wall tells.
 void Work::fill_held(const PlanarSolution& solution) {
-  if (paper() || solution.shots == 0 || !result_.covariance.allFinite()) return;
-  const PlanarProblem& p = solution.problem;
-  const TrainShape shape = p.train.shape();
-  const auto is_free = [&](int at) {
-    return std::any_of(p.free.begin(), p.free.end(), [at](const auto& free) {
-      return std::find(free.places.begin(), free.places.end(), at) != free.places.end();
-    });
-  };
-  const auto moves = [&](int at) { return is_material(at, shape.prisms) && !is_free(at); };
-  std::vector<std::pair<const ParameterInfo*, double>> own;  // tilts and the like, and their sigmas
-  for (const ParameterInfo& info : parameter_list(shape)) {
-    if (info.kind != ParameterKind::train) continue;
-    const sensors::Knowledge* known = options_.sensor.find_knowledge(info.name);
-    if (known == nullptr || known->name != info.name || !(known->sigma > 0)) continue;
-    if (is_material(info.places.front(), shape.prisms)) continue;
-    if (std::any_of(info.places.begin(), info.places.end(), is_free)) continue;
-    own.emplace_back(&info, known->sigma);
-  }
-  const auto believed = static_cast<Eigen::Index>(belief_.held.size());
-  const auto count = believed + static_cast<Eigen::Index>(own.size());
-  if (count == 0) return;
-  HeldQuantities& held = held_;
-  held.train = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(p.train.parameters().size()), count);
-  for (Eigen::Index h = 0; h < believed; ++h) {
-    const estimation::FreeParameter& parameter = belief_.held[static_cast<std::size_t>(h)];
-    result_.held.push_back(parameter.name);
-    for (const int at : parameter.places) {
-      if (moves(at)) held.train(at, h) += parameter.prior_sigma;
-    }
-    for (std::size_t j = 0; j < belief_.free.size(); ++j) {
-      for (const int at : belief_.free[j].places) {
-        if (moves(at)) held.train(at, h) += belief_.held_changes(static_cast<Eigen::Index>(j), h);
-      }
-    }
-  }
-  for (std::size_t i = 0; i < own.size(); ++i) {
-    result_.held.push_back(own[i].first->name);
-    for (const int at : own[i].first->places) {
-      held.train(at, believed + static_cast<Eigen::Index>(i)) = own[i].second;
-    }
-  }
-  for (const Eigen::MatrixXd& angles : belief_.held_angle_changes) {
-    Eigen::MatrixXd& mine =
-        held.rotation_angles.emplace_back(Eigen::MatrixXd::Zero(shape.prisms, count));
-    mine.leftCols(believed) = angles;
-  }
-  HeldResponse response = held_response(p, held);
+  if (paper() || !solution.converged || !result_.covariance.allFinite()) return;
+  held_ = held_of(options_.sensor, belief_, solution.problem);
+  if (held_.names.empty()) return;
+  HeldResponse response = held_response(solution.problem, held_.quantities);
+  result_.held = held_.names;
   result_.held_changes = std::move(response.parameters);
   result_.range_offset_held_changes = std::move(response.range_offset);
 }
@@ -395,18 +351,9 @@ void Work::fill_datum(const PlanarSolution& solution) {
   }
   result_.datum_given_held = formal_datum(p.train, p.free, result_.covariance, beams, emitter);
   result_.datum = result_.datum_given_held;
-  if (held_.count() > 0) {
-    HeldMovement held{held_.train, held_.rotation_angles.front()};
-    for (std::size_t r = 1; r < recordings_.size(); ++r) {
-      held.rotation_angles += held_.rotation_angles[r];
-    }
-    held.rotation_angles /= static_cast<double>(recordings_.size());
-    for (std::size_t j = 0; j < p.free.size(); ++j) {
-      for (const int at : p.free[j].places) {
-        held.train.row(at) = result_.held_changes.row(static_cast<Eigen::Index>(j));
-      }
-    }
-    result_.datum = formal_datum(p.train, p.free, result_.covariance, beams, emitter, held);
+  if (!result_.held.empty()) {
+    result_.datum = formal_datum(p.train, p.free, result_.covariance, beams, emitter,
+                                 movement_of(held_, p, result_.held_changes));
   }
   result_.datum_without_common = formal_datum(
       p.train, p.free, solution.noise_covariance * result_.variance_factor, beams, emitter);

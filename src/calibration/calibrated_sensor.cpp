@@ -4,12 +4,32 @@
 
 #include <cmath>
 
+#include "risley/algebra/products.hpp"
+
 namespace risley::calibration {
 
 using Eigen::Index;
 
+namespace {
+
+/// Its row behind those of the parameters.
+void add_range_offset(const PlanarSolution& solution, const Calibration& result,
+                      sensors::Sensor& sensor) {
+  const Index n = result.covariance.rows();
+  sensor.covariance_names.emplace_back("range_offset_m");
+  sensor.set_knowledge({"range_offset_m", result.range_offset_sigma,
+                        "calibrated on plane walls by risley calibrate",
+                        result.range_offset_total_sigma()});
+  sensor.covariance.col(n).head(n) = solution.range_offset_covariance * result.variance_factor;
+  sensor.covariance.row(n).head(n) = sensor.covariance.col(n).head(n).transpose();
+  sensor.covariance(n, n) = result.range_offset_sigma * result.range_offset_sigma;
+}
+
+}  // namespace
+
 sensors::Sensor calibrated_sensor(const CalibrationOptions& options, const Belief& belief,
-                                  const PlanarSolution& solution, const Calibration& result) {
+                                  const PlanarSolution& solution, const Calibration& result,
+                                  const std::vector<MovedParameter>& moved) {
   sensors::Sensor sensor = options.sensor;
   sensor.train = solution.problem.train;
   sensor.angular_velocity = belief.sensor.angular_velocity;
@@ -29,20 +49,27 @@ sensors::Sensor calibrated_sensor(const CalibrationOptions& options, const Belie
                           "calibrated on plane walls by risley calibrate", result.total_sigma(j)});
   }
   sensor.reference = sensors::CalibrationReference::planes;
-  sensor.covariance = result.covariance;
   sensor.range_offset = solution.problem.range_offset;
   std::erase_if(sensor.knowledge,
                 [](const sensors::Knowledge& entry) { return entry.name == "range_offset_m"; });
-  if (!(result.range_offset_sigma > 0)) return sensor;
-  const Index n = result.covariance.rows();
-  sensor.covariance_names.emplace_back("range_offset_m");
-  sensor.set_knowledge({"range_offset_m", result.range_offset_sigma,
-                        "calibrated on plane walls by risley calibrate",
-                        result.range_offset_total_sigma()});
-  sensor.covariance.conservativeResize(n + 1, n + 1);
-  sensor.covariance.col(n).head(n) = solution.range_offset_covariance * result.variance_factor;
-  sensor.covariance.row(n).head(n) = sensor.covariance.col(n).head(n).transpose();
-  sensor.covariance(n, n) = result.range_offset_sigma * result.range_offset_sigma;
+  const bool offset = result.range_offset_sigma > 0;
+  const Index n = result.covariance.rows(), held = n + (offset ? 1 : 0),
+              all = held + static_cast<Index>(moved.size());
+  sensor.covariance = Eigen::MatrixXd::Zero(all, all);
+  sensor.covariance.topLeftCorner(n, n) = result.covariance;
+  if (offset) add_range_offset(solution, result, sensor);
+  // With what was held as quantities of their own, beams are as sure as they are: an error of one
+  // and what it does to the others cancel in them.
+  Eigen::MatrixXd movement = Eigen::MatrixXd::Zero(all, result.held_changes.cols());
+  if (movement.cols() == 0) return sensor;
+  movement.topRows(n) = result.held_changes;
+  if (offset) movement.row(n) = result.range_offset_held_changes.transpose();
+  for (std::size_t i = 0; i < moved.size(); ++i) {
+    sensor.covariance_names.push_back(moved[i].name);
+    movement.row(held + static_cast<Index>(i)) = moved[i].by_held;
+  }
+  sensor.covariance +=
+      algebra::propagated(movement, Eigen::MatrixXd::Identity(movement.cols(), movement.cols()));
   return sensor;
 }
 

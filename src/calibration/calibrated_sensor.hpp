@@ -5,13 +5,18 @@
 #include "risley/calibration/calibrate.hpp"
 
 #include "calibration/belief.hpp"
+#include "calibration/held.hpp"
 
 namespace risley::calibration {
 
-/// The sensor as a calibration knows it: adjusted optics with covariance, and what the recordings
-/// tell of the rotors and of what the prisms are made of. All but its serial number.
-/// @param result  with free parameters, covariance, range offset sigma and variance factor
+/// The sensor as a calibration knows it: adjusted optics with the joint covariance of what was
+/// adjusted and what was held, and what the recordings tell of the rotors and of what the prisms
+/// are made of. All but its serial number.
+/// @param result  with free parameters, covariance, range offset sigma, variance factor and changes
+///                by what was held
+/// @param moved   what was held and may be off, in the order of the covariance
 sensors::Sensor calibrated_sensor(const CalibrationOptions& options, const Belief& belief,
-                                  const PlanarSolution& solution, const Calibration& result);
+                                  const PlanarSolution& solution, const Calibration& result,
+                                  const std::vector<MovedParameter>& moved);
 
 }  // namespace risley::calibration

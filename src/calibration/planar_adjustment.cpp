@@ -110,13 +110,6 @@ struct Places {
   }
 };
 
-bool is_free(const PlanarProblem& p, int place) {
-  return std::any_of(p.free.begin(), p.free.end(), [place](const auto& parameter) {
-    return std::find(parameter.places.begin(), parameter.places.end(), place) !=
-           parameter.places.end();
-  });
-}
-
 /// Considered quantities: believed parameters, then the mean angles of every recording. Held ones
 /// have the columns behind them.
 Index considered_size(const PlanarProblem& p) {
@@ -374,6 +367,13 @@ void check(const PlanarProblem& p) {
 }
 
 }  // namespace
+
+bool is_free(const PlanarProblem& problem, int place) {
+  return std::any_of(problem.free.begin(), problem.free.end(), [place](const auto& parameter) {
+    return std::find(parameter.places.begin(), parameter.places.end(), place) !=
+           parameter.places.end();
+  });
+}
 
 bool is_material(int place, int prisms) {
   if (place == place::refractive_index_air()) return true;

@@ -1,0 +1,89 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "calibration/held.hpp"
+
+#include <algorithm>
+
+namespace risley::calibration {
+namespace {
+
+using Eigen::Index;
+using estimation::FreeParameter;
+
+/// Parameters of the true prisms alone that are held, with what the sensor says of them.
+std::vector<FreeParameter> own_held(const sensors::Sensor& sensor, const PlanarProblem& problem) {
+  std::vector<FreeParameter> own;
+  for (const ParameterInfo& info : parameter_list(sensor.shape())) {
+    if (info.kind != ParameterKind::train) continue;
+    const sensors::Knowledge* known = sensor.find_knowledge(info.name);
+    if (known == nullptr || known->name != info.name || !(known->sigma > 0)) continue;
+    const bool in_both = is_material(info.places.front(), sensor.prisms());
+    const bool free = std::any_of(info.places.begin(), info.places.end(),
+                                  [&](int at) { return is_free(problem, at); });
+    if (!in_both && !free) own.push_back({info.name, info.places, known->sigma});
+  }
+  return own;
+}
+
+}  // namespace
+
+Held held_of(const sensors::Sensor& sensor, const Belief& belief, const PlanarProblem& problem) {
+  // What the sensor computes with and light meets, too.
+  const auto in_both = [&](int at) {
+    return is_material(at, sensor.prisms()) && !is_free(problem, at);
+  };
+  const std::vector<FreeParameter> own = own_held(sensor, problem);
+  const auto believed = static_cast<Index>(belief.held.size());
+  const Index count = believed + static_cast<Index>(own.size());
+  Held held;
+  Eigen::MatrixXd& train = held.quantities.train;
+  train = Eigen::MatrixXd::Zero(static_cast<Index>(problem.train.parameters().size()), count);
+  for (Index h = 0; h < believed; ++h) {
+    const FreeParameter& parameter = belief.held[static_cast<std::size_t>(h)];
+    held.names.push_back(parameter.name);
+    for (const int at : parameter.places) {
+      if (in_both(at)) train(at, h) += parameter.prior_sigma;
+    }
+    for (std::size_t j = 0; j < belief.free.size(); ++j) {
+      for (const int at : belief.free[j].places) {
+        if (in_both(at)) train(at, h) += belief.held_changes(static_cast<Index>(j), h);
+      }
+    }
+  }
+  for (Index h = believed; h < count; ++h) {
+    const FreeParameter& parameter = own[static_cast<std::size_t>(h - believed)];
+    held.names.push_back(parameter.name);
+    for (const int at : parameter.places) train(at, h) = parameter.prior_sigma;
+  }
+  for (const Eigen::MatrixXd& angles : belief.held_angle_changes) {
+    Eigen::MatrixXd& all = held.quantities.rotation_angles.emplace_back(
+        Eigen::MatrixXd::Zero(problem.train.prisms(), count));
+    all.leftCols(believed) = angles;
+  }
+  for (const auto* list : {&belief.held, &belief.free, &own}) {
+    for (const FreeParameter& parameter : *list) {
+      if (list != &own && !in_both(parameter.places.front())) continue;
+      const Eigen::RowVectorXd row = train.row(parameter.places.front());
+      if (!row.isZero(0.0)) held.moved.push_back({parameter.name, row});
+    }
+  }
+  return held;
+}
+
+HeldMovement movement_of(const Held& held, const PlanarProblem& problem,
+                         const Eigen::MatrixXd& changes) {
+  HeldMovement movement{held.quantities.train,
+                        Eigen::MatrixXd::Zero(problem.train.prisms(), held.quantities.count())};
+  for (const Eigen::MatrixXd& angles : held.quantities.rotation_angles) {
+    movement.rotation_angles += angles;
+  }
+  movement.rotation_angles /= static_cast<double>(held.quantities.rotation_angles.size());
+  for (std::size_t j = 0; j < problem.free.size(); ++j) {
+    for (const int at : problem.free[j].places) {
+      movement.train.row(at) = changes.row(static_cast<Index>(j));
+    }
+  }
+  return movement;
+}
+
+}  // namespace risley::calibration
