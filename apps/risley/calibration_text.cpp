@@ -146,6 +146,7 @@ Json calibration_json(const CalibratedRecordings& outcome, double total_time) {
       {"planes", planes},
       {"steps", steps},
       {"datum", datum_json(c.datum_kind, c.datum)},
+      {"datum_given_held", datum_json(c.datum_kind, c.datum_given_held)},
       {"prior_tests", tests},
       {"unobservable", unobservable_json(c.unobservable)},
       {"before", {{"plane_rms_m", c.rms_before}}},

@@ -22,7 +22,6 @@ namespace {
 struct PresetOptions {
   std::string name, from, output;
   std::vector<std::string> files;
-  Run run;  ///< of the action that was chosen
 };
 
 Json facts_json(const sensors::Sensor& sensor) {
@@ -97,11 +96,12 @@ ExitStatus check_presets(const PresetOptions& options, const CommonOptions& comm
 Run declare_preset(CLI::App& verb) {
   const auto options = std::make_shared<PresetOptions>();
   PresetOptions& o = *options;
+  const auto chosen = std::make_shared<Run>();  // apart from the options, which every run holds
   verb.require_subcommand(1);
   const auto action = [&](const char* name, const char* description, const Run& run) {
     CLI::App* sub = verb.add_subcommand(name, description);
     sub->fallthrough();  // --json and the like may come last
-    sub->callback([options, run] { options->run = run; });
+    sub->callback([chosen, run] { *chosen = run; });
     return sub;
   };
   const auto output = [&](CLI::App* sub) {
@@ -129,7 +129,7 @@ Run declare_preset(CLI::App& verb) {
   fresh->add_option("NAME", o.name, "Name of the new preset")->required();
   fresh->add_option("--from", o.from, "Preset to copy: by name, or a file")->required();
   output(fresh);
-  return [options](const CommonOptions& common) { return options->run(common); };
+  return [chosen](const CommonOptions& common) { return (*chosen)(common); };
 }
 
 }  // namespace risley::app

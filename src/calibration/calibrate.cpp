@@ -125,7 +125,15 @@ class Work {
     if (options_.beam_origin) p.geometry = options_.sensor.geometry;
     std::vector<std::string> held;
     for (const auto& [name, value] : options_.fixed) held.push_back(name);
-    p.free = calibration_parameters(p.train.shape(), held, options_.additional);
+    if (paper()) {
+      p.free = calibration_parameters(p.train.shape(), held, options_.additional);
+      p.prior_sigma = prior_sigmas(p.free, p.train.shape(), options_.prior_sigma);
+    } else {
+      AdjustedParameters adjusted =
+          adjusted_parameters(options_.sensor, held, options_.additional, options_.prior_sigma);
+      p.free = std::move(adjusted.free);
+      p.prior_sigma = std::move(adjusted.prior_sigma);
+    }
     for (const auto& [name, value] : options_.fixed) {
       if (!value) continue;
       for (const int place : find_parameter(name, p.train.shape()).places) {
@@ -133,7 +141,6 @@ class Work {
       }
     }
     p.prior = p.train;
-    p.prior_sigma = prior_sigmas(p.free, p.train.shape(), options_.prior_sigma);
     p.range_offset_sigma = options_.range_offset_sigma;
     p.considered = belief_.free;
     p.considered_covariance = belief_.covariance;

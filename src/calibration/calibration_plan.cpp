@@ -113,6 +113,32 @@ std::vector<estimation::FreeParameter> calibration_parameters(
   return estimation::free_parameters(names, shape);
 }
 
+AdjustedParameters adjusted_parameters(const sensors::Sensor& sensor,
+                                       const std::vector<std::string>& fixed,
+                                       const std::vector<std::string>& additional,
+                                       std::optional<double> angle_sigma) {
+  const TrainShape shape = sensor.shape();
+  AdjustedParameters adjusted{calibration_parameters(shape, fixed, additional), {}};
+  adjusted.prior_sigma = prior_sigmas(adjusted.free, shape, angle_sigma);
+  const auto is_free = [&](int at) {
+    return std::any_of(adjusted.free.begin(), adjusted.free.end(), [at](const auto& free) {
+      return std::find(free.places.begin(), free.places.end(), at) != free.places.end();
+    });
+  };
+  for (const ParameterInfo& info : parameter_list(shape)) {
+    const sensors::Knowledge* known = sensor.find_knowledge(info.name);
+    if (info.kind != ParameterKind::train || known == nullptr || known->name != info.name ||
+        !(known->sigma > 0) || is_material(info.places.front(), shape.prisms) ||
+        std::find(fixed.begin(), fixed.end(), info.name) != fixed.end() ||
+        std::any_of(info.places.begin(), info.places.end(), is_free)) {
+      continue;
+    }
+    adjusted.free.push_back(estimation::free_parameters({info.name}, shape).front());
+    adjusted.prior_sigma.push_back(std::min(known->sigma, angle_sigma.value_or(known->sigma)));
+  }
+  return adjusted;
+}
+
 CalibrationForecast forecast(const CalibrationPlan& plan, const Progress& progress) {
   const sensors::Sensor& sensor = plan.sensor;
   const double rate = plan.rate.value_or(sensor.shot_rate);
@@ -126,8 +152,10 @@ CalibrationForecast forecast(const CalibrationPlan& plan, const Progress& progre
   PlanarProblem problem;
   problem.train = problem.prior = sensor.train;
   if (plan.beam_origin) problem.geometry = sensor.geometry;
-  problem.free = calibration_parameters(sensor.shape(), plan.fixed, plan.additional);
-  problem.prior_sigma = prior_sigmas(problem.free, sensor.shape(), plan.prior_sigma);
+  AdjustedParameters adjusted =
+      adjusted_parameters(sensor, plan.fixed, plan.additional, plan.prior_sigma);
+  problem.free = std::move(adjusted.free);
+  problem.prior_sigma = std::move(adjusted.prior_sigma);
   problem.range_offset_sigma = plan.range_offset_sigma;
   // One shot of the sample stands for several: its variance is divided by their number.
   const double weight = plan.duration * rate / static_cast<double>(kSampleShots);

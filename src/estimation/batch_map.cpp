@@ -36,8 +36,8 @@ constexpr int kMostFullPasses = 8;
 /// them comes between: near the optical axis angles are far from linear in what the coarse pass
 /// does not tell, and a further pass over all shots would cost more.
 constexpr double kStrongThinning = 16.0, kSomeShots = 0.25;
-/// Rotors that were let free to follow explain correlated residuals where they leave at most this
-/// share of their correlation, or a factor of variances that is hardly one.
+/// Residuals are correlated where that multiplies variances by more than the second; rotors that
+/// were let free to follow explain it where they leave at most the first of the factor.
 constexpr double kWhitened = 0.75, kNearlyWhite = 1.2;
 /// Residual scatter above the stated one by this share enlarges the covariance.
 constexpr double kSignificantExcess = 1.02;
@@ -384,6 +384,7 @@ Solution run_batch_map(const AngleSeries& series, const Start& start, const sens
   Iteration full = go_on_with_all();
   const bool noise_is_held = options.angle_noise.has_value();
   double used_share = 0, first_factor = 1;
+  std::vector<RotorProcess> stiff_process;  // of rotors whose noise is taken to be correlated
   for (int pass = 0; pass < kMostFullPasses; ++pass) {
     full.evaluate();
     if (noise_is_held) level = full.level();
@@ -407,17 +408,18 @@ Solution run_batch_map(const AngleSeries& series, const Start& start, const sens
     const double factor = result.autocorrelation.factor;
     result.variance_factor = factor * excess;
     full.equations().scale(1.0 / excess);
-    if (choose && pass == 0) {
-      process = likeliest_process(full.equations(), full.knots());
-      first_factor = factor;
-    }
+    if (choose && pass == 0) process = likeliest_process(full.equations(), full.knots());
     full.equations().scale(1.0 / factor);
     // Neighbouring residuals hang together because rotors wander faster than was thought, or
     // because the noise itself does: rotors that follow leave white residuals in the first case
     // alone.
+    if (choose && pass == 0 && factor > kNearlyWhite) {
+      stiff_process = likeliest_process(full.equations(), full.knots());
+      first_factor = factor;
+    }
     const bool noise_is_coloured =
-        choose && pass == 1 && factor > std::max(kNearlyWhite, kWhitened * first_factor);
-    if (noise_is_coloured) process = likeliest_process(full.equations(), full.knots());
+        pass == 1 && !stiff_process.empty() && factor > kWhitened * first_factor;
+    if (noise_is_coloured) process = std::move(stiff_process);
     // The first step goes from what the thinned shots tell to what all tell, the second should be
     // one of rounding.
     SmootherSolution solution = full.solve(process, true);

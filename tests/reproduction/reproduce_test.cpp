@@ -17,7 +17,7 @@
 
 namespace risley::reproduction::reproduce_test {
 
-constexpr Effort kSmall{3, 3, 1, 0, 12, 1, 1};
+constexpr Effort kSmall{3, 3, 1, 0, 12, 1, 3};
 
 ReproduceOptions small_options() {
   ReproduceOptions options;

@@ -61,6 +61,21 @@ struct CalibrationForecast {
 ///         rate, noise or sigma out of its range, and as calibration_parameters()
 CalibrationForecast forecast(const CalibrationPlan& plan, const Progress& progress = {});
 
+/// What an adjustment estimates, and what it knows of it before.
+struct AdjustedParameters {
+  std::vector<estimation::FreeParameter> free;
+  std::vector<double> prior_sigma;  ///< [free], SI; infinite: nothing
+};
+
+/// The free parameters of a calibration and, with what the sensor states of them as priors, the
+/// tilts that directions do not tell and walls do: prism A's horizontal one, by default.
+/// @param angle_sigma  prior sigma of every angle, rad; none: only those of these tilts
+/// @throws InvalidArgument as calibration_parameters()
+AdjustedParameters adjusted_parameters(const sensors::Sensor& sensor,
+                                       const std::vector<std::string>& fixed,
+                                       const std::vector<std::string>& additional,
+                                       std::optional<double> angle_sigma);
+
 /// Free parameters of a calibration: what walls can tell, less the fixed ones plus the others. The
 /// refractive index is held unless asked for, since the recording itself tells it better.
 /// @throws InvalidArgument for a name that is no parameter of the prisms, or is in both lists
