@@ -120,21 +120,14 @@ AdjustedParameters adjusted_parameters(const sensors::Sensor& sensor,
   const TrainShape shape = sensor.shape();
   AdjustedParameters adjusted{calibration_parameters(shape, fixed, additional), {}};
   adjusted.prior_sigma = prior_sigmas(adjusted.free, shape, angle_sigma);
-  const auto is_free = [&](int at) {
-    return std::any_of(adjusted.free.begin(), adjusted.free.end(), [at](const auto& free) {
-      return std::find(free.places.begin(), free.places.end(), at) != free.places.end();
-    });
-  };
-  for (const ParameterInfo& info : parameter_list(shape)) {
-    const sensors::Knowledge* known = sensor.find_knowledge(info.name);
-    if (info.kind != ParameterKind::train || known == nullptr || known->name != info.name ||
-        !(known->sigma > 0) || is_material(info.places.front(), shape.prisms) ||
-        std::find(fixed.begin(), fixed.end(), info.name) != fixed.end() ||
-        std::any_of(info.places.begin(), info.places.end(), is_free)) {
+  for (const auto& tilt : estimation::uncertain_held(sensor, adjusted.free)) {
+    if (is_material(tilt.places.front(), shape.prisms) ||
+        std::find(fixed.begin(), fixed.end(), tilt.name) != fixed.end()) {
       continue;
     }
-    adjusted.free.push_back(estimation::free_parameters({info.name}, shape).front());
-    adjusted.prior_sigma.push_back(std::min(known->sigma, angle_sigma.value_or(known->sigma)));
+    adjusted.free.push_back(estimation::free_parameters({tilt.name}, shape).front());
+    adjusted.prior_sigma.push_back(
+        std::min(tilt.prior_sigma, angle_sigma.value_or(tilt.prior_sigma)));
   }
   return adjusted;
 }

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: MIT
 #include "calibration/held.hpp"
 
-#include <algorithm>
+#include <utility>
 
 namespace risley::calibration {
 namespace {
@@ -10,29 +10,18 @@ namespace {
 using Eigen::Index;
 using estimation::FreeParameter;
 
-/// Parameters of the true prisms alone that are held, with what the sensor says of them.
-std::vector<FreeParameter> own_held(const sensors::Sensor& sensor, const PlanarProblem& problem) {
-  std::vector<FreeParameter> own;
-  for (const ParameterInfo& info : parameter_list(sensor.shape())) {
-    if (info.kind != ParameterKind::train) continue;
-    const sensors::Knowledge* known = sensor.find_knowledge(info.name);
-    if (known == nullptr || known->name != info.name || !(known->sigma > 0)) continue;
-    const bool in_both = is_material(info.places.front(), sensor.prisms());
-    const bool free = std::any_of(info.places.begin(), info.places.end(),
-                                  [&](int at) { return is_free(problem, at); });
-    if (!in_both && !free) own.push_back({info.name, info.places, known->sigma});
-  }
-  return own;
-}
-
 }  // namespace
 
 Held held_of(const sensors::Sensor& sensor, const Belief& belief, const PlanarProblem& problem) {
   // What the sensor computes with and light meets, too.
   const auto in_both = [&](int at) {
-    return is_material(at, sensor.prisms()) && !is_free(problem, at);
+    return is_material(at, sensor.prisms()) && !estimation::takes_place(problem.free, at);
   };
-  const std::vector<FreeParameter> own = own_held(sensor, problem);
+  // What the true prisms have by themselves.
+  std::vector<FreeParameter> own = estimation::uncertain_held(sensor, problem.free);
+  std::erase_if(own, [&](const FreeParameter& parameter) {
+    return is_material(parameter.places.front(), sensor.prisms());
+  });
   const auto believed = static_cast<Index>(belief.held.size());
   const Index count = believed + static_cast<Index>(own.size());
   Held held;
@@ -60,7 +49,7 @@ Held held_of(const sensors::Sensor& sensor, const Belief& belief, const PlanarPr
         Eigen::MatrixXd::Zero(problem.train.prisms(), count));
     all.leftCols(believed) = angles;
   }
-  for (const auto* list : {&belief.held, &belief.free, &own}) {
+  for (const auto* list : {&belief.held, &belief.free, &std::as_const(own)}) {
     for (const FreeParameter& parameter : *list) {
       if (list != &own && !in_both(parameter.places.front())) continue;
       const Eigen::RowVectorXd row = train.row(parameter.places.front());

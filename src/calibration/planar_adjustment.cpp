@@ -164,7 +164,7 @@ Chain chain_of(const PlanarProblem& p, const HeldQuantities& held, const Unknown
   for (Index j = 0; j < believed; ++j) {
     for (const int place : p.considered[static_cast<std::size_t>(j)].places) {
       // The other error parameters that the sensor believes in only act through the angles.
-      if (is_material(place, p.train.prisms()) && !is_free(p, place)) {
+      if (is_material(place, p.train.prisms()) && !estimation::takes_place(p.free, place)) {
         chain.considered(places.column(place), j) = 1.0;
       }
     }
@@ -367,13 +367,6 @@ void check(const PlanarProblem& p) {
 }
 
 }  // namespace
-
-bool is_free(const PlanarProblem& problem, int place) {
-  return std::any_of(problem.free.begin(), problem.free.end(), [place](const auto& parameter) {
-    return std::find(parameter.places.begin(), parameter.places.end(), place) !=
-           parameter.places.end();
-  });
-}
 
 bool is_material(int place, int prisms) {
   if (place == place::refractive_index_air()) return true;

@@ -68,6 +68,26 @@ std::vector<FreeParameter> free_parameters(const std::vector<std::string>& names
   return free;
 }
 
+bool takes_place(const std::vector<FreeParameter>& parameters, int place) {
+  return std::any_of(parameters.begin(), parameters.end(), [place](const FreeParameter& one) {
+    return std::find(one.places.begin(), one.places.end(), place) != one.places.end();
+  });
+}
+
+std::vector<FreeParameter> uncertain_held(const sensors::Sensor& sensor,
+                                          const std::vector<FreeParameter>& free) {
+  std::vector<FreeParameter> held;
+  for (const ParameterInfo& info : parameter_list(sensor.shape())) {
+    if (info.kind != ParameterKind::train) continue;
+    const sensors::Knowledge* known = sensor.find_knowledge(info.name);
+    if (known == nullptr || known->name != info.name || !(known->sigma > 0)) continue;
+    const bool is_free = std::any_of(info.places.begin(), info.places.end(),
+                                     [&](int place) { return takes_place(free, place); });
+    if (!is_free) held.push_back({info.name, info.places, known->sigma});
+  }
+  return held;
+}
+
 Eigen::VectorXd free_values(const PrismTrain& train, const std::vector<FreeParameter>& free) {
   Eigen::VectorXd values(static_cast<Eigen::Index>(free.size()));
   for (std::size_t i = 0; i < free.size(); ++i) {

@@ -19,29 +19,18 @@ using Eigen::Index;
 /// So many shots tell how answers hang on held parameters: shares of them do, not sigmas.
 constexpr double kSampleShots = 20000;
 
-/// Parameters of the train that are held and that the sensor says may be off.
-std::vector<FreeParameter> uncertain_held(const Estimate& estimate, const sensors::Sensor& sensor) {
-  std::vector<FreeParameter> held;
-  const int prisms = sensor.prisms();
+/// Those of which some answer depends.
+std::vector<FreeParameter> telling_held(const Estimate& estimate, const sensors::Sensor& sensor) {
+  std::vector<FreeParameter> held = uncertain_held(sensor, estimate.free);
   const auto fires = [&](int emitter) {
     if (estimate.series.beam.empty()) return emitter == 0;
     return std::find(estimate.series.beam.begin(), estimate.series.beam.end(), emitter) !=
            estimate.series.beam.end();
   };
-  const auto is_free = [&](int place) {
-    return std::any_of(estimate.free.begin(), estimate.free.end(), [&](const auto& free) {
-      return std::find(free.places.begin(), free.places.end(), place) != free.places.end();
-    });
-  };
-  for (const ParameterInfo& info : parameter_list(sensor.shape())) {
-    if (info.kind != ParameterKind::train) continue;
-    const sensors::Knowledge* known = sensor.find_knowledge(info.name);
-    if (known == nullptr || known->name != info.name || !(known->sigma > 0)) continue;
-    if (std::any_of(info.places.begin(), info.places.end(), is_free)) continue;
-    const int emitter = place::emitter(info.places.front(), prisms);
-    if (emitter >= 0 && !fires(emitter)) continue;  // no answer depends on it
-    held.push_back({info.name, info.places, known->sigma});
-  }
+  std::erase_if(held, [&](const FreeParameter& parameter) {
+    const int emitter = place::emitter(parameter.places.front(), sensor.prisms());
+    return emitter >= 0 && !fires(emitter);
+  });
   return held;
 }
 
@@ -73,7 +62,7 @@ struct Sample {
 
 HeldChanges changes_by_held_parameters(const Estimate& estimate, const sensors::Sensor& sensor) {
   HeldChanges result;
-  result.held = uncertain_held(estimate, sensor);
+  result.held = telling_held(estimate, sensor);
   const std::vector<FreeParameter>& held = result.held;
   std::vector<FreeParameter> all = estimate.constants.empty() ? estimate.free : estimate.constants;
   const auto free = static_cast<Index>(all.size());

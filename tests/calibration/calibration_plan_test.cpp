@@ -329,4 +329,25 @@ TEST(CalibrationParameters, AreTheTiltsThatWallsTell) {
   EXPECT_THROW(calibration_parameters({2}, {"bearing_tilt_c_vertical_deg"}, {}), InvalidArgument);
 }
 
+// What the preset states of a tilt that directions do not tell is its prior; wedges stay held.
+TEST(AdjustedParameters, AreThoseAndTheTiltsWithAPrior) {
+  const sensors::Sensor sensor = sensors::load_sensor("mid-40");
+  const AdjustedParameters all = adjusted_parameters(sensor, {}, {}, std::nullopt);
+  ASSERT_EQ(all.free.size(), testing::kTiltNames.size() + 1);
+  ASSERT_EQ(all.prior_sigma.size(), all.free.size());
+  EXPECT_EQ(all.free.back().name, "prism_tilt_a_horizontal_deg");
+  EXPECT_NEAR(all.prior_sigma.back(), radians_from_degrees(0.3), 1e-12);
+  for (std::size_t j = 0; j + 1 < all.free.size(); ++j) EXPECT_TRUE(std::isinf(all.prior_sigma[j]));
+  const AdjustedParameters narrow = adjusted_parameters(sensor, {}, {}, radians_from_degrees(0.1));
+  for (const double sigma : narrow.prior_sigma)
+    EXPECT_NEAR(sigma, radians_from_degrees(0.1), 1e-12);
+  EXPECT_EQ(
+      adjusted_parameters(sensor, {"prism_tilt_a_horizontal_deg"}, {}, std::nullopt).free.size(),
+      testing::kTiltNames.size());
+  const AdjustedParameters freed =
+      adjusted_parameters(sensor, {}, {"prism_tilt_a_horizontal_deg"}, std::nullopt);
+  EXPECT_EQ(freed.free.size(), testing::kTiltNames.size() + 1);
+  EXPECT_TRUE(std::isinf(freed.prior_sigma.back()));
+}
+
 }  // namespace risley::calibration::calibration_plan_test

@@ -98,7 +98,7 @@ class NormalEquationsOfEmitters : public ::testing::TestWithParam<Emitters> {};
 
 TEST_P(NormalEquationsOfEmitters, AreTheSumOfThoseOfEach) {
   const PrismTrain truth = testing::imperfect_train(GetParam().order, 0.5, 1, GetParam().count);
-  const Recording all = record(truth, {1, 7, 8, 9, 100, 64, 3}, 2);
+  const Recording all = record(truth, {1, 7, 8, 9, 100, 64, 3, 2500}, 2);
   PrismTrain train = truth;  // linearised a little beside it
   train.set_place(place::incident_beam_vertical(0, train.prisms()), 3e-4 + train[2]);
   // Every place that has a name.
@@ -119,6 +119,8 @@ TEST_P(NormalEquationsOfEmitters, AreTheSumOfThoseOfEach) {
   std::vector<double> curvature, states;
   double cost = 0;
   std::size_t outliers = 0;
+  std::vector<double> azimuth_residual(all.series.size()), zenith_residual(all.series.size());
+  std::vector<unsigned char> outlier(all.series.size());
   for (int beam = 0; beam < train.emitters(); ++beam) {
     const PrismTrain own_train = testing::train_of_emitter(train, beam);
     const Recording own = of_emitter(all, beam);
@@ -132,8 +134,16 @@ TEST_P(NormalEquationsOfEmitters, AreTheSumOfThoseOfEach) {
       columns.push_back(j);
     }
     NormalEquations part;
-    accumulate(own.series, own.knots, own_train, own_free, weights, part, {},
+    std::vector<double> azimuth(own.series.size()), zenith(own.series.size());
+    std::vector<unsigned char> out(own.series.size());
+    accumulate(own.series, own.knots, own_train, own_free, weights, part, {azimuth, zenith, out},
                InstructionSet::baseline);
+    for (std::size_t i = 0, row = 0; i < all.series.size(); ++i) {
+      if (all.series.beam[i] != beam) continue;
+      azimuth_residual[i] = azimuth[row];
+      zenith_residual[i] = zenith[row];
+      outlier[i] = out[row++];
+    }
     cost += part.cost;
     outliers += part.outliers;
     curvature.resize(part.curvature.size());
@@ -159,8 +169,15 @@ TEST_P(NormalEquationsOfEmitters, AreTheSumOfThoseOfEach) {
   for (const InstructionSet set : available_instruction_sets()) {
     SCOPED_TRACE(to_string(set));
     NormalEquations found;
-    accumulate(all.series, all.knots, train, free, weights, found, {}, set);
+    std::vector<double> azimuth(all.series.size()), zenith(all.series.size());
+    std::vector<unsigned char> out(all.series.size());
+    accumulate(all.series, all.knots, train, free, weights, found, {azimuth, zenith, out}, set);
     EXPECT_EQ(found.outliers, outliers);
+    EXPECT_EQ(out, outlier);
+    for (std::size_t i = 0; i < azimuth.size(); ++i) {
+      EXPECT_NEAR(azimuth[i], azimuth_residual[i], 1e-12) << i;
+      EXPECT_NEAR(zenith[i], zenith_residual[i], 1e-12) << i;
+    }
     EXPECT_NEAR(found.cost, cost, 1e-10 * cost);
     const auto near = [](const auto& a, const auto& b, double size) {
       for (std::size_t i = 0; i < a.size(); ++i) EXPECT_NEAR(a[i], b[i], 1e-10 * size) << i;

@@ -149,9 +149,6 @@ Eigen::MatrixXd prior_information(const PlanarProblem& problem);
 /// The view of a problem as plane_equations() wants it.
 PlaneView plane_view(const PlanarProblem& problem, std::size_t view);
 
-/// Whether a place of the flat vector is one of the free parameters.
-bool is_free(const PlanarProblem& problem, int place);
-
 /// Whether a place of the flat vector describes what the prisms are made of (index, wedge), which
 /// the sensor and the calibration share, and not how they are mounted.
 bool is_material(int place, int prisms);

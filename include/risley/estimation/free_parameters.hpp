@@ -34,6 +34,14 @@ std::vector<std::string> default_free_names(TrainShape shape, bool one_glass = t
 ///         as shared and own, such as refractive_index with refractive_index_a)
 std::vector<FreeParameter> free_parameters(const std::vector<std::string>& names, TrainShape shape);
 
+/// Whether one of the parameters takes its value to a place of the flat vector.
+bool takes_place(const std::vector<FreeParameter>& parameters, int place);
+
+/// Parameters of the train of which a sensor states a sigma and none is in a place of the free
+/// ones: what is held and may be off. Their prior sigma is the stated one.
+std::vector<FreeParameter> uncertain_held(const sensors::Sensor& sensor,
+                                          const std::vector<FreeParameter>& free);
+
 /// Values of free parameters in a train [free], SI units.
 Eigen::VectorXd free_values(const PrismTrain& train, const std::vector<FreeParameter>& free);
 /// A train with the free parameters replaced. @param values  [free], SI units
