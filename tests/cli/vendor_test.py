@@ -163,7 +163,8 @@ class VendorTest(CommandTest):
                     for letter, speed in (("a", -47358), ("b", 14688)):
                         self.assertAlmostEqual(value[f"angular_velocity_{letter}_deg_per_s"], speed,
                                                delta=0.0005 * abs(speed))
-                    self.assertLess(self.residual_of(result), 0.012)
+                    # 240,000 are not quite what the packets of these files say.
+                    self.assertLess(self.residual_of(result), 0.0105 if rate else 0.010)
                     self.assertGreater(result["observations_used"], 0.998 * rows)
                     self.assertLess(result["outliers"], 0.001 * rows)
                     self.assertTrue(any("points are missing" in one for one in result["warnings"]))
