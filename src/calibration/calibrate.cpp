@@ -321,7 +321,7 @@ void Work::fill_result(const PlanarSolution& solution) {
   result_.rms_before = walls.rms_before;
   result_.rms_after = walls.rms_after;
   result_.points = walls.points;
-  result_.sensor = calibrated_sensor(options_, belief_, solution, result_, held_.moved);
+  result_.sensor = calibrated_sensor(options_, belief_, solution, result_, held_);
   result_.sensor.serial = recordings_.front().serial;
   fill_datum(solution);
   result_.reason = reason_of_failure(result_, solution);

@@ -29,7 +29,7 @@ void add_range_offset(const PlanarSolution& solution, const Calibration& result,
 
 sensors::Sensor calibrated_sensor(const CalibrationOptions& options, const Belief& belief,
                                   const PlanarSolution& solution, const Calibration& result,
-                                  const std::vector<MovedParameter>& moved) {
+                                  const Held& held) {
   sensors::Sensor sensor = options.sensor;
   sensor.train = solution.problem.train;
   sensor.angular_velocity = belief.sensor.angular_velocity;
@@ -53,8 +53,8 @@ sensors::Sensor calibrated_sensor(const CalibrationOptions& options, const Belie
   std::erase_if(sensor.knowledge,
                 [](const sensors::Knowledge& entry) { return entry.name == "range_offset_m"; });
   const bool offset = result.range_offset_sigma > 0;
-  const Index n = result.covariance.rows(), held = n + (offset ? 1 : 0),
-              all = held + static_cast<Index>(moved.size());
+  const Index n = result.covariance.rows(), first = n + (offset ? 1 : 0),
+              all = first + static_cast<Index>(held.moved.size());
   sensor.covariance = Eigen::MatrixXd::Zero(all, all);
   sensor.covariance.topLeftCorner(n, n) = result.covariance;
   if (offset) add_range_offset(solution, result, sensor);
@@ -64,9 +64,12 @@ sensors::Sensor calibrated_sensor(const CalibrationOptions& options, const Belie
   if (movement.cols() == 0) return sensor;
   movement.topRows(n) = result.held_changes;
   if (offset) movement.row(n) = result.range_offset_held_changes.transpose();
-  for (std::size_t i = 0; i < moved.size(); ++i) {
-    sensor.covariance_names.push_back(moved[i].name);
-    movement.row(held + static_cast<Index>(i)) = moved[i].by_held;
+  for (std::size_t i = 0; i < held.moved.size(); ++i) {
+    sensor.covariance_names.push_back(held.moved[i].name);
+    movement.row(first + static_cast<Index>(i)) = held.moved[i].by_held;
+  }
+  for (std::size_t h = 0; h < held.moves_optics.size(); ++h) {
+    if (!held.moves_optics[h]) movement.col(static_cast<Index>(h)).setZero();
   }
   sensor.covariance +=
       algebra::propagated(movement, Eigen::MatrixXd::Identity(movement.cols(), movement.cols()));

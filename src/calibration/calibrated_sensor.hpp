@@ -14,9 +14,9 @@ namespace risley::calibration {
 /// are made of. All but its serial number.
 /// @param result  with free parameters, covariance, range offset sigma, variance factor and changes
 ///                by what was held
-/// @param moved   what was held and may be off, in the order of the covariance
+/// @param held    what was held and may be off
 sensors::Sensor calibrated_sensor(const CalibrationOptions& options, const Belief& belief,
                                   const PlanarSolution& solution, const Calibration& result,
-                                  const std::vector<MovedParameter>& moved);
+                                  const Held& held);
 
 }  // namespace risley::calibration

@@ -30,6 +30,7 @@ Held held_of(const sensors::Sensor& sensor, const Belief& belief, const PlanarPr
   for (Index h = 0; h < believed; ++h) {
     const FreeParameter& parameter = belief.held[static_cast<std::size_t>(h)];
     held.names.push_back(parameter.name);
+    held.moves_optics.push_back(is_material(parameter.places.front(), sensor.prisms()));
     for (const int at : parameter.places) {
       if (in_both(at)) train(at, h) += parameter.prior_sigma;
     }
@@ -42,6 +43,7 @@ Held held_of(const sensors::Sensor& sensor, const Belief& belief, const PlanarPr
   for (Index h = believed; h < count; ++h) {
     const FreeParameter& parameter = own[static_cast<std::size_t>(h - believed)];
     held.names.push_back(parameter.name);
+    held.moves_optics.push_back(true);
     for (const int at : parameter.places) train(at, h) = parameter.prior_sigma;
   }
   for (const Eigen::MatrixXd& angles : belief.held_angle_changes) {
@@ -52,7 +54,10 @@ Held held_of(const sensors::Sensor& sensor, const Belief& belief, const PlanarPr
   for (const auto* list : {&belief.held, &belief.free, &std::as_const(own)}) {
     for (const FreeParameter& parameter : *list) {
       if (list != &own && !in_both(parameter.places.front())) continue;
-      const Eigen::RowVectorXd row = train.row(parameter.places.front());
+      Eigen::RowVectorXd row = train.row(parameter.places.front());
+      for (Index h = 0; h < count; ++h) {
+        if (!held.moves_optics[static_cast<std::size_t>(h)]) row[h] = 0;
+      }
       if (!row.isZero(0.0)) held.moved.push_back({parameter.name, row});
     }
   }

@@ -16,7 +16,7 @@
 namespace risley::calibration {
 
 /// A parameter that a calibration did not estimate and that may be off, by how much for a sigma of
-/// each held quantity [held], SI.
+/// each held quantity that moves the optics [held], SI.
 struct MovedParameter {
   std::string name;
   Eigen::RowVectorXd by_held;
@@ -26,6 +26,9 @@ struct MovedParameter {
 struct Held {
   std::vector<std::string> names;  ///< [held]
   HeldQuantities quantities;
+  /// Whether a quantity moves the optics themselves. The sensor's own tilts do not: who uses the
+  /// calibration computes rotation angles with the same errors again, which cancel what these did.
+  std::vector<bool> moves_optics;  ///< [held]
   std::vector<MovedParameter> moved;
 };
 

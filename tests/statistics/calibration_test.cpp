@@ -172,6 +172,20 @@ simulation::SimulationSettings settings_of_drawn_unit(std::uint64_t seed) {
   return settings;
 }
 
+/// What the covariance in a calibration's file says of its beams.
+calibration::FormalDatum datum_of_file(const sensors::Sensor& sensor, const WallRecording& walls) {
+  std::vector<std::string> names;
+  std::vector<Eigen::Index> rows;
+  for (std::size_t i = 0; i < sensor.covariance_names.size(); ++i) {
+    if (sensor.covariance_names[i] == "range_offset_m") continue;
+    names.push_back(sensor.covariance_names[i]);
+    rows.push_back(static_cast<Eigen::Index>(i));
+  }
+  return calibration::formal_datum(sensor.train, estimation::free_parameters(names, sensor.shape()),
+                                   Eigen::MatrixXd(sensor.covariance(rows, rows)),
+                                   walls.recording.shots.rotation_angle);
+}
+
 TEST(Calibration, TotalSigmasHoldWhatHeldParametersAreOffBy) {
   const int seeds = seeds_or(16);
   double squares = 0, squares_given_held = 0, parameters = 0, beyond = 0, joint = 0;
@@ -184,6 +198,8 @@ TEST(Calibration, TotalSigmasHoldWhatHeldParametersAreOffBy) {
     beams.add(judged, walls.settings.truth);
     const calibration::Calibration& c = judged.calibration;
     ASSERT_GE(c.held.size(), 2u);
+    // The file says of the beams what the calibration does: what was held cancels in them.
+    EXPECT_NEAR(datum_of_file(c.sensor, walls).total / c.datum.total, 1.0, 0.05);
     Eigen::VectorXd error(c.parameters.size());
     for (std::size_t j = 0; j < c.free.size(); ++j) {
       const auto at = static_cast<Eigen::Index>(j);
