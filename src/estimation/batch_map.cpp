@@ -419,7 +419,7 @@ Solution run_batch_map(const AngleSeries& series, const Start& start, const sens
     }
     const bool noise_is_coloured =
         pass == 1 && !stiff_process.empty() && factor > kWhitened * first_factor;
-    if (noise_is_coloured) process = std::move(stiff_process);
+    if (noise_is_coloured) process = stiff_process;
     // The first step goes from what the thinned shots tell to what all tell, the second should be
     // one of rounding.
     SmootherSolution solution = full.solve(process, true);
