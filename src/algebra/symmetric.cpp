@@ -46,6 +46,7 @@ Eigen::VectorXd SymmetricSolver::solve(const Eigen::VectorXd& right) const {
 
 Eigen::MatrixXd SymmetricSolver::solve_columns(const Eigen::MatrixXd& right) const {
   require_length("rows of the right side", length(right.rows()), length(scale_.size()));
+  if (right.cols() == 0) return right;  // Eigen would look at the first entry of none
   const Eigen::MatrixXd balanced = scale_.asDiagonal() * right;
   return scale_.asDiagonal() * factors_.solve(balanced).eval();
 }
