@@ -19,7 +19,7 @@ using Eigen::Index;
 /// So many shots tell how answers hang on held parameters: shares of them do, not sigmas.
 constexpr double kSampleShots = 20000;
 
-/// Those of which some answer depends.
+/// Held parameters that some answer depends on.
 std::vector<FreeParameter> telling_held(const Estimate& estimate, const sensors::Sensor& sensor) {
   std::vector<FreeParameter> held = uncertain_held(sensor, estimate.free);
   const auto fires = [&](int emitter) {

@@ -151,18 +151,13 @@ simulation::SimulationSettings settings_of_drawn_unit(std::uint64_t seed) {
   simulation::SimulationSettings settings = wall_settings(hall(), seed);
   const sensors::Sensor preset = sensors::load_sensor("mid-40");
   const TrainShape shape = preset.shape();
-  const auto free = estimation::default_free_names(shape);
+  const auto free = estimation::free_parameters(estimation::default_free_names(shape), shape);
   const RandomStream errors(seed, 95);
   std::uint64_t number = 0;
-  for (const ParameterInfo& info : parameter_list(shape)) {
-    const sensors::Knowledge* known = preset.find_knowledge(info.name);
-    if (info.kind != ParameterKind::train || known == nullptr || known->name != info.name ||
-        !(known->sigma > 0) || std::find(free.begin(), free.end(), info.name) != free.end()) {
-      continue;
-    }
-    const double common = known->sigma * errors.normal(number++);
-    const double own = known->sigma * errors.normal(number++);
-    for (const int at : info.places) {
+  for (const auto& held : estimation::uncertain_held(preset, free)) {
+    const double common = held.prior_sigma * errors.normal(number++);
+    const double own = held.prior_sigma * errors.normal(number++);
+    for (const int at : held.places) {
       const bool material = calibration::is_material(at, shape.prisms);
       settings.truth.train.set_place(at, settings.truth.train[at] + common);
       settings.reported->train.set_place(at,
