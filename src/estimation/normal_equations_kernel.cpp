@@ -145,22 +145,16 @@ constexpr std::size_t kMostFree = EmitterLanes<Batch, N>::kPlaces;
 /// The free parameters that the shots of one emitter depend on.
 template <int N>
 struct OwnParameters {
+  int emitter = 0;
   std::size_t count = 0;
-  std::size_t number[kMostFree<N>];   ///< among all free ones, ascending
-  int derivative[kMostFree<N>] = {};  ///< where that by a place stands in a shot's, or -1
+  std::size_t number[kMostFree<N>];  ///< among all free ones, ascending
 
   OwnParameters() = default;
-  OwnParameters(const NormalEquationArguments& a, int emitter) {
-    for (int at = 0; at < static_cast<int>(kMostFree<N>); ++at) {
-      const int of = place::emitter(at, N);
-      derivative[at] = of < 0          ? at
-                       : of != emitter ? -1
-                                       : at - place::incident_beam_horizontal(emitter, N) +
-                                             place::incident_beam_horizontal();
-    }
+  OwnParameters(const NormalEquationArguments& a, int its_emitter) : emitter(its_emitter) {
     for (int j = 0; j < a.free; ++j) {
       for (int p = a.place_begin[j]; p < a.place_begin[j + 1]; ++p) {
-        if (derivative[a.places[p]] < 0) continue;
+        const int of = place::emitter(a.places[p], N);
+        if (of >= 0 && of != emitter) continue;
         number[count++] = static_cast<std::size_t>(j);
         break;
       }
@@ -186,8 +180,7 @@ void fill_row(const NormalEquationArguments& a, const OwnParameters<N>& own,
     const std::size_t j = own.number[i];
     Batch sum(0.0);
     for (int p = a.place_begin[j]; p < a.place_begin[j + 1]; ++p) {
-      const int at = own.derivative[a.places[p]];
-      if (at >= 0) sum = sum + gradient.parameters[static_cast<std::size_t>(at)];
+      sum = sum + derivative_by(gradient, a.places[p], own.emitter);
     }
     row.free[i] = scale * sum;
   }
