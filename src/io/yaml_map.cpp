@@ -19,6 +19,7 @@
 #include <yaml-cpp/parser.h>
 
 #include "risley/core/error.hpp"
+#include "risley/core/text.hpp"
 
 namespace risley::io {
 namespace {
@@ -187,9 +188,12 @@ YamlMap::YamlMap(const YamlNode& node, std::string path, std::string field)
 void YamlMap::allow_only(std::initializer_list<std::string_view> keys) const {
   for (const Entry& entry : entries_) {
     if (std::find(keys.begin(), keys.end(), entry.key) != keys.end()) continue;
+    const std::vector<std::string> known(keys.begin(), keys.end());
+    const std::string meant = near_miss(entry.key, known);
     fail_at(path_, entry.line,
-            fmt::format("unknown field {}, allowed here: {}", field(entry.key),
-                        fmt::join(keys.begin(), keys.end(), ", ")));
+            fmt::format("unknown field {}{}, allowed here: {}", field(entry.key),
+                        meant.empty() ? "" : fmt::format(", did you mean {}?", meant),
+                        fmt::join(known, ", ")));
   }
 }
 

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
 #include <filesystem>
 #include <numbers>
@@ -17,6 +16,7 @@
 #include "risley/core/text.hpp"
 #include "risley/io/text_file.hpp"
 #include "risley/io/yaml_map.hpp"
+#include "risley/io/yaml_output.hpp"
 
 #include "sensors/builtin_presets.hpp"
 
@@ -25,6 +25,7 @@ namespace {
 
 using io::fail_at;
 using io::yaml_number;
+using io::yaml_quoted;
 using io::yaml_text;
 using io::YamlMap;
 using io::YamlNode;
@@ -46,45 +47,7 @@ std::string file_number(double value, long double scale, std::string_view field)
   if (!std::isfinite(value)) {
     throw InvalidArgument(fmt::format("{} = {}, a preset holds finite numbers only", field, value));
   }
-  const long double in_file = static_cast<long double>(value) / scale;
-  std::array<char, 64> text{};
-  char* const begin = text.data();
-  char* const limit = begin + text.size();
-  const auto reads_back = [&](const char* end) {
-    long double again = 0;
-    std::from_chars(begin, end, again);
-    return si_from_file(again, scale) == value;
-  };
-  char* end = begin;
-  int decimals = 0;
-  for (; decimals < 24; ++decimals) {
-    end = std::to_chars(begin, limit, in_file, std::chars_format::scientific, decimals).ptr;
-    if (reads_back(end)) break;
-  }
-  int exponent = 0;
-  const char* digits = std::find(begin, end, 'e') + 1;
-  std::from_chars(*digits == '+' ? digits + 1 : digits, end, exponent);
-  if (exponent >= -5 && exponent < 16) {  // as people write it
-    end = std::to_chars(begin, limit, in_file, std::chars_format::fixed,
-                        std::max(0, decimals - exponent))
-              .ptr;
-  }
-  return {begin, end};
-}
-
-std::string yaml_quoted(std::string_view text) {
-  std::string out = "\"";
-  for (const char c : text) {
-    if (c == '"' || c == '\\') {
-      out += '\\';
-      out += c;
-    } else if (static_cast<unsigned char>(c) < 0x20) {
-      out += fmt::format("\\x{:02x}", static_cast<unsigned char>(c));
-    } else {
-      out += c;
-    }
-  }
-  return out + '"';
+  return io::yaml_decimal(value, scale);
 }
 
 /// A number of a sensor that is no parameter of the observation model.

@@ -46,7 +46,9 @@ TEST(Yaml, MistakesAreFoundWithTheirLine) {
   EXPECT_THAT(refusal("- 1\n"), HasSubstr("expected a map, found a list"));
   EXPECT_THAT(refusal(""), HasSubstr("found nothing"));
   EXPECT_THAT(refusal("number: 1\nlist: 2\nnumber: 1\n"), HasSubstr("line 3: number stands twice"));
-  EXPECT_THAT(refusal("number: 1\nother: 2\n"), HasSubstr("line 2: unknown field other"));
+  EXPECT_THAT(refusal("number: 1\nother: 2\n"),
+              HasSubstr("line 2: unknown field other, allowed here"));
+  EXPECT_THAT(refusal("numbr: 1\n"), HasSubstr("unknown field numbr, did you mean number?"));
   EXPECT_THAT(refusal("number: 11\n"), HasSubstr("allowed 0 to 10"));
   EXPECT_THAT(refusal("number: .nan\n"), HasSubstr("expected a finite number"));
   EXPECT_EQ(refusal("number: 1\n"), "accepted");
