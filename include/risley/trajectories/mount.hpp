@@ -1,0 +1,79 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <array>
+#include <string>
+
+#include <Eigen/Core>
+
+namespace risley::trajectories {
+
+/// A number that somebody has stated, how well they know it, and where it comes from.
+struct StatedValue {
+  double value = 0, sigma = 0;  ///< in SI units
+  std::string source;
+};
+
+/// How a sensor sits on a moving body. A point at p in the sensor's frame is at
+///
+///     position + R (lever_arm + nominal * boresight * p)
+///
+/// where position and R (frame from body) are the trajectory's at the time
+/// recording's clock + clock_offset.
+struct Mount {
+  std::string name;             ///< of the platform or the flight; may be empty
+  std::string reference_point;  ///< in words: the point of the body that the trajectory is of
+  /// Rotation [3, 3] from the sensor's axes (X along its optical axis, Y to the left, Z up) to the
+  /// body's (x forward, y right, z down), as it was designed.
+  Eigen::Matrix3d nominal = Eigen::Matrix3d::Identity();
+  std::string nominal_source;
+  /// What the real rotation has on top: a rotation vector along the axes of the sensor, rad.
+  std::array<StatedValue, 3> boresight;
+  /// From the reference point to the sensor's origin, along the axes of the body, m.
+  std::array<StatedValue, 3> lever_arm;
+  /// What is added to the recording's clock to get the trajectory's time, s.
+  StatedValue clock_offset;
+};
+
+/// nominal * boresight: from the sensor's axes to the body's, [3, 3].
+/// @throws InvalidArgument as require_mount
+Eigen::Matrix3d body_from_sensor(const Mount& mount);
+
+/// The lever arm as a vector [3], body axes, m. @throws InvalidArgument as require_mount
+Eigen::Vector3d lever_arm(const Mount& mount);
+
+/// @throws InvalidArgument for a nominal rotation that is no right-handed rotation, values that are
+///         not finite or beyond what mount_text can write, and sigmas below 0
+void require_mount(const Mount& mount);
+
+/// Reads
+///
+///     risley_mount: 1
+///     name: hexacopter                       # optional
+///     reference_point: centre of the IMU
+///     sensor_axes: {x: down, y: left, z: forward, source: drawing}
+///     boresight:                             # about the sensor's axes
+///       x_deg: {value: 0, sigma: 3, source: as built}
+///       y_deg: ...
+///       z_deg: ...
+///     lever_arm:                             # body: x forward, y right, z down
+///       x_m: {value: 0.1, sigma: 0.01, source: tape}
+///       y_m: ...
+///       z_m: ...
+///     clock_offset_s: {value: 0, sigma: 0.002, source: PPS}
+///
+/// or, in place of sensor_axes, body_from_sensor: {matrix: [[0, 0, 1], [0, -1, 0], [1, 0, 0]],
+/// source: drawing}. A matrix whose entries were rounded to four decimals and more is made a
+/// rotation again.
+/// @param path  for messages only
+/// @throws FileError with the line for anything else
+Mount parse_mount(const std::string& text, const std::string& path);
+
+/// parse_mount of a file. @throws FileError
+Mount load_mount(const std::string& path);
+
+/// The file of a mount; reading it gives the same bits. @throws InvalidArgument as require_mount
+std::string mount_text(const Mount& mount);
+
+}  // namespace risley::trajectories

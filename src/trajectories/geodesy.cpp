@@ -1,0 +1,81 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "risley/trajectories/geodesy.hpp"
+
+#include <cmath>
+
+#include "risley/core/angle.hpp"
+#include "risley/core/require.hpp"
+
+namespace risley::trajectories {
+namespace {
+
+// Coordinates of 6.4e6 m in double precision are exact to a nanometre. Sums of them are taken in
+// extended precision, so that nothing is lost to more than the rounding of the results.
+using Extended = long double;
+
+constexpr Extended kRatio = 1 - Extended{kFlattening};  // of the polar axis to the equatorial one
+constexpr Extended kEccentricitySquared = 1 - kRatio * kRatio;
+
+void require_place(const Geodetic& place) {
+  require_between("latitude", place.latitude, -kPi / 2, kPi / 2, "rad");
+  require_between("longitude", place.longitude, -kTwoPi, kTwoPi, "rad");
+  require_between("height", place.height, kLowestHeight, kHighestHeight, "m");
+}
+
+}  // namespace
+
+Eigen::Vector3d geocentric_from_geodetic(const Geodetic& place) {
+  require_place(place);
+  const Extended sine = std::sin(Extended{place.latitude});
+  const Extended cosine = std::cos(Extended{place.latitude});
+  const Extended normal = kSemiMajorAxis / std::sqrt(1 - kEccentricitySquared * sine * sine);
+  const Extended from_axis = (normal + place.height) * cosine;
+  return {static_cast<double>(from_axis * std::cos(Extended{place.longitude})),
+          static_cast<double>(from_axis * std::sin(Extended{place.longitude})),
+          static_cast<double>((normal * (1 - kEccentricitySquared) + place.height) * sine)};
+}
+
+Geodetic geodetic_from_geocentric(const Eigen::Vector3d& position) {
+  require_finite("position.x", position.x(), "m");
+  require_finite("position.y", position.y(), "m");
+  require_finite("position.z", position.z(), "m");
+  require_between("distance from the centre of the Earth", position.norm(),
+                  kSemiMajorAxis * (1 - kFlattening) + kLowestHeight,
+                  kSemiMajorAxis + kHighestHeight, "m");
+  const Extended z = position.z();
+  const Extended from_axis = std::hypot(Extended{position.x()}, Extended{position.y()});
+  // Bowring's iteration on the reduced latitude: an error shrinks a thousand times and more with
+  // every step, and the first value is right to 0.2 degree.
+  constexpr Extended kPolarAxis = kSemiMajorAxis * kRatio;
+  constexpr Extended kSecondEccentricitySquared = 1 / (kRatio * kRatio) - 1;
+  Extended up = z, out = kRatio * kRatio * from_axis;  // along the normal of the ellipsoid
+  for (int i = 0; i < 6; ++i) {
+    const Extended length = std::hypot(kRatio * up, out);
+    const Extended sine = kRatio * up / length, cosine = out / length;
+    up = z + kSecondEccentricitySquared * kPolarAxis * sine * sine * sine;
+    out = from_axis - kEccentricitySquared * kSemiMajorAxis * cosine * cosine * cosine;
+  }
+  const Extended length = std::hypot(up, out);
+  const Extended sine = up / length, cosine = out / length;
+  Geodetic place;
+  place.latitude = static_cast<double>(std::atan2(up, out));
+  place.longitude = std::atan2(position.y(), position.x());
+  place.height =
+      static_cast<double>(from_axis * cosine + z * sine -
+                          kSemiMajorAxis * std::sqrt(1 - kEccentricitySquared * sine * sine));
+  return place;
+}
+
+Eigen::Matrix3d geocentric_from_ned(const Geodetic& place) {
+  require_place(place);
+  const double sin_latitude = std::sin(place.latitude), cos_latitude = std::cos(place.latitude);
+  const double sin_longitude = std::sin(place.longitude), cos_longitude = std::cos(place.longitude);
+  Eigen::Matrix3d axes;
+  axes.col(0) << -sin_latitude * cos_longitude, -sin_latitude * sin_longitude, cos_latitude;
+  axes.col(1) << -sin_longitude, cos_longitude, 0;
+  axes.col(2) << -cos_latitude * cos_longitude, -cos_latitude * sin_longitude, -sin_latitude;
+  return axes;
+}
+
+}  // namespace risley::trajectories
