@@ -146,6 +146,10 @@ IdentifiedSensor identified_sensor(const Identification& identification, const s
       }
     }
     const std::optional<double> sigma = sigma_of(fitted);
+    if (sigma && !std::isfinite(*sigma)) {
+      sensor.set_knowledge({info.name, 0, "glass assumed to be that of the other prisms"});
+      continue;
+    }
     sensor.set_knowledge({info.name, sigma.value_or(0.0), sigma ? kFound : "held by convention"});
   }
   sensor.set_knowledge({"angle_noise_deg", 0, fmt::format("residuals, {}", kFound)});

@@ -33,7 +33,7 @@ struct Hypothesis {
   std::vector<std::size_t> equivalent_to;
 
   /// Covariance of the same names as the fit's with the glass of every prism free, where the fit
-  /// took it as one: what is assumed counts. Empty unless the best.
+  /// took it as one: what is assumed counts; infinite where nothing tells. Empty unless the best.
   Eigen::MatrixXd total_covariance;
 
   const PrismTrain& train() const { return fit.model.train; }
