@@ -29,6 +29,7 @@ risley_package(sqlite TARGET SQLite::SQLite3 DEBIAN libsqlite3-dev PKG_CONFIG sq
                FIND SQLite3)
 risley_package(fastcdr TARGET fastcdr DEBIAN libfastcdr-dev LIBS -lfastcdr FIND fastcdr)
 risley_package(zlib TARGET ZLIB::ZLIB DEBIAN zlib1g-dev PKG_CONFIG zlib FIND ZLIB)
+risley_package(proj TARGET PROJ::proj DEBIAN libproj-dev PKG_CONFIG proj FIND PROJ)
 risley_package(laszip TARGET risley_laszip DEBIAN liblaszip-dev LIBS -llaszip)
 
 # Looks for one package by its key; its target exists afterwards if it was found.

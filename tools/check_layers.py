@@ -18,7 +18,8 @@ STRING = re.compile(r'"((?:[^"\\]|\\.)*)"')
 FLAG = re.compile(r"(?<![\w-])--[a-z][a-z0-9-]*")
 PROGRAMS = ("apps", "studies", "bench")  # may use every layer
 # Libraries with one home: what others need of them, they ask that layer for.
-HOMES = {"netcdf": "io", "hdf5": "io", "yaml-cpp": "io", "openssl": "io"}
+HOMES = {"netcdf": "io", "hdf5": "io", "yaml-cpp": "io", "openssl": "io", "proj": "cloud",
+         "proj_experimental": "cloud"}
 STRANGERS = ("simulation", "estimation")  # they meet only in tests, so their agreement counts
 
 

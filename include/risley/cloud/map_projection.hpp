@@ -1,0 +1,75 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <array>
+#include <memory>
+#include <string>
+
+#include <Eigen/Core>
+
+namespace risley::cloud {
+
+/// The second-order expansion of a map about one place: coordinates within some hundred metres to
+/// millionths of a metre (1e-6 m at 300 m, 2e-6 m at 500 m), without a call of the projection library.
+class MapTangent {
+ public:
+  /// Of a map that leaves coordinates as they are.
+  MapTangent() = default;
+  /// @param value     of the map at `center`, m
+  /// @param jacobian  [row: map axis, column: axis of the argument]
+  /// @param hessian   of each map axis, 1/m
+  MapTangent(const Eigen::Vector3d& center, const Eigen::Vector3d& value,
+             const Eigen::Matrix3d& jacobian, const std::array<Eigen::Matrix3d, 3>& hessian);
+
+  Eigen::Vector3d map(const Eigen::Vector3d& point) const;
+  /// At the centre; a covariance C becomes J C J'.
+  const Eigen::Matrix3d& jacobian() const { return jacobian_; }
+  const Eigen::Vector3d& center() const { return center_; }
+
+ private:
+  Eigen::Vector3d center_ = Eigen::Vector3d::Zero(), value_ = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d jacobian_ = Eigen::Matrix3d::Identity();
+  std::array<Eigen::Matrix3d, 3> half_hessian_{Eigen::Matrix3d::Zero(), Eigen::Matrix3d::Zero(),
+                                               Eigen::Matrix3d::Zero()};
+};
+
+/// From geocentric coordinates (WGS 84 or another datum of the Earth) to easting, northing and
+/// height of a map, all in metres. May be used by several threads.
+class MapProjection {
+ public:
+  /// @param crs     what the map is: "EPSG:25832", with a height system "EPSG:25832+7837", or WKT.
+  ///                Without a height system heights are above the ellipsoid.
+  /// @param source  the datum of the positions, a geographic or geocentric system: "EPSG:4979" is
+  ///                WGS 84, "EPSG:4937" ETRS89, "EPSG:9988" ITRF2020
+  /// @throws InvalidArgument for systems that are unknown, not a map in metres, or that can only be
+  ///         reached with a file that is not installed (the message names what is missing)
+  explicit MapProjection(const std::string& crs, const std::string& source = "EPSG:4979");
+  ~MapProjection();
+  MapProjection(MapProjection&&) noexcept;
+  MapProjection& operator=(MapProjection&&) noexcept;
+
+  /// One point, exactly as the projection library has it.
+  /// @throws InvalidArgument where the map does not reach
+  Eigen::Vector3d project(const Eigen::Vector3d& geocentric_m) const;
+
+  /// The map about a place. @throws as project()
+  MapTangent tangent(const Eigen::Vector3d& geocentric_m) const;
+
+  const std::string& name() const;  ///< "ETRS89 / UTM zone 32N"
+  const std::string& wkt() const;   ///< as LAS 1.4 files want it: OGC WKT 1
+  bool has_height_system() const;   ///< otherwise heights are ellipsoidal
+  /// What the library says of the change of datum, once a point was projected: "WGS 84 to ETRS89
+  /// (1), accuracy 1 m"; empty where there is none.
+  std::string operation() const;
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+/// The UTM zone of a place on WGS 84, with ellipsoidal heights: "EPSG:32632".
+/// @param latitude, longitude  rad @throws InvalidArgument beyond 84 north and 80 south
+std::string utm_zone_of(double latitude, double longitude);
+
+}  // namespace risley::cloud

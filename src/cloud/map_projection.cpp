@@ -1,0 +1,270 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "risley/cloud/map_projection.hpp"
+
+#include <array>
+#include <cmath>
+#include <cstdlib>
+#include <mutex>
+#include <utility>
+
+#include <fmt/format.h>
+#include <proj.h>
+#include <proj_experimental.h>
+
+#include "risley/core/angle.hpp"
+#include "risley/core/error.hpp"
+#include "risley/core/require.hpp"
+
+namespace risley::cloud {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+/// Differences for derivatives: third derivatives of a map are about 1/R^2, so that steps of this
+/// length leave 1e-10 of a derivative, and the last digit of a coordinate 1e-11.
+constexpr double kStep = 100;  // m
+
+struct FreeObject {
+  void operator()(PJ* object) const { proj_destroy(object); }
+};
+struct FreeContext {
+  void operator()(PJ_CONTEXT* context) const { proj_context_destroy(context); }
+};
+using Object = std::unique_ptr<PJ, FreeObject>;
+using Context = std::unique_ptr<PJ_CONTEXT, FreeContext>;
+
+/// The last thing that the library has to say, instead of its printing it.
+void keep_message(void* where, int /*level*/, const char* message) {
+  *static_cast<std::string*>(where) = message;
+}
+
+PJ_TYPE type_of(PJ_CONTEXT* context, const PJ* crs) {
+  const PJ_TYPE type = proj_get_type(crs);
+  if (type != PJ_TYPE_BOUND_CRS) return type;
+  const Object inner(proj_get_source_crs(context, crs));
+  return inner ? proj_get_type(inner.get()) : type;
+}
+
+/// Part of a compound system, or nothing.
+Object part_of(PJ_CONTEXT* context, const PJ* crs, int index) {
+  if (proj_get_type(crs) != PJ_TYPE_COMPOUND_CRS) return {};
+  return Object(proj_crs_get_sub_crs(context, crs, index));
+}
+
+/// Whether all axes of a system are in metres; otherwise says in what the first other one is.
+bool in_metres(PJ_CONTEXT* context, const PJ* crs, std::string& unit) {
+  const Object system(proj_crs_get_coordinate_system(context, crs));
+  if (!system) return false;
+  const int axes = proj_cs_get_axis_count(context, system.get());
+  for (int axis = 0; axis < axes; ++axis) {
+    double factor = 0;
+    const char* name = nullptr;
+    if (proj_cs_get_axis_info(context, system.get(), axis, nullptr, nullptr, nullptr, &factor,
+                              &name, nullptr, nullptr) == 0) {
+      return false;
+    }
+    if (factor != 1 || std::string(name) != "metre") {
+      unit = name;
+      return false;
+    }
+  }
+  return true;
+}
+
+}  // namespace
+
+MapTangent::MapTangent(const Vector3d& center, const Vector3d& value, const Matrix3d& jacobian,
+                       const std::array<Matrix3d, 3>& hessian)
+    : center_(center), value_(value), jacobian_(jacobian) {
+  for (std::size_t k = 0; k < 3; ++k) half_hessian_[k] = 0.5 * hessian[k];
+}
+
+Vector3d MapTangent::map(const Vector3d& point) const {
+  const Vector3d d = point - center_;
+  Vector3d bent;
+  for (Eigen::Index k = 0; k < 3; ++k) {
+    bent[k] = d.dot(half_hessian_[static_cast<std::size_t>(k)] * d);
+  }
+  return value_ + (jacobian_ * d + bent);
+}
+
+struct MapProjection::State {
+  std::string message;
+  Context context;
+  Object operation;
+  std::string name, wkt;
+  bool has_height_system = false;
+  std::mutex mutex;  // the library's objects serve one thread at a time
+};
+
+MapProjection::MapProjection(const std::string& crs, const std::string& source)
+    : state_(std::make_unique<State>()) {
+  state_->context.reset(proj_context_create());
+  PJ_CONTEXT* context = state_->context.get();
+  proj_log_func(context, &state_->message, keep_message);
+  proj_context_set_enable_network(context, 0);  // what is computed does not depend on a connection
+  const auto create = [&](const char* what, const std::string& text) {
+    Object object(proj_create(context, text.c_str()));
+    if (!object || proj_is_crs(object.get()) == 0) {
+      throw InvalidArgument(fmt::format(
+          "{} = \"{}\" is no coordinate reference system that PROJ knows: give a number such as "
+          "EPSG:25832, with a height system EPSG:25832+7837, or WKT",
+          what, text));
+    }
+    return object;
+  };
+  const Object target = create("crs", crs), from = create("source", source);
+  const Object horizontal = part_of(context, target.get(), 0);
+  const Object vertical = part_of(context, target.get(), 1);
+  const PJ* map = horizontal ? horizontal.get() : target.get();
+  const std::string name = proj_get_name(target.get());
+  if (type_of(context, map) != PJ_TYPE_PROJECTED_CRS) {
+    throw InvalidArgument(fmt::format(
+        "crs = \"{}\" ({}) is no map: points have eastings and northings in metres, as of a UTM "
+        "zone",
+        crs, name));
+  }
+  std::string unit = "no unit";
+  for (const PJ* part : {map, static_cast<const PJ*>(vertical.get())}) {
+    if (part != nullptr && !in_metres(context, part, unit)) {
+      throw InvalidArgument(fmt::format(
+          "crs = \"{}\" ({}) is in {}: points and their covariances are written in metres, choose "
+          "the same map in metres",
+          crs, name, unit));
+    }
+  }
+  const PJ_TYPE source_type = type_of(context, from.get());
+  if (source_type != PJ_TYPE_GEOCENTRIC_CRS && source_type != PJ_TYPE_GEOGRAPHIC_3D_CRS) {
+    throw InvalidArgument(
+        fmt::format("source = \"{}\" ({}) has no three dimensions: give the datum of the positions "
+                    "with ellipsoidal heights, such as EPSG:4979 for WGS 84",
+                    source, proj_get_name(from.get())));
+  }
+  // Positions come geocentric; a geographic system names their datum.
+  Object geocentric;
+  if (source_type == PJ_TYPE_GEOCENTRIC_CRS) {
+    geocentric.reset(proj_clone(context, from.get()));
+  } else {
+    const Object datum(proj_crs_get_datum(context, from.get()));
+    const Object ensemble(datum ? nullptr : proj_crs_get_datum_ensemble(context, from.get()));
+    const PJ* of = datum ? datum.get() : ensemble.get();
+    if (of != nullptr) {
+      geocentric.reset(proj_create_geocentric_crs_from_datum(context, proj_get_name(from.get()), of,
+                                                             "metre", 1.0));
+    }
+  }
+  // A map alone takes heights above its ellipsoid along.
+  Object three(vertical ? proj_clone(context, target.get())
+                        : proj_crs_promote_to_3D(context, nullptr, target.get()));
+  if (!geocentric || !three) {
+    throw InvalidArgument(
+        fmt::format("crs = \"{}\" from \"{}\": PROJ says: {}", crs, source, state_->message));
+  }
+  // Never a way that leaves out a grid or a change of datum without a word.
+  const char* const options[] = {"ALLOW_BALLPARK=NO", nullptr};
+  Object operation(
+      proj_create_crs_to_crs_from_pj(context, geocentric.get(), three.get(), nullptr, options));
+  if (operation) {
+    state_->operation.reset(proj_normalize_for_visualization(context, operation.get()));
+  }
+  if (!state_->operation) {
+    throw InvalidArgument(fmt::format(
+        "no way from \"{}\" to \"{}\" ({}) with what PROJ has installed: a change of datum or a "
+        "geoid grid is missing (Debian: projinfo -s {} -t {} names the file; heights without a "
+        "height system are ellipsoidal and need none){}{}",
+        source, crs, name, source, crs,
+        state_->message.empty() ? "" : "; PROJ says: ", state_->message));
+  }
+  state_->name = name;
+  state_->has_height_system = vertical != nullptr;
+  const char* const wkt_options[] = {"MULTILINE=NO", nullptr};
+  const char* wkt = proj_as_wkt(context, target.get(), PJ_WKT1_GDAL, wkt_options);
+  if (wkt == nullptr) {
+    throw InvalidArgument(fmt::format("crs = \"{}\" ({}) cannot be written as WKT 1: PROJ says: {}",
+                                      crs, name, state_->message));
+  }
+  state_->wkt = wkt;
+}
+
+MapProjection::~MapProjection() = default;
+MapProjection::MapProjection(MapProjection&&) noexcept = default;
+MapProjection& MapProjection::operator=(MapProjection&&) noexcept = default;
+
+Vector3d MapProjection::project(const Vector3d& geocentric_m) const {
+  const std::lock_guard lock(state_->mutex);
+  PJ* operation = state_->operation.get();
+  proj_errno_reset(operation);
+  const PJ_COORD to =
+      proj_trans(operation, PJ_FWD,
+                 proj_coord(geocentric_m.x(), geocentric_m.y(), geocentric_m.z(), HUGE_VAL));
+  const Vector3d mapped(to.xyz.x, to.xyz.y, to.xyz.z);
+  if (!mapped.allFinite()) {
+    throw InvalidArgument(
+        fmt::format("{} does not reach the place x = {:.3f}, y = {:.3f}, z = {:.3f} m "
+                    "(geocentric): {}",
+                    state_->name, geocentric_m.x(), geocentric_m.y(), geocentric_m.z(),
+                    proj_errno(operation) == 0
+                        ? "no grid covers it"
+                        : proj_context_errno_string(state_->context.get(), proj_errno(operation))));
+  }
+  return mapped;
+}
+
+MapTangent MapProjection::tangent(const Vector3d& geocentric_m) const {
+  const Vector3d at = project(geocentric_m);
+  std::array<Vector3d, 3> ahead, behind;
+  Matrix3d jacobian;
+  std::array<Matrix3d, 3> hessian;
+  const auto axis = [](Eigen::Index k) { return Vector3d(kStep * Vector3d::Unit(k)); };
+  for (Eigen::Index i = 0; i < 3; ++i) {
+    const auto k = static_cast<std::size_t>(i);
+    ahead[k] = project(geocentric_m + axis(i));
+    behind[k] = project(geocentric_m - axis(i));
+    jacobian.col(i) = (ahead[k] - behind[k]) / (2 * kStep);
+    const Vector3d second = (ahead[k] - 2 * at + behind[k]) / (kStep * kStep);
+    for (Eigen::Index m = 0; m < 3; ++m) hessian[static_cast<std::size_t>(m)](i, i) = second[m];
+  }
+  for (Eigen::Index i = 0; i < 3; ++i) {
+    for (Eigen::Index j = i + 1; j < 3; ++j) {
+      const auto a = static_cast<std::size_t>(i), b = static_cast<std::size_t>(j);
+      const Vector3d mixed =
+          (project(geocentric_m + axis(i) + axis(j)) - ahead[a] - ahead[b] + 2 * at - behind[a] -
+           behind[b] + project(geocentric_m - axis(i) - axis(j))) /
+          (2 * kStep * kStep);
+      for (Eigen::Index m = 0; m < 3; ++m) {
+        Matrix3d& h = hessian[static_cast<std::size_t>(m)];
+        h(i, j) = h(j, i) = mixed[m];
+      }
+    }
+  }
+  return {geocentric_m, at, jacobian, hessian};
+}
+
+const std::string& MapProjection::name() const { return state_->name; }
+const std::string& MapProjection::wkt() const { return state_->wkt; }
+bool MapProjection::has_height_system() const { return state_->has_height_system; }
+
+std::string MapProjection::operation() const {
+  const std::lock_guard lock(state_->mutex);
+  const Object last(proj_trans_get_last_used_operation(state_->operation.get()));
+  if (!last) return {};
+  PJ_CONTEXT* context = state_->context.get();
+  const double accuracy = proj_coordoperation_get_accuracy(context, last.get());
+  const std::string name = proj_get_name(last.get());
+  if (accuracy == 0) return {};
+  return accuracy > 0 ? fmt::format("{}, accuracy {:g} m", name, accuracy)
+                      : fmt::format("{}, of unknown accuracy", name);
+}
+
+std::string utm_zone_of(double latitude, double longitude) {
+  const double latitude_deg = degrees_from_radians(latitude);
+  require_between("latitude", latitude_deg, -80, 84, "degrees, where UTM is used");
+  require_finite("longitude", longitude, "rad");
+  const double longitude_deg = degrees_from_radians(wrap_to_pi(longitude));
+  const int zone = 1 + static_cast<int>(std::floor((longitude_deg + 180) / 6)) % 60;
+  return fmt::format("EPSG:{}", (latitude >= 0 ? 32600 : 32700) + zone);
+}
+
+}  // namespace risley::cloud
