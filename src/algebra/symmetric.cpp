@@ -15,6 +15,8 @@ namespace {
 
 /// Smaller eigenvalues of a matrix with a diagonal of ones are rounding.
 constexpr double kNoInformation = 1e-13;
+/// Of a combination's square, what may lie along directions without information by rounding.
+constexpr double kUntoldShare = 1e-6;
 
 std::size_t length(Eigen::Index size) { return static_cast<std::size_t>(size); }
 
@@ -72,6 +74,34 @@ PrincipalAxes principal_axes(const Eigen::MatrixXd& matrix) {
   if (checked(matrix).size() == 0) return {};
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(matrix);
   return {solver.eigenvalues(), solver.eigenvectors()};
+}
+
+Eigen::MatrixXd covariance_of(const Eigen::MatrixXd& normal, const Eigen::MatrixXd& combinations) {
+  const Eigen::VectorXd scale = unit_scale(checked(normal).diagonal());
+  require_length("columns of combinations", static_cast<std::size_t>(combinations.cols()),
+                 static_cast<std::size_t>(normal.rows()));
+  const PrincipalAxes axes = principal_axes(scaled(normal, scale));
+  const double least = kNoInformation * static_cast<double>(normal.rows());
+  // Of each combination, what lies along every axis.
+  const Eigen::MatrixXd along = product(combinations * scale.asDiagonal(), axes.vectors);
+  Eigen::MatrixXd told = along;
+  Eigen::VectorXd untold = Eigen::VectorXd::Zero(combinations.rows());
+  for (Eigen::Index i = 0; i < axes.values.size(); ++i) {
+    if (axes.values[i] > least) {
+      told.col(i) /= std::sqrt(axes.values[i]);
+    } else {
+      told.col(i).setZero();
+      untold += along.col(i).cwiseAbs2();
+    }
+  }
+  Eigen::MatrixXd covariance = product(told, told.transpose());
+  for (Eigen::Index r = 0; r < covariance.rows(); ++r) {
+    if (untold[r] <= kUntoldShare * along.row(r).squaredNorm()) continue;
+    covariance.row(r).setZero();
+    covariance.col(r).setZero();
+    covariance(r, r) = std::numeric_limits<double>::infinity();
+  }
+  return covariance;
 }
 
 Eigen::MatrixXd pseudo_inverse(const Eigen::MatrixXd& matrix) {

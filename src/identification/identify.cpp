@@ -676,26 +676,14 @@ class Search {
   }
 
   /// The covariance without the assumption of one glass. The first prism of a single emitter on the
-  /// axis shows its deviation alone: variances of its index and wedge are infinite.
+  /// axis shows its deviation alone: variances of its index and wedge are infinite then.
   Eigen::MatrixXd with_glass_free(const ShotGrid& grid, const TrainFit& fit,
                                   TrainFreedom freedom) const {
-    if (!freedom.one_glass || fit.model.train.prisms() == 1) return fit.covariance;
     freedom.one_glass = false;
-    freedom.first_glass = grid_.emitters > 1;
-    TrainFit free = fit_train(grid, fit.model, freedom,
-                              {.iterations = 0, .without_outliers = true, .covariance = true},
-                              progress_.silent());
-    if (!freedom.first_glass) {
-      for (const std::string name : {"refractive_index_a", "wedge_angle_a_deg"}) {
-        const auto found = std::find(free.names.begin(), free.names.end(), name);
-        if (found == free.names.end()) continue;
-        const auto at = static_cast<Eigen::Index>(found - free.names.begin());
-        free.covariance.row(at).setZero();
-        free.covariance.col(at).setZero();
-        free.covariance(at, at) = std::numeric_limits<double>::infinity();
-      }
-    }
-    return std::move(free.covariance);
+    return fit_train(grid, fit.model, freedom,
+                     {.iterations = 0, .without_outliers = true, .covariance = true},
+                     progress_.silent())
+        .covariance;
   }
 
   /// Rivals that repeat the best one's scan, free of noise.

@@ -45,7 +45,7 @@ std::vector<Unknown> unknowns_of(const PrismTrain& train, const TrainFreedom& fr
     if (freedom.one_glass) {
       unknowns.push_back({Kind::glass, 0, prisms - 1});
     } else {
-      for (int k = freedom.first_glass ? 0 : 1; k < prisms; ++k) {
+      for (int k = 0; k < prisms; ++k) {
         unknowns.push_back({Kind::glass, k, k});
       }
     }
@@ -441,9 +441,6 @@ void add_covariance(const NormalEquations& equations, const std::vector<Unknown>
   const PrismTrain& train = model.train;
   const auto constants = static_cast<Eigen::Index>(unknowns.size());
   const Eigen::MatrixXd& normal = equations.normal;
-  const Eigen::VectorXd scale = algebra::unit_scale(normal.diagonal());
-  const Eigen::MatrixXd inverse =
-      algebra::scaled(algebra::pseudo_inverse(algebra::scaled(normal, scale)), scale);
   std::vector<Eigen::VectorXd> rows;
   const auto add = [&](std::string name, const Eigen::VectorXd& row) {
     fit.names.push_back(std::move(name));
@@ -507,7 +504,7 @@ void add_covariance(const NormalEquations& equations, const std::vector<Unknown>
   }
   Eigen::MatrixXd to(static_cast<Eigen::Index>(rows.size()), normal.rows());
   for (std::size_t r = 0; r < rows.size(); ++r) to.row(static_cast<Eigen::Index>(r)) = rows[r];
-  fit.covariance = variance * to * inverse * to.transpose();
+  fit.covariance = variance * algebra::covariance_of(normal, to);
 }
 
 }  // namespace

@@ -9,6 +9,8 @@
 
 #include "risley/algebra/products.hpp"
 
+#include "refusal.hpp"
+
 namespace risley::algebra::symmetric_test {
 
 using Eigen::MatrixXd;
@@ -78,6 +80,27 @@ TEST(PseudoInverse, IsTheInverseWhereThereIsOneAndZeroAlongTheRest) {
       (pseudo_inverse(MatrixXd::Ones(2, 2)) - MatrixXd::Constant(2, 2, 0.25)).cwiseAbs().maxCoeff(),
       1e-15);
   EXPECT_EQ(pseudo_inverse(MatrixXd::Zero(2, 2)), MatrixXd(MatrixXd::Zero(2, 2)));
+}
+
+TEST(CovarianceOf, WhatNothingTellsHasAnInfiniteVariance) {
+  // Unknowns 0 and 1 act only through their sum, 2 alone.
+  Eigen::MatrixXd design(4, 3);
+  design << 1, 1, 0, 2, 2, 0, 0, 0, 3, 0, 0, 4;
+  const Eigen::MatrixXd normal = design.transpose() * design;
+  Eigen::MatrixXd combinations(4, 3);
+  combinations << 1, 1, 0,  // the sum: 1 / 5
+      1, 0, 0,              // one of them: untold
+      0, 0, 1,              // 1 / 25
+      1, 1, 1;
+  const Eigen::MatrixXd covariance = covariance_of(normal, combinations);
+  EXPECT_NEAR(covariance(0, 0), 0.2, 1e-14);
+  EXPECT_TRUE(std::isinf(covariance(1, 1)));
+  EXPECT_EQ(covariance(1, 0), 0);
+  EXPECT_NEAR(covariance(2, 2), 0.04, 1e-14);
+  EXPECT_NEAR(covariance(3, 3), 0.24, 1e-14);
+  EXPECT_NEAR(covariance(3, 0), 0.2, 1e-14);
+  EXPECT_NE(refusal([&] { covariance_of(normal, Eigen::MatrixXd::Zero(1, 2)); }).find("columns"),
+            std::string::npos);
 }
 
 }  // namespace risley::algebra::symmetric_test

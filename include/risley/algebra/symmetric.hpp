@@ -60,4 +60,12 @@ PrincipalAxes principal_axes(const Eigen::MatrixXd& matrix);
 /// @throws InvalidArgument for a matrix that is not square
 Eigen::MatrixXd pseudo_inverse(const Eigen::MatrixXd& matrix);
 
+/// Covariance [rows, rows] of linear combinations of unknowns, from the unknowns' normal equations.
+/// A combination of which a direction without information is part has an infinite variance, and
+/// covariances of 0.
+/// @param normal        as for pseudo_inverse [n, n]
+/// @param combinations  [rows, n]
+/// @throws InvalidArgument for a matrix that is not square, combinations of another width
+Eigen::MatrixXd covariance_of(const Eigen::MatrixXd& normal, const Eigen::MatrixXd& combinations);
+
 }  // namespace risley::algebra

@@ -63,13 +63,12 @@ struct TrainModel {
 
 /// What is fitted besides the rotors' motion.
 struct TrainFreedom {
-  bool glass = false;       ///< indices and deviations of the prisms
-  bool one_glass = false;   ///< all indices are the same
-  bool first_glass = true;  ///< false: the first index is held, only its deviation is fitted
-  bool emitters = false;    ///< directions of all emitters
-  bool lags = false;        ///< of all emitters but the first
-  bool frame = false;       ///< yaw and pitch
-  bool tilts = false;       ///< of prisms and bearings, with a prior of 0.3 degree
+  bool glass = false;      ///< indices and deviations of the prisms
+  bool one_glass = false;  ///< all indices are the same
+  bool emitters = false;   ///< directions of all emitters
+  bool lags = false;       ///< of all emitters but the first
+  bool frame = false;      ///< yaw and pitch
+  bool tilts = false;      ///< of prisms and bearings, with a prior of 0.3 degree
 
   friend bool operator==(const TrainFreedom&, const TrainFreedom&) = default;
 };
@@ -83,7 +82,7 @@ struct TrainFit {
   /// Of the values below, variance of the shots from their rms; independent shots.
   std::vector<std::string> names;  ///< as in parameter_list(), and "lag_2_s", "frame_yaw_deg"
   /// SI units: what is free of optics, lags and frame; rotation angles where the curves begin, and
-  /// their mean speeds.
+  /// their mean speeds. Infinite variances where nothing tells.
   Eigen::MatrixXd covariance;
   std::vector<double> azimuth_residual, zenith_residual;  ///< [shots], observed minus predicted
 };
