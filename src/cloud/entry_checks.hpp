@@ -20,6 +20,9 @@ inline void require_computed_columns(const Points& points, const CloudHeader& he
   if (header.has_covariance) {
     for (const auto& column : points.covariance) require_length("covariance", column.size(), rows);
   }
+  for (const auto& column : points.own_covariance) {
+    require_length("own_covariance", column.size(), header.has_own_covariance ? rows : 0);
+  }
   if (header.has_rotation_angles) {
     require_length("rotation_angle", points.rotation_angle.size(),
                    static_cast<std::size_t>(header.prisms));
@@ -44,6 +47,7 @@ inline void require_columns(const Points& points, const CloudHeader& header) {
   require_length("number_of_returns", points.number_of_returns.size(), rows);
   require_length("tag", points.tag.size(), rows);
   require_length("beam", points.beam.size(), rows);
+  require_length("point_source", points.point_source.size(), header.has_point_source ? rows : 0);
 }
 
 }  // namespace risley::cloud

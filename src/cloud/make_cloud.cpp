@@ -16,6 +16,7 @@
 #include "risley/core/angle.hpp"
 #include "risley/core/require.hpp"
 #include "risley/optics/observation_model.hpp"
+#include "risley/trajectories/clock.hpp"
 
 #include "cloud/piece_overlap.hpp"
 
@@ -36,6 +37,8 @@ constexpr std::size_t kPieceRows = std::size_t{1} << 18;
 constexpr std::size_t kReportedRows = std::size_t{1} << 16;
 /// Surfaces are taken to stand still for so long: docs/theory/cloud.md
 constexpr std::int64_t kSurfaceNs = 1'000'000'000;
+/// The same for a moving sensor, whose shots are put together as if it stood still.
+constexpr std::int64_t kMovingSurfaceNs = 200'000'000;
 /// Shots of it that tell a surface: on the 1160 cells of a Mid-40's field of view, a circle of 38.4
 /// degrees, 14 each and 120 in a block of nine.
 constexpr std::size_t kSurfaceShots = 16000;
@@ -54,7 +57,8 @@ struct Block {
   std::vector<std::uint8_t> returns;  ///< of each row's shot
   PointedShots shots;
   Points points;
-  std::uint64_t outliers = 0, without_rotation_angle = 0;
+  std::vector<SensorPose> poses;  ///< of the rows, of a moving sensor
+  std::uint64_t outliers = 0, without_rotation_angle = 0, without_pose = 0;
   double azimuth_squares = 0, zenith_squares = 0;
 };
 
@@ -86,6 +90,7 @@ class Work {
       std::size_t end =
           more && rotors_ ? overlap_begin(piece_.time_ns, piece_.size()) : piece_.size();
       if (end <= done_) end = piece_.size();  // times that make no sense
+      last_time_ns_ = piece_.time_ns[end - 1];
       if (end > done_) emit(end);
       if (!more) break;
       const std::size_t keep =
@@ -178,6 +183,11 @@ class Work {
       model_ = reported_pointing_model(calibration_, options_.pointing, options_.angle_noise);
     }
     for (const CommonFactor& factor : model_.factors) summary_.factors.push_back(factor.name);
+    if (options_.platform) {
+      georeference_ = std::make_unique<Georeference>(
+          *options_.platform, reader_.header().time_reference, piece_.time_ns.front());
+      first_time_ns_ = last_time_ns_ = piece_.time_ns.front();
+    }
     normals_ = std::make_unique<SurfaceNormals>(
         std::max(std::sqrt(calibration_.range_variance(0, 0, 255) +
                            square(calibration_.range_resolution) / 12.0),
@@ -195,6 +205,12 @@ class Work {
     header_.has_rotation_angles = rotors_;
     header_.has_covariance = options_.pointing.covariance;
     if (options_.loadings && header_.has_covariance) header_.factors = summary_.factors;
+    if (georeference_) {
+      sensor_factors_ = header_.factors.size();
+      georeference_->announce(header_, options_.loadings);
+      summary_.strips = georeference_->strips();
+    }
+    summary_.frame = header_.frame.text;
     header_.provenance = options_.provenance;
     writer_ = create_cloud(path_, header_, options_.writer);
   }
@@ -234,19 +250,81 @@ class Work {
   std::size_t end_of_surface(std::size_t begin, std::size_t end) const {
     std::size_t row = begin;
     const std::int64_t first = piece_.time_ns[begin];
-    while (row < end && std::llabs(piece_.time_ns[row] - first) < kSurfaceNs) ++row;
+    const std::int64_t longest = georeference_ ? kMovingSurfaceNs : kSurfaceNs;
+    while (row < end && std::llabs(piece_.time_ns[row] - first) < longest) ++row;
     return row;
   }
 
   void find_surfaces(std::size_t begin, std::size_t end) {
     normals_->clear();
+    std::optional<Georeference::Cursor> cursor;
+    if (georeference_) {
+      cursor.emplace(*georeference_);
+      surface_pose_ =
+          cursor->at(piece_.time_ns[begin] + (piece_.time_ns[end - 1] - piece_.time_ns[begin]) / 2);
+    }
     const std::size_t stride = std::max<std::size_t>(1, (end - begin) / kSurfaceShots);
     for (std::size_t row = begin; row < end; row += stride) {
       if (!has_return(row)) continue;
-      normals_->add(piece_.azimuth[row], piece_.zenith[row],
-                    piece_.range[row] - calibration_.range_offset);
+      const double range = piece_.range[row] - calibration_.range_offset;
+      if (!cursor) {
+        normals_->add(piece_.azimuth[row], piece_.zenith[row], range);
+        continue;
+      }
+      const std::optional<SensorPose> pose = cursor->at(piece_.time_ns[row]);
+      if (!pose || !surface_pose_) continue;
+      const Stood shot = stood_still(*pose, piece_.azimuth[row], piece_.zenith[row], range);
+      normals_->add(shot.azimuth, shot.zenith, shot.range);
     }
     normals_->fit();
+  }
+
+  /// A shot of a moving sensor as it would have been from where the sensor is in the middle of a
+  /// surface's time.
+  struct Stood {
+    double azimuth = 0, zenith = 0, range = 0;
+  };
+  Stood stood_still(const SensorPose& pose, double azimuth, double zenith, double range) const {
+    const SensorPose& middle = *surface_pose_;
+    const double across = std::sin(zenith);
+    const Eigen::Vector3d shot(range * across * std::cos(azimuth),
+                               range * across * std::sin(azimuth), range * std::cos(zenith));
+    const Eigen::Vector3d seen =
+        middle.turn.transpose() *
+        (pose.turn * shot + (pose.reference - middle.reference) + (pose.lever - middle.lever));
+    const double distance = seen.norm();
+    return {std::atan2(seen.y(), seen.x()), std::acos(seen.z() / distance), distance};
+  }
+
+  /// The normal of the surface that a shot met, sensor frame.
+  Vector3<double> surface_normal(const Block& block, std::size_t i) const {
+    const PointedShots& shots = block.shots;
+    if (!georeference_) return normals_->normal(shots.azimuth[i], shots.zenith[i]);
+    if (!surface_pose_) return normals_->normal(std::nan(""), 0);
+    const SensorPose& pose = block.poses[i];
+    const Stood shot = stood_still(pose, shots.azimuth[i], shots.zenith[i],
+                                   shots.range[i] - calibration_.range_offset);
+    const Vector3<double> normal = normals_->normal(shot.azimuth, shot.zenith);
+    const Eigen::Vector3d turned =
+        pose.turn.transpose() * surface_pose_->turn * Eigen::Vector3d(normal.x, normal.y, normal.z);
+    return {turned.x(), turned.y(), turned.z()};
+  }
+
+  /// Looks up where the sensor is at every row of a block, and takes out rows that have no pose.
+  void find_poses(Block& block) const {
+    Georeference::Cursor cursor(*georeference_);
+    block.poses.clear();
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < block.rows.size(); ++i) {
+      const std::optional<SensorPose> pose = cursor.at(piece_.time_ns[block.rows[i]]);
+      if (!pose) continue;
+      block.poses.push_back(*pose);
+      block.rows[kept] = block.rows[i];
+      block.returns[kept++] = block.returns[i];
+    }
+    block.without_pose = block.rows.size() - kept;
+    block.rows.resize(kept);
+    block.returns.resize(kept);
   }
 
   /// Blocks are made in parallel and written in order. No more of them are on their way than there
@@ -302,6 +380,8 @@ class Work {
   }
 
   void compute(Block& block) const {
+    block.without_pose = 0;
+    if (georeference_) find_poses(block);
     const std::size_t n = block.rows.size();
     PointedShots& shots = block.shots;
     Points& points = block.points;
@@ -341,7 +421,7 @@ class Work {
     take(piece_.zenith_resolution, shots.zenith_rounding, variance);
     take(piece_.range_resolution, shots.range_rounding, variance);
     for (std::size_t i = 0; i < n; ++i) {
-      const Vector3<double> normal = normals_->normal(shots.azimuth[i], shots.zenith[i]);
+      const Vector3<double> normal = surface_normal(block, i);
       shots.surface_normal[0][i] = normal.x;
       shots.surface_normal[1][i] = normal.y;
       shots.surface_normal[2][i] = normal.z;
@@ -350,6 +430,7 @@ class Work {
     block.outliers = block.without_rotation_angle = 0;
     block.azimuth_squares = block.zenith_squares = 0;
     if (rotors_) keep_sound(block);
+    if (georeference_) georeference_->apply(points, sensor_factors_, block.poses);
   }
 
   /// Takes out of a block what has no point.
@@ -377,6 +458,9 @@ class Work {
     }
     if (sound.size() == points.size()) return;
     points.keep(sound);
+    if (!georeference_) return;
+    for (std::size_t i = 0; i < sound.size(); ++i) block.poses[i] = block.poses[sound[i]];
+    block.poses.resize(sound.size());
   }
 
   void write(const Block& block) {
@@ -384,6 +468,7 @@ class Work {
     summary_.points += block.points.size();
     summary_.outliers += block.outliers;
     summary_.without_rotation_angle += block.without_rotation_angle;
+    summary_.without_pose += block.without_pose;
     summary_.azimuth_residual_rms += block.azimuth_squares;
     summary_.zenith_residual_rms += block.zenith_squares;
   }
@@ -418,6 +503,15 @@ class Work {
       if (summary_.damage) throw FileError(*summary_.damage);
       throw EstimationError("the recording holds no valid shot");
     }
+    if (georeference_) {
+      const std::vector<std::string> more = georeference_->warnings();
+      summary_.warnings.insert(summary_.warnings.end(), more.begin(), more.end());
+    }
+    if (summary_.points == 0 && summary_.without_pose > 0) {
+      const std::int64_t shift = georeference_->clock_shift_ns();
+      throw EstimationError(trajectories::no_overlap_words(
+          options_.platform->trajectory, first_time_ns_ + shift, last_time_ns_ + shift));
+    }
     if (summary_.points == 0) {
       throw EstimationError(summary_.warnings.empty() ? std::string("no shot has a point")
                                                       : summary_.warnings.back());
@@ -439,6 +533,10 @@ class Work {
   bool rotors_;  ///< points depend on the rotation angles
   std::optional<RotorTracker> tracker_;
   std::unique_ptr<SurfaceNormals> normals_;
+  std::unique_ptr<Georeference> georeference_;         ///< of a moving sensor
+  std::optional<SensorPose> surface_pose_;             ///< in the middle of a surface's time
+  std::size_t sensor_factors_ = 0;                     ///< whose loadings points carry
+  std::int64_t first_time_ns_ = 0, last_time_ns_ = 0;  ///< of the recording
   CloudHeader header_;
   std::unique_ptr<CloudWriter> writer_;
   std::vector<Block> blocks_;

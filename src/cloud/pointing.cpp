@@ -113,6 +113,7 @@ void for_each_computed_column(const Points& from, Points& to, const Function& fu
   }
   for (std::size_t k = 0; k < kCovarianceTerms; ++k) {
     function(from.covariance[k], to.covariance[k]);
+    function(from.own_covariance[k], to.own_covariance[k]);
   }
   for (std::size_t k = 0; k < from.loading.size(); ++k) {
     for (std::size_t i = 0; i < 3; ++i) function(from.loading[k][i], to.loading[k][i]);
@@ -143,6 +144,7 @@ class Columns {
     if (header.has_covariance) {
       for (std::size_t i = 0; i < kCovarianceTerms; ++i) {
         a.covariance[i] = points.covariance[i].data();
+        if (header.has_own_covariance) a.own_covariance[i] = points.own_covariance[i].data();
       }
     }
     a.corrected_range = points.range.data();

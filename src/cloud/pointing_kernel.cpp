@@ -68,12 +68,13 @@ class Points {
     const Batch range2 = range * range;
     own.uu = xsimd::fma(range2, Batch(a_.divergence_variance_horizontal), own.uu);
     own.vv = xsimd::fma(range2, Batch(a_.divergence_variance_vertical), own.vv);
+    if (a_.own_covariance[0]) store_covariance(at, ray, own, a_.own_covariance);
     for (int factor = 0; factor < a_.factors; ++factor) {
       const Batch fd(-a_.range_factor[factor]);
       own.dd = xsimd::fma(fd, fd, own.dd);
       if (a_.loading) store_loading(at, factor, fd * ray.direction);
     }
-    store_covariance(at, ray, own);
+    store_covariance(at, ray, own, a_.covariance);
   }
 
  protected:
@@ -147,7 +148,8 @@ class Points {
   }
 
   /// From the frame of the beam into that of the sensor.
-  void store_covariance(std::size_t at, const Ray& ray, const BeamCovariance& c) const {
+  void store_covariance(std::size_t at, const Ray& ray, const BeamCovariance& c,
+                        double* const* columns) const {
     const Vector3<Batch>&u = ray.across[0], &v = ray.across[1], &d = ray.direction;
     const Vector3<Batch> cu = c.uu * u + c.uv * v + c.ud * d;
     const Vector3<Batch> cv = c.uv * u + c.vv * v + c.vd * d;
@@ -155,12 +157,12 @@ class Points {
     const auto entry = [&](const Batch& ui, const Batch& vi, const Batch& di, const Batch& uj,
                            const Batch& vj,
                            const Batch& dj) { return uj * ui + vj * vi + dj * di; };
-    entry(u.x, v.x, d.x, cu.x, cv.x, cd.x).store_unaligned(a_.covariance[0] + at);
-    entry(u.x, v.x, d.x, cu.y, cv.y, cd.y).store_unaligned(a_.covariance[1] + at);
-    entry(u.x, v.x, d.x, cu.z, cv.z, cd.z).store_unaligned(a_.covariance[2] + at);
-    entry(u.y, v.y, d.y, cu.y, cv.y, cd.y).store_unaligned(a_.covariance[3] + at);
-    entry(u.y, v.y, d.y, cu.z, cv.z, cd.z).store_unaligned(a_.covariance[4] + at);
-    entry(u.z, v.z, d.z, cu.z, cv.z, cd.z).store_unaligned(a_.covariance[5] + at);
+    entry(u.x, v.x, d.x, cu.x, cv.x, cd.x).store_unaligned(columns[0] + at);
+    entry(u.x, v.x, d.x, cu.y, cv.y, cd.y).store_unaligned(columns[1] + at);
+    entry(u.x, v.x, d.x, cu.z, cv.z, cd.z).store_unaligned(columns[2] + at);
+    entry(u.y, v.y, d.y, cu.y, cv.y, cd.y).store_unaligned(columns[3] + at);
+    entry(u.y, v.y, d.y, cu.z, cv.z, cd.z).store_unaligned(columns[4] + at);
+    entry(u.z, v.z, d.z, cu.z, cv.z, cd.z).store_unaligned(columns[5] + at);
   }
 
   const PointArguments& a_;
@@ -212,8 +214,9 @@ class Kernel : public Points {
         linearise_point(train_, derivatives_, forward, path, face_position_, ray.across, range);
     BeamCovariance own = own_covariance(at, jacobian, zenith, range);
     own.dd = own.dd + range_noise(at, range, cosine);
+    if (a_.own_covariance[0]) store_covariance(at, ray, own, a_.own_covariance);
     add_factors(at, jacobian, ray, own);
-    store_covariance(at, ray, own);
+    store_covariance(at, ray, own, a_.covariance);
   }
 
  private:

@@ -20,6 +20,8 @@ void for_each_column(Points& p, const Function& function) {
     function(*column);
   }
   for (auto& column : p.covariance) function(column);
+  for (auto& column : p.own_covariance) function(column);
+  function(p.point_source);
   for (auto& column : p.rotation_angle) function(column);
   for (auto* column : {&p.intensity, &p.return_number, &p.number_of_returns, &p.tag, &p.beam}) {
     function(*column);
@@ -53,6 +55,8 @@ void CloudHeader::resize(Points& points, std::size_t rows) const {
     column->resize(rows);
   }
   for (auto& column : points.covariance) column.resize(has_covariance ? rows : 0);
+  for (auto& column : points.own_covariance) column.resize(has_own_covariance ? rows : 0);
+  points.point_source.resize(has_point_source ? rows : 0);
   const std::size_t angle_rows = has_rotation_angles ? rows : 0;
   points.rotation_angle.resize(has_rotation_angles ? static_cast<std::size_t>(prisms) : 0);
   for (auto& column : points.rotation_angle) column.resize(angle_rows);

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "risley/cloud/cloud_writer.hpp"
+#include "risley/cloud/georeference.hpp"
 #include "risley/cloud/pointing.hpp"
 #include "risley/cloud/rotor_tracking.hpp"
 #include "risley/core/error.hpp"
@@ -27,6 +28,7 @@ struct CloudOptions {
   std::optional<double> rate = kTrackingRate;  ///< of RotorTracker; empty: all directions
   std::optional<double> angle_noise;           ///< rad; empty: the calibration's
   bool loadings = false;                       ///< points carry the loadings of the common factors
+  std::optional<MovingPlatform> platform;      ///< of a sensor that moves
   CloudWriterOptions writer;
   std::vector<std::pair<std::string, std::string>> provenance;
 };
@@ -40,8 +42,12 @@ struct CloudSummary {
   std::uint64_t outliers = 0;
   /// In pieces of time where the rotors' motion was not found, or not through the prisms.
   std::uint64_t without_rotation_angle = 0;
-  std::string format;                ///< name of the CloudFormat written
-  std::vector<std::string> factors;  ///< names of the model's common factors
+  /// Returns at times that the trajectory of a moving sensor does not cover.
+  std::uint64_t without_pose = 0;
+  std::string format;                       ///< name of the CloudFormat written
+  std::vector<std::string> factors;         ///< names of the common factors
+  std::string frame;                        ///< of the points, in words
+  std::vector<trajectories::Strip> strips;  ///< of a flight, in the trajectory's time
   bool mirrored = false;
   double azimuth_residual_rms = 0, zenith_residual_rms = 0;  ///< rad, of the points
   /// How far points were moved from where the sensor says, rms over some beams, rad.

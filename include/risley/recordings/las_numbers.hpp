@@ -7,6 +7,8 @@
 #include <cstdint>
 #include <optional>
 
+#include "risley/core/gps_time.hpp"
+
 /// The numbers of LAS files, for those who read and those who write them [ASPRS LAS 1.0
 /// to 1.4-R15].
 namespace risley::recordings::las {
@@ -52,16 +54,6 @@ inline constexpr unsigned kIntensityFactor = 256;
 
 inline constexpr std::int64_t kSecond = 1'000'000'000;  ///< ns
 /// Seconds between 1970-01-01 and the origin of adjusted GPS time, 1e9 s after 1980-01-06.
-inline constexpr std::int64_t kGpsOrigin = 315'964'800 + 1'000'000'000;
-
-/// How much GPS time is ahead of UTC, s. Earlier than July 2012 none of these sensors measured.
-constexpr std::int64_t leap_seconds(std::int64_t utc_ns) {
-  constexpr std::int64_t k2017 = 1'483'228'800 * kSecond;  // 2017-01-01
-  constexpr std::int64_t k2015 = 1'435'708'800 * kSecond;  // 2015-07-01
-  constexpr std::int64_t k2012 = 1'341'100'800 * kSecond;  // 2012-07-01
-  if (utc_ns >= k2017) return 18;
-  if (utc_ns >= k2015) return 17;
-  return utc_ns >= k2012 ? 16 : 15;
-}
+inline constexpr std::int64_t kGpsOrigin = kGpsEpoch_s + kGpsAdjustment_s;
 
 }  // namespace risley::recordings::las

@@ -5,11 +5,14 @@
 #include <chrono>
 #include <cmath>
 #include <cstring>
+#include <limits>
+#include <span>
 #include <string_view>
 #include <utility>
 
 #include <fmt/format.h>
 
+#include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
 #include "risley/core/require.hpp"
 
@@ -72,9 +75,24 @@ void append_descriptor(std::string& data, const PointField& field) {
   data.append(bytes.begin(), bytes.end());
 }
 
-/// The coordinate system of the points: the sensor's own, and metres.
+/// The coordinate system of the points: a map, or the sensor's own or another frame in metres.
 VariableLengthRecord coordinate_system(Version version, const CloudHeader& header) {
+  if (!header.frame.wkt.empty()) {
+    if (version != Version::las_1_4) {
+      throw InvalidArgument(
+          "LAS 1.2 cannot name the map that points stand on as this program has it (WKT), allowed "
+          "las-1.4");
+    }
+    return {"LASF_Projection", 2112, "OGC WKT coordinate system", header.frame.wkt + '\0'};
+  }
   if (version == Version::las_1_4) {
+    if (header.trajectory) {
+      std::string text =
+          "LOCAL_CS[\"frame of the trajectory\",LOCAL_DATUM[\"trajectory origin\",32767],"
+          "UNIT[\"metre\",1],AXIS[\"X\",EAST],AXIS[\"Y\",NORTH],AXIS[\"Z\",UP]]";
+      text.push_back('\0');
+      return {"LASF_Projection", 2112, "OGC WKT coordinate system", std::move(text)};
+    }
     std::string name = plain(header.sensor.empty() ? "sensor" : header.sensor + " sensor");
     std::replace(name.begin(), name.end(), '"', '\'');
     std::string text = fmt::format(
@@ -91,11 +109,54 @@ VariableLengthRecord coordinate_system(Version version, const CloudHeader& heade
   return {"LASF_Projection", 34735, "GeoTIFF GeoKeyDirectoryTag", std::move(data)};
 }
 
+/// The trajectory's errors: what they are as text in record 100, where the sensor was as packed
+/// numbers in the records from 101 on. docs/files.md
+void append_trajectory(const TrajectoryErrors& errors, std::vector<VariableLengthRecord>& records) {
+  std::string text = "trajectory_errors: 1\n";
+  const auto list = [&text](std::string_view name, std::span<const double> values) {
+    text += fmt::format("{}: [{}]\n", name, fmt::join(values, ", "));
+  };
+  const std::span<const double> sigma(errors.sigma);
+  std::array<double, 3> degrees{};
+  for (std::size_t k = 0; k < 3; ++k) degrees[k] = degrees_from_radians(sigma[3 + k]);
+  list("position_sigma_north_east_down_m", sigma.first(3));
+  list("rotation_sigma_north_east_down_deg", degrees);
+  list("position_correlation_time_s", std::span(errors.correlation_time).first(3));
+  list("rotation_correlation_time_s", std::span(errors.correlation_time).last(3));
+  text += fmt::format("white_rotation_deg: {}\nrecord_interval_s: {}\n",
+                      degrees_from_radians(errors.white_rotation), errors.record_interval);
+  list("north", errors.axes_from_ned[0]);
+  list("east", errors.axes_from_ned[1]);
+  list("down", errors.axes_from_ned[2]);
+  text += fmt::format("positions: {}\n", errors.time_ns.size());
+  text.push_back('\0');
+  records.push_back({"risley", 100, "Errors of the trajectory", std::move(text)});
+  constexpr std::size_t kRowBytes = 32, kRows = kMaxRecordBytes / kRowBytes;
+  for (std::size_t first = 0; first < errors.time_ns.size(); first += kRows) {
+    const std::size_t rows = std::min(kRows, errors.time_ns.size() - first);
+    std::string data(rows * kRowBytes, '\0');
+    auto* out = reinterpret_cast<std::uint8_t*>(data.data());
+    for (std::size_t i = first; i < first + rows; ++i) {
+      out = put<std::int64_t>(out, errors.time_ns[i]);
+      for (const double value : errors.position[i]) out = put<double>(out, value);
+    }
+    const std::size_t number = 101 + first / kRows;
+    if (number > std::numeric_limits<std::uint16_t>::max()) {
+      throw InvalidArgument(
+          "positions of the trajectory do not fit into the records of a LAS file");
+    }
+    records.push_back({"risley", static_cast<std::uint16_t>(number), "Places of the trajectory",
+                       std::move(data)});
+  }
+}
+
 }  // namespace
 
 Layout::Layout(Version version, const CloudHeader& header, const CloudWriterOptions& options)
     : version_(version),
       scale_(options.las_scale),
+      offset_(header.frame.offset),
+      has_point_source_(header.has_point_source),
       utc_(header.time_reference == recordings::TimeReference::utc),
       gps_time_(utc_ && options.gps_time),
       system_identifier_(las::system_identifier(header)),
@@ -121,6 +182,7 @@ Layout::Layout(Version version, const CloudHeader& header, const CloudWriterOpti
   records_.push_back(
       {kSpecificationUser, kExtraBytesNumber, "Extra bytes", std::move(descriptors)});
   records_.push_back(coordinate_system(version_, header));
+  if (header.trajectory) append_trajectory(*header.trajectory, records_);
   std::string text;
   for (const auto& [name, value] : header.provenance) text += fmt::format("{} = {}\n", name, value);
   if (text.empty()) return;
@@ -143,8 +205,8 @@ HeaderNumbers Layout::numbers(const Summary& summary) const {
   if (summary.points == 0) return numbers;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     // A negative zero would be another byte pattern for the same box.
-    numbers.low[axis] = std::nearbyint(summary.low[axis]) * scale_ + 0.0;
-    numbers.high[axis] = std::nearbyint(summary.high[axis]) * scale_ + 0.0;
+    numbers.low[axis] = std::nearbyint(summary.low[axis]) * scale_ + offset_[axis] + 0.0;
+    numbers.high[axis] = std::nearbyint(summary.high[axis]) * scale_ + offset_[axis] + 0.0;
   }
   if (utc_) {
     using namespace std::chrono;
@@ -187,7 +249,7 @@ std::vector<std::uint8_t> Layout::head(const Summary& summary) const {
     out = put<std::uint32_t>(out, static_cast<std::uint32_t>(count));
   }
   for (int axis = 0; axis < 3; ++axis) out = put<double>(out, scale_);
-  for (int axis = 0; axis < 3; ++axis) out = put<double>(out, 0.0);
+  for (const double offset : offset_) out = put<double>(out, offset);
   for (std::size_t axis = 0; axis < 3; ++axis) {
     out = put<double>(out, numbers.high[axis]);
     out = put<double>(out, numbers.low[axis]);

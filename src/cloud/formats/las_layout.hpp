@@ -47,14 +47,16 @@ struct HeaderNumbers {
 
 /// Header (las_header.cpp) and point records (las_records.cpp) of one LAS file.
 ///
-/// - X, Y, Z: multiples of the scale, offset 0. The bounding box is that of the stored numbers.
+/// - X, Y, Z: multiples of the scale from the frame's offset on. The bounding box is that of the
+///   stored numbers.
 /// - Intensity: the sensor's 0-255 times 256, which the specification asks of a range of 256.
 /// - GPS time: adjusted standard GPS time (GPS seconds minus 1e9) where the recording's clock is
 ///   UTC, which counts no leap seconds; otherwise the recording's own seconds.
 /// - Scan angle: 0. It is an angle about the flight direction and means nothing for beams that
 ///   prisms steer.
 /// - Classification 0 (never classified), all flags, user data and scanner channel 0. File source
-///   and point source 1: the points are of this file.
+///   1; point source the strip of a flight, otherwise 1: the points are of this file.
+/// - The trajectory's errors of a moving sensor: records of the user "risley", docs/files.md.
 /// - Extra bytes: uncertainty_fields and loading_fields, then Tag and Beam.
 /// - File creation date: that of the first point in UTC, otherwise none. The same points always
 ///   give the same bytes.
@@ -66,6 +68,7 @@ class Layout {
 
   Version version() const { return version_; }
   double scale() const { return scale_; }
+  const std::array<double, 3>& offset() const { return offset_; }
   std::size_t header_bytes() const {
     return recordings::las::header_bytes(version_ == Version::las_1_4 ? 4 : 2);
   }
@@ -99,6 +102,8 @@ class Layout {
 
   Version version_;
   double scale_;
+  std::array<double, 3> offset_;
+  bool has_point_source_;
   bool utc_;       ///< times are UTC
   bool gps_time_;  ///< and stored as GPS time
   std::string system_identifier_, generating_software_;

@@ -9,6 +9,7 @@
 #include <xsimd/xsimd.hpp>
 
 #include "risley/core/error.hpp"
+#include "risley/core/gps_time.hpp"
 
 #include "cloud/formats/las_bytes.hpp"
 #include "cloud/formats/las_layout.hpp"
@@ -19,7 +20,6 @@ namespace {
 using recordings::las::kGpsOrigin;
 using recordings::las::kIntensityFactor;
 using recordings::las::kSecond;
-using recordings::las::leap_seconds;
 
 /// Greatest X, Y or Z in steps of the scale: they are stored as 32-bit integers.
 constexpr double kMaxSteps = std::numeric_limits<std::int32_t>::max();
@@ -42,10 +42,11 @@ void Layout::pack_coordinates(const Points& points, std::size_t first, std::size
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const double* from = columns[axis]->data() + first;
     double* to = coordinates_[axis].data();
+    const double offset = offset_[axis];
     Batch low(summary.low[axis]), high(summary.high[axis]);
     auto inside = Batch(0.0) == Batch(0.0);
     for (std::size_t i = 0; i < whole; i += Batch::size) {
-      const Batch steps = Batch::load_unaligned(from + i) / Batch(scale_);
+      const Batch steps = (Batch::load_unaligned(from + i) - Batch(offset)) / Batch(scale_);
       inside = inside & (xsimd::abs(steps) <= Batch(kMaxSteps));
       low = xsimd::min(low, steps);
       high = xsimd::max(high, steps);
@@ -58,20 +59,20 @@ void Layout::pack_coordinates(const Points& points, std::size_t first, std::size
     double least = *std::min_element(lows.begin(), lows.end());
     double greatest = *std::max_element(highs.begin(), highs.end());
     for (std::size_t i = whole; i < rows; ++i) {
-      const double steps = from[i] / scale_;
+      const double steps = (from[i] - offset) / scale_;
       all_inside = all_inside && std::fabs(steps) <= kMaxSteps;
       least = std::min(least, steps);
       greatest = std::max(greatest, steps);
       to[i] = steps + kRoundingShift;
     }
     if (!all_inside) {
-      const double* wrong = std::find_if(from, from + rows, [this](double value) {
-        return !(std::fabs(value / scale_) <= kMaxSteps);
+      const double* wrong = std::find_if(from, from + rows, [this, offset](double value) {
+        return !(std::fabs((value - offset) / scale_) <= kMaxSteps);
       });
       throw InvalidArgument(
           fmt::format("point {}: {} = {} m, allowed {} to {} m (las_scale = {} m)",
                       summary.points + static_cast<std::uint64_t>(wrong - from) + 1, "XYZ"[axis],
-                      *wrong, -kMaxSteps * scale_, kMaxSteps * scale_, scale_));
+                      *wrong, offset - kMaxSteps * scale_, offset + kMaxSteps * scale_, scale_));
     }
     summary.low[axis] = least;
     summary.high[axis] = greatest;
@@ -143,10 +144,11 @@ void Layout::pack(const Points& points, std::size_t first, std::size_t rows, std
     floats_[k].floats(points, first, {values_.data() + k * kBlock, rows});
   }
 
-  // Classification, flags, scan angle and user data are 0, the point source is 1.
+  // Classification, flags, scan angle and user data are 0, the point source is 1 for one file.
   constexpr std::uint8_t kModern[] = {0, 0, 0, 0, 1, 0}, kOld[] = {0, 0, 1, 0};
   const std::uint8_t* tag = points.tag.data() + first;
   const std::uint8_t* beam = points.beam.data() + first;
+  const std::uint16_t* source = has_point_source_ ? points.point_source.data() + first : nullptr;
   const auto assemble = [&](const auto& constant) {
     const std::size_t floats = floats_.size();
     std::uint8_t* to = out;
@@ -157,6 +159,7 @@ void Layout::pack(const Points& points, std::size_t first, std::size_t rows, std
       std::memcpy(to + 12, &returns_[i], 4);
       std::memcpy(to + 16, constant, sizeof constant);
       to += 16 + sizeof constant;
+      if (source != nullptr) put<std::uint16_t>(to - 2, source[i]);
       to = put<double>(to, times_[i]);
       const float* value = values_.data() + i;
       for (std::size_t k = 0; k < floats; ++k, value += kBlock) to = put<float>(to, *value);

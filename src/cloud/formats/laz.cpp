@@ -95,7 +95,9 @@ class LazWriter final : public CloudWriter {
     header->point_data_format = layout_.point_format();
     header->point_data_record_length = static_cast<laszip_U16>(layout_.record_bytes());
     header->x_scale_factor = header->y_scale_factor = header->z_scale_factor = layout_.scale();
-    header->x_offset = header->y_offset = header->z_offset = 0.0;
+    header->x_offset = layout_.offset()[0];
+    header->y_offset = layout_.offset()[1];
+    header->z_offset = layout_.offset()[2];
     for (const las::VariableLengthRecord& record : layout_.records()) {
       check(laszip_add_vlr(laszip_, record.user.c_str(), record.number,
                            static_cast<laszip_U16>(record.data.size()), record.description.c_str(),

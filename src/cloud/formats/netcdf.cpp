@@ -42,10 +42,12 @@ class NetcdfWriter final : public CloudWriter {
     put_attributes(header);
     point_ = file_.define_growing_dimension("point");
     define_sensor_variables(header);
-    if (header.has_covariance) define_covariance();
+    if (header.has_covariance) define_covariance(header);
     define_geometry(header);
     define_loadings(header.factors);
+    if (header.trajectory) define_trajectory(*header.trajectory);
     file_.end_definitions();
+    if (header.trajectory) put_trajectory(*header.trajectory);
   }
 
   void write(const Points& points) override {
@@ -80,7 +82,8 @@ class NetcdfWriter final : public CloudWriter {
     file_.put_text("title", "Points of a Risley-prism lidar with their uncertainty");
     file_.put_text("sensor", header.sensor);
     file_.put_text("serial", header.serial);
-    file_.put_text("frame", kFrameText);
+    file_.put_text("frame", header.frame.text);
+    if (!header.frame.wkt.empty()) file_.put_text("crs_wkt", header.frame.wkt);
     file_.put_text("time_reference", recordings::to_string(header.time_reference));
   }
 
@@ -143,9 +146,10 @@ class NetcdfWriter final : public CloudWriter {
         file_.put_text(variable, "ancillary_variables", fmt::format("std_{}", name));
       }
     };
-    coordinate("x_m", "X", "forward", &Points::x);
-    coordinate("y_m", "Y", "left", &Points::y);
-    coordinate("z_m", "Z", "up", &Points::z);
+    const auto& axes = header.frame.axes;
+    coordinate("x_m", "X", axes[0].c_str(), &Points::x);
+    coordinate("y_m", "Y", axes[1].c_str(), &Points::y);
+    coordinate("z_m", "Z", axes[2].c_str(), &Points::z);
     define_data<std::int64_t>({"time_ns", "ns", "time without rounding"}, time_ns);
     const auto byte = [this](const char* name, const char* meaning,
                              std::vector<std::uint8_t> Points::*column) {
@@ -158,9 +162,13 @@ class NetcdfWriter final : public CloudWriter {
     byte("number_of_returns", "returns of the shot", &Points::number_of_returns);
     byte("tag", "tag byte of the sensor", &Points::tag);
     byte("beam", "firing beam, from 0", &Points::beam);
+    if (!header.has_point_source) return;
+    define_data<std::int32_t>(
+        {"strip", "1", "strip of the flight, from 1; 0: of none"},
+        [](const Points& p, std::size_t i, std::size_t) { return p.point_source[i]; });
   }
 
-  void define_covariance() {
+  void define_covariance(const CloudHeader& header) {
     for (std::size_t axis = 0; axis < 3; ++axis) {
       define_data<float>({fmt::format("std_{}_m", kAxes[axis]), "m",
                           fmt::format("standard deviation of {}_m", kAxes[axis])},
@@ -174,6 +182,58 @@ class NetcdfWriter final : public CloudWriter {
           {fmt::format("covariance_{}_m2", name), "m2",
            fmt::format("covariance of {}_m and {}_m", name[0], name[1])},
           [term](const Points& p, std::size_t i, std::size_t) { return p.covariance[term][i]; });
+    }
+    if (!header.has_own_covariance) return;
+    for (std::size_t term = 0; term < kCovarianceTerms; ++term) {
+      const char* name = kTermNames[term];
+      define_data<float>(
+          {fmt::format("own_covariance_{}_m2", name), "m2",
+           fmt::format("part of covariance_{}_m2 that the point shares with no other", name)},
+          [term](const Points& p, std::size_t i, std::size_t) {
+            return p.own_covariance[term][i];
+          });
+    }
+  }
+
+  /// The errors of a moving sensor's trajectory: docs/files.md
+  void define_trajectory(const TrajectoryErrors& errors) {
+    const auto three = [](std::span<const double> values) {
+      return fmt::format("{} {} {}", values[0], values[1], values[2]);
+    };
+    const std::span<const double> sigma(errors.sigma), time(errors.correlation_time);
+    std::array<double, 3> degrees{};
+    for (std::size_t k = 0; k < 3; ++k) degrees[k] = degrees_from_radians(sigma[3 + k]);
+    file_.put_text_group(
+        "trajectory_errors",
+        {{"position_sigma_north_east_down_m", three(sigma.first(3))},
+         {"rotation_sigma_north_east_down_deg", three(degrees)},
+         {"position_correlation_time_s", three(time.first(3))},
+         {"rotation_correlation_time_s", three(time.last(3))},
+         {"white_rotation_deg", fmt::format("{}", degrees_from_radians(errors.white_rotation))},
+         {"record_interval_s", fmt::format("{}", errors.record_interval)},
+         {"north", three(errors.axes_from_ned[0])},
+         {"east", three(errors.axes_from_ned[1])},
+         {"down", three(errors.axes_from_ned[2])}});
+    const auto record = file_.define_dimension("trajectory_record", errors.time_ns.size());
+    const io::NetcdfStorage storage{0, true, false};
+    trajectory_.push_back(file_.define<std::int64_t>("trajectory_time_ns", {&record}, storage));
+    file_.put_text(trajectory_.back(), "units", "ns");
+    file_.put_text(trajectory_.back(), "long_name", "time of a place of the trajectory");
+    for (const char axis : kAxes) {
+      trajectory_.push_back(
+          file_.define<double>(fmt::format("trajectory_{}_m", axis), {&record}, storage));
+      file_.put_text(trajectory_.back(), "units", "m");
+      file_.put_text(trajectory_.back(), "long_name",
+                     fmt::format("{} of the sensor at that time", axis));
+    }
+  }
+
+  void put_trajectory(const TrajectoryErrors& errors) {
+    file_.put(trajectory_[0], 0, errors.time_ns);
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      std::vector<double> column;
+      for (const auto& position : errors.position) column.push_back(position[axis]);
+      file_.put(trajectory_[1 + axis], 0, column);
     }
   }
 
@@ -228,8 +288,9 @@ class NetcdfWriter final : public CloudWriter {
   io::NetcdfOutput file_;
   io::NetcdfDimension point_;
   std::vector<Variable> variables_;
-  std::size_t rows_ = 0;     ///< in the block
-  std::size_t written_ = 0;  ///< in the file
+  std::vector<io::NetcdfVariable> trajectory_;  ///< time, x, y, z
+  std::size_t rows_ = 0;                        ///< in the block
+  std::size_t written_ = 0;                     ///< in the file
 };
 
 }  // namespace

@@ -88,15 +88,15 @@ std::size_t bytes_of(FieldType type) {
   return 0;
 }
 
-std::vector<PointField> coordinate_fields() {
+std::vector<PointField> coordinate_fields(const CloudHeader& header) {
   constexpr FieldType kType = FieldType::float64;
   return {
       scaled(
-          "X", "m", "forward", kType, [](const Points& p) -> auto& { return p.x; }),
+          "X", "m", header.frame.axes[0], kType, [](const Points& p) -> auto& { return p.x; }),
       scaled(
-          "Y", "m", "left", kType, [](const Points& p) -> auto& { return p.y; }),
+          "Y", "m", header.frame.axes[1], kType, [](const Points& p) -> auto& { return p.y; }),
       scaled(
-          "Z", "m", "up", kType, [](const Points& p) -> auto& { return p.z; }),
+          "Z", "m", header.frame.axes[2], kType, [](const Points& p) -> auto& { return p.z; }),
   };
 }
 
@@ -146,6 +146,17 @@ std::vector<PointField> uncertainty_fields(const CloudHeader& header) {
     add_term("CovarianceXZ", "covariance (m2)", kXZ);
     add_term("CovarianceYZ", "covariance (m2)", kYZ);
   }
+  if (header.has_own_covariance) {
+    constexpr std::pair<const char*, CovarianceTerm> kTerms[] = {
+        {"OwnVarianceX", kXX},    {"OwnVarianceY", kYY},    {"OwnVarianceZ", kZZ},
+        {"OwnCovarianceXY", kXY}, {"OwnCovarianceXZ", kXZ}, {"OwnCovarianceYZ", kYZ}};
+    for (const auto& [name, term] : kTerms) {
+      add(
+          name, "m2", "not shared with others (m2)", [term = term](const Points& p) -> auto& {
+            return p.own_covariance[term];
+          });
+    }
+  }
   add(
       "LidarRange", "m", "range from the last prism (m)",
       [](const Points& p) -> auto& { return p.range; });
@@ -184,7 +195,7 @@ std::vector<PointField> loading_fields(const CloudHeader& header) {
 }
 
 std::vector<PointField> all_fields(const CloudHeader& header) {
-  std::vector<PointField> fields = coordinate_fields();
+  std::vector<PointField> fields = coordinate_fields(header);
   for (auto& more : {sensor_fields(), uncertainty_fields(header), loading_fields(header)}) {
     fields.insert(fields.end(), more.begin(), more.end());
   }

@@ -33,11 +33,12 @@ struct PointField {
 };
 
 /// X, Y and Z (m, float64).
-std::vector<PointField> coordinate_fields();
+std::vector<PointField> coordinate_fields(const CloudHeader& header);
 /// Time (s, float64, as recorded), Intensity, ReturnNumber, NumberOfReturns, Tag and Beam.
 std::vector<PointField> sensor_fields();
 /// What LAS needs extra bytes for (float32): StdX ... StdZ, VarianceX ... VarianceZ, CovarianceXY,
-/// CovarianceXZ, CovarianceYZ where there is a covariance, LidarRange, IncidenceAngle, and
+/// CovarianceXZ, CovarianceYZ where there is a covariance, OwnVarianceX ... OwnCovarianceYZ where
+/// points have it, LidarRange, IncidenceAngle, and
 /// PrismAngle1 ..., ResidualAzimuth, ResidualZenith where rotation angles are known. Angles in
 /// degrees.
 std::vector<PointField> uncertainty_fields(const CloudHeader& header);

@@ -95,7 +95,8 @@ std::vector<std::string> header_notes(const CloudHeader& header,
   std::vector<std::string> notes;
   add_note(notes, "sensor", header.sensor);
   if (!header.serial.empty()) add_note(notes, "serial", header.serial);
-  add_note(notes, "frame", kFrameText);
+  add_note(notes, "frame", header.frame.text);
+  if (!header.frame.wkt.empty()) add_note(notes, "coordinate_system", header.frame.wkt);
   add_note(notes, "time_reference", recordings::to_string(header.time_reference));
   for (const PointField& field : fields) {
     add_note(notes, field.name,
@@ -110,6 +111,11 @@ std::vector<std::string> header_notes(const CloudHeader& header,
 }
 
 std::vector<PointField> pcl_fields(const CloudHeader& header) {
+  if (header.frame.offset != std::array<double, 3>{}) {
+    throw InvalidArgument(
+        "this format holds coordinates as float32, which rounds those of a map to some decimetres, "
+        "allowed las-1.4, laz, netcdf, csv, npy");
+  }
   std::vector<PointField> fields = all_fields(header);
   const auto rename = [&fields](std::string_view from, std::string_view to, FieldType type) {
     const auto field = std::find_if(fields.begin(), fields.end(),

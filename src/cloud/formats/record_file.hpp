@@ -17,9 +17,6 @@
 
 namespace risley::cloud {
 
-/// The frame of all clouds.
-inline constexpr std::string_view kFrameText = "of the sensor: X forward, Y left, Z up";
-
 /// A file written in order; the calls throw FileError with the system's words.
 class SequentialFile {
  public:

@@ -1,0 +1,97 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "risley/cloud/map_projection.hpp"
+#include "risley/cloud/points.hpp"
+#include "risley/recordings/observations.hpp"
+#include "risley/trajectories/error_process.hpp"
+#include "risley/trajectories/interpolation.hpp"
+#include "risley/trajectories/mount.hpp"
+#include "risley/trajectories/strips.hpp"
+#include "risley/trajectories/trajectory.hpp"
+
+namespace risley::cloud {
+
+/// What carries a moving sensor, and where its points go.
+struct MovingPlatform {
+  trajectories::Trajectory trajectory;
+  trajectories::Mount mount;
+  /// How wrong the trajectory may be; without it points carry the sensor's and the mount's part.
+  std::optional<trajectories::ErrorProcess> errors;
+  /// The map, see MapProjection; empty: UTM on WGS 84 with ellipsoidal heights. Trajectories in a
+  /// frame of their own have no map.
+  std::string crs;
+  std::string datum = "EPSG:4979";  ///< of the trajectory's positions, see MapProjection
+};
+
+/// Where a sensor is at the time of a shot, in the trajectory's frame.
+struct SensorPose {
+  Eigen::Matrix3d turn;       ///< frame from sensor
+  Eigen::Matrix3d body;       ///< frame from body
+  Eigen::Vector3d reference;  ///< the trajectory's reference point, m
+  Eigen::Vector3d lever;      ///< from there to the sensor's origin, m
+  Eigen::Vector3d velocity;   ///< of the reference point, m/s
+  Eigen::Vector3d rate;       ///< of turning, rad/s
+  std::uint16_t strip = 0;    ///< from 1; 0: of none
+};
+
+/// Points of a moving sensor: from its own frame to a map, with the covariance that mount and
+/// trajectory add. May be used by several threads, each with a Cursor. docs/theory/cloud.md
+class Georeference {
+ public:
+  /// @param platform         must outlive this
+  /// @param recording_clock  of the points' times
+  /// @param first_time_ns    of the recording, by which weeks and days are told
+  /// @throws InvalidArgument as MapProjection, Interpolation, require_mount; for a map and a
+  ///         trajectory in a frame of its own
+  Georeference(const MovingPlatform& platform, recordings::TimeReference recording_clock,
+               std::int64_t first_time_ns);
+  ~Georeference();
+  Georeference(const Georeference&) = delete;
+  Georeference& operator=(const Georeference&) = delete;
+
+  /// Looks poses up, in times that mostly ascend.
+  class Cursor {
+   public:
+    explicit Cursor(const Georeference& georeference);
+    /// The pose at a time of the recording, or nothing where the trajectory has none.
+    std::optional<SensorPose> at(std::int64_t recording_time_ns);
+
+   private:
+    const Georeference* georeference_;
+    trajectories::Interpolation::Cursor cursor_;
+  };
+
+  /// Fills what a cloud's header says of frame, times, strips, trajectory and common factors.
+  /// @param loadings  points carry the loadings of the common factors
+  void announce(CloudHeader& header, bool loadings) const;
+
+  /// Turns points of the sensor's frame into points of the map: coordinates, covariances, loadings
+  /// (the mount's behind those that are there), times and strips.
+  /// @param sensor_factors  number of common factors that the sensor's model has
+  /// @param poses  of every point
+  void apply(Points& points, std::size_t sensor_factors, std::span<const SensorPose> poses) const;
+
+  /// What a user should know: no errors of the trajectory, an unknown clock, a change of datum.
+  std::vector<std::string> warnings() const;
+  const trajectories::Interpolation& interpolation() const;
+  /// From the recording's clock to the trajectory's time, with the mount's offset, ns.
+  std::int64_t clock_shift_ns() const;
+  const std::vector<trajectories::Strip>& strips() const;
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace risley::cloud

@@ -1,0 +1,34 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "risley/trajectories/trajectory.hpp"
+
+namespace risley::trajectories {
+
+/// What is added to UTC (since 1 January 1970) to get the time of a trajectory, ns: one number for
+/// a whole flight, since seconds of week and of day run on. Where week or day are not known, those
+/// that bring the time nearest to the trajectory are taken.
+/// @param utc_ns  of the flight, by which leap seconds are told
+/// @return nothing for an unknown scale of time
+/// @throws InvalidArgument for a trajectory without records
+std::optional<std::int64_t> shift_from_utc_ns(const Trajectory& trajectory, std::int64_t utc_ns);
+
+/// What is added to a trajectory's time to get UTC since 1 January 1970, ns; nothing where week or
+/// day are not known.
+std::optional<std::int64_t> shift_to_utc_ns(const Trajectory& trajectory);
+
+/// "from 388077.010 s to 388078.005 s (GPS second of week)"
+std::string interval_words(const Trajectory& trajectory);
+
+/// Why a recording and a trajectory share no time: both intervals, and what is probably wrong: leap
+/// seconds, a week, another scale of time.
+/// @param first_ns, last_ns  of the recording, in what is taken for the trajectory's time
+std::string no_overlap_words(const Trajectory& trajectory, std::int64_t first_ns,
+                             std::int64_t last_ns);
+
+}  // namespace risley::trajectories

@@ -1,0 +1,366 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "risley/cloud/georeference.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <utility>
+
+#include <Eigen/Geometry>
+#include <fmt/format.h>
+
+#include "risley/core/error.hpp"
+#include "risley/core/require.hpp"
+#include "risley/trajectories/clock.hpp"
+#include "risley/trajectories/geodesy.hpp"
+
+namespace risley::cloud {
+namespace {
+
+using Eigen::Index;
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+using trajectories::Frame;
+
+/// Places of the trajectory in the cloud's table stand so far apart: straight lines between them
+/// are off by millimetres, which moves a covariance by nothing.
+constexpr std::int64_t kTableStep_ns = 1'000'000'000;
+/// Points of one call may lie so far from their middle for the expansion of the map, and so far off
+/// may it be, m.
+constexpr double kWidestExpansion = 1500, kExpansionError = 1e-5;
+/// Coordinates of files that hold whole multiples of a step begin at a multiple of this, m.
+constexpr double kOffsetStep = 1000;
+
+constexpr std::array<const char*, 7> kMountFactors{
+    "boresight_x_deg", "boresight_y_deg", "boresight_z_deg", "lever_arm_x_m",
+    "lever_arm_y_m",   "lever_arm_z_m",   "clock_offset_s"};
+
+/// The matrix by which a vector is crossed from the left.
+Matrix3d cross_matrix(const Vector3d& v) {
+  Matrix3d m;
+  m << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
+  return m;
+}
+
+Matrix3d covariance_at(const std::array<std::vector<double>, kCovarianceTerms>& columns,
+                       std::size_t i) {
+  Matrix3d c;
+  c << columns[kXX][i], columns[kXY][i], columns[kXZ][i],  //
+      columns[kXY][i], columns[kYY][i], columns[kYZ][i],   //
+      columns[kXZ][i], columns[kYZ][i], columns[kZZ][i];
+  return c;
+}
+
+void store(const Matrix3d& c, std::array<std::vector<double>, kCovarianceTerms>& columns,
+           std::size_t i) {
+  columns[kXX][i] = c(0, 0);
+  columns[kXY][i] = c(0, 1);
+  columns[kXZ][i] = c(0, 2);
+  columns[kYY][i] = c(1, 1);
+  columns[kYZ][i] = c(1, 2);
+  columns[kZZ][i] = c(2, 2);
+}
+
+/// Diagonal matrix of squares.
+Matrix3d variances(double a, double b, double c) {
+  return Vector3d(a * a, b * b, c * c).asDiagonal();
+}
+
+}  // namespace
+
+struct Georeference::State {
+  explicit State(const MovingPlatform& what)
+      : platform(what),
+        interpolation(platform.trajectory),
+        strips(trajectories::find_strips(interpolation)),
+        body_from_sensor(trajectories::body_from_sensor(platform.mount)),
+        lever_arm(trajectories::lever_arm(platform.mount)) {}
+
+  const MovingPlatform& platform;
+  trajectories::Interpolation interpolation;
+  std::vector<trajectories::Strip> strips;
+  Matrix3d body_from_sensor;
+  Vector3d lever_arm;
+  std::optional<MapProjection> map;
+  std::int64_t shift_ns = 0;
+  std::optional<std::int64_t> utc_shift_ns;  ///< of the trajectory's time
+  bool clock_known = false;                  ///< the recording says what its clock counts
+
+  /// The map about a place of the trajectory's frame, or that frame itself.
+  MapTangent tangent(const Vector3d& place) const {
+    return map ? map->tangent(place) : MapTangent();
+  }
+
+  /// North, east and down at a place, axes of the map.
+  Matrix3d map_from_ned(const MapTangent& tangent, const Vector3d& place) const {
+    return tangent.jacobian() * trajectories::ned_axes(platform.trajectory.frame, place);
+  }
+
+  /// Standard deviations of the mount in the order of its factors.
+  std::array<double, kMountFactors.size()> mount_sigmas() const {
+    const trajectories::Mount& mount = platform.mount;
+    return {mount.boresight[0].sigma, mount.boresight[1].sigma, mount.boresight[2].sigma,
+            mount.lever_arm[0].sigma, mount.lever_arm[1].sigma, mount.lever_arm[2].sigma,
+            mount.clock_offset.sigma};
+  }
+};
+
+Georeference::Georeference(const MovingPlatform& platform,
+                           recordings::TimeReference recording_clock, std::int64_t first_time_ns) {
+  trajectories::require_mount(platform.mount);
+  state_ = std::make_unique<State>(platform);
+  State& s = *state_;
+  const trajectories::Trajectory& trajectory = s.platform.trajectory;
+  const Vector3d& first = trajectory.position.front();
+  if (trajectory.frame == Frame::geocentric) {
+    std::string crs = s.platform.crs;
+    if (crs.empty()) {
+      const trajectories::Geodetic place = trajectories::geodetic_from_geocentric(first);
+      crs = utm_zone_of(place.latitude, place.longitude);
+    }
+    s.map.emplace(crs, s.platform.datum);
+    s.map->project(first);  // refuses a place that the map does not reach
+  } else if (!s.platform.crs.empty()) {
+    throw InvalidArgument(fmt::format(
+        "crs = \"{}\" with a trajectory in a frame of its own, which no map knows: give no crs, or "
+        "a trajectory with latitudes and longitudes",
+        s.platform.crs));
+  }
+  const double offset_ns = 1e9 * s.platform.mount.clock_offset.value;
+  s.shift_ns = std::llround(offset_ns);
+  if (recording_clock == recordings::TimeReference::utc) {
+    const auto shift = trajectories::shift_from_utc_ns(trajectory, first_time_ns);
+    s.clock_known = shift.has_value();
+    s.shift_ns += shift.value_or(0);
+  }
+  s.utc_shift_ns = trajectories::shift_to_utc_ns(trajectory);
+}
+
+Georeference::~Georeference() = default;
+
+Georeference::Cursor::Cursor(const Georeference& georeference)
+    : georeference_(&georeference), cursor_(georeference.state_->interpolation.cursor()) {}
+
+std::optional<SensorPose> Georeference::Cursor::at(std::int64_t recording_time_ns) {
+  const State& s = *georeference_->state_;
+  const std::int64_t time_ns = recording_time_ns + s.shift_ns;
+  const std::optional<trajectories::Pose> pose = cursor_.at(time_ns);
+  if (!pose) return {};
+  SensorPose sensor;
+  sensor.body = pose->attitude.toRotationMatrix();
+  sensor.turn = sensor.body * s.body_from_sensor;
+  sensor.reference = pose->position;
+  sensor.lever = sensor.body * s.lever_arm;
+  sensor.velocity = pose->velocity;
+  sensor.rate = pose->angular_velocity;
+  const auto later = std::upper_bound(
+      s.strips.begin(), s.strips.end(), time_ns,
+      [](std::int64_t t, const trajectories::Strip& strip) { return t < strip.begin_ns; });
+  if (later != s.strips.begin() && time_ns <= std::prev(later)->end_ns) {
+    sensor.strip = static_cast<std::uint16_t>(later - s.strips.begin());
+  }
+  return sensor;
+}
+
+void Georeference::announce(CloudHeader& header, bool loadings) const {
+  const State& s = *state_;
+  const trajectories::Trajectory& trajectory = s.platform.trajectory;
+  header.has_own_covariance = header.has_covariance;
+  header.has_point_source = true;
+  const auto middle = static_cast<std::size_t>(trajectory.size() / 2);
+  const MapTangent tangent = s.tangent(trajectory.position[middle]);
+  if (s.map) {
+    header.frame.wkt = s.map->wkt();
+    header.frame.text =
+        fmt::format("{}, heights {}", s.map->name(),
+                    s.map->has_height_system() ? "of its height system" : "above the ellipsoid");
+    header.frame.axes = {"easting", "northing", "height"};
+    for (std::size_t axis = 0; axis < 2; ++axis) {
+      header.frame.offset[axis] =
+          kOffsetStep *
+          std::round(tangent.map(trajectory.position[middle])[static_cast<Index>(axis)] /
+                     kOffsetStep);
+    }
+  } else {
+    header.frame.text = "of the trajectory: X east, Y north, Z up where it says so";
+    header.frame.axes = {"x of the trajectory's frame", "y of the trajectory's frame", "up"};
+  }
+  header.time_reference =
+      s.utc_shift_ns ? recordings::TimeReference::utc : recordings::TimeReference::relative;
+  if (loadings && header.has_covariance) {
+    for (std::size_t k = 0; k < kMountFactors.size(); ++k) {
+      if (s.mount_sigmas()[k] > 0) header.factors.emplace_back(kMountFactors[k]);
+    }
+  }
+  if (!s.platform.errors || !header.has_covariance) return;
+  TrajectoryErrors& errors = header.trajectory.emplace();
+  const trajectories::ErrorProcess& process = *s.platform.errors;
+  errors.sigma = process.sigma;
+  errors.correlation_time = process.correlation_time;
+  errors.white_rotation = process.white_rotation;
+  errors.record_interval = process.sample_interval;
+  const Matrix3d axes = s.map_from_ned(tangent, trajectory.position[middle]);
+  for (std::size_t k = 0; k < 3; ++k) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      errors.axes_from_ned[k][axis] = axes(static_cast<Index>(axis), static_cast<Index>(k));
+    }
+  }
+  std::int64_t next = trajectory.time_ns.front();
+  for (std::size_t i = 0; i < trajectory.size(); ++i) {
+    if (trajectory.time_ns[i] < next && i + 1 < trajectory.size()) continue;
+    next = trajectory.time_ns[i] + kTableStep_ns;
+    const Vector3d place = s.map ? s.map->project(trajectory.position[i]) : trajectory.position[i];
+    errors.time_ns.push_back(trajectory.time_ns[i] + s.utc_shift_ns.value_or(0));
+    errors.position.push_back({place.x(), place.y(), place.z()});
+  }
+}
+
+void Georeference::apply(Points& points, std::size_t sensor_factors,
+                         std::span<const SensorPose> poses) const {
+  const State& s = *state_;
+  const std::size_t n = points.size();
+  require_length("poses", poses.size(), n);
+  require_length("point_source", points.point_source.size(), n);
+  if (n == 0) return;
+  const bool covariance = !points.covariance[kXX].empty();
+  const bool loadings = points.loading.size() > 0;
+  const std::array<double, kMountFactors.size()> sigma = s.mount_sigmas();
+  if (loadings) {
+    const auto used = static_cast<std::size_t>(
+        std::count_if(sigma.begin(), sigma.end(), [](double one) { return one > 0; }));
+    require_length("loading", points.loading.size(), sensor_factors + used);
+  }
+
+  // Where the points are, and the map about their middle.
+  const Vector3d local = poses.front().reference;  // keeps digits
+  std::vector<Vector3d> arm(n);                    // from the trajectory's reference point, m
+  Vector3d middle = Vector3d::Zero();
+  for (std::size_t i = 0; i < n; ++i) {
+    arm[i] = poses[i].turn * Vector3d(points.x[i], points.y[i], points.z[i]) + poses[i].lever;
+    middle += (poses[i].reference - local) + arm[i];
+  }
+  const Vector3d center = local + middle / static_cast<double>(n);
+  const MapTangent tangent = s.tangent(center);
+  double farthest = 0;
+  std::size_t far = 0;
+  for (std::size_t i = 0; i < n; ++i) {
+    const double distance = ((poses[i].reference - center) + arm[i]).squaredNorm();
+    if (distance > farthest) {
+      farthest = distance;
+      far = i;
+    }
+  }
+  bool expand = true;
+  if (s.map) {
+    const Vector3d place = poses[far].reference + arm[far];
+    expand = farthest < kWidestExpansion * kWidestExpansion &&
+             (tangent.map(place) - s.map->project(place)).cwiseAbs().maxCoeff() < kExpansionError;
+  }
+
+  const Matrix3d& jacobian = tangent.jacobian();
+  const Matrix3d ned = s.map_from_ned(tangent, center);
+  Matrix3d position = Matrix3d::Zero(), rotation = Matrix3d::Zero(), white = Matrix3d::Zero();
+  if (s.platform.errors) {
+    const auto& e = s.platform.errors->sigma;
+    position = ned * variances(e[0], e[1], e[2]) * ned.transpose();
+    rotation = ned * variances(e[3], e[4], e[5]) * ned.transpose();
+    const double w = s.platform.errors->white_rotation;
+    white = ned * variances(w, w, w) * ned.transpose();
+  }
+  const Matrix3d turning = rotation + white;
+  const Matrix3d boresight = variances(sigma[0], sigma[1], sigma[2]);
+  const Matrix3d lever = variances(sigma[3], sigma[4], sigma[5]);
+  const std::int64_t time_shift = s.shift_ns + s.utc_shift_ns.value_or(0);
+
+  for (std::size_t i = 0; i < n; ++i) {
+    const SensorPose& pose = poses[i];
+    const Vector3d place = pose.reference + arm[i];
+    const Vector3d mapped = expand || !s.map ? tangent.map(place) : s.map->project(place);
+    const Vector3d p(points.x[i], points.y[i], points.z[i]);
+    points.x[i] = mapped.x();
+    points.y[i] = mapped.y();
+    points.z[i] = mapped.z();
+    points.time_ns[i] += time_shift;
+    points.point_source[i] = pose.strip;
+    if (!covariance) continue;
+    const Matrix3d to_map = jacobian * pose.turn;  // from the sensor's axes
+    const Matrix3d from_body = jacobian * pose.body;
+    const Matrix3d crossed = cross_matrix(p);
+    const Matrix3d own = covariance_at(points.own_covariance, i);
+    store(to_map * own * to_map.transpose(), points.own_covariance, i);
+    const Matrix3d sensor =
+        covariance_at(points.covariance, i) + crossed * boresight * crossed.transpose();
+    const Matrix3d across = cross_matrix(jacobian * arm[i]);
+    const Vector3d moved = jacobian * (pose.velocity + pose.rate.cross(arm[i])) * sigma[6];
+    const Matrix3d total = to_map * sensor * to_map.transpose() +
+                           from_body * lever * from_body.transpose() + moved * moved.transpose() +
+                           position + across * turning * across.transpose();
+    store(total, points.covariance, i);
+    if (!loadings) continue;
+    for (std::size_t k = 0; k < sensor_factors; ++k) {
+      auto& f = points.loading[k];
+      const Vector3d turned = to_map * Vector3d(f[0][i], f[1][i], f[2][i]);
+      for (std::size_t axis = 0; axis < 3; ++axis) f[axis][i] = turned[static_cast<Index>(axis)];
+    }
+    std::size_t at = sensor_factors;
+    const auto put = [&](const Vector3d& loading) {
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        points.loading[at][axis][i] = loading[static_cast<Index>(axis)];
+      }
+      ++at;
+    };
+    for (Index k = 0; k < 3; ++k) {
+      const double one = sigma[static_cast<std::size_t>(k)];
+      if (one > 0) put(to_map * (one * Vector3d::Unit(k).cross(p)));
+    }
+    for (Index k = 0; k < 3; ++k) {
+      const double one = sigma[static_cast<std::size_t>(k) + 3];
+      if (one > 0) put(one * from_body.col(k));
+    }
+    if (sigma[6] > 0) put(moved);
+  }
+}
+
+std::vector<std::string> Georeference::warnings() const {
+  const State& s = *state_;
+  std::vector<std::string> words;
+  if (!s.platform.errors) {
+    words.emplace_back(
+        "nobody says how wrong the trajectory may be: covariances hold the sensor's and the "
+        "mount's part alone");
+  }
+  if (!s.clock_known) {
+    words.push_back(fmt::format(
+        "the recording does not say what its clock counts: its times, with the mount's offset of "
+        "{:g} s, are taken as the trajectory's ({}); a sensor that is set by PPS and NMEA "
+        "counts UTC, 18 s less than GPS time",
+        s.platform.mount.clock_offset.value, to_string(s.platform.trajectory.time_scale)));
+  }
+  if (s.map && s.platform.crs.empty()) {
+    words.push_back(
+        fmt::format("no map was named: points are in {} with ellipsoidal heights", s.map->name()));
+  }
+  if (s.map) {
+    const std::string operation = s.map->operation();
+    if (!operation.empty()) {
+      words.push_back(fmt::format("the datum was changed on the way to the map: {}", operation));
+    }
+  }
+  for (const trajectories::TrajectoryGap& gap : s.interpolation.gaps()) {
+    words.push_back(fmt::format(
+        "the trajectory has no records for {:.3f} s from {:.3f} s on: shots of that time have no "
+        "points",
+        1e-9 * static_cast<double>(gap.end_ns - gap.begin_ns),
+        1e-9 * static_cast<double>(gap.begin_ns)));
+  }
+  return words;
+}
+
+const trajectories::Interpolation& Georeference::interpolation() const {
+  return state_->interpolation;
+}
+std::int64_t Georeference::clock_shift_ns() const { return state_->shift_ns; }
+const std::vector<trajectories::Strip>& Georeference::strips() const { return state_->strips; }
+
+}  // namespace risley::cloud

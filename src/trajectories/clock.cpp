@@ -1,0 +1,146 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "risley/trajectories/clock.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "risley/core/gps_time.hpp"
+#include "risley/core/require.hpp"
+
+namespace risley::trajectories {
+namespace {
+
+constexpr std::int64_t kClockSecond = 1'000'000'000;
+
+/// The multiple of a period that brings a time nearest to the middle of a trajectory.
+std::int64_t nearest_period(const Trajectory& trajectory, std::int64_t time_ns,
+                            std::int64_t period_ns) {
+  const std::int64_t first = trajectory.time_ns.front();
+  const std::int64_t middle = first + (trajectory.time_ns.back() - first) / 2;
+  const double periods = static_cast<double>(middle - time_ns) / static_cast<double>(period_ns);
+  return std::llround(periods) * period_ns;
+}
+
+std::string scale_words(TimeScale scale) {
+  switch (scale) {
+    case TimeScale::unknown:
+      return "of a scale that the file does not name";
+    case TimeScale::gps_second_of_week:
+      return "GPS second of week";
+    case TimeScale::utc_second_of_day:
+      return "UTC second of day";
+    case TimeScale::gps:
+      return "GPS second since 1980";
+    case TimeScale::adjusted_gps:
+      return "adjusted GPS second";
+    case TimeScale::utc_unix:
+      return "UTC second since 1970";
+  }
+  return {};
+}
+
+std::string seconds_words(std::int64_t time_ns) {
+  return fmt::format("{:.3f} s", 1e-9 * static_cast<double>(time_ns));
+}
+
+}  // namespace
+
+std::optional<std::int64_t> shift_from_utc_ns(const Trajectory& trajectory, std::int64_t utc_ns) {
+  require_at_least("records of the trajectory", static_cast<long long>(trajectory.size()), 1);
+  const std::int64_t gps = (leap_seconds(utc_ns) - kGpsEpoch_s) * kClockSecond;
+  switch (trajectory.time_scale) {
+    case TimeScale::unknown:
+      return {};
+    case TimeScale::utc_unix:
+      return 0;
+    case TimeScale::gps:
+      return gps;
+    case TimeScale::adjusted_gps:
+      return gps - kGpsAdjustment_s * kClockSecond;
+    case TimeScale::gps_second_of_week: {
+      if (trajectory.gps_week) return gps - *trajectory.gps_week * kWeek_s * kClockSecond;
+      return gps + nearest_period(trajectory, utc_ns + gps, kWeek_s * kClockSecond);
+    }
+    case TimeScale::utc_second_of_day:
+      return nearest_period(trajectory, utc_ns, kDay_s * kClockSecond);
+  }
+  return {};
+}
+
+std::optional<std::int64_t> shift_to_utc_ns(const Trajectory& trajectory) {
+  require_at_least("records of the trajectory", static_cast<long long>(trajectory.size()), 1);
+  std::int64_t to_gps = 0;  // GPS time since 1980, s
+  switch (trajectory.time_scale) {
+    case TimeScale::utc_unix:
+      return 0;
+    case TimeScale::gps:
+      break;
+    case TimeScale::adjusted_gps:
+      to_gps = kGpsAdjustment_s;
+      break;
+    case TimeScale::gps_second_of_week:
+      if (!trajectory.gps_week) return {};
+      to_gps = *trajectory.gps_week * kWeek_s;
+      break;
+    case TimeScale::unknown:
+    case TimeScale::utc_second_of_day:
+      return {};
+  }
+  const std::int64_t shift = (to_gps + kGpsEpoch_s) * kClockSecond;
+  const std::int64_t gps_ns = trajectory.time_ns.front() + shift;
+  const std::int64_t about = gps_ns - leap_seconds(gps_ns) * kClockSecond;
+  return shift - leap_seconds(about) * kClockSecond;
+}
+
+std::string interval_words(const Trajectory& trajectory) {
+  require_at_least("records of the trajectory", static_cast<long long>(trajectory.size()), 1);
+  return fmt::format("from {} to {} ({})", seconds_words(trajectory.time_ns.front()),
+                     seconds_words(trajectory.time_ns.back()), scale_words(trajectory.time_scale));
+}
+
+std::string no_overlap_words(const Trajectory& trajectory, std::int64_t first_ns,
+                             std::int64_t last_ns) {
+  std::string words = fmt::format(
+      "the recording and the trajectory share no time: the trajectory runs {}, the recording from "
+      "{} to {} of the same clock",
+      interval_words(trajectory), seconds_words(first_ns), seconds_words(last_ns));
+  // What would bring them together.
+  constexpr std::int64_t kLeap = 18;  // since 2017
+  const std::array<std::pair<std::int64_t, const char*>, 7> causes{{
+      {kLeap, "one counts GPS time and the other UTC"},
+      {-kLeap, "one counts GPS time and the other UTC"},
+      {kWeek_s, "they are a week apart: one passed the end of the GPS week"},
+      {-kWeek_s, "they are a week apart: one passed the end of the GPS week"},
+      {kGpsAdjustment_s, "one counts adjusted GPS time, the other GPS time"},
+      {-kGpsEpoch_s, "one counts from 1970, the other GPS time from 1980"},
+      {-kGpsEpoch_s + kLeap, "one counts UTC from 1970, the other GPS time from 1980"},
+  }};
+  for (const auto& [seconds, cause] : causes) {
+    const std::int64_t shift = seconds * kClockSecond;
+    if (first_ns + shift <= trajectory.time_ns.back() &&
+        last_ns + shift >= trajectory.time_ns.front()) {
+      return words + fmt::format(
+                         "; they overlap when {} s are added to the recording's times: probably {} "
+                         "(clock_offset_s of the mount)",
+                         seconds, cause);
+    }
+  }
+  for (const auto& [period, name] : {std::pair{kWeek_s, "weeks"}, std::pair{kDay_s, "days"}}) {
+    const std::int64_t shift = nearest_period(trajectory, first_ns, period * kClockSecond);
+    if (shift != 0 && first_ns + shift <= trajectory.time_ns.back() &&
+        last_ns + shift >= trajectory.time_ns.front()) {
+      return words + fmt::format(
+                         "; they overlap but for whole {}: the two clocks count from different "
+                         "ones (clock_offset_s of the mount: {} s)",
+                         name, shift / kClockSecond);
+    }
+  }
+  return words + "; are they of the same flight?";
+}
+
+}  // namespace risley::trajectories
