@@ -35,11 +35,11 @@ ScenePlane read_plane(const YamlMap& map, Names& earlier) {
   const double azimuth = angle(map, "normal_azimuth_deg", -360, 360);
   const double zenith = angle(map, "normal_zenith_deg", 0, 180);
   plane.plane =
-      plane_from_angles({azimuth, zenith}, number(map, "distance_m", 1e-3, kFarthestHit, "m"));
+      plane_from_angles({azimuth, zenith}, number(map, "distance_m", 1e-3L, kFarthestHit, "m"));
   plane.horizontal_axis = {-std::sin(azimuth), std::cos(azimuth), 0.0};
   plane.vertical_axis = cross(plane.plane.normal, plane.horizontal_axis);
   if (map.find("extent_m") != nullptr)
-    plane.extent = numbers<2>(map, "extent_m", 1e-3, kFarthestHit);
+    plane.extent = numbers<2>(map, "extent_m", 1e-3L, kFarthestHit);
   if (const auto* center = map.find("center_m")) {
     if (!plane.extent) {
       fail_at(map.path(), center->line,

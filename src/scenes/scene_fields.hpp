@@ -16,20 +16,20 @@
 /// Fields of scene files.
 namespace risley::scenes {
 
-inline double number(const io::YamlMap& map, std::string_view key, double lower, double upper,
-                     std::string_view unit) {
+inline double number(const io::YamlMap& map, std::string_view key, long double lower,
+                     long double upper, std::string_view unit) {
   return static_cast<double>(map.number(key, lower, upper, unit));
 }
 
 /// rad
-inline double angle(const io::YamlMap& map, std::string_view key, double lower_deg,
-                    double upper_deg) {
+inline double angle(const io::YamlMap& map, std::string_view key, long double lower_deg,
+                    long double upper_deg) {
   return radians_from_degrees(number(map, key, lower_deg, upper_deg, "deg"));
 }
 
 template <std::size_t N>
-std::array<double, N> numbers(const io::YamlMap& map, std::string_view key, double lower,
-                              double upper, std::string_view unit = "m") {
+std::array<double, N> numbers(const io::YamlMap& map, std::string_view key, long double lower,
+                              long double upper, std::string_view unit = "m") {
   const io::YamlMap::Entry& entry = map.at(key);
   if (!entry.value.is_list() || entry.value.items.size() != N) {
     io::fail_at(map.path(), entry.line,

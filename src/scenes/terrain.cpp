@@ -29,6 +29,8 @@ constexpr double kSeam = 1e-9;
 /// Boxes of the grid are larger by this, far more than coordinates are rounded, m.
 constexpr double kBoxMargin = 1e-6;
 constexpr double kMostCells = 1e6;
+/// Walls are not lower, m.
+constexpr double kLowestWall = 0.01;
 /// Mean cosine of incidence on leaves of all directions.
 constexpr double kLeafCosine = 0.5;
 /// Number of the random stream; those of simulations are others.
@@ -45,7 +47,8 @@ Vector3<double> on_map(const std::array<double, 2>& center, double heading, doub
 
 void require_within(std::string_view name, double value, const Limits& limits,
                     std::string_view unit) {
-  require_between(name, value, limits.lowest, limits.highest, unit);
+  require_between(name, value, static_cast<double>(limits.lowest),
+                  static_cast<double>(limits.highest), unit);
 }
 
 void require_center(const std::string& of, const std::array<double, 2>& center) {
@@ -78,8 +81,9 @@ void require_roof(const GableRoof& roof) {
   require_center(roof.name, roof.center);
   require_within(roof.name + ".length", roof.length, kSizeLimits, "m");
   require_within(roof.name + ".face_width", roof.face_width, kSizeLimits, "m");
-  require_between(roof.name + ".pitch", roof.pitch, radians_from_degrees(kPitchLimits_deg.lowest),
-                  radians_from_degrees(kPitchLimits_deg.highest), "rad");
+  require_between(roof.name + ".pitch", roof.pitch,
+                  radians_from_degrees(static_cast<double>(kPitchLimits_deg.lowest)),
+                  radians_from_degrees(static_cast<double>(kPitchLimits_deg.highest)), "rad");
   require_within(roof.name + ".ridge_height", roof.ridge_height, kSizeLimits, "m");
   require_heading(roof.name, roof.heading);
   const double eaves = roof.ridge_height - roof.face_width * std::sin(roof.pitch);
@@ -96,19 +100,21 @@ void require_village(const VillageSettings& s) {
   require_within("village.half_extent", s.half_extent, kSizeLimits, "m");
   require_between("village.roofs", s.roofs, 0, kMostVillageRoofs);
   require_between("village.bushes", s.bushes, 0, kMostVillageRoofs);
-  require_between("village.minimum_distance", s.minimum_distance, 0, kSizeLimits.highest, "m");
+  require_between("village.minimum_distance", s.minimum_distance, 0,
+                  static_cast<double>(kSizeLimits.highest), "m");
   const auto require_range = [](std::string_view name, const std::array<double, 2>& range,
                                 const Limits& limits, std::string_view unit) {
-    require_between(fmt::format("village.{}[0]", name), range[0], limits.lowest, limits.highest,
-                    unit);
-    require_between(fmt::format("village.{}[1]", name), range[1], range[0], limits.highest, unit);
+    require_between(fmt::format("village.{}[0]", name), range[0],
+                    static_cast<double>(limits.lowest), static_cast<double>(limits.highest), unit);
+    require_between(fmt::format("village.{}[1]", name), range[1], range[0],
+                    static_cast<double>(limits.highest), unit);
   };
   if (s.roofs > 0) {
     require_within("village.length", s.length, kSizeLimits, "m");
     require_within("village.face_width", s.face_width, kSizeLimits, "m");
     require_range("pitch", s.pitch,
-                  {radians_from_degrees(kPitchLimits_deg.lowest),
-                   radians_from_degrees(kPitchLimits_deg.highest)},
+                  {radians_from_degrees(static_cast<double>(kPitchLimits_deg.lowest)),
+                   radians_from_degrees(static_cast<double>(kPitchLimits_deg.highest))},
                   "rad");
     require_range("ridge_height", s.ridge_height, kSizeLimits, "m");
   }
@@ -300,7 +306,7 @@ void Terrain::add_roof(const GableRoof& roof, double lowest) {
            {at(1, 0, ridge), at(-1, 0, ridge), at(-1, 1, eaves), at(1, 1, eaves)});
   add_face(roof.name + ", left face",
            {at(-1, 0, ridge), at(1, 0, ridge), at(1, -1, eaves), at(-1, -1, eaves)});
-  const double foot = std::min(lowest, eaves - kSizeLimits.lowest);
+  const double foot = std::min(lowest, eaves - kLowestWall);
   if (!roof.walls) return;
   add_face(roof.name + ", right wall",
            {at(1, 1, eaves), at(-1, 1, eaves), at(-1, 1, foot), at(1, 1, foot)});
@@ -316,7 +322,7 @@ void Terrain::add_building(const Building& building, double lowest) {
   const double top =
       parts_.ground.value_or(Ground{}).height_at(building.center[0], building.center[1]) +
       building.height;
-  const double foot = std::min(lowest, top - kSizeLimits.lowest);
+  const double foot = std::min(lowest, top - kLowestWall);
   const auto at = [&](double along, double right, double z) {
     return on_map(building.center, building.heading, along * 0.5 * building.size[0],
                   right * 0.5 * building.size[1], z);

@@ -694,6 +694,7 @@ TEST(Terrain, MistakesInAFileAreToldWithTheirLine) {
               HasSubstr("barn: its eaves are 0.5 m below the ground"));
   EXPECT_THAT(message("wavelength_m: 1.5", "wavelength_m: 0.001"),
               HasSubstr("9: terrain.ground.waves[0].wavelength_m = 0.001 m, allowed 0.1 to 1e+06"));
+  EXPECT_EQ(message("wavelength_m: 1.5", "wavelength_m: 0.1"), "");
   EXPECT_THAT(message("latitude_deg: 50.1", "latitude_deg: 95"),
               HasSubstr("5: terrain.origin.latitude_deg = 95 deg"));
   EXPECT_THAT(message("buildings:\n", "building:\n"),
