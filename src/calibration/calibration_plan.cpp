@@ -192,10 +192,11 @@ CalibrationForecast forecast(const CalibrationPlan& plan, const Progress& progre
           nearest_hit(plan.scene, station.position + station.scene_from_sensor(ray.origin),
                       station.scene_from_sensor(ray.direction));
       if (!hit || hit->range < sensor.range_minimum || hit->range > sensor.range_maximum) continue;
+      if (hit->surface >= plan.scene.planes.size()) continue;  // terrain hides walls, no more
       all.range[i] = hit->range;
-      seen.rows[hit->plane].push_back(i);
-      seen.incidence[hit->plane] += std::acos(hit->cosine);
-      seen.range[hit->plane] += hit->range;
+      seen.rows[hit->surface].push_back(i);
+      seen.incidence[hit->surface] += std::acos(hit->cosine);
+      seen.range[hit->surface] += hit->range;
     }
     for (std::size_t w = 0; w < seen.rows.size(); ++w) {
       const auto n = static_cast<double>(seen.rows[w].size());

@@ -3,8 +3,8 @@
 #include "risley/scenes/scene.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <set>
 #include <string>
 #include <tuple>
 #include <utility>
@@ -18,55 +18,14 @@
 #include "risley/io/text_file.hpp"
 #include "risley/io/yaml_map.hpp"
 
+#include "scenes/scene_fields.hpp"
+#include "scenes/terrain_file.hpp"
+
 namespace risley::scenes {
 namespace {
 
 using io::fail_at;
 using io::YamlMap;
-
-constexpr double kFarthest = 1e6;  // m
-
-double number(const YamlMap& map, std::string_view key, double lower, double upper,
-              std::string_view unit) {
-  return static_cast<double>(map.number(key, lower, upper, unit));
-}
-
-double angle(const YamlMap& map, std::string_view key, double lower_deg, double upper_deg) {
-  return radians_from_degrees(number(map, key, lower_deg, upper_deg, "deg"));
-}
-
-template <std::size_t N>
-std::array<double, N> numbers(const YamlMap& map, std::string_view key, double lower,
-                              double upper) {
-  const YamlMap::Entry& entry = map.at(key);
-  if (!entry.value.is_list() || entry.value.items.size() != N) {
-    fail_at(map.path(), entry.line,
-            fmt::format("{}: expected a list of {} numbers in m", map.field(key), N));
-  }
-  std::array<double, N> values{};
-  for (std::size_t i = 0; i < N; ++i) {
-    const std::string field = fmt::format("{}[{}]", map.field(key), i);
-    values[i] = static_cast<double>(io::yaml_number(entry.value.items[i], map.path(), field));
-    if (values[i] < lower || values[i] > upper) {
-      fail_at(map.path(), entry.line,
-              fmt::format("{} = {:g} m, allowed {:g} to {:g}", field, values[i], lower, upper));
-    }
-  }
-  return values;
-}
-
-using Names = std::set<std::string>;
-
-/// The name of an entry that no earlier entry has.
-std::string new_name(const YamlMap& map, Names& earlier) {
-  std::string name = map.text("name");
-  if (name.empty()) fail_at(map.path(), map.at("name").line, map.field("name") + " is empty");
-  if (!earlier.insert(name).second) {
-    fail_at(map.path(), map.at("name").line,
-            fmt::format("{} = \"{}\" stands twice", map.field("name"), name));
-  }
-  return name;
-}
 
 ScenePlane read_plane(const YamlMap& map, Names& earlier) {
   map.allow_only({"name", "distance_m", "normal_azimuth_deg", "normal_zenith_deg", "extent_m",
@@ -76,16 +35,17 @@ ScenePlane read_plane(const YamlMap& map, Names& earlier) {
   const double azimuth = angle(map, "normal_azimuth_deg", -360, 360);
   const double zenith = angle(map, "normal_zenith_deg", 0, 180);
   plane.plane =
-      plane_from_angles({azimuth, zenith}, number(map, "distance_m", 1e-3, kFarthest, "m"));
+      plane_from_angles({azimuth, zenith}, number(map, "distance_m", 1e-3L, kFarthestHit, "m"));
   plane.horizontal_axis = {-std::sin(azimuth), std::cos(azimuth), 0.0};
   plane.vertical_axis = cross(plane.plane.normal, plane.horizontal_axis);
-  if (map.find("extent_m") != nullptr) plane.extent = numbers<2>(map, "extent_m", 1e-3, kFarthest);
+  if (map.find("extent_m") != nullptr)
+    plane.extent = numbers<2>(map, "extent_m", 1e-3L, kFarthestHit);
   if (const auto* center = map.find("center_m")) {
     if (!plane.extent) {
       fail_at(map.path(), center->line,
               fmt::format("{} needs {}", map.field("center_m"), map.field("extent_m")));
     }
-    plane.center = numbers<2>(map, "center_m", -kFarthest, kFarthest);
+    plane.center = numbers<2>(map, "center_m", -kFarthestHit, kFarthestHit);
   }
   if (map.find("sigma_deg") != nullptr) plane.normal_sigma = angle(map, "sigma_deg", 0, 180);
   return plane;
@@ -96,7 +56,7 @@ Station read_station(const YamlMap& map, Names& earlier) {
   Station station;
   station.name = new_name(map, earlier);
   if (map.find("position_m") != nullptr) {
-    const auto [x, y, z] = numbers<3>(map, "position_m", -kFarthest, kFarthest);
+    const auto [x, y, z] = numbers<3>(map, "position_m", -kFarthestHit, kFarthestHit);
     station.position = {x, y, z};
   }
   const auto optional_angle = [&](std::string_view key, double lower_deg) {
@@ -134,17 +94,29 @@ Station Scene::station(std::string_view name) const {
                   known.empty() ? "none" : fmt::format("{}", fmt::join(known, ", "))));
 }
 
+std::size_t Scene::surfaces() const { return planes.size() + (terrain ? terrain->surfaces() : 0); }
+
+std::string Scene::surface_name(std::size_t surface) const {
+  require_place("surface", surface, surfaces());
+  return surface < planes.size() ? planes[surface].name
+                                 : terrain->surface_name(surface - planes.size());
+}
+
 std::optional<Hit> nearest_hit(const Scene& scene, const Vector3<double>& origin,
-                               const Vector3<double>& direction) {
+                               const Vector3<double>& direction, double penetration) {
   require_finite("origin.x", origin.x, "m");
   require_finite("origin.y", origin.y, "m");
   require_finite("origin.z", origin.z, "m");
   require_unit_length("direction", norm(direction));
+  if (!(penetration > 0.0 && penetration < 1.0)) {
+    throw InvalidArgument(
+        fmt::format("penetration = {:g}, allowed between 0 and 1, without both", penetration));
+  }
   std::optional<Hit> nearest;
   for (std::size_t i = 0; i < scene.planes.size(); ++i) {
     const ScenePlane& each = scene.planes[i];
     const double range = hit_distance(each.plane, origin, direction);
-    if (!(range > 0.0 && range <= kFarthest) || (nearest && range >= nearest->range)) continue;
+    if (!(range > 0.0 && range <= kFarthestHit) || (nearest && range >= nearest->range)) continue;
     if (each.extent) {
       const Vector3<double> from_foot =
           origin + range * direction - each.plane.distance * each.plane.normal;
@@ -156,28 +128,28 @@ std::optional<Hit> nearest_hit(const Scene& scene, const Vector3<double>& origin
     }
     nearest = Hit{range, std::min(1.0, std::abs(dot(each.plane.normal, direction))), i};
   }
+  if (scene.terrain) {
+    const double farthest = nearest ? nearest->range : kFarthestHit;
+    if (auto hit = scene.terrain->nearest_hit(origin, direction, farthest, penetration)) {
+      hit->surface += scene.planes.size();
+      nearest = hit;
+    }
+  }
   return nearest;
 }
 
 Scene parse_scene(const std::string& text, const std::string& path) {
   const YamlMap root(io::parse_yaml(text, path), path, "");
-  root.allow_only({"planes", "stations"});
+  root.allow_only({"planes", "stations", "terrain"});
   Scene scene;
-  const auto for_each_map = [&](std::string_view key, auto&& read) {
-    const YamlMap::Entry* entry = root.find(key);
-    if (entry == nullptr) return;
-    if (!entry->value.is_list()) {
-      fail_at(path, entry->line, fmt::format("{}: expected a list", key));
-    }
-    for (std::size_t i = 0; i < entry->value.items.size(); ++i) {
-      read(YamlMap(entry->value.items[i], path, fmt::format("{}[{}]", key, i)));
-    }
-  };
   Names planes, stations;
-  for_each_map("planes",
+  for_each_map(root, "planes",
                [&](const YamlMap& map) { scene.planes.push_back(read_plane(map, planes)); });
-  for_each_map("stations",
+  for_each_map(root, "stations",
                [&](const YamlMap& map) { scene.stations.push_back(read_station(map, stations)); });
+  if (const auto* entry = root.find("terrain")) {
+    scene.terrain = read_terrain(YamlMap(entry->value, path, "terrain"), planes);
+  }
   return scene;
 }
 

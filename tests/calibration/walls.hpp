@@ -98,7 +98,7 @@ inline std::vector<calibration::RangedShots> shots_of_planes(const PrismTrain& t
     const auto hit = nearest_hit(scene, pose.position + pose.scene_from_sensor(ray.origin),
                                  pose.scene_from_sensor(ray.direction));
     if (!hit) continue;
-    calibration::RangedShots& shots = planes[hit->plane];
+    calibration::RangedShots& shots = planes[hit->surface];
     shots.resize(prisms, shots.size() + 1);
     std::size_t pair = 0;
     for (std::size_t k = 0; k < reported.size(); ++k) {

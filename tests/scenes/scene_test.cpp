@@ -95,15 +95,15 @@ planes:
                                   "walls.yaml");
   const auto ahead = nearest_hit(scene, {0, 0, 0}, {1, 0, 0});
   ASSERT_TRUE(ahead);
-  EXPECT_EQ(ahead->plane, 1u);
+  EXPECT_EQ(ahead->surface, 1u);
   EXPECT_DOUBLE_EQ(ahead->range, 5.0);
   EXPECT_DOUBLE_EQ(ahead->cosine, 1.0);
   const auto past_it = nearest_hit(scene, {6, 0, 0}, towards(60, 90));
   ASSERT_TRUE(past_it);
-  EXPECT_EQ(past_it->plane, 0u);
+  EXPECT_EQ(past_it->surface, 0u);
   EXPECT_NEAR(past_it->range, 28.0, 1e-12);
   EXPECT_NEAR(past_it->cosine, 0.5, 1e-12);
-  EXPECT_EQ(nearest_hit(scene, {0, 0, 0}, {-1, 0, 0})->plane, 2u);
+  EXPECT_EQ(nearest_hit(scene, {0, 0, 0}, {-1, 0, 0})->surface, 2u);
   EXPECT_FALSE(nearest_hit(scene, {0, 0, 0}, {0, 0, 1}));
 }
 
@@ -111,7 +111,7 @@ TEST(Scene, ExtentEndsAPlaneAroundItsCenter) {
   const Scene scene = parse_scene(kHall, "hall.yaml");
   const auto hits_board = [&](double left, double up) {
     const auto hit = nearest_hit(scene, {0, 0, 0}, normalized(Vector3<double>{10.0, left, up}));
-    return hit && hit->plane == 1;
+    return hit && hit->surface == 1;
   };
   // 2 m wide around 3 m to the left, 1 m high around 1 m below.
   EXPECT_TRUE(hits_board(3, -1));

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "risley/core/plane.hpp"
+#include "risley/scenes/terrain.hpp"
 
 namespace risley::scenes {
 
@@ -36,33 +37,38 @@ struct Station {
   Vector3<double> scene_from_sensor(const Vector3<double>& direction) const;
 };
 
-/// Planes around the origin and the places where the sensor stands.
+/// What stands around: planes around the origin, or a terrain on a map, or both; and the places
+/// where the sensor stands.
 struct Scene {
   std::vector<ScenePlane> planes;
   std::vector<Station> stations;
+  std::optional<Terrain> terrain = {};
 
   /// The station of that name; for an empty name the sensor at the origin, X forward.
   /// @throws InvalidArgument that lists the known stations
   Station station(std::string_view name) const;
+
+  /// Number of surfaces: the planes in their order, then those of the terrain in theirs.
+  std::size_t surfaces() const;
+  /// Name of a plane or of a surface of the terrain.
+  /// @throws InvalidArgument for a surface that there is not
+  std::string surface_name(std::size_t surface) const;
 };
 
-/// Where a ray ends.
-struct Hit {
-  double range = 0;       ///< m
-  double cosine = 0;      ///< of the angle of incidence, [0, 1]
-  std::size_t plane = 0;  ///< row of Scene::planes
-};
-
-/// The nearest plane in front of a ray within 1000 km, or nothing.
-/// @param origin     scene frame, m
-/// @param direction  unit vector, scene frame
-/// @throws InvalidArgument for an origin that is not finite or a direction that is no unit vector
+/// The nearest surface in front of a ray, or nothing: planes and faces within kFarthestHit, ground
+/// with relief within kFarthestGround.
+/// @param origin       scene frame, m
+/// @param direction    unit vector, scene frame
+/// @param penetration  how much of its way through a bush the ray gets, (0, 1)
+/// @throws InvalidArgument for an origin that is not finite, a direction that is no unit vector or
+///         a penetration that is not between 0 and 1
 std::optional<Hit> nearest_hit(const Scene& scene, const Vector3<double>& origin,
-                               const Vector3<double>& direction);
+                               const Vector3<double>& direction, double penetration = 0.5);
 
 /// Reads planes: [{name, distance_m, normal_azimuth_deg, normal_zenith_deg, extent_m, center_m,
 /// sigma_deg}], of which the last three are optional, and stations: [{name, position_m, roll_deg,
-/// pitch_deg, yaw_deg, sigma_deg}], of which all but the name are. Either list may be absent.
+/// pitch_deg, yaw_deg, sigma_deg}], of which all but the name are, and terrain: {origin, ground,
+/// roofs, buildings, bushes, village}, see docs/files.md. Each may be absent.
 /// @param path  for messages only
 /// @throws FileError with the line for anything else
 Scene parse_scene(const std::string& text, const std::string& path);
