@@ -35,6 +35,7 @@ struct CloudCommandOptions {
   std::optional<double> noise_angle_deg;
   double las_scale_m = cloud::CloudWriterOptions{}.las_scale;
   ReadingWishes reading;
+  jobs::PlatformFiles platform;
 };
 
 std::string cloud_endings() {
@@ -81,6 +82,9 @@ Json summary_json(const FileJob& job, const cloud::CloudSummary& s) {
       {"no_return", s.no_return},
       {"outliers", s.outliers},
       {"without_rotation_angle", s.without_rotation_angle},
+      {"without_pose", s.without_pose},
+      {"strips", s.strips.size()},
+      {"frame", s.frame},
       {"mirrored", s.mirrored},
       {"residuals",
        {{"azimuth_deg", {{"rms", degrees_from_radians(s.azimuth_residual_rms)}}},
@@ -117,7 +121,8 @@ ExitStatus write_beam_origin_map(const CloudCommandOptions& options,
 FileOutcome make_one(const FileJob& job, const CloudCommandOptions& options,
                      const cloud::CloudOptions& settings, const Progress& progress) {
   cloud::CloudSummary s = jobs::cloud_of_recording(
-      {job.input, read_options(options.reading), options.calibration, job.output, settings},
+      {job.input, read_options(options.reading), options.calibration, job.output,
+       options.platform, settings},
       progress);
   put_flags(s.warnings);
   log_warnings(job.input, s.read_warnings);
@@ -131,6 +136,9 @@ FileOutcome make_one(const FileJob& job, const CloudCommandOptions& options,
   if (s.outliers > 0) text += fmt::format(", {} outliers left out", grouped(s.outliers));
   if (s.without_rotation_angle > 0) {
     text += fmt::format(", {} without rotation angles", grouped(s.without_rotation_angle));
+  }
+  if (s.without_pose > 0) {
+    text += fmt::format(", {} outside the trajectory left out", grouped(s.without_pose));
   }
   return {s.damage ? kBadFile : kDone, summary_json(job, s), text};
 }
@@ -171,6 +179,20 @@ Run declare_cloud(CLI::App& verb) {
          "Give every point the loadings of the errors that all points share, for covariances "
          "between points");
   add_reading_options(verb, o.reading);
+  verb.add_option("--trajectory", o.platform.trajectory,
+                  "Trajectory of a sensor that moved: SBET, Inertial Explorer or POSPac text, CSV");
+  verb.add_option("--mount", o.platform.mount,
+                  "How the sensor sits on the moving platform (YAML): axes, lever arm, boresight, "
+                  "clock");
+  verb.add_option("--accuracy", o.platform.accuracy, "Accuracies of the trajectory (SMRMSG)");
+  verb.add_option("--trajectory-errors", o.platform.errors,
+                  "How wrong the trajectory may be, and for how long (YAML)");
+  verb.add_option("--crs", o.platform.crs,
+                  "Map that the points of a moving sensor go to: EPSG:25832, with a height system "
+                  "EPSG:25832+7837 (default: UTM on WGS 84, ellipsoidal heights)");
+  verb.add_option("--datum", o.platform.datum,
+                  "Datum of the trajectory: EPSG:4979 for WGS 84, EPSG:4937 for ETRS89 (default: "
+                  "WGS 84)");
   verb.add_option("--rate-hz", o.rate_hz,
                   "Directions per second that rotation angles are found from; 'full' for all")
       ->capture_default_str();

@@ -73,13 +73,13 @@ struct Georeference::State {
   explicit State(const MovingPlatform& what)
       : platform(what),
         interpolation(platform.trajectory),
-        strips(trajectories::find_strips(interpolation)),
+        strips(trajectories::flown_strips(interpolation)),
         body_from_sensor(trajectories::body_from_sensor(platform.mount)),
         lever_arm(trajectories::lever_arm(platform.mount)) {}
 
   const MovingPlatform& platform;
   trajectories::Interpolation interpolation;
-  std::vector<trajectories::Strip> strips;
+  std::vector<trajectories::FlownStrip> strips;
   Matrix3d body_from_sensor;
   Vector3d lever_arm;
   std::optional<MapProjection> map;
@@ -156,7 +156,7 @@ std::optional<SensorPose> Georeference::Cursor::at(std::int64_t recording_time_n
   sensor.rate = pose->angular_velocity;
   const auto later = std::upper_bound(
       s.strips.begin(), s.strips.end(), time_ns,
-      [](std::int64_t t, const trajectories::Strip& strip) { return t < strip.begin_ns; });
+      [](std::int64_t t, const trajectories::FlownStrip& strip) { return t < strip.begin_ns; });
   if (later != s.strips.begin() && time_ns <= std::prev(later)->end_ns) {
     sensor.strip = static_cast<std::uint16_t>(later - s.strips.begin());
   }
@@ -361,6 +361,6 @@ const trajectories::Interpolation& Georeference::interpolation() const {
   return state_->interpolation;
 }
 std::int64_t Georeference::clock_shift_ns() const { return state_->shift_ns; }
-const std::vector<trajectories::Strip>& Georeference::strips() const { return state_->strips; }
+const std::vector<trajectories::FlownStrip>& Georeference::strips() const { return state_->strips; }
 
 }  // namespace risley::cloud

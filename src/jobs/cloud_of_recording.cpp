@@ -25,7 +25,12 @@ cloud::CloudSummary cloud_of_recording(const CloudOfRecordingOptions& options,
   }
   const sensors::Sensor calibration = sensors::load_sensor(options.calibration);
   cloud::find_cloud_format(options.output, settings.writer.format);  // before anything is read
-  settings.provenance = with_inputs(settings.provenance, {options.recording}, progress);
+  std::vector<std::string> inputs{options.recording};
+  if (moves(options.platform)) {
+    settings.platform = load_platform(options.platform, progress);
+    for (const std::string& path : paths_of(options.platform)) inputs.push_back(path);
+  }
+  settings.provenance = with_inputs(settings.provenance, inputs, progress);
   settings.provenance.emplace_back("calibration", options.calibration);
   if (std::filesystem::exists(options.calibration)) {
     settings.provenance.emplace_back("calibration_sha256", io::sha256_of_file(options.calibration));

@@ -15,9 +15,9 @@
 #include "risley/cloud/points.hpp"
 #include "risley/recordings/observations.hpp"
 #include "risley/trajectories/error_process.hpp"
+#include "risley/trajectories/flown_strips.hpp"
 #include "risley/trajectories/interpolation.hpp"
 #include "risley/trajectories/mount.hpp"
-#include "risley/trajectories/strips.hpp"
 #include "risley/trajectories/trajectory.hpp"
 
 namespace risley::cloud {
@@ -87,7 +87,7 @@ class Georeference {
   const trajectories::Interpolation& interpolation() const;
   /// From the recording's clock to the trajectory's time, with the mount's offset, ns.
   std::int64_t clock_shift_ns() const;
-  const std::vector<trajectories::Strip>& strips() const;
+  const std::vector<trajectories::FlownStrip>& strips() const;
 
  private:
   struct State;

@@ -44,10 +44,10 @@ struct CloudSummary {
   std::uint64_t without_rotation_angle = 0;
   /// Returns at times that the trajectory of a moving sensor does not cover.
   std::uint64_t without_pose = 0;
-  std::string format;                       ///< name of the CloudFormat written
-  std::vector<std::string> factors;         ///< names of the common factors
-  std::string frame;                        ///< of the points, in words
-  std::vector<trajectories::Strip> strips;  ///< of a flight, in the trajectory's time
+  std::string format;                            ///< name of the CloudFormat written
+  std::vector<std::string> factors;              ///< names of the common factors
+  std::string frame;                             ///< of the points, in words
+  std::vector<trajectories::FlownStrip> strips;  ///< of a flight, in the trajectory's time
   bool mirrored = false;
   double azimuth_residual_rms = 0, zenith_residual_rms = 0;  ///< rad, of the points
   /// How far points were moved from where the sensor says, rms over some beams, rad.

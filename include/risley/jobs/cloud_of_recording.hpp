@@ -6,6 +6,7 @@
 
 #include "risley/cloud/make_cloud.hpp"
 #include "risley/core/progress.hpp"
+#include "risley/jobs/moving_platform.hpp"
 #include "risley/recordings/reader.hpp"
 
 namespace risley::jobs {
@@ -16,8 +17,9 @@ struct CloudOfRecordingOptions {
   recordings::ReadOptions reading;  ///< see open_in_sensor_frame() where it holds no extrinsics
   std::string calibration;          ///< preset by name, or a preset or calibration file
   std::string output;               ///< path; its ending chooses the format unless one is named
+  PlatformFiles platform;  ///< of a sensor that moved
   /// Provenance goes into the cloud, with input's and calibration's SHA-256.
-  cloud::CloudOptions cloud;
+  cloud::CloudOptions cloud;  ///< without a platform
 };
 
 /// Turns a recording into points with covariance; the output appears when it is whole.

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-#include "risley/trajectories/strips.hpp"
+#include "risley/trajectories/flown_strips.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -41,7 +41,8 @@ std::vector<SecondOfFlight> seconds_of_flight(const Interpolation& interpolation
 
 }  // namespace
 
-std::vector<Strip> find_strips(const Interpolation& interpolation, const StripOptions& options) {
+std::vector<FlownStrip> flown_strips(const Interpolation& interpolation,
+                                     const FlownStripOptions& options) {
   require_above("fastest_turn", options.fastest_turn, 0, "rad/s");
   require_above("widest_course", options.widest_course, 0, "rad");
   require_above("slowest_share", options.slowest_share, 0);
@@ -54,7 +55,7 @@ std::vector<Strip> find_strips(const Interpolation& interpolation, const StripOp
   std::nth_element(ways.begin(), middle, ways.end());
   const double least = options.slowest_share * *middle;
 
-  std::vector<Strip> strips;
+  std::vector<FlownStrip> strips;
   for (std::size_t i = 0; i < seconds.size();) {
     std::size_t end = i;
     double lowest = 0, highest = 0, course = seconds[i].course, length = 0;

@@ -10,13 +10,13 @@
 namespace risley::trajectories {
 
 /// A stretch of a flight along one course.
-struct Strip {
+struct FlownStrip {
   std::int64_t begin_ns = 0, end_ns = 0;  ///< in the trajectory's time, both included
   double course = 0;                      ///< of the way over ground, clockwise from north, rad
   double length = 0;                      ///< m
 };
 
-struct StripOptions {
+struct FlownStripOptions {
   double fastest_turn = 0.0523598775598299;  ///< of the course within a strip, rad/s: 3 degrees/s
   double widest_course = 0.349065850398866;  ///< courses of a strip differ by no more, rad: 20 deg
   double slowest_share = 0.5;                ///< of the median speed
@@ -26,7 +26,7 @@ struct StripOptions {
 /// The strips of a flight in the order of time: where the platform moves on without turning. Course
 /// and speed are taken over a second, so that shaking does not count.
 /// @throws InvalidArgument for options that are not above 0
-std::vector<Strip> find_strips(const Interpolation& interpolation,
-                               const StripOptions& options = {});
+std::vector<FlownStrip> flown_strips(const Interpolation& interpolation,
+                                     const FlownStripOptions& options = {});
 
 }  // namespace risley::trajectories

@@ -1,0 +1,32 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "risley/cloud/georeference.hpp"
+#include "risley/core/progress.hpp"
+
+namespace risley::jobs {
+
+/// What says how a sensor moved.
+struct PlatformFiles {
+  std::string trajectory;  ///< path; empty: the sensor stood still
+  std::string mount;       ///< path
+  std::string accuracy;    ///< path of the trajectory's accuracies (SMRMSG); may be empty
+  std::string errors;      ///< path of an error process; may be empty
+  std::string crs;         ///< as cloud::MovingPlatform
+  std::string datum;       ///< as cloud::MovingPlatform; empty: WGS 84
+};
+
+/// Whether anything of them is given.
+bool moves(const PlatformFiles& files);
+
+/// The paths among them that are given, for provenance and for telling outputs from inputs.
+std::vector<std::string> paths_of(const PlatformFiles& files);
+
+/// @throws InvalidArgument where the trajectory or the mount is missing; FileError
+cloud::MovingPlatform load_platform(const PlatformFiles& files, const Progress& progress = {});
+
+}  // namespace risley::jobs

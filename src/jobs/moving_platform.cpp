@@ -1,0 +1,47 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "risley/jobs/moving_platform.hpp"
+
+#include "risley/core/error.hpp"
+#include "risley/trajectories/trajectory_file.hpp"
+
+namespace risley::jobs {
+
+bool moves(const PlatformFiles& files) {
+  return !paths_of(files).empty() || !files.crs.empty() || !files.datum.empty();
+}
+
+std::vector<std::string> paths_of(const PlatformFiles& files) {
+  std::vector<std::string> paths;
+  for (const std::string* path :
+       {&files.trajectory, &files.mount, &files.accuracy, &files.errors}) {
+    if (!path->empty()) paths.push_back(*path);
+  }
+  return paths;
+}
+
+cloud::MovingPlatform load_platform(const PlatformFiles& files, const Progress& progress) {
+  if (files.trajectory.empty()) {
+    throw InvalidArgument(
+        "option trajectory is missing: mount, accuracies, errors and crs are of a sensor that "
+        "moves");
+  }
+  if (files.mount.empty()) {
+    throw InvalidArgument(
+        "option mount is missing: a file that says how the sensor sits on the platform of the "
+        "trajectory (axes, lever arm, boresight, clock)");
+  }
+  cloud::MovingPlatform platform;
+  platform.mount = trajectories::load_mount(files.mount);
+  platform.trajectory = trajectories::load_trajectory(files.trajectory, progress);
+  if (!files.accuracy.empty()) {
+    trajectories::add_accuracies(platform.trajectory,
+                                 trajectories::load_accuracies(files.accuracy, progress),
+                                 files.accuracy);
+  }
+  platform.crs = files.crs;
+  if (!files.datum.empty()) platform.datum = files.datum;
+  return platform;
+}
+
+}  // namespace risley::jobs
