@@ -539,7 +539,7 @@ TEST(TextFormats, ChangedBytesAreReadOrRefused) {
   std::uint64_t draw = 0;
   for (const std::string& text :
        {explorer_text(3, true), pospac_text(3), openmms_text(3), csv_text(3), kTum}) {
-    for (int i = 0; i < 300; ++i) {
+    for (int i = 0; i < 100; ++i) {
       std::string changed = text;
       for (int k = 0; k < 3; ++k) {
         const auto at =
