@@ -14,6 +14,8 @@
 #include "risley/core/saturating.hpp"
 #include "risley/trajectories/geodesy.hpp"
 
+#include "trajectories/row_order.hpp"
+
 namespace risley::trajectories {
 namespace {
 
@@ -33,16 +35,6 @@ void require_lengths(const Trajectory& trajectory) {
   require_length("attitude", trajectory.attitude.size(), trajectory.size());
   require_length_or_none("velocity", trajectory.velocity.size(), trajectory.size());
   require_length_or_none("accuracy", trajectory.accuracy.size(), trajectory.size());
-}
-
-/// Row order[i] comes to row i.
-template <class T>
-void reorder(std::vector<T>& column, const std::vector<std::size_t>& order) {
-  if (column.empty()) return;
-  std::vector<T> sorted;
-  sorted.reserve(order.size());
-  for (const std::size_t row : order) sorted.push_back(column[row]);
-  column = std::move(sorted);
 }
 
 }  // namespace
@@ -152,39 +144,48 @@ RollPitchHeading roll_pitch_heading(Frame frame, const Eigen::Vector3d& position
                             frame_from_body);
 }
 
-TimeOrder order_by_time(Trajectory& trajectory) {
-  require_lengths(trajectory);
-  TimeOrder done;
-  const std::vector<std::int64_t>& times = trajectory.time_ns;
+RowOrder row_order(const std::vector<std::int64_t>& times) {
+  RowOrder order;
+  TimeOrder& told = order.told;
   std::int64_t latest = times.empty() ? 0 : times.front();
   bool in_order = true;
   for (std::size_t i = 1; i < times.size(); ++i) {
     in_order = in_order && times[i] > times[i - 1];
     if (times[i] < latest) {
-      ++done.moved;
+      ++told.moved;
       const std::int64_t back = saturating_difference(latest, times[i]);
-      if (back > done.largest_back_ns) {
-        done.largest_back_ns = back;
-        done.largest_back_at = i;
+      if (back > told.largest_back_ns) {
+        told.largest_back_ns = back;
+        told.largest_back_at = i;
       }
     }
     latest = std::max(latest, times[i]);
   }
-  if (in_order) return done;
-  std::vector<std::size_t> order(times.size());
-  std::iota(order.begin(), order.end(), std::size_t{0});
-  std::stable_sort(order.begin(), order.end(),
+  if (in_order) return order;
+  std::vector<std::size_t> rows(times.size());
+  std::iota(rows.begin(), rows.end(), std::size_t{0});
+  std::stable_sort(rows.begin(), rows.end(),
                    [&](std::size_t a, std::size_t b) { return times[a] < times[b]; });
-  const auto same = [&](std::size_t a, std::size_t b) { return times[a] == times[b]; };
-  const auto end = std::unique(order.begin(), order.end(), same);
-  done.repeated = static_cast<std::size_t>(order.end() - end);
-  order.erase(end, order.end());
-  reorder(trajectory.position, order);
-  reorder(trajectory.attitude, order);
-  reorder(trajectory.velocity, order);
-  reorder(trajectory.accuracy, order);
-  reorder(trajectory.time_ns, order);
-  return done;
+  for (const std::size_t row : rows) {
+    if (order.rows.empty() || times[row] != times[order.rows.back()]) {
+      order.rows.push_back(row);
+      continue;
+    }
+    if (told.repeated++ == 0) told.repeated_at = row;
+  }
+  return order;
+}
+
+TimeOrder order_by_time(Trajectory& trajectory) {
+  require_lengths(trajectory);
+  const RowOrder order = row_order(trajectory.time_ns);
+  if (order.rows.empty()) return order.told;
+  reorder(trajectory.position, order.rows);
+  reorder(trajectory.attitude, order.rows);
+  reorder(trajectory.velocity, order.rows);
+  reorder(trajectory.accuracy, order.rows);
+  reorder(trajectory.time_ns, order.rows);
+  return order.told;
 }
 
 }  // namespace risley::trajectories

@@ -7,7 +7,9 @@
 
 #include <gmock/gmock.h>
 
+#include "risley/io/block_file.hpp"
 #include "risley/io/netcdf.hpp"
+#include "risley/io/text_table.hpp"
 
 #include "io/temporary_folder.hpp"
 #include "refusal.hpp"
@@ -78,6 +80,32 @@ TEST(Entries, NetcdfIsReadByDimensionsAndTypesThatItHas) {
   std::vector<float> wrong;
   EXPECT_EQ(refusal([&] { file.get(time, 0, 1, wrong); }),
             "variable time has the type double, asked for float");
+}
+
+TEST(Entries, BlocksOfFilesLieWithinThem) {
+  const TemporaryFolder folder;
+  const std::string path = folder.file("a.bin");
+  {
+    BlockOutput file(path);
+    file.append(8);
+    EXPECT_EQ(refusal([&] { file.patch_u64(1, 0); }),
+              "offset = 1 of 8 bytes, allowed within the 8 written");
+    file.patch_u64(0, 7);
+    file.commit();
+  }
+  BlockInput file(path);
+  EXPECT_EQ(file.at(0, 8)[0], 7);
+  EXPECT_EQ(refusal([&] { file.at(4, 5); }), "bytes = [4, 9), allowed at most 8 within [0, 8)");
+}
+
+TEST(Entries, PowersOfTenFit64Bits) {
+  EXPECT_EQ(power_of_ten(18), 1'000'000'000'000'000'000);
+  EXPECT_EQ(refusal([] { power_of_ten(19); }), "exponent = 19, allowed 0 to 18");
+  EXPECT_EQ(refusal([] { power_of_ten(-1); }), "exponent = -1, allowed 0 to 18");
+  const TemporaryFolder folder;
+  TextOutput output(folder.file("a.txt"));
+  EXPECT_EQ(refusal([&] { output.append_fixed(1, 19); }), "exponent = 19, allowed 0 to 18");
+  EXPECT_EQ(refusal([&] { output.append_decimal(1, 19); }), "decimals = 19, allowed 0 to 18");
 }
 
 }  // namespace risley::io::entries_test

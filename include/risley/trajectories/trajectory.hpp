@@ -65,6 +65,21 @@ struct TrajectoryWarning {
   std::string message;
 };
 
+/// Along which axes a file's velocities stand, found by comparing them with differences of its
+/// positions.
+struct VelocityFrame {
+  std::string name;    ///< "north-east-down"; "undecided" or "none" where the trajectory has none
+  std::string reason;  ///< in words: what was compared, or why nothing was decided
+  /// Velocity less differenced position, RMS along north, east, down, m/s; of the best frame where
+  /// nothing is decided.
+  std::optional<Eigen::Vector3d> residual;
+};
+
+/// The smallest, median and largest of angles, rad.
+struct AngleSpread {
+  double least = 0, median = 0, greatest = 0;
+};
+
 /// The poses of a moving platform as columns, one row per record, ordered by time. Velocities and
 /// accuracies may be missing as a whole, all other columns have one length.
 struct Trajectory {
@@ -79,6 +94,10 @@ struct Trajectory {
   std::vector<Eigen::Vector3d> velocity;     ///< relative to the frame, along its axes, m/s
   std::vector<PoseAccuracy> accuracy;
   std::vector<TrajectoryWarning> warnings;  ///< of reading it
+  /// Of a file that has one: angle from the platform's heading to the true one, which is less.
+  std::optional<AngleSpread> wander;
+  std::optional<VelocityFrame> velocity_frame;  ///< of a file's velocities
+  int week_crossings = 0;                       ///< or midnights at which times were made to run on
 
   std::size_t size() const { return time_ns.size(); }
 };
@@ -102,8 +121,9 @@ RollPitchHeading roll_pitch_heading(Frame frame, const Eigen::Vector3d& position
 
 /// What had to be done to put rows into the order of their times.
 struct TimeOrder {
-  std::size_t moved = 0;     ///< rows that stood behind a later one
-  std::size_t repeated = 0;  ///< rows left out because an earlier one had the same time
+  std::size_t moved = 0;        ///< rows that stood behind a later one
+  std::size_t repeated = 0;     ///< rows left out because an earlier one had the same time
+  std::size_t repeated_at = 0;  ///< the first of these, from 0
   /// Row, from 0, in front of which the largest step back was, and that step.
   std::size_t largest_back_at = 0;
   std::int64_t largest_back_ns = 0;

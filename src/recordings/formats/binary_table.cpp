@@ -103,7 +103,7 @@ BinaryTableReader::BinaryTableReader(std::string path, std::string_view format, 
   used_lanes_.erase(std::unique(used_lanes_.begin(), used_lanes_.end()), used_lanes_.end());
   for (const std::size_t lane : used_lanes_) {
     rows_per_block_ = std::clamp<std::size_t>(
-        BlockInput::kBlockBytes / table_.lanes[lane].record_bytes, 1, rows_per_block_);
+        io::BlockInput::kBlockBytes / table_.lanes[lane].record_bytes, 1, rows_per_block_);
   }
   cells_.resize(columns_.wanted().size());
   look_ahead();

@@ -27,7 +27,7 @@ std::size_t FileSource::read(std::uint8_t* bytes, std::size_t count) {
   std::size_t done = 0;
   while (done < count && offset_ < end_) {
     const auto piece = static_cast<std::size_t>(
-        std::min<std::uint64_t>({count - done, end_ - offset_, BlockInput::kBlockBytes}));
+        std::min<std::uint64_t>({count - done, end_ - offset_, io::BlockInput::kBlockBytes}));
     std::copy_n(file_.at(offset_, piece), piece, bytes + done);
     done += piece;
     offset_ += piece;

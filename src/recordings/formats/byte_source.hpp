@@ -8,7 +8,7 @@
 #include <memory>
 #include <string>
 
-#include "recordings/formats/block_file.hpp"
+#include "risley/io/block_file.hpp"
 
 namespace risley::recordings {
 
@@ -44,7 +44,7 @@ class FileSource final : public ByteSource {
   bool is_plain() const override { return true; }
 
  private:
-  BlockInput file_;
+  io::BlockInput file_;
   std::uint64_t offset_, end_;
 };
 

@@ -11,12 +11,12 @@
 #include <fmt/format.h>
 
 #include "risley/core/error.hpp"
+#include "risley/io/seconds.hpp"
 
 #include "recordings/formats/cartesian.hpp"
 #include "recordings/formats/format.hpp"
 #include "recordings/formats/las_points.hpp"
 #include "recordings/formats/rounding.hpp"
-#include "recordings/formats/seconds.hpp"
 
 namespace risley::recordings {
 namespace las {
@@ -35,7 +35,7 @@ bool is_further_return(const Point& point, const Point& before) {
 class LasReader final : public Reader {
  public:
   LasReader(const std::string& path, std::string_view format) : path_(path) {
-    BlockInput input(path);
+    io::BlockInput input(path);
     file_ = read_header(input, warnings_);
     source_ = file_.compressed ? open_compressed_points(std::move(input), file_, warnings_)
                                : open_points(std::move(input), file_, warnings_);
@@ -242,7 +242,7 @@ class LasReader final : public Reader {
   std::int64_t time_ns(const Point& point) const {
     const bool utc = header_.time_reference == TimeReference::utc;
     const auto time =
-        utc ? utc_of_adjusted_gps(point.gps_time) : nanoseconds_from_seconds(point.gps_time);
+        utc ? utc_of_adjusted_gps(point.gps_time) : io::nanoseconds_from_seconds(point.gps_time);
     if (time) return *time;
     throw FileError(path_, source_->gps_time_place(row_),
                     fmt::format("expected a GPS time of point {} within +-{:g} s, found {}",

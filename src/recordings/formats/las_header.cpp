@@ -10,8 +10,7 @@
 
 #include "risley/core/error.hpp"
 #include "risley/io/little_endian.hpp"
-
-#include "recordings/formats/seconds.hpp"
+#include "risley/io/seconds.hpp"
 
 namespace risley::recordings::las {
 namespace {
@@ -48,7 +47,7 @@ std::size_t bytes_described(const std::uint8_t* descriptor) {
 
 class HeaderReader {
  public:
-  HeaderReader(BlockInput& input, std::vector<ReadWarning>& warnings)
+  HeaderReader(io::BlockInput& input, std::vector<ReadWarning>& warnings)
       : input_(input), warnings_(warnings) {}
 
   PublicHeader read() {
@@ -231,7 +230,7 @@ class HeaderReader {
     }
   }
 
-  BlockInput& input_;
+  io::BlockInput& input_;
   std::vector<ReadWarning>& warnings_;
   PublicHeader header_;
   std::uint64_t header_size_ = 0;
@@ -242,14 +241,14 @@ class HeaderReader {
 std::optional<std::int64_t> utc_of_adjusted_gps(double seconds) {
   constexpr double kFarthest = 7e9;  // with the origin's 1.3e9 s well within 64 bits of ns
   if (!(std::abs(seconds) < kFarthest)) return std::nullopt;
-  const std::int64_t gps_ns = *nanoseconds_from_seconds(seconds) + kGpsOrigin * kSecond;
+  const std::int64_t gps_ns = *io::nanoseconds_from_seconds(seconds) + kGpsOrigin * kSecond;
   // The leap seconds of a UTC that is too late by them are one too many for some seconds at most.
   std::int64_t utc_ns = gps_ns - leap_seconds(gps_ns) * kSecond;
   utc_ns = gps_ns - leap_seconds(utc_ns) * kSecond;
   return utc_ns;
 }
 
-PublicHeader read_header(BlockInput& input, std::vector<ReadWarning>& warnings) {
+PublicHeader read_header(io::BlockInput& input, std::vector<ReadWarning>& warnings) {
   return HeaderReader(input, warnings).read();
 }
 

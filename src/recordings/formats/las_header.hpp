@@ -9,10 +9,9 @@
 #include <string>
 #include <vector>
 
+#include "risley/io/block_file.hpp"
 #include "risley/recordings/las_numbers.hpp"
 #include "risley/recordings/reader.hpp"
-
-#include "recordings/formats/block_file.hpp"
 
 /// How LAS files begin [ASPRS LAS 1.0 to 1.4-R15].
 namespace risley::recordings::las {
@@ -39,6 +38,6 @@ struct PublicHeader {
 /// taken on a header's word.
 /// @param warnings  gets what is odd and does not keep points from being read
 /// @throws FileError with the byte of what cannot be
-PublicHeader read_header(BlockInput& input, std::vector<ReadWarning>& warnings);
+PublicHeader read_header(io::BlockInput& input, std::vector<ReadWarning>& warnings);
 
 }  // namespace risley::recordings::las

@@ -18,7 +18,7 @@ using io::load;
 
 class PlainPoints final : public PointSource {
  public:
-  PlainPoints(BlockInput input, const PublicHeader& header, std::vector<ReadWarning>& warnings)
+  PlainPoints(io::BlockInput input, const PublicHeader& header, std::vector<ReadWarning>& warnings)
       : input_(std::move(input)), header_(header) {
     const std::uint64_t room = (header_.points_end - header_.points_at) / header_.record_bytes;
     points_ = std::min(header_.points, room);
@@ -100,7 +100,7 @@ class PlainPoints final : public PointSource {
     return point;
   }
 
-  BlockInput input_;
+  io::BlockInput input_;
   PublicHeader header_;
   std::uint64_t points_ = 0;  ///< that the file holds
   std::uint64_t next_ = 0;
@@ -108,7 +108,7 @@ class PlainPoints final : public PointSource {
 
 }  // namespace
 
-std::unique_ptr<PointSource> open_points(BlockInput input, const PublicHeader& header,
+std::unique_ptr<PointSource> open_points(io::BlockInput input, const PublicHeader& header,
                                          std::vector<ReadWarning>& warnings) {
   return std::make_unique<PlainPoints>(std::move(input), header, warnings);
 }

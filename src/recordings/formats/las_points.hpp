@@ -11,9 +11,9 @@
 #include <vector>
 
 #include "risley/core/error.hpp"
+#include "risley/io/block_file.hpp"
 #include "risley/recordings/reader.hpp"
 
-#include "recordings/formats/block_file.hpp"
 #include "recordings/formats/las_header.hpp"
 
 namespace risley::recordings::las {
@@ -44,12 +44,13 @@ class PointSource {
 };
 
 /// Points that stand one after another. @param warnings  gets points that the header does not count
-std::unique_ptr<PointSource> open_points(BlockInput input, const PublicHeader& header,
+std::unique_ptr<PointSource> open_points(io::BlockInput input, const PublicHeader& header,
                                          std::vector<ReadWarning>& warnings);
 
 /// Points that LASzip compressed.
 /// @throws FileError also when this build has no LASzip, with what to do then
-std::unique_ptr<PointSource> open_compressed_points(BlockInput input, const PublicHeader& header,
+std::unique_ptr<PointSource> open_compressed_points(io::BlockInput input,
+                                                    const PublicHeader& header,
                                                     std::vector<ReadWarning>& warnings);
 
 }  // namespace risley::recordings::las

@@ -23,7 +23,7 @@ using io::load;
 /// Points that LASzip unpacks one by one. It reads the header again, which has been checked.
 class LazPoints final : public PointSource {
  public:
-  LazPoints(BlockInput input, const PublicHeader& header, std::vector<ReadWarning>& warnings)
+  LazPoints(io::BlockInput input, const PublicHeader& header, std::vector<ReadWarning>& warnings)
       : path_(input.path()), header_(header), size_(input.size()) {
     if (header_.points == 0 && size_ > header_.points_at + sizeof(std::int64_t)) {
       warnings.push_back({{.byte_offset = header_.points_at, .line = {}},
@@ -70,7 +70,7 @@ class LazPoints final : public PointSource {
 
  private:
   /// LASzip takes memory for as many chunks as the table counts: each begins with a whole point.
-  void check_chunk_table(BlockInput& input) const {
+  void check_chunk_table(io::BlockInput& input) const {
     constexpr std::uint64_t kTableHeaderBytes = 8;
     if (size_ - header_.points_at < sizeof(std::int64_t)) {
       fail({size_, {}}, fmt::format("expected the place of the chunk table at byte {}, found the "
@@ -170,7 +170,8 @@ class LazPoints final : public PointSource {
 
 }  // namespace
 
-std::unique_ptr<PointSource> open_compressed_points(BlockInput input, const PublicHeader& header,
+std::unique_ptr<PointSource> open_compressed_points(io::BlockInput input,
+                                                    const PublicHeader& header,
                                                     std::vector<ReadWarning>& warnings) {
   return std::make_unique<LazPoints>(std::move(input), header, warnings);
 }
@@ -181,7 +182,7 @@ std::unique_ptr<PointSource> open_compressed_points(BlockInput input, const Publ
 
 namespace risley::recordings::las {
 
-std::unique_ptr<PointSource> open_compressed_points(BlockInput input,
+std::unique_ptr<PointSource> open_compressed_points(io::BlockInput input,
                                                     const PublicHeader& /*header*/,
                                                     std::vector<ReadWarning>& /*warnings*/) {
   throw FileError(

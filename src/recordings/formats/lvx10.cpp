@@ -23,7 +23,7 @@ bool recognises_lvx10(std::string_view head) {
 
 /// Bytes of a frame header: files with 24 and with 32 are described, and the header itself does
 /// not tell. The one behind which whole packages stand is right.
-std::size_t probe_frame_header(BlockInput& file, std::uint64_t first_frame,
+std::size_t probe_frame_header(io::BlockInput& file, std::uint64_t first_frame,
                                const std::vector<Device>& devices) {
   constexpr std::size_t kShort = 24, kLong = 32;
   constexpr int kFrames = 100;
@@ -55,7 +55,7 @@ std::size_t probe_frame_header(BlockInput& file, std::uint64_t first_frame,
 }
 
 std::unique_ptr<Reader> open_lvx10(const std::string& path) {
-  BlockInput file(path);
+  io::BlockInput file(path);
   lvx_version(file);
   const std::size_t count = *lvx_header_bytes(file, kLvx10DeviceCountAt, 1, "number of devices");
   RecordingHeader header;

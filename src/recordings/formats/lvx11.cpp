@@ -11,9 +11,9 @@
 
 #include <fmt/format.h>
 
+#include "risley/io/block_file.hpp"
 #include "risley/io/little_endian.hpp"
 
-#include "recordings/formats/block_file.hpp"
 #include "recordings/formats/format.hpp"
 #include "recordings/formats/lvx_reader.hpp"
 #include "recordings/livox/packet_encoder.hpp"
@@ -39,7 +39,7 @@ bool recognises_lvx11(std::string_view head) {
 }
 
 std::unique_ptr<Reader> open_lvx11(const std::string& path) {
-  BlockInput file(path);
+  io::BlockInput file(path);
   const auto version_bytes = lvx_version(file);
   if (version_bytes[0] == 2) {
     throw FileError(path, {kLvxName.size(), {}},
@@ -111,7 +111,7 @@ class Lvx11Writer final : public Writer {
 
   RecordingHeader header_;
   std::vector<DeviceState> devices_;
-  BlockOutput output_;
+  io::BlockOutput output_;
   std::uint64_t rows_written_ = 0;
   std::int64_t time_tolerance_ns_ = 1;
   std::optional<std::uint64_t> frame_at_;  // position of the frame being written

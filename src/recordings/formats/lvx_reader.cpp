@@ -53,7 +53,7 @@ bool period_is(const FirstPackets& first, double expected_ns) {
 
 }  // namespace
 
-const std::uint8_t* lvx_header_bytes(BlockInput& file, std::uint64_t offset, std::size_t count,
+const std::uint8_t* lvx_header_bytes(io::BlockInput& file, std::uint64_t offset, std::size_t count,
                                      std::string_view part) {
   if (offset + count > file.size()) {
     throw FileError(file.path(), {file.size(), {}},
@@ -63,7 +63,7 @@ const std::uint8_t* lvx_header_bytes(BlockInput& file, std::uint64_t offset, std
   return file.at(offset, count);
 }
 
-std::array<std::uint8_t, 4> lvx_version(BlockInput& file) {
+std::array<std::uint8_t, 4> lvx_version(io::BlockInput& file) {
   const std::uint8_t* bytes = lvx_header_bytes(file, 0, kLvxPublicHeaderBytes, "LVX file header");
   if (!std::equal(kLvxName.begin(), kLvxName.end(), bytes,
                   [](char a, std::uint8_t b) { return static_cast<std::uint8_t>(a) == b; })) {
@@ -78,7 +78,7 @@ std::array<std::uint8_t, 4> lvx_version(BlockInput& file) {
   return {bytes[16], bytes[17], bytes[18], bytes[19]};
 }
 
-std::vector<Device> read_lvx_devices(BlockInput& file, std::uint64_t offset, std::size_t count,
+std::vector<Device> read_lvx_devices(io::BlockInput& file, std::uint64_t offset, std::size_t count,
                                      bool has_extrinsic_flag) {
   if (count == 0) {
     throw FileError(file.path(), {offset - 1, {}}, "number of devices = 0, allowed 1 to 255");
@@ -110,7 +110,7 @@ std::vector<Device> read_lvx_devices(BlockInput& file, std::uint64_t offset, std
   return devices;
 }
 
-LvxReader::LvxReader(BlockInput file, RecordingHeader header, const LvxVersion& version)
+LvxReader::LvxReader(io::BlockInput file, RecordingHeader header, const LvxVersion& version)
     : file_(std::move(file)), version_(version) {
   header_ = std::move(header);
   grids_.resize(header_.devices.size());

@@ -12,10 +12,9 @@
 #include <vector>
 
 #include "risley/core/error.hpp"
+#include "risley/io/block_file.hpp"
 #include "risley/recordings/livox/packet_decoder.hpp"
 #include "risley/recordings/reader.hpp"
-
-#include "recordings/formats/block_file.hpp"
 
 namespace risley::recordings {
 
@@ -38,20 +37,20 @@ struct LvxVersion {
 };
 
 /// Bytes of a file's header. @throws FileError that names the missing part when it is cut off
-const std::uint8_t* lvx_header_bytes(BlockInput& file, std::uint64_t offset, std::size_t count,
+const std::uint8_t* lvx_header_bytes(io::BlockInput& file, std::uint64_t offset, std::size_t count,
                                      std::string_view part);
 
 /// Checks name and magic code, and returns the four version bytes. @throws FileError
-std::array<std::uint8_t, 4> lvx_version(BlockInput& file);
+std::array<std::uint8_t, 4> lvx_version(io::BlockInput& file);
 
 /// Reads the device table. @throws FileError when it is empty, cut off or names a device twice
-std::vector<Device> read_lvx_devices(BlockInput& file, std::uint64_t offset, std::size_t count,
+std::vector<Device> read_lvx_devices(io::BlockInput& file, std::uint64_t offset, std::size_t count,
                                      bool has_extrinsic_flag);
 
 /// Reads the frames and packages that all LVX 1 files consist of.
 class LvxReader final : public Reader {
  public:
-  LvxReader(BlockInput file, RecordingHeader header, const LvxVersion& version);
+  LvxReader(io::BlockInput file, RecordingHeader header, const LvxVersion& version);
 
   bool read(Chunk& chunk, std::size_t max_rows) override;
   double fraction_read() const override;
@@ -67,7 +66,7 @@ class LvxReader final : public Reader {
   void step_over(std::uint8_t data_type);
   void fail(std::uint64_t offset, std::string problem);
 
-  BlockInput file_;
+  io::BlockInput file_;
   LvxVersion version_;
   std::array<int, 256> device_rows_{};                 // by device index, -1 for none
   std::vector<std::optional<livox::ShotGrid>> grids_;  // by device row; empty: as the types say

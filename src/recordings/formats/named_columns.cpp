@@ -10,10 +10,10 @@
 
 #include "risley/core/saturating.hpp"
 #include "risley/core/text.hpp"
+#include "risley/io/seconds.hpp"
 
 #include "recordings/formats/cartesian.hpp"
 #include "recordings/formats/format.hpp"
-#include "recordings/formats/seconds.hpp"
 
 namespace risley::recordings {
 namespace {

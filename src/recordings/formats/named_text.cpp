@@ -8,8 +8,7 @@
 #include <fmt/format.h>
 
 #include "risley/core/error.hpp"
-
-#include "recordings/formats/block_file.hpp"
+#include "risley/io/block_file.hpp"
 
 namespace risley::recordings {
 
@@ -61,7 +60,7 @@ void NamedTextReader::append_row(Fields fields, Chunk& chunk) {
 
 HeaderLines::HeaderLines(const std::string& path) : path_(path) {
   constexpr std::uint64_t kLongestHeader = std::uint64_t{1} << 16;
-  BlockInput file(path);
+  io::BlockInput file(path);
   file_size_ = file.size();
   const auto count = static_cast<std::size_t>(std::min(file_size_, kLongestHeader));
   if (count > 0) bytes_.assign(reinterpret_cast<const char*>(file.at(0, count)), count);

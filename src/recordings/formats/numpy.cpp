@@ -34,7 +34,7 @@ BinaryTable npy_table(const std::string& path) {
         },
         table);
     const std::uint64_t end = header.data_offset + header.elements() * header.element_bytes;
-    const std::uint64_t size = BlockInput(path).size();
+    const std::uint64_t size = io::BlockInput(path).size();
     if (size > end) {
       table.warnings.push_back(fmt::format("{} bytes behind the array were not read", size - end));
     }

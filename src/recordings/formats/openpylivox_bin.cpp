@@ -13,13 +13,13 @@
 #include <fmt/format.h>
 
 #include "risley/core/error.hpp"
+#include "risley/io/block_file.hpp"
 #include "risley/io/little_endian.hpp"
+#include "risley/io/seconds.hpp"
 #include "risley/recordings/livox/packet_decoder.hpp"
 
-#include "recordings/formats/block_file.hpp"
 #include "recordings/formats/format.hpp"
 #include "recordings/formats/openpylivox.hpp"
-#include "recordings/formats/seconds.hpp"
 #include "recordings/livox/packet_encoder.hpp"
 
 namespace risley::recordings {
@@ -126,7 +126,7 @@ class OpenpylivoxBinReader final : public Reader {
   void decode_record(const std::uint8_t* bytes, Chunk& chunk) const {
     const std::span record(bytes, parts_.points.bytes_per_record);
     const double seconds = load<double>(bytes + parts_.time_at);
-    const auto time_ns = nanoseconds_from_seconds(seconds);
+    const auto time_ns = io::nanoseconds_from_seconds(seconds);
     if (!time_ns) {
       fail(offset_ + parts_.time_at,
            fmt::format("expected a time within +-9.2e9 s, found {}", seconds));
@@ -159,7 +159,7 @@ class OpenpylivoxBinReader final : public Reader {
                          1});
   }
 
-  BlockInput input_;
+  io::BlockInput input_;
   OpenpylivoxLayout layout_;
   RecordParts parts_;
   std::uint64_t offset_ = kHeaderBytes;
@@ -216,7 +216,7 @@ class OpenpylivoxBinWriter final : public Writer {
   /// Room for one record, with its time filled in.
   std::uint8_t* append_record(std::int64_t time_ns) {
     std::uint8_t* const bytes = output_.append(parts_.bytes());
-    store<double>(bytes + parts_.time_at, seconds_from_nanoseconds(time_ns));
+    store<double>(bytes + parts_.time_at, io::seconds_from_nanoseconds(time_ns));
     return bytes;
   }
 
@@ -263,7 +263,7 @@ class OpenpylivoxBinWriter final : public Writer {
 
   OpenpylivoxLayout layout_;
   RecordParts parts_;
-  BlockOutput output_;
+  io::BlockOutput output_;
   OpenpylivoxRowFilter filter_;
   Observations pair_;  ///< two rows
   std::uint64_t pair_row_number_ = 0, pair_rows_ = 0;

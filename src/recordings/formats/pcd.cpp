@@ -155,7 +155,7 @@ NamedTextLayout text_layout(PcdHeader header) {
 }
 
 BinaryTable binary_table(const std::string& path, PcdHeader header) {
-  const std::uint64_t file_size = BlockInput(path).size();
+  const std::uint64_t file_size = io::BlockInput(path).size();
   const bool packed = header.data == "binary_compressed";
   const auto fail = [&](std::uint64_t offset, const std::string& problem) {
     throw FileError(path, {offset, {}}, problem);
@@ -203,7 +203,7 @@ BinaryTable binary_table(const std::string& path, PcdHeader header) {
   if (file_size - begin < kSizesBytes) {
     fail(begin, "expected the two sizes of the packed points, found the end of the file");
   }
-  BlockInput file(path);
+  io::BlockInput file(path);
   const std::uint8_t* const sizes = file.at(begin, kSizesBytes);
   const auto packed_bytes = load<std::uint32_t>(sizes), all_bytes = load<std::uint32_t>(sizes + 4);
   std::uint64_t expected = 0;

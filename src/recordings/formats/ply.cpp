@@ -147,7 +147,7 @@ NamedTextLayout text_layout(const PlyHeader& header) {
 }
 
 /// Where an element ends that begins at an offset. @throws FileError when the file ends before
-std::uint64_t end_of(const PlyElement& element, std::uint64_t offset, BlockInput& file) {
+std::uint64_t end_of(const PlyElement& element, std::uint64_t offset, io::BlockInput& file) {
   const auto require = [&](std::uint64_t count, std::uint64_t bytes) {
     if (bytes == 0 || count <= (file.size() - offset) / bytes) return count * bytes;
     throw FileError(file.path(), {offset, {}},
@@ -179,7 +179,7 @@ std::uint64_t end_of(const PlyElement& element, std::uint64_t offset, BlockInput
 }
 
 BinaryTable binary_table(const std::string& path, const PlyHeader& header) {
-  BlockInput file(path);
+  io::BlockInput file(path);
   std::uint64_t begin = header.data_offset;
   for (auto element = header.elements.begin(); element + 1 != header.elements.end(); ++element) {
     begin = end_of(*element, begin, file);

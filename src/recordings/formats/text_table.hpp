@@ -15,82 +15,26 @@
 #include <fmt/format.h>
 
 #include "risley/core/error.hpp"
-#include "risley/io/output_file.hpp"
+#include "risley/io/text_table.hpp"
 #include "risley/recordings/observations.hpp"
 #include "risley/recordings/reader.hpp"
 
 namespace risley::recordings {
 
-/// First line of a text without byte order mark, line end and blanks: what a header is
-/// recognised by.
-std::string normalized_header(std::string_view text);
-
-/// Reads a file line by line in large blocks, in constant memory.
-class LineReader {
- public:
-  /// @throws FileError when the file is missing or cannot be read
-  explicit LineReader(const std::string& path);
-
-  /// The next line without its line end (LF or CR LF) and, in line 1, without a byte order mark;
-  /// it lives until the next call. false at the end of the file.
-  /// @throws FileError when the disk fails or a line is longer than 64 KiB
-  bool next(std::string_view& line);
-
-  std::uint64_t line_number() const { return line_number_; }  ///< of the last line, from 1
-  bool has_line_end() const { return has_line_end_; }         ///< of the last line
-  double fraction_read() const;
-
- private:
-  void refill();
-  void require_length(std::size_t length) const;
-
-  std::string path_;
-  std::unique_ptr<std::FILE, int (*)(std::FILE*)> file_;
-  std::vector<char> buffer_;
-  std::size_t begin_ = 0, end_ = 0;  ///< unread part of the buffer
-  bool at_end_ = false, has_line_end_ = true;
-  std::uint64_t line_number_ = 0, bytes_read_ = 0, file_size_ = 0;
-};
-
-/// What is wrong with one line; TextTableReader adds the file and the line.
-class BadRow : public Error {
- public:
-  using Error::Error;
-};
-
-/// A number as it stands in a text: digits * 10^-decimals, exact.
-struct Decimal {
-  double value = 0.0;
-  std::int64_t digits = 0;
-  int decimals = -1;  ///< digits after the point; -1 where only `value` is known (exponents)
-};
-
-/// @throws BadRow with the column's name when the field is not a finite number
-Decimal decimal_field(std::string_view field, std::string_view column);
-
-/// @throws BadRow with the column's name when the field is no whole number in [low, high]
-std::int64_t integer_field(std::string_view field, std::string_view column, std::int64_t low,
-                           std::int64_t high);
-
-/// Seconds as whole nanoseconds, exact up to 9 decimals and rounded beyond.
-/// @throws BadRow when they do not fit 64 bits
-std::int64_t nanoseconds_field(std::string_view field, std::string_view column);
-std::int64_t nanoseconds_of(const Decimal& seconds, std::string_view column);
-
-/// A number, or NaN: an empty field, "nan" or an infinity. @throws BadRow for anything else
-Decimal number_or_nan(std::string_view field, std::string_view column);
-
-/// What stands between two fields: this character, or any number of blanks and tabs.
-inline constexpr char kBlanks = ' ';
-
-/// Text without blanks and tabs at its ends.
-std::string_view trimmed(std::string_view text);
-
-/// For messages: short, and without bytes that a terminal would act on.
-std::string printable(std::string_view text);
-
-/// Fields of a line, without the blanks around them.
-std::vector<std::string_view> fields_of(std::string_view line, char delimiter);
+using io::BadRow;
+using io::Decimal;
+using io::decimal_field;
+using io::fields_of;
+using io::integer_field;
+using io::kBlanks;
+using io::LineReader;
+using io::nanoseconds_field;
+using io::nanoseconds_of;
+using io::normalized_header;
+using io::number_or_nan;
+using io::printable;
+using io::TextOutput;
+using io::trimmed;
 
 /// Reads a table of rows, one per line, below one or more header lines. A byte order mark, CR LF,
 /// blanks around fields and empty lines at the end are accepted. A last line without line end
@@ -171,37 +115,6 @@ void TextTableReader::look_ahead(std::size_t max_rows, Function&& function) cons
 /// Adds one row to all columns and sets those a text format rarely knows: intensity and tag 0,
 /// first return, first beam, first device.
 std::size_t append_observation(Observations& rows, std::int64_t time_ns);
-
-/// Text that goes to a file in large blocks and appears under its name at close().
-class TextOutput {
- public:
-  /// @throws FileError
-  explicit TextOutput(const std::string& path);
-
-  fmt::memory_buffer& buffer() { return buffer_; }
-  void append(std::string_view text) { buffer_.append(text.data(), text.data() + text.size()); }
-  /// value with a fixed number of decimals, rounded to nearest.
-  void append_fixed(double value, int decimals);
-  /// digits * 10^-decimals.
-  void append_decimal(std::int64_t digits, int decimals);
-  /// Hands a full buffer to the file; to be called after each row. @throws FileError
-  void end_row() {
-    buffer_.push_back('\n');
-    if (buffer_.size() >= kBlockSize) flush();
-  }
-  /// @throws FileError
-  void close();
-
- private:
-  static constexpr std::size_t kBlockSize = std::size_t{1} << 20;
-  void append_digits(std::uint64_t digits, int decimals, bool negative);
-  void flush();
-  [[noreturn]] void fail() const;
-
-  io::OutputFile output_;
-  std::unique_ptr<std::FILE, int (*)(std::FILE*)> file_;
-  fmt::memory_buffer buffer_;
-};
 
 /// How a text format writes times: with the decimals it usually has where they are exact, and
 /// with 9 (whole nanoseconds) where they are not. The first chunk decides for the whole file;

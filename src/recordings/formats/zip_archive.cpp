@@ -165,7 +165,7 @@ class ZipDirectory {
     }
   }
 
-  BlockInput file_;
+  io::BlockInput file_;
 };
 
 /// The bytes of a member, and at their end the test of the checksum.

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-#include "recordings/formats/block_file.hpp"
+#include "risley/io/block_file.hpp"
 
 #include <algorithm>
 #include <cerrno>
@@ -14,7 +14,7 @@
 #include "risley/core/error.hpp"
 #include "risley/io/little_endian.hpp"
 
-namespace risley::recordings {
+namespace risley::io {
 
 FileDescriptor::~FileDescriptor() { close(); }
 
@@ -40,6 +40,10 @@ BlockInput::BlockInput(std::string path)
 
 const std::uint8_t* BlockInput::at(std::uint64_t offset, std::size_t count) {
   if (offset < block_offset_ || offset + count > block_offset_ + block_bytes_) {
+    if (count > block_.size() || offset > size_ - count) {
+      throw InvalidArgument(fmt::format("bytes = [{}, {}), allowed at most {} within [0, {})",
+                                        offset, offset + count, block_.size(), size_));
+    }
     block_offset_ = offset;
     block_bytes_ = 0;
     while (block_bytes_ < count) {
@@ -74,9 +78,13 @@ std::uint8_t* BlockOutput::append(std::size_t count) {
 }
 
 void BlockOutput::patch_u64(std::uint64_t offset, std::uint64_t value) {
+  if (size() < 8 || offset > size() - 8) {
+    throw InvalidArgument(
+        fmt::format("offset = {} of 8 bytes, allowed within the {} written", offset, size()));
+  }
   // A number may stand across the border of what was written already.
   std::uint8_t bytes[8];
-  io::store<std::uint64_t>(bytes, value);
+  store<std::uint64_t>(bytes, value);
   if (offset >= written_) {
     std::copy_n(bytes, 8, block_.data() + (offset - written_));
     return;
@@ -113,4 +121,4 @@ void BlockOutput::commit() {
   output_.commit();
 }
 
-}  // namespace risley::recordings
+}  // namespace risley::io

@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <optional>
 
-namespace risley::recordings {
+namespace risley::io {
 
 /// Seconds as whole nanoseconds, rounded to nearest; empty when they do not fit 64 bits.
 inline std::optional<std::int64_t> nanoseconds_from_seconds(double seconds) {
@@ -24,4 +24,4 @@ inline double seconds_from_nanoseconds(std::int64_t time_ns) {
   return static_cast<double>(whole) + static_cast<double>(time_ns - whole * kSecond) / 1e9;
 }
 
-}  // namespace risley::recordings
+}  // namespace risley::io

@@ -9,7 +9,7 @@
 
 #include "risley/io/output_file.hpp"
 
-namespace risley::recordings {
+namespace risley::io {
 
 /// An open file descriptor, closed with its owner.
 class FileDescriptor {
@@ -38,7 +38,7 @@ class BlockInput {
 
   /// The bytes [offset, offset + count), until the next call; they must lie inside the file.
   /// @param count  at most kBlockBytes
-  /// @throws FileError when the disk fails
+  /// @throws FileError when the disk fails, InvalidArgument for other bytes
   const std::uint8_t* at(std::uint64_t offset, std::size_t count);
 
   static constexpr std::size_t kBlockBytes = std::size_t{1} << 18;
@@ -65,7 +65,8 @@ class BlockOutput {
   /// Room for count more bytes at the end, until the next call. @throws FileError
   std::uint8_t* append(std::size_t count);
 
-  /// Overwrites eight bytes written before by a little-endian number. @throws FileError
+  /// Overwrites eight bytes written before by a little-endian number. @throws FileError,
+  /// InvalidArgument where they were not
   void patch_u64(std::uint64_t offset, std::uint64_t value);
 
   /// @throws FileError
@@ -75,10 +76,10 @@ class BlockOutput {
   void flush();
   void write_at(const std::uint8_t* bytes, std::size_t count, std::uint64_t offset);
 
-  io::OutputFile output_;
+  OutputFile output_;
   FileDescriptor file_;
   std::vector<std::uint8_t> block_;
   std::uint64_t written_ = 0;
 };
 
-}  // namespace risley::recordings
+}  // namespace risley::io

@@ -1,0 +1,63 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "risley/core/progress.hpp"
+#include "risley/trajectories/trajectory.hpp"
+
+namespace risley::trajectories {
+
+/// Whether a file is a trajectory or a file of accuracies: told by its content, and by its ending
+/// where the content cannot tell (.sbet, .smrmsg). What cannot be read is none.
+enum class TrajectoryFileKind { none, trajectory, accuracies };
+TrajectoryFileKind trajectory_file_kind(const std::string& path);
+
+/// Reads a trajectory of any known format: SBET, Inertial Explorer and POSPac text, CSV with named
+/// columns, TUM. docs/files.md says what each holds.
+/// @throws FileError when it is missing, empty, of no known format or damaged, and where times run
+///         back or a record holds what no platform does; Cancelled
+Trajectory load_trajectory(const std::string& path, const Progress& progress = {});
+
+/// A format that can be written, and how it is chosen by the end of a file name.
+struct WritableTrajectory {
+  std::string name;    ///< as Trajectory::format
+  std::string ending;  ///< ".csv"
+  std::string description;
+};
+
+/// All formats that can be written.
+const std::vector<WritableTrajectory>& writable_trajectories();
+
+/// Writes a trajectory. The file appears under its name when it is whole.
+/// @param format  name of a writable format; empty asks the file name's ending
+/// @return what the format has no place for and was left out, in words; empty for nothing
+/// @throws InvalidArgument as require_trajectory, for an unknown ending or format, and for what the
+///         format cannot hold at all; FileError
+std::vector<std::string> write_trajectory(const std::string& path, const Trajectory& trajectory,
+                                          const std::string& format = {});
+
+/// Accuracies with times of their own, ordered by time.
+struct AccuracyRecords {
+  TimeScale time_scale = TimeScale::gps_second_of_week;
+  std::vector<std::int64_t> time_ns;
+  std::vector<PoseAccuracy> accuracy;
+  std::vector<Eigen::Vector3d> velocity;  ///< standard deviations north, east, down, m/s
+  std::vector<TrajectoryWarning> warnings;
+};
+
+/// Reads SMRMSG, the accuracies that belong to an SBET: records of 80 bytes.
+/// @throws FileError as load_trajectory
+AccuracyRecords load_accuracies(const std::string& path, const Progress& progress = {});
+
+/// Gives every record of a trajectory the accuracy at its time: interpolated linearly, and that of
+/// the nearest record up to two median steps beyond the ends.
+/// @param path  of the accuracies, for messages
+/// @throws InvalidArgument for columns of different lengths or none; FileError where both have
+///         different scales of time or the accuracies do not cover the trajectory
+void add_accuracies(Trajectory& trajectory, const AccuracyRecords& accuracies,
+                    const std::string& path);
+
+}  // namespace risley::trajectories

@@ -1,0 +1,54 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "risley/core/progress.hpp"
+#include "risley/trajectories/trajectory.hpp"
+#include "risley/trajectories/trajectory_file.hpp"
+
+namespace risley::trajectories {
+
+/// What tells the format of a file.
+struct FileHead {
+  std::string name;        ///< of the file, in lower case
+  std::string bytes;       ///< its beginning
+  std::uint64_t size = 0;  ///< of the whole file
+  bool has_ending(std::string_view ending) const { return name.ends_with(ending); }
+};
+
+/// So much of a file's beginning is looked at.
+inline constexpr std::size_t kHeadBytes = 16384;
+
+/// One format of trajectories. Adding one means a file in this folder that defines one of these,
+/// and one line in the list of trajectory_file.cpp.
+struct Format {
+  std::string_view name;    ///< Trajectory::format
+  std::string_view ending;  ///< for writing; empty when it is only read
+  std::string_view description;
+  bool (*recognises)(const FileHead& head);
+  Trajectory (*read)(const std::string& path, const Progress& progress);
+  /// nullptr when the format is only read; as write_trajectory.
+  std::vector<std::string> (*write)(const std::string& path, const Trajectory& trajectory);
+};
+
+extern const Format kSbetFormat;              // sbet.cpp
+extern const Format kInertialExplorerFormat;  // inertial_explorer.cpp
+extern const Format kPospacFormat;            // pospac.cpp
+extern const Format kOpenmmsFormat;           // openmms.cpp
+extern const Format kNamedCsvFormat;          // named_csv.cpp
+extern const Format kTumFormat;               // tum.cpp
+extern const Format kRtklibFormat;            // rtklib.cpp
+
+bool is_smrmsg(const FileHead& head);  // smrmsg.cpp
+
+/// The lines of a text's beginning that are whole, without carriage returns; none where it is no
+/// text.
+std::vector<std::string_view> lines_of(std::string_view head);
+
+}  // namespace risley::trajectories

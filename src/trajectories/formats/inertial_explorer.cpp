@@ -1,0 +1,295 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include <algorithm>
+#include <array>
+#include <optional>
+#include <string_view>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "risley/core/angle.hpp"
+#include "risley/core/error.hpp"
+#include "risley/core/text.hpp"
+#include "risley/io/text_table.hpp"
+
+#include "trajectories/formats/format.hpp"
+#include "trajectories/formats/pose_table.hpp"
+
+/// Text of NovAtel's (Waypoint's) Inertial Explorer: lines about the project, a line of names of
+/// columns, a line of their units, rows. Which columns there are is the exporting user's choice.
+namespace risley::trajectories {
+namespace {
+
+struct ExplorerName {
+  std::string_view name;  ///< in lower case
+  PoseField field;
+  double sign = 1;
+};
+
+constexpr std::array kExplorerNames{
+    ExplorerName{"week", PoseField::gps_week},
+    ExplorerName{"gpsweek", PoseField::gps_week},
+    ExplorerName{"gpstime", PoseField::time},
+    ExplorerName{"corrtime", PoseField::time},
+    ExplorerName{"latitude", PoseField::latitude},
+    ExplorerName{"longitude", PoseField::longitude},
+    ExplorerName{"h-ell", PoseField::height},
+    ExplorerName{"roll", PoseField::roll},
+    ExplorerName{"pitch", PoseField::pitch},
+    ExplorerName{"heading", PoseField::heading},
+    ExplorerName{"veast", PoseField::velocity_1},
+    ExplorerName{"vnorth", PoseField::velocity_2},
+    ExplorerName{"vup", PoseField::velocity_3},
+    ExplorerName{"sdnorth", PoseField::sigma_north},
+    ExplorerName{"sdeast", PoseField::sigma_east},
+    ExplorerName{"sdheight", PoseField::sigma_down},
+    ExplorerName{"sdup", PoseField::sigma_down},
+    ExplorerName{"rollsd", PoseField::sigma_roll},
+    ExplorerName{"pitchsd", PoseField::sigma_pitch},
+    ExplorerName{"hdngsd", PoseField::sigma_heading},
+    ExplorerName{"headingsd", PoseField::sigma_heading},
+};
+
+constexpr std::size_t kLongestHeader = 200;  // lines
+
+/// Names or units of a line: words, of which one in parentheses may have blanks.
+std::vector<std::string> words_of_line(std::string_view line) {
+  std::vector<std::string> words;
+  for (std::size_t i = 0; i < line.size();) {
+    if (line[i] == ' ' || line[i] == '\t' || line[i] == ',') {
+      ++i;
+      continue;
+    }
+    std::size_t end = 0;
+    if (line[i] == '(' && line.find(')', i) != line.npos) {
+      end = line.find(')', i) + 1;
+    } else {
+      end = std::min(line.find_first_of(" \t,", i), line.size());
+    }
+    words.push_back(lower_case(std::string(line.substr(i, end - i))));
+    i = end;
+  }
+  return words;
+}
+
+bool has_word(const std::vector<std::string>& words, std::string_view word) {
+  return std::find(words.begin(), words.end(), word) != words.end();
+}
+
+/// Whether these are the lines of names and of units.
+bool are_explorer_names(std::string_view names, std::string_view units) {
+  if (units.find('(') == units.npos) return false;
+  const std::vector<std::string> words = words_of_line(names);
+  return (has_word(words, "latitude") || has_word(words, "x-ecef")) &&
+         (has_word(words, "heading") || has_word(words, "roll") || has_word(words, "gpstime") ||
+          has_word(words, "corrtime"));
+}
+
+bool is_explorer(const FileHead& head) {
+  const std::vector<std::string_view> lines = lines_of(head.bytes);
+  for (std::size_t i = 0; i + 1 < lines.size(); ++i) {
+    if (lines[i].find("Inertial Explorer") != lines[i].npos) return true;
+    if (are_explorer_names(lines[i], lines[i + 1])) return true;
+  }
+  return false;
+}
+
+/// What a header says beside names and units.
+struct ExplorerHeader {
+  std::vector<std::string> names, units;
+  std::uint64_t names_line = 0;
+  /// By what standard deviations were multiplied.
+  double position_scale = 1, attitude_scale = 1;
+  std::vector<TrajectoryWarning> warnings;
+};
+
+/// The factor behind "Position:", 1 for "No scaling".
+std::optional<double> scaling_of(std::string_view line) {
+  const auto colon = line.find(':');
+  const std::string text = lower_case(std::string(io::trimmed(line.substr(colon + 1))));
+  if (text.starts_with("no scaling")) return 1;
+  const std::vector<std::string_view> words = io::fields_of(text, io::kBlanks);
+  if (words.empty()) return std::nullopt;
+  try {
+    const double scale = io::decimal_field(words[0], "").value;
+    if (scale > 0 && scale < 1e3) return scale;
+  } catch (const io::BadRow&) {
+    return std::nullopt;
+  }
+  return std::nullopt;
+}
+
+ExplorerHeader read_explorer_header(const std::string& path) {
+  ExplorerHeader header;
+  io::LineReader lines(path);
+  std::string_view line;
+  std::string before;
+  bool in_scaling = false;
+  while (lines.next(line) && lines.line_number() <= kLongestHeader) {
+    const std::string_view text = io::trimmed(line);
+    if (!before.empty() && are_explorer_names(before, line)) {
+      header.names = words_of_line(before);
+      header.units = words_of_line(line);
+      header.names_line = lines.line_number() - 1;
+      return header;
+    }
+    const bool is_scaling = text.find("caling") != text.npos && text.ends_with(':');
+    if (is_scaling) in_scaling = true;
+    const bool position = text.starts_with("Position:"), attitude = text.starts_with("Attitude:");
+    if (in_scaling && (position || attitude)) {
+      const auto scale = scaling_of(text);
+      if (!scale) {
+        header.warnings.push_back(
+            {{{}, lines.line_number()},
+             fmt::format("\"{}\" is no scaling of standard deviations that is understood: they are "
+                         "taken for one sigma",
+                         io::printable(text))});
+      } else {
+        (position ? header.position_scale : header.attitude_scale) = *scale;
+        if (*scale != 1) {
+          header.warnings.push_back(
+              {{{}, lines.line_number()},
+               fmt::format("standard deviations of the {} were written {:g} times as large: they "
+                           "are divided by it",
+                           position ? "position" : "attitude", *scale)});
+        }
+      }
+    }
+    before = text;
+  }
+  throw FileError(path, {},
+                  "holds no line of names of columns with a line of their units below it; expected "
+                  "text of Inertial Explorer with GPSTime, Latitude, Longitude, H-Ell, Roll, Pitch "
+                  "and Heading");
+}
+
+/// Sets scale and fields of a column by its unit. @throws FileError
+void set_unit(PoseColumn& column, const std::string& unit, double sign, const std::string& path,
+              std::uint64_t line) {
+  const auto refuse = [&](std::string_view expected) {
+    throw FileError(path, {{}, line},
+                    fmt::format("column {} has the unit {}, expected {}", column.name,
+                                io::printable(unit), expected));
+  };
+  switch (column.field) {
+    case PoseField::time:
+      if (unit != "(sec)" && unit != "(s)") refuse("(sec)");
+      return;
+    case PoseField::latitude:
+    case PoseField::longitude:
+    case PoseField::roll:
+    case PoseField::pitch:
+    case PoseField::heading:
+    case PoseField::sigma_roll:
+    case PoseField::sigma_pitch:
+    case PoseField::sigma_heading:
+      column.scale = sign * kRadiansPerDegree;
+      if (unit == "(deg)" || unit == "(degrees)" || unit == "(+/-deg)") return;
+      if (unit == "(+/-d m s)" || unit == "(d m s)" || unit == "(deg min sec)") {
+        column.sexagesimal = true;
+        return;
+      }
+      if (unit == "(rad)" || unit == "(radians)") {
+        column.scale = sign;
+        return;
+      }
+      if (unit == "(arcmin)") {
+        column.scale = sign * kRadiansPerDegree / 60;
+        return;
+      }
+      if (unit == "(arcsec)") {
+        column.scale = sign * kRadiansPerDegree / 3600;
+        return;
+      }
+      refuse("(deg) or (+/-D M S)");
+      return;
+    case PoseField::height:
+    case PoseField::sigma_north:
+    case PoseField::sigma_east:
+    case PoseField::sigma_down:
+      if (unit != "(m)") refuse("(m)");
+      return;
+    case PoseField::velocity_1:
+    case PoseField::velocity_2:
+    case PoseField::velocity_3:
+      column.scale = sign;
+      if (unit != "(m/s)") refuse("(m/s)");
+      return;
+    default:
+      return;
+  }
+}
+
+Trajectory read_explorer(const std::string& path, const Progress& progress) {
+  ExplorerHeader header = read_explorer_header(path);
+  const auto refuse = [&](const std::string& problem) {
+    throw FileError(path, {{}, header.names_line}, problem);
+  };
+  if (header.names.size() != header.units.size()) {
+    refuse(fmt::format("names {} columns, and the line below has {} units", header.names.size(),
+                       header.units.size()));
+  }
+  PoseTable table;
+  table.delimiter = io::kBlanks;
+  table.first_row = header.names_line + 2;
+  table.has_footer = true;
+  table.contents.format = "inertial-explorer";
+  table.contents.time_scale = TimeScale::gps_second_of_week;
+  table.contents.velocity_axes = VelocityAxes::east_north_up;
+  const bool has_gps_time = has_word(header.names, "gpstime");
+  for (std::size_t i = 0; i < header.names.size(); ++i) {
+    PoseColumn column;
+    column.name = io::printable(header.names[i]);
+    double sign = 1;
+    for (const ExplorerName& known : kExplorerNames) {
+      if (known.name != header.names[i]) continue;
+      const bool second_time = known.name == "corrtime" && has_gps_time;
+      if (second_time || has_field(table.columns, known.field)) continue;
+      column.field = known.field;
+      sign = known.sign;
+    }
+    const std::string& unit = header.units[i];
+    if (column.field == PoseField::unused) {
+      column.sexagesimal = unit == "(+/-d m s)" || unit == "(d m s)" || unit == "(deg min sec)";
+    }
+    set_unit(column, unit, sign, path, header.names_line + 1);
+    table.columns.push_back(std::move(column));
+  }
+  std::vector<std::string_view> missing;
+  for (const auto& [field, name] :
+       {std::pair{PoseField::time, "GPSTime"}, std::pair{PoseField::latitude, "Latitude"},
+        std::pair{PoseField::longitude, "Longitude"}, std::pair{PoseField::height, "H-Ell"},
+        std::pair{PoseField::roll, "Roll"}, std::pair{PoseField::pitch, "Pitch"},
+        std::pair{PoseField::heading, "Heading"}}) {
+    if (!has_field(table.columns, field)) missing.push_back(name);
+  }
+  if (!missing.empty()) {
+    refuse(
+        fmt::format("column {} is missing{}", fmt::join(missing, ", "),
+                    has_word(header.names, "h-msl") && missing.size() == 1 && missing[0] == "H-Ell"
+                        ? ": H-MSL counts from a geoid that the file does not name; export the "
+                          "ellipsoidal height"
+                        : ""));
+  }
+  take_contents(table, header.warnings);
+  for (PoseColumn& column : table.columns) {
+    const bool position = column.field == PoseField::sigma_north ||
+                          column.field == PoseField::sigma_east ||
+                          column.field == PoseField::sigma_down;
+    const bool attitude = column.field == PoseField::sigma_roll ||
+                          column.field == PoseField::sigma_pitch ||
+                          column.field == PoseField::sigma_heading;
+    if (position) column.scale /= header.position_scale;
+    if (attitude) column.scale /= header.attitude_scale;
+  }
+  return read_pose_table(path, table, progress, header.warnings);
+}
+
+}  // namespace
+
+const Format kInertialExplorerFormat{
+    "inertial-explorer", "",     "text of NovAtel Inertial Explorer", is_explorer,
+    read_explorer,       nullptr};
+
+}  // namespace risley::trajectories

@@ -1,0 +1,355 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <iterator>
+#include <optional>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "risley/core/angle.hpp"
+#include "risley/core/error.hpp"
+#include "risley/core/text.hpp"
+#include "risley/io/text_table.hpp"
+#include "risley/trajectories/geodesy.hpp"
+
+#include "trajectories/formats/format.hpp"
+#include "trajectories/formats/pose_table.hpp"
+
+/// CSV whose header names the columns, each with its unit: what users of systems of their own
+/// write, and what is written here.
+namespace risley::trajectories {
+namespace {
+
+enum class CsvUnit { time, angle, length, speed, none };
+
+/// A name of a column without its unit.
+struct CsvName {
+  std::string_view base;
+  PoseField field;
+  CsvUnit unit;
+  double sign = 1;
+  TimeScale scale = TimeScale::unknown;
+};
+
+constexpr std::array kCsvNames{
+    CsvName{"time", PoseField::time, CsvUnit::time},
+    CsvName{"gps_second_of_week", PoseField::time, CsvUnit::time, 1, TimeScale::gps_second_of_week},
+    CsvName{"utc_second_of_day", PoseField::time, CsvUnit::time, 1, TimeScale::utc_second_of_day},
+    CsvName{"gps", PoseField::time, CsvUnit::time, 1, TimeScale::gps},
+    CsvName{"adjusted_gps", PoseField::time, CsvUnit::time, 1, TimeScale::adjusted_gps},
+    CsvName{"utc_unix", PoseField::time, CsvUnit::time, 1, TimeScale::utc_unix},
+    CsvName{"gps_week", PoseField::gps_week, CsvUnit::none},
+    CsvName{"latitude", PoseField::latitude, CsvUnit::angle},
+    CsvName{"longitude", PoseField::longitude, CsvUnit::angle},
+    CsvName{"ellipsoidal_height", PoseField::height, CsvUnit::length},
+    CsvName{"x", PoseField::x, CsvUnit::length},
+    CsvName{"y", PoseField::y, CsvUnit::length},
+    CsvName{"z", PoseField::z, CsvUnit::length},
+    CsvName{"roll", PoseField::roll, CsvUnit::angle},
+    CsvName{"pitch", PoseField::pitch, CsvUnit::angle},
+    CsvName{"heading", PoseField::heading, CsvUnit::angle},
+    CsvName{"qx", PoseField::qx, CsvUnit::none},
+    CsvName{"qy", PoseField::qy, CsvUnit::none},
+    CsvName{"qz", PoseField::qz, CsvUnit::none},
+    CsvName{"qw", PoseField::qw, CsvUnit::none},
+    CsvName{"velocity_north", PoseField::velocity_1, CsvUnit::speed},
+    CsvName{"velocity_east", PoseField::velocity_2, CsvUnit::speed},
+    CsvName{"velocity_down", PoseField::velocity_3, CsvUnit::speed},
+    CsvName{"velocity_up", PoseField::velocity_3, CsvUnit::speed, -1},
+    CsvName{"velocity_x", PoseField::velocity_1, CsvUnit::speed},
+    CsvName{"velocity_y", PoseField::velocity_2, CsvUnit::speed},
+    CsvName{"velocity_z", PoseField::velocity_3, CsvUnit::speed},
+    CsvName{"sigma_north", PoseField::sigma_north, CsvUnit::length},
+    CsvName{"sigma_east", PoseField::sigma_east, CsvUnit::length},
+    CsvName{"sigma_up", PoseField::sigma_down, CsvUnit::length},
+    CsvName{"sigma_down", PoseField::sigma_down, CsvUnit::length},
+    CsvName{"sigma_roll", PoseField::sigma_roll, CsvUnit::angle},
+    CsvName{"sigma_pitch", PoseField::sigma_pitch, CsvUnit::angle},
+    CsvName{"sigma_heading", PoseField::sigma_heading, CsvUnit::angle},
+};
+
+/// A unit as it ends a name.
+struct CsvUnitName {
+  CsvUnit unit;
+  std::string_view suffix;
+  double scale;
+  int time_decimals;
+};
+
+constexpr std::array kCsvUnits{
+    CsvUnitName{CsvUnit::time, "_s", 1, 0},
+    CsvUnitName{CsvUnit::time, "_ms", 1, 3},
+    CsvUnitName{CsvUnit::time, "_us", 1, 6},
+    CsvUnitName{CsvUnit::time, "_ns", 1, 9},
+    CsvUnitName{CsvUnit::angle, "_deg", kRadiansPerDegree, 0},
+    CsvUnitName{CsvUnit::angle, "_rad", 1, 0},
+    CsvUnitName{CsvUnit::length, "_m", 1, 0},
+    CsvUnitName{CsvUnit::speed, "_m_per_s", 1, 0},
+    CsvUnitName{CsvUnit::none, "", 1, 0},
+};
+
+struct CsvColumn {
+  const CsvName* name;
+  const CsvUnitName* unit;
+};
+
+std::optional<CsvColumn> csv_column(std::string_view written) {
+  for (const CsvName& name : kCsvNames) {
+    if (!written.starts_with(name.base)) continue;
+    for (const CsvUnitName& unit : kCsvUnits) {
+      if (unit.unit == name.unit && written.substr(name.base.size()) == unit.suffix) {
+        return CsvColumn{&name, &unit};
+      }
+    }
+  }
+  return std::nullopt;
+}
+
+const std::vector<std::string>& all_csv_names() {
+  static const std::vector<std::string> all = [] {
+    std::vector<std::string> names;
+    for (const CsvName& name : kCsvNames) {
+      for (const CsvUnitName& unit : kCsvUnits) {
+        if (unit.unit == name.unit) names.push_back(fmt::format("{}{}", name.base, unit.suffix));
+      }
+    }
+    return names;
+  }();
+  return all;
+}
+
+std::vector<std::string> header_names(std::string_view line) {
+  std::vector<std::string> names;
+  for (const std::string_view field : io::fields_of(line, ',')) {
+    std::string name = lower_case(std::string(field));
+    if (name.size() > 2 && name.starts_with('"') && name.ends_with('"')) {
+      name = name.substr(1, name.size() - 2);
+    }
+    names.push_back(std::move(name));
+  }
+  return names;
+}
+
+/// Two or more of a header's names are those of an attitude, or nearly so.
+bool is_trajectory_csv(const FileHead& head) {
+  const std::vector<std::string_view> lines = lines_of(head.bytes);
+  if (lines.empty() || lines[0].find(',') == std::string_view::npos) return false;
+  static const std::vector<std::string> kAttitude{"roll_deg", "pitch_deg", "heading_deg",
+                                                  "roll_rad", "pitch_rad", "heading_rad"};
+  static const std::vector<std::string> kQuaternion{"qx", "qy", "qz", "qw"};
+  int found = 0;
+  for (const std::string& name : header_names(lines[0])) {
+    const bool is_quaternion =
+        std::find(kQuaternion.begin(), kQuaternion.end(), name) != kQuaternion.end();
+    const bool without_unit = name == "roll" || name == "pitch" || name == "heading";
+    if (is_quaternion || without_unit || !near_miss(name, kAttitude).empty()) ++found;
+  }
+  return found >= 2;
+}
+
+/// Columns by a header. @throws FileError at its line
+PoseTable csv_table(const std::string& path, std::string_view header,
+                    std::vector<TrajectoryWarning>& warnings) {
+  const auto refuse = [&](const std::string& problem) { throw FileError(path, {{}, 1}, problem); };
+  PoseTable table;
+  table.first_row = 2;
+  table.contents.format = "trajectory-csv";
+  const CsvName* time = nullptr;
+  std::vector<std::string> unknown;
+  bool along_north = false, along_x = false;
+  for (const std::string& name : header_names(header)) {
+    PoseColumn column;
+    column.name = name;
+    if (const auto found = csv_column(name)) {
+      column.field = found->name->field;
+      if (has_field(table.columns, column.field)) {
+        refuse(fmt::format(
+            "column {} says again what {} says", io::printable(name),
+            std::find_if(table.columns.begin(), table.columns.end(), [&](const PoseColumn& other) {
+              return other.field == column.field;
+            })->name));
+      }
+      column.scale = found->unit->scale * found->name->sign;
+      column.time_decimals = found->unit->time_decimals;
+      if (column.field == PoseField::time) time = found->name;
+      along_north = along_north || name.starts_with("velocity_north");
+      along_x = along_x || name.starts_with("velocity_x");
+    } else {
+      unknown.push_back(name);
+    }
+    table.columns.push_back(std::move(column));
+  }
+  for (const std::string& name : unknown) {
+    const std::string meant = near_miss(name, all_csv_names());
+    const bool lacks_unit = csv_column(name + "_deg") || csv_column(name + "_m") ||
+                            csv_column(name + "_s") || csv_column(name + "_m_per_s");
+    if (lacks_unit) {
+      const std::string with_unit = csv_column(name + "_deg") ? name + "_deg"
+                                    : csv_column(name + "_s") ? name + "_s"
+                                    : csv_column(name + "_m") ? name + "_m"
+                                                              : name + "_m_per_s";
+      refuse(
+          fmt::format("column {} names no unit, did you mean {}?", io::printable(name), with_unit));
+    }
+    if (!meant.empty()) {
+      refuse(fmt::format("unknown column {}, did you mean {}?", io::printable(name), meant));
+    }
+  }
+  const auto missing = [&](std::initializer_list<std::pair<PoseField, const char*>> wanted) {
+    std::vector<std::string> names;
+    for (const auto& [field, name] : wanted) {
+      if (!has_field(table.columns, field)) names.emplace_back(name);
+    }
+    return names;
+  };
+  if (time == nullptr) {
+    refuse(
+        fmt::format("no column of times: expected time_s, gps_second_of_week_s, "
+                    "utc_second_of_day_s, gps_s, adjusted_gps_s or utc_unix_s, or the same in "
+                    "_ms, _us or _ns; the columns are {}",
+                    io::printable(header)));
+  }
+  table.contents.time_scale = time->scale;
+  const auto geodetic = missing({{PoseField::latitude, "latitude_deg"},
+                                 {PoseField::longitude, "longitude_deg"},
+                                 {PoseField::height, "ellipsoidal_height_m"},
+                                 {PoseField::roll, "roll_deg"},
+                                 {PoseField::pitch, "pitch_deg"},
+                                 {PoseField::heading, "heading_deg"}});
+  const auto local = missing({{PoseField::x, "x_m"},
+                              {PoseField::y, "y_m"},
+                              {PoseField::z, "z_m"},
+                              {PoseField::qx, "qx"},
+                              {PoseField::qy, "qy"},
+                              {PoseField::qz, "qz"},
+                              {PoseField::qw, "qw"}});
+  if (!geodetic.empty() && !local.empty()) {
+    const bool meant_local =
+        has_field(table.columns, PoseField::x) ||
+        (has_field(table.columns, PoseField::qx) && !has_field(table.columns, PoseField::latitude));
+    refuse(fmt::format("column {} is missing; expected {}",
+                       fmt::join(meant_local ? local : geodetic, ", "),
+                       meant_local ? "x_m, y_m, z_m, qx, qy, qz, qw"
+                                   : "latitude_deg, longitude_deg, ellipsoidal_height_m, roll_deg, "
+                                     "pitch_deg, heading_deg"));
+  }
+  if (geodetic.empty() && local.empty()) {
+    refuse("holds poses twice, as latitude and longitude and as x, y, z; expected one of them");
+  }
+  const bool is_local = local.empty();
+  table.contents.frame = is_local ? Frame::local : Frame::geocentric;
+  table.left_up = is_local;
+  if (along_north && along_x) refuse("holds velocities along north and along x; expected one");
+  if (along_north || along_x) {
+    table.contents.velocity_axes =
+        along_north ? VelocityAxes::north_east_down : VelocityAxes::frame;
+    if (along_x && !is_local) {
+      refuse(
+          "holds velocities along x, y, z and poses by latitude and longitude; expected "
+          "velocity_north_m_per_s, velocity_east_m_per_s, velocity_down_m_per_s");
+    }
+  }
+  take_contents(table, warnings);
+  for (const std::string& name : unknown) {
+    warnings.push_back({{{}, 1}, fmt::format("column {} is not read", io::printable(name))});
+  }
+  return table;
+}
+
+Trajectory read_trajectory_csv(const std::string& path, const Progress& progress) {
+  std::vector<TrajectoryWarning> warnings;
+  PoseTable table;
+  {
+    io::LineReader lines(path);
+    std::string_view header;
+    if (!lines.next(header)) throw FileError(path, {{}, 1}, "expected a header line");
+    table = csv_table(path, header, warnings);
+  }
+  return read_pose_table(path, table, progress, warnings);
+}
+
+std::string_view csv_time_name(TimeScale scale) {
+  for (const CsvName& name : kCsvNames) {
+    if (name.field == PoseField::time && name.scale == scale) return name.base;
+  }
+  return "time";
+}
+
+std::vector<std::string> write_trajectory_csv(const std::string& path,
+                                              const Trajectory& trajectory) {
+  const bool local = trajectory.frame == Frame::local;
+  const bool has_velocity = !trajectory.velocity.empty();
+  const bool has_accuracy = !trajectory.accuracy.empty();
+  io::TextOutput output(path);
+  output.append(fmt::format("{}_ns", csv_time_name(trajectory.time_scale)));
+  if (trajectory.gps_week) output.append(",gps_week");
+  output.append(local ? ",x_m,y_m,z_m,qx,qy,qz,qw"
+                      : ",latitude_deg,longitude_deg,ellipsoidal_height_m,roll_deg,pitch_deg,"
+                        "heading_deg");
+  if (has_velocity) {
+    output.append(local ? ",velocity_x_m_per_s,velocity_y_m_per_s,velocity_z_m_per_s"
+                        : ",velocity_north_m_per_s,velocity_east_m_per_s,velocity_down_m_per_s");
+  }
+  if (has_accuracy) {
+    output.append(
+        ",sigma_north_m,sigma_east_m,sigma_up_m,sigma_roll_deg,sigma_pitch_deg,"
+        "sigma_heading_deg");
+  }
+  output.end_row();
+  const auto add = [&](double value) {
+    fmt::format_to(std::back_inserter(output.buffer()), ",{}", value);
+  };
+  for (std::size_t i = 0; i < trajectory.size(); ++i) {
+    fmt::format_to(std::back_inserter(output.buffer()), "{}", trajectory.time_ns[i]);
+    if (trajectory.gps_week) {
+      fmt::format_to(std::back_inserter(output.buffer()), ",{}", *trajectory.gps_week);
+    }
+    const Eigen::Vector3d& position = trajectory.position[i];
+    Eigen::Vector3d velocity = has_velocity ? trajectory.velocity[i] : Eigen::Vector3d::Zero();
+    if (local) {
+      const Eigen::Quaterniond q = left_up_from_right_down(trajectory.attitude[i]);
+      for (const double value :
+           {position.x(), position.y(), position.z(), q.x(), q.y(), q.z(), q.w()}) {
+        add(value);
+      }
+    } else {
+      const Geodetic place = geodetic_from_geocentric(position);
+      const RollPitchHeading angles =
+          roll_pitch_heading(Frame::geocentric, position, trajectory.attitude[i]);
+      add(degrees_from_radians(place.latitude));
+      add(degrees_from_radians(place.longitude));
+      add(place.height);
+      for (const double angle : {angles.roll, angles.pitch, angles.heading}) {
+        add(degrees_from_radians(angle));
+      }
+      velocity = geocentric_from_ned(place).transpose() * velocity;
+    }
+    if (has_velocity) {
+      for (const double value : velocity) add(value);
+    }
+    if (has_accuracy) {
+      const PoseAccuracy& accuracy = trajectory.accuracy[i];
+      for (const double value : accuracy.position) add(value);
+      for (const double angle : {accuracy.roll, accuracy.pitch, accuracy.heading}) {
+        add(degrees_from_radians(angle));
+      }
+    }
+    output.end_row();
+  }
+  output.close();
+  return {};
+}
+
+}  // namespace
+
+const Format kNamedCsvFormat{"trajectory-csv",
+                             ".csv",
+                             "CSV whose columns name their units",
+                             is_trajectory_csv,
+                             read_trajectory_csv,
+                             write_trajectory_csv};
+
+}  // namespace risley::trajectories

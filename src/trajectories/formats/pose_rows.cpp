@@ -1,0 +1,203 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "trajectories/formats/pose_rows.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <string_view>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "risley/core/angle.hpp"
+#include "risley/core/saturating.hpp"
+
+#include "trajectories/row_order.hpp"
+
+namespace risley::trajectories {
+namespace {
+
+constexpr std::int64_t kSecond_ns = 1'000'000'000;
+/// Records may come late by so much; a larger step back is another flight or another clock.
+constexpr std::int64_t kLatest_ns = kSecond_ns;
+constexpr double kFastest = 1e4;        // m/s
+constexpr double kFarthest = 1e7;       // m, from the origin of a map
+constexpr double kWorstPosition = 1e5;  // m
+constexpr double kWorstAngle = kTwoPi;  // rad
+
+}  // namespace
+
+std::optional<std::int64_t> period_ns(TimeScale scale) {
+  if (scale == TimeScale::gps_second_of_week) return 604'800 * kSecond_ns;
+  if (scale == TimeScale::utc_second_of_day) return 86'400 * kSecond_ns;
+  return std::nullopt;
+}
+
+int unwrap_times(std::vector<std::int64_t>& times_ns, std::int64_t period) {
+  constexpr int kMost = 1000;  // nobody flies for so many weeks
+  int periods = 0, most = 0;
+  std::int64_t before = times_ns.empty() ? 0 : times_ns.front();
+  for (std::int64_t& time : times_ns) {
+    const std::int64_t back = before - saturating_sum(time, periods * period);
+    if (back > period / 2 && periods < kMost) ++periods;
+    if (back < -period / 2 && periods > 0) --periods;
+    time = saturating_sum(time, periods * period);
+    before = time;
+    most = std::max(most, periods);
+  }
+  return most;
+}
+
+Eigen::Quaterniond right_down_from_left_up(const Eigen::Quaterniond& q) {
+  return {-q.x(), q.w(), q.z(), -q.y()};  // q i
+}
+
+Eigen::Quaterniond left_up_from_right_down(const Eigen::Quaterniond& q) {
+  return {q.x(), -q.w(), -q.z(), q.y()};  // q (-i)
+}
+
+std::optional<Eigen::Quaterniond> unit_quaternion(const Eigen::Quaterniond& q) {
+  const double length = q.norm();
+  if (!(std::abs(length - 1) < 0.01)) return std::nullopt;
+  if (std::abs(length - 1) < 1e-14) return q;
+  return q.normalized();
+}
+
+PoseRows::PoseRows(std::string path, RowContents contents)
+    : path_(std::move(path)), contents_(std::move(contents)) {
+  trajectory_.format = contents_.format;
+  trajectory_.time_scale = contents_.time_scale;
+  trajectory_.gps_week = contents_.gps_week;
+  trajectory_.frame = contents_.frame;
+}
+
+void PoseRows::add(const PoseRow& row, const FilePlace& place) {
+  const auto refuse = [&](const std::string& problem) { throw FileError(path_, place, problem); };
+  const auto check = [&](std::string_view name, double value, double least, double most,
+                         std::string_view unit, std::string_view hint = "") {
+    if (value >= least && value <= most) return;
+    refuse(fmt::format("{} = {:.10g} {}, allowed {:.6g} to {:.6g}{}", name, value, unit, least,
+                       most, hint));
+  };
+  const auto finite = [&](std::string_view name, const Eigen::Vector3d& values, double most,
+                          std::string_view unit) {
+    for (const double value : values) check(name, value, -most, most, unit);
+  };
+  // Half a degree more than a turn: rounded values, and headings counted either way.
+  constexpr double kTurn = 365 * kRadiansPerDegree;
+  if (contents_.frame == Frame::geocentric) {
+    Eigen::Vector3d position = row.position;
+    if (!contents_.has_position) {
+      const auto in_degrees = [](double angle) { return degrees_from_radians(angle); };
+      constexpr std::string_view kHint =
+          "; are degrees stored where radians belong, or the other way round?";
+      check("latitude", in_degrees(row.place.latitude), -90 - 1e-9, 90 + 1e-9, "deg", kHint);
+      check("longitude", in_degrees(row.place.longitude), -360, 360, "deg", kHint);
+      check("ellipsoidal height", row.place.height, kLowestHeight, kHighestHeight, "m");
+      Geodetic within = row.place;
+      within.latitude = std::clamp(within.latitude, -kPi / 2, kPi / 2);
+      position = geocentric_from_geodetic(within);
+    } else {
+      const double distance = row.position.norm();
+      check("distance from the centre of the Earth", distance,
+            kSemiMajorAxis * (1 - kFlattening) + kLowestHeight, kSemiMajorAxis + kHighestHeight,
+            "m");
+    }
+    check("roll", row.angles.roll, -kTurn, kTurn, "rad");
+    check("pitch", row.angles.pitch, -kPi / 2 - 1e-6, kPi / 2 + 1e-6, "rad");
+    check("heading", row.angles.heading, -2 * kTurn, 2 * kTurn, "rad");
+    trajectory_.attitude.push_back(Eigen::Quaterniond(ned_axes(Frame::geocentric, position)) *
+                                   ned_from_body(row.angles));
+    trajectory_.attitude.back().normalize();
+    trajectory_.position.push_back(position);
+  } else {
+    finite("position", row.position, kFarthest, "m");
+    trajectory_.position.push_back(row.position);
+    trajectory_.attitude.push_back(row.attitude);
+  }
+  if (contents_.has_velocity) {
+    finite("velocity", row.velocity, kFastest, "m/s");
+    trajectory_.velocity.push_back(row.velocity);
+  }
+  if (contents_.has_wander) {
+    check("wander angle", row.wander, -kTurn, kTurn, "rad");
+    wander_.push_back(row.wander);
+  }
+  if (contents_.has_accuracy) {
+    for (const double value : row.accuracy.position) {
+      check("accuracy of the position", value, 0, kWorstPosition, "m");
+    }
+    for (const double value : {row.accuracy.roll, row.accuracy.pitch, row.accuracy.heading}) {
+      check("accuracy of the attitude", value, 0, kWorstAngle, "rad");
+    }
+    trajectory_.accuracy.push_back(row.accuracy);
+  }
+  trajectory_.time_ns.push_back(row.time_ns);
+  in_lines_ = place.line.has_value();
+  places_.push_back(in_lines_ ? *place.line : place.byte_offset.value_or(0));
+}
+
+void PoseRows::warn(const FilePlace& place, std::string message) {
+  trajectory_.warnings.push_back({place, std::move(message)});
+}
+
+FilePlace PoseRows::place_of(std::size_t row) const {
+  FilePlace place;
+  (in_lines_ ? place.line : place.byte_offset) = places_[row];
+  return place;
+}
+
+void PoseRows::make_times_run_on() {
+  const auto period = period_ns(contents_.time_scale);
+  if (!period) return;
+  const int crossings = unwrap_times(trajectory_.time_ns, *period);
+  trajectory_.week_crossings = crossings;
+  if (crossings == 0) return;
+  warn({},
+       fmt::format("{} ends within the trajectory: times run on beyond it",
+                   contents_.time_scale == TimeScale::gps_second_of_week ? "the GPS week (604800 s)"
+                                                                         : "the day (86400 s)"));
+}
+
+void PoseRows::put_in_order() {
+  const RowOrder order = row_order(trajectory_.time_ns);
+  const TimeOrder& told = order.told;
+  if (told.largest_back_ns > kLatest_ns) {
+    throw FileError(
+        path_, place_of(told.largest_back_at),
+        fmt::format("time runs back by {:.6f} s, to {:.6f} s; expected one flight with one clock: "
+                    "keep its records alone",
+                    1e-9 * static_cast<double>(told.largest_back_ns),
+                    1e-9 * static_cast<double>(trajectory_.time_ns[told.largest_back_at])));
+  }
+  if (order.rows.empty()) return;
+  if (told.moved > 0) {
+    warn(place_of(told.largest_back_at),
+         fmt::format("{} of {} records stand behind later ones, by up to {:.6f} s: all were put "
+                     "into the order of their times",
+                     told.moved, trajectory_.size(),
+                     1e-9 * static_cast<double>(told.largest_back_ns)));
+  }
+  if (told.repeated > 0) {
+    warn(place_of(told.repeated_at),
+         fmt::format("{} records repeat the time of an earlier one and were left out",
+                     told.repeated));
+  }
+  reorder(wander_, order.rows);
+  static_cast<void>(order_by_time(trajectory_));
+}
+
+Trajectory PoseRows::finish() {
+  if (trajectory_.size() == 0) throw FileError(path_, {}, "holds no record");
+  make_times_run_on();
+  put_in_order();
+  if (!wander_.empty()) {
+    std::vector<double> sorted = wander_;
+    std::sort(sorted.begin(), sorted.end());
+    trajectory_.wander = AngleSpread{sorted.front(), sorted[sorted.size() / 2], sorted.back()};
+  }
+  settle_velocities(trajectory_, wander_, contents_.velocity_axes);
+  return std::move(trajectory_);
+}
+
+}  // namespace risley::trajectories

@@ -1,0 +1,81 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "risley/core/progress.hpp"
+
+#include "trajectories/formats/pose_rows.hpp"
+
+namespace risley::trajectories {
+
+/// What a column of a table of poses holds.
+enum class PoseField : std::uint8_t {
+  unused,
+  time,
+  gps_week,
+  latitude,
+  longitude,
+  height,
+  x,
+  y,
+  z,
+  qx,
+  qy,
+  qz,
+  qw,
+  roll,
+  pitch,
+  heading,
+  velocity_1,  ///< along the axes of RowContents::velocity_axes
+  velocity_2,
+  velocity_3,
+  sigma_north,
+  sigma_east,
+  sigma_down,
+  sigma_roll,
+  sigma_pitch,
+  sigma_heading,
+  count,
+};
+
+/// One column of a table.
+struct PoseColumn {
+  PoseField field = PoseField::unused;
+  std::string name;          ///< as the file calls it
+  double scale = 1;          ///< SI units per unit of the file; of angles rad
+  int time_decimals = 0;     ///< of a time: 0 for seconds, 9 for nanoseconds
+  bool sexagesimal = false;  ///< degrees, minutes and seconds in three fields
+};
+
+/// A table of poses in a text file.
+struct PoseTable {
+  std::vector<PoseColumn> columns;
+  RowContents contents;
+  char delimiter = ',';
+  std::uint64_t first_row = 1;  ///< line, from 1
+  char comment = '\0';          ///< lines that begin with it are stepped over
+  /// Text may follow behind an empty line.
+  bool has_footer = false;
+  /// Bodies are forward-left-up, as ROS has them.
+  bool left_up = false;
+};
+
+/// Reads the rows of a table. A last line that is cut off is left out with a warning.
+/// @throws FileError at the line that is no row or holds what no platform does; Cancelled
+Trajectory read_pose_table(const std::string& path, const PoseTable& table,
+                           const Progress& progress,
+                           const std::vector<TrajectoryWarning>& warnings = {});
+
+/// Which fields the columns have; RowContents::has_velocity and so on follow from it.
+bool has_field(const std::vector<PoseColumn>& columns, PoseField field);
+
+/// Sets what the columns hold in the table's contents. Velocities and accuracies that are there in
+/// part are left out with a warning.
+void take_contents(PoseTable& table, std::vector<TrajectoryWarning>& warnings);
+
+}  // namespace risley::trajectories

@@ -1,0 +1,162 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include <algorithm>
+#include <array>
+#include <string_view>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "risley/core/angle.hpp"
+#include "risley/core/error.hpp"
+#include "risley/core/text.hpp"
+#include "risley/io/text_table.hpp"
+
+#include "trajectories/formats/format.hpp"
+#include "trajectories/formats/pose_table.hpp"
+
+/// Text that Applanix POSPac exports: lines about the project, a line of 20 names with commas, a
+/// line of units, rows with blanks. Eastings and northings are of a map projection and not read.
+namespace risley::trajectories {
+namespace {
+
+struct PospacName {
+  std::string_view name;  ///< in lower case
+  PoseField field;
+};
+
+constexpr std::array kPospacNames{
+    PospacName{"time", PoseField::time},
+    PospacName{"latitude", PoseField::latitude},
+    PospacName{"lat", PoseField::latitude},
+    PospacName{"longitude", PoseField::longitude},
+    PospacName{"long", PoseField::longitude},
+    PospacName{"ellipsoid height", PoseField::height},
+    PospacName{"roll", PoseField::roll},
+    PospacName{"pitch", PoseField::pitch},
+    PospacName{"heading", PoseField::heading},
+    PospacName{"east velocity", PoseField::velocity_1},
+    PospacName{"north velocity", PoseField::velocity_2},
+    PospacName{"up velocity", PoseField::velocity_3},
+    PospacName{"north sd", PoseField::sigma_north},
+    PospacName{"east sd", PoseField::sigma_east},
+    PospacName{"height sd", PoseField::sigma_down},
+    PospacName{"roll sd", PoseField::sigma_roll},
+    PospacName{"pitch sd", PoseField::sigma_pitch},
+    PospacName{"heading sd", PoseField::sigma_heading},
+};
+
+std::vector<std::string> pospac_names(std::string_view line) {
+  std::vector<std::string> names;
+  for (const std::string_view field : io::fields_of(line, ',')) {
+    names.push_back(lower_case(std::string(field)));
+  }
+  return names;
+}
+
+bool are_pospac_names(std::string_view line) {
+  const std::vector<std::string> names = pospac_names(line);
+  const auto has = [&](std::string_view name) {
+    return std::find(names.begin(), names.end(), name) != names.end();
+  };
+  return has("time") && has("distance") && (has("latitude") || has("lat")) && has("roll") &&
+         has("pitch") && has("heading");
+}
+
+bool is_pospac(const FileHead& head) {
+  const std::vector<std::string_view> lines = lines_of(head.bytes);
+  return std::any_of(lines.begin(), lines.end(), are_pospac_names);
+}
+
+Trajectory read_pospac(const std::string& path, const Progress& progress) {
+  PoseTable table;
+  table.delimiter = io::kBlanks;
+  table.has_footer = true;
+  table.contents.format = "pospac";
+  table.contents.time_scale = TimeScale::gps_second_of_week;
+  table.contents.velocity_axes = VelocityAxes::east_north_up;
+  io::LineReader lines(path);
+  std::string_view line;
+  std::string names, units;
+  while (lines.next(line)) {
+    if (!are_pospac_names(line)) continue;
+    names = line;
+    table.first_row = lines.line_number() + 1;
+    break;
+  }
+  while (lines.next(line)) {
+    const std::string_view text = io::trimmed(line);
+    if (text.empty()) continue;
+    if (text.starts_with('(')) {
+      units = lower_case(std::string(text));
+      table.first_row = lines.line_number() + 1;
+    }
+    break;
+  }
+  std::vector<TrajectoryWarning> warnings;
+  // "(time in Sec, ..., orientation angles and SD in Degrees, ...)"
+  bool degrees = false, arc_minutes = false;
+  for (const std::string_view clause : io::fields_of(units, ',')) {
+    const auto has = [clause](std::string_view word) { return clause.find(word) != clause.npos; };
+    if (has("position") || !has("sd")) continue;
+    arc_minutes = arc_minutes || has("arc");
+    degrees = degrees || has("deg");
+  }
+  if (!degrees && !arc_minutes) {
+    warnings.push_back({{{}, table.first_row - 1},
+                        "no unit of the attitudes' standard deviations is named: degrees are "
+                        "assumed"});
+  }
+  const std::uint64_t names_line = table.first_row - 1;
+  const bool heights = names.find("ELLIPSOID HEIGHT") != names.npos;
+  for (const std::string& name : pospac_names(names)) {
+    PoseColumn column;
+    column.name = io::printable(name);
+    for (const PospacName& known : kPospacNames) {
+      if (known.name == name && !has_field(table.columns, known.field)) column.field = known.field;
+    }
+    // "H" behind the longitude, where the other height has another name.
+    const bool is_height = !heights && (name == "h" || name == "height") &&
+                           has_field(table.columns, PoseField::longitude) &&
+                           !has_field(table.columns, PoseField::height);
+    if (is_height) column.field = PoseField::height;
+    switch (column.field) {
+      case PoseField::latitude:
+      case PoseField::longitude:
+      case PoseField::roll:
+      case PoseField::pitch:
+      case PoseField::heading:
+        column.scale = kRadiansPerDegree;
+        break;
+      case PoseField::sigma_roll:
+      case PoseField::sigma_pitch:
+      case PoseField::sigma_heading:
+        column.scale = kRadiansPerDegree / (arc_minutes ? 60 : 1);
+        break;
+      default:
+        break;
+    }
+    table.columns.push_back(std::move(column));
+  }
+  std::vector<std::string_view> missing;
+  for (const auto& [field, name] :
+       {std::pair{PoseField::time, "TIME"}, std::pair{PoseField::latitude, "LATITUDE"},
+        std::pair{PoseField::longitude, "LONGITUDE"},
+        std::pair{PoseField::height, "ELLIPSOID HEIGHT"}, std::pair{PoseField::roll, "ROLL"},
+        std::pair{PoseField::pitch, "PITCH"}, std::pair{PoseField::heading, "HEADING"}}) {
+    if (!has_field(table.columns, field)) missing.push_back(name);
+  }
+  if (!missing.empty()) {
+    throw FileError(path, {{}, names_line},
+                    fmt::format("column {} is missing", fmt::join(missing, ", ")));
+  }
+  take_contents(table, warnings);
+  return read_pose_table(path, table, progress, warnings);
+}
+
+}  // namespace
+
+const Format kPospacFormat{"pospac",  "",          "text exported by Applanix POSPac",
+                           is_pospac, read_pospac, nullptr};
+
+}  // namespace risley::trajectories

@@ -1,0 +1,127 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "risley/trajectories/trajectory_file.hpp"
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <optional>
+
+#include <fmt/format.h>
+
+#include "risley/core/error.hpp"
+#include "risley/core/text.hpp"
+
+#include "trajectories/formats/format.hpp"
+
+namespace risley::trajectories {
+namespace {
+
+/// In the order in which they are tried.
+const std::vector<const Format*>& formats() {
+  static const std::vector<const Format*> all{
+      &kInertialExplorerFormat, &kPospacFormat, &kRtklibFormat, &kNamedCsvFormat,
+      &kOpenmmsFormat,          &kTumFormat,    &kSbetFormat,
+  };
+  return all;
+}
+
+std::string known_formats() {
+  std::string names;
+  for (const Format* format : formats()) {
+    if (format == &kRtklibFormat) continue;
+    names += fmt::format("{}{}", names.empty() ? "" : ", ", format->name);
+  }
+  return names;
+}
+
+/// @throws FileError for what is no file
+FileHead read_file_head(const std::string& path) {
+  namespace fs = std::filesystem;
+  std::error_code code;
+  const fs::file_status status = fs::status(path, code);
+  if (status.type() == fs::file_type::not_found) throw FileError(path, {}, "no such file");
+  if (status.type() != fs::file_type::regular) {
+    throw FileError(path, {}, "is not a regular file, expected a trajectory");
+  }
+  std::ifstream stream(path, std::ios::binary);
+  if (!stream) throw FileError(path, {}, fmt::format("cannot be read: {}", std::strerror(errno)));
+  FileHead head;
+  head.name = lower_case(fs::path(path).filename().string());
+  head.size = fs::file_size(path, code);
+  head.bytes.resize(kHeadBytes);
+  stream.read(head.bytes.data(), static_cast<std::streamsize>(head.bytes.size()));
+  if (stream.bad()) throw FileError(path, {}, "cannot be read");
+  head.bytes.resize(static_cast<std::size_t>(stream.gcount()));
+  return head;
+}
+
+const Format* format_of(const FileHead& head) {
+  if (head.has_ending(".smrmsg")) return nullptr;
+  for (const Format* format : formats()) {
+    if (format->recognises(head)) return format;
+  }
+  return nullptr;
+}
+
+}  // namespace
+
+TrajectoryFileKind trajectory_file_kind(const std::string& path) {
+  try {
+    const FileHead head = read_file_head(path);
+    if (head.bytes.empty()) return TrajectoryFileKind::none;
+    if (format_of(head) != nullptr) return TrajectoryFileKind::trajectory;
+    return is_smrmsg(head) ? TrajectoryFileKind::accuracies : TrajectoryFileKind::none;
+  } catch (const FileError&) {
+    return TrajectoryFileKind::none;
+  }
+}
+
+Trajectory load_trajectory(const std::string& path, const Progress& progress) {
+  const FileHead head = read_file_head(path);
+  if (head.bytes.empty()) {
+    throw FileError(path, {0, {}},
+                    fmt::format("is empty, expected a trajectory ({})", known_formats()));
+  }
+  const Format* format = format_of(head);
+  if (format != nullptr) return format->read(path, progress);
+  if (is_smrmsg(head)) {
+    throw FileError(path, {}, "holds accuracies (SMRMSG) and no poses; expected the SBET with it");
+  }
+  if (head.has_ending(".out")) return kSbetFormat.read(path, progress);  // says what is wrong
+  throw FileError(path, {0, {}},
+                  fmt::format("is no trajectory of a known kind: expected {}", known_formats()));
+}
+
+const std::vector<WritableTrajectory>& writable_trajectories() {
+  static const std::vector<WritableTrajectory> all = [] {
+    std::vector<WritableTrajectory> list;
+    for (const Format* format : formats()) {
+      if (format->write == nullptr) continue;
+      list.push_back({std::string(format->name), std::string(format->ending),
+                      std::string(format->description)});
+    }
+    return list;
+  }();
+  return all;
+}
+
+std::vector<std::string> write_trajectory(const std::string& path, const Trajectory& trajectory,
+                                          const std::string& format) {
+  require_trajectory(trajectory);
+  const std::string name = lower_case(path);
+  std::string known;
+  for (const Format* one : formats()) {
+    if (one->write == nullptr) continue;
+    const bool meant = format.empty() ? name.ends_with(one->ending) : format == one->name;
+    if (meant) return one->write(path, trajectory);
+    known +=
+        fmt::format("{}{}", known.empty() ? "" : ", ", format.empty() ? one->ending : one->name);
+  }
+  throw InvalidArgument(format.empty() ? fmt::format("{}: unknown ending, allowed {}", path, known)
+                                       : fmt::format("format = {}, allowed {}", format, known));
+}
+
+}  // namespace risley::trajectories
