@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <span>
 #include <utility>
 
@@ -15,10 +16,13 @@
 #include <oneapi/tbb/task_arena.h>
 
 #include "risley/core/angle.hpp"
+#include "risley/core/error.hpp"
+#include "risley/core/random.hpp"
 #include "risley/core/require.hpp"
 #include "risley/optics/batch.hpp"
 #include "risley/simulation/noise.hpp"
 
+#include "simulation/platform_poses.hpp"
 #include "simulation/streams.hpp"
 
 namespace risley::simulation {
@@ -70,8 +74,17 @@ SimulationSettings checked(SimulationSettings settings) {
     throw InvalidArgument(fmt::format("station \"{}\" needs a scene", settings.station));
   }
   if (settings.scene) {
-    require_at_least("planes of the scene", static_cast<long long>(settings.scene->planes.size()),
+    require_at_least("surfaces of the scene", static_cast<long long>(settings.scene->surfaces()),
                      1);
+  }
+  if (settings.platform) first_clock_reading_ns(*settings.platform);  // refuses
+  if (settings.platform && !settings.scene) {
+    throw InvalidArgument("a sensor that moves along a trajectory needs a scene");
+  }
+  if (settings.platform && !settings.station.empty()) {
+    throw InvalidArgument(
+        fmt::format("a sensor moves along a trajectory or stands at station \"{}\", not both",
+                    settings.station));
   }
   return settings;
 }
@@ -108,6 +121,10 @@ recordings::RecordingHeader make_header(const SimulationSettings& settings) {
   device.type = static_cast<std::uint8_t>(settings.truth.device_type);
   header.devices.push_back(device);
   header.time_reference = recordings::TimeReference::power_on;
+  if (settings.platform &&
+      settings.platform->trajectory->time_scale == trajectories::TimeScale::utc_unix) {
+    header.time_reference = recordings::TimeReference::utc;
+  }
   header.has_range = settings.scene.has_value();
   header.has_intensity = settings.scene.has_value();
   return header;
@@ -126,8 +143,12 @@ class Scanner::Work {
         header(make_header(settings)),
         shots(static_cast<std::uint64_t>(std::llround(settings.duration * *settings.rate))),
         noise_(noise_settings(settings), settings.seed),
-        arena_(settings.threads == 0 ? oneapi::tbb::task_arena::automatic : settings.threads) {
+        arena_(settings.threads == 0 ? oneapi::tbb::task_arena::automatic : settings.threads),
+        bush_depth_(settings.seed, stream::kBushDepth),
+        has_bushes_(settings.scene && settings.scene->terrain &&
+                    !settings.scene->terrain->parts().bushes.empty()) {
     if (settings.scene) station_ = settings.scene->station(settings.station);
+    if (settings.platform) poses_.emplace(*settings.platform, *settings.scene, time_of(shots - 1));
     for (int i = 0; i < settings.truth.prisms(); ++i) {
       const auto at = static_cast<std::size_t>(i);
       rotors_.emplace_back(*settings.rotor_settings, i, settings.start_angles[at],
@@ -169,10 +190,12 @@ class Scanner::Work {
   void fill(recordings::Observations& rows, recordings::TruthColumns& truth, std::size_t first,
             std::size_t count) const {
     const std::uint64_t first_shot = done + first;
-    const auto times = std::span(truth.time_ns).subspan(first, count);
-    for (std::size_t i = 0; i < count; ++i) times[i] = time_of(first_shot + i);
-    std::copy(times.begin(), times.end(),
-              rows.time_ns.begin() + static_cast<std::ptrdiff_t>(first));
+    std::vector<std::int64_t> times(count);  // since the first shot
+    const std::int64_t first_clock_ns = poses_ ? poses_->first_clock_ns() : 0;
+    for (std::size_t i = 0; i < count; ++i) {
+      times[i] = time_of(first_shot + i);
+      truth.time_ns[first + i] = rows.time_ns[first + i] = first_clock_ns + times[i];
+    }
 
     std::vector<std::vector<double>> wrapped(rotors_.size());
     std::vector<std::span<const double>> angles;
@@ -214,6 +237,18 @@ class Scanner::Work {
     }
     noise_.apply_to_angles(first_shot, azimuth, zenith);
 
+    std::optional<PlatformPoses::Cursor> cursor;
+    if (poses_) cursor.emplace(*poses_);
+    /// Where a beam's origin and direction are in the scene.
+    const auto in_scene = [&](std::int64_t time_ns, const Vector3<double>& origin,
+                              const Vector3<double>& direction) {
+      if (!cursor) {
+        return std::pair{station_.position + station_.scene_from_sensor(origin),
+                         station_.scene_from_sensor(direction)};
+      }
+      const PlatformPoses::SensorPose pose = cursor->at(time_ns);
+      return std::pair{pose.point(origin), pose.direction(direction)};
+    };
     const auto range = part(rows.range, first, count);
     const auto true_range = part(truth.range, first, count);
     for (std::size_t i = 0; i < count; ++i) {
@@ -222,10 +257,11 @@ class Scanner::Work {
       range[i] = settings.scene ? 0.0 : kNaN;
       rows.intensity[row] = 0;
       if (settings.scene && !std::isnan(beam.azimuth[i])) {
-        const auto hit = scenes::nearest_hit(
-            *settings.scene,
-            station_.position + station_.scene_from_sensor({origin_x[i], origin_y[i], origin_z[i]}),
-            station_.scene_from_sensor({x[i], y[i], z[i]}));
+        const auto [origin, direction] =
+            in_scene(times[i], {origin_x[i], origin_y[i], origin_z[i]}, {x[i], y[i], z[i]});
+        const auto hit =
+            scenes::nearest_hit(*settings.scene, origin, direction,
+                                has_bushes_ ? bush_depth_.uniform(first_shot + i) : 0.5);
         if (hit) {
           true_range[i] = hit->range;
           if (hit->range >= settings.truth.range_minimum &&
@@ -258,6 +294,9 @@ class Scanner::Work {
   ObservationNoise noise_;
   oneapi::tbb::task_arena arena_;
   scenes::Station station_;
+  std::optional<PlatformPoses> poses_;
+  RandomStream bush_depth_;
+  bool has_bushes_ = false;
   std::vector<RotorMotion> rotors_;
 };
 

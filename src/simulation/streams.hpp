@@ -13,6 +13,7 @@ inline constexpr std::uint64_t kOscillationPhases = 2;
 inline constexpr std::uint64_t kAzimuthNoise = 3;
 inline constexpr std::uint64_t kZenithNoise = 4;
 inline constexpr std::uint64_t kRangeNoise = 5;
+inline constexpr std::uint64_t kBushDepth = 6;
 constexpr std::uint64_t random_walk(int prism) { return 100 + static_cast<std::uint64_t>(prism); }
 
 }  // namespace risley::simulation::stream

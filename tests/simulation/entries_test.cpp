@@ -109,7 +109,7 @@ TEST(Entries, ScannersAskForSettingsThatMakeARecording) {
             "start_angle = nan rad, allowed finite");
   EXPECT_EQ(run([](Settings& s) { s.station = "roof"; }), "station \"roof\" needs a scene");
   EXPECT_EQ(run([](Settings& s) { s.scene.emplace(); }),
-            "planes of the scene = 0, allowed 1 or more");
+            "surfaces of the scene = 0, allowed 1 or more");
 }
 
 TEST(Entries, ScannersAskForASensorThatFits) {

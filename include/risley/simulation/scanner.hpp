@@ -13,6 +13,7 @@
 #include "risley/recordings/truth.hpp"
 #include "risley/scenes/scene.hpp"
 #include "risley/sensors/sensor.hpp"
+#include "risley/simulation/platform.hpp"
 #include "risley/simulation/rotor_dynamics.hpp"
 
 namespace risley::simulation {
@@ -37,6 +38,8 @@ struct SimulationSettings {
 
   std::optional<scenes::Scene> scene;  ///< without one there are no ranges
   std::string station;                 ///< of the scene; empty: at its origin, X forward
+  /// What moves the sensor through the scene, instead of a station.
+  std::optional<Platform> platform;
 
   std::uint64_t seed = 0;
   int threads = 0;  ///< 0: as many as the machine has
@@ -47,7 +50,8 @@ struct SimulationSettings {
 /// of the pieces.
 ///
 /// Shot i is fired at round(i 1e9 / rate) ns by emitter i modulo their number, and the truth is
-/// that of this rounded time. Beams
+/// that of this rounded time; the clock of a sensor on a platform reads first_clock_reading_ns()
+/// more, and its origin is power-on or, with a trajectory in Unix time, UTC. Beams
 /// start where they leave the last prism [B21 App. A], and ranges count from there; a sensor whose
 /// prism sizes are 0 sends all of them from its origin. A beam that hits nothing, or beyond the
 /// sensor's limits of range, has no return: range 0 and valid 0, with the direction it was reported
