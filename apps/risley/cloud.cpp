@@ -120,10 +120,10 @@ ExitStatus write_beam_origin_map(const CloudCommandOptions& options,
 
 FileOutcome make_one(const FileJob& job, const CloudCommandOptions& options,
                      const cloud::CloudOptions& settings, const Progress& progress) {
-  cloud::CloudSummary s = jobs::cloud_of_recording(
-      {job.input, read_options(options.reading), options.calibration, job.output,
-       options.platform, settings},
-      progress);
+  cloud::CloudSummary s =
+      jobs::cloud_of_recording({job.input, read_options(options.reading), options.calibration,
+                                job.output, options.platform, settings},
+                               progress);
   put_flags(s.warnings);
   log_warnings(job.input, s.read_warnings);
   for (const std::string& warning : s.warnings) spdlog::warn("{}: {}", job.input, warning);

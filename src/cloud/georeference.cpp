@@ -74,12 +74,16 @@ struct Georeference::State {
       : platform(what),
         interpolation(platform.trajectory),
         strips(trajectories::flown_strips(interpolation)),
+        errors(what.errors ? std::optional<trajectories::ErrorProcess>(std::in_place, *what.errors,
+                                                                       what.trajectory)
+                           : std::nullopt),
         body_from_sensor(trajectories::body_from_sensor(platform.mount)),
         lever_arm(trajectories::lever_arm(platform.mount)) {}
 
   const MovingPlatform& platform;
   trajectories::Interpolation interpolation;
   std::vector<trajectories::FlownStrip> strips;
+  std::optional<trajectories::ErrorProcess> errors;
   Matrix3d body_from_sensor;
   Vector3d lever_arm;
   std::optional<MapProjection> map;
@@ -193,13 +197,15 @@ void Georeference::announce(CloudHeader& header, bool loadings) const {
       if (s.mount_sigmas()[k] > 0) header.factors.emplace_back(kMountFactors[k]);
     }
   }
-  if (!s.platform.errors || !header.has_covariance) return;
+  if (!s.errors || !header.has_covariance) return;
   TrajectoryErrors& errors = header.trajectory.emplace();
-  const trajectories::ErrorProcess& process = *s.platform.errors;
-  errors.sigma = process.sigma;
-  errors.correlation_time = process.correlation_time;
-  errors.white_rotation = process.white_rotation;
-  errors.record_interval = process.sample_interval;
+  const auto copy = [](const trajectories::PoseErrorVector& from, std::array<double, 6>& to) {
+    std::copy(from.begin(), from.end(), to.begin());
+  };
+  copy(s.errors->correlation_times(), errors.correlation_time);
+  copy(s.errors->white(), errors.white);
+  errors.sample_interval = s.platform.errors->sample_interval;
+  errors.first_sample_ns = trajectory.time_ns.front() + s.utc_shift_ns.value_or(0);
   const Matrix3d axes = s.map_from_ned(tangent, trajectory.position[middle]);
   for (std::size_t k = 0; k < 3; ++k) {
     for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -213,6 +219,7 @@ void Georeference::announce(CloudHeader& header, bool loadings) const {
     const Vector3d place = s.map ? s.map->project(trajectory.position[i]) : trajectory.position[i];
     errors.time_ns.push_back(trajectory.time_ns[i] + s.utc_shift_ns.value_or(0));
     errors.position.push_back({place.x(), place.y(), place.z()});
+    copy(s.errors->sigmas(trajectory.time_ns[i]), errors.sigma.emplace_back());
   }
 }
 
@@ -260,15 +267,14 @@ void Georeference::apply(Points& points, std::size_t sensor_factors,
 
   const Matrix3d& jacobian = tangent.jacobian();
   const Matrix3d ned = s.map_from_ned(tangent, center);
-  Matrix3d position = Matrix3d::Zero(), rotation = Matrix3d::Zero(), white = Matrix3d::Zero();
-  if (s.platform.errors) {
-    const auto& e = s.platform.errors->sigma;
-    position = ned * variances(e[0], e[1], e[2]) * ned.transpose();
-    rotation = ned * variances(e[3], e[4], e[5]) * ned.transpose();
-    const double w = s.platform.errors->white_rotation;
-    white = ned * variances(w, w, w) * ned.transpose();
+  Matrix3d position = Matrix3d::Zero(), turning = Matrix3d::Zero();
+  if (s.errors) {  // sigmas change slowly
+    const std::int64_t time_ns = points.time_ns[n / 2] + s.shift_ns;
+    const trajectories::PoseErrorVector variance =
+        s.errors->sigmas(time_ns).cwiseAbs2() + s.errors->white().cwiseAbs2();
+    position = ned * variance.head<3>().asDiagonal() * ned.transpose();
+    turning = ned * variance.tail<3>().asDiagonal() * ned.transpose();
   }
-  const Matrix3d turning = rotation + white;
   const Matrix3d boresight = variances(sigma[0], sigma[1], sigma[2]);
   const Matrix3d lever = variances(sigma[3], sigma[4], sigma[5]);
   const std::int64_t time_shift = s.shift_ns + s.utc_shift_ns.value_or(0);
@@ -325,7 +331,7 @@ void Georeference::apply(Points& points, std::size_t sensor_factors,
 std::vector<std::string> Georeference::warnings() const {
   const State& s = *state_;
   std::vector<std::string> words;
-  if (!s.platform.errors) {
+  if (!s.errors) {
     words.emplace_back(
         "nobody says how wrong the trajectory may be: covariances hold the sensor's and the "
         "mount's part alone");

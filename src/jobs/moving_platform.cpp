@@ -39,6 +39,11 @@ cloud::MovingPlatform load_platform(const PlatformFiles& files, const Progress& 
                                  trajectories::load_accuracies(files.accuracy, progress),
                                  files.accuracy);
   }
+  if (!files.errors.empty()) {
+    platform.errors = trajectories::load_error_model(files.errors);
+  } else if (!platform.trajectory.accuracy.empty()) {
+    platform.errors = trajectories::assumed_error_model();
+  }
   platform.crs = files.crs;
   if (!files.datum.empty()) platform.datum = files.datum;
   return platform;

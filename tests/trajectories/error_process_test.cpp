@@ -13,7 +13,7 @@
 #include "risley/core/error.hpp"
 
 #include "refusal.hpp"
-#include "trajectories/flight.hpp"
+#include "trajectories/known_flight.hpp"
 
 namespace risley::trajectories::error_process_test {
 
@@ -32,7 +32,7 @@ heading_deg: {sigma: 0.08, correlation_time_s: 300, white: 0.005, source: assume
 )";
 
 TEST(ErrorProcess, CovariancesAreThoseOfTheStatement) {
-  const Trajectory t = trajectory_of(Flight(), 400);
+  const Trajectory t = trajectory_of(KnownFlight(), 400);
   const ErrorProcess process(parse_error_model(kStated, "errors.yaml"), t);
   const std::int64_t at = t.time_ns[100];
   const PoseErrorMatrix same = process.covariance(at);
@@ -50,7 +50,7 @@ TEST(ErrorProcess, CovariancesAreThoseOfTheStatement) {
 }
 
 TEST(ErrorProcess, WhitePartsAreCommonToASample) {
-  const Trajectory t = trajectory_of(Flight(), 400);
+  const Trajectory t = trajectory_of(KnownFlight(), 400);
   const ErrorProcess process(parse_error_model(kStated, "errors.yaml"), t);
   const std::int64_t begin = t.time_ns.front() + 7 * 5'000'000;
   EXPECT_EQ(process.sample(begin), 7);
@@ -64,7 +64,7 @@ TEST(ErrorProcess, WhitePartsAreCommonToASample) {
 }
 
 TEST(ErrorProcess, AccuraciesOfTheTrajectoryHoldWhereNothingIsStated) {
-  Trajectory t = trajectory_of(Flight(), 400);
+  Trajectory t = trajectory_of(KnownFlight(), 400);
   t.accuracy.resize(400);
   for (std::size_t i = 0; i < 400; ++i) {
     t.accuracy[i] = {{0.01 + 1e-5 * static_cast<double>(i), 0.02, 0.03}, 1e-4, 3e-4, 5e-4};
@@ -93,7 +93,7 @@ TEST(ErrorProcess, AccuraciesOfTheTrajectoryHoldWhereNothingIsStated) {
 }
 
 TEST(ErrorProcess, CovariancesOfManyTimesArePositive) {
-  Trajectory t = trajectory_of(Flight(), 400);
+  Trajectory t = trajectory_of(KnownFlight(), 400);
   t.accuracy.resize(400);
   for (std::size_t i = 0; i < 400; ++i) {
     t.accuracy[i] = {{0.01 + 1e-4 * static_cast<double>(i % 7), 0.02, 0.03}, 1e-4, 3e-4, 5e-4};
@@ -155,7 +155,7 @@ TEST(ErrorModel, MistakesAreNamedWithTheirLine) {
 }
 
 TEST(ErrorModel, EntriesRefuseWhatMakesNoSense) {
-  const Trajectory t = trajectory_of(Flight(), 20);
+  const Trajectory t = trajectory_of(KnownFlight(), 20);
   const auto run = [&](auto&& change) {
     ErrorModel model = parse_error_model(kStated, "errors.yaml");
     change(model);

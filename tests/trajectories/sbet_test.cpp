@@ -18,7 +18,7 @@
 #include "risley/trajectories/trajectory_file.hpp"
 
 #include "io/temporary_folder.hpp"
-#include "trajectories/flight.hpp"
+#include "trajectories/known_flight.hpp"
 
 namespace risley::trajectories::sbet_test {
 
@@ -51,7 +51,7 @@ std::string fault(const std::vector<SbetRecord>& records) {
 }
 
 TEST(Sbet, PosesAndVelocitiesAreThoseOfTheFlight) {
-  const Flight flight;
+  const KnownFlight flight;
   for (const double wander : {0.0, 0.0178, -1.2}) {
     const Trajectory t = read(sbet_records(flight, 600, wander));
     ASSERT_EQ(t.size(), 600U);
@@ -62,8 +62,8 @@ TEST(Sbet, PosesAndVelocitiesAreThoseOfTheFlight) {
     EXPECT_EQ(t.velocity_frame->name, "north-east-down") << t.velocity_frame->reason;
     EXPECT_NEAR(t.wander->median, wander, 1e-15);
     for (std::size_t i = 0; i < t.size(); i += 37) {
-      const double time = Flight::kStep * static_cast<double>(i);
-      EXPECT_EQ(t.time_ns[i], std::llround((Flight::kBegin + time) * 1e9));
+      const double time = KnownFlight::kStep * static_cast<double>(i);
+      EXPECT_EQ(t.time_ns[i], std::llround((KnownFlight::kBegin + time) * 1e9));
       EXPECT_LT((t.position[i] - flight.position(time)).norm(), 3e-9);
       EXPECT_LT(t.attitude[i].angularDistance(flight.attitude(time)), 1e-14);
       EXPECT_LT((t.velocity[i] - flight.velocity(time)).norm(), 1e-12);
@@ -86,7 +86,7 @@ Vector3d along(const Vector3d& ned, double azimuth) {
 Vector3d flipped(const Vector3d& v) { return {v.x(), -v.y(), -v.z()}; }
 
 TEST(Sbet, FramesOfVelocitiesAreFound) {
-  const Flight flight;
+  const KnownFlight flight;
   const std::vector<VelocityCase> cases{
       {"east-north-up", 0.5,
        [](const Vector3d& v, const RollPitchHeading&, double) {
@@ -128,8 +128,9 @@ TEST(Sbet, FramesOfVelocitiesAreFound) {
     std::vector<SbetRecord> records = sbet_records(flight, 1000, each.wander);
     for (std::size_t i = 0; i < records.size(); ++i) {
       SbetRecord& n = records[i];
-      const Vector3d v = each.turn(
-          {n[4], n[5], n[6]}, flight.angles(Flight::kStep * static_cast<double>(i)), each.wander);
+      const Vector3d v =
+          each.turn({n[4], n[5], n[6]}, flight.angles(KnownFlight::kStep * static_cast<double>(i)),
+                    each.wander);
       for (std::size_t axis = 0; axis < 3; ++axis) n[4 + axis] = v[static_cast<int>(axis)];
     }
     const Trajectory t = read(records);
@@ -141,7 +142,7 @@ TEST(Sbet, FramesOfVelocitiesAreFound) {
 }
 
 TEST(Sbet, FramesThatCannotBeToldStayUndecided) {
-  const Flight flight;
+  const KnownFlight flight;
   // Too short.
   Trajectory t = read(sbet_records(flight, 9));
   EXPECT_EQ(t.velocity_frame->name, "undecided");
@@ -161,7 +162,7 @@ TEST(Sbet, FramesThatCannotBeToldStayUndecided) {
   records = sbet_records(flight, 400);
   for (std::size_t i = 0; i < records.size(); ++i) {
     SbetRecord& n = records[i];
-    n[1] = 0.6 + 20 * Flight::kStep * static_cast<double>(i) / 6.37e6;
+    n[1] = 0.6 + 20 * KnownFlight::kStep * static_cast<double>(i) / 6.37e6;
     n[2] = 0;
     n[3] = 100;
     n[4] = 20;
@@ -173,7 +174,7 @@ TEST(Sbet, FramesThatCannotBeToldStayUndecided) {
 }
 
 TEST(Sbet, NoisyPositionsDoNotHideTheFrame) {
-  std::vector<SbetRecord> records = sbet_records(Flight(), 2000, 0.018);
+  std::vector<SbetRecord> records = sbet_records(KnownFlight(), 2000, 0.018);
   const RandomStream random(5, 1);
   for (std::size_t i = 0; i < records.size(); ++i) {
     SbetRecord& n = records[i];
@@ -189,7 +190,7 @@ TEST(Sbet, NoisyPositionsDoNotHideTheFrame) {
 }
 
 TEST(Sbet, SizesThatAreNoWholeRecordsAreRefusedByName) {
-  const std::string bytes = bytes_of(sbet_records(Flight(), 3));
+  const std::string bytes = bytes_of(sbet_records(KnownFlight(), 3));
   for (std::size_t size = 0; size < bytes.size(); ++size) {
     if (size > 0 && size % 136 == 0) continue;
     try {
@@ -207,7 +208,7 @@ TEST(Sbet, SizesThatAreNoWholeRecordsAreRefusedByName) {
 }
 
 TEST(Sbet, DegreesWhereRadiansBelongAreNamed) {
-  std::vector<SbetRecord> records = sbet_records(Flight(), 20);
+  std::vector<SbetRecord> records = sbet_records(KnownFlight(), 20);
   for (SbetRecord& n : records) {
     for (const std::size_t i : {1, 2, 7, 8, 9}) n[i] = degrees_from_radians(n[i]);
   }
@@ -222,7 +223,7 @@ TEST(Sbet, DegreesWhereRadiansBelongAreNamed) {
 TEST(Sbet, ValuesThatNoPlatformHasAreRefusedAtTheirRecord) {
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
   constexpr double kInfinite = std::numeric_limits<double>::infinity();
-  const std::vector<SbetRecord> sound = sbet_records(Flight(), 20);
+  const std::vector<SbetRecord> sound = sbet_records(KnownFlight(), 20);
   for (std::size_t field = 0; field < 11; ++field) {
     for (const double value : {kNan, kInfinite, -kInfinite, 1e300, -1e9}) {
       std::vector<SbetRecord> records = sound;
@@ -234,7 +235,7 @@ TEST(Sbet, ValuesThatNoPlatformHasAreRefusedAtTheirRecord) {
 }
 
 TEST(Sbet, TimesThatRunBackAreSortedOrRefused) {
-  std::vector<SbetRecord> records = sbet_records(Flight(), 300);
+  std::vector<SbetRecord> records = sbet_records(KnownFlight(), 300);
   std::swap(records[100], records[101]);
   records.insert(records.begin() + 200, records[200]);
   const Trajectory t = read(records);
@@ -245,17 +246,17 @@ TEST(Sbet, TimesThatRunBackAreSortedOrRefused) {
   EXPECT_THAT(t.warnings[1].message, HasSubstr("1 records repeat the time"));
   EXPECT_TRUE(std::is_sorted(t.time_ns.begin(), t.time_ns.end()));
   EXPECT_EQ(t.velocity_frame->name, "north-east-down");
-  EXPECT_LT((t.position[100] - Flight().position(0.5)).norm(), 1e-8);
+  EXPECT_LT((t.position[100] - KnownFlight().position(0.5)).norm(), 1e-8);
   // Another flight behind this one.
-  const std::vector<SbetRecord> again = sbet_records(Flight(), 260);
+  const std::vector<SbetRecord> again = sbet_records(KnownFlight(), 260);
   records.insert(records.end(), again.begin(), again.end());
   EXPECT_THAT(fault(records), AllOf(HasSubstr("byte 40936"), HasSubstr("time runs back by 1.495")));
 }
 
 TEST(Sbet, TheWeekMayEnd) {
-  std::vector<SbetRecord> records = sbet_records(Flight(), 400);
+  std::vector<SbetRecord> records = sbet_records(KnownFlight(), 400);
   for (SbetRecord& n : records) {
-    n[0] += 604799 - Flight::kBegin;
+    n[0] += 604799 - KnownFlight::kBegin;
     if (n[0] >= 604800) n[0] -= 604800;
   }
   const Trajectory t = read(records);
@@ -268,7 +269,7 @@ TEST(Sbet, TheWeekMayEnd) {
 }
 
 TEST(Sbet, OneRecordIsATrajectory) {
-  const Trajectory t = read(sbet_records(Flight(), 1));
+  const Trajectory t = read(sbet_records(KnownFlight(), 1));
   EXPECT_EQ(t.size(), 1U);
   EXPECT_EQ(t.velocity_frame->name, "undecided");
 }
@@ -289,7 +290,7 @@ TEST(Sbet, RandomBytesAreRefused) {
 }
 
 TEST(Sbet, WrittenAndReadAgain) {
-  const Flight flight;
+  const KnownFlight flight;
   const Trajectory t = read(sbet_records(flight, 300, 0.3));
   const std::string path = folder().file("again.sbet");
   const auto left_out = write_trajectory(path, t);
@@ -310,8 +311,8 @@ using SmrmsgRecord = std::array<double, 10>;
 std::vector<SmrmsgRecord> accuracies(int records) {
   std::vector<SmrmsgRecord> all;
   for (int i = 0; i < records; ++i) {
-    all.push_back({Flight::kBegin - 5 + i, 0.02 + 0.001 * i, 0.03, 0.05, 0.004, 0.005, 0.006, 0.25,
-                   0.26, 1.0 + 0.1 * i});
+    all.push_back({KnownFlight::kBegin - 5 + i, 0.02 + 0.001 * i, 0.03, 0.05, 0.004, 0.005, 0.006,
+                   0.25, 0.26, 1.0 + 0.1 * i});
   }
   return all;
 }
@@ -328,7 +329,7 @@ TEST(Smrmsg, AccuraciesAreInterpolatedToTheRecords) {
   EXPECT_EQ(found.time_ns.size(), 20U);
   EXPECT_NEAR(found.accuracy[3].heading, radians_from_degrees(1.3 / 60), 1e-15);
   EXPECT_EQ(found.velocity[0], Vector3d(0.004, 0.005, 0.006));
-  Trajectory t = read(sbet_records(Flight(), 400));
+  Trajectory t = read(sbet_records(KnownFlight(), 400));
   add_accuracies(t, found, "a.smrmsg");
   ASSERT_EQ(t.accuracy.size(), 400U);
   EXPECT_NEAR(t.accuracy[100].position.x(), 0.02 + 0.001 * 5.5, 1e-12);
@@ -347,27 +348,27 @@ TEST(Smrmsg, UnorderedRecordsAndTheEndOfTheWeek) {
   // The week ends within both.
   records = accuracies(20);
   for (SmrmsgRecord& n : records) {
-    n[0] += 604799 - Flight::kBegin;
+    n[0] += 604799 - KnownFlight::kBegin;
     if (n[0] >= 604800) n[0] -= 604800;
   }
-  std::vector<SbetRecord> poses = sbet_records(Flight(), 400);
+  std::vector<SbetRecord> poses = sbet_records(KnownFlight(), 400);
   for (SbetRecord& n : poses) {
-    n[0] += 604799 - Flight::kBegin;
+    n[0] += 604799 - KnownFlight::kBegin;
     if (n[0] >= 604800) n[0] -= 604800;
   }
   Trajectory t = read(poses);
   add_accuracies(t, read_accuracies(records), "a.smrmsg");
   EXPECT_NEAR(t.accuracy[100].position.x(), 0.02 + 0.001 * 5.5, 1e-12);
   // The trajectory lies behind the end of the week, where its times began again.
-  poses = sbet_records(Flight(), 100);
-  for (SbetRecord& n : poses) n[0] += 2 - Flight::kBegin;
+  poses = sbet_records(KnownFlight(), 100);
+  for (SbetRecord& n : poses) n[0] += 2 - KnownFlight::kBegin;
   t = read(poses);
   add_accuracies(t, read_accuracies(records), "a.smrmsg");
   EXPECT_NEAR(t.accuracy[0].position.x(), 0.02 + 0.001 * 8, 1e-12);
 }
 
 TEST(Smrmsg, OtherFlightsAndDamageAreRefused) {
-  Trajectory t = read(sbet_records(Flight(), 400));
+  Trajectory t = read(sbet_records(KnownFlight(), 400));
   std::vector<SmrmsgRecord> records = accuracies(20);
   for (SmrmsgRecord& n : records) n[0] += 3600;
   try {

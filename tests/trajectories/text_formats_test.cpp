@@ -17,7 +17,7 @@
 #include "risley/trajectories/trajectory_file.hpp"
 
 #include "io/temporary_folder.hpp"
-#include "trajectories/flight.hpp"
+#include "trajectories/known_flight.hpp"
 
 namespace risley::trajectories::text_formats_test {
 
@@ -58,17 +58,17 @@ std::string replaced(std::string text, const std::string& what, const std::strin
 /// Rows of the flight by a function of the time.
 std::string rows(int count, const std::function<std::string(double)>& row) {
   std::string text;
-  for (int i = 0; i < count; ++i) text += row(Flight::kStep * i) + "\n";
+  for (int i = 0; i < count; ++i) text += row(KnownFlight::kStep * i) + "\n";
   return text;
 }
 
 void expect_flight(const Trajectory& t, std::size_t records, double position, double angle,
                    double speed) {
-  const Flight flight;
+  const KnownFlight flight;
   ASSERT_EQ(t.size(), records);
   EXPECT_EQ(t.frame, Frame::geocentric);
   for (std::size_t i = 0; i < records; i += 7) {
-    const double time = Flight::kStep * static_cast<double>(i);
+    const double time = KnownFlight::kStep * static_cast<double>(i);
     EXPECT_LT((t.position[i] - flight.position(time)).norm(), position) << i;
     EXPECT_LT(t.attitude[i].angularDistance(flight.attitude(time)), angle) << i;
     if (speed > 0) {
@@ -102,7 +102,7 @@ const std::string kExplorerHead =
     "\n";
 
 std::string explorer_text(int count, bool sexagesimal_places) {
-  const Flight flight;
+  const KnownFlight flight;
   std::string text = kExplorerHead;
   text +=
       "  GPSTime      Latitude       Longitude     H-Ell  VEast VNorth  VUp  SDNorth SDEast "
@@ -122,7 +122,7 @@ std::string explorer_text(int count, bool sexagesimal_places) {
     return fmt::format(
         "{:.4f} {} {} {:.4f} {:.4f} {:.4f} {:.4f} 0.011 0.012 0.023 {:.8f} 0.004 {:.8f} 0.005 "
         "{:.8f} 0.021 1",
-        Flight::kBegin + t,
+        KnownFlight::kBegin + t,
         sexagesimal_places ? sexagesimal(latitude) : fmt::format("{:.10f}", latitude),
         sexagesimal_places ? sexagesimal(longitude) : fmt::format("{:.10f}", longitude),
         place.height, v.y(), v.x(), -v.z(), degrees_from_radians(angles.roll),
@@ -213,7 +213,7 @@ const std::string kPospacHead =
     "\n";
 
 std::string pospac_text(int count) {
-  const Flight flight;
+  const KnownFlight flight;
   return kPospacHead + rows(count, [&](double t) {
            const Geodetic place = flight.place(t);
            const RollPitchHeading angles = flight.angles(t);
@@ -221,7 +221,7 @@ std::string pospac_text(int count) {
            return fmt::format(
                "{:.4f} 0.000 500000.0 4190000.0 {:.4f} {:.10f} {:.10f} {:.4f} {:.8f} {:.8f} {:.8f} "
                "{:.5f} {:.5f} {:.5f} 0.012 0.011 0.023 0.004 0.005 0.021",
-               Flight::kBegin + t, place.height, degrees_from_radians(place.latitude),
+               KnownFlight::kBegin + t, place.height, degrees_from_radians(place.latitude),
                degrees_from_radians(place.longitude), place.height,
                degrees_from_radians(angles.roll), degrees_from_radians(angles.pitch),
                degrees_from_radians(angles.heading), v.y(), v.x(), -v.z());
@@ -249,7 +249,7 @@ TEST(Pospac, MistakesAreNamed) {
 }
 
 std::string openmms_text(int count, bool real_time = false) {
-  const Flight flight;
+  const KnownFlight flight;
   const std::string head =
       real_time ? "\n"
                 : "UTM North,Zone 13,WGS84,WGS 84,2020.5,0,0,0,0,0,0,1,2,3,0,0,0,0,0,0,0,0,0\n";
@@ -281,7 +281,7 @@ TEST(Openmms, FifteenColumnsInUtc) {
 }
 
 TEST(Openmms, MidnightMayPass) {
-  const Flight flight;
+  const KnownFlight flight;
   std::string text = openmms_text(400);
   std::string shifted;
   std::size_t i = 0;
@@ -303,14 +303,14 @@ const std::string kCsvHead =
     "heading_deg,velocity_north_m_per_s,velocity_east_m_per_s,velocity_up_m_per_s";
 
 std::string csv_text(int count, const std::string& head = kCsvHead) {
-  const Flight flight;
+  const KnownFlight flight;
   return head + "\n" + rows(count, [&](double t) {
            const Geodetic place = flight.place(t);
            const RollPitchHeading angles = flight.angles(t);
            const Vector3d v = flight.velocity_ned(t);
            return fmt::format(
                "{:.4f},{:.12f},{:.12f},{:.6f},{:.9f},{:.9f},{:.9f},{:.6f},{:.6f},{:.6f}",
-               Flight::kBegin + t, degrees_from_radians(place.latitude),
+               KnownFlight::kBegin + t, degrees_from_radians(place.latitude),
                degrees_from_radians(place.longitude), place.height,
                degrees_from_radians(angles.roll), degrees_from_radians(angles.pitch),
                degrees_from_radians(angles.heading), v.x(), v.y(), -v.z());
@@ -447,7 +447,7 @@ TEST(TrajectoryCsv, LocalPosesComeBackToTheLastBit) {
 }
 
 TEST(TrajectoryCsv, PlacesComeBackToTheNanometre) {
-  Trajectory t = trajectory_of(Flight(), 300);
+  Trajectory t = trajectory_of(KnownFlight(), 300);
   t.gps_week = 2214;
   t.accuracy.resize(300);
   for (PoseAccuracy& accuracy : t.accuracy) accuracy = {{0.011, 0.012, 0.023}, 1e-4, 2e-4, 3e-4};
@@ -462,11 +462,11 @@ TEST(TrajectoryCsv, PlacesComeBackToTheNanometre) {
 }
 
 TEST(TrajectoryCsv, OutputsAreWholeOrNotThere) {
-  Trajectory t = trajectory_of(Flight(), 3);
+  Trajectory t = trajectory_of(KnownFlight(), 3);
   t.time_scale = TimeScale::utc_unix;
   const std::string path = folder().file("refused.sbet");
   EXPECT_THROW(write_trajectory(path, t), InvalidArgument);
-  t = trajectory_of(Flight(), 3);
+  t = trajectory_of(KnownFlight(), 3);
   t.frame = Frame::local;
   EXPECT_THROW(write_trajectory(path, t), InvalidArgument);
   EXPECT_EQ(trajectory_file_kind(path), TrajectoryFileKind::none);
@@ -573,7 +573,7 @@ TEST(TextFormats, OtherTextsAreNoTrajectory) {
 }
 
 TEST(TextFormats, UnknownEndingsListTheKnownOnes) {
-  const Trajectory t = trajectory_of(Flight(), 3);
+  const Trajectory t = trajectory_of(KnownFlight(), 3);
   try {
     write_trajectory(folder().file("a.xyz"), t);
     FAIL();

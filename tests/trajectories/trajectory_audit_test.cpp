@@ -10,7 +10,7 @@
 #include "risley/core/angle.hpp"
 
 #include "refusal.hpp"
-#include "trajectories/flight.hpp"
+#include "trajectories/known_flight.hpp"
 
 namespace risley::trajectories::trajectory_audit_test {
 
@@ -18,7 +18,7 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
 TEST(TrajectoryAudit, SaysWhatATrajectoryHolds) {
-  const Flight flight;
+  const KnownFlight flight;
   Trajectory t = trajectory_of(flight, 2001);
   t.accuracy.resize(t.size());
   for (std::size_t i = 0; i < t.size(); ++i) {
@@ -42,7 +42,7 @@ TEST(TrajectoryAudit, SaysWhatATrajectoryHolds) {
 }
 
 TEST(TrajectoryAudit, GapsAndJumpsAreNamed) {
-  Trajectory t = trajectory_of(Flight(), 600);
+  Trajectory t = trajectory_of(KnownFlight(), 600);
   for (std::size_t i = 300; i < 600; ++i) t.time_ns[i] += 2'000'000'000;
   TrajectoryAudit audit = audit_trajectory(t);
   ASSERT_EQ(audit.times.gaps.size(), 1U);
@@ -52,7 +52,7 @@ TEST(TrajectoryAudit, GapsAndJumpsAreNamed) {
   EXPECT_THAT(audit.warnings[0].message, HasSubstr("1 gap without records, the longest 2.005 s"));
   EXPECT_LT(audit.fastest, 24);  // not across the gap
 
-  t = trajectory_of(Flight(), 600);
+  t = trajectory_of(KnownFlight(), 600);
   for (std::size_t i = 300; i < 600; ++i) t.position[i] += Eigen::Vector3d(30, 0, 0);
   t.attitude[400] = t.attitude[400] * Eigen::Quaterniond(0, 0, 0, 1);
   audit = audit_trajectory(t);
@@ -76,7 +76,7 @@ TEST(TrajectoryAudit, RecordsThatAreTooFewAreNamed) {
 }
 
 TEST(TrajectoryAudit, OneRecordHasNoRate) {
-  const TrajectoryAudit audit = audit_trajectory(trajectory_of(Flight(), 1));
+  const TrajectoryAudit audit = audit_trajectory(trajectory_of(KnownFlight(), 1));
   EXPECT_EQ(audit.times.rate_hz, 0);
   EXPECT_EQ(audit.times.duration_s, 0);
 }

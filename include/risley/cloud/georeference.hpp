@@ -27,7 +27,7 @@ struct MovingPlatform {
   trajectories::Trajectory trajectory;
   trajectories::Mount mount;
   /// How wrong the trajectory may be; without it points carry the sensor's and the mount's part.
-  std::optional<trajectories::ErrorProcess> errors;
+  std::optional<trajectories::ErrorModel> errors;
   /// The map, see MapProjection; empty: UTM on WGS 84 with ellipsoidal heights. Trajectories in a
   /// frame of their own have no map.
   std::string crs;

@@ -56,20 +56,24 @@ struct PointFrame {
 };
 
 /// What the errors of a trajectory do to points: point i at x_i, taken at time t_i from r_i, moves
-/// by L_i e(t_i), L_i = [I, -[x_i - r_i]x], e = three shifts and three rotations along the axes
-/// north, east and down. docs/theory/cloud.md
+/// by L_i e(t_i), L_i = [I, -[x_i - r_i]x]; the six of e are shifts to north, east and up, m, and
+/// rotations about north, east and down, rad. docs/theory/cloud.md
 struct TrajectoryErrors {
-  /// Each of the six fades with time: sigma^2 exp(-|t_i - t_j| / correlation_time). m and rad; s.
-  std::array<double, 6> sigma{}, correlation_time{};
-  /// Rotations about all three axes on top, alike for the points of one record and independent
-  /// from record to record, rad; and how long a record lasts, s.
-  double white_rotation = 0, record_interval = 0;
+  /// Each of the six fades with time: the covariance of two times is their sigmas times
+  /// exp(-|t_i - t_j| / correlation_time), s.
+  std::array<double, 6> correlation_time{};
+  /// Parts on top that are alike within a sample of the trajectory and independent from sample to
+  /// sample, m and rad; and how long a sample lasts, s.
+  std::array<double, 6> white{};
+  double sample_interval = 0;
+  std::int64_t first_sample_ns = 0;  ///< begin of sample 0
   /// North, east and down as columns, axes of the points, in the middle of the flight.
   std::array<std::array<double, 3>, 3> axes_from_ned{{{0, 1, 0}, {1, 0, 0}, {0, 0, -1}}};
   /// Where the sensor was, about once a second: time as the points have it and place, axes of the
   /// points. Between them a straight line is off by millimetres, which costs nothing here.
   std::vector<std::int64_t> time_ns;
   std::vector<std::array<double, 3>> position;  ///< m
+  std::vector<std::array<double, 6>> sigma;     ///< of the fading parts, m and rad
 };
 
 /// What is known of a cloud before its first point.

@@ -17,7 +17,7 @@ struct CloudOfRecordingOptions {
   recordings::ReadOptions reading;  ///< see open_in_sensor_frame() where it holds no extrinsics
   std::string calibration;          ///< preset by name, or a preset or calibration file
   std::string output;               ///< path; its ending chooses the format unless one is named
-  PlatformFiles platform;  ///< of a sensor that moved
+  PlatformFiles platform;           ///< of a sensor that moved
   /// Provenance goes into the cloud, with input's and calibration's SHA-256.
   cloud::CloudOptions cloud;  ///< without a platform
 };

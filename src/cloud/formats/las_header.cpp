@@ -12,7 +12,6 @@
 
 #include <fmt/format.h>
 
-#include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
 #include "risley/core/require.hpp"
 
@@ -116,22 +115,17 @@ void append_trajectory(const TrajectoryErrors& errors, std::vector<VariableLengt
   const auto list = [&text](std::string_view name, std::span<const double> values) {
     text += fmt::format("{}: [{}]\n", name, fmt::join(values, ", "));
   };
-  const std::span<const double> sigma(errors.sigma);
-  std::array<double, 3> degrees{};
-  for (std::size_t k = 0; k < 3; ++k) degrees[k] = degrees_from_radians(sigma[3 + k]);
-  list("position_sigma_north_east_down_m", sigma.first(3));
-  list("rotation_sigma_north_east_down_deg", degrees);
-  list("position_correlation_time_s", std::span(errors.correlation_time).first(3));
-  list("rotation_correlation_time_s", std::span(errors.correlation_time).last(3));
-  text += fmt::format("white_rotation_deg: {}\nrecord_interval_s: {}\n",
-                      degrees_from_radians(errors.white_rotation), errors.record_interval);
+  list("correlation_time_s", errors.correlation_time);
+  list("white_m_and_rad", errors.white);
+  text += fmt::format("sample_interval_s: {}\nfirst_sample_ns: {}\n", errors.sample_interval,
+                      errors.first_sample_ns);
   list("north", errors.axes_from_ned[0]);
   list("east", errors.axes_from_ned[1]);
   list("down", errors.axes_from_ned[2]);
   text += fmt::format("positions: {}\n", errors.time_ns.size());
   text.push_back('\0');
   records.push_back({"risley", 100, "Errors of the trajectory", std::move(text)});
-  constexpr std::size_t kRowBytes = 32, kRows = kMaxRecordBytes / kRowBytes;
+  constexpr std::size_t kRowBytes = 80, kRows = kMaxRecordBytes / kRowBytes;
   for (std::size_t first = 0; first < errors.time_ns.size(); first += kRows) {
     const std::size_t rows = std::min(kRows, errors.time_ns.size() - first);
     std::string data(rows * kRowBytes, '\0');
@@ -139,6 +133,7 @@ void append_trajectory(const TrajectoryErrors& errors, std::vector<VariableLengt
     for (std::size_t i = first; i < first + rows; ++i) {
       out = put<std::int64_t>(out, errors.time_ns[i]);
       for (const double value : errors.position[i]) out = put<double>(out, value);
+      for (const double value : errors.sigma[i]) out = put<double>(out, value);
     }
     const std::size_t number = 101 + first / kRows;
     if (number > std::numeric_limits<std::uint16_t>::max()) {

@@ -197,23 +197,17 @@ class NetcdfWriter final : public CloudWriter {
 
   /// The errors of a moving sensor's trajectory: docs/files.md
   void define_trajectory(const TrajectoryErrors& errors) {
-    const auto three = [](std::span<const double> values) {
-      return fmt::format("{} {} {}", values[0], values[1], values[2]);
+    const auto list = [](std::span<const double> values) {
+      return fmt::format("{}", fmt::join(values, " "));
     };
-    const std::span<const double> sigma(errors.sigma), time(errors.correlation_time);
-    std::array<double, 3> degrees{};
-    for (std::size_t k = 0; k < 3; ++k) degrees[k] = degrees_from_radians(sigma[3 + k]);
-    file_.put_text_group(
-        "trajectory_errors",
-        {{"position_sigma_north_east_down_m", three(sigma.first(3))},
-         {"rotation_sigma_north_east_down_deg", three(degrees)},
-         {"position_correlation_time_s", three(time.first(3))},
-         {"rotation_correlation_time_s", three(time.last(3))},
-         {"white_rotation_deg", fmt::format("{}", degrees_from_radians(errors.white_rotation))},
-         {"record_interval_s", fmt::format("{}", errors.record_interval)},
-         {"north", three(errors.axes_from_ned[0])},
-         {"east", three(errors.axes_from_ned[1])},
-         {"down", three(errors.axes_from_ned[2])}});
+    file_.put_text_group("trajectory_errors",
+                         {{"correlation_time_s", list(errors.correlation_time)},
+                          {"white_m_and_rad", list(errors.white)},
+                          {"sample_interval_s", fmt::format("{}", errors.sample_interval)},
+                          {"first_sample_ns", fmt::format("{}", errors.first_sample_ns)},
+                          {"north", list(errors.axes_from_ned[0])},
+                          {"east", list(errors.axes_from_ned[1])},
+                          {"down", list(errors.axes_from_ned[2])}});
     const auto record = file_.define_dimension("trajectory_record", errors.time_ns.size());
     const io::NetcdfStorage storage{0, true, false};
     trajectory_.push_back(file_.define<std::int64_t>("trajectory_time_ns", {&record}, storage));
@@ -226,6 +220,12 @@ class NetcdfWriter final : public CloudWriter {
       file_.put_text(trajectory_.back(), "long_name",
                      fmt::format("{} of the sensor at that time", axis));
     }
+    const auto error = file_.define_dimension("trajectory_error", 6);
+    trajectory_.push_back(file_.define<double>("trajectory_sigma", {&record, &error}, storage));
+    file_.put_text(trajectory_.back(), "units", "m m m rad rad rad");
+    file_.put_text(trajectory_.back(), "long_name",
+                   "standard deviation of shifts north, east, up and rotations about north, east, "
+                   "down");
   }
 
   void put_trajectory(const TrajectoryErrors& errors) {
@@ -235,6 +235,9 @@ class NetcdfWriter final : public CloudWriter {
       for (const auto& position : errors.position) column.push_back(position[axis]);
       file_.put(trajectory_[1 + axis], 0, column);
     }
+    std::vector<double> sigmas;
+    for (const auto& row : errors.sigma) sigmas.insert(sigmas.end(), row.begin(), row.end());
+    file_.put(trajectory_[4], 0, sigmas);
   }
 
   void define_geometry(const CloudHeader& header) {
@@ -288,7 +291,7 @@ class NetcdfWriter final : public CloudWriter {
   io::NetcdfOutput file_;
   io::NetcdfDimension point_;
   std::vector<Variable> variables_;
-  std::vector<io::NetcdfVariable> trajectory_;  ///< time, x, y, z
+  std::vector<io::NetcdfVariable> trajectory_;  ///< time, x, y, z, sigmas
   std::size_t rows_ = 0;                        ///< in the block
   std::size_t written_ = 0;                     ///< in the file
 };

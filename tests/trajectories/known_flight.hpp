@@ -18,12 +18,12 @@
 namespace risley::trajectories {
 
 /// A flight whose every derivative is known: geocentric, 200 Hz.
-class Flight {
+class KnownFlight {
  public:
   static constexpr double kStep = 0.005;    // s
   static constexpr double kBegin = 400825;  // second of week
 
-  Flight() : origin_{0.659119304, -2.07735761, 691.6} {
+  KnownFlight() : origin_{0.659119304, -2.07735761, 691.6} {
     axes_ = geocentric_from_ned(origin_);
     begin_ = geocentric_from_geodetic(origin_);
   }
@@ -55,13 +55,13 @@ class Flight {
 };
 
 /// The flight as a trajectory of its own.
-inline Trajectory trajectory_of(const Flight& flight, int records) {
+inline Trajectory trajectory_of(const KnownFlight& flight, int records) {
   Trajectory t;
   t.frame = Frame::geocentric;
   t.time_scale = TimeScale::gps_second_of_week;
   for (int i = 0; i < records; ++i) {
-    const double time = Flight::kStep * i;
-    t.time_ns.push_back(std::llround((Flight::kBegin + time) * 1e9));
+    const double time = KnownFlight::kStep * i;
+    t.time_ns.push_back(std::llround((KnownFlight::kBegin + time) * 1e9));
     t.position.push_back(flight.position(time));
     t.attitude.push_back(flight.attitude(time));
     t.velocity.push_back(flight.velocity(time));
@@ -72,16 +72,17 @@ inline Trajectory trajectory_of(const Flight& flight, int records) {
 using SbetRecord = std::array<double, 17>;
 
 /// Records of an SBET, velocities north, east, down.
-inline std::vector<SbetRecord> sbet_records(const Flight& flight, int records, double wander = 0) {
+inline std::vector<SbetRecord> sbet_records(const KnownFlight& flight, int records,
+                                            double wander = 0) {
   std::vector<SbetRecord> all;
   for (int i = 0; i < records; ++i) {
-    const double t = Flight::kStep * i;
+    const double t = KnownFlight::kStep * i;
     const Geodetic place = flight.place(t);
     const RollPitchHeading angles = flight.angles(t);
     const Eigen::Vector3d v = flight.velocity_ned(t);
-    all.push_back({Flight::kBegin + t, place.latitude, place.longitude, place.height, v.x(), v.y(),
-                   v.z(), angles.roll, angles.pitch, wrap_to_pi(angles.heading + wander), wander, 0,
-                   0, 0, 0, 0, 0});
+    all.push_back({KnownFlight::kBegin + t, place.latitude, place.longitude, place.height, v.x(),
+                   v.y(), v.z(), angles.roll, angles.pitch, wrap_to_pi(angles.heading + wander),
+                   wander, 0, 0, 0, 0, 0, 0});
   }
   return all;
 }
