@@ -14,7 +14,7 @@ VENDOR = os.environ.get("RISLEY_VENDOR_DATA", "")
 
 
 def sbet(records, wander=0.02, week=400825):
-    """Bytes of a level flight that turns slowly, velocities north-west-up turned by the wander."""
+    """Bytes of a flight that turns slowly, velocities north-west-up turned by the wander."""
     data = b""
     for i in range(records):
         t = 0.005 * i
@@ -23,7 +23,8 @@ def sbet(records, wander=0.02, week=400825):
         longitude = 0.1 + 12 / 0.3 * (1 - math.cos(0.3 * t)) / (6.3891e6 * math.cos(0.8))
         x = math.cos(wander) * north - math.sin(wander) * east
         west = -(math.sin(wander) * north + math.cos(wander) * east)
-        data += struct.pack("<17d", week + t, latitude, longitude, 480, x, west, 0,
+        data += struct.pack("<17d", week + t, latitude, longitude, 480 + 0.5 * math.sin(t), x,
+                            west, 0.5 * math.cos(t),
                             0.05 * math.sin(2 * t), 0.04, 0.5 * t + wander, wander, *[0] * 6)
     return data
 
@@ -105,7 +106,7 @@ class TrajectoryTest(CommandTest):
     def test_recordings_stay_recordings(self):
         self.expect(0, "simulate", "-o", "unit.csv", "--duration-s", 0.1)
         info = self.expect_json(0, "info", "unit.csv")
-        self.assertEqual(info["format"], "openpylivox-csv")
+        self.assertEqual(info["format"], "scan-sequence-csv")
         self.assertIn("--accuracy", self.expect(2, "info", "unit.csv", "--accuracy",
                                                 "flight.smrmsg").stderr)
 
