@@ -174,14 +174,14 @@ void PoseRows::put_in_order() {
   if (order.rows.empty()) return;
   if (told.moved > 0) {
     warn(place_of(told.largest_back_at),
-         fmt::format("{} of {} records stand behind later ones, by up to {:.6f} s: all were put "
-                     "into the order of their times",
+         fmt::format("records behind later ones: {} of {}, by up to {:.6f} s; all were put into "
+                     "the order of their times",
                      told.moved, trajectory_.size(),
                      1e-9 * static_cast<double>(told.largest_back_ns)));
   }
   if (told.repeated > 0) {
     warn(place_of(told.repeated_at),
-         fmt::format("{} records repeat the time of an earlier one and were left out",
+         fmt::format("records that repeat the time of an earlier one: {}; they were left out",
                      told.repeated));
   }
   reorder(wander_, order.rows);

@@ -1,0 +1,117 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "risley/cloud/point_covariance.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "risley/core/error.hpp"
+#include "risley/core/require.hpp"
+
+namespace risley::cloud {
+namespace {
+
+using Eigen::Index;
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+using Lever = Eigen::Matrix<double, 3, 6>;
+
+/// What the six errors of the trajectory do to one point, each times its sigma, and without.
+struct MovedPoint {
+  std::int64_t time_ns = 0, sample = 0;
+  Lever faded, white;
+};
+
+MovedPoint moved_point(const Points& points, const TrajectoryErrors& errors, std::size_t row) {
+  MovedPoint result;
+  result.time_ns = points.time_ns[row];
+  const auto& times = errors.time_ns;
+  if (result.time_ns < times.front() || result.time_ns > times.back()) {
+    throw InvalidArgument(fmt::format(
+        "time_ns of point {} = {}, allowed {} to {}, the times of the trajectory's places", row,
+        result.time_ns, times.front(), times.back()));
+  }
+  const auto later = std::upper_bound(times.begin(), times.end(), result.time_ns);
+  const auto after = std::min(static_cast<std::size_t>(later - times.begin()), times.size() - 1);
+  const std::size_t before = after == 0 ? 0 : after - 1;
+  const double span = static_cast<double>(times[after] - times[before]);
+  const double part =
+      span > 0 ? static_cast<double>(result.time_ns - times[before]) / span : 0.0;
+  const auto between = [part](double a, double b) { return a + part * (b - a); };
+  Vector3d arm(points.x[row], points.y[row], points.z[row]);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    arm[static_cast<Index>(axis)] -=
+        between(errors.position[before][axis], errors.position[after][axis]);
+  }
+  for (std::size_t k = 0; k < 6; ++k) {
+    const auto& of = errors.axes_from_ned[k % 3];
+    Vector3d axis(of[0], of[1], of[2]);
+    if (k == 2) axis = -axis;  // up
+    const auto at = static_cast<Index>(k);
+    const Vector3d moved = k < 3 ? axis : Vector3d(axis.cross(arm));
+    result.faded.col(at) = between(errors.sigma[before][k], errors.sigma[after][k]) * moved;
+    result.white.col(at) = errors.white[k] * moved;
+  }
+  if (errors.sample_interval > 0) {
+    result.sample = static_cast<std::int64_t>(
+        std::floor(1e-9 * static_cast<double>(result.time_ns - errors.first_sample_ns) /
+                   errors.sample_interval));
+  }
+  return result;
+}
+
+}  // namespace
+
+Eigen::MatrixXd joint_covariance(const Points& points, const TrajectoryErrors& errors,
+                                 std::span<const std::size_t> rows) {
+  require_at_least("places of the trajectory", static_cast<long long>(errors.time_ns.size()), 1);
+  require_length("position", errors.position.size(), errors.time_ns.size());
+  require_length("sigma", errors.sigma.size(), errors.time_ns.size());
+  for (const auto& column : points.own_covariance) {
+    require_length("own_covariance", column.size(), points.size());
+  }
+  for (const double time : errors.correlation_time) require_above("correlation_time", time, 0, "s");
+  std::vector<MovedPoint> moved;
+  for (const std::size_t row : rows) {
+    require_place("row", row, points.size());
+    moved.push_back(moved_point(points, errors, row));
+  }
+  const auto n = static_cast<Index>(rows.size());
+  Eigen::MatrixXd joint(3 * n, 3 * n);
+  for (Index i = 0; i < n; ++i) {
+    const auto a = static_cast<std::size_t>(i);
+    for (Index j = i; j < n; ++j) {
+      const auto b = static_cast<std::size_t>(j);
+      const double apart = 1e-9 * std::abs(static_cast<double>(moved[a].time_ns - moved[b].time_ns));
+      Eigen::Matrix<double, 6, 1> faded;
+      for (std::size_t k = 0; k < 6; ++k) {
+        faded[static_cast<Index>(k)] = std::exp(-apart / errors.correlation_time[k]);
+      }
+      Matrix3d block = moved[a].faded * faded.asDiagonal() * moved[b].faded.transpose();
+      if (moved[a].sample == moved[b].sample) {
+        block += moved[a].white * moved[b].white.transpose();
+      }
+      for (const auto& factor : points.loading) {
+        const Vector3d f(factor[0][rows[a]], factor[1][rows[a]], factor[2][rows[a]]);
+        const Vector3d g(factor[0][rows[b]], factor[1][rows[b]], factor[2][rows[b]]);
+        block += f * g.transpose();
+      }
+      if (rows[a] == rows[b]) {
+        const auto& own = points.own_covariance;
+        Matrix3d c;
+        c << own[kXX][rows[a]], own[kXY][rows[a]], own[kXZ][rows[a]],  //
+            own[kXY][rows[a]], own[kYY][rows[a]], own[kYZ][rows[a]],   //
+            own[kXZ][rows[a]], own[kYZ][rows[a]], own[kZZ][rows[a]];
+        block += c;
+      }
+      joint.block<3, 3>(3 * i, 3 * j) = block;
+      joint.block<3, 3>(3 * j, 3 * i) = block.transpose();
+    }
+  }
+  return joint;
+}
+
+}  // namespace risley::cloud
