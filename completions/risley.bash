@@ -42,7 +42,7 @@ _risley() {
       case $verb in
         cloud) choices="las-1.4 las-1.2 ply pcd npy csv xyz netcdf ros1-bag" ;;
         pattern) choices="livox-csv npy helios-xml json usda" ;;
-        *) choices="lvx-1.1 netcdf openpylivox-bin openpylivox-csv scan-sequence-csv" ;;
+        *) choices="lvx-1.1 netcdf openpylivox-bin openpylivox-csv scan-sequence-csv trajectory-csv sbet" ;;
       esac ;;
   esac
   if [ -n "$choices" ]; then
@@ -55,7 +55,7 @@ _risley() {
   if [[ $current == -* ]]; then
     case $verb in
       "") choices="--help --version" ;;
-      info) choices="$common --shot-rate-hz --extrinsics --share --share-ranges" ;;
+      info) choices="$common --shot-rate-hz --extrinsics --share --share-ranges --accuracy" ;;
       identify) choices="$common --output --force --most-prisms --fastest-hz --shot-rate-hz --extrinsics" ;;
       pattern)
         choices="$common --output --format --sensor --duration-s --rate-hz --every --firing
@@ -67,7 +67,7 @@ _risley() {
           *" new "*) choices="$common --output --from" ;;
         esac ;;
       report) choices="$common --output" ;;
-      convert) choices="$common --output --format --sensor-type --shot-rate-hz --extrinsics" ;;
+      convert) choices="$common --output --format --sensor-type --accuracy --shot-rate-hz --extrinsics" ;;
       simulate)
         choices="$common --output --sensor --duration-s --rate-hz --noise-angle-deg
           --noise-range-m --quantize --beam-origin --rotor --set --reported --scene --station

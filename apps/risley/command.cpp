@@ -179,9 +179,9 @@ std::optional<double> noise_angle(const std::optional<double>& noise_angle_deg) 
 
 void note_files(const CLI::App& verb, CommonOptions& common) {
   namespace fs = std::filesystem;
-  static constexpr std::array<std::string_view, 9> kReading = {
+  static constexpr std::array<std::string_view, 10> kReading = {
       "--sensor", "--calibration", "--planes",    "--stations", "--truth",
-      "--scene",  "--plan",        "--recording", "--from"};
+      "--scene",  "--plan",        "--recording", "--from",     "--accuracy"};
   for (const CLI::Option* option : verb.get_options()) {
     for (const std::string& value : option->results()) {
       std::error_code ignored;

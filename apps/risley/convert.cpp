@@ -11,19 +11,22 @@
 
 #include "risley/core/error.hpp"
 #include "risley/jobs/convert_recording.hpp"
+#include "risley/jobs/convert_trajectory.hpp"
 #include "risley/recordings/writer.hpp"
+#include "risley/trajectories/trajectory_file.hpp"
 
 #include "command.hpp"
 #include "many_files.hpp"
 #include "reading_options.hpp"
 #include "recording_text.hpp"
+#include "trajectory_text.hpp"
 
 namespace risley::app {
 namespace {
 
 struct ConvertOptions {
   std::vector<std::string> inputs;
-  std::string output, format, sensor_type;
+  std::string output, format, sensor_type, accuracy;
   ReadingWishes reading;
 };
 
@@ -32,11 +35,16 @@ std::string recording_endings() {
   for (const recordings::WritableFormat& format : recordings::writable_formats()) {
     text += fmt::format("\n  {:<18} {} ({})", format.ending, format.description, format.name);
   }
+  text += "\nor, of a trajectory:";
+  for (const trajectories::WritableTrajectory& format : trajectories::writable_trajectories()) {
+    text += fmt::format("\n  {:<18} {} ({})", format.ending, format.description, format.name);
+  }
   return text;
 }
 
-std::set<std::string> recording_format_names() {
+std::set<std::string> writable_format_names() {
   std::set<std::string> names;
+  for (const auto& format : trajectories::writable_trajectories()) names.insert(format.name);
   for (const auto& format : recordings::writable_formats()) names.insert(format.name);
   return names;
 }
@@ -53,10 +61,40 @@ std::string ending_of(const std::string& format) {
   for (const auto& known : recordings::writable_formats()) {
     if (known.name == format) return known.ending;
   }
-  throw InvalidArgument("several recordings need --format, because -o is a folder");
+  for (const auto& known : trajectories::writable_trajectories()) {
+    if (known.name == format) return known.ending;
+  }
+  throw InvalidArgument("several files need --format, because -o is a folder");
+}
+
+FileOutcome convert_poses(const FileJob& job, const ConvertOptions& options,
+                          const Progress& progress) {
+  if (!options.sensor_type.empty()) {
+    throw InvalidArgument(
+        fmt::format("--sensor-type is for recordings, and {} is a trajectory", job.input));
+  }
+  require_no_reading_options(options.reading, "trajectories");
+  const jobs::ConvertedTrajectory done =
+      jobs::convert_trajectory({job.input, job.output, options.format, options.accuracy}, progress);
+  log_warnings(job.input, done.warnings);
+  for (const std::string& words : done.left_out) spdlog::warn("{}: {}", job.output, words);
+  const Json json = {{"records", done.records},
+                     {"left_out", done.left_out},
+                     {"input_format", done.input_format},
+                     {"input", job.input},
+                     {"output", job.output},
+                     {"warnings", warnings_json(done.warnings)}};
+  return {kDone, json, fmt::format("{}: {} records", job.output, grouped(done.records))};
 }
 
 FileOutcome convert(const FileJob& job, const ConvertOptions& options, const Progress& progress) {
+  if (trajectories::trajectory_file_kind(job.input) != trajectories::TrajectoryFileKind::none) {
+    return convert_poses(job, options, progress);
+  }
+  if (!options.accuracy.empty()) {
+    throw InvalidArgument(
+        fmt::format("--accuracy goes with a trajectory, and {} is none", job.input));
+  }
   jobs::ConvertRecordingOptions wanted{job.input, read_options(options.reading), job.output,
                                        options.format, std::nullopt};
   if (!options.sensor_type.empty()) wanted.sensor_type = sensor_types().at(options.sensor_type);
@@ -91,21 +129,24 @@ FileOutcome convert(const FileJob& job, const ConvertOptions& options, const Pro
 Run declare_convert(CLI::App& verb) {
   const auto options = std::make_shared<ConvertOptions>();
   verb.add_option("INPUT", options->inputs,
-                  "Recordings, of any known format, or patterns such as '*.lvx'")
+                  "Recordings or trajectories, of any known format, or patterns such as '*.lvx'")
       ->required();
   verb.add_option("-o,--output", options->output,
-                  "Recording to write, or a folder for several (made where it is missing); its "
+                  "File to write, or a folder for several (made where it is missing); its "
                   "ending chooses the format:" +
                       recording_endings())
       ->required();
   verb.add_option("--format", options->format,
                   "Format to write, whatever the ending; needed for a folder")
-      ->check(CLI::IsMember(recording_format_names()));
+      ->check(CLI::IsMember(writable_format_names()));
   std::set<std::string> type_names;
   for (const auto& [name, type] : sensor_types()) type_names.insert(name);
   verb.add_option("--sensor-type", options->sensor_type,
                   "Sensor that recorded, where the recording does not tell; LVX needs it")
       ->check(CLI::IsMember(type_names));
+  verb.add_option("--accuracy", options->accuracy,
+                  "Accuracies (SMRMSG) that the records of a trajectory get")
+      ->type_name("FILE");
   add_reading_options(verb, options->reading);
   return [options](const CommonOptions& common) {
     const bool folder = output_is_folder(options->inputs, options->output);

@@ -13,12 +13,15 @@
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
 #include "risley/jobs/inspect_recording.hpp"
+#include "risley/jobs/inspect_trajectory.hpp"
 #include "risley/jobs/recording_input.hpp"
+#include "risley/trajectories/trajectory_file.hpp"
 
 #include "command.hpp"
 #include "reading_options.hpp"
 #include "recording_text.hpp"
 #include "table.hpp"
+#include "trajectory_text.hpp"
 
 namespace risley::app {
 namespace {
@@ -29,7 +32,7 @@ using recordings::TimeAuditResult;
 using recordings::ValueRange;
 
 struct InfoCommandOptions {
-  std::string input, share;
+  std::string input, share, accuracy;
   bool share_ranges = false;
   ReadingWishes reading;
 };
@@ -210,9 +213,33 @@ void print_excerpt(const std::string& path, const Excerpt& excerpt) {
   }
 }
 
+ExitStatus run_trajectory_info(const InfoCommandOptions& options, const CommonOptions& common) {
+  if (!options.share.empty()) throw InvalidArgument("--share is for recordings, not trajectories");
+  require_no_reading_options(options.reading, "trajectories");
+  jobs::InspectedTrajectory found;
+  {
+    ProgressBar bar("reading", common);
+    found = jobs::inspect_trajectory({options.input, options.accuracy}, bar.progress());
+  }
+  log_warnings(options.input, found.warnings);
+  if (common.json) {
+    print_json(common, trajectory_json(found));
+  } else {
+    print_trajectory(found);
+  }
+  return kDone;
+}
+
 ExitStatus run_info(const InfoCommandOptions& options, const CommonOptions& common) {
   if (options.share_ranges && options.share.empty()) {
     throw InvalidArgument("--share-ranges needs --share: it says what an excerpt holds");
+  }
+  const bool is_trajectory =
+      trajectories::trajectory_file_kind(options.input) != trajectories::TrajectoryFileKind::none;
+  if (is_trajectory) return run_trajectory_info(options, common);
+  if (!options.accuracy.empty()) {
+    throw InvalidArgument(
+        fmt::format("--accuracy goes with a trajectory, and {} is none", options.input));
   }
   InspectedRecording found;
   {
@@ -247,7 +274,11 @@ ExitStatus run_info(const InfoCommandOptions& options, const CommonOptions& comm
 
 Run declare_info(CLI::App& verb) {
   const auto options = std::make_shared<InfoCommandOptions>();
-  verb.add_option("INPUT", options->input, "Recording, of any known format")->required();
+  verb.add_option("INPUT", options->input,
+                  "Recording, trajectory or accuracies (SMRMSG), of any known format")
+      ->required();
+  verb.add_option("--accuracy", options->accuracy, "Accuracies of a trajectory (SMRMSG)")
+      ->type_name("FILE");
   verb.add_option("--share", options->share,
                   "Write a small anonymous excerpt that can be sent to the developers (.nc): at "
                   "most a second of the best-covered part, without serial numbers, date, "

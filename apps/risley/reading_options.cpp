@@ -54,6 +54,14 @@ void add_reading_options(CLI::App& verb, ReadingWishes& wishes) {
       ->type_name("YAW,PITCH,ROLL");
 }
 
+void require_no_reading_options(const ReadingWishes& wishes, std::string_view what) {
+  if (wishes.shot_rate_hz || !wishes.extrinsics_deg.empty()) {
+    throw InvalidArgument(fmt::format("{} is for recordings, not {}",
+                                      wishes.shot_rate_hz ? "--shot-rate-hz" : "--extrinsics",
+                                      what));
+  }
+}
+
 recordings::ReadOptions read_options(const ReadingWishes& wishes) {
   recordings::ReadOptions options;
   if (wishes.shot_rate_hz) check_positive(*wishes.shot_rate_hz, "--shot-rate-hz", "Hz");

@@ -4,6 +4,7 @@
 
 #include <optional>
 #include <string>
+#include <string_view>
 
 #include "risley/recordings/reader.hpp"
 
@@ -19,6 +20,10 @@ struct ReadingWishes {
 
 /// Declares --shot-rate-hz and --extrinsics.
 void add_reading_options(CLI::App& verb, ReadingWishes& wishes);
+
+/// @param what  is read instead of recordings, in words
+/// @throws InvalidArgument when any of these options was given
+void require_no_reading_options(const ReadingWishes& wishes, std::string_view what);
 
 /// @throws InvalidArgument naming the option
 recordings::ReadOptions read_options(const ReadingWishes& wishes);

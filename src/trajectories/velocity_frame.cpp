@@ -30,7 +30,7 @@ constexpr std::array kCandidates{
 };
 
 constexpr std::size_t kFewestRecords = 10, kMostSpans = 2000, kMostSteps = 400;
-constexpr double kLongestSpan_ns = 1e9, kSpansOfAll = 5, kGapSteps = 3.5;
+constexpr double kWantedSpan_ns = 1e9, kSpansOfAll = 5, kGapSteps = 3.5;
 
 bool uses_wander(VelocityAxes axes) {
   return axes == VelocityAxes::north_west_up_wander ||
@@ -111,7 +111,7 @@ Comparison compare(const Trajectory& t, const std::vector<double>& wander,
   for (const VelocityAxes axes : tried) result.candidates.emplace_back(axes, Residuals{});
   const std::int64_t step = median_step(t.time_ns);
   const double all_ns = static_cast<double>(t.time_ns.back() - t.time_ns.front());
-  const double wanted = std::min(kLongestSpan_ns, all_ns / kSpansOfAll);
+  const double wanted = std::min(kWantedSpan_ns, all_ns / kSpansOfAll);
   const std::size_t steps = std::clamp<std::size_t>(
       static_cast<std::size_t>(std::llround(wanted / static_cast<double>(step))), 1,
       std::min(kMostSteps, t.size() - 1));

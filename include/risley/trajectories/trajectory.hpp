@@ -80,6 +80,16 @@ struct AngleSpread {
   double least = 0, median = 0, greatest = 0;
 };
 
+/// What had to be done to put rows into the order of their times.
+struct TimeOrder {
+  std::size_t moved = 0;        ///< rows that stood behind a later one
+  std::size_t repeated = 0;     ///< rows left out because an earlier one had the same time
+  std::size_t repeated_at = 0;  ///< the first of these, from 0
+  /// Row, from 0, in front of which the largest step back was, and that step.
+  std::size_t largest_back_at = 0;
+  std::int64_t largest_back_ns = 0;
+};
+
 /// The poses of a moving platform as columns, one row per record, ordered by time. Velocities and
 /// accuracies may be missing as a whole, all other columns have one length.
 struct Trajectory {
@@ -98,6 +108,7 @@ struct Trajectory {
   std::optional<AngleSpread> wander;
   std::optional<VelocityFrame> velocity_frame;  ///< of a file's velocities
   int week_crossings = 0;                       ///< or midnights at which times were made to run on
+  TimeOrder time_order;                         ///< of a file's records
 
   std::size_t size() const { return time_ns.size(); }
 };
@@ -118,16 +129,6 @@ Eigen::Matrix3d ned_axes(Frame frame, const Eigen::Vector3d& position);
 /// @throws InvalidArgument as ned_axes, roll_pitch_heading
 RollPitchHeading roll_pitch_heading(Frame frame, const Eigen::Vector3d& position,
                                     const Eigen::Quaterniond& frame_from_body);
-
-/// What had to be done to put rows into the order of their times.
-struct TimeOrder {
-  std::size_t moved = 0;        ///< rows that stood behind a later one
-  std::size_t repeated = 0;     ///< rows left out because an earlier one had the same time
-  std::size_t repeated_at = 0;  ///< the first of these, from 0
-  /// Row, from 0, in front of which the largest step back was, and that step.
-  std::size_t largest_back_at = 0;
-  std::int64_t largest_back_ns = 0;
-};
 
 /// Puts the rows of all columns into the order of their times; of rows of one time the first stays.
 /// @throws InvalidArgument for columns of different lengths

@@ -162,6 +162,7 @@ void PoseRows::make_times_run_on() {
 void PoseRows::put_in_order() {
   const RowOrder order = row_order(trajectory_.time_ns);
   const TimeOrder& told = order.told;
+  trajectory_.time_order = told;
   if (told.largest_back_ns > kLatest_ns) {
     throw FileError(
         path_, place_of(told.largest_back_at),

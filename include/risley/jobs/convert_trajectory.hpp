@@ -1,0 +1,36 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "risley/core/progress.hpp"
+#include "risley/trajectories/trajectory.hpp"
+
+namespace risley::jobs {
+
+/// What to convert, and into what.
+struct ConvertTrajectoryOptions {
+  std::string trajectory;  ///< path
+  std::string output;      ///< path; its ending chooses the format
+  std::string format;      ///< name of a format to write whatever the ending; empty asks the ending
+  std::string accuracy;    ///< path of accuracies (SMRMSG) that the records get; empty: none
+};
+
+/// What came of it.
+struct ConvertedTrajectory {
+  std::uint64_t records = 0;
+  std::string input_format;
+  std::vector<std::string> left_out;  ///< what the format has no place for, in words
+  std::vector<trajectories::TrajectoryWarning> warnings;  ///< of reading
+};
+
+/// Reads a trajectory in any known format and writes it in another. Stages: reading, writing.
+/// @throws FileError; InvalidArgument for an unknown ending or format and for what it cannot hold;
+///         Cancelled
+ConvertedTrajectory convert_trajectory(const ConvertTrajectoryOptions& options,
+                                       const Progress& progress = {});
+
+}  // namespace risley::jobs

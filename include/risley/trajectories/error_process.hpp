@@ -1,0 +1,109 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "risley/trajectories/trajectory.hpp"
+
+namespace risley::trajectories {
+
+/// Errors of a pose, in this order: of the position along north, east and up, m; rotations of the
+/// body about north, about east and about down, rad. In a local frame north is y and east is x.
+enum class PoseError : std::uint8_t { north, east, up, tilt_north, tilt_east, heading };
+inline constexpr std::size_t kPoseErrors = 6;
+
+using PoseErrorVector = Eigen::Matrix<double, 6, 1>;
+using PoseErrorMatrix = Eigen::Matrix<double, 6, 6>;
+
+/// What is stated of one error: a Gauss-Markov process, whose correlation falls by e within the
+/// correlation time, and a white part, which is constant within each sample of the trajectory.
+struct ErrorTerm {
+  std::optional<double> sigma;  ///< m or rad; without it the accuracies of the trajectory hold
+  double correlation_time = 0;  ///< s, above 0
+  double white = 0;             ///< sigma of the white part, m or rad
+  std::string source;
+};
+
+/// What is stated of all errors.
+struct ErrorModel {
+  std::array<ErrorTerm, kPoseErrors> terms;  ///< by PoseError
+  double sample_interval = 0;                ///< of the white parts, s; above 0 where there are any
+};
+
+/// Correlation times for trajectories of which nobody states any: 120 s for positions and tilts,
+/// 300 s for the heading, as assumptions. No program that makes a trajectory writes them.
+ErrorModel assumed_error_model();
+
+/// Reads
+///
+///     risley_trajectory_errors: 1
+///     sample_interval_s: 0.005               # where there are white parts
+///     north_m:        {sigma: 0.02, correlation_time_s: 120, source: data sheet}
+///     east_m:         ...
+///     up_m:           ...
+///     tilt_north_deg: {sigma: 0.025, correlation_time_s: 120, white: 0.005, source: data sheet}
+///     tilt_east_deg:  ...
+///     heading_deg:    {correlation_time_s: 300, source: assumed}
+///
+/// Without a sigma the accuracies of the trajectory hold. Without white there is none.
+/// @param path  for messages only
+/// @throws FileError with the line for anything else
+ErrorModel parse_error_model(const std::string& text, const std::string& path);
+
+/// parse_error_model of a file. @throws FileError
+ErrorModel load_error_model(const std::string& path);
+
+/// The file of a model; reading it gives the same bits.
+/// @throws InvalidArgument as require_error_model
+std::string error_model_text(const ErrorModel& model);
+
+/// @throws InvalidArgument for sigmas below 0, correlation times that are not above 0, white parts
+///         without a sample interval and what is not finite
+void require_error_model(const ErrorModel& model);
+
+/// Covariances of the errors of a trajectory at any two times:
+///
+///     K(t, u) = s(t) s(u) exp(-|t - u| / correlation time) + [same sample] white^2
+///
+/// for each of the six errors, which are independent of each other. s is the stated sigma, or that
+/// of the trajectory's accuracies, between their records linear and constant beyond the ends. Their
+/// roll and pitch become tilts about north and east by the heading; the correlation that this
+/// leaves between the two where roll and pitch differ is dropped.
+/// docs/theory/trajectories.md
+class ErrorProcess {
+ public:
+  /// @throws InvalidArgument as require_error_model and require_trajectory, and where a sigma is
+  ///         neither stated nor in the trajectory
+  ErrorProcess(const ErrorModel& model, const Trajectory& trajectory);
+
+  /// Standard deviations of the Gauss-Markov parts at a time [6].
+  PoseErrorVector sigmas(std::int64_t time_ns) const;
+  /// Standard deviations of the white parts [6].
+  const PoseErrorVector& white() const { return white_; }
+  /// Correlation times, s [6].
+  const PoseErrorVector& correlation_times() const { return correlation_times_; }
+  /// Number of the trajectory's sample that a time is in, whose white errors it has; 0 everywhere
+  /// where there are no white parts.
+  std::int64_t sample(std::int64_t time_ns) const;
+
+  /// Covariance [6, 6] between the errors at two times.
+  PoseErrorMatrix covariance(std::int64_t time_ns, std::int64_t other_ns) const;
+  /// Covariance [6, 6] at one time.
+  PoseErrorMatrix covariance(std::int64_t time_ns) const { return covariance(time_ns, time_ns); }
+
+ private:
+  std::vector<std::int64_t> time_ns_;    ///< of the sigmas; empty where all are stated
+  std::vector<PoseErrorVector> sigmas_;  ///< of these times; one where all are stated
+  PoseErrorVector correlation_times_, white_;
+  std::int64_t first_ns_ = 0, sample_ns_ = 0;
+};
+
+}  // namespace risley::trajectories

@@ -1,0 +1,42 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "risley/jobs/inspect_trajectory.hpp"
+
+#include "risley/core/error.hpp"
+#include "risley/trajectories/trajectory_file.hpp"
+
+namespace risley::jobs {
+
+InspectedTrajectory inspect_trajectory(const InspectTrajectoryOptions& options,
+                                       const Progress& progress) {
+  using trajectories::TrajectoryFileKind;
+  InspectedTrajectory result;
+  const auto take_accuracies = [&](const std::string& path) {
+    trajectories::AccuracyRecords records =
+        trajectories::load_accuracies(path, progress.stage("reading"));
+    result.accuracies = trajectories::audit_accuracies(records);
+    for (const trajectories::TrajectoryWarning& warning : records.warnings) {
+      result.warnings.push_back(warning);
+    }
+    return records;
+  };
+  if (trajectories::trajectory_file_kind(options.trajectory) == TrajectoryFileKind::accuracies) {
+    if (!options.accuracy.empty()) {
+      throw InvalidArgument("option accuracy: " + options.trajectory +
+                            " holds accuracies itself, expected a trajectory");
+    }
+    take_accuracies(options.trajectory);
+    return result;
+  }
+  result.trajectory = trajectories::load_trajectory(options.trajectory, progress.stage("reading"));
+  if (!options.accuracy.empty()) {
+    trajectories::add_accuracies(*result.trajectory, take_accuracies(options.accuracy),
+                                 options.accuracy);
+  }
+  result.audit = trajectories::audit_trajectory(*result.trajectory, {}, progress.stage("checking"));
+  result.warnings.insert(result.warnings.begin(), result.audit->warnings.begin(),
+                         result.audit->warnings.end());
+  return result;
+}
+
+}  // namespace risley::jobs

@@ -1,0 +1,588 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+// Inertial Explorer, POSPac, OpenMMS, named CSV, TUM and RTKLIB.
+#include <cmath>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "risley/core/angle.hpp"
+#include "risley/core/error.hpp"
+#include "risley/core/random.hpp"
+#include "risley/trajectories/interpolation.hpp"
+#include "risley/trajectories/trajectory_file.hpp"
+
+#include "io/temporary_folder.hpp"
+#include "trajectories/flight.hpp"
+
+namespace risley::trajectories::text_formats_test {
+
+using Eigen::Vector3d;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+const io::TemporaryFolder& folder() {
+  static const io::TemporaryFolder one;
+  return one;
+}
+
+Trajectory read(const std::string& text, const std::string& name = "a.txt") {
+  const std::string path = folder().file(name);
+  write_bytes(path, text);
+  EXPECT_EQ(trajectory_file_kind(path), TrajectoryFileKind::trajectory) << text.substr(0, 300);
+  return load_trajectory(path);
+}
+
+std::string fault(const std::string& text, const std::string& name = "a.txt") {
+  try {
+    const std::string path = folder().file(name);
+    write_bytes(path, text);
+    load_trajectory(path);
+  } catch (const FileError& error) {
+    return error.what();
+  }
+  return {};
+}
+
+std::string replaced(std::string text, const std::string& what, const std::string& by) {
+  const std::size_t at = text.find(what);
+  EXPECT_NE(at, std::string::npos) << what;
+  return text.replace(at, what.size(), by);
+}
+
+/// Rows of the flight by a function of the time.
+std::string rows(int count, const std::function<std::string(double)>& row) {
+  std::string text;
+  for (int i = 0; i < count; ++i) text += row(Flight::kStep * i) + "\n";
+  return text;
+}
+
+void expect_flight(const Trajectory& t, std::size_t records, double position, double angle,
+                   double speed) {
+  const Flight flight;
+  ASSERT_EQ(t.size(), records);
+  EXPECT_EQ(t.frame, Frame::geocentric);
+  for (std::size_t i = 0; i < records; i += 7) {
+    const double time = Flight::kStep * static_cast<double>(i);
+    EXPECT_LT((t.position[i] - flight.position(time)).norm(), position) << i;
+    EXPECT_LT(t.attitude[i].angularDistance(flight.attitude(time)), angle) << i;
+    if (speed > 0) {
+      ASSERT_EQ(t.velocity.size(), records);
+      EXPECT_LT((t.velocity[i] - flight.velocity(time)).norm(), speed) << i;
+    }
+  }
+}
+
+/// Degrees, minutes and seconds as Inertial Explorer writes them.
+std::string sexagesimal(double degrees) {
+  const double size = std::abs(degrees);
+  const int whole = static_cast<int>(size), minutes = static_cast<int>((size - whole) * 60);
+  const double seconds = ((size - whole) * 60 - minutes) * 60;
+  return fmt::format("{}{} {:02d} {:08.5f}", degrees < 0 ? "-" : " ", whole, minutes, seconds);
+}
+
+const std::string kExplorerHead =
+    "Project:     flight\n"
+    "Program:     Inertial Explorer Version 8.60.4609\n"
+    "Profile:     everything\n"
+    "Source:      GNSS/INS Epochs(Smoothed TC Combined)\n"
+    "\n"
+    "Datum:       WGS84, (processing datum)\n"
+    "Master 1:    Name BASE, Status ENABLED\n"
+    "UTC Offset:  18s\n"
+    "SD Scaling Settings:\n"
+    "  Position: 1.0000\n"
+    "  Velocity: 1.0000\n"
+    "  Attitude: 1.0000\n"
+    "\n";
+
+std::string explorer_text(int count, bool sexagesimal_places) {
+  const Flight flight;
+  std::string text = kExplorerHead;
+  text +=
+      "  GPSTime      Latitude       Longitude     H-Ell  VEast VNorth  VUp  SDNorth SDEast "
+      "SDHeight  Roll  RollSD  Pitch PitchSD Heading HdngSD Q\n";
+  text += fmt::format(
+      "    (sec)   {0}    {0}      (m)  (m/s)  (m/s) (m/s)   (m)   (m)   (m) (deg) "
+      "(deg) (deg) (deg) (deg) (deg)\n",
+      sexagesimal_places ? "(+/-D M S)" : "(Deg)");
+  text.back() = ' ';
+  text += "(none)\n\n";
+  text += rows(count, [&](double t) {
+    const Geodetic place = flight.place(t);
+    const double latitude = degrees_from_radians(place.latitude);
+    const double longitude = degrees_from_radians(place.longitude);
+    const RollPitchHeading angles = flight.angles(t);
+    const Vector3d v = flight.velocity_ned(t);
+    return fmt::format(
+        "{:.4f} {} {} {:.4f} {:.4f} {:.4f} {:.4f} 0.011 0.012 0.023 {:.8f} 0.004 {:.8f} 0.005 "
+        "{:.8f} 0.021 1",
+        Flight::kBegin + t,
+        sexagesimal_places ? sexagesimal(latitude) : fmt::format("{:.10f}", latitude),
+        sexagesimal_places ? sexagesimal(longitude) : fmt::format("{:.10f}", longitude),
+        place.height, v.y(), v.x(), -v.z(), degrees_from_radians(angles.roll),
+        degrees_from_radians(angles.pitch), degrees_from_radians(angles.heading));
+  });
+  return text;
+}
+
+TEST(InertialExplorer, ColumnsAreFoundByNamesAndUnits) {
+  for (const bool sexagesimal_places : {false, true}) {
+    const Trajectory t = read(explorer_text(300, sexagesimal_places));
+    EXPECT_EQ(t.format, "inertial-explorer");
+    EXPECT_EQ(t.time_scale, TimeScale::gps_second_of_week);
+    EXPECT_THAT(t.warnings, IsEmpty());
+    expect_flight(t, 300, 3e-4, 1e-9, 1e-4);
+    EXPECT_EQ(t.velocity_frame->name, "east-north-up");
+    EXPECT_LT(t.velocity_frame->residual->norm(), 2e-3);
+    ASSERT_EQ(t.accuracy.size(), 300U);
+    EXPECT_EQ(t.accuracy[5].position, Vector3d(0.011, 0.012, 0.023));
+    EXPECT_NEAR(degrees_from_radians(t.accuracy[5].roll), 0.004, 1e-12);
+    EXPECT_NEAR(degrees_from_radians(t.accuracy[5].pitch), 0.005, 1e-12);
+    EXPECT_NEAR(degrees_from_radians(t.accuracy[5].heading), 0.021, 1e-12);
+  }
+}
+
+TEST(InertialExplorer, HeadersOfAnyLength) {
+  const std::string text = explorer_text(60, false);
+  expect_flight(read(text.substr(text.find("  GPSTime"))), 60, 3e-4, 1e-9, 1e-4);
+  expect_flight(read("\n\nRemote: one\n" + text), 60, 3e-4, 1e-9, 1e-4);
+}
+
+TEST(InertialExplorer, ScaledStandardDeviationsAreDividedAgain) {
+  std::string text = replaced(explorer_text(60, false), "Position: 1.0000", "Position: 2.0000");
+  text = replaced(text, "Attitude: 1.0000", "Attitude: No scaling (1-sigma)");
+  Trajectory t = read(text);
+  EXPECT_DOUBLE_EQ(t.accuracy[0].position.x(), 0.0055);
+  EXPECT_NEAR(degrees_from_radians(t.accuracy[0].heading), 0.021, 1e-12);
+  ASSERT_EQ(t.warnings.size(), 1U);
+  EXPECT_THAT(t.warnings[0].message, HasSubstr("position were written 2 times as large"));
+  EXPECT_EQ(t.warnings[0].place.line, 10U);
+  t = read(replaced(text, "Position: 2.0000", "Position: 95 percent"));
+  EXPECT_THAT(t.warnings[0].message, HasSubstr("95 times"));  // a number is a number
+  t = read(replaced(text, "Position: 2.0000", "Position: twice"));
+  EXPECT_THAT(t.warnings[0].message, HasSubstr("is no scaling"));
+}
+
+TEST(InertialExplorer, MistakesAreNamed) {
+  const std::string text = explorer_text(20, false);
+  EXPECT_THAT(
+      fault(replaced(text, "H-Ell", "H-MSL")),
+      AllOf(HasSubstr("line 14"), HasSubstr("column H-Ell is missing"), HasSubstr("geoid")));
+  EXPECT_THAT(fault(replaced(text, "GPSTime", "UTCDate")), HasSubstr("column GPSTime is missing"));
+  EXPECT_THAT(fault(replaced(text, "(sec)", "(HMS)")),
+              AllOf(HasSubstr("line 15"), HasSubstr("column gpstime has the unit (hms)")));
+  EXPECT_THAT(fault(replaced(text, "(none)", "")),
+              HasSubstr("names 17 columns, and the line below"));
+  EXPECT_THAT(fault(replaced(text, "0.004 ", "nan ")),
+              AllOf(HasSubstr("line 17"), HasSubstr("expected a finite number in column rollsd")));
+  EXPECT_THAT(fault(replaced(text, " 0.004 ", " -0.004 ")),
+              AllOf(HasSubstr("line 17"), HasSubstr("accuracy of the attitude")));
+  EXPECT_THAT(fault(replaced(text, " 0.011 ", " 0.011 5 ")),
+              HasSubstr("expected 17 fields, found 18"));
+  EXPECT_THAT(fault(kExplorerHead), HasSubstr("no line of names of columns"));
+  const std::string places = replaced(explorer_text(20, true), "37 ", "37 75 ");
+  EXPECT_THAT(fault(places), HasSubstr("line 17"));
+}
+
+TEST(InertialExplorer, TextBehindTheRecordsAndCutLines) {
+  const std::string text = explorer_text(20, false);
+  Trajectory t = read(text + "\nProcessing summary\n  3 passes\n");
+  EXPECT_EQ(t.size(), 20U);
+  ASSERT_EQ(t.warnings.size(), 1U);
+  EXPECT_THAT(t.warnings[0].message, HasSubstr("text behind the records"));
+  t = read(text.substr(0, text.size() - 9));
+  EXPECT_EQ(t.size(), 19U);
+  EXPECT_THAT(t.warnings[0].message, HasSubstr("cut off"));
+}
+
+const std::string kPospacHead =
+    "POSPac Export Utility\n"
+    " Mapping frame datum: WGS84  ; Mapping frame projection : TM;\n"
+    " TIME, DISTANCE, EASTING, NORTHING, ELLIPSOID HEIGHT, LATITUDE, LONGITUDE, ELLIPSOID HEIGHT, "
+    "ROLL, PITCH, HEADING, EAST VELOCITY, NORTH VELOCITY, UP VELOCITY, EAST SD, NORTH SD, HEIGHT "
+    "SD, ROLL SD, PITCH SD, HEADING SD\n"
+    "\n"
+    "  (time in Sec, distance in Meters, position in Meters, lat, long in Degrees, orientation "
+    "angles and SD in Degrees, velocity in Meter/Sec, position SD in Meters)  \n"
+    "\n";
+
+std::string pospac_text(int count) {
+  const Flight flight;
+  return kPospacHead + rows(count, [&](double t) {
+           const Geodetic place = flight.place(t);
+           const RollPitchHeading angles = flight.angles(t);
+           const Vector3d v = flight.velocity_ned(t);
+           return fmt::format(
+               "{:.4f} 0.000 500000.0 4190000.0 {:.4f} {:.10f} {:.10f} {:.4f} {:.8f} {:.8f} {:.8f} "
+               "{:.5f} {:.5f} {:.5f} 0.012 0.011 0.023 0.004 0.005 0.021",
+               Flight::kBegin + t, place.height, degrees_from_radians(place.latitude),
+               degrees_from_radians(place.longitude), place.height,
+               degrees_from_radians(angles.roll), degrees_from_radians(angles.pitch),
+               degrees_from_radians(angles.heading), v.y(), v.x(), -v.z());
+         });
+}
+
+TEST(Pospac, ColumnsAreFoundByTheirNames) {
+  Trajectory t = read(pospac_text(300));
+  EXPECT_EQ(t.format, "pospac");
+  EXPECT_THAT(t.warnings, IsEmpty());
+  expect_flight(t, 300, 3e-4, 1e-9, 1e-4);
+  EXPECT_EQ(t.accuracy[5].position, Vector3d(0.011, 0.012, 0.023));
+  EXPECT_NEAR(degrees_from_radians(t.accuracy[5].heading), 0.021, 1e-12);
+  t = read(
+      replaced(pospac_text(30), "angles and SD in Degrees", "angles in Degrees, SD in ArcMin"));
+  EXPECT_NEAR(degrees_from_radians(t.accuracy[5].heading), 0.021 / 60, 1e-12);
+  t = read(replaced(pospac_text(30), "angles and SD in Degrees", "angles in Degrees"));
+  EXPECT_THAT(t.warnings[0].message, HasSubstr("degrees are assumed"));
+}
+
+TEST(Pospac, MistakesAreNamed) {
+  EXPECT_THAT(fault(replaced(pospac_text(20), "LONGITUDE", "ZONE")),
+              HasSubstr("column LONGITUDE is missing"));
+  EXPECT_THAT(fault(kPospacHead), HasSubstr("holds no record"));
+}
+
+std::string openmms_text(int count, bool real_time = false) {
+  const Flight flight;
+  const std::string head =
+      real_time ? "\n"
+                : "UTM North,Zone 13,WGS84,WGS 84,2020.5,0,0,0,0,0,0,1,2,3,0,0,0,0,0,0,0,0,0\n";
+  return head + rows(count, [&](double t) {
+           const Geodetic place = flight.place(t);
+           const RollPitchHeading angles = flight.angles(t);
+           const Vector3d v = real_time ? Vector3d(0, 0, 0) : flight.velocity_ned(t);
+           return fmt::format(
+               "{:.6f},{:.8f},{:.8f},{:.4f},-21.500,{:.4f},{:.4f},{:.4f},0.100,0.200,9.800,1.000,"
+               "{:.2f},{:.2f},{:.2f}",
+               40000 + t, degrees_from_radians(place.latitude),
+               degrees_from_radians(place.longitude), place.height,
+               degrees_from_radians(angles.roll), degrees_from_radians(angles.pitch),
+               degrees_from_radians(angles.heading), v.y(), v.x(), -v.z());
+         });
+}
+
+TEST(Openmms, FifteenColumnsInUtc) {
+  Trajectory t = read(openmms_text(400));
+  EXPECT_EQ(t.format, "openmms");
+  EXPECT_EQ(t.time_scale, TimeScale::utc_second_of_day);
+  EXPECT_EQ(t.time_ns[1], 40000'005'000'000);
+  EXPECT_THAT(t.accuracy, IsEmpty());
+  EXPECT_THAT(t.warnings, IsEmpty());
+  expect_flight(t, 400, 1.5e-3, 2e-6, 0.01);  // 1e-8 degree, 1e-4 degree
+  t = read(openmms_text(400, true));
+  EXPECT_EQ(t.velocity_frame->name, "undecided");
+  EXPECT_THAT(t.velocity, IsEmpty());
+}
+
+TEST(Openmms, MidnightMayPass) {
+  const Flight flight;
+  std::string text = openmms_text(400);
+  std::string shifted;
+  std::size_t i = 0;
+  for (std::size_t at = text.find('\n') + 1; at < text.size(); ++i) {
+    const std::size_t comma = text.find(',', at), end = text.find('\n', at);
+    const double time = 86399 + 0.005 * static_cast<double>(i);
+    shifted += fmt::format("{:.6f}", time >= 86400 ? time - 86400 : time) +
+               text.substr(comma, end + 1 - comma);
+    at = end + 1;
+  }
+  const Trajectory t = read(shifted);
+  EXPECT_EQ(t.week_crossings, 1);
+  EXPECT_THAT(t.warnings[0].message, HasSubstr("the day (86400 s) ends"));
+  EXPECT_EQ(t.time_ns.back() - t.time_ns.front(), 399 * 5'000'000);
+}
+
+const std::string kCsvHead =
+    "gps_second_of_week_s,latitude_deg,longitude_deg,ellipsoidal_height_m,roll_deg,pitch_deg,"
+    "heading_deg,velocity_north_m_per_s,velocity_east_m_per_s,velocity_up_m_per_s";
+
+std::string csv_text(int count, const std::string& head = kCsvHead) {
+  const Flight flight;
+  return head + "\n" + rows(count, [&](double t) {
+           const Geodetic place = flight.place(t);
+           const RollPitchHeading angles = flight.angles(t);
+           const Vector3d v = flight.velocity_ned(t);
+           return fmt::format(
+               "{:.4f},{:.12f},{:.12f},{:.6f},{:.9f},{:.9f},{:.9f},{:.6f},{:.6f},{:.6f}",
+               Flight::kBegin + t, degrees_from_radians(place.latitude),
+               degrees_from_radians(place.longitude), place.height,
+               degrees_from_radians(angles.roll), degrees_from_radians(angles.pitch),
+               degrees_from_radians(angles.heading), v.x(), v.y(), -v.z());
+         });
+}
+
+TEST(TrajectoryCsv, ColumnsAreFoundByTheirNames) {
+  const Trajectory t = read(csv_text(300), "a.csv");
+  EXPECT_EQ(t.format, "trajectory-csv");
+  EXPECT_EQ(t.time_scale, TimeScale::gps_second_of_week);
+  expect_flight(t, 300, 1e-6, 1e-10, 1e-5);
+  EXPECT_EQ(t.velocity_frame->name, "north-east-down");
+}
+
+TEST(TrajectoryCsv, NamesOfTimesSayTheirScale) {
+  for (const auto& [name, scale] : {std::pair{"time_s", TimeScale::unknown},
+                                    {"utc_second_of_day_s", TimeScale::utc_second_of_day},
+                                    {"gps_s", TimeScale::gps},
+                                    {"adjusted_gps_s", TimeScale::adjusted_gps},
+                                    {"utc_unix_s", TimeScale::utc_unix}}) {
+    const Trajectory t =
+        read(csv_text(3, replaced(kCsvHead, "gps_second_of_week_s", name)), "a.csv");
+    EXPECT_EQ(t.time_scale, scale);
+    EXPECT_EQ(t.time_ns[1], 400825'005'000'000);
+  }
+  const Trajectory t = read(
+      "utc_unix_ns,x_m,y_m,z_m,qx,qy,qz,qw\n"
+      "1700000000123456789,1,2,3,0,0,0,1\n"
+      "1700000000223456789,1,2,3,0,0,0,1\n",
+      "a.csv");
+  EXPECT_EQ(t.time_ns[0], 1'700'000'000'123'456'789);
+}
+
+TEST(TrajectoryCsv, WeeksGoAlong) {
+  const Trajectory t = read(
+      "gps_week,gps_second_of_week_s,latitude_deg,longitude_deg,"
+      "ellipsoidal_height_m,roll_deg,pitch_deg,heading_deg\n"
+      "2200,604799.5,1,2,3,0,0,0\n2201,0.5,1,2,3,0,0,0\n",
+      "a.csv");
+  EXPECT_EQ(t.gps_week, 2200);
+  EXPECT_EQ(t.time_ns[1] - t.time_ns[0], 1'000'000'000);
+  EXPECT_EQ(t.week_crossings, 0);
+}
+
+TEST(TrajectoryCsv, WrongNamesGetANearOne) {
+  const auto refused = [](const std::string& what, const std::string& by) {
+    return fault(replaced(csv_text(3), what, by), "a.csv");
+  };
+  EXPECT_THAT(refused("latitude_deg", "lattitude_deg"),
+              AllOf(HasSubstr("line 1"), HasSubstr("did you mean latitude_deg?")));
+  EXPECT_THAT(refused("latitude_deg", "latitude"), HasSubstr("did you mean latitude_deg?"));
+  EXPECT_THAT(refused("ellipsoidal_height_m", "ellipsoidal_height"),
+              HasSubstr("did you mean ellipsoidal_height_m?"));
+  EXPECT_THAT(refused("heading_deg", "colour"), HasSubstr("column heading_deg is missing"));
+  EXPECT_THAT(refused("gps_second_of_week_s", "hour"), HasSubstr("no column of times"));
+  EXPECT_THAT(refused("pitch_deg", "roll_rad"),
+              HasSubstr("column roll_rad says again what roll_deg"));
+  const Trajectory t = read(replaced(csv_text(3), "velocity_up_m_per_s", "temperature"), "a.csv");
+  EXPECT_THAT(t.velocity, IsEmpty());
+  ASSERT_EQ(t.warnings.size(), 2U);
+  EXPECT_THAT(t.warnings[0].message, HasSubstr("velocities are there in part"));
+  EXPECT_THAT(t.warnings[1].message, HasSubstr("column temperature is not read"));
+}
+
+TEST(TrajectoryCsv, ValuesThatNoPlatformHasAreRefusedAtTheirLine) {
+  const std::string text = csv_text(20);
+  const std::size_t row = text.find("400825.0250");
+  const auto with = [&](const std::string& line) {
+    return fault(text.substr(0, row) + line + text.substr(text.find('\n', row)), "a.csv");
+  };
+  EXPECT_THAT(with("400825.025,91,1,1,1,1,1,1,1,1"),
+              AllOf(HasSubstr("line 7"), HasSubstr("latitude = 91 deg, allowed -90")));
+  EXPECT_THAT(with("400825.025,1,1,nan,1,1,1,1,1,1"), HasSubstr("column ellipsoidal_height_m"));
+  EXPECT_THAT(with("400825.025,1,1,1e9,1,1,1,1,1,1"), HasSubstr("ellipsoidal height = 1"));
+  EXPECT_THAT(with("400825.025,1,1,1,1,95,1,1,1,1"), HasSubstr("pitch = "));
+  EXPECT_THAT(with("400825.025,1,1,1,1,5,1,1,1"), HasSubstr("expected 10 fields, found 9"));
+  EXPECT_THAT(with("1e300,1,1,1,1,5,1,1,1,1"), HasSubstr("expected a time"));
+  EXPECT_THAT(with(""), HasSubstr("a row behind the empty line 7"));
+  EXPECT_THAT(with("400823.9,1,1,1,1,5,1,1,1,1"), HasSubstr("time runs back by 1.12"));
+}
+
+TEST(TrajectoryCsv, StatedVelocitiesThatDoNotFitAreNamed) {
+  std::string head = replaced(kCsvHead, "velocity_north", "velocity_east");
+  head =
+      replaced(head, "velocity_east_m_per_s,velocity_east", "velocity_east_m_per_s,velocity_north");
+  head = replaced(head, "velocity_up", "velocity_down");
+  const Trajectory t = read(csv_text(400, head), "a.csv");
+  EXPECT_EQ(t.velocity.size(), 400U);
+  ASSERT_EQ(t.warnings.size(), 1U);
+  EXPECT_THAT(t.warnings[0].message, AllOf(HasSubstr("stated as north-east-down and differ"),
+                                           HasSubstr("as east-north-up they")));
+}
+
+TEST(TrajectoryCsv, ACutLastLineIsLeftOut) {
+  const std::string text = csv_text(20);
+  for (std::size_t cut = 1; cut < 60; ++cut) {
+    const Trajectory t = read(text.substr(0, text.size() - 1 - cut), "a.csv");
+    EXPECT_EQ(t.size(), 19U) << cut;
+    EXPECT_THAT(t.warnings[0].message, HasSubstr("cut off")) << cut;
+  }
+  EXPECT_EQ(read(text.substr(0, text.size() - 1), "a.csv").size(), 20U);
+}
+
+void expect_same_bits(const Trajectory& a, const Trajectory& b) {
+  EXPECT_EQ(a.time_ns, b.time_ns);
+  EXPECT_EQ(a.position, b.position);
+  EXPECT_EQ(a.velocity, b.velocity);
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    EXPECT_EQ(a.attitude[i].coeffs(), b.attitude[i].coeffs());
+  }
+}
+
+TEST(TrajectoryCsv, LocalPosesComeBackToTheLastBit) {
+  const RandomStream random(3, 4);
+  Trajectory t;
+  t.frame = Frame::local;
+  t.time_scale = TimeScale::utc_unix;
+  for (std::uint64_t i = 0; i < 500; ++i) {
+    t.time_ns.push_back(1'700'000'000'000'000'000 + static_cast<std::int64_t>(7'654'321 * i));
+    const auto vector = [&](std::uint64_t first) {
+      return Vector3d(random.normal(first), random.normal(first + 1), random.normal(first + 2));
+    };
+    t.position.emplace_back(100 * vector(20 * i));
+    t.velocity.emplace_back(vector(20 * i + 3));
+    t.attitude.push_back(Eigen::Quaterniond(random.normal(20 * i + 9), random.normal(20 * i + 6),
+                                            random.normal(20 * i + 7), random.normal(20 * i + 8))
+                             .normalized());
+  }
+  const std::string path = folder().file("local.csv");
+  EXPECT_THAT(write_trajectory(path, t), IsEmpty());
+  const Trajectory again = load_trajectory(path);
+  expect_same_bits(again, t);
+  EXPECT_EQ(again.time_scale, TimeScale::utc_unix);
+}
+
+TEST(TrajectoryCsv, PlacesComeBackToTheNanometre) {
+  Trajectory t = trajectory_of(Flight(), 300);
+  t.gps_week = 2214;
+  t.accuracy.resize(300);
+  for (PoseAccuracy& accuracy : t.accuracy) accuracy = {{0.011, 0.012, 0.023}, 1e-4, 2e-4, 3e-4};
+  const std::string path = folder().file("places.csv");
+  write_trajectory(path, t);
+  const Trajectory again = load_trajectory(path);
+  EXPECT_EQ(again.time_ns, t.time_ns);
+  EXPECT_EQ(again.gps_week, 2214);
+  expect_flight(again, 300, 2e-9, 1e-14, 1e-12);
+  EXPECT_EQ(again.accuracy[0].position, t.accuracy[0].position);
+  EXPECT_NEAR(again.accuracy[0].heading, 3e-4, 1e-18);
+}
+
+TEST(TrajectoryCsv, OutputsAreWholeOrNotThere) {
+  Trajectory t = trajectory_of(Flight(), 3);
+  t.time_scale = TimeScale::utc_unix;
+  const std::string path = folder().file("refused.sbet");
+  EXPECT_THROW(write_trajectory(path, t), InvalidArgument);
+  t = trajectory_of(Flight(), 3);
+  t.frame = Frame::local;
+  EXPECT_THROW(write_trajectory(path, t), InvalidArgument);
+  EXPECT_EQ(trajectory_file_kind(path), TrajectoryFileKind::none);
+  EXPECT_THROW(write_trajectory(folder().file("no/folder/a.csv"), t), FileError);
+}
+
+const std::string kTum =
+    "# timestamp tx ty tz qx qy qz qw\n"
+    "1305031102.1753 1.0 2.0 3.0 0.0 0.0 0.0 1.0\n"
+    "1305031102.2753 1.1 2.0 3.0 0.0 0.0 0.7071 0.7071\n"
+    "1305031102.3753 1.2 2.0 3.0 0.0 0.0 1.0 0.0\n";
+
+TEST(Tum, BodiesAreForwardLeftUp) {
+  const Trajectory t = read(kTum);
+  EXPECT_EQ(t.format, "tum");
+  EXPECT_EQ(t.frame, Frame::local);
+  EXPECT_EQ(t.time_scale, TimeScale::utc_unix);
+  ASSERT_EQ(t.size(), 3U);
+  EXPECT_EQ(t.position[1], Vector3d(1.1, 2, 3));
+  // The nose looks along x, then along y; down of the body is -z of the map.
+  EXPECT_LT((t.attitude[0] * Vector3d(1, 0, 0) - Vector3d(1, 0, 0)).norm(), 1e-15);
+  EXPECT_LT((t.attitude[0] * Vector3d(0, 0, 1) - Vector3d(0, 0, -1)).norm(), 1e-15);
+  EXPECT_LT((t.attitude[1] * Vector3d(1, 0, 0) - Vector3d(0, 1, 0)).norm(), 1e-15);
+  EXPECT_NEAR(t.attitude[1].norm(), 1, 1e-15);
+  EXPECT_EQ(t.velocity_frame->name, "none");
+  EXPECT_EQ(read("0.1 1 2 3 0 0 0 1\n0.2 1 2 3 0 0 0 1\n").time_scale, TimeScale::unknown);
+}
+
+TEST(Tum, WhatIsNoRotationIsRefused) {
+  EXPECT_THAT(
+      fault(kTum + "1305031102.4753 1.2 2.0 3.0 0.0 0.0 1.0 1.0\n"),
+      AllOf(HasSubstr("line 5"), HasSubstr("quaternion of length 1, found length 1.41421")));
+  EXPECT_THAT(fault(kTum + "1305031102.4753 1e9 2.0 3.0 0.0 0.0 1.0 0.0\n"), HasSubstr("position"));
+}
+
+TEST(Rtklib, IsRefusedBecauseItHasNoAttitude) {
+  const std::string text =
+      "% program   : RTKPOST ver.2.4.2\n"
+      "%  GPST                  latitude(deg) longitude(deg)  height(m)   Q  ns\n"
+      "2022/02/07 00:00:00.000   40.063710326  -105.222420012  1565.0000   1  12\n";
+  EXPECT_THAT(fault(text, "a.pos"), AllOf(HasSubstr("a.pos"), HasSubstr("RTKLIB"),
+                                          HasSubstr("neither roll nor pitch nor heading")));
+}
+
+TEST(TextFormats, EveryBeginningOfAFileIsReadOrRefused) {
+  for (const std::string& text :
+       {explorer_text(3, true), pospac_text(3), openmms_text(3), csv_text(3), kTum}) {
+    const std::size_t whole = load_trajectory([&] {
+                                const std::string path = folder().file("whole.txt");
+                                write_bytes(path, text);
+                                return path;
+                              }())
+                                  .size();
+    for (std::size_t size = 0; size < text.size(); ++size) {
+      const std::string path = folder().file("beginning.txt");
+      write_bytes(path, text.substr(0, size));
+      try {
+        const Trajectory t = load_trajectory(path);
+        EXPECT_LE(t.size(), whole);
+        require_trajectory(t);
+      } catch (const FileError&) {
+        continue;
+      }
+    }
+  }
+}
+
+TEST(TextFormats, ChangedBytesAreReadOrRefused) {
+  const RandomStream random(11, 1);
+  std::uint64_t draw = 0;
+  for (const std::string& text :
+       {explorer_text(3, true), pospac_text(3), openmms_text(3), csv_text(3), kTum}) {
+    for (int i = 0; i < 100; ++i) {
+      std::string changed = text;
+      for (int k = 0; k < 3; ++k) {
+        const auto at =
+            static_cast<std::size_t>(random.uniform(draw++) * static_cast<double>(text.size()));
+        changed[at] = static_cast<char>(static_cast<int>(256 * random.uniform(draw++)));
+      }
+      const std::string path = folder().file("changed.txt");
+      write_bytes(path, changed);
+      try {
+        require_trajectory(load_trajectory(path));
+      } catch (const FileError&) {
+        continue;
+      }
+    }
+  }
+}
+
+TEST(TextFormats, OtherTextsAreNoTrajectory) {
+  for (const std::string& text :
+       {std::string("hello\n"), std::string("a,b,c\n1,2,3\n"), std::string("1 2 3\n"),
+        std::string("time_s,x,y,z,intensity\n0,1,2,3,4\n"), std::string("\n\n\n"),
+        std::string("1,2,3,4,5,6,7,8\n")}) {
+    const std::string path = folder().file("other.csv");
+    write_bytes(path, text);
+    EXPECT_EQ(trajectory_file_kind(path), TrajectoryFileKind::none) << text;
+    EXPECT_THAT(fault(text, "other.csv"), HasSubstr("is no trajectory of a known kind")) << text;
+  }
+  EXPECT_EQ(trajectory_file_kind(folder().file("missing")), TrajectoryFileKind::none);
+  EXPECT_THROW(load_trajectory(folder().file("missing")), FileError);
+  EXPECT_THROW(load_trajectory(folder().path().string()), FileError);
+}
+
+TEST(TextFormats, UnknownEndingsListTheKnownOnes) {
+  const Trajectory t = trajectory_of(Flight(), 3);
+  try {
+    write_trajectory(folder().file("a.xyz"), t);
+    FAIL();
+  } catch (const InvalidArgument& error) {
+    EXPECT_THAT(error.what(), HasSubstr("unknown ending, allowed .csv, .sbet"));
+  }
+  EXPECT_THROW(write_trajectory(folder().file("a.csv"), t, "tum"), InvalidArgument);
+  EXPECT_THROW(write_trajectory(folder().file("a.csv"), {}), InvalidArgument);
+  EXPECT_EQ(writable_trajectories().size(), 2U);
+}
+
+}  // namespace risley::trajectories::text_formats_test
