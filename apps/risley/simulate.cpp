@@ -1,7 +1,13 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
 #include <memory>
 #include <optional>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
@@ -10,6 +16,10 @@
 #include "risley/core/error.hpp"
 #include "risley/sensors/preset.hpp"
 #include "risley/simulation/truth_file.hpp"
+#include "risley/trajectories/error_process.hpp"
+#include "risley/trajectories/flight_plan.hpp"
+#include "risley/trajectories/mount.hpp"
+#include "risley/trajectories/trajectory_file.hpp"
 
 #include "command.hpp"
 #include "parameter_text.hpp"
@@ -21,9 +31,10 @@ namespace {
 
 struct SimulateOptions {
   std::string output, sensor = "mid-40", quantize = "yes", beam_origin = "yes", rotor = "constant",
-                      scene, station;
-  double duration_s = 1.0;
-  std::optional<double> rate_hz, noise_angle_deg, noise_range_m;
+                      scene, station, trajectory, flight, mount, trajectory_errors,
+                      trajectory_format = "csv";
+  std::optional<double> duration_s, start_s, clock_drift_ppm, rate_hz, noise_angle_deg,
+      noise_range_m;
   std::vector<std::string> assignments, reported;
   std::vector<double> start_angles_deg;
 };
@@ -37,9 +48,63 @@ void assign(sensors::Sensor& sensor, const std::string& text) {
   sensor.set(name, value);
 }
 
+/// What moves the sensor, of a trajectory or a flight plan and a mount; nothing where it stands.
+std::optional<simulation::Platform> platform_from(const SimulateOptions& options,
+                                                  const simulation::SimulationSettings& settings) {
+  const bool moves = !options.trajectory.empty() || !options.flight.empty();
+  if (!moves) {
+    const std::pair<bool, const char*> only_moving[] = {
+        {!options.mount.empty(), "--mount"},
+        {!options.trajectory_errors.empty(), "--trajectory-errors"},
+        {options.clock_drift_ppm.has_value(), "--clock-drift-ppm"},
+        {options.start_s.has_value(), "--start-s"},
+    };
+    for (const auto& [given, flag] : only_moving) {
+      if (given) throw InvalidArgument(fmt::format("{} needs --trajectory or --flight", flag));
+    }
+    return std::nullopt;
+  }
+  if (options.mount.empty()) {
+    throw InvalidArgument(
+        "--mount is missing: how the sensor sits on what moves along the trajectory");
+  }
+  if (options.scene.empty()) {
+    throw InvalidArgument(
+        "--scene is missing: what the moving sensor meets, for example a "
+        "terrain");
+  }
+  simulation::Platform platform;
+  if (!options.flight.empty()) {
+    const trajectories::FlightPlan plan = trajectories::load_flight_plan(options.flight);
+    trajectories::Flight flight = trajectories::fly(plan);
+    platform.trajectory = std::make_shared<trajectories::Trajectory>(std::move(flight.trajectory));
+    platform.strips = std::move(flight.strips);
+    const auto& terrain = settings.scene->terrain;
+    if (!terrain || !terrain->parts().origin) platform.map_origin = plan.origin;
+  } else {
+    platform.trajectory = std::make_shared<trajectories::Trajectory>(
+        trajectories::load_trajectory(options.trajectory));
+  }
+  platform.mount = trajectories::load_mount(options.mount);
+  platform.clock_drift = 1e-6 * options.clock_drift_ppm.value_or(0.0);
+  if (options.start_s) {
+    check_not_negative(*options.start_s, "--start-s", "s");
+    if (*options.start_s > 1e9) {
+      throw InvalidArgument(fmt::format("--start-s = {:g} s, allowed 0 to 1e9", *options.start_s));
+    }
+    platform.begin_ns = platform.trajectory->time_ns.front() +
+                        static_cast<std::int64_t>(std::llround(1e9 * *options.start_s));
+  }
+  if (!options.trajectory_errors.empty()) {
+    platform.errors = trajectories::load_error_model(options.trajectory_errors);
+  }
+  platform.trajectory_ending = "." + options.trajectory_format;
+  return platform;
+}
+
 simulation::SimulationSettings settings_from(const SimulateOptions& options,
                                              const CommonOptions& common) {
-  check_positive(options.duration_s, "--duration-s", "s");
+  if (options.duration_s) check_positive(*options.duration_s, "--duration-s", "s");
   if (options.rate_hz) check_positive(*options.rate_hz, "--rate-hz", "Hz");
   if (options.noise_angle_deg) {
     check_not_negative(*options.noise_angle_deg, "--noise-angle-deg", "deg");
@@ -59,7 +124,6 @@ simulation::SimulationSettings settings_from(const SimulateOptions& options,
       }
     }
   }
-  settings.duration = options.duration_s;
   settings.rate = options.rate_hz;
   if (options.noise_angle_deg) {
     settings.angle_noise = radians_from_degrees(*options.noise_angle_deg);
@@ -72,10 +136,17 @@ simulation::SimulationSettings settings_from(const SimulateOptions& options,
   }
   if (!options.scene.empty()) settings.scene = scenes::load_scene(options.scene);
   settings.station = options.station;
+  settings.platform = platform_from(options, settings);
+  settings.duration = options.duration_s ? *options.duration_s
+                      : settings.platform
+                          ? std::max(1e-3, simulation::longest_duration(*settings.platform))
+                          : 1.0;
   settings.seed = common.seed;
   settings.threads = common.threads;
   return settings;
 }
+
+double seconds(std::int64_t time_ns) { return 1e-9 * static_cast<double>(time_ns); }
 
 /// The true parameters and the rotation angles at the start.
 std::vector<NamedValue> true_values(const simulation::SimulationResult& result) {
@@ -87,16 +158,58 @@ std::vector<NamedValue> true_values(const simulation::SimulationResult& result) 
   return values;
 }
 
-void print_result(const SimulateOptions& options, const simulation::SimulationResult& result) {
+void print_result(const SimulateOptions& options, const simulation::SimulationSettings& settings,
+                  const simulation::SimulationResult& result) {
   say("{}: {} observations, {} without a return\n", options.output, grouped(result.observations),
       grouped(result.no_return));
-  say("truth: {}, {}\n\n", simulation::truth_preset_path(options.output),
+  say("truth: {}, {}\n", simulation::truth_preset_path(options.output),
       simulation::truth_columns_path(options.output));
+  if (settings.platform) {
+    const std::string trajectory =
+        simulation::trajectory_path(options.output, settings.platform->trajectory_ending);
+    say("       {}, {}\n", simulation::truth_trajectory_path(options.output),
+        simulation::truth_mount_path(options.output));
+    say("trajectory {}: {}\n", settings.platform->errors ? "with errors" : "without errors",
+        trajectory);
+    for (const std::string& what : result.left_out) say("{}: {}\n", trajectory, what);
+    if (!settings.platform->strips.empty()) {
+      say("strips: {}\n", simulation::strips_path(options.output));
+      Table table({"strip", "begin", "end", "unit"});
+      for (const trajectories::StripTimes& strip : settings.platform->strips) {
+        table.add({strip.name, fmt::format("{:.3f}", seconds(strip.begin_ns)),
+                   fmt::format("{:.3f}", seconds(strip.end_ns)), "s"});
+      }
+      table.print();
+    }
+  }
+  say("\n");
   Table table({"parameter", "truth", "unit"});
   for (const NamedValue& value : true_values(result)) {
     table.add({value.name, fmt::format("{:.8g}", value.value), value.unit});
   }
   table.print();
+}
+
+void add_platform(Json& json, const simulation::Platform& platform,
+                  const SimulateOptions& options) {
+  json["truth_files"].push_back(simulation::truth_trajectory_path(options.output));
+  json["truth_files"].push_back(simulation::truth_mount_path(options.output));
+  json["trajectory"] = simulation::trajectory_path(options.output, platform.trajectory_ending);
+  json["strips"] = Json::array();
+  for (const trajectories::StripTimes& strip : platform.strips) {
+    json["strips"].push_back({{"name", strip.name},
+                              {"begin_s", seconds(strip.begin_ns)},
+                              {"end_s", seconds(strip.end_ns)}});
+  }
+}
+
+/// Endings of the formats of trajectories that can be written, without the dot.
+std::vector<std::string> trajectory_formats() {
+  std::vector<std::string> names;
+  for (const auto& format : trajectories::writable_trajectories()) {
+    names.push_back(format.ending.substr(1));
+  }
+  return names;
 }
 
 }  // namespace
@@ -108,7 +221,8 @@ Run declare_simulate(CLI::App& verb) {
       ->required();
   verb.add_option("--sensor", o.sensor, "Preset by name, or a preset or calibration file")
       ->capture_default_str();
-  verb.add_option("--duration-s", o.duration_s, "Length of the recording")->capture_default_str();
+  verb.add_option("--duration-s", o.duration_s,
+                  "Length of the recording (default: 1, or to the trajectory's end)");
   verb.add_option("--rate-hz", o.rate_hz, "Shots per second (default: the sensor's)");
   verb.add_option("--noise-angle-deg", o.noise_angle_deg,
                   "1 sigma of azimuth and zenith (default: the sensor's)");
@@ -135,15 +249,28 @@ Run declare_simulate(CLI::App& verb) {
       ->expected(1)
       ->allow_extra_args(false)
       ->take_all();
-  verb.add_option("--scene", o.scene, "Planes around the sensor (YAML); without it no ranges");
+  verb.add_option("--scene", o.scene, "Planes or terrain (YAML); without it no ranges");
   verb.add_option("--station", o.station, "Station of the scene to stand on");
+  auto* trajectory =
+      verb.add_option("--trajectory", o.trajectory, "True trajectory along which the sensor moves");
+  verb.add_option("--flight", o.flight, "Flight plan (YAML) that makes the true trajectory")
+      ->excludes(trajectory);
+  verb.add_option("--mount", o.mount, "True mount of the moving sensor (YAML)");
+  verb.add_option("--trajectory-errors", o.trajectory_errors,
+                  "Errors (YAML) of the trajectory that is written for users");
+  verb.add_option("--trajectory-format", o.trajectory_format, "Format of that trajectory")
+      ->check(CLI::IsMember(trajectory_formats()))
+      ->capture_default_str();
+  verb.add_option("--start-s", o.start_s,
+                  "Begin of the recording after the trajectory's first record (default: 0)");
+  verb.add_option("--clock-drift-ppm", o.clock_drift_ppm,
+                  "What the trajectory's time gains on the sensor's clock (default: 0)");
   verb.add_option("--start-angles-deg", o.start_angles_deg,
                   "Rotation angles at the start, A,B (default: random from the seed)")
       ->delimiter(',');
   return [options](const CommonOptions& common) {
-    require_apart(common, {options->output, simulation::truth_preset_path(options->output),
-                           simulation::truth_columns_path(options->output)});
-    simulation::SimulationSettings settings = settings_from(*options, common);
+    const simulation::SimulationSettings settings = settings_from(*options, common);
+    require_apart(common, simulation::simulation_files(settings, options->output));
     spdlog::debug("{} s of sensor {}, seed {}", settings.duration, settings.truth.name,
                   settings.seed);
     simulation::SimulationResult result;
@@ -154,18 +281,21 @@ Run declare_simulate(CLI::App& verb) {
           bar.progress());
     }
     if (!common.json) {
-      print_result(*options, result);
+      print_result(*options, settings, result);
       return kDone;
     }
     Json truth = Json::object();
     for (const NamedValue& value : true_values(result)) truth[value.name] = value.value;
-    print_json(common, {{"observations", result.observations},
-                        {"no_return", result.no_return},
-                        {"output", options->output},
-                        {"truth_files",
-                         {simulation::truth_preset_path(options->output),
-                          simulation::truth_columns_path(options->output)}},
-                        {"truth", truth}});
+    Json json = {{"observations", result.observations},
+                 {"no_return", result.no_return},
+                 {"output", options->output},
+                 {"truth_files",
+                  {simulation::truth_preset_path(options->output),
+                   simulation::truth_columns_path(options->output)}},
+                 {"files", result.files},
+                 {"truth", truth}};
+    if (settings.platform) add_platform(json, *settings.platform, *options);
+    print_json(common, json);
     return kDone;
   };
 }

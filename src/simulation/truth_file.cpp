@@ -2,17 +2,90 @@
 // SPDX-License-Identifier: MIT
 #include "risley/simulation/truth_file.hpp"
 
+#include <filesystem>
+#include <system_error>
+#include <utility>
+
 #include <fmt/format.h>
 
 #include "risley/core/angle.hpp"
 #include "risley/io/text_file.hpp"
 #include "risley/recordings/writer.hpp"
 #include "risley/sensors/preset.hpp"
+#include "risley/simulation/trajectory_noise.hpp"
+#include "risley/trajectories/trajectory_file.hpp"
 
 namespace risley::simulation {
+namespace {
+
+/// Files that are removed again unless all is well.
+class FilesInProgress {
+ public:
+  FilesInProgress() = default;
+  FilesInProgress(const FilesInProgress&) = delete;
+  FilesInProgress& operator=(const FilesInProgress&) = delete;
+  ~FilesInProgress() {
+    std::error_code ignored;
+    for (const std::string& path : paths_) std::filesystem::remove(path, ignored);
+  }
+  void add(std::string path) { paths_.push_back(std::move(path)); }
+  void keep() { paths_.clear(); }
+
+ private:
+  std::vector<std::string> paths_;
+};
+
+/// @return what the format of the user's trajectory has no place for
+std::vector<std::string> write_platform(const SimulationSettings& settings, const std::string& path,
+                                        FilesInProgress& files) {
+  const Platform& platform = *settings.platform;
+  const auto write = [&](const std::string& to, const trajectories::Trajectory& trajectory) {
+    auto left_out = trajectories::write_trajectory(to, trajectory);
+    files.add(to);
+    return left_out;
+  };
+  write(truth_trajectory_path(path), *platform.trajectory);
+  auto left_out =
+      write(trajectory_path(path, platform.trajectory_ending),
+            platform.errors ? with_errors(*platform.trajectory, *platform.errors, settings.seed)
+                            : *platform.trajectory);
+  io::write_text_file(truth_mount_path(path), trajectories::mount_text(platform.mount));
+  files.add(truth_mount_path(path));
+  if (!platform.strips.empty()) {
+    io::write_text_file(strips_path(path), trajectories::strip_times_text(
+                                               platform.strips, platform.trajectory->time_scale));
+    files.add(strips_path(path));
+  }
+  return left_out;
+}
+
+}  // namespace
 
 std::string truth_preset_path(const std::string& recording) { return recording + ".truth.yaml"; }
 std::string truth_columns_path(const std::string& recording) { return recording + ".truth.nc"; }
+
+std::string truth_trajectory_path(const std::string& recording) {
+  return recording + ".trajectory.truth.csv";
+}
+std::string truth_mount_path(const std::string& recording) {
+  return recording + ".mount.truth.yaml";
+}
+std::string strips_path(const std::string& recording) { return recording + ".strips.yaml"; }
+std::string trajectory_path(const std::string& recording, const std::string& ending) {
+  return recording + ".trajectory" + ending;
+}
+
+std::vector<std::string> simulation_files(const SimulationSettings& settings,
+                                          const std::string& recording) {
+  std::vector<std::string> files{recording, truth_preset_path(recording),
+                                 truth_columns_path(recording)};
+  if (!settings.platform) return files;
+  files.push_back(truth_trajectory_path(recording));
+  files.push_back(trajectory_path(recording, settings.platform->trajectory_ending));
+  files.push_back(truth_mount_path(recording));
+  if (!settings.platform->strips.empty()) files.push_back(strips_path(recording));
+  return files;
+}
 
 sensors::Sensor truth_preset(const Scanner& scanner,
                              const std::vector<std::pair<std::string, std::string>>& provenance) {
@@ -31,6 +104,11 @@ sensors::Sensor truth_preset(const Scanner& scanner,
   add("quantize", settings.quantize ? "yes" : "no");
   add("rotor", to_string(settings.rotor));
   if (!settings.station.empty()) add("station", settings.station);
+  if (settings.platform) {
+    add("clock_at_first_shot_ns", first_clock_reading_ns(*settings.platform));
+    add("clock_offset_s", settings.platform->mount.clock_offset.value);
+    add("clock_drift_ppm", 1e6 * settings.platform->clock_drift);
+  }
   for (std::size_t i = 0; i < scanner.start_angles().size(); ++i) {
     add(fmt::format("start_rotation_angle_{}_deg", prism_letter(static_cast<int>(i))),
         degrees_from_radians(scanner.start_angles()[i]));
@@ -53,6 +131,9 @@ SimulationResult simulate_to_file(
   Scanner scanner(settings);
   const auto recording = recordings::create_recording(path, scanner.header());
   recordings::TruthWriter truth_columns(truth_columns_path(path), settings.truth.prisms());
+  FilesInProgress beside;
+  std::vector<std::string> left_out;
+  if (settings.platform) left_out = write_platform(settings, path, beside);
   recordings::Chunk chunk;
   recordings::TruthColumns truth;
   while (scanner.read(chunk, truth)) {
@@ -63,9 +144,14 @@ SimulationResult simulate_to_file(
   }
   recording->close();
   truth_columns.close();
-  SimulationResult result{scanner.shots(), scanner.no_return(), truth_preset(scanner, provenance),
-                          scanner.start_angles()};
+  SimulationResult result{scanner.shots(),
+                          scanner.no_return(),
+                          truth_preset(scanner, provenance),
+                          scanner.start_angles(),
+                          simulation_files(settings, path),
+                          std::move(left_out)};
   io::write_text_file(truth_preset_path(path), sensors::preset_text(result.truth));
+  beside.keep();
   return result;
 }
 

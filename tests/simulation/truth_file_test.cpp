@@ -2,8 +2,11 @@
 // SPDX-License-Identifier: MIT
 #include "risley/simulation/truth_file.hpp"
 
+#include <algorithm>
 #include <filesystem>
+#include <memory>
 #include <string>
+#include <utility>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -14,6 +17,10 @@
 #include "risley/recordings/reader.hpp"
 #include "risley/recordings/truth.hpp"
 #include "risley/sensors/preset.hpp"
+#include "risley/trajectories/error_process.hpp"
+#include "risley/trajectories/flight_plan.hpp"
+#include "risley/trajectories/mount.hpp"
+#include "risley/trajectories/trajectory_file.hpp"
 
 namespace risley::simulation::truth_file_test {
 
@@ -142,6 +149,90 @@ TEST_F(TruthFile, SameSeedGivesTheSameBytes) {
   for (const char* ending : {".nc", ".nc.truth.nc", ".nc.truth.yaml"}) {
     EXPECT_NE(io::sha256_of_file(path("one") + ending), io::sha256_of_file(path("three") + ending));
   }
+}
+
+/// The bundled flight over the bundled village, 0.2 s of it.
+SimulationSettings flying() {
+  SimulationSettings s;
+  s.truth = sensors::load_sensor("mid-40-table3");
+  s.duration = 0.2;
+  s.scene = scenes::load_scene(RISLEY_SOURCE_DIR "/data/village.yaml");
+  const trajectories::FlightPlan plan =
+      trajectories::load_flight_plan(RISLEY_SOURCE_DIR "/data/flight-s4.yaml");
+  trajectories::Flight flight = trajectories::fly(plan);
+  Platform platform;
+  platform.trajectory = std::make_shared<trajectories::Trajectory>(std::move(flight.trajectory));
+  platform.strips = std::move(flight.strips);
+  platform.mount = trajectories::load_mount(RISLEY_SOURCE_DIR "/data/mount-nadir.yaml");
+  platform.errors =
+      trajectories::load_error_model(RISLEY_SOURCE_DIR "/data/trajectory-errors.yaml");
+  platform.begin_ns = 9'000'000'000;
+  s.platform = std::move(platform);
+  return s;
+}
+
+TEST_F(TruthFile, AMovingSensorLeavesItsTrajectoriesAndItsMount) {
+  const SimulationSettings s = flying();
+  const std::string out = path("out.lvx");
+  const SimulationResult result = simulate_to_file(s, out, {});
+  EXPECT_THAT(result.files,
+              ::testing::ElementsAre(out, out + ".truth.yaml", out + ".truth.nc",
+                                     out + ".trajectory.truth.csv", out + ".trajectory.csv",
+                                     out + ".mount.truth.yaml", out + ".strips.yaml"));
+  for (const std::string& file : result.files) EXPECT_TRUE(fs::exists(file)) << file;
+  // The true one bit by bit, the user's with errors of the stated size.
+  const auto truth = trajectories::load_trajectory(truth_trajectory_path(out));
+  EXPECT_EQ(truth.time_ns, s.platform->trajectory->time_ns);
+  EXPECT_EQ(truth.position, s.platform->trajectory->position);
+  EXPECT_TRUE(truth.accuracy.empty());
+  const auto given = trajectories::load_trajectory(trajectory_path(out, ".csv"));
+  ASSERT_EQ(given.size(), truth.size());
+  EXPECT_EQ(given.accuracy.size(), truth.size());
+  double largest = 0;
+  for (std::size_t i = 0; i < truth.size(); ++i) {
+    largest = std::max(largest, (given.position[i] - truth.position[i]).norm());
+  }
+  EXPECT_GT(largest, 0.005);
+  EXPECT_LT(largest, 0.25);
+  EXPECT_EQ(trajectories::mount_text(trajectories::load_mount(truth_mount_path(out))),
+            trajectories::mount_text(s.platform->mount));
+  const auto strips = trajectories::load_strip_times(strips_path(out));
+  ASSERT_EQ(strips.size(), 4u);
+  EXPECT_EQ(strips[1].begin_ns, s.platform->strips[1].begin_ns);
+  // LVX keeps the sensor's clock, 1.2 ms behind the trajectory's time: 8.9988 s, and so 8.999 s.
+  const recordings::Recording recording = recordings::load_recording(out);
+  const auto columns = recordings::load_truth(truth_columns_path(out));
+  EXPECT_EQ(recording.data.observations.time_ns.front(), 8'999'000'000);
+  EXPECT_EQ(recording.data.observations.time_ns, columns.time_ns);
+  const sensors::Sensor preset = sensors::load_sensor(truth_preset_path(out));
+  EXPECT_THAT(preset.provenance, Contains(Pair("clock_at_first_shot_ns", "8999000000")));
+  EXPECT_THAT(preset.provenance, Contains(Pair("clock_offset_s", "0.0012")));
+}
+
+TEST_F(TruthFile, FlightsOfTheSameSeedGiveTheSameBytes) {
+  SimulationSettings s = flying();
+  s.threads = 1;
+  const auto one = simulate_to_file(s, path("one.nc"), {}).files;
+  for (const int threads : {2, 4}) {
+    s.threads = threads;
+    const auto more = simulate_to_file(s, path("more.nc"), {}).files;
+    ASSERT_EQ(more.size(), one.size());
+    for (std::size_t i = 0; i < one.size(); ++i) {
+      EXPECT_EQ(io::sha256_of_file(one[i]), io::sha256_of_file(more[i])) << more[i];
+    }
+  }
+}
+
+TEST_F(TruthFile, AFlightThatCannotBeWrittenLeavesNothing) {
+  SimulationSettings s = flying();
+  s.platform->trajectory_ending = ".sbet";  // of a trajectory that is not on the Earth
+  EXPECT_THROW(simulate_to_file(s, path("out.nc"), {}), InvalidArgument);
+  EXPECT_TRUE(fs::is_empty(folder_));
+  s.platform->trajectory_ending = ".csv";
+  EXPECT_THROW(simulate_to_file(s, path("out.unknown"), {}), InvalidArgument);
+  const Progress cancelled([](double) { throw Cancelled(); });
+  EXPECT_THROW(simulate_to_file(s, path("out.nc"), {}, cancelled), Cancelled);
+  EXPECT_TRUE(fs::is_empty(folder_));
 }
 
 TEST_F(TruthFile, NothingIsLeftWhenTheOutputCannotBeWritten) {

@@ -5,7 +5,11 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <string>
+#include <vector>
 
+#include "risley/trajectories/error_process.hpp"
+#include "risley/trajectories/flight_plan.hpp"
 #include "risley/trajectories/geodesy.hpp"
 #include "risley/trajectories/mount.hpp"
 #include "risley/trajectories/trajectory.hpp"
@@ -30,6 +34,11 @@ struct Platform {
   /// Where x = y = z = 0 of the scene is on the Earth, its axes east, north and up there; empty:
   /// where its terrain says. A local trajectory has the scene's axes.
   std::optional<trajectories::Geodetic> map_origin;
+
+  // What is told of it beside the recording; shots do not depend on it.
+  std::optional<trajectories::ErrorModel> errors;  ///< of the trajectory that the user gets
+  std::string trajectory_ending = ".csv";          ///< of its file, which chooses the format
+  std::vector<trajectories::StripTimes> strips;    ///< of the flight; may be empty
 };
 
 /// What the recording's clock reads at its first shot, ns.

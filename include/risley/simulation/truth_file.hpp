@@ -13,12 +13,21 @@
 namespace risley::simulation {
 
 /// Where the truth of a recording is written.
-std::string truth_preset_path(const std::string& recording);   ///< OUT.truth.yaml
-std::string truth_columns_path(const std::string& recording);  ///< OUT.truth.nc
+std::string truth_preset_path(const std::string& recording);      ///< OUT.truth.yaml
+std::string truth_columns_path(const std::string& recording);     ///< OUT.truth.nc
+std::string truth_trajectory_path(const std::string& recording);  ///< OUT.trajectory.truth.csv
+std::string truth_mount_path(const std::string& recording);       ///< OUT.mount.truth.yaml
+std::string strips_path(const std::string& recording);            ///< OUT.strips.yaml
+/// OUT.trajectory.csv: what the user gets. @param ending  which chooses the format
+std::string trajectory_path(const std::string& recording, const std::string& ending);
+
+/// All files that simulate_to_file() writes, the recording first.
+std::vector<std::string> simulation_files(const SimulationSettings& settings,
+                                          const std::string& recording);
 
 /// The true sensor, with all that makes the simulation again in its provenance: the given pairs
-/// (command, version), seed, start angles, duration, rate, noise, rounding, rotor motion and what
-/// the sensor reports instead of the truth.
+/// (command, version), seed, start angles, duration, rate, noise, rounding, rotor motion, clock and
+/// what the sensor reports instead of the truth.
 sensors::Sensor truth_preset(const Scanner& scanner,
                              const std::vector<std::pair<std::string, std::string>>& provenance);
 
@@ -28,11 +37,17 @@ struct SimulationResult {
   std::uint64_t no_return = 0;
   sensors::Sensor truth;             ///< as in OUT.truth.yaml
   std::vector<double> start_angles;  ///< rotation angles at time zero, rad
+  std::vector<std::string> files;    ///< all that were written, the recording first
+  /// What the format of the user's trajectory has no place for, in words.
+  std::vector<std::string> left_out;
 };
 
 /// Simulates a whole recording and writes it with its truth: OUT in the format that its ending asks
 /// for, OUT.truth.yaml (a sensor preset) and OUT.truth.nc (see recordings::TruthWriter). Memory
-/// does not grow with the duration.
+/// does not grow with the duration. Of a sensor on a platform also OUT.trajectory.truth.csv, the
+/// true trajectory; OUT.trajectory.csv (or another ending), the one that the user gets, with errors
+/// where the platform has a model of them; OUT.mount.truth.yaml; and OUT.strips.yaml where there
+/// are strips. A failure leaves none of these.
 /// @param provenance  goes into the preset first, e.g. {"command", ...}
 /// @throws InvalidArgument for settings or an ending that make no sense, FileError
 SimulationResult simulate_to_file(
