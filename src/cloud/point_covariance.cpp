@@ -38,8 +38,7 @@ MovedPoint moved_point(const Points& points, const TrajectoryErrors& errors, std
   const auto after = std::min(static_cast<std::size_t>(later - times.begin()), times.size() - 1);
   const std::size_t before = after == 0 ? 0 : after - 1;
   const double span = static_cast<double>(times[after] - times[before]);
-  const double part =
-      span > 0 ? static_cast<double>(result.time_ns - times[before]) / span : 0.0;
+  const double part = span > 0 ? static_cast<double>(result.time_ns - times[before]) / span : 0.0;
   const auto between = [part](double a, double b) { return a + part * (b - a); };
   Vector3d arm(points.x[row], points.y[row], points.z[row]);
   for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -85,7 +84,8 @@ Eigen::MatrixXd joint_covariance(const Points& points, const TrajectoryErrors& e
     const auto a = static_cast<std::size_t>(i);
     for (Index j = i; j < n; ++j) {
       const auto b = static_cast<std::size_t>(j);
-      const double apart = 1e-9 * std::abs(static_cast<double>(moved[a].time_ns - moved[b].time_ns));
+      const double apart =
+          1e-9 * std::abs(static_cast<double>(moved[a].time_ns - moved[b].time_ns));
       Eigen::Matrix<double, 6, 1> faded;
       for (std::size_t k = 0; k < 6; ++k) {
         faded[static_cast<Index>(k)] = std::exp(-apart / errors.correlation_time[k]);

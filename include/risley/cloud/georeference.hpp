@@ -36,13 +36,13 @@ struct MovingPlatform {
 
 /// Where a sensor is at the time of a shot, in the trajectory's frame.
 struct SensorPose {
-  Eigen::Matrix3d turn;       ///< frame from sensor
-  Eigen::Matrix3d body;       ///< frame from body
-  Eigen::Vector3d reference;  ///< the trajectory's reference point, m
-  Eigen::Vector3d lever;      ///< from there to the sensor's origin, m
-  Eigen::Vector3d velocity;   ///< of the reference point, m/s
-  Eigen::Vector3d rate;       ///< of turning, rad/s
-  std::uint16_t strip = 0;    ///< from 1; 0: of none
+  Eigen::Matrix3d turn = Eigen::Matrix3d::Identity();  ///< frame from sensor
+  Eigen::Matrix3d body = Eigen::Matrix3d::Identity();  ///< frame from body
+  Eigen::Vector3d reference{0, 0, 0};                  ///< the trajectory's reference point, m
+  Eigen::Vector3d lever{0, 0, 0};                      ///< from there to the sensor's origin, m
+  Eigen::Vector3d velocity{0, 0, 0};                   ///< of the reference point, m/s
+  Eigen::Vector3d rate{0, 0, 0};                       ///< of turning, rad/s
+  std::uint16_t strip = 0;                             ///< from 1; 0: of none
 };
 
 /// Points of a moving sensor: from its own frame to a map, with the covariance that mount and
