@@ -27,5 +27,6 @@ std::vector<Target> recording_targets();
 std::vector<Target> decoder_targets();
 std::vector<Target> netcdf_targets();
 std::vector<Target> text_targets();
+std::vector<Target> trajectory_targets();
 
 }  // namespace risley::fuzz

@@ -240,9 +240,9 @@ TEST(Sbet, TimesThatRunBackAreSortedOrRefused) {
   const Trajectory t = read(records);
   EXPECT_EQ(t.size(), 300U);
   ASSERT_EQ(t.warnings.size(), 2U);
-  EXPECT_THAT(t.warnings[0].message, HasSubstr("1 of 301 records stand behind later ones"));
+  EXPECT_THAT(t.warnings[0].message, HasSubstr("records behind later ones: 1 of 301"));
   EXPECT_EQ(t.warnings[0].place.byte_offset, 101U * 136);
-  EXPECT_THAT(t.warnings[1].message, HasSubstr("1 records repeat the time"));
+  EXPECT_THAT(t.warnings[1].message, HasSubstr("repeat the time of an earlier one: 1"));
   EXPECT_TRUE(std::is_sorted(t.time_ns.begin(), t.time_ns.end()));
   EXPECT_EQ(t.velocity_frame->name, "north-east-down");
   EXPECT_LT((t.position[100] - Flight().position(0.5)).norm(), 1e-8);

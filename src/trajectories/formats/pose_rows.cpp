@@ -86,30 +86,22 @@ void PoseRows::add(const PoseRow& row, const FilePlace& place) {
   // Half a degree more than a turn: rounded values, and headings counted either way.
   constexpr double kTurn = 365 * kRadiansPerDegree;
   if (contents_.frame == Frame::geocentric) {
-    Eigen::Vector3d position = row.position;
-    if (!contents_.has_position) {
-      const auto in_degrees = [](double angle) { return degrees_from_radians(angle); };
-      constexpr std::string_view kHint =
-          "; are degrees stored where radians belong, or the other way round?";
-      check("latitude", in_degrees(row.place.latitude), -90 - 1e-9, 90 + 1e-9, "deg", kHint);
-      check("longitude", in_degrees(row.place.longitude), -360, 360, "deg", kHint);
-      check("ellipsoidal height", row.place.height, kLowestHeight, kHighestHeight, "m");
-      Geodetic within = row.place;
-      within.latitude = std::clamp(within.latitude, -kPi / 2, kPi / 2);
-      position = geocentric_from_geodetic(within);
-    } else {
-      const double distance = row.position.norm();
-      check("distance from the centre of the Earth", distance,
-            kSemiMajorAxis * (1 - kFlattening) + kLowestHeight, kSemiMajorAxis + kHighestHeight,
-            "m");
-    }
+    const auto in_degrees = [](double angle) { return degrees_from_radians(angle); };
+    constexpr std::string_view kHint =
+        "; are degrees stored where radians belong, or the other way round?";
+    check("latitude", in_degrees(row.place.latitude), -90 - 1e-9, 90 + 1e-9, "deg", kHint);
+    check("longitude", in_degrees(row.place.longitude), -360, 360, "deg", kHint);
+    check("ellipsoidal height", row.place.height, kLowestHeight, kHighestHeight, "m");
+    Geodetic within = row.place;
+    within.latitude = std::clamp(within.latitude, -kPi / 2, kPi / 2);
+    within.longitude = std::clamp(within.longitude, -kTwoPi, kTwoPi);
     check("roll", row.angles.roll, -kTurn, kTurn, "rad");
     check("pitch", row.angles.pitch, -kPi / 2 - 1e-6, kPi / 2 + 1e-6, "rad");
     check("heading", row.angles.heading, -2 * kTurn, 2 * kTurn, "rad");
-    trajectory_.attitude.push_back(Eigen::Quaterniond(ned_axes(Frame::geocentric, position)) *
+    trajectory_.attitude.push_back(Eigen::Quaterniond(geocentric_from_ned(within)) *
                                    ned_from_body(row.angles));
     trajectory_.attitude.back().normalize();
-    trajectory_.position.push_back(position);
+    trajectory_.position.push_back(geocentric_from_geodetic(within));
   } else {
     finite("position", row.position, kFarthest, "m");
     trajectory_.position.push_back(row.position);
@@ -174,14 +166,14 @@ void PoseRows::put_in_order() {
   if (order.rows.empty()) return;
   if (told.moved > 0) {
     warn(place_of(told.largest_back_at),
-         fmt::format("{} of {} records stand behind later ones, by up to {:.6f} s: all were put "
-                     "into the order of their times",
+         fmt::format("records behind later ones: {} of {}, by up to {:.6f} s; all were put into "
+                     "the order of their times",
                      told.moved, trajectory_.size(),
                      1e-9 * static_cast<double>(told.largest_back_ns)));
   }
   if (told.repeated > 0) {
     warn(place_of(told.repeated_at),
-         fmt::format("{} records repeat the time of an earlier one and were left out",
+         fmt::format("records that repeat the time of an earlier one: {}; they were left out",
                      told.repeated));
   }
   reorder(wander_, order.rows);

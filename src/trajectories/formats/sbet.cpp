@@ -82,12 +82,10 @@ bool is_sbet(const FileHead& head) {
 Trajectory read_sbet(const std::string& path, const Progress& progress) {
   io::BlockInput file(path);
   if (file.size() == 0 || file.size() % kSbetRecord != 0) {
-    throw FileError(
-        path, {},
-        fmt::format("has {} bytes, which are {} records of an SBET (136 bytes each) and "
-                    "{} bytes more; expected whole records: the file was cut off or is "
-                    "none",
-                    file.size(), file.size() / kSbetRecord, file.size() % kSbetRecord));
+    throw FileError(path, {},
+                    fmt::format("has {} bytes, no multiple of the 136 bytes of a record: the file "
+                                "was cut off or is no SBET",
+                                file.size()));
   }
   RowContents contents;
   contents.format = "sbet";

@@ -74,11 +74,10 @@ bool is_smrmsg(const FileHead& head) {
 AccuracyRecords load_accuracies(const std::string& path, const Progress& progress) {
   io::BlockInput file(path);
   if (file.size() == 0 || file.size() % kSmrmsgRecord != 0) {
-    throw FileError(
-        path, {},
-        fmt::format("has {} bytes, which are {} records of an SMRMSG (80 bytes each) and {} bytes "
-                    "more; expected whole records: the file was cut off or is none",
-                    file.size(), file.size() / kSmrmsgRecord, file.size() % kSmrmsgRecord));
+    throw FileError(path, {},
+                    fmt::format("has {} bytes, no multiple of the 80 bytes of a record: the file "
+                                "was cut off or is no SMRMSG",
+                                file.size()));
   }
   AccuracyRecords records;
   for (std::uint64_t offset = 0; offset < file.size(); offset += kSmrmsgRecord) {
@@ -117,15 +116,15 @@ AccuracyRecords load_accuracies(const std::string& path, const Progress& progres
   if (order.told.moved > 0) {
     records.warnings.push_back(
         {place_of(order.told.largest_back_at),
-         fmt::format("{} of {} records stand behind later ones: all were put "
-                     "into the order of their times",
-                     order.told.moved, records.time_ns.size())});
+         fmt::format(
+             "records behind later ones: {} of {}; all were put into the order of their times",
+             order.told.moved, records.time_ns.size())});
   }
   if (order.told.repeated > 0) {
-    records.warnings.push_back({place_of(order.told.repeated_at),
-                                fmt::format("{} records repeat the time of an earlier one and were "
-                                            "left out",
-                                            order.told.repeated)});
+    records.warnings.push_back(
+        {place_of(order.told.repeated_at),
+         fmt::format("records that repeat the time of an earlier one: {}; they were left out",
+                     order.told.repeated)});
   }
   if (!order.rows.empty()) {
     reorder(records.accuracy, order.rows);
