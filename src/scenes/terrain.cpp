@@ -181,7 +181,7 @@ void add_village(const VillageSettings& settings, TerrainParts& parts) {
   };
   const RandomStream random(settings.seed, kVillageRoofs);
   constexpr std::uint64_t kDrawsPerTry = 8;
-  constexpr int kTries = 1000;
+  constexpr int kTries = 300;
   std::uint64_t attempt = 0;
   for (int i = 0; i < settings.roofs; ++i) {
     std::array<double, 2> at{};

@@ -23,6 +23,20 @@ void require_place(const Geodetic& place) {
   require_between("height", place.height, kLowestHeight, kHighestHeight, "m");
 }
 
+/// One step towards the normal of the ellipsoid, along which up and out are components.
+/// @param z, from_axis  of the place, m
+template <class Number>
+void bowring_step(Number z, Number from_axis, Number& up, Number& out) {
+  constexpr Number kAxesRatio = static_cast<Number>(kRatio);
+  constexpr Number kUp = static_cast<Number>((1 / (kRatio * kRatio) - 1) * kSemiMajorAxis * kRatio);
+  constexpr Number kOut = static_cast<Number>(kEccentricitySquared * kSemiMajorAxis);
+  const Number flat = kAxesRatio * up;
+  const Number length = std::sqrt(flat * flat + out * out);
+  const Number sine = flat / length, cosine = out / length;
+  up = z + kUp * sine * sine * sine;
+  out = from_axis - kOut * cosine * cosine * cosine;
+}
+
 }  // namespace
 
 Eigen::Vector3d geocentric_from_geodetic(const Geodetic& place) {
@@ -43,20 +57,17 @@ Geodetic geodetic_from_geocentric(const Eigen::Vector3d& position) {
   require_between("distance from the centre of the Earth", position.norm(),
                   kSemiMajorAxis * (1 - kFlattening) + kLowestHeight,
                   kSemiMajorAxis + kHighestHeight, "m");
-  const Extended z = position.z();
-  const Extended from_axis = std::hypot(Extended{position.x()}, Extended{position.y()});
   // Bowring's iteration on the reduced latitude: an error shrinks a thousand times and more with
-  // every step, and the first value is right to 0.2 degree.
-  constexpr Extended kPolarAxis = kSemiMajorAxis * kRatio;
-  constexpr Extended kSecondEccentricitySquared = 1 / (kRatio * kRatio) - 1;
-  Extended up = z, out = kRatio * kRatio * from_axis;  // along the normal of the ellipsoid
-  for (int i = 0; i < 6; ++i) {
-    const Extended length = std::hypot(kRatio * up, out);
-    const Extended sine = kRatio * up / length, cosine = out / length;
-    up = z + kSecondEccentricitySquared * kPolarAxis * sine * sine * sine;
-    out = from_axis - kEccentricitySquared * kSemiMajorAxis * cosine * cosine * cosine;
-  }
-  const Extended length = std::hypot(up, out);
+  // every step, and the first value is right to 0.2 degree. The last step alone is extended.
+  const Extended z = position.z();
+  const Extended from_axis =
+      std::sqrt(Extended{position.x()} * position.x() + Extended{position.y()} * position.y());
+  double rough_up = position.z(), rough_out = static_cast<double>(kRatio * kRatio * from_axis);
+  for (int i = 0; i < 5; ++i)
+    bowring_step(position.z(), static_cast<double>(from_axis), rough_up, rough_out);
+  Extended up = rough_up, out = rough_out;  // along the normal of the ellipsoid
+  bowring_step(z, from_axis, up, out);
+  const Extended length = std::sqrt(up * up + out * out);
   const Extended sine = up / length, cosine = out / length;
   Geodetic place;
   place.latitude = static_cast<double>(std::atan2(up, out));

@@ -19,24 +19,38 @@ inline Eigen::Vector3d rotation_vector(const Eigen::Quaterniond& q) {
   return sign * factor * q.vec();
 }
 
+/// Below this angle, rad, series replace sine and cosine: they are exact to the last digit there,
+/// and hold for the time between records of any navigation system.
+inline constexpr double kSmallTurn = 0.02;
+
 /// The quaternion of a rotation vector.
 inline Eigen::Quaterniond turned_by(const Eigen::Vector3d& vector) {
-  const double angle = vector.norm();
-  const double factor = angle < 1e-9 ? 0.5 : std::sin(0.5 * angle) / angle;
-  Eigen::Quaterniond q;
-  q.w() = std::cos(0.5 * angle);
-  q.vec() = factor * vector;
-  return q;
+  const double squared = vector.squaredNorm();
+  double cosine = 0, factor = 0;  // of half the angle; its sine over the angle
+  if (squared < kSmallTurn * kSmallTurn) {
+    cosine = 1 - squared * (1.0 / 8 - squared * (1.0 / 384 - squared / 46080));
+    factor = 0.5 - squared * (1.0 / 48 - squared * (1.0 / 3840 - squared / 645120));
+  } else {
+    const double angle = std::sqrt(squared);
+    cosine = std::cos(0.5 * angle);
+    factor = std::sin(0.5 * angle) / angle;
+  }
+  return {cosine, factor * vector.x(), factor * vector.y(), factor * vector.z()};
 }
 
 /// Angular velocity, in the axes that are turned, where a rotation vector changes at a rate.
 inline Eigen::Vector3d angular_velocity_of(const Eigen::Vector3d& vector,
                                            const Eigen::Vector3d& rate) {
-  const double squared = vector.squaredNorm(), angle = std::sqrt(squared);
-  const bool small = angle < 1e-3;  // the series are then exact to 1e-14
-  const double first = small ? 0.5 - squared / 24 : (1 - std::cos(angle)) / squared;
-  const double second =
-      small ? 1.0 / 6 - squared / 120 : (angle - std::sin(angle)) / squared / angle;
+  const double squared = vector.squaredNorm();
+  double first = 0, second = 0;  // (1 - cos a) / a^2 and (a - sin a) / a^3
+  if (squared < kSmallTurn * kSmallTurn) {
+    first = 0.5 - squared * (1.0 / 24 - squared * (1.0 / 720 - squared / 40320));
+    second = 1.0 / 6 - squared * (1.0 / 120 - squared * (1.0 / 5040 - squared / 362880));
+  } else {
+    const double angle = std::sqrt(squared);
+    first = (1 - std::cos(angle)) / squared;
+    second = (angle - std::sin(angle)) / (squared * angle);
+  }
   const Eigen::Vector3d across = vector.cross(rate);
   return rate - first * across + second * vector.cross(across);
 }

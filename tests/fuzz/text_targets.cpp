@@ -34,10 +34,20 @@ void run_preset(std::span<const std::uint8_t> bytes) {
   }
 }
 
+/// Rays in a scene that is accepted end, and on a surface that has a name.
 void run_scene(std::span<const std::uint8_t> bytes) {
+  scenes::Scene scene;
   try {
-    scenes::parse_scene(text_of(bytes), "fuzz.yaml");
+    scene = scenes::parse_scene(text_of(bytes), "fuzz.yaml");
   } catch (const Error&) {  // refused
+    return;
+  }
+  for (const Vector3<double>& direction :
+       {Vector3<double>{0, 0, -1}, {0.6, 0, -0.8}, {0, 1, 0}, {-0.48, 0.64, 0.6}}) {
+    const auto hit = scenes::nearest_hit(scene, {1, 2, 80}, direction);
+    if (!hit) continue;
+    require(hit->range > 0 && hit->cosine >= 0 && hit->cosine <= 1, "a hit is in front");
+    scene.surface_name(hit->surface);
   }
 }
 

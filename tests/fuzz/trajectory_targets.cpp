@@ -7,6 +7,7 @@
 
 #include "risley/core/error.hpp"
 #include "risley/trajectories/error_process.hpp"
+#include "risley/trajectories/flight_plan.hpp"
 #include "risley/trajectories/interpolation.hpp"
 #include "risley/trajectories/mount.hpp"
 #include "risley/trajectories/trajectory_audit.hpp"
@@ -84,13 +85,41 @@ void run_error_model(std::span<const std::uint8_t> bytes) {
       "errors that are written twice are the same");
 }
 
+/// A plan that is accepted is flown, where that does not take long.
+void run_flight_plan(std::span<const std::uint8_t> bytes) {
+  trajectories::FlightPlan plan;
+  try {
+    plan = trajectories::parse_flight_plan(yaml_of(bytes), "fuzz.yaml");
+  } catch (const FileError&) {
+    return;
+  }
+  double seconds = 2 * plan.lead;
+  for (const auto& strip : plan.strips) seconds += plan.turn_duration + strip.length / strip.speed;
+  if (seconds * plan.rate * (1 + plan.attitude.sinusoids + plan.velocity.sinusoids) > 1e6) return;
+  const trajectories::Flight flight = trajectories::fly(plan);
+  trajectories::require_trajectory(flight.trajectory);
+  const std::string strips =
+      trajectories::strip_times_text(flight.strips, flight.trajectory.time_scale);
+  require(trajectories::parse_strip_times(strips, "fuzz.yaml").size() == plan.strips.size(),
+          "strips that were written can be read");
+}
+
+void run_strips(std::span<const std::uint8_t> bytes) {
+  try {
+    trajectories::parse_strip_times(yaml_of(bytes), "fuzz.yaml");
+  } catch (const FileError&) {  // refused
+  }
+}
+
 }  // namespace
 
 std::vector<Target> trajectory_targets() {
   return {{"trajectory", run_trajectory},
           {"accuracies", run_accuracies},
           {"mount", run_mount},
-          {"trajectory-errors", run_error_model}};
+          {"trajectory-errors", run_error_model},
+          {"flight-plan", run_flight_plan},
+          {"strips", run_strips}};
 }
 
 }  // namespace risley::fuzz

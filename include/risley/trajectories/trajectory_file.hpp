@@ -2,8 +2,11 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <vector>
+
+#include <Eigen/Core>
 
 #include "risley/core/progress.hpp"
 #include "risley/trajectories/trajectory.hpp"

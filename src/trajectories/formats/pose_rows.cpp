@@ -86,30 +86,22 @@ void PoseRows::add(const PoseRow& row, const FilePlace& place) {
   // Half a degree more than a turn: rounded values, and headings counted either way.
   constexpr double kTurn = 365 * kRadiansPerDegree;
   if (contents_.frame == Frame::geocentric) {
-    Eigen::Vector3d position = row.position;
-    if (!contents_.has_position) {
-      const auto in_degrees = [](double angle) { return degrees_from_radians(angle); };
-      constexpr std::string_view kHint =
-          "; are degrees stored where radians belong, or the other way round?";
-      check("latitude", in_degrees(row.place.latitude), -90 - 1e-9, 90 + 1e-9, "deg", kHint);
-      check("longitude", in_degrees(row.place.longitude), -360, 360, "deg", kHint);
-      check("ellipsoidal height", row.place.height, kLowestHeight, kHighestHeight, "m");
-      Geodetic within = row.place;
-      within.latitude = std::clamp(within.latitude, -kPi / 2, kPi / 2);
-      position = geocentric_from_geodetic(within);
-    } else {
-      const double distance = row.position.norm();
-      check("distance from the centre of the Earth", distance,
-            kSemiMajorAxis * (1 - kFlattening) + kLowestHeight, kSemiMajorAxis + kHighestHeight,
-            "m");
-    }
+    const auto in_degrees = [](double angle) { return degrees_from_radians(angle); };
+    constexpr std::string_view kHint =
+        "; are degrees stored where radians belong, or the other way round?";
+    check("latitude", in_degrees(row.place.latitude), -90 - 1e-9, 90 + 1e-9, "deg", kHint);
+    check("longitude", in_degrees(row.place.longitude), -360, 360, "deg", kHint);
+    check("ellipsoidal height", row.place.height, kLowestHeight, kHighestHeight, "m");
+    Geodetic within = row.place;
+    within.latitude = std::clamp(within.latitude, -kPi / 2, kPi / 2);
+    within.longitude = std::clamp(within.longitude, -kTwoPi, kTwoPi);
     check("roll", row.angles.roll, -kTurn, kTurn, "rad");
     check("pitch", row.angles.pitch, -kPi / 2 - 1e-6, kPi / 2 + 1e-6, "rad");
     check("heading", row.angles.heading, -2 * kTurn, 2 * kTurn, "rad");
-    trajectory_.attitude.push_back(Eigen::Quaterniond(ned_axes(Frame::geocentric, position)) *
+    trajectory_.attitude.push_back(Eigen::Quaterniond(geocentric_from_ned(within)) *
                                    ned_from_body(row.angles));
     trajectory_.attitude.back().normalize();
-    trajectory_.position.push_back(position);
+    trajectory_.position.push_back(geocentric_from_geodetic(within));
   } else {
     finite("position", row.position, kFarthest, "m");
     trajectory_.position.push_back(row.position);

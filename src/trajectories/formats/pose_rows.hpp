@@ -34,7 +34,6 @@ struct RowContents {
   TimeScale time_scale = TimeScale::unknown;
   std::optional<int> gps_week;
   Frame frame = Frame::geocentric;
-  bool has_position = false;  ///< PoseRow::position instead of place, in a geocentric frame
   bool has_velocity = false, has_wander = false, has_accuracy = false;
   std::optional<VelocityAxes> velocity_axes;  ///< where the file states them
 };
