@@ -8,6 +8,7 @@
 #include <utility>
 
 #include <Eigen/Geometry>
+#include <Eigen/LU>
 #include <fmt/format.h>
 
 #include "risley/core/error.hpp"
@@ -31,6 +32,10 @@ constexpr std::int64_t kTableStep_ns = 1'000'000'000;
 constexpr double kWidestExpansion = 1500, kExpansionError = 1e-5;
 /// Coordinates of files that hold whole multiples of a step begin at a multiple of this, m.
 constexpr double kOffsetStep = 1000;
+/// A polynomial of the fifth degree repeats the interpolation over so long a time, s: a turn of 10
+/// rad/s is left by (0.05)^6 / 6!.
+constexpr std::int64_t kCell_ns = 5'000'000;
+constexpr double kCell = 5e-3;
 
 constexpr std::array<const char*, 7> kMountFactors{
     "boresight_x_deg", "boresight_y_deg", "boresight_z_deg", "lever_arm_x_m",
@@ -43,23 +48,67 @@ Matrix3d cross_matrix(const Vector3d& v) {
   return m;
 }
 
-Matrix3d covariance_at(const std::array<std::vector<double>, kCovarianceTerms>& columns,
-                       std::size_t i) {
-  Matrix3d c;
-  c << columns[kXX][i], columns[kXY][i], columns[kXZ][i],  //
-      columns[kXY][i], columns[kYY][i], columns[kYZ][i],   //
-      columns[kXZ][i], columns[kYZ][i], columns[kZZ][i];
-  return c;
+/// A symmetric 3 x 3 matrix, written out: these are the inner loop.
+struct Symmetric {
+  double xx = 0, xy = 0, xz = 0, yy = 0, yz = 0, zz = 0;
+};
+
+using CovarianceColumns = std::array<std::vector<double>, kCovarianceTerms>;
+
+Symmetric load(const CovarianceColumns& columns, std::size_t i) {
+  return {columns[kXX][i], columns[kXY][i], columns[kXZ][i],
+          columns[kYY][i], columns[kYZ][i], columns[kZZ][i]};
 }
 
-void store(const Matrix3d& c, std::array<std::vector<double>, kCovarianceTerms>& columns,
-           std::size_t i) {
-  columns[kXX][i] = c(0, 0);
-  columns[kXY][i] = c(0, 1);
-  columns[kXZ][i] = c(0, 2);
-  columns[kYY][i] = c(1, 1);
-  columns[kYZ][i] = c(1, 2);
-  columns[kZZ][i] = c(2, 2);
+void store(const Symmetric& c, CovarianceColumns& columns, std::size_t i) {
+  columns[kXX][i] = c.xx;
+  columns[kXY][i] = c.xy;
+  columns[kXZ][i] = c.xz;
+  columns[kYY][i] = c.yy;
+  columns[kYZ][i] = c.yz;
+  columns[kZZ][i] = c.zz;
+}
+
+Symmetric symmetric(const Matrix3d& m) {
+  return {m(0, 0), m(0, 1), m(0, 2), m(1, 1), m(1, 2), m(2, 2)};
+}
+
+/// A C A'
+Symmetric turned(const Matrix3d& a, const Symmetric& c) {
+  double t[3][3];
+  for (Index r = 0; r < 3; ++r) {
+    const double x = a(r, 0), y = a(r, 1), z = a(r, 2);
+    t[r][0] = x * c.xx + y * c.xy + z * c.xz;
+    t[r][1] = x * c.xy + y * c.yy + z * c.yz;
+    t[r][2] = x * c.xz + y * c.yz + z * c.zz;
+  }
+  const auto entry = [&](Index r, Index s) {
+    return t[r][0] * a(s, 0) + t[r][1] * a(s, 1) + t[r][2] * a(s, 2);
+  };
+  return {entry(0, 0), entry(0, 1), entry(0, 2), entry(1, 1), entry(1, 2), entry(2, 2)};
+}
+
+void add(const Symmetric& more, Symmetric& to) {
+  to.xx += more.xx;
+  to.xy += more.xy;
+  to.xz += more.xz;
+  to.yy += more.yy;
+  to.yz += more.yz;
+  to.zz += more.zz;
+}
+
+/// v v'
+void add_square(const Vector3d& v, Symmetric& to) {
+  add({v.x() * v.x(), v.x() * v.y(), v.x() * v.z(), v.y() * v.y(), v.y() * v.z(), v.z() * v.z()},
+      to);
+}
+
+/// [p]x diag(a, b, c) [p]x'
+void add_crossed(const Vector3d& p, double a, double b, double c, Symmetric& to) {
+  const double x = p.x(), y = p.y(), z = p.z();
+  add({z * z * b + y * y * c, -x * y * c, -x * z * b, z * z * a + x * x * c, -y * z * a,
+       y * y * a + x * x * b},
+      to);
 }
 
 /// Diagonal matrix of squares.
@@ -146,25 +195,64 @@ Georeference::~Georeference() = default;
 Georeference::Cursor::Cursor(const Georeference& georeference)
     : georeference_(&georeference), cursor_(georeference.state_->interpolation.cursor()) {}
 
-std::optional<SensorPose> Georeference::Cursor::at(std::int64_t recording_time_ns) {
+void Georeference::Cursor::set_cell(std::int64_t time_ns) {
   const State& s = *georeference_->state_;
-  const std::int64_t time_ns = recording_time_ns + s.shift_ns;
-  const std::optional<trajectories::Pose> pose = cursor_.at(time_ns);
-  if (!pose) return {};
-  SensorPose sensor;
-  sensor.body = pose->attitude.toRotationMatrix();
-  sensor.turn = sensor.body * s.body_from_sensor;
-  sensor.reference = pose->position;
-  sensor.lever = sensor.body * s.lever_arm;
-  sensor.velocity = pose->velocity;
-  sensor.rate = pose->angular_velocity;
-  const auto later = std::upper_bound(
-      s.strips.begin(), s.strips.end(), time_ns,
-      [](std::int64_t t, const trajectories::FlownStrip& strip) { return t < strip.begin_ns; });
-  if (later != s.strips.begin() && time_ns <= std::prev(later)->end_ns) {
-    sensor.strip = static_cast<std::uint16_t>(later - s.strips.begin());
+  const std::vector<std::int64_t>& times = s.platform.trajectory.time_ns;
+  begin_ns_ = end_ns_ = time_ns;
+  has_pose_ = time_ns >= times.front() && time_ns <= times.back() && times.size() > 1;
+  if (!has_pose_) return;
+  const auto later = std::upper_bound(times.begin(), times.end() - 1, time_ns);
+  const std::int64_t first = *std::prev(later), last = *later;
+  const std::int64_t cells = (last - first + kCell_ns - 1) / kCell_ns;
+  const std::int64_t cell = std::min(cells - 1, (time_ns - first) / kCell_ns);
+  begin_ns_ = first + cell * kCell_ns;
+  end_ns_ = std::min(last, begin_ns_ + kCell_ns);
+  Eigen::Matrix<double, 15, kDegree + 1> values;
+  Eigen::Matrix<double, kDegree + 1, kDegree + 1> powers;
+  for (int node = 0; node <= kDegree; ++node) {
+    const std::int64_t at = begin_ns_ + (end_ns_ - begin_ns_) * node / kDegree;
+    const std::optional<trajectories::Pose> pose = cursor_.at(at);
+    if (!pose) {  // a gap, or a record between two
+      has_pose_ = false;
+      begin_ns_ = end_ns_ = time_ns;
+      return;
+    }
+    if (node == 0) {
+      origin_ = pose->position;
+      pose_.velocity = pose->velocity;
+      pose_.rate = pose->angular_velocity;
+    }
+    const Matrix3d body = pose->attitude.toRotationMatrix();
+    const Matrix3d turn = body * s.body_from_sensor;
+    values.col(node) << pose->position - origin_, body * s.lever_arm,
+        Eigen::Map<const Eigen::Matrix<double, 9, 1>>(turn.data());
+    double power = 1;
+    for (int k = 0; k <= kDegree; ++k) {
+      powers(k, node) = power;
+      power *= 1e-9 * static_cast<double>(at - begin_ns_) / kCell;
+    }
   }
-  return sensor;
+  coefficients_ = values * powers.inverse();
+  const auto behind = std::upper_bound(
+      s.strips.begin(), s.strips.end(), begin_ns_,
+      [](std::int64_t t, const trajectories::FlownStrip& strip) { return t < strip.begin_ns; });
+  pose_.strip = 0;
+  if (behind != s.strips.begin() && begin_ns_ <= std::prev(behind)->end_ns) {
+    pose_.strip = static_cast<std::uint16_t>(behind - s.strips.begin());
+  }
+}
+
+const SensorPose* Georeference::Cursor::at(std::int64_t recording_time_ns) {
+  const std::int64_t time_ns = recording_time_ns + georeference_->state_->shift_ns;
+  if (time_ns < begin_ns_ || time_ns > end_ns_) set_cell(time_ns);
+  if (!has_pose_) return nullptr;
+  const double u = 1e-9 * static_cast<double>(time_ns - begin_ns_) / kCell;
+  Eigen::Matrix<double, 15, 1> value = coefficients_.col(kDegree);
+  for (int k = kDegree; k-- > 0;) value = u * value + coefficients_.col(k);
+  pose_.reference = origin_ + value.head<3>();
+  pose_.lever = value.segment<3>(3);
+  Eigen::Map<Eigen::Matrix<double, 9, 1>>(pose_.turn.data()) = value.tail<9>();
+  return &pose_;
 }
 
 void Georeference::announce(CloudHeader& header, bool loadings) const {
@@ -275,14 +363,18 @@ void Georeference::apply(Points& points, std::size_t sensor_factors,
     position = ned * variance.head<3>().asDiagonal() * ned.transpose();
     turning = ned * variance.tail<3>().asDiagonal() * ned.transpose();
   }
-  const Matrix3d boresight = variances(sigma[0], sigma[1], sigma[2]);
-  const Matrix3d lever = variances(sigma[3], sigma[4], sigma[5]);
+  // Of the lever arm's errors, which turn with the body, that of the middle: they are millimetres.
+  const Matrix3d body_axes = jacobian * poses[n / 2].turn * s.body_from_sensor.transpose();
+  const Symmetric shifted = symmetric(
+      position + body_axes * variances(sigma[3], sigma[4], sigma[5]) * body_axes.transpose());
+  const Symmetric turned_by = symmetric(turning);
   const std::int64_t time_shift = s.shift_ns + s.utc_shift_ns.value_or(0);
+  const bool on_map = s.map.has_value();
 
   for (std::size_t i = 0; i < n; ++i) {
     const SensorPose& pose = poses[i];
     const Vector3d place = pose.reference + arm[i];
-    const Vector3d mapped = expand || !s.map ? tangent.map(place) : s.map->project(place);
+    const Vector3d mapped = !on_map ? place : (expand ? tangent.map(place) : s.map->project(place));
     const Vector3d p(points.x[i], points.y[i], points.z[i]);
     points.x[i] = mapped.x();
     points.y[i] = mapped.y();
@@ -290,24 +382,23 @@ void Georeference::apply(Points& points, std::size_t sensor_factors,
     points.time_ns[i] += time_shift;
     points.point_source[i] = pose.strip;
     if (!covariance) continue;
-    const Matrix3d to_map = jacobian * pose.turn;  // from the sensor's axes
-    const Matrix3d from_body = jacobian * pose.body;
-    const Matrix3d crossed = cross_matrix(p);
-    const Matrix3d own = covariance_at(points.own_covariance, i);
-    store(to_map * own * to_map.transpose(), points.own_covariance, i);
-    const Matrix3d sensor =
-        covariance_at(points.covariance, i) + crossed * boresight * crossed.transpose();
-    const Matrix3d across = cross_matrix(jacobian * arm[i]);
-    const Vector3d moved = jacobian * (pose.velocity + pose.rate.cross(arm[i])) * sigma[6];
-    const Matrix3d total = to_map * sensor * to_map.transpose() +
-                           from_body * lever * from_body.transpose() + moved * moved.transpose() +
-                           position + across * turning * across.transpose();
+    const Matrix3d to_map = on_map ? Matrix3d(jacobian * pose.turn) : pose.turn;
+    const Vector3d reach = on_map ? Vector3d(jacobian * arm[i]) : arm[i];
+    const Vector3d velocity = pose.velocity + pose.rate.cross(arm[i]);
+    const Vector3d moved = sigma[6] * (on_map ? Vector3d(jacobian * velocity) : velocity);
+    store(turned(to_map, load(points.own_covariance, i)), points.own_covariance, i);
+    Symmetric sensor = load(points.covariance, i);
+    add_crossed(p, sigma[0] * sigma[0], sigma[1] * sigma[1], sigma[2] * sigma[2], sensor);
+    Symmetric total = turned(to_map, sensor);
+    add(shifted, total);
+    add(turned(cross_matrix(reach), turned_by), total);
+    add_square(moved, total);
     store(total, points.covariance, i);
     if (!loadings) continue;
     for (std::size_t k = 0; k < sensor_factors; ++k) {
       auto& f = points.loading[k];
-      const Vector3d turned = to_map * Vector3d(f[0][i], f[1][i], f[2][i]);
-      for (std::size_t axis = 0; axis < 3; ++axis) f[axis][i] = turned[static_cast<Index>(axis)];
+      const Vector3d on_axes = to_map * Vector3d(f[0][i], f[1][i], f[2][i]);
+      for (std::size_t axis = 0; axis < 3; ++axis) f[axis][i] = on_axes[static_cast<Index>(axis)];
     }
     std::size_t at = sensor_factors;
     const auto put = [&](const Vector3d& loading) {
@@ -320,6 +411,7 @@ void Georeference::apply(Points& points, std::size_t sensor_factors,
       const double one = sigma[static_cast<std::size_t>(k)];
       if (one > 0) put(to_map * (one * Vector3d::Unit(k).cross(p)));
     }
+    const Matrix3d from_body = to_map * s.body_from_sensor.transpose();
     for (Index k = 0; k < 3; ++k) {
       const double one = sigma[static_cast<std::size_t>(k) + 3];
       if (one > 0) put(one * from_body.col(k));

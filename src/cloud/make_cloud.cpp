@@ -39,6 +39,7 @@ constexpr std::size_t kReportedRows = std::size_t{1} << 16;
 constexpr std::int64_t kSurfaceNs = 1'000'000'000;
 /// The same for a moving sensor, whose shots are put together as if it stood still.
 constexpr std::int64_t kMovingSurfaceNs = 200'000'000;
+constexpr std::size_t kMovingSurfaceShots = 8000;
 /// Shots of it that tell a surface: on the 1160 cells of a Mid-40's field of view, a circle of 38.4
 /// degrees, 14 each and 120 in a block of nine.
 constexpr std::size_t kSurfaceShots = 16000;
@@ -260,10 +261,12 @@ class Work {
     std::optional<Georeference::Cursor> cursor;
     if (georeference_) {
       cursor.emplace(*georeference_);
-      surface_pose_ =
+      const SensorPose* pose =
           cursor->at(piece_.time_ns[begin] + (piece_.time_ns[end - 1] - piece_.time_ns[begin]) / 2);
+      surface_pose_ = pose != nullptr ? std::optional(*pose) : std::nullopt;
     }
-    const std::size_t stride = std::max<std::size_t>(1, (end - begin) / kSurfaceShots);
+    const std::size_t most = cursor ? kMovingSurfaceShots : kSurfaceShots;
+    const std::size_t stride = std::max<std::size_t>(1, (end - begin) / most);
     for (std::size_t row = begin; row < end; row += stride) {
       if (!has_return(row)) continue;
       const double range = piece_.range[row] - calibration_.range_offset;
@@ -271,8 +274,8 @@ class Work {
         normals_->add(piece_.azimuth[row], piece_.zenith[row], range);
         continue;
       }
-      const std::optional<SensorPose> pose = cursor->at(piece_.time_ns[row]);
-      if (!pose || !surface_pose_) continue;
+      const SensorPose* pose = cursor->at(piece_.time_ns[row]);
+      if (pose == nullptr || !surface_pose_) continue;
       const Stood shot = stood_still(*pose, piece_.azimuth[row], piece_.zenith[row], range);
       normals_->add(shot.azimuth, shot.zenith, shot.range);
     }
@@ -316,8 +319,8 @@ class Work {
     block.poses.clear();
     std::size_t kept = 0;
     for (std::size_t i = 0; i < block.rows.size(); ++i) {
-      const std::optional<SensorPose> pose = cursor.at(piece_.time_ns[block.rows[i]]);
-      if (!pose) continue;
+      const SensorPose* pose = cursor.at(piece_.time_ns[block.rows[i]]);
+      if (pose == nullptr) continue;
       block.poses.push_back(*pose);
       block.rows[kept] = block.rows[i];
       block.returns[kept++] = block.returns[i];

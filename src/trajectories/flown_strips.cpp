@@ -19,6 +19,7 @@ constexpr std::int64_t kStripSecond = 1'000'000'000;
 struct SecondOfFlight {
   std::int64_t begin_ns = 0;
   double course = 0, way = 0;  ///< rad, m
+  double heading = 0;          ///< of the body where the second begins, rad
 };
 
 /// The whole seconds of a flight that have poses at both ends and no gap between.
@@ -32,7 +33,10 @@ std::vector<SecondOfFlight> seconds_of_flight(const Interpolation& interpolation
     if (before && pose) {
       const Eigen::Vector3d way =
           ned_axes(all.frame, before->position).transpose() * (pose->position - before->position);
-      seconds.push_back({t - kStripSecond, std::atan2(way.y(), way.x()), way.head<2>().norm()});
+      const double heading =
+          roll_pitch_heading(all.frame, before->position, before->attitude).heading;
+      seconds.push_back(
+          {t - kStripSecond, std::atan2(way.y(), way.x()), way.head<2>().norm(), heading});
     }
     before = pose;
   }
@@ -59,6 +63,7 @@ std::vector<FlownStrip> flown_strips(const Interpolation& interpolation,
   for (std::size_t i = 0; i < seconds.size();) {
     std::size_t end = i;
     double lowest = 0, highest = 0, course = seconds[i].course, length = 0;
+    double left = 0, right = 0;  // of the heading in the beginning
     while (end < seconds.size() && seconds[end].way > 0 && seconds[end].way >= least) {
       if (end > i) {
         if (seconds[end].begin_ns != seconds[end - 1].begin_ns + kStripSecond) break;
@@ -68,6 +73,10 @@ std::vector<FlownStrip> flown_strips(const Interpolation& interpolation,
       }
       const double off = course - seconds[i].course;
       if (std::max(highest, off) - std::min(lowest, off) > options.widest_course) break;
+      const double turned = wrap_to_pi(seconds[end].heading - seconds[i].heading);
+      if (std::max(right, turned) - std::min(left, turned) > options.widest_course) break;
+      left = std::min(left, turned);
+      right = std::max(right, turned);
       lowest = std::min(lowest, off);
       highest = std::max(highest, off);
       length += seconds[end].way;

@@ -141,9 +141,9 @@ std::vector<SensorPose> poses(const Georeference& georeference, const Points& po
   Georeference::Cursor cursor(georeference);
   std::vector<SensorPose> result;
   for (const std::int64_t time_ns : points.time_ns) {
-    const auto pose = cursor.at(time_ns);
-    EXPECT_TRUE(pose) << time_ns;
-    result.push_back(pose.value_or(SensorPose{}));
+    const SensorPose* pose = cursor.at(time_ns);
+    EXPECT_NE(pose, nullptr) << time_ns;
+    result.push_back(pose != nullptr ? *pose : SensorPose{});
   }
   return result;
 }
@@ -423,7 +423,7 @@ TEST(Georeference, RefusesWhatCannotBe) {
   const MovingPlatform bare{trajectory(1), mount(), {}, ""};
   const Georeference georeference(bare, recordings::TimeReference::relative, 0);
   Georeference::Cursor cursor(georeference);
-  EXPECT_FALSE(cursor.at(0)) << "outside of the trajectory";
+  EXPECT_EQ(cursor.at(0), nullptr) << "outside of the trajectory";
   ASSERT_EQ(georeference.warnings().size(), 3u);
   EXPECT_NE(georeference.warnings()[0].find("nobody says how wrong"), std::string::npos);
   EXPECT_NE(georeference.warnings()[1].find("does not say what its clock counts"),

@@ -37,12 +37,11 @@ struct MovingPlatform {
 /// Where a sensor is at the time of a shot, in the trajectory's frame.
 struct SensorPose {
   Eigen::Matrix3d turn = Eigen::Matrix3d::Identity();  ///< frame from sensor
-  Eigen::Matrix3d body = Eigen::Matrix3d::Identity();  ///< frame from body
   Eigen::Vector3d reference{0, 0, 0};                  ///< the trajectory's reference point, m
   Eigen::Vector3d lever{0, 0, 0};                      ///< from there to the sensor's origin, m
-  Eigen::Vector3d velocity{0, 0, 0};                   ///< of the reference point, m/s
-  Eigen::Vector3d rate{0, 0, 0};                       ///< of turning, rad/s
-  std::uint16_t strip = 0;                             ///< from 1; 0: of none
+  Eigen::Vector3d velocity{0, 0, 0};  ///< of the reference point, to some milliseconds, m/s
+  Eigen::Vector3d rate{0, 0, 0};      ///< of turning, to some milliseconds, rad/s
+  std::uint16_t strip = 0;            ///< from 1; 0: of none
 };
 
 /// Points of a moving sensor: from its own frame to a map, with the covariance that mount and
@@ -64,12 +63,23 @@ class Georeference {
   class Cursor {
    public:
     explicit Cursor(const Georeference& georeference);
-    /// The pose at a time of the recording, or nothing where the trajectory has none.
-    std::optional<SensorPose> at(std::int64_t recording_time_ns);
+    /// The pose at a time of the recording, or nullptr where the trajectory has none; valid until
+    /// the next call.
+    const SensorPose* at(std::int64_t recording_time_ns);
 
    private:
+    void set_cell(std::int64_t time_ns);
+
     const Georeference* georeference_;
     trajectories::Interpolation::Cursor cursor_;
+    // A stretch of some milliseconds without a record inside, where a polynomial of time repeats
+    // the interpolation: reference point less its place in the beginning, lever arm, rotation.
+    static constexpr int kDegree = 5;
+    std::int64_t begin_ns_ = 1, end_ns_ = 0;  // both included
+    bool has_pose_ = false;
+    Eigen::Matrix<double, 15, kDegree + 1> coefficients_;
+    Eigen::Vector3d origin_;
+    SensorPose pose_;
   };
 
   /// Fills what a cloud's header says of frame, times, strips, trajectory and common factors.

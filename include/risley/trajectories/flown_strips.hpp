@@ -18,13 +18,15 @@ struct FlownStrip {
 
 struct FlownStripOptions {
   double fastest_turn = 0.0523598775598299;  ///< of the course within a strip, rad/s: 3 degrees/s
-  double widest_course = 0.349065850398866;  ///< courses of a strip differ by no more, rad: 20 deg
-  double slowest_share = 0.5;                ///< of the median speed
-  double shortest_s = 5;                     ///< s
+  /// Courses of a strip differ by no more, and headings, rad: 20 degrees.
+  double widest_course = 0.349065850398866;
+  double slowest_share = 0.5;  ///< of the median speed
+  double shortest_s = 5;       ///< s
 };
 
-/// The strips of a flight in the order of time: where the platform moves on without turning. Course
-/// and speed are taken over a second, so that shaking does not count.
+/// The strips of a flight in the order of time: where the platform moves on without turning,
+/// neither its way nor its body. Course and speed are taken over a second, so that shaking does not
+/// count.
 /// @throws InvalidArgument for options that are not above 0
 std::vector<FlownStrip> flown_strips(const Interpolation& interpolation,
                                      const FlownStripOptions& options = {});
