@@ -93,7 +93,7 @@ void Interpolation::Cursor::set_interval(std::size_t row) {
   std::array<Vector6, kPoints> values;
   std::size_t points = 0;
   const auto add = [&](std::size_t record, const Eigen::Vector3d& neighbour) -> Eigen::Vector3d {
-    const Eigen::Vector3d turn = nearest_turn(
+    Eigen::Vector3d turn = nearest_turn(
         rotation_vector(all.attitude[row].conjugate() * all.attitude[record]), neighbour);
     at[points] = 1e-9 * static_cast<double>(all.time_ns[record] - begin_ns_) / interval_;
     values[points++] << all.position[record] - all.position[row], turn;

@@ -83,8 +83,7 @@ void PoseRows::add(const PoseRow& row, const FilePlace& place) {
                           std::string_view unit) {
     for (const double value : values) check(name, value, -most, most, unit);
   };
-  // Half a degree more than a turn: rounded values, and headings counted either way.
-  constexpr double kTurn = 365 * kRadiansPerDegree;
+  constexpr double kTurn_deg = 365;  // rounded values lie beyond 360
   if (contents_.frame == Frame::geocentric) {
     const auto in_degrees = [](double angle) { return degrees_from_radians(angle); };
     constexpr std::string_view kHint =
@@ -95,9 +94,9 @@ void PoseRows::add(const PoseRow& row, const FilePlace& place) {
     Geodetic within = row.place;
     within.latitude = std::clamp(within.latitude, -kPi / 2, kPi / 2);
     within.longitude = std::clamp(within.longitude, -kTwoPi, kTwoPi);
-    check("roll", row.angles.roll, -kTurn, kTurn, "rad");
-    check("pitch", row.angles.pitch, -kPi / 2 - 1e-6, kPi / 2 + 1e-6, "rad");
-    check("heading", row.angles.heading, -2 * kTurn, 2 * kTurn, "rad");
+    check("roll", in_degrees(row.angles.roll), -kTurn_deg, kTurn_deg, "deg", kHint);
+    check("pitch", in_degrees(row.angles.pitch), -90.0001, 90.0001, "deg", kHint);
+    check("heading", in_degrees(row.angles.heading), -2 * kTurn_deg, 2 * kTurn_deg, "deg", kHint);
     trajectory_.attitude.push_back(Eigen::Quaterniond(geocentric_from_ned(within)) *
                                    ned_from_body(row.angles));
     trajectory_.attitude.back().normalize();
@@ -112,7 +111,7 @@ void PoseRows::add(const PoseRow& row, const FilePlace& place) {
     trajectory_.velocity.push_back(row.velocity);
   }
   if (contents_.has_wander) {
-    check("wander angle", row.wander, -kTurn, kTurn, "rad");
+    check("wander angle", degrees_from_radians(row.wander), -kTurn_deg, kTurn_deg, "deg");
     wander_.push_back(row.wander);
   }
   if (contents_.has_accuracy) {

@@ -152,9 +152,10 @@ void add_accuracies(Trajectory& trajectory, const AccuracyRecords& accuracies,
   // Either file may have run on beyond the end of a week.
   std::int64_t shift = 0;
   if (const auto period = period_ns(trajectory.time_scale)) {
-    const double apart =
-        static_cast<double>(trajectory.time_ns.front() / 2 + trajectory.time_ns.back() / 2) -
-        static_cast<double>(times.front() / 2 + times.back() / 2);
+    const auto middle_of = [](const std::vector<std::int64_t>& ordered) {
+      return 0.5 * (static_cast<double>(ordered.front()) + static_cast<double>(ordered.back()));
+    };
+    const double apart = middle_of(trajectory.time_ns) - middle_of(times);
     shift = std::llround(apart / static_cast<double>(*period)) * *period;
   }
   std::vector<std::int64_t> steps;
