@@ -27,6 +27,7 @@ _risley() {
     --directions) choices="smoothed reported" ;;
     --time) choices="gps recording" ;;
     --sensor-type) choices="avia horizon mid-40 mid-70 tele-15" ;;
+    --trajectory-format) choices="csv sbet" ;;
     --rotor) choices="constant sinusoidal hunting random-walk" ;;
     --method) case $verb in calibrate) choices="adjustment paper" ;; *) choices="map ekf" ;; esac ;;
     --states) choices="knots all none" ;;
@@ -71,7 +72,8 @@ _risley() {
       simulate)
         choices="$common --output --sensor --duration-s --rate-hz --noise-angle-deg
           --noise-range-m --quantize --beam-origin --rotor --set --reported --scene --station
-          --start-angles-deg" ;;
+          --trajectory --flight --mount --trajectory-errors --trajectory-format --start-s
+          --clock-drift-ppm --start-angles-deg" ;;
       estimate)
         choices="$common --output --method --rate-hz --noise-angle-deg --sensor --fix --free
           --states --mirror --process-noise --truth --shot-rate-hz --extrinsics" ;;

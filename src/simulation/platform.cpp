@@ -43,8 +43,9 @@ std::int64_t first_clock_reading_ns(const Platform& platform) {
   require_between("clock_drift", platform.clock_drift, -kLargestDrift, kLargestDrift, "s/s");
   const std::int64_t begin =
       platform.begin_ns.value_or(platform.trajectory->time_ns.front()) - offset_ns_of(platform);
+  if (begin <= 0) return 0;  // clocks begin with 0
   const std::int64_t rest = begin % kMillisecond_ns;
-  return rest == 0 ? begin : begin - rest + (rest > 0 ? kMillisecond_ns : 0);
+  return rest == 0 ? begin : begin - rest + kMillisecond_ns;
 }
 
 double longest_duration(const Platform& platform) {

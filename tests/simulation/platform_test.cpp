@@ -265,6 +265,10 @@ TEST(Platform, TheRecordingKeepsItsOwnClock) {
   EXPECT_NEAR(longest_duration(*s.platform), (4.0 - 0.0003) / (1 + 20e-6), 1e-9);
   s.platform->begin_ns = 8'500'000'000;
   EXPECT_EQ(scan(s).truth.time_ns.front(), 8'488'000'000);
+  // A clock does not begin before 0, whatever its offset.
+  s.platform->begin_ns.reset();
+  s.platform->mount.clock_offset.value = 7.5;
+  EXPECT_EQ(scan(s).truth.time_ns.front(), 0);
   auto unix_time = std::make_shared<trajectories::Trajectory>(*s.platform->trajectory);
   unix_time->time_scale = trajectories::TimeScale::utc_unix;
   s.platform->trajectory = unix_time;

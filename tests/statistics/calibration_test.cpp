@@ -323,7 +323,7 @@ PrismTrain adjusted_with_true_labels(const WallRecording& walls) {
       std::hypot(*options.range_noise, options.sensor.range_resolution / std::sqrt(12.0));
   const std::vector<scenes::ScenePlane>& planes = walls.settings.scene->planes;
   std::vector<std::vector<std::size_t>> rows(planes.size());
-  for (std::size_t i = 0; i < walls.size(); ++i) rows[walls.hit(i).plane].push_back(i);
+  for (std::size_t i = 0; i < walls.size(); ++i) rows[walls.hit(i).surface].push_back(i);
   for (std::size_t p = 0; p < planes.size(); ++p) {
     if (rows[p].empty()) continue;
     const auto shots = std::make_shared<calibration::RangedShots>();

@@ -29,7 +29,7 @@ struct Platform {
   trajectories::Mount mount;
   double clock_drift = 0;  ///< what the trajectory's time gains on the recording's clock, s/s
   /// Time of the trajectory at which the recording begins; empty: at its first record. The clock
-  /// begins with the next whole millisecond.
+  /// begins with the next whole millisecond, and not before 0.
   std::optional<std::int64_t> begin_ns;
   /// Where x = y = z = 0 of the scene is on the Earth, its axes east, north and up there; empty:
   /// where its terrain says. A local trajectory has the scene's axes.
