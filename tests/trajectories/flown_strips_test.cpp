@@ -23,8 +23,8 @@ TEST(FlownStrips, ThoseOfThePlanAreFound) {
     ASSERT_EQ(found.size(), flight.strips.size()) << name;
     for (std::size_t i = 0; i < found.size(); ++i) {
       // The straight lead and the beginnings of turns may be taken along.
-      EXPECT_LT(std::abs(found[i].begin_ns - flight.strips[i].begin_ns), 5'000'000'000) << i;
-      EXPECT_LT(std::abs(found[i].end_ns - flight.strips[i].end_ns), 5'000'000'000) << i;
+      EXPECT_LT(std::abs(found[i].begin_ns - flight.strips[i].begin_ns), 6'000'000'000) << i;
+      EXPECT_LT(std::abs(found[i].end_ns - flight.strips[i].end_ns), 6'000'000'000) << i;
       EXPECT_LT(std::abs(wrap_to_pi(found[i].course - plan.strips[i].heading)),
                 radians_from_degrees(5))
           << i;

@@ -21,7 +21,7 @@ struct FlownStripOptions {
   /// Courses of a strip differ by no more, and headings, rad: 20 degrees.
   double widest_course = 0.349065850398866;
   double slowest_share = 0.5;  ///< of the median speed
-  double shortest_s = 5;       ///< s
+  double shortest_s = 10;      ///< s
 };
 
 /// The strips of a flight in the order of time: where the platform moves on without turning,
