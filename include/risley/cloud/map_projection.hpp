@@ -11,7 +11,8 @@
 namespace risley::cloud {
 
 /// The second-order expansion of a map about one place: coordinates within some hundred metres to
-/// millionths of a metre (1e-6 m at 300 m, 2e-6 m at 500 m), without a call of the projection library.
+/// millionths of a metre (1e-6 m at 300 m, 2e-6 m at 500 m), without a call of the projection
+/// library.
 class MapTangent {
  public:
   /// Of a map that leaves coordinates as they are.
