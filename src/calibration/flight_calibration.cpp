@@ -43,6 +43,9 @@ constexpr double kUntold = 1;
 /// A mean error of the trajectory that keeps this part of its sigma and goes with a boresight angle
 /// by this correlation is told as a sum with it only.
 constexpr double kKeptSigma = 0.6, kTiedCorrelation = 0.8;
+/// Done when a step promises less, in squared sigmas of all unknowns together: shots that come and
+/// go at the gate move the answer by about as much.
+constexpr double kSettled = 0.1;
 constexpr std::size_t kDatumBeams = 4000, kLeastCells = 20;
 
 /// What of the globals a round adjusts.
@@ -56,8 +59,8 @@ struct CoarseRound {
 
 /// From metres off to centimetres: docs/theory/flight.md
 constexpr CoarseRound kCoarseRounds[] = {
-    {10, Unlocked::boresight, 2}, {10, Unlocked::boresight, 2}, {6, Unlocked::boresight, 2},
-    {4, Unlocked::boresight, 2},  {4, Unlocked::prisms, 2},     {3, Unlocked::prisms, 2},
+    {10, Unlocked::boresight, 2},       {10, Unlocked::boresight, 2}, {6, Unlocked::boresight, 2},
+    {4, Unlocked::boresight, 2},        {4, Unlocked::prisms, 2},     {3, Unlocked::prisms, 2},
     {2.5, Unlocked::range_and_clock, 2}};
 constexpr int kAllRounds = 3, kFullRounds = 2;
 
@@ -116,7 +119,8 @@ class FlightWork {
     require_length("rotation_angle", shots.rotation_angle.size(),
                    static_cast<std::size_t>(options_.sensor.prisms()));
     check_beams(options_.sensor.train, shots.beam, shots.size());
-    require_above("range noise", options_.range_noise.value_or(options_.sensor.range_noise), 0, "m");
+    require_above("range noise", options_.range_noise.value_or(options_.sensor.range_noise), 0,
+                  "m");
     require_not_below("sigma of the range offset", options_.range_offset_sigma, 0, "m");
     require_above("prior sigma of angles", options_.angle_sigma, 0, "rad");
     require_not_below("noise of the rotation angles", options_.rotation_angle_sigma, 0, "rad");
@@ -148,8 +152,8 @@ class FlightWork {
           "all shots are of one strip: at least two that overlap are needed, best crossing ones");
     }
     // Not every n-th one: that would beat with the rotors.
-    const double share = static_cast<double>(options_.coarse_shots) /
-                         static_cast<double>(full_.shots.size());
+    const double share =
+        static_cast<double>(options_.coarse_shots) / static_cast<double>(full_.shots.size());
     if (share >= 1) {
       coarse_.shots = full_.shots;
     } else {
@@ -175,8 +179,7 @@ class FlightWork {
   FlightWeights weights() const {
     FlightWeights weights;
     weights.range_variance = range_variance_;
-    weights.rotation_angle_variance =
-        options_.rotation_angle_sigma * options_.rotation_angle_sigma;
+    weights.rotation_angle_variance = options_.rotation_angle_sigma * options_.rotation_angle_sigma;
     weights.white_attitude = options_.process.white_attitude;
     weights.sample_interval = options_.process.sample_interval;
     return weights;
@@ -217,15 +220,17 @@ class FlightWork {
     progress_.check();
     FlightAdjustmentOptions options;
     options.most_steps = steps;
-    FlightAdjustment adjusted = adjust_flight(flight.shots, flight.poses, flight.cells.plane, model_,
-                                              weights, priors_, options);
+    options.tolerance = kSettled;
+    FlightAdjustment adjusted = adjust_flight(flight.shots, flight.poses, flight.cells.plane,
+                                              model_, weights, priors_, options);
     model_ = std::move(adjusted.model);
     const VectorXd values = unknown_values(model_);
     if (values.head<3>().norm() > 1 || model_.lever_arm.norm() > 100 ||
         std::abs(model_.clock_offset - options_.mount.clock_offset.value) >
             std::max(1e-3, kPoseMargin * options_.mount.clock_offset.sigma)) {
       throw EstimationError(
-          "the adjustment ran away: boresight, lever arm or clock offset are far from what the mount "
+          "the adjustment ran away: boresight, lever arm or clock offset are far from what the "
+          "mount "
           "states; are the axes of the mount right, and the times of sensor and trajectory?");
     }
     return adjusted;
@@ -271,8 +276,8 @@ class FlightWork {
 
   /// What a piece of the flight adds to what the residuals say of the ranges' noise.
   struct PieceScatter {
-    double squares = 0;   ///< over the shots' own variance
-    double metres2 = 0;   ///< of the residuals
+    double squares = 0;  ///< over the shots' own variance
+    double metres2 = 0;  ///< of the residuals
     std::size_t count = 0;
     double time = 0;
   };
@@ -280,22 +285,22 @@ class FlightWork {
   std::vector<PieceScatter> scatter_of(const LabelledFlight& flight, const FlightWeights& weights) {
     std::vector<PieceScatter> pieces(flight_pieces(model_));
     const std::int64_t begin_ns = flight.shots.time_ns.front();
-    for_each_flight_piece(
-        flight.shots, flight.poses, flight.cells.plane, model_, weights,
-        [&](std::size_t piece, const FlightRows& rows) {
-          PieceScatter& own = pieces[piece];
-          if (rows.begin == rows.end) return;
-          own.time = 0.5 * (seconds(flight.shots.time_ns[rows.begin] - begin_ns) +
-                            seconds(flight.shots.time_ns[rows.end - 1] - begin_ns));
-          const auto columns = static_cast<std::size_t>(rows.columns);
-          for (std::size_t i = 0; i < rows.shots.size(); ++i) {
-            const double* row = rows.values.data() + (i + 1) * columns - 3;
-            if (row[2] == 0) continue;
-            own.squares += row[0] * row[0] / row[1];
-            own.metres2 += row[0] * row[0];
-            ++own.count;
-          }
-        });
+    for_each_flight_piece(flight.shots, flight.poses, flight.cells.plane, model_, weights,
+                          [&](std::size_t piece, const FlightRows& rows) {
+                            PieceScatter& own = pieces[piece];
+                            if (rows.begin == rows.end) return;
+                            own.time =
+                                0.5 * (seconds(flight.shots.time_ns[rows.begin] - begin_ns) +
+                                       seconds(flight.shots.time_ns[rows.end - 1] - begin_ns));
+                            const auto columns = static_cast<std::size_t>(rows.columns);
+                            for (std::size_t i = 0; i < rows.shots.size(); ++i) {
+                              const double* row = rows.values.data() + (i + 1) * columns - 3;
+                              if (row[2] == 0) continue;
+                              own.squares += row[0] * row[0] / row[1];
+                              own.metres2 += row[0] * row[0];
+                              ++own.count;
+                            }
+                          });
     return pieces;
   }
 
@@ -305,12 +310,13 @@ class FlightWork {
     for (const auto& interval : model_.knots.intervals) {
       flown += seconds(interval.end_ns - interval.begin_ns);
     }
-    const double room = std::max(1.0, static_cast<double>(options_.most_knots) -
-                                          static_cast<double>(full_.shots.strips()));
+    const double room = std::max(
+        1.0, static_cast<double>(options_.most_knots) - static_cast<double>(full_.shots.strips()));
     if (flown / room > spacing) {
       spacing = flown / room;
       result_.warnings.push_back(fmt::format(
-          "corrections of the trajectory have knots every {:.2f} s instead of {:g}, since {:.0f} s of "
+          "corrections of the trajectory have knots every {:.2f} s instead of {:g}, since {:.0f} s "
+          "of "
           "flight would need more than {} of them; sigmas consider what happens between",
           spacing, options_.knot_spacing, flown, options_.most_knots));
     }
@@ -365,9 +371,9 @@ class FlightWork {
   LabelledFlight full_, coarse_;
   FlightModel model_;
   FlightPriors priors_;
-  VectorXd prior_sigma_;         // [globals]
-  std::size_t considered_ = 0;   // last so many free parameters: held, and may be off
-  double range_variance_ = 0;    // m^2
+  VectorXd prior_sigma_;        // [globals]
+  std::size_t considered_ = 0;  // last so many free parameters: held, and may be off
+  double range_variance_ = 0;   // m^2
   int grids_ = 0;
   FlightAdjustment last_;
   FlightWeights final_weights_;
@@ -493,8 +499,8 @@ void FlightWork::fill_result() {
     result_.piece_time.push_back(piece.time);
     result_.piece_rms.push_back(std::sqrt(piece.metres2 / static_cast<double>(piece.count)));
   }
-  const FlightEquations equations = flight_equations(full_.shots, full_.poses, full_.cells.plane,
-                                                     model_, final_weights_);
+  const FlightEquations equations =
+      flight_equations(full_.shots, full_.poses, full_.cells.plane, model_, final_weights_);
   const FlightSystem system(equations, model_, priors_);
   progress_.report(0.93);
   fill_unknowns(system);
@@ -502,7 +508,9 @@ void FlightWork::fill_result() {
   result_.tangent = tangent_;
   result_.converged = last_.converged && result_.reason.empty();
   if (!last_.converged && result_.reason.empty()) {
-    result_.reason = "the adjustment had not settled after its last round";
+    result_.reason = fmt::format(
+        "the adjustment had not settled: its last step still promised {:.2g} squared sigmas",
+        last_.promised);
   }
   result_.model = std::move(model_);
 }
@@ -554,8 +562,8 @@ void FlightWork::fill_unknowns(const FlightSystem& system) {
     own.prior_share = std::min(1.0, std::pow(own.sigma / own.prior_sigma, 2));
     for (Index j = 0; j < globals; ++j) {
       if (j == i || priors_.held[static_cast<std::size_t>(j)]) continue;
-      const double correlation = result_.covariance(i, j) /
-                                 std::sqrt(result_.covariance(i, i) * result_.covariance(j, j));
+      const double correlation =
+          result_.covariance(i, j) / std::sqrt(result_.covariance(i, i) * result_.covariance(j, j));
       if (std::abs(correlation) > std::abs(own.twin_correlation)) {
         own.twin_correlation = correlation;
         own.twin = names[static_cast<std::size_t>(j)];
@@ -599,8 +607,8 @@ void FlightWork::fill_unknowns(const FlightSystem& system) {
   sensor.covariance.resize(count, count);
   for (Index i = 0; i < count; ++i) {
     for (Index j = 0; j < count; ++j) {
-      sensor.covariance(i, j) = result_.covariance(kept[static_cast<std::size_t>(i)],
-                                                   kept[static_cast<std::size_t>(j)]);
+      sensor.covariance(i, j) =
+          result_.covariance(kept[static_cast<std::size_t>(i)], kept[static_cast<std::size_t>(j)]);
     }
   }
 }
@@ -619,8 +627,8 @@ void FlightWork::fill_datum(const MatrixXd& movement) {
     ranges.push_back(shots.range[row]);
   }
   HeldMovement bundle;
-  bundle.train = MatrixXd::Zero(static_cast<Index>(model_.train.parameters().size()),
-                                movement.cols());
+  bundle.train =
+      MatrixXd::Zero(static_cast<Index>(model_.train.parameters().size()), movement.cols());
   bundle.rotation_angles = MatrixXd::Zero(model_.train.prisms(), movement.cols());
   bundle.turn = movement.topRows<3>();
   for (std::size_t j = 0; j < model_.free.size(); ++j) {
@@ -689,10 +697,9 @@ void FlightWork::fill_not_told(const MatrixXd& all) {
       if (priors_.held[static_cast<std::size_t>(i)]) continue;
       const double correlation = all(i, globals + c) / std::sqrt(all(i, i) * variance);
       if (std::abs(correlation) < kTiedCorrelation) continue;
-      result_.not_told.push_back(
-          {fmt::format("{} against the {} of the trajectory", names[static_cast<std::size_t>(i)],
-                       kMeans[c - 3]),
-           kept});
+      result_.not_told.push_back({fmt::format("{} against the {} of the trajectory",
+                                              names[static_cast<std::size_t>(i)], kMeans[c - 3]),
+                                  kept});
     }
   }
 }
@@ -735,8 +742,7 @@ PoseErrors correction_at(const FlightModel& model, const PoseErrorProcess& proce
     const double after =
         next == knots.size() ? 0 : std::exp(-seconds(knots.time_ns[next] - time_ns) / time);
     const double both = before * after;
-    const double left =
-        next == 0 ? 0 : model.corrections(c, static_cast<Index>(next) - 1);
+    const double left = next == 0 ? 0 : model.corrections(c, static_cast<Index>(next) - 1);
     const double right = next == knots.size() ? 0 : model.corrections(c, static_cast<Index>(next));
     const double rest = std::max(1 - both * both, 1e-15);
     error[c] = (before * (1 - after * after) * left + after * (1 - before * before) * right) / rest;

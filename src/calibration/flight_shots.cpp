@@ -18,8 +18,10 @@
 namespace risley::calibration {
 namespace {
 
-constexpr double kLongestClockOffset = 86400;  // s
-constexpr double kNanoseconds = 1e9;           // of a second
+constexpr double kLongestClockOffset = 86400;        // s
+constexpr double kNanoseconds = 1e9;                 // of a second
+constexpr std::int64_t kRateWindow_ns = 50'000'000;  // to each side
+constexpr double kLatestTime_ns = 4.6e18;            // half of what 64 bits hold
 
 std::int64_t nanoseconds(double seconds) {
   return static_cast<std::int64_t>(std::llround(seconds * kNanoseconds));
@@ -27,6 +29,54 @@ std::int64_t nanoseconds(double seconds) {
 
 [[noreturn]] void refuse_row(std::string_view column, std::size_t row, std::string_view what) {
   throw InvalidArgument(fmt::format("{}[{}] {}", column, row, what));
+}
+
+/// Velocity and angular velocity at a record, local axes.
+struct Rates {
+  Eigen::Vector3d velocity{0, 0, 0}, angular_velocity{0, 0, 0};
+};
+
+/// Slopes of straight lines through the records around each. What the clock's derivative is made of
+/// must not hold the noise of single records: it would go along with the residuals that the same
+/// noise makes, and that bias more shots do not cure. docs/theory/flight.md
+std::vector<Rates> smooth_rates(const trajectories::Interpolation& local) {
+  const trajectories::Trajectory& trajectory = local.trajectory();
+  const auto& times = trajectory.time_ns;
+  std::vector<std::uint8_t> gap_behind(times.size());
+  for (const trajectories::TrajectoryGap& gap : local.gaps()) gap_behind[gap.row] = 1;
+  std::vector<Rates> rates(times.size());
+  for_each_block(times.size(), [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      // At least one neighbour on each side, where there is one.
+      std::size_t first = i, last = i;
+      while (first > 0 && gap_behind[first - 1] == 0 &&
+             (first == i || times[i] - times[first - 1] <= kRateWindow_ns)) {
+        --first;
+      }
+      while (last + 1 < times.size() && gap_behind[last] == 0 &&
+             (last == i || times[last + 1] - times[i] <= kRateWindow_ns)) {
+        ++last;
+      }
+      if (first == last) continue;
+      const Eigen::Quaterniond back = trajectory.attitude[i].conjugate();
+      double middle = 0, squares = 0;
+      for (std::size_t j = first; j <= last; ++j) {
+        middle += static_cast<double>(times[j] - times[i]) / kNanoseconds;
+      }
+      middle /= static_cast<double>(last - first + 1);
+      Rates& own = rates[i];
+      for (std::size_t j = first; j <= last; ++j) {
+        const double time = static_cast<double>(times[j] - times[i]) / kNanoseconds - middle;
+        const Eigen::Quaterniond turn = trajectory.attitude[j] * back;
+        own.velocity += time * (trajectory.position[j] - trajectory.position[i]);
+        own.angular_velocity += time * (turn.w() < 0 ? -2.0 : 2.0) * turn.vec();
+        squares += time * time;
+      }
+      own.velocity /= squares;
+      own.angular_velocity /= squares;
+    }
+  });
+  return rates;
 }
 
 /// Columns of the rows that a function names.
@@ -57,6 +107,10 @@ void require_flight_shots(const FlightShots& shots) {
       if (!std::isfinite(column[i])) {
         refuse_row("rotation_angle", i, fmt::format("= {} rad, allowed finite", column[i]));
       }
+    }
+    if (std::abs(static_cast<double>(shots.time_ns[i])) > kLatestTime_ns) {
+      refuse_row("time_ns", i,
+                 fmt::format("= {}, allowed within 146 years of 0", shots.time_ns[i]));
     }
     if (i == 0) continue;
     if (shots.time_ns[i] < shots.time_ns[i - 1]) {
@@ -122,9 +176,14 @@ ShotPoses poses_of(const FlightShots& shots, const trajectories::Interpolation& 
   ShotPoses poses;
   poses.clock_offset = clock_offset;
   poses.pose.resize(shots.size());
+  const std::vector<Rates> rates = smooth_rates(local);
+  const auto& times = local.trajectory().time_ns;
   std::atomic<std::size_t> missing = std::numeric_limits<std::size_t>::max();
   for_each_block(shots.size(), [&](std::size_t begin, std::size_t end) {
     auto cursor = local.cursor();
+    const auto behind = std::upper_bound(times.begin(), times.end(), shots.time_ns[begin] + shift);
+    std::size_t record =
+        static_cast<std::size_t>(std::max<std::ptrdiff_t>(behind - times.begin(), 1)) - 1;
     for (std::size_t i = begin; i < end; ++i) {
       const auto found = cursor.at(shots.time_ns[i] + shift);
       if (!found) {
@@ -137,10 +196,20 @@ ShotPoses poses_of(const FlightShots& shots, const trajectories::Interpolation& 
       const Eigen::Quaterniond attitude = found->attitude.normalized();
       const double quaternion[4] = {attitude.w(), attitude.x(), attitude.y(), attitude.z()};
       std::copy(quaternion, quaternion + 4, pose.attitude);
+      const auto time = shots.time_ns[i] + shift;
+      while (record + 1 < times.size() && times[record + 1] <= time) ++record;
+      const std::size_t next = std::min(record + 1, times.size() - 1);
+      const double weight = next == record ? 0
+                                           : static_cast<double>(time - times[record]) /
+                                                 static_cast<double>(times[next] - times[record]);
+      const Eigen::Vector3d velocity =
+          (1 - weight) * rates[record].velocity + weight * rates[next].velocity;
+      const Eigen::Vector3d angular_velocity =
+          (1 - weight) * rates[record].angular_velocity + weight * rates[next].angular_velocity;
       for (Eigen::Index k = 0; k < 3; ++k) {
         pose.position[k] = found->position[k];
-        pose.velocity[k] = static_cast<float>(found->velocity[k]);
-        pose.angular_velocity[k] = static_cast<float>(found->angular_velocity[k]);
+        pose.velocity[k] = static_cast<float>(velocity[k]);
+        pose.angular_velocity[k] = static_cast<float>(angular_velocity[k]);
       }
     }
   });

@@ -24,7 +24,7 @@ namespace {
 using Eigen::Index;
 using Eigen::Vector3d;
 
-constexpr double kFarthest = 1e6;      // m
+constexpr double kFarthest = 1e6;        // m
 constexpr double kNormalOfMad = 1.4826;  // sigma of a normal distribution over its MAD
 constexpr double kCauchyMads = 1.5;
 constexpr int kFits = 8;
@@ -32,6 +32,7 @@ constexpr int kFits = 8;
 constexpr std::size_t kFittedPoints = 512;
 /// Nobody's terrain: an unknown that a pair of strips does not tell keeps this, m.
 constexpr double kShiftPrior = 1;
+constexpr double kLeastSlope = 0.02;  // RMS over the cells
 
 /// Numbers of cells by their column and row.
 class CellNumbers {
@@ -134,8 +135,7 @@ struct SortedRows {
   std::vector<std::uint32_t> rows;
 
   template <class Number>
-  SortedRows(std::size_t count, const std::vector<Number>& number, Number none)
-      : begin(count + 1) {
+  SortedRows(std::size_t count, const std::vector<Number>& number, Number none) : begin(count + 1) {
     for (const Number n : number) {
       if (n != none) ++begin[static_cast<std::size_t>(n) + 1];
     }
@@ -192,13 +192,11 @@ ShotPoints georeferenced(const FlightShots& shots, const ShotPoses& poses,
       const std::size_t shot = begin + i;
       const ShotPose& pose = poses.pose[shot];
       const Eigen::Matrix<double, 6, 1> correction =
-          before +
-          static_cast<double>(shots.time_ns[shot] - interval.begin_ns) * per_ns * change;
+          before + static_cast<double>(shots.time_ns[shot] - interval.begin_ns) * per_ns * change;
       const Vector3d velocity(pose.velocity[0], pose.velocity[1], pose.velocity[2]);
-      const Vector3d turn = correction.tail<3>() +
-                            clock_step * Vector3d(pose.angular_velocity[0],
-                                                  pose.angular_velocity[1],
-                                                  pose.angular_velocity[2]);
+      const Vector3d turn = correction.tail<3>() + clock_step * Vector3d(pose.angular_velocity[0],
+                                                                         pose.angular_velocity[1],
+                                                                         pose.angular_velocity[2]);
       const Eigen::Quaterniond attitude(pose.attitude[0], pose.attitude[1], pose.attitude[2],
                                         pose.attitude[3]);
       const Vector3d origin(columns[3][i], columns[4][i], columns[5][i]);
@@ -312,9 +310,8 @@ GroundCells ground_cells(const ShotPoints& points, const std::vector<std::uint16
 
 std::vector<StripPair> strip_pairs(const ShotPoints& points,
                                    const std::vector<std::uint16_t>& strip,
-                                   const PlaneOfShot& plane,
-                                   const std::vector<GroundPlane>& planes, double gate,
-                                   std::size_t least_shots) {
+                                   const PlaneOfShot& plane, const std::vector<GroundPlane>& planes,
+                                   double gate, std::size_t least_shots) {
   require_length("strip", strip.size(), points.size());
   require_length("planes of the shots", plane.size(), points.size());
   require_threshold("gate", gate);
@@ -373,14 +370,20 @@ std::vector<StripPair> strip_pairs(const ShotPoints& points,
   std::vector<StripPair> pairs;
   for (Sums& own : sums) {
     const auto count = static_cast<double>(own.pair.cells);
+    // Slopes that are no more than the noise of the normals tell no horizontal shift.
+    for (Index axis = 0; axis < 2; ++axis) {
+      if (own.hessian(axis, axis) > count * kLeastSlope * kLeastSlope) continue;
+      own.hessian.row(axis).setZero();
+      own.hessian.col(axis).setZero();
+      own.right[axis] = 0;
+    }
     own.pair.mean /= count;
     own.pair.rms = std::sqrt(own.squares / count);
     // What the shift leaves is the noise of the cells; at first it is all of the difference.
     double variance = std::max(own.squares / count, 1e-12);
     for (int iteration = 0; iteration < 3; ++iteration) {
       const Eigen::Matrix3d hessian =
-          own.hessian / variance +
-          Eigen::Matrix3d::Identity() / (kShiftPrior * kShiftPrior);
+          own.hessian / variance + Eigen::Matrix3d::Identity() / (kShiftPrior * kShiftPrior);
       const Eigen::Matrix3d covariance = hessian.inverse();
       own.pair.shift = covariance * own.right / variance;
       own.pair.sigma = covariance.diagonal().cwiseSqrt();

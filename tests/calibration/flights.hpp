@@ -65,9 +65,9 @@ class Sway {
 
 /// One side of a gable roof: from the ridge down one side, over a rectangle of the plan.
 struct Roof {
-  Eigen::Vector2d centre, along;  ///< of the ridge; unit vector of it
-  double side = 1;                ///< of the ridge
-  double height = 0, slope = 0;   ///< of the ridge, m; tangent
+  Eigen::Vector2d centre, along;      ///< of the ridge; unit vector of it
+  double side = 1;                    ///< of the ridge
+  double height = 0, slope = 0;       ///< of the ridge, m; tangent
   double half_length = 4, width = 5;  ///< along the ridge, and across it on the plan, m
 
   Eigen::Vector3d normal() const {
@@ -81,7 +81,7 @@ enum class Ground { flat, relief, village };
 
 struct FlightSettings {
   Ground ground = Ground::village;
-  double strip_length = 80, height = 80, speed = 5;       // m, m/s
+  double strip_length = 80, height = 80, speed = 5;  // m, m/s
   std::vector<double> headings_deg = {90, 270, 0, 180};
   double attitude_rms_deg = 2, velocity_rms = 0.15;
   double shot_rate = 5000;
@@ -89,11 +89,12 @@ struct FlightSettings {
   bool trajectory_errors = true;
   /// Errors of the trajectory at knots of this spacing, linear between; 0: at every sample.
   double error_knots = 0;
-  calibration::PoseErrorProcess process = {{0.02, 0.02, 0.03, radians_from_degrees(0.025),
-                                            radians_from_degrees(0.025), radians_from_degrees(0.08)},
-                                           {120, 120, 120, 120, 120, 300},
-                                           radians_from_degrees(0.005),
-                                           0.005};
+  calibration::PoseErrorProcess process = {
+      {0.02, 0.02, 0.03, radians_from_degrees(0.025), radians_from_degrees(0.025),
+       radians_from_degrees(0.08)},
+      {120, 120, 120, 120, 120, 300},
+      radians_from_degrees(0.005),
+      0.005};
   Eigen::Vector3d boresight_deg{2, -1.5, 1};
   Eigen::Vector3d lever_arm{0.10, 0.05, 0.12};
   double range_offset = 0.01, clock_offset = 0.001;
@@ -120,22 +121,21 @@ class SimulatedFlight {
     const double begin = static_cast<double>(strip) * period();
     const double heading = settings_.headings_deg[strip] * std::numbers::pi / 180;
     const double along = settings_.speed * (time - begin - 0.5 * duration() - kLead);
-    position = Eigen::Vector3d(along * std::sin(heading), along * std::cos(heading),
-                               settings_.height) +
-               Eigen::Vector3d(velocity_[0].integral(time), velocity_[1].integral(time),
-                               velocity_[2].integral(time));
+    position =
+        Eigen::Vector3d(along * std::sin(heading), along * std::cos(heading), settings_.height) +
+        Eigen::Vector3d(velocity_[0].integral(time), velocity_[1].integral(time),
+                        velocity_[2].integral(time));
     Eigen::Matrix3d enu_from_ned;
     enu_from_ned << 0, 1, 0, 1, 0, 0, 0, 0, -1;
-    attitude = enu_from_ned *
-               trajectories::ned_from_body(
-                   {angle_[0].at(time), angle_[1].at(time), heading + angle_[2].at(time)})
-                   .toRotationMatrix();
+    attitude = enu_from_ned * trajectories::ned_from_body({angle_[0].at(time), angle_[1].at(time),
+                                                           heading + angle_[2].at(time)})
+                                  .toRotationMatrix();
   }
 
   /// Range to the ground and what it meets: 0 the ground, i + 1 a roof.
   double range_of(const Eigen::Vector3d& start, const Eigen::Vector3d& direction,
-                  std::size_t& met) const {
-    met = 0;
+                  std::size_t& surface) const {
+    surface = 0;
     double range = -start.z() / direction.z();
     if (settings_.ground == Ground::relief) {
       for (int i = 0; i < 50; ++i) {
@@ -157,7 +157,7 @@ class SimulatedFlight {
                    v = roof.side * (from.y() * roof.along.x() - from.x() * roof.along.y());
       if (own < range && std::abs(u) <= roof.half_length && v >= 0 && v <= roof.width) {
         range = own;
-        met = i + 1;
+        surface = i + 1;
       }
     }
     return range;
@@ -184,7 +184,8 @@ class SimulatedFlight {
     for (int i = 0; i < 3; ++i) {
       const auto at = static_cast<std::size_t>(i);
       options.mount.boresight[at] = {0, radians_from_degrees(3.0), "as built"};
-      options.mount.lever_arm[at] = {settings_.lever_arm[i] + 0.01 * normal(generator), 0.01, "tape"};
+      options.mount.lever_arm[at] = {settings_.lever_arm[i] + 0.01 * normal(generator), 0.01,
+                                     "tape"};
     }
     options.mount.clock_offset = {settings_.clock_offset + 0.002 * normal(generator), 0.002, "PPS"};
     options.range_offset_sigma = 0.02;
@@ -197,10 +198,10 @@ class SimulatedFlight {
   Eigen::Matrix3d nominal, boresight;
   std::vector<Roof> roofs;
   calibration::FlightShots shots;
-  std::vector<double> true_range;     ///< [shots]
-  std::vector<std::size_t> met;       ///< [shots]
-  std::vector<double> pose_time;      ///< [shots], true, s
-  trajectories::Trajectory trajectory;  ///< as measured, local
+  std::vector<double> true_range;                  ///< [shots]
+  std::vector<std::size_t> met;                    ///< [shots]
+  std::vector<double> pose_time;                   ///< [shots], true, s
+  trajectories::Trajectory trajectory;             ///< as measured, local
   std::vector<Eigen::Matrix<double, 6, 1>> error;  ///< [records]: true less measured
 
  private:
@@ -210,8 +211,7 @@ class SimulatedFlight {
   double period() const { return duration() + 2 * kLead + kTurn; }
 
   static double relief(double x, double y) {
-    return 3 * std::sin(2 * std::numbers::pi * x / 80) *
-           std::cos(1.6 * std::numbers::pi * y / 80);
+    return 3 * std::sin(2 * std::numbers::pi * x / 80) * std::cos(1.6 * std::numbers::pi * y / 80);
   }
 
   void build() {
@@ -246,7 +246,7 @@ class SimulatedFlight {
     for (Sway& sway : velocity_) sway = Sway(generator_, 6, 0.05, 0.4, settings_.velocity_rms);
     std::normal_distribution<double> normal;
     const double step = settings_.process.sample_interval;
-    Eigen::Matrix<double, 6, 1> state;
+    Eigen::Matrix<double, 6, 1> state = Eigen::Matrix<double, 6, 1>::Zero();
     double last = -1;
     const auto advance = [&](double time) {
       for (int c = 0; c < 6; ++c) {
@@ -265,7 +265,7 @@ class SimulatedFlight {
     for (std::size_t s = 0; s < strips(); ++s) {
       const double begin = static_cast<double>(s) * period();
       const auto records = static_cast<std::size_t>((duration() + 2 * kLead) / step);
-      Eigen::Matrix<double, 6, 1> from, to;
+      Eigen::Matrix<double, 6, 1> from = Eigen::Matrix<double, 6, 1>::Zero(), to = from;
       double knot_begin = -1, knot_end = -1;
       for (std::size_t i = 0; i < records; ++i) {
         const double time = begin + static_cast<double>(i) * step;

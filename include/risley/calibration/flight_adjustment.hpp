@@ -48,7 +48,8 @@ class FlightSystem {
   struct Step {
     Eigen::VectorXd unknowns;
     Eigen::MatrixXd planes;
-    double promised = 0;  ///< by how much the cost would fall, in squared sigmas
+    /// By how much the cost would fall beyond what the planes alone could do, in squared sigmas.
+    double promised = 0;
   };
   Step step() const;
 
@@ -75,7 +76,7 @@ void apply(const FlightSystem::Step& step, FlightModel& model);
 
 struct FlightAdjustmentOptions {
   int most_steps = 10;
-  double tolerance = 1e-3;  ///< done when a step promises less, in squared sigmas
+  double tolerance = 1e-2;  ///< done when a step promises less, in squared sigmas
   InstructionSet set = best_instruction_set();
 };
 
@@ -83,7 +84,8 @@ struct FlightAdjustment {
   FlightModel model;  ///< adjusted
   int steps = 0;
   bool converged = false;
-  double cost = 0;  ///< of the shots, before the last step
+  double promised = 0;  ///< by the last step, in squared sigmas
+  double cost = 0;      ///< of the shots, before the last step
   std::size_t shots = 0, lost = 0, outliers = 0;
 };
 

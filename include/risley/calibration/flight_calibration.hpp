@@ -25,12 +25,12 @@
 namespace risley::calibration {
 
 struct FlightCalibrationOptions {
-  /// Start values, noise, geometry. What it states of its parameters are the priors; a sensor with a
-  /// covariance, as a calibration on walls writes it, brings all of it.
+  /// Start values, noise, geometry. What it states of its parameters are the priors; a sensor with
+  /// a covariance, as a calibration on walls writes it, brings all of it.
   sensors::Sensor sensor;
-  trajectories::Mount mount;  ///< start values, and priors by their sigmas; a sigma of 0 holds
-  PoseErrorProcess process;   ///< of the trajectory's errors
-  std::vector<std::string> fixed;       ///< parameters of the train to hold
+  trajectories::Mount mount;       ///< start values, and priors by their sigmas; a sigma of 0 holds
+  PoseErrorProcess process;        ///< of the trajectory's errors
+  std::vector<std::string> fixed;  ///< parameters of the train to hold
   std::vector<std::string> additional;  ///< further ones to free, e.g. refractive_index
   std::optional<double> range_noise;    ///< 1 sigma, m, default the sensor's
   double range_offset_sigma = 0.02;     ///< prior about the sensor's, m; 0 holds it
@@ -40,15 +40,15 @@ struct FlightCalibrationOptions {
   double knot_spacing = 0.25;       ///< of the corrections of the trajectory, s
   /// Knots are put further apart where there would be more: the time grows with the third power.
   std::size_t most_knots = 600;
-  double cell_size = 2;             ///< of the ground's cells at the end, m
-  double most_roughness = 0.06;     ///< of a cell, m, see GroundCellOptions
+  double cell_size = 2;               ///< of the ground's cells at the end, m
+  double most_roughness = 0.06;       ///< of a cell, m, see GroundCellOptions
   std::size_t coarse_shots = 120000;  ///< with which the first rounds are made
   std::uint64_t seed = 0;             ///< of their choice
 };
 
 /// One of the unknowns that a whole flight shares.
 struct FlightUnknown {
-  std::string name;  ///< as unknown_names()
+  std::string name;                        ///< as unknown_names()
   double start = 0, value = 0, sigma = 0;  ///< SI
   double prior_sigma = 0;                  ///< SI; infinite: none
   bool held = false;
@@ -88,9 +88,9 @@ struct FlightCalibration {
   std::vector<NotTold> not_told;
   std::vector<StripPair> pairs_before, pairs_after;
   double rms_before = 0, rms_after = 0;  ///< of all pairs and cells, along the normals, m
-  double sigma0 = 1;        ///< standard deviation of unit weight against the stated range noise
-  double range_sigma = 0;   ///< of one range, as found, m
-  std::size_t shots = 0;    ///< given
+  double sigma0 = 1;       ///< standard deviation of unit weight against the stated range noise
+  double range_sigma = 0;  ///< of one range, as found, m
+  std::size_t shots = 0;   ///< given
   std::size_t without_pose = 0;  ///< of these: outside the trajectory or in a gap of it
   std::size_t used = 0, outliers = 0;
   std::size_t cells = 0, rough_cells = 0;
@@ -107,7 +107,8 @@ Eigen::Matrix<double, kPoseErrors, 1> correction_at(const FlightModel& model,
 
 /// Calibrates mount and sensor on the strips of a flight: docs/theory/flight.md
 /// @param trajectory  of the body; its accuracies are not looked at, the process is
-/// @throws EstimationError when fewer than two strips overlap or no ground is found; InvalidArgument
+/// @throws EstimationError when fewer than two strips overlap or no ground is found;
+/// InvalidArgument
 ///         as require_flight_shots, require_trajectory, require_mount, require_process, for
 ///         rotation angles and emitters that the sensor does not have and options out of range
 FlightCalibration calibrate_flight(const FlightShots& shots,

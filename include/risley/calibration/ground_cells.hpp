@@ -24,7 +24,7 @@ ShotPoints georeferenced(const FlightShots& shots, const ShotPoses& poses,
                          const FlightModel& model);
 
 struct GroundCellOptions {
-  double size = 2;                       ///< of a cell, m
+  double size = 2;                         ///< of a cell, m
   double shift_east = 0, shift_north = 0;  ///< of the grid, in cells
   std::size_t least_shots = 8, least_strips = 2;
   double steepest = 1.0471975511965976;  ///< angle of a normal from the vertical, rad (60 degrees)
@@ -35,8 +35,8 @@ struct GroundCellOptions {
 /// Squares of a map's grid that several strips have seen, each with a plane of its own.
 struct GroundCells {
   std::vector<GroundPlane> planes;
-  PlaneOfShot plane;   ///< of every shot
-  double scatter = 0;  ///< of the points about the planes, robust 1 sigma, m
+  PlaneOfShot plane;                 ///< of every shot
+  double scatter = 0;                ///< of the points about the planes, robust 1 sigma, m
   std::size_t rough = 0, steep = 0;  ///< cells left out
 };
 
@@ -50,7 +50,7 @@ GroundCells ground_cells(const ShotPoints& points, const std::vector<std::uint16
 /// How far two strips are apart.
 struct StripPair {
   std::uint16_t first = 0, second = 0;
-  std::size_t cells = 0;  ///< that both have seen
+  std::size_t cells = 0;     ///< that both have seen
   double mean = 0, rms = 0;  ///< of the second less the first, along the cells' normals, m
   /// The shift east, north, up that explains most of it, and its sigma, m; where the ground does
   /// not tell it, sigma is 1.
@@ -62,8 +62,7 @@ struct StripPair {
 /// @throws InvalidArgument as ground_cells
 std::vector<StripPair> strip_pairs(const ShotPoints& points,
                                    const std::vector<std::uint16_t>& strip,
-                                   const PlaneOfShot& plane,
-                                   const std::vector<GroundPlane>& planes, double gate,
-                                   std::size_t least_shots = 8);
+                                   const PlaneOfShot& plane, const std::vector<GroundPlane>& planes,
+                                   double gate, std::size_t least_shots = 8);
 
 }  // namespace risley::calibration

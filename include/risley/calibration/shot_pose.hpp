@@ -8,7 +8,7 @@ namespace risley::calibration {
 struct ShotPose {
   double position[3];         ///< m
   double attitude[4];         ///< local from body, a unit quaternion w, x, y, z
-  float velocity[3];          ///< m/s
+  float velocity[3];          ///< over a tenth of a second, m/s
   float angular_velocity[3];  ///< local axes, rad/s
 };
 
