@@ -15,6 +15,7 @@
 #include "risley/algebra/symmetric.hpp"
 #include "risley/calibration/planar_adjustment.hpp"
 #include "risley/core/error.hpp"
+#include "risley/core/random.hpp"
 #include "risley/core/require.hpp"
 
 #include "calibration/eigen_vectors.hpp"
@@ -411,6 +412,17 @@ VectorXd FlightSystem::inverse_diagonal() const {
 MatrixXd FlightSystem::inverse() const { return solve(MatrixXd::Identity(size(), size())); }
 
 MatrixXd FlightSystem::held_changes() const { return -solve(parts_->held_columns); }
+
+MatrixXd FlightSystem::draw_tilts(std::uint64_t seed) const {
+  const RandomStream stream(seed, 1701);
+  MatrixXd tilts(2, static_cast<Index>(parts_->planes));
+  for (std::size_t i = 0; i < parts_->planes; ++i) {
+    const Vector3d normal(stream.normal(3 * i), stream.normal(3 * i + 1), stream.normal(3 * i + 2));
+    tilts.col(static_cast<Index>(i)) =
+        (parts_->eliminated[i].root_inverse.transpose() * normal).head<2>();
+  }
+  return tilts;
+}
 
 MatrixXd FlightSystem::prior_times(const MatrixXd& columns) const {
   const Parts& p = *parts_;

@@ -358,6 +358,7 @@ class FlightWork {
 
   void fill_result();
   void fill_unknowns(const FlightSystem& system);
+  void take_off_spurious_information(const FlightSystem& system, MatrixXd& all);
   void fill_datum(const MatrixXd& movement);
   void fill_not_told(const MatrixXd& functionals);
   void fill_trajectory();
@@ -524,8 +525,9 @@ void FlightWork::fill_unknowns(const FlightSystem& system) {
     functionals.block(kPoseErrors * k, globals, kPoseErrors, kPoseErrors) =
         MatrixXd::Identity(kPoseErrors, kPoseErrors) / static_cast<double>(knots);
   }
-  const MatrixXd all = flight_covariance(full_.shots, full_.poses, full_.cells.plane, model_,
-                                         final_weights_, priors_, system, functionals);
+  MatrixXd all = flight_covariance(full_.shots, full_.poses, full_.cells.plane, model_,
+                                   final_weights_, priors_, system, functionals);
+  take_off_spurious_information(system, all);
   fill_not_told(all);
   // What was held and may be off, one sigma each, moves everything else along.
   const MatrixXd changes = system.held_changes();
@@ -609,6 +611,57 @@ void FlightWork::fill_unknowns(const FlightSystem& system) {
     for (Index j = 0; j < count; ++j) {
       sensor.covariance(i, j) =
           result_.covariance(kept[static_cast<std::size_t>(i)], kept[static_cast<std::size_t>(j)]);
+    }
+  }
+}
+
+/// Planes' normals are off by the noise of the shots that they were found with, and a cell that
+/// leans by chance seems to tell of shifts across it, yaw above all. Its shots do not follow: the
+/// information is none. How much there is of it is seen where normals are moved by as much again.
+void FlightWork::take_off_spurious_information(const FlightSystem& system, MatrixXd& all) {
+  FlightModel moved = model_;
+  const MatrixXd tilts = system.draw_tilts(options_.seed);
+  for (std::size_t i = 0; i < moved.planes.size(); ++i) {
+    GroundPlane& plane = moved.planes[i];
+    const auto own = tilts.col(static_cast<Index>(i));
+    const auto [first, second] =
+        tangents_of({plane.normal.x(), plane.normal.y(), plane.normal.z()});
+    plane.normal = (plane.normal + own[0] * Eigen::Vector3d(first.x, first.y, first.z) +
+                    own[1] * Eigen::Vector3d(second.x, second.y, second.z))
+                       .normalized();
+  }
+  FlightWeights weights = final_weights_;
+  weights.gate = 0;  // residuals are larger now, and no matter
+  const auto inverse_of = [&](const FlightModel& model, const FlightWeights& own) {
+    const FlightSystem other(
+        flight_equations(full_.shots, full_.poses, full_.cells.plane, model, own), model, priors_);
+    MatrixXd unit = MatrixXd::Zero(other.size(), other.globals());
+    unit.bottomRows(other.globals()).setIdentity();
+    return MatrixXd(other.solve(unit).bottomRows(other.globals()));
+  };
+  const MatrixXd before = inverse_of(model_, weights), after = inverse_of(moved, weights);
+  std::vector<Index> adjusted;
+  for (Index i = 0; i < before.rows(); ++i) {
+    if (!priors_.held[static_cast<std::size_t>(i)]) adjusted.push_back(i);
+  }
+  // In units of the priors' sigmas.
+  const VectorXd unit = prior_sigma_(adjusted);
+  const auto information_of = [&](const MatrixXd& covariance) {
+    return MatrixXd(unit.asDiagonal() *
+                    algebra::SymmetricSolver(covariance(adjusted, adjusted)).inverse() *
+                    unit.asDiagonal());
+  };
+  // Of what is above 0; twice, since what the trajectory does to a cell makes it lean, too.
+  const MatrixXd spurious = root_of(2 * (information_of(after) - information_of(before)));
+  const MatrixXd prior =
+      unit.asDiagonal() * MatrixXd(priors_.information(adjusted, adjusted)) * unit.asDiagonal();
+  const MatrixXd data = root_of(information_of(all) - prior - spurious * spurious.transpose());
+  const MatrixXd covariance = unit.asDiagonal() *
+                              algebra::SymmetricSolver(prior + data * data.transpose()).inverse() *
+                              unit.asDiagonal();
+  for (std::size_t i = 0; i < adjusted.size(); ++i) {
+    for (std::size_t j = 0; j < adjusted.size(); ++j) {
+      all(adjusted[i], adjusted[j]) = covariance(static_cast<Index>(i), static_cast<Index>(j));
     }
   }
 }

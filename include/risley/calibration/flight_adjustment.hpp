@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <vector>
 
@@ -63,6 +64,9 @@ class FlightSystem {
   Eigen::VectorXd inverse_diagonal() const;
   /// By how much the unknowns move where a held global is off by one unit [size, held].
   Eigen::MatrixXd held_changes() const;
+  /// One draw of what the shots' noise does to the planes' tilts, everything else given [2,
+  /// planes], rad.
+  Eigen::MatrixXd draw_tilts(std::uint64_t seed) const;
   /// The priors' part of the equations times columns [size, columns].
   Eigen::MatrixXd prior_times(const Eigen::MatrixXd& columns) const;
 
