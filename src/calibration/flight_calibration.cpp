@@ -194,7 +194,8 @@ class FlightWork {
   }
 
   /// Poses at the model's clock offset, points, cells; each time on another grid.
-  void label(LabelledFlight& flight, double size, bool rough_too) {
+  /// @param noise  of the cells, m; 0: not known yet
+  void label(LabelledFlight& flight, double size, bool rough_too, double noise = 0) {
     const double off = std::abs(flight.poses.clock_offset - model_.clock_offset);
     if (flight.poses.pose.empty() || off > kClockRefresh) {
       flight.poses = poses_of(flight.shots, interpolation_, model_.clock_offset);
@@ -206,6 +207,7 @@ class FlightWork {
     cells.shift_north = std::fmod(0.382 * grids_ + 0.5, 1.0);
     ++grids_;
     if (!rough_too) cells.most_roughness = options_.most_roughness;
+    cells.noise = noise;
     flight.cells = ground_cells(flight.points, flight.shots.strip, cells);
     if (flight.cells.planes.size() < kLeastCells) {
       throw EstimationError(fmt::format(
@@ -331,8 +333,10 @@ class FlightWork {
     progress_.report(0.5);
     set_knots(full_.shots, spacing);
     // Then everything. What the residuals say of the ranges' noise counts in the last round.
+    double cell_noise = coarse_.cells.scatter;
     for (int round = 0; round < kFullRounds; ++round) {
-      label(full_, options_.cell_size, false);
+      label(full_, options_.cell_size, false, cell_noise);
+      cell_noise = full_.cells.scatter;
       FlightWeights own = weights();
       own.gate = kGateSigmas;
       last_ = adjust(full_, own, round + 1 < kFullRounds ? 2 : 4);

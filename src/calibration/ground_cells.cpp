@@ -28,6 +28,9 @@ constexpr double kFarthest = 1e6;        // m
 constexpr double kNormalOfMad = 1.4826;  // sigma of a normal distribution over its MAD
 constexpr double kCauchyMads = 1.5;
 constexpr int kFits = 8;
+/// Scatter that still is that of a plane, over the noise: a little unevenness, and what chance does
+/// to the median of n distances, 1.2 / sqrt(n), two and a half times.
+constexpr double kUnevenness = 1.1, kScatterSigmas = 3;
 /// Points of a cell that its plane is fitted to: the adjustment takes all.
 constexpr std::size_t kFittedPoints = 512;
 /// Nobody's terrain: an unknown that a pair of strips does not tell keeps this, m.
@@ -236,6 +239,7 @@ GroundCells ground_cells(const ShotPoints& points, const std::vector<std::uint16
   require_at_least("least shots of a cell", static_cast<long long>(options.least_shots), 3);
   require_between("steepest", options.steepest, 0, 1.57, "rad");
   require_threshold("most roughness", options.most_roughness);
+  require_not_below("noise of the cells", options.noise, 0, "m");
   const std::size_t blocks = (points.size() + kBlockShots - 1) / kBlockShots;
   std::vector<std::vector<std::uint64_t>> found(blocks);
   for_each_block(points.size(), [&](std::size_t begin, std::size_t end) {
@@ -280,7 +284,12 @@ GroundCells ground_cells(const ShotPoints& points, const std::vector<std::uint16
       return;
     }
     std::vector<double> distance = ground->distance;
-    if (kNormalOfMad * median(distance) > options.most_roughness) {
+    const double points_fitted = static_cast<double>(distance.size());
+    const double significant =
+        options.noise > 0
+            ? options.noise * (kUnevenness + kScatterSigmas / std::sqrt(points_fitted))
+            : std::numeric_limits<double>::infinity();
+    if (kNormalOfMad * median(distance) > std::min(options.most_roughness, significant)) {
       result.rough = true;
       return;
     }

@@ -73,7 +73,17 @@ TEST(GroundCells, LeaveOutWhatIsRoughSteepOrOfOneStrip) {
   const TwoStrips rough([](double, double) { return 0; }, {0, 0, 0}, 0.1);
   EXPECT_EQ(ground_cells(rough.points, rough.strip, options).planes.size(), 0U);
   EXPECT_EQ(ground_cells(rough.points, rough.strip, options).rough, 100U);
+  // A ridge through the middle: its cells scatter more than others, by less than that.
+  const TwoStrips ridge([](double x, double) { return -0.2 * std::abs(x); }, {0, 0, 0});
+  options.shift_east = 0.5;
+  EXPECT_EQ(ground_cells(ridge.points, ridge.strip, options).rough, 0U);
+  options.noise = 0.01;
+  const GroundCells sides = ground_cells(ridge.points, ridge.strip, options);
+  EXPECT_GE(sides.rough, 10U);
+  EXPECT_LE(sides.rough, 13U);
+  options.noise = 0;
   const TwoStrips steep([](double x, double) { return 2 * x; }, {0, 0, 0});
+  options.shift_east = 0;
   EXPECT_EQ(ground_cells(steep.points, steep.strip, options).steep, 100U);
   const TwoStrips apart([](double, double) { return 0; }, {100, 0, 0});
   EXPECT_EQ(ground_cells(apart.points, apart.strip, options).planes.size(), 0U);
@@ -137,6 +147,7 @@ TEST(GroundCells, RefuseNonsense) {
   EXPECT_NE(refused([](GroundCellOptions& o) { o.least_shots = 2; }), "");
   EXPECT_NE(refused([](GroundCellOptions& o) { o.steepest = 2; }), "");
   EXPECT_NE(refused([](GroundCellOptions& o) { o.most_roughness = 0; }), "");
+  EXPECT_NE(refused([](GroundCellOptions& o) { o.noise = -1; }), "");
   EXPECT_NE(refusal([&] { ground_cells(strips.points, {}, {}); }), "");
   EXPECT_NE(refusal([&] { strip_pairs(strips.points, strips.strip, {}, {}, 1); }), "");
 }

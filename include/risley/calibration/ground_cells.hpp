@@ -30,6 +30,9 @@ struct GroundCellOptions {
   double steepest = 1.0471975511965976;  ///< angle of a normal from the vertical, rad (60 degrees)
   /// Scatter of the points about their plane above which a cell is left out, 1 sigma, m.
   double most_roughness = std::numeric_limits<double>::infinity();
+  /// What the scatter is of one plane, 1 sigma, m: cells with significantly more, such as those
+  /// that an edge crosses, are left out, too. 0: not known.
+  double noise = 0;
 };
 
 /// Squares of a map's grid that several strips have seen, each with a plane of its own.
