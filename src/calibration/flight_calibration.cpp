@@ -634,16 +634,15 @@ void FlightWork::take_off_spurious_information(const FlightSystem& system, Matri
                     own[1] * Eigen::Vector3d(second.x, second.y, second.z))
                        .normalized();
   }
-  FlightWeights weights = final_weights_;
-  weights.gate = 0;  // residuals are larger now, and no matter
-  const auto inverse_of = [&](const FlightModel& model, const FlightWeights& own) {
-    const FlightSystem other(
-        flight_equations(full_.shots, full_.poses, full_.cells.plane, model, own), model, priors_);
-    MatrixXd unit = MatrixXd::Zero(other.size(), other.globals());
-    unit.bottomRows(other.globals()).setIdentity();
-    return MatrixXd(other.solve(unit).bottomRows(other.globals()));
+  const auto inverse_of = [](const FlightSystem& own) {
+    MatrixXd unit = MatrixXd::Zero(own.size(), own.globals());
+    unit.bottomRows(own.globals()).setIdentity();
+    return MatrixXd(own.solve(unit).bottomRows(own.globals()));
   };
-  const MatrixXd before = inverse_of(model_, weights), after = inverse_of(moved, weights);
+  const MatrixXd before = inverse_of(system);
+  const MatrixXd after = inverse_of(FlightSystem(
+      flight_equations(full_.shots, full_.poses, full_.cells.plane, moved, final_weights_), moved,
+      priors_));
   std::vector<Index> adjusted;
   for (Index i = 0; i < before.rows(); ++i) {
     if (!priors_.held[static_cast<std::size_t>(i)]) adjusted.push_back(i);
