@@ -87,8 +87,8 @@ _risley() {
           --extrinsics" ;;
       cloud)
         choices="$common --output --calibration --format --directions --beam-origin --covariance
-          --beam-divergence --common-factors --rate-hz --noise-angle-deg --las-scale-m --time
-          --beam-origin-map --shot-rate-hz --extrinsics" ;;
+          --beam-divergence --common-factors --trajectory --mount --accuracy --trajectory-errors --crs
+          --datum --rate-hz --noise-angle-deg --las-scale-m --time --beam-origin-map --shot-rate-hz --extrinsics" ;;
       reproduce) choices="$common --output --full --recording --shot-rate-hz --extrinsics" ;;
     esac
     mapfile -t COMPREPLY < <(compgen -W "$choices" -- "$current")

@@ -77,6 +77,10 @@ std::vector<BundleBeam> bundle(const PrismTrain& train,
         beam.jacobian(row, n + h) = sum;
       }
     }
+    for (Index h = 0; h < held.turn.cols(); ++h) {
+      const Eigen::Vector3d turn = held.turn.col(h);
+      beam.jacobian.col(n + h) += turn.cross(beam.direction);
+    }
     const AngleSeeds<double> seeds = angle_seeds(linear.direction);
     beam.of_angles.resize(2, all);
     for (Index j = 0; j < all; ++j) {
@@ -151,6 +155,11 @@ FormalDatum formal_datum(const PrismTrain& train,
     require_length("columns of their rotation angles",
                    static_cast<std::size_t>(held.rotation_angles.cols()),
                    static_cast<std::size_t>(held.train.cols()));
+    if (held.turn.size() > 0) {
+      require_length("rows of their turns", static_cast<std::size_t>(held.turn.rows()), 3);
+      require_length("columns of their turns", static_cast<std::size_t>(held.turn.cols()),
+                     static_cast<std::size_t>(held.train.cols()));
+    }
   }
   Eigen::MatrixXd covariance = Eigen::MatrixXd::Identity(all, all);
   covariance.topLeftCorner(n, n) = free_covariance;

@@ -67,7 +67,8 @@ Held held_of(const sensors::Sensor& sensor, const Belief& belief, const PlanarPr
 HeldMovement movement_of(const Held& held, const PlanarProblem& problem,
                          const Eigen::MatrixXd& changes) {
   HeldMovement movement{held.quantities.train,
-                        Eigen::MatrixXd::Zero(problem.train.prisms(), held.quantities.count())};
+                        Eigen::MatrixXd::Zero(problem.train.prisms(), held.quantities.count()),
+                        {}};
   for (const Eigen::MatrixXd& angles : held.quantities.rotation_angles) {
     movement.rotation_angles += angles;
   }

@@ -10,6 +10,8 @@
 #include "risley/optics/emitter_lanes.hpp"
 #include "risley/optics/observation_adjoint.hpp"
 
+#include "calibration/column_products.hpp"
+
 namespace risley::calibration::RISLEY_KERNEL_NAMESPACE {
 namespace {
 
@@ -22,72 +24,32 @@ constexpr double kLargest = __DBL_MAX__;
 /// sums stay in registers for a while, few enough that the rows stay in the nearest cache.
 constexpr std::size_t kGroups = 16;
 constexpr std::size_t kBlock = kGroups * kLanes;
-/// The products are summed up in squares of so many rows and columns, as the registers allow.
-constexpr std::size_t kTile = kLanes == 8 ? 4 : 3;
 
-constexpr std::size_t tiles_of(std::size_t columns) { return (columns + kTile - 1) / kTile; }
-
-/// Sums of the products of all pairs of columns.
+/// Rows of columns and the sums of their products.
 template <int N>
 class Products {
  public:
   /// @param columns  residual included
-  explicit Products(std::size_t columns) : columns_(columns), tiles_(tiles_of(columns)) {
+  explicit Products(std::size_t columns) : sums_(columns), stride_(Sums::padded(columns)) {
     const Batch zero(0.0);
-    for (std::size_t i = 0; i < tiles_ * (tiles_ + 1) / 2 * kTile * kTile; ++i) sums_[i] = zero;
     for (std::size_t group = 0; group < kGroups; ++group) {
-      for (std::size_t i = columns; i < stride(); ++i) row(group)[i] = zero;
+      for (std::size_t i = columns; i < stride_; ++i) row(group)[i] = zero;
     }
   }
 
   /// Where the columns of a group go, each times the root of the weight.
-  Batch* row(std::size_t group) { return rows_ + group * stride(); }
-
+  Batch* row(std::size_t group) { return rows_ + group * stride_; }
   /// Adds the products of the first groups.
-  void add(std::size_t groups) {
-    Batch* sums = sums_;
-    for (std::size_t i = 0; i < tiles_; ++i) {
-      for (std::size_t j = i; j < tiles_; ++j, sums += kTile * kTile) {
-        add_tile(rows_ + i * kTile, rows_ + j * kTile, groups, sums);
-      }
-    }
-  }
-
-  void store(double* out) const {
-    for (std::size_t i = 0; i < columns_; ++i) {
-      const std::size_t row_tile = i / kTile;
-      const Batch* first =
-          sums_ + (row_tile * tiles_ - row_tile * (row_tile + 1) / 2) * kTile * kTile;
-      for (std::size_t j = i; j < columns_; ++j) {
-        *out++ = sum_of_lanes(first[j / kTile * kTile * kTile + i % kTile * kTile + j % kTile]);
-      }
-    }
-  }
+  void add(std::size_t groups) { sums_.add(rows_, stride_, groups); }
+  void store(double* out) const { sums_.store(out); }
 
  private:
-  static constexpr std::size_t kMost = tiles_of(EmitterLanes<Batch, N>::kPlaces + N + 5);
+  static constexpr std::size_t kMost = EmitterLanes<Batch, N>::kPlaces + N + 5;
+  using Sums = ColumnProducts<Batch, kMost>;
 
-  std::size_t stride() const { return tiles_ * kTile; }
-
-  void add_tile(const Batch* left, const Batch* right, std::size_t groups, Batch* sums) const {
-    Batch sum[kTile][kTile];
-    for (std::size_t i = 0; i < kTile; ++i) {
-      for (std::size_t j = 0; j < kTile; ++j) sum[i][j] = sums[i * kTile + j];
-    }
-    for (std::size_t group = 0; group < groups; ++group, left += stride(), right += stride()) {
-      for (std::size_t i = 0; i < kTile; ++i) {
-        for (std::size_t j = 0; j < kTile; ++j)
-          sum[i][j] = xsimd::fma(left[i], right[j], sum[i][j]);
-      }
-    }
-    for (std::size_t i = 0; i < kTile; ++i) {
-      for (std::size_t j = 0; j < kTile; ++j) sums[i * kTile + j] = sum[i][j];
-    }
-  }
-
-  std::size_t columns_, tiles_;
-  Batch rows_[kGroups * kMost * kTile];
-  Batch sums_[kMost * (kMost + 1) / 2 * kTile * kTile];
+  Sums sums_;
+  std::size_t stride_;
+  Batch rows_[kGroups * Sums::padded(kMost)];
 };
 
 /// Everything of a call that is the same for all shots, but for the emitters of a group.

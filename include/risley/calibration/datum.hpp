@@ -37,10 +37,11 @@ struct FormalDatum {
 };
 
 /// What independent quantities that were held do to the beams, each when it is off by one sigma: to
-/// the train, its free parameters included, and to the rotation angles.
+/// the train, its free parameters included, to the rotation angles, and to all beams together.
 struct HeldMovement {
   Eigen::MatrixXd train;            ///< flat vector [places, held], SI
   Eigen::MatrixXd rotation_angles;  ///< [prisms, held], rad
+  Eigen::MatrixXd turn;  ///< rotation of the bundle about X, Y, Z [3, held], rad; empty: none
 };
 
 /// Propagates a covariance to a bundle of beams.

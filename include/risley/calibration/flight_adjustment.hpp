@@ -1,0 +1,116 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "risley/calibration/flight_equations.hpp"
+#include "risley/core/progress.hpp"
+
+namespace risley::calibration {
+
+/// What is known before a flight.
+struct FlightPriors {
+  Eigen::VectorXd mean;         ///< [globals], SI; the boresight as a rotation vector
+  Eigen::MatrixXd information;  ///< [globals, globals], inverse of its covariance; 0: nothing
+  std::vector<bool> held;       ///< [globals]: not to be adjusted; empty: none
+  PoseErrorProcess process;     ///< of the trajectory
+};
+
+/// Values of the unknowns [globals], the boresight as a rotation vector of up to half a turn.
+Eigen::VectorXd unknown_values(const FlightModel& model);
+
+/// Derivatives of unknown_values() by the unknowns [globals, globals]: the identity but for the
+/// boresight, whose unknowns are rotations after the one there is.
+Eigen::MatrixXd value_rates(const FlightModel& model);
+
+/// Normal equations with the planes eliminated and factorised: unknowns are the corrections at all
+/// knots, six by six, and behind them the globals.
+class FlightSystem {
+ public:
+  /// @throws InvalidArgument for sizes that do not fit, EstimationError when the equations tell
+  /// some
+  ///         unknown nothing at all and no prior does
+  FlightSystem(const FlightEquations& equations, const FlightModel& model,
+               const FlightPriors& priors);
+  FlightSystem(FlightSystem&&) noexcept;
+  FlightSystem& operator=(FlightSystem&&) noexcept;
+  ~FlightSystem();
+
+  Eigen::Index size() const;     ///< 6 knots + globals
+  Eigen::Index globals() const;  ///< of these
+
+  /// Solution of the equations: what to add to all unknowns [size], and to the planes' [3, planes].
+  struct Step {
+    Eigen::VectorXd unknowns;
+    Eigen::MatrixXd planes;
+    /// By how much the cost would fall beyond what the planes alone could do, in squared sigmas.
+    double promised = 0;
+  };
+  Step step() const;
+
+  /// Columns of the inverse of the equations times `right` [size, columns]; rows of what is held
+  /// count nothing.
+  Eigen::MatrixXd solve(const Eigen::MatrixXd& right) const;
+  /// The planes' part of such columns [3 planes, columns].
+  Eigen::MatrixXd planes_of(const Eigen::MatrixXd& solution) const;
+  /// The inverse [size, size], or its diagonal alone [size].
+  Eigen::MatrixXd inverse() const;
+  Eigen::VectorXd inverse_diagonal() const;
+  /// By how much the unknowns move where a held global is off by one unit [size, held].
+  Eigen::MatrixXd held_changes() const;
+  /// One draw of what the shots' noise does to the planes' tilts, everything else given [2,
+  /// planes], rad.
+  Eigen::MatrixXd draw_tilts(std::uint64_t seed) const;
+  /// The priors' part of the equations times columns [size, columns].
+  Eigen::MatrixXd prior_times(const Eigen::MatrixXd& columns) const;
+
+ private:
+  struct Parts;
+  std::unique_ptr<Parts> parts_;
+};
+
+/// Adds a step to a model.
+void apply(const FlightSystem::Step& step, FlightModel& model);
+
+struct FlightAdjustmentOptions {
+  int most_steps = 10;
+  double tolerance = 1e-2;  ///< done when a step promises less, in squared sigmas
+  InstructionSet set = best_instruction_set();
+};
+
+struct FlightAdjustment {
+  FlightModel model;  ///< adjusted
+  int steps = 0;
+  bool converged = false;
+  double promised = 0;  ///< by the last step, in squared sigmas
+  double cost = 0;      ///< of the shots, before the last step
+  std::size_t shots = 0, lost = 0, outliers = 0;
+};
+
+/// Gauss-Newton steps on shots whose planes are given.
+/// @throws EstimationError when steps grow beyond all bounds; as flight_equations, FlightSystem
+FlightAdjustment adjust_flight(const FlightShots& shots, const ShotPoses& poses,
+                               const PlaneOfShot& plane, FlightModel model,
+                               const FlightWeights& weights, const FlightPriors& priors,
+                               const FlightAdjustmentOptions& options = {},
+                               const Progress& progress = {});
+
+/// How far linear functions of the solution are off.
+/// @param functionals  [size, functions], of the unknowns of the system
+/// @return covariance of all [functions, functions]: of the ranges' own noise, of the white noise
+///         of the attitude that the shots of a sample share, of what the trajectory's process does
+///         between knots, and of the priors, whatever the weights were
+/// @throws as flight_equations
+Eigen::MatrixXd flight_covariance(const FlightShots& shots, const ShotPoses& poses,
+                                  const PlaneOfShot& plane, const FlightModel& model,
+                                  const FlightWeights& weights, const FlightPriors& priors,
+                                  const FlightSystem& system, const Eigen::MatrixXd& functionals,
+                                  InstructionSet set = best_instruction_set());
+
+}  // namespace risley::calibration

@@ -1,0 +1,119 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "risley/calibration/flight_adjustment.hpp"
+#include "risley/calibration/flight_shots.hpp"
+#include "risley/calibration/ground_cells.hpp"
+#include "risley/core/progress.hpp"
+#include "risley/estimation/weak_directions.hpp"
+#include "risley/sensors/sensor.hpp"
+#include "risley/trajectories/mount.hpp"
+#include "risley/trajectories/tangent_frame.hpp"
+#include "risley/trajectories/trajectory.hpp"
+
+namespace risley::calibration {
+
+struct FlightCalibrationOptions {
+  /// Start values, noise, geometry. What it states of its parameters are the priors; a sensor with
+  /// a covariance, as a calibration on walls writes it, brings all of it.
+  sensors::Sensor sensor;
+  trajectories::Mount mount;       ///< start values, and priors by their sigmas; a sigma of 0 holds
+  PoseErrorProcess process;        ///< of the trajectory's errors
+  std::vector<std::string> fixed;  ///< parameters of the train to hold
+  std::vector<std::string> additional;  ///< further ones to free, e.g. refractive_index
+  std::optional<double> range_noise;    ///< 1 sigma, m, default the sensor's
+  double range_offset_sigma = 0.02;     ///< prior about the sensor's, m; 0 holds it
+  /// Prior of the prisms' angles of which the sensor states no sigma, rad (0.3 degree).
+  double angle_sigma = 5.2359877559829887e-3;
+  double rotation_angle_sigma = 0;  ///< independent noise of every rotation angle, rad
+  double knot_spacing = 0.25;       ///< of the corrections of the trajectory, s
+  /// Knots are put further apart where there would be more: the time grows with the third power.
+  std::size_t most_knots = 600;
+  double cell_size = 2;               ///< of the ground's cells at the end, m
+  double most_roughness = 0.06;       ///< of a cell, m, see GroundCellOptions
+  std::size_t coarse_shots = 120000;  ///< with which the first rounds are made
+  std::uint64_t seed = 0;             ///< of their choice
+};
+
+/// One of the unknowns that a whole flight shares.
+struct FlightUnknown {
+  std::string name;                        ///< as unknown_names()
+  double start = 0, value = 0, sigma = 0;  ///< SI
+  double prior_sigma = 0;                  ///< SI; infinite: none
+  bool held = false;
+  /// Of what the answer is made: (sigma / prior sigma)^2, 1 where the flight says nothing.
+  double prior_share = 0;
+  std::string twin;  ///< the unknown that it is tied to most
+  double twin_correlation = 0;
+};
+
+/// What boresight and prisms together are known to, over the field of view.
+struct FlightDatum {
+  double sigma_x = 0, sigma_y = 0, sigma_z = 0;  ///< of the common rotation, sensor axes, rad
+  double rotation = 0, shape = 0, total = 0;     ///< RMS over the beams, rad
+  double height = 0;  ///< median range, m: times an angle gives what it is on the ground
+};
+
+/// A combination of unknowns that the flight does not tell.
+struct NotTold {
+  std::string words;  ///< "1.00 lever_arm_z_m", "boresight about the vertical against heading"
+  double sigma = 0;   ///< after the flight, in sigmas before it
+};
+
+/// What one calibration in flight found.
+struct FlightCalibration {
+  bool converged = false;
+  std::string reason;  ///< why not; empty when converged
+  std::vector<std::string> warnings;
+  trajectories::Mount mount;  ///< adjusted, with sigmas
+  sensors::Sensor sensor;     ///< adjusted, with covariance
+  FlightModel model;          ///< with corrections at the knots and planes, in the tangent frame
+  std::vector<FlightUnknown> unknowns;
+  /// [unknowns, unknowns], SI: noise, white noise shared by samples, the trajectory's process
+  /// between the knots, priors.
+  Eigen::MatrixXd covariance;
+  Eigen::MatrixXd correction_sigma;  ///< [6, knots], from the normal equations
+  FlightDatum datum;
+  std::vector<NotTold> not_told;
+  std::vector<StripPair> pairs_before, pairs_after;
+  double rms_before = 0, rms_after = 0;  ///< of all pairs and cells, along the normals, m
+  double sigma0 = 1;       ///< standard deviation of unit weight against the stated range noise
+  double range_sigma = 0;  ///< of one range, as found, m
+  std::size_t shots = 0;   ///< given
+  std::size_t without_pose = 0;  ///< of these: outside the trajectory or in a gap of it
+  std::size_t used = 0, outliers = 0;
+  std::size_t cells = 0, rough_cells = 0;
+  std::vector<double> piece_time, piece_rms;  ///< residuals along time: s since the first shot, m
+  trajectories::TangentFrame tangent;
+  trajectories::Trajectory trajectory;  ///< corrected, in the frame of the one given
+};
+
+/// Corrections at a time: linear between the knots of a strip, elsewhere what the process expects.
+/// @param time_ns  of the recording's clock
+Eigen::Matrix<double, kPoseErrors, 1> correction_at(const FlightModel& model,
+                                                    const PoseErrorProcess& process,
+                                                    std::int64_t time_ns);
+
+/// Calibrates mount and sensor on the strips of a flight: docs/theory/flight.md
+/// @param trajectory  of the body; its accuracies are not looked at, the process is
+/// @throws EstimationError when fewer than two strips overlap or no ground is found;
+/// InvalidArgument
+///         as require_flight_shots, require_trajectory, require_mount, require_process, for
+///         rotation angles and emitters that the sensor does not have and options out of range
+FlightCalibration calibrate_flight(const FlightShots& shots,
+                                   const trajectories::Trajectory& trajectory,
+                                   const FlightCalibrationOptions& options,
+                                   const Progress& progress = {});
+
+}  // namespace risley::calibration

@@ -1,0 +1,71 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "risley/calibration/flight_equations.hpp"
+
+namespace risley::calibration {
+
+/// Points of shots, local frame, m; NaN where a beam does not get through the prisms or a point is
+/// beyond 1000 km.
+using ShotPoints = std::vector<std::array<float, 3>>;
+
+/// Where the measured ranges put the points.
+/// @throws InvalidArgument as flight_equations
+ShotPoints georeferenced(const FlightShots& shots, const ShotPoses& poses,
+                         const FlightModel& model);
+
+struct GroundCellOptions {
+  double size = 2;                         ///< of a cell, m
+  double shift_east = 0, shift_north = 0;  ///< of the grid, in cells
+  std::size_t least_shots = 8, least_strips = 2;
+  double steepest = 1.0471975511965976;  ///< angle of a normal from the vertical, rad (60 degrees)
+  /// Scatter of the points about their plane above which a cell is left out, 1 sigma, m.
+  double most_roughness = std::numeric_limits<double>::infinity();
+  /// What the scatter is of one plane, 1 sigma, m: cells with significantly more, such as those
+  /// that an edge crosses, are left out, too. 0: not known.
+  double noise = 0;
+};
+
+/// Squares of a map's grid that several strips have seen, each with a plane of its own.
+struct GroundCells {
+  std::vector<GroundPlane> planes;
+  PlaneOfShot plane;                 ///< of every shot
+  double scatter = 0;                ///< of the points about the planes, robust 1 sigma, m
+  std::size_t rough = 0, steep = 0;  ///< cells left out
+};
+
+/// Sorts points into cells and fits a plane to each that takes no notice of strays: weights fall
+/// with the distance as Cauchy's, at 1.5 median absolute distances.
+/// @param strip  of every point
+/// @throws InvalidArgument for columns of different lengths and options out of range
+GroundCells ground_cells(const ShotPoints& points, const std::vector<std::uint16_t>& strip,
+                         const GroundCellOptions& options);
+
+/// How far two strips are apart.
+struct StripPair {
+  std::uint16_t first = 0, second = 0;
+  std::size_t cells = 0;     ///< that both have seen
+  double mean = 0, rms = 0;  ///< of the second less the first, along the cells' normals, m
+  /// The shift east, north, up that explains most of it, and its sigma, m; where the ground does
+  /// not tell it, sigma is 1.
+  Eigen::Vector3d shift{0, 0, 0}, sigma{1, 1, 1};
+};
+
+/// Mean distances from the planes, strip by strip, compared.
+/// @param gate  distance beyond which a point does not count, m
+/// @throws InvalidArgument as ground_cells
+std::vector<StripPair> strip_pairs(const ShotPoints& points,
+                                   const std::vector<std::uint16_t>& strip,
+                                   const PlaneOfShot& plane, const std::vector<GroundPlane>& planes,
+                                   double gate, std::size_t least_shots = 8);
+
+}  // namespace risley::calibration

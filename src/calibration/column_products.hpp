@@ -1,0 +1,77 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstddef>
+
+#include "risley/core/simd.hpp"
+
+namespace risley::calibration {
+
+/// Sums of the products of all pairs of columns, for kernels: a row holds one group of shots, a
+/// lane each. The products are summed up in squares of so many rows and columns as the registers
+/// allow, over so many groups at once that the rows stay in the nearest cache.
+/// @tparam Most  columns at most
+template <class Batch, std::size_t Most>
+class ColumnProducts {
+ public:
+  static constexpr std::size_t kTile = Batch::size == 8 ? 4 : 3;
+  static constexpr std::size_t tiles_of(std::size_t columns) {
+    return (columns + kTile - 1) / kTile;
+  }
+  /// Room of a row of so many columns; those behind the last one must be zero.
+  static constexpr std::size_t padded(std::size_t columns) { return tiles_of(columns) * kTile; }
+
+  explicit ColumnProducts(std::size_t columns) : columns_(columns), tiles_(tiles_of(columns)) {
+    const Batch zero(0.0);
+    for (std::size_t i = 0; i < tiles_ * (tiles_ + 1) / 2 * kTile * kTile; ++i) sums_[i] = zero;
+  }
+
+  /// Adds the products of some groups.
+  /// @param stride  from row to row, padded(columns) and more
+  void add(const Batch* rows, std::size_t stride, std::size_t groups) {
+    Batch* sums = sums_;
+    for (std::size_t i = 0; i < tiles_; ++i) {
+      for (std::size_t j = i; j < tiles_; ++j, sums += kTile * kTile) {
+        add_tile(rows + i * kTile, rows + j * kTile, stride, groups, sums);
+      }
+    }
+  }
+
+  /// Writes the upper triangle row by row.
+  void store(double* out) const {
+    for (std::size_t i = 0; i < columns_; ++i) {
+      const std::size_t row_tile = i / kTile;
+      const Batch* first =
+          sums_ + (row_tile * tiles_ - row_tile * (row_tile + 1) / 2) * kTile * kTile;
+      for (std::size_t j = i; j < columns_; ++j) {
+        *out++ = sum_of_lanes(first[j / kTile * kTile * kTile + i % kTile * kTile + j % kTile]);
+      }
+    }
+  }
+
+ private:
+  static constexpr std::size_t kMost = tiles_of(Most);
+
+  static void add_tile(const Batch* left, const Batch* right, std::size_t stride,
+                       std::size_t groups, Batch* sums) {
+    Batch sum[kTile][kTile];
+    for (std::size_t i = 0; i < kTile; ++i) {
+      for (std::size_t j = 0; j < kTile; ++j) sum[i][j] = sums[i * kTile + j];
+    }
+    for (std::size_t group = 0; group < groups; ++group, left += stride, right += stride) {
+      for (std::size_t i = 0; i < kTile; ++i) {
+        for (std::size_t j = 0; j < kTile; ++j)
+          sum[i][j] = xsimd::fma(left[i], right[j], sum[i][j]);
+      }
+    }
+    for (std::size_t i = 0; i < kTile; ++i) {
+      for (std::size_t j = 0; j < kTile; ++j) sums[i * kTile + j] = sum[i][j];
+    }
+  }
+
+  std::size_t columns_, tiles_;
+  Batch sums_[kMost * (kMost + 1) / 2 * kTile * kTile];
+};
+
+}  // namespace risley::calibration

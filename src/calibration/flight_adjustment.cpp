@@ -1,0 +1,608 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "risley/calibration/flight_adjustment.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Geometry>
+#include <fmt/format.h>
+#include <tbb/parallel_for.h>
+
+#include "risley/algebra/symmetric.hpp"
+#include "risley/calibration/planar_adjustment.hpp"
+#include "risley/core/error.hpp"
+#include "risley/core/random.hpp"
+#include "risley/core/require.hpp"
+
+#include "calibration/eigen_vectors.hpp"
+
+namespace risley::calibration {
+namespace {
+
+using Eigen::Index;
+using Eigen::Matrix3d;
+using Eigen::MatrixXd;
+using Eigen::Vector3d;
+using Eigen::VectorXd;
+
+constexpr Index kTwo = 2 * kPoseErrors;
+/// What is known of any plane before: keeps those of few shots regular and weighs nothing.
+constexpr double kPlaneTiltSigma = 10, kPlaneOffsetSigma = 1000;  // rad, m
+/// Parts of an interval within which the trajectory's process counts as one value.
+constexpr int kIntervalParts = 8;
+/// Columns of an inverse that are computed together.
+constexpr Index kInverseColumns = 96;
+
+Matrix3d rotation_of(const Vector3d& vector) {
+  const double angle = vector.norm();
+  if (!(angle > 0)) return Matrix3d::Identity();
+  return Eigen::AngleAxisd(angle, vector / angle).toRotationMatrix();
+}
+
+Vector3d rotation_vector_of(const Matrix3d& rotation) {
+  const Eigen::AngleAxisd turn(rotation);
+  return turn.angle() * turn.axis();
+}
+
+Matrix3d cross_matrix(const Vector3d& v) {
+  Matrix3d m;
+  m << 0, -v[2], v[1], v[2], 0, -v[0], -v[1], v[0], 0;
+  return m;
+}
+
+using PlaneRows = Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::RowMajor>;
+
+/// A plane's unknowns, eliminated: with L L' of its own equations, everything times L^-1.
+struct EliminatedPlane {
+  Matrix3d root_inverse;             // L^-1
+  Vector3d gradient;                 // L^-1 of its right side
+  MatrixXd globals;                  // [3, globals]
+  std::vector<std::uint32_t> knots;  // ascending
+  MatrixXd by_knot;                  // [6 knots, 3]
+};
+
+/// Places in a list, by what they are of.
+struct Listing {
+  std::vector<std::size_t> begin, entry;
+
+  template <class KeyOf>
+  Listing(std::size_t keys, std::size_t count, const KeyOf& key_of) : begin(keys + 1) {
+    for (std::size_t i = 0; i < count; ++i) ++begin[key_of(i) + 1];
+    for (std::size_t k = 0; k < keys; ++k) begin[k + 1] += begin[k];
+    entry.resize(count);
+    std::vector<std::size_t> next(begin.begin(), begin.end() - 1);
+    for (std::size_t i = 0; i < count; ++i) entry[next[key_of(i)]++] = i;
+  }
+};
+
+/// Takes left own' off a block of rows x 6 entries: by far the most of the work of elimination.
+void subtract_product(const double* left_0, const double* left_1, const double* left_2, Index rows,
+                      const Eigen::Matrix<double, kPoseErrors, 3>& own, double* block,
+                      Index stride) {
+  using Pair = Eigen::Array2d;  // knots have six rows: always an even number
+  for (Index c = 0; c < kPoseErrors; c += 3) {
+    const Pair a0 = Pair::Constant(own(c, 0)), a1 = Pair::Constant(own(c, 1)),
+               a2 = Pair::Constant(own(c, 2));
+    const Pair b0 = Pair::Constant(own(c + 1, 0)), b1 = Pair::Constant(own(c + 1, 1)),
+               b2 = Pair::Constant(own(c + 1, 2));
+    const Pair c0 = Pair::Constant(own(c + 2, 0)), c1 = Pair::Constant(own(c + 2, 1)),
+               c2 = Pair::Constant(own(c + 2, 2));
+    double* const first = block + c * stride;
+    for (Index i = 0; i < rows; i += 2) {
+      const Pair l0 = Eigen::Map<const Pair>(left_0 + i), l1 = Eigen::Map<const Pair>(left_1 + i),
+                 l2 = Eigen::Map<const Pair>(left_2 + i);
+      Eigen::Map<Pair>(first + i) -= l0 * a0 + l1 * a1 + l2 * a2;
+      Eigen::Map<Pair>(first + stride + i) -= l0 * b0 + l1 * b1 + l2 * b2;
+      Eigen::Map<Pair>(first + 2 * stride + i) -= l0 * c0 + l1 * c1 + l2 * c2;
+    }
+  }
+}
+
+void require_priors(const FlightPriors& priors, const FlightModel& model) {
+  const auto globals = static_cast<std::size_t>(model.unknowns().size());
+  require_length("mean of the priors", static_cast<std::size_t>(priors.mean.size()), globals);
+  require_length("rows of the priors' information",
+                 static_cast<std::size_t>(priors.information.rows()), globals);
+  require_length("columns of the priors' information",
+                 static_cast<std::size_t>(priors.information.cols()), globals);
+  if (!priors.mean.allFinite() || !priors.information.allFinite()) {
+    throw InvalidArgument("priors hold numbers that are not finite");
+  }
+  require_length_or_none("held", priors.held.size(), globals);
+  require_process(priors.process);
+}
+
+}  // namespace
+
+VectorXd unknown_values(const FlightModel& model) {
+  VectorXd values(model.unknowns().size());
+  values.head<3>() = rotation_vector_of(model.boresight);
+  values.segment<3>(FlightUnknowns::lever_arm(0)) = model.lever_arm;
+  values[FlightUnknowns::range_offset()] = model.range_offset;
+  values[FlightUnknowns::clock_offset()] = model.clock_offset;
+  values.tail(static_cast<Index>(model.free.size())) =
+      estimation::free_values(model.train, model.free);
+  return values;
+}
+
+MatrixXd value_rates(const FlightModel& model) {
+  const Index globals = model.unknowns().size();
+  MatrixXd rates = MatrixXd::Identity(globals, globals);
+  const Vector3d turn = rotation_vector_of(model.boresight);
+  const double angle = turn.norm();
+  const Matrix3d across = cross_matrix(turn);
+  const double factor =
+      angle < 1e-4 ? 1.0 / 12
+                   : 1 / (angle * angle) - (1 + std::cos(angle)) / (2 * angle * std::sin(angle));
+  rates.topLeftCorner<3, 3>() = Matrix3d::Identity() + 0.5 * across + factor * across * across;
+  return rates;
+}
+
+struct FlightSystem::Parts {
+  Index knots = 0, globals = 0;
+  std::size_t planes = 0;
+  std::vector<EliminatedPlane> eliminated;
+  std::vector<Index> held;  // globals
+  MatrixXd held_columns;    // [size, held]: of the equations, before they were taken out
+  VectorXd scale;           // to a diagonal of ones
+  Eigen::LLT<MatrixXd> factors;
+  VectorXd right;
+  MatrixXd prior;  // of the globals
+  std::vector<KnotInformation> chain;
+
+  Index size() const { return kPoseErrors * knots + globals; }
+  Index first_global() const { return kPoseErrors * knots; }
+
+  void eliminate(const FlightEquations& equations, const FlightModel& model);
+  void reduce(MatrixXd& hessian);
+  void add_priors(const FlightModel& model, const FlightPriors& priors, MatrixXd& hessian);
+  void hold(const FlightPriors& priors, MatrixXd& hessian);
+};
+
+void FlightSystem::Parts::eliminate(const FlightEquations& equations, const FlightModel& model) {
+  const Index stride = globals + kTwo + 1 + 3;
+  const Listing blocks(planes, equations.plane_blocks.size(),
+                       [&](std::size_t i) { return equations.plane_blocks[i].plane; });
+  eliminated.resize(planes);
+  tbb::parallel_for(std::size_t{0}, planes, [&](std::size_t p) {
+    Matrix3d own =
+        Vector3d(1 / (kPlaneTiltSigma * kPlaneTiltSigma), 1 / (kPlaneTiltSigma * kPlaneTiltSigma),
+                 1 / (kPlaneOffsetSigma * kPlaneOffsetSigma))
+            .asDiagonal();
+    Vector3d gradient = Vector3d::Zero();
+    MatrixXd by_global = MatrixXd::Zero(3, globals);
+    EliminatedPlane& result = eliminated[p];
+    // Blocks come in the order of time: knots ascend.
+    std::vector<Eigen::Matrix<double, 3, kPoseErrors>> by_knot;
+    for (std::size_t b = blocks.begin[p]; b < blocks.begin[p + 1]; ++b) {
+      const PlaneBlock& block = equations.plane_blocks[blocks.entry[b]];
+      const Eigen::Map<const PlaneRows> rows(equations.plane_products.data() + block.at, 3, stride);
+      by_global += rows.leftCols(globals);
+      gradient += rows.col(globals + kTwo);
+      own += rows.rightCols<3>();
+      const auto knot = static_cast<std::uint32_t>(model.knots.intervals[block.interval].knot);
+      for (std::uint32_t k = 0; k < 2; ++k) {
+        if (result.knots.empty() || result.knots.back() < knot + k) {
+          result.knots.push_back(knot + k);
+          by_knot.emplace_back(Eigen::Matrix<double, 3, kPoseErrors>::Zero());
+        }
+        const std::size_t at =
+            result.knots.back() == knot + k ? by_knot.size() - 1 : by_knot.size() - 2;
+        by_knot[at] += rows.middleCols<kPoseErrors>(globals + kPoseErrors * static_cast<Index>(k));
+      }
+    }
+    // Scaled first: a tilt of a large plane is known far better than its offset.
+    const Vector3d unit = own.diagonal().cwiseSqrt().cwiseInverse();
+    const Matrix3d scaled = unit.asDiagonal() * own * unit.asDiagonal();
+    const Eigen::LLT<Matrix3d> root(scaled + 1e-12 * Matrix3d::Identity());
+    result.root_inverse = Matrix3d::Identity();
+    root.matrixL().solveInPlace(result.root_inverse);
+    result.root_inverse = result.root_inverse * unit.asDiagonal();
+    result.gradient = result.root_inverse * gradient;
+    result.globals = result.root_inverse * by_global;
+    result.by_knot.resize(kPoseErrors * static_cast<Index>(by_knot.size()), 3);
+    for (std::size_t k = 0; k < by_knot.size(); ++k) {
+      result.by_knot.middleRows<kPoseErrors>(kPoseErrors * static_cast<Index>(k)).noalias() =
+          (result.root_inverse * by_knot[k]).transpose();
+    }
+  });
+}
+
+/// Takes the planes' part off the lower triangle and the right side.
+void FlightSystem::Parts::reduce(MatrixXd& hessian) {
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> places;  // plane, its knot
+  for (std::size_t p = 0; p < planes; ++p) {
+    for (std::size_t k = 0; k < eliminated[p].knots.size(); ++k) {
+      places.emplace_back(static_cast<std::uint32_t>(p), static_cast<std::uint32_t>(k));
+    }
+  }
+  const Listing by_knot(static_cast<std::size_t>(knots), places.size(), [&](std::size_t i) {
+    return eliminated[places[i].first].knots[places[i].second];
+  });
+  const Index g0 = first_global();
+  // Each task has the columns of one knot for itself.
+  tbb::parallel_for(Index{0}, knots, [&](Index knot) {
+    const Index column = kPoseErrors * knot;
+    const auto key = static_cast<std::size_t>(knot);
+    for (std::size_t i = by_knot.begin[key]; i < by_knot.begin[key + 1]; ++i) {
+      const auto [p, slot] = places[by_knot.entry[i]];
+      const EliminatedPlane& plane = eliminated[p];
+      const Eigen::Matrix<double, kPoseErrors, 3> own =
+          plane.by_knot.middleRows<kPoseErrors>(kPoseErrors * static_cast<Index>(slot));
+      for (std::size_t first = slot; first < plane.knots.size();) {
+        std::size_t end = first + 1;  // of the knots that follow each other
+        while (end < plane.knots.size() && plane.knots[end] == plane.knots[end - 1] + 1) ++end;
+        const auto rows = kPoseErrors * static_cast<Index>(end - first);
+        const auto at = kPoseErrors * static_cast<Index>(first);
+        const Index row = kPoseErrors * static_cast<Index>(plane.knots[first]);
+        const auto left = plane.by_knot.middleRows(at, rows);
+        subtract_product(left.col(0).data(), left.col(1).data(), left.col(2).data(), rows, own,
+                         &hessian(row, column), hessian.rows());
+        first = end;
+      }
+      for (Index c = 0; c < kPoseErrors; ++c) {
+        hessian.col(column + c).tail(globals) -= own(c, 0) * plane.globals.row(0).transpose() +
+                                                 own(c, 1) * plane.globals.row(1).transpose() +
+                                                 own(c, 2) * plane.globals.row(2).transpose();
+      }
+      right.segment<kPoseErrors>(column) -= own * plane.gradient;
+    }
+  });
+  for (const EliminatedPlane& plane : eliminated) {
+    hessian.bottomRightCorner(globals, globals).noalias() -=
+        plane.globals.transpose().lazyProduct(plane.globals);
+    right.segment(g0, globals).noalias() -= plane.globals.transpose().lazyProduct(plane.gradient);
+  }
+}
+
+void FlightSystem::Parts::add_priors(const FlightModel& model, const FlightPriors& priors,
+                                     MatrixXd& hessian) {
+  const MatrixXd rates = value_rates(model);
+  prior = rates.transpose() * priors.information * rates;
+  const VectorXd off = priors.mean - unknown_values(model);
+  const Index g0 = first_global();
+  hessian.bottomRightCorner(globals, globals) += prior;
+  right.segment(g0, globals) += rates.transpose() * (priors.information * off);
+  for (int c = 0; c < kPoseErrors; ++c) {
+    chain.push_back(knot_information(model.knots, priors.process, c));
+    const KnotInformation& own = chain.back();
+    for (Index k = 0; k < knots; ++k) {
+      const Index at = kPoseErrors * k + c;
+      const auto i = static_cast<std::size_t>(k);
+      hessian(at, at) += own.diagonal[i];
+      right[at] -= own.diagonal[i] * model.corrections(c, k);
+      if (k + 1 == knots) continue;
+      hessian(at + kPoseErrors, at) += own.next[i];
+      right[at] -= own.next[i] * model.corrections(c, k + 1);
+      right[at + kPoseErrors] -= own.next[i] * model.corrections(c, k);
+    }
+  }
+}
+
+void FlightSystem::Parts::hold(const FlightPriors& priors, MatrixXd& hessian) {
+  for (std::size_t g = 0; g < priors.held.size(); ++g) {
+    if (priors.held[g]) held.push_back(static_cast<Index>(g));
+  }
+  held_columns.resize(size(), static_cast<Index>(held.size()));
+  for (std::size_t h = 0; h < held.size(); ++h) {
+    const Index at = first_global() + held[h];
+    auto column = held_columns.col(static_cast<Index>(h));
+    column.head(at) = hessian.row(at).head(at).transpose();
+    column.tail(size() - at) = hessian.col(at).tail(size() - at);
+  }
+  for (const Index g : held) {
+    const Index at = first_global() + g;
+    hessian.row(at).head(at).setZero();
+    hessian.col(at).tail(size() - at).setZero();
+    hessian(at, at) = 1;
+    right[at] = 0;
+  }
+}
+
+FlightSystem::FlightSystem(const FlightEquations& equations, const FlightModel& model,
+                           const FlightPriors& priors)
+    : parts_(std::make_unique<Parts>()) {
+  require_priors(priors, model);
+  require_length("globals of the equations", static_cast<std::size_t>(equations.globals),
+                 static_cast<std::size_t>(model.unknowns().size()));
+  require_length("intervals of the equations", equations.knot_hessian.size(),
+                 model.knots.intervals.size());
+  Parts& p = *parts_;
+  p.knots = static_cast<Index>(model.knots.size());
+  p.globals = model.unknowns().size();
+  p.planes = model.planes.size();
+  const Index size = p.size(), g0 = p.first_global();
+  MatrixXd hessian = MatrixXd::Zero(size, size);
+  p.right = VectorXd::Zero(size);
+  hessian.bottomRightCorner(p.globals, p.globals) = equations.hessian;
+  p.right.segment(g0, p.globals) = equations.gradient;
+  for (std::size_t i = 0; i < equations.knot_hessian.size(); ++i) {
+    const Index at = kPoseErrors * static_cast<Index>(model.knots.intervals[i].knot);
+    hessian.block<kTwo, kTwo>(at, at) += equations.knot_hessian[i];
+    hessian.block(g0, at, p.globals, kTwo) += equations.knot_global[i].transpose();
+    p.right.segment<kTwo>(at) += equations.knot_gradient[i];
+  }
+  p.eliminate(equations, model);
+  p.reduce(hessian);
+  p.add_priors(model, priors, hessian);
+  p.hold(priors, hessian);
+  p.scale = algebra::unit_scale(hessian.diagonal());
+  for (Index j = 0; j < size; ++j) {
+    hessian.col(j).tail(size - j).array() *= p.scale[j] * p.scale.tail(size - j).array();
+  }
+  p.factors.compute(hessian);
+  if (p.factors.info() != Eigen::Success) {
+    throw EstimationError(
+        "the flight leaves some unknowns without any information, and no prior says anything of "
+        "them: state sigmas, or hold what is not to be adjusted");
+  }
+}
+
+FlightSystem::FlightSystem(FlightSystem&&) noexcept = default;
+FlightSystem& FlightSystem::operator=(FlightSystem&&) noexcept = default;
+FlightSystem::~FlightSystem() = default;
+
+Index FlightSystem::size() const { return parts_->size(); }
+Index FlightSystem::globals() const { return parts_->globals; }
+
+MatrixXd FlightSystem::solve(const MatrixXd& right) const {
+  require_length("rows of the right side", static_cast<std::size_t>(right.rows()),
+                 static_cast<std::size_t>(size()));
+  MatrixXd solution = parts_->scale.asDiagonal() * right;
+  for (const Index g : parts_->held) solution.row(parts_->first_global() + g).setZero();
+  parts_->factors.solveInPlace(solution);
+  return parts_->scale.asDiagonal() * solution;
+}
+
+MatrixXd FlightSystem::planes_of(const MatrixXd& solution) const {
+  const Parts& p = *parts_;
+  MatrixXd result(3 * static_cast<Index>(p.planes), solution.cols());
+  tbb::parallel_for(std::size_t{0}, p.planes, [&](std::size_t i) {
+    const EliminatedPlane& plane = p.eliminated[i];
+    MatrixXd sum = plane.globals * solution.bottomRows(p.globals);
+    for (std::size_t k = 0; k < plane.knots.size(); ++k) {
+      sum.noalias() +=
+          plane.by_knot.middleRows<kPoseErrors>(kPoseErrors * static_cast<Index>(k)).transpose() *
+          solution.middleRows<kPoseErrors>(kPoseErrors * static_cast<Index>(plane.knots[k]));
+    }
+    result.middleRows<3>(3 * static_cast<Index>(i)) = -plane.root_inverse.transpose() * sum;
+  });
+  return result;
+}
+
+FlightSystem::Step FlightSystem::step() const {
+  const Parts& p = *parts_;
+  Step step;
+  step.unknowns = solve(p.right);
+  step.promised = step.unknowns.dot(p.right);
+  const MatrixXd followed = planes_of(step.unknowns);
+  step.planes.resize(3, static_cast<Index>(p.planes));
+  for (std::size_t i = 0; i < p.planes; ++i) {
+    const auto at = static_cast<Index>(i);
+    step.planes.col(at) = followed.col(0).segment<3>(3 * at) +
+                          p.eliminated[i].root_inverse.transpose() * p.eliminated[i].gradient;
+  }
+  return step;
+}
+
+VectorXd FlightSystem::inverse_diagonal() const {
+  const Parts& p = *parts_;
+  const Index n = size(), blocks = (n + kInverseColumns - 1) / kInverseColumns;
+  VectorXd diagonal = VectorXd::Zero(n);
+  // Column j of L^-1 begins in row j; the diagonal sums up the squares of its columns.
+  tbb::parallel_for(Index{0}, blocks, [&](Index block) {
+    const Index at = block * kInverseColumns, columns = std::min(kInverseColumns, n - at);
+    MatrixXd part = MatrixXd::Zero(n - at, columns);
+    part.topRows(columns).setIdentity();
+    p.factors.matrixLLT()
+        .bottomRightCorner(n - at, n - at)
+        .triangularView<Eigen::Lower>()
+        .solveInPlace(part);
+    diagonal.segment(at, columns) = part.colwise().squaredNorm().transpose();
+  });
+  diagonal = diagonal.cwiseProduct(p.scale.cwiseAbs2());
+  for (const Index g : p.held) diagonal[p.first_global() + g] = 0;
+  return diagonal;
+}
+
+MatrixXd FlightSystem::inverse() const { return solve(MatrixXd::Identity(size(), size())); }
+
+MatrixXd FlightSystem::held_changes() const { return -solve(parts_->held_columns); }
+
+MatrixXd FlightSystem::draw_tilts(std::uint64_t seed) const {
+  const RandomStream stream(seed, 1701);
+  MatrixXd tilts(2, static_cast<Index>(parts_->planes));
+  for (std::size_t i = 0; i < parts_->planes; ++i) {
+    const Vector3d normal(stream.normal(3 * i), stream.normal(3 * i + 1), stream.normal(3 * i + 2));
+    tilts.col(static_cast<Index>(i)) =
+        (parts_->eliminated[i].root_inverse.transpose() * normal).head<2>();
+  }
+  return tilts;
+}
+
+MatrixXd FlightSystem::prior_times(const MatrixXd& columns) const {
+  const Parts& p = *parts_;
+  MatrixXd result = MatrixXd::Zero(size(), columns.cols());
+  result.bottomRows(p.globals) = p.prior * columns.bottomRows(p.globals);
+  for (int c = 0; c < kPoseErrors; ++c) {
+    const KnotInformation& own = p.chain[static_cast<std::size_t>(c)];
+    for (Index k = 0; k < p.knots; ++k) {
+      const Index at = kPoseErrors * k + c;
+      const auto i = static_cast<std::size_t>(k);
+      result.row(at) += own.diagonal[i] * columns.row(at);
+      if (k + 1 == p.knots) continue;
+      result.row(at) += own.next[i] * columns.row(at + kPoseErrors);
+      result.row(at + kPoseErrors) += own.next[i] * columns.row(at);
+    }
+  }
+  return result;
+}
+
+void apply(const FlightSystem::Step& step, FlightModel& model) {
+  const Index knots = static_cast<Index>(model.knots.size());
+  require_length("unknowns of the step", static_cast<std::size_t>(step.unknowns.size()),
+                 static_cast<std::size_t>(kPoseErrors * knots + model.unknowns().size()));
+  require_length("planes of the step", static_cast<std::size_t>(step.planes.cols()),
+                 model.planes.size());
+  model.corrections += Eigen::Map<const MatrixXd>(step.unknowns.data(), kPoseErrors, knots);
+  const VectorXd own = step.unknowns.tail(model.unknowns().size());
+  const Eigen::Quaterniond turned(model.boresight * rotation_of(own.head<3>()));
+  model.boresight = turned.normalized().toRotationMatrix();
+  model.lever_arm += own.segment<3>(FlightUnknowns::lever_arm(0));
+  model.range_offset += own[FlightUnknowns::range_offset()];
+  model.clock_offset += own[FlightUnknowns::clock_offset()];
+  for (std::size_t j = 0; j < model.free.size(); ++j) {
+    for (const int place : model.free[j].places) {
+      model.train.set_place(
+          place, model.train[place] + own[FlightUnknowns::parameter(static_cast<int>(j))]);
+    }
+  }
+  for (std::size_t i = 0; i < model.planes.size(); ++i) {
+    GroundPlane& plane = model.planes[i];
+    const auto change = step.planes.col(static_cast<Index>(i));
+    const auto [first, second] = tangents_of(plain(plane.normal));
+    plane.centre += change[2] * plane.normal;
+    plane.normal =
+        (plane.normal + change[0] * eigen(first) + change[1] * eigen(second)).normalized();
+  }
+}
+
+FlightAdjustment adjust_flight(const FlightShots& shots, const ShotPoses& poses,
+                               const PlaneOfShot& plane, FlightModel model,
+                               const FlightWeights& weights, const FlightPriors& priors,
+                               const FlightAdjustmentOptions& options, const Progress& progress) {
+  require_at_least("most steps", options.most_steps, 1);
+  require_not_below("tolerance", options.tolerance, 0);
+  FlightAdjustment result;
+  result.model = std::move(model);
+  while (result.steps < options.most_steps && !result.converged) {
+    progress.report(static_cast<double>(result.steps) / options.most_steps);
+    const FlightEquations equations =
+        flight_equations(shots, poses, plane, result.model, weights, options.set);
+    result.cost = equations.cost;
+    result.shots = equations.shots;
+    result.lost = equations.lost;
+    result.outliers = equations.outliers;
+    const FlightSystem::Step step = FlightSystem(equations, result.model, priors).step();
+    if (!step.unknowns.allFinite() || !step.planes.allFinite()) {
+      throw EstimationError("the adjustment of the flight diverged");
+    }
+    apply(step, result.model);
+    ++result.steps;
+    result.promised = step.promised;
+    result.converged = step.promised <= options.tolerance;
+  }
+  return result;
+}
+
+MatrixXd flight_covariance(const FlightShots& shots, const ShotPoses& poses,
+                           const PlaneOfShot& plane, const FlightModel& model,
+                           const FlightWeights& weights, const FlightPriors& priors,
+                           const FlightSystem& system, const MatrixXd& functionals,
+                           InstructionSet set) {
+  const MatrixXd solved = system.solve(functionals);
+  const MatrixXd planes = system.planes_of(solved);
+  const Index count = solved.cols(), globals = system.globals();
+  const MatrixXd by_global = solved.bottomRows(globals);
+  const std::size_t pieces = flight_pieces(model);
+  struct Sums {
+    MatrixXd noise, parts;  // [count, count]; [count, 6 parts]
+    std::size_t interval = 0;
+  };
+  std::vector<Sums> sums(pieces);
+  const double sample_ns = weights.sample_interval * 1e9;
+  for_each_flight_piece(
+      shots, poses, plane, model, weights,
+      [&](std::size_t piece, const FlightRows& rows) {
+        Sums& own = sums[piece];
+        own.interval = rows.interval;
+        own.noise = MatrixXd::Zero(count, count);
+        own.parts = MatrixXd::Zero(count, kPoseErrors * kIntervalParts);
+        if (rows.shots.empty()) return;
+        const TrajectoryKnots::Interval& interval = model.knots.intervals[rows.interval];
+        const auto n = static_cast<Index>(rows.shots.size());
+        const Eigen::Map<
+            const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>
+            values(rows.values.data(), n, rows.columns);
+        const MatrixXd pose = values.middleCols(globals, kPoseErrors);
+        const Index knot = kPoseErrors * static_cast<Index>(interval.knot);
+        MatrixXd moved = values.leftCols(globals) * by_global;  // [n, count]
+        VectorXd weight_behind(n);
+        const auto length = static_cast<double>(interval.end_ns - interval.begin_ns);
+        for (Index i = 0; i < n; ++i) {
+          const std::int64_t time = shots.time_ns[rows.shots[static_cast<std::size_t>(i)]];
+          weight_behind[i] = static_cast<double>(time - interval.begin_ns) / length;
+        }
+        const MatrixXd before = pose * solved.middleRows<kPoseErrors>(knot);
+        const MatrixXd behind = pose * solved.middleRows<kPoseErrors>(knot + kPoseErrors);
+        moved += before + weight_behind.asDiagonal() * (behind - before);
+        for (Index i = 0; i < n; ++i) {
+          const std::int32_t p = plane[rows.shots[static_cast<std::size_t>(i)]];
+          for (Index k = 0; k < 3; ++k) {
+            moved.row(i) +=
+                values(i, globals + kPoseErrors + k) * planes.row(3 * static_cast<Index>(p) + k);
+          }
+        }
+        const VectorXd weight = values.col(globals + 11);
+        // Rows of shots that are lost may hold NaN.
+        for (Index i = 0; i < n; ++i) {
+          if (weight[i] == 0) moved.row(i).setZero();
+        }
+        const VectorXd variance =
+            (weight.array() > 0)
+                .select(weight.array().square() * values.col(globals + 10).array(), 0.0);
+        own.noise = moved.transpose() * variance.asDiagonal() * moved;
+        const std::int64_t first_ns = shots.time_ns[rows.begin];
+        const auto samples =
+            static_cast<Index>(static_cast<double>(shots.time_ns[rows.end - 1] - first_ns) /
+                               sample_ns) +
+            2;
+        MatrixXd shared = MatrixXd::Zero(count, 3 * samples);
+        const auto first_sample = static_cast<Index>(
+            std::floor(static_cast<double>(first_ns - interval.begin_ns) / sample_ns));
+        for (Index i = 0; i < n; ++i) {
+          if (weight[i] == 0) continue;
+          const std::int64_t time = shots.time_ns[rows.shots[static_cast<std::size_t>(i)]];
+          const auto sample = static_cast<Index>(std::floor(
+                                  static_cast<double>(time - interval.begin_ns) / sample_ns)) -
+                              first_sample;
+          const auto part = std::clamp<Index>(static_cast<Index>(weight_behind[i] * kIntervalParts),
+                                              0, kIntervalParts - 1);
+          const VectorXd weighted = weight[i] * moved.row(i).transpose();
+          for (Index k = 0; k < kPoseErrors; ++k) {
+            own.parts.col(kPoseErrors * part + k) += pose(i, k) * weighted;
+          }
+          for (Index k = 0; k < 3; ++k) {
+            shared.col(3 * std::min(sample, samples - 1) + k) += pose(i, 3 + k) * weighted;
+          }
+        }
+        own.noise += weights.white_attitude * weights.white_attitude * shared * shared.transpose();
+      },
+      set);
+
+  MatrixXd covariance = solved.transpose() * system.prior_times(solved);
+  for (std::size_t first = 0; first < pieces;) {
+    MatrixXd parts = MatrixXd::Zero(count, kPoseErrors * kIntervalParts);
+    const std::size_t interval = sums[first].interval;
+    while (first < pieces && sums[first].interval == interval) {
+      covariance += sums[first].noise;
+      parts += sums[first].parts;
+      ++first;
+    }
+    const TrajectoryKnots::Interval& own = model.knots.intervals[interval];
+    const double spacing = static_cast<double>(own.end_ns - own.begin_ns) * 1e-9;
+    for (int c = 0; c < kPoseErrors; ++c) {
+      MatrixXd of_part(count, kIntervalParts);
+      for (Index k = 0; k < kIntervalParts; ++k) of_part.col(k) = parts.col(kPoseErrors * k + c);
+      covariance += of_part * covariance_between_knots(priors.process, c, spacing, kIntervalParts) *
+                    of_part.transpose();
+    }
+  }
+  return 0.5 * (covariance + covariance.transpose());
+}
+
+}  // namespace risley::calibration
