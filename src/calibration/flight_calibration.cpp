@@ -58,7 +58,7 @@ struct CoarseRound {
 };
 
 /// From metres off to centimetres: docs/theory/flight.md
-constexpr CoarseRound kCoarseRounds[] = {
+constexpr CoarseRound kCellRounds[] = {
     {10, Unlocked::boresight, 2},       {10, Unlocked::boresight, 2}, {6, Unlocked::boresight, 2},
     {4, Unlocked::boresight, 2},        {4, Unlocked::prisms, 2},     {3, Unlocked::prisms, 2},
     {2.5, Unlocked::range_and_clock, 2}};
@@ -253,7 +253,7 @@ class FlightWork {
       adjust(coarse_, own, steps);
       progress_.report(done += 0.035);
     };
-    for (const CoarseRound& own : kCoarseRounds) round(own.cell, own.unlocked, own.steps, true);
+    for (const CoarseRound& own : kCellRounds) round(own.cell, own.unlocked, own.steps, true);
     for (int i = 0; i < kAllRounds; ++i) {
       round(options_.cell_size, Unlocked::all, 2, i == 0);
     }
