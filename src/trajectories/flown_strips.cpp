@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstddef>
 #include <optional>
+#include <span>
 
 #include "risley/core/angle.hpp"
 #include "risley/core/require.hpp"
@@ -43,11 +44,41 @@ std::vector<SecondOfFlight> seconds_of_flight(const Interpolation& interpolation
   return seconds;
 }
 
+/// How far one may go from a second on without turning.
+struct Reach {
+  std::size_t end = 0;  ///< the first second behind
+  double course = 0, length = 0;
+};
+
+Reach reach_of(std::span<const SecondOfFlight> seconds, std::size_t begin, double least_way,
+               double widest) {
+  const SecondOfFlight& first = seconds[begin];
+  Reach reach{begin, first.course, 0};
+  double lowest = 0, highest = 0, left = 0, right = 0;  // of course and heading, from the first
+  double sum = 0;                                       // of courses, from the first
+  for (std::size_t i = begin; i < seconds.size(); ++i) {
+    const SecondOfFlight& one = seconds[i];
+    if (one.way <= 0 || one.way < least_way) break;
+    if (i > begin && one.begin_ns != seconds[i - 1].begin_ns + kStripSecond) break;
+    const double course = wrap_to_pi(one.course - first.course);
+    const double heading = wrap_to_pi(one.heading - first.heading);
+    lowest = std::min(lowest, course);
+    highest = std::max(highest, course);
+    left = std::min(left, heading);
+    right = std::max(right, heading);
+    if (highest - lowest > widest || right - left > widest) break;
+    reach.end = i + 1;
+    sum += course;
+    reach.course = first.course + sum / static_cast<double>(reach.end - begin);
+    reach.length += one.way;
+  }
+  return reach;
+}
+
 }  // namespace
 
 std::vector<FlownStrip> flown_strips(const Interpolation& interpolation,
                                      const FlownStripOptions& options) {
-  require_above("fastest_turn", options.fastest_turn, 0, "rad/s");
   require_above("widest_course", options.widest_course, 0, "rad");
   require_above("slowest_share", options.slowest_share, 0);
   require_above("shortest_s", options.shortest_s, 0, "s");
@@ -59,41 +90,32 @@ std::vector<FlownStrip> flown_strips(const Interpolation& interpolation,
   std::nth_element(ways.begin(), middle, ways.end());
   const double least = options.slowest_share * *middle;
 
-  std::vector<FlownStrip> strips;
-  for (std::size_t i = 0; i < seconds.size();) {
-    std::size_t end = i;
-    double lowest = 0, highest = 0, course = seconds[i].course, length = 0;
-    double left = 0, right = 0;  // of the heading in the beginning
-    while (end < seconds.size() && seconds[end].way > 0 && seconds[end].way >= least) {
-      if (end > i) {
-        if (seconds[end].begin_ns != seconds[end - 1].begin_ns + kStripSecond) break;
-        const double turn = wrap_to_pi(seconds[end].course - course);
-        if (std::abs(turn) > options.fastest_turn) break;
-        course += turn;
-      }
-      const double off = course - seconds[i].course;
-      if (std::max(highest, off) - std::min(lowest, off) > options.widest_course) break;
-      const double turned = wrap_to_pi(seconds[end].heading - seconds[i].heading);
-      if (std::max(right, turned) - std::min(left, turned) > options.widest_course) break;
-      left = std::min(left, turned);
-      right = std::max(right, turned);
-      lowest = std::min(lowest, off);
-      highest = std::max(highest, off);
-      length += seconds[end].way;
-      ++end;
-    }
-    if (end == i) {
-      ++i;
-      continue;
-    }
-    const std::int64_t begin_ns = seconds[i].begin_ns;
-    const std::int64_t end_ns = seconds[end - 1].begin_ns + kStripSecond;
-    if (1e-9 * static_cast<double>(end_ns - begin_ns) >= options.shortest_s) {
-      const double mean = seconds[i].course + 0.5 * (lowest + highest);
-      strips.push_back({begin_ns, end_ns, wrap_to_two_pi(mean), length});
-    }
-    i = end;
+  std::vector<Reach> reach;
+  for (std::size_t i = 0; i < seconds.size(); ++i) {
+    reach.push_back(reach_of(seconds, i, least, options.widest_course));
   }
+  // The longest first: one that begins in the end of a turn would break off too early.
+  std::vector<FlownStrip> strips;
+  std::vector<bool> taken(seconds.size(), false);
+  for (;;) {
+    std::size_t begin = 0, longest = 0, free = seconds.size();  // the next that is taken
+    for (std::size_t i = seconds.size(); i-- > 0;) {
+      if (taken[i]) free = i;
+      const std::size_t end = std::min(reach[i].end, free);
+      if (end > i && end - i >= longest) {
+        longest = end - i;
+        begin = i;
+      }
+    }
+    if (longest == 0 || static_cast<double>(longest) < options.shortest_s) break;
+    const Reach found =
+        reach_of({seconds.data(), begin + longest}, begin, least, options.widest_course);
+    strips.push_back({seconds[begin].begin_ns, seconds[found.end - 1].begin_ns + kStripSecond,
+                      wrap_to_two_pi(found.course), found.length});
+    std::fill_n(taken.begin() + static_cast<std::ptrdiff_t>(begin), longest, true);
+  }
+  std::sort(strips.begin(), strips.end(),
+            [](const FlownStrip& a, const FlownStrip& b) { return a.begin_ns < b.begin_ns; });
   return strips;
 }
 

@@ -17,7 +17,6 @@ struct FlownStrip {
 };
 
 struct FlownStripOptions {
-  double fastest_turn = 0.0523598775598299;  ///< of the course within a strip, rad/s: 3 degrees/s
   /// Courses of a strip differ by no more, and headings, rad: 20 degrees.
   double widest_course = 0.349065850398866;
   double slowest_share = 0.5;  ///< of the median speed
