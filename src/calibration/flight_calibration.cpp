@@ -46,7 +46,7 @@ constexpr double kKeptSigma = 0.6, kTiedCorrelation = 0.8;
 /// Done when a step promises less, in squared sigmas of all unknowns together: shots that come and
 /// go at the gate move the answer by about as much.
 constexpr double kSettled = 0.1;
-constexpr std::size_t kDatumBeams = 4000, kLeastCells = 20;
+constexpr std::size_t kDatumBeams = 4000, kFewestCells = 20;
 
 /// What of the globals a round adjusts.
 enum class Unlocked : std::uint8_t { boresight, prisms, range_and_clock, all };
@@ -64,7 +64,7 @@ constexpr CoarseRound kCellRounds[] = {
     {2.5, Unlocked::range_and_clock, 2}};
 constexpr int kAllRounds = 3, kFullRounds = 2;
 
-double seconds(std::int64_t nanoseconds) { return static_cast<double>(nanoseconds) * 1e-9; }
+double flight_seconds(std::int64_t nanoseconds) { return static_cast<double>(nanoseconds) * 1e-9; }
 
 Eigen::Matrix3d rotation_by(const Eigen::Vector3d& vector) {
   const double angle = vector.norm();
@@ -92,7 +92,6 @@ class FlightWork {
              const FlightCalibrationOptions& options, const Progress& progress)
       : options_(options),
         progress_(progress),
-        trajectory_(trajectory),
         tangent_(trajectories::tangent_frame(trajectory)),
         local_(trajectories::in_tangent_frame(trajectory, tangent_)),
         interpolation_(local_) {
@@ -142,9 +141,9 @@ class FlightWork {
       throw EstimationError(fmt::format(
           "no shot has a pose: the shots are at {:.3f} to {:.3f} s of the trajectory's time, the "
           "trajectory is of {:.3f} to {:.3f} s",
-          seconds(shots.time_ns.front()) + options_.mount.clock_offset.value,
-          seconds(shots.time_ns.back()) + options_.mount.clock_offset.value,
-          seconds(local_.time_ns.front()), seconds(local_.time_ns.back())));
+          flight_seconds(shots.time_ns.front()) + options_.mount.clock_offset.value,
+          flight_seconds(shots.time_ns.back()) + options_.mount.clock_offset.value,
+          flight_seconds(local_.time_ns.front()), flight_seconds(local_.time_ns.back())));
     }
     full_.shots = rows.size() == shots.size() ? shots : rows_of(shots, rows);
     if (full_.shots.strip.front() == full_.shots.strip.back()) {
@@ -209,11 +208,11 @@ class FlightWork {
     if (!rough_too) cells.most_roughness = options_.most_roughness;
     cells.noise = noise;
     flight.cells = ground_cells(flight.points, flight.shots.strip, cells);
-    if (flight.cells.planes.size() < kLeastCells) {
+    if (flight.cells.planes.size() < kFewestCells) {
       throw EstimationError(fmt::format(
           "only {} cells of {:g} m of ground were seen by several strips, at least {} are needed: "
           "do the strips overlap, and are mount and trajectory of this flight?",
-          flight.cells.planes.size(), size, kLeastCells));
+          flight.cells.planes.size(), size, kFewestCells));
     }
     model_.planes = flight.cells.planes;
   }
@@ -287,22 +286,22 @@ class FlightWork {
   std::vector<PieceScatter> scatter_of(const LabelledFlight& flight, const FlightWeights& weights) {
     std::vector<PieceScatter> pieces(flight_pieces(model_));
     const std::int64_t begin_ns = flight.shots.time_ns.front();
-    for_each_flight_piece(flight.shots, flight.poses, flight.cells.plane, model_, weights,
-                          [&](std::size_t piece, const FlightRows& rows) {
-                            PieceScatter& own = pieces[piece];
-                            if (rows.begin == rows.end) return;
-                            own.time =
-                                0.5 * (seconds(flight.shots.time_ns[rows.begin] - begin_ns) +
-                                       seconds(flight.shots.time_ns[rows.end - 1] - begin_ns));
-                            const auto columns = static_cast<std::size_t>(rows.columns);
-                            for (std::size_t i = 0; i < rows.shots.size(); ++i) {
-                              const double* row = rows.values.data() + (i + 1) * columns - 3;
-                              if (row[2] == 0) continue;
-                              own.squares += row[0] * row[0] / row[1];
-                              own.metres2 += row[0] * row[0];
-                              ++own.count;
-                            }
-                          });
+    for_each_flight_piece(
+        flight.shots, flight.poses, flight.cells.plane, model_, weights,
+        [&](std::size_t piece, const FlightRows& rows) {
+          PieceScatter& own = pieces[piece];
+          if (rows.begin == rows.end) return;
+          own.time = 0.5 * (flight_seconds(flight.shots.time_ns[rows.begin] - begin_ns) +
+                            flight_seconds(flight.shots.time_ns[rows.end - 1] - begin_ns));
+          const auto columns = static_cast<std::size_t>(rows.columns);
+          for (std::size_t i = 0; i < rows.shots.size(); ++i) {
+            const double* row = rows.values.data() + (i + 1) * columns - 3;
+            if (row[2] == 0) continue;
+            own.squares += row[0] * row[0] / row[1];
+            own.metres2 += row[0] * row[0];
+            ++own.count;
+          }
+        });
     return pieces;
   }
 
@@ -310,7 +309,7 @@ class FlightWork {
     hold(Unlocked::all);
     double spacing = options_.knot_spacing, flown = 0;
     for (const auto& interval : model_.knots.intervals) {
-      flown += seconds(interval.end_ns - interval.begin_ns);
+      flown += flight_seconds(interval.end_ns - interval.begin_ns);
     }
     const double room = std::max(
         1.0, static_cast<double>(options_.most_knots) - static_cast<double>(full_.shots.strips()));
@@ -369,7 +368,6 @@ class FlightWork {
 
   const FlightCalibrationOptions& options_;
   const Progress& progress_;
-  const trajectories::Trajectory& trajectory_;
   trajectories::TangentFrame tangent_;
   trajectories::Trajectory local_;
   trajectories::Interpolation interpolation_;
@@ -740,7 +738,7 @@ void FlightWork::fill_not_told(const MatrixXd& all) {
     double before = 0;
     for (const std::int64_t one : knots.time_ns) {
       for (const std::int64_t other : knots.time_ns) {
-        before += std::exp(-std::abs(seconds(one - other)) /
+        before += std::exp(-std::abs(flight_seconds(one - other)) /
                            options_.process.correlation_time[component]);
       }
     }
@@ -785,8 +783,8 @@ PoseErrors correction_at(const FlightModel& model, const PoseErrorProcess& proce
   const auto next = static_cast<std::size_t>(behind - knots.time_ns.begin());
   PoseErrors error;
   if (next > 0 && next < knots.size() && knots.strip[next] == knots.strip[next - 1]) {
-    const double weight = seconds(time_ns - knots.time_ns[next - 1]) /
-                          seconds(knots.time_ns[next] - knots.time_ns[next - 1]);
+    const double weight = flight_seconds(time_ns - knots.time_ns[next - 1]) /
+                          flight_seconds(knots.time_ns[next] - knots.time_ns[next - 1]);
     const auto at = static_cast<Index>(next);
     return (1 - weight) * model.corrections.col(at - 1) + weight * model.corrections.col(at);
   }
@@ -794,9 +792,9 @@ PoseErrors correction_at(const FlightModel& model, const PoseErrorProcess& proce
     const double time = process.correlation_time[static_cast<std::size_t>(c)];
     // Expected of a Gauss-Markov process that is known before, behind, or on both sides.
     const double before =
-        next == 0 ? 0 : std::exp(-seconds(time_ns - knots.time_ns[next - 1]) / time);
+        next == 0 ? 0 : std::exp(-flight_seconds(time_ns - knots.time_ns[next - 1]) / time);
     const double after =
-        next == knots.size() ? 0 : std::exp(-seconds(knots.time_ns[next] - time_ns) / time);
+        next == knots.size() ? 0 : std::exp(-flight_seconds(knots.time_ns[next] - time_ns) / time);
     const double both = before * after;
     const double left = next == 0 ? 0 : model.corrections(c, static_cast<Index>(next) - 1);
     const double right = next == knots.size() ? 0 : model.corrections(c, static_cast<Index>(next));

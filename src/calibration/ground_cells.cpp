@@ -75,7 +75,7 @@ std::uint64_t key_of(const std::array<float, 3>& point, const GroundCellOptions&
          number(point[0], options.shift_east);
 }
 
-double median(std::vector<double>& values) {
+double median_of(std::vector<double>& values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::nth_element(values.begin(), middle, values.end());
   return *middle;
@@ -119,7 +119,7 @@ std::optional<FittedGround> fit(const ShotPoints& points, std::span<const std::u
           std::abs(normal.dot(some.col(i)) - solution[2]) * steep;
     }
     result.distance = distance;
-    const double scale = kCauchyMads * median(distance);
+    const double scale = kCauchyMads * median_of(distance);
     result.plane.normal = normal * steep;
     result.plane.centre = centre + Vector3d(0, 0, solution[2]);
     if (!(scale > 1e-9)) break;
@@ -289,7 +289,7 @@ GroundCells ground_cells(const ShotPoints& points, const std::vector<std::uint16
         options.noise > 0
             ? options.noise * (kUnevenness + kScatterSigmas / std::sqrt(points_fitted))
             : std::numeric_limits<double>::infinity();
-    if (kNormalOfMad * median(distance) > std::min(options.most_roughness, significant)) {
+    if (kNormalOfMad * median_of(distance) > std::min(options.most_roughness, significant)) {
       result.rough = true;
       return;
     }
@@ -313,7 +313,7 @@ GroundCells ground_cells(const ShotPoints& points, const std::vector<std::uint16
       }
     }
   });
-  if (!distances.empty()) cells.scatter = kNormalOfMad * median(distances);
+  if (!distances.empty()) cells.scatter = kNormalOfMad * median_of(distances);
   return cells;
 }
 

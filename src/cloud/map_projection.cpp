@@ -199,7 +199,7 @@ Vector3d MapProjection::project(const Vector3d& geocentric_m) const {
   const PJ_COORD to =
       proj_trans(operation, PJ_FWD,
                  proj_coord(geocentric_m.x(), geocentric_m.y(), geocentric_m.z(), HUGE_VAL));
-  const Vector3d mapped(to.xyz.x, to.xyz.y, to.xyz.z);
+  Vector3d mapped(to.xyz.x, to.xyz.y, to.xyz.z);
   if (!mapped.allFinite()) {
     throw InvalidArgument(
         fmt::format("{} does not reach the place x = {:.3f}, y = {:.3f}, z = {:.3f} m "

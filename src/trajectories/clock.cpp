@@ -52,7 +52,7 @@ std::string seconds_words(std::int64_t time_ns) {
 
 std::optional<std::int64_t> shift_from_utc_ns(const Trajectory& trajectory, std::int64_t utc_ns) {
   require_at_least("records of the trajectory", static_cast<long long>(trajectory.size()), 1);
-  const std::int64_t gps = (leap_seconds(utc_ns) - kGpsEpoch_s) * kClockSecond;
+  const std::int64_t gps = (leap_seconds(utc_ns) - kGpsEpoch) * kClockSecond;
   switch (trajectory.time_scale) {
     case TimeScale::unknown:
       return {};
@@ -61,13 +61,13 @@ std::optional<std::int64_t> shift_from_utc_ns(const Trajectory& trajectory, std:
     case TimeScale::gps:
       return gps;
     case TimeScale::adjusted_gps:
-      return gps - kGpsAdjustment_s * kClockSecond;
+      return gps - kGpsAdjustment * kClockSecond;
     case TimeScale::gps_second_of_week: {
-      if (trajectory.gps_week) return gps - *trajectory.gps_week * kWeek_s * kClockSecond;
-      return gps + nearest_period(trajectory, utc_ns + gps, kWeek_s * kClockSecond);
+      if (trajectory.gps_week) return gps - *trajectory.gps_week * kWeek * kClockSecond;
+      return gps + nearest_period(trajectory, utc_ns + gps, kWeek * kClockSecond);
     }
     case TimeScale::utc_second_of_day:
-      return nearest_period(trajectory, utc_ns, kDay_s * kClockSecond);
+      return nearest_period(trajectory, utc_ns, kDay * kClockSecond);
   }
   return {};
 }
@@ -81,17 +81,17 @@ std::optional<std::int64_t> shift_to_utc_ns(const Trajectory& trajectory) {
     case TimeScale::gps:
       break;
     case TimeScale::adjusted_gps:
-      to_gps = kGpsAdjustment_s;
+      to_gps = kGpsAdjustment;
       break;
     case TimeScale::gps_second_of_week:
       if (!trajectory.gps_week) return {};
-      to_gps = *trajectory.gps_week * kWeek_s;
+      to_gps = *trajectory.gps_week * kWeek;
       break;
     case TimeScale::unknown:
     case TimeScale::utc_second_of_day:
       return {};
   }
-  const std::int64_t shift = (to_gps + kGpsEpoch_s) * kClockSecond;
+  const std::int64_t shift = (to_gps + kGpsEpoch) * kClockSecond;
   const std::int64_t gps_ns = trajectory.time_ns.front() + shift;
   const std::int64_t about = gps_ns - leap_seconds(gps_ns) * kClockSecond;
   return shift - leap_seconds(about) * kClockSecond;
@@ -114,11 +114,11 @@ std::string no_overlap_words(const Trajectory& trajectory, std::int64_t first_ns
   const std::array<std::pair<std::int64_t, const char*>, 7> causes{{
       {kLeap, "one counts GPS time and the other UTC"},
       {-kLeap, "one counts GPS time and the other UTC"},
-      {kWeek_s, "they are a week apart: one passed the end of the GPS week"},
-      {-kWeek_s, "they are a week apart: one passed the end of the GPS week"},
-      {kGpsAdjustment_s, "one counts adjusted GPS time, the other GPS time"},
-      {-kGpsEpoch_s, "one counts from 1970, the other GPS time from 1980"},
-      {-kGpsEpoch_s + kLeap, "one counts UTC from 1970, the other GPS time from 1980"},
+      {kWeek, "they are a week apart: one passed the end of the GPS week"},
+      {-kWeek, "they are a week apart: one passed the end of the GPS week"},
+      {kGpsAdjustment, "one counts adjusted GPS time, the other GPS time"},
+      {-kGpsEpoch, "one counts from 1970, the other GPS time from 1980"},
+      {-kGpsEpoch + kLeap, "one counts UTC from 1970, the other GPS time from 1980"},
   }};
   for (const auto& [seconds, cause] : causes) {
     const std::int64_t shift = seconds * kClockSecond;
@@ -130,7 +130,7 @@ std::string no_overlap_words(const Trajectory& trajectory, std::int64_t first_ns
                          seconds, cause);
     }
   }
-  for (const auto& [period, name] : {std::pair{kWeek_s, "weeks"}, std::pair{kDay_s, "days"}}) {
+  for (const auto& [period, name] : {std::pair{kWeek, "weeks"}, std::pair{kDay, "days"}}) {
     const std::int64_t shift = nearest_period(trajectory, first_ns, period * kClockSecond);
     if (shift != 0 && first_ns + shift <= trajectory.time_ns.back() &&
         last_ns + shift >= trajectory.time_ns.front()) {

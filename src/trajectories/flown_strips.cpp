@@ -85,6 +85,7 @@ std::vector<FlownStrip> flown_strips(const Interpolation& interpolation,
   const std::vector<SecondOfFlight> seconds = seconds_of_flight(interpolation);
   if (seconds.empty()) return {};
   std::vector<double> ways;
+  ways.reserve(seconds.size());
   for (const SecondOfFlight& second : seconds) ways.push_back(second.way);
   const auto middle = ways.begin() + static_cast<std::ptrdiff_t>(ways.size() / 2);
   std::nth_element(ways.begin(), middle, ways.end());

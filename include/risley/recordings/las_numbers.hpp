@@ -54,6 +54,6 @@ inline constexpr unsigned kIntensityFactor = 256;
 
 inline constexpr std::int64_t kSecond = 1'000'000'000;  ///< ns
 /// Seconds between 1970-01-01 and the origin of adjusted GPS time, 1e9 s after 1980-01-06.
-inline constexpr std::int64_t kGpsOrigin = kGpsEpoch_s + kGpsAdjustment_s;
+inline constexpr std::int64_t kGpsOrigin = kGpsEpoch + kGpsAdjustment;
 
 }  // namespace risley::recordings::las
