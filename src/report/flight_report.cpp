@@ -10,9 +10,11 @@
 
 #include <fmt/format.h>
 
+#include "risley/calibration/trajectory_knots.hpp"
 #include "risley/core/angle.hpp"
 #include "risley/report/charts.hpp"
 #include "risley/report/html.hpp"
+#include "risley/trajectories/error_process.hpp"
 
 namespace risley::report {
 namespace {
@@ -32,20 +34,31 @@ constexpr double kShownPart = 0.95;       // of the values of a map between the 
 constexpr double kLeastShown = 1e-4;      // m
 constexpr std::array<const char*, 5> kStripColours = {"a", "b", "c", "d", "bad"};
 
-/// One of the errors of a pose that are corrected: its row, and how it is drawn.
-struct CorrectedError {
-  Eigen::Index row;
+/// How the correction of one error of the trajectory is drawn.
+struct DrawnCorrection {
+  trajectories::PoseError error;
   const char *title, *label;
-  double scale;
+  double scale;  ///< to the units of the axis
 };
-const std::array<CorrectedError, 6> kCorrectedErrors = {{
-    {1, "Correction to the north", "correction, mm", kMillimetres},
-    {0, "Correction to the east", "correction, mm", kMillimetres},
-    {2, "Correction of the height", "correction, mm", kMillimetres},
-    {4, "Correction of the tilt about north", "correction, deg", kDegreesPerRadian},
-    {3, "Correction of the tilt about east", "correction, deg", kDegreesPerRadian},
-    {5, "Correction of the heading", "correction, deg", -kDegreesPerRadian},
+constexpr std::array<DrawnCorrection, trajectories::kPoseErrors> kDrawnCorrections = {{
+    {trajectories::PoseError::north, "Correction to the north", "correction, mm", kMillimetres},
+    {trajectories::PoseError::east, "Correction to the east", "correction, mm", kMillimetres},
+    {trajectories::PoseError::up, "Correction of the height", "correction, mm", kMillimetres},
+    {trajectories::PoseError::tilt_north, "Correction of the tilt about north", "correction, deg",
+     kDegreesPerRadian},
+    {trajectories::PoseError::tilt_east, "Correction of the tilt about east", "correction, deg",
+     kDegreesPerRadian},
+    // Corrections are rotations about up, headings about down.
+    {trajectories::PoseError::heading, "Correction of the heading", "correction, deg",
+     -kDegreesPerRadian},
 }};
+
+/// Row of the corrections that belongs to an error.
+Eigen::Index row_of(trajectories::PoseError error) {
+  int row = 0;
+  while (calibration::error_of(row) != error) ++row;
+  return row;
+}
 
 double nominal_value(const sensors::Sensor& nominal, const std::string& name, std::size_t unknown) {
   const auto place = static_cast<int>(unknown);
@@ -206,7 +219,9 @@ class FlightCharts {
     const TrajectoryKnots& knots = c_.model.knots;
     const auto columns = static_cast<Eigen::Index>(knots.size());
     if (columns == 0 || c_.model.corrections.cols() != columns ||
-        c_.correction_sigma.cols() != columns) {
+        c_.correction_sigma.cols() != columns ||
+        c_.model.corrections.rows() != calibration::kCorrections ||
+        c_.correction_sigma.rows() != calibration::kCorrections) {
       return {};
     }
     const std::size_t stride = (knots.size() + kMostTimes - 1) / kMostTimes;
@@ -217,7 +232,8 @@ class FlightCharts {
       if (end || i % stride == 0) kept.push_back(i);
     }
     std::vector<Chart> charts;
-    for (const CorrectedError& error : kCorrectedErrors) {
+    for (const DrawnCorrection& drawn : kDrawnCorrections) {
+      const Eigen::Index row = row_of(drawn.error);
       Series value{"correction", "a", SeriesKind::line, {}, {}};
       Series above{"± σ", "ink", SeriesKind::line, {}, {}}, below = above;
       for (std::size_t k = 0; k < kept.size(); ++k) {
@@ -226,8 +242,8 @@ class FlightCharts {
         if (k > 0 && knots.strip[kept[k]] != knots.strip[kept[k - 1]]) {
           for (Series* series : {&value, &above, &below}) add_break(*series, time);
         }
-        const double own = error.scale * c_.model.corrections(error.row, knot);
-        const double sigma = std::abs(error.scale) * c_.correction_sigma(error.row, knot);
+        const double own = drawn.scale * c_.model.corrections(row, knot);
+        const double sigma = std::abs(drawn.scale) * c_.correction_sigma(row, knot);
         for (Series* series : {&value, &above, &below}) series->x.push_back(time);
         value.y.push_back(own);
         above.y.push_back(own + sigma);
@@ -237,9 +253,9 @@ class FlightCharts {
       add_break(above, above.x.back());
       above.x.insert(above.x.end(), below.x.begin(), below.x.end());
       above.y.insert(above.y.end(), below.y.begin(), below.y.end());
-      charts.push_back({error.title,
+      charts.push_back({drawn.title,
                         "time, s",
-                        error.label,
+                        drawn.label,
                         {above, value},
                         kept.size() == knots.size()
                             ? fmt::format("All {} knots are drawn.", count_text(knots.size()))
