@@ -21,6 +21,8 @@
 #include "risley/core/saturating.hpp"
 #include "risley/optics/batch.hpp"
 
+#include "calibration/verdict.hpp"
+
 namespace risley::calibration {
 namespace {
 
@@ -82,6 +84,23 @@ trajectories::ErrorProcess process_of(const trajectories::ErrorModel& errors,
     time_ns = saturating_difference(time_ns, clock_ns);
   }
   return {errors, local};
+}
+
+/// What sigmas of corrections are in the words of a trajectory.
+trajectories::PoseAccuracy accuracy_of(const Eigen::Matrix<double, kCorrections, 1>& sigma,
+                                       double heading) {
+  const auto of = [&](trajectories::PoseError error) {
+    int c = 0;
+    while (error_of(c) != error) ++c;
+    return sigma[c];
+  };
+  using trajectories::PoseError;
+  const double along = std::cos(heading), across = std::sin(heading);
+  const double north = of(PoseError::tilt_north), east = of(PoseError::tilt_east);
+  return {{of(PoseError::north), of(PoseError::east), of(PoseError::up)},
+          std::hypot(along * north, across * east),
+          std::hypot(across * north, along * east),
+          of(PoseError::heading)};
 }
 
 /// A root of a covariance, [n, n]: its product with its transpose.
@@ -532,6 +551,7 @@ void FlightWork::fill_result() {
         last_.promised);
   }
   result_.model = std::move(model_);
+  result_.verdict = verdict_of(result_);
 }
 
 void FlightWork::fill_unknowns(const FlightSystem& system) {
@@ -781,6 +801,7 @@ void FlightWork::fill_not_told(const MatrixXd& all) {
 
 void FlightWork::fill_trajectory() {
   trajectories::Trajectory corrected = local_;
+  corrected.accuracy.resize(corrected.size());
   const auto clock_ns = static_cast<std::int64_t>(std::llround(model_.clock_offset * 1e9));
   for (std::size_t i = 0; i < corrected.size(); ++i) {
     const Eigen::Matrix<double, kCorrections, 1> error = correction_at(
@@ -788,6 +809,12 @@ void FlightWork::fill_trajectory() {
     corrected.position[i] += error.head<3>();
     corrected.attitude[i] =
         (Eigen::Quaterniond(rotation_by(error.tail<3>())) * corrected.attitude[i]).normalized();
+    corrected.accuracy[i] = accuracy_of(
+        correction_sigma_at(model_.knots, result_.correction_sigma, priors_.process,
+                            corrected.time_ns[i] - clock_ns),
+        trajectories::roll_pitch_heading(corrected.frame, corrected.position[i],
+                                         corrected.attitude[i])
+            .heading);
   }
   result_.trajectory = trajectories::from_tangent_frame(corrected, tangent_);
 }
