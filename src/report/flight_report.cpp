@@ -8,10 +8,12 @@
 #include <set>
 #include <utility>
 
+#include <Eigen/Geometry>
 #include <fmt/format.h>
 
 #include "risley/calibration/trajectory_knots.hpp"
 #include "risley/core/angle.hpp"
+#include "risley/core/error.hpp"
 #include "risley/report/charts.hpp"
 #include "risley/report/html.hpp"
 #include "risley/trajectories/error_process.hpp"
@@ -64,6 +66,22 @@ double nominal_value(const sensors::Sensor& nominal, const std::string& name, st
   const auto place = static_cast<int>(unknown);
   if (place == FlightUnknowns::range_offset()) return nominal.range_offset;
   return place < FlightUnknowns::parameter(0) ? kUnknown : nominal.get(name);
+}
+
+/// What the unknown truly was; a boresight after the mount as it was given.
+double true_value(const FlightReportInput& input, const std::string& name, std::size_t unknown) {
+  const jobs::FlightTruth& truth = *input.truth;
+  const auto place = static_cast<int>(unknown);
+  if (place >= FlightUnknowns::parameter(0)) return truth.sensor.get(name);
+  if (place == FlightUnknowns::clock_offset()) return truth.mount.clock_offset.value;
+  if (place == FlightUnknowns::range_offset()) return truth.sensor.range_offset;
+  if (place >= FlightUnknowns::lever_arm(0)) {
+    return truth.mount.lever_arm[unknown - static_cast<std::size_t>(FlightUnknowns::lever_arm(0))]
+        .value;
+  }
+  const Eigen::AngleAxisd turn(
+      Eigen::Matrix3d(input.mount.nominal.transpose() * body_from_sensor(truth.mount)));
+  return turn.angle() * turn.axis()[place];
 }
 
 /// The pairs with the most cells, in the order of their strips.
@@ -360,6 +378,12 @@ FlightReport flight_report(const FlightReportInput& input) {
   for (std::size_t i = 0; i < c.unknowns.size(); ++i) {
     report.nominal.push_back(nominal_value(input.nominal, c.unknowns[i].name, i));
   }
+  if (input.truth) {
+    report.truth = {input.truth->before, input.truth->after, {}};
+    for (std::size_t i = 0; i < c.unknowns.size(); ++i) {
+      report.truth->values.push_back(true_value(input, c.unknowns[i].name, i));
+    }
+  }
   report.covariance = c.covariance;
   report.datum = c.datum;
   report.not_told = c.not_told;
@@ -375,7 +399,6 @@ FlightReport flight_report(const FlightReportInput& input) {
   }
   report.knots = c.model.knots.size();
   report.knot_spacing = median_spacing(c.model.knots);
-  report.truth = input.truth;
   report.provenance = input.provenance;
   const FlightCharts charts(input);
   report.strip_charts = charts.strips();
@@ -384,6 +407,15 @@ FlightReport flight_report(const FlightReportInput& input) {
   report.residual_charts = charts.residuals();
   report.correction_charts = charts.corrections();
   return report;
+}
+
+FlightReport flight_report(const jobs::CalibratedFlight& calibrated) {
+  if (!calibrated.details) throw InvalidArgument("a report needs a result with details");
+  std::vector<ReportedRecording> recordings;
+  for (const jobs::ReadRecording& one : calibrated.recordings) recordings.push_back(reported(one));
+  return flight_report({calibrated.calibration, calibrated.nominal, calibrated.mount,
+                        *calibrated.details, calibrated.truth, recordings, calibrated.provenance,
+                        calibrated.warnings});
 }
 
 }  // namespace risley::report

@@ -181,7 +181,7 @@ struct Flight {
   sensors::Sensor nominal = sensors::load_sensor("mid-40");
   trajectories::Mount mount;
   jobs::FlightDetails details = details_example();
-  std::optional<FlightTruth> truth;
+  std::optional<jobs::FlightTruth> truth;
   std::vector<std::string> warnings;
   std::vector<ReportedRecording> recordings = {{"strips <1>.lvx", "lvx-1.1", "GPS", {}},
                                                {"more.lvx", "lvx-1.1", "GPS", {}}};
@@ -206,8 +206,14 @@ struct Flight {
   std::string html() const { return flight_page(report()); }
 };
 
-FlightTruth truth_example() {
-  FlightTruth truth;
+jobs::FlightTruth truth_example(const Flight& flight) {
+  jobs::FlightTruth truth;
+  truth.sensor = sensors::load_sensor("mid-40");
+  truth.sensor.range_offset = 0.0617;
+  truth.mount = flight.mount;
+  truth.mount.boresight[0].value = deg(5.0);
+  truth.mount.lever_arm[1].value = 0.0415;
+  truth.mount.clock_offset.value = 0.07;
   truth.before.gauge = deg(4.1);
   truth.before.shape = deg(0.0231);
   truth.before.rotation = {deg(2.7), deg(-1.5), deg(1.9)};
@@ -527,12 +533,18 @@ TEST(FlightPage, NumbersThatAreNotFiniteAreDashes) {
 TEST(FlightPage, TruthStandsBesideWhatIsStated) {
   Flight flight;
   EXPECT_THAT(visible(flight.html()), Not(HasSubstr("truth")));
-  flight.truth = truth_example();
+  flight.truth = truth_example(flight);
   const std::string shown = visible(flight.html());
   EXPECT_THAT(shown, HasSubstr("error before, against the truth</th><td>4.1</td>"));
   EXPECT_THAT(shown, HasSubstr("error after, against the truth</th><td>0.00303</td><td>0.003</td>"
                                "<td>0.0004</td><td>0.001</td><td>-0.002</td><td>0.0015</td>"
                                "<td>4.2</td><td>0.6</td>"));
+  // Truth, error, error over sigma.
+  EXPECT_THAT(shown, HasSubstr("<td>5.0000</td><td>1.0021</td><td class=\"far\">501.05</td>"));
+  EXPECT_THAT(shown, HasSubstr("<td>0.04150</td><td>0.00050</td><td>2.50</td>"));
+  EXPECT_THAT(shown, HasSubstr("<td>61.70</td><td>0.30</td><td>1.50</td>"));
+  EXPECT_THAT(shown, HasSubstr("<td>70.00</td><td>2.00</td><td class=\"far\">10.00</td>"));
+  EXPECT_THAT(shown, HasSubstr("held</td><td>0</td><td>0.052</td><td>–</td>"));
 }
 
 TEST(FlightPage, EscapesNames) {
@@ -570,7 +582,7 @@ class FlightReportFile : public ::testing::Test {
 
 TEST_F(FlightReportFile, ComesBackAsItWas) {
   Flight flight;
-  flight.truth = truth_example();
+  flight.truth = truth_example(flight);
   const Report report = flight.report();
   write_report(path(), report);
   const Report again = read_report(path());
@@ -586,11 +598,23 @@ TEST_F(FlightReportFile, ComesBackAsItWas) {
   EXPECT_EQ(r.pairs_before[0].shift, flight.calibration.pairs_before[0].shift);
   EXPECT_EQ(r.body_from_sensor(0, 2), 1);
   EXPECT_EQ(r.truth->after.rotation.y, deg(-0.002));
+  EXPECT_EQ(r.truth->values[4], 0.0415);
   EXPECT_EQ(r.strips[1].range, 81.9);
   EXPECT_EQ(r.knot_spacing, 2);
   const std::string first = io::read_text_file(path());
   write_report(path(), again);
   EXPECT_EQ(io::read_text_file(path()), first);
+}
+
+TEST_F(FlightReportFile, NeedsDetailsOfTheJob) {
+  jobs::CalibratedFlight calibrated;
+  calibrated.calibration = calibrated_example();
+  calibrated.nominal = sensors::load_sensor("mid-40");
+  EXPECT_THROW(flight_report(calibrated), InvalidArgument);
+  calibrated.details = details_example();
+  const FlightReport report = flight_report(calibrated);
+  EXPECT_EQ(report.unknowns.size(), 10u);
+  EXPECT_FALSE(report.truth);
 }
 
 TEST_F(FlightReportFile, OneThatFailedComesBack) {
@@ -633,6 +657,7 @@ TEST_F(FlightReportFile, WhatAPageCannotBeDrawnFromIsRefusedWithItsPlace) {
       {[](auto& r) { r.unknowns[1].twin = "dog"; }, "unknowns[1].twin: 'dog' is none"},
       {[](auto& r) { r.unknowns[1].twin_correlation = 7; }, "unknowns[1].twin_correlation: exp"},
       {[](auto& r) { r.unknowns.pop_back(); }, "is none of the unknowns"},
+      {[](auto& r) { r.truth->values.clear(); }, "truth.values: 0 values, expected 10"},
       {[](auto& r) { r.nominal.pop_back(); }, "nominal: 9 values, expected 10"},
       {[](auto& r) { r.covariance = Eigen::MatrixXd::Ones(900, 900); }, "covariance: 900 rows"},
       {[](auto& r) { r.covariance = Eigen::MatrixXd::Ones(10, 11); }, "covariance: 10 rows of 11"},
@@ -654,7 +679,9 @@ TEST_F(FlightReportFile, WhatAPageCannotBeDrawnFromIsRefusedWithItsPlace) {
       {[](auto& r) { r.strip_charts[0].kind = ChartKind::space; }, "strip_charts[0].series[0]."},
   };
   for (const auto& [damage, words] : cases) {
-    FlightReport report = Flight().report();
+    Flight flight;
+    flight.truth = truth_example(flight);
+    FlightReport report = flight.report();
     damage(report);
     write_report(path(), report);
     EXPECT_THAT(error(), HasSubstr(words));
