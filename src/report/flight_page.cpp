@@ -157,6 +157,14 @@ std::string unknown_row(const FlightReport& r, std::size_t i, bool prisms) {
                               symbol_html(unknown_info(unknown.twin, r.shape()).symbol),
                               finite_text("{:.2f}", unknown.twin_correlation));
   }
+  if (r.truth) {
+    const double error = unknown.value - r.truth->values[i];
+    const double ratio =
+        unknown.held || !is_sigma(unknown.sigma) ? kUnknown : error / unknown.sigma;
+    html += fmt::format("<td>{}</td><td>{}</td><td{}>{}</td>", in_unit(r.truth->values[i]),
+                        in_unit(error), std::abs(ratio) > kFarOff ? " class=\"far\"" : "",
+                        finite_text("{:.2f}", ratio));
+  }
   return html + "</tr>\n";
 }
 
@@ -169,8 +177,9 @@ std::string unknowns_table(const FlightReport& r, bool prisms) {
   return fmt::format(
       "<div class=\"wide\"><table><thead><tr><th>unknown</th><th>value</th><th>σ</th>"
       "<th>unit</th><th>before</th><th>change</th>{}<th>σ before</th><th>share of<br>σ before</th>"
-      "<th class=\"text\">tied most to</th></tr></thead><tbody>\n{}</tbody></table></div>\n",
-      prisms ? "<th>nominal</th>" : "", rows);
+      "<th class=\"text\">tied most to</th>{}</tr></thead><tbody>\n{}</tbody></table></div>\n",
+      prisms ? "<th>nominal</th>" : "",
+      r.truth ? "<th>truth</th><th>error</th><th>error / σ</th>" : "", rows);
 }
 
 /// "forward", "to the right" or "down" of the body, or the numbers.
