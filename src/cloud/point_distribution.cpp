@@ -27,7 +27,7 @@ constexpr double kFarthestPoint = 1e8;  // from the map's origin, m
 constexpr double kWidestFlight = 1e6;   // m
 /// A scan has reached its whole field of view after so many seconds; so many of its shots tell.
 constexpr double kFieldAfter = 30, kFieldShots = 300'000;
-constexpr double kLowestBeam = 0.17364817766693033;  // sine of 10 degrees
+constexpr double kLowestBeam = 0.17364817766693033;              // sine of 10 degrees
 constexpr double kHistogramBin = 0.05, kWidestHistogram = 5000;  // m
 constexpr double kMiddleStripe = 1;                              // m
 constexpr double kPlaceStripe = 0.02, kProfileStripe = 0.02, kProfileReach = 1.4;  // of R
@@ -131,7 +131,8 @@ using PixelTile = std::array<std::uint64_t, kTilePixels>;
 
 void mark(PixelTile& tile, std::int32_t column, std::int32_t row) {
   tile[static_cast<std::size_t>(row - divided(row, kTilePixels) * kTilePixels)] |=
-      std::uint64_t{1} << static_cast<unsigned>(column - divided(column, kTilePixels) * kTilePixels);
+      std::uint64_t{1} << static_cast<unsigned>(column -
+                                                divided(column, kTilePixels) * kTilePixels);
 }
 
 bool is_marked(const TileMap<PixelTile>& tiles, std::int32_t column, std::int32_t row) {
@@ -606,8 +607,8 @@ class PointDistribution::Work {
     const std::vector<std::pair<std::int32_t, std::int32_t>> blocks(places.begin(), places.end());
     std::vector<EmptyCircles> found(blocks.size());
     tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t i) {
-      found[i] = circles_of_block(pixels_, blocks[i].first, blocks[i].second, ground, half_swath,
-                                  pixel_);
+      found[i] =
+          circles_of_block(pixels_, blocks[i].first, blocks[i].second, ground, half_swath, pixel_);
     });
     EmptyCircles sum;
     for (const EmptyCircles& part : found) {
@@ -669,8 +670,8 @@ class PointDistribution::Work {
     });
     // Squares at the rim are not full, so that there may be a few more than were asked for.
     for (std::int32_t merged = std::max(
-             1, static_cast<std::int32_t>(std::ceil(std::sqrt(
-                    static_cast<double>(known) / static_cast<double>(most_squares)))));
+             1, static_cast<std::int32_t>(std::ceil(
+                    std::sqrt(static_cast<double>(known) / static_cast<double>(most_squares)))));
          ; ++merged) {
       std::unordered_map<std::uint64_t, Sum> sums;
       ground_.for_each([&](std::int32_t i, std::int32_t j, const CellTile<GroundCell>& tile) {

@@ -61,22 +61,22 @@ struct StripDistribution {
   std::uint16_t strip = 0;  ///< number, from 1
   std::string name;
   std::uint64_t points = 0;
-  double length = 0;            ///< flown, m
-  double height = 0;            ///< of the sensor above the points' mean, m
-  double width = 0;             ///< of the swath, 2 R, m
-  double density = 0;           ///< nominal: points within the swath per its area, 1/m^2
-  double spacing = 0;           ///< nominal: 1 / sqrt(density), m
+  double length = 0;   ///< flown, m
+  double height = 0;   ///< of the sensor above the points' mean, m
+  double width = 0;    ///< of the swath, 2 R, m
+  double density = 0;  ///< nominal: points within the swath per its area, 1/m^2
+  double spacing = 0;  ///< nominal: 1 / sqrt(density), m
   SwathProfile profile;
-  double middle_density = 0;    ///< of a stripe of 1 m in the middle (nadir), 1/m^2
+  double middle_density = 0;  ///< of a stripe of 1 m in the middle (nadir), 1/m^2
   /// At kSwathPlaces of R, both sides together, in stripes of a fiftieth of R, 1/m^2. The last is
   /// the edge.
   std::array<double, kSwathPlaces.size()> place_density{};
   /// Width about the middle where the density is at least half that of the swath, m.
   double dense_width = 0;
 
-  double whole_ground = 0;     ///< seen in full, within the swath, m^2
-  double cell_variation = 0;   ///< of the cells' counts within 0.9 R: sigma / mean
-  double cells_covered = 0;    ///< share of the cells within R that hold a point
+  double whole_ground = 0;    ///< seen in full, within the swath, m^2
+  double cell_variation = 0;  ///< of the cells' counts within 0.9 R: sigma / mean
+  double cells_covered = 0;   ///< share of the cells within R that hold a point
   /// Share of squares of twice the nominal spacing, within 0.95 R, that hold a point: at least 90 %
   /// where points are spread evenly. [USGS Lidar Base Specification]
   double spacing_cells_covered = 0;
@@ -91,8 +91,8 @@ struct StripDistribution {
 
 /// A square of the map of densities.
 struct DensitySquare {
-  double x = 0, y = 0;     ///< centre, m
-  double density = 0;      ///< 1/m^2
+  double x = 0, y = 0;       ///< centre, m
+  double density = 0;        ///< 1/m^2
   std::uint16_t strips = 0;  ///< most strips that a cell in it has points of
 };
 
@@ -100,15 +100,15 @@ struct DensitySquare {
 struct PointDistributionSummary {
   double empty_circle = 0, density_cell = 0;  ///< as asked, m
   std::vector<StripDistribution> strips;
-  std::uint64_t points = 0;     ///< of all strips
-  std::uint64_t other_points = 0;  ///< of none
-  double area = 0;              ///< of all swaths together, m^2
-  double density = 0;           ///< aggregate nominal: points on that area, 1/m^2
-  double spacing = 0;           ///< aggregate nominal: 1 / sqrt(density), m
+  std::uint64_t points = 0;                    ///< of all strips
+  std::uint64_t other_points = 0;              ///< of none
+  double area = 0;                             ///< of all swaths together, m^2
+  double density = 0;                          ///< aggregate nominal: points on that area, 1/m^2
+  double spacing = 0;                          ///< aggregate nominal: 1 / sqrt(density), m
   double low_density = 0, median_density = 0;  ///< of its cells: 5 %, 50 % have less, 1/m^2
-  double covered = 0;           ///< share of it whose cells hold a point
-  double overlap = 0;           ///< share of it whose cells hold points of several strips
-  double square = 0;            ///< edge of the map's squares, m
+  double covered = 0;                          ///< share of it whose cells hold a point
+  double overlap = 0;              ///< share of it whose cells hold points of several strips
+  double square = 0;               ///< edge of the map's squares, m
   std::vector<DensitySquare> map;  ///< those that hold a point or lie in a swath
 };
 
