@@ -97,8 +97,7 @@ std::vector<double> ranges_of(const PlannedFlight& planned, const scenes::Terrai
           pose->position +
           attitude * (lever + turn * Eigen::Vector3d(beams[3][i], beams[4][i], beams[5][i]));
       const Eigen::Vector3d direction =
-          (attitude * (turn * Eigen::Vector3d(beams[0][i], beams[1][i], beams[2][i])))
-              .normalized();
+          (attitude * (turn * Eigen::Vector3d(beams[0][i], beams[1][i], beams[2][i]))).normalized();
       const auto hit = terrain.nearest_hit(
           {start.x(), start.y(), start.z()}, {direction.x(), direction.y(), direction.z()},
           planned.sensor.range_maximum, penetration.uniform(fired.number[i]));
