@@ -18,6 +18,7 @@
 
 #include "calibration/flight_start.hpp"
 #include "calibration/judge_flight.hpp"
+#include "calibration/verdict.hpp"
 
 namespace risley::calibration {
 namespace {
@@ -61,6 +62,23 @@ Eigen::Matrix3d rotation_by(const Eigen::Vector3d& vector) {
   const double angle = vector.norm();
   if (!(angle > 0)) return Eigen::Matrix3d::Identity();
   return Eigen::AngleAxisd(angle, vector / angle).toRotationMatrix();
+}
+
+/// What sigmas of corrections are in the words of a trajectory.
+trajectories::PoseAccuracy accuracy_of(const Eigen::Matrix<double, kCorrections, 1>& sigma,
+                                       double heading) {
+  const auto of = [&](trajectories::PoseError error) {
+    int c = 0;
+    while (error_of(c) != error) ++c;
+    return sigma[c];
+  };
+  using trajectories::PoseError;
+  const double along = std::cos(heading), across = std::sin(heading);
+  const double north = of(PoseError::tilt_north), east = of(PoseError::tilt_east);
+  return {{of(PoseError::north), of(PoseError::east), of(PoseError::up)},
+          std::hypot(along * north, across * east),
+          std::hypot(across * north, along * east),
+          of(PoseError::heading)};
 }
 
 /// Shots, poses and what they are labelled with.
@@ -379,6 +397,7 @@ void FlightWork::fill_result() {
         last_.promised);
   }
   result_.model = std::move(model_);
+  result_.verdict = verdict_of(result_);
 }
 
 /// Mount and sensor with what was found.
@@ -430,6 +449,7 @@ void FlightWork::fill_mount_and_sensor() {
 
 void FlightWork::fill_trajectory() {
   trajectories::Trajectory corrected = local_;
+  corrected.accuracy.resize(corrected.size());
   const auto clock_ns = static_cast<std::int64_t>(std::llround(model_.clock_offset * 1e9));
   for (std::size_t i = 0; i < corrected.size(); ++i) {
     const Eigen::Matrix<double, kCorrections, 1> error = correction_at(
@@ -437,6 +457,12 @@ void FlightWork::fill_trajectory() {
     corrected.position[i] += error.head<3>();
     corrected.attitude[i] =
         (Eigen::Quaterniond(rotation_by(error.tail<3>())) * corrected.attitude[i]).normalized();
+    corrected.accuracy[i] = accuracy_of(
+        correction_sigma_at(model_.knots, result_.correction_sigma, priors_.process,
+                            corrected.time_ns[i] - clock_ns),
+        trajectories::roll_pitch_heading(corrected.frame, corrected.position[i],
+                                         corrected.attitude[i])
+            .heading);
   }
   result_.trajectory = trajectories::from_tangent_frame(corrected, tangent_);
 }

@@ -51,6 +51,42 @@ KnotPlace place_among(const TrajectoryKnots& knots, std::size_t begin, std::size
   return place;
 }
 
+void require_columns_of(const TrajectoryKnots& knots, const Eigen::MatrixXd& columns) {
+  require_at_least("knots", static_cast<long long>(knots.size()), 1);
+  require_length("rows of the corrections", static_cast<std::size_t>(columns.rows()), kCorrections);
+  require_length("corrections", static_cast<std::size_t>(columns.cols()), knots.size());
+}
+
+/// The knots before and behind a time.
+struct Neighbours {
+  const TrajectoryKnots& knots;
+  std::int64_t time_ns;
+  std::size_t next;  ///< the first knot behind the time
+
+  Neighbours(const TrajectoryKnots& all, std::int64_t at)
+      : knots(all),
+        time_ns(at),
+        next(static_cast<std::size_t>(
+            std::upper_bound(all.time_ns.begin(), all.time_ns.end(), at) - all.time_ns.begin())) {}
+
+  bool has_before() const { return next > 0; }
+  bool has_behind() const { return next < knots.size(); }
+  bool within_strip() const {
+    return has_before() && has_behind() && knots.strip[next] == knots.strip[next - 1];
+  }
+  double since_before() const {
+    return seconds(saturating_difference(time_ns, knots.time_ns[next - 1]));
+  }
+  double until_behind() const {
+    return seconds(saturating_difference(knots.time_ns[next], time_ns));
+  }
+  Eigen::Matrix<double, kCorrections, 1> between(const Eigen::MatrixXd& columns) const {
+    const double weight = since_before() / (since_before() + until_behind());
+    const auto at = static_cast<Index>(next);
+    return (1 - weight) * columns.col(at - 1) + weight * columns.col(at);
+  }
+};
+
 }  // namespace
 
 trajectories::PoseError error_of(int correction) {
@@ -179,18 +215,9 @@ Eigen::Matrix<double, kCorrections, 1> correction_at(const TrajectoryKnots& knot
                                                      const Eigen::MatrixXd& corrections,
                                                      const trajectories::ErrorProcess& process,
                                                      std::int64_t time_ns) {
-  require_at_least("knots", static_cast<long long>(knots.size()), 1);
-  require_length("rows of the corrections", static_cast<std::size_t>(corrections.rows()),
-                 kCorrections);
-  require_length("corrections", static_cast<std::size_t>(corrections.cols()), knots.size());
-  const auto behind = std::upper_bound(knots.time_ns.begin(), knots.time_ns.end(), time_ns);
-  const auto next = static_cast<std::size_t>(behind - knots.time_ns.begin());
-  if (next > 0 && next < knots.size() && knots.strip[next] == knots.strip[next - 1]) {
-    const double weight = seconds(time_ns - knots.time_ns[next - 1]) /
-                          seconds(knots.time_ns[next] - knots.time_ns[next - 1]);
-    const auto at = static_cast<Index>(next);
-    return (1 - weight) * corrections.col(at - 1) + weight * corrections.col(at);
-  }
+  require_columns_of(knots, corrections);
+  const Neighbours near(knots, time_ns);
+  if (near.within_strip()) return near.between(corrections);
   Eigen::Matrix<double, kCorrections, 1> found;
   for (int c = 0; c < kCorrections; ++c) {
     // Expected of a Gauss-Markov process that is known before, behind, or on both sides.
@@ -199,17 +226,39 @@ Eigen::Matrix<double, kCorrections, 1> correction_at(const TrajectoryKnots& knot
     const auto in_sigmas = [&](std::size_t knot) {
       return corrections(c, static_cast<Index>(knot)) / sigma_at(process, c, knots.time_ns[knot]);
     };
-    if (next > 0) {
-      before = std::exp(-seconds(saturating_difference(time_ns, knots.time_ns[next - 1])) / time);
-      left = in_sigmas(next - 1);
+    if (near.has_before()) {
+      before = std::exp(-near.since_before() / time);
+      left = in_sigmas(near.next - 1);
     }
-    if (next < knots.size()) {
-      after = std::exp(-seconds(saturating_difference(knots.time_ns[next], time_ns)) / time);
-      right = in_sigmas(next);
+    if (near.has_behind()) {
+      after = std::exp(-near.until_behind() / time);
+      right = in_sigmas(near.next);
     }
     const double both = before * after, rest = std::max(1 - both * both, 1e-15);
     found[c] = sigma_at(process, c, time_ns) *
                (before * (1 - after * after) * left + after * (1 - before * before) * right) / rest;
+  }
+  return found;
+}
+
+Eigen::Matrix<double, kCorrections, 1> correction_sigma_at(
+    const TrajectoryKnots& knots, const Eigen::MatrixXd& knot_sigma,
+    const trajectories::ErrorProcess& process, std::int64_t time_ns) {
+  require_columns_of(knots, knot_sigma);
+  const Neighbours near(knots, time_ns);
+  if (near.within_strip()) return near.between(knot_sigma);
+  Eigen::Matrix<double, kCorrections, 1> found;
+  for (int c = 0; c < kCorrections; ++c) {
+    double variance = 1;  // in squared sigmas of the process
+    const auto add = [&](std::size_t knot, double apart) {
+      const double kept = std::exp(-2 * apart / correlation_time(process, c));
+      const double own = knot_sigma(c, static_cast<Index>(knot)) /
+                         sigma_at(process, c, knots.time_ns[knot]);
+      variance = std::min(variance, 1 - kept * (1 - own * own));
+    };
+    if (near.has_before()) add(near.next - 1, near.since_before());
+    if (near.has_behind()) add(near.next, near.until_behind());
+    found[c] = sigma_at(process, c, time_ns) * std::sqrt(std::max(variance, 0.0));
   }
   return found;
 }

@@ -166,6 +166,17 @@ TEST(TrajectoryKnots, CorrectPosesBetweenBeforeAndBehindThem) {
   EXPECT_NEAR(at(5),
               -1e-4 * (before - behind * both) / rest + 2e-4 * (behind - before * both) / rest,
               1e-15);
+  // Half known at the knots: half and half between, and forgotten by and by.
+  MatrixXd sigma(6, static_cast<Index>(knots.size()));
+  for (int c = 0; c < 6; ++c) sigma.row(c).setConstant(0.5 * kSigma[c]);
+  const auto sigma_of = [&](double seconds) {
+    return correction_sigma_at(knots, sigma, process, std::llround(1e9 * seconds))[3];
+  };
+  EXPECT_NEAR(sigma_of(0.25), 0.5e-4, 1e-15);
+  EXPECT_NEAR(sigma_of(-5), 1e-4 * std::sqrt(1 - 0.75 * std::exp(-1.0)), 1e-15);
+  EXPECT_NEAR(sigma_of(5), 1e-4 * std::sqrt(1 - 0.75 * std::exp(-0.6)), 1e-15);
+  EXPECT_NEAR(sigma_of(500), 1e-4, 1e-15);
+  EXPECT_NE(refusal([&] { correction_sigma_at(knots, sigma.topRows(3), process, 0); }), "");
   EXPECT_NE(refusal([&] { correction_at(knots, corrections.leftCols(2), process, 0); }), "");
   EXPECT_NE(refusal([&] { correction_at({}, {}, process, 0); }), "");
   EXPECT_NE(refusal([&] { knot_information(knots, process, 6); }), "");

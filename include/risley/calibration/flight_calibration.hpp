@@ -12,6 +12,7 @@
 
 #include <Eigen/Core>
 
+#include "risley/calibration/calibration_verdict.hpp"
 #include "risley/calibration/flight_adjustment.hpp"
 #include "risley/calibration/flight_judgement.hpp"
 #include "risley/calibration/flight_shots.hpp"
@@ -53,6 +54,7 @@ struct FlightCalibrationOptions {
 struct FlightCalibration : FlightJudgement {
   bool converged = false;
   std::string reason;  ///< why not; empty when converged
+  CalibrationVerdict verdict;
   std::vector<std::string> warnings;
   trajectories::Mount mount;  ///< adjusted, with sigmas
   sensors::Sensor sensor;     ///< adjusted, with covariance

@@ -72,4 +72,12 @@ Eigen::Matrix<double, kCorrections, 1> correction_at(const TrajectoryKnots& knot
                                                      const trajectories::ErrorProcess& process,
                                                      std::int64_t time_ns);
 
+/// Standard deviations of corrections at a time: linear between the knots of a strip, elsewhere
+/// what the process adds to those of the nearest knot.
+/// @param knot_sigma  [6, knots]
+/// @throws as correction_at
+Eigen::Matrix<double, kCorrections, 1> correction_sigma_at(
+    const TrajectoryKnots& knots, const Eigen::MatrixXd& knot_sigma,
+    const trajectories::ErrorProcess& process, std::int64_t time_ns);
+
 }  // namespace risley::calibration
