@@ -457,12 +457,12 @@ void FlightWork::fill_trajectory() {
     corrected.position[i] += error.head<3>();
     corrected.attitude[i] =
         (Eigen::Quaterniond(rotation_by(error.tail<3>())) * corrected.attitude[i]).normalized();
-    corrected.accuracy[i] = accuracy_of(
-        correction_sigma_at(model_.knots, result_.correction_sigma, priors_.process,
-                            corrected.time_ns[i] - clock_ns),
-        trajectories::roll_pitch_heading(corrected.frame, corrected.position[i],
-                                         corrected.attitude[i])
-            .heading);
+    corrected.accuracy[i] =
+        accuracy_of(correction_sigma_at(model_.knots, result_.correction_sigma, priors_.process,
+                                        corrected.time_ns[i] - clock_ns),
+                    trajectories::roll_pitch_heading(corrected.frame, corrected.position[i],
+                                                     corrected.attitude[i])
+                        .heading);
   }
   result_.trajectory = trajectories::from_tangent_frame(corrected, tangent_);
 }

@@ -67,8 +67,8 @@ void take_off_spurious_information(const FlightEvidence& e, MatrixXd& all) {
                     algebra::SymmetricSolver(covariance(adjusted, adjusted)).inverse() *
                     unit.asDiagonal());
   };
-  // Of what is above 0; twice, since what the trajectory does to a cell makes it lean, too.
-  const MatrixXd spurious = root_of(2 * (information_of(after) - information_of(before)));
+  // Of what is above 0.
+  const MatrixXd spurious = root_of(e.spurious * (information_of(after) - information_of(before)));
   const MatrixXd prior =
       unit.asDiagonal() * MatrixXd(e.priors.information(adjusted, adjusted)) * unit.asDiagonal();
   const MatrixXd data = root_of(information_of(all) - prior - spurious * spurious.transpose());
