@@ -83,7 +83,8 @@ _risley() {
       calibrate)
         choices="$common --output --method --planes --stations --station --plan --duration-s
           --rate-hz --noise-angle-deg --noise-range-m --sensor --fix --free --prior-sigma-deg
-          --range-offset-sigma-m --beam-origin --states --mirror --force --truth --shot-rate-hz
+          --range-offset-sigma-m --beam-origin --states --mirror --force --truth --trajectory
+          --mount --accuracy --trajectory-errors --knot-spacing-s --cell-size-m --shot-rate-hz
           --extrinsics" ;;
       cloud)
         choices="$common --output --calibration --format --directions --beam-origin --covariance

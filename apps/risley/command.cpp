@@ -280,4 +280,6 @@ void require_apart(const CommonOptions& common, const std::vector<std::string>& 
   }
 }
 
+Json number_or_null(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
+
 }  // namespace risley::app

@@ -11,6 +11,7 @@
 #include <fmt/format.h>
 
 #include "risley/core/angle.hpp"
+#include "risley/core/error.hpp"
 #include "risley/report/charts.hpp"
 #include "risley/report/html.hpp"
 
@@ -368,6 +369,17 @@ FlightReport flight_report(const FlightReportInput& input) {
   report.residual_charts = charts.residuals();
   report.correction_charts = charts.corrections();
   return report;
+}
+
+FlightReport flight_report(const jobs::CalibratedFlight& calibrated) {
+  if (!calibrated.details) throw InvalidArgument("a report needs a result with details");
+  std::vector<ReportedRecording> recordings;
+  for (const jobs::ReadRecording& one : calibrated.recordings) recordings.push_back(reported(one));
+  std::optional<FlightTruth> truth;
+  if (calibrated.truth) truth = {calibrated.truth->before, calibrated.truth->after};
+  return flight_report({calibrated.calibration, calibrated.nominal, calibrated.mount,
+                        *calibrated.details, truth, recordings, calibrated.provenance,
+                        calibrated.warnings});
 }
 
 }  // namespace risley::report

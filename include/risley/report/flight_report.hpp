@@ -13,6 +13,7 @@
 #include "risley/calibration/datum.hpp"
 #include "risley/calibration/flight_calibration.hpp"
 #include "risley/calibration/ground_cells.hpp"
+#include "risley/jobs/calibrate_flight.hpp"
 #include "risley/jobs/flight_details.hpp"
 #include "risley/report/chart.hpp"
 #include "risley/report/report_facts.hpp"
@@ -89,5 +90,7 @@ struct FlightReportInput {
 
 /// Thins what the page draws. What is not finite stays so.
 FlightReport flight_report(const FlightReportInput& input);
+/// Of a job's result. @throws InvalidArgument when it was not asked for details
+FlightReport flight_report(const jobs::CalibratedFlight& calibrated);
 
 }  // namespace risley::report
