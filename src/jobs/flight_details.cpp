@@ -34,10 +34,11 @@ using calibration::TrajectoryKnots;
 constexpr double kNothing = std::numeric_limits<double>::quiet_NaN();
 constexpr std::size_t kMostStrips = 100, kMostDrawnPairs = 6;
 constexpr std::size_t kMostPlaces = 3000, kMostStripPlaces = 200, kFewestStripPlaces = 2;
-constexpr double kShotsPerPlane = 24;         // that the sample must leave, on average
+constexpr double kShotsPerPlane = 48;         // that the sample must leave, on average
 constexpr double kAreaSquare = 10;            // with which the flown area is measured, m
+constexpr std::size_t kAreaPoints = 200'000;  // that it is measured with
 constexpr double kLargestPlane = 20;          // m
-constexpr std::size_t kFewestStripShots = 3;  // that say where a strip lies in a cell
+constexpr std::size_t kFewestStripShots = 5;  // that say where a strip lies in a cell
 constexpr double kGate = 3;                   // range sigmas beyond which a point does not count
 constexpr double kSigmaOfMedian = 1.4826;     // of absolute values of a normal distribution
 constexpr double kClockMargin = 1e-3;         // s
@@ -111,10 +112,11 @@ FlightModel start_model(const FlightCalibrationOptions& options, const FlightCal
 double plane_size_of(const ShotPoints& points, double wished) {
   std::set<Place> squares;
   std::size_t count = 0;
-  for (const auto& point : points) {
-    if (!std::isfinite(point[0])) continue;
-    squares.insert(place_of(point[0], point[1], kAreaSquare));
-    ++count;
+  const std::size_t step = points.size() / kAreaPoints + 1;
+  for (std::size_t i = 0; i < points.size(); i += step) {
+    if (!std::isfinite(points[i][0])) continue;
+    squares.insert(place_of(points[i][0], points[i][1], kAreaSquare));
+    count += step;
   }
   if (count == 0) return wished;
   const double area = static_cast<double>(squares.size()) * kAreaSquare * kAreaSquare;
@@ -290,7 +292,7 @@ class FlightPictures {
       ground.after.push_back(std::sqrt(own.squares.after.mean()));
       ground.roughness.push_back(own.roughness.mean());
       ground.slope.push_back(own.slope.mean());
-      ground.strips.push_back(own.strips == 0 ? kNothing : static_cast<double>(own.strips));
+      ground.strips.push_back(own.strips < 2 ? kNothing : static_cast<double>(own.strips));
     }
   }
 

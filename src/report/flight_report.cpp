@@ -305,6 +305,12 @@ class FlightCharts {
     return knots.strip[static_cast<std::size_t>(at)];
   }
 
+  /// ", colours in mm" of "difference, mm".
+  static std::string unit_words(const std::string& label) {
+    const std::size_t comma = label.rfind(", ");
+    return comma == std::string::npos ? "" : ", colours in " + label.substr(comma + 2);
+  }
+
   /// Squares that have a value.
   Chart map(std::string title, const std::vector<double>& east, const std::vector<double>& north,
             const std::vector<double>& values, std::string value_label) const {
@@ -317,16 +323,22 @@ class FlightCharts {
       cells.value.push_back(values[i]);
     }
     Chart chart{std::move(title), "east, m", "north, m", {std::move(cells)}, {}, ChartKind::ground};
+    chart.note = fmt::format("Squares of {:g} m{}.", details_.square_size, unit_words(value_label));
     chart.value_label = std::move(value_label);
-    chart.note = fmt::format("Squares of {:g} m.", details_.square_size);
     return chart;
   }
 
-  /// Before and after in the same colours, and after in colours of its own.
+  /// Before and after in the same colours, and after in colours of its own; on the same squares
+  /// where there are any.
   void add_differences(std::vector<Chart>& charts, const std::string& who,
                        const std::vector<double>& east, const std::vector<double>& north,
-                       const std::vector<double>& before, const std::vector<double>& after,
-                       bool signs) const {
+                       std::vector<double> before, std::vector<double> after, bool signs) const {
+    const auto known = [&](std::size_t i) { return std::isfinite(before[i] + after[i]); };
+    std::size_t common = 0;
+    for (std::size_t i = 0; i < east.size(); ++i) common += known(i) ? 1 : 0;
+    for (std::size_t i = 0; i < east.size() && common > 0; ++i) {
+      if (!known(i)) before[i] = after[i] = kUnknown;
+    }
     const double fine = kMillimetres * shown_size(after);
     const double coarse = std::max(fine, kMillimetres * shown_size(before));
     const auto add = [&](const char* when, const std::vector<double>& values, double size,
@@ -338,8 +350,8 @@ class FlightCharts {
       chart.value_range = {signs ? -size : 0.0, size};
       charts.push_back(std::move(chart));
     };
-    add("before", before, coarse, " One square in twenty may be beyond the colours.");
-    add("after", after, coarse, " The colours are those of the picture before.");
+    add("before", before, coarse, " One square in twenty is beyond the ends of the colours.");
+    add("after", after, coarse, " The same colours as before.");
     add("after, finer colours", after, fine, " The same differences in colours of their own.");
   }
 

@@ -166,10 +166,10 @@ TEST(FlightDetails, OfAPerfectStartShowNothing) {
   }
   one.options.mount.clock_offset.value = settings.clock_offset;
   const FlightDetails details = one.details();
-  // Means of three shots and more of 20 mm, most of many more.
+  // Means of five shots and more of 20 mm, most of many more.
   EXPECT_GT(finite(details.ground.before), 50u);
-  EXPECT_LT(rms(details.ground.before), 0.02);
-  for (const StripDifferences& pair : details.pairs) EXPECT_LT(rms(pair.before), 0.02);
+  EXPECT_LT(rms(details.ground.before), 0.015);
+  for (const StripDifferences& pair : details.pairs) EXPECT_LT(rms(pair.before), 0.015);
 }
 
 TEST(FlightDetails, RefuseWhatDoesNotBelongTogether) {

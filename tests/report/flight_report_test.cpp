@@ -339,7 +339,7 @@ TEST(FlightPage, UnknownsStandWithTheirPriorsAndTwins) {
   // Prisms have a nominal value.
   EXPECT_THAT(shown, HasSubstr("<th>nominal</th>"));
   EXPECT_THAT(shown, HasSubstr("X, its optical axis, points down, its Y to the left and its Z "
-                               "forward. The trajectory is of centre of the IMU."));
+                               "forward. Point that the trajectory is of: centre of the IMU."));
 }
 
 TEST(FlightPage, WhatIsHeldAndMayBeOffSaysSo) {
@@ -421,11 +421,21 @@ TEST(FlightPage, BothPicturesOfADifferenceHaveTheSameColours) {
     EXPECT_LT(fine.at("value_range")[1], after.at("value_range")[1]);
     EXPECT_EQ(fine.at("series"), after.at("series"));
   }
-  // A square that was not compared is not drawn.
+  // Squares that were compared before and after.
   const auto after = chart(html, "Strip 2 less strip 1, after").at("series").at(0);
-  EXPECT_EQ(after.at("x"), (nlohmann::json{-2.0, 6.0}));
-  EXPECT_EQ(after.at("value"), (nlohmann::json{4.0, -6.0}));
+  EXPECT_EQ(after.at("x"), nlohmann::json::array({-2.0}));
+  EXPECT_EQ(after.at("value"), nlohmann::json::array({4.0}));
   EXPECT_EQ(after.at("cell_width"), 4.0);
+  EXPECT_THAT(html, HasSubstr("Squares of 4 m, colours in mm."));
+  // Without any each picture has its own.
+  Flight flight;
+  flight.details.pairs[0].after = {kNaN, kNaN, 0.001};
+  const std::string apart = flight.html();
+  const auto squares = [&](const char* title) {
+    return chart(apart, title).at("series").at(0).at("x");
+  };
+  EXPECT_EQ(squares("Strip 2 less strip 1, before"), (nlohmann::json::array({-2.0, 2.0})));
+  EXPECT_EQ(squares("Strip 2 less strip 1, after"), nlohmann::json::array({6.0}));
 }
 
 TEST(FlightPage, CorrectionsHaveTheSignsAndUnitsOfTheirErrors) {
