@@ -180,7 +180,11 @@ Run declare_cloud(CLI::App& verb) {
          "between points");
   add_reading_options(verb, o.reading);
   verb.add_option("--trajectory", o.platform.trajectory,
-                  "Trajectory of a sensor that moved: SBET, Inertial Explorer or POSPac text, CSV");
+                  "Trajectory of a sensor that moved: SBET, Inertial Explorer or POSPac text, CSV, "
+                  "poses of a ROS bag");
+  verb.add_option("--trajectory-topic", o.platform.topic,
+                  "Topic of its poses, of a ROS bag that has several")
+      ->type_name("NAME");
   verb.add_option("--mount", o.platform.mount,
                   "How the sensor sits on the moving platform (YAML): axes, lever arm, boresight, "
                   "clock");

@@ -35,6 +35,7 @@ constexpr OptionName kNames[] = {
     {"shot_rate", "--shot-rate-hz"},
     {"states", "--states"},
     {"stations", "--stations"},
+    {"trajectory_topic", "--trajectory-topic"},
     {"truth", "--truth"},
 };
 
