@@ -29,7 +29,7 @@ using Eigen::MatrixXd;
 using Eigen::Vector3d;
 using Eigen::VectorXd;
 
-constexpr Index kTwo = 2 * kPoseErrors;
+constexpr Index kTwo = 2 * kCorrections;
 /// What is known of any plane before: keeps those of few shots regular and weighs nothing.
 constexpr double kPlaneTiltSigma = 10, kPlaneOffsetSigma = 1000;  // rad, m
 /// Parts of an interval within which the trajectory's process counts as one value.
@@ -81,10 +81,10 @@ struct Listing {
 
 /// Takes left own' off a block of rows x 6 entries: by far the most of the work of elimination.
 void subtract_product(const double* left_0, const double* left_1, const double* left_2, Index rows,
-                      const Eigen::Matrix<double, kPoseErrors, 3>& own, double* block,
+                      const Eigen::Matrix<double, kCorrections, 3>& own, double* block,
                       Index stride) {
   using Pair = Eigen::Array2d;  // knots have six rows: always an even number
-  for (Index c = 0; c < kPoseErrors; c += 3) {
+  for (Index c = 0; c < kCorrections; c += 3) {
     const Pair a0 = Pair::Constant(own(c, 0)), a1 = Pair::Constant(own(c, 1)),
                a2 = Pair::Constant(own(c, 2));
     const Pair b0 = Pair::Constant(own(c + 1, 0)), b1 = Pair::Constant(own(c + 1, 1)),
@@ -113,7 +113,6 @@ void require_priors(const FlightPriors& priors, const FlightModel& model) {
     throw InvalidArgument("priors hold numbers that are not finite");
   }
   require_length_or_none("held", priors.held.size(), globals);
-  require_process(priors.process);
 }
 
 }  // namespace
@@ -154,8 +153,8 @@ struct FlightSystem::Parts {
   MatrixXd prior;  // of the globals
   std::vector<KnotInformation> chain;
 
-  Index size() const { return kPoseErrors * knots + globals; }
-  Index first_global() const { return kPoseErrors * knots; }
+  Index size() const { return kCorrections * knots + globals; }
+  Index first_global() const { return kCorrections * knots; }
 
   void eliminate(const FlightEquations& equations, const FlightModel& model);
   void reduce(MatrixXd& hessian);
@@ -177,7 +176,7 @@ void FlightSystem::Parts::eliminate(const FlightEquations& equations, const Flig
     MatrixXd by_global = MatrixXd::Zero(3, globals);
     EliminatedPlane& result = eliminated[p];
     // Blocks come in the order of time: knots ascend.
-    std::vector<Eigen::Matrix<double, 3, kPoseErrors>> by_knot;
+    std::vector<Eigen::Matrix<double, 3, kCorrections>> by_knot;
     for (std::size_t b = blocks.begin[p]; b < blocks.begin[p + 1]; ++b) {
       const PlaneBlock& block = equations.plane_blocks[blocks.entry[b]];
       const Eigen::Map<const PlaneRows> rows(equations.plane_products.data() + block.at, 3, stride);
@@ -188,11 +187,12 @@ void FlightSystem::Parts::eliminate(const FlightEquations& equations, const Flig
       for (std::uint32_t k = 0; k < 2; ++k) {
         if (result.knots.empty() || result.knots.back() < knot + k) {
           result.knots.push_back(knot + k);
-          by_knot.emplace_back(Eigen::Matrix<double, 3, kPoseErrors>::Zero());
+          by_knot.emplace_back(Eigen::Matrix<double, 3, kCorrections>::Zero());
         }
         const std::size_t at =
             result.knots.back() == knot + k ? by_knot.size() - 1 : by_knot.size() - 2;
-        by_knot[at] += rows.middleCols<kPoseErrors>(globals + kPoseErrors * static_cast<Index>(k));
+        by_knot[at] +=
+            rows.middleCols<kCorrections>(globals + kCorrections * static_cast<Index>(k));
       }
     }
     // Scaled first: a tilt of a large plane is known far better than its offset.
@@ -204,9 +204,9 @@ void FlightSystem::Parts::eliminate(const FlightEquations& equations, const Flig
     result.root_inverse = result.root_inverse * unit.asDiagonal();
     result.gradient = result.root_inverse * gradient;
     result.globals = result.root_inverse * by_global;
-    result.by_knot.resize(kPoseErrors * static_cast<Index>(by_knot.size()), 3);
+    result.by_knot.resize(kCorrections * static_cast<Index>(by_knot.size()), 3);
     for (std::size_t k = 0; k < by_knot.size(); ++k) {
-      result.by_knot.middleRows<kPoseErrors>(kPoseErrors * static_cast<Index>(k)).noalias() =
+      result.by_knot.middleRows<kCorrections>(kCorrections * static_cast<Index>(k)).noalias() =
           (result.root_inverse * by_knot[k]).transpose();
     }
   });
@@ -226,30 +226,30 @@ void FlightSystem::Parts::reduce(MatrixXd& hessian) {
   const Index g0 = first_global();
   // Each task has the columns of one knot for itself.
   tbb::parallel_for(Index{0}, knots, [&](Index knot) {
-    const Index column = kPoseErrors * knot;
+    const Index column = kCorrections * knot;
     const auto key = static_cast<std::size_t>(knot);
     for (std::size_t i = by_knot.begin[key]; i < by_knot.begin[key + 1]; ++i) {
       const auto [p, slot] = places[by_knot.entry[i]];
       const EliminatedPlane& plane = eliminated[p];
-      const Eigen::Matrix<double, kPoseErrors, 3> own =
-          plane.by_knot.middleRows<kPoseErrors>(kPoseErrors * static_cast<Index>(slot));
+      const Eigen::Matrix<double, kCorrections, 3> own =
+          plane.by_knot.middleRows<kCorrections>(kCorrections * static_cast<Index>(slot));
       for (std::size_t first = slot; first < plane.knots.size();) {
         std::size_t end = first + 1;  // of the knots that follow each other
         while (end < plane.knots.size() && plane.knots[end] == plane.knots[end - 1] + 1) ++end;
-        const auto rows = kPoseErrors * static_cast<Index>(end - first);
-        const auto at = kPoseErrors * static_cast<Index>(first);
-        const Index row = kPoseErrors * static_cast<Index>(plane.knots[first]);
+        const auto rows = kCorrections * static_cast<Index>(end - first);
+        const auto at = kCorrections * static_cast<Index>(first);
+        const Index row = kCorrections * static_cast<Index>(plane.knots[first]);
         const auto left = plane.by_knot.middleRows(at, rows);
         subtract_product(left.col(0).data(), left.col(1).data(), left.col(2).data(), rows, own,
                          &hessian(row, column), hessian.rows());
         first = end;
       }
-      for (Index c = 0; c < kPoseErrors; ++c) {
+      for (Index c = 0; c < kCorrections; ++c) {
         hessian.col(column + c).tail(globals) -= own(c, 0) * plane.globals.row(0).transpose() +
                                                  own(c, 1) * plane.globals.row(1).transpose() +
                                                  own(c, 2) * plane.globals.row(2).transpose();
       }
-      right.segment<kPoseErrors>(column) -= own * plane.gradient;
+      right.segment<kCorrections>(column) -= own * plane.gradient;
     }
   });
   for (const EliminatedPlane& plane : eliminated) {
@@ -267,18 +267,18 @@ void FlightSystem::Parts::add_priors(const FlightModel& model, const FlightPrior
   const Index g0 = first_global();
   hessian.bottomRightCorner(globals, globals) += prior;
   right.segment(g0, globals) += rates.transpose() * (priors.information * off);
-  for (int c = 0; c < kPoseErrors; ++c) {
+  for (int c = 0; c < kCorrections; ++c) {
     chain.push_back(knot_information(model.knots, priors.process, c));
     const KnotInformation& own = chain.back();
     for (Index k = 0; k < knots; ++k) {
-      const Index at = kPoseErrors * k + c;
+      const Index at = kCorrections * k + c;
       const auto i = static_cast<std::size_t>(k);
       hessian(at, at) += own.diagonal[i];
       right[at] -= own.diagonal[i] * model.corrections(c, k);
       if (k + 1 == knots) continue;
-      hessian(at + kPoseErrors, at) += own.next[i];
+      hessian(at + kCorrections, at) += own.next[i];
       right[at] -= own.next[i] * model.corrections(c, k + 1);
-      right[at + kPoseErrors] -= own.next[i] * model.corrections(c, k);
+      right[at + kCorrections] -= own.next[i] * model.corrections(c, k);
     }
   }
 }
@@ -321,7 +321,7 @@ FlightSystem::FlightSystem(const FlightEquations& equations, const FlightModel& 
   hessian.bottomRightCorner(p.globals, p.globals) = equations.hessian;
   p.right.segment(g0, p.globals) = equations.gradient;
   for (std::size_t i = 0; i < equations.knot_hessian.size(); ++i) {
-    const Index at = kPoseErrors * static_cast<Index>(model.knots.intervals[i].knot);
+    const Index at = kCorrections * static_cast<Index>(model.knots.intervals[i].knot);
     hessian.block<kTwo, kTwo>(at, at) += equations.knot_hessian[i];
     hessian.block(g0, at, p.globals, kTwo) += equations.knot_global[i].transpose();
     p.right.segment<kTwo>(at) += equations.knot_gradient[i];
@@ -366,8 +366,8 @@ MatrixXd FlightSystem::planes_of(const MatrixXd& solution) const {
     MatrixXd sum = plane.globals * solution.bottomRows(p.globals);
     for (std::size_t k = 0; k < plane.knots.size(); ++k) {
       sum.noalias() +=
-          plane.by_knot.middleRows<kPoseErrors>(kPoseErrors * static_cast<Index>(k)).transpose() *
-          solution.middleRows<kPoseErrors>(kPoseErrors * static_cast<Index>(plane.knots[k]));
+          plane.by_knot.middleRows<kCorrections>(kCorrections * static_cast<Index>(k)).transpose() *
+          solution.middleRows<kCorrections>(kCorrections * static_cast<Index>(plane.knots[k]));
     }
     result.middleRows<3>(3 * static_cast<Index>(i)) = -plane.root_inverse.transpose() * sum;
   });
@@ -428,15 +428,15 @@ MatrixXd FlightSystem::prior_times(const MatrixXd& columns) const {
   const Parts& p = *parts_;
   MatrixXd result = MatrixXd::Zero(size(), columns.cols());
   result.bottomRows(p.globals) = p.prior * columns.bottomRows(p.globals);
-  for (int c = 0; c < kPoseErrors; ++c) {
+  for (int c = 0; c < kCorrections; ++c) {
     const KnotInformation& own = p.chain[static_cast<std::size_t>(c)];
     for (Index k = 0; k < p.knots; ++k) {
-      const Index at = kPoseErrors * k + c;
+      const Index at = kCorrections * k + c;
       const auto i = static_cast<std::size_t>(k);
       result.row(at) += own.diagonal[i] * columns.row(at);
       if (k + 1 == p.knots) continue;
-      result.row(at) += own.next[i] * columns.row(at + kPoseErrors);
-      result.row(at + kPoseErrors) += own.next[i] * columns.row(at);
+      result.row(at) += own.next[i] * columns.row(at + kCorrections);
+      result.row(at + kCorrections) += own.next[i] * columns.row(at);
     }
   }
   return result;
@@ -445,10 +445,10 @@ MatrixXd FlightSystem::prior_times(const MatrixXd& columns) const {
 void apply(const FlightSystem::Step& step, FlightModel& model) {
   const Index knots = static_cast<Index>(model.knots.size());
   require_length("unknowns of the step", static_cast<std::size_t>(step.unknowns.size()),
-                 static_cast<std::size_t>(kPoseErrors * knots + model.unknowns().size()));
+                 static_cast<std::size_t>(kCorrections * knots + model.unknowns().size()));
   require_length("planes of the step", static_cast<std::size_t>(step.planes.cols()),
                  model.planes.size());
-  model.corrections += Eigen::Map<const MatrixXd>(step.unknowns.data(), kPoseErrors, knots);
+  model.corrections += Eigen::Map<const MatrixXd>(step.unknowns.data(), kCorrections, knots);
   const VectorXd own = step.unknowns.tail(model.unknowns().size());
   const Eigen::Quaterniond turned(model.boresight * rotation_of(own.head<3>()));
   model.boresight = turned.normalized().toRotationMatrix();
@@ -521,15 +521,15 @@ MatrixXd flight_covariance(const FlightShots& shots, const ShotPoses& poses,
         Sums& own = sums[piece];
         own.interval = rows.interval;
         own.noise = MatrixXd::Zero(count, count);
-        own.parts = MatrixXd::Zero(count, kPoseErrors * kIntervalParts);
+        own.parts = MatrixXd::Zero(count, kCorrections * kIntervalParts);
         if (rows.shots.empty()) return;
         const TrajectoryKnots::Interval& interval = model.knots.intervals[rows.interval];
         const auto n = static_cast<Index>(rows.shots.size());
         const Eigen::Map<
             const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>
             values(rows.values.data(), n, rows.columns);
-        const MatrixXd pose = values.middleCols(globals, kPoseErrors);
-        const Index knot = kPoseErrors * static_cast<Index>(interval.knot);
+        const MatrixXd pose = values.middleCols(globals, kCorrections);
+        const Index knot = kCorrections * static_cast<Index>(interval.knot);
         MatrixXd moved = values.leftCols(globals) * by_global;  // [n, count]
         VectorXd weight_behind(n);
         const auto length = static_cast<double>(interval.end_ns - interval.begin_ns);
@@ -537,14 +537,14 @@ MatrixXd flight_covariance(const FlightShots& shots, const ShotPoses& poses,
           const std::int64_t time = shots.time_ns[rows.shots[static_cast<std::size_t>(i)]];
           weight_behind[i] = static_cast<double>(time - interval.begin_ns) / length;
         }
-        const MatrixXd before = pose * solved.middleRows<kPoseErrors>(knot);
-        const MatrixXd behind = pose * solved.middleRows<kPoseErrors>(knot + kPoseErrors);
+        const MatrixXd before = pose * solved.middleRows<kCorrections>(knot);
+        const MatrixXd behind = pose * solved.middleRows<kCorrections>(knot + kCorrections);
         moved += before + weight_behind.asDiagonal() * (behind - before);
         for (Index i = 0; i < n; ++i) {
           const std::int32_t p = plane[rows.shots[static_cast<std::size_t>(i)]];
           for (Index k = 0; k < 3; ++k) {
             moved.row(i) +=
-                values(i, globals + kPoseErrors + k) * planes.row(3 * static_cast<Index>(p) + k);
+                values(i, globals + kCorrections + k) * planes.row(3 * static_cast<Index>(p) + k);
           }
         }
         const VectorXd weight = values.col(globals + 11);
@@ -561,7 +561,7 @@ MatrixXd flight_covariance(const FlightShots& shots, const ShotPoses& poses,
             static_cast<Index>(static_cast<double>(shots.time_ns[rows.end - 1] - first_ns) /
                                sample_ns) +
             2;
-        MatrixXd shared = MatrixXd::Zero(count, 3 * samples);
+        MatrixXd shared = MatrixXd::Zero(count, kCorrections * samples);
         const auto first_sample = static_cast<Index>(
             std::floor(static_cast<double>(first_ns - interval.begin_ns) / sample_ns));
         for (Index i = 0; i < n; ++i) {
@@ -573,20 +573,21 @@ MatrixXd flight_covariance(const FlightShots& shots, const ShotPoses& poses,
           const auto part = std::clamp<Index>(static_cast<Index>(weight_behind[i] * kIntervalParts),
                                               0, kIntervalParts - 1);
           const VectorXd weighted = weight[i] * moved.row(i).transpose();
-          for (Index k = 0; k < kPoseErrors; ++k) {
-            own.parts.col(kPoseErrors * part + k) += pose(i, k) * weighted;
-          }
-          for (Index k = 0; k < 3; ++k) {
-            shared.col(3 * std::min(sample, samples - 1) + k) += pose(i, 3 + k) * weighted;
+          for (Index k = 0; k < kCorrections; ++k) {
+            own.parts.col(kCorrections * part + k) += pose(i, k) * weighted;
+            const double white = weights.white[static_cast<std::size_t>(k)];
+            if (white == 0) continue;
+            shared.col(kCorrections * std::min(sample, samples - 1) + k) +=
+                white * pose(i, k) * weighted;
           }
         }
-        own.noise += weights.white_attitude * weights.white_attitude * shared * shared.transpose();
+        own.noise += shared * shared.transpose();
       },
       set);
 
   MatrixXd covariance = solved.transpose() * system.prior_times(solved);
   for (std::size_t first = 0; first < pieces;) {
-    MatrixXd parts = MatrixXd::Zero(count, kPoseErrors * kIntervalParts);
+    MatrixXd parts = MatrixXd::Zero(count, kCorrections * kIntervalParts);
     const std::size_t interval = sums[first].interval;
     while (first < pieces && sums[first].interval == interval) {
       covariance += sums[first].noise;
@@ -594,12 +595,13 @@ MatrixXd flight_covariance(const FlightShots& shots, const ShotPoses& poses,
       ++first;
     }
     const TrajectoryKnots::Interval& own = model.knots.intervals[interval];
-    const double spacing = static_cast<double>(own.end_ns - own.begin_ns) * 1e-9;
-    for (int c = 0; c < kPoseErrors; ++c) {
+    for (int c = 0; c < kCorrections; ++c) {
       MatrixXd of_part(count, kIntervalParts);
-      for (Index k = 0; k < kIntervalParts; ++k) of_part.col(k) = parts.col(kPoseErrors * k + c);
-      covariance += of_part * covariance_between_knots(priors.process, c, spacing, kIntervalParts) *
-                    of_part.transpose();
+      for (Index k = 0; k < kIntervalParts; ++k) of_part.col(k) = parts.col(kCorrections * k + c);
+      covariance +=
+          of_part *
+          covariance_between_knots(priors.process, c, own.begin_ns, own.end_ns, kIntervalParts) *
+          of_part.transpose();
     }
   }
   return 0.5 * (covariance + covariance.transpose());

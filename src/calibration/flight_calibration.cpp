@@ -18,7 +18,10 @@
 #include "risley/core/error.hpp"
 #include "risley/core/random.hpp"
 #include "risley/core/require.hpp"
+#include "risley/core/saturating.hpp"
 #include "risley/optics/batch.hpp"
+
+#include "calibration/verdict.hpp"
 
 namespace risley::calibration {
 namespace {
@@ -26,7 +29,6 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-using PoseErrors = Eigen::Matrix<double, kPoseErrors, 1>;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kNormalOfMedian = 1.4826;  // sigma of a normal distribution over its MAD
@@ -72,6 +74,35 @@ Eigen::Matrix3d rotation_by(const Eigen::Vector3d& vector) {
   return Eigen::AngleAxisd(angle, vector / angle).toRotationMatrix();
 }
 
+/// The process of a trajectory's errors by the recording's clock.
+trajectories::ErrorProcess process_of(const trajectories::ErrorModel& errors,
+                                      trajectories::Trajectory local,
+                                      const trajectories::Mount& mount) {
+  trajectories::require_mount(mount);
+  const std::int64_t clock_ns = std::llround(mount.clock_offset.value * 1e9);
+  for (std::int64_t& time_ns : local.time_ns) {
+    time_ns = saturating_difference(time_ns, clock_ns);
+  }
+  return {errors, local};
+}
+
+/// What sigmas of corrections are in the words of a trajectory.
+trajectories::PoseAccuracy accuracy_of(const Eigen::Matrix<double, kCorrections, 1>& sigma,
+                                       double heading) {
+  const auto of = [&](trajectories::PoseError error) {
+    int c = 0;
+    while (error_of(c) != error) ++c;
+    return sigma[c];
+  };
+  using trajectories::PoseError;
+  const double along = std::cos(heading), across = std::sin(heading);
+  const double north = of(PoseError::tilt_north), east = of(PoseError::tilt_east);
+  return {{of(PoseError::north), of(PoseError::east), of(PoseError::up)},
+          std::hypot(along * north, across * east),
+          std::hypot(across * north, along * east),
+          of(PoseError::heading)};
+}
+
 /// A root of a covariance, [n, n]: its product with its transpose.
 MatrixXd root_of(const MatrixXd& covariance) {
   const algebra::PrincipalAxes axes = algebra::principal_axes(covariance);
@@ -94,7 +125,10 @@ class FlightWork {
         progress_(progress),
         tangent_(trajectories::tangent_frame(trajectory)),
         local_(trajectories::in_tangent_frame(trajectory, tangent_)),
-        interpolation_(local_) {
+        interpolation_(local_),
+        priors_{.process = process_of(options.errors, local_, options.mount),
+                .mean = {},
+                .information = {}} {
     require_flight_shots(shots);
     require_options(shots);
     take_shots(shots);
@@ -113,8 +147,6 @@ class FlightWork {
 
  private:
   void require_options(const FlightShots& shots) const {
-    trajectories::require_mount(options_.mount);
-    require_process(options_.process);
     require_length("rotation_angle", shots.rotation_angle.size(),
                    static_cast<std::size_t>(options_.sensor.prisms()));
     check_beams(options_.sensor.train, shots.beam, shots.size());
@@ -179,15 +211,19 @@ class FlightWork {
     FlightWeights weights;
     weights.range_variance = range_variance_;
     weights.rotation_angle_variance = options_.rotation_angle_sigma * options_.rotation_angle_sigma;
-    weights.white_attitude = options_.process.white_attitude;
-    weights.sample_interval = options_.process.sample_interval;
+    if (priors_.process.sample_interval() == 0) return weights;
+    weights.sample_interval = priors_.process.sample_interval();
+    for (int c = 0; c < kCorrections; ++c) {
+      weights.white[static_cast<std::size_t>(c)] =
+          priors_.process.white()[static_cast<Index>(error_of(c))];
+    }
     return weights;
   }
 
   void set_knots(const FlightShots& shots, double spacing) {
     const TrajectoryKnots knots = make_knots(shots, spacing);
     model_.corrections = model_.knots.size() == 0
-                             ? MatrixXd::Zero(kPoseErrors, static_cast<Index>(knots.size()))
+                             ? MatrixXd::Zero(kCorrections, static_cast<Index>(knots.size()))
                              : resampled(model_.knots, model_.corrections, knots);
     model_.knots = knots;
   }
@@ -420,7 +456,6 @@ void FlightWork::set_up_model() {
 
 void FlightWork::set_priors() {
   const Index globals = model_.unknowns().size();
-  priors_.process = options_.process;
   priors_.mean = unknown_values(model_);
   prior_sigma_ = VectorXd::Zero(globals);
   for (Index i = 0; i < 3; ++i) {
@@ -516,16 +551,17 @@ void FlightWork::fill_result() {
         last_.promised);
   }
   result_.model = std::move(model_);
+  result_.verdict = verdict_of(result_);
 }
 
 void FlightWork::fill_unknowns(const FlightSystem& system) {
   const Index globals = system.globals(), size = system.size();
-  const Index knots = (size - globals) / kPoseErrors;
-  MatrixXd functionals = MatrixXd::Zero(size, globals + kPoseErrors);
+  const Index knots = (size - globals) / kCorrections;
+  MatrixXd functionals = MatrixXd::Zero(size, globals + kCorrections);
   functionals.bottomLeftCorner(globals, globals).setIdentity();
   for (Index k = 0; k < knots; ++k) {
-    functionals.block(kPoseErrors * k, globals, kPoseErrors, kPoseErrors) =
-        MatrixXd::Identity(kPoseErrors, kPoseErrors) / static_cast<double>(knots);
+    functionals.block(kCorrections * k, globals, kCorrections, kCorrections) =
+        MatrixXd::Identity(kCorrections, kCorrections) / static_cast<double>(knots);
   }
   MatrixXd all = flight_covariance(full_.shots, full_.poses, full_.cells.plane, model_,
                                    final_weights_, priors_, system, functionals);
@@ -548,7 +584,7 @@ void FlightWork::fill_unknowns(const FlightSystem& system) {
   const MatrixXd rates = value_rates(model_);
   result_.covariance = rates * movement * movement.transpose() * rates.transpose();
   const VectorXd diagonal = system.inverse_diagonal();
-  result_.correction_sigma = Eigen::Map<const MatrixXd>(diagonal.data(), kPoseErrors, knots);
+  result_.correction_sigma = Eigen::Map<const MatrixXd>(diagonal.data(), kCorrections, knots);
   result_.correction_sigma = result_.correction_sigma.cwiseSqrt().eval();
 
   const std::vector<std::string> names = unknown_names(model_);
@@ -733,17 +769,22 @@ void FlightWork::fill_not_told(const MatrixXd& all) {
   // Errors of the trajectory that stay as they are all flight long look like a boresight.
   constexpr const char* kMeans[] = {"tilts about east", "tilts about north", "heading"};
   const TrajectoryKnots& knots = model_.knots;
-  for (Index c = 3; c < kPoseErrors; ++c) {
-    const auto component = static_cast<std::size_t>(c);
-    double before = 0;
+  for (Index c = 3; c < kCorrections; ++c) {
+    const auto row = static_cast<Index>(error_of(static_cast<int>(c)));
+    const double time = priors_.process.correlation_times()[row];
+    std::vector<double> sigmas;
     for (const std::int64_t one : knots.time_ns) {
-      for (const std::int64_t other : knots.time_ns) {
-        before += std::exp(-std::abs(flight_seconds(one - other)) /
-                           options_.process.correlation_time[component]);
+      sigmas.push_back(priors_.process.sigmas(one)[row]);
+    }
+    double before = 0;
+    for (std::size_t i = 0; i < knots.size(); ++i) {
+      for (std::size_t j = 0; j < knots.size(); ++j) {
+        before += sigmas[i] * sigmas[j] *
+                  std::exp(-std::abs(flight_seconds(knots.time_ns[i] - knots.time_ns[j])) / time);
       }
     }
-    const double sigma_before =
-        options_.process.sigma[component] * std::sqrt(before) / static_cast<double>(knots.size());
+    if (!(before > 0)) continue;
+    const double sigma_before = std::sqrt(before) / static_cast<double>(knots.size());
     const double variance = all(globals + c, globals + c);
     const double kept = std::sqrt(variance) / sigma_before;
     if (kept < kKeptSigma) continue;
@@ -760,49 +801,25 @@ void FlightWork::fill_not_told(const MatrixXd& all) {
 
 void FlightWork::fill_trajectory() {
   trajectories::Trajectory corrected = local_;
+  corrected.accuracy.resize(corrected.size());
   const auto clock_ns = static_cast<std::int64_t>(std::llround(model_.clock_offset * 1e9));
   for (std::size_t i = 0; i < corrected.size(); ++i) {
-    const PoseErrors error =
-        correction_at(model_, options_.process, corrected.time_ns[i] - clock_ns);
+    const Eigen::Matrix<double, kCorrections, 1> error = correction_at(
+        model_.knots, model_.corrections, priors_.process, corrected.time_ns[i] - clock_ns);
     corrected.position[i] += error.head<3>();
     corrected.attitude[i] =
         (Eigen::Quaterniond(rotation_by(error.tail<3>())) * corrected.attitude[i]).normalized();
+    corrected.accuracy[i] = accuracy_of(
+        correction_sigma_at(model_.knots, result_.correction_sigma, priors_.process,
+                            corrected.time_ns[i] - clock_ns),
+        trajectories::roll_pitch_heading(corrected.frame, corrected.position[i],
+                                         corrected.attitude[i])
+            .heading);
   }
   result_.trajectory = trajectories::from_tangent_frame(corrected, tangent_);
 }
 
 }  // namespace
-
-PoseErrors correction_at(const FlightModel& model, const PoseErrorProcess& process,
-                         std::int64_t time_ns) {
-  require_process(process);
-  const TrajectoryKnots& knots = model.knots;
-  require_at_least("knots", static_cast<long long>(knots.size()), 1);
-  require_length("corrections", static_cast<std::size_t>(model.corrections.cols()), knots.size());
-  const auto behind = std::upper_bound(knots.time_ns.begin(), knots.time_ns.end(), time_ns);
-  const auto next = static_cast<std::size_t>(behind - knots.time_ns.begin());
-  PoseErrors error;
-  if (next > 0 && next < knots.size() && knots.strip[next] == knots.strip[next - 1]) {
-    const double weight = flight_seconds(time_ns - knots.time_ns[next - 1]) /
-                          flight_seconds(knots.time_ns[next] - knots.time_ns[next - 1]);
-    const auto at = static_cast<Index>(next);
-    return (1 - weight) * model.corrections.col(at - 1) + weight * model.corrections.col(at);
-  }
-  for (Index c = 0; c < kPoseErrors; ++c) {
-    const double time = process.correlation_time[static_cast<std::size_t>(c)];
-    // Expected of a Gauss-Markov process that is known before, behind, or on both sides.
-    const double before =
-        next == 0 ? 0 : std::exp(-flight_seconds(time_ns - knots.time_ns[next - 1]) / time);
-    const double after =
-        next == knots.size() ? 0 : std::exp(-flight_seconds(knots.time_ns[next] - time_ns) / time);
-    const double both = before * after;
-    const double left = next == 0 ? 0 : model.corrections(c, static_cast<Index>(next) - 1);
-    const double right = next == knots.size() ? 0 : model.corrections(c, static_cast<Index>(next));
-    const double rest = std::max(1 - both * both, 1e-15);
-    error[c] = (before * (1 - after * after) * left + after * (1 - before * before) * right) / rest;
-  }
-  return error;
-}
 
 FlightCalibration calibrate_flight(const FlightShots& shots,
                                    const trajectories::Trajectory& trajectory,

@@ -24,7 +24,7 @@ using Eigen::Index;
 
 /// Shots of a piece at most: some milliseconds.
 constexpr std::size_t kPieceShots = 32768;
-constexpr int kTwoKnots = 2 * kPoseErrors;
+constexpr int kTwoKnots = 2 * kCorrections;
 
 /// Some shots of one interval, in the order of their times.
 struct FlightPiece {
@@ -71,7 +71,7 @@ void require_columns(const FlightShots& shots, const ShotPoses& poses, const Pla
 void require_knots(const FlightShots& shots, const FlightModel& model) {
   const TrajectoryKnots& knots = model.knots;
   require_length("rows of the corrections", static_cast<std::size_t>(model.corrections.rows()),
-                 kPoseErrors);
+                 kCorrections);
   require_length("corrections", static_cast<std::size_t>(model.corrections.cols()), knots.size());
   if (!model.corrections.allFinite()) {
     throw InvalidArgument("corrections hold numbers that are not finite");
@@ -115,7 +115,9 @@ void require_model(const FlightModel& model, const FlightWeights& weights, doubl
   }
   require_above("range variance", weights.range_variance, 0, "m^2");
   require_not_below("variance of a rotation angle", weights.rotation_angle_variance, 0, "rad^2");
-  require_not_below("white attitude", weights.white_attitude, 0, "rad");
+  for (std::size_t i = 0; i < weights.white.size(); ++i) {
+    require_not_below("white noise of the poses", weights.white[i], 0, i < 3 ? "m" : "rad");
+  }
   require_above("sample interval", weights.sample_interval, 0, "s");
   require_not_below("scale of the weights", weights.cauchy_scale, 0, "m");
   require_not_below("gate", weights.gate, 0);
@@ -232,7 +234,7 @@ class FlightCalls {
                     const std::vector<FlightRun>& runs, FlightArguments arguments) const {
     FlightArguments a = all_;
     const TrajectoryKnots::Interval& interval = model_.knots.intervals[piece.interval];
-    for (Index i = 0; i < kPoseErrors; ++i) {
+    for (Index i = 0; i < kCorrections; ++i) {
       for (Index k = 0; k < 2; ++k) {
         a.corrections[k][i] = model_.corrections(i, static_cast<Index>(interval.knot) + k);
       }
@@ -244,7 +246,9 @@ class FlightCalls {
                         static_cast<double>(interval.end_shot - interval.first_shot);
     const double samples = std::max(1.0, length_ns * 1e-9 * part / weights_.sample_interval);
     const double together = std::max(1.0, static_cast<double>(sorter.order().size()) / samples);
-    a.attitude_variance = together * weights_.white_attitude * weights_.white_attitude;
+    for (std::size_t i = 0; i < weights_.white.size(); ++i) {
+      a.white_variance[i] = together * weights_.white[i] * weights_.white[i];
+    }
     a.order = sorter.order().data();
     a.runs = runs.data();
     a.run_count = runs.size();
@@ -379,7 +383,7 @@ void for_each_flight_piece(
     InstructionSet set) {
   const FlightCalls calls(shots, poses, plane, model, weights, set);
   const std::vector<FlightPiece> pieces = pieces_of(model.knots);
-  const int columns = calls.globals() + kPoseErrors + kPlaneColumns + 3;
+  const int columns = calls.globals() + kCorrections + kPlaneColumns + 3;
   tbb::enumerable_thread_specific<RunSorter> sorters;
   tbb::parallel_for(std::size_t{0}, pieces.size(), [&](std::size_t i) {
     RunSorter& sorter = sorters.local();

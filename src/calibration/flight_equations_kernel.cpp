@@ -209,7 +209,11 @@ FlightCounts fill_flight_row(const FlightArguments& a, FlightConstants<N>& c,
     angles = xsimd::fma(gradient.rotation_angles[k], gradient.rotation_angles[k], angles);
   }
   const Batch own_variance = Batch(a.range_variance) + Batch(a.rotation_angle_variance) * angles;
-  const Batch variance = own_variance + Batch(a.attitude_variance) * dot(by_turn, by_turn);
+  const auto squared = [](const Vector& by) {
+    return Vector{by.x * by.x, by.y * by.y, by.z * by.z};
+  };
+  const Batch variance = own_variance + dot(broadcast(a.white_variance), squared(by_point)) +
+                         dot(broadcast(a.white_variance + 3), squared(by_turn));
   const Lanes met = (xsimd::abs(approach) > Batch(kLeastFlightApproach)) & (range > zero) &
                     (xsimd::abs(residual) <= Batch(kLargest)) & (variance > zero) &
                     (variance <= Batch(kLargest));

@@ -46,9 +46,9 @@ struct FlightArguments {
   double per_ns = 0;                   ///< 1 / time between the knots
   double range_variance = 0;           ///< m^2
   double rotation_angle_variance = 0;  ///< of each, rad^2
-  double attitude_variance = 0;        ///< of each axis, as if it were each shot's own, rad^2
-  double cauchy_scale = 0;             ///< m; 0: none
-  double gate = 0;                     ///< largest residual in its sigmas; 0: none
+  double white_variance[6] = {};  ///< of the pose, as if it were each shot's own, m^2 and rad^2
+  double cauchy_scale = 0;        ///< m; 0: none
+  double gate = 0;                ///< largest residual in its sigmas; 0: none
 
   const double* const* rotation_angle = nullptr;  ///< [prisms][shots]
   const double* range = nullptr;                  ///< [shots]

@@ -317,36 +317,44 @@ GroundCells ground_cells(const ShotPoints& points, const std::vector<std::uint16
   return cells;
 }
 
-std::vector<StripPair> strip_pairs(const ShotPoints& points,
-                                   const std::vector<std::uint16_t>& strip,
-                                   const PlaneOfShot& plane, const std::vector<GroundPlane>& planes,
-                                   double gate, std::size_t least_shots) {
+std::vector<StripInCell> strips_in_cells(const ShotPoints& points,
+                                         const std::vector<std::uint16_t>& strip,
+                                         const PlaneOfShot& plane,
+                                         const std::vector<GroundPlane>& planes, double gate,
+                                         std::size_t least_shots) {
   require_length("strip", strip.size(), points.size());
   require_length("planes of the shots", plane.size(), points.size());
   require_threshold("gate", gate);
   const SortedRows rows(planes.size(), plane, kNoPlane);
-  struct Seen {
-    std::uint16_t strip;
-    double mean;
-  };
-  std::vector<std::vector<Seen>> seen(planes.size());
+  std::vector<std::vector<StripInCell>> seen(planes.size());
   tbb::parallel_for(std::size_t{0}, planes.size(), [&](std::size_t p) {
     const auto own = rows.of(p);
     for (std::size_t i = 0; i < own.size();) {
-      const std::uint16_t number = strip[own[i]];
-      double sum = 0;
-      std::size_t count = 0;
-      for (; i < own.size() && strip[own[i]] == number; ++i) {
+      StripInCell one{p, strip[own[i]], 0, 0};
+      for (; i < own.size() && strip[own[i]] == one.strip; ++i) {
         const auto& point = points[own[i]];
         const double distance =
             planes[p].normal.dot(Vector3d(point[0], point[1], point[2]) - planes[p].centre);
         if (!(std::abs(distance) <= gate)) continue;
-        sum += distance;
-        ++count;
+        one.mean += distance;
+        ++one.shots;
       }
-      if (count >= least_shots) seen[p].push_back({number, sum / static_cast<double>(count)});
+      if (one.shots < std::max<std::size_t>(least_shots, 1)) continue;
+      one.mean /= static_cast<double>(one.shots);
+      seen[p].push_back(one);
     }
   });
+  std::vector<StripInCell> all;
+  for (const auto& own : seen) all.insert(all.end(), own.begin(), own.end());
+  return all;
+}
+
+std::vector<StripPair> strip_pairs(const ShotPoints& points,
+                                   const std::vector<std::uint16_t>& strip,
+                                   const PlaneOfShot& plane, const std::vector<GroundPlane>& planes,
+                                   double gate, std::size_t least_shots) {
+  const std::vector<StripInCell> seen =
+      strips_in_cells(points, strip, plane, planes, gate, least_shots);
   struct Sums {
     StripPair pair;
     Eigen::Matrix3d hessian = Eigen::Matrix3d::Zero();
@@ -354,26 +362,25 @@ std::vector<StripPair> strip_pairs(const ShotPoints& points,
     double squares = 0;
   };
   std::vector<Sums> sums;
-  for (std::size_t p = 0; p < planes.size(); ++p) {
-    for (std::size_t i = 0; i < seen[p].size(); ++i) {
-      for (std::size_t j = i + 1; j < seen[p].size(); ++j) {
-        const auto first = seen[p][i].strip, second = seen[p][j].strip;
-        auto at = std::find_if(sums.begin(), sums.end(), [&](const Sums& own) {
-          return own.pair.first == first && own.pair.second == second;
-        });
-        if (at == sums.end()) {
-          sums.push_back({});
-          at = sums.end() - 1;
-          at->pair.first = first;
-          at->pair.second = second;
-        }
-        const double difference = seen[p][j].mean - seen[p][i].mean;
-        ++at->pair.cells;
-        at->pair.mean += difference;
-        at->squares += difference * difference;
-        at->hessian += planes[p].normal * planes[p].normal.transpose();
-        at->right += difference * planes[p].normal;
+  for (std::size_t i = 0; i < seen.size(); ++i) {
+    for (std::size_t j = i + 1; j < seen.size() && seen[j].plane == seen[i].plane; ++j) {
+      const auto first = seen[i].strip, second = seen[j].strip;
+      auto at = std::find_if(sums.begin(), sums.end(), [&](const Sums& own) {
+        return own.pair.first == first && own.pair.second == second;
+      });
+      if (at == sums.end()) {
+        sums.push_back({});
+        at = sums.end() - 1;
+        at->pair.first = first;
+        at->pair.second = second;
       }
+      const Vector3d& normal = planes[seen[i].plane].normal;
+      const double difference = seen[j].mean - seen[i].mean;
+      ++at->pair.cells;
+      at->pair.mean += difference;
+      at->squares += difference * difference;
+      at->hessian += normal * normal.transpose();
+      at->right += difference * normal;
     }
   }
   std::vector<StripPair> pairs;

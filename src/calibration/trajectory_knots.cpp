@@ -9,6 +9,7 @@
 
 #include "risley/core/error.hpp"
 #include "risley/core/require.hpp"
+#include "risley/core/saturating.hpp"
 
 namespace risley::calibration {
 namespace {
@@ -19,8 +20,16 @@ constexpr double kMostKnots = 1e5;
 
 double seconds(std::int64_t nanoseconds) { return static_cast<double>(nanoseconds) * 1e-9; }
 
-void require_component(int component) {
-  require_place("component", static_cast<std::size_t>(component), kPoseErrors);
+constexpr double kLeastSigma = 1e-7;  // of a correction, m and rad
+
+/// Standard deviation of a correction at a time, of its Gauss-Markov part.
+double sigma_at(const trajectories::ErrorProcess& process, int correction, std::int64_t time_ns) {
+  const auto row = static_cast<Index>(error_of(correction));
+  return std::max(process.sigmas(time_ns)[row], kLeastSigma);
+}
+
+double correlation_time(const trajectories::ErrorProcess& process, int correction) {
+  return process.correlation_times()[static_cast<Index>(error_of(correction))];
 }
 
 /// A time among knots of one strip: the knot before it, and the weight of the one behind that.
@@ -42,17 +51,51 @@ KnotPlace place_among(const TrajectoryKnots& knots, std::size_t begin, std::size
   return place;
 }
 
+void require_columns_of(const TrajectoryKnots& knots, const Eigen::MatrixXd& columns) {
+  require_at_least("knots", static_cast<long long>(knots.size()), 1);
+  require_length("rows of the corrections", static_cast<std::size_t>(columns.rows()), kCorrections);
+  require_length("corrections", static_cast<std::size_t>(columns.cols()), knots.size());
+}
+
+/// The knots before and behind a time.
+struct Neighbours {
+  const TrajectoryKnots& knots;
+  std::int64_t time_ns;
+  std::size_t next;  ///< the first knot behind the time
+
+  Neighbours(const TrajectoryKnots& all, std::int64_t at)
+      : knots(all),
+        time_ns(at),
+        next(static_cast<std::size_t>(
+            std::upper_bound(all.time_ns.begin(), all.time_ns.end(), at) - all.time_ns.begin())) {}
+
+  bool has_before() const { return next > 0; }
+  bool has_behind() const { return next < knots.size(); }
+  bool within_strip() const {
+    return has_before() && has_behind() && knots.strip[next] == knots.strip[next - 1];
+  }
+  double since_before() const {
+    return seconds(saturating_difference(time_ns, knots.time_ns[next - 1]));
+  }
+  double until_behind() const {
+    return seconds(saturating_difference(knots.time_ns[next], time_ns));
+  }
+  Eigen::Matrix<double, kCorrections, 1> between(const Eigen::MatrixXd& columns) const {
+    const double weight = since_before() / (since_before() + until_behind());
+    const auto at = static_cast<Index>(next);
+    return (1 - weight) * columns.col(at - 1) + weight * columns.col(at);
+  }
+};
+
 }  // namespace
 
-void require_process(const PoseErrorProcess& process) {
-  for (std::size_t i = 0; i < kPoseErrors; ++i) {
-    require_above(fmt::format("sigma[{}] of the trajectory's errors", i), process.sigma[i], 0,
-                  i < 3 ? "m" : "rad");
-    require_above(fmt::format("correlation_time[{}] of the trajectory's errors", i),
-                  process.correlation_time[i], 0, "s");
-  }
-  require_not_below("white_attitude", process.white_attitude, 0, "rad");
-  require_above("sample_interval", process.sample_interval, 0, "s");
+trajectories::PoseError error_of(int correction) {
+  using trajectories::PoseError;
+  constexpr PoseError kErrors[kCorrections] = {PoseError::east,       PoseError::north,
+                                               PoseError::up,         PoseError::tilt_east,
+                                               PoseError::tilt_north, PoseError::heading};
+  require_place("correction", static_cast<std::size_t>(correction), kCorrections);
+  return kErrors[correction];
 }
 
 TrajectoryKnots make_knots(const FlightShots& shots, double spacing) {
@@ -98,9 +141,9 @@ TrajectoryKnots make_knots(const FlightShots& shots, double spacing) {
 Eigen::MatrixXd resampled(const TrajectoryKnots& from, const Eigen::MatrixXd& corrections,
                           const TrajectoryKnots& to) {
   require_length("rows of the corrections", static_cast<std::size_t>(corrections.rows()),
-                 kPoseErrors);
+                 kCorrections);
   require_length("corrections", static_cast<std::size_t>(corrections.cols()), from.size());
-  Eigen::MatrixXd result = Eigen::MatrixXd::Zero(kPoseErrors, static_cast<Index>(to.size()));
+  Eigen::MatrixXd result = Eigen::MatrixXd::Zero(kCorrections, static_cast<Index>(to.size()));
   for (std::size_t k = 0; k < to.size(); ++k) {
     const auto range = std::equal_range(from.strip.begin(), from.strip.end(), to.strip[k]);
     const auto begin = static_cast<std::size_t>(range.first - from.strip.begin());
@@ -114,42 +157,46 @@ Eigen::MatrixXd resampled(const TrajectoryKnots& from, const Eigen::MatrixXd& co
   return result;
 }
 
-KnotInformation knot_information(const TrajectoryKnots& knots, const PoseErrorProcess& process,
-                                 int component) {
-  require_process(process);
-  require_component(component);
-  const auto at = static_cast<std::size_t>(component);
-  const double information = 1 / (process.sigma[at] * process.sigma[at]);
+KnotInformation knot_information(const TrajectoryKnots& knots,
+                                 const trajectories::ErrorProcess& process, int correction) {
+  const double time = correlation_time(process, correction);
   KnotInformation result{std::vector<double>(knots.size()),
                          std::vector<double>(knots.size() > 0 ? knots.size() - 1 : 0)};
   if (knots.size() == 0) return result;
-  result.diagonal[0] = information;
+  // Of the corrections in their sigmas, whose process has a variance of 1 everywhere.
+  result.diagonal[0] = 1;
   for (std::size_t k = 1; k < knots.size(); ++k) {
     const double step = seconds(knots.time_ns[k] - knots.time_ns[k - 1]);
     // Of the later value given the earlier one, decay times which it is expected.
-    const double decay = std::exp(-step / process.correlation_time[at]);
-    const double gained = -information / std::expm1(-2 * step / process.correlation_time[at]);
+    const double decay = std::exp(-step / time);
     // Both knots of two strips may have one time: what they have in common is then known well.
-    const double known = std::min(gained, 1e12 * information);
+    const double known = std::min(-1 / std::expm1(-2 * step / time), 1e12);
     result.diagonal[k] += known;
     result.diagonal[k - 1] += decay * decay * known;
     result.next[k - 1] = -decay * known;
   }
+  double sigma = sigma_at(process, correction, knots.time_ns[0]);
+  for (std::size_t k = 0; k < knots.size(); ++k) {
+    result.diagonal[k] /= sigma * sigma;
+    if (k + 1 == knots.size()) break;
+    const double behind = sigma_at(process, correction, knots.time_ns[k + 1]);
+    result.next[k] /= sigma * behind;
+    sigma = behind;
+  }
   return result;
 }
 
-Eigen::MatrixXd covariance_between_knots(const PoseErrorProcess& process, int component,
-                                         double spacing, int parts) {
-  require_process(process);
-  require_component(component);
+Eigen::MatrixXd covariance_between_knots(const trajectories::ErrorProcess& process, int correction,
+                                         std::int64_t begin_ns, std::int64_t end_ns, int parts) {
+  const double time = correlation_time(process, correction);
+  const double spacing = seconds(saturating_difference(end_ns, begin_ns));
   require_above("spacing", spacing, 0, "s");
   require_at_least("parts", parts, 1);
-  const auto at = static_cast<std::size_t>(component);
-  const double variance = process.sigma[at] * process.sigma[at];
+  const double sigma = sigma_at(process, correction, begin_ns + (end_ns - begin_ns) / 2);
   // Of two places by what share of the interval they are apart, less 1: differences of covariances
   // count, and those of close places are small.
   const auto covariance = [&](double share) {
-    return variance * std::expm1(-std::abs(share) * spacing / process.correlation_time[at]);
+    return sigma * sigma * std::expm1(-std::abs(share) * spacing / time);
   };
   Eigen::MatrixXd result(parts, parts);
   const auto middle = [&](int part) { return (part + 0.5) / parts; };
@@ -162,6 +209,58 @@ Eigen::MatrixXd covariance_between_knots(const PoseErrorProcess& process, int co
     }
   }
   return result;
+}
+
+Eigen::Matrix<double, kCorrections, 1> correction_at(const TrajectoryKnots& knots,
+                                                     const Eigen::MatrixXd& corrections,
+                                                     const trajectories::ErrorProcess& process,
+                                                     std::int64_t time_ns) {
+  require_columns_of(knots, corrections);
+  const Neighbours near(knots, time_ns);
+  if (near.within_strip()) return near.between(corrections);
+  Eigen::Matrix<double, kCorrections, 1> found;
+  for (int c = 0; c < kCorrections; ++c) {
+    // Expected of a Gauss-Markov process that is known before, behind, or on both sides.
+    double before = 0, left = 0, after = 0, right = 0;
+    const double time = correlation_time(process, c);
+    const auto in_sigmas = [&](std::size_t knot) {
+      return corrections(c, static_cast<Index>(knot)) / sigma_at(process, c, knots.time_ns[knot]);
+    };
+    if (near.has_before()) {
+      before = std::exp(-near.since_before() / time);
+      left = in_sigmas(near.next - 1);
+    }
+    if (near.has_behind()) {
+      after = std::exp(-near.until_behind() / time);
+      right = in_sigmas(near.next);
+    }
+    const double both = before * after, rest = std::max(1 - both * both, 1e-15);
+    found[c] = sigma_at(process, c, time_ns) *
+               (before * (1 - after * after) * left + after * (1 - before * before) * right) / rest;
+  }
+  return found;
+}
+
+Eigen::Matrix<double, kCorrections, 1> correction_sigma_at(
+    const TrajectoryKnots& knots, const Eigen::MatrixXd& knot_sigma,
+    const trajectories::ErrorProcess& process, std::int64_t time_ns) {
+  require_columns_of(knots, knot_sigma);
+  const Neighbours near(knots, time_ns);
+  if (near.within_strip()) return near.between(knot_sigma);
+  Eigen::Matrix<double, kCorrections, 1> found;
+  for (int c = 0; c < kCorrections; ++c) {
+    double variance = 1;  // in squared sigmas of the process
+    const auto add = [&](std::size_t knot, double apart) {
+      const double kept = std::exp(-2 * apart / correlation_time(process, c));
+      const double own = knot_sigma(c, static_cast<Index>(knot)) /
+                         sigma_at(process, c, knots.time_ns[knot]);
+      variance = std::min(variance, 1 - kept * (1 - own * own));
+    };
+    if (near.has_before()) add(near.next - 1, near.since_before());
+    if (near.has_behind()) add(near.next, near.until_behind());
+    found[c] = sigma_at(process, c, time_ns) * std::sqrt(std::max(variance, 0.0));
+  }
+  return found;
 }
 
 }  // namespace risley::calibration

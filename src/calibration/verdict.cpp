@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 #include "calibration/verdict.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include <fmt/format.h>
@@ -89,6 +90,48 @@ CalibrationVerdict verdict_of(const Calibration& c) {
   }
   return {CalibrationCode::bent, moved,
           "use the calibration for this unit's clouds, and repeat it on other walls"};
+}
+
+CalibrationVerdict verdict_of(const FlightCalibration& c) {
+  if (!c.converged) {
+    return {CalibrationCode::undecided, c.reason,
+            "fly crossing strips that overlap, over roofs or other slopes, and see whether mount "
+            "and trajectory are of this flight"};
+  }
+  std::vector<Eigen::Index> prisms;
+  for (std::size_t i = FlightUnknowns{}.size(); i < c.unknowns.size(); ++i) {
+    if (!c.unknowns[i].held) prisms.push_back(static_cast<Eigen::Index>(i));
+  }
+  Eigen::VectorXd change(static_cast<Eigen::Index>(prisms.size()));
+  for (Eigen::Index i = 0; i < change.size(); ++i) {
+    const FlightUnknown& own =
+        c.unknowns[static_cast<std::size_t>(prisms[static_cast<std::size_t>(i)])];
+    change[i] = own.value - own.start;
+  }
+  const auto freedom = static_cast<double>(change.size());
+  const double chi2 =
+      prisms.empty()
+          ? 0.0
+          : change.dot(algebra::SymmetricSolver(c.covariance(prisms, prisms)).solve(change));
+  const std::string strips =
+      fmt::format("strips were {:.3g} mm apart with what was stated and are {:.3g} mm apart now",
+                  1e3 * c.rms_before, 1e3 * c.rms_after);
+  if (c.rms_after >= c.rms_before) {
+    return {CalibrationCode::not_better, strips,
+            "do not use it: see whether ground, trajectory and mount are those of this flight"};
+  }
+  if (!(chi2 > significant_chi2(std::max(1.0, freedom)))) {
+    return {CalibrationCode::as_believed,
+            fmt::format("the strips bear out what the sensor believes of its prisms (chi2 {:.3g} "
+                        "of {:.0f} parameters); {}",
+                        chi2, freedom, strips),
+            "use the mount that was found for clouds of this platform"};
+  }
+  return {CalibrationCode::bent,
+          fmt::format("the prisms differ from what the sensor believes (chi2 {:.3g} of {:.0f} "
+                      "parameters); {}",
+                      chi2, freedom, strips),
+          "use mount and calibration, both, for clouds of this platform"};
 }
 
 const char* to_string(CalibrationCode code) {

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "risley/calibration/calibrate.hpp"
+#include "risley/calibration/flight_calibration.hpp"
 
 namespace risley::calibration {
 
@@ -16,6 +17,9 @@ std::string reason_of_failure(const Calibration& c, const PlanarSolution& soluti
 /// What a calibration comes to: whether its parameters differ from the believed ones beyond what
 /// chance makes once in a thousand times, and whether the walls got flatter by it.
 CalibrationVerdict verdict_of(const Calibration& c);
+
+/// The same of a calibration in flight, by the prisms' parameters and the distances between strips.
+CalibrationVerdict verdict_of(const FlightCalibration& c);
 
 /// What a user should know of a calibration beside its numbers.
 std::vector<std::string> warnings_of(const Calibration& c, const PlanarSolution& solution,

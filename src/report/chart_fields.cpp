@@ -42,7 +42,8 @@ std::span<const char* const> enum_names(SeriesKind) {
 }
 
 std::span<const char* const> enum_names(ChartKind) {
-  static constexpr const char* kNames[] = {"plain", "full_turn", "two_turns", "map", "space"};
+  static constexpr const char* kNames[] = {"plain", "full_turn", "two_turns",
+                                           "map",   "ground",    "space"};
   return kNames;
 }
 

@@ -4,17 +4,22 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
 
 #include "risley/core/error.hpp"
 
+#include "report/flight_unknowns.hpp"
 #include "report/json_archive.hpp"
 
 namespace risley::report {
 namespace {
+
+constexpr double kMostCorrelation = 1 + 1e-9;
 
 void expect(bool right, const std::string& place, const std::string& problem) {
   if (!right) throw FieldError(fmt::format("{}: {}", place, problem));
@@ -68,15 +73,33 @@ void check_charts(const std::vector<Chart>& charts, const std::string& list) {
   }
 }
 
-/// What both kinds of report have.
 template <class AnyReport>
-void check_common(const AnyReport& report) {
-  const TrainShape shape = report.shape();
+void check_train_shape(const AnyReport& report) {
   try {
-    check_shape(shape);
+    check_shape(report.shape());
   } catch (const InvalidArgument& error) {
     throw FieldError(fmt::format("prisms, emitters: {}", error.what()));
   }
+}
+
+/// @param list  what the covariance is of
+void check_covariance(const Eigen::MatrixXd& c, std::size_t expected, const char* list,
+                      bool converged) {
+  const auto size = static_cast<Eigen::Index>(expected);
+  expect(c.rows() == size && (c.cols() == size || size == 0), "covariance",
+         fmt::format("{} rows of {} values, expected {} of {} as many as {} has", c.rows(),
+                     c.cols(), size, size, list));
+  for (Eigen::Index i = 0; i < size && converged; ++i) {
+    expect(c.row(i).allFinite() && c(i, i) >= 0, fmt::format("covariance[{}]", i),
+           "expected numbers, on the diagonal none below 0");
+  }
+}
+
+/// What estimates and calibrations on walls have.
+template <class AnyReport>
+void check_common(const AnyReport& report) {
+  check_train_shape(report);
+  const TrainShape shape = report.shape();
   for (std::size_t i = 0; i < report.parameters.size(); ++i) {
     const ReportedParameter& row = report.parameters[i];
     const std::string place = fmt::format("parameters[{}]", i);
@@ -89,14 +112,47 @@ void check_common(const AnyReport& report) {
   for (std::size_t i = 0; i < report.free.size(); ++i) {
     check_known(report.free[i], shape, fmt::format("free[{}]", i));
   }
-  const auto free = static_cast<Eigen::Index>(report.free.size());
-  const Eigen::MatrixXd& c = report.covariance;
-  expect(c.rows() == free && (c.cols() == free || free == 0), "covariance",
-         fmt::format("{} rows of {} values, expected {} of {} as many as free has", c.rows(),
-                     c.cols(), free, free));
-  for (Eigen::Index i = 0; i < free && report.converged; ++i) {
-    expect(c.row(i).allFinite() && c(i, i) >= 0, fmt::format("covariance[{}]", i),
-           "expected numbers, on the diagonal none below 0");
+  check_covariance(report.covariance, report.free.size(), "free", report.converged);
+}
+
+/// A number where the result converged, and nowhere one below 0.
+void check_size_of(double value, bool converged, const std::string& place) {
+  expect(!converged || std::isfinite(value), place, "expected a number");
+  expect(!(value < 0), place, "is negative");
+}
+
+void check_unknowns(const FlightReport& r) {
+  std::set<std::string> names;
+  for (std::size_t i = 0; i < r.unknowns.size(); ++i) {
+    const calibration::FlightUnknown& own = r.unknowns[i];
+    const std::string place = fmt::format("unknowns[{}]", i);
+    if (is_of_train(own.name)) check_known(own.name, r.shape(), place + ".name");
+    expect(names.insert(own.name).second, place + ".name",
+           fmt::format("'{}' stands there twice", own.name));
+    expect(!r.converged || std::isfinite(own.value), place + ".value", "expected a number");
+    check_size_of(own.sigma, r.converged, place + ".sigma");
+    expect(!(own.prior_sigma < 0), place + ".prior_sigma", "is negative");
+    expect(!(own.prior_share < 0 || own.prior_share > 1), place + ".prior_share",
+           "expected 0 to 1");
+    expect(!(std::abs(own.twin_correlation) > kMostCorrelation), place + ".twin_correlation",
+           "expected -1 to 1");
+  }
+  for (std::size_t i = 0; i < r.unknowns.size(); ++i) {
+    const std::string& twin = r.unknowns[i].twin;
+    expect(twin.empty() || names.contains(twin), fmt::format("unknowns[{}].twin", i),
+           fmt::format("'{}' is none of the unknowns", twin));
+  }
+}
+
+void check_pairs(const std::vector<calibration::StripPair>& pairs, const std::string& list) {
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    const std::string place = fmt::format("{}[{}]", list, i);
+    expect(pairs[i].first < pairs[i].second, place,
+           "expected two strips, the one with the smaller number first");
+    expect(!(pairs[i].rms < 0), place + ".rms_m", "is negative");
+    for (Eigen::Index axis = 0; axis < 3; ++axis) {
+      expect(!(pairs[i].sigma[axis] < 0), place + ".shift_sigma_m", "is negative");
+    }
   }
 }
 
@@ -124,6 +180,34 @@ void check_report(const CalibrationReport& r) {
   check_charts(r.thickness_charts, "thickness_charts");
   check_charts(r.wall_charts, "wall_charts");
   check_charts(r.view_charts, "view_charts");
+}
+
+void check_report(const FlightReport& r) {
+  check_train_shape(r);
+  check_unknowns(r);
+  check_size(r.nominal.size(), r.unknowns.size(), "nominal");
+  check_covariance(r.covariance, r.unknowns.size(), "unknowns", r.converged);
+  const Eigen::MatrixXd& mount = r.body_from_sensor;
+  expect(mount.rows() == 3 && mount.cols() == 3 && mount.allFinite(), "body_from_sensor",
+         "expected three rows of three numbers");
+  for (const auto& [value, name] :
+       {std::pair(r.datum.sigma_x, "sigma_x"), std::pair(r.datum.sigma_y, "sigma_y"),
+        std::pair(r.datum.sigma_z, "sigma_z"), std::pair(r.datum.rotation, "rotation"),
+        std::pair(r.datum.shape, "shape"), std::pair(r.datum.total, "total"),
+        std::pair(r.datum.height, "height_m")}) {
+    check_size_of(value, r.converged, fmt::format("datum.{}", name));
+  }
+  for (std::size_t i = 0; i < r.not_told.size(); ++i) {
+    expect(!(r.not_told[i].sigma < 0), fmt::format("not_told[{}].sigma", i), "is negative");
+  }
+  check_pairs(r.pairs_before, "pairs_before");
+  check_pairs(r.pairs_after, "pairs_after");
+  expect(r.knot_spacing >= 0, "knot_spacing_s", "expected a time");
+  check_charts(r.strip_charts, "strip_charts");
+  check_charts(r.difference_charts, "difference_charts");
+  check_charts(r.ground_charts, "ground_charts");
+  check_charts(r.residual_charts, "residual_charts");
+  check_charts(r.correction_charts, "correction_charts");
 }
 
 }  // namespace risley::report

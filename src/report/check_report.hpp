@@ -4,6 +4,7 @@
 
 #include "risley/report/calibration_report.hpp"
 #include "risley/report/estimate_report.hpp"
+#include "risley/report/flight_report.hpp"
 
 namespace risley::report {
 
@@ -12,5 +13,6 @@ namespace risley::report {
 /// @throws FieldError naming the field
 void check_report(const EstimateReport& report);
 void check_report(const CalibrationReport& report);
+void check_report(const FlightReport& report);
 
 }  // namespace risley::report

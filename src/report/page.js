@@ -158,13 +158,14 @@
   }
 
   function flatOption(one) {
-    const square = one.kind === 'map';
+    const square = one.kind === 'map' || one.kind === 'ground';
     const scaled = hasValues(one);
     const x = axis(one.x_label, 30, every(one, 'x')), y = axis(one.y_label, 52, every(one, 'y'));
     if (square) {
       const limits = mapLimits(one);
-      Object.assign(x, limits[0], { inverse: true, position: 'bottom' }); // as one looks out
-      Object.assign(y, limits[1], { inverse: true, position: 'left' });
+      const turned = one.kind === 'map'; // as one looks out
+      Object.assign(x, limits[0], { inverse: turned, position: 'bottom' });
+      Object.assign(y, limits[1], { inverse: turned, position: 'left' });
       // The ends are no round numbers.
       for (const one of [x, y]) Object.assign(one.axisLabel, { showMinLabel: false, showMaxLabel: false });
     }
@@ -355,7 +356,7 @@
 
   // ---- the page ----
 
-  const isSquare = (one) => one.kind === 'map' || one.kind === 'two_turns';
+  const isSquare = (one) => ['map', 'ground', 'two_turns'].includes(one.kind);
 
   function size(entry) {
     if (!isSquare(entry.data)) return;

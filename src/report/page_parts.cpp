@@ -74,10 +74,14 @@ bool any_held_parameter(std::span<const ReportedParameter> parameters) {
   });
 }
 
-std::string parameter_head(const ParameterInfo& parameter) {
+std::string parameter_head(const std::string& long_name, const std::string& symbol,
+                           const std::string& name) {
   return fmt::format("<th scope=\"row\">{}, {}<span class=\"name\">{}</span></th>",
-                     escape_html(parameter.long_name), symbol_html(parameter.symbol),
-                     escape_html(parameter.name));
+                     escape_html(long_name), symbol_html(symbol), escape_html(name));
+}
+
+std::string parameter_head(const ParameterInfo& parameter) {
+  return parameter_head(parameter.long_name, parameter.symbol, parameter.name);
 }
 
 std::string list_html(const std::vector<std::string>& items) {
@@ -105,20 +109,18 @@ std::string verdict_html(const Verdict& verdict) {
                      kind, escape_html(title), escape_html(verdict.facts), advice);
 }
 
-std::string correlation_html(const std::vector<std::string>& free,
-                             const Eigen::MatrixXd& covariance, TrainShape shape) {
-  if (free.empty()) return "";
+std::string correlation_html(const std::vector<CorrelationHead>& heads,
+                             const Eigen::MatrixXd& covariance) {
+  if (heads.empty()) return "";
   std::string html =
       "<h2>Correlations of the parameters</h2>\n<div class=\"wide\">"
       "<table class=\"heat\"><thead><tr><th></th>";
-  std::vector<const ParameterInfo*> infos;
-  for (const std::string& name : free) {
-    infos.push_back(&find_parameter(name, shape));
-    html += fmt::format("<th scope=\"col\">{}</th>", symbol_html(infos.back()->symbol));
+  for (const CorrelationHead& head : heads) {
+    html += fmt::format("<th scope=\"col\">{}</th>", head.symbol_html);
   }
   html += "</tr></thead><tbody>\n";
   for (Eigen::Index i = 0; i < covariance.rows(); ++i) {
-    html += fmt::format("<tr>{}", parameter_head(*infos[static_cast<std::size_t>(i)]));
+    html += fmt::format("<tr>{}", heads[static_cast<std::size_t>(i)].row_html);
     for (Eigen::Index j = 0; j < covariance.cols(); ++j) {
       double r = covariance(i, j) / std::sqrt(covariance(i, i) * covariance(j, j));
       if (!std::isfinite(r)) {
@@ -135,6 +137,16 @@ std::string correlation_html(const std::vector<std::string>& free,
          "</tbody></table></div>\n<p class=\"note\">Blue: the two rise together. Red: one "
          "rises where the other falls. Near ±1 only their sum or difference is well "
          "known.</p>\n";
+}
+
+std::string correlation_html(const std::vector<std::string>& free,
+                             const Eigen::MatrixXd& covariance, TrainShape shape) {
+  std::vector<CorrelationHead> heads;
+  for (const std::string& name : free) {
+    const ParameterInfo& info = find_parameter(name, shape);
+    heads.push_back({parameter_head(info), symbol_html(info.symbol)});
+  }
+  return correlation_html(heads, covariance);
 }
 
 std::string time_audit_html(const std::vector<ReportedRecording>& recordings) {
@@ -180,7 +192,8 @@ std::string Figures::add(const Chart& chart) {
 
 std::string charts_html(const std::vector<Chart>& charts, Figures& figures) {
   const auto is_square = [](const Chart& chart) {
-    return chart.kind == ChartKind::map || chart.kind == ChartKind::two_turns;
+    return chart.kind == ChartKind::map || chart.kind == ChartKind::ground ||
+           chart.kind == ChartKind::two_turns;
   };
   std::string html;
   for (std::size_t first = 0, last = 0; first < charts.size(); first = last) {

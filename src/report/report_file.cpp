@@ -2,12 +2,15 @@
 // SPDX-License-Identifier: MIT
 #include "risley/report/report_file.hpp"
 
+#include <optional>
+
 #include <fmt/format.h>
 
 #include "risley/core/error.hpp"
 #include "risley/io/text_file.hpp"
 #include "risley/report/calibration_page.hpp"
 #include "risley/report/estimate_page.hpp"
+#include "risley/report/flight_page.hpp"
 
 #include "report/chart_fields.hpp"
 #include "report/check_report.hpp"
@@ -150,13 +153,74 @@ void fields(Archive& archive, T& step) {
   archive("points", step.points);
 }
 
+template <class Archive, report::FieldsOf<FlightUnknown> T>
+void fields(Archive& archive, T& unknown) {
+  archive("name", unknown.name);
+  archive("start", unknown.start);
+  archive("value", unknown.value);
+  archive("sigma", unknown.sigma);
+  archive("prior_sigma", unknown.prior_sigma);
+  archive("held", unknown.held);
+  archive("prior_share", unknown.prior_share);
+  archive("twin", unknown.twin);
+  archive("twin_correlation", unknown.twin_correlation);
+}
+
+template <class Archive, report::FieldsOf<FlightDatum> T>
+void fields(Archive& archive, T& datum) {
+  archive("sigma_x", datum.sigma_x);
+  archive("sigma_y", datum.sigma_y);
+  archive("sigma_z", datum.sigma_z);
+  archive("rotation", datum.rotation);
+  archive("shape", datum.shape);
+  archive("total", datum.total);
+  archive("height_m", datum.height);
+}
+
+template <class Archive, report::FieldsOf<NotTold> T>
+void fields(Archive& archive, T& combination) {
+  archive("words", combination.words);
+  archive("sigma", combination.sigma);
+}
+
+template <class Archive, report::FieldsOf<StripPair> T>
+void fields(Archive& archive, T& pair) {
+  archive("first", pair.first);
+  archive("second", pair.second);
+  archive("cells", pair.cells);
+  archive("mean_m", pair.mean);
+  archive("rms_m", pair.rms);
+  archive("shift_m", pair.shift);
+  archive("shift_sigma_m", pair.sigma);
+}
+
 }  // namespace calibration
 
 namespace report {
+
+/// East, north, up.
+template <class Archive, FieldsOf<Eigen::Vector3d> T>
+void fields(Archive& archive, T& vector) {
+  archive("east", vector.x());
+  archive("north", vector.y());
+  archive("up", vector.z());
+}
+
 namespace {
 
 constexpr const char* kFormat = "risley report";
 constexpr int kFormatVersion = 1;
+/// What a calibration was made on, where a file says so: walls otherwise.
+constexpr const char* kFlight = "flight";
+
+/// What read_report() found.
+template <class AnyReport>
+AnyReport checked_report(FieldReader& reader) {
+  AnyReport report;
+  fields(reader, report);
+  check_report(report);
+  return report;
+}
 
 }  // namespace
 
@@ -302,6 +366,69 @@ void fields(Archive& archive, T& report) {
   archive("provenance", report.provenance);
 }
 
+template <class Archive, FieldsOf<FlightTruth> T>
+void fields(Archive& archive, T& truth) {
+  archive("before", truth.before);
+  archive("after", truth.after);
+}
+
+template <class Archive, FieldsOf<FlightReport::Strip> T>
+void fields(Archive& archive, T& strip) {
+  archive("strip", strip.strip);
+  archive("begin_s", strip.begin);
+  archive("duration_s", strip.duration);
+  archive("course", strip.course);
+  archive("sway", strip.sway);
+  archive("speed_m_per_s", strip.speed);
+  archive("range_m", strip.range);
+}
+
+template <class Archive, FieldsOf<FlightReport> T>
+void fields(Archive& archive, T& report) {
+  archive("recordings", report.recordings);
+  archive("observations", report.observations);
+  archive("sensor", report.sensor);
+  archive("serial", report.serial);
+  archive("preset", report.preset);
+  archive("prisms", report.prisms);
+  archive("emitters", report.emitters);
+  archive("mount", report.mount);
+  archive("reference_point", report.reference_point);
+  archive("body_from_sensor", report.body_from_sensor);
+  archive("converged", report.converged);
+  archive("reason", report.reason);
+  archive("warnings", report.warnings);
+  archive("shots", report.shots);
+  archive("without_pose", report.without_pose);
+  archive("used", report.used);
+  archive("outliers", report.outliers);
+  archive("cells", report.cells);
+  archive("rough_cells", report.rough_cells);
+  archive("unknowns", report.unknowns);
+  archive("nominal", report.nominal);
+  archive("covariance", report.covariance);
+  archive("datum", report.datum);
+  archive("not_told", report.not_told);
+  archive("pair_count", report.pair_count);
+  archive("pairs_before", report.pairs_before);
+  archive("pairs_after", report.pairs_after);
+  archive("rms_before_m", report.rms_before);
+  archive("rms_after_m", report.rms_after);
+  archive("sigma0", report.sigma0);
+  archive("range_sigma_m", report.range_sigma);
+  archive("strip_count", report.strip_count);
+  archive("strips", report.strips);
+  archive("knots", report.knots);
+  archive("knot_spacing_s", report.knot_spacing);
+  archive("truth", report.truth);
+  archive("strip_charts", report.strip_charts);
+  archive("difference_charts", report.difference_charts);
+  archive("ground_charts", report.ground_charts);
+  archive("residual_charts", report.residual_charts);
+  archive("correction_charts", report.correction_charts);
+  archive("provenance", report.provenance);
+}
+
 const char* verb_of(const Report& report) {
   return std::holds_alternative<EstimateReport>(report) ? "estimate" : "calibrate";
 }
@@ -310,6 +437,7 @@ std::string report_text(const Report& report) {
   const Json body = std::visit([](const auto& one) { return to_json(one); }, report);
   Json object = {
       {"format", kFormat}, {"format_version", kFormatVersion}, {"verb", verb_of(report)}};
+  if (std::holds_alternative<FlightReport>(report)) object["calibrated_on"] = kFlight;
   object.update(body);
   return object.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n";
 }
@@ -343,17 +471,14 @@ Report read_report(const std::string& path) {
           fmt::format("format_version: expected {}, found {}", kFormatVersion, version));
     }
     reader("verb", verb);
-    if (verb == "estimate") {
-      EstimateReport report;
-      fields(reader, report);
-      check_report(report);
-      return report;
-    }
+    if (verb == "estimate") return checked_report<EstimateReport>(reader);
     if (verb == "calibrate") {
-      CalibrationReport report;
-      fields(reader, report);
-      check_report(report);
-      return report;
+      std::optional<std::string> calibrated_on;
+      reader("calibrated_on", calibrated_on);
+      if (!calibrated_on) return checked_report<CalibrationReport>(reader);
+      if (*calibrated_on == kFlight) return checked_report<FlightReport>(reader);
+      throw FieldError(
+          fmt::format("calibrated_on: expected {}, found '{}'", kFlight, *calibrated_on));
     }
     throw FieldError(fmt::format("verb: expected estimate or calibrate, found '{}'", verb));
   } catch (const FieldError& error) {
@@ -363,6 +488,7 @@ Report read_report(const std::string& path) {
 
 std::string report_page(const Report& report) {
   if (const auto* estimate = std::get_if<EstimateReport>(&report)) return estimate_page(*estimate);
+  if (const auto* flight = std::get_if<FlightReport>(&report)) return flight_page(*flight);
   return calibration_page(std::get<CalibrationReport>(report));
 }
 

@@ -45,7 +45,10 @@ struct KnownPlanes {
   }
 
   explicit KnownPlanes(const FlightSettings& wanted = noise_free(), double knots = 1)
-      : settings(wanted), flight(settings), interpolation(flight.trajectory) {
+      : settings(wanted),
+        flight(settings),
+        interpolation(flight.trajectory),
+        priors{.process = {settings.errors, flight.trajectory}, .mean = {}, .information = {}} {
     model.train = sensors::load_sensor("mid-40").train;
     for (const char* name : {"refractive_index"}) model.train.set(name, flight.sensor.get(name));
     model.geometry = flight.sensor.geometry;
@@ -66,9 +69,7 @@ struct KnownPlanes {
     for (const std::size_t met : flight.met) plane.push_back(static_cast<std::int32_t>(met));
     priors.mean = unknown_values(model);
     priors.information = MatrixXd::Zero(model.unknowns().size(), model.unknowns().size());
-    priors.process = settings.process;
     weights.range_variance = 4e-4;
-    weights.sample_interval = settings.process.sample_interval;
     poses = poses_of(flight.shots, interpolation, 0);
   }
 
@@ -117,7 +118,7 @@ TEST(FlightAdjustment, RecoversEverythingFromANoiseFreeFlight) {
 TEST(FlightAdjustment, RecoversTheTrajectorysCorrections) {
   FlightSettings settings = KnownPlanes::noise_free();
   settings.trajectory_errors = true;
-  settings.process.white_attitude = 0;
+  for (trajectories::ErrorTerm& term : settings.errors.terms) term.white = 0;
   settings.error_knots = 3.5;  // two lines a strip, from half a second before its shots
   KnownPlanes known(settings, 0.25);
   known.weights.range_variance = 1e-6;
@@ -252,7 +253,12 @@ TEST(FlightAdjustment, EliminatesPlanesWithoutLoss) {
 TEST(FlightAdjustment, CovarianceIsTheInverseWhereWeightsTellTheTruth) {
   KnownPlanes known;
   known.priors.information = VectorXd::Constant(known.model.unknowns().size(), 100).asDiagonal();
-  known.priors.process.correlation_time.fill(1e9);  // nothing happens between knots
+  const auto process_lasting = [&](double correlation_time) {
+    trajectories::ErrorModel model = known.settings.errors;
+    for (trajectories::ErrorTerm& term : model.terms) term.correlation_time = correlation_time;
+    return trajectories::ErrorProcess(model, known.flight.trajectory);
+  };
+  known.priors.process = process_lasting(1e9);  // nothing happens between knots
   const FlightEquations equations =
       flight_equations(known.flight.shots, known.poses, known.plane, known.model, known.weights);
   const FlightSystem system(equations, known.model, known.priors);
@@ -270,7 +276,7 @@ TEST(FlightAdjustment, CovarianceIsTheInverseWhereWeightsTellTheTruth) {
       sigma.cwiseInverse().asDiagonal() * (found - expected) * sigma.cwiseInverse().asDiagonal();
   EXPECT_LT(correlation_off.cwiseAbs().maxCoeff(), 1e-3);
   // A process that moves between knots, and noise that shots share, both add to it.
-  known.priors.process.correlation_time.fill(5);
+  known.priors.process = process_lasting(5);
   const MatrixXd moving = covariance_with(known.weights);
   EXPECT_GT((moving - found).diagonal().minCoeff(), -1e-18);
   EXPECT_GT(moving(1, 1), 1.05 * found(1, 1));
@@ -290,7 +296,6 @@ TEST(FlightAdjustment, RefusesWhatDoesNotFit) {
   EXPECT_NE(refused([](FlightPriors& p) { p.information.resize(3, 3); }), "");
   EXPECT_NE(refused([](FlightPriors& p) { p.mean[0] = std::nan(""); }), "");
   EXPECT_NE(refused([](FlightPriors& p) { p.held = {true}; }), "");
-  EXPECT_NE(refused([](FlightPriors& p) { p.process.sigma[0] = 0; }), "");
   FlightAdjustmentOptions options;
   options.most_steps = 0;
   EXPECT_NE(refusal([&] {

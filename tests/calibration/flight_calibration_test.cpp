@@ -211,7 +211,8 @@ TEST(FlightCalibration, FailsInWords) {
   };
   EXPECT_NE(refused([](FlightCalibrationOptions& o) { o.knot_spacing = 0; }), "");
   EXPECT_NE(refused([](FlightCalibrationOptions& o) { o.cell_size = -1; }), "");
-  EXPECT_NE(refused([](FlightCalibrationOptions& o) { o.process.sigma[2] = 0; }), "");
+  EXPECT_NE(refused([](FlightCalibrationOptions& o) { o.errors.terms[2].sigma = -1; }), "");
+  EXPECT_NE(refused([](FlightCalibrationOptions& o) { o.errors.terms[2].sigma.reset(); }), "");
   EXPECT_NE(refused([](FlightCalibrationOptions& o) { o.range_noise = -1; }), "");
   EXPECT_NE(refused([](FlightCalibrationOptions& o) { o.fixed = {"nonsense"}; }), "");
   EXPECT_NE(refused([](FlightCalibrationOptions& o) { o.mount.nominal *= 2; }), "");

@@ -260,7 +260,7 @@ INSTANTIATE_TEST_SUITE_P(Trains, EveryTrain,
 
 TEST(FlightEquations, AreTheSumsOfTheRows) {
   Flight flight("PA-AP");
-  flight.weights.white_attitude = 1e-4;
+  flight.weights.white = {1e-3, 2e-3, 3e-3, 1e-4, 2e-4, 3e-4};
   flight.weights.sample_interval = 0.02;
   std::vector<double> together(flight.model.knots.intervals.size());  // in a sample, on average
   flight.weights.rotation_angle_variance = 1e-10;
@@ -278,6 +278,7 @@ TEST(FlightEquations, AreTheSumsOfTheRows) {
     const FlightEquations found = flight_equations(flight.shots, flight.poses, flight.plane,
                                                    flight.model, flight.weights, set);
     const int g = flight.model.unknowns().size();
+    const Eigen::Map<const Eigen::Matrix<double, 6, 1>> white(flight.weights.white.data());
     Eigen::MatrixXd hessian = Eigen::MatrixXd::Zero(g, g);
     Eigen::VectorXd gradient = Eigen::VectorXd::Zero(g);
     const std::size_t knots = flight.model.knots.intervals.size();
@@ -298,9 +299,10 @@ TEST(FlightEquations, AreTheSumsOfTheRows) {
       } else {
         // What the shots of a sample share counts as each one's own, as many times.
         const double shared = 1 / weight - variance;
-        EXPECT_NEAR(shared,
-                    row.segment<3>(g + 3).squaredNorm() * 1e-8 * together[flight.interval_of(i)],
-                    1e-9);
+        EXPECT_NEAR(
+            shared,
+            row.segment<6>(g).cwiseProduct(white).squaredNorm() * together[flight.interval_of(i)],
+            1e-9);
         EXPECT_LE(residual * residual, 4 / weight);
       }
       EXPECT_GT(variance, 4e-4);

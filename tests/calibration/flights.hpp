@@ -30,6 +30,18 @@ inline Eigen::Matrix3d flight_rotation(const Eigen::Vector3d& vector) {
   return Eigen::AngleAxisd(angle, vector / angle).toRotationMatrix();
 }
 
+/// 20, 20 and 30 mm, 0.025, 0.025 and 0.08 degrees, minutes long; white 0.005 degree at 200 Hz.
+inline trajectories::ErrorModel flight_errors_of_a_good_unit() {
+  trajectories::ErrorModel model = trajectories::assumed_error_model();
+  constexpr double kSigma[] = {0.02, 0.02, 0.03, 0.025, 0.025, 0.08};  // m, degrees
+  for (std::size_t i = 0; i < model.terms.size(); ++i) {
+    model.terms[i].sigma = i < 3 ? kSigma[i] : radians_from_degrees(kSigma[i]);
+    if (i >= 3) model.terms[i].white = radians_from_degrees(0.005);
+  }
+  model.sample_interval = 0.005;
+  return model;
+}
+
 /// A sum of sinusoids and its integral.
 class Sway {
  public:
@@ -89,12 +101,7 @@ struct FlightSettings {
   bool trajectory_errors = true;
   /// Errors of the trajectory at knots of this spacing, linear between; 0: at every sample.
   double error_knots = 0;
-  calibration::PoseErrorProcess process = {
-      {0.02, 0.02, 0.03, radians_from_degrees(0.025), radians_from_degrees(0.025),
-       radians_from_degrees(0.08)},
-      {120, 120, 120, 120, 120, 300},
-      radians_from_degrees(0.005),
-      0.005};
+  trajectories::ErrorModel errors = flight_errors_of_a_good_unit();
   Eigen::Vector3d boresight_deg{2, -1.5, 1};
   Eigen::Vector3d lever_arm{0.10, 0.05, 0.12};
   double range_offset = 0.01, clock_offset = 0.001;
@@ -177,7 +184,7 @@ class SimulatedFlight {
     // What a recording tells by itself.
     options.sensor.set("refractive_index", sensor.get("refractive_index"));
     options.sensor.set_knowledge({"refractive_index", 1e-5, "its own estimate", 0});
-    options.process = settings_.process;
+    options.errors = settings_.errors;
     options.mount.nominal = nominal;
     std::mt19937_64 generator(settings_.seed + 77);
     std::normal_distribution<double> normal;
@@ -203,6 +210,10 @@ class SimulatedFlight {
   std::vector<double> pose_time;                   ///< [shots], true, s
   trajectories::Trajectory trajectory;             ///< as measured, local
   std::vector<Eigen::Matrix<double, 6, 1>> error;  ///< [records]: true less measured
+
+  const trajectories::ErrorTerm& term_of(int correction) const {
+    return settings_.errors.terms[static_cast<std::size_t>(calibration::error_of(correction))];
+  }
 
  private:
   static constexpr double kLead = 0.5, kTurn = 20;  // s of trajectory around a strip; of a turn
@@ -245,17 +256,17 @@ class SimulatedFlight {
     for (Sway& sway : angle_) sway = Sway(generator_, 6, 0.15, 1.2, rms);
     for (Sway& sway : velocity_) sway = Sway(generator_, 6, 0.05, 0.4, settings_.velocity_rms);
     std::normal_distribution<double> normal;
-    const double step = settings_.process.sample_interval;
+    constexpr double step = 0.005;
     Eigen::Matrix<double, 6, 1> state = Eigen::Matrix<double, 6, 1>::Zero();
     double last = -1;
     const auto advance = [&](double time) {
       for (int c = 0; c < 6; ++c) {
-        const auto at = static_cast<std::size_t>(c);
-        const double sigma = settings_.process.sigma[at];
+        const trajectories::ErrorTerm& term = term_of(c);
+        const double sigma = *term.sigma;
         if (last < 0) {
           state[c] = sigma * normal(generator_);
         } else {
-          const double decay = std::exp(-(time - last) / settings_.process.correlation_time[at]);
+          const double decay = std::exp(-(time - last) / term.correlation_time);
           state[c] = decay * state[c] + sigma * std::sqrt(1 - decay * decay) * normal(generator_);
         }
       }
@@ -291,7 +302,7 @@ class SimulatedFlight {
             off = state;
           }
           for (int c = 3; c < 6; ++c) {
-            off[c] += settings_.process.white_attitude * normal(generator_);
+            off[c] += term_of(c).white * normal(generator_);
           }
         }
         Eigen::Vector3d position;

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 #include "risley/calibration/trajectory_knots.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include <Eigen/LU>
@@ -14,8 +15,30 @@ namespace risley::calibration::trajectory_knots_test {
 using Eigen::Index;
 using Eigen::MatrixXd;
 
-PoseErrorProcess some_process() {
-  return {{0.02, 0.03, 0.04, 1e-4, 2e-4, 3e-4}, {100, 60, 30, 10, 5, 2}, 1e-5, 0.005};
+/// Of the corrections, m or rad, and s.
+constexpr double kSigma[] = {0.02, 0.03, 0.04, 1e-4, 2e-4, 3e-4};
+constexpr double kTime[] = {100, 60, 30, 10, 5, 2};
+
+/// @param growing  by the trajectory's accuracies, to twice as much within the first ten seconds
+trajectories::ErrorProcess some_process(bool growing = false) {
+  trajectories::ErrorModel model = trajectories::assumed_error_model();
+  trajectories::Trajectory trajectory;
+  trajectory.frame = trajectories::Frame::local;
+  for (int c = 0; c < kCorrections; ++c) {
+    trajectories::ErrorTerm& term = model.terms[static_cast<std::size_t>(error_of(c))];
+    if (!growing) term.sigma = kSigma[c];
+    term.correlation_time = kTime[c];
+  }
+  for (const int second : {0, 10}) {  // level, to the north
+    const Eigen::Vector3d position(0, 0, 0);
+    trajectory.time_ns.push_back(1'000'000'000LL * second);
+    trajectory.position.push_back(position);
+    trajectory.attitude.emplace_back(trajectories::ned_axes(trajectory.frame, position));
+    const double size = 1 + 0.1 * second;
+    trajectory.accuracy.push_back({size * Eigen::Vector3d(kSigma[1], kSigma[0], kSigma[2]),
+                                   size * kSigma[4], size * kSigma[3], size * kSigma[5]});
+  }
+  return {model, trajectory};
 }
 
 /// Two strips of 2 s and 1 s, 10 s apart.
@@ -55,17 +78,21 @@ TEST(TrajectoryKnots, DivideEveryStripEvenly) {
 
 TEST(TrajectoryKnots, KnowTheProcessByTheInverseOfItsCovariance) {
   const TrajectoryKnots knots = make_knots(two_strips(), 0.25);
-  const PoseErrorProcess process = some_process();
   const auto n = static_cast<Index>(knots.size());
-  for (int c = 0; c < kPoseErrors; ++c) {
-    const auto at = static_cast<std::size_t>(c);
+  for (int number = 0; number < 2 * kCorrections; ++number) {
+    const int c = number % kCorrections;
+    const bool growing = number >= kCorrections;
+    const trajectories::ErrorProcess process = some_process(growing);
+    const auto sigma = [&](Index k) {
+      const double seconds = 1e-9 * static_cast<double>(knots.time_ns[static_cast<std::size_t>(k)]);
+      return kSigma[c] * (growing ? 1 + std::min(0.1 * seconds, 1.0) : 1);
+    };
     MatrixXd covariance(n, n);
     for (Index i = 0; i < n; ++i) {
       for (Index j = 0; j < n; ++j) {
         const double apart = 1e-9 * static_cast<double>(knots.time_ns[static_cast<std::size_t>(i)] -
                                                         knots.time_ns[static_cast<std::size_t>(j)]);
-        covariance(i, j) = process.sigma[at] * process.sigma[at] *
-                           std::exp(-std::abs(apart) / process.correlation_time[at]);
+        covariance(i, j) = sigma(i) * sigma(j) * std::exp(-std::abs(apart) / kTime[c]);
       }
     }
     const KnotInformation information = knot_information(knots, process, c);
@@ -80,7 +107,7 @@ TEST(TrajectoryKnots, KnowTheProcessByTheInverseOfItsCovariance) {
 
 TEST(TrajectoryKnots, KnowWhatHappensBetweenThem) {
   // Values at the ends and at the middles of the parts, all at once.
-  const PoseErrorProcess process = some_process();
+  const trajectories::ErrorProcess process = some_process();
   constexpr int kParts = 5;
   constexpr double kSpacing = 3;
   const auto covariance = [&](double s, double t) {
@@ -99,11 +126,11 @@ TEST(TrajectoryKnots, KnowWhatHappensBetweenThem) {
     off(i, kParts + 1) = -place(i);
   }
   const MatrixXd expected = off * all * off.transpose();
-  const MatrixXd found = covariance_between_knots(process, 4, kSpacing, kParts);
+  const MatrixXd found = covariance_between_knots(process, 4, 0, 3'000'000'000, kParts);
   EXPECT_LT((found - expected).cwiseAbs().maxCoeff(), 1e-15);
   EXPECT_GT(found(2, 2), 0);
   // A short interval of a slow process: a random walk tied at both ends, 2 s^2 / T per second.
-  const MatrixXd tied = covariance_between_knots(process, 0, 0.25, 1);
+  const MatrixXd tied = covariance_between_knots(process, 0, 0, 250'000'000, 1);
   EXPECT_NEAR(tied(0, 0), 2 * 4e-4 / 100 * 0.25 / 4, 1e-3 * tied(0, 0));
 }
 
@@ -122,17 +149,53 @@ TEST(TrajectoryKnots, PassCorrectionsOn) {
   EXPECT_NE(refusal([&] { resampled(fine, corrections, coarse); }), "");
 }
 
-TEST(TrajectoryKnots, RefuseAProcessThatIsNone) {
-  const auto refused = [](const auto& damage) {
-    PoseErrorProcess process = some_process();
-    damage(process);
-    return refusal([&] { require_process(process); });
+TEST(TrajectoryKnots, CorrectPosesBetweenBeforeAndBehindThem) {
+  const TrajectoryKnots knots = make_knots(two_strips(), 1);  // at 0, 1, 2; 12.01, 13 s
+  const trajectories::ErrorProcess process = some_process();
+  MatrixXd corrections = MatrixXd::Zero(6, static_cast<Index>(knots.size()));
+  corrections.row(3) << 1e-4, 3e-4, -1e-4, 2e-4, 0;
+  const auto at = [&](double seconds) {
+    return correction_at(knots, corrections, process, std::llround(1e9 * seconds))[3];
   };
-  EXPECT_EQ(refused([](PoseErrorProcess&) {}), "");
-  EXPECT_NE(refused([](PoseErrorProcess& p) { p.sigma[1] = 0; }), "");
-  EXPECT_NE(refused([](PoseErrorProcess& p) { p.correlation_time[5] = -1; }), "");
-  EXPECT_NE(refused([](PoseErrorProcess& p) { p.white_attitude = std::nan(""); }), "");
-  EXPECT_NE(refused([](PoseErrorProcess& p) { p.sample_interval = 0; }), "");
+  EXPECT_NEAR(at(0.25), 1.5e-4, 1e-15);
+  EXPECT_NEAR(at(-5), 1e-4 * std::exp(-0.5), 1e-15);
+  EXPECT_NEAR(at(33), 0, 1e-15);
+  // Between strips: what a process of 10 s leaves of both, as the inverse of its covariance says.
+  const double before = std::exp(-0.3), behind = std::exp(-0.701), both = std::exp(-1.001);
+  const double rest = 1 - both * both;
+  EXPECT_NEAR(at(5),
+              -1e-4 * (before - behind * both) / rest + 2e-4 * (behind - before * both) / rest,
+              1e-15);
+  // Half known at the knots: half and half between, and forgotten by and by.
+  MatrixXd sigma(6, static_cast<Index>(knots.size()));
+  for (int c = 0; c < 6; ++c) sigma.row(c).setConstant(0.5 * kSigma[c]);
+  const auto sigma_of = [&](double seconds) {
+    return correction_sigma_at(knots, sigma, process, std::llround(1e9 * seconds))[3];
+  };
+  EXPECT_NEAR(sigma_of(0.25), 0.5e-4, 1e-15);
+  EXPECT_NEAR(sigma_of(-5), 1e-4 * std::sqrt(1 - 0.75 * std::exp(-1.0)), 1e-15);
+  EXPECT_NEAR(sigma_of(5), 1e-4 * std::sqrt(1 - 0.75 * std::exp(-0.6)), 1e-15);
+  EXPECT_NEAR(sigma_of(500), 1e-4, 1e-15);
+  EXPECT_NE(refusal([&] { correction_sigma_at(knots, sigma.topRows(3), process, 0); }), "");
+  EXPECT_NE(refusal([&] { correction_at(knots, corrections.leftCols(2), process, 0); }), "");
+  EXPECT_NE(refusal([&] { correction_at({}, {}, process, 0); }), "");
+  EXPECT_NE(refusal([&] { knot_information(knots, process, 6); }), "");
+  EXPECT_NE(refusal([&] { covariance_between_knots(process, 0, 5, 5, 1); }), "");
+  EXPECT_NE(refusal([&] { covariance_between_knots(process, 0, 0, 5, 0); }), "");
+}
+
+TEST(TrajectoryKnots, KeepWhatIsKnownExactly) {
+  trajectories::ErrorModel model = trajectories::assumed_error_model();
+  for (trajectories::ErrorTerm& term : model.terms) term.sigma = 0;
+  trajectories::Trajectory trajectory;
+  trajectory.frame = trajectories::Frame::local;
+  trajectory.time_ns = {0};
+  trajectory.position = {{0, 0, 0}};
+  trajectory.attitude = {Eigen::Quaterniond::Identity()};
+  const KnotInformation known = knot_information(make_knots(two_strips(), 1),
+                                                 trajectories::ErrorProcess(model, trajectory), 2);
+  EXPECT_GT(known.diagonal[0], 1e13);
+  EXPECT_TRUE(std::isfinite(known.diagonal[0]));
 }
 
 }  // namespace risley::calibration::trajectory_knots_test

@@ -11,6 +11,7 @@
 
 #include <Eigen/Core>
 
+#include "risley/calibration/calibration_verdict.hpp"
 #include "risley/calibration/datum.hpp"
 #include "risley/calibration/planar_adjustment.hpp"
 #include "risley/calibration/plane_points.hpp"
@@ -82,24 +83,6 @@ struct ThicknessProfile {
   std::vector<std::size_t> count;               ///< [bins]
   std::vector<double> rms_before, rms_after;    ///< [bins], m; NaN in an empty bin
   std::vector<double> mean_before, mean_after;  ///< [bins], m; NaN in an empty bin
-};
-
-/// What a calibration comes to. The codes are stable: scripts read them.
-enum class CalibrationCode {
-  as_believed,  ///< the walls bear out what the sensor believes of itself
-  bent,         ///< the beam goes elsewhere, significantly
-  not_better,   ///< parameters moved, and the walls are no flatter for it
-  undecided,    ///< the walls do not tell, or contradict what is stated of them
-};
-
-/// "as_believed", ...
-const char* to_string(CalibrationCode code);
-
-/// The same for people.
-struct CalibrationVerdict {
-  CalibrationCode code = CalibrationCode::undecided;
-  std::string words;  ///< what was found
-  std::string to_do;  ///< what follows from it
 };
 
 /// Everything one calibration found.

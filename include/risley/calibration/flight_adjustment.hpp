@@ -16,10 +16,10 @@ namespace risley::calibration {
 
 /// What is known before a flight.
 struct FlightPriors {
-  Eigen::VectorXd mean;         ///< [globals], SI; the boresight as a rotation vector
+  trajectories::ErrorProcess process;  ///< of the trajectory, at times of the recording's clock
+  Eigen::VectorXd mean;                ///< [globals], SI; the boresight as a rotation vector
   Eigen::MatrixXd information;  ///< [globals, globals], inverse of its covariance; 0: nothing
-  std::vector<bool> held;       ///< [globals]: not to be adjusted; empty: none
-  PoseErrorProcess process;     ///< of the trajectory
+  std::vector<bool> held{};     ///< [globals]: not to be adjusted; empty: none
 };
 
 /// Values of the unknowns [globals], the boresight as a rotation vector of up to half a turn.

@@ -12,12 +12,14 @@
 
 #include <Eigen/Core>
 
+#include "risley/calibration/calibration_verdict.hpp"
 #include "risley/calibration/flight_adjustment.hpp"
 #include "risley/calibration/flight_shots.hpp"
 #include "risley/calibration/ground_cells.hpp"
 #include "risley/core/progress.hpp"
 #include "risley/estimation/weak_directions.hpp"
 #include "risley/sensors/sensor.hpp"
+#include "risley/trajectories/error_process.hpp"
 #include "risley/trajectories/mount.hpp"
 #include "risley/trajectories/tangent_frame.hpp"
 #include "risley/trajectories/trajectory.hpp"
@@ -28,9 +30,10 @@ struct FlightCalibrationOptions {
   /// Start values, noise, geometry. What it states of its parameters are the priors; a sensor with
   /// a covariance, as a calibration on walls writes it, brings all of it.
   sensors::Sensor sensor;
-  trajectories::Mount mount;       ///< start values, and priors by their sigmas; a sigma of 0 holds
-  PoseErrorProcess process;        ///< of the trajectory's errors
-  std::vector<std::string> fixed;  ///< parameters of the train to hold
+  trajectories::Mount mount;  ///< start values, and priors by their sigmas; a sigma of 0 holds
+  /// Of the trajectory; where it states no sigma the trajectory's own accuracies count.
+  trajectories::ErrorModel errors = trajectories::assumed_error_model();
+  std::vector<std::string> fixed;       ///< parameters of the train to hold
   std::vector<std::string> additional;  ///< further ones to free, e.g. refractive_index
   std::optional<double> range_noise;    ///< 1 sigma, m, default the sensor's
   double range_offset_sigma = 0.02;     ///< prior about the sensor's, m; 0 holds it
@@ -75,6 +78,7 @@ struct NotTold {
 struct FlightCalibration {
   bool converged = false;
   std::string reason;  ///< why not; empty when converged
+  CalibrationVerdict verdict;
   std::vector<std::string> warnings;
   trajectories::Mount mount;  ///< adjusted, with sigmas
   sensors::Sensor sensor;     ///< adjusted, with covariance
@@ -99,18 +103,12 @@ struct FlightCalibration {
   trajectories::Trajectory trajectory;  ///< corrected, in the frame of the one given
 };
 
-/// Corrections at a time: linear between the knots of a strip, elsewhere what the process expects.
-/// @param time_ns  of the recording's clock
-Eigen::Matrix<double, kPoseErrors, 1> correction_at(const FlightModel& model,
-                                                    const PoseErrorProcess& process,
-                                                    std::int64_t time_ns);
-
 /// Calibrates mount and sensor on the strips of a flight: docs/theory/flight.md
-/// @param trajectory  of the body; its accuracies are not looked at, the process is
+/// @param trajectory  of the body
 /// @throws EstimationError when fewer than two strips overlap or no ground is found;
-/// InvalidArgument
-///         as require_flight_shots, require_trajectory, require_mount, require_process, for
-///         rotation angles and emitters that the sensor does not have and options out of range
+///         InvalidArgument as require_flight_shots, require_trajectory, require_mount,
+///         ErrorProcess, for rotation angles and emitters that the sensor does not have and options
+///         out of range
 FlightCalibration calibrate_flight(const FlightShots& shots,
                                    const trajectories::Trajectory& trajectory,
                                    const FlightCalibrationOptions& options,

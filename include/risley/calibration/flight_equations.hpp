@@ -59,7 +59,7 @@ struct FlightModel {
   double range_offset = 0;                                  ///< m
   double clock_offset = 0;                                  ///< s
   TrajectoryKnots knots;
-  Eigen::MatrixXd corrections;  ///< [6, knots], as kPoseErrors says
+  Eigen::MatrixXd corrections;  ///< [6, knots], see kCorrections
   std::vector<GroundPlane> planes;
 
   FlightUnknowns unknowns() const { return {static_cast<int>(free.size())}; }
@@ -73,9 +73,11 @@ std::vector<std::string> unknown_names(const FlightModel& model);
 struct FlightWeights {
   double range_variance = 0;           ///< of one range, m^2
   double rotation_angle_variance = 0;  ///< of each rotation angle, independent, rad^2
-  /// White attitude noise that the shots of a sample share. Weights treat it as each shot's own, as
-  /// many times its variance as a sample has shots, so that planes stay apart from each other.
-  double white_attitude = 0, sample_interval = 0.005;  ///< rad, s
+  /// White noise of the poses that the shots of a sample share, in the order of the corrections, 1
+  /// sigma, m and rad. Weights treat it as each shot's own, as many times its variance as a sample
+  /// has shots, so that planes stay apart from each other.
+  std::array<double, kCorrections> white{};
+  double sample_interval = 0.005;  ///< s
   /// Residual at which a shot counts half, m; 0: all alike.
   double cauchy_scale = 0;
   double gate = 0;  ///< residual beyond which a shot does not count, in its sigmas; 0: none

@@ -50,6 +50,24 @@ struct GroundCells {
 GroundCells ground_cells(const ShotPoints& points, const std::vector<std::uint16_t>& strip,
                          const GroundCellOptions& options);
 
+/// Where one strip saw a cell.
+struct StripInCell {
+  std::size_t plane = 0;  ///< of the cell
+  std::uint16_t strip = 0;
+  std::size_t shots = 0;  ///< that count
+  double mean = 0;        ///< distance from the plane, along its normal, m
+};
+
+/// Mean distances from the planes, strip by strip; ordered by plane, then strip.
+/// @param gate         distance beyond which a point does not count, m
+/// @param least_shots  a strip with fewer is left out
+/// @throws InvalidArgument as ground_cells
+std::vector<StripInCell> strips_in_cells(const ShotPoints& points,
+                                         const std::vector<std::uint16_t>& strip,
+                                         const PlaneOfShot& plane,
+                                         const std::vector<GroundPlane>& planes, double gate,
+                                         std::size_t least_shots = 8);
+
 /// How far two strips are apart.
 struct StripPair {
   std::uint16_t first = 0, second = 0;
@@ -60,9 +78,7 @@ struct StripPair {
   Eigen::Vector3d shift{0, 0, 0}, sigma{1, 1, 1};
 };
 
-/// Mean distances from the planes, strip by strip, compared.
-/// @param gate  distance beyond which a point does not count, m
-/// @throws InvalidArgument as ground_cells
+/// strips_in_cells(), compared. @throws InvalidArgument as ground_cells
 std::vector<StripPair> strip_pairs(const ShotPoints& points,
                                    const std::vector<std::uint16_t>& strip,
                                    const PlaneOfShot& plane, const std::vector<GroundPlane>& planes,

@@ -2,7 +2,6 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -10,26 +9,17 @@
 #include <Eigen/Core>
 
 #include "risley/calibration/flight_shots.hpp"
+#include "risley/trajectories/error_process.hpp"
 
 namespace risley::calibration {
 
-/// Errors of a trajectory along the axes of a map: of the position to the east, the north and up,
-/// and of the attitude about those three axes. (A turn about up is an error of the heading.)
-inline constexpr int kPoseErrors = 6;
+/// Corrections of a pose along the axes of a local frame: a shift along x (east), y (north) and
+/// z (up), and a rotation about these three axes.
+inline constexpr int kCorrections = 6;
 
-/// How the errors of a trajectory go on: each is a Gauss-Markov process of its own, of covariance
-/// sigma^2 exp(-|t - t'| / correlation_time). On top comes white noise of the attitude, about each
-/// axis the same, independent from sample to sample.
-struct PoseErrorProcess {
-  std::array<double, kPoseErrors> sigma{};             ///< m and rad
-  std::array<double, kPoseErrors> correlation_time{};  ///< s
-  double white_attitude = 0;                           ///< rad
-  double sample_interval = 0.005;                      ///< s
-};
-
-/// @throws InvalidArgument for sigmas that are not above 0, or correlation times or a sample
-///         interval that are not
-void require_process(const PoseErrorProcess& process);
+/// The error of the trajectory whose process a correction follows: position east, north and up,
+/// tilts about east and north, heading. @throws InvalidArgument for another correction
+trajectories::PoseError error_of(int correction);
 
 /// Knots between which corrections of a trajectory are linear. Every strip has knots of its own.
 struct TrajectoryKnots {
@@ -57,18 +47,37 @@ TrajectoryKnots make_knots(const FlightShots& shots, double spacing);
 Eigen::MatrixXd resampled(const TrajectoryKnots& from, const Eigen::MatrixXd& corrections,
                           const TrajectoryKnots& to);
 
-/// What the process says of one component of the corrections at all knots, the inverse of its
-/// covariance, which is tridiagonal.
+/// What a process says of one correction at all knots: the inverse of its covariance, which is
+/// tridiagonal. A sigma below 1e-7 (m, rad) counts as that.
+/// @param process  at the knots' times
 struct KnotInformation {
   std::vector<double> diagonal;  ///< [knots]
   std::vector<double> next;      ///< [knots - 1] between a knot and the next
 };
-KnotInformation knot_information(const TrajectoryKnots& knots, const PoseErrorProcess& process,
-                                 int component);
+KnotInformation knot_information(const TrajectoryKnots& knots,
+                                 const trajectories::ErrorProcess& process, int correction);
 
-/// Covariance of what a component does between two knots beside the straight line through its
-/// values there, at the middles of equal parts of the interval [parts, parts].
-Eigen::MatrixXd covariance_between_knots(const PoseErrorProcess& process, int component,
-                                         double spacing, int parts);
+/// Covariance of what a correction does within an interval beside the straight line through its
+/// values at the ends, at the middles of equal parts [parts, parts]; with the sigma that the
+/// process has in the middle of the interval.
+/// @throws InvalidArgument for an interval that is not longer than 0, and less than one part
+Eigen::MatrixXd covariance_between_knots(const trajectories::ErrorProcess& process, int correction,
+                                         std::int64_t begin_ns, std::int64_t end_ns, int parts);
+
+/// Corrections at a time: linear between the knots of a strip, elsewhere what the process expects.
+/// @param corrections  [6, knots]
+/// @throws InvalidArgument for corrections that are not those of the knots, and for no knots
+Eigen::Matrix<double, kCorrections, 1> correction_at(const TrajectoryKnots& knots,
+                                                     const Eigen::MatrixXd& corrections,
+                                                     const trajectories::ErrorProcess& process,
+                                                     std::int64_t time_ns);
+
+/// Standard deviations of corrections at a time: linear between the knots of a strip, elsewhere
+/// what the process adds to those of the nearest knot.
+/// @param knot_sigma  [6, knots]
+/// @throws as correction_at
+Eigen::Matrix<double, kCorrections, 1> correction_sigma_at(
+    const TrajectoryKnots& knots, const Eigen::MatrixXd& knot_sigma,
+    const trajectories::ErrorProcess& process, std::int64_t time_ns);
 
 }  // namespace risley::calibration

@@ -23,6 +23,7 @@ enum class ChartKind {
   full_turn,  ///< x runs from 0 to 360 degree
   two_turns,  ///< square, both axes run from 0 to 360 degree
   map,        ///< square, equal scales, both axes turned: a view along the beam
+  ground,     ///< square, equal scales: the ground from above, east to the right
   space,      ///< three axes of equal scale, can be rotated; points only
 };
 

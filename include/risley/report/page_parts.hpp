@@ -23,6 +23,8 @@ inline constexpr double kFarOff = 3.0;
 std::string symbol_html(const std::string& symbol);
 
 /// Head of a parameter's row: its name in words, its symbol and its name in files.
+std::string parameter_head(const std::string& long_name, const std::string& symbol,
+                           const std::string& name);
 std::string parameter_head(const ParameterInfo& parameter);
 
 /// Whether held parameters make the sigma of some parameter larger.
@@ -44,7 +46,17 @@ struct Verdict {
 };
 std::string verdict_html(const Verdict& verdict);
 
-/// Correlations of the free parameters as a table in colours; nothing when none is free.
+/// What stands before a row and above a column of correlations.
+struct CorrelationHead {
+  std::string row_html, symbol_html;
+};
+
+/// Correlations as a table in colours; nothing when there are none.
+/// @param covariance  [heads, heads]
+std::string correlation_html(const std::vector<CorrelationHead>& heads,
+                             const Eigen::MatrixXd& covariance);
+
+/// The same of the free parameters of a train.
 /// @param free        names
 /// @param covariance  [free, free]
 std::string correlation_html(const std::vector<std::string>& free,

@@ -7,11 +7,12 @@
 
 #include "risley/report/calibration_report.hpp"
 #include "risley/report/estimate_report.hpp"
+#include "risley/report/flight_report.hpp"
 
 namespace risley::report {
 
 /// A report of any kind.
-using Report = std::variant<EstimateReport, CalibrationReport>;
+using Report = std::variant<EstimateReport, CalibrationReport, FlightReport>;
 
 /// The text of report.json; numbers that are not finite are null.
 std::string report_text(const Report& report);

@@ -88,6 +88,8 @@ class ErrorProcess {
   PoseErrorVector sigmas(std::int64_t time_ns) const;
   /// Standard deviations of the white parts [6].
   const PoseErrorVector& white() const { return white_; }
+  /// For how long white errors stay the same, s; 0 where there are none.
+  double sample_interval() const { return 1e-9 * static_cast<double>(sample_ns_); }
   /// Correlation times, s [6].
   const PoseErrorVector& correlation_times() const { return correlation_times_; }
   /// Number of the trajectory's sample that a time is in, whose white errors it has; 0 everywhere

@@ -1,0 +1,373 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "risley/report/flight_report.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <set>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "risley/core/angle.hpp"
+#include "risley/report/charts.hpp"
+#include "risley/report/html.hpp"
+
+namespace risley::report {
+namespace {
+
+using calibration::FlightCalibration;
+using calibration::FlightUnknowns;
+using calibration::StripPair;
+using calibration::TrajectoryKnots;
+using jobs::FlightDetails;
+using jobs::FlightGround;
+using jobs::FlightStrip;
+using jobs::StripDifferences;
+
+constexpr std::size_t kMostPairs = 200;
+constexpr std::size_t kMostTimes = 1200;  // of a line along time
+constexpr double kShownPart = 0.95;       // of the values of a map between the ends of its colours
+constexpr double kLeastShown = 1e-4;      // m
+constexpr std::array<const char*, 5> kStripColours = {"a", "b", "c", "d", "bad"};
+
+/// One of the errors of a pose that are corrected: its row, and how it is drawn.
+struct CorrectedError {
+  Eigen::Index row;
+  const char *title, *label;
+  double scale;
+};
+const std::array<CorrectedError, 6> kCorrectedErrors = {{
+    {1, "Correction to the north", "correction, mm", kMillimetres},
+    {0, "Correction to the east", "correction, mm", kMillimetres},
+    {2, "Correction of the height", "correction, mm", kMillimetres},
+    {4, "Correction of the tilt about north", "correction, deg", kDegreesPerRadian},
+    {3, "Correction of the tilt about east", "correction, deg", kDegreesPerRadian},
+    {5, "Correction of the heading", "correction, deg", -kDegreesPerRadian},
+}};
+
+double nominal_value(const sensors::Sensor& nominal, const std::string& name, std::size_t unknown) {
+  const auto place = static_cast<int>(unknown);
+  if (place == FlightUnknowns::range_offset()) return nominal.range_offset;
+  return place < FlightUnknowns::parameter(0) ? kUnknown : nominal.get(name);
+}
+
+/// The pairs with the most cells, in the order of their strips.
+void take_pairs(const FlightCalibration& c, FlightReport& report) {
+  const auto key = [](const StripPair& pair) { return std::pair(pair.first, pair.second); };
+  std::vector<StripPair> largest = c.pairs_after.empty() ? c.pairs_before : c.pairs_after;
+  std::stable_sort(largest.begin(), largest.end(),
+                   [](const StripPair& a, const StripPair& b) { return a.cells > b.cells; });
+  largest.resize(std::min(largest.size(), kMostPairs));
+  std::set<std::pair<std::uint16_t, std::uint16_t>> kept, all;
+  for (const StripPair& pair : largest) kept.insert(key(pair));
+  const auto take = [&](const std::vector<StripPair>& from, std::vector<StripPair>& to) {
+    for (const StripPair& pair : from) {
+      all.insert(key(pair));
+      if (kept.contains(key(pair))) to.push_back(pair);
+    }
+  };
+  take(c.pairs_before, report.pairs_before);
+  take(c.pairs_after, report.pairs_after);
+  report.pair_count = all.size();
+}
+
+double seconds_between(std::int64_t begin_ns, std::int64_t end_ns) {
+  return 1e-9 * static_cast<double>(end_ns - begin_ns);
+}
+
+double median_spacing(const TrajectoryKnots& knots) {
+  std::vector<double> spacings;
+  for (const TrajectoryKnots::Interval& interval : knots.intervals) {
+    spacings.push_back(seconds_between(interval.begin_ns, interval.end_ns));
+  }
+  if (spacings.empty()) return 0;
+  const auto middle = spacings.begin() + static_cast<std::ptrdiff_t>(spacings.size() / 2);
+  std::nth_element(spacings.begin(), middle, spacings.end());
+  return *middle;
+}
+
+std::string strip_name(std::size_t strip) { return fmt::format("strip {}", strip + 1); }
+
+/// Size that most of the values stay below, not 0.
+double shown_size(std::vector<double> values) {
+  std::erase_if(values, [](double value) { return !std::isfinite(value); });
+  if (values.empty()) return kLeastShown;
+  for (double& value : values) value = std::abs(value);
+  const auto at = values.begin() +
+                  static_cast<std::ptrdiff_t>(kShownPart * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), at, values.end());
+  return std::max(*at, kLeastShown);
+}
+
+/// All diagrams of the page.
+class FlightCharts {
+ public:
+  explicit FlightCharts(const FlightReportInput& input)
+      : c_(input.calibration), details_(input.details) {}
+
+  std::vector<Chart> strips() const {
+    if (details_.strips.empty()) return {};
+    Chart chart{"The strips from above", "east, m", "north, m", {}, {}, ChartKind::ground};
+    for (std::size_t i = 0; i < details_.strips.size(); ++i) {
+      const FlightStrip& strip = details_.strips[i];
+      chart.series.push_back({strip_name(strip.strip), kStripColours[i % kStripColours.size()],
+                              SeriesKind::line, strip.east, strip.north});
+    }
+    chart.note = "Places of the trajectory, metres from the middle of the flight.";
+    if (details_.strips.size() < details_.strip_count) {
+      chart.note += fmt::format(" The first {} of {} strips are drawn.", details_.strips.size(),
+                                details_.strip_count);
+    }
+    if (details_.strips.size() > kStripColours.size()) {
+      chart.note += fmt::format(" Colours repeat after {} strips.", kStripColours.size());
+    }
+    return {chart};
+  }
+
+  std::vector<Chart> differences() const {
+    std::vector<Chart> charts;
+    const FlightGround& ground = details_.ground;
+    if (!ground.east.empty()) {
+      add_differences(charts, "All strips", ground.east, ground.north, ground.before, ground.after,
+                      false);
+    }
+    for (const StripDifferences& pair : details_.pairs) {
+      add_differences(charts,
+                      fmt::format("Strip {} less strip {}", pair.second + 1, pair.first + 1),
+                      pair.east, pair.north, pair.before, pair.after, true);
+    }
+    return charts;
+  }
+
+  std::vector<Chart> ground() const {
+    const FlightGround& g = details_.ground;
+    if (g.east.empty()) return {};
+    std::vector<Chart> charts;
+    Chart roughness = map("How rough the ground is", g.east, g.north,
+                          scaled(g.roughness, kMillimetres), "scatter about the planes, mm");
+    roughness.value_range = {0.0, kMillimetres * shown_size(g.roughness)};
+    roughness.note +=
+        " Scatter of the points about a plane in each cell, 1 sigma. Plain ground shows the noise "
+        "of the ranges; bushes, edges and steps show more, and their cells do not count.";
+    charts.push_back(std::move(roughness));
+    Chart slope = map("How steep the ground is", g.east, g.north,
+                      scaled(g.slope, kDegreesPerRadian), "slope, deg");
+    slope.note +=
+        " Slopes in many directions are what tells shifts of strips, and a turn about "
+        "the vertical.";
+    charts.push_back(std::move(slope));
+    Chart strips = map("How many strips saw it", g.east, g.north, g.strips, "strips");
+    strips.note += " Only ground that two strips and more saw is used.";
+    charts.push_back(std::move(strips));
+    return charts;
+  }
+
+  std::vector<Chart> residuals() const {
+    if (c_.piece_time.empty()) return {};
+    // The mean of squares of several pieces, never across two strips.
+    const std::size_t stride = (c_.piece_time.size() + kMostTimes - 1) / kMostTimes;
+    Series rms{"residuals, RMS", "a", SeriesKind::line, {}, {}};
+    std::size_t strip = strip_at(c_.piece_time.front());
+    for (std::size_t i = 0; i < c_.piece_time.size();) {
+      const std::size_t own = strip_at(c_.piece_time[i]);
+      if (own != strip) add_break(rms, c_.piece_time[i]);
+      strip = own;
+      double time = 0, squares = 0;
+      std::size_t count = 0;
+      for (; i < c_.piece_time.size() && count < stride && strip_at(c_.piece_time[i]) == own; ++i) {
+        time += c_.piece_time[i];
+        squares += c_.piece_rms[i] * c_.piece_rms[i];
+        ++count;
+      }
+      rms.x.push_back(time / static_cast<double>(count));
+      rms.y.push_back(kMillimetres * std::sqrt(squares / static_cast<double>(count)));
+    }
+    Chart chart{"Residuals along time",
+                "time, s",
+                "residual of a range, mm",
+                {rms},
+                fmt::format("Root mean square of measured less predicted ranges, {} pieces of the "
+                            "flight{}. The line is the noise of one range over the whole flight.",
+                            count_text(c_.piece_time.size()),
+                            stride > 1 ? fmt::format(", {} together", stride) : "")};
+    if (std::isfinite(c_.range_sigma)) {
+      chart.series.push_back({"noise of a range",
+                              "ink",
+                              SeriesKind::line,
+                              {c_.piece_time.front(), c_.piece_time.back()},
+                              {kMillimetres * c_.range_sigma, kMillimetres * c_.range_sigma}});
+    }
+    return {chart};
+  }
+
+  std::vector<Chart> corrections() const {
+    const TrajectoryKnots& knots = c_.model.knots;
+    const auto columns = static_cast<Eigen::Index>(knots.size());
+    if (columns == 0 || c_.model.corrections.cols() != columns ||
+        c_.correction_sigma.cols() != columns) {
+      return {};
+    }
+    const std::size_t stride = (knots.size() + kMostTimes - 1) / kMostTimes;
+    std::vector<std::size_t> kept;
+    for (std::size_t i = 0; i < knots.size(); ++i) {
+      const bool end = i == 0 || i + 1 == knots.size() || knots.strip[i] != knots.strip[i - 1] ||
+                       knots.strip[i + 1] != knots.strip[i];
+      if (end || i % stride == 0) kept.push_back(i);
+    }
+    std::vector<Chart> charts;
+    for (const CorrectedError& error : kCorrectedErrors) {
+      Series value{"correction", "a", SeriesKind::line, {}, {}};
+      Series above{"± σ", "ink", SeriesKind::line, {}, {}}, below = above;
+      for (std::size_t k = 0; k < kept.size(); ++k) {
+        const auto knot = static_cast<Eigen::Index>(kept[k]);
+        const double time = seconds_between(knots.time_ns.front(), knots.time_ns[kept[k]]);
+        if (k > 0 && knots.strip[kept[k]] != knots.strip[kept[k - 1]]) {
+          for (Series* series : {&value, &above, &below}) add_break(*series, time);
+        }
+        const double own = error.scale * c_.model.corrections(error.row, knot);
+        const double sigma = std::abs(error.scale) * c_.correction_sigma(error.row, knot);
+        for (Series* series : {&value, &above, &below}) series->x.push_back(time);
+        value.y.push_back(own);
+        above.y.push_back(own + sigma);
+        below.y.push_back(own - sigma);
+      }
+      // One series, so that the legend has one entry.
+      add_break(above, above.x.back());
+      above.x.insert(above.x.end(), below.x.begin(), below.x.end());
+      above.y.insert(above.y.end(), below.y.begin(), below.y.end());
+      charts.push_back({error.title,
+                        "time, s",
+                        error.label,
+                        {above, value},
+                        kept.size() == knots.size()
+                            ? fmt::format("All {} knots are drawn.", count_text(knots.size()))
+                            : fmt::format("Of {} knots one in {} is drawn, and the ends of strips.",
+                                          count_text(knots.size()), stride)});
+    }
+    return charts;
+  }
+
+ private:
+  static void add_break(Series& series, double time) {
+    series.x.push_back(time);
+    series.y.push_back(kUnknown);
+  }
+
+  static std::vector<double> scaled(std::vector<double> values, double scale) {
+    for (double& value : values) value *= scale;
+    return values;
+  }
+
+  /// Strip of a time since the first shot; that before it in a turn.
+  std::size_t strip_at(double time) const {
+    const TrajectoryKnots& knots = c_.model.knots;
+    if (knots.size() == 0) return 0;
+    const std::int64_t time_ns =
+        knots.time_ns.front() + static_cast<std::int64_t>(std::llround(1e9 * time));
+    const auto behind = std::upper_bound(knots.time_ns.begin(), knots.time_ns.end(), time_ns);
+    const auto at = behind == knots.time_ns.begin() ? 0 : behind - knots.time_ns.begin() - 1;
+    return knots.strip[static_cast<std::size_t>(at)];
+  }
+
+  /// Squares that have a value.
+  Chart map(std::string title, const std::vector<double>& east, const std::vector<double>& north,
+            const std::vector<double>& values, std::string value_label) const {
+    Series cells{"", "ink", SeriesKind::cells, {}, {}};
+    cells.cell_width = cells.cell_height = details_.square_size;
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      if (!std::isfinite(values[i])) continue;
+      cells.x.push_back(east[i]);
+      cells.y.push_back(north[i]);
+      cells.value.push_back(values[i]);
+    }
+    Chart chart{std::move(title), "east, m", "north, m", {std::move(cells)}, {}, ChartKind::ground};
+    chart.value_label = std::move(value_label);
+    chart.note = fmt::format("Squares of {:g} m.", details_.square_size);
+    return chart;
+  }
+
+  /// Before and after in the same colours, and after in colours of its own.
+  void add_differences(std::vector<Chart>& charts, const std::string& who,
+                       const std::vector<double>& east, const std::vector<double>& north,
+                       const std::vector<double>& before, const std::vector<double>& after,
+                       bool signs) const {
+    const double fine = kMillimetres * shown_size(after);
+    const double coarse = std::max(fine, kMillimetres * shown_size(before));
+    const auto add = [&](const char* when, const std::vector<double>& values, double size,
+                         const char* colours) {
+      Chart chart = map(fmt::format("{}, {}", who, when), east, north, scaled(values, kMillimetres),
+                        signs ? "difference, mm" : "RMS difference, mm");
+      chart.note += colours;
+      chart.palette = signs ? Palette::diverging : Palette::sequential;
+      chart.value_range = {signs ? -size : 0.0, size};
+      charts.push_back(std::move(chart));
+    };
+    add("before", before, coarse, " One square in twenty may be beyond the colours.");
+    add("after", after, coarse, " The colours are those of the picture before.");
+    add("after, finer colours", after, fine, " The same differences in colours of their own.");
+  }
+
+  const FlightCalibration& c_;
+  const FlightDetails& details_;
+};
+
+}  // namespace
+
+FlightReport flight_report(const FlightReportInput& input) {
+  const FlightCalibration& c = input.calibration;
+  FlightReport report;
+  report.recordings = input.recordings;
+  for (const ReportedRecording& one : input.recordings) {
+    report.observations += one.audit.observations;
+  }
+  report.sensor = c.sensor.name;
+  report.serial = c.sensor.serial;
+  report.preset = input.nominal.name;
+  report.prisms = c.sensor.prisms();
+  report.emitters = c.sensor.train.emitters();
+  report.mount = input.mount.name;
+  report.reference_point = input.mount.reference_point;
+  report.body_from_sensor = input.mount.nominal;
+  report.converged = c.converged;
+  report.reason = c.reason;
+  report.warnings = c.warnings;
+  report.warnings.insert(report.warnings.end(), input.warnings.begin(), input.warnings.end());
+  report.shots = c.shots;
+  report.without_pose = c.without_pose;
+  report.used = c.used;
+  report.outliers = c.outliers;
+  report.cells = c.cells;
+  report.rough_cells = c.rough_cells;
+  report.unknowns = c.unknowns;
+  for (std::size_t i = 0; i < c.unknowns.size(); ++i) {
+    report.nominal.push_back(nominal_value(input.nominal, c.unknowns[i].name, i));
+  }
+  report.covariance = c.covariance;
+  report.datum = c.datum;
+  report.not_told = c.not_told;
+  take_pairs(c, report);
+  report.rms_before = c.rms_before;
+  report.rms_after = c.rms_after;
+  report.sigma0 = c.sigma0;
+  report.range_sigma = c.range_sigma;
+  report.strip_count = input.details.strip_count;
+  for (const FlightStrip& strip : input.details.strips) {
+    report.strips.push_back({strip.strip, strip.begin, strip.duration, strip.course, strip.sway,
+                             strip.speed, strip.range});
+  }
+  report.knots = c.model.knots.size();
+  report.knot_spacing = median_spacing(c.model.knots);
+  report.truth = input.truth;
+  report.provenance = input.provenance;
+  const FlightCharts charts(input);
+  report.strip_charts = charts.strips();
+  report.difference_charts = charts.differences();
+  report.ground_charts = charts.ground();
+  report.residual_charts = charts.residuals();
+  report.correction_charts = charts.corrections();
+  return report;
+}
+
+}  // namespace risley::report
