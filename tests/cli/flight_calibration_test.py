@@ -60,7 +60,7 @@ class FlightCalibrationTest(CommandTest):
         self.assertGreater(strips["before"]["rms_m"], 0.05)
         self.assertLess(strips["after"]["rms_m"], 0.006)
         self.assertEqual(len(strips["pairs"]), 6)
-        self.assertEqual(len(result["inputs"]), 4)
+        self.assertEqual(len(result["inputs"]), 5)
         folder = self.folder / "out"
         self.assertEqual(sorted(path.name for path in folder.iterdir()),
                          ["calibration.yaml", "mount.yaml", "report.html", "report.json",
