@@ -19,6 +19,7 @@
 #include "command.hpp"
 #include "many_files.hpp"
 #include "option_names.hpp"
+#include "platform_options.hpp"
 #include "reading_options.hpp"
 #include "recording_text.hpp"
 #include "result_folder.hpp"
@@ -179,14 +180,7 @@ Run declare_cloud(CLI::App& verb) {
          "Give every point the loadings of the errors that all points share, for covariances "
          "between points");
   add_reading_options(verb, o.reading);
-  verb.add_option("--trajectory", o.platform.trajectory,
-                  "Trajectory of a sensor that moved: SBET, Inertial Explorer or POSPac text, CSV");
-  verb.add_option("--mount", o.platform.mount,
-                  "How the sensor sits on the moving platform (YAML): axes, lever arm, boresight, "
-                  "clock");
-  verb.add_option("--accuracy", o.platform.accuracy, "Accuracies of the trajectory (SMRMSG)");
-  verb.add_option("--trajectory-errors", o.platform.errors,
-                  "How wrong the trajectory may be, and for how long (YAML)");
+  add_platform_options(verb, o.platform);
   verb.add_option("--crs", o.platform.crs,
                   "Map that the points of a moving sensor go to: EPSG:25832, with a height system "
                   "EPSG:25832+7837 (default: UTM on WGS 84, ellipsoidal heights)");

@@ -94,6 +94,7 @@ struct TimeOrder {
 /// accuracies may be missing as a whole, all other columns have one length.
 struct Trajectory {
   std::string format;  ///< short name, e.g. "sbet"; empty when it comes from no file
+  std::string source;  ///< within a file that holds several: topic and frames, in words
   TimeScale time_scale = TimeScale::unknown;
   std::optional<int> gps_week;  ///< of the first record's second of week, since 6 January 1980
   Frame frame = Frame::local;
