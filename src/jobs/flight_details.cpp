@@ -58,14 +58,16 @@ double median_of(std::vector<double>& values) {
   return *middle;
 }
 
-/// Rows of a random sample; every n-th shot would beat with the rotors.
-std::vector<std::size_t> sample_of(std::vector<std::size_t> rows, std::size_t most,
-                                   std::uint64_t seed) {
-  if (rows.size() <= most) return rows;
+/// A random sample of the shots; every n-th one would beat with the rotors.
+FlightShots sample_of(const FlightShots& shots, std::size_t most, std::uint64_t seed) {
+  if (shots.size() <= most) return shots;
   const RandomStream stream(seed, kSampleStream);
-  const double share = static_cast<double>(most) / static_cast<double>(rows.size());
-  std::erase_if(rows, [&](std::size_t row) { return !(stream.uniform(row) < share); });
-  return rows;
+  const double share = static_cast<double>(most) / static_cast<double>(shots.size());
+  std::vector<std::size_t> rows;
+  for (std::size_t row = 0; row < shots.size(); ++row) {
+    if (stream.uniform(row) < share) rows.push_back(row);
+  }
+  return calibration::rows_of(shots, rows);
 }
 
 /// The same knots for shots that are some of those they were made for.
@@ -376,9 +378,10 @@ FlightDetails flight_details(const FlightShots& shots, const trajectories::Traje
   const trajectories::Interpolation interpolation(local);
   const double start_clock = options.mount.clock_offset.value;
   const double margin = std::abs(found.model.clock_offset - start_clock) + kClockMargin;
-  const FlightShots sample = calibration::rows_of(
-      shots, sample_of(calibration::rows_with_pose(shots, interpolation, start_clock, margin),
-                       bounds.most_shots, options.seed));
+  FlightShots sample = sample_of(shots, bounds.most_shots, options.seed);
+  const std::vector<std::size_t> rows =
+      calibration::rows_with_pose(sample, interpolation, start_clock, margin);
+  if (rows.size() < sample.size()) sample = calibration::rows_of(sample, rows);
   require_at_least("shots with a pose", static_cast<long long>(sample.size()), 1);
   FlightDetails details;
   details.shots = sample.size();

@@ -62,7 +62,7 @@ Eigen::Index row_of(trajectories::PoseError error) {
   return row;
 }
 
-double nominal_value(const sensors::Sensor& nominal, const std::string& name, std::size_t unknown) {
+double nominal_of(const sensors::Sensor& nominal, const std::string& name, std::size_t unknown) {
   const auto place = static_cast<int>(unknown);
   if (place == FlightUnknowns::range_offset()) return nominal.range_offset;
   return place < FlightUnknowns::parameter(0) ? kUnknown : nominal.get(name);
@@ -388,7 +388,7 @@ FlightReport flight_report(const FlightReportInput& input) {
   report.rough_cells = c.rough_cells;
   report.unknowns = c.unknowns;
   for (std::size_t i = 0; i < c.unknowns.size(); ++i) {
-    report.nominal.push_back(nominal_value(input.nominal, c.unknowns[i].name, i));
+    report.nominal.push_back(nominal_of(input.nominal, c.unknowns[i].name, i));
   }
   if (input.truth) {
     report.truth = {input.truth->before, input.truth->after, {}};
