@@ -13,6 +13,7 @@ struct OptionName {
 };
 
 constexpr OptionName kNames[] = {
+    {"accuracy", "--accuracy"},
     {"additional", "--free"},
     {"angle_noise", "--noise-angle-deg"},
     {"common_factors", "--common-factors"},
@@ -23,6 +24,7 @@ constexpr OptionName kNames[] = {
     {"las_scale", "--las-scale-m"},
     {"method", "--method"},
     {"mirrored", "--mirror"},
+    {"mount", "--mount"},
     {"planes", "--planes"},
     {"prior_sigma", "--prior-sigma-deg"},
     {"range_noise", "--noise-range-m"},
@@ -35,6 +37,7 @@ constexpr OptionName kNames[] = {
     {"shot_rate", "--shot-rate-hz"},
     {"states", "--states"},
     {"stations", "--stations"},
+    {"trajectory", "--trajectory"},
     {"trajectory_topic", "--trajectory-topic"},
     {"truth", "--truth"},
 };

@@ -34,9 +34,8 @@ std::vector<std::size_t> by_time(const std::vector<RangedRecording>& recordings)
   for (std::size_t i = 1; i < order.size(); ++i) {
     const RangedRecording &one = recordings[order[i - 1]], &next = recordings[order[i]];
     if (next.time_ns.front() < one.time_ns.back()) {
-      throw InvalidArgument(
-          fmt::format("{} begins before {} ends: one sensor cannot have made both", next.name,
-                      one.name));
+      throw InvalidArgument(fmt::format(
+          "{} begins before {} ends: one sensor cannot have made both", next.name, one.name));
     }
   }
   return order;
@@ -103,8 +102,7 @@ FlightRecordings flight_recordings(const std::vector<RangedRecording>& recording
   if (shots.size() == 0) {
     throw EstimationError("no shot was made on a strip of the flight");
   }
-  result.rotation_angle_sigma =
-      std::sqrt(squares / static_cast<double>(prisms * shots.size()));
+  result.rotation_angle_sigma = std::sqrt(squares / static_cast<double>(prisms * shots.size()));
   result.angle_shift = std::move(belief.angle_shift);
   return result;
 }

@@ -66,8 +66,8 @@ struct Neighbours {
   Neighbours(const TrajectoryKnots& all, std::int64_t at)
       : knots(all),
         time_ns(at),
-        next(static_cast<std::size_t>(
-            std::upper_bound(all.time_ns.begin(), all.time_ns.end(), at) - all.time_ns.begin())) {}
+        next(static_cast<std::size_t>(std::upper_bound(all.time_ns.begin(), all.time_ns.end(), at) -
+                                      all.time_ns.begin())) {}
 
   bool has_before() const { return next > 0; }
   bool has_behind() const { return next < knots.size(); }
@@ -252,8 +252,8 @@ Eigen::Matrix<double, kCorrections, 1> correction_sigma_at(
     double variance = 1;  // in squared sigmas of the process
     const auto add = [&](std::size_t knot, double apart) {
       const double kept = std::exp(-2 * apart / correlation_time(process, c));
-      const double own = knot_sigma(c, static_cast<Index>(knot)) /
-                         sigma_at(process, c, knots.time_ns[knot]);
+      const double own =
+          knot_sigma(c, static_cast<Index>(knot)) / sigma_at(process, c, knots.time_ns[knot]);
       variance = std::min(variance, 1 - kept * (1 - own * own));
     };
     if (near.has_before()) add(near.next - 1, near.since_before());

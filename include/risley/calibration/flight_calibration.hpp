@@ -74,6 +74,14 @@ struct NotTold {
   double sigma = 0;   ///< after the flight, in sigmas before it
 };
 
+/// A drift of the recording's clock that the adjustment does not know of, as the flight shows it.
+struct ClockDrift {
+  double value = 0, sigma = 0;  ///< gain of the trajectory's clock on the recording's, s/s
+  double seconds = 0;           ///< time between the first and the last shot
+  /// Beyond chance: what was found holds for a clock that does not drift, and the clock does.
+  bool significant = false;
+};
+
 /// What one calibration in flight found.
 struct FlightCalibration {
   bool converged = false;
@@ -90,6 +98,7 @@ struct FlightCalibration {
   Eigen::MatrixXd correction_sigma;  ///< [6, knots], from the normal equations
   FlightDatum datum;
   std::vector<NotTold> not_told;
+  ClockDrift clock_drift;
   std::vector<StripPair> pairs_before, pairs_after;
   double rms_before = 0, rms_after = 0;  ///< of all pairs and cells, along the normals, m
   double sigma0 = 1;       ///< standard deviation of unit weight against the stated range noise

@@ -31,10 +31,10 @@ struct CalibrateFlightOptions {
   PlatformFiles platform;               ///< trajectory and mount; no map
   /// As given_sensor(). A calibration, from walls say, counts with its covariance.
   std::string sensor;
-  std::optional<double> rate;         ///< shots per second to use; empty: all
-  std::optional<double> angle_noise;  ///< as estimation::EstimateOptions
-  std::optional<bool> mirrored;       ///< the elevation's sign is turned; empty: find out
-  std::vector<std::string> fixed;     ///< parameters to hold
+  std::optional<double> rate;           ///< shots per second to use; empty: all
+  std::optional<double> angle_noise;    ///< as estimation::EstimateOptions
+  std::optional<bool> mirrored;         ///< the elevation's sign is turned; empty: find out
+  std::vector<std::string> fixed;       ///< parameters to hold
   std::vector<std::string> additional;  ///< further parameters to free
   /// As calibration::FlightCalibrationOptions has them.
   std::optional<double> range_noise, prior_sigma;
