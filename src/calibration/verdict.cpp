@@ -98,6 +98,14 @@ CalibrationVerdict verdict_of(const FlightCalibration& c) {
             "fly crossing strips that overlap, over roofs or other slopes, and see whether mount "
             "and trajectory are of this flight"};
   }
+  if (c.clock_drift.significant) {
+    return {CalibrationCode::undecided,
+            fmt::format("the clocks of sensor and trajectory drift apart by {:.2g} +- {:.1g} ppm, "
+                        "{:.2g} ms over the flight",
+                        1e6 * c.clock_drift.value, 1e6 * c.clock_drift.sigma,
+                        1e3 * std::abs(c.clock_drift.value) * c.clock_drift.seconds),
+            "set the sensor's clock by PPS or PTP, or calibrate shorter parts of the flight"};
+  }
   std::vector<Eigen::Index> prisms;
   for (std::size_t i = FlightUnknowns{}.size(); i < c.unknowns.size(); ++i) {
     if (!c.unknowns[i].held) prisms.push_back(static_cast<Eigen::Index>(i));
