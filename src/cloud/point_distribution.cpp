@@ -451,6 +451,9 @@ class PointDistribution::Work {
     ++points_;
     z_sum_ += z - first_z_;
     across_.add(line_.place_across(x, y));
+    const double along = line_.place_along(x, y);
+    nearest_ = std::min(nearest_, along);
+    farthest_ = std::max(farthest_, along);
     const std::int32_t column = cell_of(x, options_.density_cell);
     const std::int32_t row = cell_of(y, options_.density_cell);
     ++opened_cell(cells_, column, row, options_.density_cell);
@@ -466,7 +469,7 @@ class PointDistribution::Work {
     if (tile != nullptr) {
       mark(*tile, i, j);
     } else if (!(known_until_ < std::numeric_limits<double>::infinity())) {
-      known_until_ = line_.place_along(x, y);
+      known_until_ = along;
     }
   }
 
@@ -477,12 +480,13 @@ class PointDistribution::Work {
     own.strip = current_;
     own.name = line.name;
     own.points = points_;
-    own.length = line_.last;
     own.height = line.height - (first_z_ + z_sum_ / static_cast<double>(points_));
     own.density = own.spacing = own.middle_density = own.dense_width = own.cell_variation =
         own.cells_covered = own.spacing_cells_covered = own.empty_share = kNoNumber;
     own.place_density.fill(kNoNumber);
     own.largest_empty.fill(kNoNumber);
+    if (own.height > 0) keep_to_points(own.height);
+    own.length = line_.last - line_.first;
     if (own.height > 0) fill(own);
     done_.push_back(std::move(own));
     last_done_ = current_;
@@ -492,7 +496,17 @@ class PointDistribution::Work {
     across_ = {};
     cells_.clear();
     pixels_.clear();
-    known_until_ = std::numeric_limits<double>::infinity();
+    known_until_ = nearest_ = std::numeric_limits<double>::infinity();
+    farthest_ = -nearest_;
+  }
+
+  /// A recording may begin or end within a strip: where the first and the last field of view were.
+  void keep_to_points(double height) {
+    const double first = std::max(line_.first, nearest_ + height * reach_.behind);
+    const double last = std::min(line_.last, farthest_ - height * reach_.ahead);
+    if (!(last > first)) return;  // the field of view was never seen in full
+    line_.first = first;
+    line_.last = last;
   }
 
   void fill(StripDistribution& own) {
@@ -505,7 +519,7 @@ class PointDistribution::Work {
       opened_cell(ground_, column, row, options_.density_cell).in_swath = 1;
     });
     Stretch whole = swath;
-    whole.first = own.height * reach_.ahead;
+    whole.first += own.height * reach_.ahead;
     whole.last -= own.height * reach_.behind;
     own.whole_ground = whole.area();
     if (!(own.whole_ground > 0)) return;
@@ -723,6 +737,8 @@ class PointDistribution::Work {
   Stretch line_;
   std::uint64_t points_ = 0;
   double first_z_ = 0, z_sum_ = 0;
+  /// Of its points along the line, m.
+  double nearest_ = std::numeric_limits<double>::infinity(), farthest_ = -nearest_;
   AcrossHistogram across_;
   TileMap<CellTile<std::uint32_t>> cells_;
   TileMap<PixelTile> pixels_;
