@@ -31,6 +31,7 @@ constexpr double kLowestBeam = 0.17364817766693033;              // sine of 10 d
 constexpr double kHistogramBin = 0.05, kWidestHistogram = 5000;  // m
 constexpr double kMiddleStripe = 1;                              // m
 constexpr double kPlaceStripe = 0.02, kProfileStripe = 0.02, kProfileReach = 1.4;  // of R
+constexpr double kRim = 0.05;  // of the field of view
 constexpr double kVariationWithin = 0.9, kCirclesWithin = 0.97, kSpacingWithin = 0.95;
 constexpr std::array<double, 2> kThirds{0.3, 0.7};  // of R
 /// Cells of the counts, in squares of so many.
@@ -505,8 +506,10 @@ class PointDistribution::Work {
     const double first = std::max(line_.first, nearest_ + height * reach_.behind);
     const double last = std::min(line_.last, farthest_ - height * reach_.ahead);
     if (!(last > first)) return;  // the field of view was never seen in full
-    line_.first = first;
-    line_.last = last;
+    // Its rim is seen seldom: less than that says nothing.
+    const double rim = kRim * height * (reach_.ahead + reach_.behind);
+    if (first > line_.first + rim) line_.first = first;
+    if (last < line_.last - rim) line_.last = last;
   }
 
   void fill(StripDistribution& own) {
