@@ -43,7 +43,7 @@ constexpr std::int32_t kRadiusPixels = 9;
 constexpr std::int32_t kTilePixels = 64;
 constexpr std::int32_t kBlockPixels = 1024, kHaloPixels = 16 * kRadiusPixels;
 
-std::int32_t cell_of(double value, double cell) {
+std::int32_t cell_number(double value, double cell) {
   return static_cast<std::int32_t>(std::floor(value / cell));
 }
 
@@ -183,7 +183,7 @@ void for_each_square(const Stretch& stretch, double edge, Visit visit) {
     low = std::min(low, corners[k][1]);
     high = std::max(high, corners[k][1]);
   }
-  for (std::int32_t row = cell_of(low, edge); row <= cell_of(high, edge); ++row) {
+  for (std::int32_t row = cell_number(low, edge); row <= cell_number(high, edge); ++row) {
     const double y = (row + 0.5) * edge;
     double left = std::numeric_limits<double>::infinity(), right = -left;
     for (std::size_t k = 0; k < 4; ++k) {
@@ -455,8 +455,8 @@ class PointDistribution::Work {
     const double along = line_.place_along(x, y);
     nearest_ = std::min(nearest_, along);
     farthest_ = std::max(farthest_, along);
-    const std::int32_t column = cell_of(x, options_.density_cell);
-    const std::int32_t row = cell_of(y, options_.density_cell);
+    const std::int32_t column = cell_number(x, options_.density_cell);
+    const std::int32_t row = cell_number(y, options_.density_cell);
     ++opened_cell(cells_, column, row, options_.density_cell);
     GroundCell& ground = opened_cell(ground_, column, row, options_.density_cell);
     ++ground.points;
@@ -464,7 +464,7 @@ class PointDistribution::Work {
       ground.last_strip = current_;
       if (ground.strips < 255) ++ground.strips;
     }
-    const std::int32_t i = cell_of(x, pixel_), j = cell_of(y, pixel_);
+    const std::int32_t i = cell_number(x, pixel_), j = cell_number(y, pixel_);
     PixelTile* tile =
         pixels_.open(divided(i, kTilePixels), divided(j, kTilePixels), most_pixel_tiles_);
     if (tile != nullptr) {
@@ -593,10 +593,10 @@ class PointDistribution::Work {
     const std::size_t all = std::numeric_limits<std::size_t>::max();
     pixels_.for_each([&](std::int32_t i, std::int32_t j, const PixelTile& tile) {
       for (std::int32_t y = 0; y < kTilePixels; ++y) {
-        const std::int32_t row = cell_of((j * kTilePixels + y + 0.5) * pixel_, edge);
+        const std::int32_t row = cell_number((j * kTilePixels + y + 0.5) * pixel_, edge);
         for (std::uint64_t bits = tile[static_cast<std::size_t>(y)]; bits != 0; bits &= bits - 1) {
           const std::int32_t column =
-              cell_of((i * kTilePixels + std::countr_zero(bits) + 0.5) * pixel_, edge);
+              cell_number((i * kTilePixels + std::countr_zero(bits) + 0.5) * pixel_, edge);
           mark(*seen.open(divided(column, kTilePixels), divided(row, kTilePixels), all), column,
                row);
         }

@@ -23,7 +23,7 @@ using cloud::StripDistribution;
 constexpr std::size_t kMostProfiles = 6;
 constexpr std::size_t kMostStripRows = 200;
 
-std::string strip_name(const StripDistribution& strip) {
+std::string title_of_strip(const StripDistribution& strip) {
   return strip.name.empty() ? fmt::format("{}", strip.strip)
                             : fmt::format("{} ({})", strip.strip, strip.name);
 }
@@ -79,8 +79,8 @@ Chart profile_of(const PointDistributionSummary& d) {
               "Mean along every strip."};
   for (std::size_t i = 0; i < std::min(kMostProfiles, d.strips.size()); ++i) {
     const StripDistribution& strip = d.strips[i];
-    Series line{"strip " + strip_name(strip), kColours[i], SeriesKind::steps, strip.profile.across,
-                strip.profile.density};
+    Series line{"strip " + title_of_strip(strip), kColours[i], SeriesKind::steps,
+                strip.profile.across, strip.profile.density};
     chart.series.push_back(std::move(line));
   }
   if (d.strips.size() > kMostProfiles) {
@@ -104,7 +104,7 @@ std::string summary_html(const PointDistributionSummary& d) {
          row("cells that several strips see", percent(d.overlap)) + "</tbody></table>\n";
 }
 
-std::string strips_html(const PointDistributionSummary& d) {
+std::string swaths_html(const PointDistributionSummary& d) {
   std::string html =
       "<h2>Strip by strip</h2>\n<div class=\"wide\"><table><thead><tr><th>strip</th>"
       "<th>points</th><th>height, m</th><th>swath, m</th><th>dense, m</th><th>density, 1/m²</th>"
@@ -118,7 +118,7 @@ std::string strips_html(const PointDistributionSummary& d) {
     html += fmt::format(
         "<tr><th scope=\"row\">{}</th><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td>"
         "<td>{}</td><td>{}</td>",
-        escape_html(strip_name(s)), count_text(s.points), finite_text("{:.1f}", s.height),
+        escape_html(title_of_strip(s)), count_text(s.points), finite_text("{:.1f}", s.height),
         finite_text("{:.1f}", s.width), finite_text("{:.1f}", s.dense_width),
         finite_text("{:.0f}", s.density), finite_text("{:.3f}", s.spacing),
         finite_text("{:.0f}", s.middle_density));
@@ -155,7 +155,7 @@ std::string distribution_page(const PointDistributionSummary& distribution,
   std::string body = summary_html(distribution);
   body += charts_html({map_of(distribution), strips_of(distribution)}, figures);
   body += charts_html({profile_of(distribution)}, figures);
-  body += strips_html(distribution);
+  body += swaths_html(distribution);
   body += provenance_html(provenance);
   return page_html("Points on the ground: " + flight,
                    "How densely and how evenly the points of a flight lie on the ground.", body,

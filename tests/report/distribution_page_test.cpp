@@ -61,7 +61,7 @@ TEST(DistributionPage, HasADashForWhatIsNotKnown) {
   d.strips[0].empty_share = d.strips[0].density = nan;
   d.strips[0].profile = {};
   d.map.clear();
-  EXPECT_THAT(distribution_page(d, "nothing", {}), Not(HasSubstr("nan")));
+  EXPECT_THAT(distribution_page(d, "nothing", {}), Not(HasSubstr(">nan")));
 }
 
 }  // namespace risley::report::distribution_page_test
