@@ -12,6 +12,7 @@
 #include "risley/jobs/calibrate_flight.hpp"
 #include "risley/jobs/calibrate_recordings.hpp"
 #include "risley/jobs/plan_calibration.hpp"
+#include "risley/jobs/plan_flight.hpp"
 #include "risley/report/calibration_report.hpp"
 #include "risley/report/flight_report.hpp"
 
@@ -20,6 +21,7 @@
 #include "flight_text.hpp"
 #include "option_names.hpp"
 #include "parameter_choice.hpp"
+#include "plan_flight.hpp"
 #include "platform_options.hpp"
 #include "reading_options.hpp"
 #include "result_folder.hpp"
@@ -33,11 +35,10 @@ struct CalibrateCommandOptions {
   std::vector<std::string> inputs, station_names, truths;
   jobs::PlatformFiles platform;
   std::string folder, method = "adjustment", rate_hz = "full", sensor, planes, stations,
-                      beam_origin = "yes", states = "knots", mirror = "auto", plan;
+                      beam_origin = "yes", states = "knots", mirror = "auto", plan, scene, page;
   std::optional<double> noise_angle_deg, noise_range_m, prior_sigma_deg;
-  std::optional<double> range_offset_sigma_m;
-  double duration_s = 10.0, knot_spacing_s = calibration::FlightCalibrationOptions{}.knot_spacing,
-         cell_size_m = calibration::FlightCalibrationOptions{}.cell_size;
+  std::optional<double> range_offset_sigma_m, knot_spacing_s, cell_size_m;
+  double duration_s = 10.0, empty_circle_m = cloud::PointDistributionOptions{}.empty_circle;
   bool force = false;
   ParameterWishes parameters;
   ReadingWishes reading;
@@ -79,6 +80,19 @@ void take_common(const CalibrateCommandOptions& options, Job& job) {
   job.fixed = held_parameters(options.parameters.fixed);
   job.additional = options.parameters.freed;
   job.range_noise = options.noise_range_m;
+}
+
+/// What flights share, flown and planned.
+template <class Job>
+void take_grid(const CalibrateCommandOptions& options, Job& job) {
+  if (options.knot_spacing_s) {
+    check_positive(*options.knot_spacing_s, "--knot-spacing-s", "s");
+    job.knot_spacing = *options.knot_spacing_s;
+  }
+  if (options.cell_size_m) {
+    check_positive(*options.cell_size_m, "--cell-size-m", "m");
+    job.cell_size = *options.cell_size_m;
+  }
 }
 
 /// What recordings of walls and of a flight share.
@@ -154,10 +168,7 @@ jobs::CalibrateFlightOptions flight_job_of(const CalibrateCommandOptions& option
   jobs::CalibrateFlightOptions job;
   take_recordings(options, common, job);
   job.platform = options.platform;
-  check_positive(options.knot_spacing_s, "--knot-spacing-s", "s");
-  check_positive(options.cell_size_m, "--cell-size-m", "m");
-  job.knot_spacing = options.knot_spacing_s;
-  job.cell_size = options.cell_size_m;
+  take_grid(options, job);
   require_folder_apart(common, options.folder, {"mount.yaml", "trajectory.csv"});
   job.files = result_files(options.folder, "none", common);
   job.texts = [](const jobs::CalibratedFlight& outcome) {
@@ -189,6 +200,23 @@ ExitStatus run_flight(const CalibrateCommandOptions& options, const CommonOption
 
 ExitStatus run_plan(const CalibrateCommandOptions& options, const CommonOptions& common) {
   if (!options.inputs.empty()) throw InvalidArgument("--plan takes no recordings");
+  if (is_flight_plan(options.plan)) {
+    jobs::PlanFlightOptions job;
+    take_common(options, job);
+    take_grid(options, job);
+    check_positive(options.empty_circle_m, "--empty-circle-m", "m");
+    job.distribution.empty_circle = options.empty_circle_m;
+    job.seed = common.seed;
+    return run_flight_plan(job, options.plan, options.platform, options.scene, options.page,
+                           common);
+  }
+  if (moves(options.platform) || !options.scene.empty() || !options.page.empty() ||
+      options.knot_spacing_s || options.cell_size_m) {
+    throw InvalidArgument(fmt::format(
+        "{} is a scene of walls: --mount, --trajectory-errors, --scene, --report, --knot-spacing-s "
+        "and --cell-size-m go with a flight, which has strips",
+        options.plan));
+  }
   check_positive(options.duration_s, "--duration-s", "s");
   jobs::PlanCalibrationOptions job;
   take_common(options, job);
@@ -235,21 +263,30 @@ Run declare_calibrate(CLI::App& verb) {
       ->allow_extra_args(false)
       ->take_all();
   verb.add_option("--plan", o.plan,
-                  "Scene (YAML) to plan for: says what a calibration there would reach")
+                  "Scene or flight (YAML) to plan for: says what a calibration there would reach, "
+                  "and of a flight how its points lie on the ground")
       ->excludes("--output", "--method", "--planes", "--stations", "--station");
   verb.add_option("--duration-s", o.duration_s, "Length of each planned recording")
       ->needs("--plan")
       ->capture_default_str();
+  verb.add_option("--scene", o.scene, "Terrain (YAML) below a planned flight (default: level)")
+      ->needs("--plan");
+  verb.add_option("--empty-circle-m", o.empty_circle_m,
+                  "Diameter of circles that the points of a planned flight should not leave empty")
+      ->needs("--plan")
+      ->capture_default_str();
+  verb.add_option("--report", o.page, "Page (HTML) on the points of a planned flight")
+      ->needs("--plan");
   add_platform_options(verb, o.platform);
   verb.get_option("--trajectory")->excludes("--plan", "--method", "--planes", "--stations");
   verb.add_option("--knot-spacing-s", o.knot_spacing_s,
-                  "Between corrections of the trajectory; further apart on long flights")
-      ->needs("--trajectory")
-      ->capture_default_str();
-  verb.add_option("--cell-size-m", o.cell_size_m, "Of the squares of ground that strips share")
-      ->needs("--trajectory")
-      ->capture_default_str();
-  verb.add_option("--rate-hz", o.rate_hz, "Shots per second to use, or of the plan; 'full' for all")
+                  "Of a flight: between corrections of the trajectory; further apart on long "
+                  "flights (default: 0.25)");
+  verb.add_option("--cell-size-m", o.cell_size_m,
+                  "Of a flight: of the squares of ground that strips share (default: 2)");
+  verb.add_option(
+          "--rate-hz", o.rate_hz,
+          "Shots per second to use, or of the plan; 'full' for all, of a planned flight 5000")
       ->capture_default_str();
   verb.add_option("--noise-angle-deg", o.noise_angle_deg,
                   "1 sigma of azimuth and zenith before rounding (default: the sensor's)");
@@ -291,6 +328,9 @@ Run declare_calibrate(CLI::App& verb) {
     options->truths.insert(options->truths.end(), truth, options->inputs.end());
     options->inputs.erase(truth, options->inputs.end());
     if (!options->plan.empty()) return run_plan(*options, common);
+    if ((options->knot_spacing_s || options->cell_size_m) && !moves(options->platform)) {
+      throw InvalidArgument("--knot-spacing-s and --cell-size-m go with --trajectory or --plan");
+    }
     if (options->inputs.empty()) throw InvalidArgument("INPUT is missing: a recording, or --plan");
     if (moves(options->platform)) return run_flight(*options, common);
     return run_calibration(*options, common);

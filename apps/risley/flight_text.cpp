@@ -25,21 +25,6 @@ using jobs::CalibratedFlight;
 
 double in_degrees(double radians) { return degrees_from_radians(radians); }
 
-/// A value of an unknown in the unit of its name.
-double in_unit_of(const FlightUnknown& unknown, double value, TrainShape shape) {
-  if (unknown.name.starts_with("boresight")) return in_degrees(value);
-  const bool plain = unknown.name.starts_with("lever_arm") || unknown.name == "range_offset_m" ||
-                     unknown.name == "clock_offset_s";
-  return plain ? value : in_file_unit(unknown.name, value, shape);
-}
-
-std::string unit_of(const FlightUnknown& unknown, TrainShape shape) {
-  if (unknown.name.starts_with("boresight")) return "deg";
-  if (unknown.name == "clock_offset_s") return "s";
-  if (unknown.name.starts_with("lever_arm") || unknown.name == "range_offset_m") return "m";
-  return find_parameter(unknown.name, shape).unit;
-}
-
 Json value_and_sigma(const FlightUnknown& unknown, TrainShape shape) {
   return {{"value", in_unit_of(unknown, unknown.value, shape)},
           {"sigma", number_or_null(in_unit_of(unknown, unknown.sigma, shape))}};
@@ -95,23 +80,65 @@ Json strips_json(const CalibratedFlight& outcome) {
 
 }  // namespace
 
+double in_unit_of(const FlightUnknown& unknown, double value, TrainShape shape) {
+  if (unknown.name.starts_with("boresight")) return in_degrees(value);
+  const bool plain = unknown.name.starts_with("lever_arm") || unknown.name == "range_offset_m" ||
+                     unknown.name == "clock_offset_s";
+  return plain ? value : in_file_unit(unknown.name, value, shape);
+}
+
+std::string unit_of(const FlightUnknown& unknown, TrainShape shape) {
+  if (unknown.name.starts_with("boresight")) return "deg";
+  if (unknown.name == "clock_offset_s") return "s";
+  if (unknown.name.starts_with("lever_arm") || unknown.name == "range_offset_m") return "m";
+  return find_parameter(unknown.name, shape).unit;
+}
+
+Json judgement_json(const calibration::FlightJudgement& judgement, TrainShape shape) {
+  Json unknowns = Json::object(), not_told = Json::array();
+  for (const FlightUnknown& unknown : judgement.unknowns) {
+    unknowns[unknown.name] = unknown_json(unknown, shape);
+  }
+  for (const calibration::NotTold& own : judgement.not_told) {
+    not_told.push_back({{"combination", own.words}, {"sigma_over_before", own.sigma}});
+  }
+  const calibration::FlightDatum& datum = judgement.datum;
+  return {{"unknowns", unknowns},
+          {"datum",
+           {{"sigma_x_deg", in_degrees(datum.sigma_x)},
+            {"sigma_y_deg", in_degrees(datum.sigma_y)},
+            {"sigma_z_deg", in_degrees(datum.sigma_z)},
+            {"sigma_rotation_deg", in_degrees(datum.rotation)},
+            {"sigma_shape_deg", in_degrees(datum.shape)},
+            {"sigma_total_deg", in_degrees(datum.total)},
+            {"height_m", datum.height},
+            {"sigma_total_m", datum.total * datum.height}}},
+          {"not_told", not_told}};
+}
+
+void print_judgement(const calibration::FlightJudgement& judgement) {
+  const calibration::FlightDatum& datum = judgement.datum;
+  say("boresight and prisms together: 1 sigma {:.2g} deg over the field of view ({:.2g} shared by "
+      "all beams, {:.2g} in shape), {:.1f} mm at {:.0f} m\n",
+      in_degrees(datum.total), in_degrees(datum.rotation), in_degrees(datum.shape),
+      1e3 * datum.total * datum.height, datum.height);
+  for (const calibration::NotTold& own : judgement.not_told) {
+    say("not told by this flight: {} (keeps {:.0f} % of its sigma)\n", own.words,
+        100 * std::min(1.0, own.sigma));
+  }
+}
+
 Json flight_json(const CalibratedFlight& outcome, double total_time) {
   const FlightCalibration& c = outcome.calibration;
   const TrainShape shape = c.sensor.shape();
   const auto stated = [&](int at) {
     return value_and_sigma(c.unknowns[static_cast<std::size_t>(at)], shape);
   };
-  Json parameters = Json::object(), not_told = Json::array();
+  Json parameters = Json::object();
   for (std::size_t i = FlightUnknowns{}.size(); i < c.unknowns.size(); ++i) {
     parameters[c.unknowns[i].name] = unknown_json(c.unknowns[i], shape);
   }
-  for (const calibration::NotTold& own : c.not_told) {
-    not_told.push_back({{"combination", own.words}, {"sigma_over_before", own.sigma}});
-  }
-  Json unknowns = Json::object();
-  for (const FlightUnknown& unknown : c.unknowns) {
-    unknowns[unknown.name] = unknown_json(unknown, shape);
-  }
+  const Json judged = judgement_json(c, shape);
   std::vector<std::string> warnings = outcome.warnings;
   warnings.insert(warnings.end(), c.warnings.begin(), c.warnings.end());
   Json object = {{"serial", outcome.recordings.front().serial()},
@@ -137,17 +164,9 @@ Json flight_json(const CalibratedFlight& outcome, double total_time) {
                    {"significant", c.clock_drift.significant}}},
                  {"range_offset_m", stated(FlightUnknowns::range_offset())},
                  {"parameters", parameters},
-                 {"unknowns", unknowns},
-                 {"datum",
-                  {{"sigma_x_deg", in_degrees(c.datum.sigma_x)},
-                   {"sigma_y_deg", in_degrees(c.datum.sigma_y)},
-                   {"sigma_z_deg", in_degrees(c.datum.sigma_z)},
-                   {"sigma_rotation_deg", in_degrees(c.datum.rotation)},
-                   {"sigma_shape_deg", in_degrees(c.datum.shape)},
-                   {"sigma_total_deg", in_degrees(c.datum.total)},
-                   {"height_m", c.datum.height},
-                   {"sigma_total_m", c.datum.total * c.datum.height}}},
-                 {"not_told", not_told},
+                 {"unknowns", judged["unknowns"]},
+                 {"datum", judged["datum"]},
+                 {"not_told", judged["not_told"]},
                  {"strips", strips_json(outcome)},
                  {"cells", c.cells},
                  {"rough_cells", c.rough_cells},
@@ -206,14 +225,7 @@ void print_flight(const CalibratedFlight& outcome) {
   table.print();
   say("\nshare: of the answer that comes from what was known before; twin: the unknown it is tied "
       "to most\n");
-  say("boresight and prisms together: 1 sigma {:.2g} deg over the field of view ({:.2g} shared by "
-      "all beams, {:.2g} in shape), {:.1f} mm at {:.0f} m\n",
-      in_degrees(c.datum.total), in_degrees(c.datum.rotation), in_degrees(c.datum.shape),
-      1e3 * c.datum.total * c.datum.height, c.datum.height);
-  for (const calibration::NotTold& own : c.not_told) {
-    say("not told by this flight: {} (keeps {:.0f} % of its sigma)\n", own.words,
-        100 * std::min(1.0, own.sigma));
-  }
+  print_judgement(c);
   say("strips apart along the ground's normals: {:.1f} mm before, {:.1f} mm after\n\n",
       1e3 * c.rms_before, 1e3 * c.rms_after);
   Table pairs({"strips", "cells", "before mm", "after mm", "east mm", "north mm", "up mm"});

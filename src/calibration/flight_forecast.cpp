@@ -32,7 +32,7 @@ constexpr std::uint64_t kRangeNoise = 1703;  // random stream
 /// Where the grid of cells lies does not matter; not along a strip's edge.
 constexpr double kGridShift = 0.382;
 /// Places of the ground at which points are looked at.
-constexpr std::size_t kPlaces = 24;
+constexpr std::size_t kGroundPlaces = 24;
 /// A calibration takes off twice what noise of the normals seems to tell, of which it has had once.
 constexpr double kSpuriousOfTrueNormals = 1;
 constexpr double kParameterStep = 1e-6;
@@ -182,8 +182,8 @@ std::vector<Place> places_of(const ForecastWork& work) {
   }
   // Every cell counts alike, and of its pairs of strips one after the other.
   std::vector<Place> places;
-  for (std::size_t k = 0; k < kPlaces; ++k) {
-    const std::size_t cell = (2 * k + 1) * rows.size() / (2 * kPlaces);
+  for (std::size_t k = 0; k < kGroundPlaces; ++k) {
+    const std::size_t cell = (2 * k + 1) * rows.size() / (2 * kGroundPlaces);
     const std::vector<std::size_t>& own = rows[cell];
     if (own.size() < 2) continue;
     const std::size_t first = k % own.size(),

@@ -22,7 +22,7 @@ namespace risley::calibration {
 namespace {
 
 /// Shots of a piece, those that are not chosen included, and of what one task works on.
-constexpr std::uint64_t kPieceShots = std::uint64_t{1} << 18U;
+constexpr std::uint64_t kPlannedPieceShots = std::uint64_t{1} << 18U;
 constexpr std::size_t kTaskShots = 16384;
 constexpr std::uint64_t kChoice = 1701, kPenetration = 1702;  // random streams
 constexpr double kBillion = 1e9;
@@ -153,8 +153,8 @@ void for_each_planned_piece(const PlannedFlight& planned, const trajectories::Fl
           std::ceil(static_cast<double>(time_ns - start_ns) / kBillion * sensor.shot_rate));
     };
     const std::uint64_t first = number_at(strip.begin_ns), end = number_at(strip.end_ns);
-    for (std::uint64_t begin = first; begin < end; begin += kPieceShots) {
-      const std::uint64_t last = std::min(begin + kPieceShots, end);
+    for (std::uint64_t begin = first; begin < end; begin += kPlannedPieceShots) {
+      const std::uint64_t last = std::min(begin + kPlannedPieceShots, end);
       progress.report(done / all);
       fire(planned, begin, last, start_ns, share, options.seed, fired);
       PlannedPiece piece;

@@ -31,6 +31,7 @@ constexpr double kLowestBeam = 0.17364817766693033;              // sine of 10 d
 constexpr double kHistogramBin = 0.05, kWidestHistogram = 5000;  // m
 constexpr double kMiddleStripe = 1;                              // m
 constexpr double kPlaceStripe = 0.02, kProfileStripe = 0.02, kProfileReach = 1.4;  // of R
+constexpr double kRim = 0.05;  // of the field of view
 constexpr double kVariationWithin = 0.9, kCirclesWithin = 0.97, kSpacingWithin = 0.95;
 constexpr std::array<double, 2> kThirds{0.3, 0.7};  // of R
 /// Cells of the counts, in squares of so many.
@@ -42,7 +43,7 @@ constexpr std::int32_t kRadiusPixels = 9;
 constexpr std::int32_t kTilePixels = 64;
 constexpr std::int32_t kBlockPixels = 1024, kHaloPixels = 16 * kRadiusPixels;
 
-std::int32_t cell_of(double value, double cell) {
+std::int32_t cell_number(double value, double cell) {
   return static_cast<std::int32_t>(std::floor(value / cell));
 }
 
@@ -182,7 +183,7 @@ void for_each_square(const Stretch& stretch, double edge, Visit visit) {
     low = std::min(low, corners[k][1]);
     high = std::max(high, corners[k][1]);
   }
-  for (std::int32_t row = cell_of(low, edge); row <= cell_of(high, edge); ++row) {
+  for (std::int32_t row = cell_number(low, edge); row <= cell_number(high, edge); ++row) {
     const double y = (row + 0.5) * edge;
     double left = std::numeric_limits<double>::infinity(), right = -left;
     for (std::size_t k = 0; k < 4; ++k) {
@@ -451,8 +452,11 @@ class PointDistribution::Work {
     ++points_;
     z_sum_ += z - first_z_;
     across_.add(line_.place_across(x, y));
-    const std::int32_t column = cell_of(x, options_.density_cell);
-    const std::int32_t row = cell_of(y, options_.density_cell);
+    const double along = line_.place_along(x, y);
+    nearest_ = std::min(nearest_, along);
+    farthest_ = std::max(farthest_, along);
+    const std::int32_t column = cell_number(x, options_.density_cell);
+    const std::int32_t row = cell_number(y, options_.density_cell);
     ++opened_cell(cells_, column, row, options_.density_cell);
     GroundCell& ground = opened_cell(ground_, column, row, options_.density_cell);
     ++ground.points;
@@ -460,13 +464,13 @@ class PointDistribution::Work {
       ground.last_strip = current_;
       if (ground.strips < 255) ++ground.strips;
     }
-    const std::int32_t i = cell_of(x, pixel_), j = cell_of(y, pixel_);
+    const std::int32_t i = cell_number(x, pixel_), j = cell_number(y, pixel_);
     PixelTile* tile =
         pixels_.open(divided(i, kTilePixels), divided(j, kTilePixels), most_pixel_tiles_);
     if (tile != nullptr) {
       mark(*tile, i, j);
     } else if (!(known_until_ < std::numeric_limits<double>::infinity())) {
-      known_until_ = line_.place_along(x, y);
+      known_until_ = along;
     }
   }
 
@@ -477,12 +481,13 @@ class PointDistribution::Work {
     own.strip = current_;
     own.name = line.name;
     own.points = points_;
-    own.length = line_.last;
     own.height = line.height - (first_z_ + z_sum_ / static_cast<double>(points_));
     own.density = own.spacing = own.middle_density = own.dense_width = own.cell_variation =
         own.cells_covered = own.spacing_cells_covered = own.empty_share = kNoNumber;
     own.place_density.fill(kNoNumber);
     own.largest_empty.fill(kNoNumber);
+    if (own.height > 0) keep_to_points(own.height);
+    own.length = line_.last - line_.first;
     if (own.height > 0) fill(own);
     done_.push_back(std::move(own));
     last_done_ = current_;
@@ -492,7 +497,19 @@ class PointDistribution::Work {
     across_ = {};
     cells_.clear();
     pixels_.clear();
-    known_until_ = std::numeric_limits<double>::infinity();
+    known_until_ = nearest_ = std::numeric_limits<double>::infinity();
+    farthest_ = -nearest_;
+  }
+
+  /// A recording may begin or end within a strip: where the first and the last field of view were.
+  void keep_to_points(double height) {
+    const double first = std::max(line_.first, nearest_ + height * reach_.behind);
+    const double last = std::min(line_.last, farthest_ - height * reach_.ahead);
+    if (!(last > first)) return;  // the field of view was never seen in full
+    // Its rim is seen seldom: less than that says nothing.
+    const double rim = kRim * height * (reach_.ahead + reach_.behind);
+    if (first > line_.first + rim) line_.first = first;
+    if (last < line_.last - rim) line_.last = last;
   }
 
   void fill(StripDistribution& own) {
@@ -505,7 +522,7 @@ class PointDistribution::Work {
       opened_cell(ground_, column, row, options_.density_cell).in_swath = 1;
     });
     Stretch whole = swath;
-    whole.first = own.height * reach_.ahead;
+    whole.first += own.height * reach_.ahead;
     whole.last -= own.height * reach_.behind;
     own.whole_ground = whole.area();
     if (!(own.whole_ground > 0)) return;
@@ -576,10 +593,10 @@ class PointDistribution::Work {
     const std::size_t all = std::numeric_limits<std::size_t>::max();
     pixels_.for_each([&](std::int32_t i, std::int32_t j, const PixelTile& tile) {
       for (std::int32_t y = 0; y < kTilePixels; ++y) {
-        const std::int32_t row = cell_of((j * kTilePixels + y + 0.5) * pixel_, edge);
+        const std::int32_t row = cell_number((j * kTilePixels + y + 0.5) * pixel_, edge);
         for (std::uint64_t bits = tile[static_cast<std::size_t>(y)]; bits != 0; bits &= bits - 1) {
           const std::int32_t column =
-              cell_of((i * kTilePixels + std::countr_zero(bits) + 0.5) * pixel_, edge);
+              cell_number((i * kTilePixels + std::countr_zero(bits) + 0.5) * pixel_, edge);
           mark(*seen.open(divided(column, kTilePixels), divided(row, kTilePixels), all), column,
                row);
         }
@@ -723,6 +740,8 @@ class PointDistribution::Work {
   Stretch line_;
   std::uint64_t points_ = 0;
   double first_z_ = 0, z_sum_ = 0;
+  /// Of its points along the line, m.
+  double nearest_ = std::numeric_limits<double>::infinity(), farthest_ = -nearest_;
   AcrossHistogram across_;
   TileMap<CellTile<std::uint32_t>> cells_;
   TileMap<PixelTile> pixels_;

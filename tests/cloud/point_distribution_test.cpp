@@ -310,8 +310,9 @@ TEST(PointDistribution, CountsWhatSeveralStripsSee) {
   distribution.add(points.x, points.y, points.z, points.strip);
   const auto summary = distribution.summary();
   EXPECT_EQ(summary.other_points, 1U);
-  EXPECT_NEAR(summary.area, 2 * 20 * 40, 40);  // swaths beside each other
-  EXPECT_NEAR(summary.overlap, 0.5, 0.02);     // swaths from -10 to 30, both from 0 to 20
+  // Swaths beside each other; points reach as far as the strips, so that only the middle was flown.
+  EXPECT_NEAR(summary.area, 2 * 20 * 20, 40);
+  EXPECT_NEAR(summary.overlap, 0.5, 0.02);  // swaths from -10 to 30, both from 0 to 20
   EXPECT_NEAR(summary.covered, 1, 0.01);
   EXPECT_NEAR(summary.density, 200 * 1.5, 200 * 0.03);
   int most = 0;
@@ -339,10 +340,33 @@ TEST(PointDistribution, SaysNothingOfGroundThatNoStripHasSeenInFull) {
   EXPECT_TRUE(std::isnan(below.summary().strips.at(0).density));
 }
 
+TEST(PointDistribution, CountsOnlyTheWayThatThereArePointsOf) {
+  // The recording ends in the middle of a strip of 80 m.
+  Scattered points;
+  points.add(40, 60, 1, 4);
+  StripLine line = line_at(0);
+  line.begin[1] = -40;
+  line.end[1] = 40;
+  const auto run = [&](double until) {
+    PointDistribution distribution({line}, kReach);
+    for (std::size_t i = 0; i < points.x.size(); ++i) {
+      if (points.y[i] > until) continue;
+      distribution.add(std::span(points.x).subspan(i, 1), std::span(points.y).subspan(i, 1),
+                       std::span(points.z).subspan(i, 1), std::span(points.strip).subspan(i, 1));
+    }
+    return distribution.summary().strips.at(0);
+  };
+  EXPECT_NEAR(run(60).length, 80, 1e-9);
+  const StripDistribution half = run(10);  // the sensor came to 0
+  EXPECT_NEAR(half.length, 40, 0.1);
+  EXPECT_NEAR(half.whole_ground, 20 * 20, 3);
+  EXPECT_NEAR(half.cells_covered, 1, 0.01);
+}
+
 TEST(PointDistribution, LooksForCirclesOnAsMuchGroundAsItMay) {
   // Points in the order of a flight: to the north.
   Scattered points;
-  points.add(100, 60, 1, 3);
+  points.add(100, 71, 1, 3);
   std::vector<std::size_t> order(points.x.size());
   for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
   std::sort(order.begin(), order.end(),

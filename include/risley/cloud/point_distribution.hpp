@@ -61,7 +61,7 @@ struct StripDistribution {
   std::uint16_t strip = 0;  ///< number, from 1
   std::string name;
   std::uint64_t points = 0;
-  double length = 0;   ///< flown, m
+  double length = 0;   ///< of the way that there are points of, m
   double height = 0;   ///< of the sensor above the points' mean, m
   double width = 0;    ///< of the swath, 2 R, m
   double density = 0;  ///< nominal: points within the swath per its area, 1/m^2
