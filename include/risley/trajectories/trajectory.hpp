@@ -28,6 +28,9 @@ enum class TimeScale : std::uint8_t {
 /// "gps-second-of-week"
 std::string to_string(TimeScale scale);
 
+/// "GPS second of week", for messages
+std::string words_of(TimeScale scale);
+
 /// What positions and attitudes refer to.
 enum class Frame : std::uint8_t {
   geocentric,  ///< Earth-centred, Earth-fixed, WGS84-like ellipsoid (geodesy.hpp)
