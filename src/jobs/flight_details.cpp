@@ -154,6 +154,7 @@ std::vector<double> roughness_of(const ShotPoints& points, const GroundCells& ce
         std::abs(cells.planes[plane].normal.dot(point - cells.planes[plane].centre)));
   }
   std::vector<double> roughness;
+  roughness.reserve(distances.size());
   for (auto& own : distances) roughness.push_back(kSigmaOfMedian * median_of(own));
   return roughness;
 }

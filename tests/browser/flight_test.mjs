@@ -38,7 +38,7 @@ inspect('flight', async () => {
                '--mount', 'mount.yaml', ...errors, '--truth', 'strips.lvx.truth.yaml',
                '-o', 'calibrate');
   return file;
-}, /strips lie on each other/);
+}, /lie [0-9.]+ mm apart before and [0-9]\.[0-9] mm after/);
 
 let browser, page;
 
