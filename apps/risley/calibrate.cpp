@@ -130,35 +130,31 @@ jobs::CalibrateRecordingsOptions job_of(const CalibrateCommandOptions& options,
   return job;
 }
 
-/// What stands in the way of using a result, said once for walls and flights.
-void say_verdict(const calibration::CalibrationVerdict& verdict, bool converged,
-                 const std::string& reason, const CalibrateCommandOptions& options) {
-  if (!converged) spdlog::error("not converged: {}", reason);
-  if (!converged || options.force || options.folder.empty()) return;
-  const bool worse = verdict.code == calibration::CalibrationCode::not_better;
-  if (worse || verdict.code == calibration::CalibrationCode::undecided) {
-    spdlog::warn("calibration.yaml was not written, because {}: --force writes it",
-                 worse ? "it is not better" : "it is not to be trusted");
-  }
-}
-
-ExitStatus run_calibration(const CalibrateCommandOptions& options, const CommonOptions& common) {
+/// Runs a calibration, on walls or in flight, and says what came of it.
+template <class Calibrate, class JsonOf, class Print>
+ExitStatus run_job(const CalibrateCommandOptions& options, const CommonOptions& common,
+                   const Calibrate& calibrate, const JsonOf& json_of, const Print& print) {
   const double started = now();
-  CalibratedRecordings outcome;
-  {
+  auto outcome = [&] {
     ProgressBar bar("calibrating", common);
-    outcome = jobs::calibrate_recordings(job_of(options, common), bar.progress());
-  }
-  calibration::Calibration& c = outcome.calibration;
+    return calibrate(bar.progress());
+  }();
+  auto& c = outcome.calibration;
   c.reason = with_flags(c.reason);
   put_flags(outcome.warnings);
   for (const std::string& warning : outcome.warnings) spdlog::warn(warning);
   for (const std::string& warning : c.warnings) spdlog::warn(warning);
-  say_verdict(c.verdict, c.converged, c.reason, options);
+  if (!c.converged) spdlog::error("not converged: {}", c.reason);
+  const bool worse = c.verdict.code == calibration::CalibrationCode::not_better;
+  const bool doubtful = c.verdict.code == calibration::CalibrationCode::undecided;
+  if (c.converged && (worse || doubtful) && !options.force && !options.folder.empty()) {
+    spdlog::warn("calibration.yaml was not written, because {}: --force writes it",
+                 worse ? "it is not better" : "it is not to be trusted");
+  }
   if (common.json) {
-    print_json(common, calibration_json(outcome, now() - started), outcome.provenance);
+    print_json(common, json_of(outcome, now() - started), outcome.provenance);
   } else {
-    print_calibration(outcome);
+    print(outcome);
   }
   return c.converged ? kDone : kNumbersFailed;
 }
@@ -175,27 +171,6 @@ jobs::CalibrateFlightOptions flight_job_of(const CalibrateCommandOptions& option
     return report_texts(report::flight_report(outcome));
   };
   return job;
-}
-
-ExitStatus run_flight(const CalibrateCommandOptions& options, const CommonOptions& common) {
-  const double started = now();
-  jobs::CalibratedFlight outcome;
-  {
-    ProgressBar bar("calibrating", common);
-    outcome = jobs::calibrate_flight(flight_job_of(options, common), bar.progress());
-  }
-  calibration::FlightCalibration& c = outcome.calibration;
-  c.reason = with_flags(c.reason);
-  put_flags(outcome.warnings);
-  for (const std::string& warning : outcome.warnings) spdlog::warn(warning);
-  for (const std::string& warning : c.warnings) spdlog::warn(warning);
-  say_verdict(c.verdict, c.converged, c.reason, options);
-  if (common.json) {
-    print_json(common, flight_json(outcome, now() - started), outcome.provenance);
-  } else {
-    print_flight(outcome);
-  }
-  return c.converged ? kDone : kNumbersFailed;
 }
 
 ExitStatus run_plan(const CalibrateCommandOptions& options, const CommonOptions& common) {
@@ -332,8 +307,20 @@ Run declare_calibrate(CLI::App& verb) {
       throw InvalidArgument("--knot-spacing-s and --cell-size-m go with --trajectory or --plan");
     }
     if (options->inputs.empty()) throw InvalidArgument("INPUT is missing: a recording, or --plan");
-    if (moves(options->platform)) return run_flight(*options, common);
-    return run_calibration(*options, common);
+    if (moves(options->platform)) {
+      return run_job(
+          *options, common,
+          [&](const Progress& progress) {
+            return jobs::calibrate_flight(flight_job_of(*options, common), progress);
+          },
+          flight_json, print_flight);
+    }
+    return run_job(
+        *options, common,
+        [&](const Progress& progress) {
+          return jobs::calibrate_recordings(job_of(*options, common), progress);
+        },
+        calibration_json, print_calibration);
   };
 }
 
