@@ -56,7 +56,7 @@ _risley() {
   if [[ $current == -* ]]; then
     case $verb in
       "") choices="--help --version" ;;
-      info) choices="$common --shot-rate-hz --extrinsics --share --share-ranges --accuracy" ;;
+      info) choices="$common --shot-rate-hz --extrinsics --share --share-ranges --accuracy --trajectory-topic" ;;
       identify) choices="$common --output --force --most-prisms --fastest-hz --shot-rate-hz --extrinsics" ;;
       pattern)
         choices="$common --output --format --sensor --duration-s --rate-hz --every --firing
@@ -68,7 +68,7 @@ _risley() {
           *" new "*) choices="$common --output --from" ;;
         esac ;;
       report) choices="$common --output" ;;
-      convert) choices="$common --output --format --sensor-type --accuracy --shot-rate-hz --extrinsics" ;;
+      convert) choices="$common --output --format --sensor-type --accuracy --trajectory-topic --shot-rate-hz --extrinsics" ;;
       simulate)
         choices="$common --output --sensor --duration-s --rate-hz --noise-angle-deg
           --noise-range-m --quantize --beam-origin --rotor --set --reported --scene --station
@@ -84,12 +84,11 @@ _risley() {
         choices="$common --output --method --planes --stations --station --plan --duration-s
           --rate-hz --noise-angle-deg --noise-range-m --sensor --fix --free --prior-sigma-deg
           --range-offset-sigma-m --beam-origin --states --mirror --force --truth --trajectory
-          --mount --accuracy --trajectory-errors --knot-spacing-s --cell-size-m --scene
-          --empty-circle-m --report --shot-rate-hz
-          --extrinsics" ;;
+          --trajectory-topic --mount --accuracy --trajectory-errors --knot-spacing-s --cell-size-m --scene
+          --empty-circle-m --report --shot-rate-hz --extrinsics" ;;
       cloud)
         choices="$common --output --calibration --format --directions --beam-origin --covariance
-          --beam-divergence --common-factors --trajectory --mount --accuracy --trajectory-errors --crs
+          --beam-divergence --common-factors --trajectory --trajectory-topic --mount --accuracy --trajectory-errors --crs
           --datum --distribution --rate-hz --noise-angle-deg --las-scale-m --time --beam-origin-map --shot-rate-hz --extrinsics" ;;
       reproduce) choices="$common --output --full --recording --shot-rate-hz --extrinsics" ;;
     esac

@@ -134,9 +134,11 @@ jobs::CalibrateRecordingsOptions job_of(const CalibrateCommandOptions& options,
 void say_verdict(const calibration::CalibrationVerdict& verdict, bool converged,
                  const std::string& reason, const CalibrateCommandOptions& options) {
   if (!converged) spdlog::error("not converged: {}", reason);
-  if (verdict.code == calibration::CalibrationCode::not_better && !options.force &&
-      !options.folder.empty()) {
-    spdlog::warn("calibration.yaml was not written, because it is not better: --force writes it");
+  if (!converged || options.force || options.folder.empty()) return;
+  const bool worse = verdict.code == calibration::CalibrationCode::not_better;
+  if (worse || verdict.code == calibration::CalibrationCode::undecided) {
+    spdlog::warn("calibration.yaml was not written, because {}: --force writes it",
+                 worse ? "it is not better" : "it is not to be trusted");
   }
 }
 

@@ -26,7 +26,7 @@ namespace {
 
 struct ConvertOptions {
   std::vector<std::string> inputs;
-  std::string output, format, sensor_type, accuracy;
+  std::string output, format, sensor_type, accuracy, topic;
   ReadingWishes reading;
 };
 
@@ -74,8 +74,8 @@ FileOutcome convert_poses(const FileJob& job, const ConvertOptions& options,
         fmt::format("--sensor-type is for recordings, and {} is a trajectory", job.input));
   }
   require_no_reading_options(options.reading, "trajectories");
-  const jobs::ConvertedTrajectory done =
-      jobs::convert_trajectory({job.input, job.output, options.format, options.accuracy}, progress);
+  const jobs::ConvertedTrajectory done = jobs::convert_trajectory(
+      {job.input, job.output, options.format, options.accuracy, options.topic}, progress);
   log_warnings(job.input, done.warnings);
   for (const std::string& words : done.left_out) spdlog::warn("{}: {}", job.output, words);
   const Json json = {{"records", done.records},
@@ -88,7 +88,8 @@ FileOutcome convert_poses(const FileJob& job, const ConvertOptions& options,
 }
 
 FileOutcome convert(const FileJob& job, const ConvertOptions& options, const Progress& progress) {
-  if (trajectories::trajectory_file_kind(job.input) != trajectories::TrajectoryFileKind::none) {
+  if (!options.topic.empty() ||
+      trajectories::trajectory_file_kind(job.input) != trajectories::TrajectoryFileKind::none) {
     return convert_poses(job, options, progress);
   }
   if (!options.accuracy.empty()) {
@@ -147,6 +148,9 @@ Run declare_convert(CLI::App& verb) {
   verb.add_option("--accuracy", options->accuracy,
                   "Accuracies (SMRMSG) that the records of a trajectory get")
       ->type_name("FILE");
+  verb.add_option("--trajectory-topic", options->topic,
+                  "Convert the poses of this topic of a ROS bag, a trajectory")
+      ->type_name("NAME");
   add_reading_options(verb, options->reading);
   return [options](const CommonOptions& common) {
     const bool folder = output_is_folder(options->inputs, options->output);

@@ -32,7 +32,7 @@ using recordings::TimeAuditResult;
 using recordings::ValueRange;
 
 struct InfoCommandOptions {
-  std::string input, share, accuracy;
+  std::string input, share, accuracy, topic;
   bool share_ranges = false;
   ReadingWishes reading;
 };
@@ -219,7 +219,8 @@ ExitStatus run_trajectory_info(const InfoCommandOptions& options, const CommonOp
   jobs::InspectedTrajectory found;
   {
     ProgressBar bar("reading", common);
-    found = jobs::inspect_trajectory({options.input, options.accuracy}, bar.progress());
+    found =
+        jobs::inspect_trajectory({options.input, options.accuracy, options.topic}, bar.progress());
   }
   log_warnings(options.input, found.warnings);
   if (common.json) {
@@ -235,6 +236,7 @@ ExitStatus run_info(const InfoCommandOptions& options, const CommonOptions& comm
     throw InvalidArgument("--share-ranges needs --share: it says what an excerpt holds");
   }
   const bool is_trajectory =
+      !options.topic.empty() ||
       trajectories::trajectory_file_kind(options.input) != trajectories::TrajectoryFileKind::none;
   if (is_trajectory) return run_trajectory_info(options, common);
   if (!options.accuracy.empty()) {
@@ -279,6 +281,9 @@ Run declare_info(CLI::App& verb) {
       ->required();
   verb.add_option("--accuracy", options->accuracy, "Accuracies of a trajectory (SMRMSG)")
       ->type_name("FILE");
+  verb.add_option("--trajectory-topic", options->topic,
+                  "Look at the poses of this topic of a ROS bag, a trajectory")
+      ->type_name("NAME");
   verb.add_option("--share", options->share,
                   "Write a small anonymous excerpt that can be sent to the developers (.nc): at "
                   "most a second of the best-covered part, without serial numbers, date, "

@@ -13,16 +13,22 @@ struct OptionName {
 };
 
 constexpr OptionName kNames[] = {
+    {"accuracy", "--accuracy"},
     {"additional", "--free"},
     {"angle_noise", "--noise-angle-deg"},
+    {"cell_size", "--cell-size-m"},
     {"common_factors", "--common-factors"},
     {"covariance", "--covariance"},
+    {"crs", "--crs"},
+    {"datum", "--datum"},
     {"duration", "--duration-s"},
     {"extrinsics", "--extrinsics"},
     {"fixed", "--fix"},
+    {"knot_spacing", "--knot-spacing-s"},
     {"las_scale", "--las-scale-m"},
     {"method", "--method"},
     {"mirrored", "--mirror"},
+    {"mount", "--mount"},
     {"planes", "--planes"},
     {"prior_sigma", "--prior-sigma-deg"},
     {"range_noise", "--noise-range-m"},
@@ -35,6 +41,9 @@ constexpr OptionName kNames[] = {
     {"shot_rate", "--shot-rate-hz"},
     {"states", "--states"},
     {"stations", "--stations"},
+    {"trajectory", "--trajectory"},
+    {"trajectory_errors", "--trajectory-errors"},
+    {"trajectory_topic", "--trajectory-topic"},
     {"truth", "--truth"},
 };
 

@@ -6,7 +6,11 @@ namespace risley::app {
 
 void add_platform_options(CLI::App& verb, jobs::PlatformFiles& files) {
   verb.add_option("--trajectory", files.trajectory,
-                  "Trajectory of a sensor that moved: SBET, Inertial Explorer or POSPac text, CSV");
+                  "Trajectory of a sensor that moved: SBET, Inertial Explorer or POSPac text, CSV, "
+                  "poses of a ROS bag");
+  verb.add_option("--trajectory-topic", files.topic,
+                  "Topic of its poses, of a ROS bag that has several")
+      ->type_name("NAME");
   verb.add_option("--mount", files.mount,
                   "How the sensor sits on the moving platform (YAML): axes, lever arm, boresight, "
                   "clock");

@@ -31,7 +31,7 @@ namespace {
 
 struct SimulateOptions {
   std::string output, sensor = "mid-40", quantize = "yes", beam_origin = "yes", rotor = "constant",
-                      scene, station, trajectory, flight, mount, trajectory_errors,
+                      scene, station, trajectory, topic, flight, mount, trajectory_errors,
                       trajectory_format = "csv";
   std::optional<double> duration_s, start_s, clock_drift_ppm, rate_hz, noise_angle_deg,
       noise_range_m;
@@ -83,7 +83,7 @@ std::optional<simulation::Platform> platform_from(const SimulateOptions& options
     if (!terrain || !terrain->parts().origin) platform.map_origin = plan.origin;
   } else {
     platform.trajectory = std::make_shared<trajectories::Trajectory>(
-        trajectories::load_trajectory(options.trajectory));
+        trajectories::load_trajectory(options.trajectory, {}, options.topic));
   }
   platform.mount = trajectories::load_mount(options.mount);
   platform.clock_drift = 1e-6 * options.clock_drift_ppm.value_or(0.0);
@@ -253,6 +253,10 @@ Run declare_simulate(CLI::App& verb) {
   verb.add_option("--station", o.station, "Station of the scene to stand on");
   auto* trajectory =
       verb.add_option("--trajectory", o.trajectory, "True trajectory along which the sensor moves");
+  verb.add_option("--trajectory-topic", o.topic,
+                  "Topic of its poses, of a ROS bag that has several")
+      ->type_name("NAME")
+      ->needs(trajectory);
   verb.add_option("--flight", o.flight, "Flight plan (YAML) that makes the true trajectory")
       ->excludes(trajectory);
   verb.add_option("--mount", o.mount, "True mount of the moving sensor (YAML)");

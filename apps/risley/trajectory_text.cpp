@@ -97,6 +97,7 @@ Json poses_json(const Trajectory& trajectory, const TrajectoryAudit& audit) {
   times_json(audit.times, object);
   const auto& velocity = trajectory.velocity_frame;
   object["time_scale"] = to_string(trajectory.time_scale);
+  object["source"] = trajectory.source;
   object["gps_week"] = trajectory.gps_week ? Json(*trajectory.gps_week) : Json();
   object["week_crossings"] = trajectory.week_crossings;
   object["records_out_of_order"] = trajectory.time_order.moved;
@@ -128,6 +129,7 @@ Json poses_json(const Trajectory& trajectory, const TrajectoryAudit& audit) {
 
 void print_poses(const Trajectory& trajectory, const TrajectoryAudit& audit, Table& table) {
   table.add({"format", trajectory.format});
+  if (!trajectory.source.empty()) table.add({"source", trajectory.source});
   add_times(audit.times, table);
   std::string times = to_string(trajectory.time_scale);
   if (trajectory.gps_week) times += fmt::format(", GPS week {}", *trajectory.gps_week);

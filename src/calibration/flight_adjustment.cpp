@@ -118,12 +118,12 @@ void require_priors(const FlightPriors& priors, const FlightModel& model) {
 }  // namespace
 
 VectorXd unknown_values(const FlightModel& model) {
-  VectorXd values(model.unknowns().size());
+  VectorXd values = VectorXd::Zero(model.unknowns().size());
   values.head<3>() = rotation_vector_of(model.boresight);
   values.segment<3>(FlightUnknowns::lever_arm(0)) = model.lever_arm;
   values[FlightUnknowns::range_offset()] = model.range_offset;
   values[FlightUnknowns::clock_offset()] = model.clock_offset;
-  values.tail(static_cast<Index>(model.free.size())) =
+  values.segment(FlightUnknowns::parameter(0), static_cast<Index>(model.free.size())) =
       estimation::free_values(model.train, model.free);
   return values;
 }

@@ -15,6 +15,7 @@
 #include "risley/core/random.hpp"
 #include "risley/core/require.hpp"
 #include "risley/optics/batch.hpp"
+#include "risley/trajectories/clock.hpp"
 
 #include "calibration/flight_start.hpp"
 #include "calibration/judge_flight.hpp"
@@ -39,6 +40,8 @@ constexpr double kPoseMargin = 5;       // sigmas of the clock offset
 /// Done when a step promises less, in squared sigmas of all unknowns together: shots that come and
 /// go at the gate move the answer by about as much.
 constexpr double kSettled = 0.1;
+/// A drift of the clock counts from so many sigmas on; known before to no better than this, s/s.
+constexpr double kDriftSigmas = 5, kDriftPrior = 1e-3;
 
 /// What of the globals a round adjusts.
 enum class Unlocked : std::uint8_t { boresight, prisms, range_and_clock, all };
@@ -127,12 +130,10 @@ class FlightWork {
         rows_with_pose(shots, interpolation_, options_.mount.clock_offset.value, margin);
     result_.without_pose = shots.size() - rows.size();
     if (rows.empty()) {
-      throw EstimationError(fmt::format(
-          "no shot has a pose: the shots are at {:.3f} to {:.3f} s of the trajectory's time, the "
-          "trajectory is of {:.3f} to {:.3f} s",
-          flight_seconds(shots.time_ns.front()) + options_.mount.clock_offset.value,
-          flight_seconds(shots.time_ns.back()) + options_.mount.clock_offset.value,
-          flight_seconds(local_.time_ns.front()), flight_seconds(local_.time_ns.back())));
+      const std::int64_t clock_ns = std::llround(options_.mount.clock_offset.value * 1e9);
+      throw EstimationError(
+          trajectories::no_overlap_words(local_, saturating_sum(shots.time_ns.front(), clock_ns),
+                                         saturating_sum(shots.time_ns.back(), clock_ns)));
     }
     full_.shots = rows.size() == shots.size() ? shots : rows_of(shots, rows);
     if (full_.shots.strip.front() == full_.shots.strip.back()) {
@@ -330,6 +331,7 @@ class FlightWork {
 
   void fill_result();
   void fill_mount_and_sensor();
+  void test_clock_drift();
   void fill_trajectory();
 
   const FlightCalibrationOptions& options_;
@@ -388,6 +390,7 @@ void FlightWork::fill_result() {
       judge_flight({full_.shots, full_.poses, full_.cells.plane, model_, final_weights_, priors_,
                     start_.prior_sigma, start_.considered, system, options_.seed});
   fill_mount_and_sensor();
+  test_clock_drift();
   fill_trajectory();
   result_.tangent = tangent_;
   result_.converged = last_.converged && result_.reason.empty();
@@ -445,6 +448,39 @@ void FlightWork::fill_mount_and_sensor() {
           result_.covariance(kept[static_cast<std::size_t>(i)], kept[static_cast<std::size_t>(j)]);
     }
   }
+}
+
+/// What one more step would do if the clock could drift, and how well that is known.
+void FlightWork::test_clock_drift() {
+  const std::vector<std::int64_t>& times = full_.shots.time_ns;
+  FlightModel drifting = model_;
+  drifting.drift_about_ns = times.front() + (times.back() - times.front()) / 2;
+  const Index drift = drifting.unknowns().clock_drift();
+  FlightPriors priors = priors_;
+  priors.mean.conservativeResizeLike(VectorXd::Zero(drift + 1));
+  priors.information.conservativeResizeLike(MatrixXd::Zero(drift + 1, drift + 1));
+  priors.information(drift, drift) = 1 / (kDriftPrior * kDriftPrior);
+  priors.held.push_back(false);
+  const FlightSystem system(
+      flight_equations(full_.shots, full_.poses, full_.cells.plane, drifting, final_weights_),
+      drifting, priors);
+  MatrixXd functional = MatrixXd::Zero(system.size(), 1);
+  functional(system.size() - 1, 0) = 1;
+  ClockDrift& found = result_.clock_drift;
+  found.value = system.step().unknowns[system.size() - 1];
+  found.sigma = std::sqrt(flight_covariance(full_.shots, full_.poses, full_.cells.plane, drifting,
+                                            final_weights_, priors, system, functional)(0, 0));
+  found.seconds = flight_seconds(times.back() - times.front());
+  found.significant = std::abs(found.value) > kDriftSigmas * found.sigma;
+  if (!found.significant) return;
+  result_.warnings.push_back(fmt::format(
+      "the clocks of sensor and trajectory drift apart: the trajectory's gains {:.2g} +- {:.1g} "
+      "ppm "
+      "on the recording's, {:.2g} ms over the {:.0f} s between the first shot and the last; an "
+      "offset of the clock cannot hold that, and what was found is off by more than its sigmas. "
+      "Set "
+      "the sensor's clock by PPS or PTP, or calibrate shorter parts of the flight",
+      1e6 * found.value, 1e6 * found.sigma, 1e3 * found.value * found.seconds, found.seconds));
 }
 
 void FlightWork::fill_trajectory() {

@@ -211,6 +211,7 @@ class FlightCalls {
     a.places = places_.data();
     a.place_begin = place_begin_.data();
     a.free_count = static_cast<int>(model.free.size());
+    a.drift = model.drift_about_ns.has_value();
     const Eigen::Matrix3d mount = model.nominal * model.boresight;
     for (Index i = 0; i < 9; ++i) a.body_from_sensor[i] = mount(i / 3, i % 3);
     copy(model.lever_arm, a.lever_arm);
@@ -242,6 +243,7 @@ class FlightCalls {
     const auto length_ns = static_cast<double>(interval.end_ns - interval.begin_ns);
     a.begin_ns = interval.begin_ns;
     a.per_ns = 1 / length_ns;
+    if (a.drift) a.since = 1e-9 * static_cast<double>(interval.begin_ns - *model_.drift_about_ns);
     const double part = static_cast<double>(piece.end - piece.begin) /
                         static_cast<double>(interval.end_shot - interval.first_shot);
     const double samples = std::max(1.0, length_ns * 1e-9 * part / weights_.sample_interval);
@@ -290,6 +292,7 @@ std::vector<std::string> unknown_names(const FlightModel& model) {
                                  "lever_arm_x_m",   "lever_arm_y_m",   "lever_arm_z_m",
                                  "range_offset_m",  "clock_offset_s"};
   for (const estimation::FreeParameter& parameter : model.free) names.push_back(parameter.name);
+  if (model.drift_about_ns) names.emplace_back("clock_drift");
   return names;
 }
 

@@ -108,7 +108,7 @@ struct FlightConstants {
         position_change(broadcast(a.corrections[1]) - position_before),
         turn_before(broadcast(a.corrections[0] + 3)),
         turn_change(broadcast(a.corrections[1] + 3) - turn_before),
-        main(static_cast<std::size_t>(kMountColumns + a.free_count) + 2 * kKnot + 1) {
+        main(static_cast<std::size_t>(a.global_count()) + 2 * kKnot + 1) {
     std::array<Batch, parameter_count(N)> parameters;
     for (std::size_t i = 0; i < parameter_count(N); ++i) parameters[i] = Batch(a.parameters[i]);
     std::array<FaceOrder, N> order;
@@ -122,7 +122,7 @@ struct FlightConstants {
 
 template <int N>
 constexpr std::size_t most_columns() {
-  return kMountColumns + EmitterLanes<Batch, N>::kPlaces + 2 * kKnot + 1;
+  return kMountColumns + EmitterLanes<Batch, N>::kPlaces + 1 + 2 * kKnot + 1;
 }
 
 /// Lane by lane, [shots][columns].
@@ -239,8 +239,7 @@ FlightCounts fill_flight_row(const FlightArguments& a, FlightConstants<N>& c,
   };
   Batch storage[EmitterLanes<Batch, N>::kPlaces];
   const Batch* by_place = c.emitters.by_place(gradient, storage);
-  RowWriter out(rows_out,
-                static_cast<std::size_t>(kMountColumns + a.free_count) + kKnot + kPlaneColumns + 3,
+  RowWriter out(rows_out, static_cast<std::size_t>(a.global_count()) + kKnot + kPlaneColumns + 3,
                 count);
   Batch* column = row;
   const auto put_vector = [&](const Vector& value) {
@@ -262,6 +261,11 @@ FlightCounts fill_flight_row(const FlightArguments& a, FlightConstants<N>& c,
     }
     put(column, sum);
     out.add(sum);
+  }
+  if (a.drift) {
+    const Batch by_drift = by_clock * (shot.knot_weight * Batch(1e-9 / a.per_ns) + Batch(a.since));
+    put(column, by_drift);
+    out.add(by_drift);
   }
   out.add(by_point);
   out.add(by_turn);
@@ -367,7 +371,7 @@ FlightCounts accumulate_runs(const FlightArguments& a) {
   FlightConstants<N> constants(a);
   FlightSums<N> sums(constants.main);
   const std::size_t row_columns =
-      static_cast<std::size_t>(kMountColumns + a.free_count) + kKnot + kPlaneColumns + 3;
+      static_cast<std::size_t>(a.global_count()) + kKnot + kPlaneColumns + 3;
   FlightCounts counts;
   std::size_t group = 0;
   double* rows = a.rows;

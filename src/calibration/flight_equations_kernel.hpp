@@ -37,6 +37,8 @@ struct FlightArguments {
   const int* places = nullptr;
   const int* place_begin = nullptr;
   int free_count = 0;
+  bool drift = false;               ///< one more column behind those: the drift of the clock
+  double since = 0;                 ///< begin_ns after the time about which the clock drifts, s
   double body_from_sensor[9] = {};  ///< row by row
   double lever_arm[3] = {};
   double range_offset = 0;
@@ -59,12 +61,16 @@ struct FlightArguments {
   const FlightRun* runs = nullptr;
   std::size_t run_count = 0;
 
-  /// Products of the columns [mount, train, first knot 6, second knot 6, residual]: upper triangle.
+  /// Columns of the unknowns that the whole flight shares.
+  int global_count() const { return kMountColumns + free_count + (drift ? 1 : 0); }
+
+  /// Products of the columns [mount, train, drift, first knot 6, second knot 6, residual]: upper
+  /// triangle.
   double* products = nullptr;
   /// [runs][3][columns of products + 3]: of the plane's columns with those and with its own.
   double* plane_products = nullptr;
-  /// [shots of the runs][mount, train, knot 6, plane 3, residual, variance, weight], not weighted,
-  /// or nullptr. The variance is the shot's own, without that of the attitude.
+  /// [shots of the runs][mount, train, drift, knot 6, plane 3, residual, variance, weight], not
+  /// weighted, or nullptr. The variance is the shot's own, without that of the attitude.
   double* rows = nullptr;
 };
 

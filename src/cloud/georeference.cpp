@@ -11,6 +11,7 @@
 #include <Eigen/LU>
 #include <fmt/format.h>
 
+#include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
 #include "risley/core/require.hpp"
 #include "risley/trajectories/clock.hpp"
@@ -116,6 +117,36 @@ Matrix3d variances(double a, double b, double c) {
   return Vector3d(a * a, b * b, c * c).asDiagonal();
 }
 
+/// Says when a trajectory leaves the area that a map is meant for; empty when it does not.
+/// @throws InvalidArgument far away from it, where a map is of no use
+std::string far_from_map(const MapProjection& map, const trajectories::Trajectory& trajectory) {
+  constexpr std::size_t kPlaces = 100;
+  constexpr double kFarAway = 6 * kRadiansPerDegree;  // the width of a zone of UTM
+  if (!map.area()) return {};
+  double farthest = 0;
+  trajectories::Geodetic where;
+  for (std::size_t i = 0; i <= kPlaces; ++i) {
+    const trajectories::Geodetic place = trajectories::geodetic_from_geocentric(
+        trajectory.position[(trajectory.size() - 1) * i / kPlaces]);
+    const double beyond = map.area()->beyond(place.latitude, place.longitude);
+    if (beyond <= farthest) continue;
+    farthest = beyond;
+    where = place;
+  }
+  // Borders of areas are rounded.
+  constexpr double kRounded = 0.01 * kRadiansPerDegree;
+  if (farthest <= kRounded) return {};
+  const std::string words = fmt::format(
+      "crs {} is for {} (latitude {:.2f} to {:.2f}, longitude {:.2f} to {:.2f} degrees), and the "
+      "trajectory is at latitude {:.4f}, longitude {:.4f}: is it the right zone?",
+      map.name(), map.area()->name.empty() ? "another area" : map.area()->name,
+      degrees_from_radians(map.area()->south), degrees_from_radians(map.area()->north),
+      degrees_from_radians(map.area()->west), degrees_from_radians(map.area()->east),
+      degrees_from_radians(where.latitude), degrees_from_radians(where.longitude));
+  if (farthest > kFarAway) throw InvalidArgument(words);
+  return words;
+}
+
 }  // namespace
 
 struct Georeference::State {
@@ -138,6 +169,7 @@ struct Georeference::State {
   std::optional<MapProjection> map;
   std::int64_t shift_ns = 0;
   std::optional<std::int64_t> utc_shift_ns;  ///< of the trajectory's time
+  std::string beyond_area;                   ///< in words; empty: within the map's area of use
   bool clock_known = false;                  ///< the recording says what its clock counts
 
   /// The map about a place of the trajectory's frame, or that frame itself.
@@ -174,6 +206,7 @@ Georeference::Georeference(const MovingPlatform& platform,
     }
     s.map.emplace(crs, s.platform.datum);
     s.map->project(first);  // refuses a place that the map does not reach
+    s.beyond_area = far_from_map(*s.map, trajectory);
   } else if (!s.platform.crs.empty()) {
     throw InvalidArgument(fmt::format(
         "crs = \"{}\" with a trajectory in a frame of its own, which no map knows: give no crs, or "
@@ -433,8 +466,9 @@ std::vector<std::string> Georeference::warnings() const {
         "the recording does not say what its clock counts: its times, with the mount's offset of "
         "{:g} s, are taken as the trajectory's ({}); a sensor that is set by PPS and NMEA "
         "counts UTC, 18 s less than GPS time",
-        s.platform.mount.clock_offset.value, to_string(s.platform.trajectory.time_scale)));
+        s.platform.mount.clock_offset.value, words_of(s.platform.trajectory.time_scale)));
   }
+  if (!s.beyond_area.empty()) words.push_back(s.beyond_area);
   if (s.map && s.platform.crs.empty()) {
     words.push_back(
         fmt::format("no map was named: points are in {} with ellipsoidal heights", s.map->name()));

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 #include "risley/cloud/map_projection.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdlib>
@@ -73,7 +74,33 @@ bool in_metres(PJ_CONTEXT* context, const PJ* crs, std::string& unit) {
   return true;
 }
 
+std::optional<AreaOfUse> area_of(PJ_CONTEXT* context, const PJ* crs) {
+  double west = 0, south = 0, east = 0, north = 0;
+  const char* name = nullptr;
+  constexpr double kUnknown = -999;  // below it the library knows no place
+  if (proj_get_area_of_use(context, crs, &west, &south, &east, &north, &name) == 0 ||
+      west < kUnknown + 1) {
+    return std::nullopt;
+  }
+  // The first sentence: lists of countries follow.
+  std::string words = name == nullptr ? "" : name;
+  words.resize(std::min(words.size(), words.find(". ")));
+  if (words.ends_with('.')) words.pop_back();
+  return AreaOfUse{std::move(words), radians_from_degrees(west), radians_from_degrees(south),
+                   radians_from_degrees(east), radians_from_degrees(north)};
+}
+
 }  // namespace
+
+double AreaOfUse::beyond(double latitude, double longitude) const {
+  const double of_latitude = std::max({0.0, south - latitude, latitude - north});
+  // Eastwards from the western edge; the rest of the circle is nearer to one edge or the other.
+  const double width = wrap_to_two_pi(east - west), along = wrap_to_two_pi(longitude - west);
+  const bool all_around = east - west > kTwoPi - 1e-9;
+  const double of_longitude =
+      all_around || along <= width ? 0.0 : std::min(along - width, kTwoPi - along);
+  return std::max(of_latitude, of_longitude);
+}
 
 MapTangent::MapTangent(const Vector3d& center, const Vector3d& value, const Matrix3d& jacobian,
                        const std::array<Matrix3d, 3>& hessian)
@@ -96,6 +123,7 @@ struct MapProjection::State {
   Object operation;
   std::string name, wkt;
   bool has_height_system = false;
+  std::optional<AreaOfUse> area;
   std::mutex mutex;  // the library's objects serve one thread at a time
 };
 
@@ -179,6 +207,7 @@ MapProjection::MapProjection(const std::string& crs, const std::string& source)
   }
   state_->name = name;
   state_->has_height_system = vertical != nullptr;
+  state_->area = area_of(context, map);
   const char* const wkt_options[] = {"MULTILINE=NO", nullptr};
   const char* wkt = proj_as_wkt(context, target.get(), PJ_WKT1_GDAL, wkt_options);
   if (wkt == nullptr) {
@@ -244,6 +273,7 @@ MapTangent MapProjection::tangent(const Vector3d& geocentric_m) const {
 
 const std::string& MapProjection::name() const { return state_->name; }
 const std::string& MapProjection::wkt() const { return state_->wkt; }
+const std::optional<AreaOfUse>& MapProjection::area() const { return state_->area; }
 bool MapProjection::has_height_system() const { return state_->has_height_system; }
 
 std::string MapProjection::operation() const {

@@ -94,8 +94,9 @@ void write_flight(const CalibrateFlightOptions& options, CalibratedFlight& resul
   for (const std::string& path : paths_of(options.platform)) inputs.push_back(path);
   result.provenance = with_inputs(options.files.provenance, inputs, progress);
   const calibration::FlightCalibration& found = result.calibration;
-  const bool better = found.verdict.code != CalibrationCode::not_better;
-  if (found.converged && (better || options.force)) {
+  const CalibrationCode code = found.verdict.code;
+  const bool sound = code != CalibrationCode::not_better && code != CalibrationCode::undecided;
+  if (found.converged && (sound || options.force)) {
     sensors::Sensor calibrated = found.sensor;
     calibrated.provenance = result.provenance;
     folder.add_calibration(calibrated);

@@ -9,7 +9,7 @@ namespace risley::jobs {
 ConvertedTrajectory convert_trajectory(const ConvertTrajectoryOptions& options,
                                        const Progress& progress) {
   trajectories::Trajectory trajectory =
-      trajectories::load_trajectory(options.trajectory, progress.stage("reading"));
+      trajectories::load_trajectory(options.trajectory, progress.stage("reading"), options.topic);
   ConvertedTrajectory result;
   result.input_format = trajectory.format;
   result.warnings = trajectory.warnings;

@@ -28,7 +28,8 @@ InspectedTrajectory inspect_trajectory(const InspectTrajectoryOptions& options,
     take_accuracies(options.trajectory);
     return result;
   }
-  result.trajectory = trajectories::load_trajectory(options.trajectory, progress.stage("reading"));
+  result.trajectory =
+      trajectories::load_trajectory(options.trajectory, progress.stage("reading"), options.topic);
   if (!options.accuracy.empty()) {
     trajectories::add_accuracies(*result.trajectory, take_accuracies(options.accuracy),
                                  options.accuracy);

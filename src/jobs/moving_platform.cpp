@@ -8,7 +8,8 @@
 namespace risley::jobs {
 
 bool moves(const PlatformFiles& files) {
-  return !paths_of(files).empty() || !files.crs.empty() || !files.datum.empty();
+  return !paths_of(files).empty() || !files.topic.empty() || !files.crs.empty() ||
+         !files.datum.empty();
 }
 
 std::vector<std::string> paths_of(const PlatformFiles& files) {
@@ -33,7 +34,7 @@ cloud::MovingPlatform load_platform(const PlatformFiles& files, const Progress& 
   }
   cloud::MovingPlatform platform;
   platform.mount = trajectories::load_mount(files.mount);
-  platform.trajectory = trajectories::load_trajectory(files.trajectory, progress);
+  platform.trajectory = trajectories::load_trajectory(files.trajectory, progress, files.topic);
   if (!files.accuracy.empty()) {
     trajectories::add_accuracies(platform.trajectory,
                                  trajectories::load_accuracies(files.accuracy, progress),

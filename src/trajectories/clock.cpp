@@ -26,24 +26,6 @@ std::int64_t nearest_period(const Trajectory& trajectory, std::int64_t time_ns,
   return std::llround(periods) * period_ns;
 }
 
-std::string scale_words(TimeScale scale) {
-  switch (scale) {
-    case TimeScale::unknown:
-      return "of a scale that the file does not name";
-    case TimeScale::gps_second_of_week:
-      return "GPS second of week";
-    case TimeScale::utc_second_of_day:
-      return "UTC second of day";
-    case TimeScale::gps:
-      return "GPS second since 1980";
-    case TimeScale::adjusted_gps:
-      return "adjusted GPS second";
-    case TimeScale::utc_unix:
-      return "UTC second since 1970";
-  }
-  return {};
-}
-
 std::string seconds_words(std::int64_t time_ns) {
   return fmt::format("{:.3f} s", 1e-9 * static_cast<double>(time_ns));
 }
@@ -100,11 +82,17 @@ std::optional<std::int64_t> shift_to_utc_ns(const Trajectory& trajectory) {
 std::string interval_words(const Trajectory& trajectory) {
   require_at_least("records of the trajectory", static_cast<long long>(trajectory.size()), 1);
   return fmt::format("from {} to {} ({})", seconds_words(trajectory.time_ns.front()),
-                     seconds_words(trajectory.time_ns.back()), scale_words(trajectory.time_scale));
+                     seconds_words(trajectory.time_ns.back()), words_of(trajectory.time_scale));
 }
 
 std::string no_overlap_words(const Trajectory& trajectory, std::int64_t first_ns,
                              std::int64_t last_ns) {
+  if (first_ns <= trajectory.time_ns.back() && last_ns >= trajectory.time_ns.front()) {
+    return fmt::format(
+        "no shot of the recording has a pose: the trajectory runs {}, the recording from {} to {} "
+        "of the same clock, where the trajectory has a gap",
+        interval_words(trajectory), seconds_words(first_ns), seconds_words(last_ns));
+  }
   std::string words = fmt::format(
       "the recording and the trajectory share no time: the trajectory runs {}, the recording from "
       "{} to {} of the same clock",

@@ -57,6 +57,24 @@ std::string to_string(TimeScale scale) {
   return "unknown";
 }
 
+std::string words_of(TimeScale scale) {
+  switch (scale) {
+    case TimeScale::unknown:
+      break;
+    case TimeScale::gps_second_of_week:
+      return "GPS second of week";
+    case TimeScale::utc_second_of_day:
+      return "UTC second of day";
+    case TimeScale::gps:
+      return "GPS second since 1980";
+    case TimeScale::adjusted_gps:
+      return "adjusted GPS second";
+    case TimeScale::utc_unix:
+      return "UTC second since 1970";
+  }
+  return "of a scale that the file does not name";
+}
+
 std::string to_string(Frame frame) { return frame == Frame::geocentric ? "geocentric" : "local"; }
 
 Eigen::Quaterniond ned_from_body(const RollPitchHeading& angles) {

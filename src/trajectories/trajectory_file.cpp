@@ -15,6 +15,7 @@
 #include "risley/core/text.hpp"
 
 #include "trajectories/formats/format.hpp"
+#include "trajectories/formats/ros_bag.hpp"
 
 namespace risley::trajectories {
 namespace {
@@ -23,7 +24,7 @@ namespace {
 const std::vector<const Format*>& formats() {
   static const std::vector<const Format*> all{
       &kInertialExplorerFormat, &kPospacFormat, &kRtklibFormat, &kNamedCsvFormat,
-      &kOpenmmsFormat,          &kTumFormat,    &kSbetFormat,
+      &kOpenmmsFormat,          &kTumFormat,    &kRosBagFormat, &kSbetFormat,
   };
   return all;
 }
@@ -72,20 +73,30 @@ TrajectoryFileKind trajectory_file_kind(const std::string& path) {
   try {
     const FileHead head = read_file_head(path);
     if (head.bytes.empty()) return TrajectoryFileKind::none;
-    if (format_of(head) != nullptr) return TrajectoryFileKind::trajectory;
+    const Format* const format = format_of(head);
+    if (format == &kRosBagFormat && !holds_poses_alone(path)) return TrajectoryFileKind::none;
+    if (format != nullptr) return TrajectoryFileKind::trajectory;
     return is_smrmsg(head) ? TrajectoryFileKind::accuracies : TrajectoryFileKind::none;
   } catch (const FileError&) {
     return TrajectoryFileKind::none;
   }
 }
 
-Trajectory load_trajectory(const std::string& path, const Progress& progress) {
+Trajectory load_trajectory(const std::string& path, const Progress& progress,
+                           const std::string& topic) {
   const FileHead head = read_file_head(path);
   if (head.bytes.empty()) {
     throw FileError(path, {0, {}},
                     fmt::format("is empty, expected a trajectory ({})", known_formats()));
   }
   const Format* format = format_of(head);
+  if (format == &kRosBagFormat) return read_ros_bag(path, topic, progress);
+  if (!topic.empty()) {
+    throw InvalidArgument(
+        fmt::format("option trajectory_topic = {}: {} is no bag of ROS, and only "
+                    "bags have topics",
+                    topic, path));
+  }
   if (format != nullptr) return format->read(path, progress);
   if (is_smrmsg(head)) {
     throw FileError(path, {}, "holds accuracies (SMRMSG) and no poses; expected the SBET with it");

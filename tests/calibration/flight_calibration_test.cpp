@@ -187,6 +187,40 @@ TEST(FlightCalibration, HoldsWhatIsStatedToBeExact) {
   EXPECT_EQ(found.mount.lever_arm[2].source, "tape");
 }
 
+// 20 ppm are 1.3 ms at either end of two minutes: pixels of boresight in a flight that sways.
+TEST(FlightCalibration, TellsAClockThatDrifts) {
+  const int seeds = number_of_seeds(2);
+  double squares = 0;
+  int flights = 0;
+  for (int seed = 1; seed <= seeds; ++seed) {
+    for (const double drift : {0.0, 20e-6, -20e-6}) {
+      FlightSettings settings = short_flight();
+      settings.seed = static_cast<std::uint64_t>(seed);
+      settings.clock_drift = drift;
+      const SimulatedFlight flight(settings);
+      FlightCalibrationOptions options = flight.options();
+      options.coarse_shots = 40000;
+      options.knot_spacing = 0.5;
+      const FlightCalibration found = calibrate_flight(flight.shots, flight.trajectory, options);
+      const ClockDrift& clock = found.clock_drift;
+
+      EXPECT_EQ(clock.significant, drift != 0) << "seed " << seed;
+      EXPECT_NEAR(clock.value, drift, 2e-6) << "seed " << seed;
+      const bool warned =
+          std::any_of(found.warnings.begin(), found.warnings.end(), [](const std::string& words) {
+            return words.find("drift apart") != std::string::npos &&
+                   words.find("ppm") != std::string::npos && words.find("PPS") != std::string::npos;
+          });
+      EXPECT_EQ(warned, drift != 0);
+      EXPECT_EQ(found.verdict.code == CalibrationCode::undecided, drift != 0);
+      if (drift != 0) continue;
+      squares += std::pow(clock.value / clock.sigma, 2);
+      ++flights;
+    }
+  }
+  EXPECT_LT(squares / flights, 1 + 3 * std::sqrt(2.0 / flights));
+}
+
 TEST(FlightCalibration, FailsInWords) {
   FlightSettings settings = short_flight();
   settings.strip_length = 15;
@@ -195,7 +229,12 @@ TEST(FlightCalibration, FailsInWords) {
   const FlightCalibrationOptions options = flight.options();
   SimulatedFlight other = flight;
   for (auto& time : other.shots.time_ns) time += 604'800'000'000'000;  // a week
-  EXPECT_NE(failure(other, options).find("no shot has a pose"), std::string::npos);
+  const std::string week_apart = failure(other, options);
+  EXPECT_NE(week_apart.find("share no time"), std::string::npos) << week_apart;
+  EXPECT_NE(week_apart.find("a week apart"), std::string::npos) << week_apart;
+  other = flight;  // a record here and there, in the turns
+  for (auto& time : other.shots.time_ns) time = other.shots.time_ns.front() + 20'000'000'000;
+  EXPECT_NE(failure(other, options).find("where the trajectory has a gap"), std::string::npos);
   other = flight;
   for (auto& strip : other.shots.strip) strip = 0;
   EXPECT_NE(failure(other, options).find("one strip"), std::string::npos);

@@ -105,6 +105,7 @@ struct FlightSettings {
   Eigen::Vector3d boresight_deg{2, -1.5, 1};
   Eigen::Vector3d lever_arm{0.10, 0.05, 0.12};
   double range_offset = 0.01, clock_offset = 0.001;
+  double clock_drift = 0;  ///< s/s that the trajectory's clock gains, about the flight's middle
   std::uint64_t seed = 1;
 };
 
@@ -369,7 +370,10 @@ class SimulatedFlight {
       pose_time.push_back(times[i]);
       shots.range.push_back(range + settings_.range_offset +
                             settings_.range_noise * normal(generator_));
-      shots.time_ns.push_back(std::llround((times[i] - settings_.clock_offset) * 1e9) + kEpoch);
+      const double gained =
+          settings_.clock_drift * (times[i] - 0.5 * (times.front() + times.back()));
+      shots.time_ns.push_back(std::llround((times[i] - settings_.clock_offset - gained) * 1e9) +
+                              kEpoch);
     }
   }
 

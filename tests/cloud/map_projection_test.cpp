@@ -118,6 +118,31 @@ TEST(MapProjection, SaysHowTheDatumWasChanged) {
   EXPECT_NE(other.operation().find("accuracy"), std::string::npos) << other.operation();
 }
 
+TEST(MapProjection, AreasOfUse) {
+  const auto beyond = [](const std::string& crs, double latitude_deg, double longitude_deg) {
+    const MapProjection map(crs);
+    EXPECT_TRUE(map.area().has_value()) << crs;
+    return degrees_from_radians(map.area()->beyond(radians_from_degrees(latitude_deg),
+                                                   radians_from_degrees(longitude_deg)));
+  };
+  EXPECT_EQ(beyond("EPSG:32632", 50, 9), 0);
+  EXPECT_NEAR(beyond("EPSG:32632", 50, 13.5), 1.5, 1e-9);
+  EXPECT_NEAR(beyond("EPSG:32632", 50, 4), 2, 1e-9);
+  EXPECT_NEAR(beyond("EPSG:32632", -30, 9), 30, 1e-9);
+  EXPECT_NEAR(beyond("EPSG:32632", 50, 189), 177, 1e-9);
+  EXPECT_EQ(beyond("EPSG:32601", 10, 181), 0);
+  EXPECT_NEAR(beyond("EPSG:32660", 10, -178), 2, 1e-9);
+  const AreaOfUse across{"New Zealand", radians_from_degrees(160), radians_from_degrees(-56),
+                         radians_from_degrees(-171), radians_from_degrees(-25)};
+  EXPECT_EQ(across.beyond(radians_from_degrees(-40), radians_from_degrees(179)), 0);
+  EXPECT_EQ(across.beyond(radians_from_degrees(-40), radians_from_degrees(-175)), 0);
+  EXPECT_NEAR(across.beyond(radians_from_degrees(-40), radians_from_degrees(-169)),
+              radians_from_degrees(2), 1e-12);
+  const AreaOfUse world{"", -kPi, -kPi / 2, kPi, kPi / 2};
+  EXPECT_EQ(world.beyond(0.3, 3.1), 0);
+  EXPECT_NE(MapProjection("EPSG:32632").area()->name, "");
+}
+
 TEST(MapProjection, UtmZones) {
   const auto zone = [](double latitude_deg, double longitude_deg) {
     return utm_zone_of(radians_from_degrees(latitude_deg), radians_from_degrees(longitude_deg));

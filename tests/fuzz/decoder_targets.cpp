@@ -2,14 +2,17 @@
 // SPDX-License-Identifier: MIT
 // What stands inside files and streams, given to its decoder without them.
 #include <algorithm>
+#include <array>
 #include <cmath>
 
+#include "risley/bags/bag.hpp"
 #include "risley/recordings/livox/packet_decoder.hpp"
 
 #include "fuzz/invariants.hpp"
 #include "fuzz/targets.hpp"
 #include "recordings/formats/ros1_message.hpp"
 #include "recordings/formats/ros2_message.hpp"
+#include "trajectories/formats/ros_pose.hpp"
 
 namespace risley::fuzz {
 namespace {
@@ -45,15 +48,15 @@ void run_packets(std::span<const std::uint8_t> bytes) {
 }
 
 /// A message of each kind: the first byte says which.
-template <void (*decode)(recordings::MessageKind, std::span<const std::uint8_t>,
-                         recordings::BagMessage&)>
+template <void (*decode)(bags::MessageKind, std::span<const std::uint8_t>,
+                         recordings::LidarMessage&)>
 void run_message(std::span<const std::uint8_t> bytes) {
   if (bytes.empty()) return;
-  const auto kind = static_cast<recordings::MessageKind>(bytes[0] % 3);
-  recordings::BagMessage message;
+  const auto kind = static_cast<bags::MessageKind>(bytes[0] % 3);
+  recordings::LidarMessage message;
   try {
     decode(kind, bytes.subspan(1), message);
-  } catch (const recordings::BadMessage&) {
+  } catch (const bags::BadMessage&) {
     return;
   }
   require(message.points.size() <= bytes.size(), "no more points than bytes");
@@ -63,12 +66,31 @@ void run_message(std::span<const std::uint8_t> bytes) {
   }
 }
 
+/// A message with a pose: the first byte says which, and how it is serialised.
+void run_pose_message(std::span<const std::uint8_t> bytes) {
+  using bags::MessageKind;
+  constexpr std::array kKinds{MessageKind::odometry, MessageKind::pose,
+                              MessageKind::pose_with_covariance, MessageKind::transform};
+  if (bytes.empty()) return;
+  const auto bag = bytes[0] % 2 == 0 ? bags::BagKind::ros1 : bags::BagKind::ros2;
+  const MessageKind kind = kKinds[bytes[0] / 2 % kKinds.size()];
+  try {
+    const auto pose = trajectories::decode_ros_pose(bag, kind, bytes.subspan(1));
+    require(pose.position.allFinite(), "positions are numbers");
+    require(std::abs(pose.attitude.norm() - 1) < 1e-9, "attitudes are of length 1");
+    require(pose.frame.size() + pose.body.size() < bytes.size(), "no longer names than bytes");
+  } catch (const bags::BadMessage&) {
+    return;
+  }
+}
+
 }  // namespace
 
 std::vector<Target> decoder_targets() {
   return {{"packets", run_packets},
           {"ros1-message", run_message<recordings::decode_ros1_message>},
-          {"ros2-message", run_message<recordings::decode_ros2_message>}};
+          {"ros2-message", run_message<recordings::decode_ros2_message>},
+          {"pose-message", run_pose_message}};
 }
 
 }  // namespace risley::fuzz

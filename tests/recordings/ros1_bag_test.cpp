@@ -15,86 +15,15 @@
 #include <rosbag/bag.h>
 #include <sys/resource.h>
 
+#include "bags/written_bags.hpp"
 #include "recordings/format_tests.hpp"
 
 namespace risley::recordings::ros1_bag_test {
 
-/// A serialised message of any type.
-struct RawMessage {
-  std::string type, md5, definition, bytes;
-};
-
-}  // namespace risley::recordings::ros1_bag_test
-
-namespace ros {
-namespace message_traits {
-
-template <>
-struct DataType<risley::recordings::ros1_bag_test::RawMessage> {
-  static const char* value(const risley::recordings::ros1_bag_test::RawMessage& m) {
-    return m.type.c_str();
-  }
-};
-template <>
-struct MD5Sum<risley::recordings::ros1_bag_test::RawMessage> {
-  static const char* value(const risley::recordings::ros1_bag_test::RawMessage& m) {
-    return m.md5.c_str();
-  }
-};
-template <>
-struct Definition<risley::recordings::ros1_bag_test::RawMessage> {
-  static const char* value(const risley::recordings::ros1_bag_test::RawMessage& m) {
-    return m.definition.c_str();
-  }
-};
-
-}  // namespace message_traits
-namespace serialization {
-
-template <>
-struct Serializer<risley::recordings::ros1_bag_test::RawMessage> {
-  template <class Stream>
-  static void write(Stream& stream, const risley::recordings::ros1_bag_test::RawMessage& m) {
-    const auto bytes = static_cast<std::uint32_t>(m.bytes.size());
-    std::copy(m.bytes.begin(), m.bytes.end(), stream.advance(bytes));
-  }
-  // NOLINTNEXTLINE(readability-identifier-naming): the name that ROS calls
-  static std::uint32_t serializedLength(const risley::recordings::ros1_bag_test::RawMessage& m) {
-    return static_cast<std::uint32_t>(m.bytes.size());
-  }
-};
-
-}  // namespace serialization
-}  // namespace ros
-
-namespace risley::recordings::ros1_bag_test {
-
+using namespace bags::written;
 using namespace format_tests;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
-
-constexpr const char* kHeaderDefinition =
-    "================================================================================\n"
-    "MSG: std_msgs/Header\nuint32 seq\ntime stamp\nstring frame_id\n";
-
-template <class T>
-void put(std::string& bytes, std::type_identity_t<T> value) {
-  bytes.append(reinterpret_cast<const char*>(&value), sizeof value);
-}
-
-void put_text(std::string& bytes, const std::string& text) {
-  put<std::uint32_t>(bytes, static_cast<std::uint32_t>(text.size()));
-  bytes += text;
-}
-
-std::string ros_header(std::uint64_t time_ns, const std::string& frame = "livox_frame") {
-  std::string bytes;
-  put<std::uint32_t>(bytes, 7);
-  put<std::uint32_t>(bytes, static_cast<std::uint32_t>(time_ns / 1'000'000'000));
-  put<std::uint32_t>(bytes, static_cast<std::uint32_t>(time_ns % 1'000'000'000));
-  put_text(bytes, frame);
-  return bytes;
-}
 
 struct Point {
   std::uint32_t offset_ns;
@@ -230,26 +159,7 @@ RawMessage imu(std::uint64_t time_ns, double acceleration_z) {
   return message;
 }
 
-/// A bag of these messages, one each 10 ms.
-struct Bag {
-  rosbag::CompressionType compression = rosbag::compression::Uncompressed;
-  std::uint32_t chunk_bytes = 1000;
-  std::vector<std::pair<std::string, RawMessage>> messages;
-
-  void add(const std::string& topic, RawMessage message) {
-    messages.emplace_back(topic, std::move(message));
-  }
-  void write(const std::string& path) const {
-    rosbag::Bag bag(path, rosbag::bagmode::Write);
-    bag.setCompression(compression);
-    bag.setChunkThreshold(chunk_bytes);
-    std::uint32_t number = 0;
-    for (const auto& [topic, message] : messages) {
-      bag.write(topic, ros::Time(1'600'000'000 + number / 100, number % 100 * 10'000'000), message);
-      ++number;
-    }
-    bag.close();
-  }
+struct Bag : Ros1BagFile {
   Outcome read(std::size_t chunk_rows = kDefaultChunkRows) const {
     const TemporaryFolder folder;
     const std::string path = folder.file("input.bag");

@@ -11,10 +11,12 @@
 #include <gtest/gtest.h>
 #include <sqlite3.h>
 
+#include "bags/written_bags.hpp"
 #include "recordings/format_tests.hpp"
 
 namespace risley::recordings::ros2_bag_test {
 
+using namespace bags::written;
 using namespace format_tests;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
@@ -25,41 +27,6 @@ constexpr const char* kTopic = "/livox/lidar";
 constexpr const char* kCustomType = "livox_ros_driver2/msg/CustomMsg";
 constexpr const char* kCloudType = "sensor_msgs/msg/PointCloud2";
 constexpr const char* kImuType = "sensor_msgs/msg/Imu";
-
-/// A message in CDR, written by hand: numbers stand at multiples of their size.
-class Cdr {
- public:
-  explicit Cdr(bool big_endian = false) : big_endian_(big_endian) {
-    bytes_ = {'\0', big_endian ? '\0' : '\1', '\0', '\0'};
-  }
-  template <class T>
-  Cdr& put(std::type_identity_t<T> value) {
-    while ((bytes_.size() - 4) % sizeof(T) != 0) bytes_ += '\0';
-    std::string number(reinterpret_cast<const char*>(&value), sizeof value);
-    if (big_endian_) number.assign(number.rbegin(), number.rend());
-    bytes_ += number;
-    return *this;
-  }
-  Cdr& text(const std::string& value) {
-    put<std::uint32_t>(static_cast<std::uint32_t>(value.size() + 1));
-    bytes_ += value + '\0';
-    return *this;
-  }
-  Cdr& header(std::uint64_t time_ns) {
-    put<std::int32_t>(static_cast<std::int32_t>(time_ns / 1'000'000'000));
-    put<std::uint32_t>(static_cast<std::uint32_t>(time_ns % 1'000'000'000));
-    return text("livox_frame");
-  }
-  Cdr& raw(const std::string& bytes) {
-    bytes_ += bytes;
-    return *this;
-  }
-  const std::string& bytes() const { return bytes_; }
-
- private:
-  bool big_endian_;
-  std::string bytes_;
-};
 
 struct Point {
   std::uint32_t offset_ns;
@@ -131,58 +98,7 @@ std::string imu(std::uint64_t time_ns) {
   return cdr.bytes();
 }
 
-/// A bag of these messages, one each 10 ms.
-struct Bag {
-  struct Topic {
-    std::string name, type, format = "cdr";
-  };
-  std::vector<Topic> topics;
-  std::vector<std::pair<std::size_t, std::string>> messages;
-  std::string pragma;
-
-  std::size_t topic(const std::string& name, const std::string& type,
-                    const std::string& format = "cdr") {
-    topics.push_back({name, type, format});
-    return topics.size() - 1;
-  }
-  void add(std::size_t topic, std::string message) {
-    messages.emplace_back(topic, std::move(message));
-  }
-
-  /// Leaves the database open, as while recording.
-  std::shared_ptr<sqlite3> write(const std::string& path) const {
-    sqlite3* opened = nullptr;
-    EXPECT_EQ(sqlite3_open(path.c_str(), &opened), SQLITE_OK);
-    std::shared_ptr<sqlite3> database(opened, sqlite3_close);
-    const auto run = [&](const std::string& sql) {
-      EXPECT_EQ(sqlite3_exec(opened, sql.c_str(), nullptr, nullptr, nullptr), SQLITE_OK) << sql;
-    };
-    run(pragma +
-        "PRAGMA page_size=512; PRAGMA synchronous=OFF;"
-        "CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT NOT NULL, type TEXT NOT NULL,"
-        " serialization_format TEXT NOT NULL, offered_qos_profiles TEXT NOT NULL);"
-        "CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER NOT NULL,"
-        " timestamp INTEGER NOT NULL, data BLOB NOT NULL);"
-        "CREATE INDEX timestamp_idx ON messages (timestamp ASC); BEGIN;");
-    for (std::size_t i = 0; i < topics.size(); ++i) {
-      run(fmt::format("INSERT INTO topics VALUES({}, '{}', '{}', '{}', '')", i + 10, topics[i].name,
-                      topics[i].type, topics[i].format));
-    }
-    sqlite3_stmt* insert = nullptr;
-    sqlite3_prepare_v2(opened, "INSERT INTO messages(topic_id, timestamp, data) VALUES(?, ?, ?)",
-                       -1, &insert, nullptr);
-    for (std::size_t i = 0; i < messages.size(); ++i) {
-      const std::string& blob = messages[i].second;
-      sqlite3_bind_int64(insert, 1, static_cast<sqlite3_int64>(messages[i].first + 10));
-      sqlite3_bind_int64(insert, 2, static_cast<sqlite3_int64>(kUtc + i * 10'000'000));
-      sqlite3_bind_blob(insert, 3, blob.data(), static_cast<int>(blob.size()), SQLITE_STATIC);
-      EXPECT_EQ(sqlite3_step(insert), SQLITE_DONE);
-      sqlite3_reset(insert);
-    }
-    sqlite3_finalize(insert);
-    run("COMMIT");
-    return database;
-  }
+struct Bag : Ros2BagFile {
   Outcome read(std::size_t chunk_rows = kDefaultChunkRows) const {
     const TemporaryFolder folder;
     const std::string path = folder.file("input.db3");

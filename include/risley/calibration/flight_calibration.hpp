@@ -50,6 +50,14 @@ struct FlightCalibrationOptions {
   std::uint64_t seed = 0;             ///< of their choice
 };
 
+/// A drift of the recording's clock that the adjustment does not know of, as the flight shows it.
+struct ClockDrift {
+  double value = 0, sigma = 0;  ///< gain of the trajectory's clock on the recording's, s/s
+  double seconds = 0;           ///< time between the first and the last shot
+  /// Beyond chance: what was found holds for a clock that does not drift, and the clock does.
+  bool significant = false;
+};
+
 /// What one calibration in flight found.
 struct FlightCalibration : FlightJudgement {
   bool converged = false;
@@ -59,6 +67,7 @@ struct FlightCalibration : FlightJudgement {
   trajectories::Mount mount;  ///< adjusted, with sigmas
   sensors::Sensor sensor;     ///< adjusted, with covariance
   FlightModel model;          ///< with corrections at the knots and planes, in the tangent frame
+  ClockDrift clock_drift;
   std::vector<StripPair> pairs_before, pairs_after;
   double rms_before = 0, rms_after = 0;  ///< of all pairs and cells, along the normals, m
   double sigma0 = 1;       ///< standard deviation of unit weight against the stated range noise

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -33,14 +34,17 @@ struct GroundPlane {
 ///   6        range offset, m
 ///   7        clock offset, s
 ///   8 ..     free parameters of the train
+///   last     drift of the clock, s/s, where it is tested
 struct FlightUnknowns {
   int free = 0;
+  bool drift = false;
   static constexpr int boresight(int axis) { return axis; }
   static constexpr int lever_arm(int axis) { return 3 + axis; }
   static constexpr int range_offset() { return 6; }
   static constexpr int clock_offset() { return 7; }
   static constexpr int parameter(int number) { return 8 + number; }
-  int size() const { return 8 + free; }
+  int clock_drift() const { return 8 + free; }
+  int size() const { return 8 + free + (drift ? 1 : 0); }
 };
 
 /// Everything that the range of a shot is predicted from. A point p of the sensor's frame is at
@@ -62,7 +66,13 @@ struct FlightModel {
   Eigen::MatrixXd corrections;  ///< [6, knots], see kCorrections
   std::vector<GroundPlane> planes;
 
-  FlightUnknowns unknowns() const { return {static_cast<int>(free.size())}; }
+  /// Where given, a drift of the clock of 0 about this time, ns, is one more unknown: its
+  /// derivatives tell how much of one there is.
+  std::optional<std::int64_t> drift_about_ns;
+
+  FlightUnknowns unknowns() const {
+    return {static_cast<int>(free.size()), drift_about_ns.has_value()};
+  }
 };
 
 /// "boresight_x_deg", ..., "lever_arm_x_m", ..., "range_offset_m", "clock_offset_s" and the

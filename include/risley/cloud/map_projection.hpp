@@ -4,6 +4,7 @@
 
 #include <array>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include <Eigen/Core>
@@ -35,6 +36,14 @@ class MapTangent {
                                                Eigen::Matrix3d::Zero()};
 };
 
+/// Where a map is meant to be used.
+struct AreaOfUse {
+  std::string name;  ///< "Between 6°E and 12°E, northern hemisphere between equator and 84°N, ..."
+  double west = 0, south = 0, east = 0, north = 0;  ///< rad; west above east: across 180 degrees
+  /// How far a place is outside, of latitude or longitude, rad; 0 within.
+  double beyond(double latitude, double longitude) const;
+};
+
 /// From geocentric coordinates (WGS 84 or another datum of the Earth) to easting, northing and
 /// height of a map, all in metres. May be used by several threads.
 class MapProjection {
@@ -60,6 +69,8 @@ class MapProjection {
   const std::string& name() const;  ///< "ETRS89 / UTM zone 32N"
   const std::string& wkt() const;   ///< as LAS 1.4 files want it: OGC WKT 1
   bool has_height_system() const;   ///< otherwise heights are ellipsoidal
+  /// Nothing where the system does not say, as own ones in WKT.
+  const std::optional<AreaOfUse>& area() const;
   /// What the library says of the change of datum, once a point was projected: "WGS 84 to ETRS89
   /// (1), accuracy 1 m"; empty where there is none.
   std::string operation() const;

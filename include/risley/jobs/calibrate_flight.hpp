@@ -39,7 +39,7 @@ struct CalibrateFlightOptions : RangedInputOptions {  ///< recordings of one fli
   std::uint64_t seed = 0;
   std::vector<std::string> truths;  ///< OUT.truth.yaml of each recording to judge by, or none
   bool details = false;             ///< wanted in the result
-  bool force = false;               ///< write a calibration that is not better, too
+  bool force = false;  ///< write what is not better, and what a drifting clock has spoilt, too
   /// Names the outputs: calibration.yaml, mount.yaml and trajectory.csv; without them nothing is
   /// written.
   ResultFiles files;

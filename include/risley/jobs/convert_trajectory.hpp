@@ -17,6 +17,7 @@ struct ConvertTrajectoryOptions {
   std::string output;      ///< path; its ending chooses the format
   std::string format;      ///< name of a format to write whatever the ending; empty asks the ending
   std::string accuracy;    ///< path of accuracies (SMRMSG) that the records get; empty: none
+  std::string topic;       ///< of a bag of ROS; empty: its only one with poses
 };
 
 /// What came of it.

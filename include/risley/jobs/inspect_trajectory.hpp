@@ -16,6 +16,7 @@ namespace risley::jobs {
 struct InspectTrajectoryOptions {
   std::string trajectory;  ///< path of a trajectory, or of accuracies (SMRMSG) alone
   std::string accuracy;    ///< path of the accuracies of the trajectory; empty: those that it holds
+  std::string topic;       ///< of a bag of ROS; empty: its only one with poses
 };
 
 /// What a file of poses or accuracies holds.

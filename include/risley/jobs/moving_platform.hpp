@@ -13,6 +13,7 @@ namespace risley::jobs {
 /// What says how a sensor moved.
 struct PlatformFiles {
   std::string trajectory;  ///< path; empty: the sensor stood still
+  std::string topic;       ///< of a trajectory that is a bag of ROS; empty: its only one
   std::string mount;       ///< path
   std::string accuracy;    ///< path of the trajectory's accuracies (SMRMSG); may be empty
   std::string errors;      ///< path of an error process; may be empty

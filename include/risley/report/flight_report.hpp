@@ -22,11 +22,6 @@
 
 namespace risley::report {
 
-/// Directions of boresight and prisms together against the truth of a simulation.
-struct FlightTruth {
-  calibration::DirectionErrors before, after;
-};
-
 /// All that the page of one calibration in flight says and draws, and all that report.json keeps of
 /// it. SI units; the diagrams are in the units of their axes.
 struct FlightReport {
@@ -67,7 +62,13 @@ struct FlightReport {
   std::size_t knots = 0;      ///< of the trajectory's corrections
   double knot_spacing = 0;    ///< median, s
 
-  std::optional<FlightTruth> truth;
+  /// Against the truth of a simulation.
+  struct Truth {
+    /// Of boresight and prisms together.
+    calibration::DirectionErrors before, after;
+    std::vector<double> values;  ///< [unknowns]
+  };
+  std::optional<Truth> truth;
 
   std::vector<Chart> strip_charts, difference_charts, ground_charts, residual_charts,
       correction_charts;
@@ -82,7 +83,7 @@ struct FlightReportInput {
   const sensors::Sensor& nominal;    ///< preset of the sensor
   const trajectories::Mount& mount;  ///< as given
   const jobs::FlightDetails& details;
-  std::optional<FlightTruth> truth;  ///< where it is known
+  const std::optional<jobs::FlightTruth>& truth;  ///< where it is known
   std::vector<ReportedRecording> recordings;
   Provenance provenance;
   std::vector<std::string> warnings;  ///< beside those of the calibration

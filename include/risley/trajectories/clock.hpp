@@ -25,8 +25,8 @@ std::optional<std::int64_t> shift_to_utc_ns(const Trajectory& trajectory);
 /// "from 388077.010 s to 388078.005 s (GPS second of week)"
 std::string interval_words(const Trajectory& trajectory);
 
-/// Why a recording and a trajectory share no time: both intervals, and what is probably wrong: leap
-/// seconds, a week, another scale of time.
+/// Why a recording and a trajectory share no pose: both intervals, and what is probably wrong: leap
+/// seconds, a week, another scale of time, a gap.
 /// @param first_ns, last_ns  of the recording, in what is taken for the trajectory's time
 std::string no_overlap_words(const Trajectory& trajectory, std::int64_t first_ns,
                              std::int64_t last_ns);

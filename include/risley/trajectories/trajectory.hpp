@@ -28,6 +28,9 @@ enum class TimeScale : std::uint8_t {
 /// "gps-second-of-week"
 std::string to_string(TimeScale scale);
 
+/// "GPS second of week", for messages
+std::string words_of(TimeScale scale);
+
 /// What positions and attitudes refer to.
 enum class Frame : std::uint8_t {
   geocentric,  ///< Earth-centred, Earth-fixed, WGS84-like ellipsoid (geodesy.hpp)
@@ -94,6 +97,7 @@ struct TimeOrder {
 /// accuracies may be missing as a whole, all other columns have one length.
 struct Trajectory {
   std::string format;  ///< short name, e.g. "sbet"; empty when it comes from no file
+  std::string source;  ///< within a file that holds several: topic and frames, in words
   TimeScale time_scale = TimeScale::unknown;
   std::optional<int> gps_week;  ///< of the first record's second of week, since 6 January 1980
   Frame frame = Frame::local;

@@ -14,15 +14,19 @@
 namespace risley::trajectories {
 
 /// Whether a file is a trajectory or a file of accuracies: told by its content, and by its ending
-/// where the content cannot tell (.sbet, .smrmsg). What cannot be read is none.
+/// where the content cannot tell (.sbet, .smrmsg). What cannot be read is none, and neither is a
+/// bag that holds points of a lidar: it is a recording, though load_trajectory() reads its poses.
 enum class TrajectoryFileKind { none, trajectory, accuracies };
 TrajectoryFileKind trajectory_file_kind(const std::string& path);
 
 /// Reads a trajectory of any known format: SBET, Inertial Explorer and POSPac text, CSV with named
-/// columns, TUM. docs/files.md says what each holds.
+/// columns, TUM, poses in bags of ROS. docs/files.md says what each holds.
+/// @param topic  of a bag that holds several topics of poses; otherwise it may be empty
 /// @throws FileError when it is missing, empty, of no known format or damaged, and where times run
-///         back or a record holds what no platform does; Cancelled
-Trajectory load_trajectory(const std::string& path, const Progress& progress = {});
+///         back or a record holds what no platform does; InvalidArgument for a topic that is
+///         missing or holds no poses, and for a topic of what is no bag; Cancelled
+Trajectory load_trajectory(const std::string& path, const Progress& progress = {},
+                           const std::string& topic = {});
 
 /// A format that can be written, and how it is chosen by the end of a file name.
 struct WritableTrajectory {

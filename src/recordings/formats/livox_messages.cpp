@@ -13,6 +13,8 @@
 
 #include "recordings/formats/cartesian.hpp"
 #include "recordings/formats/format.hpp"
+#include "recordings/formats/ros1_message.hpp"
+#include "recordings/formats/ros2_message.hpp"
 
 namespace risley::recordings {
 namespace {
@@ -20,7 +22,6 @@ namespace {
 using io::load;
 
 constexpr std::int64_t kSecond = 1'000'000'000;
-constexpr std::int64_t kLatestTime = 230LL * 31'557'600 * kSecond;  // the year 2200
 constexpr std::int64_t kYear2000 = 946'684'800 * kSecond;
 constexpr std::size_t kMostReturns = 3;
 /// How much describe() looks at, of all topics together.
@@ -145,28 +146,7 @@ std::size_t run_length(const std::vector<MessagePoint>& points, std::size_t firs
 
 }  // namespace
 
-std::int64_t message_time(std::uint64_t time_ns) {
-  if (time_ns > static_cast<std::uint64_t>(kLatestTime)) {
-    throw BadMessage{fmt::format("expected a time before the year 2200, found {} ns", time_ns)};
-  }
-  return static_cast<std::int64_t>(time_ns);
-}
-
-std::int64_t message_time(std::int64_t seconds, std::uint32_t nanoseconds) {
-  if (seconds < 0) {
-    throw BadMessage{fmt::format("expected a time of 0 or later, found {} s", seconds)};
-  }
-  return message_time(static_cast<std::uint64_t>(seconds) * kSecond + nanoseconds);
-}
-
-void require_room(std::string_view what, std::uint64_t count, std::size_t bytes_each,
-                  std::size_t bytes_left) {
-  if (count <= bytes_left / bytes_each) return;
-  throw BadMessage{fmt::format("expected {} {} of at least {} bytes each, found {} bytes", count,
-                               what, bytes_each, bytes_left)};
-}
-
-void append_point(BagMessage& message, const MessagePoint& point) {
+void append_point(LidarMessage& message, const MessagePoint& point) {
   if (!std::isfinite(point.x + point.y + point.z)) {
     throw BadMessage{
         fmt::format("point {} has a coordinate that is no number", message.points.size() + 1)};
@@ -175,7 +155,7 @@ void append_point(BagMessage& message, const MessagePoint& point) {
 }
 
 void decode_cloud(const CloudLayout& layout, std::span<const std::uint8_t> data,
-                  BagMessage& message) {
+                  LidarMessage& message) {
   message.points.clear();
   if (layout.big_endian) {
     throw BadMessage{"the point cloud is big-endian, expected a little-endian one"};
@@ -217,31 +197,56 @@ void decode_cloud(const CloudLayout& layout, std::span<const std::uint8_t> data,
   }
 }
 
-void MessageReader::set_topics(std::vector<BagTopic> topics) {
-  topics_ = std::move(topics);
-  devices_.assign(topics_.size(), std::nullopt);
-  clouds_.assign(topics_.size(), {});
-  acceleration_units_.assign(topics_.size(), 1.0);
+MessageReader::MessageReader(std::unique_ptr<bags::Bag> bag, std::string_view format)
+    : bag_(std::move(bag)) {
+  header_.format = format;
+  choose_topics();
+  describe();
+}
+
+void MessageReader::rewind() {
+  std::vector<bool> wanted;
+  for (const auto& device : devices_) wanted.push_back(device.has_value());
+  bag_->rewind(wanted);
+}
+
+bool MessageReader::next(LidarMessage& message) {
+  bags::Message serialised;
+  if (!bag_->next(serialised)) return false;
+  message.topic = serialised.topic;
+  const MessageKind kind = *topics()[serialised.topic].kind;
+  try {
+    if (bag_->kind() == bags::BagKind::ros1) {
+      decode_ros1_message(kind, serialised.bytes, message);
+    } else {
+      decode_ros2_message(kind, serialised.bytes, message);
+    }
+  } catch (const BadMessage& bad) {
+    bag_->fail(serialised, bad.what());
+  }
+  return true;
+}
+
+void MessageReader::choose_topics() {
+  devices_.assign(topics().size(), std::nullopt);
+  clouds_.assign(topics().size(), {});
+  acceleration_units_.assign(topics().size(), 1.0);
   const auto has_kind = [this](MessageKind kind) {
-    return std::any_of(topics_.begin(), topics_.end(),
-                       [kind](const BagTopic& topic) { return topic.kind == kind; });
+    return std::any_of(topics().begin(), topics().end(),
+                       [kind](const bags::Topic& topic) { return topic.kind == kind; });
   };
   // Beside the driver's own messages, clouds are the same points again or of other origin.
   const MessageKind wanted =
       has_kind(MessageKind::points) ? MessageKind::points : MessageKind::cloud;
   if (!has_kind(wanted)) {
-    std::string found;
-    for (const BagTopic& topic : topics_) {
-      found += fmt::format("{}{} ({})", found.empty() ? "" : ", ", topic.name, topic.type);
-    }
-    fail(
+    bag_->fail(
         fmt::format("holds no points of a lidar: expected a topic of type CustomMsg of a Livox "
                     "driver or sensor_msgs PointCloud2, found {}",
-                    found.empty() ? "no topic" : found));
+                    bags::words_of(topics())));
   }
   header_.devices.clear();
-  for (std::size_t i = 0; i < topics_.size(); ++i) {
-    const BagTopic& topic = topics_[i];
+  for (std::size_t i = 0; i < topics().size(); ++i) {
+    const bags::Topic& topic = topics()[i];
     if (topic.kind == MessageKind::cloud && wanted == MessageKind::points) {
       warn(
           fmt::format("the point clouds of topic {} were left out: the Livox driver's own "
@@ -250,7 +255,7 @@ void MessageReader::set_topics(std::vector<BagTopic> topics) {
     }
     if (topic.kind != wanted) continue;
     if (header_.devices.size() > UINT8_MAX) {
-      fail("holds more than 256 topics of lidar points, expected at most 256");
+      bag_->fail("holds more than 256 topics of lidar points, expected at most 256");
     }
     Device device;
     device.serial = serial_of(topic.name);
@@ -265,18 +270,18 @@ void MessageReader::set_topics(std::vector<BagTopic> topics) {
 /// An IMU belongs to the lidar of its serial or name space, or to the only lidar when it is itself
 /// the only one.
 void MessageReader::choose_imu_topics() {
-  const auto imu_topics = std::count_if(topics_.begin(), topics_.end(), [](const BagTopic& topic) {
-    return topic.kind == MessageKind::imu;
-  });
-  for (std::size_t i = 0; i < topics_.size(); ++i) {
-    if (topics_[i].kind != MessageKind::imu) continue;
-    const std::string serial = serial_of(topics_[i].name);
+  const auto imu_topics =
+      std::count_if(topics().begin(), topics().end(),
+                    [](const bags::Topic& topic) { return topic.kind == MessageKind::imu; });
+  for (std::size_t i = 0; i < topics().size(); ++i) {
+    if (topics()[i].kind != MessageKind::imu) continue;
+    const std::string serial = serial_of(topics()[i].name);
     std::vector<std::uint8_t> candidates;
-    for (std::size_t lidar = 0; lidar < topics_.size(); ++lidar) {
-      if (!devices_[lidar] || topics_[lidar].kind == MessageKind::imu) continue;
-      const bool same_sensor =
-          serial == header_.devices[*devices_[lidar]].serial &&
-          (!serial.empty() || name_space_of(topics_[lidar].name) == name_space_of(topics_[i].name));
+    for (std::size_t lidar = 0; lidar < topics().size(); ++lidar) {
+      if (!devices_[lidar] || topics()[lidar].kind == MessageKind::imu) continue;
+      const bool same_sensor = serial == header_.devices[*devices_[lidar]].serial &&
+                               (!serial.empty() || name_space_of(topics()[lidar].name) ==
+                                                       name_space_of(topics()[i].name));
       if (same_sensor) candidates.push_back(*devices_[lidar]);
     }
     if (candidates.size() == 1) {
@@ -287,7 +292,7 @@ void MessageReader::choose_imu_topics() {
       warn(
           fmt::format("the inertial samples of topic {} were left out: it does not say to which "
                       "lidar they belong",
-                      topics_[i].name));
+                      topics()[i].name));
     }
   }
 }
@@ -306,16 +311,17 @@ struct MessageReader::FirstMessages {
 void MessageReader::describe() {
   header_.cartesian = true;
   header_.has_intensity = false;
-  std::vector<FirstMessages> first(topics_.size());
+  rewind();
+  std::vector<FirstMessages> first(topics().size());
   std::size_t points = 0, messages = 0, point_messages = 0;
   std::optional<std::int64_t> first_time_ns;
-  BagMessage message;
+  LidarMessage message;
   try {
     while (points < kPointsLookedAt && messages < kMessagesLookedAt &&
            point_messages < kPointMessagesLookedAt * header_.devices.size() && next(message)) {
       ++messages;
       FirstMessages& topic = first[message.topic];
-      if (topics_[message.topic].kind == MessageKind::imu) {
+      if (topics()[message.topic].kind == MessageKind::imu) {
         const auto& a = message.acceleration;
         topic.accelerations.push_back(std::hypot(a[0], a[1], a[2]));
         continue;
@@ -330,7 +336,7 @@ void MessageReader::describe() {
       }
       topic.last_time_ns = message.time_ns;
       topic.last_points = message.points.size();
-      const bool has_times = topics_[message.topic].kind == MessageKind::points;
+      const bool has_times = topics()[message.topic].kind == MessageKind::points;
       for (std::size_t i = 0; i < message.points.size();) {
         const MessagePoint& point = message.points[i];
         topic.tagged = topic.tagged || point.tag != 0;
@@ -352,17 +358,17 @@ void MessageReader::describe() {
     header_.time_reference =
         *first_time_ns >= kYear2000 ? TimeReference::utc : TimeReference::power_on;
   }
-  for (std::size_t i = 0; i < topics_.size(); ++i) {
+  for (std::size_t i = 0; i < topics().size(); ++i) {
     if (!devices_[i]) continue;
-    if (topics_[i].kind == MessageKind::cloud) settle_cloud_grid(i, first[i]);
-    if (topics_[i].kind != MessageKind::imu) {
+    if (topics()[i].kind == MessageKind::cloud) settle_cloud_grid(i, first[i]);
+    if (topics()[i].kind != MessageKind::imu) {
       describe_device(i, first[i]);
     } else if (!first[i].accelerations.empty() && median(first[i].accelerations) > kLongestInG) {
       acceleration_units_[i] = 1.0 / kStandardGravity;
       warn(
           fmt::format("the accelerations of topic {} are in m/s^2 by their size and were "
                       "divided by {} m/s^2",
-                      topics_[i].name, kStandardGravity));
+                      topics()[i].name, kStandardGravity));
     }
   }
   rewind();
@@ -371,7 +377,7 @@ void MessageReader::describe() {
 /// Tells the model where only one is left: three returns have only the Avia, 100 kHz only the
 /// Mid-40, which has no tags, and the Mid-70, which has.
 void MessageReader::describe_device(std::size_t topic, const FirstMessages& first) {
-  const bool is_cloud = topics_[topic].kind == MessageKind::cloud;
+  const bool is_cloud = topics()[topic].kind == MessageKind::cloud;
   const int returns = is_cloud ? clouds_[topic].returns : static_cast<int>(first.most_returns);
   header_.returns_per_shot = std::max(header_.returns_per_shot, returns);
   Device& device = header_.devices[*devices_[topic]];
@@ -412,7 +418,7 @@ void MessageReader::settle_cloud_grid(std::size_t topic, const FirstMessages& fi
   std::string message = fmt::format(
       "the points of topic {} have no times of their own: each got its message's time and {} us "
       "per shot, {}",
-      topics_[topic].name, best.grid.beams == 1 ? "10" : "4.1667",
+      topics()[topic].name, best.grid.beams == 1 ? "10" : "4.1667",
       best.returns == 1 ? "one point" : fmt::format("{} points", best.returns));
   if (!is_known) {
     message += "; too few messages to check that";
@@ -442,16 +448,16 @@ bool MessageReader::read(Chunk& chunk, std::size_t max_rows) {
   return false;
 }
 
-void MessageReader::append(const BagMessage& message, Chunk& chunk) {
+void MessageReader::append(const LidarMessage& message, Chunk& chunk) {
   const std::uint8_t device = *devices_[message.topic];
-  switch (*topics_[message.topic].kind) {
+  switch (*topics()[message.topic].kind) {
     case MessageKind::points:
       append_points(message, device, chunk.observations);
       break;
     case MessageKind::cloud:
       append_cloud(message, device, chunk.observations);
       break;
-    case MessageKind::imu:
+    default:
       append_imu(message, device, chunk.imu);
       break;
   }
@@ -472,7 +478,7 @@ void set_row(Observations& rows, std::size_t row, const MessagePoint& point, std
 
 }  // namespace
 
-void MessageReader::append_points(const BagMessage& message, std::uint8_t device,
+void MessageReader::append_points(const LidarMessage& message, std::uint8_t device,
                                   Observations& rows) {
   const std::vector<MessagePoint>& points = message.points;
   std::size_t row = rows.size();
@@ -485,7 +491,7 @@ void MessageReader::append_points(const BagMessage& message, std::uint8_t device
       warn(
           fmt::format("{} points of topic {} have the same time; more than {} are taken as shots "
                       "of their own, without knowledge of when they were fired",
-                      run, topics_[message.topic].name, kMostReturns));
+                      run, topics()[message.topic].name, kMostReturns));
     }
     for (std::size_t i = 0; i < run; ++i, ++row) {
       const MessagePoint& point = points[first + i];
@@ -495,7 +501,7 @@ void MessageReader::append_points(const BagMessage& message, std::uint8_t device
   }
 }
 
-void MessageReader::append_cloud(const BagMessage& message, std::uint8_t device,
+void MessageReader::append_cloud(const LidarMessage& message, std::uint8_t device,
                                  Observations& rows) const {
   const CloudGrid& cloud = clouds_[message.topic];
   const auto returns = static_cast<std::size_t>(cloud.returns);
@@ -508,7 +514,7 @@ void MessageReader::append_cloud(const BagMessage& message, std::uint8_t device,
   }
 }
 
-void MessageReader::append_imu(const BagMessage& message, std::uint8_t device,
+void MessageReader::append_imu(const LidarMessage& message, std::uint8_t device,
                                std::vector<ImuSample>& samples) {
   ImuSample sample;
   sample.time_ns = message.time_ns;

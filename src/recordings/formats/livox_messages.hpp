@@ -15,36 +15,22 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "risley/bags/bag.hpp"
 #include "risley/core/error.hpp"
 #include "risley/recordings/livox/packet.hpp"
 #include "risley/recordings/reader.hpp"
 
 namespace risley::recordings {
 
-/// A message that is not as its type says; the reader adds where it stands.
-class BadMessage : public Error {
- public:
-  using Error::Error;
-};
-
-/// The messages that are read.
-enum class MessageKind : std::uint8_t {
-  points,  ///< CustomMsg of the Livox drivers
-  cloud,   ///< PointCloud2
-  imu,     ///< Imu
-};
-
-/// A topic of a bag.
-struct BagTopic {
-  std::string name, type;
-  std::optional<MessageKind> kind;  ///< empty for all that is not read
-};
+using bags::BadMessage;
+using bags::MessageKind;
 
 /// One point of a message.
 struct MessagePoint {
@@ -53,8 +39,8 @@ struct MessagePoint {
   std::uint8_t intensity = 0, tag = 0, line = 0;
 };
 
-/// A message after decoding.
-struct BagMessage {
+/// A message of a lidar after decoding.
+struct LidarMessage {
   std::size_t topic = 0;     ///< index of the topic
   std::int64_t time_ns = 0;  ///< of the first point, or of the inertial sample
   std::vector<MessagePoint> points;
@@ -66,17 +52,8 @@ struct BagMessage {
 /// Bytes of one point of a CustomMsg, without padding.
 inline constexpr std::size_t kCustomPointBytes = 19;
 
-/// A time of a message, ns. @throws BadMessage when it is beyond the year 2200
-std::int64_t message_time(std::uint64_t time_ns);
-/// @throws BadMessage also when the time is negative
-std::int64_t message_time(std::int64_t seconds, std::uint32_t nanoseconds);
-
-/// Checks that a sequence can stand in what is left of its message. @throws BadMessage
-void require_room(std::string_view what, std::uint64_t count, std::size_t bytes_each,
-                  std::size_t bytes_left);
-
 /// Adds a point of a CustomMsg. @throws BadMessage when a coordinate is no number
-void append_point(BagMessage& message, const MessagePoint& point);
+void append_point(LidarMessage& message, const MessagePoint& point);
 
 /// A PointCloud2 up to its points.
 struct CloudLayout {
@@ -95,32 +72,18 @@ struct CloudLayout {
 /// without return.
 /// @throws BadMessage when the layout does not fit itself or the data
 void decode_cloud(const CloudLayout& layout, std::span<const std::uint8_t> data,
-                  BagMessage& message);
+                  LidarMessage& message);
 
-/// Turns the messages of a bag into chunks. A bag kind says how to come to its messages.
-class MessageReader : public Reader {
+/// Turns the messages of a bag into chunks.
+class MessageReader final : public Reader {
  public:
-  bool read(Chunk& chunk, std::size_t max_rows) final;
-
- protected:
-  explicit MessageReader(std::string path) : path_(std::move(path)) {}
-
-  /// Chooses the topics to read and fills in the devices.
+  /// Chooses the topics to read and fills in the header, devices included.
+  /// @param format  RecordingHeader::format
   /// @throws FileError when no topic holds lidar points
-  void set_topics(std::vector<BagTopic> topics);
-  /// Completes the header from the first messages; the last step of a constructor.
-  void describe();
+  MessageReader(std::unique_ptr<bags::Bag> bag, std::string_view format);
 
-  const std::string& path() const { return path_; }
-  const std::vector<BagTopic>& topics() const { return topics_; }
-  bool is_wanted(std::size_t topic) const { return devices_[topic].has_value(); }
-  [[noreturn]] void fail(const std::string& problem) const { throw FileError(path_, {}, problem); }
-
-  /// The next message of a wanted topic, replacing all of `message`.
-  /// @return false at the end
-  /// @throws FileError
-  virtual bool next(BagMessage& message) = 0;
-  virtual void rewind() = 0;
+  bool read(Chunk& chunk, std::size_t max_rows) override;
+  double fraction_read() const override { return bag_->fraction_read(); }
 
  private:
   /// How the points of a cloud topic lie in time.
@@ -130,21 +93,29 @@ class MessageReader : public Reader {
   };
   struct FirstMessages;
 
+  const std::vector<bags::Topic>& topics() const { return bag_->topics(); }
+  /// Chooses the topics of points and those of inertial samples.
+  void choose_topics();
+  /// Completes the header from the first messages.
+  void describe();
+  void rewind();
+  /// The next message of a wanted topic, replacing all of `message`. @return false at the end
+  bool next(LidarMessage& message);
   void choose_imu_topics();
   void describe_device(std::size_t topic, const FirstMessages& first);
   void settle_cloud_grid(std::size_t topic, const FirstMessages& first);
-  void append(const BagMessage& message, Chunk& chunk);
-  void append_points(const BagMessage& message, std::uint8_t device, Observations& rows);
-  void append_cloud(const BagMessage& message, std::uint8_t device, Observations& rows) const;
-  void append_imu(const BagMessage& message, std::uint8_t device, std::vector<ImuSample>& samples);
+  void append(const LidarMessage& message, Chunk& chunk);
+  void append_points(const LidarMessage& message, std::uint8_t device, Observations& rows);
+  void append_cloud(const LidarMessage& message, std::uint8_t device, Observations& rows) const;
+  void append_imu(const LidarMessage& message, std::uint8_t device,
+                  std::vector<ImuSample>& samples);
   void warn(std::string message) { warnings_.push_back({{}, std::move(message), 0}); }
 
-  std::string path_;
-  std::vector<BagTopic> topics_;
+  std::unique_ptr<bags::Bag> bag_;
   std::vector<std::optional<std::uint8_t>> devices_;  ///< by topic; empty when it is not read
   std::vector<CloudGrid> clouds_;                     ///< by topic
   std::vector<double> acceleration_units_;            ///< by topic: g per unit of the message
-  BagMessage message_;
+  LidarMessage message_;
   std::optional<FileError> failure_;
   bool equal_times_reported_ = false;
 };

@@ -9,65 +9,19 @@
 
 #include <fmt/format.h>
 
+#include "risley/bags/message_fields.hpp"
 #include "risley/io/little_endian.hpp"
 
 namespace risley::recordings {
 namespace {
 
+using bags::Header;
+using bags::message_time;
+using bags::require_room;
+using bags::Ros1Fields;
 using io::load;
 
-/// The bytes of one serialised message, taken from the front.
-class MessageBytes {
- public:
-  explicit MessageBytes(std::span<const std::uint8_t> bytes) : left_(bytes) {}
-
-  std::size_t left() const { return left_.size(); }
-
-  std::span<const std::uint8_t> take(std::size_t count, std::string_view what) {
-    require_room(what, count, 1, left());
-    const auto taken = left_.first(count);
-    left_ = left_.subspan(count);
-    return taken;
-  }
-
-  template <class T>
-  T number(std::string_view what) {
-    if (left() < sizeof(T)) {
-      throw BadMessage{fmt::format("expected {} bytes of {}, found {}", sizeof(T), what, left())};
-    }
-    return load<T>(take(sizeof(T), what).data());
-  }
-
-  std::string text(std::string_view what) {
-    const auto bytes = take(number<std::uint32_t>(what), what);
-    return {bytes.begin(), bytes.end()};
-  }
-
-  void require_end() const {
-    if (left() > 0) {
-      throw BadMessage{fmt::format("expected the end of the message, found {} more bytes", left())};
-    }
-  }
-
- private:
-  std::span<const std::uint8_t> left_;
-};
-
-/// std_msgs/Header: its stamp, not yet checked.
-struct Ros1Stamp {
-  std::uint32_t seconds = 0, nanoseconds = 0;
-};
-
-Ros1Stamp take_header(MessageBytes& bytes) {
-  bytes.number<std::uint32_t>("the sequence number");
-  Ros1Stamp stamp;
-  stamp.seconds = bytes.number<std::uint32_t>("the stamp");
-  stamp.nanoseconds = bytes.number<std::uint32_t>("the stamp");
-  bytes.text("characters of the frame name");
-  return stamp;
-}
-
-void decode_points(MessageBytes bytes, BagMessage& message) {
+void decode_points(Ros1Fields bytes, LidarMessage& message) {
   take_header(bytes);
   message.time_ns = message_time(bytes.number<std::uint64_t>("the time base"));
   bytes.number<std::uint32_t>("the number of points");
@@ -83,9 +37,9 @@ void decode_points(MessageBytes bytes, BagMessage& message) {
   bytes.require_end();
 }
 
-void decode_cloud_message(MessageBytes bytes, BagMessage& message) {
-  const Ros1Stamp stamp = take_header(bytes);
-  message.time_ns = message_time(std::int64_t{stamp.seconds}, stamp.nanoseconds);
+void decode_cloud_message(Ros1Fields bytes, LidarMessage& message) {
+  const Header header = take_header(bytes);
+  message.time_ns = message_time(header);
   CloudLayout layout;
   layout.height = bytes.number<std::uint32_t>("the height");
   layout.width = bytes.number<std::uint32_t>("the width");
@@ -110,10 +64,10 @@ void decode_cloud_message(MessageBytes bytes, BagMessage& message) {
   decode_cloud(layout, data, message);
 }
 
-void decode_imu_message(MessageBytes bytes, BagMessage& message) {
+void decode_imu_message(Ros1Fields bytes, LidarMessage& message) {
   constexpr std::size_t kOrientation = 13 * sizeof(double), kCovariance = 9 * sizeof(double);
-  const Ros1Stamp stamp = take_header(bytes);
-  message.time_ns = message_time(std::int64_t{stamp.seconds}, stamp.nanoseconds);
+  const Header header = take_header(bytes);
+  message.time_ns = message_time(header);
   bytes.take(kOrientation, "bytes of the orientation");
   for (double& value : message.angular_velocity) value = bytes.number<double>("angular velocity");
   bytes.take(kCovariance, "bytes of a covariance");
@@ -125,10 +79,10 @@ void decode_imu_message(MessageBytes bytes, BagMessage& message) {
 }  // namespace
 
 void decode_ros1_message(MessageKind kind, std::span<const std::uint8_t> bytes,
-                         BagMessage& message) {
+                         LidarMessage& message) {
   message.points.clear();
   message.has_intensity = true;
-  const MessageBytes all(bytes);
+  const Ros1Fields all(bytes);
   switch (kind) {
     case MessageKind::points:
       return decode_points(all, message);
@@ -136,6 +90,8 @@ void decode_ros1_message(MessageKind kind, std::span<const std::uint8_t> bytes,
       return decode_cloud_message(all, message);
     case MessageKind::imu:
       return decode_imu_message(all, message);
+    default:
+      throw BadMessage{"expected a message of a lidar"};
   }
 }
 

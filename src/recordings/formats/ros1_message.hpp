@@ -12,6 +12,6 @@ namespace risley::recordings {
 /// Decodes a message as ROS 1 serialises it, and replaces all of `message` but its topic.
 /// @throws BadMessage
 void decode_ros1_message(MessageKind kind, std::span<const std::uint8_t> bytes,
-                         BagMessage& message);
+                         LidarMessage& message);
 
 }  // namespace risley::recordings

@@ -7,101 +7,20 @@
 #include <string_view>
 #include <utility>
 
-#include <fastcdr/Cdr.h>
-#include <fastcdr/FastBuffer.h>
-#include <fastcdr/exceptions/Exception.h>
-#include <fmt/format.h>
-#if __has_include(<fastcdr/config.h>)
-#include <fastcdr/config.h>
-#endif
+#include "risley/bags/message_fields.hpp"
 
 namespace risley::recordings {
 namespace {
 
-/// A message in CDR, read from the front. The two major versions of Fast-CDR differ in names.
-class CdrMessage {
- public:
-  /// @throws BadMessage, or an exception of Fast-CDR as all its functions do
-  explicit CdrMessage(std::span<const std::uint8_t> bytes)
-      : bytes_(bytes),
-        // Reading changes nothing, but the buffer is of bytes that could be written.
-        buffer_(reinterpret_cast<char*>(const_cast<std::uint8_t*>(bytes.data())), bytes.size()),
-#if defined(FASTCDR_VERSION_MAJOR) && FASTCDR_VERSION_MAJOR >= 2
-        cdr_(buffer_, eprosima::fastcdr::Cdr::DEFAULT_ENDIAN,
-             eprosima::fastcdr::CdrVersion::DDS_CDR)
-#else
-        cdr_(buffer_, eprosima::fastcdr::Cdr::DEFAULT_ENDIAN, eprosima::fastcdr::Cdr::DDS_CDR)
-#endif
-  {
-    constexpr std::size_t kEncapsulationBytes = 4;
-    // Plain CDR, big- or little-endian.
-    if (bytes.size() < kEncapsulationBytes || bytes[0] != 0 || bytes[1] > 1) {
-      throw BadMessage{
-          "expected a message that begins with 00 00 or 00 01, the marks of plain CDR"};
-    }
-    cdr_.read_encapsulation();
-  }
+using bags::CdrFields;
+using bags::Header;
+using bags::message_time;
 
-  template <class T>
-  T number() {
-    T value{};
-    cdr_ >> value;
-    return value;
-  }
-
-  std::string text() {
-    std::string value;
-    cdr_ >> value;
-    return value;
-  }
-
-  std::size_t left() const {
-#if defined(FASTCDR_VERSION_MAJOR) && FASTCDR_VERSION_MAJOR >= 2
-    return bytes_.size() - cdr_.get_serialized_data_length();
-#else
-    return bytes_.size() - cdr_.getSerializedDataLength();
-#endif
-  }
-
-  /// Length of a sequence whose elements have at least so many bytes.
-  std::uint32_t length(std::string_view what, std::size_t bytes_each) {
-    const auto count = number<std::uint32_t>();
-    require_room(what, count, bytes_each, left());
-    return count;
-  }
-
-  std::span<const std::uint8_t> byte_sequence(std::string_view what) {
-    const std::size_t count = length(what, 1);
-    const auto bytes = bytes_.subspan(bytes_.size() - left(), count);
-    cdr_.jump(count);
-    return bytes;
-  }
-
-  void skip_doubles(int count) {
-    for (int i = 0; i < count; ++i) number<double>();
-  }
-
- private:
-  std::span<const std::uint8_t> bytes_;
-  eprosima::fastcdr::FastBuffer buffer_;
-  eprosima::fastcdr::Cdr cdr_;
-};
-
-/// std_msgs/msg/Header: its stamp, not yet checked.
-struct Ros2Stamp {
-  std::int32_t seconds = 0;
-  std::uint32_t nanoseconds = 0;
-};
-
-Ros2Stamp take_header(CdrMessage& cdr) {
-  Ros2Stamp stamp;
-  stamp.seconds = cdr.number<std::int32_t>();
-  stamp.nanoseconds = cdr.number<std::uint32_t>();
-  cdr.text();
-  return stamp;
+void skip_doubles(CdrFields& cdr, int count) {
+  for (int i = 0; i < count; ++i) cdr.number<double>();
 }
 
-void decode_points(CdrMessage& cdr, BagMessage& message) {
+void decode_points(CdrFields& cdr, LidarMessage& message) {
   take_header(cdr);
   message.time_ns = message_time(cdr.number<std::uint64_t>());
   cdr.number<std::uint32_t>();  // number of points, also in front of them
@@ -121,9 +40,9 @@ void decode_points(CdrMessage& cdr, BagMessage& message) {
   }
 }
 
-void decode_cloud_message(CdrMessage& cdr, BagMessage& message) {
-  const Ros2Stamp stamp = take_header(cdr);
-  message.time_ns = message_time(std::int64_t{stamp.seconds}, stamp.nanoseconds);
+void decode_cloud_message(CdrFields& cdr, LidarMessage& message) {
+  const Header header = take_header(cdr);
+  message.time_ns = message_time(header);
   CloudLayout layout;
   layout.height = cdr.number<std::uint32_t>();
   layout.width = cdr.number<std::uint32_t>();
@@ -143,35 +62,32 @@ void decode_cloud_message(CdrMessage& cdr, BagMessage& message) {
   decode_cloud(layout, cdr.byte_sequence("values of data"), message);
 }
 
-void decode_imu_message(CdrMessage& cdr, BagMessage& message) {
+void decode_imu_message(CdrFields& cdr, LidarMessage& message) {
   constexpr int kOrientation = 13, kCovariance = 9;
-  const Ros2Stamp stamp = take_header(cdr);
-  message.time_ns = message_time(std::int64_t{stamp.seconds}, stamp.nanoseconds);
-  cdr.skip_doubles(kOrientation);
+  const Header header = take_header(cdr);
+  message.time_ns = message_time(header);
+  skip_doubles(cdr, kOrientation);
   for (double& value : message.angular_velocity) value = cdr.number<double>();
-  cdr.skip_doubles(kCovariance);
+  skip_doubles(cdr, kCovariance);
   for (double& value : message.acceleration) value = cdr.number<double>();
 }
 
 }  // namespace
 
 void decode_ros2_message(MessageKind kind, std::span<const std::uint8_t> bytes,
-                         BagMessage& message) {
+                         LidarMessage& message) {
   message.points.clear();
   message.has_intensity = true;
-  try {
-    CdrMessage cdr(bytes);
-    switch (kind) {
-      case MessageKind::points:
-        return decode_points(cdr, message);
-      case MessageKind::cloud:
-        return decode_cloud_message(cdr, message);
-      case MessageKind::imu:
-        return decode_imu_message(cdr, message);
-    }
-  } catch (const eprosima::fastcdr::exception::Exception& error) {
-    throw BadMessage{
-        fmt::format("expected more than its {} bytes of CDR ({})", bytes.size(), error.what())};
+  CdrFields cdr(bytes);
+  switch (kind) {
+    case MessageKind::points:
+      return decode_points(cdr, message);
+    case MessageKind::cloud:
+      return decode_cloud_message(cdr, message);
+    case MessageKind::imu:
+      return decode_imu_message(cdr, message);
+    default:
+      throw BadMessage{"expected a message of a lidar"};
   }
 }
 

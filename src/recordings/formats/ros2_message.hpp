@@ -13,6 +13,6 @@ namespace risley::recordings {
 /// topic.
 /// @throws BadMessage
 void decode_ros2_message(MessageKind kind, std::span<const std::uint8_t> bytes,
-                         BagMessage& message);
+                         LidarMessage& message);
 
 }  // namespace risley::recordings

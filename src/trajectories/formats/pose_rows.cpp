@@ -48,6 +48,14 @@ int unwrap_times(std::vector<std::int64_t>& times_ns, std::int64_t period) {
   return most;
 }
 
+TimeScale scale_by_size(const std::vector<std::int64_t>& ascending) {
+  constexpr std::int64_t kFirst_ns = 883'612'800 * kSecond_ns,
+                         kLast_ns = 4'102'444'800 * kSecond_ns;
+  const bool fits =
+      !ascending.empty() && ascending.front() >= kFirst_ns && ascending.back() <= kLast_ns;
+  return fits ? TimeScale::utc_unix : TimeScale::unknown;
+}
+
 Eigen::Quaterniond right_down_from_left_up(const Eigen::Quaterniond& q) {
   return {-q.x(), q.w(), q.z(), -q.y()};  // q i
 }
@@ -72,11 +80,11 @@ PoseRows::PoseRows(std::string path, RowContents contents)
 }
 
 void PoseRows::add(const PoseRow& row, const FilePlace& place) {
-  const auto refuse = [&](const std::string& problem) { throw FileError(path_, place, problem); };
   const auto check = [&](std::string_view name, double value, double least, double most,
                          std::string_view unit, std::string_view hint = "") {
     if (value >= least && value <= most) return;
-    refuse(fmt::format("{} = {:.10g} {}, allowed {:.6g} to {:.6g}{}", name, value, unit, least,
+    refuse(trajectory_.size(), place,
+           fmt::format("{} = {:.10g} {}, allowed {:.6g} to {:.6g}{}", name, value, unit, least,
                        most, hint));
   };
   const auto finite = [&](std::string_view name, const Eigen::Vector3d& values, double most,
@@ -124,18 +132,16 @@ void PoseRows::add(const PoseRow& row, const FilePlace& place) {
     trajectory_.accuracy.push_back(row.accuracy);
   }
   trajectory_.time_ns.push_back(row.time_ns);
-  in_lines_ = place.line.has_value();
-  places_.push_back(in_lines_ ? *place.line : place.byte_offset.value_or(0));
+  places_.push_back(place);
 }
 
 void PoseRows::warn(const FilePlace& place, std::string message) {
   trajectory_.warnings.push_back({place, std::move(message)});
 }
 
-FilePlace PoseRows::place_of(std::size_t row) const {
-  FilePlace place;
-  (in_lines_ ? place.line : place.byte_offset) = places_[row];
-  return place;
+void PoseRows::refuse(std::size_t row, const FilePlace& place, const std::string& problem) const {
+  const bool placed = place.line || place.byte_offset;
+  throw FileError(path_, place, placed ? problem : fmt::format("record {}: {}", row + 1, problem));
 }
 
 void PoseRows::make_times_run_on() {
@@ -155,8 +161,8 @@ void PoseRows::put_in_order() {
   const TimeOrder& told = order.told;
   trajectory_.time_order = told;
   if (told.largest_back_ns > kLatest_ns) {
-    throw FileError(
-        path_, place_of(told.largest_back_at),
+    refuse(
+        told.largest_back_at, places_[told.largest_back_at],
         fmt::format("time runs back by {:.6f} s, to {:.6f} s; expected one flight with one clock: "
                     "keep its records alone",
                     1e-9 * static_cast<double>(told.largest_back_ns),
@@ -164,14 +170,14 @@ void PoseRows::put_in_order() {
   }
   if (order.rows.empty()) return;
   if (told.moved > 0) {
-    warn(place_of(told.largest_back_at),
+    warn(places_[told.largest_back_at],
          fmt::format("records behind later ones: {} of {}, by up to {:.6f} s; all were put into "
                      "the order of their times",
                      told.moved, trajectory_.size(),
                      1e-9 * static_cast<double>(told.largest_back_ns)));
   }
   if (told.repeated > 0) {
-    warn(place_of(told.repeated_at),
+    warn(places_[told.repeated_at],
          fmt::format("records that repeat the time of an earlier one: {}; they were left out",
                      told.repeated));
   }

@@ -43,7 +43,7 @@ class PoseRows {
  public:
   PoseRows(std::string path, RowContents contents);
 
-  /// Adds a record. @param place  of the record, for messages
+  /// Adds a record. @param place  of the record, for messages; none: its number
   /// @throws FileError for values that no platform has
   void add(const PoseRow& row, const FilePlace& place);
 
@@ -58,14 +58,14 @@ class PoseRows {
  private:
   void make_times_run_on();
   void put_in_order();
-  FilePlace place_of(std::size_t row) const;
+  [[noreturn]] void refuse(std::size_t row, const FilePlace& place,
+                           const std::string& problem) const;
 
   std::string path_;
   RowContents contents_;
   Trajectory trajectory_;
   std::vector<double> wander_;
-  std::vector<std::uint64_t> places_;
-  bool in_lines_ = false;
+  std::vector<FilePlace> places_;  ///< of the rows
 };
 
 /// Seconds after which a scale of time begins again; nothing where it never does.
@@ -75,6 +75,10 @@ std::optional<std::int64_t> period_ns(TimeScale scale);
 /// before.
 /// @return how often they began again
 int unwrap_times(std::vector<std::int64_t>& times_ns, std::int64_t period_ns);
+
+/// What times count from by their size: UTC since 1970 where they are of the years 1998 to 2100, a
+/// clock that nobody has stated otherwise.
+TimeScale scale_by_size(const std::vector<std::int64_t>& ascending_ns);
 
 /// Half the body's turn about its x axis: forward-left-up axes, as ROS has them, to
 /// forward-right-down and back. Exact.

@@ -56,11 +56,7 @@ Trajectory read_tum(const std::string& path, const Progress& progress) {
       std::pair{PoseField::qz, "qz"},     std::pair{PoseField::qw, "qw"}};
   for (const auto& [field, name] : kTumColumns) table.columns.push_back({field, name});
   Trajectory trajectory = read_pose_table(path, table, progress);
-  // Seconds since 1970, in the years 1998 to 2100, or of a clock that nobody has stated.
-  constexpr std::int64_t kFirst_ns = 883'612'800'000'000'000, kLast_ns = 4'102'444'800'000'000'000;
-  if (trajectory.time_ns.front() >= kFirst_ns && trajectory.time_ns.back() <= kLast_ns) {
-    trajectory.time_scale = TimeScale::utc_unix;
-  }
+  trajectory.time_scale = scale_by_size(trajectory.time_ns);
   return trajectory;
 }
 

@@ -1,0 +1,112 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+// Bags of ROS 1 (version 2.0) and of ROS 2 (SQLite): topics and the bytes of their messages. What
+// the messages mean is for the layers above.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "risley/core/error.hpp"
+
+namespace risley::bags {
+
+/// The kinds of bags, and so how their messages are serialised.
+enum class BagKind : std::uint8_t {
+  ros1,
+  ros2,  ///< plain CDR
+};
+
+/// Which kind of bag a file is that begins with these bytes; nothing where it is none.
+std::optional<BagKind> bag_kind(std::string_view head);
+/// The same of the file's own bytes; nothing also where it cannot be read.
+std::optional<BagKind> bag_kind_of_file(const std::string& path);
+
+/// The messages that are known here, told by type in ROS 2 and by type's md5 in ROS 1.
+enum class MessageKind : std::uint8_t {
+  points,                ///< CustomMsg of the Livox drivers
+  cloud,                 ///< sensor_msgs PointCloud2
+  imu,                   ///< sensor_msgs Imu
+  odometry,              ///< nav_msgs Odometry
+  pose,                  ///< geometry_msgs PoseStamped
+  pose_with_covariance,  ///< geometry_msgs PoseWithCovarianceStamped
+  transform,             ///< geometry_msgs TransformStamped
+};
+
+/// A topic of a bag.
+struct Topic {
+  std::string name;
+  std::string type;  ///< with what a reader must know where the name alone would mislead
+  std::optional<MessageKind> kind;  ///< empty for all that is not known
+};
+
+/// "/a (nav_msgs/Odometry), /b (std_msgs/String)", or "no topic"
+std::string words_of(const std::vector<Topic>& topics);
+
+/// A message that is not as its type says; Bag::fail() adds where it stands.
+class BadMessage : public Error {
+ public:
+  using Error::Error;
+};
+
+/// One serialised message.
+struct Message {
+  std::size_t topic = 0;                ///< index of the topic
+  std::int64_t number = 0;              ///< ROS 1: of its topic, from 1; ROS 2: row of the table
+  std::span<const std::uint8_t> bytes;  ///< valid until the next one is asked for
+};
+
+/// A bag that is read from its beginning to its end.
+class Bag {
+ public:
+  virtual ~Bag() = default;
+  BagKind kind() const { return kind_; }
+  const std::string& path() const { return path_; }
+  /// By name; a topic may stand here twice, with different types.
+  const std::vector<Topic>& topics() const { return topics_; }
+
+  /// Begins at the first message of the wanted topics.
+  /// @param wanted  by topic
+  /// @throws FileError; InvalidArgument for a different number of topics
+  virtual void rewind(const std::vector<bool>& wanted) = 0;
+  /// The next message of a wanted topic, in the order of recording; rewind() must have been called.
+  /// @return false at the end
+  /// @throws FileError
+  virtual bool next(Message& message) = 0;
+  /// Part of the messages already read, [0, 1].
+  virtual double fraction_read() const = 0;
+
+  /// Refuses the bag. @throws FileError, always
+  [[noreturn]] void fail(const std::string& problem) const;
+  /// Refuses a message. @throws FileError, always
+  [[noreturn]] void fail(const Message& message, const std::string& problem) const;
+
+ protected:
+  Bag(BagKind kind, std::string path) : path_(std::move(path)), kind_(kind) {}
+  void require_topics(const std::vector<bool>& wanted) const;
+
+  std::string path_;
+  std::vector<Topic> topics_;
+
+ private:
+  BagKind kind_;
+};
+
+/// Opens a bag of a kind. The structure of a ROS 1 bag is checked to its end before.
+/// @throws FileError when it is no bag, is cut off or damaged
+std::unique_ptr<Bag> open_bag(const std::string& path, BagKind kind);
+/// The same of the kind that the file's bytes tell.
+std::unique_ptr<Bag> open_bag(const std::string& path);
+
+/// The topics of a bag, from its index alone.
+/// @throws FileError as open_bag, for damage in what has to be read
+std::vector<Topic> list_topics(const std::string& path);
+
+}  // namespace risley::bags

@@ -1,0 +1,44 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <array>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "risley/bags/bag.hpp"
+
+namespace risley::bags {
+
+inline constexpr std::string_view kRos1Signature = "#ROSBAG V2.0";
+
+/// A type whose messages are known.
+struct KnownType {
+  MessageKind kind;
+  std::string_view ros1_name, md5, ros2_name;
+};
+/// A CustomMsg, whose package differs between drivers, has no names here.
+inline constexpr std::array kKnownTypes{
+    KnownType{MessageKind::points, "", "e4d6829bdfe657cb6c21a746c86b21a6", ""},
+    KnownType{MessageKind::cloud, "sensor_msgs/PointCloud2", "1158d486dd51d683ce2f1be655c3c181",
+              "sensor_msgs/msg/PointCloud2"},
+    KnownType{MessageKind::imu, "sensor_msgs/Imu", "6a62c6daae103f4ff57a132d6f95cec2",
+              "sensor_msgs/msg/Imu"},
+    KnownType{MessageKind::odometry, "nav_msgs/Odometry", "cd5e73d190d741a2f92e81eda573aca7",
+              "nav_msgs/msg/Odometry"},
+    KnownType{MessageKind::pose, "geometry_msgs/PoseStamped", "d3812c3cbc69362b77dc0b19b345f8f5",
+              "geometry_msgs/msg/PoseStamped"},
+    KnownType{MessageKind::pose_with_covariance, "geometry_msgs/PoseWithCovarianceStamped",
+              "953b798c0f514ff060a53a3498ce6246", "geometry_msgs/msg/PoseWithCovarianceStamped"},
+    KnownType{MessageKind::transform, "geometry_msgs/TransformStamped",
+              "b5764a33bfeb3588febc2682852579b0", "geometry_msgs/msg/TransformStamped"},
+};
+
+std::unique_ptr<Bag> open_ros1_bag(const std::string& path);   // ros1_bag.cpp
+std::vector<Topic> list_ros1_topics(const std::string& path);  // ros1_bag.cpp
+std::unique_ptr<Bag> open_ros2_bag(const std::string& path);   // ros2_bag.cpp
+
+}  // namespace risley::bags
