@@ -24,8 +24,7 @@ constexpr std::size_t kMostProfiles = 6;
 constexpr std::size_t kMostStripRows = 200;
 
 std::string title_of_strip(const StripDistribution& strip) {
-  return strip.name.empty() ? fmt::format("{}", strip.strip)
-                            : fmt::format("{} ({})", strip.strip, strip.name);
+  return strip.name.empty() ? fmt::format("strip {}", strip.strip) : strip.name;
 }
 
 std::string percent(double share) { return finite_text("{:.2f} %", 100 * share); }
@@ -79,8 +78,8 @@ Chart profile_of(const PointDistributionSummary& d) {
               "Mean along every strip."};
   for (std::size_t i = 0; i < std::min(kMostProfiles, d.strips.size()); ++i) {
     const StripDistribution& strip = d.strips[i];
-    Series line{"strip " + title_of_strip(strip), kColours[i], SeriesKind::steps,
-                strip.profile.across, strip.profile.density};
+    Series line{title_of_strip(strip), kColours[i], SeriesKind::line, strip.profile.across,
+                strip.profile.density};
     chart.series.push_back(std::move(line));
   }
   if (d.strips.size() > kMostProfiles) {
