@@ -72,7 +72,7 @@ _risley() {
       simulate)
         choices="$common --output --sensor --duration-s --rate-hz --noise-angle-deg
           --noise-range-m --quantize --beam-origin --rotor --set --reported --scene --station
-          --trajectory --flight --mount --trajectory-errors --trajectory-format --start-s
+          --trajectory --trajectory-topic --flight --mount --trajectory-errors --trajectory-format --start-s
           --clock-drift-ppm --start-angles-deg" ;;
       estimate)
         choices="$common --output --method --rate-hz --noise-angle-deg --sensor --fix --free
