@@ -116,6 +116,19 @@ Json judgement_json(const calibration::FlightJudgement& judgement, TrainShape sh
           {"not_told", not_told}};
 }
 
+Json held_json(const FlightCalibration& c) {
+  const TrainShape shape = c.sensor.shape();
+  Json object = Json::object();
+  for (const calibration::HeldParameter& held : c.held) {
+    object[held.name] = {{"value", in_file_unit(held.name, held.held, shape)},
+                         {"stated_sigma", in_file_unit(held.name, held.stated_sigma, shape)},
+                         {"told", in_file_unit(held.name, held.told, shape)},
+                         {"sigma", in_file_unit(held.name, held.sigma, shape)},
+                         {"significant", held.significant}};
+  }
+  return object;
+}
+
 void print_judgement(const calibration::FlightJudgement& judgement) {
   const calibration::FlightDatum& datum = judgement.datum;
   say("boresight and prisms together: 1 sigma {:.2g} deg over the field of view ({:.2g} shared by "
@@ -163,6 +176,7 @@ Json flight_json(const CalibratedFlight& outcome, double total_time) {
                    {"sigma", 1e6 * c.clock_drift.sigma},
                    {"significant", c.clock_drift.significant}}},
                  {"range_offset_m", stated(FlightUnknowns::range_offset())},
+                 {"held", held_json(c)},
                  {"parameters", parameters},
                  {"unknowns", judged["unknowns"]},
                  {"datum", judged["datum"]},

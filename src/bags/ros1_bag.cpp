@@ -107,6 +107,7 @@ std::vector<Topic> topics_of(std::vector<TopicKey> keys, std::vector<TopicKey>* 
                          [](const TopicKey& a, const TopicKey& b) { return a.is_of(b); }),
              keys.end());
   std::vector<Topic> topics;
+  topics.reserve(keys.size());
   for (const TopicKey& key : keys) topics.push_back(ros1_topic(key.name, key.type, key.md5));
   if (kept != nullptr) *kept = std::move(keys);
   return topics;

@@ -41,8 +41,9 @@ constexpr double kPoseMargin = 5;       // sigmas of the clock offset
 /// Done when a step promises less, in squared sigmas of all unknowns together: shots that come and
 /// go at the gate move the answer by about as much.
 constexpr double kSettled = 0.1;
-/// A drift of the clock counts from so many sigmas on; known before to no better than this, s/s.
-constexpr double kDriftSigmas = 5, kDriftPrior = 1e-3;
+/// A drift of the clock, or a held parameter that is off, counts from so many sigmas on. Known
+/// before to no better than these, s/s and SI.
+constexpr double kTestedSigmas = 5, kDriftPrior = 1e-3, kHeldPrior = 1e-2;
 
 /// What of the globals a round adjusts.
 enum class Unlocked : std::uint8_t { boresight, prisms, range_and_clock, all };
@@ -332,7 +333,9 @@ class FlightWork {
 
   void fill_result();
   void fill_mount_and_sensor();
-  void test_clock_drift();
+  void test_assumptions();
+  void judge_clock_drift(double value, double sigma);
+  void judge_held(HeldParameter held);
   void fill_trajectory();
 
   const FlightCalibrationOptions& options_;
@@ -391,7 +394,7 @@ void FlightWork::fill_result() {
       judge_flight({full_.shots, full_.poses, full_.cells.plane, model_, final_weights_, priors_,
                     start_.prior_sigma, start_.considered, system, options_.seed});
   fill_mount_and_sensor();
-  test_clock_drift();
+  test_assumptions();
   fill_trajectory();
   result_.tangent = tangent_;
   result_.converged = last_.converged && result_.reason.empty();
@@ -451,28 +454,51 @@ void FlightWork::fill_mount_and_sensor() {
   }
 }
 
-/// What one more step would do if the clock could drift, and how well that is known.
-void FlightWork::test_clock_drift() {
+/// What one more step would do if the clock could drift and what is held, though it may be off,
+/// were free; and how well that is known.
+void FlightWork::test_assumptions() {
   const std::vector<std::int64_t>& times = full_.shots.time_ns;
-  FlightModel drifting = model_;
-  drifting.drift_about_ns = times.front() + (times.back() - times.front()) / 2;
-  const Index drift = drifting.unknowns().clock_drift();
+  FlightModel model = model_;
+  model.drift_about_ns = times.front() + (times.back() - times.front()) / 2;
+  const auto considered = static_cast<Index>(start_.considered);
+  const Index drift = model.unknowns().clock_drift(), first = drift - considered;
   FlightPriors priors = priors_;
   priors.mean.conservativeResizeLike(VectorXd::Zero(drift + 1));
   priors.information.conservativeResizeLike(MatrixXd::Zero(drift + 1, drift + 1));
   priors.information(drift, drift) = 1 / (kDriftPrior * kDriftPrior);
   priors.held.push_back(false);
+  for (Index i = first; i < drift; ++i) {
+    priors.information(i, i) = 1 / (kHeldPrior * kHeldPrior);
+    priors.held[static_cast<std::size_t>(i)] = false;
+  }
   const FlightSystem system(
-      flight_equations(full_.shots, full_.poses, full_.cells.plane, drifting, final_weights_),
-      drifting, priors);
-  MatrixXd functional = MatrixXd::Zero(system.size(), 1);
-  functional(system.size() - 1, 0) = 1;
+      flight_equations(full_.shots, full_.poses, full_.cells.plane, model, final_weights_), model,
+      priors);
+  const Index tested = considered + 1, at = system.size() - tested;
+  MatrixXd functionals = MatrixXd::Zero(system.size(), tested);
+  functionals.bottomRows(tested).setIdentity();
+  const VectorXd steps = system.step().unknowns.segment(at, tested);
+  const MatrixXd covariance = flight_covariance(full_.shots, full_.poses, full_.cells.plane, model,
+                                                final_weights_, priors, system, functionals);
+  judge_clock_drift(steps[considered], std::sqrt(covariance(considered, considered)));
+  const std::vector<std::string> names = unknown_names(model_);
+  const VectorXd values = unknown_values(model_);
+  for (Index i = 0; i < considered; ++i) {
+    const Index row = first + i;
+    judge_held({.name = names[static_cast<std::size_t>(row)],
+                .held = values[row],
+                .stated_sigma = start_.prior_sigma[row],
+                .told = values[row] + steps[i],
+                .sigma = std::sqrt(covariance(i, i))});
+  }
+}
+
+void FlightWork::judge_clock_drift(double value, double sigma) {
   ClockDrift& found = result_.clock_drift;
-  found.value = system.step().unknowns[system.size() - 1];
-  found.sigma = std::sqrt(flight_covariance(full_.shots, full_.poses, full_.cells.plane, drifting,
-                                            final_weights_, priors, system, functional)(0, 0));
-  found.seconds = flight_seconds(times.back() - times.front());
-  found.significant = std::abs(found.value) > kDriftSigmas * found.sigma;
+  found.value = value;
+  found.sigma = sigma;
+  found.seconds = flight_seconds(full_.shots.time_ns.back() - full_.shots.time_ns.front());
+  found.significant = std::abs(found.value) > kTestedSigmas * found.sigma;
   if (!found.significant) return;
   result_.warnings.push_back(fmt::format(
       "the clocks of sensor and trajectory drift apart: the trajectory's gains {:.2g} +- {:.1g} "
@@ -482,6 +508,18 @@ void FlightWork::test_clock_drift() {
       "Set "
       "the sensor's clock by PPS or PTP, or calibrate shorter parts of the flight",
       1e6 * found.value, 1e6 * found.sigma, 1e3 * found.value * found.seconds, found.seconds));
+}
+
+void FlightWork::judge_held(HeldParameter held) {
+  held.significant =
+      std::abs(held.told - held.held) > kTestedSigmas * std::hypot(held.sigma, held.stated_sigma);
+  if (held.significant) {
+    result_.warnings.push_back(
+        fmt::format("the strips contradict what is held: {}; what was found is off by more than "
+                    "its sigmas. Let it be estimated as well (option additional)",
+                    in_words(held, options_.sensor)));
+  }
+  result_.held.push_back(std::move(held));
 }
 
 void FlightWork::fill_trajectory() {

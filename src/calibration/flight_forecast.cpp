@@ -256,7 +256,7 @@ SharedPointErrors point_errors(const ForecastWork& work, const FlightSystem& sys
       apart += difference.diagonal();
     }
     single = (single / static_cast<double>(points)).cwiseMax(0).cwiseSqrt().eval();
-    apart = (apart / static_cast<double>(points / 2)).cwiseMax(0).cwiseSqrt().eval();
+    apart = (2 * apart / static_cast<double>(points)).cwiseMax(0).cwiseSqrt().eval();
   };
   fill(before, result.trajectory, result.strips_trajectory);
   fill(after, result.adjusted, result.strips_adjusted);

@@ -94,6 +94,15 @@ CalibrationVerdict verdict_of(const Calibration& c) {
           "use the calibration for this unit's clouds, and repeat it on other walls"};
 }
 
+std::string in_words(const HeldParameter& held, const sensors::Sensor& sensor) {
+  const ParameterInfo& info = find_parameter(held.name, sensor.shape());
+  const auto in_unit = [&](double value) { return value / info.si_per_unit; };
+  const std::string unit = info.unit == "1" ? "" : " " + info.unit;
+  return fmt::format("{} is held at {:.6g} +- {:.2g}{}, and the strips say {:.6g} +- {:.2g}{}",
+                     held.name, in_unit(held.held), in_unit(held.stated_sigma), unit,
+                     in_unit(held.told), in_unit(held.sigma), unit);
+}
+
 CalibrationVerdict verdict_of(const FlightCalibration& c) {
   if (!c.converged) {
     return {CalibrationCode::undecided, c.reason,
@@ -107,6 +116,11 @@ CalibrationVerdict verdict_of(const FlightCalibration& c) {
                         1e6 * c.clock_drift.value, 1e6 * c.clock_drift.sigma,
                         1e3 * std::abs(c.clock_drift.value) * c.clock_drift.seconds),
             "set the sensor's clock by PPS or PTP, or calibrate shorter parts of the flight"};
+  }
+  for (const HeldParameter& held : c.held) {
+    if (!held.significant) continue;
+    return {CalibrationCode::undecided, in_words(held, c.sensor),
+            "let " + held.name + " be estimated as well (option additional)"};
   }
   // Of the change of some unknowns, and how many these are.
   const auto significance = [&](std::size_t from) {

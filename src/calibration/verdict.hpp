@@ -21,6 +21,9 @@ CalibrationVerdict verdict_of(const Calibration& c);
 /// The same of a calibration in flight, by the prisms' parameters and the distances between strips.
 CalibrationVerdict verdict_of(const FlightCalibration& c);
 
+/// What is held and what the flight tells of it: "refractive_index is held at 1.51 +- 1e-06, ...".
+std::string in_words(const HeldParameter& held, const sensors::Sensor& sensor);
+
 /// What a user should know of a calibration beside its numbers.
 std::vector<std::string> warnings_of(const Calibration& c, const PlanarSolution& solution,
                                      const std::vector<RangedRecording>& recordings);

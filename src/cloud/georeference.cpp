@@ -136,7 +136,7 @@ std::string far_from_map(const MapProjection& map, const trajectories::Trajector
   // Borders of areas are rounded.
   constexpr double kRounded = 0.01 * kRadiansPerDegree;
   if (farthest <= kRounded) return {};
-  const std::string words = fmt::format(
+  std::string words = fmt::format(
       "crs {} is for {} (latitude {:.2f} to {:.2f}, longitude {:.2f} to {:.2f} degrees), and the "
       "trajectory is at latitude {:.4f}, longitude {:.4f}: is it the right zone?",
       map.name(), map.area()->name.empty() ? "another area" : map.area()->name,

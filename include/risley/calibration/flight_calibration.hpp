@@ -58,6 +58,15 @@ struct ClockDrift {
   bool significant = false;
 };
 
+/// A parameter that the adjustment holds and that may be off, as the flight itself tells it.
+struct HeldParameter {
+  std::string name;
+  double held = 0, stated_sigma = 0;  ///< SI
+  double told = 0, sigma = 0;         ///< by the flight alone, SI
+  /// Beyond chance: what was found holds for the value held, and the flight contradicts it.
+  bool significant = false;
+};
+
 /// What one calibration in flight found.
 struct FlightCalibration : FlightJudgement {
   bool converged = false;
@@ -68,6 +77,7 @@ struct FlightCalibration : FlightJudgement {
   sensors::Sensor sensor;     ///< adjusted, with covariance
   FlightModel model;          ///< with corrections at the knots and planes, in the tangent frame
   ClockDrift clock_drift;
+  std::vector<HeldParameter> held;  ///< indices that recordings told, above all
   std::vector<StripPair> pairs_before, pairs_after;
   double rms_before = 0, rms_after = 0;  ///< of all pairs and cells, along the normals, m
   double sigma0 = 1;       ///< standard deviation of unit weight against the stated range noise
