@@ -72,7 +72,7 @@ _risley() {
       simulate)
         choices="$common --output --sensor --duration-s --rate-hz --noise-angle-deg
           --noise-range-m --quantize --beam-origin --rotor --set --reported --scene --station
-          --trajectory --flight --mount --trajectory-errors --trajectory-format --start-s
+          --trajectory --trajectory-topic --flight --mount --trajectory-errors --trajectory-format --start-s
           --clock-drift-ppm --start-angles-deg" ;;
       estimate)
         choices="$common --output --method --rate-hz --noise-angle-deg --sensor --fix --free
@@ -83,12 +83,14 @@ _risley() {
       calibrate)
         choices="$common --output --method --planes --stations --station --plan --duration-s
           --rate-hz --noise-angle-deg --noise-range-m --sensor --fix --free --prior-sigma-deg
-          --range-offset-sigma-m --beam-origin --states --mirror --force --truth --shot-rate-hz
+          --range-offset-sigma-m --beam-origin --states --mirror --force --truth --trajectory
+          --trajectory-topic --mount --accuracy --trajectory-errors --knot-spacing-s --cell-size-m --scene
+          --empty-circle-m --report --shot-rate-hz
           --extrinsics" ;;
       cloud)
         choices="$common --output --calibration --format --directions --beam-origin --covariance
           --beam-divergence --common-factors --trajectory --trajectory-topic --mount --accuracy --trajectory-errors --crs
-          --datum --rate-hz --noise-angle-deg --las-scale-m --time --beam-origin-map --shot-rate-hz --extrinsics" ;;
+          --datum --distribution --rate-hz --noise-angle-deg --las-scale-m --time --beam-origin-map --shot-rate-hz --extrinsics" ;;
       reproduce) choices="$common --output --full --recording --shot-rate-hz --extrinsics" ;;
     esac
     mapfile -t COMPREPLY < <(compgen -W "$choices" -- "$current")

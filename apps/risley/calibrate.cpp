@@ -9,14 +9,20 @@
 
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
+#include "risley/jobs/calibrate_flight.hpp"
 #include "risley/jobs/calibrate_recordings.hpp"
 #include "risley/jobs/plan_calibration.hpp"
+#include "risley/jobs/plan_flight.hpp"
 #include "risley/report/calibration_report.hpp"
+#include "risley/report/flight_report.hpp"
 
 #include "calibration_text.hpp"
 #include "command.hpp"
+#include "flight_text.hpp"
 #include "option_names.hpp"
 #include "parameter_choice.hpp"
+#include "plan_flight.hpp"
+#include "platform_options.hpp"
 #include "reading_options.hpp"
 #include "result_folder.hpp"
 
@@ -27,10 +33,12 @@ using jobs::CalibratedRecordings;
 
 struct CalibrateCommandOptions {
   std::vector<std::string> inputs, station_names, truths;
+  jobs::PlatformFiles platform;
   std::string folder, method = "adjustment", rate_hz = "full", sensor, planes, stations,
-                      beam_origin = "yes", states = "knots", mirror = "auto", plan;
+                      beam_origin = "yes", states = "knots", mirror = "auto", plan, scene, page;
   std::optional<double> noise_angle_deg, noise_range_m, prior_sigma_deg;
-  double range_offset_sigma_m = 0.05, duration_s = 10.0;
+  std::optional<double> range_offset_sigma_m, knot_spacing_s, cell_size_m;
+  double duration_s = 10.0, empty_circle_m = cloud::PointDistributionOptions{}.empty_circle;
   bool force = false;
   ParameterWishes parameters;
   ReadingWishes reading;
@@ -55,11 +63,14 @@ std::vector<scenes::Station> stations_for(const CalibrateCommandOptions& options
   return stations;
 }
 
-/// What recordings and plans share; `Job` is the options of either.
+/// What all kinds of calibrations share; `Job` is the options of one.
 template <class Job>
 void take_common(const CalibrateCommandOptions& options, Job& job) {
   if (options.noise_range_m) check_positive(*options.noise_range_m, "--noise-range-m", "m");
-  check_not_negative(options.range_offset_sigma_m, "--range-offset-sigma-m", "m");
+  if (options.range_offset_sigma_m) {
+    check_not_negative(*options.range_offset_sigma_m, "--range-offset-sigma-m", "m");
+    job.range_offset_sigma = *options.range_offset_sigma_m;
+  }
   if (options.prior_sigma_deg) {
     check_positive(*options.prior_sigma_deg, "--prior-sigma-deg", "deg");
     job.prior_sigma = radians_from_degrees(*options.prior_sigma_deg);
@@ -69,25 +80,44 @@ void take_common(const CalibrateCommandOptions& options, Job& job) {
   job.fixed = held_parameters(options.parameters.fixed);
   job.additional = options.parameters.freed;
   job.range_noise = options.noise_range_m;
-  job.range_offset_sigma = options.range_offset_sigma_m;
-  job.beam_origin = options.beam_origin == "yes";
 }
 
-jobs::CalibrateRecordingsOptions job_of(const CalibrateCommandOptions& options,
-                                        const CommonOptions& common) {
-  jobs::CalibrateRecordingsOptions job;
+/// What flights share, flown and planned.
+template <class Job>
+void take_grid(const CalibrateCommandOptions& options, Job& job) {
+  if (options.knot_spacing_s) {
+    check_positive(*options.knot_spacing_s, "--knot-spacing-s", "s");
+    job.knot_spacing = *options.knot_spacing_s;
+  }
+  if (options.cell_size_m) {
+    check_positive(*options.cell_size_m, "--cell-size-m", "m");
+    job.cell_size = *options.cell_size_m;
+  }
+}
+
+/// What recordings of walls and of a flight share.
+template <class Job>
+void take_recordings(const CalibrateCommandOptions& options, const CommonOptions& common,
+                     Job& job) {
   take_common(options, job);
   job.recordings = options.inputs;
   job.reading = read_options(options.reading);
   job.angle_noise = noise_angle(options.noise_angle_deg);
   if (options.mirror != "auto") job.mirrored = options.mirror == "yes";
-  if (options.method == "paper") job.method = calibration::CalibrationMethod::paper;
-  if (!options.planes.empty()) job.planes = scenes::load_scene(options.planes);
-  job.stations = stations_for(options);
   job.seed = common.seed;
   job.truths = options.truths;
   job.details = !options.folder.empty();
   job.force = options.force;
+}
+
+jobs::CalibrateRecordingsOptions job_of(const CalibrateCommandOptions& options,
+                                        const CommonOptions& common) {
+  jobs::CalibrateRecordingsOptions job;
+  take_recordings(options, common, job);
+  job.beam_origin = options.beam_origin == "yes";
+  if (options.method == "paper") job.method = calibration::CalibrationMethod::paper;
+  if (!options.planes.empty()) job.planes = scenes::load_scene(options.planes);
+  job.stations = stations_for(options);
   std::vector<std::string> states = {"states.nc"};
   for (std::size_t i = 1; i <= options.inputs.size(); ++i) {
     states.push_back(fmt::format("states_{}.nc", i));
@@ -100,36 +130,72 @@ jobs::CalibrateRecordingsOptions job_of(const CalibrateCommandOptions& options,
   return job;
 }
 
-ExitStatus run_calibration(const CalibrateCommandOptions& options, const CommonOptions& common) {
+/// Runs a calibration, on walls or in flight, and says what came of it.
+template <class Calibrate, class JsonOf, class Print>
+ExitStatus run_job(const CalibrateCommandOptions& options, const CommonOptions& common,
+                   const Calibrate& calibrate, const JsonOf& json_of, const Print& print) {
   const double started = now();
-  CalibratedRecordings outcome;
-  {
+  auto outcome = [&] {
     ProgressBar bar("calibrating", common);
-    outcome = jobs::calibrate_recordings(job_of(options, common), bar.progress());
-  }
-  calibration::Calibration& c = outcome.calibration;
+    return calibrate(bar.progress());
+  }();
+  auto& c = outcome.calibration;
   c.reason = with_flags(c.reason);
   put_flags(outcome.warnings);
   for (const std::string& warning : outcome.warnings) spdlog::warn(warning);
   for (const std::string& warning : c.warnings) spdlog::warn(warning);
   if (!c.converged) spdlog::error("not converged: {}", c.reason);
-  if (c.verdict.code == calibration::CalibrationCode::not_better && !options.force &&
-      !options.folder.empty()) {
-    spdlog::warn("calibration.yaml was not written, because it is not better: --force writes it");
+  const bool worse = c.verdict.code == calibration::CalibrationCode::not_better;
+  const bool doubtful = c.verdict.code == calibration::CalibrationCode::undecided;
+  if (c.converged && (worse || doubtful) && !options.force && !options.folder.empty()) {
+    spdlog::warn("calibration.yaml was not written, because {}: --force writes it",
+                 worse ? "it is not better" : "it is not to be trusted");
   }
   if (common.json) {
-    print_json(common, calibration_json(outcome, now() - started), outcome.provenance);
+    print_json(common, json_of(outcome, now() - started), outcome.provenance);
   } else {
-    print_calibration(outcome);
+    print(outcome);
   }
   return c.converged ? kDone : kNumbersFailed;
 }
 
+jobs::CalibrateFlightOptions flight_job_of(const CalibrateCommandOptions& options,
+                                           const CommonOptions& common) {
+  jobs::CalibrateFlightOptions job;
+  take_recordings(options, common, job);
+  job.platform = options.platform;
+  take_grid(options, job);
+  require_folder_apart(common, options.folder, {"mount.yaml", "trajectory.csv"});
+  job.files = result_files(options.folder, "none", common);
+  job.texts = [](const jobs::CalibratedFlight& outcome) {
+    return report_texts(report::flight_report(outcome));
+  };
+  return job;
+}
+
 ExitStatus run_plan(const CalibrateCommandOptions& options, const CommonOptions& common) {
   if (!options.inputs.empty()) throw InvalidArgument("--plan takes no recordings");
+  if (is_flight_plan(options.plan)) {
+    jobs::PlanFlightOptions job;
+    take_common(options, job);
+    take_grid(options, job);
+    check_positive(options.empty_circle_m, "--empty-circle-m", "m");
+    job.distribution.empty_circle = options.empty_circle_m;
+    job.seed = common.seed;
+    return run_flight_plan(job, options.plan, options.platform, options.scene, options.page,
+                           common);
+  }
+  if (moves(options.platform) || !options.scene.empty() || !options.page.empty() ||
+      options.knot_spacing_s || options.cell_size_m) {
+    throw InvalidArgument(fmt::format(
+        "{} is a scene of walls: --mount, --trajectory-errors, --scene, --report, --knot-spacing-s "
+        "and --cell-size-m go with a flight, which has strips",
+        options.plan));
+  }
   check_positive(options.duration_s, "--duration-s", "s");
   jobs::PlanCalibrationOptions job;
   take_common(options, job);
+  job.beam_origin = options.beam_origin == "yes";
   job.scene = scenes::load_scene(options.plan);
   job.duration = options.duration_s;
   jobs::PlannedCalibration planned;
@@ -150,7 +216,8 @@ ExitStatus run_plan(const CalibrateCommandOptions& options, const CommonOptions&
 Run declare_calibrate(CLI::App& verb) {
   const auto options = std::make_shared<CalibrateCommandOptions>();
   CalibrateCommandOptions& o = *options;
-  verb.add_option("INPUT", o.inputs, "Recordings of one sensor, with ranges to plane walls");
+  verb.add_option("INPUT", o.inputs,
+                  "Recordings of one sensor, with ranges to plane walls or from a flight");
   verb.add_option(
       "-o,--output", o.folder,
       "Folder for calibration.yaml, states.nc (states_1.nc, ...), report.json and report.html");
@@ -171,12 +238,30 @@ Run declare_calibrate(CLI::App& verb) {
       ->allow_extra_args(false)
       ->take_all();
   verb.add_option("--plan", o.plan,
-                  "Scene (YAML) to plan for: says what a calibration there would reach")
+                  "Scene or flight (YAML) to plan for: says what a calibration there would reach, "
+                  "and of a flight how its points lie on the ground")
       ->excludes("--output", "--method", "--planes", "--stations", "--station");
   verb.add_option("--duration-s", o.duration_s, "Length of each planned recording")
       ->needs("--plan")
       ->capture_default_str();
-  verb.add_option("--rate-hz", o.rate_hz, "Shots per second to use, or of the plan; 'full' for all")
+  verb.add_option("--scene", o.scene, "Terrain (YAML) below a planned flight (default: level)")
+      ->needs("--plan");
+  verb.add_option("--empty-circle-m", o.empty_circle_m,
+                  "Diameter of circles that the points of a planned flight should not leave empty")
+      ->needs("--plan")
+      ->capture_default_str();
+  verb.add_option("--report", o.page, "Page (HTML) on the points of a planned flight")
+      ->needs("--plan");
+  add_platform_options(verb, o.platform);
+  verb.get_option("--trajectory")->excludes("--plan", "--method", "--planes", "--stations");
+  verb.add_option("--knot-spacing-s", o.knot_spacing_s,
+                  "Of a flight: between corrections of the trajectory; further apart on long "
+                  "flights (default: 0.25)");
+  verb.add_option("--cell-size-m", o.cell_size_m,
+                  "Of a flight: of the squares of ground that strips share (default: 2)");
+  verb.add_option(
+          "--rate-hz", o.rate_hz,
+          "Shots per second to use, or of the plan; 'full' for all, of a planned flight 5000")
       ->capture_default_str();
   verb.add_option("--noise-angle-deg", o.noise_angle_deg,
                   "1 sigma of azimuth and zenith before rounding (default: the sensor's)");
@@ -189,8 +274,8 @@ Run declare_calibrate(CLI::App& verb) {
   verb.add_option("--prior-sigma-deg", o.prior_sigma_deg,
                   "1 sigma of every error angle about what the sensor believes (default: none)");
   verb.add_option("--range-offset-sigma-m", o.range_offset_sigma_m,
-                  "Prior of the range offset about 0; 0 holds it there")
-      ->capture_default_str();
+                  "Prior of the range offset about what the sensor states; 0 holds it there "
+                  "(default: 0.05, of a flight 0.02)");
   verb.add_option("--beam-origin", o.beam_origin,
                   "Start beams where they leave the last prism; 'no': at the sensor's origin")
       ->check(CLI::IsMember({"yes", "no"}))
@@ -218,8 +303,24 @@ Run declare_calibrate(CLI::App& verb) {
     options->truths.insert(options->truths.end(), truth, options->inputs.end());
     options->inputs.erase(truth, options->inputs.end());
     if (!options->plan.empty()) return run_plan(*options, common);
+    if ((options->knot_spacing_s || options->cell_size_m) && !moves(options->platform)) {
+      throw InvalidArgument("--knot-spacing-s and --cell-size-m go with --trajectory or --plan");
+    }
     if (options->inputs.empty()) throw InvalidArgument("INPUT is missing: a recording, or --plan");
-    return run_calibration(*options, common);
+    if (moves(options->platform)) {
+      return run_job(
+          *options, common,
+          [&](const Progress& progress) {
+            return jobs::calibrate_flight(flight_job_of(*options, common), progress);
+          },
+          flight_json, print_flight);
+    }
+    return run_job(
+        *options, common,
+        [&](const Progress& progress) {
+          return jobs::calibrate_recordings(job_of(*options, common), progress);
+        },
+        calibration_json, print_calibration);
   };
 }
 

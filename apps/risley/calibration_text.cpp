@@ -25,7 +25,30 @@ using jobs::CalibratedRecordings;
 
 double deg(double radians) { return degrees_from_radians(radians); }
 
-/// Slips of all recordings, each with the name of its own.
+Json datum_json(calibration::DatumKind kind, const FormalDatum& datum) {
+  return {{"kind", calibration::to_string(kind)},      {"sigma_roll_deg", deg(datum.sigma_roll)},
+          {"sigma_pitch_deg", deg(datum.sigma_pitch)}, {"sigma_yaw_deg", deg(datum.sigma_yaw)},
+          {"sigma_gauge_deg", deg(datum.gauge)},       {"sigma_shape_deg", deg(datum.shape)},
+          {"sigma_total_deg", deg(datum.total)}};
+}
+
+Json vector_json(const Vector3<double>& v) { return {v.x, v.y, v.z}; }
+
+Json unobservable_json(const std::vector<estimation::WeakDirection>& directions) {
+  Json list = Json::array();
+  for (const auto& direction : directions) list.push_back(weak_direction_json(direction));
+  return list;
+}
+
+void print_datum(calibration::DatumKind kind, const FormalDatum& datum) {
+  say("datum: {}; 1 sigma of roll {:.2g}, pitch {:.2g}, yaw {:.2g} deg; of the beams against each "
+      "other {:.2g} deg\n",
+      calibration::to_string(kind), deg(datum.sigma_roll), deg(datum.sigma_pitch),
+      deg(datum.sigma_yaw), deg(datum.shape));
+}
+
+}  // namespace
+
 Json slips_of_all(const std::vector<jobs::ReadRecording>& recordings) {
   Json all = Json::array();
   for (const jobs::ReadRecording& recording : recordings) {
@@ -47,33 +70,6 @@ Json errors_json(const DirectionErrors& e) {
           {"shape_deg", deg(e.shape)}};
 }
 
-Json datum_json(calibration::DatumKind kind, const FormalDatum& datum) {
-  return {{"kind", calibration::to_string(kind)},      {"sigma_roll_deg", deg(datum.sigma_roll)},
-          {"sigma_pitch_deg", deg(datum.sigma_pitch)}, {"sigma_yaw_deg", deg(datum.sigma_yaw)},
-          {"sigma_gauge_deg", deg(datum.gauge)},       {"sigma_shape_deg", deg(datum.shape)},
-          {"sigma_total_deg", deg(datum.total)}};
-}
-
-Json vector_json(const Vector3<double>& v) { return {v.x, v.y, v.z}; }
-
-Json unobservable_json(const std::vector<estimation::WeakDirection>& directions) {
-  Json list = Json::array();
-  for (const auto& direction : directions) list.push_back(weak_direction_json(direction));
-  return list;
-}
-
-/// NaN has no place in JSON.
-Json finite_or_null(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
-
-void print_datum(calibration::DatumKind kind, const FormalDatum& datum) {
-  say("datum: {}; 1 sigma of roll {:.2g}, pitch {:.2g}, yaw {:.2g} deg; of the beams against each "
-      "other {:.2g} deg\n",
-      calibration::to_string(kind), deg(datum.sigma_roll), deg(datum.sigma_pitch),
-      deg(datum.sigma_yaw), deg(datum.shape));
-}
-
-}  // namespace
-
 Json calibration_json(const CalibratedRecordings& outcome, double total_time) {
   const Calibration& c = outcome.calibration;
   const TrainShape shape = c.sensor.shape();
@@ -83,9 +79,9 @@ Json calibration_json(const CalibratedRecordings& outcome, double total_time) {
     const auto at = static_cast<Eigen::Index>(j);
     parameters[c.free[j].name] = {
         {"value", in_file_unit(c.free[j].name, c.parameters[at], shape)},
-        {"sigma", finite_or_null(in_file_unit(c.free[j].name, c.total_sigma(j), shape))},
+        {"sigma", number_or_null(in_file_unit(c.free[j].name, c.total_sigma(j), shape))},
         {"sigma_given_held",
-         finite_or_null(in_file_unit(c.free[j].name, std::sqrt(c.covariance(at, at)), shape))}};
+         number_or_null(in_file_unit(c.free[j].name, std::sqrt(c.covariance(at, at)), shape))}};
   }
   for (const calibration::CalibratedPlane& plane : c.planes) {
     planes.push_back({{"name", plane.name},
@@ -256,7 +252,7 @@ Json forecast_json(const CalibrationForecast& f, TrainShape shape) {
     const auto at = static_cast<Eigen::Index>(j);
     parameters[f.free[j].name] = {
         {"sigma",
-         finite_or_null(in_file_unit(f.free[j].name, std::sqrt(f.covariance(at, at)), shape))}};
+         number_or_null(in_file_unit(f.free[j].name, std::sqrt(f.covariance(at, at)), shape))}};
   }
   for (const calibration::PlannedWall& wall : f.walls) {
     walls.push_back({{"name", wall.name},
@@ -266,7 +262,7 @@ Json forecast_json(const CalibrationForecast& f, TrainShape shape) {
                      {"mean_range_m", wall.mean_range}});
   }
   return {{"parameters", parameters},
-          {"range_offset_m", {{"sigma", finite_or_null(f.range_offset_sigma)}}},
+          {"range_offset_m", {{"sigma", number_or_null(f.range_offset_sigma)}}},
           {"datum", datum_json(f.datum_kind, f.datum)},
           {"unobservable", unobservable_json(f.unobservable)},
           {"walls", walls},

@@ -2,7 +2,10 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <vector>
+
 #include "risley/calibration/calibration_plan.hpp"
+#include "risley/calibration/datum.hpp"
 #include "risley/jobs/calibrate_recordings.hpp"
 
 #include "command.hpp"
@@ -12,6 +15,11 @@ namespace risley::app {
 /// @param total_time  that the verb took, s
 Json calibration_json(const jobs::CalibratedRecordings& outcome, double total_time);
 void print_calibration(const jobs::CalibratedRecordings& outcome);
+
+/// Errors of directions against a known truth.
+Json errors_json(const calibration::DirectionErrors& errors);
+/// Slips of all recordings, each with the name of its own.
+Json slips_of_all(const std::vector<jobs::ReadRecording>& recordings);
 
 Json forecast_json(const calibration::CalibrationForecast& forecast, TrainShape shape);
 void print_forecast(const calibration::CalibrationForecast& forecast, TrainShape shape);

@@ -14,11 +14,14 @@
 #include "risley/jobs/cloud_of_recording.hpp"
 #include "risley/jobs/recording_input.hpp"
 #include "risley/report/beam_origin_page.hpp"
+#include "risley/report/distribution_page.hpp"
 #include "risley/sensors/preset.hpp"
 
 #include "command.hpp"
+#include "distribution_text.hpp"
 #include "many_files.hpp"
 #include "option_names.hpp"
+#include "platform_options.hpp"
 #include "reading_options.hpp"
 #include "recording_text.hpp"
 #include "result_folder.hpp"
@@ -28,7 +31,7 @@ namespace {
 
 struct CloudCommandOptions {
   std::vector<std::string> inputs;
-  std::string output, calibration, format, beam_origin_map;
+  std::string output, calibration, format, beam_origin_map, distribution;
   std::string directions = "smoothed", beam_origin = "yes", beam_divergence = "yes",
               covariance = "yes", common_factors = "no", time = "gps";
   std::string rate_hz = fmt::format("{:.0f}", cloud::kTrackingRate);
@@ -67,6 +70,7 @@ cloud::CloudOptions cloud_options(const CloudCommandOptions& options) {
   check_positive(options.las_scale_m, "--las-scale-m", "m");
   result.writer.las_scale = options.las_scale_m;
   result.writer.gps_time = options.time == "gps";
+  if (!options.distribution.empty()) result.distribution.emplace();
   return result;
 }
 
@@ -95,6 +99,7 @@ Json summary_json(const FileJob& job, const cloud::CloudSummary& s) {
       {"warnings", warnings},
   };
   if (s.damage) json.update(damage_json(*s.damage));
+  if (s.distribution) json["distribution"] = distribution_json(*s.distribution);
   return json;
 }
 
@@ -130,6 +135,10 @@ FileOutcome make_one(const FileJob& job, const CloudCommandOptions& options,
   if (s.damage) {
     spdlog::error("{}; the {} points before it are saved in {}", s.damage->what(), s.points,
                   job.output);
+  }
+  if (s.distribution) {
+    io::write_text_file(options.distribution,
+                        report::distribution_page(*s.distribution, job.input, settings.provenance));
   }
   std::string text = fmt::format("{}: {} points", job.output, grouped(s.points));
   if (s.no_return > 0) text += fmt::format(", {} shots without return", grouped(s.no_return));
@@ -179,24 +188,18 @@ Run declare_cloud(CLI::App& verb) {
          "Give every point the loadings of the errors that all points share, for covariances "
          "between points");
   add_reading_options(verb, o.reading);
-  verb.add_option("--trajectory", o.platform.trajectory,
-                  "Trajectory of a sensor that moved: SBET, Inertial Explorer or POSPac text, CSV, "
-                  "poses of a ROS bag");
-  verb.add_option("--trajectory-topic", o.platform.topic,
-                  "Topic of its poses, of a ROS bag that has several")
-      ->type_name("NAME");
-  verb.add_option("--mount", o.platform.mount,
-                  "How the sensor sits on the moving platform (YAML): axes, lever arm, boresight, "
-                  "clock");
-  verb.add_option("--accuracy", o.platform.accuracy, "Accuracies of the trajectory (SMRMSG)");
-  verb.add_option("--trajectory-errors", o.platform.errors,
-                  "How wrong the trajectory may be, and for how long (YAML)");
+  add_platform_options(verb, o.platform);
   verb.add_option("--crs", o.platform.crs,
                   "Map that the points of a moving sensor go to: EPSG:25832, with a height system "
                   "EPSG:25832+7837 (default: UTM on WGS 84, ellipsoidal heights)");
   verb.add_option("--datum", o.platform.datum,
                   "Datum of the trajectory: EPSG:4979 for WGS 84, EPSG:4937 for ETRS89 (default: "
                   "WGS 84)");
+  verb.add_option(
+          "--distribution", o.distribution,
+          "Page (HTML) on how the points of one flight lie on the ground; its numbers are in "
+          "--json")
+      ->needs("--trajectory");
   verb.add_option("--rate-hz", o.rate_hz,
                   "Directions per second that rotation angles are found from; 'full' for all")
       ->capture_default_str();
@@ -227,6 +230,13 @@ Run declare_cloud(CLI::App& verb) {
       ending = cloud::find_cloud_format("", options->format).ending;
     }
     const std::vector<FileJob> files = file_jobs(options->inputs, options->output, ending);
+    if (!options->distribution.empty()) {
+      if (files.size() != 1) {
+        throw InvalidArgument(
+            fmt::format("--distribution is of one recording, and there are {}", files.size()));
+      }
+      require_apart(common, {options->distribution, files.front().output});
+    }
     settings.writer.format = options->format;
     settings.provenance = provenance_of(common);
     return run_file_jobs(

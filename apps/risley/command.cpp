@@ -179,9 +179,20 @@ std::optional<double> noise_angle(const std::optional<double>& noise_angle_deg) 
 
 void note_files(const CLI::App& verb, CommonOptions& common) {
   namespace fs = std::filesystem;
-  static constexpr std::array<std::string_view, 10> kReading = {
-      "--sensor", "--calibration", "--planes",    "--stations", "--truth",
-      "--scene",  "--plan",        "--recording", "--from",     "--accuracy"};
+  static constexpr std::array<std::string_view, 14> kReading = {"--sensor",
+                                                                "--calibration",
+                                                                "--planes",
+                                                                "--stations",
+                                                                "--truth",
+                                                                "--scene",
+                                                                "--plan",
+                                                                "--recording",
+                                                                "--from",
+                                                                "--accuracy",
+                                                                "--trajectory",
+                                                                "--mount",
+                                                                "--trajectory-errors",
+                                                                "--flight"};
   for (const CLI::Option* option : verb.get_options()) {
     for (const std::string& value : option->results()) {
       std::error_code ignored;
@@ -279,5 +290,7 @@ void require_apart(const CommonOptions& common, const std::vector<std::string>& 
     }
   }
 }
+
+Json number_or_null(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
 
 }  // namespace risley::app

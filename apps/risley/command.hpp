@@ -151,6 +151,9 @@ void require_apart(const CommonOptions& common, const std::vector<std::string>& 
 void print_json(const CommonOptions& common, const Json& object,
                 const jobs::Provenance& known = {});
 
+/// NaN and the infinite have no place in JSON.
+Json number_or_null(double value);
+
 /// A verdict: stable code, words, what to do. Words of options become flags.
 template <class Verdict>
 Json verdict_json(const Verdict& verdict) {

@@ -69,8 +69,6 @@ std::vector<FittedValue> values_of(const Hypothesis& hypothesis) {
   return values;
 }
 
-Json number_or_null(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
-
 Json hypothesis_json(const identification::Identification& found, const Hypothesis& hypothesis) {
   Json parameters = Json::object(), equivalent = Json::array(), lags = Json::array();
   for (const FittedValue& one : values_of(hypothesis)) {

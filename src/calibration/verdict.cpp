@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
+#include <vector>
 
 #include <fmt/format.h>
 
@@ -106,39 +108,45 @@ CalibrationVerdict verdict_of(const FlightCalibration& c) {
                         1e3 * std::abs(c.clock_drift.value) * c.clock_drift.seconds),
             "set the sensor's clock by PPS or PTP, or calibrate shorter parts of the flight"};
   }
-  std::vector<Eigen::Index> prisms;
-  for (std::size_t i = FlightUnknowns{}.size(); i < c.unknowns.size(); ++i) {
-    if (!c.unknowns[i].held) prisms.push_back(static_cast<Eigen::Index>(i));
-  }
-  Eigen::VectorXd change(static_cast<Eigen::Index>(prisms.size()));
-  for (Eigen::Index i = 0; i < change.size(); ++i) {
-    const FlightUnknown& own =
-        c.unknowns[static_cast<std::size_t>(prisms[static_cast<std::size_t>(i)])];
-    change[i] = own.value - own.start;
-  }
-  const auto freedom = static_cast<double>(change.size());
-  const double chi2 =
-      prisms.empty()
-          ? 0.0
-          : change.dot(algebra::SymmetricSolver(c.covariance(prisms, prisms)).solve(change));
+  // Of the change of some unknowns, and how many these are.
+  const auto significance = [&](std::size_t from) {
+    std::vector<Eigen::Index> rows;
+    for (std::size_t i = from; i < c.unknowns.size(); ++i) {
+      if (!c.unknowns[i].held) rows.push_back(static_cast<Eigen::Index>(i));
+    }
+    Eigen::VectorXd change(static_cast<Eigen::Index>(rows.size()));
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+      const FlightUnknown& own = c.unknowns[static_cast<std::size_t>(rows[i])];
+      change[static_cast<Eigen::Index>(i)] = own.value - own.start;
+    }
+    const double chi2 =
+        rows.empty() ? 0.0
+                     : change.dot(algebra::SymmetricSolver(c.covariance(rows, rows)).solve(change));
+    return std::pair{chi2, static_cast<double>(rows.size())};
+  };
+  const auto significant = [](const std::pair<double, double>& test) {
+    return test.first > significant_chi2(std::max(1.0, test.second));
+  };
+  const auto all = significance(0),
+             prisms = significance(static_cast<std::size_t>(FlightUnknowns{}.size()));
   const std::string strips =
       fmt::format("strips were {:.3g} mm apart with what was stated and are {:.3g} mm apart now",
                   1e3 * c.rms_before, 1e3 * c.rms_after);
-  if (c.rms_after >= c.rms_before) {
+  if (significant(all) && c.rms_after >= c.rms_before) {
     return {CalibrationCode::not_better, strips,
             "do not use it: see whether ground, trajectory and mount are those of this flight"};
   }
-  if (!(chi2 > significant_chi2(std::max(1.0, freedom)))) {
+  if (!significant(prisms)) {
     return {CalibrationCode::as_believed,
             fmt::format("the strips bear out what the sensor believes of its prisms (chi2 {:.3g} "
                         "of {:.0f} parameters); {}",
-                        chi2, freedom, strips),
+                        prisms.first, prisms.second, strips),
             "use the mount that was found for clouds of this platform"};
   }
   return {CalibrationCode::bent,
           fmt::format("the prisms differ from what the sensor believes (chi2 {:.3g} of {:.0f} "
                       "parameters); {}",
-                      chi2, freedom, strips),
+                      prisms.first, prisms.second, strips),
           "use mount and calibration, both, for clouds of this platform"};
 }
 

@@ -490,4 +490,23 @@ std::vector<std::string> Georeference::warnings() const {
 std::int64_t Georeference::clock_shift_ns() const { return state_->shift_ns; }
 const std::vector<trajectories::FlownStrip>& Georeference::strips() const { return state_->strips; }
 
+std::vector<StripLine> Georeference::strip_lines() const {
+  const State& s = *state_;
+  std::vector<StripLine> lines;
+  for (const trajectories::FlownStrip& strip : s.strips) {
+    std::array<Vector3d, 2> ends;
+    for (std::size_t k = 0; k < 2; ++k) {
+      const auto pose = s.interpolation.at(k == 0 ? strip.begin_ns : strip.end_ns);
+      if (!pose) return {};
+      const Vector3d place = pose->position + pose->attitude * s.lever_arm;
+      ends[k] = s.tangent(place).map(place);
+    }
+    lines.push_back({"",
+                     {ends[0].x(), ends[0].y()},
+                     {ends[1].x(), ends[1].y()},
+                     0.5 * (ends[0].z() + ends[1].z())});
+  }
+  return lines;
+}
+
 }  // namespace risley::cloud

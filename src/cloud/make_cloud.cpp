@@ -3,9 +3,11 @@
 #include "risley/cloud/make_cloud.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdlib>
 #include <memory>
+#include <string_view>
 #include <utility>
 
 #include <fmt/format.h>
@@ -222,6 +224,7 @@ class Work {
       sensor_factors_ = header_.factors.size();
       georeference_->announce(header_, options_.loadings);
       summary_.strips = georeference_->strips();
+      if (options_.distribution) begin_distribution();
     }
     summary_.frame = header_.frame.text;
     header_.provenance = options_.provenance;
@@ -505,8 +508,45 @@ class Work {
     block.poses.resize(sound.size());
   }
 
+  void begin_distribution() {
+    try {
+      std::vector<StripLine> lines = georeference_->strip_lines();
+      if (lines.empty()) {
+        no_distribution("no strips were found in the trajectory");
+        return;
+      }
+      distribution_.emplace(std::move(lines), swath_reach(calibration_, options_.platform->mount),
+                            *options_.distribution);
+    } catch (const InvalidArgument& error) {
+      no_distribution(error.what());
+    }
+  }
+
+  void no_distribution(std::string_view why) {
+    distribution_.reset();
+    summary_.warnings.push_back(fmt::format("how points lie on the ground is not told: {}", why));
+  }
+
+  void count_on_ground(const Points& points) {
+    std::array<std::vector<double>, 3> first;
+    std::vector<std::uint16_t> strip;
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      if (points.return_number[i] > 1) continue;
+      first[0].push_back(points.x[i]);
+      first[1].push_back(points.y[i]);
+      first[2].push_back(points.z[i]);
+      strip.push_back(points.point_source[i]);
+    }
+    try {
+      distribution_->add(first[0], first[1], first[2], strip);
+    } catch (const InvalidArgument& error) {
+      no_distribution(error.what());
+    }
+  }
+
   void write(const Block& block) {
     writer_->write(block.points);
+    if (distribution_) count_on_ground(block.points);
     summary_.points += block.points.size();
     summary_.outliers += block.outliers;
     summary_.without_rotation_angle += block.without_rotation_angle;
@@ -561,6 +601,7 @@ class Work {
     const auto n = static_cast<double>(summary_.points);
     summary_.azimuth_residual_rms = std::sqrt(summary_.azimuth_residual_rms / n);
     summary_.zenith_residual_rms = std::sqrt(summary_.zenith_residual_rms / n);
+    if (distribution_) summary_.distribution = distribution_->summary();
     writer_->close();
   }
 
@@ -579,6 +620,7 @@ class Work {
   std::optional<SensorPose> surface_pose_;             ///< in the middle of a surface's time
   std::size_t sensor_factors_ = 0;                     ///< whose loadings points carry
   std::int64_t first_time_ns_ = 0, last_time_ns_ = 0;  ///< of the recording
+  std::optional<PointDistribution> distribution_;
   CloudHeader header_;
   std::unique_ptr<CloudWriter> writer_;
   std::vector<Block> blocks_;
@@ -593,6 +635,10 @@ class Work {
 CloudSummary make_cloud(recordings::Reader& reader, const sensors::Sensor& calibration,
                         const std::string& path, const CloudOptions& options,
                         const Progress& progress) {
+  if (options.distribution && !options.platform) {
+    throw InvalidArgument(
+        "how points lie on the ground is of a sensor that moves: a trajectory is missing");
+  }
   if (options.rate) require_above("rate", *options.rate, 0, "Hz");
   if (options.angle_noise) require_above("angle noise", *options.angle_noise, 0, "rad");
   return Work(reader, calibration, path, options, progress).run();

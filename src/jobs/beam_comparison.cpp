@@ -4,9 +4,12 @@
 
 #include <algorithm>
 
+#include <Eigen/Core>
+
 #include "risley/core/angle.hpp"
 #include "risley/core/direction.hpp"
 #include "risley/core/error.hpp"
+#include "risley/core/require.hpp"
 #include "risley/optics/observation_model.hpp"
 #include "risley/recordings/truth.hpp"
 #include "risley/sensors/preset.hpp"
@@ -25,9 +28,21 @@ struct Beams {
   std::vector<Vector3<double>> before, after, truth;
 };
 
-void add_beams(const RangedRecording& recording, const PrismTrain& calibrated,
-               const std::vector<double>& shift, const std::string& truth_path, std::size_t most,
-               Beams& beams) {
+/// What directions are computed with.
+struct BeamModel {
+  const PrismTrain& train;
+  Eigen::Matrix3d turn = Eigen::Matrix3d::Identity();  ///< of the sensor
+};
+
+Vector3<double> turned(const Eigen::Matrix3d& turn, const Vector3<double>& v) {
+  const Eigen::Vector3d result = turn * Eigen::Vector3d(v.x, v.y, v.z);
+  return {result.x(), result.y(), result.z()};
+}
+
+/// @param true_turn  of the sensor
+void add_beams(const RangedRecording& recording, const BeamModel& before, const BeamModel& after,
+               const Eigen::Matrix3d& true_turn, const std::vector<double>& shift,
+               const std::string& truth_path, std::size_t most, Beams& beams) {
   const std::vector<std::size_t> rows = calibration::spread_rows(recording.shots.size(), most);
   std::vector<std::int64_t> times;
   times.reserve(rows.size());
@@ -42,10 +57,11 @@ void add_beams(const RangedRecording& recording, const PrismTrain& calibrated,
     std::vector<double> angles;
     for (const auto& column : recording.shots.rotation_angle) angles.push_back(column[row]);
     const int beam = recording.shots.beam[row];
-    beams.before.push_back(observe(recording.believed.train, angles, beam).direction);
+    beams.before.push_back(turned(before.turn, observe(before.train, angles, beam).direction));
     for (std::size_t k = 0; k < angles.size(); ++k) angles[k] += shift[k];
-    beams.after.push_back(observe(calibrated, angles, beam).direction);
-    beams.truth.push_back(direction_from_angles<double>({truth.azimuth[at], truth.zenith[at]}));
+    beams.after.push_back(turned(after.turn, observe(after.train, angles, beam).direction));
+    beams.truth.push_back(
+        turned(true_turn, direction_from_angles<double>({truth.azimuth[at], truth.zenith[at]})));
   }
 }
 
@@ -66,7 +82,8 @@ BeamComparison compare_beams(const std::vector<RangedRecording>& recordings,
   Beams beams;
   for (std::size_t r = 0; r < recordings.size(); ++r) {
     progress.report(static_cast<double>(r) / static_cast<double>(recordings.size()));
-    add_beams(recordings[r], calibration.sensor.train, calibration.angle_shift[r], truths[r],
+    add_beams(recordings[r], {recordings[r].believed.train}, {calibration.sensor.train},
+              Eigen::Matrix3d::Identity(), calibration.angle_shift[r], truths[r],
               kMostBeams / recordings.size(), beams);
   }
   BeamComparison result;
@@ -78,6 +95,33 @@ BeamComparison compare_beams(const std::vector<RangedRecording>& recordings,
     add_errors(beams.before[i], truth, result.azimuth_before, result.zenith_before);
     add_errors(beams.after[i], truth, result.azimuth_after, result.zenith_after);
   }
+  return result;
+}
+
+FlightTruth compare_flight_beams(const std::vector<RangedRecording>& recordings,
+                                 const calibration::FlightRecordings& flight,
+                                 const trajectories::Mount& given,
+                                 const calibration::FlightCalibration& found,
+                                 const std::vector<std::string>& truths, const Progress& progress) {
+  check_truths(truths, recordings.size());
+  require_length("angle_shift", flight.angle_shift.size(), recordings.size());
+  FlightTruth result;
+  result.sensor = sensors::load_sensor(truths.front());
+  result.mount = trajectories::load_mount(truth_mount(truths.front()));
+  // As if the sensor sat on the body as it was designed to.
+  const auto turn = [&](const trajectories::Mount& mount) {
+    return Eigen::Matrix3d(given.nominal.transpose() * trajectories::body_from_sensor(mount));
+  };
+  Beams beams;
+  for (std::size_t r = 0; r < recordings.size(); ++r) {
+    progress.report(static_cast<double>(r) / static_cast<double>(recordings.size()));
+    add_beams(recordings[r], {flight.sensor.train, turn(given)},
+              {found.sensor.train, turn(found.mount)},
+              turn(trajectories::load_mount(truth_mount(truths[r]))), flight.angle_shift[r],
+              truths[r], kMostBeams / recordings.size(), beams);
+  }
+  result.before = calibration::direction_errors(beams.before, beams.truth);
+  result.after = calibration::direction_errors(beams.after, beams.truth);
   return result;
 }
 

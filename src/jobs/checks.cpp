@@ -43,4 +43,11 @@ std::string truth_columns(const std::string& truth) {
   return std::filesystem::path(truth).replace_extension(".nc").string();
 }
 
+std::string truth_mount(const std::string& truth) {
+  std::filesystem::path path(truth);
+  path.replace_extension();  // .yaml
+  if (path.extension() == ".truth") path.replace_extension();
+  return path.string() + ".mount.truth.yaml";
+}
+
 }  // namespace risley::jobs

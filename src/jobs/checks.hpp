@@ -20,5 +20,7 @@ void check_truth_name(const std::string& truth);
 void check_truths(const std::vector<std::string>& truths, std::size_t recordings);
 /// OUT.truth.nc of OUT.truth.yaml.
 std::string truth_columns(const std::string& truth);
+/// OUT.mount.truth.yaml of OUT.truth.yaml.
+std::string truth_mount(const std::string& truth);
 
 }  // namespace risley::jobs

@@ -34,10 +34,11 @@ using calibration::TrajectoryKnots;
 constexpr double kNothing = std::numeric_limits<double>::quiet_NaN();
 constexpr std::size_t kMostStrips = 100, kMostDrawnPairs = 6;
 constexpr std::size_t kMostPlaces = 3000, kMostStripPlaces = 200, kFewestStripPlaces = 2;
-constexpr double kShotsPerPlane = 24;         // that the sample must leave, on average
+constexpr double kShotsPerPlane = 48;         // that the sample must leave, on average
 constexpr double kAreaSquare = 10;            // with which the flown area is measured, m
+constexpr std::size_t kAreaPoints = 200'000;  // that it is measured with
 constexpr double kLargestPlane = 20;          // m
-constexpr std::size_t kFewestStripShots = 3;  // that say where a strip lies in a cell
+constexpr std::size_t kFewestStripShots = 5;  // that say where a strip lies in a cell
 constexpr double kGate = 3;                   // range sigmas beyond which a point does not count
 constexpr double kSigmaOfMedian = 1.4826;     // of absolute values of a normal distribution
 constexpr double kClockMargin = 1e-3;         // s
@@ -57,14 +58,16 @@ double median_of(std::vector<double>& values) {
   return *middle;
 }
 
-/// Rows of a random sample; every n-th shot would beat with the rotors.
-std::vector<std::size_t> sample_of(std::vector<std::size_t> rows, std::size_t most,
-                                   std::uint64_t seed) {
-  if (rows.size() <= most) return rows;
+/// A random sample of the shots; every n-th one would beat with the rotors.
+FlightShots sample_of(const FlightShots& shots, std::size_t most, std::uint64_t seed) {
+  if (shots.size() <= most) return shots;
   const RandomStream stream(seed, kSampleStream);
-  const double share = static_cast<double>(most) / static_cast<double>(rows.size());
-  std::erase_if(rows, [&](std::size_t row) { return !(stream.uniform(row) < share); });
-  return rows;
+  const double share = static_cast<double>(most) / static_cast<double>(shots.size());
+  std::vector<std::size_t> rows;
+  for (std::size_t row = 0; row < shots.size(); ++row) {
+    if (stream.uniform(row) < share) rows.push_back(row);
+  }
+  return calibration::rows_of(shots, rows);
 }
 
 /// The same knots for shots that are some of those they were made for.
@@ -111,10 +114,11 @@ FlightModel start_model(const FlightCalibrationOptions& options, const FlightCal
 double plane_size_of(const ShotPoints& points, double wished) {
   std::set<Place> squares;
   std::size_t count = 0;
-  for (const auto& point : points) {
-    if (!std::isfinite(point[0])) continue;
-    squares.insert(place_of(point[0], point[1], kAreaSquare));
-    ++count;
+  const std::size_t step = points.size() / kAreaPoints + 1;
+  for (std::size_t i = 0; i < points.size(); i += step) {
+    if (!std::isfinite(points[i][0])) continue;
+    squares.insert(place_of(points[i][0], points[i][1], kAreaSquare));
+    count += step;
   }
   if (count == 0) return wished;
   const double area = static_cast<double>(squares.size()) * kAreaSquare * kAreaSquare;
@@ -150,6 +154,7 @@ std::vector<double> roughness_of(const ShotPoints& points, const GroundCells& ce
         std::abs(cells.planes[plane].normal.dot(point - cells.planes[plane].centre)));
   }
   std::vector<double> roughness;
+  roughness.reserve(distances.size());
   for (auto& own : distances) roughness.push_back(kSigmaOfMedian * median_of(own));
   return roughness;
 }
@@ -290,7 +295,7 @@ class FlightPictures {
       ground.after.push_back(std::sqrt(own.squares.after.mean()));
       ground.roughness.push_back(own.roughness.mean());
       ground.slope.push_back(own.slope.mean());
-      ground.strips.push_back(own.strips == 0 ? kNothing : static_cast<double>(own.strips));
+      ground.strips.push_back(own.strips < 2 ? kNothing : static_cast<double>(own.strips));
     }
   }
 
@@ -374,9 +379,10 @@ FlightDetails flight_details(const FlightShots& shots, const trajectories::Traje
   const trajectories::Interpolation interpolation(local);
   const double start_clock = options.mount.clock_offset.value;
   const double margin = std::abs(found.model.clock_offset - start_clock) + kClockMargin;
-  const FlightShots sample = calibration::rows_of(
-      shots, sample_of(calibration::rows_with_pose(shots, interpolation, start_clock, margin),
-                       bounds.most_shots, options.seed));
+  FlightShots sample = sample_of(shots, bounds.most_shots, options.seed);
+  const std::vector<std::size_t> rows =
+      calibration::rows_with_pose(sample, interpolation, start_clock, margin);
+  if (rows.size() < sample.size()) sample = calibration::rows_of(sample, rows);
   require_at_least("shots with a pose", static_cast<long long>(sample.size()), 1);
   FlightDetails details;
   details.shots = sample.size();

@@ -186,6 +186,7 @@ void check_report(const FlightReport& r) {
   check_train_shape(r);
   check_unknowns(r);
   check_size(r.nominal.size(), r.unknowns.size(), "nominal");
+  if (r.truth) check_size(r.truth->values.size(), r.unknowns.size(), "truth.values");
   check_covariance(r.covariance, r.unknowns.size(), "unknowns", r.converged);
   const Eigen::MatrixXd& mount = r.body_from_sensor;
   expect(mount.rows() == 3 && mount.cols() == 3 && mount.allFinite(), "body_from_sensor",

@@ -32,6 +32,8 @@ using calibration::StripPair;
 constexpr double kUntoldShift = 0.99;
 /// Component of a sensor's axis along the vertical from which on it counts as vertical.
 constexpr double kUpright = 0.8;
+/// Correlations below it tie nothing.
+constexpr double kTied = 0.1;
 
 std::string angle_text(double radians) {
   return finite_text("{:.3g}", degrees_from_radians(radians));
@@ -151,11 +153,19 @@ std::string unknown_row(const FlightReport& r, std::size_t i, bool prisms) {
                         is_sigma(unknown.sigma) ? "held, and may be off" : "held");
   } else {
     html += fmt::format("<td>{}</td>", finite_text("{:.0f} %", 100 * unknown.prior_share));
-    html += unknown.twin.empty()
+    html += unknown.twin.empty() || !(std::abs(unknown.twin_correlation) >= kTied)
                 ? "<td class=\"text\">–</td>"
                 : fmt::format("<td class=\"text\">{} ({})</td>",
                               symbol_html(unknown_info(unknown.twin, r.shape()).symbol),
                               finite_text("{:.2f}", unknown.twin_correlation));
+  }
+  if (r.truth) {
+    const double error = unknown.value - r.truth->values[i];
+    const double ratio =
+        unknown.held || !is_sigma(unknown.sigma) ? kUnknown : error / unknown.sigma;
+    html += fmt::format("<td>{}</td><td>{}</td><td{}>{}</td>", in_unit(r.truth->values[i]),
+                        in_unit(error), std::abs(ratio) > kFarOff ? " class=\"far\"" : "",
+                        finite_text("{:.2f}", ratio));
   }
   return html + "</tr>\n";
 }
@@ -169,8 +179,9 @@ std::string unknowns_table(const FlightReport& r, bool prisms) {
   return fmt::format(
       "<div class=\"wide\"><table><thead><tr><th>unknown</th><th>value</th><th>σ</th>"
       "<th>unit</th><th>before</th><th>change</th>{}<th>σ before</th><th>share of<br>σ before</th>"
-      "<th class=\"text\">tied most to</th></tr></thead><tbody>\n{}</tbody></table></div>\n",
-      prisms ? "<th>nominal</th>" : "", rows);
+      "<th class=\"text\">tied most to</th>{}</tr></thead><tbody>\n{}</tbody></table></div>\n",
+      prisms ? "<th>nominal</th>" : "",
+      r.truth ? "<th>truth</th><th>error</th><th>error / σ</th>" : "", rows);
 }
 
 /// "forward", "to the right" or "down" of the body, or the numbers.
@@ -191,17 +202,18 @@ std::string mount_html(const FlightReport& r) {
   std::string html = "<h2>Mount, ranges and clock</h2>\n";
   const Eigen::MatrixXd& m = r.body_from_sensor;
   html += fmt::format(
-      "<p>As designed the sensor's X, its optical axis, points {}, its Y {} and its Z {}. The "
-      "trajectory is of {}.</p>\n",
+      "<p>As designed the sensor's X, its optical axis, points {}, its Y {} and its Z {}. Point "
+      "that "
+      "the trajectory is of: {}.</p>\n",
       axis_text(m, 0), axis_text(m, 1), axis_text(m, 2),
-      r.reference_point.empty() ? "a point that the mount does not name"
-                                : escape_html(r.reference_point));
+      r.reference_point.empty() ? "the mount does not name it" : escape_html(r.reference_point));
   html += unknowns_table(r, false);
   return html +
          "<p class=\"note\">σ is one standard deviation, everything included. Before: what was "
          "given, with its σ. Share of σ before: (σ / σ before)², 100 % where the flight says "
-         "nothing. Tied most to: the unknown with the largest correlation, in brackets; near ±1 "
-         "only the sum or the difference of the two is well known. Lever arm: from the point that "
+         "nothing. Tied most to: the unknown with the largest correlation, in brackets, from ±0.1 "
+         "on; near ±1 only the sum or the difference of the two is well known. Lever arm: from the "
+         "point that "
          "the trajectory is of to the sensor, along the body's axes.</p>\n";
 }
 
@@ -265,8 +277,8 @@ std::string advice_of(const FlightReport& r, const NotTold& combination) {
     return "Both lift or lower all ground. Points of known height tell them.";
   }
   if (has("lever_arm_z")) {
-    return "In level flight it lifts or lowers all ground alike. Measure it well, or take points "
-           "of known height.";
+    return "A lever arm down lifts or lowers all ground alike in level flight. Measure it well, or "
+           "take points of known height.";
   }
   if (has("lever_arm")) {
     return "Slopes in several directions, strips in several directions and a swaying aircraft "
@@ -371,7 +383,9 @@ std::string strips_html(const FlightReport& r, Figures& figures) {
 std::string shots_html(const FlightReport& r) {
   std::string html = fmt::format(
       "<p>{} of {} shots were used, on {} cells of ground. {} were left out because they lie "
-      "beyond three sigmas of their cell{}; {} cells were too rough.</p>\n",
+      "beyond three sigmas of their cell{}; {} cells were too rough. The other shots met ground "
+      "that "
+      "only one strip saw, or such cells.</p>\n",
       count_text(r.used), count_text(r.shots), count_text(r.cells), count_text(r.outliers),
       r.without_pose == 0 ? ""
                           : fmt::format(", and {} because the trajectory has no pose for them",
@@ -387,8 +401,10 @@ std::string corrections_html(const FlightReport& r, Figures& figures) {
   return fmt::format(
              "<h2>Corrections of the trajectory</h2>\n<p>Position and attitude are corrected at {} "
              "knots, points in time {} s apart, and linearly between. σ is what is left of their "
-             "uncertainty. Corrections that keep to the size which the errors were stated with are "
-             "sound; the same over all strips, they belong to mount or clock.</p>\n",
+             "uncertainty. Corrections should be about as large as the errors that were stated for "
+             "the "
+             "trajectory; much larger ones mean that these were stated too small, or that axes or "
+             "times are wrong.</p>\n",
              count_text(r.knots), finite_text("{:.3g}", r.knot_spacing)) +
          charts_html(r.correction_charts, figures);
 }

@@ -8,11 +8,15 @@
 #include <set>
 #include <utility>
 
+#include <Eigen/Geometry>
 #include <fmt/format.h>
 
+#include "risley/calibration/trajectory_knots.hpp"
 #include "risley/core/angle.hpp"
+#include "risley/core/error.hpp"
 #include "risley/report/charts.hpp"
 #include "risley/report/html.hpp"
+#include "risley/trajectories/error_process.hpp"
 
 namespace risley::report {
 namespace {
@@ -32,25 +36,52 @@ constexpr double kShownPart = 0.95;       // of the values of a map between the 
 constexpr double kLeastShown = 1e-4;      // m
 constexpr std::array<const char*, 5> kStripColours = {"a", "b", "c", "d", "bad"};
 
-/// One of the errors of a pose that are corrected: its row, and how it is drawn.
-struct CorrectedError {
-  Eigen::Index row;
+/// How the correction of one error of the trajectory is drawn.
+struct DrawnCorrection {
+  trajectories::PoseError error;
   const char *title, *label;
-  double scale;
+  double scale;  ///< to the units of the axis
 };
-const std::array<CorrectedError, 6> kCorrectedErrors = {{
-    {1, "Correction to the north", "correction, mm", kMillimetres},
-    {0, "Correction to the east", "correction, mm", kMillimetres},
-    {2, "Correction of the height", "correction, mm", kMillimetres},
-    {4, "Correction of the tilt about north", "correction, deg", kDegreesPerRadian},
-    {3, "Correction of the tilt about east", "correction, deg", kDegreesPerRadian},
-    {5, "Correction of the heading", "correction, deg", -kDegreesPerRadian},
+constexpr std::array<DrawnCorrection, trajectories::kPoseErrors> kDrawnCorrections = {{
+    {trajectories::PoseError::north, "Correction to the north", "correction, mm", kMillimetres},
+    {trajectories::PoseError::east, "Correction to the east", "correction, mm", kMillimetres},
+    {trajectories::PoseError::up, "Correction of the height", "correction, mm", kMillimetres},
+    {trajectories::PoseError::tilt_north, "Correction of the tilt about north", "correction, deg",
+     kDegreesPerRadian},
+    {trajectories::PoseError::tilt_east, "Correction of the tilt about east", "correction, deg",
+     kDegreesPerRadian},
+    // Corrections are rotations about up, headings about down.
+    {trajectories::PoseError::heading, "Correction of the heading", "correction, deg",
+     -kDegreesPerRadian},
 }};
 
-double nominal_value(const sensors::Sensor& nominal, const std::string& name, std::size_t unknown) {
+/// Row of the corrections that belongs to an error.
+Eigen::Index row_of(trajectories::PoseError error) {
+  int row = 0;
+  while (calibration::error_of(row) != error) ++row;
+  return row;
+}
+
+double nominal_of(const sensors::Sensor& nominal, const std::string& name, std::size_t unknown) {
   const auto place = static_cast<int>(unknown);
   if (place == FlightUnknowns::range_offset()) return nominal.range_offset;
   return place < FlightUnknowns::parameter(0) ? kUnknown : nominal.get(name);
+}
+
+/// What the unknown truly was; a boresight after the mount as it was given.
+double true_value(const FlightReportInput& input, const std::string& name, std::size_t unknown) {
+  const jobs::FlightTruth& truth = *input.truth;
+  const auto place = static_cast<int>(unknown);
+  if (place >= FlightUnknowns::parameter(0)) return truth.sensor.get(name);
+  if (place == FlightUnknowns::clock_offset()) return truth.mount.clock_offset.value;
+  if (place == FlightUnknowns::range_offset()) return truth.sensor.range_offset;
+  if (place >= FlightUnknowns::lever_arm(0)) {
+    return truth.mount.lever_arm[unknown - static_cast<std::size_t>(FlightUnknowns::lever_arm(0))]
+        .value;
+  }
+  const Eigen::AngleAxisd turn(
+      Eigen::Matrix3d(input.mount.nominal.transpose() * body_from_sensor(truth.mount)));
+  return turn.angle() * turn.axis()[place];
 }
 
 /// The pairs with the most cells, in the order of their strips.
@@ -206,7 +237,9 @@ class FlightCharts {
     const TrajectoryKnots& knots = c_.model.knots;
     const auto columns = static_cast<Eigen::Index>(knots.size());
     if (columns == 0 || c_.model.corrections.cols() != columns ||
-        c_.correction_sigma.cols() != columns) {
+        c_.correction_sigma.cols() != columns ||
+        c_.model.corrections.rows() != calibration::kCorrections ||
+        c_.correction_sigma.rows() != calibration::kCorrections) {
       return {};
     }
     const std::size_t stride = (knots.size() + kMostTimes - 1) / kMostTimes;
@@ -217,7 +250,8 @@ class FlightCharts {
       if (end || i % stride == 0) kept.push_back(i);
     }
     std::vector<Chart> charts;
-    for (const CorrectedError& error : kCorrectedErrors) {
+    for (const DrawnCorrection& drawn : kDrawnCorrections) {
+      const Eigen::Index row = row_of(drawn.error);
       Series value{"correction", "a", SeriesKind::line, {}, {}};
       Series above{"± σ", "ink", SeriesKind::line, {}, {}}, below = above;
       for (std::size_t k = 0; k < kept.size(); ++k) {
@@ -226,8 +260,8 @@ class FlightCharts {
         if (k > 0 && knots.strip[kept[k]] != knots.strip[kept[k - 1]]) {
           for (Series* series : {&value, &above, &below}) add_break(*series, time);
         }
-        const double own = error.scale * c_.model.corrections(error.row, knot);
-        const double sigma = std::abs(error.scale) * c_.correction_sigma(error.row, knot);
+        const double own = drawn.scale * c_.model.corrections(row, knot);
+        const double sigma = std::abs(drawn.scale) * c_.correction_sigma(row, knot);
         for (Series* series : {&value, &above, &below}) series->x.push_back(time);
         value.y.push_back(own);
         above.y.push_back(own + sigma);
@@ -237,9 +271,9 @@ class FlightCharts {
       add_break(above, above.x.back());
       above.x.insert(above.x.end(), below.x.begin(), below.x.end());
       above.y.insert(above.y.end(), below.y.begin(), below.y.end());
-      charts.push_back({error.title,
+      charts.push_back({drawn.title,
                         "time, s",
-                        error.label,
+                        drawn.label,
                         {above, value},
                         kept.size() == knots.size()
                             ? fmt::format("All {} knots are drawn.", count_text(knots.size()))
@@ -271,6 +305,12 @@ class FlightCharts {
     return knots.strip[static_cast<std::size_t>(at)];
   }
 
+  /// ", colours in mm" of "difference, mm".
+  static std::string unit_words(const std::string& label) {
+    const std::size_t comma = label.rfind(", ");
+    return comma == std::string::npos ? "" : ", colours in " + label.substr(comma + 2);
+  }
+
   /// Squares that have a value.
   Chart map(std::string title, const std::vector<double>& east, const std::vector<double>& north,
             const std::vector<double>& values, std::string value_label) const {
@@ -283,16 +323,22 @@ class FlightCharts {
       cells.value.push_back(values[i]);
     }
     Chart chart{std::move(title), "east, m", "north, m", {std::move(cells)}, {}, ChartKind::ground};
+    chart.note = fmt::format("Squares of {:g} m{}.", details_.square_size, unit_words(value_label));
     chart.value_label = std::move(value_label);
-    chart.note = fmt::format("Squares of {:g} m.", details_.square_size);
     return chart;
   }
 
-  /// Before and after in the same colours, and after in colours of its own.
+  /// Before and after in the same colours, and after in colours of its own; on the same squares
+  /// where there are any.
   void add_differences(std::vector<Chart>& charts, const std::string& who,
                        const std::vector<double>& east, const std::vector<double>& north,
-                       const std::vector<double>& before, const std::vector<double>& after,
-                       bool signs) const {
+                       std::vector<double> before, std::vector<double> after, bool signs) const {
+    const auto known = [&](std::size_t i) { return std::isfinite(before[i] + after[i]); };
+    std::size_t common = 0;
+    for (std::size_t i = 0; i < east.size(); ++i) common += known(i) ? 1 : 0;
+    for (std::size_t i = 0; i < east.size() && common > 0; ++i) {
+      if (!known(i)) before[i] = after[i] = kUnknown;
+    }
     const double fine = kMillimetres * shown_size(after);
     const double coarse = std::max(fine, kMillimetres * shown_size(before));
     const auto add = [&](const char* when, const std::vector<double>& values, double size,
@@ -304,8 +350,8 @@ class FlightCharts {
       chart.value_range = {signs ? -size : 0.0, size};
       charts.push_back(std::move(chart));
     };
-    add("before", before, coarse, " One square in twenty may be beyond the colours.");
-    add("after", after, coarse, " The colours are those of the picture before.");
+    add("before", before, coarse, " One square in twenty is beyond the ends of the colours.");
+    add("after", after, coarse, " The same colours as before.");
     add("after, finer colours", after, fine, " The same differences in colours of their own.");
   }
 
@@ -342,7 +388,13 @@ FlightReport flight_report(const FlightReportInput& input) {
   report.rough_cells = c.rough_cells;
   report.unknowns = c.unknowns;
   for (std::size_t i = 0; i < c.unknowns.size(); ++i) {
-    report.nominal.push_back(nominal_value(input.nominal, c.unknowns[i].name, i));
+    report.nominal.push_back(nominal_of(input.nominal, c.unknowns[i].name, i));
+  }
+  if (input.truth) {
+    report.truth = {input.truth->before, input.truth->after, {}};
+    for (std::size_t i = 0; i < c.unknowns.size(); ++i) {
+      report.truth->values.push_back(true_value(input, c.unknowns[i].name, i));
+    }
   }
   report.covariance = c.covariance;
   report.datum = c.datum;
@@ -359,7 +411,6 @@ FlightReport flight_report(const FlightReportInput& input) {
   }
   report.knots = c.model.knots.size();
   report.knot_spacing = median_spacing(c.model.knots);
-  report.truth = input.truth;
   report.provenance = input.provenance;
   const FlightCharts charts(input);
   report.strip_charts = charts.strips();
@@ -368,6 +419,15 @@ FlightReport flight_report(const FlightReportInput& input) {
   report.residual_charts = charts.residuals();
   report.correction_charts = charts.corrections();
   return report;
+}
+
+FlightReport flight_report(const jobs::CalibratedFlight& calibrated) {
+  if (!calibrated.details) throw InvalidArgument("a report needs a result with details");
+  std::vector<ReportedRecording> recordings;
+  for (const jobs::ReadRecording& one : calibrated.recordings) recordings.push_back(reported(one));
+  return flight_report({calibrated.calibration, calibrated.nominal, calibrated.mount,
+                        *calibrated.details, calibrated.truth, recordings, calibrated.provenance,
+                        calibrated.warnings});
 }
 
 }  // namespace risley::report

@@ -6,6 +6,8 @@
 
 #include <fmt/format.h>
 
+#include "risley/report/number_text.hpp"
+
 namespace risley::report {
 
 std::string escape_html(std::string_view text) {
@@ -45,9 +47,7 @@ std::string count_text(std::uint64_t count) {
 
 std::string finite_text(std::string_view format, double value) {
   if (!std::isfinite(value)) return "–";
-  const std::string text = fmt::vformat(format, fmt::make_format_args(value));
-  const bool zero = text.find_first_not_of("-0.") == std::string::npos;
-  return zero && text.front() == '-' ? text.substr(1) : text;  // not "-0.00"
+  return without_minus_zero(fmt::vformat(format, fmt::make_format_args(value)));
 }
 
 std::string millimetres(double metres) { return finite_text("{:.1f}", kMillimetres * metres); }

@@ -20,17 +20,24 @@ int decimals_for(double sigma) {
 
 }  // namespace
 
+std::string without_minus_zero(std::string number) {
+  const bool zero = number.find_first_not_of("-0.") == std::string::npos;
+  if (zero && number.starts_with('-')) number.erase(0, 1);
+  return number;
+}
+
 bool is_sigma(double sigma) { return std::isfinite(sigma) && sigma > 0; }
 
 NumberText number_text(double value, double sigma) {
-  if (!is_sigma(sigma)) return {fmt::format("{:.7g}", value), ""};
+  if (!is_sigma(sigma)) return {without_minus_zero(fmt::format("{:.7g}", value)), ""};
   const int decimals = decimals_for(sigma);
-  return {fmt::format("{:.{}f}", value, decimals), fmt::format("{:.{}f}", sigma, decimals)};
+  return {without_minus_zero(fmt::format("{:.{}f}", value, decimals)),
+          fmt::format("{:.{}f}", sigma, decimals)};
 }
 
 std::string text_to_place_of(double value, double sigma) {
-  if (!is_sigma(sigma)) return fmt::format("{:.7g}", value);
-  return fmt::format("{:.{}f}", value, decimals_for(sigma));
+  if (!is_sigma(sigma)) return without_minus_zero(fmt::format("{:.7g}", value));
+  return without_minus_zero(fmt::format("{:.{}f}", value, decimals_for(sigma)));
 }
 
 }  // namespace risley::report

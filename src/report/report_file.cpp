@@ -366,10 +366,11 @@ void fields(Archive& archive, T& report) {
   archive("provenance", report.provenance);
 }
 
-template <class Archive, FieldsOf<FlightTruth> T>
+template <class Archive, FieldsOf<FlightReport::Truth> T>
 void fields(Archive& archive, T& truth) {
   archive("before", truth.before);
   archive("after", truth.after);
+  archive("values", truth.values);
 }
 
 template <class Archive, FieldsOf<FlightReport::Strip> T>

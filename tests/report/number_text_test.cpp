@@ -19,7 +19,10 @@ TEST(NumberText, ShowsTwoDigitsOfTheSigmaAndTheValueToTheSamePlace) {
       {0.123456, 0.0996, "0.12", "0.10"},  // the sigma's rounding moves its place
       {12.3, 0.995, "12.3", "1.0"},
       {1234.5, 37.2, "1234", "37"},
+      {-0.0004, 0.14, "0.00", "0.14"},
+      {-0.0096, 0.14, "-0.01", "0.14"},
       {1.25, 0.0, "1.25", ""},
+      {-0.0, 0.0, "0", ""},
       {1.25, std::numeric_limits<double>::quiet_NaN(), "1.25", ""},
   };
   for (const Case& one : cases) {

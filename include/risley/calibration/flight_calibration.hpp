@@ -14,6 +14,7 @@
 
 #include "risley/calibration/calibration_verdict.hpp"
 #include "risley/calibration/flight_adjustment.hpp"
+#include "risley/calibration/flight_judgement.hpp"
 #include "risley/calibration/flight_shots.hpp"
 #include "risley/calibration/ground_cells.hpp"
 #include "risley/core/progress.hpp"
@@ -49,31 +50,6 @@ struct FlightCalibrationOptions {
   std::uint64_t seed = 0;             ///< of their choice
 };
 
-/// One of the unknowns that a whole flight shares.
-struct FlightUnknown {
-  std::string name;                        ///< as unknown_names()
-  double start = 0, value = 0, sigma = 0;  ///< SI
-  double prior_sigma = 0;                  ///< SI; infinite: none
-  bool held = false;
-  /// Of what the answer is made: (sigma / prior sigma)^2, 1 where the flight says nothing.
-  double prior_share = 0;
-  std::string twin;  ///< the unknown that it is tied to most
-  double twin_correlation = 0;
-};
-
-/// What boresight and prisms together are known to, over the field of view.
-struct FlightDatum {
-  double sigma_x = 0, sigma_y = 0, sigma_z = 0;  ///< of the common rotation, sensor axes, rad
-  double rotation = 0, shape = 0, total = 0;     ///< RMS over the beams, rad
-  double height = 0;  ///< median range, m: times an angle gives what it is on the ground
-};
-
-/// A combination of unknowns that the flight does not tell.
-struct NotTold {
-  std::string words;  ///< "1.00 lever_arm_z_m", "boresight about the vertical against heading"
-  double sigma = 0;   ///< after the flight, in sigmas before it
-};
-
 /// A drift of the recording's clock that the adjustment does not know of, as the flight shows it.
 struct ClockDrift {
   double value = 0, sigma = 0;  ///< gain of the trajectory's clock on the recording's, s/s
@@ -83,7 +59,7 @@ struct ClockDrift {
 };
 
 /// What one calibration in flight found.
-struct FlightCalibration {
+struct FlightCalibration : FlightJudgement {
   bool converged = false;
   std::string reason;  ///< why not; empty when converged
   CalibrationVerdict verdict;
@@ -91,13 +67,6 @@ struct FlightCalibration {
   trajectories::Mount mount;  ///< adjusted, with sigmas
   sensors::Sensor sensor;     ///< adjusted, with covariance
   FlightModel model;          ///< with corrections at the knots and planes, in the tangent frame
-  std::vector<FlightUnknown> unknowns;
-  /// [unknowns, unknowns], SI: noise, white noise shared by samples, the trajectory's process
-  /// between the knots, priors.
-  Eigen::MatrixXd covariance;
-  Eigen::MatrixXd correction_sigma;  ///< [6, knots], from the normal equations
-  FlightDatum datum;
-  std::vector<NotTold> not_told;
   ClockDrift clock_drift;
   std::vector<StripPair> pairs_before, pairs_after;
   double rms_before = 0, rms_after = 0;  ///< of all pairs and cells, along the normals, m

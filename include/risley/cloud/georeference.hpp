@@ -12,6 +12,7 @@
 #include <Eigen/Core>
 
 #include "risley/cloud/map_projection.hpp"
+#include "risley/cloud/point_distribution.hpp"
 #include "risley/cloud/points.hpp"
 #include "risley/core/instruction_set.hpp"
 #include "risley/recordings/observations.hpp"
@@ -101,6 +102,9 @@ class Georeference {
   /// From the recording's clock to the trajectory's time, with the mount's offset, ns.
   std::int64_t clock_shift_ns() const;
   const std::vector<trajectories::FlownStrip>& strips() const;
+  /// The ways of the sensor along them, on the points' map; none where the trajectory has no pose
+  /// at an end of one.
+  std::vector<StripLine> strip_lines() const;
 
  private:
   void turn_loadings(Points& points, std::size_t sensor_factors, std::span<const SensorPose> poses,

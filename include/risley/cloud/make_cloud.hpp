@@ -10,6 +10,7 @@
 
 #include "risley/cloud/cloud_writer.hpp"
 #include "risley/cloud/georeference.hpp"
+#include "risley/cloud/point_distribution.hpp"
 #include "risley/cloud/pointing.hpp"
 #include "risley/cloud/rotor_tracking.hpp"
 #include "risley/core/error.hpp"
@@ -29,6 +30,8 @@ struct CloudOptions {
   std::optional<double> angle_noise;           ///< rad; empty: the calibration's
   bool loadings = false;                       ///< points carry the loadings of the common factors
   std::optional<MovingPlatform> platform;      ///< of a sensor that moves
+  /// Count how the first returns of a sensor that moves lie on the ground.
+  std::optional<PointDistributionOptions> distribution;
   CloudWriterOptions writer;
   std::vector<std::pair<std::string, std::string>> provenance;
 };
@@ -48,6 +51,8 @@ struct CloudSummary {
   std::vector<std::string> factors;              ///< names of the common factors
   std::string frame;                             ///< of the points, in words
   std::vector<trajectories::FlownStrip> strips;  ///< of a flight, in the trajectory's time
+  /// Where it was asked for; a warning says why it is not there.
+  std::optional<PointDistributionSummary> distribution;
   bool mirrored = false;
   double azimuth_residual_rms = 0, zenith_residual_rms = 0;  ///< rad, of the points
   /// How far points were moved from where the sensor says, rms over some beams, rad.

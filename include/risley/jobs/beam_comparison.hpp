@@ -7,9 +7,12 @@
 
 #include "risley/calibration/calibrate.hpp"
 #include "risley/calibration/datum.hpp"
+#include "risley/calibration/flight_calibration.hpp"
+#include "risley/calibration/flight_recordings.hpp"
 #include "risley/calibration/plane_points.hpp"
 #include "risley/core/progress.hpp"
 #include "risley/sensors/sensor.hpp"
+#include "risley/trajectories/mount.hpp"
 
 namespace risley::jobs {
 
@@ -27,5 +30,25 @@ struct BeamComparison {
 BeamComparison compare_beams(const std::vector<calibration::RangedRecording>& recordings,
                              const calibration::Calibration& calibration,
                              const std::vector<std::string>& truths, const Progress& progress = {});
+
+/// Where the beams of a moving sensor were thought to go before and after a calibration, boresight
+/// and prisms together, against where they truly went, sensor axes as the mount was designed.
+struct FlightTruth {
+  calibration::DirectionErrors before, after;
+  sensors::Sensor sensor;     ///< true, of the first recording
+  trajectories::Mount mount;  ///< true
+};
+
+/// Compares an evenly spread sample of the beams of all recordings.
+/// @param flight  made of the recordings
+/// @param given   the mount before the calibration
+/// @param truths  as compare_beams(); beside each stands OUT.mount.truth.yaml, too
+/// @throws as compare_beams()
+FlightTruth compare_flight_beams(const std::vector<calibration::RangedRecording>& recordings,
+                                 const calibration::FlightRecordings& flight,
+                                 const trajectories::Mount& given,
+                                 const calibration::FlightCalibration& found,
+                                 const std::vector<std::string>& truths,
+                                 const Progress& progress = {});
 
 }  // namespace risley::jobs

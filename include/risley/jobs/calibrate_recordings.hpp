@@ -12,22 +12,15 @@
 #include "risley/core/progress.hpp"
 #include "risley/jobs/beam_comparison.hpp"
 #include "risley/jobs/calibration_details.hpp"
-#include "risley/jobs/recording_input.hpp"
+#include "risley/jobs/ranged_input.hpp"
 #include "risley/jobs/result_files.hpp"
-#include "risley/jobs/sensor_choice.hpp"
 
 namespace risley::jobs {
 
 struct CalibratedRecordings;
 
 /// What to calibrate on, and how. SI units.
-struct CalibrateRecordingsOptions {
-  std::vector<std::string> recordings;  ///< paths; of one sensor, each with ranges to plane walls
-  recordings::ReadOptions reading;      ///< see open_in_sensor_frame()
-  std::string sensor;                   ///< as given_sensor()
-  std::optional<double> rate;           ///< shots per second to use; empty: all
-  std::optional<double> angle_noise;    ///< as estimation::EstimateOptions
-  std::optional<bool> mirrored;         ///< the elevation's sign is turned; empty: find out
+struct CalibrateRecordingsOptions : RangedInputOptions {  ///< recordings of plane walls
   HeldParameters fixed;
   std::vector<std::string> additional;  ///< further parameters to free
   /// As calibration::CalibrationOptions has them.
@@ -49,17 +42,12 @@ struct CalibrateRecordingsOptions {
 };
 
 /// What came of it.
-struct CalibratedRecordings {
-  std::vector<ReadRecording> recordings;
-  std::uint64_t observations = 0;     ///< rows of all recordings
-  std::vector<std::string> warnings;  ///< of the recordings; the calibration has its own
-  SensorChoice choice;                ///< who says which sensor the first one was
-  sensors::Sensor nominal;            ///< preset that all started from
+struct CalibratedRecordings : RangedInput {
   calibration::Calibration calibration;
   std::optional<BeamComparison> truth;        ///< where it is known
   std::optional<CalibrationDetails> details;  ///< where they were asked for
-  Provenance provenance;  ///< of the options, with the inputs; empty where nothing was written
-  double reading_time = 0, angles_time = 0, solving_time = 0;  ///< s
+  Provenance provenance;    ///< of the options, with the inputs; empty where nothing was written
+  double solving_time = 0;  ///< s
 };
 
 /// Finds the rotation angles of every recording and calibrates the sensor on the walls that they

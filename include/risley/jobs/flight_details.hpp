@@ -54,7 +54,7 @@ struct FlightDetails {
 };
 
 struct FlightDetailsOptions {
-  std::size_t most_shots = 3'000'000;  ///< of the sample
+  std::size_t most_shots = 1'000'000;  ///< of the sample
   std::size_t most_squares = 2000;     ///< of a picture
 };
 

@@ -13,6 +13,7 @@
 #include "risley/calibration/datum.hpp"
 #include "risley/calibration/flight_calibration.hpp"
 #include "risley/calibration/ground_cells.hpp"
+#include "risley/jobs/calibrate_flight.hpp"
 #include "risley/jobs/flight_details.hpp"
 #include "risley/report/chart.hpp"
 #include "risley/report/report_facts.hpp"
@@ -20,11 +21,6 @@
 #include "risley/trajectories/mount.hpp"
 
 namespace risley::report {
-
-/// Directions of boresight and prisms together against the truth of a simulation.
-struct FlightTruth {
-  calibration::DirectionErrors before, after;
-};
 
 /// All that the page of one calibration in flight says and draws, and all that report.json keeps of
 /// it. SI units; the diagrams are in the units of their axes.
@@ -66,7 +62,13 @@ struct FlightReport {
   std::size_t knots = 0;      ///< of the trajectory's corrections
   double knot_spacing = 0;    ///< median, s
 
-  std::optional<FlightTruth> truth;
+  /// Against the truth of a simulation.
+  struct Truth {
+    /// Of boresight and prisms together.
+    calibration::DirectionErrors before, after;
+    std::vector<double> values;  ///< [unknowns]
+  };
+  std::optional<Truth> truth;
 
   std::vector<Chart> strip_charts, difference_charts, ground_charts, residual_charts,
       correction_charts;
@@ -81,7 +83,7 @@ struct FlightReportInput {
   const sensors::Sensor& nominal;    ///< preset of the sensor
   const trajectories::Mount& mount;  ///< as given
   const jobs::FlightDetails& details;
-  std::optional<FlightTruth> truth;  ///< where it is known
+  const std::optional<jobs::FlightTruth>& truth;  ///< where it is known
   std::vector<ReportedRecording> recordings;
   Provenance provenance;
   std::vector<std::string> warnings;  ///< beside those of the calibration
@@ -89,5 +91,7 @@ struct FlightReportInput {
 
 /// Thins what the page draws. What is not finite stays so.
 FlightReport flight_report(const FlightReportInput& input);
+/// Of a job's result. @throws InvalidArgument when it was not asked for details
+FlightReport flight_report(const jobs::CalibratedFlight& calibrated);
 
 }  // namespace risley::report

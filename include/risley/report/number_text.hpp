@@ -11,6 +11,9 @@ struct NumberText {
   std::string value, sigma;
 };
 
+/// "-0.00" as "0.00", any other number as it is.
+std::string without_minus_zero(std::string number);
+
 /// Whether a sigma is finite and above zero.
 bool is_sigma(double sigma);
 

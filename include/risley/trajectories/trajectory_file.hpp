@@ -46,6 +46,10 @@ const std::vector<WritableTrajectory>& writable_trajectories();
 std::vector<std::string> write_trajectory(const std::string& path, const Trajectory& trajectory,
                                           const std::string& format = {});
 
+/// The text of a trajectory as CSV, as write_trajectory() puts it into a file.
+/// @throws InvalidArgument as require_trajectory
+std::string trajectory_csv(const Trajectory& trajectory);
+
 /// Accuracies with times of their own, ordered by time.
 struct AccuracyRecords {
   TimeScale time_scale = TimeScale::gps_second_of_week;

@@ -278,34 +278,35 @@ std::string_view csv_time_name(TimeScale scale) {
   return "time";
 }
 
-std::vector<std::string> write_trajectory_csv(const std::string& path,
-                                              const Trajectory& trajectory) {
+/// @param end_row  called after each row, also that of the names
+template <class EndRow>
+void append_csv(const Trajectory& trajectory, fmt::memory_buffer& buffer, const EndRow& end_row) {
   const bool local = trajectory.frame == Frame::local;
   const bool has_velocity = !trajectory.velocity.empty();
   const bool has_accuracy = !trajectory.accuracy.empty();
-  io::TextOutput output(path);
-  output.append(fmt::format("{}_ns", csv_time_name(trajectory.time_scale)));
-  if (trajectory.gps_week) output.append(",gps_week");
-  output.append(local ? ",x_m,y_m,z_m,qx,qy,qz,qw"
-                      : ",latitude_deg,longitude_deg,ellipsoidal_height_m,roll_deg,pitch_deg,"
-                        "heading_deg");
+  const auto append = [&](std::string_view text) {
+    buffer.append(text.data(), text.data() + text.size());
+  };
+  append(fmt::format("{}_ns", csv_time_name(trajectory.time_scale)));
+  if (trajectory.gps_week) append(",gps_week");
+  append(local ? ",x_m,y_m,z_m,qx,qy,qz,qw"
+               : ",latitude_deg,longitude_deg,ellipsoidal_height_m,roll_deg,pitch_deg,"
+                 "heading_deg");
   if (has_velocity) {
-    output.append(local ? ",velocity_x_m_per_s,velocity_y_m_per_s,velocity_z_m_per_s"
-                        : ",velocity_north_m_per_s,velocity_east_m_per_s,velocity_down_m_per_s");
+    append(local ? ",velocity_x_m_per_s,velocity_y_m_per_s,velocity_z_m_per_s"
+                 : ",velocity_north_m_per_s,velocity_east_m_per_s,velocity_down_m_per_s");
   }
   if (has_accuracy) {
-    output.append(
+    append(
         ",sigma_north_m,sigma_east_m,sigma_up_m,sigma_roll_deg,sigma_pitch_deg,"
         "sigma_heading_deg");
   }
-  output.end_row();
-  const auto add = [&](double value) {
-    fmt::format_to(std::back_inserter(output.buffer()), ",{}", value);
-  };
+  end_row();
+  const auto add = [&](double value) { fmt::format_to(fmt::appender(buffer), ",{}", value); };
   for (std::size_t i = 0; i < trajectory.size(); ++i) {
-    fmt::format_to(std::back_inserter(output.buffer()), "{}", trajectory.time_ns[i]);
+    fmt::format_to(fmt::appender(buffer), "{}", trajectory.time_ns[i]);
     if (trajectory.gps_week) {
-      fmt::format_to(std::back_inserter(output.buffer()), ",{}", *trajectory.gps_week);
+      fmt::format_to(fmt::appender(buffer), ",{}", *trajectory.gps_week);
     }
     const Eigen::Vector3d& position = trajectory.position[i];
     Eigen::Vector3d velocity = has_velocity ? trajectory.velocity[i] : Eigen::Vector3d::Zero();
@@ -337,8 +338,14 @@ std::vector<std::string> write_trajectory_csv(const std::string& path,
         add(degrees_from_radians(angle));
       }
     }
-    output.end_row();
+    end_row();
   }
+}
+
+std::vector<std::string> write_trajectory_csv(const std::string& path,
+                                              const Trajectory& trajectory) {
+  io::TextOutput output(path);
+  append_csv(trajectory, output.buffer(), [&] { output.end_row(); });
   output.close();
   return {};
 }
@@ -351,5 +358,12 @@ const Format kNamedCsvFormat{"trajectory-csv",
                              is_trajectory_csv,
                              read_trajectory_csv,
                              write_trajectory_csv};
+
+std::string trajectory_csv(const Trajectory& trajectory) {
+  require_trajectory(trajectory);
+  fmt::memory_buffer buffer;
+  append_csv(trajectory, buffer, [&] { buffer.push_back('\n'); });
+  return fmt::to_string(buffer);
+}
 
 }  // namespace risley::trajectories

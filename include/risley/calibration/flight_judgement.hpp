@@ -1,0 +1,48 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+namespace risley::calibration {
+
+/// One of the unknowns that a whole flight shares.
+struct FlightUnknown {
+  std::string name;                        ///< as unknown_names()
+  double start = 0, value = 0, sigma = 0;  ///< SI
+  double prior_sigma = 0;                  ///< SI; infinite: none
+  bool held = false;
+  /// Of what the answer is made: (sigma / prior sigma)^2, 1 where the flight says nothing.
+  double prior_share = 0;
+  std::string twin;  ///< the unknown that it is tied to most
+  double twin_correlation = 0;
+};
+
+/// What boresight and prisms together are known to, over the field of view.
+struct FlightDatum {
+  double sigma_x = 0, sigma_y = 0, sigma_z = 0;  ///< of the common rotation, sensor axes, rad
+  double rotation = 0, shape = 0, total = 0;     ///< RMS over the beams, rad
+  double height = 0;  ///< median range, m: times an angle gives what it is on the ground
+};
+
+/// A combination of unknowns that the flight does not tell.
+struct NotTold {
+  std::string words;  ///< "1.00 lever_arm_z_m", "boresight about the vertical against heading"
+  double sigma = 0;   ///< after the flight, in sigmas before it
+};
+
+/// What a flight tells of everything that is the same for all of it, and what it does not.
+struct FlightJudgement {
+  std::vector<FlightUnknown> unknowns;
+  /// [unknowns, unknowns], SI: noise, white noise shared by samples, the trajectory's process
+  /// between the knots, priors.
+  Eigen::MatrixXd covariance;
+  Eigen::MatrixXd correction_sigma;  ///< [6, knots], from the normal equations
+  FlightDatum datum;
+  std::vector<NotTold> not_told;
+};
+
+}  // namespace risley::calibration

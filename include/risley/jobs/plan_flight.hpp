@@ -1,0 +1,54 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "risley/calibration/flight_forecast.hpp"
+#include "risley/cloud/point_distribution.hpp"
+#include "risley/core/progress.hpp"
+#include "risley/jobs/sensor_choice.hpp"
+#include "risley/scenes/terrain.hpp"
+#include "risley/trajectories/error_process.hpp"
+#include "risley/trajectories/flight_plan.hpp"
+#include "risley/trajectories/mount.hpp"
+
+namespace risley::jobs {
+
+/// The flight to plan. SI units.
+struct PlanFlightOptions {
+  trajectories::FlightPlan plan;
+  trajectories::Mount mount;        ///< its sigmas are what is known before
+  trajectories::ErrorModel errors;  ///< of the trajectory that will come of it; states all sigmas
+  std::optional<scenes::TerrainParts> terrain;  ///< empty: level ground at a height of 0
+  std::string sensor;                           ///< preset by name or file; empty: kUsualSensor
+  HeldParameters fixed;
+  std::vector<std::string> additional;  ///< further parameters to free
+  /// As calibration::FlightForecastOptions and calibration::FlightCalibrationOptions have them.
+  std::optional<double> rate, range_noise, prior_sigma;
+  double range_offset_sigma = calibration::FlightCalibrationOptions{}.range_offset_sigma;
+  double knot_spacing = calibration::FlightCalibrationOptions{}.knot_spacing;
+  double cell_size = calibration::FlightCalibrationOptions{}.cell_size;
+  std::uint64_t seed = 0;
+  cloud::PointDistributionOptions distribution;
+};
+
+/// What the flight will come to.
+struct PlannedFlightResult {
+  sensors::Sensor sensor;
+  calibration::FlightForecast forecast;
+  /// Of all shots that the sensor fires; empty where the sensor does not look down.
+  std::optional<cloud::PointDistributionSummary> distribution;
+  std::vector<std::string> warnings;
+};
+
+/// Accuracy of a calibration on the strips of a planned flight, and how its points lie on the
+/// ground. Stages: calibration, points.
+/// @throws EstimationError when fewer than two strips overlap or no ground is found;
+///         InvalidArgument; FileError; Cancelled
+PlannedFlightResult plan_flight(const PlanFlightOptions& options, const Progress& progress = {});
+
+}  // namespace risley::jobs

@@ -1,0 +1,248 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "calibration/judge_flight.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include <fmt/format.h>
+
+#include "risley/algebra/symmetric.hpp"
+#include "risley/calibration/datum.hpp"
+#include "risley/calibration/planar_adjustment.hpp"
+#include "risley/estimation/weak_directions.hpp"
+
+namespace risley::calibration {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+/// Combinations that the flight tells less of than what was known before are named.
+constexpr double kUntold = 1;
+/// A mean error of the trajectory that keeps this part of its sigma and goes with a boresight angle
+/// by this correlation is told as a sum with it only.
+constexpr double kKeptSigma = 0.6, kTiedCorrelation = 0.8;
+constexpr std::size_t kDatumBeams = 4000;
+
+/// A root of a covariance, [n, n]: its product with its transpose.
+MatrixXd root_of(const MatrixXd& covariance) {
+  const algebra::PrincipalAxes axes = algebra::principal_axes(covariance);
+  return axes.vectors * axes.values.cwiseMax(0).cwiseSqrt().asDiagonal();
+}
+
+/// Planes' normals are off by the noise of the shots that they were found with, and a cell that
+/// leans by chance seems to tell of shifts across it, yaw above all. Its shots do not follow: the
+/// information is none. How much there is of it is seen where normals are moved by as much again.
+void take_off_spurious_information(const FlightEvidence& e, MatrixXd& all) {
+  FlightModel moved = e.model;
+  const MatrixXd tilts = e.system.draw_tilts(e.seed);
+  for (std::size_t i = 0; i < moved.planes.size(); ++i) {
+    GroundPlane& plane = moved.planes[i];
+    const auto own = tilts.col(static_cast<Index>(i));
+    const auto [first, second] =
+        tangents_of({plane.normal.x(), plane.normal.y(), plane.normal.z()});
+    plane.normal = (plane.normal + own[0] * Eigen::Vector3d(first.x, first.y, first.z) +
+                    own[1] * Eigen::Vector3d(second.x, second.y, second.z))
+                       .normalized();
+  }
+  const auto inverse_of = [](const FlightSystem& own) {
+    MatrixXd unit = MatrixXd::Zero(own.size(), own.globals());
+    unit.bottomRows(own.globals()).setIdentity();
+    return MatrixXd(own.solve(unit).bottomRows(own.globals()));
+  };
+  const MatrixXd before = inverse_of(e.system);
+  const MatrixXd after = inverse_of(
+      FlightSystem(flight_equations(e.shots, e.poses, e.plane, moved, e.weights), moved, e.priors));
+  std::vector<Index> adjusted;
+  for (Index i = 0; i < before.rows(); ++i) {
+    if (!e.priors.held[static_cast<std::size_t>(i)]) adjusted.push_back(i);
+  }
+  // In units of the priors' sigmas.
+  const VectorXd unit = e.prior_sigma(adjusted);
+  const auto information_of = [&](const MatrixXd& covariance) {
+    return MatrixXd(unit.asDiagonal() *
+                    algebra::SymmetricSolver(covariance(adjusted, adjusted)).inverse() *
+                    unit.asDiagonal());
+  };
+  // Of what is above 0.
+  const MatrixXd spurious = root_of(e.spurious * (information_of(after) - information_of(before)));
+  const MatrixXd prior =
+      unit.asDiagonal() * MatrixXd(e.priors.information(adjusted, adjusted)) * unit.asDiagonal();
+  const MatrixXd data = root_of(information_of(all) - prior - spurious * spurious.transpose());
+  const MatrixXd covariance = unit.asDiagonal() *
+                              algebra::SymmetricSolver(prior + data * data.transpose()).inverse() *
+                              unit.asDiagonal();
+  for (std::size_t i = 0; i < adjusted.size(); ++i) {
+    for (std::size_t j = 0; j < adjusted.size(); ++j) {
+      all(adjusted[i], adjusted[j]) = covariance(static_cast<Index>(i), static_cast<Index>(j));
+    }
+  }
+}
+
+FlightDatum datum_of(const FlightEvidence& e, const MatrixXd& movement) {
+  const FlightShots& shots = e.shots;
+  const std::vector<std::size_t> rows = spread_rows(shots.size(), kDatumBeams);
+  std::vector<std::vector<double>> angles(shots.rotation_angle.size());
+  std::vector<std::uint8_t> beam;
+  std::vector<double> ranges;
+  for (const std::size_t row : rows) {
+    for (std::size_t k = 0; k < angles.size(); ++k) {
+      angles[k].push_back(shots.rotation_angle[k][row]);
+    }
+    if (!shots.beam.empty()) beam.push_back(shots.beam[row]);
+    ranges.push_back(shots.range[row]);
+  }
+  HeldMovement bundle;
+  bundle.train =
+      MatrixXd::Zero(static_cast<Index>(e.model.train.parameters().size()), movement.cols());
+  bundle.rotation_angles = MatrixXd::Zero(e.model.train.prisms(), movement.cols());
+  bundle.turn = movement.topRows<3>();
+  for (std::size_t j = 0; j < e.model.free.size(); ++j) {
+    for (const int at : e.model.free[j].places) {
+      bundle.train.row(at) = movement.row(FlightUnknowns::parameter(static_cast<int>(j)));
+    }
+  }
+  const FormalDatum formal =
+      formal_datum(e.model.train, {}, MatrixXd::Zero(0, 0), angles, beam, bundle);
+  FlightDatum datum;
+  datum.sigma_x = formal.sigma_roll;
+  datum.sigma_y = formal.sigma_pitch;
+  datum.sigma_z = formal.sigma_yaw;
+  datum.rotation = formal.gauge;
+  datum.shape = formal.shape;
+  datum.total = std::hypot(formal.gauge, formal.shape);
+  const auto middle = ranges.begin() + static_cast<std::ptrdiff_t>(ranges.size() / 2);
+  std::nth_element(ranges.begin(), middle, ranges.end());
+  datum.height = *middle;
+  return datum;
+}
+
+std::vector<NotTold> not_told_of(const FlightEvidence& e, const MatrixXd& all) {
+  std::vector<NotTold> not_told;
+  const Index globals = e.model.unknowns().size();
+  const std::vector<std::string> names = unknown_names(e.model);
+  std::vector<Index> adjusted;
+  std::vector<estimation::FreeParameter> unknowns;
+  for (Index i = 0; i < globals; ++i) {
+    if (e.priors.held[static_cast<std::size_t>(i)]) continue;
+    adjusted.push_back(i);
+    unknowns.push_back({names[static_cast<std::size_t>(i)], {}, e.prior_sigma[i]});
+  }
+  const auto count = static_cast<Index>(adjusted.size());
+  MatrixXd covariance(count, count), prior(count, count);
+  for (Index i = 0; i < count; ++i) {
+    for (Index j = 0; j < count; ++j) {
+      const Index row = adjusted[static_cast<std::size_t>(i)],
+                  column = adjusted[static_cast<std::size_t>(j)];
+      covariance(i, j) = all(row, column);
+      prior(i, j) = e.priors.information(row, column);
+    }
+  }
+  // Of the flight alone.
+  const MatrixXd information = algebra::SymmetricSolver(covariance).inverse() - prior;
+  for (const auto& weak : estimation::weak_directions(information, unknowns, kUntold)) {
+    not_told.push_back(
+        {estimation::direction_text(weak), weak.sigma / std::hypot(1.0, weak.sigma)});
+  }
+  // Errors of the trajectory that stay as they are all flight long look like a boresight.
+  constexpr const char* kMeans[] = {"tilts about east", "tilts about north", "heading"};
+  const TrajectoryKnots& knots = e.model.knots;
+  for (Index c = 3; c < kCorrections; ++c) {
+    const auto row = static_cast<Index>(error_of(static_cast<int>(c)));
+    const double time = e.priors.process.correlation_times()[row];
+    std::vector<double> sigmas;
+    for (const std::int64_t one : knots.time_ns) {
+      sigmas.push_back(e.priors.process.sigmas(one)[row]);
+    }
+    double before = 0;
+    for (std::size_t i = 0; i < knots.size(); ++i) {
+      for (std::size_t j = 0; j < knots.size(); ++j) {
+        before +=
+            sigmas[i] * sigmas[j] *
+            std::exp(-std::abs(static_cast<double>(knots.time_ns[i] - knots.time_ns[j]) * 1e-9) /
+                     time);
+      }
+    }
+    if (!(before > 0)) continue;
+    const double sigma_before = std::sqrt(before) / static_cast<double>(knots.size());
+    const double variance = all(globals + c, globals + c);
+    const double kept = std::sqrt(variance) / sigma_before;
+    if (kept < kKeptSigma) continue;
+    for (Index i = 0; i < 3; ++i) {
+      if (e.priors.held[static_cast<std::size_t>(i)]) continue;
+      const double correlation = all(i, globals + c) / std::sqrt(all(i, i) * variance);
+      if (std::abs(correlation) < kTiedCorrelation) continue;
+      not_told.push_back({fmt::format("{} against the {} of the trajectory",
+                                      names[static_cast<std::size_t>(i)], kMeans[c - 3]),
+                          kept});
+    }
+  }
+  return not_told;
+}
+
+}  // namespace
+
+FlightJudgement judge_flight(const FlightEvidence& e) {
+  FlightJudgement result;
+  const Index globals = e.system.globals(), size = e.system.size();
+  const Index knots = (size - globals) / kCorrections;
+  MatrixXd functionals = MatrixXd::Zero(size, globals + kCorrections);
+  functionals.bottomLeftCorner(globals, globals).setIdentity();
+  for (Index k = 0; k < knots; ++k) {
+    functionals.block(kCorrections * k, globals, kCorrections, kCorrections) =
+        MatrixXd::Identity(kCorrections, kCorrections) / static_cast<double>(knots);
+  }
+  MatrixXd all = flight_covariance(e.shots, e.poses, e.plane, e.model, e.weights, e.priors,
+                                   e.system, functionals);
+  take_off_spurious_information(e, all);
+  result.not_told = not_told_of(e, all);
+  // What was held and may be off, one sigma each, moves everything else along.
+  const MatrixXd changes = e.system.held_changes();
+  MatrixXd movement = MatrixXd::Zero(globals, globals + static_cast<Index>(e.considered));
+  movement.leftCols(globals) = root_of(all.topLeftCorner(globals, globals));
+  Index column = 0, of_considered = globals;
+  for (Index i = 0; i < globals; ++i) {
+    if (!e.priors.held[static_cast<std::size_t>(i)]) continue;
+    if (i >= globals - static_cast<Index>(e.considered)) {
+      movement.col(of_considered) = e.prior_sigma[i] * changes.col(column).tail(globals);
+      movement(i, of_considered++) = e.prior_sigma[i];
+    }
+    ++column;
+  }
+  result.datum = datum_of(e, movement);
+  const MatrixXd rates = value_rates(e.model);
+  result.covariance = rates * movement * movement.transpose() * rates.transpose();
+  const VectorXd diagonal = e.system.inverse_diagonal();
+  result.correction_sigma = Eigen::Map<const MatrixXd>(diagonal.data(), kCorrections, knots);
+  result.correction_sigma = result.correction_sigma.cwiseSqrt().eval();
+
+  const std::vector<std::string> names = unknown_names(e.model);
+  const VectorXd values = unknown_values(e.model);
+  for (Index i = 0; i < globals; ++i) {
+    const auto at = static_cast<std::size_t>(i);
+    FlightUnknown& own = result.unknowns.emplace_back();
+    own.name = names[at];
+    own.start = e.priors.mean[i];
+    own.value = values[i];
+    own.sigma = std::sqrt(result.covariance(i, i));
+    own.prior_sigma = e.prior_sigma[i];
+    own.held = e.priors.held[at];
+    if (own.held) continue;
+    own.prior_share = std::min(1.0, std::pow(own.sigma / own.prior_sigma, 2));
+    for (Index j = 0; j < globals; ++j) {
+      if (j == i || e.priors.held[static_cast<std::size_t>(j)]) continue;
+      const double correlation =
+          result.covariance(i, j) / std::sqrt(result.covariance(i, i) * result.covariance(j, j));
+      if (std::abs(correlation) > std::abs(own.twin_correlation)) {
+        own.twin_correlation = correlation;
+        own.twin = names[static_cast<std::size_t>(j)];
+      }
+    }
+  }
+  return result;
+}
+
+}  // namespace risley::calibration

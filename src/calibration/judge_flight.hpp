@@ -1,0 +1,34 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstdint>
+
+#include "risley/calibration/flight_judgement.hpp"
+
+#include "calibration/flight_start.hpp"
+
+namespace risley::calibration {
+
+/// The last equations of a calibration in flight and what they were made of; all of it must outlive
+/// this.
+struct FlightEvidence {
+  const FlightShots& shots;
+  const ShotPoses& poses;
+  const PlaneOfShot& plane;
+  const FlightModel& model;
+  const FlightWeights& weights;
+  const FlightPriors& priors;
+  const Eigen::VectorXd& prior_sigma;  ///< [globals]
+  std::size_t considered = 0;          ///< last so many free parameters: held, and may be off
+  const FlightSystem& system;
+  std::uint64_t seed = 0;  ///< of a draw of the planes' normals
+  /// How many times what that draw seems to tell is taken off. Of normals that were found with
+  /// noise: twice, since what the trajectory does to a cell makes it lean, too.
+  double spurious = 2;
+};
+
+/// What the evidence tells: of a calibration that was made, or of one that is planned.
+FlightJudgement judge_flight(const FlightEvidence& evidence);
+
+}  // namespace risley::calibration

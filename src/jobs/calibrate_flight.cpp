@@ -1,0 +1,182 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "risley/jobs/calibrate_flight.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "risley/calibration/flight_recordings.hpp"
+#include "risley/core/error.hpp"
+#include "risley/trajectories/clock.hpp"
+#include "risley/trajectories/interpolation.hpp"
+#include "risley/trajectories/trajectory_file.hpp"
+
+#include "jobs/checks.hpp"
+#include "jobs/ranged_input.hpp"
+#include "jobs/result_folder.hpp"
+#include "jobs/stopwatch.hpp"
+
+namespace risley::jobs {
+namespace {
+
+using calibration::CalibrationCode;
+using calibration::RangedRecording;
+
+/// Wrong wishes are told before an hour of reading.
+void check_flight_options(const CalibrateFlightOptions& options) {
+  check_ranged_input(options);
+  if (options.range_noise) check_positive(*options.range_noise, "range_noise", "m");
+  if (options.prior_sigma) check_positive(*options.prior_sigma, "prior_sigma", "rad");
+  check_not_negative(options.range_offset_sigma, "range_offset_sigma", "m");
+  check_positive(options.knot_spacing, "knot_spacing", "s");
+  check_positive(options.cell_size, "cell_size", "m");
+  if (!options.truths.empty()) check_truths(options.truths, options.recordings.size());
+  if (!options.platform.crs.empty() || !options.platform.datum.empty()) {
+    throw InvalidArgument(
+        "option crs and option datum are of maps: a flight is calibrated without one");
+  }
+}
+
+cloud::MovingPlatform platform_of(const CalibrateFlightOptions& options, const Progress& progress) {
+  cloud::MovingPlatform platform = load_platform(options.platform, progress);
+  if (!platform.errors) {
+    throw InvalidArgument(fmt::format(
+        "{} states no accuracies: option trajectory_errors says how wrong a trajectory may be, and "
+        "for how long, and without that nobody knows what strips that do not fit tell of the "
+        "sensor",
+        options.platform.trajectory));
+  }
+  return platform;
+}
+
+/// What is added to the recordings' times to get those of the trajectory, ns.
+std::int64_t shift_of(const CalibratedFlight& result, const trajectories::Trajectory& trajectory,
+                      std::int64_t first_ns, std::vector<std::string>& warnings) {
+  const bool utc =
+      std::all_of(result.recordings.begin(), result.recordings.end(), [](const auto& recording) {
+        return recording.header.time_reference == recordings::TimeReference::utc;
+      });
+  const auto shift =
+      utc ? trajectories::shift_from_utc_ns(trajectory, first_ns) : std::optional<std::int64_t>();
+  if (!shift) {
+    warnings.push_back(fmt::format(
+        "{}: its times are taken for those of the trajectory, with the mount's clock offset",
+        utc ? "the trajectory does not say what its times count"
+            : "the recordings do not say what their clock counts"));
+  }
+  return shift.value_or(0);
+}
+
+calibration::FlightCalibrationOptions settings_of(const CalibrateFlightOptions& options,
+                                                  const calibration::FlightRecordings& flight,
+                                                  const cloud::MovingPlatform& platform) {
+  calibration::FlightCalibrationOptions settings;
+  settings.sensor = flight.sensor;
+  settings.fixed = hold(options.fixed, settings.sensor);
+  settings.additional = options.additional;
+  settings.mount = platform.mount;
+  settings.errors = *platform.errors;
+  settings.range_noise = options.range_noise;
+  settings.range_offset_sigma = options.range_offset_sigma;
+  if (options.prior_sigma) settings.angle_sigma = *options.prior_sigma;
+  settings.rotation_angle_sigma = flight.rotation_angle_sigma;
+  settings.knot_spacing = options.knot_spacing;
+  settings.cell_size = options.cell_size;
+  settings.seed = options.seed;
+  return settings;
+}
+
+void write_flight(const CalibrateFlightOptions& options, CalibratedFlight& result,
+                  ResultFolder& folder, const Progress& progress) {
+  std::vector<std::string> inputs = options.recordings;
+  for (const std::string& path : paths_of(options.platform)) inputs.push_back(path);
+  result.provenance = with_inputs(options.files.provenance, inputs, progress);
+  const calibration::FlightCalibration& found = result.calibration;
+  const CalibrationCode code = found.verdict.code;
+  const bool sound = code != CalibrationCode::not_better && code != CalibrationCode::undecided;
+  if (found.converged && (sound || options.force)) {
+    sensors::Sensor calibrated = found.sensor;
+    calibrated.provenance = result.provenance;
+    folder.add_calibration(calibrated);
+    folder.add_text({"mount.yaml", trajectories::mount_text(found.mount)});
+    folder.add_text({"trajectory.csv", trajectories::trajectory_csv(found.trajectory)});
+  }
+  if (options.texts) {
+    for (const NamedText& text : options.texts(result)) folder.add_text(text);
+  }
+  progress.check();
+  for (std::string& text : folder.commit()) result.warnings.push_back(std::move(text));
+}
+
+}  // namespace
+
+CalibratedFlight calibrate_flight(const CalibrateFlightOptions& options, const Progress& progress) {
+  check_flight_options(options);
+  ResultFolder folder(options.files.folder);
+  CalibratedFlight result;
+  cloud::MovingPlatform platform = platform_of(options, progress.stage("reading"));
+  result.mount = platform.mount;
+  result.errors = *platform.errors;
+  for (const trajectories::TrajectoryWarning& warning : platform.trajectory.warnings) {
+    result.warnings.push_back(fmt::format("{}: {}", options.platform.trajectory, warning.message));
+  }
+  result.strips = trajectories::flown_strips(trajectories::Interpolation(platform.trajectory));
+  std::vector<RangedRecording> recordings;
+  for (std::size_t r = 0; r < options.recordings.size(); ++r) {
+    recordings.push_back(read_ranged(options, r, result, progress));
+  }
+  const auto first = std::min_element(recordings.begin(), recordings.end(),
+                                      [](const RangedRecording& a, const RangedRecording& b) {
+                                        return a.time_ns.front() < b.time_ns.front();
+                                      });
+  const auto last = std::max_element(recordings.begin(), recordings.end(),
+                                     [](const RangedRecording& a, const RangedRecording& b) {
+                                       return a.time_ns.back() < b.time_ns.back();
+                                     });
+  const std::int64_t shift_ns =
+      shift_of(result, platform.trajectory, first->time_ns.front(), result.warnings);
+  const Stopwatch watch;
+  const Progress calibrating = progress.stage("calibrating");
+  const auto offset_ns = static_cast<std::int64_t>(1e9 * result.mount.clock_offset.value);
+  const std::int64_t begin_ns = first->time_ns.front() + shift_ns + offset_ns,
+                     end_ns = last->time_ns.back() + shift_ns + offset_ns;
+  if (end_ns < platform.trajectory.time_ns.front() ||
+      begin_ns > platform.trajectory.time_ns.back()) {
+    throw EstimationError(trajectories::no_overlap_words(platform.trajectory, begin_ns, end_ns));
+  }
+  if (result.strips.size() < 2) {
+    throw EstimationError(fmt::format(
+        "{} has {} strips, flown straight for ten seconds and more, at least 2 that overlap are "
+        "needed, best crossing ones",
+        options.platform.trajectory, result.strips.size()));
+  }
+  // By the recordings' clock: what the offset really is will be found.
+  std::vector<trajectories::FlownStrip> strips = result.strips;
+  for (trajectories::FlownStrip& strip : strips) {
+    strip.begin_ns -= offset_ns;
+    strip.end_ns -= offset_ns;
+  }
+  const calibration::FlightRecordings flight =
+      calibration::flight_recordings(recordings, result.nominal, strips, shift_ns);
+  if (options.truths.empty()) recordings.clear();  // they take as much memory as the shots
+  result.strip_rows = flight.strip_rows;
+  result.outside_strips = flight.outside_strips;
+  const calibration::FlightCalibrationOptions settings = settings_of(options, flight, platform);
+  result.calibration =
+      calibration::calibrate_flight(flight.shots, platform.trajectory, settings, calibrating);
+  result.solving_time = watch.seconds();
+  if (!options.truths.empty()) {
+    result.truth = compare_flight_beams(recordings, flight, result.mount, result.calibration,
+                                        options.truths, calibrating.silent());
+  }
+  if (options.details) {
+    result.details = flight_details(flight.shots, platform.trajectory, settings, result.calibration,
+                                    {}, calibrating.silent());
+  }
+  if (folder) write_flight(options, result, folder, progress.silent());
+  return result;
+}
+
+}  // namespace risley::jobs

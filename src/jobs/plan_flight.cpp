@@ -1,0 +1,118 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "risley/jobs/plan_flight.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "risley/core/error.hpp"
+#include "risley/sensors/preset.hpp"
+
+#include "jobs/checks.hpp"
+
+namespace risley::jobs {
+namespace {
+
+/// What a minute of any recording tells of an index: docs/theory/flight.md
+constexpr double kToldIndex = 1e-5;
+
+std::vector<cloud::StripLine> lines_of(const calibration::PlannedFlight& planned) {
+  std::vector<cloud::StripLine> lines;
+  for (const trajectories::Strip& strip : planned.plan.strips) {
+    const double x = 0.5 * strip.length * std::sin(strip.heading),
+                 y = 0.5 * strip.length * std::cos(strip.heading);
+    lines.push_back({strip.name,
+                     {strip.center[0] - x, strip.center[1] - y},
+                     {strip.center[0] + x, strip.center[1] + y},
+                     strip.height - planned.mount.lever_arm[2].value});
+  }
+  return lines;
+}
+
+cloud::PointDistributionSummary distribution_of(const calibration::PlannedFlight& planned,
+                                                const PlanFlightOptions& options,
+                                                const Progress& progress) {
+  cloud::PointDistribution distribution(
+      lines_of(planned), cloud::swath_reach(planned.sensor, planned.mount), options.distribution);
+  std::vector<std::uint16_t> strip;
+  calibration::for_each_planned_piece(
+      planned, calibration::flown(planned), {std::nullopt, options.seed},
+      [&](calibration::PlannedPiece& piece) {
+        strip = piece.shots.strip;
+        for (std::uint16_t& number : strip) ++number;
+        distribution.add(piece.x, piece.y, piece.z, strip, progress.silent());
+      },
+      progress);
+  return distribution.summary();
+}
+
+}  // namespace
+
+PlannedFlightResult plan_flight(const PlanFlightOptions& options, const Progress& progress) {
+  if (options.rate) check_positive(*options.rate, "rate", "Hz");
+  if (options.range_noise) check_positive(*options.range_noise, "range_noise", "m");
+  if (options.prior_sigma) check_positive(*options.prior_sigma, "prior_sigma", "rad");
+  check_not_negative(options.range_offset_sigma, "range_offset_sigma", "m");
+  check_positive(options.knot_spacing, "knot_spacing", "s");
+  check_positive(options.cell_size, "cell_size", "m");
+  for (const trajectories::ErrorTerm& term : options.errors.terms) {
+    if (!term.sigma) {
+      throw InvalidArgument(
+          "the trajectory's errors state no sigma for one of the six: of a flight that is planned "
+          "there are no accuracies to take its place");
+    }
+  }
+  PlannedFlightResult result;
+  result.sensor = sensors::load_sensor(options.sensor.empty() ? kUsualSensor : options.sensor);
+  calibration::FlightForecastOptions wanted;
+  if (options.rate) wanted.rate = *options.rate;
+  calibration::FlightCalibrationOptions& own = wanted.calibration;
+  own.sensor = result.sensor;
+  own.fixed = hold(options.fixed, own.sensor);
+  own.additional = options.additional;
+  own.mount = options.mount;
+  own.errors = options.errors;
+  own.range_noise = options.range_noise;
+  own.range_offset_sigma = options.range_offset_sigma;
+  if (options.prior_sigma) own.angle_sigma = *options.prior_sigma;
+  own.knot_spacing = options.knot_spacing;
+  own.cell_size = options.cell_size;
+  own.seed = options.seed;
+  // A recording tells the indices by itself, before strips are compared.
+  for (const sensors::Knowledge& known : std::vector(own.sensor.knowledge)) {
+    if (!known.name.starts_with("refractive_index") || known.name == "refractive_index_air" ||
+        known.sigma <= kToldIndex) {
+      continue;
+    }
+    own.sensor.set_knowledge({known.name, kToldIndex, "a recording tells it", 0});
+  }
+  calibration::PlannedFlight planned{own.sensor, options.mount, options.plan, {}};
+  if (options.terrain) {
+    planned.terrain = *options.terrain;
+  } else {
+    planned.terrain.ground = scenes::Ground{};
+    result.warnings.emplace_back(
+        "no terrain is given: the ground is taken to be level at a height of 0, which tells the "
+        "least; roofs tell more");
+  }
+  const bool all_held =
+      std::all_of(options.mount.boresight.begin(), options.mount.boresight.end(),
+                  [](const trajectories::StatedValue& angle) { return angle.sigma == 0; });
+  if (all_held) {
+    result.warnings.emplace_back(
+        "the mount states its boresight with a sigma of 0, so that it counts as known and is not "
+        "looked for: a sigma of 3 degrees is that of a mount as it was built");
+  }
+  result.forecast = calibration::forecast(planned, wanted, progress.stage("calibration"));
+  try {
+    result.distribution = distribution_of(planned, options, progress.stage("points"));
+  } catch (const InvalidArgument& error) {
+    result.warnings.push_back(
+        fmt::format("how points lie on the ground is not told: {}", error.what()));
+  }
+  return result;
+}
+
+}  // namespace risley::jobs

@@ -1,0 +1,92 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "jobs/ranged_input.hpp"
+
+#include <filesystem>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "risley/core/error.hpp"
+
+#include "jobs/checks.hpp"
+#include "jobs/stopwatch.hpp"
+
+namespace risley::jobs {
+
+using calibration::RangedRecording;
+
+namespace {
+
+/// Each recording stands for observations of its own.
+void require_recordings(const std::vector<std::string>& recordings) {
+  if (recordings.empty()) throw InvalidArgument("option recordings is empty, expected one or more");
+  for (std::size_t i = 0; i < recordings.size(); ++i) {
+    for (std::size_t j = 0; j < i; ++j) {
+      std::error_code ignored;
+      if (std::filesystem::equivalent(recordings[i], recordings[j], ignored)) {
+        throw InvalidArgument(fmt::format("{} is given twice", recordings[i]));
+      }
+    }
+  }
+}
+
+}  // namespace
+
+void check_ranged_input(const RangedInputOptions& options) {
+  if (options.rate) check_positive(*options.rate, "rate", "Hz");
+  if (options.angle_noise) check_positive(*options.angle_noise, "angle_noise", "rad");
+  require_recordings(options.recordings);
+}
+
+RangedRecording read_ranged(const RangedInputOptions& options, std::size_t number,
+                            RangedInput& result, const Progress& progress,
+                            const EstimateTaker& take) {
+  const std::string& path = options.recordings[number];
+  EstimationInput input =
+      read_for_estimation({path,
+                           options.reading,
+                           options.sensor,
+                           {.rate = options.rate, .ranges = true, .rows = false}},
+                          progress.stage("reading"));
+  result.reading_time += input.reading_time;
+  result.observations += input.recording.audit.observations;
+  if (!input.recording.header.has_range) {
+    throw EstimationError(
+        fmt::format("{} holds no ranges: there is nothing to calibrate on", path));
+  }
+  estimation::EstimateOptions settings;
+  settings.sensor = input.choice.sensor;
+  settings.angle_noise = options.angle_noise;
+  settings.cartesian = input.whole_steps;
+  settings.mirrored = options.mirrored;
+  if (number == 0) {
+    result.nominal = settings.sensor;
+    result.choice = input.choice;
+  }
+  for (const std::string& text : input.warnings) {
+    result.warnings.push_back(fmt::format("{}: {}", path, text));
+  }
+  const Stopwatch watch;
+  const Progress angles =
+      progress.stage(fmt::format("rotation angles {}/{}", number + 1, options.recordings.size()));
+  const estimation::Estimate estimate = [&] {
+    try {
+      return estimation::estimate(estimation::Method::map, std::move(input.series), input.head,
+                                  settings, angles);
+    } catch (const EstimationError& error) {
+      throw EstimationError(fmt::format("{}: {}", path, error.what()));
+    }
+  }();
+  for (const std::string& text : estimate.warnings) {
+    result.warnings.push_back(fmt::format("{}: {}", path, text));
+  }
+  RangedRecording recording =
+      calibration::ranged_recording(estimate, path, input.recording.serial());
+  if (take) take(estimate, angles);
+  result.recordings.push_back(std::move(input.recording));
+  result.angles_time += watch.seconds();
+  return recording;
+}
+
+}  // namespace risley::jobs

@@ -1,0 +1,28 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstddef>
+#include <functional>
+
+#include "risley/calibration/plane_points.hpp"
+#include "risley/core/progress.hpp"
+#include "risley/estimation/estimate.hpp"
+#include "risley/jobs/ranged_input.hpp"
+
+namespace risley::jobs {
+
+/// What looks at an estimate before its shots are all that is left of it.
+using EstimateTaker = std::function<void(const estimation::Estimate&, const Progress&)>;
+
+/// @throws InvalidArgument for no recordings, one that is given twice, rate or noise out of range
+void check_ranged_input(const RangedInputOptions& options);
+
+/// Reads one recording, finds its rotation angles, and adds to the result what there is to know
+/// beside its shots. Stages: reading, rotation angles.
+/// @throws as read_for_estimation(), estimate(), ranged_recording(); the message names the file
+calibration::RangedRecording read_ranged(const RangedInputOptions& options, std::size_t number,
+                                         RangedInput& result, const Progress& progress,
+                                         const EstimateTaker& take = {});
+
+}  // namespace risley::jobs

@@ -1,0 +1,747 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "risley/report/flight_report.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <limits>
+#include <regex>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "risley/calibration/trajectory_knots.hpp"
+#include "risley/core/angle.hpp"
+#include "risley/core/error.hpp"
+#include "risley/io/text_file.hpp"
+#include "risley/jobs/flight_details.hpp"
+#include "risley/report/flight_page.hpp"
+#include "risley/report/report_file.hpp"
+#include "risley/sensors/preset.hpp"
+
+#include "calibration/flights.hpp"
+
+namespace risley::report::flight_report_test {
+
+using calibration::FlightCalibration;
+using calibration::FlightUnknown;
+using calibration::FlightUnknowns;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr std::size_t kStrips = 4, kKnotsOfStrip = 9;
+
+double deg(double degrees) { return radians_from_degrees(degrees); }
+
+calibration::StripPair pair(std::uint16_t first, std::uint16_t second, double rms) {
+  calibration::StripPair own;
+  own.first = first;
+  own.second = second;
+  own.cells = 1000 + 10 * first + second;
+  own.mean = -0.3 * rms;
+  own.rms = rms;
+  own.shift = {0.5 * rms, -0.4 * rms, 0.1 * rms};
+  own.sigma = {0.02 * rms, 1.0, 0.01 * rms};  // the north is not told
+  return own;
+}
+
+/// Knots every two seconds of strips that take 16 s, with turns between.
+calibration::TrajectoryKnots knots() {
+  calibration::TrajectoryKnots own;
+  for (std::size_t s = 0; s < kStrips; ++s) {
+    for (std::size_t k = 0; k < kKnotsOfStrip; ++k) {
+      own.time_ns.push_back(1'300'000'000'000'000'000 +
+                            static_cast<std::int64_t>(36 * s + 2 * k) * 1'000'000'000);
+      own.strip.push_back(static_cast<std::uint16_t>(s));
+      if (k == 0) continue;
+      const std::size_t knot = own.time_ns.size() - 2;
+      own.intervals.push_back({knot, own.time_ns[knot], own.time_ns[knot + 1], 0, 0});
+    }
+  }
+  return own;
+}
+
+/// A calibration with numbers that tell each from the others.
+FlightCalibration calibrated_example() {
+  FlightCalibration c;
+  c.converged = true;
+  c.sensor = sensors::load_sensor("mid-40");
+  c.sensor.serial = "1PQD&7";
+  c.model.train = c.sensor.train;
+  c.model.free =
+      estimation::free_parameters({"prism_tilt_a_vertical_deg", "incident_beam_vertical_deg"}, {2});
+  c.model.knots = knots();
+  const auto columns = static_cast<Eigen::Index>(c.model.knots.size());
+  c.model.corrections = Eigen::MatrixXd::Zero(calibration::kCorrections, columns);
+  c.correction_sigma = Eigen::MatrixXd::Zero(calibration::kCorrections, columns);
+  for (Eigen::Index row = 0; row < calibration::kCorrections; ++row) {
+    const double size = row < 3 ? 0.001 : deg(0.001);
+    for (Eigen::Index knot = 0; knot < columns; ++knot) {
+      c.model.corrections(row, knot) = size * static_cast<double>(10 * (row + 1) + knot);
+      c.correction_sigma(row, knot) = size * static_cast<double>(row + 1);
+    }
+  }
+  const std::vector<std::string> names = calibration::unknown_names(c.model);
+  const auto n = static_cast<Eigen::Index>(names.size());
+  c.covariance = Eigen::MatrixXd::Zero(n, n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    FlightUnknown own;
+    own.name = names[static_cast<std::size_t>(i)];
+    own.sigma = i < 3 || i >= FlightUnknowns::parameter(0) ? deg(0.002) : 0.0002;
+    own.start = 0.01 * static_cast<double>(i);
+    own.value = own.start + 10 * own.sigma;
+    own.prior_sigma = 100 * own.sigma;
+    own.prior_share = 1e-4;
+    own.twin = names[static_cast<std::size_t>((i + 1) % n)];
+    own.twin_correlation = -0.43;
+    c.unknowns.push_back(own);
+    for (Eigen::Index j = 0; j <= i; ++j) {
+      c.covariance(i, j) = c.covariance(j, i) = std::pow(-0.7, static_cast<double>(i - j)) *
+                                                own.sigma *
+                                                c.unknowns[static_cast<std::size_t>(j)].sigma;
+    }
+  }
+  c.unknowns[0].value = deg(6.0021);
+  c.unknowns[5].held = true;
+  c.unknowns[5].sigma = 0;
+  c.unknowns[5].twin = "";
+  c.covariance.row(5).setZero();
+  c.covariance.col(5).setZero();
+  c.unknowns[6].prior_sigma = kInfinity;
+  c.unknowns[6].prior_share = 0;
+  c.datum = {deg(0.0018), deg(0.0023), deg(0.0024), deg(0.0038), deg(0.0004), deg(0.0039), 80.2};
+  c.not_told = {{"0.71 lever_arm_x_m - 0.70 clock_offset_s", 0.98},
+                {"boresight_x_deg against the heading of the trajectory", 0.93}};
+  for (std::uint16_t i = 0; i < kStrips; ++i) {
+    for (std::uint16_t j = i + 1; j < kStrips; ++j) {
+      c.pairs_before.push_back(pair(i, j, 0.3412));
+      c.pairs_after.push_back(pair(i, j, 0.0054));
+    }
+  }
+  c.rms_before = 0.3412;
+  c.rms_after = 0.0054;
+  c.sigma0 = 0.981;
+  c.range_sigma = 0.0196;
+  c.shots = 200000;
+  c.without_pose = 1234;
+  c.used = 190000;
+  c.outliers = 777;
+  c.cells = 1525;
+  c.rough_cells = 31;
+  for (std::size_t i = 0; i + 1 < c.model.knots.size(); ++i) {
+    if (c.model.knots.strip[i] != c.model.knots.strip[i + 1]) continue;
+    c.piece_time.push_back(
+        1e-9 * static_cast<double>(c.model.knots.time_ns[i] - c.model.knots.time_ns[0]) + 1);
+    c.piece_rms.push_back(0.019 + 1e-5 * static_cast<double>(i));
+  }
+  return c;
+}
+
+jobs::FlightDetails details_example() {
+  jobs::FlightDetails d;
+  d.shots = 200000;
+  d.plane_size = 2;
+  d.square_size = 4;
+  d.strip_count = kStrips;
+  d.pair_count = 6;
+  for (std::uint16_t s = 0; s < kStrips; ++s) {
+    const double course = kPi / 2 * s;
+    d.strips.push_back({s,
+                        50000,
+                        36.0 * s,
+                        16,
+                        course,
+                        5.01,
+                        81.9,
+                        deg(2.8),
+                        {-40 * std::sin(course), 40 * std::sin(course)},
+                        {-40 * std::cos(course), 40 * std::cos(course)}});
+  }
+  for (std::uint16_t s = 1; s < kStrips; ++s) {
+    d.pairs.push_back({0, s, {-2, 2, 6}, {2, 2, 2}, {0.3, -0.2, kNaN}, {0.004, kNaN, -0.006}});
+  }
+  d.ground = {{-2, 2, 6},         {2, 2, 2},   {0.3, 0.2, kNaN}, {0.004, 0.005, kNaN},
+              {0.02, 0.04, kNaN}, {0, 0.5, 1}, {2, 4, kNaN}};
+  return d;
+}
+
+/// What a page is made of, with everything that belongs to it.
+struct Flight {
+  FlightCalibration calibration = calibrated_example();
+  sensors::Sensor nominal = sensors::load_sensor("mid-40");
+  trajectories::Mount mount;
+  jobs::FlightDetails details = details_example();
+  std::optional<jobs::FlightTruth> truth;
+  std::vector<std::string> warnings;
+  std::vector<ReportedRecording> recordings = {{"strips <1>.lvx", "lvx-1.1", "GPS", {}},
+                                               {"more.lvx", "lvx-1.1", "GPS", {}}};
+
+  Flight() {
+    mount.name = "hexacopter";
+    mount.reference_point = "centre of the IMU";
+    mount.nominal << 0, 0, 1, 0, -1, 0, 1, 0, 0;
+    recordings[0].audit.observations = 150000;
+    recordings[1].audit.observations = 60000;
+  }
+  FlightReport report() const {
+    return flight_report({calibration,
+                          nominal,
+                          mount,
+                          details,
+                          truth,
+                          recordings,
+                          {{"command", "risley calibrate \"strips <1>.lvx\""}, {"seed", "0"}},
+                          warnings});
+  }
+  std::string html() const { return flight_page(report()); }
+};
+
+jobs::FlightTruth truth_example(const Flight& flight) {
+  jobs::FlightTruth truth;
+  truth.sensor = sensors::load_sensor("mid-40");
+  truth.sensor.range_offset = 0.0617;
+  truth.mount = flight.mount;
+  truth.mount.boresight[0].value = deg(5.0);
+  truth.mount.lever_arm[1].value = 0.0415;
+  truth.mount.clock_offset.value = 0.07;
+  truth.before.gauge = deg(4.1);
+  truth.before.shape = deg(0.0231);
+  truth.before.rotation = {deg(2.7), deg(-1.5), deg(1.9)};
+  truth.after.gauge = deg(0.003);
+  truth.after.shape = deg(0.0004);
+  truth.after.rotation = {deg(0.001), deg(-0.002), deg(0.0015)};
+  return truth;
+}
+
+/// The page's own part: no style, no scripts.
+std::string visible(const std::string& html) {
+  const std::size_t first = html.find("<main>"), last = html.find("</main>");
+  EXPECT_NE(first, std::string::npos);
+  EXPECT_NE(last, std::string::npos);
+  return html.substr(first, last - first);
+}
+
+std::string data_text(const std::string& html) {
+  const std::string start = "<script type=\"application/json\" id=\"page-data\">";
+  const std::size_t first = html.find(start) + start.size();
+  return html.substr(first, html.find("</script>", first) - first);
+}
+
+nlohmann::json data(const std::string& html) { return nlohmann::json::parse(data_text(html)); }
+
+std::vector<std::string> titles(const std::string& html) {
+  std::vector<std::string> found;
+  const std::regex caption("<figcaption>([^<]*)</figcaption>");
+  for (std::sregex_iterator i(html.begin(), html.end(), caption), end; i != end; ++i) {
+    found.push_back((*i)[1]);
+  }
+  return found;
+}
+
+nlohmann::json chart(const std::string& html, const std::string& title) {
+  for (const auto& one : data(html)) {
+    if (one.at("title") == title) return one;
+  }
+  ADD_FAILURE() << "no diagram " << title;
+  return {};
+}
+
+nlohmann::json series(const nlohmann::json& chart, const std::string& label) {
+  for (const auto& one : chart.at("series")) {
+    if (one.at("label") == label) return one;
+  }
+  ADD_FAILURE() << "no series " << label;
+  return {};
+}
+
+void expect_sound(const std::string& html) {
+  const std::string shown = visible(html);
+  const std::regex not_finite("(^|[^A-Za-z])(nan|inf)([^A-Za-z]|$)", std::regex::icase);
+  std::smatch found;
+  EXPECT_FALSE(std::regex_search(shown, found, not_finite)) << found.suffix().str().substr(0, 200);
+  EXPECT_FALSE(std::regex_search(data_text(html), not_finite));
+  const nlohmann::json charts = data(html);
+  EXPECT_EQ(charts.size(), titles(shown).size());
+  const std::set<std::string> colours = {"a", "b", "c", "d", "ink", "bad"};
+  for (const auto& one : charts) {
+    EXPECT_THAT(shown, HasSubstr("class=\"plot\" id=\"" + one.at("id").get<std::string>() + "\""));
+    for (const auto& drawn : one.at("series")) {
+      EXPECT_EQ(drawn.at("x").size(), drawn.at("y").size());
+      EXPECT_TRUE(colours.contains(drawn.at("colour").get<std::string>()));
+      for (const auto& x : drawn.at("x")) EXPECT_TRUE(x.is_number());
+    }
+  }
+}
+
+TEST(FlightPage, SaysFirstWhatTheFlightFoundAndHowWell) {
+  Flight flight;
+  const std::string html = flight.html(), shown = visible(html);
+  expect_sound(html);
+  EXPECT_THAT(shown, HasSubstr("class=\"verdict ok\""));
+  EXPECT_THAT(shown, HasSubstr("341.2 mm apart before and 5.4 mm after"));
+  EXPECT_THAT(shown, HasSubstr("over 6 pairs of them"));
+  EXPECT_THAT(shown, HasSubstr("X 6.0021° ± 0.0020°"));
+  EXPECT_THAT(shown, HasSubstr("to 0.0039° (5.5 mm at 80 m)"));
+  EXPECT_THAT(shown, HasSubstr("200\u202f000 shots with a range, 190\u202f000 of them used"));
+  EXPECT_THAT(shown, HasSubstr("on hexacopter"));
+  EXPECT_LT(shown.find("class=\"verdict"), shown.find("<h2>"));
+}
+
+TEST(FlightPage, HasEverySectionAndDiagram) {
+  const std::string shown = visible(Flight().html());
+  for (const char* text :
+       {"<h2>How well the beams are known</h2>", "<h2>Mount, ranges and clock</h2>",
+        "<h2>What this flight does not tell</h2>", "<h2>Strips before and after</h2>",
+        "<h2>The flight</h2>", "<h2>Ground</h2>", "<h2>Residuals</h2>",
+        "<h2>Corrections of the trajectory</h2>", "<h2>Prisms</h2>",
+        "<h2>Correlations of the parameters</h2>", "<h2>Times of the recording</h2>",
+        "<h2>How to make it again</h2>"}) {
+    EXPECT_THAT(shown, HasSubstr(text));
+  }
+  EXPECT_THAT(titles(shown),
+              ::testing::ElementsAre(
+                  "All strips, before", "All strips, after", "All strips, after, finer colours",
+                  "Strip 2 less strip 1, before", "Strip 2 less strip 1, after",
+                  "Strip 2 less strip 1, after, finer colours", "Strip 3 less strip 1, before",
+                  "Strip 3 less strip 1, after", "Strip 3 less strip 1, after, finer colours",
+                  "Strip 4 less strip 1, before", "Strip 4 less strip 1, after",
+                  "Strip 4 less strip 1, after, finer colours", "The strips from above",
+                  "How rough the ground is", "How steep the ground is", "How many strips saw it",
+                  "Residuals along time", "Correction to the north", "Correction to the east",
+                  "Correction of the height", "Correction of the tilt about north",
+                  "Correction of the tilt about east", "Correction of the heading"));
+}
+
+TEST(FlightPage, UnknownsStandWithTheirPriorsAndTwins) {
+  Flight flight;
+  const std::string shown = visible(flight.html());
+  // Name, value, sigma, unit, before, change, sigma before, share, twin.
+  EXPECT_THAT(shown, HasSubstr("boresight_x_deg</span></th><td>6.0021</td><td>0.0020</td>"
+                               "<td>deg</td><td>0.0000</td><td>6.0021</td><td>0.2</td>"
+                               "<td>0 %</td><td class=\"text\">β<sub>Y</sub> (-0.43)</td>"));
+  EXPECT_THAT(shown, HasSubstr("lever_arm_z_m</span></th><td>0.052</td><td>–</td><td>m</td>"
+                               "<td>0.05</td><td>0.002</td><td>0.02</td>"
+                               "<td class=\"text\" colspan=\"2\">held</td>"));
+  EXPECT_THAT(shown, HasSubstr("clock_offset_s</span></th><td>72.00</td><td>0.20</td><td>ms</td>"));
+  // No prior at all: a dash.
+  EXPECT_THAT(shown, HasSubstr("range_offset_m</span></th><td>62.00</td><td>0.20</td><td>mm</td>"
+                               "<td>60.00</td><td>2.00</td><td>–</td>"));
+  // Prisms have a nominal value.
+  EXPECT_THAT(shown, HasSubstr("<th>nominal</th>"));
+  EXPECT_THAT(shown, HasSubstr("X, its optical axis, points down, its Y to the left and its Z "
+                               "forward. Point that the trajectory is of: centre of the IMU."));
+}
+
+TEST(FlightPage, WhatIsHeldAndMayBeOffSaysSo) {
+  Flight flight;
+  flight.calibration.unknowns.back().held = true;
+  EXPECT_THAT(visible(flight.html()), HasSubstr("held, and may be off"));
+}
+
+TEST(FlightPage, SaysInWordsWhatIsNotTold) {
+  Flight flight;
+  std::string shown = visible(flight.html());
+  EXPECT_THAT(shown, HasSubstr("<li>0.71 lever arm forward - 0.70 clock offset: 98 % of the σ "
+                               "before is left. At one speed"));
+  EXPECT_THAT(shown, HasSubstr("<li>boresight about the sensor&#39;s X against the heading of the "
+                               "trajectory: 93 %"));
+  flight.calibration.not_told = {
+      {"1.00 boresight_x_deg", 1}, {"1.00 boresight_y_deg", 1}, {"1.00 lever_arm_z_m", 1}};
+  shown = visible(flight.html());
+  EXPECT_THAT(shown, HasSubstr("Flat ground does not show a turn about the vertical"));
+  EXPECT_THAT(shown, HasSubstr("Strips in opposite or crossing directions"));
+  EXPECT_THAT(shown, HasSubstr("points of known height"));
+  flight.calibration.not_told.clear();
+  EXPECT_THAT(visible(flight.html()), HasSubstr("It tells something of everything that was free"));
+}
+
+TEST(FlightPage, PairsOfStripsStandBeforeAndAfter) {
+  Flight flight;
+  const std::string shown = visible(flight.html());
+  EXPECT_THAT(shown,
+              HasSubstr("strip 2 less strip 1</th><td class=\"text\">before</td><td>1\u202f001</td>"
+                        "<td>-102.4</td><td>341.2</td><td>170.6 ± 6.8</td><td>–</td>"
+                        "<td>34.1 ± 3.4</td>"));
+  EXPECT_THAT(shown, HasSubstr("<td class=\"text\">after</td><td>1\u202f001</td><td>-1.6</td>"
+                               "<td>5.4</td>"));
+}
+
+TEST(FlightPage, ManyPairsAreThoseWithTheMostGround) {
+  Flight flight;
+  flight.calibration.pairs_before.clear();
+  flight.calibration.pairs_after.clear();
+  for (std::uint16_t i = 0; i < 40; ++i) {
+    for (std::uint16_t j = i + 1; j < 40; ++j) {
+      flight.calibration.pairs_before.push_back(pair(i, j, 0.3));
+      flight.calibration.pairs_after.push_back(pair(i, j, 0.005));
+    }
+  }
+  const FlightReport report = flight.report();
+  EXPECT_EQ(report.pair_count, 780u);
+  EXPECT_EQ(report.pairs_before.size(), 200u);
+  EXPECT_EQ(report.pairs_after.size(), 200u);
+  EXPECT_EQ(report.pairs_after.back().second, 39);
+  EXPECT_EQ(report.pairs_before.back().second, 39);
+  EXPECT_THAT(visible(flight_page(report)), HasSubstr("The 200 pairs with the most ground"));
+}
+
+TEST(FlightPage, OnePairAndNoPairAreSaid) {
+  Flight flight;
+  flight.calibration.pairs_before.resize(1);
+  flight.calibration.pairs_after.resize(1);
+  flight.details.pairs.resize(1);
+  flight.details.pair_count = 1;
+  EXPECT_THAT(visible(flight.html()), HasSubstr("over one pair of them"));
+  expect_sound(flight.html());
+  flight.calibration.pairs_before.clear();
+  flight.calibration.pairs_after.clear();
+  flight.details = {};
+  const std::string html = flight.html();
+  expect_sound(html);
+  EXPECT_THAT(visible(html), HasSubstr("No two strips saw the same ground."));
+}
+
+TEST(FlightPage, BothPicturesOfADifferenceHaveTheSameColours) {
+  const std::string html = Flight().html();
+  for (const std::string who : {"All strips", "Strip 2 less strip 1"}) {
+    const auto before = chart(html, who + ", before"), after = chart(html, who + ", after"),
+               fine = chart(html, who + ", after, finer colours");
+    EXPECT_EQ(before.at("kind"), "ground");
+    EXPECT_EQ(before.at("value_range"), after.at("value_range"));
+    EXPECT_LT(fine.at("value_range")[1], after.at("value_range")[1]);
+    EXPECT_EQ(fine.at("series"), after.at("series"));
+  }
+  // Squares that were compared before and after.
+  const auto after = chart(html, "Strip 2 less strip 1, after").at("series").at(0);
+  EXPECT_EQ(after.at("x"), nlohmann::json::array({-2.0}));
+  EXPECT_EQ(after.at("value"), nlohmann::json::array({4.0}));
+  EXPECT_EQ(after.at("cell_width"), 4.0);
+  EXPECT_THAT(html, HasSubstr("Squares of 4 m, colours in mm."));
+  // Without any each picture has its own.
+  Flight flight;
+  flight.details.pairs[0].after = {kNaN, kNaN, 0.001};
+  const std::string apart = flight.html();
+  const auto squares = [&](const char* title) {
+    return chart(apart, title).at("series").at(0).at("x");
+  };
+  EXPECT_EQ(squares("Strip 2 less strip 1, before"), (nlohmann::json::array({-2.0, 2.0})));
+  EXPECT_EQ(squares("Strip 2 less strip 1, after"), nlohmann::json::array({6.0}));
+}
+
+TEST(FlightPage, CorrectionsHaveTheSignsAndUnitsOfTheirErrors) {
+  const std::string html = Flight().html();
+  const auto value = [&](const char* title) {
+    return series(chart(html, title), "correction").at("y").at(0).get<double>();
+  };
+  // Row r of the corrections begins at 10 (r + 1) mm or 0.001 degrees.
+  EXPECT_NEAR(value("Correction to the east"), 10, 1e-4);
+  EXPECT_NEAR(value("Correction to the north"), 20, 1e-4);
+  EXPECT_NEAR(value("Correction of the height"), 30, 1e-4);
+  EXPECT_NEAR(value("Correction of the tilt about east"), 0.040, 1e-6);
+  EXPECT_NEAR(value("Correction of the tilt about north"), 0.050, 1e-6);
+  EXPECT_NEAR(value("Correction of the heading"), -0.060, 1e-6);  // about down
+  const auto north = chart(html, "Correction to the north");
+  const auto line = series(north, "correction"), band = series(north, "± σ");
+  // A break between strips, and none else.
+  ASSERT_EQ(line.at("x").size(), kStrips * kKnotsOfStrip + kStrips - 1);
+  EXPECT_TRUE(line.at("y").at(kKnotsOfStrip).is_null());
+  EXPECT_EQ(std::count(line.at("y").begin(), line.at("y").end(), nullptr), kStrips - 1);
+  EXPECT_EQ(line.at("x").at(kKnotsOfStrip + 1), 36.0);
+  EXPECT_EQ(band.at("x").size(), 2 * line.at("x").size() + 1);
+  EXPECT_NEAR(band.at("y").at(0), 22, 1e-4);
+}
+
+TEST(FlightPage, ResidualsBreakBetweenStrips) {
+  const auto line = series(chart(Flight().html(), "Residuals along time"), "residuals, RMS");
+  ASSERT_EQ(line.at("x").size(), kStrips * (kKnotsOfStrip - 1) + kStrips - 1);
+  EXPECT_EQ(std::count(line.at("y").begin(), line.at("y").end(), nullptr), kStrips - 1);
+  EXPECT_NEAR(line.at("y").at(0), 19, 1e-4);
+}
+
+TEST(FlightPage, LongFlightsAreThinned) {
+  Flight flight;
+  FlightCalibration& c = flight.calibration;
+  calibration::TrajectoryKnots& own = c.model.knots;
+  own = {};
+  c.piece_time.clear();
+  c.piece_rms.clear();
+  for (std::size_t i = 0; i < 50000; ++i) {
+    own.time_ns.push_back(static_cast<std::int64_t>(i) * 250'000'000);
+    own.strip.push_back(static_cast<std::uint16_t>(i / 1000));
+    c.piece_time.push_back(0.25 * static_cast<double>(i) + 0.1);
+    c.piece_rms.push_back(0.02);
+  }
+  c.model.corrections = c.correction_sigma = Eigen::MatrixXd::Constant(6, 50000, 0.01);
+  const std::string html = flight.html();
+  expect_sound(html);
+  EXPECT_LT(series(chart(html, "Correction to the north"), "correction").at("x").size(), 1500u);
+  const auto rms = series(chart(html, "Residuals along time"), "residuals, RMS");
+  EXPECT_LT(rms.at("x").size(), 1500u);
+  EXPECT_NEAR(rms.at("y").at(0), 20, 1e-4);
+  EXPECT_THAT(visible(html), HasSubstr("Of 50\u202f000 knots one in 42 is drawn"));
+}
+
+TEST(FlightPage, AFailureSaysWhyAndWhatToDo) {
+  Flight flight;
+  flight.calibration = FlightCalibration();
+  flight.calibration.sensor = sensors::load_sensor("mid-40");
+  flight.calibration.reason = "the adjustment had not settled & more";
+  flight.calibration.rms_before = flight.calibration.rms_after = kNaN;
+  flight.calibration.warnings = {"a warning"};
+  flight.details = {};
+  const std::string html = flight.html(), shown = visible(html);
+  expect_sound(html);
+  EXPECT_THAT(shown, HasSubstr("class=\"verdict bad\""));
+  EXPECT_THAT(shown, HasSubstr("the adjustment had not settled &amp; more"));
+  EXPECT_THAT(shown, HasSubstr("<li>a warning</li>"));
+  EXPECT_THAT(shown, HasSubstr("What to do:"));
+  EXPECT_EQ(data(html).size(), 0u);
+}
+
+TEST(FlightPage, APoorResultAsksForCare) {
+  Flight flight;
+  flight.calibration.datum.rotation = flight.calibration.datum.total = deg(3);
+  EXPECT_THAT(visible(flight.html()), HasSubstr("The directions of the beams are poorly known"));
+  EXPECT_THAT(visible(flight.html()), HasSubstr("class=\"verdict care\""));
+  flight = {};
+  flight.calibration.rms_after = 0.35;
+  EXPECT_THAT(visible(flight.html()), HasSubstr("no better on each other than before"));
+  flight = {};
+  flight.calibration.warnings = {"one"};
+  flight.warnings = {"two"};
+  EXPECT_THAT(visible(flight.html()), HasSubstr("<li>one</li><li>two</li>"));
+}
+
+TEST(FlightPage, NumbersThatAreNotFiniteAreDashes) {
+  Flight flight;
+  FlightCalibration& c = flight.calibration;
+  c.unknowns[0].value = c.unknowns[1].sigma = c.unknowns[2].start = kNaN;
+  c.unknowns[3].prior_share = c.unknowns[4].twin_correlation = kNaN;
+  c.covariance(2, 3) = c.covariance(4, 4) = kNaN;
+  c.covariance(6, 6) = -1;
+  c.datum.total = c.datum.height = kInfinity;
+  c.not_told[0].sigma = kNaN;
+  c.pairs_after[0].mean = c.pairs_after[1].shift[0] = c.pairs_after[2].sigma[2] = kNaN;
+  c.sigma0 = c.range_sigma = c.rms_after = kNaN;
+  c.model.corrections(0, 3) = c.correction_sigma(5, 2) = kNaN;
+  c.piece_rms[4] = kInfinity;
+  flight.details.strips[0].speed = flight.details.strips[1].sway = kNaN;
+  flight.details.ground.after.assign(3, kNaN);
+  expect_sound(flight.html());
+}
+
+TEST(FlightPage, TruthStandsBesideWhatIsStated) {
+  Flight flight;
+  EXPECT_THAT(visible(flight.html()), Not(HasSubstr("truth")));
+  flight.truth = truth_example(flight);
+  const std::string shown = visible(flight.html());
+  EXPECT_THAT(shown, HasSubstr("error before, against the truth</th><td>4.1</td>"));
+  EXPECT_THAT(shown, HasSubstr("error after, against the truth</th><td>0.00303</td><td>0.003</td>"
+                               "<td>0.0004</td><td>0.001</td><td>-0.002</td><td>0.0015</td>"
+                               "<td>4.2</td><td>0.6</td>"));
+  // Truth, error, error over sigma.
+  EXPECT_THAT(shown, HasSubstr("<td>5.0000</td><td>1.0021</td><td class=\"far\">501.05</td>"));
+  EXPECT_THAT(shown, HasSubstr("<td>0.04150</td><td>0.00050</td><td>2.50</td>"));
+  EXPECT_THAT(shown, HasSubstr("<td>61.70</td><td>0.30</td><td>1.50</td>"));
+  EXPECT_THAT(shown, HasSubstr("<td>70.00</td><td>2.00</td><td class=\"far\">10.00</td>"));
+  EXPECT_THAT(shown, HasSubstr("held</td><td>0</td><td>0.052</td><td>–</td>"));
+}
+
+TEST(FlightPage, EscapesNames) {
+  Flight flight;
+  const std::string bad = "<script>alert(1)</script>";
+  flight.mount.name = flight.mount.reference_point = bad;
+  flight.recordings[0].name = bad;
+  flight.warnings = {bad};
+  flight.calibration.sensor.serial = bad;
+  flight.calibration.not_told = {{bad, 1}};
+  const std::string html = flight.html();
+  expect_sound(html);
+  EXPECT_THAT(html, Not(HasSubstr("<script>alert")));
+  EXPECT_THAT(visible(html), HasSubstr("on &lt;script&gt;alert(1)"));
+  EXPECT_THAT(html, HasSubstr("Content-Security-Policy"));
+}
+
+class FlightReportFile : public ::testing::Test {
+ protected:
+  std::string path(const std::string& ending = ".json") const {
+    const auto folder = std::filesystem::path(::testing::TempDir()) / "flight_report";
+    std::filesystem::create_directories(folder);
+    const auto* info = ::testing::UnitTest::GetInstance()->current_test_info();
+    return (folder / (info->name() + ending)).string();
+  }
+  std::string error() const {
+    try {
+      read_report(path());
+    } catch (const FileError& found) {
+      return found.what();
+    }
+    return "no error";
+  }
+};
+
+TEST_F(FlightReportFile, ComesBackAsItWas) {
+  Flight flight;
+  flight.truth = truth_example(flight);
+  const Report report = flight.report();
+  write_report(path(), report);
+  const Report again = read_report(path());
+  ASSERT_TRUE(std::holds_alternative<FlightReport>(again));
+  EXPECT_STREQ(verb_of(again), "calibrate");
+  EXPECT_EQ(report_page(again), report_page(report));
+  const auto& r = std::get<FlightReport>(again);
+  EXPECT_EQ(r.observations, 210000u);
+  EXPECT_EQ(r.unknowns[0].value, flight.calibration.unknowns[0].value);
+  EXPECT_TRUE(r.unknowns[5].held);
+  EXPECT_TRUE(std::isnan(r.unknowns[6].prior_sigma));  // infinite
+  EXPECT_EQ(r.covariance, flight.calibration.covariance);
+  EXPECT_EQ(r.pairs_before[0].shift, flight.calibration.pairs_before[0].shift);
+  EXPECT_EQ(r.body_from_sensor(0, 2), 1);
+  EXPECT_EQ(r.truth->after.rotation.y, deg(-0.002));
+  EXPECT_EQ(r.truth->values[4], 0.0415);
+  EXPECT_EQ(r.strips[1].range, 81.9);
+  EXPECT_EQ(r.knot_spacing, 2);
+  const std::string first = io::read_text_file(path());
+  write_report(path(), again);
+  EXPECT_EQ(io::read_text_file(path()), first);
+}
+
+TEST_F(FlightReportFile, NeedsDetailsOfTheJob) {
+  jobs::CalibratedFlight calibrated;
+  calibrated.calibration = calibrated_example();
+  calibrated.nominal = sensors::load_sensor("mid-40");
+  EXPECT_THROW(flight_report(calibrated), InvalidArgument);
+  calibrated.details = details_example();
+  const FlightReport report = flight_report(calibrated);
+  EXPECT_EQ(report.unknowns.size(), 10u);
+  EXPECT_FALSE(report.truth);
+}
+
+TEST_F(FlightReportFile, OneThatFailedComesBack) {
+  Flight flight;
+  flight.calibration = FlightCalibration();
+  flight.calibration.sensor = sensors::load_sensor("mid-40");
+  flight.calibration.reason = "why";
+  flight.calibration.datum.total = kNaN;
+  flight.details = {};
+  const Report report = flight.report();
+  write_report(path(), report);
+  const Report again = read_report(path());
+  EXPECT_EQ(report_page(again), report_page(report));
+}
+
+TEST_F(FlightReportFile, EveryMissingFieldIsNamed) {
+  write_report(path(), Flight().report());
+  const std::string text = io::read_text_file(path());
+  for (const char* field :
+       {"mount", "body_from_sensor", "unknowns", "prior_share", "nominal", "covariance", "datum",
+        "height_m", "not_told", "pairs_after", "shift_m", "north", "strips", "knots",
+        "difference_charts", "correction_charts", "provenance"}) {
+    std::string cut = text;
+    const std::string key = std::string("\"") + field + "\":";
+    cut.replace(cut.find(key), key.size(), "\"other\":");
+    std::ofstream(path()) << cut;
+    EXPECT_THAT(error(), HasSubstr(std::string(field) + " is missing"));
+  }
+}
+
+TEST_F(FlightReportFile, WhatAPageCannotBeDrawnFromIsRefusedWithItsPlace) {
+  const std::vector<std::pair<std::function<void(FlightReport&)>, std::string>> cases = {
+      {[](auto& r) { r.prisms = 99; }, "prisms"},
+      {[](auto& r) { r.unknowns[1].name = "<b>"; }, "unknowns[1].name: "},
+      {[](auto& r) { r.unknowns[1].name = r.unknowns[0].name; }, "[1].name: 'boresight_x_deg' st"},
+      {[](auto& r) { r.unknowns[1].value = kNaN; }, "unknowns[1].value: expected a number"},
+      {[](auto& r) { r.unknowns[1].sigma = -1; }, "unknowns[1].sigma: is negative"},
+      {[](auto& r) { r.unknowns[1].prior_sigma = -1; }, "unknowns[1].prior_sigma: is negative"},
+      {[](auto& r) { r.unknowns[1].prior_share = 2; }, "unknowns[1].prior_share: expected 0"},
+      {[](auto& r) { r.unknowns[1].twin = "dog"; }, "unknowns[1].twin: 'dog' is none"},
+      {[](auto& r) { r.unknowns[1].twin_correlation = 7; }, "unknowns[1].twin_correlation: exp"},
+      {[](auto& r) { r.unknowns.pop_back(); }, "is none of the unknowns"},
+      {[](auto& r) { r.truth->values.clear(); }, "truth.values: 0 values, expected 10"},
+      {[](auto& r) { r.nominal.pop_back(); }, "nominal: 9 values, expected 10"},
+      {[](auto& r) { r.covariance = Eigen::MatrixXd::Ones(900, 900); }, "covariance: 900 rows"},
+      {[](auto& r) { r.covariance = Eigen::MatrixXd::Ones(10, 11); }, "covariance: 10 rows of 11"},
+      {[](auto& r) { r.covariance(2, 1) = kNaN; }, "covariance[2]: expected numbers"},
+      {[](auto& r) { r.covariance(2, 2) = -1; }, "covariance[2]: expected numbers"},
+      {[](auto& r) { r.body_from_sensor = Eigen::MatrixXd::Ones(2, 3); }, "body_from_sensor: exp"},
+      {[](auto& r) { r.body_from_sensor(1, 1) = kNaN; }, "body_from_sensor: expected"},
+      {[](auto& r) { r.datum.total = kNaN; }, "datum.total: expected a number"},
+      {[](auto& r) { r.datum.height = -1; }, "datum.height_m: is negative"},
+      {[](auto& r) { r.not_told[1].sigma = -1; }, "not_told[1].sigma: is negative"},
+      {[](auto& r) { r.pairs_after[2].second = 0; }, "pairs_after[2]: expected two strips"},
+      {[](auto& r) { r.pairs_before[2].rms = -1; }, "pairs_before[2].rms_m: is negative"},
+      {[](auto& r) { r.pairs_before[2].sigma[1] = -1; }, "shift_sigma_m: is negative"},
+      {[](auto& r) { r.knot_spacing = kNaN; }, "knot_spacing_s: expected a time"},
+      {[](auto& r) { r.difference_charts[0].series[0].value.pop_back(); }, "series[0].value: 1 v"},
+      {[](auto& r) { r.correction_charts[0].series[0].colour = "x"; }, "colour: 'x' is no known"},
+      {[](auto& r) { r.ground_charts[0].series[0].cell_width = -1; }, "are lengths"},
+      {[](auto& r) { r.residual_charts[0].series[0].y.clear(); }, "series[0].y: 0 values"},
+      {[](auto& r) { r.strip_charts[0].kind = ChartKind::space; }, "strip_charts[0].series[0]."},
+  };
+  for (const auto& [damage, words] : cases) {
+    Flight flight;
+    flight.truth = truth_example(flight);
+    FlightReport report = flight.report();
+    damage(report);
+    write_report(path(), report);
+    EXPECT_THAT(error(), HasSubstr(words));
+    EXPECT_THAT(error(), HasSubstr(path()));
+  }
+}
+
+TEST_F(FlightReportFile, TextsThatDoNotFitAreRefused) {
+  const std::pair<std::string, std::pair<std::string, std::string>> cases[] = {
+      {"\"calibrated_on\":\"flight\"", {"\"calibrated_on\":\"water\"", "found 'water'"}},
+      {"\"calibrated_on\":\"flight\"", {"\"calibrated_on\":7", "calibrated_on: expected a text"}},
+      {"\"calibrated_on\":\"flight\",", {"", "is missing"}},  // one on walls then
+      {"\"first\":0", {"\"first\":70000", "first: 70000 is out of range"}},
+      {"\"first\":0", {"\"first\":-1", "first: -1 is out of range"}},
+      {"\"cells\":1525", {"\"cells\":1e999", "is no JSON that can be read"}},
+      {"\"cells\":1525", {"\"cells\":\"many\"", "cells: expected a whole number"}},
+      {"\"shift_m\":{", {"\"shift_m\":[],\"x\":{", "shift_m: expected an object, found array"}},
+  };
+  for (const auto& [before, damage] : cases) {
+    write_report(path(), Flight().report());
+    std::string text = io::read_text_file(path());
+    ASSERT_NE(text.find(before), std::string::npos) << before;
+    text.replace(text.find(before), before.size(), damage.first);
+    std::ofstream(path()) << text;
+    EXPECT_THAT(error(), HasSubstr(damage.second));
+  }
+}
+
+TEST_F(FlightReportFile, OfARealCalibrationMakesTheSamePageAgain) {
+  testing::FlightSettings settings;
+  settings.strip_length = 25;
+  settings.shot_rate = 2000;
+  const testing::SimulatedFlight simulated(settings);
+  calibration::FlightCalibrationOptions options = simulated.options();
+  options.knot_spacing = 2;
+  options.cell_size = 3;
+  Flight flight;
+  flight.mount = options.mount;
+  flight.calibration =
+      calibration::calibrate_flight(simulated.shots, simulated.trajectory, options);
+  flight.details =
+      jobs::flight_details(simulated.shots, simulated.trajectory, options, flight.calibration);
+  const Report report = flight.report();
+  write_report(path(), report);
+  const Report again = read_report(path());
+  const std::string html = report_page(again);
+  EXPECT_EQ(html, report_page(report));
+  expect_sound(html);
+  EXPECT_THAT(visible(html), HasSubstr("Strip 4 less strip 1, after"));
+  EXPECT_LT(std::filesystem::file_size(path()), 3'000'000u);
+}
+
+}  // namespace risley::report::flight_report_test
