@@ -498,7 +498,8 @@ std::vector<StripLine> Georeference::strip_lines() const {
     for (std::size_t k = 0; k < 2; ++k) {
       const auto pose = s.interpolation.at(k == 0 ? strip.begin_ns : strip.end_ns);
       if (!pose) return {};
-      const Vector3d place = pose->position + pose->attitude * s.lever_arm;
+      const Vector3d place =
+          pose->position + pose->attitude * trajectories::lever_arm(s.platform.mount);
       ends[k] = s.tangent(place).map(place);
     }
     lines.push_back({"",
