@@ -6,10 +6,12 @@
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
+#include <memory>
 #include <string>
 #include <vector>
 
 #include <benchmark/benchmark.h>
+#include <fmt/format.h>
 #include <tbb/global_control.h>
 #include <unistd.h>
 
@@ -18,6 +20,9 @@
 #include "risley/recordings/writer.hpp"
 #include "risley/sensors/preset.hpp"
 #include "risley/simulation/scanner.hpp"
+#include "risley/trajectories/error_process.hpp"
+#include "risley/trajectories/flight_plan.hpp"
+#include "risley/trajectories/mount.hpp"
 
 namespace risley {
 namespace {
@@ -112,6 +117,84 @@ BENCHMARK(lvx_to_las_smoothed)->Unit(benchmark::kMillisecond)->MinTime(3.0);
 /// Directions as reported, from the frame's origin: no rotation angles are needed.
 void lvx_to_las_reported(benchmark::State& state) { make(state, true); }
 BENCHMARK(lvx_to_las_reported)->Unit(benchmark::kMillisecond)->MinTime(3.0);
+
+/// The same of a sensor that flies: a minute over level ground, made into points as if it had
+/// stood, in the trajectory's own frame, and on a map. Their rates in one run are what counts.
+enum class Carrier { stands, own_frame, map };
+
+struct Flown {
+  std::shared_ptr<const trajectories::Trajectory> trajectory;
+  trajectories::Mount mount;
+  std::string path;
+};
+
+const Flown& flown(bool on_earth) {
+  static const File local_file("-local.lvx"), earth_file("-earth.lvx");
+  const auto make_flight = [](const File& file, bool earth) {
+    constexpr const char* kOrigin =
+        "origin: {latitude_deg: 50, longitude_deg: 8.5, ellipsoidal_height_m: 250}\n";
+    const std::string plan = fmt::format(
+        "risley_flight: 1\n{}rate_hz: 200\nheight_m: 80\nspeed_m_per_s: 5\nturn_duration_s: 20\n"
+        "strips: [{{headings_deg: [90, 270], length_m: 160}}]\n"
+        "motion: {{seed: 4, attitude: {{roll_deg: 2, pitch_deg: 2, heading_deg: 2, lowest_hz: "
+        "0.15, "
+        "highest_hz: 1.2, sinusoids: 6}}}}\n",
+        earth ? kOrigin : "");
+    Flown result;
+    result.trajectory = std::make_shared<trajectories::Trajectory>(
+        trajectories::fly(trajectories::parse_flight_plan(plan, "bench")).trajectory);
+    result.mount.reference_point = "centre of the inertial unit";
+    result.mount.nominal << 0, 0, 1, 0, -1, 0, 1, 0, 0;
+    result.path = file.path();
+    simulation::SimulationSettings settings;
+    settings.truth = sensors::load_sensor("mid-40-table3");
+    settings.rate = 100000.0;
+    settings.duration = kDuration;
+    settings.range_noise = 0.02;
+    settings.rotor = simulation::RotorKind::sinusoidal;
+    settings.scene = scenes::parse_scene(
+        fmt::format("terrain:\n  {}  ground: {{height_m: 0}}\n", earth ? kOrigin : ""), "bench");
+    settings.platform.emplace();
+    settings.platform->trajectory = result.trajectory;
+    settings.platform->mount = result.mount;
+    simulation::Scanner scanner(settings);
+    const auto writer = recordings::create_recording(file.path(), scanner.header());
+    recordings::Chunk chunk;
+    recordings::TruthColumns truth;
+    while (scanner.read(chunk, truth)) writer->write(chunk);
+    writer->close();
+    return result;
+  };
+  static const Flown local = make_flight(local_file, false), earth = make_flight(earth_file, true);
+  return on_earth ? earth : local;
+}
+
+void fly(benchmark::State& state, Carrier carrier) {
+  const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
+  const File output(".las");
+  const Flown& flight = flown(carrier == Carrier::map);
+  cloud::CloudOptions options;
+  if (carrier != Carrier::stands) {
+    options.platform.emplace();
+    options.platform->trajectory = *flight.trajectory;
+    options.platform->mount = flight.mount;
+    options.platform->errors = trajectories::assumed_error_model();
+    for (std::size_t k = 0; k < 6; ++k)
+      options.platform->errors->terms[k].sigma = k < 3 ? 0.02 : 5e-4;
+    if (carrier == Carrier::map) options.platform->crs = "EPSG:32632";
+  }
+  const sensors::Sensor sensor = calibration();
+  for (auto _ : state) {
+    const auto reader = recordings::open_recording(flight.path);
+    benchmark::DoNotOptimize(cloud::make_cloud(*reader, sensor, output.path(), options));
+  }
+  state.SetItemsProcessed(state.iterations() * kShots);
+}
+BENCHMARK_CAPTURE(fly, as_if_standing, Carrier::stands)
+    ->Unit(benchmark::kMillisecond)
+    ->MinTime(3.0);
+BENCHMARK_CAPTURE(fly, own_frame, Carrier::own_frame)->Unit(benchmark::kMillisecond)->MinTime(3.0);
+BENCHMARK_CAPTURE(fly, on_a_map, Carrier::map)->Unit(benchmark::kMillisecond)->MinTime(3.0);
 
 void bytes_only(benchmark::State& state) {
   const File output(".las");

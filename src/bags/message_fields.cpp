@@ -12,8 +12,8 @@
 namespace risley::bags {
 namespace {
 
-constexpr std::int64_t kSecond_ns = 1'000'000'000;
-constexpr std::int64_t kLatestTime_ns = 230LL * 31'557'600 * kSecond_ns;  // the year 2200
+constexpr std::int64_t kNanosecondsPerSecond = 1'000'000'000;
+constexpr std::int64_t kLatestTime = 230LL * 31'557'600 * kNanosecondsPerSecond;  // the year 2200
 
 }  // namespace
 
@@ -123,7 +123,7 @@ Header take_header(CdrFields& fields) {
 }
 
 std::int64_t message_time(std::uint64_t time_ns) {
-  if (time_ns > static_cast<std::uint64_t>(kLatestTime_ns)) {
+  if (time_ns > static_cast<std::uint64_t>(kLatestTime)) {
     throw BadMessage{fmt::format("expected a time before the year 2200, found {} ns", time_ns)};
   }
   return static_cast<std::int64_t>(time_ns);
@@ -133,7 +133,7 @@ std::int64_t message_time(std::int64_t seconds, std::uint32_t nanoseconds) {
   if (seconds < 0) {
     throw BadMessage{fmt::format("expected a time of 0 or later, found {} s", seconds)};
   }
-  return message_time(static_cast<std::uint64_t>(seconds) * kSecond_ns + nanoseconds);
+  return message_time(static_cast<std::uint64_t>(seconds) * kNanosecondsPerSecond + nanoseconds);
 }
 
 std::int64_t message_time(const Header& header) {

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
 #include <utility>
 
 #include <Eigen/Geometry>
@@ -16,6 +17,9 @@
 #include "risley/core/require.hpp"
 #include "risley/trajectories/clock.hpp"
 #include "risley/trajectories/geodesy.hpp"
+
+#include "cloud/georeference_kernel.hpp"
+#include "cloud/plain_poses.hpp"
 
 namespace risley::cloud {
 namespace {
@@ -41,76 +45,6 @@ constexpr double kCell = 5e-3;
 constexpr std::array<const char*, 7> kMountFactors{
     "boresight_x_deg", "boresight_y_deg", "boresight_z_deg", "lever_arm_x_m",
     "lever_arm_y_m",   "lever_arm_z_m",   "clock_offset_s"};
-
-/// The matrix by which a vector is crossed from the left.
-Matrix3d cross_matrix(const Vector3d& v) {
-  Matrix3d m;
-  m << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
-  return m;
-}
-
-/// A symmetric 3 x 3 matrix, written out: these are the inner loop.
-struct Symmetric {
-  double xx = 0, xy = 0, xz = 0, yy = 0, yz = 0, zz = 0;
-};
-
-using CovarianceColumns = std::array<std::vector<double>, kCovarianceTerms>;
-
-Symmetric load(const CovarianceColumns& columns, std::size_t i) {
-  return {columns[kXX][i], columns[kXY][i], columns[kXZ][i],
-          columns[kYY][i], columns[kYZ][i], columns[kZZ][i]};
-}
-
-void store(const Symmetric& c, CovarianceColumns& columns, std::size_t i) {
-  columns[kXX][i] = c.xx;
-  columns[kXY][i] = c.xy;
-  columns[kXZ][i] = c.xz;
-  columns[kYY][i] = c.yy;
-  columns[kYZ][i] = c.yz;
-  columns[kZZ][i] = c.zz;
-}
-
-Symmetric symmetric(const Matrix3d& m) {
-  return {m(0, 0), m(0, 1), m(0, 2), m(1, 1), m(1, 2), m(2, 2)};
-}
-
-/// A C A'
-Symmetric turned(const Matrix3d& a, const Symmetric& c) {
-  double t[3][3];
-  for (Index r = 0; r < 3; ++r) {
-    const double x = a(r, 0), y = a(r, 1), z = a(r, 2);
-    t[r][0] = x * c.xx + y * c.xy + z * c.xz;
-    t[r][1] = x * c.xy + y * c.yy + z * c.yz;
-    t[r][2] = x * c.xz + y * c.yz + z * c.zz;
-  }
-  const auto entry = [&](Index r, Index s) {
-    return t[r][0] * a(s, 0) + t[r][1] * a(s, 1) + t[r][2] * a(s, 2);
-  };
-  return {entry(0, 0), entry(0, 1), entry(0, 2), entry(1, 1), entry(1, 2), entry(2, 2)};
-}
-
-void add(const Symmetric& more, Symmetric& to) {
-  to.xx += more.xx;
-  to.xy += more.xy;
-  to.xz += more.xz;
-  to.yy += more.yy;
-  to.yz += more.yz;
-  to.zz += more.zz;
-}
-
-/// v v'
-void add_square(const Vector3d& v, Symmetric& to) {
-  add({v.x() * v.x(), v.x() * v.y(), v.x() * v.z(), v.y() * v.y(), v.y() * v.z(), v.z() * v.z()},
-      to);
-}
-
-/// [p]x diag(a, b, c) [p]x'
-void add_crossed(const Vector3d& p, double a, double b, double c, Symmetric& to) {
-  const double x = p.x(), y = p.y(), z = p.z();
-  add({z * z * b + y * y * c, -x * y * c, -x * z * b, z * z * a + x * x * c, -y * z * a,
-       y * y * a + x * x * b},
-      to);
-}
 
 /// Diagonal matrix of squares.
 Matrix3d variances(double a, double b, double c) {
@@ -147,6 +81,23 @@ std::string far_from_map(const MapProjection& map, const trajectories::Trajector
   return words;
 }
 
+/// The six terms of a symmetric matrix in the order of kXX ... kZZ.
+void copy_terms(const Matrix3d& m, double (&terms)[kCovarianceTerms]) {
+  terms[kXX] = m(0, 0);
+  terms[kXY] = m(0, 1);
+  terms[kXZ] = m(0, 2);
+  terms[kYY] = m(1, 1);
+  terms[kYZ] = m(1, 2);
+  terms[kZZ] = m(2, 2);
+}
+
+void copy_vector(const Vector3d& v, double (&numbers)[3]) { std::copy_n(v.data(), 3, numbers); }
+
+/// Row by row.
+void copy_matrix(const Matrix3d& m, double (&numbers)[9]) {
+  for (Index i = 0; i < 9; ++i) numbers[i] = m(i / 3, i % 3);
+}
+
 }  // namespace
 
 struct Georeference::State {
@@ -158,14 +109,14 @@ struct Georeference::State {
                                                                        what.trajectory)
                            : std::nullopt),
         body_from_sensor(trajectories::body_from_sensor(platform.mount)),
-        lever_arm(trajectories::lever_arm(platform.mount)) {}
+        sensor_lever_arm(body_from_sensor.transpose() * trajectories::lever_arm(platform.mount)) {}
 
   const MovingPlatform& platform;
   trajectories::Interpolation interpolation;
   std::vector<trajectories::FlownStrip> strips;
   std::optional<trajectories::ErrorProcess> errors;
   Matrix3d body_from_sensor;
-  Vector3d lever_arm;
+  Vector3d sensor_lever_arm;  ///< axes of the sensor
   std::optional<MapProjection> map;
   std::int64_t shift_ns = 0;
   std::optional<std::int64_t> utc_shift_ns;  ///< of the trajectory's time
@@ -240,7 +191,7 @@ void Georeference::Cursor::set_cell(std::int64_t time_ns) {
   const std::int64_t cell = std::min(cells - 1, (time_ns - first) / kCell_ns);
   begin_ns_ = first + cell * kCell_ns;
   end_ns_ = std::min(last, begin_ns_ + kCell_ns);
-  Eigen::Matrix<double, 15, kDegree + 1> values;
+  Eigen::Matrix<double, kNumbers, kDegree + 1> values;
   Eigen::Matrix<double, kDegree + 1, kDegree + 1> powers;
   for (int node = 0; node <= kDegree; ++node) {
     const std::int64_t at = begin_ns_ + (end_ns_ - begin_ns_) * node / kDegree;
@@ -255,9 +206,8 @@ void Georeference::Cursor::set_cell(std::int64_t time_ns) {
       pose_.velocity = pose->velocity;
       pose_.rate = pose->angular_velocity;
     }
-    const Matrix3d body = pose->attitude.toRotationMatrix();
-    const Matrix3d turn = body * s.body_from_sensor;
-    values.col(node) << pose->position - origin_, body * s.lever_arm,
+    const Matrix3d turn = pose->attitude.toRotationMatrix() * s.body_from_sensor;
+    values.col(node) << pose->position - origin_,
         Eigen::Map<const Eigen::Matrix<double, 9, 1>>(turn.data());
     double power = 1;
     for (int k = 0; k <= kDegree; ++k) {
@@ -280,11 +230,11 @@ const SensorPose* Georeference::Cursor::at(std::int64_t recording_time_ns) {
   if (time_ns < begin_ns_ || time_ns > end_ns_) set_cell(time_ns);
   if (!has_pose_) return nullptr;
   const double u = 1e-9 * static_cast<double>(time_ns - begin_ns_) / kCell;
-  Eigen::Matrix<double, 15, 1> value = coefficients_.col(kDegree);
+  Eigen::Matrix<double, kNumbers, 1> value = coefficients_.col(kDegree);
   for (int k = kDegree; k-- > 0;) value = u * value + coefficients_.col(k);
   pose_.reference = origin_ + value.head<3>();
-  pose_.lever = value.segment<3>(3);
   Eigen::Map<Eigen::Matrix<double, 9, 1>>(pose_.turn.data()) = value.tail<9>();
+  pose_.lever = pose_.turn * georeference_->state_->sensor_lever_arm;
   return &pose_;
 }
 
@@ -303,9 +253,7 @@ void Georeference::announce(CloudHeader& header, bool loadings) const {
     header.frame.axes = {"easting", "northing", "height"};
     for (std::size_t axis = 0; axis < 2; ++axis) {
       header.frame.offset[axis] =
-          kOffsetStep *
-          std::round(tangent.map(trajectory.position[middle])[static_cast<Index>(axis)] /
-                     kOffsetStep);
+          kOffsetStep * std::round(tangent.value()[static_cast<Index>(axis)] / kOffsetStep);
     }
   } else {
     header.frame.text = "of the trajectory: X east, Y north, Z up where it says so";
@@ -345,7 +293,7 @@ void Georeference::announce(CloudHeader& header, bool loadings) const {
 }
 
 void Georeference::apply(Points& points, std::size_t sensor_factors,
-                         std::span<const SensorPose> poses) const {
+                         std::span<const SensorPose> poses, InstructionSet set) const {
   const State& s = *state_;
   const std::size_t n = points.size();
   require_length("poses", poses.size(), n);
@@ -362,29 +310,47 @@ void Georeference::apply(Points& points, std::size_t sensor_factors,
 
   // Where the points are, and the map about their middle.
   const Vector3d local = poses.front().reference;  // keeps digits
-  std::vector<Vector3d> arm(n);                    // from the trajectory's reference point, m
+  std::array<std::vector<double>, 3> arm, place;
+  PlaceArguments put;
+  put.poses = plain_poses(poses);
+  put.shots = n;
+  put.point[0] = points.x.data();
+  put.point[1] = points.y.data();
+  put.point[2] = points.z.data();
+  copy_vector(local, put.local);
   Vector3d middle = Vector3d::Zero();
-  for (std::size_t i = 0; i < n; ++i) {
-    arm[i] = poses[i].turn * Vector3d(points.x[i], points.y[i], points.z[i]) + poses[i].lever;
-    middle += (poses[i].reference - local) + arm[i];
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    arm[axis].resize(n);
+    place[axis].resize(n);
+    put.arm[axis] = arm[axis].data();
+    put.place[axis] = place[axis].data();
   }
-  const Vector3d center = local + middle / static_cast<double>(n);
+  RISLEY_KERNEL_COPIES(place_points).at(set)(put);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    middle[static_cast<Index>(axis)] =
+        std::accumulate(place[axis].begin(), place[axis].end(), 0.0) / static_cast<double>(n);
+  }
+  const auto place_of = [&](std::size_t i) {
+    return Vector3d(local + Vector3d(place[0][i], place[1][i], place[2][i]));
+  };
+  const Vector3d center = local + middle;
   const MapTangent tangent = s.tangent(center);
   double farthest = 0;
   std::size_t far = 0;
   for (std::size_t i = 0; i < n; ++i) {
-    const double distance = ((poses[i].reference - center) + arm[i]).squaredNorm();
+    const double x = place[0][i] - middle.x(), y = place[1][i] - middle.y(),
+                 z = place[2][i] - middle.z();
+    const double distance = x * x + y * y + z * z;
     if (distance > farthest) {
       farthest = distance;
       far = i;
     }
   }
-  bool expand = true;
-  if (s.map) {
-    const Vector3d place = poses[far].reference + arm[far];
-    expand = farthest < kWidestExpansion * kWidestExpansion &&
-             (tangent.map(place) - s.map->project(place)).cwiseAbs().maxCoeff() < kExpansionError;
-  }
+  const bool expand =
+      !s.map ||
+      (farthest < kWidestExpansion * kWidestExpansion &&
+       (tangent.map(place_of(far)) - s.map->project(place_of(far))).cwiseAbs().maxCoeff() <
+           kExpansionError);
 
   const Matrix3d& jacobian = tangent.jacobian();
   const Matrix3d ned = s.map_from_ned(tangent, center);
@@ -398,36 +364,66 @@ void Georeference::apply(Points& points, std::size_t sensor_factors,
   }
   // Of the lever arm's errors, which turn with the body, that of the middle: they are millimetres.
   const Matrix3d body_axes = jacobian * poses[n / 2].turn * s.body_from_sensor.transpose();
-  const Symmetric shifted = symmetric(
-      position + body_axes * variances(sigma[3], sigma[4], sigma[5]) * body_axes.transpose());
-  const Symmetric turned_by = symmetric(turning);
   const std::int64_t time_shift = s.shift_ns + s.utc_shift_ns.value_or(0);
-  const bool on_map = s.map.has_value();
-
   for (std::size_t i = 0; i < n; ++i) {
-    const SensorPose& pose = poses[i];
-    const Vector3d place = pose.reference + arm[i];
-    const Vector3d mapped = !on_map ? place : (expand ? tangent.map(place) : s.map->project(place));
-    const Vector3d p(points.x[i], points.y[i], points.z[i]);
+    points.time_ns[i] += time_shift;
+    points.point_source[i] = poses[i].strip;
+  }
+  if (loadings) {
+    const std::vector<Vector3d> arms = [&] {
+      std::vector<Vector3d> all(n);
+      for (std::size_t i = 0; i < n; ++i) all[i] = {arm[0][i], arm[1][i], arm[2][i]};
+      return all;
+    }();
+    turn_loadings(points, sensor_factors, poses, arms, jacobian);
+  }
+
+  MapArguments to_map;
+  to_map.poses = put.poses;
+  to_map.shots = n;
+  to_map.point[0] = points.x.data();
+  to_map.point[1] = points.y.data();
+  to_map.point[2] = points.z.data();
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    to_map.arm[axis] = arm[axis].data();
+    to_map.place[axis] = place[axis].data();
+    copy_matrix(tangent.half_hessian(axis), to_map.half_hessian[axis]);
+  }
+  copy_matrix(jacobian, to_map.jacobian);
+  // A frame that is its own map is expanded about the local place, which has fewer digits.
+  copy_vector(s.map ? middle : Vector3d(Vector3d::Zero()), to_map.center);
+  copy_vector(s.map ? tangent.value() : local, to_map.value);
+  if (covariance) {
+    for (std::size_t k = 0; k < kCovarianceTerms; ++k) {
+      to_map.covariance[k] = points.covariance[k].data();
+      to_map.own_covariance[k] = points.own_covariance[k].data();
+    }
+    for (std::size_t k = 0; k < 3; ++k) to_map.boresight_variance[k] = sigma[k] * sigma[k];
+    to_map.clock_sigma = sigma[6];
+    copy_terms(
+        position + body_axes * variances(sigma[3], sigma[4], sigma[5]) * body_axes.transpose(),
+        to_map.shifted);
+    copy_terms(turning, to_map.turned_by);
+  }
+  RISLEY_KERNEL_COPIES(map_points).at(set)(to_map);
+  if (expand) return;
+  for (std::size_t i = 0; i < n; ++i) {
+    const Vector3d mapped = s.map->project(place_of(i));
     points.x[i] = mapped.x();
     points.y[i] = mapped.y();
     points.z[i] = mapped.z();
-    points.time_ns[i] += time_shift;
-    points.point_source[i] = pose.strip;
-    if (!covariance) continue;
-    const Matrix3d to_map = on_map ? Matrix3d(jacobian * pose.turn) : pose.turn;
-    const Vector3d reach = on_map ? Vector3d(jacobian * arm[i]) : arm[i];
-    const Vector3d velocity = pose.velocity + pose.rate.cross(arm[i]);
-    const Vector3d moved = sigma[6] * (on_map ? Vector3d(jacobian * velocity) : velocity);
-    store(turned(to_map, load(points.own_covariance, i)), points.own_covariance, i);
-    Symmetric sensor = load(points.covariance, i);
-    add_crossed(p, sigma[0] * sigma[0], sigma[1] * sigma[1], sigma[2] * sigma[2], sensor);
-    Symmetric total = turned(to_map, sensor);
-    add(shifted, total);
-    add(turned(cross_matrix(reach), turned_by), total);
-    add_square(moved, total);
-    store(total, points.covariance, i);
-    if (!loadings) continue;
+  }
+}
+
+void Georeference::turn_loadings(Points& points, std::size_t sensor_factors,
+                                 std::span<const SensorPose> poses, std::span<const Vector3d> arms,
+                                 const Matrix3d& jacobian) const {
+  const State& s = *state_;
+  const std::array<double, kMountFactors.size()> sigma = s.mount_sigmas();
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const SensorPose& pose = poses[i];
+    const Vector3d p(points.x[i], points.y[i], points.z[i]);
+    const Matrix3d to_map = jacobian * pose.turn;
     for (std::size_t k = 0; k < sensor_factors; ++k) {
       auto& f = points.loading[k];
       const Vector3d on_axes = to_map * Vector3d(f[0][i], f[1][i], f[2][i]);
@@ -449,7 +445,9 @@ void Georeference::apply(Points& points, std::size_t sensor_factors,
       const double one = sigma[static_cast<std::size_t>(k) + 3];
       if (one > 0) put(one * from_body.col(k));
     }
-    if (sigma[6] > 0) put(moved);
+    if (sigma[6] > 0) {
+      put(sigma[6] * (jacobian * (pose.velocity + pose.rate.cross(arms[i]))));
+    }
   }
 }
 
@@ -489,9 +487,6 @@ std::vector<std::string> Georeference::warnings() const {
   return words;
 }
 
-const trajectories::Interpolation& Georeference::interpolation() const {
-  return state_->interpolation;
-}
 std::int64_t Georeference::clock_shift_ns() const { return state_->shift_ns; }
 const std::vector<trajectories::FlownStrip>& Georeference::strips() const { return state_->strips; }
 
@@ -503,7 +498,8 @@ std::vector<StripLine> Georeference::strip_lines() const {
     for (std::size_t k = 0; k < 2; ++k) {
       const auto pose = s.interpolation.at(k == 0 ? strip.begin_ns : strip.end_ns);
       if (!pose) return {};
-      const Vector3d place = pose->position + pose->attitude * s.lever_arm;
+      const Vector3d place =
+          pose->position + pose->attitude * trajectories::lever_arm(s.platform.mount);
       ends[k] = s.tangent(place).map(place);
     }
     lines.push_back({"",

@@ -20,7 +20,9 @@
 #include "risley/optics/observation_model.hpp"
 #include "risley/trajectories/clock.hpp"
 
+#include "cloud/georeference_kernel.hpp"
 #include "cloud/piece_overlap.hpp"
+#include "cloud/plain_poses.hpp"
 
 namespace risley::cloud {
 namespace {
@@ -54,6 +56,15 @@ constexpr double kLeastRangeNoise = 1e-3;
 
 double square(double x) { return x * x; }
 
+/// Shots in polar coordinates, rad and m.
+struct PolarShots {
+  std::vector<double> azimuth, zenith, range;
+
+  void resize(std::size_t shots) {
+    for (auto* column : {&azimuth, &zenith, &range}) column->resize(shots);
+  }
+};
+
 /// Some rows of a piece on their way to the file.
 struct Block {
   std::vector<std::size_t> rows;
@@ -61,6 +72,7 @@ struct Block {
   PointedShots shots;
   Points points;
   std::vector<SensorPose> poses;  ///< of the rows, of a moving sensor
+  PolarShots stood;               ///< these, as if the sensor stood
   std::uint64_t outliers = 0, without_rotation_angle = 0, without_pose = 0;
   double azimuth_squares = 0, zenith_squares = 0;
 };
@@ -268,6 +280,8 @@ class Work {
           cursor->at(piece_.time_ns[begin] + (piece_.time_ns[end - 1] - piece_.time_ns[begin]) / 2);
       surface_pose_ = pose != nullptr ? std::optional(*pose) : std::nullopt;
     }
+    std::vector<SensorPose> poses;
+    PolarShots shots, stood;
     const std::size_t most = cursor ? kMovingSurfaceShots : kSurfaceShots;
     const std::size_t stride = std::max<std::size_t>(1, (end - begin) / most);
     for (std::size_t row = begin; row < end; row += stride) {
@@ -279,56 +293,86 @@ class Work {
       }
       const SensorPose* pose = cursor->at(piece_.time_ns[row]);
       if (pose == nullptr || !surface_pose_) continue;
-      const Stood shot = stood_still(*pose, piece_.azimuth[row], piece_.zenith[row], range);
-      normals_->add(shot.azimuth, shot.zenith, shot.range);
+      poses.push_back(*pose);
+      shots.azimuth.push_back(piece_.azimuth[row]);
+      shots.zenith.push_back(piece_.zenith[row]);
+      shots.range.push_back(piece_.range[row]);
+    }
+    stand_still(poses, shots.azimuth, shots.zenith, shots.range, stood);
+    for (std::size_t i = 0; i < poses.size(); ++i) {
+      normals_->add(stood.azimuth[i], stood.zenith[i], stood.range[i]);
     }
     normals_->fit();
   }
 
-  /// A shot of a moving sensor as it would have been from where the sensor is in the middle of a
+  /// Shots of a moving sensor as they would have been from where the sensor is in the middle of a
   /// surface's time.
-  struct Stood {
-    double azimuth = 0, zenith = 0, range = 0;
-  };
-  Stood stood_still(const SensorPose& pose, double azimuth, double zenith, double range) const {
+  void stand_still(const std::vector<SensorPose>& poses, const std::vector<double>& azimuth,
+                   const std::vector<double>& zenith, const std::vector<double>& range,
+                   PolarShots& stood) const {
+    const std::size_t n = poses.size();
+    stood.resize(n);
+    if (n == 0) return;
     const SensorPose& middle = *surface_pose_;
-    const double across = std::sin(zenith);
-    const Eigen::Vector3d shot(range * across * std::cos(azimuth),
-                               range * across * std::sin(azimuth), range * std::cos(zenith));
-    const Eigen::Vector3d seen =
-        middle.turn.transpose() *
-        (pose.turn * shot + (pose.reference - middle.reference) + (pose.lever - middle.lever));
-    const double distance = seen.norm();
-    return {std::atan2(seen.y(), seen.x()), std::acos(seen.z() / distance), distance};
+    StandArguments a;
+    a.poses = plain_poses(poses);
+    a.shots = n;
+    a.azimuth = azimuth.data();
+    a.zenith = zenith.data();
+    a.range = range.data();
+    a.range_offset = calibration_.range_offset;
+    std::copy_n(middle.turn.data(), 9, a.turn);
+    std::copy_n(middle.reference.data(), 3, a.reference);
+    std::copy_n(middle.lever.data(), 3, a.lever);
+    a.stood_azimuth = stood.azimuth.data();
+    a.stood_zenith = stood.zenith.data();
+    a.stood_range = stood.range.data();
+    RISLEY_KERNEL_COPIES(stand_shots).at(best_instruction_set())(a);
   }
 
-  /// The normal of the surface that a shot met, sensor frame.
-  Vector3<double> surface_normal(const Block& block, std::size_t i) const {
-    const PointedShots& shots = block.shots;
-    if (!georeference_) return normals_->normal(shots.azimuth[i], shots.zenith[i]);
-    if (!surface_pose_) return normals_->normal(std::nan(""), 0);
-    const SensorPose& pose = block.poses[i];
-    const Stood shot = stood_still(pose, shots.azimuth[i], shots.zenith[i],
-                                   shots.range[i] - calibration_.range_offset);
-    const Vector3<double> normal = normals_->normal(shot.azimuth, shot.zenith);
-    const Eigen::Vector3d turned =
-        pose.turn.transpose() * surface_pose_->turn * Eigen::Vector3d(normal.x, normal.y, normal.z);
-    return {turned.x(), turned.y(), turned.z()};
+  /// The normals of the surfaces that the shots of a block met, sensor frame.
+  void find_normals(Block& block) const {
+    PointedShots& shots = block.shots;
+    const std::size_t n = shots.size();
+    const auto set = [&shots](std::size_t i, const Vector3<double>& normal) {
+      shots.surface_normal[0][i] = normal.x;
+      shots.surface_normal[1][i] = normal.y;
+      shots.surface_normal[2][i] = normal.z;
+    };
+    if (!georeference_ || !surface_pose_) {
+      const double nowhere = std::nan("");
+      for (std::size_t i = 0; i < n; ++i) {
+        set(i, normals_->normal(georeference_ ? nowhere : shots.azimuth[i], shots.zenith[i]));
+      }
+      return;
+    }
+    if (n == 0) return;
+    stand_still(block.poses, shots.azimuth, shots.zenith, shots.range, block.stood);
+    for (std::size_t i = 0; i < n; ++i) {
+      set(i, normals_->normal(block.stood.azimuth[i], block.stood.zenith[i]));
+    }
+    TurnArguments a;
+    a.poses = plain_poses(block.poses);
+    a.shots = n;
+    std::copy_n(surface_pose_->turn.data(), 9, a.turn);
+    for (std::size_t axis = 0; axis < 3; ++axis) a.vector[axis] = shots.surface_normal[axis].data();
+    RISLEY_KERNEL_COPIES(turn_vectors).at(best_instruction_set())(a);
   }
 
   /// Looks up where the sensor is at every row of a block, and takes out rows that have no pose.
   void find_poses(Block& block) const {
     Georeference::Cursor cursor(*georeference_);
-    block.poses.clear();
+    block.poses.resize(block.rows.size());
     std::size_t kept = 0;
     for (std::size_t i = 0; i < block.rows.size(); ++i) {
       const SensorPose* pose = cursor.at(piece_.time_ns[block.rows[i]]);
       if (pose == nullptr) continue;
-      block.poses.push_back(*pose);
+      block.poses[kept] = *pose;
       block.rows[kept] = block.rows[i];
       block.returns[kept++] = block.returns[i];
     }
     block.without_pose = block.rows.size() - kept;
+    block.poses.resize(kept);
     block.rows.resize(kept);
     block.returns.resize(kept);
   }
@@ -426,12 +470,7 @@ class Work {
     take(piece_.azimuth_resolution, shots.azimuth_rounding, variance);
     take(piece_.zenith_resolution, shots.zenith_rounding, variance);
     take(piece_.range_resolution, shots.range_rounding, variance);
-    for (std::size_t i = 0; i < n; ++i) {
-      const Vector3<double> normal = surface_normal(block, i);
-      shots.surface_normal[0][i] = normal.x;
-      shots.surface_normal[1][i] = normal.y;
-      shots.surface_normal[2][i] = normal.z;
-    }
+    find_normals(block);
     compute_points(model_, header_, shots, points);
     block.outliers = block.without_rotation_angle = 0;
     block.azimuth_squares = block.zenith_squares = 0;

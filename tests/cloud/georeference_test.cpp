@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include <Eigen/Cholesky>
@@ -198,6 +199,46 @@ TEST(Georeference, AgreesWithExtendedPrecisionOnAMap) {
   EXPECT_GT(of.points.y.front(), 5.5e6);
   EXPECT_LT(worst, 1e-5);  // a hundredth of a millimetre; 0.1 mm is asked for
   RecordProperty("worst_m", fmt::format("{}", worst));
+}
+
+// Whole groups, and what is left of one.
+TEST(Georeference, EveryInstructionSetGivesTheSame) {
+  const MovingPlatform on_map{trajectory(20), mount(), apx18(), "EPSG:32632"};
+  MovingPlatform local = on_map;
+  local.crs.clear();
+  local.trajectory.frame = trajectories::Frame::local;
+  for (Vector3d& place : local.trajectory.position) place -= on_map.trajectory.position.front();
+  for (const MovingPlatform* platform : {&on_map, &std::as_const(local)}) {
+    const Georeference georeference(*platform, recordings::TimeReference::relative, 0);
+    for (const std::size_t count : {1U, 7U, 8U, 9U, 100U}) {
+      std::vector<double> times;
+      for (std::size_t i = 0; i < count; ++i) times.push_back(3 + 0.0007 * static_cast<double>(i));
+      const auto applied = [&](InstructionSet set) {
+        SensorPoints of = sensor_points(times);
+        const Points before = of.points;
+        CloudHeader header = of.header;
+        georeference.announce(header, true);
+        header.resize(of.points, times.size());
+        georeference.apply(of.points, 1, poses(georeference, before), set);
+        return of.points;
+      };
+      const Points plain = applied(InstructionSet::baseline);
+      for (const InstructionSet set : available_instruction_sets()) {
+        const Points other = applied(set);
+        for (std::size_t i = 0; i < count; ++i) {
+          EXPECT_NEAR(other.x[i], plain.x[i], 5e-9);
+          EXPECT_NEAR(other.y[i], plain.y[i], 5e-9);
+          EXPECT_NEAR(other.z[i], plain.z[i], 5e-9);
+          for (std::size_t term = 0; term < kCovarianceTerms; ++term) {
+            EXPECT_NEAR(other.covariance[term][i], plain.covariance[term][i], 1e-15);
+            EXPECT_NEAR(other.own_covariance[term][i], plain.own_covariance[term][i], 1e-15);
+          }
+        }
+      }
+      // The total is own and the loadings' squares, and what the trajectory adds.
+      EXPECT_GT(plain.covariance[kXX][0], plain.own_covariance[kXX][0]);
+    }
+  }
 }
 
 TEST(Georeference, TimesBecomeUtcAndStripsAreNumbered) {

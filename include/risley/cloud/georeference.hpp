@@ -14,6 +14,7 @@
 #include "risley/cloud/map_projection.hpp"
 #include "risley/cloud/point_distribution.hpp"
 #include "risley/cloud/points.hpp"
+#include "risley/core/instruction_set.hpp"
 #include "risley/recordings/observations.hpp"
 #include "risley/trajectories/error_process.hpp"
 #include "risley/trajectories/flown_strips.hpp"
@@ -74,11 +75,13 @@ class Georeference {
     const Georeference* georeference_;
     trajectories::Interpolation::Cursor cursor_;
     // A stretch of some milliseconds without a record inside, where a polynomial of time repeats
-    // the interpolation: reference point less its place in the beginning, lever arm, rotation.
+    // the interpolation: reference point less its place in the beginning, and rotation, column by
+    // column.
     static constexpr int kDegree = 5;
     std::int64_t begin_ns_ = 1, end_ns_ = 0;  // both included
     bool has_pose_ = false;
-    Eigen::Matrix<double, 15, kDegree + 1> coefficients_;
+    static constexpr int kNumbers = 12;
+    Eigen::Matrix<double, kNumbers, kDegree + 1> coefficients_;
     Eigen::Vector3d origin_;
     SensorPose pose_;
   };
@@ -91,11 +94,11 @@ class Georeference {
   /// (the mount's behind those that are there), times and strips.
   /// @param sensor_factors  number of common factors that the sensor's model has
   /// @param poses  of every point
-  void apply(Points& points, std::size_t sensor_factors, std::span<const SensorPose> poses) const;
+  void apply(Points& points, std::size_t sensor_factors, std::span<const SensorPose> poses,
+             InstructionSet set = best_instruction_set()) const;
 
   /// What a user should know: no errors of the trajectory, an unknown clock, a change of datum.
   std::vector<std::string> warnings() const;
-  const trajectories::Interpolation& interpolation() const;
   /// From the recording's clock to the trajectory's time, with the mount's offset, ns.
   std::int64_t clock_shift_ns() const;
   const std::vector<trajectories::FlownStrip>& strips() const;
@@ -104,6 +107,9 @@ class Georeference {
   std::vector<StripLine> strip_lines() const;
 
  private:
+  void turn_loadings(Points& points, std::size_t sensor_factors, std::span<const SensorPose> poses,
+                     std::span<const Eigen::Vector3d> arms, const Eigen::Matrix3d& jacobian) const;
+
   struct State;
   std::unique_ptr<State> state_;
 };

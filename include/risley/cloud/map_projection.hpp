@@ -28,6 +28,10 @@ class MapTangent {
   /// At the centre; a covariance C becomes J C J'.
   const Eigen::Matrix3d& jacobian() const { return jacobian_; }
   const Eigen::Vector3d& center() const { return center_; }
+  /// Of the map at the centre, m.
+  const Eigen::Vector3d& value() const { return value_; }
+  /// Half the second derivatives of a map axis, 1/m.
+  const Eigen::Matrix3d& half_hessian(std::size_t axis) const { return half_hessian_[axis]; }
 
  private:
   Eigen::Vector3d center_ = Eigen::Vector3d::Zero(), value_ = Eigen::Vector3d::Zero();

@@ -54,8 +54,8 @@ template <class Fields>
 RosPose take_ros_pose(Fields&& fields, MessageKind kind) {
   RosPose pose;
   const bags::Header header = take_header(fields);
-  constexpr std::uint32_t kSecond_ns = 1'000'000'000;
-  if (header.nanoseconds >= kSecond_ns) {
+  constexpr std::uint32_t kWholeSecond = 1'000'000'000;
+  if (header.nanoseconds >= kWholeSecond) {
     throw BadMessage{
         fmt::format("expected a stamp of less than 1e9 ns beside its seconds, found "
                     "{}",

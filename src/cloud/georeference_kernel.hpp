@@ -1,0 +1,70 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstddef>
+
+#include "risley/core/instruction_set.hpp"
+
+namespace risley::cloud {
+
+/// Poses as plain numbers: where those of the first shot stand, and how many numbers further those
+/// of the next one do. Rotations are frame from sensor, column by column.
+struct PlainPoses {
+  const double *turn = nullptr, *reference = nullptr, *lever = nullptr, *velocity = nullptr,
+               *rate = nullptr;
+  std::size_t stride = 0;
+};
+
+/// Points of the sensor's frame put into the trajectory's. Columns have one entry per shot.
+struct PlaceArguments {
+  PlainPoses poses;
+  std::size_t shots = 0;
+  const double* point[3] = {};  ///< sensor frame, m
+  double local[3] = {};         ///< a place near all, frame, m
+  double* arm[3] = {};          ///< from the trajectory's reference point, axes of the frame, m
+  double* place[3] = {};        ///< from the local place, axes of the frame, m
+};
+
+/// Places of the frame put onto a map, with their covariances.
+struct MapArguments {
+  PlainPoses poses;
+  std::size_t shots = 0;
+  const double *arm[3] = {}, *place[3] = {};  ///< as PlaceArguments
+  double* point[3] = {};                      ///< in: sensor frame, m; out: of the map, m
+  double center[3] = {};              ///< about which the map is expanded, from the local place, m
+  double value[3] = {};               ///< of the map there, m
+  double jacobian[9] = {};            ///< row by row
+  double half_hessian[3][9] = {};     ///< 1/m
+  double* covariance[6] = {};         ///< in: sensor frame; out: map, m^2; or nullptr
+  double* own_covariance[6] = {};     ///< the same
+  double boresight_variance[3] = {};  ///< about the sensor's axes, rad^2
+  double clock_sigma = 0;             ///< s
+  double shifted[6] = {};             ///< covariance that every point gets, upper triangle, m^2
+  double turned_by[6] = {};           ///< covariance of rotations of the body, map axes, rad^2
+};
+
+/// Shots as they would have been from one place.
+struct StandArguments {
+  PlainPoses poses;
+  std::size_t shots = 0;
+  const double *azimuth = nullptr, *zenith = nullptr, *range = nullptr;  ///< rad, m
+  double range_offset = 0;                                               ///< taken off, m
+  double turn[9] = {}, reference[3] = {}, lever[3] = {};  ///< of the place, as in PlainPoses
+  double *stood_azimuth = nullptr, *stood_zenith = nullptr, *stood_range = nullptr;
+};
+
+/// Vectors of the sensor's frame at that place turned to its frame at the shots, in place.
+struct TurnArguments {
+  PlainPoses poses;
+  std::size_t shots = 0;
+  double turn[9] = {};
+  double* vector[3] = {};
+};
+
+RISLEY_DECLARE_KERNEL(void place_points(const PlaceArguments& arguments))
+RISLEY_DECLARE_KERNEL(void map_points(const MapArguments& arguments))
+RISLEY_DECLARE_KERNEL(void stand_shots(const StandArguments& arguments))
+RISLEY_DECLARE_KERNEL(void turn_vectors(const TurnArguments& arguments))
+
+}  // namespace risley::cloud
