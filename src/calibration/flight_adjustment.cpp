@@ -15,10 +15,10 @@
 #include "risley/algebra/symmetric.hpp"
 #include "risley/calibration/planar_adjustment.hpp"
 #include "risley/core/error.hpp"
-#include "risley/core/random.hpp"
 #include "risley/core/require.hpp"
 
 #include "calibration/eigen_vectors.hpp"
+#include "calibration/smooth_ground.hpp"
 
 namespace risley::calibration {
 namespace {
@@ -413,17 +413,6 @@ MatrixXd FlightSystem::inverse() const { return solve(MatrixXd::Identity(size(),
 
 MatrixXd FlightSystem::held_changes() const { return -solve(parts_->held_columns); }
 
-MatrixXd FlightSystem::draw_tilts(std::uint64_t seed) const {
-  const RandomStream stream(seed, 1701);
-  MatrixXd tilts(2, static_cast<Index>(parts_->planes));
-  for (std::size_t i = 0; i < parts_->planes; ++i) {
-    const Vector3d normal(stream.normal(3 * i), stream.normal(3 * i + 1), stream.normal(3 * i + 2));
-    tilts.col(static_cast<Index>(i)) =
-        (parts_->eliminated[i].root_inverse.transpose() * normal).head<2>();
-  }
-  return tilts;
-}
-
 MatrixXd FlightSystem::prior_times(const MatrixXd& columns) const {
   const Parts& p = *parts_;
   MatrixXd result = MatrixXd::Zero(size(), columns.cols());
@@ -479,10 +468,19 @@ FlightAdjustment adjust_flight(const FlightShots& shots, const ShotPoses& poses,
   require_not_below("tolerance", options.tolerance, 0);
   FlightAdjustment result;
   result.model = std::move(model);
+  std::vector<Eigen::Matrix2d> information;  // weights hardly change it
+  const auto equations_now = [&] {
+    return flight_equations(shots, poses, plane, result.model, weights, options.set);
+  };
   while (result.steps < options.most_steps && !result.converged) {
     progress.report(static_cast<double>(result.steps) / options.most_steps);
-    const FlightEquations equations =
-        flight_equations(shots, poses, plane, result.model, weights, options.set);
+    if (options.smooth) {
+      if (information.empty()) {
+        information = tilt_information(result.model.planes.size(), equations_now());
+      }
+      result.model.planes = smooth_ground(result.model.planes, information);
+    }
+    const FlightEquations equations = equations_now();
     result.cost = equations.cost;
     result.shots = equations.shots;
     result.lost = equations.lost;

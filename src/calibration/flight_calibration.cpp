@@ -20,6 +20,7 @@
 
 #include "calibration/flight_start.hpp"
 #include "calibration/judge_flight.hpp"
+#include "calibration/smooth_ground.hpp"
 #include "calibration/verdict.hpp"
 
 namespace risley::calibration {
@@ -59,7 +60,7 @@ constexpr CoarseRound kCellRounds[] = {
     {10, Unlocked::boresight, 2},       {10, Unlocked::boresight, 2}, {6, Unlocked::boresight, 2},
     {4, Unlocked::boresight, 2},        {4, Unlocked::prisms, 2},     {3, Unlocked::prisms, 2},
     {2.5, Unlocked::range_and_clock, 2}};
-constexpr int kAllRounds = 3, kFullRounds = 2;
+constexpr int kAllRounds = 3, kFullRounds = 2, kLastSteps = 8;
 
 double flight_seconds(std::int64_t nanoseconds) { return static_cast<double>(nanoseconds) * 1e-9; }
 
@@ -199,6 +200,7 @@ class FlightWork {
     FlightAdjustmentOptions options;
     options.most_steps = steps;
     options.tolerance = kSettled;
+    options.smooth = weights.gate > 0;
     FlightAdjustment adjusted = adjust_flight(flight.shots, flight.poses, flight.cells.plane,
                                               model_, weights, priors_, options);
     model_ = std::move(adjusted.model);
@@ -310,7 +312,7 @@ class FlightWork {
       cell_noise = full_.cells.scatter;
       FlightWeights own = weights();
       own.gate = kGateSigmas;
-      last_ = adjust(full_, own, round + 1 < kFullRounds ? 2 : 4);
+      last_ = adjust(full_, own, round + 1 < kFullRounds ? 2 : kLastSteps);
       progress_.report(0.5 + 0.2 * (round + 1));
       final_weights_ = own;
       if (round + 1 < kFullRounds) update_range_variance();
@@ -346,6 +348,7 @@ class FlightWork {
   LabelledFlight full_, coarse_;
   FlightStart start_;
   FlightModel model_;
+  FlightModel smooth_;  ///< at the end, over smooth ground
   FlightPriors priors_;
   double range_variance_ = 0;  // m^2
   int grids_ = 0;
@@ -386,13 +389,18 @@ void FlightWork::fill_result() {
     result_.piece_time.push_back(piece.time);
     result_.piece_rms.push_back(std::sqrt(piece.metres2 / static_cast<double>(piece.count)));
   }
-  const FlightEquations equations =
-      flight_equations(full_.shots, full_.poses, full_.cells.plane, model_, final_weights_);
-  const FlightSystem system(equations, model_, priors_);
+  smooth_ = model_;
+  smooth_.planes = smooth_ground(
+      model_.planes, tilt_information(model_.planes.size(),
+                                      flight_equations(full_.shots, full_.poses, full_.cells.plane,
+                                                       model_, final_weights_)));
+  const FlightSystem system(
+      flight_equations(full_.shots, full_.poses, full_.cells.plane, smooth_, final_weights_),
+      smooth_, priors_);
   progress_.report(0.93);
   static_cast<FlightJudgement&>(result_) =
-      judge_flight({full_.shots, full_.poses, full_.cells.plane, model_, final_weights_, priors_,
-                    start_.prior_sigma, start_.considered, system, options_.seed});
+      judge_flight({full_.shots, full_.poses, full_.cells.plane, smooth_, final_weights_, priors_,
+                    start_.prior_sigma, start_.considered, system});
   fill_mount_and_sensor();
   test_assumptions();
   fill_trajectory();
@@ -458,7 +466,7 @@ void FlightWork::fill_mount_and_sensor() {
 /// were free; and how well that is known.
 void FlightWork::test_assumptions() {
   const std::vector<std::int64_t>& times = full_.shots.time_ns;
-  FlightModel model = model_;
+  FlightModel model = smooth_;
   model.drift_about_ns = times.front() + (times.back() - times.front()) / 2;
   const auto considered = static_cast<Index>(start_.considered);
   const Index drift = model.unknowns().clock_drift(), first = drift - considered;

@@ -347,9 +347,9 @@ FlightForecast forecast(const PlannedFlight& planned, const FlightForecastOption
   progress.report(0.5);
   const FlightSystem system(equations, model, work.start.priors);
   progress.report(0.6);
-  static_cast<FlightJudgement&>(result) = judge_flight(
-      {work.shots, work.poses, work.cells.plane, model, work.weights, work.start.priors,
-       work.start.prior_sigma, work.start.considered, system, calibration.seed});
+  static_cast<FlightJudgement&>(result) =
+      judge_flight({work.shots, work.poses, work.cells.plane, model, work.weights,
+                    work.start.priors, work.start.prior_sigma, work.start.considered, system});
   progress.report(0.85);
   result.points = point_errors(work, system);
   for (std::size_t s = 0; s < result.strip_shots.size(); ++s) {

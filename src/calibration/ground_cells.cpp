@@ -13,6 +13,7 @@
 #include <tbb/parallel_for.h>
 
 #include "risley/core/error.hpp"
+#include "risley/core/median.hpp"
 #include "risley/core/require.hpp"
 #include "risley/optics/batch.hpp"
 
@@ -75,12 +76,6 @@ std::uint64_t key_of(const std::array<float, 3>& point, const GroundCellOptions&
          number(point[0], options.shift_east);
 }
 
-double median_of(std::vector<double>& values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 /// z = z0 + slope.(x, y) about a centre.
 struct FittedGround {
   GroundPlane plane;
@@ -119,7 +114,7 @@ std::optional<FittedGround> fit(const ShotPoints& points, std::span<const std::u
           std::abs(normal.dot(some.col(i)) - solution[2]) * steep;
     }
     result.distance = distance;
-    const double scale = kCauchyMads * median_of(distance);
+    const double scale = kCauchyMads * median(distance);
     result.plane.normal = normal * steep;
     result.plane.centre = centre + Vector3d(0, 0, solution[2]);
     if (!(scale > 1e-9)) break;
@@ -289,7 +284,7 @@ GroundCells ground_cells(const ShotPoints& points, const std::vector<std::uint16
         options.noise > 0
             ? options.noise * (kUnevenness + kScatterSigmas / std::sqrt(points_fitted))
             : std::numeric_limits<double>::infinity();
-    if (kNormalOfMad * median_of(distance) > std::min(options.most_roughness, significant)) {
+    if (kNormalOfMad * median(distance) > std::min(options.most_roughness, significant)) {
       result.rough = true;
       return;
     }
@@ -313,7 +308,7 @@ GroundCells ground_cells(const ShotPoints& points, const std::vector<std::uint16
       }
     }
   });
-  if (!distances.empty()) cells.scatter = kNormalOfMad * median_of(distances);
+  if (!distances.empty()) cells.scatter = kNormalOfMad * median(distances);
   return cells;
 }
 

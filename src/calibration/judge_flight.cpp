@@ -33,55 +33,6 @@ MatrixXd root_of(const MatrixXd& covariance) {
   return axes.vectors * axes.values.cwiseMax(0).cwiseSqrt().asDiagonal();
 }
 
-/// Planes' normals are off by the noise of the shots that they were found with, and a cell that
-/// leans by chance seems to tell of shifts across it, yaw above all. Its shots do not follow: the
-/// information is none. How much there is of it is seen where normals are moved by as much again.
-void take_off_spurious_information(const FlightEvidence& e, MatrixXd& all) {
-  FlightModel moved = e.model;
-  const MatrixXd tilts = e.system.draw_tilts(e.seed);
-  for (std::size_t i = 0; i < moved.planes.size(); ++i) {
-    GroundPlane& plane = moved.planes[i];
-    const auto own = tilts.col(static_cast<Index>(i));
-    const auto [first, second] =
-        tangents_of({plane.normal.x(), plane.normal.y(), plane.normal.z()});
-    plane.normal = (plane.normal + own[0] * Eigen::Vector3d(first.x, first.y, first.z) +
-                    own[1] * Eigen::Vector3d(second.x, second.y, second.z))
-                       .normalized();
-  }
-  const auto inverse_of = [](const FlightSystem& own) {
-    MatrixXd unit = MatrixXd::Zero(own.size(), own.globals());
-    unit.bottomRows(own.globals()).setIdentity();
-    return MatrixXd(own.solve(unit).bottomRows(own.globals()));
-  };
-  const MatrixXd before = inverse_of(e.system);
-  const MatrixXd after = inverse_of(
-      FlightSystem(flight_equations(e.shots, e.poses, e.plane, moved, e.weights), moved, e.priors));
-  std::vector<Index> adjusted;
-  for (Index i = 0; i < before.rows(); ++i) {
-    if (!e.priors.held[static_cast<std::size_t>(i)]) adjusted.push_back(i);
-  }
-  // In units of the priors' sigmas.
-  const VectorXd unit = e.prior_sigma(adjusted);
-  const auto information_of = [&](const MatrixXd& covariance) {
-    return MatrixXd(unit.asDiagonal() *
-                    algebra::SymmetricSolver(covariance(adjusted, adjusted)).inverse() *
-                    unit.asDiagonal());
-  };
-  // Of what is above 0.
-  const MatrixXd spurious = root_of(e.spurious * (information_of(after) - information_of(before)));
-  const MatrixXd prior =
-      unit.asDiagonal() * MatrixXd(e.priors.information(adjusted, adjusted)) * unit.asDiagonal();
-  const MatrixXd data = root_of(information_of(all) - prior - spurious * spurious.transpose());
-  const MatrixXd covariance = unit.asDiagonal() *
-                              algebra::SymmetricSolver(prior + data * data.transpose()).inverse() *
-                              unit.asDiagonal();
-  for (std::size_t i = 0; i < adjusted.size(); ++i) {
-    for (std::size_t j = 0; j < adjusted.size(); ++j) {
-      all(adjusted[i], adjusted[j]) = covariance(static_cast<Index>(i), static_cast<Index>(j));
-    }
-  }
-}
-
 FlightDatum datum_of(const FlightEvidence& e, const MatrixXd& movement) {
   const FlightShots& shots = e.shots;
   const std::vector<std::size_t> rows = spread_rows(shots.size(), kDatumBeams);
@@ -195,9 +146,8 @@ FlightJudgement judge_flight(const FlightEvidence& e) {
     functionals.block(kCorrections * k, globals, kCorrections, kCorrections) =
         MatrixXd::Identity(kCorrections, kCorrections) / static_cast<double>(knots);
   }
-  MatrixXd all = flight_covariance(e.shots, e.poses, e.plane, e.model, e.weights, e.priors,
-                                   e.system, functionals);
-  take_off_spurious_information(e, all);
+  const MatrixXd all = flight_covariance(e.shots, e.poses, e.plane, e.model, e.weights, e.priors,
+                                         e.system, functionals);
   result.not_told = not_told_of(e, all);
   // What was held and may be off, one sigma each, moves everything else along.
   const MatrixXd changes = e.system.held_changes();

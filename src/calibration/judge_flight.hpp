@@ -22,10 +22,6 @@ struct FlightEvidence {
   const Eigen::VectorXd& prior_sigma;  ///< [globals]
   std::size_t considered = 0;          ///< last so many free parameters: held, and may be off
   const FlightSystem& system;
-  std::uint64_t seed = 0;  ///< of a draw of the planes' normals
-  /// How many times what that draw seems to tell is taken off. Of normals that were found with
-  /// noise: twice, since what the trajectory does to a cell makes it lean, too.
-  double spurious = 2;
 };
 
 /// What the evidence tells: of a calibration that was made, or of one that is planned.

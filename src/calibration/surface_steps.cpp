@@ -14,6 +14,7 @@
 #include "risley/algebra/symmetric.hpp"
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
+#include "risley/core/median.hpp"
 
 namespace risley::calibration {
 namespace {
@@ -33,14 +34,6 @@ constexpr double kAboveWaves = 3.0;     ///< least height in robust sigmas of th
 constexpr double kCore = 0.7;           ///< of its height: cells that lie wholly within a step
 constexpr double kInside = 0.5;         ///< of its height: cells that lie mostly within a step
 constexpr double kSeparable = 4.0;      ///< sigmas of one point: height that tells its side
-
-double median(std::vector<double>& values) {
-  const std::size_t half = values.size() / 2;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(half);
-  std::nth_element(values.begin(), middle, values.end());
-  if (values.size() % 2 == 1) return *middle;
-  return 0.5 * (*middle + *std::max_element(values.begin(), middle));
-}
 
 /// Means over one cell.
 struct Cell {

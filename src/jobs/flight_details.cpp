@@ -14,6 +14,7 @@
 
 #include "risley/calibration/ground_cells.hpp"
 #include "risley/core/angle.hpp"
+#include "risley/core/median.hpp"
 #include "risley/core/random.hpp"
 #include "risley/core/require.hpp"
 #include "risley/trajectories/interpolation.hpp"
@@ -49,13 +50,6 @@ using Place = std::pair<long, long>;
 
 Place place_of(double east, double north, double size) {
   return {std::lround(std::floor(east / size)), std::lround(std::floor(north / size))};
-}
-
-double median_of(std::vector<double>& values) {
-  if (values.empty()) return kNothing;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 /// A random sample of the shots; every n-th one would beat with the rotors.
@@ -155,7 +149,7 @@ std::vector<double> roughness_of(const ShotPoints& points, const GroundCells& ce
   }
   std::vector<double> roughness;
   roughness.reserve(distances.size());
-  for (auto& own : distances) roughness.push_back(kSigmaOfMedian * median_of(own));
+  for (auto& own : distances) roughness.push_back(kSigmaOfMedian * median(own));
   return roughness;
 }
 
@@ -323,7 +317,7 @@ FlightStrip flown_strip(const FlightShots& shots, const ShotPoses& poses, std::s
   strip.speed = strip.duration > 0 ? std::hypot(east, north) / strip.duration : 0;
   std::vector<double> ranges(shots.range.begin() + static_cast<std::ptrdiff_t>(begin),
                              shots.range.begin() + static_cast<std::ptrdiff_t>(end));
-  strip.range = median_of(ranges);
+  strip.range = median(ranges);
   std::vector<double> roll, pitch;
   for (std::size_t k = 0; k < places; ++k) {
     const std::size_t row = begin + k * (end - 1 - begin) / std::max<std::size_t>(places - 1, 1);

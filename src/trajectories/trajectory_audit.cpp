@@ -9,6 +9,7 @@
 
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
+#include "risley/core/median.hpp"
 #include "risley/core/require.hpp"
 #include "risley/trajectories/geodesy.hpp"
 
@@ -22,14 +23,6 @@ void include(Extent& extent, double value, bool first) {
   extent.max = first ? value : std::max(extent.max, value);
 }
 
-/// The middle value; of two the mean.
-double median_of(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  if (values.size() % 2 == 1) return *middle;
-  return 0.5 * (*middle + *std::max_element(values.begin(), middle));
-}
-
 /// A function of many values, for each accuracy apart.
 template <class Function>
 PoseAccuracy for_each_accuracy(const std::vector<PoseAccuracy>& all, Function&& function) {
@@ -37,7 +30,7 @@ PoseAccuracy for_each_accuracy(const std::vector<PoseAccuracy>& all, Function&& 
     std::vector<double> values;
     values.reserve(all.size());
     for (const PoseAccuracy& one : all) values.push_back(get(one));
-    return function(std::move(values));
+    return function(values);
   };
   PoseAccuracy result;
   for (Eigen::Index axis = 0; axis < 3; ++axis) {
@@ -153,7 +146,7 @@ TrajectoryAudit audit_trajectory(const Trajectory& t, const InterpolationOptions
         "nothing says what the times count from: a clock offset must bring the recording's clock "
         "to them");
   }
-  if (!t.accuracy.empty()) audit.accuracy = for_each_accuracy(t.accuracy, median_of);
+  if (!t.accuracy.empty()) audit.accuracy = for_each_accuracy(t.accuracy, median);
   return audit;
 }
 
@@ -169,16 +162,17 @@ AccuracyAudit audit_accuracies(const AccuracyRecords& accuracies) {
     }
     steps.push_back(static_cast<double>(times[i] - times[i - 1]));
   }
-  const double median = steps.empty() ? 0 : median_of(steps);
+  std::vector<double> ordered = steps;
+  const double usual = steps.empty() ? 0 : median(ordered);
   std::vector<TrajectoryGap> gaps;
   for (std::size_t i = 0; i < steps.size(); ++i) {
-    if (steps[i] > InterpolationOptions{}.gap_steps * median) {
+    if (steps[i] > InterpolationOptions{}.gap_steps * usual) {
       gaps.push_back({i, times[i], times[i + 1]});
     }
   }
   AccuracyAudit audit;
-  audit.times = times_of(times, std::llround(median), std::move(gaps));
-  audit.median = for_each_accuracy(accuracies.accuracy, median_of);
+  audit.times = times_of(times, std::llround(usual), std::move(gaps));
+  audit.median = for_each_accuracy(accuracies.accuracy, median);
   audit.worst = for_each_accuracy(accuracies.accuracy, [](const std::vector<double>& values) {
     return *std::max_element(values.begin(), values.end());
   });

@@ -138,7 +138,8 @@ TEST(FlightForecast, NamesWhatALevelFlightWillNotTell) {
   const FlightForecast level = forecast(flat_flight({90, 270}, 60, 0.01), options);
   EXPECT_FALSE(told(level, "lever_arm_z_m"));
   EXPECT_FALSE(told(level, "clock_offset_s"));
-  EXPECT_FALSE(told(level, "boresight_x_deg"));
+  // The little that it sways leaves the yaw a third of what was known before.
+  EXPECT_GT(level.unknowns[0].sigma, 0.3 * level.unknowns[0].prior_sigma);
   EXPECT_TRUE(told(level, "boresight_y_deg"));
   EXPECT_TRUE(told(level, "boresight_z_deg"));
   const FlightForecast swaying = forecast(flat_flight({90, 270, 0, 180}, 60, 2), options);

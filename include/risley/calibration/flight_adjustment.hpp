@@ -64,9 +64,6 @@ class FlightSystem {
   Eigen::VectorXd inverse_diagonal() const;
   /// By how much the unknowns move where a held global is off by one unit [size, held].
   Eigen::MatrixXd held_changes() const;
-  /// One draw of what the shots' noise does to the planes' tilts, everything else given [2,
-  /// planes], rad.
-  Eigen::MatrixXd draw_tilts(std::uint64_t seed) const;
   /// The priors' part of the equations times columns [size, columns].
   Eigen::MatrixXd prior_times(const Eigen::MatrixXd& columns) const;
 
@@ -81,6 +78,9 @@ void apply(const FlightSystem::Step& step, FlightModel& model);
 struct FlightAdjustmentOptions {
   int most_steps = 10;
   double tolerance = 1e-2;  ///< done when a step promises less, in squared sigmas
+  /// Columns of a cell that leans as its surroundings do, but for noise, are those of its
+  /// surroundings; its plane is adjusted as ever.
+  bool smooth = false;
   InstructionSet set = best_instruction_set();
 };
 

@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "risley/core/error.hpp"
+#include "risley/core/median.hpp"
 #include "risley/io/little_endian.hpp"
 
 #include "recordings/formats/cartesian.hpp"
@@ -122,12 +123,6 @@ FieldReader find_field(const CloudLayout& layout, std::string_view name, bool re
                                  field->offset, field->offset + type.bytes - 1, layout.point_step)};
   }
   return {field->offset, type.value};
-}
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 bool is_close(double value, double expected) {
@@ -376,7 +371,7 @@ void MessageReader::describe() {
 
 /// Tells the model where only one is left: three returns have only the Avia, 100 kHz only the
 /// Mid-40, which has no tags, and the Mid-70, which has.
-void MessageReader::describe_device(std::size_t topic, const FirstMessages& first) {
+void MessageReader::describe_device(std::size_t topic, FirstMessages& first) {
   const bool is_cloud = topics()[topic].kind == MessageKind::cloud;
   const int returns = is_cloud ? clouds_[topic].returns : static_cast<int>(first.most_returns);
   header_.returns_per_shot = std::max(header_.returns_per_shot, returns);
@@ -393,7 +388,7 @@ void MessageReader::describe_device(std::size_t topic, const FirstMessages& firs
 
 /// Finds the shots per second and the returns per shot of a cloud topic from its points per
 /// second.
-void MessageReader::settle_cloud_grid(std::size_t topic, const FirstMessages& first) {
+void MessageReader::settle_cloud_grid(std::size_t topic, FirstMessages& first) {
   struct Candidate {
     double rate_hz;  ///< points per second
     livox::ShotGrid grid;

@@ -102,8 +102,8 @@ class MessageReader final : public Reader {
   /// The next message of a wanted topic, replacing all of `message`. @return false at the end
   bool next(LidarMessage& message);
   void choose_imu_topics();
-  void describe_device(std::size_t topic, const FirstMessages& first);
-  void settle_cloud_grid(std::size_t topic, const FirstMessages& first);
+  void describe_device(std::size_t topic, FirstMessages& first);
+  void settle_cloud_grid(std::size_t topic, FirstMessages& first);
   void append(const LidarMessage& message, Chunk& chunk);
   void append_points(const LidarMessage& message, std::uint8_t device, Observations& rows);
   void append_cloud(const LidarMessage& message, std::uint8_t device, Observations& rows) const;

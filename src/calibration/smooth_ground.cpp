@@ -1,0 +1,112 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "calibration/smooth_ground.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <utility>
+
+#include <Eigen/Core>
+
+#include "risley/calibration/planar_adjustment.hpp"
+#include "risley/core/median.hpp"
+#include "risley/core/require.hpp"
+
+#include "calibration/eigen_vectors.hpp"
+
+namespace risley::calibration {
+namespace {
+
+using Eigen::Index;
+using Eigen::Matrix2d;
+using Eigen::Vector2d;
+
+/// A lean counts from this chi2 of its two tilts on: chance reaches it once in 20,000 cells.
+constexpr double kLeaningChi2 = 20;
+/// Surroundings are squares of this size, and count from so many cells on.
+constexpr double kSurroundings = 20;  // m
+constexpr std::size_t kFewestNeighbours = 20;
+
+/// Of the height over east and north.
+Vector2d slope_of(const GroundPlane& plane) { return -plane.normal.head<2>() / plane.normal.z(); }
+
+bool is_wall(const GroundPlane& plane) { return plane.normal.z() == 0; }
+
+Vector2d median_slope(const std::vector<GroundPlane>& planes,
+                      const std::vector<std::size_t>& members) {
+  std::vector<double> east, north;
+  east.reserve(members.size());
+  north.reserve(members.size());
+  for (const std::size_t i : members) {
+    const Vector2d slope = slope_of(planes[i]);
+    east.push_back(slope.x());
+    north.push_back(slope.y());
+  }
+  return {median(east), median(north)};
+}
+
+/// Gives a plane that slope where it has it but for noise.
+bool take_slope(const Vector2d& slope, const Matrix2d& information, GroundPlane& plane) {
+  const double side = plane.normal.z() > 0 ? 1 : -1;
+  const Eigen::Vector3d wanted = side * Eigen::Vector3d(-slope.x(), -slope.y(), 1).normalized();
+  const auto [first, second] = tangents_of(plain(plane.normal));
+  const Vector2d lean =
+      Vector2d(wanted.dot(eigen(first)), wanted.dot(eigen(second))) / wanted.dot(plane.normal);
+  if (lean.dot(information * lean) > kLeaningChi2) return false;
+  plane.normal = wanted;
+  return true;
+}
+
+}  // namespace
+
+std::vector<Matrix2d> tilt_information(std::size_t planes, const FlightEquations& equations) {
+  using Rows = Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::RowMajor>;
+  const Index stride = equations.globals + 2 * kCorrections + 1 + 3;
+  std::vector<Eigen::Matrix3d> sums(planes, Eigen::Matrix3d::Zero());
+  for (const PlaneBlock& block : equations.plane_blocks) {
+    const Eigen::Map<const Rows> rows(equations.plane_products.data() + block.at, 3, stride);
+    sums[block.plane] += rows.rightCols<3>();
+  }
+  std::vector<Matrix2d> information;
+  information.reserve(planes);
+  for (const Eigen::Matrix3d& sum : sums) {
+    const Vector2d with_offset = sum.topRightCorner<2, 1>();
+    Matrix2d own = sum.topLeftCorner<2, 2>();
+    if (sum(2, 2) > 0) own -= with_offset * with_offset.transpose() / sum(2, 2);
+    information.push_back(own);
+  }
+  return information;
+}
+
+std::vector<GroundPlane> smooth_ground(const std::vector<GroundPlane>& planes,
+                                       const std::vector<Matrix2d>& information) {
+  require_length("information", information.size(), planes.size());
+  std::vector<GroundPlane> smooth = planes;
+  std::vector<std::size_t> all;
+  std::map<std::pair<std::int64_t, std::int64_t>, std::vector<std::size_t>> squares;
+  for (std::size_t i = 0; i < planes.size(); ++i) {
+    if (is_wall(planes[i])) continue;
+    all.push_back(i);
+    const auto square_of = [](double at) {
+      return static_cast<std::int64_t>(std::floor(at / kSurroundings));
+    };
+    squares[{square_of(planes[i].centre.x()), square_of(planes[i].centre.y())}].push_back(i);
+  }
+  if (all.size() < kFewestNeighbours) return smooth;
+  // Fields are one plane; elsewhere the ground rolls.
+  const Vector2d everywhere = median_slope(planes, all);
+  for (const auto& [square, members] : squares) {
+    const Vector2d here =
+        members.size() < kFewestNeighbours ? everywhere : median_slope(planes, members);
+    for (const std::size_t i : members) {
+      if (take_slope(everywhere, information[i], smooth[i])) continue;
+      take_slope(here, information[i], smooth[i]);
+    }
+  }
+  return smooth;
+}
+
+}  // namespace risley::calibration
