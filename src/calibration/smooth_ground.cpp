@@ -29,35 +29,53 @@ constexpr double kLeaningChi2 = 20;
 /// Surroundings are squares of this size, and count from so many cells on.
 constexpr double kSurroundings = 20;  // m
 constexpr std::size_t kFewestNeighbours = 20;
+constexpr int kMeanRounds = 2;
 
 /// Of the height over east and north.
 Vector2d slope_of(const GroundPlane& plane) { return -plane.normal.head<2>() / plane.normal.z(); }
 
 bool is_wall(const GroundPlane& plane) { return plane.normal.z() == 0; }
 
-Vector2d median_slope(const std::vector<GroundPlane>& planes,
+/// From a plane's normal to that of a slope, along its tangents, rad.
+Vector2d lean_to(const Vector2d& slope, const GroundPlane& plane) {
+  const Eigen::Vector3d wanted(-slope.x(), -slope.y(), 1);
+  const auto [first, second] = tangents_of(plain(plane.normal));
+  return Vector2d(wanted.dot(eigen(first)), wanted.dot(eigen(second))) / wanted.dot(plane.normal);
+}
+
+void give_slope(const Vector2d& slope, GroundPlane& plane) {
+  const double side = plane.normal.z() > 0 ? 1 : -1;
+  plane.normal = side * Eigen::Vector3d(-slope.x(), -slope.y(), 1).normalized();
+}
+
+bool is_like(const Vector2d& slope, const GroundPlane& plane, const Matrix2d& information) {
+  const Vector2d lean = lean_to(slope, plane);
+  return lean.dot(information * lean) < kLeaningChi2;
+}
+
+/// Slope of most of some planes: the mean of those that are like the median but for noise.
+Vector2d common_slope(const std::vector<GroundPlane>& planes,
+                      const std::vector<Matrix2d>& information,
                       const std::vector<std::size_t>& members) {
   std::vector<double> east, north;
-  east.reserve(members.size());
-  north.reserve(members.size());
   for (const std::size_t i : members) {
     const Vector2d slope = slope_of(planes[i]);
     east.push_back(slope.x());
     north.push_back(slope.y());
   }
-  return {median(east), median(north)};
-}
-
-/// Gives a plane that slope where it has it but for noise.
-bool take_slope(const Vector2d& slope, const Matrix2d& information, GroundPlane& plane) {
-  const double side = plane.normal.z() > 0 ? 1 : -1;
-  const Eigen::Vector3d wanted = side * Eigen::Vector3d(-slope.x(), -slope.y(), 1).normalized();
-  const auto [first, second] = tangents_of(plain(plane.normal));
-  const Vector2d lean =
-      Vector2d(wanted.dot(eigen(first)), wanted.dot(eigen(second))) / wanted.dot(plane.normal);
-  if (lean.dot(information * lean) > kLeaningChi2) return false;
-  plane.normal = wanted;
-  return true;
+  Vector2d common{median(east), median(north)};
+  for (int round = 0; round < kMeanRounds; ++round) {
+    Vector2d sum = Vector2d::Zero();
+    double count = 0;
+    for (const std::size_t i : members) {
+      if (!is_like(common, planes[i], information[i])) continue;
+      sum += slope_of(planes[i]);
+      ++count;
+    }
+    if (count == 0) break;
+    common = sum / count;
+  }
+  return common;
 }
 
 }  // namespace
@@ -97,13 +115,21 @@ std::vector<GroundPlane> smooth_ground(const std::vector<GroundPlane>& planes,
   }
   if (all.size() < kFewestNeighbours) return smooth;
   // Fields are one plane; elsewhere the ground rolls.
-  const Vector2d everywhere = median_slope(planes, all);
+  const Vector2d everywhere = common_slope(planes, information, all);
   for (const auto& [square, members] : squares) {
-    const Vector2d here =
-        members.size() < kFewestNeighbours ? everywhere : median_slope(planes, members);
+    Vector2d slope = everywhere;
+    if (members.size() >= kFewestNeighbours) {
+      const Vector2d here = common_slope(planes, information, members);
+      GroundPlane middle = planes[members.front()];
+      give_slope(here, middle);
+      Matrix2d of_all = Matrix2d::Zero();
+      for (const std::size_t i : members) {
+        if (is_like(here, planes[i], information[i])) of_all += information[i];
+      }
+      if (!is_like(everywhere, middle, of_all)) slope = here;
+    }
     for (const std::size_t i : members) {
-      if (take_slope(everywhere, information[i], smooth[i])) continue;
-      take_slope(here, information[i], smooth[i]);
+      if (is_like(slope, planes[i], information[i])) give_slope(slope, smooth[i]);
     }
   }
   return smooth;

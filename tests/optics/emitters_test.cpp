@@ -303,6 +303,23 @@ TEST(Beams, WrongColumnsAreRefused) {
               HasSubstr("beam = 1 in row 4, allowed 0 to 0"));
 }
 
+TEST(Beams, EveryValueInEveryRowIsChecked) {
+  for (const int emitters : {1, 2, 3, kMaxEmitters}) {
+    const PrismTrain train = imperfect_train("PA-AP", 0.5, 1, emitters);
+    for (std::size_t row = 0; row < 21; ++row) {
+      for (int value = 0; value < 256; ++value) {
+        std::vector<std::uint8_t> beam(21, static_cast<std::uint8_t>(emitters - 1));
+        beam[row] = static_cast<std::uint8_t>(value);
+        if (value < emitters) {
+          EXPECT_NO_THROW(check_beams(train, beam, beam.size()));
+        } else {
+          EXPECT_THROW(check_beams(train, beam, beam.size()), InvalidArgument);
+        }
+      }
+    }
+  }
+}
+
 TEST(InstructionSets, AnUnavailableOneIsRefusedEveryTime) {
   const std::vector<double> column(3, 0.1);
   const std::vector<std::span<const double>> angles{column};
