@@ -17,6 +17,7 @@
 #include "risley/core/error.hpp"
 #include "risley/core/require.hpp"
 
+#include "calibration/cholesky.hpp"
 #include "calibration/eigen_vectors.hpp"
 #include "calibration/smooth_ground.hpp"
 
@@ -148,7 +149,7 @@ struct FlightSystem::Parts {
   std::vector<Index> held;  // globals
   MatrixXd held_columns;    // [size, held]: of the equations, before they were taken out
   VectorXd scale;           // to a diagonal of ones
-  Eigen::LLT<MatrixXd> factors;
+  Cholesky root;
   VectorXd right;
   MatrixXd prior;  // of the globals
   std::vector<KnotInformation> chain;
@@ -334,8 +335,8 @@ FlightSystem::FlightSystem(const FlightEquations& equations, const FlightModel& 
   for (Index j = 0; j < size; ++j) {
     hessian.col(j).tail(size - j).array() *= p.scale[j] * p.scale.tail(size - j).array();
   }
-  p.factors.compute(hessian);
-  if (p.factors.info() != Eigen::Success) {
+  p.root = Cholesky(std::move(hessian));
+  if (!p.root.positive()) {
     throw EstimationError(
         "the flight leaves some unknowns without any information, and no prior says anything of "
         "them: state sigmas, or hold what is not to be adjusted");
@@ -354,7 +355,7 @@ MatrixXd FlightSystem::solve(const MatrixXd& right) const {
                  static_cast<std::size_t>(size()));
   MatrixXd solution = parts_->scale.asDiagonal() * right;
   for (const Index g : parts_->held) solution.row(parts_->first_global() + g).setZero();
-  parts_->factors.solveInPlace(solution);
+  parts_->root.solve_in_place(solution);
   return parts_->scale.asDiagonal() * solution;
 }
 
@@ -398,7 +399,7 @@ VectorXd FlightSystem::inverse_diagonal() const {
     const Index at = block * kInverseColumns, columns = std::min(kInverseColumns, n - at);
     MatrixXd part = MatrixXd::Zero(n - at, columns);
     part.topRows(columns).setIdentity();
-    p.factors.matrixLLT()
+    p.root.factor()
         .bottomRightCorner(n - at, n - at)
         .triangularView<Eigen::Lower>()
         .solveInPlace(part);

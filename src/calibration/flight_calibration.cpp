@@ -60,7 +60,7 @@ constexpr CoarseRound kCellRounds[] = {
     {10, Unlocked::boresight, 2},       {10, Unlocked::boresight, 2}, {6, Unlocked::boresight, 2},
     {4, Unlocked::boresight, 2},        {4, Unlocked::prisms, 2},     {3, Unlocked::prisms, 2},
     {2.5, Unlocked::range_and_clock, 2}};
-constexpr int kAllRounds = 3, kFullRounds = 2, kLastSteps = 8;
+constexpr int kAllRounds = 3, kManySteps = 2, kLastSteps = 8;
 
 double flight_seconds(std::int64_t nanoseconds) { return static_cast<double>(nanoseconds) * 1e-9; }
 
@@ -143,19 +143,20 @@ class FlightWork {
       throw EstimationError(
           "all shots are of one strip: at least two that overlap are needed, best crossing ones");
     }
-    // Not every n-th one: that would beat with the rotors.
-    const double share =
-        static_cast<double>(options_.coarse_shots) / static_cast<double>(full_.shots.size());
-    if (share >= 1) {
-      coarse_.shots = full_.shots;
-    } else {
-      const RandomStream stream(options_.seed, 1700);
-      std::vector<std::size_t> some;
-      for (std::size_t i = 0; i < full_.shots.size(); ++i) {
-        if (stream.uniform(i) < share) some.push_back(i);
-      }
-      coarse_.shots = rows_of(full_.shots, some);
+    coarse_.shots = sample_of_all(options_.coarse_shots);
+  }
+
+  /// About so many shots at random: every n-th one would beat with the rotors.
+  FlightShots sample_of_all(std::size_t count) const {
+    const FlightShots& all = full_.shots;
+    const double share = static_cast<double>(count) / static_cast<double>(all.size());
+    if (share >= 1) return all;
+    const RandomStream stream(options_.seed, 1700);
+    std::vector<std::size_t> some;
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      if (stream.uniform(i) < share) some.push_back(i);
     }
+    return rows_of(all, some);
   }
 
   void hold(Unlocked unlocked);
@@ -307,23 +308,31 @@ class FlightWork {
     set_knots(full_.shots, spacing);
     // Then everything. What the residuals say of the ranges' noise counts in the last round.
     double cell_noise = coarse_.cells.scatter;
-    for (int round = 0; round < kFullRounds; ++round) {
-      label(full_, options_.cell_size, false, cell_noise);
-      cell_noise = full_.cells.scatter;
-      FlightWeights own = weights();
-      own.gate = kGateSigmas;
-      last_ = adjust(full_, own, round + 1 < kFullRounds ? 2 : kLastSteps);
-      progress_.report(0.5 + 0.2 * (round + 1));
-      final_weights_ = own;
-      if (round + 1 < kFullRounds) update_range_variance();
+    const auto round = [&](LabelledFlight& flight, int steps) {
+      label(flight, options_.cell_size, false, cell_noise);
+      cell_noise = flight.cells.scatter;
+      final_weights_ = weights();
+      final_weights_.gate = kGateSigmas;
+      last_ = adjust(flight, final_weights_, steps);
+    };
+    if (full_.shots.size() <= options_.many_shots) {
+      round(full_, kManySteps);
+      update_range_variance(full_);
+    } else {
+      LabelledFlight many;
+      many.shots = sample_of_all(options_.many_shots);
+      set_knots(many.shots, spacing);
+      round(many, kManySteps);
+      update_range_variance(many);
+      set_knots(full_.shots, spacing);
     }
+    progress_.report(0.6);
+    round(full_, kLastSteps);
   }
 
-  void update_range_variance() {
-    FlightWeights own = weights();
-    own.gate = kGateSigmas;
+  void update_range_variance(const LabelledFlight& flight) {
     double squares = 0, count = 0;
-    for (const PieceScatter& piece : scatter_of(full_, own)) {
+    for (const PieceScatter& piece : scatter_of(flight, final_weights_)) {
       squares += piece.squares;
       count += static_cast<double>(piece.count);
     }

@@ -51,6 +51,7 @@ void require_flight_options(const FlightCalibrationOptions& options) {
   require_between("size of a cell", options.cell_size, 0.1, 100, "m");
   require_threshold("most roughness", options.most_roughness);
   require_at_least("coarse shots", static_cast<long long>(options.coarse_shots), 1000);
+  require_at_least("many shots", static_cast<long long>(options.many_shots), 1000);
 }
 
 void set_model(const FlightCalibrationOptions& options, FlightStart& start) {

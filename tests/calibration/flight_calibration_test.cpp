@@ -88,6 +88,7 @@ TEST(FlightCalibration, CorrectsTheTrajectory) {
   const SimulatedFlight flight(settings);
   FlightCalibrationOptions options = flight.options();
   options.coarse_shots = 40000;
+  options.many_shots = 60000;
   options.knot_spacing = 0.5;
   const FlightCalibration found = calibrate_flight(flight.shots, flight.trajectory, options);
   ASSERT_EQ(found.trajectory.size(), flight.trajectory.size());

@@ -47,7 +47,9 @@ struct FlightCalibrationOptions {
   double cell_size = 2;               ///< of the ground's cells at the end, m
   double most_roughness = 0.06;       ///< of a cell, m, see GroundCellOptions
   std::size_t coarse_shots = 120000;  ///< with which the first rounds are made
-  std::uint64_t seed = 0;             ///< of their choice
+  /// With which the last but one is made: these tell the ranges' noise.
+  std::size_t many_shots = 2'000'000;
+  std::uint64_t seed = 0;  ///< of their choice
 };
 
 /// A drift of the recording's clock that the adjustment does not know of, as the flight shows it.
