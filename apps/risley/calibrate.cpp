@@ -142,6 +142,7 @@ ExitStatus run_job(const CalibrateCommandOptions& options, const CommonOptions& 
   auto& c = outcome.calibration;
   c.reason = with_flags(c.reason);
   put_flags(outcome.warnings);
+  put_flags(c.warnings);
   for (const std::string& warning : outcome.warnings) spdlog::warn(warning);
   for (const std::string& warning : c.warnings) spdlog::warn(warning);
   if (!c.converged) spdlog::error("not converged: {}", c.reason);

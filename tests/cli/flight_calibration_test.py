@@ -27,11 +27,11 @@ class FlightCalibrationTest(CommandTest):
     def run_json(self, status, *arguments):
         return self.expect_json(status, *map(str, arguments))
 
-    def fly(self, name, rate_hz):
+    def fly(self, name, rate_hz, *more):
         (self.folder / "plan.yaml").write_text(PLAN)
         self.run_json(0, "simulate", "-o", name, "--sensor", "mid-40-table3", "--reported",
                       "nominal", "--rate-hz", rate_hz, "--flight", "plan.yaml", "--mount",
-                      DATA / "mount-nadir.yaml", "--scene", DATA / "village.yaml", *ERRORS)
+                      DATA / "mount-nadir.yaml", "--scene", DATA / "village.yaml", *ERRORS, *more)
 
     def calibrate(self, status, name, *more):
         return self.run_json(status, "calibrate", name, "--trajectory", f"{name}.trajectory.csv",
@@ -94,6 +94,18 @@ class FlightCalibrationTest(CommandTest):
         self.assertEqual(again["verdict"]["code"], "as_believed")
         for axis in TRUE_BORESIGHT:
             self.assertLess(again["boresight"][axis]["sigma"], result["boresight"][axis]["sigma"])
+
+    def test_a_unit_that_believes_in_another_index(self):
+        self.fly("b.lvx", 1500, "--reported", "refractive_index=1.512")
+        result = self.calibrate(0, "b.lvx", "-o", "out", "--knot-spacing-s", 5)
+        self.assertEqual(result["verdict"]["code"], "undecided")
+        self.assertIn("--free", result["verdict"]["to_do"])
+        index = result["held"]["refractive_index"]
+        self.assertTrue(index["significant"])
+        self.assertLess(abs(index["told"] - 1.509), 5 * index["sigma"])
+        self.assertTrue(any("(--free)" in warning for warning in result["warnings"]))
+        self.assertEqual(sorted(path.name for path in (self.folder / "out").iterdir()),
+                         ["report.html", "report.json"])
 
     def test_what_is_missing_or_does_not_fit_is_told(self):
         self.fly("c.lvx", 300)
