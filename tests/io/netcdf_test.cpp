@@ -17,6 +17,7 @@
 #include "risley/core/error.hpp"
 
 #include "io/temporary_folder.hpp"
+#include "source_tree.hpp"
 
 namespace risley::io::netcdf_test {
 
@@ -301,7 +302,7 @@ TEST(HostileNetcdf, OtherFiles) {
 /// library would end or hold this process.
 std::string reading(const std::string& name) {
   return refusal([&] {
-    const NetcdfInput file(std::string(RISLEY_TEST_DATA "/hostile/") + name);
+    const NetcdfInput file(in_source_tree("tests/golden/hostile/") + name);
     for (const char* dimension : {"row", "knot", "shot"}) {
       try {
         file.dimension(dimension);

@@ -11,6 +11,7 @@
 
 #include "risley/core/error.hpp"
 #include "risley/io/text_file.hpp"
+#include "source_tree.hpp"
 
 namespace risley::io::yaml_map_test {
 
@@ -61,7 +62,7 @@ TEST(Yaml, ASecondDocumentIsRefused) {
 }
 
 TEST(Yaml, ATextThatTheLibraryReadsForEverIsRefused) {
-  const std::string text = read_text_file(RISLEY_TEST_DATA "/hostile/yaml-endless.yaml");
+  const std::string text = read_text_file(in_source_tree("tests/golden/hostile/yaml-endless.yaml"));
   EXPECT_THAT(refusal(text), HasSubstr("line "));
 }
 

@@ -26,6 +26,7 @@
 #include "risley/sensors/preset.hpp"
 
 #include "refusal.hpp"
+#include "source_tree.hpp"
 
 namespace risley::jobs::helios_xml_test {
 
@@ -212,7 +213,7 @@ TEST(HeliosXml, IsThePatternWhereNothingIsLost) {
 class Altered {
  public:
   Altered(const std::string& preset, const std::map<std::string, double>& values) {
-    std::ifstream in(RISLEY_SOURCE_DIR "/presets/" + preset + ".yaml");
+    std::ifstream in(in_source_tree("presets/") + preset + ".yaml");
     std::string text((std::istreambuf_iterator<char>(in)), {});
     for (const auto& [name, value] : values) {
       const std::string before = text;

@@ -27,6 +27,7 @@
 #include "risley/jobs/plan_calibration.hpp"
 #include "risley/sensors/preset.hpp"
 #include "risley/simulation/truth_file.hpp"
+#include "source_tree.hpp"
 
 namespace risley::jobs::jobs_test {
 
@@ -45,7 +46,7 @@ class JobsTest : public ::testing::Test {
     settings.truth = sensors::load_sensor("mid-40-table3");
     settings.reported = settings.truth;
     settings.reported->train = settings.reported->train.without_errors();
-    settings.scene = scenes::load_scene(RISLEY_SOURCE_DIR "/data/hall.yaml");
+    settings.scene = scenes::load_scene(in_source_tree("data/hall.yaml"));
     settings.duration = 2.0;
     settings.rate = 50000.0;
     settings.seed = 7;
@@ -287,7 +288,7 @@ TEST_F(JobsTest, ASetFlagStopsWhatTellsNothing) {
   EXPECT_THROW(convert_recording({hall(), {}, path("again.nc"), {}, {}}, silent), Cancelled);
   EXPECT_THROW(judge_observability({}, silent), Cancelled);
   PlanCalibrationOptions plan;
-  plan.scene = scenes::load_scene(RISLEY_SOURCE_DIR "/data/hall.yaml");
+  plan.scene = scenes::load_scene(in_source_tree("data/hall.yaml"));
   EXPECT_THROW(plan_calibration(plan, silent), Cancelled);
   EXPECT_TRUE(names().empty());
 }

@@ -13,6 +13,7 @@
 #include "risley/core/error.hpp"
 
 #include "refusal.hpp"
+#include "source_tree.hpp"
 
 namespace risley::jobs::plan_flight_test {
 
@@ -21,7 +22,7 @@ using ::testing::HasSubstr;
 /// Two opposite strips, low and short, over level ground.
 PlanFlightOptions small_flight() {
   PlanFlightOptions options;
-  const std::string data = std::string(RISLEY_SOURCE_DIR) + "/data/";
+  const std::string data = in_source_tree("data/");
   options.mount = trajectories::load_mount(data + "mount-as-built.yaml");
   options.errors = trajectories::load_error_model(data + "trajectory-errors.yaml");
   for (const double heading_deg : {90.0, 270.0}) {

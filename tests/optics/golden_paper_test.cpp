@@ -13,6 +13,7 @@
 #include "risley/core/angle.hpp"
 #include "risley/optics/inverse.hpp"
 #include "risley/optics/observation_model.hpp"
+#include "source_tree.hpp"
 
 namespace risley::golden_paper_test {
 
@@ -26,7 +27,7 @@ double half_last_digit(const std::string& printed) {
 PrismTrain nominal() { return PrismTrain(parse_face_order("PA-AP")); }
 
 TEST(GoldenPaper, EveryRowOfTheDirectionTable) {
-  std::ifstream table(RISLEY_TEST_DATA "/directions.txt");
+  std::ifstream table(in_source_tree("tests/golden/directions.txt"));
   ASSERT_TRUE(table) << "tests/golden/directions.txt is missing";
   std::string line;
   int rows = 0;

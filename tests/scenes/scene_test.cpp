@@ -10,6 +10,7 @@
 
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
+#include "source_tree.hpp"
 
 namespace risley::scenes::scene_test {
 
@@ -58,7 +59,7 @@ TEST(Scene, ReadsPlanesAndStations) {
 }
 
 TEST(Scene, BundledRoomIsClosedTowardsTheFront) {
-  const Scene room = load_scene(RISLEY_SOURCE_DIR "/data/room.yaml");
+  const Scene room = load_scene(in_source_tree("data/room.yaml"));
   for (int azimuth = -19; azimuth <= 19; ++azimuth) {
     for (int zenith = 71; zenith <= 109; ++zenith) {
       EXPECT_TRUE(nearest_hit(room, {0, 0, 0}, towards(azimuth, zenith)).has_value());

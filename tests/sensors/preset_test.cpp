@@ -13,6 +13,7 @@
 
 #include "risley/core/angle.hpp"
 #include "risley/io/text_file.hpp"
+#include "source_tree.hpp"
 
 namespace risley::sensors::preset_test {
 
@@ -20,7 +21,7 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
 std::string preset_file(const std::string& name) {
-  return io::read_text_file(std::string(RISLEY_SOURCE_DIR) + "/presets/" + name + ".yaml");
+  return io::read_text_file(in_source_tree("presets/") + name + ".yaml");
 }
 
 /// The text with its first occurrence of a piece replaced.

@@ -21,6 +21,7 @@
 #include "risley/trajectories/flight_plan.hpp"
 #include "risley/trajectories/mount.hpp"
 #include "risley/trajectories/trajectory_file.hpp"
+#include "source_tree.hpp"
 
 namespace risley::simulation::truth_file_test {
 
@@ -47,7 +48,7 @@ class TruthFile : public ::testing::Test {
     s.rate = 2000;
     s.rotor = RotorKind::sinusoidal;
     s.seed = 77;
-    s.scene = scenes::load_scene(RISLEY_SOURCE_DIR "/data/room.yaml");
+    s.scene = scenes::load_scene(in_source_tree("data/room.yaml"));
     return s;
   }
 
@@ -156,16 +157,16 @@ SimulationSettings flying() {
   SimulationSettings s;
   s.truth = sensors::load_sensor("mid-40-table3");
   s.duration = 0.2;
-  s.scene = scenes::load_scene(RISLEY_SOURCE_DIR "/data/village.yaml");
+  s.scene = scenes::load_scene(in_source_tree("data/village.yaml"));
   const trajectories::FlightPlan plan =
-      trajectories::load_flight_plan(RISLEY_SOURCE_DIR "/data/flight-s4.yaml");
+      trajectories::load_flight_plan(in_source_tree("data/flight-s4.yaml"));
   trajectories::Flight flight = trajectories::fly(plan);
   Platform platform;
   platform.trajectory = std::make_shared<trajectories::Trajectory>(std::move(flight.trajectory));
   platform.strips = std::move(flight.strips);
-  platform.mount = trajectories::load_mount(RISLEY_SOURCE_DIR "/data/mount-nadir.yaml");
+  platform.mount = trajectories::load_mount(in_source_tree("data/mount-nadir.yaml"));
   platform.errors =
-      trajectories::load_error_model(RISLEY_SOURCE_DIR "/data/trajectory-errors.yaml");
+      trajectories::load_error_model(in_source_tree("data/trajectory-errors.yaml"));
   platform.begin_ns = 9'000'000'000;
   s.platform = std::move(platform);
   return s;

@@ -13,6 +13,7 @@
 #include "risley/cloud/pointing.hpp"
 #include "risley/cloud/rotor_tracking.hpp"
 
+#include "source_tree.hpp"
 #include "statistics/simulated_walls.hpp"
 
 namespace risley::testing::cloud_test {
@@ -130,7 +131,7 @@ cloud::Points points_of(const simulation::SimulationSettings& settings,
 // scatter over seeds of the three means is 0.06, 0.8 and 0.7 per seed, and the bands are four of
 // their sigmas.
 TEST(CloudStatistics, CovariancesOfPointsAndOfTheirDifferencesAreTrue) {
-  const scenes::Scene hall = scenes::load_scene(RISLEY_SOURCE_DIR "/data/hall.yaml");
+  const scenes::Scene hall = scenes::load_scene(in_source_tree("data/hall.yaml"));
   std::vector<Plane> walls;
   for (const scenes::ScenePlane& plane : hall.planes) walls.push_back(plane.plane);
   const int seeds = seeds_or(12);

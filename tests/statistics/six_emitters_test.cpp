@@ -18,6 +18,7 @@
 #include "risley/jobs/estimate_recording.hpp"
 #include "risley/simulation/truth_file.hpp"
 
+#include "source_tree.hpp"
 #include "statistics/simulated_walls.hpp"
 
 namespace risley::six_emitters_test {
@@ -90,7 +91,7 @@ TEST_P(SixEmitters, FromAFileToACloudEveryParameterIsAsGoodAsItsSigma) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     simulation::SimulationSettings settings;
     settings.truth = random_unit(GetParam().preset, static_cast<std::uint64_t>(seed));
-    settings.scene = scenes::load_scene(RISLEY_SOURCE_DIR "/data/hall.yaml");
+    settings.scene = scenes::load_scene(in_source_tree("data/hall.yaml"));
     settings.duration = 1.5;
     settings.angle_noise = radians_from_degrees(0.004);
     settings.rotor = simulation::RotorKind::hunting;

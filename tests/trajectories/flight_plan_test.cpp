@@ -14,13 +14,14 @@
 #include "risley/trajectories/interpolation.hpp"
 
 #include "refusal.hpp"
+#include "source_tree.hpp"
 
 namespace risley::trajectories::flight_plan_test {
 
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 
-FlightPlan bundled() { return load_flight_plan(RISLEY_SOURCE_DIR "/data/flight-v4.yaml"); }
+FlightPlan bundled() { return load_flight_plan(in_source_tree("data/flight-v4.yaml")); }
 
 FlightPlan smooth(FlightPlan plan) {
   plan.attitude = {};

@@ -10,12 +10,13 @@
 #include "risley/trajectories/flight_plan.hpp"
 
 #include "refusal.hpp"
+#include "source_tree.hpp"
 
 namespace risley::trajectories::flown_strips_test {
 
 TEST(FlownStrips, ThoseOfThePlanAreFound) {
   for (const char* name : {"flight-s4.yaml", "flight-v4.yaml"}) {
-    FlightPlan plan = load_flight_plan(std::string(RISLEY_SOURCE_DIR) + "/data/" + name);
+    FlightPlan plan = load_flight_plan(in_source_tree("data/") + name);
     plan.origin = Geodetic{0.87, 0.2, 300};
     const Flight flight = fly(plan);
     const Interpolation interpolation(flight.trajectory);
