@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <string>
 
 #include <gtest/gtest.h>
@@ -15,6 +14,7 @@
 
 #include "calibration/flights.hpp"
 #include "refusal.hpp"
+#include "seeds.hpp"
 
 namespace risley::calibration::flight_calibration_test {
 
@@ -22,11 +22,6 @@ using Eigen::Index;
 using testing::FlightErrors;
 using testing::FlightSettings;
 using testing::SimulatedFlight;
-
-int number_of_seeds(int usual) {
-  const char* wish = std::getenv("RISLEY_SEEDS");
-  return wish != nullptr ? std::max(1, std::atoi(wish)) : usual;
-}
 
 std::string failure(const SimulatedFlight& flight, const FlightCalibrationOptions& options) {
   try {
@@ -46,7 +41,7 @@ FlightSettings short_flight() {
 }
 
 TEST(FlightCalibration, FindsMountAndPrismsFromDegreesOff) {
-  const int seeds = number_of_seeds(1);
+  const int seeds = testing::seeds_or(1);
   double nees = 0, total = 0, stated = 0;
   int flights = 0;
   for (int seed = 1; seed <= seeds; ++seed) {
@@ -157,7 +152,7 @@ TEST(FlightCalibration, NamesWhatALevelFlightDoesNotTell) {
 
 // Cells that lean by chance seem to tell of shifts across them, and of the yaw to 0.3 degree.
 TEST(FlightCalibration, FlatGroundTellsOfTheYawWhatItStates) {
-  const int seeds = number_of_seeds(4);
+  const int seeds = testing::seeds_or(4);
   double squares = 0;
   for (int seed = 1; seed <= seeds; ++seed) {
     FlightSettings settings = short_flight();
@@ -215,7 +210,7 @@ TEST(FlightCalibration, HoldsWhatIsStatedToBeExact) {
 
 // 20 ppm are 1.3 ms at either end of two minutes: pixels of boresight in a flight that sways.
 TEST(FlightCalibration, TellsAClockThatDrifts) {
-  const int seeds = number_of_seeds(2);
+  const int seeds = testing::seeds_or(2);
   double squares = 0;
   int flights = 0;
   for (int seed = 1; seed <= seeds; ++seed) {

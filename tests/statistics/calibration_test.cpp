@@ -93,7 +93,7 @@ void expect_honest(const WallMonteCarlo& result) {
 TEST(Calibration, Section33ScattersAsItMustByBothMethods) {
   // 200 seeds: mean total within 0.008 degree, scatter over bound within 0.1. Their scatter falls
   // with the square root of the number.
-  const int seeds = seeds_or(60);
+  const int seeds = seeds_or(40);
   const double wider = std::sqrt(200.0 / seeds);
   WallMonteCarlo paper, adjusted;
   for (int seed = 0; seed < seeds; ++seed) {

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <cstdlib>
 #include <functional>
 #include <string>
 #include <utility>
@@ -19,16 +18,10 @@
 #include "risley/core/direction.hpp"
 #include "risley/core/random.hpp"
 
+#include "seeds.hpp"
 #include "statistics/simulated.hpp"
 
 namespace risley::testing {
-
-/// How many seeds a Monte Carlo takes: RISLEY_SEEDS in the environment, or the usual number. Bounds
-/// that depend on it are written as functions of it.
-inline int seeds_or(int usual) {
-  const char* wish = std::getenv("RISLEY_SEEDS");
-  return wish != nullptr ? std::max(1, std::atoi(wish)) : usual;
-}
 
 /// A recording of walls by a sensor that believes its optics perfect (section 3.3 of the paper),
 /// with rotation angles estimated as the command does, and what truly happened.
