@@ -15,6 +15,7 @@
 #include "risley/sensors/preset.hpp"
 
 #include "jobs/open_input.hpp"
+#include "jobs/packet_recording.hpp"
 #include "jobs/stopwatch.hpp"
 
 namespace risley::jobs {
@@ -25,7 +26,9 @@ using identification::Identification;
 
 estimation::AngleSeries read(const IdentifyRecordingOptions& options, IdentifiedRecording& result,
                              const Progress& progress) {
-  const auto reader = open_input(options.recording, options.reading);
+  const PlacedInput input =
+      place_input(options.recording, options.reading, UntoldShots::left_out, progress);
+  const auto reader = open_input(options.recording, input.reading);
   const recordings::RecordingHeader& header = reader->header();
   recordings::require_times(header);
   if (header.devices.size() > 1) {
@@ -39,6 +42,13 @@ estimation::AngleSeries read(const IdentifyRecordingOptions& options, Identified
     progress.report(reader->fraction_read());
   }
   for (const auto& warning : reader->warnings()) result.warnings.push_back(warning_text(warning));
+  result.warnings.insert(result.warnings.end(), input.words.begin(), input.words.end());
+  if (input.choice) {
+    result.warnings.push_back(fmt::format(
+        "the optics of {} told when the shots of packets that lack points were fired: what is "
+        "found here is not independent of them",
+        input.choice->sensor.name));
+  }
   return selector.take_series();
 }
 
