@@ -43,7 +43,8 @@ estimation::AngleSeries read(const IdentifyRecordingOptions& options, Identified
   }
   for (const auto& warning : reader->warnings()) result.warnings.push_back(warning_text(warning));
   result.warnings.insert(result.warnings.end(), input.words.begin(), input.words.end());
-  if (input.choice) {
+  result.cropped = input.choice.has_value();
+  if (result.cropped) {
     result.warnings.push_back(fmt::format(
         "the optics of {} told when the shots of packets that lack points were fired: what is "
         "found here is not independent of them",
@@ -84,8 +85,12 @@ void judge(IdentifiedRecording& result) {
         "no train of up to three prisms that was tried describes this scan: the best one leaves {}",
         rms);
     result.to_do =
-        "check the times (option shot_rate gives the rate of shots that are counted) and that the "
-        "recording is of one sensor at rest";
+        result.cropped
+            ? "export the recording again without cropping or filtering it: a small part of the "
+              "field of view shows no lines; what is known of a sensor holds there, too, and is "
+              "what an estimate begins with"
+            : "check the times (option shot_rate gives the rate of shots that are counted) and "
+              "that the recording is of one sensor at rest";
     return;
   }
   if (!found.decided) {
