@@ -4,6 +4,8 @@
 
 namespace risley {
 
-std::string in_source_tree(const std::string& name) { return std::string(RISLEY_SOURCE_DIR "/") + name; }
+std::string in_source_tree(const std::string& name) {
+  return std::string(RISLEY_SOURCE_DIR "/") + name;
+}
 
 }  // namespace risley

@@ -111,6 +111,7 @@ FileOutcome convert(const FileJob& job, const ConvertOptions& options, const Pro
                {"input_format", done.input_format},
                {"input", job.input},
                {"output", job.output},
+               {"time_uncertainty_s", done.time_uncertainty},
                {"warnings", warnings_json(done.warnings)}};
   if (done.choice) {
     json["sensor_chosen_by"] = to_string(done.choice->chosen_by);

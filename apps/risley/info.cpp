@@ -105,6 +105,7 @@ Json audit_json(const InspectedRecording& found) {
           {"largest_gap_s", if_times(audit.gaps.largest_s)},
           {"largest_gap_after_ns", if_times(audit.gaps.largest_after_ns)},
           {"time_resets", audit.time_resets},
+          {"time_uncertainty_s", if_times(found.time_uncertainty)},
           {"non_monotonic_packets", audit.non_monotonic_packets},
           {"pps_wraps", audit.pps_wraps},
           {"azimuth_deg", range_json(audit.azimuth, kDegreesPerRadian)},
@@ -141,6 +142,10 @@ void print_audit(const InspectedRecording& found) {
     table.add({"duration", fmt::format("{:.6g} s", audit.duration_s)});
     table.add({"rate", fmt::format("{:.6g} Hz", audit.rate_hz)});
     table.add({"time from", to_string(header.time_reference)});
+    if (found.time_uncertainty > 0) {
+      table.add(
+          {"guessed times", fmt::format("off by up to {:.2g} ms", 1e3 * found.time_uncertainty)});
+    }
   } else {
     table.add({"times", "none of single shots: --shot-rate-hz counts them"});
     gaps += " in the shot numbers";

@@ -10,16 +10,19 @@
 #include <span>
 #include <utility>
 
+#include "risley/algebra/symmetric.hpp"
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
 #include "risley/core/require.hpp"
 #include "risley/estimation/diagnostics.hpp"
+#include "risley/estimation/estimate.hpp"
 #include "risley/estimation/initialisation.hpp"
 #include "risley/estimation/sensor_recognition.hpp"
 #include "risley/optics/observation_model.hpp"
 #include "risley/recordings/cut_coordinates.hpp"
 
 #include "estimation/block_fit.hpp"
+#include "estimation/evident_places.hpp"
 #include "estimation/optics_fit.hpp"
 
 namespace risley::estimation {
@@ -47,12 +50,15 @@ struct PacketFit {
 /// Fits rotors and places to single packets.
 class PacketFitter : private BlockFit {
  public:
-  /// @param series  in the sensor's frame
-  PacketFitter(const PacketShots& shots, const AngleSeries& series, double rate,
-               const PrismTrain& train, std::vector<std::uint8_t> firing_order)
+  /// @param series   in the sensor's frame
+  /// @param evident  places that shots are known to have, or kNoPlace
+  PacketFitter(const PacketShots& shots, const AngleSeries& series,
+               const std::vector<std::uint8_t>& evident, double rate, const PrismTrain& train,
+               std::vector<std::uint8_t> firing_order)
       : BlockFit(train, kPlaceSoftening),
         shots_(shots),
         series_(series),
+        evident_(evident),
         rate_(rate),
         firing_order_(std::move(firing_order)) {
     first_.assign(shots.packets.size() + 1, 0);
@@ -63,6 +69,12 @@ class PacketFitter : private BlockFit {
 
   std::size_t begin(std::size_t packet) const { return first_[packet]; }
   std::size_t size(std::size_t packet) const { return first_[packet + 1] - first_[packet]; }
+  /// Whether the place of any of its shots is.
+  bool is_evident(std::size_t packet) const {
+    return std::any_of(evident_.begin() + static_cast<std::ptrdiff_t>(begin(packet)),
+                       evident_.begin() + static_cast<std::ptrdiff_t>(begin(packet + 1)),
+                       [](std::uint8_t place) { return place != kNoPlace; });
+  }
   std::int64_t time_ns(std::size_t packet, int place) const {
     return shots_.packets[packet].time_ns + std::llround(place * 1e9 / rate_);
   }
@@ -178,10 +190,18 @@ class PacketFitter : private BlockFit {
         loss_[i * places + k] = chi2 / (1.0 + weights_.softening * chi2);
       }
     }
+    for (std::size_t i = 0; i < block_.size(); ++i) {
+      const std::uint8_t known = evident_[begin(packet) + i];
+      if (known == kNoPlace) continue;
+      for (std::size_t k = 0; k < places; ++k) {
+        if (k != known) loss_[i * places + k] = std::numeric_limits<double>::infinity();
+      }
+    }
   }
 
   const PacketShots& shots_;
   const AngleSeries& series_;
+  const std::vector<std::uint8_t>& evident_;
   double rate_;
   std::vector<std::uint8_t> firing_order_;
   std::vector<std::size_t> first_;             // shot of each packet
@@ -190,11 +210,12 @@ class PacketFitter : private BlockFit {
   std::vector<double> lead_;
 };
 
-/// A packet that told the rotors by itself.
+/// A packet at which the rotors are known.
 struct PacketAnchor {
   Start start;  // the series is in its frame; its residuals are those of packets
   std::vector<std::uint8_t> firing_order;
   std::size_t packet = 0;
+  double speed_share = 2e-4;  // of the speeds, by which they may be off
 };
 
 /// The series with times and beams of places.
@@ -257,9 +278,10 @@ std::optional<PacketAnchor> find_packet_anchor(const PacketShots& shots, double 
   constexpr std::size_t kMostRefined = 4;
   constexpr int kDelays = 12;  // on either side
   const int emitters = sensor.train.emitters();
-  std::vector<std::uint8_t> in_turn = emitters_in_order({}, emitters);
+  const std::vector<std::uint8_t> none_evident(shots.series.size(), kNoPlace);
+  const std::vector<std::uint8_t> in_turn = emitters_in_order({}, emitters);
   const AngleSeries rough =
-      head_of(placed_series(shots, shots.series, middle_places(shots), rate, in_turn));
+      head_of(placed_series(shots, shots.series, guess_places(shots).place, rate, in_turn));
   std::vector<PacketAnchor> anchors;
   for (const bool mirrored : {false, true}) {
     const std::optional<Start> start = rough_start(rough, sensor, mirrored);
@@ -273,7 +295,7 @@ std::optional<PacketAnchor> find_packet_anchor(const PacketShots& shots, double 
       if (backwards && emitters == 1) break;
       const FiringOrder order{backwards ? emitters - 1 : 0, backwards};
       PacketAnchor anchor{*start, emitters_in_order(order, emitters), 0};
-      PacketFitter fitter(shots, series, rate, start->train, anchor.firing_order);
+      PacketFitter fitter(shots, series, none_evident, rate, start->train, anchor.firing_order);
       double sum = 0, least = std::numeric_limits<double>::infinity();
       const std::vector<std::size_t> packets = fullest_packets(shots, fitter, start->time_ns);
       if (packets.empty()) break;
@@ -325,17 +347,102 @@ std::optional<PacketAnchor> find_packet_anchor(const PacketShots& shots, double 
   return best;
 }
 
+/// Fits the optics to the placed shots about an anchor. @return whether that went well
+bool refit(const PacketShots& shots, const AngleSeries& series,
+           const std::vector<std::uint8_t>& place, double rate, const sensors::Sensor& sensor,
+           PacketAnchor& anchor) {
+  constexpr std::size_t kMostShots = 40000;
+  const AngleSeries placed = placed_series(shots, series, place, rate, anchor.firing_order);
+  const auto at = static_cast<std::size_t>(
+      std::lower_bound(placed.time_ns.begin(), placed.time_ns.end(), anchor.start.time_ns) -
+      placed.time_ns.begin());
+  const AngleSeries near = rows_of(placed, at - std::min(at, kMostShots / 2),
+                                   std::min(placed.size(), at + kMostShots / 2));
+  const std::optional<Start> fitted = fit_optics(near, anchor.start, sensor, Priors::of_the_type);
+  if (fitted) anchor.start = *fitted;
+  return fitted.has_value();
+}
+
+/// Rotors and optics that the shots of evident places tell, at one of their packets.
+std::optional<PacketAnchor> find_evident_anchor(const PacketShots& shots,
+                                                const std::vector<std::uint8_t>& evident,
+                                                double rate, const sensors::Sensor& sensor,
+                                                const Progress& progress) {
+  constexpr std::size_t kFewestShots = 300;
+  constexpr double kClear = 0.6, kFittedSpeedShare = 5e-5;
+  constexpr double kMostResidual = radians_from_degrees(0.2);
+  const int emitters = sensor.train.emitters();
+  EstimateOptions usual;
+  usual.sensor = sensor;
+  StartOptions options;
+  options.free = chosen_parameters(usual);
+  // Free emitters could take over each other's directions.
+  std::erase_if(options.free, [emitters](const FreeParameter& one) {
+    return emitters > 1 && one.name.starts_with("incident_beam");
+  });
+  options.angle_noise = sensor.angle_noise;
+  options.mirrored.reset();
+  std::vector<PacketAnchor> anchors;
+  for (const bool backwards : {false, true}) {
+    if (backwards && emitters == 1) break;
+    progress.check();
+    PacketAnchor anchor;
+    anchor.speed_share = kFittedSpeedShare;
+    anchor.firing_order = emitters_in_order({backwards ? emitters - 1 : 0, backwards}, emitters);
+    const AngleSeries placed =
+        placed_series(shots, shots.series, evident, rate, anchor.firing_order);
+    if (placed.size() < kFewestShots) return std::nullopt;
+    try {
+      anchor.start = find_start(head_of(placed), sensor, options);
+    } catch (const EstimationError&) {
+      continue;
+    }
+    if (anchor.start.residual_rms < kMostResidual) anchors.push_back(std::move(anchor));
+  }
+  if (anchors.empty()) return std::nullopt;
+  std::stable_sort(anchors.begin(), anchors.end(),
+                   [](const PacketAnchor& a, const PacketAnchor& b) {
+                     return a.start.residual_rms < b.start.residual_rms;
+                   });
+  PacketAnchor& best = anchors.front();
+  if (anchors.size() > 1 && best.start.residual_rms > kClear * anchors[1].start.residual_rms) {
+    return std::nullopt;
+  }
+  AngleSeries series = shots.series;
+  prepare_shots(series, best.start);
+  if (!refit(shots, series, evident, rate, sensor, best)) return std::nullopt;
+  std::int64_t nearest = std::numeric_limits<std::int64_t>::max();
+  for (std::size_t i = 0; i < evident.size(); ++i) {
+    const std::int64_t away = std::abs(shots.packets[shots.packet[i]].time_ns - best.start.time_ns);
+    if (evident[i] == kNoPlace || away >= nearest) continue;
+    nearest = away;
+    best.packet = shots.packet[i];
+  }
+  return best;
+}
+
 /// What following the rotors from packet to packet came to.
 struct FollowedPackets {
   std::vector<std::uint8_t> place;  // of each shot, or kNoPlace
   std::size_t placed = 0;
   RotorState anchor;
+  std::size_t evident = 0, contradicting = 0;  // packets
+
+  /// Whether the rotors went along with what is evident, and told most of the rest.
+  bool is_sound() const {
+    constexpr double kMostContradicting = 0.05;
+    return 2 * placed > place.size() &&
+           static_cast<double>(contradicting) <= kMostContradicting * static_cast<double>(evident);
+  }
 };
 
-FollowedPackets follow_packets(const PacketShots& shots, const AngleSeries& series, double rate,
+FollowedPackets follow_packets(const PacketShots& shots, const AngleSeries& series,
+                               const std::vector<std::uint8_t>& evident, double rate,
                                const PacketAnchor& anchor, const Progress& progress) {
-  constexpr double kAnchorAngle = radians_from_degrees(1.0), kAnchorSpeedShare = 2e-4;
+  constexpr double kAnchorAngle = radians_from_degrees(1.0);
   constexpr double kLearnedShare = 0.03;
+  // Of a single emitter: chi2 of a place further, and of what is no motion of rotors.
+  constexpr double kOtherPlace = 36.0, kOtherMotion = 60.0;
   constexpr std::size_t kFewestAnew = 24, kFewestJudged = 4, kFewestLearned = 24;
   const double step = usual_step(anchor.start, rate);
   const double least_noise = kLeastPlaceNoise * step;
@@ -343,7 +450,8 @@ FollowedPackets follow_packets(const PacketShots& shots, const AngleSeries& seri
   for (const double speed : anchor.start.angular_velocity) {
     leaning = std::max(leaning, speed == 0 ? 0.0 : step * rate / std::abs(speed));
   }
-  PacketFitter fitter(shots, series, rate, anchor.start.train, anchor.firing_order);
+  PacketFitter fitter(shots, series, evident, rate, anchor.start.train, anchor.firing_order);
+  const bool single = anchor.firing_order.size() == 1;
   // Shots of the same emitter stand so far apart.
   const double spacing = step * static_cast<double>(anchor.firing_order.size());
   FollowedPackets result;
@@ -351,7 +459,7 @@ FollowedPackets follow_packets(const PacketShots& shots, const AngleSeries& seri
   for (const int direction : {1, -1}) {
     double noise = std::max(least_noise, anchor.start.residual_rms);
     RotorState state =
-        direction > 0 ? PacketFitter::loose_state(anchor.start, kAnchorAngle, kAnchorSpeedShare)
+        direction > 0 ? PacketFitter::loose_state(anchor.start, kAnchorAngle, anchor.speed_share)
                       : result.anchor;
     std::size_t packet = anchor.packet + (direction > 0 ? 0 : 1);
     const std::size_t end = direction > 0 ? shots.packets.size() : 0;
@@ -366,12 +474,23 @@ FollowedPackets follow_packets(const PacketShots& shots, const AngleSeries& seri
         unsure = std::max(unsure, leaning * std::sqrt(prior.covariance(k, k)));
       }
       const bool first = present == anchor.packet && direction > 0;
-      // Shots of a single emitter fit as well one place further.
-      const bool anew = 6.0 * unsure > spacing;
-      if (!first && anew && (count < kFewestAnew || anchor.firing_order.size() == 1)) continue;
+      const bool known = first || fitter.is_evident(present);
+      const algebra::SymmetricSolver expected{Eigen::MatrixXd(prior.covariance)};
+      if (single && !known) {  // shots of a single emitter fit as well one place further
+        Eigen::VectorXd further = Eigen::VectorXd::Zero(prior.mean.size());
+        for (Eigen::Index k = 0; k < further.size(); k += 3) further[k] = prior.mean[k + 1] / rate;
+        if (expected.chi2(further) < kOtherPlace) continue;
+      } else if (!known && 6.0 * unsure > spacing && count < kFewestAnew) {
+        continue;
+      }
       const std::array<double, 2> levels = {std::max(noise, std::min(unsure, spacing)), noise};
       const PacketFit fit = fitter.fit(present, prior, levels);
-      if (!first && count >= kFewestJudged && fit.scale > kPoorPacket * noise) continue;
+      const bool fits = first || count < kFewestJudged || fit.scale <= kPoorPacket * noise;
+      const bool moved =
+          single && !first && expected.chi2(fit.state.mean - prior.mean) > kOtherMotion;
+      if (known) ++result.evident;
+      if (known && (!fits || moved)) ++result.contradicting;
+      if (!fits || (moved && !known)) continue;
       if (count >= kFewestLearned) {
         noise = std::clamp(
             std::sqrt(noise * noise + kLearnedShare * (fit.scale * fit.scale - noise * noise)),
@@ -396,23 +515,6 @@ AngleSeries before_cut(AngleSeries series) {
     recordings::move_to_middle_of_cut(step, series.azimuth[i], series.zenith[i]);
   }
   return series;
-}
-
-/// Fits the optics to the placed shots about an anchor. @return whether that went well
-bool refit(const PacketShots& shots, const AngleSeries& series, double rate,
-           const sensors::Sensor& sensor, const FollowedPackets& followed, PacketAnchor& anchor) {
-  constexpr std::size_t kMostShots = 40000;
-  const AngleSeries placed =
-      placed_series(shots, series, followed.place, rate, anchor.firing_order);
-  const auto at = static_cast<std::size_t>(
-      std::lower_bound(placed.time_ns.begin(), placed.time_ns.end(), followed.anchor.time_ns) -
-      placed.time_ns.begin());
-  const AngleSeries near = rows_of(placed, at - std::min(at, kMostShots / 2),
-                                   std::min(placed.size(), at + kMostShots / 2));
-  set_rotors(anchor.start, followed.anchor);
-  const std::optional<Start> fitted = fit_optics(near, anchor.start, sensor, Priors::of_the_type);
-  if (fitted) anchor.start = *fitted;
-  return fitted.has_value();
 }
 
 void check_packets(const PacketShots& shots) {
@@ -452,15 +554,36 @@ double shot_rate_of(const PacketShots& shots, const sensors::Sensor& sensor) {
   return 1e9 * shots.places * static_cast<double>(count) / sum;
 }
 
-std::vector<std::uint8_t> middle_places(const PacketShots& shots) {
+GuessedPlaces guess_places(const PacketShots& shots, const std::vector<std::uint8_t>& known) {
   check_packets(shots);
-  std::vector<std::uint8_t> places;
-  places.reserve(shots.series.size());
-  for (std::size_t i = 0; i < shots.series.size(); ++i) {
-    const int missing = shots.places - shots.packets[shots.packet[i]].shots;
-    places.push_back(static_cast<std::uint8_t>(shots.precedent[i] + missing / 2));
+  const std::size_t count = shots.series.size();
+  GuessedPlaces result{known, 0};
+  if (known.empty()) result.place.assign(count, kNoPlace);
+  require_length("known places", result.place.size(), count);
+  // Highest place that each shot may have, from the last one on.
+  std::vector<int> highest(count);
+  for (std::size_t i = count; i-- > 0;) {
+    highest[i] = shots.precedent[i] + shots.places - shots.packets[shots.packet[i]].shots;
+    if (i + 1 < count && shots.packet[i + 1] == shots.packet[i]) {
+      const int steps = shots.precedent[i + 1] - shots.precedent[i];
+      highest[i] = std::min(highest[i], highest[i + 1] - steps);
+    }
+    if (result.place[i] != kNoPlace) highest[i] = std::min<int>(highest[i], result.place[i]);
   }
-  return places;
+  int lowest = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    const bool same = i > 0 && shots.packet[i] == shots.packet[i - 1];
+    lowest = same ? lowest + shots.precedent[i] - shots.precedent[i - 1] : shots.precedent[i];
+    if (result.place[i] != kNoPlace) {
+      require_between("known place", result.place[i], lowest, highest[i]);
+      lowest = result.place[i];
+      continue;
+    }
+    const int middle = (lowest + highest[i]) / 2;
+    result.most_off = std::max<double>(result.most_off, highest[i] - middle);
+    result.place[i] = static_cast<std::uint8_t>(middle);
+  }
+  return result;
 }
 
 ShotPlaces find_places(const PacketShots& shots, double shot_rate, const sensors::Sensor& sensor,
@@ -471,10 +594,14 @@ ShotPlaces find_places(const PacketShots& shots, double shot_rate, const sensors
   constexpr double kClearlyBetter = 0.95;  // residuals
   ShotPlaces result;
   result.firing_order = emitters_in_order({}, sensor.train.emitters());
-  result.place.assign(shots.series.size(), kNoPlace);
-  std::optional<PacketAnchor> anchor = find_packet_anchor(shots, shot_rate, sensor, progress);
-  for (std::size_t i = 0; i < shots.series.size(); ++i) {
-    if (shots.is_whole(shots.packet[i])) result.place[i] = shots.precedent[i];
+  const std::vector<std::uint8_t> evident =
+      evident_places(shots, shot_rate, sensor.train.emitters());
+  result.place = evident;
+  std::optional<PacketAnchor> anchor =
+      find_evident_anchor(shots, evident, shot_rate, sensor, progress);
+  // A packet of a single emitter does not tell which of its places are missing.
+  if (!anchor && sensor.train.emitters() > 1) {
+    anchor = find_packet_anchor(shots, shot_rate, sensor, progress);
   }
   if (!anchor) return result;
   const Start frame = anchor->start;
@@ -482,15 +609,16 @@ ShotPlaces find_places(const PacketShots& shots, double shot_rate, const sensors
   prepare_shots(series, frame);
   anchor->start.mirrored = false;
   anchor->start.frame.reset();
-  FollowedPackets followed = follow_packets(shots, series, shot_rate, *anchor, progress);
+  FollowedPackets followed = follow_packets(shots, series, evident, shot_rate, *anchor, progress);
   for (int round = 0; round < kMostRounds; ++round) {
     PacketAnchor refined = *anchor;
-    if (!refit(shots, series, shot_rate, sensor, followed, refined)) break;
+    set_rotors(refined.start, followed.anchor);
+    PacketAnchor other = refined;
+    if (!refit(shots, series, followed.place, shot_rate, sensor, refined)) break;
     if (round == 0 && shots.cartesian) {
       AngleSeries uncut = before_cut(shots.series);
       prepare_shots(uncut, frame);
-      PacketAnchor other = *anchor;
-      if (refit(shots, uncut, shot_rate, sensor, followed, other) &&
+      if (refit(shots, uncut, followed.place, shot_rate, sensor, other) &&
           other.start.residual_rms < kClearlyBetter * refined.start.residual_rms) {
         result.cut_coordinates = true;
         series = std::move(uncut);
@@ -498,13 +626,13 @@ ShotPlaces find_places(const PacketShots& shots, double shot_rate, const sensors
       }
     }
     *anchor = std::move(refined);
-    FollowedPackets again = follow_packets(shots, series, shot_rate, *anchor, progress);
+    FollowedPackets again = follow_packets(shots, series, evident, shot_rate, *anchor, progress);
     if (again.placed < followed.placed) break;
     const bool settled = again.place == followed.place;
     followed = std::move(again);
     if (settled) break;
   }
-  if (2 * followed.placed < shots.series.size()) {  // the rotors were lost
+  if (!followed.is_sound()) {  // the rotors were lost
     result.cut_coordinates = false;
     return result;
   }

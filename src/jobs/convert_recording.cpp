@@ -7,6 +7,7 @@
 #include "risley/recordings/writer.hpp"
 
 #include "jobs/open_input.hpp"
+#include "jobs/packet_recording.hpp"
 
 namespace risley::jobs {
 namespace {
@@ -14,7 +15,8 @@ namespace {
 /// The header to write, with a type of sensor where the recording does not tell it.
 recordings::RecordingHeader header_of(const recordings::Reader& reader,
                                       const ConvertRecordingOptions& options,
-                                      ConvertedRecording& result, const Progress& progress) {
+                                      const PlacedInput& input, ConvertedRecording& result,
+                                      const Progress& progress) {
   recordings::RecordingHeader header = reader.header();
   if (options.sensor_type) {
     for (recordings::Device& device : header.devices) {
@@ -31,7 +33,9 @@ recordings::RecordingHeader header_of(const recordings::Reader& reader,
   recordings::Device& device = header.devices.front();
   const bool named = device.type != recordings::kUnknownDeviceType && !device.type_inferred;
   if (named || header.devices.size() > 1) return header;
-  result.choice = choose_sensor(options.recording, options.reading, header, {}, progress);
+  result.choice = input.choice
+                      ? input.choice
+                      : choose_sensor(options.recording, options.reading, header, {}, progress);
   if (result.choice->chosen_by == ChosenBy::scan) {
     device.type = static_cast<std::uint8_t>(result.choice->sensor.device_type);
   }
@@ -43,9 +47,12 @@ recordings::RecordingHeader header_of(const recordings::Reader& reader,
 ConvertedRecording convert_recording(const ConvertRecordingOptions& options,
                                      const Progress& progress) {
   ConvertedRecording result;
-  const auto reader = open_input(options.recording, options.reading);
+  const PlacedInput input =
+      place_input(options.recording, options.reading, UntoldShots::guessed, progress.silent());
+  const auto reader = open_input(options.recording, input.reading);
   const auto writer = recordings::create_recording(
-      options.output, header_of(*reader, options, result, progress.silent()), options.format);
+      options.output, header_of(*reader, options, input, result, progress.silent()),
+      options.format);
   recordings::Chunk chunk;
   const auto read_next = [&] {
     try {
@@ -64,6 +71,8 @@ ConvertedRecording convert_recording(const ConvertRecordingOptions& options,
   result.left_out = writer->left_out();
   result.input_format = reader->header().format;
   result.warnings = reader->warnings();
+  for (const std::string& words : input.words) result.warnings.push_back({{}, words});
+  result.time_uncertainty = input.time_uncertainty;
   return result;
 }
 

@@ -15,6 +15,7 @@
 #include "risley/sensors/preset.hpp"
 
 #include "jobs/open_input.hpp"
+#include "jobs/packet_recording.hpp"
 #include "jobs/stopwatch.hpp"
 
 namespace risley::jobs {
@@ -25,7 +26,9 @@ using identification::Identification;
 
 estimation::AngleSeries read(const IdentifyRecordingOptions& options, IdentifiedRecording& result,
                              const Progress& progress) {
-  const auto reader = open_input(options.recording, options.reading);
+  const PlacedInput input =
+      place_input(options.recording, options.reading, UntoldShots::left_out, progress);
+  const auto reader = open_input(options.recording, input.reading);
   const recordings::RecordingHeader& header = reader->header();
   recordings::require_times(header);
   if (header.devices.size() > 1) {
@@ -39,6 +42,14 @@ estimation::AngleSeries read(const IdentifyRecordingOptions& options, Identified
     progress.report(reader->fraction_read());
   }
   for (const auto& warning : reader->warnings()) result.warnings.push_back(warning_text(warning));
+  result.warnings.insert(result.warnings.end(), input.words.begin(), input.words.end());
+  result.cropped = input.choice.has_value();
+  if (result.cropped) {
+    result.warnings.push_back(fmt::format(
+        "the optics of {} told when the shots of packets that lack points were fired: what is "
+        "found here is not independent of them",
+        input.choice->sensor.name));
+  }
   return selector.take_series();
 }
 
@@ -74,8 +85,12 @@ void judge(IdentifiedRecording& result) {
         "no train of up to three prisms that was tried describes this scan: the best one leaves {}",
         rms);
     result.to_do =
-        "check the times (option shot_rate gives the rate of shots that are counted) and that the "
-        "recording is of one sensor at rest";
+        result.cropped
+            ? "export the recording again without cropping or filtering it: a small part of the "
+              "field of view shows no lines; what is known of a sensor holds there, too, and is "
+              "what an estimate begins with"
+            : "check the times (option shot_rate gives the rate of shots that are counted) and "
+              "that the recording is of one sensor at rest";
     return;
   }
   if (!found.decided) {

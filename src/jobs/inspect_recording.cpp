@@ -2,20 +2,25 @@
 // SPDX-License-Identifier: MIT
 #include "risley/jobs/inspect_recording.hpp"
 
+#include <utility>
+
 #include "jobs/open_input.hpp"
+#include "jobs/packet_recording.hpp"
 
 namespace risley::jobs {
 
 InspectedRecording inspect_recording(const InspectRecordingOptions& options,
                                      const Progress& progress) {
   InspectedRecording result;
+  PlacedInput input = place_input(options.recording, options.reading, UntoldShots::guessed,
+                                  progress.stage("placing"));
   if (!options.excerpt.empty()) {  // first, because it may have to be refused
     result.excerpt =
         recordings::write_excerpt(options.recording, options.excerpt, options.excerpt_options,
-                                  options.reading, progress.stage("sharing"));
+                                  input.reading, progress.stage("sharing"));
   }
   const Progress reading = progress.stage("reading");
-  const auto reader = open_input(options.recording, options.reading);
+  const auto reader = open_input(options.recording, input.reading);
   recordings::TimeAudit audit;
   recordings::Chunk chunk;
   try {
@@ -30,7 +35,10 @@ InspectedRecording inspect_recording(const InspectRecordingOptions& options,
   result.audit = audit.result();
   result.audit.pps_wraps = reader->clock_wraps();
   result.warnings = reader->warnings();
-  if (result.header.devices.size() != 1 || result.audit.shots == 0) return result;
+  for (const std::string& words : input.words) result.warnings.push_back({{}, words});
+  result.time_uncertainty = input.time_uncertainty;
+  if (input.choice) result.choice = std::move(input.choice);
+  if (result.choice || result.header.devices.size() != 1 || result.audit.shots == 0) return result;
   try {
     result.choice = choose_sensor(options.recording, options.reading, result.header, {},
                                   progress.stage("recognising"));

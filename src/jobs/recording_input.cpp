@@ -3,7 +3,6 @@
 #include "risley/jobs/recording_input.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdint>
 #include <optional>
@@ -14,12 +13,12 @@
 
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
-#include "risley/estimation/packet_places.hpp"
 #include "risley/estimation/shot_slips.hpp"
 #include "risley/estimation/stored_pose.hpp"
 #include "risley/jobs/sensor_choice.hpp"
 
 #include "jobs/open_input.hpp"
+#include "jobs/packet_recording.hpp"
 #include "jobs/stopwatch.hpp"
 
 namespace risley::jobs {
@@ -27,9 +26,6 @@ namespace {
 
 using estimation::StoredPoseUse;
 using recordings::Extrinsics;
-
-/// Fewer tell nothing of rotors.
-constexpr std::size_t kFewestWholePackets = 10;
 
 /// The pose that a roll about the optical axis amounts to: recorded = pose unrolled.
 Extrinsics roll_about_axis(double roll, const estimation::FrameTurn& frame) {
@@ -172,131 +168,6 @@ std::vector<std::string> count_words(const estimation::ShotCount& count, double 
   return words;
 }
 
-/// All shots of a recording with one time for each packet, and its rows.
-struct PacketRecording {
-  estimation::PacketShots shots;
-  std::vector<std::size_t> first_row;  ///< of each packet
-  std::vector<std::uint8_t> index;     ///< of each row's shot among those of its packet in the file
-  std::uint8_t last_beam = 0;          ///< as the kind of packets says
-
-  /// A recording may end within a packet.
-  bool lacks_points() const {
-    for (std::size_t packet = 0; packet + 1 < shots.packets.size(); ++packet) {
-      if (!shots.is_whole(packet)) return true;
-    }
-    return false;
-  }
-  std::size_t whole_packets() const {
-    std::size_t count = 0;
-    for (std::size_t packet = 0; packet < shots.packets.size(); ++packet) {
-      count += shots.is_whole(packet) ? 1 : 0;
-    }
-    return count;
-  }
-};
-
-/// Empty for other recordings and those of several sensors.
-std::optional<PacketRecording> packet_recording(const std::string& path,
-                                                const recordings::ReadOptions& options,
-                                                const Progress& progress) {
-  recordings::ReadOptions as_it_is;
-  as_it_is.extrinsics = options.extrinsics;
-  const auto reader = recordings::open_recording(path, as_it_is);
-  if (reader->header().packet_shots == 0 || reader->header().devices.size() != 1) {
-    return std::nullopt;
-  }
-  const auto variance = [](float step) { return step * step / 12.0F; };
-  PacketRecording result;
-  estimation::PacketShots& shots = result.shots;
-  shots.places = reader->header().packet_shots;
-  shots.cartesian = reader->header().cartesian && !options.extrinsics;
-  recordings::Chunk chunk;
-  try {
-    while (reader->read(chunk)) {
-      const recordings::Observations& rows = chunk.observations;
-      auto begin = chunk.packet_begins.begin();
-      for (std::size_t row = 0; row < rows.size(); ++row) {
-        if (begin != chunk.packet_begins.end() && *begin == row) {
-          result.first_row.push_back(result.index.size());
-          shots.packets.push_back({rows.time_ns[row], 0});
-          ++begin;
-        }
-        const bool is_new = rows.return_number[row] <= 1 || shots.packets.back().shots == 0;
-        if (is_new) ++shots.packets.back().shots;
-        result.index.push_back(static_cast<std::uint8_t>(shots.packets.back().shots - 1));
-        result.last_beam = std::max(result.last_beam, rows.beam[row]);
-        if (!is_new || rows.valid[row] == 0) continue;
-        shots.series.append(rows.time_ns[row], rows.azimuth[row], rows.zenith[row], 0,
-                            variance(rows.azimuth_resolution[row]),
-                            variance(rows.zenith_resolution[row]));
-        shots.packet.push_back(shots.packets.size() - 1);
-        shots.precedent.push_back(result.index.back());
-      }
-      progress.check();
-    }
-  } catch (const FileError&) {  // who reads on is told of it
-  }
-  return result;
-}
-
-/// Places of all rows from those of shots.
-recordings::PacketPlaces places_of_rows(const PacketRecording& recording,
-                                        const std::vector<std::uint8_t>& place, double shot_rate,
-                                        std::vector<std::uint8_t> firing_order) {
-  const estimation::PacketShots& shots = recording.shots;
-  recordings::PacketPlaces result{
-      std::vector<std::uint8_t>(recording.index.size(), recordings::kNoPlace), shot_rate,
-      std::move(firing_order), false};
-  std::size_t shot = 0;
-  for (std::size_t packet = 0; packet < shots.packets.size(); ++packet) {
-    std::array<std::uint8_t, recordings::kNoPlace> of_index{};
-    of_index.fill(recordings::kNoPlace);
-    for (std::uint8_t i = 0; shots.is_whole(packet) && i < shots.places; ++i) of_index[i] = i;
-    for (; shot < place.size() && shots.packet[shot] == packet; ++shot) {
-      of_index[shots.precedent[shot]] = place[shot];
-    }
-    const std::size_t end = packet + 1 < shots.packets.size() ? recording.first_row[packet + 1]
-                                                              : recording.index.size();
-    for (std::size_t row = recording.first_row[packet]; row < end; ++row) {
-      result.of_row[row] = of_index[recording.index[row]];
-    }
-  }
-  return result;
-}
-
-/// What was done about packets that lack points, in words.
-/// @throws EstimationError when nothing is left
-std::string places_words(const PacketRecording& recording, const estimation::ShotPlaces& found,
-                         const std::string& sensor) {
-  const std::size_t packets = recording.shots.packets.size(), whole = recording.whole_packets();
-  const auto left_out = static_cast<std::size_t>(
-      std::count(found.place.begin(), found.place.end(), recordings::kNoPlace));
-  const std::string lacking =
-      fmt::format("points are missing in {} of {} packets, and the file does not say which",
-                  packets - whole, packets);
-  if (found.followed) {
-    return fmt::format(
-        "{}: the rotors were followed and tell when each of {} shots was fired; {} that fit two "
-        "places in their packet are left out",
-        lacking, found.place.size() - left_out, left_out);
-  }
-  const std::string remedy =
-      "export the recording again without cropping or filtering it, or use the recording that it "
-      "was exported from";
-  if (whole < kFewestWholePackets) {
-    throw EstimationError(fmt::format(
-        "{}: when the shots were fired is unknown, because they do not tell the rotors of the "
-        "sensor {}, and {} whole packets are too few; {}, or say with option sensor which sensor "
-        "it was",
-        lacking, sensor, whole, remedy));
-  }
-  return fmt::format(
-      "{}: they do not tell the rotors of the sensor {}, and only the {} shots of the {} whole "
-      "packets are "
-      "used; {}",
-      lacking, sensor, found.place.size() - left_out, whole, remedy);
-}
-
 std::string share_text(double share) { return fmt::format("{:.1f} %", 100.0 * share); }
 
 /// Opens a recording, chooses its sensor, and turns it back by the pose that it states where its
@@ -361,37 +232,16 @@ SensorFrameRecording open_by_stated_pose(const std::string& path, recordings::Re
 SensorFrameRecording open_with_places(const std::string& path, recordings::ReadOptions reading,
                                       const std::optional<sensors::Sensor>& given,
                                       PacketRecording packets, const Progress& progress) {
-  const std::optional<double> given_rate = std::exchange(reading.shot_rate, std::nullopt);
   const bool given_pose = reading.extrinsics.has_value();
-  // The middle of the places that a shot may have is no worse than a few degrees of the rotors.
-  const double usual_rate = packets.last_beam > 0 ? 240e3 : 100e3;
-  std::vector<std::uint8_t> in_turn;
-  for (int beam = 0; beam <= packets.last_beam; ++beam) {
-    in_turn.push_back(static_cast<std::uint8_t>(beam));
-  }
-  reading.packet_places = places_of_rows(packets, estimation::middle_places(packets.shots),
-                                         usual_rate, std::move(in_turn));
+  const std::optional<double> given_rate = std::exchange(reading.shot_rate, std::nullopt);
+  reading.packet_places = packets.middle_places();
   SensorFrameRecording result = open_by_stated_pose(path, reading, given, progress);
-  const sensors::Sensor& sensor = result.choice.sensor;
-  if (reading.extrinsics && !given_pose) packets = *packet_recording(path, reading, progress);
-  const double rate = given_rate ? *given_rate : estimation::shot_rate_of(packets.shots, sensor);
-  estimation::ShotPlaces found = estimation::find_places(packets.shots, rate, sensor, progress);
-  result.warnings.push_back(places_words(packets, found, sensor.name));
-  if (given_rate) {
-    result.warnings.push_back(
-        fmt::format("shots cannot be counted where points are missing: the packets keep their "
-                    "times, and {:.6g} "
-                    "shots per second are those within a packet",
-                    rate));
-  }
-  if (found.cut_coordinates) {
-    result.warnings.push_back(
-        "the shots fit better as points whose coordinates were cut off towards zero than as "
-        "rounded "
-        "ones: half a step was put back");
-  }
-  reading.packet_places = places_of_rows(packets, found.place, rate, std::move(found.firing_order));
-  reading.packet_places->cut_coordinates = result.cut_mended = found.cut_coordinates;
+  if (reading.extrinsics && !given_pose) packets = *PacketRecording::open(path, reading, progress);
+  PlacedRows placed =
+      packets.place_rows(result.choice.sensor, given_rate, UntoldShots::left_out, progress);
+  result.warnings.insert(result.warnings.end(), placed.words.begin(), placed.words.end());
+  result.cut_mended = placed.places.cut_coordinates;
+  reading.packet_places = std::move(placed.places);
   result.reader = open_input(path, reading);
   return result;
 }
@@ -403,11 +253,9 @@ SensorFrameRecording open_in_sensor_frame(const std::string& path,
                                           const std::optional<sensors::Sensor>& asked_for,
                                           const Progress& progress) {
   recordings::ReadOptions reading = options;
-  auto packets = packet_recording(path, reading, progress);
-  if (packets && packets->lacks_points()) {
+  if (auto packets = PacketRecording::open(path, reading, progress)) {
     return open_with_places(path, reading, asked_for, *std::move(packets), progress);
   }
-  packets.reset();
   SensorFrameRecording result = open_by_stated_pose(path, reading, asked_for, progress);
   const sensors::Sensor& sensor = result.choice.sensor;
   const bool given = reading.shot_rate.has_value();

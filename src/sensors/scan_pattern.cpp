@@ -6,9 +6,6 @@
 #include <numbers>
 #include <span>
 
-#include <fmt/format.h>
-
-#include "risley/core/error.hpp"
 #include "risley/core/require.hpp"
 #include "risley/optics/batch.hpp"
 
@@ -23,12 +20,9 @@ ScanPattern scan_pattern(const Sensor& sensor, std::uint64_t first_row, std::siz
                          const ScanPatternOptions& options) {
   const auto prisms = static_cast<std::size_t>(sensor.prisms());
   const ScanSequence sequence = sensor.sequence.value_or(ScanSequence{});
-  const std::vector<double>& start =
+  std::vector<double> start =
       options.rotation_angle.empty() ? sequence.rotation_angle : options.rotation_angle;
-  if (start.empty()) {
-    throw InvalidArgument(fmt::format(
-        "sensor \"{}\" has no scan sequence: give the rotation angles at its start", sensor.name));
-  }
+  if (start.empty()) start.assign(prisms, 0.0);
   require_length("rotation_angle", start.size(), prisms);
   require_length("angular_velocity of the sensor", sensor.angular_velocity.size(), prisms);
   const double rate = options.shot_rate.value_or(sensor.shot_rate);

@@ -168,6 +168,12 @@ class VendorTest(CommandTest):
                     self.assertGreater(result["observations_used"], 0.998 * rows)
                     self.assertLess(result["outliers"], 0.001 * rows)
                     self.assertTrue(any("points are missing" in one for one in result["warnings"]))
+            # Other verbs know the same times.
+            with self.subTest(name, verb="convert"):
+                done = self.expect_json(0, "convert", recording, "-o", "placed.nc")
+                self.assertEqual(done["time_uncertainty_s"], 0)
+                again = self.expect_json(0, "estimate", "placed.nc", "--sensor", "avia")
+                self.assertLess(self.residual_of(again), 0.010)
 
     @staticmethod
     def residual_of(result):

@@ -11,13 +11,17 @@
 #include <string>
 #include <vector>
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
+#include "risley/estimation/free_parameters.hpp"
 #include "risley/estimation/sensor_recognition.hpp"
 #include "risley/optics/observation_model.hpp"
 #include "risley/sensors/preset.hpp"
+
+#include "estimation/evident_places.hpp"
 
 namespace risley::estimation::packet_places_test {
 
@@ -26,6 +30,7 @@ struct Cropped {
   double width = 13.0, height = 12.0;  // of the window, deg
   bool backwards = false;              // emitters fire from the last to the first
   bool cut = true;                     // coordinates are cut off at millimetres, not rounded
+  bool bent = false;                   // tilts of 0.3 degree and more, speeds off by 5e-4
 };
 
 void PrintTo(const Cropped& scan, std::ostream* stream) { *stream << scan.sensor; }
@@ -35,11 +40,28 @@ struct CroppedRecording {
   std::vector<std::uint8_t> truth;
 };
 
+/// The sensor of a scan.
+sensors::Sensor unit_of(const Cropped& scan) {
+  sensors::Sensor unit = sensors::load_sensor(scan.sensor);
+  if (!scan.bent) return unit;
+  double tilt = radians_from_degrees(0.3);
+  for (const std::string& name : default_free_names(unit.shape(), one_glass(unit.train))) {
+    const ParameterInfo& info = find_parameter(name, unit.shape());
+    const bool is_tilt = name.find("tilt") != std::string::npos;
+    for (const int place : info.places) {
+      unit.train.set_place(place, unit.train[place] + (is_tilt ? tilt : 0.1 * tilt));
+    }
+    if (is_tilt) tilt = -1.1 * tilt;
+  }
+  for (double& speed : unit.angular_velocity) speed *= 1.0005;
+  return unit;
+}
+
 /// Points of a wall in 2 m in millimetres, 0.25 s of rotors that swing by 0.1 degree, packets that
 /// begin half a microsecond early or late.
 CroppedRecording record_packets(const Cropped& scan, double azimuth = 1.0,
                                 double elevation = -4.0) {
-  const sensors::Sensor sensor = sensors::load_sensor(scan.sensor);
+  const sensors::Sensor sensor = unit_of(scan);
   constexpr double kSwing = radians_from_degrees(0.1), kSwingSpeed = kTwoPi * 3.0;
   constexpr double kNoise = radians_from_degrees(0.003), kDistance = 2.0, kStep = 0.001;
   std::mt19937_64 generator(7);
@@ -116,19 +138,74 @@ INSTANTIATE_TEST_SUITE_P(
     Sensors, CroppedPackets,
     ::testing::Values(Cropped{"avia"}, Cropped{"avia", 20.0, 20.0, true, false},
                       Cropped{"mid-40", 20.0, 15.0}, Cropped{"mid-70", 40.0, 30.0},
-                      Cropped{"tele-15", 9.0, 7.0}, Cropped{"horizon", 30.0, 15.0}),
+                      Cropped{"tele-15", 9.0, 7.0}, Cropped{"horizon", 30.0, 15.0},
+                      Cropped{"mid-40", 8.0, 8.0, false, true, true},
+                      Cropped{"mid-70", 13.0, 12.0, false, true, true},
+                      Cropped{"mid-70", 10.0, 8.0, false, true, true},
+                      Cropped{"tele-15", 9.0, 7.0, true, true, true}),
     [](const auto& scan) {
       std::string name = scan.param.sensor;
       std::erase(name, '-');
-      return name + (scan.param.backwards ? "Backwards" : "");
+      return fmt::format("{}{:.0f}{}{}", name, scan.param.width,
+                         scan.param.backwards ? "Backwards" : "", scan.param.bent ? "Bent" : "");
     });
+
+TEST(PacketPlaces, OfRunsFromPacketToPacketAreEvident) {
+  const Cropped scan{"mid-70", 13.0, 12.0, false, true, true};
+  const CroppedRecording recording = record_packets(scan);
+  const std::vector<std::uint8_t> place = evident_places(recording.shots, 100e3, 1);
+  std::size_t evident = 0;
+  for (std::size_t i = 0; i < place.size(); ++i) {
+    EXPECT_FALSE(recording.shots.is_whole(recording.shots.packet[i]));
+    if (place[i] == recordings::kNoPlace) continue;
+    ++evident;
+    EXPECT_EQ(place[i], recording.truth[i]);
+  }
+  EXPECT_GT(evident, place.size() / 3);
+  // Nobody knows which of several emitters fired.
+  for (const std::uint8_t one : evident_places(recording.shots, 100e3, 6)) {
+    EXPECT_EQ(one, recordings::kNoPlace);
+  }
+}
+
+TEST(PacketPlaces, OfASingleEmittersFewShotsStayUnknown) {
+  const CroppedRecording recording = record_packets({"mid-70", 4.0, 4.0, false, true, true});
+  const ShotPlaces found = find_places(recording.shots, 100e3, sensors::load_sensor("mid-70"));
+  EXPECT_FALSE(found.followed);
+  for (std::size_t i = 0; i < found.place.size(); ++i) {
+    if (found.place[i] == recordings::kNoPlace) continue;
+    EXPECT_EQ(found.place[i], recording.truth[i]);
+  }
+}
+
+TEST(PacketPlaces, AreGuessedInTheOrderOfTheShotsWithinAKnownDistance) {
+  const CroppedRecording recording = record_packets({"mid-70", 13.0, 12.0});
+  std::vector<std::uint8_t> known(recording.truth.size(), recordings::kNoPlace);
+  for (std::size_t i = 0; i < known.size(); i += 7) known[i] = recording.truth[i];
+  for (const auto& some : {std::vector<std::uint8_t>(), known}) {
+    const GuessedPlaces guess = guess_places(recording.shots, some);
+    EXPECT_GT(guess.most_off, 1.0);
+    for (std::size_t i = 0; i < known.size(); ++i) {
+      EXPECT_LE(std::abs(guess.place[i] - recording.truth[i]), guess.most_off);
+      const bool is_known = !some.empty() && some[i] != recordings::kNoPlace;
+      EXPECT_TRUE(!is_known || guess.place[i] == some[i]);
+      const bool same = i > 0 && recording.shots.packet[i] == recording.shots.packet[i - 1];
+      EXPECT_TRUE(!same || guess.place[i] > guess.place[i - 1]);
+    }
+  }
+  EXPECT_EQ(guess_places(recording.shots, recording.truth).most_off, 0.0);
+  known.front() = 99;
+  EXPECT_THROW(guess_places(recording.shots, known), InvalidArgument);
+  known.pop_back();
+  EXPECT_THROW(guess_places(recording.shots, known), InvalidArgument);
+}
 
 TEST(PacketPlaces, AreThoseOfTheirOrderInWholePackets) {
   const CroppedRecording recording = record_packets({"avia", 180.0, 180.0});
   for (std::size_t i = 0; i < recording.shots.packets.size(); ++i) {
     EXPECT_TRUE(recording.shots.is_whole(i));
   }
-  EXPECT_EQ(middle_places(recording.shots), recording.truth);
+  EXPECT_EQ(guess_places(recording.shots).place, recording.truth);
 }
 
 TEST(PacketPlaces, OfAnotherSensorAreUnknownAndNotGuessed) {
@@ -144,7 +221,7 @@ TEST(PacketPlaces, OfAnotherSensorAreUnknownAndNotGuessed) {
 TEST(PacketPlaces, RefuseShotsThatDoNotAscend) {
   CroppedRecording recording = record_packets({"avia"});
   std::swap(recording.shots.packet.front(), recording.shots.packet.back());
-  EXPECT_THROW(middle_places(recording.shots), InvalidArgument);
+  EXPECT_THROW(guess_places(recording.shots), InvalidArgument);
 }
 
 }  // namespace risley::estimation::packet_places_test

@@ -11,6 +11,7 @@
 
 #include "risley/core/error.hpp"
 #include "risley/io/text_file.hpp"
+
 #include "source_tree.hpp"
 
 namespace risley::io::yaml_map_test {

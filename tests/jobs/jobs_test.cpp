@@ -27,6 +27,7 @@
 #include "risley/jobs/plan_calibration.hpp"
 #include "risley/sensors/preset.hpp"
 #include "risley/simulation/truth_file.hpp"
+
 #include "source_tree.hpp"
 
 namespace risley::jobs::jobs_test {

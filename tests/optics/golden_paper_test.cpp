@@ -13,6 +13,7 @@
 #include "risley/core/angle.hpp"
 #include "risley/optics/inverse.hpp"
 #include "risley/optics/observation_model.hpp"
+
 #include "source_tree.hpp"
 
 namespace risley::golden_paper_test {

@@ -10,6 +10,7 @@
 
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
+
 #include "source_tree.hpp"
 
 namespace risley::scenes::scene_test {

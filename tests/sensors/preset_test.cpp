@@ -13,6 +13,7 @@
 
 #include "risley/core/angle.hpp"
 #include "risley/io/text_file.hpp"
+
 #include "source_tree.hpp"
 
 namespace risley::sensors::preset_test {

@@ -178,7 +178,7 @@ TEST(ScanPattern, StaysInTheFieldOfViewAndFillsIt) {
   }
 }
 
-TEST(ScanPattern, AsksForAStartAndSensibleNumbers) {
+TEST(ScanPattern, AsksForSensibleNumbers) {
   const Sensor avia = load_sensor("avia");
   const auto refused = [&](const ScanPatternOptions& options) {
     return refusal([&] { return scan_pattern(avia, 0, 10, options); });
@@ -190,8 +190,16 @@ TEST(ScanPattern, AsksForAStartAndSensibleNumbers) {
   EXPECT_EQ(refused(rate), "shot_rate = -1 Hz, allowed 0.001 to 1000000000");
   every.every = 0;
   EXPECT_EQ(refused(every), "every = 0, allowed 1 to 1000000000");
-  EXPECT_EQ(refusal([&] { return scan_pattern(load_sensor("mid-40"), 0, 10); }),
-            "sensor \"mid-40\" has no scan sequence: give the rotation angles at its start");
+}
+
+TEST(ScanPattern, StartsAtZeroWhereThePresetHasNoSequence) {
+  const Sensor unit = load_sensor("mid-40");
+  ASSERT_FALSE(unit.sequence);
+  ScanPatternOptions zero;
+  zero.rotation_angle = {0.0, 0.0};
+  const ScanPattern pattern = scan_pattern(unit, 0, 10), expected = scan_pattern(unit, 0, 10, zero);
+  EXPECT_EQ(pattern.azimuth, expected.azimuth);
+  EXPECT_EQ(pattern.zenith, expected.zenith);
 }
 
 }  // namespace risley::sensors::scan_pattern_test

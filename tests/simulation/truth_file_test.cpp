@@ -21,6 +21,7 @@
 #include "risley/trajectories/flight_plan.hpp"
 #include "risley/trajectories/mount.hpp"
 #include "risley/trajectories/trajectory_file.hpp"
+
 #include "source_tree.hpp"
 
 namespace risley::simulation::truth_file_test {
@@ -165,8 +166,7 @@ SimulationSettings flying() {
   platform.trajectory = std::make_shared<trajectories::Trajectory>(std::move(flight.trajectory));
   platform.strips = std::move(flight.strips);
   platform.mount = trajectories::load_mount(in_source_tree("data/mount-nadir.yaml"));
-  platform.errors =
-      trajectories::load_error_model(in_source_tree("data/trajectory-errors.yaml"));
+  platform.errors = trajectories::load_error_model(in_source_tree("data/trajectory-errors.yaml"));
   platform.begin_ns = 9'000'000'000;
   s.platform = std::move(platform);
   return s;

@@ -33,7 +33,7 @@ struct PacketShots {
 
 /// What was found of the places of shots.
 struct ShotPlaces {
-  /// The rotors could be followed; otherwise only whole packets have places.
+  /// The rotors could be followed; otherwise only evident places are known.
   bool followed = false;
   std::vector<std::uint8_t> place;         ///< of each shot, or recordings::kNoPlace
   std::vector<std::uint8_t> firing_order;  ///< emitter of places 0, 1, ...; one entry per emitter
@@ -46,15 +46,25 @@ struct ShotPlaces {
 /// next, where enough follow each other; the sensor's otherwise.
 double shot_rate_of(const PacketShots& shots, const sensors::Sensor& sensor);
 
-/// Middle of the places that each shot may have: how a recording can be looked at before more is
-/// known.
-std::vector<std::uint8_t> middle_places(const PacketShots& shots);
+/// Places of all shots, some of them guesses.
+struct GuessedPlaces {
+  std::vector<std::uint8_t> place;  ///< of each shot, ascending within a packet
+  double most_off = 0;              ///< by which a guess may be off, places
+};
 
-/// Finds the places of the shots. Packets that lack few shots tell, each by itself, the angles of
-/// the rotors, the order of the emitters and their shots' places, because neighbouring shots are
-/// far apart. From there the rotors are followed from packet to packet in both directions, and in
-/// each the likeliest places in ascending order are taken; a shot that fits another place nearly as
-/// well has none. docs/theory/slips.md
+/// The known places, and for every other shot the middle of those that its order leaves it: how a
+/// recording can be looked at before more is known.
+/// @param known  of each shot, or recordings::kNoPlace; none: no place is known
+/// @throws InvalidArgument as find_places(), and for known places that the order does not leave
+GuessedPlaces guess_places(const PacketShots& shots, const std::vector<std::uint8_t>& known = {});
+
+/// Finds the places of the shots. Those of whole packets are evident, and those of a single
+/// emitter's runs of shots that go on smoothly from packet to packet; where there are enough they
+/// tell optics and rotors. Otherwise packets of several emitters that lack few shots tell, each by
+/// itself, the angles of the rotors, the order of the emitters and their shots' places, because
+/// neighbouring shots are far apart. From there the rotors are followed from packet to packet in
+/// both directions, and in each the likeliest places in ascending order are taken; a shot that fits
+/// another place nearly as well has none. docs/theory/slips.md
 /// @param shot_rate  within packets, Hz
 /// @throws InvalidArgument for columns of different lengths, more shots than places, a rate that is
 ///         not above 0

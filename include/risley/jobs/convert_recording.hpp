@@ -32,6 +32,8 @@ struct ConvertedRecording {
   std::string input_format;
   std::optional<SensorChoice> choice;  ///< where the file does not name the sensor
   std::vector<recordings::ReadWarning> warnings;
+  /// By which times that had to be guessed may be off, s; 0: there are none.
+  double time_uncertainty = 0;
   std::optional<FileError> damage;  ///< of the recording's body; what came before it was written
 };
 

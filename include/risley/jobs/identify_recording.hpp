@@ -43,6 +43,7 @@ struct IdentifiedRecording {
   bool like_mirrored = false;             ///< it is that one's mirror image
   std::vector<std::string> unobservable;  ///< what such a recording never tells, in words
   std::vector<std::string> warnings;
+  bool cropped = false;  ///< packets lack points, and a preset's optics told their shots' times
   bool written = false;
   double reading_time = 0, solving_time = 0;  ///< s
 };

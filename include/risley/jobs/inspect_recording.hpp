@@ -30,12 +30,14 @@ struct InspectedRecording {
   std::optional<SensorChoice> choice;
   recordings::TimeAuditResult audit;
   std::vector<recordings::ReadWarning> warnings;
+  /// By which times that had to be guessed may be off, s; 0: there are none.
+  double time_uncertainty = 0;
   std::optional<FileError> damage;  ///< of its body; what came before it is in the audit
   std::optional<recordings::Excerpt> excerpt;
 };
 
-/// Reads a recording to its end, audits its times and tells its sensor. Stages: sharing, reading,
-/// recognising.
+/// Reads a recording to its end, audits its times and tells its sensor. Stages: placing, sharing,
+/// reading, recognising.
 /// @throws FileError when it cannot be opened; InvalidArgument; Cancelled
 InspectedRecording inspect_recording(const InspectRecordingOptions& options,
                                      const Progress& progress = {});

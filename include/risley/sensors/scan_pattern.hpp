@@ -15,7 +15,7 @@ namespace risley::sensors {
 struct ScanPatternOptions {
   std::optional<double> shot_rate;     ///< shots per second; empty: the sensor's
   std::optional<Firing> firing;        ///< empty: as the sensor's sequence says
-  std::vector<double> rotation_angle;  ///< [prisms] at time 0, rad; empty: the sequence's
+  std::vector<double> rotation_angle;  ///< [prisms] at time 0, rad; empty: the sequence's, or 0
   std::uint64_t every = 1;             ///< keeps the last of so many shots
 };
 
@@ -31,9 +31,8 @@ struct ScanPattern {
 
 /// Rows [first_row, first_row + rows) of the scan sequence with rotors at constant speed: row r is
 /// shot every (r + 1) - 1.
-/// @throws InvalidArgument for a sensor without sequence where no rotation angles are given, angles
-///         or speeds that are not one per prism, a rate that is not positive, every = 0, and for a
-///         time beyond 1e7 s
+/// @throws InvalidArgument for angles or speeds that are not one per prism, a rate that is not
+///         positive, every = 0, and for a time beyond 1e7 s
 ScanPattern scan_pattern(const Sensor& sensor, std::uint64_t first_row, std::size_t rows,
                          const ScanPatternOptions& options = {});
 

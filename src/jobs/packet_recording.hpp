@@ -1,0 +1,78 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "risley/core/progress.hpp"
+#include "risley/estimation/packet_places.hpp"
+#include "risley/jobs/sensor_choice.hpp"
+#include "risley/recordings/reader.hpp"
+#include "risley/sensors/sensor.hpp"
+
+namespace risley::jobs {
+
+/// What becomes of shots that the rotors do not tell the times of.
+enum class UntoldShots {
+  left_out,  ///< they lose their directions
+  guessed,   ///< they get times in their order
+};
+
+/// When the rows of a recording were fired, as far as it is known.
+struct PlacedRows {
+  recordings::PacketPlaces places;
+  std::vector<std::string> words;  ///< what was done about missing points
+  double time_uncertainty = 0;     ///< by which guessed times may be off, s; 0: there are none
+};
+
+/// A recording of one sensor with one time for each packet, some of which lack points: all of its
+/// shots, and its rows.
+class PacketRecording {
+ public:
+  /// Empty for any other recording. One may end within a packet.
+  static std::optional<PacketRecording> open(const std::string& path,
+                                             const recordings::ReadOptions& options,
+                                             const Progress& progress);
+
+  /// Every shot in the middle of the places that it may have, which is no worse than a few degrees
+  /// of the rotors: how the recording can be looked at before more is known.
+  recordings::PacketPlaces middle_places() const;
+
+  /// Follows the rotors to find when each shot was fired.
+  /// @param shot_rate  within packets, Hz, if it was given
+  /// @throws EstimationError when untold shots are left out and next to nothing is left
+  PlacedRows place_rows(const sensors::Sensor& sensor, std::optional<double> shot_rate,
+                        UntoldShots untold, const Progress& progress) const;
+
+ private:
+  bool lacks_points() const;
+  std::size_t whole_packets() const;
+  recordings::PacketPlaces places_of_rows(const std::vector<std::uint8_t>& place, double shot_rate,
+                                          std::vector<std::uint8_t> firing_order) const;
+
+  estimation::PacketShots shots_;
+  std::vector<std::size_t> first_row_;  // of each packet
+  std::vector<std::uint8_t> index_;     // of each row's shot among those of its packet in the file
+  std::uint8_t last_beam_ = 0;          // as the kind of packets says
+};
+
+/// How a recording is read that is not estimated, and which sensor made it.
+struct PlacedInput {
+  recordings::ReadOptions reading;     ///< with the places of rows whose packets lack points
+  std::optional<SensorChoice> choice;  ///< where such places were looked for
+  std::vector<std::string> words;      ///< as PlacedRows
+  double time_uncertainty = 0;         ///< as PlacedRows
+};
+
+/// Finds when the shots of packets that lack points were fired; other recordings are read as asked
+/// for.
+/// @throws EstimationError as PacketRecording::place_rows(); as recordings::open_recording,
+///         choose_sensor()
+PlacedInput place_input(const std::string& path, const recordings::ReadOptions& options,
+                        UntoldShots untold, const Progress& progress);
+
+}  // namespace risley::jobs
