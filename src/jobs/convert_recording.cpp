@@ -43,7 +43,7 @@ recordings::RecordingHeader header_of(const recordings::Reader& reader,
 ConvertedRecording convert_recording(const ConvertRecordingOptions& options,
                                      const Progress& progress) {
   ConvertedRecording result;
-  const auto reader = open_input(options.recording, options.reading);
+  const auto reader = open_input(options.recording, options.reading, progress);
   const auto writer = recordings::create_recording(
       options.output, header_of(*reader, options, result, progress.silent()), options.format);
   recordings::Chunk chunk;

@@ -25,7 +25,7 @@ using identification::Identification;
 
 estimation::AngleSeries read(const IdentifyRecordingOptions& options, IdentifiedRecording& result,
                              const Progress& progress) {
-  const auto reader = open_input(options.recording, options.reading);
+  const auto reader = open_input(options.recording, options.reading, progress);
   const recordings::RecordingHeader& header = reader->header();
   recordings::require_times(header);
   if (header.devices.size() > 1) {

@@ -15,7 +15,7 @@ InspectedRecording inspect_recording(const InspectRecordingOptions& options,
                                   options.reading, progress.stage("sharing"));
   }
   const Progress reading = progress.stage("reading");
-  const auto reader = open_input(options.recording, options.reading);
+  const auto reader = open_input(options.recording, options.reading, progress);
   recordings::TimeAudit audit;
   recordings::Chunk chunk;
   try {

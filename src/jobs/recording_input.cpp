@@ -98,7 +98,7 @@ std::optional<estimation::CountedShots> counted_shots(const std::string& path,
                                                       const sensors::Sensor& sensor,
                                                       const Progress& progress) {
   options.emitters = 0;  // beams as the file has them
-  const auto reader = recordings::open_recording(path, options);
+  const auto reader = recordings::open_recording(path, options, progress);
   estimation::ShotSelector selector({.rate = std::nullopt, .ranges = false, .rows = true});
   EvenTimes even(sensor.shot_rate);
   recordings::Chunk chunk;
@@ -201,7 +201,7 @@ std::optional<PacketRecording> packet_recording(const std::string& path,
                                                 const Progress& progress) {
   recordings::ReadOptions as_it_is;
   as_it_is.extrinsics = options.extrinsics;
-  const auto reader = recordings::open_recording(path, as_it_is);
+  const auto reader = recordings::open_recording(path, as_it_is, progress);
   if (reader->header().packet_shots == 0 || reader->header().devices.size() != 1) {
     return std::nullopt;
   }
@@ -306,7 +306,7 @@ SensorFrameRecording open_by_stated_pose(const std::string& path, recordings::Re
                                          const std::optional<sensors::Sensor>& given,
                                          const Progress& progress) {
   progress.check();
-  SensorFrameRecording result{open_input(path, reading), {}, {}, reading.extrinsics.has_value()};
+  SensorFrameRecording result{open_input(path, reading, progress), {}, {}, reading.extrinsics.has_value()};
   recordings::require_times(result.reader->header());
   result.choice = choose_sensor(path, reading, result.reader->header(), given, progress);
   result.warnings = result.choice.warnings;
@@ -318,7 +318,7 @@ SensorFrameRecording open_by_stated_pose(const std::string& path, recordings::Re
   if (!pose) {
     if (result.choice.roll == 0) return result;
     reading.extrinsics = roll_about_axis(result.choice.roll, result.choice.frame);
-    result.reader = open_input(path, reading);
+    result.reader = open_input(path, reading, progress);
     result.turned_back = true;
     result.warnings.push_back(fmt::format(
         "the recording is rolled about the optical axis by {:.1f} deg, as the sensor's emitters "
@@ -341,7 +341,7 @@ SensorFrameRecording open_by_stated_pose(const std::string& path, recordings::Re
   result.turned_back = decided ? verdict.use == StoredPoseUse::applied : by_hub;
   if (result.turned_back) {
     reading = turned_back;
-    result.reader = open_input(path, reading);
+    result.reader = open_input(path, reading, progress);
   }
   if (decided && result.turned_back) {
     result.warnings.push_back(found + ": the shots were turned back into the sensor's frame");
@@ -392,7 +392,7 @@ SensorFrameRecording open_with_places(const std::string& path, recordings::ReadO
   }
   reading.packet_places = places_of_rows(packets, found.place, rate, std::move(found.firing_order));
   reading.packet_places->cut_coordinates = result.cut_mended = found.cut_coordinates;
-  result.reader = open_input(path, reading);
+  result.reader = open_input(path, reading, progress);
   return result;
 }
 
@@ -415,7 +415,7 @@ SensorFrameRecording open_in_sensor_frame(const std::string& path,
     if (given && sensor.train.emitters() > 1) {
       reading.emitters = sensor.train.emitters();
       reading.firing_order = estimation::emitters_in_order(result.choice.order, reading.emitters);
-      result.reader = open_input(path, reading);
+      result.reader = open_input(path, reading, progress);
     }
     return result;
   }
@@ -432,7 +432,7 @@ SensorFrameRecording open_in_sensor_frame(const std::string& path,
       count.firing_order.empty() && sensor.train.emitters() > 1
           ? estimation::emitters_in_order(result.choice.order, sensor.train.emitters())
           : std::move(count.firing_order);
-  result.reader = open_input(path, reading);
+  result.reader = open_input(path, reading, progress);
   return result;
 }
 
