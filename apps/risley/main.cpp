@@ -1,135 +1,26 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
 #include <algorithm>
-#include <charconv>
-#include <cstdint>
-#include <cstring>
+#include <cstdio>
 #include <exception>
-#include <limits>
-#include <map>
 #include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
-#include <fmt/format.h>
-#include <fmt/ranges.h>
 #include <spdlog/pattern_formatter.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 #include <tbb/global_control.h>
 #include <unistd.h>
 
-#include "risley/core/error.hpp"
 #include "risley/core/text.hpp"
 
-#include "command.hpp"
+#include "command_line.hpp"
 
 namespace risley::app {
 namespace {
-
-struct Verb {
-  const char* name;
-  const char* description;
-  const char* example;
-  Run (*declare)(CLI::App& verb);
-};
-
-constexpr Verb kVerbs[] = {
-    {"info", "What a recording holds, with an audit of its times",
-     "  risley info recording.lvx\n  risley info recording.lvx --json\n"
-     "  risley info recording.lvx --share excerpt.nc",
-     declare_info},
-    {"convert", "One recording format into another, by the ending of the output",
-     "  risley convert recording.lvx -o recording.csv", declare_convert},
-    {"simulate", "A recording whose truth is known",
-     "  risley simulate -o room.lvx --sensor mid-40 --scene data/room.yaml --duration-s 10\n"
-     "  risley simulate -o unit.csv --rate-hz 1000 --set prism_tilt_a_vertical_deg=0.1 --seed 7\n"
-     "  risley simulate -o flight.lvx --flight data/flight-v4.yaml --mount data/mount-nadir.yaml "
-     "--scene data/village.yaml",
-     declare_simulate},
-    {"estimate", "The sensor's parameters and rotation angles from one recording",
-     "  risley estimate recording.lvx -o result/\n"
-     "  risley estimate unit.csv --truth unit.csv.truth.yaml --json",
-     declare_estimate},
-    {"observability", "What a recording, planned or made, can tell of every parameter",
-     "  risley observability --sensor mid-40 --duration-s 30 --rate-hz 100000\n"
-     "  risley observability recording.lvx --free wedge_angle_deg",
-     declare_observability},
-    {"calibrate", "The sensor's parameters from scans of plane walls",
-     "  risley calibrate wall.lvx -o calibration/\n"
-     "  risley calibrate upright.lvx flipped.lvx --stations stations.yaml -o calibration/\n"
-     "  risley calibrate --plan hall.yaml --duration-s 30",
-     declare_calibrate},
-    {"cloud", "Points with their covariance from recordings and a calibration",
-     "  risley cloud recording.lvx --calibration calibration/calibration.yaml -o cloud.las\n"
-     "  risley cloud 'flight/*.lvx' --calibration mid-40 --format ply -o clouds/",
-     declare_cloud},
-    {"identify", "Which prisms made a scan, from its directions alone",
-     "  risley identify sequence.csv -o mine.yaml\n"
-     "  risley identify frame.pcd --shot-rate-hz 240385 --json",
-     declare_identify},
-    {"pattern", "The scan pattern of a sensor, for simulators",
-     "  risley pattern --sensor avia --format npy --duration-s 4 -o avia.npy\n"
-     "  risley pattern --sensor horizon-sequence --format livox-csv --every 40 -o -\n"
-     "  risley pattern --sensor horizon --format helios-xml -o horizon.xml\n"
-     "  risley pattern --sensor tele-15 --coverage --report tele-15.html",
-     declare_pattern},
-    {"preset", "The presets of sensors: list, show, check, new",
-     "  risley preset list\n  risley preset show avia\n"
-     "  risley preset new unit-17 --from avia -o unit-17.yaml\n  risley preset check unit-17.yaml",
-     declare_preset},
-    {"report", "The page of a result folder, drawn again from its report.json",
-     "  risley report result/\n  risley report result/ -o sensor-17.html", declare_report},
-    {"reproduce", "Every table and figure of the paper, ours beside the paper's",
-     "  risley reproduce -o reproduction/\n"
-     "  risley reproduce --full --recording stationary.lvx -o reproduction/",
-     declare_reproduce},
-};
-
-/// Text of --seed, which CLI11 would wrap around.
-std::string seed_problem(const std::string& text) {
-  std::uint64_t seed = 0;
-  const char* const end = text.data() + text.size();
-  const auto [last, code] = std::from_chars(text.data(), end, seed);
-  if (code == std::errc() && last == end) return {};
-  return fmt::format("found {}, allowed whole numbers 0 to {}", text,
-                     std::numeric_limits<std::uint64_t>::max());
-}
-
-void add_common_options(CLI::App& verb, CommonOptions& common) {
-  const std::string group = "Common options";
-  verb.add_flag("--json", common.json, "Print exactly one JSON object on stdout")->group(group);
-  verb.add_option("--threads", common.threads, "Number of threads (default: all cores)")
-      ->check(CLI::Range(1, 4096))
-      ->group(group);
-  verb.add_option("--seed", common.seed, "Seed of everything random (default 0)")
-      ->check(CLI::Validator(seed_problem, ""))
-      ->group(group);
-  auto* quiet = verb.add_flag("--quiet", common.quiet, "No progress bar and no warnings on stderr")
-                    ->group(group);
-  verb.add_flag("--verbose", common.verbose, "Say more on stderr")->excludes(quiet)->group(group);
-}
-
-/// The command as it could be typed again.
-std::string shell_text(int argc, char** argv) {
-  std::string command = "risley";
-  constexpr std::string_view kPlain =
-      "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-+=.,:/@%";
-  for (int i = 1; i < argc; ++i) {
-    const std::string_view word = argv[i];
-    command += ' ';
-    if (!word.empty() && word.find_first_not_of(kPlain) == std::string_view::npos) {
-      command += word;
-      continue;
-    }
-    command += '\'';
-    for (const char c : word) command += c == '\'' ? std::string("'\\''") : std::string(1, c);
-    command += '\'';
-  }
-  return command;
-}
 
 /// Tells of an error: words on stderr, and with --json an object on stdout.
 ExitStatus fail(ExitStatus status, const std::string& message, const CommonOptions& common,
@@ -160,50 +51,15 @@ ExitStatus run_verb(const Run& run, const CommonOptions& common) {
   }
 }
 
-/// What was wrong, in words; CLI11 would not name an unknown verb.
-std::string usage_error(const CLI::ParseError& error, int argc, char** argv) {
-  const std::string_view first = argc > 1 ? argv[1] : "-";
-  std::vector<std::string> names;
-  for (const Verb& verb : kVerbs) {
-    if (first == verb.name) return fmt::format("{} (see risley {} --help)", error.what(), first);
-    names.emplace_back(verb.name);
+ExitStatus run_command(const std::vector<std::string>& words) {
+  CommandLine line;
+  const CommandLine::Parsed parsed = line.parse(words);
+  const CommonOptions& common = line.common();
+  if (parsed.help) {
+    std::fputs(parsed.help->c_str(), stdout);
+    return kDone;
   }
-  if (first.starts_with('-')) return fmt::format("{} (see risley --help)", error.what());
-  const std::string meant = near_miss(first, names);
-  return fmt::format("unknown verb '{}'{}, known: {}", first,
-                     meant.empty() ? "" : fmt::format(", did you mean {}?", meant),
-                     fmt::join(names, ", "));
-}
-
-ExitStatus run_command(int argc, char** argv) {
-  CLI::App app("Observation model, simulator and estimator for Risley-prism lidars", "risley");
-  app.set_version_flag("--version", "risley " RISLEY_VERSION);
-  app.require_subcommand(1);
-  app.footer(
-      "Exit status: 0 done, 1 the numbers failed, 2 wrong usage, 3 a file is bad, 4 a fault of "
-      "the\n"
-      "program or of the machine, 130 interrupted.\n"
-      "risley VERB --help tells more.");
-  CommonOptions common;
-  common.command = shell_text(argc, argv);
-  std::map<const CLI::App*, Run> runs;
-  for (const Verb& verb : kVerbs) {
-    CLI::App& sub = *app.add_subcommand(verb.name, verb.description);
-    runs[&sub] = verb.declare(sub);
-    add_common_options(sub, common);
-    sub.footer(fmt::format("Example:\n{}", verb.example));
-  }
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    if (error.get_exit_code() == 0) {  // --help, --version
-      app.exit(error);
-      return kDone;
-    }
-    common.json = std::any_of(argv + 1, argv + argc,
-                              [](const char* word) { return std::strcmp(word, "--json") == 0; });
-    return fail(kWrongUsage, usage_error(error, argc, argv), common);
-  }
+  if (parsed.problem) return fail(kWrongUsage, *parsed.problem, common);
   if (common.quiet) spdlog::set_level(spdlog::level::err);
   if (common.verbose) spdlog::set_level(spdlog::level::debug);
   std::optional<tbb::global_control> limit;
@@ -211,10 +67,7 @@ ExitStatus run_command(int argc, char** argv) {
     limit.emplace(tbb::global_control::max_allowed_parallelism,
                   static_cast<std::size_t>(common.threads));
   }
-  const CLI::App& verb = *app.get_subcommands().front();
-  common.verb = verb.get_name();
-  note_files(verb, common);
-  return run_verb(runs.at(&verb), common);
+  return run_verb(line.run_of(*parsed.verb), common);
 }
 
 /// The message of a log entry on one line that a terminal does not obey.
@@ -257,5 +110,5 @@ int main(int argc, char** argv) {
   hold_standard_streams();
   start_log();
   watch_signals();
-  return close_stdout(run_command(argc, argv));
+  return close_stdout(run_command({argv + std::min(argc, 1), argv + argc}));
 }

@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include "risley/io/output_file.hpp"
 #include "risley/io/text_file.hpp"
 #include "risley/jobs/recording_input.hpp"
 #include "risley/jobs/sensor_choice.hpp"
@@ -135,11 +136,13 @@ ExitStatus run_reproduce(const ReproduceCommandOptions& options, const CommonOpt
     found = reproduction::reproduce(settings, bar.progress());
   }
   const Json object = with_head(common, reproduction_json(found, common, inputs));
-  io::write_text_file(
-      path("report.html"),
-      reproduction::reproduction_page(found, jobs::with_inputs(provenance_of(common), inputs)));
-  io::write_text_file(path("reproduction.json"),
-                      object.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
+  io::OutputFile page(path("report.html")), numbers(path("reproduction.json"));
+  io::write_text(page, reproduction::reproduction_page(
+                           found, jobs::with_inputs(provenance_of(common), inputs)));
+  io::write_text(numbers, object.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
+  for (const io::OutputFile* file : {&page, &numbers}) file->sync();  // both, before one is named
+  page.commit();
+  numbers.commit();
   if (common.json) {
     print_json(common, object);
   } else {

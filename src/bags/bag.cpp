@@ -53,14 +53,14 @@ void Bag::require_topics(const std::vector<bool>& wanted) const {
   require_length("wanted", wanted.size(), topics_.size());
 }
 
-std::unique_ptr<Bag> open_bag(const std::string& path, BagKind kind) {
-  return kind == BagKind::ros1 ? open_ros1_bag(path) : open_ros2_bag(path);
+std::unique_ptr<Bag> open_bag(const std::string& path, BagKind kind, const Progress& progress) {
+  return kind == BagKind::ros1 ? open_ros1_bag(path, progress) : open_ros2_bag(path, progress);
 }
 
-std::unique_ptr<Bag> open_bag(const std::string& path) {
+std::unique_ptr<Bag> open_bag(const std::string& path, const Progress& progress) {
   const std::optional<BagKind> kind = bag_kind_of_file(path);
   if (!kind) throw FileError(path, {0, {}}, "is no bag of ROS 1 or ROS 2");
-  return open_bag(path, *kind);
+  return open_bag(path, *kind, progress);
 }
 
 std::vector<Topic> list_topics(const std::string& path) {

@@ -37,8 +37,10 @@ inline constexpr std::array kKnownTypes{
               "b5764a33bfeb3588febc2682852579b0", "geometry_msgs/msg/TransformStamped"},
 };
 
-std::unique_ptr<Bag> open_ros1_bag(const std::string& path);   // ros1_bag.cpp
+std::unique_ptr<Bag> open_ros1_bag(const std::string& path,
+                                   const Progress& progress);  // ros1_bag.cpp
 std::vector<Topic> list_ros1_topics(const std::string& path);  // ros1_bag.cpp
-std::unique_ptr<Bag> open_ros2_bag(const std::string& path);   // ros2_bag.cpp
+std::unique_ptr<Bag> open_ros2_bag(const std::string& path,
+                                   const Progress& progress);  // ros2_bag.cpp
 
 }  // namespace risley::bags

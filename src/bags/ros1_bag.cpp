@@ -117,7 +117,9 @@ std::vector<Topic> topics_of(std::vector<TopicKey> keys, std::vector<TopicKey>* 
 class BagStructure {
  public:
   /// @throws FileError
-  static void check(const std::string& path) { BagStructure(path).check_records(); }
+  static void check(const std::string& path, const Progress& progress) {
+    BagStructure(path).check_records(progress);
+  }
 
   /// The topics by the connections of the index. @throws FileError
   static std::vector<Topic> topics(const std::string& path) {
@@ -287,10 +289,11 @@ class BagStructure {
     return key;
   }
 
-  void check_records() {
+  void check_records(const Progress& progress) {
     const auto [first_record, index] = check_file_header();
     bool index_found = index == size_;
     for (std::uint64_t offset = first_record; offset < size_;) {
+      progress.check();
       const Record record = record_at(offset, size_);
       index_found = index_found || offset == index;
       check_record(record);
@@ -426,8 +429,9 @@ class BagStructure {
 
 class Ros1Bag final : public Bag {
  public:
-  explicit Ros1Bag(const std::string& path) : Bag(BagKind::ros1, path) {
-    BagStructure::check(path);
+  Ros1Bag(const std::string& path, const Progress& progress)
+      : Bag(BagKind::ros1, path, progress) {
+    BagStructure::check(path, progress_);
     guarded("be opened", [&] {
       bag_.reset(new rosbag::Bag);
       bag_->open(path, rosbag::bagmode::Read);
@@ -449,6 +453,7 @@ class Ros1Bag final : public Bag {
   }
 
   bool next(Message& message) override {
+    progress_.check();
     if (messages_read_ == message_count_) return false;
     const std::string where =
         fmt::format("be read behind message {} of {}", messages_read_, message_count_);
@@ -511,8 +516,8 @@ class Ros1Bag final : public Bag {
 
 }  // namespace
 
-std::unique_ptr<Bag> open_ros1_bag(const std::string& path) {
-  return std::make_unique<Ros1Bag>(path);
+std::unique_ptr<Bag> open_ros1_bag(const std::string& path, const Progress& progress) {
+  return std::make_unique<Ros1Bag>(path, progress);
 }
 
 std::vector<Topic> list_ros1_topics(const std::string& path) { return BagStructure::topics(path); }

@@ -84,7 +84,8 @@ std::uint64_t bytes_by_header(const std::string& path, std::uint64_t file_bytes)
 
 class Ros2Bag final : public Bag {
  public:
-  explicit Ros2Bag(const std::string& path) : Bag(BagKind::ros2, path) {
+  Ros2Bag(const std::string& path, const Progress& progress)
+      : Bag(BagKind::ros2, path, progress) {
     open_database();
     restrict_database();
     require_plain_table("topics");
@@ -107,6 +108,7 @@ class Ros2Bag final : public Bag {
   bool next(Message& message) override {
     if (ended_) return false;  // stepping again would begin anew
     while (step(messages_.get(), "be read to its end")) {
+      progress_.check();
       const sqlite3_int64 id = sqlite3_column_int64(messages_.get(), 0);
       if (any_read_ && id <= id_) {  // pages that stand in the table again and again
         fail(fmt::format("message row {} follows row {}, expected ascending numbers", id, id_));
@@ -140,6 +142,7 @@ class Ros2Bag final : public Bag {
 
  private:
   [[noreturn]] void fail_database(const char* what) const {
+    progress_.check();
     fail(fmt::format("the database cannot {}: {}", what,
                      database_ ? sqlite3_errmsg(database_.get()) : "no memory"));
   }
@@ -204,7 +207,7 @@ class Ros2Bag final : public Bag {
         database, kInstructionsPerLook,
         [](void* reader) {
           auto* const self = static_cast<Ros2Bag*>(reader);
-          return ++self->looks_ > self->most_looks_ ? 1 : 0;
+          return self->progress_.cancelled() || ++self->looks_ > self->most_looks_ ? 1 : 0;
         },
         this);
   }
@@ -242,6 +245,7 @@ class Ros2Bag final : public Bag {
     const int result = sqlite3_step(statement);
     if (result == SQLITE_ROW) return true;
     if (result == SQLITE_INTERRUPT) {
+      progress_.check();
       fail(fmt::format("the database cannot {}: it takes more steps than a bag of its size needs",
                        what));
     }
@@ -281,6 +285,7 @@ class Ros2Bag final : public Bag {
     looks_ = 0;
     if (sqlite3_step(first.get()) == SQLITE_ROW) first_id_ = sqlite3_column_int64(first.get(), 0);
     if (sqlite3_step(last.get()) == SQLITE_ROW) last_id_ = sqlite3_column_int64(last.get(), 0);
+    progress_.check();
     id_ = first_id_;
   }
 
@@ -308,8 +313,8 @@ class Ros2Bag final : public Bag {
 
 }  // namespace
 
-std::unique_ptr<Bag> open_ros2_bag(const std::string& path) {
-  return std::make_unique<Ros2Bag>(path);
+std::unique_ptr<Bag> open_ros2_bag(const std::string& path, const Progress& progress) {
+  return std::make_unique<Ros2Bag>(path, progress);
 }
 
 }  // namespace risley::bags

@@ -124,7 +124,8 @@ void close_all_but(int socket) {
 
 }  // namespace
 
-ConfinedProcess::ConfinedProcess(const Service& service) {
+ConfinedProcess::ConfinedProcess(const Service& service, const Progress& progress)
+    : progress_(progress.silent()) {
   int ends[2];
   if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends) != 0) {
     throw ProcessEnded(
@@ -141,7 +142,12 @@ ConfinedProcess::ConfinedProcess(const Service& service) {
     ::close(socket_);
     throw ProcessEnded(fmt::format("no process of its own: {}", std::strerror(problem)));
   }
-  receive();  // it has let go of our files
+  try {
+    receive();  // it has let go of our files
+  } catch (const Cancelled&) {
+    end();
+    throw;
+  }
 }
 
 ConfinedProcess::~ConfinedProcess() { end(); }
@@ -162,12 +168,15 @@ std::string ConfinedProcess::ask(std::string_view request) {
 }
 
 std::string ConfinedProcess::receive() {
+  constexpr int kLookSeldom_ms = 200;
   pollfd ready{socket_, POLLIN, 0};
-  for (;;) {
-    const int events = ::poll(&ready, 1, 1000 * kMostWaitSeconds);
-    if (events < 0 && errno == EINTR) continue;
-    waited_too_long_ = events == 0;
+  for (int looks_left = 1000 * kMostWaitSeconds / kLookSeldom_ms;;) {
+    const int events = ::poll(&ready, 1, kLookSeldom_ms);
     if (events > 0) break;
+    progress_.check();
+    if (events < 0 && errno == EINTR) continue;
+    if (events == 0 && --looks_left > 0) continue;
+    waited_too_long_ = events == 0;
     fail();
   }
   std::uint64_t size = 0;

@@ -9,6 +9,7 @@
 #include <sys/types.h>
 
 #include "risley/core/error.hpp"
+#include "risley/core/progress.hpp"
 
 namespace risley::io {
 
@@ -33,13 +34,14 @@ class ConfinedProcess {
   /// Answers one request; called in the child. Must not throw but std::bad_alloc.
   using Service = std::function<std::string(std::string_view request)>;
 
+  /// @param progress  stops waiting for answers; its flag must outlive the process
   /// @throws ProcessEnded where the system refuses a process
-  explicit ConfinedProcess(const Service& service);
+  explicit ConfinedProcess(const Service& service, const Progress& progress = {});
   ~ConfinedProcess();
   ConfinedProcess(const ConfinedProcess&) = delete;
   ConfinedProcess& operator=(const ConfinedProcess&) = delete;
 
-  /// @return the service's answer. @throws ProcessEnded
+  /// @return the service's answer. @throws ProcessEnded, Cancelled
   std::string ask(std::string_view request);
 
  private:
@@ -47,6 +49,7 @@ class ConfinedProcess {
   [[noreturn]] void fail();
   void end();
 
+  Progress progress_;
   pid_t child_ = -1;
   int socket_ = -1;
   bool waited_too_long_ = false;

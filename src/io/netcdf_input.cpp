@@ -184,10 +184,11 @@ Parcel request(Request kind, const std::string& name) {
 /// The process that reads the file.
 class NetcdfInput::Process {
  public:
-  Process(const NetcdfInput& owner, const std::string& path) : owner_(owner) {
+  Process(const NetcdfInput& owner, const std::string& path, const Progress& progress)
+      : owner_(owner) {
     try {
       const NetcdfLock lock;  // the copy of this process finds the library at rest
-      process_.emplace(Service(path));
+      process_.emplace(Service(path), progress);
     } catch (const ProcessEnded& error) {
       owner_.fail(error.what());
     }
@@ -211,8 +212,8 @@ class NetcdfInput::Process {
   std::optional<ConfinedProcess> process_;
 };
 
-NetcdfInput::NetcdfInput(const std::string& path)
-    : path_(path), process_(std::make_unique<Process>(*this, path)) {
+NetcdfInput::NetcdfInput(const std::string& path, const Progress& progress)
+    : path_(path), process_(std::make_unique<Process>(*this, path, progress)) {
   process_->ask(request(Request::open), "the file");
 }
 

@@ -49,7 +49,7 @@ ConvertedRecording convert_recording(const ConvertRecordingOptions& options,
   ConvertedRecording result;
   const PlacedInput input =
       place_input(options.recording, options.reading, UntoldShots::guessed, progress.silent());
-  const auto reader = open_input(options.recording, input.reading);
+  const auto reader = open_input(options.recording, input.reading, progress);
   const auto writer = recordings::create_recording(
       options.output, header_of(*reader, options, input, result, progress.silent()),
       options.format);

@@ -28,7 +28,7 @@ estimation::AngleSeries read(const IdentifyRecordingOptions& options, Identified
                              const Progress& progress) {
   const PlacedInput input =
       place_input(options.recording, options.reading, UntoldShots::left_out, progress);
-  const auto reader = open_input(options.recording, input.reading);
+  const auto reader = open_input(options.recording, input.reading, progress);
   const recordings::RecordingHeader& header = reader->header();
   recordings::require_times(header);
   if (header.devices.size() > 1) {

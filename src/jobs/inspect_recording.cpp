@@ -20,7 +20,7 @@ InspectedRecording inspect_recording(const InspectRecordingOptions& options,
                                   input.reading, progress.stage("sharing"));
   }
   const Progress reading = progress.stage("reading");
-  const auto reader = open_input(options.recording, input.reading);
+  const auto reader = open_input(options.recording, input.reading, progress);
   recordings::TimeAudit audit;
   recordings::Chunk chunk;
   try {

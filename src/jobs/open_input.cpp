@@ -9,10 +9,11 @@
 namespace risley::jobs {
 
 std::unique_ptr<recordings::Reader> open_input(const std::string& path,
-                                               const recordings::ReadOptions& options) {
-  if (!options.extrinsics) return recordings::open_recording(path, options);
+                                               const recordings::ReadOptions& options,
+                                               const Progress& progress) {
+  if (!options.extrinsics) return recordings::open_recording(path, options, progress);
   try {
-    return recordings::open_recording(path, options);
+    return recordings::open_recording(path, options, progress);
   } catch (const InvalidArgument& error) {  // several sensors
     throw InvalidArgument(fmt::format("option extrinsics, {}: {}", path, error.what()));
   }

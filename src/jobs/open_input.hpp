@@ -11,6 +11,7 @@ namespace risley::jobs {
 
 /// As recordings::open_recording; refused extrinsics are told with option and file.
 std::unique_ptr<recordings::Reader> open_input(const std::string& path,
-                                               const recordings::ReadOptions& options);
+                                               const recordings::ReadOptions& options,
+                                               const Progress& progress);
 
 }  // namespace risley::jobs

@@ -94,7 +94,7 @@ std::optional<estimation::CountedShots> counted_shots(const std::string& path,
                                                       const sensors::Sensor& sensor,
                                                       const Progress& progress) {
   options.emitters = 0;  // beams as the file has them
-  const auto reader = recordings::open_recording(path, options);
+  const auto reader = recordings::open_recording(path, options, progress);
   estimation::ShotSelector selector({.rate = std::nullopt, .ranges = false, .rows = true});
   EvenTimes even(sensor.shot_rate);
   recordings::Chunk chunk;
@@ -177,7 +177,7 @@ SensorFrameRecording open_by_stated_pose(const std::string& path, recordings::Re
                                          const std::optional<sensors::Sensor>& given,
                                          const Progress& progress) {
   progress.check();
-  SensorFrameRecording result{open_input(path, reading), {}, {}, reading.extrinsics.has_value()};
+  SensorFrameRecording result{open_input(path, reading, progress), {}, {}, reading.extrinsics.has_value()};
   recordings::require_times(result.reader->header());
   result.choice = choose_sensor(path, reading, result.reader->header(), given, progress);
   result.warnings = result.choice.warnings;
@@ -189,7 +189,7 @@ SensorFrameRecording open_by_stated_pose(const std::string& path, recordings::Re
   if (!pose) {
     if (result.choice.roll == 0) return result;
     reading.extrinsics = roll_about_axis(result.choice.roll, result.choice.frame);
-    result.reader = open_input(path, reading);
+    result.reader = open_input(path, reading, progress);
     result.turned_back = true;
     result.warnings.push_back(fmt::format(
         "the recording is rolled about the optical axis by {:.1f} deg, as the sensor's emitters "
@@ -212,7 +212,7 @@ SensorFrameRecording open_by_stated_pose(const std::string& path, recordings::Re
   result.turned_back = decided ? verdict.use == StoredPoseUse::applied : by_hub;
   if (result.turned_back) {
     reading = turned_back;
-    result.reader = open_input(path, reading);
+    result.reader = open_input(path, reading, progress);
   }
   if (decided && result.turned_back) {
     result.warnings.push_back(found + ": the shots were turned back into the sensor's frame");
@@ -263,7 +263,7 @@ SensorFrameRecording open_in_sensor_frame(const std::string& path,
     if (given && sensor.train.emitters() > 1) {
       reading.emitters = sensor.train.emitters();
       reading.firing_order = estimation::emitters_in_order(result.choice.order, reading.emitters);
-      result.reader = open_input(path, reading);
+      result.reader = open_input(path, reading, progress);
     }
     return result;
   }
@@ -280,7 +280,7 @@ SensorFrameRecording open_in_sensor_frame(const std::string& path,
       count.firing_order.empty() && sensor.train.emitters() > 1
           ? estimation::emitters_in_order(result.choice.order, sensor.train.emitters())
           : std::move(count.firing_order);
-  result.reader = open_input(path, reading);
+  result.reader = open_input(path, reading, progress);
   return result;
 }
 

@@ -270,7 +270,7 @@ AngleSeries first_second(const std::string& path, const recordings::ReadOptions&
   // One shot a second, and all of the head.
   estimation::ShotSelector selector({.rate = 1.0, .ranges = false, .rows = false});
   try {
-    const auto reader = recordings::open_recording(path, options);
+    const auto reader = recordings::open_recording(path, options, progress);
     recordings::Chunk chunk;
     while (selector.series().size() < 2 && reader->read(chunk)) {
       selector.add(chunk.observations);

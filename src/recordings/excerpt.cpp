@@ -303,14 +303,14 @@ Excerpt write_excerpt(const std::string& recording, const std::string& path,
                       const Progress& progress) {
   check(recording, path, options);
   std::optional<FileError> damage;
-  auto reader = open_recording(recording, reading);
+  auto reader = open_recording(recording, reading, progress);
   const Stretch stretch = best_stretch(*reader, options, progress, damage);
   std::vector<ReadWarning> warnings = reader->warnings();
   if (stretch.valid == 0) {
     if (damage) throw FileError(*damage);
     throw FileError(recording, {}, "holds no shot with a direction, so there is nothing to share");
   }
-  reader = open_recording(recording, reading);
+  reader = open_recording(recording, reading, progress);
   ExcerptWriter writer(path, reader->header(), stretch, options);
   Chunk chunk;
   while (reader->read(chunk)) {

@@ -65,10 +65,12 @@ std::string read_head(const std::string& path) {
   return head;
 }
 
-std::unique_ptr<Reader> open_as_it_is(const std::string& path) {
+std::unique_ptr<Reader> open_as_it_is(const std::string& path, const Progress& progress) {
   const std::string head = read_head(path);
   for (const Format* format : all_formats()) {
-    if (format->recognises(head)) return format->open(path);
+    if (!format->recognises(head)) continue;
+    return format->open_cancellable != nullptr ? format->open_cancellable(path, progress)
+                                               : format->open(path);
   }
   throw FileError(path, {0, {}},
                   fmt::format("is of no known kind: expected {}; it begins with {}",
@@ -77,8 +79,9 @@ std::unique_ptr<Reader> open_as_it_is(const std::string& path) {
 
 }  // namespace
 
-std::unique_ptr<Reader> open_recording(const std::string& path, const ReadOptions& options) {
-  std::unique_ptr<Reader> reader = open_as_it_is(path);
+std::unique_ptr<Reader> open_recording(const std::string& path, const ReadOptions& options,
+                                       const Progress& progress) {
+  std::unique_ptr<Reader> reader = open_as_it_is(path, progress);
   if (options.shot_rate) reader = with_counted_times(std::move(reader), path, options);
   if (options.packet_places) reader = with_packet_places(std::move(reader), options);
   if (options.extrinsics) reader = in_sensor_frame(std::move(reader), *options.extrinsics);
@@ -95,7 +98,7 @@ void require_times(const RecordingHeader& header) {
 
 Recording load_recording(const std::string& path, const Progress& progress,
                          const ReadOptions& options) {
-  const std::unique_ptr<Reader> reader = open_recording(path, options);
+  const std::unique_ptr<Reader> reader = open_recording(path, options, progress);
   Recording recording;
   Chunk chunk;
   while (reader->read(chunk)) {

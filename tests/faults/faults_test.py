@@ -43,11 +43,21 @@ FILES += [("simulate", ["simulate", "--duration-s", "0.01", "-o"], "out.nc"),
 FILES += [("page of a pattern", ["pattern", "--sensor", "avia", "--duration-s", "0.002", "--report"],
            "out.html"),
           ("map of beam origins", ["cloud", "--calibration", "mid-40", "--beam-origin-map"], "map.html")]
+FILES += [("excerpt", ["info", "walls.nc", "--share"], "out.nc"),
+          ("convert a trajectory", ["convert", "trajectory.csv", "-o"], "out.csv")]
+FLIGHT = ["--trajectory", "trajectory.csv", "--mount", str(SOURCE / "data/mount-nadir.yaml")]
+SIMULATED_FLIGHT = ["simulate", *FLIGHT, "--scene", str(SOURCE / "data/village.yaml"), "--rate-hz", "2000",
+                    "--duration-s", "0.2", "-o"]
+if EVERY:  # which take longer
+    FILES += [("simulate a flight", SIMULATED_FLIGHT, "out.nc"),
+              ("cloud of a flight", ["cloud", "flown.nc", "--calibration", "mid-40", *FLIGHT, "-o"], "out.las"),
+              ("identify", ["identify", "short.nc", "-o"], "out.yaml")]
 FOLDERS = [("estimate", ["estimate", "walls.nc", "-o"], "result"),
            ("calibrate", ["calibrate", "walls.nc", "-o"],
             "result")]
 STDOUT = [("info", ["info", "walls.nc", "--json"]), ("estimate", ["estimate", "walls.nc", "--json"]),
           ("observability", ["observability", "walls.nc", "--json"]),
+          ("trajectory", ["info", "trajectory.csv", "--json"]),
           ("plan", ["calibrate", "--plan", str(SOURCE / "data/room.yaml"), "--duration-s", "1", "--json"])]
 
 
@@ -92,6 +102,19 @@ class FaultsTest(unittest.TestCase):
             assert done.returncode == 0, done.stderr
         done, _ = run(inputs, ["estimate", "old.nc", "-o", "result"])
         assert done.returncode == 0, done.stderr
+        done, _ = run(inputs, ["simulate", "-o", "flight.lvx", "--flight", str(SOURCE / "data/flight-s4.yaml"),
+                               *FLIGHT[2:], "--scene", str(SOURCE / "data/village.yaml"), "--rate-hz", "100",
+                               "--duration-s", "0.1"])
+        assert done.returncode == 0, done.stderr
+        lines = (inputs / "flight.lvx.trajectory.csv").read_text().splitlines(keepends=True)
+        for left in inputs.glob("flight.lvx*"):
+            left.unlink()
+        (inputs / "trajectory.csv").write_text("".join(lines[:120]))
+        if EVERY:
+            for arguments in (SIMULATED_FLIGHT + ["flown.nc"],
+                              ["simulate", "-o", "short.nc", "--duration-s", "0.05", "--rate-hz", "10000"]):
+                done, _ = run(inputs, arguments)
+                assert done.returncode == 0, done.stderr
         cls.inputs = inputs
 
     @classmethod

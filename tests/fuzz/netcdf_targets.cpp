@@ -171,6 +171,11 @@ void run_truth(std::span<const std::uint8_t> bytes) {
     const recordings::TruthColumns rows = recordings::load_truth(path);
     recordings::require_columns(rows, rows.prisms());
     require(rows.size() <= 1'000'000, "rows are those of the file");
+    const auto chosen = recordings::load_truth(path, rows.time_ns);  // those of a recording
+    require(chosen.size() <= rows.size(), "no more rows than there are");
+    recordings::TruthColumns twice = rows;
+    twice.append(rows);
+    require(twice.size() == 2 * rows.size(), "rows can be put behind others");
   } catch (const Error&) {  // refused
   }
 }

@@ -28,5 +28,6 @@ std::vector<Target> decoder_targets();
 std::vector<Target> netcdf_targets();
 std::vector<Target> text_targets();
 std::vector<Target> trajectory_targets();
+std::vector<Target> command_targets();
 
 }  // namespace risley::fuzz

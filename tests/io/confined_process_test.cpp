@@ -3,9 +3,11 @@
 #include "io/confined_process.hpp"
 
 #include <atomic>
+#include <chrono>
 #include <csignal>
 #include <cstdlib>
 #include <numeric>
+#include <thread>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -61,6 +63,23 @@ TEST(ConfinedProcess, MemoryIsLimited) {
 #endif
   ConfinedProcess process([](std::string_view) { return std::string(std::size_t{3} << 30, 'x'); });
   EXPECT_THAT(end_of(process, "much"), HasSubstr("1024 MiB"));
+}
+
+TEST(ConfinedProcess, WaitingForAnAnswerCanBeCancelled) {
+  CancelFlag flag;
+  ConfinedProcess process(
+      [](std::string_view) -> std::string {
+        for (;;) ::pause();  // takes no processor time
+      },
+      Progress([](double) {}, &flag));
+  std::thread user([&flag] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+    flag.set();
+  });
+  const auto begin = std::chrono::steady_clock::now();
+  EXPECT_THROW(process.ask("anything"), Cancelled);
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(1));
+  user.join();
 }
 
 TEST(ConfinedProcess, AnEndBetweenRequestsIsSeen) {

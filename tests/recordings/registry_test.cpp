@@ -1,6 +1,8 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
 #include <algorithm>
+#include <filesystem>
+#include <fstream>
 #include <limits>
 #include <set>
 
@@ -144,6 +146,54 @@ TEST_F(RegistryTest, AWholeRecordingIsLoadedWithItsWarnings) {
   EXPECT_GT(progress.size(), 2U);
   EXPECT_TRUE(std::is_sorted(progress.begin(), progress.end()));
   EXPECT_EQ(progress.back(), 1.0);
+}
+
+/// A file that is changed between two reads of its content: rows that were read stand, none is
+/// invented, and what is missing is told or was never announced.
+void expect_changes_survived(const std::string& ending, bool shrinks) {
+  SCOPED_TRACE(ending);
+  constexpr std::size_t kRows = 150'000;
+  const lvx_bytes::TemporaryFolder folder;
+  const std::string path = folder.file("recording" + ending);
+  RecordingHeader header;
+  header.devices.resize(1);
+  header.has_range = ending != ".sequence.csv";
+  Chunk chunk;
+  Observations& o = chunk.observations;
+  o.resize(kRows);
+  for (std::size_t row = 0; row < kRows; ++row) {
+    o.time_ns[row] = static_cast<std::int64_t>(row) * 10'000;
+    o.azimuth[row] = 0.1;
+    o.zenith[row] = 1.5;
+    o.range[row] = header.has_range ? 4.0 : std::numeric_limits<double>::quiet_NaN();
+    o.return_number[row] = o.valid[row] = 1;
+  }
+  const auto writer = create_recording(path, header);
+  writer->write(chunk);
+  writer->close();
+  const auto size = std::filesystem::file_size(path);
+  const auto reader = open_recording(path);
+  std::size_t rows = 0;
+  ASSERT_TRUE(reader->read(chunk, 1000));
+  rows += chunk.observations.size();
+  if (shrinks) {
+    std::filesystem::resize_file(path, size / 3);
+  } else {
+    std::ofstream(path, std::ios::binary | std::ios::app) << std::string(size / 3, '7');
+  }
+  try {
+    while (reader->read(chunk)) rows += chunk.observations.size();
+  } catch (const FileError& error) {
+    EXPECT_EQ(error.path(), path);
+  }
+  EXPECT_LE(rows, kRows + (shrinks ? 0 : size / 3));
+}
+
+TEST(Registry, FilesThatShrinkOrGrowWhileTheyAreRead) {
+  for (const char* ending : {".lvx", ".nc", ".sequence.csv", ".openpylivox.csv", ".bin"}) {
+    expect_changes_survived(ending, true);
+    expect_changes_survived(ending, false);
+  }
 }
 
 }  // namespace risley::recordings::registry_test

@@ -439,6 +439,19 @@ TEST(Ros1Bag, AnyTypeNameWithTheSameMd5) {
   EXPECT_EQ(outcome.recording.header.devices[0].serial, "");
 }
 
+TEST(Ros1Bag, OpeningAndReadingCanBeCancelled) {
+  const TemporaryFolder folder;
+  const std::string path = folder.file("input.bag");
+  small_bag().write(path);
+  CancelFlag flag;
+  const Progress progress([](double) {}, &flag);
+  const auto reader = open_recording(path, {}, progress);
+  flag.set();
+  Chunk chunk;
+  EXPECT_THROW(reader->read(chunk), Cancelled);
+  EXPECT_THROW(open_recording(path, {}, progress), Cancelled);
+}
+
 TEST(Ros1Bag, MessagesStayWhole) {
   const TemporaryFolder folder;
   const std::string path = folder.file("input.bag");

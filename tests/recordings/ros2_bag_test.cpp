@@ -372,6 +372,37 @@ Outcome read_changed(const std::string& sql, const Bag& bag = small_bag()) {
   return read_all(kRos2BagFormat, path);
 }
 
+/// Expects a bag whose tables were changed to be given up at once when that is asked for.
+void expect_cancelled(const std::string& sql, bool while_opened) {
+  const TemporaryFolder folder;
+  const std::string path = folder.file("input.db3");
+  const auto database = small_bag().write(path);
+  ASSERT_EQ(sqlite3_exec(database.get(), sql.c_str(), nullptr, nullptr, nullptr), SQLITE_OK);
+  CancelFlag flag;
+  const Progress progress([](double) {}, &flag);
+  if (while_opened) {
+    flag.set();
+    EXPECT_THROW(open_recording(path, {}, progress), Cancelled);
+    return;
+  }
+  const auto reader = open_recording(path, {}, progress);
+  flag.set();
+  Chunk chunk;
+  EXPECT_THROW(reader->read(chunk), Cancelled);
+}
+
+TEST(Ros2Bag, CanBeCancelledWithinSqlite) {
+  const std::string many =
+      "WITH RECURSIVE c(n) AS (SELECT 1000 UNION ALL SELECT n + 1 FROM c WHERE n < 60000)"
+      " INSERT INTO messages(id, topic_id, timestamp, data) SELECT n, 99, n, x'00' FROM c;";
+  expect_cancelled(many, false);  // messages of others
+  // Numbers that are no key have to be looked for in the whole table.
+  expect_cancelled(
+      "ALTER TABLE messages RENAME TO m; CREATE TABLE messages(id, topic_id, timestamp, data);" +
+          many,
+      true);
+}
+
 TEST(Ros2Bag, OnlyStoredTablesAreRead) {
   const Outcome endless = read_changed(
       "ALTER TABLE messages RENAME TO m;"

@@ -145,25 +145,13 @@ TEST(Calibration, RecordingsInBothSpeedCombinationsTellOfOneSensor) {
   expect_honest(result);
 }
 
-/// A unit whose held parameters are off by what its preset allows: wedges alike in the prisms and
-/// in what the sensor computes with, tilts in each by themselves.
+/// A unit whose held parameters are off by what its preset allows.
 simulation::SimulationSettings settings_of_drawn_unit(std::uint64_t seed) {
   simulation::SimulationSettings settings = wall_settings(hall(), seed);
   const sensors::Sensor preset = sensors::load_sensor("mid-40");
   const TrainShape shape = preset.shape();
   const auto free = estimation::free_parameters(estimation::default_free_names(shape), shape);
-  const RandomStream errors(seed, 95);
-  std::uint64_t number = 0;
-  for (const auto& held : estimation::uncertain_held(preset, free)) {
-    const double common = held.prior_sigma * errors.normal(number++);
-    const double own = held.prior_sigma * errors.normal(number++);
-    for (const int at : held.places) {
-      const bool material = calibration::is_material(at, shape.prisms);
-      settings.truth.train.set_place(at, settings.truth.train[at] + common);
-      settings.reported->train.set_place(at,
-                                         settings.reported->train[at] + (material ? common : own));
-    }
-  }
+  testing::draw_unit(settings, estimation::uncertain_held(preset, free), RandomStream(seed, 95));
   return settings;
 }
 

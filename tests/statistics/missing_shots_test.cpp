@@ -5,16 +5,17 @@
 // its sigmas and its noise must be true.
 #include <cmath>
 
-#include <Eigen/Cholesky>
 #include <gtest/gtest.h>
 
 #include "risley/core/random.hpp"
 
-#include "statistics/simulated.hpp"
+#include "statistics/sky.hpp"
 
 namespace risley::missing_shots_test {
 
-using recordings::Observations;
+using testing::as_millimetres;
+using testing::estimate_found_noise;
+using testing::nees;
 
 simulation::SimulationSettings random_unit(std::uint64_t seed, double duration) {
   simulation::SimulationSettings settings;
@@ -37,77 +38,15 @@ simulation::SimulationSettings random_unit(std::uint64_t seed, double duration) 
   return settings;
 }
 
-/// The directions as a record of whole millimetres in a hall holds them; a row without a return
-/// holds nothing.
-template <class Returns>
-void as_millimetres(Observations& o, const Returns& returns) {
-  constexpr double kStep = 0.001;
-  for (std::size_t i = 0; i < o.size(); ++i) {
-    const auto v = direction_from_angles<double>({o.azimuth[i], o.zenith[i]});
-    if (!returns(o.azimuth[i], o.zenith[i], i)) {
-      o.valid[i] = 0;
-      o.azimuth[i] = o.zenith[i] = std::nan("");
-      o.range[i] = 0;
-      continue;
-    }
-    const double range = 3.0 / std::max(0.1, std::abs(v.y) + std::abs(v.z));
-    const auto whole = [&](double value) { return kStep * std::round(range * value / kStep); };
-    const Vector3<double> point{whole(v.x), whole(v.y), whole(v.z)};
-    const auto angles = angles_from_direction(point);
-    o.azimuth[i] = angles.azimuth;
-    o.zenith[i] = angles.zenith;
-    o.range[i] = norm(point);
-    o.zenith_resolution[i] = static_cast<float>(kStep / o.range[i]);
-    o.azimuth_resolution[i] = static_cast<float>(kStep / o.range[i] / std::sin(angles.zenith));
-  }
-}
-
-estimation::Estimate estimate_found_noise(const Observations& observations, bool cartesian) {
-  estimation::ShotSelector selector({.rate = {}, .ranges = cartesian, .rows = false});
-  selector.add(observations);
-  estimation::EstimateOptions options;
-  options.sensor = sensors::load_sensor("mid-40");
-  options.cartesian = cartesian;
-  return estimation::estimate(estimation::Method::map, selector.take_series(), selector.head(),
-                              options);
-}
-
-/// NEES of the prisms' parameters per degree of freedom.
-double nees(const estimation::Estimate& estimate, const sensors::Sensor& truth, double& largest) {
-  Eigen::VectorXd error(estimate.parameters.size());
-  for (std::size_t k = 0; k < estimate.free.size(); ++k) {
-    const auto at = static_cast<Eigen::Index>(k);
-    error[at] = estimate.parameters[at] - truth.get(estimate.free[k].name);
-    largest = std::max(largest, std::abs(error[at]) / std::sqrt(estimate.covariance(at, at)));
-  }
-  return error.dot(estimate.covariance.ldlt().solve(error)) / static_cast<double>(error.size());
-}
-
 TEST(MissingShots, RandomUnitsAreFoundInAnyPartOfTheField) {
   int right = 0, all = 0;
   double sum = 0;
   for (std::uint64_t seed = 0; seed < 24; ++seed) {
     const auto settings = random_unit(seed, seed % 4 == 0 ? 0.3 : 0.1);
     auto data = testing::simulate(settings);
-    const RandomStream place(seed, 6);
-    const double middle_azimuth = radians_from_degrees(8.0 * (2 * place.uniform(0) - 1));
-    const double middle_zenith = kPi / 2 + radians_from_degrees(8.0 * (2 * place.uniform(1) - 1));
+    const testing::Sky sky(seed);
     as_millimetres(data.observations, [&](double azimuth, double zenith, std::size_t i) {
-      switch (seed % 6) {
-        case 0:
-          return zenith > kPi / 2 + radians_from_degrees(2.0);
-        case 1:
-          return zenith < kPi / 2;
-        case 2:
-          return azimuth > 0;
-        case 3:
-          return std::abs(azimuth - middle_azimuth) < radians_from_degrees(6.0) &&
-                 std::abs(zenith - middle_zenith) < radians_from_degrees(6.0);
-        case 4:
-          return place.uniform(10 + i) < 0.2;
-        default:
-          return true;
-      }
+      return sky.returns(azimuth, zenith, i);
     });
     SCOPED_TRACE(seed);
     ++all;

@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "risley/core/error.hpp"
+#include "risley/core/progress.hpp"
 
 namespace risley::bags {
 
@@ -78,7 +79,7 @@ class Bag {
   virtual void rewind(const std::vector<bool>& wanted) = 0;
   /// The next message of a wanted topic, in the order of recording; rewind() must have been called.
   /// @return false at the end
-  /// @throws FileError
+  /// @throws FileError; Cancelled, however many messages of others stand before it
   virtual bool next(Message& message) = 0;
   /// Part of the messages already read, [0, 1].
   virtual double fraction_read() const = 0;
@@ -89,10 +90,12 @@ class Bag {
   [[noreturn]] void fail(const Message& message, const std::string& problem) const;
 
  protected:
-  Bag(BagKind kind, std::string path) : path_(std::move(path)), kind_(kind) {}
+  Bag(BagKind kind, std::string path, const Progress& progress)
+      : path_(std::move(path)), progress_(progress.silent()), kind_(kind) {}
   void require_topics(const std::vector<bool>& wanted) const;
 
   std::string path_;
+  Progress progress_;  ///< asked whether to go on
   std::vector<Topic> topics_;
 
  private:
@@ -100,10 +103,11 @@ class Bag {
 };
 
 /// Opens a bag of a kind. The structure of a ROS 1 bag is checked to its end before.
+/// @param progress  cancels opening and reading; its flag must outlive the bag
 /// @throws FileError when it is no bag, is cut off or damaged
-std::unique_ptr<Bag> open_bag(const std::string& path, BagKind kind);
+std::unique_ptr<Bag> open_bag(const std::string& path, BagKind kind, const Progress& progress = {});
 /// The same of the kind that the file's bytes tell.
-std::unique_ptr<Bag> open_bag(const std::string& path);
+std::unique_ptr<Bag> open_bag(const std::string& path, const Progress& progress = {});
 
 /// The topics of a bag, from its index alone.
 /// @throws FileError as open_bag, for damage in what has to be read

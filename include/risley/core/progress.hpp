@@ -57,8 +57,10 @@ class Progress {
   }
   /// @throws Cancelled when the flag is set
   void check() const {
-    if (cancel_ != nullptr && cancel_->is_set()) throw Cancelled();
+    if (cancelled()) throw Cancelled();
   }
+  /// The same where nothing can be thrown.
+  bool cancelled() const noexcept { return cancel_ != nullptr && cancel_->is_set(); }
 
   /// Another callback, the same flag.
   Progress with(Callback callback) const {

@@ -136,7 +136,8 @@ class NetcdfOutput {
 /// docs/decisions/0008-netcdf-in-a-child-process.md
 class NetcdfInput {
  public:
-  explicit NetcdfInput(const std::string& path);
+  /// @param progress  stops waiting for the library; its flag must outlive the file
+  explicit NetcdfInput(const std::string& path, const Progress& progress = {});
   ~NetcdfInput();
   NetcdfInput(const NetcdfInput&) = delete;
   NetcdfInput& operator=(const NetcdfInput&) = delete;

@@ -105,12 +105,15 @@ struct ReadOptions {
 };
 
 /// Opens a recording of any known format, recognised by its content and not by its name.
+/// @param progress  cancels opening, and reading where a chunk may take long; its flag must outlive
+///                  the reader
 /// @throws FileError when it is missing, empty, of no known format, or its header is damaged;
 ///         InvalidArgument when shot_rate is not a finite number above 0, emitters are not 0 to
 ///         255 or not as many as the firing order has, slips do not ascend, places come with a shot
 ///         rate, without a firing order or for a recording that has none, extrinsics are not
 ///         finite, or when they are given for a recording of several sensors
-std::unique_ptr<Reader> open_recording(const std::string& path, const ReadOptions& options = {});
+std::unique_ptr<Reader> open_recording(const std::string& path, const ReadOptions& options = {},
+                                       const Progress& progress = {});
 
 /// A recording without times was given to something that needs them.
 class MissingTimes : public InvalidArgument {

@@ -29,6 +29,10 @@ struct Format {
   /// nullptr when the format is only read.
   std::unique_ptr<Writer> (*create)(const std::string& path, const RecordingHeader& header);
   bool holds_shot_numbers = false;  ///< recordings without times can be written, too
+  /// As open, where much may have to be looked through before there is a row, or nothing is heard
+  /// of a library for long: can be cancelled.
+  std::unique_ptr<Reader> (*open_cancellable)(const std::string& path,
+                                              const Progress& progress) = nullptr;
 };
 
 extern const Format kLvx11Format;            // lvx11.cpp

@@ -89,7 +89,7 @@ Device device_of(const DeviceColumns& columns, std::size_t i) {
 
 class NetcdfReader final : public Reader {
  public:
-  explicit NetcdfReader(const std::string& path) : file_(path) {
+  NetcdfReader(const std::string& path, const Progress& progress) : file_(path, progress) {
     read_header();
     const auto row = file_.dimension(kRowDimension);
     const auto packet = file_.dimension(kPacketDimension);
@@ -273,8 +273,8 @@ class NetcdfReader final : public Reader {
 
 }  // namespace
 
-std::unique_ptr<Reader> open_recording(const std::string& path) {
-  return std::make_unique<NetcdfReader>(path);
+std::unique_ptr<Reader> open_recording(const std::string& path, const Progress& progress) {
+  return std::make_unique<NetcdfReader>(path, progress);
 }
 
 }  // namespace risley::recordings::netcdf

@@ -147,7 +147,7 @@ bool holds_poses_alone(const std::string& path) {
 
 Trajectory read_ros_bag(const std::string& path, const std::string& topic_name,
                         const Progress& progress) {
-  const std::unique_ptr<bags::Bag> bag = bags::open_bag(path);
+  const std::unique_ptr<bags::Bag> bag = bags::open_bag(path, progress);
   const std::size_t chosen = chosen_topic(*bag, topic_name);
   const bags::Topic& topic = bag->topics()[chosen];
   std::vector<bool> wanted(bag->topics().size(), false);
