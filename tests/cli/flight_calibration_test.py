@@ -97,14 +97,14 @@ class FlightCalibrationTest(CommandTest):
 
     def test_a_unit_that_believes_in_another_index(self):
         self.fly("b.lvx", 1500, "--reported", "refractive_index=1.512")
-        result = self.calibrate(0, "b.lvx", "-o", "out", "--knot-spacing-s", 5)
+        result = self.calibrate(0, "b.lvx", "-o", "contradicted", "--knot-spacing-s", 5)
         self.assertEqual(result["verdict"]["code"], "undecided")
         self.assertIn("--free", result["verdict"]["to_do"])
         index = result["held"]["refractive_index"]
         self.assertTrue(index["significant"])
         self.assertLess(abs(index["told"] - 1.509), 5 * index["sigma"])
         self.assertTrue(any("(--free)" in warning for warning in result["warnings"]))
-        self.assertEqual(sorted(path.name for path in (self.folder / "out").iterdir()),
+        self.assertEqual(sorted(path.name for path in (self.folder / "contradicted").iterdir()),
                          ["report.html", "report.json"])
 
     def test_what_is_missing_or_does_not_fit_is_told(self):
