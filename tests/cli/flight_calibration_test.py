@@ -113,7 +113,7 @@ class FlightCalibrationTest(CommandTest):
         self.assertEqual((yard["name"], yard["used"], yard["significant"]), ("yard", True, False))
         self.assertGreater(yard["shots"], 20)
         self.assertLess(abs(yard["off_m"]), 0.02)
-        self.assertEqual([one["path"] for one in again["inputs"]][-1], "control.yaml")
+        self.assertIn("control.yaml", [one["path"] for one in again["inputs"]])
         for axis in TRUE_BORESIGHT:
             self.assertLess(again["boresight"][axis]["sigma"], result["boresight"][axis]["sigma"])
 

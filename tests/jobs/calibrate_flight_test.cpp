@@ -70,13 +70,14 @@ class CalibrateFlightTest : public ::testing::Test {
 
   /// Flies the unit of Table 3, whose stored calibration is `reported`.
   static void record(const sensors::Sensor& reported, const std::string& name,
-                     const std::string& plan = "plan.yaml") {
+                     const std::string& plan = "plan.yaml",
+                     const std::string& scene = "village.yaml") {
     simulation::SimulationSettings settings;
     settings.truth = sensors::load_sensor("mid-40-table3");
     settings.reported = reported;
     settings.rate = 1500;
     settings.rotor = simulation::RotorKind::hunting;
-    settings.scene = scenes::load_scene(file("village.yaml"));
+    settings.scene = scenes::load_scene(file(scene));
     const trajectories::Flight flight =
         trajectories::fly(trajectories::load_flight_plan(file(plan)));
     simulation::Platform platform;
@@ -173,11 +174,14 @@ TEST_F(CalibrateFlightTest, ContradictsAnIndexThatIsHeld) {
 
 /// A flight on the Earth, and ground of it that is known on a map.
 TEST_F(CalibrateFlightTest, IsFixedOnGroundOfAMap) {
-  std::string plan = kPlan;
-  plan.insert(plan.find("rate_hz"),
-              "origin: {latitude_deg: 50, longitude_deg: 8.5, ellipsoidal_height_m: 250}\n");
+  const std::string on_earth =
+      "origin: {latitude_deg: 50, longitude_deg: 8.5, ellipsoidal_height_m: 250}\n";
+  std::string plan = kPlan, village = kVillage;
+  plan.insert(plan.find("rate_hz"), on_earth);
+  village.insert(village.find("  ground"), "  " + on_earth);
   io::write_text_file(file("earth.yaml"), plan);
-  record(sensors::load_sensor("mid-40-table3"), "earth.nc", "earth.yaml");
+  io::write_text_file(file("village-on-earth.yaml"), village);
+  record(sensors::load_sensor("mid-40-table3"), "earth.nc", "earth.yaml", "village-on-earth.yaml");
   const trajectories::Geodetic origin{radians_from_degrees(50), radians_from_degrees(8.5), 250};
   const Eigen::Vector3d place = trajectories::geocentric_from_geodetic(origin) +
                                 trajectories::geocentric_from_ned(origin) *
