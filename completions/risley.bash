@@ -84,7 +84,7 @@ _risley() {
         choices="$common --output --method --planes --stations --station --plan --duration-s
           --rate-hz --noise-angle-deg --noise-range-m --sensor --fix --free --prior-sigma-deg
           --range-offset-sigma-m --beam-origin --states --mirror --force --truth --trajectory
-          --trajectory-topic --mount --accuracy --trajectory-errors --knot-spacing-s --cell-size-m --scene
+          --trajectory-topic --mount --accuracy --trajectory-errors --control --knot-spacing-s --cell-size-m --scene
           --empty-circle-m --report --shot-rate-hz
           --extrinsics" ;;
       cloud)

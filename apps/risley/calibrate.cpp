@@ -34,7 +34,7 @@ using jobs::CalibratedRecordings;
 struct CalibrateCommandOptions {
   std::vector<std::string> inputs, station_names, truths;
   jobs::PlatformFiles platform;
-  std::string folder, method = "adjustment", rate_hz = "full", sensor, planes, stations,
+  std::string folder, method = "adjustment", rate_hz = "full", sensor, planes, control, stations,
                       beam_origin = "yes", states = "knots", mirror = "auto", plan, scene, page;
   std::optional<double> noise_angle_deg, noise_range_m, prior_sigma_deg;
   std::optional<double> range_offset_sigma_m, knot_spacing_s, cell_size_m;
@@ -165,6 +165,7 @@ jobs::CalibrateFlightOptions flight_job_of(const CalibrateCommandOptions& option
   jobs::CalibrateFlightOptions job;
   take_recordings(options, common, job);
   job.platform = options.platform;
+  job.control = options.control;
   take_grid(options, job);
   require_folder_apart(common, options.folder, {"mount.yaml", "trajectory.csv"});
   job.files = result_files(options.folder, "none", common);
@@ -255,6 +256,9 @@ Run declare_calibrate(CLI::App& verb) {
       ->needs("--plan");
   add_platform_options(verb, o.platform);
   verb.get_option("--trajectory")->excludes("--plan", "--method", "--planes", "--stations");
+  verb.add_option("--control", o.control,
+                  "Known points and planes of the ground that a flight is fixed on (YAML)")
+      ->needs("--trajectory");
   verb.add_option("--knot-spacing-s", o.knot_spacing_s,
                   "Of a flight: between corrections of the trajectory; further apart on long "
                   "flights (default: 0.25)");

@@ -179,20 +179,10 @@ std::optional<double> noise_angle(const std::optional<double>& noise_angle_deg) 
 
 void note_files(const CLI::App& verb, CommonOptions& common) {
   namespace fs = std::filesystem;
-  static constexpr std::array<std::string_view, 14> kReading = {"--sensor",
-                                                                "--calibration",
-                                                                "--planes",
-                                                                "--stations",
-                                                                "--truth",
-                                                                "--scene",
-                                                                "--plan",
-                                                                "--recording",
-                                                                "--from",
-                                                                "--accuracy",
-                                                                "--trajectory",
-                                                                "--mount",
-                                                                "--trajectory-errors",
-                                                                "--flight"};
+  static constexpr std::array<std::string_view, 15> kReading = {
+      "--sensor",   "--calibration", "--planes", "--control",           "--stations",
+      "--truth",    "--scene",       "--plan",   "--recording",         "--from",
+      "--accuracy", "--trajectory",  "--mount",  "--trajectory-errors", "--flight"};
   for (const CLI::Option* option : verb.get_options()) {
     for (const std::string& value : option->results()) {
       std::error_code ignored;

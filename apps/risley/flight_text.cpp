@@ -78,6 +78,31 @@ Json strips_json(const CalibratedFlight& outcome) {
           {"pairs", pairs}};
 }
 
+Json control_json(const FlightCalibration& c) {
+  Json list = Json::array();
+  for (const calibration::SeenControl& seen : c.control) {
+    list.push_back({{"name", seen.name},
+                    {"shots", seen.shots},
+                    {"used", seen.used},
+                    {"off_m", seen.used ? Json(seen.off) : Json(nullptr)},
+                    {"sigma_m", seen.sigma},
+                    {"significant", seen.significant}});
+  }
+  return list;
+}
+
+void print_control(const FlightCalibration& c) {
+  if (c.control.empty()) return;
+  say("\n");
+  Table table({"known ground", "shots", "seen above it mm", "+- sigma mm"});
+  for (const calibration::SeenControl& seen : c.control) {
+    table.add({seen.name, grouped(seen.shots),
+               seen.used ? fmt::format("{:+.1f}", 1e3 * seen.off) : "left out",
+               fmt::format("{:.1f}", 1e3 * seen.sigma)});
+  }
+  table.print();
+}
+
 }  // namespace
 
 double in_unit_of(const FlightUnknown& unknown, double value, TrainShape shape) {
@@ -182,6 +207,7 @@ Json flight_json(const CalibratedFlight& outcome, double total_time) {
                  {"datum", judged["datum"]},
                  {"not_told", judged["not_told"]},
                  {"strips", strips_json(outcome)},
+                 {"control", control_json(c)},
                  {"cells", c.cells},
                  {"rough_cells", c.rough_cells},
                  {"knots", c.model.knots.size()},
@@ -257,6 +283,7 @@ void print_flight(const CalibratedFlight& outcome) {
     pairs.add(row);
   }
   pairs.print();
+  print_control(c);
   if (!outcome.truth) return;
   say("\n");
   Table errors({"error, deg", "total", "shared rotation", "shape"});

@@ -57,6 +57,35 @@ Matrix3d cross_matrix(const Vector3d& v) {
 
 using PlaneRows = Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::RowMajor>;
 
+/// What is known of a plane before, of its two tilts and its offset.
+struct PlaneKnowledge {
+  Vector3d information{1 / (kPlaneTiltSigma * kPlaneTiltSigma),
+                       1 / (kPlaneTiltSigma * kPlaneTiltSigma),
+                       1 / (kPlaneOffsetSigma * kPlaneOffsetSigma)};
+  Vector3d off{0, 0, 0};  ///< of what is known from what there is
+};
+
+PlaneKnowledge knowledge_of(const PlanePrior& prior, const GroundPlane& plane) {
+  PlaneKnowledge known;
+  known.information[2] = 1 / (prior.sigma * prior.sigma);
+  known.off[2] = plane.normal.dot(prior.place - plane.centre);
+  if (!prior.normal) return known;
+  const auto [first, second] = tangents_of(plain(plane.normal));
+  const double along = prior.normal->dot(plane.normal);
+  known.off[0] = prior.normal->dot(eigen(first)) / along;
+  known.off[1] = prior.normal->dot(eigen(second)) / along;
+  known.information.head<2>().setConstant(1 / (prior.normal_sigma * prior.normal_sigma));
+  return known;
+}
+
+std::vector<PlaneKnowledge> plane_knowledge(const FlightPriors& priors, const FlightModel& model) {
+  std::vector<PlaneKnowledge> known(model.planes.size());
+  for (const PlanePrior& prior : priors.planes) {
+    known[prior.plane] = knowledge_of(prior, model.planes[prior.plane]);
+  }
+  return known;
+}
+
 /// A plane's unknowns, eliminated: with L L' of its own equations, everything times L^-1.
 struct EliminatedPlane {
   Matrix3d root_inverse;             // L^-1
@@ -114,6 +143,14 @@ void require_priors(const FlightPriors& priors, const FlightModel& model) {
     throw InvalidArgument("priors hold numbers that are not finite");
   }
   require_length_or_none("held", priors.held.size(), globals);
+  for (const PlanePrior& prior : priors.planes) {
+    require_place("plane of a prior", prior.plane, model.planes.size());
+    require_above("sigma of a plane's place", prior.sigma, 0, "m");
+    for (Index i = 0; i < 3; ++i) require_finite("place of a plane", prior.place[i], "m");
+    if (!prior.normal) continue;
+    require_unit_length("known normal of a plane", prior.normal->norm());
+    require_above("sigma of a plane's normal", prior.normal_sigma, 0, "rad");
+  }
 }
 
 }  // namespace
@@ -157,23 +194,22 @@ struct FlightSystem::Parts {
   Index size() const { return kCorrections * knots + globals; }
   Index first_global() const { return kCorrections * knots; }
 
-  void eliminate(const FlightEquations& equations, const FlightModel& model);
+  void eliminate(const FlightEquations& equations, const FlightModel& model,
+                 const std::vector<PlaneKnowledge>& known);
   void reduce(MatrixXd& hessian);
   void add_priors(const FlightModel& model, const FlightPriors& priors, MatrixXd& hessian);
   void hold(const FlightPriors& priors, MatrixXd& hessian);
 };
 
-void FlightSystem::Parts::eliminate(const FlightEquations& equations, const FlightModel& model) {
+void FlightSystem::Parts::eliminate(const FlightEquations& equations, const FlightModel& model,
+                                    const std::vector<PlaneKnowledge>& known) {
   const Index stride = globals + kTwo + 1 + 3;
   const Listing blocks(planes, equations.plane_blocks.size(),
                        [&](std::size_t i) { return equations.plane_blocks[i].plane; });
   eliminated.resize(planes);
   tbb::parallel_for(std::size_t{0}, planes, [&](std::size_t p) {
-    Matrix3d own =
-        Vector3d(1 / (kPlaneTiltSigma * kPlaneTiltSigma), 1 / (kPlaneTiltSigma * kPlaneTiltSigma),
-                 1 / (kPlaneOffsetSigma * kPlaneOffsetSigma))
-            .asDiagonal();
-    Vector3d gradient = Vector3d::Zero();
+    Matrix3d own = known[p].information.asDiagonal();
+    Vector3d gradient = known[p].information.cwiseProduct(known[p].off);
     MatrixXd by_global = MatrixXd::Zero(3, globals);
     EliminatedPlane& result = eliminated[p];
     // Blocks come in the order of time: knots ascend.
@@ -327,7 +363,7 @@ FlightSystem::FlightSystem(const FlightEquations& equations, const FlightModel& 
     hessian.block(g0, at, p.globals, kTwo) += equations.knot_global[i].transpose();
     p.right.segment<kTwo>(at) += equations.knot_gradient[i];
   }
-  p.eliminate(equations, model);
+  p.eliminate(equations, model, plane_knowledge(priors, model));
   p.reduce(hessian);
   p.add_priors(model, priors, hessian);
   p.hold(priors, hessian);
@@ -585,6 +621,11 @@ MatrixXd flight_covariance(const FlightShots& shots, const ShotPoses& poses,
       set);
 
   MatrixXd covariance = solved.transpose() * system.prior_times(solved);
+  const std::vector<PlaneKnowledge> known = plane_knowledge(priors, model);
+  for (const PlanePrior& prior : priors.planes) {
+    const auto own = planes.middleRows<3>(3 * static_cast<Index>(prior.plane));
+    covariance += own.transpose() * known[prior.plane].information.asDiagonal() * own;
+  }
   for (std::size_t first = 0; first < pieces;) {
     MatrixXd parts = MatrixXd::Zero(count, kCorrections * kIntervalParts);
     const std::size_t interval = sums[first].interval;

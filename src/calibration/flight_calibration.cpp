@@ -18,6 +18,7 @@
 #include "risley/optics/batch.hpp"
 #include "risley/trajectories/clock.hpp"
 
+#include "calibration/eigen_vectors.hpp"
 #include "calibration/flight_start.hpp"
 #include "calibration/judge_flight.hpp"
 #include "calibration/smooth_ground.hpp"
@@ -111,6 +112,15 @@ class FlightWork {
     require_length("rotation_angle", shots.rotation_angle.size(),
                    static_cast<std::size_t>(options_.sensor.prisms()));
     check_beams(options_.sensor.train, shots.beam, shots.size());
+    const Eigen::Matrix3d to_tangent = tangent_.axes.transpose();
+    for (const scenes::KnownGround& ground : options_.control) {
+      scenes::require_known_ground(ground);
+      PlanePrior& known = control_.emplace_back();
+      known.place = to_tangent * (eigen(ground.place) - tangent_.origin);
+      known.sigma = ground.sigma;
+      if (ground.normal) known.normal = to_tangent * eigen(*ground.normal);
+      known.normal_sigma = ground.normal_sigma;
+    }
     take_shots(shots);
   }
 
@@ -187,6 +197,7 @@ class FlightWork {
     if (!rough_too) cells.most_roughness = options_.most_roughness;
     cells.noise = noise;
     flight.cells = ground_cells(flight.points, flight.shots.strip, cells);
+    take_control(flight, cells);
     if (flight.cells.planes.size() < kFewestCells) {
       throw EstimationError(fmt::format(
           "only {} cells of {:g} m of ground were seen by several strips, at least {} are needed: "
@@ -194,6 +205,26 @@ class FlightWork {
           flight.cells.planes.size(), size, kFewestCells));
     }
     model_.planes = flight.cells.planes;
+  }
+
+  /// Known ground has planes of its own, whose places are fixed on what is known.
+  void take_control(LabelledFlight& flight, const GroundCellOptions& cells) {
+    priors_.planes.clear();
+    control_plane_.clear();
+    if (!with_control_ || options_.control.empty()) return;
+    std::vector<GroundCircle> circles;
+    for (const PlanePrior& known : control_) {
+      circles.push_back({known.place, options_.control[circles.size()].radius});
+    }
+    control_plane_ = add_circles(flight.points, circles, cells, flight.cells);
+    for (std::size_t i = 0; i < control_.size(); ++i) {
+      if (control_plane_[i] == kNoPlane) continue;
+      PlanePrior& known = priors_.planes.emplace_back(control_[i]);
+      known.plane = static_cast<std::size_t>(control_plane_[i]);
+      GroundPlane& plane = flight.cells.planes[known.plane];
+      // Tilts turn about the place that is known.
+      plane.centre = known.place - plane.normal.dot(known.place - plane.centre) * plane.normal;
+    }
   }
 
   FlightAdjustment adjust(const LabelledFlight& flight, const FlightWeights& weights, int steps) {
@@ -234,6 +265,7 @@ class FlightWork {
       progress_.report(done += 0.035);
     };
     for (const CoarseRound& own : kCellRounds) round(own.cell, own.unlocked, own.steps, true);
+    with_control_ = true;  // before, shots are metres off
     for (int i = 0; i < kAllRounds; ++i) {
       round(options_.cell_size, Unlocked::all, 2, i == 0);
     }
@@ -348,6 +380,7 @@ class FlightWork {
   void judge_clock_drift(double value, double sigma);
   void judge_held(HeldParameter held);
   void fill_trajectory();
+  void fill_control();
 
   const FlightCalibrationOptions& options_;
   const Progress& progress_;
@@ -355,6 +388,9 @@ class FlightWork {
   trajectories::Trajectory local_;
   trajectories::Interpolation interpolation_;
   LabelledFlight full_, coarse_;
+  std::vector<PlanePrior> control_;  ///< known ground, in the tangent frame
+  std::vector<std::int32_t> control_plane_;
+  bool with_control_ = false;
   FlightStart start_;
   FlightModel model_;
   FlightModel smooth_;  ///< at the end, over smooth ground
@@ -411,6 +447,7 @@ void FlightWork::fill_result() {
       judge_flight({full_.shots, full_.poses, full_.cells.plane, smooth_, final_weights_, priors_,
                     start_.prior_sigma, start_.considered, system});
   fill_mount_and_sensor();
+  fill_control();
   test_assumptions();
   fill_trajectory();
   result_.tangent = tangent_;
@@ -537,6 +574,42 @@ void FlightWork::judge_held(HeldParameter held) {
                     in_words(held, options_.sensor)));
   }
   result_.held.push_back(std::move(held));
+}
+
+void FlightWork::fill_control() {
+  for (std::size_t i = 0; i < control_.size(); ++i) {
+    SeenControl& seen = result_.control.emplace_back();
+    const scenes::KnownGround& ground = options_.control[i];
+    seen.name = ground.name;
+    seen.sigma = ground.sigma;
+    const double radius2 = ground.radius * ground.radius;
+    seen.shots = static_cast<std::size_t>(std::count_if(
+        full_.points.begin(), full_.points.end(), [&](const std::array<float, 3>& point) {
+          const double east = point[0] - control_[i].place.x(),
+                       north = point[1] - control_[i].place.y();
+          return east * east + north * north <= radius2;
+        }));
+    seen.used = control_plane_[i] != kNoPlane;
+    if (!seen.used) {
+      result_.warnings.push_back(fmt::format(
+          "known ground \"{}\" is left out: {} shots within {:g} m of it{}", ground.name,
+          seen.shots, ground.radius,
+          seen.shots < GroundCellOptions{}.least_shots
+              ? fmt::format(", at least {} are needed; is it in the map that is stated?",
+                            GroundCellOptions{}.least_shots)
+              : " are no plane"));
+      continue;
+    }
+    const GroundPlane& plane = model_.planes[static_cast<std::size_t>(control_plane_[i])];
+    seen.off = plane.normal.dot(plane.centre - control_[i].place);
+    seen.significant = std::abs(seen.off) > kTestedSigmas * seen.sigma;
+    if (!seen.significant) continue;
+    result_.warnings.push_back(fmt::format(
+        "known ground \"{}\" contradicts the flight: the strips see it {:.3f} m {} what is stated, "
+        "{:.0f} of its sigmas; is the place right, or {:g} m about it no plane?",
+        ground.name, std::abs(seen.off), seen.off > 0 ? "above" : "below",
+        std::abs(seen.off) / seen.sigma, ground.radius));
+  }
 }
 
 void FlightWork::fill_trajectory() {

@@ -127,6 +127,44 @@ std::optional<FittedGround> fit(const ShotPoints& points, std::span<const std::u
   return result;
 }
 
+/// The plane of some points, or why there is none.
+struct Outcome {
+  std::optional<FittedGround> ground;
+  bool rough = false, steep = false;
+};
+
+Outcome plane_of(const ShotPoints& points, std::span<const std::uint32_t> rows,
+                 const GroundCellOptions& options) {
+  Outcome result;
+  std::optional<FittedGround> ground = fit(points, rows);
+  if (!ground) return result;
+  if (ground->plane.normal.z() < std::cos(options.steepest)) {
+    result.steep = true;
+    return result;
+  }
+  std::vector<double> distance = ground->distance;
+  const double points_fitted = static_cast<double>(distance.size());
+  const double significant =
+      options.noise > 0 ? options.noise * (kUnevenness + kScatterSigmas / std::sqrt(points_fitted))
+                        : std::numeric_limits<double>::infinity();
+  if (kNormalOfMad * median(distance) > std::min(options.most_roughness, significant)) {
+    result.rough = true;
+    return result;
+  }
+  result.ground = std::move(ground);
+  return result;
+}
+
+void require_cells(const GroundCellOptions& options) {
+  require_between("size of a cell", options.size, 0.01, 1e4, "m");
+  require_between("shift of the grid", options.shift_east, -1, 1);
+  require_between("shift of the grid", options.shift_north, -1, 1);
+  require_at_least("least shots of a cell", static_cast<long long>(options.least_shots), 3);
+  require_between("steepest", options.steepest, 0, 1.57, "rad");
+  require_threshold("most roughness", options.most_roughness);
+  require_not_below("noise of the cells", options.noise, 0, "m");
+}
+
 /// Rows of points sorted by a number below `count`; rows without one are left out.
 struct SortedRows {
   std::vector<std::size_t> begin;
@@ -228,13 +266,7 @@ ShotPoints georeferenced(const FlightShots& shots, const ShotPoses& poses,
 GroundCells ground_cells(const ShotPoints& points, const std::vector<std::uint16_t>& strip,
                          const GroundCellOptions& options) {
   require_length("strip", strip.size(), points.size());
-  require_between("size of a cell", options.size, 0.01, 1e4, "m");
-  require_between("shift of the grid", options.shift_east, -1, 1);
-  require_between("shift of the grid", options.shift_north, -1, 1);
-  require_at_least("least shots of a cell", static_cast<long long>(options.least_shots), 3);
-  require_between("steepest", options.steepest, 0, 1.57, "rad");
-  require_threshold("most roughness", options.most_roughness);
-  require_not_below("noise of the cells", options.noise, 0, "m");
+  require_cells(options);
   const std::size_t blocks = (points.size() + kBlockShots - 1) / kBlockShots;
   std::vector<std::vector<std::uint64_t>> found(blocks);
   for_each_block(points.size(), [&](std::size_t begin, std::size_t end) {
@@ -260,35 +292,13 @@ GroundCells ground_cells(const ShotPoints& points, const std::vector<std::uint16
     }
   });
   const SortedRows rows(numbers.size(), cells.plane, kNoPlane);
-  struct Outcome {
-    std::optional<FittedGround> ground;
-    bool rough = false, steep = false;
-  };
   std::vector<Outcome> outcome(numbers.size());
   tbb::parallel_for(std::size_t{0}, numbers.size(), [&](std::size_t cell) {
     const auto own = rows.of(cell);
     if (own.size() < options.least_shots) return;
     std::size_t strips = 1;  // rows ascend, and so do their strips
     for (std::size_t i = 1; i < own.size(); ++i) strips += strip[own[i]] != strip[own[i - 1]];
-    if (strips < options.least_strips) return;
-    std::optional<FittedGround> ground = fit(points, own);
-    if (!ground) return;
-    Outcome& result = outcome[cell];
-    if (ground->plane.normal.z() < std::cos(options.steepest)) {
-      result.steep = true;
-      return;
-    }
-    std::vector<double> distance = ground->distance;
-    const double points_fitted = static_cast<double>(distance.size());
-    const double significant =
-        options.noise > 0
-            ? options.noise * (kUnevenness + kScatterSigmas / std::sqrt(points_fitted))
-            : std::numeric_limits<double>::infinity();
-    if (kNormalOfMad * median(distance) > std::min(options.most_roughness, significant)) {
-      result.rough = true;
-      return;
-    }
-    result.ground = std::move(ground);
+    if (strips >= options.least_strips) outcome[cell] = plane_of(points, own, options);
   });
   std::vector<std::int32_t> number(numbers.size(), kNoPlane);
   std::vector<double> distances;
@@ -310,6 +320,41 @@ GroundCells ground_cells(const ShotPoints& points, const std::vector<std::uint16
   });
   if (!distances.empty()) cells.scatter = kNormalOfMad * median(distances);
   return cells;
+}
+
+std::vector<std::int32_t> add_circles(const ShotPoints& points,
+                                      const std::vector<GroundCircle>& circles,
+                                      const GroundCellOptions& options, GroundCells& cells) {
+  require_cells(options);
+  require_length("planes of the points", cells.plane.size(), points.size());
+  for (const GroundCircle& circle : circles) {
+    require_above("radius of a circle", circle.radius, 0, "m");
+    for (Index i = 0; i < 3; ++i) require_finite("centre of a circle", circle.centre[i], "m");
+  }
+  std::vector<std::int32_t> circle_of(points.size(), kNoPlane);
+  for_each_block(points.size(), [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      for (std::size_t c = 0; c < circles.size() && circle_of[i] == kNoPlane; ++c) {
+        const double east = points[i][0] - circles[c].centre.x(),
+                     north = points[i][1] - circles[c].centre.y();
+        if (east * east + north * north <= circles[c].radius * circles[c].radius) {
+          circle_of[i] = static_cast<std::int32_t>(c);
+        }
+      }
+    }
+  });
+  const SortedRows rows(circles.size(), circle_of, kNoPlane);
+  std::vector<std::int32_t> planes(circles.size(), kNoPlane);
+  for (std::size_t c = 0; c < circles.size(); ++c) {
+    const auto own = rows.of(c);
+    if (own.size() < options.least_shots) continue;
+    const Outcome outcome = plane_of(points, own, options);
+    if (!outcome.ground) continue;
+    planes[c] = static_cast<std::int32_t>(cells.planes.size());
+    cells.planes.push_back(outcome.ground->plane);
+    for (const std::uint32_t row : own) cells.plane[row] = planes[c];
+  }
+  return planes;
 }
 
 std::vector<StripInCell> strips_in_cells(const ShotPoints& points,

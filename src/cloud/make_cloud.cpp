@@ -223,6 +223,7 @@ class Work {
     if (georeference_) {
       sensor_factors_ = header_.factors.size();
       georeference_->announce(header_, options_.loadings);
+      if (!header_.factors.empty()) summary_.factors = header_.factors;
       summary_.strips = georeference_->strips();
       if (options_.distribution) begin_distribution();
     }

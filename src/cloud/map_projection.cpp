@@ -241,6 +241,20 @@ Vector3d MapProjection::project(const Vector3d& geocentric_m) const {
   return mapped;
 }
 
+Vector3d MapProjection::unproject(const Vector3d& on_map_m) const {
+  const std::lock_guard lock(state_->mutex);
+  PJ* operation = state_->operation.get();
+  proj_errno_reset(operation);
+  const PJ_COORD from =
+      proj_trans(operation, PJ_INV, proj_coord(on_map_m.x(), on_map_m.y(), on_map_m.z(), HUGE_VAL));
+  const Vector3d place(from.xyz.x, from.xyz.y, from.xyz.z);
+  if (!place.allFinite()) {
+    throw InvalidArgument(fmt::format("{} has no place with the coordinates {:.3f}, {:.3f}, {:.3f}",
+                                      state_->name, on_map_m.x(), on_map_m.y(), on_map_m.z()));
+  }
+  return place;
+}
+
 MapTangent MapProjection::tangent(const Vector3d& geocentric_m) const {
   const Vector3d at = project(geocentric_m);
   std::array<Vector3d, 3> ahead, behind;

@@ -45,7 +45,11 @@ void require_shots(const PointingModel& model, const CloudHeader& header,
                    const PointedShots& shots) {
   const int prisms = model.train.prisms();
   require_between("number of prisms of the cloud", header.prisms, prisms, prisms);
-  require_length_or_none("factors of the cloud", header.factors.size(), model.factors.size());
+  // Those of a mount stand behind the sensor's and are none of this.
+  if (!header.factors.empty()) {
+    require_at_least("factors of the cloud", static_cast<long long>(header.factors.size()),
+                     static_cast<long long>(model.factors.size()));
+  }
   const std::size_t n = shots.size();
   if (header.has_rotation_angles) {
     const auto rotors = static_cast<std::size_t>(prisms);

@@ -8,7 +8,9 @@
 #include <fmt/format.h>
 
 #include "risley/calibration/flight_recordings.hpp"
+#include "risley/cloud/map_projection.hpp"
 #include "risley/core/error.hpp"
+#include "risley/scenes/control.hpp"
 #include "risley/trajectories/clock.hpp"
 #include "risley/trajectories/interpolation.hpp"
 #include "risley/trajectories/trajectory_file.hpp"
@@ -49,6 +51,41 @@ cloud::MovingPlatform platform_of(const CalibrateFlightOptions& options, const P
         options.platform.trajectory));
   }
   return platform;
+}
+
+/// Known ground in the trajectory's frame.
+std::vector<scenes::KnownGround> control_of(const std::string& path,
+                                            const trajectories::Trajectory& trajectory) {
+  if (path.empty()) return {};
+  scenes::Control control = scenes::load_control(path);
+  if (trajectory.frame == trajectories::Frame::local) {
+    if (!control.crs.empty()) {
+      throw InvalidArgument(fmt::format(
+          "{} has known ground on the map {}, and the trajectory is in a frame of its own, which "
+          "no map knows: give the places in that frame, without crs",
+          path, control.crs));
+    }
+    return std::move(control.ground);
+  }
+  if (control.crs.empty()) {
+    throw InvalidArgument(fmt::format(
+        "{} does not say on which map its places are, and the trajectory is on the Earth: crs is "
+        "missing, such as EPSG:25832",
+        path));
+  }
+  const cloud::MapProjection map(control.crs, control.datum.empty() ? "EPSG:4979" : control.datum);
+  for (scenes::KnownGround& ground : control.ground) {
+    const Eigen::Vector3d place = map.unproject({ground.place.x, ground.place.y, ground.place.z});
+    ground.place = {place.x(), place.y(), place.z()};
+    if (!ground.normal) continue;
+    // Normals are gradients: of the height over a plane of the map.
+    const Eigen::Vector3d normal =
+        (map.tangent(place).jacobian().transpose() *
+         Eigen::Vector3d(ground.normal->x, ground.normal->y, ground.normal->z))
+            .normalized();
+    ground.normal = Vector3<double>{normal.x(), normal.y(), normal.z()};
+  }
+  return std::move(control.ground);
 }
 
 /// What is added to the recordings' times to get those of the trajectory, ns.
@@ -92,6 +129,7 @@ void write_flight(const CalibrateFlightOptions& options, CalibratedFlight& resul
                   ResultFolder& folder, const Progress& progress) {
   std::vector<std::string> inputs = options.recordings;
   for (const std::string& path : paths_of(options.platform)) inputs.push_back(path);
+  if (!options.control.empty()) inputs.push_back(options.control);
   result.provenance = with_inputs(options.files.provenance, inputs, progress);
   const calibration::FlightCalibration& found = result.calibration;
   const CalibrationCode code = found.verdict.code;
@@ -122,6 +160,7 @@ CalibratedFlight calibrate_flight(const CalibrateFlightOptions& options, const P
   for (const trajectories::TrajectoryWarning& warning : platform.trajectory.warnings) {
     result.warnings.push_back(fmt::format("{}: {}", options.platform.trajectory, warning.message));
   }
+  std::vector<scenes::KnownGround> control = control_of(options.control, platform.trajectory);
   result.strips = trajectories::flown_strips(trajectories::Interpolation(platform.trajectory));
   std::vector<RangedRecording> recordings;
   for (std::size_t r = 0; r < options.recordings.size(); ++r) {
@@ -163,7 +202,8 @@ CalibratedFlight calibrate_flight(const CalibrateFlightOptions& options, const P
   if (options.truths.empty()) recordings.clear();  // they take as much memory as the shots
   result.strip_rows = flight.strip_rows;
   result.outside_strips = flight.outside_strips;
-  const calibration::FlightCalibrationOptions settings = settings_of(options, flight, platform);
+  calibration::FlightCalibrationOptions settings = settings_of(options, flight, platform);
+  settings.control = std::move(control);
   result.calibration =
       calibration::calibrate_flight(flight.shots, platform.trajectory, settings, calibrating);
   result.solving_time = watch.seconds();

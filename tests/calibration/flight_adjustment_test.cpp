@@ -183,6 +183,24 @@ MatrixXd dense_equations(const FlightEquations& equations, const FlightModel& mo
   return all;
 }
 
+/// Adds what is known of a plane: its place, and how it leans.
+void add_plane_prior(const PlanePrior& prior, const FlightModel& model, MatrixXd& all,
+                     VectorXd& right) {
+  const GroundPlane& plane = model.planes[prior.plane];
+  const auto [first, second] = tangents_of({plane.normal.x(), plane.normal.y(), plane.normal.z()});
+  const Eigen::Vector3d tilt = *prior.normal / prior.normal->dot(plane.normal) - plane.normal;
+  const Eigen::Vector3d off(tilt.dot(Eigen::Vector3d(first.x, first.y, first.z)),
+                            tilt.dot(Eigen::Vector3d(second.x, second.y, second.z)),
+                            plane.normal.dot(prior.place - plane.centre));
+  const Index at = all.rows() - 3 * static_cast<Index>(model.planes.size()) +
+                   3 * static_cast<Index>(prior.plane);
+  for (Index k = 0; k < 3; ++k) {
+    const double sigma = k < 2 ? prior.normal_sigma : prior.sigma;
+    all(at + k, at + k) += 1 / (sigma * sigma) - (k < 2 ? 1e-2 : 1e-6);
+    right[at + k] += off[k] / (sigma * sigma);
+  }
+}
+
 TEST(FlightAdjustment, EliminatesPlanesWithoutLoss) {
   KnownPlanes known(KnownPlanes::noise_free(), 2);
   known.priors.information.diagonal().setConstant(10);
@@ -190,10 +208,16 @@ TEST(FlightAdjustment, EliminatesPlanesWithoutLoss) {
   known.model.corrections.setConstant(1e-4);
   known.priors.held.assign(static_cast<std::size_t>(known.model.unknowns().size()), false);
   known.priors.held[FlightUnknowns::lever_arm(2)] = true;
+  known.priors.planes.push_back({.plane = 0,
+                                 .place = {3, 4, 0.01},
+                                 .sigma = 0.005,
+                                 .normal = Eigen::Vector3d(0.002, -0.001, 1).normalized(),
+                                 .normal_sigma = 0.001});
   const FlightEquations equations =
       flight_equations(known.flight.shots, known.poses, known.plane, known.model, known.weights);
   VectorXd right;
   MatrixXd all = dense_equations(equations, known.model, right);
+  add_plane_prior(known.priors.planes.front(), known.model, all, right);
   const Index knots = 6 * static_cast<Index>(known.model.knots.size()),
               g = known.model.unknowns().size();
   const MatrixXd rates = value_rates(known.model);
@@ -280,6 +304,40 @@ TEST(FlightAdjustment, CovarianceIsTheInverseWhereWeightsTellTheTruth) {
   const MatrixXd moving = covariance_with(known.weights);
   EXPECT_GT((moving - found).diagonal().minCoeff(), -1e-18);
   EXPECT_GT(moving(1, 1), 1.05 * found(1, 1));
+}
+
+TEST(FlightAdjustment, KnownGroundIsPartOfTheCovariance) {
+  KnownPlanes known;
+  known.priors.information = VectorXd::Constant(known.model.unknowns().size(), 100).asDiagonal();
+  trajectories::ErrorModel still = known.settings.errors;
+  for (trajectories::ErrorTerm& term : still.terms) term.correlation_time = 1e9;
+  known.priors.process = trajectories::ErrorProcess(still, known.flight.trajectory);
+  for (std::size_t p = 0; p < known.model.planes.size(); ++p) {
+    known.priors.planes.push_back({.plane = p,
+                                   .place = known.model.planes[p].centre,
+                                   .sigma = 0.003,
+                                   .normal = known.model.planes[p].normal,
+                                   .normal_sigma = 0.0005});
+  }
+  const auto covariance = [&](bool inverse) {
+    const FlightSystem system(
+        flight_equations(known.flight.shots, known.poses, known.plane, known.model, known.weights),
+        known.model, known.priors);
+    const Index g = system.globals();
+    MatrixXd functionals = MatrixXd::Zero(system.size(), g);
+    functionals.bottomRows(g).setIdentity();
+    if (inverse) return MatrixXd(system.solve(functionals).bottomRows(g));
+    return flight_covariance(known.flight.shots, known.poses, known.plane, known.model,
+                             known.weights, known.priors, system, functionals);
+  };
+  const MatrixXd expected = covariance(true), found = covariance(false);
+  const VectorXd scale = expected.diagonal().cwiseSqrt().cwiseInverse();
+  EXPECT_LT((scale.asDiagonal() * (found - expected) * scale.asDiagonal()).cwiseAbs().maxCoeff(),
+            1e-3);
+  known.priors.planes.clear();
+  // Tied to the trajectory's heights and the ranges' offset, and still better known.
+  EXPECT_LT(expected(FlightUnknowns::lever_arm(2), FlightUnknowns::lever_arm(2)),
+            0.95 * covariance(true)(FlightUnknowns::lever_arm(2), FlightUnknowns::lever_arm(2)));
 }
 
 TEST(FlightAdjustment, RefusesWhatDoesNotFit) {

@@ -189,6 +189,92 @@ TEST(FlightCalibration, DoesNotDependOnThreads) {
   EXPECT_EQ(one.covariance, four.covariance);
 }
 
+/// A place of the village's level ground, at least 12 m from its houses.
+Eigen::Vector3d level_place(const SimulatedFlight& flight, double east, double north) {
+  for (double step = 0;; step += 0.7) {
+    const Eigen::Vector2d at(east + step * std::cos(step), north + step * std::sin(step));
+    if (std::all_of(flight.roofs.begin(), flight.roofs.end(),
+                    [&](const testing::Roof& roof) { return (roof.centre - at).norm() > 9; })) {
+      return {at.x(), at.y(), 0};
+    }
+  }
+}
+
+scenes::KnownGround known_ground(const char* name, const Eigen::Vector3d& place) {
+  scenes::KnownGround ground;
+  ground.name = name;
+  ground.place = {place.x(), place.y(), place.z()};
+  ground.sigma = 0.004;
+  ground.radius = 1.5;
+  return ground;
+}
+
+/// Mean height of level ground as a calibration sees it; truly 0.
+double seen_height(const FlightCalibration& found) {
+  double sum = 0, count = 0;
+  for (const GroundPlane& plane : found.model.planes) {
+    if (plane.normal.z() < 0.9995) continue;
+    sum += plane.centre.z() + found.tangent.origin.z();
+    ++count;
+  }
+  return sum / count;
+}
+
+// Nothing else tells the mean height of a flight, nor the lever arm's.
+TEST(FlightCalibration, KnownGroundFixesTheHeight) {
+  FlightSettings settings = short_flight();
+  settings.seed = 5;
+  settings.shot_rate = 1500;
+  *settings.errors.terms[2].sigma = 0.1;  // heights are a decimetre off
+  const SimulatedFlight flight(settings);
+  FlightCalibrationOptions options = flight.options();
+  options.coarse_shots = 20000;
+  options.knot_spacing = 2;
+  const auto point = [&](const char* name, double east, double north) {
+    const Eigen::Vector3d at = level_place(flight, east, north);
+    return known_ground(name, {at.x(), at.y(), 0});
+  };
+  const testing::Roof& roof = flight.roofs.front();
+  const Eigen::Vector3d normal = roof.normal();
+  const Eigen::Vector2d across(-roof.along.y(), roof.along.x());
+  const Eigen::Vector2d middle = roof.centre + 0.5 * roof.width * roof.side * across;
+  const FlightCalibration alone = calibrate_flight(flight.shots, flight.trajectory, options);
+  EXPECT_TRUE(alone.control.empty());
+  options.control = {point("yard", 6, -4), point("field", -12, 10)};
+  options.control.push_back(
+      known_ground("roof", {middle.x(), middle.y(), roof.height - 0.5 * roof.width * roof.slope}));
+  options.control.back().normal = Vector3<double>{normal.x(), normal.y(), normal.z()};
+  options.control.back().normal_sigma = 1e-3;
+  options.control.push_back(known_ground("far away", {4000, 0, 0}));
+  const FlightCalibration fixed = calibrate_flight(flight.shots, flight.trajectory, options);
+  ASSERT_EQ(fixed.control.size(), 4U);
+  for (std::size_t i = 0; i < 3; ++i) {
+    EXPECT_TRUE(fixed.control[i].used) << fixed.control[i].name;
+    EXPECT_GT(fixed.control[i].shots, 20U);
+    EXPECT_LT(std::abs(fixed.control[i].off), 4 * fixed.control[i].sigma);
+    EXPECT_FALSE(fixed.control[i].significant);
+  }
+  EXPECT_FALSE(fixed.control[3].used);
+  EXPECT_EQ(fixed.control[3].shots, 0U);
+  EXPECT_EQ(fixed.warnings.size(), alone.warnings.size() + 1);
+  EXPECT_NE(fixed.warnings.front().find("far away"), std::string::npos) << fixed.warnings.front();
+  EXPECT_GT(std::abs(seen_height(alone)), 0.02);
+  EXPECT_LT(std::abs(seen_height(fixed)), 0.008);
+  // The corrections' mean height is known as well as the ground is.
+  EXPECT_LT(fixed.correction_sigma.row(2).mean(), 0.3 * alone.correction_sigma.row(2).mean());
+  const FlightErrors errors = flight_errors(flight, settings, fixed);
+  EXPECT_LT(errors.total, 4 * fixed.datum.total);
+
+  options.control[1].place.z += 0.3;  // a blunder
+  const FlightCalibration fooled = calibrate_flight(flight.shots, flight.trajectory, options);
+  EXPECT_TRUE(fooled.control[1].significant);
+  EXPECT_LT(fooled.control[1].off, -5 * fooled.control[1].sigma);
+  EXPECT_TRUE(
+      std::any_of(fooled.warnings.begin(), fooled.warnings.end(), [](const std::string& words) {
+        return words.find("\"field\" contradicts the flight") != std::string::npos;
+      }));
+}
+
 TEST(FlightCalibration, HoldsWhatIsStatedToBeExact) {
   FlightSettings settings = short_flight();
   settings.strip_length = 25;
@@ -277,6 +363,11 @@ TEST(FlightCalibration, FailsInWords) {
   EXPECT_NE(refused([](FlightCalibrationOptions& o) { o.fixed = {"nonsense"}; }), "");
   EXPECT_NE(refused([](FlightCalibrationOptions& o) { o.mount.nominal *= 2; }), "");
   EXPECT_NE(refused([](FlightCalibrationOptions& o) { o.coarse_shots = 3; }), "");
+  EXPECT_NE(refused([](FlightCalibrationOptions& o) {
+              o.control = {known_ground("a", {0, 0, 0})};
+              o.control.front().sigma = 0;
+            }),
+            "");
   other = flight;
   other.shots.rotation_angle.pop_back();
   EXPECT_NE(refusal([&] { calibrate_flight(other.shots, other.trajectory, options); }), "");

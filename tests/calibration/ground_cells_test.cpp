@@ -92,6 +92,44 @@ TEST(GroundCells, LeaveOutWhatIsRoughSteepOrOfOneStrip) {
   EXPECT_EQ(ground_cells(lost.points, lost.strip, options).planes.size(), 0U);
 }
 
+TEST(GroundCells, CirclesTakePointsOutOfTheirCells) {
+  // A table of 3 m x 3 m stands on level ground; only one strip sees the south.
+  TwoStrips strips([](double x, double y) { return std::hypot(x - 4, y - 4) < 3 ? 1.0 : 0.0; },
+                   {0, 0, 0});
+  std::mt19937 generator(3);
+  std::uniform_real_distribution<double> uniform(-10, 10);
+  for (int i = 0; i < 4000; ++i) {
+    strips.points.push_back(
+        {static_cast<float>(uniform(generator)), static_cast<float>(uniform(generator) - 20), 0.F});
+    strips.strip.push_back(3);
+  }
+  GroundCells cells = ground_cells(strips.points, strips.strip, {});
+  const std::size_t before = cells.planes.size();
+  GroundCellOptions options;
+  options.noise = 0.01;
+  const std::vector<std::int32_t> found = add_circles(
+      strips.points,
+      {{{4, 4, 77}, 1.5}, {{4, 4, 0}, 2}, {{0, -20, 0}, 1}, {{7, 4, 0}, 1}, {{50, 0, 0}, 1}},
+      options, cells);
+  ASSERT_EQ(found.size(), 5U);
+  EXPECT_EQ(found[0], static_cast<std::int32_t>(before));
+  EXPECT_EQ(found[3], kNoPlane) << "the edge of the table";
+  EXPECT_EQ(found[4], kNoPlane) << "nothing there";
+  ASSERT_NE(found[1], kNoPlane);
+  ASSERT_NE(found[2], kNoPlane) << "one strip is enough";
+  EXPECT_EQ(cells.planes.size(), before + 3);
+  EXPECT_NEAR(cells.planes[before].centre.z(), 1, 0.003);
+  EXPECT_NEAR(cells.planes[static_cast<std::size_t>(found[2])].centre.z(), 0, 0.003);
+  for (std::size_t i = 0; i < strips.points.size(); ++i) {
+    const double from = std::hypot(strips.points[i][0] - 4, strips.points[i][1] - 4);
+    EXPECT_EQ(cells.plane[i] == found[0], from <= 1.5) << from;
+    if (from > 1.501 && from < 1.999) {
+      EXPECT_EQ(cells.plane[i], found[1]);
+    }
+  }
+  EXPECT_NE(refusal([&] { add_circles(strips.points, {{{0, 0, 0}, 0}}, {}, cells); }), "");
+}
+
 TEST(GroundCells, DoNotDependOnThreads) {
   const TwoStrips strips([](double x, double y) { return 0.01 * x * y; }, {0, 0, 0.05});
   const auto run = [&](std::size_t threads) {

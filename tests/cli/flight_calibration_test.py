@@ -41,6 +41,18 @@ class FlightCalibrationTest(CommandTest):
         self.assertGreater(found["sigma"], 0, what)
         self.assertLess(abs(found["value"] - true), 4.5 * found["sigma"], what)
 
+    def level_place(self, name):
+        """East and north of level ground that many points lie on."""
+        points = [tuple(map(float, line.split()[:3]))
+                  for line in (self.folder / name).read_text().splitlines()
+                  if line[0] in "-0123456789"]
+        for step in range(100):
+            east, north = 2 * (step % 10) - 9, 2 * (step // 10) - 9
+            near = [p[2] for p in points if (p[0] - east) ** 2 + (p[1] - north) ** 2 < 3]
+            if len(near) > 50 and max(map(abs, near)) < 0.15:
+                return east, north
+        raise AssertionError("no level ground")
+
     def test_a_bent_unit_on_an_unknown_mount(self):
         self.fly("a.lvx", 2500)
         result = self.calibrate(0, "a.lvx", "-o", "out", "--truth", "a.lvx.truth.yaml",
@@ -87,11 +99,21 @@ class FlightCalibrationTest(CommandTest):
         # Most of the ground is level: 20 mm of range noise and what strips are off.
         self.assertGreater(points["before"], 2 * points["after"])
         self.assertLess(points["after"], 0.06)
-        # A calibration is where the next one begins.
+        # A calibration is where the next one begins, and known ground is what it is fixed on.
+        east, north = self.level_place("after.xyz")
+        (self.folder / "control.yaml").write_text(
+            f"risley_control: 1\nground:\n  - {{name: yard, place_m: [{east}, {north}, 0], "
+            "sigma_m: 0.005}\n")
         again = self.run_json(0, "calibrate", "a.lvx", "--trajectory", "a.lvx.trajectory.csv",
                               "--mount", "out/mount.yaml", "--sensor", "out/calibration.yaml",
-                              *ERRORS, "--knot-spacing-s", 1)
+                              *ERRORS, "--knot-spacing-s", 1, "--control", "control.yaml")
         self.assertEqual(again["verdict"]["code"], "as_believed")
+        self.assertEqual(result["control"], [])
+        yard = again["control"][0]
+        self.assertEqual((yard["name"], yard["used"], yard["significant"]), ("yard", True, False))
+        self.assertGreater(yard["shots"], 20)
+        self.assertLess(abs(yard["off_m"]), 0.02)
+        self.assertIn("control.yaml", [one["path"] for one in again["inputs"]])
         for axis in TRUE_BORESIGHT:
             self.assertLess(again["boresight"][axis]["sigma"], result["boresight"][axis]["sigma"])
 
@@ -124,6 +146,9 @@ class FlightCalibrationTest(CommandTest):
                 (2, "states no accuracies",
                  ("--trajectory", "c.lvx.trajectory.truth.csv") + mount),
                 (2, "excludes", trajectory + mount + ("--planes", DATA / "hall.yaml")),
+                (3, "risley_control is missing",
+                 trajectory + mount + ERRORS + ("--control", DATA / "hall.yaml")),
+                (2, "--trajectory", ("--control", DATA / "hall.yaml")),
                 (2, "--knot-spacing-s", trajectory + mount + ERRORS + ("--knot-spacing-s", "0")),
                 (1, "share no time", ("--trajectory", "other.csv") + mount + ERRORS),
                 (1, "at least 2", ("--trajectory", "one-strip.csv") + mount + ERRORS)):

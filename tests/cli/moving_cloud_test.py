@@ -92,6 +92,109 @@ class MovingCloudTest(CommandTest):
         self.assertLess(max(abs(p[1] - 5538631) for p in points), 200)
         self.assertLess(max(abs(p[2] - 254) for p in points), 8)
 
+    def read_las(self, name):
+        """Points with their extra fields, and the table of the trajectory's errors, by the words of
+        docs/files.md."""
+        data = (self.folder / name).read_bytes()
+        at, points_at, records = struct.unpack_from("<HII", data, 94)
+        length, = struct.unpack_from("<H", data, 105)
+        scale, offset = struct.unpack_from("<3d", data, 131), struct.unpack_from("<3d", data, 155)
+        (evlr_at, evlrs), (count,) = struct.unpack_from("<QI", data, 235), struct.unpack_from(
+            "<Q", data, 247)
+        fields, kinds, facts, rows = [], [], {}, []
+
+        def take(user, number, body):
+            if user == b"LASF_Spec" and number == 4:
+                for k in range(0, len(body), 192):
+                    fields.append(body[k + 4:k + 36].split(b"\0")[0].decode())
+                    kinds.append(" BbHhIiQqfd"[body[k + 2]])
+            if user == b"risley" and number == 100:
+                for line in body.decode().rstrip("\0").splitlines():
+                    key, _, values = line.partition(": ")
+                    facts[key] = values.strip("[]").split(",")
+            if user == b"risley" and number > 100:
+                for k in range(0, len(body), 80):
+                    rows.append(struct.unpack_from("<q9d", body, k))
+        for _ in range(records):
+            user, number, size = struct.unpack_from("<16sHH", data, at + 2)
+            take(user.split(b"\0")[0], number, data[at + 54:at + 54 + size])
+            at += 54 + size
+        at = evlr_at
+        for _ in range(evlrs):
+            user, number, size = struct.unpack_from("<16sHQ", data, at + 2)
+            take(user.split(b"\0")[0], number, data[at + 60:at + 60 + size])
+            at += 60 + size
+        points = []
+        for k in range(0, count, 97):
+            base = points_at + k * length
+            whole = struct.unpack_from("<3i", data, base)
+            extra = struct.unpack_from("<" + "".join(kinds), data, base + 30)
+            point = dict(zip(fields, extra))
+            point["at"] = [w * s + o for w, s, o in zip(whole, scale, offset)]
+            adjusted, = struct.unpack_from("<d", data, base + 22)
+            point["time_ns"] = round(1e9 * adjusted) + (10**9 + 315964800 - 18) * 10**9
+            points.append(point)
+        return points, facts, rows
+
+    def test_covariances_follow_from_the_table_by_its_recipe(self):
+        done = self.cloud(0, "--trajectory-errors", DATA / "trajectory-errors.yaml",
+                          "--common-factors", "yes", mount=DATA / "mount-as-built.yaml",
+                          output="a.las")
+        self.assertIn("boresight_x_deg", done["common_factors"])
+        points, facts, rows = self.read_las("a.las")
+        self.assertGreater(len(points), 30)
+        self.assertGreaterEqual(len(rows), 2)
+        number = {key: [float(v) for v in values] for key, values in facts.items()
+                  if key in ("correlation_time_s", "white_m_and_rad", "sample_interval_s",
+                             "first_sample_ns", "north", "east", "down")}
+        factors = len([field for field in points[0]
+                       if field.startswith("Loading") and field.endswith("X")])
+        self.assertEqual(factors, len(done["common_factors"]))
+
+        def cross(a, b):
+            return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+
+        def lever(point):
+            """Columns of L, sigmas and the sample."""
+            time = point["time_ns"]
+            k = max(i for i in range(len(rows) - 1) if i == 0 or rows[i][0] <= time)
+            part = (time - rows[k][0]) / (rows[k + 1][0] - rows[k][0])
+            row = [a + part * (b - a) for a, b in zip(rows[k][1:], rows[k + 1][1:])]
+            arm = [x - r for x, r in zip(point["at"], row[:3])]
+            north, east, down = number["north"], number["east"], number["down"]
+            columns = [north, east, [-d for d in down]] + [cross(axis, arm)
+                                                           for axis in (north, east, down)]
+            sample = (time - number["first_sample_ns"][0]) * 1e-9 // number["sample_interval_s"][0]
+            return columns, row[3:], sample
+
+        def covariance(i, j, p, q):
+            (left, s, own), (right, t, other) = lever(points[i]), lever(points[j])
+            apart = 1e-9 * abs(points[i]["time_ns"] - points[j]["time_ns"])
+            total = 0
+            for k in range(6):
+                shared = s[k] * t[k] * math.exp(-apart / number["correlation_time_s"][k])
+                if own == other:
+                    shared += number["white_m_and_rad"][k] ** 2
+                total += left[k][p] * shared * right[k][q]
+            for k in range(1, factors + 1):
+                total += points[i][f"Loading{k}{'XYZ'[p]}"] * points[j][f"Loading{k}{'XYZ'[q]}"]
+            if i == j:
+                a, b = sorted((p, q))
+                name = f"OwnVariance{'XYZ'[a]}" if a == b else f"OwnCovariance{'XYZ'[a]}{'XYZ'[b]}"
+                total += points[i][name]
+            return total
+        for i in range(0, len(points), 7):
+            for axis in range(3):
+                stated = points[i][f"Variance{'XYZ'[axis]}"]
+                self.assertAlmostEqual(covariance(i, i, axis, axis) / stated, 1, delta=0.01)
+        # Two points differ by less than independent ones would, whatever lies between them.
+        for i, j in ((0, 1), (0, len(points) - 1)):
+            for axis in range(3):
+                alone = covariance(i, i, axis, axis) + covariance(j, j, axis, axis)
+                differ = alone - 2 * covariance(i, j, axis, axis)
+                self.assertGreater(differ, 0)
+                self.assertLess(differ, 0.9 * alone)
+
     def test_no_common_time_is_told_with_its_likely_cause(self):
         for seconds, words in ((18, "18 s are added"), (-18, "UTC"), (WEEK_S, "week"),
                                (1000, "are they of the same flight?")):

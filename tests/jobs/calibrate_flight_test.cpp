@@ -5,16 +5,20 @@
 #include <filesystem>
 #include <set>
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include "risley/cloud/map_projection.hpp"
+#include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
 #include "risley/io/text_file.hpp"
 #include "risley/scenes/scene.hpp"
 #include "risley/sensors/preset.hpp"
 #include "risley/simulation/truth_file.hpp"
 #include "risley/trajectories/flight_plan.hpp"
+#include "risley/trajectories/geodesy.hpp"
 #include "risley/trajectories/mount.hpp"
 #include "risley/trajectories/trajectory_file.hpp"
 
@@ -65,15 +69,17 @@ class CalibrateFlightTest : public ::testing::Test {
   }
 
   /// Flies the unit of Table 3, whose stored calibration is `reported`.
-  static void record(const sensors::Sensor& reported, const std::string& name) {
+  static void record(const sensors::Sensor& reported, const std::string& name,
+                     const std::string& plan = "plan.yaml",
+                     const std::string& scene = "village.yaml") {
     simulation::SimulationSettings settings;
     settings.truth = sensors::load_sensor("mid-40-table3");
     settings.reported = reported;
     settings.rate = 1500;
     settings.rotor = simulation::RotorKind::hunting;
-    settings.scene = scenes::load_scene(file("village.yaml"));
+    settings.scene = scenes::load_scene(file(scene));
     const trajectories::Flight flight =
-        trajectories::fly(trajectories::load_flight_plan(file("plan.yaml")));
+        trajectories::fly(trajectories::load_flight_plan(file(plan)));
     simulation::Platform platform;
     platform.trajectory = std::make_shared<trajectories::Trajectory>(flight.trajectory);
     platform.mount = trajectories::load_mount(file("mount.yaml"));
@@ -164,6 +170,62 @@ TEST_F(CalibrateFlightTest, ContradictsAnIndexThatIsHeld) {
   EXPECT_TRUE(found.calibration.held.empty());
   EXPECT_EQ(found.calibration.verdict.code, calibration::CalibrationCode::bent);
   EXPECT_LT(found.truth->after.total, 4 * found.calibration.datum.total);
+}
+
+/// A flight on the Earth, and ground of it that is known on a map.
+TEST_F(CalibrateFlightTest, IsFixedOnGroundOfAMap) {
+  const std::string on_earth =
+      "origin: {latitude_deg: 50, longitude_deg: 8.5, ellipsoidal_height_m: 250}\n";
+  std::string plan = kPlan, village = kVillage;
+  plan.insert(plan.find("rate_hz"), on_earth);
+  village.insert(village.find("  ground"), "  " + on_earth);
+  io::write_text_file(file("earth.yaml"), plan);
+  io::write_text_file(file("village-on-earth.yaml"), village);
+  record(sensors::load_sensor("mid-40-table3"), "earth.nc", "earth.yaml", "village-on-earth.yaml");
+  const trajectories::Geodetic origin{radians_from_degrees(50), radians_from_degrees(8.5), 250};
+  const Eigen::Vector3d place = trajectories::geocentric_from_geodetic(origin) +
+                                trajectories::geocentric_from_ned(origin) *
+                                    Eigen::Vector3d(2, 38, 0);  // to the east of all houses
+  const Eigen::Vector3d on_map = cloud::MapProjection("EPSG:25832", "EPSG:4937").project(place);
+  const auto control = [&](double height) {
+    return fmt::format(
+        "risley_control: 1\ncrs: EPSG:25832\ndatum: EPSG:4937\nground:\n  - {{name: mark, place_m: "
+        "[{:.4f}, {:.4f}, {:.4f}], sigma_m: 0.005, radius_m: 2, normal_azimuth_deg: 0, "
+        "normal_zenith_deg: 0, "
+        "normal_sigma_deg: 0.1}}\n",
+        on_map.x(), on_map.y(), on_map.z() + height);
+  };
+  io::write_text_file(file("control.yaml"), control(0));
+  CalibrateFlightOptions wanted = options("earth.nc");
+  wanted.details = false;
+  wanted.control = file("control.yaml");
+  const CalibratedFlight found = calibrate_flight(wanted);
+  ASSERT_EQ(found.calibration.control.size(), 1U);
+  EXPECT_TRUE(found.calibration.control.front().used);
+  EXPECT_GT(found.calibration.control.front().shots, 8U);
+  EXPECT_LT(std::abs(found.calibration.control.front().off), 0.01);
+  EXPECT_TRUE(std::any_of(found.provenance.begin(), found.provenance.end(),
+                          [&](const auto& fact) { return fact.second == file("control.yaml"); }));
+  fs::remove_all(file("out"));
+  io::write_text_file(file("control.yaml"), control(0.2));
+  wanted.files = {};
+  EXPECT_TRUE(calibrate_flight(wanted).calibration.control.front().significant);
+
+  const auto refused = [&](const std::string& recording, const std::string& text) {
+    io::write_text_file(file("control.yaml"), text);
+    CalibrateFlightOptions wrong = options(recording);
+    wrong.control = file("control.yaml");
+    try {
+      calibrate_flight(wrong);
+    } catch (const InvalidArgument& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  std::string no_map = control(0);
+  no_map.replace(no_map.find("crs"), no_map.find("ground") - no_map.find("crs"), "");
+  EXPECT_THAT(refused("earth.nc", no_map), ::testing::HasSubstr("crs is missing"));
+  EXPECT_THAT(refused("flight.nc", control(0)), ::testing::HasSubstr("a frame of its own"));
 }
 
 TEST_F(CalibrateFlightTest, LeavesNothingWhenCancelled) {

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include <Eigen/Core>
@@ -14,12 +15,22 @@
 
 namespace risley::calibration {
 
+/// What is known of a plane before a flight.
+struct PlanePrior {
+  std::size_t plane = 0;
+  Eigen::Vector3d place{0, 0, 0};  ///< on it, local frame, m
+  double sigma = 0;                ///< of the place along the normal, m
+  std::optional<Eigen::Vector3d> normal{};
+  double normal_sigma = 0;  ///< of each of its two tilts, rad
+};
+
 /// What is known before a flight.
 struct FlightPriors {
   trajectories::ErrorProcess process;  ///< of the trajectory, at times of the recording's clock
   Eigen::VectorXd mean;                ///< [globals], SI; the boresight as a rotation vector
-  Eigen::MatrixXd information;  ///< [globals, globals], inverse of its covariance; 0: nothing
-  std::vector<bool> held{};     ///< [globals]: not to be adjusted; empty: none
+  Eigen::MatrixXd information;       ///< [globals, globals], inverse of its covariance; 0: nothing
+  std::vector<bool> held{};          ///< [globals]: not to be adjusted; empty: none
+  std::vector<PlanePrior> planes{};  ///< of those that are known, at most one for each
 };
 
 /// Values of the unknowns [globals], the boresight as a rotation vector of up to half a turn.

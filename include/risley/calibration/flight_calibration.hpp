@@ -19,6 +19,7 @@
 #include "risley/calibration/ground_cells.hpp"
 #include "risley/core/progress.hpp"
 #include "risley/estimation/weak_directions.hpp"
+#include "risley/scenes/control.hpp"
 #include "risley/sensors/sensor.hpp"
 #include "risley/trajectories/error_process.hpp"
 #include "risley/trajectories/mount.hpp"
@@ -44,6 +45,8 @@ struct FlightCalibrationOptions {
   double knot_spacing = 0.25;       ///< of the corrections of the trajectory, s
   /// Knots are put further apart where there would be more: the time grows with the third power.
   std::size_t most_knots = 600;
+  /// Ground that is known, in the frame of the trajectory.
+  std::vector<scenes::KnownGround> control;
   double cell_size = 2;               ///< of the ground's cells at the end, m
   double most_roughness = 0.06;       ///< of a cell, m, see GroundCellOptions
   std::size_t coarse_shots = 120000;  ///< with which the first rounds are made
@@ -69,6 +72,17 @@ struct HeldParameter {
   bool significant = false;
 };
 
+/// How the flight sees ground that was known.
+struct SeenControl {
+  std::string name;
+  std::size_t shots = 0;  ///< within its circle
+  bool used = false;      ///< enough of them, and they are a plane
+  double off = 0;         ///< of the ground seen from the one that is known, along the normal, m
+  double sigma = 0;       ///< as it was stated, m
+  /// Beyond chance: what is known there contradicts the rest.
+  bool significant = false;
+};
+
 /// What one calibration in flight found.
 struct FlightCalibration : FlightJudgement {
   bool converged = false;
@@ -79,7 +93,8 @@ struct FlightCalibration : FlightJudgement {
   sensors::Sensor sensor;     ///< adjusted, with covariance
   FlightModel model;          ///< with corrections at the knots and planes, in the tangent frame
   ClockDrift clock_drift;
-  std::vector<HeldParameter> held;  ///< indices that recordings told, above all
+  std::vector<HeldParameter> held;   ///< indices that recordings told, above all
+  std::vector<SeenControl> control;  ///< in the order of the options
   std::vector<StripPair> pairs_before, pairs_after;
   double rms_before = 0, rms_after = 0;  ///< of all pairs and cells, along the normals, m
   double sigma0 = 1;       ///< standard deviation of unit weight against the stated range noise
@@ -97,8 +112,8 @@ struct FlightCalibration : FlightJudgement {
 /// @param trajectory  of the body
 /// @throws EstimationError when fewer than two strips overlap or no ground is found;
 ///         InvalidArgument as require_flight_shots, require_trajectory, require_mount,
-///         ErrorProcess, for rotation angles and emitters that the sensor does not have and options
-///         out of range
+///         require_known_ground, ErrorProcess, for rotation angles and emitters that the sensor
+///         does not have and options out of range
 FlightCalibration calibrate_flight(const FlightShots& shots,
                                    const trajectories::Trajectory& trajectory,
                                    const FlightCalibrationOptions& options,

@@ -50,6 +50,22 @@ struct GroundCells {
 GroundCells ground_cells(const ShotPoints& points, const std::vector<std::uint16_t>& strip,
                          const GroundCellOptions& options);
 
+/// A level circle of ground.
+struct GroundCircle {
+  Eigen::Vector3d centre{0, 0, 0};  ///< of which the height counts nothing
+  double radius = 1;                ///< m
+};
+
+/// Takes the points of circles out of their cells and gives each circle a plane behind those of the
+/// cells, under the same conditions but for the number of strips: one is enough. Of circles that
+/// overlap the first has the points.
+/// @param cells  of these points; changed
+/// @return the plane of every circle, kNoPlane where there are too few points or they are no plane
+/// @throws InvalidArgument as ground_cells, for radii that are not above 0
+std::vector<std::int32_t> add_circles(const ShotPoints& points,
+                                      const std::vector<GroundCircle>& circles,
+                                      const GroundCellOptions& options, GroundCells& cells);
+
 /// Where one strip saw a cell.
 struct StripInCell {
   std::size_t plane = 0;  ///< of the cell

@@ -67,6 +67,10 @@ class MapProjection {
   /// @throws InvalidArgument where the map does not reach
   Eigen::Vector3d project(const Eigen::Vector3d& geocentric_m) const;
 
+  /// The geocentric place of a point of the map, m: the inverse of project().
+  /// @throws InvalidArgument where there is none
+  Eigen::Vector3d unproject(const Eigen::Vector3d& on_map_m) const;
+
   /// The map about a place. @throws as project()
   MapTangent tangent(const Eigen::Vector3d& geocentric_m) const;
 

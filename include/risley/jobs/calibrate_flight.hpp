@@ -37,6 +37,8 @@ struct CalibrateFlightOptions : RangedInputOptions {  ///< recordings of one fli
   double knot_spacing = calibration::FlightCalibrationOptions{}.knot_spacing;
   double cell_size = calibration::FlightCalibrationOptions{}.cell_size;
   std::uint64_t seed = 0;
+  /// Path of known ground, see scenes::load_control; may be empty. The flight is fixed on it.
+  std::string control;
   std::vector<std::string> truths;  ///< OUT.truth.yaml of each recording to judge by, or none
   bool details = false;             ///< wanted in the result
   bool force = false;  ///< write what is not better, and what a drifting clock has spoilt, too
@@ -65,7 +67,8 @@ struct CalibratedFlight : RangedInput {
 /// the flight. Stages, for each recording: reading, rotation angles; then calibrating.
 /// @throws EstimationError when recordings and trajectory share no time, for fewer than two strips
 ///         that overlap; InvalidArgument, also for a recording that is given twice and where
-///         nothing says how wrong the trajectory may be; FileError; Cancelled
+///         nothing says how wrong the trajectory may be, and for known ground on a map where the
+///         trajectory has none or the other way about; FileError; Cancelled
 CalibratedFlight calibrate_flight(const CalibrateFlightOptions& options,
                                   const Progress& progress = {});
 
