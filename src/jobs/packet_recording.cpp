@@ -27,7 +27,7 @@ std::optional<PacketRecording> PacketRecording::open(const std::string& path,
                                                      const Progress& progress) {
   recordings::ReadOptions as_it_is;
   as_it_is.extrinsics = options.extrinsics;
-  const auto reader = open_input(path, as_it_is);
+  const auto reader = open_input(path, as_it_is, progress);
   if (reader->header().packet_shots == 0 || reader->header().devices.size() != 1) {
     return std::nullopt;
   }
@@ -178,7 +178,7 @@ PlacedInput place_input(const std::string& path, const recordings::ReadOptions& 
   if (!packets) return result;
   result.reading.shot_rate.reset();
   result.reading.packet_places = packets->middle_places();
-  const auto reader = open_input(path, result.reading);
+  const auto reader = open_input(path, result.reading, progress);
   result.choice = choose_sensor(path, result.reading, reader->header(), {}, progress);
   PlacedRows placed =
       packets->place_rows(result.choice->sensor, options.shot_rate, untold, progress);

@@ -177,7 +177,8 @@ SensorFrameRecording open_by_stated_pose(const std::string& path, recordings::Re
                                          const std::optional<sensors::Sensor>& given,
                                          const Progress& progress) {
   progress.check();
-  SensorFrameRecording result{open_input(path, reading, progress), {}, {}, reading.extrinsics.has_value()};
+  SensorFrameRecording result{
+      open_input(path, reading, progress), {}, {}, reading.extrinsics.has_value()};
   recordings::require_times(result.reader->header());
   result.choice = choose_sensor(path, reading, result.reader->header(), given, progress);
   result.warnings = result.choice.warnings;
@@ -242,7 +243,7 @@ SensorFrameRecording open_with_places(const std::string& path, recordings::ReadO
   result.warnings.insert(result.warnings.end(), placed.words.begin(), placed.words.end());
   result.cut_mended = placed.places.cut_coordinates;
   reading.packet_places = std::move(placed.places);
-  result.reader = open_input(path, reading);
+  result.reader = open_input(path, reading, progress);
   return result;
 }
 
