@@ -320,6 +320,9 @@ std::optional<double> start_residual(const AngleSeries& head, const sensors::Sen
   options.mirrored.reset();
   try {
     const Start start = find_start(shots, sensor, options);
+    // Where times are wrong, parameters bend as far as they can and mean nothing.
+    constexpr double kRightTimes = radians_from_degrees(0.1);
+    if (start.residual_rms > kRightTimes) return start.residual_rms;
     const Eigen::VectorXd off =
         free_values(start.train, options.free) - free_values(sensor.train, options.free);
     double unusual = 0;  // chi2 of the parameters
