@@ -16,6 +16,7 @@
 #include "risley/core/error.hpp"
 #include "risley/core/require.hpp"
 #include "risley/estimation/estimate.hpp"
+#include "risley/estimation/free_parameters.hpp"
 #include "risley/estimation/initialisation.hpp"
 #include "risley/estimation/spectral_lines.hpp"
 #include "risley/optics/observation_model.hpp"
@@ -318,7 +319,21 @@ std::optional<double> start_residual(const AngleSeries& head, const sensors::Sen
   options.angle_noise = sensor.angle_noise;
   options.mirrored.reset();
   try {
-    return find_start(shots, sensor, options).residual_rms;
+    const Start start = find_start(shots, sensor, options);
+    // Where times are wrong, parameters bend as far as they can and mean nothing.
+    constexpr double kRightTimes = radians_from_degrees(0.1);
+    if (start.residual_rms > kRightTimes) return start.residual_rms;
+    const Eigen::VectorXd off =
+        free_values(start.train, options.free) - free_values(sensor.train, options.free);
+    double unusual = 0;  // chi2 of the parameters
+    for (Eigen::Index i = 0; i < off.size(); ++i) {
+      unusual += std::pow(off[i] / options.free[static_cast<std::size_t>(i)].prior_sigma, 2);
+    }
+    // Residuals of unknown noise, two per shot, that are as unlikely as both together. Those of
+    // neighbouring shots hang together, so that few count.
+    constexpr double kIndependentShots = 100, kMostExponent = 20;
+    return start.residual_rms *
+           std::exp(std::min(kMostExponent, unusual / (4.0 * kIndependentShots)));
   } catch (const EstimationError&) {
     return std::nullopt;
   } catch (const InvalidArgument&) {  // beams that it has not

@@ -102,6 +102,33 @@ TEST(SensorRecognition, KnowsEverySensorWhateverHappenedToItsScan) {
   }
 }
 
+TEST(SensorRecognition, ASmallWindowOfAMid70IsNoMid40OfImpossibleGlass) {
+  const std::vector<sensors::Sensor> sensors = types();
+  sensors::Sensor unit = sensors[1];
+  unit.set("bearing_tilt_a_horizontal_deg", deg(-0.3));
+  unit.set("prism_tilt_a_vertical_deg", deg(0.4));
+  constexpr double kRate = 100e3, kDuration = 0.3;
+  std::mt19937_64 generator(3);
+  std::normal_distribution<double> normal(0.0, deg(0.005));
+  AngleSeries series;
+  for (int i = 0; i < static_cast<int>(kRate * kDuration); ++i) {
+    const double time = i / kRate;
+    const std::vector<double> angles = {3.8 + time * unit.angular_velocity[0],
+                                        5.5 + time * unit.angular_velocity[1]};
+    const Observation seen = observe(unit.train, angles);
+    if (std::abs(seen.azimuth - deg(1)) > deg(10) || std::abs(seen.zenith - deg(94)) > deg(7.5)) {
+      continue;
+    }
+    series.append(std::llround(1e9 * time), seen.azimuth + normal(generator),
+                  seen.zenith + normal(generator), 0);
+  }
+  // Freed, a Mid-40 describes it as well, with an index off by 0.3 and a prism tilted by 17
+  // degrees.
+  const SensorRecognition found = recognise_sensor(series, sensors, BeamSource::recorded);
+  EXPECT_EQ(sensors[found.matches.front().candidate].name, "mid-70");
+  EXPECT_TRUE(found.decided);
+}
+
 TEST(SensorRecognition, EmittersThatTheFileNamesTellTheRoll) {
   const std::vector<sensors::Sensor> sensors = types();
   Scene scene;
