@@ -429,8 +429,7 @@ class BagStructure {
 
 class Ros1Bag final : public Bag {
  public:
-  Ros1Bag(const std::string& path, const Progress& progress)
-      : Bag(BagKind::ros1, path, progress) {
+  Ros1Bag(const std::string& path, const Progress& progress) : Bag(BagKind::ros1, path, progress) {
     BagStructure::check(path, progress_);
     guarded("be opened", [&] {
       bag_.reset(new rosbag::Bag);

@@ -84,8 +84,7 @@ std::uint64_t bytes_by_header(const std::string& path, std::uint64_t file_bytes)
 
 class Ros2Bag final : public Bag {
  public:
-  Ros2Bag(const std::string& path, const Progress& progress)
-      : Bag(BagKind::ros2, path, progress) {
+  Ros2Bag(const std::string& path, const Progress& progress) : Bag(BagKind::ros2, path, progress) {
     open_database();
     restrict_database();
     require_plain_table("topics");

@@ -306,7 +306,8 @@ SensorFrameRecording open_by_stated_pose(const std::string& path, recordings::Re
                                          const std::optional<sensors::Sensor>& given,
                                          const Progress& progress) {
   progress.check();
-  SensorFrameRecording result{open_input(path, reading, progress), {}, {}, reading.extrinsics.has_value()};
+  SensorFrameRecording result{
+      open_input(path, reading, progress), {}, {}, reading.extrinsics.has_value()};
   recordings::require_times(result.reader->header());
   result.choice = choose_sensor(path, reading, result.reader->header(), given, progress);
   result.warnings = result.choice.warnings;

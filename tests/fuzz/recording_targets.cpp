@@ -107,8 +107,8 @@ void write_and_read(const Format& format, const recordings::RecordingHeader& hea
 void convert(const recordings::RecordingHeader& header, const std::vector<Chunk>& chunks,
              std::size_t choice) {
   static const io::TemporaryFolder folder;
-  constexpr std::array kEndings = {".lvx",          ".openpylivox.csv", ".openpylivox.bin",
-                                   ".sequence.csv", ".csv",             ".no-format"};
+  constexpr std::array kEndings = {".lvx", ".openpylivox.csv", ".openpylivox.bin", ".sequence.csv",
+                                   ".csv", ".no-format"};
   const std::string path = folder.file(std::string("other") + kEndings[choice % kEndings.size()]);
   std::uint64_t written = 0;
   try {
@@ -126,7 +126,8 @@ void convert(const recordings::RecordingHeader& header, const std::vector<Chunk>
     require_sound(recording.header);
     require_sound(recording.data, recording.header);
     constexpr std::uint64_t kPacketRows = 128;  // a packet of LVX is filled up
-    require(recording.data.observations.size() <= kPacketRows * (written + 1), "nothing is invented");
+    require(recording.data.observations.size() <= kPacketRows * (written + 1),
+            "nothing is invented");
   } catch (const Error&) {
     require(written == 0, "what is converted can be read");
   }

@@ -13,7 +13,8 @@ namespace {
 constexpr std::string_view kRos1Bag = "ros1-bag";
 
 std::unique_ptr<Reader> open_ros1(const std::string& path, const Progress& progress) {
-  return std::make_unique<MessageReader>(bags::open_bag(path, bags::BagKind::ros1, progress), kRos1Bag);
+  return std::make_unique<MessageReader>(bags::open_bag(path, bags::BagKind::ros1, progress),
+                                         kRos1Bag);
 }
 
 }  // namespace

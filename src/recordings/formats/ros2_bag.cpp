@@ -13,7 +13,8 @@ namespace {
 constexpr std::string_view kRos2Bag = "ros2-bag";
 
 std::unique_ptr<Reader> open_ros2(const std::string& path, const Progress& progress) {
-  return std::make_unique<MessageReader>(bags::open_bag(path, bags::BagKind::ros2, progress), kRos2Bag);
+  return std::make_unique<MessageReader>(bags::open_bag(path, bags::BagKind::ros2, progress),
+                                         kRos2Bag);
 }
 
 }  // namespace
