@@ -136,6 +136,12 @@ class FilesTest(CommandTest):
         self.assertIn("covariance: 60 rows", done.stderr)
         self.assertNotIn("page.html", self.names())
 
+    def test_every_hostile_file_has_its_test(self):
+        tests = "".join(path.read_text() for kind in ("py", "cpp", "mjs")
+                        for path in (SOURCE / "tests").glob(f"*/*.{kind}"))
+        for path in (SOURCE / "tests/golden/hostile").iterdir():
+            self.assertIn(path.name, tests)
+
     def test_what_is_written_is_read(self):
         # A coordinate of -2147483.648 m.
         for ending in ("lvx", "nc", "bin", "openpylivox.csv", "openpylivox.bin", "sequence.csv"):

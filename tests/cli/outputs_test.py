@@ -10,7 +10,7 @@ import subprocess
 import time
 import unittest
 
-from command import COMMAND, SOURCE, CommandTest, run
+from command import COMMAND, SANITIZED, SOURCE, CommandTest, run
 
 
 class OutputTest(CommandTest):
@@ -25,6 +25,8 @@ class OutputTest(CommandTest):
             assert done.returncode == 0, done.stderr
             (cls.folder / "made.nc").rename(cls.folder / name)
 
+    # Their memory may stay locked in a process forked beside threads: docs/decisions/0008.
+    @unittest.skipIf(SANITIZED, "sanitizers do not stand it")
     def test_netcdf_files_of_any_name_are_converted_in_parallel(self):
         formats = {"nc": "netcdf", "sequence.csv": "scan-sequence-csv"}
         for ending in formats:
