@@ -35,6 +35,8 @@ constexpr Index kTwo = 2 * kCorrections;
 constexpr double kPlaneTiltSigma = 10, kPlaneOffsetSigma = 1000;  // rad, m
 /// Parts of an interval within which the trajectory's process counts as one value.
 constexpr int kIntervalParts = 8;
+/// A long flight has settled when its corrections move by no more than this, RMS, in their sigmas.
+constexpr double kSettledCorrection = 0.02;
 /// Columns of an inverse that are computed together.
 constexpr Index kInverseColumns = 96;
 
@@ -151,6 +153,21 @@ void require_priors(const FlightPriors& priors, const FlightModel& model) {
     require_unit_length("known normal of a plane", prior.normal->norm());
     require_above("sigma of a plane's normal", prior.normal_sigma, 0, "rad");
   }
+}
+
+/// By how much a step moves what the whole flight shares, in squared sigmas of it.
+double promised_to_globals(const FlightSystem& system, const FlightSystem::Step& step,
+                           const std::vector<bool>& held) {
+  std::vector<Index> free;
+  const Index globals = system.globals();
+  for (Index g = 0; g < globals; ++g) {
+    if (held.empty() || !held[static_cast<std::size_t>(g)]) free.push_back(g);
+  }
+  MatrixXd units = MatrixXd::Zero(system.size(), globals);
+  units.bottomRows(globals).setIdentity();
+  const MatrixXd covariance = system.solve(units).bottomRows(globals)(free, free);
+  const VectorXd moved = step.unknowns.tail(globals)(free);
+  return moved.dot(algebra::SymmetricSolver(covariance).inverse() * moved);
 }
 
 }  // namespace
@@ -522,7 +539,8 @@ FlightAdjustment adjust_flight(const FlightShots& shots, const ShotPoses& poses,
     result.shots = equations.shots;
     result.lost = equations.lost;
     result.outliers = equations.outliers;
-    const FlightSystem::Step step = FlightSystem(equations, result.model, priors).step();
+    const FlightSystem system(equations, result.model, priors);
+    const FlightSystem::Step step = system.step();
     if (!step.unknowns.allFinite() || !step.planes.allFinite()) {
       throw EstimationError("the adjustment of the flight diverged");
     }
@@ -530,6 +548,12 @@ FlightAdjustment adjust_flight(const FlightShots& shots, const ShotPoses& poses,
     ++result.steps;
     result.promised = step.promised;
     result.converged = step.promised <= options.tolerance;
+    // Shots at the gate move each of many corrections by a hair, without an end.
+    if (!result.converged && result.steps == options.most_steps &&
+        step.promised <= kSettledCorrection * kSettledCorrection *
+                             static_cast<double>(kCorrections * result.model.knots.size())) {
+      result.converged = promised_to_globals(system, step, priors.held) <= options.tolerance;
+    }
   }
   return result;
 }

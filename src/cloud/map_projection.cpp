@@ -247,7 +247,7 @@ Vector3d MapProjection::unproject(const Vector3d& on_map_m) const {
   proj_errno_reset(operation);
   const PJ_COORD from =
       proj_trans(operation, PJ_INV, proj_coord(on_map_m.x(), on_map_m.y(), on_map_m.z(), HUGE_VAL));
-  const Vector3d place(from.xyz.x, from.xyz.y, from.xyz.z);
+  Vector3d place(from.xyz.x, from.xyz.y, from.xyz.z);
   if (!place.allFinite()) {
     throw InvalidArgument(fmt::format("{} has no place with the coordinates {:.3f}, {:.3f}, {:.3f}",
                                       state_->name, on_map_m.x(), on_map_m.y(), on_map_m.z()));

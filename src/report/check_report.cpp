@@ -201,6 +201,9 @@ void check_report(const FlightReport& r) {
   for (std::size_t i = 0; i < r.not_told.size(); ++i) {
     expect(!(r.not_told[i].sigma < 0), fmt::format("not_told[{}].sigma", i), "is negative");
   }
+  for (std::size_t i = 0; i < r.control.size(); ++i) {
+    expect(r.control[i].sigma > 0, fmt::format("control[{}].sigma_m", i), "expected above 0");
+  }
   check_pairs(r.pairs_before, "pairs_before");
   check_pairs(r.pairs_after, "pairs_after");
   expect(r.knot_spacing >= 0, "knot_spacing_s", "expected a time");

@@ -311,6 +311,23 @@ std::string not_told_html(const FlightReport& r) {
   return html + "</ul>\n";
 }
 
+std::string control_html(const FlightReport& r) {
+  if (r.control.empty()) return {};
+  std::string html =
+      "<h2>Known ground</h2>\n<div class=\"wide\"><table><thead><tr><th>name</th><th>shots</th>"
+      "<th>seen above it, mm</th><th>stated σ, mm</th><th></th></tr></thead><tbody>\n";
+  for (const calibration::SeenControl& seen : r.control) {
+    html += fmt::format(
+        "<tr><th scope=\"row\">{}</th><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>\n",
+        escape_html(seen.name), count_text(seen.shots), seen.used ? millimetres(seen.off) : "–",
+        millimetres(seen.sigma),
+        !seen.used ? "left out" : (seen.significant ? "contradicts the flight" : ""));
+  }
+  return html +
+         "</tbody></table></div>\n<p class=\"note\">Points and planes of the ground that were "
+         "given; the flight is fixed on them. Along the ground's normal.</p>\n";
+}
+
 std::string shift_cell(const StripPair& pair, Eigen::Index axis) {
   if (!(pair.sigma[axis] < kUntoldShift)) return "<td>–</td>";
   const NumberText text =
@@ -431,6 +448,7 @@ std::string flight_page(const FlightReport& r) {
   body += directions_html(r);
   body += mount_html(r);
   body += not_told_html(r);
+  body += control_html(r);
   body += strips_html(r, figures);
   body += "<h2>Ground</h2>\n" + shots_html(r) + charts_html(r.ground_charts, figures);
   body += "<h2>Residuals</h2>\n";

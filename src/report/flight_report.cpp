@@ -399,6 +399,7 @@ FlightReport flight_report(const FlightReportInput& input) {
   report.covariance = c.covariance;
   report.datum = c.datum;
   report.not_told = c.not_told;
+  report.control = c.control;
   take_pairs(c, report);
   report.rms_before = c.rms_before;
   report.rms_after = c.rms_after;

@@ -183,6 +183,16 @@ void fields(Archive& archive, T& combination) {
   archive("sigma", combination.sigma);
 }
 
+template <class Archive, report::FieldsOf<SeenControl> T>
+void fields(Archive& archive, T& seen) {
+  archive("name", seen.name);
+  archive("shots", seen.shots);
+  archive("used", seen.used);
+  archive("off_m", seen.off);
+  archive("sigma_m", seen.sigma);
+  archive("significant", seen.significant);
+}
+
 template <class Archive, report::FieldsOf<StripPair> T>
 void fields(Archive& archive, T& pair) {
   archive("first", pair.first);
@@ -410,6 +420,7 @@ void fields(Archive& archive, T& report) {
   archive("covariance", report.covariance);
   archive("datum", report.datum);
   archive("not_told", report.not_told);
+  archive("control", report.control);
   archive("pair_count", report.pair_count);
   archive("pairs_before", report.pairs_before);
   archive("pairs_after", report.pairs_after);

@@ -26,7 +26,7 @@ constexpr double kSmallestSigma = 1e-4, kLargestSigma = 10;
 constexpr double kSmallestRadius = 0.1, kLargestRadius = 100;  // m
 constexpr double kSteepest_deg = 60;
 
-KnownGround read_ground(const YamlMap& map, Names& earlier) {
+KnownGround read_known_ground(const YamlMap& map, Names& earlier) {
   map.allow_only({"name", "place_m", "sigma_m", "radius_m", "normal_azimuth_deg",
                   "normal_zenith_deg", "normal_sigma_deg"});
   KnownGround ground;
@@ -80,8 +80,9 @@ Control parse_control(const std::string& text, const std::string& path) {
   }
   root.at("ground");
   Names names;
-  for_each_map(root, "ground",
-               [&](const YamlMap& map) { control.ground.push_back(read_ground(map, names)); });
+  for_each_map(root, "ground", [&](const YamlMap& map) {
+    control.ground.push_back(read_known_ground(map, names));
+  });
   if (control.ground.empty()) {
     io::fail_at(path, root.at("ground").line, "ground: the list is empty");
   }

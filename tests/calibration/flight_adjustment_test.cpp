@@ -115,6 +115,45 @@ TEST(FlightAdjustment, RecoversEverythingFromANoiseFreeFlight) {
   }
 }
 
+// Eight steps do not still the hundreds of corrections of a long flight that shots at the gate move
+// by a hair each; what counts is that the calibration does not move any more.
+TEST(FlightAdjustment, HasSettledWhenOnlyCorrectionsStillMoveByAHair) {
+  KnownPlanes known(KnownPlanes::noise_free(), 0.25);
+  known.priors.information = VectorXd::Constant(known.model.unknowns().size(), 100).asDiagonal();
+  FlightAdjustmentOptions options;
+  options.most_steps = 6;
+  const FlightModel settled = adjust_flight(known.flight.shots, known.poses, known.plane,
+                                            known.model, known.weights, known.priors, options)
+                                  .model;
+  options.most_steps = 1;
+  options.tolerance = 0.01;
+  const auto next = [&](const FlightModel& model) {
+    return adjust_flight(known.flight.shots, known.poses, known.plane, model, known.weights,
+                         known.priors, options);
+  };
+  FlightModel shaken = settled;
+  const auto shake = [&](double by) {
+    for (Index k = 0; k < shaken.corrections.cols(); ++k) {
+      shaken.corrections(4, k) = settled.corrections(4, k) + (k % 2 == 0 ? by : -by);
+    }
+    return next(shaken);
+  };
+  const double once = shake(1e-6).promised;
+  const FlightAdjustment hair = shake(1e-6 * std::sqrt(0.1 / once));
+  EXPECT_GT(hair.promised, 5 * options.tolerance);
+  EXPECT_TRUE(hair.converged) << hair.promised;
+  EXPECT_FALSE(shake(1e-6 * std::sqrt(2 / once)).converged) << "more than a hair";
+  // As little, but of the boresight.
+  FlightModel turned = settled;
+  const auto turn = [&](double by) {
+    turned.boresight = settled.boresight * Eigen::AngleAxisd(by, Eigen::Vector3d::UnitX());
+    return next(turned);
+  };
+  const FlightAdjustment moved = turn(1e-6 * std::sqrt(0.1 / turn(1e-6).promised));
+  EXPECT_NEAR(moved.promised, 0.1, 0.02);
+  EXPECT_FALSE(moved.converged);
+}
+
 TEST(FlightAdjustment, RecoversTheTrajectorysCorrections) {
   FlightSettings settings = KnownPlanes::noise_free();
   settings.trajectory_errors = true;

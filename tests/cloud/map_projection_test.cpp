@@ -39,7 +39,7 @@ TEST(MapProjection, AgreesWithAnIndependentSeries) {
     EXPECT_NEAR(mapped.y(), static_cast<double>(north), 1e-6);
     EXPECT_NEAR(mapped.z(), height, 1e-6);
     EXPECT_GT(mapped.y(), 5.5e6);
-    EXPECT_LT((map.unproject(mapped) - place).norm(), 1e-7);
+    EXPECT_LT((map.unproject(mapped) - place).norm(), 1e-6);
   }
   EXPECT_EQ(map.name(), "WGS 84 / UTM zone 32N");
   EXPECT_FALSE(map.has_height_system());

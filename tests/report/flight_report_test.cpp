@@ -365,6 +365,19 @@ TEST(FlightPage, SaysInWordsWhatIsNotTold) {
   EXPECT_THAT(visible(flight.html()), HasSubstr("It tells something of everything that was free"));
 }
 
+TEST(FlightPage, KnownGroundStandsWithWhatTheStripsSee) {
+  Flight flight;
+  EXPECT_THAT(visible(flight.html()), Not(HasSubstr("Known ground")));
+  flight.calibration.control = {{"yard <1>", 812, true, 0.0031, 0.005, false},
+                                {"field", 640, true, -0.0417, 0.005, true},
+                                {"far away", 0, false, 0, 0.01, false}};
+  const std::string shown = visible(flight.html());
+  EXPECT_THAT(shown, HasSubstr("Known ground"));
+  EXPECT_THAT(shown, HasSubstr("yard &lt;1&gt;</th><td>812</td><td>3.1</td><td>5.0</td><td></td>"));
+  EXPECT_THAT(shown, HasSubstr("<td>-41.7</td><td>5.0</td><td>contradicts the flight</td>"));
+  EXPECT_THAT(shown, HasSubstr("<td>–</td><td>10.0</td><td>left out</td>"));
+}
+
 TEST(FlightPage, PairsOfStripsStandBeforeAndAfter) {
   Flight flight;
   const std::string shown = visible(flight.html());
@@ -645,7 +658,7 @@ TEST_F(FlightReportFile, EveryMissingFieldIsNamed) {
   const std::string text = io::read_text_file(path());
   for (const char* field :
        {"mount", "body_from_sensor", "unknowns", "prior_share", "nominal", "covariance", "datum",
-        "height_m", "not_told", "pairs_after", "shift_m", "north", "strips", "knots",
+        "height_m", "not_told", "control", "pairs_after", "shift_m", "north", "strips", "knots",
         "difference_charts", "correction_charts", "provenance"}) {
     std::string cut = text;
     const std::string key = std::string("\"") + field + "\":";
@@ -678,6 +691,8 @@ TEST_F(FlightReportFile, WhatAPageCannotBeDrawnFromIsRefusedWithItsPlace) {
       {[](auto& r) { r.datum.total = kNaN; }, "datum.total: expected a number"},
       {[](auto& r) { r.datum.height = -1; }, "datum.height_m: is negative"},
       {[](auto& r) { r.not_told[1].sigma = -1; }, "not_told[1].sigma: is negative"},
+      {[](auto& r) { r.control = {{"yard", 9, true, 0, 0, false}}; },
+       "control[0].sigma_m: expected above 0"},
       {[](auto& r) { r.pairs_after[2].second = 0; }, "pairs_after[2]: expected two strips"},
       {[](auto& r) { r.pairs_before[2].rms = -1; }, "pairs_before[2].rms_m: is negative"},
       {[](auto& r) { r.pairs_before[2].sigma[1] = -1; }, "shift_sigma_m: is negative"},

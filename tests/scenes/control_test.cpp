@@ -58,10 +58,10 @@ TEST(Control, MistakesAreToldWithTheirLine) {
     return std::string();
   };
   EXPECT_THAT(failure("risley_control: 1\n", ""), HasSubstr("risley_control is missing"));
-  EXPECT_THAT(failure("risley_control: 1", "risley_control: 2"), HasSubstr("allowed 1 to 1"));
+  EXPECT_THAT(failure("risley_control: 1", "risley_control: 2"), HasSubstr("allowed whole numbers 1 to 1"));
   EXPECT_THAT(failure("crs: EPSG:25832\n", ""), HasSubstr("datum needs crs"));
   EXPECT_THAT(failure("sigma_m: 0.008", "sigma_m: 0"), HasSubstr("ground[0].sigma_m"));
-  EXPECT_THAT(failure("sigma_m: 0.008", "sigma_m: 0"), HasSubstr("c.yaml:5"));
+  EXPECT_THAT(failure("sigma_m: 0.008", "sigma_m: 0"), HasSubstr("c.yaml: line 5"));
   EXPECT_THAT(failure("[1, 2, 3]", "[1, 2]"), HasSubstr("expected a list of 3 numbers in m"));
   EXPECT_THAT(failure("radius_m: 1.5", "radius_m: 500"), HasSubstr("allowed 0.1 to 100"));
   EXPECT_THAT(failure("normal_zenith_deg: 30, ", ""), HasSubstr("normal_zenith_deg is missing"));

@@ -44,6 +44,7 @@ struct FlightReport {
   Eigen::MatrixXd covariance;   ///< [unknowns, unknowns]
   calibration::FlightDatum datum;
   std::vector<calibration::NotTold> not_told;
+  std::vector<calibration::SeenControl> control;  ///< ground that was known
 
   std::size_t pair_count = 0;  ///< of strips that saw the same ground
   std::vector<calibration::StripPair> pairs_before, pairs_after;  ///< with the most cells
