@@ -691,7 +691,9 @@ TEST_F(FlightReportFile, WhatAPageCannotBeDrawnFromIsRefusedWithItsPlace) {
       {[](auto& r) { r.datum.total = kNaN; }, "datum.total: expected a number"},
       {[](auto& r) { r.datum.height = -1; }, "datum.height_m: is negative"},
       {[](auto& r) { r.not_told[1].sigma = -1; }, "not_told[1].sigma: is negative"},
-      {[](auto& r) { r.control = {{"yard", 9, true, 0, 0, false}}; },
+      {[](auto& r) {
+         r.control = {{"yard", 9, true, 0, 0, false}};
+       },
        "control[0].sigma_m: expected above 0"},
       {[](auto& r) { r.pairs_after[2].second = 0; }, "pairs_after[2]: expected two strips"},
       {[](auto& r) { r.pairs_before[2].rms = -1; }, "pairs_before[2].rms_m: is negative"},

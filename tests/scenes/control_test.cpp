@@ -58,7 +58,8 @@ TEST(Control, MistakesAreToldWithTheirLine) {
     return std::string();
   };
   EXPECT_THAT(failure("risley_control: 1\n", ""), HasSubstr("risley_control is missing"));
-  EXPECT_THAT(failure("risley_control: 1", "risley_control: 2"), HasSubstr("allowed whole numbers 1 to 1"));
+  EXPECT_THAT(failure("risley_control: 1", "risley_control: 2"),
+              HasSubstr("allowed whole numbers 1 to 1"));
   EXPECT_THAT(failure("crs: EPSG:25832\n", ""), HasSubstr("datum needs crs"));
   EXPECT_THAT(failure("sigma_m: 0.008", "sigma_m: 0"), HasSubstr("ground[0].sigma_m"));
   EXPECT_THAT(failure("sigma_m: 0.008", "sigma_m: 0"), HasSubstr("c.yaml: line 5"));
