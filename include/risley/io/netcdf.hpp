@@ -13,6 +13,7 @@
 #include <utility>
 #include <vector>
 
+#include "risley/core/progress.hpp"
 #include "risley/io/output_file.hpp"
 
 /// NetCDF-4 files. The library behind them, HDF5 included, is not thread-safe: what is written here
