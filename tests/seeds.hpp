@@ -7,11 +7,14 @@
 
 namespace risley::testing {
 
-/// How many seeds a Monte Carlo takes: RISLEY_SEEDS in the environment, or the usual number. Bounds
-/// that depend on it are written as functions of it.
-inline int seeds_or(int usual) {
-  const char* wish = std::getenv("RISLEY_SEEDS");
+/// A whole number from 1 on of the environment, or the usual one.
+inline int number_or(const char* variable, int usual) {
+  const char* wish = std::getenv(variable);
   return wish != nullptr ? std::max(1, std::atoi(wish)) : usual;
 }
+
+/// How many seeds a Monte Carlo takes: RISLEY_SEEDS in the environment, or the usual number. Bounds
+/// that depend on it are written as functions of it.
+inline int seeds_or(int usual) { return number_or("RISLEY_SEEDS", usual); }
 
 }  // namespace risley::testing

@@ -645,10 +645,10 @@ MatrixXd flight_covariance(const FlightShots& shots, const ShotPoses& poses,
       set);
 
   MatrixXd covariance = solved.transpose() * system.prior_times(solved);
-  const std::vector<PlaneKnowledge> known = plane_knowledge(priors, model);
   for (const PlanePrior& prior : priors.planes) {
     const auto own = planes.middleRows<3>(3 * static_cast<Index>(prior.plane));
-    covariance += own.transpose() * known[prior.plane].information.asDiagonal() * own;
+    const PlaneKnowledge known = knowledge_of(prior, model.planes[prior.plane]);
+    covariance += own.transpose() * known.information.asDiagonal() * own;
   }
   for (std::size_t first = 0; first < pieces;) {
     MatrixXd parts = MatrixXd::Zero(count, kCorrections * kIntervalParts);

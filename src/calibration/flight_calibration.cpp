@@ -582,13 +582,10 @@ void FlightWork::fill_control() {
     const scenes::KnownGround& ground = options_.control[i];
     seen.name = ground.name;
     seen.sigma = ground.sigma;
-    const double radius2 = ground.radius * ground.radius;
-    seen.shots = static_cast<std::size_t>(std::count_if(
-        full_.points.begin(), full_.points.end(), [&](const std::array<float, 3>& point) {
-          const double east = point[0] - control_[i].place.x(),
-                       north = point[1] - control_[i].place.y();
-          return east * east + north * north <= radius2;
-        }));
+    const GroundCircle circle{control_[i].place, ground.radius};
+    seen.shots = static_cast<std::size_t>(
+        std::count_if(full_.points.begin(), full_.points.end(),
+                      [&](const std::array<float, 3>& point) { return circle.holds(point); }));
     seen.used = control_plane_[i] != kNoPlane;
     if (!seen.used) {
       result_.warnings.push_back(fmt::format(

@@ -335,11 +335,7 @@ std::vector<std::int32_t> add_circles(const ShotPoints& points,
   for_each_block(points.size(), [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
       for (std::size_t c = 0; c < circles.size() && circle_of[i] == kNoPlane; ++c) {
-        const double east = points[i][0] - circles[c].centre.x(),
-                     north = points[i][1] - circles[c].centre.y();
-        if (east * east + north * north <= circles[c].radius * circles[c].radius) {
-          circle_of[i] = static_cast<std::int32_t>(c);
-        }
+        if (circles[c].holds(points[i])) circle_of[i] = static_cast<std::int32_t>(c);
       }
     }
   });

@@ -125,9 +125,9 @@ class RunFinder {
 
   /// The farthest shot that a curve leads to without a gap, from one at a border on inwards.
   std::size_t end_of_run(std::size_t shot, int direction) const {
-    std::size_t reached =
-        shot + static_cast<std::size_t>(direction * static_cast<long>(arm(shot, direction) - 1));
-    if (arm(shot, direction) < kArm) return reached;
+    const std::size_t first = arm(shot, direction);
+    std::size_t reached = shot + static_cast<std::size_t>(direction * static_cast<long>(first - 1));
+    if (first < kArm) return reached;
     // The weights by which the next value of a parabola follows from the last kArm.
     static const Eigen::RowVectorXd weights = [] {
       std::vector<double> places;

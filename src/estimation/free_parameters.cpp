@@ -3,6 +3,7 @@
 #include "risley/estimation/free_parameters.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 #include <fmt/format.h>
 
@@ -103,6 +104,15 @@ PrismTrain with_free_values(PrismTrain train, const std::vector<FreeParameter>& 
     for (const int at : free[i].places) train.set_place(at, values[static_cast<Eigen::Index>(i)]);
   }
   return train;
+}
+
+double prior_chi2(const std::vector<FreeParameter>& free, const Eigen::VectorXd& offset) {
+  require_length("offset", static_cast<std::size_t>(offset.size()), free.size());
+  double chi2 = 0;
+  for (Eigen::Index i = 0; i < offset.size(); ++i) {
+    chi2 += std::pow(offset[i] / free[static_cast<std::size_t>(i)].prior_sigma, 2);
+  }
+  return chi2;
 }
 
 }  // namespace risley::estimation

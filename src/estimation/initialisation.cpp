@@ -148,12 +148,7 @@ class WindowFitter {
   }
 
   double prior_chi2(const WindowFit& fit) const {
-    const Eigen::VectorXd offset = offsets(fit);
-    double chi2 = 0;
-    for (Eigen::Index i = 0; i < offset.size(); ++i) {
-      chi2 += std::pow(offset[i] / all_[static_cast<std::size_t>(i)].prior_sigma, 2);
-    }
-    return chi2;
+    return estimation::prior_chi2(all_, offsets(fit));
   }
 
   double evaluate(const WindowFit& fit) {

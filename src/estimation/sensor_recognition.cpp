@@ -323,12 +323,8 @@ std::optional<double> start_residual(const AngleSeries& head, const sensors::Sen
     // Where times are wrong, parameters bend as far as they can and mean nothing.
     constexpr double kRightTimes = radians_from_degrees(0.1);
     if (start.residual_rms > kRightTimes) return start.residual_rms;
-    const Eigen::VectorXd off =
-        free_values(start.train, options.free) - free_values(sensor.train, options.free);
-    double unusual = 0;  // chi2 of the parameters
-    for (Eigen::Index i = 0; i < off.size(); ++i) {
-      unusual += std::pow(off[i] / options.free[static_cast<std::size_t>(i)].prior_sigma, 2);
-    }
+    const double unusual = prior_chi2(options.free, free_values(start.train, options.free) -
+                                                        free_values(sensor.train, options.free));
     // Residuals of unknown noise, two per shot, that are as unlikely as both together. Those of
     // neighbouring shots hang together, so that few count.
     constexpr double kIndependentShots = 100, kMostExponent = 20;

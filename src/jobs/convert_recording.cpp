@@ -6,7 +6,6 @@
 
 #include "risley/recordings/writer.hpp"
 
-#include "jobs/open_input.hpp"
 #include "jobs/packet_recording.hpp"
 
 namespace risley::jobs {
@@ -49,7 +48,7 @@ ConvertedRecording convert_recording(const ConvertRecordingOptions& options,
   ConvertedRecording result;
   const PlacedInput input =
       place_input(options.recording, options.reading, UntoldShots::guessed, progress.silent());
-  const auto reader = open_input(options.recording, input.reading, progress);
+  const std::unique_ptr<recordings::Reader>& reader = input.reader;
   const auto writer = recordings::create_recording(
       options.output, header_of(*reader, options, input, result, progress.silent()),
       options.format);

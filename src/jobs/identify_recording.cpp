@@ -14,7 +14,6 @@
 #include "risley/jobs/sensor_choice.hpp"
 #include "risley/sensors/preset.hpp"
 
-#include "jobs/open_input.hpp"
 #include "jobs/packet_recording.hpp"
 #include "jobs/stopwatch.hpp"
 
@@ -28,7 +27,7 @@ estimation::AngleSeries read(const IdentifyRecordingOptions& options, Identified
                              const Progress& progress) {
   const PlacedInput input =
       place_input(options.recording, options.reading, UntoldShots::left_out, progress);
-  const auto reader = open_input(options.recording, input.reading, progress);
+  const std::unique_ptr<recordings::Reader>& reader = input.reader;
   const recordings::RecordingHeader& header = reader->header();
   recordings::require_times(header);
   if (header.devices.size() > 1) {

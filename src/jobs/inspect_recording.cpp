@@ -4,7 +4,6 @@
 
 #include <utility>
 
-#include "jobs/open_input.hpp"
 #include "jobs/packet_recording.hpp"
 
 namespace risley::jobs {
@@ -20,7 +19,7 @@ InspectedRecording inspect_recording(const InspectRecordingOptions& options,
                                   input.reading, progress.stage("sharing"));
   }
   const Progress reading = progress.stage("reading");
-  const auto reader = open_input(options.recording, input.reading, progress);
+  const std::unique_ptr<recordings::Reader>& reader = input.reader;
   recordings::TimeAudit audit;
   recordings::Chunk chunk;
   try {

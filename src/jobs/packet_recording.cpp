@@ -22,15 +22,17 @@ constexpr std::size_t kFewestPackets = 10;
 
 }  // namespace
 
+bool PacketRecording::is_one(const recordings::RecordingHeader& header) {
+  return header.packet_shots > 0 && header.devices.size() == 1;
+}
+
 std::optional<PacketRecording> PacketRecording::open(const std::string& path,
                                                      const recordings::ReadOptions& options,
                                                      const Progress& progress) {
   recordings::ReadOptions as_it_is;
   as_it_is.extrinsics = options.extrinsics;
   const auto reader = open_input(path, as_it_is, progress);
-  if (reader->header().packet_shots == 0 || reader->header().devices.size() != 1) {
-    return std::nullopt;
-  }
+  if (!is_one(reader->header())) return std::nullopt;
   const auto variance = [](float step) { return step * step / 12.0F; };
   PacketRecording result;
   estimation::PacketShots& shots = result.shots_;
@@ -173,18 +175,20 @@ PlacedRows PacketRecording::place_rows(const sensors::Sensor& sensor,
 
 PlacedInput place_input(const std::string& path, const recordings::ReadOptions& options,
                         UntoldShots untold, const Progress& progress) {
-  PlacedInput result{options, {}, {}, 0};
+  PlacedInput result{options, open_input(path, options, progress), {}, {}, 0};
+  if (!PacketRecording::is_one(result.reader->header())) return result;
   const auto packets = PacketRecording::open(path, options, progress);
   if (!packets) return result;
   result.reading.shot_rate.reset();
   result.reading.packet_places = packets->middle_places();
-  const auto reader = open_input(path, result.reading, progress);
-  result.choice = choose_sensor(path, result.reading, reader->header(), {}, progress);
+  result.reader = open_input(path, result.reading, progress);
+  result.choice = choose_sensor(path, result.reading, result.reader->header(), {}, progress);
   PlacedRows placed =
       packets->place_rows(result.choice->sensor, options.shot_rate, untold, progress);
   result.reading.packet_places = std::move(placed.places);
   result.words = std::move(placed.words);
   result.time_uncertainty = placed.time_uncertainty;
+  result.reader = open_input(path, result.reading, progress);
   return result;
 }
 

@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -33,6 +34,8 @@ struct PlacedRows {
 /// shots, and its rows.
 class PacketRecording {
  public:
+  /// Whether a recording has one time for each packet, and is of one sensor.
+  static bool is_one(const recordings::RecordingHeader& header);
   /// Empty for any other recording. One may end within a packet.
   static std::optional<PacketRecording> open(const std::string& path,
                                              const recordings::ReadOptions& options,
@@ -60,16 +63,17 @@ class PacketRecording {
   std::uint8_t last_beam_ = 0;          // as the kind of packets says
 };
 
-/// How a recording is read that is not estimated, and which sensor made it.
+/// A recording that is not estimated, opened, and which sensor made it.
 struct PlacedInput {
-  recordings::ReadOptions reading;     ///< with the places of rows whose packets lack points
-  std::optional<SensorChoice> choice;  ///< where such places were looked for
-  std::vector<std::string> words;      ///< as PlacedRows
-  double time_uncertainty = 0;         ///< as PlacedRows
+  recordings::ReadOptions reading;  ///< with the places of rows whose packets lack points
+  std::unique_ptr<recordings::Reader> reader;  ///< as reading says, at its first row
+  std::optional<SensorChoice> choice;          ///< where such places were looked for
+  std::vector<std::string> words;              ///< as PlacedRows
+  double time_uncertainty = 0;                 ///< as PlacedRows
 };
 
-/// Finds when the shots of packets that lack points were fired; other recordings are read as asked
-/// for.
+/// Opens a recording and finds when the shots of packets that lack points were fired; others are
+/// read as asked for.
 /// @throws EstimationError as PacketRecording::place_rows(); as recordings::open_recording,
 ///         choose_sensor()
 PlacedInput place_input(const std::string& path, const recordings::ReadOptions& options,

@@ -68,9 +68,7 @@ std::string read_head(const std::string& path) {
 std::unique_ptr<Reader> open_as_it_is(const std::string& path, const Progress& progress) {
   const std::string head = read_head(path);
   for (const Format* format : all_formats()) {
-    if (!format->recognises(head)) continue;
-    return format->open_cancellable != nullptr ? format->open_cancellable(path, progress)
-                                               : format->open(path);
+    if (format->recognises(head)) return format->open(path, progress);
   }
   throw FileError(path, {0, {}},
                   fmt::format("is of no known kind: expected {}; it begins with {}",

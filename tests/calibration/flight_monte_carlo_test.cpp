@@ -25,6 +25,7 @@
 #include "risley/optics/observation_model.hpp"
 
 #include "calibration/flights.hpp"
+#include "seeds.hpp"
 
 namespace risley::calibration::flight_monte_carlo_test {
 
@@ -35,11 +36,6 @@ using Eigen::Vector3d;
 using testing::FlightErrors;
 using testing::FlightSettings;
 using testing::SimulatedFlight;
-
-int number_of(const char* wish, int usual) {
-  const char* const given = std::getenv(wish);
-  return given != nullptr ? std::max(1, std::atoi(given)) : usual;
-}
 
 Vector3d position_of(const ShotPose& pose) {
   return {pose.position[0], pose.position[1], pose.position[2]};
@@ -278,7 +274,7 @@ struct MeanSquare {
 TEST(FlightMonteCarlo, FourCrossingStripsAndThreeAnglesBesideThem) {
   const bool all_shots = std::getenv("RISLEY_SEEDS") != nullptr;
   const bool still = std::getenv("RISLEY_STILL") != nullptr;
-  const int first = number_of("RISLEY_FIRST_SEED", 1), seeds = number_of("RISLEY_SEEDS", 1);
+  const int first = testing::number_or("RISLEY_FIRST_SEED", 1), seeds = testing::seeds_or(1);
   MeanSquare total, shape, of_three, coverage;
   Vector3d before{0, 0, 0}, after{0, 0, 0};
   double nees = 0, covered = 0;

@@ -92,7 +92,7 @@ void write_and_read(const Format& format, const recordings::RecordingHeader& hea
     return;
   }
   try {
-    const auto reader = format.open(path);
+    const auto reader = format.open(path, {});
     std::vector<Chunk> again;
     require(read_all(*reader, written + 64 * (written + 1), &again), "what is written can be read");
     std::uint64_t rows = 0;
@@ -140,7 +140,7 @@ void read_twice(const Format& format, std::uint64_t rows_per_byte,
   std::vector<Chunk> chunks;
   bool opened = false;
   try {
-    const auto reader = format.open(file.path());
+    const auto reader = format.open(file.path(), {});
     opened = true;
     const bool sound = read_all(*reader, most_rows, &chunks);
     if (sound && format.create != nullptr) write_and_read(format, reader->header(), chunks);

@@ -4,7 +4,6 @@
 // RISLEY_FIRST_SEED, and prints what became of them.
 #include <algorithm>
 #include <chrono>
-#include <cstdlib>
 #include <string>
 
 #include <fmt/format.h>
@@ -15,13 +14,9 @@
 
 #include "identification/judge.hpp"
 #include "identification/scans.hpp"
+#include "seeds.hpp"
 
 namespace risley::identification::random_trains_test {
-
-std::uint64_t number_from(const char* variable, std::uint64_t otherwise) {
-  const char* text = std::getenv(variable);
-  return text == nullptr ? otherwise : std::strtoull(text, nullptr, 10);
-}
 
 /// A field of view below 80 degrees, by the deviations of thin prisms.
 constexpr double kLargestAside_deg = 38;
@@ -66,7 +61,7 @@ struct Tally {
 
 Tally run(int prisms, bool noisy, int trains) {
   Tally tally;
-  const std::uint64_t first = number_from("RISLEY_FIRST_SEED", 1);
+  const auto first = static_cast<std::uint64_t>(testing::number_or("RISLEY_FIRST_SEED", 1));
   for (int i = 0; i < trains; ++i) {
     Scan scan = random_scan(prisms, first + static_cast<std::uint64_t>(i));
     if (noisy) {
@@ -113,7 +108,7 @@ Tally run(int prisms, bool noisy, int trains) {
 
 /// @param share  that must be right of many
 void expect_right(int prisms, bool noisy, int few, double share) {
-  const int trains = static_cast<int>(number_from("RISLEY_SEEDS", static_cast<std::uint64_t>(few)));
+  const int trains = testing::seeds_or(few);
   const Tally tally = run(prisms, noisy, trains);
   EXPECT_LE(tally.wrong, trains >= 20 ? 1 : 0);
   EXPECT_GE(tally.right, trains >= 20 ? static_cast<int>(share * trains) : trains);

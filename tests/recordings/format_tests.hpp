@@ -68,7 +68,7 @@ inline Outcome read_all(const Format& format, const std::string& path,
   Outcome outcome;
   std::unique_ptr<Reader> reader;
   try {
-    reader = format.open(path);
+    reader = format.open(path, {});
     outcome.opened = true;
     outcome.recording.header = reader->header();
     Chunk chunk;
@@ -109,7 +109,7 @@ inline std::string copy_of(const Format& format, const std::string& path, std::s
                            const Format* target = nullptr) {
   const TemporaryFolder folder;
   const std::string copy = folder.file("copy");
-  auto reader = format.open(path);
+  auto reader = format.open(path, {});
   auto writer = (target != nullptr ? *target : format).create(copy, reader->header());
   Chunk chunk;
   while (reader->read(chunk, chunk_rows)) writer->write(chunk);

@@ -155,7 +155,7 @@ TEST(Netcdf, ChunksHoldWholePackets) {
   const TemporaryFolder folder;
   const std::string path = folder.file("recording.nc");
   write_all(kNetcdfFormat, path, rich_header(), packet_chunk(30));
-  auto reader = kNetcdfFormat.open(path);
+  auto reader = kNetcdfFormat.open(path, {});
   Chunk chunk;
   std::size_t chunks = 0;
   for (; reader->read(chunk, 100); ++chunks) {
@@ -291,7 +291,7 @@ TEST(Netcdf, RefusesForeignFiles) {
 
   EXPECT_FALSE(kNetcdfFormat.recognises("CDF\1"));
   EXPECT_TRUE(read_text(kNetcdfFormat, "\x89HDF\r\n\x1a\nnothing else").error);
-  EXPECT_THROW(kNetcdfFormat.open(folder.file("missing.nc")), FileError);
+  EXPECT_THROW(kNetcdfFormat.open(folder.file("missing.nc"), {}), FileError);
 }
 
 /// A sound recording that another program spoilt.

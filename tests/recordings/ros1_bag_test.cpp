@@ -456,7 +456,7 @@ TEST(Ros1Bag, MessagesStayWhole) {
   const TemporaryFolder folder;
   const std::string path = folder.file("input.bag");
   small_bag().write(path);
-  const auto reader = kRos1BagFormat.open(path);
+  const auto reader = kRos1BagFormat.open(path, {});
   Chunk chunk;
   std::size_t chunks = 0, rows = 0;
   double fraction = 0.0;

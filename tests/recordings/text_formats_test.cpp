@@ -193,7 +193,7 @@ TEST(ScanSequence, DamageIsReportedAgain) {
   const TemporaryFolder folder;
   const std::string path = folder.file("damaged.csv");
   put_bytes(path, kHead + "0.00001,1.00000,2.00000\nx\n");
-  auto reader = kScanSequenceCsvFormat.open(path);
+  auto reader = kScanSequenceCsvFormat.open(path, {});
   Chunk chunk;
   EXPECT_TRUE(reader->read(chunk));
   EXPECT_THROW(reader->read(chunk), FileError);
@@ -210,8 +210,8 @@ TEST(ScanSequence, RefusesOtherHeaders) {
     ASSERT_TRUE(outcome.error);
     EXPECT_EQ(outcome.error->place().line, 1U);
   }
-  EXPECT_THROW(kScanSequenceCsvFormat.open("/no/such/file.csv"), FileError);
-  EXPECT_THROW(kScanSequenceCsvFormat.open("/"), FileError);
+  EXPECT_THROW(kScanSequenceCsvFormat.open("/no/such/file.csv", {}), FileError);
+  EXPECT_THROW(kScanSequenceCsvFormat.open("/", {}), FileError);
 }
 
 TEST(ScanSequence, ShotNumbersAreNoSeconds) {

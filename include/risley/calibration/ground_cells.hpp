@@ -54,6 +54,11 @@ GroundCells ground_cells(const ShotPoints& points, const std::vector<std::uint16
 struct GroundCircle {
   Eigen::Vector3d centre{0, 0, 0};  ///< of which the height counts nothing
   double radius = 1;                ///< m
+
+  bool holds(const std::array<float, 3>& point) const {
+    const double east = point[0] - centre.x(), north = point[1] - centre.y();
+    return east * east + north * north <= radius * radius;
+  }
 };
 
 /// Takes the points of circles out of their cells and gives each circle a plane behind those of the

@@ -48,4 +48,8 @@ Eigen::VectorXd free_values(const PrismTrain& train, const std::vector<FreeParam
 PrismTrain with_free_values(PrismTrain train, const std::vector<FreeParameter>& free,
                             const Eigen::VectorXd& values);
 
+/// Squared distances of values from those expected before, in prior sigmas, summed.
+/// @param offset  [free], SI units
+double prior_chi2(const std::vector<FreeParameter>& free, const Eigen::VectorXd& offset);
+
 }  // namespace risley::estimation

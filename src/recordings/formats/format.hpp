@@ -25,14 +25,12 @@ struct Format {
   std::string_view description;  ///< one line for the help
   /// Whether a file that starts with these bytes (up to kHeadBytes) is of this format.
   bool (*recognises)(std::string_view head);
-  std::unique_ptr<Reader> (*open)(const std::string& path);
+  /// @param progress  cancels where much may have to be looked through before there is a row, or
+  ///                  nothing is heard of a library for long
+  std::unique_ptr<Reader> (*open)(const std::string& path, const Progress& progress);
   /// nullptr when the format is only read.
   std::unique_ptr<Writer> (*create)(const std::string& path, const RecordingHeader& header);
   bool holds_shot_numbers = false;  ///< recordings without times can be written, too
-  /// As open, where much may have to be looked through before there is a row, or nothing is heard
-  /// of a library for long: can be cancelled.
-  std::unique_ptr<Reader> (*open_cancellable)(const std::string& path,
-                                              const Progress& progress) = nullptr;
 };
 
 extern const Format kLvx11Format;            // lvx11.cpp

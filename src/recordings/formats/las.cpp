@@ -291,7 +291,7 @@ const Format kLasFormat = {
     "",
     "LAS 1.0 to 1.4: points in the frame of the sensor (read only)",
     [](std::string_view head) { return las::is_las(head) && !las::is_compressed(head); },
-    [](const std::string& path) -> std::unique_ptr<Reader> {
+    [](const std::string& path, const Progress&) -> std::unique_ptr<Reader> {
       return std::make_unique<las::LasReader>(path, "las");
     },
     nullptr,
@@ -302,7 +302,7 @@ const Format kLazFormat = {
     "",
     "LAS compressed by LASzip: points in the frame of the sensor (read only)",
     [](std::string_view head) { return las::is_las(head) && las::is_compressed(head); },
-    [](const std::string& path) -> std::unique_ptr<Reader> {
+    [](const std::string& path, const Progress&) -> std::unique_ptr<Reader> {
       return std::make_unique<las::LasReader>(path, "laz");
     },
     nullptr,

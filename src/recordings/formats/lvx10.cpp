@@ -54,7 +54,7 @@ std::size_t probe_frame_header(io::BlockInput& file, std::uint64_t first_frame,
   return kLong;
 }
 
-std::unique_ptr<Reader> open_lvx10(const std::string& path) {
+std::unique_ptr<Reader> open_lvx10(const std::string& path, const Progress&) {
   io::BlockInput file(path);
   lvx_version(file);
   const std::size_t count = *lvx_header_bytes(file, kLvx10DeviceCountAt, 1, "number of devices");

@@ -38,7 +38,7 @@ bool recognises_lvx11(std::string_view head) {
   return head.starts_with(kLvxName) && !kLvx10Format.recognises(head);
 }
 
-std::unique_ptr<Reader> open_lvx11(const std::string& path) {
+std::unique_ptr<Reader> open_lvx11(const std::string& path, const Progress&) {
   io::BlockInput file(path);
   const auto version_bytes = lvx_version(file);
   if (version_bytes[0] == 2) {

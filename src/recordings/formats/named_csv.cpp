@@ -179,7 +179,7 @@ const Format kNamedCsvFormat = {
       const auto head = find_head(bytes);
       return head && (head->has_row || has_directions(*head));
     },
-    [](const std::string& path) -> std::unique_ptr<Reader> {
+    [](const std::string& path, const Progress&) -> std::unique_ptr<Reader> {
       return std::make_unique<NamedTextReader>(path, kNamedCsv, read_layout(path));
     },
     nullptr,

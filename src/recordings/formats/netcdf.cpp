@@ -17,10 +17,9 @@ const Format kNetcdfFormat = {
     ".nc",
     "NetCDF-4, the lossless format: everything a recording holds",
     [](std::string_view head) { return head.starts_with(kNetcdf4Signature); },
-    [](const std::string& path) { return netcdf::open_recording(path, {}); },
+    netcdf::open_recording,
     netcdf::create_recording,
     true,
-    netcdf::open_recording,
 };
 
 }  // namespace risley::recordings

@@ -173,7 +173,7 @@ const Format kNpyFormat = {
     "",
     "NumPy array of named fields, or of rows x y z [intensity] (read only)",
     [](std::string_view head) { return head.starts_with(kArraySignature); },
-    [](const std::string& path) -> std::unique_ptr<Reader> {
+    [](const std::string& path, const Progress&) -> std::unique_ptr<Reader> {
       return std::make_unique<BinaryTableReader>(path, kNpyName, npy_table(path));
     },
     nullptr,
@@ -184,7 +184,7 @@ const Format kNpzFormat = {
     "",
     "NumPy arrays by name, such as x, y, z and time (read only)",
     [](std::string_view head) { return head.starts_with("PK\x03\x04"); },
-    [](const std::string& path) -> std::unique_ptr<Reader> {
+    [](const std::string& path, const Progress&) -> std::unique_ptr<Reader> {
       return std::make_unique<BinaryTableReader>(path, kNpzName, npz_table(path));
     },
     nullptr,

@@ -277,7 +277,7 @@ const Format kOpenpylivoxBinFormat = {
     ".bin",
     "openpylivox binary capture: points with intensity and time",
     [](std::string_view head) { return head.starts_with(kBinSignature); },
-    [](const std::string& path) -> std::unique_ptr<Reader> {
+    [](const std::string& path, const Progress&) -> std::unique_ptr<Reader> {
       return std::make_unique<OpenpylivoxBinReader>(path);
     },
     [](const std::string& path, const RecordingHeader& header) -> std::unique_ptr<Writer> {

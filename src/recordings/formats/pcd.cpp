@@ -249,7 +249,7 @@ const Format kPcdFormat = {
     "",
     "PCD point cloud, as text, bytes or packed bytes (read only)",
     is_pcd,
-    [](const std::string& path) -> std::unique_ptr<Reader> {
+    [](const std::string& path, const Progress&) -> std::unique_ptr<Reader> {
       PcdHeader header = read_pcd_header(path);
       if (header.data == "ascii") {
         return std::make_unique<NamedTextReader>(path, kPcd, text_layout(std::move(header)));

@@ -205,7 +205,7 @@ const Format kPlyFormat = {
     "",
     "PLY point cloud, as text or bytes (read only)",
     [](std::string_view head) { return head.starts_with("ply\n") || head.starts_with("ply\r\n"); },
-    [](const std::string& path) -> std::unique_ptr<Reader> {
+    [](const std::string& path, const Progress&) -> std::unique_ptr<Reader> {
       const PlyHeader header = read_ply_header(path);
       if (header.text) {
         return std::make_unique<NamedTextReader>(path, kPly, text_layout(header));

@@ -12,11 +12,6 @@ namespace {
 
 constexpr std::string_view kRos1Bag = "ros1-bag";
 
-std::unique_ptr<Reader> open_ros1(const std::string& path, const Progress& progress) {
-  return std::make_unique<MessageReader>(bags::open_bag(path, bags::BagKind::ros1, progress),
-                                         kRos1Bag);
-}
-
 }  // namespace
 
 const Format kRos1BagFormat = {
@@ -24,10 +19,11 @@ const Format kRos1BagFormat = {
     "",
     "bag of ROS 1: messages of Livox drivers, point clouds (read only)",
     [](std::string_view head) { return bags::bag_kind(head) == bags::BagKind::ros1; },
-    [](const std::string& path) { return open_ros1(path, {}); },
+    [](const std::string& path, const Progress& progress) -> std::unique_ptr<Reader> {
+      return std::make_unique<MessageReader>(bags::open_bag(path, bags::BagKind::ros1, progress),
+                                             kRos1Bag);
+    },
     nullptr,
-    false,
-    open_ros1,
 };
 
 }  // namespace risley::recordings

@@ -12,11 +12,6 @@ namespace {
 
 constexpr std::string_view kRos2Bag = "ros2-bag";
 
-std::unique_ptr<Reader> open_ros2(const std::string& path, const Progress& progress) {
-  return std::make_unique<MessageReader>(bags::open_bag(path, bags::BagKind::ros2, progress),
-                                         kRos2Bag);
-}
-
 }  // namespace
 
 const Format kRos2BagFormat = {
@@ -24,10 +19,11 @@ const Format kRos2BagFormat = {
     "",
     "bag of ROS 2 in SQLite (.db3): messages of Livox drivers, point clouds (read only)",
     [](std::string_view head) { return bags::bag_kind(head) == bags::BagKind::ros2; },
-    [](const std::string& path) { return open_ros2(path, {}); },
+    [](const std::string& path, const Progress& progress) -> std::unique_ptr<Reader> {
+      return std::make_unique<MessageReader>(bags::open_bag(path, bags::BagKind::ros2, progress),
+                                             kRos2Bag);
+    },
     nullptr,
-    false,
-    open_ros2,
 };
 
 }  // namespace risley::recordings

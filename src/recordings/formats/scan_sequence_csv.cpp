@@ -226,7 +226,7 @@ const Format kScanSequenceCsvFormat = {
     ".csv",
     "Livox scan sequence: time, azimuth and zenith as text, no ranges",
     [](std::string_view head) { return normalized_header(head) == kSequenceHeader; },
-    [](const std::string& path) -> std::unique_ptr<Reader> {
+    [](const std::string& path, const Progress&) -> std::unique_ptr<Reader> {
       return std::make_unique<ScanSequenceReader>(path);
     },
     [](const std::string& path, const RecordingHeader& header) -> std::unique_ptr<Writer> {
