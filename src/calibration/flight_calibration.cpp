@@ -482,30 +482,33 @@ void FlightWork::fill_mount_and_sensor() {
   sensor.range_offset = model_.range_offset;
   sensor.reference = sensors::CalibrationReference::planes;
   sensor.provenance.clear();
-  sensor.covariance_names.clear();
-  std::vector<Index> kept;
-  for (Index i = FlightUnknowns::range_offset(); i < globals; ++i) {
+  std::vector<Index> of_mount_rows, of_sensor_rows;
+  for (Index i = 0; i < globals; ++i) {
     const bool adjusted = !priors_.held[static_cast<std::size_t>(i)];
-    if (i == FlightUnknowns::clock_offset() ||
-        (!adjusted && i < globals - static_cast<Index>(start_.considered))) {
+    const std::string& name = names[static_cast<std::size_t>(i)];
+    if (i < FlightUnknowns::range_offset() || i == FlightUnknowns::clock_offset()) {
+      if (adjusted) of_mount_rows.push_back(i);
       continue;
     }
-    kept.push_back(i);
-    const std::string& name = names[static_cast<std::size_t>(i)];
-    sensor.covariance_names.push_back(name);
+    if (!adjusted && i < globals - static_cast<Index>(start_.considered)) continue;
+    of_sensor_rows.push_back(i);
     if (adjusted) {
       sensor.set_knowledge({name, std::sqrt(result_.covariance(i, i)),
                             "calibrated in flight by risley calibrate", 0});
     }
   }
-  const auto count = static_cast<Index>(kept.size());
-  sensor.covariance.resize(count, count);
-  for (Index i = 0; i < count; ++i) {
-    for (Index j = 0; j < count; ++j) {
-      sensor.covariance(i, j) =
-          result_.covariance(kept[static_cast<std::size_t>(i)], kept[static_cast<std::size_t>(j)]);
-    }
-  }
+  const auto named = [&](const std::vector<Index>& rows) {
+    algebra::NamedCovariance some;
+    for (const Index i : rows) some.names.push_back(names[static_cast<std::size_t>(i)]);
+    some.matrix = result_.covariance(rows, rows);
+    return some;
+  };
+  algebra::NamedCovariance own = named(of_sensor_rows);
+  sensor.covariance_names = std::move(own.names);
+  sensor.covariance = std::move(own.matrix);
+  std::vector<Index> all_rows = of_mount_rows;
+  all_rows.insert(all_rows.end(), of_sensor_rows.begin(), of_sensor_rows.end());
+  result_.mount.covariance = named(all_rows);
 }
 
 /// What one more step would do if the clock could drift and what is held, though it may be off,

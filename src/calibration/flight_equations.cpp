@@ -288,9 +288,9 @@ struct PieceSums {
 }  // namespace
 
 std::vector<std::string> unknown_names(const FlightModel& model) {
-  std::vector<std::string> names{"boresight_x_deg", "boresight_y_deg", "boresight_z_deg",
-                                 "lever_arm_x_m",   "lever_arm_y_m",   "lever_arm_z_m",
-                                 "range_offset_m",  "clock_offset_s"};
+  const auto& of_mount = trajectories::mount_names();
+  std::vector<std::string> names(of_mount.begin(), of_mount.end() - 1);
+  names.insert(names.end(), {"range_offset_m", of_mount.back()});
   for (const estimation::FreeParameter& parameter : model.free) names.push_back(parameter.name);
   if (model.drift_about_ns) names.emplace_back("clock_drift");
   return names;

@@ -102,7 +102,8 @@ void set_priors(const FlightCalibrationOptions& options, FlightStart& start) {
     start.prior_sigma[FlightUnknowns::parameter(static_cast<int>(j))] =
         start.model.free[j].prior_sigma;
   }
-  // A calibration's covariance takes the place of the single sigmas.
+  // A calibration's covariance, and that of a mount that was found with it, take the place of the
+  // single sigmas.
   MatrixXd covariance = start.prior_sigma.cwiseAbs2().asDiagonal();
   const sensors::Sensor& sensor = options.sensor;
   require_length("rows of the sensor's covariance",
@@ -111,21 +112,19 @@ void set_priors(const FlightCalibrationOptions& options, FlightStart& start) {
   require_length("columns of the sensor's covariance",
                  static_cast<std::size_t>(sensor.covariance.cols()),
                  sensor.covariance_names.size());
+  const algebra::NamedCovariance stated =
+      trajectories::joint_covariance({sensor.covariance_names, sensor.covariance}, options.mount);
   const std::vector<std::string> names = unknown_names(start.model);
-  std::vector<std::pair<Index, Index>> known;  // unknown, its row of the sensor's covariance
+  std::vector<std::pair<Index, Index>> known;  // unknown, its row of what is stated
   const Index adjusted = globals - static_cast<Index>(start.considered);
-  for (std::size_t i = 0; i < sensor.covariance_names.size(); ++i) {
-    const auto at = std::find(names.begin(), names.end(), sensor.covariance_names[i]);
-    if (at != names.end() && at - names.begin() < adjusted) {
-      known.emplace_back(at - names.begin(), static_cast<Index>(i));
-    }
+  for (std::size_t i = 0; i < stated.names.size(); ++i) {
+    const auto at = std::find(names.begin(), names.end(), stated.names[i]) - names.begin();
+    if (at >= adjusted) continue;
+    if (at == FlightUnknowns::range_offset() && options.range_offset_sigma == 0) continue;
+    known.emplace_back(at, static_cast<Index>(i));
   }
   for (const auto& [i, row] : known) {
-    if (i == FlightUnknowns::range_offset() && options.range_offset_sigma == 0) continue;
-    for (const auto& [j, column] : known) {
-      if (j == FlightUnknowns::range_offset() && options.range_offset_sigma == 0) continue;
-      covariance(i, j) = sensor.covariance(row, column);
-    }
+    for (const auto& [j, column] : known) covariance(i, j) = stated.matrix(row, column);
     start.prior_sigma[i] = std::sqrt(covariance(i, i));
   }
   // What has a sigma of 0 is held; any information keeps the matrix regular.

@@ -40,14 +40,20 @@ Factors::Factors(PointingModel& model, const SensorBelief& belief)
   for (int place = 0; place < all_places(); ++place) model_.places.push_back(place);
 }
 
-void Factors::add(const Uncertain& uncertain, bool moves_beam, bool moves_angles) {
-  const Eigen::MatrixXd factor = lower_factor(uncertain.covariance);
+void Factors::add(const algebra::NamedCovariance& uncertain, bool moves_beam, bool moves_angles) {
+  const Eigen::MatrixXd factor = lower_factor(uncertain.matrix);
+  const auto& of_mount = trajectories::mount_names();
   for (Index j = 0; j < factor.cols(); ++j) {
     CommonFactor common = nothing(uncertain.names[static_cast<std::size_t>(j)]);
     for (Index i = j; i < factor.rows(); ++i) {
       const std::string& name = uncertain.names[static_cast<std::size_t>(i)];
       if (name == kRangeOffset) {
         common.range_offset = factor(i, j);
+        continue;
+      }
+      const auto own = std::find(of_mount.begin(), of_mount.end(), name);
+      if (own != of_mount.end()) {
+        common.mount[static_cast<std::size_t>(own - of_mount.begin())] = factor(i, j);
         continue;
       }
       if (moves_beam) {
@@ -61,9 +67,10 @@ void Factors::add(const Uncertain& uncertain, bool moves_beam, bool moves_angles
   }
 }
 
-void Factors::add_angles(const Uncertain& uncertain) {
+void Factors::add_angles(const algebra::NamedCovariance& uncertain) {
+  if (uncertain.empty()) return;  // held, all of them
   const Eigen::MatrixXd factor =
-      lower_factor(algebra::propagated(belief_.angle_sensitivity, uncertain.covariance));
+      lower_factor(algebra::propagated(belief_.angle_sensitivity, uncertain.matrix));
   for (int j = 0; j < prisms(); ++j) {
     CommonFactor common = nothing(fmt::format("rotation_angle_{}_deg", prism_letter(j)));
     common.weights.segment(all_places(), prisms()) = factor.col(j);
@@ -112,7 +119,8 @@ void Factors::finish() {
 CommonFactor Factors::nothing(std::string name) const {
   return {std::move(name),
           Eigen::VectorXd::Zero(all_places() + prisms() + static_cast<Index>(model_.sizes.size())),
-          0.0};
+          0.0,
+          {}};
 }
 
 void Factors::move_angles(const std::string& name, double value, CommonFactor& common) const {
@@ -126,7 +134,9 @@ void Factors::move_angles(const std::string& name, double value, CommonFactor& c
 }
 
 void Factors::keep(CommonFactor common) {
-  if (common.range_offset == 0 && common.weights.isZero(0.0)) return;
+  const bool moves_mount = std::any_of(common.mount.begin(), common.mount.end(),
+                                       [](double weight) { return weight != 0; });
+  if (common.range_offset == 0 && common.weights.isZero(0.0) && !moves_mount) return;
   model_.factors.push_back(std::move(common));
 }
 

@@ -7,6 +7,7 @@
 
 #include <Eigen/Core>
 
+#include "risley/algebra/named_covariance.hpp"
 #include "risley/cloud/pointing_model.hpp"
 
 namespace risley::cloud {
@@ -14,23 +15,18 @@ namespace risley::cloud {
 /// The range offset among the names of a calibration's quantities.
 inline constexpr const char* kRangeOffset = "range_offset_m";
 
-/// Some quantities with a joint covariance.
-struct Uncertain {
-  std::vector<std::string> names;
-  Eigen::MatrixXd covariance;
-};
-
 /// Builds the common factors of a model.
 class Factors {
  public:
   Factors(PointingModel& model, const SensorBelief& belief);
 
+  /// The quantities may be parameters, the range offset and those of a mount.
   /// @param moves_beam    errors of the parameters move the beam at given rotation angles
   /// @param moves_angles  they also move the rotation angles that were found
-  void add(const Uncertain& uncertain, bool moves_beam, bool moves_angles);
+  void add(const algebra::NamedCovariance& uncertain, bool moves_beam, bool moves_angles);
 
   /// What errors of the believed parameters do to the rotation angles, as one factor per prism.
-  void add_angles(const Uncertain& uncertain);
+  void add_angles(const algebra::NamedCovariance& uncertain);
 
   /// Those of the prisms' sizes and, where the calibration's covariance has none, the range offset.
   void add_geometry(const sensors::Sensor& sensor);

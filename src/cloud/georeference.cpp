@@ -19,7 +19,7 @@
 #include "risley/trajectories/geodesy.hpp"
 
 #include "cloud/georeference_kernel.hpp"
-#include "cloud/plain_poses.hpp"
+#include "cloud/sensor_poses.hpp"
 
 namespace risley::cloud {
 namespace {
@@ -41,15 +41,6 @@ constexpr double kOffsetStep = 1000;
 /// rad/s is left by (0.05)^6 / 6!.
 constexpr std::int64_t kCell_ns = 5'000'000;
 constexpr double kCell = 5e-3;
-
-constexpr std::array<const char*, 7> kMountFactors{
-    "boresight_x_deg", "boresight_y_deg", "boresight_z_deg", "lever_arm_x_m",
-    "lever_arm_y_m",   "lever_arm_z_m",   "clock_offset_s"};
-
-/// Diagonal matrix of squares.
-Matrix3d variances(double a, double b, double c) {
-  return Vector3d(a * a, b * b, c * c).asDiagonal();
-}
 
 /// Says when a trajectory leaves the area that a map is meant for; empty when it does not.
 /// @throws InvalidArgument far away from it, where a map is of no use
@@ -131,14 +122,6 @@ struct Georeference::State {
   /// North, east and down at a place, axes of the map.
   Matrix3d map_from_ned(const MapTangent& tangent, const Vector3d& place) const {
     return tangent.jacobian() * trajectories::ned_axes(platform.trajectory.frame, place);
-  }
-
-  /// Standard deviations of the mount in the order of its factors.
-  std::array<double, kMountFactors.size()> mount_sigmas() const {
-    const trajectories::Mount& mount = platform.mount;
-    return {mount.boresight[0].sigma, mount.boresight[1].sigma, mount.boresight[2].sigma,
-            mount.lever_arm[0].sigma, mount.lever_arm[1].sigma, mount.lever_arm[2].sigma,
-            mount.clock_offset.sigma};
   }
 };
 
@@ -238,7 +221,7 @@ const SensorPose* Georeference::Cursor::at(std::int64_t recording_time_ns) {
   return &pose_;
 }
 
-void Georeference::announce(CloudHeader& header, bool loadings) const {
+void Georeference::announce(CloudHeader& header) const {
   const State& s = *state_;
   const trajectories::Trajectory& trajectory = s.platform.trajectory;
   header.has_own_covariance = header.has_covariance;
@@ -261,11 +244,6 @@ void Georeference::announce(CloudHeader& header, bool loadings) const {
   }
   header.time_reference =
       s.utc_shift_ns ? recordings::TimeReference::utc : recordings::TimeReference::relative;
-  if (loadings && header.has_covariance) {
-    for (std::size_t k = 0; k < kMountFactors.size(); ++k) {
-      if (s.mount_sigmas()[k] > 0) header.factors.emplace_back(kMountFactors[k]);
-    }
-  }
   if (!s.errors || !header.has_covariance) return;
   TrajectoryErrors& errors = header.trajectory.emplace();
   const auto copy = [](const trajectories::PoseErrorVector& from, std::array<double, 6>& to) {
@@ -292,21 +270,14 @@ void Georeference::announce(CloudHeader& header, bool loadings) const {
   }
 }
 
-void Georeference::apply(Points& points, std::size_t sensor_factors,
-                         std::span<const SensorPose> poses, InstructionSet set) const {
+void Georeference::apply(Points& points, std::span<const SensorPose> poses,
+                         InstructionSet set) const {
   const State& s = *state_;
   const std::size_t n = points.size();
   require_length("poses", poses.size(), n);
   require_length("point_source", points.point_source.size(), n);
   if (n == 0) return;
   const bool covariance = !points.covariance[kXX].empty();
-  const bool loadings = points.loading.size() > 0;
-  const std::array<double, kMountFactors.size()> sigma = s.mount_sigmas();
-  if (loadings) {
-    const auto used = static_cast<std::size_t>(
-        std::count_if(sigma.begin(), sigma.end(), [](double one) { return one > 0; }));
-    require_length("loading", points.loading.size(), sensor_factors + used);
-  }
 
   // Where the points are, and the map about their middle.
   const Vector3d local = poses.front().reference;  // keeps digits
@@ -362,20 +333,19 @@ void Georeference::apply(Points& points, std::size_t sensor_factors,
     position = ned * variance.head<3>().asDiagonal() * ned.transpose();
     turning = ned * variance.tail<3>().asDiagonal() * ned.transpose();
   }
-  // Of the lever arm's errors, which turn with the body, that of the middle: they are millimetres.
-  const Matrix3d body_axes = jacobian * poses[n / 2].turn * s.body_from_sensor.transpose();
   const std::int64_t time_shift = s.shift_ns + s.utc_shift_ns.value_or(0);
   for (std::size_t i = 0; i < n; ++i) {
     points.time_ns[i] += time_shift;
     points.point_source[i] = poses[i].strip;
   }
-  if (loadings) {
-    const std::vector<Vector3d> arms = [&] {
-      std::vector<Vector3d> all(n);
-      for (std::size_t i = 0; i < n; ++i) all[i] = {arm[0][i], arm[1][i], arm[2][i]};
-      return all;
-    }();
-    turn_loadings(points, sensor_factors, poses, arms, jacobian);
+  for (auto& loading : points.loading) {
+    for (std::size_t i = 0; i < n; ++i) {
+      const Vector3d on_axes =
+          jacobian * (poses[i].turn * Vector3d(loading[0][i], loading[1][i], loading[2][i]));
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        loading[axis][i] = on_axes[static_cast<Index>(axis)];
+      }
+    }
   }
 
   MapArguments to_map;
@@ -398,11 +368,7 @@ void Georeference::apply(Points& points, std::size_t sensor_factors,
       to_map.covariance[k] = points.covariance[k].data();
       to_map.own_covariance[k] = points.own_covariance[k].data();
     }
-    for (std::size_t k = 0; k < 3; ++k) to_map.boresight_variance[k] = sigma[k] * sigma[k];
-    to_map.clock_sigma = sigma[6];
-    copy_terms(
-        position + body_axes * variances(sigma[3], sigma[4], sigma[5]) * body_axes.transpose(),
-        to_map.shifted);
+    copy_terms(position, to_map.shifted);
     copy_terms(turning, to_map.turned_by);
   }
   RISLEY_KERNEL_COPIES(map_points).at(set)(to_map);
@@ -412,42 +378,6 @@ void Georeference::apply(Points& points, std::size_t sensor_factors,
     points.x[i] = mapped.x();
     points.y[i] = mapped.y();
     points.z[i] = mapped.z();
-  }
-}
-
-void Georeference::turn_loadings(Points& points, std::size_t sensor_factors,
-                                 std::span<const SensorPose> poses, std::span<const Vector3d> arms,
-                                 const Matrix3d& jacobian) const {
-  const State& s = *state_;
-  const std::array<double, kMountFactors.size()> sigma = s.mount_sigmas();
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    const SensorPose& pose = poses[i];
-    const Vector3d p(points.x[i], points.y[i], points.z[i]);
-    const Matrix3d to_map = jacobian * pose.turn;
-    for (std::size_t k = 0; k < sensor_factors; ++k) {
-      auto& f = points.loading[k];
-      const Vector3d on_axes = to_map * Vector3d(f[0][i], f[1][i], f[2][i]);
-      for (std::size_t axis = 0; axis < 3; ++axis) f[axis][i] = on_axes[static_cast<Index>(axis)];
-    }
-    std::size_t at = sensor_factors;
-    const auto put = [&](const Vector3d& loading) {
-      for (std::size_t axis = 0; axis < 3; ++axis) {
-        points.loading[at][axis][i] = loading[static_cast<Index>(axis)];
-      }
-      ++at;
-    };
-    for (Index k = 0; k < 3; ++k) {
-      const double one = sigma[static_cast<std::size_t>(k)];
-      if (one > 0) put(to_map * (one * Vector3d::Unit(k).cross(p)));
-    }
-    const Matrix3d from_body = to_map * s.body_from_sensor.transpose();
-    for (Index k = 0; k < 3; ++k) {
-      const double one = sigma[static_cast<std::size_t>(k) + 3];
-      if (one > 0) put(one * from_body.col(k));
-    }
-    if (sigma[6] > 0) {
-      put(sigma[6] * (jacobian * (pose.velocity + pose.rate.cross(arms[i]))));
-    }
   }
 }
 

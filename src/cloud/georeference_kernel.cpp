@@ -6,11 +6,14 @@
 #include "risley/core/simd.hpp"
 #include "risley/core/vector3.hpp"
 
+#include "cloud/pose_lanes.hpp"
+
 namespace risley::cloud::RISLEY_KERNEL_NAMESPACE {
 namespace {
 
 using Batch = xsimd::batch<double>;
 using Vector = Vector3<Batch>;
+using Matrix = LaneMatrix<Batch>;
 constexpr std::size_t kLanes = Batch::size;
 
 /// The shots of one group: those from `at` on, the last one again where there are fewer.
@@ -42,18 +45,14 @@ struct Group {
     store(value.z, columns[2]);
   }
   /// Numbers that stand with the poses.
-  template <std::size_t N>
-  void gather(const double* first, std::size_t stride, Batch (&numbers)[N]) const {
-    alignas(64) double lanes[N][kLanes];
-    for (std::size_t i = 0; i < kLanes; ++i) {
-      const double* own = first + (at + (i < count ? i : count - 1)) * stride;
-      for (std::size_t k = 0; k < N; ++k) lanes[k][i] = own[k];
-    }
-    for (std::size_t k = 0; k < N; ++k) numbers[k] = Batch::load_aligned(lanes[k]);
+  Matrix matrix(const double* first, std::size_t stride) const {
+    Matrix result;
+    gather(first, stride, at, count, result.m);
+    return result;
   }
-  Vector gather(const double* first, std::size_t stride) const {
+  Vector vector(const double* first, std::size_t stride) const {
     Batch numbers[3];
-    gather(first, stride, numbers);
+    gather(first, stride, at, count, numbers);
     return {numbers[0], numbers[1], numbers[2]};
   }
 };
@@ -64,24 +63,6 @@ void for_each_group(std::size_t shots, Function&& function) {
     function(Group{at, shots - at < kLanes ? shots - at : kLanes});
   }
 }
-
-/// Column by column.
-struct Matrix {
-  Batch m[9];
-
-  Matrix() = default;
-  explicit Matrix(const double* numbers) {
-    for (std::size_t k = 0; k < 9; ++k) m[k] = Batch(numbers[k]);
-  }
-  Vector operator*(const Vector& v) const {
-    return {m[0] * v.x + m[3] * v.y + m[6] * v.z, m[1] * v.x + m[4] * v.y + m[7] * v.z,
-            m[2] * v.x + m[5] * v.y + m[8] * v.z};
-  }
-  Vector back(const Vector& v) const {
-    return {m[0] * v.x + m[1] * v.y + m[2] * v.z, m[3] * v.x + m[4] * v.y + m[5] * v.z,
-            m[6] * v.x + m[7] * v.y + m[8] * v.z};
-  }
-};
 
 Vector broadcast_vector(const double (&v)[3]) { return {Batch(v[0]), Batch(v[1]), Batch(v[2])}; }
 
@@ -129,11 +110,10 @@ void place_points(const PlaceArguments& a) {
   const Vector local = broadcast_vector(a.local);
   for_each_group(a.shots, [&](const Group& group) {
     const PlainPoses& poses = a.poses;
-    Matrix turn;
-    group.gather(poses.turn, poses.stride, turn.m);
-    const Vector arm = turn * group.load(a.point) + group.gather(poses.lever, poses.stride);
+    const Matrix turn = group.matrix(poses.turn, poses.stride);
+    const Vector arm = turn * group.load(a.point) + group.vector(poses.lever, poses.stride);
     group.store(arm, a.arm);
-    group.store((group.gather(poses.reference, poses.stride) - local) + arm, a.place);
+    group.store((group.vector(poses.reference, poses.stride) - local) + arm, a.place);
   });
 }
 
@@ -143,13 +123,11 @@ void map_points(const MapArguments& a) {
     const Vector d = group.load(a.place) - center;
     const Vector bent{dot(d, product(a.half_hessian[0], d)), dot(d, product(a.half_hessian[1], d)),
                       dot(d, product(a.half_hessian[2], d))};
-    const Vector p = group.load(a.point);
     group.store(value + (product(a.jacobian, d) + bent), a.point);
     if (!a.covariance[0]) return;
 
     const PlainPoses& poses = a.poses;
-    Matrix turn;
-    group.gather(poses.turn, poses.stride, turn.m);
+    const Matrix turn = group.matrix(poses.turn, poses.stride);
     const Vector x = product(a.jacobian, {turn.m[0], turn.m[1], turn.m[2]}),
                  y = product(a.jacobian, {turn.m[3], turn.m[4], turn.m[5]}),
                  z = product(a.jacobian, {turn.m[6], turn.m[7], turn.m[8]});
@@ -158,35 +136,19 @@ void map_points(const MapArguments& a) {
       store_symmetric(group, turned(to_map, load_symmetric(group, a.own_covariance)),
                       a.own_covariance);
     }
-    // What the boresight does, [p]x diag [p]x', stands in the sensor's axes.
-    Symmetric sensor = load_symmetric(group, a.covariance);
-    const Batch b0(a.boresight_variance[0]), b1(a.boresight_variance[1]),
-        b2(a.boresight_variance[2]);
-    sensor.xx = sensor.xx + p.z * p.z * b1 + p.y * p.y * b2;
-    sensor.xy = sensor.xy - p.x * p.y * b2;
-    sensor.xz = sensor.xz - p.x * p.z * b1;
-    sensor.yy = sensor.yy + p.z * p.z * b0 + p.x * p.x * b2;
-    sensor.yz = sensor.yz - p.y * p.z * b0;
-    sensor.zz = sensor.zz + p.y * p.y * b0 + p.x * p.x * b1;
-    const Symmetric turned_sensor = turned(to_map, sensor);
-    const Vector arm = group.load(a.arm);
-    const Vector reach = product(a.jacobian, arm);
+    const Symmetric turned_sensor = turned(to_map, load_symmetric(group, a.covariance));
+    const Vector reach = product(a.jacobian, group.load(a.arm));
     const Batch zero(0.0);
     const Vector crossing[3] = {
         {zero, -reach.z, reach.y}, {reach.z, zero, -reach.x}, {-reach.y, reach.x, zero}};
     const Symmetric attitude = turned(crossing, broadcast_symmetric(a.turned_by));
-    const Vector velocity = group.gather(poses.velocity, poses.stride) +
-                            cross(group.gather(poses.rate, poses.stride), arm);
-    const Vector moved = Batch(a.clock_sigma) * product(a.jacobian, velocity);
     const Symmetric shifted = broadcast_symmetric(a.shifted);
-    store_symmetric(group,
-                    {turned_sensor.xx + shifted.xx + attitude.xx + moved.x * moved.x,
-                     turned_sensor.xy + shifted.xy + attitude.xy + moved.x * moved.y,
-                     turned_sensor.xz + shifted.xz + attitude.xz + moved.x * moved.z,
-                     turned_sensor.yy + shifted.yy + attitude.yy + moved.y * moved.y,
-                     turned_sensor.yz + shifted.yz + attitude.yz + moved.y * moved.z,
-                     turned_sensor.zz + shifted.zz + attitude.zz + moved.z * moved.z},
-                    a.covariance);
+    store_symmetric(
+        group,
+        {turned_sensor.xx + shifted.xx + attitude.xx, turned_sensor.xy + shifted.xy + attitude.xy,
+         turned_sensor.xz + shifted.xz + attitude.xz, turned_sensor.yy + shifted.yy + attitude.yy,
+         turned_sensor.yz + shifted.yz + attitude.yz, turned_sensor.zz + shifted.zz + attitude.zz},
+        a.covariance);
   });
 }
 
@@ -199,12 +161,11 @@ void stand_shots(const StandArguments& a) {
     const Batch range = group.load(a.range) - Batch(a.range_offset);
     const Batch across = range * sine_zenith;
     const PlainPoses& poses = a.poses;
-    Matrix turn;
-    group.gather(poses.turn, poses.stride, turn.m);
+    const Matrix turn = group.matrix(poses.turn, poses.stride);
     const Vector from_there =
         turn * Vector{across * cosine_azimuth, across * sine_azimuth, range * cosine_zenith} +
-        (group.gather(poses.reference, poses.stride) - reference) +
-        (group.gather(poses.lever, poses.stride) - lever);
+        (group.vector(poses.reference, poses.stride) - reference) +
+        (group.vector(poses.lever, poses.stride) - lever);
     const Vector seen = place.back(from_there);
     const Batch distance = xsimd::sqrt(dot(seen, seen));
     group.store(xsimd::atan2(seen.y, seen.x), a.stood_azimuth);
@@ -216,8 +177,7 @@ void stand_shots(const StandArguments& a) {
 void turn_vectors(const TurnArguments& a) {
   const Matrix place(a.turn);
   for_each_group(a.shots, [&](const Group& group) {
-    Matrix turn;
-    group.gather(a.poses.turn, a.poses.stride, turn.m);
+    const Matrix turn = group.matrix(a.poses.turn, a.poses.stride);
     group.store(turn.back(place * group.load(a.vector)), a.vector);
   });
 }

@@ -6,15 +6,9 @@
 
 #include "risley/core/instruction_set.hpp"
 
-namespace risley::cloud {
+#include "cloud/plain_poses.hpp"
 
-/// Poses as plain numbers: where those of the first shot stand, and how many numbers further those
-/// of the next one do. Rotations are frame from sensor, column by column.
-struct PlainPoses {
-  const double *turn = nullptr, *reference = nullptr, *lever = nullptr, *velocity = nullptr,
-               *rate = nullptr;
-  std::size_t stride = 0;
-};
+namespace risley::cloud {
 
 /// Points of the sensor's frame put into the trajectory's. Columns have one entry per shot.
 struct PlaceArguments {
@@ -32,16 +26,14 @@ struct MapArguments {
   std::size_t shots = 0;
   const double *arm[3] = {}, *place[3] = {};  ///< as PlaceArguments
   double* point[3] = {};                      ///< in: sensor frame, m; out: of the map, m
-  double center[3] = {};              ///< about which the map is expanded, from the local place, m
-  double value[3] = {};               ///< of the map there, m
-  double jacobian[9] = {};            ///< row by row
-  double half_hessian[3][9] = {};     ///< 1/m
-  double* covariance[6] = {};         ///< in: sensor frame; out: map, m^2; or nullptr
-  double* own_covariance[6] = {};     ///< the same
-  double boresight_variance[3] = {};  ///< about the sensor's axes, rad^2
-  double clock_sigma = 0;             ///< s
-  double shifted[6] = {};             ///< covariance that every point gets, upper triangle, m^2
-  double turned_by[6] = {};           ///< covariance of rotations of the body, map axes, rad^2
+  double center[3] = {};           ///< about which the map is expanded, from the local place, m
+  double value[3] = {};            ///< of the map there, m
+  double jacobian[9] = {};         ///< row by row
+  double half_hessian[3][9] = {};  ///< 1/m
+  double* covariance[6] = {};      ///< in: sensor frame; out: map, m^2; or nullptr
+  double* own_covariance[6] = {};  ///< the same
+  double shifted[6] = {};          ///< covariance that every point gets, upper triangle, m^2
+  double turned_by[6] = {};        ///< covariance of rotations of the body, map axes, rad^2
 };
 
 /// Shots as they would have been from one place.

@@ -22,7 +22,7 @@
 
 #include "cloud/georeference_kernel.hpp"
 #include "cloud/piece_overlap.hpp"
-#include "cloud/plain_poses.hpp"
+#include "cloud/sensor_poses.hpp"
 
 namespace risley::cloud {
 namespace {
@@ -175,6 +175,10 @@ class Work {
     return static_cast<double>(kBeliefShots) / seconds;
   }
 
+  std::optional<trajectories::Mount> mount() const {
+    return options_.platform ? std::optional(options_.platform->mount) : std::nullopt;
+  }
+
   /// Everything that wants to have seen the beginning of the recording.
   void set_up() {
     if (rotors_) {
@@ -185,7 +189,7 @@ class Work {
       if (belief_->mirrored) mirror(piece_);
       summary_.mirrored = belief_->mirrored;
       summary_.warnings = belief_->warnings;
-      model_ = pointing_model(calibration_, *belief_, options_.pointing);
+      model_ = pointing_model(calibration_, *belief_, options_.pointing, mount());
       if (calibration_.reference != model_.reference &&
           model_.reference == sensors::CalibrationReference::planes) {
         summary_.warnings.emplace_back(
@@ -195,9 +199,16 @@ class Work {
       }
       tracker_.emplace(*belief_, options_.rate);
     } else {
-      model_ = reported_pointing_model(calibration_, options_.pointing, options_.angle_noise);
+      model_ =
+          reported_pointing_model(calibration_, options_.pointing, options_.angle_noise, mount());
     }
     for (const CommonFactor& factor : model_.factors) summary_.factors.push_back(factor.name);
+    if (model_.mount_of_another) {
+      summary_.warnings.emplace_back(
+          "the mount was found together with another calibration than this one: what errors of "
+          "both "
+          "have in common is not known, and points are stated as if they had nothing in common");
+    }
     if (options_.platform) {
       georeference_ = std::make_unique<Georeference>(
           *options_.platform, reader_.header().time_reference, piece_.time_ns.front());
@@ -221,9 +232,7 @@ class Work {
     header_.has_covariance = options_.pointing.covariance;
     if (options_.loadings && header_.has_covariance) header_.factors = summary_.factors;
     if (georeference_) {
-      sensor_factors_ = header_.factors.size();
-      georeference_->announce(header_, options_.loadings);
-      if (!header_.factors.empty()) summary_.factors = header_.factors;
+      georeference_->announce(header_);
       summary_.strips = georeference_->strips();
       if (options_.distribution) begin_distribution();
     }
@@ -472,11 +481,11 @@ class Work {
     take(piece_.zenith_resolution, shots.zenith_rounding, variance);
     take(piece_.range_resolution, shots.range_rounding, variance);
     find_normals(block);
-    compute_points(model_, header_, shots, points);
+    compute_points(model_, header_, shots, points, block.poses);
     block.outliers = block.without_rotation_angle = 0;
     block.azimuth_squares = block.zenith_squares = 0;
     if (rotors_) keep_sound(block);
-    if (georeference_) georeference_->apply(points, sensor_factors_, block.poses);
+    if (georeference_) georeference_->apply(points, block.poses);
   }
 
   /// Takes out of a block what has no point.
@@ -619,7 +628,6 @@ class Work {
   std::unique_ptr<SurfaceNormals> normals_;
   std::unique_ptr<Georeference> georeference_;         ///< of a moving sensor
   std::optional<SensorPose> surface_pose_;             ///< in the middle of a surface's time
-  std::size_t sensor_factors_ = 0;                     ///< whose loadings points carry
   std::int64_t first_time_ns_ = 0, last_time_ns_ = 0;  ///< of the recording
   std::optional<PointDistribution> distribution_;
   CloudHeader header_;

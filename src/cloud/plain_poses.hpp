@@ -2,20 +2,16 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <span>
-
-#include "risley/cloud/georeference.hpp"
-
-#include "cloud/georeference_kernel.hpp"
+#include <cstddef>
 
 namespace risley::cloud {
 
-/// Poses, at least one, as the kernels read them.
-inline PlainPoses plain_poses(std::span<const SensorPose> poses) {
-  static_assert(sizeof(SensorPose) % sizeof(double) == 0);
-  const SensorPose& first = poses.front();
-  return {first.turn.data(),     first.reference.data(), first.lever.data(),
-          first.velocity.data(), first.rate.data(),      sizeof(SensorPose) / sizeof(double)};
-}
+/// Poses as plain numbers: where those of the first shot stand, and how many numbers further those
+/// of the next one do. Rotations are frame from sensor, column by column.
+struct PlainPoses {
+  const double *turn = nullptr, *reference = nullptr, *lever = nullptr, *velocity = nullptr,
+               *rate = nullptr;
+  std::size_t stride = 0;
+};
 
 }  // namespace risley::cloud

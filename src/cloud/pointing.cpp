@@ -13,6 +13,7 @@
 
 #include "cloud/entry_checks.hpp"
 #include "cloud/pointing_kernel.hpp"
+#include "cloud/sensor_poses.hpp"
 
 namespace risley::cloud {
 namespace {
@@ -45,10 +46,8 @@ void require_shots(const PointingModel& model, const CloudHeader& header,
                    const PointedShots& shots) {
   const int prisms = model.train.prisms();
   require_between("number of prisms of the cloud", header.prisms, prisms, prisms);
-  // Those of a mount stand behind the sensor's and are none of this.
   if (!header.factors.empty()) {
-    require_at_least("factors of the cloud", static_cast<long long>(header.factors.size()),
-                     static_cast<long long>(model.factors.size()));
+    require_length("factors of the cloud", header.factors.size(), model.factors.size());
   }
   const std::size_t n = shots.size();
   if (header.has_rotation_angles) {
@@ -85,6 +84,25 @@ struct Faces {
     for (const PrismSize& size : model.sizes) {
       const auto over = face_positions(model.train.face_order(), size.rate);
       over_size.insert(over_size.end(), over.begin(), over.end());
+    }
+  }
+};
+
+/// Errors of a mount as the kernel wants them: along the axes of the sensor.
+struct MountFactors {
+  std::vector<double> weights;  ///< [factors][7]
+  Eigen::Vector3d lever_arm = Eigen::Vector3d::Zero();
+
+  explicit MountFactors(const PointingModel& model) {
+    if (!model.mount) return;
+    const Eigen::Matrix3d sensor_from_body =
+        trajectories::body_from_sensor(*model.mount).transpose();
+    lever_arm = sensor_from_body * trajectories::lever_arm(*model.mount);
+    for (const CommonFactor& factor : model.factors) {
+      std::array<double, trajectories::kMountQuantities> own = factor.mount;
+      Eigen::Map<Eigen::Vector3d> shift(own.data() + 3);
+      shift = sensor_from_body * Eigen::Vector3d(shift);
+      weights.insert(weights.end(), own.begin(), own.end());
     }
   }
 };
@@ -189,9 +207,11 @@ void PointedShots::resize(int prisms, std::size_t shots) {
 }
 
 void compute_points(const PointingModel& model, const CloudHeader& header,
-                    const PointedShots& shots, Points& points, InstructionSet set) {
+                    const PointedShots& shots, Points& points, std::span<const SensorPose> poses,
+                    InstructionSet set) {
   require_model(model);
   require_shots(model, header, shots);
+  require_length("poses", poses.size(), model.mount ? shots.size() : 0);
   require_computed_columns(points, header, shots.size());
   const Faces faces(model);
   const int prisms = model.train.prisms();
@@ -240,11 +260,17 @@ void compute_points(const PointingModel& model, const CloudHeader& header,
   a.factor_row = factor_row.data();
   a.factor_weight = factor_weight.data();
   a.range_factor = range_factor.data();
+  const MountFactors mount(model);
+  if (model.mount) {
+    a.mount_factor = mount.weights.data();
+    std::copy_n(mount.lever_arm.data(), 3, a.lever_arm);
+  }
 
   const std::size_t whole = shots.size() / kPointPadding * kPointPadding;
   {
     const Columns columns(header, shots, points, a);
     a.shots = whole;
+    if (!poses.empty()) a.poses = plain_poses(poses);
     kernel(a);
   }
   if (whole < shots.size()) {  // the last group, filled up
@@ -261,8 +287,11 @@ void compute_points(const PointingModel& model, const CloudHeader& header,
     };
     for_each_column(shots, last_shots,
                     [&](const auto& from, auto& to) { copy(from, whole, rest, to, 0); });
+    std::vector<SensorPose> last_poses(poses.empty() ? 0 : kPointPadding);
+    copy(poses, whole, poses.empty() ? 0 : rest, last_poses, 0);
     const Columns columns(header, last_shots, last_points, a);
     a.shots = kPointPadding;
+    if (!poses.empty()) a.poses = plain_poses(last_poses);
     kernel(a);
     for_each_computed_column(last_points, points,
                              [&](const auto& from, auto& to) { copy(from, 0, rest, to, whole); });

@@ -10,6 +10,8 @@
 #include "risley/optics/emitter_lanes.hpp"
 #include "risley/optics/observation_adjoint.hpp"
 
+#include "cloud/pose_lanes.hpp"
+
 namespace risley::cloud::RISLEY_KERNEL_NAMESPACE {
 namespace {
 
@@ -69,10 +71,9 @@ class Points {
     own.uu = xsimd::fma(range2, Batch(a_.divergence_variance_horizontal), own.uu);
     own.vv = xsimd::fma(range2, Batch(a_.divergence_variance_vertical), own.vv);
     if (a_.own_covariance[0]) store_covariance(at, ray, own, a_.own_covariance);
+    const Platform platform = platform_of(at, ray, range);
     for (int factor = 0; factor < a_.factors; ++factor) {
-      const Batch fd(-a_.range_factor[factor]);
-      own.dd = xsimd::fma(fd, fd, own.dd);
-      if (a_.loading) store_loading(at, factor, fd * ray.direction);
+      add_factor(at, factor, zero, zero, platform, ray, own);
     }
     store_covariance(at, ray, own, a_.covariance);
   }
@@ -117,11 +118,55 @@ class Points {
     return cosine;
   }
 
-  void store_loading(std::size_t at, int factor, const Vector3<Batch>& moved) const {
+  /// What a mount's errors do to the points of a moving sensor, sensor's axes.
+  struct Platform {
+    Vector3<Batch> point;     ///< from the sensor, m
+    Vector3<Batch> velocity;  ///< of the point as a part of the body, m/s
+  };
+
+  Platform platform_of(std::size_t at, const Ray& ray, const Batch& range) const {
+    Platform platform{};
+    if (!a_.mount_factor) return platform;
+    const PlainPoses& poses = a_.poses;
+    LaneMatrix<Batch> turn;
+    gather(poses.turn, poses.stride, at, kLanes, turn.m);
+    Batch velocity[3], rate[3];
+    gather(poses.velocity, poses.stride, at, kLanes, velocity);
+    gather(poses.rate, poses.stride, at, kLanes, rate);
+    platform.point = ray.origin + range * ray.direction;
+    const Vector3<Batch> arm{platform.point.x + Batch(a_.lever_arm[0]),
+                             platform.point.y + Batch(a_.lever_arm[1]),
+                             platform.point.z + Batch(a_.lever_arm[2])};
+    platform.velocity = turn.back({velocity[0], velocity[1], velocity[2]}) +
+                        cross(turn.back({rate[0], rate[1], rate[2]}), arm);
+    return platform;
+  }
+
+  /// Adds what one common factor does, beam and mount together, and stores its loading.
+  /// @param fu, fv  what it does across the beam, m
+  void add_factor(std::size_t at, int factor, const Batch& fu, const Batch& fv,
+                  const Platform& platform, const Ray& ray, BeamCovariance& c) const {
+    const Vector3<Batch>&u = ray.across[0], &v = ray.across[1], &d = ray.direction;
+    Vector3<Batch> f{fu, fv, Batch(-a_.range_factor[factor])};  // the offset is taken off the range
+    if (a_.mount_factor) {
+      const double* m = a_.mount_factor + 7 * factor;
+      const Vector3<Batch> moved =
+          cross(Vector3<Batch>{Batch(m[0]), Batch(m[1]), Batch(m[2])}, platform.point) +
+          Vector3<Batch>{Batch(m[3]), Batch(m[4]), Batch(m[5])} + Batch(m[6]) * platform.velocity;
+      f = f + Vector3<Batch>{dot(u, moved), dot(v, moved), dot(d, moved)};
+    }
+    c.uu = xsimd::fma(f.x, f.x, c.uu);
+    c.uv = xsimd::fma(f.x, f.y, c.uv);
+    c.vv = xsimd::fma(f.y, f.y, c.vv);
+    c.ud = xsimd::fma(f.x, f.z, c.ud);
+    c.vd = xsimd::fma(f.y, f.z, c.vd);
+    c.dd = xsimd::fma(f.z, f.z, c.dd);
+    if (!a_.loading) return;
+    const Vector3<Batch> loading = f.x * u + f.y * v + f.z * d;
     double* const* columns = a_.loading + 3 * factor;
-    moved.x.store_unaligned(columns[0] + at);
-    moved.y.store_unaligned(columns[1] + at);
-    moved.z.store_unaligned(columns[2] + at);
+    loading.x.store_unaligned(columns[0] + at);
+    loading.y.store_unaligned(columns[1] + at);
+    loading.z.store_unaligned(columns[2] + at);
   }
 
   void add_angle_noise(std::size_t at, const Sines& zenith, const Batch& range,
@@ -215,7 +260,7 @@ class Kernel : public Points {
     BeamCovariance own = own_covariance(at, jacobian, zenith, range);
     own.dd = own.dd + range_noise(at, range, cosine);
     if (a_.own_covariance[0]) store_covariance(at, ray, own, a_.own_covariance);
-    add_factors(at, jacobian, ray, own);
+    add_factors(at, jacobian, ray, range, own);
     store_covariance(at, ray, own, a_.covariance);
   }
 
@@ -298,7 +343,7 @@ class Kernel : public Points {
 
   /// Adds the common factors' covariance and stores their loadings.
   void add_factors(std::size_t at, const PointLinearisation<Batch, N>& jacobian, const Ray& ray,
-                   BeamCovariance& c) const {
+                   const Batch& range, BeamCovariance& c) const {
     constexpr std::size_t kPlaces = EmitterLanes<Batch, N>::kPlaces;
     constexpr std::size_t kMostRows = kPlaces + N + kMostSizes;
     Batch u[kMostRows], v[kMostRows];
@@ -323,6 +368,7 @@ class Kernel : public Points {
       }
       ++rows;
     }
+    const Platform platform = platform_of(at, ray, range);
     for (int factor = 0; factor < a_.factors; ++factor) {
       Batch fu(0.0), fv(0.0);
       for (int entry = a_.factor_begin[factor]; entry < a_.factor_begin[factor + 1]; ++entry) {
@@ -331,16 +377,7 @@ class Kernel : public Points {
         fu = xsimd::fma(u[row], w, fu);
         fv = xsimd::fma(v[row], w, fv);
       }
-      const Batch fd(-a_.range_factor[factor]);  // the offset is taken off the range
-      c.uu = xsimd::fma(fu, fu, c.uu);
-      c.uv = xsimd::fma(fu, fv, c.uv);
-      c.vv = xsimd::fma(fv, fv, c.vv);
-      c.ud = xsimd::fma(fu, fd, c.ud);
-      c.vd = xsimd::fma(fv, fd, c.vd);
-      c.dd = xsimd::fma(fd, fd, c.dd);
-      if (a_.loading) {
-        store_loading(at, factor, fu * ray.across[0] + fv * ray.across[1] + fd * ray.direction);
-      }
+      add_factor(at, factor, fu, fv, platform, ray, c);
     }
   }
 

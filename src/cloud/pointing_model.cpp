@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: MIT
 #include "risley/cloud/pointing_model.hpp"
 
+#include <algorithm>
+
 #include <fmt/format.h>
 
 #include "risley/core/error.hpp"
@@ -14,11 +16,12 @@
 namespace risley::cloud {
 namespace {
 
+using algebra::NamedCovariance;
 using Eigen::Index;
 
 /// Those of a calibration that a point depends on: not its speeds and rotation angles.
-Uncertain calibrated(const sensors::Sensor& sensor) {
-  Uncertain result;
+NamedCovariance calibrated(const sensors::Sensor& sensor) {
+  NamedCovariance result;
   std::vector<Index> rows;
   for (std::size_t i = 0; i < sensor.covariance_names.size(); ++i) {
     const std::string& name = sensor.covariance_names[i];
@@ -28,25 +31,25 @@ Uncertain calibrated(const sensors::Sensor& sensor) {
     result.names.push_back(name);
     rows.push_back(static_cast<Index>(i));
   }
-  result.covariance = sensor.covariance(rows, rows);
+  result.matrix = sensor.covariance(rows, rows);
   return result;
 }
 
-Uncertain believed(const SensorBelief& belief) {
-  Uncertain result;
+NamedCovariance believed(const SensorBelief& belief) {
+  NamedCovariance result;
   for (const auto& free : belief.free) result.names.push_back(free.name);
-  result.covariance = belief.covariance;
+  result.matrix = belief.covariance;
   return result;
 }
 
 /// What a sensor that was not calibrated says of the parameters that a belief has.
-Uncertain assumed(const sensors::Sensor& sensor, const SensorBelief& belief) {
-  Uncertain result = believed(belief);
-  result.covariance.setZero();
+NamedCovariance assumed(const sensors::Sensor& sensor, const SensorBelief& belief) {
+  NamedCovariance result = believed(belief);
+  result.matrix.setZero();
   for (std::size_t j = 0; j < belief.free.size(); ++j) {
     const sensors::Knowledge* known = sensor.find_knowledge(belief.free[j].name);
     const auto at = static_cast<Index>(j);
-    if (known != nullptr) result.covariance(at, at) = known->sigma * known->sigma;
+    if (known != nullptr) result.matrix(at, at) = known->sigma * known->sigma;
   }
   return result;
 }
@@ -80,15 +83,25 @@ sensors::CalibrationReference meaning_of(const sensors::Sensor& calibration,
     const int place = belief.free[static_cast<std::size_t>(j)].places.front();
     off[j] = belief.sensor.train[place] - calibration.train[place];
   }
-  const Eigen::MatrixXd covariance = belief.covariance + assumed(calibration, belief).covariance;
+  const Eigen::MatrixXd covariance = belief.covariance + assumed(calibration, belief).matrix;
   return estimation::disagreement(off, covariance).same_sensor() ? CalibrationReference::directions
                                                                  : CalibrationReference::planes;
+}
+
+/// Whether a mount was found together with parameters of its sensor.
+bool is_of_a_calibration(const trajectories::Mount& mount) {
+  const auto& own = trajectories::mount_names();
+  return std::any_of(mount.covariance.names.begin(), mount.covariance.names.end(),
+                     [&](const std::string& name) {
+                       return std::find(own.begin(), own.end(), name) == own.end();
+                     });
 }
 
 }  // namespace
 
 PointingModel pointing_model(const sensors::Sensor& calibration, const SensorBelief& belief,
-                             const PointingOptions& options) {
+                             const PointingOptions& options,
+                             const std::optional<trajectories::Mount>& mount) {
   using sensors::CalibrationReference;
   PointingModel model;
   require_belief(belief);
@@ -115,13 +128,17 @@ PointingModel pointing_model(const sensors::Sensor& calibration, const SensorBel
     if (calibration.find_knowledge(size.name) != nullptr) model.sizes.push_back(size);
   }
   Factors factors(model, belief);
-  if (planes) {
-    factors.add(type ? assumed(calibration, belief) : calibrated(calibration), true, false);
-    factors.add_angles(believed(belief));
-  } else {
-    const bool smoothed = !options.reported_directions;
-    factors.add(type ? believed(belief) : calibrated(calibration), smoothed, smoothed);
+  const bool smoothed = !options.reported_directions;
+  NamedCovariance uncertain = !type    ? calibrated(calibration)
+                              : planes ? assumed(calibration, belief)
+                                       : believed(belief);
+  if (mount) {
+    model.mount = mount;
+    model.mount_of_another = is_of_a_calibration(*mount) && !found_together(*mount, uncertain);
+    uncertain = trajectories::joint_covariance(uncertain, *mount);
   }
+  factors.add(uncertain, planes || smoothed, !planes && smoothed);
+  if (planes) factors.add_angles(believed(belief));
   factors.add_geometry(calibration);
   factors.finish();
   if (model.factors.size() > static_cast<std::size_t>(kMostFactors)) {
@@ -138,7 +155,8 @@ bool needs_rotation_angles(const sensors::Sensor& calibration, const PointingOpt
 
 PointingModel reported_pointing_model(const sensors::Sensor& calibration,
                                       const PointingOptions& options,
-                                      std::optional<double> angle_noise) {
+                                      std::optional<double> angle_noise,
+                                      const std::optional<trajectories::Mount>& mount) {
   if (needs_rotation_angles(calibration, options)) {
     throw InvalidArgument(
         "points of reported directions need rotation angles for the beam's origin "
@@ -148,7 +166,7 @@ PointingModel reported_pointing_model(const sensors::Sensor& calibration,
   belief.sensor = calibration;
   belief.covariance.resize(0, 0);
   belief.angle_noise = angle_noise.value_or(calibration.angle_noise);
-  return pointing_model(calibration, belief, options);
+  return pointing_model(calibration, belief, options, mount);
 }
 
 }  // namespace risley::cloud

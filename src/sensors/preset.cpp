@@ -11,10 +11,10 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "risley/algebra/symmetric.hpp"
 #include "risley/core/require.hpp"
 #include "risley/core/text.hpp"
 #include "risley/io/text_file.hpp"
+#include "risley/io/yaml_covariance.hpp"
 #include "risley/io/yaml_map.hpp"
 #include "risley/io/yaml_output.hpp"
 
@@ -101,9 +101,11 @@ std::vector<std::string_view> section_names() {
   return names;
 }
 
-/// The unit of a value that a covariance can name. @throws InvalidArgument for other names
-std::string_view unit_of(const std::string& name, TrainShape shape) {
-  return name == "range_offset_m" ? "m" : std::string_view(find_parameter(name, shape).unit);
+/// Of the values that a covariance can name.
+io::ScaleOfName covariance_scale(const Sensor& sensor) {
+  return [shape = sensor.shape()](const std::string& name) {
+    return name == "range_offset_m" ? 1.0L : scale_of(find_parameter(name, shape).unit);
+  };
 }
 
 /// A value of the file with its line.
@@ -373,76 +375,6 @@ void read_sequence(const YamlMap& root, Sensor& sensor) {
   sensor.sequence = std::move(sequence);
 }
 
-void read_covariance(const YamlMap& root, Sensor& sensor) {
-  const YamlMap map(root.at("covariance").value, root.path(), "covariance");
-  map.allow_only({"names", "matrix"});
-  const YamlMap::Entry& names = map.at("names");
-  if (!names.value.is_list() || names.value.items.size() == 0) {
-    fail_at(map.path(), names.line, "covariance.names: expected a list of parameter names");
-  }
-  std::vector<long double> scale;
-  for (const YamlNode& node : names.value.items) {
-    const std::string name = yaml_text(node, map.path(), "covariance.names");
-    try {
-      scale.push_back(scale_of(unit_of(name, sensor.shape())));
-    } catch (const InvalidArgument& error) {
-      fail_at(map.path(), node.line, fmt::format("covariance.names: {}", error.what()));
-    }
-    auto& known = sensor.covariance_names;
-    if (std::find(known.begin(), known.end(), name) != known.end()) {
-      fail_at(map.path(), node.line, fmt::format("covariance.names: {} stands twice", name));
-    }
-    known.push_back(name);
-  }
-  const YamlMap::Entry& matrix = map.at("matrix");
-  const std::size_t n = scale.size();
-  if (!matrix.value.is_list() || matrix.value.items.size() != n) {
-    fail_at(map.path(), matrix.line,
-            fmt::format("covariance.matrix: expected {} rows, one per name, found {}", n,
-                        matrix.value.items.size()));
-  }
-  const auto size = static_cast<Eigen::Index>(n);
-  sensor.covariance.resize(size, size);
-  std::vector<std::size_t> line(n);
-  for (std::size_t i = 0; i < n; ++i) {
-    const YamlNode& row = matrix.value.items[i];
-    line[i] = row.line;
-    if (!row.is_list() || row.items.size() != n) {
-      fail_at(map.path(), line[i],
-              fmt::format("covariance.matrix[{}]: expected {} numbers, found {}", i, n,
-                          row.items.size()));
-    }
-    for (std::size_t j = 0; j < n; ++j) {
-      const auto field = fmt::format("covariance.matrix[{}][{}]", i, j);
-      sensor.covariance(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) =
-          si_from_file(yaml_number(row.items[j], map.path(), field), scale[i] * scale[j]);
-    }
-  }
-  const Eigen::MatrixXd& c = sensor.covariance;
-  for (Eigen::Index i = 0; i < size; ++i) {
-    if (!(c(i, i) > 0.0)) {
-      fail_at(map.path(), line[static_cast<std::size_t>(i)],
-              fmt::format("covariance.matrix[{0}][{0}]: a variance must be above 0", i));
-    }
-    for (Eigen::Index j = 0; j < i; ++j) {
-      if (std::abs(c(i, j) - c(j, i)) > 1e-12 * std::sqrt(c(i, i) * c(j, j))) {
-        fail_at(
-            map.path(), line[static_cast<std::size_t>(i)],
-            fmt::format("covariance.matrix is not symmetric: [{0}][{1}] differs from [{1}][{0}]", i,
-                        j));
-      }
-    }
-  }
-  const Eigen::VectorXd over_sigma = c.diagonal().cwiseSqrt().cwiseInverse();
-  const double smallest = algebra::principal_axes(algebra::scaled(c, over_sigma)).values.minCoeff();
-  if (smallest < -1e-9) {
-    fail_at(map.path(), matrix.line,
-            fmt::format("covariance.matrix is not positive: the smallest eigenvalue of its "
-                        "correlations is {:.3g}, allowed 0 and above",
-                        smallest));
-  }
-}
-
 /// Writes one quantity with what is known of it.
 std::string quantity_text(const Sensor& sensor, std::string_view name, double value,
                           std::string_view unit, const Knowledge* known) {
@@ -562,30 +494,6 @@ std::string sequence_text(const Sensor& sensor, const ScanSequence& sequence) {
   }
   return text + fmt::format("  first_shot: {}\n  firing: {}\n", sequence.first_shot,
                             to_string(sequence.firing));
-}
-
-std::string covariance_text(const Sensor& sensor) {
-  const auto n = static_cast<Eigen::Index>(sensor.covariance_names.size());
-  if (sensor.covariance.rows() != n || sensor.covariance.cols() != n) {
-    throw InvalidArgument(fmt::format("covariance is {} x {}, expected {} x {}, one row per name",
-                                      sensor.covariance.rows(), sensor.covariance.cols(), n, n));
-  }
-  std::vector<long double> scale;
-  for (const std::string& name : sensor.covariance_names) {
-    scale.push_back(scale_of(unit_of(name, sensor.shape())));
-  }
-  std::string text = "# Element [i][j] is in the unit of names[i] times the unit of names[j].\n";
-  text += fmt::format("covariance:\n  names: [{}]\n  matrix:\n",
-                      fmt::join(sensor.covariance_names, ", "));
-  for (Eigen::Index i = 0; i < n; ++i) {
-    std::vector<std::string> row;
-    for (Eigen::Index j = 0; j < n; ++j) {
-      const auto unit = scale[static_cast<std::size_t>(i)] * scale[static_cast<std::size_t>(j)];
-      row.push_back(file_number(sensor.covariance(i, j), unit, "covariance"));
-    }
-    text += fmt::format("    - [{}]\n", fmt::join(row, ", "));
-  }
-  return text;
 }
 
 }  // namespace
@@ -710,7 +618,11 @@ Sensor parse_preset(const std::string& text, const std::string& path) {
               fmt::format("calibrated_against = \"{}\", allowed directions, planes", against));
     }
   }
-  if (root.find("covariance") != nullptr) read_covariance(root, sensor);
+  if (root.find("covariance") != nullptr) {
+    algebra::NamedCovariance found = io::read_covariance(root, covariance_scale(sensor));
+    sensor.covariance_names = std::move(found.names);
+    sensor.covariance = std::move(found.matrix);
+  }
   if (root.find("provenance") != nullptr) {
     const YamlMap provenance(root.at("provenance").value, path, "provenance");
     for (const YamlMap::Entry& entry : provenance.entries()) {
@@ -751,7 +663,10 @@ std::string preset_text(const Sensor& sensor) {
   if (sensor.reference != CalibrationReference::none) {
     text += fmt::format("calibrated_against: {}\n", to_string(sensor.reference));
   }
-  if (!sensor.covariance_names.empty()) text += covariance_text(sensor);
+  if (!sensor.covariance_names.empty()) {
+    text +=
+        io::covariance_text({sensor.covariance_names, sensor.covariance}, covariance_scale(sensor));
+  }
   if (!sensor.provenance.empty()) {
     text += "provenance:\n";
     for (const auto& [key, value] : sensor.provenance) {

@@ -19,6 +19,7 @@
 #include "risley/core/require.hpp"
 #include "risley/core/text.hpp"
 #include "risley/io/text_file.hpp"
+#include "risley/io/yaml_covariance.hpp"
 #include "risley/io/yaml_map.hpp"
 #include "risley/io/yaml_output.hpp"
 
@@ -189,6 +190,41 @@ Eigen::Matrix3d read_matrix(const YamlMap& map) {
   return nominal;
 }
 
+/// Of the values that a covariance can name: their names end in the unit.
+long double scale_of(const std::string& name) {
+  if (name.find_first_not_of("abcdefghijklmnopqrstuvwxyz0123456789_") != std::string::npos) {
+    throw InvalidArgument(fmt::format("{} is no name of a quantity", name));
+  }
+  return name.ends_with("_deg") ? kDegree : 1.0L;
+}
+
+/// A covariance and the sigmas beside it are of one adjustment.
+void require_own_covariance(const Mount& mount) {
+  const algebra::NamedCovariance& own = mount.covariance;
+  if (const auto n = static_cast<Eigen::Index>(own.names.size());
+      own.matrix.rows() != n || own.matrix.cols() != n) {
+    throw InvalidArgument(fmt::format("covariance is {} x {}, expected {} x {}, one row per name",
+                                      own.matrix.rows(), own.matrix.cols(), n, n));
+  }
+  if (!own.matrix.allFinite()) throw InvalidArgument("covariance: expected finite numbers");
+  if (const auto fault = algebra::covariance_fault(own.matrix)) {
+    throw InvalidArgument("covariance" + fault->words);
+  }
+  const std::array<double, kMountQuantities> sigmas = mount_sigmas(mount);
+  for (std::size_t k = 0; k < kMountQuantities; ++k) {
+    const std::string& name = mount_names()[k];
+    const Eigen::Index row = own.find(name);
+    if (row < 0) continue;
+    const auto scale = static_cast<double>(scale_of(name));
+    const double sigma = std::sqrt(own.matrix(row, row));
+    if (std::abs(sigma - sigmas[k]) <= 1e-9 * sigma) continue;
+    throw InvalidArgument(fmt::format(
+        "covariance: {} has a sigma of {:g} in it, and {:g} where its value stands: who changes "
+        "one of them takes the covariance out",
+        name, sigma / scale, sigmas[k] / scale));
+  }
+}
+
 void require_stated(std::string_view name, const StatedValue& stated, double limit,
                     std::string_view unit) {
   require_between(name, stated.value, -limit, limit, unit);
@@ -214,6 +250,63 @@ void require_mount(const Mount& mount) {
     require_stated(fmt::format("lever_arm[{}]", i), mount.lever_arm[i], kLongestLeverArm, "m");
   }
   require_stated("clock_offset", mount.clock_offset, kLargestClockOffset, "s");
+  require_own_covariance(mount);
+}
+
+const std::array<std::string, kMountQuantities>& mount_names() {
+  static const std::array<std::string, kMountQuantities> names{
+      "boresight_x_deg", "boresight_y_deg", "boresight_z_deg", "lever_arm_x_m",
+      "lever_arm_y_m",   "lever_arm_z_m",   "clock_offset_s"};
+  return names;
+}
+
+std::array<double, kMountQuantities> mount_sigmas(const Mount& mount) {
+  return {mount.boresight[0].sigma, mount.boresight[1].sigma, mount.boresight[2].sigma,
+          mount.lever_arm[0].sigma, mount.lever_arm[1].sigma, mount.lever_arm[2].sigma,
+          mount.clock_offset.sigma};
+}
+
+bool found_together(const Mount& mount, const algebra::NamedCovariance& sensor) {
+  const algebra::NamedCovariance own = mount.covariance.part(sensor.names);
+  if (sensor.empty() || own.names != sensor.names) return false;
+  const Eigen::VectorXd over_sigma = sensor.matrix.diagonal().cwiseSqrt().cwiseInverse();
+  const Eigen::MatrixXd off =
+      over_sigma.asDiagonal() * (own.matrix - sensor.matrix) * over_sigma.asDiagonal();
+  return off.cwiseAbs().maxCoeff() <= 1e-9;
+}
+
+algebra::NamedCovariance joint_covariance(const algebra::NamedCovariance& sensor,
+                                          const Mount& mount) {
+  require_mount(mount);
+  algebra::NamedCovariance joint = sensor;
+  const std::array<double, kMountQuantities> sigmas = mount_sigmas(mount);
+  std::vector<double> variances;
+  for (std::size_t k = 0; k < kMountQuantities; ++k) {
+    if (!(sigmas[k] > 0)) continue;
+    joint.names.push_back(mount_names()[k]);
+    variances.push_back(sigmas[k] * sigmas[k]);
+  }
+  const auto known = static_cast<Eigen::Index>(sensor.names.size());
+  const auto all = static_cast<Eigen::Index>(joint.names.size());
+  joint.matrix = Eigen::MatrixXd::Zero(all, all);
+  joint.matrix.topLeftCorner(known, known) = sensor.matrix;
+  for (Eigen::Index i = known; i < all; ++i) {
+    joint.matrix(i, i) = variances[static_cast<std::size_t>(i - known)];
+  }
+  const bool together = found_together(mount, sensor);
+  const auto row_of = [&](Eigen::Index i) {
+    return i < known && !together ? -1
+                                  : mount.covariance.find(joint.names[static_cast<std::size_t>(i)]);
+  };
+  for (Eigen::Index i = known; i < all; ++i) {
+    const Eigen::Index row = row_of(i);
+    for (Eigen::Index j = 0; j < i; ++j) {
+      const Eigen::Index column = row_of(j);
+      if (row < 0 || column < 0) continue;
+      joint.matrix(i, j) = joint.matrix(j, i) = mount.covariance.matrix(row, column);
+    }
+  }
+  return joint;
 }
 
 Eigen::Matrix3d body_from_sensor(const Mount& mount) {
@@ -235,7 +328,7 @@ Mount parse_mount(const std::string& text, const std::string& path) {
   }
   root.integer("risley_mount", kMountVersion, kMountVersion);
   root.allow_only({"risley_mount", "name", "reference_point", "sensor_axes", "body_from_sensor",
-                   "boresight", "lever_arm", "clock_offset_s"});
+                   "boresight", "lever_arm", "clock_offset_s", "covariance"});
   Mount mount;
   if (root.find("name") != nullptr) mount.name = root.text("name");
   mount.reference_point = root.text("reference_point");
@@ -259,6 +352,14 @@ Mount parse_mount(const std::string& text, const std::string& path) {
   mount.boresight = read_three(root, "boresight", "deg", kLargestBoresight_deg, kDegree);
   mount.lever_arm = read_three(root, "lever_arm", "m", kLongestLeverArm, 1);
   mount.clock_offset = read_stated(root, "clock_offset_s", kLargestClockOffset, "s", 1);
+  if (const YamlMap::Entry* entry = root.find("covariance")) {
+    mount.covariance = io::read_covariance(root, scale_of);
+    try {
+      require_own_covariance(mount);
+    } catch (const InvalidArgument& error) {
+      fail_at(path, entry->line, error.what());
+    }
+  }
   return mount;
 }
 
@@ -295,6 +396,12 @@ std::string mount_text(const Mount& mount) {
   }
   text += "# added to the recording's clock to get the trajectory's time\n";
   text += fmt::format("clock_offset_s: {}\n", stated_text(mount.clock_offset, 1));
+  if (!mount.covariance.empty()) {
+    text +=
+        "# Found together with the sensor's parameters, which its calibration states: with that\n"
+        "# calibration, points know what errors of both have in common.\n";
+    text += io::covariance_text(mount.covariance, scale_of);
+  }
   return text;
 }
 

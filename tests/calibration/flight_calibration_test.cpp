@@ -109,6 +109,22 @@ TEST(FlightCalibration, CorrectsTheTrajectory) {
   EXPECT_EQ(found.mount.clock_offset.value, found.model.clock_offset);
   EXPECT_EQ(found.sensor.covariance.rows(),
             static_cast<Index>(found.sensor.covariance_names.size()));
+  // Mount and sensor are known together: yaw of the boresight against yaw of the beams above all.
+  const algebra::NamedCovariance of_sensor{found.sensor.covariance_names, found.sensor.covariance};
+  EXPECT_TRUE(trajectories::found_together(found.mount, of_sensor));
+  trajectories::require_mount(found.mount);
+  const algebra::NamedCovariance& joint = found.mount.covariance;
+  const Index yaw = joint.find("boresight_z_deg"),
+              beam = joint.find("incident_beam_horizontal_deg");
+  ASSERT_GE(std::min(yaw, beam), 0);
+  EXPECT_GT(std::abs(joint.matrix(yaw, beam)),
+            0.5 * std::sqrt(joint.matrix(yaw, yaw) * joint.matrix(beam, beam)));
+  EXPECT_EQ(joint.matrix(yaw, beam), found.covariance(2, [&] {
+    for (std::size_t i = 0; i < found.unknowns.size(); ++i) {
+      if (found.unknowns[i].name == "incident_beam_horizontal_deg") return static_cast<Index>(i);
+    }
+    return Index{-1};
+  }()));
   EXPECT_EQ(found.correction_sigma.cols(), found.model.corrections.cols());
   EXPECT_LT(found.correction_sigma.maxCoeff(), 0.031);
   EXPECT_FALSE(found.pairs_after.empty());

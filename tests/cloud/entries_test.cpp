@@ -113,7 +113,7 @@ struct Pointed {
     header.resize(points, 3);
   }
   std::string run(InstructionSet set = best_instruction_set()) {
-    return refusal([&] { compute_points(model, header, shots, points, set); });
+    return refusal([&] { compute_points(model, header, shots, points, {}, set); });
   }
 };
 
@@ -146,7 +146,7 @@ TEST(Entries, PointsAskForAHeaderAndAModelThatFit) {
   one = {};
   ASSERT_GT(one.model.factors.size(), 1U);
   one.header.factors.assign(one.model.factors.size() - 1, "factor");
-  EXPECT_THAT(one.run(), ::testing::StartsWith("factors of the cloud = "));
+  EXPECT_THAT(one.run(), ::testing::StartsWith("factors of the cloud has "));
   one = {};
   one.header.has_rotation_angles = false;
   EXPECT_EQ(one.run(), "the cloud has no rotation angles, which the model needs");

@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -16,6 +17,7 @@
 #include <gtest/gtest.h>
 
 #include "risley/cloud/point_covariance.hpp"
+#include "risley/cloud/pointing.hpp"
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
 #include "risley/core/random.hpp"
@@ -99,25 +101,33 @@ trajectories::ErrorModel apx18() {
   return model;
 }
 
-/// Points of a sensor 80 m above ground, at times of the trajectory, with 20 mm of range noise and
-/// the range's offset as the one common factor of the sensor.
-struct SensorPoints {
-  CloudHeader header;
-  Points points;
-  std::vector<Vector3d> direction;
-};
-
 constexpr double kRangeNoise = 0.02, kRangeOffset = 0.005;
+
+/// A sensor with the ranges of these tests.
+sensors::Sensor with_ranges(sensors::Sensor sensor) {
+  sensor.range_noise = kRangeNoise;
+  sensor.range_noise_per_range = sensor.range_noise_incidence = sensor.range_noise_weak_return = 0;
+  sensor.set_knowledge({"range_offset_m", kRangeOffset, "test", 0});
+  sensor.angle_noise = 0;
+  return sensor;
+}
 
 /// The unit that the paper's Table 3 simulates, its beams, and how wrong its prisms may be.
 class BentUnit {
  public:
   static constexpr double kPrismSigma = radians_from_degrees(0.005);
 
-  BentUnit() : sensor_(sensors::load_sensor("mid-40-table3")) {
+  BentUnit() : sensor_(with_ranges(sensors::load_sensor("mid-40-table3"))) {
     names_ = estimation::default_free_names(sensor_.train.shape());
     std::erase(names_, "refractive_index");
+    sensor_.reference = sensors::CalibrationReference::planes;
+    sensor_.covariance_names = names_;
+    sensor_.covariance =
+        kPrismSigma * kPrismSigma *
+        MatrixXd::Identity(static_cast<Index>(names_.size()), static_cast<Index>(names_.size()));
   }
+  const sensors::Sensor& sensor() const { return sensor_; }
+  sensors::Sensor& sensor() { return sensor_; }
   const std::vector<std::string>& names() const { return names_; }
   /// At a time, with each prism's errors so many sigmas off.
   Vector3d direction(double time, const std::vector<double>& sigmas) const {
@@ -130,83 +140,77 @@ class BentUnit {
     const auto d = observe(train, angles).direction;
     return {d.x, d.y, d.z};
   }
-  /// What one sigma of a prism's error does to a direction.
-  Vector3d rate(double time, std::size_t prism) const {
-    std::vector<double> sigmas(names_.size());
-    sigmas[prism] = 0.01;
-    const Vector3d ahead = direction(time, sigmas);
-    sigmas[prism] = -0.01;
-    return (ahead - direction(time, sigmas)) / 0.02;
-  }
 
  private:
   sensors::Sensor sensor_;
   std::vector<std::string> names_;
 };
 
-SensorPoints sensor_points(const std::vector<double>& times) {
-  SensorPoints result;
+/// Points of a sensor 80 m above ground, at times of the trajectory, with 20 mm of range noise and
+/// a range offset that is known to 5 mm.
+struct SensorPoints {
+  CloudHeader header;
+  PointingModel model;
+  PointedShots shots;
+  Points points;
+
+  SensorPoints(const std::vector<double>& times, PointingModel of) : model(std::move(of)) {
+    header.has_own_covariance = header.has_point_source = true;
+    for (const CommonFactor& factor : model.factors) header.factors.push_back(factor.name);
+    shots.resize(header.prisms, times.size());
+    points.time_ns.resize(times.size());
+    for (std::size_t i = 0; i < times.size(); ++i) {
+      // The recording's clock is behind by the mount's offset.
+      points.time_ns[i] = 200'000 * kSecond + std::llround(1e9 * (times[i] - 0.25));
+      for (auto& column : shots.surface_normal) column[i] = std::nan("");
+    }
+  }
+
+  std::size_t size() const { return points.size(); }
+  /// A shot that meets the ground in a direction.
+  void set(std::size_t shot, const Vector3d& direction) {
+    shots.azimuth[shot] = std::atan2(direction.y(), direction.x());
+    shots.zenith[shot] = std::acos(direction.z());
+    shots.range[shot] = 80 / direction.x();
+  }
+  void compute(std::span<const SensorPose> at) {
+    header.resize(points, size());
+    compute_points(model, header, shots, points, at);
+  }
+  Vector3d point(std::size_t i) const { return {points.x[i], points.y[i], points.z[i]}; }
+};
+
+/// Of directions that the sensor reports without error.
+SensorPoints sensor_points(const std::vector<double>& times, const trajectories::Mount& mount) {
+  const PointingOptions options{.reported_directions = true,
+                                .beam_origin = false,
+                                .beam_divergence = false,
+                                .covariance = true};
+  SensorPoints result(times, reported_pointing_model(with_ranges(sensors::load_sensor("mid-40")),
+                                                     options, std::nullopt, mount));
   result.header.has_rotation_angles = false;
-  result.header.factors = {"range_offset_m"};
-  result.header.has_own_covariance = result.header.has_point_source = true;
-  result.header.resize(result.points, times.size());
-  Points& p = result.points;
   for (std::size_t i = 0; i < times.size(); ++i) {
-    // The recording's clock is behind by the mount's offset.
-    p.time_ns[i] = 200'000 * kSecond + std::llround(1e9 * (times[i] - 0.25));
     const double aside = radians_from_degrees(19.0 * std::sin(1.0 + 37.0 * times[i]));
     const double turn = 11.0 * times[i];
-    const Vector3d d(std::cos(aside), std::sin(aside) * std::cos(turn),
-                     std::sin(aside) * std::sin(turn));
-    const Vector3d x = 80 / std::cos(aside) * d;
-    result.direction.push_back(d);
-    p.x[i] = x.x();
-    p.y[i] = x.y();
-    p.z[i] = x.z();
-    const Matrix3d own = kRangeNoise * kRangeNoise * d * d.transpose();
-    const Matrix3d all = own + kRangeOffset * kRangeOffset * d * d.transpose();
-    constexpr std::array<std::array<Index, 2>, 6> kPlaces{
-        {{0, 0}, {0, 1}, {0, 2}, {1, 1}, {1, 2}, {2, 2}}};
-    for (std::size_t term = 0; term < 6; ++term) {
-      p.own_covariance[term][i] = own(kPlaces[term][0], kPlaces[term][1]);
-      p.covariance[term][i] = all(kPlaces[term][0], kPlaces[term][1]);
-    }
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      p.loading[0][axis][i] = -kRangeOffset * d[static_cast<Index>(axis)];
-    }
+    result.set(
+        i, {std::cos(aside), std::sin(aside) * std::cos(turn), std::sin(aside) * std::sin(turn)});
   }
   return result;
 }
 
-/// Points of a bent unit's beams, 80 m below it, with the prisms' errors as further factors.
-SensorPoints prism_points(const std::vector<double>& times, const BentUnit& unit) {
-  SensorPoints result = sensor_points(times);
-  for (const std::string& name : unit.names()) result.header.factors.push_back(name);
-  result.header.resize(result.points, times.size());
-  Points& p = result.points;
-  const std::vector<double> exact(unit.names().size());
+/// Of a calibrated bent unit's beams, whose prisms have errors.
+SensorPoints prism_points(const std::vector<double>& times, const BentUnit& unit,
+                          const trajectories::Mount& mount) {
+  SensorBelief belief;
+  belief.sensor = unit.sensor();
+  belief.covariance.resize(0, 0);
+  SensorPoints result(
+      times, pointing_model(unit.sensor(), belief, {.beam_origin = false, .beam_divergence = false},
+                            mount));
   for (std::size_t i = 0; i < times.size(); ++i) {
-    const Vector3d d = unit.direction(times[i], exact);
-    const double range = 80 / d.x();
-    result.direction[i] = d;
-    p.x[i] = range * d.x();
-    p.y[i] = range * d.y();
-    p.z[i] = range * d.z();
-    const Matrix3d own = kRangeNoise * kRangeNoise * d * d.transpose();
-    Matrix3d all = own;
-    for (std::size_t k = 0; k <= unit.names().size(); ++k) {
-      const Vector3d loading =
-          k == 0 ? Vector3d(-kRangeOffset * d) : Vector3d(range * unit.rate(times[i], k - 1));
-      all += loading * loading.transpose();
-      for (std::size_t axis = 0; axis < 3; ++axis) {
-        p.loading[k][axis][i] = loading[static_cast<Index>(axis)];
-      }
-    }
-    constexpr std::array<std::array<Index, 2>, 6> kPlaces{
-        {{0, 0}, {0, 1}, {0, 2}, {1, 1}, {1, 2}, {2, 2}}};
-    for (std::size_t term = 0; term < 6; ++term) {
-      p.own_covariance[term][i] = own(kPlaces[term][0], kPlaces[term][1]);
-      p.covariance[term][i] = all(kPlaces[term][0], kPlaces[term][1]);
+    result.set(i, unit.direction(times[i], std::vector<double>(unit.names().size())));
+    for (std::size_t k = 0; k < 2; ++k) {
+      result.shots.rotation_angle[k][i] = unit.sensor().angular_velocity[k] * times[i];
     }
   }
   return result;
@@ -229,12 +233,12 @@ TEST(Georeference, AgreesWithExtendedPrecisionOnAMap) {
   std::vector<double> times;
   for (int i = 10; i < 3990; i += 7) times.push_back(i / kRate);
   const Georeference georeference(platform, recordings::TimeReference::relative, 0);
-  SensorPoints of = sensor_points(times);
+  SensorPoints of = sensor_points(times, platform.mount);
+  const std::vector<SensorPose> at = poses(georeference, of.points);
+  of.compute(at);
   const Points before = of.points;
-  CloudHeader header = of.header;
-  georeference.announce(header, true);
-  header.resize(of.points, times.size());
-  georeference.apply(of.points, 1, poses(georeference, before));
+  georeference.announce(of.header);
+  georeference.apply(of.points, at);
 
   const UtmReferee zone{6378137.0L, 1 / 298.257223563L, 9 * M_PIl / 180};
   const auto angle = [](const trajectories::StatedValue& stated) {
@@ -257,8 +261,8 @@ TEST(Georeference, AgreesWithExtendedPrecisionOnAMap) {
     // Back from the map by Newton: which latitude, longitude and height is that place?
     long double latitude = kOrigin.latitude, longitude = kOrigin.longitude, height = 0;
     for (int step = 0; step < 40; ++step) {  // radii differ by some thousandths: converge slowly
-      const auto at = zone.geocentric(latitude, longitude, height);
-      const Wide off = place - Wide(at[0], at[1], at[2]);
+      const auto reached = zone.geocentric(latitude, longitude, height);
+      const Wide off = place - Wide(reached[0], reached[1], reached[2]);
       const long double sl = std::sin(latitude), cl = std::cos(latitude), so = std::sin(longitude),
                         co = std::cos(longitude);
       latitude += off.dot(Wide(-sl * co, -sl * so, cl)) / 6378137.0L;
@@ -288,12 +292,11 @@ TEST(Georeference, EveryInstructionSetGivesTheSame) {
       std::vector<double> times;
       for (std::size_t i = 0; i < count; ++i) times.push_back(3 + 0.0007 * static_cast<double>(i));
       const auto applied = [&](InstructionSet set) {
-        SensorPoints of = sensor_points(times);
-        const Points before = of.points;
-        CloudHeader header = of.header;
-        georeference.announce(header, true);
-        header.resize(of.points, times.size());
-        georeference.apply(of.points, 1, poses(georeference, before), set);
+        SensorPoints of = sensor_points(times, platform->mount);
+        const std::vector<SensorPose> at = poses(georeference, of.points);
+        of.compute(at);
+        georeference.announce(of.header);
+        georeference.apply(of.points, at, set);
         return of.points;
       };
       const Points plain = applied(InstructionSet::baseline);
@@ -319,11 +322,11 @@ TEST(Georeference, TimesBecomeUtcAndStripsAreNumbered) {
   MovingPlatform platform{trajectory(220), mount(), apx18(), "EPSG:32632"};
   const Georeference georeference(platform, recordings::TimeReference::relative, 0);
   ASSERT_EQ(georeference.strips().size(), 2u);
-  SensorPoints of = sensor_points({1.0, 50.0, 180.0});
-  const Points before = of.points;
-  georeference.announce(of.header, true);
-  of.header.resize(of.points, 3);
-  georeference.apply(of.points, 1, poses(georeference, before));
+  SensorPoints of = sensor_points({1.0, 50.0, 180.0}, platform.mount);
+  const std::vector<SensorPose> at = poses(georeference, of.points);
+  of.compute(at);
+  georeference.announce(of.header);
+  georeference.apply(of.points, at);
   EXPECT_EQ(of.points.point_source, (std::vector<std::uint16_t>{1, 1, 2}));
   EXPECT_EQ(of.header.time_reference, recordings::TimeReference::utc);
   // 2400 weeks and 200,001 s of GPS time are 1,767,684,801 s of UTC since 1970.
@@ -336,10 +339,10 @@ TEST(Georeference, TimesBecomeUtcAndStripsAreNumbered) {
   const std::vector<std::size_t> rows{0, 1, 2};
   const MatrixXd joint = joint_covariance(of.points, *of.header.trajectory, rows);
   for (std::size_t i = 0; i < 3; ++i) {
-    const auto at = static_cast<Index>(3 * i);
-    EXPECT_NEAR(joint(at, at) / of.points.covariance[kXX][i], 1, 2e-3);
-    EXPECT_NEAR(joint(at + 1, at + 1) / of.points.covariance[kYY][i], 1, 2e-3);
-    EXPECT_NEAR(joint(at + 2, at + 2) / of.points.covariance[kZZ][i], 1, 2e-3);
+    const auto first = static_cast<Index>(3 * i);
+    EXPECT_NEAR(joint(first, first) / of.points.covariance[kXX][i], 1, 2e-3);
+    EXPECT_NEAR(joint(first + 1, first + 1) / of.points.covariance[kYY][i], 1, 2e-3);
+    EXPECT_NEAR(joint(first + 2, first + 2) / of.points.covariance[kZZ][i], 1, 2e-3);
   }
 }
 
@@ -408,8 +411,7 @@ class Draws {
           Eigen::AngleAxisd(turn.norm(), axes * turn.normalized()).toRotationMatrix());
       const Matrix3d body = (wrong * pose->attitude).toRotationMatrix();
       const double noise = kRangeNoise * normal() - range;
-      const double measured =
-          Vector3d(of_.points.x[row], of_.points.y[row], of_.points.z[row]).norm() + noise;
+      const double measured = of_.point(row).norm() + noise;
       const Vector3d p = measured * unit_.direction(times_[row], prisms);
       places.push_back(pose->position + axes * shift + body * (lever + sensor * p));
     }
@@ -450,11 +452,12 @@ TEST(Georeference, CovariancesOfAnySetOfPointsAreTrue) {
   for (int i = 0; i < 40; ++i) times.push_back(160 + 0.0113 * i);
   const Georeference georeference(platform, recordings::TimeReference::relative, 0);
   const BentUnit unit;
-  const SensorPoints sensor = prism_points(times, unit);
+  SensorPoints sensor = prism_points(times, unit, platform.mount);
+  const std::vector<SensorPose> at = poses(georeference, sensor.points);
+  sensor.compute(at);
   SensorPoints of = sensor;
-  georeference.announce(of.header, true);
-  of.header.resize(of.points, times.size());
-  georeference.apply(of.points, 1 + unit.names().size(), poses(georeference, sensor.points));
+  georeference.announce(of.header);
+  georeference.apply(of.points, at);
   std::vector<std::size_t> rows;
   for (std::size_t i = 0; i < times.size(); ++i) rows.push_back(i);
   const std::array<MatrixXd, 2> joint{
@@ -508,20 +511,12 @@ TEST(Georeference, CovariancesOfAnySetOfPointsAreTrue) {
   const Draws draws(platform, sensor, unit, times);
   std::vector<MapTangent> tangents;
   std::vector<Vector3d> true_places;
-  {
-    const std::vector<SensorPose> at = poses(georeference, sensor.points);
-    for (Index i = 0; i < n; ++i) {
-      const auto row = static_cast<std::size_t>(i);
-      const Vector3d place =
-          at[row].reference + at[row].lever +
-          at[row].turn * Vector3d(sensor.points.x[row], sensor.points.y[row], sensor.points.z[row]);
-      tangents.push_back(map.tangent(place));
-      true_places.push_back(tangents.back().map(place));
-      EXPECT_NEAR(
-          (true_places.back() - Vector3d(of.points.x[row], of.points.y[row], of.points.z[row]))
-              .norm(),
-          0, 1e-5);
-    }
+  for (Index i = 0; i < n; ++i) {
+    const auto row = static_cast<std::size_t>(i);
+    const Vector3d place = at[row].reference + at[row].lever + at[row].turn * sensor.point(row);
+    tangents.push_back(map.tangent(place));
+    true_places.push_back(tangents.back().map(place));
+    EXPECT_NEAR((true_places.back() - of.point(row)).norm(), 0, 1e-5);
   }
   constexpr int kDraws = 1000;
   for (int draw = 0; draw < kDraws; ++draw) {
@@ -574,6 +569,114 @@ TEST(Georeference, CovariancesOfAnySetOfPointsAreTrue) {
   }
 }
 
+/// Covariances of some quantities with correlations of up to 0.9 between the first ones and the
+/// last.
+MatrixXd correlated(const Eigen::VectorXd& sigma) {
+  const Index n = sigma.size();
+  MatrixXd factor(n, n);
+  const RandomStream random(7, 3);
+  for (Index i = 0; i < n; ++i) {
+    for (Index j = 0; j < n; ++j) {
+      factor(i, j) = random.normal(static_cast<std::uint64_t>(n * i + j));
+    }
+    factor(i, 0) += i % 2 == 0 ? 4 : -4;  // what all have in common
+    factor.row(i) *= sigma[i] / factor.row(i).norm();
+  }
+  return factor * factor.transpose();
+}
+
+// A flight that calibrates finds mount and prisms together. With that calibration a point's
+// covariance is that of all of them, J C J', with J by differences of what a surveyor computes;
+// with another one, of which only the variances differ, that of both apart.
+TEST(Georeference, MountAndPrismsThatWereFoundTogetherAreCountedTogether) {
+  const std::vector<double> times{20.0, 20.015, 21.0, 50.0, 150.0};
+  MovingPlatform platform{trajectory(220), mount(), {}, "EPSG:32632"};
+  trajectories::Mount& m = platform.mount;
+  BentUnit unit;
+  const auto prisms = static_cast<Index>(unit.names().size()), all = prisms + 7;
+  Eigen::VectorXd sigma = Eigen::VectorXd::Constant(all, BentUnit::kPrismSigma);
+  const auto sigmas = trajectories::mount_sigmas(m);
+  sigma.tail(7) = Eigen::Map<const Eigen::VectorXd>(sigmas.data(), 7);
+  m.covariance = {unit.names(), correlated(sigma)};
+  m.covariance.names.insert(m.covariance.names.end(), trajectories::mount_names().begin(),
+                            trajectories::mount_names().end());
+  unit.sensor().covariance = m.covariance.matrix.topLeftCorner(prisms, prisms);
+
+  const trajectories::Interpolation interpolation(platform.trajectory);
+  const MapProjection map("EPSG:32632");
+  /// @param errors  in sigmas
+  const auto place = [&](double time, double range, const Eigen::VectorXd& errors) {
+    trajectories::Mount moved = m;
+    for (Index k = 0; k < 3; ++k) {
+      const auto at = static_cast<std::size_t>(k);
+      moved.lever_arm[at].value += errors[prisms + 3 + k] * sigmas[at + 3];
+    }
+    const Vector3d turn =
+        errors.segment<3>(prisms).cwiseProduct(Eigen::Map<const Vector3d>(sigmas.data()));
+    const auto pose = interpolation.at(200'000 * kSecond +
+                                       std::llround(1e9 * (time + errors[all - 1] * sigmas[6])));
+    const std::vector<double> of_prisms(errors.data(), errors.data() + prisms);
+    Vector3d p = range * unit.direction(time, of_prisms);
+    p += turn.cross(p);
+    return map.project(pose->position +
+                       pose->attitude.toRotationMatrix() * (trajectories::lever_arm(moved) +
+                                                            trajectories::body_from_sensor(m) * p));
+  };
+  const Georeference georeference(platform, recordings::TimeReference::relative, 0);
+  const auto stated = [&] {
+    SensorPoints of = prism_points(times, unit, m);
+    const std::vector<SensorPose> at = poses(georeference, of.points);
+    of.compute(at);
+    georeference.announce(of.header);
+    georeference.apply(of.points, at);
+    return of;
+  };
+  const SensorPoints together = stated();
+  EXPECT_FALSE(together.model.mount_of_another);
+  unit.sensor().covariance *= 1.001;
+  const SensorPoints apart = stated();
+  EXPECT_TRUE(apart.model.mount_of_another);
+  MatrixXd independent = m.covariance.matrix;
+  independent.topLeftCorner(prisms, prisms) = unit.sensor().covariance;
+  independent.topRightCorner(prisms, 7).setZero();
+  independent.bottomLeftCorner(7, prisms).setZero();
+
+  const Eigen::VectorXd none = Eigen::VectorXd::Zero(all);
+  for (std::size_t i = 0; i < times.size(); ++i) {
+    const double range = together.shots.range[i];
+    MatrixXd jacobian(3, all);
+    for (Index k = 0; k < all; ++k) {
+      Eigen::VectorXd step = none;
+      step[k] = 1;
+      jacobian.col(k) = (place(times[i], range, step) - place(times[i], range, -step)) / 2;
+      jacobian.col(k) /= k < prisms ? BentUnit::kPrismSigma : sigma[k];
+    }
+    const Vector3d along =
+        (place(times[i], range + 0.5, none) - place(times[i], range - 0.5, none));
+    const Matrix3d ranges =
+        (kRangeNoise * kRangeNoise + kRangeOffset * kRangeOffset) * along * along.transpose();
+    const auto check = [&](const SensorPoints& of, const MatrixXd& covariance) {
+      const Matrix3d expected = jacobian * covariance * jacobian.transpose() + ranges;
+      const auto& c = of.points.covariance;
+      Matrix3d got;
+      got << c[kXX][i], c[kXY][i], c[kXZ][i], c[kXY][i], c[kYY][i], c[kYZ][i], c[kXZ][i], c[kYZ][i],
+          c[kZZ][i];
+      EXPECT_LT((got - expected).norm(), 2e-3 * expected.norm()) << got << "\n" << expected;
+      // The loadings say the same, but for the range's own noise.
+      Matrix3d shared = Matrix3d::Zero();
+      for (const auto& loading : of.points.loading) {
+        const Vector3d one(loading[0][i], loading[1][i], loading[2][i]);
+        shared += one * one.transpose();
+      }
+      EXPECT_LT((shared + kRangeNoise * kRangeNoise * along * along.transpose() - got).norm(),
+                1e-4 * got.norm());
+      return expected;
+    };
+    const Matrix3d joint = check(together, m.covariance.matrix), alone = check(apart, independent);
+    EXPECT_GT((joint - alone).norm(), 0.1 * alone.norm()) << "the case tells nothing";
+  }
+}
+
 TEST(Georeference, RefusesWhatCannotBe) {
   Trajectory local = trajectory(1);
   local.frame = trajectories::Frame::local;
@@ -595,7 +698,7 @@ TEST(Georeference, RefusesWhatCannotBe) {
   CloudHeader header;
   header.has_point_source = true;
   header.resize(points, 2);
-  EXPECT_NE(refusal([&] { georeference.apply(points, 0, {}); }).find("poses"), std::string::npos);
+  EXPECT_NE(refusal([&] { georeference.apply(points, {}); }).find("poses"), std::string::npos);
 }
 
 }  // namespace risley::cloud::georeference_test

@@ -311,7 +311,7 @@ Points points_of(const PointingModel& model, const CloudHeader& header, const Po
                  InstructionSet set = available_instruction_sets().back()) {
   Points points;
   header.resize(points, shots.size());
-  compute_points(model, header, shots, points, set);
+  compute_points(model, header, shots, points, {}, set);
   return points;
 }
 

@@ -133,6 +133,18 @@ TEST(Entries, MountsHoldWhatCanBeWritten) {
   EXPECT_THAT(run([](Mount& m) { m.lever_arm[2].value = kNan; }),
               HasSubstr("lever_arm[2] = nan m"));
   EXPECT_THAT(run([](Mount& m) { m.clock_offset.value = 1e11; }), HasSubstr("clock_offset = 1"));
+  const auto covariance = [](double sigma, double variance) {
+    return [=](Mount& m) {
+      m.clock_offset.sigma = sigma;
+      m.covariance = {{"clock_offset_s"}, Eigen::MatrixXd::Constant(1, 1, variance)};
+    };
+  };
+  EXPECT_EQ(run(covariance(0.5, 0.25)), "");
+  EXPECT_THAT(run(covariance(0.5, 0.26)), HasSubstr("clock_offset_s has a sigma of 0.5099"));
+  EXPECT_THAT(run(covariance(0, 0)), HasSubstr("covariance[0][0]: a variance must be above 0"));
+  EXPECT_THAT(run(covariance(kNan, kNan)), HasSubstr("sigma of clock_offset = nan"));
+  EXPECT_THAT(run([](Mount& m) { m.covariance.names = {"clock_offset_s"}; }),
+              HasSubstr("covariance is 0 x 0, expected 1 x 1"));
 }
 
 }  // namespace risley::trajectories::entries_test

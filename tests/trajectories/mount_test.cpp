@@ -113,6 +113,84 @@ TEST(Mount, WritesWhatItReads) {
               HasSubstr("sensor_axes: {x: down, y: left, z: forward,"));
 }
 
+/// Calibrated in flight: three quantities of the mount with two of the sensor.
+Mount calibrated_mount() {
+  Mount mount = parse_mount(kHexacopter, "mount.yaml");
+  mount.boresight[1].sigma = 1e-4;
+  mount.lever_arm[0].sigma = 0.01;
+  mount.clock_offset.sigma = 1.0 / 3e4;
+  const Eigen::VectorXd sigma =
+      (Eigen::VectorXd(5) << 1e-4, 0.01, 1.0 / 3e4, 2e-4, 0.003).finished();
+  Eigen::MatrixXd correlation = Eigen::MatrixXd::Constant(5, 5, 0.3);
+  correlation(0, 3) = correlation(3, 0) = -0.4;
+  correlation.diagonal().setOnes();
+  mount.covariance = {{"boresight_y_deg", "lever_arm_x_m", "clock_offset_s",
+                       "incident_beam_vertical_deg", "range_offset_m"},
+                      sigma.asDiagonal() * correlation * sigma.asDiagonal()};
+  // What rounding makes of the halves is none of this.
+  mount.covariance.matrix =
+      Eigen::MatrixXd(mount.covariance.matrix.selfadjointView<Eigen::Lower>());
+  return mount;
+}
+
+TEST(Mount, WritesTheCovarianceThatItHasWithItsSensor) {
+  const Mount mount = calibrated_mount();
+  const Mount again = parse_mount(mount_text(mount), "again.yaml");
+  EXPECT_EQ(again.covariance.names, mount.covariance.names);
+  EXPECT_EQ(again.covariance.matrix, mount.covariance.matrix);
+}
+
+// With the calibration that it was found with a mount has all covariances; with another one, or of
+// a sensor that has none, its own alone.
+TEST(Mount, KnowsWhichCalibrationItWasFoundWith) {
+  const Mount mount = calibrated_mount();
+  const std::vector<std::string> of_sensor{"range_offset_m", "incident_beam_vertical_deg"};
+  const algebra::NamedCovariance sensor = mount.covariance.part(of_sensor);
+  ASSERT_EQ(sensor.names, of_sensor);
+  EXPECT_TRUE(found_together(mount, sensor));
+  const algebra::NamedCovariance joint = joint_covariance(sensor, mount);
+  // Behind the sensor's the seven of the mount, all of which have a sigma.
+  ASSERT_EQ(joint.names.size(), 2 + kMountQuantities);
+  for (std::size_t i = 0; i < joint.names.size(); ++i) {
+    for (std::size_t j = 0; j < joint.names.size(); ++j) {
+      const auto own = mount.covariance.find(joint.names[i]),
+                 other = mount.covariance.find(joint.names[j]);
+      const double got = joint.matrix(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
+      if (own >= 0 && other >= 0) {
+        EXPECT_EQ(got, mount.covariance.matrix(own, other)) << joint.names[i] << joint.names[j];
+      } else if (i == j) {
+        EXPECT_GT(got, 0);
+      } else {
+        EXPECT_EQ(got, 0);
+      }
+    }
+  }
+  algebra::NamedCovariance another = sensor;
+  another.matrix *= 1 + 1e-6;
+  EXPECT_FALSE(found_together(mount, another));
+  const algebra::NamedCovariance apart = joint_covariance(another, mount);
+  EXPECT_EQ(apart.matrix.topRightCorner(2, 7), (Eigen::MatrixXd::Zero(2, 7)));
+  EXPECT_EQ(apart.matrix.topLeftCorner(2, 2), another.matrix);
+  EXPECT_EQ(apart.matrix.bottomRightCorner(7, 7), joint.matrix.bottomRightCorner(7, 7));
+  EXPECT_FALSE(found_together(mount, {}));
+  EXPECT_EQ(joint_covariance({{}, Eigen::MatrixXd(0, 0)}, mount).matrix,
+            joint.matrix.bottomRightCorner(7, 7));
+}
+
+TEST(Mount, RefusesACovarianceThatIsNotOfItsSigmas) {
+  std::string text = mount_text(calibrated_mount());
+  const std::string sigma = "sigma: 0.01, source";
+  const auto at = text.find(sigma, text.find("lever_arm"));
+  ASSERT_NE(at, std::string::npos);
+  text.replace(at, sigma.size(), "sigma: 0.02, source");
+  try {
+    parse_mount(text, "mount.yaml");
+    FAIL() << "not refused";
+  } catch (const FileError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("lever_arm_x_m has a sigma of 0.01 in it, and 0.02"));
+  }
+}
+
 TEST(Mount, TheTextOfAnEmptyMountIsRead) {
   const Mount again = parse_mount(mount_text({}), "again.yaml");
   EXPECT_EQ(again.nominal, Matrix3d::Identity());

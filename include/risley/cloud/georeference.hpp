@@ -14,6 +14,7 @@
 #include "risley/cloud/map_projection.hpp"
 #include "risley/cloud/point_distribution.hpp"
 #include "risley/cloud/points.hpp"
+#include "risley/cloud/sensor_pose.hpp"
 #include "risley/core/instruction_set.hpp"
 #include "risley/recordings/observations.hpp"
 #include "risley/trajectories/error_process.hpp"
@@ -36,18 +37,9 @@ struct MovingPlatform {
   std::string datum = "EPSG:4979";  ///< of the trajectory's positions, see MapProjection
 };
 
-/// Where a sensor is at the time of a shot, in the trajectory's frame.
-struct SensorPose {
-  Eigen::Matrix3d turn = Eigen::Matrix3d::Identity();  ///< frame from sensor
-  Eigen::Vector3d reference{0, 0, 0};                  ///< the trajectory's reference point, m
-  Eigen::Vector3d lever{0, 0, 0};                      ///< from there to the sensor's origin, m
-  Eigen::Vector3d velocity{0, 0, 0};  ///< of the reference point, to some milliseconds, m/s
-  Eigen::Vector3d rate{0, 0, 0};      ///< of turning, to some milliseconds, rad/s
-  std::uint16_t strip = 0;            ///< from 1; 0: of none
-};
-
-/// Points of a moving sensor: from its own frame to a map, with the covariance that mount and
-/// trajectory add. May be used by several threads, each with a Cursor. docs/theory/cloud.md
+/// Points of a moving sensor: from its own frame to a map, with the covariance that the trajectory
+/// adds; a mount's errors are common factors of the PointingModel. May be used by several threads,
+/// each with a Cursor. docs/theory/cloud.md
 class Georeference {
  public:
   /// @param platform         must outlive this
@@ -86,15 +78,13 @@ class Georeference {
     SensorPose pose_;
   };
 
-  /// Fills what a cloud's header says of frame, times, strips, trajectory and common factors.
-  /// @param loadings  points carry the loadings of the common factors
-  void announce(CloudHeader& header, bool loadings) const;
+  /// Fills what a cloud's header says of frame, times, strips and trajectory.
+  void announce(CloudHeader& header) const;
 
-  /// Turns points of the sensor's frame into points of the map: coordinates, covariances, loadings
-  /// (the mount's behind those that are there), times and strips.
-  /// @param sensor_factors  number of common factors that the sensor's model has
+  /// Turns points of the sensor's frame into points of the map: coordinates, covariances, loadings,
+  /// times and strips.
   /// @param poses  of every point
-  void apply(Points& points, std::size_t sensor_factors, std::span<const SensorPose> poses,
+  void apply(Points& points, std::span<const SensorPose> poses,
              InstructionSet set = best_instruction_set()) const;
 
   /// What a user should know: no errors of the trajectory, an unknown clock, a change of datum.
@@ -107,9 +97,6 @@ class Georeference {
   std::vector<StripLine> strip_lines() const;
 
  private:
-  void turn_loadings(Points& points, std::size_t sensor_factors, std::span<const SensorPose> poses,
-                     std::span<const Eigen::Vector3d> arms, const Eigen::Matrix3d& jacobian) const;
-
   struct State;
   std::unique_ptr<State> state_;
 };

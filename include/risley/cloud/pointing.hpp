@@ -5,10 +5,12 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "risley/cloud/pointing_model.hpp"
 #include "risley/cloud/points.hpp"
+#include "risley/cloud/sensor_pose.hpp"
 #include "risley/core/instruction_set.hpp"
 
 namespace risley::cloud {
@@ -30,16 +32,18 @@ struct PointedShots {
   void resize(int prisms, std::size_t shots);
 };
 
-/// Cartesian points with covariance [B21 Eq. (31), App. A]. Fills x, y, z, covariance, range,
-/// incidence, rotation_angle, residuals and loading, as far as the header announces them; the
-/// points' other columns are the caller's. A beam that does not get through the prisms gives NaN.
-/// Residuals are exact to 1e-8 of them up to 0.1 rad; larger ones are only large.
+/// Cartesian points of the sensor's frame with covariance [B21 Eq. (31), App. A]. Fills x, y, z,
+/// covariance, range, incidence, rotation_angle, residuals and loading, as far as the header
+/// announces them; the points' other columns are the caller's. A beam that does not get through the
+/// prisms gives NaN. Residuals are exact to 1e-8 of them up to 0.1 rad; larger ones are only large.
 /// @param header  of the points: without rotation angles only where the model needs none; with one
 /// factor name per factor of the model or none
+/// @param poses  of the shots of a model with a mount, whose errors then count
 /// @throws InvalidArgument for columns, factors or prisms that are not as model and header announce
 ///         them, emitters that the model does not have, and as check_available()
 void compute_points(const PointingModel& model, const CloudHeader& header,
                     const PointedShots& shots, Points& points,
+                    std::span<const SensorPose> poses = {},
                     InstructionSet set = best_instruction_set());
 
 }  // namespace risley::cloud

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <array>
 #include <optional>
 #include <string>
 #include <vector>
@@ -11,6 +12,7 @@
 #include "risley/cloud/rotor_tracking.hpp"
 #include "risley/optics/beam_origin.hpp"
 #include "risley/sensors/sensor.hpp"
+#include "risley/trajectories/mount.hpp"
 
 namespace risley::cloud {
 
@@ -30,6 +32,8 @@ struct CommonFactor {
   Eigen::VectorXd
       weights;  ///< [places + prisms + sizes]: flat vector, rotation angles, sizes of prisms
   double range_offset = 0;  ///< m
+  /// Of the mount, in the order of trajectories::mount_names(), rad, m and s.
+  std::array<double, trajectories::kMountQuantities> mount{};
 };
 
 /// Where the beam of a sensor goes, and how wrong that may be. Derivation: docs/theory/cloud.md
@@ -47,6 +51,10 @@ struct PointingModel {
   PointingOptions options;
   std::vector<int> places;  ///< of the flat vector that have a common factor
   std::vector<CommonFactor> factors;
+  std::optional<trajectories::Mount> mount;  ///< of a moving sensor
+  /// The mount was found together with the parameters of another calibration than this one: what
+  /// their errors have in common is not known.
+  bool mount_of_another = false;
 };
 
 /// Standard deviation of a direction within a beam of a full divergence angle: a quarter of it.
@@ -62,10 +70,13 @@ inline constexpr double kDivergenceSigma = 0.25;
 ///   sensor believes; both have errors of their own.
 /// - Not calibrated, as a type or a unit of the simulator: as directions where the recording agrees
 ///   with the parameters within their sigmas, otherwise as planes with these sigmas.
+/// @param mount  of a moving sensor; what its errors have in common with those of the calibration
+///               counts where one adjustment found both, see trajectories::found_together
 /// @throws InvalidArgument for a calibration of another sensor (face order, emitters), matrices
-///         that do not belong to the free parameters, angle noise below 0
+///         that do not belong to the free parameters, angle noise below 0, and as require_mount
 PointingModel pointing_model(const sensors::Sensor& calibration, const SensorBelief& belief,
-                             const PointingOptions& options);
+                             const PointingOptions& options,
+                             const std::optional<trajectories::Mount>& mount = {});
 
 /// Whether points depend on the rotation angles at all: not where they go where the sensor says,
 /// start at the frame's origin, and the sensor's own directions are taken as true.
@@ -77,6 +88,7 @@ bool needs_rotation_angles(const sensors::Sensor& calibration, const PointingOpt
 /// @throws InvalidArgument where needs_rotation_angles(), for angle noise below 0
 PointingModel reported_pointing_model(const sensors::Sensor& calibration,
                                       const PointingOptions& options,
-                                      std::optional<double> angle_noise);
+                                      std::optional<double> angle_noise,
+                                      const std::optional<trajectories::Mount>& mount = {});
 
 }  // namespace risley::cloud

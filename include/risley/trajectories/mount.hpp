@@ -3,9 +3,12 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <string>
 
 #include <Eigen/Core>
+
+#include "risley/algebra/named_covariance.hpp"
 
 namespace risley::trajectories {
 
@@ -34,7 +37,29 @@ struct Mount {
   std::array<StatedValue, 3> lever_arm;
   /// What is added to the recording's clock to get the trajectory's time, s.
   StatedValue clock_offset;
+  /// Of quantities of the mount and of its sensor that one adjustment found together, SI units:
+  /// names are those of mount_names() and of the sensor's calibration. The diagonal is the square
+  /// of the sigmas above. Empty where each is known by itself.
+  algebra::NamedCovariance covariance;
 };
+
+/// What a mount states beside its nominal rotation, in this order: boresight x, y, z, lever arm
+/// x, y, z, clock offset. Names end in the unit that files have.
+inline constexpr std::size_t kMountQuantities = 7;
+const std::array<std::string, kMountQuantities>& mount_names();
+
+/// Their standard deviations, rad, m and s.
+std::array<double, kMountQuantities> mount_sigmas(const Mount& mount);
+
+/// Whether the mount's covariance holds these quantities of a sensor, with the covariance given:
+/// one adjustment found both. A calibration that was made again is another one.
+bool found_together(const Mount& mount, const algebra::NamedCovariance& sensor);
+
+/// Joint covariance of quantities of a sensor and, behind them, of those of its mount that have a
+/// sigma. Where they were not found together mount and sensor are independent.
+/// @throws InvalidArgument as require_mount
+algebra::NamedCovariance joint_covariance(const algebra::NamedCovariance& sensor,
+                                          const Mount& mount);
 
 /// nominal * boresight: from the sensor's axes to the body's, [3, 3].
 /// @throws InvalidArgument as require_mount
@@ -44,7 +69,8 @@ Eigen::Matrix3d body_from_sensor(const Mount& mount);
 Eigen::Vector3d lever_arm(const Mount& mount);
 
 /// @throws InvalidArgument for a nominal rotation that is no right-handed rotation, values that are
-///         not finite or beyond what mount_text can write, and sigmas below 0
+///         not finite or beyond what mount_text can write, sigmas below 0, and a covariance that is
+///         none or does not belong to them
 void require_mount(const Mount& mount);
 
 /// Reads
@@ -62,6 +88,7 @@ void require_mount(const Mount& mount);
 ///       y_m: ...
 ///       z_m: ...
 ///     clock_offset_s: {value: 0, sigma: 0.002, source: PPS}
+///     covariance: {names: [...], matrix: [...]}   # optional, see io::read_covariance
 ///
 /// or, in place of sensor_axes, body_from_sensor: {matrix: [[0, 0, 1], [0, -1, 0], [1, 0, 0]],
 /// source: drawing}. A matrix whose entries were rounded to four decimals and more is made a
