@@ -99,9 +99,8 @@ RotorWindows::RotorWindows(const NormalEquations& equations, const RotorTrajecto
       const double dt = 1e-9 * static_cast<double>(at.time_ns[i] - at.time_ns[middle]);
       // The knot's deviation as a function of the window's: T u + e.
       Square h = knot_curvature<Eigen::Dynamic>(equations, i);
-      Vector e = center;
-      for (int k = 0; k < prisms; ++k) advance_rows(e, 3 * k, dt);
-      e -= Eigen::Map<const Vector>(at.state_of(i).data(), states);
+      const Vector own_state = Eigen::Map<const Vector>(at.state_of(i).data(), states);
+      const Vector e = motion_offset(center, own_state, dt);
       const double* own = equations.gradient.data() + i * static_cast<std::size_t>(states);
       Vector g = Eigen::Map<const Vector>(own, states) - h * e;
       for (int k = 0; k < prisms; ++k) {
@@ -139,9 +138,7 @@ RotorWindows::RotorWindows(const NormalEquations& equations, const RotorTrajecto
     window.state = center.segment<3>(3 * rotor);
     if (!fresh && !windows_.empty()) {
       window.step = 1e-9 * static_cast<double>(at.time_ns[middle] - at.time_ns[before]);
-      Eigen::Vector3d moved = windows_.back().state;
-      advance_rows(moved, 0, window.step);
-      window.offset = moved - window.state;
+      window.offset = motion_offset(windows_.back().state, window.state, window.step);
     }
     before = middle;
     windows_.push_back(window);

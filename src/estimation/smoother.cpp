@@ -170,9 +170,7 @@ class Smoother {
   /// Where the motion from the knot before misses a knot's linearisation: states are deviations
   /// from the linearisation, which need not follow the motion itself.
   Vector step_offset(std::size_t knot) const {
-    Vector offset = state(knot - 1);
-    for (int k = 0; k < prisms(); ++k) advance_rows(offset, 3 * k, step_before(knot));
-    return offset - state(knot);
+    return motion_offset(state(knot - 1), state(knot), step_before(knot));
   }
 
   void predict(std::size_t knot, Affine& x, Square& p) const {
