@@ -305,8 +305,8 @@ TEST(Smoother, ALongGapAfterFewKnotsCostsNoAccuracy) {
   }
 }
 
-// A rotor that turns evenly is known better than what is rounded in its angle, summed over the knots:
-// after an hour of shots steps of a sigma came and went, and the estimate never settled.
+// A rotor that turns evenly is known better than what is rounded in its angle, summed over the
+// knots: after an hour of shots steps of a sigma came and went, and the estimate never settled.
 TEST(Smoother, ManyTurnsOfAnEvenRotorCostNoAccuracy) {
   constexpr std::size_t kKnots = 20000;
   constexpr double kSpeed = 400, kFirstAngle = 1e9;  // rounded to 1.2e-7 rad
