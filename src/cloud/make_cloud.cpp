@@ -206,8 +206,7 @@ class Work {
     if (model_.mount_of_another) {
       summary_.warnings.emplace_back(
           "the mount was found together with another calibration than this one: what errors of "
-          "both "
-          "have in common is not known, and points are stated as if they had nothing in common");
+          "both have in common is not known, and points are stated as if that were nothing");
     }
     if (options_.platform) {
       georeference_ = std::make_unique<Georeference>(

@@ -91,6 +91,7 @@ class FlightCalibrationTest(CommandTest):
                                   "--trajectory", trajectory, "--mount", mount, *ERRORS,
                                   "--rate-hz", "full", "-o", f"{name}.xyz")
             self.assertEqual(cloud["strips"], 4)
+            self.assertNotIn("another calibration", " ".join(cloud["warnings"]))
             heights = [float(line.split()[2])
                        for line in (self.folder / f"{name}.xyz").read_text().splitlines()
                        if line[0] in "-0123456789"]
@@ -99,6 +100,11 @@ class FlightCalibrationTest(CommandTest):
         # Most of the ground is level: 20 mm of range noise and what strips are off.
         self.assertGreater(points["before"], 2 * points["after"])
         self.assertLess(points["after"], 0.06)
+        # A mount and a calibration that were found together belong together.
+        cloud = self.run_json(0, "cloud", "a.lvx", "--calibration", "mid-40", "--trajectory",
+                              "out/trajectory.csv", "--mount", "out/mount.yaml", *ERRORS,
+                              "-o", "apart.las")
+        self.assertIn("another calibration", " ".join(cloud["warnings"]))
         # A calibration is where the next one begins, and known ground is what it is fixed on.
         east, north = self.level_place("after.xyz")
         (self.folder / "control.yaml").write_text(
