@@ -88,25 +88,6 @@ struct Faces {
   }
 };
 
-/// Errors of a mount as the kernel wants them: along the axes of the sensor.
-struct MountFactors {
-  std::vector<double> weights;  ///< [factors][7]
-  Eigen::Vector3d lever_arm = Eigen::Vector3d::Zero();
-
-  explicit MountFactors(const PointingModel& model) {
-    if (!model.mount) return;
-    const Eigen::Matrix3d sensor_from_body =
-        trajectories::body_from_sensor(*model.mount).transpose();
-    lever_arm = sensor_from_body * trajectories::lever_arm(*model.mount);
-    for (const CommonFactor& factor : model.factors) {
-      std::array<double, trajectories::kMountQuantities> own = factor.mount;
-      Eigen::Map<Eigen::Vector3d> shift(own.data() + 3);
-      shift = sensor_from_body * Eigen::Vector3d(shift);
-      weights.insert(weights.end(), own.begin(), own.end());
-    }
-  }
-};
-
 /// Calls function(from column, to column) for every column of shots.
 template <class Function>
 void for_each_column(const PointedShots& from, PointedShots& to, const Function& function) {
@@ -211,7 +192,7 @@ void compute_points(const PointingModel& model, const CloudHeader& header,
                     InstructionSet set) {
   require_model(model);
   require_shots(model, header, shots);
-  require_length("poses", poses.size(), model.mount ? shots.size() : 0);
+  require_length("poses", poses.size(), model.lever_arm ? shots.size() : 0);
   require_computed_columns(points, header, shots.size());
   const Faces faces(model);
   const int prisms = model.train.prisms();
@@ -260,10 +241,13 @@ void compute_points(const PointingModel& model, const CloudHeader& header,
   a.factor_row = factor_row.data();
   a.factor_weight = factor_weight.data();
   a.range_factor = range_factor.data();
-  const MountFactors mount(model);
-  if (model.mount) {
-    a.mount_factor = mount.weights.data();
-    std::copy_n(mount.lever_arm.data(), 3, a.lever_arm);
+  std::vector<double> mount_factor;
+  if (model.lever_arm) {
+    for (const CommonFactor& factor : model.factors) {
+      mount_factor.insert(mount_factor.end(), factor.mount.begin(), factor.mount.end());
+    }
+    a.mount_factor = mount_factor.data();
+    std::copy_n(model.lever_arm->data(), 3, a.lever_arm);
   }
 
   const std::size_t whole = shots.size() / kPointPadding * kPointPadding;

@@ -133,7 +133,6 @@ PointingModel pointing_model(const sensors::Sensor& calibration, const SensorBel
                               : planes ? assumed(calibration, belief)
                                        : believed(belief);
   if (mount) {
-    model.mount = mount;
     model.mount_of_another = is_of_a_calibration(*mount) && !found_together(*mount, uncertain);
     uncertain = trajectories::joint_covariance(uncertain, *mount);
   }
@@ -141,6 +140,14 @@ PointingModel pointing_model(const sensors::Sensor& calibration, const SensorBel
   if (planes) factors.add_angles(believed(belief));
   factors.add_geometry(calibration);
   factors.finish();
+  if (mount) {
+    const Eigen::Matrix3d sensor_from_body = trajectories::body_from_sensor(*mount).transpose();
+    model.lever_arm = sensor_from_body * trajectories::lever_arm(*mount);
+    for (CommonFactor& factor : model.factors) {
+      Eigen::Map<Eigen::Vector3d> shift(factor.mount.data() + 3);
+      shift = sensor_from_body * Eigen::Vector3d(shift);
+    }
+  }
   if (model.factors.size() > static_cast<std::size_t>(kMostFactors)) {
     throw InvalidArgument(fmt::format("the calibration's covariance has {} quantities, allowed {}",
                                       model.factors.size(), kMostFactors));

@@ -32,7 +32,8 @@ struct CommonFactor {
   Eigen::VectorXd
       weights;  ///< [places + prisms + sizes]: flat vector, rotation angles, sizes of prisms
   double range_offset = 0;  ///< m
-  /// Of the mount, in the order of trajectories::mount_names(), rad, m and s.
+  /// Of the mount, in the order of trajectories::mount_names() but all of it along the axes of the
+  /// sensor, rad, m and s.
   std::array<double, trajectories::kMountQuantities> mount{};
 };
 
@@ -51,7 +52,8 @@ struct PointingModel {
   PointingOptions options;
   std::vector<int> places;  ///< of the flat vector that have a common factor
   std::vector<CommonFactor> factors;
-  std::optional<trajectories::Mount> mount;  ///< of a moving sensor
+  /// Of a moving sensor: from the trajectory's reference point, sensor's axes, m.
+  std::optional<Eigen::Vector3d> lever_arm;
   /// The mount was found together with the parameters of another calibration than this one: what
   /// their errors have in common is not known.
   bool mount_of_another = false;
