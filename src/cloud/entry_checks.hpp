@@ -5,9 +5,20 @@
 #include <cstddef>
 
 #include "risley/cloud/points.hpp"
+#include "risley/cloud/sensor_poses.hpp"
 #include "risley/core/require.hpp"
 
 namespace risley::cloud {
+
+inline void require_poses(const SensorPoses& poses, std::size_t shots) {
+  require_length("poses", poses.size(), shots);
+  for (const auto& column : poses.turn) require_length("turn of poses", column.size(), shots);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    require_length("reference of poses", poses.reference[axis].size(), shots);
+    require_length("velocity of poses", poses.velocity[axis].size(), shots);
+    require_length("rate of poses", poses.rate[axis].size(), shots);
+  }
+}
 
 /// The columns that compute_points() fills, as far as a header announces them.
 inline void require_computed_columns(const Points& points, const CloudHeader& header,

@@ -18,8 +18,10 @@
 #include "risley/trajectories/clock.hpp"
 #include "risley/trajectories/geodesy.hpp"
 
+#include "cloud/entry_checks.hpp"
 #include "cloud/georeference_kernel.hpp"
-#include "cloud/sensor_poses.hpp"
+#include "cloud/pose_columns.hpp"
+#include "cloud/sensor_path.hpp"
 
 namespace risley::cloud {
 namespace {
@@ -37,10 +39,6 @@ constexpr std::int64_t kTableStep_ns = 1'000'000'000;
 constexpr double kWidestExpansion = 1500, kExpansionError = 1e-5;
 /// Coordinates of files that hold whole multiples of a step begin at a multiple of this, m.
 constexpr double kOffsetStep = 1000;
-/// A polynomial of the fifth degree repeats the interpolation over so long a time, s: a turn of 10
-/// rad/s is left by (0.05)^6 / 6!.
-constexpr std::int64_t kCell_ns = 5'000'000;
-constexpr double kCell = 5e-3;
 
 /// Says when a trajectory leaves the area that a map is meant for; empty when it does not.
 /// @throws InvalidArgument far away from it, where a map is of no use
@@ -95,19 +93,15 @@ struct Georeference::State {
   explicit State(const MovingPlatform& what)
       : platform(what),
         interpolation(platform.trajectory),
-        strips(trajectories::flown_strips(interpolation)),
+        path(what.trajectory, interpolation, what.mount),
         errors(what.errors ? std::optional<trajectories::ErrorProcess>(std::in_place, *what.errors,
                                                                        what.trajectory)
-                           : std::nullopt),
-        body_from_sensor(trajectories::body_from_sensor(platform.mount)),
-        sensor_lever_arm(body_from_sensor.transpose() * trajectories::lever_arm(platform.mount)) {}
+                           : std::nullopt) {}
 
   const MovingPlatform& platform;
   trajectories::Interpolation interpolation;
-  std::vector<trajectories::FlownStrip> strips;
+  SensorPath path;
   std::optional<trajectories::ErrorProcess> errors;
-  Matrix3d body_from_sensor;
-  Vector3d sensor_lever_arm;  ///< axes of the sensor
   std::optional<MapProjection> map;
   std::int64_t shift_ns = 0;
   std::optional<std::int64_t> utc_shift_ns;  ///< of the trajectory's time
@@ -159,66 +153,11 @@ Georeference::Georeference(const MovingPlatform& platform,
 
 Georeference::~Georeference() = default;
 
-Georeference::Cursor::Cursor(const Georeference& georeference)
-    : georeference_(&georeference), cursor_(georeference.state_->interpolation.cursor()) {}
-
-void Georeference::Cursor::set_cell(std::int64_t time_ns) {
-  const State& s = *georeference_->state_;
-  const std::vector<std::int64_t>& times = s.platform.trajectory.time_ns;
-  begin_ns_ = end_ns_ = time_ns;
-  has_pose_ = time_ns >= times.front() && time_ns <= times.back() && times.size() > 1;
-  if (!has_pose_) return;
-  const auto later = std::upper_bound(times.begin(), times.end() - 1, time_ns);
-  const std::int64_t first = *std::prev(later), last = *later;
-  const std::int64_t cells = (last - first + kCell_ns - 1) / kCell_ns;
-  const std::int64_t cell = std::min(cells - 1, (time_ns - first) / kCell_ns);
-  begin_ns_ = first + cell * kCell_ns;
-  end_ns_ = std::min(last, begin_ns_ + kCell_ns);
-  Eigen::Matrix<double, kNumbers, kDegree + 1> values;
-  Eigen::Matrix<double, kDegree + 1, kDegree + 1> powers;
-  for (int node = 0; node <= kDegree; ++node) {
-    const std::int64_t at = begin_ns_ + (end_ns_ - begin_ns_) * node / kDegree;
-    const std::optional<trajectories::Pose> pose = cursor_.at(at);
-    if (!pose) {  // a gap, or a record between two
-      has_pose_ = false;
-      begin_ns_ = end_ns_ = time_ns;
-      return;
-    }
-    if (node == 0) {
-      origin_ = pose->position;
-      pose_.velocity = pose->velocity;
-      pose_.rate = pose->angular_velocity;
-    }
-    const Matrix3d turn = pose->attitude.toRotationMatrix() * s.body_from_sensor;
-    values.col(node) << pose->position - origin_,
-        Eigen::Map<const Eigen::Matrix<double, 9, 1>>(turn.data());
-    double power = 1;
-    for (int k = 0; k <= kDegree; ++k) {
-      powers(k, node) = power;
-      power *= 1e-9 * static_cast<double>(at - begin_ns_) / kCell;
-    }
-  }
-  coefficients_ = values * powers.inverse();
-  const auto behind = std::upper_bound(
-      s.strips.begin(), s.strips.end(), begin_ns_,
-      [](std::int64_t t, const trajectories::FlownStrip& strip) { return t < strip.begin_ns; });
-  pose_.strip = 0;
-  if (behind != s.strips.begin() && begin_ns_ <= std::prev(behind)->end_ns) {
-    pose_.strip = static_cast<std::uint16_t>(behind - s.strips.begin());
-  }
-}
-
-const SensorPose* Georeference::Cursor::at(std::int64_t recording_time_ns) {
-  const std::int64_t time_ns = recording_time_ns + georeference_->state_->shift_ns;
-  if (time_ns < begin_ns_ || time_ns > end_ns_) set_cell(time_ns);
-  if (!has_pose_) return nullptr;
-  const double u = 1e-9 * static_cast<double>(time_ns - begin_ns_) / kCell;
-  Eigen::Matrix<double, kNumbers, 1> value = coefficients_.col(kDegree);
-  for (int k = kDegree; k-- > 0;) value = u * value + coefficients_.col(k);
-  pose_.reference = origin_ + value.head<3>();
-  Eigen::Map<Eigen::Matrix<double, 9, 1>>(pose_.turn.data()) = value.tail<9>();
-  pose_.lever = pose_.turn * georeference_->state_->sensor_lever_arm;
-  return &pose_;
+void Georeference::find_poses(std::span<const std::int64_t> times_ns, SensorPoses& poses,
+                              std::vector<std::size_t>& rows, InstructionSet set) const {
+  std::vector<std::int64_t> shifted(times_ns.begin(), times_ns.end());
+  for (std::int64_t& time_ns : shifted) time_ns += state_->shift_ns;
+  state_->path.find(shifted, poses, rows, set);
 }
 
 void Georeference::announce(CloudHeader& header) const {
@@ -270,20 +209,21 @@ void Georeference::announce(CloudHeader& header) const {
   }
 }
 
-void Georeference::apply(Points& points, std::span<const SensorPose> poses,
-                         InstructionSet set) const {
+void Georeference::apply(Points& points, const SensorPoses& poses, InstructionSet set) const {
   const State& s = *state_;
   const std::size_t n = points.size();
-  require_length("poses", poses.size(), n);
+  require_poses(poses, n);
   require_length("point_source", points.point_source.size(), n);
   if (n == 0) return;
   const bool covariance = !points.covariance[kXX].empty();
 
   // Where the points are, and the map about their middle.
-  const Vector3d local = poses.front().reference;  // keeps digits
-  std::array<std::vector<double>, 3> arm, place;
+  const auto& [first_x, first_y, first_z] = poses.reference;
+  const Vector3d local(first_x.front(), first_y.front(), first_z.front());  // keeps digits
+  const auto columns = std::make_unique_for_overwrite<double[]>(6 * n);
+  std::array<double*, 3> arm{}, place{};
   PlaceArguments put;
-  put.poses = plain_poses(poses);
+  put.poses = pose_columns(poses);
   put.shots = n;
   put.point[0] = points.x.data();
   put.point[1] = points.y.data();
@@ -291,15 +231,13 @@ void Georeference::apply(Points& points, std::span<const SensorPose> poses,
   copy_vector(local, put.local);
   Vector3d middle = Vector3d::Zero();
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    arm[axis].resize(n);
-    place[axis].resize(n);
-    put.arm[axis] = arm[axis].data();
-    put.place[axis] = place[axis].data();
+    put.arm[axis] = arm[axis] = columns.get() + axis * n;
+    put.place[axis] = place[axis] = arm[axis] + 3 * n;
   }
   RISLEY_KERNEL_COPIES(place_points).at(set)(put);
   for (std::size_t axis = 0; axis < 3; ++axis) {
     middle[static_cast<Index>(axis)] =
-        std::accumulate(place[axis].begin(), place[axis].end(), 0.0) / static_cast<double>(n);
+        std::accumulate(place[axis], place[axis] + n, 0.0) / static_cast<double>(n);
   }
   const auto place_of = [&](std::size_t i) {
     return Vector3d(local + Vector3d(place[0][i], place[1][i], place[2][i]));
@@ -334,19 +272,8 @@ void Georeference::apply(Points& points, std::span<const SensorPose> poses,
     turning = ned * variance.tail<3>().asDiagonal() * ned.transpose();
   }
   const std::int64_t time_shift = s.shift_ns + s.utc_shift_ns.value_or(0);
-  for (std::size_t i = 0; i < n; ++i) {
-    points.time_ns[i] += time_shift;
-    points.point_source[i] = poses[i].strip;
-  }
-  for (auto& loading : points.loading) {
-    for (std::size_t i = 0; i < n; ++i) {
-      const Vector3d on_axes =
-          jacobian * (poses[i].turn * Vector3d(loading[0][i], loading[1][i], loading[2][i]));
-      for (std::size_t axis = 0; axis < 3; ++axis) {
-        loading[axis][i] = on_axes[static_cast<Index>(axis)];
-      }
-    }
-  }
+  for (std::int64_t& time_ns : points.time_ns) time_ns += time_shift;
+  points.point_source = poses.strip;
 
   MapArguments to_map;
   to_map.poses = put.poses;
@@ -355,15 +282,21 @@ void Georeference::apply(Points& points, std::span<const SensorPose> poses,
   to_map.point[1] = points.y.data();
   to_map.point[2] = points.z.data();
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    to_map.arm[axis] = arm[axis].data();
-    to_map.place[axis] = place[axis].data();
+    to_map.arm[axis] = arm[axis];
+    to_map.place[axis] = place[axis];
     copy_matrix(tangent.half_hessian(axis), to_map.half_hessian[axis]);
   }
   copy_matrix(jacobian, to_map.jacobian);
   // A frame that is its own map is expanded about the local place, which has fewer digits.
   copy_vector(s.map ? middle : Vector3d(Vector3d::Zero()), to_map.center);
   copy_vector(s.map ? tangent.value() : local, to_map.value);
+  std::vector<double*> loading;
   if (covariance) {
+    for (auto& factor : points.loading) {
+      for (auto& column : factor) loading.push_back(column.data());
+    }
+    to_map.loading = loading.data();
+    to_map.loadings = points.loading.size();
     for (std::size_t k = 0; k < kCovarianceTerms; ++k) {
       to_map.covariance[k] = points.covariance[k].data();
       to_map.own_covariance[k] = points.own_covariance[k].data();
@@ -418,12 +351,14 @@ std::vector<std::string> Georeference::warnings() const {
 }
 
 std::int64_t Georeference::clock_shift_ns() const { return state_->shift_ns; }
-const std::vector<trajectories::FlownStrip>& Georeference::strips() const { return state_->strips; }
+const std::vector<trajectories::FlownStrip>& Georeference::strips() const {
+  return state_->path.strips();
+}
 
 std::vector<StripLine> Georeference::strip_lines() const {
   const State& s = *state_;
   std::vector<StripLine> lines;
-  for (const trajectories::FlownStrip& strip : s.strips) {
+  for (const trajectories::FlownStrip& strip : s.path.strips()) {
     std::array<Vector3d, 2> ends;
     for (std::size_t k = 0; k < 2; ++k) {
       const auto pose = s.interpolation.at(k == 0 ? strip.begin_ns : strip.end_ns);

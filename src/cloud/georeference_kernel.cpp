@@ -6,15 +6,31 @@
 #include "risley/core/simd.hpp"
 #include "risley/core/vector3.hpp"
 
-#include "cloud/pose_lanes.hpp"
-
 namespace risley::cloud::RISLEY_KERNEL_NAMESPACE {
 namespace {
 
 using Batch = xsimd::batch<double>;
 using Vector = Vector3<Batch>;
-using Matrix = LaneMatrix<Batch>;
 constexpr std::size_t kLanes = Batch::size;
+
+/// Of three rows, column by column.
+struct Matrix {
+  Batch m[9];
+
+  Matrix() = default;
+  explicit Matrix(const double (&numbers)[9]) {
+    for (std::size_t k = 0; k < 9; ++k) m[k] = Batch(numbers[k]);
+  }
+  Vector operator*(const Vector& v) const {
+    return {m[0] * v.x + m[3] * v.y + m[6] * v.z, m[1] * v.x + m[4] * v.y + m[7] * v.z,
+            m[2] * v.x + m[5] * v.y + m[8] * v.z};
+  }
+  /// The transpose times a vector.
+  Vector back(const Vector& v) const {
+    return {m[0] * v.x + m[1] * v.y + m[2] * v.z, m[3] * v.x + m[4] * v.y + m[5] * v.z,
+            m[6] * v.x + m[7] * v.y + m[8] * v.z};
+  }
+};
 
 /// The shots of one group: those from `at` on, the last one again where there are fewer.
 struct Group {
@@ -26,8 +42,7 @@ struct Group {
     for (std::size_t i = 0; i < kLanes; ++i) lanes[i] = column[at + (i < count ? i : count - 1)];
     return Batch::load_aligned(lanes);
   }
-  template <class Number>  // const or not
-  Vector load(Number* const (&columns)[3]) const {
+  Vector load(const double* const* columns) const {
     return {load(columns[0]), load(columns[1]), load(columns[2])};
   }
   void store(const Batch& value, double* column) const {
@@ -39,21 +54,15 @@ struct Group {
     value.store_aligned(lanes);
     for (std::size_t i = 0; i < count; ++i) column[at + i] = lanes[i];
   }
-  void store(const Vector& value, double* const (&columns)[3]) const {
+  void store(const Vector& value, double* const* columns) const {
     store(value.x, columns[0]);
     store(value.y, columns[1]);
     store(value.z, columns[2]);
   }
-  /// Numbers that stand with the poses.
-  Matrix matrix(const double* first, std::size_t stride) const {
+  Matrix load_matrix(const double* const (&columns)[9]) const {
     Matrix result;
-    gather(first, stride, at, count, result.m);
+    for (std::size_t k = 0; k < 9; ++k) result.m[k] = load(columns[k]);
     return result;
-  }
-  Vector vector(const double* first, std::size_t stride) const {
-    Batch numbers[3];
-    gather(first, stride, at, count, numbers);
-    return {numbers[0], numbers[1], numbers[2]};
   }
 };
 
@@ -106,14 +115,33 @@ Symmetric broadcast_symmetric(const double (&c)[6]) {
 
 }  // namespace
 
+void follow_path(const PathArguments& a) {
+  // A column at a time: all begin at much the same place of a page, too many for a cache's set.
+  for (std::size_t k = 0; k < kPathNumbers; ++k) {
+    Batch coefficients[kPathPowers];
+    for (std::size_t power = 0; power < kPathPowers; ++power) {
+      coefficients[power] = Batch(a.coefficients[power * kPathNumbers + k]);
+    }
+    const Batch origin(k < 3 ? a.origin[k] : 0.0);
+    double* column = k < 3 ? a.reference[k] : a.turn[k - 3];
+    for_each_group(a.shots, [&](const Group& group) {
+      const Batch part = group.load(a.part);
+      Batch value = coefficients[kPathPowers - 1];
+      for (std::size_t power = kPathPowers - 1; power-- > 0;) {
+        value = xsimd::fma(part, value, coefficients[power]);
+      }
+      group.store(origin + value, column);
+    });
+  }
+}
+
 void place_points(const PlaceArguments& a) {
-  const Vector local = broadcast_vector(a.local);
+  const Vector local = broadcast_vector(a.local), lever = broadcast_vector(a.poses.lever_arm);
   for_each_group(a.shots, [&](const Group& group) {
-    const PlainPoses& poses = a.poses;
-    const Matrix turn = group.matrix(poses.turn, poses.stride);
-    const Vector arm = turn * group.load(a.point) + group.vector(poses.lever, poses.stride);
+    const Matrix turn = group.load_matrix(a.poses.turn);
+    const Vector arm = turn * (group.load(a.point) + lever);
     group.store(arm, a.arm);
-    group.store((group.vector(poses.reference, poses.stride) - local) + arm, a.place);
+    group.store((group.load(a.poses.reference) - local) + arm, a.place);
   });
 }
 
@@ -126,12 +154,16 @@ void map_points(const MapArguments& a) {
     group.store(value + (product(a.jacobian, d) + bent), a.point);
     if (!a.covariance[0]) return;
 
-    const PlainPoses& poses = a.poses;
-    const Matrix turn = group.matrix(poses.turn, poses.stride);
+    const Matrix turn = group.load_matrix(a.poses.turn);
     const Vector x = product(a.jacobian, {turn.m[0], turn.m[1], turn.m[2]}),
                  y = product(a.jacobian, {turn.m[3], turn.m[4], turn.m[5]}),
                  z = product(a.jacobian, {turn.m[6], turn.m[7], turn.m[8]});
     const Vector to_map[3] = {{x.x, y.x, z.x}, {x.y, y.y, z.y}, {x.z, y.z, z.z}};
+    for (std::size_t k = 0; k < a.loadings; ++k) {
+      double* const* columns = a.loading + 3 * k;
+      const Vector v = group.load(columns);
+      group.store(Vector{dot(to_map[0], v), dot(to_map[1], v), dot(to_map[2], v)}, columns);
+    }
     if (a.own_covariance[0]) {
       store_symmetric(group, turned(to_map, load_symmetric(group, a.own_covariance)),
                       a.own_covariance);
@@ -154,19 +186,17 @@ void map_points(const MapArguments& a) {
 
 void stand_shots(const StandArguments& a) {
   const Matrix place(a.turn);
-  const Vector reference = broadcast_vector(a.reference), lever = broadcast_vector(a.lever);
+  const Vector reference = broadcast_vector(a.reference),
+               lever = broadcast_vector(a.poses.lever_arm);
   for_each_group(a.shots, [&](const Group& group) {
     const auto [sine_azimuth, cosine_azimuth] = xsimd::sincos(group.load(a.azimuth));
     const auto [sine_zenith, cosine_zenith] = xsimd::sincos(group.load(a.zenith));
     const Batch range = group.load(a.range) - Batch(a.range_offset);
     const Batch across = range * sine_zenith;
-    const PlainPoses& poses = a.poses;
-    const Matrix turn = group.matrix(poses.turn, poses.stride);
-    const Vector from_there =
-        turn * Vector{across * cosine_azimuth, across * sine_azimuth, range * cosine_zenith} +
-        (group.vector(poses.reference, poses.stride) - reference) +
-        (group.vector(poses.lever, poses.stride) - lever);
-    const Vector seen = place.back(from_there);
+    const Vector point{across * cosine_azimuth, across * sine_azimuth, range * cosine_zenith};
+    const Vector from_there = group.load_matrix(a.poses.turn) * (point + lever) +
+                              (group.load(a.poses.reference) - reference);
+    const Vector seen = place.back(from_there) - lever;
     const Batch distance = xsimd::sqrt(dot(seen, seen));
     group.store(xsimd::atan2(seen.y, seen.x), a.stood_azimuth);
     group.store(xsimd::acos(seen.z / distance), a.stood_zenith);
@@ -177,7 +207,7 @@ void stand_shots(const StandArguments& a) {
 void turn_vectors(const TurnArguments& a) {
   const Matrix place(a.turn);
   for_each_group(a.shots, [&](const Group& group) {
-    const Matrix turn = group.matrix(a.poses.turn, a.poses.stride);
+    const Matrix turn = group.load_matrix(a.poses.turn);
     group.store(turn.back(place * group.load(a.vector)), a.vector);
   });
 }

@@ -21,8 +21,9 @@
 #include "risley/trajectories/clock.hpp"
 
 #include "cloud/georeference_kernel.hpp"
+#include "cloud/keep_rows.hpp"
 #include "cloud/piece_overlap.hpp"
-#include "cloud/sensor_poses.hpp"
+#include "cloud/pose_columns.hpp"
 
 namespace risley::cloud {
 namespace {
@@ -47,8 +48,8 @@ constexpr std::size_t kMovingSurfaceShots = 4000;
 /// Shots of it that tell a surface: on the 1160 cells of a Mid-40's field of view, a circle of 38.4
 /// degrees, 14 each and 120 in a block of nine.
 constexpr std::size_t kSurfaceShots = 16000;
-/// Rows that one task works on: some thirty columns of them are 1 MB.
-constexpr std::size_t kBlockRows = 4096;
+/// Rows that one task works on: the sixty columns of a moving sensor are 1 MB.
+constexpr std::size_t kBlockRows = 2048;
 /// Directions beyond are damaged records: the rotors' motion is found without them, too.
 const double kOutlierChi2 = estimation::BatchMapOptions{}.outlier_chi2;
 /// For telling surfaces: the step in which these sensors give ranges, m.
@@ -71,8 +72,8 @@ struct Block {
   std::vector<std::uint8_t> returns;  ///< of each row's shot
   PointedShots shots;
   Points points;
-  std::vector<SensorPose> poses;  ///< of the rows, of a moving sensor
-  PolarShots stood;               ///< these, as if the sensor stood
+  SensorPoses poses;  ///< of the rows, of a moving sensor
+  PolarShots stood;   ///< these, as if the sensor stood
   std::uint64_t outliers = 0, without_rotation_angle = 0, without_pose = 0;
   double azimuth_squares = 0, zenith_squares = 0;
 };
@@ -282,57 +283,62 @@ class Work {
 
   void find_surfaces(std::size_t begin, std::size_t end) {
     normals_->clear();
-    std::optional<Georeference::Cursor> cursor;
-    if (georeference_) {
-      cursor.emplace(*georeference_);
-      const SensorPose* pose =
-          cursor->at(piece_.time_ns[begin] + (piece_.time_ns[end - 1] - piece_.time_ns[begin]) / 2);
-      surface_pose_ = pose != nullptr ? std::optional(*pose) : std::nullopt;
-    }
-    std::vector<SensorPose> poses;
-    PolarShots shots, stood;
-    const std::size_t most = cursor ? kMovingSurfaceShots : kSurfaceShots;
+    const std::size_t most = georeference_ ? kMovingSurfaceShots : kSurfaceShots;
     const std::size_t stride = std::max<std::size_t>(1, (end - begin) / most);
+    std::vector<std::size_t> rows;
     for (std::size_t row = begin; row < end; row += stride) {
-      if (!has_return(row)) continue;
-      const double range = piece_.range[row] - calibration_.range_offset;
-      if (!cursor) {
-        normals_->add(piece_.azimuth[row], piece_.zenith[row], range);
-        continue;
+      if (has_return(row)) rows.push_back(row);
+    }
+    if (georeference_) {
+      add_moving(piece_.time_ns[begin] + (piece_.time_ns[end - 1] - piece_.time_ns[begin]) / 2,
+                 rows);
+    } else {
+      for (const std::size_t row : rows) {
+        normals_->add(piece_.azimuth[row], piece_.zenith[row],
+                      piece_.range[row] - calibration_.range_offset);
       }
-      const SensorPose* pose = cursor->at(piece_.time_ns[row]);
-      if (pose == nullptr || !surface_pose_) continue;
-      poses.push_back(*pose);
-      shots.azimuth.push_back(piece_.azimuth[row]);
-      shots.zenith.push_back(piece_.zenith[row]);
-      shots.range.push_back(piece_.range[row]);
+    }
+    normals_->fit();
+  }
+
+  /// Adds rows to the surfaces as if the sensor stood where it was at a time, if it is known.
+  void add_moving(std::int64_t middle_ns, const std::vector<std::size_t>& rows) {
+    std::vector<std::size_t> known;
+    georeference_->find_poses({&middle_ns, 1}, surface_pose_, known);
+    if (known.empty()) return;
+    std::vector<std::int64_t> times;
+    for (const std::size_t row : rows) times.push_back(piece_.time_ns[row]);
+    SensorPoses poses;
+    georeference_->find_poses(times, poses, known);
+    PolarShots shots, stood;
+    for (const std::size_t i : known) {
+      shots.azimuth.push_back(piece_.azimuth[rows[i]]);
+      shots.zenith.push_back(piece_.zenith[rows[i]]);
+      shots.range.push_back(piece_.range[rows[i]]);
     }
     stand_still(poses, shots.azimuth, shots.zenith, shots.range, stood);
     for (std::size_t i = 0; i < poses.size(); ++i) {
       normals_->add(stood.azimuth[i], stood.zenith[i], stood.range[i]);
     }
-    normals_->fit();
   }
 
   /// Shots of a moving sensor as they would have been from where the sensor is in the middle of a
   /// surface's time.
-  void stand_still(const std::vector<SensorPose>& poses, const std::vector<double>& azimuth,
+  void stand_still(const SensorPoses& poses, const std::vector<double>& azimuth,
                    const std::vector<double>& zenith, const std::vector<double>& range,
                    PolarShots& stood) const {
     const std::size_t n = poses.size();
     stood.resize(n);
     if (n == 0) return;
-    const SensorPose& middle = *surface_pose_;
     StandArguments a;
-    a.poses = plain_poses(poses);
+    a.poses = pose_columns(poses);
     a.shots = n;
     a.azimuth = azimuth.data();
     a.zenith = zenith.data();
     a.range = range.data();
     a.range_offset = calibration_.range_offset;
-    std::copy_n(middle.turn.data(), 9, a.turn);
-    std::copy_n(middle.reference.data(), 3, a.reference);
-    std::copy_n(middle.lever.data(), 3, a.lever);
+    for (std::size_t k = 0; k < 9; ++k) a.turn[k] = surface_pose_.turn[k].front();
+    for (std::size_t k = 0; k < 3; ++k) a.reference[k] = surface_pose_.reference[k].front();
     a.stood_azimuth = stood.azimuth.data();
     a.stood_zenith = stood.zenith.data();
     a.stood_range = stood.range.data();
@@ -348,7 +354,7 @@ class Work {
       shots.surface_normal[1][i] = normal.y;
       shots.surface_normal[2][i] = normal.z;
     };
-    if (!georeference_ || !surface_pose_) {
+    if (surface_pose_.size() == 0) {
       const double nowhere = std::nan("");
       for (std::size_t i = 0; i < n; ++i) {
         set(i, normals_->normal(georeference_ ? nowhere : shots.azimuth[i], shots.zenith[i]));
@@ -361,29 +367,23 @@ class Work {
       set(i, normals_->normal(block.stood.azimuth[i], block.stood.zenith[i]));
     }
     TurnArguments a;
-    a.poses = plain_poses(block.poses);
+    a.poses = pose_columns(block.poses);
     a.shots = n;
-    std::copy_n(surface_pose_->turn.data(), 9, a.turn);
+    for (std::size_t k = 0; k < 9; ++k) a.turn[k] = surface_pose_.turn[k].front();
     for (std::size_t axis = 0; axis < 3; ++axis) a.vector[axis] = shots.surface_normal[axis].data();
     RISLEY_KERNEL_COPIES(turn_vectors).at(best_instruction_set())(a);
   }
 
   /// Looks up where the sensor is at every row of a block, and takes out rows that have no pose.
   void find_poses(Block& block) const {
-    Georeference::Cursor cursor(*georeference_);
-    block.poses.resize(block.rows.size());
-    std::size_t kept = 0;
-    for (std::size_t i = 0; i < block.rows.size(); ++i) {
-      const SensorPose* pose = cursor.at(piece_.time_ns[block.rows[i]]);
-      if (pose == nullptr) continue;
-      block.poses[kept] = *pose;
-      block.rows[kept] = block.rows[i];
-      block.returns[kept++] = block.returns[i];
-    }
-    block.without_pose = block.rows.size() - kept;
-    block.poses.resize(kept);
-    block.rows.resize(kept);
-    block.returns.resize(kept);
+    std::vector<std::int64_t> times(block.rows.size());
+    for (std::size_t i = 0; i < times.size(); ++i) times[i] = piece_.time_ns[block.rows[i]];
+    std::vector<std::size_t> known;
+    georeference_->find_poses(times, block.poses, known);
+    block.without_pose = times.size() - known.size();
+    if (block.without_pose == 0) return;
+    keep_rows(block.rows, known);
+    keep_rows(block.returns, known);
   }
 
   /// Blocks are made in parallel and written in order. No more of them are on their way than there
@@ -513,8 +513,7 @@ class Work {
     if (sound.size() == points.size()) return;
     points.keep(sound);
     if (!georeference_) return;
-    for (std::size_t i = 0; i < sound.size(); ++i) block.poses[i] = block.poses[sound[i]];
-    block.poses.resize(sound.size());
+    block.poses.keep(sound);
   }
 
   void begin_distribution() {
@@ -625,8 +624,8 @@ class Work {
   bool rotors_;  ///< points depend on the rotation angles
   std::optional<RotorTracker> tracker_;
   std::unique_ptr<SurfaceNormals> normals_;
-  std::unique_ptr<Georeference> georeference_;         ///< of a moving sensor
-  std::optional<SensorPose> surface_pose_;             ///< in the middle of a surface's time
+  std::unique_ptr<Georeference> georeference_;  ///< of a moving sensor
+  SensorPoses surface_pose_;  ///< in the middle of a surface's time, where it is known
   std::int64_t first_time_ns_ = 0, last_time_ns_ = 0;  ///< of the recording
   std::optional<PointDistribution> distribution_;
   CloudHeader header_;

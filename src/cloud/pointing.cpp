@@ -13,7 +13,6 @@
 
 #include "cloud/entry_checks.hpp"
 #include "cloud/pointing_kernel.hpp"
-#include "cloud/sensor_poses.hpp"
 
 namespace risley::cloud {
 namespace {
@@ -123,10 +122,30 @@ void for_each_computed_column(const Points& from, Points& to, const Function& fu
   }
 }
 
+/// Those numbers of rows that are not zero.
+struct SparseRows {
+  std::vector<int> begin{0}, column;
+  std::vector<double> weight;
+
+  template <class Row>
+  void add(const Row& row) {
+    int at = 0;
+    for (const double value : row) {
+      if (value != 0) {
+        column.push_back(at);
+        weight.push_back(value);
+      }
+      ++at;
+    }
+    begin.push_back(static_cast<int>(column.size()));
+  }
+};
+
 /// Pointers to the columns of some shots and points.
 class Columns {
  public:
-  Columns(const CloudHeader& header, const PointedShots& shots, Points& points, PointArguments& a) {
+  Columns(const CloudHeader& header, const PointedShots& shots, const SensorPoses& poses,
+          Points& points, PointArguments& a) {
     for (const auto& column : shots.rotation_angle) angle_.push_back(column.data());
     for (const auto& column : shots.angle_covariance) covariance_.push_back(column.data());
     for (std::size_t i = 0; i < 3; ++i) normal_[i] = shots.surface_normal[i].data();
@@ -141,6 +160,10 @@ class Columns {
     a.rounding_variance = shots.range_rounding.data();
     a.intensity = shots.intensity.data();
     a.beam = shots.beam.data();
+    for (std::size_t i = 0; i < 3; ++i) {
+      a.velocity[i] = poses.velocity[i].data();
+      a.rate[i] = poses.rate[i].data();
+    }
     a.point[0] = points.x.data();
     a.point[1] = points.y.data();
     a.point[2] = points.z.data();
@@ -188,11 +211,11 @@ void PointedShots::resize(int prisms, std::size_t shots) {
 }
 
 void compute_points(const PointingModel& model, const CloudHeader& header,
-                    const PointedShots& shots, Points& points, std::span<const SensorPose> poses,
+                    const PointedShots& shots, Points& points, const SensorPoses& poses,
                     InstructionSet set) {
   require_model(model);
   require_shots(model, header, shots);
-  require_length("poses", poses.size(), model.lever_arm ? shots.size() : 0);
+  require_poses(poses, model.moves ? shots.size() : 0);
   require_computed_columns(points, header, shots.size());
   const Faces faces(model);
   const int prisms = model.train.prisms();
@@ -219,42 +242,30 @@ void compute_points(const PointingModel& model, const CloudHeader& header,
     a.divergence_variance_horizontal = square(kDivergenceSigma * sensor.beam_divergence_horizontal);
     a.divergence_variance_vertical = square(kDivergenceSigma * sensor.beam_divergence_vertical);
   }
-  const std::size_t factors = model.factors.size();
-  const std::size_t rows =
-      model.places.size() + static_cast<std::size_t>(prisms) + model.sizes.size();
-  std::vector<int> factor_begin{0}, factor_row;
-  std::vector<double> factor_weight, range_factor(factors);
-  for (std::size_t j = 0; j < factors; ++j) {
-    range_factor[j] = model.factors[j].range_offset;
-    for (std::size_t i = 0; i < rows; ++i) {
-      const double weight = model.factors[j].weights[static_cast<Eigen::Index>(i)];
-      if (weight == 0) continue;
-      factor_row.push_back(static_cast<int>(i));
-      factor_weight.push_back(weight);
-    }
-    factor_begin.push_back(static_cast<int>(factor_row.size()));
+  std::vector<double> range_factor;
+  SparseRows of_sensor, of_mount;
+  for (const CommonFactor& factor : model.factors) {
+    range_factor.push_back(factor.range_offset);
+    of_sensor.add(factor.weights);
+    of_mount.add(factor.mount);
   }
   a.places = model.places.data();
   a.place_count = static_cast<int>(model.places.size());
-  a.factors = static_cast<int>(factors);
-  a.factor_begin = factor_begin.data();
-  a.factor_row = factor_row.data();
-  a.factor_weight = factor_weight.data();
+  a.factors = static_cast<int>(model.factors.size());
+  a.factor_begin = of_sensor.begin.data();
+  a.factor_row = of_sensor.column.data();
+  a.factor_weight = of_sensor.weight.data();
   a.range_factor = range_factor.data();
-  std::vector<double> mount_factor;
-  if (model.lever_arm) {
-    for (const CommonFactor& factor : model.factors) {
-      mount_factor.insert(mount_factor.end(), factor.mount.begin(), factor.mount.end());
-    }
-    a.mount_factor = mount_factor.data();
-    std::copy_n(model.lever_arm->data(), 3, a.lever_arm);
+  if (model.moves) {
+    a.mount_begin = of_mount.begin.data();
+    a.mount_row = of_mount.column.data();
+    a.mount_weight = of_mount.weight.data();
   }
 
   const std::size_t whole = shots.size() / kPointPadding * kPointPadding;
   {
-    const Columns columns(header, shots, points, a);
+    const Columns columns(header, shots, poses, points, a);
     a.shots = whole;
-    if (!poses.empty()) a.poses = plain_poses(poses);
     kernel(a);
   }
   if (whole < shots.size()) {  // the last group, filled up
@@ -271,11 +282,14 @@ void compute_points(const PointingModel& model, const CloudHeader& header,
     };
     for_each_column(shots, last_shots,
                     [&](const auto& from, auto& to) { copy(from, whole, rest, to, 0); });
-    std::vector<SensorPose> last_poses(poses.empty() ? 0 : kPointPadding);
-    copy(poses, whole, poses.empty() ? 0 : rest, last_poses, 0);
-    const Columns columns(header, last_shots, last_points, a);
+    SensorPoses last_poses;
+    last_poses.resize(kPointPadding);
+    for (std::size_t k = 0; k < 3; ++k) {
+      copy(poses.velocity[k], whole, rest, last_poses.velocity[k], 0);
+      copy(poses.rate[k], whole, rest, last_poses.rate[k], 0);
+    }
+    const Columns columns(header, last_shots, last_poses, last_points, a);
     a.shots = kPointPadding;
-    if (!poses.empty()) a.poses = plain_poses(last_poses);
     kernel(a);
     for_each_computed_column(last_points, points,
                              [&](const auto& from, auto& to) { copy(from, 0, rest, to, whole); });

@@ -10,8 +10,6 @@
 #include "risley/optics/emitter_lanes.hpp"
 #include "risley/optics/observation_adjoint.hpp"
 
-#include "cloud/pose_lanes.hpp"
-
 namespace risley::cloud::RISLEY_KERNEL_NAMESPACE {
 namespace {
 
@@ -71,9 +69,9 @@ class Points {
     own.uu = xsimd::fma(range2, Batch(a_.divergence_variance_horizontal), own.uu);
     own.vv = xsimd::fma(range2, Batch(a_.divergence_variance_vertical), own.vv);
     if (a_.own_covariance[0]) store_covariance(at, ray, own, a_.own_covariance);
-    const Platform platform = platform_of(at, ray, range);
+    const MountEffects effects = mount_effects(at, ray, range);
     for (int factor = 0; factor < a_.factors; ++factor) {
-      add_factor(at, factor, zero, zero, platform, ray, own);
+      add_factor(at, factor, zero, zero, effects, ray, own);
     }
     store_covariance(at, ray, own, a_.covariance);
   }
@@ -118,42 +116,46 @@ class Points {
     return cosine;
   }
 
-  /// What a mount's errors do to the points of a moving sensor, sensor's axes.
-  struct Platform {
-    Vector3<Batch> point;     ///< from the sensor, m
-    Vector3<Batch> velocity;  ///< of the point as a part of the body, m/s
-  };
+  /// What errors of the mount do to points of a moving sensor: to each unit of its seven
+  /// quantities belongs a shift across the beam, in both directions, and along it.
+  using MountEffects = std::array<Vector3<Batch>, 7>;
 
-  Platform platform_of(std::size_t at, const Ray& ray, const Batch& range) const {
-    Platform platform{};
-    if (!a_.mount_factor) return platform;
-    const PlainPoses& poses = a_.poses;
-    LaneMatrix<Batch> turn;
-    gather(poses.turn, poses.stride, at, kLanes, turn.m);
-    Batch velocity[3], rate[3];
-    gather(poses.velocity, poses.stride, at, kLanes, velocity);
-    gather(poses.rate, poses.stride, at, kLanes, rate);
-    platform.point = ray.origin + range * ray.direction;
-    const Vector3<Batch> arm{platform.point.x + Batch(a_.lever_arm[0]),
-                             platform.point.y + Batch(a_.lever_arm[1]),
-                             platform.point.z + Batch(a_.lever_arm[2])};
-    platform.velocity = turn.back({velocity[0], velocity[1], velocity[2]}) +
-                        cross(turn.back({rate[0], rate[1], rate[2]}), arm);
-    return platform;
+  MountEffects mount_effects(std::size_t at, const Ray& ray, const Batch& range) const {
+    MountEffects effects;
+    if (!a_.mount_begin) return effects;
+    const auto vector = [at](const double* const(&columns)[3]) {
+      return Vector3<Batch>{load(columns[0], at), load(columns[1], at), load(columns[2], at)};
+    };
+    const Vector3<Batch> point = ray.origin + range * ray.direction;
+    const Vector3<Batch> velocity = vector(a_.velocity) + cross(vector(a_.rate), point);
+    const std::array<const Vector3<Batch>*, 3> axes{&ray.across[0], &ray.across[1], &ray.direction};
+    const std::array<Batch Vector3<Batch>::*, 3> of{&Vector3<Batch>::x, &Vector3<Batch>::y,
+                                                    &Vector3<Batch>::z};
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Vector3<Batch>& axis = *axes[k];
+      const Vector3<Batch> turned = cross(point, axis);  // axis . (e x point) = e . (point x axis)
+      effects[0].*of[k] = turned.x;
+      effects[1].*of[k] = turned.y;
+      effects[2].*of[k] = turned.z;
+      effects[3].*of[k] = axis.x;
+      effects[4].*of[k] = axis.y;
+      effects[5].*of[k] = axis.z;
+      effects[6].*of[k] = dot(axis, velocity);
+    }
+    return effects;
   }
 
   /// Adds what one common factor does, beam and mount together, and stores its loading.
   /// @param fu, fv  what it does across the beam, m
   void add_factor(std::size_t at, int factor, const Batch& fu, const Batch& fv,
-                  const Platform& platform, const Ray& ray, BeamCovariance& c) const {
+                  const MountEffects& effects, const Ray& ray, BeamCovariance& c) const {
     const Vector3<Batch>&u = ray.across[0], &v = ray.across[1], &d = ray.direction;
     Vector3<Batch> f{fu, fv, Batch(-a_.range_factor[factor])};  // the offset is taken off the range
-    if (a_.mount_factor) {
-      const double* m = a_.mount_factor + 7 * factor;
-      const Vector3<Batch> moved =
-          cross(Vector3<Batch>{Batch(m[0]), Batch(m[1]), Batch(m[2])}, platform.point) +
-          Vector3<Batch>{Batch(m[3]), Batch(m[4]), Batch(m[5])} + Batch(m[6]) * platform.velocity;
-      f = f + Vector3<Batch>{dot(u, moved), dot(v, moved), dot(d, moved)};
+    if (a_.mount_begin) {
+      for (int entry = a_.mount_begin[factor]; entry < a_.mount_begin[factor + 1]; ++entry) {
+        f = f +
+            Batch(a_.mount_weight[entry]) * effects[static_cast<std::size_t>(a_.mount_row[entry])];
+      }
     }
     c.uu = xsimd::fma(f.x, f.x, c.uu);
     c.uv = xsimd::fma(f.x, f.y, c.uv);
@@ -368,7 +370,7 @@ class Kernel : public Points {
       }
       ++rows;
     }
-    const Platform platform = platform_of(at, ray, range);
+    const MountEffects effects = mount_effects(at, ray, range);
     for (int factor = 0; factor < a_.factors; ++factor) {
       Batch fu(0.0), fv(0.0);
       for (int entry = a_.factor_begin[factor]; entry < a_.factor_begin[factor + 1]; ++entry) {
@@ -377,7 +379,7 @@ class Kernel : public Points {
         fu = xsimd::fma(u[row], w, fu);
         fv = xsimd::fma(v[row], w, fv);
       }
-      add_factor(at, factor, fu, fv, platform, ray, c);
+      add_factor(at, factor, fu, fv, effects, ray, c);
     }
   }
 

@@ -8,8 +8,6 @@
 #include "risley/core/instruction_set.hpp"
 #include "risley/optics/prism.hpp"
 
-#include "cloud/plain_poses.hpp"
-
 namespace risley::cloud {
 
 /// Most common factors that a call can take.
@@ -50,11 +48,13 @@ struct PointArguments {
   const int* factor_row = nullptr;
   const double* factor_weight = nullptr;
   const double* range_factor = nullptr;  ///< [factors], m
-  /// Of a moving sensor, what one standard deviation does to the mount: rotation about the sensor's
-  /// axes, rad, shift along them, m, and clock, s [factors][7]; or nullptr.
-  const double* mount_factor = nullptr;
-  double lever_arm[3] = {};  ///< from the trajectory's reference point, sensor's axes, m
-  PlainPoses poses;          ///< of the shots, with a mount_factor
+  /// Of a moving sensor, or nullptr, what one standard deviation does to the mount, in the same
+  /// way: rows are rotations about the sensor's axes, rad, shifts along them, m, and clock, s.
+  const int* mount_begin = nullptr;
+  const int* mount_row = nullptr;
+  const double* mount_weight = nullptr;
+  /// Then also velocity and rate of turning of the sensor, its axes, m/s and rad/s [3][shots].
+  const double *velocity[3] = {}, *rate[3] = {};
 
   std::size_t shots = 0;
   /// [prisms][shots], rad, or nullptr: then directions are as reported and start at the origin.

@@ -142,7 +142,7 @@ PointingModel pointing_model(const sensors::Sensor& calibration, const SensorBel
   factors.finish();
   if (mount) {
     const Eigen::Matrix3d sensor_from_body = trajectories::body_from_sensor(*mount).transpose();
-    model.lever_arm = sensor_from_body * trajectories::lever_arm(*mount);
+    model.moves = true;
     for (CommonFactor& factor : model.factors) {
       Eigen::Map<Eigen::Vector3d> shift(factor.mount.data() + 3);
       shift = sensor_from_body * Eigen::Vector3d(shift);

@@ -2,11 +2,10 @@
 // SPDX-License-Identifier: MIT
 #include "risley/cloud/points.hpp"
 
-#include <fmt/format.h>
-
-#include "risley/core/error.hpp"
 #include "risley/core/require.hpp"
 #include "risley/optics/prism.hpp"
+
+#include "cloud/keep_rows.hpp"
 
 namespace risley::cloud {
 namespace {
@@ -34,18 +33,8 @@ void for_each_column(Points& p, const Function& function) {
 }  // namespace
 
 void Points::keep(std::span<const std::size_t> rows) {
-  for (std::size_t i = 0; i < rows.size(); ++i) {
-    require_place("row", rows[i], size());
-    if (i > 0 && rows[i] <= rows[i - 1]) {
-      throw InvalidArgument(
-          fmt::format("row = {} after row {}, allowed ascending", rows[i], rows[i - 1]));
-    }
-  }
-  for_each_column(*this, [rows](auto& column) {
-    if (column.empty()) return;
-    for (std::size_t i = 0; i < rows.size(); ++i) column[i] = column[rows[i]];
-    column.resize(rows.size());
-  });
+  require_rows(rows, size());
+  for_each_column(*this, [rows](auto& column) { keep_rows(column, rows); });
 }
 
 void CloudHeader::resize(Points& points, std::size_t rows) const {

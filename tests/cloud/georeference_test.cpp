@@ -173,7 +173,7 @@ struct SensorPoints {
     shots.zenith[shot] = std::acos(direction.z());
     shots.range[shot] = 80 / direction.x();
   }
-  void compute(std::span<const SensorPose> at) {
+  void compute(const SensorPoses& at) {
     header.resize(points, size());
     compute_points(model, header, shots, points, at);
   }
@@ -216,15 +216,86 @@ SensorPoints prism_points(const std::vector<double>& times, const BentUnit& unit
   return result;
 }
 
-std::vector<SensorPose> poses(const Georeference& georeference, const Points& points) {
-  Georeference::Cursor cursor(georeference);
-  std::vector<SensorPose> result;
-  for (const std::int64_t time_ns : points.time_ns) {
-    const SensorPose* pose = cursor.at(time_ns);
-    EXPECT_NE(pose, nullptr) << time_ns;
-    result.push_back(pose != nullptr ? *pose : SensorPose{});
-  }
+SensorPoses poses(const Georeference& georeference, const Points& points,
+                  InstructionSet set = best_instruction_set()) {
+  SensorPoses result;
+  std::vector<std::size_t> rows;
+  georeference.find_poses(points.time_ns, result, rows, set);
+  EXPECT_EQ(rows.size(), points.size());
   return result;
+}
+
+// Records are 5 ms apart, and then 10: one and several polynomials between two of them.
+TEST(Georeference, PosesAreThoseOfTheTrajectory) {
+  MovingPlatform platform{trajectory(8), mount(), {}, ""};
+  Trajectory& all = platform.trajectory;
+  Trajectory sparse = all;
+  sparse.time_ns.clear();
+  sparse.position.clear();
+  sparse.attitude.clear();
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    const bool in_gap = i > 600 && i<700, left_out = i> 1000 && i % 2 != 0;
+    if (in_gap || left_out) continue;
+    sparse.time_ns.push_back(all.time_ns[i]);
+    sparse.position.push_back(all.position[i]);
+    sparse.attitude.push_back(all.attitude[i]);
+  }
+  all = sparse;
+  const Georeference georeference(platform, recordings::TimeReference::relative, 0);
+  // Shots of 1 kHz from before the begin to behind the end, every hundredth out of order.
+  std::vector<std::int64_t> times;
+  for (std::int64_t i = -200; i < 8500; ++i) {
+    const std::int64_t jump = i % 100 == 50 ? -1234 : 0;
+    times.push_back(200'000 * kSecond + (i + jump) * 1'000'077);
+  }
+  const trajectories::Interpolation interpolation(all);
+  const Matrix3d body_from_sensor = trajectories::body_from_sensor(platform.mount);
+  const Vector3d lever = trajectories::lever_arm(platform.mount);
+  for (const InstructionSet set : available_instruction_sets()) {
+    SensorPoses got;
+    std::vector<std::size_t> rows;
+    georeference.find_poses(times, got, rows, set);
+    ASSERT_EQ(got.size(), rows.size());
+    EXPECT_LT((body_from_sensor * got.lever_arm - lever).norm(), 1e-12);
+    std::size_t row = 0;
+    double place = 0, turn = 0, velocity = 0, rate = 0;
+    for (std::size_t i = 0; i < times.size(); ++i) {
+      const auto pose = interpolation.at(times[i] + georeference.clock_shift_ns());
+      ASSERT_EQ(pose.has_value(), row < rows.size() && rows[row] == i) << i;
+      if (!pose) continue;
+      const auto vector = [row](const std::array<std::vector<double>, 3>& columns) {
+        return Vector3d(columns[0][row], columns[1][row], columns[2][row]);
+      };
+      Matrix3d frame_from_sensor;
+      for (Index k = 0; k < 9; ++k) {
+        frame_from_sensor.data()[k] = got.turn[static_cast<std::size_t>(k)][row];
+      }
+      place = std::max(place, (vector(got.reference) - pose->position).norm());
+      turn = std::max(
+          turn, (frame_from_sensor - pose->attitude.toRotationMatrix() * body_from_sensor).norm());
+      rate = std::max(rate, (frame_from_sensor * vector(got.rate) - pose->angular_velocity).norm());
+      velocity = std::max(velocity, (frame_from_sensor * vector(got.velocity) - pose->velocity -
+                                     pose->angular_velocity.cross(pose->attitude * lever))
+                                        .norm());
+      ++row;
+    }
+    EXPECT_EQ(row, rows.size());
+    EXPECT_GT(rows.size(), 7000u);
+    EXPECT_LT(rows.size(), 7600u) << "the gap and both ends";
+    EXPECT_LT(place, 5e-9);
+    EXPECT_LT(turn, 1e-10);
+    // As they are up to 5 ms earlier, at 0.5 m/s^2 and 0.4 rad/s^2.
+    EXPECT_LT(velocity, 5e-3);
+    EXPECT_LT(rate, 5e-3);
+    const std::vector<std::size_t> some{1, 5, 77};
+    SensorPoses kept = got;
+    kept.keep(some);
+    ASSERT_EQ(kept.size(), 3u);
+    for (std::size_t i = 0; i < 3; ++i) {
+      EXPECT_EQ(kept.turn[4][i], got.turn[4][some[i]]);
+      EXPECT_EQ(kept.velocity[1][i], got.velocity[1][some[i]]);
+    }
+  }
 }
 
 /// Of the records themselves, in extended precision: no interpolation takes part.
@@ -234,7 +305,7 @@ TEST(Georeference, AgreesWithExtendedPrecisionOnAMap) {
   for (int i = 10; i < 3990; i += 7) times.push_back(i / kRate);
   const Georeference georeference(platform, recordings::TimeReference::relative, 0);
   SensorPoints of = sensor_points(times, platform.mount);
-  const std::vector<SensorPose> at = poses(georeference, of.points);
+  const SensorPoses at = poses(georeference, of.points);
   of.compute(at);
   const Points before = of.points;
   georeference.announce(of.header);
@@ -293,7 +364,7 @@ TEST(Georeference, EveryInstructionSetGivesTheSame) {
       for (std::size_t i = 0; i < count; ++i) times.push_back(3 + 0.0007 * static_cast<double>(i));
       const auto applied = [&](InstructionSet set) {
         SensorPoints of = sensor_points(times, platform->mount);
-        const std::vector<SensorPose> at = poses(georeference, of.points);
+        const SensorPoses at = poses(georeference, of.points, set);
         of.compute(at);
         georeference.announce(of.header);
         georeference.apply(of.points, at, set);
@@ -323,7 +394,7 @@ TEST(Georeference, TimesBecomeUtcAndStripsAreNumbered) {
   const Georeference georeference(platform, recordings::TimeReference::relative, 0);
   ASSERT_EQ(georeference.strips().size(), 2u);
   SensorPoints of = sensor_points({1.0, 50.0, 180.0}, platform.mount);
-  const std::vector<SensorPose> at = poses(georeference, of.points);
+  const SensorPoses at = poses(georeference, of.points);
   of.compute(at);
   georeference.announce(of.header);
   georeference.apply(of.points, at);
@@ -453,7 +524,7 @@ TEST(Georeference, CovariancesOfAnySetOfPointsAreTrue) {
   const Georeference georeference(platform, recordings::TimeReference::relative, 0);
   const BentUnit unit;
   SensorPoints sensor = prism_points(times, unit, platform.mount);
-  const std::vector<SensorPose> at = poses(georeference, sensor.points);
+  const SensorPoses at = poses(georeference, sensor.points);
   sensor.compute(at);
   SensorPoints of = sensor;
   georeference.announce(of.header);
@@ -513,7 +584,12 @@ TEST(Georeference, CovariancesOfAnySetOfPointsAreTrue) {
   std::vector<Vector3d> true_places;
   for (Index i = 0; i < n; ++i) {
     const auto row = static_cast<std::size_t>(i);
-    const Vector3d place = at[row].reference + at[row].lever + at[row].turn * sensor.point(row);
+    Vector3d place;
+    const Vector3d arm = at.lever_arm + sensor.point(row);
+    for (std::size_t k = 0; k < 3; ++k) {
+      place[static_cast<Index>(k)] = at.reference[k][row] + at.turn[k][row] * arm.x() +
+                                     at.turn[3 + k][row] * arm.y() + at.turn[6 + k][row] * arm.z();
+    }
     tangents.push_back(map.tangent(place));
     true_places.push_back(tangents.back().map(place));
     EXPECT_NEAR((true_places.back() - of.point(row)).norm(), 0, 1e-5);
@@ -625,7 +701,7 @@ TEST(Georeference, MountAndPrismsThatWereFoundTogetherAreCountedTogether) {
   const Georeference georeference(platform, recordings::TimeReference::relative, 0);
   const auto stated = [&] {
     SensorPoints of = prism_points(times, unit, m);
-    const std::vector<SensorPose> at = poses(georeference, of.points);
+    const SensorPoses at = poses(georeference, of.points);
     of.compute(at);
     georeference.announce(of.header);
     georeference.apply(of.points, at);
@@ -687,8 +763,8 @@ TEST(Georeference, RefusesWhatCannotBe) {
             std::string::npos);
   const MovingPlatform bare{trajectory(1), mount(), {}, ""};
   const Georeference georeference(bare, recordings::TimeReference::relative, 0);
-  Georeference::Cursor cursor(georeference);
-  EXPECT_EQ(cursor.at(0), nullptr) << "outside of the trajectory";
+  SensorPoses at;
+  EXPECT_NE(refusal([&] { at.keep(std::vector<std::size_t>{0}); }).find("row"), std::string::npos);
   ASSERT_EQ(georeference.warnings().size(), 3u);
   EXPECT_NE(georeference.warnings()[0].find("nobody says how wrong"), std::string::npos);
   EXPECT_NE(georeference.warnings()[1].find("does not say what its clock counts"),
@@ -699,6 +775,10 @@ TEST(Georeference, RefusesWhatCannotBe) {
   header.has_point_source = true;
   header.resize(points, 2);
   EXPECT_NE(refusal([&] { georeference.apply(points, {}); }).find("poses"), std::string::npos);
+  at.resize(2);
+  at.turn[4].pop_back();
+  EXPECT_NE(refusal([&] { georeference.apply(points, at); }).find("turn of poses"),
+            std::string::npos);
 }
 
 }  // namespace risley::cloud::georeference_test

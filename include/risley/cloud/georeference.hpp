@@ -14,12 +14,11 @@
 #include "risley/cloud/map_projection.hpp"
 #include "risley/cloud/point_distribution.hpp"
 #include "risley/cloud/points.hpp"
-#include "risley/cloud/sensor_pose.hpp"
+#include "risley/cloud/sensor_poses.hpp"
 #include "risley/core/instruction_set.hpp"
 #include "risley/recordings/observations.hpp"
 #include "risley/trajectories/error_process.hpp"
 #include "risley/trajectories/flown_strips.hpp"
-#include "risley/trajectories/interpolation.hpp"
 #include "risley/trajectories/mount.hpp"
 #include "risley/trajectories/trajectory.hpp"
 
@@ -38,8 +37,8 @@ struct MovingPlatform {
 };
 
 /// Points of a moving sensor: from its own frame to a map, with the covariance that the trajectory
-/// adds; a mount's errors are common factors of the PointingModel. May be used by several threads,
-/// each with a Cursor. docs/theory/cloud.md
+/// adds; a mount's errors are common factors of the PointingModel. May be used by several threads.
+/// docs/theory/cloud.md
 class Georeference {
  public:
   /// @param platform         must outlive this
@@ -53,30 +52,12 @@ class Georeference {
   Georeference(const Georeference&) = delete;
   Georeference& operator=(const Georeference&) = delete;
 
-  /// Looks poses up, in times that mostly ascend.
-  class Cursor {
-   public:
-    explicit Cursor(const Georeference& georeference);
-    /// The pose at a time of the recording, or nullptr where the trajectory has none; valid until
-    /// the next call.
-    const SensorPose* at(std::int64_t recording_time_ns);
-
-   private:
-    void set_cell(std::int64_t time_ns);
-
-    const Georeference* georeference_;
-    trajectories::Interpolation::Cursor cursor_;
-    // A stretch of some milliseconds without a record inside, where a polynomial of time repeats
-    // the interpolation: reference point less its place in the beginning, and rotation, column by
-    // column.
-    static constexpr int kDegree = 5;
-    std::int64_t begin_ns_ = 1, end_ns_ = 0;  // both included
-    bool has_pose_ = false;
-    static constexpr int kNumbers = 12;
-    Eigen::Matrix<double, kNumbers, kDegree + 1> coefficients_;
-    Eigen::Vector3d origin_;
-    SensorPose pose_;
-  };
+  /// The poses of those times that have one.
+  /// @param times_ns  of the recording, mostly ascending: other orders take longer
+  /// @param rows      which times they are, ascending
+  void find_poses(std::span<const std::int64_t> times_ns, SensorPoses& poses,
+                  std::vector<std::size_t>& rows,
+                  InstructionSet set = best_instruction_set()) const;
 
   /// Fills what a cloud's header says of frame, times, strips and trajectory.
   void announce(CloudHeader& header) const;
@@ -84,7 +65,8 @@ class Georeference {
   /// Turns points of the sensor's frame into points of the map: coordinates, covariances, loadings,
   /// times and strips.
   /// @param poses  of every point
-  void apply(Points& points, std::span<const SensorPose> poses,
+  /// @throws InvalidArgument for columns that are not as long, and as check_available()
+  void apply(Points& points, const SensorPoses& poses,
              InstructionSet set = best_instruction_set()) const;
 
   /// What a user should know: no errors of the trajectory, an unknown clock, a change of datum.

@@ -5,12 +5,11 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <span>
 #include <vector>
 
 #include "risley/cloud/pointing_model.hpp"
 #include "risley/cloud/points.hpp"
-#include "risley/cloud/sensor_pose.hpp"
+#include "risley/cloud/sensor_poses.hpp"
 #include "risley/core/instruction_set.hpp"
 
 namespace risley::cloud {
@@ -42,8 +41,7 @@ struct PointedShots {
 /// @throws InvalidArgument for columns, factors or prisms that are not as model and header announce
 ///         them, emitters that the model does not have, and as check_available()
 void compute_points(const PointingModel& model, const CloudHeader& header,
-                    const PointedShots& shots, Points& points,
-                    std::span<const SensorPose> poses = {},
+                    const PointedShots& shots, Points& points, const SensorPoses& poses = {},
                     InstructionSet set = best_instruction_set());
 
 }  // namespace risley::cloud

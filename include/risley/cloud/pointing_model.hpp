@@ -52,8 +52,7 @@ struct PointingModel {
   PointingOptions options;
   std::vector<int> places;  ///< of the flat vector that have a common factor
   std::vector<CommonFactor> factors;
-  /// Of a moving sensor: from the trajectory's reference point, sensor's axes, m.
-  std::optional<Eigen::Vector3d> lever_arm;
+  bool moves = false;  ///< the sensor, on a mount whose errors are among the factors
   /// The mount was found together with the parameters of another calibration than this one: what
   /// their errors have in common is not known.
   bool mount_of_another = false;
