@@ -8,7 +8,7 @@
 #include <fmt/format.h>
 
 #include "risley/core/angle.hpp"
-#include "risley/report/number_text.hpp"
+#include "risley/core/number_text.hpp"
 
 #include "observability_text.hpp"
 #include "recording_text.hpp"
@@ -30,6 +30,21 @@ Json datum_json(calibration::DatumKind kind, const FormalDatum& datum) {
           {"sigma_pitch_deg", deg(datum.sigma_pitch)}, {"sigma_yaw_deg", deg(datum.sigma_yaw)},
           {"sigma_gauge_deg", deg(datum.gauge)},       {"sigma_shape_deg", deg(datum.shape)},
           {"sigma_total_deg", deg(datum.total)}};
+}
+
+Json pointing_json(const calibration::PointingErrors& reported) {
+  const DirectionErrors& errors = reported.errors;
+  return {{"total_deg", deg(errors.total)},
+          {"total_sigma_deg", deg(reported.total_sigma)},
+          {"gauge_deg", deg(errors.gauge)},
+          {"gauge_sigma_deg", deg(reported.gauge_sigma)},
+          {"shape_deg", deg(errors.shape)},
+          {"shape_sigma_deg", deg(reported.shape_sigma)},
+          {"largest_shape_deg", deg(reported.largest_shape)},
+          {"rotation_deg",
+           {{"roll", deg(errors.rotation.x)},
+            {"pitch", deg(errors.rotation.y)},
+            {"yaw", deg(errors.rotation.z)}}}};
 }
 
 Json vector_json(const Vector3<double>& v) { return {v.x, v.y, v.z}; }
@@ -143,6 +158,7 @@ Json calibration_json(const CalibratedRecordings& outcome, double total_time) {
       {"steps", steps},
       {"datum", datum_json(c.datum_kind, c.datum)},
       {"datum_given_held", datum_json(c.datum_kind, c.datum_given_held)},
+      {"reported_directions", pointing_json(c.reported)},
       {"prior_tests", tests},
       {"unobservable", unobservable_json(c.unobservable)},
       {"before", {{"plane_rms_m", c.rms_before}}},
@@ -170,7 +186,7 @@ void print_calibration(const CalibratedRecordings& outcome) {
   const Calibration& c = outcome.calibration;
   const TrainShape shape = c.sensor.shape();
   say("{}\n", c.converged ? "converged" : "NOT CONVERGED: " + c.reason);
-  say("{}: {}\n", to_string(c.verdict.code), with_flags(c.verdict.words));
+  print_verdict(c.verdict);
   say("sensor {}: {}\n", outcome.choice.sensor.name, outcome.choice.words);
   say("{} points on {} planes, {:.2f} mm thick before, {:.2f} mm after; read {:.2f} s, rotation "
       "angles {:.2f} s, solved {:.2f} s\n\n",
@@ -186,26 +202,24 @@ void print_calibration(const CalibratedRecordings& outcome) {
     const auto at = static_cast<Eigen::Index>(j);
     const double sigma = in_file_unit(name, std::sqrt(c.covariance(at, at)), shape);
     const double value = in_file_unit(name, c.parameters[at], shape);
-    const report::NumberText text = report::number_text(value, sigma);
+    const NumberText text = number_text(value, sigma);
     const double total_sigma = in_file_unit(name, c.total_sigma(j), shape);
-    std::vector<std::string> row = {name, text.value,
-                                    report::number_text(value, total_sigma).sigma};
+    std::vector<std::string> row = {name, text.value, number_text(value, total_sigma).sigma};
     if (any_held) row.push_back(text.sigma);
     row.push_back(find_parameter(name, shape).unit);
-    row.push_back(report::text_to_place_of(in_file_unit(name, c.believed.get(name), shape), sigma));
+    row.push_back(text_to_place_of(in_file_unit(name, c.believed.get(name), shape), sigma));
     if (outcome.truth) {
       const double truth = in_file_unit(name, outcome.truth->truth.get(name), shape);
-      row.push_back(report::text_to_place_of(truth, sigma));
+      row.push_back(text_to_place_of(truth, sigma));
       row.push_back(fmt::format("{:.2f}", (value - truth) / total_sigma));
     }
     table.add(row);
   }
   if (c.range_offset_sigma > 0) {
-    const report::NumberText text =
-        report::number_text(1e3 * c.range_offset, 1e3 * c.range_offset_sigma);
+    const NumberText text = number_text(1e3 * c.range_offset, 1e3 * c.range_offset_sigma);
     std::vector<std::string> row = {
         "range offset", text.value,
-        report::number_text(1e3 * c.range_offset, 1e3 * c.range_offset_total_sigma()).sigma};
+        number_text(1e3 * c.range_offset, 1e3 * c.range_offset_total_sigma()).sigma};
     if (any_held) row.push_back(text.sigma);
     row.insert(row.end(), {"mm", "0"});
     table.add(row);

@@ -162,4 +162,11 @@ Json verdict_json(const Verdict& verdict) {
           {"to_do", with_flags(verdict.to_do)}};
 }
 
+/// The same as lines of text.
+template <class Verdict>
+void print_verdict(const Verdict& verdict) {
+  say("{}: {}\nwhat to do: {}\n", to_string(verdict.code), with_flags(verdict.words),
+      with_flags(verdict.to_do));
+}
+
 }  // namespace risley::app

@@ -9,9 +9,9 @@
 #include <spdlog/spdlog.h>
 
 #include "risley/core/angle.hpp"
+#include "risley/core/number_text.hpp"
 #include "risley/jobs/estimate_recording.hpp"
 #include "risley/report/estimate_report.hpp"
-#include "risley/report/number_text.hpp"
 
 #include "command.hpp"
 #include "observability_text.hpp"
@@ -236,8 +236,7 @@ Json outcome_json(const EstimatedRecording& outcome, double total_time) {
 void print_noise(const Estimate& e) {
   const auto angle = [&](double value, double sigma) {
     if (e.noise_held) return fmt::format("{:.3g}", degrees_from_radians(value));
-    const report::NumberText text =
-        report::number_text(degrees_from_radians(value), degrees_from_radians(sigma));
+    const NumberText text = number_text(degrees_from_radians(value), degrees_from_radians(sigma));
     return fmt::format("{} +- {}", text.value, text.sigma);
   };
   say("\nnoise before rounding, {}: azimuth {} deg, zenith {} deg; a healthy unit: {:.3g} "
@@ -250,7 +249,7 @@ void print_outcome(const EstimatedRecording& outcome) {
   const Estimate& e = outcome.estimate;
   const TrainShape shape = e.sensor.shape();
   say("{}\n", e.converged ? "converged" : "NOT CONVERGED: " + e.reason);
-  say("{}: {}\n", to_string(e.verdict.code), with_flags(e.verdict.words));
+  print_verdict(e.verdict);
   say("sensor {}: {}\n", outcome.choice.sensor.name, outcome.choice.words);
   say("{} shots used, {} of them outliers{}; read {:.2f} s, solved {:.2f} s\n\n",
       grouped(e.series.size()), grouped(e.outliers),
@@ -268,17 +267,17 @@ void print_outcome(const EstimatedRecording& outcome) {
   for (const estimation::EstimatedValue& value : e.values) {
     const double sigma = in_file_unit(value.name, value.sigma_given_held, shape);
     const double found = in_file_unit(value.name, value.value, shape);
-    const report::NumberText text = report::number_text(found, sigma);
+    const NumberText text = number_text(found, sigma);
     std::vector<std::string> row = {
         value.name, text.value,
-        report::number_text(found, in_file_unit(value.name, value.sigma, shape)).sigma};
+        number_text(found, in_file_unit(value.name, value.sigma, shape)).sigma};
     if (any_held) row.push_back(text.sigma);
     row.push_back(find_parameter(value.name, shape).unit);
     if (outcome.evaluation) {
       for (const estimation::TruthComparison& one : outcome.evaluation->parameters) {
         if (one.name != value.name) continue;
-        row.push_back(report::text_to_place_of(in_file_unit(one.name, one.truth, shape), sigma));
-        row.push_back(report::text_to_place_of(in_file_unit(one.name, one.error, shape), sigma));
+        row.push_back(text_to_place_of(in_file_unit(one.name, one.truth, shape), sigma));
+        row.push_back(text_to_place_of(in_file_unit(one.name, one.error, shape), sigma));
         row.push_back(fmt::format("{:.2f}", one.error_over_sigma));
       }
     }

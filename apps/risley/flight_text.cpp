@@ -8,7 +8,7 @@
 #include <fmt/format.h>
 
 #include "risley/core/angle.hpp"
-#include "risley/report/number_text.hpp"
+#include "risley/core/number_text.hpp"
 
 #include "calibration_text.hpp"
 #include "recording_text.hpp"
@@ -232,7 +232,7 @@ void print_flight(const CalibratedFlight& outcome) {
   const FlightCalibration& c = outcome.calibration;
   const TrainShape shape = c.sensor.shape();
   say("{}\n", c.converged ? "converged" : "NOT CONVERGED: " + c.reason);
-  say("{}: {}\n", to_string(c.verdict.code), with_flags(c.verdict.words));
+  print_verdict(c.verdict);
   say("sensor {}: {}\n", outcome.choice.sensor.name, outcome.choice.words);
   say("{} shots on {} strips, {} cells of ground; read {:.2f} s, rotation angles {:.2f} s, solved "
       "{:.2f} s\n\n",
@@ -241,8 +241,8 @@ void print_flight(const CalibratedFlight& outcome) {
   Table table({"unknown", "value", "+- sigma", "unit", "before", "+- sigma", "share", "twin"});
   for (const FlightUnknown& unknown : c.unknowns) {
     if (unknown.held && !(unknown.sigma > 0)) continue;
-    const report::NumberText text = report::number_text(in_unit_of(unknown, unknown.value, shape),
-                                                        in_unit_of(unknown, unknown.sigma, shape));
+    const NumberText text = number_text(in_unit_of(unknown, unknown.value, shape),
+                                        in_unit_of(unknown, unknown.sigma, shape));
     const double before = in_unit_of(unknown, unknown.start, shape);
     const double prior = in_unit_of(unknown, unknown.prior_sigma, shape);
     std::vector<std::string> row = {
@@ -250,7 +250,7 @@ void print_flight(const CalibratedFlight& outcome) {
         text.value,
         text.sigma,
         unit_of(unknown, shape),
-        report::text_to_place_of(before, in_unit_of(unknown, unknown.sigma, shape)),
+        text_to_place_of(before, in_unit_of(unknown, unknown.sigma, shape)),
         std::isfinite(prior) ? fmt::format("{:.2g}", prior) : "none"};
     if (unknown.held) {
       row.insert(row.end(), {"held", ""});

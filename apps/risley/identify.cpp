@@ -9,8 +9,8 @@
 #include <spdlog/spdlog.h>
 
 #include "risley/core/angle.hpp"
+#include "risley/core/number_text.hpp"
 #include "risley/jobs/identify_recording.hpp"
-#include "risley/report/number_text.hpp"
 
 #include "command.hpp"
 #include "option_names.hpp"
@@ -139,7 +139,7 @@ void print_outcome(const IdentifiedRecording& outcome) {
   Table parameters({"parameter", "value", "+- sigma", "unit"});
   for (const FittedValue& one : values_of(found.best())) {
     if (std::isfinite(one.sigma) && one.sigma > 0) {
-      const report::NumberText text = report::number_text(one.value, one.sigma);
+      const NumberText text = number_text(one.value, one.sigma);
       parameters.add({one.name, text.value, text.sigma, one.unit});
     } else {
       parameters.add({one.name, fmt::format("{:.8g}", one.value), "held", one.unit});

@@ -52,6 +52,10 @@ std::vector<jobs::NamedText> report_texts(report::Report report) {
       [](auto& one) {
         put_flags(one.warnings);
         one.reason = with_flags(one.reason);
+        if (one.verdict) {
+          one.verdict->words = with_flags(one.verdict->words);
+          one.verdict->to_do = with_flags(one.verdict->to_do);
+        }
       },
       report);
   return {{"report.json", report::report_text(report)}, {"report.html", page_of(report)}};

@@ -357,11 +357,11 @@ void Work::fill_datum(const PlanarSolution& solution) {
     }
   }
   result_.datum_given_held = formal_datum(p.train, p.free, result_.covariance, beams, emitter);
-  result_.datum = result_.datum_given_held;
-  if (!result_.held.empty()) {
-    result_.datum = formal_datum(p.train, p.free, result_.covariance, beams, emitter,
-                                 movement_of(held_, p, result_.held_changes));
-  }
+  HeldMovement held;
+  if (!result_.held.empty()) held = movement_of(held_, p, result_.held_changes);
+  result_.datum = formal_datum(p.train, p.free, result_.covariance, beams, emitter, held);
+  result_.reported = pointing_errors(belief_.sensor.train, p.train, p.free, result_.covariance,
+                                     beams, emitter, held);
   result_.datum_without_common = formal_datum(
       p.train, p.free, solution.noise_covariance * result_.variance_factor, beams, emitter);
 }

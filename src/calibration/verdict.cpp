@@ -11,6 +11,7 @@
 
 #include "risley/algebra/symmetric.hpp"
 #include "risley/core/angle.hpp"
+#include "risley/core/number_text.hpp"
 
 namespace risley::calibration {
 namespace {
@@ -27,6 +28,22 @@ double significant_chi2(double degrees_of_freedom) {
 }
 
 }  // namespace
+
+std::string in_words(const PointingErrors& reported) {
+  constexpr double kDistance = 30;  // m, where people say how far beams are off
+  const auto in_degrees = [](double value, double sigma) {
+    return number_text(degrees_from_radians(value), degrees_from_radians(sigma));
+  };
+  const DirectionErrors& errors = reported.errors;
+  const NumberText total = in_degrees(errors.total, reported.total_sigma);
+  const NumberText gauge = in_degrees(errors.gauge, reported.gauge_sigma);
+  const NumberText shape = in_degrees(errors.shape, reported.shape_sigma);
+  return fmt::format(
+      "reported directions are off by {} ± {} degree ({:.2g} m at {:.0f} m): {} ± {} shared by all "
+      "beams and {} ± {} in shape, {} at worst",
+      total.value, total.sigma, kDistance * errors.total, kDistance, gauge.value, gauge.sigma,
+      shape.value, shape.sigma, in_degrees(reported.largest_shape, reported.shape_sigma).value);
+}
 
 std::string reason_of_failure(const Calibration& c, const PlanarSolution& solution) {
   std::string reason;
@@ -77,18 +94,27 @@ CalibrationVerdict verdict_of(const Calibration& c) {
       change.size() == 0 ? 0.0 : change.dot(algebra::SymmetricSolver(c.covariance).solve(change));
   if (!(chi2 > significant_chi2(freedom))) {
     return {CalibrationCode::as_believed,
-            fmt::format("the walls bear out what the sensor believes of itself (chi2 {:.3g} of "
-                        "{:.0f} parameters)",
-                        chi2, freedom),
+            fmt::format("the walls bear out what the sensor believes of itself to {:.2g} degree "
+                        "(chi2 {:.3g} of {:.0f} parameters)",
+                        degrees_from_radians(c.datum.total), chi2, freedom),
             "nothing"};
   }
-  const std::string moved = fmt::format(
-      "the parameters differ from what the sensor believes (chi2 {:.3g} of {:.0f}), and "
-      "the walls are {:.3g} mm thick after and {:.3g} mm before",
-      chi2, freedom, 1e3 * c.rms_after, 1e3 * c.rms_before);
+  const std::string moved = in_words(c.reported);
   if (c.rms_after >= c.rms_before) {
-    return {CalibrationCode::not_better, moved,
+    return {CalibrationCode::not_better,
+            fmt::format("{}; but the walls are {:.4g} mm thick before and {:.4g} mm after", moved,
+                        1e3 * c.rms_before, 1e3 * c.rms_after),
             "do not use it: see whether the walls are flat and the sensor stood still"};
+  }
+  // A mean square of what was found holds that of the calibration's own errors, too.
+  const double own = c.datum.total, found = c.reported.errors.total;
+  if (2 * own * own > found * found) {
+    return {CalibrationCode::not_better,
+            fmt::format("{}; but the calibration itself may be off by {:.2g} degree, which is no "
+                        "better than that",
+                        moved, degrees_from_radians(own)),
+            "scan more walls, tilted ones among them, or give what is known of walls and poses "
+            "(option planes, option stations)"};
   }
   return {CalibrationCode::bent, moved,
           "use the calibration for this unit's clouds, and repeat it on other walls"};

@@ -15,11 +15,15 @@ namespace risley::calibration {
 std::string reason_of_failure(const Calibration& c, const PlanarSolution& solution);
 
 /// What a calibration comes to: whether its parameters differ from the believed ones beyond what
-/// chance makes once in a thousand times, and whether the walls got flatter by it.
+/// chance makes once in a thousand times, and whether the walls got flatter by it and directions
+/// can be expected to be nearer to the truth.
 CalibrationVerdict verdict_of(const Calibration& c);
 
 /// The same of a calibration in flight, by the prisms' parameters and the distances between strips.
 CalibrationVerdict verdict_of(const FlightCalibration& c);
+
+/// How wrong reported directions are: "reported directions are off by 0.4029 ± 0.0013 degree ...".
+std::string in_words(const PointingErrors& reported);
 
 /// What is held and what the flight tells of it: "refractive_index is held at 1.51 +- 1e-06, ...".
 std::string in_words(const HeldParameter& held, const sensors::Sensor& sensor);

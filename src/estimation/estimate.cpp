@@ -225,9 +225,12 @@ void say_verdict(Estimate& estimate, const std::vector<std::string>& oddities) {
   }
   switch (verdict.code) {
     case EstimateCode::consistent:
-      verdict.words =
-          "the directions agree with the sensor's own belief; walls have not been asked";
-      verdict.to_do = "nothing; calibrating on walls tells where the beam truly goes";
+      verdict.words = fmt::format(
+          "the directions are what the sensor's belief of itself makes them, to {:.2g} degree; "
+          "whether that belief is true only walls tell",
+          degrees_from_radians(
+              std::max(estimate.azimuth_moments.rms, estimate.zenith_moments.rms)));
+      verdict.to_do = "calibrate the unit on walls, or use it as one that is as it believes";
       break;
     case EstimateCode::unusual:
       verdict.words = "the model describes the directions, but " + oddities.front();

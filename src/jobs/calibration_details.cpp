@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "risley/calibration/surface_steps.hpp"
+#include "risley/core/direction.hpp"
 
 namespace risley::jobs {
 namespace {
@@ -61,6 +62,36 @@ std::optional<WallField> wall_field(const std::vector<const SamplePoint*>& point
   result.rms_before = std::sqrt(before_squares / count);
   result.rms_after = std::sqrt(after_squares / count);
   result.noise = std::sqrt(noise_squares / count);
+  return result;
+}
+
+/// How wrong reported directions are in each part of the field of view.
+std::optional<PointingField> pointing_field(const Calibration& c,
+                                            const std::vector<SamplePoint>& sample) {
+  struct Cell {
+    int count = 0;
+    double total = 0, shape = 0;
+  };
+  std::map<std::pair<long, long>, Cell> cells;
+  const Vector3<double>& turn = c.reported.errors.rotation;
+  for (const SamplePoint& point : sample) {
+    const double total = norm(point.off);
+    if (!std::isfinite(total + point.azimuth)) continue;
+    const auto beam = direction_from_angles<double>({point.azimuth, point.zenith});
+    Cell& cell = cells[{cell_of(point.azimuth), cell_of(point.zenith)}];
+    ++cell.count;
+    cell.total += total;
+    cell.shape += norm(point.off - cross(turn, beam));
+  }
+  if (cells.empty()) return std::nullopt;
+  PointingField result;
+  result.cell = kSurfaceCell;
+  for (const auto& [place, cell] : cells) {
+    result.azimuth.push_back(kSurfaceCell * (static_cast<double>(place.first) + 0.5));
+    result.zenith.push_back(kSurfaceCell * (static_cast<double>(place.second) + 0.5));
+    result.total.push_back(cell.total / cell.count);
+    result.shape.push_back(cell.shape / cell.count);
+  }
   return result;
 }
 
@@ -122,6 +153,7 @@ CalibrationDetails calibration_details(const Calibration& calibration, std::size
   result.points_on_planes = on_planes.size();
   result.distances_before = estimation::moments(before);
   result.distances_after = estimation::moments(after);
+  result.pointing = pointing_field(calibration, result.sample);
   result.field = wall_field(on_planes);
   for (std::size_t r = 0; r < std::min(recordings, kMostSpaces); ++r) {
     result.walls.push_back(walls_in_space(calibration, on_planes, r));

@@ -45,7 +45,8 @@ std::vector<SamplePoint> wall_sample(const std::vector<calibration::RangedRecord
                       kNaN,
                       kNaN,
                       angles.azimuth,
-                      angles.zenith};
+                      angles.zenith,
+                      before.direction(i) - after.direction(i)};
       if (one.plane >= 0) {
         const auto& plane = calibration.planes[static_cast<std::size_t>(one.plane)];
         one.before = signed_distance(plane.believed, before.point(i, shots.range[i]));

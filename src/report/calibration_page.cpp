@@ -8,8 +8,8 @@
 
 #include "risley/core/angle.hpp"
 #include "risley/core/direction.hpp"
+#include "risley/core/number_text.hpp"
 #include "risley/report/html.hpp"
-#include "risley/report/number_text.hpp"
 #include "risley/report/page_parts.hpp"
 
 namespace risley::report {
@@ -81,6 +81,7 @@ Verdict verdict_of(const CalibrationReport& r) {
   Verdict verdict;
   verdict.converged = r.converged;
   verdict.reason = r.reason;
+  verdict.result = r.verdict.value_or(ReportedVerdict{});
   verdict.warnings = r.warnings;
   verdict.facts =
       r.planes.empty()
@@ -93,15 +94,11 @@ Verdict verdict_of(const CalibrationReport& r) {
                 millimetres(r.rms_before), millimetres(r.rms_after), count_text(r.points),
                 r.planes.size(), datum_text(r.datum_kind), sigma_degrees(r.datum.sigma_roll),
                 sigma_degrees(r.datum.sigma_pitch), sigma_degrees(r.datum.sigma_yaw));
-  verdict.healthy = "Healthy: the walls are flat in this calibration.";
-  verdict.mend_html =
+  verdict.mend =
       "look at the views below whether what was taken for walls are walls; record walls that fill "
       "the field of view, more of them, from nearer and farther and steeply tilted; hold "
-      "parameters that these walls do not tell (<code>option fixed</code>); and check known "
-      "normals and "
-      "stations, if any were given.";
-  verdict.use_html =
-      "nothing. Any command takes <code>calibration.yaml</code> with <code>option sensor</code>.";
+      "parameters that these walls do not tell (option fixed); and check known normals and "
+      "stations, if any were given";
   if (r.converged && has_poor_datum(r)) verdict.care_html = boresight_advice_html(r);
   return verdict;
 }
@@ -198,6 +195,40 @@ std::string direction_errors_row(const char* name, const DirectionErrors& errors
     html += fmt::format("<td>{}</td>", degrees(error));
   }
   return html + "</tr>\n";
+}
+
+/// What reported directions are off by, and what of it all beams share.
+std::string pointing_html(const CalibrationReport& r) {
+  if (!r.reported) return "";
+  constexpr double kDistance = 30;  // m
+  const DirectionErrors& errors = r.reported->errors;
+  std::string html = fmt::format(
+      "<h2>Where the sensor points</h2>\n<div class=\"wide\"><table><thead><tr><th>error of "
+      "reported "
+      "directions</th><th>deg</th><th>σ</th><th>mm at {:.0f} m</th></tr></thead><tbody>\n",
+      kDistance);
+  const auto add = [&](const char* name, double error, double sigma) {
+    html += fmt::format("<tr><th scope=\"row\">{}</th><td>{}</td>{}<td>{}</td></tr>\n", name,
+                        to_place_of(degrees_from_radians(error), degrees_from_radians(sigma)),
+                        sigma_cell(degrees_from_radians(error), degrees_from_radians(sigma)),
+                        millimetres(kDistance * error));
+  };
+  add("all of it", errors.total, r.reported->total_sigma);
+  add("shared: a rotation of all beams together", errors.gauge, r.reported->gauge_sigma);
+  add("shape: what is left", errors.shape, r.reported->shape_sigma);
+  add("shape of the worst beam", r.reported->largest_shape, r.reported->shape_sigma);
+  return html +
+         fmt::format(
+             "</tbody></table></div>\n<p class=\"note\">Root mean squares over the beams of the "
+             "recordings: reported directions against those of this calibration, σ from the "
+             "calibration's covariance. The shared rotation is roll {}°, pitch {}° and yaw {}°; a "
+             "mount that is aligned by its points takes it up, the shape it does not.</p>\n",
+             to_place_of(degrees_from_radians(errors.rotation.x),
+                         degrees_from_radians(r.datum.sigma_roll)),
+             to_place_of(degrees_from_radians(errors.rotation.y),
+                         degrees_from_radians(r.datum.sigma_pitch)),
+             to_place_of(degrees_from_radians(errors.rotation.z),
+                         degrees_from_radians(r.datum.sigma_yaw)));
 }
 
 std::string prior_tests_html(const std::vector<PriorTest>& tests) {
@@ -331,6 +362,8 @@ std::string steps_html(const CalibrationReport& r) {
 std::string calibration_page(const CalibrationReport& r) {
   Figures figures;
   std::string body = verdict_html(verdict_of(r));
+  body += pointing_html(r);
+  if (r.pointing_charts) body += charts_html(*r.pointing_charts, figures);
   body += parameters_html(r);
   body += datum_html(r) + charts_html(r.truth_charts, figures);
   body += planes_html(r) + steps_html(r) + charts_html(r.wall_charts, figures);

@@ -132,6 +132,39 @@ class CalibrationCharts {
     return charts;
   }
 
+  /// How wrong reported directions are over the field of view.
+  std::vector<Chart> pointing() const {
+    if (!input_.details.pointing) return {};
+    const jobs::PointingField& field = *input_.details.pointing;
+    const double width = degrees_from_radians(field.cell);
+    const auto chart = [&](std::string title, const std::vector<double>& errors,
+                           const std::string& note) {
+      Series series{"", "ink", SeriesKind::cells, {}, {}};
+      series.cell_width = series.cell_height = width;
+      for (std::size_t i = 0; i < errors.size(); ++i) {
+        series.x.push_back(degrees_from_radians(field.azimuth[i]));
+        series.y.push_back(degrees_from_radians(field.zenith[i]));
+        series.value.push_back(degrees_from_radians(errors[i]));
+      }
+      Chart result{std::move(title),
+                   "azimuth, deg",
+                   "zenith, deg",
+                   {series},
+                   fmt::format("Angle between the direction that the sensor reports and the one of "
+                               "this calibration, {}; means over cells of {:.3g} degree.",
+                               note, width),
+                   ChartKind::map};
+      result.value_label = "error, deg";
+      const double largest = *std::max_element(errors.begin(), errors.end());
+      result.value_range = {0.0, degrees_from_radians(largest)};
+      return result;
+    };
+    return {chart("Error of reported directions over the field of view", field.total,
+                  "everything included"),
+            chart("The same without the rotation that all beams share", field.shape,
+                  "after turning all beams together as well as they can be turned")};
+  }
+
   /// The walls in space, before and after, with their thickness enlarged.
   std::vector<Chart> walls() const {
     std::vector<Chart> charts;
@@ -427,6 +460,7 @@ CalibrationReport calibration_report(const CalibrationReportInput& input) {
   report.method = c.method;
   report.converged = c.converged;
   report.reason = c.reason;
+  report.verdict = reported_verdict(c.verdict);
   report.warnings = c.warnings;
   report.warnings.insert(report.warnings.end(), input.warnings.begin(), input.warnings.end());
   report.points = c.points;
@@ -439,6 +473,7 @@ CalibrationReport calibration_report(const CalibrationReportInput& input) {
   report.datum_kind = c.datum_kind;
   report.datum = c.datum;
   report.datum_without_common = c.datum_without_common;
+  report.reported = c.reported;
   report.prior_tests = c.prior_tests;
   report.planes = c.planes;
   report.steps = c.steps;
@@ -451,6 +486,7 @@ CalibrationReport calibration_report(const CalibrationReportInput& input) {
   report.provenance = input.provenance;
   const CalibrationCharts charts(input);
   report.truth_charts = charts.truth();
+  report.pointing_charts = charts.pointing();
   report.thickness_charts = charts.thickness();
   report.wall_charts = charts.walls();
   report.view_charts = charts.views();

@@ -177,6 +177,7 @@ void check_report(const EstimateReport& r) {
 void check_report(const CalibrationReport& r) {
   check_common(r);
   check_charts(r.truth_charts, "truth_charts");
+  if (r.pointing_charts) check_charts(*r.pointing_charts, "pointing_charts");
   check_charts(r.thickness_charts, "thickness_charts");
   check_charts(r.wall_charts, "wall_charts");
   check_charts(r.view_charts, "view_charts");

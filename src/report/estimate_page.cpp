@@ -8,8 +8,8 @@
 #include <fmt/format.h>
 
 #include "risley/core/angle.hpp"
+#include "risley/core/number_text.hpp"
 #include "risley/report/html.hpp"
-#include "risley/report/number_text.hpp"
 #include "risley/report/page_parts.hpp"
 
 namespace risley::report {
@@ -38,6 +38,7 @@ Verdict verdict_of(const EstimateReport& r) {
   Verdict verdict;
   verdict.converged = r.converged;
   verdict.reason = r.reason;
+  verdict.result = r.verdict.value_or(ReportedVerdict{});
   verdict.warnings = r.warnings;
   verdict.facts = fmt::format(
       "What is left unexplained is {:.3g}° in azimuth and {:.3g}° in zenith (root mean square). "
@@ -45,14 +46,10 @@ Verdict verdict_of(const EstimateReport& r) {
       "of {} shots were left out as outliers.",
       degrees_from_radians(r.azimuth_residuals.rms), degrees_from_radians(r.zenith_residuals.rms),
       noise_words(r), count_text(r.outliers), count_text(r.shots));
-  verdict.healthy = "Healthy: the model describes this recording.";
-  verdict.mend_html =
+  verdict.mend =
       "check that option sensor is the instrument that recorded, that its times are right, and "
-      "whether "
-      "the file has the sign of the elevation turned (option mirrored yes); a longer "
-      "recording or option rate full gives the estimation more to hold on to.";
-  verdict.use_html =
-      "nothing. Any command takes <code>calibration.yaml</code> with <code>option sensor</code>.";
+      "whether the file has the sign of the elevation turned (option mirrored yes); a longer "
+      "recording or option rate full gives the estimation more to hold on to";
   return verdict;
 }
 

@@ -376,6 +376,7 @@ EstimateReport estimate_report(const EstimateReportInput& input) {
   report.method = to_string(e.method);
   report.converged = e.converged;
   report.reason = e.reason;
+  report.verdict = reported_verdict(e.verdict);
   report.warnings = e.warnings;
   report.warnings.insert(report.warnings.end(), input.warnings.begin(), input.warnings.end());
   report.shots = e.series.size();

@@ -13,8 +13,8 @@
 
 #include "risley/calibration/calibrate.hpp"
 #include "risley/core/angle.hpp"
+#include "risley/core/number_text.hpp"
 #include "risley/report/html.hpp"
-#include "risley/report/number_text.hpp"
 #include "risley/report/page_parts.hpp"
 
 #include "report/flight_unknowns.hpp"
@@ -78,6 +78,7 @@ Verdict verdict_of(const FlightReport& r) {
   Verdict verdict;
   verdict.converged = r.converged;
   verdict.reason = r.reason;
+  verdict.result = r.verdict.value_or(ReportedVerdict{});
   verdict.warnings = r.warnings;
   verdict.facts =
       r.unknowns.empty()
@@ -94,16 +95,11 @@ Verdict verdict_of(const FlightReport& r) {
                 boresight_text(r, "boresight_x_deg"), boresight_text(r, "boresight_y_deg"),
                 boresight_text(r, "boresight_z_deg"),
                 angle_on_ground(r.datum.total, r.datum.height));
-  verdict.healthy = "Healthy: the strips lie on each other.";
-  verdict.mend_html =
+  verdict.mend =
       "look at the differences between strips below whether strips that overlap are of one flight; "
       "check the axes of the mount, and that recording and trajectory count the same time; give "
       "larger sigmas to what the mount states too well; and hold parameters that this flight does "
-      "not tell (<code>option fixed</code>).";
-  verdict.use_html =
-      "nothing. For points of this flight take the calibration, the mount and the corrected "
-      "trajectory that stand beside this page; for other flights with this sensor on this mount "
-      "take calibration and mount.";
+      "not tell (option fixed)";
   if (!r.converged) return verdict;
   if (!(r.datum.rotation <= calibration::kPoorDatum)) verdict.care_html = poor_rotation_html(r);
   if (!(r.rms_after < r.rms_before)) {

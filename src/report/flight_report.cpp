@@ -378,6 +378,7 @@ FlightReport flight_report(const FlightReportInput& input) {
   report.body_from_sensor = input.mount.nominal;
   report.converged = c.converged;
   report.reason = c.reason;
+  report.verdict = reported_verdict(c.verdict);
   report.warnings = c.warnings;
   report.warnings.insert(report.warnings.end(), input.warnings.begin(), input.warnings.end());
   report.shots = c.shots;

@@ -6,7 +6,7 @@
 
 #include <fmt/format.h>
 
-#include "risley/report/number_text.hpp"
+#include "risley/core/number_text.hpp"
 
 namespace risley::report {
 

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "risley/io/sha256.hpp"
 #include "risley/report/html.hpp"
@@ -14,6 +15,22 @@
 
 namespace risley::report {
 namespace {
+
+/// What stands largest on a page, and its colour.
+struct Headline {
+  const char *code, *kind, *words;
+};
+
+constexpr Headline kHeadlines[] = {
+    {"consistent", "ok",
+     "The sensor's directions agree with what it believes of itself. Whether that belief is true, "
+     "only walls tell."},
+    {"unusual", "care", "The model describes this recording, but not all of it is as usual."},
+    {"as_believed", "ok", "The sensor points where it believes."},
+    {"bent", "care", "The sensor does not point where it believes: use this calibration."},
+    {"not_better", "bad",
+     "This calibration is not better than what the sensor believes: do not use it."},
+};
 
 /// Before anything is drawn, so that a dark page never flashes.
 constexpr std::string_view kFirstScript =
@@ -91,22 +108,41 @@ std::string list_html(const std::vector<std::string>& items) {
 }
 
 std::string verdict_html(const Verdict& verdict) {
-  std::string kind = "ok", title = verdict.healthy, advice;
-  const std::string warnings = verdict.warnings.empty() ? "" : list_html(verdict.warnings);
+  const auto found =
+      std::find_if(std::begin(kHeadlines), std::end(kHeadlines),
+                   [&](const Headline& headline) { return headline.code == verdict.result.code; });
+  std::string kind = "ok", title = "Converged.", html;
   if (!verdict.converged) {
     kind = "bad";
     title = "Not converged: do not use these numbers.";
-    advice = fmt::format("<p><b>Why:</b> {}</p><p><b>What to do:</b> {}</p>{}",
-                         escape_html(verdict.reason), verdict.mend_html, warnings);
-  } else if (!verdict.warnings.empty() || !verdict.care_html.empty()) {
-    kind = "care";
-    title = "Converged: usable, with care.";
-    advice = warnings + verdict.care_html;
+    html = fmt::format("<p><b>Why:</b> {}</p>", escape_html(verdict.reason));
   } else {
-    advice = fmt::format("<p><b>What to do:</b> {}</p>", verdict.use_html);
+    if (found != std::end(kHeadlines)) {
+      kind = found->kind;
+      title = found->words;
+    } else if (!verdict.result.code.empty()) {  // undecided
+      kind = "care";
+      title = "Converged, and not to be trusted.";
+    }
+    if (!verdict.warnings.empty() || !verdict.care_html.empty()) {
+      if (kind == "ok") kind = "care";
+    }
+    if (!verdict.result.words.empty()) {
+      html = fmt::format("<p><b>Found:</b> {}.</p>", escape_html(verdict.result.words));
+    }
   }
-  return fmt::format("<section class=\"verdict {}\"><strong>{}</strong><p>{}</p>{}</section>\n",
-                     kind, escape_html(title), escape_html(verdict.facts), advice);
+  html += fmt::format("<p>{}</p>", escape_html(verdict.facts));
+  std::vector<std::string> to_do;
+  if (!verdict.result.to_do.empty()) to_do.push_back(verdict.result.to_do);
+  if (!verdict.converged && !verdict.mend.empty()) to_do.push_back(verdict.mend);
+  if (!to_do.empty()) {
+    html += fmt::format("<p><b>What to do:</b> {}.</p>",
+                        escape_html(fmt::format("{}", fmt::join(to_do, "; "))));
+  }
+  if (!verdict.warnings.empty()) html += "<p><b>With care:</b></p>" + list_html(verdict.warnings);
+  if (verdict.converged) html += verdict.care_html;
+  return fmt::format("<section class=\"verdict {}\"><strong>{}</strong>{}</section>\n", kind,
+                     escape_html(title), html);
 }
 
 std::string correlation_html(const std::vector<CorrelationHead>& heads,

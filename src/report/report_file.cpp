@@ -119,6 +119,15 @@ void fields(Archive& archive, T& datum) {
   archive("total", datum.total);
 }
 
+template <class Archive, report::FieldsOf<PointingErrors> T>
+void fields(Archive& archive, T& pointing) {
+  archive("errors", pointing.errors);
+  archive("total_sigma", pointing.total_sigma);
+  archive("gauge_sigma", pointing.gauge_sigma);
+  archive("shape_sigma", pointing.shape_sigma);
+  archive("largest_shape", pointing.largest_shape);
+}
+
 template <class Archive, report::FieldsOf<PriorTest> T>
 void fields(Archive& archive, T& test) {
   archive("name", test.name);
@@ -234,6 +243,13 @@ AnyReport checked_report(FieldReader& reader) {
 
 }  // namespace
 
+template <class Archive, FieldsOf<ReportedVerdict> T>
+void fields(Archive& archive, T& verdict) {
+  archive("code", verdict.code);
+  archive("words", verdict.words);
+  archive("to_do", verdict.to_do);
+}
+
 template <class Archive, FieldsOf<ReportedParameter> T>
 void fields(Archive& archive, T& row) {
   archive("name", row.name);
@@ -307,6 +323,7 @@ void fields(Archive& archive, T& report) {
   archive("method", report.method);
   archive("converged", report.converged);
   archive("reason", report.reason);
+  archive("verdict", report.verdict);
   archive("warnings", report.warnings);
   archive("shots", report.shots);
   archive("outliers", report.outliers);
@@ -349,6 +366,7 @@ void fields(Archive& archive, T& report) {
   archive("method", report.method);
   archive("converged", report.converged);
   archive("reason", report.reason);
+  archive("verdict", report.verdict);
   archive("warnings", report.warnings);
   archive("points", report.points);
   archive("parameters", report.parameters);
@@ -360,6 +378,7 @@ void fields(Archive& archive, T& report) {
   archive("datum_kind", report.datum_kind);
   archive("datum", report.datum);
   archive("datum_without_common", report.datum_without_common);
+  archive("reported_directions", report.reported);
   archive("prior_tests", report.prior_tests);
   archive("planes", report.planes);
   archive("steps", report.steps);
@@ -370,6 +389,7 @@ void fields(Archive& archive, T& report) {
   archive("variance_factor", report.variance_factor);
   archive("truth", report.truth);
   archive("truth_charts", report.truth_charts);
+  archive("pointing_charts", report.pointing_charts);
   archive("thickness_charts", report.thickness_charts);
   archive("wall_charts", report.wall_charts);
   archive("view_charts", report.view_charts);
@@ -408,6 +428,7 @@ void fields(Archive& archive, T& report) {
   archive("body_from_sensor", report.body_from_sensor);
   archive("converged", report.converged);
   archive("reason", report.reason);
+  archive("verdict", report.verdict);
   archive("warnings", report.warnings);
   archive("shots", report.shots);
   archive("without_pose", report.without_pose);

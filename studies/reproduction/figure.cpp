@@ -10,10 +10,10 @@
 
 #include <fmt/format.h>
 
+#include "risley/core/number_text.hpp"
 #include "risley/estimation/diagnostics.hpp"
 #include "risley/report/charts.hpp"
 #include "risley/report/html.hpp"
-#include "risley/report/number_text.hpp"
 
 namespace risley::reproduction {
 report::Chart histogram_chart(std::string title, std::string x_label,
@@ -25,7 +25,7 @@ report::Chart histogram_chart(std::string title, std::string x_label,
     const double sigma = scale * m.std / std::sqrt(static_cast<double>(m.count));  // of the mean
     chart.note =
         fmt::format("{} values, mean {}, standard deviation {:.3g}", report::count_text(m.count),
-                    report::number_text(scale * m.mean, sigma).value, scale * m.std);
+                    number_text(scale * m.mean, sigma).value, scale * m.std);
   }
   return chart;
 }

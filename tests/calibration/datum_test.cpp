@@ -246,4 +246,57 @@ TEST(FormalDatum, AsksForACovarianceOfTheFreeParametersAndAnglesOfEveryPrism) {
   EXPECT_EQ(run(one, {{1, 2}, {3}}), "rotation angles of a prism has 1 values, expected 2");
 }
 
+/// Total, gauge and shape scatter over draws of the calibration as they say, about what they are.
+TEST(PointingErrors, ScatterOverDrawsAsTheirSigmasSay) {
+  constexpr int kDraws = 2000;
+  const PrismTrain truth = testing::imperfect_train("PA-AP", 0.3, 5);
+  const auto free = estimation::free_parameters(testing::kTiltNames, {2});
+  const auto n = static_cast<Index>(free.size());
+  Eigen::MatrixXd root = Eigen::MatrixXd::Zero(n, n);
+  const RandomStream entries(7, 1);
+  for (Index i = 0; i < n; ++i) {
+    for (Index j = 0; j < n; ++j) {
+      root(i, j) = 2e-5 * entries.normal(static_cast<std::uint64_t>(i * n + j));
+    }
+  }
+  const Eigen::MatrixXd covariance = root * root.transpose();
+  const auto angles = some_angles(80, 4);
+  PrismTrain believed = truth;
+  add_errors(believed, free, Eigen::VectorXd::Constant(n, 2e-3));
+  const PointingErrors exact = pointing_errors(believed, truth, free, covariance, angles);
+  const DirectionErrors known =
+      direction_errors(beams_of(believed, angles), beams_of(truth, angles));
+  EXPECT_NEAR(exact.errors.total, known.total, 1e-12);
+  EXPECT_NEAR(exact.errors.shape, known.shape, 1e-12);
+  EXPECT_GT(exact.largest_shape, known.shape);
+  EXPECT_LT(exact.largest_shape, 5 * known.shape);
+
+  const RandomStream draws(8, 1);
+  double total = 0, gauge = 0, shape = 0;
+  for (int draw = 0; draw < kDraws; ++draw) {
+    Eigen::VectorXd white(n);
+    draws.fill_normal(static_cast<std::uint64_t>(draw * n),
+                      {white.data(), static_cast<std::size_t>(n)});
+    PrismTrain found = truth;
+    add_errors(found, free, root * white);
+    const DirectionErrors errors =
+        pointing_errors(believed, found, free, covariance, angles).errors;
+    total += std::pow(errors.total - known.total, 2) / kDraws;
+    gauge += std::pow(errors.gauge - known.gauge, 2) / kDraws;
+    shape += std::pow(errors.shape - known.shape, 2) / kDraws;
+  }
+  EXPECT_NEAR(std::sqrt(total) / exact.total_sigma, 1, 0.06);
+  EXPECT_NEAR(std::sqrt(gauge) / exact.gauge_sigma, 1, 0.06);
+  EXPECT_NEAR(std::sqrt(shape) / exact.shape_sigma, 1, 0.06);
+}
+
+TEST(PointingErrors, RefuseAnotherSensor) {
+  const PrismTrain train = testing::imperfect_train("PA-AP", 0.3, 5);
+  const PrismTrain three = testing::imperfect_train("PA-AP-PA", 0.3, 5);
+  EXPECT_NE(refusal([&] {
+              pointing_errors(three, train, {}, Eigen::MatrixXd(0, 0), some_angles(5, 1));
+            }).find("prisms of the believed train"),
+            std::string::npos);
+}
+
 }  // namespace risley::calibration::datum_test

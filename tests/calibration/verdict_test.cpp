@@ -46,6 +46,30 @@ TEST(Verdict, ParametersBeyondChanceAreBentWhereWallsGetFlatter) {
   EXPECT_EQ(code_of(c), "as_believed");
 }
 
+TEST(Verdict, SaysByHowMuchDirectionsAreOff) {
+  Calibration c = moved_by(1e-3);
+  constexpr double kDegree = 0.017453292519943295;
+  c.reported.errors.total = 0.4012 * kDegree;
+  c.reported.errors.gauge = 0.4003 * kDegree;
+  c.reported.errors.shape = 0.02304 * kDegree;
+  c.reported.total_sigma = c.reported.gauge_sigma = 0.0015 * kDegree;
+  c.reported.shape_sigma = 0.0004 * kDegree;
+  c.reported.largest_shape = 0.0451 * kDegree;
+  EXPECT_EQ(verdict_of(c).words,
+            "reported directions are off by 0.4012 ± 0.0015 degree (0.21 m at 30 m): 0.4003 ± "
+            "0.0015 shared by all beams and 0.02304 ± 0.00040 in shape, 0.04510 at worst");
+}
+
+// What was found holds the calibration's own errors: half of the square, and nothing is won.
+TEST(Verdict, ACalibrationAsUncertainAsTheBeliefIsOffIsNotBetter) {
+  Calibration c = moved_by(1e-3);
+  c.reported.errors.total = 1e-3;
+  c.datum.total = 0.69e-3;
+  EXPECT_EQ(code_of(c), "bent");
+  c.datum.total = 0.72e-3;
+  EXPECT_EQ(code_of(c), "not_better");
+}
+
 TEST(Verdict, WhatDidNotConvergeIsUndecidedAndSaysWhy) {
   Calibration c = moved_by(0.0);
   c.converged = false;

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 #include "risley/recordings/extrinsics.hpp"
 
+#include <array>
 #include <cmath>
 #include <limits>
 #include <random>
@@ -47,14 +48,14 @@ Extrinsics pose_deg(double yaw, double pitch, double roll, Vector3<double> trans
           translation};
 }
 
-/// Angles all around and both poles' neighbourhoods.
+/// Angles all around and both poles' neighbourhoods: every yaw with every pitch.
 std::vector<Extrinsics> many_poses() {
+  constexpr std::array kRolls{-90.0, 0.0, 17.0, 180.0, 0.0};
   std::vector<Extrinsics> poses;
   for (const double yaw : {-180.0, -90.0, -0.3, 0.0, 41.0, 180.0, 300.0}) {
     for (const double pitch : {-90.0, -35.0, 0.0, 2.0, 90.0, 179.0}) {
-      for (const double roll : {-90.0, 0.0, 17.0, 180.0}) {
-        poses.push_back(pose_deg(yaw, pitch, roll, {0.4, -1.2, 0.05 * yaw}));
-      }
+      const double roll = kRolls[poses.size() % kRolls.size()];
+      poses.push_back(pose_deg(yaw, pitch, roll, {0.4, -1.2, 0.05 * yaw}));
     }
   }
   return poses;

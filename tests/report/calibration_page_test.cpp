@@ -88,6 +88,7 @@ std::vector<jobs::SamplePoint> sample_on(const std::vector<calibration::Calibrat
       range *= 0.3 + 0.7 * noise.uniform(2 * i + 1);
     }
     one.point = range * beam;
+    one.off = {0, deg(0.2), deg(-0.1) * one.azimuth};
     sample.push_back(one);
   }
   return sample;
@@ -123,6 +124,12 @@ Calibration example() {
                    {"ceiling", false, deg(0.4), 80.5, 2, 18.4},
                    {"nobody knows", false, kNaN, kNaN, 2, 18.4},
                    {"unseen", true, 0, 0, 0, 0}};
+  c.reported = {{deg(0.07), deg(0.35), 0, 0, deg(0.3571), deg(0.3502), deg(0.0231), {}},
+                deg(0.0016),
+                deg(0.0017),
+                deg(0.00031),
+                deg(0.0512)};
+  c.verdict = {calibration::CalibrationCode::as_believed, "walls <bear out> the belief", "nothing"};
   c.sigma0 = 0.98;
   c.unevenness = 1.4;
   c.variance_factor = 1.4;
@@ -252,7 +259,30 @@ TEST(CalibrationPage, SaysFirstThatAGoodCalibrationIsHealthy) {
   EXPECT_THAT(shown, HasSubstr("80\u202f000 points"));
   EXPECT_THAT(shown, HasSubstr("roll 0.0041°, pitch 0.0123°"));
   EXPECT_THAT(shown, Not(HasSubstr("must not be trusted")));
+  EXPECT_THAT(shown, HasSubstr("The sensor points where it believes."));
+  EXPECT_THAT(shown, HasSubstr("walls &lt;bear out&gt; the belief"));
   EXPECT_LT(shown.find("class=\"verdict"), shown.find("<h2>"));
+}
+
+TEST(CalibrationPage, OfABentUnitSaysByHowMuchAndWhere) {
+  Page page;
+  page.calibration.verdict = {calibration::CalibrationCode::bent, "directions are off",
+                              "use the calibration"};
+  const std::string html = page.html(), shown = visible(html);
+  expect_sound(html);
+  EXPECT_THAT(shown, HasSubstr("class=\"verdict care\""));
+  EXPECT_THAT(shown, HasSubstr("does not point where it believes: use this calibration"));
+  EXPECT_THAT(shown, HasSubstr("<td>0.3571</td><td>0.0016</td><td>187.0</td>"));
+  EXPECT_THAT(shown, HasSubstr("<td>0.02310</td><td>0.00031</td><td>12.1</td>"));
+  EXPECT_THAT(shown, HasSubstr("<td>0.05120</td><td>0.00031</td><td>26.8</td>"));
+  // The map's mean is what its beams are off by.
+  const nlohmann::json charts = data(html);
+  ASSERT_EQ(charts[0].at("title"), "Error of reported directions over the field of view");
+  for (const auto& value : charts[0].at("series")[0].at("value")) {
+    EXPECT_NEAR(value.get<double>(), 0.2, 0.01);
+  }
+  page.calibration.verdict.code = calibration::CalibrationCode::not_better;
+  EXPECT_THAT(visible(page.html()), HasSubstr("class=\"verdict bad\""));
 }
 
 TEST(CalibrationPage, HasEverySection) {
@@ -260,18 +290,20 @@ TEST(CalibrationPage, HasEverySection) {
   page.truth = example_truth();
   const std::string shown = visible(page.html());
   for (const char* text :
-       {"<h2>Parameters</h2>", "<h2>Datum</h2>", "Against the truth", "against the data",
-        "<h2>Walls</h2>", "Steps on the walls", "<h2>Thickness of the walls</h2>",
-        "<h2>What was taken for a wall</h2>", "<h2>Correlations of the parameters</h2>",
-        "<h2>Times of the recording</h2>", "<h2>How to make it again</h2>", "range offset"}) {
+       {"<h2>Where the sensor points</h2>", "<h2>Parameters</h2>", "<h2>Datum</h2>",
+        "Against the truth", "against the data", "<h2>Walls</h2>", "Steps on the walls",
+        "<h2>Thickness of the walls</h2>", "<h2>What was taken for a wall</h2>",
+        "<h2>Correlations of the parameters</h2>", "<h2>Times of the recording</h2>",
+        "<h2>How to make it again</h2>", "range offset"}) {
     EXPECT_THAT(shown, HasSubstr(text));
   }
   EXPECT_THAT(
       titles(shown),
       ::testing::ElementsAre(
-          "Errors of the azimuth before", "Errors of the zenith angle before",
-          "Errors of the azimuth after", "Errors of the zenith angle after",
-          "Walls before the calibration: room &lt;1&gt;.lvx",
+          "Error of reported directions over the field of view",
+          "The same without the rotation that all beams share", "Errors of the azimuth before",
+          "Errors of the zenith angle before", "Errors of the azimuth after",
+          "Errors of the zenith angle after", "Walls before the calibration: room &lt;1&gt;.lvx",
           "Walls after the calibration: room &lt;1&gt;.lvx",
           "Walls before the calibration: hall.lvx", "Walls after the calibration: hall.lvx",
           "Thickness over the angle of incidence", "Thickness over the rotation angle of prism a",

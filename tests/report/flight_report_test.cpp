@@ -75,6 +75,7 @@ calibration::TrajectoryKnots knots() {
 FlightCalibration calibrated_example() {
   FlightCalibration c;
   c.converged = true;
+  c.verdict = {calibration::CalibrationCode::as_believed, "strips bear out the belief", "nothing"};
   c.sensor = sensors::load_sensor("mid-40");
   c.sensor.serial = "1PQD&7";
   c.model.train = c.sensor.train;

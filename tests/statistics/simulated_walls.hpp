@@ -204,6 +204,8 @@ class WallMonteCarlo {
     largest_total = std::max(largest_total, total);
     gauge_ += degrees_from_radians(e.after.gauge);
     shape_ += degrees_from_radians(e.after.shape);
+    const double over = (c.reported.errors.total - e.before.total) / c.reported.total_sigma;
+    reported_over_sigma2_ += over * over;
     total2_ += std::pow(e.after.total, 2);
     shape2_ += std::pow(e.after.shape, 2);
     // The units of these tests are in what is held exactly as held, but for one.
@@ -232,6 +234,8 @@ class WallMonteCarlo {
   double mean_shape() const { return shape_ / runs; }
   /// Root mean square errors over the formal ones: 1 when these are honest.
   double total_ratio() const { return std::sqrt(total2_ / formal_total2_); }
+  /// What the calibrations say that reported directions are off by, against the truth, in sigmas.
+  double reported_ratio() const { return std::sqrt(reported_over_sigma2_ / runs); }
   double shape_ratio() const { return std::sqrt(shape2_ / formal_shape2_); }
   double offset_ratio() const { return std::sqrt(offset2_ / runs); }
   /// Normalised estimation error squared of the parameters, per degree of freedom.
@@ -259,6 +263,7 @@ class WallMonteCarlo {
     one("formal_shape_deg", degrees_from_radians(std::sqrt(formal_shape2_ / runs)));
     one("total_over_formal", total_ratio());
     one("shape_over_formal", shape_ratio());
+    one("reported_over_sigma", reported_ratio());
     one("range_offset_over_sigma", offset_ratio());
     one("nees", nees());
     one("nees_band", nees_band());
@@ -276,6 +281,7 @@ class WallMonteCarlo {
   double azimuth_before = 0, zenith_before = 0;
   double total_ = 0, gauge_ = 0, shape_ = 0;
   double total2_ = 0, shape2_ = 0, formal_total2_ = 0, formal_shape2_ = 0, offset2_ = 0;
+  double reported_over_sigma2_ = 0;
   double nees_ = 0, parameters_ = 0, covered_ = 0, variance_factor_ = 0;
 };
 

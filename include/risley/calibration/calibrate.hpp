@@ -115,6 +115,7 @@ struct Calibration {
   FormalDatum datum;                 ///< after, everything included
   FormalDatum datum_given_held;      ///< if everything that was held were exactly as held
   FormalDatum datum_without_common;  ///< without the common errors of the rotation angles
+  PointingErrors reported;           ///< of the directions that the sensor reports
   std::vector<estimation::WeakDirection> unobservable;
   std::vector<PriorTest> prior_tests;
   double sigma0 = 0;           ///< standard deviation of unit weight against the stated range noise

@@ -54,6 +54,23 @@ FormalDatum formal_datum(const PrismTrain& train,
                          const std::vector<std::vector<double>>& rotation_angles,
                          std::span<const std::uint8_t> emitter = {}, const HeldMovement& held = {});
 
+/// How wrong the directions are that a sensor reports, as a calibration has it.
+struct PointingErrors {
+  DirectionErrors errors;  ///< reported minus calibrated
+  /// Of errors.total, gauge and shape, to first order in the covariance of the calibration, rad.
+  double total_sigma = 0, gauge_sigma = 0, shape_sigma = 0;
+  double largest_shape = 0;  ///< of the beams, without the rotation that all share, rad
+};
+
+/// @param believed  what the sensor computes directions with
+/// Else as formal_datum(). @throws InvalidArgument as formal_datum() and direction_errors()
+PointingErrors pointing_errors(const PrismTrain& believed, const PrismTrain& train,
+                               const std::vector<estimation::FreeParameter>& free,
+                               const Eigen::MatrixXd& covariance,
+                               const std::vector<std::vector<double>>& rotation_angles,
+                               std::span<const std::uint8_t> emitter = {},
+                               const HeldMovement& held = {});
+
 /// What ties the frame of the calibrated beams to the outside.
 enum class DatumKind {
   none,      ///< walls of unknown orientation: boresight only through the bundle's shape

@@ -26,6 +26,14 @@ struct WallField {
   double noise = 0;                             ///< what noise alone would leave of that, m
 };
 
+/// Mean errors of reported directions over cells of the field of view, of all recordings together.
+struct PointingField {
+  double cell = 0;                      ///< side, rad
+  std::vector<double> azimuth, zenith;  ///< middle of the cells, rad
+  std::vector<double> total;            ///< [cells], rad
+  std::vector<double> shape;            ///< without the rotation that all beams share, rad
+};
+
 /// Mean of the points of one wall in one cell of the field of view: single points would show
 /// nothing but the noise of ranges.
 struct WallPatch {
@@ -55,6 +63,7 @@ struct CalibrationDetails {
   std::vector<SamplePoint> sample;
   std::size_t points_on_planes = 0;                       ///< of the sample
   estimation::Moments distances_before, distances_after;  ///< from the planes, m
+  std::optional<PointingField> pointing;                  ///< where a beam is known
   std::optional<WallField> field;                         ///< where a cell holds points enough
   std::vector<WallsInSpace> walls;                        ///< of the first recordings
   std::optional<BeamErrorMoments> beam_errors;

@@ -17,6 +17,7 @@ struct SamplePoint {
   Vector3<double> point;           ///< sensor frame, m, after the calibration
   double before = 0, after = 0;    ///< distance from the plane, m; NaN without a plane
   double azimuth = 0, zenith = 0;  ///< of the beam after the calibration, rad
+  Vector3<double> off;             ///< reported minus calibrated direction, sensor frame
 };
 
 /// At most 20,000 shots of all recordings together, evenly spread.

@@ -32,6 +32,7 @@ struct CalibrationReport {
 
   bool converged = false;
   std::string reason;
+  std::optional<ReportedVerdict> verdict;  ///< not in files of older versions
   std::vector<std::string> warnings;
   std::size_t points = 0;  ///< used
 
@@ -43,6 +44,7 @@ struct CalibrationReport {
 
   calibration::DatumKind datum_kind = calibration::DatumKind::none;
   calibration::FormalDatum datum, datum_without_common;
+  std::optional<calibration::PointingErrors> reported;  ///< not in files of older versions
   std::vector<calibration::PriorTest> prior_tests;
   std::vector<calibration::CalibratedPlane> planes;
   std::vector<calibration::SurfaceStep> steps;
@@ -55,6 +57,7 @@ struct CalibrationReport {
   };
   std::optional<Truth> truth;
 
+  std::optional<std::vector<Chart>> pointing_charts;  ///< not in files of older versions
   std::vector<Chart> truth_charts, thickness_charts, wall_charts, view_charts;
   Provenance provenance;
 

@@ -34,6 +34,7 @@ struct EstimateReport {
 
   bool converged = false;
   std::string reason;
+  std::optional<ReportedVerdict> verdict;  ///< not in files of older versions
   std::vector<std::string> warnings;
   std::size_t shots = 0, outliers = 0;
 

@@ -35,6 +35,7 @@ struct FlightReport {
 
   bool converged = false;
   std::string reason;
+  std::optional<ReportedVerdict> verdict;  ///< not in files of older versions
   std::vector<std::string> warnings;
   std::size_t shots = 0, without_pose = 0, used = 0, outliers = 0;
   std::size_t cells = 0, rough_cells = 0;

@@ -36,11 +36,10 @@ std::string list_html(const std::vector<std::string>& items);
 struct Verdict {
   bool converged = false;
   std::string reason;                 ///< why not converged
+  ReportedVerdict result;             ///< empty in files of older versions
   std::vector<std::string> warnings;  ///< any makes a converged result one to use with care
   std::string facts;
-  std::string healthy;    ///< the headline when nothing speaks against the result
-  std::string mend_html;  ///< what to do when it did not converge
-  std::string use_html;   ///< what to do with a healthy result
+  std::string mend;  ///< what else to do when it did not converge; empty: nothing
   /// A reason for care that needs more than a line: paragraphs, or nothing.
   std::string care_html;
 };

@@ -30,6 +30,17 @@ struct ReportedParameter {
   double truth = kUnknown, error = kUnknown, error_over_sigma = kUnknown;
 };
 
+/// What a result comes to, as EstimateVerdict and CalibrationVerdict have it.
+struct ReportedVerdict {
+  std::string code, words, to_do;
+};
+
+/// As reports tell of it.
+template <class ResultVerdict>
+ReportedVerdict reported_verdict(const ResultVerdict& verdict) {
+  return {to_string(verdict.code), verdict.words, verdict.to_do};
+}
+
 /// One recording and the audit of its times.
 struct ReportedRecording {
   std::string name;    ///< of the file

@@ -4,7 +4,7 @@
 
 #include <string>
 
-namespace risley::report {
+namespace risley {
 
 /// A value and its sigma for people, with the digits that mean something.
 struct NumberText {
@@ -25,4 +25,4 @@ NumberText number_text(double value, double sigma);
 /// number_text.
 std::string text_to_place_of(double value, double sigma);
 
-}  // namespace risley::report
+}  // namespace risley

@@ -1,12 +1,12 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-#include "risley/report/number_text.hpp"
+#include "risley/core/number_text.hpp"
 
 #include <limits>
 
 #include <gtest/gtest.h>
 
-namespace risley::report::number_text_test {
+namespace risley::number_text_test {
 
 TEST(NumberText, ShowsTwoDigitsOfTheSigmaAndTheValueToTheSamePlace) {
   struct Case {
@@ -33,4 +33,4 @@ TEST(NumberText, ShowsTwoDigitsOfTheSigmaAndTheValueToTheSamePlace) {
   }
 }
 
-}  // namespace risley::report::number_text_test
+}  // namespace risley::number_text_test

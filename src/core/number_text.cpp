@@ -1,13 +1,13 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-#include "risley/report/number_text.hpp"
+#include "risley/core/number_text.hpp"
 
 #include <algorithm>
 #include <cmath>
 
 #include <fmt/format.h>
 
-namespace risley::report {
+namespace risley {
 namespace {
 
 /// Decimals that show two significant digits; 0.0996 is shown as 0.10, so round first.
@@ -40,4 +40,4 @@ std::string text_to_place_of(double value, double sigma) {
   return without_minus_zero(fmt::format("{:.{}f}", value, decimals_for(sigma)));
 }
 
-}  // namespace risley::report
+}  // namespace risley
