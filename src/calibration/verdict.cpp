@@ -106,8 +106,9 @@ CalibrationVerdict verdict_of(const Calibration& c) {
                         1e3 * c.rms_before, 1e3 * c.rms_after),
             "do not use it: see whether the walls are flat and the sensor stood still"};
   }
-  // A mean square of what was found holds that of the calibration's own errors, too.
-  const double own = c.datum.total, found = c.reported.errors.total;
+  // A mean square of what was found holds that of the calibration's own errors, too. What a user
+  // holds is taken at the user's word.
+  const double own = c.datum_given_held.total, found = c.reported.errors.total;
   if (2 * own * own > found * found) {
     return {CalibrationCode::not_better,
             fmt::format("{}; but the calibration itself may be off by {:.2g} degree, which is no "

@@ -64,9 +64,9 @@ TEST(Verdict, SaysByHowMuchDirectionsAreOff) {
 TEST(Verdict, ACalibrationAsUncertainAsTheBeliefIsOffIsNotBetter) {
   Calibration c = moved_by(1e-3);
   c.reported.errors.total = 1e-3;
-  c.datum.total = 0.69e-3;
+  c.datum_given_held.total = 0.69e-3;
   EXPECT_EQ(code_of(c), "bent");
-  c.datum.total = 0.72e-3;
+  c.datum_given_held.total = 0.72e-3;
   EXPECT_EQ(code_of(c), "not_better");
 }
 

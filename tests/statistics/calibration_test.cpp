@@ -93,7 +93,7 @@ void expect_honest(const WallMonteCarlo& result) {
 TEST(Calibration, Section33ScattersAsItMustByBothMethods) {
   // 200 seeds: mean total within 0.008 degree, scatter over bound within 0.1. Their scatter falls
   // with the square root of the number.
-  const int seeds = seeds_or(24);
+  const int seeds = seeds_or(40);
   const double wider = std::sqrt(200.0 / seeds);
   WallMonteCarlo paper, adjusted;
   for (int seed = 0; seed < seeds; ++seed) {
@@ -122,7 +122,7 @@ TEST(Calibration, AHallTellsTenTimesAsMuch) {
   EXPECT_LE(result.mean_total(), 0.015);
   // The sigma holds what held parameters may be off by, which they are not here.
   EXPECT_LE(result.reported_ratio(), 1.0 + 3.3 / std::sqrt(2.0 * seeds));
-  EXPECT_GE(result.reported_ratio(), 0.5);
+  EXPECT_GE(result.reported_ratio(), 0.25);
   expect_honest(result);
 }
 

@@ -204,8 +204,8 @@ class WallMonteCarlo {
     largest_total = std::max(largest_total, total);
     gauge_ += degrees_from_radians(e.after.gauge);
     shape_ += degrees_from_radians(e.after.shape);
-    const double over = (c.reported.errors.total - e.before.total) / c.reported.total_sigma;
-    reported_over_sigma2_ += over * over;
+    const double off = (c.reported.errors.total - e.before.total) / c.reported.total_sigma;
+    reported_over_sigma2_ += off * off;
     total2_ += std::pow(e.after.total, 2);
     shape2_ += std::pow(e.after.shape, 2);
     // The units of these tests are in what is held exactly as held, but for one.
