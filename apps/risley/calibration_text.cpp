@@ -32,7 +32,8 @@ Json datum_json(calibration::DatumKind kind, const FormalDatum& datum) {
           {"sigma_total_deg", deg(datum.total)}};
 }
 
-Json pointing_json(const calibration::PointingErrors& reported) {
+Json pointing_json(const Calibration& calibration) {
+  const calibration::PointingErrors& reported = calibration.reported;
   const DirectionErrors& errors = reported.errors;
   return {{"total_deg", deg(errors.total)},
           {"total_sigma_deg", deg(reported.total_sigma)},
@@ -41,6 +42,7 @@ Json pointing_json(const calibration::PointingErrors& reported) {
           {"shape_deg", deg(errors.shape)},
           {"shape_sigma_deg", deg(reported.shape_sigma)},
           {"largest_shape_deg", deg(reported.largest_shape)},
+          {"better_probability", number_or_null(calibration.better_probability)},
           {"rotation_deg",
            {{"roll", deg(errors.rotation.x)},
             {"pitch", deg(errors.rotation.y)},
@@ -158,7 +160,7 @@ Json calibration_json(const CalibratedRecordings& outcome, double total_time) {
       {"steps", steps},
       {"datum", datum_json(c.datum_kind, c.datum)},
       {"datum_given_held", datum_json(c.datum_kind, c.datum_given_held)},
-      {"reported_directions", pointing_json(c.reported)},
+      {"reported_directions", pointing_json(c)},
       {"prior_tests", tests},
       {"unobservable", unobservable_json(c.unobservable)},
       {"before", {{"plane_rms_m", c.rms_before}}},

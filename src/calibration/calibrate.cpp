@@ -362,6 +362,9 @@ void Work::fill_datum(const PlanarSolution& solution) {
   result_.datum = formal_datum(p.train, p.free, result_.covariance, beams, emitter, held);
   result_.reported = pointing_errors(belief_.sensor.train, p.train, p.free, result_.covariance,
                                      beams, emitter, held);
+  const PointingErrors given_held =
+      pointing_errors(belief_.sensor.train, p.train, p.free, result_.covariance, beams, emitter);
+  result_.better_probability = better_probability(given_held);
   result_.datum_without_common = formal_datum(
       p.train, p.free, solution.noise_covariance * result_.variance_factor, beams, emitter);
 }

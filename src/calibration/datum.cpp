@@ -283,6 +283,12 @@ PointingErrors pointing_errors(const PrismTrain& believed, const PrismTrain& tra
   return result;
 }
 
+double better_probability(const PointingErrors& reported) {
+  const double total = reported.errors.total, sigma = reported.total_sigma;
+  if (total == 0) return 0.5;  // they are the same
+  return 0.5 * std::erfc(-total / (2 * sigma) / std::sqrt(2.0));
+}
+
 DatumKind datum_kind(bool planes, bool stations) {
   if (planes) return stations ? DatumKind::both : DatumKind::planes;
   return stations ? DatumKind::stations : DatumKind::none;

@@ -290,6 +290,37 @@ TEST(PointingErrors, ScatterOverDrawsAsTheirSigmasSay) {
   EXPECT_NEAR(std::sqrt(shape) / exact.shape_sigma, 1, 0.06);
 }
 
+// Draws of the truth about what was found: how often is what was found nearer than what was
+// believed?
+TEST(PointingErrors, TellHowProbablyACalibrationIsBetter) {
+  constexpr int kDraws = 4000;
+  const PrismTrain found = testing::imperfect_train("PA-AP", 0.3, 5);
+  const auto free = estimation::free_parameters(testing::kTiltNames, {2});
+  const auto n = static_cast<Index>(free.size());
+  const auto angles = some_angles(40, 4);
+  const Bundle calibrated = beams_of(found, angles);
+  const RandomStream draws(8, 2);
+  for (const double sigma : {1e-4, 2e-4, 5e-4}) {
+    const Eigen::MatrixXd covariance = sigma * sigma * Eigen::MatrixXd::Identity(n, n);
+    PrismTrain believed = found;
+    add_errors(believed, free, Eigen::VectorXd::Constant(n, 3e-4));
+    const Bundle reported = beams_of(believed, angles);
+    double better = 0;
+    for (int draw = 0; draw < kDraws; ++draw) {
+      Eigen::VectorXd white(n);
+      draws.fill_normal(static_cast<std::uint64_t>(draw * n),
+                        {white.data(), static_cast<std::size_t>(n)});
+      PrismTrain truth = found;
+      add_errors(truth, free, sigma * white);
+      const Bundle beams = beams_of(truth, angles);
+      better += direction_errors(calibrated, beams).total < direction_errors(reported, beams).total;
+    }
+    const double stated =
+        better_probability(pointing_errors(believed, found, free, covariance, angles));
+    EXPECT_NEAR(better / kDraws, stated, 0.025) << sigma;
+  }
+}
+
 TEST(PointingErrors, RefuseAnotherSensor) {
   const PrismTrain train = testing::imperfect_train("PA-AP", 0.3, 5);
   const PrismTrain three = testing::imperfect_train("PA-AP-PA", 0.3, 5);

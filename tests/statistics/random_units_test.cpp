@@ -238,4 +238,86 @@ TEST(RandomUnits, HallsCalibrateWithinTheirTotalSigmasOrAreRefused) {
   score.expect_honest(true);
 }
 
+/// One to five walls, honest and hopeless: near and far, all about straight ahead or tilted.
+scenes::Scene random_walls(std::uint64_t seed) {
+  const RandomStream choice(seed, 121);
+  const auto within = [&](std::uint64_t number, double least, double most) {
+    return least + (most - least) * choice.uniform(number);
+  };
+  const std::uint64_t count = 1 + seed % 5;
+  const double most_deg = choice.uniform(0) < 0.4 ? 10 : 70;  // against the axis
+  std::string text = "planes:\n";
+  for (std::uint64_t i = 0; i < count; ++i) {
+    text += fmt::format(
+        "  - {{name: wall {}, distance_m: {}, normal_azimuth_deg: {}, normal_zenith_deg: {}}}\n", i,
+        within(10 * i + 1, 3, 30), within(10 * i + 2, -most_deg, most_deg),
+        90 + within(10 * i + 3, -most_deg, most_deg));
+  }
+  return scenes::parse_scene(text, "random walls");
+}
+
+// What is written as better is better, and what is held back would not have been: a calibration
+// whose beams are known ten times better than they were off is written.
+TEST(RandomUnits, NoCalibrationWorseThanTheBeliefPassesForABetterOne) {
+  const int seeds = seeds_or(10);
+  int better = 0, worse = 0, said_not_better = 0, as_believed = 0, undecided = 0, sure = 0;
+  int sure_held_back = 0, good_held_back = 0;
+  for (int seed = 0; seed < seeds; ++seed) {
+    SCOPED_TRACE(seed);
+    auto settings = random_hall_settings(static_cast<std::uint64_t>(seed));
+    settings.scene = random_walls(static_cast<std::uint64_t>(seed));
+    settings.station.clear();
+    if (seed % 2 == 1) {  // some are nearly as they believe
+      const PrismTrain ideal = settings.reported->train;
+      for (int at = 0; at < parameter_count(ideal.shape()); ++at) {
+        const double off = settings.truth.train[at] - ideal[at];
+        settings.truth.train.set_place(at, ideal[at] + 0.03 * off);
+      }
+    }
+    try {
+      const auto walls = testing::record_walls(settings, false);
+      auto options = testing::wall_options();
+      options.range_noise.reset();
+      const calibration::Calibration c = testing::judge_walls({&walls}, options).calibration;
+      const auto errors = testing::wall_errors({&walls}, c.sensor.train, c.angle_shift);
+      using calibration::CalibrationCode;
+      const bool is_sure =
+          c.covariance.allFinite() && 10 * c.datum_given_held.total < errors.before.total;
+      sure += is_sure;
+      const CalibrationCode code = c.verdict.code;
+      if (is_sure && (code == CalibrationCode::undecided || code == CalibrationCode::not_better)) {
+        ++sure_held_back;
+      }
+      if (code == CalibrationCode::undecided) {
+        ++undecided;
+      } else if (code == CalibrationCode::not_better) {
+        ++said_not_better;
+        good_held_back += errors.after.total < errors.before.total;
+      } else if (code == CalibrationCode::as_believed) {
+        ++as_believed;
+        // It says so, and how well.
+        EXPECT_LT(errors.before.total, 5 * c.datum.total);
+      } else if (errors.after.total > errors.before.total) {
+        ++worse;
+        ADD_FAILURE() << "written, and worse: " << degrees_from_radians(errors.before.total)
+                      << " before, " << degrees_from_radians(errors.after.total) << " after; "
+                      << c.verdict.words;
+      } else {
+        ++better;
+      }
+    } catch (const EstimationError&) {
+      ++undecided;
+    }
+  }
+  RecordProperty("better", better);
+  RecordProperty("worse", worse);
+  RecordProperty("not_better", said_not_better);
+  RecordProperty("as_believed", as_believed);
+  RecordProperty("undecided", undecided);
+  RecordProperty("sure", sure);
+  RecordProperty("sure_held_back", sure_held_back);
+  RecordProperty("good_held_back", good_held_back);
+  EXPECT_LE(sure_held_back, std::max(0.02 * sure, 0.5));
+}
+
 }  // namespace risley::random_units_test

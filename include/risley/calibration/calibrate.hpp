@@ -116,6 +116,9 @@ struct Calibration {
   FormalDatum datum_given_held;      ///< if everything that was held were exactly as held
   FormalDatum datum_without_common;  ///< without the common errors of the rotation angles
   PointingErrors reported;           ///< of the directions that the sensor reports
+  /// That calibrated directions are nearer to the truth than reported ones, root mean square over
+  /// the beams, if everything that was held is as held. docs/theory/calibration.md
+  double better_probability = 1;
   std::vector<estimation::WeakDirection> unobservable;
   std::vector<PriorTest> prior_tests;
   double sigma0 = 0;           ///< standard deviation of unit weight against the stated range noise

@@ -71,6 +71,10 @@ PointingErrors pointing_errors(const PrismTrain& believed, const PrismTrain& tra
                                std::span<const std::uint8_t> emitter = {},
                                const HeldMovement& held = {});
 
+/// Probability that the calibration's directions are nearer to the truth than the reported ones.
+/// Where these differ by d, the calibration is worse when its own error along d is below -d / 2.
+double better_probability(const PointingErrors& reported);
+
 /// What ties the frame of the calibrated beams to the outside.
 enum class DatumKind {
   none,      ///< walls of unknown orientation: boresight only through the bundle's shape
