@@ -68,7 +68,7 @@ const pictures = [
   },
   {
     file: 'calibrate.png', needs: ['calibrate'], page: 'out/calibration/report.html', width: 1160,
-    keep: [{ section: /^Datum/, without: 'figure' },
+    keep: [{ css: '.verdict' }, { section: /^Where the sensor points/ },
            { figure: /^(Walls (before|after)|Thickness over the (angle of incidence|rotation angle of prism a))/ }],
   },
   {

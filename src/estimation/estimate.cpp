@@ -226,11 +226,12 @@ void say_verdict(Estimate& estimate, const std::vector<std::string>& oddities) {
   switch (verdict.code) {
     case EstimateCode::consistent:
       verdict.words = fmt::format(
-          "the directions are what the sensor's belief of itself makes them, to {:.2g} degree; "
+          "the directions are consistent with what the sensor believes of its optics, to {:.2g} "
+          "degree; "
           "whether that belief is true only walls tell",
           degrees_from_radians(
               std::max(estimate.azimuth_moments.rms, estimate.zenith_moments.rms)));
-      verdict.to_do = "calibrate the unit on walls, or use it as one that is as it believes";
+      verdict.to_do = "to find out, record walls and calibrate the unit on them";
       break;
     case EstimateCode::unusual:
       verdict.words = "the model describes the directions, but " + oddities.front();

@@ -22,9 +22,7 @@ struct Headline {
 };
 
 constexpr Headline kHeadlines[] = {
-    {"consistent", "ok",
-     "The sensor's directions agree with what it believes of itself. Whether that belief is true, "
-     "only walls tell."},
+    {"consistent", "ok", "The sensor's directions agree with what it believes of its optics."},
     {"unusual", "care", "The model describes this recording, but not all of it is as usual."},
     {"as_believed", "ok", "The sensor points where it believes."},
     {"bent", "care", "The sensor does not point where it believes: use this calibration."},
