@@ -479,8 +479,10 @@ TEST(RosBags, MessagesOfAnotherSizeAreRefused) {
        {Type::odometry, Type::pose, Type::pose_with_covariance, Type::transform}) {
     const Sample s = samples(1)[0];
     const std::string one = ros1_bytes(type, s), two = ros2_bytes(type, s);
-    for (std::size_t length = 0; length <= one.size() + 8; ++length) {
-      if (length == one.size()) continue;
+    // From 1 on: rosbag's writer, which stands in for a hostile one, must not copy from nowhere.
+    for (std::size_t length = 1; length <= one.size() + 8; ++length) {
+      const bool between = length > 64 && length + 16 < one.size();
+      if (length == one.size() || (between && length % 7 != 0)) continue;
       std::string bytes = one;
       bytes.resize(length);
       Ros1BagFile bag;
