@@ -119,12 +119,47 @@ std::string shell_text(const std::vector<std::string>& words) {
   return command;
 }
 
+/// The first option that a verb does not have, in words; CLI11 would name its value as well. Empty:
+/// there is none.
+std::string unknown_option(const CLI::App& verb, const std::vector<std::string>& words) {
+  std::vector<std::string> names;
+  const auto add_names = [&names](const CLI::App& app) {
+    for (const CLI::Option* option : app.get_options()) {
+      for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
+    }
+  };
+  add_names(verb);
+  for (const CLI::App* below : verb.get_subcommands([](const CLI::App*) { return true; })) {
+    add_names(*below);
+  }
+  for (const std::string& word : words) {
+    if (word == "--") break;
+    const std::string name = word.substr(0, word.find('='));
+    if (!name.starts_with("--") || std::find(names.begin(), names.end(), name) != names.end()) {
+      continue;
+    }
+    std::string meant = near_miss(name, names);
+    const auto longer = std::find_if(names.begin(), names.end(), [&](const std::string& known) {
+      return known.starts_with(name + "-");
+    });
+    if (meant.empty() && longer != names.end()) meant = *longer;
+    return fmt::format("unknown option {}{}", name,
+                       meant.empty() ? "" : fmt::format(", did you mean {}?", meant));
+  }
+  return {};
+}
+
 /// What was wrong, in words; CLI11 would not name an unknown verb.
-std::string usage_error(const CLI::ParseError& error, const std::vector<std::string>& words) {
+std::string usage_error(const CLI::ParseError& error, const std::vector<std::string>& words,
+                        const CLI::App& app) {
   const std::string first = words.empty() ? "-" : words.front();
   std::vector<std::string> names;
   for (const Verb& verb : kVerbs) {
-    if (first == verb.name) return fmt::format("{} (see risley {} --help)", error.what(), first);
+    if (first == verb.name) {
+      const std::string unknown = unknown_option(*app.get_subcommand(first), words);
+      return fmt::format("{} (see risley {} --help)", unknown.empty() ? error.what() : unknown,
+                         first);
+    }
     names.emplace_back(verb.name);
   }
   if (first.starts_with('-')) return fmt::format("{} (see risley --help)", error.what());
@@ -166,7 +201,7 @@ CommandLine::Parsed CommandLine::parse(const std::vector<std::string>& words) {
       parsed.help = text.str();
     } else {
       common_.json = std::find(words.begin(), words.end(), "--json") != words.end();
-      parsed.problem = usage_error(error, words);
+      parsed.problem = usage_error(error, words, app_);
     }
     return parsed;
   }

@@ -164,7 +164,7 @@ Bundle bundle_of(const PrismTrain& train, const std::vector<estimation::FreePara
 /// Sigma of a quantity that changes by a row with free and held.
 double sigma_of(const Eigen::RowVectorXd& gradient, const Eigen::MatrixXd& covariance) {
   const Eigen::RowVectorXd product = gradient * covariance;
-  return std::sqrt(std::max(0.0, product.dot(gradient)));
+  return std::sqrt(std::max(product.dot(gradient), 0.0));  // NaN stays
 }
 
 }  // namespace

@@ -49,6 +49,7 @@ void add_beams(const RangedRecording& recording, const BeamModel& before, const 
   for (const std::size_t row : rows) times.push_back(recording.time_ns[row]);
   std::sort(times.begin(), times.end());
   const recordings::TruthColumns truth = recordings::load_truth(truth_columns(truth_path), times);
+  std::vector<Vector3<double>> recorded, true_beams;
   for (const std::size_t row : rows) {
     const auto found =
         std::lower_bound(truth.time_ns.begin(), truth.time_ns.end(), recording.time_ns[row]);
@@ -57,12 +58,14 @@ void add_beams(const RangedRecording& recording, const BeamModel& before, const 
     std::vector<double> angles;
     for (const auto& column : recording.shots.rotation_angle) angles.push_back(column[row]);
     const int beam = recording.shots.beam[row];
-    beams.before.push_back(turned(before.turn, observe(before.train, angles, beam).direction));
+    recorded.push_back(observe(before.train, angles, beam).direction);
+    true_beams.push_back(direction_from_angles<double>({truth.azimuth[at], truth.zenith[at]}));
+    beams.before.push_back(turned(before.turn, recorded.back()));
     for (std::size_t k = 0; k < angles.size(); ++k) angles[k] += shift[k];
     beams.after.push_back(turned(after.turn, observe(after.train, angles, beam).direction));
-    beams.truth.push_back(
-        turned(true_turn, direction_from_angles<double>({truth.azimuth[at], truth.zenith[at]})));
+    beams.truth.push_back(turned(true_turn, true_beams.back()));
   }
+  check_truth_is_of_recording(recorded, true_beams, truth_path);
 }
 
 /// Appends computed minus true angles.

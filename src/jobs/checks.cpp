@@ -7,7 +7,10 @@
 
 #include <fmt/format.h>
 
+#include "risley/core/angle.hpp"
+#include "risley/core/direction.hpp"
 #include "risley/core/error.hpp"
+#include "risley/core/median.hpp"
 
 namespace risley::jobs {
 
@@ -37,6 +40,23 @@ void check_truths(const std::vector<std::string>& truths, std::size_t recordings
                     recordings));
   }
   for (const std::string& truth : truths) check_truth_name(truth);
+}
+
+void check_truth_is_of_recording(std::span<const Vector3<double>> recorded,
+                                 std::span<const Vector3<double>> beams, const std::string& truth) {
+  constexpr double kMost = 5 * kRadiansPerDegree;  // a bent unit's are some tenths
+  std::vector<double> apart;
+  for (std::size_t i = 0; i < beams.size(); ++i) {
+    const double angle = angle_between(recorded[i], beams[i]);
+    if (std::isfinite(angle)) apart.push_back(angle);
+  }
+  const double middle = median(apart);
+  if (!(middle > kMost)) return;
+  throw InvalidArgument(
+      fmt::format("option truth = {} is of another recording: at the same times its beams go "
+                  "elsewhere, by {:.3g} "
+                  "degrees in the middle of all, allowed {:.0f}",
+                  truth, degrees_from_radians(middle), degrees_from_radians(kMost)));
 }
 
 std::string truth_columns(const std::string& truth) {

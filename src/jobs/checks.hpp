@@ -3,9 +3,12 @@
 #pragma once
 
 #include <cstddef>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
+
+#include "risley/core/vector3.hpp"
 
 namespace risley::jobs {
 
@@ -18,6 +21,10 @@ void check_not_negative(double value, std::string_view option, std::string_view 
 void check_truth_name(const std::string& truth);
 /// The same of many. @throws InvalidArgument unless there is one of each recording
 void check_truths(const std::vector<std::string>& truths, std::size_t recordings);
+/// @param recorded, beams  recorded and true directions of the same shots, NaN where not known
+/// @throws InvalidArgument when they are farther apart than optics are ever bent
+void check_truth_is_of_recording(std::span<const Vector3<double>> recorded,
+                                 std::span<const Vector3<double>> beams, const std::string& truth);
 /// OUT.truth.nc of OUT.truth.yaml.
 std::string truth_columns(const std::string& truth);
 /// OUT.mount.truth.yaml of OUT.truth.yaml.

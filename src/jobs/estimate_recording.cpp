@@ -7,7 +7,9 @@
 
 #include <fmt/format.h>
 
+#include "risley/core/direction.hpp"
 #include "risley/core/error.hpp"
+#include "risley/core/vector3.hpp"
 #include "risley/sensors/preset.hpp"
 
 #include "jobs/checks.hpp"
@@ -64,6 +66,21 @@ std::string clock_words(const estimation::SpeedFactor& factor, double counted_ra
   return words;
 }
 
+/// @throws InvalidArgument as check_truth_is_of_recording()
+void check_beams(const estimation::AngleSeries& series, const recordings::TruthColumns& columns,
+                 const std::string& truth) {
+  std::vector<Vector3<double>> recorded, beams;
+  std::size_t row = 0;
+  for (std::size_t i = 0; i < series.size(); ++i) {
+    while (row < columns.size() && columns.time_ns[row] < series.time_ns[i]) ++row;
+    if (row == columns.size()) break;
+    if (columns.time_ns[row] != series.time_ns[i]) continue;
+    recorded.push_back(direction_from_angles<double>({series.azimuth[i], series.zenith[i]}));
+    beams.push_back(direction_from_angles<double>({columns.azimuth[row], columns.zenith[row]}));
+  }
+  check_truth_is_of_recording(recorded, beams, truth);
+}
+
 }  // namespace
 
 std::optional<double> usual_rate(estimation::Method method) {
@@ -78,8 +95,9 @@ estimation::Evaluation evaluate_by_file(const estimation::Estimate& estimate,
   // One row per state: the truth of a full-rate recording is larger than the recording.
   std::vector<std::int64_t> times = estimate.states.time_ns;
   std::sort(times.begin(), times.end());
-  return estimation::evaluate(estimate, sensor,
-                              recordings::load_truth(truth_columns(truth), times));
+  const recordings::TruthColumns columns = recordings::load_truth(truth_columns(truth), times);
+  check_beams(estimate.series, columns, truth);
+  return estimation::evaluate(estimate, sensor, columns);
 }
 
 EstimatedRecording estimate_recording(const EstimateRecordingOptions& options,

@@ -226,6 +226,11 @@ class CalibrateTest(CommandTest):
                          | {"prism_tilt_a_horizontal_deg"})
         self.assertIn("incident_beam_vertical_deg: {value: -0.385,", self.calibration_of("chosen"))
 
+    def test_the_truth_of_another_recording_is_refused(self):
+        for verb, *more in (("calibrate",), ("estimate",)):
+            done = self.expect(2, verb, "hall.nc", *truth_of("hall.csv"))
+            self.assertIn("--truth = hall.csv.truth.yaml is of another recording", done.stderr)
+
     def test_range_offset(self):
         head, *rows = (self.folder / "hall.csv").read_text().splitlines()
         rows = [row.split(",", 1) for row in rows]
