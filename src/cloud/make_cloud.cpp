@@ -301,15 +301,19 @@ class Work {
     normals_->fit();
   }
 
+  std::vector<std::int64_t> times_of(const std::vector<std::size_t>& rows) const {
+    std::vector<std::int64_t> times(rows.size());
+    for (std::size_t i = 0; i < rows.size(); ++i) times[i] = piece_.time_ns[rows[i]];
+    return times;
+  }
+
   /// Adds rows to the surfaces as if the sensor stood where it was at a time, if it is known.
   void add_moving(std::int64_t middle_ns, const std::vector<std::size_t>& rows) {
     std::vector<std::size_t> known;
     georeference_->find_poses({&middle_ns, 1}, surface_pose_, known);
     if (known.empty()) return;
-    std::vector<std::int64_t> times;
-    for (const std::size_t row : rows) times.push_back(piece_.time_ns[row]);
     SensorPoses poses;
-    georeference_->find_poses(times, poses, known);
+    georeference_->find_poses(times_of(rows), poses, known);
     PolarShots shots, stood;
     for (const std::size_t i : known) {
       shots.azimuth.push_back(piece_.azimuth[rows[i]]);
@@ -376,11 +380,9 @@ class Work {
 
   /// Looks up where the sensor is at every row of a block, and takes out rows that have no pose.
   void find_poses(Block& block) const {
-    std::vector<std::int64_t> times(block.rows.size());
-    for (std::size_t i = 0; i < times.size(); ++i) times[i] = piece_.time_ns[block.rows[i]];
     std::vector<std::size_t> known;
-    georeference_->find_poses(times, block.poses, known);
-    block.without_pose = times.size() - known.size();
+    georeference_->find_poses(times_of(block.rows), block.poses, known);
+    block.without_pose = block.rows.size() - known.size();
     if (block.without_pose == 0) return;
     keep_rows(block.rows, known);
     keep_rows(block.returns, known);
