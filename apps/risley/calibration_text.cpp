@@ -32,17 +32,15 @@ Json datum_json(calibration::DatumKind kind, const FormalDatum& datum) {
           {"sigma_total_deg", deg(datum.total)}};
 }
 
-Json pointing_json(const Calibration& calibration) {
-  const calibration::PointingErrors& reported = calibration.reported;
-  const DirectionErrors& errors = reported.errors;
-  return {{"total_deg", deg(errors.total)},
-          {"total_sigma_deg", deg(reported.total_sigma)},
-          {"gauge_deg", deg(errors.gauge)},
-          {"gauge_sigma_deg", deg(reported.gauge_sigma)},
-          {"shape_deg", deg(errors.shape)},
-          {"shape_sigma_deg", deg(reported.shape_sigma)},
-          {"largest_shape_deg", deg(reported.largest_shape)},
-          {"better_probability", number_or_null(calibration.better_probability)},
+Json pointing_json(const calibration::PointingError& pointing) {
+  const DirectionErrors& errors = pointing.errors;
+  const auto known = [](double value, double sigma) {
+    return Json{{"value", deg(value)}, {"sigma", number_or_null(deg(sigma))}};
+  };
+  return {{"total_deg", known(errors.total, pointing.total_sigma)},
+          {"shared_deg", known(errors.gauge, pointing.gauge_sigma)},
+          {"shape_deg", known(errors.shape, pointing.shape_sigma)},
+          {"worst_deg", known(pointing.worst_shape, pointing.worst_shape_sigma)},
           {"rotation_deg",
            {{"roll", deg(errors.rotation.x)},
             {"pitch", deg(errors.rotation.y)},
@@ -160,7 +158,8 @@ Json calibration_json(const CalibratedRecordings& outcome, double total_time) {
       {"steps", steps},
       {"datum", datum_json(c.datum_kind, c.datum)},
       {"datum_given_held", datum_json(c.datum_kind, c.datum_given_held)},
-      {"reported_directions", pointing_json(c)},
+      {"pointing_error", pointing_json(c.pointing_error)},
+      {"better_probability", number_or_null(c.better_probability)},
       {"prior_tests", tests},
       {"unobservable", unobservable_json(c.unobservable)},
       {"before", {{"plane_rms_m", c.rms_before}}},

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cstdint>
+#include <filesystem>
 #include <limits>
 #include <sstream>
 #include <string_view>
@@ -138,13 +139,7 @@ std::string unknown_option(const CLI::App& verb, const std::vector<std::string>&
     if (!name.starts_with("--") || std::find(names.begin(), names.end(), name) != names.end()) {
       continue;
     }
-    std::string meant = near_miss(name, names);
-    const auto longer = std::find_if(names.begin(), names.end(), [&](const std::string& known) {
-      return known.starts_with(name + "-");
-    });
-    if (meant.empty() && longer != names.end()) meant = *longer;
-    return fmt::format("unknown option {}{}", name,
-                       meant.empty() ? "" : fmt::format(", did you mean {}?", meant));
+    return fmt::format("unknown option {}{}", name, did_you_mean(name, names));
   }
   return {};
 }
@@ -163,10 +158,25 @@ std::string usage_error(const CLI::ParseError& error, const std::vector<std::str
     names.emplace_back(verb.name);
   }
   if (first.starts_with('-')) return fmt::format("{} (see risley --help)", error.what());
-  const std::string meant = near_miss(first, names);
-  return fmt::format("unknown verb '{}'{}, known: {}", first,
-                     meant.empty() ? "" : fmt::format(", did you mean {}?", meant),
+  return fmt::format("unknown verb '{}'{}, known: {}", first, did_you_mean(first, names),
                      fmt::join(names, ", "));
+}
+
+/// Options that take a calibration take the folder that `calibrate` or `estimate` wrote it to.
+void take_result_folders(CLI::App& verb) {
+  for (CLI::Option* option : verb.get_options([](const CLI::Option* one) {
+         return one->check_lname("sensor") || one->check_lname("calibration");
+       })) {
+    option->transform(CLI::Validator(
+        [](std::string& value) {
+          namespace fs = std::filesystem;
+          std::error_code ignored;
+          const fs::path inside = fs::path(value) / "calibration.yaml";
+          if (fs::is_regular_file(inside, ignored)) value = inside.string();
+          return std::string();
+        },
+        ""));
+  }
 }
 
 }  // namespace
@@ -183,6 +193,7 @@ CommandLine::CommandLine()
   for (const Verb& verb : kVerbs) {
     CLI::App& sub = *app_.add_subcommand(verb.name, verb.description);
     runs_[&sub] = verb.declare(sub);
+    take_result_folders(sub);
     add_common_options(sub, common_);
     sub.footer(fmt::format("Example:\n{}", verb.example));
   }

@@ -1,5 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
+#include <algorithm>
 #include <map>
 #include <memory>
 #include <optional>
@@ -9,7 +10,9 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include "risley/cloud/cloud_writer.hpp"
 #include "risley/core/error.hpp"
+#include "risley/core/text.hpp"
 #include "risley/jobs/convert_recording.hpp"
 #include "risley/jobs/convert_trajectory.hpp"
 #include "risley/recordings/writer.hpp"
@@ -87,6 +90,22 @@ FileOutcome convert_poses(const FileJob& job, const ConvertOptions& options,
   return {kDone, json, fmt::format("{}: {} records", job.output, grouped(done.records))};
 }
 
+/// Somebody who wants points has to take another verb.
+void refuse_point_clouds(const std::string& output) {
+  const std::string name = lower_case(output);
+  const auto has_ending = [&name](const auto& format) { return name.ends_with(format.ending); };
+  const auto& recordings = recordings::writable_formats();
+  const auto& clouds = cloud::cloud_formats();
+  if (std::any_of(recordings.begin(), recordings.end(), has_ending) ||
+      std::none_of(clouds.begin(), clouds.end(), has_ending)) {
+    return;
+  }
+  throw InvalidArgument(fmt::format(
+      "{}: is a point cloud by its ending, and convert writes recordings; for points take: risley "
+      "cloud RECORDING --calibration CALIBRATION -o {}",
+      output, output));
+}
+
 FileOutcome convert(const FileJob& job, const ConvertOptions& options, const Progress& progress) {
   if (!options.topic.empty() ||
       trajectories::trajectory_file_kind(job.input) != trajectories::TrajectoryFileKind::none) {
@@ -96,6 +115,7 @@ FileOutcome convert(const FileJob& job, const ConvertOptions& options, const Pro
     throw InvalidArgument(
         fmt::format("--accuracy goes with a trajectory, and {} is none", job.input));
   }
+  if (options.format.empty()) refuse_point_clouds(job.output);
   jobs::ConvertRecordingOptions wanted{job.input, read_options(options.reading), job.output,
                                        options.format, std::nullopt};
   if (!options.sensor_type.empty()) wanted.sensor_type = sensor_types().at(options.sensor_type);

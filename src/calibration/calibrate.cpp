@@ -356,17 +356,15 @@ void Work::fill_datum(const PlanarSolution& solution) {
       emitter.push_back(all_[r].shots.beam.empty() ? std::uint8_t{0} : all_[r].shots.beam[row]);
     }
   }
-  result_.datum_given_held = formal_datum(p.train, p.free, result_.covariance, beams, emitter);
   HeldMovement held;
   if (!result_.held.empty()) held = movement_of(held_, p, result_.held_changes);
-  result_.datum = formal_datum(p.train, p.free, result_.covariance, beams, emitter, held);
-  result_.reported = pointing_errors(belief_.sensor.train, p.train, p.free, result_.covariance,
-                                     beams, emitter, held);
-  const PointingErrors given_held =
-      pointing_errors(belief_.sensor.train, p.train, p.free, result_.covariance, beams, emitter);
-  result_.better_probability = better_probability(given_held);
-  result_.datum_without_common = formal_datum(
-      p.train, p.free, solution.noise_covariance * result_.variance_factor, beams, emitter);
+  const BeamBundle bundle(p.train, p.free, beams, emitter, held);
+  result_.datum = bundle.formal_datum(result_.covariance);
+  result_.datum_given_held = bundle.formal_datum(result_.covariance, HeldErrors::left_out);
+  result_.datum_without_common = bundle.formal_datum(
+      solution.noise_covariance * result_.variance_factor, HeldErrors::left_out);
+  result_.pointing_error = bundle.pointing_error(belief_.sensor.train, result_.covariance);
+  result_.better_probability = better_probability(result_.pointing_error);
 }
 
 }  // namespace

@@ -248,7 +248,8 @@ CalibrationForecast forecast(const CalibrationPlan& plan, const Progress& progre
   result.range_offset_sigma = solution.range_offset_sigma;
   result.unobservable = estimation::weak_directions(
       solution.information + prior_information(problem), problem.free, kWidestDirection);
-  result.datum = formal_datum(problem.train, problem.free, result.covariance, bundle, bundle_beam);
+  result.datum =
+      BeamBundle(problem.train, problem.free, bundle, bundle_beam).formal_datum(result.covariance);
   result.advice = advice_for(result, plan);
   progress.report(1.0);
   return result;

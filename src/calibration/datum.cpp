@@ -26,141 +26,6 @@ namespace {
 using Eigen::Index;
 using Eigen::Matrix3d;
 
-/// One beam of a bundle and how it follows the parameters.
-struct BundleBeam {
-  std::size_t row = 0;  ///< of the rotation angles
-  Eigen::Vector3d direction;
-  Eigen::Matrix<double, 3, Eigen::Dynamic> jacobian;   ///< of the direction [3, free + held]
-  Eigen::Matrix<double, 2, Eigen::Dynamic> of_angles;  ///< of azimuth and zenith [2, free + held]
-};
-
-template <int N>
-std::vector<BundleBeam> bundle(const PrismTrain& train,
-                               const std::vector<estimation::FreeParameter>& free,
-                               const std::vector<std::vector<double>>& rotation_angles,
-                               std::span<const std::uint8_t> emitter, const HeldMovement& held) {
-  const auto order = face_order_array<N>(train);
-  std::vector<PreparedTrain<double, N>> prepared;
-  std::vector<PreparedDerivatives<double, N>> derivatives;
-  for (int j = 0; j < train.emitters(); ++j) {
-    prepared.push_back(prepare<double, N>(parameter_array<N>(train, j), order));
-    derivatives.push_back(prepare_derivatives<double, N>(parameter_array<N>(train, j), order));
-  }
-  const auto n = static_cast<Index>(free.size());
-  const Index all = n + held.train.cols();
-  std::vector<BundleBeam> beams;
-  for (std::size_t i = 0; i < rotation_angles.front().size(); ++i) {
-    std::array<double, N> angles;
-    for (std::size_t k = 0; k < N; ++k) angles[k] = rotation_angles[k][i];
-    const std::size_t own = emitter.empty() ? 0 : emitter[i];
-    const auto linear = linearise_direction(prepared[own], derivatives[own], angles);
-    if (!linear.valid) continue;
-    BundleBeam beam{i, eigen(linear.direction), {}, {}};
-    beam.jacobian.resize(3, all);
-    for (Index row = 0; row < 3; ++row) {
-      const auto& gradient = linear.components[static_cast<std::size_t>(row)];
-      for (Index j = 0; j < n; ++j) {
-        double sum = 0;
-        for (const int place : free[static_cast<std::size_t>(j)].places) {
-          sum += derivative_by(gradient, place, static_cast<int>(own));
-        }
-        beam.jacobian(row, j) = sum;
-      }
-      for (Index h = 0; h < held.train.cols(); ++h) {
-        double sum = 0;
-        for (Index at = 0; at < held.train.rows(); ++at) {
-          if (held.train(at, h) == 0) continue;
-          sum += held.train(at, h) *
-                 derivative_by(gradient, static_cast<int>(at), static_cast<int>(own));
-        }
-        for (std::size_t k = 0; k < N; ++k) {
-          sum += held.rotation_angles(static_cast<Index>(k), h) * gradient.rotation_angles[k];
-        }
-        beam.jacobian(row, n + h) = sum;
-      }
-    }
-    for (Index h = 0; h < held.turn.cols(); ++h) {
-      const Eigen::Vector3d turn = held.turn.col(h);
-      beam.jacobian.col(n + h) += turn.cross(beam.direction);
-    }
-    const AngleSeeds<double> seeds = angle_seeds(linear.direction);
-    beam.of_angles.resize(2, all);
-    for (Index j = 0; j < all; ++j) {
-      beam.of_angles(0, j) = eigen(seeds.azimuth).dot(beam.jacobian.col(j));
-      beam.of_angles(1, j) = eigen(seeds.zenith).dot(beam.jacobian.col(j));
-    }
-    beams.push_back(std::move(beam));
-  }
-  return beams;
-}
-
-/// Beams that get through the prisms, and how they turn together.
-struct Bundle {
-  std::vector<BundleBeam> beams;
-  Eigen::MatrixXd covariance;  ///< of free and held [free + held, free + held]
-  Matrix3d normal = Matrix3d::Zero();
-  Eigen::MatrixXd turn;  ///< the shared rotation that each of them makes [3, free + held]
-
-  double count() const { return static_cast<double>(beams.size()); }
-  /// What is left of a beam's movements without the shared rotation [3, free + held].
-  Eigen::MatrixXd rest(const BundleBeam& beam) const {
-    Eigen::MatrixXd result = beam.jacobian;
-    for (Index j = 0; j < result.cols(); ++j) {
-      const Eigen::Vector3d shared = turn.col(j);
-      result.col(j) += beam.direction.cross(shared);
-    }
-    return result;
-  }
-};
-
-Bundle bundle_of(const PrismTrain& train, const std::vector<estimation::FreeParameter>& free,
-                 const Eigen::MatrixXd& free_covariance,
-                 const std::vector<std::vector<double>>& rotation_angles,
-                 std::span<const std::uint8_t> emitter, const HeldMovement& held) {
-  require_length("rows of the covariance", static_cast<std::size_t>(free_covariance.rows()),
-                 free.size());
-  require_length("columns of the covariance", static_cast<std::size_t>(free_covariance.cols()),
-                 free.size());
-  const Index n = free_covariance.rows(), all = n + held.train.cols();
-  if (all > n) {
-    require_length("rows of the held quantities", static_cast<std::size_t>(held.train.rows()),
-                   train.parameters().size());
-    require_length("rows of their rotation angles",
-                   static_cast<std::size_t>(held.rotation_angles.rows()),
-                   static_cast<std::size_t>(train.prisms()));
-    require_length("columns of their rotation angles",
-                   static_cast<std::size_t>(held.rotation_angles.cols()),
-                   static_cast<std::size_t>(held.train.cols()));
-    if (held.turn.size() > 0) {
-      require_length("rows of their turns", static_cast<std::size_t>(held.turn.rows()), 3);
-      require_length("columns of their turns", static_cast<std::size_t>(held.turn.cols()),
-                     static_cast<std::size_t>(held.train.cols()));
-    }
-  }
-  Bundle result;
-  result.covariance = Eigen::MatrixXd::Identity(all, all);
-  result.covariance.topLeftCorner(n, n) = free_covariance;
-  require_length("rotation_angles", rotation_angles.size(),
-                 static_cast<std::size_t>(train.prisms()));
-  for (const auto& column : rotation_angles) {
-    require_length("rotation angles of a prism", column.size(), rotation_angles.front().size());
-  }
-  result.beams = with_prism_count(train.prisms(), [&]<int N>() {
-    check_beams(train, emitter, rotation_angles.front().size());
-    return bundle<N>(train, free, rotation_angles, emitter, held);
-  });
-  if (result.beams.empty()) throw InvalidArgument("no beam gets through the prisms");
-  Eigen::MatrixXd right = Eigen::MatrixXd::Zero(3, all);
-  for (const BundleBeam& beam : result.beams) {
-    result.normal += Matrix3d::Identity() - beam.direction * beam.direction.transpose();
-    for (Index j = 0; j < right.cols(); ++j) {
-      right.col(j) += beam.direction.cross(beam.jacobian.col(j));
-    }
-  }
-  result.turn = algebra::SymmetricSolver(result.normal).solve_columns(right);
-  return result;
-}
-
 /// Sigma of a quantity that changes by a row with free and held.
 double sigma_of(const Eigen::RowVectorXd& gradient, const Eigen::MatrixXd& covariance) {
   const Eigen::RowVectorXd product = gradient * covariance;
@@ -211,80 +76,192 @@ DirectionErrors direction_errors(std::span<const Vector3<double>> computed,
   return errors;
 }
 
-FormalDatum formal_datum(const PrismTrain& train,
-                         const std::vector<estimation::FreeParameter>& free,
-                         const Eigen::MatrixXd& covariance,
-                         const std::vector<std::vector<double>>& rotation_angles,
-                         std::span<const std::uint8_t> emitter, const HeldMovement& held) {
-  const Bundle bundle = bundle_of(train, free, covariance, rotation_angles, emitter, held);
-  const Matrix3d turn_covariance = algebra::propagated(bundle.turn, bundle.covariance);
+BeamBundle::BeamBundle(const PrismTrain& train, const std::vector<estimation::FreeParameter>& free,
+                       const std::vector<std::vector<double>>& rotation_angles,
+                       std::span<const std::uint8_t> emitter, const HeldMovement& held)
+    : prisms_(train.prisms()),
+      emitters_(train.emitters()),
+      free_(static_cast<Index>(free.size())),
+      held_(held.train.cols()) {
+  if (held_ > 0) {
+    const auto quantities = static_cast<std::size_t>(held_);
+    require_length("rows of the held quantities", static_cast<std::size_t>(held.train.rows()),
+                   train.parameters().size());
+    require_length("rows of their rotation angles",
+                   static_cast<std::size_t>(held.rotation_angles.rows()),
+                   static_cast<std::size_t>(prisms_));
+    require_length("columns of their rotation angles",
+                   static_cast<std::size_t>(held.rotation_angles.cols()), quantities);
+    if (held.turn.size() > 0) {
+      require_length("rows of their turns", static_cast<std::size_t>(held.turn.rows()), 3);
+      require_length("columns of their turns", static_cast<std::size_t>(held.turn.cols()),
+                     quantities);
+    }
+  }
+  require_length("rotation_angles", rotation_angles.size(), static_cast<std::size_t>(prisms_));
+  for (const auto& column : rotation_angles) {
+    require_length("rotation angles of a prism", column.size(), rotation_angles.front().size());
+  }
+  with_prism_count(prisms_, [&]<int N>() {
+    check_beams(train, emitter, rotation_angles.front().size());
+    add_beams<N>(train, free, rotation_angles, emitter, held);
+  });
+  if (beams_.empty()) throw InvalidArgument("no beam gets through the prisms");
+  Eigen::MatrixXd right = Eigen::MatrixXd::Zero(3, free_ + held_);
+  for (const Beam& beam : beams_) {
+    normal_ += Matrix3d::Identity() - beam.direction * beam.direction.transpose();
+    for (Index j = 0; j < right.cols(); ++j) {
+      right.col(j) += beam.direction.cross(beam.jacobian.col(j));
+    }
+  }
+  turn_ = algebra::SymmetricSolver(normal_).solve_columns(right);
+}
+
+template <int N>
+void BeamBundle::add_beams(const PrismTrain& train,
+                           const std::vector<estimation::FreeParameter>& free,
+                           const std::vector<std::vector<double>>& rotation_angles,
+                           std::span<const std::uint8_t> emitter, const HeldMovement& held) {
+  const auto order = face_order_array<N>(train);
+  std::vector<PreparedTrain<double, N>> prepared;
+  std::vector<PreparedDerivatives<double, N>> derivatives;
+  for (int j = 0; j < emitters_; ++j) {
+    prepared.push_back(prepare<double, N>(parameter_array<N>(train, j), order));
+    derivatives.push_back(prepare_derivatives<double, N>(parameter_array<N>(train, j), order));
+  }
+  for (std::size_t i = 0; i < rotation_angles.front().size(); ++i) {
+    std::array<double, N> angles;
+    for (std::size_t k = 0; k < N; ++k) angles[k] = rotation_angles[k][i];
+    const std::uint8_t own = emitter.empty() ? std::uint8_t{0} : emitter[i];
+    const auto linear = linearise_direction(prepared[own], derivatives[own], angles);
+    if (!linear.valid) continue;
+    Beam beam{{angles.begin(), angles.end()}, own, eigen(linear.direction), {}, {}};
+    beam.jacobian.resize(3, free_ + held_);
+    for (Index row = 0; row < 3; ++row) {
+      const auto& gradient = linear.components[static_cast<std::size_t>(row)];
+      for (Index j = 0; j < free_; ++j) {
+        double sum = 0;
+        for (const int place : free[static_cast<std::size_t>(j)].places) {
+          sum += derivative_by(gradient, place, own);
+        }
+        beam.jacobian(row, j) = sum;
+      }
+      for (Index h = 0; h < held_; ++h) {
+        double sum = 0;
+        for (Index at = 0; at < held.train.rows(); ++at) {
+          if (held.train(at, h) == 0) continue;
+          sum += held.train(at, h) * derivative_by(gradient, static_cast<int>(at), own);
+        }
+        for (std::size_t k = 0; k < N; ++k) {
+          sum += held.rotation_angles(static_cast<Index>(k), h) * gradient.rotation_angles[k];
+        }
+        beam.jacobian(row, free_ + h) = sum;
+      }
+    }
+    for (Index h = 0; h < held.turn.cols(); ++h) {
+      const Eigen::Vector3d turn = held.turn.col(h);
+      beam.jacobian.col(free_ + h) += turn.cross(beam.direction);
+    }
+    const AngleSeeds<double> seeds = angle_seeds(linear.direction);
+    beam.of_angles.resize(2, free_ + held_);
+    for (Index j = 0; j < free_ + held_; ++j) {
+      beam.of_angles(0, j) = eigen(seeds.azimuth).dot(beam.jacobian.col(j));
+      beam.of_angles(1, j) = eigen(seeds.zenith).dot(beam.jacobian.col(j));
+    }
+    beams_.push_back(std::move(beam));
+  }
+}
+
+/// Of free parameters and what was held, which has sigmas of one [free + held, free + held].
+Eigen::MatrixXd BeamBundle::covariance_of_all(const Eigen::MatrixXd& covariance,
+                                              HeldErrors held) const {
+  const auto free = static_cast<std::size_t>(free_);
+  require_length("rows of the covariance", static_cast<std::size_t>(covariance.rows()), free);
+  require_length("columns of the covariance", static_cast<std::size_t>(covariance.cols()), free);
+  Eigen::MatrixXd all = Eigen::MatrixXd::Zero(free_ + held_, free_ + held_);
+  all.topLeftCorner(free_, free_) = covariance;
+  if (held == HeldErrors::included) all.diagonal().tail(held_).setOnes();
+  return all;
+}
+
+/// What is left of a beam's movements without the shared rotation [3, free + held].
+Eigen::MatrixXd BeamBundle::rest(const Beam& beam) const {
+  Eigen::MatrixXd result = beam.jacobian;
+  for (Index j = 0; j < result.cols(); ++j) {
+    const Eigen::Vector3d shared = turn_.col(j);
+    result.col(j) += beam.direction.cross(shared);
+  }
+  return result;
+}
+
+FormalDatum BeamBundle::formal_datum(const Eigen::MatrixXd& covariance, HeldErrors held) const {
+  const Eigen::MatrixXd all = covariance_of_all(covariance, held);
+  const Matrix3d turn_covariance = algebra::propagated(turn_, all);
   FormalDatum datum;
   datum.sigma_roll = std::sqrt(turn_covariance(0, 0));
   datum.sigma_pitch = std::sqrt(turn_covariance(1, 1));
   datum.sigma_yaw = std::sqrt(turn_covariance(2, 2));
-  datum.gauge = std::sqrt(turn_covariance.cwiseProduct(bundle.normal).sum() / bundle.count());
+  datum.gauge = std::sqrt(turn_covariance.cwiseProduct(normal_).sum() / count());
   // Sums of J^T J over the beams: their products with the covariance sum up the variances.
-  Eigen::MatrixXd shape = Eigen::MatrixXd::Zero(bundle.covariance.rows(), bundle.covariance.cols());
-  Eigen::MatrixXd total = shape;
-  for (const BundleBeam& beam : bundle.beams) {
-    const Eigen::MatrixXd rest = bundle.rest(beam);
-    algebra::add_transposed_product(rest, rest, rest.rows(), shape);
+  Eigen::MatrixXd shape = Eigen::MatrixXd::Zero(all.rows(), all.cols()), total = shape;
+  for (const Beam& beam : beams_) {
+    const Eigen::MatrixXd rest_of_beam = rest(beam);
+    algebra::add_transposed_product(rest_of_beam, rest_of_beam, rest_of_beam.rows(), shape);
     algebra::add_transposed_product(beam.of_angles, beam.of_angles, 2, total);
   }
-  const auto rms = [&bundle](const Eigen::MatrixXd& squares) {
-    return std::sqrt(std::max(0.0, squares.cwiseProduct(bundle.covariance).sum()) / bundle.count());
+  const auto rms = [&](const Eigen::MatrixXd& squares) {
+    return std::sqrt(std::max(0.0, squares.cwiseProduct(all).sum()) / count());
   };
   datum.shape = rms(shape);
   datum.total = rms(total);
   return datum;
 }
 
-PointingErrors pointing_errors(const PrismTrain& believed, const PrismTrain& train,
-                               const std::vector<estimation::FreeParameter>& free,
-                               const Eigen::MatrixXd& covariance,
-                               const std::vector<std::vector<double>>& rotation_angles,
-                               std::span<const std::uint8_t> emitter, const HeldMovement& held) {
-  require_between("number of prisms of the believed train", believed.prisms(), train.prisms(),
-                  train.prisms());
-  require_between("number of emitters of the believed train", believed.emitters(), train.emitters(),
-                  train.emitters());
-  const Bundle bundle = bundle_of(train, free, covariance, rotation_angles, emitter, held);
+PointingError BeamBundle::pointing_error(const PrismTrain& believed,
+                                         const Eigen::MatrixXd& covariance) const {
+  require_between("number of prisms of the believed train", believed.prisms(), prisms_, prisms_);
+  require_between("number of emitters of the believed train", believed.emitters(), emitters_,
+                  emitters_);
+  const Eigen::MatrixXd all = covariance_of_all(covariance, HeldErrors::included);
+  const Eigen::MatrixXd given_held = covariance_of_all(covariance, HeldErrors::left_out);
   std::vector<Vector3<double>> reported, calibrated;
-  std::vector<double> angles(rotation_angles.size());
-  for (const BundleBeam& beam : bundle.beams) {
-    for (std::size_t k = 0; k < angles.size(); ++k) angles[k] = rotation_angles[k][beam.row];
-    reported.push_back(
-        observe(believed, angles, emitter.empty() ? 0 : emitter[beam.row]).direction);
+  for (const Beam& beam : beams_) {
+    reported.push_back(observe(believed, beam.rotation_angles, beam.emitter).direction);
     calibrated.push_back({beam.direction.x(), beam.direction.y(), beam.direction.z()});
   }
-  PointingErrors result;
+  PointingError result;
   result.errors = direction_errors(reported, calibrated);
   const Eigen::Vector3d turn = eigen(result.errors.rotation);
   // Each of the three is the root of a mean square: half the slope of the sum of squares, over
   // number and root.
-  Eigen::RowVectorXd total = Eigen::RowVectorXd::Zero(bundle.covariance.cols()), shape = total;
-  for (std::size_t i = 0; i < bundle.beams.size(); ++i) {
-    const BundleBeam& beam = bundle.beams[i];
+  Eigen::RowVectorXd total = Eigen::RowVectorXd::Zero(all.cols()), shape = total;
+  for (std::size_t i = 0; i < beams_.size(); ++i) {
+    const Beam& beam = beams_[i];
     if (!std::isfinite(reported[i].x)) continue;
     const auto from = angles_from_direction(reported[i]), to = angles_from_direction(calibrated[i]);
     total += std::remainder(from.azimuth - to.azimuth, kTwoPi) * beam.of_angles.row(0) +
              (from.zenith - to.zenith) * beam.of_angles.row(1);
-    const Eigen::Vector3d rest = eigen(reported[i]) - beam.direction - turn.cross(beam.direction);
-    shape += rest.transpose() * bundle.rest(beam);
-    result.largest_shape = std::max(result.largest_shape, rest.norm());
+    const Eigen::Vector3d left = eigen(reported[i]) - beam.direction - turn.cross(beam.direction);
+    const Eigen::RowVectorXd slope = left.transpose() * rest(beam);
+    shape += slope;
+    if (left.norm() <= result.worst_shape) continue;
+    result.worst_shape = left.norm();
+    result.worst_shape_sigma = sigma_of(slope / left.norm(), all);
   }
-  const Eigen::RowVectorXd gauge = (turn.transpose() * bundle.normal) * bundle.turn;
-  const auto sigma = [&bundle](const Eigen::RowVectorXd& slope, double root) {
-    return root > 0 ? sigma_of(slope / (bundle.count() * root), bundle.covariance) : 0.0;
+  const Eigen::RowVectorXd gauge = (turn.transpose() * normal_) * turn_;
+  const auto sigma = [&](const Eigen::RowVectorXd& slope, double root,
+                         const Eigen::MatrixXd& of_all) {
+    return root > 0 ? sigma_of(slope / (count() * root), of_all) : 0.0;
   };
-  result.total_sigma = sigma(total, result.errors.total);
-  result.gauge_sigma = sigma(gauge, result.errors.gauge);
-  result.shape_sigma = sigma(shape, result.errors.shape);
+  result.total_sigma = sigma(total, result.errors.total, all);
+  result.gauge_sigma = sigma(gauge, result.errors.gauge, all);
+  result.shape_sigma = sigma(shape, result.errors.shape, all);
+  result.total_sigma_given_held = sigma(total, result.errors.total, given_held);
   return result;
 }
 
-double better_probability(const PointingErrors& reported) {
-  const double total = reported.errors.total, sigma = reported.total_sigma;
+double better_probability(const PointingError& error) {
+  const double total = error.errors.total, sigma = error.total_sigma_given_held;
   if (total == 0) return 0.5;  // they are the same
   return 0.5 * std::erfc(-total / (2 * sigma) / std::sqrt(2.0));
 }

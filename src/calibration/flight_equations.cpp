@@ -213,7 +213,7 @@ class FlightCalls {
     a.free_count = static_cast<int>(model.free.size());
     a.drift = model.drift_about_ns.has_value();
     const Eigen::Matrix3d mount = model.nominal * model.boresight;
-    for (Index i = 0; i < 9; ++i) a.body_from_sensor[i] = mount(i / 3, i % 3);
+    for (Index i = 0; i < 9; ++i) a.body_from_sensor[i] = mount(i % 3, i / 3);
     copy(model.lever_arm, a.lever_arm);
     a.range_offset = model.range_offset;
     a.clock_step = model.clock_offset - poses.clock_offset;

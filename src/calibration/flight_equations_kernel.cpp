@@ -6,6 +6,7 @@
 #include <array>
 
 #include "risley/calibration/shot_pose.hpp"
+#include "risley/core/matrix3.hpp"
 #include "risley/core/simd.hpp"
 #include "risley/optics/beam_origin.hpp"
 #include "risley/optics/emitter_lanes.hpp"
@@ -19,6 +20,7 @@ namespace {
 using Batch = xsimd::batch<double>;
 using Lanes = xsimd::batch_bool<double>;
 using Vector = Vector3<Batch>;
+using Matrix = Matrix3<Batch>;
 constexpr std::size_t kLanes = Batch::size;
 constexpr double kLargest = __DBL_MAX__;
 /// A beam that meets the ground at a flatter angle, as the cosine of the angle of incidence, counts
@@ -27,27 +29,15 @@ constexpr double kLeastFlightApproach = 0.02;
 constexpr std::size_t kGroups = 16;
 constexpr std::size_t kKnot = 6;
 
-struct Matrix {
-  Batch m[9];
-
-  Vector operator*(const Vector& v) const {
-    return {m[0] * v.x + m[1] * v.y + m[2] * v.z, m[3] * v.x + m[4] * v.y + m[5] * v.z,
-            m[6] * v.x + m[7] * v.y + m[8] * v.z};
-  }
-  Vector back(const Vector& v) const {
-    return {m[0] * v.x + m[3] * v.y + m[6] * v.z, m[1] * v.x + m[4] * v.y + m[7] * v.z,
-            m[2] * v.x + m[5] * v.y + m[8] * v.z};
-  }
-};
-
 /// Rotation of a quaternion that has nearly length 1.
 Matrix rotation(const Batch& w, const Batch& x, const Batch& y, const Batch& z) {
   const Batch one(1.0), s = Batch(2.0) / (w * w + x * x + y * y + z * z);
   const Batch xs = s * x, ys = s * y, zs = s * z;
   const Batch wx = w * xs, wy = w * ys, wz = w * zs, xx = x * xs, xy = x * ys, xz = x * zs;
   const Batch yy = y * ys, yz = y * zs, zz = z * zs;
-  return {{one - (yy + zz), xy - wz, xz + wy, xy + wz, one - (xx + zz), yz - wx, xz - wy, yz + wx,
-           one - (xx + yy)}};
+  return {{{one - (yy + zz), xy + wz, xz - wy},
+           {xy - wz, one - (xx + zz), yz + wx},
+           {xz + wy, yz - wx, one - (xx + yy)}}};
 }
 
 Vector broadcast(const double* v) { return {Batch(v[0]), Batch(v[1]), Batch(v[2])}; }
@@ -116,7 +106,7 @@ struct FlightConstants {
     train = prepare<Batch, N>(parameters, order);
     derivatives = prepare_derivatives<Batch, N>(parameters, order);
     for (std::size_t i = 0; i < 2 * N; ++i) face_position[i] = Batch(a.face_position[i]);
-    for (std::size_t i = 0; i < 9; ++i) body_from_sensor.m[i] = Batch(a.body_from_sensor[i]);
+    body_from_sensor = Matrix::from_columns(a.body_from_sensor);
   }
 };
 
@@ -193,8 +183,8 @@ FlightCounts fill_flight_row(const FlightArguments& a, FlightConstants<N>& c,
 
   // d range / d displacement of the point, map, body and sensor axes.
   const Vector by_point = Batch(-over_approach) * normal;
-  const Vector by_point_body = local_from_body.back(by_point);
-  const Vector by_point_sensor = c.body_from_sensor.back(by_point_body);
+  const Vector by_point_body = transposed_product(local_from_body, by_point);
+  const Vector by_point_sensor = transposed_product(c.body_from_sensor, by_point_body);
   const auto gradients = trace_adjoint(c.train, c.derivatives, forward,
                                        std::array<Vector, 1>{range * by_point_sensor});
   const Gradient<Batch, N>& gradient = gradients[0];

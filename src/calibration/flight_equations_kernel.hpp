@@ -39,7 +39,7 @@ struct FlightArguments {
   int free_count = 0;
   bool drift = false;               ///< one more column behind those: the drift of the clock
   double since = 0;                 ///< begin_ns after the time about which the clock drifts, s
-  double body_from_sensor[9] = {};  ///< row by row
+  double body_from_sensor[9] = {};  ///< column by column
   double lever_arm[3] = {};
   double range_offset = 0;
   double clock_step = 0;               ///< from the poses' time to the shots', s

@@ -57,7 +57,7 @@ FlightDatum datum_of(const FlightEvidence& e, const MatrixXd& movement) {
     }
   }
   const FormalDatum formal =
-      formal_datum(e.model.train, {}, MatrixXd::Zero(0, 0), angles, beam, bundle);
+      BeamBundle(e.model.train, {}, angles, beam, bundle).formal_datum(MatrixXd::Zero(0, 0));
   FlightDatum datum;
   datum.sigma_x = formal.sigma_roll;
   datum.sigma_y = formal.sigma_pitch;

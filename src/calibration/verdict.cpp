@@ -33,20 +33,20 @@ double significant_chi2(double degrees_of_freedom) {
 
 }  // namespace
 
-std::string in_words(const PointingErrors& reported) {
-  constexpr double kDistance = 30;  // m, where people say how far beams are off
+std::string in_words(const PointingError& error) {
   const auto in_degrees = [](double value, double sigma) {
     return number_text(degrees_from_radians(value), degrees_from_radians(sigma));
   };
-  const DirectionErrors& errors = reported.errors;
-  const NumberText total = in_degrees(errors.total, reported.total_sigma);
-  const NumberText gauge = in_degrees(errors.gauge, reported.gauge_sigma);
-  const NumberText shape = in_degrees(errors.shape, reported.shape_sigma);
+  const DirectionErrors& errors = error.errors;
+  const NumberText total = in_degrees(errors.total, error.total_sigma);
+  const NumberText gauge = in_degrees(errors.gauge, error.gauge_sigma);
+  const NumberText shape = in_degrees(errors.shape, error.shape_sigma);
   return fmt::format(
       "reported directions are off by {} ± {} degree ({:.2g} m at {:.0f} m): {} ± {} shared by all "
       "beams and {} ± {} in shape, {} at worst",
-      total.value, total.sigma, kDistance * errors.total, kDistance, gauge.value, gauge.sigma,
-      shape.value, shape.sigma, in_degrees(reported.largest_shape, reported.shape_sigma).value);
+      total.value, total.sigma, kStatedDistance * errors.total, kStatedDistance, gauge.value,
+      gauge.sigma, shape.value, shape.sigma,
+      in_degrees(error.worst_shape, error.worst_shape_sigma).value);
 }
 
 std::string reason_of_failure(const Calibration& c, const PlanarSolution& solution) {
@@ -103,7 +103,7 @@ CalibrationVerdict verdict_of(const Calibration& c) {
                         degrees_from_radians(c.datum.total), chi2, freedom),
             "nothing"};
   }
-  const std::string moved = in_words(c.reported);
+  const std::string moved = in_words(c.pointing_error);
   if (c.rms_after >= c.rms_before) {
     return {CalibrationCode::not_better,
             fmt::format("{}; but the walls are {:.4g} mm thick before and {:.4g} mm after", moved,

@@ -23,7 +23,7 @@ CalibrationVerdict verdict_of(const Calibration& c);
 CalibrationVerdict verdict_of(const FlightCalibration& c);
 
 /// How wrong reported directions are: "reported directions are off by 0.4029 ± 0.0013 degree ...".
-std::string in_words(const PointingErrors& reported);
+std::string in_words(const PointingError& error);
 
 /// What is held and what the flight tells of it: "refractive_index is held at 1.51 +- 1e-06, ...".
 std::string in_words(const HeldParameter& held, const sensors::Sensor& sensor);

@@ -3,6 +3,7 @@
 // Compiled once per instruction set under the rules of risley/core/simd.hpp.
 #include "cloud/georeference_kernel.hpp"
 
+#include "risley/core/matrix3.hpp"
 #include "risley/core/simd.hpp"
 #include "risley/core/vector3.hpp"
 
@@ -11,26 +12,8 @@ namespace {
 
 using Batch = xsimd::batch<double>;
 using Vector = Vector3<Batch>;
+using Matrix = Matrix3<Batch>;
 constexpr std::size_t kLanes = Batch::size;
-
-/// Of three rows, column by column.
-struct Matrix {
-  Batch m[9];
-
-  Matrix() = default;
-  explicit Matrix(const double (&numbers)[9]) {
-    for (std::size_t k = 0; k < 9; ++k) m[k] = Batch(numbers[k]);
-  }
-  Vector operator*(const Vector& v) const {
-    return {m[0] * v.x + m[3] * v.y + m[6] * v.z, m[1] * v.x + m[4] * v.y + m[7] * v.z,
-            m[2] * v.x + m[5] * v.y + m[8] * v.z};
-  }
-  /// The transpose times a vector.
-  Vector back(const Vector& v) const {
-    return {m[0] * v.x + m[1] * v.y + m[2] * v.z, m[3] * v.x + m[4] * v.y + m[5] * v.z,
-            m[6] * v.x + m[7] * v.y + m[8] * v.z};
-  }
-};
 
 /// The shots of one group: those from `at` on, the last one again where there are fewer.
 struct Group {
@@ -61,7 +44,7 @@ struct Group {
   }
   Matrix load_matrix(const double* const (&columns)[9]) const {
     Matrix result;
-    for (std::size_t k = 0; k < 9; ++k) result.m[k] = load(columns[k]);
+    for (std::size_t k = 0; k < 3; ++k) result.column[k] = load(columns + 3 * k);
     return result;
   }
 };
@@ -155,9 +138,8 @@ void map_points(const MapArguments& a) {
     if (!a.covariance[0]) return;
 
     const Matrix turn = group.load_matrix(a.poses.turn);
-    const Vector x = product(a.jacobian, {turn.m[0], turn.m[1], turn.m[2]}),
-                 y = product(a.jacobian, {turn.m[3], turn.m[4], turn.m[5]}),
-                 z = product(a.jacobian, {turn.m[6], turn.m[7], turn.m[8]});
+    const Vector x = product(a.jacobian, turn.column[0]), y = product(a.jacobian, turn.column[1]),
+                 z = product(a.jacobian, turn.column[2]);
     const Vector to_map[3] = {{x.x, y.x, z.x}, {x.y, y.y, z.y}, {x.z, y.z, z.z}};
     for (std::size_t k = 0; k < a.loadings; ++k) {
       double* const* columns = a.loading + 3 * k;
@@ -185,7 +167,7 @@ void map_points(const MapArguments& a) {
 }
 
 void stand_shots(const StandArguments& a) {
-  const Matrix place(a.turn);
+  const auto place = Matrix::from_columns(a.turn);
   const Vector reference = broadcast_vector(a.reference),
                lever = broadcast_vector(a.poses.lever_arm);
   for_each_group(a.shots, [&](const Group& group) {
@@ -196,7 +178,7 @@ void stand_shots(const StandArguments& a) {
     const Vector point{across * cosine_azimuth, across * sine_azimuth, range * cosine_zenith};
     const Vector from_there = group.load_matrix(a.poses.turn) * (point + lever) +
                               (group.load(a.poses.reference) - reference);
-    const Vector seen = place.back(from_there) - lever;
+    const Vector seen = transposed_product(place, from_there) - lever;
     const Batch distance = xsimd::sqrt(dot(seen, seen));
     group.store(xsimd::atan2(seen.y, seen.x), a.stood_azimuth);
     group.store(xsimd::acos(seen.z / distance), a.stood_zenith);
@@ -205,10 +187,10 @@ void stand_shots(const StandArguments& a) {
 }
 
 void turn_vectors(const TurnArguments& a) {
-  const Matrix place(a.turn);
+  const auto place = Matrix::from_columns(a.turn);
   for_each_group(a.shots, [&](const Group& group) {
     const Matrix turn = group.load_matrix(a.poses.turn);
-    group.store(turn.back(place * group.load(a.vector)), a.vector);
+    group.store(transposed_product(turn, place * group.load(a.vector)), a.vector);
   });
 }
 

@@ -361,14 +361,15 @@ class Work {
     if (surface_pose_.size() == 0) {
       const double nowhere = std::nan("");
       for (std::size_t i = 0; i < n; ++i) {
-        set(i, normals_->normal(georeference_ ? nowhere : shots.azimuth[i], shots.zenith[i]));
+        set(i, normals_->normal(georeference_ ? nowhere : shots.azimuth[i], shots.zenith[i],
+                                shots.range[i]));
       }
       return;
     }
     if (n == 0) return;
     stand_still(block.poses, shots.azimuth, shots.zenith, shots.range, block.stood);
     for (std::size_t i = 0; i < n; ++i) {
-      set(i, normals_->normal(block.stood.azimuth[i], block.stood.zenith[i]));
+      set(i, normals_->normal(block.stood.azimuth[i], block.stood.zenith[i], block.stood.range[i]));
     }
     TurnArguments a;
     a.poses = pose_columns(block.poses);

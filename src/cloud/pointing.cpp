@@ -17,6 +17,8 @@
 namespace risley::cloud {
 namespace {
 
+static_assert(kMountEffects == trajectories::kMountQuantities);
+
 void require_model(const PointingModel& model) {
   require_between("number of sizes of prisms", static_cast<double>(model.sizes.size()), 0,
                   kMostSizes);

@@ -118,7 +118,7 @@ class Points {
 
   /// What errors of the mount do to points of a moving sensor: to each unit of its seven
   /// quantities belongs a shift across the beam, in both directions, and along it.
-  using MountEffects = std::array<Vector3<Batch>, 7>;
+  using MountEffects = std::array<Vector3<Batch>, kMountEffects>;
 
   MountEffects mount_effects(std::size_t at, const Ray& ray, const Batch& range) const {
     MountEffects effects;

@@ -16,6 +16,9 @@ inline constexpr int kMostFactors = 64;
 /// prism and the spacing behind every one but the last.
 inline constexpr int kMostSizes = 2 + 2 * kMaxPrisms - 1;
 
+/// Quantities of a mount: trajectories::kMountQuantities, whose header is not for kernels.
+inline constexpr int kMountEffects = 7;
+
 /// Plain arguments of one call, see optics/batch_kernel.hpp for why they are plain. Every column
 /// has one entry per shot and room for whole groups: a multiple of kPointPadding.
 inline constexpr std::size_t kPointPadding = 8;

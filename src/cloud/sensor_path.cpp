@@ -19,7 +19,6 @@ using Eigen::Vector3d;
 /// A polynomial repeats the interpolation over so long a time: a turn of 10 rad/s is left by
 /// (0.05)^6 / 6!.
 constexpr std::int64_t kCell_ns = 5'000'000;
-constexpr double kCell = 5e-3;
 constexpr int kDegree = static_cast<int>(kPathPowers) - 1;
 
 }  // namespace
@@ -35,7 +34,7 @@ class SensorPath::Cell {
   bool contains(std::int64_t time_ns) const { return time_ns >= begin_ns_ && time_ns <= end_ns_; }
   /// Since the beginning, in parts of a whole cell.
   double part(std::int64_t time_ns) const {
-    return 1e-9 / kCell * static_cast<double>(time_ns - begin_ns_);
+    return static_cast<double>(time_ns - begin_ns_) / static_cast<double>(kCell_ns);
   }
   /// Fills rows [first, first + count) of poses. @param parts  of their times
   void fill(const double* parts, std::size_t count, SensorPoses& poses, std::size_t first,

@@ -12,7 +12,6 @@
 namespace risley::cloud {
 namespace {
 
-constexpr float kNoNormal = std::numeric_limits<float>::quiet_NaN();
 /// Of a fit: nine degrees of freedom tell its roughness to a quarter, 1 / sqrt(2 * 9).
 constexpr double kLeastShots = 12;
 /// X of the directions that are looked at: sine of the six degrees that SurfaceNormals tells of.
@@ -20,10 +19,30 @@ constexpr double kLeastForward = 0.1;
 /// Part of the squared spread across that shots along one line lack: 1 - correlation^2.
 /// SurfaceNormals.ShotsAlongALineHaveNone
 constexpr double kLeastSpread = 1e-3;
+/// Cells between a cell without a fit and those that it looks at: an edge in one cell spoils the
+/// fits of all eight around it.
+constexpr int kReach = 2;
+/// A shot is on a surface nearby that leads to its range within so many sigmas.
+constexpr double kNearEnough = 3;
+/// Surfaces that differ by less, in sigmas and as the cosine between normals, are one: 3 degrees.
+constexpr double kSameRange = 1, kSameNormal = 0.9986;
+
+constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 
 }  // namespace
 
-const Vector3<double> SurfaceNormals::kNone{kNoNormal, kNoNormal, kNoNormal};
+const SurfaceNormals::FittedPlane SurfaceNormals::kNoPlane{{kNaN, kNaN, kNaN}, kNaN};
+const Vector3<double> SurfaceNormals::kNone{kNaN, kNaN, kNaN};
+
+template <class Function>
+void SurfaceNormals::for_cells_around(std::size_t cell, int reach, Function&& function) {
+  const int row = static_cast<int>(cell) / kSide, column = static_cast<int>(cell) % kSide;
+  for (int i = std::max(row - reach, 0); i <= std::min(row + reach, kSide - 1); ++i) {
+    for (int j = std::max(column - reach, 0); j <= std::min(column + reach, kSide - 1); ++j) {
+      function(static_cast<std::size_t>(i * kSide + j));
+    }
+  }
+}
 
 void SurfaceNormals::Moments::add(const Moments& other) {
   for (const auto term :
@@ -36,7 +55,7 @@ void SurfaceNormals::Moments::add(const Moments& other) {
 SurfaceNormals::SurfaceNormals(double range_noise) : range_noise_(range_noise) {
   require_above("range noise", range_noise, 0, "m");
   moments_.resize(static_cast<std::size_t>(kSide) * kSide);
-  normals_.assign(moments_.size(), {kNoNormal, kNoNormal, kNoNormal});
+  surfaces_.assign(moments_.size(), {kNoPlane});
 }
 
 void SurfaceNormals::clear() {
@@ -70,37 +89,75 @@ void SurfaceNormals::add(double azimuth, double zenith, double range) {
 }
 
 void SurfaceNormals::fit() {
-  std::fill(normals_.begin(), normals_.end(),
-            std::array<float, 3>{kNoNormal, kNoNormal, kNoNormal});
+  std::fill(surfaces_.begin(), surfaces_.end(), Surface{kNoPlane});
+  beside_.clear();
   for (const std::size_t cell : touched_) {
-    const int row = static_cast<int>(cell) / kSide, column = static_cast<int>(cell) % kSide;
     Moments sum;
-    for (int i = std::max(row - 1, 0); i <= std::min(row + 1, kSide - 1); ++i) {
-      for (int j = std::max(column - 1, 0); j <= std::min(column + 1, kSide - 1); ++j) {
-        sum.add(moments_[static_cast<std::size_t>(i * kSide + j)]);
-      }
-    }
-    normals_[cell] = fitted(sum);
+    for_cells_around(cell, 1, [&](std::size_t other) { sum.add(moments_[other]); });
+    surfaces_[cell].plane = fitted(sum);
+  }
+  for (const std::size_t cell : touched_) {
+    if (!surfaces_[cell].plane.exists()) find_beside(cell);
   }
 }
 
-std::array<float, 3> SurfaceNormals::fitted(const Moments& m) const {
-  if (m.count < kLeastShots) return {kNoNormal, kNoNormal, kNoNormal};
+void SurfaceNormals::find_beside(std::size_t cell) {
+  Surface& own = surfaces_[cell];
+  own.beside = static_cast<std::uint32_t>(beside_.size());
+  const auto middle = [](std::size_t number) {
+    return (static_cast<double>(number) + 0.5) / kCellsPerRadian;
+  };
+  const Vector3<double> towards = direction_from_angles<double>(
+      {middle(cell % kSide) - kHalf / kCellsPerRadian, middle(cell / kSide)});
+  const auto known = [&](const FittedPlane& plane) {
+    return std::any_of(beside_.begin() + own.beside, beside_.end(), [&](const FittedPlane& other) {
+      return std::abs(plane.range(towards) - other.range(towards)) < kSameRange * range_noise_ &&
+             std::abs(dot(plane.normal(), other.normal())) > kSameNormal;
+    });
+  };
+  for_cells_around(cell, kReach, [&](std::size_t other) {
+    const FittedPlane& plane = surfaces_[other].plane;
+    if (plane.exists() && !known(plane)) beside_.push_back(plane);
+  });
+  own.beside_count = static_cast<std::uint32_t>(beside_.size()) - own.beside;
+}
+
+Vector3<double> SurfaceNormals::normal_beside(const Surface& surface, double azimuth, double zenith,
+                                              double range) const {
+  const Vector3<double> direction = direction_from_angles<double>({azimuth, zenith});
+  double nearest = kNearEnough * range_noise_;
+  Vector3<double> normal = kNone;
+  for (std::uint32_t k = 0; k < surface.beside_count; ++k) {
+    const FittedPlane& plane = beside_[surface.beside + k];
+    const double off = std::abs(plane.range(direction) - range);
+    if (!(off < nearest)) continue;
+    nearest = off;
+    normal = plane.normal();
+  }
+  return normal;
+}
+
+SurfaceNormals::FittedPlane SurfaceNormals::fitted(const Moments& m) const {
+  if (m.count < kLeastShots) return kNoPlane;
   // About the mean: q + slope_u (u - mean u) + slope_v (v - mean v).
   const double u = m.u / m.n, v = m.v / m.n, q = m.q / m.n;
   const double uu = m.uu - m.n * u * u, uv = m.uv - m.n * u * v, vv = m.vv - m.n * v * v;
   const double qu = m.qu - m.n * q * u, qv = m.qv - m.n * q * v;
   const double determinant = uu * vv - uv * uv;
   // Shots along one line tell a slope in one direction only.
-  if (!(determinant > kLeastSpread * uu * vv)) return {kNoNormal, kNoNormal, kNoNormal};
+  if (!(determinant > kLeastSpread * uu * vv)) return kNoPlane;
   const double slope_u = (qu * vv - qv * uv) / determinant;
   const double slope_v = (qv * uu - qu * uv) / determinant;
   const double misfit = m.qq - m.n * q * q - slope_u * qu - slope_v * qv;
   const double limit = kRoughest * range_noise_;
-  if (misfit > limit * limit * (m.count - 3)) return {kNoNormal, kNoNormal, kNoNormal};
-  const Vector3<double> normal =
-      normalized(Vector3<double>{q - u * slope_u - v * slope_v, slope_u, slope_v});
-  return {static_cast<float>(normal.x), static_cast<float>(normal.y), static_cast<float>(normal.z)};
+  if (misfit > limit * limit * (m.count - 3)) return kNoPlane;
+  // The coefficients of 1, u and v are n over the distance.
+  const Vector3<double> over_distance{q - u * slope_u - v * slope_v, slope_u, slope_v};
+  const double distance = 1.0 / norm(over_distance);
+  const Vector3<double> normal = distance * over_distance;
+  return {
+      {static_cast<float>(normal.x), static_cast<float>(normal.y), static_cast<float>(normal.z)},
+      static_cast<float>(distance)};
 }
 
 }  // namespace risley::cloud

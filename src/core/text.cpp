@@ -13,10 +13,12 @@
 namespace risley {
 namespace {
 
+bool is_mark(char c) { return c == '-' || c == '_' || c == ' '; }
+
 /// In lower case and without what joins words.
 std::string letters_of(std::string_view text) {
   std::string letters = lower_case(std::string(text));
-  std::erase_if(letters, [](char c) { return c == '-' || c == '_' || c == ' '; });
+  std::erase_if(letters, is_mark);
   return letters;
 }
 
@@ -91,7 +93,18 @@ std::string near_miss(std::string_view word, std::span<const std::string> names)
       best = name;
     }
   }
-  return best;
+  if (!best.empty() || wanted.empty()) return best;
+  for (const std::string& name : names) {
+    if (name.size() > word.size() && name.starts_with(word) && is_mark(name[word.size()])) {
+      return name;
+    }
+  }
+  return {};
+}
+
+std::string did_you_mean(std::string_view word, std::span<const std::string> names) {
+  const std::string meant = near_miss(word, names);
+  return meant.empty() ? "" : fmt::format(", did you mean {}?", meant);
 }
 
 std::string printable(std::string_view text, bool lines) {

@@ -35,9 +35,10 @@ class Descriptor {
 
 void read_bytes(const std::string& path, const std::function<void(std::span<const char>)>& take) {
   const auto refuse = [&path](int error) {
-    throw FileError(
-        path, {},
-        error == ENOENT ? "no such file" : fmt::format("cannot be read: {}", std::strerror(error)));
+    throw FileError(path, {},
+                    error == ENOENT   ? "no such file"
+                    : error == EISDIR ? "is a folder, expected a file"
+                                      : fmt::format("cannot be read: {}", std::strerror(error)));
   };
   const Descriptor file(path);
   if (file.get() < 0) refuse(errno);

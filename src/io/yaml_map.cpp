@@ -189,11 +189,9 @@ void YamlMap::allow_only(std::initializer_list<std::string_view> keys) const {
   for (const Entry& entry : entries_) {
     if (std::find(keys.begin(), keys.end(), entry.key) != keys.end()) continue;
     const std::vector<std::string> known(keys.begin(), keys.end());
-    const std::string meant = near_miss(entry.key, known);
     fail_at(path_, entry.line,
             fmt::format("unknown field {}{}, allowed here: {}", field(entry.key),
-                        meant.empty() ? "" : fmt::format(", did you mean {}?", meant),
-                        fmt::join(known, ", ")));
+                        did_you_mean(entry.key, known), fmt::join(known, ", ")));
   }
 }
 

@@ -26,39 +26,58 @@ bool is_complete(const SamplePoint& point) {
 
 long cell_of(double angle) { return std::lround(std::floor(angle / kSurfaceCell)); }
 
+/// Means of two quantities over cells of the field of view.
+class FieldMeans {
+ public:
+  void add(double azimuth, double zenith, double first, double second) {
+    Sum& sum = sums_[{cell_of(azimuth), cell_of(zenith)}];
+    ++sum.count;
+    sum.first += first;
+    sum.second += second;
+  }
+  /// Hands every cell with points enough to function(count, mean of the first, of the second).
+  template <class Function>
+  FieldCells for_each(int fewest, Function&& function) const {
+    FieldCells cells{kSurfaceCell, {}, {}};
+    for (const auto& [place, sum] : sums_) {
+      if (sum.count < fewest) continue;
+      cells.azimuth.push_back(kSurfaceCell * (static_cast<double>(place.first) + 0.5));
+      cells.zenith.push_back(kSurfaceCell * (static_cast<double>(place.second) + 0.5));
+      function(sum.count, sum.first / sum.count, sum.second / sum.count);
+    }
+    return cells;
+  }
+
+ private:
+  struct Sum {
+    int count = 0;
+    double first = 0, second = 0;
+  };
+  std::map<std::pair<long, long>, Sum> sums_;
+};
+
 /// Where in the field of view points lie beyond their planes, and where before them.
 std::optional<WallField> wall_field(const std::vector<const SamplePoint*>& points) {
-  struct Cell {
-    int count = 0;
-    double before = 0, after = 0;
-  };
   WallField result;
-  result.cell = kSurfaceCell;
   result.fewest_points = kFewestPointsInCell;
-  std::map<std::pair<long, long>, Cell> cells;
+  FieldMeans means;
   double squares = 0;
   for (const SamplePoint* point : points) {
     if (!is_complete(*point)) continue;
-    Cell& cell = cells[{cell_of(point->azimuth), cell_of(point->zenith)}];
-    ++cell.count;
-    cell.before += point->before;
-    cell.after += point->after;
+    means.add(point->azimuth, point->zenith, point->before, point->after);
     squares += point->after * point->after;
     ++result.points;
   }
   double before_squares = 0, after_squares = 0, noise_squares = 0;
-  for (const auto& [place, cell] : cells) {
-    if (cell.count < kFewestPointsInCell) continue;
-    result.azimuth.push_back(kSurfaceCell * (static_cast<double>(place.first) + 0.5));
-    result.zenith.push_back(kSurfaceCell * (static_cast<double>(place.second) + 0.5));
-    result.mean_before.push_back(cell.before / cell.count);
-    result.mean_after.push_back(cell.after / cell.count);
-    before_squares += result.mean_before.back() * result.mean_before.back();
-    after_squares += result.mean_after.back() * result.mean_after.back();
-    noise_squares += squares / static_cast<double>(result.points) / cell.count;
-  }
-  if (result.azimuth.empty()) return std::nullopt;
-  const auto count = static_cast<double>(result.azimuth.size());
+  result.cells = means.for_each(kFewestPointsInCell, [&](int count, double before, double after) {
+    result.mean_before.push_back(before);
+    result.mean_after.push_back(after);
+    before_squares += before * before;
+    after_squares += after * after;
+    noise_squares += squares / static_cast<double>(result.points) / count;
+  });
+  if (result.mean_before.empty()) return std::nullopt;
+  const auto count = static_cast<double>(result.mean_before.size());
   result.rms_before = std::sqrt(before_squares / count);
   result.rms_after = std::sqrt(after_squares / count);
   result.noise = std::sqrt(noise_squares / count);
@@ -68,30 +87,20 @@ std::optional<WallField> wall_field(const std::vector<const SamplePoint*>& point
 /// How wrong reported directions are in each part of the field of view.
 std::optional<PointingField> pointing_field(const Calibration& c,
                                             const std::vector<SamplePoint>& sample) {
-  struct Cell {
-    int count = 0;
-    double total = 0, shape = 0;
-  };
-  std::map<std::pair<long, long>, Cell> cells;
-  const Vector3<double>& turn = c.reported.errors.rotation;
+  FieldMeans means;
+  const Vector3<double>& turn = c.pointing_error.errors.rotation;
   for (const SamplePoint& point : sample) {
     const double total = norm(point.off);
     if (!std::isfinite(total + point.azimuth)) continue;
     const auto beam = direction_from_angles<double>({point.azimuth, point.zenith});
-    Cell& cell = cells[{cell_of(point.azimuth), cell_of(point.zenith)}];
-    ++cell.count;
-    cell.total += total;
-    cell.shape += norm(point.off - cross(turn, beam));
+    means.add(point.azimuth, point.zenith, total, norm(point.off - cross(turn, beam)));
   }
-  if (cells.empty()) return std::nullopt;
   PointingField result;
-  result.cell = kSurfaceCell;
-  for (const auto& [place, cell] : cells) {
-    result.azimuth.push_back(kSurfaceCell * (static_cast<double>(place.first) + 0.5));
-    result.zenith.push_back(kSurfaceCell * (static_cast<double>(place.second) + 0.5));
-    result.total.push_back(cell.total / cell.count);
-    result.shape.push_back(cell.shape / cell.count);
-  }
+  result.cells = means.for_each(1, [&](int, double total, double shape) {
+    result.total.push_back(total);
+    result.shape.push_back(shape);
+  });
+  if (result.total.empty()) return std::nullopt;
   return result;
 }
 

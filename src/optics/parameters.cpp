@@ -11,6 +11,7 @@
 
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
+#include "risley/core/text.hpp"
 #include "risley/optics/prism.hpp"
 
 namespace risley {
@@ -146,8 +147,8 @@ const ParameterInfo& find_parameter(std::string_view name, TrainShape shape) {
   std::vector<std::string> names;
   names.reserve(list.size());
   for (const auto& parameter : list) names.push_back(parameter.name);
-  throw InvalidArgument(
-      fmt::format("unknown parameter \"{}\", known: {}", name, fmt::join(names, ", ")));
+  throw InvalidArgument(fmt::format("unknown parameter \"{}\"{}, known: {}", name,
+                                    did_you_mean(name, names), fmt::join(names, ", ")));
 }
 
 void check_bounds(const ParameterInfo& parameter, double value) {

@@ -19,6 +19,7 @@ using calibration::CalibratedPlane;
 using calibration::DatumKind;
 using calibration::DirectionErrors;
 using calibration::FormalDatum;
+using calibration::kStatedDistance;
 using calibration::PriorTest;
 using calibration::SurfaceStep;
 
@@ -199,24 +200,24 @@ std::string direction_errors_row(const char* name, const DirectionErrors& errors
 
 /// What reported directions are off by, and what of it all beams share.
 std::string pointing_html(const CalibrationReport& r) {
-  if (!r.reported) return "";
-  constexpr double kDistance = 30;  // m
-  const DirectionErrors& errors = r.reported->errors;
+  if (!r.pointing_error) return "";
+  const DirectionErrors& errors = r.pointing_error->errors;
   std::string html = fmt::format(
       "<h2>Where the sensor points</h2>\n<div class=\"wide\"><table><thead><tr><th>error of "
       "reported "
       "directions</th><th>deg</th><th>σ</th><th>mm at {:.0f} m</th></tr></thead><tbody>\n",
-      kDistance);
+      kStatedDistance);
   const auto add = [&](const char* name, double error, double sigma) {
     html += fmt::format("<tr><th scope=\"row\">{}</th><td>{}</td>{}<td>{}</td></tr>\n", name,
                         to_place_of(degrees_from_radians(error), degrees_from_radians(sigma)),
                         sigma_cell(degrees_from_radians(error), degrees_from_radians(sigma)),
-                        millimetres(kDistance * error));
+                        millimetres(kStatedDistance * error));
   };
-  add("all of it", errors.total, r.reported->total_sigma);
-  add("shared: a rotation of all beams together", errors.gauge, r.reported->gauge_sigma);
-  add("shape: what is left", errors.shape, r.reported->shape_sigma);
-  add("shape of the worst beam", r.reported->largest_shape, r.reported->shape_sigma);
+  add("all of it", errors.total, r.pointing_error->total_sigma);
+  add("shared: a rotation of all beams together", errors.gauge, r.pointing_error->gauge_sigma);
+  add("shape: what is left", errors.shape, r.pointing_error->shape_sigma);
+  add("shape of the worst beam", r.pointing_error->worst_shape,
+      r.pointing_error->worst_shape_sigma);
   return html +
          fmt::format(
              "</tbody></table></div>\n<p class=\"note\">Root mean squares over the beams of the "

@@ -91,6 +91,20 @@ double zenith_degrees(const SamplePoint& p) { return degrees_from_radians(p.zeni
 double before_millimetres(const SamplePoint& p) { return kMillimetres * p.before; }
 double after_millimetres(const SamplePoint& p) { return kMillimetres * p.after; }
 
+/// Cells of the field of view, coloured by values in the unit of the reader.
+Chart map_of_cells(std::string title, std::string note, const jobs::FieldCells& cells,
+                   const std::vector<double>& values, double unit) {
+  Series series{"", "ink", SeriesKind::cells, {}, {}};
+  series.cell_width = series.cell_height = degrees_from_radians(cells.side);
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    series.x.push_back(degrees_from_radians(cells.azimuth[i]));
+    series.y.push_back(degrees_from_radians(cells.zenith[i]));
+    series.value.push_back(unit * values[i]);
+  }
+  return {std::move(title), "azimuth, deg",  "zenith, deg",
+          {series},         std::move(note), ChartKind::map};
+}
+
 /// All diagrams of the page.
 class CalibrationCharts {
  public:
@@ -136,24 +150,14 @@ class CalibrationCharts {
   std::vector<Chart> pointing() const {
     if (!input_.details.pointing) return {};
     const jobs::PointingField& field = *input_.details.pointing;
-    const double width = degrees_from_radians(field.cell);
     const auto chart = [&](std::string title, const std::vector<double>& errors,
                            const std::string& note) {
-      Series series{"", "ink", SeriesKind::cells, {}, {}};
-      series.cell_width = series.cell_height = width;
-      for (std::size_t i = 0; i < errors.size(); ++i) {
-        series.x.push_back(degrees_from_radians(field.azimuth[i]));
-        series.y.push_back(degrees_from_radians(field.zenith[i]));
-        series.value.push_back(degrees_from_radians(errors[i]));
-      }
-      Chart result{std::move(title),
-                   "azimuth, deg",
-                   "zenith, deg",
-                   {series},
-                   fmt::format("Angle between the direction that the sensor reports and the one of "
-                               "this calibration, {}; means over cells of {:.3g} degree.",
-                               note, width),
-                   ChartKind::map};
+      Chart result = map_of_cells(
+          std::move(title),
+          fmt::format("Angle between the direction that the sensor reports and the one of this "
+                      "calibration, {}; means over cells of {:.3g} degree.",
+                      note, degrees_from_radians(field.cells.side)),
+          field.cells, errors, degrees_from_radians(1.0));
       result.value_label = "error, deg";
       const double largest = *std::max_element(errors.begin(), errors.end());
       result.value_range = {0.0, degrees_from_radians(largest)};
@@ -365,28 +369,18 @@ class CalibrationCharts {
   std::vector<Chart> cell_means() const {
     if (!input_.details.field) return {};
     const jobs::WallField& field = *input_.details.field;
-    const double width = degrees_from_radians(field.cell);
     const auto chart = [&](const char* when, const std::vector<double>& means, double rms) {
-      Series series{"", "ink", SeriesKind::cells, {}, {}};
-      series.cell_width = series.cell_height = width;
-      for (std::size_t i = 0; i < means.size(); ++i) {
-        series.x.push_back(degrees_from_radians(field.azimuth[i]));
-        series.y.push_back(degrees_from_radians(field.zenith[i]));
-        series.value.push_back(kMillimetres * means[i]);
-      }
-      Chart result{
+      Chart result = map_of_cells(
           fmt::format("Mean distance from the planes over the field of view, {}", when),
-          "azimuth, deg",
-          "zenith, deg",
-          {series},
           fmt::format("Means of {} sample points over cells of {:.3g} degree, all "
                       "recordings together; cells with fewer than {} points are left out. "
                       "The {} means have a root mean square of {:.2f} mm, where noise "
                       "alone would leave about {:.2f} mm. Patches of one colour are walls "
                       "that are not flat, or beams that are bent.",
-                      count_text(field.points), width, field.fewest_points,
-                      count_text(means.size()), kMillimetres * rms, kMillimetres * field.noise),
-          ChartKind::map};
+                      count_text(field.points), degrees_from_radians(field.cells.side),
+                      field.fewest_points, count_text(means.size()), kMillimetres * rms,
+                      kMillimetres * field.noise),
+          field.cells, means, kMillimetres);
       result.value_label = "mean distance, mm";
       result.palette = Palette::diverging;
       double largest = 0;
@@ -473,7 +467,7 @@ CalibrationReport calibration_report(const CalibrationReportInput& input) {
   report.datum_kind = c.datum_kind;
   report.datum = c.datum;
   report.datum_without_common = c.datum_without_common;
-  report.reported = c.reported;
+  report.pointing_error = c.pointing_error;
   report.prior_tests = c.prior_tests;
   report.planes = c.planes;
   report.steps = c.steps;

@@ -119,13 +119,14 @@ void fields(Archive& archive, T& datum) {
   archive("total", datum.total);
 }
 
-template <class Archive, report::FieldsOf<PointingErrors> T>
+template <class Archive, report::FieldsOf<PointingError> T>
 void fields(Archive& archive, T& pointing) {
   archive("errors", pointing.errors);
   archive("total_sigma", pointing.total_sigma);
   archive("gauge_sigma", pointing.gauge_sigma);
   archive("shape_sigma", pointing.shape_sigma);
-  archive("largest_shape", pointing.largest_shape);
+  archive("worst_shape", pointing.worst_shape);
+  archive("worst_shape_sigma", pointing.worst_shape_sigma);
 }
 
 template <class Archive, report::FieldsOf<PriorTest> T>
@@ -378,7 +379,7 @@ void fields(Archive& archive, T& report) {
   archive("datum_kind", report.datum_kind);
   archive("datum", report.datum);
   archive("datum_without_common", report.datum_without_common);
-  archive("reported_directions", report.reported);
+  archive("pointing_error", report.pointing_error);
   archive("prior_tests", report.prior_tests);
   archive("planes", report.planes);
   archive("steps", report.steps);

@@ -155,11 +155,14 @@ void read_parameters(const YamlMap& map, Sensor& sensor) {
       return info.name == entry.key && info.kind != ParameterKind::rotation_angle;
     });
     if (found == list.end()) {
-      fail_at(map.path(), entry.line,
-              fmt::format(
-                  "unknown parameter {} of a sensor with {} prisms (face_order {}) and {} emitters",
-                  map.field(entry.key), sensor.prisms(), to_string(sensor.train.face_order()),
-                  sensor.train.emitters()));
+      std::vector<std::string> names;
+      for (const ParameterInfo& info : list) names.push_back(info.name);
+      fail_at(
+          map.path(), entry.line,
+          fmt::format("unknown parameter {} of a sensor with {} prisms (face_order {}) and {} "
+                      "emitters{}",
+                      map.field(entry.key), sensor.prisms(), to_string(sensor.train.face_order()),
+                      sensor.train.emitters(), did_you_mean(entry.key, names)));
     }
     const Quantity quantity = read_quantity(map, entry.key, found->unit, sensor);
     double value = si_from_file(quantity.value, scale_of(found->unit));
@@ -514,10 +517,8 @@ struct PresetSource {
 
 [[noreturn]] void fail_unknown(const std::string& name, const char* is_neither) {
   const std::vector<std::string> known = builtin_preset_names();
-  const std::string meant = near_miss(name, known);
   throw InvalidArgument(fmt::format("sensor \"{}\" {}{}; known presets: {}", name, is_neither,
-                                    meant.empty() ? "" : fmt::format("; did you mean {}?", meant),
-                                    fmt::join(known, ", ")));
+                                    did_you_mean(name, known), fmt::join(known, ", ")));
 }
 
 const BuiltinPreset* find_builtin(const std::string& name) {

@@ -296,11 +296,9 @@ void read_start(const YamlMap& map, FlightPlan& plan) {
     found = true;
   }
   if (!found) {
-    const std::string meant = near_miss(word, known);
     fail_at(map.path(), map.at("scale").line,
             fmt::format("{} = \"{}\"{}, allowed {}", map.field("scale"), word,
-                        meant.empty() ? "" : fmt::format(", did you mean {}?", meant),
-                        fmt::join(known, ", ")));
+                        did_you_mean(word, known), fmt::join(known, ", ")));
   }
   plan.start = plan_number(map, "time_s", -kLargestStart, kLargestStart, "s");
   if (map.find("gps_week") == nullptr) return;

@@ -118,11 +118,9 @@ Eigen::Matrix3d read_axes(const YamlMap& map) {
       found = true;
     }
     if (found) continue;
-    const std::string meant = near_miss(word, known);
     fail_at(map.path(), map.at(key).line,
             fmt::format("{} = \"{}\"{}, allowed forward, backward, right, left, down, up",
-                        map.field(key), word,
-                        meant.empty() ? "" : fmt::format(", did you mean {}?", meant)));
+                        map.field(key), word, did_you_mean(word, known)));
   }
   if (skewness_of(nominal) != 0) {
     fail_at(map.path(), map.line(),

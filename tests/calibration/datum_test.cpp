@@ -185,7 +185,7 @@ TEST(FormalDatum, EqualsDrawsOfTheCovariance) {
   root.row(n - 1) *= 0.3;
   const Eigen::MatrixXd covariance = root * root.transpose();
   const auto angles = some_angles(80, 4);
-  const FormalDatum formal = formal_datum(shared, free, covariance, angles);
+  const FormalDatum formal = BeamBundle(shared, free, angles).formal_datum(covariance);
 
   const Bundle truth = beams_of(shared, angles);
   const RandomStream draws(8, 1);
@@ -218,11 +218,41 @@ TEST(FormalDatum, EqualsDrawsOfTheCovariance) {
   EXPECT_GT(together, 0.93 * formal.total);
 }
 
+// What was held moves the beams with a sigma of one; left out, it is as if nothing had been held.
+TEST(BeamBundle, WhatWasHeldCountsUnlessItIsLeftOut) {
+  const PrismTrain train = testing::imperfect_train("PA-AP", 0.3, 5);
+  const auto free = estimation::free_parameters(testing::kTiltNames, {2});
+  const auto n = static_cast<Index>(free.size());
+  const Eigen::MatrixXd covariance = 4e-10 * Eigen::MatrixXd::Identity(n, n);
+  const auto angles = some_angles(60, 4);
+  HeldMovement held;
+  held.train = Eigen::MatrixXd::Zero(static_cast<Index>(train.parameters().size()), 1);
+  held.rotation_angles = Eigen::MatrixXd::Zero(2, 1);
+  held.turn = Eigen::MatrixXd::Zero(3, 1);
+  held.turn(2, 0) = 1e-3;
+  const BeamBundle alone(train, free, angles), together(train, free, angles, {}, held);
+  const FormalDatum without = alone.formal_datum(covariance),
+                    with = together.formal_datum(covariance);
+  const FormalDatum left_out = together.formal_datum(covariance, HeldErrors::left_out);
+  EXPECT_NEAR(with.sigma_yaw, std::hypot(without.sigma_yaw, 1e-3), 1e-12);
+  EXPECT_NEAR(with.shape, without.shape, 1e-9);  // all beams together
+  EXPECT_DOUBLE_EQ(left_out.total, without.total);
+  EXPECT_DOUBLE_EQ(left_out.gauge, without.gauge);
+
+  PrismTrain believed = train;
+  add_errors(believed, free, Eigen::VectorXd::Constant(n, 2e-3));
+  const PointingError a = alone.pointing_error(believed, covariance);
+  const PointingError b = together.pointing_error(believed, covariance);
+  EXPECT_DOUBLE_EQ(a.total_sigma, a.total_sigma_given_held);
+  EXPECT_DOUBLE_EQ(b.total_sigma_given_held, a.total_sigma);
+  EXPECT_GT(b.total_sigma, 2 * a.total_sigma);
+  EXPECT_DOUBLE_EQ(better_probability(a), better_probability(b));
+}
+
 TEST(FormalDatum, OfNoBeamIsRefused) {
   const PrismTrain train(parse_face_order("PA-AP"));
   const auto free = estimation::free_parameters({"incident_beam_vertical_deg"}, {2});
-  EXPECT_THROW(formal_datum(train, free, Eigen::MatrixXd::Identity(1, 1), {{}, {}}),
-               InvalidArgument);
+  EXPECT_THROW(BeamBundle(train, free, {{}, {}}), InvalidArgument);
 }
 
 TEST(Datum, KindsHaveNames) {
@@ -238,7 +268,7 @@ TEST(FormalDatum, AsksForACovarianceOfTheFreeParametersAndAnglesOfEveryPrism) {
   const Eigen::MatrixXd one = Eigen::MatrixXd::Identity(1, 1);
   const auto run = [&](const Eigen::MatrixXd& covariance,
                        const std::vector<std::vector<double>>& angles) {
-    return refusal([&] { return formal_datum(train, free, covariance, angles); });
+    return refusal([&] { return BeamBundle(train, free, angles).formal_datum(covariance); });
   };
   EXPECT_EQ(run(Eigen::MatrixXd::Identity(2, 2), {{1, 2}, {3, 4}}),
             "rows of the covariance has 2 values, expected 1");
@@ -247,7 +277,7 @@ TEST(FormalDatum, AsksForACovarianceOfTheFreeParametersAndAnglesOfEveryPrism) {
 }
 
 /// Total, gauge and shape scatter over draws of the calibration as they say, about what they are.
-TEST(PointingErrors, ScatterOverDrawsAsTheirSigmasSay) {
+TEST(PointingError, ScatterOverDrawsAsTheirSigmasSay) {
   constexpr int kDraws = 2000;
   const PrismTrain truth = testing::imperfect_train("PA-AP", 0.3, 5);
   const auto free = estimation::free_parameters(testing::kTiltNames, {2});
@@ -263,13 +293,13 @@ TEST(PointingErrors, ScatterOverDrawsAsTheirSigmasSay) {
   const auto angles = some_angles(80, 4);
   PrismTrain believed = truth;
   add_errors(believed, free, Eigen::VectorXd::Constant(n, 2e-3));
-  const PointingErrors exact = pointing_errors(believed, truth, free, covariance, angles);
+  const PointingError exact = BeamBundle(truth, free, angles).pointing_error(believed, covariance);
   const DirectionErrors known =
       direction_errors(beams_of(believed, angles), beams_of(truth, angles));
   EXPECT_NEAR(exact.errors.total, known.total, 1e-12);
   EXPECT_NEAR(exact.errors.shape, known.shape, 1e-12);
-  EXPECT_GT(exact.largest_shape, known.shape);
-  EXPECT_LT(exact.largest_shape, 5 * known.shape);
+  EXPECT_GT(exact.worst_shape, known.shape);
+  EXPECT_LT(exact.worst_shape, 5 * known.shape);
 
   const RandomStream draws(8, 1);
   double total = 0, gauge = 0, shape = 0;
@@ -280,7 +310,7 @@ TEST(PointingErrors, ScatterOverDrawsAsTheirSigmasSay) {
     PrismTrain found = truth;
     add_errors(found, free, root * white);
     const DirectionErrors errors =
-        pointing_errors(believed, found, free, covariance, angles).errors;
+        BeamBundle(found, free, angles).pointing_error(believed, covariance).errors;
     total += std::pow(errors.total - known.total, 2) / kDraws;
     gauge += std::pow(errors.gauge - known.gauge, 2) / kDraws;
     shape += std::pow(errors.shape - known.shape, 2) / kDraws;
@@ -292,7 +322,7 @@ TEST(PointingErrors, ScatterOverDrawsAsTheirSigmasSay) {
 
 // Draws of the truth about what was found: how often is what was found nearer than what was
 // believed?
-TEST(PointingErrors, TellHowProbablyACalibrationIsBetter) {
+TEST(PointingError, TellHowProbablyACalibrationIsBetter) {
   constexpr int kDraws = 4000;
   const PrismTrain found = testing::imperfect_train("PA-AP", 0.3, 5);
   const auto free = estimation::free_parameters(testing::kTiltNames, {2});
@@ -316,16 +346,16 @@ TEST(PointingErrors, TellHowProbablyACalibrationIsBetter) {
       better += direction_errors(calibrated, beams).total < direction_errors(reported, beams).total;
     }
     const double stated =
-        better_probability(pointing_errors(believed, found, free, covariance, angles));
+        better_probability(BeamBundle(found, free, angles).pointing_error(believed, covariance));
     EXPECT_NEAR(better / kDraws, stated, 0.025) << sigma;
   }
 }
 
-TEST(PointingErrors, RefuseAnotherSensor) {
+TEST(PointingError, RefuseAnotherSensor) {
   const PrismTrain train = testing::imperfect_train("PA-AP", 0.3, 5);
   const PrismTrain three = testing::imperfect_train("PA-AP-PA", 0.3, 5);
   EXPECT_NE(refusal([&] {
-              pointing_errors(three, train, {}, Eigen::MatrixXd(0, 0), some_angles(5, 1));
+              BeamBundle(train, {}, some_angles(5, 1)).pointing_error(three, Eigen::MatrixXd(0, 0));
             }).find("prisms of the believed train"),
             std::string::npos);
 }

@@ -49,12 +49,12 @@ TEST(Verdict, ParametersBeyondChanceAreBentWhereWallsGetFlatter) {
 TEST(Verdict, SaysByHowMuchDirectionsAreOff) {
   Calibration c = moved_by(1e-3);
   constexpr double kDegree = 0.017453292519943295;
-  c.reported.errors.total = 0.4012 * kDegree;
-  c.reported.errors.gauge = 0.4003 * kDegree;
-  c.reported.errors.shape = 0.02304 * kDegree;
-  c.reported.total_sigma = c.reported.gauge_sigma = 0.0015 * kDegree;
-  c.reported.shape_sigma = 0.0004 * kDegree;
-  c.reported.largest_shape = 0.0451 * kDegree;
+  c.pointing_error.errors.total = 0.4012 * kDegree;
+  c.pointing_error.errors.gauge = 0.4003 * kDegree;
+  c.pointing_error.errors.shape = 0.02304 * kDegree;
+  c.pointing_error.total_sigma = c.pointing_error.gauge_sigma = 0.0015 * kDegree;
+  c.pointing_error.worst_shape_sigma = c.pointing_error.shape_sigma = 0.0004 * kDegree;
+  c.pointing_error.worst_shape = 0.0451 * kDegree;
   EXPECT_EQ(verdict_of(c).words,
             "reported directions are off by 0.4012 ± 0.0015 degree (0.21 m at 30 m): 0.4003 ± "
             "0.0015 shared by all beams and 0.02304 ± 0.00040 in shape, 0.04510 at worst");

@@ -21,7 +21,8 @@ NICHE = "planes:\n" + "".join(
                                   ("down", 0, 145)))
 
 KEYS = {"converged", "iterations", "parameters", "planes", "datum", "before", "after", "sigma0",
-        "seconds"}
+        "seconds", "pointing_error", "verdict"}
+POINTING = {"total_deg", "shared_deg", "shape_deg", "worst_deg"}
 PLANE = {"normal", "offset_m", "points", "outliers", "rms_m"}
 DATUM = {"kind", "sigma_roll_deg", "sigma_pitch_deg", "sigma_yaw_deg"}
 ERRORS = {"azimuth_rmse_deg", "zenith_rmse_deg", "azimuth_bias_deg", "zenith_bias_deg",
@@ -99,6 +100,9 @@ class CalibrateTest(CommandTest):
             self.assertLess(plane["rms_m"], 0.021)
         self.assertLessEqual(DATUM, result["datum"].keys())
         self.assertEqual(result["datum"]["kind"], kind)
+        for name in POINTING:
+            self.assertGreater(result["pointing_error"][name]["value"], 0)
+            self.assertGreater(result["pointing_error"][name]["sigma"], 0)
         self.assertLess(result["after"]["plane_rms_m"], result["before"]["plane_rms_m"])
         self.assertLessEqual({"read", "solve", "total"}, result["seconds"].keys())
 
@@ -110,6 +114,10 @@ class CalibrateTest(CommandTest):
         self.assertLess(after["total_deg"], most_deg)
         self.assertLess(after["shape_deg"], 0.1 * before["shape_deg"] + 0.005)
         self.assertLess(after["total_deg"], 5 * result["datum"]["sigma_total_deg"])
+        for found, true in (("total_deg", "total_deg"), ("shared_deg", "gauge_deg"),
+                            ("shape_deg", "shape_deg")):
+            known = result["pointing_error"][found]
+            self.assertLess(abs(known["value"] - before[true]), 5 * known["sigma"])
 
     def test_hall(self):
         result = self.expect_json(0, "calibrate", "hall.nc", *truth_of("hall.nc"), "-o", "out")

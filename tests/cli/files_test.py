@@ -46,6 +46,21 @@ class FilesTest(CommandTest):
                     for key, value in place.items():
                         self.assertEqual(result[key], value)
 
+    def test_a_result_folder_stands_for_its_calibration(self):
+        for name, preset in (("result", "avia"), ("nothing", None)):
+            (self.folder / name).mkdir()
+            if preset:
+                text = self.expect(0, "preset", "show", preset).stdout
+                (self.folder / name / "calibration.yaml").write_text(text)
+        seconds = ["--duration-s", "0.01"]
+        self.expect(0, "simulate", "-o", "a.sequence.csv", "--sensor", "result", *seconds)
+        self.expect(0, "simulate", "-o", "b.sequence.csv", "--sensor", "avia", *seconds)
+        self.assertEqual((self.folder / "a.sequence.csv").read_bytes(), (self.folder / "b.sequence.csv").read_bytes())
+        inputs = self.expect_json(0, "simulate", "-o", "a.sequence.csv", "--sensor", "result", *seconds)["inputs"]
+        self.assertEqual([one["path"] for one in inputs], ["result/calibration.yaml"])
+        done = self.expect(3, "simulate", "-o", "c.sequence.csv", "--sensor", "nothing", *seconds)
+        self.assertIn("nothing: is a folder, expected a file", done.stderr)
+
     def test_rows_before_damage_are_told(self):
         result = self.expect_json(3, "info", "nan.csv")
         self.assertEqual(result["observations"], 1)

@@ -19,6 +19,15 @@ TEST(NearMiss, FindsWhatWasMeant) {
   EXPECT_EQ(near_miss("avai", names), "avia");
 }
 
+TEST(NearMiss, FindsANameByItsBeginning) {
+  const std::vector<std::string> names{"--noise-angle-deg", "--noise-range-m", "wedge_angle_deg"};
+  EXPECT_EQ(near_miss("--noise", names), "--noise-angle-deg");
+  EXPECT_EQ(near_miss("wedge", names), "wedge_angle_deg");
+  EXPECT_EQ(near_miss("--noi", names), "");  // not up to a mark
+  EXPECT_EQ(did_you_mean("wedge", names), ", did you mean wedge_angle_deg?");
+  EXPECT_EQ(did_you_mean("lens", names), "");
+}
+
 TEST(NearMiss, IsSilentWhereNothingIsNear) {
   const std::vector<std::string> names{"avia", "horizon"};
   EXPECT_EQ(near_miss("velodyne", names), "");

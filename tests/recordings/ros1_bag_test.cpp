@@ -648,7 +648,9 @@ TEST(Ros1Bag, AClaimedChunkCostsNoMemory) {
   const Outcome outcome = read_all(kRos1BagFormat, path);
   ASSERT_TRUE(outcome.error);
   EXPECT_THAT(outcome.error->problem(), HasSubstr("of the unpacked chunk"));
+#if !defined(__SANITIZE_THREAD__)  // it touches its own notes of every allocation
   EXPECT_LT(peak_kib() - before, 200 << 10);
+#endif
 }
 
 TEST(Ros1Bag, ReadersOfSeveralThreadsLeaveTheLoggingAsItWas) {

@@ -124,11 +124,13 @@ Calibration example() {
                    {"ceiling", false, deg(0.4), 80.5, 2, 18.4},
                    {"nobody knows", false, kNaN, kNaN, 2, 18.4},
                    {"unseen", true, 0, 0, 0, 0}};
-  c.reported = {{deg(0.07), deg(0.35), 0, 0, deg(0.3571), deg(0.3502), deg(0.0231), {}},
-                deg(0.0016),
-                deg(0.0017),
-                deg(0.00031),
-                deg(0.0512)};
+  c.pointing_error = {{deg(0.07), deg(0.35), 0, 0, deg(0.3571), deg(0.3502), deg(0.0231), {}},
+                      deg(0.0016),
+                      deg(0.0017),
+                      deg(0.00031),
+                      deg(0.0015),
+                      deg(0.0512),
+                      deg(0.0006)};
   c.verdict = {calibration::CalibrationCode::as_believed, "walls <bear out> the belief", "nothing"};
   c.sigma0 = 0.98;
   c.unevenness = 1.4;
@@ -274,7 +276,7 @@ TEST(CalibrationPage, OfABentUnitSaysByHowMuchAndWhere) {
   EXPECT_THAT(shown, HasSubstr("does not point where it believes: use this calibration"));
   EXPECT_THAT(shown, HasSubstr("<td>0.3571</td><td>0.0016</td><td>187.0</td>"));
   EXPECT_THAT(shown, HasSubstr("<td>0.02310</td><td>0.00031</td><td>12.1</td>"));
-  EXPECT_THAT(shown, HasSubstr("<td>0.05120</td><td>0.00031</td><td>26.8</td>"));
+  EXPECT_THAT(shown, HasSubstr("<td>0.05120</td><td>0.00060</td><td>26.8</td>"));
   // The map's mean is what its beams are off by.
   const nlohmann::json charts = data(html);
   ASSERT_EQ(charts[0].at("title"), "Error of reported directions over the field of view");

@@ -87,7 +87,7 @@ CalibrationReport calibration_example() {
   r.datum = {1, 2, 3, 4, 5, 6};
   r.datum_without_common = {6, 5, 4, 3, 2, 1};
   r.verdict = {"bent", "reported directions are off", "use it"};
-  r.reported = {{1, 2, 3, 4, 5, 6, 7, {8, 9, 10}}, 11, 12, 13, 14};
+  r.pointing_error = {{1, 2, 3, 4, 5, 6, 7, {8, 9, 10}}, 11, 12, 13, 20, 14, 15};
   r.prior_tests = {{"flipped", true, 0.01, 4.5, 3, 21.1}};
   calibration::CalibratedPlane plane;
   plane.name = "floor";
@@ -165,7 +165,7 @@ TEST_F(ReportFile, ACalibrationComesBackAsItWas) {
   EXPECT_TRUE(std::isnan(r.planes[0].rms));
   EXPECT_EQ(r.truth->after.rotation.y, 10);
   EXPECT_EQ(r.verdict->words, "reported directions are off");
-  EXPECT_EQ(r.reported->largest_shape, 14);
+  EXPECT_EQ(r.pointing_error->worst_shape, 14);
   EXPECT_EQ(r.wall_charts[0].series[0].z[0], 3);
   EXPECT_EQ(r.pointing_charts->at(0).title, "pointing");
   const std::string first = io::read_text_file(path());

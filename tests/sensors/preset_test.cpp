@@ -232,7 +232,7 @@ TEST(Preset, UnknownNameListsTheKnownOnes) {
     FAIL();
   } catch (const InvalidArgument& error) {
     EXPECT_THAT(error.what(),
-                HasSubstr("neither a file nor a known preset; did you mean mid-40?; known presets: "
+                HasSubstr("neither a file nor a known preset, did you mean mid-40?; known presets: "
                           "avia, avia-sequence, horizon"));
   }
   EXPECT_THROW(load_sensor("velodyne"), InvalidArgument);

@@ -167,9 +167,10 @@ calibration::FormalDatum datum_of_file(const sensors::Sensor& sensor, const Wall
     names.push_back(sensor.covariance_names[i]);
     rows.push_back(static_cast<Eigen::Index>(i));
   }
-  return calibration::formal_datum(sensor.train, estimation::free_parameters(names, sensor.shape()),
-                                   Eigen::MatrixXd(sensor.covariance(rows, rows)),
-                                   walls.recording.shots.rotation_angle);
+  const calibration::BeamBundle bundle(sensor.train,
+                                       estimation::free_parameters(names, sensor.shape()),
+                                       walls.recording.shots.rotation_angle);
+  return bundle.formal_datum(Eigen::MatrixXd(sensor.covariance(rows, rows)));
 }
 
 TEST(Calibration, TotalSigmasHoldWhatHeldParametersAreOffBy) {

@@ -204,7 +204,8 @@ class WallMonteCarlo {
     largest_total = std::max(largest_total, total);
     gauge_ += degrees_from_radians(e.after.gauge);
     shape_ += degrees_from_radians(e.after.shape);
-    const double off = (c.reported.errors.total - e.before.total) / c.reported.total_sigma;
+    const double off =
+        (c.pointing_error.errors.total - e.before.total) / c.pointing_error.total_sigma;
     reported_over_sigma2_ += off * off;
     total2_ += std::pow(e.after.total, 2);
     shape2_ += std::pow(e.after.shape, 2);

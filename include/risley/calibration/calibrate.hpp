@@ -115,7 +115,7 @@ struct Calibration {
   FormalDatum datum;                 ///< after, everything included
   FormalDatum datum_given_held;      ///< if everything that was held were exactly as held
   FormalDatum datum_without_common;  ///< without the common errors of the rotation angles
-  PointingErrors reported;           ///< of the directions that the sensor reports
+  PointingError pointing_error;      ///< of the directions that the sensor reports
   /// That calibrated directions are nearer to the truth than reported ones, root mean square over
   /// the beams, if everything that was held is as held. docs/theory/calibration.md
   double better_probability = 1;

@@ -44,36 +44,72 @@ struct HeldMovement {
   Eigen::MatrixXd turn;  ///< rotation of the bundle about X, Y, Z [3, held], rad; empty: none
 };
 
-/// Propagates a covariance to a bundle of beams.
-/// @param rotation_angles  [prisms][beams], rad
-/// @param emitter          of every beam, from 0; empty: all the first
-/// @param held             what goes on top; without columns: nothing
-FormalDatum formal_datum(const PrismTrain& train,
-                         const std::vector<estimation::FreeParameter>& free,
-                         const Eigen::MatrixXd& covariance,
-                         const std::vector<std::vector<double>>& rotation_angles,
-                         std::span<const std::uint8_t> emitter = {}, const HeldMovement& held = {});
+/// Where people say in metres how far beams are off, m.
+inline constexpr double kStatedDistance = 30;
 
 /// How wrong the directions are that a sensor reports, as a calibration has it.
-struct PointingErrors {
+struct PointingError {
   DirectionErrors errors;  ///< reported minus calibrated
   /// Of errors.total, gauge and shape, to first order in the covariance of the calibration, rad.
   double total_sigma = 0, gauge_sigma = 0, shape_sigma = 0;
-  double largest_shape = 0;  ///< of the beams, without the rotation that all share, rad
+  double total_sigma_given_held = 0;  ///< as if what was held were true, rad
+  /// Of the beam with the largest, without the rotation that all share, rad.
+  double worst_shape = 0, worst_shape_sigma = 0;
 };
 
-/// @param believed  what the sensor computes directions with
-/// Else as formal_datum(). @throws InvalidArgument as formal_datum() and direction_errors()
-PointingErrors pointing_errors(const PrismTrain& believed, const PrismTrain& train,
-                               const std::vector<estimation::FreeParameter>& free,
-                               const Eigen::MatrixXd& covariance,
-                               const std::vector<std::vector<double>>& rotation_angles,
-                               std::span<const std::uint8_t> emitter = {},
-                               const HeldMovement& held = {});
+/// Whether what was held may be wrong.
+enum class HeldErrors { included, left_out };
 
-/// Probability that the calibration's directions are nearer to the truth than the reported ones.
-/// Where these differ by d, the calibration is worse when its own error along d is below -d / 2.
-double better_probability(const PointingErrors& reported);
+/// Beams that get through a train, and how their directions follow its free parameters and what was
+/// held.
+class BeamBundle {
+ public:
+  /// @param rotation_angles  [prisms][beams], rad
+  /// @param emitter          of every beam, from 0; empty: all the first
+  /// @param held             without columns: nothing was
+  /// @throws InvalidArgument where lengths do not match or no beam gets through
+  BeamBundle(const PrismTrain& train, const std::vector<estimation::FreeParameter>& free,
+             const std::vector<std::vector<double>>& rotation_angles,
+             std::span<const std::uint8_t> emitter = {}, const HeldMovement& held = {});
+
+  /// What a covariance means for the beams.
+  /// @param covariance  of the free parameters [free, free], SI
+  FormalDatum formal_datum(const Eigen::MatrixXd& covariance,
+                           HeldErrors held = HeldErrors::included) const;
+
+  /// @param believed    what the sensor computes directions with
+  /// @param covariance  of the free parameters [free, free], SI
+  /// @throws InvalidArgument as direction_errors()
+  PointingError pointing_error(const PrismTrain& believed, const Eigen::MatrixXd& covariance) const;
+
+ private:
+  struct Beam {
+    std::vector<double> rotation_angles;  ///< [prisms]
+    std::uint8_t emitter = 0;
+    Eigen::Vector3d direction;
+    Eigen::Matrix<double, 3, Eigen::Dynamic> jacobian;   ///< of the direction [3, free + held]
+    Eigen::Matrix<double, 2, Eigen::Dynamic> of_angles;  ///< of azimuth and zenith [2, free + held]
+  };
+
+  template <int N>
+  void add_beams(const PrismTrain& train, const std::vector<estimation::FreeParameter>& free,
+                 const std::vector<std::vector<double>>& rotation_angles,
+                 std::span<const std::uint8_t> emitter, const HeldMovement& held);
+  Eigen::MatrixXd covariance_of_all(const Eigen::MatrixXd& covariance, HeldErrors held) const;
+  Eigen::MatrixXd rest(const Beam& beam) const;
+  double count() const { return static_cast<double>(beams_.size()); }
+
+  int prisms_ = 0, emitters_ = 0;
+  Eigen::Index free_ = 0, held_ = 0;  ///< quantities
+  std::vector<Beam> beams_;
+  Eigen::Matrix3d normal_ = Eigen::Matrix3d::Zero();
+  Eigen::MatrixXd turn_;  ///< the shared rotation that each quantity makes [3, free + held]
+};
+
+/// Probability that the calibration's directions are nearer to the truth than the reported ones, if
+/// what was held is true. Where these differ by d, the calibration is worse when its own error
+/// along d is below -d / 2.
+double better_probability(const PointingError& error);
 
 /// What ties the frame of the calibrated beams to the outside.
 enum class DatumKind {

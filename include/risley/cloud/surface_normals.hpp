@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -13,8 +14,9 @@ namespace risley::cloud {
 
 /// Directions of the surfaces that a sensor looks at, from the ranges around each direction. Cells
 /// of one degree collect moments of inverse depth over y/x and z/x, in which a plane is linear; a
-/// cell and its eight neighbours together make one fit. Directions flatter than six degrees to the
-/// plane across the X axis, or behind it, have none.
+/// cell and its eight neighbours together make one fit. Where surfaces end or meet there is no fit,
+/// and a shot belongs to the surface of a cell nearby that leads to its range, if one does.
+/// Directions flatter than six degrees to the plane across the X axis, or behind it, have none.
 /// Derivation: docs/theory/cloud.md
 class SurfaceNormals {
  public:
@@ -33,13 +35,14 @@ class SurfaceNormals {
   void add(double azimuth, double zenith, double range);
   /// Fits all cells to the shots added.
   void fit();
-  /// Unit normal of the surface in a direction, of either sign, sensor frame; NaN where there is
+  /// Unit normal of the surface that a shot is on, of either sign, sensor frame; NaN where there is
   /// none.
-  Vector3<double> normal(double azimuth, double zenith) const {
+  Vector3<double> normal(double azimuth, double zenith, double range) const {
     const std::size_t cell = cell_of(azimuth, zenith);
     if (cell == kNowhere) return kNone;
-    const auto& n = normals_[cell];
-    return {n[0], n[1], n[2]};
+    const Surface& own = surfaces_[cell];
+    if (own.beside_count == 0) return own.plane.normal();
+    return normal_beside(own, azimuth, zenith, range);
   }
 
  private:
@@ -62,12 +65,39 @@ class SurfaceNormals {
     if (!(column >= 0 && column < kSide && row >= 0 && row < kSide)) return kNowhere;
     return static_cast<std::size_t>(row) * kSide + static_cast<std::size_t>(column);
   }
-  std::array<float, 3> fitted(const Moments& moments) const;
+  /// Points p with n p = distance; NaN where there is none.
+  struct FittedPlane {
+    std::array<float, 3> n;
+    float distance = 0;
+
+    bool exists() const { return n[0] == n[0]; }
+    Vector3<double> normal() const { return {n[0], n[1], n[2]}; }
+    /// How far it is in a direction.
+    double range(const Vector3<double>& direction) const {
+      return static_cast<double>(distance) / dot(normal(), direction);
+    }
+  };
+  /// What a cell knows: its plane, or those of cells nearby.
+  struct Surface {
+    FittedPlane plane;
+    std::uint32_t beside = 0;  ///< first of its row in beside_
+    std::uint32_t beside_count = 0;
+  };
+
+  static const FittedPlane kNoPlane;
+
+  FittedPlane fitted(const Moments& moments) const;
+  void find_beside(std::size_t cell);
+  template <class Function>
+  static void for_cells_around(std::size_t cell, int reach, Function&& function);
+  Vector3<double> normal_beside(const Surface& surface, double azimuth, double zenith,
+                                double range) const;
 
   double range_noise_;
   std::vector<Moments> moments_;
   std::vector<std::size_t> touched_;
-  std::vector<std::array<float, 3>> normals_;
+  std::vector<Surface> surfaces_;
+  std::vector<FittedPlane> beside_;
 };
 
 }  // namespace risley::cloud

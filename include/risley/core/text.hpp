@@ -13,8 +13,12 @@ std::string lower_case(std::string text);
 
 /// The name that somebody may have meant who wrote another word: the one that fewest changed,
 /// missing, added or swapped letters separate from it, where capitals and hyphens, underscores and
-/// spaces do not count. Empty when every name is further than a third of its letters away.
+/// spaces do not count; else the first name that the word is the beginning of, up to such a mark.
+/// Empty when every name is further than a third of its letters away.
 std::string near_miss(std::string_view word, std::span<const std::string> names);
+
+/// The same for a message: ", did you mean NAME?", or nothing.
+std::string did_you_mean(std::string_view word, std::span<const std::string> names);
 
 /// The same for a terminal: what it would obey instead of showing is written out, control
 /// characters as \u001b, marks that turn the direction of writing as \u202e, bytes that are no

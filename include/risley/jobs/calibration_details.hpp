@@ -14,11 +14,16 @@
 
 namespace risley::jobs {
 
+/// Square cells of the field of view.
+struct FieldCells {
+  double side = 0;                      ///< rad
+  std::vector<double> azimuth, zenith;  ///< middle of the cells, rad
+};
+
 /// Mean distances from the planes over cells of the field of view, of all recordings together.
 /// Cells with few points are left out.
 struct WallField {
-  double cell = 0;                              ///< side, rad
-  std::vector<double> azimuth, zenith;          ///< middle of the cells, rad
+  FieldCells cells;
   std::vector<double> mean_before, mean_after;  ///< [cells], m
   std::size_t fewest_points = 0;                ///< that a cell must hold
   std::size_t points = 0;                       ///< of all cells, those left out too
@@ -28,10 +33,9 @@ struct WallField {
 
 /// Mean errors of reported directions over cells of the field of view, of all recordings together.
 struct PointingField {
-  double cell = 0;                      ///< side, rad
-  std::vector<double> azimuth, zenith;  ///< middle of the cells, rad
-  std::vector<double> total;            ///< [cells], rad
-  std::vector<double> shape;            ///< without the rotation that all beams share, rad
+  FieldCells cells;
+  std::vector<double> total;  ///< [cells], rad
+  std::vector<double> shape;  ///< without the rotation that all beams share, rad
 };
 
 /// Mean of the points of one wall in one cell of the field of view: single points would show

@@ -44,7 +44,7 @@ struct CalibrationReport {
 
   calibration::DatumKind datum_kind = calibration::DatumKind::none;
   calibration::FormalDatum datum, datum_without_common;
-  std::optional<calibration::PointingErrors> reported;  ///< not in files of older versions
+  std::optional<calibration::PointingError> pointing_error;  ///< not in files of older versions
   std::vector<calibration::PriorTest> prior_tests;
   std::vector<calibration::CalibratedPlane> planes;
   std::vector<calibration::SurfaceStep> steps;

@@ -183,7 +183,6 @@ PoseTable csv_table(const std::string& path, std::string_view header,
     table.columns.push_back(std::move(column));
   }
   for (const std::string& name : unknown) {
-    const std::string meant = near_miss(name, all_csv_names());
     const bool lacks_unit = csv_column(name + "_deg") || csv_column(name + "_m") ||
                             csv_column(name + "_s") || csv_column(name + "_m_per_s");
     if (lacks_unit) {
@@ -194,9 +193,8 @@ PoseTable csv_table(const std::string& path, std::string_view header,
       refuse(
           fmt::format("column {} names no unit, did you mean {}?", io::printable(name), with_unit));
     }
-    if (!meant.empty()) {
-      refuse(fmt::format("unknown column {}, did you mean {}?", io::printable(name), meant));
-    }
+    const std::string meant = did_you_mean(name, all_csv_names());
+    if (!meant.empty()) refuse(fmt::format("unknown column {}{}", io::printable(name), meant));
   }
   const auto missing = [&](std::initializer_list<std::pair<PoseField, const char*>> wanted) {
     std::vector<std::string> names;
