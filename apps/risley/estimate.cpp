@@ -302,7 +302,7 @@ void print_outcome(const EstimatedRecording& outcome) {
   if (outcome.evaluation) {
     say("\nrotation angle rmse:");
     for (std::size_t i = 0; i < outcome.evaluation->rotation_angle_rmse.size(); ++i) {
-      say(" {} {:.5f} deg", prism_letter(static_cast<int>(i)),
+      say(" {} {:.5f} deg", prism_capital(static_cast<int>(i)),
           degrees_from_radians(outcome.evaluation->rotation_angle_rmse[i]));
     }
     say("\nNEES per degree of freedom (1 is honest): parameters {:.3g}, rotation angles {:.3g}\n",

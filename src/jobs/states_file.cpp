@@ -45,25 +45,25 @@ std::vector<StateColumn> columns_of(const estimation::RotorStates& states) {
   std::size_t entry = 0;
   std::vector<StateColumn> covariances;
   for (std::size_t i = 0; i < prisms; ++i) {
-    const char a = prism_letter(static_cast<int>(i));
+    const char a = prism_letter(static_cast<int>(i)), prism = prism_capital(static_cast<int>(i));
     columns.push_back({fmt::format("rotation_angle_{}_deg", a), "degree",
-                       fmt::format("rotation angle of prism {}, not wrapped", a),
+                       fmt::format("rotation angle of prism {}, not wrapped", prism),
                        &states.rotation_angle[i], k});
     columns.push_back({fmt::format("rotation_angle_sigma_{}_deg", a), "degree",
-                       fmt::format("standard deviation of the rotation angle of prism {}", a),
+                       fmt::format("standard deviation of the rotation angle of prism {}", prism),
                        &states.rotation_angle_covariance[entry++], k, true});
     for (std::size_t j = i + 1; j < prisms; ++j) {
       const char b = prism_letter(static_cast<int>(j));
-      covariances.push_back(
-          {fmt::format("rotation_angle_covariance_{}{}_deg2", a, b), "degree2",
-           fmt::format("covariance of the rotation angles of prisms {} and {}", a, b),
-           &states.rotation_angle_covariance[entry++], k * k});
+      covariances.push_back({fmt::format("rotation_angle_covariance_{}{}_deg2", a, b), "degree2",
+                             fmt::format("covariance of the rotation angles of prisms {} and {}",
+                                         prism, prism_capital(static_cast<int>(j))),
+                             &states.rotation_angle_covariance[entry++], k * k});
     }
     columns.push_back({fmt::format("angular_velocity_{}_deg_per_s", a), "degree s-1",
-                       fmt::format("angular velocity of prism {}", a), &states.angular_velocity[i],
-                       k});
+                       fmt::format("angular velocity of prism {}", prism),
+                       &states.angular_velocity[i], k});
     columns.push_back({fmt::format("angular_velocity_sigma_{}_deg_per_s", a), "degree s-1",
-                       fmt::format("standard deviation of the angular velocity of prism {}", a),
+                       fmt::format("standard deviation of the angular velocity of prism {}", prism),
                        &states.angular_velocity_sigma[i], k});
   }
   columns.insert(columns.end(), covariances.begin(), covariances.end());
@@ -123,7 +123,8 @@ void write_states(const io::OutputFile& output, const StatesContent& content,
       const auto profile = [&](const std::string& name, const char* units,
                                const std::string& what) {
         return define<double>(file, angles, name, units,
-                              fmt::format("{} by rotation angle of prism {}", what, letter));
+                              fmt::format("{} by rotation angle of prism {}", what,
+                                          prism_capital(static_cast<int>(i))));
       };
       profiles.push_back(
           {profile(fmt::format("residual_shots_by_angle_{}", letter), "1", "shots used"),

@@ -62,31 +62,34 @@ std::string millimetres_text(const std::vector<double>& sizes) {
 std::string beam_origin_page(const BeamOriginMap& map, const sensors::Sensor& sensor,
                              const Provenance& provenance) {
   Figures figures;
-  std::string body = fmt::format(
+  const std::string head = fmt::format(
       "<p>Prisms {} mm thick with perpendicular faces {} mm apart shift the beam sideways. {} "
       "beams, cells of {} degree.</p>\n",
       millimetres_text(sensor.geometry.thickness), millimetres_text(sensor.geometry.spacing),
       map.beams, degrees_from_radians(map.cell));
+  Sections sections;
   if (map.size() > 0) {
-    body += "<h2>Horizontal (Y)</h2>\n";
-    body += charts_html(
-        {map_chart(map, "Least Y of the beam's origin", map.least_y),
-         map_chart(map, "Greatest Y of the beam's origin", map.greatest_y),
-         map_chart(map, "Y: greatest minus least", difference(map.greatest_y, map.least_y))},
-        figures);
-    body += "<h2>Vertical (Z)</h2>\n";
-    body += charts_html(
-        {map_chart(map, "Least Z of the beam's origin", map.least_z),
-         map_chart(map, "Greatest Z of the beam's origin", map.greatest_z),
-         map_chart(map, "Z: greatest minus least", difference(map.greatest_z, map.least_z))},
-        figures);
+    sections.add("Horizontal (Y)",
+                 charts_html({map_chart(map, "Least Y of the beam's origin", map.least_y),
+                              map_chart(map, "Greatest Y of the beam's origin", map.greatest_y),
+                              map_chart(map, "Y: greatest minus least",
+                                        difference(map.greatest_y, map.least_y))},
+                             figures),
+                 Sections::Shown::unfolded);
+    sections.add("Vertical (Z)",
+                 charts_html({map_chart(map, "Least Z of the beam's origin", map.least_z),
+                              map_chart(map, "Greatest Z of the beam's origin", map.greatest_z),
+                              map_chart(map, "Z: greatest minus least",
+                                        difference(map.greatest_z, map.least_z))},
+                             figures),
+                 Sections::Shown::unfolded);
   }
-  body += provenance_html(provenance);
+  sections.add(kHowToRepeat, provenance_html(provenance));
   return page_html(
       "Where beams start: " + sensor.name,
       "How far the point where the beam leaves the last prism lies beside the origin of "
       "the sensor's frame, over its field of view.",
-      body, figures);
+      head, sections, figures);
 }
 
 }  // namespace risley::report

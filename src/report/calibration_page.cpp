@@ -28,7 +28,10 @@ constexpr const char* kNothingToDraw = "<p>There are no points to draw.</p>\n";
 std::string degrees(double radians) { return finite_text("{:.3g}", degrees_from_radians(radians)); }
 
 /// A sigma that was never computed is zero.
-std::string sigma_degrees(double sigma) { return is_sigma(sigma) ? degrees(sigma) : "–"; }
+std::string sigma_degrees(double sigma) {
+  const double in_degrees = degrees_from_radians(sigma);
+  return is_sigma(sigma) ? number_text(in_degrees, in_degrees).sigma : "–";
+}
 
 std::string recording_name(const CalibrationReport& r, std::size_t recording) {
   if (recording < r.recordings.size()) return r.recordings[recording].name;
@@ -59,13 +62,15 @@ const char* datum_text(DatumKind kind) {
     case DatumKind::none:
       break;
   }
-  return "no outside reference fixes the sensor's frame, only the shape of its bundle of beams";
+  return "no outside reference fixes the sensor's frame, only the shape of the bundle that its "
+         "beams form";
 }
 
 std::string boresight_advice_html(const CalibrationReport& r) {
   return fmt::format(
       "<p><b>Absolute boresight must not be trusted from these walls:</b> pitch and yaw, which all "
-      "beams share, have a formal sigma of {}° together, and more than {:.2g}° is poor. The shape "
+      "beams share, have a standard uncertainty of {}° together, and more than {:.2g}° is poor. "
+      "The shape "
       "of the bundle, and with it the flatness of point clouds, does not suffer. Set-ups that "
       "help:</p>{}",
       sigma_degrees(boresight_sigma(r.datum)), degrees_from_radians(calibration::kPoorDatum),
@@ -90,8 +95,8 @@ Verdict verdict_of(const CalibrationReport& r) {
           : fmt::format(
                 "The walls are {} mm thick before and {} mm after the calibration (root mean "
                 "square distance "
-                "of {} points from {} planes); {}; formal sigma of roll {}°, pitch {}° and yaw "
-                "{}°.",
+                "of {} points from {} planes); {}; the standard uncertainty of roll is {}°, of "
+                "pitch {}° and of yaw {}°.",
                 millimetres(r.rms_before), millimetres(r.rms_after), count_text(r.points),
                 r.planes.size(), datum_text(r.datum_kind), sigma_degrees(r.datum.sigma_roll),
                 sigma_degrees(r.datum.sigma_pitch), sigma_degrees(r.datum.sigma_yaw));
@@ -117,6 +122,28 @@ std::string subject_text(const CalibrationReport& r) {
               ? "; by the paper's unweighted distances from planes"
               : "; by an adjustment of all recordings together";
   return text + ".";
+}
+
+std::vector<KeyNumber> key_numbers(const CalibrationReport& r) {
+  std::vector<KeyNumber> numbers;
+  if (r.pointing_error) {
+    const auto known = [](double value, double sigma) {
+      const NumberText text = number_text(degrees_from_radians(value), degrees_from_radians(sigma));
+      return fmt::format("{}° ± {}°", text.value, text.sigma);
+    };
+    const DirectionErrors& errors = r.pointing_error->errors;
+    numbers.push_back({known(errors.total, r.pointing_error->total_sigma),
+                       fmt::format("error of the reported directions: {} mm at {:.0f} m",
+                                   millimetres(kStatedDistance * errors.total), kStatedDistance)});
+    numbers.push_back({known(errors.shape, r.pointing_error->shape_sigma),
+                       fmt::format("of it in the shape of the bundle of beams, which no alignment "
+                                   "takes up: {} mm at {:.0f} m",
+                                   millimetres(kStatedDistance * errors.shape), kStatedDistance)});
+  }
+  numbers.push_back({fmt::format("{} mm", millimetres(r.rms_after)),
+                     fmt::format("thickness of the walls after the calibration, {} mm before",
+                                 millimetres(r.rms_before))});
+  return numbers;
 }
 
 std::string to_place_of(double value, double sigma) {
@@ -151,7 +178,7 @@ std::string parameters_html(const CalibrationReport& r) {
   const bool truth = !r.parameters.empty() && std::isfinite(r.parameters.front().truth);
   const bool any_held = any_held_parameter(r.parameters);
   std::string html =
-      "<h2>Parameters</h2>\n<div class=\"wide\"><table><thead><tr><th>parameter</th><th>value</th>"
+      "<div class=\"wide\"><table><thead><tr><th>parameter</th><th>value</th>"
       "<th>σ</th>";
   if (any_held) html += "<th>σ given held</th>";
   html += "<th>unit</th><th>nominal</th><th>believed</th><th>difference</th>";
@@ -203,7 +230,7 @@ std::string pointing_html(const CalibrationReport& r) {
   if (!r.pointing_error) return "";
   const DirectionErrors& errors = r.pointing_error->errors;
   std::string html = fmt::format(
-      "<h2>Where the sensor points</h2>\n<div class=\"wide\"><table><thead><tr><th>error of "
+      "<div class=\"wide\"><table><thead><tr><th>error of "
       "reported "
       "directions</th><th>deg</th><th>σ</th><th>mm at {:.0f} m</th></tr></thead><tbody>\n",
       kStatedDistance);
@@ -272,8 +299,9 @@ std::string unobservable_html(const CalibrationReport& r) {
 
 std::string datum_html(const CalibrationReport& r) {
   std::string html = fmt::format(
-      "<h2>Datum</h2>\n<p>In this calibration {}.</p>\n"
-      "<div class=\"wide\"><table><thead><tr><th>formal sigma of the beams, deg</th><th>shape</th>"
+      "<p>In this calibration {}.</p>\n"
+      "<div class=\"wide\"><table><thead><tr><th>standard uncertainty of the beams, "
+      "deg</th><th>shape</th>"
       "<th>gauge</th><th>total</th><th>roll</th><th>pitch</th><th>yaw</th></tr></thead><tbody>\n",
       datum_text(r.datum_kind));
   html += formal_datum_row("everything included", r.datum);
@@ -306,9 +334,9 @@ bool is_level(const CalibratedPlane& plane) {
 }
 
 std::string planes_html(const CalibrationReport& r) {
-  if (r.planes.empty()) return "<h2>Walls</h2>\n<p>There are none.</p>\n";
+  if (r.planes.empty()) return "<p>There are none.</p>\n";
   std::string html =
-      "<h2>Walls</h2>\n<div class=\"wide\"><table><thead><tr><th>plane</th><th>recording</th>"
+      "<div class=\"wide\"><table><thead><tr><th>plane</th><th>recording</th>"
       "<th>normal azimuth,<br>deg</th><th>zenith,<br>deg</th><th>distance,<br>m</th><th>points</th>"
       "<th>outliers</th><th>RMS before,<br>mm</th><th>after,<br>mm</th><th>range σ,<br>mm</th></tr>"
       "</thead><tbody>\n";
@@ -362,23 +390,29 @@ std::string steps_html(const CalibrationReport& r) {
 
 std::string calibration_page(const CalibrationReport& r) {
   Figures figures;
-  std::string body = verdict_html(verdict_of(r));
-  body += pointing_html(r);
-  if (r.pointing_charts) body += charts_html(*r.pointing_charts, figures);
-  body += parameters_html(r);
-  body += datum_html(r) + charts_html(r.truth_charts, figures);
-  body += planes_html(r) + steps_html(r) + charts_html(r.wall_charts, figures);
-  body += "<h2>Thickness of the walls</h2>\n";
-  body += r.thickness_charts.empty() ? kNothingToDraw : charts_html(r.thickness_charts, figures);
-  body += "<h2>What was taken for a wall</h2>\n";
-  body += r.view_charts.empty() ? kNothingToDraw : charts_html(r.view_charts, figures);
-  body += correlation_html(r.free, r.covariance, r.shape());
-  body += time_audit_html(r.recordings);
-  body += provenance_html(r.provenance);
+  const std::vector<Chart>& first = r.pointing_charts ? *r.pointing_charts : r.thickness_charts;
+  const std::string head =
+      verdict_html(verdict_of(r)) + overview_html(key_numbers(r), first, figures);
+  Sections sections;
+  std::string pointing = pointing_html(r);
+  if (r.pointing_charts) pointing += charts_html(*r.pointing_charts, figures, 1);
+  sections.add("Where the sensor points", pointing, Sections::Shown::unfolded);
+  sections.add("Parameters", parameters_html(r), Sections::Shown::unfolded);
+  sections.add("Datum", datum_html(r) + charts_html(r.truth_charts, figures));
+  sections.add("Walls", planes_html(r) + steps_html(r) + charts_html(r.wall_charts, figures));
+  sections.add("Thickness of the walls",
+               r.thickness_charts.empty()
+                   ? kNothingToDraw
+                   : charts_html(r.thickness_charts, figures, r.pointing_charts ? 0 : 1));
+  sections.add("What was taken for a wall",
+               r.view_charts.empty() ? kNothingToDraw : charts_html(r.view_charts, figures));
+  sections.add(kCorrelations, correlation_html(r.free, r.covariance, r.shape()));
+  sections.add(kTimes, time_audit_html(r.recordings));
+  sections.add(kHowToRepeat, provenance_html(r.provenance));
   std::string title = "risley calibrate";
   if (!r.recordings.empty()) title += ": " + r.recordings.front().name;
   if (r.recordings.size() > 1) title += fmt::format(" and {} more", r.recordings.size() - 1);
-  return page_html(title, subject_text(r), body, figures);
+  return page_html(title, subject_text(r), head, sections, figures);
 }
 
 }  // namespace risley::report

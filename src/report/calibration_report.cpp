@@ -272,7 +272,7 @@ class CalibrationCharts {
     constexpr std::string_view kRotationAngle = "rotation_angle_";
     if (variable == "incidence") return "angle of incidence";
     if (variable.starts_with(kRotationAngle)) {
-      return "rotation angle of prism " + variable.substr(kRotationAngle.size());
+      return fmt::format("rotation angle of prism {}", prism_capital(variable.back() - 'a'));
     }
     std::string text = variable;
     std::replace(text.begin(), text.end(), '_', ' ');

@@ -92,7 +92,7 @@ std::string summary_html(const PointDistributionSummary& d) {
   const auto row = [](const char* head, const std::string& value) {
     return fmt::format("<tr><th scope=\"row\">{}</th><td>{}</td></tr>\n", head, value);
   };
-  return "<h2>All strips together</h2>\n<table><tbody>\n" + row("points", count_text(d.points)) +
+  return "<table><tbody>\n" + row("points", count_text(d.points)) +
          row("area of all swaths", finite_text("{:.0f} m²", d.area)) +
          row("aggregate nominal density (ANPD)", finite_text("{:.1f} /m²", d.density)) +
          row("aggregate nominal spacing (ANPS)", finite_text("{:.3f} m", d.spacing)) +
@@ -103,9 +103,15 @@ std::string summary_html(const PointDistributionSummary& d) {
          row("cells that several strips see", percent(d.overlap)) + "</tbody></table>\n";
 }
 
+std::vector<KeyNumber> key_numbers(const PointDistributionSummary& d) {
+  return {{finite_text("{:.1f} points/m²", d.density), "density of all strips together (ANPD)"},
+          {percent(d.covered), "of the cells hold a point"},
+          {finite_text("{:.3f} m", d.spacing), "spacing of the points (ANPS)"}};
+}
+
 std::string swaths_html(const PointDistributionSummary& d) {
   std::string html =
-      "<h2>Strip by strip</h2>\n<div class=\"wide\"><table><thead><tr><th>strip</th>"
+      "<div class=\"wide\"><table><thead><tr><th>strip</th>"
       "<th>points</th><th>height, m</th><th>swath, m</th><th>dense, m</th><th>density, 1/m²</th>"
       "<th>spacing, m</th><th>in the middle</th>";
   for (const double place : cloud::kSwathPlaces) html += fmt::format("<th>at {:g} R</th>", place);
@@ -151,14 +157,17 @@ std::string swaths_html(const PointDistributionSummary& d) {
 std::string distribution_page(const PointDistributionSummary& distribution,
                               const std::string& flight, const Provenance& provenance) {
   Figures figures;
-  std::string body = summary_html(distribution);
-  body += charts_html({map_of(distribution), strips_of(distribution)}, figures);
-  body += charts_html({profile_of(distribution)}, figures);
-  body += swaths_html(distribution);
-  body += provenance_html(provenance);
+  const std::vector<Chart> charts{map_of(distribution), strips_of(distribution),
+                                  profile_of(distribution)};
+  const std::string head = overview_html(key_numbers(distribution), charts, figures);
+  Sections sections;
+  sections.add("All strips together", summary_html(distribution) + charts_html(charts, figures, 1),
+               Sections::Shown::unfolded);
+  sections.add("Strip by strip", swaths_html(distribution));
+  sections.add(kHowToRepeat, provenance_html(provenance));
   return page_html("Points on the ground: " + flight,
-                   "How densely and how evenly the points of a flight lie on the ground.", body,
-                   figures);
+                   "How densely and how evenly the points of a flight lie on the ground.", head,
+                   sections, figures);
 }
 
 }  // namespace risley::report

@@ -53,6 +53,23 @@ Verdict verdict_of(const EstimateReport& r) {
   return verdict;
 }
 
+std::vector<KeyNumber> key_numbers(const EstimateReport& r) {
+  const auto angles = [](double azimuth, double zenith) {
+    return fmt::format("{}°, {}°", finite_text("{:.3g}", degrees_from_radians(azimuth)),
+                       finite_text("{:.3g}", degrees_from_radians(zenith)));
+  };
+  std::vector<KeyNumber> numbers{
+      {angles(r.azimuth_residuals.rms, r.zenith_residuals.rms),
+       "left unexplained of the directions in azimuth and in zenith, root mean square"}};
+  if (r.noise && !r.noise->held) {
+    numbers.push_back({angles(r.noise->azimuth, r.noise->zenith),
+                       "noise of the directions that was found, one standard deviation"});
+  }
+  numbers.push_back({count_text(r.shots),
+                     fmt::format("shots used, of which {} are outliers", count_text(r.outliers))});
+  return numbers;
+}
+
 std::string subject_text(const EstimateReport& r) {
   const recordings::TimeAuditResult& audit = r.recording.audit;
   std::string text =
@@ -74,7 +91,7 @@ std::string subject_text(const EstimateReport& r) {
 std::string parameters_html(const EstimateReport& r) {
   const bool any_held = any_held_parameter(r.parameters);
   std::string html =
-      "<h2>Parameters</h2>\n<div class=\"wide\"><table><thead><tr><th>parameter</th><th>value</th>"
+      "<div class=\"wide\"><table><thead><tr><th>parameter</th><th>value</th>"
       "<th>σ</th>";
   if (any_held) html += "<th>σ given held</th>";
   html += "<th>unit</th><th>nominal</th><th>difference</th>";
@@ -117,7 +134,7 @@ std::string parameters_html(const EstimateReport& r) {
     for (std::size_t i = 0; i < r.truth->rotation_angle_rmse.size(); ++i) {
       rmse += fmt::format("{}{:.3g}° for prism {}", i == 0 ? "" : ", ",
                           degrees_from_radians(r.truth->rotation_angle_rmse[i]),
-                          prism_letter(static_cast<int>(i)));
+                          prism_capital(static_cast<int>(i)));
     }
     html += fmt::format(
         "<p>Against the truth: rotation angles are off by {} (root mean square). The squared "
@@ -129,7 +146,7 @@ std::string parameters_html(const EstimateReport& r) {
 }
 
 std::string unobservable_html(const EstimateReport& r) {
-  std::string html = "<h2>What this recording does not tell</h2>\n";
+  std::string html;
   if (!r.unobservable.empty()) {
     std::vector<std::string> items;
     for (const estimation::WeakDirection& weak : r.unobservable) {
@@ -150,7 +167,7 @@ std::string pieces_html(const EstimateReport& r, Figures& figures) {
   if (!r.pieces || r.parameter_charts.empty()) return "";
   const EstimateReport::Pieces& p = *r.pieces;
   std::string html = fmt::format(
-      "<h2>Do the parameters stand still?</h2>\n<p>Each dot is the estimate from one of {} pieces "
+      "<p>Each dot is the estimate from one of {} pieces "
       "of the recording alone ({:.2g} s or less), with its own sigma. Their differences are {} "
       "times what their sigmas promise ({:.0f} degrees of freedom, so 1 ± {:.2f} is to be "
       "expected of a sensor that does not change and of sigmas that are true).{}</p>\n",
@@ -193,7 +210,7 @@ std::string variance_html(const EstimateReport& r) {
   for (std::size_t k = 0; k < r.unevenness.size(); ++k) {
     uneven +=
         fmt::format("{}{} for prism {}", k == 0 ? "" : ", ", finite_text("{:.2f}", r.unevenness[k]),
-                    prism_letter(static_cast<int>(k)));
+                    prism_capital(static_cast<int>(k)));
   }
   return html + fmt::format(
                     "<p>Mean residuals over 5° of a prism's angle have so many times the variance "
@@ -206,18 +223,21 @@ std::string variance_html(const EstimateReport& r) {
 
 std::string estimate_page(const EstimateReport& r) {
   Figures figures;
-  std::string body = verdict_html(verdict_of(r));
-  body += parameters_html(r);
-  body += unobservable_html(r);
-  body += pieces_html(r, figures);
-  body += "<h2>Rotors</h2>\n" + charts_html(r.rotor_charts, figures);
-  body += "<h2>Residuals</h2>\n" + moments_html(r) + variance_html(r) +
-          charts_html(r.residual_charts, figures);
-  body += "<h2>Scan pattern</h2>\n" + charts_html(r.pattern_charts, figures);
-  body += correlation_html(r.free, r.covariance, r.shape());
-  body += time_audit_html({r.recording});
-  body += provenance_html(r.provenance);
-  return page_html("risley estimate: " + r.recording.name, subject_text(r), body, figures);
+  const std::string head =
+      verdict_html(verdict_of(r)) + overview_html(key_numbers(r), r.residual_charts, figures);
+  Sections sections;
+  sections.add("Parameters", parameters_html(r), Sections::Shown::unfolded);
+  sections.add("What this recording does not tell", unobservable_html(r));
+  sections.add("Do the parameters stand still?", pieces_html(r, figures));
+  sections.add("Rotors", charts_html(r.rotor_charts, figures));
+  sections.add("Residuals",
+               moments_html(r) + variance_html(r) + charts_html(r.residual_charts, figures, 1));
+  sections.add("Scan pattern", charts_html(r.pattern_charts, figures));
+  sections.add(kCorrelations, correlation_html(r.free, r.covariance, r.shape()));
+  sections.add(kTimes, time_audit_html({r.recording}));
+  sections.add(kHowToRepeat, provenance_html(r.provenance));
+  return page_html("risley estimate: " + r.recording.name, subject_text(r), head, sections,
+                   figures);
 }
 
 }  // namespace risley::report

@@ -23,7 +23,10 @@ constexpr std::size_t kMostShotPoints = 4000;  // per scatter diagram
 constexpr std::size_t kMostMapPoints = 9000;   // of the scan pattern
 constexpr double kPatternDuration = 0.09;      // s, as in [B21 Fig. 2a]
 
-std::string letter(std::size_t rotor) {
+/// Of a rotor in titles.
+char capital(std::size_t rotor) { return prism_capital(static_cast<int>(rotor)); }
+/// Colour of a rotor in diagrams.
+std::string colour_of(std::size_t rotor) {
   return std::string(1, prism_letter(static_cast<int>(rotor)));
 }
 
@@ -110,31 +113,32 @@ class EstimateCharts {
       const jobs::RotorSpeed& speed = input_.details.speeds[rotor];
       const std::string label =
           fmt::format("angular velocity less {:.5f}, deg/s", degrees_from_radians(speed.mean));
-      charts.push_back({fmt::format("Angular velocity of prism {}", letter(rotor)),
+      charts.push_back({fmt::format("Angular velocity of prism {}", capital(rotor)),
                         "time, s",
                         label,
                         {line(rotor, speed.change)},
                         peak_line_note(states_.size())});
       if (!(speed.moments.std > 0)) continue;  // it stood still
       distributions.push_back(distribution(
-          fmt::format("Distribution of the angular velocity of prism {}", letter(rotor)), label,
-          letter(rotor), speed.change, speed.moments, "velocity"));
+          fmt::format("Distribution of the angular velocity of prism {}", capital(rotor)), label,
+          colour_of(rotor), speed.change, speed.moments, "velocity"));
     }
     charts.insert(charts.end(), distributions.begin(), distributions.end());
     if (!input_.evaluation) return charts;
     const auto& errors = input_.evaluation->rotation_angle_error;
     for (std::size_t rotor = 0; rotor < errors.size(); ++rotor) {
-      charts.push_back({fmt::format("Error of the rotation angle of prism {}", letter(rotor)),
+      charts.push_back({fmt::format("Error of the rotation angle of prism {}", capital(rotor)),
                         "time, s",
                         "estimate minus truth, deg",
                         {line(rotor, errors[rotor])},
                         peak_line_note(states_.size())});
     }
     for (std::size_t rotor = 0; rotor < errors.size(); ++rotor) {
-      charts.push_back(distribution(
-          fmt::format("Distribution of the error of the rotation angle of prism {}", letter(rotor)),
-          "estimate minus truth, deg", letter(rotor), errors[rotor],
-          input_.details.rotation_angle_errors[rotor], "error"));
+      charts.push_back(
+          distribution(fmt::format("Distribution of the error of the rotation angle of prism {}",
+                                   capital(rotor)),
+                       "estimate minus truth, deg", colour_of(rotor), errors[rotor],
+                       input_.details.rotation_angle_errors[rotor], "error"));
     }
     return charts;
   }
@@ -158,12 +162,13 @@ class EstimateCharts {
     }
     for (const jobs::PrismPairResiduals& pair : input_.details.residuals_over_angles) {
       const auto axis = [](int prism) {
-        return fmt::format("rotation angle of prism {}, deg", prism_letter(prism));
+        return fmt::format("rotation angle of prism {}, deg", prism_capital(prism));
       };
-      for (Chart& chart : maps(pair.residuals,
-                               fmt::format("the angles of prisms {} and {}",
-                                           prism_letter(pair.prism_x), prism_letter(pair.prism_y)),
-                               axis(pair.prism_x), axis(pair.prism_y))) {
+      for (Chart& chart :
+           maps(pair.residuals,
+                fmt::format("the angles of prisms {} and {}", prism_capital(pair.prism_x),
+                            prism_capital(pair.prism_y)),
+                axis(pair.prism_x), axis(pair.prism_y))) {
         chart.kind = ChartKind::two_turns;
         charts.push_back(std::move(chart));
       }
@@ -207,7 +212,7 @@ class EstimateCharts {
 
   Series line(std::size_t rotor, const std::vector<double>& values) const {
     return peak_line(
-        "", letter(rotor), states_.size(), [this](std::size_t i) { return time(i); },
+        "", colour_of(rotor), states_.size(), [this](std::size_t i) { return time(i); },
         [&values](std::size_t i) { return degrees_from_radians(values[i]); });
   }
 
@@ -298,7 +303,7 @@ class EstimateCharts {
     const auto angle = [this, rotor](std::size_t i) {
       return degrees_from_radians(wrap_to_two_pi(states_.rotation_angle[rotor][i]));
     };
-    Chart chart{fmt::format("Residuals over the rotation angle of prism {}", letter(rotor)),
+    Chart chart{fmt::format("Residuals over the rotation angle of prism {}", capital(rotor)),
                 "rotation angle, deg",
                 "observed minus estimated, deg",
                 {},

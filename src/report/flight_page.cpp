@@ -35,8 +35,16 @@ constexpr double kUpright = 0.8;
 /// Correlations below it tie nothing.
 constexpr double kTied = 0.1;
 
+/// Three significant digits at most, never as a power of ten.
 std::string angle_text(double radians) {
-  return finite_text("{:.3g}", degrees_from_radians(radians));
+  const double angle = degrees_from_radians(radians);
+  if (!is_sigma(std::abs(angle))) return finite_text("{:.0f}", angle);
+  constexpr double kThirdDigit = 0.1;  // of two
+  std::string text = text_to_place_of(angle, kThirdDigit * std::abs(angle));
+  if (text.find('.') == std::string::npos) return text;
+  text.erase(text.find_last_not_of('0') + 1);
+  if (text.ends_with('.')) text.pop_back();
+  return text;
 }
 
 /// "0.0039° (5.4 mm at 80 m)"
@@ -124,6 +132,18 @@ std::string subject_of(const FlightReport& r) {
   return text + "; by an adjustment of all strips, the mount and the trajectory together.";
 }
 
+std::vector<KeyNumber> key_numbers(const FlightReport& r) {
+  if (r.unknowns.empty()) return {};
+  return {{fmt::format("{} mm", millimetres(r.rms_after)),
+           fmt::format("between strips after the calibration, {} mm before",
+                       millimetres(r.rms_before))},
+          {fmt::format("{}°", angle_text(r.datum.total)),
+           fmt::format("standard uncertainty of the directions of the beams: {} mm at {} m",
+                       millimetres(r.datum.total * r.datum.height),
+                       finite_text("{:.0f}", r.datum.height))},
+          {fmt::format("{} mm", millimetres(r.range_sigma)), "noise of one range"}};
+}
+
 std::string to_place(double value, double sigma) {
   return std::isfinite(value) ? text_to_place_of(value, sigma) : "–";
 }
@@ -195,7 +215,7 @@ std::string axis_text(const Eigen::MatrixXd& body_from_sensor, Eigen::Index axis
 }
 
 std::string mount_html(const FlightReport& r) {
-  std::string html = "<h2>Mount, ranges and clock</h2>\n";
+  std::string html;
   const Eigen::MatrixXd& m = r.body_from_sensor;
   html += fmt::format(
       "<p>As designed the sensor's X, its optical axis, points {}, its Y {} and its Z {}. Point "
@@ -214,7 +234,7 @@ std::string mount_html(const FlightReport& r) {
 }
 
 std::string prisms_html(const FlightReport& r) {
-  return "<h2>Prisms</h2>\n" + unknowns_table(r, true) +
+  return unknowns_table(r, true) +
          "<p class=\"note\">Nominal: the preset. A common pitch or yaw of the beams and the "
          "boresight are nearly the same thing, so single angles may be known worse than the "
          "directions of the beams.</p>\n";
@@ -233,7 +253,7 @@ std::string datum_row(const char* name, double height, double total, double rota
 std::string directions_html(const FlightReport& r) {
   const FlightDatum& d = r.datum;
   std::string html = fmt::format(
-      "<h2>How well the beams are known</h2>\n<div class=\"wide\"><table><thead><tr><th>directions "
+      "<div class=\"wide\"><table><thead><tr><th>directions "
       "of the beams, deg</th><th>total</th><th>rotation</th><th>shape</th><th>about X</th>"
       "<th>about Y</th><th>about Z</th><th>total at {0} m,<br>mm</th><th>shape at {0} m,<br>mm</th>"
       "</tr></thead><tbody>\n",
@@ -291,7 +311,7 @@ std::string advice_of(const FlightReport& r, const NotTold& combination) {
 }
 
 std::string not_told_html(const FlightReport& r) {
-  std::string html = "<h2>What this flight does not tell</h2>\n";
+  std::string html;
   if (r.not_told.empty()) {
     return html + (r.unknowns.empty() ? "<p>Nothing was adjusted.</p>\n"
                                       : "<p>It tells something of everything that was free.</p>\n");
@@ -310,7 +330,7 @@ std::string not_told_html(const FlightReport& r) {
 std::string control_html(const FlightReport& r) {
   if (r.control.empty()) return {};
   std::string html =
-      "<h2>Known ground</h2>\n<div class=\"wide\"><table><thead><tr><th>name</th><th>shots</th>"
+      "<div class=\"wide\"><table><thead><tr><th>name</th><th>shots</th>"
       "<th>seen above it, mm</th><th>stated σ, mm</th><th></th></tr></thead><tbody>\n";
   for (const calibration::SeenControl& seen : r.control) {
     html += fmt::format(
@@ -368,9 +388,7 @@ std::string pairs_html(const FlightReport& r) {
 }
 
 std::string strips_html(const FlightReport& r, Figures& figures) {
-  std::string html = "<h2>Strips before and after</h2>\n" + pairs_html(r);
-  html += charts_html(r.difference_charts, figures);
-  html += "<h2>The flight</h2>\n";
+  std::string html;
   if (!r.strips.empty()) {
     html +=
         "<div class=\"wide\"><table><thead><tr><th>strip</th><th>begins, s</th><th>takes, s</th>"
@@ -412,7 +430,7 @@ std::string shots_html(const FlightReport& r) {
 
 std::string corrections_html(const FlightReport& r, Figures& figures) {
   return fmt::format(
-             "<h2>Corrections of the trajectory</h2>\n<p>Position and attitude are corrected at {} "
+             "<p>Position and attitude are corrected at {} "
              "knots, points in time {} s apart, and linearly between. σ is what is left of their "
              "uncertainty. Corrections should be about as large as the errors that were stated for "
              "the "
@@ -440,25 +458,28 @@ std::string correlations_html(const FlightReport& r) {
 
 std::string flight_page(const FlightReport& r) {
   Figures figures;
-  std::string body = verdict_html(verdict_of(r));
-  body += directions_html(r);
-  body += mount_html(r);
-  body += not_told_html(r);
-  body += control_html(r);
-  body += strips_html(r, figures);
-  body += "<h2>Ground</h2>\n" + shots_html(r) + charts_html(r.ground_charts, figures);
-  body += "<h2>Residuals</h2>\n";
-  body += r.residual_charts.empty() ? "<p>There are none to draw.</p>\n"
-                                    : charts_html(r.residual_charts, figures);
-  body += corrections_html(r, figures);
-  body += prisms_html(r);
-  body += correlations_html(r);
-  body += time_audit_html(r.recordings);
-  body += provenance_html(r.provenance);
+  const std::string head =
+      verdict_html(verdict_of(r)) + overview_html(key_numbers(r), r.difference_charts, figures);
+  Sections sections;
+  sections.add("How well the beams are known", directions_html(r), Sections::Shown::unfolded);
+  sections.add("Mount, ranges and clock", mount_html(r), Sections::Shown::unfolded);
+  sections.add("What this flight does not tell", not_told_html(r));
+  sections.add("Known ground", control_html(r));
+  sections.add("Strips before and after",
+               pairs_html(r) + charts_html(r.difference_charts, figures, 1));
+  sections.add("The flight", strips_html(r, figures));
+  sections.add("Ground", shots_html(r) + charts_html(r.ground_charts, figures));
+  sections.add("Residuals", r.residual_charts.empty() ? "<p>There are none to draw.</p>\n"
+                                                      : charts_html(r.residual_charts, figures));
+  sections.add("Corrections of the trajectory", corrections_html(r, figures));
+  sections.add("Prisms", prisms_html(r));
+  sections.add(kCorrelations, correlations_html(r));
+  sections.add(kTimes, time_audit_html(r.recordings));
+  sections.add(kHowToRepeat, provenance_html(r.provenance));
   std::string title = "risley calibrate, in flight";
   if (!r.recordings.empty()) title += ": " + r.recordings.front().name;
   if (r.recordings.size() > 1) title += fmt::format(" and {} more", r.recordings.size() - 1);
-  return page_html(title, subject_of(r), body, figures);
+  return page_html(title, subject_of(r), head, sections, figures);
 }
 
 }  // namespace risley::report

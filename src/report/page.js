@@ -1,7 +1,8 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
 // Draws the diagrams that stand as JSON in the element "page-data" with Apache ECharts.
-// window.risley.charts: [{data, chart}] once <html data-drawn="N"> is set.
+// window.risley.charts: [{data, chart}] of the unfolded sections once <html data-drawn="N"> is set,
+// which counts them.
 (function () {
   'use strict';
   const page = document.documentElement;
@@ -506,6 +507,10 @@
 
   // Paper gets pictures in light colours: canvases do not follow the width of a sheet.
   function beforePrint() {
+    foldedAgain = sections.filter((one) => !one.open);
+    for (const section of foldedAgain) section.open = true;
+    drawUnfolded();
+    drawn.filter(({ place }) => foldedAgain.some((one) => one.contains(place))).forEach(fit);
     page.dataset.printing = '1';
     redraw();
     drawn.forEach(({ chart, data: one, place }) => {
@@ -523,6 +528,7 @@
   function afterPrint() {
     document.querySelectorAll('img.printed').forEach((picture) => picture.remove());
     delete page.dataset.printing;
+    for (const section of foldedAgain) section.open = false;
     redraw();
   }
 
@@ -531,12 +537,73 @@
     redraw();
   }
 
+  // In the order of the page, whenever they were unfolded.
+  function keep(entry) {
+    drawn.push(entry);
+    drawn.sort((a, b) => data.indexOf(a.data) - data.indexOf(b.data));
+    if (window.risley) page.dataset.drawn = String(drawn.length);
+  }
+
+  // Diagrams that nobody has unfolded have no room, and are made when somebody does.
+  const isFolded = ({ id }) => document.getElementById(id).closest('details:not([open])') !== null;
+  const isDrawn = (one) => drawn.some((entry) => entry.data === one);
+
+  function drawUnfolded() {
+    data.filter((one) => !isFolded(one) && !isDrawn(one)).forEach((one) => {
+      const entry = one.kind === 'space' ? makeOrSay(one) : make(one);
+      if (entry) keep(entry);
+    });
+  }
+
+  function fit(entry) {
+    if (isFolded(entry.data)) return;
+    size(entry);
+    entry.chart.resize();
+  }
+
+  // Sections open for links that lead into them, and all of them for the button and for paper.
+  const sections = [...document.querySelectorAll('details.section')];
+  let foldedAgain = [];
+
+  function unfoldTarget() {
+    const target = location.hash && document.getElementById(decodeURIComponent(location.hash.slice(1)));
+    const section = target && target.closest('details.section');
+    if (!section) return;
+    section.open = true;
+    target.scrollIntoView();
+  }
+
+  function addFolding() {
+    const button = document.getElementById('unfold');
+    const name = () => {
+      button.textContent = sections.every((one) => one.open) ? 'Fold all' : 'Unfold all';
+    };
+    for (const section of sections) {
+      section.addEventListener('toggle', () => {
+        if (button) name();
+        if (!section.open || !page.dataset.begun) return;
+        drawUnfolded();
+        drawn.filter(({ place }) => section.contains(place)).forEach(fit);
+      });
+    }
+    button?.addEventListener('click', () => {
+      const open = !sections.every((one) => one.open);
+      for (const section of sections) section.open = open;
+    });
+    if (button) name();
+    window.addEventListener('hashchange', unfoldTarget);
+    // A link that was followed before leads there again.
+    document.querySelector('.contents')?.addEventListener('click', (event) => {
+      if (event.target.hash && event.target.hash === location.hash) unfoldTarget();
+    });
+    unfoldTarget();
+  }
+
   async function start() {
     const main = document.querySelector('main');
     // A window that is not shown yet has no room, and diagrams cannot be made without any.
-    const figures = data.map(({ id }) => document.getElementById(id).parentElement);
-    const hasRoom = () => figures.some((figure) => figure.clientWidth > leastWidth);
-    if (figures.length > 0 && !hasRoom()) await new Promise((done) => {
+    const hasRoom = () => main.clientWidth > leastWidth;
+    if (data.length > 0 && !hasRoom()) await new Promise((done) => {
       const watch = new ResizeObserver(() => {
         if (!hasRoom()) return;
         watch.disconnect();
@@ -544,10 +611,12 @@
       });
       watch.observe(main);
     });
+    page.dataset.begun = '1';
     let pause = performance.now();
     for (const one of data) {
+      if (isFolded(one) || isDrawn(one)) continue;
       const entry = one.kind === 'space' ? makeOrSay(one) : make(one);
-      if (entry) drawn.push(entry);
+      if (entry) keep(entry);
       if (performance.now() - pause < longestPause) continue;
       await new Promise((done) => setTimeout(done)); // the page stays alive meanwhile
       pause = performance.now();
@@ -558,10 +627,7 @@
     new ResizeObserver(() => {
       if (main.clientWidth === width || !hasRoom()) return;
       width = main.clientWidth;
-      drawn.forEach((entry) => {
-        size(entry);
-        entry.chart.resize();
-      });
+      drawn.forEach(fit);
     }).observe(main);
   }
 
@@ -571,5 +637,6 @@
   window.addEventListener('afterprint', afterPrint);
   document.getElementById('theme')
     .addEventListener('click', () => setTheme(page.dataset.theme !== 'dark'));
+  addFolding();
   start();
 })();

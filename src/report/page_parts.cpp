@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "risley/core/text.hpp"
 #include "risley/io/sha256.hpp"
 #include "risley/report/html.hpp"
 
@@ -146,9 +147,7 @@ std::string verdict_html(const Verdict& verdict) {
 std::string correlation_html(const std::vector<CorrelationHead>& heads,
                              const Eigen::MatrixXd& covariance) {
   if (heads.empty()) return "";
-  std::string html =
-      "<h2>Correlations of the parameters</h2>\n<div class=\"wide\">"
-      "<table class=\"heat\"><thead><tr><th></th>";
+  std::string html = "<div class=\"wide\"><table class=\"heat\"><thead><tr><th></th>";
   for (const CorrelationHead& head : heads) {
     html += fmt::format("<th scope=\"col\">{}</th>", head.symbol_html);
   }
@@ -185,7 +184,7 @@ std::string correlation_html(const std::vector<std::string>& free,
 
 std::string time_audit_html(const std::vector<ReportedRecording>& recordings) {
   std::string html =
-      "<h2>Times of the recording</h2>\n<div class=\"wide\"><table><thead><tr><th>recording</th>"
+      "<div class=\"wide\"><table><thead><tr><th>recording</th>"
       "<th>format</th><th>time from</th><th>shots</th><th>without return</th><th>duration, s</th>"
       "<th>rate, Hz</th><th>gaps</th><th>missing, s</th><th>longest, s</th><th>clock resets</th>"
       "<th>late packets</th><th>PPS seconds</th></tr></thead><tbody>\n";
@@ -210,7 +209,7 @@ std::string time_audit_html(const std::vector<ReportedRecording>& recordings) {
 }
 
 std::string provenance_html(const Provenance& provenance) {
-  std::string html = "<h2>How to make it again</h2>\n<dl>\n";
+  std::string html = "<dl>\n";
   for (const auto& [name, value] : provenance) {
     html += fmt::format("<dt>{}</dt><dd>{}</dd>\n", escape_html(name), escape_html(value));
   }
@@ -224,13 +223,13 @@ std::string Figures::add(const Chart& chart) {
   return figure_html(chart, number_++);
 }
 
-std::string charts_html(const std::vector<Chart>& charts, Figures& figures) {
+std::string charts_html(const std::vector<Chart>& charts, Figures& figures, std::size_t first) {
   const auto is_square = [](const Chart& chart) {
     return chart.kind == ChartKind::map || chart.kind == ChartKind::ground ||
            chart.kind == ChartKind::two_turns;
   };
   std::string html;
-  for (std::size_t first = 0, last = 0; first < charts.size(); first = last) {
+  for (std::size_t last = first; first < charts.size(); first = last) {
     // Rows of one height: square diagrams stand among their own, three in a row if that leaves none
     // over.
     while (last < charts.size() && is_square(charts[last]) == is_square(charts[first])) ++last;
@@ -242,8 +241,56 @@ std::string charts_html(const std::vector<Chart>& charts, Figures& figures) {
   return html;
 }
 
+std::string overview_html(const std::vector<KeyNumber>& numbers, const std::vector<Chart>& charts,
+                          Figures& figures) {
+  std::string html = "<div class=\"overview\">\n<dl class=\"numbers\">\n";
+  for (const KeyNumber& number : numbers) {
+    html += fmt::format("<div><dd>{}</dd><dt>{}</dt></div>\n", escape_html(number.text),
+                        escape_html(number.words));
+  }
+  html += "</dl>\n";
+  if (!charts.empty()) html += figures.add(charts.front());
+  return html + "</div>\n";
+}
+
+void Sections::add(const std::string& title, const std::string& html, Shown shown) {
+  std::string id;
+  for (const char c : lower_case(title)) {
+    if ((c >= 'a' && c <= 'z') || (c >= '0' && c <= '9')) {
+      id += c;
+    } else if (!id.empty() && id.back() != '-') {
+      id += '-';
+    }
+  }
+  add(title, html, id, "", shown);
+}
+
+void Sections::add(const std::string& title, const std::string& html, const std::string& id,
+                   const std::string& remark) {
+  add(title, html, id, ": " + remark, Shown::folded);
+}
+
+void Sections::add(const std::string& title, const std::string& html, const std::string& id,
+                   const std::string& remark, Shown shown) {
+  if (html.empty()) return;
+  contents_ += fmt::format("<li><a href=\"#{}\">{}</a>{}</li>\n", escape_html(id),
+                           escape_html(title), escape_html(remark));
+  sections_ += fmt::format(
+      "<details class=\"section\" id=\"{}\"{}>\n<summary><h2>{}</h2></summary>\n{}</details>\n",
+      escape_html(id), shown == Shown::unfolded ? " open" : "", escape_html(title), html);
+}
+
+std::string Sections::html() const {
+  if (sections_.empty()) return {};
+  return fmt::format(
+      "<nav class=\"contents\" aria-label=\"Contents\">\n<ul>\n{}</ul>\n"
+      "<button id=\"unfold\" type=\"button\">Unfold all</button>\n</nav>\n{}",
+      contents_, sections_);
+}
+
 std::string page_html(const std::string& title, const std::string& lead,
-                      const std::string& body_html, const Figures& figures) {
+                      const std::string& head_html, const Sections& sections,
+                      const Figures& figures) {
   std::vector<std::string_view> scripts = {kFirstScript, echarts_script()};
   if (figures.has_space()) scripts.insert(scripts.end(), {kSizesScript, echarts_gl_script()});
   scripts.push_back(page_script());
@@ -259,13 +306,16 @@ std::string page_html(const std::string& title, const std::string& lead,
       "Texts and tables are complete.</p></noscript>\n",
       policy(page_style(), scripts), escape_html(title), page_style(), kFirstScript,
       escape_html(title), escape_html(lead));
-  page += body_html;
+  page += head_html;
   page +=
-      "<p class=\"note help\">Diagrams: point at them for values; draw a box to zoom, double-click "
-      "to show all; <kbd>Ctrl</kbd> and the wheel zoom, <kbd>Shift</kbd> and dragging move. In "
-      "three dimensions drag to rotate, the wheel goes nearer. With the keyboard: <kbd>Tab</kbd> "
-      "to a diagram, <kbd>+</kbd> <kbd>-</kbd> zoom, arrows move or rotate, <kbd>0</kbd> shows "
-      "all, <kbd>n</kbd> <kbd>p</kbd> go through the points of the first series.</p>\n"
+      "<details class=\"help\"><summary>How to use the diagrams, with mouse or keyboard</summary>\n"
+      "<p>Point at a diagram for values; draw a box to zoom, double-click to show all; "
+      "<kbd>Ctrl</kbd> and the wheel zoom, <kbd>Shift</kbd> and dragging move. In three dimensions "
+      "drag to rotate; the wheel goes nearer. With the keyboard: <kbd>Tab</kbd> to a diagram, "
+      "<kbd>+</kbd> and <kbd>-</kbd> zoom, arrows move or rotate, <kbd>0</kbd> shows all, "
+      "<kbd>n</kbd> and <kbd>p</kbd> go through the points of the first series.</p></details>\n";
+  page += sections.html();
+  page +=
       "<div id=\"spoken\" class=\"hidden\" aria-live=\"polite\"></div>\n"
       "<footer>Diagrams by Apache ECharts (Apache License 2.0)";
   page +=

@@ -3,7 +3,6 @@
 #include "risley/report/pattern_page.hpp"
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <map>
 #include <utility>
@@ -117,9 +116,19 @@ Chart growth_chart(const sensors::PatternCoverage& coverage) {
   return chart;
 }
 
+std::vector<KeyNumber> key_numbers(const sensors::PatternCoverage& coverage) {
+  if (coverage.after.empty()) return {};
+  const sensors::CoverageAfter& last = coverage.after.back();
+  return {{fmt::format("{:.1f} %", 100 * last.covered),
+           fmt::format("of the field of view covered after {:g} s", last.time)},
+          {finite_text("{:.3f}°", degrees_from_radians(last.gap)),
+           fmt::format("diameter of the largest gap after {:g} s", last.time)},
+          {count_text(last.shots), fmt::format("shots in {:g} s", last.time)}};
+}
+
 std::string coverage_html(const sensors::PatternCoverage& coverage) {
   std::string html =
-      "<h2>Coverage and gaps</h2>\n<div class=\"wide\"><table><thead><tr><th>after, s</th>"
+      "<div class=\"wide\"><table><thead><tr><th>after, s</th>"
       "<th>shots</th><th>covered</th><th>mean density, 1/deg²</th><th>least</th><th>greatest</th>"
       "<th>largest gap, deg</th><th>at azimuth, deg</th><th>zenith, deg</th></tr></thead><tbody>\n";
   for (const sensors::CoverageAfter& after : coverage.after) {
@@ -146,14 +155,14 @@ std::string coverage_html(const sensors::PatternCoverage& coverage) {
 
 std::string prisms_html(const sensors::Sensor& sensor) {
   std::string html =
-      "<h2>Prisms</h2>\n<div class=\"wide\"><table><thead><tr><th>prism</th><th>first face</th>"
+      "<div class=\"wide\"><table><thead><tr><th>prism</th><th>first face</th>"
       "<th>wedge angle, deg</th><th>refractive index</th><th>speed, rpm</th></tr></thead><tbody>\n";
   for (int i = 0; i < sensor.prisms(); ++i) {
     const auto k = static_cast<std::size_t>(i);
     html += fmt::format(
         "<tr><th scope=\"row\">{}</th><td>{}</td><td>{:.6g}</td><td>{:.6g}</td>"
         "<td>{:.8g}</td></tr>\n",
-        static_cast<char>(std::toupper(prism_letter(i))),
+        prism_capital(i),
         sensor.train.face_order()[k] == FaceOrder::angled_perpendicular ? "angled"
                                                                         : "perpendicular",
         degrees_from_radians(sensor.train[place::wedge_angle(i)]),
@@ -171,22 +180,23 @@ std::string prisms_html(const sensors::Sensor& sensor) {
 std::string pattern_page(const jobs::PatternDetails& details, const Provenance& provenance) {
   Figures figures;
   const sensors::PatternCoverage& coverage = details.coverage;
-  std::string body = charts_html({rosette_chart(details)}, figures);
-  body += coverage_html(coverage);
+  const std::string head = overview_html(key_numbers(coverage), {rosette_chart(details)}, figures);
+  Sections sections;
   std::vector<Chart> charts;
   for (const sensors::CoverageAfter& after : coverage.after) {
     charts.push_back(density_chart(coverage, after));
   }
   charts.push_back(growth_chart(coverage));
   charts.push_back(ring_chart(coverage));
-  body += charts_html(charts, figures);
-  body += prisms_html(details.sensor);
-  body += provenance_html(provenance);
+  sections.add("Coverage and gaps", coverage_html(coverage) + charts_html(charts, figures),
+               Sections::Shown::unfolded);
+  sections.add("Prisms", prisms_html(details.sensor));
+  sections.add(kHowToRepeat, provenance_html(provenance));
   return page_html(
       "Scan pattern: " + details.sensor.name,
       "Where the sensor sends its shots, free of noise, with rotors at constant speed, "
       "and how they fill its field of view.",
-      body, figures);
+      head, sections, figures);
 }
 
 }  // namespace risley::report

@@ -165,7 +165,7 @@ std::string reason_text(const Row& row) {
     if (!pass && passes(check)) return {};
     const char* place = passes(check) ? "within" : "NOT within";
     if (check.least == 1.0 && check.greatest == 1.0) {
-      return fmt::format("{}: {}", check.what, passes(check) ? "so it is" : "NOT so");
+      return fmt::format("{}: {}", check.what, passes(check) ? "holds" : "does NOT hold");
     }
     return fmt::format("{} is {:.{}g}, {} its limits", check.what, check.value, digits_of(check),
                        place);

@@ -39,11 +39,11 @@ std::string row_html(const Row& row) {
 
 std::string table_html(const Table& table) {
   std::string html = fmt::format(
-      "<h2 id=\"{0}\">{1}</h2>\n<p>{2}</p>\n<div class=\"wide\"><table><thead><tr><th>term</th>"
+      "<p>{}</p>\n<div class=\"wide\"><table><thead><tr><th>term</th>"
       "<th class=\"text\">verdict</th><th>paper</th><th>ours</th><th>± σ</th><th>unit</th><th "
       "class=\"text\">what must hold</th>"
       "<th class=\"text\">what was found</th></tr></thead><tbody>\n",
-      escape_html(table.name), escape_html(table.title), escape_html(table.method));
+      escape_html(table.method));
   for (const Row& row : table.rows) html += row_html(row);
   return html + "</tbody></table></div>\n";
 }
@@ -51,13 +51,7 @@ std::string table_html(const Table& table) {
 std::string verdict_html(const Reproduction& all) {
   const std::size_t rows = row_count(all), passed = passed_count(all);
   std::vector<std::string> failed;
-  std::string contents;
   for (const Table& table : all.tables) {
-    const auto good = std::count_if(table.rows.begin(), table.rows.end(),
-                                    [](const Row& row) { return passes(row); });
-    contents +=
-        fmt::format("<li><a href=\"#{}\">{}</a>: {} of {} rows pass</li>\n",
-                    escape_html(table.name), escape_html(table.title), good, table.rows.size());
     for (const Row& row : table.rows) {
       if (passes(row)) continue;
       failed.push_back(fmt::format("{}, {}: {}", table.name, row.term, reason_text(row)));
@@ -65,12 +59,12 @@ std::string verdict_html(const Reproduction& all) {
   }
   return fmt::format(
       "<section class=\"verdict {}\"><strong>{} of {} rows pass</strong>"
-      "<p>{}</p>{}</section>\n<ul>\n{}</ul>\n",
+      "<p>{}</p>{}</section>\n",
       passed == rows ? "ok" : "bad", passed, rows,
       passed == rows ? "Every number of the paper that can be worked out again holds within its "
                        "stated bound."
                      : "These do not:",
-      failed.empty() ? "" : report::list_html(failed), contents);
+      failed.empty() ? "" : report::list_html(failed));
 }
 
 }  // namespace
@@ -78,25 +72,30 @@ std::string verdict_html(const Reproduction& all) {
 std::string reproduction_page(const Reproduction& reproduction,
                               const std::vector<std::pair<std::string, std::string>>& provenance) {
   report::Figures figures;
-  std::string body = verdict_html(reproduction);
-  body +=
+  const std::string head =
+      verdict_html(reproduction) +
       "<p>Bounds say what must hold for a row to pass. Where the paper shows one random draw, ours "
       "is the median of many and the bound is on where the paper's falls among them. Drawings "
       "without numbers (Figs. 1 and 3 to 6) are left out.</p>\n";
+  report::Sections sections;
   for (const Table& table : reproduction.tables) {
-    body += table_html(table);
+    std::string html = table_html(table);
     for (const Figure& figure : reproduction.figures) {
       if (figure.table != table.name) continue;
-      body += fmt::format("<h3 id=\"{}_diagrams\">{}</h3>\n", escape_html(figure.name),
+      html += fmt::format("<h3 id=\"{}_diagrams\">{}</h3>\n", escape_html(figure.name),
                           escape_html(figure.title));
-      body += report::charts_html(figure.charts, figures);
+      html += report::charts_html(figure.charts, figures);
     }
+    const auto good = std::count_if(table.rows.begin(), table.rows.end(),
+                                    [](const Row& row) { return passes(row); });
+    sections.add(table.title, html, table.name,
+                 fmt::format("{} of {} rows pass", good, table.rows.size()));
   }
-  body += report::provenance_html(provenance);
+  sections.add(report::kHowToRepeat, report::provenance_html(provenance));
   return report::page_html("The paper again",
                            "Brazeal, Wilkinson & Hochmair 2021, Sensors 21(14), 4722: every table "
                            "and figure that holds numbers, the paper's beside ours.",
-                           body, figures);
+                           head, sections, figures);
 }
 
 }  // namespace risley::reproduction

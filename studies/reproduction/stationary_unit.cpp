@@ -206,7 +206,7 @@ Reproduction simulated(const ReproduceOptions& options, const Progress& progress
                       [&](const auto& one) { return one.name == name; });
     const double unit = si_per_unit(name);
     Row mean{fmt::format("all shots: mean speed of prism {} (Fig. 8)",
-                         static_cast<char>(letter - 'a' + 'A')),
+                         prism_capital(static_cast<int>(k))),
              "deg/s", printed(kPapersSpeeds[k].known), value_of(all, name).value / unit};
     mean.sigma = value_of(all, name).sigma_given_held / unit;
     mean.checks = {
@@ -217,7 +217,7 @@ Reproduction simulated(const ReproduceOptions& options, const Progress& progress
                "swing leaves up to 0.1; 99.9 %")};
     table.rows.push_back(mean);
     Row swing{fmt::format("all shots: standard deviation of the speed of prism {} (Fig. 9)",
-                          static_cast<char>(letter - 'a' + 'A')),
+                          prism_capital(static_cast<int>(k))),
               "deg/s", printed("2.2"), speed_std(all, k)};
     swing.checks = {at_most("error of the speed at any time over the swing",
                             degrees_from_radians(evaluation.angular_velocity_rmse[k]) / swing.ours,
@@ -289,10 +289,10 @@ Reproduction real(const RealRecording& recording) {
     const std::string name = fmt::format("angular_velocity_{}_deg_per_s", letter);
     const double ours = value_of(all, name).value / si_per_unit(name);
     const bool slow = std::abs(std::abs(ours) - 27984.0) < std::abs(std::abs(ours) - 43764.0);
-    Row speed{
-        fmt::format("all shots: mean speed of prism {}", static_cast<char>(letter - 'a' + 'A')),
-        "deg/s", printed(k == 0 ? (slow ? "-27,984" : "-43,764") : (slow ? "27,984" : "43,764")),
-        ours};
+    Row speed{fmt::format("all shots: mean speed of prism {}", prism_capital(static_cast<int>(k))),
+              "deg/s",
+              printed(k == 0 ? (slow ? "-27,984" : "-43,764") : (slow ? "27,984" : "43,764")),
+              ours};
     speed.checks = {within("ours over the paper's", ours / speed.paper->value, 0.99, 1.01,
                            "one of the paper's two combinations, 1 %")};
     table.rows.push_back(speed);

@@ -157,7 +157,7 @@ Table estimate_table(const ReproduceOptions& options, const std::vector<TripleDr
   }
   for (std::size_t k = 0; k < 3; ++k) {
     Row row{fmt::format("rotation angle errors of prism {}, root mean square",
-                        static_cast<char>('A' + k)),
+                        prism_capital(static_cast<int>(k))),
             "deg",
             {},
             over_draws(
@@ -411,8 +411,7 @@ Table emitter_table(const ReproduceOptions& options, const Estimate& six, const 
     const char letter = prism_letter(k);
     const auto& wedge = quantity_of(all, fmt::format("wedge_angle_{}_deg", letter));
     const std::string glass = fmt::format("refractive_index_{}", letter);
-    Row row{fmt::format("correlation of prism {}'s wedge angle with its index",
-                        static_cast<char>('A' + k)),
+    Row row{fmt::format("correlation of prism {}'s wedge angle with its index", prism_capital(k)),
             "1",
             {},
             wedge.twins.front().second};

@@ -48,8 +48,9 @@ export async function launch() {
   });
 }
 
-// A new tab. open: opens a file in it. draw: also waits until all its diagrams are drawn, and returns
-// the milliseconds from the start of the navigation until then. complaints: what the page opened
+// A new tab. open: opens a file in it. draw: also waits until its diagrams are drawn, and returns the
+// milliseconds from the start of the navigation until then. unfold: unfolds all
+// sections and waits for their diagrams, openSections does not wait. complaints: what the page opened
 // last says or asks for and should not.
 export async function newTab(browser, options = {}) {
   const context = await browser.newContext({
@@ -82,11 +83,23 @@ export async function newTab(browser, options = {}) {
                               { timeout: longestDrawing, polling: 10 });
     return tab.evaluate(() => performance.now());
   };
-  return { tab, context, complaints, open, draw };
+  const openSections = () => tab.evaluate(() => {
+    for (const section of document.querySelectorAll('details')) section.open = true;
+  });
+  const unfold = async () => {
+    await openSections();
+    await tab.waitForFunction(() =>
+      window.risley.charts.length === document.querySelectorAll('figure .plot').length, null,
+                              { timeout: longestDrawing, polling: 10 });
+  };
+  return { tab, context, complaints, open, openSections, draw, unfold };
 }
 
-// A new tab in which all diagrams of a page are drawn, after so many milliseconds.
+// A new tab in which all diagrams of a page are drawn; those that are not folded after so many
+// milliseconds.
 export async function openPage(browser, file, options = {}) {
   const opened = await newTab(browser, options);
-  return { ...opened, milliseconds: await opened.draw(file) };
+  const milliseconds = await opened.draw(file);
+  await opened.unfold();
+  return { ...opened, milliseconds };
 }

@@ -8,6 +8,7 @@ import { look } from './looking.mjs';
 const largestFile = 4 * 1024 * 1024;
 const noise = 0.02; // of an axis: a pixel or two of a drawn box
 
+const tallestPage = 4000; // before anything is unfolded
 const otherPixels = 0.002; // of a picture: by so much it may differ from itself
 const longestReaction = 5000; // ms, of a page to a hand; a good one is not waited for
 
@@ -387,6 +388,61 @@ export async function checkPrint(tab, file) {
   (await differences(tab, 'before', 'after')).forEach(({ share }, i) => {
     if (share > otherPixels) complaints.push(`${titles[i]}: looks different after printing`);
   });
+  return complaints;
+}
+
+// What stands folded is not drawn; a link of the contents leads into its section, the button unfolds
+// all, paper gets all, and a page is short before somebody unfolds it.
+export async function checkFolding(tab, { patience = longestReaction } = {}) {
+  const complaints = [];
+  const state = () => tab.evaluate(() => ({
+    places: document.querySelectorAll('figure .plot').length,
+    folded: document.querySelectorAll('details.section:not([open])').length,
+    hidden: document.querySelectorAll('details.section:not([open]) .plot').length,
+    drawn: window.risley.charts.length, height: document.documentElement.scrollHeight,
+  }));
+  const first = await state();
+  if (first.height > tallestPage) complaints.push(`${first.height} pixels high, allowed ${tallestPage}`);
+  if (first.drawn !== first.places - first.hidden) {
+    complaints.push(`${first.drawn} of ${first.places - first.hidden} diagrams drawn at first`);
+  }
+
+  await tab.evaluate(() => window.addEventListener('beforeprint', () => {
+    window.printedDiagrams = document.querySelectorAll('img.printed').length;
+  }, { once: true }));
+  await tab.pdf();
+  const printed = await tab.evaluate(() => window.printedDiagrams);
+  if (printed !== first.places) complaints.push(`${printed} of ${first.places} diagrams are printed`);
+  const { folded } = await state();
+  if (folded !== first.folded) complaints.push(`${folded} of ${first.folded} sections folded again`);
+
+  const links = await tab.locator('nav.contents a').count();
+  const sections = await tab.locator('details.section').count();
+  if (links !== sections) complaints.push(`${links} links to ${sections} sections`);
+  for (let i = links - 1; i >= 0; --i) {
+    const link = tab.locator('nav.contents a').nth(i);
+    const title = await link.innerText();
+    const section = tab.locator(`[id="${(await link.getAttribute('href')).slice(1)}"]`);
+    await link.click();
+    const seen = () => section.evaluate((one) => ({
+      open: one.open, top: one.getBoundingClientRect().top, room: window.innerHeight,
+      places: one.querySelectorAll('.plot').length,
+      drawn: window.risley.charts.filter(({ place }) => one.contains(place)).length,
+    }));
+    const good = ({ open, top, room, places, drawn }) =>
+      open && drawn === places && top >= -1 && top < room;
+    const found = await whenGood(tab, seen, good, patience);
+    if (!found.open) complaints.push(`${title}: the link does not unfold it`);
+    if (found.drawn !== found.places) {
+      complaints.push(`${title}: ${found.drawn} of ${found.places} diagrams are drawn once it is unfolded`);
+    }
+    if (!(found.top >= -1 && found.top < found.room)) complaints.push(`${title}: stands at ${found.top}`);
+  }
+
+  const isWhole = (now) => now.folded === 0 && now.drawn === now.places;
+  if ((await state()).folded > 0) await tab.click('#unfold');
+  const all = await whenGood(tab, state, isWhole, patience);
+  if (!isWhole(all)) complaints.push(`the button leaves ${JSON.stringify(all)}`);
   return complaints;
 }
 

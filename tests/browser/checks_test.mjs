@@ -66,12 +66,13 @@ function replaced(from, to) {
 }
 
 // Opens a page in the tab of the page before, which is faster than in a new one.
-async function withPage(html, visit, viewport = usualView) {
+async function withPage(html, visit, viewport = usualView, unfolded = true) {
   const file = join(folder, `page-${++count}.html`);
   writeFileSync(file, html);
   opened ??= await newTab(browser);
   await opened.tab.setViewportSize(viewport);
   await opened.draw(file);
+  if (unfolded) await opened.unfold();
   try {
     return await visit(opened.tab, opened.complaints, file);
   } catch (error) {
@@ -197,6 +198,14 @@ test('a page that is too wide', () => withPage(
   async (tab) => complains(await checks.checkWidth(tab), /pixels wide where 400 are/),
   { width: 400, height: 800 }));
 
+test('sections that unfold without their diagrams, and that paper does not get', () => withPage(
+  replaced("toggle'", "toggled'").replace('for (const section of foldedAgain) section.open = true;', ''),
+  async (tab) => {
+    const complaints = await checks.checkFolding(tab, soon);
+    complains(complaints, /are drawn once it is unfolded/);
+    complains(complaints, /diagrams are printed/);
+  }, usualView, false));
+
 test('a file that is too large', () => {
   const file = join(folder, 'large.html');
   writeFileSync(file, page + ' '.repeat(5 << 20));
@@ -209,6 +218,7 @@ test('tables that need JavaScript, and no note', () => withPage(
   async (tab, said, file) => {
     const bare = await newTab(browser, { javaScriptEnabled: false });
     await bare.open(file);
+    await bare.openSections();
     const complaints = await checks.checkWithoutScript(bare.tab, tab);
     complains(complaints, /no note/);
     complains(complaints, /table differ/);

@@ -68,6 +68,7 @@ export function inspect(name, make, says, whole = true) {
       await page.tab.emulateMedia({ colorScheme });
       await page.tab.setViewportSize(size);
       await page.draw(file);
+      await page.unfold();
     };
 
     test('its file is small', () => good(checks.checkFile(file)));
@@ -78,6 +79,14 @@ export function inspect(name, make, says, whole = true) {
       await page.tab.screenshot({ path: artefact('-light.png'), fullPage: true });
       await good(checks.checkDrawn(page.tab));
     });
+    testScript('folds', async () => {
+      const fresh = await newTab(browser);
+      await fresh.draw(file);
+      await fresh.tab.screenshot({ path: artefact('-folded.png'), fullPage: true });
+      await good(checks.checkFolding(fresh.tab));
+      await good(fresh.complaints);
+      await fresh.context.close();
+    });
     testScript('prints', () => good(checks.checkPrint(page.tab, artefact('.pdf'))));
     testScript('changes its colours', () => good(checks.checkTheme(page.tab)));
     test('shows values under the mouse', () => good(checks.checkHover(page.tab)));
@@ -87,6 +96,7 @@ export function inspect(name, make, says, whole = true) {
     testScript('is readable without JavaScript', async () => {
       const bare = await newTab(browser, { javaScriptEnabled: false });
       await bare.open(file);
+      await bare.openSections();
       await good(checks.checkWithoutScript(bare.tab, page.tab));
       await good(bare.complaints);
       await bare.context.close();

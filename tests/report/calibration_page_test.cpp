@@ -259,7 +259,7 @@ TEST(CalibrationPage, SaysFirstThatAGoodCalibrationIsHealthy) {
   EXPECT_THAT(shown, HasSubstr("class=\"verdict ok\""));
   EXPECT_THAT(shown, HasSubstr("21.4 mm thick before and 15.1 mm after"));
   EXPECT_THAT(shown, HasSubstr("80\u202f000 points"));
-  EXPECT_THAT(shown, HasSubstr("roll 0.0041°, pitch 0.0123°"));
+  EXPECT_THAT(shown, HasSubstr("roll is 0.0041°, of pitch 0.012°"));
   EXPECT_THAT(shown, Not(HasSubstr("must not be trusted")));
   EXPECT_THAT(shown, HasSubstr("The sensor points where it believes."));
   EXPECT_THAT(shown, HasSubstr("walls &lt;bear out&gt; the belief"));
@@ -308,8 +308,8 @@ TEST(CalibrationPage, HasEverySection) {
           "Errors of the zenith angle after", "Walls before the calibration: room &lt;1&gt;.lvx",
           "Walls after the calibration: room &lt;1&gt;.lvx",
           "Walls before the calibration: hall.lvx", "Walls after the calibration: hall.lvx",
-          "Thickness over the angle of incidence", "Thickness over the rotation angle of prism a",
-          "Thickness over the rotation angle of prism b",
+          "Thickness over the angle of incidence", "Thickness over the rotation angle of prism A",
+          "Thickness over the rotation angle of prism B",
           "Histogram of the distances from the planes",
           "Distances from the planes over the azimuth",
           "Mean distance from the planes over the field of view, before",
@@ -441,7 +441,7 @@ TEST(CalibrationPage, AStepStandsWithItsHeightAndPlace) {
 }
 
 TEST(CalibrationPage, RotationAnglesRunFromZeroToAFullTurn) {
-  const auto drawn = chart(Page().html(), "Thickness over the rotation angle of prism a");
+  const auto drawn = chart(Page().html(), "Thickness over the rotation angle of prism A");
   EXPECT_EQ(drawn.at("kind"), "full_turn");
   const auto after = series(drawn, "RMS after");
   const auto x = after.at("x").get<std::vector<double>>();

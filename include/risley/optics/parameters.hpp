@@ -100,5 +100,7 @@ void check_bounds(const ParameterInfo& parameter, double value);
 
 /// The letter of a prism in names: 'a' for the first in beam order.
 constexpr char prism_letter(int prism) { return static_cast<char>('a' + prism); }
+/// The same in texts for people: 'A'.
+constexpr char prism_capital(int prism) { return static_cast<char>('A' + prism); }
 
 }  // namespace risley

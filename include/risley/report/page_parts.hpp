@@ -50,6 +50,11 @@ struct CorrelationHead {
   std::string row_html, symbol_html;
 };
 
+/// Headings of sections that several pages have.
+inline constexpr const char* kCorrelations = "Correlations of the parameters";
+inline constexpr const char* kTimes = "Times of the recording";
+inline constexpr const char* kHowToRepeat = "How to make it again";
+
 /// Correlations as a table in colours; nothing when there are none.
 /// @param covariance  [heads, heads]
 std::string correlation_html(const std::vector<CorrelationHead>& heads,
@@ -84,12 +89,44 @@ class Figures {
 };
 
 /// Diagrams side by side, as far as the page is wide.
-std::string charts_html(const std::vector<Chart>& charts, Figures& figures);
+/// @param first  how many stand elsewhere already
+std::string charts_html(const std::vector<Chart>& charts, Figures& figures, std::size_t first = 0);
+
+/// A number that a page says before its tables.
+struct KeyNumber {
+  std::string text;   ///< with its unit, "0.4034° ± 0.0007°"
+  std::string words;  ///< what it is
+};
+
+/// What stands under the verdict: a few numbers beside the first of some diagrams, if there is one.
+std::string overview_html(const std::vector<KeyNumber>& numbers, const std::vector<Chart>& charts,
+                          Figures& figures);
+
+/// The sections of a page under their headings. Each unfolds, and a table of contents leads to it.
+class Sections {
+ public:
+  enum class Shown { folded, unfolded };
+  /// @param html  empty: there is no such section
+  void add(const std::string& title, const std::string& html, Shown shown = Shown::folded);
+  /// @param id      for links to it
+  /// @param remark  what the contents say beside the title
+  void add(const std::string& title, const std::string& html, const std::string& id,
+           const std::string& remark);
+  /// Contents and sections.
+  std::string html() const;
+
+ private:
+  void add(const std::string& title, const std::string& html, const std::string& id,
+           const std::string& remark, Shown shown);
+
+  std::string contents_, sections_;
+};
 
 /// One self-contained page (Apache ECharts included, no network).
 /// @param lead       one sentence under the title, text
-/// @param body_html  all that follows
+/// @param head_html  what is read first: verdict_html(), overview_html()
 std::string page_html(const std::string& title, const std::string& lead,
-                      const std::string& body_html, const Figures& figures);
+                      const std::string& head_html, const Sections& sections,
+                      const Figures& figures);
 
 }  // namespace risley::report

@@ -253,7 +253,7 @@ class NetcdfWriter final : public CloudWriter {
     for (int k = 0; k < header.prisms; ++k) {
       define_data<float>(
           {fmt::format("rotation_angle_{}_deg", prism_letter(k)), "degree",
-           fmt::format("rotation angle of prism {}", prism_letter(k))},
+           fmt::format("rotation angle of prism {}", prism_capital(k))},
           [k](const Points& p, std::size_t i, std::size_t) {
             return degrees_from_radians(p.rotation_angle[static_cast<std::size_t>(k)][i]);
           });
