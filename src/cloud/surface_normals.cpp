@@ -27,12 +27,12 @@ constexpr double kNearEnough = 3;
 /// Surfaces that differ by less, in sigmas and as the cosine between normals, are one: 3 degrees.
 constexpr double kSameRange = 1, kSameNormal = 0.9986;
 
-constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
+constexpr float kNoValue = std::numeric_limits<float>::quiet_NaN();
 
 }  // namespace
 
-const SurfaceNormals::FittedPlane SurfaceNormals::kNoPlane{{kNaN, kNaN, kNaN}, kNaN};
-const Vector3<double> SurfaceNormals::kNone{kNaN, kNaN, kNaN};
+const SurfaceNormals::FittedPlane SurfaceNormals::kNoPlane{{kNoValue, kNoValue, kNoValue}, kNoValue};
+const Vector3<double> SurfaceNormals::kNone{kNoValue, kNoValue, kNoValue};
 
 template <class Function>
 void SurfaceNormals::for_cells_around(std::size_t cell, int reach, Function&& function) {

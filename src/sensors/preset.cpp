@@ -155,8 +155,9 @@ void read_parameters(const YamlMap& map, Sensor& sensor) {
       return info.name == entry.key && info.kind != ParameterKind::rotation_angle;
     });
     if (found == list.end()) {
-      std::vector<std::string> names;
-      for (const ParameterInfo& info : list) names.push_back(info.name);
+      std::vector<std::string> names(list.size());
+      std::transform(list.begin(), list.end(), names.begin(),
+                     [](const ParameterInfo& info) { return info.name; });
       fail_at(
           map.path(), entry.line,
           fmt::format("unknown parameter {} of a sensor with {} prisms (face_order {}) and {} "
