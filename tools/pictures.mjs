@@ -35,7 +35,8 @@ const steps = {
   },
   cloud: () => {
     need('calibrate');
-    run('risley cloud out/hall.lvx --calibration out/calibration/calibration.yaml -o out/hall.npy');
+    run('risley cloud out/hall.lvx --calibration out/calibration/calibration.yaml -o out/hall.las ' +
+      '--report out/hall.html');
   },
   real: () => run(`risley estimate ${resolve(recordings, 'real/mid-40-hub-frame.csv')} ` +
     '--shot-rate-hz 100000 -o out/real/'),
@@ -44,7 +45,7 @@ const steps = {
 
 // ---- the pictures ----
 
-// page: the page, of which `keep` stays: {css}, {section: h2 and all up to the next},
+// page: the page, of which `keep` stays: {css}, {section: its heading},
 // {figure: title}; or lines of a terminal. width: of the page. scale: 2 where text is small.
 // rows, columns: as many of every table. before: what to do on the page first.
 const pictures = [
@@ -69,10 +70,10 @@ const pictures = [
   {
     file: 'calibrate.png', needs: ['calibrate'], page: 'out/calibration/report.html', width: 1160,
     keep: [{ css: '.verdict' }, { section: /^Where the sensor points/ },
-           { figure: /^(Walls (before|after)|Thickness over the (angle of incidence|rotation angle of prism a))/ }],
+           { figure: /^(Walls (before|after)|Thickness over the (angle of incidence|rotation angle of prism A))/ }],
   },
   {
-    file: 'cloud.png', needs: ['cloud'], page: cloudPage, width: 1000, keep: [{ css: 'figure' }],
+    file: 'cloud.png', needs: ['cloud'], page: 'out/hall.html', width: 1000, keep: [{ figure: /^The points$/ }],
     before: () => window.risley.charts[0].chart.setOption({
       grid3D: { viewControl: { alpha: 22, beta: -62, distance: 140 } },
     }),
@@ -182,63 +183,6 @@ b { color: #1a5fc4; font-weight: 600; } i { color: #5b6470; font-style: normal; 
   return file;
 }
 
-// Columns of a structured array of numpy, every n-th row.
-function columnsOf(file, names, stride) {
-  const bytes = readFileSync(join(folder, file));
-  const long = bytes.readUInt8(6) >= 2;
-  const start = long ? 12 : 10;
-  const size = long ? bytes.readUInt32LE(8) : bytes.readUInt16LE(8);
-  const head = bytes.toString('latin1', start, start + size);
-  const fields = [...head.matchAll(/\('([^']+)', '([<|])([a-z])(\d+)'/g)];
-  const rows = Number(/'shape': \((\d+)/.exec(head)[1]);
-  const width = fields.reduce((sum, field) => sum + Number(field[4]), 0);
-  let offset = 0;
-  const columns = {};
-  for (const [, name, , kind, length] of fields) {
-    if (names.includes(name)) {
-      if (kind !== 'f') throw new Error(`${name} is not a floating-point number`);
-      const read = length === '8' ? 'readDoubleLE' : 'readFloatLE';
-      columns[name] = [];
-      for (let row = 0; row < rows; row += stride) {
-        columns[name].push(bytes[read](start + size + row * width + offset));
-      }
-    }
-    offset += Number(length);
-  }
-  return columns;
-}
-
-// Points of the hall in a page of their own, drawn by the script of every page.
-function cloudPage() {
-  const names = ['X', 'Y', 'Z', 'StdX', 'StdY', 'StdZ'];
-  const column = columnsOf('out/hall.npy', names, 25);
-  const sigma = column.X.map((_, i) =>
-    1000 * Math.hypot(column.StdX[i], column.StdY[i], column.StdZ[i]));
-  const keep = sigma.flatMap((value, i) => (Number.isFinite(value) ? [i] : []));
-  const pick = (values, digits) => keep.map((i) => Number(values[i].toFixed(digits)));
-  const sorted = pick(sigma, 1).sort((a, b) => a - b);
-  const at = (share) => Math.round(sorted[Math.floor(share * (sorted.length - 1))]);
-  const chart = {
-    id: 'chart-0', title: 'Standard deviation of every point, mm', x_label: 'X (forward), m',
-    y_label: 'Y (left), m', z_label: 'Z (up), m', value_label: 'standard deviation, mm',
-    kind: 'space', palette: 'sequential', value_range: [at(0.01), at(0.99)],
-    series: [{ label: '', colour: 'a', kind: 'points', x: pick(column.X, 3), y: pick(column.Y, 3),
-               z: pick(column.Z, 3), value: pick(sigma, 2), cell_width: 0, cell_height: 0 }],
-  };
-  const page = readFileSync(join(folder, 'out/calibration/report.html'), 'utf8');
-  const between = (text, from, to, middle) => {
-    const start = text.indexOf(from) + from.length;
-    return text.slice(0, start) + middle + text.slice(text.indexOf(to, start));
-  };
-  const body = '<button id="theme" type="button"></button><figure class="space"><figcaption>' +
-    `${chart.title}</figcaption><div class="plot" id="chart-0" tabindex="0"></div></figure>` +
-    '<div id="spoken"></div>';
-  const file = join(folder, 'cloud.html');
-  writeFileSync(file, between(between(page, '<main>', '</main>', body),
-                              'id="page-data">', '</script>', JSON.stringify([chart])));
-  return file;
-}
-
 // Leaves only what is wanted on a page.
 function keepOnly(wishes) {
   const main = document.querySelector('main');
@@ -248,14 +192,13 @@ function keepOnly(wishes) {
     const before = kept.size;
     if (css) main.querySelectorAll(css).forEach((element) => kept.add(element));
     if (section) {
-      const head = [...main.querySelectorAll('h2')].find((h) =>
-        new RegExp(section).test(h.textContent));
-      for (let next = head; next && (next === head || next.tagName !== 'H2');
-        next = next.nextElementSibling) {
-        if (!without || !next.matches('.charts, ' + without)) kept.add(next);
+      const found = [...main.querySelectorAll('details.section')].find((one) =>
+        new RegExp(section).test(one.querySelector('h2').textContent));
+      for (const part of found?.children ?? []) {
+        if (!without || !part.matches('.charts, ' + without)) kept.add(part);
         const beyond = [rows && `tbody tr:nth-child(n + ${rows + 1})`,
                         columns && `tr > :nth-child(n + ${columns + 1})`].filter(Boolean).join();
-        if (beyond) next.querySelectorAll(beyond).forEach((element) => element.remove());
+        if (beyond) part.querySelectorAll(beyond).forEach((element) => element.remove());
       }
     }
     if (figure) {
@@ -277,8 +220,7 @@ function keepOnly(wishes) {
 
 async function take(browser, picture) {
   picture.needs.forEach(need);
-  const page = typeof picture.page === 'function' ? picture.page() : picture.page;
-  const file = page ? resolve(folder, page) : terminalPage(picture.terminal());
+  const file = picture.page ? resolve(folder, picture.page) : terminalPage(picture.terminal());
   const { tab, context, complaints } = await openPage(browser, file, {
     viewport: { width: picture.width ?? 1300, height: 900 },
     deviceScaleFactor: picture.scale ?? 1,

@@ -14,6 +14,7 @@
 #include "risley/jobs/cloud_of_recording.hpp"
 #include "risley/jobs/recording_input.hpp"
 #include "risley/report/beam_origin_page.hpp"
+#include "risley/report/cloud_page.hpp"
 #include "risley/report/distribution_page.hpp"
 #include "risley/sensors/preset.hpp"
 
@@ -31,7 +32,7 @@ namespace {
 
 struct CloudCommandOptions {
   std::vector<std::string> inputs;
-  std::string output, calibration, format, beam_origin_map, distribution;
+  std::string output, calibration, format, beam_origin_map, distribution, report;
   std::string directions = "smoothed", beam_origin = "yes", beam_divergence = "yes",
               covariance = "yes", common_factors = "no", time = "gps";
   std::string rate_hz = fmt::format("{:.0f}", cloud::kTrackingRate);
@@ -71,6 +72,7 @@ cloud::CloudOptions cloud_options(const CloudCommandOptions& options) {
   result.writer.las_scale = options.las_scale_m;
   result.writer.gps_time = options.time == "gps";
   if (!options.distribution.empty()) result.distribution.emplace();
+  if (!options.report.empty()) result.sample = report::kCloudPagePoints;
   return result;
 }
 
@@ -140,6 +142,9 @@ FileOutcome make_one(const FileJob& job, const CloudCommandOptions& options,
     io::write_text_file(options.distribution,
                         report::distribution_page(*s.distribution, job.input, settings.provenance));
   }
+  if (s.sample) {
+    io::write_text_file(options.report, report::cloud_page(s, job.input, settings.provenance));
+  }
   std::string text = fmt::format("{}: {} points", job.output, grouped(s.points));
   if (s.no_return > 0) text += fmt::format(", {} shots without return", grouped(s.no_return));
   if (s.outliers > 0) text += fmt::format(", {} outliers left out", grouped(s.outliers));
@@ -149,7 +154,9 @@ FileOutcome make_one(const FileJob& job, const CloudCommandOptions& options,
   if (s.without_pose > 0) {
     text += fmt::format(", {} outside the trajectory left out", grouped(s.without_pose));
   }
-  return {s.damage ? kBadFile : kDone, summary_json(job, s), text};
+  Json json = summary_json(job, s);
+  if (s.sample) json["html"] = options.report;
+  return {s.damage ? kBadFile : kDone, std::move(json), text};
 }
 
 }  // namespace
@@ -200,6 +207,10 @@ Run declare_cloud(CLI::App& verb) {
           "Page (HTML) on how the points of one flight lie on the ground; its numbers are in "
           "--json")
       ->needs("--trajectory");
+  verb.add_option(
+      "--report", o.report,
+      "Page (HTML) that shows the points of one recording in three dimensions, coloured "
+      "by uncertainty, height, intensity or angle of incidence");
   verb.add_option("--rate-hz", o.rate_hz,
                   "Directions per second that rotation angles are found from; 'full' for all")
       ->capture_default_str();
@@ -230,12 +241,14 @@ Run declare_cloud(CLI::App& verb) {
       ending = cloud::find_cloud_format("", options->format).ending;
     }
     const std::vector<FileJob> files = file_jobs(options->inputs, options->output, ending);
-    if (!options->distribution.empty()) {
-      if (files.size() != 1) {
-        throw InvalidArgument(
-            fmt::format("--distribution is of one recording, and there are {}", files.size()));
-      }
-      require_apart(common, {options->distribution, files.front().output});
+    for (const auto& [name, page] : {std::pair{"--distribution", options->distribution},
+                                     std::pair{"--report", options->report}}) {
+      if (page.empty() || files.size() == 1) continue;
+      throw InvalidArgument(
+          fmt::format("{} is of one recording, and there are {}", name, files.size()));
+    }
+    if (files.size() == 1) {
+      require_apart(common, {options->distribution, options->report, files.front().output});
     }
     settings.writer.format = options->format;
     settings.provenance = provenance_of(common);

@@ -237,6 +237,7 @@ class Work {
       if (options_.distribution) begin_distribution();
     }
     summary_.frame = header_.frame.text;
+    if (options_.sample) sampler_.emplace(header_.frame, *options_.sample);
     header_.provenance = options_.provenance;
     writer_ = create_cloud(path_, header_, options_.writer);
   }
@@ -558,6 +559,7 @@ class Work {
   void write(const Block& block) {
     writer_->write(block.points);
     if (distribution_) count_on_ground(block.points);
+    if (sampler_) sampler_->add(block.points);
     summary_.points += block.points.size();
     summary_.outliers += block.outliers;
     summary_.without_rotation_angle += block.without_rotation_angle;
@@ -613,6 +615,7 @@ class Work {
     summary_.azimuth_residual_rms = std::sqrt(summary_.azimuth_residual_rms / n);
     summary_.zenith_residual_rms = std::sqrt(summary_.zenith_residual_rms / n);
     if (distribution_) summary_.distribution = distribution_->summary();
+    if (sampler_) summary_.sample = sampler_->sample();
     writer_->close();
   }
 
@@ -631,6 +634,7 @@ class Work {
   SensorPoses surface_pose_;  ///< in the middle of a surface's time, where it is known
   std::int64_t first_time_ns_ = 0, last_time_ns_ = 0;  ///< of the recording
   std::optional<PointDistribution> distribution_;
+  std::optional<PointSampler> sampler_;
   CloudHeader header_;
   std::unique_ptr<CloudWriter> writer_;
   std::vector<Block> blocks_;

@@ -31,7 +31,8 @@ constexpr float kNoValue = std::numeric_limits<float>::quiet_NaN();
 
 }  // namespace
 
-const SurfaceNormals::FittedPlane SurfaceNormals::kNoPlane{{kNoValue, kNoValue, kNoValue}, kNoValue};
+const SurfaceNormals::FittedPlane SurfaceNormals::kNoPlane{{kNoValue, kNoValue, kNoValue},
+                                                           kNoValue};
 const Vector3<double> SurfaceNormals::kNone{kNoValue, kNoValue, kNoValue};
 
 template <class Function>

@@ -135,13 +135,14 @@ class CalibrationCharts {
       charts.push_back(view.chart("Field of view: " + name, "azimuth, deg", azimuth_degrees,
                                   "zenith, deg", zenith_degrees));
       charts.push_back(view.chart_with_sensor(
-          "From above: " + name, "X (forward), m", [](const SamplePoint& p) { return p.point.x; },
-          "Y (left), m", [](const SamplePoint& p) { return p.point.y; },
-          "Forward is to the left, the sensor's left is below."));
+          "From above: " + name, "right of the sensor (−Y), m",
+          [](const SamplePoint& p) { return -p.point.y; }, "ahead of it (X), m",
+          [](const SamplePoint& p) { return p.point.x; }, "Ahead is up, as on a map."));
       charts.push_back(view.chart_with_sensor(
-          "From the side: " + name, "X (forward), m",
-          [](const SamplePoint& p) { return p.point.x; }, "below the sensor (−Z), m",
-          [](const SamplePoint& p) { return -p.point.z; }, "Forward is to the left, up is up."));
+          "From the side: " + name, "ahead of the sensor (X), m",
+          [](const SamplePoint& p) { return p.point.x; }, "above it (Z), m",
+          [](const SamplePoint& p) { return p.point.z; },
+          "Seen from the right of the sensor."));
     }
     return charts;
   }
@@ -254,6 +255,7 @@ class CalibrationCharts {
                             std::string y_label, const PointValue& y,
                             const std::string& orientation) const {
       Chart result = chart(std::move(title), std::move(x_label), x, std::move(y_label), y);
+      result.kind = ChartKind::ground;
       result.series.push_back({"sensor", "ink", SeriesKind::points, {0.0}, {0.0}});
       result.note += " " + orientation;
       return result;

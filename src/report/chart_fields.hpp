@@ -47,6 +47,13 @@ void fields(Archive& archive, T& series) {
   archive("cell_height", series.cell_height);
 }
 
+template <class Archive, FieldsOf<Colouring> T>
+void fields(Archive& archive, T& colouring) {
+  archive("label", colouring.label);
+  column(archive, "value", colouring.value);
+  archive("value_range", colouring.value_range);
+}
+
 template <class Archive, FieldsOf<Chart> T>
 void fields(Archive& archive, T& chart) {
   archive("title", chart.title);
@@ -58,6 +65,7 @@ void fields(Archive& archive, T& chart) {
   archive("palette", chart.palette);
   archive("value_range", chart.value_range);
   archive("grows_for", chart.grows_for);
+  archive("colourings", chart.colourings);
   archive("note", chart.note);
   archive("series", chart.series);
 }

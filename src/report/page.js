@@ -9,6 +9,7 @@
   const data = JSON.parse(document.getElementById('page-data').textContent);
   const sequential = ['#440154', '#414487', '#2a788e', '#22a884', '#7ad151', '#fde725'];
   const margins = { left: 74, right: 24, top: 36, bottom: 52 };
+  const toolsWidth = 125, narrow = 500; // pixels
   const barWidth = 64; // of the colour scale
   const zoomStep = 0.8, panStep = 0.1, turnStep = 10;
   const thinnestBox = 8; // pixels
@@ -50,7 +51,21 @@
       return tiny && round !== 0 ? round.toExponential() : String(round);
     };
   };
+  // What the numbers of the upright axis need between it and its title.
+  const titleGap = (one) => {
+    const text = marks(every(one, 'y'));
+    const ends = [least(every(one, 'y')), most(every(one, 'y'))].filter(Number.isFinite);
+    return Math.max(52, ...ends.map((end) => 16 + 7 * text(Number(end.toPrecision(3))).length));
+  };
+  const leftMargin = (one) => titleGap(one) + margins.left - 52;
   const hasValues = (one) => one.series.some((series) => series.value.length > 0);
+
+  // Points take the colours that the reader chose.
+  function colourBy(one, { label, value, value_range }) {
+    one.series[0].value = value;
+    Object.assign(one, { value_label: label, value_range: value_range });
+  }
+  for (const one of data) if (one.colourings) colourBy(one, one.colourings[0]);
 
   // ---- two dimensions ----
 
@@ -125,32 +140,36 @@
     const escaped = echarts.format.encodeHTML; // names come from files
     const row = (name, value) => escaped(name) + ': <b>' + value + '</b>';
     const digits = { x: digitsOf(every(one, 'x')), y: digitsOf(every(one, 'y')) };
+    const across = (item) => row(one.x_label, rounded(item.value[0], digits.x));
     const text = (item) => {
-      const rows = [row(one.x_label, rounded(item.value[0], digits.x)),
-                    row(one.y_label, rounded(item.value[1], digits.y))];
+      const rows = [across(item), row(one.y_label, rounded(item.value[1], digits.y))];
       if (one.z_label) rows.push(row(one.z_label, short(item.value[2])));
       const value = item.value[one.z_label ? 3 : 2];
       if (one.value_label && value !== undefined) rows.push(row(one.value_label, short(value)));
       return (item.seriesName ? escaped(item.seriesName) + '<br>' : '') + rows.join('<br>');
     };
+    // Of several lines at one place: the place, and a line for each.
+    const texts = (items) => [across(items[0]), ...items.map((item) =>
+      row(item.seriesName || one.y_label, rounded(item.value[1], digits.y)))].join('<br>');
     const lines = one.series.some((series) => series.kind === 'line' || series.kind === 'steps');
     return {
       trigger: lines ? 'axis' : 'item', confine: true, transitionDuration: 0,
       axisPointer: { type: 'line', snap: true, lineStyle: { color: colour('muted') } },
       backgroundColor: colour('paper'), borderColor: colour('muted'),
       textStyle: { color: colour('ink'), fontSize: 12 },
-      formatter: (items) =>
-        Array.isArray(items) ? items.map(text).slice(0, 4).join('<br>') : text(items),
+      formatter: (items) => (Array.isArray(items) ? texts(items) : text(items)),
     };
   }
 
-  function colourScale(one, dimension) {
+  // below: beneath the diagram, where it is too narrow for a scale beside it.
+  function colourScale(one, dimension, below) {
     const values = every(one, 'value');
     const range = one.value_range || [least(values), most(values)];
     const diverging = ['low', 'low-half', 'middle', 'high-half', 'high'].map(colour);
     return {
       type: 'continuous', dimension: dimension, min: range[0], max: range[1], calculable: false,
-      right: 0, top: 'middle', itemHeight: 150, itemWidth: 12, precision: 6, formatter: short,
+      ...(below ? { orient: 'horizontal', left: 'center', bottom: 0 } : { right: 0, top: 'middle' }),
+      itemHeight: 150, itemWidth: 12, precision: 6, formatter: short,
       text: [range[1], range[0]].map((end) => marks(range)(Number(rounded(end, 2)))),
       seriesIndex: one.series.flatMap((series, i) => (series.value.length > 0 ? [i] : [])),
       inRange: { color: one.palette === 'diverging' ? diverging : sequential },
@@ -161,7 +180,8 @@
   function flatOption(one) {
     const square = one.kind === 'map' || one.kind === 'ground';
     const scaled = hasValues(one);
-    const x = axis(one.x_label, 30, every(one, 'x')), y = axis(one.y_label, 52, every(one, 'y'));
+    const x = axis(one.x_label, 30, every(one, 'x'));
+    const y = axis(one.y_label, titleGap(one), every(one, 'y'));
     if (square) {
       const limits = mapLimits(one);
       const turned = one.kind === 'map'; // as one looks out
@@ -183,12 +203,12 @@
     return {
       animation: false, backgroundColor: 'transparent',
       grid: {
-        ...margins, right: margins.right + (scaled ? barWidth : 0), containLabel: false,
+        ...margins, left: leftMargin(one), right: margins.right + (scaled ? barWidth : 0), containLabel: false,
         outerBoundsMode: 'none',
       },
       xAxis: x, yAxis: y,
       legend: {
-        show: one.series.length > 1, top: 0, left: margins.left, right: 125, type: 'scroll',
+        show: one.series.length > 1, top: 0, left: leftMargin(one), right: toolsWidth, type: 'scroll',
         itemWidth: 16, itemHeight: 8,
         textStyle: { color: colour('ink') }, inactiveColor: colour('grid'),
         pageTextStyle: { color: colour('ink') },
@@ -214,7 +234,7 @@
 
   // ---- three dimensions ----
 
-  function spaceOption(one) {
+  function spaceOption(one, below) {
     const span = (key) => {
       const values = every(one, key);
       return [least(values), most(values)];
@@ -245,16 +265,16 @@
         },
       },
       legend: {
-        show: one.series.length > 1, top: 0, left: 10, type: 'scroll',
+        show: one.series.length > 1, top: 0, left: 10, right: toolsWidth / 2, type: 'scroll',
         itemWidth: 16, itemHeight: 8,
         textStyle: { color: colour('ink') }, inactiveColor: colour('grid'),
       },
-      visualMap: hasValues(one) ? [colourScale(one, 3)] : [],
+      visualMap: hasValues(one) ? [colourScale(one, 3, below)] : [],
       xAxis3D: axis3d(one.x_label, spans[0]),
       yAxis3D: axis3d(one.y_label, spans[1]),
       zAxis3D: axis3d(one.z_label, spans[2]),
       grid3D: {
-        left: 0, right: hasValues(one) ? barWidth : 0, top: -30, bottom: 0,
+        left: 0, right: hasValues(one) && !below ? barWidth : 0, top: -30, bottom: below ? 30 : 0,
         boxWidth: box(0), boxDepth: box(1), boxHeight: box(2),
         viewControl: { alpha: 25, beta: -50, distance: 140, zoomSensitivity: 1, animation: false },
         postEffect: { enable: false }, temporalSuperSampling: { enable: false },
@@ -264,9 +284,12 @@
         type: 'scatter3D', name: series.label, symbolSize: series.x.length < 3000 ? 6 : 3,
         itemStyle: series.value.length > 0 ? { opacity: 0.9 }
                                            : { color: colour(series.colour), opacity: 0.9 },
-        data: series.x.map((x, i) =>
-          series.value.length > 0 ? [x, series.y[i], series.z[i], series.value[i]]
-                                  : [x, series.y[i], series.z[i]]),
+        data: series.x.map((x, i) => {
+          const place = [x, series.y[i], series.z[i]];
+          if (series.value.length === 0) return place;
+          place.push(series.value[i]);
+          return series.value[i] === null ? { value: place, itemStyle: { opacity: 0 } } : place;
+        }),
       })),
     };
   }
@@ -368,7 +391,7 @@
     const right = margins.right + (hasValues(entry.data) ? barWidth : 0);
     entry.place.style.width = width + 'px';
     entry.place.style.height =
-      width - margins.left - right + margins.top + margins.bottom + 'px';
+      width - leftMargin(entry.data) - right + margins.top + margins.bottom + 'px';
   }
 
   // Whether a box drawn with the mouse zooms.
@@ -380,11 +403,14 @@
     });
   }
 
+  const isNarrow = ({ place }) => place.clientWidth < narrow;
+
   // again: in other colours, as it is turned or zoomed now.
   function draw(entry, again) {
     const one = entry.data;
     if (one.kind === 'space') {
-      const option = spaceOption(one);
+      entry.below = isNarrow(entry);
+      const option = spaceOption(one, entry.below);
       if (again) delete option.grid3D.viewControl; // a new camera would need a frame to stand right
       entry.chart.setOption(option, !again);
       return;
@@ -476,6 +502,20 @@
     entry.grown = { show };
   }
 
+  function addColourings(entry) {
+    const { data: one, place } = entry;
+    const label = document.createElement('label');
+    const choice = document.createElement('select');
+    label.className = 'colouring';
+    label.append('Coloured by ', choice);
+    choice.append(...one.colourings.map((colouring) => new Option(colouring.label)));
+    place.before(label);
+    choice.addEventListener('change', () => {
+      colourBy(one, one.colourings[choice.selectedIndex]);
+      draw(entry, true);
+    });
+  }
+
   function make(one) {
     const place = document.getElementById(one.id);
     const entry = { data: one, place: place };
@@ -484,6 +524,7 @@
     draw(entry);
     if (one.kind !== 'space') guideMouse(entry);
     if (one.grows_for && one.kind !== 'space') addGrowth(entry);
+    if (one.colourings) addColourings(entry);
     place.addEventListener('keydown', (event) => onKey(event, entry));
     return entry;
   }
@@ -559,6 +600,7 @@
     if (isFolded(entry.data)) return;
     size(entry);
     entry.chart.resize();
+    if (entry.data.kind === 'space' && entry.below !== isNarrow(entry)) draw(entry, true);
   }
 
   // Sections open for links that lead into them, and all of them for the button and for paper.

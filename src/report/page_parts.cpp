@@ -167,7 +167,7 @@ std::string correlation_html(const std::vector<CorrelationHead>& heads,
     html += "</tr>\n";
   }
   return html +
-         "</tbody></table></div>\n<p class=\"note\">Blue: the two rise together. Red: one "
+         "</tbody></table></div>\n<p class=\"note\">Red: the two rise together. Blue: one "
          "rises where the other falls. Near ±1 only their sum or difference is well "
          "known.</p>\n";
 }

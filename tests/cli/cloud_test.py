@@ -211,6 +211,20 @@ class CloudTest(CommandTest):
         self.assertEqual(self.expect_json(2, "convert", "wall.nc", "./wall.nc", "-o", "twice",
                                           "--format", "lvx-1.1")["exit_status"], 2)
 
+    def test_page_of_the_points(self):
+        found = self.expect_json(0, "cloud", "wall.nc", "--calibration", "mid-40-table3", "-o",
+                                 "page.ply", "--report", "page.html")
+        self.assertEqual(found["html"], "page.html")
+        page = (self.folder / "page.html").read_text(encoding="utf-8")
+        self.assertIn("How sure the points are", page)
+        self.assertIn(f"{found['points']:,}".replace(",", "\u202f"), page)
+        error = self.expect(2, "cloud", "wall.nc", "other.nc", "--calibration", "mid-40-table3",
+                            "-o", "clouds", "--report", "page.html").stderr
+        self.assertIn("--report is of one recording, and there are 2", error)
+        self.expect(2, "cloud", "wall.nc", "--calibration", "mid-40-table3", "-o", "same.ply",
+                    "--report", "same.ply")
+        self.assertFalse((self.folder / "same.ply").exists())
+
     def test_beam_origin_map(self):
         found = self.expect_json(0, "cloud", "--calibration", "mid-40", "--beam-origin-map",
                                  "map.html")

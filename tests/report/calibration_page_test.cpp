@@ -542,8 +542,8 @@ TEST(CalibrationPage, ViewsAreThinnedAndSayHow) {
   const auto floor = series(chart(html, "From the side: room &lt;1&gt;.lvx"), "floor");
   ASSERT_GT(floor.at("x").size(), 10u);
   for (std::size_t i = 0; i < floor.at("x").size(); ++i) {
-    const auto x = floor.at("x")[i].get<double>(), below = floor.at("y")[i].get<double>();
-    EXPECT_NEAR(below, (1.2 - std::sin(deg(2)) * x) / std::cos(deg(2)), 1e-5);
+    const auto x = floor.at("x")[i].get<double>(), above = floor.at("y")[i].get<double>();
+    EXPECT_NEAR(above, -(1.2 - std::sin(deg(2)) * x) / std::cos(deg(2)), 1e-5);
   }
 }
 

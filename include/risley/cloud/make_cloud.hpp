@@ -11,6 +11,7 @@
 #include "risley/cloud/cloud_writer.hpp"
 #include "risley/cloud/georeference.hpp"
 #include "risley/cloud/point_distribution.hpp"
+#include "risley/cloud/point_sample.hpp"
 #include "risley/cloud/pointing.hpp"
 #include "risley/cloud/rotor_tracking.hpp"
 #include "risley/core/error.hpp"
@@ -32,6 +33,8 @@ struct CloudOptions {
   std::optional<MovingPlatform> platform;      ///< of a sensor that moves
   /// Count how the first returns of a sensor that moves lie on the ground.
   std::optional<PointDistributionOptions> distribution;
+  /// Draw a sample of at most so many points.
+  std::optional<std::size_t> sample;
   CloudWriterOptions writer;
   std::vector<std::pair<std::string, std::string>> provenance;
 };
@@ -53,6 +56,7 @@ struct CloudSummary {
   std::vector<trajectories::FlownStrip> strips;  ///< of a flight, in the trajectory's time
   /// Where it was asked for; a warning says why it is not there.
   std::optional<PointDistributionSummary> distribution;
+  std::optional<PointSample> sample;  ///< where it was asked for
   bool mirrored = false;
   double azimuth_residual_rms = 0, zenith_residual_rms = 0;  ///< rad, of the points
   /// How far points were moved from where the sensor says, rms over some beams, rad.

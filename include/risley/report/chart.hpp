@@ -23,7 +23,7 @@ enum class ChartKind {
   full_turn,  ///< x runs from 0 to 360 degree
   two_turns,  ///< square, both axes run from 0 to 360 degree
   map,        ///< square, equal scales, both axes turned: a view along the beam
-  ground,     ///< square, equal scales: the ground from above, east to the right
+  ground,     ///< square, equal scales: from above or from the side, x to the right, y up
   space,      ///< three axes of equal scale, can be rotated; points only
 };
 
@@ -44,6 +44,13 @@ struct Series {
   double cell_width = 0, cell_height = 0;
 };
 
+/// What colours the points of a diagram while the reader has chosen it.
+struct Colouring {
+  std::string label;
+  std::vector<double> value;  ///< [points of the first series]; NaN: not known, not drawn
+  std::optional<std::pair<double, double>> value_range = {};  ///< as Chart::value_range
+};
+
 /// One diagram with labelled axes.
 struct Chart {
   std::string title, x_label, y_label;
@@ -58,6 +65,8 @@ struct Chart {
   /// The points of the first series came one after another in so many seconds, and the page can
   /// show how.
   std::optional<double> grows_for = {};
+  /// Choices for the colours of the first series, instead of its values; the first is shown first.
+  std::optional<std::vector<Colouring>> colourings = {};
 };
 
 }  // namespace risley::report

@@ -1,0 +1,116 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "risley/cloud/point_sample.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <limits>
+#include <span>
+#include <utility>
+
+#include "risley/core/error.hpp"
+#include "risley/core/random.hpp"
+#include "risley/core/require.hpp"
+
+#include "cloud/keep_rows.hpp"
+
+namespace risley::cloud {
+namespace {
+
+constexpr double kClassBegin[] = {0, 2, 5, 10, 20, 50, 100, 200, 500};  // m
+constexpr double kHighShare = 0.95;
+
+double quantile(std::vector<double>& values, double share) {
+  const double place = std::floor(share * static_cast<double>(values.size() - 1));
+  const auto at = values.begin() + static_cast<std::ptrdiff_t>(place);
+  std::nth_element(values.begin(), at, values.end());
+  return *at;
+}
+
+RangeClass class_of(const PointSample& sample, std::span<const std::size_t> rows, double from,
+                    double to) {
+  RangeClass result{from, to, rows.size(), 0, 0, 0};
+  std::vector<double> sigma(rows.size());
+  std::transform(rows.begin(), rows.end(), sigma.begin(),
+                 [&](std::size_t row) { return sample.total_sigma[row]; });
+  result.median_sigma = quantile(sigma, 0.5);
+  result.high_sigma = quantile(sigma, kHighShare);
+  const auto known = std::count_if(rows.begin(), rows.end(), [&](std::size_t row) {
+    return std::isfinite(sample.incidence[row]);
+  });
+  result.known_incidence = static_cast<double>(known) / static_cast<double>(rows.size());
+  return result;
+}
+
+std::vector<std::size_t> rows_between(const PointSample& sample, double from, double to) {
+  require_length("total_sigma", sample.total_sigma.size(), sample.size());
+  std::vector<std::size_t> rows;
+  for (std::size_t i = 0; i < sample.size(); ++i) {
+    if (sample.range[i] >= from && sample.range[i] < to) rows.push_back(i);
+  }
+  return rows;
+}
+
+}  // namespace
+
+std::vector<RangeClass> range_classes(const PointSample& sample) {
+  std::vector<RangeClass> result;
+  for (const double& from : kClassBegin) {
+    const bool last = &from == std::prev(std::end(kClassBegin));
+    const double to = last ? std::numeric_limits<double>::infinity() : *std::next(&from);
+    const std::vector<std::size_t> rows = rows_between(sample, from, to);
+    if (!rows.empty()) result.push_back(class_of(sample, rows, from, to));
+  }
+  return result;
+}
+
+RangeClass whole_range(const PointSample& sample) {
+  constexpr double kEndless = std::numeric_limits<double>::infinity();
+  const std::vector<std::size_t> rows = rows_between(sample, -kEndless, kEndless);
+  if (rows.empty()) throw InvalidArgument("points of a sample = 0, allowed 1 or more");
+  return class_of(sample, rows, 0, kEndless);
+}
+
+PointSampler::PointSampler(PointFrame frame, std::size_t most) : most_(most) {
+  require_above("points of a sample", static_cast<double>(most), 0, "");
+  sample_.frame = std::move(frame);
+}
+
+void PointSampler::add(const Points& points) {
+  const RandomStream lots(0, 0);
+  const auto& offset = sample_.frame.offset;
+  const bool has_covariance = !points.covariance[kXX].empty();
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const double lot = lots.uniform(sample_.points++);
+    if (!(lot < share_)) continue;
+    lot_.push_back(lot);
+    sample_.x.push_back(points.x[i] - offset[0]);
+    sample_.y.push_back(points.y[i] - offset[1]);
+    sample_.z.push_back(points.z[i] - offset[2]);
+    sample_.range.push_back(points.range[i]);
+    sample_.incidence.push_back(points.incidence[i]);
+    sample_.intensity.push_back(points.intensity[i]);
+    if (has_covariance) {
+      sample_.total_sigma.push_back(std::sqrt(
+          points.covariance[kXX][i] + points.covariance[kYY][i] + points.covariance[kZZ][i]));
+    }
+    if (lot_.size() > most_) thin();
+  }
+}
+
+void PointSampler::thin() {
+  share_ /= 2;
+  std::vector<std::size_t> kept;
+  for (std::size_t i = 0; i < lot_.size(); ++i) {
+    if (lot_[i] < share_) kept.push_back(i);
+  }
+  for (auto* column :
+       {&lot_, &sample_.x, &sample_.y, &sample_.z, &sample_.range, &sample_.incidence}) {
+    keep_rows(*column, kept);
+  }
+  keep_rows(sample_.intensity, kept);
+  if (!sample_.total_sigma.empty()) keep_rows(sample_.total_sigma, kept);
+}
+
+}  // namespace risley::cloud
