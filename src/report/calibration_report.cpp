@@ -141,8 +141,7 @@ class CalibrationCharts {
       charts.push_back(view.chart_with_sensor(
           "From the side: " + name, "ahead of the sensor (X), m",
           [](const SamplePoint& p) { return p.point.x; }, "above it (Z), m",
-          [](const SamplePoint& p) { return p.point.z; },
-          "Seen from the right of the sensor."));
+          [](const SamplePoint& p) { return p.point.z; }, "Seen from the right of the sensor."));
     }
     return charts;
   }

@@ -3,11 +3,15 @@
 // What a page of results has to do. Every check takes an open page and returns complaints: an
 // empty list is good. checks_test.mjs proves that they can complain.
 import { statSync } from 'node:fs';
+import { contrast, difference, eyes, lab } from './colours.mjs';
 import { look } from './looking.mjs';
 
 const largestFile = 4 * 1024 * 1024;
 const noise = 0.02; // of an axis: a pixel or two of a drawn box
 
+// CIELAB units between colours that stand for different things; 2.3 are just noticed side by side.
+const leastDifference = 20;
+const leastContrast = 3; // of lines and dots with what is behind them, WCAG 1.4.11
 const tallestPage = 4000; // before anything is unfolded
 const otherPixels = 0.002; // of a picture: by so much it may differ from itself
 const longestReaction = 5000; // ms, of a page to a hand; a good one is not waited for
@@ -308,6 +312,54 @@ export async function checkRotation(tab) {
 }
 
 // The button changes the colours, everything is drawn in both, and the way back is the way back.
+// Colours that stand for different things in one diagram are told apart by those who see fewer, and
+// scales run from dark to light or have their middle at one end of it, light and dark.
+export async function checkColours(tab) {
+  const complaints = [];
+  for (let turn = 0; turn < 2; ++turn) {
+    const found = await tab.evaluate(() => {
+      const style = getComputedStyle(document.documentElement);
+      const named = (name) => style.getPropertyValue('--' + name).trim();
+      return { theme: document.documentElement.dataset.theme, behind: named('panel'),
+               diagrams: window.risley.charts.map(({ data, chart }) => ({
+                 title: data.title,
+                 colours: [...new Set(data.series.filter((one) => one.value.length === 0)
+                   .map((one) => named(one.colour)))],
+                 scale: chart.getOption().visualMap?.[0]?.inRange.color ?? [],
+                 palette: data.palette,
+               })) };
+    });
+    for (const { title, colours, scale, palette } of found.diagrams) {
+      const say = (text) => complaints.push(`${title}: ${text} (theme ${found.theme})`);
+      for (const colour of colours) {
+        const ratio = contrast(colour, found.behind);
+        if (ratio < leastContrast) say(`${colour} has a contrast of ${ratio.toFixed(1)}`);
+      }
+      for (const [eye, matrix] of Object.entries(eyes)) {
+        colours.forEach((one, i) => colours.slice(i + 1).forEach((other) => {
+          const units = difference(one, other, matrix);
+          if (units < leastDifference) say(`${one} and ${other} look alike to eyes with ${eye}`);
+        }));
+        const light = scale.map((one) => lab(one, matrix)[0]);
+        const steps = light.slice(1).map((one, i) => one - light[i]);
+        const half = steps.length / 2;
+        const rises = palette === 'diverging'
+          ? steps.every((step, i) => (i < half) === (step > 0)) ||
+            steps.every((step, i) => (i < half) === (step < 0))
+          : steps.every((step) => step > 0);
+        if (!rises) say(`the scale goes to and fro in lightness for eyes with ${eye}`);
+        if (palette === 'diverging' && scale.length > 0 &&
+            difference(scale[0], scale.at(-1), matrix) < leastDifference) {
+          say(`the ends of the scale look alike to eyes with ${eye}`);
+        }
+      }
+    }
+    await tab.click('#theme');
+    await frames(tab);
+  }
+  return [...new Set(complaints)];
+}
+
 export async function checkTheme(tab) {
   await look(tab);
   const complaints = [];

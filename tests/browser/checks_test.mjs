@@ -90,7 +90,7 @@ const complains = (complaints, sort) =>
 const addScript = (script) => replaced('</body>', `<script>${script}</script></body>`);
 
 test('the page as it is: nothing to complain about', () => withPage(whole, async (tab, said) => {
-  for (const check of [checks.checkDrawn, checks.checkTheme, checks.checkHover, checks.checkMouse,
+  for (const check of [checks.checkDrawn, checks.checkColours, checks.checkTheme, checks.checkHover, checks.checkMouse,
                        checks.checkKeyboard, checks.checkWidth]) {
     assert.deepEqual(await check(tab), [], check.name);
   }
@@ -180,6 +180,24 @@ test('diagrams that keep their colours', () => withPage(
   replaced("page.dataset.theme = dark ? 'dark' : 'light';\n    redraw();",
            "page.dataset.theme = dark ? 'dark' : 'light';"),
   async (tab) => complains(await checks.checkTheme(tab), /is not drawn anew/)));
+
+test('colours that colour-blind readers confuse, and faint ones', () => withPage(
+  page.replaceAll(/--b: #[0-9a-f]+/g, '--b: #7f7b20').replaceAll(/--c: #[0-9a-f]+/g, '--c: #d0782c')
+    .replaceAll(/--a: #[0-9a-f]+/g, '--a: #dfe3e8'),
+  async (tab) => {
+    await tab.evaluate(() => {
+      const [first] = window.risley.charts;
+      first.data.series.push({ ...first.data.series[0], colour: 'b' },
+                             { ...first.data.series[0], colour: 'c' });
+    });
+    const complaints = await checks.checkColours(tab);
+    complains(complaints, /look alike to eyes with no (red|green)/);
+    complains(complaints, /has a contrast of/);
+  }));
+
+test('a scale of colours that goes to and fro', () => withPage(
+  whole.replace("'#fde725']", "'#202020']").replace(/<meta http-equiv="Content-Security-Policy"[^>]*>/, ''),
+  async (tab) => complains(await checks.checkColours(tab), /to and fro in lightness/)));
 
 test('paper without diagrams', async () => {
   await withPage(replaced("window.addEventListener('beforeprint', beforePrint);", ''),

@@ -89,6 +89,7 @@ export function inspect(name, make, says, whole = true) {
     });
     testScript('prints', () => good(checks.checkPrint(page.tab, artefact('.pdf'))));
     testScript('changes its colours', () => good(checks.checkTheme(page.tab)));
+    test('has colours that everybody tells apart', () => good(checks.checkColours(page.tab)));
     test('shows values under the mouse', () => good(checks.checkHover(page.tab)));
     testScript('zooms and moves with the mouse', () => good(checks.checkMouse(page.tab)));
     testScript('rotates what has three dimensions', () => good(checks.checkRotation(page.tab)));
@@ -113,6 +114,16 @@ export function inspect(name, make, says, whole = true) {
       await startAgain('dark', usualView);
       assert.equal(await page.tab.evaluate(() => document.documentElement.dataset.theme), 'dark');
       await page.tab.screenshot({ path: artefact('-dark.png'), fullPage: true });
+      await good(page.complaints);
+    });
+    testScript('is looked at by colour-blind eyes', async () => {
+      await startAgain('light', usualView);
+      const eyes = await page.context.newCDPSession(page.tab);
+      for (const type of ['protanopia', 'deuteranopia', 'tritanopia']) {
+        await eyes.send('Emulation.setEmulatedVisionDeficiency', { type });
+        await page.tab.screenshot({ path: artefact(`-${type}.png`), fullPage: true });
+      }
+      await eyes.send('Emulation.setEmulatedVisionDeficiency', { type: 'none' });
       await good(page.complaints);
     });
     testScript('fits a narrow screen', async () => {

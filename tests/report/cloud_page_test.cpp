@@ -41,8 +41,8 @@ TEST(CloudPage, SaysHowSureThePointsAre) {
   const std::string page = cloud_page(cloud, "a <scan>", {{"command", "risley"}});
   for (const char* words :
        {"a &lt;scan&gt;", "of the &lt;sensor&gt;", "a &lt;warning&gt;", "50.0 mm", "95.0 mm",
-        "forward − 691000 m", "\"left, m\"", "100 are drawn, chosen by lot", "20 to 50 m",
-        "99.0 %", "angle of incidence, deg", "intensity"}) {
+        "forward − 691000 m", "\"left, m\"", "100 are drawn, chosen by lot", "20 to 50 m", "99.0 %",
+        "angle of incidence, deg", "intensity"}) {
     EXPECT_THAT(page, HasSubstr(words));
   }
   EXPECT_THAT(page, HasSubstr("[0.0,1.0,2.0,"));  // millimetres are enough
