@@ -32,21 +32,6 @@ Json datum_json(calibration::DatumKind kind, const FormalDatum& datum) {
           {"sigma_total_deg", deg(datum.total)}};
 }
 
-Json pointing_json(const calibration::PointingError& pointing) {
-  const DirectionErrors& errors = pointing.errors;
-  const auto known = [](double value, double sigma) {
-    return Json{{"value", deg(value)}, {"sigma", number_or_null(deg(sigma))}};
-  };
-  return {{"total_deg", known(errors.total, pointing.total_sigma)},
-          {"shared_deg", known(errors.gauge, pointing.gauge_sigma)},
-          {"shape_deg", known(errors.shape, pointing.shape_sigma)},
-          {"worst_deg", known(pointing.worst_shape, pointing.worst_shape_sigma)},
-          {"rotation_deg",
-           {{"roll", deg(errors.rotation.x)},
-            {"pitch", deg(errors.rotation.y)},
-            {"yaw", deg(errors.rotation.z)}}}};
-}
-
 Json vector_json(const Vector3<double>& v) { return {v.x, v.y, v.z}; }
 
 Json unobservable_json(const std::vector<estimation::WeakDirection>& directions) {
@@ -63,6 +48,21 @@ void print_datum(calibration::DatumKind kind, const FormalDatum& datum) {
 }
 
 }  // namespace
+
+Json pointing_json(const calibration::PointingError& pointing) {
+  const DirectionErrors& errors = pointing.errors;
+  const auto known = [](double value, double sigma) {
+    return Json{{"value", deg(value)}, {"sigma", number_or_null(deg(sigma))}};
+  };
+  return {{"total_deg", known(errors.total, pointing.total_sigma)},
+          {"shared_deg", known(errors.gauge, pointing.gauge_sigma)},
+          {"shape_deg", known(errors.shape, pointing.shape_sigma)},
+          {"worst_deg", known(pointing.worst_shape, pointing.worst_shape_sigma)},
+          {"rotation_deg",
+           {{"roll", deg(errors.rotation.x)},
+            {"pitch", deg(errors.rotation.y)},
+            {"yaw", deg(errors.rotation.z)}}}};
+}
 
 Json slips_of_all(const std::vector<jobs::ReadRecording>& recordings) {
   Json all = Json::array();

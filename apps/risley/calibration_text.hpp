@@ -16,6 +16,8 @@ namespace risley::app {
 Json calibration_json(const jobs::CalibratedRecordings& outcome, double total_time);
 void print_calibration(const jobs::CalibratedRecordings& outcome);
 
+/// How far directions are off, in the keys of the contract.
+Json pointing_json(const calibration::PointingError& pointing);
 /// Errors of directions against a known truth.
 Json errors_json(const calibration::DirectionErrors& errors);
 /// Slips of all recordings, each with the name of its own.

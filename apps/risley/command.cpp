@@ -191,6 +191,11 @@ void note_files(const CLI::App& verb, CommonOptions& common) {
         common.inputs.push_back(value);
       } else if (name == "DIR") {
         common.inputs.push_back((fs::path(value) / "report.json").string());
+        // Of two results the numbers are compared as well.
+        const fs::path numbers = fs::path(value) / "calibration.yaml";
+        if (option->results().size() > 1 && fs::is_regular_file(numbers, ignored)) {
+          common.files.push_back(numbers.string());
+        }
       } else if (std::find(kReading.begin(), kReading.end(), name) != kReading.end() &&
                  fs::is_regular_file(value, ignored)) {
         common.files.push_back(value);

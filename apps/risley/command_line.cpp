@@ -70,8 +70,11 @@ constexpr Verb kVerbs[] = {
      "  risley preset list\n  risley preset show avia\n"
      "  risley preset new unit-17 --from avia -o unit-17.yaml\n  risley preset check unit-17.yaml",
      declare_preset},
-    {"report", "The page of a result folder, drawn again from its report.json",
-     "  risley report result/\n  risley report result/ -o sensor-17.html", declare_report},
+    {"report",
+     "The page of a result folder, drawn again from its report.json, or of two side by side",
+     "  risley report result/\n  risley report result/ -o sensor-17.html\n"
+     "  risley report spring/ autumn/ -o changes.html",
+     declare_report},
     {"reproduce", "Every table and figure of the paper, ours beside the paper's",
      "  risley reproduce -o reproduction/\n"
      "  risley reproduce --full --recording stationary.lvx -o reproduction/",

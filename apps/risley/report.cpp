@@ -2,61 +2,109 @@
 // SPDX-License-Identifier: MIT
 #include <filesystem>
 #include <memory>
+#include <string>
+#include <vector>
 
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
 #include "risley/core/error.hpp"
 #include "risley/io/text_file.hpp"
+#include "risley/jobs/compare_results.hpp"
+#include "risley/optics/parameters.hpp"
+#include "risley/report/comparison_page.hpp"
 #include "risley/report/report_file.hpp"
 
+#include "calibration_text.hpp"
 #include "command.hpp"
 #include "result_folder.hpp"
 
 namespace risley::app {
 namespace {
 
+namespace fs = std::filesystem;
+
 struct ReportCommandOptions {
-  std::string folder, page;
+  std::vector<std::string> folders;
+  std::string page;
 };
 
-ExitStatus run_report(const ReportCommandOptions& options, const CommonOptions& common) {
-  namespace fs = std::filesystem;
-  const fs::path folder(options.folder), data = folder / "report.json";
+report::Report report_of(const std::string& path) {
+  const fs::path folder(path), data = folder / "report.json";
   if (!fs::is_directory(folder)) {
-    throw FileError(options.folder, {}, "expected a folder that estimate or calibrate wrote");
+    throw FileError(path, {}, "expected a folder that estimate or calibrate wrote");
   }
   if (!fs::exists(data)) {
     throw FileError(data.string(), {},
                     "is missing: estimate -o and calibrate -o write it beside calibration.yaml");
   }
-  const std::string page = options.page.empty() ? (folder / "report.html").string() : options.page;
-  require_apart(common, {page});
   if (fs::exists(folder / jobs::kIncomplete)) {
     spdlog::warn(
         "{}: the files beside it may be of different runs, because the last one was "
         "stopped: run it again",
         (folder / jobs::kIncomplete).string());
   }
-  const report::Report report = report::read_report(data.string());
-  const std::string html = page_of(report);
+  return report::read_report(data.string());
+}
+
+ExitStatus write_page(const std::string& page, const std::string& html, Json facts,
+                      const CommonOptions& common) {
   io::write_text_file(page, html);
   if (common.json) {
-    print_json(common, {{"html", page}, {"bytes", html.size()}, {"verb", report::verb_of(report)}});
+    Json json{{"html", page}, {"bytes", html.size()}};
+    json.update(facts);
+    print_json(common, json);
   } else {
     say("{}\n", page);
   }
   return kDone;
 }
 
+ExitStatus report_one(const std::string& folder, std::string page, const CommonOptions& common) {
+  if (page.empty()) page = (fs::path(folder) / "report.html").string();
+  require_apart(common, {page});
+  const report::Report report = report_of(folder);
+  return write_page(page, page_of(report), {{"verb", report::verb_of(report)}}, common);
+}
+
+/// Of two results, side by side.
+ExitStatus report_two(const std::string& a, const std::string& b, const std::string& page,
+                      const CommonOptions& common) {
+  if (page.empty()) throw InvalidArgument("--output is missing: the page of the two results");
+  require_apart(common, {page});
+  const report::Report report_a = report_of(a), report_b = report_of(b);
+  const jobs::ResultComparison c = jobs::compare_results(a, b);
+  const std::string html =
+      report::comparison_page({a, report_a}, {b, report_b}, c, provenance_of(common));
+  Json differences = Json::object();
+  for (const jobs::ParameterDifference& one : c.parameters) {
+    const bool in_metres = one.name == "range_offset_m";
+    const double unit = in_metres ? 1 : find_parameter(one.name, c.b.shape()).si_per_unit;
+    differences[one.name] = {{"value", one.difference / unit}, {"sigma", one.sigma / unit}};
+  }
+  return write_page(page, html,
+                    {{"verbs", {report::verb_of(report_a), report::verb_of(report_b)}},
+                     {"same_unit", c.same_unit},
+                     {"directions", pointing_json(c.beams)},
+                     {"differences", differences}},
+                    common);
+}
+
 }  // namespace
 
 Run declare_report(CLI::App& verb) {
   const auto options = std::make_shared<ReportCommandOptions>();
-  verb.add_option("DIR", options->folder, "Folder that estimate -o or calibrate -o wrote")
-      ->required();
-  verb.add_option("-o,--output", options->page, "The page (default: DIR/report.html)");
-  return [options](const CommonOptions& common) { return run_report(*options, common); };
+  verb.add_option("DIR", options->folders,
+                  "Folder that estimate -o or calibrate -o wrote, or two of them side by side")
+      ->required()
+      ->expected(1, 2);
+  verb.add_option("-o,--output", options->page,
+                  "The page (default for one folder: DIR/report.html)");
+  return [options](const CommonOptions& common) {
+    const std::vector<std::string>& folders = options->folders;
+    return folders.size() == 1 ? report_one(folders.front(), options->page, common)
+                               : report_two(folders.front(), folders.back(), options->page, common);
+  };
 }
 
 }  // namespace risley::app

@@ -3,6 +3,7 @@
 # SPDX-License-Identifier: MIT
 """The page of a result folder, drawn again."""
 import json
+import math
 import unittest
 
 from command import SOURCE, CommandTest
@@ -46,6 +47,26 @@ class ReportTest(CommandTest):
         self.assertNotIn("src=", own)
         for word in ("risley estimate unit.lvx -o estimate", "input_sha256", "seed", "version"):
             self.assertIn(word, own)
+
+    def test_two_results_side_by_side(self):
+        found = self.expect_json(0, "report", "estimate", "calibrate", "-o", "two.html")
+        self.assertEqual(found["verbs"], ["estimate", "calibrate"])
+        self.assertTrue(found["same_unit"])
+        # The estimate is what the sensor believes; the calibration says how wrong that is.
+        bent = json.loads((self.folder / "calibrate/report.json").read_text())["pointing_error"]
+        for key, name in (("total_deg", "total"), ("shared_deg", "gauge"), ("shape_deg", "shape")):
+            said = math.degrees(bent["errors"][name])
+            self.assertAlmostEqual(found["directions"][key]["value"], said, delta=0.03 * said)
+        self.assertGreater(found["differences"]["incident_beam_vertical_deg"]["sigma"], 0)
+        self.assertIn("calibrate/calibration.yaml", [one["path"] for one in found["inputs"]])
+        page = (self.folder / "two.html").read_text()
+        for words in ("estimate (estimate)", "calibrate (calibrate)", "One unit, mid-40",
+                      "The sensor does not point where it believes"):
+            self.assertIn(words, page)
+        self.assertIn("--output is missing",
+                      self.expect(2, "report", "estimate", "calibrate").stderr)
+        self.assertIn("calibration.yaml", self.expect(
+            2, "report", "estimate", "calibrate", "-o", "calibrate/calibration.yaml").stderr)
 
     def test_a_folder_without_a_report(self):
         (self.folder / "empty").mkdir(exist_ok=True)

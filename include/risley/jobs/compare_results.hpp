@@ -1,0 +1,38 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "risley/calibration/datum.hpp"
+#include "risley/sensors/sensor.hpp"
+
+namespace risley::jobs {
+
+/// One parameter as two results have it, SI units.
+struct ParameterDifference {
+  std::string name;  ///< as in parameter_list(), or "range_offset_m"
+  double value_a = 0, value_b = 0;
+  double sigma_a = 0, sigma_b = 0;  ///< 0 where it was held
+  double difference = 0;            ///< b minus a
+  double sigma = 0;                 ///< of it, the two results being independent
+};
+
+/// Two results side by side: what each says of a sensor of the same kind.
+struct ResultComparison {
+  sensors::Sensor a, b;
+  std::vector<ParameterDifference> parameters;
+  calibration::PointingError beams;  ///< directions of a minus those of b, over all rotation angles
+  bool same_unit = false;            ///< the serial numbers are known and equal
+  /// Both are of one unit and held the same parameters at the same values: what these are off by is
+  /// alike in both, and the sigmas leave it out.
+  bool held_alike = false;
+};
+
+/// @param a, b  folders with the calibration.yaml of a result, such files, or presets
+/// @throws FileError; InvalidArgument for sensors with other numbers of prisms or emitters, and
+///         where one result has an index for all prisms and the other one for each
+ResultComparison compare_results(const std::string& a, const std::string& b);
+
+}  // namespace risley::jobs

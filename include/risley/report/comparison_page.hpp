@@ -1,0 +1,25 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <string>
+
+#include "risley/jobs/compare_results.hpp"
+#include "risley/report/report_facts.hpp"
+#include "risley/report/report_file.hpp"
+
+namespace risley::report {
+
+/// One of two results on a page.
+struct ComparedResult {
+  std::string name;  ///< such as its folder
+  const Report& report;
+};
+
+/// One self-contained HTML page of two results side by side: their verdicts, by how much their
+/// beams differ, and every parameter with its difference.
+/// @param provenance  how to make it again: name and value pairs
+std::string comparison_page(const ComparedResult& a, const ComparedResult& b,
+                            const jobs::ResultComparison& comparison, const Provenance& provenance);
+
+}  // namespace risley::report

@@ -1,0 +1,202 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "risley/jobs/compare_results.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+
+#include <Eigen/Core>
+#include <fmt/format.h>
+
+#include "risley/core/angle.hpp"
+#include "risley/core/error.hpp"
+#include "risley/core/random.hpp"
+#include "risley/estimation/free_parameters.hpp"
+#include "risley/sensors/preset.hpp"
+
+namespace risley::jobs {
+namespace {
+
+using sensors::Sensor;
+
+constexpr std::size_t kBeams = 2000;  // over all rotation angles; tell a mean square to 3 %
+constexpr const char* kRangeOffset = "range_offset_m";
+
+Sensor load_result(const std::string& path) {
+  namespace fs = std::filesystem;
+  if (!fs::is_directory(path)) return sensors::load_sensor(path);
+  const fs::path file = fs::path(path) / "calibration.yaml";
+  if (!fs::exists(file)) {
+    throw FileError(file.string(), {},
+                    "is missing: a result folder holds it where estimate or calibrate came to a "
+                    "result that is better than what the sensor believed");
+  }
+  return sensors::load_sensor(file.string());
+}
+
+void require_same_kind(const Sensor& a, const Sensor& b) {
+  if (a.shape() == b.shape() && a.train.face_order() == b.train.face_order()) return;
+  const auto words = [](const Sensor& sensor) {
+    return fmt::format("{} prisms ({}) and {} emitters", sensor.prisms(),
+                       to_string(sensor.train.face_order()), sensor.train.emitters());
+  };
+  throw InvalidArgument(
+      fmt::format("two results of sensors of one kind can be compared, and the first has {}, the "
+                  "second {}",
+                  words(a), words(b)));
+}
+
+/// A named covariance.
+struct Known {
+  std::vector<std::string> names;
+  Eigen::MatrixXd covariance;  ///< [names, names]
+
+  double sigma(const std::string& name) const {
+    const auto found = std::find(names.begin(), names.end(), name);
+    if (found == names.end()) return 0;
+    const auto at = static_cast<Eigen::Index>(found - names.begin());
+    return std::sqrt(covariance(at, at));
+  }
+};
+
+/// Parameters that a result held though they may be off: nothing comes on top of their sigma.
+std::vector<std::string> held_names(const Sensor& sensor) {
+  std::vector<std::string> names;
+  for (const std::string& name : sensor.covariance_names) {
+    const sensors::Knowledge* known = sensor.find_knowledge(name);
+    if (known != nullptr && known->total_sigma == 0) names.push_back(name);
+  }
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
+bool hold_alike(const Sensor& a, const Sensor& b) {
+  const std::vector<std::string> held = held_names(a);
+  return held == held_names(b) && std::all_of(held.begin(), held.end(), [&](const auto& name) {
+           return a.get(name) == b.get(name);
+         });
+}
+
+/// What a result would know if the parameters that it held were exactly as held: the joint
+/// covariance under that condition.
+Known given_held(const Sensor& sensor) {
+  const std::vector<std::string> held = held_names(sensor);
+  std::vector<Eigen::Index> free_at, held_at;
+  Known known;
+  for (std::size_t i = 0; i < sensor.covariance_names.size(); ++i) {
+    const std::string& name = sensor.covariance_names[i];
+    const bool is_held = std::binary_search(held.begin(), held.end(), name);
+    (is_held ? held_at : free_at).push_back(static_cast<Eigen::Index>(i));
+    if (!is_held) known.names.push_back(name);
+  }
+  const Eigen::MatrixXd& all = sensor.covariance;
+  const Eigen::MatrixXd both = all(free_at, held_at);
+  known.covariance = all(free_at, free_at);
+  if (!held_at.empty()) {
+    known.covariance -= both * all(held_at, held_at).ldlt().solve(both.transpose()).eval();
+  }
+  return known;
+}
+
+/// Both results, each with the covariance that its part of a difference has.
+struct Pair {
+  const Sensor &a, &b;
+  Known known_a, known_b;
+};
+
+ParameterDifference difference_of(const std::string& name, const Pair& pair, double value_a,
+                                  double value_b) {
+  const double sigma_a = pair.known_a.sigma(name), sigma_b = pair.known_b.sigma(name);
+  return {
+      name, value_a, value_b, sigma_a, sigma_b, value_b - value_a, std::hypot(sigma_a, sigma_b)};
+}
+
+/// Whether a parameter of several places has one value in all of them.
+bool is_shared(const PrismTrain& train, const ParameterInfo& parameter) {
+  return std::all_of(parameter.places.begin(), parameter.places.end(),
+                     [&](int place) { return train[place] == train[parameter.places.front()]; });
+}
+
+/// Every place of the train once: what all prisms share by its name for all.
+std::vector<ParameterDifference> differences(const Pair& pair) {
+  const Sensor &a = pair.a, &b = pair.b;
+  std::vector<ParameterDifference> result;
+  std::vector<bool> told(static_cast<std::size_t>(parameter_count(a.shape())), false);
+  for (const ParameterInfo& one : parameter_list(a.shape())) {
+    if (one.kind != ParameterKind::train) continue;
+    if (!is_shared(a.train, one) || !is_shared(b.train, one)) continue;
+    if (told[static_cast<std::size_t>(one.places.front())]) continue;
+    for (const int place : one.places) told[static_cast<std::size_t>(place)] = true;
+    result.push_back(difference_of(one.name, pair, a.get(one.name), b.get(one.name)));
+  }
+  result.push_back(difference_of(kRangeOffset, pair, a.range_offset, b.range_offset));
+  return result;
+}
+
+/// Adds a covariance to that of some of its names and others.
+void add_covariance(const Known& known, const std::vector<std::string>& names,
+                    Eigen::MatrixXd& covariance) {
+  std::vector<Eigen::Index> from, to;
+  for (std::size_t i = 0; i < known.names.size(); ++i) {
+    const auto found = std::find(names.begin(), names.end(), known.names[i]);
+    if (found == names.end()) continue;
+    from.push_back(static_cast<Eigen::Index>(i));
+    to.push_back(found - names.begin());
+  }
+  covariance(to, to) += known.covariance(from, from);
+}
+
+calibration::PointingError compare_directions(const Pair& pair) {
+  const Sensor& b = pair.b;
+  std::vector<std::string> names;
+  for (const Known* known : {&pair.known_a, &pair.known_b}) {
+    for (const std::string& name : known->names) {
+      const auto& list = parameter_list(b.shape());
+      const bool of_train = std::any_of(list.begin(), list.end(), [&](const ParameterInfo& one) {
+        return one.name == name && one.kind == ParameterKind::train;
+      });
+      if (of_train && std::find(names.begin(), names.end(), name) == names.end()) {
+        names.push_back(name);
+      }
+    }
+  }
+  const auto n = static_cast<Eigen::Index>(names.size());
+  Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(n, n);
+  add_covariance(pair.known_a, names, covariance);
+  add_covariance(pair.known_b, names, covariance);
+  std::vector<std::vector<double>> angles(static_cast<std::size_t>(b.prisms()),
+                                          std::vector<double>(kBeams));
+  for (std::size_t k = 0; k < angles.size(); ++k) {
+    const RandomStream places(0, k);
+    for (std::size_t i = 0; i < kBeams; ++i) angles[k][i] = kTwoPi * places.uniform(i);
+  }
+  std::vector<std::uint8_t> emitters(kBeams);
+  for (std::size_t i = 0; i < kBeams; ++i) {
+    emitters[i] = static_cast<std::uint8_t>(i % static_cast<std::size_t>(b.train.emitters()));
+  }
+  const calibration::BeamBundle bundle(b.train, estimation::free_parameters(names, b.shape()),
+                                       angles, emitters);
+  return bundle.pointing_error(pair.a.train, covariance);
+}
+
+}  // namespace
+
+ResultComparison compare_results(const std::string& a, const std::string& b) {
+  ResultComparison result{load_result(a), load_result(b), {}, {}, false, false};
+  require_same_kind(result.a, result.b);
+  result.same_unit = !result.a.serial.empty() && result.a.serial == result.b.serial;
+  result.held_alike = result.same_unit && hold_alike(result.a, result.b);
+  const auto known = [&](const Sensor& sensor) {
+    return result.held_alike ? given_held(sensor)
+                             : Known{sensor.covariance_names, sensor.covariance};
+  };
+  const Pair pair{result.a, result.b, known(result.a), known(result.b)};
+  result.parameters = differences(pair);
+  result.beams = compare_directions(pair);
+  return result;
+}
+
+}  // namespace risley::jobs

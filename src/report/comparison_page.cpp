@@ -1,0 +1,194 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "risley/report/comparison_page.hpp"
+
+#include <cmath>
+#include <string_view>
+#include <utility>
+#include <variant>
+
+#include <fmt/format.h>
+
+#include "risley/core/angle.hpp"
+#include "risley/core/number_text.hpp"
+#include "risley/report/html.hpp"
+#include "risley/report/page_parts.hpp"
+
+namespace risley::report {
+namespace {
+
+using calibration::kStatedDistance;
+using calibration::PointingError;
+using jobs::ParameterDifference;
+using jobs::ResultComparison;
+
+/// "0.4034° ± 0.0007°"
+std::string angle_text(double value, double sigma) {
+  const NumberText text = number_text(degrees_from_radians(value), degrees_from_radians(sigma));
+  return is_sigma(sigma) ? fmt::format("{}° ± {}°", text.value, text.sigma)
+                         : fmt::format("{:.3g}°", degrees_from_radians(value));
+}
+
+std::string at_distance(double angle) {
+  return fmt::format("{} mm at {:g} m", millimetres(kStatedDistance * angle), kStatedDistance);
+}
+
+std::vector<KeyNumber> key_numbers(const PointingError& beams) {
+  return {{angle_text(beams.errors.total, beams.total_sigma),
+           fmt::format("between the directions of the two ({})", at_distance(beams.errors.total))},
+          {angle_text(beams.errors.gauge, beams.gauge_sigma),
+           "of that is a rotation of all beams together"},
+          {angle_text(beams.errors.shape, beams.shape_sigma),
+           "is the beams against each other: their shape"}};
+}
+
+std::string facts_of(const EstimateReport& report) { return "Of " + report.recording.name + "."; }
+
+/// @tparam Kind  of report that is of several recordings
+template <class Kind>
+std::string facts_of(const Kind& report) {
+  std::string names;
+  for (const ReportedRecording& recording : report.recordings) {
+    names += (names.empty() ? "" : ", ") + recording.name;
+  }
+  return "Of " + names + ".";
+}
+
+/// Results of one converged run look alike on every page.
+std::string verdict_of(const ComparedResult& one) {
+  const std::string html = std::visit(
+      [](const auto& report) {
+        Verdict verdict;
+        verdict.converged = report.converged;
+        verdict.reason = report.reason;
+        verdict.result = report.verdict.value_or(ReportedVerdict{});
+        verdict.warnings = report.warnings;
+        verdict.facts = facts_of(report);
+        return verdict_html(verdict);
+      },
+      one.report);
+  return fmt::format("<div><h3>{} ({})</h3>{}</div>\n", escape_html(one.name), verb_of(one.report),
+                     html);
+}
+
+struct InUnits {
+  std::string head;
+  double factor = 1;  ///< times the SI value
+};
+
+InUnits in_units(const ParameterDifference& one, TrainShape shape) {
+  constexpr std::string_view kRangeOffset = "range_offset_m";
+  if (one.name == kRangeOffset) {
+    return {parameter_head("range offset", "r_0", one.name), 1};
+  }
+  const ParameterInfo& info = find_parameter(one.name, shape);
+  return {parameter_head(info), 1 / info.si_per_unit};
+}
+
+std::string value_cells(double value, double sigma) {
+  const NumberText text = number_text(value, sigma);
+  return fmt::format("<td>{}</td><td>{}</td>", text.value,
+                     is_sigma(sigma) ? text.sigma : std::string("held"));
+}
+
+std::string parameters_html(const ResultComparison& c, const ComparedResult& a,
+                            const ComparedResult& b) {
+  std::string html = fmt::format(
+      "<div class=\"wide\"><table><thead><tr><th>parameter</th><th>{}</th><th>±</th><th>{}</th>"
+      "<th>±</th><th>difference</th><th>±</th><th>in sigmas</th></tr></thead><tbody>\n",
+      escape_html(a.name), escape_html(b.name));
+  for (const ParameterDifference& one : c.parameters) {
+    const InUnits units = in_units(one, c.b.shape());
+    const bool known = is_sigma(one.sigma);
+    const double ratio = known ? one.difference / one.sigma : 0;
+    html += "<tr>" + units.head +
+            value_cells(units.factor * one.value_a, units.factor * one.sigma_a) +
+            value_cells(units.factor * one.value_b, units.factor * one.sigma_b);
+    if (known) {
+      const NumberText text = number_text(units.factor * one.difference, units.factor * one.sigma);
+      html += fmt::format("<td>{}</td><td>{}</td><td{}>{:.1f}</td></tr>\n", text.value, text.sigma,
+                          std::abs(ratio) > kFarOff ? " class=\"far\"" : "", ratio);
+    } else {
+      html +=
+          fmt::format("<td>{:.4g}</td><td>–</td><td>–</td></tr>\n", units.factor * one.difference);
+    }
+  }
+  return html +
+         fmt::format(
+             "</tbody></table></div>\n<p class=\"note\">{} The two results count as independent. "
+             "Differences beyond {:g} standard uncertainties stand out. Parameters may differ "
+             "together in ways that leave the directions alone: what decides is how much the "
+             "directions differ.</p>\n",
+             c.held_alike ? "Both results are of one unit and held the same parameters at the same "
+                            "values: what these may be off by is alike in both, and the standard "
+                            "uncertainties leave it out."
+                          : "Standard uncertainties include what parameters that were held may be "
+                            "off by.",
+             kFarOff);
+}
+
+std::string directions_html(const PointingError& beams) {
+  std::string html =
+      "<table><thead><tr><th>difference of the directions</th><th>root mean square</th><th>at "
+      "30 m</th></tr></thead><tbody>\n";
+  const auto row = [&](const char* head, double value, double sigma) {
+    html += fmt::format("<tr><th scope=\"row\">{}</th><td>{}</td><td>{} mm</td></tr>\n", head,
+                        angle_text(value, sigma), millimetres(kStatedDistance * value));
+  };
+  row("all of it", beams.errors.total, beams.total_sigma);
+  row("shared: a rotation of all beams together", beams.errors.gauge, beams.gauge_sigma);
+  row("shape: what is left", beams.errors.shape, beams.shape_sigma);
+  row("shape of the worst beam", beams.worst_shape, beams.worst_shape_sigma);
+  const Vector3<double>& turn = beams.errors.rotation;
+  return html +
+         fmt::format(
+             "</tbody></table>\n<p class=\"note\">Where the first result sends a beam against "
+             "where "
+             "the second sends it, over all rotation angles of the prisms. The shared rotation has "
+             "a roll of {:.4g}°, a pitch of {:.4g}° and a yaw of {:.4g}°.</p>\n",
+             degrees_from_radians(turn.x), degrees_from_radians(turn.y),
+             degrees_from_radians(turn.z));
+}
+
+Chart differences_chart(const ResultComparison& c) {
+  Chart chart{"Differences of the parameters",
+              "parameter, in the order of the table",
+              "difference, sigmas",
+              {},
+              "Parameters that both results held are left out."};
+  Series bars{"", "a", SeriesKind::points, {}, {}};
+  for (std::size_t i = 0; i < c.parameters.size(); ++i) {
+    if (!is_sigma(c.parameters[i].sigma)) continue;
+    bars.x.push_back(static_cast<double>(i + 1));
+    bars.y.push_back(c.parameters[i].difference / c.parameters[i].sigma);
+  }
+  chart.series.push_back(std::move(bars));
+  return chart;
+}
+
+std::string subject_text(const ResultComparison& c) {
+  const auto words = [](const sensors::Sensor& sensor) {
+    return sensor.serial.empty() ? sensor.name + " of no known serial number"
+                                 : fmt::format("{} {}", sensor.name, sensor.serial);
+  };
+  if (c.same_unit) return fmt::format("One unit, {}, in two results.", words(c.a));
+  return fmt::format("{} and {}.", words(c.a), words(c.b));
+}
+
+}  // namespace
+
+std::string comparison_page(const ComparedResult& a, const ComparedResult& b,
+                            const ResultComparison& comparison, const Provenance& provenance) {
+  Figures figures;
+  const std::string head =
+      "<div class=\"charts\">\n" + verdict_of(a) + verdict_of(b) + "</div>\n" +
+      overview_html(key_numbers(comparison.beams), {differences_chart(comparison)}, figures);
+  Sections sections;
+  sections.add("Parameters", parameters_html(comparison, a, b), Sections::Shown::unfolded);
+  sections.add("Directions", directions_html(comparison.beams), Sections::Shown::unfolded);
+  sections.add(kHowToRepeat, provenance_html(provenance));
+  return page_html(fmt::format("Two results: {} and {}", a.name, b.name), subject_text(comparison),
+                   head, sections, figures);
+}
+
+}  // namespace risley::report
