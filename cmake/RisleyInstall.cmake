@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: MIT
 # What `cmake --install` gives: headers, libraries, a package for find_package(risley) whose components
 # are the layers, with the same target names as in the tree (risley::risley is all of them), pkg-config
-# files (risley, risley-<layer>), the command and the completion of its verbs.
+# files (risley, risley-<layer>), the command and the completion of its verbs, presets and the scenes,
+# mounts and flights of the tutorials to look at, and the licences of risley and of what its pages hold.
 include(CMakePackageConfigHelpers)
 set(package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/risley)
 set(pkg_config_dir ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
@@ -90,7 +91,14 @@ install(FILES ${PROJECT_BINARY_DIR}/risleyConfig.cmake
               ${CMAKE_CURRENT_LIST_DIR}/RisleyRosbag.cmake
         DESTINATION ${package_dir})
 
+install(FILES ${PROJECT_SOURCE_DIR}/LICENSE ${PROJECT_SOURCE_DIR}/README.md ${PROJECT_SOURCE_DIR}/CHANGELOG.md
+              ${PROJECT_SOURCE_DIR}/CITATION.cff ${PROJECT_SOURCE_DIR}/SECURITY.md
+        DESTINATION ${CMAKE_INSTALL_DOCDIR})
 if(TARGET risley)
+  install(DIRECTORY ${PROJECT_SOURCE_DIR}/data ${PROJECT_SOURCE_DIR}/presets
+          DESTINATION ${CMAKE_INSTALL_DATADIR}/risley FILES_MATCHING PATTERN *.yaml)
+  install(FILES ${echarts}/LICENSE ${echarts}/NOTICE DESTINATION ${CMAKE_INSTALL_DOCDIR}/echarts)
+  install(FILES ${echarts_gl}/LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR}/echarts-gl)
   install(TARGETS risley RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
   if(EXISTS ${PROJECT_SOURCE_DIR}/completions/risley.bash)
     install(FILES ${PROJECT_SOURCE_DIR}/completions/risley.bash RENAME risley
