@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <limits>
+#include <memory>
 #include <sstream>
 #include <string_view>
 #include <system_error>
@@ -15,6 +16,8 @@
 #include <fmt/ranges.h>
 
 #include "risley/core/text.hpp"
+
+#include "help_text.hpp"
 
 namespace risley::app {
 namespace {
@@ -186,6 +189,7 @@ void take_result_folders(CLI::App& verb) {
 
 CommandLine::CommandLine()
     : app_("Observation model, simulator and estimator for Risley-prism lidars", "risley") {
+  app_.formatter(std::make_shared<HelpFormatter>());
   app_.set_version_flag("--version", "risley " RISLEY_VERSION);
   app_.require_subcommand(1);
   app_.footer(
