@@ -90,7 +90,7 @@ _risley() {
       cloud)
         choices="$common --output --calibration --format --directions --beam-origin --covariance
           --beam-divergence --common-factors --trajectory --trajectory-topic --mount --accuracy --trajectory-errors --crs
-          --datum --distribution --rate-hz --noise-angle-deg --las-scale-m --time --beam-origin-map --shot-rate-hz --extrinsics" ;;
+          --datum --distribution --report --rate-hz --noise-angle-deg --las-scale-m --time --beam-origin-map --shot-rate-hz --extrinsics" ;;
       reproduce) choices="$common --output --full --recording --shot-rate-hz --extrinsics" ;;
     esac
     mapfile -t COMPREPLY < <(compgen -W "$choices" -- "$current")

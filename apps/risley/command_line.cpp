@@ -39,8 +39,8 @@ constexpr Verb kVerbs[] = {
     {"simulate", "A recording whose truth is known",
      "  risley simulate -o room.lvx --sensor mid-40 --scene data/room.yaml --duration-s 10\n"
      "  risley simulate -o unit.csv --rate-hz 1000 --set prism_tilt_a_vertical_deg=0.1 --seed 7\n"
-     "  risley simulate -o flight.lvx --flight data/flight-v4.yaml --mount data/mount-nadir.yaml "
-     "--scene data/village.yaml --rate-hz 5000",
+     "  risley simulate -o flight.lvx --flight data/flight-v4.yaml --mount data/mount-nadir.yaml \\\n"
+     "    --scene data/village.yaml --rate-hz 5000",
      declare_simulate},
     {"estimate", "The sensor's parameters and rotation angles from one recording",
      "  risley estimate recording.lvx -o result/\n"
@@ -76,7 +76,7 @@ constexpr Verb kVerbs[] = {
     {"report",
      "The page of a result folder, drawn again from its report.json, or of two side by side",
      "  risley report result/\n  risley report result/ -o sensor-17.html\n"
-     "  risley report spring/ autumn/ -o changes.html",
+     "  risley report result/ calibration/ -o both.html",
      declare_report},
     {"reproduce", "Every table and figure of the paper, ours beside the paper's",
      "  risley reproduce -o reproduction/\n"

@@ -46,7 +46,7 @@ class CompletionTest(CommandTest):
                              ("pattern", "--format"), ("pattern", "--firing")):
             text = self.expect(0, verb, "--help").stdout
             shown = re.search(option + r" TEXT:\{([^}]+)\}", text).group(1)
-            self.assertEqual(complete("risley", verb, option, ""), set(shown.split(",")), option)
+            self.assertEqual(complete("risley", verb, option, ""), {one.strip() for one in shown.split(",")}, option)
 
     def test_presets(self):
         names = {one["name"] for one in self.expect_json(0, "preset", "list")["presets"]}

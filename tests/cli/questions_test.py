@@ -11,7 +11,7 @@ from command import SOURCE, CommandTest, run
 MAKE = {
     "calibrate": ("calibrate", "hall.nc"),
     "estimate": ("estimate", "unit.nc"),
-    "cloud": ("cloud", "hall.nc", "--calibration", "mid-40", "-o", "out/hall.ply"),
+    "cloud": ("cloud", "hall.nc", "--calibration", "mid-40", "-o", "out/hall.ply", "--report", "out/hall.html"),
 }
 
 

@@ -102,6 +102,11 @@ class UsageTest(CommandTest):
             for option in ("--json", "--threads", "--seed", "--quiet", "--verbose"):
                 self.assertIn(option, text)
 
+    def test_help_fits_into_a_terminal(self):
+        for verb in (None, *VERBS):
+            for line in self.expect(0, *filter(None, (verb, "--help"))).stdout.splitlines():
+                self.assertLessEqual(len(line), 100, line)
+
     def test_wrong_usage(self):
         (self.folder / "a.lvx").write_bytes(b"")
         (self.folder / "a.csv").write_text("Time/s,Azimuth/deg,Zenith/deg\n0,1,90\n")
