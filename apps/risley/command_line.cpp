@@ -39,7 +39,8 @@ constexpr Verb kVerbs[] = {
     {"simulate", "A recording whose truth is known",
      "  risley simulate -o room.lvx --sensor mid-40 --scene data/room.yaml --duration-s 10\n"
      "  risley simulate -o unit.csv --rate-hz 1000 --set prism_tilt_a_vertical_deg=0.1 --seed 7\n"
-     "  risley simulate -o flight.lvx --flight data/flight-v4.yaml --mount data/mount-nadir.yaml \\\n"
+     "  risley simulate -o flight.lvx --flight data/flight-v4.yaml --mount data/mount-nadir.yaml "
+     "\\\n"
      "    --scene data/village.yaml --rate-hz 5000",
      declare_simulate},
     {"estimate", "The sensor's parameters and rotation angles from one recording",

@@ -10,6 +10,8 @@
 #include <string_view>
 #include <utility>
 
+#include <Eigen/Cholesky>
+#include <Eigen/Core>
 #include <fmt/format.h>
 #include <tbb/parallel_pipeline.h>
 #include <tbb/task_arena.h>
@@ -214,10 +216,7 @@ class Work {
           *options_.platform, reader_.header().time_reference, piece_.time_ns.front());
       first_time_ns_ = last_time_ns_ = piece_.time_ns.front();
     }
-    normals_ = std::make_unique<SurfaceNormals>(
-        std::max(std::sqrt(calibration_.range_variance(0, 0, 255) +
-                           square(calibration_.range_resolution) / 12.0),
-                 kLeastRangeNoise));
+    expect_distortion(0);
     const recordings::Device& device = reader_.header().devices.front();
     if (device.extrinsic_enabled) {
       summary_.warnings.emplace_back(
@@ -240,6 +239,17 @@ class Work {
     if (options_.sample) sampler_.emplace(header_.frame, *options_.sample);
     header_.provenance = options_.provenance;
     writer_ = create_cloud(path_, header_, options_.writer);
+  }
+
+  /// Surfaces are told from directions as the sensor reports them.
+  /// @param distortion  of these against each other, rms, rad
+  void expect_distortion(double distortion) {
+    const double range = std::sqrt(calibration_.range_variance(0, 0, 255) +
+                                   square(calibration_.range_resolution) / 12.0);
+    const double direction = square(model_.angle_noise) + square(distortion) +
+                             square(calibration_.angle_resolution) / 12.0;
+    normals_ =
+        std::make_unique<SurfaceNormals>(std::max(range, kLeastRangeNoise), std::sqrt(direction));
   }
 
   /// Turns rows [done_, end) of the piece into points.
@@ -568,7 +578,8 @@ class Work {
     summary_.zenith_residual_rms += block.zenith_squares;
   }
 
-  /// How far the calibration moves the beams, seen on shots of the first piece.
+  /// How far the calibration moves the beams, together and against each other, seen on shots of the
+  /// first piece.
   void find_repointing() {
     constexpr std::size_t kBeams = 2000;  // tell a root mean square to 2 %, 1 / sqrt(2 * 2000)
     std::vector<std::size_t> rows;
@@ -578,17 +589,25 @@ class Work {
     shots.resize(header_.prisms, rows.size());
     tracker_->angles(piece_, rows, shots.rotation_angle, shots.angle_covariance);
     double squares = 0, count = 0;
+    Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();  // of the rotation that all beams share
+    Eigen::Vector3d moment = Eigen::Vector3d::Zero();
     std::vector<double> angles(shots.rotation_angle.size());
     for (std::size_t i = 0; i < rows.size(); ++i) {
       for (std::size_t k = 0; k < angles.size(); ++k) angles[k] = shots.rotation_angle[k][i];
       const Observation to = observe(model_.train, angles, piece_.beam[rows[i]]);
       const Observation from = observe(model_.believed, angles, piece_.beam[rows[i]]);
       if (!to.valid || !from.valid) continue;
-      squares += square(norm(to.direction - from.direction));
+      const Vector3<double> moved = to.direction - from.direction;
+      squares += square(norm(moved));
+      const Eigen::Vector3d d(from.direction.x, from.direction.y, from.direction.z);
+      normal += Eigen::Matrix3d::Identity() - d * d.transpose();
+      moment += d.cross(Eigen::Vector3d(moved.x, moved.y, moved.z));
       count += 1;
     }
     if (count == 0) return;
     summary_.repointing_rms = std::sqrt(squares / count);
+    const double shared = moment.dot(normal.ldlt().solve(moment));
+    expect_distortion(std::sqrt(std::max(squares - shared, 0.0) / count));
     repointing_known_ = true;
   }
 

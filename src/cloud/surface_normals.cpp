@@ -53,8 +53,20 @@ void SurfaceNormals::Moments::add(const Moments& other) {
   }
 }
 
-SurfaceNormals::SurfaceNormals(double range_noise) : range_noise_(range_noise) {
+double SurfaceNormals::FittedPlane::slope(const Vector3<double>& direction) const {
+  const double cosine = dot(normal(), direction);
+  return range(direction) * std::sqrt(std::max(1 - cosine * cosine, 0.0)) / cosine;
+}
+
+double SurfaceNormals::variance(const FittedPlane& plane, const Vector3<double>& direction) const {
+  const double slanted = plane.slope(direction) * direction_noise_;
+  return range_noise_ * range_noise_ + slanted * slanted;
+}
+
+SurfaceNormals::SurfaceNormals(double range_noise, double direction_noise)
+    : range_noise_(range_noise), direction_noise_(direction_noise) {
   require_above("range noise", range_noise, 0, "m");
+  require_not_below("direction noise", direction_noise, 0, "rad");
   moments_.resize(static_cast<std::size_t>(kSide) * kSide);
   surfaces_.assign(moments_.size(), {kNoPlane});
 }
@@ -126,11 +138,12 @@ void SurfaceNormals::find_beside(std::size_t cell) {
 Vector3<double> SurfaceNormals::normal_beside(const Surface& surface, double azimuth, double zenith,
                                               double range) const {
   const Vector3<double> direction = direction_from_angles<double>({azimuth, zenith});
-  double nearest = kNearEnough * range_noise_;
+  double nearest = kNearEnough;  // sigmas
   Vector3<double> normal = kNone;
   for (std::uint32_t k = 0; k < surface.beside_count; ++k) {
     const FittedPlane& plane = beside_[surface.beside + k];
-    const double off = std::abs(plane.range(direction) - range);
+    const double off =
+        std::abs(plane.range(direction) - range) / std::sqrt(variance(plane, direction));
     if (!(off < nearest)) continue;
     nearest = off;
     normal = plane.normal();
@@ -150,15 +163,16 @@ SurfaceNormals::FittedPlane SurfaceNormals::fitted(const Moments& m) const {
   const double slope_u = (qu * vv - qv * uv) / determinant;
   const double slope_v = (qv * uu - qu * uv) / determinant;
   const double misfit = m.qq - m.n * q * q - slope_u * qu - slope_v * qv;
-  const double limit = kRoughest * range_noise_;
-  if (misfit > limit * limit * (m.count - 3)) return kNoPlane;
   // The coefficients of 1, u and v are n over the distance.
   const Vector3<double> over_distance{q - u * slope_u - v * slope_v, slope_u, slope_v};
   const double distance = 1.0 / norm(over_distance);
   const Vector3<double> normal = distance * over_distance;
-  return {
+  const FittedPlane plane{
       {static_cast<float>(normal.x), static_cast<float>(normal.y), static_cast<float>(normal.z)},
       static_cast<float>(distance)};
+  const Vector3<double> towards = (1.0 / std::sqrt(1 + u * u + v * v)) * Vector3<double>{1, u, v};
+  const double limit = kRoughest * kRoughest * variance(plane, towards);
+  return misfit > limit * (m.count - 3) ? kNoPlane : plane;
 }
 
 }  // namespace risley::cloud

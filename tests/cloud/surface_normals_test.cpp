@@ -143,6 +143,40 @@ TEST(SurfaceNormals, ScatterAsTheNoiseOfTheRangesSays) {
   }
 }
 
+// On a surface that is nearly along the beam, directions that are off scatter the ranges far more
+// than the ranges' own noise does.
+TEST(SurfaceNormals, OfSlantedSurfacesKnowTheNoiseOfDirections) {
+  const double noise = 0.01, turn = radians_from_degrees(0.03);
+  const Plane wall = tilted_plane(80, 90, 4.0);
+  const RandomStream stream(21, 2);
+  const auto shots = shots_over_the_field(kShots, 21);
+  for (const double known : {0.0, turn}) {
+    SurfaceNormals normals(noise, known);
+    std::vector<std::pair<Shot, double>> met;
+    for (std::size_t i = 0; i < shots.size(); ++i) {
+      const double range = range_of(wall, shots[i]);
+      const Shot seen{shots[i].azimuth + turn * stream.normal(3 * i),
+                      shots[i].zenith + turn * stream.normal(3 * i + 1)};
+      if (!(range > 20 && range < 60)) continue;
+      met.emplace_back(seen, range + noise * stream.normal(3 * i + 2));
+      normals.add(seen.azimuth, seen.zenith, met.back().second);
+    }
+    normals.fit();
+    double missing = 0;
+    for (const auto& [shot, range] : met) {
+      const Vector3<double> normal = normals.normal(shot.azimuth, shot.zenith, range);
+      if (none(normal)) {
+        missing += 1;
+      } else {
+        EXPECT_LT(angle_deg(normal, wall.normal), 1.0);
+      }
+    }
+    ASSERT_GT(met.size(), 1000u);
+    const double share = missing / static_cast<double>(met.size());
+    EXPECT_TRUE(known > 0 ? share < 0.01 : share > 0.3) << share << " with " << known;
+  }
+}
+
 // Two walls that meet at a corner: each shot has the normal of its own wall, up to the edge. There
 // ranges do not tell the walls apart: ten millimetres are 0.03 degree of 90.
 TEST(SurfaceNormals, WallsReachToTheEdgeWhereTheyMeet) {

@@ -22,8 +22,10 @@ class SurfaceNormals {
  public:
   /// @param range_noise  1 sigma, m: surfaces whose ranges scatter more than kRoughest times as
   ///                     much are edges, leaves or several surfaces, and get no normal
-  /// @throws InvalidArgument for range noise that is not above 0
-  explicit SurfaceNormals(double range_noise);
+  /// @param direction_noise  1 sigma about two axes, rad: on a slanted surface it adds its distance
+  ///                     times the tangent of the angle of incidence to the scatter of ranges
+  /// @throws InvalidArgument for range noise that is not above 0, direction noise below 0
+  explicit SurfaceNormals(double range_noise, double direction_noise = 0);
 
   /// How much more than the noise ranges may scatter about a surface.
   static constexpr double kRoughest = 2.0;
@@ -76,6 +78,8 @@ class SurfaceNormals {
     double range(const Vector3<double>& direction) const {
       return static_cast<double>(distance) / dot(normal(), direction);
     }
+    /// Slope of the range over the direction, m per rad.
+    double slope(const Vector3<double>& direction) const;
   };
   /// What a cell knows: its plane, or those of cells nearby.
   struct Surface {
@@ -93,7 +97,10 @@ class SurfaceNormals {
   Vector3<double> normal_beside(const Surface& surface, double azimuth, double zenith,
                                 double range) const;
 
-  double range_noise_;
+  /// Variance of ranges of a plane in a direction, m^2.
+  double variance(const FittedPlane& plane, const Vector3<double>& direction) const;
+
+  double range_noise_, direction_noise_;
   std::vector<Moments> moments_;
   std::vector<std::size_t> touched_;
   std::vector<Surface> surfaces_;
