@@ -98,9 +98,9 @@ CalibrationVerdict verdict_of(const Calibration& c) {
       change.size() == 0 ? 0.0 : change.dot(algebra::SymmetricSolver(c.covariance).solve(change));
   if (!(chi2 > significant_chi2(freedom))) {
     return {CalibrationCode::as_believed,
-            fmt::format("the walls bear out what the sensor believes of itself to {:.2g} degree "
+            fmt::format("the walls bear out what the sensor believes of itself to {} degree "
                         "(chi2 {:.3g} of {:.0f} parameters)",
-                        degrees_from_radians(c.datum.total), chi2, freedom),
+                        plain_text(degrees_from_radians(c.datum.total), 2), chi2, freedom),
             "nothing"};
   }
   const std::string moved = in_words(c.pointing_error);
@@ -211,11 +211,13 @@ std::vector<std::string> warnings_of(const Calibration& c, const PlanarSolution&
   std::vector<std::string> warnings;
   const double boresight = std::hypot(c.datum.sigma_pitch, c.datum.sigma_yaw);
   if (boresight > kPoorDatum) {
-    warnings.push_back(fmt::format(
-        "the direction that all beams share is only known to {:.2g} degrees (pitch {:.2g}, yaw "
-        "{:.2g}); their directions against each other to {:.2g}",
-        degrees_from_radians(boresight), degrees_from_radians(c.datum.sigma_pitch),
-        degrees_from_radians(c.datum.sigma_yaw), degrees_from_radians(c.datum.shape)));
+    warnings.push_back(
+        fmt::format("the direction that all beams share is only known to {} degrees (pitch {}, yaw "
+                    "{}); their directions against each other to {}",
+                    plain_text(degrees_from_radians(boresight), 2),
+                    plain_text(degrees_from_radians(c.datum.sigma_pitch), 2),
+                    plain_text(degrees_from_radians(c.datum.sigma_yaw), 2),
+                    plain_text(degrees_from_radians(c.datum.shape), 2)));
   }
   for (const SurfaceStep& step : c.steps) {
     warnings.push_back(fmt::format(

@@ -26,6 +26,16 @@ std::string without_minus_zero(std::string number) {
   return number;
 }
 
+std::string plain_text(double value, int digits) {
+  std::string text = fmt::format("{:.{}g}", value, digits);
+  const std::size_t mark = text.find('e');
+  if (mark == std::string::npos) return without_minus_zero(text);
+  const int exponent = std::stoi(text.substr(mark + 1));
+  const std::size_t point = text.find('.');
+  const int decimals = point == std::string::npos ? 0 : static_cast<int>(mark - point) - 1;
+  return fmt::format("{:.{}f}", std::stod(text), std::max(decimals - exponent, 0));
+}
+
 bool is_sigma(double sigma) { return std::isfinite(sigma) && sigma > 0; }
 
 NumberText number_text(double value, double sigma) {

@@ -184,16 +184,19 @@ class CalibrationCharts {
     const jobs::BeamComparison& t = *input_.truth;
     const jobs::BeamErrorMoments& moments = *input_.details.beam_errors;
     std::vector<Chart> charts;
+    const auto degrees_text = [](double angle) {
+      return finite_text("{:.3g}", degrees_from_radians(angle));
+    };
     const auto add = [&](const char* title, const char* colour, const std::vector<double>& errors,
                          const estimation::Moments& m) {
       if (errors.empty()) return;
       charts.push_back({title, "computed minus true, deg", "beams",
                         histogram("errors", colour, errors, {}, m, kDegreesPerRadian),
-                        fmt::format("{} beams: mean {:.3g}°, standard deviation {:.3g}°, root mean "
-                                    "square {:.3g}°. The outermost bins hold everything beyond 4.5 "
+                        fmt::format("{} beams: mean {}°, standard deviation {}°, root mean "
+                                    "square {}°. The outermost bins hold everything beyond 4.5 "
                                     "standard deviations.",
-                                    count_text(m.count), degrees_from_radians(m.mean),
-                                    degrees_from_radians(m.std), degrees_from_radians(m.rms))});
+                                    count_text(m.count), degrees_text(m.mean), degrees_text(m.std),
+                                    degrees_text(m.rms))});
     };
     add("Errors of the azimuth before", "b", t.azimuth_before, moments.azimuth_before);
     add("Errors of the zenith angle before", "b", t.zenith_before, moments.zenith_before);
@@ -314,7 +317,7 @@ class CalibrationCharts {
              line("mean before", "d", profile.mean_before)},
             fmt::format("All points in {} bins, which hold {} to {} points; empty bins "
                         "leave a gap. A calibrated sensor has means near 0.",
-                        bins.size(), fewest, most),
+                        bins.size(), count_text(fewest), count_text(most)),
             turn ? ChartKind::full_turn : ChartKind::plain};
   }
 

@@ -26,7 +26,7 @@ using jobs::ResultComparison;
 std::string angle_text(double value, double sigma) {
   const NumberText text = number_text(degrees_from_radians(value), degrees_from_radians(sigma));
   return is_sigma(sigma) ? fmt::format("{}° ± {}°", text.value, text.sigma)
-                         : fmt::format("{:.3g}°", degrees_from_radians(value));
+                         : plain_text(degrees_from_radians(value), 3) + "°";
 }
 
 std::string at_distance(double angle) {
@@ -109,8 +109,8 @@ std::string parameters_html(const ResultComparison& c, const ComparedResult& a,
       html += fmt::format("<td>{}</td><td>{}</td><td{}>{:.1f}</td></tr>\n", text.value, text.sigma,
                           std::abs(ratio) > kFarOff ? " class=\"far\"" : "", ratio);
     } else {
-      html +=
-          fmt::format("<td>{:.4g}</td><td>–</td><td>–</td></tr>\n", units.factor * one.difference);
+      html += fmt::format("<td>{}</td><td>–</td><td>–</td></tr>\n",
+                          plain_text(units.factor * one.difference, 4));
     }
   }
   return html +
@@ -145,9 +145,10 @@ std::string directions_html(const PointingError& beams) {
              "</tbody></table>\n<p class=\"note\">Where the first result sends a beam against "
              "where "
              "the second sends it, over all rotation angles of the prisms. The shared rotation has "
-             "a roll of {:.4g}°, a pitch of {:.4g}° and a yaw of {:.4g}°.</p>\n",
-             degrees_from_radians(turn.x), degrees_from_radians(turn.y),
-             degrees_from_radians(turn.z));
+             "a roll of {}°, a pitch of {}° and a yaw of {}°.</p>\n",
+             plain_text(degrees_from_radians(turn.x), 3),
+             plain_text(degrees_from_radians(turn.y), 3),
+             plain_text(degrees_from_radians(turn.z), 3));
 }
 
 Chart differences_chart(const ResultComparison& c) {

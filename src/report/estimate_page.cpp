@@ -21,7 +21,8 @@ using estimation::Moments;
 std::string noise_words(const EstimateReport& r) {
   const double expected = degrees_from_radians(r.expected_residual);
   if (!r.noise || r.noise->held) {
-    return fmt::format("The stated noise and rounding alone would leave {:.3g}°. ", expected);
+    return fmt::format("The stated noise and rounding alone would leave {}°. ",
+                       plain_text(expected, 3));
   }
   const auto angle = [](double value, double sigma) {
     const NumberText text = number_text(degrees_from_radians(value), degrees_from_radians(sigma));
@@ -29,9 +30,10 @@ std::string noise_words(const EstimateReport& r) {
   };
   return fmt::format(
       "Beside rounding the directions have a noise of {} in azimuth and {} in zenith, found in the "
-      "data; a healthy unit of this kind has {:.3g}°. ",
+      "data; a healthy unit of this kind has {}°. ",
       angle(r.noise->azimuth, r.noise->azimuth_sigma),
-      angle(r.noise->zenith, r.noise->zenith_sigma), degrees_from_radians(r.noise->usual));
+      angle(r.noise->zenith, r.noise->zenith_sigma),
+      plain_text(degrees_from_radians(r.noise->usual), 3));
 }
 
 Verdict verdict_of(const EstimateReport& r) {
@@ -41,11 +43,12 @@ Verdict verdict_of(const EstimateReport& r) {
   verdict.result = r.verdict.value_or(ReportedVerdict{});
   verdict.warnings = r.warnings;
   verdict.facts = fmt::format(
-      "What is left unexplained is {:.3g}° in azimuth and {:.3g}° in zenith (root mean square). "
+      "What is left unexplained is {}° in azimuth and {}° in zenith (root mean square). "
       "{}{} "
       "of {} shots were left out as outliers.",
-      degrees_from_radians(r.azimuth_residuals.rms), degrees_from_radians(r.zenith_residuals.rms),
-      noise_words(r), count_text(r.outliers), count_text(r.shots));
+      finite_text("{:.3g}", degrees_from_radians(r.azimuth_residuals.rms)),
+      finite_text("{:.3g}", degrees_from_radians(r.zenith_residuals.rms)), noise_words(r),
+      count_text(r.outliers), count_text(r.shots));
   verdict.mend =
       "check that option sensor is the instrument that recorded, that its times are right, and "
       "whether the file has the sign of the elevation turned (option mirrored yes); a longer "
@@ -132,9 +135,10 @@ std::string parameters_html(const EstimateReport& r) {
   if (r.truth) {
     std::string rmse;
     for (std::size_t i = 0; i < r.truth->rotation_angle_rmse.size(); ++i) {
-      rmse += fmt::format("{}{:.3g}° for prism {}", i == 0 ? "" : ", ",
-                          degrees_from_radians(r.truth->rotation_angle_rmse[i]),
-                          prism_capital(static_cast<int>(i)));
+      rmse +=
+          fmt::format("{}{}° for prism {}", i == 0 ? "" : ", ",
+                      finite_text("{:.3g}", degrees_from_radians(r.truth->rotation_angle_rmse[i])),
+                      prism_capital(static_cast<int>(i)));
     }
     html += fmt::format(
         "<p>Against the truth: rotation angles are off by {} (root mean square). The squared "

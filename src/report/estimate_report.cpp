@@ -221,10 +221,11 @@ class EstimateCharts {
                      const Moments& moments, const std::string& what) const {
     return {title, x_label, "shots",
             histogram(what, colour, values, states_.outlier, moments, kDegreesPerRadian),
-            fmt::format("At {} shots: mean {:.7g}, standard deviation {:.3g} deg{}. The outermost "
+            fmt::format("At {} shots: mean {:.7g}, standard deviation {} deg{}. The outermost "
                         "bins hold everything beyond 4.5 standard deviations.",
                         count_text(moments.count), degrees_from_radians(moments.mean),
-                        degrees_from_radians(moments.std), what == "velocity" ? "/s" : "")};
+                        finite_text("{:.3g}", degrees_from_radians(moments.std)),
+                        what == "velocity" ? "/s" : "")};
   }
 
   Chart over_time(const std::string& title, const std::vector<double>& residual,
@@ -280,15 +281,16 @@ class EstimateCharts {
         cells.value.push_back(degrees_from_radians(mean[i]));
         largest = std::max(largest, std::abs(cells.value.back()));
       }
-      Chart chart{fmt::format("Mean {} residuals over {}", what, over),
-                  x_label,
-                  y_label,
-                  {cells},
-                  fmt::format("Means of all {} used shots over cells of {:.3g}°; cells with fewer "
-                              "than {} shots are left out. Noise alone leaves about {:.2g}° in a "
-                              "cell.",
-                              count_text(map.shots), degrees_from_radians(map.cell),
-                              plane.fewest_shots, degrees_from_radians(noise))};
+      Chart chart{
+          fmt::format("Mean {} residuals over {}", what, over),
+          x_label,
+          y_label,
+          {cells},
+          fmt::format("Means of all {} used shots over cells of {:.3g}°; cells with fewer "
+                      "than {} shots are left out. Noise alone leaves about {}° in a "
+                      "cell.",
+                      count_text(map.shots), degrees_from_radians(map.cell), plane.fewest_shots,
+                      finite_text("{:.2g}", degrees_from_radians(noise)))};
       chart.value_label = "mean residual, deg";
       chart.palette = Palette::diverging;
       chart.value_range = {-largest, largest};

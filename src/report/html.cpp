@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 #include "risley/report/html.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include <fmt/format.h>
@@ -47,7 +48,12 @@ std::string count_text(std::uint64_t count) {
 
 std::string finite_text(std::string_view format, double value) {
   if (!std::isfinite(value)) return "–";
-  return without_minus_zero(fmt::vformat(format, fmt::make_format_args(value)));
+  const std::string text = fmt::vformat(format, fmt::make_format_args(value));
+  const std::size_t mark = text.find('e');
+  if (mark == std::string::npos) return without_minus_zero(text);
+  const auto digits = std::count_if(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(mark),
+                                    [](char c) { return c >= '0' && c <= '9'; });
+  return plain_text(value, static_cast<int>(digits));
 }
 
 std::string millimetres(double metres) { return finite_text("{:.1f}", kMillimetres * metres); }

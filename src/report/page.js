@@ -9,7 +9,7 @@
   const data = JSON.parse(document.getElementById('page-data').textContent);
   const sequential = ['#440154', '#414487', '#2a788e', '#22a884', '#7ad151', '#fde725'];
   const margins = { left: 74, right: 24, top: 36, bottom: 52 };
-  const toolsWidth = 125, narrow = 500; // pixels
+  const toolsWidth = 125, scaleHeight = 36, narrow = 500; // pixels
   const barWidth = 64; // of the colour scale
   const zoomStep = 0.8, panStep = 0.1, turnStep = 10;
   const thinnestBox = 8; // pixels
@@ -33,6 +33,11 @@
   const rounded = (value, digits) =>
     value === null || value === undefined ? '–' : String(Number(Number(value).toPrecision(digits)));
   const short = (value) => rounded(value, 6);
+  // 12345 as "12 345", with spaces that do not break, as in the text of the page.
+  const grouped = (value) => {
+    const [whole, part] = String(value).split('.');
+    return whole.replace(/(?<=\d)(?=(\d{3})+$)/g, '\u202f') + (part ? '.' + part : '');
+  };
   const finite = (values) => values.filter((v) => v !== null);
   const least = (values) => finite(values).reduce((a, b) => Math.min(a, b), Infinity);
   const most = (values) => finite(values).reduce((a, b) => Math.max(a, b), -Infinity);
@@ -43,12 +48,14 @@
     if (!(to > from) || !Number.isFinite(size)) return 6;
     return Math.min(6 + Math.max(0, Math.ceil(Math.log10(size / (to - from)))), 15);
   };
-  // Ticks of an axis. They stand at round numbers; 0.00012 would be too long.
+  // Ticks of an axis. They stand at round numbers.
   const marks = (values) => {
-    const tiny = Math.max(Math.abs(least(values)), Math.abs(most(values))) < 2e-3;
+    const tiny = Math.max(Math.abs(least(values)), Math.abs(most(values))) < 1e-6;
     return (value) => {
       const round = Number(value.toPrecision(12));
-      return tiny && round !== 0 ? round.toExponential() : String(round);
+      if (round === 0 || tiny) return round === 0 ? '0' : round.toExponential();
+      if (Math.abs(round) >= 10_000) return grouped(round);
+      return Math.abs(round) < 1e-6 ? round.toFixed(12).replace(/0+$/, '') : String(round);
     };
   };
   // What the numbers of the upright axis need between it and its title.
@@ -177,7 +184,7 @@
     };
   }
 
-  function flatOption(one) {
+  function flatOption(one, below) {
     const square = one.kind === 'map' || one.kind === 'ground';
     const scaled = hasValues(one);
     const x = axis(one.x_label, 30, every(one, 'x'));
@@ -203,7 +210,8 @@
     return {
       animation: false, backgroundColor: 'transparent',
       grid: {
-        ...margins, left: leftMargin(one), right: margins.right + (scaled ? barWidth : 0), containLabel: false,
+        ...margins, left: leftMargin(one), right: margins.right + (scaled && !below ? barWidth : 0),
+        bottom: margins.bottom + (scaled && below ? scaleHeight : 0), containLabel: false,
         outerBoundsMode: 'none',
       },
       xAxis: x, yAxis: y,
@@ -227,7 +235,7 @@
         },
       },
       dataZoom: [zoom('xAxisIndex'), zoom('yAxisIndex')],
-      visualMap: scaled ? [colourScale(one, 2)] : [],
+      visualMap: scaled ? [colourScale(one, 2, below)] : [],
       series: one.series.map(flatSeries),
     };
   }
@@ -382,16 +390,22 @@
 
   const isSquare = (one) => ['map', 'ground', 'two_turns'].includes(one.kind);
 
+  // Pixels of a figure without its paddings.
+  function room({ place }) {
+    const figure = getComputedStyle(place.parentElement);
+    return place.parentElement.clientWidth - parseFloat(figure.paddingLeft) -
+      parseFloat(figure.paddingRight);
+  }
+  const isNarrow = (entry) => room(entry) < narrow;
+
   function size(entry) {
     if (!isSquare(entry.data)) return;
-    const figure = getComputedStyle(entry.place.parentElement);
-    const inside = entry.place.parentElement.clientWidth - parseFloat(figure.paddingLeft) -
-      parseFloat(figure.paddingRight);
-    const width = Math.min(inside, 640);
-    const right = margins.right + (hasValues(entry.data) ? barWidth : 0);
+    const width = Math.min(room(entry), 640);
+    const [right, bottom] = !hasValues(entry.data) ? [0, 0]
+      : isNarrow(entry) ? [0, scaleHeight] : [barWidth, 0];
     entry.place.style.width = width + 'px';
-    entry.place.style.height =
-      width - leftMargin(entry.data) - right + margins.top + margins.bottom + 'px';
+    entry.place.style.height = width - leftMargin(entry.data) - margins.right - right +
+      margins.top + margins.bottom + bottom + 'px';
   }
 
   // Whether a box drawn with the mouse zooms.
@@ -403,13 +417,11 @@
     });
   }
 
-  const isNarrow = ({ place }) => place.clientWidth < narrow;
-
   // again: in other colours, as it is turned or zoomed now.
   function draw(entry, again) {
     const one = entry.data;
+    entry.below = isNarrow(entry);
     if (one.kind === 'space') {
-      entry.below = isNarrow(entry);
       const option = spaceOption(one, entry.below);
       if (again) delete option.grid3D.viewControl; // a new camera would need a frame to stand right
       entry.chart.setOption(option, !again);
@@ -418,7 +430,7 @@
     const limits = again ? limitsNow(entry.chart) : null;
     const boxes = entry.boxes;
     if (boxes) setBoxes(entry, false); // or the old toolbox goes on drawing beside the new
-    entry.chart.setOption(flatOption(one), true);
+    entry.chart.setOption(flatOption(one, entry.below), true);
     if (boxes) setBoxes(entry, true);
     if (entry.grown && !page.dataset.printing) entry.grown.show(); // paper gets all
     if (limits && limits.some(([from, to]) => to - from < 100)) show(entry.chart, limits);
@@ -600,7 +612,7 @@
     if (isFolded(entry.data)) return;
     size(entry);
     entry.chart.resize();
-    if (entry.data.kind === 'space' && entry.below !== isNarrow(entry)) draw(entry, true);
+    if (entry.below !== isNarrow(entry)) draw(entry, true);
   }
 
   // Sections open for links that lead into them, and all of them for the button and for paper.

@@ -195,12 +195,12 @@ std::string time_audit_html(const std::vector<ReportedRecording>& recordings) {
         "<tr><th scope=\"row\">{}</th><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td>"
         "<td>{}</td><td{}>{}</td><td>{}</td><td>{}</td><td{}>{}</td><td{}>{}</td><td>{}</td></"
         "tr>\n",
-        escape_html(one.name), escape_html(one.format), escape_html(one.time_from), audit.shots,
-        audit.no_return, finite_text("{:.6g}", audit.duration_s),
-        finite_text("{:.6g}", audit.rate_hz), alarming(audit.gaps.count), audit.gaps.count,
-        finite_text("{:.4g}", audit.gaps.total_s), finite_text("{:.4g}", audit.gaps.largest_s),
-        alarming(audit.time_resets), audit.time_resets, alarming(audit.non_monotonic_packets),
-        audit.non_monotonic_packets, audit.pps_wraps);
+        escape_html(one.name), escape_html(one.format), escape_html(one.time_from),
+        count_text(audit.shots), count_text(audit.no_return),
+        finite_text("{:.6g}", audit.duration_s), finite_text("{:.6g}", audit.rate_hz),
+        alarming(audit.gaps.count), audit.gaps.count, finite_text("{:.4g}", audit.gaps.total_s),
+        finite_text("{:.4g}", audit.gaps.largest_s), alarming(audit.time_resets), audit.time_resets,
+        alarming(audit.non_monotonic_packets), audit.non_monotonic_packets, audit.pps_wraps);
   }
   return html +
          "</tbody></table></div>\n<p class=\"note\">Gaps: steps longer than 1.8 usual ones. Clock "

@@ -33,4 +33,13 @@ TEST(NumberText, ShowsTwoDigitsOfTheSigmaAndTheValueToTheSamePlace) {
   }
 }
 
+TEST(PlainText, HasNoPowersOfTen) {
+  EXPECT_EQ(plain_text(8.571e-5, 3), "0.0000857");
+  EXPECT_EQ(plain_text(-7.9e-12, 2), "-0.0000000000079");
+  EXPECT_EQ(plain_text(1e-5, 3), "0.00001");
+  EXPECT_EQ(plain_text(0.40224, 3), "0.402");
+  EXPECT_EQ(plain_text(123456.0, 3), "123000");
+  EXPECT_EQ(plain_text(-0.0, 3), "0");
+}
+
 }  // namespace risley::number_text_test

@@ -14,6 +14,9 @@ struct NumberText {
 /// "-0.00" as "0.00", any other number as it is.
 std::string without_minus_zero(std::string number);
 
+/// A number with so many significant digits and never as a power of ten: "0.0000857".
+std::string plain_text(double value, int digits);
+
 /// Whether a sigma is finite and above zero.
 bool is_sigma(double sigma);
 

@@ -14,7 +14,7 @@ std::string escape_html(std::string_view text);
 /// 1234567 as "1 234 567", with spaces that do not break.
 std::string count_text(std::uint64_t count);
 
-/// A number as text, and a dash for one that is not finite.
+/// A number as text, never as a power of ten, and a dash for one that is not finite.
 /// @param format  of fmt, such as "{:.3g}"
 std::string finite_text(std::string_view format, double value);
 
