@@ -227,8 +227,7 @@ function install() {
     const visible = Boolean(tip) && style.visibility === 'visible' && style.opacity !== '0' &&
       style.display !== 'none' && tip.textContent.length > 0;
     const text = visible ? tip.textContent : '';
-    const numbers = (text.match(/: ?(-?[\d.]+(e[+-]?\d+)?)/g) ?? [])
-      .map((match) => Number(match.replace(/: ?/, '')));
+    const numbers = visible ? [...tip.querySelectorAll('b')].map((one) => Number(one.textContent)) : [];
     // As far as a value can be told from the others along its axis, whichever series they are of.
     const spread = (axis) => {
       const known = one.data.series.flatMap((series) => series[axis]).filter((v) => v !== null);
