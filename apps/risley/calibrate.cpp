@@ -206,7 +206,7 @@ ExitStatus run_plan(const CalibrateCommandOptions& options, const CommonOptions&
     planned = jobs::plan_calibration(job, bar.progress());
   }
   if (common.json) {
-    print_json(common, forecast_json(planned.forecast, planned.shape));
+    print_json(common, forecast_json(planned));
   } else {
     print_forecast(planned.forecast, planned.shape);
   }
