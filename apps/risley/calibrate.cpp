@@ -145,7 +145,7 @@ ExitStatus run_job(const CalibrateCommandOptions& options, const CommonOptions& 
   put_flags(c.warnings);
   for (const std::string& warning : outcome.warnings) spdlog::warn(warning);
   for (const std::string& warning : c.warnings) spdlog::warn(warning);
-  if (!c.converged) spdlog::error("not converged: {}", c.reason);
+  if (!c.converged) log_failure(c.reason, common);
   const bool worse = c.verdict.code == calibration::CalibrationCode::not_better;
   const bool doubtful = c.verdict.code == calibration::CalibrationCode::undecided;
   if (c.converged && (worse || doubtful) && !options.force && !options.folder.empty()) {

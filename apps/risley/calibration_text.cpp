@@ -186,12 +186,12 @@ Json calibration_json(const CalibratedRecordings& outcome, double total_time) {
 void print_calibration(const CalibratedRecordings& outcome) {
   const Calibration& c = outcome.calibration;
   const TrainShape shape = c.sensor.shape();
-  say("{}\n", c.converged ? "converged" : "NOT CONVERGED: " + c.reason);
+  say("{}\n", c.converged ? "converged" : "NOT CONVERGED");
   print_verdict(c.verdict);
   say("sensor {}: {}\n", outcome.choice.sensor.name, outcome.choice.words);
-  say("{} points on {} planes, {:.2f} mm thick before, {:.2f} mm after; read {:.2f} s, rotation "
+  say("{} points on {} plane{}, {:.2f} mm thick before, {:.2f} mm after; read {:.2f} s, rotation "
       "angles {:.2f} s, solved {:.2f} s\n\n",
-      grouped(c.points), c.planes.size(), 1e3 * c.rms_before, 1e3 * c.rms_after,
+      grouped(c.points), c.planes.size(), c.planes.size() == 1 ? "" : "s", 1e3 * c.rms_before, 1e3 * c.rms_after,
       outcome.reading_time, outcome.angles_time, outcome.solving_time);
   const bool any_held = c.held_changes.cols() > 0;
   std::vector<std::string> head = {"parameter", "value", "+- sigma", "unit", "before"};

@@ -20,7 +20,7 @@ rate_hz: 100
 height_m: 40
 speed_m_per_s: 5
 turn_duration_s: 6
-strips: [{headings_deg: [90, 270, 0], length_m: 20}]
+strips: [{headings_deg: [90, 270], length_m: 55}]
 motion:
   seed: 4
   attitude: {roll_deg: 2, pitch_deg: 2, heading_deg: 2, lowest_hz: 0.15, highest_hz: 1.2, sinusoids: 6}
@@ -30,7 +30,8 @@ WALL = """planes:
 """
 # What the runs below do not meet, because it takes minutes or a fault of the machine.
 RARE = re.compile(r"^reproduce|^common#slip\.|^estimate#result\.shot_clock\.|^calibrate#walls\.steps\[\]\."
-                  r"|^calibrate#flight\.control\[\]\.|^calibrate#flight\.held\.\*\.")
+                  r"|^info#accuracies\.warnings\[\]|^common#failed_file\.line|^calibrate#flight\.control\[\]\."
+                  r"|^calibrate#flight\.held\.\*\.")
 UNKNOWN = ("No such name", [["x"]])
 
 
@@ -99,7 +100,9 @@ def shortened(instance):
     """The same with short lists, which are as good to damage."""
     if isinstance(instance, dict):
         return {name: shortened(one) for name, one in instance.items()}
-    return [shortened(one) for one in instance[:3]] if isinstance(instance, list) else instance
+    if not isinstance(instance, list):
+        return instance
+    return [shortened(one) for one in instance[:1 if isinstance(instance[0], (dict, list)) else 3]] if instance else []
 
 
 def inside(instance, path):
@@ -117,43 +120,53 @@ class SchemasTest(CommandTest):
         cls.outputs = []  # verb, object
         for name, text in (("flight.yaml", FLIGHT), ("wall.yaml", WALL), ("no.yaml", "7\n")):
             (cls.folder / name).write_text(text, encoding="utf-8")
-        (cls.folder / "flight.sbet").write_bytes(sbet(1000))
-        (cls.folder / "flight.smrmsg").write_bytes(smrmsg(20))
+        path, accuracies = sbet(1000), smrmsg(20)
+        for name, data in (("flight.sbet", path), ("flight.smrmsg", accuracies), ("no.lvx", b"nothing"),
+                           ("gap.sbet", path[:136 * 300] + path[136 * 250:136 * 400] + path[136 * 700:]),
+                           ("gap.smrmsg", accuracies[:80 * 5] + accuracies[80 * 10:])):
+            (cls.folder / name).write_bytes(data)
         bent = ("--sensor", "mid-40-table3", "--reported", "nominal", "--rate-hz", 1000)
         truth = ("--truth", "hall.lvx.truth.yaml")
         cls.print(0, "simulate", "-o", "hall.lvx", *bent, "--scene", HALL, "--duration-s", 2)
         cls.print(0, "info", "hall.lvx", "--share", "excerpt.nc")
         cls.print(0, "convert", "hall.lvx", "-o", "hall.csv")
         (cls.folder / "cut.csv").write_bytes((cls.folder / "hall.csv").read_bytes()[:9000] + b"7,x\n")
-        (cls.folder / "no.lvx").write_bytes(b"no recording")
-        for verb, *more in (("info",), ("convert", "-o", "saved.nc"),
-                            ("cloud", "--calibration", "mid-40-table3", "-o", "saved.las")):
-            cls.print(3, verb, "cut.csv", *more)
-        cls.print(3, "convert", "cut.csv", "hall.lvx", "no.lvx", "-o", "many", "--format",
-                  "netcdf")
+        whole = (cls.folder / "hall.lvx").read_bytes()
+        middle = len(whole) // 2
+        (cls.folder / "bad.lvx").write_bytes(whole[:middle] + b"\xff" * 3000 + whole[middle + 3000:])
+        (cls.folder / "tail.lvx").write_bytes(whole[:-10])
+        for name in ("cut.csv", "bad.lvx"):
+            for verb, *more in (("info",), ("convert", "-o", "saved.nc"), ("observability",), ("estimate",),
+                                ("cloud", "--calibration", "mid-40-table3", "-o", "saved.las")):
+                cls.print(3, verb, name, *more)
+        cls.print(0, "info", "tail.lvx")
+        cls.print(3, "convert", "bad.lvx", "cut.csv", "hall.lvx", "no.lvx", "-o", "many", "--format", "netcdf")
+        cls.print(0, "pattern", "--sensor", "mid-40-sequence", "--format", "livox-csv", "-o", "scan.csv",
+                  "--duration-s", 0.2)
         cls.print(0, "estimate", "hall.lvx", *truth, "-o", "estimated")
         cls.print(1, "estimate", "hall.lvx", "--free", "refractive_index_air")
-        cls.print(3, "estimate", "cut.csv")
         cls.print(0, "calibrate", "hall.lvx", *truth, "-o", "calibrated")
         cls.print(0, "simulate", "-o", "wall.lvx", *bent, "--scene", "wall.yaml", "--duration-s", 1)
         cls.print(1, "calibrate", "wall.lvx", "--planes", "wall.yaml")
         cls.print(2, "calibrate", "hall.lvx", "--nonsense")
+        cls.print(1, "calibrate", "scan.csv")
         cls.print(0, "calibrate", "--plan", DATA / "stations.yaml", "--duration-s", 1)
         cls.print(0, "observability", "--duration-s", 1, "--rate-hz", 1000)
         cls.print(0, "observability", "--sensor", "horizon", "--duration-s", 0.5, "--rate-hz", 24000)
         cloud = ("--calibration", "calibrated", "--common-factors", "yes")
         cls.print(0, "cloud", "hall.lvx", *cloud, "-o", "hall.las")
-        cls.print(3, "cloud", "hall.lvx", "no.lvx", "cut.csv", *cloud, "-o", "clouds/",
-                  "--format", "xyz")
+        cls.print(3, "cloud", "hall.lvx", "no.lvx", "bad.lvx", "cut.csv", *cloud, "-o", "clouds/")
+        cls.print(1, "cloud", "hall.lvx", "--calibration", "avia", "-o", "no.las")
+        cls.print(1, "cloud", "hall.lvx", "wall.lvx", "--calibration", "avia", "-o", "clouds/")
         cls.print(0, "cloud", "--calibration", "mid-40", "--beam-origin-map", "map.html")
         cls.print(0, "report", "estimated")
         cls.print(3, "report", "no")
         cls.print(0, "pattern", "--sensor", "mid-40", "--format", "helios-xml", "-o", "p.xml", "--duration-s",
                   0.1, "--coverage", "--report", "pattern.html", "--integration-s", 0.1)
         cls.print(0, "pattern", "--coverage", "--integration-s", 0.1, "--report", "pattern.html")
-        cls.print(0, "pattern", "--sensor", "mid-40-sequence", "--format", "livox-csv", "-o", "scan.csv",
-                  "--duration-s", 0.5)
-        cls.print(0, "identify", "scan.csv")
+        cls.print(0, "convert", "scan.csv", "-o", "scan.nc")
+        cls.print(0, "convert", "scan.csv", "hall.lvx", "-o", "more", "--format", "netcdf")
+        cls.print(0, "identify", "scan.csv", "--most-prisms", 2)
         cls.print(0, "preset", "list")
         cls.print(0, "preset", "show", "avia")
         cls.print(0, "preset", "new", "mine", "--from", "avia", "-o", "mine.yaml")
@@ -166,13 +179,14 @@ class SchemasTest(CommandTest):
                   DATA / "mount-nadir.yaml", "--scene", DATA / "village.yaml", *ERRORS)
         trajectory = ("--trajectory", "a.lvx.trajectory.csv")
         cls.print(0, "info", "flight.sbet", "--accuracy", "flight.smrmsg")
-        cls.print(0, "info", "flight.smrmsg")
-        cls.print(0, "convert", "flight.sbet", "-o", "path.csv")
-        cls.print(0, "convert", "flight.sbet", "a.lvx.trajectory.csv", "-o", "paths", "--format",
+        cls.print(0, "info", "gap.sbet")
+        cls.print(0, "info", "gap.smrmsg")
+        cls.print(0, "convert", "gap.sbet", "-o", "path.csv")
+        cls.print(0, "convert", "gap.sbet", "a.lvx.trajectory.csv", "-o", "paths", "--format",
                   "trajectory-csv")
         cls.print(0, "cloud", "a.lvx", *trajectory, *MOUNT, *ERRORS, "--calibration", "mid-40", "-o",
                   "a.las", "--distribution", "ground.html")
-        cls.print(1, "calibrate", "a.lvx", *trajectory, *MOUNT, *ERRORS, "--truth", "a.lvx.truth.yaml",
+        cls.print(0, "calibrate", "a.lvx", *trajectory, *MOUNT, *ERRORS, "--truth", "a.lvx.truth.yaml",
                   "--knot-spacing-s", 2)
         cls.print(0, "calibrate", "--plan", "flight.yaml", *MOUNT, *ERRORS, "--rate-hz", 1000,
                   "--knot-spacing-s", 4, "--report", "plan.html")
@@ -180,9 +194,7 @@ class SchemasTest(CommandTest):
     @classmethod
     def print(cls, status, verb, *arguments):
         """Keeps what a verb prints; run() holds it against the schema."""
-        import time; t0=time.time()
         done = run(verb, *arguments, "--json", folder=cls.folder)
-        print(round(time.time()-t0,2), verb, *arguments)
         assert done.returncode == status, f"{verb} {arguments}: {done.stdout}\n{done.stderr}"
         cls.outputs.append((verb, json.loads(done.stdout)))
 
@@ -220,8 +232,10 @@ class SchemasTest(CommandTest):
         self.assertGreater(len(done), 1000)
 
     def test_values_beyond_the_law_are_refused(self):
-        estimate, calibrate, cloud = (next(output for one, output in self.outputs if one == verb)
-                                      for verb in ("estimate", "calibrate", "cloud"))
+        def printed(verb, name):
+            return next(output for one, output in self.outputs if one == verb and name in output)
+
+        estimate, calibrate = printed("estimate", "parameters"), printed("calibrate", "pointing_error")
         glass = ("parameters", "incident_beam_vertical_deg")
         for verb, output, path, value in (
                 ("estimate", estimate, (*glass, "sigma"), -0.1),
@@ -240,9 +254,9 @@ class SchemasTest(CommandTest):
                 damaged = copy.deepcopy(output)
                 inside(damaged, path[:-1])[path[-1]] = value
                 self.refused(verb, damaged, f"{path} = {value}")
-        self.assertEqual(cloud["exit_status"], 3)  # a damaged recording's
-        del cloud["exit_status"]
-        self.refused("cloud", cloud, "error without exit_status")
+        damaged = copy.deepcopy(printed("info", "exit_status"))
+        del damaged["exit_status"]
+        self.refused("info", damaged, "error without exit_status")
 
     def test_no_schema_has_names_that_nothing_prints(self):
         known, met = set(), set()
@@ -253,11 +267,10 @@ class SchemasTest(CommandTest):
                 met.update(f"{place}.{name}" for name in inside(output, path)
                            if name in schema.get("properties", {}))
         unmet = sorted(one for one in known - met if not RARE.search(one))
-        self.assertEqual(unmet, [])
+        self.assertEqual(unmet, [], "\n".join(unmet))
         common = json.loads((schemas.FOLDER / "common.json").read_text(encoding="utf-8"))["$defs"]
         texts = "".join(path.read_text(encoding="utf-8") for path in schemas.FOLDER.glob("*.json"))
-        for name in common:
-            self.assertRegex(texts, rf'"(common\.json)?#/\$defs/{name}"')
+        self.assertEqual([name for name in common if f'#/$defs/{name}"' not in texts], [])
 
 
 if __name__ == "__main__":
