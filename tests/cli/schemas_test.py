@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-FileCopyrightText: 2026 The risley authors
 # SPDX-License-Identifier: MIT
-"""The schemas of what --json prints take what verbs print, refuse what is damaged, and name nothing else."""
+"""The schemas of what --json prints take it, refuse it when damaged, and name nothing else."""
 import copy
 import json
 import re
@@ -102,7 +102,8 @@ def shortened(instance):
         return {name: shortened(one) for name, one in instance.items()}
     if not isinstance(instance, list):
         return instance
-    return [shortened(one) for one in instance[:1 if isinstance(instance[0], (dict, list)) else 3]] if instance else []
+    most = 1 if instance and isinstance(instance[0], (dict, list)) else 3
+    return [shortened(one) for one in instance[:most]]
 
 
 def inside(instance, path):
@@ -140,7 +141,8 @@ class SchemasTest(CommandTest):
                                 ("cloud", "--calibration", "mid-40-table3", "-o", "saved.las")):
                 cls.print(3, verb, name, *more)
         cls.print(0, "info", "tail.lvx")
-        cls.print(3, "convert", "bad.lvx", "cut.csv", "hall.lvx", "no.lvx", "-o", "many", "--format", "netcdf")
+        cls.print(3, "convert", "bad.lvx", "cut.csv", "hall.lvx", "no.lvx", "-o", "many", "--format",
+                  "netcdf")
         cls.print(0, "pattern", "--sensor", "mid-40-sequence", "--format", "livox-csv", "-o", "scan.csv",
                   "--duration-s", 0.2)
         cls.print(0, "estimate", "hall.lvx", *truth, "-o", "estimated")
@@ -161,8 +163,8 @@ class SchemasTest(CommandTest):
         cls.print(0, "cloud", "--calibration", "mid-40", "--beam-origin-map", "map.html")
         cls.print(0, "report", "estimated")
         cls.print(3, "report", "no")
-        cls.print(0, "pattern", "--sensor", "mid-40", "--format", "helios-xml", "-o", "p.xml", "--duration-s",
-                  0.1, "--coverage", "--report", "pattern.html", "--integration-s", 0.1)
+        cls.print(0, "pattern", "--sensor", "mid-40", "--format", "helios-xml", "-o", "p.xml",
+                  "--duration-s", 0.1, "--coverage", "--report", "pattern.html", "--integration-s", 0.1)
         cls.print(0, "pattern", "--coverage", "--integration-s", 0.1, "--report", "pattern.html")
         cls.print(0, "convert", "scan.csv", "-o", "scan.nc")
         cls.print(0, "convert", "scan.csv", "hall.lvx", "-o", "more", "--format", "netcdf")
