@@ -507,7 +507,8 @@ Start start_anywhere(const AngleSeries& series, const AngleSeries& head,
   };
   try {
     return start_of(head);
-  } catch (const EstimationError&) {
+  } catch (const EstimationError& error) {
+    bool is_wrong_clock = dynamic_cast<const WrongClock*>(&error) != nullptr;
     constexpr std::size_t kPlaces = 50;
     constexpr std::int64_t kLongestNs = 500'000'000;
     for (std::size_t place = 1; place < kPlaces; ++place) {
@@ -519,6 +520,9 @@ Start start_anywhere(const AngleSeries& series, const AngleSeries& head,
       }
       try {
         return start_of(rows_of(series, begin, end));
+      } catch (const WrongClock&) {
+        if (is_wrong_clock) throw;  // two places that agree are enough
+        is_wrong_clock = true;
       } catch (const EstimationError&) {  // nor here
       }
     }
