@@ -508,7 +508,8 @@ Start start_anywhere(const AngleSeries& series, const AngleSeries& head,
   try {
     return start_of(head);
   } catch (const EstimationError& error) {
-    bool is_wrong_clock = dynamic_cast<const WrongClock*>(&error) != nullptr;
+    std::optional<WrongClock> wrong_clock;
+    if (const auto* own = dynamic_cast<const WrongClock*>(&error)) wrong_clock = *own;
     constexpr std::size_t kPlaces = 50;
     constexpr std::int64_t kLongestNs = 500'000'000;
     for (std::size_t place = 1; place < kPlaces; ++place) {
@@ -520,9 +521,9 @@ Start start_anywhere(const AngleSeries& series, const AngleSeries& head,
       }
       try {
         return start_of(rows_of(series, begin, end));
-      } catch (const WrongClock&) {
-        if (is_wrong_clock) throw;  // two places that agree are enough
-        is_wrong_clock = true;
+      } catch (const WrongClock& other) {
+        if (wrong_clock) throw *wrong_clock;  // two places that agree are enough
+        wrong_clock = other;
       } catch (const EstimationError&) {  // nor here
       }
     }
