@@ -191,8 +191,8 @@ void print_calibration(const CalibratedRecordings& outcome) {
   say("sensor {}: {}\n", outcome.choice.sensor.name, outcome.choice.words);
   say("{} points on {} plane{}, {:.2f} mm thick before, {:.2f} mm after; read {:.2f} s, rotation "
       "angles {:.2f} s, solved {:.2f} s\n\n",
-      grouped(c.points), c.planes.size(), c.planes.size() == 1 ? "" : "s", 1e3 * c.rms_before, 1e3 * c.rms_after,
-      outcome.reading_time, outcome.angles_time, outcome.solving_time);
+      grouped(c.points), c.planes.size(), c.planes.size() == 1 ? "" : "s", 1e3 * c.rms_before,
+      1e3 * c.rms_after, outcome.reading_time, outcome.angles_time, outcome.solving_time);
   const bool any_held = c.held_changes.cols() > 0;
   std::vector<std::string> head = {"parameter", "value", "+- sigma", "unit", "before"};
   if (any_held) head.insert(head.begin() + 3, "given held");

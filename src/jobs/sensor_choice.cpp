@@ -156,8 +156,8 @@ void call_it_a_guess(SensorChoice& choice, const std::string& why) {
 /// Where the values of a calibration are from; empty for other presets.
 std::string origin_of(const Sensor& sensor) {
   if (sensor.reference == sensors::CalibrationReference::none) return {};
-  std::string text =
-      sensor.reference == sensors::CalibrationReference::planes ? ", a calibration" : ", an estimate";
+  std::string text = sensor.reference == sensors::CalibrationReference::planes ? ", a calibration"
+                                                                               : ", an estimate";
   for (const auto& [name, value] : sensor.provenance) {
     if (name == "input") text += " from " + value;
   }
