@@ -145,7 +145,7 @@ ExitStatus run_job(const CalibrateCommandOptions& options, const CommonOptions& 
   put_flags(c.warnings);
   for (const std::string& warning : outcome.warnings) spdlog::warn(warning);
   for (const std::string& warning : c.warnings) spdlog::warn(warning);
-  if (!c.converged) spdlog::error("not converged: {}", c.reason);
+  if (!c.converged) log_failure(c.reason, common);
   const bool worse = c.verdict.code == calibration::CalibrationCode::not_better;
   const bool doubtful = c.verdict.code == calibration::CalibrationCode::undecided;
   if (c.converged && (worse || doubtful) && !options.force && !options.folder.empty()) {
@@ -206,7 +206,7 @@ ExitStatus run_plan(const CalibrateCommandOptions& options, const CommonOptions&
     planned = jobs::plan_calibration(job, bar.progress());
   }
   if (common.json) {
-    print_json(common, forecast_json(planned.forecast, planned.shape));
+    print_json(common, forecast_json(planned));
   } else {
     print_forecast(planned.forecast, planned.shape);
   }

@@ -186,13 +186,13 @@ Json calibration_json(const CalibratedRecordings& outcome, double total_time) {
 void print_calibration(const CalibratedRecordings& outcome) {
   const Calibration& c = outcome.calibration;
   const TrainShape shape = c.sensor.shape();
-  say("{}\n", c.converged ? "converged" : "NOT CONVERGED: " + c.reason);
+  say("{}\n", c.converged ? "converged" : "NOT CONVERGED");
   print_verdict(c.verdict);
   say("sensor {}: {}\n", outcome.choice.sensor.name, outcome.choice.words);
-  say("{} points on {} planes, {:.2f} mm thick before, {:.2f} mm after; read {:.2f} s, rotation "
+  say("{} points on {} plane{}, {:.2f} mm thick before, {:.2f} mm after; read {:.2f} s, rotation "
       "angles {:.2f} s, solved {:.2f} s\n\n",
-      grouped(c.points), c.planes.size(), 1e3 * c.rms_before, 1e3 * c.rms_after,
-      outcome.reading_time, outcome.angles_time, outcome.solving_time);
+      grouped(c.points), c.planes.size(), c.planes.size() == 1 ? "" : "s", 1e3 * c.rms_before,
+      1e3 * c.rms_after, outcome.reading_time, outcome.angles_time, outcome.solving_time);
   const bool any_held = c.held_changes.cols() > 0;
   std::vector<std::string> head = {"parameter", "value", "+- sigma", "unit", "before"};
   if (any_held) head.insert(head.begin() + 3, "given held");
@@ -261,7 +261,18 @@ void print_calibration(const CalibratedRecordings& outcome) {
   }
 }
 
-Json forecast_json(const CalibrationForecast& f, TrainShape shape) {
+Json plan_head(const std::string& sensor) {
+  return {{"serial", nullptr},
+          {"sensor", sensor},
+          {"verdict",
+           {{"code", "undecided"},
+            {"words", "this is a plan: nothing was measured"},
+            {"to_do", "record as planned, and calibrate from that"}}}};
+}
+
+Json forecast_json(const jobs::PlannedCalibration& planned) {
+  const CalibrationForecast& f = planned.forecast;
+  const TrainShape shape = planned.shape;
   Json parameters = Json::object(), walls = Json::array();
   for (std::size_t j = 0; j < f.free.size(); ++j) {
     const auto at = static_cast<Eigen::Index>(j);
@@ -276,13 +287,15 @@ Json forecast_json(const CalibrationForecast& f, TrainShape shape) {
                      {"mean_incidence_deg", deg(wall.mean_incidence)},
                      {"mean_range_m", wall.mean_range}});
   }
-  return {{"parameters", parameters},
-          {"range_offset_m", {{"sigma", number_or_null(f.range_offset_sigma)}}},
-          {"datum", datum_json(f.datum_kind, f.datum)},
-          {"unobservable", unobservable_json(f.unobservable)},
-          {"walls", walls},
-          {"observations", f.shots},
-          {"advice", f.advice}};
+  Json object = plan_head(planned.sensor);
+  object.update({{"parameters", parameters},
+                 {"range_offset_m", {{"sigma", number_or_null(f.range_offset_sigma)}}},
+                 {"datum", datum_json(f.datum_kind, f.datum)},
+                 {"unobservable", unobservable_json(f.unobservable)},
+                 {"walls", walls},
+                 {"observations", f.shots},
+                 {"advice", f.advice}});
+  return object;
 }
 
 void print_forecast(const CalibrationForecast& f, TrainShape shape) {

@@ -7,6 +7,7 @@
 #include "risley/calibration/calibration_plan.hpp"
 #include "risley/calibration/datum.hpp"
 #include "risley/jobs/calibrate_recordings.hpp"
+#include "risley/jobs/plan_calibration.hpp"
 
 #include "command.hpp"
 
@@ -23,7 +24,9 @@ Json errors_json(const calibration::DirectionErrors& errors);
 /// Slips of all recordings, each with the name of its own.
 Json slips_of_all(const std::vector<jobs::ReadRecording>& recordings);
 
-Json forecast_json(const calibration::CalibrationForecast& forecast, TrainShape shape);
+/// What a plan says where a calibration says whose sensor it was, and how it turned out.
+Json plan_head(const std::string& sensor);
+Json forecast_json(const jobs::PlannedCalibration& planned);
 void print_forecast(const calibration::CalibrationForecast& forecast, TrainShape shape);
 
 }  // namespace risley::app

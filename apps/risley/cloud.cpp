@@ -76,6 +76,22 @@ cloud::CloudOptions cloud_options(const CloudCommandOptions& options) {
   return result;
 }
 
+/// What sent the beams where the points are.
+std::string calibration_text(const std::string& name, const sensors::Sensor& calibration) {
+  const bool is_none = calibration.reference == sensors::CalibrationReference::none;
+  const bool is_estimate = calibration.reference == sensors::CalibrationReference::directions;
+  return fmt::format("{} ({})", name,
+                     is_none       ? "a preset"
+                     : is_estimate ? "an estimate; only walls tell whether it is true"
+                                   : "a calibration");
+}
+
+Json calibration_json(const std::string& name, const sensors::Sensor& calibration) {
+  const bool is_none = calibration.reference == sensors::CalibrationReference::none;
+  return {{"path", name},
+          {"calibrated_against", is_none ? Json() : Json(to_string(calibration.reference))}};
+}
+
 Json summary_json(const FileJob& job, const cloud::CloudSummary& s) {
   std::vector<std::string> warnings = s.warnings;
   for (const auto& warning : s.read_warnings) warnings.push_back(jobs::warning_text(warning));
@@ -126,7 +142,8 @@ ExitStatus write_beam_origin_map(const CloudCommandOptions& options,
 }
 
 FileOutcome make_one(const FileJob& job, const CloudCommandOptions& options,
-                     const cloud::CloudOptions& settings, const Progress& progress) {
+                     const sensors::Sensor& calibration, const cloud::CloudOptions& settings,
+                     const Progress& progress) {
   cloud::CloudSummary s =
       jobs::cloud_of_recording({job.input, read_options(options.reading), options.calibration,
                                 job.output, options.platform, settings},
@@ -147,14 +164,18 @@ FileOutcome make_one(const FileJob& job, const CloudCommandOptions& options,
   }
   std::string text = fmt::format("{}: {} points", job.output, grouped(s.points));
   if (s.no_return > 0) text += fmt::format(", {} shots without return", grouped(s.no_return));
-  if (s.outliers > 0) text += fmt::format(", {} outliers left out", grouped(s.outliers));
+  if (s.outliers > 0) {
+    text += fmt::format(", {} outlier{} left out", grouped(s.outliers), s.outliers == 1 ? "" : "s");
+  }
   if (s.without_rotation_angle > 0) {
     text += fmt::format(", {} without rotation angles", grouped(s.without_rotation_angle));
   }
   if (s.without_pose > 0) {
     text += fmt::format(", {} outside the trajectory left out", grouped(s.without_pose));
   }
+  text += fmt::format("; beams by {}", calibration_text(options.calibration, calibration));
   Json json = summary_json(job, s);
+  json["calibration"] = calibration_json(options.calibration, calibration);
   if (s.sample) json["html"] = options.report;
   return {s.damage ? kBadFile : kDone, std::move(json), text};
 }
@@ -255,7 +276,7 @@ Run declare_cloud(CLI::App& verb) {
     return run_file_jobs(
         files, "making points", "points",
         [&](const FileJob& job, const Progress& progress) {
-          return make_one(job, *options, settings, progress);
+          return make_one(job, *options, calibration, settings, progress);
         },
         common);
   };

@@ -286,6 +286,11 @@ void require_apart(const CommonOptions& common, const std::vector<std::string>& 
   }
 }
 
+void log_failure(const std::string& reason, const CommonOptions& common) {
+  const bool is_seen = !common.json && isatty(STDOUT_FILENO) != 0 && isatty(STDERR_FILENO) != 0;
+  spdlog::error("not converged{}", is_seen ? "" : ": " + reason);
+}
+
 Json number_or_null(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
 
 }  // namespace risley::app

@@ -154,6 +154,9 @@ void print_json(const CommonOptions& common, const Json& object,
 /// NaN and the infinite have no place in JSON.
 Json number_or_null(double value);
 
+/// Says on stderr that numbers failed; why only where the verdict's text on stdout does not.
+void log_failure(const std::string& reason, const CommonOptions& common);
+
 /// A verdict: stable code, words, what to do. Words of options become flags.
 template <class Verdict>
 Json verdict_json(const Verdict& verdict) {

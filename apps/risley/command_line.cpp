@@ -220,6 +220,7 @@ CommandLine::Parsed CommandLine::parse(const std::vector<std::string>& words) {
       parsed.help = text.str();
     } else {
       common_.json = std::find(words.begin(), words.end(), "--json") != words.end();
+      if (!words.empty()) common_.verb = words.front();
       parsed.problem = usage_error(error, words, app_);
     }
     return parsed;

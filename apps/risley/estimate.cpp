@@ -248,7 +248,7 @@ void print_noise(const Estimate& e) {
 void print_outcome(const EstimatedRecording& outcome) {
   const Estimate& e = outcome.estimate;
   const TrainShape shape = e.sensor.shape();
-  say("{}\n", e.converged ? "converged" : "NOT CONVERGED: " + e.reason);
+  say("{}\n", e.converged ? "converged" : "NOT CONVERGED");
   print_verdict(e.verdict);
   say("sensor {}: {}\n", outcome.choice.sensor.name, outcome.choice.words);
   say("{} shots used, {} of them outliers{}; read {:.2f} s, solved {:.2f} s\n\n",
@@ -327,7 +327,7 @@ ExitStatus run_estimate(const EstimateCommandOptions& options, const CommonOptio
       degrees_from_radians(e.start.residual_rms));
   for (const std::string& warning : outcome.warnings) spdlog::warn(warning);
   for (const std::string& warning : e.warnings) spdlog::warn(warning);
-  if (!e.converged) spdlog::error("not converged: {}", e.reason);
+  if (!e.converged) log_failure(e.reason, common);
   if (common.json) {
     print_json(common, outcome_json(outcome, now() - started), outcome.provenance);
   } else {

@@ -231,7 +231,7 @@ Json flight_json(const CalibratedFlight& outcome, double total_time) {
 void print_flight(const CalibratedFlight& outcome) {
   const FlightCalibration& c = outcome.calibration;
   const TrainShape shape = c.sensor.shape();
-  say("{}\n", c.converged ? "converged" : "NOT CONVERGED: " + c.reason);
+  say("{}\n", c.converged ? "converged" : "NOT CONVERGED");
   print_verdict(c.verdict);
   say("sensor {}: {}\n", outcome.choice.sensor.name, outcome.choice.words);
   say("{} shots on {} strips, {} cells of ground; read {:.2f} s, rotation angles {:.2f} s, solved "

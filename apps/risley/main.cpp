@@ -29,7 +29,7 @@ ExitStatus fail(ExitStatus status, const std::string& message, const CommonOptio
   if (common.json) {
     Json object = {{"error", message}, {"exit_status", static_cast<int>(status)}};
     if (details.is_object()) object.update(details);
-    if (status == kNumbersFailed && (common.verb == "estimate" || common.verb == "calibrate")) {
+    if (common.verb == "estimate" || common.verb == "calibrate") {
       object.update({{"serial", nullptr},
                      {"sensor", nullptr},
                      {"verdict",

@@ -65,10 +65,20 @@ class SharedProgress {
 
 FileOutcome failed(const FileJob& job, const Failure& failure) {
   Json json = {{"input", job.input},
-               {"error", failure.message},
-               {"exit_status", static_cast<int>(failure.status)}};
+               {"status", static_cast<int>(failure.status)},
+               {"message", failure.message}};
   if (failure.details.is_object()) json.update(failure.details);
   return {failure.status, json, fmt::format("{}: failed: {}", job.input, failure.message)};
+}
+
+/// An outcome beside others: "status" and "message" stand where an object of its own has "error".
+Json of_several(const FileOutcome& outcome) {
+  Json json = outcome.json;
+  json["status"] = static_cast<int>(outcome.status);
+  if (!json.contains("message")) json["message"] = json.value("error", "");
+  json.erase("error");
+  json.erase("exit_status");
+  return json;
 }
 
 }  // namespace
@@ -138,7 +148,7 @@ ExitStatus run_file_jobs(const std::vector<FileJob>& jobs, const std::string& la
   ExitStatus status = kDone;
   std::size_t sound = 0;
   std::uint64_t total = 0;
-  Json files = Json::array();
+  Json results = Json::array();
   for (const FileOutcome& outcome : outcomes) {
     if (outcome.status == kDone) {
       ++sound;
@@ -146,13 +156,14 @@ ExitStatus run_file_jobs(const std::vector<FileJob>& jobs, const std::string& la
       status = std::max(status, outcome.status);
     }
     total += outcome.json.value(counted, std::uint64_t{0});
-    files.push_back(outcome.json);
+    results.push_back(of_several(outcome));
   }
   if (common.json) {
     print_json(told, {{counted, total},
-                      {"files_done", sound},
-                      {"files_failed", jobs.size() - sound},
-                      {"files", files}});
+                      {"done", sound},
+                      {"failed", jobs.size() - sound},
+                      {"skipped", 0},
+                      {"results", results}});
   } else {
     for (const FileOutcome& outcome : outcomes) say("{}\n", outcome.text);
     say("{} of {} files done, {} {} in all\n", sound, jobs.size(), grouped(total), counted);

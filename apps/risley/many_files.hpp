@@ -40,7 +40,7 @@ bool output_is_folder(const std::vector<std::string>& inputs, const std::string&
 /// Runs all jobs, several at a time unless NetCDF is among them (its library is not thread-safe),
 /// and prints what came of them. One alone is as if there were no others: its JSON is
 /// the object, its errors leave by throwing. Of several, one that fails does not stop the rest; the
-/// JSON has an entry per file under "files" and the sum of `counted`.
+/// JSON has an entry per file under "results" and the sum of `counted`.
 /// @return kDone when all went well, otherwise the highest status of those that did not
 ExitStatus run_file_jobs(const std::vector<FileJob>& jobs, const std::string& label,
                          const char* counted,

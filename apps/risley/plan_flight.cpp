@@ -15,6 +15,7 @@
 #include "risley/report/distribution_page.hpp"
 #include "risley/scenes/scene.hpp"
 
+#include "calibration_text.hpp"
 #include "distribution_text.hpp"
 #include "flight_text.hpp"
 #include "recording_text.hpp"
@@ -35,14 +36,14 @@ Json lengths_json(const Eigen::Vector3d& v) {
 
 Json plan_json(const jobs::PlannedFlightResult& planned) {
   const FlightForecast& f = planned.forecast;
-  Json json = judgement_json(f, planned.sensor.shape());
+  Json json = plan_head(planned.sensor.name);
+  json.update(judgement_json(f, planned.sensor.shape()));
   Json strips = Json::array();
   for (std::size_t s = 0; s < f.strips.size(); ++s) {
     strips.push_back({{"name", f.strips[s].name},
                       {"duration_s", 1e-9 * double(f.strips[s].end_ns - f.strips[s].begin_ns)},
                       {"shots", f.strip_shots[s]}});
   }
-  json["sensor"] = planned.sensor.name;
   json["points"] = {{"trajectory_m", lengths_json(f.points.trajectory)},
                     {"adjusted_m", lengths_json(f.points.adjusted)},
                     {"strips_trajectory_m", lengths_json(f.points.strips_trajectory)},

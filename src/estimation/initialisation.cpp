@@ -438,9 +438,9 @@ int turning_rotors(const sensors::Sensor& sensor) {
                                         [](double speed) { return speed != 0; }));
 }
 
-/// What to say of lines that are no combination of the sensor's speeds.
-EstimationError unknown_speeds(const RotorLines& found, const sensors::Sensor& sensor,
-                               const std::vector<Hypothesis>& hypotheses) {
+/// Says of lines that they are no combination of the sensor's speeds.
+[[noreturn]] void refuse_speeds(const RotorLines& found, const sensors::Sensor& sensor,
+                                const std::vector<Hypothesis>& hypotheses) {
   std::vector<double> speeds;
   for (const SpectralLine& line : found.lines) speeds.push_back(line.angular_velocity);
   const std::string words =
@@ -458,14 +458,14 @@ EstimationError unknown_speeds(const RotorLines& found, const sensors::Sensor& s
         high = std::max(high, ratio);
       }
       if (low > 0 && high < 1.01 * low) {
-        return EstimationError(fmt::format(
+        throw WrongClock(fmt::format(
             "{}: {} are {:.4g} times as fast, so the time stamps are in another unit or their "
             "clock is wrong",
             words, speeds.size() == 2 ? "both" : "all", low));
       }
     } while (std::next_permutation(order.begin(), order.end()));
   }
-  return EstimationError(words + ": wrong sensor, a moving sensor, or a mirrored recording");
+  throw EstimationError(words + ": wrong sensor, a moving sensor, or a mirrored recording");
 }
 
 /// Looks for the best answer in one window.
@@ -516,7 +516,7 @@ Answer find_in_window(const StartWindow& window, const sensors::Sensor& sensor,
         !everywhere.empty() &&
         (answers.empty() ||
          everywhere.front().unexplained < 0.25 * answers.front().trial.lines.unexplained);
-    if (better_elsewhere) throw unknown_speeds(everywhere.front(), sensor, hypotheses);
+    if (better_elsewhere) refuse_speeds(everywhere.front(), sensor, hypotheses);
     if (answers.empty()) {
       throw EstimationError(
           fmt::format("no {} turning lines about the speeds of {}, {} deg/s, describe the "

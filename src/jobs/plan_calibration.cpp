@@ -26,7 +26,7 @@ PlannedCalibration plan_calibration(const PlanCalibrationOptions& options,
   plan.prior_sigma = options.prior_sigma;
   plan.range_offset_sigma = options.range_offset_sigma;
   plan.beam_origin = options.beam_origin;
-  return {plan.sensor.shape(), calibration::forecast(plan, progress)};
+  return {plan.sensor.name, plan.sensor.shape(), calibration::forecast(plan, progress)};
 }
 
 }  // namespace risley::jobs

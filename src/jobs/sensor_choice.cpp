@@ -153,6 +153,17 @@ void call_it_a_guess(SensorChoice& choice, const std::string& why) {
       choice.sensor.name, why));
 }
 
+/// Where the values of a calibration are from; empty for other presets.
+std::string origin_of(const Sensor& sensor) {
+  if (sensor.reference == sensors::CalibrationReference::none) return {};
+  std::string text = sensor.reference == sensors::CalibrationReference::planes ? ", a calibration"
+                                                                               : ", an estimate";
+  for (const auto& [name, value] : sensor.provenance) {
+    if (name == "input") text += " from " + value;
+  }
+  return text;
+}
+
 /// What is left where shots did not decide: the best description, the field of view, or a habit.
 void guess(const FirstShots& shots, const std::optional<SensorRecognition>& found,
            std::span<const Sensor> candidates, SensorChoice& choice) {
@@ -294,7 +305,7 @@ SensorChoice choose_sensor(const std::string& path, const recordings::ReadOption
   const bool one_sensor = header.devices.size() == 1;
   if (given) {
     choice.sensor = *given;
-    choice.words = "as asked for";
+    choice.words = "as asked for" + origin_of(*given);
     if (given->train.emitters() == 1 || !has_times || !one_sensor) return choice;
     const FirstShots shots = first_shots(path, reading, {&*given, 1}, progress);
     if (const auto found = recognised(shots, {&*given, 1})) take(*found, {&*given, 1}, choice);

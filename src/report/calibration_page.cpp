@@ -95,11 +95,12 @@ Verdict verdict_of(const CalibrationReport& r) {
           : fmt::format(
                 "The walls are {} mm thick before and {} mm after the calibration (root mean "
                 "square distance "
-                "of {} points from {} planes); {}; the standard uncertainty of roll is {}°, of "
+                "of {} points from {} plane{}); {}; the standard uncertainty of roll is {}°, of "
                 "pitch {}° and of yaw {}°.",
                 millimetres(r.rms_before), millimetres(r.rms_after), count_text(r.points),
-                r.planes.size(), datum_text(r.datum_kind), sigma_degrees(r.datum.sigma_roll),
-                sigma_degrees(r.datum.sigma_pitch), sigma_degrees(r.datum.sigma_yaw));
+                r.planes.size(), r.planes.size() == 1 ? "" : "s", datum_text(r.datum_kind),
+                sigma_degrees(r.datum.sigma_roll), sigma_degrees(r.datum.sigma_pitch),
+                sigma_degrees(r.datum.sigma_yaw));
   verdict.mend =
       "look at the views below whether what was taken for walls are walls; record walls that fill "
       "the field of view, more of them, from nearer and farther and steeply tilted; hold "

@@ -140,8 +140,11 @@ std::string verdict_html(const Verdict& verdict) {
   }
   if (!verdict.warnings.empty()) html += "<p><b>With care:</b></p>" + list_html(verdict.warnings);
   if (verdict.converged) html += verdict.care_html;
-  return fmt::format("<section class=\"verdict {}\"><strong>{}</strong>{}</section>\n", kind,
-                     escape_html(title), html);
+  const std::string code = verdict.result.code.empty()
+                               ? ""
+                               : fmt::format(" <code>{}</code>", escape_html(verdict.result.code));
+  return fmt::format("<section class=\"verdict {}\"><strong>{}</strong>{}{}</section>\n", kind,
+                     escape_html(title), code, html);
 }
 
 std::string correlation_html(const std::vector<CorrelationHead>& heads,

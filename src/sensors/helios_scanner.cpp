@@ -184,9 +184,7 @@ HeliosScanner helios_scanner(const Sensor& sensor, std::uint64_t rows,
     weights.push_back(std::abs((index - 1) * wedge));
   }
 
-  const Start start =
-      start_of(options.rotation_angle.empty() ? sequence.rotation_angle : options.rotation_angle,
-               sensor.angular_velocity, weights);
+  const Start start = start_of(start_angles(sensor, options), sensor.angular_velocity, weights);
   PrismTrain train = sensor.train.without_errors();
   const Eigen::Matrix3d common = about(Eigen::Vector3d::UnitY(), start.turn);
   for (int i = 0; i < emitters; ++i) {

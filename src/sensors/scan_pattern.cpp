@@ -16,14 +16,20 @@ constexpr long double kTurn = 2.0L * std::numbers::pi_v<long double>;
 
 }  // namespace
 
+std::vector<double> start_angles(const Sensor& sensor, const ScanPatternOptions& options) {
+  const auto prisms = static_cast<std::size_t>(sensor.prisms());
+  std::vector<double> start = options.rotation_angle;
+  if (start.empty() && sensor.sequence) start = sensor.sequence->rotation_angle;
+  if (start.empty()) start.assign(prisms, 0.0);
+  require_length("rotation_angle", start.size(), prisms);
+  return start;
+}
+
 ScanPattern scan_pattern(const Sensor& sensor, std::uint64_t first_row, std::size_t rows,
                          const ScanPatternOptions& options) {
   const auto prisms = static_cast<std::size_t>(sensor.prisms());
   const ScanSequence sequence = sensor.sequence.value_or(ScanSequence{});
-  std::vector<double> start =
-      options.rotation_angle.empty() ? sequence.rotation_angle : options.rotation_angle;
-  if (start.empty()) start.assign(prisms, 0.0);
-  require_length("rotation_angle", start.size(), prisms);
+  const std::vector<double> start = start_angles(sensor, options);
   require_length("angular_velocity of the sensor", sensor.angular_velocity.size(), prisms);
   const double rate = options.shot_rate.value_or(sensor.shot_rate);
   require_between("shot_rate", rate, 1e-3, 1e9, "Hz");

@@ -191,11 +191,12 @@ class CloudTest(CommandTest):
         (self.folder / "broken.nc").write_bytes((self.folder / "wall.nc").read_bytes()[:3000])
         found = self.expect_json(3, "cloud", "[wo]*r.nc", "wall.nc", "broken.nc", "--calibration",
                                  "mid-40-table3", "-o", "clouds", "--threads", 2)
-        self.assertEqual(found["files_done"], 2)
-        self.assertEqual(found["files_failed"], 1)
-        by_input = {entry["input"]: entry for entry in found["files"]}
-        self.assertEqual(by_input["broken.nc"]["exit_status"], 3)
-        self.assertEqual(found["points"], sum(e.get("points", 0) for e in found["files"]))
+        self.assertEqual(found["done"], 2)
+        self.assertEqual(found["failed"], 1)
+        by_input = {entry["input"]: entry for entry in found["results"]}
+        self.assertEqual(by_input["broken.nc"]["status"], 3)
+        self.assertIn("broken.nc", by_input["broken.nc"]["message"])
+        self.assertEqual(found["points"], sum(e.get("points", 0) for e in found["results"]))
         self.assertEqual({p.name for p in (self.folder / "clouds").iterdir()},
                          {"wall.las", "other.las"})
         text = self.expect(3, "cloud", "wall.nc", "broken.nc", "--calibration", "mid-40-table3",
@@ -205,7 +206,7 @@ class CloudTest(CommandTest):
     def test_converting_many_files(self):
         found = self.expect_json(0, "convert", "*r.nc", "wall.nc", "-o", "converted", "--format",
                                  "lvx-1.1", "--threads", 2)
-        self.assertEqual(found["files_failed"], 0)
+        self.assertEqual(found["failed"], 0)
         self.assertEqual({p.name for p in (self.folder / "converted").iterdir()},
                          {"other.lvx", "wall.lvx"})
         self.assertEqual(self.expect_json(2, "convert", "wall.nc", "./wall.nc", "-o", "twice",

@@ -9,15 +9,20 @@ import subprocess
 import tempfile
 import unittest
 
+import schemas
+
 COMMAND = os.environ["RISLEY_COMMAND"]
 SOURCE = pathlib.Path(os.environ["RISLEY_SOURCE_DIR"])
 SANITIZED = os.environ.get("RISLEY_SANITIZED") == "ON"  # many times slower, and no limit of memory
 
 
 def run(*arguments, folder=None):
-    """The finished process, with text of stdout and stderr."""
-    return subprocess.run([COMMAND, *map(str, arguments)], cwd=folder, capture_output=True,
+    """The finished process, with text of stdout and stderr; what --json prints is as its schema."""
+    done = subprocess.run([COMMAND, *map(str, arguments)], cwd=folder, capture_output=True,
                           text=True, timeout=3000 if SANITIZED else 300, check=False)
+    if "--json" in arguments:
+        schemas.check_output(arguments, done.stdout)
+    return done
 
 
 class CommandTest(unittest.TestCase):

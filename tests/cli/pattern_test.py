@@ -97,6 +97,13 @@ class PatternTest(CommandTest):
         self.assertIn("--format", self.expect(2, "pattern", "-o", "-").stderr)
         self.assertIn("nothing to do", self.expect(2, "pattern").stderr)
 
+    def test_helios_gets_a_sensor_whose_preset_has_no_sequence(self):
+        made = self.expect_json(0, "pattern", "--sensor", "mid-40", "--duration-s", "0.01", "--format",
+                                "helios-xml", "-o", "plain.xml")
+        self.assertLess(made["residual"]["worst_deg"], 1e-6)
+        self.expect(2, "pattern", "--sensor", "mid-40", "--format", "helios-xml", "-o", "one.xml",
+                    "--start-angles-deg", "1")
+
     def test_isaac_gets_every_shot_with_its_time(self):
         arguments = ("pattern", "--sensor", "horizon", "--duration-s", "0.05")
         self.expect(0, *arguments, "--format", "livox-csv", "-o", "horizon.csv")

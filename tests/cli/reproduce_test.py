@@ -9,6 +9,7 @@ import shutil
 import subprocess
 import unittest
 
+import schemas
 from command import COMMAND, CommandTest
 
 TABLES = {"table_1", "table_2", "figure_2", "section_2_3", "zero_position", "section_3_1", "table_3",
@@ -25,6 +26,7 @@ class ReproduceTest(CommandTest):
         # Longer than run() waits: a sanitizer's build takes many minutes.
         done = subprocess.run([COMMAND, "reproduce", "-o", "result", "--quiet", "--json"],
                               cwd=cls.folder, capture_output=True, text=True, check=False)
+        schemas.check_output(["reproduce"], done.stdout)
         cls.result = json.loads(done.stdout)
         cls.status = done.returncode
         if os.environ.get("RISLEY_REPRODUCED"):  # for others who look at the page

@@ -6,12 +6,19 @@
 #include <optional>
 #include <vector>
 
+#include "risley/core/error.hpp"
 #include "risley/estimation/angle_series.hpp"
 #include "risley/estimation/frame_turn.hpp"
 #include "risley/estimation/free_parameters.hpp"
 #include "risley/sensors/sensor.hpp"
 
 namespace risley::estimation {
+
+/// The beam turns like the sensor's rotors, but all of them faster by one factor.
+class WrongClock : public EstimationError {
+ public:
+  using EstimationError::EstimationError;
+};
 
 /// How a start is looked for.
 struct StartOptions {
@@ -50,7 +57,7 @@ struct Start {
 /// @param head  every shot of about the first second, as recorded
 /// @throws EstimationError naming what is missing: duration, shots, matching speeds; also when two
 ///         answers fit equally well, and when the recording's clock rather than the rotors must be
-///         off
+///         off (WrongClock)
 Start find_start(const AngleSeries& head, const sensors::Sensor& sensor,
                  const StartOptions& options);
 

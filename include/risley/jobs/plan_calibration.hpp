@@ -28,6 +28,7 @@ struct PlanCalibrationOptions {
 
 /// What it would reach.
 struct PlannedCalibration {
+  std::string sensor;  ///< name of its preset
   TrainShape shape;
   calibration::CalibrationForecast forecast;
 };

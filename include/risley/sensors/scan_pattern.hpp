@@ -29,6 +29,10 @@ struct ScanPattern {
   std::size_t size() const { return time.size(); }
 };
 
+/// The rotors' places at time 0, rad, [prisms].
+/// @throws InvalidArgument for angles that are not one per prism
+std::vector<double> start_angles(const Sensor& sensor, const ScanPatternOptions& options);
+
 /// Rows [first_row, first_row + rows) of the scan sequence with rotors at constant speed: row r is
 /// shot every (r + 1) - 1.
 /// @throws InvalidArgument for angles or speeds that are not one per prism, a rate that is not

@@ -1,0 +1,280 @@
+#!/usr/bin/env python3
+# SPDX-FileCopyrightText: 2026 The risley authors
+# SPDX-License-Identifier: MIT
+"""The schemas of what --json prints take it, refuse it when damaged, and name nothing else."""
+import copy
+import json
+import re
+import unittest
+
+import schemas
+from command import SOURCE, CommandTest, run
+from trajectory_test import sbet, smrmsg
+
+DATA = SOURCE / "data"
+HALL = DATA / "hall.yaml"
+MOUNT = ("--mount", DATA / "mount-as-built.yaml")
+ERRORS = ("--trajectory-errors", DATA / "trajectory-errors.yaml")
+FLIGHT = """risley_flight: 1
+rate_hz: 100
+height_m: 40
+speed_m_per_s: 5
+turn_duration_s: 6
+strips: [{headings_deg: [90, 270], length_m: 55}]
+motion:
+  seed: 4
+  attitude: {roll_deg: 2, pitch_deg: 2, heading_deg: 2, lowest_hz: 0.15, highest_hz: 1.2, sinusoids: 6}
+"""
+WALL = """planes:
+  - {name: wall, distance_m: 20, normal_azimuth_deg: 0, normal_zenith_deg: 90, sigma_deg: 0.01}
+"""
+# What the runs below do not meet, because it takes minutes or a fault of the machine.
+RARE = re.compile(r"^reproduce|^common#slip\.|^estimate#result\.shot_clock\.|^calibrate#walls\.steps\[\]\."
+                  r"|^info#accuracies\.warnings\[\]|^common#failed_file\.line|^calibrate#flight\.control\[\]\."
+                  r"|^calibrate#flight\.held\.\*\.")
+UNKNOWN = ("No such name", [["x"]])
+
+
+class Walker:
+    """Goes through an object and the schema of its verb side by side."""
+
+    def __init__(self, verb):
+        self.verb = verb
+        self.whole = schemas.schema_of(verb)
+        self.own = json.loads((schemas.FOLDER / f"{verb}.json").read_text(encoding="utf-8"))["$defs"]
+        self.valid = {}
+
+    def resolve(self, schema, place):
+        while "$ref" in schema:
+            name = schema["$ref"].rpartition("/")[2]
+            place = f"{self.verb if name in self.own else 'common'}#{name}"
+            schema = self.whole["$defs"][name]
+        return schema, place
+
+    def takes(self, schema, instance):
+        key = json.dumps(schema)
+        if key not in self.valid:
+            self.valid[key] = schemas.jsonschema.Draft202012Validator(
+                {**schema, "$defs": self.whole["$defs"]})
+        return self.valid[key].is_valid(instance)
+
+    def objects(self, instance, schema=None, place="", path=()):
+        """Each object: where in the instance, its schema, and the place's name in the schema."""
+        schema, place = self.resolve(self.whole if schema is None else schema, place)
+        for choice in schema.get("anyOf", []):
+            if self.takes(choice, instance):
+                yield from self.objects(instance, choice, place, path)
+        if isinstance(instance, list) and "items" in schema:
+            for i, one in enumerate(instance):
+                yield from self.objects(one, schema["items"], place + "[]", (*path, i))
+        if not isinstance(instance, dict) or "anyOf" in schema:
+            return
+        yield path, schema, place
+        rest = schema.get("additionalProperties")
+        for name, one in instance.items():
+            if name in schema.get("properties", {}):
+                yield from self.objects(one, schema["properties"][name], f"{place}.{name}", (*path, name))
+            elif rest:
+                yield from self.objects(one, rest, place + ".*", (*path, name))
+
+    def names(self, schema=None, place="", met=None):
+        """The place of each name that the schema knows."""
+        met = set() if met is None else met
+        schema, place = self.resolve(self.whole if schema is None else schema, place)
+        if "#" in place and "." not in place and "[" not in place:
+            if place in met:
+                return
+            met.add(place)
+        for choice in schema.get("anyOf", []):
+            yield from self.names(choice, place, met)
+        if "items" in schema:
+            yield from self.names(schema["items"], place + "[]", met)
+        if isinstance(schema.get("additionalProperties"), dict):
+            yield from self.names(schema["additionalProperties"], place + ".*", met)
+        for name, one in schema.get("properties", {}).items():
+            yield f"{place}.{name}"
+            yield from self.names(one, f"{place}.{name}", met)
+
+
+def shortened(instance):
+    """The same with short lists, which are as good to damage."""
+    if isinstance(instance, dict):
+        return {name: shortened(one) for name, one in instance.items()}
+    if not isinstance(instance, list):
+        return instance
+    most = 1 if instance and isinstance(instance[0], (dict, list)) else 3
+    return [shortened(one) for one in instance[:most]]
+
+
+def inside(instance, path):
+    for step in path:
+        instance = instance[step]
+    return instance
+
+
+class SchemasTest(CommandTest):
+    @classmethod
+    def setUpClass(cls):
+        if schemas.jsonschema is None:
+            raise unittest.SkipTest("python3-jsonschema is missing")
+        super().setUpClass()
+        cls.outputs = []  # verb, object
+        for name, text in (("flight.yaml", FLIGHT), ("wall.yaml", WALL), ("no.yaml", "7\n")):
+            (cls.folder / name).write_text(text, encoding="utf-8")
+        path, accuracies = sbet(1000), smrmsg(20)
+        for name, data in (("flight.sbet", path), ("flight.smrmsg", accuracies), ("no.lvx", b"nothing"),
+                           ("gap.sbet", path[:136 * 300] + path[136 * 250:136 * 400] + path[136 * 700:]),
+                           ("gap.smrmsg", accuracies[:80 * 5] + accuracies[80 * 10:])):
+            (cls.folder / name).write_bytes(data)
+        bent = ("--sensor", "mid-40-table3", "--reported", "nominal", "--rate-hz", 1000)
+        truth = ("--truth", "hall.lvx.truth.yaml")
+        cls.print(0, "simulate", "-o", "hall.lvx", *bent, "--scene", HALL, "--duration-s", 2)
+        cls.print(0, "info", "hall.lvx", "--share", "excerpt.nc")
+        cls.print(0, "convert", "hall.lvx", "-o", "hall.csv")
+        (cls.folder / "cut.csv").write_bytes((cls.folder / "hall.csv").read_bytes()[:9000] + b"7,x\n")
+        whole = (cls.folder / "hall.lvx").read_bytes()
+        middle = len(whole) // 2
+        (cls.folder / "bad.lvx").write_bytes(whole[:middle] + b"\xff" * 3000 + whole[middle + 3000:])
+        (cls.folder / "tail.lvx").write_bytes(whole[:-10])
+        for name in ("cut.csv", "bad.lvx"):
+            for verb, *more in (("info",), ("convert", "-o", "saved.nc"), ("observability",), ("estimate",),
+                                ("cloud", "--calibration", "mid-40-table3", "-o", "saved.las")):
+                cls.print(3, verb, name, *more)
+        cls.print(0, "info", "tail.lvx")
+        cls.print(3, "convert", "bad.lvx", "cut.csv", "hall.lvx", "no.lvx", "-o", "many", "--format",
+                  "netcdf")
+        cls.print(0, "pattern", "--sensor", "mid-40-sequence", "--format", "livox-csv", "-o", "scan.csv",
+                  "--duration-s", 0.2)
+        cls.print(0, "estimate", "hall.lvx", *truth, "-o", "estimated")
+        cls.print(1, "estimate", "hall.lvx", "--free", "refractive_index_air")
+        cls.print(0, "calibrate", "hall.lvx", *truth, "-o", "calibrated")
+        cls.print(0, "simulate", "-o", "wall.lvx", *bent, "--scene", "wall.yaml", "--duration-s", 1)
+        cls.print(1, "calibrate", "wall.lvx", "--planes", "wall.yaml")
+        cls.print(2, "calibrate", "hall.lvx", "--nonsense")
+        cls.print(1, "calibrate", "scan.csv")
+        cls.print(0, "calibrate", "--plan", DATA / "stations.yaml", "--duration-s", 1)
+        cls.print(0, "observability", "--duration-s", 1, "--rate-hz", 1000)
+        cls.print(0, "observability", "--sensor", "horizon", "--duration-s", 0.5, "--rate-hz", 24000)
+        cloud = ("--calibration", "calibrated", "--common-factors", "yes")
+        cls.print(0, "cloud", "hall.lvx", *cloud, "-o", "hall.las", "--report", "hall.html")
+        cls.print(3, "cloud", "hall.lvx", "no.lvx", "bad.lvx", "cut.csv", *cloud, "-o", "clouds/")
+        cls.print(1, "cloud", "hall.lvx", "--calibration", "avia", "-o", "no.las")
+        cls.print(1, "cloud", "hall.lvx", "wall.lvx", "--calibration", "avia", "-o", "clouds/")
+        cls.print(0, "cloud", "--calibration", "mid-40", "--beam-origin-map", "map.html")
+        cls.print(0, "report", "estimated")
+        cls.print(0, "report", "estimated", "calibrated", "-o", "two.html")
+        cls.print(3, "report", "no")
+        cls.print(0, "pattern", "--sensor", "mid-40", "--format", "helios-xml", "-o", "p.xml",
+                  "--duration-s", 0.1, "--coverage", "--report", "pattern.html", "--integration-s", 0.1)
+        cls.print(0, "pattern", "--coverage", "--integration-s", 0.1, "--report", "pattern.html")
+        cls.print(0, "convert", "scan.csv", "-o", "scan.nc")
+        cls.print(0, "convert", "scan.csv", "hall.lvx", "-o", "more", "--format", "netcdf")
+        cls.print(0, "identify", "scan.csv", "--most-prisms", 2)
+        cls.print(0, "preset", "list")
+        cls.print(0, "preset", "show", "avia")
+        cls.print(0, "preset", "new", "mine", "--from", "avia", "-o", "mine.yaml")
+        cls.print(3, "preset", "check", "mine.yaml", "no.yaml")
+        cls.fly(bent)
+
+    @classmethod
+    def fly(cls, bent):
+        cls.print(0, "simulate", "-o", "a.lvx", *bent, "--flight", "flight.yaml", "--mount",
+                  DATA / "mount-nadir.yaml", "--scene", DATA / "village.yaml", *ERRORS)
+        trajectory = ("--trajectory", "a.lvx.trajectory.csv")
+        cls.print(0, "info", "flight.sbet", "--accuracy", "flight.smrmsg")
+        cls.print(0, "info", "gap.sbet")
+        cls.print(0, "info", "gap.smrmsg")
+        cls.print(0, "convert", "gap.sbet", "-o", "path.csv")
+        cls.print(0, "convert", "gap.sbet", "a.lvx.trajectory.csv", "-o", "paths", "--format",
+                  "trajectory-csv")
+        cls.print(0, "cloud", "a.lvx", *trajectory, *MOUNT, *ERRORS, "--calibration", "mid-40", "-o",
+                  "a.las", "--distribution", "ground.html")
+        cls.print(0, "calibrate", "a.lvx", *trajectory, *MOUNT, *ERRORS, "--truth", "a.lvx.truth.yaml",
+                  "--knot-spacing-s", 2)
+        cls.print(0, "calibrate", "--plan", "flight.yaml", *MOUNT, *ERRORS, "--rate-hz", 1000,
+                  "--knot-spacing-s", 4, "--report", "plan.html")
+
+    @classmethod
+    def print(cls, status, verb, *arguments):
+        """Keeps what a verb prints; run() holds it against the schema."""
+        done = run(verb, *arguments, "--json", folder=cls.folder)
+        assert done.returncode == status, f"{verb} {arguments}: {done.stdout}\n{done.stderr}"
+        cls.outputs.append((verb, json.loads(done.stdout)))
+
+    def test_every_verb_has_a_schema(self):
+        verbs = run("--help").stdout.partition("Subcommands:")[2].partition("Exit status")[0]
+        known = re.findall(r"^  ([a-z-]+) ", verbs, re.M)
+        self.assertGreater(len(known), 10)
+        self.assertEqual(sorted(known), schemas.VERBS)
+
+    def refused(self, verb, damaged, what):
+        self.assertIsNotNone(schemas.problem(verb, damaged), f"{verb}: {what} is taken")
+
+    def test_damaged_outputs_are_refused(self):
+        done = set()
+        for verb, output in self.outputs:
+            output = shortened(output)
+            self.assertIsNone(schemas.problem(verb, output))
+            for path, schema, place in list(Walker(verb).objects(output)):
+                names = [name for name in inside(output, path)]
+                required = [name for name in schema.get("required", []) if name in names]
+                for kind, name in [("drop", name) for name in required] + [("add", UNKNOWN[0])] + \
+                        [("type", name) for name in names]:
+                    what = f"{kind} {place}.{name if name in schema.get('properties', {}) else '*'}"
+                    if what in done:
+                        continue
+                    done.add(what)
+                    damaged = copy.deepcopy(output)
+                    at = inside(damaged, path)
+                    if kind == "drop":
+                        del at[name]
+                    else:
+                        at[name] = UNKNOWN[1] if kind == "add" else {"x": 1} if not isinstance(
+                            at[name], dict) else "x"
+                    self.refused(verb, damaged, what)
+        self.assertGreater(len(done), 1000)
+
+    def test_values_beyond_the_law_are_refused(self):
+        def printed(verb, name):
+            return next(output for one, output in self.outputs if one == verb and name in output)
+
+        estimate, calibrate = printed("estimate", "parameters"), printed("calibrate", "pointing_error")
+        glass = ("parameters", "incident_beam_vertical_deg")
+        for verb, output, path, value in (
+                ("estimate", estimate, (*glass, "sigma"), -0.1),
+                ("estimate", estimate, (*glass, "sigma"), None),  # it converged
+                ("estimate", estimate, ("verdict", "code"), "bent"),
+                ("estimate", estimate, ("observations_used",), -1),
+                ("estimate", estimate, ("observations_used",), 0.5),
+                ("estimate", estimate, ("reason",), "none"),
+                ("estimate", estimate, ("format_version",), 2),
+                ("estimate", estimate, ("inputs", 0, "sha256"), "abc"),
+                ("calibrate", calibrate, ("verdict", "code"), "healthy"),
+                ("calibrate", calibrate, ("better_probability",), 1.01),
+                ("calibrate", calibrate, ("datum", "kind"), "none"),
+                ("calibrate", calibrate, ("pointing_error", "total_deg", "sigma"), -1)):
+            with self.subTest(path=path):
+                damaged = copy.deepcopy(output)
+                inside(damaged, path[:-1])[path[-1]] = value
+                self.refused(verb, damaged, f"{path} = {value}")
+        damaged = copy.deepcopy(printed("info", "exit_status"))
+        del damaged["exit_status"]
+        self.refused("info", damaged, "error without exit_status")
+
+    def test_no_schema_has_names_that_nothing_prints(self):
+        known, met = set(), set()
+        for verb in schemas.VERBS:
+            known.update(Walker(verb).names())
+        for verb, output in self.outputs:
+            for path, schema, place in Walker(verb).objects(output):
+                met.update(f"{place}.{name}" for name in inside(output, path)
+                           if name in schema.get("properties", {}))
+        unmet = sorted(one for one in known - met if not RARE.search(one))
+        self.assertEqual(unmet, [], "\n".join(unmet))
+        common = json.loads((schemas.FOLDER / "common.json").read_text(encoding="utf-8"))["$defs"]
+        texts = "".join(path.read_text(encoding="utf-8") for path in schemas.FOLDER.glob("*.json"))
+        self.assertEqual([name for name in common if f'#/$defs/{name}"' not in texts], [])
+
+
+if __name__ == "__main__":
+    unittest.main()
