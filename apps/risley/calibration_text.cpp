@@ -168,6 +168,7 @@ Json calibration_json(const CalibratedRecordings& outcome, double total_time) {
       {"unevenness", c.unevenness},
       {"variance_factor", c.variance_factor},
       {"thickness", profiles},
+      {"frame", frame_json()},
       {"slips", slips_of_all(outcome.recordings)},
       {"warnings", warnings},
       {"seconds",

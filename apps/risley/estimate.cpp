@@ -122,19 +122,6 @@ Json start_json(const estimation::Start& start) {
           {"residual_rms_deg", degrees_from_radians(start.residual_rms)}};
 }
 
-/// An angle and its sigma, rad, in degrees.
-Json value_json(double value, double sigma) {
-  return {{"value", degrees_from_radians(value)}, {"sigma", degrees_from_radians(sigma)}};
-}
-
-/// How the recording's frame is turned; zeros without sigma where it is the sensor's.
-Json frame_json(const Estimate& e) {
-  const estimation::FrameEstimate frame = e.frame_turn.value_or(estimation::FrameEstimate{});
-  return {{"yaw_deg", value_json(frame.turn.yaw, std::sqrt(frame.covariance(0, 0)))},
-          {"pitch_deg", value_json(frame.turn.pitch, std::sqrt(frame.covariance(1, 1)))},
-          {"estimated", e.frame_turn.has_value()}};
-}
-
 /// What rotors say of the clock, and the shot rate with which they would turn as usual.
 Json shot_clock_json(const EstimatedRecording& outcome) {
   if (!outcome.estimate.speed_factor) return nullptr;
@@ -209,7 +196,7 @@ Json outcome_json(const EstimatedRecording& outcome, double total_time) {
        {{"azimuth_deg", value_json(e.noise.value.azimuth, e.noise.sigma.azimuth)},
         {"zenith_deg", value_json(e.noise.value.zenith, e.noise.sigma.zenith)},
         {"held", e.noise_held}}},
-      {"frame", frame_json(e)},
+      {"frame", frame_json(e.frame_turn)},
       {"slips", slips_json(outcome.recording.header.slips)},
       {"shot_clock", shot_clock_json(outcome)},
       {"coordinates", to_string(e.coordinates)},

@@ -213,6 +213,7 @@ Json flight_json(const CalibratedFlight& outcome, double total_time) {
                  {"knots", c.model.knots.size()},
                  {"sigma0", c.sigma0},
                  {"range_sigma_m", c.range_sigma},
+                 {"frame", frame_json()},
                  {"slips", slips_of_all(outcome.recordings)},
                  {"warnings", warnings},
                  {"seconds",

@@ -50,6 +50,17 @@ Json choice_json(const jobs::SensorChoice& choice) {
             {"warnings", warnings}}}};
 }
 
+Json value_json(double value, double sigma) {
+  return {{"value", degrees_from_radians(value)}, {"sigma", degrees_from_radians(sigma)}};
+}
+
+Json frame_json(const std::optional<estimation::FrameEstimate>& turn) {
+  const estimation::FrameEstimate frame = turn.value_or(estimation::FrameEstimate{});
+  return {{"yaw_deg", value_json(frame.turn.yaw, std::sqrt(frame.covariance(0, 0)))},
+          {"pitch_deg", value_json(frame.turn.pitch, std::sqrt(frame.covariance(1, 1)))},
+          {"estimated", turn.has_value()}};
+}
+
 Json slips_json(const std::vector<recordings::ShotSlip>& slips) {
   Json list = Json::array();
   for (const recordings::ShotSlip& slip : slips) {

@@ -3,10 +3,12 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "risley/core/error.hpp"
+#include "risley/estimation/frame_turn.hpp"
 #include "risley/jobs/sensor_choice.hpp"
 #include "risley/recordings/reader.hpp"
 
@@ -22,6 +24,11 @@ std::string sensor_name(const jobs::SensorChoice& choice);
 
 /// Which sensor it was and who says so: sensor, preset, sensor_chosen_by, sensor_choice.
 Json choice_json(const jobs::SensorChoice& choice);
+
+/// An angle and its sigma, rad, in degrees.
+Json value_json(double value, double sigma);
+/// How a recording's frame is turned; zeros without sigma where it is the sensor's.
+Json frame_json(const std::optional<estimation::FrameEstimate>& turn = {});
 
 /// Where the count of shots was wrong: [{row, shots}], shots null where they could not be counted.
 Json slips_json(const std::vector<recordings::ShotSlip>& slips);
