@@ -122,7 +122,10 @@ TEST(Mcap, OtherEncodingsAndVersionsAreNamed) {
 }
 
 TEST(Mcap, CutAnywhereItGivesWhatIsWhole) {
-  for (const McapFile& way : all_ways(small_file())) {
+  McapFile file = small_file();
+  file.messages.resize(8);  // three of them with 20 points
+  file.messages_per_chunk = 2;
+  for (const McapFile& way : all_ways(file)) {
     SCOPED_TRACE(fmt::format("{} {} {}", way.packing, way.chunked, way.summary));
     const std::string bytes = way.bytes();
     const Outcome whole = read_bytes(bytes);
@@ -149,7 +152,7 @@ TEST(Mcap, CutAnywhereItGivesWhatIsWhole) {
                   HasSubstr(fmt::format("it ends at byte {}", length)));
       ASSERT_LE(*cut.recording.warnings[0].place.byte_offset, length);
     }
-    EXPECT_EQ(most, 120U);
+    EXPECT_EQ(most, 60U);
   }
 }
 
@@ -160,7 +163,8 @@ TEST(Mcap, AnyChangedBitIsFoundByTheChecksums) {
     file.data_checksum = true;
     const std::string bytes = file.bytes();
     const Outcome whole = read_bytes(bytes);
-    for (std::size_t at = 0; at < bytes.size(); at += at < 300 || at + 400 > bytes.size() ? 1 : 17) {
+    for (std::size_t at = 0; at < bytes.size();
+         at += at < 300 || at + 400 > bytes.size() ? 1 : 17) {
       SCOPED_TRACE(at);
       std::string changed = bytes;
       changed[at] = static_cast<char>(changed[at] ^ (1 << (at % 8)));
