@@ -83,6 +83,10 @@ Progress ProgressBar::progress() {
   return {[this](double fraction, std::string_view stage) { show(fraction, stage); }, &interrupted};
 }
 
+Progress cancellable() {
+  return {[](double, std::string_view) {}, &interrupted};
+}
+
 void ProgressBar::show(double fraction, std::string_view stage) {
   const double time = now();
   if (!stage.empty() && stage != label_) {
@@ -177,6 +181,11 @@ std::optional<double> noise_angle(const std::optional<double>& noise_angle_deg) 
   return radians_from_degrees(*noise_angle_deg);
 }
 
+void add_files(const std::string& path, std::vector<std::string>& files) {
+  const std::vector<std::string> own = recordings::recording_files(path);
+  files.insert(files.end(), own.begin(), own.end());
+}
+
 void note_files(const CLI::App& verb, CommonOptions& common) {
   namespace fs = std::filesystem;
   static constexpr std::array<std::string_view, 15> kReading = {
@@ -188,7 +197,7 @@ void note_files(const CLI::App& verb, CommonOptions& common) {
       std::error_code ignored;
       const std::string name = option->get_name();
       if (name == "INPUT" || name == "FILE") {
-        common.inputs.push_back(value);
+        add_files(value, common.inputs);
       } else if (name == "DIR") {
         common.inputs.push_back((fs::path(value) / "report.json").string());
         // Of two results the numbers are compared as well.
@@ -197,8 +206,9 @@ void note_files(const CLI::App& verb, CommonOptions& common) {
           common.files.push_back(numbers.string());
         }
       } else if (std::find(kReading.begin(), kReading.end(), name) != kReading.end() &&
-                 fs::is_regular_file(value, ignored)) {
-        common.files.push_back(value);
+                 (fs::is_regular_file(value, ignored) ||
+                  recordings::recording_files(value).size() > 1)) {
+        add_files(value, common.files);
       }
     }
   }

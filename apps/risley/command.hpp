@@ -122,6 +122,12 @@ void check_not_negative(double value, std::string_view option, std::string_view 
 /// The value of --noise-angle-deg, rad. @throws InvalidArgument naming the option
 std::optional<double> noise_angle(const std::optional<double>& noise_angle_deg);
 
+/// For a library function that tells nothing; a signal cancels it.
+Progress cancellable();
+
+/// Adds a file to others, or the files of which a folder of ROS 2 consists.
+void add_files(const std::string& path, std::vector<std::string>& files);
+
 /// Fills inputs and files from what was typed for a verb.
 void note_files(const CLI::App& verb, CommonOptions& common);
 

@@ -107,8 +107,8 @@ void refuse_point_clouds(const std::string& output) {
 }
 
 FileOutcome convert(const FileJob& job, const ConvertOptions& options, const Progress& progress) {
-  if (!options.topic.empty() ||
-      trajectories::trajectory_file_kind(job.input) != trajectories::TrajectoryFileKind::none) {
+  if (!options.topic.empty() || trajectories::trajectory_file_kind(job.input, progress.silent()) !=
+                                    trajectories::TrajectoryFileKind::none) {
     return convert_poses(job, options, progress);
   }
   if (!options.accuracy.empty()) {
@@ -151,7 +151,8 @@ FileOutcome convert(const FileJob& job, const ConvertOptions& options, const Pro
 Run declare_convert(CLI::App& verb) {
   const auto options = std::make_shared<ConvertOptions>();
   verb.add_option("INPUT", options->inputs,
-                  "Recordings or trajectories, of any known format, or patterns such as '*.lvx'")
+                  "Recordings or trajectories, of any known format, folders of ROS 2 with their "
+                  "metadata.yaml, or patterns such as '*.lvx'")
       ->required();
   verb.add_option("-o,--output", options->output,
                   "File to write, or a folder for several (made where it is missing); its "

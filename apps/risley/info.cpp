@@ -241,8 +241,8 @@ ExitStatus run_info(const InfoCommandOptions& options, const CommonOptions& comm
     throw InvalidArgument("--share-ranges needs --share: it says what an excerpt holds");
   }
   const bool is_trajectory =
-      !options.topic.empty() ||
-      trajectories::trajectory_file_kind(options.input) != trajectories::TrajectoryFileKind::none;
+      !options.topic.empty() || trajectories::trajectory_file_kind(options.input, cancellable()) !=
+                                    trajectories::TrajectoryFileKind::none;
   if (is_trajectory) return run_trajectory_info(options, common);
   if (!options.accuracy.empty()) {
     throw InvalidArgument(
@@ -282,7 +282,8 @@ ExitStatus run_info(const InfoCommandOptions& options, const CommonOptions& comm
 Run declare_info(CLI::App& verb) {
   const auto options = std::make_shared<InfoCommandOptions>();
   verb.add_option("INPUT", options->input,
-                  "Recording, trajectory or accuracies (SMRMSG), of any known format")
+                  "Recording, trajectory or accuracies (SMRMSG), of any known format, or a folder "
+                  "of ROS 2 with its metadata.yaml")
       ->required();
   verb.add_option("--accuracy", options->accuracy, "Accuracies of a trajectory (SMRMSG)")
       ->type_name("FILE");

@@ -34,13 +34,26 @@ std::vector<std::string> files_of(const std::string& pattern) {
   std::vector<std::string> names;
   if (::glob(pattern.c_str(), GLOB_MARK, nullptr, &found) == 0) {
     for (std::size_t i = 0; i < found.gl_pathc; ++i) {
-      const std::string name = found.gl_pathv[i];
-      if (!name.ends_with('/')) names.push_back(name);
+      std::string name = found.gl_pathv[i];
+      if (name.ends_with('/')) {  // a folder: only one of ROS 2
+        std::error_code ignored;
+        if (!fs::exists(fs::path(name) / "metadata.yaml", ignored)) continue;
+        name.pop_back();
+      }
+      names.push_back(std::move(name));
     }
   }
   ::globfree(&found);
   if (names.empty()) throw InvalidArgument(fmt::format("{}: no file has such a name", pattern));
   return names;
+}
+
+/// Name of a file without its ending, or of a folder.
+std::string bare_name(const std::string& name) {
+  fs::path path(name);
+  if (!path.has_filename()) path = path.parent_path();
+  std::error_code ignored;
+  return (fs::is_directory(path, ignored) ? path.filename() : path.stem()).string();
 }
 
 /// The progress of all jobs together.
@@ -95,7 +108,7 @@ std::vector<FileJob> file_jobs(const std::vector<std::string>& inputs, const std
   std::vector<FileJob> jobs;
   for (const std::string& input : inputs) {
     for (const std::string& name : is_pattern(input) ? files_of(input) : std::vector{input}) {
-      const fs::path made = fs::path(output) / (fs::path(name).stem().string() + ending);
+      const fs::path made = fs::path(output) / (bare_name(name) + ending);
       for (const FileJob& other : jobs) {
         if (other.output == made.string()) {
           throw InvalidArgument(fmt::format("{} and {} would both be written to {}", other.input,
@@ -115,7 +128,7 @@ ExitStatus run_file_jobs(const std::vector<FileJob>& jobs, const std::string& la
                          const CommonOptions& common) {
   CommonOptions told = common;  // patterns are names by now
   told.inputs.clear();
-  for (const FileJob& job : jobs) told.inputs.push_back(job.input);
+  for (const FileJob& job : jobs) add_files(job.input, told.inputs);
   std::vector<std::string> outputs;
   outputs.reserve(jobs.size());
   for (const FileJob& job : jobs) outputs.push_back(job.output);

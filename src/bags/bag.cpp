@@ -3,7 +3,9 @@
 #include "risley/bags/bag.hpp"
 
 #include <array>
+#include <filesystem>
 #include <fstream>
+#include <system_error>
 
 #include <fmt/format.h>
 
@@ -18,15 +20,40 @@ using namespace std::string_view_literals;
 
 constexpr std::string_view kSqliteSignature = "SQLite format 3\0"sv;
 
+bool is_folder(const std::string& path) {
+  std::error_code ignored;
+  return std::filesystem::is_directory(path, ignored);
+}
+
 }  // namespace
 
 std::optional<BagKind> bag_kind(std::string_view head) {
   if (head.starts_with(kRos1Signature)) return BagKind::ros1;
   if (head.starts_with(kSqliteSignature)) return BagKind::ros2;
+  if (head.starts_with(kMcapSignature)) return BagKind::mcap;
   return std::nullopt;
 }
 
+std::string_view name_of(BagKind kind) {
+  switch (kind) {
+    case BagKind::ros1:
+      return "ros1-bag";
+    case BagKind::ros2:
+      return "ros2-bag";
+    case BagKind::mcap:
+      break;
+  }
+  return "mcap";
+}
+
 std::optional<BagKind> bag_kind_of_file(const std::string& path) {
+  if (is_folder(path)) {
+    try {
+      return bag_kind_of_file(files_of_bag_folder(path).front());
+    } catch (const FileError&) {
+      return std::nullopt;
+    }
+  }
   std::array<char, 32> head{};
   std::ifstream stream(path, std::ios::binary);
   stream.read(head.data(), static_cast<std::streamsize>(head.size()));
@@ -45,27 +72,61 @@ void Bag::fail(const std::string& problem) const { throw FileError(path_, {}, pr
 
 void Bag::fail(const Message& message, const std::string& problem) const {
   const Topic& topic = topics_[message.topic];
-  fail(fmt::format("message {}{} of topic {} ({}): {}", kind_ == BagKind::ros2 ? "row " : "",
-                   message.number, topic.name, topic.type, problem));
+  throw FileError(
+      path_, {message.byte_offset, {}},
+      fmt::format("message {}{} of topic {} ({}): {}", kind_ == BagKind::ros2 ? "row " : "",
+                  message.number, topic.name, topic.type, problem));
 }
 
 void Bag::require_topics(const std::vector<bool>& wanted) const {
   require_length("wanted", wanted.size(), topics_.size());
 }
 
+std::optional<MessageKind> ros2_kind(std::string_view type) {
+  if (type == "livox_interfaces/msg/CustomMsg" || type == "livox_ros_driver2/msg/CustomMsg") {
+    return MessageKind::points;
+  }
+  for (const KnownType& known : kKnownTypes) {
+    if (type == known.ros2_name) return known.kind;
+  }
+  return std::nullopt;
+}
+
+Topic ros1_topic(const std::string& name, const std::string& type, const std::string& md5) {
+  Topic topic{name, type, std::nullopt};
+  bool named_alike = type.ends_with("/CustomMsg");
+  if (md5.empty() && named_alike) topic.kind = MessageKind::points;
+  for (const KnownType& known : kKnownTypes) {
+    if (md5.empty() ? type == known.ros1_name : md5 == known.md5) topic.kind = known.kind;
+    named_alike = named_alike || type == known.ros1_name;
+  }
+  if (named_alike && !topic.kind) topic.type += fmt::format(" with the unknown md5 {}", md5);
+  return topic;
+}
+
 std::unique_ptr<Bag> open_bag(const std::string& path, BagKind kind, const Progress& progress) {
-  return kind == BagKind::ros1 ? open_ros1_bag(path, progress) : open_ros2_bag(path, progress);
+  if (is_folder(path)) return open_bag_folder(path, files_of_bag_folder(path), kind, progress);
+  switch (kind) {
+    case BagKind::ros1:
+      return open_ros1_bag(path, progress);
+    case BagKind::ros2:
+      return open_ros2_bag(path, progress);
+    case BagKind::mcap:
+      break;
+  }
+  return open_mcap_bag(path, progress);
 }
 
 std::unique_ptr<Bag> open_bag(const std::string& path, const Progress& progress) {
-  const std::optional<BagKind> kind = bag_kind_of_file(path);
-  if (!kind) throw FileError(path, {0, {}}, "is no bag of ROS 1 or ROS 2");
+  const std::string first = is_folder(path) ? files_of_bag_folder(path).front() : path;
+  const std::optional<BagKind> kind = bag_kind_of_file(first);
+  if (!kind) throw FileError(first, {0, {}}, "is no bag of ROS 1 or ROS 2");
   return open_bag(path, *kind, progress);
 }
 
-std::vector<Topic> list_topics(const std::string& path) {
-  if (bag_kind_of_file(path) == BagKind::ros1) return list_ros1_topics(path);
-  return open_bag(path)->topics();
+std::vector<Topic> list_topics(const std::string& path, const Progress& progress) {
+  if (!is_folder(path) && bag_kind_of_file(path) == BagKind::ros1) return list_ros1_topics(path);
+  return open_bag(path, progress)->topics();
 }
 
 }  // namespace risley::bags

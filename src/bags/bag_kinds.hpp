@@ -14,6 +14,7 @@
 namespace risley::bags {
 
 inline constexpr std::string_view kRos1Signature = "#ROSBAG V2.0";
+inline constexpr std::string_view kMcapSignature = "\x89MCAP";  ///< the version follows
 
 /// A type whose messages are known.
 struct KnownType {
@@ -37,10 +38,21 @@ inline constexpr std::array kKnownTypes{
               "b5764a33bfeb3588febc2682852579b0", "geometry_msgs/msg/TransformStamped"},
 };
 
+/// The kind of messages of a type of ROS 2.
+std::optional<MessageKind> ros2_kind(std::string_view type);
+/// A topic of ROS 1, whose md5 sum matters where the name alone would fit.
+/// @param md5  empty where it is not known: then the name decides
+Topic ros1_topic(const std::string& name, const std::string& type, const std::string& md5);
+
 std::unique_ptr<Bag> open_ros1_bag(const std::string& path,
                                    const Progress& progress);  // ros1_bag.cpp
 std::vector<Topic> list_ros1_topics(const std::string& path);  // ros1_bag.cpp
 std::unique_ptr<Bag> open_ros2_bag(const std::string& path,
                                    const Progress& progress);  // ros2_bag.cpp
+std::unique_ptr<Bag> open_mcap_bag(const std::string& path,
+                                   const Progress& progress);  // mcap_bag.cpp
+/// A folder of bags of one kind. @param files  as files_of_bag_folder() gives them
+std::unique_ptr<Bag> open_bag_folder(const std::string& folder, std::vector<std::string> files,
+                                     BagKind kind, const Progress& progress);  // bag_folder.cpp
 
 }  // namespace risley::bags

@@ -4,12 +4,10 @@
 // positions in a file, so the structure is checked before the file is given to it. For that, chunks
 // that are compressed are unpacked once more than for reading.
 #include <algorithm>
-#include <cstdlib>
 #include <cstring>
 #include <fstream>
 #include <memory>
 #include <mutex>
-#include <new>
 #include <tuple>
 #include <utility>
 
@@ -25,6 +23,7 @@
 #include "risley/io/rosbag_lock.hpp"
 
 #include "bags/bag_kinds.hpp"
+#include "bags/untouched_bytes.hpp"
 
 namespace risley::bags {
 namespace {
@@ -32,18 +31,6 @@ namespace {
 using io::load;
 
 constexpr std::string_view kMend = "; the command `rosbag reindex` mends it";
-
-/// md5 sums matter where the name alone would fit.
-Topic ros1_topic(const std::string& name, const std::string& type, const std::string& md5) {
-  Topic topic{name, type, std::nullopt};
-  bool named_alike = type.ends_with("/CustomMsg");
-  for (const KnownType& known : kKnownTypes) {
-    if (md5 == known.md5) topic.kind = known.kind;
-    named_alike = named_alike || type == known.ros1_name;
-  }
-  if (named_alike && !topic.kind) topic.type += fmt::format(" with the unknown md5 {}", md5);
-  return topic;
-}
 
 /// Holds rosbag_storage for one thread. While it lives, the library prints nothing: it logs what it
 /// throws.
@@ -66,27 +53,6 @@ struct DeleteInRosbag {
     const RosbagCall call;
     delete object;
   }
-};
-
-/// Zeroed memory that costs nothing until it is written to, however much a file asks for.
-class UntouchedBytes {
- public:
-  UntouchedBytes() = default;
-  explicit UntouchedBytes(std::size_t count)
-      : bytes_(static_cast<std::uint8_t*>(std::calloc(count, 1))), size_(count) {
-    if (bytes_ == nullptr && count > 0) throw std::bad_alloc();
-  }
-
-  bool empty() const { return size_ == 0; }
-  std::uint8_t* data() { return bytes_.get(); }
-  const std::uint8_t* data() const { return bytes_.get(); }
-
- private:
-  struct Free {
-    void operator()(std::uint8_t* bytes) const { std::free(bytes); }
-  };
-  std::unique_ptr<std::uint8_t, Free> bytes_;
-  std::size_t size_ = 0;
 };
 
 /// What tells one topic from another.

@@ -24,16 +24,6 @@
 namespace risley::bags {
 namespace {
 
-std::optional<MessageKind> ros2_kind(std::string_view type) {
-  if (type == "livox_interfaces/msg/CustomMsg" || type == "livox_ros_driver2/msg/CustomMsg") {
-    return MessageKind::points;
-  }
-  for (const KnownType& known : kKnownTypes) {
-    if (type == known.ros2_name) return known.kind;
-  }
-  return std::nullopt;
-}
-
 struct CloseDatabase {
   void operator()(sqlite3* database) const { sqlite3_close(database); }
 };
@@ -266,6 +256,7 @@ class Ros2Bag final : public Bag {
       topic.name = text_column(query.get(), 1);
       topic.type = text_column(query.get(), 2);
       topic.kind = ros2_kind(topic.type);
+      topic.serialisation = Serialisation::cdr;
       const std::string serialization = text_column(query.get(), 3);
       if (topic.kind && serialization != "cdr") {
         topic.kind.reset();

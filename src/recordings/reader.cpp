@@ -12,6 +12,8 @@
 
 #include <fmt/format.h>
 
+#include "risley/bags/bag.hpp"
+
 #include "recordings/formats/format.hpp"
 #include "recordings/reader_decorators.hpp"
 
@@ -46,9 +48,6 @@ std::string read_head(const std::string& path) {
   std::error_code code;
   const fs::file_status status = fs::status(path, code);
   if (status.type() == fs::file_type::not_found) throw FileError(path, {}, "no such file");
-  if (status.type() == fs::file_type::directory) {
-    throw FileError(path, {}, "is a folder, expected a recording");
-  }
   if (status.type() != fs::file_type::regular) {
     throw FileError(path, {}, "is not a regular file, expected a recording");
   }
@@ -65,8 +64,19 @@ std::string read_head(const std::string& path) {
   return head;
 }
 
+/// The file that tells the kind of a recording: itself, or the first of a folder of bags.
+std::string told_by(const std::string& path) {
+  std::error_code code;
+  if (!std::filesystem::is_directory(path, code)) return path;
+  return bags::files_of_bag_folder(path).front();
+}
+
 std::unique_ptr<Reader> open_as_it_is(const std::string& path, const Progress& progress) {
-  const std::string head = read_head(path);
+  const std::string first = told_by(path), head = read_head(first);
+  if (first != path && !bags::bag_kind(head)) {
+    throw FileError(first, {0, {}},
+                    fmt::format("is no bag of ROS 2; it begins with {}", shown(head)));
+  }
   for (const Format* format : all_formats()) {
     if (format->recognises(head)) return format->open(path, progress);
   }
@@ -84,6 +94,18 @@ std::unique_ptr<Reader> open_recording(const std::string& path, const ReadOption
   if (options.packet_places) reader = with_packet_places(std::move(reader), options);
   if (options.extrinsics) reader = in_sensor_frame(std::move(reader), *options.extrinsics);
   return within_time_span(std::move(reader), path);
+}
+
+std::vector<std::string> recording_files(const std::string& path) {
+  std::error_code code;
+  if (!std::filesystem::is_directory(path, code)) return {path};
+  try {
+    std::vector<std::string> files = bags::files_of_bag_folder(path);
+    files.insert(files.begin(), (std::filesystem::path(path) / "metadata.yaml").string());
+    return files;
+  } catch (const FileError&) {  // who reads it is told of it
+    return {path};
+  }
 }
 
 void require_times(const RecordingHeader& header) {

@@ -11,6 +11,7 @@
 
 #include <fmt/format.h>
 
+#include "risley/bags/bag.hpp"
 #include "risley/core/error.hpp"
 #include "risley/core/text.hpp"
 
@@ -44,6 +45,11 @@ FileHead read_file_head(const std::string& path) {
   std::error_code code;
   const fs::file_status status = fs::status(path, code);
   if (status.type() == fs::file_type::not_found) throw FileError(path, {}, "no such file");
+  if (status.type() == fs::file_type::directory) {
+    FileHead head = read_file_head(bags::files_of_bag_folder(path).front());
+    if (kRosBagFormat.recognises(head)) return head;
+    throw FileError(path, {}, "is a folder whose first file is no bag of ROS 2");
+  }
   if (status.type() != fs::file_type::regular) {
     throw FileError(path, {}, "is not a regular file, expected a trajectory");
   }
@@ -69,12 +75,13 @@ const Format* format_of(const FileHead& head) {
 
 }  // namespace
 
-TrajectoryFileKind trajectory_file_kind(const std::string& path) {
+TrajectoryFileKind trajectory_file_kind(const std::string& path, const Progress& progress) {
   try {
     const FileHead head = read_file_head(path);
     if (head.bytes.empty()) return TrajectoryFileKind::none;
     const Format* const format = format_of(head);
-    if (format == &kRosBagFormat && !holds_poses_alone(path)) return TrajectoryFileKind::none;
+    if (format == &kRosBagFormat && !holds_poses_alone(path, progress))
+      return TrajectoryFileKind::none;
     if (format != nullptr) return TrajectoryFileKind::trajectory;
     return is_smrmsg(head) ? TrajectoryFileKind::accuracies : TrajectoryFileKind::none;
   } catch (const FileError&) {

@@ -209,7 +209,7 @@ void use_pcl_names(TestTable& table) {
 
 std::size_t record_bytes(const TestTable& table) {
   std::size_t bytes = 0;
-  for (const TestColumn& one : table) bytes += one.type == 'u' ? 1 : one.type == 'f' ? 4 : 8;
+  for (const TestColumn& one : table) bytes += one.type == 'u' ? 1 : one.type == 'd' ? 8 : 4;
   return bytes;
 }
 
@@ -224,6 +224,7 @@ void read_records(const std::string& bytes, TestTable& table) {
     for (TestColumn& one : table) {
       one.values.push_back(one.type == 'u'   ? next(std::uint8_t{})
                            : one.type == 'f' ? next(float{})
+                           : one.type == 'i' ? next(std::uint32_t{})
                                              : next(double{}));
     }
   }

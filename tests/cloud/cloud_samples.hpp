@@ -44,7 +44,7 @@ void write_uneven(const std::string& path, const std::string& format, const Clou
 /// A field of a file: values as they were before they were given the type.
 struct TestColumn {
   std::string name;
-  char type = 'f';  ///< 'u' 8-bit, 'f' 32-bit, 'd' 64-bit
+  char type = 'f';  ///< 'u' 8-bit, 'i' unsigned 32-bit, 'f' 32-bit, 'd' 64-bit
   std::vector<double> values;
 };
 using TestTable = std::vector<TestColumn>;

@@ -61,7 +61,11 @@ class Deserializer {
 constexpr std::uint64_t kSecond = 1'000'000'000;
 
 char type_of(std::uint32_t datatype) {
-  return datatype == 2 ? 'u' : datatype == 7 ? 'f' : datatype == 8 ? 'd' : '?';
+  return datatype == 2   ? 'u'
+         : datatype == 6 ? 'i'
+         : datatype == 7 ? 'f'
+         : datatype == 8 ? 'd'
+                         : '?';
 }
 
 Message parse(const std::string& bytes) {
@@ -129,6 +133,13 @@ class RosbagCloud : public ::testing::TestWithParam<CloudCase> {
   TestTable expected_ = [this] {
     TestTable table = expected_table(GetParam().header, points_);
     use_pcl_names(table);
+    TestColumn offsets{"offset_time", 'i', {}};
+    std::int64_t begin = 0;
+    for (const std::int64_t time : points_.time_ns) {
+      if (offsets.values.empty() || time - begin >= 100'000'000) begin = time;
+      offsets.values.push_back(static_cast<double>(time - begin));
+    }
+    table.push_back(offsets);
     return table;
   }();
 };
@@ -154,7 +165,7 @@ TEST_P(RosbagCloud, HoldsEveryField) {
     std::uint32_t offset = 0;
     for (std::size_t k = 0; k < message.fields.size(); ++k) {
       EXPECT_EQ(message.offsets[k], offset);
-      offset += message.fields[k].type == 'u' ? 1 : message.fields[k].type == 'f' ? 4 : 8;
+      offset += message.fields[k].type == 'u' ? 1 : message.fields[k].type == 'd' ? 8 : 4;
     }
     const auto start = static_cast<std::uint64_t>(points_.time_ns.at(first));
     EXPECT_EQ(message.stamp, start);

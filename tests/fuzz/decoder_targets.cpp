@@ -64,6 +64,15 @@ void run_message(std::span<const std::uint8_t> bytes) {
     require(std::isfinite(point.x) && std::isfinite(point.y) && std::isfinite(point.z),
             "coordinates are numbers");
   }
+  if (kind != bags::MessageKind::cloud) return;
+  recordings::CloudTimeSearch search;
+  search.add(message.layout, message.data, message.time_ns);
+  const auto time = search.found();
+  if (!time) return;
+  std::size_t times = 0;
+  recordings::for_each_time(*time, message.layout, message.data, message.time_ns,
+                            [&times](std::int64_t) { ++times; });
+  require(times == message.points.size(), "a time for each point");
 }
 
 /// A message with a pose: the first byte says which, and how it is serialised.
@@ -72,7 +81,7 @@ void run_pose_message(std::span<const std::uint8_t> bytes) {
   constexpr std::array kKinds{MessageKind::odometry, MessageKind::pose,
                               MessageKind::pose_with_covariance, MessageKind::transform};
   if (bytes.empty()) return;
-  const auto bag = bytes[0] % 2 == 0 ? bags::BagKind::ros1 : bags::BagKind::ros2;
+  const auto bag = bytes[0] % 2 == 0 ? bags::Serialisation::ros1 : bags::Serialisation::cdr;
   const MessageKind kind = kKinds[bytes[0] / 2 % kKinds.size()];
   try {
     const auto pose = trajectories::decode_ros_pose(bag, kind, bytes.subspan(1));

@@ -22,7 +22,7 @@ inline void require(bool holds, const char* what) {
 }
 
 /// Rows that a file of one byte may have: one in plain formats, more where repetition is packed.
-inline constexpr std::uint64_t kPlainRows = 1, kPackedRows = 1100;
+inline constexpr std::uint64_t kPlainRows = 1, kPackedRows = 1100, kZstdRows = 32'768;
 
 inline void require_sound(const recordings::RecordingHeader& header) {
   require(!header.devices.empty() && header.devices.size() <= 256, "1 to 256 devices");

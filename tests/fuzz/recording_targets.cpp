@@ -194,6 +194,7 @@ std::vector<Target> recording_targets() {
       {"npz", run<kNpzFormat, kPackedRows>},
       {"ros1-bag", run<kRos1BagFormat, kPackedRows>},
       {"ros2-bag", run<kRos2BagFormat, kPlainRows>},
+      {"mcap", run<kMcapFormat, kZstdRows>},
   };
 }
 

@@ -3,6 +3,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <filesystem>
 #include <fstream>
 #include <functional>
 #include <iterator>
@@ -21,6 +22,7 @@
 #include "risley/trajectories/trajectory_file.hpp"
 
 #include "bags/written_bags.hpp"
+#include "bags/written_mcap.hpp"
 #include "io/temporary_folder.hpp"
 #include "trajectories/known_flight.hpp"
 
@@ -133,6 +135,11 @@ std::string write(BagKind kind, const std::vector<TopicOfSamples>& topics) {
     const std::size_t id = bag.topic(topic.name, names_of(topic.type).ros2);
     for (const Sample& s : topic.samples) bag.add(id, ros2_bytes(topic.type, s));
   }
+  if (kind == BagKind::mcap) {
+    const std::string path = folder().file("poses.mcap");
+    McapFile(bag).write(path);
+    return path;
+  }
   const std::string path = folder().file("poses.db3");
   std::remove(path.c_str());
   bag.write(path).reset();
@@ -184,7 +191,7 @@ std::vector<Sample> samples(int count) {
   return all;
 }
 
-constexpr std::array kKinds{BagKind::ros1, BagKind::ros2};
+constexpr std::array kKinds{BagKind::ros1, BagKind::ros2, BagKind::mcap};
 
 TEST(RosBags, OdometryIsPosesAndVelocities) {
   for (const BagKind kind : kKinds) {
@@ -194,7 +201,7 @@ TEST(RosBags, OdometryIsPosesAndVelocities) {
     const Trajectory t = load_trajectory(path);
     require_trajectory(t);
     ASSERT_EQ(t.size(), flown.size());
-    EXPECT_EQ(t.format, kind == BagKind::ros1 ? "ros1-bag" : "ros2-bag");
+    EXPECT_EQ(t.format, bags::name_of(kind));
     EXPECT_THAT(t.source, AllOf(HasSubstr("topic /odom"), HasSubstr("Odometry"),
                                 HasSubstr("frame \"odom\""), HasSubstr("body \"base_link\"")));
     EXPECT_EQ(t.frame, Frame::local);
@@ -537,8 +544,44 @@ std::string bytes_of_file(const std::string& path) {
   return {std::istreambuf_iterator<char>(stream), {}};
 }
 
-TEST(RosBags, BagsCutAnywhereAreRefused) {
-  for (const BagKind kind : kKinds) {
+TEST(RosBags, McapCutAnywhereGivesThePosesBeforeTheCut) {
+  const std::string whole = bytes_of_file(write(BagKind::mcap, {{"/a", Type::pose, samples(9)}}));
+  const std::string path = folder().file("cut.mcap");
+  std::size_t most = 0;
+  for (std::size_t length = 0; length < whole.size(); length += 3) {
+    write_bytes(path, whole.substr(0, length));
+    try {
+      const Trajectory part = load_trajectory(path);
+      EXPECT_GE(part.size(), most) << length;
+      most = part.size();
+      ASSERT_FALSE(part.warnings.empty());
+      EXPECT_THAT(part.warnings.front().message, HasSubstr("not closed or is cut off"));
+    } catch (const FileError&) {
+      EXPECT_EQ(most, 0U) << length;
+    }
+  }
+  EXPECT_EQ(most, 9U);
+}
+
+TEST(RosBags, AFolderOfRos2IsOneTrajectory) {
+  const std::string bag = folder().file("folder");
+  std::filesystem::create_directories(bag);
+  std::vector<Sample> flown = samples(20);
+  for (const auto& [name, first] : {std::pair{"0.mcap", 0}, {"1.mcap", 10}}) {
+    std::filesystem::copy_file(
+        write(BagKind::mcap,
+              {{"/a", Type::pose, {flown.begin() + first, flown.begin() + first + 10}}}),
+        bag + "/" + name, std::filesystem::copy_options::overwrite_existing);
+  }
+  EXPECT_THAT(fault(bag), HasSubstr("without metadata.yaml"));
+  write_bytes(bag + "/metadata.yaml",
+              "rosbag2_bagfile_information: {version: 6, relative_file_paths: [0.mcap, 1.mcap]}");
+  EXPECT_EQ(load_trajectory(bag).size(), 20U);
+  EXPECT_EQ(trajectory_file_kind(bag), TrajectoryFileKind::trajectory);
+}
+
+TEST(RosBags, OtherBagsCutAnywhereAreRefused) {
+  for (const BagKind kind : {BagKind::ros1, BagKind::ros2}) {
     const std::string whole = bytes_of_file(write(kind, {{"/a", Type::pose, samples(3)}}));
     const std::string path = folder().file("cut");
     for (std::size_t length = 0; length < whole.size(); ++length) {

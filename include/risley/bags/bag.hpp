@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-// Bags of ROS 1 (version 2.0) and of ROS 2 (SQLite): topics and the bytes of their messages. What
-// the messages mean is for the layers above.
+// Bags of ROS 1 (version 2.0) and of ROS 2 (SQLite, MCAP), and folders of these: topics and the
+// bytes of their messages. What the messages mean is for the layers above.
 #pragma once
 
 #include <cstddef>
@@ -19,16 +19,33 @@
 
 namespace risley::bags {
 
-/// The kinds of bags, and so how their messages are serialised.
+/// The kinds of bags.
 enum class BagKind : std::uint8_t {
+  ros1,  ///< version 2.0
+  ros2,  ///< SQLite
+  mcap,  ///< version 0, with messages of ROS 2 or ROS 1
+};
+
+/// "ros1-bag", "ros2-bag" or "mcap".
+std::string_view name_of(BagKind kind);
+
+/// How messages are serialised.
+enum class Serialisation : std::uint8_t {
   ros1,
-  ros2,  ///< plain CDR
+  cdr,  ///< plain CDR, as in ROS 2
 };
 
 /// Which kind of bag a file is that begins with these bytes; nothing where it is none.
 std::optional<BagKind> bag_kind(std::string_view head);
-/// The same of the file's own bytes; nothing also where it cannot be read.
+/// The same of the file's own bytes, or of those of a folder's first file; nothing also where it
+/// cannot be read.
 std::optional<BagKind> bag_kind_of_file(const std::string& path);
+
+/// The files that a folder of ROS 2 names as one bag in its metadata.yaml, in their order. They lie
+/// in the folder itself.
+/// @throws FileError without such a file, with the names of files that are missing, for a name that
+///         leads out of the folder or stands twice, and for files that rosbag2 compressed
+std::vector<std::string> files_of_bag_folder(const std::string& folder);
 
 /// The messages that are known here, told by type in ROS 2 and by type's md5 in ROS 1.
 enum class MessageKind : std::uint8_t {
@@ -46,6 +63,7 @@ struct Topic {
   std::string name;
   std::string type;  ///< with what a reader must know where the name alone would mislead
   std::optional<MessageKind> kind;  ///< empty for all that is not known
+  Serialisation serialisation = Serialisation::ros1;
 };
 
 /// "/a (nav_msgs/Odometry), /b (std_msgs/String)", or "no topic"
@@ -60,8 +78,15 @@ class BadMessage : public Error {
 /// One serialised message.
 struct Message {
   std::size_t topic = 0;                ///< index of the topic
-  std::int64_t number = 0;              ///< ROS 1: of its topic, from 1; ROS 2: row of the table
+  std::int64_t number = 0;              ///< of its topic, from 1; in SQLite: row of the table
   std::span<const std::uint8_t> bytes;  ///< valid until the next one is asked for
+  std::optional<std::uint64_t> byte_offset = {};  ///< in the file, of it or of its packed chunk
+};
+
+/// What a user should know that does not make a bag useless.
+struct BagWarning {
+  FilePlace place;
+  std::string message;
 };
 
 /// A bag that is read from its beginning to its end.
@@ -83,11 +108,13 @@ class Bag {
   virtual bool next(Message& message) = 0;
   /// Part of the messages already read, [0, 1].
   virtual double fraction_read() const = 0;
+  /// Since rewind(): a bag that was cut off while it was recorded, where its kind can be read.
+  const std::vector<BagWarning>& warnings() const { return warnings_; }
 
   /// Refuses the bag. @throws FileError, always
   [[noreturn]] void fail(const std::string& problem) const;
-  /// Refuses a message. @throws FileError, always
-  [[noreturn]] void fail(const Message& message, const std::string& problem) const;
+  /// Refuses the message that next() gave last. @throws FileError, always
+  [[noreturn]] virtual void fail(const Message& message, const std::string& problem) const;
 
  protected:
   Bag(BagKind kind, std::string path, const Progress& progress)
@@ -97,12 +124,15 @@ class Bag {
   std::string path_;
   Progress progress_;  ///< asked whether to go on
   std::vector<Topic> topics_;
+  std::vector<BagWarning> warnings_;
 
  private:
   BagKind kind_;
 };
 
-/// Opens a bag of a kind. The structure of a ROS 1 bag is checked to its end before.
+/// Opens a bag of a kind. The structure of a ROS 1 bag is checked to its end before; an MCAP file
+/// without a sound summary is looked through for its topics.
+/// @param path  of a file, or of a folder as files_of_bag_folder() takes it
 /// @param progress  cancels opening and reading; its flag must outlive the bag
 /// @throws FileError when it is no bag, is cut off or damaged
 std::unique_ptr<Bag> open_bag(const std::string& path, BagKind kind, const Progress& progress = {});
@@ -110,7 +140,7 @@ std::unique_ptr<Bag> open_bag(const std::string& path, BagKind kind, const Progr
 std::unique_ptr<Bag> open_bag(const std::string& path, const Progress& progress = {});
 
 /// The topics of a bag, from its index alone.
-/// @throws FileError as open_bag, for damage in what has to be read
-std::vector<Topic> list_topics(const std::string& path);
+/// @throws FileError as open_bag, for damage in what has to be read; Cancelled
+std::vector<Topic> list_topics(const std::string& path, const Progress& progress = {});
 
 }  // namespace risley::bags

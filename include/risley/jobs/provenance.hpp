@@ -13,7 +13,8 @@ namespace risley::jobs {
 /// Name and value pairs such as command, version, seed, input_sha256: how to make a result again.
 using Provenance = std::vector<std::pair<std::string, std::string>>;
 
-/// Appends name and SHA-256 of every input: "input", "input_sha256", "input_2", ...
+/// Appends name and SHA-256 of every input: "input", "input_sha256", "input_2", ...; of a folder of
+/// ROS 2 those of each of its files.
 /// @throws FileError, Cancelled
 Provenance with_inputs(Provenance provenance, const std::vector<std::string>& inputs,
                        const Progress& progress = {});

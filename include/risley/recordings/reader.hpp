@@ -104,7 +104,8 @@ struct ReadOptions {
   std::optional<Extrinsics> extrinsics = {};
 };
 
-/// Opens a recording of any known format, recognised by its content and not by its name.
+/// Opens a recording of any known format, recognised by its content and not by its name: a file, or
+/// a folder of ROS 2 whose metadata.yaml names the bags that are read one after the other.
 /// @param progress  cancels opening, and reading where a chunk may take long; its flag must outlive
 ///                  the reader
 /// @throws FileError when it is missing, empty, of no known format, or its header is damaged;
@@ -114,6 +115,10 @@ struct ReadOptions {
 ///         finite, or when they are given for a recording of several sensors
 std::unique_ptr<Reader> open_recording(const std::string& path, const ReadOptions& options = {},
                                        const Progress& progress = {});
+
+/// The files that a recording consists of: its own, or metadata.yaml and the bags that it names
+/// where it is a folder of ROS 2. Of what is no recording the path itself.
+std::vector<std::string> recording_files(const std::string& path);
 
 /// A recording without times was given to something that needs them.
 class MissingTimes : public InvalidArgument {

@@ -16,11 +16,12 @@ namespace risley::trajectories {
 /// Whether a file is a trajectory or a file of accuracies: told by its content, and by its ending
 /// where the content cannot tell (.sbet, .smrmsg). What cannot be read is none, and neither is a
 /// bag that holds points of a lidar: it is a recording, though load_trajectory() reads its poses.
+/// @throws Cancelled: a bag that was cut off may have to be looked through for its topics
 enum class TrajectoryFileKind { none, trajectory, accuracies };
-TrajectoryFileKind trajectory_file_kind(const std::string& path);
+TrajectoryFileKind trajectory_file_kind(const std::string& path, const Progress& progress = {});
 
 /// Reads a trajectory of any known format: SBET, Inertial Explorer and POSPac text, CSV with named
-/// columns, TUM, poses in bags of ROS. docs/files.md says what each holds.
+/// columns, TUM, poses in bags of ROS and folders of them. docs/files.md says what each holds.
 /// @param topic  of a bag that holds several topics of poses; otherwise it may be empty
 /// @throws FileError when it is missing, empty, of no known format or damaged, and where times run
 ///         back or a record holds what no platform does; InvalidArgument for a topic that is

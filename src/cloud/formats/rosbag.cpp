@@ -3,7 +3,9 @@
 // ROS 1 bag: one message sensor_msgs/PointCloud2 per 100 ms of the recording. A message is stamped
 // with the time of its first point on the recording's clock. Bags hold no time before 1 ns: when
 // the first point of a cloud is earlier, all stamps are moved by what brings that point to 1 ns,
-// and a later message that would still be earlier is stamped 1 ns. The field "time" is never moved.
+// and a later message that would still be earlier is stamped 1 ns. The field "time", s, is never
+// moved; "offset_time", ns after the first point of the message, is what doubles of today's times
+// are too coarse for.
 #include <algorithm>
 #include <cstring>
 #include <limits>
@@ -13,6 +15,7 @@
 #include <rosbag/bag.h>
 
 #include "risley/core/error.hpp"
+#include "risley/io/little_endian.hpp"
 #include "risley/io/output_file.hpp"
 #include "risley/io/rosbag_lock.hpp"
 
@@ -24,6 +27,8 @@ namespace {
 
 constexpr const char* kTopic = "/risley/points";
 constexpr std::string_view kFrame = "livox_frame";
+constexpr std::string_view kOffsetField = "offset_time";     ///< as in Livox's own messages
+constexpr std::uint8_t kUint32 = 6;                          ///< datatype of a PointField
 constexpr std::int64_t kMessageDuration = 100'000'000;       ///< ns
 constexpr std::size_t kMessageBytes = std::size_t{1} << 24;  ///< of points in one message, at most
 constexpr std::int64_t kNanoseconds = 1'000'000'000;         ///< in a second
@@ -160,7 +165,7 @@ class RosbagWriter final : public CloudWriter {
   void write(const Points& points) override {
     require_usable();
     failed_ = true;  // unless all goes well
-    const std::size_t step = packer_.record_bytes();
+    const std::size_t step = point_bytes();
     records_.resize(points.size() * step);
     packer_.pack(points, records_.data(), step);
     const std::size_t most = std::max<std::size_t>(kMessageBytes / step, 1) * step;
@@ -174,12 +179,15 @@ class RosbagWriter final : public CloudWriter {
     for (std::size_t i = 0; i < points.size(); ++i) {
       const std::int64_t time = points.time_ns[i];
       const bool full = message_.points.size() + (i - first) * step >= most;
-      if (begin_ && !full && time >= *begin_ && since(*begin_, time) < kMessageDuration) continue;
-      take(i);
-      put_message();
-      begin_ = time;
-      if (!shift_) shift_ = time < kEarliest ? since(time, kEarliest) : 0;
-      require_in_range(time, points_ + i);
+      if (!begin_ || full || time < *begin_ || since(*begin_, time) >= kMessageDuration) {
+        take(i);
+        put_message();
+        begin_ = time;
+        if (!shift_) shift_ = time < kEarliest ? since(time, kEarliest) : 0;
+        require_in_range(time, points_ + i);
+      }
+      io::store<std::uint32_t>(records_.data() + i * step + packer_.record_bytes(),
+                               static_cast<std::uint32_t>(since(*begin_, time)));
     }
     take(points.size());
     points_ += points.size();
@@ -194,6 +202,9 @@ class RosbagWriter final : public CloudWriter {
   }
 
  private:
+  /// The packed fields and the offset of the time.
+  std::size_t point_bytes() const { return packer_.record_bytes() + sizeof(std::uint32_t); }
+
   /// From one time to a later one, ns.
   static std::uint64_t since(std::int64_t earlier, std::int64_t later) {
     return static_cast<std::uint64_t>(later) - static_cast<std::uint64_t>(earlier);
@@ -223,7 +234,7 @@ class RosbagWriter final : public CloudWriter {
   void put_message() {
     if (!begin_) return;
     const auto bytes = static_cast<std::uint32_t>(message_.points.size());
-    const auto step = static_cast<std::uint32_t>(packer_.record_bytes());
+    const auto step = static_cast<std::uint32_t>(point_bytes());
     const std::uint64_t stamp = stamp_of(*begin_);
     const auto seconds = static_cast<std::uint32_t>(stamp / kNanoseconds);
     const auto nanoseconds = static_cast<std::uint32_t>(stamp % kNanoseconds);
@@ -234,13 +245,17 @@ class RosbagWriter final : public CloudWriter {
     message_.add(kFrame);
     message_.add(std::uint32_t{1});  // height
     message_.add(bytes / step);
-    message_.add(static_cast<std::uint32_t>(packer_.fields().size()));
+    message_.add(static_cast<std::uint32_t>(packer_.fields().size() + 1));
     for (std::size_t k = 0; k < packer_.fields().size(); ++k) {
       message_.add(packer_.fields()[k].name);
       message_.add(static_cast<std::uint32_t>(packer_.offset(k)));
       message_.add(datatype_of(packer_.fields()[k].type));
       message_.add(std::uint32_t{1});
     }
+    message_.add(kOffsetField);
+    message_.add(static_cast<std::uint32_t>(packer_.record_bytes()));
+    message_.add(kUint32);
+    message_.add(std::uint32_t{1});
     message_.add(std::uint8_t{0});  // is_bigendian
     message_.add(step);
     message_.add(bytes);

@@ -5,12 +5,12 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include <fmt/format.h>
 
 #include "risley/core/error.hpp"
 #include "risley/core/median.hpp"
-#include "risley/io/little_endian.hpp"
 
 #include "recordings/formats/cartesian.hpp"
 #include "recordings/formats/format.hpp"
@@ -19,8 +19,6 @@
 
 namespace risley::recordings {
 namespace {
-
-using io::load;
 
 constexpr std::int64_t kSecond = 1'000'000'000;
 constexpr std::int64_t kYear2000 = 946'684'800 * kSecond;
@@ -51,80 +49,6 @@ std::string_view name_space_of(std::string_view topic) {
   return topic.substr(0, topic.rfind('/') == topic.npos ? 0 : topic.rfind('/'));
 }
 
-template <class T>
-double value_at(const std::uint8_t* bytes) {
-  return static_cast<double>(load<T>(bytes));
-}
-
-/// How a datatype of a PointField is read.
-struct Datatype {
-  std::size_t bytes = 0;  ///< 0 for an unknown one
-  double (*value)(const std::uint8_t* bytes) = nullptr;
-};
-
-Datatype datatype(std::uint8_t code) {
-  switch (code) {
-    case 1:
-      return {1, value_at<std::int8_t>};
-    case 2:
-      return {1, value_at<std::uint8_t>};
-    case 3:
-      return {2, value_at<std::int16_t>};
-    case 4:
-      return {2, value_at<std::uint16_t>};
-    case 5:
-      return {4, value_at<std::int32_t>};
-    case 6:
-      return {4, value_at<std::uint32_t>};
-    case 7:
-      return {4, value_at<float>};
-    case 8:
-      return {8, value_at<double>};
-    default:
-      return {};
-  }
-}
-
-/// A field of a cloud that is read.
-struct FieldReader {
-  std::size_t offset = 0;
-  double (*value)(const std::uint8_t* bytes) = nullptr;
-
-  explicit operator bool() const { return value != nullptr; }
-  double operator()(const std::uint8_t* point) const { return value(point + offset); }
-  /// The nearest whole number of a byte; 0 where the field is missing or holds no number.
-  std::uint8_t byte(const std::uint8_t* point) const {
-    if (value == nullptr) return 0;
-    const double number = (*this)(point);
-    if (!(number > 0.0)) return 0;
-    return static_cast<std::uint8_t>(std::lround(std::min(number, 255.0)));
-  }
-};
-
-FieldReader find_field(const CloudLayout& layout, std::string_view name, bool required) {
-  const auto field = std::find_if(layout.fields.begin(), layout.fields.end(),
-                                  [&](const CloudLayout::Field& f) { return f.name == name; });
-  if (field == layout.fields.end()) {
-    if (!required) return {};
-    std::string names;
-    for (const CloudLayout::Field& other : layout.fields) {
-      names += (names.empty() ? "" : ", ") + other.name;
-    }
-    throw BadMessage{fmt::format("expected the fields x, y and z in the point cloud, found {}",
-                                 names.empty() ? "none" : names)};
-  }
-  const Datatype type = datatype(field->datatype);
-  if (type.bytes == 0) {
-    throw BadMessage{fmt::format("expected a datatype in [1, 8] for the field {}, found {}", name,
-                                 field->datatype)};
-  }
-  if (std::uint64_t{field->offset} + type.bytes > layout.point_step) {
-    throw BadMessage{fmt::format("the field {} takes bytes {} to {} of a point of {} bytes", name,
-                                 field->offset, field->offset + type.bytes - 1, layout.point_step)};
-  }
-  return {field->offset, type.value};
-}
-
 bool is_close(double value, double expected) {
   return std::fabs(value - expected) < 0.05 * expected;
 }
@@ -152,44 +76,28 @@ void append_point(LidarMessage& message, const MessagePoint& point) {
 void decode_cloud(const CloudLayout& layout, std::span<const std::uint8_t> data,
                   LidarMessage& message) {
   message.points.clear();
-  if (layout.big_endian) {
-    throw BadMessage{"the point cloud is big-endian, expected a little-endian one"};
-  }
-  const FieldReader x = find_field(layout, "x", true), y = find_field(layout, "y", true),
-                    z = find_field(layout, "z", true);
-  const FieldReader intensity = find_field(layout, "intensity", false),
-                    tag = find_field(layout, "tag", false),
-                    line = find_field(layout, "line", false);
+  message.layout = layout;
+  message.data = data;
+  const CloudField x = required_field(layout, "x"), y = required_field(layout, "y"),
+                   z = required_field(layout, "z");
+  const CloudField intensity = find_field(layout, {"intensity"}), tag = find_field(layout, {"tag"}),
+                   line = find_field(layout, {"line", "beam"});
   message.has_intensity = static_cast<bool>(intensity);
-  const std::uint64_t row_bytes = std::uint64_t{layout.width} * layout.point_step;
-  if (layout.width == 0 || layout.height == 0) return;
-  if (layout.height > 1 && layout.row_step < row_bytes) {
-    throw BadMessage{fmt::format("expected rows of at least {} bytes in the point cloud, found {}",
-                                 row_bytes, layout.row_step)};
-  }
-  const std::uint64_t rows_before_last = std::uint64_t{layout.height - 1} * layout.row_step;
-  if (row_bytes > data.size() || rows_before_last > data.size() - row_bytes) {
-    throw BadMessage{fmt::format("expected {} x {} points of {} bytes, found {} bytes",
-                                 layout.height, layout.width, layout.point_step, data.size())};
-  }
-  message.points.reserve(std::size_t{layout.height} * layout.width);
-  for (std::size_t row = 0; row < layout.height; ++row) {
-    const std::uint8_t* bytes = data.data() + row * layout.row_step;
-    for (std::size_t column = 0; column < layout.width; ++column, bytes += layout.point_step) {
-      MessagePoint point;
-      point.x = x(bytes);
-      point.y = y(bytes);
-      point.z = z(bytes);
-      // Also numbers whose squares are none.
-      if (!std::isfinite(point.x * point.x + point.y * point.y + point.z * point.z)) {
-        point.x = point.y = point.z = 0.0;
-      }
-      point.intensity = intensity.byte(bytes);
-      point.tag = tag.byte(bytes);
-      point.line = line.byte(bytes);
-      message.points.push_back(point);
+  message.points.reserve(count_points(layout, data));
+  for_each_point(layout, data, [&](const std::uint8_t* bytes) {
+    MessagePoint point;
+    point.x = x(bytes);
+    point.y = y(bytes);
+    point.z = z(bytes);
+    // Also numbers whose squares are none.
+    if (!std::isfinite(point.x * point.x + point.y * point.y + point.z * point.z)) {
+      point.x = point.y = point.z = 0.0;
     }
-  }
+    point.intensity = intensity.byte(bytes);
+    point.tag = tag.byte(bytes);
+    point.line = line.byte(bytes);
+    message.points.push_back(point);
+  });
 }
 
 MessageReader::MessageReader(std::unique_ptr<bags::Bag> bag, std::string_view format)
@@ -211,19 +119,28 @@ bool MessageReader::next(LidarMessage& message) {
   message.topic = serialised.topic;
   const MessageKind kind = *topics()[serialised.topic].kind;
   try {
-    if (bag_->kind() == bags::BagKind::ros1) {
+    if (topics()[serialised.topic].serialisation == bags::Serialisation::ros1) {
       decode_ros1_message(kind, serialised.bytes, message);
     } else {
       decode_ros2_message(kind, serialised.bytes, message);
     }
+    if (kind == MessageKind::cloud && cloud_times_[message.topic]) set_times(message);
   } catch (const BadMessage& bad) {
     bag_->fail(serialised, bad.what());
   }
   return true;
 }
 
+void MessageReader::set_times(LidarMessage& message) const {
+  auto point = message.points.begin();
+  for_each_time(*cloud_times_[message.topic], message.layout, message.data, message.time_ns,
+                [&point](std::int64_t offset_ns) { point++->offset_ns = offset_ns; });
+}
+
 void MessageReader::choose_topics() {
   devices_.assign(topics().size(), std::nullopt);
+  cloud_times_.assign(topics().size(), std::nullopt);
+  unused_times_.assign(topics().size(), {});
   clouds_.assign(topics().size(), {});
   acceleration_units_.assign(topics().size(), 1.0);
   const auto has_kind = [this](MessageKind kind) {
@@ -303,9 +220,47 @@ struct MessageReader::FirstMessages {
   std::vector<double> accelerations;
 };
 
+void MessageReader::find_cloud_times() {
+  const auto is_cloud = [this](std::size_t topic) {
+    return devices_[topic] && topics()[topic].kind == MessageKind::cloud;
+  };
+  std::size_t clouds = 0;
+  for (std::size_t i = 0; i < topics().size(); ++i) clouds += is_cloud(i) ? 1 : 0;
+  if (clouds == 0) return;
+  std::vector<CloudTimeSearch> searches(topics().size());
+  std::size_t points = 0, messages = 0, cloud_messages = 0;
+  LidarMessage message;
+  rewind();
+  try {
+    while (points < kPointsLookedAt && messages < kMessagesLookedAt &&
+           cloud_messages < kPointMessagesLookedAt * clouds && next(message)) {
+      ++messages;
+      if (!is_cloud(message.topic)) continue;
+      ++cloud_messages;
+      points += message.points.size();
+      searches[message.topic].add(message.layout, message.data, message.time_ns);
+    }
+  } catch (const FileError&) {
+    // Reported when the caller comes to it, behind the sound messages.
+  }
+  for (std::size_t i = 0; i < topics().size(); ++i) {
+    if (!is_cloud(i)) continue;
+    cloud_times_[i] = searches[i].found();
+    if (!cloud_times_[i]) {
+      unused_times_[i] = searches[i].problem();
+    } else if (constexpr double kCoarse_ns = 100; cloud_times_[i]->step_ns >= kCoarse_ns) {
+      warn(
+          fmt::format("the times of the points of topic {} are floating-point numbers in steps of "
+                      "{:.0f} ns (field {})",
+                      topics()[i].name, cloud_times_[i]->step_ns, cloud_times_[i]->field));
+    }
+  }
+}
+
 void MessageReader::describe() {
   header_.cartesian = true;
   header_.has_intensity = false;
+  find_cloud_times();
   rewind();
   std::vector<FirstMessages> first(topics().size());
   std::size_t points = 0, messages = 0, point_messages = 0;
@@ -331,16 +286,17 @@ void MessageReader::describe() {
       }
       topic.last_time_ns = message.time_ns;
       topic.last_points = message.points.size();
-      const bool has_times = topics()[message.topic].kind == MessageKind::points;
+      const bool timed = has_times(message.topic);
       for (std::size_t i = 0; i < message.points.size();) {
         const MessagePoint& point = message.points[i];
         topic.tagged = topic.tagged || point.tag != 0;
         topic.several_lines = topic.several_lines || point.line != 0;
-        const std::size_t run = has_times ? run_length(message.points, i) : 1;
+        const std::size_t run = timed ? run_length(message.points, i) : 1;
         if (run <= kMostReturns) topic.most_returns = std::max(topic.most_returns, run);
-        if (i + run < message.points.size() && has_times &&
+        if (i + run < message.points.size() && timed &&
             message.points[i + run].offset_ns > point.offset_ns) {
-          topic.intervals.push_back(message.points[i + run].offset_ns - point.offset_ns);
+          topic.intervals.push_back(
+              static_cast<double>(message.points[i + run].offset_ns - point.offset_ns));
         }
         i += run;
       }
@@ -355,7 +311,7 @@ void MessageReader::describe() {
   }
   for (std::size_t i = 0; i < topics().size(); ++i) {
     if (!devices_[i]) continue;
-    if (topics()[i].kind == MessageKind::cloud) settle_cloud_grid(i, first[i]);
+    if (topics()[i].kind == MessageKind::cloud && !has_times(i)) settle_cloud_grid(i, first[i]);
     if (topics()[i].kind != MessageKind::imu) {
       describe_device(i, first[i]);
     } else if (!first[i].accelerations.empty() && median(first[i].accelerations) > kLongestInG) {
@@ -372,7 +328,7 @@ void MessageReader::describe() {
 /// Tells the model where only one is left: three returns have only the Avia, 100 kHz only the
 /// Mid-40, which has no tags, and the Mid-70, which has.
 void MessageReader::describe_device(std::size_t topic, FirstMessages& first) {
-  const bool is_cloud = topics()[topic].kind == MessageKind::cloud;
+  const bool is_cloud = !has_times(topic);
   const int returns = is_cloud ? clouds_[topic].returns : static_cast<int>(first.most_returns);
   header_.returns_per_shot = std::max(header_.returns_per_shot, returns);
   Device& device = header_.devices[*devices_[topic]];
@@ -415,6 +371,7 @@ void MessageReader::settle_cloud_grid(std::size_t topic, FirstMessages& first) {
       "per shot, {}",
       topics()[topic].name, best.grid.beams == 1 ? "10" : "4.1667",
       best.returns == 1 ? "one point" : fmt::format("{} points", best.returns));
+  if (!unused_times_[topic].empty()) message += fmt::format(" ({})", unused_times_[topic]);
   if (!is_known) {
     message += "; too few messages to check that";
   } else if (!is_close(rate, best.rate_hz)) {
@@ -431,7 +388,10 @@ bool MessageReader::read(Chunk& chunk, std::size_t max_rows) {
   max_rows = std::max<std::size_t>(max_rows, 1);
   while (!failure_ && chunk.observations.size() + chunk.imu.size() < max_rows) {
     try {
-      if (!next(message_)) break;
+      if (!next(message_)) {
+        take_bag_warnings();
+        break;
+      }
     } catch (const FileError& error) {
       failure_.emplace(error);
       break;
@@ -443,6 +403,13 @@ bool MessageReader::read(Chunk& chunk, std::size_t max_rows) {
   return false;
 }
 
+void MessageReader::take_bag_warnings() {
+  if (std::exchange(ended_, true)) return;
+  for (const bags::BagWarning& one : bag_->warnings()) {
+    warnings_.push_back({one.place, one.message, 0});
+  }
+}
+
 void MessageReader::append(const LidarMessage& message, Chunk& chunk) {
   const std::uint8_t device = *devices_[message.topic];
   switch (*topics()[message.topic].kind) {
@@ -450,7 +417,11 @@ void MessageReader::append(const LidarMessage& message, Chunk& chunk) {
       append_points(message, device, chunk.observations);
       break;
     case MessageKind::cloud:
-      append_cloud(message, device, chunk.observations);
+      if (has_times(message.topic)) {
+        append_points(message, device, chunk.observations);
+      } else {
+        append_cloud(message, device, chunk.observations);
+      }
       break;
     default:
       append_imu(message, device, chunk.imu);

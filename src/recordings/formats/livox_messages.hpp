@@ -1,12 +1,13 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-// What ROS 1 and ROS 2 bags share: the messages of lidar drivers and how they become rows.
+// What bags of all kinds share: the messages of lidar drivers and how they become rows.
 //
-// Times. A CustomMsg gives each point its own time. A PointCloud2 gives only the time of its first
-// point: a point's own time is counted from there on the grid of the sensor's shots (100 or
-// 240 kHz, one to three returns per shot), which is found from the number of points and the stamps
-// of the first messages. Times from the year 2000 on are taken as UTC (PTP may serve TAI, which
-// no message tells), earlier ones as counted from power-on.
+// Times. A CustomMsg gives each point its own time, a PointCloud2 where it has a field of times
+// (cloud_times.hpp). Otherwise it gives only the time of its first point: a point's own time is
+// counted from there on the grid of the sensor's shots (100 or 240 kHz, one to three returns per
+// shot), which is found from the number of points and the stamps of the first messages. Times from
+// the year 2000 on are taken as UTC (PTP may serve TAI, which no message tells), earlier ones as
+// counted from power-on.
 //
 // Sensors. Every topic of points is one device; its serial is the broadcast code with which the
 // topic ends, if it does. Messages do not name the model: it is told only where the shot interval,
@@ -27,6 +28,8 @@
 #include "risley/recordings/livox/packet.hpp"
 #include "risley/recordings/reader.hpp"
 
+#include "recordings/formats/cloud_times.hpp"
+
 namespace risley::recordings {
 
 using bags::BadMessage;
@@ -34,7 +37,7 @@ using bags::MessageKind;
 
 /// One point of a message.
 struct MessagePoint {
-  std::uint32_t offset_ns = 0;       ///< after the message's time; 0 in a cloud
+  std::int64_t offset_ns = 0;        ///< after the message's time; 0 in a cloud without times
   double x = 0.0, y = 0.0, z = 0.0;  ///< m
   std::uint8_t intensity = 0, tag = 0, line = 0;
 };
@@ -47,6 +50,8 @@ struct LidarMessage {
   bool has_intensity = true;
   std::array<double, 3> angular_velocity{};  ///< rad/s
   std::array<double, 3> acceleration{};      ///< g from Livox drivers, m/s^2 from others
+  CloudLayout layout;                        ///< of a cloud
+  std::span<const std::uint8_t> data;        ///< of a cloud, valid as long as the message's bytes
 };
 
 /// Bytes of one point of a CustomMsg, without padding.
@@ -54,19 +59,6 @@ inline constexpr std::size_t kCustomPointBytes = 19;
 
 /// Adds a point of a CustomMsg. @throws BadMessage when a coordinate is no number
 void append_point(LidarMessage& message, const MessagePoint& point);
-
-/// A PointCloud2 up to its points.
-struct CloudLayout {
-  struct Field {
-    std::string name;
-    std::uint32_t offset = 0;  ///< from the start of a point
-    std::uint8_t datatype = 0;
-    std::uint32_t count = 1;
-  };
-  std::uint32_t height = 0, width = 0, point_step = 0, row_step = 0;
-  bool big_endian = false;
-  std::vector<Field> fields;
-};
 
 /// Turns the data of a PointCloud2 into points. Points whose coordinates are no numbers are shots
 /// without return.
@@ -86,7 +78,7 @@ class MessageReader final : public Reader {
   double fraction_read() const override { return bag_->fraction_read(); }
 
  private:
-  /// How the points of a cloud topic lie in time.
+  /// How the points of a cloud topic without times lie in time.
   struct CloudGrid {
     livox::ShotGrid grid = livox::kGrid100kHz;
     int returns = 1;
@@ -98,11 +90,20 @@ class MessageReader final : public Reader {
   void choose_topics();
   /// Completes the header from the first messages.
   void describe();
+  /// Finds the fields by which clouds tell times, from the first messages.
+  void find_cloud_times();
   void rewind();
   /// The next message of a wanted topic, replacing all of `message`. @return false at the end
   bool next(LidarMessage& message);
+  /// The times that a cloud's points tell. @throws BadMessage
+  void set_times(LidarMessage& message) const;
+  void take_bag_warnings();
   void choose_imu_topics();
   void describe_device(std::size_t topic, FirstMessages& first);
+  /// Whether the points of a topic have times of their own.
+  bool has_times(std::size_t topic) const {
+    return topics()[topic].kind == MessageKind::points || cloud_times_[topic];
+  }
   void settle_cloud_grid(std::size_t topic, FirstMessages& first);
   void append(const LidarMessage& message, Chunk& chunk);
   void append_points(const LidarMessage& message, std::uint8_t device, Observations& rows);
@@ -112,12 +113,14 @@ class MessageReader final : public Reader {
   void warn(std::string message) { warnings_.push_back({{}, std::move(message), 0}); }
 
   std::unique_ptr<bags::Bag> bag_;
-  std::vector<std::optional<std::uint8_t>> devices_;  ///< by topic; empty when it is not read
-  std::vector<CloudGrid> clouds_;                     ///< by topic
-  std::vector<double> acceleration_units_;            ///< by topic: g per unit of the message
+  std::vector<std::optional<std::uint8_t>> devices_;   ///< by topic; empty when it is not read
+  std::vector<CloudGrid> clouds_;                      ///< by topic
+  std::vector<std::optional<CloudTime>> cloud_times_;  ///< by topic
+  std::vector<std::string> unused_times_;              ///< by topic: why a field is not used
+  std::vector<double> acceleration_units_;             ///< by topic: g per unit of the message
   LidarMessage message_;
   std::optional<FileError> failure_;
-  bool equal_times_reported_ = false;
+  bool equal_times_reported_ = false, ended_ = false;
 };
 
 }  // namespace risley::recordings

@@ -15,6 +15,7 @@ const std::vector<const Format*>& all_formats() {
       &kScanSequenceCsvFormat,
       &kRos1BagFormat,
       &kRos2BagFormat,
+      &kMcapFormat,
       &kLasFormat,
       &kLazFormat,
       &kPcdFormat,

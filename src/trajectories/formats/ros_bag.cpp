@@ -139,8 +139,8 @@ bool is_bag(const FileHead& head) { return bags::bag_kind(head.bytes).has_value(
 
 }  // namespace
 
-bool holds_poses_alone(const std::string& path) {
-  const std::vector<bags::Topic> topics = bags::list_topics(path);
+bool holds_poses_alone(const std::string& path, const Progress& progress) {
+  const std::vector<bags::Topic> topics = bags::list_topics(path, progress);
   return std::any_of(topics.begin(), topics.end(), is_pose_topic) &&
          std::none_of(topics.begin(), topics.end(), is_lidar_topic);
 }
@@ -161,7 +161,7 @@ Trajectory read_ros_bag(const std::string& path, const std::string& topic_name,
     if (all.rows.size() % kOften == 0) progress.report(bag->fraction_read());
     RosPose pose;
     try {
-      pose = decode_ros_pose(bag->kind(), *topic.kind, message.bytes);
+      pose = decode_ros_pose(topic.serialisation, *topic.kind, message.bytes);
     } catch (const bags::BadMessage& bad) {
       bag->fail(message, bad.what());
     }
@@ -170,7 +170,7 @@ Trajectory read_ros_bag(const std::string& path, const std::string& topic_name,
   if (all.rows.empty()) bag->fail(fmt::format("the topic {} holds no message", topic.name));
 
   RowContents contents;
-  contents.format = bag->kind() == bags::BagKind::ros1 ? "ros1-bag" : "ros2-bag";
+  contents.format = bags::name_of(bag->kind());
   contents.frame = Frame::local;
   contents.has_velocity = all.without_velocity == 0;
   contents.has_accuracy = all.without_accuracy == 0;
@@ -184,6 +184,7 @@ Trajectory read_ros_bag(const std::string& path, const std::string& topic_name,
   };
   warn_of_part(all.without_accuracy, "accuracies of position and attitude");
   warn_of_part(all.without_velocity, "velocities");
+  for (const bags::BagWarning& one : bag->warnings()) rows.warn(one.place, one.message);
   for (const PoseRow& row : all.rows) rows.add(row, {});
   Trajectory trajectory = rows.finish();
   trajectory.time_scale = scale_by_size(trajectory.time_ns);
@@ -194,7 +195,7 @@ Trajectory read_ros_bag(const std::string& path, const std::string& topic_name,
 
 const Format kRosBagFormat{"ros-bag",
                            "",
-                           "bag of ROS 1 or ROS 2: odometry, poses, transforms",
+                           "bag of ROS 1 or ROS 2, MCAP: odometry, poses, transforms",
                            is_bag,
                            [](const std::string& path, const Progress& progress) {
                              return read_ros_bag(path, {}, progress);

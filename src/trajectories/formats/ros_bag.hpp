@@ -9,8 +9,9 @@
 
 namespace risley::trajectories {
 
-/// Whether a bag holds topics of poses and none of a lidar's points. @throws FileError
-bool holds_poses_alone(const std::string& path);
+/// Whether a bag holds topics of poses and none of a lidar's points.
+/// @throws FileError; Cancelled
+bool holds_poses_alone(const std::string& path, const Progress& progress);
 
 /// The poses of one topic.
 /// @param topic  its name; empty where the bag has only one topic of poses

@@ -97,9 +97,10 @@ bool holds_pose(MessageKind kind) {
          kind == MessageKind::pose_with_covariance || kind == MessageKind::transform;
 }
 
-RosPose decode_ros_pose(bags::BagKind bag, MessageKind kind, std::span<const std::uint8_t> bytes) {
-  return bag == bags::BagKind::ros1 ? take_ros_pose(bags::Ros1Fields(bytes), kind)
-                                    : take_ros_pose(bags::CdrFields(bytes), kind);
+RosPose decode_ros_pose(bags::Serialisation serialisation, MessageKind kind,
+                        std::span<const std::uint8_t> bytes) {
+  return serialisation == bags::Serialisation::ros1 ? take_ros_pose(bags::Ros1Fields(bytes), kind)
+                                                    : take_ros_pose(bags::CdrFields(bytes), kind);
 }
 
 }  // namespace risley::trajectories

@@ -32,7 +32,7 @@ bool holds_pose(bags::MessageKind kind);
 
 /// @throws BadMessage for a message that is too short or too long, and for a pose that is none;
 ///         covariances and velocities may hold anything
-RosPose decode_ros_pose(bags::BagKind bag, bags::MessageKind kind,
+RosPose decode_ros_pose(bags::Serialisation serialisation, bags::MessageKind kind,
                         std::span<const std::uint8_t> bytes);
 
 }  // namespace risley::trajectories

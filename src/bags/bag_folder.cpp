@@ -1,0 +1,244 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+// Folders as rosbag2 writes them: metadata.yaml and the files that it names, into which a recording
+// was split. They are read one after the other, as one bag.
+#include <algorithm>
+#include <filesystem>
+#include <memory>
+#include <set>
+#include <string>
+#include <string_view>
+#include <system_error>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "risley/bags/bag.hpp"
+#include "risley/core/error.hpp"
+#include "risley/core/text.hpp"
+#include "risley/io/text_file.hpp"
+#include "risley/io/yaml_map.hpp"
+
+#include "bags/bag_kinds.hpp"
+
+namespace risley::bags {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kMetadata = "metadata.yaml";
+constexpr std::size_t kMostNamed = 10;  // in a message
+
+std::string some_names(std::vector<std::string> names) {
+  const std::size_t more = names.size() - std::min(names.size(), kMostNamed);
+  names.resize(names.size() - more);
+  std::string words = fmt::format("{}", fmt::join(names, ", "));
+  if (more > 0) words += fmt::format(" and {} more", more);
+  return words;
+}
+
+/// A folder without metadata.yaml: is it one of a bag?
+[[noreturn]] void fail_without_metadata(const std::string& folder) {
+  std::vector<std::string> bags;
+  std::error_code code;
+  for (fs::directory_iterator file(folder, code), end; !code && file != end; file.increment(code)) {
+    std::string name = file->path().filename().string();
+    const std::string ending = lower_case(fs::path(name).extension().string());
+    if (ending == ".db3" || ending == ".mcap" || ending == ".bag") bags.push_back(std::move(name));
+  }
+  if (bags.empty()) {
+    throw FileError(folder, {},
+                    "is a folder; expected a file, or a folder of ROS 2 with its metadata.yaml and "
+                    "the bags that it names");
+  }
+  std::sort(bags.begin(), bags.end());
+  throw FileError(folder, {},
+                  fmt::format("is a folder of bags ({}) without metadata.yaml, which tells their "
+                              "order: name one of the files, or let `ros2 bag reindex` write it",
+                              some_names(std::move(bags))));
+}
+
+/// The names that a folder's metadata states, each with its line.
+std::vector<std::pair<std::string, std::size_t>> stated_names(const std::string& path) {
+  constexpr int kLatestVersion = 1'000'000, kLastWithFolder = 3;
+  const io::YamlMap whole(io::parse_yaml(io::read_text_file(path), path), path, "");
+  const io::YamlMap bag(whole.at("rosbag2_bagfile_information").value, path,
+                        "rosbag2_bagfile_information");
+  const int version = bag.integer("version", 0, kLatestVersion);
+  if (const auto* mode = bag.find("compression_mode");
+      mode != nullptr && mode->value.kind != io::YamlNode::Kind::nothing) {
+    const std::string text = lower_case(bag.text("compression_mode"));
+    if (!text.empty() && text != "none") {
+      io::fail_at(path, mode->line,
+                  fmt::format("{} = {}: rosbag2 compressed the files or the messages in them, "
+                              "expected none (`ros2 bag convert` writes such a bag)",
+                              bag.field("compression_mode"), text));
+    }
+  }
+  const auto& list = bag.at("relative_file_paths");
+  const std::string field = bag.field("relative_file_paths");
+  if (!list.value.is_list() || list.value.items.empty()) {
+    io::fail_at(path, list.line, fmt::format("{}: expected a list of files", field));
+  }
+  std::vector<std::pair<std::string, std::size_t>> names;
+  std::set<std::string> seen;
+  for (const io::YamlNode& item : list.value.items) {
+    fs::path stated = io::yaml_text(item, path, field);
+    // Up to version 3 the name of the folder stands before.
+    if (version <= kLastWithFolder && std::distance(stated.begin(), stated.end()) == 2 &&
+        stated.is_relative()) {
+      stated = stated.filename();
+    }
+    const std::string name = stated.filename().string();
+    if (name.empty() || name == "." || name == ".." || stated.has_parent_path()) {
+      io::fail_at(path, item.line,
+                  fmt::format("{}: expected the name of a file in this folder, found {}", field,
+                              stated.string()));
+    }
+    if (!seen.insert(name).second) {
+      io::fail_at(path, item.line, fmt::format("{}: {} stands twice", field, name));
+    }
+    names.emplace_back(name, item.line);
+  }
+  return names;
+}
+
+auto key_of(const Topic& topic) {
+  return std::tie(topic.name, topic.type, topic.kind, topic.serialisation);
+}
+
+/// Several bags as one. A topic is the same in all of them if its name and type are.
+class BagFolder final : public Bag {
+ public:
+  BagFolder(const std::string& folder, std::vector<std::string> files, BagKind kind,
+            const Progress& progress)
+      : Bag(kind, folder, progress), files_(std::move(files)) {
+    for (const std::string& file : files_) {
+      progress_.check();
+      try {
+        const std::unique_ptr<Bag> bag = open_file(file);
+        for (const Topic& topic : bag->topics()) {
+          if (find(topic) == topics_.size()) topics_.push_back(topic);
+        }
+      } catch (const FileError&) {
+        if (&file == &files_.front()) throw;
+        break;  // told when reading comes to it, behind the sound files
+      }
+    }
+    std::sort(topics_.begin(), topics_.end(),
+              [](const Topic& a, const Topic& b) { return key_of(a) < key_of(b); });
+  }
+
+  void rewind(const std::vector<bool>& wanted) override {
+    require_topics(wanted);
+    wanted_ = wanted;
+    part_.reset();
+    read_ = 0;
+    warnings_.clear();
+  }
+
+  bool next(Message& message) override {
+    while (true) {
+      if (!part_) {
+        if (read_ == files_.size()) return false;
+        open_part();
+      }
+      if (part_->next(part_message_)) {
+        message = part_message_;
+        message.topic = topic_of_[part_message_.topic];
+        return true;
+      }
+      const std::string name = fs::path(part_->path()).filename().string();
+      for (const BagWarning& warning : part_->warnings()) {
+        warnings_.push_back({warning.place, fmt::format("{}: {}", name, warning.message)});
+      }
+      part_.reset();
+      ++read_;
+    }
+  }
+
+  double fraction_read() const override {
+    const double part = part_ ? part_->fraction_read() : 0.0;
+    return (static_cast<double>(read_) + part) / static_cast<double>(files_.size());
+  }
+
+  using Bag::fail;
+  [[noreturn]] void fail(const Message& message, const std::string& problem) const override {
+    if (part_) part_->fail(part_message_, problem);
+    Bag::fail(message, problem);
+  }
+
+ private:
+  std::unique_ptr<Bag> open_file(const std::string& file) const {
+    if (bag_kind_of_file(file) != kind()) {
+      throw FileError(
+          file, {0, {}},
+          fmt::format("expected a bag of the kind {} as the first file of the folder is",
+                      name_of(kind())));
+    }
+    return open_bag(file, kind(), progress_);
+  }
+
+  std::size_t find(const Topic& topic) const {
+    const auto is_same = [&](const Topic& other) { return key_of(other) == key_of(topic); };
+    return static_cast<std::size_t>(std::find_if(topics_.begin(), topics_.end(), is_same) -
+                                    topics_.begin());
+  }
+
+  void open_part() {
+    std::unique_ptr<Bag> part = open_file(files_[read_]);
+    topic_of_.clear();
+    std::vector<bool> wanted;
+    for (const Topic& topic : part->topics()) {
+      topic_of_.push_back(find(topic));
+      if (topic_of_.back() == topics_.size()) {
+        part->fail(fmt::format("the topic {} came while the folder was read", topic.name));
+      }
+      wanted.push_back(wanted_[topic_of_.back()]);
+    }
+    part->rewind(wanted);
+    part_ = std::move(part);
+  }
+
+  std::vector<std::string> files_;
+  std::vector<bool> wanted_;
+  std::unique_ptr<Bag> part_;          ///< the file that is being read
+  std::size_t read_ = 0;               ///< files before it
+  std::vector<std::size_t> topic_of_;  ///< by topic of the file
+  Message part_message_;               ///< the last one, with the file's topic
+};
+
+}  // namespace
+
+std::vector<std::string> files_of_bag_folder(const std::string& folder) {
+  const std::string metadata = (fs::path(folder) / kMetadata).string();
+  std::error_code code;
+  if (!fs::is_regular_file(metadata, code)) fail_without_metadata(folder);
+  std::vector<std::string> files, missing;
+  std::size_t line = 0;
+  for (const auto& [name, stated_in_line] : stated_names(metadata)) {
+    std::string file = (fs::path(folder) / name).string();
+    if (!fs::is_regular_file(file, code)) {
+      if (missing.empty()) line = stated_in_line;
+      missing.push_back(name);
+    }
+    files.push_back(std::move(file));
+  }
+  if (!missing.empty()) {
+    io::fail_at(metadata, line,
+                fmt::format("names files that are not in the folder: {}; bring them, or take their "
+                            "names out",
+                            some_names(std::move(missing))));
+  }
+  return files;
+}
+
+std::unique_ptr<Bag> open_bag_folder(const std::string& folder, std::vector<std::string> files,
+                                     BagKind kind, const Progress& progress) {
+  return std::make_unique<BagFolder>(folder, std::move(files), kind, progress);
+}
+
+}  // namespace risley::bags

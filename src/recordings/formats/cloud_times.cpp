@@ -1,0 +1,271 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "recordings/formats/cloud_times.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include <fmt/format.h>
+
+#include "risley/bags/bag.hpp"
+#include "risley/core/saturating.hpp"
+#include "risley/core/text.hpp"
+#include "risley/io/little_endian.hpp"
+#include "risley/io/seconds.hpp"
+
+#include "recordings/formats/format.hpp"
+
+namespace risley::recordings {
+namespace {
+
+using bags::BadMessage;
+
+constexpr std::array<std::string_view, 4> kTimeNames{"time", "t", "timestamp", "offset_time"};
+constexpr std::int64_t kFarthest_ns = 10'000'000'000;
+constexpr std::uint8_t kInt32 = 5, kUint32 = 6, kFloat32 = 7, kFloat64 = 8;
+
+template <class T>
+double value_at(const std::uint8_t* bytes) {
+  return static_cast<double>(io::load<T>(bytes));
+}
+
+/// How a datatype of a PointField is read.
+struct Datatype {
+  std::size_t bytes = 0;  ///< 0 for an unknown one
+  double (*value)(const std::uint8_t* bytes) = nullptr;
+};
+
+Datatype datatype_of(std::uint8_t code) {
+  switch (code) {
+    case 1:
+      return {1, value_at<std::int8_t>};
+    case 2:
+      return {1, value_at<std::uint8_t>};
+    case 3:
+      return {2, value_at<std::int16_t>};
+    case 4:
+      return {2, value_at<std::uint16_t>};
+    case kInt32:
+      return {4, value_at<std::int32_t>};
+    case kUint32:
+      return {4, value_at<std::uint32_t>};
+    case kFloat32:
+      return {4, value_at<float>};
+    case kFloat64:
+      return {8, value_at<double>};
+    default:
+      return {};
+  }
+}
+
+/// What numbers of a datatype may be as times.
+std::vector<TimeReading> readings_of(std::uint8_t datatype) {
+  switch (datatype) {
+    case kInt32:
+    case kUint32:
+      return {TimeReading::nanoseconds_after};
+    case kFloat32:
+      return {TimeReading::seconds_after};
+    case kFloat64:
+      return {TimeReading::seconds_after, TimeReading::seconds, TimeReading::nanoseconds};
+    default:
+      return {};
+  }
+}
+
+/// Width of the step between numbers of that size, ns, at least 1.
+double step_of(const CloudTime& time, double largest) {
+  const double per_unit =
+      time.reading == TimeReading::seconds_after || time.reading == TimeReading::seconds ? 1e9
+                                                                                         : 1.0;
+  double step = 0;
+  if (time.datatype == kFloat32) {
+    const auto number = static_cast<float>(largest);
+    step = std::nextafter(number, std::numeric_limits<float>::infinity()) - number;
+  } else if (time.datatype == kFloat64) {
+    step = std::nextafter(largest, std::numeric_limits<double>::infinity()) - largest;
+  }
+  return std::max(step * per_unit, 1.0);
+}
+
+}  // namespace
+
+std::size_t count_points(const CloudLayout& layout, std::span<const std::uint8_t> data) {
+  if (layout.big_endian) {
+    throw BadMessage{"the point cloud is big-endian, expected a little-endian one"};
+  }
+  if (layout.width == 0 || layout.height == 0) return 0;
+  const std::uint64_t row_bytes = std::uint64_t{layout.width} * layout.point_step;
+  if (layout.height > 1 && layout.row_step < row_bytes) {
+    throw BadMessage{fmt::format("expected rows of at least {} bytes in the point cloud, found {}",
+                                 row_bytes, layout.row_step)};
+  }
+  const std::uint64_t rows_before_last = std::uint64_t{layout.height - 1} * layout.row_step;
+  if (row_bytes > data.size() || rows_before_last > data.size() - row_bytes) {
+    throw BadMessage{fmt::format("expected {} x {} points of {} bytes, found {} bytes",
+                                 layout.height, layout.width, layout.point_step, data.size())};
+  }
+  return std::size_t{layout.height} * layout.width;
+}
+
+std::uint8_t CloudField::byte(const std::uint8_t* point) const {
+  if (value == nullptr) return 0;
+  const double number = (*this)(point);
+  if (!(number > 0.0)) return 0;
+  return static_cast<std::uint8_t>(std::lround(std::min(number, 255.0)));
+}
+
+CloudField find_field(const CloudLayout& layout, std::initializer_list<std::string_view> names) {
+  const auto is_meant = [&](const CloudLayout::Field& field) {
+    return std::find(names.begin(), names.end(), lower_case(field.name)) != names.end();
+  };
+  const auto field = std::find_if(layout.fields.begin(), layout.fields.end(), is_meant);
+  if (field == layout.fields.end()) return {};
+  const Datatype type = datatype_of(field->datatype);
+  if (type.bytes == 0) {
+    throw BadMessage{fmt::format("expected a datatype in [1, 8] for the field {}, found {}",
+                                 field->name, field->datatype)};
+  }
+  if (std::uint64_t{field->offset} + type.bytes > layout.point_step) {
+    throw BadMessage{fmt::format("the field {} takes bytes {} to {} of a point of {} bytes",
+                                 field->name, field->offset,
+                                 std::uint64_t{field->offset} + type.bytes - 1, layout.point_step)};
+  }
+  return {field->offset, field->datatype, type.value};
+}
+
+CloudField required_field(const CloudLayout& layout, std::string_view name) {
+  const CloudField field = find_field(layout, {name});
+  if (field) return field;
+  std::string names;
+  for (const CloudLayout::Field& other : layout.fields) {
+    names += (names.empty() ? "" : ", ") + other.name;
+  }
+  throw BadMessage{fmt::format("expected the fields x, y and z in the point cloud, found {}",
+                               names.empty() ? "none" : names)};
+}
+
+std::optional<std::int64_t> offset_of(TimeReading reading, double value, std::int64_t stamp_ns) {
+  constexpr double kLatest_ns = 9.2e18;
+  std::optional<std::int64_t> offset_ns;
+  switch (reading) {
+    case TimeReading::nanoseconds_after:
+    case TimeReading::nanoseconds:
+      if (std::abs(value) < kLatest_ns) offset_ns = std::llround(value);
+      break;
+    case TimeReading::seconds_after:
+    case TimeReading::seconds:
+      offset_ns = io::nanoseconds_from_seconds(value);
+      break;
+  }
+  if (!offset_ns) return std::nullopt;
+  if (reading == TimeReading::seconds || reading == TimeReading::nanoseconds) {
+    offset_ns = saturating_difference(*offset_ns, stamp_ns);
+  }
+  if (*offset_ns < -kFarthest_ns || *offset_ns > kFarthest_ns) return std::nullopt;
+  return offset_ns;
+}
+
+CloudField time_field(const CloudTime& time, const CloudLayout& layout) {
+  const CloudField field = find_field(layout, {time.field});
+  if (field && field.datatype == time.datatype) return field;
+  throw BadMessage{fmt::format(
+      "expected the field {} of datatype {} with the times of the points, as in the "
+      "messages before, found {}",
+      time.field, time.datatype,
+      field ? fmt::format("datatype {}", field.datatype) : std::string("no such field"))};
+}
+
+void fail_time(const CloudTime& time, std::size_t point, double value) {
+  throw BadMessage{
+      fmt::format("point {} has the {} {}, allowed at most {} s from the stamp of its "
+                  "message",
+                  point, time.field, value, kFarthest_ns / 1'000'000'000)};
+}
+
+void CloudTimeSearch::add(const CloudLayout& layout, std::span<const std::uint8_t> data,
+                          std::int64_t stamp_ns) {
+  if (layout.width == 0 || layout.height == 0) return;
+  ++messages_;
+  for (const std::string_view name : kTimeNames) {
+    const CloudField field = find_field(layout, {name});
+    if (!field) continue;
+    const std::vector<TimeReading> readings = readings_of(field.datatype);
+    if (readings.empty()) {
+      other_type_ =
+          fmt::format("its field {} is of datatype {}, expected 5 to 8", name, field.datatype);
+    }
+    for (const TimeReading reading : readings) {
+      const auto is_same = [&](const Candidate& other) {
+        return other.time.field == name && other.time.datatype == field.datatype &&
+               other.time.reading == reading;
+      };
+      auto known = std::find_if(candidates_.begin(), candidates_.end(), is_same);
+      if (known == candidates_.end()) {
+        if (messages_ > 1) continue;  // messages before it are without
+        candidates_.push_back({{std::string(name), field.datatype, reading}});
+        known = candidates_.end() - 1;
+      }
+      add(field, layout, data, stamp_ns, *known);
+    }
+  }
+}
+
+void CloudTimeSearch::add(const CloudField& field, const CloudLayout& layout,
+                          std::span<const std::uint8_t> data, std::int64_t stamp_ns,
+                          Candidate& candidate) const {
+  ++candidate.messages;
+  std::optional<double> last;
+  for_each_point(layout, data, [&](const std::uint8_t* bytes) {
+    const double value = field(bytes);
+    ++candidate.points;
+    if (last != value) ++candidate.times;
+    last = value;
+    candidate.largest = std::max(candidate.largest, std::abs(value));
+    const auto offset_ns = offset_of(candidate.time.reading, value, stamp_ns);
+    if (!offset_ns) candidate.far_ns.reset();
+    if (candidate.far_ns && offset_ns) {
+      candidate.far_ns = std::max(*candidate.far_ns, std::abs(*offset_ns));
+    }
+  });
+}
+
+bool CloudTimeSearch::shares_times(const Candidate& candidate) const {
+  return candidate.points >= kShotsOfOneTime * candidate.times;
+}
+
+std::optional<CloudTime> CloudTimeSearch::found() const {
+  const Candidate* best = nullptr;
+  double best_step = 0;
+  for (const Candidate& candidate : candidates_) {
+    if (candidate.messages < messages_ || !candidate.far_ns || shares_times(candidate)) continue;
+    const double step = step_of(candidate.time, candidate.largest);
+    const bool better = best == nullptr ||
+                        (candidate.time.field == best->time.field ? candidate.far_ns < best->far_ns
+                                                                  : step < best_step);
+    if (!better) continue;
+    best = &candidate;
+    best_step = step;
+  }
+  if (best == nullptr) return std::nullopt;
+  CloudTime time = best->time;
+  time.step_ns = best_step;
+  return time;
+}
+
+std::string CloudTimeSearch::problem() const {
+  if (candidates_.empty()) return other_type_;
+  const Candidate& first = candidates_.front();
+  const std::string& field = first.time.field;
+  if (first.messages < messages_) return fmt::format("only some have a field {}", field);
+  if (shares_times(first)) {
+    return fmt::format("their field {} has one time for {} points", field,
+                       first.points / first.times);
+  }
+  return fmt::format("the numbers of their field {} are further than {} s from the stamps", field,
+                     kFarthest_ns / 1'000'000'000);
+}
+
+}  // namespace risley::recordings

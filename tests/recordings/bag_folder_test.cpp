@@ -1,0 +1,195 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+// Recordings that rosbag2 split into several files of a folder.
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "bags/written_mcap.hpp"
+#include "recordings/format_tests.hpp"
+#include "recordings/ros2_messages.hpp"
+
+namespace risley::recordings::bag_folder_test {
+
+using namespace ros2_messages;
+using namespace format_tests;
+using ::testing::HasSubstr;
+
+/// The small bag in three files of a folder; inertial samples stand in the second and third alone.
+class BagFolder {
+ public:
+  explicit BagFolder(bool mcap) : mcap_(mcap) {
+    std::filesystem::create_directories(path());
+    const Ros2BagFile whole = small_ros2_bag();
+    for (std::size_t part = 0; part < 3; ++part) {
+      Ros2BagFile bag;
+      bag.topics = whole.topics;
+      if (part == 0) bag.topics.resize(1);
+      bag.messages.assign(whole.messages.begin() + static_cast<std::ptrdiff_t>(6 * part),
+                          whole.messages.begin() + static_cast<std::ptrdiff_t>(6 * part + 6));
+      if (part == 0) std::erase_if(bag.messages, [](const auto& one) { return one.first != 0; });
+      if (mcap) {
+        McapFile(bag).write(file(name(part)));
+      } else {
+        bag.write(file(name(part))).reset();
+      }
+    }
+    write_metadata({name(0), name(1), name(2)});
+  }
+
+  std::string path() const { return folder_.file("bag"); }
+  std::string file(const std::string& name) const { return path() + "/" + name; }
+  std::string name(std::size_t part) const {
+    return fmt::format("bag_{}.{}", part, mcap_ ? "mcap" : "db3");
+  }
+  void write_metadata(const std::vector<std::string>& names, int version = 5,
+                      const std::string& mode = "") const {
+    std::string text = fmt::format(
+        "rosbag2_bagfile_information:\n  version: {}\n  storage_identifier: sqlite3\n"
+        "  duration:\n    nanoseconds: 180000000\n  relative_file_paths:\n",
+        version);
+    for (const std::string& one : names) text += fmt::format("    - {}\n", one);
+    text += fmt::format("  compression_format: \"\"\n  compression_mode: \"{}\"\n", mode);
+    put_bytes(file("metadata.yaml"), text);
+  }
+  std::string refused() const {
+    try {
+      load_recording(path());
+    } catch (const FileError& error) {
+      return error.what();
+    }
+    return "";
+  }
+
+ private:
+  TemporaryFolder folder_;
+  bool mcap_;
+};
+
+/// All rows of a folder, up to its damage.
+struct Read {
+  Observations rows;
+  std::size_t samples = 0;
+  std::vector<ReadWarning> warnings;
+  std::string format, error;
+};
+
+Read read_folder(const BagFolder& folder) {
+  Read all;
+  const auto reader = open_recording(folder.path());
+  all.format = reader->header().format;
+  try {
+    Chunk chunk;
+    double fraction = 0;
+    while (reader->read(chunk, 10)) {
+      all.rows.append(chunk.observations);
+      all.samples += chunk.imu.size();
+      EXPECT_GE(reader->fraction_read(), fraction);
+      fraction = reader->fraction_read();
+      EXPECT_LE(fraction, 1.0);
+    }
+  } catch (const FileError& error) {
+    all.error = error.what();
+  }
+  all.warnings = reader->warnings();
+  return all;
+}
+
+TEST(BagFolder, ItsFilesAreReadInOrder) {
+  const TemporaryFolder other;
+  small_ros2_bag().write(other.file("whole.db3")).reset();
+  const Recording wanted = load_recording(other.file("whole.db3"));
+  for (const bool mcap : {false, true}) {
+    const BagFolder folder(mcap);
+    Read read = read_folder(folder);
+    EXPECT_EQ(read.error, "");
+    EXPECT_EQ(read.format, mcap ? "mcap" : "ros2-bag");
+    EXPECT_TRUE(is_same(read.rows, wanted.data.observations));
+    EXPECT_EQ(read.samples, 4U);
+    EXPECT_TRUE(read.warnings.empty());
+    // The order is that of the list, whatever the names.
+    folder.write_metadata({folder.name(1), folder.name(2), folder.name(0)});
+    read = read_folder(folder);
+    ASSERT_EQ(read.rows.size(), 120U);
+    EXPECT_EQ(read.rows.time_ns[0], wanted.data.observations.time_ns[40]);
+    // Up to version 3 the folder's name stands before.
+    folder.write_metadata({"anything/" + folder.name(0)}, 3);
+    EXPECT_EQ(read_folder(folder).rows.size(), 40U);
+  }
+}
+
+TEST(BagFolder, WhatIsWrongWithTheListIsSaid) {
+  const BagFolder folder(true);
+  const std::string first = folder.name(0);
+  const auto refused = [&](const std::vector<std::string>& names, int version = 5,
+                           const std::string& mode = "") {
+    folder.write_metadata(names, version, mode);
+    return folder.refused();
+  };
+  EXPECT_THAT(refused({first, "gone_1.mcap", "gone_2.mcap"}),
+              ::testing::AllOf(HasSubstr("metadata.yaml: line 8"),
+                               HasSubstr("not in the folder: gone_1.mcap, gone_2.mcap; bring")));
+  for (const char* name : {"../x.mcap", "/etc/passwd", "sub/x.mcap", "..", "''"}) {
+    EXPECT_THAT(refused({first, name}), HasSubstr("expected the name of a file in this folder"));
+  }
+  EXPECT_THAT(refused({"../x/y.mcap"}, 3), HasSubstr("expected the name of a file"));
+  EXPECT_THAT(refused({"../x.mcap"}, 3), HasSubstr("not in the folder: x.mcap"));
+  EXPECT_THAT(refused({first, first}), HasSubstr("bag_0.mcap stands twice"));
+  EXPECT_THAT(refused({first}, 5, "FILE"),
+              HasSubstr("compression_mode = file: rosbag2 compressed"));
+  EXPECT_EQ(refused({first}, 5, "NONE"), "");
+  EXPECT_THAT(refused({}), HasSubstr("relative_file_paths: expected a list of files"));
+  EXPECT_THAT(refused({"metadata.yaml"}), HasSubstr("is no bag of ROS 2"));
+  put_bytes(folder.file("metadata.yaml"), "other: 1\n");
+  EXPECT_THAT(folder.refused(), HasSubstr("rosbag2_bagfile_information is missing"));
+  std::filesystem::remove(folder.file("metadata.yaml"));
+  EXPECT_THAT(folder.refused(),
+              HasSubstr("is a folder of bags (bag_0.mcap, bag_1.mcap, bag_2.mcap) without "
+                        "metadata.yaml"));
+  for (std::size_t part = 0; part < 3; ++part)
+    std::filesystem::remove(folder.file(folder.name(part)));
+  EXPECT_THAT(folder.refused(), HasSubstr("is a folder; expected a file"));
+}
+
+TEST(BagFolder, DamageInAFileKeepsTheFilesBefore) {
+  for (const bool mcap : {false, true}) {
+    const BagFolder folder(mcap);
+    put_bytes(folder.file(folder.name(1)), "no bag");
+    Read read = read_folder(folder);
+    EXPECT_EQ(read.rows.size(), 40U);
+    EXPECT_THAT(read.error, HasSubstr(folder.name(1) + ": byte 0: expected a bag of the kind"));
+  }
+  const BagFolder folder(true);
+  std::string bytes = get_bytes(folder.file(folder.name(1)));
+  put_bytes(folder.file(folder.name(1)), std::string_view(bytes).substr(0, bytes.size() - 50));
+  Read read = read_folder(folder);
+  EXPECT_EQ(read.error, "");
+  EXPECT_EQ(read.rows.size(), 120U);
+  ASSERT_EQ(read.warnings.size(), 1U);
+  EXPECT_THAT(read.warnings[0].message, HasSubstr("bag_1.mcap: the file was not closed"));
+  // A message that is damaged is told with its file.
+  McapFile part(small_ros2_bag());
+  part.messages[1].second = "no CDR";
+  part.write(folder.file(folder.name(2)));
+  read = read_folder(folder);
+  EXPECT_THAT(read.error, HasSubstr("bag_2.mcap: byte"));
+  EXPECT_THAT(read.error, HasSubstr("message 1 of topic /livox/lidar"));
+  EXPECT_EQ(read.rows.size(), 80U);
+}
+
+TEST(BagFolder, CanBeCancelled) {
+  const BagFolder folder(true);
+  CancelFlag flag;
+  const Progress progress([](double) {}, &flag);
+  const auto reader = open_recording(folder.path(), {}, progress);
+  flag.set();
+  Chunk chunk;
+  EXPECT_THROW(reader->read(chunk), Cancelled);
+  EXPECT_THROW(open_recording(folder.path(), {}, progress), Cancelled);
+}
+
+}  // namespace risley::recordings::bag_folder_test
