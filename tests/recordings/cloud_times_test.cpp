@@ -206,6 +206,8 @@ TEST(CloudTimes, WhatIsNoTimeOfSinglePointsIsNotUsed) {
   };
   EXPECT_THAT(warning_of({{{"time", 2, 1e3, false}}}),
               HasSubstr("its field time is of datatype 2, expected 5 to 8"));
+  EXPECT_THAT(warning_of({{{"time", 0, 1e3, false}}}),
+              HasSubstr("expected a datatype in [1, 8] for the field time, found 0"));
   // Floats in nanoseconds would be hours off as seconds.
   EXPECT_THAT(warning_of({{{"time", 7, 1e9, false}}}), HasSubstr("further than 10 s"));
   EXPECT_THAT(warning_of({{{"time", 7, 0, false}}}), HasSubstr("one time for 40 points"));

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
 #include <cstdint>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -298,6 +299,18 @@ TEST(Mcap, DamagedMessagesAreNamed) {
     EXPECT_THAT(outcome.error->problem(), HasSubstr("message 3 of topic /livox/lidar"));
     EXPECT_EQ(outcome.error->place().byte_offset, bytes.find("no CDR") - 31);
   }
+}
+
+TEST(Mcap, InertialSamplesWithoutNumbersAreLeftOut) {
+  McapFile file = small_file();
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  std::string& message = file.messages[2].second;  // the last number but nine
+  message.replace(message.size() - 80, 8, reinterpret_cast<const char*>(&nan), 8);
+  const Outcome outcome = read_bytes(file.bytes());
+  EXPECT_FALSE(outcome.error);
+  EXPECT_EQ(outcome.recording.data.imu.size(), 5U);
+  ASSERT_EQ(outcome.recording.warnings.size(), 1U);
+  EXPECT_THAT(outcome.recording.warnings[0].message, HasSubstr("are no numbers were left out"));
 }
 
 TEST(Mcap, AClaimedChunkCostsNoMemory) {

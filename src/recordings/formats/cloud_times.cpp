@@ -190,7 +190,12 @@ void CloudTimeSearch::add(const CloudLayout& layout, std::span<const std::uint8_
   if (layout.width == 0 || layout.height == 0) return;
   ++messages_;
   for (const std::string_view name : kTimeNames) {
-    const CloudField field = find_field(layout, {name});
+    CloudField field;
+    try {
+      field = find_field(layout, {name});
+    } catch (const BadMessage& bad) {  // of a field that is not needed
+      other_type_ = bad.what();
+    }
     if (!field) continue;
     const std::vector<TimeReading> readings = readings_of(field.datatype);
     if (readings.empty()) {

@@ -489,6 +489,14 @@ void MessageReader::append_imu(const LidarMessage& message, std::uint8_t device,
     sample.angular_velocity[axis] = static_cast<float>(message.angular_velocity[axis]);
     sample.acceleration_g[axis] =
         static_cast<float>(message.acceleration[axis] * acceleration_units_[message.topic]);
+    if (std::isfinite(sample.angular_velocity[axis] + sample.acceleration_g[axis])) continue;
+    if (!std::exchange(imu_without_numbers_reported_, true)) {
+      warn(
+          fmt::format("inertial samples of topic {} whose rates or accelerations are no numbers "
+                      "were left out",
+                      topics()[message.topic].name));
+    }
+    return;
   }
   samples.push_back(sample);
 }

@@ -120,7 +120,7 @@ class MessageReader final : public Reader {
   std::vector<double> acceleration_units_;             ///< by topic: g per unit of the message
   LidarMessage message_;
   std::optional<FileError> failure_;
-  bool equal_times_reported_ = false, ended_ = false;
+  bool equal_times_reported_ = false, imu_without_numbers_reported_ = false, ended_ = false;
 };
 
 }  // namespace risley::recordings
