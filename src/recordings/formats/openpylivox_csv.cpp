@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 
 #include "recordings/formats/cartesian.hpp"
 #include "recordings/formats/format.hpp"
@@ -217,12 +218,23 @@ class OpenpylivoxCsvWriter final : public Writer {
                                                  whole_steps(point.z, kMillimetre)};
       if (steps == std::array<std::int64_t, 3>{}) return false;
       for (const auto step : steps) {
+        if (step < std::numeric_limits<std::int32_t>::min() ||
+            step > std::numeric_limits<std::int32_t>::max()) {
+          throw InvalidArgument(fmt::format(
+              "row {}: range = {} m, allowed coordinates in [-2147483.648, 2147483.647] "
+              "m",
+              i, rows.range[i]));
+        }
         output_.append_decimal(step, kMetreDecimals);
         comma();
       }
     } else {
       const auto depth = whole_steps(rows.range[i], kMillimetre);
       if (depth == 0) return false;
+      if (depth > std::numeric_limits<std::uint32_t>::max()) {
+        throw InvalidArgument(
+            fmt::format("row {}: range = {} m, allowed up to 4294967.295 m", i, rows.range[i]));
+      }
       output_.append_decimal(depth, kMetreDecimals);
       comma();
       output_.append_fixed(degrees_from_radians(rows.zenith[i]), kDegreeDecimals);
