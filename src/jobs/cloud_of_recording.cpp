@@ -2,7 +2,10 @@
 // SPDX-License-Identifier: MIT
 #include "risley/jobs/cloud_of_recording.hpp"
 
+#include <chrono>
 #include <filesystem>
+#include <optional>
+#include <system_error>
 
 #include "risley/core/error.hpp"
 #include "risley/io/sha256.hpp"
@@ -13,6 +16,18 @@
 #include "jobs/checks.hpp"
 
 namespace risley::jobs {
+namespace {
+
+/// The day on which a file was last changed, UTC: of a recording, mostly when it was made.
+std::optional<std::chrono::sys_days> day_of(const std::string& path) {
+  using namespace std::chrono;
+  std::error_code problem;
+  const auto time = std::filesystem::last_write_time(path, problem);
+  if (problem) return std::nullopt;
+  return floor<days>(file_clock::to_sys(time));
+}
+
+}  // namespace
 
 cloud::CloudSummary cloud_of_recording(const CloudOfRecordingOptions& options,
                                        const Progress& progress) {
@@ -35,6 +50,7 @@ cloud::CloudSummary cloud_of_recording(const CloudOfRecordingOptions& options,
   if (std::filesystem::exists(options.calibration)) {
     settings.provenance.emplace_back("calibration_sha256", io::sha256_of_file(options.calibration));
   }
+  if (!settings.writer.date) settings.writer.date = day_of(options.recording);
   const SensorFrameRecording input =
       open_in_sensor_frame(options.recording, options.reading, calibration, progress);
   cloud::CloudSummary result =

@@ -518,6 +518,12 @@ TEST_F(LasTest, OtherClocksAreNotGpsTime) {
     EXPECT_EQ(file.creation_day, 0);
     EXPECT_EQ(file.points[0].gps_time, 0.0);
     EXPECT_EQ(file.points[1].gps_time, 987'654'321.012345678);
+    using namespace std::chrono;
+    options_.date = sys_days{year{2026} / February / 1};
+    write(points);
+    EXPECT_EQ(las_checker::read(path()).creation_day, 32);
+    EXPECT_EQ(las_checker::read(path()).creation_year, 2026);
+    options_.date.reset();
   }
 }
 

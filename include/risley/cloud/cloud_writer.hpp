@@ -2,8 +2,10 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -33,6 +35,8 @@ struct CloudWriterOptions {
   /// LAS stores GPS time where the recording's clock is UTC; otherwise, or when this is false, the
   /// recording's own seconds.
   bool gps_time = true;
+  /// Creation date of LAS where the recording's clock knows none.
+  std::optional<std::chrono::sys_days> date = {};
 };
 
 /// A format that clouds can be written in.

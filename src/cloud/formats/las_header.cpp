@@ -154,6 +154,7 @@ Layout::Layout(Version version, const CloudHeader& header, const CloudWriterOpti
       has_point_source_(header.has_point_source),
       utc_(header.time_reference == recordings::TimeReference::utc),
       gps_time_(utc_ && options.gps_time),
+      date_(options.date),
       system_identifier_(las::system_identifier(header)),
       generating_software_(las::generating_software(header)),
       floats_(uncertainty_fields(header)) {
@@ -203,12 +204,13 @@ HeaderNumbers Layout::numbers(const Summary& summary) const {
     numbers.low[axis] = std::nearbyint(summary.low[axis]) * scale_ + offset_[axis] + 0.0;
     numbers.high[axis] = std::nearbyint(summary.high[axis]) * scale_ + offset_[axis] + 0.0;
   }
-  if (utc_) {
-    using namespace std::chrono;
-    const auto day = floor<days>(sys_time<nanoseconds>{nanoseconds{summary.first_time_ns}});
-    const year_month_day date{day};
+  using namespace std::chrono;
+  std::optional<sys_days> day = date_;
+  if (utc_) day = floor<days>(sys_time<nanoseconds>{nanoseconds{summary.first_time_ns}});
+  if (day) {
+    const year_month_day date{*day};
     const sys_days new_year{date.year() / January / 1};
-    numbers.creation_day = static_cast<std::uint16_t>((day - new_year).count() + 1);
+    numbers.creation_day = static_cast<std::uint16_t>((*day - new_year).count() + 1);
     numbers.creation_year = static_cast<std::uint16_t>(static_cast<int>(date.year()));
   }
   return numbers;

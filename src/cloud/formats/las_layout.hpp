@@ -3,9 +3,11 @@
 #pragma once
 
 #include <array>
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -41,7 +43,7 @@ struct VariableLengthRecord {
 
 /// The public header's numbers that depend on the points, as they stand in the file.
 struct HeaderNumbers {
-  std::uint16_t creation_day = 0, creation_year = 0;  ///< of the first point, 0 without UTC
+  std::uint16_t creation_day = 0, creation_year = 0;  ///< 0 where nobody knows
   std::array<double, 3> low{}, high{};                ///< m; 0 without points
 };
 
@@ -58,8 +60,8 @@ struct HeaderNumbers {
 ///   1; point source the strip of a flight, otherwise 1: the points are of this file.
 /// - The trajectory's errors of a moving sensor: records of the user "risley", docs/files.md.
 /// - Extra bytes: uncertainty_fields and loading_fields, then Tag and Beam.
-/// - File creation date: that of the first point in UTC, otherwise none. The same points always
-///   give the same bytes.
+/// - File creation date: that of the first point in UTC, otherwise that of the options; never today,
+///   so that the same points give the same bytes.
 class Layout {
  public:
   /// @throws InvalidArgument for a scale that is not positive, and for more common factors or
@@ -106,6 +108,7 @@ class Layout {
   bool has_point_source_;
   bool utc_;       ///< times are UTC
   bool gps_time_;  ///< and stored as GPS time
+  std::optional<std::chrono::sys_days> date_;  ///< of other clocks
   std::string system_identifier_, generating_software_;
   std::vector<VariableLengthRecord> records_;
   std::vector<PointField> floats_;  ///< float32 extra bytes
