@@ -528,11 +528,27 @@
     });
   }
 
+  // Thousands of small dots are painted on the canvas on which they were painted first, unless they
+  // are said to have changed: a picture to print or to save would lack them.
+  function paintAllOnPictures(chart) {
+    const { painter, storage } = chart.getZr();
+    const paint = painter.getRenderedCanvas;
+    if (!paint) return; // three dimensions
+    const renew = () => storage.getDisplayList(true).forEach((one) => one.dirtyShape?.());
+    painter.getRenderedCanvas = (options) => {
+      renew();
+      const canvas = paint.call(painter, options);
+      renew();
+      return canvas;
+    };
+  }
+
   function make(one) {
     const place = document.getElementById(one.id);
     const entry = { data: one, place: place };
     size(entry);
     entry.chart = echarts.init(place);
+    paintAllOnPictures(entry.chart);
     draw(entry);
     if (one.kind !== 'space') guideMouse(entry);
     if (one.grows_for && one.kind !== 'space') addGrowth(entry);

@@ -403,6 +403,14 @@ export async function checkPrint(tab, file) {
   await look(tab);
   const complaints = [];
   const titles = (await figuresOf(tab)).map(({ title }) => title);
+  const onScreen = await tab.evaluate(async () => {
+    const busy = [];
+    for (const { data, place } of window.risley.charts) {
+      const canvas = place.querySelector('canvas');
+      busy.push(data.kind === 'space' ? 0 : (await window.looking.seen(canvas.toDataURL())).busy);
+    }
+    return busy;
+  });
   await tab.evaluate(() => {
     window.addEventListener('beforeprint', () => {
       window.printed = [...document.querySelectorAll('img.printed')].map((image) => ({
@@ -430,6 +438,10 @@ export async function checkPrint(tab, file) {
   printed.forEach((picture, i) => {
     if (picture.alt !== titles[i]) complaints.push(`${titles[i]}: printed as ${picture.alt}`);
     if (picture.busy < 0.01) complaints.push(`${titles[i]}: printed blank`);
+    if (picture.busy < 0.7 * onScreen[i]) {
+      complaints.push(`${titles[i]}: printed with less than the screen shows, ` +
+        `${picture.busy.toFixed(3)} of the picture instead of ${onScreen[i].toFixed(3)}`);
+    }
     if (!inPdf.has(String(picture.size))) {
       complaints.push(`${titles[i]}: no picture of ${picture.size} in the PDF`);
     }

@@ -211,6 +211,11 @@ test('paper without diagrams', async () => {
                                           /printed pictures stay/));
 });
 
+test('pictures without their dots', () => withPage(
+  replaced('paintAllOnPictures(entry.chart);', ''),
+  async (tab) => complains(await checks.checkPrint(tab, join(folder, 'b.pdf')),
+                           /printed with less than the screen shows/)));
+
 test('a page that is too wide', () => withPage(
   replaced('</main>', '<p style="width: 900px">wide</p></main>'),
   async (tab) => complains(await checks.checkWidth(tab), /pixels wide where 400 are/),

@@ -88,11 +88,11 @@ class ReadersTest(CommandTest):
         if rosbag is None:
             self.skipTest("rosbag")
         path = self.cloud("cloud.bag")
-        columns = {}
+        columns, times = {}, []
         with rosbag.Bag(path) as bag:
             for _, message, _ in bag.read_messages():
                 numpy = importlib.import_module("numpy")
-                kinds = {2: "u1", 7: "<f4", 8: "<f8"}
+                kinds = {2: "u1", 6: "<u4", 7: "<f4", 8: "<f8"}
                 dtype = numpy.dtype({"names": [f.name for f in message.fields],
                                      "formats": [kinds[f.datatype] for f in message.fields],
                                      "offsets": [f.offset for f in message.fields],
@@ -100,8 +100,10 @@ class ReadersTest(CommandTest):
                 rows = numpy.frombuffer(message.data, dtype)
                 for name in rows.dtype.names:
                     columns.setdefault(name.lower(), []).extend(rows[name].astype(float).tolist())
+                times += (message.header.stamp.to_sec() + 1e-9 * rows["offset_time"]).tolist()
         for name in self.expected:
             self.compare(name, columns[name.lower()])
+        self.compare("Time", times, tolerance=1e-6)
         info = subprocess.run(["rosbag", "info", path], capture_output=True, text=True, check=False)
         self.assertIn("sensor_msgs/PointCloud2", info.stdout)
 
