@@ -47,7 +47,7 @@ report::Report report_of(const std::string& path) {
   return report::read_report(data.string());
 }
 
-ExitStatus write_page(const std::string& page, const std::string& html, Json facts,
+ExitStatus write_page(const std::string& page, const std::string& html, const Json& facts,
                       const CommonOptions& common) {
   io::write_text_file(page, html);
   if (common.json) {

@@ -60,7 +60,8 @@ struct HeaderNumbers {
 ///   1; point source the strip of a flight, otherwise 1: the points are of this file.
 /// - The trajectory's errors of a moving sensor: records of the user "risley", docs/files.md.
 /// - Extra bytes: uncertainty_fields and loading_fields, then Tag and Beam.
-/// - File creation date: that of the first point in UTC, otherwise that of the options; never today,
+/// - File creation date: that of the first point in UTC, otherwise that of the options; never
+/// today,
 ///   so that the same points give the same bytes.
 class Layout {
  public:
@@ -106,8 +107,8 @@ class Layout {
   double scale_;
   std::array<double, 3> offset_;
   bool has_point_source_;
-  bool utc_;       ///< times are UTC
-  bool gps_time_;  ///< and stored as GPS time
+  bool utc_;                                   ///< times are UTC
+  bool gps_time_;                              ///< and stored as GPS time
   std::optional<std::chrono::sys_days> date_;  ///< of other clocks
   std::string system_identifier_, generating_software_;
   std::vector<VariableLengthRecord> records_;
