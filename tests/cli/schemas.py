@@ -44,6 +44,11 @@ def _validator(verb):
     return jsonschema.Draft202012Validator(schema_of(verb))
 
 
+def takes(verb, instance):
+    """Whether an object is as the schema of a verb has it."""
+    return _validator(verb).is_valid(instance)
+
+
 def problem(verb, instance):
     """What the schema of a verb has against an object, in words; None where nothing."""
     if jsonschema is None:
