@@ -155,12 +155,14 @@ class DocumentsTest(unittest.TestCase):
         return printed
 
     def outputs(self, commands):
+        """What each command prints; no list where this machine lacks what one of them needs."""
         printed = []
         for command in commands:
             words = command.split()
             reason = next((why for start, why in LEFT_OUT.items() if command.startswith(start)), None)
             if "jq" in words and not shutil.which("jq"):
-                reason = "no jq"
+                skip_aloud(command.strip(), "no jq, and nothing that it would print is compared")
+                return None
             if reason:
                 skip_aloud(command.strip(), reason)
                 continue
@@ -194,7 +196,7 @@ class DocumentsTest(unittest.TestCase):
                 self.skipTest("data")
             self.told(0, command)
         messages = dict(MESSAGES.get(name, {}))
-        printed = None
+        printed = []
         for language, lines in blocks_of(text):
             if language == "sh":
                 printed = self.outputs(commands_of(lines))
@@ -205,7 +207,7 @@ class DocumentsTest(unittest.TestCase):
                 with self.subTest(lines[0]):
                     if start:
                         self.check_message(lines, messages.pop(start))
-                    else:
+                    elif printed is not None:
                         self.assertTrue(printed, f"{lines}: no command was shown before")
                         self.assertTrue(any(follows(lines, one) for one in whole_outputs(printed)),
                                         "\n".join(["shown:", *lines, "printed:", *sum(printed, [])]))
