@@ -89,7 +89,7 @@ export async function newTab(browser, options = {}) {
   const unfold = async () => {
     await openSections();
     await tab.waitForFunction(() =>
-      window.risley.charts.length === document.querySelectorAll('figure .plot').length, null,
+      (window.risley?.charts.length ?? 0) === document.querySelectorAll('figure .plot').length, null,
                               { timeout: longestDrawing, polling: 10 });
   };
   return { tab, context, complaints, open, openSections, draw, unfold };
