@@ -73,7 +73,7 @@ const pictures = [
            { figure: /^(Walls (before|after)|Thickness over the (angle of incidence|rotation angle of prism A))/ }],
   },
   {
-    file: 'cloud.png', needs: ['cloud'], page: 'out/hall.html', width: 1000, keep: [{ figure: /^The points$/ }],
+    file: 'cloud.png', needs: ['cloud'], page: 'out/hall.html', width: 1100, keep: [{ css: '.overview' }],
     before: () => window.risley.charts[0].chart.setOption({
       grid3D: { viewControl: { alpha: 22, beta: -62, distance: 140 } },
     }),
