@@ -132,6 +132,8 @@ FileOutcome convert(const FileJob& job, const ConvertOptions& options, const Pro
                {"input", job.input},
                {"output", job.output},
                {"time_uncertainty_s", done.time_uncertainty},
+               {"frame", nullptr},
+               {"slips", nullptr},
                {"warnings", warnings_json(done.warnings)}};
   if (done.choice) {
     json["sensor_chosen_by"] = to_string(done.choice->chosen_by);

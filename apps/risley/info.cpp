@@ -115,6 +115,8 @@ Json audit_json(const InspectedRecording& found) {
           {"packets_by_data_type", counts_json(audit.packets_by_data_type)},
           {"imu_samples", audit.imu},
           {"devices", devices_json(header, audit)},
+          {"frame", nullptr},
+          {"slips", nullptr},
           {"warnings", warnings_json(found.warnings)}};
 }
 

@@ -82,6 +82,8 @@ Json observability_json(const JudgedObservability& judged) {
           {"observations", o.shots},
           {"duration_s", o.duration},
           {"rate_hz", o.rate},
+          {"frame", nullptr},
+          {"slips", nullptr},
           {"words", judged.words}};
 }
 
