@@ -78,7 +78,7 @@ ExitStatus report_two(const std::string& a, const std::string& b, const std::str
       report::comparison_page({a, report_a}, {b, report_b}, c, provenance_of(common));
   Json differences = Json::object();
   for (const jobs::ParameterDifference& one : c.parameters) {
-    const bool in_metres = one.name == "range_offset_m";
+    const bool in_metres = one.name == jobs::kRangeOffset;
     const double unit = in_metres ? 1 : find_parameter(one.name, c.b.shape()).si_per_unit;
     differences[one.name] = {{"value", one.difference / unit}, {"sigma", one.sigma / unit}};
   }

@@ -8,9 +8,11 @@
 #include <cstdint>
 #include <filesystem>
 
+#include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <fmt/format.h>
 
+#include "risley/algebra/named_covariance.hpp"
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
 #include "risley/core/random.hpp"
@@ -20,10 +22,10 @@
 namespace risley::jobs {
 namespace {
 
+using algebra::NamedCovariance;
 using sensors::Sensor;
 
 constexpr std::size_t kBeams = 2000;  // over all rotation angles; tell a mean square to 3 %
-constexpr const char* kRangeOffset = "range_offset_m";
 
 Sensor load_result(const std::string& path) {
   namespace fs = std::filesystem;
@@ -49,18 +51,10 @@ void require_same_kind(const Sensor& a, const Sensor& b) {
                   words(a), words(b)));
 }
 
-/// A named covariance.
-struct Known {
-  std::vector<std::string> names;
-  Eigen::MatrixXd covariance;  ///< [names, names]
-
-  double sigma(const std::string& name) const {
-    const auto found = std::find(names.begin(), names.end(), name);
-    if (found == names.end()) return 0;
-    const auto at = static_cast<Eigen::Index>(found - names.begin());
-    return std::sqrt(covariance(at, at));
-  }
-};
+double sigma_of(const NamedCovariance& known, const std::string& name) {
+  const Eigen::Index at = known.find(name);
+  return at < 0 ? 0 : std::sqrt(known.matrix(at, at));
+}
 
 /// Parameters that a result held though they may be off: nothing comes on top of their sigma.
 std::vector<std::string> held_names(const Sensor& sensor) {
@@ -82,21 +76,18 @@ bool hold_alike(const Sensor& a, const Sensor& b) {
 
 /// What a result would know if the parameters that it held were exactly as held: the joint
 /// covariance under that condition.
-Known given_held(const Sensor& sensor) {
-  const std::vector<std::string> held = held_names(sensor);
+NamedCovariance given_held(const NamedCovariance& all, const std::vector<std::string>& held) {
+  std::vector<std::string> free;
   std::vector<Eigen::Index> free_at, held_at;
-  Known known;
-  for (std::size_t i = 0; i < sensor.covariance_names.size(); ++i) {
-    const std::string& name = sensor.covariance_names[i];
-    const bool is_held = std::binary_search(held.begin(), held.end(), name);
+  for (std::size_t i = 0; i < all.names.size(); ++i) {
+    const bool is_held = std::binary_search(held.begin(), held.end(), all.names[i]);
     (is_held ? held_at : free_at).push_back(static_cast<Eigen::Index>(i));
-    if (!is_held) known.names.push_back(name);
+    if (!is_held) free.push_back(all.names[i]);
   }
-  const Eigen::MatrixXd& all = sensor.covariance;
-  const Eigen::MatrixXd both = all(free_at, held_at);
-  known.covariance = all(free_at, free_at);
+  NamedCovariance known = all.part(free);
   if (!held_at.empty()) {
-    known.covariance -= both * all(held_at, held_at).ldlt().solve(both.transpose()).eval();
+    const Eigen::MatrixXd both = all.matrix(free_at, held_at);
+    known.matrix -= both * all.matrix(held_at, held_at).ldlt().solve(both.transpose()).eval();
   }
   return known;
 }
@@ -104,12 +95,12 @@ Known given_held(const Sensor& sensor) {
 /// Both results, each with the covariance that its part of a difference has.
 struct Pair {
   const Sensor &a, &b;
-  Known known_a, known_b;
+  NamedCovariance known_a, known_b;
 };
 
 ParameterDifference difference_of(const std::string& name, const Pair& pair, double value_a,
                                   double value_b) {
-  const double sigma_a = pair.known_a.sigma(name), sigma_b = pair.known_b.sigma(name);
+  const double sigma_a = sigma_of(pair.known_a, name), sigma_b = sigma_of(pair.known_b, name);
   return {
       name, value_a, value_b, sigma_a, sigma_b, value_b - value_a, std::hypot(sigma_a, sigma_b)};
 }
@@ -136,37 +127,31 @@ std::vector<ParameterDifference> differences(const Pair& pair) {
   return result;
 }
 
-/// Adds a covariance to that of some of its names and others.
-void add_covariance(const Known& known, const std::vector<std::string>& names,
-                    Eigen::MatrixXd& covariance) {
-  std::vector<Eigen::Index> from, to;
-  for (std::size_t i = 0; i < known.names.size(); ++i) {
-    const auto found = std::find(names.begin(), names.end(), known.names[i]);
-    if (found == names.end()) continue;
-    from.push_back(static_cast<Eigen::Index>(i));
-    to.push_back(found - names.begin());
-  }
-  covariance(to, to) += known.covariance(from, from);
+/// Adds a covariance to that of more names, or of fewer.
+void add_covariance(const NamedCovariance& known, NamedCovariance& sum) {
+  const NamedCovariance part = known.part(sum.names);
+  std::vector<Eigen::Index> to(part.names.size());
+  std::transform(part.names.begin(), part.names.end(), to.begin(),
+                 [&](const std::string& name) { return sum.find(name); });
+  sum.matrix(to, to) += part.matrix;
 }
 
 calibration::PointingError compare_directions(const Pair& pair) {
   const Sensor& b = pair.b;
-  std::vector<std::string> names;
-  for (const Known* known : {&pair.known_a, &pair.known_b}) {
+  NamedCovariance sum;
+  for (const NamedCovariance* known : {&pair.known_a, &pair.known_b}) {
     for (const std::string& name : known->names) {
       const auto& list = parameter_list(b.shape());
       const bool of_train = std::any_of(list.begin(), list.end(), [&](const ParameterInfo& one) {
         return one.name == name && one.kind == ParameterKind::train;
       });
-      if (of_train && std::find(names.begin(), names.end(), name) == names.end()) {
-        names.push_back(name);
-      }
+      if (of_train && sum.find(name) < 0) sum.names.push_back(name);
     }
   }
-  const auto n = static_cast<Eigen::Index>(names.size());
-  Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(n, n);
-  add_covariance(pair.known_a, names, covariance);
-  add_covariance(pair.known_b, names, covariance);
+  const auto n = static_cast<Eigen::Index>(sum.names.size());
+  sum.matrix = Eigen::MatrixXd::Zero(n, n);
+  add_covariance(pair.known_a, sum);
+  add_covariance(pair.known_b, sum);
   std::vector<std::vector<double>> angles(static_cast<std::size_t>(b.prisms()),
                                           std::vector<double>(kBeams));
   for (std::size_t k = 0; k < angles.size(); ++k) {
@@ -177,9 +162,9 @@ calibration::PointingError compare_directions(const Pair& pair) {
   for (std::size_t i = 0; i < kBeams; ++i) {
     emitters[i] = static_cast<std::uint8_t>(i % static_cast<std::size_t>(b.train.emitters()));
   }
-  const calibration::BeamBundle bundle(b.train, estimation::free_parameters(names, b.shape()),
+  const calibration::BeamBundle bundle(b.train, estimation::free_parameters(sum.names, b.shape()),
                                        angles, emitters);
-  return bundle.pointing_error(pair.a.train, covariance);
+  return bundle.pointing_error(pair.a.train, sum.matrix);
 }
 
 }  // namespace
@@ -190,8 +175,8 @@ ResultComparison compare_results(const std::string& a, const std::string& b) {
   result.same_unit = !result.a.serial.empty() && result.a.serial == result.b.serial;
   result.held_alike = result.same_unit && hold_alike(result.a, result.b);
   const auto known = [&](const Sensor& sensor) {
-    return result.held_alike ? given_held(sensor)
-                             : Known{sensor.covariance_names, sensor.covariance};
+    const NamedCovariance all{sensor.covariance_names, sensor.covariance};
+    return result.held_alike ? given_held(all, held_names(sensor)) : all;
   };
   const Pair pair{result.a, result.b, known(result.a), known(result.b)};
   result.parameters = differences(pair);

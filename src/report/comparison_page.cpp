@@ -3,7 +3,6 @@
 #include "risley/report/comparison_page.hpp"
 
 #include <cmath>
-#include <string_view>
 #include <utility>
 #include <variant>
 
@@ -77,8 +76,7 @@ struct InUnits {
 };
 
 InUnits in_units(const ParameterDifference& one, TrainShape shape) {
-  constexpr std::string_view kRangeOffset = "range_offset_m";
-  if (one.name == kRangeOffset) {
+  if (one.name == jobs::kRangeOffset) {
     return {parameter_head("range offset", "r_0", one.name), 1};
   }
   const ParameterInfo& info = find_parameter(one.name, shape);

@@ -10,9 +10,12 @@
 
 namespace risley::jobs {
 
+/// Name of the only quantity in a comparison that is no parameter of the train.
+inline constexpr const char* kRangeOffset = "range_offset_m";
+
 /// One parameter as two results have it, SI units.
 struct ParameterDifference {
-  std::string name;  ///< as in parameter_list(), or "range_offset_m"
+  std::string name;  ///< as in parameter_list(), or kRangeOffset
   double value_a = 0, value_b = 0;
   double sigma_a = 0, sigma_b = 0;  ///< 0 where it was held
   double difference = 0;            ///< b minus a

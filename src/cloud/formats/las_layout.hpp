@@ -60,9 +60,8 @@ struct HeaderNumbers {
 ///   1; point source the strip of a flight, otherwise 1: the points are of this file.
 /// - The trajectory's errors of a moving sensor: records of the user "risley", docs/files.md.
 /// - Extra bytes: uncertainty_fields and loading_fields, then Tag and Beam.
-/// - File creation date: that of the first point in UTC, otherwise that of the options; never
-/// today,
-///   so that the same points give the same bytes.
+/// - File creation date: that of the first point in UTC, otherwise that of the options. It is
+///   never today: the same points give the same bytes.
 class Layout {
  public:
   /// @throws InvalidArgument for a scale that is not positive, and for more common factors or
