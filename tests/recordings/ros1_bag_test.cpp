@@ -17,19 +17,15 @@
 
 #include "bags/written_bags.hpp"
 #include "recordings/format_tests.hpp"
+#include "recordings/livox_points.hpp"
 
 namespace risley::recordings::ros1_bag_test {
 
 using namespace bags::written;
 using namespace format_tests;
+using namespace livox_points;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
-
-struct Point {
-  std::uint32_t offset_ns;
-  float x, y, z;
-  std::uint8_t intensity = 0, tag = 0, line = 0;
-};
 
 RawMessage custom(std::uint64_t timebase, const std::vector<Point>& points,
                   std::int64_t claimed_more = 0) {
@@ -62,23 +58,6 @@ RawMessage custom(std::uint64_t timebase, const std::vector<Point>& points,
   }
   return message;
 }
-
-/// Single-return shots every 10 us, as a Mid-40 sends them.
-std::vector<Point> shots(std::size_t count, float x = 2.0F, std::uint32_t step_ns = 10'000) {
-  std::vector<Point> points;
-  for (std::uint32_t i = 0; i < count; ++i) {
-    const auto number = static_cast<float>(i);
-    points.push_back({i * step_ns, x + 0.001F * number, 0.25F, -0.5F + 0.002F * number,
-                      static_cast<std::uint8_t>(i)});
-  }
-  return points;
-}
-
-struct Field {
-  const char* name;
-  std::uint32_t offset;
-  std::uint8_t datatype;
-};
 
 struct Cloud {
   std::uint32_t height = 1, width = 0, point_step = 18, row_step = 0;

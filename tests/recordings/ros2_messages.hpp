@@ -8,10 +8,12 @@
 #include <vector>
 
 #include "bags/written_bags.hpp"
+#include "recordings/livox_points.hpp"
 
 namespace risley::recordings::ros2_messages {
 
 using namespace bags::written;
+using namespace livox_points;
 
 inline constexpr std::uint64_t kPowerOn = 5'000'000'000;          // ns since power-on
 inline constexpr std::uint64_t kUtc = 1'600'000'000'123'456'789;  // 2020
@@ -19,12 +21,6 @@ inline constexpr const char* kTopic = "/livox/lidar";
 inline constexpr const char* kCustomType = "livox_ros_driver2/msg/CustomMsg";
 inline constexpr const char* kCloudType = "sensor_msgs/msg/PointCloud2";
 inline constexpr const char* kImuType = "sensor_msgs/msg/Imu";
-
-struct Point {
-  std::uint32_t offset_ns;
-  float x, y, z;
-  std::uint8_t intensity = 0, tag = 0, line = 0;
-};
 
 inline std::string custom(std::uint64_t timebase, const std::vector<Point>& points,
                           std::int64_t claimed_more = 0, bool big_endian = false) {
@@ -40,22 +36,6 @@ inline std::string custom(std::uint64_t timebase, const std::vector<Point>& poin
   }
   return cdr.bytes();
 }
-
-inline std::vector<Point> shots(std::size_t count, float x = 2.0F) {
-  std::vector<Point> points;
-  for (std::uint32_t i = 0; i < count; ++i) {
-    const auto number = static_cast<float>(i);
-    points.push_back({i * 10'000, x + 0.001F * number, 0.25F, -0.5F + 0.002F * number,
-                      static_cast<std::uint8_t>(i)});
-  }
-  return points;
-}
-
-struct Field {
-  const char* name;
-  std::uint32_t offset;
-  std::uint8_t datatype;
-};
 
 /// As PCL's PointXYZI: with holes between the fields.
 inline std::string cloud(std::uint64_t time_ns, std::uint32_t points,
