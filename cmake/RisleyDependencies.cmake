@@ -12,6 +12,15 @@ risley_package(spdlog TARGET spdlog::spdlog DEBIAN libspdlog-dev FIND spdlog)
 risley_package(gtest TARGET GTest::gmock DEBIAN libgmock-dev FIND GTest)
 risley_package(ceres TARGET Ceres::ceres DEBIAN libceres-dev FIND Ceres)
 risley_package(benchmark TARGET benchmark::benchmark DEBIAN libbenchmark-dev FIND benchmark)
+# The interpreter is the system's, never whichever python3 stands first in the path; scikit-build-core
+# and whoever sets Python_EXECUTABLE choose another.
+if(NOT DEFINED Python_EXECUTABLE AND NOT SKBUILD AND EXISTS /usr/bin/python3)
+  set(Python_EXECUTABLE /usr/bin/python3)
+endif()
+risley_package(python TARGET Python::Module DEBIAN python3-dev
+               FIND Python 3.9 COMPONENTS Interpreter Development.Module)
+set(PYBIND11_NOPYTHON ON) # it is found above
+risley_package(pybind11 TARGET pybind11::headers DEBIAN pybind11-dev FIND pybind11 2.10)
 
 find_path(RISLEY_RANDOM123_INCLUDE_DIR Random123/philox.h)
 mark_as_advanced(RISLEY_RANDOM123_INCLUDE_DIR)

@@ -17,9 +17,10 @@ INCLUDE = re.compile(r'^\s*#\s*include\s*["<]([^">]+)[">]')
 STRING = re.compile(r'"((?:[^"\\]|\\.)*)"')
 FLAG = re.compile(r"(?<![\w-])--[a-z][a-z0-9-]*")
 PROGRAMS = ("apps", "studies", "bench")  # may use every layer
+BINDINGS = "python"  # src/python: may use every layer's public headers, and nothing may use it
 # Libraries with one home: what others need of them, they ask that layer for.
 HOMES = {"netcdf": "io", "hdf5": "io", "yaml-cpp": "io", "openssl": "io", "proj": "cloud",
-         "proj_experimental": "cloud"}
+         "proj_experimental": "cloud", "pybind11": BINDINGS}
 STRANGERS = ("simulation", "estimation")  # they meet only in tests, so their agreement counts
 
 
@@ -48,7 +49,8 @@ def included_layer(include, layers):
     parts = include.split("/")
     if parts[0] == "risley" and len(parts) > 2:
         return parts[1], False
-    return (parts[0], True) if len(parts) > 1 and parts[0] in layers else (None, False)
+    private = len(parts) > 1 and (parts[0] in layers or parts[0] == BINDINGS)
+    return (parts[0], True) if private else (None, False)
 
 
 def flags_in(line):
@@ -85,9 +87,11 @@ def check_file(path, shown, own, allowed, layers):
         if library and own != HOMES[library]:
             errors.append(f"{shown}:{number}: only the layer {HOMES[library]} may include {include}")
         layer, private = included_layer(include, layers)
-        if layer is None:
+        if layer is None or layer == own == BINDINGS:
             continue
-        if layer not in layers:
+        if layer == BINDINGS:
+            errors.append(f"{shown}:{number}: nothing may include the bindings ({include})")
+        elif layer not in layers:
             errors.append(f"{shown}:{number}: {include} is in no declared layer")
         elif layer not in allowed:
             errors.append(f"{shown}:{number}: may not include the layer {layer} ({include})")
@@ -104,13 +108,13 @@ def check(root):
     errors = check_declarations(layers)
     for top in (root / "include/risley", root / "src"):
         for folder in sorted(entry for entry in top.glob("*") if entry.is_dir()):
-            if folder.name not in layers:
+            if folder.name not in layers and folder != root / "src" / BINDINGS:
                 errors.append(f"{folder.relative_to(root)}: the folder is no declared layer")
     for folder in ("include/risley", "src", *PROGRAMS):
         for path in sorted((root / folder).rglob("*.[ch]pp")):
             shown = path.relative_to(root)
             layer = None if folder in PROGRAMS else path.relative_to(root / folder).parts[0]
-            if layer is None:
+            if layer is None or (folder, layer) == ("src", BINDINGS):
                 allowed = layers.keys()
             elif layer in layers:
                 allowed = layers[layer] | {layer}

@@ -2,8 +2,13 @@
 // SPDX-License-Identifier: MIT
 #include "risley/recordings/observations.hpp"
 
+#include <cmath>
 #include <string_view>
 
+#include <fmt/format.h>
+
+#include "risley/core/angle.hpp"
+#include "risley/core/error.hpp"
 #include "risley/core/require.hpp"
 
 namespace risley::recordings {
@@ -58,6 +63,21 @@ void require_columns(const Observations& rows) {
   for_each_column([&rows](std::string_view name,
                           const auto& column) { require_length(name, column.size(), rows.size()); },
                   rows);
+}
+
+void require_angles(const Observations& rows) {
+  require_columns(rows);
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    if (rows.valid[i] == 0) continue;
+    const double azimuth = rows.azimuth[i], zenith = rows.zenith[i];
+    if (!(std::abs(azimuth) <= kPi)) {
+      throw InvalidArgument(
+          fmt::format("azimuth = {} rad in row {}, allowed -pi to pi", azimuth, i));
+    }
+    if (!(zenith >= 0 && zenith <= kPi)) {
+      throw InvalidArgument(fmt::format("zenith = {} rad in row {}, allowed 0 to pi", zenith, i));
+    }
+  }
 }
 
 void Chunk::clear() {

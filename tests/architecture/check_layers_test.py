@@ -90,6 +90,18 @@ class CheckLayersTest(unittest.TestCase):
             'src/core/a.cpp:5: a library knows no --shot-rate-hz, say "option NAME"',
         ])
 
+    def test_bindings_may_use_all_layers_and_nothing_may_use_them(self):
+        self.assertEqual(self.errors({
+            "src/python/optics.cpp": '#include <pybind11/pybind11.h>\n#include "python/arrays.hpp"\n'
+                                     '#include "risley/core/angle.hpp"\n'
+                                     '#include "estimation/knots.hpp"\n',
+            "src/core/a.cpp": '#include <pybind11/pybind11.h>\n#include "python/arrays.hpp"\n',
+        }), [
+            "src/core/a.cpp:1: only the layer python may include pybind11/pybind11.h",
+            "src/core/a.cpp:2: nothing may include the bindings (python/arrays.hpp)",
+            "src/python/optics.cpp:4: estimation/knots.hpp is a private header of the layer estimation",
+        ])
+
     def test_an_undeclared_folder_is_found(self):
         self.assertEqual(self.errors({"src/clouds/cloud.cpp": ""}),
                          ["src/clouds: the folder is no declared layer"])

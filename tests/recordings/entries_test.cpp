@@ -1,6 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
 // What the entries of the layer refuse, and that they say what would be right.
+#include <cmath>
 #include <cstdint>
 #include <limits>
 #include <vector>
@@ -67,6 +68,26 @@ TEST(Entries, EveryColumnHasTheLengthOfTheTimes) {
   EXPECT_EQ(run([](Observations& o) { o.range_resolution.pop_back(); }),
             "range_resolution has 3 values, expected 4");
   EXPECT_EQ(run([](Observations& o) { o.valid.push_back(1); }), "valid has 5 values, expected 4");
+}
+
+TEST(Entries, AnglesOfValidRowsAreRadians) {
+  const auto run = [](auto&& change) {
+    Observations rows = points(4);
+    change(rows);
+    return refusal([&] { require_angles(rows); });
+  };
+  EXPECT_EQ(run([](Observations&) {}), "");
+  EXPECT_EQ(run([](Observations& o) { o.zenith[2] = 90; }),
+            "zenith = 90 rad in row 2, allowed 0 to pi");
+  EXPECT_EQ(run([](Observations& o) { o.azimuth[1] = -30; }),
+            "azimuth = -30 rad in row 1, allowed -pi to pi");
+  EXPECT_EQ(run([](Observations& o) { o.zenith[2] = NAN; }),
+            "zenith = nan rad in row 2, allowed 0 to pi");
+  EXPECT_EQ(run([](Observations& o) {
+              o.zenith[2] = 90;
+              o.valid[2] = 0;
+            }),
+            "");
 }
 
 TEST(Entries, RowsAskForColumnsOfOneLength) {

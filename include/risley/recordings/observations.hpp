@@ -45,6 +45,9 @@ struct Observations {
 
 /// @throws InvalidArgument when a column has another length than time_ns
 void require_columns(const Observations& rows);
+/// @throws InvalidArgument naming the row of a valid direction whose azimuth is not in [-pi, pi] or
+///         whose zenith is not in [0, pi]
+void require_angles(const Observations& rows);
 
 /// Header of one sensor data packet as it was recorded, kept so that a packet format can be
 /// written again byte by byte.

@@ -1,0 +1,48 @@
+# SPDX-FileCopyrightText: 2026 The risley authors
+# SPDX-License-Identifier: MIT
+"""How far a job is: what callers may pass as ``progress``."""
+import contextlib
+from typing import Any, Callable, Iterator, Optional, Union
+
+Tell = Callable[[str, float], object]
+Progress = Union[None, bool, Tell]
+
+
+class _Bars:
+    """A bar of tqdm for every stage."""
+
+    def __init__(self, tqdm: Any) -> None:
+        self._tqdm = tqdm
+        self._bar: Any = None
+
+    def tell(self, name: str, fraction: float) -> None:
+        if self._bar is None or self._bar.desc.rstrip(": ") != name:
+            self.close()
+            self._bar = self._tqdm(total=1.0, desc=name,
+                                   bar_format="{l_bar}{bar}| {elapsed}<{remaining}")
+        self._bar.n = fraction
+        self._bar.refresh()
+
+    def close(self) -> None:
+        if self._bar is not None:
+            self._bar.close()
+
+
+@contextlib.contextmanager
+def telling(progress: Progress) -> Iterator[Optional[Tell]]:
+    """What is called with the name of a stage and the fraction done; None for nobody."""
+    if progress is None or progress is False:
+        yield None
+    elif progress is True:
+        try:
+            from tqdm.auto import tqdm
+        except ImportError:
+            yield None
+            return
+        bars = _Bars(tqdm)
+        try:
+            yield bars.tell
+        finally:
+            bars.close()
+    else:
+        yield progress

@@ -1,0 +1,35 @@
+# SPDX-FileCopyrightText: 2026 The risley authors
+# SPDX-License-Identifier: MIT
+"""Sensors by name and of files."""
+import os
+from typing import List
+
+from risley import _risley
+from risley._units import Path
+
+
+def presets() -> List[str]:
+    """Names of the built-in sensors."""
+    return _risley.preset_names()
+
+
+def load_sensor(name_or_path: Path) -> _risley.Sensor:
+    """A built-in sensor by name, or one of a preset or calibration file.
+
+    Parameters
+    ----------
+    name_or_path : str or path
+        A name of `presets`, or a file.
+
+    Returns
+    -------
+    Sensor
+
+    Raises
+    ------
+    ValueError
+        For an unknown name; the message lists the known ones.
+    FileError
+        For a file that breaks the schema, with the line.
+    """
+    return _risley.load_sensor(os.fspath(name_or_path))

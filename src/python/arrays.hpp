@@ -1,0 +1,74 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include <Eigen/Core>
+#include <pybind11/numpy.h>
+
+#include "python/bind.hpp"
+
+namespace risley::python {
+
+/// A column as an array that cannot be written to, without a copy. It keeps its owner alive.
+/// @param owner  of the column's memory
+template <class T, class Owner>
+py::array_t<T> view_of(const std::vector<T>& column, const std::shared_ptr<const Owner>& owner) {
+  using Held = std::shared_ptr<const Owner>;
+  const py::capsule base(new Held(owner), [](void* held) { delete static_cast<Held*>(held); });
+  py::array_t<T> array(static_cast<py::ssize_t>(column.size()), column.data(), base);
+  array.attr("flags").attr("writeable") = false;
+  return array;
+}
+
+/// An array that owns what was a vector.
+template <class T>
+py::array_t<T> array_of(std::vector<T> values) {
+  const auto owner = std::make_shared<const std::vector<T>>(std::move(values));
+  return view_of(*owner, owner);
+}
+
+/// A matrix [rows, columns], or a vector, as an array of its own.
+inline py::array_t<double> array_of(const Eigen::MatrixXd& matrix) {
+  py::array_t<double> array({matrix.rows(), matrix.cols()});
+  Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>(
+      array.mutable_data(), matrix.rows(), matrix.cols()) = matrix;
+  return array;
+}
+
+using Numbers = py::array_t<double, py::array::c_style>;
+using Times = py::array_t<std::int64_t, py::array::c_style>;
+using Bytes = py::array_t<std::uint8_t, py::array::c_style>;
+
+/// Numbers of any shape; an array of double in order is taken as it is.
+/// @throws TypeError, ValueError naming the argument
+Numbers numbers_from(const py::handle& values, std::string_view name);
+/// Whole numbers. @throws as numbers_from()
+Times times_from(const py::handle& values, std::string_view name);
+/// Whole numbers 0 to 255. @throws as numbers_from()
+Bytes bytes_from(const py::handle& values, std::string_view name);
+
+using Shape = std::vector<py::ssize_t>;
+/// "(3, 4)"
+std::string shape_text(const Shape& shape);
+std::string shape_text(const py::array& array);
+Shape shape_of(const py::array& array);
+
+/// The shape that arrays have together, as numpy broadcasts them.
+/// @throws InvalidArgument naming the first that does not go with those before it
+Shape broadcast_shape(const std::vector<std::pair<std::string, py::array>>& arrays);
+/// The array in that shape, in order; itself where it has it.
+py::array broadcast_to(const py::array& array, const Shape& shape);
+
+inline std::span<const double> span_of(const Numbers& array) {
+  return {array.data(), static_cast<std::size_t>(array.size())};
+}
+
+}  // namespace risley::python

@@ -1,0 +1,20 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <pybind11/pybind11.h>
+
+/// The module risley._risley: arguments of Python become those of the libraries, and what these
+/// give becomes objects and arrays of Python. There is one file for each layer of the libraries.
+namespace risley::python {
+
+namespace py = pybind11;
+
+void bind_errors(py::module_& module);
+void bind_calls(py::module_& module);
+void bind_recordings(py::module_& module);
+void bind_optics(py::module_& module);
+void bind_sensors(py::module_& module);
+void bind_jobs(py::module_& module);
+
+}  // namespace risley::python

@@ -1,0 +1,21 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "risley/core/angle.hpp"
+
+#include "python/bind.hpp"
+
+PYBIND11_MODULE(_risley, module) {
+  using namespace risley::python;
+  py::options options;
+  options.disable_function_signatures();  // the stubs have them
+  module.doc() = "The libraries of risley; use the package risley, which documents them.";
+  module.attr("__version__") = RISLEY_VERSION;
+  module.def("radians", &risley::radians_from_degrees, py::arg("degrees"),
+             "An angle in degrees as the libraries convert it, rad.");
+  bind_errors(module);
+  bind_calls(module);
+  bind_recordings(module);
+  bind_optics(module);
+  bind_sensors(module);
+  bind_jobs(module);
+}

@@ -1,0 +1,27 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include "risley/optics/parameters.hpp"
+
+namespace risley::python {
+
+/// The name of a parameter whose values are in SI units: that of files without the unit,
+/// "wedge_angle_a" for "wedge_angle_a_deg".
+std::string si_name(const std::string& file_name);
+
+/// A parameter by either name, and what a value under that name is to be multiplied by.
+struct NamedParameter {
+  const ParameterInfo* info = nullptr;
+  double si_per_unit = 1;
+};
+/// @throws InvalidArgument that lists the known names
+NamedParameter named_parameter(const std::string& name, TrainShape shape);
+
+/// The SI unit of a parameter: "1", "rad" or "rad/s".
+std::string si_unit(const ParameterInfo& info);
+
+}  // namespace risley::python

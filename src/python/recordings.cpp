@@ -1,0 +1,313 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <numeric>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+#include <pybind11/stl.h>
+
+#include "risley/core/error.hpp"
+#include "risley/core/require.hpp"
+#include "risley/jobs/recording_input.hpp"
+#include "risley/recordings/observations.hpp"
+#include "risley/recordings/reader.hpp"
+#include "risley/recordings/writer.hpp"
+
+#include "python/arrays.hpp"
+#include "python/bind.hpp"
+#include "python/call.hpp"
+#include "python/reading.hpp"
+
+namespace risley::python {
+namespace {
+
+using recordings::Observations;
+using recordings::Recording;
+using recordings::RecordingHeader;
+using SharedRecording = std::shared_ptr<Recording>;
+
+std::vector<std::string> texts_of(const std::vector<recordings::ReadWarning>& warnings) {
+  std::vector<std::string> texts;
+  for (const auto& warning : warnings) texts.push_back(jobs::warning_text(warning));
+  return texts;
+}
+
+/// Reads on where the last piece ended.
+class ChunkReader {
+ public:
+  ChunkReader(const std::string& path, std::size_t rows, const recordings::ReadOptions& options)
+      : rows_(rows) {
+    require_at_least("rows", static_cast<long long>(rows), 1);
+    run_job(
+        py::none(), 0,
+        [&](const Progress& progress) {
+          reader_ = recordings::open_recording(path, options, progress.silent());
+        },
+        &cancel_);
+  }
+
+  SharedRecording next() {
+    if (!reader_) throw py::stop_iteration();
+    auto piece = std::make_shared<Recording>();
+    bool more = false;
+    run_job(
+        py::none(), 0, [&](const Progress&) { more = reader_->read(piece->data, rows_); },
+        &cancel_);
+    if (!more) throw py::stop_iteration();
+    piece->header = reader_->header();
+    return piece;
+  }
+
+  void close() {
+    if (!reader_) return;
+    header_ = reader_->header();
+    warnings_ = reader_->warnings();
+    fraction_ = reader_->fraction_read();
+    reader_.reset();
+  }
+
+  const RecordingHeader& header() const { return reader_ ? reader_->header() : header_; }
+  std::vector<std::string> warnings() const {
+    return texts_of(reader_ ? reader_->warnings() : warnings_);
+  }
+  double fraction_read() const { return reader_ ? reader_->fraction_read() : fraction_; }
+
+ private:
+  std::size_t rows_;
+  CancelFlag cancel_;
+  std::unique_ptr<recordings::Reader> reader_;
+  // Of a reader that was closed.
+  RecordingHeader header_;
+  std::vector<recordings::ReadWarning> warnings_;
+  double fraction_ = 0;
+};
+
+/// Fills a column from an array of one value per row, or one for all.
+template <class T, class Array>
+void take_column(std::vector<T>& column, const Array& array, std::string_view name,
+                 std::size_t rows) {
+  if (array.ndim() > 1) {
+    throw InvalidArgument(
+        fmt::format("{} has the shape {}, expected ({},)", name, shape_text(array), rows));
+  }
+  if (array.ndim() == 0) {
+    column.assign(rows, static_cast<T>(array.data()[0]));
+    return;
+  }
+  require_length(name, static_cast<std::size_t>(array.size()), rows);
+  column.assign(array.data(), array.data() + array.size());
+}
+
+SharedRecording recording_from_arrays(const py::object& time_ns, const py::object& azimuth,
+                                      const py::object& zenith, const py::object& range,
+                                      const py::dict& others, const std::string& serial,
+                                      std::uint8_t device_type) {
+  const RunningCall call;
+  auto recording = std::make_shared<Recording>();
+  Observations& rows = recording->data.observations;
+  RecordingHeader& header = recording->header;
+  header.format = "arrays";
+  header.devices.emplace_back();
+  header.devices.front().serial = serial;
+  header.devices.front().type = device_type;
+  header.has_times = !time_ns.is_none();
+  header.has_range = !range.is_none();
+  header.has_intensity = others.contains("intensity");
+
+  const Numbers azimuths = numbers_from(azimuth, "azimuth");
+  if (azimuths.ndim() != 1) {
+    throw InvalidArgument(
+        fmt::format("azimuth has the shape {}, expected one value per row", shape_text(azimuths)));
+  }
+  const auto count = static_cast<std::size_t>(azimuths.size());
+  take_column(rows.azimuth, azimuths, "azimuth", count);
+  take_column(rows.zenith, numbers_from(zenith, "zenith"), "zenith", count);
+  if (header.has_range) {
+    take_column(rows.range, numbers_from(range, "range"), "range", count);
+  } else {
+    rows.range.assign(count, std::numeric_limits<double>::quiet_NaN());
+  }
+  if (header.has_times) {
+    take_column(rows.time_ns, times_from(time_ns, "time_ns"), "time_ns", count);
+  } else {
+    rows.time_ns.resize(count);
+    std::iota(rows.time_ns.begin(), rows.time_ns.end(), 0);
+  }
+  const auto take_numbers = [&](std::vector<float>& column, const char* name) {
+    const py::object given = others.attr("pop")(name, 0.0);
+    take_column(column, numbers_from(given, name), name, count);
+  };
+  take_numbers(rows.azimuth_resolution, "azimuth_resolution");
+  take_numbers(rows.zenith_resolution, "zenith_resolution");
+  take_numbers(rows.range_resolution, "range_resolution");
+  const auto take_bytes = [&](std::vector<std::uint8_t>& column, const char* name, int usual) {
+    const py::object given = others.attr("pop")(name, usual);
+    take_column(column, bytes_from(given, name), name, count);
+  };
+  take_bytes(rows.intensity, "intensity", 0);
+  take_bytes(rows.return_number, "return_number", 1);
+  take_bytes(rows.tag, "tag", 0);
+  take_bytes(rows.beam, "beam", 0);
+  rows.device.assign(count, 0);
+  if (others.contains("valid")) {
+    take_bytes(rows.valid, "valid", 1);
+  } else {
+    rows.valid.resize(count);
+    for (std::size_t i = 0; i < count; ++i) {
+      rows.valid[i] =
+          std::isfinite(rows.azimuth[i]) && std::isfinite(rows.zenith[i]) && !(rows.range[i] <= 0);
+    }
+  }
+  for (const auto& [name, values] : others) {
+    throw py::type_error(fmt::format("unknown column {}", name.cast<std::string>()));
+  }
+  header.returns_per_shot =
+      count == 0 ? 1 : *std::max_element(rows.return_number.begin(), rows.return_number.end());
+  recordings::require_angles(rows);
+  return recording;
+}
+
+/// A property with the column of that name.
+template <class T>
+void bind_column(py::class_<Recording, SharedRecording>& type, const char* name,
+                 std::vector<T> Observations::*column, const char* doc) {
+  type.def_property_readonly(
+      name,
+      [column](const SharedRecording& recording) {
+        return view_of<T, Recording>(recording->data.observations.*column, recording);
+      },
+      doc);
+}
+
+void bind_header(py::module_& module) {
+  using recordings::Device;
+  py::class_<Device>(module, "Device", "One sensor of a recording.")
+      .def_readonly("serial", &Device::serial, "Broadcast code; empty when it is not known.")
+      .def_readonly("hub_serial", &Device::hub_serial, "That of the hub; empty without one.")
+      .def_readonly("type", &Device::type, "Number of the Livox type; 255 when it is not known.")
+      .def_property_readonly(
+          "type_name",
+          [](const Device& device) { return recordings::device_type_name(device.type); },
+          "Commercial name of the type.")
+      .def("__repr__", [](const Device& device) {
+        return fmt::format("<risley.Device {} {}>", recordings::device_type_name(device.type),
+                           device.serial);
+      });
+  py::class_<RecordingHeader>(module, "RecordingHeader",
+                              "What is known of a recording before its first row.")
+      .def_readonly("format", &RecordingHeader::format, "Short name of the format.")
+      .def_readonly("devices", &RecordingHeader::devices, "Its sensors, at least one.")
+      .def_property_readonly(
+          "time_reference",
+          [](const RecordingHeader& header) { return to_string(header.time_reference); },
+          "What the origin of the times is, in words.")
+      .def_readonly("has_times", &RecordingHeader::has_times,
+                    "False where ``time_ns`` holds the numbers of shots.")
+      .def_readonly("has_range", &RecordingHeader::has_range, "Whether there are ranges.")
+      .def_readonly("has_intensity", &RecordingHeader::has_intensity,
+                    "Whether there are intensities.")
+      .def_readonly("cartesian", &RecordingHeader::cartesian,
+                    "Whether the file holds coordinates and not angles.")
+      .def_readonly("returns_per_shot", &RecordingHeader::returns_per_shot,
+                    "Rows that a shot may have.")
+      .def("__repr__", [](const RecordingHeader& header) {
+        return fmt::format("<risley.RecordingHeader {}>", header.format);
+      });
+}
+
+}  // namespace
+
+void bind_recordings(py::module_& module) {
+  bind_header(module);
+  py::class_<Recording, SharedRecording> type(
+      module, "Recording",
+      "Observations of a recording as columns, one row per return.\n\n"
+      "Every column is a numpy array of shape (rows,) that shares the recording's memory: it\n"
+      "cannot be written to and stays sound when the recording is gone. `read` and `read_chunks`\n"
+      "make recordings of files, `from_arrays` of numbers.");
+  type.def("__len__", [](const Recording& recording) { return recording.data.observations.size(); })
+      .def_readonly("header", &Recording::header, "What is known of the whole recording.")
+      .def_property_readonly(
+          "warnings", [](const Recording& recording) { return texts_of(recording.warnings); },
+          "What does not make the recording useless, in sentences.")
+      .def("__repr__", [](const Recording& recording) {
+        return fmt::format("<risley.Recording {}, {} rows>", recording.header.format,
+                           recording.data.observations.size());
+      });
+  bind_column(type, "time_ns", &Observations::time_ns,
+              "Time of the shot, ns; its number in firing order where there are no times. int64.");
+  bind_column(type, "azimuth", &Observations::azimuth,
+              "Azimuth from X towards Y in (-pi, pi], rad. float64.");
+  bind_column(type, "zenith", &Observations::zenith, "Zenith from Z in [0, pi], rad. float64.");
+  bind_column(type, "range", &Observations::range,
+              "Range, m; 0 without a return, NaN where the format holds none. float64.");
+  bind_column(type, "azimuth_resolution", &Observations::azimuth_resolution,
+              "Rounding step of the azimuth at this point, rad; 0: not rounded. float32.");
+  bind_column(type, "zenith_resolution", &Observations::zenith_resolution,
+              "Rounding step of the zenith at this point, rad; 0: not rounded. float32.");
+  bind_column(type, "range_resolution", &Observations::range_resolution,
+              "Rounding step of the range at this point, m; 0: not rounded. float32.");
+  bind_column(type, "intensity", &Observations::intensity,
+              "Intensity as the sensor reports it, 0 to 255. uint8.");
+  bind_column(type, "return_number", &Observations::return_number,
+              "Number of the return of its shot, from 1. uint8.");
+  bind_column(type, "tag", &Observations::tag, "Tag byte of the format; 0 without. uint8.");
+  bind_column(type, "beam", &Observations::beam, "Number of the emitter, from 0. uint8.");
+  bind_column(type, "device", &Observations::device, "Row of ``header.devices``. uint8.");
+  bind_column(type, "valid", &Observations::valid,
+              "1 where the direction can be trusted, 0 elsewhere. uint8.");
+
+  py::class_<ChunkReader>(module, "ChunkReader",
+                          "Iterator over the pieces of a recording; see `read_chunks`.")
+      .def(py::init([](const std::string& path, std::size_t rows, std::optional<double> shot_rate,
+                       const YawPitchRoll& extrinsics) {
+             return std::make_unique<ChunkReader>(path, rows, read_options(shot_rate, extrinsics));
+           }),
+           py::arg("path"), py::arg("rows"), py::arg("shot_rate"), py::arg("extrinsics"))
+      .def("__iter__", [](py::object self) { return self; })
+      .def("__next__", &ChunkReader::next)
+      .def("__enter__", [](py::object self) { return self; })
+      .def("__exit__", [](ChunkReader& self, const py::args&) { self.close(); })
+      .def("close", &ChunkReader::close, "Closes the file; there are no further pieces.")
+      .def_property_readonly("header", &ChunkReader::header,
+                             "What is known of the whole recording.")
+      .def_property_readonly("warnings", &ChunkReader::warnings,
+                             "What was found so far that does not make the recording useless.")
+      .def_property_readonly("fraction_read", &ChunkReader::fraction_read,
+                             "Part of the file that was read, 0 to 1.");
+
+  module.def(
+      "read",
+      [](const std::string& path, std::optional<double> shot_rate, const YawPitchRoll& extrinsics,
+         const py::object& tell) {
+        const recordings::ReadOptions options = read_options(shot_rate, extrinsics);
+        auto recording = std::make_shared<Recording>();
+        run_job(tell, 0, [&](const Progress& progress) {
+          *recording = recordings::load_recording(path, progress.stage("reading"), options);
+        });
+        return recording;
+      },
+      py::arg("path"), py::arg("shot_rate"), py::arg("extrinsics"), py::arg("tell"));
+  module.def("recording_from_arrays", &recording_from_arrays, py::arg("time_ns"),
+             py::arg("azimuth"), py::arg("zenith"), py::arg("range"), py::arg("others"),
+             py::arg("serial"), py::arg("device_type"));
+  module.def(
+      "write_recording",
+      [](const SharedRecording& recording, const std::string& path, const std::string& format) {
+        run_job(py::none(), 0, [&](const Progress&) {
+          const auto writer = recordings::create_recording(path, recording->header, format);
+          writer->write(recording->data);
+          writer->close();
+        });
+      },
+      py::arg("recording"), py::arg("path"), py::arg("format"));
+}
+
+}  // namespace risley::python

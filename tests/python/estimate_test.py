@@ -1,0 +1,130 @@
+# SPDX-FileCopyrightText: 2026 The risley authors
+# SPDX-License-Identifier: MIT
+"""An estimate from Python: numbers, page, interrupts, exceptions, and the end of the interpreter."""
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+import risley
+from scans import scan
+
+
+@pytest.fixture(scope="module")
+def path(tmp_path_factory):
+    name = tmp_path_factory.mktemp("estimates") / "scan.nc"
+    risley.write(scan(), name)
+    return name
+
+
+@pytest.fixture(scope="module")
+def result(path):
+    return risley.estimate(path, rate=4000)
+
+
+def test_numbers_have_names_units_and_sigmas(result):
+    assert len(result.names) == len(result.units) == len(result.values) == len(result.sigmas)
+    assert "angular_velocity_a" in result.names and set(result.units) == {"1", "rad", "rad/s"}
+    assert result.covariance.shape == (len(result.free), len(result.free))
+    speeds = risley.load_sensor("mid-40")
+    at = result.names.index("angular_velocity_a")
+    assert abs(result.values[at] - speeds["angular_velocity_a"]) < 0.01
+    assert result.azimuth_residual.ndim == 1 and not result.azimuth_residual.flags.writeable
+    assert 0.5e-4 < np.nanstd(result.zenith_residual) < 2e-4
+    code, words, to_do = result.verdict
+    assert code in ("consistent", "unusual", "inconsistent", "undecided") and words and to_do
+    html = result._repr_html_()
+    assert code in html and "<td>angular_velocity_a_deg_per_s</td>" in html
+
+
+def test_a_page_is_written(result, tmp_path):
+    risley.write_report(result, tmp_path / "page.html")
+    assert "<html" in (tmp_path / "page.html").read_text(encoding="utf-8")
+
+
+def test_the_calibrated_sensor_is_a_preset(result, tmp_path):
+    result.sensor.write(tmp_path / "calibration.yaml")
+    assert risley.load_sensor(tmp_path / "calibration.yaml") == result.sensor
+
+
+@pytest.mark.parametrize("options, words", [
+    ({"method": "guess"}, "method = 'guess'"),
+    ({"rate": 0}, "rate = 0"),
+    ({"angle_noise": 1e-4, "angle_noise_deg": 0.01}, "angle_noise and angle_noise_deg"),
+    ({"fixed": ["colour"]}, "colour"),
+    ({"fixed": {"wedge_angle_a_deg": 90}}, "wedge_angle_a"),
+    ({"threads": -1}, "threads = -1"),
+    ({"sensor": "mid-41"}, "mid-41"),
+])
+def test_wrong_options_are_named(path, options, words):
+    with pytest.raises(ValueError, match=words):
+        risley.estimate(path, **options)
+
+
+def test_too_few_shots_cannot_answer(tmp_path):
+    risley.write(scan(0.0005), tmp_path / "short.nc")
+    with pytest.raises(risley.EstimationError):
+        risley.estimate(tmp_path / "short.nc", sensor="mid-40")
+
+
+def test_an_exception_in_the_callback_stops_the_job(path):
+    class Enough(Exception):
+        pass
+
+    def tell(name, fraction):
+        raise Enough(name)
+
+    started = time.monotonic()
+    with pytest.raises(Enough):
+        risley.estimate(path, rate="full", progress=tell)
+    assert time.monotonic() - started < 10
+
+
+CHILD = """
+import sys, threading, time, risley
+def tell(name, fraction):
+    print(name, flush=True)
+def run():
+    risley.estimate(sys.argv[1], rate="full", progress=tell)
+"""
+
+
+def child(path, rest):
+    return subprocess.Popen([sys.executable, "-c", CHILD + rest, str(path)], text=True,
+                            stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+
+
+@pytest.fixture(scope="module")
+def long_path(tmp_path_factory):
+    name = tmp_path_factory.mktemp("estimates") / "long.nc"
+    risley.write(scan(10.0), name)
+    return name
+
+
+def test_an_interrupt_stops_the_job(long_path):
+    process = child(long_path, "run()")
+    process.stdout.readline()
+    sent = time.monotonic()
+    process.send_signal(signal.SIGINT)
+    _, errors = process.communicate(timeout=60)
+    assert errors.rstrip().endswith("KeyboardInterrupt")
+    assert process.returncode in (-signal.SIGINT, 130)
+    assert time.monotonic() - sent < 5  # a second on a machine that does nothing else
+
+
+def test_the_interpreter_ends_while_a_job_runs(long_path):
+    process = child(long_path, """
+def observe():
+    train = risley.PrismTrain()
+    while True:
+        risley.observe(train, [[0.1] * 10000, 0.2])
+for target in (run, observe):
+    threading.Thread(target=target, daemon=True).start()
+time.sleep(1.5)
+""")
+    _, errors = process.communicate(timeout=120)
+    assert process.returncode == 0, errors
+    assert "terminate" not in errors and "Fatal" not in errors

@@ -1,0 +1,132 @@
+# SPDX-FileCopyrightText: 2026 The risley authors
+# SPDX-License-Identifier: MIT
+"""Recordings as columns: no copy, read-only, sound without their owner, errors with names."""
+import gc
+import pickle
+
+import numpy as np
+import pytest
+
+import risley
+from scans import scan
+
+COLUMNS = {"time_ns": np.int64, "azimuth": np.float64, "zenith": np.float64, "range": np.float64,
+           "azimuth_resolution": np.float32, "zenith_resolution": np.float32,
+           "range_resolution": np.float32, "intensity": np.uint8, "return_number": np.uint8,
+           "tag": np.uint8, "beam": np.uint8, "device": np.uint8, "valid": np.uint8}
+
+
+@pytest.fixture(scope="module")
+def path(tmp_path_factory):
+    name = tmp_path_factory.mktemp("recordings") / "scan.nc"
+    risley.write(scan(0.5), name)
+    return name
+
+
+def test_columns_are_views_without_a_copy(path):
+    recording = risley.read(path)
+    for name, dtype in COLUMNS.items():
+        column, again = getattr(recording, name), getattr(recording, name)
+        assert column.dtype == dtype and column.shape == (len(recording),)
+        address, read_only = column.__array_interface__["data"]
+        assert address == again.__array_interface__["data"][0]
+        assert read_only and not column.flags.writeable and not column.flags.owndata
+        with pytest.raises(ValueError):
+            column[0] = 1
+        with pytest.raises(ValueError):
+            column.flags.writeable = True
+
+
+def test_columns_outlive_the_recording(path):
+    recording = risley.read(path)
+    azimuth, expected = recording.azimuth, recording.azimuth.copy()
+    del recording
+    gc.collect()
+    others = [risley.read(path) for _ in range(3)]  # would reuse memory that was given back
+    np.testing.assert_array_equal(azimuth, expected)
+    assert len(others) == 3
+
+
+def test_chunks_are_the_whole(path):
+    whole = risley.read(path)
+    with risley.read_chunks(path, rows=1000) as reader:
+        assert reader.header.format == "netcdf"
+        chunks = list(reader)
+        assert reader.fraction_read == 1
+    assert len(chunks) == 10
+    for name in COLUMNS:
+        np.testing.assert_array_equal(np.concatenate([getattr(one, name) for one in chunks]),
+                                      getattr(whole, name))
+    assert list(reader) == []
+
+
+def test_arrays_come_back(path):
+    original, back = scan(0.5), risley.read(path)
+    for name in COLUMNS:
+        np.testing.assert_array_equal(getattr(original, name), getattr(back, name))
+    assert back.header.has_times and not back.header.has_range
+    assert back.header.devices[0].type_name == "Livox Mid-40"
+
+
+def test_rows_without_a_return_are_not_valid():
+    recording = risley.from_arrays(azimuth=[0, 0.1, 0.2], zenith=[1, np.nan, 1], range=[5, 5, 0],
+                                   beam=2)
+    assert recording.valid.tolist() == [1, 0, 0]
+    assert recording.beam.tolist() == [2, 2, 2]
+    assert not recording.header.has_times and recording.time_ns.tolist() == [0, 1, 2]
+
+
+@pytest.mark.parametrize("change, error, words", [
+    ({"zenith": [1.0]}, ValueError, "zenith has 1 values, expected 2"),
+    ({"azimuth": [[0.1, 0.2]]}, ValueError, r"azimuth has the shape \(1, 2\), expected one value"),
+    ({"range": [[1, 2]]}, ValueError, r"range has the shape \(1, 2\), expected \(2,\)"),
+    ({"zenith": [1, 90]}, ValueError, "zenith = 90 rad in row 1, allowed 0 to pi"),
+    ({"beam": [1, 300]}, ValueError, "beam = 300 in row 1, allowed 0 to 255"),
+    ({"time_ns": [0.5, 1.5]}, TypeError, "time_ns has the type float64, expected whole numbers"),
+    ({"azimuth": ["a", "b"]}, TypeError, "azimuth has the type <U1, expected numbers"),
+    ({"colour": [1, 2]}, TypeError, "unknown column colour"),
+])
+def test_wrong_columns_are_named(change, error, words):
+    columns = {"azimuth": [0.1, 0.2], "zenith": [1.0, 1.1], **change}
+    with pytest.raises(error, match=words):
+        risley.from_arrays(**columns)
+
+
+def test_files_that_cannot_be_read(tmp_path):
+    with pytest.raises(risley.MissingFileError, match="none.lvx") as missing:
+        risley.read(tmp_path / "none.lvx")
+    assert isinstance(missing.value, FileNotFoundError) and isinstance(missing.value, OSError)
+    broken = tmp_path / "broken.lvx"
+    broken.write_bytes(b"what is this" * 9)
+    with pytest.raises(risley.FileError) as damaged:
+        risley.read(broken)
+    assert damaged.value.path == str(broken)
+    assert damaged.value.problem in str(damaged.value)
+    assert not isinstance(damaged.value, FileNotFoundError)
+    copy = pickle.loads(pickle.dumps(damaged.value))
+    assert str(copy) == str(damaged.value) and copy.path == damaged.value.path
+
+
+def test_wrong_options_of_reading(path):
+    with pytest.raises(ValueError, match="rows = 0"):
+        risley.read_chunks(path, rows=0)
+    with pytest.raises(ValueError, match="extrinsics and extrinsics_deg"):
+        risley.read(path, extrinsics=(0, 0, 0), extrinsics_deg=(0, 0, 0))
+    with pytest.raises(ValueError, match="shot_rate"):
+        risley.read(path, shot_rate=-1)
+
+
+def test_progress_is_told_and_may_stop(path):
+    told = []
+    risley.read(path, progress=lambda name, fraction: told.append((name, fraction)))
+    assert told[-1] == ("reading", 1.0)
+
+    class Enough(Exception):
+        pass
+
+    def stop(name, fraction):
+        raise Enough(name)
+
+    with pytest.raises(Enough, match="reading"):
+        risley.read(path, progress=stop)
+    risley.read(path, progress=True)
