@@ -9,7 +9,13 @@ from risley._units import Path
 
 
 def presets() -> List[str]:
-    """Names of the built-in sensors."""
+    """Names of the built-in sensors.
+
+    Returns
+    -------
+    list of str
+        Sorted; `load_sensor` takes each of them.
+    """
     return _risley.preset_names()
 
 

@@ -1,0 +1,46 @@
+# SPDX-FileCopyrightText: 2026 The risley authors
+# SPDX-License-Identifier: MIT
+"""The stubs say what the module has, and the public face is typed and documented."""
+import inspect
+import pathlib
+import subprocess
+import sys
+
+import pytest
+
+import risley
+
+PACKAGE = pathlib.Path(risley.__file__).parent
+# pybind11 gives its classes a metaclass, and those without a constructor one that refuses.
+ALLOWED = r"risley\._risley\.(ChunkReader|Device|Estimate|PrismTrain|Recording|RecordingHeader|Sensor)(\.__init__)?"
+
+
+def run(*words, folder):
+    pytest.importorskip("mypy")
+    done = subprocess.run([sys.executable, "-m", *words], cwd=folder, capture_output=True,
+                          text=True, timeout=300, check=False,
+                          env={"PYTHONPATH": str(PACKAGE.parent), "MYPYPATH": str(PACKAGE.parent)})
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_stubs_are_those_of_the_module(tmp_path):
+    allowed = tmp_path / "allowed"
+    allowed.write_text(ALLOWED + "\n", encoding="utf-8")
+    run("mypy.stubtest", "risley._risley", "--allowlist", str(allowed), folder=tmp_path)
+
+
+def test_the_public_face_is_typed(tmp_path):
+    run("mypy", "--strict", "--ignore-missing-imports", "--cache-dir", str(tmp_path / "cache"),
+        "-p", "risley", folder=tmp_path)
+
+
+def test_every_public_name_is_documented():
+    for name in risley.__all__:
+        public = getattr(risley, name)
+        if name.startswith("__"):
+            continue
+        assert inspect.getdoc(public), name
+        if inspect.isfunction(public):
+            assert "Returns" in public.__doc__ or "Raises" in public.__doc__, name
+            for parameter in inspect.signature(public).parameters:
+                assert parameter in public.__doc__, f"{name}: {parameter}"
