@@ -19,7 +19,7 @@ std::string type_text(const py::handle& object) {
 /// What numpy makes of it, which must be of one of the kinds: b, i, u, f.
 py::array numpy_array(const py::handle& values, std::string_view name, std::string_view kinds,
                       std::string_view wanted) {
-  const py::array array = py::array::ensure(values);
+  py::array array = py::array::ensure(values);
   if (!array) {
     PyErr_Clear();
     throw py::type_error(fmt::format("{} is a {}, expected {}", name, type_text(values), wanted));

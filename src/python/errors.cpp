@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 #include <exception>
 #include <filesystem>
+#include <utility>
 
 #include <pybind11/stl.h>
 
@@ -67,9 +68,9 @@ void bind_errors(py::module_& module) {
   types.cancelled =
       new_error(module, "Cancelled", "A call was stopped because the interpreter is about to end.",
                 PyExc_RuntimeError);
-  py::register_exception_translator([](std::exception_ptr thrown) {  // NOLINT(*-value-param)
+  py::register_exception_translator([](std::exception_ptr thrown) {
     try {
-      std::rethrow_exception(thrown);
+      std::rethrow_exception(std::move(thrown));
     } catch (const InvalidArgument& error) {
       PyErr_SetString(PyExc_ValueError, error.what());
     } catch (const FileError& error) {

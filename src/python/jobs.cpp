@@ -66,6 +66,7 @@ std::vector<std::string> freed_parameters(const std::vector<std::string>& names)
 
 std::vector<std::string> names_of(const std::vector<estimation::EstimatedValue>& values) {
   std::vector<std::string> names;
+  names.reserve(values.size());
   for (const auto& value : values) names.push_back(si_name(value.name));
   return names;
 }
@@ -74,6 +75,7 @@ std::vector<std::string> names_of(const std::vector<estimation::EstimatedValue>&
 py::array_t<double> column_of(const std::vector<estimation::EstimatedValue>& values,
                               double estimation::EstimatedValue::*number) {
   std::vector<double> column;
+  column.reserve(values.size());
   for (const auto& value : values) column.push_back(value.*number);
   return array_of(std::move(column));
 }

@@ -35,6 +35,7 @@ using SharedRecording = std::shared_ptr<Recording>;
 
 std::vector<std::string> texts_of(const std::vector<recordings::ReadWarning>& warnings) {
   std::vector<std::string> texts;
+  texts.reserve(warnings.size());
   for (const auto& warning : warnings) texts.push_back(jobs::warning_text(warning));
   return texts;
 }

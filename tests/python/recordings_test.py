@@ -60,6 +60,17 @@ def test_chunks_are_the_whole(path):
     assert list(reader) == []
 
 
+def test_columns_of_a_piece_outlive_it(path):
+    whole = risley.read(path).azimuth
+    columns = [piece.azimuth for piece in risley.read_chunks(path, rows=700)]
+    np.testing.assert_array_equal(np.concatenate(columns), whole)
+    seen = 0
+    for piece in risley.read_chunks(path, rows=700):
+        np.testing.assert_array_equal(piece.azimuth, whole[seen:seen + len(piece)])
+        seen += len(piece)
+    assert seen == len(whole)
+
+
 def test_arrays_come_back(path):
     original, back = scan(0.5), risley.read(path)
     for name in COLUMNS:
