@@ -2,9 +2,7 @@
 // SPDX-License-Identifier: MIT
 #include "parameter_choice.hpp"
 
-#include <algorithm>
-
-#include "risley/optics/prism.hpp"
+#include "risley/optics/parameters.hpp"
 
 namespace risley::app {
 
@@ -32,15 +30,7 @@ jobs::HeldParameters held_parameters(const std::vector<std::string>& fixed) {
     const auto assignment = split_assignment(text);
     const std::string& name = assignment.first;
     double value = assignment.second;
-    // The train is not known yet; a name means the same in any, and only emitters' names differ.
-    for (const TrainShape& shape : {TrainShape{kMaxPrisms, 1}, {kMaxPrisms, kMaxEmitters}}) {
-      const auto& known = parameter_list(shape);
-      const auto found = std::find_if(known.begin(), known.end(),
-                                      [&](const ParameterInfo& one) { return one.name == name; });
-      if (found == known.end()) continue;
-      value *= found->si_per_unit;
-      break;
-    }
+    if (const ParameterInfo* known = find_parameter_of_any_train(name)) value *= known->si_per_unit;
     held.emplace_back(name, value);
   }
   return held;

@@ -151,6 +151,16 @@ const ParameterInfo& find_parameter(std::string_view name, TrainShape shape) {
                                     did_you_mean(name, names), fmt::join(names, ", ")));
 }
 
+const ParameterInfo* find_parameter_of_any_train(std::string_view name) {
+  // Only emitters' names differ: one alone has no number.
+  for (const TrainShape shape : {TrainShape{kMaxPrisms, 1}, {kMaxPrisms, kMaxEmitters}}) {
+    for (const ParameterInfo& parameter : parameter_list(shape)) {
+      if (parameter.name == name) return &parameter;
+    }
+  }
+  return nullptr;
+}
+
 void check_bounds(const ParameterInfo& parameter, double value) {
   if (std::isfinite(value) && value >= parameter.lower && value <= parameter.upper) return;
   throw InvalidArgument(fmt::format("{} = {:.10g} {}, allowed {:.10g} to {:.10g}", parameter.name,

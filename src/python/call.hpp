@@ -4,7 +4,6 @@
 
 #include <functional>
 #include <optional>
-#include <type_traits>
 #include <utility>
 
 #include "risley/core/progress.hpp"
@@ -50,13 +49,5 @@ decltype(auto) unlocked(Function&& function) {
 /// @throws what the job throws, what `tell` raises and, after Ctrl-C, KeyboardInterrupt
 void run_job(const py::object& tell, int threads, const std::function<void(const Progress&)>& job,
              CancelFlag* cancel = nullptr);
-
-/// The same of a job that gives something.
-template <class Job>
-auto result_of_job(const py::object& tell, int threads, Job&& job) {
-  std::optional<std::invoke_result_t<Job, const Progress&>> result;
-  run_job(tell, threads, [&](const Progress& progress) { result.emplace(job(progress)); });
-  return std::move(*result);
-}
 
 }  // namespace risley::python

@@ -32,34 +32,27 @@ using jobs::EstimatedRecording;
 using SharedEstimate = std::shared_ptr<EstimatedRecording>;
 using Held = std::vector<std::pair<std::string, std::optional<double>>>;
 
-/// A parameter of any train by either name. The train is not known yet; a name means the same in
-/// any, and only emitters' names differ. Jobs refuse unknown ones.
-NamedParameter any_parameter(const std::string& name) {
-  for (const TrainShape shape : {TrainShape{kMaxPrisms, 1}, {kMaxPrisms, kMaxEmitters}}) {
-    for (const ParameterInfo& info : parameter_list(shape)) {
-      if (info.name == name) return {&info, info.si_per_unit};
-      if (si_name(info.name) == name) return {&info, 1.0};
-    }
-  }
-  return {};
+/// The name in files of a parameter of any train; an unknown name as it is, for the job to refuse.
+std::string file_name_of(const NamedParameter& parameter, const std::string& name) {
+  return parameter.info != nullptr ? parameter.info->name : name;
 }
 
 jobs::HeldParameters held_parameters(const Held& fixed) {
   jobs::HeldParameters held;
   for (const auto& [name, value] : fixed) {
-    const NamedParameter parameter = any_parameter(name);
+    const NamedParameter parameter = parameter_of_any_train(name);
     std::optional<double> si = value;
     if (si) *si *= parameter.si_per_unit;
-    held.emplace_back(parameter.info != nullptr ? parameter.info->name : name, si);
+    held.emplace_back(file_name_of(parameter, name), si);
   }
   return held;
 }
 
 std::vector<std::string> freed_parameters(const std::vector<std::string>& names) {
   std::vector<std::string> freed;
+  freed.reserve(names.size());
   for (const std::string& name : names) {
-    const NamedParameter parameter = any_parameter(name);
-    freed.push_back(parameter.info != nullptr ? parameter.info->name : name);
+    freed.push_back(file_name_of(parameter_of_any_train(name), name));
   }
   return freed;
 }
@@ -149,10 +142,10 @@ SharedEstimate estimate(const std::string& recording, const std::string& sensor,
 }  // namespace
 
 void bind_jobs(py::module_& module) {
-  using Result = py::class_<EstimatedRecording, std::shared_ptr<EstimatedRecording>>;
-  Result(module, "Estimate",
-         "What `estimate` found. Numbers are in SI units, names without a unit; texts and tables\n"
-         "for people are in degrees.")
+  py::class_<EstimatedRecording, SharedEstimate>(
+      module, "Estimate",
+      "What `estimate` found. Numbers are in SI units, names without a unit; texts and tables\n"
+      "for people are in degrees.")
       .def_property_readonly(
           "converged", [](const EstimatedRecording& r) { return r.estimate.converged; },
           "Whether the numbers can be used.")
@@ -216,13 +209,13 @@ void bind_jobs(py::module_& module) {
           "What else there is to know, in sentences.")
       .def_property_readonly(
           "azimuth_residual",
-          [](const std::shared_ptr<EstimatedRecording>& r) {
+          [](const SharedEstimate& r) {
             return view_of<double, EstimatedRecording>(r->estimate.azimuth_residual, r);
           },
           "Observed less estimated azimuth of every used shot, rad; a view.")
       .def_property_readonly(
           "zenith_residual",
-          [](const std::shared_ptr<EstimatedRecording>& r) {
+          [](const SharedEstimate& r) {
             return view_of<double, EstimatedRecording>(r->estimate.zenith_residual, r);
           },
           "Observed less estimated zenith of every used shot, rad; a view.")

@@ -20,6 +20,8 @@ struct NamedParameter {
 };
 /// @throws InvalidArgument that lists the known names
 NamedParameter named_parameter(const std::string& name, TrainShape shape);
+/// The same where the train is not known yet; without info for a name that no train has.
+NamedParameter parameter_of_any_train(const std::string& name);
 
 /// The SI unit of a parameter: "1", "rad" or "rad/s".
 std::string si_unit(const ParameterInfo& info);

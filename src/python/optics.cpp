@@ -194,26 +194,6 @@ PrismTrain train_from(const std::string& face_order, int emitters,
 
 }  // namespace
 
-std::string si_name(const std::string& file_name) {
-  for (const std::string_view unit : {"_deg_per_s", "_deg"}) {
-    if (file_name.ends_with(unit)) return file_name.substr(0, file_name.size() - unit.size());
-  }
-  return file_name;
-}
-
-NamedParameter named_parameter(const std::string& name, TrainShape shape) {
-  for (const ParameterInfo& info : parameter_list(shape)) {
-    if (info.name == name) return {&info, info.si_per_unit};
-    if (si_name(info.name) == name) return {&info, 1.0};
-  }
-  return {&find_parameter(name, shape), 1.0};
-}
-
-std::string si_unit(const ParameterInfo& info) {
-  if (info.unit == "deg") return "rad";
-  return info.unit == "deg/s" ? "rad/s" : info.unit;
-}
-
 void bind_optics(py::module_& module) {
   py::class_<PrismTrain>(
       module, "PrismTrain",

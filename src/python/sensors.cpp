@@ -51,9 +51,10 @@ std::vector<std::string> covariance_names(const Sensor& sensor) {
 }
 
 std::optional<double> sigma_of(const Sensor& sensor, const std::string& name) {
-  const Knowledge* known = sensor.find_knowledge(constant_parameter(name, sensor).info->name);
+  const NamedParameter parameter = constant_parameter(name, sensor);
+  const Knowledge* known = sensor.find_knowledge(parameter.info->name);
   if (known == nullptr) return std::nullopt;
-  return std::max(known->sigma, known->total_sigma) / constant_parameter(name, sensor).si_per_unit;
+  return std::max(known->sigma, known->total_sigma) / parameter.si_per_unit;
 }
 
 std::string source_of(const Sensor& sensor, const std::string& name) {

@@ -65,6 +65,13 @@ TEST(TrainShape, EmittersAreNamedByTheirNumberFromOne) {
   EXPECT_EQ(parameter_count(six), 31);
   EXPECT_THROW(find_parameter("incident_beam_vertical_deg", six), InvalidArgument);
   EXPECT_THROW(find_parameter("incident_beam_1_vertical_deg", {3, 1}), InvalidArgument);
+  for (const char* name : {"incident_beam_vertical_deg", "incident_beam_6_vertical_deg",
+                           "wedge_angle_d_deg", "angular_velocity_a_deg_per_s"}) {
+    const ParameterInfo* info = find_parameter_of_any_train(name);
+    ASSERT_NE(info, nullptr) << name;
+    EXPECT_EQ(info->name, name);
+  }
+  EXPECT_EQ(find_parameter_of_any_train("incident_beam_9_vertical_deg"), nullptr);
 }
 
 TEST(TrainShape, OtherNumbersAreRefused) {

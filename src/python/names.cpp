@@ -1,0 +1,53 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "python/names.hpp"
+
+#include <array>
+
+namespace risley::python {
+namespace {
+
+/// What the names of files end in beyond those in SI units.
+constexpr std::array<std::string_view, 2> kUnits = {"_deg_per_s", "_deg"};
+
+/// A parameter by either name.
+/// @param find  gives the entry of a name in files, null where there is none
+template <class Find>
+NamedParameter find_by_either_name(const std::string& name, const Find& find) {
+  if (const ParameterInfo* info = find(name)) return {info, info->si_per_unit};
+  for (const std::string_view unit : kUnits) {
+    if (const ParameterInfo* info = find(name + std::string(unit))) return {info, 1.0};
+  }
+  return {};
+}
+
+}  // namespace
+
+std::string si_name(const std::string& file_name) {
+  for (const std::string_view unit : kUnits) {
+    if (file_name.ends_with(unit)) return file_name.substr(0, file_name.size() - unit.size());
+  }
+  return file_name;
+}
+
+NamedParameter named_parameter(const std::string& name, TrainShape shape) {
+  const NamedParameter known =
+      find_by_either_name(name, [&](std::string_view wanted) -> const ParameterInfo* {
+        for (const ParameterInfo& info : parameter_list(shape)) {
+          if (info.name == wanted) return &info;
+        }
+        return nullptr;
+      });
+  return known.info != nullptr ? known : NamedParameter{&find_parameter(name, shape), 1.0};
+}
+
+NamedParameter parameter_of_any_train(const std::string& name) {
+  return find_by_either_name(name, find_parameter_of_any_train);
+}
+
+std::string si_unit(const ParameterInfo& info) {
+  if (info.unit == "deg") return "rad";
+  return info.unit == "deg/s" ? "rad/s" : info.unit;
+}
+
+}  // namespace risley::python
