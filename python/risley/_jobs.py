@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The risley authors
 # SPDX-License-Identifier: MIT
-"""Jobs over recordings."""
+"""Jobs on recordings."""
 import os
 from typing import Iterable, List, Mapping, Optional, Tuple, Union
 
@@ -31,27 +31,28 @@ def estimate(recording: Path, *, sensor: Path = "", method: str = "map",
     recording : str or path
         A recording of one sensor.
     sensor : str or path, optional
-        Preset by name, or a preset or calibration file; otherwise the recording tells.
+        Name of a preset, or a preset or calibration file; otherwise found from the recording.
     method : {'map', 'ekf'}
         All shots at once, or the paper's filter.
     rate : float or 'full', optional
-        Shots per second to use, Hz; otherwise what is usual for the method.
+        Shots per second to use, Hz; by default what is usual for the method.
     angle_noise, angle_noise_deg : float, optional
-        1 sigma of azimuth and zenith before rounding, rad or deg; found otherwise.
+        Standard deviation of the noise of azimuth and zenith before rounding, rad or deg; by
+        default estimated.
     fixed : mapping of str to float or None, or iterable of str
-        Parameters to hold, at a value if there is one, in the unit of the name.
+        Parameters to hold, at the given value (in the unit of the name) if there is one.
     free : iterable of str
         Further parameters to estimate.
     mirrored : bool, optional
-        Whether the elevation has the opposite sign; found out otherwise.
+        Whether the elevation has the opposite sign; by default found from the recording.
     truth : str or path, optional
-        ``OUT.truth.yaml`` of the recording's simulation, to judge the estimate by.
+        ``OUT.truth.yaml`` of the simulation that made the recording, to compare the estimate with.
     shot_rate, extrinsics, extrinsics_deg
-        As `risley.read` has them.
+        As in `risley.read`.
     threads : int, default 0
-        How many to use; 0: all cores.
+        Number of threads; 0 means one per core.
     progress : bool or callable, optional
-        As `risley.read` has it.
+        As in `risley.read`.
 
     Returns
     -------
@@ -60,9 +61,9 @@ def estimate(recording: Path, *, sensor: Path = "", method: str = "map",
     Raises
     ------
     EstimationError
-        When the data cannot answer.
+        If nothing can be estimated from the data.
     FileError, ValueError
-        For damaged files and for options that make no sense.
+        For damaged files, and for options that make no sense.
     """
     noise = angle("angle_noise", angle_noise, angle_noise_deg)
     with telling(progress) as tell:
@@ -72,21 +73,21 @@ def estimate(recording: Path, *, sensor: Path = "", method: str = "map",
 
 
 def write_report(result: _risley.Estimate, path: Path, *, progress: Progress = None) -> None:
-    """Write the page of a result, one HTML file that needs no network.
+    """Write the page of a result as one HTML file that needs no network.
 
     Parameters
     ----------
     result : Estimate
-        What `risley.estimate` found.
+        What `risley.estimate` returned.
     path : str or path
-        The page.
+        The file to write.
     progress : bool or callable, optional
-        As `risley.read` has it.
+        As in `risley.read`.
 
     Raises
     ------
     FileError
-        When the file cannot be written.
+        If the file cannot be written.
     """
     with telling(progress) as tell:
         _risley.write_page(result, os.fspath(path), tell)
