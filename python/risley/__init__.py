@@ -2,10 +2,10 @@
 # SPDX-License-Identifier: MIT
 """Risley-prism lidars: observation model, recordings, simulation, estimation, calibration, points.
 
-Everything is in SI units (radians, metres, seconds) unless a name ends in another one, as in
-``_deg``. Nothing here computes: the C++ libraries of risley do, without the interpreter's lock.
-Wrong arguments raise `ValueError`, files `FileError` (an `OSError`), numbers that cannot answer
-`EstimationError`; Ctrl-C stops what runs.
+Everything is in SI units (radians, metres, seconds) unless a name ends in another unit, such as
+``_deg``. All computation is done by the C++ libraries of risley, with the interpreter's lock
+released. Wrong arguments raise `ValueError`, files that cannot be read or written `FileError` (an `OSError`),
+and data from which nothing can be estimated `EstimationError`. Ctrl-C stops what is running.
 """
 from risley._jobs import (calibrate, cloud, coverage, estimate, identify, info, observability,
                           pattern, plan, simulate)

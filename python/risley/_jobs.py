@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The risley authors
 # SPDX-License-Identifier: MIT
-"""Jobs over files: each does what a verb of the command does."""
+"""Jobs on files: each does what a verb of the command does."""
 import os
 from typing import Any, Dict, Iterable, List, Mapping, Optional, Sequence, Tuple, Union
 
@@ -40,31 +40,32 @@ def estimate(recording: Path, *, sensor: Path = "", output: Path = "", method: s
     recording : str or path
         A recording of one sensor.
     sensor : str or path, optional
-        Preset by name, or a preset or calibration file; otherwise the recording tells.
+        Name of a preset, or a preset or calibration file; otherwise found from the recording.
     output : str or path, optional
         Folder for calibration.yaml, states.nc, report.json and report.html.
     method : {'map', 'ekf'}
         All shots at once, or the paper's filter.
     rate : float or 'full', optional
-        Shots per second to use, Hz; otherwise what is usual for the method.
+        Shots per second to use, Hz; by default what is usual for the method.
     angle_noise, angle_noise_deg : float, optional
-        1 sigma of azimuth and zenith before rounding, rad or deg; found otherwise.
+        Standard deviation of the noise of azimuth and zenith before rounding, rad or deg; by
+        default estimated.
     fixed : mapping of str to float or None, or iterable of str
-        Parameters to hold, at a value if there is one, in the unit of the name.
+        Parameters to hold, at the given value (in the unit of the name) if there is one.
     free : iterable of str
         Further parameters to estimate.
     mirrored : bool, optional
-        Whether the elevation has the opposite sign; found out otherwise.
+        Whether the elevation has the opposite sign; by default found from the recording.
     truth : str or path, optional
-        ``OUT.truth.yaml`` of the recording's simulation, to judge the estimate by.
+        ``OUT.truth.yaml`` of the simulation that made the recording, to compare the estimate with.
     states : {'knots', 'all', 'none'}
         Rotor states to write into ``output``.
     shot_rate, extrinsics, extrinsics_deg
-        As `risley.read` has them.
+        As in `risley.read`.
     threads : int, default 0
-        How many to use; 0: all cores.
+        Number of threads; 0 means one per core.
     progress : bool or callable, optional
-        As `risley.read` has it.
+        As in `risley.read`.
 
     Returns
     -------
@@ -73,9 +74,9 @@ def estimate(recording: Path, *, sensor: Path = "", output: Path = "", method: s
     Raises
     ------
     EstimationError
-        When the data cannot answer.
+        If nothing can be estimated from the data.
     FileError, ValueError
-        For damaged files and for options that make no sense.
+        For damaged files, and for options that make no sense.
     """
     options = {
         "recording": os.fspath(recording), "sensor": os.fspath(sensor),
@@ -109,7 +110,7 @@ def calibrate(recordings: Union[Path, Sequence[Path]], *, sensor: Path = "", out
     recordings : str, path or a sequence of them
         Of one sensor, with ranges.
     sensor : str or path, optional
-        Preset by name, or a preset or calibration file; otherwise the recordings tell.
+        Name of a preset, or a preset or calibration file; otherwise found from the recordings.
     output : str or path, optional
         Folder for calibration.yaml, states, report.json and report.html; of a flight for
         mount.yaml and trajectory.csv too.
@@ -134,19 +135,21 @@ def calibrate(recordings: Union[Path, Sequence[Path]], *, sensor: Path = "", out
     rate : float or 'full', optional
         Shots per second to use, Hz; otherwise all.
     angle_noise, angle_noise_deg : float, optional
-        1 sigma of azimuth and zenith before rounding, rad or deg; otherwise the sensor's.
+        Standard deviation of the noise of azimuth and zenith before rounding, rad or deg; by
+        default the sensor's.
     range_noise : float, optional
-        1 sigma of ranges before rounding, m; otherwise the sensor's.
+        Standard deviation of ranges before rounding, m; by default the sensor's.
     prior_sigma, prior_sigma_deg : float, optional
-        1 sigma of every error angle about what the sensor believes, rad or deg.
+        Standard deviation of every error angle about the believed value, rad or deg; by default
+        there is no such prior.
     range_offset_sigma : float, optional
         Prior of the range offset, m; 0 holds it.
     beam_origin : bool, default True
         Whether beams start where they leave the last prism.
     fixed, free, mirrored, shot_rate, extrinsics, extrinsics_deg, threads, progress
-        As `risley.estimate` has them.
+        As in `risley.estimate`.
     truth : str, path or a sequence of them
-        ``OUT.truth.yaml`` of each recording's simulation, to judge by.
+        ``OUT.truth.yaml`` of the simulation of each recording, to compare with.
     force : bool, default False
         Write calibration.yaml also where it is not better.
     states : {'knots', 'all', 'none'}
@@ -161,9 +164,9 @@ def calibrate(recordings: Union[Path, Sequence[Path]], *, sensor: Path = "", out
     Raises
     ------
     EstimationError
-        When there is nothing to calibrate on.
+        If there is nothing to calibrate on.
     FileError, ValueError
-        For damaged files and for options that make no sense.
+        For damaged files, and for options that make no sense.
     """
     options = {
         "recordings": _paths(recordings), "sensor": os.fspath(sensor),
@@ -183,7 +186,8 @@ def calibrate(recordings: Union[Path, Sequence[Path]], *, sensor: Path = "", out
     with telling(progress) as tell:
         if os.fspath(trajectory):
             _refuse("trajectory", {"planes": planes, "stations": stations, "station": station})
-            return FlightCalibration(_risley.calibrate_flight({**options, **in_flight}, threads, tell))
+            found = _risley.calibrate_flight({**options, **in_flight}, threads, tell)
+            return FlightCalibration(found)
         _refuse("no trajectory", {"mount": mount, "accuracy": accuracy, "control": control,
                                   "trajectory_errors": trajectory_errors,
                                   "knot_spacing": knot_spacing, "cell_size": cell_size})
@@ -211,7 +215,7 @@ def plan(scene_or_flight: Path, *, sensor: Path = "", duration: Optional[float] 
     scene_or_flight : str or path
         A scene of walls with stations, or a flight with strips (YAML).
     sensor : str or path, optional
-        Preset by name, or a preset or calibration file; otherwise a Mid-40.
+        Name of a preset, or a preset or calibration file; otherwise a Mid-40.
     duration : float, optional
         Of each recording of walls, s; otherwise 10.
     mount, trajectory_errors : str or path
@@ -224,9 +228,9 @@ def plan(scene_or_flight: Path, *, sensor: Path = "", duration: Optional[float] 
     rate : float, optional
         Shots per second, Hz; otherwise the sensor's, of a flight 5000.
     range_noise, prior_sigma, prior_sigma_deg, range_offset_sigma, beam_origin, fixed, free, seed
-        As `risley.calibrate` has them.
+        As in `risley.calibrate`.
     progress : bool or callable, optional
-        As `risley.read` has it.
+        As in `risley.read`.
 
     Returns
     -------
@@ -290,19 +294,20 @@ def cloud(recording: Path, calibration: Path, output: Path, *, format: str = "",
     rate : float or 'full', optional
         Directions per second that rotation angles are found from, Hz.
     angle_noise, angle_noise_deg : float, optional
-        1 sigma of azimuth and zenith before rounding, rad or deg; otherwise the calibration's.
+        Standard deviation of the noise of azimuth and zenith before rounding, rad or deg; by
+        default the calibration's.
     las_scale : float, optional
         LAS stores coordinates as multiples of this, m.
     time : {'gps', 'recording'}
         LAS: GPS time where the recording's clock is UTC, or the clock as it is.
     trajectory, trajectory_topic, mount, accuracy, trajectory_errors
-        As `risley.calibrate` has them, of a sensor that moved.
+        As in `risley.calibrate`, for a sensor that moved.
     crs, datum : str, optional
         Map of the points and datum of the trajectory, ``EPSG:N``.
     distribution : bool, default False
         Tell how the points of a flight lie on the ground.
     shot_rate, extrinsics, extrinsics_deg, threads, progress
-        As `risley.estimate` has them.
+        As in `risley.estimate`.
 
     Returns
     -------
@@ -311,9 +316,9 @@ def cloud(recording: Path, calibration: Path, output: Path, *, format: str = "",
     Raises
     ------
     EstimationError
-        When the rotors' motion cannot be found.
+        If the rotors' motion cannot be found.
     FileError, ValueError
-        For damaged files and for options that make no sense.
+        For damaged files, and for options that make no sense.
     """
     options = {
         "recording": os.fspath(recording), "calibration": os.fspath(calibration),
@@ -349,13 +354,13 @@ def simulate(output: Path, *, sensor: Path = "mid-40", duration: Optional[float]
     output : str or path
         The recording; its ending chooses the format. The truth stands beside it.
     sensor : str or path, default 'mid-40'
-        Preset by name, or a preset or calibration file.
+        Name of a preset, or a preset or calibration file.
     duration : float, optional
         Length, s; otherwise 1, or to the trajectory's end.
     rate : float, optional
         Shots per second, Hz; otherwise the sensor's.
     angle_noise, angle_noise_deg, range_noise : float, optional
-        1 sigma of directions, rad or deg, and of ranges, m; otherwise the sensor's.
+        Standard deviations of directions, rad or deg, and of ranges, m; by default the sensor's.
     quantize : bool, default True
         Round to the sensor's resolution.
     beam_origin : bool, default True
@@ -389,9 +394,9 @@ def simulate(output: Path, *, sensor: Path = "mid-40", duration: Optional[float]
     seed : int, default 0
         Same seed, same bytes.
     threads : int, default 0
-        How many to use; 0: all cores.
+        Number of threads; 0 means one per core.
     progress : bool or callable, optional
-        As `risley.read` has it.
+        As in `risley.read`.
 
     Returns
     -------
@@ -437,7 +442,7 @@ def identify(recording: Path, *, output: Path = "", force: bool = False, most_pr
     fastest : float, optional
         No rotor turns faster, rad/s; otherwise 400 turns a second.
     shot_rate, extrinsics, extrinsics_deg, threads, progress
-        As `risley.estimate` has them.
+        As in `risley.estimate`.
 
     Returns
     -------
@@ -446,9 +451,9 @@ def identify(recording: Path, *, output: Path = "", force: bool = False, most_pr
     Raises
     ------
     EstimationError
-        When the data cannot answer.
+        If nothing can be estimated from the data.
     FileError, ValueError
-        For damaged files and for options that make no sense.
+        For damaged files, and for options that make no sense.
     """
     options = {
         "recording": os.fspath(recording), "output": os.fspath(output), "force": force,
@@ -468,7 +473,7 @@ def pattern(sensor: Path, format: str, output: Path, *, duration: float = 1.0,
     Parameters
     ----------
     sensor : str or path
-        Preset by name, or a preset or calibration file.
+        Name of a preset, or a preset or calibration file.
     format : str
         ``livox-csv``, ``helios-xml``, ``npy`` and others, as ``risley pattern --help`` lists them.
     output : str or path
@@ -484,9 +489,9 @@ def pattern(sensor: Path, format: str, output: Path, *, duration: float = 1.0,
     start_angles, start_angles_deg : sequence of float, optional
         Rotation angles at time 0, rad or deg; otherwise the preset's.
     threads : int, default 0
-        How many to use; 0: all cores.
+        Number of threads; 0 means one per core.
     progress : bool or callable, optional
-        As `risley.read` has it.
+        As in `risley.read`.
 
     Returns
     -------
@@ -516,13 +521,13 @@ def coverage(sensor: Path, *, after: Optional[Sequence[float]] = None,
     Parameters
     ----------
     sensor : str or path
-        Preset by name, or a preset or calibration file.
+        Name of a preset, or a preset or calibration file.
     after : sequence of float, optional
         After which times, s.
     cell, cell_deg : float, optional
         Edge of a cell, rad or deg.
     rate, every, firing, start_angles, start_angles_deg, threads, progress
-        As `risley.pattern` has them.
+        As in `risley.pattern`.
 
     Returns
     -------
@@ -556,9 +561,9 @@ def observability(recording: Path = "", *, sensor: Path = "", duration: Optional
     rounding : bool, default True
         A plan's angles are rounded to the sensor's resolution.
     sensor, angle_noise, angle_noise_deg, fixed, free, shot_rate, extrinsics, extrinsics_deg
-        As `risley.estimate` has them.
+        As in `risley.estimate`.
     threads, progress
-        As `risley.estimate` has them.
+        As in `risley.estimate`.
 
     Returns
     -------
@@ -588,7 +593,7 @@ def info(file: Path, *, accuracy: Path = "", trajectory_topic: str = "",
     trajectory_topic : str, optional
         Look at the poses of this topic of a ROS bag.
     shot_rate, extrinsics, extrinsics_deg, progress
-        As `risley.read` has them.
+        As in `risley.read`.
 
     Returns
     -------

@@ -66,7 +66,7 @@ class _Columns(_Answer):
         Raises
         ------
         ImportError
-            Where xarray is not installed.
+            If xarray is not installed.
         """
         import xarray
         columns = {name: ("name", column) for name, column in self._columns().items()}
@@ -116,19 +116,19 @@ class Solution(_Columns):
         return self._report
 
     def report(self, path: Path, *, progress: Progress = None) -> None:
-        """Write the page of the result, one HTML file that needs no network.
+        """Write the page of the result as one HTML file that needs no network.
 
         Parameters
         ----------
         path : str or path
-            The page.
+            The file to write.
         progress : bool or callable, optional
-            As `risley.read` has it.
+            As in `risley.read`.
 
         Raises
         ------
         FileError
-            When the file cannot be written.
+            If the file cannot be written.
         """
         _risley.write_page(self._report_text(progress), os.fspath(path))
 
