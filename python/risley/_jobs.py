@@ -140,8 +140,8 @@ def calibrate(recordings: Union[Path, Sequence[Path]], *, sensor: Path = "", out
     range_noise : float, optional
         Standard deviation of ranges before rounding, m; by default the sensor's.
     prior_sigma, prior_sigma_deg : float, optional
-        Prior standard deviation of every error angle around the believed value, rad or deg; by default
-        there is no such prior.
+        Prior standard deviation of every error angle around the believed value, rad or deg; by
+        default there is no such prior.
     range_offset_sigma : float, optional
         Prior standard deviation of the range offset, m; 0 holds it.
     beam_origin : bool, default True
