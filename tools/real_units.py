@@ -72,7 +72,8 @@ def text_of(command, path, options):
     slips = found["slips"]
     lost = f" {sum(one['shots'] or 0 for one in slips)} shots are missing at {len(slips)} places." if slips else ""
     digest = hashlib.sha256(path.read_bytes()).hexdigest()
-    rows = [(in_words(name), one["value"], one["sigma"], unit_of(name)) for name, one in found["parameters"].items()]
+    rows = [(in_words(name), one["value"], one["sigma_given_held"], unit_of(name))
+            for name, one in found["parameters"].items()]
     if found["frame"]["estimated"]:
         rows += [(f"{axis} of the frame", found["frame"][f"{axis}_deg"]["value"],
                   found["frame"][f"{axis}_deg"]["sigma"], "deg") for axis in ("yaw", "pitch")]

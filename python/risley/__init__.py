@@ -4,8 +4,9 @@
 
 Everything is in SI units (radians, metres, seconds) unless a name ends in another unit, such as
 ``_deg``. All computation is done by the C++ libraries of risley, with the interpreter's lock
-released. Wrong arguments raise `ValueError`, files that cannot be read or written `FileError` (an `OSError`),
-and data from which nothing can be estimated `EstimationError`. Ctrl-C stops what is running.
+released. Wrong arguments raise `ValueError`, files that cannot be read or written `FileError` (an
+`OSError`), and data from which nothing can be estimated `EstimationError`. Ctrl-C stops what is
+running.
 """
 from risley._jobs import (calibrate, cloud, coverage, estimate, identify, info, observability,
                           pattern, plan, simulate)

@@ -108,54 +108,54 @@ def calibrate(recordings: Union[Path, Sequence[Path]], *, sensor: Path = "", out
     Parameters
     ----------
     recordings : str, path or a sequence of them
-        Of one sensor, with ranges.
+        Recordings of one sensor, with ranges.
     sensor : str or path, optional
         Name of a preset, or a preset or calibration file; otherwise found from the recordings.
     output : str or path, optional
-        Folder for calibration.yaml, states, report.json and report.html; of a flight for
-        mount.yaml and trajectory.csv too.
+        Folder for calibration.yaml, states, report.json and report.html; for a flight also for
+        mount.yaml and trajectory.csv.
     method : {'adjustment', 'paper'}
-        On walls: all recordings together, weighted; or unweighted distances as in the paper.
+        On walls: a weighted adjustment of all recordings, or unweighted distances as in the paper.
     planes : str or path, optional
-        Walls by name (YAML); those with a ``sigma_deg`` have known normals.
+        Names of walls (YAML); those with a ``sigma_deg`` have known normals.
     stations : str or path, optional
-        Known rotations of the sensor (YAML), one station per recording in their order.
+        Known rotations of the sensor (YAML): one station per recording, in the same order.
     station : sequence of str
-        Which stations of that file, in the order of the recordings.
+        Names of the stations in that file to use, in the order of the recordings.
     trajectory, mount : str or path
-        Of a flight: where the platform was, and how the sensor sits on it.
+        For a flight: where the platform was, and how the sensor sits on it.
     trajectory_topic : str
-        Of a trajectory that is a ROS bag with several topics of poses.
+        Topic to use if the trajectory is a ROS bag with several topics of poses.
     accuracy, trajectory_errors : str or path, optional
         How wrong the trajectory may be: accuracies (SMRMSG), or an error process (YAML).
     control : str or path, optional
         Known points and planes of the ground (YAML).
     knot_spacing, cell_size : float, optional
-        Between corrections of the trajectory, s; of the squares of ground, m.
+        Time between corrections of the trajectory, s; edge of the squares of ground, m.
     rate : float or 'full', optional
-        Shots per second to use, Hz; otherwise all.
+        Shots per second to use, Hz; by default all.
     angle_noise, angle_noise_deg : float, optional
         Standard deviation of the noise of azimuth and zenith before rounding, rad or deg; by
         default the sensor's.
     range_noise : float, optional
         Standard deviation of ranges before rounding, m; by default the sensor's.
     prior_sigma, prior_sigma_deg : float, optional
-        Standard deviation of every error angle about the believed value, rad or deg; by default
-        there is no such prior.
+        Prior standard deviation of every error angle around the believed value, rad or deg; by
+        default there is no such prior.
     range_offset_sigma : float, optional
-        Prior of the range offset, m; 0 holds it.
+        Prior standard deviation of the range offset, m; 0 holds it.
     beam_origin : bool, default True
         Whether beams start where they leave the last prism.
     fixed, free, mirrored, shot_rate, extrinsics, extrinsics_deg, threads, progress
         As in `risley.estimate`.
     truth : str, path or a sequence of them
-        ``OUT.truth.yaml`` of the simulation of each recording, to compare with.
+        ``OUT.truth.yaml`` of the simulation that made each recording, to compare with.
     force : bool, default False
-        Write calibration.yaml also where it is not better.
+        Write calibration.yaml even if the calibration is not better.
     states : {'knots', 'all', 'none'}
         Rotor states to write into ``output``.
     seed : int, default 0
-        Of the search for planes.
+        Seed of the search for planes.
 
     Returns
     -------
@@ -208,25 +208,25 @@ def plan(scene_or_flight: Path, *, sensor: Path = "", duration: Optional[float] 
          prior_sigma_deg: Optional[float] = None, range_offset_sigma: Optional[float] = None,
          beam_origin: bool = True, fixed: Fixed = (), free: Iterable[str] = (), seed: int = 0,
          progress: Progress = None) -> Plan:
-    """Say what a calibration on planned walls or in a planned flight would reach.
+    """Predict the accuracy of a calibration on planned walls or in a planned flight.
 
     Parameters
     ----------
     scene_or_flight : str or path
         A scene of walls with stations, or a flight with strips (YAML).
     sensor : str or path, optional
-        Name of a preset, or a preset or calibration file; otherwise a Mid-40.
+        Name of a preset, or a preset or calibration file; by default a Mid-40.
     duration : float, optional
-        Of each recording of walls, s; otherwise 10.
+        Length of each recording of walls, s; by default 10.
     mount, trajectory_errors : str or path
-        Of a flight: how the sensor sits on the platform, and how wrong the trajectory will be.
+        For a flight: how the sensor sits on the platform, and how wrong the trajectory will be.
     scene : str or path, optional
-        Of a flight: the terrain; otherwise level ground.
+        For a flight: the terrain; by default level ground.
     knot_spacing, cell_size, empty_circle : float, optional
-        Of a flight: between corrections of the trajectory, s; of the squares of ground, m; of the
-        circles that points should not leave empty, m.
+        For a flight: time between corrections of the trajectory, s; edge of the squares of ground,
+        m; diameter of the circles that are searched for points, m.
     rate : float, optional
-        Shots per second, Hz; otherwise the sensor's, of a flight 5000.
+        Shots per second, Hz; by default the sensor's, for a flight 5000.
     range_noise, prior_sigma, prior_sigma_deg, range_offset_sigma, beam_origin, fixed, free, seed
         As in `risley.calibrate`.
     progress : bool or callable, optional
@@ -239,7 +239,7 @@ def plan(scene_or_flight: Path, *, sensor: Path = "", duration: Optional[float] 
     Raises
     ------
     EstimationError, FileError, ValueError
-        As `risley.calibrate`.
+        As in `risley.calibrate`.
     """
     options: Dict[str, Any] = {
         "plan": os.fspath(scene_or_flight), "sensor": os.fspath(sensor), "rate": rate,
@@ -278,34 +278,35 @@ def cloud(recording: Path, calibration: Path, output: Path, *, format: str = "",
     Parameters
     ----------
     recording : str or path
-        Of one sensor, with ranges.
+        A recording of one sensor, with ranges.
     calibration : str or path
-        ``calibration.yaml`` of an estimate or a calibration, or a preset by name.
+        ``calibration.yaml`` of an estimate or a calibration, or the name of a preset.
     output : str or path
-        The file; its ending chooses the format unless one is named.
+        The file; its ending chooses the format unless `format` does.
     format : str, optional
-        Name of a format, whatever the ending.
+        Name of a format; the ending then does not matter.
     directions : {'smoothed', 'reported'}
-        Where the calibration sends the beam, or where the sensor says.
+        Directions from the calibration, or as the sensor reports them.
     beam_origin, beam_divergence, covariance : bool, default True
-        Start beams where they leave the last prism; count the footprint; give covariances.
+        Start beams where they leave the last prism; include the footprint in the covariance; write
+        covariances.
     common_factors : bool, default False
-        Give every point the loadings of the errors that all points share.
+        Write for every point the loadings of the errors that all points share.
     rate : float or 'full', optional
-        Directions per second that rotation angles are found from, Hz.
+        Directions per second from which rotation angles are found, Hz.
     angle_noise, angle_noise_deg : float, optional
         Standard deviation of the noise of azimuth and zenith before rounding, rad or deg; by
         default the calibration's.
     las_scale : float, optional
         LAS stores coordinates as multiples of this, m.
     time : {'gps', 'recording'}
-        LAS: GPS time where the recording's clock is UTC, or the clock as it is.
+        For LAS: GPS time if the recording's clock is UTC, or the clock as it is.
     trajectory, trajectory_topic, mount, accuracy, trajectory_errors
-        As in `risley.calibrate`, for a sensor that moved.
+        As in `risley.calibrate`, for a moving sensor.
     crs, datum : str, optional
         Map of the points and datum of the trajectory, ``EPSG:N``.
     distribution : bool, default False
-        Tell how the points of a flight lie on the ground.
+        Report how the points of a flight lie on the ground.
     shot_rate, extrinsics, extrinsics_deg, threads, progress
         As in `risley.estimate`.
 
@@ -316,7 +317,7 @@ def cloud(recording: Path, calibration: Path, output: Path, *, format: str = "",
     Raises
     ------
     EstimationError
-        If the rotors' motion cannot be found.
+        If the motion of the rotors cannot be found.
     FileError, ValueError
         For damaged files, and for options that make no sense.
     """
@@ -352,13 +353,13 @@ def simulate(output: Path, *, sensor: Path = "mid-40", duration: Optional[float]
     Parameters
     ----------
     output : str or path
-        The recording; its ending chooses the format. The truth stands beside it.
+        The recording; its ending chooses the format. The truth is written beside it.
     sensor : str or path, default 'mid-40'
         Name of a preset, or a preset or calibration file.
     duration : float, optional
-        Length, s; otherwise 1, or to the trajectory's end.
+        Length, s; by default 1, or until the end of the trajectory.
     rate : float, optional
-        Shots per second, Hz; otherwise the sensor's.
+        Shots per second, Hz; by default the sensor's.
     angle_noise, angle_noise_deg, range_noise : float, optional
         Standard deviations of directions, rad or deg, and of ranges, m; by default the sensor's.
     quantize : bool, default True
@@ -370,29 +371,29 @@ def simulate(output: Path, *, sensor: Path = "mid-40", duration: Optional[float]
     set : mapping of str to float
         Parameters of the true sensor, in the unit of the name.
     reported : mapping of str to float
-        What the sensor believes where that is not the truth.
+        Parameters for which the sensor believes another value than the true one.
     reported_nominal : bool, default False
         The sensor believes that it has no errors.
     start_angles, start_angles_deg : sequence of float, optional
-        Rotation angles at the start, rad or deg; otherwise random from the seed.
+        Rotation angles at the start, rad or deg; by default random, from the seed.
     scene : str or path, optional
         Planes or terrain (YAML); without it there are no ranges.
     station : str, optional
-        Station of the scene to stand on.
+        Station of the scene at which the sensor stands.
     trajectory, flight : str or path, optional
-        Along which the sensor moves, or a plan that makes it.
+        Trajectory along which the sensor moves, or a flight plan.
     trajectory_topic : str, optional
-        Of a trajectory that is a ROS bag with several topics of poses.
+        Topic to use if the trajectory is a ROS bag with several topics of poses.
     mount, trajectory_errors : str or path
-        True mount of the moving sensor; errors of the trajectory that is written for users.
+        True mount of the moving sensor; errors of the trajectory that a user would have.
     trajectory_format : str, default 'csv'
-        Of that trajectory.
+        Format of that trajectory.
     start : float, optional
-        Of the recording after the trajectory's first record, s.
+        Start of the recording after the first record of the trajectory, s.
     clock_drift : float, optional
-        What the trajectory's time gains on the sensor's clock, s/s.
+        Rate at which the trajectory's time gains on the sensor's clock, s/s.
     seed : int, default 0
-        Same seed, same bytes.
+        The same seed gives the same bytes.
     threads : int, default 0
         Number of threads; 0 means one per core.
     progress : bool or callable, optional
@@ -405,7 +406,7 @@ def simulate(output: Path, *, sensor: Path = "mid-40", duration: Optional[float]
     Raises
     ------
     FileError, ValueError
-        For files that cannot be read or written and for options that make no sense.
+        For files that cannot be read or written, and for options that make no sense.
     """
     options = {
         "output": os.fspath(output), "sensor": os.fspath(sensor), "duration": duration,
@@ -427,20 +428,20 @@ def identify(recording: Path, *, output: Path = "", force: bool = False, most_pr
              fastest: Optional[float] = None, shot_rate: Optional[float] = None,
              extrinsics: YawPitchRoll = None, extrinsics_deg: YawPitchRoll = None,
              threads: int = 0, progress: Progress = None) -> Identification:
-    """Find out which prisms made a scan, from its times and directions alone.
+    """Find which prisms made a scan, from its times and directions alone.
 
     Parameters
     ----------
     recording : str or path
-        Of one sensor.
+        A recording of one sensor.
     output : str or path, optional
-        Preset to write (.yaml), which every ``sensor`` takes.
+        Preset to write (.yaml), which can be given as ``sensor`` elsewhere.
     force : bool, default False
-        Write it even if the answer is not sure.
+        Write it even if the answer is undecided.
     most_prisms : int, default 3
-        Try trains of up to so many.
+        Largest number of prisms to try.
     fastest : float, optional
-        No rotor turns faster, rad/s; otherwise 400 turns a second.
+        Largest speed of a rotor, rad/s; by default 400 turns a second.
     shot_rate, extrinsics, extrinsics_deg, threads, progress
         As in `risley.estimate`.
 
@@ -481,13 +482,13 @@ def pattern(sensor: Path, format: str, output: Path, *, duration: float = 1.0,
     duration : float, default 1
         Length of the scan, s.
     rate : float, optional
-        Shots per second, Hz; otherwise the sensor's.
+        Shots per second, Hz; by default the sensor's.
     every : int, default 1
-        Of so many shots one.
+        Write one of so many shots.
     firing : {'in-turn', 'together'}, optional
-        When the emitters of a sensor that has several fire; otherwise as the preset says.
+        When the emitters fire if there are several; by default as in the preset.
     start_angles, start_angles_deg : sequence of float, optional
-        Rotation angles at time 0, rad or deg; otherwise the preset's.
+        Rotation angles at time 0, rad or deg; by default the preset's.
     threads : int, default 0
         Number of threads; 0 means one per core.
     progress : bool or callable, optional
@@ -500,7 +501,7 @@ def pattern(sensor: Path, format: str, output: Path, *, duration: float = 1.0,
     Raises
     ------
     FileError, ValueError
-        For files that cannot be written and for options that make no sense.
+        For files that cannot be written, and for options that make no sense.
     """
     options = {
         "sensor": os.fspath(sensor), "format": format, "output": os.fspath(output),
@@ -516,14 +517,14 @@ def coverage(sensor: Path, *, after: Optional[Sequence[float]] = None,
              start_angles: Optional[Sequence[float]] = None,
              start_angles_deg: Optional[Sequence[float]] = None, threads: int = 0,
              progress: Progress = None) -> Dict[str, Any]:
-    """Say how the scan of a sensor fills its field of view.
+    """Compute how the scan of a sensor fills its field of view.
 
     Parameters
     ----------
     sensor : str or path
         Name of a preset, or a preset or calibration file.
     after : sequence of float, optional
-        After which times, s.
+        Times since the start of the scan, s.
     cell, cell_deg : float, optional
         Edge of a cell, rad or deg.
     rate, every, firing, start_angles, start_angles_deg, threads, progress
@@ -532,7 +533,7 @@ def coverage(sensor: Path, *, after: Optional[Sequence[float]] = None,
     Returns
     -------
     dict
-        ``coverage`` of ``risley pattern --coverage --json``.
+        As ``coverage`` in ``risley pattern --coverage --json``.
     """
     options = {
         "sensor": os.fspath(sensor), "after": None if after is None else list(after),
@@ -548,18 +549,18 @@ def observability(recording: Path = "", *, sensor: Path = "", duration: Optional
                   fixed: Fixed = (), free: Iterable[str] = (), shot_rate: Optional[float] = None,
                   extrinsics: YawPitchRoll = None, extrinsics_deg: YawPitchRoll = None,
                   threads: int = 0, progress: Progress = None) -> Dict[str, Any]:
-    """Say what a recording, or a planned one, tells of each parameter: Cramér-Rao bounds.
+    """Compute Cramér-Rao bounds of all parameters for a recording or a plan.
 
     Parameters
     ----------
     recording : str or path, optional
-        To judge; without one a plan is judged.
+        The recording; without one, the bounds are those of a plan.
     duration : float, optional
-        Of the plan, s; otherwise 30.
+        Length of the plan, s; by default 30.
     rate : float or 'full', optional
-        Shots per second of the plan, or to use of the recording, Hz.
+        Shots per second of the plan, or to use from the recording, Hz.
     rounding : bool, default True
-        A plan's angles are rounded to the sensor's resolution.
+        Whether the angles of a plan are rounded to the sensor's resolution.
     sensor, angle_noise, angle_noise_deg, fixed, free, shot_rate, extrinsics, extrinsics_deg
         As in `risley.estimate`.
     threads, progress
@@ -568,7 +569,7 @@ def observability(recording: Path = "", *, sensor: Path = "", duration: Optional
     Returns
     -------
     dict
-        As ``risley observability --json``.
+        As in ``risley observability --json``.
     """
     options = {
         "recording": os.fspath(recording), "sensor": os.fspath(sensor), "duration": duration,
@@ -582,23 +583,23 @@ def observability(recording: Path = "", *, sensor: Path = "", duration: Optional
 def info(file: Path, *, accuracy: Path = "", trajectory_topic: str = "",
          shot_rate: Optional[float] = None, extrinsics: YawPitchRoll = None,
          extrinsics_deg: YawPitchRoll = None, progress: Progress = None) -> Dict[str, Any]:
-    """Say what a recording or a trajectory holds, with an audit of its times.
+    """Describe what a recording or a trajectory holds, and check its times.
 
     Parameters
     ----------
     file : str or path
-        Of any known format.
+        A recording or trajectory in any known format.
     accuracy : str or path, optional
-        Accuracies (SMRMSG) of a trajectory.
+        Accuracies of a trajectory (SMRMSG).
     trajectory_topic : str, optional
-        Look at the poses of this topic of a ROS bag.
+        Topic of a ROS bag whose poses are described.
     shot_rate, extrinsics, extrinsics_deg, progress
         As in `risley.read`.
 
     Returns
     -------
     dict
-        As ``risley info --json``. Damage is told under ``error``.
+        As in ``risley info --json``. Damage is reported under ``error``.
     """
     options = {"input": os.fspath(file), "accuracy": os.fspath(accuracy),
                "trajectory_topic": trajectory_topic, "shot_rate": shot_rate,

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The risley authors
 # SPDX-License-Identifier: MIT
-"""What jobs found, as plain data: columns, dictionaries, a sensor. All of it can be pickled."""
+"""Results of jobs as plain data: columns, dictionaries, a sensor. All of it can be pickled."""
 import html
 import os
 from typing import Any, Dict, List, NamedTuple, Optional, Union
@@ -22,13 +22,13 @@ class Verdict(NamedTuple):
 
 
 class _Answer:
-    """What a job found, in the keys of the command's ``--json``."""
+    """Result of a job, with the keys of the command's ``--json``."""
 
     def __init__(self, found: Dict[str, Any]) -> None:
         self._dict = found
 
     def to_dict(self) -> Dict[str, Any]:
-        """The same as the command prints with ``--json``, but for ``command`` and ``inputs``.
+        """The same as the command prints with ``--json``, without ``command`` and ``inputs``.
 
         Angles are in degrees there, as the names say.
         """
@@ -36,7 +36,7 @@ class _Answer:
 
     @property
     def warnings(self) -> List[str]:
-        """What else there is to know, in sentences."""
+        """Warnings, as sentences."""
         return [one["message"] if isinstance(one, dict) else one
                 for one in self._dict.get("warnings", [])]
 
@@ -46,15 +46,15 @@ class _Columns(_Answer):
 
     def __init__(self, found: Dict[str, Any], table: _risley.ValueTable) -> None:
         super().__init__(found)
-        #: What was found, by names without a unit.
+        #: Names of the quantities, without units.
         self.names = table.names
         #: Their units: 1, rad, rad/s, m or s.
         self.units = table.units
-        #: One standard deviation each, with what held parameters may be off by; shape (n,).
+        #: One standard deviation each, including the uncertainty of held parameters; shape (n,).
         self.sigmas = table.sigmas
-        #: What the covariance is of.
+        #: Names of the quantities of the covariance.
         self.free = table.covariance_names
-        #: Of the free quantities if those held are exact; shape (free, free).
+        #: Covariance of the free quantities if held ones are exact; shape (free, free).
         self.covariance = table.covariance
 
     def _columns(self) -> Dict[str, Any]:
@@ -90,7 +90,7 @@ class Solution(_Columns):
         self.sigmas_given_held = table.sigmas_given_held
         #: Whether the numbers can be used.
         self.converged = found.converged
-        #: Why they cannot; empty otherwise.
+        #: Why they cannot be used; empty otherwise.
         self.reason = found.reason
         #: Stable code, what was found, and what follows from it.
         self.verdict = Verdict(*found.verdict)
@@ -102,7 +102,7 @@ class Solution(_Columns):
 
     @property
     def warnings(self) -> List[str]:
-        """What else there is to know, in sentences."""
+        """Warnings, as sentences."""
         return list(self._dict["warnings"])
 
     def _columns(self) -> Dict[str, Any]:
@@ -150,7 +150,7 @@ class Estimate(Solution):
     Attributes
     ----------
     azimuth_residual, zenith_residual : ndarray
-        Observed less estimated direction of every used shot, rad.
+        Observed minus estimated direction of every used shot, rad.
     """
 
     def __init__(self, found: _risley.EstimatedRecording) -> None:
@@ -164,12 +164,12 @@ class Calibration(Solution):
 
     @property
     def planes(self) -> List[Dict[str, Any]]:
-        """The walls, as ``--json`` has them."""
+        """The walls, as in ``--json``."""
         return list(self._dict["planes"])
 
     @property
     def pointing_error(self) -> Dict[str, Any]:
-        """How far reported directions are off, with sigmas, in degrees."""
+        """Errors of the reported directions, with sigmas, in degrees."""
         return dict(self._dict["pointing_error"])
 
 
@@ -178,14 +178,14 @@ class FlightCalibration(Solution):
 
 
 class Plan(_Columns):
-    """What `risley.plan` says a calibration would reach: sigmas without values."""
+    """What `risley.plan` predicts for a calibration: sigmas without values."""
 
     def __init__(self, planned: Planned) -> None:
         super().__init__(planned.to_dict(), planned.table)
 
     @property
     def advice(self) -> List[str]:
-        """What would make it better; of walls alone."""
+        """What would improve it; for walls only."""
         return list(self._dict.get("advice", []))
 
     def _repr_html_(self) -> str:
@@ -200,12 +200,12 @@ class Cloud(_Answer):
 
     @property
     def points(self) -> int:
-        """How many."""
+        """Number of points."""
         return int(self._dict["points"])
 
     @property
     def output(self) -> str:
-        """The file."""
+        """Path of the file."""
         return str(self._dict["output"])
 
     @property
@@ -219,12 +219,12 @@ class Simulation(_Answer):
 
     @property
     def observations(self) -> int:
-        """How many, those without return included."""
+        """Number of observations, including those without a return."""
         return int(self._dict["observations"])
 
     @property
     def files(self) -> List[str]:
-        """All that were written, the recording first."""
+        """All files that were written, the recording first."""
         return list(self._dict["files"])
 
     @property
@@ -253,7 +253,7 @@ class Identification(_Answer):
 
     @property
     def hypotheses(self) -> List[Dict[str, Any]]:
-        """Trains that may have made the scan, best first, as ``--json`` has them."""
+        """Trains that may have made the scan, best first, as in ``--json``."""
         return list(self._dict["hypotheses"])
 
 
@@ -262,5 +262,5 @@ class Pattern(_Answer):
 
     @property
     def rows(self) -> int:
-        """How many shots."""
+        """Number of shots."""
         return int(self._dict["rows"])
