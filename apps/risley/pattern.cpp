@@ -13,6 +13,7 @@
 
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
+#include "risley/core/number_text.hpp"
 #include "risley/io/text_file.hpp"
 #include "risley/jobs/pattern_details.hpp"
 #include "risley/jobs/write_pattern.hpp"
@@ -126,11 +127,11 @@ void print_written(const jobs::WrittenPattern& written, const std::string& outpu
         written.format == "livox-csv" || written.format == "npy" ? " and are NaN" : "");
   }
   if (written.helios) {
-    say("against the pattern itself {:.3g} degree (root mean square), {:.3g} at most, over {} "
+    say("against the pattern itself {:.3g} degree (root mean square; {}), {:.3g} at most, over {} "
         "shots; a shot at time t is at t {} {:.6g} s there\n",
-        degrees_from_radians(written.helios->rms), degrees_from_radians(written.helios->worst),
-        grouped(written.helios->compared), written.helios->time_lag < 0 ? '-' : '+',
-        std::abs(written.helios->time_lag));
+        degrees_from_radians(written.helios->rms), offset_text(written.helios->rms),
+        degrees_from_radians(written.helios->worst), grouped(written.helios->compared),
+        written.helios->time_lag < 0 ? '-' : '+', std::abs(written.helios->time_lag));
   }
   for (const std::string& one : written.not_carried) say("not carried: {}\n", one);
 }
