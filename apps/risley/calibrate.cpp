@@ -201,84 +201,98 @@ Run declare_calibrate(CLI::App& verb) {
   const auto options = std::make_shared<CalibrateCommandOptions>();
   CalibrateCommandOptions& o = *options;
   verb.add_option("INPUT", o.inputs,
-                  "Recordings of one sensor, with ranges to plane walls or from a flight");
+                  "Recordings of one sensor with ranges to plane walls, or from a flight");
   verb.add_option(
       "-o,--output", o.folder,
-      "Folder for calibration.yaml, states.nc (states_1.nc, ...), report.json and report.html");
+      "Folder to write calibration.yaml, states.nc (states_1.nc, ...), report.json and report.html "
+      "to (default: none)");
   verb.add_option("--method", o.method,
-                  "adjustment: all recordings together, weighted; paper: unweighted distances from "
-                  "SVD planes")
+                  "adjustment: weighted, of all recordings together; paper: unweighted distances "
+                  "from planes fitted by SVD")
       ->check(CLI::IsMember({"adjustment", "paper"}))
       ->capture_default_str();
-  verb.add_option("--planes", o.planes,
-                  "Walls by name (YAML); those with a sigma_deg have known normals");
-  verb.add_option("--stations", o.stations,
-                  "Known rotations of the sensor (YAML), one station per recording in their order");
+  verb.add_option(
+      "--planes", o.planes,
+      "Walls by name (YAML); the normal of a wall with sigma_deg is known (default: walls "
+      "are found in the data)");
+  verb.add_option(
+      "--stations", o.stations,
+      "Known rotations of the sensor (YAML): one station for each recording, in the same "
+      "order");
   verb.add_option("--station", o.station_names,
-                  "Station of each recording, in their order, where the file lists others too "
-                  "(repeatable)")
+                  "Station of each recording, in the same order, where --stations lists others as "
+                  "well (repeatable)")
       ->type_name("NAME")
       ->expected(1)
       ->allow_extra_args(false)
       ->take_all();
   verb.add_option("--plan", o.plan,
-                  "Scene or flight (YAML) to plan for: says what a calibration there would reach, "
-                  "and of a flight how its points lie on the ground")
+                  "Scene or flight (YAML) to plan for: predicts how good a calibration there would "
+                  "be and, for a flight, how its points would lie on the ground")
       ->excludes("--output", "--method", "--planes", "--stations", "--station");
-  verb.add_option("--duration-s", o.duration_s, "Length of each planned recording")
+  verb.add_option("--duration-s", o.duration_s, "Length of each planned recording, s")
       ->needs("--plan")
       ->capture_default_str();
-  verb.add_option("--scene", o.scene, "Terrain (YAML) below a planned flight (default: level)")
+  verb.add_option("--scene", o.scene,
+                  "Terrain (YAML) below a planned flight (default: level ground)")
       ->needs("--plan");
-  verb.add_option("--empty-circle-m", o.empty_circle_m,
-                  "Diameter of circles that the points of a planned flight should not leave empty")
+  verb.add_option(
+          "--empty-circle-m", o.empty_circle_m,
+          "Diameter, m, of circles that the points of a planned flight should not leave empty")
       ->needs("--plan")
       ->capture_default_str();
-  verb.add_option("--report", o.page, "Page (HTML) on the points of a planned flight")
+  verb.add_option("--report", o.page, "Page (HTML) to write about the points of a planned flight")
       ->needs("--plan");
   add_platform_options(verb, o.platform);
   verb.get_option("--trajectory")->excludes("--plan", "--method", "--planes", "--stations");
   verb.add_option("--control", o.control,
-                  "Known points and planes of the ground that a flight is fixed on (YAML)")
+                  "Known points and planes on the ground that a flight is tied to (YAML)")
       ->needs("--trajectory");
   verb.add_option("--knot-spacing-s", o.knot_spacing_s,
-                  "Of a flight: between corrections of the trajectory; further apart on long "
-                  "flights (default: 0.25)");
-  verb.add_option("--cell-size-m", o.cell_size_m,
-                  "Of a flight: of the squares of ground that strips share (default: 2)");
+                  "Flights: time between corrections of the trajectory, s; longer flights may get "
+                  "a longer one (default: 0.25)");
+  verb.add_option(
+      "--cell-size-m", o.cell_size_m,
+      "Flights: side of the squares of ground on which strips are compared, m (default: 2)");
   verb.add_option(
           "--rate-hz", o.rate_hz,
-          "Shots per second to use, or of the plan; 'full' for all, of a planned flight 5000")
+          "Shots per second to use or to plan with, Hz; 'full': all of them, 5000 in the plan of a "
+          "flight")
       ->capture_default_str();
   verb.add_option("--noise-angle-deg", o.noise_angle_deg,
-                  "1 sigma of azimuth and zenith before rounding (default: the sensor's)");
+                  "1 sigma of azimuth and zenith before rounding, deg (default: the sensor's)");
   verb.add_option("--noise-range-m", o.noise_range_m,
-                  "1 sigma of ranges before rounding (default: the sensor's)");
+                  "1 sigma of ranges before rounding, m (default: the sensor's)");
   verb.add_option("--sensor", o.sensor,
                   "Preset by name, or a preset or calibration file (default: from the recording)");
   add_reading_options(verb, o.reading);
   add_parameter_choice(verb, o.parameters);
-  verb.add_option("--prior-sigma-deg", o.prior_sigma_deg,
-                  "1 sigma of every error angle about what the sensor believes (default: none)");
+  verb.add_option(
+      "--prior-sigma-deg", o.prior_sigma_deg,
+      "Prior: 1 sigma of every error angle about what the sensor believes, deg (default: no "
+      "prior)");
   verb.add_option("--range-offset-sigma-m", o.range_offset_sigma_m,
-                  "Prior of the range offset about what the sensor states; 0 holds it there "
-                  "(default: 0.05, of a flight 0.02)");
+                  "Prior: 1 sigma of the range offset about what the sensor states, m; 0 holds it "
+                  "there (default: 0.05, for a flight 0.02)");
   verb.add_option("--beam-origin", o.beam_origin,
-                  "Start beams where they leave the last prism; 'no': at the sensor's origin")
+                  "Let beams start where they leave the last prism; 'no': at the sensor's origin")
       ->check(CLI::IsMember({"yes", "no"}))
       ->capture_default_str();
-  verb.add_option("--states", o.states, "Which rotor states to write, see estimate")
+  verb.add_option(
+          "--states", o.states,
+          "Rotor states to write: 'knots': at one shot every 2 ms; 'all': at all shots; 'none'")
       ->check(CLI::IsMember({"knots", "all", "none"}))
       ->capture_default_str();
   verb.add_option("--mirror", o.mirror,
-                  "Whether the elevation in the files has the opposite sign; auto finds out")
+                  "Whether the elevation in the files has the opposite sign; 'auto' finds out")
       ->check(CLI::IsMember({"auto", "yes", "no"}))
       ->capture_default_str();
   verb.add_flag("--force", o.force,
-                "Write calibration.yaml also where the verdict is that it is not better")
+                "Write calibration.yaml even where the verdict is that it is no better")
       ->excludes("--plan");
   verb.add_option("--truth", o.truths,
-                  "OUT.truth.yaml of each recording's simulation, to judge the calibration by")
+                  "OUT.truth.yaml of each simulated recording, to compare the calibration with "
+                  "(repeatable)")
       ->expected(1)
       ->allow_extra_args(false)
       ->take_all();

@@ -26,10 +26,11 @@ using jobs::CalibratedRecordings;
 double deg(double radians) { return degrees_from_radians(radians); }
 
 void print_datum(calibration::DatumKind kind, const FormalDatum& datum) {
-  say("datum: {}; 1 sigma of roll {:.2g}, pitch {:.2g}, yaw {:.2g} deg; of the beams against each "
-      "other {:.2g} deg\n",
-      calibration::to_string(kind), deg(datum.sigma_roll), deg(datum.sigma_pitch),
-      deg(datum.sigma_yaw), deg(datum.shape));
+  say("datum: {}; 1 sigma of roll {}, pitch {}, yaw {} deg; of the beams against each other {} deg "
+      "({})\n",
+      calibration::to_string(kind), plain_text(deg(datum.sigma_roll), 2),
+      plain_text(deg(datum.sigma_pitch), 2), plain_text(deg(datum.sigma_yaw), 2),
+      plain_text(deg(datum.shape), 2), offset_text(datum.shape));
 }
 
 }  // namespace
@@ -99,12 +100,13 @@ void print_calibration(const CalibratedRecordings& outcome) {
   }
   if (outcome.truth) {
     say("\n");
-    Table errors(
-        {"error, deg", "azimuth rmse", "zenith rmse", "total", "shared rotation", "shape"});
+    Table errors({"error, deg", "azimuth rmse", "zenith rmse", "total", "shared rotation", "shape",
+                  fmt::format("total at {:.0f} m, mm", kStatedDistance)});
     const auto add = [&errors](const char* name, const DirectionErrors& e) {
       errors.add({name, fmt::format("{:.5f}", deg(e.azimuth_rmse)),
                   fmt::format("{:.5f}", deg(e.zenith_rmse)), fmt::format("{:.5f}", deg(e.total)),
-                  fmt::format("{:.5f}", deg(e.gauge)), fmt::format("{:.5f}", deg(e.shape))});
+                  fmt::format("{:.5f}", deg(e.gauge)), fmt::format("{:.5f}", deg(e.shape)),
+                  fmt::format("{:.1f}", 1e3 * offset_at(e.total))});
     };
     add("before", outcome.truth->before);
     add("after", outcome.truth->after);
@@ -133,7 +135,8 @@ void print_forecast(const CalibrationForecast& f, TrainShape shape) {
   table.print();
   say("\n");
   print_datum(f.datum_kind, f.datum);
-  say("error of a direction by noise alone: {:.2g} deg\n", deg(f.datum.total));
+  say("error of a direction by noise alone: {} deg ({})\n", plain_text(deg(f.datum.total), 2),
+      offset_text(f.datum.total));
   for (const auto& weak : f.unobservable) {
     say("not told by these walls: {}\n", direction_text(weak));
   }

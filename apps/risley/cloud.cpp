@@ -152,62 +152,71 @@ Run declare_cloud(CLI::App& verb) {
         ->check(CLI::IsMember({"yes", "no"}))
         ->capture_default_str();
   };
-  auto* inputs =
-      verb.add_option("INPUT", o.inputs, "Recordings with ranges, or patterns such as '*.lvx'");
-  verb.add_option("--calibration", o.calibration,
-                  "calibration.yaml of estimate or calibrate, or a preset by name")
+  auto* inputs = verb.add_option("INPUT", o.inputs,
+                                 "Recordings with ranges, or quoted patterns such as '*.lvx'");
+  verb.add_option(
+          "--calibration", o.calibration,
+          "calibration.yaml of estimate or calibrate, the folder that holds it, or a preset by "
+          "name")
       ->required();
   auto* output = verb.add_option(
       "-o,--output", o.output,
-      "Cloud to write, or a folder for several (made where it is missing); its ending "
+      "Cloud to write, or a folder for several, which is made where it is missing; the ending "
       "chooses the format:" +
           cloud_endings());
-  verb.add_option("--format", o.format,
-                  "Format to write, whatever the ending; in a folder las-1.4 unless said otherwise")
+  verb.add_option(
+          "--format", o.format,
+          "Format to write, whatever the ending (default: by the ending, las-1.4 in a folder)")
       ->check(CLI::IsMember(cloud_format_names()));
-  verb.add_option("--directions", o.directions,
-                  "smoothed: where the calibration sends the beam at the smoothed rotation angles; "
-                  "reported: where the sensor says")
+  verb.add_option(
+          "--directions", o.directions,
+          "Directions of the points: 'smoothed', where the calibration sends the beam at the "
+          "smoothed rotation angles; 'reported', as the sensor reports them")
       ->check(CLI::IsMember({"smoothed", "reported"}))
       ->capture_default_str();
   yes_no("--beam-origin", o.beam_origin,
-         "Start beams where they leave the last prism; 'no': at the sensor's origin");
-  yes_no("--covariance", o.covariance, "Give every point its covariance");
-  yes_no("--beam-divergence", o.beam_divergence, "Count the footprint's size in the covariance");
+         "Let beams start where they leave the last prism; 'no': at the sensor's origin");
+  yes_no("--covariance", o.covariance, "Write the covariance of every point");
+  yes_no("--beam-divergence", o.beam_divergence,
+         "Include the size of the beam's footprint in the covariance");
   yes_no("--common-factors", o.common_factors,
-         "Give every point the loadings of the errors that all points share, for covariances "
-         "between points");
+         "Write, for every point, the loadings of the errors that all points share, from which "
+         "covariances between points follow");
   add_reading_options(verb, o.reading);
   add_platform_options(verb, o.platform);
-  verb.add_option("--crs", o.platform.crs,
-                  "Map that the points of a moving sensor go to: EPSG:25832, with a height system "
-                  "EPSG:25832+7837 (default: UTM on WGS 84, ellipsoidal heights)");
+  verb.add_option(
+      "--crs", o.platform.crs,
+      "Coordinate reference system of a moving sensor's points, such as EPSG:25832, or "
+      "EPSG:25832+7837 with a height system (default: UTM on WGS 84, ellipsoidal heights)");
   verb.add_option("--datum", o.platform.datum,
-                  "Datum of the trajectory: EPSG:4979 for WGS 84, EPSG:4937 for ETRS89 (default: "
-                  "WGS 84)");
+                  "Datum of the trajectory: EPSG:4979 is WGS 84, EPSG:4937 is ETRS89 (default: "
+                  "EPSG:4979)");
   verb.add_option(
           "--distribution", o.distribution,
-          "Page (HTML) on how the points of one flight lie on the ground; its numbers are in "
-          "--json")
+          "Page (HTML) to write about how the points of one flight lie on the ground; --json has "
+          "its numbers")
       ->needs("--trajectory");
   verb.add_option(
       "--report", o.report,
-      "Page (HTML) that shows the points of one recording in three dimensions, coloured "
+      "Page (HTML) to write that shows the points of one recording in three dimensions, coloured "
       "by uncertainty, height, intensity or angle of incidence");
-  verb.add_option("--rate-hz", o.rate_hz,
-                  "Directions per second that rotation angles are found from; 'full' for all")
+  verb.add_option(
+          "--rate-hz", o.rate_hz,
+          "Directions per second, Hz, to find the rotation angles from; 'full': all of them")
       ->capture_default_str();
-  verb.add_option("--noise-angle-deg", o.noise_angle_deg,
-                  "1 sigma of azimuth and zenith before rounding (default: the calibration's)");
-  verb.add_option("--las-scale-m", o.las_scale_m, "LAS stores coordinates as multiples of this")
+  verb.add_option(
+      "--noise-angle-deg", o.noise_angle_deg,
+      "1 sigma of azimuth and zenith before rounding, deg (default: the calibration's)");
+  verb.add_option("--las-scale-m", o.las_scale_m, "Resolution of the coordinates in LAS files, m")
       ->capture_default_str();
   verb.add_option("--time", o.time,
-                  "LAS: gps for GPS time where the recording's clock is UTC; recording for the "
-                  "clock as it is")
+                  "Times in LAS files: 'gps', GPS time where the recording's clock is UTC; "
+                  "'recording', the recording's clock as it is")
       ->check(CLI::IsMember({"gps", "recording"}))
       ->capture_default_str();
-  verb.add_option("--beam-origin-map", o.beam_origin_map,
-                  "Page (HTML) with maps of where the calibration's beams start; no cloud is made")
+  verb.add_option(
+          "--beam-origin-map", o.beam_origin_map,
+          "Page (HTML) to write with maps of where the calibration's beams start; no cloud is made")
       ->excludes(inputs, output);
   return [options](const CommonOptions& common) {
     cloud::CloudOptions settings = cloud_options(*options);

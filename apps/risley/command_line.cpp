@@ -30,56 +30,57 @@ struct Verb {
 };
 
 constexpr Verb kVerbs[] = {
-    {"info", "What a recording holds, with an audit of its times",
+    {"info", "Show what a recording holds, with an audit of its times",
      "  risley info recording.lvx\n  risley info recording.lvx --json\n"
      "  risley info recording.lvx --share excerpt.nc",
      declare_info},
-    {"convert", "One recording format into another, by the ending of the output",
+    {"convert", "Convert a recording or trajectory to the format that the output's ending names",
      "  risley convert recording.lvx -o recording.csv", declare_convert},
-    {"simulate", "A recording whose truth is known",
+    {"simulate", "Simulate a recording whose truth is known",
      "  risley simulate -o room.lvx --sensor mid-40 --scene data/room.yaml --duration-s 10\n"
      "  risley simulate -o unit.csv --rate-hz 1000 --set prism_tilt_a_vertical_deg=0.1 --seed 7\n"
      "  risley simulate -o flight.lvx --flight data/flight-v4.yaml --mount data/mount-nadir.yaml "
      "\\\n"
      "    --scene data/village.yaml --rate-hz 5000",
      declare_simulate},
-    {"estimate", "The sensor's parameters and rotation angles from one recording",
+    {"estimate", "Estimate the sensor's parameters and rotation angles from one recording",
      "  risley estimate recording.lvx -o result/\n"
      "  risley estimate unit.csv --truth unit.csv.truth.yaml --json",
      declare_estimate},
-    {"observability", "What a recording, planned or made, can tell of every parameter",
+    {"observability", "Show how well a recording, planned or made, determines each parameter",
      "  risley observability --sensor mid-40 --duration-s 30 --rate-hz 100000\n"
      "  risley observability recording.lvx --free wedge_angle_deg",
      declare_observability},
-    {"calibrate", "The sensor's parameters from scans of plane walls",
+    {"calibrate", "Calibrate the sensor on scans of plane walls or on a flight",
      "  risley calibrate wall.lvx -o calibration/\n"
      "  risley calibrate upright.lvx flipped.lvx --stations stations.yaml -o calibration/\n"
      "  risley calibrate --plan hall.yaml --duration-s 30",
      declare_calibrate},
-    {"cloud", "Points with their covariance from recordings and a calibration",
+    {"cloud", "Make point clouds with covariances from recordings and a calibration",
      "  risley cloud recording.lvx --calibration calibration/calibration.yaml -o cloud.las\n"
      "  risley cloud 'flight/*.lvx' --calibration mid-40 --format ply -o clouds/",
      declare_cloud},
-    {"identify", "Which prisms made a scan, from its directions alone",
+    {"identify", "Identify the prisms that made a scan, from its directions alone",
      "  risley identify sequence.csv -o mine.yaml\n"
      "  risley identify frame.pcd --shot-rate-hz 240385 --json",
      declare_identify},
-    {"pattern", "The scan pattern of a sensor, for simulators",
+    {"pattern",
+     "Export a sensor's scan pattern for simulators, or show how it covers the field of view",
      "  risley pattern --sensor avia --format npy --duration-s 4 -o avia.npy\n"
      "  risley pattern --sensor horizon-sequence --format livox-csv --every 40 -o -\n"
      "  risley pattern --sensor horizon --format helios-xml -o horizon.xml\n"
      "  risley pattern --sensor tele-15 --coverage --report tele-15.html",
      declare_pattern},
-    {"preset", "The presets of sensors: list, show, check, new",
+    {"preset", "List, show, check or copy sensor presets",
      "  risley preset list\n  risley preset show avia\n"
      "  risley preset new unit-17 --from avia -o unit-17.yaml\n  risley preset check unit-17.yaml",
      declare_preset},
     {"report",
-     "The page of a result folder, drawn again from its report.json, or of two side by side",
+     "Draw the page of a result folder again from its report.json, or compare two results on one",
      "  risley report result/\n  risley report result/ -o sensor-17.html\n"
      "  risley report result/ calibration/ -o both.html",
      declare_report},
-    {"reproduce", "Every table and figure of the paper, ours beside the paper's",
+    {"reproduce", "Reproduce every table and figure of the paper, beside the paper's own values",
      "  risley reproduce -o reproduction/\n"
      "  risley reproduce --full --recording stationary.lvx -o reproduction/",
      declare_reproduce},
@@ -97,16 +98,20 @@ std::string seed_problem(const std::string& text) {
 
 void add_common_options(CLI::App& verb, CommonOptions& common) {
   const std::string group = "Common options";
-  verb.add_flag("--json", common.json, "Print exactly one JSON object on stdout")->group(group);
+  verb.add_flag("--json", common.json, "Print the result as exactly one JSON object on stdout")
+      ->group(group);
   verb.add_option("--threads", common.threads, "Number of threads (default: all cores)")
       ->check(CLI::Range(1, 4096))
       ->group(group);
-  verb.add_option("--seed", common.seed, "Seed of everything random (default 0)")
+  verb.add_option("--seed", common.seed, "Seed of all random numbers (default: 0)")
       ->check(CLI::Validator(seed_problem, ""))
       ->group(group);
-  auto* quiet = verb.add_flag("--quiet", common.quiet, "No progress bar and no warnings on stderr")
-                    ->group(group);
-  verb.add_flag("--verbose", common.verbose, "Say more on stderr")->excludes(quiet)->group(group);
+  auto* quiet =
+      verb.add_flag("--quiet", common.quiet, "Show no progress bar and no warnings on stderr")
+          ->group(group);
+  verb.add_flag("--verbose", common.verbose, "Print more detail on stderr")
+      ->excludes(quiet)
+      ->group(group);
 }
 
 /// The command as it could be typed again.
@@ -194,10 +199,9 @@ CommandLine::CommandLine()
   app_.set_version_flag("--version", "risley " RISLEY_VERSION);
   app_.require_subcommand(1);
   app_.footer(
-      "Exit status: 0 done, 1 the numbers failed, 2 wrong usage, 3 a file is bad, 4 a fault of "
-      "the\n"
-      "program or of the machine, 130 interrupted.\n"
-      "risley VERB --help tells more.");
+      "Exit status: 0 done, 1 no trustworthy result from these data, 2 wrong usage, 3 a bad file,\n"
+      "4 a fault in the program or the machine, 130 interrupted.\n"
+      "risley VERB --help shows the options of a verb.");
   for (const Verb& verb : kVerbs) {
     CLI::App& sub = *app_.add_subcommand(verb.name, verb.description);
     runs_[&sub] = verb.declare(sub);

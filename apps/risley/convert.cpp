@@ -138,27 +138,28 @@ FileOutcome convert(const FileJob& job, const ConvertOptions& options, const Pro
 Run declare_convert(CLI::App& verb) {
   const auto options = std::make_shared<ConvertOptions>();
   verb.add_option("INPUT", options->inputs,
-                  "Recordings or trajectories, of any known format, folders of ROS 2 with their "
-                  "metadata.yaml, or patterns such as '*.lvx'")
+                  "Recordings or trajectories of any known format, ROS 2 bag folders (with "
+                  "metadata.yaml), or quoted patterns such as '*.lvx'")
       ->required();
   verb.add_option("-o,--output", options->output,
-                  "File to write, or a folder for several (made where it is missing); its "
+                  "File to write, or a folder for several, which is made where it is missing; the "
                   "ending chooses the format:" +
                       recording_endings())
       ->required();
-  verb.add_option("--format", options->format,
-                  "Format to write, whatever the ending; needed for a folder")
+  verb.add_option(
+          "--format", options->format,
+          "Format to write, whatever the ending; required for a folder (default: by the ending)")
       ->check(CLI::IsMember(writable_format_names()));
   std::set<std::string> type_names;
   for (const auto& [name, type] : sensor_types()) type_names.insert(name);
   verb.add_option("--sensor-type", options->sensor_type,
-                  "Sensor that recorded, where the recording does not tell; LVX needs it")
+                  "Type of the sensor, which LVX files state (default: from the recording)")
       ->check(CLI::IsMember(type_names));
   verb.add_option("--accuracy", options->accuracy,
-                  "Accuracies (SMRMSG) that the records of a trajectory get")
+                  "Accuracies (SMRMSG file) to store with the records of a trajectory")
       ->type_name("FILE");
   verb.add_option("--trajectory-topic", options->topic,
-                  "Convert the poses of this topic of a ROS bag, a trajectory")
+                  "Convert a ROS bag as a trajectory: the poses of this topic")
       ->type_name("NAME");
   add_reading_options(verb, options->reading);
   return [options](const CommonOptions& common) {

@@ -126,12 +126,14 @@ void print_outcome(const EstimatedRecording& outcome) {
   }
   table.print();
   say("\n");
-  Table residuals({"residual", "mean deg", "std deg", "rms deg", "skewness", "excess kurtosis"});
+  Table residuals({"residual", "mean deg", "std deg", "rms deg",
+                   fmt::format("at {:.0f} m, mm", kStatedDistance), "skewness", "excess kurtosis"});
   const auto add = [&residuals](const char* name, const estimation::Moments& m) {
     residuals.add({name, fmt::format("{:.6f}", degrees_from_radians(m.mean)),
                    fmt::format("{:.6f}", degrees_from_radians(m.std)),
                    fmt::format("{:.6f}", degrees_from_radians(m.rms)),
-                   fmt::format("{:.3f}", m.skewness), fmt::format("{:.3f}", m.kurtosis)});
+                   fmt::format("{:.2f}", 1e3 * offset_at(m.rms)), fmt::format("{:.3f}", m.skewness),
+                   fmt::format("{:.3f}", m.kurtosis)});
   };
   add("azimuth", e.azimuth_moments);
   add("zenith", e.zenith_moments);
@@ -185,39 +187,42 @@ Run declare_estimate(CLI::App& verb) {
   EstimateCommandOptions& o = *options;
   verb.add_option("INPUT", o.input, "Recording of one sensor, of any known format")->required();
   verb.add_option("-o,--output", o.folder,
-                  "Folder for calibration.yaml, states.nc, report.json and report.html");
-  verb.add_option("--method", o.method,
-                  "map: most probable trajectory of all shots at once; ekf: the paper's filter")
+                  "Folder to write calibration.yaml, states.nc, report.json and report.html to "
+                  "(default: none)");
+  verb.add_option(
+          "--method", o.method,
+          "map: the most probable motion of the rotors, from all shots at once; ekf: the paper's "
+          "filter")
       ->check(CLI::IsMember({"map", "ekf"}))
       ->capture_default_str();
   verb.add_option(
       "--rate-hz", o.rate_hz,
-      "Shots per second to use, or 'full' for all (default: full with map, 1000 with ekf)");
+      "Shots per second to use, Hz, or 'full' for all (default: full with map, 1000 with ekf)");
   verb.add_option(
       "--noise-angle-deg", o.noise_angle_deg,
-      "Hold the noise of azimuth and zenith before rounding, 1 sigma, at this (default: "
-      "found in the data; ekf: the sensor's)");
+      "1 sigma of azimuth and zenith before rounding, deg, held at this (default: found in the "
+      "data; with ekf the sensor's)");
   verb.add_option("--sensor", o.sensor,
                   "Preset by name, or a preset or calibration file (default: from the recording)");
   add_reading_options(verb, o.reading);
   add_parameter_choice(verb, o.parameters);
   verb.add_option(
           "--states", o.states,
-          "Which rotor states to write: at one shot every 2 ms (ekf: at the shots used), at "
-          "all shots, none")
+          "Rotor states to write: 'knots': at one shot every 2 ms (ekf: at the shots used); 'all': "
+          "at all shots; 'none'")
       ->check(CLI::IsMember({"knots", "all", "none"}))
       ->capture_default_str();
   verb.add_option("--mirror", o.mirror,
-                  "Whether the elevation in the file has the opposite sign; auto finds out")
+                  "Whether the elevation in the file has the opposite sign; 'auto' finds out")
       ->check(CLI::IsMember({"auto", "yes", "no"}))
       ->capture_default_str();
   verb.add_option("--process-noise", o.process_noise,
-                  "How rotors may move: auto (random walks of speed and, with map, acceleration, "
-                  "by maximum "
-                  "likelihood), none (constant acceleration), paper (900), or a random walk of the "
-                  "speed in deg/s per sqrt(s)")
+                  "Process noise of the rotors' speed, deg/s per sqrt(s): a number; 'paper' (900); "
+                  "'none' (constant acceleration); or 'auto' (random walks of the speed and, with "
+                  "map, of the acceleration, found by maximum likelihood)")
       ->capture_default_str();
-  verb.add_option("--truth", o.truth, "OUT.truth.yaml of a simulation, to judge the estimate by");
+  verb.add_option("--truth", o.truth,
+                  "OUT.truth.yaml of the simulated recording, to compare the estimate with");
   return [options](const CommonOptions& common) { return run_estimate(*options, common); };
 }
 

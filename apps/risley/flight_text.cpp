@@ -42,9 +42,9 @@ void print_control(const FlightCalibration& c) {
 void print_judgement(const calibration::FlightJudgement& judgement) {
   const calibration::FlightDatum& datum = judgement.datum;
   say("boresight and prisms together: 1 sigma {:.2g} deg over the field of view ({:.2g} shared by "
-      "all beams, {:.2g} in shape), {:.1f} mm at {:.0f} m\n",
+      "all beams, {:.2g} in shape), {}\n",
       in_degrees(datum.total), in_degrees(datum.rotation), in_degrees(datum.shape),
-      1e3 * datum.total * datum.height, datum.height);
+      offset_text(datum.total, datum.height));
   for (const calibration::NotTold& own : judgement.not_told) {
     say("not told by this flight: {} (keeps {:.0f} % of its sigma)\n", own.words,
         100 * std::min(1.0, own.sigma));
@@ -109,11 +109,14 @@ void print_flight(const CalibratedFlight& outcome) {
   print_control(c);
   if (!outcome.truth) return;
   say("\n");
-  Table errors({"error, deg", "total", "shared rotation", "shape"});
-  const auto add = [&errors](const char* name, const calibration::DirectionErrors& e) {
+  const double height = c.datum.height;
+  Table errors({"error, deg", "total", "shared rotation", "shape",
+                fmt::format("total at {:.0f} m, mm", height)});
+  const auto add = [&errors, height](const char* name, const calibration::DirectionErrors& e) {
     errors.add({name, fmt::format("{:.5f}", in_degrees(e.total)),
                 fmt::format("{:.5f}", in_degrees(e.gauge)),
-                fmt::format("{:.5f}", in_degrees(e.shape))});
+                fmt::format("{:.5f}", in_degrees(e.shape)),
+                fmt::format("{:.1f}", 1e3 * offset_at(e.total, height))});
   };
   add("before", outcome.truth->before);
   add("after", outcome.truth->after);

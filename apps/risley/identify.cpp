@@ -117,12 +117,14 @@ Run declare_identify(CLI::App& verb) {
   IdentifyCommandOptions& o = *options;
   verb.add_option("INPUT", o.input, "Recording of one sensor, of any known format")->required();
   verb.add_option("-o,--output", o.output,
-                  "Preset to write, which any verb takes with --sensor (.yaml)");
-  verb.add_flag("--force", o.force, "Write the preset even if the answer is not sure");
-  verb.add_option("--most-prisms", o.most_prisms, "Try trains of up to so many prisms")
+                  "Preset to write (.yaml), which other verbs take as --sensor (default: none)");
+  verb.add_flag("--force", o.force, "Write the preset even if the answer is not certain");
+  verb.add_option("--most-prisms", o.most_prisms, "Largest number of prisms to try")
       ->check(CLI::Range(1, 3))
       ->capture_default_str();
-  verb.add_option("--fastest-hz", o.fastest_hz, "No rotor turns faster")->capture_default_str();
+  verb.add_option("--fastest-hz", o.fastest_hz,
+                  "Highest speed of a rotor to look for, revolutions per second")
+      ->capture_default_str();
   add_reading_options(verb, o.reading);
   return [options](const CommonOptions& common) { return run_identify(*options, common); };
 }

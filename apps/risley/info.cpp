@@ -172,23 +172,25 @@ ExitStatus run_info(const InfoCommandOptions& options, const CommonOptions& comm
 
 Run declare_info(CLI::App& verb) {
   const auto options = std::make_shared<InfoCommandOptions>();
-  verb.add_option("INPUT", options->input,
-                  "Recording, trajectory or accuracies (SMRMSG), of any known format, or a folder "
-                  "of ROS 2 with its metadata.yaml")
+  verb.add_option(
+          "INPUT", options->input,
+          "Recording, trajectory or accuracies (SMRMSG file) of any known format, or a ROS 2 "
+          "bag folder (with metadata.yaml)")
       ->required();
-  verb.add_option("--accuracy", options->accuracy, "Accuracies of a trajectory (SMRMSG)")
+  verb.add_option("--accuracy", options->accuracy, "Accuracies of the trajectory (SMRMSG file)")
       ->type_name("FILE");
   verb.add_option("--trajectory-topic", options->topic,
-                  "Look at the poses of this topic of a ROS bag, a trajectory")
+                  "Look at a ROS bag as a trajectory: at the poses of this topic")
       ->type_name("NAME");
-  verb.add_option("--share", options->share,
-                  "Write a small anonymous excerpt that can be sent to the developers (.nc): at "
-                  "most a second of the best-covered part, without serial numbers, date, "
-                  "intensities and ranges")
+  verb.add_option(
+          "--share", options->share,
+          "Write a small anonymous excerpt (.nc) that can be sent to the developers: at most "
+          "one second, where most shots have a return, without serial number, date, "
+          "intensities and ranges")
       ->type_name("OUT");
   verb.add_flag("--share-ranges", options->share_ranges,
-                "Let the excerpt hold ranges, too. They are left out otherwise because they show "
-                "the place where it was recorded; only calibrations on walls need them");
+                "Keep the ranges in the excerpt. They are left out otherwise because they show the "
+                "place of the recording; only calibrations on walls need them");
   add_reading_options(verb, options->reading);
   return [options](const CommonOptions& common) {
     require_apart(common, {options->share});

@@ -10,13 +10,15 @@
 namespace risley::app {
 
 void add_parameter_choice(CLI::App& verb, ParameterWishes& wishes) {
-  verb.add_option("--fix", wishes.fixed,
-                  "Hold a parameter, at a value if one is given (repeatable)")
+  verb.add_option(
+          "--fix", wishes.fixed,
+          "Hold a parameter at VALUE, in the unit that its name ends with, or at the sensor's "
+          "value (repeatable)")
       ->type_name("NAME[=VALUE]")
       ->expected(1)
       ->allow_extra_args(false)
       ->take_all();
-  verb.add_option("--free", wishes.freed, "Estimate one more parameter (repeatable)")
+  verb.add_option("--free", wishes.freed, "Estimate this parameter as well (repeatable)")
       ->type_name("NAME")
       ->expected(1)
       ->allow_extra_args(false)

@@ -13,6 +13,7 @@
 
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
+#include "risley/core/number_text.hpp"
 #include "risley/io/text_file.hpp"
 #include "risley/jobs/pattern_details.hpp"
 #include "risley/jobs/write_pattern.hpp"
@@ -89,11 +90,11 @@ void print_written(const jobs::WrittenPattern& written, const std::string& outpu
         written.format == "livox-csv" || written.format == "npy" ? " and are NaN" : "");
   }
   if (written.helios) {
-    say("against the pattern itself {:.3g} degree (root mean square), {:.3g} at most, over {} "
+    say("against the pattern itself {:.3g} degree (root mean square; {}), {:.3g} at most, over {} "
         "shots; a shot at time t is at t {} {:.6g} s there\n",
-        degrees_from_radians(written.helios->rms), degrees_from_radians(written.helios->worst),
-        grouped(written.helios->compared), written.helios->time_lag < 0 ? '-' : '+',
-        std::abs(written.helios->time_lag));
+        degrees_from_radians(written.helios->rms), offset_text(written.helios->rms),
+        degrees_from_radians(written.helios->worst), grouped(written.helios->compared),
+        written.helios->time_lag < 0 ? '-' : '+', std::abs(written.helios->time_lag));
   }
   for (const std::string& one : written.not_carried) say("not carried: {}\n", one);
 }
@@ -163,33 +164,37 @@ ExitStatus run_pattern(const PatternOptions& options, const CommonOptions& commo
 Run declare_pattern(CLI::App& verb) {
   const auto options = std::make_shared<PatternOptions>();
   PatternOptions& o = *options;
-  verb.add_option("-o,--output", o.output, "File to write; - is standard output");
+  verb.add_option("-o,--output", o.output, "File to write, - for standard output");
   std::set<std::string> names;
   for (const jobs::PatternFormat& format : jobs::pattern_formats()) names.insert(format.name);
   verb.add_option("--format", o.format, "What to write:" + format_list())
       ->check(CLI::IsMember(names));
   verb.add_option("--sensor", o.sensor, "Preset by name, or a preset or calibration file")
       ->capture_default_str();
-  verb.add_option("--duration-s", o.duration_s, "Length of the scan")->capture_default_str();
-  verb.add_option("--rate-hz", o.rate_hz, "Shots per second (default: the sensor's)");
-  verb.add_option("--every", o.every, "Keep the last of so many shots")
+  verb.add_option("--duration-s", o.duration_s, "Length of the scan, s")->capture_default_str();
+  verb.add_option("--rate-hz", o.rate_hz, "Shots per second, Hz (default: the sensor's)");
+  verb.add_option("--every", o.every, "Keep only the last of every N shots")
       ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{1'000'000'000}))
       ->capture_default_str();
   verb.add_option(
           "--firing", o.firing,
-          "When the emitters of a sensor that has several fire: in-turn, as real sensors, or "
-          "together, as in the maker's sequences (default: as the preset says)")
+          "When the emitters fire, where a sensor has several: 'in-turn', as in real sensors, or "
+          "'together', as in the maker's sequences (default: the preset's)")
       ->check(CLI::IsMember({"in-turn", "together"}));
-  verb.add_option("--start-angles-deg", o.start_angles_deg,
-                  "Rotation angles of the prisms at time 0, A,B (default: the preset's)")
+  verb.add_option(
+          "--start-angles-deg", o.start_angles_deg,
+          "Rotation angles of the prisms at time 0, deg, as A,B or A,B,C (default: the preset's)")
       ->delimiter(',');
-  verb.add_flag("--coverage", o.coverage,
-                "Print how the scan fills the field of view: share of cells, density, gaps");
-  verb.add_option("--integration-s", o.integration_s, "After which times")
+  verb.add_flag(
+      "--coverage", o.coverage,
+      "Print how the scan fills the field of view: share of cells with a shot, density, gaps");
+  verb.add_option("--integration-s", o.integration_s,
+                  "Times after which --coverage is given, s, as T,T,...")
       ->delimiter(',')
       ->capture_default_str();
-  verb.add_option("--cell-deg", o.cell_deg, "Edge of a cell")->capture_default_str();
-  verb.add_option("--report", o.report, "Page to write (HTML) with the pattern as it grows");
+  verb.add_option("--cell-deg", o.cell_deg, "Side of the cells of --coverage, deg")
+      ->capture_default_str();
+  verb.add_option("--report", o.report, "Page (HTML) to write that shows the pattern as it grows");
   return [options](const CommonOptions& common) { return run_pattern(*options, common); };
 }
 

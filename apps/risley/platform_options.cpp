@@ -6,17 +6,17 @@ namespace risley::app {
 
 void add_platform_options(CLI::App& verb, jobs::PlatformFiles& files) {
   verb.add_option("--trajectory", files.trajectory,
-                  "Trajectory of a sensor that moved: SBET, Inertial Explorer or POSPac text, CSV, "
-                  "poses of a ROS bag");
+                  "Trajectory of a moving sensor: SBET, Inertial Explorer or POSPac text, CSV, or "
+                  "the poses in a ROS bag (default: the sensor stands still)");
   verb.add_option("--trajectory-topic", files.topic,
-                  "Topic of its poses, of a ROS bag that has several")
+                  "Topic of the poses, where a ROS bag has several")
       ->type_name("NAME");
   verb.add_option("--mount", files.mount,
-                  "How the sensor sits on the moving platform (YAML): axes, lever arm, boresight, "
+                  "Mount of the sensor on the moving platform (YAML): axes, lever arm, boresight, "
                   "clock");
-  verb.add_option("--accuracy", files.accuracy, "Accuracies of the trajectory (SMRMSG)");
+  verb.add_option("--accuracy", files.accuracy, "Accuracies of the trajectory (SMRMSG file)");
   verb.add_option("--trajectory-errors", files.errors,
-                  "How wrong the trajectory may be, and for how long (YAML)");
+                  "How large errors of the trajectory may be, and how long they last (YAML)");
 }
 
 }  // namespace risley::app

@@ -99,27 +99,26 @@ Run declare_preset(CLI::App& verb) {
   const auto output = [&](CLI::App* sub) {
     sub->add_option("-o,--output", o.output, "File to write (default: standard output)");
   };
-  action("list", "The built-in presets",
+  action("list", "List the built-in presets",
          [](const CommonOptions& common) { return list_presets(common); });
   CLI::App* show =
-      action("show", "The file of a built-in preset, with the source of every value",
+      action("show", "Print a built-in preset, with the source of every value",
              [options](const CommonOptions& common) {
                return hand_out(sensors::builtin_preset_text(options->name), *options, common);
              });
-  show->add_option("NAME", o.name, "Built-in preset")->required();
+  show->add_option("NAME", o.name, "Name of a built-in preset")->required();
   output(show);
   CLI::App* check =
-      action("check", "Whether files are sound presets, and where they are not",
+      action("check", "Check whether files are valid presets, and say where they are not",
              [options](const CommonOptions& common) { return check_presets(*options, common); });
   check->add_option("FILE", o.files, "Preset or calibration files")->required();
-  CLI::App* fresh =
-      action("new", "A copy under a name of its own, to start a preset from",
-             [options](const CommonOptions& common) {
-               return hand_out(sensors::copied_preset_text(options->from, options->name), *options,
-                               common);
-             });
+  CLI::App* fresh = action(
+      "new", "Copy a preset under a new name, to edit it", [options](const CommonOptions& common) {
+        return hand_out(sensors::copied_preset_text(options->from, options->name), *options,
+                        common);
+      });
   fresh->add_option("NAME", o.name, "Name of the new preset")->required();
-  fresh->add_option("--from", o.from, "Preset to copy: by name, or a file")->required();
+  fresh->add_option("--from", o.from, "Preset to copy: a name or a file")->required();
   output(fresh);
   return [chosen](const CommonOptions& common) { return (*chosen)(common); };
 }

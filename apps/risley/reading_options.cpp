@@ -45,12 +45,14 @@ recordings::Extrinsics extrinsics_from(const std::string& text) {
 
 void add_reading_options(CLI::App& verb, ReadingWishes& wishes) {
   verb.add_option("--shot-rate-hz", wishes.shot_rate_hz,
-                  "Shots per second of a recording without times, or with bad ones: times are "
-                  "counted, shots without return keep their places");
-  verb.add_option("--extrinsics", wishes.extrinsics_deg,
-                  "Pose of the sensor in the frame that the recording stands in, deg: recorded = "
-                  "Rz(yaw) Ry(pitch) Rx(roll) sensor. Shots are turned back; 0,0,0 leaves them as "
-                  "they are, whatever pose the recording states")
+                  "Shots per second, Hz, of a recording without times or with bad ones: times are "
+                  "then counted from the shots, and shots without a return keep their places "
+                  "(default: the times in the file)");
+  verb.add_option(
+          "--extrinsics", wishes.extrinsics_deg,
+          "Rotation of the sensor in the recording's frame, deg: recorded = Rz(yaw) "
+          "Ry(pitch) Rx(roll) sensor. Shots are turned back by it; 0,0,0 leaves them as they "
+          "are (default: what the recording states)")
       ->type_name("YAW,PITCH,ROLL");
 }
 

@@ -90,11 +90,11 @@ ExitStatus report_two(const std::string& a, const std::string& b, const std::str
 Run declare_report(CLI::App& verb) {
   const auto options = std::make_shared<ReportCommandOptions>();
   verb.add_option("DIR", options->folders,
-                  "Folder that estimate -o or calibrate -o wrote, or two of them side by side")
+                  "Folder that estimate -o or calibrate -o wrote, or two of them to compare")
       ->required()
       ->expected(1, 2);
   verb.add_option("-o,--output", options->page,
-                  "The page (default for one folder: DIR/report.html)");
+                  "Page (HTML) to write (default: DIR/report.html; required for two folders)");
   return [options](const CommonOptions& common) {
     const std::vector<std::string>& folders = options->folders;
     return folders.size() == 1 ? report_one(folders.front(), options->page, common)

@@ -156,10 +156,11 @@ ExitStatus run_reproduce(const ReproduceCommandOptions& options, const CommonOpt
 Run declare_reproduce(CLI::App& verb) {
   const auto options = std::make_shared<ReproduceCommandOptions>();
   ReproduceCommandOptions& o = *options;
-  verb.add_option("-o,--output", o.folder, "Folder for reproduction.json and report.html")
+  verb.add_option("-o,--output", o.folder, "Folder to write reproduction.json and report.html to")
       ->required();
-  verb.add_flag("--full", o.full,
-                "More random draws, and Table 3 from all 100,000 shots a second (minutes)");
+  verb.add_flag(
+      "--full", o.full,
+      "Take more random draws, and all 100,000 shots per second for Table 3 (takes minutes)");
   verb.add_option("--recording", o.recording,
                   "Recording of a real, stationary Mid-40 for section 3.1");
   add_reading_options(verb, o.reading);

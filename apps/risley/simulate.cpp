@@ -118,55 +118,64 @@ Run declare_simulate(CLI::App& verb) {
   verb.add_option("--sensor", o.sensor, "Preset by name, or a preset or calibration file")
       ->capture_default_str();
   verb.add_option("--duration-s", o.duration_s,
-                  "Length of the recording (default: 1, or to the trajectory's end)");
-  verb.add_option("--rate-hz", o.rate_hz, "Shots per second (default: the sensor's)");
+                  "Length of the recording, s (default: 1, or to the end of the trajectory)");
+  verb.add_option("--rate-hz", o.rate_hz, "Shots per second, Hz (default: the sensor's)");
   verb.add_option("--noise-angle-deg", o.noise_angle_deg,
-                  "1 sigma of azimuth and zenith (default: the sensor's)");
-  verb.add_option("--noise-range-m", o.noise_range_m, "1 sigma of ranges (default: the sensor's)");
-  verb.add_option("--quantize", o.quantize, "Round to the sensor's resolution")
+                  "1 sigma of azimuth and zenith before rounding, deg (default: the sensor's)");
+  verb.add_option("--noise-range-m", o.noise_range_m,
+                  "1 sigma of ranges before rounding, m (default: the sensor's)");
+  verb.add_option("--quantize", o.quantize, "Round angles and ranges to the sensor's resolution")
       ->check(CLI::IsMember({"yes", "no"}))
       ->capture_default_str();
   verb.add_option("--beam-origin", o.beam_origin,
-                  "Start beams where they leave the last prism; 'no': at the sensor's origin")
+                  "Let beams start where they leave the last prism; 'no': at the sensor's origin")
       ->check(CLI::IsMember({"yes", "no"}))
       ->capture_default_str();
-  verb.add_option("--rotor", o.rotor, "How the rotors run")
+  verb.add_option("--rotor", o.rotor, "How the rotors' speeds vary")
       ->check(CLI::IsMember(simulation::rotor_kind_names()))
       ->capture_default_str();
-  verb.add_option("--set", o.assignments, "NAME=VALUE of the true sensor (repeatable)")
+  verb.add_option(
+          "--set", o.assignments,
+          "Set a parameter of the true sensor, in the unit that its name ends with (repeatable)")
       ->type_name("NAME=VALUE")
       ->expected(1)
       ->allow_extra_args(false)
       ->take_all();
-  verb.add_option("--reported", o.reported,
-                  "What the sensor believes where it differs from the truth (repeatable); "
-                  "'nominal' sets every error parameter to 0")
+  verb.add_option(
+          "--reported", o.reported,
+          "Set a parameter as the sensor believes it to be, where that differs from the "
+          "truth (repeatable); 'nominal' sets every error parameter to 0 (default: the truth)")
       ->type_name("NAME=VALUE|nominal")
       ->expected(1)
       ->allow_extra_args(false)
       ->take_all();
-  verb.add_option("--scene", o.scene, "Planes or terrain (YAML); without it no ranges");
-  verb.add_option("--station", o.station, "Station of the scene to stand on");
+  verb.add_option("--scene", o.scene,
+                  "Planes or terrain (YAML) to measure ranges to (default: none, and no ranges)");
+  verb.add_option("--station", o.station,
+                  "Station of the scene to stand on (default: the scene's origin)");
   auto* trajectory =
-      verb.add_option("--trajectory", o.trajectory, "True trajectory along which the sensor moves");
-  verb.add_option("--trajectory-topic", o.topic,
-                  "Topic of its poses, of a ROS bag that has several")
+      verb.add_option("--trajectory", o.trajectory,
+                      "True trajectory along which the sensor moves (default: it stands still)");
+  verb.add_option("--trajectory-topic", o.topic, "Topic of the poses, where a ROS bag has several")
       ->type_name("NAME")
       ->needs(trajectory);
-  verb.add_option("--flight", o.flight, "Flight plan (YAML) that makes the true trajectory")
+  verb.add_option("--flight", o.flight, "Flight plan (YAML) to make the true trajectory from")
       ->excludes(trajectory);
   verb.add_option("--mount", o.mount, "True mount of the moving sensor (YAML)");
-  verb.add_option("--trajectory-errors", o.trajectory_errors,
-                  "Errors (YAML) of the trajectory that is written for users");
-  verb.add_option("--trajectory-format", o.trajectory_format, "Format of that trajectory")
+  verb.add_option(
+      "--trajectory-errors", o.trajectory_errors,
+      "Errors (YAML) of the trajectory file that is written beside the recording (default: "
+      "none)");
+  verb.add_option("--trajectory-format", o.trajectory_format, "Format of that trajectory file")
       ->check(CLI::IsMember(trajectory_formats()))
       ->capture_default_str();
   verb.add_option("--start-s", o.start_s,
-                  "Begin of the recording after the trajectory's first record (default: 0)");
+                  "Start of the recording, s after the trajectory's first record (default: 0)");
   verb.add_option("--clock-drift-ppm", o.clock_drift_ppm,
-                  "What the trajectory's time gains on the sensor's clock (default: 0)");
-  verb.add_option("--start-angles-deg", o.start_angles_deg,
-                  "Rotation angles at the start, A,B (default: random from the seed)")
+                  "How fast the trajectory's time gains on the sensor's clock, ppm (default: 0)");
+  verb.add_option(
+          "--start-angles-deg", o.start_angles_deg,
+          "Rotation angles of the prisms at the start, deg, as A,B or A,B,C (default: random)")
       ->delimiter(',');
   return [options](const CommonOptions& common) {
     const simulation::SimulationSettings settings =

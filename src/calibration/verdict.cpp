@@ -42,11 +42,10 @@ std::string in_words(const PointingError& error) {
   const NumberText gauge = in_degrees(errors.gauge, error.gauge_sigma);
   const NumberText shape = in_degrees(errors.shape, error.shape_sigma);
   return fmt::format(
-      "reported directions are off by {} ± {} degree ({:.2g} m at {:.0f} m): {} ± {} shared by all "
-      "beams and {} ± {} in shape, {} at worst",
-      total.value, total.sigma, kStatedDistance * errors.total, kStatedDistance, gauge.value,
-      gauge.sigma, shape.value, shape.sigma,
-      in_degrees(error.worst_shape, error.worst_shape_sigma).value);
+      "reported directions are off by {} ± {} degree ({}): {} ± {} shared by all beams and {} ± {} "
+      "in shape, {} at worst",
+      total.value, total.sigma, offset_text(errors.total), gauge.value, gauge.sigma, shape.value,
+      shape.sigma, in_degrees(error.worst_shape, error.worst_shape_sigma).value);
 }
 
 std::string reason_of_failure(const Calibration& c, const PlanarSolution& solution) {
@@ -98,9 +97,10 @@ CalibrationVerdict verdict_of(const Calibration& c) {
       change.size() == 0 ? 0.0 : change.dot(algebra::SymmetricSolver(c.covariance).solve(change));
   if (!(chi2 > significant_chi2(freedom))) {
     return {CalibrationCode::as_believed,
-            fmt::format("the walls bear out what the sensor believes of itself to {} degree "
+            fmt::format("the walls bear out what the sensor believes of itself to {} degree, {} "
                         "(chi2 {:.3g} of {:.0f} parameters)",
-                        plain_text(degrees_from_radians(c.datum.total), 2), chi2, freedom),
+                        plain_text(degrees_from_radians(c.datum.total), 2),
+                        offset_text(c.datum.total), chi2, freedom),
             "nothing"};
   }
   const std::string moved = in_words(c.pointing_error);
@@ -112,9 +112,10 @@ CalibrationVerdict verdict_of(const Calibration& c) {
   }
   if (c.better_probability < kBetter) {
     return {CalibrationCode::not_better,
-            fmt::format("{}; but the calibration itself may be off by {:.2g} degree, and is better "
-                        "than what the sensor believes with a probability of {:.2g} only",
-                        moved, degrees_from_radians(c.datum.total), c.better_probability),
+            fmt::format("{}; but the calibration itself may be off by {} degree ({}), and is "
+                        "better than what the sensor believes with a probability of {:.2g} only",
+                        moved, plain_text(degrees_from_radians(c.datum.total), 2),
+                        offset_text(c.datum.total), c.better_probability),
             "scan more walls, tilted ones among them, or give what is known of walls and poses "
             "(option planes, option stations)"};
   }
@@ -211,13 +212,13 @@ std::vector<std::string> warnings_of(const Calibration& c, const PlanarSolution&
   std::vector<std::string> warnings;
   const double boresight = std::hypot(c.datum.sigma_pitch, c.datum.sigma_yaw);
   if (boresight > kPoorDatum) {
-    warnings.push_back(
-        fmt::format("the direction that all beams share is only known to {} degrees (pitch {}, yaw "
-                    "{}); their directions against each other to {}",
-                    plain_text(degrees_from_radians(boresight), 2),
-                    plain_text(degrees_from_radians(c.datum.sigma_pitch), 2),
-                    plain_text(degrees_from_radians(c.datum.sigma_yaw), 2),
-                    plain_text(degrees_from_radians(c.datum.shape), 2)));
+    warnings.push_back(fmt::format(
+        "the direction that all beams share is only known to {} degrees, {} (pitch {}, "
+        "yaw {}); their directions against each other to {} degrees, {}",
+        plain_text(degrees_from_radians(boresight), 2), offset_text(boresight),
+        plain_text(degrees_from_radians(c.datum.sigma_pitch), 2),
+        plain_text(degrees_from_radians(c.datum.sigma_yaw), 2),
+        plain_text(degrees_from_radians(c.datum.shape), 2), offset_text(c.datum.shape)));
   }
   for (const SurfaceStep& step : c.steps) {
     warnings.push_back(fmt::format(

@@ -18,6 +18,16 @@ int decimals_for(double sigma) {
   return std::clamp(1 - place, 0, 15);
 }
 
+/// Two significant digits of a length, m, in mm, cm or m.
+std::string length_text(double length) {
+  const auto in = [&](double unit, const char* name) {
+    return fmt::format("{} {}", number_text(length / unit, length / unit).value, name);
+  };
+  // A unit ends where two digits round to the next one.
+  if (length < 0.0995) return in(0.001, "mm");
+  return length < 0.995 ? in(0.01, "cm") : in(1, "m");
+}
+
 }  // namespace
 
 std::string without_minus_zero(std::string number) {
@@ -48,6 +58,15 @@ NumberText number_text(double value, double sigma) {
 std::string text_to_place_of(double value, double sigma) {
   if (!is_sigma(sigma)) return without_minus_zero(fmt::format("{:.7g}", value));
   return without_minus_zero(fmt::format("{:.{}f}", value, decimals_for(sigma)));
+}
+
+double offset_at(double angle, double distance) { return distance * std::tan(std::abs(angle)); }
+
+std::string offset_text(double angle, double distance) {
+  const double offset = offset_at(angle, distance);
+  if (!std::isfinite(offset)) return "–";
+  return fmt::format("{} at {} m", length_text(offset),
+                     distance >= 10 ? fmt::format("{:.0f}", distance) : plain_text(distance, 2));
 }
 
 }  // namespace risley

@@ -11,6 +11,7 @@
 
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
+#include "risley/core/number_text.hpp"
 #include "risley/estimation/batch_map.hpp"
 #include "risley/estimation/ekf.hpp"
 #include "risley/estimation/free_parameters.hpp"
@@ -238,12 +239,13 @@ void say_verdict(Estimate& estimate, const sensors::Sensor& nominal,
   if (estimate.converged) {
     verdict.code = oddities.empty() ? EstimateCode::consistent : EstimateCode::unusual;
   }
+  const double larger_rms = std::max(estimate.azimuth_moments.rms, estimate.zenith_moments.rms);
   switch (verdict.code) {
     case EstimateCode::consistent:
       verdict.words = fmt::format(
           "the directions are consistent with what the sensor believes of its optics, to {:.2g} "
-          "degree{}",
-          degrees_from_radians(std::max(estimate.azimuth_moments.rms, estimate.zenith_moments.rms)),
+          "degree ({}){}",
+          degrees_from_radians(larger_rms), offset_text(larger_rms),
           calibrated ? ", and so is its calibration"
                      : "; whether that belief is true only walls tell");
       verdict.to_do =
@@ -284,8 +286,9 @@ void judge(Estimate& estimate, const sensors::Sensor& nominal) {
                             ? 0.0
                             : rms * std::sqrt(estimate.autocorrelation.rho.front());
   const std::string residuals =
-      fmt::format("residuals of {:.3g} deg where noise and rounding amount to {:.3g} deg",
-                  degrees_from_radians(rms), degrees_from_radians(estimate.expected_residual));
+      fmt::format("residuals of {:.3g} deg ({}) where noise and rounding amount to {:.3g} deg",
+                  degrees_from_radians(rms), offset_text(rms),
+                  degrees_from_radians(estimate.expected_residual));
   estimate.converged = true;
   std::vector<std::string> oddities;  // of the unit
   const auto fail = [&](std::string reason, EstimateCode code = EstimateCode::inconsistent) {
@@ -304,10 +307,10 @@ void judge(Estimate& estimate, const sensors::Sensor& nominal) {
     fail(residuals + ": the model does not describe these data, or their noise is larger");
   } else if (!estimate.noise_held && misfit > kFarAbove * estimate.usual_residual) {
     fail(
-        fmt::format("residuals of {:.3g} deg, of which neighbouring shots share {:.3g} deg, where "
-                    "noise and rounding of a healthy unit amount to {:.3g} deg: the model does not "
-                    "describe these data",
-                    degrees_from_radians(rms), degrees_from_radians(misfit),
+        fmt::format("residuals of {:.3g} deg ({}), of which neighbouring shots share {:.3g} deg, "
+                    "where noise and rounding of a healthy unit amount to {:.3g} deg: the model "
+                    "does not describe these data",
+                    degrees_from_radians(rms), offset_text(rms), degrees_from_radians(misfit),
                     degrees_from_radians(estimate.usual_residual)));
   } else if (!estimate.unobservable.empty()) {
     const WeakDirection& worst = estimate.unobservable.front();
@@ -331,13 +334,12 @@ void judge(Estimate& estimate, const sensors::Sensor& nominal) {
                                 "the stated noise is too large");
   }
   if (!estimate.noise_held && estimate.noise.value.rms() > kNoisy * estimate.usual_noise) {
-    estimate.warnings.push_back(
-        fmt::format("the directions are {:.3g} times as noisy ({:.3g} deg) as the preset says of a "
-                    "healthy unit "
-                    "({:.3g} deg)",
-                    estimate.noise.value.rms() / estimate.usual_noise,
-                    degrees_from_radians(estimate.noise.value.rms()),
-                    degrees_from_radians(estimate.usual_noise)));
+    estimate.warnings.push_back(fmt::format(
+        "the directions are {:.3g} times as noisy ({:.3g} deg, {}) as the preset says "
+        "of a healthy unit ({:.3g} deg)",
+        estimate.noise.value.rms() / estimate.usual_noise,
+        degrees_from_radians(estimate.noise.value.rms()), offset_text(estimate.noise.value.rms()),
+        degrees_from_radians(estimate.usual_noise)));
     oddities.push_back(estimate.warnings.back());
   }
   double unevenness = 1.0;

@@ -9,6 +9,7 @@
 
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
+#include "risley/core/number_text.hpp"
 #include "risley/io/text_file.hpp"
 #include "risley/jobs/recording_input.hpp"
 #include "risley/jobs/sensor_choice.hpp"
@@ -77,7 +78,9 @@ void find_like(IdentifiedRecording& result) {
 
 void judge(IdentifiedRecording& result) {
   const Identification& found = result.identification;
-  const std::string rms = fmt::format("{:.2g} degree", degrees_from_radians(found.best().fit.rms));
+  const double left = found.best().fit.rms;
+  const std::string rms =
+      fmt::format("{:.2g} degree ({})", degrees_from_radians(left), offset_text(left));
   if (!found.fits) {
     result.verdict = IdentificationVerdict::inconsistent;
     result.words = fmt::format(

@@ -19,7 +19,6 @@ using calibration::CalibratedPlane;
 using calibration::DatumKind;
 using calibration::DirectionErrors;
 using calibration::FormalDatum;
-using calibration::kStatedDistance;
 using calibration::PriorTest;
 using calibration::SurfaceStep;
 
@@ -134,12 +133,10 @@ std::vector<KeyNumber> key_numbers(const CalibrationReport& r) {
     };
     const DirectionErrors& errors = r.pointing_error->errors;
     numbers.push_back({known(errors.total, r.pointing_error->total_sigma),
-                       fmt::format("error of the reported directions: {} mm at {:.0f} m",
-                                   millimetres(kStatedDistance * errors.total), kStatedDistance)});
+                       "error of the reported directions: " + offset_text(errors.total)});
     numbers.push_back({known(errors.shape, r.pointing_error->shape_sigma),
-                       fmt::format("of it in the shape of the bundle of beams, which no alignment "
-                                   "takes up: {} mm at {:.0f} m",
-                                   millimetres(kStatedDistance * errors.shape), kStatedDistance)});
+                       "of it in the shape of the bundle of beams, which no alignment takes up: " +
+                           offset_text(errors.shape)});
   }
   numbers.push_back({fmt::format("{} mm", millimetres(r.rms_after)),
                      fmt::format("thickness of the walls after the calibration, {} mm before",
@@ -239,7 +236,7 @@ std::string pointing_html(const CalibrationReport& r) {
     html += fmt::format("<tr><th scope=\"row\">{}</th><td>{}</td>{}<td>{}</td></tr>\n", name,
                         to_place_of(degrees_from_radians(error), degrees_from_radians(sigma)),
                         sigma_cell(degrees_from_radians(error), degrees_from_radians(sigma)),
-                        millimetres(kStatedDistance * error));
+                        millimetres(offset_at(error)));
   };
   add("all of it", errors.total, r.pointing_error->total_sigma);
   add("shared: a rotation of all beams together", errors.gauge, r.pointing_error->gauge_sigma);

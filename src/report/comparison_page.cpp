@@ -16,7 +16,6 @@
 namespace risley::report {
 namespace {
 
-using calibration::kStatedDistance;
 using calibration::PointingError;
 using jobs::ParameterDifference;
 using jobs::ResultComparison;
@@ -28,13 +27,9 @@ std::string angle_text(double value, double sigma) {
                          : plain_text(degrees_from_radians(value), 3) + "°";
 }
 
-std::string at_distance(double angle) {
-  return fmt::format("{} mm at {:g} m", millimetres(kStatedDistance * angle), kStatedDistance);
-}
-
 std::vector<KeyNumber> key_numbers(const PointingError& beams) {
   return {{angle_text(beams.errors.total, beams.total_sigma),
-           fmt::format("between the directions of the two ({})", at_distance(beams.errors.total))},
+           fmt::format("between the directions of the two ({})", offset_text(beams.errors.total))},
           {angle_text(beams.errors.gauge, beams.gauge_sigma),
            "of that is a rotation of all beams together"},
           {angle_text(beams.errors.shape, beams.shape_sigma),
@@ -126,12 +121,13 @@ std::string parameters_html(const ResultComparison& c, const ComparedResult& a,
 }
 
 std::string directions_html(const PointingError& beams) {
-  std::string html =
-      "<table><thead><tr><th>difference of the directions</th><th>root mean square</th><th>at "
-      "30 m</th></tr></thead><tbody>\n";
+  std::string html = fmt::format(
+      "<table><thead><tr><th>difference of the directions</th><th>root mean square</th><th>mm at "
+      "{:.0f} m</th></tr></thead><tbody>\n",
+      kStatedDistance);
   const auto row = [&](const char* head, double value, double sigma) {
-    html += fmt::format("<tr><th scope=\"row\">{}</th><td>{}</td><td>{} mm</td></tr>\n", head,
-                        angle_text(value, sigma), millimetres(kStatedDistance * value));
+    html += fmt::format("<tr><th scope=\"row\">{}</th><td>{}</td><td>{}</td></tr>\n", head,
+                        angle_text(value, sigma), millimetres(offset_at(value)));
   };
   row("all of it", beams.errors.total, beams.total_sigma);
   row("shared: a rotation of all beams together", beams.errors.gauge, beams.gauge_sigma);

@@ -63,10 +63,12 @@ std::vector<KeyNumber> key_numbers(const EstimateReport& r) {
   };
   std::vector<KeyNumber> numbers{
       {angles(r.azimuth_residuals.rms, r.zenith_residuals.rms),
-       "left unexplained of the directions in azimuth and in zenith, root mean square"}};
+       "left unexplained of the directions in azimuth and in zenith, root mean square: at most " +
+           offset_text(std::max(r.azimuth_residuals.rms, r.zenith_residuals.rms))}};
   if (r.noise && !r.noise->held) {
     numbers.push_back({angles(r.noise->azimuth, r.noise->zenith),
-                       "noise of the directions that was found, one standard deviation"});
+                       "noise of the directions that was found, one standard deviation: at most " +
+                           offset_text(std::max(r.noise->azimuth, r.noise->zenith))});
   }
   numbers.push_back({count_text(r.shots),
                      fmt::format("shots used, of which {} are outliers", count_text(r.outliers))});
@@ -186,18 +188,24 @@ std::string moments_html(const EstimateReport& r) {
     const double k = kDegreesPerRadian;
     return fmt::format(
         "<tr><th scope=\"row\">{}</th><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td>"
-        "<td>{}</td></tr>\n",
+        "<td>{}</td><td>{}</td></tr>\n",
         name, finite_text("{:.3g}", k * m.mean), finite_text("{:.3g}", k * m.std),
-        finite_text("{:.3g}", k * m.rms), finite_text("{:.2f}", m.skewness),
-        finite_text("{:.2f}", m.kurtosis), count_text(m.count));
+        finite_text("{:.3g}", k * m.rms), millimetres(offset_at(m.rms)),
+        finite_text("{:.2f}", m.skewness), finite_text("{:.2f}", m.kurtosis), count_text(m.count));
   };
-  return "<div class=\"wide\"><table><thead><tr><th>residual</th><th>mean, deg</th>"
-         "<th>standard deviation, deg</th><th>root mean square, deg</th><th>skewness</th>"
-         "<th>excess kurtosis</th><th>shots</th></tr></thead><tbody>\n" +
+  return fmt::format(
+             "<div class=\"wide\"><table><thead><tr><th>residual</th><th>mean, deg</th>"
+             "<th>standard deviation, deg</th><th>root mean square, deg</th>"
+             "<th>at {:.0f} m, mm</th><th>skewness</th><th>excess kurtosis</th><th>shots</th></tr>"
+             "</thead><tbody>\n",
+             kStatedDistance) +
          row("azimuth", r.azimuth_residuals) + row("zenith", r.zenith_residuals) +
-         "</tbody></table></div>\n<p class=\"note\">Residual: observed minus estimated. Outliers "
-         "are left out of this table, of the histograms and of the maps. Skewness and excess "
-         "kurtosis of a normal distribution are 0.</p>\n";
+         fmt::format(
+             "</tbody></table></div>\n<p class=\"note\">Residual: observed minus estimated. At "
+             "{:.0f} m: how far the root mean square moves a point there, at most. Outliers are "
+             "left out of this table, of the histograms and of the maps. Skewness and excess "
+             "kurtosis of a normal distribution are 0.</p>\n",
+             kStatedDistance);
 }
 
 /// What the residuals did to the sigmas, and whether they hang on a prism's angle.

@@ -47,10 +47,9 @@ std::string angle_text(double radians) {
   return text;
 }
 
-/// "0.0039° (5.4 mm at 80 m)"
+/// "0.0039° (5.4 mm at 80 m)", at the height flown
 std::string angle_on_ground(double radians, double height) {
-  return fmt::format("{}° ({} mm at {} m)", angle_text(radians), millimetres(radians * height),
-                     finite_text("{:.0f}", height));
+  return fmt::format("{}° ({})", angle_text(radians), offset_text(radians, height));
 }
 
 const FlightUnknown* find_unknown(const FlightReport& r, std::string_view name) {
@@ -138,9 +137,8 @@ std::vector<KeyNumber> key_numbers(const FlightReport& r) {
            fmt::format("between strips after the calibration, {} mm before",
                        millimetres(r.rms_before))},
           {fmt::format("{}°", angle_text(r.datum.total)),
-           fmt::format("standard uncertainty of the directions of the beams: {} mm at {} m",
-                       millimetres(r.datum.total * r.datum.height),
-                       finite_text("{:.0f}", r.datum.height))},
+           "standard uncertainty of the directions of the beams: " +
+               offset_text(r.datum.total, r.datum.height)},
           {fmt::format("{} mm", millimetres(r.range_sigma)), "noise of one range"}};
 }
 
@@ -246,8 +244,8 @@ std::string datum_row(const char* name, double height, double total, double rota
   for (const double value : {total, rotation, shape, axes[0], axes[1], axes[2]}) {
     html += fmt::format("<td>{}</td>", angle_text(value));
   }
-  return html + fmt::format("<td>{}</td><td>{}</td></tr>\n", millimetres(height * total),
-                            millimetres(height * shape));
+  return html + fmt::format("<td>{}</td><td>{}</td></tr>\n", millimetres(offset_at(total, height)),
+                            millimetres(offset_at(shape, height)));
 }
 
 std::string directions_html(const FlightReport& r) {

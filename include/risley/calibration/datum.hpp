@@ -44,9 +44,6 @@ struct HeldMovement {
   Eigen::MatrixXd turn;  ///< rotation of the bundle about X, Y, Z [3, held], rad; empty: none
 };
 
-/// Where people say in metres how far beams are off, m.
-inline constexpr double kStatedDistance = 30;
-
 /// How wrong the directions are that a sensor reports, as a calibration has it.
 struct PointingError {
   DirectionErrors errors;  ///< reported minus calibrated

@@ -28,4 +28,16 @@ NumberText number_text(double value, double sigma);
 /// number_text.
 std::string text_to_place_of(double value, double sigma);
 
+/// Where people are told how far a small angle moves a point, m.
+inline constexpr double kStatedDistance = 30;
+
+/// How far a direction that is off by an angle, rad, moves a point at a distance, m, from where it
+/// is: distance * tan(|angle|), m.
+/// @param angle  below a right angle
+double offset_at(double angle, double distance = kStatedDistance);
+
+/// The same for people, with two significant digits: "2.6 mm at 30 m", from 10 cm on "21 cm at
+/// 30 m", from 1 m on "1.6 m at 30 m"; "–" where angle or distance is not finite.
+std::string offset_text(double angle, double distance = kStatedDistance);
+
 }  // namespace risley
