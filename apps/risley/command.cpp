@@ -179,6 +179,13 @@ void note_files(const CLI::App& verb, CommonOptions& common) {
       const std::string name = option->get_name();
       if (name == "INPUT" || name == "FILE") {
         add_files(value, common.inputs);
+      } else if (name == "RESULT") {
+        const fs::path numbers = fs::path(value) / "calibration.yaml";
+        if (fs::is_regular_file(numbers, ignored)) {
+          common.inputs.push_back(numbers.string());
+        } else if (fs::is_regular_file(value, ignored)) {
+          common.inputs.push_back(value);
+        }
       } else if (name == "DIR") {
         common.inputs.push_back((fs::path(value) / "report.json").string());
         // Of two results the numbers are compared as well.

@@ -580,6 +580,34 @@ def observability(recording: Path = "", *, sensor: Path = "", duration: Optional
         return dict(_risley.observability(options, threads, tell))
 
 
+def compare(results: Sequence[Path], *, false_alarm: float = 0.01,
+            progress: Progress = None) -> Dict[str, Any]:
+    """Find out whether a unit has changed, from results of different days.
+
+    Parameters
+    ----------
+    results : sequence of str or path
+        Folders that `estimate` or `calibrate` wrote, or calibration files, in order of time; at
+        least two.
+    false_alarm : float, default 0.01
+        Probability that a series without any change is called changed.
+    progress : bool or callable, optional
+        As in `risley.read`.
+
+    Returns
+    -------
+    dict
+        As ``risley compare --json``.
+
+    Raises
+    ------
+    FileError, ValueError
+        For damaged files, and for results of different kinds of sensors.
+    """
+    with telling(progress) as tell:
+        return dict(_risley.compare(_paths(results), false_alarm, tell))
+
+
 def info(file: Path, *, accuracy: Path = "", trajectory_topic: str = "",
          shot_rate: Optional[float] = None, extrinsics: YawPitchRoll = None,
          extrinsics_deg: YawPitchRoll = None, progress: Progress = None) -> Dict[str, Any]:

@@ -17,6 +17,7 @@
 #include "risley/core/require.hpp"
 #include "risley/io/text_file.hpp"
 #include "risley/jobs/cloud_of_recording.hpp"
+#include "risley/jobs/compare_series.hpp"
 #include "risley/jobs/identify_recording.hpp"
 #include "risley/jobs/inspect_recording.hpp"
 #include "risley/jobs/inspect_trajectory.hpp"
@@ -431,6 +432,13 @@ py::object observability(const py::dict& values, int threads, const py::object& 
   });
 }
 
+py::object compare(const std::vector<std::string>& results, double false_alarm,
+                   const py::object& tell) {
+  return told_by(tell, 0, [&](const Progress& progress) {
+    return jobs::compare_series({results, false_alarm}, progress);
+  });
+}
+
 py::object info(const py::dict& values, const py::object& tell) {
   const Options options(values);
   std::string input, accuracy, topic;
@@ -509,6 +517,7 @@ void bind_jobs(py::module_& module) {
   module.def("pattern", &pattern, options, threads, tell);
   module.def("coverage", &coverage, options, threads, tell);
   module.def("observability", &observability, options, threads, tell);
+  module.def("compare", &compare, py::arg("results"), py::arg("false_alarm"), tell);
   module.def("info", &info, options, tell);
   module.def(
       "is_flight_plan",

@@ -199,6 +199,13 @@ def test_observability(hall):
                 command("observability", hall, "--rate-hz", 2000))
 
 
+def test_compare(calibration, estimate, folder):
+    calibration.sensor.write(folder / "a.yaml")
+    estimate.sensor.write(folder / "b.yaml")
+    assert_same(risley.compare([folder / "a.yaml", folder / "b.yaml", folder / "a.yaml"]),
+                command("compare", folder / "a.yaml", folder / "b.yaml", folder / "a.yaml"))
+
+
 def test_presets():
     listed = command("preset", "list")["presets"]
     assert [one["name"] for one in listed] == list(risley.presets())

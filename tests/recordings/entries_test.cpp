@@ -248,7 +248,7 @@ TEST(Entries, DecodersAskForAllBytes) {
   EXPECT_EQ(chunk.observations.size(), 0U);
 }
 
-TEST(RecordingEntries, RowsThatOthersFilledAreValidWhereTheyHaveADirectionAndNoEmptyRange) {
+TEST(Entries, RowsThatOthersFilledAreValidWhereTheyHaveADirectionAndNoEmptyRange) {
   Observations rows = points(5);
   rows.azimuth[0] = kNan;
   rows.zenith[1] = kInfinite;

@@ -17,6 +17,7 @@ namespace jobs {
 struct BeamOrigins;
 struct CalibratedFlight;
 struct CalibratedRecordings;
+struct ComparedSeries;
 struct ConvertedRecording;
 struct ConvertedTrajectory;
 struct EstimatedRecording;
@@ -58,6 +59,7 @@ Json of(const jobs::ConvertedTrajectory& done);
 Json of(const jobs::WrittenPattern& written);
 Json of(const jobs::BeamOrigins& found);
 Json of(const jobs::ResultComparison& compared);
+Json of(const jobs::ComparedSeries& series);
 Json of(const simulation::SimulationResult& simulated);
 Json of(const sensors::PatternCoverage& coverage);
 /// What a list of presets tells of one.
