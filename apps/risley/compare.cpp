@@ -79,9 +79,10 @@ ExitStatus run_compare(const CompareOptions& options, const CommonOptions& commo
 Run declare_compare(CLI::App& verb) {
   const auto options = std::make_shared<CompareOptions>();
   CompareOptions& o = *options;
-  verb.add_option("RESULT", o.job.results,
-                  "Folders that estimate -o or calibrate -o wrote, or calibration files, in order of "
-                  "time; at least two")
+  verb.add_option(
+          "RESULT", o.job.results,
+          "Folders that estimate -o or calibrate -o wrote, or calibration files, in order of "
+          "time; at least two")
       ->required()
       ->expected(2, 1'000'000);
   verb.add_option("-o,--output", o.page, "Page (HTML) to write (default: none)");

@@ -21,8 +21,8 @@ ComparedSeries compare_series(const CompareSeriesOptions& options, const Progres
   series.pairs.reserve(places.size());
   for (const auto& [a, b] : places) {
     progress.report(static_cast<double>(series.pairs.size()) / static_cast<double>(places.size()));
-    ComparedPair pair{a, b, 
-                      compare_results(options.results[a], options.results[b], OneUnit::caller), false};
+    ComparedPair pair{
+        a, b, compare_results(options.results[a], options.results[b], OneUnit::caller), false};
     pair.changed = pair.comparison.change.degrees_of_freedom > 0 &&
                    pair.comparison.change.p_value < series.least_p_value;
     series.pairs.push_back(std::move(pair));

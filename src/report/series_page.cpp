@@ -22,12 +22,6 @@ using jobs::ComparedPair;
 using jobs::ComparedSeries;
 using jobs::ParameterDifference;
 
-/// "0.4034° ± 0.0007°"
-std::string angle_text(double value, double sigma) {
-  const NumberText text = number_text(degrees_from_radians(value), degrees_from_radians(sigma));
-  return fmt::format("{}° ± {}°", text.value, text.sigma);
-}
-
 std::size_t changes_of(const ComparedSeries& series) {
   return static_cast<std::size_t>(std::count_if(series.pairs.begin(), series.pairs.end(),
                                                 [](const auto& pair) { return pair.changed; }));
@@ -52,8 +46,8 @@ std::string pairs_html(const ComparedSeries& series) {
         "<td>{}</td></tr>\n",
         pair.changed ? " class=\"bad\"" : "", escape_html(series.results[pair.a]),
         escape_html(series.results[pair.b]), c.same_unit ? "yes" : "not known",
-        angle_text(c.beams.errors.total, c.beams.total_sigma),
-        angle_text(c.beams.errors.shape, c.beams.shape_sigma),
+        angle_with_sigma(c.beams.errors.total, c.beams.total_sigma),
+        angle_with_sigma(c.beams.errors.shape, c.beams.shape_sigma),
         tested ? fmt::format("{:.2g}", c.change.p_value) : "&ndash;",
         !tested        ? "no sigmas to test with"
         : pair.changed ? "changed"
@@ -89,8 +83,11 @@ Chart chart_of(const ComparedSeries& series, std::size_t parameter) {
     if (pair.b == 1) add(0, one.value_a, one.sigma_a);
     if (pair.a + 1 == pair.b) add(pair.b, one.value_b, one.sigma_b);
   }
-  Chart chart{like.name, "result, in the order given",
-              in_metres ? "m" : find_parameter(like.name, shape).unit, {}, {}};
+  Chart chart{like.name,
+              "result, in the order given",
+              in_metres ? "m" : find_parameter(like.name, shape).unit,
+              {},
+              {}};
   chart.series = {std::move(values), std::move(low), std::move(high)};
   return chart;
 }
@@ -129,9 +126,9 @@ std::string series_page(const ComparedSeries& series, const Provenance& provenan
                                : fmt::format("{} of {} pairs differ by more than chance explains.",
                                              changes, series.pairs.size())) +
       overview_html(
-          {{angle_text(ends.comparison.beams.errors.total, ends.comparison.beams.total_sigma),
+          {{angle_with_sigma(ends.comparison.beams.errors.total, ends.comparison.beams.total_sigma),
             "between the directions of the first result and the last"},
-           {angle_text(ends.comparison.beams.errors.shape, ends.comparison.beams.shape_sigma),
+           {angle_with_sigma(ends.comparison.beams.errors.shape, ends.comparison.beams.shape_sigma),
             "of that is the beams against each other: their shape"},
            {fmt::format("{:.2g}", ends.comparison.change.p_value),
             "is the probability of such differences by chance"}},

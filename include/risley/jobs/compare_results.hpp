@@ -37,8 +37,8 @@ struct ResultComparison {
   std::vector<ParameterDifference> parameters;
   calibration::PointingError beams;  ///< directions of a minus those of b, over all rotation angles
   bool same_unit = false;            ///< the serial numbers are known and equal
-  /// Both are taken to be of one unit and held the same parameters at the same values: what these are off by is
-  /// alike in both, and the sigmas leave it out.
+  /// Both are taken to be of one unit and held the same parameters at the same values: what these
+  /// are off by is alike in both, and the sigmas leave it out.
   bool held_alike = false;
   ChangeTest change;
 };

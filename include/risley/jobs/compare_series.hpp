@@ -32,8 +32,8 @@ struct ComparedSeries {
   std::vector<ComparedPair> pairs;
 };
 
-/// Compares each result with the one before it and, from the third on, with the first. Results whose
-/// serial numbers are not known count as one unit's.
+/// Compares each result with the one before it and, from the third on, with the first. Results
+/// whose serial numbers are not known count as one unit's.
 /// @throws InvalidArgument for fewer than two results, a false alarm outside of 0 to 1, and as
 ///         compare_results(); FileError; Cancelled
 ComparedSeries compare_series(const CompareSeriesOptions& options, const Progress& progress = {});
