@@ -253,8 +253,8 @@ def plan(scene_or_flight: Path, *, sensor: Path = "", duration: Optional[float] 
         if _risley.is_flight_plan(os.fspath(scene_or_flight)):
             if duration is not None:
                 raise ValueError("duration is not for a planned flight, whose strips say it")
-            paths = {name: os.fspath(of_flight[name])
-                     for name in ("mount", "trajectory_errors", "scene")}
+            paths = {"mount": os.fspath(mount), "trajectory_errors": os.fspath(trajectory_errors),
+                     "scene": os.fspath(scene)}
             return Plan(_risley.plan_flight({**options, **of_flight, **paths, "seed": seed}, tell))
         for name, value in of_flight.items():
             if value not in (None, ""):

@@ -69,17 +69,15 @@ class _Columns(_Answer):
             If xarray is not installed.
         """
         import xarray
-        columns = {name: ("name", column) for name, column in self._columns().items()}
+        data: Dict[str, Any] = {name: ("name", column) for name, column in self._columns().items()}
+        data["covariance"] = (("free", "free_too"), self.covariance)
         return xarray.Dataset(
-            {**columns, "covariance": (("free", "free_too"), self.covariance)},
-            coords={"name": self.names, "unit": ("name", self.units), "free": self.free,
-                    "free_too": self.free})
+            data, coords={"name": self.names, "unit": ("name", self.units), "free": self.free,
+                          "free_too": self.free})
 
 
 class Solution(_Columns):
     """What estimates and calibrations have in common."""
-
-    _kind = ""
 
     def __init__(self, found: Found) -> None:
         table = found.table

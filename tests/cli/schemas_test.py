@@ -165,7 +165,7 @@ class SchemasTest(CommandTest):
         cls.print(0, "report", "estimated", "calibrated", "-o", "two.html")
         cls.print(3, "report", "no")
         cls.print(0, "compare", "estimated", "calibrated", "mid-40", "-o", "series.html")
-        cls.print(3, "compare", "no", "estimated")
+        cls.print(2, "compare", "no", "estimated")
         cls.print(0, "pattern", "--sensor", "mid-40", "--format", "helios-xml", "-o", "p.xml",
                   "--duration-s", 0.1, "--coverage", "--report", "pattern.html", "--integration-s", 0.1)
         cls.print(0, "pattern", "--coverage", "--integration-s", 0.1, "--report", "pattern.html")
