@@ -185,19 +185,20 @@ def calibrate(recordings: Union[Path, Sequence[Path]], *, sensor: Path = "", out
                  "control": os.fspath(control)}
     with telling(progress) as tell:
         if os.fspath(trajectory):
-            _refuse("trajectory", {"planes": planes, "stations": stations, "station": station})
+            _refuse({"planes": planes, "stations": stations, "station": station},
+                    "is not for a calibration with trajectory")
             found = _risley.calibrate_flight({**options, **in_flight}, threads, tell)
             return FlightCalibration(found)
-        _refuse("no trajectory", {"mount": mount, "accuracy": accuracy, "control": control,
-                                  "trajectory_errors": trajectory_errors,
-                                  "knot_spacing": knot_spacing, "cell_size": cell_size})
+        _refuse({"mount": mount, "accuracy": accuracy, "control": control,
+                 "trajectory_errors": trajectory_errors, "knot_spacing": knot_spacing,
+                 "cell_size": cell_size}, "is not for a calibration with no trajectory")
         return Calibration(_risley.calibrate({**options, **on_walls}, threads, tell))
 
 
-def _refuse(where: str, options: Mapping[str, Any]) -> None:
+def _refuse(options: Mapping[str, Any], why: str) -> None:
     for name, value in options.items():
         if value not in (None, "", (), []):
-            raise ValueError(f"{name} is not for a calibration with {where}")
+            raise ValueError(f"{name} {why}")
 
 
 def plan(scene_or_flight: Path, *, sensor: Path = "", duration: Optional[float] = None,
@@ -256,9 +257,7 @@ def plan(scene_or_flight: Path, *, sensor: Path = "", duration: Optional[float] 
             paths = {"mount": os.fspath(mount), "trajectory_errors": os.fspath(trajectory_errors),
                      "scene": os.fspath(scene)}
             return Plan(_risley.plan_flight({**options, **of_flight, **paths, "seed": seed}, tell))
-        for name, value in of_flight.items():
-            if value not in (None, ""):
-                raise ValueError(f"{name} goes with a flight, and {scene_or_flight} is a scene")
+        _refuse(of_flight, f"goes with a flight, and {scene_or_flight} is a scene")
         return Plan(_risley.plan({**options, "duration": duration, "beam_origin": beam_origin},
                                  tell))
 

@@ -87,21 +87,16 @@ class Solution(_Columns):
         #: One standard deviation each if held parameters are exact; shape (n,).
         self.sigmas_given_held = table.sigmas_given_held
         #: Whether the numbers can be used.
-        self.converged = found.converged
+        self.converged = bool(self._dict["converged"])
         #: Why they cannot be used; empty otherwise.
-        self.reason = found.reason
+        self.reason = str(self._dict["reason"])
         #: Stable code, what was found, and what follows from it.
-        self.verdict = Verdict(*found.verdict)
+        self.verdict = Verdict(**self._dict["verdict"])
         #: The sensor as it was found, with its covariance.
         self.sensor = found.sensor
         self._html = found.html
         self._found: Optional[Found] = found
         self._report = ""
-
-    @property
-    def warnings(self) -> List[str]:
-        """Warnings, as sentences."""
-        return list(self._dict["warnings"])
 
     def _columns(self) -> Dict[str, Any]:
         return {"value": self.values, "sigma": self.sigmas,

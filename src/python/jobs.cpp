@@ -12,7 +12,6 @@
 #include <nlohmann/json.hpp>
 #include <pybind11/stl.h>
 
-#include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
 #include "risley/core/require.hpp"
 #include "risley/io/text_file.hpp"
@@ -43,12 +42,6 @@ using jobs::CalibratedRecordings;
 using jobs::EstimatedRecording;
 using jobs::NamedText;
 
-/// The page of a result and the numbers behind it, as `-o DIR` of the command writes them.
-std::vector<NamedText> texts_of(const report::Report& report) {
-  return {{"report.json", report::report_text(report)},
-          {"report.html", report::report_page(report)}};
-}
-
 template <class Found>
 const auto& solution_of(const Found& found) {
   if constexpr (std::is_same_v<Found, EstimatedRecording>) {
@@ -58,26 +51,40 @@ const auto& solution_of(const Found& found) {
   }
 }
 
+report::Report report_of(const EstimatedRecording& found) { return report::estimate_report(found); }
+report::Report report_of(const CalibratedRecordings& found) {
+  return report::calibration_report(found);
+}
+report::Report report_of(const CalibratedFlight& found) { return report::flight_report(found); }
+
+/// The page of a result and the numbers behind it, as `-o DIR` of the command writes them.
+template <class Found>
+std::vector<NamedText> texts_of(const Found& found) {
+  const report::Report report = report_of(found);
+  return {{"report.json", report::report_text(report)},
+          {"report.html", report::report_page(report)}};
+}
+
+/// What a page shows beyond the estimate takes its time; calibrations always have it.
+template <class Found>
+void make_details(Found& found, const py::object& tell) {
+  if constexpr (std::is_same_v<Found, EstimatedRecording>) {
+    if (found.details) return;
+    std::optional<jobs::EstimateDetails> details;
+    run_job(tell, 0, [&](const Progress& progress) {
+      details = jobs::estimate_details(found.estimate, found.nominal, found.head, found.evaluation,
+                                       progress.stage("judging"));
+    });
+    found.details = std::move(details);
+  }
+}
+
 /// What all results share: the face of Python makes its objects of these.
 template <class Found>
 py::class_<Found, std::shared_ptr<Found>> bind_found(py::module_& module, const char* name) {
   py::class_<Found, std::shared_ptr<Found>> type(module, name);
-  type.def_property_readonly("converged",
-                             [](const Found& found) { return solution_of(found).converged; });
-  type.def_property_readonly("reason",
-                             [](const Found& found) { return solution_of(found).reason; });
-  type.def_property_readonly("verdict", [](const Found& found) {
-    const auto& verdict = solution_of(found).verdict;
-    return py::make_tuple(to_string(verdict.code), verdict.words, verdict.to_do);
-  });
   type.def_property_readonly("sensor",
                              [](const Found& found) { return solution_of(found).sensor; });
-  type.def_property_readonly("warnings", [](const Found& found) {
-    std::vector<std::string> warnings = found.warnings;
-    const auto& own = solution_of(found).warnings;
-    warnings.insert(warnings.end(), own.begin(), own.end());
-    return warnings;
-  });
   type.def_property_readonly("table", [](const Found& found) { return table_of(found); });
   type.def_property_readonly("html", [](const Found& found) {
     const auto& solution = solution_of(found);
@@ -85,31 +92,14 @@ py::class_<Found, std::shared_ptr<Found>> bind_found(py::module_& module, const 
                    solution.sensor.shape());
   });
   type.def("to_dict", [](const Found& found) { return dict_of(json::of(found)); });
+  type.def(
+      "report_text",
+      [](Found& found, const py::object& tell) {
+        make_details(found, tell);
+        return unlocked([&] { return report::report_text(report_of(found)); });
+      },
+      py::arg("tell"));
   return type;
-}
-
-/// What the page of a result is made of.
-template <class Found>
-std::string report_text(const Found& found) {
-  return unlocked([&] {
-    if constexpr (std::is_same_v<Found, CalibratedFlight>) {
-      return report::report_text(report::flight_report(found));
-    } else {
-      return report::report_text(report::calibration_report(found));
-    }
-  });
-}
-
-std::string estimate_report_text(const EstimatedRecording& found, const py::object& tell) {
-  std::string text;
-  run_job(tell, 0, [&](const Progress& progress) {
-    const jobs::EstimateDetails details = jobs::estimate_details(
-        found.estimate, found.nominal, found.head, found.evaluation, progress.stage("judging"));
-    text = report::report_text(report::estimate_report(
-        {found.estimate, found.nominal, found.evaluation, found.head, details,
-         report::reported(found.recording), found.provenance, found.warnings}));
-  });
-  return text;
 }
 
 void write_page(const std::string& report, const std::string& path) {
@@ -141,7 +131,6 @@ void take_rate(const Options& options, std::optional<double>& rate) {
     return;
   }
   options.take("rate", rate);
-  if (rate) require_above("rate", *rate, 0, "Hz");
 }
 
 std::shared_ptr<EstimatedRecording> estimate(const py::dict& values, int threads,
@@ -156,16 +145,13 @@ std::shared_ptr<EstimatedRecording> estimate(const py::dict& values, int threads
   job.rate = jobs::usual_rate(job.method);
   take_rate(options, job.rate);
   options.take("angle_noise", job.angle_noise);
-  if (job.angle_noise) require_above("angle_noise", *job.angle_noise, 0, "rad");
   job.fixed = held_parameters(options);
   job.additional = parameter_names(options, "free");
   options.take("mirrored", job.mirrored);
   options.take("truth", job.truth);
   job.files = result_files(options, "estimate");
   job.details = !job.files.folder.empty();
-  job.texts = [](const EstimatedRecording& found) {
-    return texts_of(report::estimate_report(found));
-  };
+  job.texts = [](const EstimatedRecording& found) { return texts_of(found); };
   return found_by(tell, threads, [&](const Progress& progress) {
     return jobs::estimate_recording(job, progress);
   });
@@ -179,11 +165,8 @@ void take_model(const Options& options, Job& job) {
   job.additional = parameter_names(options, "free");
   take_rate(options, job.rate);
   options.take("range_noise", job.range_noise);
-  if (job.range_noise) require_above("range_noise", *job.range_noise, 0, "m");
   options.take("prior_sigma", job.prior_sigma);
-  if (job.prior_sigma) require_above("prior_sigma", *job.prior_sigma, 0, "rad");
   options.take("range_offset_sigma", job.range_offset_sigma);
-  require_not_below("range_offset_sigma", job.range_offset_sigma, 0, "m");
 }
 
 /// What calibrations on walls and in flight share.
@@ -193,7 +176,6 @@ void take_recordings(const Options& options, Job& job) {
   options.take("recordings", job.recordings);
   job.reading = read_options(options);
   options.take("angle_noise", job.angle_noise);
-  if (job.angle_noise) require_above("angle_noise", *job.angle_noise, 0, "rad");
   options.take("mirrored", job.mirrored);
   options.take("seed", job.seed);
   options.take("truth", job.truths);
@@ -206,9 +188,7 @@ void take_recordings(const Options& options, Job& job) {
 template <class Job>
 void take_grid(const Options& options, Job& job) {
   options.take("knot_spacing", job.knot_spacing);
-  require_above("knot_spacing", job.knot_spacing, 0, "s");
   options.take("cell_size", job.cell_size);
-  require_above("cell_size", job.cell_size, 0, "m");
 }
 
 std::shared_ptr<CalibratedRecordings> calibrate(const py::dict& values, int threads,
@@ -227,9 +207,7 @@ std::shared_ptr<CalibratedRecordings> calibrate(const py::dict& values, int thre
   options.take("station", station_names);
   if (!planes.empty()) job.planes = scenes::load_scene(planes);
   job.stations = jobs::stations_of(stations, station_names, job.recordings.size());
-  job.texts = [](const CalibratedRecordings& found) {
-    return texts_of(report::calibration_report(found));
-  };
+  job.texts = [](const CalibratedRecordings& found) { return texts_of(found); };
   return found_by(tell, threads, [&](const Progress& progress) {
     return jobs::calibrate_recordings(job, progress);
   });
@@ -243,7 +221,7 @@ std::shared_ptr<CalibratedFlight> calibrate_flight(const py::dict& values, int t
   take_grid(options, job);
   job.platform = platform_files(options);
   options.take("control", job.control);
-  job.texts = [](const CalibratedFlight& found) { return texts_of(report::flight_report(found)); };
+  job.texts = [](const CalibratedFlight& found) { return texts_of(found); };
   return found_by(tell, threads,
                   [&](const Progress& progress) { return jobs::calibrate_flight(job, progress); });
 }
@@ -256,7 +234,6 @@ std::shared_ptr<jobs::PlannedCalibration> plan(const py::dict& values, const py:
   options.take("plan", scene);
   job.scene = scenes::load_scene(scene);
   options.take("duration", job.duration);
-  require_above("duration", job.duration, 0, "s");
   options.take("beam_origin", job.beam_origin);
   return found_by(tell, 0,
                   [&](const Progress& progress) { return jobs::plan_calibration(job, progress); });
@@ -421,7 +398,6 @@ py::object observability(const py::dict& values, int threads, const py::object& 
   job.reading = read_options(options);
   options.take("sensor", job.sensor);
   options.take("duration", job.duration);
-  require_above("duration", job.duration, 0, "s");
   take_rate(options, job.rate);
   options.take("angle_noise", job.angle_noise);
   options.take("rounding", job.rounding);
@@ -484,22 +460,12 @@ void bind_jobs(py::module_& module) {
                                return view_of<double, EstimatedRecording>(
                                    found->estimate.azimuth_residual, found);
                              })
-      .def_property_readonly("zenith_residual",
-                             [](const std::shared_ptr<EstimatedRecording>& found) {
-                               return view_of<double, EstimatedRecording>(
-                                   found->estimate.zenith_residual, found);
-                             })
-      .def("report_text", &estimate_report_text, py::arg("tell"));
-  bind_found<CalibratedRecordings>(module, "CalibratedRecordings")
-      .def(
-          "report_text",
-          [](const CalibratedRecordings& found, const py::object&) { return report_text(found); },
-          py::arg("tell"));
-  bind_found<CalibratedFlight>(module, "CalibratedFlight")
-      .def(
-          "report_text",
-          [](const CalibratedFlight& found, const py::object&) { return report_text(found); },
-          py::arg("tell"));
+      .def_property_readonly(
+          "zenith_residual", [](const std::shared_ptr<EstimatedRecording>& found) {
+            return view_of<double, EstimatedRecording>(found->estimate.zenith_residual, found);
+          });
+  bind_found<CalibratedRecordings>(module, "CalibratedRecordings");
+  bind_found<CalibratedFlight>(module, "CalibratedFlight");
   bind_planned<jobs::PlannedCalibration>(module, "PlannedCalibration");
   bind_planned<jobs::PlannedFlightResult>(module, "PlannedFlight");
   module.def("write_page", &write_page, py::arg("report"), py::arg("path"));

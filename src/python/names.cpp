@@ -45,9 +45,9 @@ NamedParameter parameter_of_any_train(const std::string& name) {
   return find_by_either_name(name, find_parameter_of_any_train);
 }
 
-std::string si_unit(const ParameterInfo& info) {
-  if (info.unit == "deg") return "rad";
-  return info.unit == "deg/s" ? "rad/s" : info.unit;
+std::string si_unit(const std::string& file_unit) {
+  if (file_unit == "deg") return "rad";
+  return file_unit == "deg/s" ? "rad/s" : file_unit;
 }
 
 }  // namespace risley::python

@@ -23,7 +23,8 @@ NamedParameter named_parameter(const std::string& name, TrainShape shape);
 /// The same where the train is not known yet; without info for a name that no train has.
 NamedParameter parameter_of_any_train(const std::string& name);
 
-/// The SI unit of a parameter: "1", "rad" or "rad/s".
-std::string si_unit(const ParameterInfo& info);
+/// The SI unit of what files have in a unit: "rad" for "deg", "rad/s" for "deg/s", others as they
+/// are.
+std::string si_unit(const std::string& file_unit);
 
 }  // namespace risley::python

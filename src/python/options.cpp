@@ -8,6 +8,7 @@
 #include <fmt/ranges.h>
 
 #include "python/names.hpp"
+#include "python/reading.hpp"
 
 namespace risley::python {
 namespace {
@@ -38,15 +39,11 @@ py::type_error Options::wrong_type(const char* name) const {
 }
 
 recordings::ReadOptions read_options(const Options& options) {
-  recordings::ReadOptions reading;
-  options.take("shot_rate", reading.shot_rate);
-  std::optional<std::array<double, 3>> pose;
-  options.take("extrinsics", pose);
-  if (pose) {
-    const auto& [yaw, pitch, roll] = *pose;
-    reading.extrinsics = recordings::Extrinsics{yaw, pitch, roll, {}};
-  }
-  return reading;
+  std::optional<double> shot_rate;
+  YawPitchRoll extrinsics;
+  options.take("shot_rate", shot_rate);
+  options.take("extrinsics", extrinsics);
+  return read_options(shot_rate, extrinsics);
 }
 
 jobs::HeldParameters held_parameters(const Options& options) {

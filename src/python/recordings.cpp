@@ -87,7 +87,7 @@ class ChunkReader {
 
   SharedRecording next() {
     if (!reader_) throw py::stop_iteration();
-    const SharedRecording piece = spare_->take();
+    SharedRecording piece = spare_->take();
     bool more = false;
     run_job(
         py::none(), 0, [&](const Progress&) { more = reader_->read(piece->data, rows_); },

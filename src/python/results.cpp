@@ -32,7 +32,7 @@ void add_free(ValueTable& table, const Found& found, TrainShape shape) {
     table.covariance_names.push_back(si_name(found.free[j].name));
     const auto at = static_cast<Eigen::Index>(j);
     const double given_held = std::sqrt(found.covariance(at, at));
-    const std::string unit = si_unit(find_parameter(found.free[j].name, shape));
+    const std::string unit = si_unit(find_parameter(found.free[j].name, shape).unit);
     if constexpr (requires { found.total_sigma(j); }) {
       add(table, found.free[j].name, unit, found.parameters[at], found.total_sigma(j), given_held);
     } else {
@@ -45,14 +45,8 @@ void add_unknowns(ValueTable& table, const calibration::FlightJudgement& judgeme
                   TrainShape shape) {
   table.covariance = judgement.covariance;
   for (const calibration::FlightUnknown& unknown : judgement.unknowns) {
-    const std::string unit = calibration::file_unit(unknown, shape);
-    const bool is_angle = unit == "deg";
-    const bool is_speed = unit == "deg/s";
-    add(table, unknown.name,
-        is_angle   ? "rad"
-        : is_speed ? "rad/s"
-                   : unit,
-        unknown.value, unknown.sigma, unknown.sigma);
+    add(table, unknown.name, si_unit(calibration::file_unit(unknown, shape)), unknown.value,
+        unknown.sigma, unknown.sigma);
     table.covariance_names.push_back(table.names.back());
   }
 }
@@ -63,7 +57,7 @@ ValueTable table_of(const jobs::EstimatedRecording& found) {
   const estimation::Estimate& e = found.estimate;
   ValueTable table;
   for (const estimation::EstimatedValue& value : e.values) {
-    add(table, value.name, si_unit(find_parameter(value.name, e.sensor.shape())), value.value,
+    add(table, value.name, si_unit(find_parameter(value.name, e.sensor.shape()).unit), value.value,
         value.sigma, value.sigma_given_held);
   }
   table.covariance = e.covariance;

@@ -134,7 +134,8 @@ def test_plan():
 
 
 def test_a_flight_planned_and_calibrated(folder):
-    plan, path, mount = folder / "flight.yaml", folder / "flight.nc", DATA / "mount-nadir.yaml"
+    plan, path = folder / "flight.yaml", folder / "flight.nc"
+    true_mount, mount = DATA / "mount-nadir.yaml", DATA / "mount-as-built.yaml"
     plan.write_text(FLIGHT, encoding="utf-8")
     errors = DATA / "trajectory-errors.yaml"
     planned = risley.plan(plan, rate=200.0, mount=mount, trajectory_errors=errors)
@@ -143,12 +144,12 @@ def test_a_flight_planned_and_calibrated(folder):
                         "--trajectory-errors", errors))
     assert "boresight_x" in planned.names and set(planned.units) >= {"rad", "m", "s"}
     assert planned.covariance.shape == (len(planned.names),) * 2
-    flown = risley.simulate(path, rate=1000.0, flight=plan, mount=mount, seed=1,
+    flown = risley.simulate(path, rate=1000.0, flight=plan, mount=true_mount, seed=1,
                             scene=DATA / "village.yaml", trajectory_errors=errors)
     trajectory = flown.to_dict()["trajectory"]
     assert_same(flown.to_dict(),
-                command("simulate", "-o", path, "--rate-hz", 1000, "--flight", plan, "--mount", mount,
-                        "--seed", 1, "--scene", DATA / "village.yaml",
+                command("simulate", "-o", path, "--rate-hz", 1000, "--flight", plan,
+                        "--mount", true_mount, "--seed", 1, "--scene", DATA / "village.yaml",
                         "--trajectory-errors", errors))
     found = risley.calibrate(path, trajectory=trajectory, mount=mount, trajectory_errors=errors,
                              knot_spacing=1.0, sensor="mid-40")
