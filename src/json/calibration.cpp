@@ -85,8 +85,6 @@ Json of(const jobs::CalibratedRecordings& found) {
     }
     profiles[profile.variable] = rows;
   }
-  std::vector<std::string> warnings = found.warnings;
-  warnings.insert(warnings.end(), c.warnings.begin(), c.warnings.end());
   Json object = {
       {"serial", found.recordings.front().serial()},
       {"verdict", verdict_json(c.verdict)},
@@ -114,20 +112,8 @@ Json of(const jobs::CalibratedRecordings& found) {
       {"sigma0", c.sigma0},
       {"unevenness", c.unevenness},
       {"variance_factor", c.variance_factor},
-      {"thickness", profiles},
-      {"frame", frame_json()},
-      {"slips", slips_of_all(found.recordings)},
-      {"warnings", warnings},
-      {"seconds",
-       {{"read", found.reading_time},
-        {"rotation_angles", found.angles_time},
-        {"solve", found.solving_time},
-        {"total", found.total_time}}}};
-  object.update(choice_json(found.choice));
-  if (found.truth) {
-    object["truth"] = {{"before", errors_json(found.truth->before)},
-                       {"after", errors_json(found.truth->after)}};
-  }
+      {"thickness", profiles}};
+  add_end(found, object);
   return object;
 }
 

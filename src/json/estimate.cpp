@@ -111,8 +111,6 @@ Json of(const jobs::EstimatedRecording& found) {
   for (const estimation::WeakDirection& weak : e.unobservable) {
     unobservable.push_back(weak_direction_json(weak));
   }
-  std::vector<std::string> warnings = found.warnings;
-  warnings.insert(warnings.end(), e.warnings.begin(), e.warnings.end());
   Json object = {
       {"serial", found.recording.serial()},
       {"verdict", verdict_json(e.verdict)},
@@ -142,7 +140,7 @@ Json of(const jobs::EstimatedRecording& found) {
       {"unobservable", unobservable},
       {"residuals_over_angle_chi2_per_bin", uneven},
       {"start", start_json(e.start)},
-      {"warnings", warnings},
+      {"warnings", all_warnings(found.warnings, e.warnings)},
       {"seconds",
        {{"read", found.reading_time}, {"solve", found.solving_time}, {"total", found.total_time}}}};
   object.update(choice_json(found.choice));

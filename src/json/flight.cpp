@@ -132,8 +132,6 @@ Json of(const jobs::CalibratedFlight& found) {
     parameters[c.unknowns[i].name] = unknown_json(c.unknowns[i], shape);
   }
   const Json judged = judgement_json(c, shape);
-  std::vector<std::string> warnings = found.warnings;
-  warnings.insert(warnings.end(), c.warnings.begin(), c.warnings.end());
   Json object = {{"serial", found.recordings.front().serial()},
                  {"verdict", verdict_json(c.verdict)},
                  {"converged", c.converged},
@@ -167,20 +165,8 @@ Json of(const jobs::CalibratedFlight& found) {
                  {"rough_cells", c.rough_cells},
                  {"knots", c.model.knots.size()},
                  {"sigma0", c.sigma0},
-                 {"range_sigma_m", c.range_sigma},
-                 {"frame", frame_json()},
-                 {"slips", slips_of_all(found.recordings)},
-                 {"warnings", warnings},
-                 {"seconds",
-                  {{"read", found.reading_time},
-                   {"rotation_angles", found.angles_time},
-                   {"solve", found.solving_time},
-                   {"total", found.total_time}}}};
-  object.update(choice_json(found.choice));
-  if (found.truth) {
-    object["truth"] = {{"before", errors_json(found.truth->before)},
-                       {"after", errors_json(found.truth->after)}};
-  }
+                 {"range_sigma_m", c.range_sigma}};
+  add_end(found, object);
   return object;
 }
 
@@ -209,9 +195,7 @@ Json of(const jobs::PlannedFlightResult& planned) {
   json["strips"] = strips;
   json["distribution"] =
       planned.distribution ? distribution_json(*planned.distribution) : Json(nullptr);
-  std::vector<std::string> warnings = planned.warnings;
-  warnings.insert(warnings.end(), f.warnings.begin(), f.warnings.end());
-  json["warnings"] = warnings;
+  json["warnings"] = all_warnings(planned.warnings, f.warnings);
   return json;
 }
 

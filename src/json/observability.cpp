@@ -11,20 +11,15 @@
 namespace risley::json {
 namespace {
 
-/// A sigma that data never tell is null.
-Json sigma_json(double sigma, double unit) {
-  return std::isfinite(sigma) ? Json(sigma / unit) : Json();
-}
-
 /// Null for one emitter.
 Json emitters_json(const estimation::EmitterComparison& emitters, TrainShape shape) {
   if (emitters.bounds.empty()) return nullptr;
   Json parameters = Json::object(), untold = Json::array();
   for (const auto& bounds : emitters.bounds) {
     const double unit = find_parameter(bounds.name, shape).si_per_unit;
-    parameters[bounds.name] = {{"sigma", sigma_json(bounds.all, unit)},
-                               {"sigma_directions_known", sigma_json(bounds.known, unit)},
-                               {"sigma_alone", sigma_json(bounds.alone, unit)}};
+    parameters[bounds.name] = {{"sigma", number_or_null(bounds.all / unit)},
+                               {"sigma_directions_known", number_or_null(bounds.known / unit)},
+                               {"sigma_alone", number_or_null(bounds.alone / unit)}};
   }
   for (const auto& weak : emitters.untold_alone) untold.push_back(weak_direction_json(weak));
   return {{"count", emitters.emitters},
@@ -41,7 +36,7 @@ Json of(const jobs::JudgedObservability& judged) {
   Json parameters = Json::object(), matrix = Json::array(), unobservable = Json::array();
   for (const auto& quantity : o.quantities) {
     const double unit = find_parameter(quantity.name, shape).si_per_unit;
-    Json one = {{"sigma", sigma_json(quantity.sigma, unit)},
+    Json one = {{"sigma", number_or_null(quantity.sigma / unit)},
                 {"sensitivity", deg(quantity.sensitivity) * unit},
                 {"free", quantity.free},
                 {"most_correlated", quantity.twins.front().first},

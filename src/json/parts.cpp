@@ -12,9 +12,7 @@ namespace risley::json {
 Json choice_json(const jobs::SensorChoice& choice) {
   Json misfits = Json::array();
   for (const jobs::PresetMisfit& one : choice.misfits) {
-    const bool has_lines = std::isfinite(one.misfit);
-    misfits.push_back(
-        {{"preset", one.preset}, {"misfit_deg", has_lines ? Json(deg(one.misfit)) : Json()}});
+    misfits.push_back({{"preset", one.preset}, {"misfit_deg", number_or_null(deg(one.misfit))}});
   }
   return {{"sensor", jobs::sensor_name(choice)},
           {"preset", choice.sensor.name},
@@ -59,6 +57,13 @@ Json weak_direction_json(const estimation::WeakDirection& direction) {
   Json weights = Json::object();
   for (const auto& [name, weight] : direction.weights) weights[name] = weight;
   return {{"direction", weights}, {"ratio", direction.ratio}, {"sigma", direction.sigma}};
+}
+
+std::vector<std::string> all_warnings(const std::vector<std::string>& of_job,
+                                      const std::vector<std::string>& own) {
+  std::vector<std::string> warnings = of_job;
+  warnings.insert(warnings.end(), own.begin(), own.end());
+  return warnings;
 }
 
 Json number_or_null(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }

@@ -52,10 +52,32 @@ Json warnings_json(const std::vector<recordings::ReadWarning>& warnings);
 /// A combination of parameters that data do not tell.
 Json weak_direction_json(const estimation::WeakDirection& direction);
 
+/// Those of a job, then those of what it computed.
+std::vector<std::string> all_warnings(const std::vector<std::string>& of_job,
+                                      const std::vector<std::string>& own);
+
 /// How far directions are off, with sigmas.
 Json pointing_json(const calibration::PointingError& pointing);
 /// Errors of directions against a known truth.
 Json errors_json(const calibration::DirectionErrors& errors);
+
+/// What calibrations on walls and in flight end with.
+/// @tparam Found  jobs::CalibratedRecordings or jobs::CalibratedFlight
+template <class Found>
+void add_end(const Found& found, Json& object) {
+  object.update({{"frame", frame_json()},
+                 {"slips", slips_of_all(found.recordings)},
+                 {"warnings", all_warnings(found.warnings, found.calibration.warnings)},
+                 {"seconds",
+                  {{"read", found.reading_time},
+                   {"rotation_angles", found.angles_time},
+                   {"solve", found.solving_time},
+                   {"total", found.total_time}}}});
+  object.update(choice_json(found.choice));
+  if (!found.truth) return;
+  object["truth"] = {{"before", errors_json(found.truth->before)},
+                     {"after", errors_json(found.truth->after)}};
+}
 
 /// What a plan says where a calibration says whose sensor it was, and how it turned out.
 Json plan_head(const std::string& sensor);
