@@ -25,6 +25,7 @@
 #include "risley/core/error.hpp"
 #include "risley/core/text.hpp"
 #include "risley/io/sha256.hpp"
+#include "risley/jobs/result_files.hpp"
 #include "risley/recordings/reader.hpp"
 
 namespace risley::app {
@@ -180,19 +181,13 @@ void note_files(const CLI::App& verb, CommonOptions& common) {
       if (name == "INPUT" || name == "FILE") {
         add_files(value, common.inputs);
       } else if (name == "RESULT") {
-        const fs::path numbers = fs::path(value) / "calibration.yaml";
-        if (fs::is_regular_file(numbers, ignored)) {
-          common.inputs.push_back(numbers.string());
-        } else if (fs::is_regular_file(value, ignored)) {
-          common.inputs.push_back(value);
-        }
+        const std::string file = jobs::calibration_in(value).value_or(value);
+        if (fs::is_regular_file(file, ignored)) common.inputs.push_back(file);
       } else if (name == "DIR") {
         common.inputs.push_back((fs::path(value) / "report.json").string());
         // Of two results the numbers are compared as well.
-        const fs::path numbers = fs::path(value) / "calibration.yaml";
-        if (option->results().size() > 1 && fs::is_regular_file(numbers, ignored)) {
-          common.files.push_back(numbers.string());
-        }
+        const std::optional<std::string> numbers = jobs::calibration_in(value);
+        if (option->results().size() > 1 && numbers) common.files.push_back(*numbers);
       } else if (std::find(kReading.begin(), kReading.end(), name) != kReading.end() &&
                  (fs::is_regular_file(value, ignored) ||
                   recordings::recording_files(value).size() > 1)) {

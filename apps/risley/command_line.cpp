@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <charconv>
 #include <cstdint>
-#include <filesystem>
 #include <limits>
 #include <memory>
 #include <sstream>
@@ -16,6 +15,7 @@
 #include <fmt/ranges.h>
 
 #include "risley/core/text.hpp"
+#include "risley/jobs/result_files.hpp"
 
 #include "help_text.hpp"
 
@@ -185,10 +185,7 @@ void take_result_folders(CLI::App& verb) {
        })) {
     option->transform(CLI::Validator(
         [](std::string& value) {
-          namespace fs = std::filesystem;
-          std::error_code ignored;
-          const fs::path inside = fs::path(value) / "calibration.yaml";
-          if (fs::is_regular_file(inside, ignored)) value = inside.string();
+          value = jobs::calibration_in(value).value_or(value);
           return std::string();
         },
         ""));

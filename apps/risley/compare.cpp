@@ -1,10 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-#include <algorithm>
-#include <cmath>
 #include <memory>
 #include <string>
-#include <vector>
 
 #include <fmt/format.h>
 
@@ -26,11 +23,6 @@ struct CompareOptions {
   std::string page;
 };
 
-std::string answer_of(const jobs::ComparedPair& pair) {
-  if (pair.comparison.change.degrees_of_freedom == 0) return "no sigmas";
-  return pair.changed ? "changed" : "no change seen";
-}
-
 void print_series(const jobs::ComparedSeries& series) {
   Table table({"from", "to", "one unit", "directions apart deg", "+- sigma", "shape deg",
                "+- sigma", "p", "answer"});
@@ -41,10 +33,10 @@ void print_series(const jobs::ComparedSeries& series) {
     };
     const NumberText total = text(c.beams.errors.total, c.beams.total_sigma);
     const NumberText shape = text(c.beams.errors.shape, c.beams.shape_sigma);
-    table.add({series.results[pair.a], series.results[pair.b], c.same_unit ? "yes" : "not known",
-               total.value, total.sigma, shape.value, shape.sigma,
+    table.add({series.results[pair.a], series.results[pair.b], jobs::one_unit_words(c), total.value,
+               total.sigma, shape.value, shape.sigma,
                c.change.degrees_of_freedom > 0 ? fmt::format("{:.2g}", c.change.p_value) : "-",
-               answer_of(pair)});
+               jobs::answer_words(pair)});
   }
   table.print();
   say("\np: probability that differences of the parameters are as large as these, or larger, by "

@@ -25,7 +25,6 @@ namespace risley::app {
 namespace {
 
 using estimation::Estimate;
-using estimation::Evaluation;
 using jobs::EstimatedRecording;
 
 struct EstimateCommandOptions {

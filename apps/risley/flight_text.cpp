@@ -19,7 +19,6 @@ namespace {
 
 using calibration::FlightCalibration;
 using calibration::FlightUnknown;
-using calibration::FlightUnknowns;
 using calibration::StripPair;
 using jobs::CalibratedFlight;
 

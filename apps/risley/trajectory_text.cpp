@@ -18,7 +18,6 @@
 namespace risley::app {
 namespace {
 
-using trajectories::AngleSpread;
 using trajectories::Extent;
 using trajectories::PoseAccuracy;
 using trajectories::RecordTimes;

@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
@@ -19,6 +20,7 @@
 #include "risley/core/error.hpp"
 #include "risley/core/random.hpp"
 #include "risley/estimation/free_parameters.hpp"
+#include "risley/jobs/result_files.hpp"
 #include "risley/sensors/preset.hpp"
 
 namespace risley::jobs {
@@ -28,18 +30,6 @@ using algebra::NamedCovariance;
 using sensors::Sensor;
 
 constexpr std::size_t kBeams = 2000;  // over all rotation angles; tell a mean square to 3 %
-
-Sensor load_result(const std::string& path) {
-  namespace fs = std::filesystem;
-  if (!fs::is_directory(path)) return sensors::load_sensor(path);
-  const fs::path file = fs::path(path) / "calibration.yaml";
-  if (!fs::exists(file)) {
-    throw FileError(file.string(), {},
-                    "is missing: a result folder holds it where estimate or calibrate came to a "
-                    "result that is better than what the sensor believed");
-  }
-  return sensors::load_sensor(file.string());
-}
 
 void require_same_kind(const Sensor& a, const Sensor& b) {
   if (a.shape() == b.shape() && a.train.face_order() == b.train.face_order()) return;
@@ -209,10 +199,32 @@ calibration::PointingError compare_directions(const Pair& pair, const NamedCovar
 
 }  // namespace
 
-ResultComparison compare_results(const std::string& a, const std::string& b, OneUnit one_unit) {
+Sensor load_result(const std::string& path) {
+  namespace fs = std::filesystem;
+  if (!fs::is_directory(path)) return sensors::load_sensor(path);
+  const std::optional<std::string> file = calibration_in(path);
+  if (!file) {
+    throw FileError((fs::path(path) / kCalibrationFile).string(), {},
+                    "is missing: a result folder holds it where estimate or calibrate came to a "
+                    "result that is better than what the sensor believed");
+  }
+  return sensors::load_sensor(*file);
+}
+
+std::string one_unit_words(const ResultComparison& comparison) {
+  if (comparison.same_unit) return "yes";
+  const bool unknown = comparison.a.serial.empty() || comparison.b.serial.empty();
+  return unknown ? "not known" : "no";
+}
+
+ResultComparison compare_results(const std::string& a, const std::string& b) {
+  return compare_results(load_result(a), load_result(b));
+}
+
+ResultComparison compare_results(const Sensor& a, const Sensor& b, OneUnit one_unit) {
   ResultComparison result;
-  result.a = load_result(a);
-  result.b = load_result(b);
+  result.a = a;
+  result.b = b;
   require_same_kind(result.a, result.b);
   result.same_unit = !result.a.serial.empty() && result.a.serial == result.b.serial;
   const bool unknown = result.a.serial.empty() || result.b.serial.empty();

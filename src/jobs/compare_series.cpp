@@ -18,16 +18,23 @@ ComparedSeries compare_series(const CompareSeriesOptions& options, const Progres
   }
   ComparedSeries series{options.results, options.false_alarm, 0, {}};
   series.least_p_value = options.false_alarm / static_cast<double>(places.size());
+  std::vector<sensors::Sensor> loaded;
+  loaded.reserve(options.results.size());
+  for (const std::string& path : options.results) loaded.push_back(load_result(path));
   series.pairs.reserve(places.size());
   for (const auto& [a, b] : places) {
     progress.report(static_cast<double>(series.pairs.size()) / static_cast<double>(places.size()));
-    ComparedPair pair{
-        a, b, compare_results(options.results[a], options.results[b], OneUnit::caller), false};
+    ComparedPair pair{a, b, compare_results(loaded[a], loaded[b], OneUnit::caller), false};
     pair.changed = pair.comparison.change.degrees_of_freedom > 0 &&
                    pair.comparison.change.p_value < series.least_p_value;
     series.pairs.push_back(std::move(pair));
   }
   return series;
+}
+
+std::string answer_words(const ComparedPair& pair) {
+  if (pair.comparison.change.degrees_of_freedom == 0) return "no sigmas to test with";
+  return pair.changed ? "changed" : "no change seen";
 }
 
 }  // namespace risley::jobs

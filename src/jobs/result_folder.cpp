@@ -81,7 +81,7 @@ void ResultFolder::add_states(const std::string& name, const estimation::Estimat
 
 void ResultFolder::add_calibration(const sensors::Sensor& sensor) {
   if (folder_.empty()) return;
-  write("calibration.yaml", sensors::preset_text(sensor));
+  write(kCalibrationFile, sensors::preset_text(sensor));
 }
 
 void ResultFolder::add_text(const NamedText& text) {
@@ -132,6 +132,13 @@ std::vector<std::string> ResultFolder::left_over() const {
 
 std::string ResultFolder::path(const std::string& name) const {
   return (fs::path(folder_) / name).string();
+}
+
+std::optional<std::string> calibration_in(const std::string& folder) {
+  std::error_code ignored;
+  const fs::path file = fs::path(folder) / kCalibrationFile;
+  if (!fs::is_regular_file(file, ignored)) return std::nullopt;
+  return file.string();
 }
 
 }  // namespace risley::jobs

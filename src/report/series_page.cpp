@@ -3,15 +3,12 @@
 #include "risley/report/series_page.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <cstddef>
 #include <utility>
 #include <vector>
 
 #include <fmt/format.h>
 
-#include "risley/core/angle.hpp"
-#include "risley/core/number_text.hpp"
 #include "risley/report/html.hpp"
 #include "risley/report/page_parts.hpp"
 
@@ -45,13 +42,10 @@ std::string pairs_html(const ComparedSeries& series) {
         "<tr{}><th scope=\"row\">{}</th><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td>"
         "<td>{}</td></tr>\n",
         pair.changed ? " class=\"bad\"" : "", escape_html(series.results[pair.a]),
-        escape_html(series.results[pair.b]), c.same_unit ? "yes" : "not known",
+        escape_html(series.results[pair.b]), jobs::one_unit_words(c),
         angle_with_sigma(c.beams.errors.total, c.beams.total_sigma),
         angle_with_sigma(c.beams.errors.shape, c.beams.shape_sigma),
-        tested ? fmt::format("{:.2g}", c.change.p_value) : "&ndash;",
-        !tested        ? "no sigmas to test with"
-        : pair.changed ? "changed"
-                       : "no change seen");
+        tested ? fmt::format("{:.2g}", c.change.p_value) : "&ndash;", jobs::answer_words(pair));
   }
   return html +
          fmt::format(

@@ -101,6 +101,9 @@ TEST_F(CompareResults, LeavesOutWhatBothHeldAlike) {
   const double all = std::hypot(kSigma, kResponse * kHeldSigma);
   const ResultComparison other = compare_results(a, saved("c", result("B2")));
   EXPECT_FALSE(other.same_unit);
+  EXPECT_EQ(one_unit_words(same), "yes");
+  EXPECT_EQ(one_unit_words(other), "no");
+  EXPECT_EQ(one_unit_words(compare_results(a, "mid-40")), "not known");
   EXPECT_FALSE(other.held_alike);
   EXPECT_NEAR(row(other, kTilt).sigma, std::sqrt(2.0) * all, 1e-6 * all);
   EXPECT_NEAR(row(other, kWedge).sigma, std::sqrt(2.0) * kHeldSigma, 1e-9);

@@ -43,16 +43,25 @@ struct ResultComparison {
   ChangeTest change;
 };
 
+/// Whether two results are of one unit, by their serial numbers: "yes", "no" or "not known".
+std::string one_unit_words(const ResultComparison& comparison);
+
 /// Who says that two results are of one unit.
 enum class OneUnit {
   serials,  ///< their serial numbers, which are known and equal
   caller,   ///< whoever asks, unless the serial numbers are known and differ
 };
 
-/// @param a, b  folders with the calibration.yaml of a result, such files, or presets
-/// @throws FileError; InvalidArgument for sensors with other numbers of prisms or emitters, and
-///         where one result has an index for all prisms and the other one for each
-ResultComparison compare_results(const std::string& a, const std::string& b,
+/// A result: the calibration.yaml of a folder, such a file, or a preset. @throws FileError
+sensors::Sensor load_result(const std::string& path);
+
+/// @throws InvalidArgument for sensors with other numbers of prisms or emitters, and where one of
+///         them has an index for all prisms and the other one for each
+ResultComparison compare_results(const sensors::Sensor& a, const sensors::Sensor& b,
                                  OneUnit one_unit = OneUnit::serials);
+
+/// The same of files. @param a, b  as load_result()
+/// @throws FileError; InvalidArgument
+ResultComparison compare_results(const std::string& a, const std::string& b);
 
 }  // namespace risley::jobs

@@ -24,6 +24,9 @@ struct ComparedPair {
   bool changed = false;
 };
 
+/// "changed", "no change seen", or "no sigmas to test with".
+std::string answer_words(const ComparedPair& pair);
+
 /// A unit over time, or units against each other.
 struct ComparedSeries {
   std::vector<std::string> results;

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include "risley/jobs/provenance.hpp"
@@ -31,6 +32,12 @@ struct ResultFiles {
 struct NamedText {
   std::string name, text;
 };
+
+/// The file with the numbers of a result.
+inline constexpr const char* kCalibrationFile = "calibration.yaml";
+
+/// Its path in a result folder; empty where there is none, or no folder.
+std::optional<std::string> calibration_in(const std::string& folder);
 
 /// The file that marks a folder whose files may be of different runs.
 inline constexpr const char* kIncomplete = "INCOMPLETE";
