@@ -287,14 +287,11 @@ void print_flight(const CalibratedFlight& outcome) {
   print_control(c);
   if (!outcome.truth) return;
   say("\n");
-  const double height = c.datum.height;
-  Table errors({"error, deg", "total", "shared rotation", "shape",
-                fmt::format("total at {:.0f} m, mm", height)});
-  const auto add = [&errors, height](const char* name, const calibration::DirectionErrors& e) {
+  Table errors({"error, deg", "total", "shared rotation", "shape"});
+  const auto add = [&errors](const char* name, const calibration::DirectionErrors& e) {
     errors.add({name, fmt::format("{:.5f}", in_degrees(e.total)),
                 fmt::format("{:.5f}", in_degrees(e.gauge)),
-                fmt::format("{:.5f}", in_degrees(e.shape)),
-                fmt::format("{:.1f}", 1e3 * offset_at(e.total, height))});
+                fmt::format("{:.5f}", in_degrees(e.shape))});
   };
   add("before", outcome.truth->before);
   add("after", outcome.truth->after);

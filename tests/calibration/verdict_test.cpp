@@ -56,7 +56,7 @@ TEST(Verdict, SaysByHowMuchDirectionsAreOff) {
   c.pointing_error.worst_shape_sigma = c.pointing_error.shape_sigma = 0.0004 * kDegree;
   c.pointing_error.worst_shape = 0.0451 * kDegree;
   EXPECT_EQ(verdict_of(c).words,
-            "reported directions are off by 0.4012 ± 0.0015 degree (0.21 m at 30 m): 0.4003 ± "
+            "reported directions are off by 0.4012 ± 0.0015 degree (21 cm at 30 m): 0.4003 ± "
             "0.0015 shared by all beams and 0.02304 ± 0.00040 in shape, 0.04510 at worst");
 }
 
