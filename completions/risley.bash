@@ -4,7 +4,7 @@
 # the command is missing here.
 _risley() {
   local current=${COMP_WORDS[COMP_CWORD]} previous=${COMP_WORDS[COMP_CWORD-1]}
-  local verbs="info convert simulate estimate observability calibrate cloud identify pattern preset report reproduce"
+  local verbs="info convert simulate estimate observability calibrate cloud compare identify pattern preset report reproduce"
   local common="--help --json --threads --seed --quiet --verbose"
   local names="refractive_index_air refractive_index refractive_index_a refractive_index_b
     wedge_angle_deg wedge_angle_a_deg wedge_angle_b_deg
@@ -68,6 +68,7 @@ _risley() {
           *" new "*) choices="$common --output --from" ;;
         esac ;;
       report) choices="$common --output" ;;
+      compare) choices="$common --output --false-alarm" ;;
       convert) choices="$common --output --format --sensor-type --accuracy --trajectory-topic --shot-rate-hz --extrinsics" ;;
       simulate)
         choices="$common --output --sensor --duration-s --rate-hz --noise-angle-deg

@@ -12,6 +12,7 @@ Usage: real_units.py RISLEY FOLDER
 import hashlib
 import json
 import pathlib
+import re
 import subprocess
 import sys
 import tempfile
@@ -42,6 +43,17 @@ def unit_of(name):
     return "1"
 
 
+def in_words(name):
+    """The name of a parameter without its unit; prisms have capital letters."""
+    words = name.replace("_", " ").removesuffix(" deg per s").removesuffix(" deg")
+    return re.sub(r"\b[a-h]\b", lambda letter: letter.group().upper(), words)
+
+
+def grouped(count):
+    """As the command groups counts."""
+    return f"{count:,}".replace(",", " ") if count >= 10_000 else str(count)
+
+
 def table(rows):
     lines = ["| quantity | value | sigma | unit |", "|---|---|---|---|"]
     for name, value, sigma, unit in rows:
@@ -60,14 +72,14 @@ def text_of(command, path, options):
     slips = found["slips"]
     lost = f" {sum(one['shots'] or 0 for one in slips)} shots are missing at {len(slips)} places." if slips else ""
     digest = hashlib.sha256(path.read_bytes()).hexdigest()
-    rows = [(name.replace("_", " ").removesuffix(" deg per s").removesuffix(" deg"), one["value"],
-             one["sigma"], unit_of(name)) for name, one in found["parameters"].items()]
+    rows = [(in_words(name), one["value"], one["sigma_given_held"], unit_of(name))
+            for name, one in found["parameters"].items()]
     if found["frame"]["estimated"]:
         rows += [(f"{axis} of the frame", found["frame"][f"{axis}_deg"]["value"],
                   found["frame"][f"{axis}_deg"]["sigma"], "deg") for axis in ("yaw", "pitch")]
     for axis in ("azimuth", "zenith"):
         noise = found["noise"][f"{axis}_deg"]
-        rows.append((f"noise of the {axis}, rounding apart", noise["value"], noise["sigma"], "deg"))
+        rows.append((f"noise of the {axis}, without rounding", noise["value"], noise["sigma"], "deg"))
     residual = {axis: found["residuals"][f"{axis}_deg"]["rms"] for axis in ("azimuth", "zenith")}
     image = "mirrored" if found["mirrored"] else "not mirrored"
     if found["combination"] is not None:
@@ -77,8 +89,8 @@ def text_of(command, path, options):
         " ".join(["risley estimate", path.name, *options]),
         "```",
         "",
-        f"`{path.name}`, SHA-256 `{digest}`, {found['observations_used']} directions used, "
-        f"{found['outliers']} of them left out. {image[0].upper()}{image[1:]}; residuals (root mean square) "
+        f"`{path.name}`, SHA-256 `{digest}`: {grouped(found['observations_used'])} directions were used, of which "
+        f"{found['outliers']} are outliers. {image[0].upper()}{image[1:]}. Residuals (root mean square): "
         f"{residual['azimuth']:.2g} degree in azimuth and {residual['zenith']:.2g} in zenith.{lost}",
         "",
         *table(rows),

@@ -44,25 +44,6 @@ struct CalibrateCommandOptions {
   ReadingWishes reading;
 };
 
-/// The stations of the recordings, in their order.
-std::vector<scenes::Station> stations_for(const CalibrateCommandOptions& options) {
-  if (options.stations.empty()) {
-    if (!options.station_names.empty()) throw InvalidArgument("--station needs --stations");
-    return {};
-  }
-  const scenes::Scene scene = scenes::load_scene(options.stations);
-  std::vector<scenes::Station> stations;
-  for (const std::string& name : options.station_names) stations.push_back(scene.station(name));
-  if (options.station_names.empty()) stations = scene.stations;
-  if (stations.size() != options.inputs.size()) {
-    throw InvalidArgument(fmt::format(
-        "{} stations for {} recordings: {} has to list one for each, in their order, or --station "
-        "names them",
-        stations.size(), options.inputs.size(), options.stations));
-  }
-  return stations;
-}
-
 /// What all kinds of calibrations share; `Job` is the options of one.
 template <class Job>
 void take_common(const CalibrateCommandOptions& options, Job& job) {
@@ -117,7 +98,7 @@ jobs::CalibrateRecordingsOptions job_of(const CalibrateCommandOptions& options,
   job.beam_origin = options.beam_origin == "yes";
   if (options.method == "paper") job.method = calibration::CalibrationMethod::paper;
   if (!options.planes.empty()) job.planes = scenes::load_scene(options.planes);
-  job.stations = stations_for(options);
+  job.stations = jobs::stations_of(options.stations, options.station_names, options.inputs.size());
   std::vector<std::string> states = {"states.nc"};
   for (std::size_t i = 1; i <= options.inputs.size(); ++i) {
     states.push_back(fmt::format("states_{}.nc", i));
@@ -131,10 +112,9 @@ jobs::CalibrateRecordingsOptions job_of(const CalibrateCommandOptions& options,
 }
 
 /// Runs a calibration, on walls or in flight, and says what came of it.
-template <class Calibrate, class JsonOf, class Print>
+template <class Calibrate, class Print>
 ExitStatus run_job(const CalibrateCommandOptions& options, const CommonOptions& common,
-                   const Calibrate& calibrate, const JsonOf& json_of, const Print& print) {
-  const double started = now();
+                   const Calibrate& calibrate, const Print& print) {
   auto outcome = [&] {
     ProgressBar bar("calibrating", common);
     return calibrate(bar.progress());
@@ -142,6 +122,8 @@ ExitStatus run_job(const CalibrateCommandOptions& options, const CommonOptions& 
   auto& c = outcome.calibration;
   c.reason = with_flags(c.reason);
   put_flags(outcome.warnings);
+  put_flags(outcome.choice.warnings);
+  put_flags(c.verdict);
   put_flags(c.warnings);
   for (const std::string& warning : outcome.warnings) spdlog::warn(warning);
   for (const std::string& warning : c.warnings) spdlog::warn(warning);
@@ -153,7 +135,7 @@ ExitStatus run_job(const CalibrateCommandOptions& options, const CommonOptions& 
                  worse ? "it is not better" : "it is not to be trusted");
   }
   if (common.json) {
-    print_json(common, json_of(outcome, now() - started), outcome.provenance);
+    print_json(common, json::of(outcome), outcome.provenance);
   } else {
     print(outcome);
   }
@@ -177,7 +159,7 @@ jobs::CalibrateFlightOptions flight_job_of(const CalibrateCommandOptions& option
 
 ExitStatus run_plan(const CalibrateCommandOptions& options, const CommonOptions& common) {
   if (!options.inputs.empty()) throw InvalidArgument("--plan takes no recordings");
-  if (is_flight_plan(options.plan)) {
+  if (jobs::is_flight_plan(options.plan)) {
     jobs::PlanFlightOptions job;
     take_common(options, job);
     take_grid(options, job);
@@ -206,7 +188,7 @@ ExitStatus run_plan(const CalibrateCommandOptions& options, const CommonOptions&
     planned = jobs::plan_calibration(job, bar.progress());
   }
   if (common.json) {
-    print_json(common, forecast_json(planned));
+    print_json(common, json::of(planned));
   } else {
     print_forecast(planned.forecast, planned.shape);
   }
@@ -332,14 +314,14 @@ Run declare_calibrate(CLI::App& verb) {
           [&](const Progress& progress) {
             return jobs::calibrate_flight(flight_job_of(*options, common), progress);
           },
-          flight_json, print_flight);
+          print_flight);
     }
     return run_job(
         *options, common,
         [&](const Progress& progress) {
           return jobs::calibrate_recordings(job_of(*options, common), progress);
         },
-        calibration_json, print_calibration);
+        print_calibration);
   };
 }
 

@@ -10,7 +10,7 @@
 #include "risley/core/angle.hpp"
 #include "risley/core/number_text.hpp"
 
-#include "observability_text.hpp"
+#include "command.hpp"
 #include "recording_text.hpp"
 #include "table.hpp"
 
@@ -25,21 +25,6 @@ using jobs::CalibratedRecordings;
 
 double deg(double radians) { return degrees_from_radians(radians); }
 
-Json datum_json(calibration::DatumKind kind, const FormalDatum& datum) {
-  return {{"kind", calibration::to_string(kind)},      {"sigma_roll_deg", deg(datum.sigma_roll)},
-          {"sigma_pitch_deg", deg(datum.sigma_pitch)}, {"sigma_yaw_deg", deg(datum.sigma_yaw)},
-          {"sigma_gauge_deg", deg(datum.gauge)},       {"sigma_shape_deg", deg(datum.shape)},
-          {"sigma_total_deg", deg(datum.total)}};
-}
-
-Json vector_json(const Vector3<double>& v) { return {v.x, v.y, v.z}; }
-
-Json unobservable_json(const std::vector<estimation::WeakDirection>& directions) {
-  Json list = Json::array();
-  for (const auto& direction : directions) list.push_back(weak_direction_json(direction));
-  return list;
-}
-
 void print_datum(calibration::DatumKind kind, const FormalDatum& datum) {
   say("datum: {}; 1 sigma of roll {}, pitch {}, yaw {} deg; of the beams against each other {} deg "
       "({})\n",
@@ -49,141 +34,6 @@ void print_datum(calibration::DatumKind kind, const FormalDatum& datum) {
 }
 
 }  // namespace
-
-Json pointing_json(const calibration::PointingError& pointing) {
-  const DirectionErrors& errors = pointing.errors;
-  const auto known = [](double value, double sigma) {
-    return Json{{"value", deg(value)}, {"sigma", number_or_null(deg(sigma))}};
-  };
-  return {{"total_deg", known(errors.total, pointing.total_sigma)},
-          {"shared_deg", known(errors.gauge, pointing.gauge_sigma)},
-          {"shape_deg", known(errors.shape, pointing.shape_sigma)},
-          {"worst_deg", known(pointing.worst_shape, pointing.worst_shape_sigma)},
-          {"rotation_deg",
-           {{"roll", deg(errors.rotation.x)},
-            {"pitch", deg(errors.rotation.y)},
-            {"yaw", deg(errors.rotation.z)}}}};
-}
-
-Json slips_of_all(const std::vector<jobs::ReadRecording>& recordings) {
-  Json all = Json::array();
-  for (const jobs::ReadRecording& recording : recordings) {
-    for (Json& slip : slips_json(recording.header.slips)) {
-      slip["recording"] = recording.path;
-      all.push_back(std::move(slip));
-    }
-  }
-  return all;
-}
-
-Json errors_json(const DirectionErrors& e) {
-  return {{"azimuth_rmse_deg", deg(e.azimuth_rmse)},
-          {"zenith_rmse_deg", deg(e.zenith_rmse)},
-          {"azimuth_bias_deg", deg(e.azimuth_bias)},
-          {"zenith_bias_deg", deg(e.zenith_bias)},
-          {"total_deg", deg(e.total)},
-          {"gauge_deg", deg(e.gauge)},
-          {"shape_deg", deg(e.shape)}};
-}
-
-Json calibration_json(const CalibratedRecordings& outcome, double total_time) {
-  const Calibration& c = outcome.calibration;
-  const TrainShape shape = c.sensor.shape();
-  Json parameters = Json::object(), planes = Json::array(), steps = Json::array(),
-       tests = Json::array(), profiles = Json::object();
-  for (std::size_t j = 0; j < c.free.size(); ++j) {
-    const auto at = static_cast<Eigen::Index>(j);
-    parameters[c.free[j].name] = {
-        {"value", in_file_unit(c.free[j].name, c.parameters[at], shape)},
-        {"sigma", number_or_null(in_file_unit(c.free[j].name, c.total_sigma(j), shape))},
-        {"sigma_given_held",
-         number_or_null(in_file_unit(c.free[j].name, std::sqrt(c.covariance(at, at)), shape))}};
-  }
-  for (const calibration::CalibratedPlane& plane : c.planes) {
-    planes.push_back({{"name", plane.name},
-                      {"recording", outcome.recordings[plane.recording].path},
-                      {"normal", vector_json(plane.normal)},
-                      {"offset_m", plane.distance},
-                      {"points", plane.points},
-                      {"outliers", plane.outliers},
-                      {"rms_m", plane.rms},
-                      {"before_rms_m", plane.rms_before},
-                      {"range_sigma_m", plane.range_sigma}});
-  }
-  for (const calibration::SurfaceStep& step : c.steps) {
-    steps.push_back({{"recording", outcome.recordings[step.recording].path},
-                     {"plane", c.planes[step.plane].name},
-                     {"height_m", step.height},
-                     {"azimuth_deg", deg(step.azimuth)},
-                     {"zenith_deg", deg(step.zenith)},
-                     {"size_deg", deg(step.size)},
-                     {"points", step.points}});
-  }
-  for (const calibration::PriorTest& test : c.prior_tests) {
-    tests.push_back({{"name", test.name},
-                     {"kind", test.station ? "station" : "plane"},
-                     {"misfit_deg", deg(test.misfit)},
-                     {"chi2", test.chi2},
-                     {"degrees_of_freedom", test.degrees_of_freedom},
-                     {"critical", test.critical}});
-  }
-  for (const calibration::ThicknessProfile& profile : c.profiles) {
-    Json rows = Json::array();
-    for (std::size_t i = 0; i < profile.count.size(); ++i) {
-      if (profile.count[i] == 0) continue;
-      rows.push_back({{"from_deg", deg(profile.from[i])},
-                      {"to_deg", deg(profile.to[i])},
-                      {"points", profile.count[i]},
-                      {"before_rms_m", profile.rms_before[i]},
-                      {"after_rms_m", profile.rms_after[i]}});
-    }
-    profiles[profile.variable] = rows;
-  }
-  std::vector<std::string> warnings = outcome.warnings;
-  warnings.insert(warnings.end(), c.warnings.begin(), c.warnings.end());
-  Json object = {
-      {"serial", outcome.recordings.front().serial()},
-      {"verdict", verdict_json(c.verdict)},
-      {"converged", c.converged},
-      {"reason", c.reason},
-      {"method", c.method == calibration::CalibrationMethod::paper ? "paper" : "adjustment"},
-      {"iterations", c.iterations},
-      {"observations", outcome.observations},
-      {"points", c.points},
-      {"parameters", parameters},
-      {"range_offset_m",
-       {{"value", c.range_offset},
-        {"sigma", c.range_offset_total_sigma()},
-        {"sigma_given_held", c.range_offset_sigma}}},
-      {"planes", planes},
-      {"steps", steps},
-      {"datum", datum_json(c.datum_kind, c.datum)},
-      {"datum_given_held", datum_json(c.datum_kind, c.datum_given_held)},
-      {"pointing_error", pointing_json(c.pointing_error)},
-      {"better_probability", number_or_null(c.better_probability)},
-      {"prior_tests", tests},
-      {"unobservable", unobservable_json(c.unobservable)},
-      {"before", {{"plane_rms_m", c.rms_before}}},
-      {"after", {{"plane_rms_m", c.rms_after}}},
-      {"sigma0", c.sigma0},
-      {"unevenness", c.unevenness},
-      {"variance_factor", c.variance_factor},
-      {"thickness", profiles},
-      {"frame", frame_json()},
-      {"slips", slips_of_all(outcome.recordings)},
-      {"warnings", warnings},
-      {"seconds",
-       {{"read", outcome.reading_time},
-        {"rotation_angles", outcome.angles_time},
-        {"solve", outcome.solving_time},
-        {"total", total_time}}}};
-  object.update(choice_json(outcome.choice));
-  if (outcome.truth) {
-    object["truth"] = {{"before", errors_json(outcome.truth->before)},
-                       {"after", errors_json(outcome.truth->after)}};
-  }
-  return object;
-}
 
 void print_calibration(const CalibratedRecordings& outcome) {
   const Calibration& c = outcome.calibration;
@@ -262,43 +112,6 @@ void print_calibration(const CalibratedRecordings& outcome) {
     add("after", outcome.truth->after);
     errors.print();
   }
-}
-
-Json plan_head(const std::string& sensor) {
-  return {{"serial", nullptr},
-          {"sensor", sensor},
-          {"verdict",
-           {{"code", "undecided"},
-            {"words", "this is a plan: nothing was measured"},
-            {"to_do", "record as planned, and calibrate from that"}}}};
-}
-
-Json forecast_json(const jobs::PlannedCalibration& planned) {
-  const CalibrationForecast& f = planned.forecast;
-  const TrainShape shape = planned.shape;
-  Json parameters = Json::object(), walls = Json::array();
-  for (std::size_t j = 0; j < f.free.size(); ++j) {
-    const auto at = static_cast<Eigen::Index>(j);
-    parameters[f.free[j].name] = {
-        {"sigma",
-         number_or_null(in_file_unit(f.free[j].name, std::sqrt(f.covariance(at, at)), shape))}};
-  }
-  for (const calibration::PlannedWall& wall : f.walls) {
-    walls.push_back({{"name", wall.name},
-                     {"station", wall.station},
-                     {"share", wall.share},
-                     {"mean_incidence_deg", deg(wall.mean_incidence)},
-                     {"mean_range_m", wall.mean_range}});
-  }
-  Json object = plan_head(planned.sensor);
-  object.update({{"parameters", parameters},
-                 {"range_offset_m", {{"sigma", number_or_null(f.range_offset_sigma)}}},
-                 {"datum", datum_json(f.datum_kind, f.datum)},
-                 {"unobservable", unobservable_json(f.unobservable)},
-                 {"walls", walls},
-                 {"observations", f.shots},
-                 {"advice", f.advice}});
-  return object;
 }
 
 void print_forecast(const CalibrationForecast& f, TrainShape shape) {

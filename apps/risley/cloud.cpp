@@ -77,63 +77,25 @@ cloud::CloudOptions cloud_options(const CloudCommandOptions& options) {
 }
 
 /// What sent the beams where the points are.
-std::string calibration_text(const std::string& name, const sensors::Sensor& calibration) {
-  const bool is_none = calibration.reference == sensors::CalibrationReference::none;
-  const bool is_estimate = calibration.reference == sensors::CalibrationReference::directions;
-  return fmt::format("{} ({})", name,
-                     is_none       ? "a preset"
-                     : is_estimate ? "an estimate; only walls tell whether it is true"
-                                   : "a calibration");
-}
-
-Json calibration_json(const std::string& name, const sensors::Sensor& calibration) {
-  const bool is_none = calibration.reference == sensors::CalibrationReference::none;
-  return {{"path", name},
-          {"calibrated_against", is_none ? Json() : Json(to_string(calibration.reference))}};
-}
-
-Json summary_json(const FileJob& job, const cloud::CloudSummary& s) {
-  std::vector<std::string> warnings = s.warnings;
-  for (const auto& warning : s.read_warnings) warnings.push_back(jobs::warning_text(warning));
-  Json json = {
-      {"points", s.points},
-      {"format", s.format},
-      {"input", job.input},
-      {"output", job.output},
-      {"observations", s.observations},
-      {"no_return", s.no_return},
-      {"outliers", s.outliers},
-      {"without_rotation_angle", s.without_rotation_angle},
-      {"without_pose", s.without_pose},
-      {"strips", s.strips.size()},
-      {"frame", frame_json()},
-      {"point_frame", s.frame},
-      {"mirrored", s.mirrored},
-      {"residuals",
-       {{"azimuth_deg", {{"rms", degrees_from_radians(s.azimuth_residual_rms)}}},
-        {"zenith_deg", {{"rms", degrees_from_radians(s.zenith_residual_rms)}}}}},
-      {"repointing_deg", {{"rms", degrees_from_radians(s.repointing_rms)}}},
-      {"common_factors", s.factors},
-      {"slips", slips_json(s.slips)},
-      {"warnings", warnings},
-  };
-  if (s.damage) json.update(damage_json(*s.damage));
-  if (s.distribution) json["distribution"] = distribution_json(*s.distribution);
-  return json;
+std::string calibration_text(const jobs::RecordingCloud& made) {
+  using sensors::CalibrationReference;
+  return fmt::format("{} ({})", made.calibration,
+                     made.calibrated_against == CalibrationReference::none ? "a preset"
+                     : made.calibrated_against == CalibrationReference::directions
+                         ? "an estimate; only walls tell whether it is true"
+                         : "a calibration");
 }
 
 /// The maps of where beams start.
-ExitStatus write_beam_origin_map(const CloudCommandOptions& options,
-                                 const sensors::Sensor& calibration, const CommonOptions& common) {
+ExitStatus write_beam_origin_map(const CloudCommandOptions& options, const CommonOptions& common) {
+  const sensors::Sensor calibration = sensors::load_sensor(options.calibration);
   const jobs::BeamOrigins found = jobs::beam_origins(calibration);
   io::write_text_file(options.beam_origin_map,
                       report::beam_origin_page(found.map, calibration, provenance_of(common)));
   if (common.json) {
-    print_json(common, {{"html", options.beam_origin_map},
-                        {"beams", found.map.beams},
-                        {"cells", found.map.size()},
-                        {"y_m", {{"min", found.least_y}, {"max", found.greatest_y}}},
-                        {"z_m", {{"min", found.least_z}, {"max", found.greatest_z}}}});
+    Json json = {{"html", options.beam_origin_map}};
+    json.update(json::of(found));
+    print_json(common, json);
   } else {
     say("{}: beams start {:.1f} to {:.1f} mm beside the origin in Y, {:.1f} to {:.1f} mm in Z\n",
         options.beam_origin_map, 1e3 * found.least_y, 1e3 * found.greatest_y, 1e3 * found.least_z,
@@ -143,12 +105,12 @@ ExitStatus write_beam_origin_map(const CloudCommandOptions& options,
 }
 
 FileOutcome make_one(const FileJob& job, const CloudCommandOptions& options,
-                     const sensors::Sensor& calibration, const cloud::CloudOptions& settings,
-                     const Progress& progress) {
-  cloud::CloudSummary s =
+                     const cloud::CloudOptions& settings, const Progress& progress) {
+  jobs::RecordingCloud made =
       jobs::cloud_of_recording({job.input, read_options(options.reading), options.calibration,
                                 job.output, options.platform, settings},
                                progress);
+  cloud::CloudSummary& s = made.summary;
   put_flags(s.warnings);
   log_warnings(job.input, s.read_warnings);
   for (const std::string& warning : s.warnings) spdlog::warn("{}: {}", job.input, warning);
@@ -174,9 +136,8 @@ FileOutcome make_one(const FileJob& job, const CloudCommandOptions& options,
   if (s.without_pose > 0) {
     text += fmt::format(", {} outside the trajectory left out", grouped(s.without_pose));
   }
-  text += fmt::format("; beams by {}", calibration_text(options.calibration, calibration));
-  Json json = summary_json(job, s);
-  json["calibration"] = calibration_json(options.calibration, calibration);
+  text += fmt::format("; beams by {}", calibration_text(made));
+  Json json = with_status(json::of(made), s.damage);
   if (s.sample) json["html"] = options.report;
   return {s.damage ? kBadFile : kDone, std::move(json), text};
 }
@@ -259,10 +220,9 @@ Run declare_cloud(CLI::App& verb) {
       ->excludes(inputs, output);
   return [options](const CommonOptions& common) {
     cloud::CloudOptions settings = cloud_options(*options);
-    const sensors::Sensor calibration = sensors::load_sensor(options->calibration);
     if (!options->beam_origin_map.empty()) {
       require_apart(common, {options->beam_origin_map});
-      return write_beam_origin_map(*options, calibration, common);
+      return write_beam_origin_map(*options, common);
     }
     if (options->inputs.empty()) throw InvalidArgument("INPUT is missing: a recording");
     if (options->output.empty()) throw InvalidArgument("--output is missing");
@@ -286,7 +246,7 @@ Run declare_cloud(CLI::App& verb) {
     return run_file_jobs(
         files, "making points", "points",
         [&](const FileJob& job, const Progress& progress) {
-          return make_one(job, *options, calibration, settings, progress);
+          return make_one(job, *options, settings, progress);
         },
         common);
   };

@@ -35,15 +35,6 @@ CancelFlag
 
 void note_signal(int) { interrupted.set(); }
 
-double number_from(const std::string& text, std::string_view name) {
-  char* end = nullptr;
-  const double value = std::strtod(text.c_str(), &end);
-  if (text.empty() || *end != '\0' || !std::isfinite(value)) {
-    throw InvalidArgument(fmt::format("{} = '{}', expected a number", name, text));
-  }
-  return value;
-}
-
 std::string duration_text(double seconds) {
   const int whole = static_cast<int>(std::lround(std::min(seconds, 359999.0)));
   if (whole < 60) return fmt::format("{} s", whole);
@@ -106,6 +97,11 @@ void ProgressBar::show(double fraction, std::string_view stage) {
   std::fflush(stderr);
 }
 
+Json with_status(Json result, const std::optional<FileError>& damage) {
+  if (damage) result["exit_status"] = static_cast<int>(kBadFile);
+  return result;
+}
+
 Failure current_failure() {
   try {
     throw;
@@ -114,10 +110,7 @@ Failure current_failure() {
   } catch (const InvalidArgument& error) {
     return {kWrongUsage, with_flags(error.what()), {}};
   } catch (const FileError& error) {
-    Json details = {{"file", error.path()}};
-    if (error.place().byte_offset) details["byte_offset"] = *error.place().byte_offset;
-    if (error.place().line) details["line"] = *error.place().line;
-    return {kBadFile, error.what(), details};
+    return {kBadFile, error.what(), json::of(error)};
   } catch (const cloud::TurnedFrame& error) {
     const std::string text =
         fmt::format("{}: say it with --extrinsics YAW,PITCH,ROLL", error.what());
@@ -136,25 +129,13 @@ Failure current_failure() {
   }
 }
 
-std::pair<std::string, double> split_assignment(const std::string& text) {
-  const std::size_t equals = text.find('=');
-  if (equals == std::string::npos || equals == 0) {
-    throw InvalidArgument(fmt::format("'{}', expected NAME=VALUE", text));
+double number_from(const std::string& text, std::string_view name) {
+  char* end = nullptr;
+  const double value = std::strtod(text.c_str(), &end);
+  if (text.empty() || *end != '\0' || !std::isfinite(value)) {
+    throw InvalidArgument(fmt::format("{} = '{}', expected a number", name, text));
   }
-  const std::string name = text.substr(0, equals);
-  return {name, number_from(text.substr(equals + 1), name)};
-}
-
-std::pair<std::string, double> parameter_assignment(const std::string& text, TrainShape shape) {
-  auto [name, value] = split_assignment(text);
-  const ParameterInfo& parameter = find_parameter(name, shape);
-  value *= parameter.si_per_unit;
-  check_bounds(parameter, value);
-  return {name, value};
-}
-
-double in_file_unit(const std::string& name, double value, TrainShape shape) {
-  return value / find_parameter(name, shape).si_per_unit;
+  return value;
 }
 
 double positive_number(const std::string& text, std::string_view option, std::string_view unit) {
@@ -198,6 +179,13 @@ void note_files(const CLI::App& verb, CommonOptions& common) {
       const std::string name = option->get_name();
       if (name == "INPUT" || name == "FILE") {
         add_files(value, common.inputs);
+      } else if (name == "RESULT") {
+        const fs::path numbers = fs::path(value) / "calibration.yaml";
+        if (fs::is_regular_file(numbers, ignored)) {
+          common.inputs.push_back(numbers.string());
+        } else if (fs::is_regular_file(value, ignored)) {
+          common.inputs.push_back(value);
+        }
       } else if (name == "DIR") {
         common.inputs.push_back((fs::path(value) / "report.json").string());
         // Of two results the numbers are compared as well.
@@ -216,7 +204,6 @@ void note_files(const CLI::App& verb, CommonOptions& common) {
 }
 
 Json with_head(const CommonOptions& common, const Json& object, const jobs::Provenance& known) {
-  constexpr int kFormatVersion = 1;
   Json inputs = Json::array();
   const auto add = [&](const std::string& path) {
     Json one = {{"path", path}, {"sha256", nullptr}};
@@ -238,7 +225,7 @@ Json with_head(const CommonOptions& common, const Json& object, const jobs::Prov
   };
   for (const std::string& path : common.inputs) add(path);
   for (const std::string& path : common.files) add(path);
-  Json whole = {{"format_version", kFormatVersion},
+  Json whole = {{"format_version", json::kFormatVersion},
                 {"version", RISLEY_VERSION},
                 {"command", common.command},
                 {"inputs", inputs}};
@@ -300,7 +287,5 @@ void log_failure(const std::string& reason, const CommonOptions& common) {
   const bool is_seen = !common.json && isatty(STDOUT_FILENO) != 0 && isatty(STDERR_FILENO) != 0;
   spdlog::error("not converged{}", is_seen ? "" : ": " + reason);
 }
-
-Json number_or_null(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
 
 }  // namespace risley::app

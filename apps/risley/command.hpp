@@ -16,13 +16,14 @@
 
 #include "risley/core/progress.hpp"
 #include "risley/jobs/provenance.hpp"
+#include "risley/json/results.hpp"
 #include "risley/optics/parameters.hpp"
 
 #include "option_names.hpp"
 
 namespace risley::app {
 
-using Json = nlohmann::ordered_json;
+using json::Json;
 
 /// What the shell sees.
 enum ExitStatus : int {
@@ -54,6 +55,9 @@ struct Failure {
   Json details;  ///< for --json, may be null
 };
 
+/// The result of a verb that did what damage of a file left to do, with the exit status.
+Json with_status(Json result, const std::optional<FileError>& damage);
+
 /// Of the exception that is being handled.
 Failure current_failure();
 
@@ -68,6 +72,7 @@ Run declare_estimate(CLI::App& verb);
 Run declare_observability(CLI::App& verb);
 Run declare_calibrate(CLI::App& verb);
 Run declare_cloud(CLI::App& verb);
+Run declare_compare(CLI::App& verb);
 Run declare_identify(CLI::App& verb);
 Run declare_pattern(CLI::App& verb);
 Run declare_preset(CLI::App& verb);
@@ -106,13 +111,8 @@ class ProgressBar {
 /// Seconds on a clock that never jumps.
 double now();
 
-/// "NAME=VALUE" with a value in the unit of the name. @throws InvalidArgument
-std::pair<std::string, double> split_assignment(const std::string& text);
-/// As split_assignment, as SI. @throws InvalidArgument also for unknown names and out of bounds
-std::pair<std::string, double> parameter_assignment(const std::string& text, TrainShape shape);
-/// An SI value in the unit of the name of a parameter.
-double in_file_unit(const std::string& name, double value, TrainShape shape);
-
+/// @param name  of what it is the value of. @throws InvalidArgument unless it is a finite number
+double number_from(const std::string& text, std::string_view name);
 /// A value of --rate-hz and the like. @throws InvalidArgument naming the option
 double positive_number(const std::string& text, std::string_view option, std::string_view unit);
 /// @throws InvalidArgument unless the value is finite and above (or at) zero
@@ -157,25 +157,13 @@ void require_apart(const CommonOptions& common, const std::vector<std::string>& 
 void print_json(const CommonOptions& common, const Json& object,
                 const jobs::Provenance& known = {});
 
-/// NaN and the infinite have no place in JSON.
-Json number_or_null(double value);
-
 /// Says on stderr that numbers failed; why only where the verdict's text on stdout does not.
 void log_failure(const std::string& reason, const CommonOptions& common);
 
-/// A verdict: stable code, words, what to do. Words of options become flags.
-template <class Verdict>
-Json verdict_json(const Verdict& verdict) {
-  return {{"code", to_string(verdict.code)},
-          {"words", with_flags(verdict.words)},
-          {"to_do", with_flags(verdict.to_do)}};
-}
-
-/// The same as lines of text.
+/// A verdict as lines of text.
 template <class Verdict>
 void print_verdict(const Verdict& verdict) {
-  say("{}: {}\nwhat to do: {}\n", to_string(verdict.code), with_flags(verdict.words),
-      with_flags(verdict.to_do));
+  say("{}: {}\nwhat to do: {}\n", to_string(verdict.code), verdict.words, verdict.to_do);
 }
 
 }  // namespace risley::app

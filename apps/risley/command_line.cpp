@@ -60,6 +60,10 @@ constexpr Verb kVerbs[] = {
      "  risley cloud recording.lvx --calibration calibration/calibration.yaml -o cloud.las\n"
      "  risley cloud 'flight/*.lvx' --calibration mid-40 --format ply -o clouds/",
      declare_cloud},
+    {"compare", "Find out whether a unit has changed, from results of different days",
+     "  risley compare march/ june/ november/\n"
+     "  risley compare march/calibration.yaml november/calibration.yaml -o changes.html",
+     declare_compare},
     {"identify", "Identify the prisms that made a scan, from its directions alone",
      "  risley identify sequence.csv -o mine.yaml\n"
      "  risley identify frame.pcd --shot-rate-hz 240385 --json",

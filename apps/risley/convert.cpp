@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 #include <set>
+#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
@@ -81,13 +82,9 @@ FileOutcome convert_poses(const FileJob& job, const ConvertOptions& options,
       {job.input, job.output, options.format, options.accuracy, options.topic}, progress);
   log_warnings(job.input, done.warnings);
   for (const std::string& words : done.left_out) spdlog::warn("{}: {}", job.output, words);
-  const Json json = {{"records", done.records},
-                     {"left_out", done.left_out},
-                     {"input_format", done.input_format},
-                     {"input", job.input},
-                     {"output", job.output},
-                     {"warnings", warnings_json(done.warnings)}};
-  return {kDone, json, fmt::format("{}: {} records", job.output, grouped(done.records))};
+  Json json = json::of(done);
+  json.update({{"input", job.input}, {"output", job.output}});
+  return {kDone, std::move(json), fmt::format("{}: {} records", job.output, grouped(done.records))};
 }
 
 /// Somebody who wants points has to take another verb.
@@ -126,25 +123,13 @@ FileOutcome convert(const FileJob& job, const ConvertOptions& options, const Pro
     spdlog::warn("{}: {} of {} observations have no place in this format and were left out",
                  job.output, done.left_out, done.observations);
   }
-  Json json = {{"observations", written},
-               {"left_out", done.left_out},
-               {"input_format", done.input_format},
-               {"input", job.input},
-               {"output", job.output},
-               {"time_uncertainty_s", done.time_uncertainty},
-               {"frame", nullptr},
-               {"slips", nullptr},
-               {"warnings", warnings_json(done.warnings)}};
-  if (done.choice) {
-    json["sensor_chosen_by"] = to_string(done.choice->chosen_by);
-    json["sensor"] = sensor_name(*done.choice);
-  }
+  Json json = with_status(json::of(done), done.damage);
+  json.update({{"input", job.input}, {"output", job.output}});
   if (done.damage) {
     spdlog::error("{}; the {} observations before it are saved in {}", done.damage->what(), written,
                   job.output);
-    json.update(damage_json(*done.damage));
   }
-  return {done.damage ? kBadFile : kDone, json,
+  return {done.damage ? kBadFile : kDone, std::move(json),
           fmt::format("{}: {} observations", job.output, grouped(written))};
 }
 

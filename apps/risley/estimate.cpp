@@ -14,7 +14,6 @@
 #include "risley/report/estimate_report.hpp"
 
 #include "command.hpp"
-#include "observability_text.hpp"
 #include "option_names.hpp"
 #include "parameter_choice.hpp"
 #include "reading_options.hpp"
@@ -73,151 +72,6 @@ jobs::EstimateRecordingOptions job_of(const EstimateCommandOptions& options,
     return report_texts(report::estimate_report(outcome));
   };
   return job;
-}
-
-Json moments_json(const estimation::Moments& moments) {
-  return {{"mean", degrees_from_radians(moments.mean)},
-          {"std", degrees_from_radians(moments.std)},
-          {"rms", degrees_from_radians(moments.rms)},
-          {"skewness", moments.skewness},
-          {"kurtosis", moments.kurtosis}};
-}
-
-Json evaluation_json(const Evaluation& evaluation, TrainShape shape) {
-  Json parameters = Json::object();
-  for (const estimation::TruthComparison& one : evaluation.parameters) {
-    parameters[one.name] = {{"true", in_file_unit(one.name, one.truth, shape)},
-                            {"error", in_file_unit(one.name, one.error, shape)},
-                            {"error_over_sigma", one.error_over_sigma}};
-  }
-  const auto by_prism = [](const std::vector<double>& values, double scale) {
-    Json object = Json::object();
-    for (std::size_t i = 0; i < values.size(); ++i) {
-      object[std::string(1, prism_letter(static_cast<int>(i)))] = scale * values[i];
-    }
-    return object;
-  };
-  return {
-      {"parameters", parameters},
-      {"rotation_angle_rmse_deg", by_prism(evaluation.rotation_angle_rmse, kDegreesPerRadian)},
-      {"rotation_angle_rmse_over_sigma", by_prism(evaluation.rotation_angle_rmse_over_sigma, 1.0)},
-      {"angular_velocity_rmse_deg_per_s",
-       by_prism(evaluation.angular_velocity_rmse, kDegreesPerRadian)},
-      {"angular_velocity_rmse_over_sigma",
-       by_prism(evaluation.angular_velocity_rmse_over_sigma, 1.0)},
-      {"nees_parameters", evaluation.nees_parameters},
-      {"nees_rotation_angles", evaluation.nees_rotation_angles}};
-}
-
-Json start_json(const estimation::Start& start) {
-  Json angles = Json::object(), speeds = Json::object();
-  for (std::size_t i = 0; i < start.rotation_angle.size(); ++i) {
-    const std::string letter(1, prism_letter(static_cast<int>(i)));
-    angles[letter] = degrees_from_radians(start.rotation_angle[i]);
-    speeds[letter] = degrees_from_radians(start.angular_velocity[i]);
-  }
-  return {{"time_ns", start.time_ns},
-          {"rotation_angle_deg", angles},
-          {"angular_velocity_deg_per_s", speeds},
-          {"residual_rms_deg", degrees_from_radians(start.residual_rms)}};
-}
-
-/// What rotors say of the clock, and the shot rate with which they would turn as usual.
-Json shot_clock_json(const EstimatedRecording& outcome) {
-  if (!outcome.estimate.speed_factor) return nullptr;
-  const estimation::SpeedFactor& factor = *outcome.estimate.speed_factor;
-  Json clock = {{"speed_factor", {{"value", factor.value}, {"sigma", factor.sigma}}},
-                {"shot_rate_hz", nullptr}};
-  const double rate = outcome.recording.header.counted_rate;
-  if (rate > 0) clock["shot_rate_hz"] = rate / factor.value;
-  return clock;
-}
-
-/// Parameters of the prisms that the estimation did not touch.
-Json fixed_json(const Estimate& estimate) {
-  std::vector<int> free_places;
-  for (const estimation::FreeParameter& free : estimate.free) {
-    free_places.insert(free_places.end(), free.places.begin(), free.places.end());
-  }
-  Json object = Json::object();
-  for (const ParameterInfo& info : parameter_list(estimate.sensor.shape())) {
-    if (info.kind != ParameterKind::train || info.places.size() > 1) continue;
-    if (std::find(free_places.begin(), free_places.end(), info.places.front()) !=
-        free_places.end()) {
-      continue;
-    }
-    object[info.name] = estimate.sensor.get(info.name) / info.si_per_unit;
-  }
-  return object;
-}
-
-Json outcome_json(const EstimatedRecording& outcome, double total_time) {
-  const Estimate& e = outcome.estimate;
-  const TrainShape shape = e.sensor.shape();
-  Json parameters = Json::object();
-  for (const estimation::EstimatedValue& value : e.values) {
-    parameters[value.name] = {
-        {"value", in_file_unit(value.name, value.value, shape)},
-        {"sigma", in_file_unit(value.name, value.sigma, shape)},
-        {"sigma_given_held", in_file_unit(value.name, value.sigma_given_held, shape)}};
-  }
-  Json rotors = Json::array(), jerks = Json::array(), unobservable = Json::array();
-  for (const estimation::RotorProcess& process : e.rotor_process) {
-    rotors.push_back(degrees_from_radians(process.acceleration));
-    jerks.push_back(degrees_from_radians(process.jerk));
-  }
-  Json uneven = Json::object();
-  for (std::size_t k = 0; k < e.residuals_over_angle.size(); ++k) {
-    uneven[std::string(1, prism_letter(static_cast<int>(k)))] =
-        e.residuals_over_angle[k].chi2_per_bin;
-  }
-  for (const estimation::WeakDirection& weak : e.unobservable) {
-    unobservable.push_back(weak_direction_json(weak));
-  }
-  std::vector<std::string> warnings = outcome.warnings;
-  warnings.insert(warnings.end(), e.warnings.begin(), e.warnings.end());
-  Json object = {
-      {"serial", outcome.recording.serial()},
-      {"verdict", verdict_json(e.verdict)},
-      {"converged", e.converged},
-      {"reason", e.reason},
-      {"method", to_string(e.method)},
-      {"observations_used", e.series.size() - e.unused_shots},
-      {"outliers", e.outliers},
-      {"combination", nullptr},
-      {"mirrored", e.mirrored},
-      {"parameters", parameters},
-      {"fixed", fixed_json(e)},
-      {"residuals",
-       {{"azimuth_deg", moments_json(e.azimuth_moments)},
-        {"zenith_deg", moments_json(e.zenith_moments)},
-        {"expected_rms_deg", degrees_from_radians(e.expected_residual)}}},
-      {"noise",
-       {{"azimuth_deg", value_json(e.noise.value.azimuth, e.noise.sigma.azimuth)},
-        {"zenith_deg", value_json(e.noise.value.zenith, e.noise.sigma.zenith)},
-        {"held", e.noise_held}}},
-      {"frame", frame_json(e.frame_turn)},
-      {"slips", slips_json(outcome.recording.header.slips)},
-      {"shot_clock", shot_clock_json(outcome)},
-      {"coordinates", to_string(e.coordinates)},
-      {"process_noise_deg_per_s_per_sqrt_s", rotors},
-      {"process_jerk_deg_per_s2_per_sqrt_s", jerks},
-      {"unobservable", unobservable},
-      {"residuals_over_angle_chi2_per_bin", uneven},
-      {"start", start_json(e.start)},
-      {"warnings", warnings},
-      {"seconds",
-       {{"read", outcome.reading_time}, {"solve", outcome.solving_time}, {"total", total_time}}}};
-  object.update(choice_json(outcome.choice));
-  object["iterations"] = e.iterations;
-  object["residuals"]["autocorrelation"] =
-      e.autocorrelation.rho.empty() ? 0.0 : e.autocorrelation.rho.front();
-  object["residuals"]["autocorrelation_factor"] = e.autocorrelation.factor;
-  object["residuals"]["unit_variance"] = e.unit_variance;
-  object["residuals"]["variance_factor"] = e.variance_factor;
-  if (e.sensor.combination) object["combination"] = *e.sensor.combination;
-  if (outcome.evaluation) object["truth"] = evaluation_json(*outcome.evaluation, shape);
-  return object;
 }
 
 void print_noise(const Estimate& e) {
@@ -300,13 +154,14 @@ void print_outcome(const EstimatedRecording& outcome) {
 }
 
 ExitStatus run_estimate(const EstimateCommandOptions& options, const CommonOptions& common) {
-  const double started = now();
   EstimatedRecording outcome;
   {
     ProgressBar bar("estimating", common);
     outcome = jobs::estimate_recording(job_of(options, common), bar.progress());
   }
   put_flags(outcome.warnings);
+  put_flags(outcome.choice.warnings);
+  put_flags(outcome.estimate.verdict);
   const Estimate& e = outcome.estimate;
   spdlog::debug(
       "{} observations of format {}, {} without a direction, {} out of order; {} shots used "
@@ -318,7 +173,7 @@ ExitStatus run_estimate(const EstimateCommandOptions& options, const CommonOptio
   for (const std::string& warning : e.warnings) spdlog::warn(warning);
   if (!e.converged) log_failure(e.reason, common);
   if (common.json) {
-    print_json(common, outcome_json(outcome, now() - started), outcome.provenance);
+    print_json(common, json::of(outcome), outcome.provenance);
   } else {
     print_outcome(outcome);
   }

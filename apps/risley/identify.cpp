@@ -1,6 +1,5 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-#include <algorithm>
 #include <cmath>
 #include <memory>
 #include <string>
@@ -10,6 +9,7 @@
 
 #include "risley/core/angle.hpp"
 #include "risley/core/number_text.hpp"
+#include "risley/identification/fitted_values.hpp"
 #include "risley/jobs/identify_recording.hpp"
 
 #include "command.hpp"
@@ -33,95 +33,6 @@ struct IdentifyCommandOptions {
   ReadingWishes reading;
 };
 
-/// What a hypothesis says of a parameter, in the unit of files; sigmas NaN where it has none.
-struct FittedValue {
-  std::string name, unit;
-  double value = 0, sigma = 0, sigma_given_held = 0;
-};
-
-std::vector<FittedValue> values_of(const Hypothesis& hypothesis) {
-  const identification::TrainFit& fit = hypothesis.fit;
-  const TrainShape shape = hypothesis.train().shape();
-  std::vector<FittedValue> values;
-  for (const ParameterInfo& info : parameter_list(shape)) {
-    if (info.kind == ParameterKind::train && info.places.size() > 1) continue;
-    double value = 0;
-    const int place = info.places.front();
-    const identification::RotorCurves& rotors = fit.model.rotors;
-    if (info.kind == ParameterKind::train) {
-      value = hypothesis.train()[place];
-    } else if (info.kind == ParameterKind::angular_velocity) {
-      value = rotors.mean_angular_velocity(place);
-    } else {
-      value = wrap_to_pi(rotors.angle(place, rotors.begin));
-    }
-    const auto at = std::find(fit.names.begin(), fit.names.end(), info.name);
-    const auto row = static_cast<Eigen::Index>(at - fit.names.begin());
-    // What was held at zero is no answer.
-    if (at == fit.names.end() && info.kind == ParameterKind::train && value == 0) continue;
-    const auto sigma = [&](const Eigen::MatrixXd& covariance) {
-      if (row >= covariance.rows()) return std::nan("");
-      return std::sqrt(std::max(0.0, covariance(row, row))) / info.si_per_unit;
-    };
-    values.push_back({info.name, info.unit, value / info.si_per_unit,
-                      sigma(hypothesis.total_covariance), sigma(fit.covariance)});
-  }
-  return values;
-}
-
-Json hypothesis_json(const identification::Identification& found, const Hypothesis& hypothesis) {
-  Json parameters = Json::object(), equivalent = Json::array(), lags = Json::array();
-  for (const FittedValue& one : values_of(hypothesis)) {
-    parameters[one.name] = {{"value", one.value},
-                            {"sigma", number_or_null(one.sigma)},
-                            {"sigma_given_held", number_or_null(one.sigma_given_held)}};
-  }
-  for (const std::size_t other : hypothesis.equivalent_to) {
-    equivalent.push_back(to_string(found.hypotheses[other].train().face_order()));
-  }
-  for (const double lag : hypothesis.fit.model.lag) lags.push_back(lag);
-  const estimation::FrameTurn& frame = hypothesis.fit.model.frame;
-  return {{"faces", to_string(hypothesis.train().face_order())},
-          {"parameters", parameters},
-          {"rms_deg", degrees_from_radians(hypothesis.fit.rms)},
-          {"chi2_excess", hypothesis.excess},
-          {"equivalent_to", equivalent},
-          {"emitter_lags_s", lags},
-          {"frame",
-           {{"yaw_deg", degrees_from_radians(frame.yaw)},
-            {"pitch_deg", degrees_from_radians(frame.pitch)}}},
-          {"observations_used", hypothesis.fit.shots},
-          {"outliers", hypothesis.fit.outliers}};
-}
-
-Json outcome_json(const IdentifiedRecording& outcome) {
-  const identification::Identification& found = outcome.identification;
-  Json hypotheses = Json::array(), lines = Json::array();
-  for (const Hypothesis& one : found.hypotheses) hypotheses.push_back(hypothesis_json(found, one));
-  for (const identification::Line& line : found.spectrum.lines) {
-    lines.push_back({{"frequency_hz", line.angular_velocity / kTwoPi},
-                     {"amplitude", std::abs(line.amplitude)}});
-  }
-  Json object = {
-      {"hypotheses", hypotheses},
-      {"verdict",
-       {{"code", to_string(outcome.verdict)}, {"words", outcome.words}, {"to_do", outcome.to_do}}},
-      {"preset", nullptr},
-      {"mirrored", outcome.like_mirrored},
-      {"emitters", found.emitters},
-      {"emitters_named", found.emitters_named},
-      {"timing", to_string(found.timing)},
-      {"decimation", outcome.sensor.decimation},
-      {"shot_rate_hz", outcome.sensor.sensor.shot_rate},
-      {"rotor_segments_s", found.motion.length},
-      {"lines", lines},
-      {"unobservable", outcome.unobservable},
-      {"warnings", outcome.warnings},
-      {"seconds", {{"read", outcome.reading_time}, {"solve", outcome.solving_time}}}};
-  if (!outcome.like.empty()) object["preset"] = outcome.like;
-  return object;
-}
-
 void print_outcome(const IdentifiedRecording& outcome) {
   const identification::Identification& found = outcome.identification;
   say("{}: {}\n", to_string(outcome.verdict), outcome.words);
@@ -137,7 +48,7 @@ void print_outcome(const IdentifiedRecording& outcome) {
           ? ", the shots of a round share the rotors' position"
           : ", at uneven times");
   Table parameters({"parameter", "value", "+- sigma", "unit"});
-  for (const FittedValue& one : values_of(found.best())) {
+  for (const identification::FittedValue& one : identification::fitted_values(found.best())) {
     if (std::isfinite(one.sigma) && one.sigma > 0) {
       const NumberText text = number_text(one.value, one.sigma);
       parameters.add({one.name, text.value, text.sigma, one.unit});
@@ -192,7 +103,7 @@ ExitStatus run_identify(const IdentifyCommandOptions& options, const CommonOptio
                  outcome.words);
   }
   if (common.json) {
-    print_json(common, outcome_json(outcome), outcome.sensor.sensor.provenance);
+    print_json(common, json::of(outcome), outcome.sensor.sensor.provenance);
   } else {
     print_outcome(outcome);
   }

@@ -1,6 +1,5 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-#include <array>
 #include <memory>
 #include <optional>
 #include <string>
@@ -37,87 +36,11 @@ struct InfoCommandOptions {
   ReadingWishes reading;
 };
 
-Json range_json(const std::optional<ValueRange>& range, double scale) {
-  if (!range) return {{"min", nullptr}, {"max", nullptr}};
-  return {{"min", range->min * scale}, {"max", range->max * scale}};
-}
-
 std::string range_text(const std::optional<ValueRange>& range, double scale, int decimals,
                        std::string_view unit) {
   if (!range) return "none";
   return fmt::format("{:.{}f} to {:.{}f} {}", range->min * scale, decimals, range->max * scale,
                      decimals, unit);
-}
-
-/// YAW,PITCH,ROLL as --extrinsics takes them.
-std::array<double, 3> yaw_pitch_roll_deg(const recordings::Extrinsics& pose) {
-  return {degrees_from_radians(pose.yaw), degrees_from_radians(pose.pitch),
-          degrees_from_radians(pose.roll)};
-}
-
-Json devices_json(const recordings::RecordingHeader& header, const TimeAuditResult& audit) {
-  Json devices = Json::array();
-  for (std::size_t i = 0; i < header.devices.size(); ++i) {
-    const recordings::Device& device = header.devices[i];
-    const auto pose = recordings::stored_extrinsics(device);
-    devices.push_back(
-        {{"type", recordings::device_type_name(device.type)},
-         {"serial", device.serial},
-         {"hub_serial", device.hub_serial},
-         {"extrinsics_deg", pose ? Json(yaw_pitch_roll_deg(*pose)) : Json()},
-         {"translation_m",
-          pose ? Json({pose->translation.x, pose->translation.y, pose->translation.z}) : Json()},
-         {"observations", i < audit.rows_by_device.size() ? audit.rows_by_device[i] : 0}});
-  }
-  return devices;
-}
-
-/// Counts by number, the empty ones left out.
-template <class Counts>
-Json counts_json(const Counts& counts) {
-  Json object = Json::object();
-  for (std::size_t i = 0; i < counts.size(); ++i) {
-    if (counts[i] > 0) object[std::to_string(i)] = counts[i];
-  }
-  return object;
-}
-
-Json audit_json(const InspectedRecording& found) {
-  const recordings::RecordingHeader& header = found.header;
-  const TimeAuditResult& audit = found.audit;
-  const auto if_times = [&header](auto value) { return header.has_times ? Json(value) : Json(); };
-  return {{"format", header.format},
-          {"sensor", found.choice ? sensor_name(*found.choice) : sensor_name(header)},
-          {"observations", audit.observations},
-          {"shots", audit.shots},
-          {"no_return", audit.no_return},
-          {"has_times", header.has_times},
-          {"duration_s", if_times(audit.duration_s)},
-          {"rate_hz", if_times(audit.rate_hz)},
-          {"has_range", header.has_range},
-          {"has_intensity", header.has_intensity},
-          {"cartesian", header.cartesian},
-          {"time_reference", to_string(header.time_reference)},
-          {"first_time_ns", if_times(audit.first_time_ns)},
-          {"last_time_ns", if_times(audit.last_time_ns)},
-          {"gaps", audit.gaps.count},
-          {"gaps_total_s", if_times(audit.gaps.total_s)},
-          {"largest_gap_s", if_times(audit.gaps.largest_s)},
-          {"largest_gap_after_ns", if_times(audit.gaps.largest_after_ns)},
-          {"time_resets", audit.time_resets},
-          {"time_uncertainty_s", if_times(found.time_uncertainty)},
-          {"non_monotonic_packets", audit.non_monotonic_packets},
-          {"pps_wraps", audit.pps_wraps},
-          {"azimuth_deg", range_json(audit.azimuth, kDegreesPerRadian)},
-          {"zenith_deg", range_json(audit.zenith, kDegreesPerRadian)},
-          {"range_m", range_json(audit.range, 1.0)},
-          {"returns", counts_json(audit.rows_by_return_number)},
-          {"packets_by_data_type", counts_json(audit.packets_by_data_type)},
-          {"imu_samples", audit.imu},
-          {"devices", devices_json(header, audit)},
-          {"frame", nullptr},
-          {"slips", nullptr},
-          {"warnings", warnings_json(found.warnings)}};
 }
 
 void print_audit(const InspectedRecording& found) {
@@ -126,7 +49,7 @@ void print_audit(const InspectedRecording& found) {
   Table table;
   table.add({"format", header.format});
   if (found.choice) {
-    const std::string name = sensor_name(*found.choice);
+    const std::string name = jobs::sensor_name(*found.choice);
     table.add(
         {"sensor", fmt::format("{}, {}{}", name,
                                found.choice->chosen_by == jobs::ChosenBy::guess && name != "unknown"
@@ -134,7 +57,7 @@ void print_audit(const InspectedRecording& found) {
                                    : "",
                                found.choice->words)});
   } else {
-    table.add({"sensor", sensor_name(header)});
+    table.add({"sensor", jobs::sensor_name(header)});
   }
   table.add({"observations", grouped(audit.observations)});
   if (audit.shots != audit.observations) table.add({"shots", grouped(audit.shots)});
@@ -175,43 +98,12 @@ void print_audit(const InspectedRecording& found) {
   table.print();
 }
 
-/// What an excerpt holds, and what of a recording it does not.
-struct ExcerptContents {
-  std::vector<std::string> holds, lacks;
-};
-
-ExcerptContents contents_of(const Excerpt& excerpt) {
-  ExcerptContents contents;
-  contents.holds = {excerpt.rounded ? "directions and their resolution, rounded" : "directions",
-                    excerpt.has_times ? "times from 0" : "shot numbers from 0",
-                    "shots without return in their places", "return numbers, tags and beams",
-                    "the type of the sensor and the format of the recording"};
-  contents.lacks = {"serial numbers",   "date and time of day", "file names",    "intensities",
-                    "inertial samples", "extrinsics",           "packet headers"};
-  auto& ranges = excerpt.has_ranges ? contents.holds : contents.lacks;
-  ranges.insert(ranges.begin() + 1, "ranges");
-  return contents;
-}
-
-Json excerpt_json(const std::string& path, const Excerpt& excerpt) {
-  const ExcerptContents contents = contents_of(excerpt);
-  return {{"output", path},
-          {"observations", excerpt.observations},
-          {"shots", excerpt.shots},
-          {"no_return", excerpt.no_return},
-          {"duration_s", excerpt.has_times ? Json(excerpt.duration) : Json()},
-          {"has_range", excerpt.has_ranges},
-          {"rounded", excerpt.rounded},
-          {"holds", contents.holds},
-          {"does_not_hold", contents.lacks}};
-}
-
-void print_excerpt(const std::string& path, const Excerpt& excerpt) {
-  const ExcerptContents contents = contents_of(excerpt);
+void print_excerpt(const Excerpt& excerpt) {
+  const recordings::ExcerptContents contents = contents_of(excerpt);
   const std::string duration =
       excerpt.has_times ? fmt::format(" in {:.6g} s", excerpt.duration) : "";
-  say("\n{}: {} shots{}, {} observations without return\n", path, grouped(excerpt.shots), duration,
-      grouped(excerpt.no_return));
+  say("\n{}: {} shots{}, {} observations without return\n", excerpt.path, grouped(excerpt.shots),
+      duration, grouped(excerpt.no_return));
   say("  holds: {}\n  does not hold: {}\n", fmt::join(contents.holds, "; "),
       fmt::join(contents.lacks, "; "));
   if (excerpt.rounded) {
@@ -231,7 +123,7 @@ ExitStatus run_trajectory_info(const InfoCommandOptions& options, const CommonOp
   }
   log_warnings(options.input, found.warnings);
   if (common.json) {
-    print_json(common, trajectory_json(found));
+    print_json(common, json::of(found));
   } else {
     print_trajectory(found);
   }
@@ -261,20 +153,17 @@ ExitStatus run_info(const InfoCommandOptions& options, const CommonOptions& comm
   }
   log_warnings(options.input, found.warnings);
   if (found.choice) {
+    put_flags(found.choice->warnings);
     for (const std::string& warning : found.choice->warnings) {
-      spdlog::warn("{}: {}", options.input, with_flags(warning));
+      spdlog::warn("{}: {}", options.input, warning);
     }
   }
   if (found.damage) spdlog::error(found.damage->what());
   if (common.json) {
-    Json object = audit_json(found);
-    if (found.choice) object.update(choice_json(*found.choice));
-    if (found.excerpt) object["excerpt"] = excerpt_json(options.share, *found.excerpt);
-    if (found.damage) object.update(damage_json(*found.damage));
-    print_json(common, object);
+    print_json(common, with_status(json::of(found), found.damage));
   } else {
     print_audit(found);
-    if (found.excerpt) print_excerpt(options.share, *found.excerpt);
+    if (found.excerpt) print_excerpt(*found.excerpt);
   }
   return found.damage ? kBadFile : kDone;
 }

@@ -11,4 +11,12 @@ namespace risley::app {
 std::string with_flags(const std::string& text);
 void put_flags(std::vector<std::string>& texts);
 
+/// The same in what a verdict says and what follows from it.
+template <class Verdict>
+requires requires(Verdict verdict) { verdict.to_do; }
+void put_flags(Verdict& verdict) {
+  verdict.words = with_flags(verdict.words);
+  verdict.to_do = with_flags(verdict.to_do);
+}
+
 }  // namespace risley::app

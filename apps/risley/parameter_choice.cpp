@@ -2,6 +2,9 @@
 // SPDX-License-Identifier: MIT
 #include "parameter_choice.hpp"
 
+#include <fmt/format.h>
+
+#include "risley/core/error.hpp"
 #include "risley/optics/parameters.hpp"
 
 namespace risley::app {
@@ -22,20 +25,34 @@ void add_parameter_choice(CLI::App& verb, ParameterWishes& wishes) {
       ->take_all();
 }
 
+std::pair<std::string, double> assignment(const std::string& text) {
+  const std::size_t equals = text.find('=');
+  if (equals == std::string::npos || equals == 0) {
+    throw InvalidArgument(fmt::format("'{}', expected NAME=VALUE", text));
+  }
+  const std::string name = text.substr(0, equals);
+  double value = number_from(text.substr(equals + 1), name);
+  if (const ParameterInfo* known = find_parameter_of_any_train(name)) value *= known->si_per_unit;
+  return {name, value};
+}
+
 jobs::HeldParameters held_parameters(const std::vector<std::string>& fixed) {
   jobs::HeldParameters held;
   for (const std::string& text : fixed) {
     if (text.find('=') == std::string::npos) {
       held.emplace_back(text, std::nullopt);
-      continue;
+    } else {
+      held.emplace_back(assignment(text));
     }
-    const auto assignment = split_assignment(text);
-    const std::string& name = assignment.first;
-    double value = assignment.second;
-    if (const ParameterInfo* known = find_parameter_of_any_train(name)) value *= known->si_per_unit;
-    held.emplace_back(name, value);
   }
   return held;
+}
+
+jobs::ParameterValues parameter_values(const std::vector<std::string>& assignments) {
+  jobs::ParameterValues values;
+  values.reserve(assignments.size());
+  for (const std::string& text : assignments) values.push_back(assignment(text));
+  return values;
 }
 
 }  // namespace risley::app

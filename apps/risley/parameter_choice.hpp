@@ -3,9 +3,11 @@
 #pragma once
 
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "risley/jobs/sensor_choice.hpp"
+#include "risley/jobs/simulation_settings.hpp"
 
 #include "command.hpp"
 
@@ -19,7 +21,12 @@ struct ParameterWishes {
 /// Declares --fix and --free.
 void add_parameter_choice(CLI::App& verb, ParameterWishes& wishes);
 
+/// NAME=VALUE, the value in SI units where the name is known. @throws InvalidArgument
+std::pair<std::string, double> assignment(const std::string& text);
+
 /// NAME and NAME=VALUE as jobs take them; they refuse unknown names. @throws InvalidArgument
 jobs::HeldParameters held_parameters(const std::vector<std::string>& fixed);
+/// The same of NAME=VALUE alone.
+jobs::ParameterValues parameter_values(const std::vector<std::string>& assignments);
 
 }  // namespace risley::app

@@ -27,9 +27,6 @@
 namespace risley::app {
 namespace {
 
-constexpr int kShares[] = {50, 90, 99};  // of the field of view, percent
-constexpr double kSquareDegree = kRadiansPerDegree * kRadiansPerDegree;  // sr
-
 struct PatternOptions {
   std::string sensor = "mid-40-sequence", format, output, firing, report;
   double duration_s = 1.0;
@@ -63,40 +60,6 @@ sensors::ScanPatternOptions scan_options(const PatternOptions& options) {
   return scan;
 }
 
-Json coverage_json(const sensors::PatternCoverage& coverage) {
-  Json after = Json::array();
-  for (const sensors::CoverageAfter& one : coverage.after) {
-    Json rings = Json::array();
-    for (const double density : one.ring_density) rings.push_back(density * kSquareDegree);
-    after.push_back({{"time_s", one.time},
-                     {"shots", one.shots},
-                     {"covered", one.covered},
-                     {"density_per_deg2",
-                      {{"mean", one.mean_density * kSquareDegree},
-                       {"min", one.least_density * kSquareDegree},
-                       {"max", one.greatest_density * kSquareDegree}}},
-                     {"density_per_sr", {{"mean", one.mean_density}}},
-                     {"gap_deg", degrees_from_radians(one.gap)},
-                     {"gap_at",
-                      {{"azimuth_deg", degrees_from_radians(one.gap_azimuth)},
-                       {"zenith_deg", degrees_from_radians(one.gap_zenith)}}},
-                     {"ring_density_per_deg2", rings}});
-  }
-  Json covers = Json::object();
-  for (const int percent : kShares) {
-    covers[fmt::format("{}", percent)] = coverage.time_to_cover(0.01 * percent);
-  }
-  return {{"cell_deg", degrees_from_radians(coverage.cell)},
-          {"ring_deg", degrees_from_radians(coverage.ring)},
-          {"field_of_view",
-           {{"after_s", coverage.field_after},
-            {"deg2", coverage.field_solid_angle / kSquareDegree},
-            {"sr", coverage.field_solid_angle},
-            {"half_angle_deg", degrees_from_radians(coverage.field_half_angle)}}},
-          {"time_to_cover_s", covers},
-          {"after", after}};
-}
-
 void print_coverage(const sensors::PatternCoverage& coverage) {
   say("field of view {:.5g} square degrees within {:.2f} degree of the axis\n",
       coverage.field_solid_angle / kSquareDegree, degrees_from_radians(coverage.field_half_angle));
@@ -111,7 +74,7 @@ void print_coverage(const sensors::PatternCoverage& coverage) {
                fmt::format("{:.3f}", degrees_from_radians(one.gap))});
   }
   table.print();
-  for (const int percent : kShares) {
+  for (const int percent : sensors::kToldShares) {
     const double time = coverage.time_to_cover(0.01 * percent);
     if (std::isfinite(time)) say("{} % covered after {:.3g} s\n", percent, time);
   }
@@ -134,27 +97,6 @@ void print_written(const jobs::WrittenPattern& written, const std::string& outpu
         written.helios->time_lag < 0 ? '-' : '+', std::abs(written.helios->time_lag));
   }
   for (const std::string& one : written.not_carried) say("not carried: {}\n", one);
-}
-
-Json written_json(const jobs::WrittenPattern& written, const std::string& output) {
-  Json json = {{"rows", written.rows},
-               {"blocked", written.blocked},
-               {"sensor", written.sensor},
-               {"format", written.format},
-               {"firing", written.firing},
-               {"output", output},
-               {"not_carried", written.not_carried}};
-  if (written.helios) {
-    json["residual"] = {{"rms_deg", degrees_from_radians(written.helios->rms)},
-                        {"worst_deg", degrees_from_radians(written.helios->worst)},
-                        {"shots", written.helios->compared},
-                        {"time_lag_s", written.helios->time_lag},
-                        {"turn_deg",
-                         {{"y", degrees_from_radians(written.helios->turn[0])},
-                          {"x", degrees_from_radians(written.helios->turn[1])},
-                          {"z", degrees_from_radians(written.helios->turn[2])}}}};
-  }
-  return json;
 }
 
 ExitStatus run_pattern(const PatternOptions& options, const CommonOptions& common) {
@@ -202,11 +144,11 @@ ExitStatus run_pattern(const PatternOptions& options, const CommonOptions& commo
   }
   if (common.json) {
     if (written) {
-      json = written_json(*written, options.output);
+      json = json::of(*written);
     } else {
       json = {{"rows", details->coverage.after.back().shots}, {"sensor", details->sensor.name}};
     }
-    if (details) json["coverage"] = coverage_json(details->coverage);
+    if (details) json["coverage"] = json::of(details->coverage);
     if (!options.report.empty()) json["html"] = options.report;
     print_json(common, json);
     return kDone;

@@ -11,9 +11,6 @@
 
 namespace risley::app {
 
-/// Whether a file to plan for is a flight, and not a scene of walls. @throws FileError
-bool is_flight_plan(const std::string& path);
-
 /// @param options   without what the files hold
 /// @param plan      file
 /// @param platform  mount and the errors of the trajectory; nothing else may be given

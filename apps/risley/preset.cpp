@@ -24,20 +24,12 @@ struct PresetOptions {
   std::vector<std::string> files;
 };
 
-Json facts_json(const sensors::Sensor& sensor) {
-  return {{"name", sensor.name},
-          {"model", sensor.model},
-          {"face_order", to_string(sensor.train.face_order())},
-          {"prisms", sensor.prisms()},
-          {"emitters", sensor.train.emitters()}};
-}
-
 ExitStatus list_presets(const CommonOptions& common) {
   Json presets = Json::array();
   Table table({"preset", "model", "faces", "emitters"});
   for (const std::string& name : sensors::builtin_preset_names()) {
     const sensors::Sensor sensor = sensors::load_sensor(name);
-    presets.push_back(facts_json(sensor));
+    presets.push_back(json::of(sensor));
     table.add({name, sensor.model, to_string(sensor.train.face_order()),
                fmt::format("{}", sensor.train.emitters())});
   }
@@ -55,7 +47,7 @@ ExitStatus hand_out(const std::string& text, const PresetOptions& options,
   require_apart(common, {options.output});
   if (!options.output.empty()) io::write_text_file(options.output, text);
   if (common.json) {
-    Json json = facts_json(sensors::parse_preset(text, options.name));
+    Json json = json::of(sensors::parse_preset(text, options.name));
     json["text"] = text;
     if (!options.output.empty()) json["output"] = options.output;
     print_json(common, json);
@@ -73,7 +65,7 @@ ExitStatus check_presets(const PresetOptions& options, const CommonOptions& comm
   for (const std::string& file : options.files) {
     try {
       const sensors::Sensor sensor = sensors::parse_preset(io::read_text_file(file), file);
-      Json json = facts_json(sensor);
+      Json json = json::of(sensor);
       json.update({{"input", file}, {"status", kDone}, {"message", ""}});
       results.push_back(json);
       if (!common.json) {

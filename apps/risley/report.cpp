@@ -11,11 +11,9 @@
 #include "risley/core/error.hpp"
 #include "risley/io/text_file.hpp"
 #include "risley/jobs/compare_results.hpp"
-#include "risley/optics/parameters.hpp"
 #include "risley/report/comparison_page.hpp"
 #include "risley/report/report_file.hpp"
 
-#include "calibration_text.hpp"
 #include "command.hpp"
 #include "result_folder.hpp"
 
@@ -82,12 +80,9 @@ ExitStatus report_two(const std::string& a, const std::string& b, const std::str
     const double unit = in_metres ? 1 : find_parameter(one.name, c.b.shape()).si_per_unit;
     differences[one.name] = {{"value", one.difference / unit}, {"sigma", one.sigma / unit}};
   }
-  return write_page(page, html,
-                    {{"verbs", {report::verb_of(report_a), report::verb_of(report_b)}},
-                     {"same_unit", c.same_unit},
-                     {"directions", pointing_json(c.beams)},
-                     {"differences", differences}},
-                    common);
+  Json facts{{"verbs", {report::verb_of(report_a), report::verb_of(report_b)}}};
+  facts.update(json::of(c));
+  return write_page(page, html, facts, common);
 }
 
 }  // namespace

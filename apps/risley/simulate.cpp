@@ -1,28 +1,21 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-#include <algorithm>
-#include <cmath>
 #include <cstdint>
 #include <memory>
 #include <optional>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
 #include "risley/core/angle.hpp"
-#include "risley/core/error.hpp"
-#include "risley/sensors/preset.hpp"
+#include "risley/jobs/simulation_settings.hpp"
 #include "risley/simulation/truth_file.hpp"
-#include "risley/trajectories/error_process.hpp"
-#include "risley/trajectories/flight_plan.hpp"
-#include "risley/trajectories/mount.hpp"
 #include "risley/trajectories/trajectory_file.hpp"
 
 #include "command.hpp"
-#include "parameter_text.hpp"
+#include "parameter_choice.hpp"
 #include "recording_text.hpp"
 #include "table.hpp"
 
@@ -39,143 +32,59 @@ struct SimulateOptions {
   std::vector<double> start_angles_deg;
 };
 
-void assign(sensors::Sensor& sensor, const std::string& text) {
-  const auto [name, value] = parameter_assignment(text, sensor.shape());
-  if (find_parameter(name, sensor.shape()).kind == ParameterKind::rotation_angle) {
-    throw InvalidArgument(
-        fmt::format("{}: the rotation angles at the start are set by --start-angles-deg", name));
-  }
-  sensor.set(name, value);
-}
-
-/// What moves the sensor, of a trajectory or a flight plan and a mount; nothing where it stands.
-std::optional<simulation::Platform> platform_from(const SimulateOptions& options,
-                                                  const simulation::SimulationSettings& settings) {
-  const bool moves = !options.trajectory.empty() || !options.flight.empty();
-  if (!moves) {
-    const std::pair<bool, const char*> only_moving[] = {
-        {!options.mount.empty(), "--mount"},
-        {!options.trajectory_errors.empty(), "--trajectory-errors"},
-        {options.clock_drift_ppm.has_value(), "--clock-drift-ppm"},
-        {options.start_s.has_value(), "--start-s"},
-    };
-    for (const auto& [given, flag] : only_moving) {
-      if (given) throw InvalidArgument(fmt::format("{} needs --trajectory or --flight", flag));
-    }
-    return std::nullopt;
-  }
-  if (options.mount.empty()) {
-    throw InvalidArgument(
-        "--mount is missing: how the sensor sits on what moves along the trajectory");
-  }
-  if (options.scene.empty()) {
-    throw InvalidArgument(
-        "--scene is missing: what the moving sensor meets, for example a "
-        "terrain");
-  }
-  simulation::Platform platform;
-  if (!options.flight.empty()) {
-    const trajectories::FlightPlan plan = trajectories::load_flight_plan(options.flight);
-    trajectories::Flight flight = trajectories::fly(plan);
-    platform.trajectory = std::make_shared<trajectories::Trajectory>(std::move(flight.trajectory));
-    platform.strips = std::move(flight.strips);
-    const auto& terrain = settings.scene->terrain;
-    if (!terrain || !terrain->parts().origin) platform.map_origin = plan.origin;
-  } else {
-    platform.trajectory = std::make_shared<trajectories::Trajectory>(
-        trajectories::load_trajectory(options.trajectory, {}, options.topic));
-  }
-  platform.mount = trajectories::load_mount(options.mount);
-  platform.clock_drift = 1e-6 * options.clock_drift_ppm.value_or(0.0);
-  if (options.start_s) {
-    check_not_negative(*options.start_s, "--start-s", "s");
-    if (*options.start_s > 1e9) {
-      throw InvalidArgument(fmt::format("--start-s = {:g} s, allowed 0 to 1e9", *options.start_s));
-    }
-    platform.begin_ns = platform.trajectory->time_ns.front() +
-                        static_cast<std::int64_t>(std::llround(1e9 * *options.start_s));
-  }
-  if (!options.trajectory_errors.empty()) {
-    platform.errors = trajectories::load_error_model(options.trajectory_errors);
-  }
-  platform.trajectory_ending = "." + options.trajectory_format;
-  return platform;
-}
-
-simulation::SimulationSettings settings_from(const SimulateOptions& options,
-                                             const CommonOptions& common) {
+jobs::SimulationOptions job_of(const SimulateOptions& options, const CommonOptions& common) {
   if (options.duration_s) check_positive(*options.duration_s, "--duration-s", "s");
   if (options.rate_hz) check_positive(*options.rate_hz, "--rate-hz", "Hz");
   if (options.noise_angle_deg) {
     check_not_negative(*options.noise_angle_deg, "--noise-angle-deg", "deg");
   }
   if (options.noise_range_m) check_not_negative(*options.noise_range_m, "--noise-range-m", "m");
-  simulation::SimulationSettings settings;
-  settings.truth = sensors::load_sensor(options.sensor);
-  for (const std::string& text : options.assignments) assign(settings.truth, text);
-  if (options.beam_origin == "no") settings.truth.set_prism_geometry({});
-  if (!options.reported.empty()) {
-    settings.reported = settings.truth;
-    for (const std::string& text : options.reported) {
-      if (text == "nominal") {
-        settings.reported->train = settings.reported->train.without_errors();
-      } else {
-        assign(*settings.reported, text);
-      }
-    }
-  }
-  settings.rate = options.rate_hz;
-  if (options.noise_angle_deg) {
-    settings.angle_noise = radians_from_degrees(*options.noise_angle_deg);
-  }
-  settings.range_noise = options.noise_range_m;
-  settings.quantize = options.quantize == "yes";
-  settings.rotor = simulation::rotor_kind_from(options.rotor);
+  jobs::SimulationOptions job;
+  job.sensor = options.sensor;
+  job.set = parameter_values(options.assignments);
+  std::vector<std::string> believed = options.reported;
+  job.reported_nominal = std::erase(believed, "nominal") > 0;
+  job.reported = parameter_values(believed);
+  job.duration = options.duration_s;
+  job.rate = options.rate_hz;
+  if (options.noise_angle_deg) job.angle_noise = radians_from_degrees(*options.noise_angle_deg);
+  job.range_noise = options.noise_range_m;
+  job.quantize = options.quantize == "yes";
+  job.beam_origin = options.beam_origin == "yes";
+  job.rotor = simulation::rotor_kind_from(options.rotor);
   for (const double angle_deg : options.start_angles_deg) {
-    settings.start_angles.push_back(radians_from_degrees(angle_deg));
+    job.start_angles.push_back(radians_from_degrees(angle_deg));
   }
-  if (!options.scene.empty()) settings.scene = scenes::load_scene(options.scene);
-  settings.station = options.station;
-  settings.platform = platform_from(options, settings);
-  settings.duration = options.duration_s ? *options.duration_s
-                      : settings.platform
-                          ? std::max(1e-3, simulation::longest_duration(*settings.platform))
-                          : 1.0;
-  settings.seed = common.seed;
-  settings.threads = common.threads;
-  return settings;
+  job.scene = options.scene;
+  job.station = options.station;
+  job.trajectory = options.trajectory;
+  job.topic = options.topic;
+  job.flight = options.flight;
+  job.mount = options.mount;
+  job.trajectory_errors = options.trajectory_errors;
+  job.trajectory_ending = "." + options.trajectory_format;
+  job.start = options.start_s;
+  if (options.clock_drift_ppm) job.clock_drift = 1e-6 * *options.clock_drift_ppm;
+  job.seed = common.seed;
+  job.threads = common.threads;
+  return job;
 }
 
 double seconds(std::int64_t time_ns) { return 1e-9 * static_cast<double>(time_ns); }
 
-/// The true parameters and the rotation angles at the start.
-std::vector<NamedValue> true_values(const simulation::SimulationResult& result) {
-  std::vector<NamedValue> values = sensor_values(result.truth);
-  for (std::size_t i = 0; i < result.start_angles.size(); ++i) {
-    values.push_back({fmt::format("rotation_angle_{}_deg", prism_letter(static_cast<int>(i))),
-                      degrees_from_radians(result.start_angles[i]), "deg"});
-  }
-  return values;
-}
-
-void print_result(const SimulateOptions& options, const simulation::SimulationSettings& settings,
-                  const simulation::SimulationResult& result) {
-  say("{}: {} observations, {} without a return\n", options.output, grouped(result.observations),
+void print_result(const simulation::SimulationResult& result, bool with_errors) {
+  const std::string& output = result.files.front();
+  say("{}: {} observations, {} without a return\n", output, grouped(result.observations),
       grouped(result.no_return));
-  say("truth: {}, {}\n", simulation::truth_preset_path(options.output),
-      simulation::truth_columns_path(options.output));
-  if (settings.platform) {
-    const std::string trajectory =
-        simulation::trajectory_path(options.output, settings.platform->trajectory_ending);
-    say("       {}, {}\n", simulation::truth_trajectory_path(options.output),
-        simulation::truth_mount_path(options.output));
-    say("trajectory {}: {}\n", settings.platform->errors ? "with errors" : "without errors",
-        trajectory);
-    for (const std::string& what : result.left_out) say("{}: {}\n", trajectory, what);
-    if (!settings.platform->strips.empty()) {
-      say("strips: {}\n", simulation::strips_path(options.output));
+  say("truth: {}, {}\n", result.truth_files[0], result.truth_files[1]);
+  if (!result.trajectory.empty()) {
+    say("       {}, {}\n", result.truth_files[2], result.truth_files[3]);
+    say("trajectory {}: {}\n", with_errors ? "with errors" : "without errors", result.trajectory);
+    for (const std::string& what : result.left_out) say("{}: {}\n", result.trajectory, what);
+    if (!result.strips.empty()) {
+      say("strips: {}\n", simulation::strips_path(output));
       Table table({"strip", "begin", "end", "unit"});
-      for (const trajectories::StripTimes& strip : settings.platform->strips) {
+      for (const trajectories::StripTimes& strip : result.strips) {
         table.add({strip.name, fmt::format("{:.3f}", seconds(strip.begin_ns)),
                    fmt::format("{:.3f}", seconds(strip.end_ns)), "s"});
       }
@@ -184,23 +93,10 @@ void print_result(const SimulateOptions& options, const simulation::SimulationSe
   }
   say("\n");
   Table table({"parameter", "truth", "unit"});
-  for (const NamedValue& value : true_values(result)) {
+  for (const sensors::NamedValue& value : simulation::true_values(result)) {
     table.add({value.name, fmt::format("{:.8g}", value.value), value.unit});
   }
   table.print();
-}
-
-void add_platform(Json& json, const simulation::Platform& platform,
-                  const SimulateOptions& options) {
-  json["truth_files"].push_back(simulation::truth_trajectory_path(options.output));
-  json["truth_files"].push_back(simulation::truth_mount_path(options.output));
-  json["trajectory"] = simulation::trajectory_path(options.output, platform.trajectory_ending);
-  json["strips"] = Json::array();
-  for (const trajectories::StripTimes& strip : platform.strips) {
-    json["strips"].push_back({{"name", strip.name},
-                              {"begin_s", seconds(strip.begin_ns)},
-                              {"end_s", seconds(strip.end_ns)}});
-  }
 }
 
 /// Endings of the formats of trajectories that can be written, without the dot.
@@ -282,7 +178,8 @@ Run declare_simulate(CLI::App& verb) {
           "Rotation angles of the prisms at the start, deg, as A,B or A,B,C (default: random)")
       ->delimiter(',');
   return [options](const CommonOptions& common) {
-    const simulation::SimulationSettings settings = settings_from(*options, common);
+    const simulation::SimulationSettings settings =
+        jobs::simulation_settings(job_of(*options, common));
     require_apart(common, simulation::simulation_files(settings, options->output));
     spdlog::debug("{} s of sensor {}, seed {}", settings.duration, settings.truth.name,
                   settings.seed);
@@ -293,22 +190,11 @@ Run declare_simulate(CLI::App& verb) {
           settings, options->output, {{"command", common.command}, {"version", RISLEY_VERSION}},
           bar.progress());
     }
-    if (!common.json) {
-      print_result(*options, settings, result);
-      return kDone;
+    if (common.json) {
+      print_json(common, json::of(result));
+    } else {
+      print_result(result, settings.platform && settings.platform->errors);
     }
-    Json truth = Json::object();
-    for (const NamedValue& value : true_values(result)) truth[value.name] = value.value;
-    Json json = {{"observations", result.observations},
-                 {"no_return", result.no_return},
-                 {"output", options->output},
-                 {"truth_files",
-                  {simulation::truth_preset_path(options->output),
-                   simulation::truth_columns_path(options->output)}},
-                 {"files", result.files},
-                 {"truth", truth}};
-    if (settings.platform) add_platform(json, *settings.platform, *options);
-    print_json(common, json);
     return kDone;
   };
 }

@@ -1,14 +1,17 @@
 # SPDX-FileCopyrightText: 2026 The risley authors
 # SPDX-License-Identifier: MIT
-"""Jobs over recordings."""
+"""Jobs on files: each does what a verb of the command does."""
 import os
-from typing import Iterable, List, Mapping, Optional, Tuple, Union
+from typing import Any, Dict, Iterable, List, Mapping, Optional, Sequence, Tuple, Union
 
 from risley import _risley
 from risley._progress import Progress, telling
-from risley._units import Path, YawPitchRoll, angle, pose
+from risley._results import (Calibration, Cloud, Estimate, FlightCalibration, Identification,
+                             Pattern, Plan, Simulation)
+from risley._units import Path, YawPitchRoll, angle, angles, pose
 
 Fixed = Union[Mapping[str, Optional[float]], Iterable[str]]
+Rate = Union[None, float, str]
 
 
 def _held(fixed: Fixed) -> List[Tuple[str, Optional[float]]]:
@@ -17,13 +20,19 @@ def _held(fixed: Fixed) -> List[Tuple[str, Optional[float]]]:
     return [(name, None) for name in fixed]
 
 
-def estimate(recording: Path, *, sensor: Path = "", method: str = "map",
-             rate: Union[None, float, str] = None, angle_noise: Optional[float] = None,
+def _paths(paths: Union[Path, Sequence[Path]]) -> List[str]:
+    if isinstance(paths, (str, os.PathLike)):
+        return [os.fspath(paths)]
+    return [os.fspath(path) for path in paths]
+
+
+def estimate(recording: Path, *, sensor: Path = "", output: Path = "", method: str = "map",
+             rate: Rate = None, angle_noise: Optional[float] = None,
              angle_noise_deg: Optional[float] = None, fixed: Fixed = (), free: Iterable[str] = (),
-             mirrored: Optional[bool] = None, truth: Path = "",
+             mirrored: Optional[bool] = None, truth: Path = "", states: str = "knots",
              shot_rate: Optional[float] = None, extrinsics: YawPitchRoll = None,
              extrinsics_deg: YawPitchRoll = None, threads: int = 0,
-             progress: Progress = None) -> _risley.Estimate:
+             progress: Progress = None) -> Estimate:
     """Estimate a sensor's parameters and rotation angles from a recording.
 
     Parameters
@@ -31,27 +40,32 @@ def estimate(recording: Path, *, sensor: Path = "", method: str = "map",
     recording : str or path
         A recording of one sensor.
     sensor : str or path, optional
-        Preset by name, or a preset or calibration file; otherwise the recording tells.
+        Name of a preset, or a preset or calibration file; otherwise found from the recording.
+    output : str or path, optional
+        Folder for calibration.yaml, states.nc, report.json and report.html.
     method : {'map', 'ekf'}
         All shots at once, or the paper's filter.
     rate : float or 'full', optional
-        Shots per second to use, Hz; otherwise what is usual for the method.
+        Shots per second to use, Hz; by default what is usual for the method.
     angle_noise, angle_noise_deg : float, optional
-        1 sigma of azimuth and zenith before rounding, rad or deg; found otherwise.
+        Standard deviation of the noise of azimuth and zenith before rounding, rad or deg; by
+        default estimated.
     fixed : mapping of str to float or None, or iterable of str
-        Parameters to hold, at a value if there is one, in the unit of the name.
+        Parameters to hold, at the given value (in the unit of the name) if there is one.
     free : iterable of str
         Further parameters to estimate.
     mirrored : bool, optional
-        Whether the elevation has the opposite sign; found out otherwise.
+        Whether the elevation has the opposite sign; by default found from the recording.
     truth : str or path, optional
-        ``OUT.truth.yaml`` of the recording's simulation, to judge the estimate by.
+        ``OUT.truth.yaml`` of the simulation that made the recording, to compare the estimate with.
+    states : {'knots', 'all', 'none'}
+        Rotor states to write into ``output``.
     shot_rate, extrinsics, extrinsics_deg
-        As `risley.read` has them.
+        As in `risley.read`.
     threads : int, default 0
-        How many to use; 0: all cores.
+        Number of threads; 0 means one per core.
     progress : bool or callable, optional
-        As `risley.read` has it.
+        As in `risley.read`.
 
     Returns
     -------
@@ -60,33 +74,563 @@ def estimate(recording: Path, *, sensor: Path = "", method: str = "map",
     Raises
     ------
     EstimationError
-        When the data cannot answer.
+        If nothing can be estimated from the data.
     FileError, ValueError
-        For damaged files and for options that make no sense.
+        For damaged files, and for options that make no sense.
     """
-    noise = angle("angle_noise", angle_noise, angle_noise_deg)
+    options = {
+        "recording": os.fspath(recording), "sensor": os.fspath(sensor),
+        "output": os.fspath(output), "method": method, "rate": rate,
+        "angle_noise": angle("angle_noise", angle_noise, angle_noise_deg), "fixed": _held(fixed),
+        "free": list(free), "mirrored": mirrored, "truth": os.fspath(truth), "states": states,
+        "shot_rate": shot_rate, "extrinsics": pose(extrinsics, extrinsics_deg)}
     with telling(progress) as tell:
-        return _risley.estimate(os.fspath(recording), os.fspath(sensor), method, rate, noise,
-                                _held(fixed), list(free), mirrored, os.fspath(truth), shot_rate,
-                                pose(extrinsics, extrinsics_deg), threads, tell)
+        return Estimate(_risley.estimate(options, threads, tell))
 
 
-def write_report(result: _risley.Estimate, path: Path, *, progress: Progress = None) -> None:
-    """Write the page of a result, one HTML file that needs no network.
+def calibrate(recordings: Union[Path, Sequence[Path]], *, sensor: Path = "", output: Path = "",
+              method: str = "adjustment", planes: Path = "", stations: Path = "",
+              station: Sequence[str] = (), trajectory: Path = "", trajectory_topic: str = "",
+              mount: Path = "", accuracy: Path = "", trajectory_errors: Path = "",
+              control: Path = "", knot_spacing: Optional[float] = None,
+              cell_size: Optional[float] = None, rate: Rate = None,
+              angle_noise: Optional[float] = None, angle_noise_deg: Optional[float] = None,
+              range_noise: Optional[float] = None, prior_sigma: Optional[float] = None,
+              prior_sigma_deg: Optional[float] = None, range_offset_sigma: Optional[float] = None,
+              beam_origin: bool = True, fixed: Fixed = (), free: Iterable[str] = (),
+              mirrored: Optional[bool] = None, truth: Union[Path, Sequence[Path]] = (),
+              force: bool = False, states: str = "knots", shot_rate: Optional[float] = None,
+              extrinsics: YawPitchRoll = None, extrinsics_deg: YawPitchRoll = None, seed: int = 0,
+              threads: int = 0,
+              progress: Progress = None) -> Union[Calibration, FlightCalibration]:
+    """Calibrate a sensor on plane walls or, with a trajectory, on the strips of a flight.
 
     Parameters
     ----------
-    result : Estimate
-        What `risley.estimate` found.
-    path : str or path
-        The page.
-    progress : bool or callable, optional
-        As `risley.read` has it.
+    recordings : str, path or a sequence of them
+        Recordings of one sensor, with ranges.
+    sensor : str or path, optional
+        Name of a preset, or a preset or calibration file; otherwise found from the recordings.
+    output : str or path, optional
+        Folder for calibration.yaml, states, report.json and report.html; for a flight also for
+        mount.yaml and trajectory.csv.
+    method : {'adjustment', 'paper'}
+        On walls: a weighted adjustment of all recordings, or unweighted distances as in the paper.
+    planes : str or path, optional
+        Names of walls (YAML); those with a ``sigma_deg`` have known normals.
+    stations : str or path, optional
+        Known rotations of the sensor (YAML): one station per recording, in the same order.
+    station : sequence of str
+        Names of the stations in that file to use, in the order of the recordings.
+    trajectory, mount : str or path
+        For a flight: where the platform was, and how the sensor sits on it.
+    trajectory_topic : str
+        Topic to use if the trajectory is a ROS bag with several topics of poses.
+    accuracy, trajectory_errors : str or path, optional
+        How wrong the trajectory may be: accuracies (SMRMSG), or an error process (YAML).
+    control : str or path, optional
+        Known points and planes of the ground (YAML).
+    knot_spacing, cell_size : float, optional
+        Time between corrections of the trajectory, s; edge of the squares of ground, m.
+    rate : float or 'full', optional
+        Shots per second to use, Hz; by default all.
+    angle_noise, angle_noise_deg : float, optional
+        Standard deviation of the noise of azimuth and zenith before rounding, rad or deg; by
+        default the sensor's.
+    range_noise : float, optional
+        Standard deviation of ranges before rounding, m; by default the sensor's.
+    prior_sigma, prior_sigma_deg : float, optional
+        Prior standard deviation of every error angle around the believed value, rad or deg; by
+        default there is no such prior.
+    range_offset_sigma : float, optional
+        Prior standard deviation of the range offset, m; 0 holds it.
+    beam_origin : bool, default True
+        Whether beams start where they leave the last prism.
+    fixed, free, mirrored, shot_rate, extrinsics, extrinsics_deg, threads, progress
+        As in `risley.estimate`.
+    truth : str, path or a sequence of them
+        ``OUT.truth.yaml`` of the simulation that made each recording, to compare with.
+    force : bool, default False
+        Write calibration.yaml even if the calibration is not better.
+    states : {'knots', 'all', 'none'}
+        Rotor states to write into ``output``.
+    seed : int, default 0
+        Seed of the search for planes.
+
+    Returns
+    -------
+    Calibration or FlightCalibration
 
     Raises
     ------
-    FileError
-        When the file cannot be written.
+    EstimationError
+        If there is nothing to calibrate on.
+    FileError, ValueError
+        For damaged files, and for options that make no sense.
+    """
+    options = {
+        "recordings": _paths(recordings), "sensor": os.fspath(sensor),
+        "output": os.fspath(output), "knot_spacing": knot_spacing, "cell_size": cell_size,
+        "rate": rate, "angle_noise": angle("angle_noise", angle_noise, angle_noise_deg),
+        "range_noise": range_noise,
+        "prior_sigma": angle("prior_sigma", prior_sigma, prior_sigma_deg),
+        "range_offset_sigma": range_offset_sigma, "fixed": _held(fixed), "free": list(free),
+        "mirrored": mirrored, "truth": _paths(truth), "force": force, "shot_rate": shot_rate,
+        "extrinsics": pose(extrinsics, extrinsics_deg), "seed": seed}
+    on_walls = {"method": method, "planes": os.fspath(planes), "stations": os.fspath(stations),
+                "station": list(station), "beam_origin": beam_origin, "states": states}
+    in_flight = {"trajectory": os.fspath(trajectory), "trajectory_topic": trajectory_topic,
+                 "mount": os.fspath(mount), "accuracy": os.fspath(accuracy),
+                 "trajectory_errors": os.fspath(trajectory_errors),
+                 "control": os.fspath(control)}
+    with telling(progress) as tell:
+        if os.fspath(trajectory):
+            _refuse("trajectory", {"planes": planes, "stations": stations, "station": station})
+            found = _risley.calibrate_flight({**options, **in_flight}, threads, tell)
+            return FlightCalibration(found)
+        _refuse("no trajectory", {"mount": mount, "accuracy": accuracy, "control": control,
+                                  "trajectory_errors": trajectory_errors,
+                                  "knot_spacing": knot_spacing, "cell_size": cell_size})
+        return Calibration(_risley.calibrate({**options, **on_walls}, threads, tell))
+
+
+def _refuse(where: str, options: Mapping[str, Any]) -> None:
+    for name, value in options.items():
+        if value not in (None, "", (), []):
+            raise ValueError(f"{name} is not for a calibration with {where}")
+
+
+def plan(scene_or_flight: Path, *, sensor: Path = "", duration: Optional[float] = None,
+         mount: Path = "", trajectory_errors: Path = "", scene: Path = "",
+         knot_spacing: Optional[float] = None, cell_size: Optional[float] = None,
+         empty_circle: Optional[float] = None, rate: Optional[float] = None,
+         range_noise: Optional[float] = None, prior_sigma: Optional[float] = None,
+         prior_sigma_deg: Optional[float] = None, range_offset_sigma: Optional[float] = None,
+         beam_origin: bool = True, fixed: Fixed = (), free: Iterable[str] = (), seed: int = 0,
+         progress: Progress = None) -> Plan:
+    """Predict the accuracy of a calibration on planned walls or in a planned flight.
+
+    Parameters
+    ----------
+    scene_or_flight : str or path
+        A scene of walls with stations, or a flight with strips (YAML).
+    sensor : str or path, optional
+        Name of a preset, or a preset or calibration file; by default a Mid-40.
+    duration : float, optional
+        Length of each recording of walls, s; by default 10.
+    mount, trajectory_errors : str or path
+        For a flight: how the sensor sits on the platform, and how wrong the trajectory will be.
+    scene : str or path, optional
+        For a flight: the terrain; by default level ground.
+    knot_spacing, cell_size, empty_circle : float, optional
+        For a flight: time between corrections of the trajectory, s; edge of the squares of ground,
+        m; diameter of the circles that are searched for points, m.
+    rate : float, optional
+        Shots per second, Hz; by default the sensor's, for a flight 5000.
+    range_noise, prior_sigma, prior_sigma_deg, range_offset_sigma, beam_origin, fixed, free, seed
+        As in `risley.calibrate`.
+    progress : bool or callable, optional
+        As in `risley.read`.
+
+    Returns
+    -------
+    Plan
+
+    Raises
+    ------
+    EstimationError, FileError, ValueError
+        As in `risley.calibrate`.
+    """
+    options: Dict[str, Any] = {
+        "plan": os.fspath(scene_or_flight), "sensor": os.fspath(sensor), "rate": rate,
+        "range_noise": range_noise,
+        "prior_sigma": angle("prior_sigma", prior_sigma, prior_sigma_deg),
+        "range_offset_sigma": range_offset_sigma, "fixed": _held(fixed), "free": list(free)}
+    of_flight = {"mount": mount, "trajectory_errors": trajectory_errors, "scene": scene,
+                 "knot_spacing": knot_spacing, "cell_size": cell_size,
+                 "empty_circle": empty_circle}
+    with telling(progress) as tell:
+        if _risley.is_flight_plan(os.fspath(scene_or_flight)):
+            if duration is not None:
+                raise ValueError("duration is not for a planned flight, whose strips say it")
+            paths = {"mount": os.fspath(mount), "trajectory_errors": os.fspath(trajectory_errors),
+                     "scene": os.fspath(scene)}
+            return Plan(_risley.plan_flight({**options, **of_flight, **paths, "seed": seed}, tell))
+        for name, value in of_flight.items():
+            if value not in (None, ""):
+                raise ValueError(f"{name} goes with a flight, and {scene_or_flight} is a scene")
+        return Plan(_risley.plan({**options, "duration": duration, "beam_origin": beam_origin},
+                                 tell))
+
+
+def cloud(recording: Path, calibration: Path, output: Path, *, format: str = "",
+          directions: str = "smoothed", beam_origin: bool = True, beam_divergence: bool = True,
+          covariance: bool = True, common_factors: bool = False, rate: Rate = None,
+          angle_noise: Optional[float] = None, angle_noise_deg: Optional[float] = None,
+          las_scale: Optional[float] = None, time: str = "gps", trajectory: Path = "",
+          trajectory_topic: str = "", mount: Path = "", accuracy: Path = "",
+          trajectory_errors: Path = "", crs: str = "", datum: str = "", distribution: bool = False,
+          shot_rate: Optional[float] = None, extrinsics: YawPitchRoll = None,
+          extrinsics_deg: YawPitchRoll = None, threads: int = 0,
+          progress: Progress = None) -> Cloud:
+    """Turn a recording into points with covariance.
+
+    Parameters
+    ----------
+    recording : str or path
+        A recording of one sensor, with ranges.
+    calibration : str or path
+        ``calibration.yaml`` of an estimate or a calibration, or the name of a preset.
+    output : str or path
+        The file; its ending chooses the format unless `format` does.
+    format : str, optional
+        Name of a format; the ending then does not matter.
+    directions : {'smoothed', 'reported'}
+        Directions from the calibration, or as the sensor reports them.
+    beam_origin, beam_divergence, covariance : bool, default True
+        Start beams where they leave the last prism; include the footprint in the covariance; write
+        covariances.
+    common_factors : bool, default False
+        Write for every point the loadings of the errors that all points share.
+    rate : float or 'full', optional
+        Directions per second from which rotation angles are found, Hz.
+    angle_noise, angle_noise_deg : float, optional
+        Standard deviation of the noise of azimuth and zenith before rounding, rad or deg; by
+        default the calibration's.
+    las_scale : float, optional
+        LAS stores coordinates as multiples of this, m.
+    time : {'gps', 'recording'}
+        For LAS: GPS time if the recording's clock is UTC, or the clock as it is.
+    trajectory, trajectory_topic, mount, accuracy, trajectory_errors
+        As in `risley.calibrate`, for a moving sensor.
+    crs, datum : str, optional
+        Map of the points and datum of the trajectory, ``EPSG:N``.
+    distribution : bool, default False
+        Report how the points of a flight lie on the ground.
+    shot_rate, extrinsics, extrinsics_deg, threads, progress
+        As in `risley.estimate`.
+
+    Returns
+    -------
+    Cloud
+
+    Raises
+    ------
+    EstimationError
+        If the motion of the rotors cannot be found.
+    FileError, ValueError
+        For damaged files, and for options that make no sense.
+    """
+    options = {
+        "recording": os.fspath(recording), "calibration": os.fspath(calibration),
+        "output": os.fspath(output), "format": format, "directions": directions,
+        "beam_origin": beam_origin, "beam_divergence": beam_divergence, "covariance": covariance,
+        "common_factors": common_factors, "rate": rate,
+        "angle_noise": angle("angle_noise", angle_noise, angle_noise_deg),
+        "las_scale": las_scale, "time": time, "trajectory": os.fspath(trajectory),
+        "trajectory_topic": trajectory_topic, "mount": os.fspath(mount),
+        "accuracy": os.fspath(accuracy), "trajectory_errors": os.fspath(trajectory_errors),
+        "crs": crs, "datum": datum, "distribution": distribution, "shot_rate": shot_rate,
+        "extrinsics": pose(extrinsics, extrinsics_deg)}
+    with telling(progress) as tell:
+        return Cloud(_risley.cloud(options, threads, tell))
+
+
+def simulate(output: Path, *, sensor: Path = "mid-40", duration: Optional[float] = None,
+             rate: Optional[float] = None, angle_noise: Optional[float] = None,
+             angle_noise_deg: Optional[float] = None, range_noise: Optional[float] = None,
+             quantize: bool = True, beam_origin: bool = True, rotor: str = "constant",
+             set: Mapping[str, float] = {}, reported: Mapping[str, float] = {},
+             reported_nominal: bool = False, start_angles: Optional[Sequence[float]] = None,
+             start_angles_deg: Optional[Sequence[float]] = None, scene: Path = "",
+             station: str = "", trajectory: Path = "", trajectory_topic: str = "",
+             flight: Path = "", mount: Path = "", trajectory_errors: Path = "",
+             trajectory_format: str = "csv", start: Optional[float] = None,
+             clock_drift: Optional[float] = None, seed: int = 0, threads: int = 0,
+             progress: Progress = None) -> Simulation:
+    """Write a recording with known truth.
+
+    Parameters
+    ----------
+    output : str or path
+        The recording; its ending chooses the format. The truth is written beside it.
+    sensor : str or path, default 'mid-40'
+        Name of a preset, or a preset or calibration file.
+    duration : float, optional
+        Length, s; by default 1, or until the end of the trajectory.
+    rate : float, optional
+        Shots per second, Hz; by default the sensor's.
+    angle_noise, angle_noise_deg, range_noise : float, optional
+        Standard deviations of directions, rad or deg, and of ranges, m; by default the sensor's.
+    quantize : bool, default True
+        Round to the sensor's resolution.
+    beam_origin : bool, default True
+        Start beams where they leave the last prism.
+    rotor : {'constant', 'sinusoidal', 'hunting'}
+        How the rotors run.
+    set : mapping of str to float
+        Parameters of the true sensor, in the unit of the name.
+    reported : mapping of str to float
+        Parameters for which the sensor believes another value than the true one.
+    reported_nominal : bool, default False
+        The sensor believes that it has no errors.
+    start_angles, start_angles_deg : sequence of float, optional
+        Rotation angles at the start, rad or deg; by default random, from the seed.
+    scene : str or path, optional
+        Planes or terrain (YAML); without it there are no ranges.
+    station : str, optional
+        Station of the scene at which the sensor stands.
+    trajectory, flight : str or path, optional
+        Trajectory along which the sensor moves, or a flight plan.
+    trajectory_topic : str, optional
+        Topic to use if the trajectory is a ROS bag with several topics of poses.
+    mount, trajectory_errors : str or path
+        True mount of the moving sensor; errors of the trajectory that a user would have.
+    trajectory_format : str, default 'csv'
+        Format of that trajectory.
+    start : float, optional
+        Start of the recording after the first record of the trajectory, s.
+    clock_drift : float, optional
+        Rate at which the trajectory's time gains on the sensor's clock, s/s.
+    seed : int, default 0
+        The same seed gives the same bytes.
+    threads : int, default 0
+        Number of threads; 0 means one per core.
+    progress : bool or callable, optional
+        As in `risley.read`.
+
+    Returns
+    -------
+    Simulation
+
+    Raises
+    ------
+    FileError, ValueError
+        For files that cannot be read or written, and for options that make no sense.
+    """
+    options = {
+        "output": os.fspath(output), "sensor": os.fspath(sensor), "duration": duration,
+        "rate": rate, "angle_noise": angle("angle_noise", angle_noise, angle_noise_deg),
+        "range_noise": range_noise, "quantize": quantize, "beam_origin": beam_origin,
+        "rotor": rotor, "set": list(set.items()), "reported": list(reported.items()),
+        "reported_nominal": reported_nominal,
+        "start_angles": angles("start_angles", start_angles, start_angles_deg),
+        "scene": os.fspath(scene), "station": station, "trajectory": os.fspath(trajectory),
+        "trajectory_topic": trajectory_topic, "flight": os.fspath(flight),
+        "mount": os.fspath(mount), "trajectory_errors": os.fspath(trajectory_errors),
+        "trajectory_format": trajectory_format, "start": start, "clock_drift": clock_drift,
+        "seed": seed}
+    with telling(progress) as tell:
+        return Simulation(_risley.simulate(options, threads, tell))
+
+
+def identify(recording: Path, *, output: Path = "", force: bool = False, most_prisms: int = 3,
+             fastest: Optional[float] = None, shot_rate: Optional[float] = None,
+             extrinsics: YawPitchRoll = None, extrinsics_deg: YawPitchRoll = None,
+             threads: int = 0, progress: Progress = None) -> Identification:
+    """Find which prisms made a scan, from its times and directions alone.
+
+    Parameters
+    ----------
+    recording : str or path
+        A recording of one sensor.
+    output : str or path, optional
+        Preset to write (.yaml), which can be given as ``sensor`` elsewhere.
+    force : bool, default False
+        Write it even if the answer is undecided.
+    most_prisms : int, default 3
+        Largest number of prisms to try.
+    fastest : float, optional
+        Largest speed of a rotor, rad/s; by default 400 turns a second.
+    shot_rate, extrinsics, extrinsics_deg, threads, progress
+        As in `risley.estimate`.
+
+    Returns
+    -------
+    Identification
+
+    Raises
+    ------
+    EstimationError
+        If nothing can be estimated from the data.
+    FileError, ValueError
+        For damaged files, and for options that make no sense.
+    """
+    options = {
+        "recording": os.fspath(recording), "output": os.fspath(output), "force": force,
+        "most_prisms": most_prisms, "fastest": fastest, "shot_rate": shot_rate,
+        "extrinsics": pose(extrinsics, extrinsics_deg)}
+    with telling(progress) as tell:
+        return Identification(*_risley.identify(options, threads, tell))
+
+
+def pattern(sensor: Path, format: str, output: Path, *, duration: float = 1.0,
+            rate: Optional[float] = None, every: int = 1, firing: Optional[str] = None,
+            start_angles: Optional[Sequence[float]] = None,
+            start_angles_deg: Optional[Sequence[float]] = None, threads: int = 0,
+            progress: Progress = None) -> Pattern:
+    """Write the scan of a sensor for simulators.
+
+    Parameters
+    ----------
+    sensor : str or path
+        Name of a preset, or a preset or calibration file.
+    format : str
+        ``livox-csv``, ``helios-xml``, ``npy`` and others, as ``risley pattern --help`` lists them.
+    output : str or path
+        The file.
+    duration : float, default 1
+        Length of the scan, s.
+    rate : float, optional
+        Shots per second, Hz; by default the sensor's.
+    every : int, default 1
+        Write one of so many shots.
+    firing : {'in-turn', 'together'}, optional
+        When the emitters fire if there are several; by default as in the preset.
+    start_angles, start_angles_deg : sequence of float, optional
+        Rotation angles at time 0, rad or deg; by default the preset's.
+    threads : int, default 0
+        Number of threads; 0 means one per core.
+    progress : bool or callable, optional
+        As in `risley.read`.
+
+    Returns
+    -------
+    Pattern
+
+    Raises
+    ------
+    FileError, ValueError
+        For files that cannot be written, and for options that make no sense.
+    """
+    options = {
+        "sensor": os.fspath(sensor), "format": format, "output": os.fspath(output),
+        "duration": duration, "rate": rate, "every": every, "firing": firing,
+        "start_angles": angles("start_angles", start_angles, start_angles_deg)}
+    with telling(progress) as tell:
+        return Pattern(_risley.pattern(options, threads, tell))
+
+
+def coverage(sensor: Path, *, after: Optional[Sequence[float]] = None,
+             cell: Optional[float] = None, cell_deg: Optional[float] = None,
+             rate: Optional[float] = None, every: int = 1, firing: Optional[str] = None,
+             start_angles: Optional[Sequence[float]] = None,
+             start_angles_deg: Optional[Sequence[float]] = None, threads: int = 0,
+             progress: Progress = None) -> Dict[str, Any]:
+    """Compute how the scan of a sensor fills its field of view.
+
+    Parameters
+    ----------
+    sensor : str or path
+        Name of a preset, or a preset or calibration file.
+    after : sequence of float, optional
+        Times since the start of the scan, s.
+    cell, cell_deg : float, optional
+        Edge of a cell, rad or deg.
+    rate, every, firing, start_angles, start_angles_deg, threads, progress
+        As in `risley.pattern`.
+
+    Returns
+    -------
+    dict
+        As ``coverage`` in ``risley pattern --coverage --json``.
+    """
+    options = {
+        "sensor": os.fspath(sensor), "after": None if after is None else list(after),
+        "cell": angle("cell", cell, cell_deg), "rate": rate, "every": every, "firing": firing,
+        "start_angles": angles("start_angles", start_angles, start_angles_deg)}
+    with telling(progress) as tell:
+        return dict(_risley.coverage(options, threads, tell))
+
+
+def observability(recording: Path = "", *, sensor: Path = "", duration: Optional[float] = None,
+                  rate: Rate = None, angle_noise: Optional[float] = None,
+                  angle_noise_deg: Optional[float] = None, rounding: bool = True,
+                  fixed: Fixed = (), free: Iterable[str] = (), shot_rate: Optional[float] = None,
+                  extrinsics: YawPitchRoll = None, extrinsics_deg: YawPitchRoll = None,
+                  threads: int = 0, progress: Progress = None) -> Dict[str, Any]:
+    """Compute Cramér-Rao bounds of all parameters for a recording or a plan.
+
+    Parameters
+    ----------
+    recording : str or path, optional
+        The recording; without one, the bounds are those of a plan.
+    duration : float, optional
+        Length of the plan, s; by default 30.
+    rate : float or 'full', optional
+        Shots per second of the plan, or to use from the recording, Hz.
+    rounding : bool, default True
+        Whether the angles of a plan are rounded to the sensor's resolution.
+    sensor, angle_noise, angle_noise_deg, fixed, free, shot_rate, extrinsics, extrinsics_deg
+        As in `risley.estimate`.
+    threads, progress
+        As in `risley.estimate`.
+
+    Returns
+    -------
+    dict
+        As in ``risley observability --json``.
+    """
+    options = {
+        "recording": os.fspath(recording), "sensor": os.fspath(sensor), "duration": duration,
+        "rate": rate, "angle_noise": angle("angle_noise", angle_noise, angle_noise_deg),
+        "rounding": rounding, "fixed": _held(fixed), "free": list(free), "shot_rate": shot_rate,
+        "extrinsics": pose(extrinsics, extrinsics_deg)}
+    with telling(progress) as tell:
+        return dict(_risley.observability(options, threads, tell))
+
+
+def compare(results: Sequence[Path], *, false_alarm: float = 0.01,
+            progress: Progress = None) -> Dict[str, Any]:
+    """Find out whether a unit has changed, from results of different days.
+
+    Parameters
+    ----------
+    results : sequence of str or path
+        Folders that `estimate` or `calibrate` wrote, or calibration files, in order of time; at
+        least two.
+    false_alarm : float, default 0.01
+        Probability that a series without any change is called changed.
+    progress : bool or callable, optional
+        As in `risley.read`.
+
+    Returns
+    -------
+    dict
+        As ``risley compare --json``.
+
+    Raises
+    ------
+    FileError, ValueError
+        For damaged files, and for results of different kinds of sensors.
     """
     with telling(progress) as tell:
-        _risley.write_page(result, os.fspath(path), tell)
+        return dict(_risley.compare(_paths(results), false_alarm, tell))
+
+
+def info(file: Path, *, accuracy: Path = "", trajectory_topic: str = "",
+         shot_rate: Optional[float] = None, extrinsics: YawPitchRoll = None,
+         extrinsics_deg: YawPitchRoll = None, progress: Progress = None) -> Dict[str, Any]:
+    """Describe what a recording or a trajectory holds, and check its times.
+
+    Parameters
+    ----------
+    file : str or path
+        A recording or trajectory in any known format.
+    accuracy : str or path, optional
+        Accuracies of a trajectory (SMRMSG).
+    trajectory_topic : str, optional
+        Topic of a ROS bag whose poses are described.
+    shot_rate, extrinsics, extrinsics_deg, progress
+        As in `risley.read`.
+
+    Returns
+    -------
+    dict
+        As in ``risley info --json``. Damage is reported under ``error``.
+    """
+    options = {"input": os.fspath(file), "accuracy": os.fspath(accuracy),
+               "trajectory_topic": trajectory_topic, "shot_rate": shot_rate,
+               "extrinsics": pose(extrinsics, extrinsics_deg)}
+    with telling(progress) as tell:
+        return dict(_risley.info(options, tell))

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The risley authors
 # SPDX-License-Identifier: MIT
-"""The observation model and its inverse over arrays."""
+"""The observation model and its inverse, for arrays."""
 from typing import Any, NamedTuple, Optional, Sequence, Tuple, Union
 
 from risley import _risley
@@ -9,14 +9,14 @@ Optics = Union[_risley.PrismTrain, _risley.Sensor]
 
 
 class Directions(NamedTuple):
-    """Where shots point, rad: azimuth from X towards Y, zenith from Z."""
+    """Directions of shots, rad: azimuth from X towards Y, zenith from Z."""
 
     azimuth: Any
     zenith: Any
 
 
 class Rays(NamedTuple):
-    """Beams as lines in space, x, y and z of each in the sensor's frame."""
+    """Beams as lines in space: x, y and z of each in the sensor's frame."""
 
     origin: Tuple[Any, Any, Any]  #: where the beam leaves the last face, m
     direction: Tuple[Any, Any, Any]  #: unit vectors
@@ -25,8 +25,8 @@ class Rays(NamedTuple):
 class Linearisation(NamedTuple):
     """Directions and their derivatives, rad per SI unit.
 
-    The first axis of the derivatives stands for the flat parameters of the train
-    (`PrismTrain.parameters`), then for the rotation angles of the prisms.
+    The first axis of the derivatives runs over the flat parameters of the train
+    (`PrismTrain.parameters`) and then over the rotation angles of the prisms.
     """
 
     azimuth: Any
@@ -36,11 +36,11 @@ class Linearisation(NamedTuple):
 
 
 class Inverse(NamedTuple):
-    """Pairs of rotation angles of the last two prisms, rad; NaN where there are fewer than four."""
+    """Pairs of rotation angles of the last two prisms, rad; filled up to four with NaN."""
 
-    first: Any  #: of the last prism but one, shape (..., 4)
+    first: Any  #: of the second-to-last prism, shape (..., 4)
     second: Any  #: of the last prism, shape (..., 4)
-    count: Any  #: pairs found, shape (...)
+    count: Any  #: number of pairs found, shape (...)
     continuum: Any  #: whether infinitely many pairs reach the direction
 
 
@@ -55,29 +55,31 @@ def observe(optics: Optics, angles: Any, *, beam: Any = None,
     Parameters
     ----------
     optics : PrismTrain or Sensor
-        What bends the beams.
+        The optics that bend the beams.
     angles : array_like of float, shape (prisms, ...), or one array_like per prism
-        Rotation angles in beam order, rad. They broadcast. Arrays of float64 in C order are read
-        where they lie.
+        Rotation angles in the order of the beam, rad. They broadcast. Arrays of float64 in C order
+        are read without a copy.
     beam : array_like of int, optional
         Number of the emitter of every shot, from 0; broadcasts with the angles.
     out : (ndarray, ndarray), optional
-        Where azimuth and zenith are written, float64 in C order.
+        Arrays to write azimuth and zenith to, float64 in C order.
 
     Returns
     -------
     Directions
         Azimuth in (-pi, pi] and zenith in [0, pi], rad; NaN for beams that do not get through the
-        prisms and for angles that are NaN.
+        prisms, and for angles that are NaN.
 
     Raises
     ------
     ValueError
-        Naming an array whose shape does not go with the others, or a beam that there is not.
+        If the shape of an array does not match the others, or a beam does not exist; the message
+        names it.
 
     Notes
     -----
-    The practical model of Brazeal, Wilkinson and Hochmair (2021), the libraries' observe_batch().
+    This is the practical model of Brazeal, Wilkinson and Hochmair (2021), `observe_batch()` of the
+    C++ libraries.
     """
     azimuth_out, zenith_out = (None, None) if out is None else out
     return Directions(*_risley.observe(_train(optics), angles, beam, azimuth_out, zenith_out))
@@ -91,10 +93,10 @@ def rays(optics: Optics, angles: Any, *, beam: Any = None,
     Parameters
     ----------
     optics, angles, beam
-        As `observe` has them.
+        As in `observe`.
     prism_thickness, prism_spacing : sequence of float, optional
-        Sizes of the prisms, m: one value each, or one for all. Those of a sensor where there are
-        none; beams of a train without them start at the frame's origin.
+        Sizes of the prisms, m: one value each, or one for all. By default those of the sensor;
+        beams of a train without sizes start at the origin of the frame.
 
     Returns
     -------
@@ -103,7 +105,7 @@ def rays(optics: Optics, angles: Any, *, beam: Any = None,
     Raises
     ------
     ValueError
-        As `observe`, and for sizes of another number of prisms.
+        As in `observe`, and for the wrong number of sizes.
     """
     if isinstance(optics, _risley.Sensor):
         if prism_thickness is None:
@@ -115,12 +117,12 @@ def rays(optics: Optics, angles: Any, *, beam: Any = None,
 
 
 def linearise(optics: Optics, angles: Any, *, beam: Any = None) -> Linearisation:
-    """Directions of shots and how they depend on parameters and rotation angles.
+    """Directions of shots and their derivatives by parameters and rotation angles.
 
     Parameters
     ----------
     optics, angles, beam
-        As `observe` has them.
+        As in `observe`.
 
     Returns
     -------
@@ -129,19 +131,19 @@ def linearise(optics: Optics, angles: Any, *, beam: Any = None) -> Linearisation
     Raises
     ------
     ValueError
-        As `observe`.
+        As in `observe`.
     """
     return Linearisation(*_risley.linearise(_train(optics), angles, beam))
 
 
 def invert(optics: Optics, azimuth: Any, zenith: Any, *, beam: Any = 0,
            fixed_angles: Sequence[float] = ()) -> Inverse:
-    """Rotation angles of the last two prisms that point beams in directions.
+    """Rotation angles of the last two prisms that send beams in given directions.
 
     Parameters
     ----------
     optics : PrismTrain or Sensor
-        What bends the beams.
+        The optics that bend the beams.
     azimuth, zenith : array_like of float
         Directions, rad. They broadcast.
     beam : array_like of int, default 0
@@ -152,12 +154,12 @@ def invert(optics: Optics, azimuth: Any, zenith: Any, *, beam: Any = 0,
     Returns
     -------
     Inverse
-        Sorted by the second angle. There are none outside the field of view and for NaN.
+        Sorted by the second angle. No pairs are found outside the field of view and for NaN.
 
     Raises
     ------
     ValueError
-        For arrays whose shapes do not go together, fewer than two prisms, or another number of
-        fixed angles.
+        For arrays whose shapes do not match, fewer than two prisms, or the wrong number of fixed
+        angles.
     """
     return Inverse(*_risley.invert(_train(optics), azimuth, zenith, list(fixed_angles), beam))

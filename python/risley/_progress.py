@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The risley authors
 # SPDX-License-Identifier: MIT
-"""How far a job is: what callers may pass as ``progress``."""
+"""Progress of a job: what callers may pass as ``progress``."""
 import contextlib
 from typing import Any, Callable, Iterator, Optional, Union
 
@@ -9,7 +9,7 @@ Progress = Union[None, bool, Tell]
 
 
 class _Bars:
-    """A bar of tqdm for every stage."""
+    """A tqdm bar for every stage."""
 
     def __init__(self, tqdm: Any) -> None:
         self._tqdm = tqdm
@@ -30,7 +30,7 @@ class _Bars:
 
 @contextlib.contextmanager
 def telling(progress: Progress) -> Iterator[Optional[Tell]]:
-    """What is called with the name of a stage and the fraction done; None for nobody."""
+    """The function to call with the name of a stage and the fraction done, or None."""
     if progress is None or progress is False:
         yield None
     elif progress is True:

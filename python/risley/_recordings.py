@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The risley authors
 # SPDX-License-Identifier: MIT
-"""Recordings of files and of arrays."""
+"""Recordings from files and from arrays."""
 import os
 from typing import Any, Optional
 
@@ -18,25 +18,25 @@ def read(path: Path, *, shot_rate: Optional[float] = None, extrinsics: YawPitchR
     Parameters
     ----------
     path : str or path
-        A file, or a folder of ROS 2.
+        A file, or a ROS 2 folder.
     shot_rate : float, optional
-        Shots per second, Hz. Times are then counted, whatever times the file holds.
+        Shots per second, Hz. Times are then computed from it, whatever times the file holds.
     extrinsics, extrinsics_deg : (float, float, float), optional
-        Yaw, pitch and roll of the sensor in the frame that the recording stands in, rad or deg.
-        Rows are turned back into the sensor's frame.
+        Yaw, pitch and roll of the sensor in the frame of the recording, rad or deg. The rows are
+        transformed back into the sensor's frame.
     progress : bool or callable, optional
-        Called with the name of the stage and the fraction done; True shows bars of tqdm where it
-        is installed. An exception in it stops reading and is raised here.
+        Function that is called with the name of the stage and the fraction done; True shows tqdm
+        bars if tqdm is installed. An exception in the function stops reading and is raised here.
 
     Returns
     -------
     Recording
-        Its columns are read-only arrays without a copy.
+        Its columns are read-only arrays that share its memory.
 
     Raises
     ------
     FileError
-        When the file is missing (also a `FileNotFoundError`), damaged or of no known format.
+        If the file is missing (also a `FileNotFoundError`), damaged, or of no known format.
     ValueError
         For options that make no sense.
     """
@@ -47,14 +47,14 @@ def read(path: Path, *, shot_rate: Optional[float] = None, extrinsics: YawPitchR
 def read_chunks(path: Path, rows: int = 65536, *, shot_rate: Optional[float] = None,
                 extrinsics: YawPitchRoll = None,
                 extrinsics_deg: YawPitchRoll = None) -> _risley.ChunkReader:
-    """Read a recording piece by piece, so that memory does not grow with its length.
+    """Read a recording piece by piece, so that memory use does not grow with its length.
 
     Parameters
     ----------
     path, shot_rate, extrinsics, extrinsics_deg
-        As `read` has them.
+        As in `read`.
     rows : int, default 65536
-        About how many rows a piece has; packets stay whole.
+        Approximate number of rows of a piece; packets are not split.
 
     Returns
     -------
@@ -64,7 +64,7 @@ def read_chunks(path: Path, rows: int = 65536, *, shot_rate: Optional[float] = N
     Raises
     ------
     FileError, ValueError
-        As `read`; at damage in the body after every sound row before it was given.
+        As in `read`. Damage in the body is raised only after all sound rows before it were given.
     """
     return _risley.ChunkReader(os.fspath(path), rows, shot_rate, pose(extrinsics, extrinsics_deg))
 
@@ -72,37 +72,38 @@ def read_chunks(path: Path, rows: int = 65536, *, shot_rate: Optional[float] = N
 def from_arrays(*, azimuth: Any, zenith: Any, time_ns: Any = None, range: Any = None,
                 serial: str = "", device_type: int = _UNKNOWN_TYPE,
                 **columns: Any) -> _risley.Recording:
-    """Make a recording of columns that come from anywhere.
+    """Make a recording from columns of any origin.
 
     Parameters
     ----------
     azimuth, zenith : array_like of float, shape (rows,)
         Directions, rad; azimuth from X towards Y, zenith from Z.
     time_ns : array_like of int, shape (rows,), optional
-        Times of the shots, ns. Without them rows are shots in firing order.
+        Times of the shots, ns. Without them, rows are taken as shots in firing order.
     range : array_like of float, shape (rows,), optional
-        Ranges, m; 0 or less where the shot had no return.
+        Ranges, m; 0 or less if the shot had no return.
     serial : str, optional
         Serial number of the sensor.
     device_type : int, default 255
-        Livox number of its type; 255 when it is not known.
+        Livox number of its type; 255 if unknown.
     **columns : array_like, shape (rows,) or ()
         Further columns of `Recording`: ``intensity``, ``return_number``, ``tag``, ``beam``,
         ``valid``, ``azimuth_resolution``, ``zenith_resolution``, ``range_resolution``. Rows are
-        valid where directions are finite and there is no range of 0 or less, unless ``valid`` says
+        valid if their direction is finite and their range is not 0 or less, unless ``valid`` says
         otherwise.
 
     Returns
     -------
     Recording
-        With copies of the columns.
+        It holds copies of the columns.
 
     Raises
     ------
     ValueError
-        Naming a column of another length, or a row whose angle is out of range, as degrees are.
+        If a column has another length, or an angle is out of range, as it is when given in degrees;
+        the message names the column or row.
     TypeError
-        For columns that hold no numbers, and for unknown columns.
+        For columns that do not hold numbers, and for unknown columns.
     """
     return _risley.recording_from_arrays(time_ns, azimuth, zenith, range, columns, serial,
                                          device_type)
@@ -114,16 +115,16 @@ def write(recording: _risley.Recording, path: Path, *, format: str = "") -> None
     Parameters
     ----------
     recording : Recording
-        What is written.
+        What to write.
     path : str or path
-        The file; its ending chooses the format unless one is named.
+        The file; its ending chooses the format unless `format` does.
     format : str, optional
         Name of a format.
 
     Raises
     ------
     FileError
-        When the file cannot be written.
+        If the file cannot be written.
     ValueError
         For an unknown format, or a value that it cannot hold.
     """

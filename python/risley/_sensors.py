@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The risley authors
 # SPDX-License-Identifier: MIT
-"""Sensors by name and of files."""
+"""Sensors by name and from files."""
 import os
 from typing import List
 
@@ -14,18 +14,18 @@ def presets() -> List[str]:
     Returns
     -------
     list of str
-        Sorted; `load_sensor` takes each of them.
+        Sorted; `load_sensor` accepts each of them.
     """
     return _risley.preset_names()
 
 
 def load_sensor(name_or_path: Path) -> _risley.Sensor:
-    """A built-in sensor by name, or one of a preset or calibration file.
+    """Load a built-in sensor by name, or a sensor from a preset or calibration file.
 
     Parameters
     ----------
     name_or_path : str or path
-        A name of `presets`, or a file.
+        A name from `presets`, or a file.
 
     Returns
     -------
@@ -36,6 +36,6 @@ def load_sensor(name_or_path: Path) -> _risley.Sensor:
     ValueError
         For an unknown name; the message lists the known ones.
     FileError
-        For a file that breaks the schema, with the line.
+        For a file that does not follow the schema; the message names the line.
     """
     return _risley.load_sensor(os.fspath(name_or_path))

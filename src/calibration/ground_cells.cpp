@@ -451,4 +451,11 @@ std::vector<StripPair> strip_pairs(const ShotPoints& points,
   return pairs;
 }
 
+const StripPair* find_pair(const std::vector<StripPair>& pairs, const StripPair& like) {
+  const auto at = std::find_if(pairs.begin(), pairs.end(), [&](const StripPair& pair) {
+    return pair.first == like.first && pair.second == like.second;
+  });
+  return at == pairs.end() ? nullptr : &*at;
+}
+
 }  // namespace risley::calibration

@@ -151,6 +151,7 @@ void write_flight(const CalibrateFlightOptions& options, CalibratedFlight& resul
 }  // namespace
 
 CalibratedFlight calibrate_flight(const CalibrateFlightOptions& options, const Progress& progress) {
+  const Stopwatch whole;
   check_flight_options(options);
   ResultFolder folder(options.files.folder);
   CalibratedFlight result;
@@ -216,6 +217,7 @@ CalibratedFlight calibrate_flight(const CalibrateFlightOptions& options, const P
                                     {}, calibrating.silent());
   }
   if (folder) write_flight(options, result, folder, progress.silent());
+  result.total_time = whole.seconds();
   return result;
 }
 

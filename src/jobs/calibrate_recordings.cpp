@@ -70,8 +70,30 @@ void write_files(const CalibrateRecordingsOptions& options, CalibratedRecordings
 
 }  // namespace
 
+std::vector<scenes::Station> stations_of(const std::string& path,
+                                         const std::vector<std::string>& names,
+                                         std::size_t recordings) {
+  if (path.empty()) {
+    if (!names.empty()) throw InvalidArgument("option station needs option stations");
+    return {};
+  }
+  const scenes::Scene scene = scenes::load_scene(path);
+  std::vector<scenes::Station> stations;
+  stations.reserve(names.size());
+  for (const std::string& name : names) stations.push_back(scene.station(name));
+  if (names.empty()) stations = scene.stations;
+  if (stations.size() != recordings) {
+    throw InvalidArgument(fmt::format(
+        "{} stations for {} recordings: {} has to list one for each, in their order, or option "
+        "station names them",
+        stations.size(), recordings, path));
+  }
+  return stations;
+}
+
 CalibratedRecordings calibrate_recordings(const CalibrateRecordingsOptions& options,
                                           const Progress& progress) {
+  const Stopwatch whole;
   calibration::CalibrationOptions settings = checked_settings(options);
   ResultFolder folder(options.files.folder);
   CalibratedRecordings result;
@@ -103,6 +125,7 @@ CalibratedRecordings calibrate_recordings(const CalibrateRecordingsOptions& opti
                                          wall_sample(recordings, result.calibration), result.truth);
   }
   if (folder) write_files(options, result, folder, progress.silent());
+  result.total_time = whole.seconds();
   return result;
 }
 

@@ -29,8 +29,8 @@ std::optional<std::chrono::sys_days> day_of(const std::string& path) {
 
 }  // namespace
 
-cloud::CloudSummary cloud_of_recording(const CloudOfRecordingOptions& options,
-                                       const Progress& progress) {
+RecordingCloud cloud_of_recording(const CloudOfRecordingOptions& options,
+                                  const Progress& progress) {
   cloud::CloudOptions settings = options.cloud;
   if (settings.rate) check_positive(*settings.rate, "rate", "Hz");
   if (settings.angle_noise) check_positive(*settings.angle_noise, "angle_noise", "rad");
@@ -53,9 +53,11 @@ cloud::CloudSummary cloud_of_recording(const CloudOfRecordingOptions& options,
   if (!settings.writer.date) settings.writer.date = day_of(options.recording);
   const SensorFrameRecording input =
       open_in_sensor_frame(options.recording, options.reading, calibration, progress);
-  cloud::CloudSummary result =
-      cloud::make_cloud(*input.reader, calibration, options.output, settings, progress);
-  result.warnings.insert(result.warnings.begin(), input.warnings.begin(), input.warnings.end());
+  RecordingCloud result{
+      options.recording, options.output, options.calibration, calibration.reference,
+      cloud::make_cloud(*input.reader, calibration, options.output, settings, progress)};
+  std::vector<std::string>& warnings = result.summary.warnings;
+  warnings.insert(warnings.begin(), input.warnings.begin(), input.warnings.end());
   return result;
 }
 

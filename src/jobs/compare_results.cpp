@@ -11,8 +11,10 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <fmt/format.h>
+#include <unsupported/Eigen/SpecialFunctions>
 
 #include "risley/algebra/named_covariance.hpp"
+#include "risley/algebra/symmetric.hpp"
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
 #include "risley/core/random.hpp"
@@ -136,7 +138,8 @@ void add_covariance(const NamedCovariance& known, NamedCovariance& sum) {
   sum.matrix(to, to) += part.matrix;
 }
 
-calibration::PointingError compare_directions(const Pair& pair) {
+/// The covariance of the differences of the train's parameters.
+NamedCovariance covariance_of_differences(const Pair& pair) {
   const Sensor& b = pair.b;
   NamedCovariance sum;
   for (const NamedCovariance* known : {&pair.known_a, &pair.known_b}) {
@@ -152,6 +155,43 @@ calibration::PointingError compare_directions(const Pair& pair) {
   sum.matrix = Eigen::MatrixXd::Zero(n, n);
   add_covariance(pair.known_a, sum);
   add_covariance(pair.known_b, sum);
+  return sum;
+}
+
+/// Combinations of parameters that neither result tells from zero by so little of the largest
+/// variance are numerically none.
+constexpr double kSmallestVariance = 1e-13;
+
+ChangeTest test_of_change(const Pair& pair, const NamedCovariance& sum) {
+  ChangeTest test;
+  const auto n = static_cast<Eigen::Index>(sum.names.size());
+  if (n == 0) return test;
+  // In sigmas, so that units do not matter.
+  const Eigen::VectorXd sigma = sum.matrix.diagonal().cwiseMax(0).cwiseSqrt();
+  Eigen::VectorXd off(n);
+  Eigen::MatrixXd correlation(n, n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const std::string& name = sum.names[static_cast<std::size_t>(i)];
+    off[i] = sigma[i] > 0 ? (pair.b.get(name) - pair.a.get(name)) / sigma[i] : 0.0;
+    for (Eigen::Index j = 0; j < n; ++j) {
+      const double scale = sigma[i] * sigma[j];
+      correlation(i, j) = scale > 0 ? sum.matrix(i, j) / scale : 0.0;
+    }
+  }
+  const algebra::PrincipalAxes axes = algebra::principal_axes(correlation);
+  for (Eigen::Index k = 0; k < n; ++k) {
+    if (axes.values[k] <= kSmallestVariance * static_cast<double>(n)) continue;
+    const double along = axes.vectors.col(k).dot(off);
+    test.chi2 += along * along / axes.values[k];
+    ++test.degrees_of_freedom;
+  }
+  if (test.degrees_of_freedom == 0) return test;
+  test.p_value = Eigen::numext::igammac(0.5 * test.degrees_of_freedom, 0.5 * test.chi2);
+  return test;
+}
+
+calibration::PointingError compare_directions(const Pair& pair, const NamedCovariance& sum) {
+  const Sensor& b = pair.b;
   std::vector<std::vector<double>> angles(static_cast<std::size_t>(b.prisms()),
                                           std::vector<double>(kBeams));
   for (std::size_t k = 0; k < angles.size(); ++k) {
@@ -169,18 +209,24 @@ calibration::PointingError compare_directions(const Pair& pair) {
 
 }  // namespace
 
-ResultComparison compare_results(const std::string& a, const std::string& b) {
-  ResultComparison result{load_result(a), load_result(b), {}, {}, false, false};
+ResultComparison compare_results(const std::string& a, const std::string& b, OneUnit one_unit) {
+  ResultComparison result;
+  result.a = load_result(a);
+  result.b = load_result(b);
   require_same_kind(result.a, result.b);
   result.same_unit = !result.a.serial.empty() && result.a.serial == result.b.serial;
-  result.held_alike = result.same_unit && hold_alike(result.a, result.b);
+  const bool unknown = result.a.serial.empty() || result.b.serial.empty();
+  const bool taken_for_one = result.same_unit || (one_unit == OneUnit::caller && unknown);
+  result.held_alike = taken_for_one && hold_alike(result.a, result.b);
   const auto known = [&](const Sensor& sensor) {
     const NamedCovariance all{sensor.covariance_names, sensor.covariance};
     return result.held_alike ? given_held(all, held_names(sensor)) : all;
   };
   const Pair pair{result.a, result.b, known(result.a), known(result.b)};
   result.parameters = differences(pair);
-  result.beams = compare_directions(pair);
+  const NamedCovariance covariance = covariance_of_differences(pair);
+  result.change = test_of_change(pair, covariance);
+  result.beams = compare_directions(pair, covariance);
   return result;
 }
 

@@ -102,6 +102,7 @@ estimation::Evaluation evaluate_by_file(const estimation::Estimate& estimate,
 
 EstimatedRecording estimate_recording(const EstimateRecordingOptions& options,
                                       const Progress& progress) {
+  const Stopwatch whole;
   check(options);
   ResultFolder folder(options.files.folder);
   EstimationInput input =
@@ -149,6 +150,7 @@ EstimatedRecording estimate_recording(const EstimateRecordingOptions& options,
     result.provenance = with_inputs(options.files.provenance, {options.recording}, judging);
     write_files(options, result, folder, judging);
   }
+  result.total_time = whole.seconds();
   return result;
 }
 

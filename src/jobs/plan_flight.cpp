@@ -4,10 +4,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <sstream>
 
 #include <fmt/format.h>
 
 #include "risley/core/error.hpp"
+#include "risley/io/text_file.hpp"
+#include "risley/scenes/scene.hpp"
 #include "risley/sensors/preset.hpp"
 
 #include "jobs/checks.hpp"
@@ -49,6 +52,37 @@ cloud::PointDistributionSummary distribution_of(const calibration::PlannedFlight
 }
 
 }  // namespace
+
+bool is_flight_plan(const std::string& path) {
+  std::istringstream lines(io::read_text_file(path));
+  for (std::string line; std::getline(lines, line);) {
+    if (line.starts_with("strips:") || line.starts_with("risley_flight:")) return true;
+  }
+  return false;
+}
+
+void load_flight_plan(const FlightPlanFiles& files, PlanFlightOptions& options) {
+  options.plan = trajectories::load_flight_plan(files.plan);
+  if (files.mount.empty()) {
+    throw InvalidArgument(
+        "option mount is missing: a file that says how the sensor sits on the platform, and by its "
+        "sigmas how well that is known before the flight");
+  }
+  if (files.errors.empty()) {
+    throw InvalidArgument(
+        "option trajectory_errors is missing: a file that says how wrong the trajectory of the "
+        "flight will be, and for how long");
+  }
+  options.mount = trajectories::load_mount(files.mount);
+  options.errors = trajectories::load_error_model(files.errors);
+  if (files.scene.empty()) return;
+  const scenes::Scene scene = scenes::load_scene(files.scene);
+  if (!scene.terrain) {
+    throw InvalidArgument(fmt::format(
+        "{} has no terrain to fly over: give it terrain: {{ground: ...}}", files.scene));
+  }
+  options.terrain = scene.terrain->parts();
+}
 
 PlannedFlightResult plan_flight(const PlanFlightOptions& options, const Progress& progress) {
   if (options.rate) check_positive(*options.rate, "rate", "Hz");

@@ -262,6 +262,23 @@ SensorChoice choose_by_name(const FirstShots& shots, const Sensor& named,
 
 }  // namespace
 
+std::string sensor_name(const recordings::RecordingHeader& header) {
+  std::vector<std::string> names;
+  for (const recordings::Device& device : header.devices) {
+    const std::string name = recordings::device_type_name(device.type);
+    if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
+  }
+  std::string text;
+  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
+  return text;
+}
+
+std::string sensor_name(const SensorChoice& choice) {
+  const bool unknown = choice.chosen_by == ChosenBy::guess && choice.fits == false;
+  return unknown ? "unknown"
+                 : fmt::format("{} {}", choice.sensor.manufacturer, choice.sensor.model);
+}
+
 std::string to_string(ChosenBy chosen_by) {
   switch (chosen_by) {
     case ChosenBy::option:

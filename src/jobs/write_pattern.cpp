@@ -72,6 +72,7 @@ WrittenPattern write_pattern(const WritePatternOptions& options, std::ostream& s
   WrittenPattern result;
   result.sensor = sensor.name;
   result.format = format.shown.name;
+  result.output = options.output;
   result.rows = shots / options.scan.every;
   require_at_least("rows of the pattern", static_cast<long long>(result.rows), 1);
   result.firing = to_string(options.scan.firing.value_or(

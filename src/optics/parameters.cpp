@@ -151,6 +151,10 @@ const ParameterInfo& find_parameter(std::string_view name, TrainShape shape) {
                                     did_you_mean(name, names), fmt::join(names, ", ")));
 }
 
+double in_file_unit(std::string_view name, double value, TrainShape shape) {
+  return value / find_parameter(name, shape).si_per_unit;
+}
+
 const ParameterInfo* find_parameter_of_any_train(std::string_view name) {
   // Only emitters' names differ: one alone has no number.
   for (const TrainShape shape : {TrainShape{kMaxPrisms, 1}, {kMaxPrisms, kMaxEmitters}}) {

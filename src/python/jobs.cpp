@@ -1,235 +1,528 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
+#include <array>
 #include <memory>
 #include <optional>
 #include <string>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 #include <pybind11/stl.h>
 
+#include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
-#include "risley/core/number_text.hpp"
 #include "risley/core/require.hpp"
 #include "risley/io/text_file.hpp"
-#include "risley/jobs/estimate_recording.hpp"
-#include "risley/report/estimate_report.hpp"
-#include "risley/report/html.hpp"
-#include "risley/report/report_facts.hpp"
+#include "risley/jobs/cloud_of_recording.hpp"
+#include "risley/jobs/compare_series.hpp"
+#include "risley/jobs/identify_recording.hpp"
+#include "risley/jobs/inspect_recording.hpp"
+#include "risley/jobs/inspect_trajectory.hpp"
+#include "risley/jobs/observability.hpp"
+#include "risley/jobs/pattern_details.hpp"
+#include "risley/jobs/simulation_settings.hpp"
+#include "risley/jobs/write_pattern.hpp"
 #include "risley/report/report_file.hpp"
+#include "risley/simulation/truth_file.hpp"
 
 #include "python/arrays.hpp"
-#include "python/bind.hpp"
 #include "python/call.hpp"
+#include "python/json.hpp"
 #include "python/names.hpp"
-#include "python/reading.hpp"
+#include "python/options.hpp"
+#include "python/results.hpp"
 
 namespace risley::python {
 namespace {
 
+using jobs::CalibratedFlight;
+using jobs::CalibratedRecordings;
 using jobs::EstimatedRecording;
-using SharedEstimate = std::shared_ptr<EstimatedRecording>;
-using Held = std::vector<std::pair<std::string, std::optional<double>>>;
+using jobs::NamedText;
 
-/// The name in files of a parameter of any train; an unknown name as it is, for the job to refuse.
-std::string file_name_of(const NamedParameter& parameter, const std::string& name) {
-  return parameter.info != nullptr ? parameter.info->name : name;
+/// The page of a result and the numbers behind it, as `-o DIR` of the command writes them.
+std::vector<NamedText> texts_of(const report::Report& report) {
+  return {{"report.json", report::report_text(report)},
+          {"report.html", report::report_page(report)}};
 }
 
-jobs::HeldParameters held_parameters(const Held& fixed) {
-  jobs::HeldParameters held;
-  for (const auto& [name, value] : fixed) {
-    const NamedParameter parameter = parameter_of_any_train(name);
-    std::optional<double> si = value;
-    if (si) *si *= parameter.si_per_unit;
-    held.emplace_back(file_name_of(parameter, name), si);
+template <class Found>
+const auto& solution_of(const Found& found) {
+  if constexpr (std::is_same_v<Found, EstimatedRecording>) {
+    return found.estimate;
+  } else {
+    return found.calibration;
   }
-  return held;
 }
 
-std::vector<std::string> freed_parameters(const std::vector<std::string>& names) {
-  std::vector<std::string> freed;
-  freed.reserve(names.size());
-  for (const std::string& name : names) {
-    freed.push_back(file_name_of(parameter_of_any_train(name), name));
-  }
-  return freed;
+/// What all results share: the face of Python makes its objects of these.
+template <class Found>
+py::class_<Found, std::shared_ptr<Found>> bind_found(py::module_& module, const char* name) {
+  py::class_<Found, std::shared_ptr<Found>> type(module, name);
+  type.def_property_readonly("converged",
+                             [](const Found& found) { return solution_of(found).converged; });
+  type.def_property_readonly("reason",
+                             [](const Found& found) { return solution_of(found).reason; });
+  type.def_property_readonly("verdict", [](const Found& found) {
+    const auto& verdict = solution_of(found).verdict;
+    return py::make_tuple(to_string(verdict.code), verdict.words, verdict.to_do);
+  });
+  type.def_property_readonly("sensor",
+                             [](const Found& found) { return solution_of(found).sensor; });
+  type.def_property_readonly("warnings", [](const Found& found) {
+    std::vector<std::string> warnings = found.warnings;
+    const auto& own = solution_of(found).warnings;
+    warnings.insert(warnings.end(), own.begin(), own.end());
+    return warnings;
+  });
+  type.def_property_readonly("table", [](const Found& found) { return table_of(found); });
+  type.def_property_readonly("html", [](const Found& found) {
+    const auto& solution = solution_of(found);
+    return html_of(to_string(solution.verdict.code), solution.verdict.words, table_of(found),
+                   solution.sensor.shape());
+  });
+  type.def("to_dict", [](const Found& found) { return dict_of(json::of(found)); });
+  return type;
 }
 
-std::vector<std::string> names_of(const std::vector<estimation::EstimatedValue>& values) {
-  std::vector<std::string> names;
-  names.reserve(values.size());
-  for (const auto& value : values) names.push_back(si_name(value.name));
-  return names;
+/// What the page of a result is made of.
+template <class Found>
+std::string report_text(const Found& found) {
+  return unlocked([&] {
+    if constexpr (std::is_same_v<Found, CalibratedFlight>) {
+      return report::report_text(report::flight_report(found));
+    } else {
+      return report::report_text(report::calibration_report(found));
+    }
+  });
 }
 
-/// One number of every value.
-py::array_t<double> column_of(const std::vector<estimation::EstimatedValue>& values,
-                              double estimation::EstimatedValue::*number) {
-  std::vector<double> column;
-  column.reserve(values.size());
-  for (const auto& value : values) column.push_back(value.*number);
-  return array_of(std::move(column));
-}
-
-void write_page(const EstimatedRecording& outcome, const std::string& path,
-                const py::object& tell) {
+std::string estimate_report_text(const EstimatedRecording& found, const py::object& tell) {
+  std::string text;
   run_job(tell, 0, [&](const Progress& progress) {
-    const jobs::EstimateDetails details =
-        jobs::estimate_details(outcome.estimate, outcome.nominal, outcome.head, outcome.evaluation,
-                               progress.stage("judging"));
-    io::write_text_file(
-        path, report::report_page(report::estimate_report(
-                  {outcome.estimate, outcome.nominal, outcome.evaluation, outcome.head, details,
-                   report::reported(outcome.recording), outcome.provenance, outcome.warnings})));
+    const jobs::EstimateDetails details = jobs::estimate_details(
+        found.estimate, found.nominal, found.head, found.evaluation, progress.stage("judging"));
+    text = report::report_text(report::estimate_report(
+        {found.estimate, found.nominal, found.evaluation, found.head, details,
+         report::reported(found.recording), found.provenance, found.warnings}));
+  });
+  return text;
+}
+
+void write_page(const std::string& report, const std::string& path) {
+  unlocked([&] {
+    io::write_text_file(path,
+                        report::report_page(report::parse_report(report, "a result of Python")));
   });
 }
 
-/// The verdict and a table of what was found.
-std::string html_of(const EstimatedRecording& outcome) {
-  const estimation::Estimate& e = outcome.estimate;
-  std::string html = fmt::format(
-      "<p><b>{}</b>: {}</p><table><tr><th>parameter</th><th>value</th>"
-      "<th>&plusmn; sigma</th><th>unit</th></tr>",
-      estimation::to_string(e.verdict.code), report::escape_html(e.verdict.words));
-  for (const estimation::EstimatedValue& value : e.values) {
-    const ParameterInfo& info = find_parameter(value.name, e.sensor.shape());
-    const NumberText text =
-        number_text(value.value / info.si_per_unit, value.sigma / info.si_per_unit);
-    html += fmt::format("<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>", value.name,
-                        text.value, text.sigma, info.unit);
-  }
-  return html + "</table>";
+/// Runs a job and gives what it found to Python.
+template <class Job>
+auto found_by(const py::object& tell, int threads, const Job& job) {
+  using Found = std::invoke_result_t<const Job&, const Progress&>;
+  auto found = std::make_shared<Found>();
+  run_job(tell, threads, [&](const Progress& progress) { *found = job(progress); });
+  return found;
+}
+/// The same as a dictionary.
+template <class Job>
+py::object told_by(const py::object& tell, int threads, const Job& job) {
+  return dict_of(json::of(*found_by(tell, threads, job)));
 }
 
-SharedEstimate estimate(const std::string& recording, const std::string& sensor,
-                        const std::string& method, const py::object& rate,
-                        std::optional<double> angle_noise, const Held& fixed,
-                        const std::vector<std::string>& freed, std::optional<bool> mirrored,
-                        const std::string& truth, std::optional<double> shot_rate,
-                        const YawPitchRoll& extrinsics, int threads, const py::object& tell) {
+/// Shots per second to use: a number, or 'full' for all.
+void take_rate(const Options& options, std::optional<double>& rate) {
+  if (options.is_text("rate")) {
+    options.choice("rate", {"full"});
+    rate.reset();
+    return;
+  }
+  options.take("rate", rate);
+  if (rate) require_above("rate", *rate, 0, "Hz");
+}
+
+std::shared_ptr<EstimatedRecording> estimate(const py::dict& values, int threads,
+                                             const py::object& tell) {
+  const Options options(values);
   jobs::EstimateRecordingOptions job;
-  job.recording = recording;
-  job.reading = read_options(shot_rate, extrinsics);
-  job.sensor = sensor;
-  if (method != "map" && method != "ekf") {
-    throw InvalidArgument(fmt::format("method = '{}', allowed map and ekf", method));
-  }
-  job.method = method == "ekf" ? estimation::Method::ekf : estimation::Method::map;
-  if (rate.is_none()) {
-    job.rate = jobs::usual_rate(job.method);
-  } else if (!py::isinstance<py::str>(rate)) {
-    job.rate = rate.cast<double>();
-    require_above("rate", *job.rate, 0, "Hz");
-  } else if (rate.cast<std::string>() != "full") {
-    throw InvalidArgument(
-        fmt::format("rate = '{}', expected a number or 'full'", rate.cast<std::string>()));
-  }
-  if (angle_noise) require_above("angle_noise", *angle_noise, 0, "rad");
-  job.angle_noise = angle_noise;
-  job.fixed = held_parameters(fixed);
-  job.additional = freed_parameters(freed);
-  job.mirrored = mirrored;
-  job.truth = truth;
-  SharedEstimate result;
-  run_job(tell, threads, [&](const Progress& progress) {
-    result = std::make_shared<EstimatedRecording>(jobs::estimate_recording(job, progress));
+  options.take("recording", job.recording);
+  job.reading = read_options(options);
+  options.take("sensor", job.sensor);
+  constexpr std::array kMethods = {estimation::Method::map, estimation::Method::ekf};
+  job.method = kMethods.at(options.choice("method", {"map", "ekf"}));
+  job.rate = jobs::usual_rate(job.method);
+  take_rate(options, job.rate);
+  options.take("angle_noise", job.angle_noise);
+  if (job.angle_noise) require_above("angle_noise", *job.angle_noise, 0, "rad");
+  job.fixed = held_parameters(options);
+  job.additional = parameter_names(options, "free");
+  options.take("mirrored", job.mirrored);
+  options.take("truth", job.truth);
+  job.files = result_files(options, "estimate");
+  job.details = !job.files.folder.empty();
+  job.texts = [](const EstimatedRecording& found) {
+    return texts_of(report::estimate_report(found));
+  };
+  return found_by(tell, threads, [&](const Progress& progress) {
+    return jobs::estimate_recording(job, progress);
   });
-  return result;
+}
+
+/// What calibrations and plans share.
+template <class Job>
+void take_model(const Options& options, Job& job) {
+  options.take("sensor", job.sensor);
+  job.fixed = held_parameters(options);
+  job.additional = parameter_names(options, "free");
+  take_rate(options, job.rate);
+  options.take("range_noise", job.range_noise);
+  if (job.range_noise) require_above("range_noise", *job.range_noise, 0, "m");
+  options.take("prior_sigma", job.prior_sigma);
+  if (job.prior_sigma) require_above("prior_sigma", *job.prior_sigma, 0, "rad");
+  options.take("range_offset_sigma", job.range_offset_sigma);
+  require_not_below("range_offset_sigma", job.range_offset_sigma, 0, "m");
+}
+
+/// What calibrations on walls and in flight share.
+template <class Job>
+void take_recordings(const Options& options, Job& job) {
+  take_model(options, job);
+  options.take("recordings", job.recordings);
+  job.reading = read_options(options);
+  options.take("angle_noise", job.angle_noise);
+  if (job.angle_noise) require_above("angle_noise", *job.angle_noise, 0, "rad");
+  options.take("mirrored", job.mirrored);
+  options.take("seed", job.seed);
+  options.take("truth", job.truths);
+  options.take("force", job.force);
+  job.files = result_files(options, "calibrate");
+  job.details = true;
+}
+
+/// Squares of ground and knots of a flight.
+template <class Job>
+void take_grid(const Options& options, Job& job) {
+  options.take("knot_spacing", job.knot_spacing);
+  require_above("knot_spacing", job.knot_spacing, 0, "s");
+  options.take("cell_size", job.cell_size);
+  require_above("cell_size", job.cell_size, 0, "m");
+}
+
+std::shared_ptr<CalibratedRecordings> calibrate(const py::dict& values, int threads,
+                                                const py::object& tell) {
+  const Options options(values);
+  jobs::CalibrateRecordingsOptions job;
+  take_recordings(options, job);
+  constexpr std::array kMethods = {calibration::CalibrationMethod::adjustment,
+                                   calibration::CalibrationMethod::paper};
+  job.method = kMethods.at(options.choice("method", {"adjustment", "paper"}));
+  options.take("beam_origin", job.beam_origin);
+  std::string planes, stations;
+  std::vector<std::string> station_names;
+  options.take("planes", planes);
+  options.take("stations", stations);
+  options.take("station", station_names);
+  if (!planes.empty()) job.planes = scenes::load_scene(planes);
+  job.stations = jobs::stations_of(stations, station_names, job.recordings.size());
+  job.texts = [](const CalibratedRecordings& found) {
+    return texts_of(report::calibration_report(found));
+  };
+  return found_by(tell, threads, [&](const Progress& progress) {
+    return jobs::calibrate_recordings(job, progress);
+  });
+}
+
+std::shared_ptr<CalibratedFlight> calibrate_flight(const py::dict& values, int threads,
+                                                   const py::object& tell) {
+  const Options options(values);
+  jobs::CalibrateFlightOptions job;
+  take_recordings(options, job);
+  take_grid(options, job);
+  job.platform = platform_files(options);
+  options.take("control", job.control);
+  job.texts = [](const CalibratedFlight& found) { return texts_of(report::flight_report(found)); };
+  return found_by(tell, threads,
+                  [&](const Progress& progress) { return jobs::calibrate_flight(job, progress); });
+}
+
+std::shared_ptr<jobs::PlannedCalibration> plan(const py::dict& values, const py::object& tell) {
+  const Options options(values);
+  jobs::PlanCalibrationOptions job;
+  take_model(options, job);
+  std::string scene;
+  options.take("plan", scene);
+  job.scene = scenes::load_scene(scene);
+  options.take("duration", job.duration);
+  require_above("duration", job.duration, 0, "s");
+  options.take("beam_origin", job.beam_origin);
+  return found_by(tell, 0,
+                  [&](const Progress& progress) { return jobs::plan_calibration(job, progress); });
+}
+
+std::shared_ptr<jobs::PlannedFlightResult> plan_flight(const py::dict& values,
+                                                       const py::object& tell) {
+  const Options options(values);
+  jobs::PlanFlightOptions job;
+  take_model(options, job);
+  take_grid(options, job);
+  options.take("empty_circle", job.distribution.empty_circle);
+  require_above("empty_circle", job.distribution.empty_circle, 0, "m");
+  options.take("seed", job.seed);
+  jobs::FlightPlanFiles files;
+  options.take("plan", files.plan);
+  options.take("mount", files.mount);
+  options.take("trajectory_errors", files.errors);
+  options.take("scene", files.scene);
+  jobs::load_flight_plan(files, job);
+  return found_by(tell, 0,
+                  [&](const Progress& progress) { return jobs::plan_flight(job, progress); });
+}
+
+/// Bindings of a plan.
+template <class Planned>
+void bind_planned(py::module_& module, const char* name) {
+  py::class_<Planned, std::shared_ptr<Planned>>(module, name)
+      .def_property_readonly("table", [](const Planned& planned) { return table_of(planned); })
+      .def("to_dict", [](const Planned& planned) { return dict_of(json::of(planned)); });
+}
+
+py::object cloud(const py::dict& values, int threads, const py::object& tell) {
+  const Options options(values);
+  jobs::CloudOfRecordingOptions job;
+  options.take("recording", job.recording);
+  job.reading = read_options(options);
+  options.take("calibration", job.calibration);
+  options.take("output", job.output);
+  job.platform = platform_files(options);
+  cloud::CloudOptions& settings = job.cloud;
+  settings.pointing.reported_directions =
+      options.choice("directions", {"smoothed", "reported"}) == 1;
+  options.take("beam_origin", settings.pointing.beam_origin);
+  options.take("beam_divergence", settings.pointing.beam_divergence);
+  options.take("covariance", settings.pointing.covariance);
+  options.take("common_factors", settings.loadings);
+  settings.rate = cloud::kTrackingRate;
+  take_rate(options, settings.rate);
+  options.take("angle_noise", settings.angle_noise);
+  options.take("las_scale", settings.writer.las_scale);
+  options.take("format", settings.writer.format);
+  settings.writer.gps_time = options.choice("time", {"gps", "recording"}) == 0;
+  bool distribution = false;
+  options.take("distribution", distribution);
+  if (distribution) settings.distribution.emplace();
+  settings.provenance = provenance_of("cloud");
+  return told_by(tell, threads,
+                 [&](const Progress& progress) { return jobs::cloud_of_recording(job, progress); });
+}
+
+py::object simulate(const py::dict& values, int threads, const py::object& tell) {
+  const Options options(values);
+  jobs::SimulationOptions job;
+  std::string output;
+  options.take("output", output);
+  options.take("sensor", job.sensor);
+  job.set = parameter_values(options, "set");
+  options.take("reported_nominal", job.reported_nominal);
+  job.reported = parameter_values(options, "reported");
+  options.take("duration", job.duration);
+  options.take("rate", job.rate);
+  options.take("angle_noise", job.angle_noise);
+  options.take("range_noise", job.range_noise);
+  options.take("quantize", job.quantize);
+  options.take("beam_origin", job.beam_origin);
+  std::string rotor = to_string(job.rotor);
+  options.take("rotor", rotor);
+  job.rotor = simulation::rotor_kind_from(rotor);
+  options.take("start_angles", job.start_angles);
+  options.take("scene", job.scene);
+  options.take("station", job.station);
+  options.take("trajectory", job.trajectory);
+  options.take("trajectory_topic", job.topic);
+  options.take("flight", job.flight);
+  options.take("mount", job.mount);
+  options.take("trajectory_errors", job.trajectory_errors);
+  if (options.has("trajectory_format")) {
+    options.take("trajectory_format", job.trajectory_ending);
+    job.trajectory_ending.insert(0, ".");
+  }
+  options.take("start", job.start);
+  options.take("clock_drift", job.clock_drift);
+  options.take("seed", job.seed);
+  job.threads = threads;
+  return told_by(tell, threads, [&](const Progress& progress) {
+    return simulation::simulate_to_file(jobs::simulation_settings(job), output,
+                                        provenance_of("simulate"), progress);
+  });
+}
+
+py::object identify(const py::dict& values, int threads, const py::object& tell) {
+  const Options options(values);
+  jobs::IdentifyRecordingOptions job;
+  options.take("recording", job.recording);
+  job.reading = read_options(options);
+  options.take("most_prisms", job.identify.most_prisms);
+  options.take("fastest", job.identify.fastest);
+  require_above("fastest", job.identify.fastest, 0, "rad/s");
+  options.take("output", job.output);
+  options.take("force", job.undecided);
+  job.provenance = provenance_of("identify");
+  const auto found = found_by(tell, threads, [&](const Progress& progress) {
+    return jobs::identify_recording(job, progress);
+  });
+  return py::make_tuple(found->sensor.sensor, dict_of(json::of(*found)));
+}
+
+sensors::ScanPatternOptions scan_options(const Options& options) {
+  sensors::ScanPatternOptions scan;
+  options.take("rate", scan.shot_rate);
+  options.take("every", scan.every);
+  options.take("start_angles", scan.rotation_angle);
+  if (options.has("firing")) {
+    scan.firing = options.choice("firing", {"in-turn", "together"}) == 0
+                      ? sensors::Firing::in_turn
+                      : sensors::Firing::together;
+  }
+  return scan;
+}
+
+py::object pattern(const py::dict& values, int threads, const py::object& tell) {
+  const Options options(values);
+  jobs::WritePatternOptions job;
+  options.take("sensor", job.sensor);
+  options.take("format", job.format);
+  options.take("output", job.output);
+  options.take("duration", job.duration);
+  require_above("duration", job.duration, 0, "s");
+  job.scan = scan_options(options);
+  return told_by(tell, threads,
+                 [&](const Progress& progress) { return jobs::write_pattern(job, progress); });
+}
+
+py::object coverage(const py::dict& values, int threads, const py::object& tell) {
+  const Options options(values);
+  std::string sensor;
+  options.take("sensor", sensor);
+  sensors::CoverageOptions settings;
+  options.take("after", settings.after);
+  options.take("cell", settings.cell);
+  const auto found = found_by(tell, threads, [&](const Progress& progress) {
+    return jobs::pattern_details(sensor, scan_options(options), settings, progress);
+  });
+  return dict_of(json::of(found->coverage));
+}
+
+py::object observability(const py::dict& values, int threads, const py::object& tell) {
+  const Options options(values);
+  jobs::ObservabilityOptions job;
+  options.take("recording", job.recording);
+  job.reading = read_options(options);
+  options.take("sensor", job.sensor);
+  options.take("duration", job.duration);
+  require_above("duration", job.duration, 0, "s");
+  take_rate(options, job.rate);
+  options.take("angle_noise", job.angle_noise);
+  options.take("rounding", job.rounding);
+  job.fixed = held_parameters(options);
+  job.additional = parameter_names(options, "free");
+  return told_by(tell, threads, [&](const Progress& progress) {
+    return jobs::judge_observability(job, progress);
+  });
+}
+
+py::object compare(const std::vector<std::string>& results, double false_alarm,
+                   const py::object& tell) {
+  return told_by(tell, 0, [&](const Progress& progress) {
+    return jobs::compare_series({results, false_alarm}, progress);
+  });
+}
+
+py::object info(const py::dict& values, const py::object& tell) {
+  const Options options(values);
+  std::string input, accuracy, topic;
+  options.take("input", input);
+  options.take("accuracy", accuracy);
+  options.take("trajectory_topic", topic);
+  bool is_trajectory = !topic.empty() || !accuracy.empty();
+  if (!is_trajectory) {
+    run_job(tell, 0, [&](const Progress& progress) {
+      is_trajectory = trajectories::trajectory_file_kind(input, progress.silent()) !=
+                      trajectories::TrajectoryFileKind::none;
+    });
+  }
+  if (is_trajectory) {
+    return told_by(tell, 0, [&](const Progress& progress) {
+      return jobs::inspect_trajectory({input, accuracy, topic}, progress);
+    });
+  }
+  return told_by(tell, 0, [&](const Progress& progress) {
+    return jobs::inspect_recording({input, read_options(options), {}, {}}, progress);
+  });
 }
 
 }  // namespace
 
 void bind_jobs(py::module_& module) {
-  py::class_<EstimatedRecording, SharedEstimate>(
-      module, "Estimate",
-      "What `estimate` found. Numbers are in SI units, names without a unit; texts and tables\n"
-      "for people are in degrees.")
+  py::class_<ValueTable>(module, "ValueTable")
+      .def_readonly("names", &ValueTable::names)
+      .def_readonly("units", &ValueTable::units)
+      .def_property_readonly("values",
+                             [](const ValueTable& table) { return array_of(table.values); })
+      .def_property_readonly("sigmas",
+                             [](const ValueTable& table) { return array_of(table.sigmas); })
       .def_property_readonly(
-          "converged", [](const EstimatedRecording& r) { return r.estimate.converged; },
-          "Whether the numbers can be used.")
-      .def_property_readonly(
-          "reason", [](const EstimatedRecording& r) { return r.estimate.reason; },
-          "Why they cannot; empty otherwise.")
-      .def_property_readonly(
-          "verdict",
-          [](const EstimatedRecording& r) {
-            const estimation::EstimateVerdict& verdict = r.estimate.verdict;
-            return py::make_tuple(estimation::to_string(verdict.code), verdict.words,
-                                  verdict.to_do);
-          },
-          "Stable code, what was found, and what follows from it.")
-      .def_property_readonly(
-          "sensor", [](const EstimatedRecording& r) { return r.estimate.sensor; },
-          "The sensor with the estimated parameters and their covariance.")
-      .def_property_readonly(
-          "names", [](const EstimatedRecording& r) { return names_of(r.estimate.values); },
-          "What was estimated: parameters, mean speeds, first rotation angles.")
-      .def_property_readonly(
-          "units",
-          [](const EstimatedRecording& r) {
-            std::vector<std::string> units;
-            for (const auto& value : r.estimate.values) {
-              units.push_back(si_unit(find_parameter(value.name, r.estimate.sensor.shape())));
-            }
-            return units;
-          },
-          "Their units: 1, rad or rad/s.")
-      .def_property_readonly(
-          "values",
-          [](const EstimatedRecording& r) {
-            return column_of(r.estimate.values, &estimation::EstimatedValue::value);
-          },
-          "Their values, shape (n,).")
-      .def_property_readonly(
-          "sigmas",
-          [](const EstimatedRecording& r) {
-            return column_of(r.estimate.values, &estimation::EstimatedValue::sigma);
-          },
-          "One standard deviation each, with what held parameters may be off by, shape (n,).")
-      .def_property_readonly(
-          "free",
-          [](const EstimatedRecording& r) {
-            std::vector<std::string> names;
-            for (const auto& free : r.estimate.free) names.push_back(si_name(free.name));
-            return names;
-          },
-          "What the covariance is of.")
-      .def_property_readonly(
-          "covariance", [](const EstimatedRecording& r) { return array_of(r.estimate.covariance); },
-          "Of the free parameters if those held are exact, shape (free, free).")
-      .def_property_readonly(
-          "warnings",
-          [](const EstimatedRecording& r) {
-            std::vector<std::string> warnings = r.warnings;
-            warnings.insert(warnings.end(), r.estimate.warnings.begin(), r.estimate.warnings.end());
-            return warnings;
-          },
-          "What else there is to know, in sentences.")
-      .def_property_readonly(
-          "azimuth_residual",
-          [](const SharedEstimate& r) {
-            return view_of<double, EstimatedRecording>(r->estimate.azimuth_residual, r);
-          },
-          "Observed less estimated azimuth of every used shot, rad; a view.")
-      .def_property_readonly(
-          "zenith_residual",
-          [](const SharedEstimate& r) {
-            return view_of<double, EstimatedRecording>(r->estimate.zenith_residual, r);
-          },
-          "Observed less estimated zenith of every used shot, rad; a view.")
-      .def("_repr_html_", &html_of)
-      .def("__repr__", [](const EstimatedRecording& r) {
-        return fmt::format("<risley.Estimate {}: {} values, {}>", r.estimate.sensor.name,
-                           r.estimate.values.size(),
-                           estimation::to_string(r.estimate.verdict.code));
-      });
-  module.def("write_page", &write_page, py::arg("estimate"), py::arg("path"), py::arg("tell"));
-  module.def("estimate", &estimate, py::arg("recording"), py::arg("sensor"), py::arg("method"),
-             py::arg("rate"), py::arg("angle_noise"), py::arg("fixed"), py::arg("free"),
-             py::arg("mirrored"), py::arg("truth"), py::arg("shot_rate"), py::arg("extrinsics"),
-             py::arg("threads"), py::arg("tell"));
+          "sigmas_given_held",
+          [](const ValueTable& table) { return array_of(table.sigmas_given_held); })
+      .def_readonly("covariance_names", &ValueTable::covariance_names)
+      .def_property_readonly("covariance",
+                             [](const ValueTable& table) { return array_of(table.covariance); });
+  bind_found<EstimatedRecording>(module, "EstimatedRecording")
+      .def_property_readonly("azimuth_residual",
+                             [](const std::shared_ptr<EstimatedRecording>& found) {
+                               return view_of<double, EstimatedRecording>(
+                                   found->estimate.azimuth_residual, found);
+                             })
+      .def_property_readonly("zenith_residual",
+                             [](const std::shared_ptr<EstimatedRecording>& found) {
+                               return view_of<double, EstimatedRecording>(
+                                   found->estimate.zenith_residual, found);
+                             })
+      .def("report_text", &estimate_report_text, py::arg("tell"));
+  bind_found<CalibratedRecordings>(module, "CalibratedRecordings")
+      .def(
+          "report_text",
+          [](const CalibratedRecordings& found, const py::object&) { return report_text(found); },
+          py::arg("tell"));
+  bind_found<CalibratedFlight>(module, "CalibratedFlight")
+      .def(
+          "report_text",
+          [](const CalibratedFlight& found, const py::object&) { return report_text(found); },
+          py::arg("tell"));
+  bind_planned<jobs::PlannedCalibration>(module, "PlannedCalibration");
+  bind_planned<jobs::PlannedFlightResult>(module, "PlannedFlight");
+  module.def("write_page", &write_page, py::arg("report"), py::arg("path"));
+  const auto options = py::arg("options");
+  const auto threads = py::arg("threads");
+  const auto tell = py::arg("tell");
+  module.def("estimate", &estimate, options, threads, tell);
+  module.def("calibrate", &calibrate, options, threads, tell);
+  module.def("calibrate_flight", &calibrate_flight, options, threads, tell);
+  module.def("plan", &plan, options, tell);
+  module.def("plan_flight", &plan_flight, options, tell);
+  module.def("cloud", &cloud, options, threads, tell);
+  module.def("simulate", &simulate, options, threads, tell);
+  module.def("identify", &identify, options, threads, tell);
+  module.def("pattern", &pattern, options, threads, tell);
+  module.def("coverage", &coverage, options, threads, tell);
+  module.def("observability", &observability, options, threads, tell);
+  module.def("compare", &compare, py::arg("results"), py::arg("false_alarm"), tell);
+  module.def("info", &info, options, tell);
+  module.def(
+      "is_flight_plan",
+      [](const std::string& path) { return unlocked([&] { return jobs::is_flight_plan(path); }); },
+      py::arg("path"));
 }
 
 }  // namespace risley::python

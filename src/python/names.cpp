@@ -8,7 +8,7 @@ namespace risley::python {
 namespace {
 
 /// What the names of files end in beyond those in SI units.
-constexpr std::array<std::string_view, 2> kUnits = {"_deg_per_s", "_deg"};
+constexpr std::array<std::string_view, 4> kUnits = {"_deg_per_s", "_deg", "_m", "_s"};
 
 /// A parameter by either name.
 /// @param find  gives the entry of a name in files, null where there is none

@@ -137,9 +137,6 @@ py::tuple linearise_shots(const PrismTrain& train, const py::object& angles,
   return py::make_tuple(result_of(azimuth), result_of(zenith), d_azimuth, d_zenith);
 }
 
-/// Solutions of the inverse for one direction, at most so many.
-constexpr py::ssize_t kMostPairs = 4;
-
 py::tuple invert(const PrismTrain& train, const py::object& azimuth, const py::object& zenith,
                  const std::vector<double>& fixed_angles, const py::object& beam) {
   const RunningCall call;
@@ -153,15 +150,15 @@ py::tuple invert(const PrismTrain& train, const py::object& azimuth, const py::o
   const Bytes beams(broadcast_to(arrays[2].second, shape));
   py::array_t<std::int64_t, py::array::c_style> count(shape);
   py::array_t<bool, py::array::c_style> continuum(shape);
-  shape.push_back(kMostPairs);
+  shape.push_back(kMostRotationPairs);
   Numbers first(shape), second(shape);
   const auto solve = [&, count = count.mutable_data(), continuum = continuum.mutable_data(),
                       first = first.mutable_data(), second = second.mutable_data(),
                       azimuths = azimuths.data(), zeniths = zeniths.data(), beams = beams.data(),
                       shots = azimuths.size()](const Progress& progress) {
     constexpr py::ssize_t kLook = 4096;
-    std::fill_n(first, kMostPairs * shots, std::numeric_limits<double>::quiet_NaN());
-    std::fill_n(second, kMostPairs * shots, std::numeric_limits<double>::quiet_NaN());
+    std::fill_n(first, kMostRotationPairs * shots, std::numeric_limits<double>::quiet_NaN());
+    std::fill_n(second, kMostRotationPairs * shots, std::numeric_limits<double>::quiet_NaN());
     for (py::ssize_t i = 0; i < shots; ++i) {
       if (i % kLook == 0) progress.report(static_cast<double>(i) / static_cast<double>(shots));
       count[i] = 0;
@@ -170,9 +167,9 @@ py::tuple invert(const PrismTrain& train, const py::object& azimuth, const py::o
       const InverseSolution solution = rotation_angles_for(
           train, direction_from_angles<double>({azimuths[i], zeniths[i]}), fixed_angles, beams[i]);
       for (const RotationPair& pair : solution.pairs) {
-        if (count[i] == kMostPairs) break;
-        first[kMostPairs * i + count[i]] = pair.first;
-        second[kMostPairs * i + count[i]] = pair.second;
+        if (count[i] == kMostRotationPairs) break;
+        first[kMostRotationPairs * i + count[i]] = pair.first;
+        second[kMostRotationPairs * i + count[i]] = pair.second;
         ++count[i];
       }
       continuum[i] = solution.continuum;

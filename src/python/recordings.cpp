@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <memory>
+#include <mutex>
 #include <numeric>
 #include <optional>
 #include <string>
@@ -40,6 +41,36 @@ std::vector<std::string> texts_of(const std::vector<recordings::ReadWarning>& wa
   return texts;
 }
 
+/// Pieces that nobody looks at any more, to be filled again: memory that is used for the first time
+/// costs more than reading.
+class SparePieces : public std::enable_shared_from_this<SparePieces> {
+ public:
+  /// A piece of any content that comes back when its last owner lets it go.
+  SharedRecording take() {
+    std::unique_ptr<Recording> piece;
+    {
+      const std::lock_guard lock(mutex_);
+      if (!spare_.empty()) {
+        piece = std::move(spare_.back());
+        spare_.pop_back();
+      }
+    }
+    if (!piece) piece = std::make_unique<Recording>();
+    return {piece.release(), [home = weak_from_this()](Recording* done) {
+              std::unique_ptr<Recording> owned(done);
+              const auto pieces = home.lock();
+              if (!pieces) return;
+              const std::lock_guard lock(pieces->mutex_);
+              if (pieces->spare_.size() < kMost) pieces->spare_.push_back(std::move(owned));
+            }};
+  }
+
+ private:
+  static constexpr std::size_t kMost = 2;
+  std::mutex mutex_;
+  std::vector<std::unique_ptr<Recording>> spare_;
+};
+
 /// Reads on where the last piece ended.
 class ChunkReader {
  public:
@@ -56,7 +87,7 @@ class ChunkReader {
 
   SharedRecording next() {
     if (!reader_) throw py::stop_iteration();
-    auto piece = std::make_shared<Recording>();
+    const SharedRecording piece = spare_->take();
     bool more = false;
     run_job(
         py::none(), 0, [&](const Progress&) { more = reader_->read(piece->data, rows_); },
@@ -72,6 +103,7 @@ class ChunkReader {
     warnings_ = reader_->warnings();
     fraction_ = reader_->fraction_read();
     reader_.reset();
+    spare_ = std::make_shared<SparePieces>();
   }
 
   const RecordingHeader& header() const { return reader_ ? reader_->header() : header_; }
@@ -82,6 +114,7 @@ class ChunkReader {
 
  private:
   std::size_t rows_;
+  std::shared_ptr<SparePieces> spare_ = std::make_shared<SparePieces>();
   CancelFlag cancel_;
   std::unique_ptr<recordings::Reader> reader_;
   // Of a reader that was closed.
@@ -160,11 +193,7 @@ SharedRecording recording_from_arrays(const py::object& time_ns, const py::objec
   if (others.contains("valid")) {
     take_bytes(rows.valid, "valid", 1);
   } else {
-    rows.valid.resize(count);
-    for (std::size_t i = 0; i < count; ++i) {
-      rows.valid[i] =
-          std::isfinite(rows.azimuth[i]) && std::isfinite(rows.zenith[i]) && !(rows.range[i] <= 0);
-    }
+    recordings::mark_valid(rows);
   }
   for (const auto& [name, values] : others) {
     throw py::type_error(fmt::format("unknown column {}", name.cast<std::string>()));

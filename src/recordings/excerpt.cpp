@@ -148,6 +148,7 @@ class ExcerptWriter {
   ExcerptWriter(const std::string& path, const RecordingHeader& source, const Stretch& stretch,
                 const ExcerptOptions& options)
       : stretch_(stretch), cartesian_(source.cartesian) {
+    excerpt_.path = path;
     excerpt_.has_times = source.has_times;
     excerpt_.has_ranges = options.ranges && source.has_range;
     excerpt_.first_row = stretch.first_row;
@@ -297,6 +298,19 @@ Stretch best_stretch(Reader& reader, const ExcerptOptions& options, const Progre
 }
 
 }  // namespace
+
+ExcerptContents contents_of(const Excerpt& excerpt) {
+  ExcerptContents contents;
+  contents.holds = {excerpt.rounded ? "directions and their resolution, rounded" : "directions",
+                    excerpt.has_times ? "times from 0" : "shot numbers from 0",
+                    "shots without return in their places", "return numbers, tags and beams",
+                    "the type of the sensor and the format of the recording"};
+  contents.lacks = {"serial numbers",   "date and time of day", "file names",    "intensities",
+                    "inertial samples", "extrinsics",           "packet headers"};
+  auto& ranges = excerpt.has_ranges ? contents.holds : contents.lacks;
+  ranges.insert(ranges.begin() + 1, "ranges");
+  return contents;
+}
 
 Excerpt write_excerpt(const std::string& recording, const std::string& path,
                       const ExcerptOptions& options, const ReadOptions& reading,

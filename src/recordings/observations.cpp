@@ -65,6 +65,14 @@ void require_columns(const Observations& rows) {
                   rows);
 }
 
+void mark_valid(Observations& rows) {
+  rows.valid.resize(rows.size());
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    rows.valid[i] =
+        std::isfinite(rows.azimuth[i]) && std::isfinite(rows.zenith[i]) && !(rows.range[i] <= 0);
+  }
+}
+
 void require_angles(const Observations& rows) {
   require_columns(rows);
   for (std::size_t i = 0; i < rows.size(); ++i) {

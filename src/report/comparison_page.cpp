@@ -20,19 +20,12 @@ using calibration::PointingError;
 using jobs::ParameterDifference;
 using jobs::ResultComparison;
 
-/// "0.4034° ± 0.0007°"
-std::string angle_text(double value, double sigma) {
-  const NumberText text = number_text(degrees_from_radians(value), degrees_from_radians(sigma));
-  return is_sigma(sigma) ? fmt::format("{}° ± {}°", text.value, text.sigma)
-                         : plain_text(degrees_from_radians(value), 3) + "°";
-}
-
 std::vector<KeyNumber> key_numbers(const PointingError& beams) {
-  return {{angle_text(beams.errors.total, beams.total_sigma),
+  return {{angle_with_sigma(beams.errors.total, beams.total_sigma),
            fmt::format("between the directions of the two ({})", offset_text(beams.errors.total))},
-          {angle_text(beams.errors.gauge, beams.gauge_sigma),
+          {angle_with_sigma(beams.errors.gauge, beams.gauge_sigma),
            "of that is a rotation of all beams together"},
-          {angle_text(beams.errors.shape, beams.shape_sigma),
+          {angle_with_sigma(beams.errors.shape, beams.shape_sigma),
            "is the beams against each other: their shape"}};
 }
 
@@ -127,7 +120,7 @@ std::string directions_html(const PointingError& beams) {
       kStatedDistance);
   const auto row = [&](const char* head, double value, double sigma) {
     html += fmt::format("<tr><th scope=\"row\">{}</th><td>{}</td><td>{}</td></tr>\n", head,
-                        angle_text(value, sigma), millimetres(offset_at(value)));
+                        angle_with_sigma(value, sigma), millimetres(offset_at(value)));
   };
   row("all of it", beams.errors.total, beams.total_sigma);
   row("shared: a rotation of all beams together", beams.errors.gauge, beams.gauge_sigma);

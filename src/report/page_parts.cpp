@@ -8,6 +8,8 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "risley/core/angle.hpp"
+#include "risley/core/number_text.hpp"
 #include "risley/core/text.hpp"
 #include "risley/io/sha256.hpp"
 #include "risley/report/html.hpp"
@@ -98,6 +100,12 @@ std::string parameter_head(const std::string& long_name, const std::string& symb
 
 std::string parameter_head(const ParameterInfo& parameter) {
   return parameter_head(parameter.long_name, parameter.symbol, parameter.name);
+}
+
+std::string angle_with_sigma(double value, double sigma) {
+  const NumberText text = number_text(degrees_from_radians(value), degrees_from_radians(sigma));
+  return is_sigma(sigma) ? fmt::format("{}° ± {}°", text.value, text.sigma)
+                         : plain_text(degrees_from_radians(value), 3) + "°";
 }
 
 std::string list_html(const std::vector<std::string>& items) {

@@ -16,8 +16,6 @@
 namespace risley::report {
 namespace {
 
-constexpr double kSquareDegree = kRadiansPerDegree * kRadiansPerDegree;  // sr
-
 Chart rosette_chart(const jobs::PatternDetails& details) {
   const sensors::ScanPattern& rosette = details.rosette;
   Series dots{"", "a", SeriesKind::points, {}, {}};

@@ -480,8 +480,9 @@ void write_report(const std::string& path, const Report& report) {
   io::write_text_file(path, report_text(report));
 }
 
-Report read_report(const std::string& path) {
-  const std::string text = io::read_text_file(path);
+Report read_report(const std::string& path) { return parse_report(io::read_text_file(path), path); }
+
+Report parse_report(const std::string& text, const std::string& path) {
   Json object;
   try {
     object = Json::parse(text);

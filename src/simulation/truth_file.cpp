@@ -144,15 +144,32 @@ SimulationResult simulate_to_file(
   }
   recording->close();
   truth_columns.close();
-  SimulationResult result{scanner.shots(),
-                          scanner.no_return(),
-                          truth_preset(scanner, provenance),
-                          scanner.start_angles(),
-                          simulation_files(settings, path),
-                          std::move(left_out)};
+  SimulationResult result;
+  result.observations = scanner.shots();
+  result.no_return = scanner.no_return();
+  result.truth = truth_preset(scanner, provenance);
+  result.start_angles = scanner.start_angles();
+  result.files = simulation_files(settings, path);
+  result.truth_files = {truth_preset_path(path), truth_columns_path(path)};
+  if (settings.platform) {
+    result.truth_files.insert(result.truth_files.end(),
+                              {truth_trajectory_path(path), truth_mount_path(path)});
+    result.trajectory = trajectory_path(path, settings.platform->trajectory_ending);
+    result.strips = settings.platform->strips;
+  }
+  result.left_out = std::move(left_out);
   io::write_text_file(truth_preset_path(path), sensors::preset_text(result.truth));
   beside.keep();
   return result;
+}
+
+std::vector<sensors::NamedValue> true_values(const SimulationResult& result) {
+  std::vector<sensors::NamedValue> values = sensors::named_values(result.truth);
+  for (std::size_t i = 0; i < result.start_angles.size(); ++i) {
+    values.push_back({fmt::format("rotation_angle_{}_deg", prism_letter(static_cast<int>(i))),
+                      degrees_from_radians(result.start_angles[i]), "deg"});
+  }
+  return values;
 }
 
 }  // namespace risley::simulation

@@ -10,7 +10,7 @@ from command import SOURCE, CommandTest, run
 
 HALL = SOURCE / "data" / "hall.yaml"
 VERBS = ("info", "convert", "simulate", "estimate", "observability", "calibrate", "cloud",
-         "identify", "pattern", "preset", "report")
+         "compare", "identify", "pattern", "preset", "report")
 RATES = {"mid-40": 100000, "mid-70": 100000, "avia": 240000, "horizon": 240000, "tele-15": 240000}
 
 
@@ -53,6 +53,7 @@ class ContractTest(CommandTest):
                          "avia.npy"), ()),
             "preset": (("check", "out/calibration.yaml"), ("out/calibration.yaml",)),
             "report": (("out",), ("out/report.json",)),
+            "compare": (("out", "out"), ("out/calibration.yaml", "out/calibration.yaml")),
         }
         self.assertEqual(set(commands), set(VERBS))
         for verb, (arguments, inputs) in commands.items():

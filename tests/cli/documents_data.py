@@ -58,6 +58,7 @@ DATA = {
           f"--scene stations.yaml --station '{station} right' --duration-s 1"
           for station in ("upright", "flipped")),
         "mkdir flight && cp recording.lvx flight/",
+        "risley calibrate wall.lvx --force -o march/ && cp -r march june && cp -r march november",
         "risley pattern --sensor horizon --format livox-csv --duration-s 0.1 -o sequence.csv",
         # A frame of a sensor in which no shot is missing, as points.
         "risley simulate -o all.csv --sensor tele-15 --rate-hz 240385 --duration-s 0.1 --scene data/room.yaml",

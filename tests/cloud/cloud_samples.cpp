@@ -122,17 +122,17 @@ Points slice(const CloudHeader& header, const Points& points, std::size_t first,
 
 void write_uneven(const std::string& path, const std::string& format, const CloudHeader& header,
                   const Points& points) {
-  constexpr std::size_t kLengths[] = {1, 7, 0, 1000, 2, 613};
+  constexpr std::size_t kLengths[] = {0, 1, 7, 0, 1000, 2, 613};
   CloudWriterOptions options;
   options.format = format;
   const auto writer = create_cloud(path, header, options);
-  std::size_t first = 0;
-  for (std::size_t piece = 0; first < points.size(); ++piece) {
+  std::size_t first = 0, piece = 0;
+  do {
     const std::size_t count =
-        std::min(kLengths[piece % std::size(kLengths)], points.size() - first);
+        std::min(kLengths[piece++ % std::size(kLengths)], points.size() - first);
     writer->write(slice(header, points, first, count));
     first += count;
-  }
+  } while (first < points.size());
   writer->close();
 }
 

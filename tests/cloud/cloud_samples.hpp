@@ -37,7 +37,7 @@ Points make_points(const CloudCase& one);
 /// Points [first, first + count).
 Points slice(const CloudHeader& header, const Points& points, std::size_t first, std::size_t count);
 
-/// Writes a whole cloud in pieces of uneven lengths, some of them empty.
+/// Writes a whole cloud in pieces of uneven lengths, the first and some others empty.
 void write_uneven(const std::string& path, const std::string& format, const CloudHeader& header,
                   const Points& points);
 

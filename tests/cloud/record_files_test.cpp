@@ -12,6 +12,7 @@
 #include "risley/io/text_file.hpp"
 
 #include "cloud/cloud_samples.hpp"
+#include "cloud/formats/point_fields.hpp"
 
 namespace risley::cloud::record_files_test {
 
@@ -173,6 +174,14 @@ with open(sys.argv[2], 'wb') as answer:
     at += points_.size() * sizeof(double);
   }
   expect_same(found, expected_);
+}
+
+TEST(RecordPacker, NoPointsNeedNoRoom) {
+  const CloudHeader header = cloud_cases().front().header;
+  RecordPacker packer(all_fields(header));
+  Points none;
+  header.resize(none, 0);
+  packer.pack(none, nullptr, packer.record_bytes());  // the undefined-behaviour sanitizer looks on
 }
 
 TEST(PlyComments, TellTheProvenanceInLinesThatEveryReaderTakes) {

@@ -39,7 +39,8 @@ FILES += [(f"pattern to {name}", ["pattern", "--sensor", "avia", "--duration-s",
                                ("json", "json"), ("usda", "usda"))]
 FILES += [("simulate", ["simulate", "--duration-s", "0.01", "-o"], "out.nc"),
           ("preset new", ["preset", "new", "mine", "--from", "mid-40", "-o"], "out.yaml"),
-          ("report", ["report", "result", "-o"], "out.html")]
+          ("report", ["report", "result", "-o"], "out.html"),
+          ("compare", ["compare", "result", "result", "-o"], "out.html")]
 FILES += [("page of a pattern", ["pattern", "--sensor", "avia", "--duration-s", "0.002", "--report"],
            "out.html"),
           ("map of beam origins", ["cloud", "--calibration", "mid-40", "--beam-origin-map"], "map.html")]

@@ -10,6 +10,7 @@
 #include "command_line.hpp"
 #include "fuzz/invariants.hpp"
 #include "fuzz/targets.hpp"
+#include "parameter_choice.hpp"
 #include "reading_options.hpp"
 
 namespace risley::fuzz {
@@ -35,7 +36,7 @@ std::vector<std::string> words_of(std::span<const std::uint8_t> bytes) {
 /// What stands behind options is read as each of the things it may be.
 void read_value(const std::string& word) {
   try {
-    const auto [name, value] = app::parameter_assignment(word, {2});
+    const auto [name, value] = app::assignment(word);
     require(!name.empty() && std::isfinite(value), "a parameter has a name and a number");
   } catch (const InvalidArgument&) {  // refused
   }

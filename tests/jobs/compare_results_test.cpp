@@ -12,6 +12,7 @@
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
 #include "risley/io/text_file.hpp"
+#include "risley/jobs/compare_series.hpp"
 #include "risley/sensors/preset.hpp"
 
 namespace risley::jobs::compare_results_test {
@@ -109,6 +110,64 @@ TEST_F(CompareResults, LeavesOutWhatBothHeldAlike) {
   const ResultComparison elsewhere = compare_results(a, saved("d", held_elsewhere));
   EXPECT_TRUE(elsewhere.same_unit);
   EXPECT_FALSE(elsewhere.held_alike);
+}
+
+// Of one parameter that is not held alike: a squared normal value, which is beyond 1.96 sigmas with
+// a probability of 5 %.
+TEST_F(CompareResults, TestsWhetherTheUnitChanged) {
+  const std::string a = saved("a", result("A1"));
+  const ResultComparison same = compare_results(a, a);
+  EXPECT_EQ(same.change.chi2, 0);
+  EXPECT_EQ(same.change.degrees_of_freedom, 1);
+  EXPECT_EQ(same.change.p_value, 1);
+  sensors::Sensor moved = result("A1");
+  moved.set(kTilt, moved.get(kTilt) + 1.959964 * std::sqrt(2.0) * kSigma);
+  const ResultComparison apart = compare_results(a, saved("b", moved));
+  EXPECT_NEAR(apart.change.chi2, 3.841459, 1e-5);
+  EXPECT_NEAR(apart.change.p_value, 0.05, 1e-6);
+  EXPECT_EQ(compare_results("mid-40", "mid-40").change.degrees_of_freedom, 0);
+}
+
+// A turn of all beams that nobody knows does not hide a change of their shape, nor count as one.
+TEST_F(CompareResults, WhatIsHardlyKnownHardlyCounts) {
+  sensors::Sensor one = sensors::load_sensor("mid-40");
+  constexpr const char* kOther = "incident_beam_horizontal_deg";
+  constexpr double kUnknown = 1e-2;
+  one.serial = "A1";
+  one.covariance_names = {kTilt, kOther};
+  one.covariance.resize(2, 2);
+  const double common = kUnknown * kUnknown, own = kSigma * kSigma;
+  one.covariance << common + own, common, common, common + own;
+  for (const char* name : {kTilt, kOther}) one.set_knowledge({name, kUnknown, "calibrated"});
+  sensors::Sensor turned = one, bent = one;
+  for (const char* name : {kTilt, kOther}) turned.set(name, turned.get(name) + kUnknown);
+  bent.set(kTilt, bent.get(kTilt) + 10 * kSigma);
+  const std::string a = saved("a", one);
+  EXPECT_GT(compare_results(a, saved("b", turned)).change.p_value, 0.5);
+  EXPECT_LT(compare_results(a, saved("c", bent)).change.p_value, 1e-4);
+}
+
+TEST_F(CompareResults, OfASeriesEachIsComparedWithTheOneBeforeAndTheFirst) {
+  sensors::Sensor moved = result("");
+  moved.set(kTilt, moved.get(kTilt) + 20 * kSigma);
+  CompareSeriesOptions options;
+  options.results = {saved("a", result("")), saved("b", result("")), saved("c", moved)};
+  const ComparedSeries series = compare_series(options);
+  ASSERT_EQ(series.pairs.size(), 3U);
+  EXPECT_DOUBLE_EQ(series.least_p_value, 0.01 / 3);
+  const auto is = [&](std::size_t pair, std::size_t a, std::size_t b, bool changed) {
+    const ComparedPair& one = series.pairs[pair];
+    return one.a == a && one.b == b && one.changed == changed && one.comparison.held_alike &&
+           !one.comparison.same_unit;
+  };
+  EXPECT_TRUE(is(0, 0, 1, false));
+  EXPECT_TRUE(is(1, 1, 2, true));
+  EXPECT_TRUE(is(2, 0, 2, true));
+  options.results.resize(1);
+  EXPECT_THROW(compare_series(options), InvalidArgument);
+  options.results = {"mid-40", "mid-40"};
+  options.false_alarm = 2;
+  EXPECT_THROW(compare_series(options), InvalidArgument);
 }
 
 TEST_F(CompareResults, IsOfSensorsOfOneKind) {

@@ -135,7 +135,7 @@ TEST_F(JobsTest, LeadFromARecordingToACloud) {
   EXPECT_EQ(calibrated.details->walls.size(), 1u);
 
   const cloud::CloudSummary made =
-      cloud_of_recording(cloud(path("calibration/calibration.yaml")), progress);
+      cloud_of_recording(cloud(path("calibration/calibration.yaml")), progress).summary;
   EXPECT_GT(made.points, 90000u);
   EXPECT_FALSE(made.damage);
 

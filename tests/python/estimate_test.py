@@ -41,7 +41,7 @@ def test_numbers_have_names_units_and_sigmas(result):
 
 
 def test_a_page_is_written(result, tmp_path):
-    risley.write_report(result, tmp_path / "page.html")
+    result.report(tmp_path / "page.html")
     assert "<html" in (tmp_path / "page.html").read_text(encoding="utf-8")
 
 

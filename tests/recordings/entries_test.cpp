@@ -248,4 +248,15 @@ TEST(Entries, DecodersAskForAllBytes) {
   EXPECT_EQ(chunk.observations.size(), 0U);
 }
 
+TEST(Entries, RowsThatOthersFilledAreValidWhereTheyHaveADirectionAndNoEmptyRange) {
+  Observations rows = points(5);
+  rows.azimuth[0] = kNan;
+  rows.zenith[1] = kInfinite;
+  rows.range[2] = 0;
+  rows.range[3] = kNan;
+  rows.valid.clear();
+  mark_valid(rows);
+  EXPECT_THAT(rows.valid, ::testing::ElementsAre(0, 0, 0, 1, 1));
+}
+
 }  // namespace risley::recordings::entries_test

@@ -123,7 +123,7 @@ TEST_P(SixEmitters, FromAFileToACloudEveryParameterIsAsGoodAsItsSigma) {
     cloud.recording = recording;
     cloud.calibration = (folder / "calibration/calibration.yaml").string();
     cloud.output = (folder / "cloud.nc").string();
-    const cloud::CloudSummary points = jobs::cloud_of_recording(cloud);
+    const cloud::CloudSummary points = jobs::cloud_of_recording(cloud).summary;
     EXPECT_GT(points.points, 340'000u);
     EXPECT_FALSE(points.damage);
   }

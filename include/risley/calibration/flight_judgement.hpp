@@ -7,6 +7,8 @@
 
 #include <Eigen/Core>
 
+#include "risley/optics/parameters.hpp"
+
 namespace risley::calibration {
 
 /// One of the unknowns that a whole flight shares.
@@ -20,6 +22,10 @@ struct FlightUnknown {
   std::string twin;  ///< the unknown that it is tied to most
   double twin_correlation = 0;
 };
+
+/// An SI value of an unknown in the unit that its name states, and that unit.
+double in_file_unit(const FlightUnknown& unknown, double value, TrainShape shape);
+std::string file_unit(const FlightUnknown& unknown, TrainShape shape);
 
 /// What boresight and prisms together are known to, over the field of view.
 struct FlightDatum {

@@ -99,6 +99,9 @@ struct StripPair {
   Eigen::Vector3d shift{0, 0, 0}, sigma{1, 1, 1};
 };
 
+/// The pair of the same two strips; null where there is none.
+const StripPair* find_pair(const std::vector<StripPair>& pairs, const StripPair& like);
+
 /// strips_in_cells(), compared. @throws InvalidArgument as ground_cells
 std::vector<StripPair> strip_pairs(const ShotPoints& points,
                                    const std::vector<std::uint16_t>& strip,

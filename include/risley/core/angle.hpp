@@ -14,6 +14,9 @@ inline constexpr double kDegreesPerRadian = 180.0 / std::numbers::pi;
 
 /// Degrees exist only at the edges (files, command line, plots).
 constexpr double radians_from_degrees(double degrees) { return degrees * kRadiansPerDegree; }
+/// Solid angle, sr.
+inline constexpr double kSquareDegree = kRadiansPerDegree * kRadiansPerDegree;
+
 constexpr double degrees_from_radians(double radians) { return radians * kDegreesPerRadian; }
 
 /// The same angle in [-pi, pi]; NaN for what is no angle.

@@ -61,6 +61,7 @@ struct CalibratedFlight : RangedInput {
   std::optional<FlightDetails> details;  ///< where they were asked for
   Provenance provenance;    ///< of the options, with the inputs; empty where nothing was written
   double solving_time = 0;  ///< s
+  double total_time = 0;    ///< of the job, s
 };
 
 /// Finds the rotation angles of every recording and calibrates mount and sensor on the strips of

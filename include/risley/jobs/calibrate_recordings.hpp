@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <optional>
@@ -14,6 +15,7 @@
 #include "risley/jobs/calibration_details.hpp"
 #include "risley/jobs/ranged_input.hpp"
 #include "risley/jobs/result_files.hpp"
+#include "risley/scenes/scene.hpp"
 
 namespace risley::jobs {
 
@@ -41,6 +43,14 @@ struct CalibrateRecordingsOptions : RangedInputOptions {  ///< recordings of pla
   std::function<std::vector<NamedText>(const CalibratedRecordings&)> texts;
 };
 
+/// The stations of recordings, in their order.
+/// @param path   of a scene with stations; empty: none
+/// @param names  which of them, one per recording; empty: all, which are as many
+/// @throws InvalidArgument naming the numbers where they differ; FileError
+std::vector<scenes::Station> stations_of(const std::string& path,
+                                         const std::vector<std::string>& names,
+                                         std::size_t recordings);
+
 /// What came of it.
 struct CalibratedRecordings : RangedInput {
   calibration::Calibration calibration;
@@ -48,6 +58,7 @@ struct CalibratedRecordings : RangedInput {
   std::optional<CalibrationDetails> details;  ///< where they were asked for
   Provenance provenance;    ///< of the options, with the inputs; empty where nothing was written
   double solving_time = 0;  ///< s
+  double total_time = 0;    ///< of the job, s
 };
 
 /// Finds the rotation angles of every recording and calibrates the sensor on the walls that they

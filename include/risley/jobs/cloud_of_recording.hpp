@@ -8,6 +8,7 @@
 #include "risley/core/progress.hpp"
 #include "risley/jobs/moving_platform.hpp"
 #include "risley/recordings/reader.hpp"
+#include "risley/sensors/sensor.hpp"
 
 namespace risley::jobs {
 
@@ -22,9 +23,16 @@ struct CloudOfRecordingOptions {
   cloud::CloudOptions cloud;  ///< without a platform
 };
 
+/// The points of a recording.
+struct RecordingCloud {
+  std::string recording, output, calibration;  ///< as the options have them
+  sensors::CalibrationReference calibrated_against = sensors::CalibrationReference::none;
+  cloud::CloudSummary summary;
+};
+
 /// Turns a recording into points with covariance; the output appears when it is whole.
 /// @throws cloud::TurnedFrame, EstimationError, InvalidArgument, FileError, Cancelled
-cloud::CloudSummary cloud_of_recording(const CloudOfRecordingOptions& options,
-                                       const Progress& progress = {});
+RecordingCloud cloud_of_recording(const CloudOfRecordingOptions& options,
+                                  const Progress& progress = {});
 
 }  // namespace risley::jobs

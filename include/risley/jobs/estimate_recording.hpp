@@ -56,6 +56,7 @@ struct EstimatedRecording {
   std::optional<EstimateDetails> details;            ///< where they were asked for
   Provenance provenance;  ///< of the options, with the input; empty where nothing was written
   double reading_time = 0, solving_time = 0;  ///< s
+  double total_time = 0;                      ///< of the job, s
 };
 
 /// Estimates a sensor's parameters and the rotation angles of its prisms from a recording. Stages:

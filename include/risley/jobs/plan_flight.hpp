@@ -36,6 +36,19 @@ struct PlanFlightOptions {
   cloud::PointDistributionOptions distribution;
 };
 
+/// What a plan is made of. Paths.
+struct FlightPlanFiles {
+  std::string plan, mount, errors;  ///< none may be empty
+  std::string scene;                ///< with a terrain; empty: level ground
+};
+
+/// Whether a file is the plan of a flight, and not a scene of walls. @throws FileError
+bool is_flight_plan(const std::string& path);
+
+/// Puts what the files hold into the options.
+/// @throws InvalidArgument for a file that is missing and for a scene without terrain; FileError
+void load_flight_plan(const FlightPlanFiles& files, PlanFlightOptions& options);
+
 /// What the flight will come to.
 struct PlannedFlightResult {
   sensors::Sensor sensor;

@@ -69,6 +69,11 @@ SensorChoice choose_sensor(const std::string& path, const recordings::ReadOption
                            const std::optional<sensors::Sensor>& given,
                            const Progress& progress = {});
 
+/// Commercial name of the sensor that made a recording; of several, each once.
+std::string sensor_name(const recordings::RecordingHeader& header);
+/// The same where the scan was asked too: "unknown" where nothing describes it.
+std::string sensor_name(const SensorChoice& choice);
+
 /// Every shot of a recording's first second, up to damage.
 estimation::AngleSeries first_second(const std::string& path,
                                      const recordings::ReadOptions& options,

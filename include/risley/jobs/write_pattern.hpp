@@ -36,6 +36,7 @@ struct WritePatternOptions {
 struct WrittenPattern {
   std::string sensor;  ///< name
   std::string format;
+  std::string output;  ///< path; empty: a stream
   std::uint64_t rows = 0;
   std::uint64_t blocked = 0;  ///< of them, shots that do not get through the prisms
   std::string firing;         ///< "in_turn" or "together"

@@ -16,6 +16,9 @@ struct RotationPair {
   double second = 0;  ///< of the last prism
 };
 
+/// So many pairs point the beam in one direction, at most: docs/theory/inverse.md
+inline constexpr int kMostRotationPairs = 4;
+
 /// Every answer of the inverse.
 struct InverseSolution {
   /// All isolated pairs, by the second angle. Two in general; where they merge at the edge of the

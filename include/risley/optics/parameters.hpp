@@ -98,6 +98,9 @@ const ParameterInfo& find_parameter(std::string_view name, TrainShape shape);
 /// means the same in each. Null where no train has it.
 const ParameterInfo* find_parameter_of_any_train(std::string_view name);
 
+/// An SI value in the unit that the name states. @throws InvalidArgument as find_parameter()
+double in_file_unit(std::string_view name, double value, TrainShape shape);
+
 /// @param value  SI units
 /// @throws InvalidArgument naming the parameter, value, unit and range, also when it is not finite
 void check_bounds(const ParameterInfo& parameter, double value);

@@ -24,6 +24,7 @@ struct ExcerptOptions {
 
 /// What an excerpt came to hold.
 struct Excerpt {
+  std::string path;                ///< of its file
   std::uint64_t observations = 0;  ///< rows, those without return included
   std::uint64_t shots = 0;
   std::uint64_t no_return = 0;  ///< rows that are not valid
@@ -37,6 +38,13 @@ struct Excerpt {
   std::vector<ReadWarning> warnings;  ///< of the recording
   std::optional<FileError> damage;    ///< of the recording, behind the rows searched
 };
+
+/// The same in words, for who is to send it away.
+struct ExcerptContents {
+  std::vector<std::string> holds, lacks;
+};
+
+ExcerptContents contents_of(const Excerpt& excerpt);
 
 /// Writes a small and anonymous part of a recording in the lossless NetCDF form: the stretch of one
 /// device, no longer than the options say and without a clock reset in it, that has most shots with

@@ -45,6 +45,9 @@ struct Observations {
 
 /// @throws InvalidArgument when a column has another length than time_ns
 void require_columns(const Observations& rows);
+/// Sets `valid` for columns that somebody else filled: 1 where both angles are finite and the
+/// range, unless it is NaN, is above 0.
+void mark_valid(Observations& rows);
 /// @throws InvalidArgument naming the row of a valid direction whose azimuth is not in [-pi, pi] or
 ///         whose zenith is not in [0, pi]
 void require_angles(const Observations& rows);

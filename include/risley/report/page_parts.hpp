@@ -30,6 +30,9 @@ std::string parameter_head(const ParameterInfo& parameter);
 /// Whether held parameters make the sigma of some parameter larger.
 bool any_held_parameter(std::span<const ReportedParameter> parameters);
 
+/// "0.4034° ± 0.0007°"; without a sigma, three digits. @param value, sigma  rad
+std::string angle_with_sigma(double value, double sigma);
+
 std::string list_html(const std::vector<std::string>& items);
 
 /// What a page says first.

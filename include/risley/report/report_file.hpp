@@ -24,6 +24,8 @@ void write_report(const std::string& path, const Report& report);
 /// Reads what write_report wrote. @throws FileError naming the byte where the text breaks off, or
 /// the field that is missing or of another kind
 Report read_report(const std::string& path);
+/// The same of a text. @param path  how errors name it
+Report parse_report(const std::string& text, const std::string& path);
 
 /// The page of a report of any kind.
 std::string report_page(const Report& report);

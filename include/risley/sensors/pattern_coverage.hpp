@@ -39,6 +39,9 @@ struct CoverageAfter {
                                            ///< where a ring has none
 };
 
+/// Shares of the field of view for which time_to_cover() is told, percent.
+inline constexpr int kToldShares[] = {50, 90, 99};
+
 /// How a scan fills the field of view. Cells are squares of the equal-area map of Lambert about the
 /// X axis: they all have the same solid angle, and near the axis the map is in radians from it.
 struct PatternCoverage {

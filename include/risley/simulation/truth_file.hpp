@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "risley/core/progress.hpp"
+#include "risley/sensors/named_values.hpp"
 #include "risley/simulation/scanner.hpp"
 
 namespace risley::simulation {
@@ -35,9 +36,12 @@ sensors::Sensor truth_preset(const Scanner& scanner,
 struct SimulationResult {
   std::uint64_t observations = 0;
   std::uint64_t no_return = 0;
-  sensors::Sensor truth;             ///< as in OUT.truth.yaml
-  std::vector<double> start_angles;  ///< rotation angles at time zero, rad
-  std::vector<std::string> files;    ///< all that were written, the recording first
+  sensors::Sensor truth;                         ///< as in OUT.truth.yaml
+  std::vector<double> start_angles;              ///< rotation angles at time zero, rad
+  std::vector<std::string> files;                ///< all that were written, the recording first
+  std::vector<std::string> truth_files;          ///< of them, those that tell the truth
+  std::string trajectory;                        ///< the user's; empty where the sensor stands
+  std::vector<trajectories::StripTimes> strips;  ///< of a flight
   /// What the format of the user's trajectory has no place for, in words.
   std::vector<std::string> left_out;
 };
@@ -54,5 +58,8 @@ SimulationResult simulate_to_file(
     const SimulationSettings& settings, const std::string& path,
     const std::vector<std::pair<std::string, std::string>>& provenance,
     const Progress& progress = {});
+
+/// The true parameters, and the rotation angles at the start.
+std::vector<sensors::NamedValue> true_values(const SimulationResult& result);
 
 }  // namespace risley::simulation

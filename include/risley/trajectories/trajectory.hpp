@@ -68,6 +68,9 @@ struct TrajectoryWarning {
   std::string message;
 };
 
+/// A warning in one line: the message, then the place in brackets.
+std::string warning_text(const TrajectoryWarning& warning);
+
 /// Along which axes a file's velocities stand, found by comparing them with differences of its
 /// positions.
 struct VelocityFrame {

@@ -210,6 +210,7 @@ RecordPacker::RecordPacker(std::vector<PointField> fields) : fields_(std::move(f
 }
 
 void RecordPacker::pack(const Points& points, std::uint8_t* out, std::size_t stride) {
+  if (points.size() == 0) return;
   values_.resize(points.size());
   for (std::size_t k = 0; k < fields_.size(); ++k) {
     fields_[k].values(points, values_);

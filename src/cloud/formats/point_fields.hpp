@@ -57,7 +57,8 @@ class RecordPacker {
   /// Byte at which a field starts in its record.
   std::size_t offset(std::size_t field) const { return offsets_[field]; }
 
-  /// Packs all points into records that begin `stride` bytes apart, the first at `out`.
+  /// Packs all points into records that begin `stride` bytes apart, the first at `out`, which
+  /// may be null where there are no points.
   void pack(const Points& points, std::uint8_t* out, std::size_t stride);
 
  private:

@@ -1,12 +1,12 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-#include "parameter_text.hpp"
+#include "risley/sensors/named_values.hpp"
 
 #include <algorithm>
 
-namespace risley::app {
+namespace risley::sensors {
 
-std::vector<NamedValue> sensor_values(const sensors::Sensor& sensor) {
+std::vector<NamedValue> named_values(const Sensor& sensor) {
   std::vector<NamedValue> values;
   for (const ParameterInfo& parameter : parameter_list(sensor.shape())) {
     if (parameter.kind == ParameterKind::rotation_angle) continue;
@@ -23,4 +23,4 @@ std::vector<NamedValue> sensor_values(const sensors::Sensor& sensor) {
   return values;
 }
 
-}  // namespace risley::app
+}  // namespace risley::sensors

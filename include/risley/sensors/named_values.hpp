@@ -7,9 +7,9 @@
 
 #include "risley/sensors/sensor.hpp"
 
-namespace risley::app {
+namespace risley::sensors {
 
-/// A parameter as files and the command line have it.
+/// A parameter as files have it.
 struct NamedValue {
   std::string name;
   double value = 0;  ///< in the unit
@@ -17,6 +17,6 @@ struct NamedValue {
 };
 
 /// Every parameter of a sensor; a name shared by all prisms only where the prisms agree.
-std::vector<NamedValue> sensor_values(const sensors::Sensor& sensor);
+std::vector<NamedValue> named_values(const Sensor& sensor);
 
-}  // namespace risley::app
+}  // namespace risley::sensors

@@ -1,0 +1,264 @@
+# SPDX-FileCopyrightText: 2026 The risley authors
+# SPDX-License-Identifier: MIT
+"""Results of jobs as plain data: columns, dictionaries, a sensor. All of it can be pickled."""
+import html
+import os
+from typing import Any, Dict, List, NamedTuple, Optional, Union
+
+from risley import _risley
+from risley._progress import Progress, telling
+from risley._units import Path
+
+Found = Union[_risley.EstimatedRecording, _risley.CalibratedRecordings, _risley.CalibratedFlight]
+Planned = Union[_risley.PlannedCalibration, _risley.PlannedFlight]
+
+
+class Verdict(NamedTuple):
+    """A stable code, what was found in words, and what follows from it."""
+
+    code: str
+    words: str
+    to_do: str
+
+
+class _Answer:
+    """Result of a job, with the keys of the command's ``--json``."""
+
+    def __init__(self, found: Dict[str, Any]) -> None:
+        self._dict = found
+
+    def to_dict(self) -> Dict[str, Any]:
+        """The same as the command prints with ``--json``, without ``command`` and ``inputs``.
+
+        Angles are in degrees there, as the names say.
+        """
+        return dict(self._dict)
+
+    @property
+    def warnings(self) -> List[str]:
+        """Warnings, as sentences."""
+        return [one["message"] if isinstance(one, dict) else one
+                for one in self._dict.get("warnings", [])]
+
+
+class _Columns(_Answer):
+    """Quantities by name, in SI units."""
+
+    def __init__(self, found: Dict[str, Any], table: _risley.ValueTable) -> None:
+        super().__init__(found)
+        #: Names of the quantities, without units.
+        self.names = table.names
+        #: Their units: 1, rad, rad/s, m or s.
+        self.units = table.units
+        #: One standard deviation each, including the uncertainty of held parameters; shape (n,).
+        self.sigmas = table.sigmas
+        #: Names of the quantities of the covariance.
+        self.free = table.covariance_names
+        #: Covariance of the free quantities if held ones are exact; shape (free, free).
+        self.covariance = table.covariance
+
+    def _columns(self) -> Dict[str, Any]:
+        return {"sigma": self.sigmas}
+
+    def to_xarray(self) -> Any:
+        """An `xarray.Dataset` of all columns over ``name`` and the covariance over ``free``.
+
+        Raises
+        ------
+        ImportError
+            If xarray is not installed.
+        """
+        import xarray
+        data: Dict[str, Any] = {name: ("name", column) for name, column in self._columns().items()}
+        data["covariance"] = (("free", "free_too"), self.covariance)
+        return xarray.Dataset(
+            data, coords={"name": self.names, "unit": ("name", self.units), "free": self.free,
+                          "free_too": self.free})
+
+
+class Solution(_Columns):
+    """What estimates and calibrations have in common."""
+
+    def __init__(self, found: Found) -> None:
+        table = found.table
+        super().__init__(found.to_dict(), table)
+        #: Their values; shape (n,).
+        self.values = table.values
+        #: One standard deviation each if held parameters are exact; shape (n,).
+        self.sigmas_given_held = table.sigmas_given_held
+        #: Whether the numbers can be used.
+        self.converged = found.converged
+        #: Why they cannot be used; empty otherwise.
+        self.reason = found.reason
+        #: Stable code, what was found, and what follows from it.
+        self.verdict = Verdict(*found.verdict)
+        #: The sensor as it was found, with its covariance.
+        self.sensor = found.sensor
+        self._html = found.html
+        self._found: Optional[Found] = found
+        self._report = ""
+
+    @property
+    def warnings(self) -> List[str]:
+        """Warnings, as sentences."""
+        return list(self._dict["warnings"])
+
+    def _columns(self) -> Dict[str, Any]:
+        return {"value": self.values, "sigma": self.sigmas,
+                "sigma_given_held": self.sigmas_given_held}
+
+    def _report_text(self, progress: Progress) -> str:
+        if not self._report and self._found is not None:
+            with telling(progress) as tell:
+                self._report = self._found.report_text(tell)
+        return self._report
+
+    def report(self, path: Path, *, progress: Progress = None) -> None:
+        """Write the page of the result as one HTML file that needs no network.
+
+        Parameters
+        ----------
+        path : str or path
+            The file to write.
+        progress : bool or callable, optional
+            As in `risley.read`.
+
+        Raises
+        ------
+        FileError
+            If the file cannot be written.
+        """
+        _risley.write_page(self._report_text(progress), os.fspath(path))
+
+    def __getstate__(self) -> Dict[str, Any]:
+        self._report_text(None)  # what the page needs is gone with the C++ object
+        return {**self.__dict__, "_found": None}
+
+    def _repr_html_(self) -> str:
+        return self._html
+
+    def __repr__(self) -> str:
+        return (f"<risley.{type(self).__name__} {self.sensor.name}: {len(self.names)} values, "
+                f"{self.verdict.code}>")
+
+
+class Estimate(Solution):
+    """What `risley.estimate` found: parameters, mean speeds, first rotation angles.
+
+    Attributes
+    ----------
+    azimuth_residual, zenith_residual : ndarray
+        Observed minus estimated direction of every used shot, rad.
+    """
+
+    def __init__(self, found: _risley.EstimatedRecording) -> None:
+        super().__init__(found)
+        self.azimuth_residual = found.azimuth_residual
+        self.zenith_residual = found.zenith_residual
+
+
+class Calibration(Solution):
+    """What `risley.calibrate` found on walls: parameters and the offset of ranges."""
+
+    @property
+    def planes(self) -> List[Dict[str, Any]]:
+        """The walls, as in ``--json``."""
+        return list(self._dict["planes"])
+
+    @property
+    def pointing_error(self) -> Dict[str, Any]:
+        """Errors of the reported directions, with sigmas, in degrees."""
+        return dict(self._dict["pointing_error"])
+
+
+class FlightCalibration(Solution):
+    """What `risley.calibrate` found in flight: boresight, lever arm, clock, ranges, parameters."""
+
+
+class Plan(_Columns):
+    """What `risley.plan` predicts for a calibration: sigmas without values."""
+
+    def __init__(self, planned: Planned) -> None:
+        super().__init__(planned.to_dict(), planned.table)
+
+    @property
+    def advice(self) -> List[str]:
+        """What would improve it; for walls only."""
+        return list(self._dict.get("advice", []))
+
+    def _repr_html_(self) -> str:
+        rows = "".join(f"<tr><td>{html.escape(name)}</td><td>{sigma:.2g}</td><td>{unit}</td></tr>"
+                       for name, sigma, unit in zip(self.names, self.sigmas, self.units))
+        return ("<table><tr><th>parameter</th><th>&plusmn; sigma</th><th>unit</th></tr>"
+                f"{rows}</table>")
+
+
+class Cloud(_Answer):
+    """What `risley.cloud` wrote."""
+
+    @property
+    def points(self) -> int:
+        """Number of points."""
+        return int(self._dict["points"])
+
+    @property
+    def output(self) -> str:
+        """Path of the file."""
+        return str(self._dict["output"])
+
+    @property
+    def format(self) -> str:
+        """Name of its format."""
+        return str(self._dict["format"])
+
+
+class Simulation(_Answer):
+    """What `risley.simulate` wrote."""
+
+    @property
+    def observations(self) -> int:
+        """Number of observations, including those without a return."""
+        return int(self._dict["observations"])
+
+    @property
+    def files(self) -> List[str]:
+        """All files that were written, the recording first."""
+        return list(self._dict["files"])
+
+    @property
+    def truth(self) -> Dict[str, float]:
+        """The true parameters in the units of their names."""
+        return dict(self._dict["truth"])
+
+
+class Identification(_Answer):
+    """What `risley.identify` found.
+
+    Attributes
+    ----------
+    sensor : Sensor
+        The best hypothesis as a sensor.
+    """
+
+    def __init__(self, sensor: _risley.Sensor, found: Dict[str, Any]) -> None:
+        super().__init__(found)
+        self.sensor = sensor
+
+    @property
+    def verdict(self) -> Verdict:
+        """Stable code, what was found, and what follows from it."""
+        return Verdict(**self._dict["verdict"])
+
+    @property
+    def hypotheses(self) -> List[Dict[str, Any]]:
+        """Trains that may have made the scan, best first, as in ``--json``."""
+        return list(self._dict["hypotheses"])
+
+
+class Pattern(_Answer):
+    """What `risley.pattern` wrote."""
+
+    @property
+    def rows(self) -> int:
+        """Number of shots."""
+        return int(self._dict["rows"])

@@ -1,0 +1,124 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "risley/jobs/simulation_settings.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+
+#include <fmt/format.h>
+
+#include "risley/core/error.hpp"
+#include "risley/core/require.hpp"
+#include "risley/sensors/preset.hpp"
+#include "risley/trajectories/trajectory_file.hpp"
+
+#include "jobs/checks.hpp"
+
+namespace risley::jobs {
+namespace {
+
+void assign(sensors::Sensor& sensor, const ParameterValues& values) {
+  for (const auto& [name, value] : values) {
+    const ParameterInfo& parameter = find_parameter(name, sensor.shape());
+    check_bounds(parameter, value);
+    if (parameter.kind == ParameterKind::rotation_angle) {
+      throw InvalidArgument(
+          fmt::format("{}: the rotation angles at the start are set by option start_angles", name));
+    }
+    sensor.set(name, value);
+  }
+}
+
+void check_moves(const SimulationOptions& options) {
+  const std::pair<bool, const char*> only_moving[] = {
+      {!options.mount.empty(), "mount"},
+      {!options.trajectory_errors.empty(), "trajectory_errors"},
+      {options.clock_drift.has_value(), "clock_drift"},
+      {options.start.has_value(), "start"},
+  };
+  for (const auto& [given, name] : only_moving) {
+    if (!given) continue;
+    throw InvalidArgument(fmt::format("option {} needs option trajectory or option flight", name));
+  }
+}
+
+/// What moves the sensor, of a trajectory or a flight plan and a mount; nothing where it stands.
+std::optional<simulation::Platform> platform_from(const SimulationOptions& options,
+                                                  const simulation::SimulationSettings& settings) {
+  if (options.trajectory.empty() && options.flight.empty()) {
+    check_moves(options);
+    return std::nullopt;
+  }
+  if (!options.trajectory.empty() && !options.flight.empty()) {
+    throw InvalidArgument("option trajectory and option flight do not go together");
+  }
+  if (options.mount.empty()) {
+    throw InvalidArgument(
+        "option mount is missing: how the sensor sits on what moves along the trajectory");
+  }
+  if (!settings.scene) {
+    throw InvalidArgument(
+        "option scene is missing: what the moving sensor meets, for example a terrain");
+  }
+  simulation::Platform platform;
+  if (!options.flight.empty()) {
+    const trajectories::FlightPlan plan = trajectories::load_flight_plan(options.flight);
+    trajectories::Flight flight = trajectories::fly(plan);
+    platform.trajectory = std::make_shared<trajectories::Trajectory>(std::move(flight.trajectory));
+    platform.strips = std::move(flight.strips);
+    const auto& terrain = settings.scene->terrain;
+    if (!terrain || !terrain->parts().origin) platform.map_origin = plan.origin;
+  } else {
+    platform.trajectory = std::make_shared<trajectories::Trajectory>(
+        trajectories::load_trajectory(options.trajectory, {}, options.topic));
+  }
+  platform.mount = trajectories::load_mount(options.mount);
+  platform.clock_drift = options.clock_drift.value_or(0.0);
+  if (options.start) {
+    require_between("option start", *options.start, 0, 1e9, "s");
+    platform.begin_ns = platform.trajectory->time_ns.front() +
+                        static_cast<std::int64_t>(std::llround(1e9 * *options.start));
+  }
+  if (!options.trajectory_errors.empty()) {
+    platform.errors = trajectories::load_error_model(options.trajectory_errors);
+  }
+  platform.trajectory_ending = options.trajectory_ending;
+  return platform;
+}
+
+}  // namespace
+
+simulation::SimulationSettings simulation_settings(const SimulationOptions& options) {
+  if (options.duration) check_positive(*options.duration, "duration", "s");
+  if (options.rate) check_positive(*options.rate, "rate", "Hz");
+  simulation::SimulationSettings settings;
+  settings.truth = sensors::load_sensor(options.sensor);
+  assign(settings.truth, options.set);
+  if (!options.beam_origin) settings.truth.set_prism_geometry({});
+  if (options.reported_nominal || !options.reported.empty()) {
+    settings.reported = settings.truth;
+    if (options.reported_nominal) {
+      settings.reported->train = settings.reported->train.without_errors();
+    }
+    assign(*settings.reported, options.reported);
+  }
+  settings.rate = options.rate;
+  settings.angle_noise = options.angle_noise;
+  settings.range_noise = options.range_noise;
+  settings.quantize = options.quantize;
+  settings.rotor = options.rotor;
+  settings.start_angles = options.start_angles;
+  if (!options.scene.empty()) settings.scene = scenes::load_scene(options.scene);
+  settings.station = options.station;
+  settings.platform = platform_from(options, settings);
+  settings.duration = options.duration ? *options.duration
+                      : settings.platform
+                          ? std::max(1e-3, simulation::longest_duration(*settings.platform))
+                          : 1.0;
+  settings.seed = options.seed;
+  settings.threads = options.threads;
+  return settings;
+}
+
+}  // namespace risley::jobs

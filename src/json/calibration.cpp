@@ -1,0 +1,162 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include <cmath>
+
+#include "risley/jobs/calibrate_recordings.hpp"
+#include "risley/jobs/plan_calibration.hpp"
+#include "risley/json/results.hpp"
+
+#include "json/parts.hpp"
+
+namespace risley::json {
+namespace {
+
+using calibration::Calibration;
+using calibration::CalibrationForecast;
+using calibration::FormalDatum;
+
+Json datum_json(calibration::DatumKind kind, const FormalDatum& datum) {
+  return {{"kind", calibration::to_string(kind)},      {"sigma_roll_deg", deg(datum.sigma_roll)},
+          {"sigma_pitch_deg", deg(datum.sigma_pitch)}, {"sigma_yaw_deg", deg(datum.sigma_yaw)},
+          {"sigma_gauge_deg", deg(datum.gauge)},       {"sigma_shape_deg", deg(datum.shape)},
+          {"sigma_total_deg", deg(datum.total)}};
+}
+
+Json vector_json(const Vector3<double>& v) { return {v.x, v.y, v.z}; }
+
+Json unobservable_json(const std::vector<estimation::WeakDirection>& directions) {
+  Json list = Json::array();
+  for (const auto& direction : directions) list.push_back(weak_direction_json(direction));
+  return list;
+}
+
+}  // namespace
+
+Json of(const jobs::CalibratedRecordings& found) {
+  const Calibration& c = found.calibration;
+  const TrainShape shape = c.sensor.shape();
+  Json parameters = Json::object(), planes = Json::array(), steps = Json::array(),
+       tests = Json::array(), profiles = Json::object();
+  for (std::size_t j = 0; j < c.free.size(); ++j) {
+    const auto at = static_cast<Eigen::Index>(j);
+    parameters[c.free[j].name] = {
+        {"value", in_file_unit(c.free[j].name, c.parameters[at], shape)},
+        {"sigma", number_or_null(in_file_unit(c.free[j].name, c.total_sigma(j), shape))},
+        {"sigma_given_held",
+         number_or_null(in_file_unit(c.free[j].name, std::sqrt(c.covariance(at, at)), shape))}};
+  }
+  for (const calibration::CalibratedPlane& plane : c.planes) {
+    planes.push_back({{"name", plane.name},
+                      {"recording", found.recordings[plane.recording].path},
+                      {"normal", vector_json(plane.normal)},
+                      {"offset_m", plane.distance},
+                      {"points", plane.points},
+                      {"outliers", plane.outliers},
+                      {"rms_m", plane.rms},
+                      {"before_rms_m", plane.rms_before},
+                      {"range_sigma_m", plane.range_sigma}});
+  }
+  for (const calibration::SurfaceStep& step : c.steps) {
+    steps.push_back({{"recording", found.recordings[step.recording].path},
+                     {"plane", c.planes[step.plane].name},
+                     {"height_m", step.height},
+                     {"azimuth_deg", deg(step.azimuth)},
+                     {"zenith_deg", deg(step.zenith)},
+                     {"size_deg", deg(step.size)},
+                     {"points", step.points}});
+  }
+  for (const calibration::PriorTest& test : c.prior_tests) {
+    tests.push_back({{"name", test.name},
+                     {"kind", test.station ? "station" : "plane"},
+                     {"misfit_deg", deg(test.misfit)},
+                     {"chi2", test.chi2},
+                     {"degrees_of_freedom", test.degrees_of_freedom},
+                     {"critical", test.critical}});
+  }
+  for (const calibration::ThicknessProfile& profile : c.profiles) {
+    Json rows = Json::array();
+    for (std::size_t i = 0; i < profile.count.size(); ++i) {
+      if (profile.count[i] == 0) continue;
+      rows.push_back({{"from_deg", deg(profile.from[i])},
+                      {"to_deg", deg(profile.to[i])},
+                      {"points", profile.count[i]},
+                      {"before_rms_m", profile.rms_before[i]},
+                      {"after_rms_m", profile.rms_after[i]}});
+    }
+    profiles[profile.variable] = rows;
+  }
+  std::vector<std::string> warnings = found.warnings;
+  warnings.insert(warnings.end(), c.warnings.begin(), c.warnings.end());
+  Json object = {
+      {"serial", found.recordings.front().serial()},
+      {"verdict", verdict_json(c.verdict)},
+      {"converged", c.converged},
+      {"reason", c.reason},
+      {"method", c.method == calibration::CalibrationMethod::paper ? "paper" : "adjustment"},
+      {"iterations", c.iterations},
+      {"observations", found.observations},
+      {"points", c.points},
+      {"parameters", parameters},
+      {"range_offset_m",
+       {{"value", c.range_offset},
+        {"sigma", c.range_offset_total_sigma()},
+        {"sigma_given_held", c.range_offset_sigma}}},
+      {"planes", planes},
+      {"steps", steps},
+      {"datum", datum_json(c.datum_kind, c.datum)},
+      {"datum_given_held", datum_json(c.datum_kind, c.datum_given_held)},
+      {"pointing_error", pointing_json(c.pointing_error)},
+      {"better_probability", number_or_null(c.better_probability)},
+      {"prior_tests", tests},
+      {"unobservable", unobservable_json(c.unobservable)},
+      {"before", {{"plane_rms_m", c.rms_before}}},
+      {"after", {{"plane_rms_m", c.rms_after}}},
+      {"sigma0", c.sigma0},
+      {"unevenness", c.unevenness},
+      {"variance_factor", c.variance_factor},
+      {"thickness", profiles},
+      {"frame", frame_json()},
+      {"slips", slips_of_all(found.recordings)},
+      {"warnings", warnings},
+      {"seconds",
+       {{"read", found.reading_time},
+        {"rotation_angles", found.angles_time},
+        {"solve", found.solving_time},
+        {"total", found.total_time}}}};
+  object.update(choice_json(found.choice));
+  if (found.truth) {
+    object["truth"] = {{"before", errors_json(found.truth->before)},
+                       {"after", errors_json(found.truth->after)}};
+  }
+  return object;
+}
+
+Json of(const jobs::PlannedCalibration& planned) {
+  const CalibrationForecast& f = planned.forecast;
+  const TrainShape shape = planned.shape;
+  Json parameters = Json::object(), walls = Json::array();
+  for (std::size_t j = 0; j < f.free.size(); ++j) {
+    const auto at = static_cast<Eigen::Index>(j);
+    parameters[f.free[j].name] = {
+        {"sigma",
+         number_or_null(in_file_unit(f.free[j].name, std::sqrt(f.covariance(at, at)), shape))}};
+  }
+  for (const calibration::PlannedWall& wall : f.walls) {
+    walls.push_back({{"name", wall.name},
+                     {"station", wall.station},
+                     {"share", wall.share},
+                     {"mean_incidence_deg", deg(wall.mean_incidence)},
+                     {"mean_range_m", wall.mean_range}});
+  }
+  Json object = plan_head(planned.sensor);
+  object.update({{"parameters", parameters},
+                 {"range_offset_m", {{"sigma", number_or_null(f.range_offset_sigma)}}},
+                 {"datum", datum_json(f.datum_kind, f.datum)},
+                 {"unobservable", unobservable_json(f.unobservable)},
+                 {"walls", walls},
+                 {"observations", f.shots},
+                 {"advice", f.advice}});
+  return object;
+}
+
+}  // namespace risley::json

@@ -1,0 +1,102 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include <fmt/format.h>
+
+#include "risley/jobs/cloud_of_recording.hpp"
+#include "risley/jobs/recording_input.hpp"
+#include "risley/json/results.hpp"
+
+#include "json/parts.hpp"
+
+namespace risley::json {
+namespace {
+
+using cloud::PointDistributionSummary;
+using cloud::StripDistribution;
+
+Json strip_json(const StripDistribution& s) {
+  Json places = Json::object(), densities = Json::array();
+  for (std::size_t k = 0; k < s.place_density.size(); ++k) {
+    places[fmt::format("{:g}", cloud::kSwathPlaces[k])] = number_or_null(s.place_density[k]);
+  }
+  Json largest = Json::array();
+  for (const double diameter : s.largest_empty) largest.push_back(number_or_null(diameter));
+  return {{"strip", s.strip},
+          {"name", s.name},
+          {"points", s.points},
+          {"length_m", s.length},
+          {"height_m", number_or_null(s.height)},
+          {"swath_m", s.width},
+          {"dense_swath_m", number_or_null(s.dense_width)},
+          {"nominal_density_per_m2", number_or_null(s.density)},
+          {"nominal_spacing_m", number_or_null(s.spacing)},
+          {"middle_density_per_m2", number_or_null(s.middle_density)},
+          {"density_at_share_of_half_swath_per_m2", places},
+          {"cell_variation", number_or_null(s.cell_variation)},
+          {"cells_covered", number_or_null(s.cells_covered)},
+          {"spacing_cells_covered", number_or_null(s.spacing_cells_covered)},
+          {"empty_share", number_or_null(s.empty_share)},
+          {"largest_empty_m", largest},
+          {"seen_in_full_m2", s.whole_ground},
+          {"circles_looked_for_m2", s.circles_ground},
+          {"profile",
+           {{"stripe_m", s.profile.stripe},
+            {"across_m", s.profile.across},
+            {"density_per_m2", s.profile.density}}}};
+}
+
+}  // namespace
+
+Json distribution_json(const PointDistributionSummary& d) {
+  Json strips = Json::array();
+  for (const StripDistribution& strip : d.strips) strips.push_back(strip_json(strip));
+  return {{"empty_circle_m", d.empty_circle},
+          {"density_cell_m", d.density_cell},
+          {"points", d.points},
+          {"points_of_no_strip", d.other_points},
+          {"area_m2", d.area},
+          {"aggregate_density_per_m2", number_or_null(d.density)},
+          {"aggregate_spacing_m", number_or_null(d.spacing)},
+          {"low_density_per_m2", number_or_null(d.low_density)},
+          {"median_density_per_m2", number_or_null(d.median_density)},
+          {"cells_covered", number_or_null(d.covered)},
+          {"overlap", number_or_null(d.overlap)},
+          {"strips", strips}};
+}
+
+Json of(const jobs::RecordingCloud& made) {
+  const cloud::CloudSummary& s = made.summary;
+  std::vector<std::string> warnings = s.warnings;
+  for (const auto& warning : s.read_warnings) warnings.push_back(jobs::warning_text(warning));
+  Json json = {
+      {"points", s.points},
+      {"format", s.format},
+      {"input", made.recording},
+      {"output", made.output},
+      {"observations", s.observations},
+      {"no_return", s.no_return},
+      {"outliers", s.outliers},
+      {"without_rotation_angle", s.without_rotation_angle},
+      {"without_pose", s.without_pose},
+      {"strips", s.strips.size()},
+      {"frame", frame_json()},
+      {"point_frame", s.frame},
+      {"mirrored", s.mirrored},
+      {"residuals",
+       {{"azimuth_deg", {{"rms", deg(s.azimuth_residual_rms)}}},
+        {"zenith_deg", {{"rms", deg(s.zenith_residual_rms)}}}}},
+      {"repointing_deg", {{"rms", deg(s.repointing_rms)}}},
+      {"common_factors", s.factors},
+      {"slips", slips_json(s.slips)},
+      {"warnings", warnings},
+  };
+  if (s.damage) json.update(of(*s.damage));
+  const bool is_none = made.calibrated_against == sensors::CalibrationReference::none;
+  json["calibration"] = {
+      {"path", made.calibration},
+      {"calibrated_against", is_none ? Json() : Json(to_string(made.calibrated_against))}};
+  if (s.distribution) json["distribution"] = distribution_json(*s.distribution);
+  return json;
+}
+
+}  // namespace risley::json

@@ -1,0 +1,111 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "json/parts.hpp"
+
+#include <cmath>
+
+#include "risley/core/angle.hpp"
+#include "risley/jobs/recording_input.hpp"
+
+namespace risley::json {
+
+Json choice_json(const jobs::SensorChoice& choice) {
+  Json misfits = Json::array();
+  for (const jobs::PresetMisfit& one : choice.misfits) {
+    const bool has_lines = std::isfinite(one.misfit);
+    misfits.push_back(
+        {{"preset", one.preset}, {"misfit_deg", has_lines ? Json(deg(one.misfit)) : Json()}});
+  }
+  return {{"sensor", jobs::sensor_name(choice)},
+          {"preset", choice.sensor.name},
+          {"sensor_chosen_by", to_string(choice.chosen_by)},
+          {"sensor_choice",
+           {{"words", choice.words},
+            {"fits", choice.fits ? Json(*choice.fits) : Json()},
+            {"misfits", misfits},
+            {"warnings", choice.warnings}}}};
+}
+
+Json value_json(double value, double sigma) {
+  return {{"value", deg(value)}, {"sigma", deg(sigma)}};
+}
+
+Json frame_json(const std::optional<estimation::FrameEstimate>& turn) {
+  const estimation::FrameEstimate frame = turn.value_or(estimation::FrameEstimate{});
+  return {{"yaw_deg", value_json(frame.turn.yaw, std::sqrt(frame.covariance(0, 0)))},
+          {"pitch_deg", value_json(frame.turn.pitch, std::sqrt(frame.covariance(1, 1)))},
+          {"estimated", turn.has_value()}};
+}
+
+Json slips_json(const std::vector<recordings::ShotSlip>& slips) {
+  Json list = Json::array();
+  for (const recordings::ShotSlip& slip : slips) {
+    list.push_back({{"row", slip.row}, {"shots", nullptr}});
+    if (slip.counted) list.back()["shots"] = slip.shots;
+  }
+  return list;
+}
+
+Json warnings_json(const std::vector<recordings::ReadWarning>& warnings) {
+  Json list = Json::array();
+  for (const recordings::ReadWarning& warning : warnings) {
+    list.push_back(
+        {{"message", jobs::warning_text(warning)}, {"lost_records", warning.lost_records}});
+  }
+  return list;
+}
+
+Json weak_direction_json(const estimation::WeakDirection& direction) {
+  Json weights = Json::object();
+  for (const auto& [name, weight] : direction.weights) weights[name] = weight;
+  return {{"direction", weights}, {"ratio", direction.ratio}, {"sigma", direction.sigma}};
+}
+
+Json number_or_null(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
+
+Json pointing_json(const calibration::PointingError& pointing) {
+  const calibration::DirectionErrors& errors = pointing.errors;
+  const auto known = [](double value, double sigma) {
+    return Json{{"value", deg(value)}, {"sigma", number_or_null(deg(sigma))}};
+  };
+  return {{"total_deg", known(errors.total, pointing.total_sigma)},
+          {"shared_deg", known(errors.gauge, pointing.gauge_sigma)},
+          {"shape_deg", known(errors.shape, pointing.shape_sigma)},
+          {"worst_deg", known(pointing.worst_shape, pointing.worst_shape_sigma)},
+          {"rotation_deg",
+           {{"roll", deg(errors.rotation.x)},
+            {"pitch", deg(errors.rotation.y)},
+            {"yaw", deg(errors.rotation.z)}}}};
+}
+
+Json errors_json(const calibration::DirectionErrors& e) {
+  return {{"azimuth_rmse_deg", deg(e.azimuth_rmse)},
+          {"zenith_rmse_deg", deg(e.zenith_rmse)},
+          {"azimuth_bias_deg", deg(e.azimuth_bias)},
+          {"zenith_bias_deg", deg(e.zenith_bias)},
+          {"total_deg", deg(e.total)},
+          {"gauge_deg", deg(e.gauge)},
+          {"shape_deg", deg(e.shape)}};
+}
+
+Json slips_of_all(const std::vector<jobs::ReadRecording>& recordings) {
+  Json all = Json::array();
+  for (const jobs::ReadRecording& recording : recordings) {
+    for (Json& slip : slips_json(recording.header.slips)) {
+      slip["recording"] = recording.path;
+      all.push_back(std::move(slip));
+    }
+  }
+  return all;
+}
+
+Json plan_head(const std::string& sensor) {
+  return {{"serial", nullptr},
+          {"sensor", sensor},
+          {"verdict",
+           {{"code", "undecided"},
+            {"words", "this is a plan: nothing was measured"},
+            {"to_do", "record as planned, and calibrate from that"}}}};
+}
+
+}  // namespace risley::json

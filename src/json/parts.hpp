@@ -1,0 +1,66 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "risley/calibration/datum.hpp"
+#include "risley/cloud/point_distribution.hpp"
+#include "risley/core/angle.hpp"
+#include "risley/estimation/frame_turn.hpp"
+#include "risley/estimation/weak_directions.hpp"
+#include "risley/jobs/ranged_input.hpp"
+#include "risley/jobs/sensor_choice.hpp"
+#include "risley/json/results.hpp"
+#include "risley/recordings/reader.hpp"
+
+namespace risley::json {
+
+// What several results have in common. Angles come in rad and leave in deg.
+
+inline double deg(double radians) { return degrees_from_radians(radians); }
+
+/// NaN and the infinite have no place in JSON.
+Json number_or_null(double value);
+
+/// An angle and its sigma.
+Json value_json(double value, double sigma);
+
+/// A verdict: stable code, words, what to do.
+template <class Verdict>
+Json verdict_json(const Verdict& verdict) {
+  return {{"code", to_string(verdict.code)}, {"words", verdict.words}, {"to_do", verdict.to_do}};
+}
+
+/// Which sensor it was and who says so: sensor, preset, sensor_chosen_by, sensor_choice.
+Json choice_json(const jobs::SensorChoice& choice);
+
+/// How a recording's frame is turned; zeros without sigma where it is the sensor's.
+Json frame_json(const std::optional<estimation::FrameEstimate>& turn = {});
+
+/// Where the count of shots was wrong: [{row, shots}], shots null where they could not be counted.
+Json slips_json(const std::vector<recordings::ShotSlip>& slips);
+/// Slips of all recordings, each with the name of its own.
+Json slips_of_all(const std::vector<jobs::ReadRecording>& recordings);
+
+Json warnings_json(const std::vector<recordings::ReadWarning>& warnings);
+
+/// A combination of parameters that data do not tell.
+Json weak_direction_json(const estimation::WeakDirection& direction);
+
+/// How far directions are off, with sigmas.
+Json pointing_json(const calibration::PointingError& pointing);
+/// Errors of directions against a known truth.
+Json errors_json(const calibration::DirectionErrors& errors);
+
+/// What a plan says where a calibration says whose sensor it was, and how it turned out.
+Json plan_head(const std::string& sensor);
+
+/// How the points of a flight lie on the ground.
+Json distribution_json(const cloud::PointDistributionSummary& distribution);
+
+}  // namespace risley::json

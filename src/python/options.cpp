@@ -1,0 +1,110 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "python/options.hpp"
+
+#include <algorithm>
+#include <array>
+
+#include <fmt/ranges.h>
+
+#include "python/names.hpp"
+
+namespace risley::python {
+namespace {
+
+/// The name in files of a parameter of any train; an unknown name as it is, for the job to refuse.
+std::string file_name_of(const NamedParameter& parameter, const std::string& name) {
+  return parameter.info != nullptr ? parameter.info->name : name;
+}
+
+}  // namespace
+
+std::size_t Options::choice(const char* name, const std::vector<std::string>& allowed,
+                            std::size_t usual) const {
+  if (!has(name)) return usual;
+  std::string word;
+  take(name, word);
+  const auto found = std::find(allowed.begin(), allowed.end(), word);
+  if (found == allowed.end()) {
+    throw InvalidArgument(
+        fmt::format("{} = '{}', allowed {}", name, word, fmt::join(allowed, ", ")));
+  }
+  return static_cast<std::size_t>(found - allowed.begin());
+}
+
+py::type_error Options::wrong_type(const char* name) const {
+  return py::type_error(fmt::format("{} = {} is of a type that cannot be taken", name,
+                                    py::repr(values_[name]).cast<std::string>()));
+}
+
+recordings::ReadOptions read_options(const Options& options) {
+  recordings::ReadOptions reading;
+  options.take("shot_rate", reading.shot_rate);
+  std::optional<std::array<double, 3>> pose;
+  options.take("extrinsics", pose);
+  if (pose) {
+    const auto& [yaw, pitch, roll] = *pose;
+    reading.extrinsics = recordings::Extrinsics{yaw, pitch, roll, {}};
+  }
+  return reading;
+}
+
+jobs::HeldParameters held_parameters(const Options& options) {
+  std::vector<std::pair<std::string, std::optional<double>>> fixed;
+  options.take("fixed", fixed);
+  for (auto& [name, value] : fixed) {
+    const NamedParameter parameter = parameter_of_any_train(name);
+    if (value) *value *= parameter.si_per_unit;
+    name = file_name_of(parameter, name);
+  }
+  return fixed;
+}
+
+std::vector<std::string> parameter_names(const Options& options, const char* name) {
+  std::vector<std::string> names;
+  options.take(name, names);
+  for (std::string& one : names) one = file_name_of(parameter_of_any_train(one), one);
+  return names;
+}
+
+jobs::ParameterValues parameter_values(const Options& options, const char* name) {
+  jobs::ParameterValues values;
+  options.take(name, values);
+  for (auto& [one, value] : values) {
+    const NamedParameter parameter = parameter_of_any_train(one);
+    value *= parameter.si_per_unit;
+    one = file_name_of(parameter, one);
+  }
+  return values;
+}
+
+jobs::PlatformFiles platform_files(const Options& options) {
+  jobs::PlatformFiles files;
+  options.take("trajectory", files.trajectory);
+  options.take("trajectory_topic", files.topic);
+  options.take("mount", files.mount);
+  options.take("accuracy", files.accuracy);
+  options.take("trajectory_errors", files.errors);
+  options.take("crs", files.crs);
+  options.take("datum", files.datum);
+  return files;
+}
+
+jobs::Provenance provenance_of(const char* job) {
+  return {{"command", fmt::format("risley.{} of Python", job)}, {"version", RISLEY_VERSION}};
+}
+
+jobs::ResultFiles result_files(const Options& options, const char* job) {
+  jobs::ResultFiles files;
+  options.take("output", files.folder);
+  constexpr std::array kRows = {jobs::StatesRows::knots, jobs::StatesRows::all,
+                                jobs::StatesRows::none};
+  files.states = kRows.at(options.choice("states", {"knots", "all", "none"}));
+  files.provenance = provenance_of(job);
+  std::uint64_t seed = 0;
+  options.take("seed", seed);
+  files.provenance.emplace_back("seed", std::to_string(seed));
+  return files;
+}
+
+}  // namespace risley::python

@@ -1,0 +1,75 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+#include <pybind11/stl.h>
+
+#include "risley/core/error.hpp"
+#include "risley/jobs/moving_platform.hpp"
+#include "risley/jobs/result_files.hpp"
+#include "risley/jobs/sensor_choice.hpp"
+#include "risley/jobs/simulation_settings.hpp"
+#include "risley/recordings/reader.hpp"
+
+#include "python/bind.hpp"
+
+namespace risley::python {
+
+/// Keyword arguments of a job by name. None, and what is not there, leaves a default as it is.
+class Options {
+ public:
+  explicit Options(py::dict values) : values_(std::move(values)) {}
+
+  bool has(const char* name) const { return values_.contains(name) && !values_[name].is_none(); }
+
+  bool is_text(const char* name) const {
+    return has(name) && py::isinstance<py::str>(values_[name]);
+  }
+
+  /// @throws TypeError naming the option
+  template <class T>
+  void take(const char* name, T& to) const {
+    if (!has(name)) return;
+    try {
+      to = values_[name].cast<T>();
+    } catch (const py::cast_error&) {
+      throw wrong_type(name);
+    }
+  }
+  template <class T>
+  void take(const char* name, std::optional<T>& to) const {
+    if (has(name)) take(name, to.emplace());
+  }
+
+  /// A word among those allowed. @return its place; `usual` where it is not there
+  std::size_t choice(const char* name, const std::vector<std::string>& allowed,
+                     std::size_t usual = 0) const;
+
+ private:
+  py::type_error wrong_type(const char* name) const;
+
+  py::dict values_;
+};
+
+/// shot_rate, Hz, and extrinsics, yaw, pitch, roll in rad.
+recordings::ReadOptions read_options(const Options& options);
+/// fixed: [(name, value or None)], by either name of a parameter.
+jobs::HeldParameters held_parameters(const Options& options);
+/// A list of names, by either name of a parameter.
+std::vector<std::string> parameter_names(const Options& options, const char* name);
+/// [(name, value)], by either name of a parameter.
+jobs::ParameterValues parameter_values(const Options& options, const char* name);
+/// trajectory, topic, mount, accuracy, trajectory_errors, crs, datum: paths and names.
+jobs::PlatformFiles platform_files(const Options& options);
+/// output: the folder of results; states: knots, all or none.
+jobs::ResultFiles result_files(const Options& options, const char* job);
+/// What a file says of the program that made it.
+jobs::Provenance provenance_of(const char* job);
+
+}  // namespace risley::python

@@ -1,0 +1,262 @@
+# SPDX-FileCopyrightText: 2026 The risley authors
+# SPDX-License-Identifier: MIT
+"""Every job of Python gives what its verb of the command prints, to the last digit."""
+import json
+import math
+import os
+import pathlib
+import pickle
+import re
+import subprocess
+
+import numpy as np
+import pytest
+
+import risley
+
+DATA = pathlib.Path(os.environ["RISLEY_SOURCE_DIR"]) / "data"
+OF_A_RUN = {"command", "inputs", "seconds"}
+FLIGHT = """risley_flight: 1
+rate_hz: 200
+height_m: 60
+speed_m_per_s: 5
+turn_duration_s: 10
+strips: [{headings_deg: [90, 270, 0, 180], length_m: 55}]
+"""
+
+
+def command(*words, status=0):
+    """What a verb prints."""
+    done = subprocess.run([os.environ["RISLEY_COMMAND"], *map(str, words), "--json"],
+                          capture_output=True, text=True, check=False)
+    assert done.returncode == status, done.stderr
+    return json.loads(done.stdout)
+
+
+def without_names_of_options(value):
+    """Where libraries say "option planes", the command says "--planes"."""
+    if isinstance(value, dict):
+        return {key: without_names_of_options(one) for key, one in value.items()}
+    if isinstance(value, list):
+        return [without_names_of_options(one) for one in value]
+    return re.sub(r"option \w+|--[a-z-]+", "OPTION", value) if isinstance(value, str) else value
+
+
+def assert_same(ours, theirs):
+    """Every key and every number is alike, except what belongs to a run."""
+    ours, theirs = ({key: without_names_of_options(value) for key, value in one.items()
+                     if key not in OF_A_RUN} for one in (ours, theirs))
+    assert ours.keys() == theirs.keys()
+    for key, value in ours.items():
+        assert value == theirs[key], key
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("jobs")
+
+
+@pytest.fixture(scope="module")
+def simulation(folder):
+    """A bent unit in a hall that believes itself perfect."""
+    return risley.simulate(folder / "hall.nc", rate=20000.0, duration=2.0, seed=4,
+                           scene=DATA / "hall.yaml", set={"prism_tilt_a_vertical_deg": 0.5},
+                           reported_nominal=True)
+
+
+@pytest.fixture(scope="module")
+def hall(simulation):
+    return simulation.files[0]
+
+
+@pytest.fixture(scope="module")
+def truth(hall):
+    return hall + ".truth.yaml"
+
+
+@pytest.fixture(scope="module")
+def estimate(hall, truth):
+    return risley.estimate(hall, truth=truth, rate=5000)
+
+
+@pytest.fixture(scope="module")
+def calibration(hall, truth):
+    return risley.calibrate([hall], truth=truth, rate=5000)
+
+
+def test_simulate(simulation, hall):
+    before = pathlib.Path(hall).read_bytes()
+    printed = command("simulate", "-o", hall, "--rate-hz", 20000, "--duration-s", 2, "--seed", 4,
+                      "--scene", DATA / "hall.yaml", "--set", "prism_tilt_a_vertical_deg=0.5",
+                      "--reported", "nominal")
+    assert_same(simulation.to_dict(), printed)
+    assert len(pathlib.Path(hall).read_bytes()) == len(before)
+    assert simulation.observations == 40000 and len(simulation.files) == 3
+    assert simulation.truth["prism_tilt_a_vertical_deg"] == pytest.approx(0.5)
+
+
+def test_info(hall):
+    assert_same(risley.info(hall), command("info", hall))
+
+
+def test_estimate(estimate, hall, truth):
+    assert_same(estimate.to_dict(),
+                command("estimate", hall, "--truth", truth, "--rate-hz", 5000))
+    held = risley.estimate(hall, rate=5000, fixed={"bearing_tilt_a_horizontal": math.radians(0.1)},
+                           angle_noise_deg=0.004)
+    assert_same(held.to_dict(),
+                command("estimate", hall, "--rate-hz", 5000, "--fix",
+                        "bearing_tilt_a_horizontal_deg=0.1", "--noise-angle-deg", 0.004))
+    filtered = risley.estimate(hall, method="ekf")
+    assert_same(filtered.to_dict(), command("estimate", hall, "--method", "ekf"))
+
+
+def test_calibrate(calibration, hall, truth):
+    assert_same(calibration.to_dict(),
+                command("calibrate", hall, "--truth", truth, "--rate-hz", 5000))
+    assert calibration.verdict.code == calibration.to_dict()["verdict"]["code"] == "bent"
+    assert calibration.pointing_error["total_deg"]["value"] > 0.01
+    assert calibration.names[-1] == "range_offset" and calibration.units[-1] == "m"
+    assert calibration.covariance.shape == (len(calibration.free),) * 2
+    held = risley.calibrate(hall, rate=2000, fixed=["refractive_index"], beam_origin=False,
+                            range_offset_sigma=0.0, prior_sigma_deg=0.2)
+    assert_same(held.to_dict(),
+                command("calibrate", hall, "--rate-hz", 2000, "--fix", "refractive_index",
+                        "--beam-origin", "no", "--range-offset-sigma-m", 0,
+                        "--prior-sigma-deg", 0.2))
+
+
+def test_plan():
+    planned = risley.plan(DATA / "hall.yaml", duration=5.0, range_noise=0.01)
+    assert_same(planned.to_dict(), command("calibrate", "--plan", DATA / "hall.yaml",
+                                           "--duration-s", 5, "--noise-range-m", 0.01))
+    assert np.all(planned.sigmas > 0) and "<td>" in planned._repr_html_()
+
+
+def test_a_flight_planned_and_calibrated(folder):
+    plan, path, mount = folder / "flight.yaml", folder / "flight.nc", DATA / "mount-nadir.yaml"
+    plan.write_text(FLIGHT, encoding="utf-8")
+    errors = DATA / "trajectory-errors.yaml"
+    planned = risley.plan(plan, rate=200.0, mount=mount, trajectory_errors=errors)
+    assert_same(planned.to_dict(),
+                command("calibrate", "--plan", plan, "--rate-hz", 200, "--mount", mount,
+                        "--trajectory-errors", errors))
+    assert "boresight_x" in planned.names and set(planned.units) >= {"rad", "m", "s"}
+    assert planned.covariance.shape == (len(planned.names),) * 2
+    flown = risley.simulate(path, rate=1000.0, flight=plan, mount=mount, seed=1,
+                            scene=DATA / "village.yaml", trajectory_errors=errors)
+    trajectory = flown.to_dict()["trajectory"]
+    assert_same(flown.to_dict(),
+                command("simulate", "-o", path, "--rate-hz", 1000, "--flight", plan, "--mount", mount,
+                        "--seed", 1, "--scene", DATA / "village.yaml",
+                        "--trajectory-errors", errors))
+    found = risley.calibrate(path, trajectory=trajectory, mount=mount, trajectory_errors=errors,
+                             knot_spacing=1.0, sensor="mid-40")
+    assert isinstance(found, risley.FlightCalibration)
+    assert_same(found.to_dict(),
+                command("calibrate", path, "--trajectory", trajectory, "--mount", mount,
+                        "--trajectory-errors", errors, "--knot-spacing-s", 1,
+                        "--sensor", "mid-40"))
+    at = found.names.index("boresight_x")
+    assert found.units[at] == "rad" and found.sigmas[at] > 0
+    found.report(folder / "flight.html")
+
+
+def test_cloud(hall, calibration, folder):
+    calibration.sensor.write(folder / "calibration.yaml")
+    made = risley.cloud(hall, folder / "calibration.yaml", folder / "hall.ply",
+                        common_factors=True)
+    assert_same(made.to_dict(),
+                command("cloud", hall, "--calibration", folder / "calibration.yaml",
+                        "-o", folder / "hall.ply", "--common-factors", "yes"))
+    assert made.points > 10000 and pathlib.Path(made.output).stat().st_size > 0
+
+
+def test_identify(folder):
+    scan = folder / "scan.nc"
+    risley.simulate(scan, rate=20000.0, duration=1.0, seed=2)
+    found = risley.identify(scan, most_prisms=2)
+    assert_same(found.to_dict(), command("identify", scan, "--most-prisms", 2))
+    assert found.verdict.code == "identified" and found.sensor["wedge_angle_a_deg"] > 1
+
+
+def test_pattern(folder):
+    written = risley.pattern("mid-70", "npy", folder / "mid-70.npy", duration=0.2)
+    assert_same(written.to_dict(),
+                command("pattern", "--sensor", "mid-70", "--format", "npy",
+                        "-o", folder / "mid-70.npy", "--duration-s", 0.2))
+    assert written.rows == len(np.load(folder / "mid-70.npy"))
+    covered = risley.coverage("mid-70", after=[0.1, 0.5])
+    printed = command("pattern", "--sensor", "mid-70", "--coverage", "--integration-s", "0.1,0.5")
+    assert_same(covered, {**printed["coverage"], "format_version": 1,
+                          "version": risley.__version__})
+
+
+def test_observability(hall):
+    assert_same(risley.observability(sensor="mid-70", duration=5.0),
+                command("observability", "--sensor", "mid-70", "--duration-s", 5))
+    assert_same(risley.observability(hall, rate=2000.0),
+                command("observability", hall, "--rate-hz", 2000))
+
+
+def test_compare(calibration, estimate, folder):
+    calibration.sensor.write(folder / "a.yaml")
+    estimate.sensor.write(folder / "b.yaml")
+    assert_same(risley.compare([folder / "a.yaml", folder / "b.yaml", folder / "a.yaml"]),
+                command("compare", folder / "a.yaml", folder / "b.yaml", folder / "a.yaml"))
+
+
+def test_presets():
+    listed = command("preset", "list")["presets"]
+    assert [one["name"] for one in listed] == list(risley.presets())
+
+
+def test_files_of_a_result(hall, folder):
+    risley.calibrate([hall], rate=2000, output=folder / "result")
+    names = {path.name for path in (folder / "result").iterdir()}
+    assert names == {"calibration.yaml", "states.nc", "report.json", "report.html"}
+    again = command("report", folder / "result", "-o", folder / "again.html")
+    assert again["verb"] == "calibrate"
+
+
+@pytest.mark.parametrize("name", ["estimate", "calibration"])
+def test_results_are_pickled_and_drawn(name, folder, request):
+    result = request.getfixturevalue(name)
+    result.report(folder / "page.html")
+    restored = pickle.loads(pickle.dumps(result))
+    restored.report(folder / "restored.html")
+    assert (folder / "page.html").read_bytes() == (folder / "restored.html").read_bytes()
+    assert restored.to_dict() == result.to_dict() and restored.sensor == result.sensor
+    assert restored.names == result.names and restored.verdict == result.verdict
+    np.testing.assert_array_equal(restored.covariance, result.covariance)
+    assert result.verdict.words.split()[0] in result._repr_html_()
+
+
+def test_results_become_datasets(calibration):
+    pytest.importorskip("xarray")
+    data = calibration.to_xarray()
+    assert float(data["sigma"].sel(name="range_offset")) == calibration.sigmas[-1]
+    assert data["covariance"].shape == calibration.covariance.shape
+
+
+@pytest.mark.parametrize("call, words", [
+    (lambda hall: risley.calibrate(hall, method="guess"), "method = 'guess', allowed adjustment"),
+    (lambda hall: risley.calibrate(hall, mount="m.yaml"), "mount is not for a calibration with no"),
+    (lambda hall: risley.calibrate(hall, range_noise=0.0), "range_noise = 0 m"),
+    (lambda hall: risley.calibrate(hall, planes="no.yaml"), "no.yaml"),
+    (lambda hall: risley.cloud(hall, "mid-40", "x.ply", time="now"), "time = 'now', allowed gps"),
+    (lambda hall: risley.cloud(hall, "mid-40", "x.xyz1"), "x.xyz1"),
+    (lambda hall: risley.simulate("x.nc", set={"colour": 1.0}), "unknown parameter \"colour\""),
+    (lambda hall: risley.simulate("x.nc", mount="m.yaml"), "option mount needs option trajectory"),
+    (lambda hall: risley.identify(hall, fastest=-1.0), "fastest = -1 rad/s"),
+    (lambda hall: risley.pattern("mid-40", "bmp", "x.bmp"), "bmp"),
+    (lambda hall: risley.plan(DATA / "hall.yaml", cell_size=2.0), "cell_size goes with a flight"),
+])
+def test_wrong_options_are_named(hall, call, words):
+    with pytest.raises((ValueError, OSError), match=words):
+        call(hall)
+
+
+def test_a_wrong_type_is_named(hall):
+    with pytest.raises(TypeError, match="range_noise = 'loud'"):
+        risley.calibrate(hall, range_noise="loud")
