@@ -70,16 +70,16 @@ std::string beam_origin_page(const BeamOriginMap& map, const sensors::Sensor& se
   Sections sections;
   if (map.size() > 0) {
     sections.add("Horizontal (Y)",
-                 charts_html({map_chart(map, "Least Y of the beam's origin", map.least_y),
-                              map_chart(map, "Greatest Y of the beam's origin", map.greatest_y),
-                              map_chart(map, "Y: greatest minus least",
+                 charts_html({map_chart(map, "Smallest Y of the beam's origin", map.least_y),
+                              map_chart(map, "Largest Y of the beam's origin", map.greatest_y),
+                              map_chart(map, "Y: largest minus smallest",
                                         difference(map.greatest_y, map.least_y))},
                              figures),
                  Sections::Shown::unfolded);
     sections.add("Vertical (Z)",
-                 charts_html({map_chart(map, "Least Z of the beam's origin", map.least_z),
-                              map_chart(map, "Greatest Z of the beam's origin", map.greatest_z),
-                              map_chart(map, "Z: greatest minus least",
+                 charts_html({map_chart(map, "Smallest Z of the beam's origin", map.least_z),
+                              map_chart(map, "Largest Z of the beam's origin", map.greatest_z),
+                              map_chart(map, "Z: largest minus smallest",
                                         difference(map.greatest_z, map.least_z))},
                              figures),
                  Sections::Shown::unfolded);
@@ -87,8 +87,8 @@ std::string beam_origin_page(const BeamOriginMap& map, const sensors::Sensor& se
   sections.add(kHowToRepeat, provenance_html(provenance));
   return page_html(
       "Where beams start: " + sensor.name,
-      "How far the point where the beam leaves the last prism lies beside the origin of "
-      "the sensor's frame, over its field of view.",
+      "How far the point where the beam leaves the last prism lies from the origin of the "
+      "sensor's frame, across the optical axis, over the field of view.",
       head, sections, figures);
 }
 

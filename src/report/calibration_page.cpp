@@ -67,11 +67,10 @@ const char* datum_text(DatumKind kind) {
 
 std::string boresight_advice_html(const CalibrationReport& r) {
   return fmt::format(
-      "<p><b>Absolute boresight must not be trusted from these walls:</b> pitch and yaw, which all "
-      "beams share, have a standard uncertainty of {}° together, and more than {:.2g}° is poor. "
-      "The shape "
-      "of the bundle, and with it the flatness of point clouds, does not suffer. Set-ups that "
-      "help:</p>{}",
+      "<p><b>The absolute boresight from these walls must not be trusted:</b> pitch and yaw, "
+      "which all beams share, have a combined standard uncertainty of {}°, and more than {:.2g}° "
+      "is poor. The shape of the bundle, and with it the flatness of point clouds, is not "
+      "affected. Set-ups that help:</p>{}",
       sigma_degrees(boresight_sigma(r.datum)), degrees_from_radians(calibration::kPoorDatum),
       list_html(
           {"a wall that is steeply tilted against the axis of view, 50 to 65 degrees, and "
@@ -101,10 +100,10 @@ Verdict verdict_of(const CalibrationReport& r) {
                 sigma_degrees(r.datum.sigma_roll), sigma_degrees(r.datum.sigma_pitch),
                 sigma_degrees(r.datum.sigma_yaw));
   verdict.mend =
-      "look at the views below whether what was taken for walls are walls; record walls that fill "
-      "the field of view, more of them, from nearer and farther and steeply tilted; hold "
-      "parameters that these walls do not tell (option fixed); and check known normals and "
-      "stations, if any were given";
+      "check in the views below that what was taken for walls really is walls; record more walls "
+      "that fill the field of view, near and far and steeply tilted; hold parameters that these "
+      "walls do not determine (option fixed); and check known normals and stations, if any were "
+      "given";
   if (r.converged && has_poor_datum(r)) verdict.care_html = boresight_advice_html(r);
   return verdict;
 }
@@ -135,7 +134,8 @@ std::vector<KeyNumber> key_numbers(const CalibrationReport& r) {
     numbers.push_back({known(errors.total, r.pointing_error->total_sigma),
                        "error of the reported directions: " + offset_text(errors.total)});
     numbers.push_back({known(errors.shape, r.pointing_error->shape_sigma),
-                       "of it in the shape of the bundle of beams, which no alignment takes up: " +
+                       "of this is in the shape of the bundle of beams, which no alignment "
+                       "removes: " +
                            offset_text(errors.shape)});
   }
   numbers.push_back({fmt::format("{} mm", millimetres(r.rms_after)),
@@ -196,12 +196,12 @@ std::string parameters_html(const CalibrationReport& r) {
   return html +
          "</tbody></table></div>\n<p class=\"note\">σ is one standard deviation, everything "
          "included" +
-         (any_held ? ", also what the parameters that were held may be off by, which the second σ "
-                     "leaves out: a held parameter that is off moves the others so that the beams "
-                     "go where they went. Nominal"
+         (any_held ? ", also the uncertainty of the parameters that were held, which the second σ "
+                     "leaves out: if a held parameter is wrong, the others change so that the "
+                     "beams still point the same way. Nominal"
                    : ". Nominal") +
-         ": the preset. Believed: what the sensor computed its directions with "
-         "when it recorded. Difference: value minus believed.</p>\n";
+         ": the preset. Believed: what the sensor used to compute its directions. Difference: "
+         "value minus believed.</p>\n";
 }
 
 std::string formal_datum_row(const char* name, const FormalDatum& datum) {
@@ -238,17 +238,17 @@ std::string pointing_html(const CalibrationReport& r) {
                         sigma_cell(degrees_from_radians(error), degrees_from_radians(sigma)),
                         millimetres(offset_at(error)));
   };
-  add("all of it", errors.total, r.pointing_error->total_sigma);
+  add("total", errors.total, r.pointing_error->total_sigma);
   add("shared: a rotation of all beams together", errors.gauge, r.pointing_error->gauge_sigma);
-  add("shape: what is left", errors.shape, r.pointing_error->shape_sigma);
+  add("shape: the rest", errors.shape, r.pointing_error->shape_sigma);
   add("shape of the worst beam", r.pointing_error->worst_shape,
       r.pointing_error->worst_shape_sigma);
   return html +
          fmt::format(
              "</tbody></table></div>\n<p class=\"note\">Root mean squares over the beams of the "
              "recordings: reported directions against those of this calibration, σ from the "
-             "calibration's covariance. The shared rotation is roll {}°, pitch {}° and yaw {}°; a "
-             "mount that is aligned by its points takes it up, the shape it does not.</p>\n",
+             "calibration's covariance. The shared rotation is roll {}°, pitch {}° and yaw {}°; "
+             "aligning the mount by its point clouds removes it, but not the shape.</p>\n",
              to_place_of(degrees_from_radians(errors.rotation.x),
                          degrees_from_radians(r.datum.sigma_roll)),
              to_place_of(degrees_from_radians(errors.rotation.y),
@@ -260,9 +260,10 @@ std::string pointing_html(const CalibrationReport& r) {
 std::string prior_tests_html(const std::vector<PriorTest>& tests) {
   if (tests.empty()) return "";
   std::string html =
-      "<h3>What was known before, against the data</h3>\n<div class=\"wide\"><table><thead><tr>"
-      "<th>known</th><th>kind</th><th>misfit, deg</th><th>χ²</th><th>degrees of freedom</th>"
-      "<th>critical χ²</th><th>verdict</th></tr></thead><tbody>\n";
+      "<h3>Prior knowledge against the data</h3>\n<div "
+      "class=\"wide\"><table><thead><tr><th>name</th><th>kind</th><th>misfit, "
+      "deg</th><th>χ²</th><th>degrees of freedom</th><th>critical "
+      "χ²</th><th>verdict</th></tr></thead><tbody>\n";
   for (const PriorTest& test : tests) {
     // Without a degree of freedom the data say nothing of it.
     const bool tested = test.degrees_of_freedom > 0 && std::isfinite(test.chi2 + test.critical);
@@ -278,19 +279,19 @@ std::string prior_tests_html(const std::vector<PriorTest>& tests) {
                 : "contradicts the data");
   }
   return html +
-         "</tbody></table></div>\n<p class=\"note\">Misfit: the rotation between what was said and "
-         "what the adjustment found. A sound station or normal exceeds the critical value once in "
-         "10,000. Not tested: the data have nothing to say of it.</p>\n";
+         "</tbody></table></div>\n<p class=\"note\">Misfit: the rotation between what was stated "
+         "and what the adjustment found. A correct station or normal exceeds the critical value "
+         "once in 10,000 times. Not tested: the data do not determine it.</p>\n";
 }
 
 std::string unobservable_html(const CalibrationReport& r) {
   if (r.unobservable.empty()) return "";
   std::vector<std::string> items;
   for (const estimation::WeakDirection& weak : r.unobservable) {
-    items.push_back(fmt::format("{}: its sigma stays {}", direction_text(weak),
+    items.push_back(fmt::format("{}: its sigma remains {}", direction_text(weak),
                                 finite_text("{:.2g}", weak.sigma)));
   }
-  return "<h3>What stays unobservable</h3>\n<p>The walls do not tell these combinations of "
+  return "<h3>What remains unobservable</h3>\n<p>The walls do not determine these combinations of "
          "parameters (in units of 1 degree, or 0.01 of an index).</p>\n" +
          list_html(items) + "\n";
 }
@@ -306,10 +307,10 @@ std::string datum_html(const CalibrationReport& r) {
   html +=
       formal_datum_row("without the common errors of the rotation angles", r.datum_without_common);
   html +=
-      "</tbody></table></div>\n<p class=\"note\">Shape: what bends the bundle of beams; walls see "
-      "it. Gauge: the rotation that all beams share, roll, pitch and yaw about X, Y and Z; only "
-      "something from outside, or the bundle's shape, tells it. Both are root mean squares over "
-      "the beams.</p>\n";
+      "</tbody></table></div>\n<p class=\"note\">Shape: distortion of the bundle of beams, which "
+      "walls reveal. Gauge: the rotation that all beams share, roll, pitch and yaw about X, Y and "
+      "Z, which only an outside reference, or the bundle's shape, determines. Both are root mean "
+      "squares over the beams.</p>\n";
   if (r.truth) {
     html +=
         "<h3>Against the truth</h3>\n<div class=\"wide\"><table><thead><tr>"
@@ -355,19 +356,21 @@ std::string planes_html(const CalibrationReport& r) {
       "before with the believed parameters and a plane fitted to them. Outliers: shots near the "
       "plane that were not used. Range σ: noise of one range that the residuals show.</p>\n";
   html += fmt::format(
-      "<p>Residuals scatter {} times as much as the stated range noise promises. Means over cells "
-      "of one degree have {} times the variance that noise gives them; 1 is a flat wall.{}</p>\n",
+      "<p>The residuals scatter {} times as much as the stated range noise predicts. Means over "
+      "cells of one degree have {} times the variance that noise alone would give them; 1 is a "
+      "flat wall.{}</p>\n",
       finite_text("{:.3g}", r.sigma0), finite_text("{:.3g}", r.unevenness),
       r.variance_factor == 1
           ? ""
-          : fmt::format(" For uneven walls every variance on this page was multiplied by {}.",
+          : fmt::format(" Because the walls are uneven, every variance on this page was "
+                        "multiplied by {}.",
                         finite_text("{:.3g}", r.variance_factor)));
   return html;
 }
 
 std::string steps_html(const CalibrationReport& r) {
   if (r.planes.empty()) return "";
-  if (r.steps.empty()) return "<p>No step stands off a wall.</p>\n";
+  if (r.steps.empty()) return "<p>No step was found on a wall.</p>\n";
   std::vector<std::string> items;
   for (const SurfaceStep& step : r.steps) {
     items.push_back(fmt::format(
@@ -379,8 +382,8 @@ std::string steps_html(const CalibrationReport& r) {
         finite_text("{:.1f}", degrees_from_radians(step.azimuth)),
         finite_text("{:.1f}", degrees_from_radians(step.zenith)), step.points));
   }
-  return "<h3>Steps on the walls</h3>\n<p>These regions stand off their wall, as a door frame or a "
-         "picture does; their shots were left out.</p>\n" +
+  return "<h3>Steps on the walls</h3>\n<p>These regions stand off their wall, as a door frame or "
+         "a picture does; their shots were left out of the adjustment.</p>\n" +
          list_html(items) + "\n";
 }
 

@@ -315,14 +315,15 @@ class CalibrationCharts {
             {line("RMS after", "a", profile.rms_after), line("RMS before", "b", profile.rms_before),
              line("mean after", "c", profile.mean_after),
              line("mean before", "d", profile.mean_before)},
-            fmt::format("All points in {} bins, which hold {} to {} points; empty bins "
-                        "leave a gap. A calibrated sensor has means near 0.",
+            fmt::format("All points in {} bins, which hold {} to {} points; empty bins leave a "
+                        "gap. Distances are positive beyond the plane as seen from the sensor; a "
+                        "calibrated sensor has means near 0.",
                         bins.size(), count_text(fewest), count_text(most)),
             turn ? ChartKind::full_turn : ChartKind::plain};
   }
 
   std::string sample_note() const {
-    return fmt::format("Of the {} used points the {} that stand in an evenly spread sample. ",
+    return fmt::format("An evenly spread sample: {1} of the {0} used points. ",
                        count_text(c_.points), count_text(input_.details.points_on_planes));
   }
 
@@ -376,11 +377,12 @@ class CalibrationCharts {
     const auto chart = [&](const char* when, const std::vector<double>& means, double rms) {
       Chart result = map_of_cells(
           fmt::format("Mean distance from the planes over the field of view, {}", when),
-          fmt::format("Means of {} sample points over cells of {:.3g} degree, all "
-                      "recordings together; cells with fewer than {} points are left out. "
-                      "The {} means have a root mean square of {:.2f} mm, where noise "
-                      "alone would leave about {:.2f} mm. Patches of one colour are walls "
-                      "that are not flat, or beams that are bent.",
+          fmt::format("Means of {} sample points over cells of {:.3g} degree, all recordings "
+                      "together; cells with fewer than {} points are left out. The {} means have "
+                      "a root mean square of {:.2f} mm, where noise alone would leave about "
+                      "{:.2f} mm. Red: beyond the plane as seen from the sensor, blue: in front "
+                      "of it. Patches of one colour are walls that are not flat, or beams that "
+                      "are off.",
                       count_text(field.points), degrees_from_radians(field.cells.side),
                       field.fewest_points, count_text(means.size()), kMillimetres * rms,
                       kMillimetres * field.noise),
@@ -422,8 +424,9 @@ class CalibrationCharts {
                    {series},
                    fmt::format("Each dot is the mean of the {} sample points of a wall within one "
                                "degree, {} dots; cells with fewer than {} points are left out. "
-                               "Distances from the planes are drawn {:.0f} times as large. Drag to "
-                               "rotate.",
+                               "Distances from the planes are drawn {:.0f} times as large; red is "
+                               "beyond the plane as seen from the sensor, blue in front of it. "
+                               "Drag to rotate.",
                                count_text(walls.points), count_text(series.x.size()),
                                walls.fewest_points, enlarged),
                    ChartKind::space};

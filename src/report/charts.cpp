@@ -60,7 +60,7 @@ std::vector<std::size_t> every_nth(std::size_t rows, std::size_t most) {
 std::string every_nth_note(std::size_t rows, std::size_t most, std::string_view what) {
   const std::size_t stride = stride_for(rows, most);
   if (stride == 1) return fmt::format("All {} {} are drawn.", count_text(rows), what);
-  return fmt::format("Of {} {} one in {} is drawn.", count_text(rows), what, stride);
+  return fmt::format("One in {2} of the {0} {1} is drawn.", count_text(rows), what, stride);
 }
 
 Series peak_line(std::string label, std::string colour, std::size_t rows, const Column& x,
@@ -90,8 +90,8 @@ Series peak_line(std::string label, std::string colour, std::size_t rows, const 
 std::string peak_line_note(std::size_t rows) {
   const std::size_t bin = stride_for(rows, kLineBins);
   if (bin <= 2) return fmt::format("All {} shots are drawn.", count_text(rows));
-  return fmt::format("Of every {} of {} shots the smallest and the largest value are drawn.", bin,
-                     count_text(rows));
+  return fmt::format("The smallest and the largest value of every {} of the {} shots are drawn.",
+                     bin, count_text(rows));
 }
 
 std::vector<Series> histogram(const std::string& label, const std::string& colour,

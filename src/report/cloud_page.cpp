@@ -62,10 +62,10 @@ Chart points_chart(const PointSample& sample) {
   points.z = stepped(sample.z, 1, 1e-3);
   Chart chart{"The points", label(0), label(1), {}, "", ChartKind::space};
   chart.z_label = label(2);
-  chart.note = fmt::format("{} Colours end where 2 % of the points lie below and 2 % above.",
+  chart.note = fmt::format("{} The colours leave out the lowest and the highest 2 % of the values.",
                            sample.size() == sample.points
                                ? fmt::format("All {} points are drawn.", count_text(sample.points))
-                               : fmt::format("Of {} points {} are drawn, chosen by lot.",
+                               : fmt::format("{1} of the {0} points are drawn, chosen at random.",
                                              count_text(sample.points), count_text(sample.size())));
   std::vector<Colouring>& colourings = chart.colourings.emplace();
   const auto add = [&](std::string name, std::vector<double> values) {
@@ -109,9 +109,9 @@ std::string row_of(const std::string& head, const RangeClass& one) {
 std::string uncertainty_html(const PointSample& sample, Figures& figures) {
   if (sample.total_sigma.empty()) return "";
   std::string html =
-      "<div class=\"wide\"><table><thead><tr><th>range</th><th>points of the sample</th>"
-      "<th>median, mm</th><th>95 % are below, mm</th><th>angle of incidence known</th></tr></thead>"
-      "<tbody>\n";
+      "<div class=\"wide\"><table><thead><tr><th>range</th><th>points of the "
+      "sample</th><th>median, mm</th><th>95 % are below, mm</th><th>angle of incidence "
+      "known</th></tr></thead><tbody>\n";
   for (const RangeClass& one : cloud::range_classes(sample)) {
     html += row_of(std::isfinite(one.to) ? fmt::format("{:g} to {:g} m", one.from, one.to)
                                          : fmt::format("beyond {:g} m", one.from),
@@ -120,10 +120,9 @@ std::string uncertainty_html(const PointSample& sample, Figures& figures) {
   html += row_of("all", cloud::whole_range(sample));
   return html +
          "</tbody></table></div>\n<p class=\"note\">Standard uncertainty of the position: the "
-         "square "
-         "root of the sum of the variances of the three coordinates. It counts the noise of ranges "
-         "and of rotation angles, the width of the beam, and what is not known of the sensor and, "
-         "if it moves, of its mount and its path.</p>\n" +
+         "square root of the sum of the variances of the three coordinates. It includes the noise "
+         "of the ranges and rotation angles, the width of the beam, and the uncertainty of the "
+         "calibration and, if the sensor moves, of its mount and trajectory.</p>\n" +
          charts_html({sigma_chart(sample, "Uncertainty against range", "range, m",
                                   stepped(sample.range, 1, 1e-3)),
                       sigma_chart(sample, "Uncertainty against the angle of incidence",
@@ -156,7 +155,7 @@ std::vector<KeyNumber> key_numbers(const CloudSummary& cloud) {
   numbers.push_back({fmt::format("{} mm", millimetres(all.median_sigma)),
                      "standard uncertainty of a point's position, median"});
   numbers.push_back({fmt::format("{} mm", millimetres(all.high_sigma)),
-                     "95 % of the points are surer than this"});
+                     "95 % of the points have a smaller standard uncertainty"});
   return numbers;
 }
 
@@ -174,7 +173,7 @@ std::string cloud_page(const CloudSummary& cloud, const std::string& recording,
             list_html(cloud.warnings) + "</section>\n";
   }
   Sections sections;
-  sections.add("How sure the points are", uncertainty_html(*cloud.sample, figures),
+  sections.add("Uncertainty of the points", uncertainty_html(*cloud.sample, figures),
                Sections::Shown::unfolded);
   sections.add("What is not in the cloud", counts_html(cloud));
   sections.add(kHowToRepeat, provenance_html(provenance));

@@ -26,7 +26,7 @@ std::vector<KeyNumber> key_numbers(const PointingError& beams) {
           {angle_with_sigma(beams.errors.gauge, beams.gauge_sigma),
            "of that is a rotation of all beams together"},
           {angle_with_sigma(beams.errors.shape, beams.shape_sigma),
-           "is the beams against each other: their shape"}};
+           "of that is the beams against each other: their shape"}};
 }
 
 std::string facts_of(const EstimateReport& report) { return "Of " + report.recording.name + "."; }
@@ -103,13 +103,12 @@ std::string parameters_html(const ResultComparison& c, const ComparedResult& a,
          fmt::format(
              "</tbody></table></div>\n<p class=\"note\">{} The two results count as independent. "
              "Differences beyond {:g} standard uncertainties stand out. Parameters may differ "
-             "together in ways that leave the directions alone: what decides is how much the "
+             "together in ways that leave the directions unchanged: what matters is how much the "
              "directions differ.</p>\n",
-             c.held_alike ? "Both results are of one unit and held the same parameters at the same "
-                            "values: what these may be off by is alike in both, and the standard "
+             c.held_alike ? "Both results are of one unit and held the same parameters at the "
+                            "same values: any error of these is common to both, and the standard "
                             "uncertainties leave it out."
-                          : "Standard uncertainties include what parameters that were held may be "
-                            "off by.",
+                          : "Standard uncertainties include that of the parameters that were held.",
              kFarOff);
 }
 
@@ -122,17 +121,16 @@ std::string directions_html(const PointingError& beams) {
     html += fmt::format("<tr><th scope=\"row\">{}</th><td>{}</td><td>{}</td></tr>\n", head,
                         angle_with_sigma(value, sigma), millimetres(offset_at(value)));
   };
-  row("all of it", beams.errors.total, beams.total_sigma);
+  row("total", beams.errors.total, beams.total_sigma);
   row("shared: a rotation of all beams together", beams.errors.gauge, beams.gauge_sigma);
-  row("shape: what is left", beams.errors.shape, beams.shape_sigma);
+  row("shape: the rest", beams.errors.shape, beams.shape_sigma);
   row("shape of the worst beam", beams.worst_shape, beams.worst_shape_sigma);
   const Vector3<double>& turn = beams.errors.rotation;
   return html +
          fmt::format(
-             "</tbody></table>\n<p class=\"note\">Where the first result sends a beam against "
-             "where "
-             "the second sends it, over all rotation angles of the prisms. The shared rotation has "
-             "a roll of {}°, a pitch of {}° and a yaw of {}°.</p>\n",
+             "</tbody></table>\n<p class=\"note\">The direction of a beam by the first result "
+             "against that by the second, over all rotation angles of the prisms. The shared "
+             "rotation has a roll of {}°, a pitch of {}° and a yaw of {}°.</p>\n",
              plain_text(degrees_from_radians(turn.x), 3),
              plain_text(degrees_from_radians(turn.y), 3),
              plain_text(degrees_from_radians(turn.z), 3));

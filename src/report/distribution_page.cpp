@@ -41,8 +41,8 @@ Chart map_of(const PointDistributionSummary& d) {
               "x (east), m",
               "y (north), m",
               {std::move(squares)},
-              fmt::format("All strips together, squares of {:g} m. Colours end at three times the "
-                          "mean.",
+              fmt::format("All strips together, squares of {:g} m. The colours end at three times "
+                          "the mean.",
                           d.square),
               ChartKind::ground};
   chart.value_label = "points per square metre";
@@ -62,7 +62,7 @@ Chart strips_of(const PointDistributionSummary& d) {
               "x (east), m",
               "y (north), m",
               {std::move(squares)},
-              "Ground that one strip sees tells nothing of the mount.",
+              "Ground that only one strip sees says nothing about the mount.",
               ChartKind::ground};
   chart.value_label = "strips";
   return chart;
@@ -72,7 +72,7 @@ Chart profile_of(const PointDistributionSummary& d) {
   static constexpr const char* kColours[] = {"a", "b", "c", "d", "ink", "bad"};
   static_assert(std::size(kColours) == kMostProfiles);
   Chart chart{"Density across the strips",
-              "from the middle of the swath to the left, m",
+              "left of the middle of the swath, m",
               "points per square metre",
               {},
               "Mean along every strip."};

@@ -29,8 +29,8 @@ std::string noise_words(const EstimateReport& r) {
     return fmt::format("{}° ± {}°", text.value, text.sigma);
   };
   return fmt::format(
-      "Beside rounding the directions have a noise of {} in azimuth and {} in zenith, found in the "
-      "data; a healthy unit of this kind has {}°. ",
+      "Apart from rounding, the directions have a noise of {} in azimuth and {} in zenith, found "
+      "in the data; a healthy unit of this kind has {}°. ",
       angle(r.noise->azimuth, r.noise->azimuth_sigma),
       angle(r.noise->zenith, r.noise->zenith_sigma),
       plain_text(degrees_from_radians(r.noise->usual), 3));
@@ -43,16 +43,15 @@ Verdict verdict_of(const EstimateReport& r) {
   verdict.result = r.verdict.value_or(ReportedVerdict{});
   verdict.warnings = r.warnings;
   verdict.facts = fmt::format(
-      "What is left unexplained is {}° in azimuth and {}° in zenith (root mean square). "
-      "{}{} "
-      "of {} shots were left out as outliers.",
+      "The residuals are {}° in azimuth and {}° in zenith (root mean square). {}{} of {} shots "
+      "were left out as outliers.",
       finite_text("{:.3g}", degrees_from_radians(r.azimuth_residuals.rms)),
       finite_text("{:.3g}", degrees_from_radians(r.zenith_residuals.rms)), noise_words(r),
       count_text(r.outliers), count_text(r.shots));
   verdict.mend =
-      "check that option sensor is the instrument that recorded, that its times are right, and "
-      "whether the file has the sign of the elevation turned (option mirrored yes); a longer "
-      "recording or option rate full gives the estimation more to hold on to";
+      "check that option sensor is the instrument that made the recording, that its times are "
+      "right, and whether the elevation in the file has the opposite sign (option mirrored yes); "
+      "a longer recording, or option rate full, gives the estimate more data";
   return verdict;
 }
 
@@ -63,11 +62,11 @@ std::vector<KeyNumber> key_numbers(const EstimateReport& r) {
   };
   std::vector<KeyNumber> numbers{
       {angles(r.azimuth_residuals.rms, r.zenith_residuals.rms),
-       "left unexplained of the directions in azimuth and in zenith, root mean square: at most " +
+       "residuals of the directions in azimuth and zenith, root mean square: at most " +
            offset_text(std::max(r.azimuth_residuals.rms, r.zenith_residuals.rms))}};
   if (r.noise && !r.noise->held) {
     numbers.push_back({angles(r.noise->azimuth, r.noise->zenith),
-                       "noise of the directions that was found, one standard deviation: at most " +
+                       "noise found in the directions, one standard deviation: at most " +
                            offset_text(std::max(r.noise->azimuth, r.noise->zenith))});
   }
   numbers.push_back({count_text(r.shots),
@@ -85,10 +84,12 @@ std::string subject_text(const EstimateReport& r) {
     text += r.combination == 1 ? "; speed combination 1, the slow rotor first"
                                : "; speed combination 2, the fast rotor first";
   }
-  if (r.mirrored) text += "; the sign of the elevation was turned";
+  if (r.mirrored) text += "; the sign of the elevation was reversed";
   if (r.frame) {
-    text += fmt::format("; the frame was turned back by {:.3f}° in yaw and {:.3f}° in pitch",
-                        degrees_from_radians(r.frame->yaw), degrees_from_radians(r.frame->pitch));
+    text += fmt::format(
+        "; the recording's frame was turned back by {:.3f}° in yaw and {:.3f}° in "
+        "pitch",
+        degrees_from_radians(r.frame->yaw), degrees_from_radians(r.frame->pitch));
   }
   return text + ".";
 }
@@ -131,8 +132,8 @@ std::string parameters_html(const EstimateReport& r) {
   html += fmt::format(
       "</tbody></table></div>\n<p class=\"note\">σ is one standard deviation. {}Angular velocities "
       "are means over the recording, rotation angles are those at the first used shot.</p>\n",
-      any_held ? "It includes what the parameters that were held may be off by, which the second "
-                 "σ leaves out: that one compares recordings of one unit. "
+      any_held ? "It includes the uncertainty of the parameters that were held; the second σ "
+                 "leaves that out and is for comparing recordings of one unit. "
                : "");
   if (r.truth) {
     std::string rmse;
@@ -143,9 +144,9 @@ std::string parameters_html(const EstimateReport& r) {
                       prism_capital(static_cast<int>(i)));
     }
     html += fmt::format(
-        "<p>Against the truth: rotation angles are off by {} (root mean square). The squared "
+        "<p>Against the truth: the rotation angles are off by {} (root mean square). The squared "
         "errors are {:.3g} times (parameters) and {:.3g} times (rotation angles) what the stated "
-        "sigmas promise; 1 is honest, far above 1 means sigmas that are too small.</p>\n",
+        "sigmas predict; near 1 the sigmas are right, far above 1 they are too small.</p>\n",
         escape_html(rmse), r.truth->nees_parameters, r.truth->nees_rotation_angles);
   }
   return html;
@@ -156,14 +157,16 @@ std::string unobservable_html(const EstimateReport& r) {
   if (!r.unobservable.empty()) {
     std::vector<std::string> items;
     for (const estimation::WeakDirection& weak : r.unobservable) {
-      items.push_back(fmt::format("{}: its sigma stays {:.2g}", direction_text(weak), weak.sigma));
+      items.push_back(
+          fmt::format("{}: its sigma remains {:.2g}", direction_text(weak), weak.sigma));
     }
     html +=
-        "<p>These combinations of the free parameters were not measured (in units of 1 degree, "
-        "or 0.01 of an index). Hold one of each with <code>option fixed</code>.</p>\n" +
+        "<p>The recording does not determine these combinations of the free parameters (in units "
+        "of 1 degree, or 0.01 of an index). Hold one parameter of each with <code>option "
+        "fixed</code>.</p>\n" +
         list_html(items);
   } else {
-    html += "<p>All free parameters were measured.</p>\n";
+    html += "<p>The recording determines all free parameters.</p>\n";
   }
   if (!r.advice.empty()) html += list_html(r.advice);
   return html;
@@ -173,10 +176,10 @@ std::string pieces_html(const EstimateReport& r, Figures& figures) {
   if (!r.pieces || r.parameter_charts.empty()) return "";
   const EstimateReport::Pieces& p = *r.pieces;
   std::string html = fmt::format(
-      "<p>Each dot is the estimate from one of {} pieces "
-      "of the recording alone ({:.2g} s or less), with its own sigma. Their differences are {} "
-      "times what their sigmas promise ({:.0f} degrees of freedom, so 1 ± {:.2f} is to be "
-      "expected of a sensor that does not change and of sigmas that are true).{}</p>\n",
+      "<p>Each dot is the estimate from one of {} pieces of the recording alone ({:.2g} s or "
+      "less), with its own sigma. Their squared differences are {} times what their sigmas "
+      "predict ({:.0f} degrees of freedom: 1 ± {:.2f} is expected if the sensor does not change "
+      "and the sigmas are right).{}</p>\n",
       p.count, p.duration, finite_text("{:.2f}", p.chi2), p.degrees_of_freedom,
       p.degrees_of_freedom > 0 ? std::sqrt(2.0 / p.degrees_of_freedom) : 0.0,
       p.failed == 0 ? "" : fmt::format(" {} more pieces gave no estimate.", p.failed));
@@ -213,8 +216,8 @@ std::string variance_html(const EstimateReport& r) {
   std::string html;
   if (r.variance) {
     html += fmt::format(
-        "<p>Residuals show {:.3f} times the variance that was stated, and their autocorrelation "
-        "multiplies the variance of means by {:.3f}; for that every variance on this page was "
+        "<p>The residuals have {:.3f} times the stated variance, and their autocorrelation "
+        "multiplies the variance of means by {:.3f}; every variance on this page was therefore "
         "multiplied by {:.3f}.</p>\n",
         r.variance->unit_variance, r.variance->autocorrelation_factor, r.variance->variance_factor);
   }
@@ -225,9 +228,9 @@ std::string variance_html(const EstimateReport& r) {
                     prism_capital(static_cast<int>(k)));
   }
   return html + fmt::format(
-                    "<p>Mean residuals over 5° of a prism's angle have so many times the variance "
-                    "that noise gives them: {}. Far above 1 the sensor is bent in a way that the "
-                    "free parameters do not describe.</p>\n",
+                    "<p>The residuals' means over 5° of a prism's rotation angle have this many "
+                    "times the variance that noise alone would give them: {}. Far above 1, the "
+                    "optics are off in a way that the free parameters do not describe.</p>\n",
                     uneven);
 }
 
@@ -239,8 +242,8 @@ std::string estimate_page(const EstimateReport& r) {
       verdict_html(verdict_of(r)) + overview_html(key_numbers(r), r.residual_charts, figures);
   Sections sections;
   sections.add("Parameters", parameters_html(r), Sections::Shown::unfolded);
-  sections.add("What this recording does not tell", unobservable_html(r));
-  sections.add("Do the parameters stand still?", pieces_html(r, figures));
+  sections.add("What this recording does not determine", unobservable_html(r));
+  sections.add("Are the parameters stable?", pieces_html(r, figures));
   sections.add("Rotors", charts_html(r.rotor_charts, figures));
   sections.add("Residuals",
                moments_html(r) + variance_html(r) + charts_html(r.residual_charts, figures, 1));

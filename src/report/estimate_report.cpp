@@ -112,7 +112,7 @@ class EstimateCharts {
     for (std::size_t rotor = 0; rotor < states_.angular_velocity.size(); ++rotor) {
       const jobs::RotorSpeed& speed = input_.details.speeds[rotor];
       const std::string label =
-          fmt::format("angular velocity less {:.5f}, deg/s", degrees_from_radians(speed.mean));
+          fmt::format("angular velocity minus {:.5f}, deg/s", degrees_from_radians(speed.mean));
       charts.push_back({fmt::format("Angular velocity of prism {}", capital(rotor)),
                         "time, s",
                         label,
@@ -221,8 +221,8 @@ class EstimateCharts {
                      const Moments& moments, const std::string& what) const {
     return {title, x_label, "shots",
             histogram(what, colour, values, states_.outlier, moments, kDegreesPerRadian),
-            fmt::format("At {} shots: mean {:.7g}, standard deviation {} deg{}. The outermost "
-                        "bins hold everything beyond 4.5 standard deviations.",
+            fmt::format("{} shots: mean {:.7g}, standard deviation {} deg{}. The outermost bins "
+                        "hold everything beyond 4.5 standard deviations.",
                         count_text(moments.count), degrees_from_radians(moments.mean),
                         finite_text("{:.3g}", degrees_from_radians(moments.std)),
                         what == "velocity" ? "/s" : "")};
@@ -261,8 +261,8 @@ class EstimateCharts {
     return {title, "observed minus estimated, deg", "shots",
             histogram("residuals", colour, residual, input_.estimate.outlier, moments,
                       kDegreesPerRadian),
-            "All shots but the outliers. The outermost bins hold everything beyond 4.5 standard "
-            "deviations."};
+            "All shots except the outliers. The outermost bins hold everything beyond 4.5 "
+            "standard deviations."};
   }
 
   /// Mean azimuth and zenith residuals over the cells of a plane.
@@ -286,9 +286,9 @@ class EstimateCharts {
           x_label,
           y_label,
           {cells},
-          fmt::format("Means of all {} used shots over cells of {:.3g}°; cells with fewer "
-                      "than {} shots are left out. Noise alone leaves about {}° in a "
-                      "cell.",
+          fmt::format("Means of all {} used shots over cells of {:.3g}°; cells with fewer than {} "
+                      "shots are left out. Red: observed above estimated, blue: below. Noise "
+                      "alone leaves about {}° in a cell.",
                       count_text(map.shots), degrees_from_radians(map.cell), plane.fewest_shots,
                       finite_text("{:.2g}", degrees_from_radians(noise)))};
       chart.value_label = "mean residual, deg";
@@ -310,7 +310,7 @@ class EstimateCharts {
                 "observed minus estimated, deg",
                 {},
                 every_nth_note(states_.size(), kMostShotPoints / 2, "knots") +
-                    " Lines: means over 5° of all shots that were used.",
+                    " Lines: means over 5° of all used shots.",
                 ChartKind::full_turn};
     const estimation::AngleProfile& profile = input_.estimate.residuals_over_angle[rotor];
     const auto add = [&](const std::string& name, const std::vector<double>& residual,
@@ -356,8 +356,8 @@ class EstimateCharts {
         "azimuth, deg",
         "zenith, deg",
         {cells},
-        fmt::format("All {} shots, counted over cells of {:.3g}°. Colours end at ten times the "
-                    "mean density.",
+        fmt::format("All {} shots, counted over cells of {:.3g}°. The colours end at ten times "
+                    "the mean density.",
                     count_text(density.total), cell),
         ChartKind::map};
     chart.value_label = "shots per square degree";

@@ -70,15 +70,15 @@ std::string boresight_text(const FlightReport& r, std::string_view name) {
 
 std::string poor_rotation_html(const FlightReport& r) {
   return fmt::format(
-      "<p><b>The directions of the beams are poorly known:</b> the rotation that all share has a "
-      "sigma of {}°, {}° and {}° about the sensor's X, Y and Z, and more than {:.2g}° together is "
-      "poor. Flights that help:</p>{}",
+      "<p><b>The directions of the beams are poorly known:</b> the rotation that all beams share "
+      "has a sigma of {}°, {}° and {}° about the sensor's X, Y and Z, and more than {:.2g}° "
+      "together is poor. Flights that help:</p>{}",
       angle_text(r.datum.sigma_x), angle_text(r.datum.sigma_y), angle_text(r.datum.sigma_z),
       degrees_from_radians(calibration::kPoorDatum),
       list_html({"strips that cross, and strips in opposite directions over the same ground",
                  "ground with roofs, embankments or other slopes in several directions",
                  "a better trajectory, above all in heading",
-                 "an aircraft that sways a little: damped mounts tell less"}));
+                 "an aircraft that sways a little: damped mounts reveal less"}));
 }
 
 Verdict verdict_of(const FlightReport& r) {
@@ -93,7 +93,7 @@ Verdict verdict_of(const FlightReport& r) {
           : fmt::format(
                 "The strips, straight stretches of the flight, lie {} mm apart before and {} mm "
                 "after the calibration (root mean square over {} of them and all ground that they "
-                "share). The boresight, how the sensor is really turned against its mount as "
+                "share). The boresight, the sensor's actual rotation against the mount as "
                 "designed, is X {}, Y {}, Z {} about the sensor's axes. Boresight and prisms "
                 "together give the directions of the beams to {}, root mean square over the field "
                 "of view.",
@@ -103,16 +103,16 @@ Verdict verdict_of(const FlightReport& r) {
                 boresight_text(r, "boresight_z_deg"),
                 angle_on_ground(r.datum.total, r.datum.height));
   verdict.mend =
-      "look at the differences between strips below whether strips that overlap are of one flight; "
-      "check the axes of the mount, and that recording and trajectory count the same time; give "
-      "larger sigmas to what the mount states too well; and hold parameters that this flight does "
-      "not tell (option fixed)";
+      "check in the differences between strips below that overlapping strips are of one flight; "
+      "check the axes of the mount, and that recording and trajectory use the same time; give "
+      "larger sigmas to what the mount states too precisely; and hold parameters that this flight "
+      "does not determine (option fixed)";
   if (!r.converged) return verdict;
   if (!(r.datum.rotation <= calibration::kPoorDatum)) verdict.care_html = poor_rotation_html(r);
   if (!(r.rms_after < r.rms_before)) {
     verdict.care_html +=
-        "<p><b>The strips lie no better on each other than before.</b> What was given may be as "
-        "good as what was found.</p>";
+        "<p><b>The strips fit no better than before.</b> What was given may be as good as what "
+        "was found.</p>";
   }
   return verdict;
 }
@@ -164,7 +164,7 @@ std::string unknown_row(const FlightReport& r, std::size_t i, bool prisms) {
                                          : "–");
   if (unknown.held) {
     html += fmt::format("<td class=\"text\" colspan=\"2\">{}</td>",
-                        is_sigma(unknown.sigma) ? "held, and may be off" : "held");
+                        is_sigma(unknown.sigma) ? "held, but uncertain" : "held");
   } else {
     html += fmt::format("<td>{}</td>", finite_text("{:.0f} %", 100 * unknown.prior_share));
     html += unknown.twin.empty() || !(std::abs(unknown.twin_correlation) >= kTied)
@@ -191,9 +191,11 @@ std::string unknowns_table(const FlightReport& r, bool prisms) {
   }
   if (rows.empty()) return "<p>There are none.</p>\n";
   return fmt::format(
-      "<div class=\"wide\"><table><thead><tr><th>unknown</th><th>value</th><th>σ</th>"
-      "<th>unit</th><th>before</th><th>change</th>{}<th>σ before</th><th>share of<br>σ before</th>"
-      "<th class=\"text\">tied most to</th>{}</tr></thead><tbody>\n{}</tbody></table></div>\n",
+      "<div "
+      "class=\"wide\"><table><thead><tr><th>unknown</th><th>value</th><th>σ</th><th>unit</"
+      "th><th>before</th><th>change</th>{}<th>σ "
+      "before</th><th>share of<br>σ before</th><th class=\"text\">most correlated "
+      "with</th>{}</tr></thead><tbody>\n{}</tbody></table></div>\n",
       prisms ? "<th>nominal</th>" : "",
       r.truth ? "<th>truth</th><th>error</th><th>error / σ</th>" : "", rows);
 }
@@ -216,26 +218,25 @@ std::string mount_html(const FlightReport& r) {
   std::string html;
   const Eigen::MatrixXd& m = r.body_from_sensor;
   html += fmt::format(
-      "<p>As designed the sensor's X, its optical axis, points {}, its Y {} and its Z {}. Point "
-      "that "
-      "the trajectory is of: {}.</p>\n",
+      "<p>As designed, the sensor's X, its optical axis, points {}, its Y {} and its Z {}. "
+      "Reference point of the trajectory: {}.</p>\n",
       axis_text(m, 0), axis_text(m, 1), axis_text(m, 2),
-      r.reference_point.empty() ? "the mount does not name it" : escape_html(r.reference_point));
+      r.reference_point.empty() ? "not named by the mount" : escape_html(r.reference_point));
   html += unknowns_table(r, false);
   return html +
          "<p class=\"note\">σ is one standard deviation, everything included. Before: what was "
-         "given, with its σ. Share of σ before: (σ / σ before)², 100 % where the flight says "
-         "nothing. Tied most to: the unknown with the largest correlation, in brackets, from ±0.1 "
-         "on; near ±1 only the sum or the difference of the two is well known. Lever arm: from the "
-         "point that "
-         "the trajectory is of to the sensor, along the body's axes.</p>\n";
+         "given, with its σ. Share of σ before: (σ / σ before)², 100 % where the flight "
+         "determines nothing. Most correlated with: the unknown with the largest correlation, "
+         "which is in brackets, from ±0.1 on; near ±1 only the sum or the difference of the two "
+         "is well known. Lever arm: from the trajectory's reference point to the sensor, along "
+         "the body's axes.</p>\n";
 }
 
 std::string prisms_html(const FlightReport& r) {
   return unknowns_table(r, true) +
-         "<p class=\"note\">Nominal: the preset. A common pitch or yaw of the beams and the "
-         "boresight are nearly the same thing, so single angles may be known worse than the "
-         "directions of the beams.</p>\n";
+         "<p class=\"note\">Nominal: the preset. A pitch or yaw that all beams share can hardly "
+         "be told from the boresight, so single angles may be known less well than the directions "
+         "of the beams.</p>\n";
 }
 
 std::string datum_row(const char* name, double height, double total, double rotation, double shape,
@@ -280,30 +281,30 @@ std::string advice_of(const FlightReport& r, const NotTold& combination) {
     return combination.words.find(name) != std::string::npos;
   };
   if (has("of the trajectory")) {
-    return "Only their sum is known. Points of this flight do not suffer; on another flight the "
-           "boresight alone may be off by as much as the trajectory was on this one.";
+    return "Only their sum is known. Points of this flight are not affected; on another flight "
+           "the boresight may be off by as much as the trajectory was on this one.";
   }
   if (has("lever_arm") && has("clock_offset")) {
-    return "At one speed a sensor that sits further ahead and one whose clock is late look the "
+    return "At one speed, a sensor that sits further ahead and one whose clock is late look the "
            "same. Strips at two speeds tell them apart.";
   }
   if (has("lever_arm_z") && has("range_offset")) {
-    return "Both lift or lower all ground. Points of known height tell them.";
+    return "Both raise or lower all ground. Points of known height determine them.";
   }
   if (has("lever_arm_z")) {
-    return "A lever arm down lifts or lowers all ground alike in level flight. Measure it well, or "
-           "take points of known height.";
+    return "In level flight the lever arm down raises or lowers all ground alike. Measure it "
+           "well, or use points of known height.";
   }
   if (has("lever_arm")) {
     return "Slopes in several directions, strips in several directions and a swaying aircraft "
-           "tell it.";
+           "determine it.";
   }
   for (Eigen::Index axis = 0; axis < 3; ++axis) {
     if (!has(fmt::format("boresight_{}", "xyz"[axis]))) continue;
     return std::abs(r.body_from_sensor(2, axis)) > kUpright
-               ? "Flat ground does not show a turn about the vertical: fly over roofs or other "
-                 "slopes."
-               : "Strips in opposite or crossing directions tell it.";
+               ? "Flat ground does not show a rotation about the vertical: fly over roofs or "
+                 "other slopes."
+               : "Strips in opposite or crossing directions determine it.";
   }
   return "";
 }
@@ -312,13 +313,14 @@ std::string not_told_html(const FlightReport& r) {
   std::string html;
   if (r.not_told.empty()) {
     return html + (r.unknowns.empty() ? "<p>Nothing was adjusted.</p>\n"
-                                      : "<p>It tells something of everything that was free.</p>\n");
+                                      : "<p>The flight adds to what was known of every free "
+                                        "unknown.</p>\n");
   }
   html +=
-      "<p>Of these the flight says less than was known before; what was given decides (numbers are "
-      "in units of the σ before).</p>\n<ul>";
+      "<p>The flight says less about these than was known before, so what was given decides "
+      "(numbers are in units of the σ before).</p>\n<ul>";
   for (const NotTold& one : r.not_told) {
-    html += fmt::format("<li>{}: {} of the σ before is left. {}</li>",
+    html += fmt::format("<li>{}: {} of the σ before remains. {}</li>",
                         escape_html(words_of_unknowns(one.words, r.shape())),
                         finite_text("{:.0f} %", 100 * one.sigma), escape_html(advice_of(r, one)));
   }
@@ -338,8 +340,8 @@ std::string control_html(const FlightReport& r) {
         !seen.used ? "left out" : (seen.significant ? "contradicts the flight" : ""));
   }
   return html +
-         "</tbody></table></div>\n<p class=\"note\">Points and planes of the ground that were "
-         "given; the flight is fixed on them. Along the ground's normal.</p>\n";
+         "</tbody></table></div>\n<p class=\"note\">Known points and planes on the ground, which "
+         "the flight is tied to. Heights are along the ground's normal.</p>\n";
 }
 
 std::string shift_cell(const StripPair& pair, Eigen::Index axis) {
@@ -369,8 +371,9 @@ std::string pairs_html(const FlightReport& r) {
       "</tr></thead><tbody>\n";
   for (const auto& [strips, pair] : rows) {
     html += fmt::format(
-        "<tr><th scope=\"row\">strip {} less strip {}</th><td class=\"text\">before</td>{}</tr>\n"
-        "<tr><th scope=\"row\"></th><td class=\"text\">after</td>{}</tr>\n",
+        "<tr><th scope=\"row\">strip {} minus strip {}</th><td "
+        "class=\"text\">before</td>{}</tr>\n<tr><th scope=\"row\"></th><td "
+        "class=\"text\">after</td>{}</tr>\n",
         strips.second + 1, strips.first + 1, pair_cells(pair.first), pair_cells(pair.second));
   }
   html += "</tbody></table></div>\n<p class=\"note\">";
@@ -380,9 +383,9 @@ std::string pairs_html(const FlightReport& r) {
   }
   return html +
          "Cells: squares of ground that both strips saw. Differences are along the ground's "
-         "normals; the shift is what explains most of them, with its sigma, and a dash where the "
-         "ground has no slope that would tell it. After the calibration no mean or shift should "
-         "stand out.</p>\n";
+         "normals, positive where the first strip named lies above the second; the shift is what "
+         "explains most of them, with its sigma, and a dash where the ground has no slope that "
+         "would determine it. After the calibration no mean or shift should stand out.</p>\n";
 }
 
 std::string strips_html(const FlightReport& r, Figures& figures) {
@@ -401,9 +404,9 @@ std::string strips_html(const FlightReport& r, Figures& figures) {
           finite_text("{:.1f}", one.range), finite_text("{:.2f}", degrees_from_radians(one.sway)));
     }
     html +=
-        "</tbody></table></div>\n<p class=\"note\">Strips are numbered from 1, begin in seconds "
-        "since the first shot, and have the course of their way over ground. Sway: how much roll "
-        "and pitch vary, together; an aircraft that sways tells more.</p>\n";
+        "</tbody></table></div>\n<p class=\"note\">Strips are numbered from 1; they begin in "
+        "seconds since the first shot, and their course is that over ground. Sway: how much roll "
+        "and pitch vary together; an aircraft that sways reveals more.</p>\n";
   }
   html += charts_html(r.strip_charts, figures);
   return html;
@@ -412,28 +415,25 @@ std::string strips_html(const FlightReport& r, Figures& figures) {
 std::string shots_html(const FlightReport& r) {
   std::string html = fmt::format(
       "<p>{} of {} shots were used, on {} cells of ground. {} were left out because they lie "
-      "beyond three sigmas of their cell{}; {} cells were too rough. The other shots met ground "
-      "that "
-      "only one strip saw, or such cells.</p>\n",
+      "beyond three sigmas of their cell{}; {} cells were too rough. The other shots hit such "
+      "cells, or ground that only one strip saw.</p>\n",
       count_text(r.used), count_text(r.shots), count_text(r.cells), count_text(r.outliers),
       r.without_pose == 0 ? ""
                           : fmt::format(", and {} because the trajectory has no pose for them",
                                         count_text(r.without_pose)),
       count_text(r.rough_cells));
   return html + fmt::format(
-                    "<p>Residuals scatter {} times as much as the stated noise of ranges promises: "
-                    "one range is good to {} mm.</p>\n",
+                    "<p>The residuals scatter {} times as much as the stated noise of the ranges "
+                    "predicts: the noise of one range is {} mm.</p>\n",
                     finite_text("{:.3g}", r.sigma0), millimetres(r.range_sigma));
 }
 
 std::string corrections_html(const FlightReport& r, Figures& figures) {
   return fmt::format(
-             "<p>Position and attitude are corrected at {} "
-             "knots, points in time {} s apart, and linearly between. σ is what is left of their "
-             "uncertainty. Corrections should be about as large as the errors that were stated for "
-             "the "
-             "trajectory; much larger ones mean that these were stated too small, or that axes or "
-             "times are wrong.</p>\n",
+             "<p>Position and attitude are corrected at {} knots, points in time {} s apart, and "
+             "linearly between. σ is their remaining uncertainty. Corrections should be about as "
+             "large as the errors stated for the trajectory; much larger ones mean that these "
+             "were stated too small, or that axes or times are wrong.</p>\n",
              count_text(r.knots), finite_text("{:.3g}", r.knot_spacing)) +
          charts_html(r.correction_charts, figures);
 }
@@ -461,7 +461,7 @@ std::string flight_page(const FlightReport& r) {
   Sections sections;
   sections.add("How well the beams are known", directions_html(r), Sections::Shown::unfolded);
   sections.add("Mount, ranges and clock", mount_html(r), Sections::Shown::unfolded);
-  sections.add("What this flight does not tell", not_told_html(r));
+  sections.add("What this flight does not determine", not_told_html(r));
   sections.add("Known ground", control_html(r));
   sections.add("Strips before and after",
                pairs_html(r) + charts_html(r.difference_charts, figures, 1));

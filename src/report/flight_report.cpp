@@ -146,7 +146,7 @@ class FlightCharts {
       chart.series.push_back({strip_name(strip.strip), kStripColours[i % kStripColours.size()],
                               SeriesKind::line, strip.east, strip.north});
     }
-    chart.note = "Places of the trajectory, metres from the middle of the flight.";
+    chart.note = "Positions of the trajectory, in metres from the middle of the flight.";
     if (details_.strips.size() < details_.strip_count) {
       chart.note += fmt::format(" The first {} of {} strips are drawn.", details_.strips.size(),
                                 details_.strip_count);
@@ -166,7 +166,7 @@ class FlightCharts {
     }
     for (const StripDifferences& pair : details_.pairs) {
       add_differences(charts,
-                      fmt::format("Strip {} less strip {}", pair.second + 1, pair.first + 1),
+                      fmt::format("Strip {} minus strip {}", pair.second + 1, pair.first + 1),
                       pair.east, pair.north, pair.before, pair.after, true);
     }
     return charts;
@@ -180,17 +180,16 @@ class FlightCharts {
                           scaled(g.roughness, kMillimetres), "scatter about the planes, mm");
     roughness.value_range = {0.0, kMillimetres * shown_size(g.roughness)};
     roughness.note +=
-        " Scatter of the points about a plane in each cell, 1 sigma. Plain ground shows the noise "
-        "of the ranges; bushes, edges and steps show more, and their cells do not count.";
+        " Scatter of the points about a plane in each cell, 1 sigma. Smooth ground shows the "
+        "noise of the ranges; bushes, edges and steps show more, and their cells are not used.";
     charts.push_back(std::move(roughness));
     Chart slope = map("How steep the ground is", g.east, g.north,
                       scaled(g.slope, kDegreesPerRadian), "slope, deg");
     slope.note +=
-        " Slopes in many directions are what tells shifts of strips, and a turn about "
-        "the vertical.";
+        " Slopes in many directions reveal shifts of strips and a rotation about the vertical.";
     charts.push_back(std::move(slope));
     Chart strips = map("How many strips saw it", g.east, g.north, g.strips, "strips");
-    strips.note += " Only ground that two strips and more saw is used.";
+    strips.note += " Only ground that two or more strips saw is used.";
     charts.push_back(std::move(strips));
     return charts;
   }
@@ -219,8 +218,9 @@ class FlightCharts {
                 "time, s",
                 "residual of a range, mm",
                 {rms},
-                fmt::format("Root mean square of measured less predicted ranges, {} pieces of the "
-                            "flight{}. The line is the noise of one range over the whole flight.",
+                fmt::format("Root mean square of measured minus predicted ranges, {} pieces of "
+                            "the flight{}. The line is the noise of one range over the whole "
+                            "flight.",
                             count_text(c_.piece_time.size()),
                             stride > 1 ? fmt::format(", {} together", stride) : "")};
     if (std::isfinite(c_.range_sigma)) {
@@ -277,7 +277,8 @@ class FlightCharts {
                         {above, value},
                         kept.size() == knots.size()
                             ? fmt::format("All {} knots are drawn.", count_text(knots.size()))
-                            : fmt::format("Of {} knots one in {} is drawn, and the ends of strips.",
+                            : fmt::format("One in {1} of the {0} knots is drawn, and the ends of "
+                                          "strips.",
                                           count_text(knots.size()), stride)});
     }
     return charts;
@@ -345,6 +346,7 @@ class FlightCharts {
                          const char* colours) {
       Chart chart = map(fmt::format("{}, {}", who, when), east, north, scaled(values, kMillimetres),
                         signs ? "difference, mm" : "RMS difference, mm");
+      if (signs) chart.note += " Red: the first strip named lies above the other, blue: below.";
       chart.note += colours;
       chart.palette = signs ? Palette::diverging : Palette::sequential;
       chart.value_range = {signs ? -size : 0.0, size};

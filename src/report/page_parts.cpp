@@ -26,11 +26,11 @@ struct Headline {
 
 constexpr Headline kHeadlines[] = {
     {"consistent", "ok", "The sensor's directions agree with what it believes of its optics."},
-    {"unusual", "care", "The model describes this recording, but not all of it is as usual."},
+    {"unusual", "care", "The model describes this recording, but something about it is unusual."},
     {"as_believed", "ok", "The sensor points where it believes."},
     {"bent", "care", "The sensor does not point where it believes: use this calibration."},
     {"not_better", "bad",
-     "This calibration is not better than what the sensor believes: do not use it."},
+     "This calibration is no better than what the sensor believes: do not use it."},
 };
 
 /// Before anything is drawn, so that a dark page never flashes.
@@ -129,7 +129,7 @@ std::string verdict_html(const Verdict& verdict) {
       title = found->words;
     } else if (!verdict.result.code.empty()) {  // undecided
       kind = "care";
-      title = "Converged, and not to be trusted.";
+      title = "Converged, but not to be trusted.";
     }
     if (!verdict.warnings.empty() || !verdict.care_html.empty()) {
       if (kind == "ok") kind = "care";
@@ -178,9 +178,8 @@ std::string correlation_html(const std::vector<CorrelationHead>& heads,
     html += "</tr>\n";
   }
   return html +
-         "</tbody></table></div>\n<p class=\"note\">Red: the two rise together. Blue: one "
-         "rises where the other falls. Near ±1 only their sum or difference is well "
-         "known.</p>\n";
+         "</tbody></table></div>\n<p class=\"note\">Red: the two rise together. Blue: one rises "
+         "when the other falls. Near ±1 only their sum or difference is well known.</p>\n";
 }
 
 std::string correlation_html(const std::vector<std::string>& free,
@@ -214,9 +213,9 @@ std::string time_audit_html(const std::vector<ReportedRecording>& recordings) {
         alarming(audit.non_monotonic_packets), audit.non_monotonic_packets, audit.pps_wraps);
   }
   return html +
-         "</tbody></table></div>\n<p class=\"note\">Gaps: steps longer than 1.8 usual ones. Clock "
-         "resets: jumps back, or to another source of time. In 10 µs a prism turns by up to half a "
-         "degree, so the estimation lives on sound times.</p>\n";
+         "</tbody></table></div>\n<p class=\"note\">Gaps: steps longer than 1.8 times the usual "
+         "one. Clock resets: the clock jumps back or changes to another source of time. In 10 µs "
+         "a prism turns by up to half a degree, so the estimate depends on sound times.</p>\n";
 }
 
 std::string provenance_html(const Provenance& provenance) {
@@ -319,12 +318,13 @@ std::string page_html(const std::string& title, const std::string& lead,
       escape_html(title), escape_html(lead));
   page += head_html;
   page +=
-      "<details class=\"help\"><summary>How to use the diagrams, with mouse or keyboard</summary>\n"
-      "<p>Point at a diagram for values; draw a box to zoom, double-click to show all; "
-      "<kbd>Ctrl</kbd> and the wheel zoom, <kbd>Shift</kbd> and dragging move. In three dimensions "
-      "drag to rotate; the wheel goes nearer. With the keyboard: <kbd>Tab</kbd> to a diagram, "
-      "<kbd>+</kbd> and <kbd>-</kbd> zoom, arrows move or rotate, <kbd>0</kbd> shows all, "
-      "<kbd>n</kbd> and <kbd>p</kbd> go through the points of the first series.</p></details>\n";
+      "<details class=\"help\"><summary>How to use the diagrams, with mouse or "
+      "keyboard</summary>\n<p>Point at a diagram to read values; drag a box to zoom in, "
+      "double-click to show everything; <kbd>Ctrl</kbd> and the wheel zoom, <kbd>Shift</kbd> and "
+      "dragging pan. In three dimensions drag to rotate; the wheel moves nearer. With the "
+      "keyboard: <kbd>Tab</kbd> goes to a diagram, <kbd>+</kbd> and <kbd>-</kbd> zoom, the arrow "
+      "keys pan or rotate, <kbd>0</kbd> shows everything, <kbd>n</kbd> and <kbd>p</kbd> step "
+      "through the points of the first series.</p></details>\n";
   page += sections.html();
   page +=
       "<div id=\"spoken\" class=\"hidden\" aria-live=\"polite\"></div>\n"

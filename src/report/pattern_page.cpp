@@ -31,7 +31,7 @@ Chart rosette_chart(const jobs::PatternDetails& details) {
               {dots},
               details.rosette_every == 1
                   ? "Every shot is drawn."
-                  : fmt::format("Of every {} shots one is drawn.", details.rosette_every),
+                  : fmt::format("One in {} shots is drawn.", details.rosette_every),
               ChartKind::map};
   chart.grows_for = duration;
   return chart;
@@ -61,7 +61,8 @@ Chart density_chart(const sensors::PatternCoverage& coverage, const sensors::Cov
               "left of the axis, deg",
               "below the axis, deg",
               {cells},
-              fmt::format("{} shots, cells of {:.3g} degree. Colours end at four times the mean.",
+              fmt::format("{} shots, cells of {:.3g} degree. The colours end at four times the "
+                          "mean.",
                           count_text(after.shots), degrees_from_radians(edge)),
               ChartKind::map};
   chart.value_label = "shots per square degree";
@@ -75,7 +76,7 @@ Chart ring_chart(const sensors::PatternCoverage& coverage) {
               "angle from the X axis, deg",
               "shots per square degree",
               {},
-              "Of the part of every ring that lies in the field of view."};
+              "Only the part of each ring inside the field of view counts."};
   for (std::size_t k = 0; k < coverage.after.size(); ++k) {
     const sensors::CoverageAfter& after = coverage.after[k];
     Series line{fmt::format("{:g} s", after.time),
@@ -143,10 +144,9 @@ std::string coverage_html(const sensors::PatternCoverage& coverage) {
   return html +
          fmt::format(
              "</tbody></table></div>\n<p class=\"note\">Covered: the share of cells of {:.3g} "
-             "degree that hold a shot, of those that {:.3g} s reach: {:.5g} square degrees. "
-             "Gap: the diameter of the largest circle about a direction of this field of view "
-             "that holds no shot. Cells are squares of Lambert's equal-area map about the X "
-             "axis.</p>\n",
+             "degree that hold a shot, among those that {:.3g} s reach ({:.5g} square degrees). "
+             "Gap: the diameter of the largest circle that holds no shot, centred in this field "
+             "of view. Cells are squares of Lambert's equal-area map about the X axis.</p>\n",
              degrees_from_radians(coverage.cell), coverage.field_after,
              coverage.field_solid_angle / kSquareDegree);
 }
@@ -168,7 +168,7 @@ std::string prisms_html(const sensors::Sensor& sensor) {
   }
   return html + fmt::format(
                     "</tbody></table></div>\n<p class=\"note\">In the order of the beam; {} "
-                    "emitter{}, {:.10g} shots a second.</p>\n",
+                    "emitter{}, {:.10g} shots per second.</p>\n",
                     sensor.train.emitters(), sensor.train.emitters() == 1 ? "" : "s",
                     sensor.shot_rate);
 }
@@ -192,8 +192,8 @@ std::string pattern_page(const jobs::PatternDetails& details, const Provenance& 
   sections.add(kHowToRepeat, provenance_html(provenance));
   return page_html(
       "Scan pattern: " + details.sensor.name,
-      "Where the sensor sends its shots, free of noise, with rotors at constant speed, "
-      "and how they fill its field of view.",
+      "Where the sensor sends its shots, without noise and with rotors at constant speed, and how "
+      "they fill its field of view.",
       head, sections, figures);
 }
 

@@ -18,7 +18,7 @@ inspect('cloud', async () => {
   await risley(folder, 0, 'cloud', 'hall.lvx', '--calibration', 'mid-40', '-o', 'hall.las',
                '--report', file);
   return file;
-}, /How sure the points are/, false);
+}, /Uncertainty of the points/, false);
 
 let browser, page;
 before(async () => {

@@ -98,7 +98,7 @@ for (const [command, make] of Object.entries(pages)) {
       await page.draw(join(folder, command, 'report.html'));
       assert.deepEqual(await find(page.tab, 'a sentence that no page has'), []);
       if (command !== 'cloud') {
-        assert.deepEqual(await find(page.tab, 'Gaps: steps longer than 1.8 usual ones.'), []);
+        assert.deepEqual(await find(page.tab, 'Gaps: steps longer than 1.8 times the usual one.'), []);
       }
       const last = await find(page.tab, 'How to make it again');
       assert.ok(last.some(({ section }) => section !== null));

@@ -217,7 +217,7 @@ class CloudTest(CommandTest):
                                  "page.ply", "--report", "page.html")
         self.assertEqual(found["html"], "page.html")
         page = (self.folder / "page.html").read_text(encoding="utf-8")
-        self.assertIn("How sure the points are", page)
+        self.assertIn("Uncertainty of the points", page)
         self.assertIn(f"{found['points']:,}".replace(",", "\u202f"), page)
         error = self.expect(2, "cloud", "wall.nc", "other.nc", "--calibration", "mid-40-table3",
                             "-o", "clouds", "--report", "page.html").stderr

@@ -534,7 +534,7 @@ TEST(CalibrationPage, ViewsAreThinnedAndSayHow) {
   std::size_t points = 0;
   for (const auto& one : drawn.at("series")) points += one.at("x").size();
   EXPECT_LE(points, 4001u);
-  EXPECT_THAT(visible(html), HasSubstr("Of 10\u202f000 sample points one in 3 is drawn."));
+  EXPECT_THAT(visible(html), HasSubstr("One in 3 of the 10\u202f000 sample points is drawn."));
   EXPECT_EQ(series(drawn, "no plane").at("colour"), "ink");
   EXPECT_EQ(series(drawn, "front <wall> & door").at("colour"), "a");
   EXPECT_EQ(series(drawn, "sensor").at("x").at(0), 0);

@@ -29,7 +29,7 @@ TEST(Charts, AShortLineIsDrawnWhole) {
 TEST(Charts, EveryNthKeepsAtMostSoManyAndTellsIt) {
   EXPECT_EQ(every_nth(10, 4), (std::vector<std::size_t>{0, 3, 6, 9}));
   EXPECT_EQ(every_nth(3, 4).size(), 3u);
-  EXPECT_EQ(every_nth_note(10, 4), "Of 10 shots one in 3 is drawn.");
+  EXPECT_EQ(every_nth_note(10, 4), "One in 3 of the 10 shots is drawn.");
   EXPECT_EQ(every_nth_note(3, 4, "outliers"), "All 3 outliers are drawn.");
 }
 

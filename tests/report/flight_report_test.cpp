@@ -302,7 +302,7 @@ TEST(FlightPage, HasEverySectionAndDiagram) {
   const std::string shown = visible(Flight().html());
   for (const char* text :
        {"<h2>How well the beams are known</h2>", "<h2>Mount, ranges and clock</h2>",
-        "<h2>What this flight does not tell</h2>", "<h2>Strips before and after</h2>",
+        "<h2>What this flight does not determine</h2>", "<h2>Strips before and after</h2>",
         "<h2>The flight</h2>", "<h2>Ground</h2>", "<h2>Residuals</h2>",
         "<h2>Corrections of the trajectory</h2>", "<h2>Prisms</h2>",
         "<h2>Correlations of the parameters</h2>", "<h2>Times of the recording</h2>",
@@ -312,11 +312,11 @@ TEST(FlightPage, HasEverySectionAndDiagram) {
   EXPECT_THAT(titles(shown),
               ::testing::ElementsAre(
                   "All strips, before", "All strips, after", "All strips, after, finer colours",
-                  "Strip 2 less strip 1, before", "Strip 2 less strip 1, after",
-                  "Strip 2 less strip 1, after, finer colours", "Strip 3 less strip 1, before",
-                  "Strip 3 less strip 1, after", "Strip 3 less strip 1, after, finer colours",
-                  "Strip 4 less strip 1, before", "Strip 4 less strip 1, after",
-                  "Strip 4 less strip 1, after, finer colours", "The strips from above",
+                  "Strip 2 minus strip 1, before", "Strip 2 minus strip 1, after",
+                  "Strip 2 minus strip 1, after, finer colours", "Strip 3 minus strip 1, before",
+                  "Strip 3 minus strip 1, after", "Strip 3 minus strip 1, after, finer colours",
+                  "Strip 4 minus strip 1, before", "Strip 4 minus strip 1, after",
+                  "Strip 4 minus strip 1, after, finer colours", "The strips from above",
                   "How rough the ground is", "How steep the ground is", "How many strips saw it",
                   "Residuals along time", "Correction to the north", "Correction to the east",
                   "Correction of the height", "Correction of the tilt about north",
@@ -340,30 +340,31 @@ TEST(FlightPage, UnknownsStandWithTheirPriorsAndTwins) {
   // Prisms have a nominal value.
   EXPECT_THAT(shown, HasSubstr("<th>nominal</th>"));
   EXPECT_THAT(shown, HasSubstr("X, its optical axis, points down, its Y to the left and its Z "
-                               "forward. Point that the trajectory is of: centre of the IMU."));
+                               "forward. Reference point of the trajectory: centre of the IMU."));
 }
 
 TEST(FlightPage, WhatIsHeldAndMayBeOffSaysSo) {
   Flight flight;
   flight.calibration.unknowns.back().held = true;
-  EXPECT_THAT(visible(flight.html()), HasSubstr("held, and may be off"));
+  EXPECT_THAT(visible(flight.html()), HasSubstr("held, but uncertain"));
 }
 
 TEST(FlightPage, SaysInWordsWhatIsNotTold) {
   Flight flight;
   std::string shown = visible(flight.html());
   EXPECT_THAT(shown, HasSubstr("<li>0.71 lever arm forward - 0.70 clock offset: 98 % of the σ "
-                               "before is left. At one speed"));
+                               "before remains. At one speed"));
   EXPECT_THAT(shown, HasSubstr("<li>boresight about the sensor&#39;s X against the heading of the "
                                "trajectory: 93 %"));
   flight.calibration.not_told = {
       {"1.00 boresight_x_deg", 1}, {"1.00 boresight_y_deg", 1}, {"1.00 lever_arm_z_m", 1}};
   shown = visible(flight.html());
-  EXPECT_THAT(shown, HasSubstr("Flat ground does not show a turn about the vertical"));
+  EXPECT_THAT(shown, HasSubstr("Flat ground does not show a rotation about the vertical"));
   EXPECT_THAT(shown, HasSubstr("Strips in opposite or crossing directions"));
   EXPECT_THAT(shown, HasSubstr("points of known height"));
   flight.calibration.not_told.clear();
-  EXPECT_THAT(visible(flight.html()), HasSubstr("It tells something of everything that was free"));
+  EXPECT_THAT(visible(flight.html()),
+              HasSubstr("The flight adds to what was known of every free unknown"));
 }
 
 TEST(FlightPage, KnownGroundStandsWithWhatTheStripsSee) {
@@ -382,10 +383,10 @@ TEST(FlightPage, KnownGroundStandsWithWhatTheStripsSee) {
 TEST(FlightPage, PairsOfStripsStandBeforeAndAfter) {
   Flight flight;
   const std::string shown = visible(flight.html());
-  EXPECT_THAT(shown,
-              HasSubstr("strip 2 less strip 1</th><td class=\"text\">before</td><td>1\u202f001</td>"
-                        "<td>-102.4</td><td>341.2</td><td>170.6 ± 6.8</td><td>–</td>"
-                        "<td>34.1 ± 3.4</td>"));
+  EXPECT_THAT(
+      shown, HasSubstr("strip 2 minus strip 1</th><td class=\"text\">before</td><td>1\u202f001</td>"
+                       "<td>-102.4</td><td>341.2</td><td>170.6 ± 6.8</td><td>–</td>"
+                       "<td>34.1 ± 3.4</td>"));
   EXPECT_THAT(shown, HasSubstr("<td class=\"text\">after</td><td>1\u202f001</td><td>-1.6</td>"
                                "<td>5.4</td>"));
 }
@@ -427,7 +428,7 @@ TEST(FlightPage, OnePairAndNoPairAreSaid) {
 
 TEST(FlightPage, BothPicturesOfADifferenceHaveTheSameColours) {
   const std::string html = Flight().html();
-  for (const std::string who : {"All strips", "Strip 2 less strip 1"}) {
+  for (const std::string who : {"All strips", "Strip 2 minus strip 1"}) {
     const auto before = chart(html, who + ", before"), after = chart(html, who + ", after"),
                fine = chart(html, who + ", after, finer colours");
     EXPECT_EQ(before.at("kind"), "ground");
@@ -436,7 +437,7 @@ TEST(FlightPage, BothPicturesOfADifferenceHaveTheSameColours) {
     EXPECT_EQ(fine.at("series"), after.at("series"));
   }
   // Squares that were compared before and after.
-  const auto after = chart(html, "Strip 2 less strip 1, after").at("series").at(0);
+  const auto after = chart(html, "Strip 2 minus strip 1, after").at("series").at(0);
   EXPECT_EQ(after.at("x"), nlohmann::json::array({-2.0}));
   EXPECT_EQ(after.at("value"), nlohmann::json::array({4.0}));
   EXPECT_EQ(after.at("cell_width"), 4.0);
@@ -448,8 +449,8 @@ TEST(FlightPage, BothPicturesOfADifferenceHaveTheSameColours) {
   const auto squares = [&](const char* title) {
     return chart(apart, title).at("series").at(0).at("x");
   };
-  EXPECT_EQ(squares("Strip 2 less strip 1, before"), (nlohmann::json::array({-2.0, 2.0})));
-  EXPECT_EQ(squares("Strip 2 less strip 1, after"), nlohmann::json::array({6.0}));
+  EXPECT_EQ(squares("Strip 2 minus strip 1, before"), (nlohmann::json::array({-2.0, 2.0})));
+  EXPECT_EQ(squares("Strip 2 minus strip 1, after"), nlohmann::json::array({6.0}));
 }
 
 TEST(FlightPage, CorrectionsHaveTheSignsAndUnitsOfTheirErrors) {
@@ -502,7 +503,7 @@ TEST(FlightPage, LongFlightsAreThinned) {
   const auto rms = series(chart(html, "Residuals along time"), "residuals, RMS");
   EXPECT_LT(rms.at("x").size(), 1500u);
   EXPECT_NEAR(rms.at("y").at(0), 20, 1e-4);
-  EXPECT_THAT(visible(html), HasSubstr("Of 50\u202f000 knots one in 42 is drawn"));
+  EXPECT_THAT(visible(html), HasSubstr("One in 42 of the 50\u202f000 knots is drawn"));
 }
 
 TEST(FlightPage, AFailureSaysWhyAndWhatToDo) {
@@ -529,7 +530,7 @@ TEST(FlightPage, APoorResultAsksForCare) {
   EXPECT_THAT(visible(flight.html()), HasSubstr("class=\"verdict care\""));
   flight = {};
   flight.calibration.rms_after = 0.35;
-  EXPECT_THAT(visible(flight.html()), HasSubstr("no better on each other than before"));
+  EXPECT_THAT(visible(flight.html()), HasSubstr("The strips fit no better than before"));
   flight = {};
   flight.calibration.warnings = {"one"};
   flight.warnings = {"two"};
@@ -758,7 +759,7 @@ TEST_F(FlightReportFile, OfARealCalibrationMakesTheSamePageAgain) {
   const std::string html = report_page(again);
   EXPECT_EQ(html, report_page(report));
   expect_sound(html);
-  EXPECT_THAT(visible(html), HasSubstr("Strip 4 less strip 1, after"));
+  EXPECT_THAT(visible(html), HasSubstr("Strip 4 minus strip 1, after"));
   EXPECT_LT(std::filesystem::file_size(path()), 3'000'000u);
 }
 

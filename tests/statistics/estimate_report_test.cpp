@@ -183,8 +183,8 @@ TEST(EstimatePage, HasEverySectionInItsOrder) {
   const std::string html = report::estimate_page(report_of(make_case(5)));
   std::size_t last = 0;
   for (const char* text :
-       {"class=\"verdict", "<h2>Parameters</h2>", "<h2>What this recording does not tell</h2>",
-        "<h2>Do the parameters stand still?</h2>", "<h2>Rotors</h2>", "<h2>Residuals</h2>",
+       {"class=\"verdict", "<h2>Parameters</h2>", "<h2>What this recording does not determine</h2>",
+        "<h2>Are the parameters stable?</h2>", "<h2>Rotors</h2>", "<h2>Residuals</h2>",
         "<h2>Scan pattern</h2>", "<h2>Correlations of the parameters</h2>",
         "<h2>Times of the recording</h2>", "<h2>How to make it again</h2>"}) {
     const std::size_t at = html.find(text);
@@ -230,7 +230,7 @@ TEST(EstimateReport, SpeedsAreDrawnAboutTheirMean) {
   const Case one = make_case(5);
   const report::EstimateReport r = report_of(one);
   const report::Chart& chart = r.rotor_charts[0];
-  EXPECT_THAT(chart.y_label, HasSubstr("angular velocity less -437"));
+  EXPECT_THAT(chart.y_label, HasSubstr("angular velocity minus -437"));
   for (const double change : chart.series[0].y) EXPECT_LT(std::abs(change), 6.0);  // sqrt(2) 2.2
   const auto [least, greatest] =
       std::minmax_element(chart.series[0].y.begin(), chart.series[0].y.end());
