@@ -9,24 +9,47 @@ Optics = Union[_risley.PrismTrain, _risley.Sensor]
 
 
 class Directions(NamedTuple):
-    """Directions of shots, rad: azimuth from X towards Y, zenith from Z."""
+    """Directions of shots.
+
+    Attributes
+    ----------
+    azimuth : float or ndarray
+        From X towards Y, rad.
+    zenith : float or ndarray
+        From Z, rad.
+    """
 
     azimuth: Any
     zenith: Any
 
 
 class Rays(NamedTuple):
-    """Beams as lines in space: x, y and z of each in the sensor's frame."""
+    """Beams as lines in space: x, y and z of each in the sensor's frame.
 
-    origin: Tuple[Any, Any, Any]  #: where the beam leaves the last face, m
-    direction: Tuple[Any, Any, Any]  #: unit vectors
+    Attributes
+    ----------
+    origin : tuple
+        Where the beam leaves the last face, m.
+    direction : tuple
+        Unit vectors.
+    """
+
+    origin: Tuple[Any, Any, Any]
+    direction: Tuple[Any, Any, Any]
 
 
 class Linearisation(NamedTuple):
-    """Directions and their derivatives, rad per SI unit.
+    """Directions and their derivatives.
 
     The first axis of the derivatives runs over the flat parameters of the train
     (`PrismTrain.parameters`) and then over the rotation angles of the prisms.
+
+    Attributes
+    ----------
+    azimuth, zenith : float or ndarray
+        As in `Directions`, rad.
+    d_azimuth, d_zenith : ndarray
+        Their derivatives, rad per SI unit.
     """
 
     azimuth: Any
@@ -36,12 +59,24 @@ class Linearisation(NamedTuple):
 
 
 class Inverse(NamedTuple):
-    """Pairs of rotation angles of the last two prisms, rad; filled up to four with NaN."""
+    """Pairs of rotation angles of the last two prisms, rad; filled up to four with NaN.
 
-    first: Any  #: of the second-to-last prism, shape (..., 4)
-    second: Any  #: of the last prism, shape (..., 4)
-    count: Any  #: number of pairs found, shape (...)
-    continuum: Any  #: whether infinitely many pairs reach the direction
+    Attributes
+    ----------
+    first : ndarray
+        Of the second-to-last prism, shape (..., 4).
+    second : ndarray
+        Of the last prism, shape (..., 4).
+    count : int or ndarray
+        Number of pairs found, shape (...).
+    continuum : bool or ndarray
+        Whether infinitely many pairs reach the direction, shape (...).
+    """
+
+    first: Any
+    second: Any
+    count: Any
+    continuum: Any
 
 
 def _train(optics: Optics) -> _risley.PrismTrain:

@@ -14,7 +14,17 @@ Planned = Union[_risley.PlannedCalibration, _risley.PlannedFlight]
 
 
 class Verdict(NamedTuple):
-    """A stable code, what was found in words, and what follows from it."""
+    """What came of a job.
+
+    Attributes
+    ----------
+    code : str
+        Stable, for programs.
+    words : str
+        What was found, in a sentence.
+    to_do : str
+        What follows from it.
+    """
 
     code: str
     words: str

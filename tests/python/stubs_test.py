@@ -45,3 +45,24 @@ def test_every_public_name_is_documented():
             assert "Returns" in public.__doc__ or "Raises" in public.__doc__, name
             for parameter in inspect.signature(public).parameters:
                 assert parameter in public.__doc__, f"{name}: {parameter}"
+
+
+def public_members(cls):
+    """(name, member) of what a public class has of its own or from classes of this package."""
+    for owner in cls.__mro__:
+        if owner.__module__.split(".")[0] == "risley":
+            for name, member in vars(owner).items():
+                if not name.startswith("_"):
+                    yield name, getattr(member, "__func__", member)
+
+
+def test_every_method_and_property_is_documented():
+    classes = {name: getattr(risley, name) for name in risley.__all__
+               if inspect.isclass(getattr(risley, name))}
+    assert {"Recording", "Sensor", "Solution", "Verdict"} <= set(classes)
+    for class_name, cls in classes.items():
+        for name, member in public_members(cls):
+            if name in getattr(cls, "_fields", ()):  # of a named tuple, which speaks for its fields
+                assert name in cls.__doc__, f"{class_name}.{name}"
+            else:
+                assert inspect.getdoc(member), f"{class_name}.{name}"

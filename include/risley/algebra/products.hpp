@@ -4,6 +4,7 @@
 
 #include <Eigen/Core>
 
+/// @file
 /// Products of matrices whose sizes are only known when running. They are compiled here once: the
 /// products of Eigen's own expressions take seconds of compilation in every file that has one.
 /// All throw InvalidArgument for sizes that do not fit.

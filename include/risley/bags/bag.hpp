@@ -93,8 +93,8 @@ struct BagWarning {
 class Bag {
  public:
   virtual ~Bag() = default;
-  BagKind kind() const { return kind_; }
-  const std::string& path() const { return path_; }
+  BagKind kind() const { return kind_; }             ///< ROS 1, ROS 2 or MCAP
+  const std::string& path() const { return path_; }  ///< as it was given when the bag was opened
   /// By name; a topic may stand here twice, with different types.
   const std::vector<Topic>& topics() const { return topics_; }
 
@@ -119,6 +119,7 @@ class Bag {
  protected:
   Bag(BagKind kind, std::string path, const Progress& progress)
       : path_(std::move(path)), progress_(progress.silent()), kind_(kind) {}
+  /// Refuses a choice that does not hold one value per topic. @throws InvalidArgument
   void require_topics(const std::vector<bool>& wanted) const;
 
   std::string path_;

@@ -27,7 +27,7 @@ class Ros1Fields {
  public:
   explicit Ros1Fields(std::span<const std::uint8_t> bytes) : left_(bytes) {}
 
-  std::size_t left() const { return left_.size(); }
+  std::size_t left() const { return left_.size(); }  ///< bytes that have not been read yet
 
   /// @param what  of which bytes, for the message. @throws BadMessage
   std::span<const std::uint8_t> take(std::size_t count, std::string_view what) {
@@ -79,7 +79,7 @@ class CdrFields {
   CdrFields(const CdrFields&) = delete;
   CdrFields& operator=(const CdrFields&) = delete;
 
-  std::size_t left() const;
+  std::size_t left() const;  ///< bytes that have not been read yet
 
   /// For integers of 8 to 64 bits, float and double. @throws BadMessage
   template <class T>

@@ -35,6 +35,7 @@ inline constexpr double kPoorDatum = 8.7266462599716477e-4;
 /// prior sigmas of the parameters (1 degree, 0.01 in an index).
 inline constexpr double kWidestDirection = 0.5;
 
+/// How a calibration on planes is made, and what it may assume.
 struct CalibrationOptions {
   CalibrationMethod method = CalibrationMethod::adjustment;
   sensors::Sensor sensor;  ///< noise, geometry, name; its errors are not used
@@ -108,6 +109,7 @@ struct Calibration {
 
   /// Sigma of a free parameter, what was held included.
   double total_sigma(std::size_t parameter) const;
+  /// Sigma of the range offset, m, what was held included; 0 where it was held itself.
   double range_offset_total_sigma() const;
   std::vector<CalibratedPlane> planes;
   std::vector<SurfaceStep> steps;

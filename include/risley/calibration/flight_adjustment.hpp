@@ -63,6 +63,7 @@ class FlightSystem {
     /// By how much the cost would fall beyond what the planes alone could do, in squared sigmas.
     double promised = 0;
   };
+  /// The Gauss-Newton step that these equations ask for.
   Step step() const;
 
   /// Columns of the inverse of the equations times `right` [size, columns]; rows of what is held
@@ -70,8 +71,9 @@ class FlightSystem {
   Eigen::MatrixXd solve(const Eigen::MatrixXd& right) const;
   /// The planes' part of such columns [3 planes, columns].
   Eigen::MatrixXd planes_of(const Eigen::MatrixXd& solution) const;
-  /// The inverse [size, size], or its diagonal alone [size].
+  /// The inverse of the equations [size, size].
   Eigen::MatrixXd inverse() const;
+  /// Diagonal of inverse() [size], in less memory than the whole.
   Eigen::VectorXd inverse_diagonal() const;
   /// By how much the unknowns move where a held global is off by one unit [size, held].
   Eigen::MatrixXd held_changes() const;
@@ -86,6 +88,7 @@ class FlightSystem {
 /// Adds a step to a model.
 void apply(const FlightSystem::Step& step, FlightModel& model);
 
+/// When an adjustment in flight stops, and how it weighs the ground.
 struct FlightAdjustmentOptions {
   int most_steps = 10;
   double tolerance = 1e-2;  ///< done when a step promises less, in squared sigmas
@@ -95,6 +98,7 @@ struct FlightAdjustmentOptions {
   InstructionSet set = best_instruction_set();
 };
 
+/// What an adjustment in flight arrived at.
 struct FlightAdjustment {
   FlightModel model;  ///< adjusted
   int steps = 0;

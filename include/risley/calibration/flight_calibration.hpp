@@ -28,6 +28,7 @@
 
 namespace risley::calibration {
 
+/// What a calibration in flight starts from, what it frees and how much of the data it takes.
 struct FlightCalibrationOptions {
   /// Start values, noise, geometry. What it states of its parameters are the priors; a sensor with
   /// a covariance, as a calibration on walls writes it, brings all of it.

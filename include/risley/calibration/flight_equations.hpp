@@ -38,12 +38,12 @@ struct GroundPlane {
 struct FlightUnknowns {
   int free = 0;
   bool drift = false;
-  static constexpr int boresight(int axis) { return axis; }
-  static constexpr int lever_arm(int axis) { return 3 + axis; }
-  static constexpr int range_offset() { return 6; }
-  static constexpr int clock_offset() { return 7; }
-  static constexpr int parameter(int number) { return 8 + number; }
-  int clock_drift() const { return 8 + free; }
+  static constexpr int boresight(int axis) { return axis; }          ///< about X, Y, Z: 0 to 2
+  static constexpr int lever_arm(int axis) { return 3 + axis; }      ///< along X, Y, Z: 0 to 2
+  static constexpr int range_offset() { return 6; }                  ///< m
+  static constexpr int clock_offset() { return 7; }                  ///< s
+  static constexpr int parameter(int number) { return 8 + number; }  ///< of the free ones, from 0
+  int clock_drift() const { return 8 + free; }                       ///< only where drift is set
   int size() const { return 8 + free + (drift ? 1 : 0); }
 };
 
@@ -70,6 +70,7 @@ struct FlightModel {
   /// derivatives tell how much of one there is.
   std::optional<std::int64_t> drift_about_ns;
 
+  /// The unknowns of this model beside the knots and the planes.
   FlightUnknowns unknowns() const {
     return {static_cast<int>(free.size()), drift_about_ns.has_value()};
   }
@@ -119,6 +120,7 @@ struct FlightEquations {
 
 /// Plane of every shot, or kNoPlane.
 using PlaneOfShot = std::vector<std::int32_t>;
+/// Stands in PlaneOfShot for a shot without a plane.
 inline constexpr std::int32_t kNoPlane = -1;
 
 /// Residuals and derivatives of every shot that has a plane, summed up. The range of a shot is

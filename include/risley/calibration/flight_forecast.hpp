@@ -15,6 +15,7 @@
 
 namespace risley::calibration {
 
+/// The calibration whose accuracy is to be predicted, and the number of shots for it.
 struct FlightForecastOptions {
   /// The calibration that will be made: priors are those of its sensor and mount, which take the
   /// place of the planned flight's, and its errors are those of the trajectory.

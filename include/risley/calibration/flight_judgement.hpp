@@ -23,8 +23,9 @@ struct FlightUnknown {
   double twin_correlation = 0;
 };
 
-/// An SI value of an unknown in the unit that its name states, and that unit.
+/// An SI value of an unknown in the unit that its name states.
 double in_file_unit(const FlightUnknown& unknown, double value, TrainShape shape);
+/// The unit that in_file_unit() converts to: "deg", "m", "s" or that of the train's parameter.
 std::string file_unit(const FlightUnknown& unknown, TrainShape shape);
 
 /// What boresight and prisms together are known to, over the field of view.

@@ -22,7 +22,9 @@ struct FlightShots {
   std::vector<std::uint16_t> strip;                 ///< number of the strip, from 0, ascending
 
   std::size_t size() const { return range.size(); }
+  /// Number of columns of rotation angles.
   int prisms() const { return static_cast<int>(rotation_angle.size()); }
+  /// Number of strips: one more than the last shot's.
   std::size_t strips() const { return strip.empty() ? 0 : std::size_t{1} + strip.back(); }
 };
 

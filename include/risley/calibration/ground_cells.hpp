@@ -23,6 +23,7 @@ using ShotPoints = std::vector<std::array<float, 3>>;
 ShotPoints georeferenced(const FlightShots& shots, const ShotPoses& poses,
                          const FlightModel& model);
 
+/// How ground is cut into cells, and which of them may be called planes.
 struct GroundCellOptions {
   double size = 2;                         ///< of a cell, m
   double shift_east = 0, shift_north = 0;  ///< of the grid, in cells
@@ -55,6 +56,7 @@ struct GroundCircle {
   Eigen::Vector3d centre{0, 0, 0};  ///< of which the height counts nothing
   double radius = 1;                ///< m
 
+  /// Whether a point (east, north, up), m, lies inside or on the rim; its height counts nothing.
   bool holds(const std::array<float, 3>& point) const {
     const double east = point[0] - centre.x(), north = point[1] - centre.y();
     return east * east + north * north <= radius * radius;

@@ -105,6 +105,7 @@ struct PlanarSolution {
   std::vector<double> chi2;
 };
 
+/// When an adjustment on planes stops.
 struct AdjustmentOptions {
   int most_iterations = 50;
   /// Done when a step would lower the cost by less than this (in the unit of one squared sigma).
@@ -122,7 +123,7 @@ struct HeldQuantities {
   Eigen::MatrixXd train;  ///< flat vector [places, held], SI; 0 in the places of free parameters
   std::vector<Eigen::MatrixXd> rotation_angles;  ///< [recordings] of [prisms, held], rad
 
-  Eigen::Index count() const { return train.cols(); }
+  Eigen::Index count() const { return train.cols(); }  ///< of held quantities
 };
 
 /// By how much a solution is off where a held quantity is off by one unit, SI.

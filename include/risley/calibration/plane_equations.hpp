@@ -33,10 +33,11 @@ struct PlaneView {
 ///   + prisms + 3     distance of the plane
 struct PlaneColumns {
   int places = 0, prisms = 0;
-  int rotation_angle(int rotor) const { return places + rotor; }
-  int range_offset() const { return places + prisms; }
+  int rotation_angle(int rotor) const { return places + rotor; }  ///< a shift at all shots
+  int range_offset() const { return places + prisms; }            ///< of the sensor, m
+  /// Towards tangent 1, which has the number 0, or tangent 2.
   int normal(int tangent) const { return places + prisms + 1 + tangent; }
-  int distance() const { return places + prisms + 3; }
+  int distance() const { return places + prisms + 3; }  ///< of the plane, m
   int size() const { return places + prisms + 4; }
 };
 

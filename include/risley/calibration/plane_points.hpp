@@ -26,6 +26,7 @@ struct RangedShots {
   std::vector<std::uint8_t> beam;  ///< emitter that fired, from 0; empty: all the first
 
   std::size_t size() const { return range.size(); }
+  /// Number of columns of rotation angles.
   int prisms() const { return static_cast<int>(rotation_angle.size()); }
   /// @throws InvalidArgument for a number of prisms that no sensor has
   void resize(int prisms, std::size_t shots);

@@ -33,6 +33,7 @@ struct PlannedPiece {
   std::uint64_t fired = 0;      ///< of them, and of those that end nowhere
 };
 
+/// Which shots of a planned flight are made, and with which random numbers.
 struct PlannedShotsOptions {
   /// Shots per second: chosen by chance among the sensor's, since every n-th would beat with the
   /// rotors. Empty: all of them.

@@ -19,8 +19,11 @@ class Rays {
   Rays(const PrismTrain& train, const PrismGeometry& geometry, const RangedShots& shots);
 
   std::size_t size() const { return x_.size(); }
+  /// Unit vector, sensor frame.
   Vector3<double> direction(std::size_t i) const { return {x_[i], y_[i], z_[i]}; }
+  /// Where a shot's beam leaves the sensor, m, sensor frame.
   Vector3<double> origin(std::size_t i) const { return {origin_x_[i], origin_y_[i], origin_z_[i]}; }
+  /// The point at a range from the origin, m, sensor frame.
   Vector3<double> point(std::size_t i, double range) const {
     return origin(i) + range * direction(i);
   }

@@ -54,6 +54,7 @@ struct KnotInformation {
   std::vector<double> diagonal;  ///< [knots]
   std::vector<double> next;      ///< [knots - 1] between a knot and the next
 };
+/// What a process says of one correction. @param correction  from 0, see kCorrections
 KnotInformation knot_information(const TrajectoryKnots& knots,
                                  const trajectories::ErrorProcess& process, int correction);
 

@@ -73,6 +73,7 @@ class Georeference {
   std::vector<std::string> warnings() const;
   /// From the recording's clock to the trajectory's time, with the mount's offset, ns.
   std::int64_t clock_shift_ns() const;
+  /// The strips of the flight, in the order of their numbers from 1.
   const std::vector<trajectories::FlownStrip>& strips() const;
   /// The ways of the sensor along them, on the points' map; none where the trajectory has no pose
   /// at an end of one.

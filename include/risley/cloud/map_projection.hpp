@@ -24,9 +24,11 @@ class MapTangent {
   MapTangent(const Eigen::Vector3d& center, const Eigen::Vector3d& value,
              const Eigen::Matrix3d& jacobian, const std::array<Eigen::Matrix3d, 3>& hessian);
 
+  /// The map at a point, to second order about the centre, m.
   Eigen::Vector3d map(const Eigen::Vector3d& point) const;
   /// At the centre; a covariance C becomes J C J'.
   const Eigen::Matrix3d& jacobian() const { return jacobian_; }
+  /// Where the expansion was made, m.
   const Eigen::Vector3d& center() const { return center_; }
   /// Of the map at the centre, m.
   const Eigen::Vector3d& value() const { return value_; }

@@ -46,7 +46,7 @@ class PointSampler {
   PointSampler(PointFrame frame, std::size_t most);
   /// Takes the next points of the cloud.
   void add(const Points& points);
-  const PointSample& sample() const { return sample_; }
+  const PointSample& sample() const { return sample_; }  ///< of the points so far
 
  private:
   void thin();

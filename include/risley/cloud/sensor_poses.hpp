@@ -25,7 +25,7 @@ struct SensorPoses {
   Eigen::Vector3d lever_arm{0, 0, 0};
 
   std::size_t size() const { return strip.size(); }
-  void resize(std::size_t shots);
+  void resize(std::size_t shots);  ///< gives every column so many rows
   /// Keeps only these rows. @param rows  ascending @throws InvalidArgument
   void keep(std::span<const std::size_t> rows);
 };

@@ -7,9 +7,13 @@
 
 namespace risley {
 
+/// Half a turn, rad.
 inline constexpr double kPi = std::numbers::pi;
+/// A whole turn, rad.
 inline constexpr double kTwoPi = 2.0 * std::numbers::pi;
+/// Factor from degrees to radians.
 inline constexpr double kRadiansPerDegree = std::numbers::pi / 180.0;
+/// Factor from radians to degrees.
 inline constexpr double kDegreesPerRadian = 180.0 / std::numbers::pi;
 
 /// Degrees exist only at the edges (files, command line, plots).
@@ -17,6 +21,7 @@ constexpr double radians_from_degrees(double degrees) { return degrees * kRadian
 /// Solid angle, sr.
 inline constexpr double kSquareDegree = kRadiansPerDegree * kRadiansPerDegree;
 
+/// As radians_from_degrees(), the other way.
 constexpr double degrees_from_radians(double radians) { return radians * kDegreesPerRadian; }
 
 /// The same angle in [-pi, pi]; NaN for what is no angle.

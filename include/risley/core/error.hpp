@@ -33,8 +33,9 @@ class FileError : public Error {
   /// @param problem  what was expected and what was found
   FileError(std::string path, FilePlace place, std::string problem);
 
-  const std::string& path() const { return path_; }
-  const FilePlace& place() const { return place_; }
+  const std::string& path() const { return path_; }  ///< of the file, as the caller gave it
+  const FilePlace& place() const { return place_; }  ///< of what is wrong, if known
+  /// What was expected and what was found.
   const std::string& problem() const { return problem_; }
 
  private:

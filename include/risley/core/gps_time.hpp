@@ -10,7 +10,8 @@ namespace risley {
 inline constexpr std::int64_t kGpsEpoch = 315'964'800;
 /// What adjusted standard GPS time of LAS files has less than GPS time, s.
 inline constexpr std::int64_t kGpsAdjustment = 1'000'000'000;
-inline constexpr std::int64_t kWeek = 604'800, kDay = 86'400;
+inline constexpr std::int64_t kWeek = 604'800,  ///< s
+    kDay = 86'400;                              ///< s
 
 /// How much GPS time is ahead of UTC, s. Earlier than July 2012 none of these sensors measured.
 /// @param utc_ns  since 1 January 1970

@@ -10,6 +10,7 @@ namespace risley {
 /// Instruction sets that kernels exist in; baseline is what the compiler targets by default.
 enum class InstructionSet { baseline, avx2, avx512 };
 
+/// "baseline", "avx2" or "avx512".
 std::string to_string(InstructionSet set);
 
 /// The instruction sets this binary holds and this processor runs, best last.

@@ -22,7 +22,8 @@ class Cancelled : public Error {
 /// Asks computations to stop; may be set from any thread and from a signal handler.
 class CancelFlag {
  public:
-  void set() noexcept { set_.store(true, std::memory_order_relaxed); }
+  void set() noexcept { set_.store(true, std::memory_order_relaxed); }  ///< cannot be taken back
+  /// Whether to stop.
   bool is_set() const noexcept { return set_.load(std::memory_order_relaxed); }
 
  private:

@@ -35,6 +35,7 @@ constexpr const T& select(bool mask, const T& a, const T& b) {
 /// How a scalar computes sine and cosine together; batches specialise it.
 template <class T>
 struct SineCosine {
+  /// Sine and cosine of an angle in rad, in this order.
   static std::pair<T, T> of(const T& angle) {
     using std::cos;
     using std::sin;

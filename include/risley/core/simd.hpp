@@ -18,9 +18,11 @@
 
 namespace risley {
 
+/// Sine and cosine of all lanes of a batch at once.
 template <class Number, class Arch>
 struct SineCosine<xsimd::batch<Number, Arch>> {
-  using Batch = xsimd::batch<Number, Arch>;
+  using Batch = xsimd::batch<Number, Arch>;  ///< of any instruction set
+  /// Sine and cosine of an angle in rad, in this order.
   static std::pair<Batch, Batch> of(const Batch& angle) { return xsimd::sincos(angle); }
 };
 

@@ -21,8 +21,8 @@ std::string near_miss(std::string_view word, std::span<const std::string> names)
 std::string did_you_mean(std::string_view word, std::span<const std::string> names);
 
 /// The same for a terminal: what it would obey instead of showing is written out, control
-/// characters as \u001b, marks that turn the direction of writing as \u202e, bytes that are no
-/// UTF-8 as \x9b. Tabs stay.
+/// characters as `\u001b`, marks that turn the direction of writing as `\u202e`, bytes that are no
+/// UTF-8 as `\x9b`. Tabs stay.
 /// @param lines  whether line feeds stay, too
 std::string printable(std::string_view text, bool lines);
 

@@ -37,22 +37,26 @@ struct Vector3 {
   Vector3& operator+=(const Vector3& b) { return *this = *this + b; }
 };
 
+/// Scalar product.
 template <class T>
 T dot(const Vector3<T>& a, const Vector3<T>& b) {
   return a.x * b.x + a.y * b.y + a.z * b.z;
 }
 
+/// Vector product a x b: right-handed, perpendicular to both.
 template <class T>
 Vector3<T> cross(const Vector3<T>& a, const Vector3<T>& b) {
   return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
 
+/// Length, in the unit of the components.
 template <class T>
 T norm(const Vector3<T>& a) {
   using std::sqrt;
   return sqrt(dot(a, a));
 }
 
+/// The unit vector along a; not finite for a vector of length 0.
 template <class T>
 Vector3<T> normalized(const Vector3<T>& a) {
   return (T(1.0) / norm(a)) * a;

@@ -76,6 +76,7 @@ class TickSampler {
   /// @param rate  Hz, > 0
   explicit TickSampler(double rate);
 
+  /// Begins a new grid of ticks at a time, with every beam's turn still to come.
   void restart(std::int64_t time_ns) {
     origin_ns_ = next_ns_ = time_ns;
     had_turn_.reset();
@@ -118,6 +119,7 @@ class ShotSelector {
  public:
   explicit ShotSelector(const SelectionOptions& options);
 
+  /// Takes the next rows of the recording. Those whose direction is not valid only count.
   void add(const recordings::Observations& observations);
 
   /// The chosen shots.
@@ -126,6 +128,7 @@ class ShotSelector {
   AngleSeries take_series() { return std::move(series_); }
   /// All shots of the first second, not thinned: the start of an estimation wants every one.
   const AngleSeries& head() const { return head_; }
+  /// How many rows came so far, and how many were left out for which reason.
   const SelectionCounts& counts() const { return counts_; }
   /// Number of each chosen shot's observation, counted over all that were offered; empty unless
   /// asked for.

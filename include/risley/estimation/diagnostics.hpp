@@ -60,6 +60,7 @@ class AngleProfiler {
   /// A shot of which any number is not finite does not count.
   /// @param angle  rotation angle of the prism, rad, any number of turns
   void add(double angle, double azimuth_residual, double zenith_residual);
+  /// The profile of the shots so far.
   AngleProfile result() const;
 
  private:

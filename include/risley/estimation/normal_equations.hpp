@@ -50,6 +50,7 @@ struct NormalEquations {
   double cost = 0;                  ///< sum of the shots' losses
   std::size_t shots = 0, outliers = 0;
 
+  /// Number of knots; 0 without prisms.
   std::size_t knots() const {
     return prisms < 1 ? 0 : gradient.size() / static_cast<std::size_t>(3 * prisms);
   }

@@ -16,6 +16,7 @@ namespace risley::estimation {
 /// The shots of a recording that has one time for each packet and keeps the order of the shots, but
 /// not the places of those that are missing.
 struct PacketShots {
+  /// Time and number of shots of one packet.
   struct OnePacket {
     std::int64_t time_ns = 0;  ///< of its first place
     std::uint8_t shots = 0;    ///< that the file has of it

@@ -17,6 +17,7 @@ struct Disagreement {
   Eigen::Index worst = 0;       ///< parameter with the most sigmas
   double worst_over_sigma = 0;  ///< its difference over its sigma, without sign
 
+  /// Whether both sets can be of one sensor; see kMostDisagreement.
   bool same_sensor() const { return chi2_per_parameter <= kMostDisagreement; }
 };
 

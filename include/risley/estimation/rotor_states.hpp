@@ -22,6 +22,7 @@ struct RotorStates {
   std::vector<unsigned char> outlier;                       ///< 1 where the shot was left out
 
   std::size_t size() const { return time_ns.size(); }
+  /// Number of columns of rotation angles.
   int prisms() const { return static_cast<int>(rotation_angle.size()); }
 
   /// Gives every column so many rows.

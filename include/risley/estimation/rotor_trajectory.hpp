@@ -36,27 +36,30 @@ struct RotorTrajectory {
   std::vector<double> covariance;
 
   std::size_t size() const { return time_ns.size(); }
-  int states() const { return kStatesPerRotor * prisms; }
+  int states() const { return kStatesPerRotor * prisms; }  ///< of one knot, all rotors together
   /// Knot behind the last one of a stretch.
   std::size_t stretch_end(std::size_t stretch) const {
     return stretch + 1 < stretch_begin.size() ? stretch_begin[stretch + 1] : size();
   }
   /// The knot that serves a shot; none in an unused stretch.
   std::optional<std::size_t> knot_of_shot(std::size_t shot) const;
+  /// The states of a knot [prisms][3], to read and to change.
   std::span<double> state_of(std::size_t knot) {
     const auto d = static_cast<std::size_t>(states());
     return {state.data() + knot * d, d};
   }
+  /// The states of a knot [prisms][3].
   std::span<const double> state_of(std::size_t knot) const {
     const auto d = static_cast<std::size_t>(states());
     return {state.data() + knot * d, d};
   }
 
-  /// Rotation angle and speed of one rotor, rad and rad/s, seconds from a knot.
+  /// Rotation angle of one rotor, rad, seconds from a knot.
   double angle(std::size_t knot, std::size_t rotor, double seconds) const {
     const auto s = state_of(knot).subspan(kStatesPerRotor * rotor);
     return s[0] + seconds * (s[1] + 0.5 * seconds * s[2]);
   }
+  /// Speed of one rotor, rad/s, seconds from a knot.
   double speed(std::size_t knot, std::size_t rotor, double seconds) const {
     const auto s = state_of(knot).subspan(kStatesPerRotor * rotor);
     return s[1] + seconds * s[2];
@@ -65,8 +68,9 @@ struct RotorTrajectory {
   /// s^0, s^-1, ... s^-4.
   std::array<double, 5> angle_covariance_terms(std::size_t knot, std::size_t a,
                                                std::size_t b) const;
-  /// Covariance of the angles of two rotors, rad^2, and variance of the speed of one, (rad/s)^2.
+  /// Covariance of the angles of two rotors, rad^2, seconds from a knot.
   double angle_covariance(std::size_t knot, std::size_t a, std::size_t b, double seconds) const;
+  /// Variance of the speed of one rotor, (rad/s)^2, seconds from a knot.
   double speed_variance(std::size_t knot, std::size_t rotor, double seconds) const;
 
  private:

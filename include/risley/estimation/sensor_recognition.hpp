@@ -54,6 +54,7 @@ struct SensorRecognition {
   bool decided = false;  ///< and every other one leaves at least kClearlyWorse times as much
 };
 
+/// By how much every other candidate must be worse for a recognition to be decided.
 inline constexpr double kClearlyWorse = 1.5;
 
 /// Tells which sensor made a recording by the lines of y + iz that its rotors leave: their speeds,

@@ -16,6 +16,7 @@
 
 namespace risley::estimation {
 
+/// A position across the axis, y + iz.
 using Complex = std::complex<double>;
 
 /// One line of the spectrum of y + iz, the beam's position across the axis.

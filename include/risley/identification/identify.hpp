@@ -36,6 +36,7 @@ struct Hypothesis {
   /// took it as one: what is assumed counts; infinite where nothing tells. Empty unless the best.
   Eigen::MatrixXd total_covariance;
 
+  /// The prisms of the fit.
   const PrismTrain& train() const { return fit.model.train; }
 };
 
@@ -47,6 +48,7 @@ enum class EmitterTiming {
   uneven,    ///< neither
 };
 
+/// The name of the enumerator: "one_emitter", "in_turn", "together" or "uneven".
 std::string to_string(EmitterTiming timing);
 
 /// How the rotors move.
@@ -71,6 +73,7 @@ struct Identification {
   bool decided = false;                ///< every rival that is not equivalent is far worse
   bool fits = false;                   ///< the best one describes the scan
 
+  /// The first hypothesis. There must be one.
   const Hypothesis& best() const { return hypotheses.front(); }
 };
 

@@ -10,6 +10,7 @@
 
 namespace risley::identification {
 
+/// A position across the axis, y + iz.
 using Complex = std::complex<double>;
 
 /// One line of the spectrum of y + iz: a vector of the unit sphere's tangent plane that turns.

@@ -24,6 +24,7 @@ struct ShotGrid {
   int emitters = 1;                     ///< that the recording names
 
   std::size_t size() const { return slot.size(); }
+  /// From slot 0 to the last shot, s.
   double duration() const { return size() == 0 ? 0.0 : time.back(); }
 };
 

@@ -29,13 +29,14 @@ struct RotorCurves {
   /// All coefficients zero.
   RotorCurves(int prisms, double begin, double end, int segments, int degree, bool smooth);
 
+  /// Number of coefficients of one rotor.
   int coefficients() const { return smooth ? segments + degree : segments * (degree + 1); }
-  double segment_length() const { return (end - begin) / segments; }
+  double segment_length() const { return (end - begin) / segments; }  ///< s
   /// The segment of that time, the first or last one beyond them.
   int segment_of(double time) const;
   /// The first of the degree + 1 coefficients that act in a segment.
   int first_coefficient(int segment) const { return smooth ? segment : segment * (degree + 1); }
-  double angle(int rotor, double time) const;
+  double angle(int rotor, double time) const;             ///< rad, not wrapped
   double angular_velocity(int rotor, double time) const;  ///< rad/s
   double mean_angular_velocity(int rotor) const;          ///< from begin to end, rad/s
 };
@@ -48,6 +49,7 @@ inline constexpr int kMaxCurveDegree = 4;
 struct CurveWeights {
   std::array<double, kMaxCurveDegree + 1> value{}, rate{};
 };
+/// The weights of a segment's coefficients. @param time  s
 CurveWeights curve_weights(const RotorCurves& curves, int segment, double time);
 
 /// The curves of that shape nearest to others, by least squares at many times.
@@ -73,6 +75,7 @@ struct TrainFreedom {
   friend bool operator==(const TrainFreedom&, const TrainFreedom&) = default;
 };
 
+/// A train and its motion as fitted to the shots of a grid, and how well they describe them.
 struct TrainFit {
   TrainModel model;
   double rms = 0;         ///< of azimuth and zenith together, rad; infinite where nothing fits
@@ -87,6 +90,7 @@ struct TrainFit {
   std::vector<double> azimuth_residual, zenith_residual;  ///< [shots], observed minus predicted
 };
 
+/// When a fit ends, and what it does beside minimising.
 struct TrainFitOptions {
   int iterations = 30;
   double tolerance = 1e-7;  ///< a step that gains a smaller share of the sum of squares is the last

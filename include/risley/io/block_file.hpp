@@ -18,7 +18,7 @@ class FileDescriptor {
   ~FileDescriptor();
   FileDescriptor(FileDescriptor&& other) noexcept : value_(other.value_) { other.value_ = -1; }
   FileDescriptor& operator=(FileDescriptor&&) = delete;
-  int get() const { return value_; }
+  int get() const { return value_; }  ///< the descriptor, still owned by this
 
   /// @return 0, or errno when the system refuses (a full disk may show only here)
   int close();
@@ -33,14 +33,15 @@ class BlockInput {
   /// @throws FileError when the file is missing or not a regular file
   explicit BlockInput(std::string path);
 
-  const std::string& path() const { return path_; }
-  std::uint64_t size() const { return size_; }
+  const std::string& path() const { return path_; }  ///< as it was given
+  std::uint64_t size() const { return size_; }       ///< bytes, when it was opened
 
   /// The bytes [offset, offset + count), until the next call; they must lie inside the file.
   /// @param count  at most kBlockBytes
   /// @throws FileError when the disk fails, InvalidArgument for other bytes
   const std::uint8_t* at(std::uint64_t offset, std::size_t count);
 
+  /// Most bytes that at() gives at once.
   static constexpr std::size_t kBlockBytes = std::size_t{1} << 18;
 
  private:
@@ -59,8 +60,8 @@ class BlockOutput {
   /// @throws FileError
   explicit BlockOutput(std::string path);
 
-  const std::string& path() const { return output_.path(); }
-  std::uint64_t size() const { return written_ + block_.size(); }
+  const std::string& path() const { return output_.path(); }       ///< that commit() will give it
+  std::uint64_t size() const { return written_ + block_.size(); }  ///< bytes appended so far
 
   /// Room for count more bytes at the end, until the next call. @throws FileError
   std::uint8_t* append(std::size_t count);

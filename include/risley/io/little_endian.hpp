@@ -21,6 +21,7 @@ T load(const std::uint8_t* bytes) {
   return value;
 }
 
+/// Writes a number as sizeof(T) little-endian bytes, aligned or not.
 template <class T>
 void store(std::uint8_t* bytes, std::type_identity_t<T> value) {
   static_assert(std::is_arithmetic_v<T>);

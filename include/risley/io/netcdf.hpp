@@ -16,12 +16,14 @@
 #include "risley/core/progress.hpp"
 #include "risley/io/output_file.hpp"
 
+/// @file
 /// NetCDF-4 files. The library behind them, HDF5 included, is not thread-safe: what is written here
 /// holds one lock of the whole process, and every file that is read has a process of its own, so
 /// that any number of threads may each have files open. A single file belongs to one thread at a
 /// time.
 namespace risley::io {
 
+/// Types of values that are written and read; text is one of characters.
 enum class NetcdfType { text, uint8, int32, uint32, int64, uint64, float32, float64 };
 
 /// The type in the file of a C++ type; char stands for text.
@@ -37,12 +39,14 @@ constexpr NetcdfType netcdf_type_of() {
   if constexpr (std::is_same_v<T, double>) return NetcdfType::float64;
 }
 
+/// A dimension of an open file.
 struct NetcdfDimension {
   std::string name;
   std::size_t length = 0;  ///< entries; 0 in a file that is written: it grows
   int id = 0;
 };
 
+/// A variable of an open file.
 struct NetcdfVariable {
   std::string name;
   NetcdfType type = NetcdfType::float64;
@@ -70,7 +74,7 @@ class NetcdfOutput {
   NetcdfOutput(const NetcdfOutput&) = delete;
   NetcdfOutput& operator=(const NetcdfOutput&) = delete;
 
-  const std::string& path() const;
+  const std::string& path() const;  ///< that the file gets with close()
 
   /// @param length  at least 1
   NetcdfDimension define_dimension(const std::string& name, std::size_t length);
@@ -90,17 +94,22 @@ class NetcdfOutput {
   /// What readers get for values that were not written, and may take for "missing".
   void set_fill(const NetcdfVariable& variable, float value);
 
-  /// Attributes of the file and of a variable; text attributes of a group, which is made with the
-  /// first of them.
+  /// A text attribute of the file.
   void put_text(const std::string& name, std::string_view text);
+  /// A text attribute of a variable.
   void put_text(const NetcdfVariable& variable, const std::string& name, std::string_view text);
+  /// A number as an attribute of the file, uint32.
   void put_number(const std::string& name, std::uint32_t value);
+  /// As above, int32.
   void put_number(const std::string& name, std::int32_t value);
+  /// Bytes as an attribute of a variable.
   void put_numbers(const NetcdfVariable& variable, const std::string& name,
                    std::span<const std::uint8_t> values);
+  /// Makes a group with nothing but text attributes, name and value each.
   void put_text_group(const std::string& group,
                       const std::vector<std::pair<std::string, std::string>>& attributes);
 
+  /// After this there are only values to write.
   void end_definitions();
 
   /// Writes entries [first, first + values.size() / width) of a variable.
@@ -108,6 +117,7 @@ class NetcdfOutput {
   void put(const NetcdfVariable& variable, std::size_t first, std::span<const T> values) {
     put(variable, netcdf_type_of<T>(), first, values.data(), values.size());
   }
+  /// As above, for a whole vector.
   template <class T>
   void put(const NetcdfVariable& variable, std::size_t first, const std::vector<T>& values) {
     put(variable, first, std::span<const T>(values));
@@ -143,18 +153,22 @@ class NetcdfInput {
   NetcdfInput(const NetcdfInput&) = delete;
   NetcdfInput& operator=(const NetcdfInput&) = delete;
 
-  const std::string& path() const { return path_; }
+  const std::string& path() const { return path_; }  ///< as it was given
 
-  /// Attributes of the file.
+  /// Whether the file has an attribute of that name.
   bool has_attribute(const std::string& name) const;
+  /// A text attribute of the file. @throws FileError where it is missing or no text
   std::string text(const std::string& name) const;
   /// Any whole number that fits.
   std::uint32_t number(const std::string& name) const;
   /// All attributes of a group, which must be texts.
   std::vector<std::pair<std::string, std::string>> text_group(const std::string& group) const;
 
+  /// A dimension by its name. @throws FileError where it is missing
   NetcdfDimension dimension(const std::string& name) const;
+  /// As above. @throws FileError for another length, too
   NetcdfDimension dimension(const std::string& name, std::size_t length) const;
+  /// Whether the file has a variable of that name, whatever its type.
   bool has_variable(const std::string& name) const;
 
   /// A variable of values of type T along exactly these dimensions.

@@ -21,6 +21,7 @@ class OutputFile {
   OutputFile(OutputFile&& other) noexcept;
   OutputFile& operator=(OutputFile&&) = delete;
 
+  /// The path that commit() gives the file.
   const std::string& path() const { return path_; }
   /// An empty file, to be opened and written by this name; never a link or a device.
   const std::string& temporary_path() const { return temporary_path_; }

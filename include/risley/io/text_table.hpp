@@ -16,6 +16,7 @@
 #include "risley/core/error.hpp"
 #include "risley/io/output_file.hpp"
 
+/// @file
 /// Tables in text files: lines, fields, numbers.
 namespace risley::io {
 
@@ -36,7 +37,7 @@ class LineReader {
 
   std::uint64_t line_number() const { return line_number_; }  ///< of the last line, from 1
   bool has_line_end() const { return has_line_end_; }         ///< of the last line
-  double fraction_read() const;
+  double fraction_read() const;                               ///< of the file's bytes, [0, 1]
 
  private:
   void refill();
@@ -73,6 +74,7 @@ std::int64_t integer_field(std::string_view field, std::string_view column, std:
 /// Seconds as whole nanoseconds, exact up to 9 decimals and rounded beyond.
 /// @throws BadRow when they do not fit 64 bits
 std::int64_t nanoseconds_field(std::string_view field, std::string_view column);
+/// The same for a number that has been read already.
 std::int64_t nanoseconds_of(const Decimal& seconds, std::string_view column);
 
 /// A number, or NaN: an empty field, "nan" or an infinity. @throws BadRow for anything else
@@ -103,7 +105,9 @@ class TextOutput {
   /// @throws FileError
   explicit TextOutput(const std::string& path);
 
+  /// What has not gone to the file yet, for fmt to append to.
   fmt::memory_buffer& buffer() { return buffer_; }
+  /// Text as it is.
   void append(std::string_view text) { buffer_.append(text.data(), text.data() + text.size()); }
   /// value with a fixed number of decimals, 0 to 18, rounded to nearest.
   void append_fixed(double value, int decimals);

@@ -10,11 +10,13 @@
 #include <string_view>
 #include <vector>
 
+/// @file
 /// Strict reading of YAML: every mistake becomes a FileError with its line.
 namespace risley::io {
 
 /// A value of a YAML text with everything below it.
 struct YamlNode {
+  /// What a node is; an empty value is nothing.
   enum class Kind { nothing, scalar, list, map };
 
   Kind kind = Kind::nothing;
@@ -22,7 +24,7 @@ struct YamlNode {
   std::string scalar;           ///< of a scalar, as it is written
   std::vector<YamlNode> items;  ///< of a list; of a map: each key before its value
 
-  bool is_list() const { return kind == Kind::list; }
+  bool is_list() const { return kind == Kind::list; }  ///< whether it has items without keys
 };
 
 /// @throws FileError where the text is not YAML, holds more than one document, or has more than a
@@ -41,6 +43,7 @@ std::string yaml_text(const YamlNode& node, const std::string& path, const std::
 /// A map whose keys are all known: unknown, repeated and missing keys are errors.
 class YamlMap {
  public:
+  /// A key with its value.
   struct Entry {
     std::string key;
     std::size_t line;
@@ -53,22 +56,25 @@ class YamlMap {
   /// @throws FileError for a key that is not among these
   void allow_only(std::initializer_list<std::string_view> keys) const;
 
+  /// All entries, in the order of the text.
   const std::vector<Entry>& entries() const { return entries_; }
   /// The entry of that key, or nullptr.
   const Entry* find(std::string_view key) const;
   /// The entry of that key. @throws FileError naming the key when it is missing
   const Entry& at(std::string_view key) const;
 
+  /// The text of an entry. @throws FileError where it is missing or no text
   std::string text(std::string_view key) const;
   /// @throws FileError with value, unit and range unless lower <= number <= upper
   long double number(std::string_view key, long double lower, long double upper,
                      std::string_view unit) const;
+  /// As number(), for a whole number without unit.
   int integer(std::string_view key, int lower, int upper) const;
 
   /// How messages call an entry, e.g. "noise.angle_noise_deg".
   std::string field(std::string_view key) const;
-  const std::string& path() const { return path_; }
-  std::size_t line() const { return line_; }
+  const std::string& path() const { return path_; }  ///< of the file, for messages
+  std::size_t line() const { return line_; }         ///< where the map begins, from 1
 
  private:
   std::string path_, field_;

@@ -11,6 +11,7 @@
 
 namespace risley::jobs {
 
+/// The results that are compared, and how rarely chance may be taken for a change.
 struct CompareSeriesOptions {
   std::vector<std::string> results;  ///< as compare_results(), at least two, in order of time
   /// Probability that at least one pair of a series in which nothing changed is called changed.

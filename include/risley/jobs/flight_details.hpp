@@ -53,6 +53,7 @@ struct FlightDetails {
   FlightGround ground;
 };
 
+/// How large a FlightDetails may become.
 struct FlightDetailsOptions {
   std::size_t most_shots = 1'000'000;  ///< of the sample
   std::size_t most_squares = 2000;     ///< of a picture

@@ -31,6 +31,7 @@ enum class IdentificationVerdict {
   inconsistent,  ///< no train that was tried describes it
 };
 
+/// The name of the enumerator: "identified", "undecided" or "inconsistent".
 std::string to_string(IdentificationVerdict verdict);
 
 /// What came of it.

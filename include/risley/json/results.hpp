@@ -44,23 +44,41 @@ inline constexpr int kFormatVersion = 1;
 // What every job found, in the keys, units and codes that docs/schemas describe: angles in degrees,
 // numbers that are not finite as null. Messages say "option NAME".
 
+/// Of `risley estimate`.
 Json of(const jobs::EstimatedRecording& found);
+/// Of `risley calibrate` on walls.
 Json of(const jobs::CalibratedRecordings& found);
+/// Of `risley calibrate --trajectory`.
 Json of(const jobs::CalibratedFlight& found);
+/// Of `risley calibrate --plan` on walls.
 Json of(const jobs::PlannedCalibration& planned);
+/// Of `risley calibrate --plan` in flight.
 Json of(const jobs::PlannedFlightResult& planned);
+/// Of `risley observability`.
 Json of(const jobs::JudgedObservability& judged);
+/// Of `risley identify`.
 Json of(const jobs::IdentifiedRecording& found);
+/// Of `risley cloud`.
 Json of(const jobs::RecordingCloud& made);
+/// Of `risley info` about a recording.
 Json of(const jobs::InspectedRecording& found);
+/// Of `risley convert` with a recording.
 Json of(const jobs::ConvertedRecording& done);
+/// Of `risley info` about a trajectory.
 Json of(const jobs::InspectedTrajectory& found);
+/// Of `risley convert` with a trajectory.
 Json of(const jobs::ConvertedTrajectory& done);
+/// Of `risley pattern` with an output.
 Json of(const jobs::WrittenPattern& written);
+/// Extremes of the beams' origins, of `risley cloud --beam-origin-map`.
 Json of(const jobs::BeamOrigins& found);
+/// Of `risley report` about two results.
 Json of(const jobs::ResultComparison& compared);
+/// Of `risley compare`.
 Json of(const jobs::ComparedSeries& series);
+/// Of `risley simulate`.
 Json of(const simulation::SimulationResult& simulated);
+/// The `coverage` of `risley pattern`.
 Json of(const sensors::PatternCoverage& coverage);
 /// What a list of presets tells of one.
 Json of(const sensors::Sensor& sensor);

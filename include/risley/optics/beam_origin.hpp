@@ -10,6 +10,7 @@
 
 #include "risley/optics/observation_adjoint.hpp"
 
+/// @file
 /// Where the beam leaves the sensor. The prisms shift it sideways on its way through them, so it
 /// does not start at the frame's origin.                                          [B21 App. A]
 namespace risley {

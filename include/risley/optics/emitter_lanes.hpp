@@ -17,6 +17,7 @@ namespace risley {
 template <class Batch, int N>
 class EmitterLanes {
  public:
+  /// Shots that are computed at once.
   static constexpr std::size_t kLanes = Batch::size;
   /// Places of the flat vector, with those of all emitters.
   static constexpr std::size_t kPlaces =
@@ -35,7 +36,7 @@ class EmitterLanes {
     }
   }
 
-  bool several() const { return emitters_ > 1; }
+  bool several() const { return emitters_ > 1; }  ///< whether lanes can differ at all
 
   /// Turns to shots [shot, shot + kLanes); beyond `end` the last one is repeated.
   void select(std::size_t shot, std::size_t end) {
@@ -58,6 +59,7 @@ class EmitterLanes {
   void apply(PreparedTrain<Batch, N>& train) const {
     if (several()) train.incident = vector(0);
   }
+  /// Puts the derivatives of the selected shots' beams into those of a train.
   void apply(PreparedDerivatives<Batch, N>& derivatives) const {
     if (!several()) return;
     derivatives.incident_horizontal = vector(3);

@@ -95,7 +95,9 @@ struct Trace {
   std::array<Refraction<T>, 2 * N> refraction;
   std::array<T, N> sine, cosine;
 
+  /// The emergent beam: unit vector, sensor frame.
   const Vector3<T>& direction() const { return refraction[2 * N - 1].direction; }
+  /// Whether the beam gets through every face.
   Mask<T> valid() const {
     Mask<T> all = refraction[0].valid;
     for (std::size_t i = 1; i < 2 * N; ++i) all = Mask<T>(all & refraction[i].valid);
@@ -210,6 +212,7 @@ struct AngleSeeds {
   Vector3<T> azimuth, zenith;
 };
 
+/// Derivatives of both angles by a direction: what trace_adjoint() starts from.
 template <ModelScalar T>
 AngleSeeds<T> angle_seeds(const Vector3<T>& direction) {
   using std::sqrt;
@@ -231,6 +234,7 @@ struct AngleLinearisation {
   Mask<T> valid;
 };
 
+/// One shot: its direction, azimuth and zenith, and the gradients of both angles.
 template <ModelScalar T, int N>
 AngleLinearisation<T, N> linearise_angles(const PreparedTrain<T, N>& train,
                                           const PreparedDerivatives<T, N>& derivatives,
@@ -266,6 +270,7 @@ struct DirectionLinearisation {
   Mask<T> valid;
 };
 
+/// One shot: its direction and the gradients of its x, y and z.
 template <ModelScalar T, int N>
 DirectionLinearisation<T, N> linearise_direction(const PreparedTrain<T, N>& train,
                                                  const PreparedDerivatives<T, N>& derivatives,

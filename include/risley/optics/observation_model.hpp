@@ -13,6 +13,7 @@
 #include "risley/optics/prism_train.hpp"
 #include "risley/optics/snell.hpp"
 
+/// @file
 /// The one physical model. Ideal and practical model are the same code: the ideal model is the
 /// practical one with every error parameter zero.
 namespace risley {
@@ -30,13 +31,14 @@ Vector3<T> leaning_direction(const T& horizontal, const T& vertical) {
   return {cos_h * cos_v, -sin_h * cos_v, sin_v};
 }
 
-/// Derivatives of leaning_direction by its two angles.
+/// Derivative of leaning_direction() by its horizontal angle.
 template <ModelScalar T>
 Vector3<T> leaning_horizontal_rate(const T& horizontal, const T& vertical) {
   const auto [sin_h, cos_h] = sin_cos(horizontal);
   const auto [sin_v, cos_v] = sin_cos(vertical);
   return {-sin_h * cos_v, -cos_h * cos_v, T(0.0)};
 }
+/// Derivative of leaning_direction() by its vertical angle.
 template <ModelScalar T>
 Vector3<T> leaning_vertical_rate(const T& horizontal, const T& vertical) {
   const auto [sin_h, cos_h] = sin_cos(horizontal);
@@ -57,6 +59,7 @@ template <ModelScalar T>
 struct TurningVector {
   Vector3<T> along, cosine, sine;
 
+  /// The normal at an angle, given by its sine and cosine.
   Vector3<T> at(const T& sin_angle, const T& cos_angle) const {
     return along + cos_angle * cosine + sin_angle * sine;
   }
@@ -69,6 +72,7 @@ struct TurningVector {
 /// A train with everything computed that does not depend on the rotation angles.
 template <ModelScalar T, int N>
 struct PreparedTrain {
+  /// One face of a prism.
   struct Face {
     TurningVector<T> normal;
     T index_ratio;  ///< index before the face over index behind it

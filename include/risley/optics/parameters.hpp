@@ -29,13 +29,14 @@ void check_shape(TrainShape shape);
 /// with one emitter has, with its own emitter's beam. The last prism's axis is the X axis of the
 /// sensor, so its two bearing-tilt places exist only to keep the stride and always hold zero.
 namespace place {
-constexpr int refractive_index_air() { return 0; }
-constexpr int incident_beam_horizontal() { return 1; }
-constexpr int incident_beam_vertical() { return 2; }
+constexpr int refractive_index_air() { return 0; }      ///< of the medium around the prisms
+constexpr int incident_beam_horizontal() { return 1; }  ///< of the first emitter
+constexpr int incident_beam_vertical() { return 2; }    ///< of the first emitter
 /// Of an emitter, counted from 0.
 constexpr int incident_beam_horizontal(int emitter, int prisms) {
   return emitter == 0 ? 1 : 1 + 6 * prisms + 2 * emitter;
 }
+/// Of an emitter, counted from 0.
 constexpr int incident_beam_vertical(int emitter, int prisms) {
   return incident_beam_horizontal(emitter, prisms) + 1;
 }
@@ -44,15 +45,19 @@ constexpr int emitter(int at, int prisms) {
   if (at == incident_beam_horizontal() || at == incident_beam_vertical()) return 0;
   return at < 3 + 6 * prisms ? -1 : (at - 1 - 6 * prisms) / 2;
 }
+/// Of a prism's glass; prisms count from 0.
 constexpr int refractive_index(int prism) { return 3 + 6 * prism; }
-constexpr int wedge_angle(int prism) { return 4 + 6 * prism; }
-constexpr int prism_tilt_horizontal(int prism) { return 5 + 6 * prism; }
-constexpr int prism_tilt_vertical(int prism) { return 6 + 6 * prism; }
+constexpr int wedge_angle(int prism) { return 4 + 6 * prism; }            ///< between the two faces
+constexpr int prism_tilt_horizontal(int prism) { return 5 + 6 * prism; }  ///< against its bearing
+constexpr int prism_tilt_vertical(int prism) { return 6 + 6 * prism; }    ///< against its bearing
+/// Of the axis about which a prism turns, against X; always zero for the last prism.
 constexpr int bearing_tilt_horizontal(int prism) { return 7 + 6 * prism; }
+/// Of the axis about which a prism turns, against X; always zero for the last prism.
 constexpr int bearing_tilt_vertical(int prism) { return 8 + 6 * prism; }
 /// Derivatives keep in the last prism's two bearing places, which are no parameters, what a small
 /// turn of the whole emergent beam about Z (yaw) and about Y (pitch) does: turn_derivatives().
 constexpr int frame_yaw(int prisms) { return bearing_tilt_horizontal(prisms - 1); }
+/// As frame_yaw(), of the pitch.
 constexpr int frame_pitch(int prisms) { return bearing_tilt_vertical(prisms - 1); }
 }  // namespace place
 

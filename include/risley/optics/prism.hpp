@@ -15,8 +15,9 @@ inline constexpr int kMaxPrisms = 4;
 /// @throws InvalidArgument naming the number and what is allowed
 [[noreturn]] void refuse_prism_count(int prisms);
 
-/// Calls function.template operator()<N>() for the run-time number of prisms: the one place where
-/// run-time and compile-time sizes meet. @throws InvalidArgument unless 1 <= prisms <= kMaxPrisms
+/// Calls `function.template operator()<N>()` for the run-time number of prisms: the one place
+/// where run-time and compile-time sizes meet.
+/// @throws InvalidArgument unless 1 <= prisms <= kMaxPrisms
 template <class Function>
 decltype(auto) with_prism_count(int prisms, Function&& function) {
   switch (prisms) {

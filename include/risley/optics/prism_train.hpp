@@ -24,9 +24,10 @@ class PrismTrain {
   /// @throws InvalidArgument as check_shape()
   explicit PrismTrain(std::vector<FaceOrder> face_order, int emitters = 1);
 
-  int prisms() const { return static_cast<int>(face_order_.size()); }
-  int emitters() const { return emitters_; }
-  TrainShape shape() const { return {prisms(), emitters_}; }
+  int prisms() const { return static_cast<int>(face_order_.size()); }  ///< how many
+  int emitters() const { return emitters_; }                           ///< how many
+  TrainShape shape() const { return {prisms(), emitters_}; }  ///< numbers of prisms and emitters
+  /// Which face of every prism the beam meets first [prisms], beam order.
   const std::vector<FaceOrder>& face_order() const { return face_order_; }
 
   /// The flat vector, SI units, length parameter_count(shape()); see namespace place.
@@ -79,6 +80,7 @@ std::array<double, parameter_count(N)> parameter_array(const PrismTrain& train, 
   return values;
 }
 
+/// The order of the faces of a train, which must have N prisms.
 template <int N>
 std::array<FaceOrder, N> face_order_array(const PrismTrain& train) {
   std::array<FaceOrder, N> values{};

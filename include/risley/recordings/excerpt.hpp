@@ -44,6 +44,7 @@ struct ExcerptContents {
   std::vector<std::string> holds, lacks;
 };
 
+/// What an excerpt holds and lacks, item by item.
 ExcerptContents contents_of(const Excerpt& excerpt);
 
 /// Writes a small and anonymous part of a recording in the lossless NetCDF form: the stretch of one

@@ -32,18 +32,22 @@ constexpr std::optional<std::size_t> gps_time_at(int point_format) {
   return is_modern(point_format) ? 22 : 20;
 }
 
-/// Byte of the public header that holds the point format, and the bit by which LASzip marks it.
+/// Byte of the public header that holds the point format.
 inline constexpr std::size_t kPointFormatAt = 104;
+/// Bit of the point format by which LASzip marks a compressed file.
 inline constexpr std::uint8_t kCompressionMark = 0x80;
 
 inline constexpr std::size_t kRecordHeaderBytes = 54;  ///< of a variable length record
+/// Bytes of the header of an extended variable length record.
 inline constexpr std::size_t kExtendedRecordHeaderBytes = 60;
-/// User and number of the record that describes extra bytes, and the length of one description.
+/// User of the record that describes extra bytes.
 inline constexpr const char* kSpecificationUser = "LASF_Spec";
+/// Number of the record that describes extra bytes.
 inline constexpr std::uint16_t kExtraBytesNumber = 4;
-inline constexpr std::size_t kDescriptorBytes = 192;
+inline constexpr std::size_t kDescriptorBytes = 192;  ///< of one description in it
 /// Extra bytes by which clouds keep what LAS has no field for, each a uint8.
 inline constexpr const char* kTagField = "Tag";
+/// As kTagField, for the emitter that fired.
 inline constexpr const char* kBeamField = "Beam";
 
 /// Bit of the global encoding: GPS times are adjusted standard GPS time.

@@ -34,8 +34,8 @@ struct Observations {
   std::vector<std::uint8_t> valid;          ///< 1 where the direction can be trusted
 
   std::size_t size() const { return time_ns.size(); }
-  void clear();
-  void resize(std::size_t rows);
+  void clear();                   ///< leaves no row
+  void resize(std::size_t rows);  ///< gives every column so many rows
   /// @throws InvalidArgument as require_columns()
   void append(const Observations& other);
   /// Removes rows from the beginning.
@@ -80,11 +80,16 @@ struct Chunk {
   /// RecordingHeader::packet_shots.
   std::vector<std::size_t> packet_begins;
 
+  /// Leaves no row, packet or inertial sample.
   void clear();
 };
 
 /// Device::type of Livox's sensors.
-inline constexpr std::uint8_t kMid40 = 1, kTele15 = 2, kHorizon = 3, kMid70 = 6, kAvia = 7;
+inline constexpr std::uint8_t kMid40 = 1,  ///< Mid-40
+    kTele15 = 2,                           ///< Tele-15
+    kHorizon = 3,                          ///< Horizon
+    kMid70 = 6,                            ///< Mid-70
+    kAvia = 7;                             ///< Avia
 /// Device::type of a sensor about which a format tells nothing, or only that it is no Mid-40.
 inline constexpr std::uint8_t kUnknownDeviceType = 255;
 
@@ -107,6 +112,7 @@ std::string device_type_name(std::uint8_t type);
 /// What the origin of the times is.
 enum class TimeReference : std::uint8_t { relative, power_on, ptp, utc, pps };
 
+/// "relative", "power-on", "PTP", "UTC" or "PPS".
 std::string to_string(TimeReference reference);
 
 /// A place where the count of a recording's shots is wrong.
@@ -144,6 +150,7 @@ struct RecordingHeader {
 
   /// Value of a detail, or the fallback.
   std::string detail(const std::string& name, const std::string& fallback = {}) const;
+  /// Replaces the value of a detail, or appends it to the others.
   void set_detail(const std::string& name, const std::string& value);
 };
 

@@ -31,7 +31,9 @@ inline constexpr std::size_t kDefaultChunkRows = 65536;
 class Reader {
  public:
   virtual ~Reader() = default;
+  /// What is known of the whole recording.
   const RecordingHeader& header() const { return header_; }
+  /// What is wrong with the rows so far and did not end the reading.
   const std::vector<ReadWarning>& warnings() const { return warnings_; }
   /// How often a PPS clock began a new second so far, over all devices; 0 for other clocks.
   std::uint64_t clock_wraps() const { return clock_wraps_; }

@@ -21,6 +21,7 @@ struct TruthColumns {
   std::vector<double> range;                          ///< m, NaN where the beam hits nothing
 
   std::size_t size() const { return time_ns.size(); }
+  /// Number of columns of rotation angles.
   int prisms() const { return static_cast<int>(rotation_angle.size()); }
   /// @throws InvalidArgument for a negative number of prisms or more than 26
   void resize(int prisms, std::size_t rows);

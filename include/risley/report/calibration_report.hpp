@@ -61,6 +61,7 @@ struct CalibrationReport {
   std::vector<Chart> truth_charts, thickness_charts, wall_charts, view_charts;
   Provenance provenance;
 
+  /// Numbers of prisms and emitters; one emitter in files that do not name a number.
   TrainShape shape() const { return {prisms, emitters.value_or(1)}; }
 };
 

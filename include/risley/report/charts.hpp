@@ -14,9 +14,9 @@
 
 namespace risley::report {
 
-/// A diagram as a figure element, and its data as a JSON object that page.js draws and
-/// that may stand inside a script element.
+/// A diagram as a figure element, which page.js fills.
 std::string figure_html(const Chart& chart, std::size_t number);
+/// The data of figure_html()'s diagram for page.js: JSON that may stand inside a script element.
 std::string chart_json(const Chart& chart, std::size_t number);
 
 /// Value of a row.
@@ -31,6 +31,7 @@ std::string every_nth_note(std::size_t rows, std::size_t most, std::string_view 
 /// they stand; short columns stay as they are.
 Series peak_line(std::string label, std::string colour, std::size_t rows, const Column& x,
                  const Column& y);
+/// Which rows peak_line() draws of so many shots, as a sentence.
 std::string peak_line_note(std::size_t rows);
 
 /// Counts per bin within 4.5 standard deviations of the mean (9 to 61 bins, by the cube root of the

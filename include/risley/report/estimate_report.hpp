@@ -85,6 +85,7 @@ struct EstimateReport {
   std::vector<Chart> parameter_charts, rotor_charts, residual_charts, pattern_charts;
   Provenance provenance;
 
+  /// Numbers of prisms and emitters; one emitter in files that do not name a number.
   TrainShape shape() const { return {prisms, emitters.value_or(1)}; }
 };
 

@@ -76,6 +76,7 @@ struct FlightReport {
       correction_charts;
   Provenance provenance;
 
+  /// Numbers of prisms and emitters; one emitter in files that do not name a number.
   TrainShape shape() const { return {prisms, emitters.value_or(1)}; }
 };
 

@@ -18,7 +18,8 @@ std::string count_text(std::uint64_t count);
 /// @param format  of fmt, such as "{:.3g}"
 std::string finite_text(std::string_view format, double value);
 
-inline constexpr double kMillimetres = 1000.0;  // of a metre
+/// Millimetres in a metre.
+inline constexpr double kMillimetres = 1000.0;
 /// A length in metres as millimetres with one decimal, and a dash where there is none.
 std::string millimetres(double metres);
 

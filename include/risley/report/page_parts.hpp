@@ -25,6 +25,7 @@ std::string symbol_html(const std::string& symbol);
 /// Head of a parameter's row: its name in words, its symbol and its name in files.
 std::string parameter_head(const std::string& long_name, const std::string& symbol,
                            const std::string& name);
+/// As above, of one parameter of a train.
 std::string parameter_head(const ParameterInfo& parameter);
 
 /// Whether held parameters make the sigma of some parameter larger.
@@ -33,6 +34,7 @@ bool any_held_parameter(std::span<const ReportedParameter> parameters);
 /// "0.4034° ± 0.0007°"; without a sigma, three digits. @param value, sigma  rad
 std::string angle_with_sigma(double value, double sigma);
 
+/// Texts as the items of a bulleted list.
 std::string list_html(const std::vector<std::string>& items);
 
 /// What a page says first.
@@ -46,6 +48,7 @@ struct Verdict {
   /// A reason for care that needs more than a line: paragraphs, or nothing.
   std::string care_html;
 };
+/// The box at the top of a page that says whether the result can be used, and why not.
 std::string verdict_html(const Verdict& verdict);
 
 /// What stands before a row and above a column of correlations.
@@ -55,7 +58,9 @@ struct CorrelationHead {
 
 /// Headings of sections that several pages have.
 inline constexpr const char* kCorrelations = "Correlations of the parameters";
+/// Where a page says how regular the times of its recordings are.
 inline constexpr const char* kTimes = "Times of the recording";
+/// Where a page gives the command that made it, and its inputs.
 inline constexpr const char* kHowToRepeat = "How to make it again";
 
 /// Correlations as a table in colours; nothing when there are none.
@@ -108,6 +113,7 @@ std::string overview_html(const std::vector<KeyNumber>& numbers, const std::vect
 /// The sections of a page under their headings. Each unfolds, and a table of contents leads to it.
 class Sections {
  public:
+  /// Whether a section is open when a page is.
   enum class Shown { folded, unfolded };
   /// @param html  empty: there is no such section
   void add(const std::string& title, const std::string& html, Shown shown = Shown::folded);

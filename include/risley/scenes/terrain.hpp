@@ -13,8 +13,9 @@
 
 namespace risley::scenes {
 
-/// Rays are followed so far to planes and faces, and so far to ground with relief, m.
-inline constexpr double kFarthestHit = 1e6, kFarthestGround = 1e5;
+/// How far rays are followed, m.
+inline constexpr double kFarthestHit = 1e6,  ///< to planes and faces
+    kFarthestGround = 1e5;                   ///< to ground with relief
 
 /// Where a ray ends.
 struct Hit {
@@ -121,9 +122,11 @@ class Terrain {
   /// @throws InvalidArgument for parts that make no sense or terrain without anything
   explicit Terrain(TerrainParts parts);
 
+  /// The parts that it was made of.
   const TerrainParts& parts() const { return parts_; }
   /// All roofs, tops and walls: surfaces 0, 1, ... The bushes follow them, then the ground.
   const std::vector<Face>& faces() const { return faces_; }
+  /// Number of surfaces: those of faces(), the bushes and, where there is one, the ground.
   std::size_t surfaces() const;
   /// "barn, right face", "ground". @throws InvalidArgument for a surface that there is not
   std::string surface_name(std::size_t surface) const;

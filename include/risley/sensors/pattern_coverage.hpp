@@ -57,7 +57,7 @@ struct PatternCoverage {
   /// [cells], when the first shot came, s; infinite where none did within the last of `after`
   std::vector<double> first_shot;
 
-  std::size_t cells() const { return left.size(); }
+  std::size_t cells() const { return left.size(); }  ///< cells of the map
   /// After which time that share of the field of view holds a shot, s; infinite where the last of
   /// `after` is too short. @throws InvalidArgument for a share outside of 0 to 1
   double time_to_cover(double share) const;

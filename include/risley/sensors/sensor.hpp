@@ -37,6 +37,7 @@ enum class Firing {
   together,  ///< all at once, as in the scan sequences of the maker
 };
 
+/// "in_turn" or "together".
 std::string to_string(Firing firing);
 
 /// The scan that a sensor of this type makes from its start. Shot i, counted from 0, is of emitter
@@ -55,6 +56,7 @@ enum class CalibrationReference {
   planes,      ///< plane walls: where the beam truly goes
 };
 
+/// "none", "directions" or "planes".
 std::string to_string(CalibrationReference reference);
 
 /// A named instrument: its optics, its rotors, its noise and its limits. SI units.
@@ -101,8 +103,8 @@ struct Sensor {
   /// version, seed, input_sha256.
   std::vector<std::pair<std::string, std::string>> provenance;
 
-  int prisms() const { return train.prisms(); }
-  TrainShape shape() const { return train.shape(); }
+  int prisms() const { return train.prisms(); }       ///< how many
+  TrainShape shape() const { return train.shape(); }  ///< numbers of prisms and emitters
   /// Variance of one range by its parts, which are independent of each other; rounding not
   /// included.
   /// @param range          m

@@ -33,7 +33,7 @@ class ObservationNoise {
   /// not fall below 0.
   void apply_to_ranges(std::uint64_t first_shot, std::span<double> range) const;
 
-  const NoiseSettings& settings() const { return settings_; }
+  const NoiseSettings& settings() const { return settings_; }  ///< as they were given
 
  private:
   NoiseSettings settings_;

@@ -20,6 +20,7 @@ enum class RotorKind {
   random_walk,  ///< white acceleration alone: the motion model of the estimators, exactly
 };
 
+/// As rotor_kind_names() lists it.
 std::string to_string(RotorKind kind);
 /// @throws InvalidArgument that lists the known names
 RotorKind rotor_kind_from(std::string_view name);

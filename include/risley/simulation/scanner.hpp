@@ -65,12 +65,15 @@ class Scanner {
   explicit Scanner(SimulationSettings settings);
   ~Scanner();
 
+  /// The settings, as they were given.
   const SimulationSettings& settings() const;
+  /// What readers of the recording will find in its header.
   const recordings::RecordingHeader& header() const;
   /// Number of shots of the whole recording.
   std::uint64_t shots() const;
-  /// Number of shots given so far, and of those among them without a return.
+  /// Number of shots given so far.
   std::uint64_t shots_done() const;
+  /// Number of shots given so far without a return.
   std::uint64_t no_return() const;
   /// Rotation angles at time zero, rad.
   const std::vector<double>& start_angles() const;

@@ -18,9 +18,12 @@ namespace risley::trajectories {
 /// Errors of a pose, in this order: of the position along north, east and up, m; rotations of the
 /// body about north, about east and about down, rad. In a local frame north is y and east is x.
 enum class PoseError : std::uint8_t { north, east, up, tilt_north, tilt_east, heading };
+/// Number of errors of a pose.
 inline constexpr std::size_t kPoseErrors = 6;
 
+/// One value per error of a pose, in the order of PoseError.
 using PoseErrorVector = Eigen::Matrix<double, 6, 1>;
+/// A covariance of the errors of a pose, rows and columns in the order of PoseError.
 using PoseErrorMatrix = Eigen::Matrix<double, 6, 6>;
 
 /// What is stated of one error: a Gauss-Markov process, whose correlation falls by e within the

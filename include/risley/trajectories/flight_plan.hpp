@@ -87,6 +87,7 @@ Flight fly(const FlightPlan& plan);
 ///         and more than kMostFlightRecords records
 void require_flight_plan(const FlightPlan& plan);
 
+/// Most records that a planned flight may have.
 inline constexpr std::size_t kMostFlightRecords = 10'000'000;
 
 /// Reads
@@ -105,9 +106,10 @@ inline constexpr std::size_t kMostFlightRecords = 10'000'000;
 ///       - {heading_deg: 0, count: 3, spacing_m: 28, length_m: 160, height_m: 50}
 ///     motion:                                # optional, and so is each of the two
 ///       seed: 1
-///       attitude: {roll_deg: 2, pitch_deg: 2, heading_deg: 2, lowest_hz: 0.15, highest_hz: 1.2,
-///       sinusoids: 6} velocity: {x_m_per_s: 0.15, y_m_per_s: 0.15, z_m_per_s: 0.15, lowest_hz:
-///       0.05, highest_hz: 0.4, sinusoids: 6}
+///       attitude: {roll_deg: 2, pitch_deg: 2, heading_deg: 2, lowest_hz: 0.15,
+///                  highest_hz: 1.2, sinusoids: 6}
+///       velocity: {x_m_per_s: 0.15, y_m_per_s: 0.15, z_m_per_s: 0.15, lowest_hz: 0.05,
+///                  highest_hz: 0.4, sinusoids: 6}
 ///
 /// A group of strips may have its own name, center_m, height_m and speed_m_per_s. Parallel strips
 /// lie from left to right of the heading and are flown to and fro.

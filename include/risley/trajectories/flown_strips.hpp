@@ -16,6 +16,7 @@ struct FlownStrip {
   double length = 0;                      ///< m
 };
 
+/// What counts as a strip.
 struct FlownStripOptions {
   /// Courses of a strip differ by no more, and headings, rad: 20 degrees.
   double widest_course = 0.349065850398866;

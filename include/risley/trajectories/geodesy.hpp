@@ -4,6 +4,7 @@
 
 #include <Eigen/Core>
 
+/// @file
 /// Places on the WGS84 ellipsoid. GRS80, the ellipsoid of ITRF and ETRS89, differs from it by 0.1
 /// mm in its polar radius and by nothing at the equator.
 namespace risley::trajectories {
@@ -16,8 +17,9 @@ struct Geodetic {
   double latitude = 0, longitude = 0, height = 0;
 };
 
-/// Lowest and highest place that is understood, m above the ellipsoid.
-inline constexpr double kLowestHeight = -1e5, kHighestHeight = 1e8;
+/// The places that are understood, m above the ellipsoid.
+inline constexpr double kLowestHeight = -1e5,  ///< the lowest
+    kHighestHeight = 1e8;                      ///< the highest
 
 /// Earth-centred, Earth-fixed coordinates [3], m: Z along the axis of rotation, X towards latitude
 /// and longitude 0.

@@ -30,6 +30,7 @@ struct TrajectoryGap {
   std::int64_t begin_ns = 0, end_ns = 0;  ///< times of the records around it
 };
 
+/// Where a trajectory is not interpolated.
 struct InterpolationOptions {
   /// A step longer than so many median steps is a gap, over which there are no poses, > 1. The
   /// default lets two records in a row be missing.
@@ -75,11 +76,14 @@ class Interpolation {
     std::array<Eigen::Matrix<double, 6, 1>, kPoints> coefficients_;
   };
 
+  /// A cursor of its own for every thread that asks for poses. @note This must outlive it.
   Cursor cursor() const { return Cursor(*this); }
   /// As Cursor::at, for single times.
   std::optional<Pose> at(std::int64_t time_ns) const { return cursor().at(time_ns); }
 
+  /// The records between which it interpolates.
   const Trajectory& trajectory() const { return *trajectory_; }
+  /// The gaps between records, over which there are no poses.
   const std::vector<TrajectoryGap>& gaps() const { return gaps_; }
   std::int64_t median_step_ns() const { return median_step_ns_; }  ///< 0 for a single record
 

@@ -46,6 +46,7 @@ struct Mount {
 /// What a mount states beside its nominal rotation, in this order: boresight x, y, z, lever arm
 /// x, y, z, clock offset. Names end in the unit that files have.
 inline constexpr std::size_t kMountQuantities = 7;
+/// The names of these quantities, in that order: "boresight_x_deg" and so on.
 const std::array<std::string, kMountQuantities>& mount_names();
 
 /// Their standard deviations, rad, m and s.

@@ -21,8 +21,10 @@ inline constexpr std::uint8_t kPacketVersion = 5;
 inline constexpr std::uint8_t kImuDataType = 6;
 
 /// Where the fields of the header begin.
-inline constexpr std::size_t kVersionAt = 0, kTimestampTypeAt = 8, kDataTypeAt = 9,
-                             kTimestampAt = 10;
+inline constexpr std::size_t kVersionAt = 0,  ///< kPacketVersion, one byte
+    kTimestampTypeAt = 8,                     ///< which clock, one byte
+    kDataTypeAt = 9,                          ///< see record_layout(), one byte
+    kTimestampAt = 10;                        ///< eight bytes
 
 /// How a data type stores its points.
 struct RecordLayout {
@@ -31,7 +33,9 @@ struct RecordLayout {
   std::uint16_t records;  ///< per packet
   std::uint16_t bytes_per_record;
 
+  /// Bytes of all records of a packet.
   std::size_t bytes() const { return std::size_t{records} * bytes_per_record; }
+  /// Rows of observations that a packet gives.
   std::size_t rows() const { return std::size_t{records} * returns; }
 };
 
@@ -59,7 +63,9 @@ struct ShotGrid {
   }
 };
 
+/// Single-beam sensors: a shot every 10 microseconds.
 inline constexpr ShotGrid kGrid100kHz{10'000, 1, 1, 1};
+/// Sensors with six beams: a shot every 12500/3 ns.
 inline constexpr ShotGrid kGrid240kHz{12'500, 3, 6, 1};
 
 /// Grid of a device type and data type, empty when the two do not tell.

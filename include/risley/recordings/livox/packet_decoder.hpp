@@ -21,7 +21,9 @@ class BadPacket : public Error {
   /// @param problem      what was expected and what was found
   BadPacket(std::size_t byte_offset, std::string problem);
 
+  /// Of what is wrong, from the first byte that was given.
   std::size_t byte_offset() const { return byte_offset_; }
+  /// What was expected and what was found.
   const std::string& problem() const { return problem_; }
 
  private:
