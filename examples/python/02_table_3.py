@@ -55,7 +55,7 @@ for name in names:
     ratios.append(error / bound)
     print(f"{name:31}{truth[name]['true']:9.4f}{error:11.6f}{found[name]['sigma_given_held']:11.6f}{bound:11.6f}"
           f"{ratios[-1]:13.2f}")
-print(f"root mean square of error/bound: {np.sqrt(np.mean(np.square(ratios))):.2f}, 1 on average over many seeds")
+print(f"root mean square of error/bound: {np.sqrt(np.mean(np.square(ratios))):.2f} (about 1 over many seeds)")
 
 # %%
 if pyplot:

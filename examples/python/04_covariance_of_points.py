@@ -70,9 +70,9 @@ for n, axis in enumerate("XYZ"):
 
 # %%
 if pyplot:
-    some = points[::20]
+    some = points[::50]
     figure, axes = pyplot.subplots(figsize=(6, 3), layout="constrained")
-    dots = axes.scatter(some["X"], some["Y"], c=1000 * total[::20], s=1)
+    dots = axes.scatter(some["X"], some["Y"], c=1000 * total[::50], s=2)
     figure.colorbar(dots, label="total sigma, mm")
     axes.set(xlabel="ahead, m", ylabel="left, m", aspect="equal")
-    figure.savefig(folder / "cloud.png", dpi=90)
+    figure.savefig(folder / "cloud.png", dpi=80)
