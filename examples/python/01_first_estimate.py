@@ -31,13 +31,10 @@ options = parser.parse_args([] if "ipykernel" in sys.modules else None)
 folder = Path(options.folder or tempfile.mkdtemp(prefix="risley-"))
 folder.mkdir(parents=True, exist_ok=True)
 
-# %% [markdown]
-# A simulation also writes what is true, so that an estimate can be compared with it.
-
 # %%
-recording, truth = options.recording, ""
+recording = options.recording
 if not recording:
-    recording, truth = folder / "unit.nc", folder / "unit.nc.truth.yaml"
+    recording = folder / "unit.nc"
     made = risley.simulate(recording, sensor="mid-40-table3", duration=1.0, seed=1)
     print(f"{made.observations} shots simulated")
 
@@ -46,7 +43,7 @@ if not recording:
 # parameters that no recording determines, such as the wedge angles, may be off by.
 
 # %%
-result = risley.estimate(recording, truth=truth)
+result = risley.estimate(recording)
 print(f"{'parameter':27}{'value':>15}{'sigma':>11}{'given held':>12}  unit")
 for name, value, sigma, given_held, unit in zip(result.names, result.values, result.sigmas,
                                                 result.sigmas_given_held, result.units):
@@ -71,8 +68,8 @@ print("written:", folder / "calibration.yaml")
 # %%
 if pyplot:
     figure, axes = pyplot.subplots(figsize=(5, 3), layout="constrained")
-    axes.hist(np.degrees(result.azimuth_residual), bins=60, range=(-0.02, 0.02), histtype="step", label="azimuth")
-    axes.hist(np.degrees(result.zenith_residual), bins=60, range=(-0.02, 0.02), histtype="step", label="zenith")
-    axes.set(xlabel="observed less estimated, degree", ylabel="shots")
+    for name, residual in (("azimuth", result.azimuth_residual), ("zenith", result.zenith_residual)):
+        axes.hist(1000 * np.degrees(residual), bins=60, range=(-20, 20), histtype="step", label=name)
+    axes.set(xlabel="observed less estimated, 0.001 degree", ylabel="shots")
     axes.legend()
     figure.savefig(folder / "residuals.png", dpi=90)

@@ -69,7 +69,7 @@ if pyplot:
     degrees = [(one["from_deg"] + one["to_deg"]) / 2 for one in bins]
     figure, axes = pyplot.subplots(figsize=(5, 3), layout="constrained")
     for when in ("before", "after"):
-        axes.plot(degrees, [1000 * one[f"{when}_rms_m"] for one in bins], ".-", label=when)
+        axes.plot(degrees, [1000 * one[f"{when}_rms_m"] for one in bins], "o", fillstyle="none", label=when)
     axes.set(xlabel="angle of incidence, degree", ylabel="distance from the wall, rms, mm", ylim=(0, None))
     axes.legend()
     figure.savefig(folder / "walls.png", dpi=90)
