@@ -1,0 +1,59 @@
+# SPDX-FileCopyrightText: 2026 The risley authors
+# SPDX-License-Identifier: MIT
+# %% [markdown]
+# # A scan pattern for a simulator
+#
+# Where an Avia sends its shots, as pairs of azimuth and elevation for a simulator that has walls of its own, and how
+# much of the field of view they have met after a tenth of a second, half a second and a second.
+#
+#     python3 05_pattern_for_a_simulator.py [SENSOR] [--folder FOLDER]
+
+# %%
+import argparse
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+import risley
+
+try:
+    from matplotlib import pyplot
+except ImportError:  # there are no pictures then
+    pyplot = None
+
+parser = argparse.ArgumentParser(description="Writes where a sensor sends its shots.")
+parser.add_argument("sensor", nargs="?", default="avia", help="preset, or a preset or calibration file (avia)")
+parser.add_argument("--folder", help="for the results; otherwise a temporary one")
+options = parser.parse_args([] if "ipykernel" in sys.modules else None)
+folder = Path(options.folder or tempfile.mkdtemp(prefix="risley-"))
+folder.mkdir(parents=True, exist_ok=True)
+
+# %% [markdown]
+# `livox-csv`, `helios-xml`, `json` and `usda` are further formats.
+
+# %%
+made = risley.pattern(options.sensor, "npy", folder / "pattern.npy", duration=1.0)
+azimuth, elevation = np.degrees(np.load(folder / "pattern.npy")).T
+print(f"{made.rows} shots, azimuth {azimuth.min():.2f} to {azimuth.max():.2f} degree, "
+      f"elevation {elevation.min():.2f} to {elevation.max():.2f} degree")
+
+# %% [markdown]
+# Covered are cells of half a degree with a shot in them; a gap is the largest circle without one.
+
+# %%
+for one in risley.coverage(options.sensor, after=[0.1, 0.5, 1.0])["after"]:
+    print(f"after {one['time_s']:.1f} s: {one['shots']} shots, {100 * one['covered']:.1f} % covered, "
+          f"largest gap {one['gap_deg']:.2f} degree")
+
+# %%
+if pyplot:
+    figure, axes = pyplot.subplots(1, 2, figsize=(7, 3.6), sharey=True, layout="constrained")
+    for one, seconds in zip(axes, (0.02, 0.1)):
+        shots = int(seconds * len(azimuth))
+        one.plot(azimuth[:shots], elevation[:shots], ",")
+        one.set(title=f"{seconds:g} s", xlabel="azimuth, degree", aspect="equal")
+        one.invert_xaxis()  # left is left
+    axes[0].set_ylabel("elevation, degree")
+    figure.savefig(folder / "pattern.png", dpi=90)
