@@ -6,6 +6,7 @@ if(NOT BUILD_SHARED_LIBS OR NOT RISLEY_BUILD_APPS OR NOT RISLEY_BUILD_PYTHON)
   message(FATAL_ERROR "Debian packages hold shared libraries, the command and the Python package: use the preset "
                       "package, or scripts/package")
 endif()
+find_package(Python 3.9 REQUIRED COMPONENTS Interpreter) # its version
 set(debian_library librisley${PROJECT_VERSION_MAJOR}.${PROJECT_VERSION_MINOR})
 find_program(RISLEY_GZIP gzip REQUIRED)
 mark_as_advanced(RISLEY_GZIP)
@@ -47,27 +48,38 @@ foreach(layer IN LISTS RISLEY_LAYERS)
 endforeach()
 list(REMOVE_DUPLICATES header_packages)
 
-set(about "The open model of lidars that steer their beam with spinning wedge prisms, as Livox's \
-Mid-40, Mid-70, Avia, Horizon and Tele-15: simulation, estimation and calibration with honest sigmas.")
+set(about "The open model of lidars that steer their beam with spinning wedge
+prisms, as Livox's Mid-40, Mid-70, Avia, Horizon and Tele-15: simulation,
+estimation and calibration with honest sigmas.")
 risley_debian_package(library ${debian_library} SECTION libs
   SYNOPSIS "model of Risley-prism lidars, shared libraries"
   DESCRIPTION "${about}")
 risley_debian_package(development librisley-dev SECTION libdevel DEPENDS ${header_packages}
   SYNOPSIS "model of Risley-prism lidars, files for development"
-  DESCRIPTION "${about}\n.\nThis package has the headers, and the files by which CMake and pkg-config find the libraries.")
+  DESCRIPTION "${about}
+.
+This package has the headers, and the files by which CMake and pkg-config
+find the libraries.")
 risley_debian_package(command risley SECTION science RECOMMENDS risley-data
   SYNOPSIS "simulate, estimate and calibrate Risley-prism lidars"
-  DESCRIPTION "${about}\n.\nThis package has the command risley.")
+  DESCRIPTION "${about}
+.
+This package has the command risley.")
 math(EXPR next_minor "${Python_VERSION_MINOR} + 1")
 risley_debian_package(python python3-risley SECTION python
   DEPENDS "python3 (>= ${Python_VERSION_MAJOR}.${Python_VERSION_MINOR}~)"
           "python3 (<< ${Python_VERSION_MAJOR}.${next_minor})" python3-numpy
   SYNOPSIS "model of Risley-prism lidars, Python package"
-  DESCRIPTION "${about}\n.\nThis package has the module risley: the observation model, recordings and estimates as numpy arrays.")
+  DESCRIPTION "${about}
+.
+This package has the module risley: the observation model, recordings and
+estimates as numpy arrays.")
 risley_debian_package(data risley-data SECTION science
   SYNOPSIS "presets and scenes of Risley-prism lidars"
-  DESCRIPTION "${about}\n.\nThis package has the presets of sensors, the scenes, mounts and flights of the tutorials, and the \
-notices of the works that risley includes.")
+  DESCRIPTION "${about}
+.
+This package has the presets of sensors, the scenes, mounts and flights of
+the tutorials, and the notices of the works that risley includes.")
 
 set(CPACK_GENERATOR DEB)
 set(CPACK_COMPONENTS_ALL library development command python data)
