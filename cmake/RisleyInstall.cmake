@@ -2,21 +2,21 @@
 # SPDX-License-Identifier: MIT
 # What `cmake --install` gives: headers, libraries, a package for find_package(risley) whose components
 # are the layers, with the same target names as in the tree (risley::risley is all of them), pkg-config
-# files (risley, risley-<layer>), the command and the completion of its verbs, presets and the scenes,
+# files (risley, risley-<layer>), the command, its manual pages and completions, presets and the scenes,
 # mounts and flights of the tutorials to look at, and the licences of risley and of what its pages hold.
+# The components are the packages of RisleyDebian: library, development, command, python, data.
 include(CMakePackageConfigHelpers)
 set(package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/risley)
 set(pkg_config_dir ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
 
-# risley<suffix>.pc; a static library hands on all that it is linked with.
+# risley<suffix>.pc; a static library hands on all that it is linked with, a shared one nothing: pkg-config
+# would ask for the packages of Requires.private, which no user of it needs.
 function(risley_install_pkg_config suffix description requires requires_private libs libs_private)
   if(NOT BUILD_SHARED_LIBS)
     list(APPEND requires ${requires_private})
     list(APPEND libs ${libs_private})
-    set(requires_private "")
-    set(libs_private "")
   endif()
-  foreach(field requires requires_private libs libs_private)
+  foreach(field requires libs)
     list(REMOVE_ITEM ${field} "")
     list(JOIN ${field} " " ${field})
   endforeach()
@@ -30,12 +30,10 @@ Name: risley@suffix@
 Description: @description@
 Version: @PROJECT_VERSION@
 Requires: @requires@
-Requires.private: @requires_private@
 Libs: @libs@
-Libs.private: @libs_private@
 Cflags: -I${includedir}
 ]])
-  install(FILES ${PROJECT_BINARY_DIR}/risley${suffix}.pc DESTINATION ${pkg_config_dir})
+  install(FILES ${PROJECT_BINARY_DIR}/risley${suffix}.pc DESTINATION ${pkg_config_dir} COMPONENT development)
 endfunction()
 
 # Splits package keys into modules of pkg-config and flags of the linker.
@@ -55,10 +53,10 @@ endfunction()
 set(layer_facts "")
 foreach(layer IN LISTS RISLEY_LAYERS)
   install(TARGETS risley_${layer} EXPORT risley-${layer}
-          ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR}
-          LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}
-          FILE_SET HEADERS DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})
-  install(EXPORT risley-${layer} NAMESPACE risley:: DESTINATION ${package_dir})
+          ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT development
+          LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT library NAMELINK_COMPONENT development
+          FILE_SET HEADERS DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT development)
+  install(EXPORT risley-${layer} NAMESPACE risley:: DESTINATION ${package_dir} COMPONENT development)
 
   set(packages ${RISLEY_${layer}_PUBLIC})
   if(NOT BUILD_SHARED_LIBS)
@@ -89,19 +87,30 @@ install(FILES ${PROJECT_BINARY_DIR}/risleyConfig.cmake
               ${PROJECT_BINARY_DIR}/risleyConfigVersion.cmake
               ${CMAKE_CURRENT_LIST_DIR}/RisleyPackages.cmake
               ${CMAKE_CURRENT_LIST_DIR}/RisleyRosbag.cmake
-        DESTINATION ${package_dir})
+        DESTINATION ${package_dir} COMPONENT development)
 
-install(FILES ${PROJECT_SOURCE_DIR}/LICENSE ${PROJECT_SOURCE_DIR}/README.md ${PROJECT_SOURCE_DIR}/CHANGELOG.md
-              ${PROJECT_SOURCE_DIR}/CITATION.cff ${PROJECT_SOURCE_DIR}/SECURITY.md
-        DESTINATION ${CMAKE_INSTALL_DOCDIR})
+set(notices_dir ${CMAKE_INSTALL_DOCDIR})
+set(zsh_dir ${CMAKE_INSTALL_DATADIR}/zsh/site-functions)
+if(RISLEY_DEBIAN_PACKAGES)
+  set(notices_dir ${CMAKE_INSTALL_DATADIR}/doc/risley-data)
+  set(zsh_dir ${CMAKE_INSTALL_DATADIR}/zsh/vendor-completions)
+  include(RisleyDebian)
+else() # packages have both under other names
+  install(FILES ${PROJECT_SOURCE_DIR}/LICENSE ${PROJECT_SOURCE_DIR}/CHANGELOG.md DESTINATION ${CMAKE_INSTALL_DOCDIR})
+endif()
+install(FILES ${PROJECT_SOURCE_DIR}/README.md ${PROJECT_SOURCE_DIR}/CITATION.cff ${PROJECT_SOURCE_DIR}/SECURITY.md
+        DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT command)
+install(FILES ${PROJECT_SOURCE_DIR}/THIRD-PARTY.md DESTINATION ${notices_dir} COMPONENT data)
 if(TARGET risley)
   install(DIRECTORY ${PROJECT_SOURCE_DIR}/data ${PROJECT_SOURCE_DIR}/presets
-          DESTINATION ${CMAKE_INSTALL_DATADIR}/risley FILES_MATCHING PATTERN *.yaml)
-  install(FILES ${echarts}/LICENSE ${echarts}/NOTICE DESTINATION ${CMAKE_INSTALL_DOCDIR}/echarts)
-  install(FILES ${echarts_gl}/LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR}/echarts-gl)
-  install(TARGETS risley RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
-  if(EXISTS ${PROJECT_SOURCE_DIR}/completions/risley.bash)
-    install(FILES ${PROJECT_SOURCE_DIR}/completions/risley.bash RENAME risley
-            DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions)
-  endif()
+          DESTINATION ${CMAKE_INSTALL_DATADIR}/risley COMPONENT data FILES_MATCHING PATTERN *.yaml)
+  install(FILES ${echarts}/LICENSE ${echarts}/NOTICE DESTINATION ${notices_dir}/echarts COMPONENT data)
+  install(FILES ${echarts_gl}/LICENSE DESTINATION ${notices_dir}/echarts-gl COMPONENT data)
+  install(TARGETS risley RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT command)
+  install(DIRECTORY ${RISLEY_DOCUMENTS}/man/ DESTINATION ${CMAKE_INSTALL_MANDIR}/man1 COMPONENT command)
+  install(FILES ${RISLEY_DOCUMENTS}/completions/risley.bash RENAME risley
+          DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions COMPONENT command)
+  install(FILES ${RISLEY_DOCUMENTS}/completions/_risley DESTINATION ${zsh_dir} COMPONENT command)
+  install(FILES ${RISLEY_DOCUMENTS}/completions/risley.fish
+          DESTINATION ${CMAKE_INSTALL_DATADIR}/fish/vendor_completions.d COMPONENT command)
 endif()

@@ -4,7 +4,8 @@
 
 set(RISLEY_NPM_FOLDER ${PROJECT_BINARY_DIR}/npm CACHE PATH "Where packages of npm are kept")
 
-# Downloads one package, once, and sets <out> to its folder.
+# Unpacks one package, once, and sets <out> to its folder. Archives of scripts/source-archive have it in
+# third-party/npm; otherwise it is downloaded, and kept in RISLEY_NPM_ARCHIVES if that is set.
 # Both the server's certificate and the hash must be right.
 function(risley_npm_package out name version sha512)
   set(folder ${RISLEY_NPM_FOLDER}/${name}-${version})
@@ -13,26 +14,44 @@ function(risley_npm_package out name version sha512)
     return()
   endif()
   set(url https://registry.npmjs.org/${name}/-/${name}-${version}.tgz)
-  set(archive ${RISLEY_NPM_FOLDER}/${name}-${version}.tgz)
+  set(archive ${PROJECT_SOURCE_DIR}/third-party/npm/${name}-${version}.tgz)
+  if(EXISTS ${archive})
+    risley_check_npm_archive(${archive} ${archive} ${sha512})
+  else()
+    set(archive ${RISLEY_NPM_FOLDER}/${name}-${version}.tgz)
+    risley_download(${url} ${archive} ${folder}/package)
+    risley_check_npm_archive(${archive} ${url} ${sha512})
+    if(RISLEY_NPM_ARCHIVES)
+      file(COPY ${archive} DESTINATION ${RISLEY_NPM_ARCHIVES})
+    endif()
+  endif()
+  file(ARCHIVE_EXTRACT INPUT ${archive} DESTINATION ${folder})
+  file(REMOVE ${RISLEY_NPM_FOLDER}/${name}-${version}.tgz)
+endfunction()
+
+function(risley_download url archive place)
   foreach(attempt RANGE 1 3)
     file(DOWNLOAD ${url} ${archive} TLS_VERIFY ON INACTIVITY_TIMEOUT 30 STATUS status)
     list(GET status 0 code)
     if(code EQUAL 0)
-      break()
+      return()
     endif()
   endforeach()
-  if(NOT code EQUAL 0)
-    list(GET status 1 reason)
-    file(REMOVE ${archive})
-    message(FATAL_ERROR "${url} cannot be downloaded: ${reason}. Certificates of servers are in the "
-                        "Debian package ca-certificates. Without a network, unpack the archive on "
-                        "another machine and copy its folder \"package\" to ${folder}/package.")
-  endif()
+  list(GET status 1 reason)
+  file(REMOVE ${archive})
+  message(FATAL_ERROR "${url} cannot be downloaded: ${reason}. Certificates of servers are in the "
+                      "Debian package ca-certificates. Without a network, unpack the archive on "
+                      "another machine and copy its folder \"package\" to ${place}, or build from an "
+                      "archive that scripts/source-archive made.")
+endfunction()
+
+# An archive with another hash is removed, but for one that came with the sources.
+function(risley_check_npm_archive archive source sha512)
   file(SHA512 ${archive} found)
   if(NOT found STREQUAL sha512)
-    file(REMOVE ${archive})
-    message(FATAL_ERROR "${url} has the SHA-512 ${found}, expected ${sha512}")
+    if(NOT archive STREQUAL source)
+      file(REMOVE ${archive})
+    endif()
+    message(FATAL_ERROR "${source} has the SHA-512 ${found}, expected ${sha512}")
   endif()
-  file(ARCHIVE_EXTRACT INPUT ${archive} DESTINATION ${folder})
-  file(REMOVE ${archive})
 endfunction()

@@ -16,7 +16,8 @@ class PackagesTest(unittest.TestCase):
             named |= set(re.findall(r"^risley_package\([^)]*?DEBIAN ([\w+.-]+)", text, re.MULTILINE))
         self.assertGreater(len(named), 10)
         script = (ROOT / "scripts/install-dependencies").read_text(encoding="utf-8")
-        installed = set(re.findall(r"[\w+.-]+-dev\b", script))
+        installed = set(re.findall(r"^  ([\w+.-]+) +#|\+=\(([\w+.-]+)\)", script, re.MULTILINE))
+        installed = {name for names in installed for name in names}
         self.assertEqual(sorted(named - installed), [])
 
 

@@ -61,7 +61,9 @@ if(WAY STREQUAL "installed")
     run(${WORK}/prefix/bin/risley --version)
     foreach(file share/risley/data/hall.yaml share/risley/presets/mid-40.yaml share/doc/risley/LICENSE
                  share/doc/risley/echarts/LICENSE share/doc/risley/echarts/NOTICE
-                 share/doc/risley/echarts-gl/LICENSE share/bash-completion/completions/risley)
+                 share/doc/risley/echarts-gl/LICENSE share/doc/risley/THIRD-PARTY.md share/man/man1/risley.1
+                 share/man/man1/risley-estimate.1 share/bash-completion/completions/risley
+                 share/zsh/site-functions/_risley share/fish/vendor_completions.d/risley.fish)
       if(NOT EXISTS ${WORK}/prefix/${file})
         message(FATAL_ERROR "${file} is not installed")
       endif()

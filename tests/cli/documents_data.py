@@ -75,6 +75,9 @@ DATA = {
 LEFT_OUT = {
     "scripts/demo": "it installs packages and builds",
     "scripts/test": "it installs packages and builds",
+    "scripts/package": "it installs packages and builds",
+    "apt-get install ./build/packages": "tools/try-packages does it on a bare system",
+    "man risley": "tools/try-packages does it on a bare system; cli.man_test looks at the pages",
     "risley reproduce -o": "a minute of two cores; cli.reproduce_test runs it",
     "risley reproduce --full": "it takes many minutes",
 }
