@@ -17,6 +17,8 @@ function(risley_target_defaults target)
                          $<IF:$<AND:$<CXX_COMPILER_ID:GNU>,$<BOOL:${CMAKE_UNITY_BUILD}>>,-Wshadow=local,-Wshadow>
                          # ccache reads from the preprocessor which parsed headers were used
                          $<$<AND:$<CXX_COMPILER_ID:GNU>,$<BOOL:${CMAKE_CXX_COMPILER_LAUNCHER}>>:-fpch-preprocess>
+                         # and gives back parsed headers that are not as old as what they were parsed from
+                         "$<$<AND:$<CXX_COMPILER_ID:Clang>,$<BOOL:${CMAKE_CXX_COMPILER_LAUNCHER}>>:SHELL:-Xclang -fno-pch-timestamp>"
                          $<$<BOOL:${RISLEY_WARNINGS_AS_ERRORS}>:-Werror>)
 endfunction()
 

@@ -19,12 +19,6 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-#define RISLEY_OWN_MEMORY_MAP 1  // sanitizers reserve terabytes
-#else
-#define RISLEY_OWN_MEMORY_MAP 0
-#endif
-
 namespace risley::io {
 namespace {
 
@@ -102,7 +96,7 @@ void close_all_but(int socket) {
   sigemptyset(&none);
   ::sigprocmask(SIG_SETMASK, &none, nullptr);
   limit(RLIMIT_CORE, 0);
-  if (const std::size_t mapped = mapped_bytes(); mapped > 0 && RISLEY_OWN_MEMORY_MAP == 0) {
+  if (const std::size_t mapped = mapped_bytes(); mapped > 0 && kMemoryIsLimited) {
     limit(RLIMIT_AS, mapped + ConfinedProcess::kMostBytes);
   }
   std::uint64_t size = 0;

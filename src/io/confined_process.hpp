@@ -13,6 +13,21 @@
 
 namespace risley::io {
 
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#define RISLEY_SANITIZED
+#elif defined(__has_feature)  // how clang says it
+#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer)
+#define RISLEY_SANITIZED
+#endif
+#endif
+
+/// Whether a child's memory is limited: not under sanitizers, which reserve terabytes.
+#ifdef RISLEY_SANITIZED
+inline constexpr bool kMemoryIsLimited = false;
+#else
+inline constexpr bool kMemoryIsLimited = true;
+#endif
+
 /// The child process of a ConfinedProcess ended, or did not answer; the message says how.
 class ProcessEnded : public Error {
  public:
