@@ -177,8 +177,6 @@ class Command:
             speeds = name == "--set"
             names = [one for one in self.parameters if speeds or not one.startswith("angular_velocity")]
             return ("names" if name == "--set" else "words"), names + re.findall(r"'(\w+)'", option.text)
-        if name == "--process-noise":
-            return "words", re.findall(r"(\w+) \(", option.text.replace("speed (", ""))
         quoted = re.findall(r"'(\w+)'", option.text)
         if quoted:
             return "words", quoted

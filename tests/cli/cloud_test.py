@@ -232,7 +232,7 @@ class CloudTest(CommandTest):
         for axis in ("y_m", "z_m"):
             self.assertAlmostEqual(found[axis]["max"], 0.0044, 4)
             self.assertAlmostEqual(found[axis]["min"], -0.0044, 4)
-        self.assertIn("Greatest Y", (self.folder / "map.html").read_text(encoding="utf-8"))
+        self.assertIn("Largest Y", (self.folder / "map.html").read_text(encoding="utf-8"))
 
 
 if __name__ == "__main__":
