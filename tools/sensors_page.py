@@ -115,7 +115,7 @@ def table(head, rows):
 
 def short_source(source):
     if "scan sequence" in source:
-        return "maker's scan sequence"
+        return "manufacturer's scan sequence"
     return source.split(";")[0]
 
 

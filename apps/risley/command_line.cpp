@@ -30,7 +30,7 @@ struct Verb {
 };
 
 constexpr Verb kVerbs[] = {
-    {"info", "Show what a recording holds, with an audit of its times",
+    {"info", "Show what a recording holds, and check its times",
      "  risley info recording.lvx\n  risley info recording.lvx --json\n"
      "  risley info recording.lvx --share excerpt.nc",
      declare_info},

@@ -179,7 +179,7 @@ Run declare_pattern(CLI::App& verb) {
   verb.add_option(
           "--firing", o.firing,
           "When the emitters fire, where a sensor has several: 'in-turn', as in real sensors, or "
-          "'together', as in the maker's sequences (default: the preset's)")
+          "'together', as in the manufacturer's sequences (default: the preset's)")
       ->check(CLI::IsMember({"in-turn", "together"}));
   verb.add_option(
           "--start-angles-deg", o.start_angles_deg,

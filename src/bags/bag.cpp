@@ -120,7 +120,7 @@ std::unique_ptr<Bag> open_bag(const std::string& path, BagKind kind, const Progr
 std::unique_ptr<Bag> open_bag(const std::string& path, const Progress& progress) {
   const std::string first = is_folder(path) ? files_of_bag_folder(path).front() : path;
   const std::optional<BagKind> kind = bag_kind_of_file(first);
-  if (!kind) throw FileError(first, {0, {}}, "is no bag of ROS 1 or ROS 2");
+  if (!kind) throw FileError(first, {0, {}}, "is not a ROS 1 or ROS 2 bag");
   return open_bag(path, *kind, progress);
 }
 

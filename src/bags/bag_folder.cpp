@@ -51,12 +51,12 @@ std::string some_names(std::vector<std::string> names) {
   }
   if (bags.empty()) {
     throw FileError(folder, {},
-                    "is a folder; expected a file, or a folder of ROS 2 with its metadata.yaml and "
-                    "the bags that it names");
+                    "is a folder; expected a file, or a ROS 2 bag folder with its metadata.yaml "
+                    "and the files that it names");
   }
   std::sort(bags.begin(), bags.end());
   throw FileError(folder, {},
-                  fmt::format("is a folder of bags ({}) without metadata.yaml, which tells their "
+                  fmt::format("is a folder of bags ({}) without metadata.yaml, which states their "
                               "order: name one of the files, or let `ros2 bag reindex` write it",
                               some_names(std::move(bags))));
 }
@@ -74,7 +74,7 @@ std::vector<std::pair<std::string, std::size_t>> stated_names(const std::string&
     if (!text.empty() && text != "none") {
       io::fail_at(path, mode->line,
                   fmt::format("{} = {}: rosbag2 compressed the files or the messages in them, "
-                              "expected none (`ros2 bag convert` writes such a bag)",
+                              "expected none (`ros2 bag convert` writes an uncompressed bag)",
                               bag.field("compression_mode"), text));
     }
   }
@@ -99,7 +99,7 @@ std::vector<std::pair<std::string, std::size_t>> stated_names(const std::string&
                               stated.string()));
     }
     if (!seen.insert(name).second) {
-      io::fail_at(path, item.line, fmt::format("{}: {} stands twice", field, name));
+      io::fail_at(path, item.line, fmt::format("{}: {} appears twice", field, name));
     }
     names.emplace_back(name, item.line);
   }
@@ -176,7 +176,7 @@ class BagFolder final : public Bag {
     if (bag_kind_of_file(file) != kind()) {
       throw FileError(
           file, {0, {}},
-          fmt::format("expected a bag of the kind {} as the first file of the folder is",
+          fmt::format("expected a bag of the same kind as the first file of the folder, {}",
                       name_of(kind())));
     }
     return open_bag(file, kind(), progress_);
@@ -195,7 +195,8 @@ class BagFolder final : public Bag {
     for (const Topic& topic : part->topics()) {
       topic_of_.push_back(find(topic));
       if (topic_of_.back() == topics_.size()) {
-        part->fail(fmt::format("the topic {} came while the folder was read", topic.name));
+        part->fail(
+            fmt::format("the topic {} appeared while the folder was being read", topic.name));
       }
       wanted.push_back(wanted_[topic_of_.back()]);
     }
@@ -229,8 +230,8 @@ std::vector<std::string> files_of_bag_folder(const std::string& folder) {
   }
   if (!missing.empty()) {
     io::fail_at(metadata, line,
-                fmt::format("names files that are not in the folder: {}; bring them, or take their "
-                            "names out",
+                fmt::format("names files that are not in the folder: {}; copy them into it, or "
+                            "delete their names here",
                             some_names(std::move(missing))));
   }
   return files;

@@ -194,7 +194,7 @@ class McapBag final : public Bag {
     const auto bytes = load<std::uint64_t>(head + 1);
     if (bytes > limit - record.data) return std::nullopt;
     record.end = record.data + bytes;
-    if (record.op == 0) fail_at(offset, "expected a record, found the type 0, which there is not");
+    if (record.op == 0) fail_at(offset, "expected a record, found type 0, which does not exist");
     return record;
   }
 
@@ -204,7 +204,7 @@ class McapBag final : public Bag {
     const std::string_view found(reinterpret_cast<const char*>(file_.at(0, magic)), magic);
     if (found != kMcapMagic) {
       fail_at(kMcapSignature.size(),
-              "expected version 0 of MCAP (89 4D 43 41 50 30 0D 0A), found another");
+              "expected version 0 of MCAP (89 4D 43 41 50 30 0D 0A), found other bytes");
     }
     const auto header = record_at(magic, file_.size());
     if (!header) fail_at(magic, "is cut off within its header");
@@ -236,8 +236,8 @@ class McapBag final : public Bag {
     if (summary_ < first_ || summary_ > footer) {
       summary_problem_.emplace(
           path_, FilePlace{footer, {}},
-          fmt::format("the summary begins at byte {} by the footer, allowed {} to {}", summary_,
-                      first_, footer));
+          fmt::format("the footer states that the summary begins at byte {}, allowed {} to {}",
+                      summary_, first_, footer));
       summary_ = 0;
       return;
     }
@@ -245,10 +245,11 @@ class McapBag final : public Bag {
     if (stated == 0) return;
     const std::uint32_t found = checksum(summary_, footer + kRecordHead + 16);
     if (found == stated) return;
-    summary_problem_.emplace(path_, FilePlace{summary_, {}},
-                             fmt::format("the summary, which begins here, has the checksum {:08X}, "
-                                         "its footer states {:08X}",
-                                         found, stated));
+    summary_problem_.emplace(
+        path_, FilePlace{summary_, {}},
+        fmt::format(
+            "the summary that begins here has the checksum {:08X}, but the footer states {:08X}",
+            found, stated));
   }
 
   /// Takes channels and counts from the summary. @return whether it is sound and has them all
@@ -339,7 +340,7 @@ class McapBag final : public Bag {
     }
     auto [id, channel] = take_channel(bytes);
     if (looking_ && channel.schema != 0 && !schemas_.contains(channel.schema)) {
-      throw BadMessage{fmt::format("channel {} has the schema {}, which no record before it holds",
+      throw BadMessage{fmt::format("channel {} has the schema {}, which no earlier record holds",
                                    id, channel.schema)};
     }
     const auto known = channels_.find(id);
@@ -381,8 +382,8 @@ class McapBag final : public Bag {
     const auto record = record_at(offset_, data_limit_);
     if (!record) {
       if (closed_)
-        fail_at(offset_, fmt::format("a record does not end before byte {}, where the "
-                                     "data of the file does",
+        fail_at(offset_, fmt::format("expected a record that ends by byte {}, where the data of "
+                                     "the file end, found one that ends later",
                                      data_limit_));
       finish();
       return false;
@@ -406,8 +407,8 @@ class McapBag final : public Bag {
       case kFooterOp:  // of a file whose last bytes are not as they should be
         if (file_.size() - record->end >= kMcapMagic.size()) {
           fail_at(record->end,
-                  "expected the file to end with 89 4D 43 41 50 30 0D 0A behind the "
-                  "footer, found others");
+                  "expected the file to end with 89 4D 43 41 50 30 0D 0A after the footer, found "
+                  "other bytes");
         }
         finish();
         break;
@@ -426,9 +427,8 @@ class McapBag final : public Bag {
                            record.op == kDataEndOp || record.op > kLastKnownOp ||
                            (record.op == kFooterOp && !closed_);
     if (is_either || is_data != data_ended_) return;
-    fail_at(record.offset,
-            fmt::format("a record of type {} stands {} the record that ends the data", record.op,
-                        data_ended_ ? "behind" : "before"));
+    fail_at(record.offset, fmt::format("a record of type {} comes {} the record that ends the data",
+                                       record.op, data_ended_ ? "behind" : "before"));
   }
 
   bool take_message(const McapRecord& record, Message& message) {
@@ -470,8 +470,7 @@ class McapBag final : public Bag {
     const std::uint64_t most = Unpacker::most_per_byte(packing);
     if (!packing.empty() && most == 0) {
       fail_at(record.offset,
-              fmt::format("expected a chunk that is packed by lz4, by zstd or not at "
-                          "all, found \"{}\"",
+              fmt::format("expected a chunk compressed by lz4, by zstd or not at all, found \"{}\"",
                           packing.substr(0, kLongestName)));
     }
     if (packed > record.end - begin) {
@@ -504,8 +503,9 @@ class McapBag final : public Bag {
       const auto found = static_cast<std::uint32_t>(
           crc32(crc32(0, nullptr, 0), chunk_.data(), static_cast<uInt>(bytes)));
       if (found != stated) {
-        fail_at(record.offset,
-                fmt::format("the chunk has the checksum {:08X}, it states {:08X}", found, stated));
+        fail_at(
+            record.offset,
+            fmt::format("the chunk has the checksum {:08X}, but it states {:08X}", found, stated));
       }
     }
     chunk_offset_ = record.offset;
@@ -553,9 +553,10 @@ class McapBag final : public Bag {
   void end_data(const McapRecord& record) {
     data_ended_ = true;
     if (closed_ && record.end != data_limit_ && (summary_ != 0 || !summary_problem_)) {
-      fail_at(record.offset, fmt::format("the data end here, but the file's last record before its "
-                                         "summary ends at byte {}",
-                                         data_limit_));
+      fail_at(record.offset,
+              fmt::format(
+                  "the record that ends the data is here, but other records follow up to byte {}",
+                  data_limit_));
     }
     const Bytes bytes = some_bytes(record);
     const auto stated = guarded(record.offset, [&] {
@@ -564,9 +565,10 @@ class McapBag final : public Bag {
     if (stated == 0 || looking_) return;
     const std::uint32_t found = checksum(0, record.offset);
     if (found == stated) return;
-    fail_at(record.offset, fmt::format("the file up to here has the checksum {:08X}, this record "
-                                       "states {:08X}",
-                                       found, stated));
+    fail_at(
+        record.offset,
+        fmt::format("the file up to here has the checksum {:08X}, but this record states {:08X}",
+                    found, stated));
   }
 
   /// All that can be read is read: says what is wrong with the end.
@@ -576,14 +578,14 @@ class McapBag final : public Bag {
     if (closed_) {
       if (summary_problem_) throw FileError(*summary_problem_);
       if (!message_count_ || *message_count_ == messages_) return;
-      fail_at(footer_, fmt::format("the file has {} messages, its summary counts {}", messages_,
+      fail_at(footer_, fmt::format("the file has {} messages, but its summary states {}", messages_,
                                    *message_count_));
     }
     const std::string part =
-        data_ended_ ? "the messages are complete"
+        data_ended_ ? "all messages were read"
         : offset_ < file_.size()
-            ? "a record begins here and is not complete; what was recorded before is there"
-            : "what was recorded is there up to here";
+            ? "the record that begins here is incomplete; everything before it was read"
+            : "everything up to here was read";
     warnings_.push_back(
         {{offset_, {}},
          fmt::format(

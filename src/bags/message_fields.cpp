@@ -44,8 +44,8 @@ struct CdrFields::State {
     try {
       function();
     } catch (const eprosima::fastcdr::exception::Exception& error) {
-      throw BadMessage{
-          fmt::format("expected more than its {} bytes of CDR ({})", bytes.size(), error.what())};
+      throw BadMessage{fmt::format("expected a longer message than its {} bytes of CDR ({})",
+                                   bytes.size(), error.what())};
     }
   }
 
@@ -58,7 +58,7 @@ CdrFields::CdrFields(std::span<const std::uint8_t> bytes) : state_(std::make_uni
   constexpr std::size_t kEncapsulationBytes = 4;
   // Plain CDR, big- or little-endian.
   if (bytes.size() < kEncapsulationBytes || bytes[0] != 0 || bytes[1] > 1) {
-    throw BadMessage{"expected a message that begins with 00 00 or 00 01, the marks of plain CDR"};
+    throw BadMessage{"expected a message that begins with 00 00 or 00 01, as plain CDR does"};
   }
   state_->guarded([&] { state_->cdr.read_encapsulation(); });
 }

@@ -30,7 +30,7 @@ namespace {
 
 using io::load;
 
-constexpr std::string_view kMend = "; the command `rosbag reindex` mends it";
+constexpr std::string_view kMend = "; the command `rosbag reindex` repairs it";
 
 /// Holds rosbag_storage for one thread. While it lives, the library prints nothing: it logs what it
 /// throws.
@@ -120,9 +120,10 @@ class BagStructure {
                     fmt::format("{}, at byte {} of the unpacked chunk", problem, offset));
   }
   [[noreturn]] void fail_cut(std::uint64_t offset) const {
-    fail(offset, fmt::format("the bag is cut off inside a record that begins here, the file ends "
-                             "at byte {}{}",
-                             size_, kMend));
+    fail(offset,
+         fmt::format(
+             "the bag is cut off within the record that begins here, the file ends at byte {}{}",
+             size_, kMend));
   }
 
   /// Reads from the file, or from the chunk that was unpacked.
@@ -178,7 +179,7 @@ class BagStructure {
       const std::string_view text = header.substr(0, length);
       const std::size_t equals = text.find('=');
       if (length == 0 || length > header.size() || equals == text.npos) {
-        fail(offset, "expected fields NAME=VALUE in the header of a record, found others");
+        fail(offset, "expected fields NAME=VALUE in the header of a record, found something else");
       }
       header.remove_prefix(length);
       visit(text.substr(0, equals), text.substr(equals + 1));
@@ -267,7 +268,7 @@ class BagStructure {
     }
     if (!index_found)
       fail(kRos1Signature.size() + 1,
-           fmt::format("no record begins at byte {}, the index's", index));
+           fmt::format("expected the index at byte {}, found no record there", index));
   }
 
   void check_record(const Record& record) {
@@ -283,7 +284,7 @@ class BagStructure {
         const auto position = number<std::uint64_t>(record, "chunk_pos");
         if (!std::binary_search(chunks_.begin(), chunks_.end(), position)) {
           fail(record.offset,
-               fmt::format("no chunk begins at byte {}, where the index has one", position));
+               fmt::format("expected a chunk at byte {}, as the index says, found none", position));
         }
         break;
       }
@@ -324,7 +325,7 @@ class BagStructure {
     constexpr std::uint32_t kLargestChunk = 1U << 30U;
     if (compression != "bz2" && compression != "lz4") {
       fail(record.offset,
-           fmt::format("expected a compression of none, bz2 or lz4, found \"{}\"", compression));
+           fmt::format("expected the compression none, bz2 or lz4, found \"{}\"", compression));
     }
     if (bytes > kLargestChunk) {
       fail(record.offset,
@@ -372,15 +373,16 @@ class BagStructure {
   void check_index(const Record& record) {
     constexpr std::size_t kEntryBytes = 12, kOffsetAt = 8;
     require_entries(record, kEntryBytes);
-    if (chunks_.empty()) fail(record.offset, "an index of messages stands in front of all chunks");
+    if (chunks_.empty()) fail(record.offset, "an index of messages comes before the first chunk");
     std::vector<std::uint8_t> entries(record.data_bytes());
     read(record.data, reinterpret_cast<char*>(entries.data()), entries.size());
     for (std::size_t at = 0; at < entries.size(); at += kEntryBytes) {
       const auto offset = load<std::uint32_t>(entries.data() + at + kOffsetAt);
       if (!std::binary_search(messages_.begin(), messages_.end(), offset)) {
-        fail(record.data + at, fmt::format("no message begins at byte {} of the chunk, where the "
-                                           "index has one",
-                                           offset));
+        fail(
+            record.data + at,
+            fmt::format("expected a message at byte {} of the chunk, as the index says, found none",
+                        offset));
       }
     }
   }
@@ -421,7 +423,7 @@ class Ros1Bag final : public Bag {
     progress_.check();
     if (messages_read_ == message_count_) return false;
     const std::string where =
-        fmt::format("be read behind message {} of {}", messages_read_, message_count_);
+        fmt::format("be read after message {} of {}", messages_read_, message_count_);
     guarded(where.c_str(), [&] {
       if (messages_read_ > 0) ++position_;
       const rosbag::MessageInstance& instance = *position_;

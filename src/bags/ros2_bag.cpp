@@ -111,7 +111,7 @@ class Ros2Bag final : public Bag {
       const auto bytes = static_cast<std::size_t>(sqlite3_column_bytes(messages_.get(), 2));
       blob_bytes_ += bytes;
       if (blob_bytes_ > file_bytes_) {  // pages that stand in several messages
-        fail(fmt::format("the messages up to row {} have {} bytes, the database only {}", id_,
+        fail(fmt::format("the messages up to row {} have {} bytes, but the database only {}", id_,
                          blob_bytes_, file_bytes_));
       }
       message.number = id;
@@ -156,7 +156,7 @@ class Ros2Bag final : public Bag {
     if (found >= expected) return;
     throw FileError(path_, {found, {}},
                     fmt::format("the database is cut off: expected {} bytes, found {}; the command "
-                                "`.recover` of sqlite3 saves what is left",
+                                "`.recover` of sqlite3 rescues what is left",
                                 expected, found));
   }
 
@@ -215,7 +215,7 @@ class Ros2Bag final : public Bag {
     const Statement columns = prepare(fmt::format("PRAGMA table_xinfo({})", name));
     while (step(columns.get(), "give its columns")) {
       if (sqlite3_column_int(columns.get(), kHiddenColumn) == 0) continue;
-      fail(fmt::format("the column {} of the table {} is computed, expected stored ones",
+      fail(fmt::format("the column {} of the table {} is computed, expected a stored one",
                        text_column(columns.get(), kNameColumn), name));
     }
   }
@@ -224,7 +224,7 @@ class Ros2Bag final : public Bag {
     looks_ = 0;
     sqlite3_stmt* statement = nullptr;
     if (sqlite3_prepare_v2(database_.get(), query.c_str(), -1, &statement, nullptr) != SQLITE_OK) {
-      fail_database("be read as a bag of ROS 2");
+      fail_database("be read as a ROS 2 bag");
     }
     return Statement(statement);
   }

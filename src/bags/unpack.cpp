@@ -58,7 +58,8 @@ struct Unpacker::State {
       done += made;
     }
     // A frame that wants more may only have to give what has no room.
-    if (more != 0) fail_length(room.size(), done == room.size() ? "more" : "a frame without end");
+    if (more != 0)
+      fail_length(room.size(), done == room.size() ? "more" : "a frame without an end");
     return done;
   }
 

@@ -123,7 +123,7 @@ ConfinedProcess::ConfinedProcess(const Service& service, const Progress& progres
   int ends[2];
   if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends) != 0) {
     throw ProcessEnded(
-        fmt::format("no connection to a process of its own: {}", std::strerror(errno)));
+        fmt::format("no connection to the process that reads the file: {}", std::strerror(errno)));
   }
   child_ = ::fork();
   if (child_ == 0) {
@@ -134,7 +134,8 @@ ConfinedProcess::ConfinedProcess(const Service& service, const Progress& progres
   socket_ = ends[0];
   if (child_ < 0) {
     ::close(socket_);
-    throw ProcessEnded(fmt::format("no process of its own: {}", std::strerror(problem)));
+    throw ProcessEnded(fmt::format("the process that reads the file could not be started: {}",
+                                   std::strerror(problem)));
   }
   try {
     receive();  // it has let go of our files
@@ -202,7 +203,7 @@ void ConfinedProcess::fail() {
   }
   if (ended > 0 && WIFEXITED(status) && WEXITSTATUS(status) == kOutOfMemory) {
     throw ProcessEnded(
-        fmt::format("the library wanted more than {} MiB of memory", kMostBytes >> 20));
+        fmt::format("the library needed more than {} MiB of memory", kMostBytes >> 20));
   }
   throw ProcessEnded("the library's process ended without an answer");
 }

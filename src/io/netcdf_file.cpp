@@ -58,7 +58,7 @@ bool lies_elsewhere(hid_t group, const char* name) {
 herr_t find_link_outside(hid_t group, const char* name, const H5L_info_t* link, void* found) {
   const bool inside = link->type == H5L_TYPE_HARD || link->type == H5L_TYPE_SOFT;
   if (inside && !(link->type == H5L_TYPE_HARD && lies_elsewhere(group, name))) return 0;
-  *static_cast<std::string*>(found) = fmt::format("{} leads to another file", name);
+  *static_cast<std::string*>(found) = fmt::format("{} refers to another file", name);
   return 1;
 }
 
@@ -82,7 +82,7 @@ void NetcdfFile::refuse_links() const {
   std::string found;
   const herr_t visited = H5Lvisit(file, H5_INDEX_NAME, H5_ITER_NATIVE, find_link_outside, &found);
   H5Fclose(file);
-  if (!found.empty()) fail(found + ", and only a file that holds all that it has is read");
+  if (!found.empty()) fail(found + ", and only files that hold all their data themselves are read");
   if (visited < 0) fail("cannot be opened as NetCDF: its groups cannot be listed");
 }
 

@@ -69,7 +69,8 @@ class Unpacker {
   }
   std::string take_text() { return std::string(take_bytes(take<std::size_t>())); }
   std::string_view take_bytes(std::size_t size) {
-    if (size > left_.size()) throw ProcessEnded("the library's process sent nonsense");
+    if (size > left_.size())
+      throw ProcessEnded("the process that reads the file sent an answer that makes no sense");
     const std::string_view taken = left_.substr(0, size);
     left_.remove_prefix(size);
     return taken;

@@ -28,7 +28,7 @@ std::string npy_head(std::string description) {
   description += '\n';
   if (description.size() > kNpyTextLimit) {
     throw InvalidArgument(
-        fmt::format("npy: a header of {} bytes, allowed up to {}: too many common factors",
+        fmt::format("npy: header of {} bytes, allowed up to {}: there are too many common factors",
                     description.size(), kNpyTextLimit));
   }
   const char length[] = {static_cast<char>(description.size() & 0xFF),

@@ -234,8 +234,9 @@ OutputFile::~OutputFile() {
 
 void OutputFile::sync() const {
   if (!is_named(temporary_, temporary_path_)) {
-    throw FileError(path_, {},
-                    fmt::format("cannot be written: {} was replaced meanwhile", temporary_path_));
+    throw FileError(
+        path_, {},
+        fmt::format("cannot be written: {} was replaced in the meantime", temporary_path_));
   }
   struct stat before {};
   if (!copied_ && ::stat(target_.c_str(), &before) == 0 &&

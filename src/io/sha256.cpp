@@ -16,7 +16,7 @@ namespace risley::io {
 namespace {
 
 void require_done(bool done) {
-  if (!done) throw Error("SHA-256: the cryptographic library refuses it");
+  if (!done) throw Error("SHA-256 is not available in the cryptographic library (OpenSSL)");
 }
 
 }  // namespace

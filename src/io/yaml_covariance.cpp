@@ -32,7 +32,7 @@ algebra::NamedCovariance read_covariance(const YamlMap& root, const ScaleOfName&
       fail_at(map.path(), node.line, fmt::format("covariance.names: {}", error.what()));
     }
     if (result.find(name) >= 0) {
-      fail_at(map.path(), node.line, fmt::format("covariance.names: {} stands twice", name));
+      fail_at(map.path(), node.line, fmt::format("covariance.names: {} appears twice", name));
     }
     result.names.push_back(std::move(name));
   }
@@ -76,7 +76,7 @@ std::string covariance_text(const algebra::NamedCovariance& covariance,
                                       covariance.matrix.rows(), covariance.matrix.cols(), n, n));
   }
   if (!covariance.matrix.allFinite()) {
-    throw InvalidArgument("covariance: files hold finite numbers only");
+    throw InvalidArgument("covariance: expected finite numbers");
   }
   std::vector<long double> scale;
   for (const std::string& name : covariance.names) scale.push_back(scale_of(name));

@@ -52,7 +52,8 @@ class TreeBuilder final : public YAML::EventHandler {
   }
   void OnAlias(const YAML::Mark& mark, YAML::anchor_t anchor) override {
     const auto known = anchored_.find(anchor);
-    if (known == anchored_.end()) fail_at(path_, line_of(mark), "an alias (*name) within its node");
+    if (known == anchored_.end())
+      fail_at(path_, line_of(mark), "an alias (*name) within the node that it names");
     count(line_of(mark), known->second.nodes);
     add({known->second.node, YAML::NullAnchor, known->second.nodes});
   }
@@ -139,7 +140,7 @@ YamlNode parse_yaml(const std::string& text, const std::string& path) {
     }
     return first.take_root();
   } catch (const YAML::Exception& error) {
-    fail_at(path, line_of(error.mark), fmt::format("is not YAML: {}", error.msg));
+    fail_at(path, line_of(error.mark), fmt::format("is not valid YAML: {}", error.msg));
   }
 }
 
@@ -180,7 +181,7 @@ YamlMap::YamlMap(const YamlNode& node, std::string path, std::string field)
     const std::size_t line = node.items[i].line;
     const std::string key = yaml_text(node.items[i], path_, fmt::format("a key of {}", called));
     if (!places_.emplace(key, entries_.size()).second)
-      fail_at(path_, line, fmt::format("{} stands twice", this->field(key)));
+      fail_at(path_, line, fmt::format("{} appears twice", this->field(key)));
     entries_.push_back({key, line, node.items[i + 1]});
   }
 }

@@ -19,8 +19,8 @@ namespace {
 
 constexpr std::uint64_t kPieceRows = 65536;
 
-/// A number as the maker's scan sequences print it: ten digits, nine of them after the point at
-/// most, no zeros at the end.
+/// A number as the manufacturer's scan sequences print it: ten digits, nine of them after the point
+/// at most, no zeros at the end.
 void append_number(std::string& text, double value) {
   const double whole = std::floor(std::log10(std::max(std::abs(value), 1.0)));
   const int decimals = 9 - static_cast<int>(std::min(whole, 9.0));

@@ -35,7 +35,7 @@ constexpr std::size_t kFewestInField = 1000;
 constexpr double kLeastRoll = radians_from_degrees(20.0);
 
 /// The built-in presets of the types of sensors; those of single units, of reversed rotors and of
-/// the maker's sequences have longer names than that of their type.
+/// the manufacturer's sequences have longer names than that of their type.
 std::vector<Sensor> type_presets() {
   std::map<int, Sensor> by_type;
   for (const std::string& name : sensors::builtin_preset_names()) {

@@ -27,12 +27,14 @@ struct Format {
 
 const std::vector<Format>& formats() {
   static const std::vector<Format> all = {
-      {{"livox-csv", "time (s), azimuth and zenith (degrees), as the maker's scan sequences"},
+      {{"livox-csv",
+        "time (s), azimuth and zenith (degrees), as in the manufacturer's scan sequences"},
        put_livox_csv},
       {{"npy",
         "float32 pairs of azimuth and elevation (radians), for MuJoCo-LiDAR, OmniPerception"},
        put_npy},
-      {{"helios-xml", "the prisms as a scanner of HELIOS++, with what that costs"}, put_helios_xml},
+      {{"helios-xml", "the prisms as a scanner of HELIOS++, with a list of what it cannot show"},
+       put_helios_xml},
       {{"json", "a lidar profile of Isaac Sim up to 4.5, one emitter per shot"}, put_isaac_json},
       {{"usda", "an OmniLidar in USD for Isaac Sim 5 and later, one emitter per shot"},
        put_isaac_usda}};

@@ -42,8 +42,8 @@ class CountingReader final : public DecoratingReader {
     clock_wraps_ = 0;
     if (lost_samples_ == 0) return;
     warnings_.push_back({{},
-                         "inertial samples were left out: their times are not those of counted "
-                         "shots",
+                         "inertial samples were left out: their times cannot be compared with "
+                         "those of counted shots",
                          lost_samples_});
   }
 
@@ -64,10 +64,11 @@ class CountingReader final : public DecoratingReader {
       const std::int64_t shot = shot_number(rows, row) + missing_;
       const std::optional<std::int64_t> time_ns = time_of(shot);
       if (!time_ns) {
-        FileError error(path_, FilePlace{},
-                        fmt::format("shot number {} at {} Hz is beyond 9.2e9 s, the latest time; "
-                                    "expected smaller numbers or a higher shot rate",
-                                    shot, shot_rate_));
+        FileError error(
+            path_, FilePlace{},
+            fmt::format("shot number {} at {} Hz would be later than 9.2e9 s, the latest possible "
+                        "time; expected smaller numbers or a higher shot rate",
+                        shot, shot_rate_));
         rows.resize(row);
         return error;
       }
@@ -121,8 +122,9 @@ std::unique_ptr<Reader> with_counted_times(std::unique_ptr<Reader> reader, const
                      static_cast<long long>(options.slips[i - 1].row) + 1);
   }
   if (!options.slips.empty() && reader->header().devices.size() > 1) {
-    throw InvalidArgument(fmt::format("ReadOptions::slips for a recording of {} sensors, allowed 1",
-                                      reader->header().devices.size()));
+    throw InvalidArgument(
+        fmt::format("ReadOptions::slips is given for a recording of {} sensors, allowed for one",
+                    reader->header().devices.size()));
   }
   return std::make_unique<CountingReader>(std::move(reader), path, options);
 }

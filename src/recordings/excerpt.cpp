@@ -244,10 +244,10 @@ class ExcerptWriter {
 
 void check(const std::string& recording, const std::string& path, const ExcerptOptions& options) {
   if (!lower_case(path).ends_with(kEnding)) {
-    throw InvalidArgument(
-        fmt::format("{}: the name of an excerpt must end in {}: it is written in the lossless "
-                    "NetCDF form, because others drop shots without return or round directions",
-                    path, kEnding));
+    throw InvalidArgument(fmt::format(
+        "{}: the name of an excerpt must end in {}: it is written in the lossless NetCDF format, "
+        "because other formats drop shots without return or round directions",
+        path, kEnding));
   }
   std::error_code missing;
   if (std::filesystem::equivalent(recording, path, missing)) {

@@ -46,8 +46,8 @@ class SensorFrameReader final : public DecoratingReader {
   void describe() override {
     if (header_.devices.size() > 1) {
       throw InvalidArgument(
-          fmt::format("ReadOptions::extrinsics for a recording of {} sensors, expected one sensor: "
-                      "a pose is that of one",
+          fmt::format("ReadOptions::extrinsics is given for a recording of {} sensors, allowed for "
+                      "one: a pose belongs to one sensor",
                       header_.devices.size()));
     }
     for (Device& device : header_.devices) {

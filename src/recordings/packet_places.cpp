@@ -67,8 +67,8 @@ std::unique_ptr<Reader> with_packet_places(std::unique_ptr<Reader> reader,
   const RecordingHeader& header = reader->header();
   if (header.packet_shots == 0 || header.devices.size() != 1 || options.shot_rate) {
     throw InvalidArgument(fmt::format(
-        "ReadOptions::packet_places for a recording of format {} and {} sensors{}, "
-        "allowed for one sensor, with one time for each packet and no shot rate",
+        "ReadOptions::packet_places is given for a recording of format {} and {} sensors{}, "
+        "allowed for one sensor, with one time for each packet and without a shot rate",
         header.format, header.devices.size(), options.shot_rate ? " with a shot rate" : ""));
   }
   require_above("ReadOptions::packet_places, shot_rate", options.packet_places->shot_rate, 0, "Hz");

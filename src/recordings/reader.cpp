@@ -75,7 +75,7 @@ std::unique_ptr<Reader> open_as_it_is(const std::string& path, const Progress& p
   const std::string first = told_by(path), head = read_head(first);
   if (first != path && !bags::bag_kind(head)) {
     throw FileError(first, {0, {}},
-                    fmt::format("is no bag of ROS 2; it begins with {}", shown(head)));
+                    fmt::format("is not a ROS 2 bag; it begins with {}", shown(head)));
   }
   for (const Format* format : all_formats()) {
     if (format->recognises(head)) return format->open(path, progress);
@@ -110,10 +110,10 @@ std::vector<std::string> recording_files(const std::string& path) {
 
 void require_times(const RecordingHeader& header) {
   if (header.has_times) return;
-  throw MissingTimes(fmt::format(
-      "a recording of format {} that holds no times of single shots, which are needed here; "
-      "expected a shot rate to count them by",
-      header.format));
+  throw MissingTimes(
+      fmt::format("this recording of format {} holds no times of single shots, which are needed "
+                  "here; expected a shot rate to count them by",
+                  header.format));
 }
 
 Recording load_recording(const std::string& path, const Progress& progress,

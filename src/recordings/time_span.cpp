@@ -64,8 +64,8 @@ class TimeSpanReader final : public DecoratingReader {
     const bool is_row = row != times.end();
     FileError error(
         path_, {},
-        fmt::format("the time of {} is {} ns, that of the first {} ns; times of a recording lie "
-                    "within 146 years of the first",
+        fmt::format("the time of {} is {} ns, that of the first {} ns; allowed within 146 years of "
+                    "the first",
                     is_row ? fmt::format("observation {} (from 0)", rows_ + (row - times.begin()))
                            : std::string("an inertial sample"),
                     is_row ? *row : sample->time_ns, *first_ns_));

@@ -152,8 +152,8 @@ class TruthFile {
  public:
   explicit TruthFile(const std::string& path) : file_(path) {
     if (!file_.has_attribute(kMarker) || file_.number(kMarker) != kLayoutVersion) {
-      file_.fail(
-          fmt::format("is no truth file: attribute {} = {} is missing", kMarker, kLayoutVersion));
+      file_.fail(fmt::format("is not a truth file: attribute {} = {} is missing", kMarker,
+                             kLayoutVersion));
     }
     shot_ = file_.dimension(kDimension);
     while (prisms_ < kMostPrisms &&

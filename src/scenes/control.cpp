@@ -66,7 +66,7 @@ void require_known_ground(const KnownGround& ground) {
 Control parse_control(const std::string& text, const std::string& path) {
   const YamlMap root(io::parse_yaml(text, path), path, "");
   if (root.find("risley_control") == nullptr) {
-    io::fail_at(path, root.line(), "is no list of known ground: risley_control is missing");
+    io::fail_at(path, root.line(), "is not a list of known ground: risley_control is missing");
   }
   root.integer("risley_control", kControlVersion, kControlVersion);
   root.allow_only({"risley_control", "crs", "datum", "ground"});
@@ -75,7 +75,8 @@ Control parse_control(const std::string& text, const std::string& path) {
   if (root.find("datum") != nullptr) {
     control.datum = root.text("datum");
     if (control.crs.empty()) {
-      io::fail_at(path, root.at("datum").line, "datum needs crs, the map of the places");
+      io::fail_at(path, root.at("datum").line,
+                  "datum needs crs, the map projection of the coordinates");
     }
   }
   root.at("ground");

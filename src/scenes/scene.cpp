@@ -110,7 +110,7 @@ std::optional<Hit> nearest_hit(const Scene& scene, const Vector3<double>& origin
   require_unit_length("direction", norm(direction));
   if (!(penetration > 0.0 && penetration < 1.0)) {
     throw InvalidArgument(
-        fmt::format("penetration = {:g}, allowed between 0 and 1, without both", penetration));
+        fmt::format("penetration = {:g}, allowed above 0 and below 1", penetration));
   }
   std::optional<Hit> nearest;
   for (std::size_t i = 0; i < scene.planes.size(); ++i) {

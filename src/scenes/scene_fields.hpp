@@ -57,7 +57,7 @@ inline std::string new_name(const io::YamlMap& map, Names& earlier) {
   if (name.empty()) io::fail_at(map.path(), map.at("name").line, map.field("name") + " is empty");
   if (!earlier.insert(name).second) {
     io::fail_at(map.path(), map.at("name").line,
-                fmt::format("{} = \"{}\" stands twice", map.field("name"), name));
+                fmt::format("{} = \"{}\" appears twice", map.field("name"), name));
   }
   return name;
 }

@@ -49,9 +49,10 @@ std::array<double, 2> range(const YamlMap& map, std::string_view key, const Limi
                             std::string_view unit) {
   const auto values = numbers<2>(map, key, limits.lowest, limits.highest, unit);
   if (values[0] > values[1]) {
-    fail_at(map.path(), map.at(key).line,
-            fmt::format("{} = [{:g}, {:g}] {}: the first is the least, the second the most",
-                        map.field(key), values[0], values[1], unit));
+    fail_at(
+        map.path(), map.at(key).line,
+        fmt::format("{} = [{:g}, {:g}] {}, expected the least value first and the greatest second",
+                    map.field(key), values[0], values[1], unit));
   }
   return values;
 }
@@ -61,9 +62,9 @@ std::string name_of(const YamlMap& map, std::string_view kind, std::size_t numbe
   if (map.find("name") != nullptr) return new_name(map, names);
   std::string name = fmt::format("{} {}", kind, number);
   if (!names.insert(name).second) {
-    fail_at(
-        map.path(), map.line(),
-        fmt::format("{} has no name, and \"{}\" is taken; give it one", map.field("name"), name));
+    fail_at(map.path(), map.line(),
+            fmt::format("{} has no name, and \"{}\" is already used; give it a name",
+                        map.field("name"), name));
   }
   return name;
 }

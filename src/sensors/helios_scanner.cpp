@@ -158,8 +158,8 @@ HeliosScanner helios_scanner(const Sensor& sensor, std::uint64_t rows,
   const int prisms = sensor.prisms(), emitters = sensor.train.emitters();
   if (prisms > kHeliosPrisms) {
     throw InvalidArgument(
-        fmt::format("sensor \"{}\" has {} prisms, a scanner of HELIOS++ at most {}", sensor.name,
-                    prisms, kHeliosPrisms));
+        fmt::format("sensor \"{}\" has {} prisms, allowed at most {} in a scanner of HELIOS++",
+                    sensor.name, prisms, kHeliosPrisms));
   }
   if (options.every != 1) {
     throw InvalidArgument(fmt::format(

@@ -45,7 +45,7 @@ double si_from_file(long double value, long double scale) {
 /// The shortest decimal that reads as exactly this value.
 std::string file_number(double value, long double scale, std::string_view field) {
   if (!std::isfinite(value)) {
-    throw InvalidArgument(fmt::format("{} = {}, a preset holds finite numbers only", field, value));
+    throw InvalidArgument(fmt::format("{} = {}, expected a finite number", field, value));
   }
   return io::yaml_decimal(value, scale);
 }
@@ -185,8 +185,7 @@ void read_parameters(const YamlMap& map, Sensor& sensor) {
     for (const int place : found->places) {
       const std::string*& taken = owner[static_cast<std::size_t>(place)];
       if (taken != nullptr) {
-        fail_at(map.path(), entry.line,
-                fmt::format("{} says again what {} says", map.field(entry.key), *taken));
+        fail_at(map.path(), entry.line, fmt::format("{} repeats {}", map.field(entry.key), *taken));
       }
       taken = &entry.key;
       sensor.train.set_place(place, value);
@@ -273,9 +272,9 @@ void read_geometry(const YamlMap& root, Sensor& sensor) {
   }
   for (const YamlMap::Entry& entry : map.entries()) {
     if (std::find(read.begin(), read.end(), entry.key) == read.end()) {
-      fail_at(map.path(), entry.line,
-              fmt::format("{}: unknown, or said again by the value of all prisms",
-                          map.field(entry.key)));
+      fail_at(
+          map.path(), entry.line,
+          fmt::format("{}: unknown, or repeats the value for all prisms", map.field(entry.key)));
     }
   }
 }
@@ -285,8 +284,9 @@ void read_geometry(const YamlMap& root, Sensor& sensor) {
 void read_combinations(const YamlMap& root, Sensor& sensor) {
   if (root.find("combination") == nullptr) {
     if (root.find("combinations") != nullptr) {
-      fail_at(root.path(), root.at("combinations").line,
-              "combinations: combination must say which of them the parameters are of");
+      fail_at(
+          root.path(), root.at("combinations").line,
+          "combination is missing: it must say to which of the combinations the parameters belong");
     }
     return;
   }
@@ -549,7 +549,7 @@ PresetSource source_of(const std::string& name_or_path) {
 
 std::string builtin_preset_text(const std::string& name) {
   const BuiltinPreset* preset = find_builtin(name);
-  if (preset == nullptr) fail_unknown(name, "is no known preset");
+  if (preset == nullptr) fail_unknown(name, "is not a known preset");
   return preset->text;
 }
 
@@ -586,7 +586,7 @@ Sensor load_sensor(const std::string& name_or_path) {
 Sensor parse_preset(const std::string& text, const std::string& path) {
   const YamlMap root(io::parse_yaml(text, path), path, "");
   if (root.find("risley_preset") == nullptr) {
-    fail_at(path, root.line(), "is no sensor preset: risley_preset is missing");
+    fail_at(path, root.line(), "is not a sensor preset: risley_preset is missing");
   }
   root.integer("risley_preset", kSchemaVersion, kSchemaVersion);
   root.allow_only({"risley_preset", "name",        "manufacturer", "model",

@@ -18,7 +18,7 @@ const ParameterInfo& find_sensor_parameter(std::string_view name, TrainShape sha
   const ParameterInfo& parameter = find_parameter(name, shape);
   if (parameter.kind == ParameterKind::rotation_angle) {
     throw InvalidArgument(
-        fmt::format("{} belongs to a recording and is no property of a sensor", name));
+        fmt::format("{} belongs to a recording and is not a property of a sensor", name));
   }
   return parameter;
 }

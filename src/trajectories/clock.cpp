@@ -90,12 +90,12 @@ std::string no_overlap_words(const Trajectory& trajectory, std::int64_t first_ns
   if (first_ns <= trajectory.time_ns.back() && last_ns >= trajectory.time_ns.front()) {
     return fmt::format(
         "no shot of the recording has a pose: the trajectory runs {}, the recording from {} to {} "
-        "of the same clock, where the trajectory has a gap",
+        "by the same clock, where the trajectory has a gap",
         interval_words(trajectory), seconds_words(first_ns), seconds_words(last_ns));
   }
   std::string words = fmt::format(
       "the recording and the trajectory share no time: the trajectory runs {}, the recording from "
-      "{} to {} of the same clock",
+      "{} to {} by the same clock",
       interval_words(trajectory), seconds_words(first_ns), seconds_words(last_ns));
   // What would bring them together.
   constexpr std::int64_t kLeap = 18;  // since 2017
@@ -123,7 +123,7 @@ std::string no_overlap_words(const Trajectory& trajectory, std::int64_t first_ns
     if (shift != 0 && first_ns + shift <= trajectory.time_ns.back() &&
         last_ns + shift >= trajectory.time_ns.front()) {
       return words + fmt::format(
-                         "; they overlap but for whole {}: the two clocks count from different "
+                         "; apart from whole {}, they overlap: the two clocks start from different "
                          "ones (clock_offset_s of the mount: {} s)",
                          name, shift / kClockSecond);
     }

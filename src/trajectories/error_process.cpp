@@ -86,7 +86,7 @@ ErrorModel parse_error_model(const std::string& text, const std::string& path) {
   const YamlMap root(io::parse_yaml(text, path), path, "");
   if (root.find("risley_trajectory_errors") == nullptr) {
     fail_at(path, root.line(),
-            "states no errors of a trajectory: risley_trajectory_errors is missing");
+            "is not a file of trajectory errors: risley_trajectory_errors is missing");
   }
   root.integer("risley_trajectory_errors", kErrorModelVersion, kErrorModelVersion);
   root.allow_only({"risley_trajectory_errors", "sample_interval_s", "north_m", "east_m", "up_m",

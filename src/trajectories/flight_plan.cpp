@@ -222,14 +222,14 @@ void read_strips(const YamlMap& map, const Strip& usual, std::vector<Strip>& str
   const bool several = map.find("headings_deg") != nullptr;
   if (several == (map.find("heading_deg") != nullptr)) {
     fail_at(map.path(), map.line(),
-            fmt::format("{} for strips through one place, or {}, with count and spacing_m for "
-                        "parallel ones: expected one of the two, found {}",
+            fmt::format("expected either {}, for strips through one place, or {} with count and "
+                        "spacing_m, for parallel strips; found {}",
                         map.field("headings_deg"), map.field("heading_deg"),
                         several ? "both" : "none"));
   }
   if (several && map.find("count") != nullptr) {
     fail_at(map.path(), map.at("count").line,
-            fmt::format("{} is of parallel strips, with {}", map.field("count"),
+            fmt::format("{} is for parallel strips, with {}", map.field("count"),
                         map.field("heading_deg")));
   }
   if ((map.find("spacing_m") != nullptr) != (map.find("count") != nullptr)) {

@@ -171,14 +171,13 @@ Eigen::Matrix3d read_matrix(const YamlMap& map) {
   const double skewness = skewness_of(nominal);
   if (skewness > kRounded) {
     fail_at(map.path(), entry.line,
-            fmt::format("{}: is no rotation: lengths of its columns or products of two of them are "
-                        "off by {:.2g}, allowed {:g}",
+            fmt::format("{} is not a rotation: the lengths of its columns, or the products of two "
+                        "of them, are off by {:.2g}, allowed {:g}",
                         field, skewness, kRounded));
   }
   if (nominal.determinant() < 0) {
-    fail_at(
-        map.path(), entry.line,
-        field + ": is a mirror image (its determinant is -1), expected a right-handed rotation");
+    fail_at(map.path(), entry.line,
+            field + " is a mirror image (its determinant is -1), expected a right-handed rotation");
   }
   if (skewness > kExact) {
     for (int i = 0; i < 4; ++i) {  // to the nearest rotation
@@ -191,7 +190,7 @@ Eigen::Matrix3d read_matrix(const YamlMap& map) {
 /// Of the values that a covariance can name: their names end in the unit.
 long double scale_of(const std::string& name) {
   if (name.find_first_not_of("abcdefghijklmnopqrstuvwxyz0123456789_") != std::string::npos) {
-    throw InvalidArgument(fmt::format("{} is no name of a quantity", name));
+    throw InvalidArgument(fmt::format("{} is not the name of a quantity of a mount", name));
   }
   return name.ends_with("_deg") ? kDegree : 1.0L;
 }
@@ -216,10 +215,10 @@ void require_own_covariance(const Mount& mount) {
     const auto scale = static_cast<double>(scale_of(name));
     const double sigma = std::sqrt(own.matrix(row, row));
     if (std::abs(sigma - sigmas[k]) <= 1e-9 * sigma) continue;
-    throw InvalidArgument(fmt::format(
-        "covariance: {} has a sigma of {:g} in it, and {:g} where its value stands: who changes "
-        "one of them takes the covariance out",
-        name, sigma / scale, sigmas[k] / scale));
+    throw InvalidArgument(
+        fmt::format("covariance: {} has a sigma of {:g} here, and {:g} beside its value; change "
+                    "both, or delete the covariance",
+                    name, sigma / scale, sigmas[k] / scale));
   }
 }
 
@@ -322,7 +321,7 @@ Eigen::Vector3d lever_arm(const Mount& mount) {
 Mount parse_mount(const std::string& text, const std::string& path) {
   const YamlMap root(io::parse_yaml(text, path), path, "");
   if (root.find("risley_mount") == nullptr) {
-    fail_at(path, root.line(), "is no mount of a sensor: risley_mount is missing");
+    fail_at(path, root.line(), "is not a mount of a sensor: risley_mount is missing");
   }
   root.integer("risley_mount", kMountVersion, kMountVersion);
   root.allow_only({"risley_mount", "name", "reference_point", "sensor_axes", "body_from_sensor",
@@ -337,11 +336,12 @@ Mount parse_mount(const std::string& text, const std::string& path) {
   const YamlMap::Entry* const axes = root.find("sensor_axes");
   const YamlMap::Entry* const matrix = root.find("body_from_sensor");
   if (axes == nullptr && matrix == nullptr) {
-    fail_at(path, root.line(), "sensor_axes is missing; body_from_sensor may stand in its place");
+    fail_at(path, root.line(), "sensor_axes is missing; body_from_sensor may be given instead");
   }
   if (axes != nullptr && matrix != nullptr) {
     fail_at(path, std::max(axes->line, matrix->line),
-            "sensor_axes and body_from_sensor say the same, expected one of them");
+            "sensor_axes and body_from_sensor are two ways to state the same, expected only one of "
+            "them");
   }
   const YamlMap rotation(axes != nullptr ? axes->value : matrix->value, path,
                          axes != nullptr ? "sensor_axes" : "body_from_sensor");

@@ -48,7 +48,7 @@ FileHead read_file_head(const std::string& path) {
   if (status.type() == fs::file_type::directory) {
     FileHead head = read_file_head(bags::files_of_bag_folder(path).front());
     if (kRosBagFormat.recognises(head)) return head;
-    throw FileError(path, {}, "is a folder whose first file is no bag of ROS 2");
+    throw FileError(path, {}, "is a folder whose first file is not a ROS 2 bag");
   }
   if (status.type() != fs::file_type::regular) {
     throw FileError(path, {}, "is not a regular file, expected a trajectory");
@@ -100,17 +100,17 @@ Trajectory load_trajectory(const std::string& path, const Progress& progress,
   if (format == &kRosBagFormat) return read_ros_bag(path, topic, progress);
   if (!topic.empty()) {
     throw InvalidArgument(
-        fmt::format("option trajectory_topic = {}: {} is no bag of ROS, and only "
-                    "bags have topics",
+        fmt::format("option trajectory_topic = {}: {} is not a ROS bag, and only bags have topics",
                     topic, path));
   }
   if (format != nullptr) return format->read(path, progress);
   if (is_smrmsg(head)) {
-    throw FileError(path, {}, "holds accuracies (SMRMSG) and no poses; expected the SBET with it");
+    throw FileError(path, {},
+                    "holds accuracies (SMRMSG) and no poses; expected the SBET that belongs to it");
   }
   if (head.has_ending(".out")) return kSbetFormat.read(path, progress);  // says what is wrong
   throw FileError(path, {0, {}},
-                  fmt::format("is no trajectory of a known kind: expected {}", known_formats()));
+                  fmt::format("is not a trajectory of a known kind: expected {}", known_formats()));
 }
 
 const std::vector<WritableTrajectory>& writable_trajectories() {

@@ -281,15 +281,15 @@ void settle_velocities(Trajectory& trajectory, const std::vector<double>& wander
   found.residual = best.second.rms(spans);
   if (total(best) > largest) {
     drop(
-        fmt::format("none of {} frames fits the change of the positions: the best, {}, leaves {} "
-                    "(north, east, down)",
+        fmt::format("none of {} frames fits the change of the positions: with the best, {}, they "
+                    "differ by {} (north, east, down)",
                     candidates.size(), words_of(best.first), in_mm(*found.residual)));
     return;
   }
   if (total(second) < std::max(3 * total(best), 2e-3)) {
     drop(
-        fmt::format("{} and {} fit the change of the positions alike: they leave {} and {} "
-                    "(north, east, down)",
+        fmt::format("{} and {} fit the change of the positions equally well: with them, they "
+                    "differ by {} and {} (north, east, down)",
                     words_of(best.first), words_of(second.first), in_mm(*found.residual),
                     in_mm(second.second.rms(spans))));
     return;

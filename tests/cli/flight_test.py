@@ -90,7 +90,7 @@ class FlightTest(CommandTest):
                 (2, "frame of its own", FLIGHT + SHORT + ("--trajectory-format", "sbet")),
                 (3, "missing.yaml", FLIGHT[:2] + ("--mount", "missing.yaml") + FLIGHT[4:]),
                 (3, "risley_flight", ("--flight", DATA / "village.yaml") + FLIGHT[2:]),
-                (3, "no trajectory of a known kind",
+                (3, "not a trajectory of a known kind",
                  ("--trajectory", DATA / "village.yaml") + FLIGHT[2:])):
             with self.subTest(words=words):
                 done = self.expect(status, "simulate", "-o", "bad.lvx", *map(str, arguments))

@@ -55,7 +55,7 @@ class IdentifyTest(CommandTest):
         self.assertIn("turns", done.stderr)
         self.assertFalse((self.folder / "still.yaml").exists())
 
-    @unittest.skipUnless(FOLDER, "SKIPPED: RISLEY_VENDOR_DATA names no folder with the maker's files")
+    @unittest.skipUnless(FOLDER, "SKIPPED: RISLEY_VENDOR_DATA names no folder with the manufacturer's files")
     def test_the_makers_sequences(self):
         for name, (faces, prisms) in SEQUENCES.items():
             with self.subTest(name):

@@ -331,7 +331,7 @@ class MovingCloudTest(CommandTest):
         self.assertEqual(done["records"], 100)
         self.assertIn("/nothing", self.expect(2, "convert", "slam.db3", "--trajectory-topic",
                                               "/nothing", "-o", "no.csv").stderr)
-        self.assertIn("is no bag", self.expect(2, "info", "gps.csv", "--trajectory-topic",
+        self.assertIn("is not a ROS bag", self.expect(2, "info", "gps.csv", "--trajectory-topic",
                                                "/gps").stderr)
         said = self.cloud(2, trajectory="slam.db3", crs=None).stderr
         self.assertIn("--trajectory-topic is missing", said)

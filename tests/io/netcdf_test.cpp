@@ -333,7 +333,7 @@ TEST(HostileNetcdf, NothingIsReadFromOtherFiles) {
   EXPECT_GE(H5Lcreate_external("secret.nc", "/time", linked, "time", 0, 0), 0);
   H5Fclose(linked);
   EXPECT_THAT(refusal([&] { NetcdfInput{folder.file("linked.nc")}; }),
-              HasSubstr("time leads to another file"));
+              HasSubstr("time refers to another file"));
   const hid_t stored = H5Fcreate(folder.file("stored.nc").c_str(), H5F_ACC_TRUNC, 0, 0);
   const hid_t properties = H5Pcreate(H5P_DATASET_CREATE);
   H5Pset_external(properties, "/etc/hostname", 0, 4);
@@ -346,7 +346,7 @@ TEST(HostileNetcdf, NothingIsReadFromOtherFiles) {
   H5Pclose(properties);
   H5Fclose(stored);
   EXPECT_THAT(refusal([&] { NetcdfInput{folder.file("stored.nc")}; }),
-              HasSubstr("flag leads to another file"));
+              HasSubstr("flag refers to another file"));
 }
 
 TEST(Netcdf, DevicesSurvive) {

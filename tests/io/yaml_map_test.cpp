@@ -44,10 +44,11 @@ TEST(Yaml, ValuesKeepTheirLines) {
 }
 
 TEST(Yaml, MistakesAreFoundWithTheirLine) {
-  EXPECT_THAT(refusal("number: [1\n"), HasSubstr("is not YAML"));
+  EXPECT_THAT(refusal("number: [1\n"), HasSubstr("is not valid YAML"));
   EXPECT_THAT(refusal("- 1\n"), HasSubstr("expected a map, found a list"));
   EXPECT_THAT(refusal(""), HasSubstr("found nothing"));
-  EXPECT_THAT(refusal("number: 1\nlist: 2\nnumber: 1\n"), HasSubstr("line 3: number stands twice"));
+  EXPECT_THAT(refusal("number: 1\nlist: 2\nnumber: 1\n"),
+              HasSubstr("line 3: number appears twice"));
   EXPECT_THAT(refusal("number: 1\nother: 2\n"),
               HasSubstr("line 2: unknown field other, allowed here"));
   EXPECT_THAT(refusal("numbr: 1\n"), HasSubstr("unknown field numbr, did you mean number?"));

@@ -138,12 +138,12 @@ TEST(BagFolder, WhatIsWrongWithTheListIsSaid) {
   }
   EXPECT_THAT(refused({"../x/y.mcap"}, 3), HasSubstr("expected the name of a file"));
   EXPECT_THAT(refused({"../x.mcap"}, 3), HasSubstr("not in the folder: x.mcap"));
-  EXPECT_THAT(refused({first, first}), HasSubstr("bag_0.mcap stands twice"));
+  EXPECT_THAT(refused({first, first}), HasSubstr("bag_0.mcap appears twice"));
   EXPECT_THAT(refused({first}, 5, "FILE"),
               HasSubstr("compression_mode = file: rosbag2 compressed"));
   EXPECT_EQ(refused({first}, 5, "NONE"), "");
   EXPECT_THAT(refused({}), HasSubstr("relative_file_paths: expected a list of files"));
-  EXPECT_THAT(refused({"metadata.yaml"}), HasSubstr("is no bag of ROS 2"));
+  EXPECT_THAT(refused({"metadata.yaml"}), HasSubstr("is not a ROS 2 bag"));
   put_bytes(folder.file("metadata.yaml"), "other: 1\n");
   EXPECT_THAT(folder.refused(), HasSubstr("rosbag2_bagfile_information is missing"));
   std::filesystem::remove(folder.file("metadata.yaml"));

@@ -209,8 +209,8 @@ TEST(CloudTimes, WhatIsNoTimeOfSinglePointsIsNotUsed) {
   EXPECT_THAT(warning_of({{{"time", 0, 1e3, false}}}),
               HasSubstr("expected a datatype in [1, 8] for the field time, found 0"));
   // Floats in nanoseconds would be hours off as seconds.
-  EXPECT_THAT(warning_of({{{"time", 7, 1e9, false}}}), HasSubstr("further than 10 s"));
-  EXPECT_THAT(warning_of({{{"time", 7, 0, false}}}), HasSubstr("one time for 40 points"));
+  EXPECT_THAT(warning_of({{{"time", 7, 1e9, false}}}), HasSubstr("more than 10 s"));
+  EXPECT_THAT(warning_of({{{"time", 7, 0, false}}}), HasSubstr("40 points share one time"));
   EXPECT_THAT(warning_of({{{"curvature", 7, 1e3, false}}}), HasSubstr("no times of their own"));
 }
 
@@ -250,7 +250,8 @@ TEST(CloudTimes, ATimeFarFromItsStampIsDamage) {
     }
     return "";
   };
-  EXPECT_EQ(problem(7), "point 2 has the t 11, allowed at most 10 s from the stamp of its message");
+  EXPECT_EQ(problem(7),
+            "point 2 has t = 11, allowed at most 10 s from the time stamp of its message");
   EXPECT_THAT(problem(8), HasSubstr("of datatype 8"));
   layout.fields[0].name = "u";
   EXPECT_THAT(problem(7), HasSubstr("found no such field"));

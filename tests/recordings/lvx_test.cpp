@@ -715,7 +715,7 @@ TEST_F(LvxTest, UnknownDataTypesAreSteppedOverToTheNextFrame) {
   file[frames[1] + 24 + 10] = 9;
   result = read(file);
   EXPECT_EQ(result.warnings.size(), 1U);
-  EXPECT_THAT(result.warnings[0].message, ::testing::HasSubstr("1 more frame"));
+  EXPECT_THAT(result.warnings[0].message, ::testing::HasSubstr("its frame and of 1 more"));
 }
 
 TEST_F(LvxTest, TheLastFrameMayBeLeftOpen) {

@@ -239,11 +239,11 @@ TEST(Mcap, DamageKeepsWhatStandsBefore) {
   expect_damage(changed(chunks[2] + 41, "zfoo"), 60, chunks[2], "found \"zfoo\"");
   expect_damage(changed(chunks[2] + 45, huge), 60, chunks[2], "bytes of records, found");
   expect_damage(changed(chunks[2] + 53, "????"), 60, chunks[2], "cannot be unpacked by Zstandard");
-  expect_damage(changed(chunks[2] + 1, huge), 60, chunks[2], "a record does not end before byte");
-  expect_damage(changed(chunks[2], std::string(1, '\0')), 60, chunks[2], "the type 0");
-  expect_damage(changed(chunks[2], "\x45"), 100, std::nullopt, "its summary counts 18");
+  expect_damage(changed(chunks[2] + 1, huge), 60, chunks[2], "expected a record that ends by byte");
+  expect_damage(changed(chunks[2], std::string(1, '\0')), 60, chunks[2], "found type 0");
+  expect_damage(changed(chunks[2], "\x45"), 100, std::nullopt, "its summary states 18");
   const std::size_t footer = bytes.size() - 37;
-  expect_damage(changed(footer + 25, "\1\1\1\1"), 120, std::nullopt, "the summary, which begins");
+  expect_damage(changed(footer + 25, "\1\1\1\1"), 120, std::nullopt, "the summary that begins");
   expect_damage(changed(footer + 9, huge), 120, footer, "the summary begins at byte 9187201950");
   expect_damage(changed(bytes.size() - 1, "x"), 120, bytes.size() - 8, "expected the file to end");
 
@@ -280,7 +280,8 @@ TEST(Mcap, RecordsThatContradictEachOther) {
   lost[9] = '\x77';
   EXPECT_THAT(problem(with(lost)), HasSubstr("a message of channel 119, which no record"));
   EXPECT_THAT(problem(with(mcap_record(5, "short"))), HasSubstr("a message of at least 22 bytes"));
-  EXPECT_THAT(problem(with(mcap_record(15, "abcd"))), HasSubstr("the data end here, but"));
+  EXPECT_THAT(problem(with(mcap_record(15, "abcd"))),
+              HasSubstr("the record that ends the data is here, but"));
   EXPECT_THAT(problem(with(mcap_chunk(mcap_record(6, ""), "", 0))), HasSubstr("record of type 6"));
   EXPECT_THAT(problem(with(mcap_chunk("123", "lz4", 0))), HasSubstr("does not fit into its chunk"));
   EXPECT_THAT(problem(with(mcap_record(6, "1234"))), HasSubstr("bytes of the chunk's times"));
@@ -310,7 +311,8 @@ TEST(Mcap, InertialSamplesWithoutNumbersAreLeftOut) {
   EXPECT_FALSE(outcome.error);
   EXPECT_EQ(outcome.recording.data.imu.size(), 5U);
   ASSERT_EQ(outcome.recording.warnings.size(), 1U);
-  EXPECT_THAT(outcome.recording.warnings[0].message, HasSubstr("are no numbers were left out"));
+  EXPECT_THAT(outcome.recording.warnings[0].message,
+              HasSubstr("are not finite numbers were left out"));
 }
 
 TEST(Mcap, AClaimedChunkCostsNoMemory) {

@@ -238,7 +238,7 @@ TEST(NamedCsv, RefusesWhatItCannotTell) {
   EXPECT_THAT(open_problem(kNamedCsvFormat, "x,y,height\n1.0,2.0,3.0\n"),
               AllOf(HasSubstr("x, y, height"), HasSubstr("azimuth and zenith")));
   EXPECT_THAT(open_problem(kNamedCsvFormat, "x (ft),y (ft),z (ft)\n1,2,3\n"), HasSubstr("x (ft)"));
-  EXPECT_THAT(open_problem(kNamedCsvFormat, "x_m,y_mm,z_m\n1,2,3\n"), HasSubstr("one unit"));
+  EXPECT_THAT(open_problem(kNamedCsvFormat, "x_m,y_mm,z_m\n1,2,3\n"), HasSubstr("the same unit"));
   EXPECT_TRUE(kNamedCsvFormat.recognises("1.0,2.0,3.0\n4.0,5.0,6.0\n"));
   EXPECT_FALSE(kNamedCsvFormat.recognises("hello, world"));
   EXPECT_FALSE(kNamedCsvFormat.recognises("Dear reader,\nthis is no table.\n"));
@@ -366,7 +366,7 @@ TEST(Pcd, OddFields) {
   const Outcome outcome = read_text(kPcdFormat, turned);
   expect_scene(outcome);
   EXPECT_THAT(all_warnings(outcome),
-              AllOf(HasSubstr("pose"), HasSubstr("POINTS was taken"), HasSubstr("4 bytes behind")));
+              AllOf(HasSubstr("pose"), HasSubstr("POINTS was used"), HasSubstr("4 bytes after")));
 }
 
 TEST(Pcd, Damage) {
@@ -655,11 +655,12 @@ TEST(Npz, Damage) {
   EXPECT_EQ(outcome.rows().size(), Scene::kRows);
   EXPECT_THAT(outcome.error->problem(), HasSubstr("checksum"));
   EXPECT_THAT(open_problem(kNpzFormat, bytes.substr(0, bytes.size() - 30)), HasSubstr("cut off"));
-  EXPECT_THAT(open_problem(kNpzFormat, zip({{"x.txt", "hello"}}, false)), HasSubstr("found none"));
+  EXPECT_THAT(open_problem(kNpzFormat, zip({{"x.txt", "hello"}}, false)),
+              HasSubstr("found no array"));
   EXPECT_THAT(open_problem(kNpzFormat, zip(scene_members(), true, false, 4'000'000'000)),
-              HasSubstr("cannot hold"));
+              HasSubstr("compressed bytes can hold"));
   EXPECT_THAT(open_problem(kNpzFormat, zip(scene_members(), true, true, UINT64_MAX / 2)),
-              HasSubstr("cannot hold"));
+              HasSubstr("compressed bytes can hold"));
   EXPECT_THAT(open_problem(kNpzFormat, zip(scene_members(), true, false, 20'000)),
               HasSubstr("expected 12128 bytes"));
   auto unequal = scene_members();

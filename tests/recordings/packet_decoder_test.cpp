@@ -123,7 +123,7 @@ TEST(PacketDecoder, NamesTheByteOfWhatIsWrong) {
   std::mt19937 random(6);
   PacketDecoder decoder({.device_type = kMid40});
   const std::string good = packet(1, 1000, random);
-  expect_bad(decoder, "", 0, "expected 18 bytes of header");
+  expect_bad(decoder, "", 0, "expected a packet header of 18 bytes");
   expect_bad(decoder, good.substr(0, 17), 17, "found 17");
   expect_bad(decoder, good.substr(0, 100), 100, "expected 900 bytes of records, found 82");
   expect_bad(decoder, good + "x", 918, "found 901");
@@ -135,10 +135,10 @@ TEST(PacketDecoder, NamesTheByteOfWhatIsWrong) {
   expect_bad(decoder, bad, 9, "data type = 9");
   bad = good;
   bad[8] = 6;
-  expect_bad(decoder, bad, 8, "timestamp of type 6");
+  expect_bad(decoder, bad, 8, "are not a time stamp of type 6");
   bad = good;
   put_at(bad, 10, ~std::uint64_t{0});
-  expect_bad(decoder, bad, 8, "is no time");
+  expect_bad(decoder, bad, 8, "are not a time stamp");
   bad = good;
   put_at(bad, 18 + 3 * 9, std::uint32_t{1});
   put_at(bad, 18 + 3 * 9 + 4, std::uint16_t{18'001});

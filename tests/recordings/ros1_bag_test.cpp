@@ -597,7 +597,7 @@ TEST(Ros1Bag, DamagedCloudsAreNamed) {
         [](Cloud& c) { c.fields.resize(2); });
   check("found none", [](Cloud& c) { c.fields.clear(); });
   check("datatype in [1, 8] for the field z, found 9", [](Cloud& c) { c.fields[2].datatype = 9; });
-  check("the field z takes bytes 15 to 18 of a point of 18 bytes",
+  check("the field z takes bytes 15 to 18, but a point has only 18 bytes",
         [](Cloud& c) { c.fields[2].offset = 15; });
   check("the field line takes", [](Cloud& c) { c.fields[5].offset = ~0U; });
   check("1 x 5 points of 18 bytes, found 72 bytes", [](Cloud& c) { c.width = 5; });

@@ -196,7 +196,7 @@ TEST(Ros2Bag, OtherDatabasesAreRefused) {
   sqlite3_close(database);
   const Outcome outcome = read_all(kRos2BagFormat, path);
   ASSERT_TRUE(outcome.error);
-  EXPECT_THAT(outcome.error->problem(), HasSubstr("cannot be read as a bag of ROS 2"));
+  EXPECT_THAT(outcome.error->problem(), HasSubstr("cannot be read as a ROS 2 bag"));
 }
 
 TEST(Ros2Bag, DamagedMessagesAreNamed) {
@@ -212,8 +212,8 @@ TEST(Ros2Bag, DamagedMessagesAreNamed) {
       {"huge", custom(kPowerOn, shots(4), 4'294'967'000), "expected 4294967004 points"});
   cases.push_back({"time", custom(~std::uint64_t{0}, shots(4)), "before the year 2200"});
   cases.push_back({"nan", custom(kPowerOn, {{0, std::nanf(""), 0.0F, 0.0F}}), "point 1 has a"});
-  cases.push_back({"nothing", "", "the marks of plain CDR"});
-  cases.push_back({"mark", sound, "the marks of plain CDR"});
+  cases.push_back({"nothing", "", "as plain CDR does"});
+  cases.push_back({"mark", sound, "as plain CDR does"});
   cases.back().message[1] = '\7';
   for (std::size_t length = 4; length + 3 < sound.size(); length += 3) {
     cases.push_back({"cut", sound.substr(0, length), "expected"});

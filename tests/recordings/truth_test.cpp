@@ -167,7 +167,7 @@ TEST_F(Truth, OtherFilesAreRefused) {
     load_truth(path());
     FAIL();
   } catch (const FileError& error) {
-    EXPECT_THAT(error.what(), ::testing::HasSubstr("no truth file"));
+    EXPECT_THAT(error.what(), ::testing::HasSubstr("is not a truth file"));
   }
 }
 

@@ -67,7 +67,7 @@ TEST(Control, MistakesAreToldWithTheirLine) {
   EXPECT_THAT(failure("radius_m: 1.5", "radius_m: 500"), HasSubstr("allowed 0.1 to 100"));
   EXPECT_THAT(failure("normal_zenith_deg: 30, ", ""), HasSubstr("normal_zenith_deg is missing"));
   EXPECT_THAT(failure("normal_zenith_deg: 30", "normal_zenith_deg: 80"), HasSubstr("0 to 60"));
-  EXPECT_THAT(failure("name: roof", "name: yard"), HasSubstr("stands twice"));
+  EXPECT_THAT(failure("name: roof", "name: yard"), HasSubstr("appears twice"));
   EXPECT_THAT(failure("name: roof", "nam: roof"), HasSubstr("nam"));
   try {
     parse_control("risley_control: 1\nground: []\n", "c.yaml");

@@ -177,7 +177,7 @@ INSTANTIATE_TEST_SUITE_P(
         Mistake{"NoName",
                 "planes:\n  - {distance_m: 3, normal_azimuth_deg: 0, normal_zenith_deg: 90}\n", 2,
                 "planes[0].name is missing"},
-        Mistake{"NameTwice", "stations:\n  - {name: a}\n  - {name: a}\n", 3, "stands twice"},
+        Mistake{"NameTwice", "stations:\n  - {name: a}\n  - {name: a}\n", 3, "appears twice"},
         Mistake{"ZeroDistance",
                 "planes:\n"
                 "  - {name: a, normal_azimuth_deg: 0, normal_zenith_deg: 90, distance_m: 0}\n",

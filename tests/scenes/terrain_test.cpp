@@ -659,7 +659,7 @@ TEST(Terrain, IsReadFromASceneBesidePlanes) {
   EXPECT_THAT(refusal([&] {
                 static_cast<void>(nearest_hit(scene, {0, 0, 9}, {1, 0, 0}, 1.0));
               }),
-              HasSubstr("penetration = 1, allowed between 0 and 1"));
+              HasSubstr("penetration = 1, allowed above 0 and below 1"));
 }
 
 TEST(Terrain, MistakesInAFileAreToldWithTheirLine) {
@@ -685,8 +685,8 @@ TEST(Terrain, MistakesInAFileAreToldWithTheirLine) {
   EXPECT_THAT(message("walls: yes", "walls: maybe"),
               HasSubstr("terrain.roofs[0].walls = \"maybe\", allowed yes and no"));
   EXPECT_THAT(message("name: garage", "name: barn"),
-              HasSubstr("14: terrain.buildings[0].name = \"barn\" stands twice"));
-  EXPECT_THAT(message("name: garage", "name: tower"), HasSubstr("stands twice"));
+              HasSubstr("14: terrain.buildings[0].name = \"barn\" appears twice"));
+  EXPECT_THAT(message("name: garage", "name: tower"), HasSubstr("appears twice"));
   EXPECT_THAT(message("[20, 45]", "[45, 20]"),
               HasSubstr("terrain.village.pitch_deg = [45, 20] deg: the first is the least"));
   EXPECT_THAT(message("roofs: 5", "roofs: 5000"), HasSubstr("found room within +-50 m"));

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-// Scan patterns of the presets, against the maker's scan sequences, which only the maker may hand
-// out, and against the optics shot by shot.
+// Scan patterns of the presets, against the manufacturer's scan sequences, which only the
+// manufacturer may hand out, and against the optics shot by shot.
 #include "risley/sensors/scan_pattern.hpp"
 
 #include <algorithm>
@@ -40,7 +40,7 @@ TEST(SixEmitters, AreARowOfEqualSteps) {
   EXPECT_EQ(horizon.angular_velocity[0], -horizon.angular_velocity[1]);
 }
 
-/// A scan sequence of the maker and the preset that predicts it.
+/// A scan sequence of the manufacturer and the preset that predicts it.
 struct Sequence {
   const char* preset;
   const char* file;
@@ -113,7 +113,8 @@ INSTANTIATE_TEST_SUITE_P(
                       Sequence{"horizon-sequence", "livox-horizon-sequence-every-40th.csv", 40,
                                0}));
 
-// Real units as the maker's files have them: an Avia the same, a Horizon as its mirror image.
+// Real units as the manufacturer's files have them: an Avia the same, a Horizon as its mirror
+// image.
 TEST(ScanPattern, RealUnitsThatFireTogetherAreTheSequence) {
   ScanPatternOptions together;
   together.firing = Firing::together;

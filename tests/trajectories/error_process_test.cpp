@@ -140,7 +140,8 @@ std::string mistake(const std::string& what, const std::string& by) {
 }
 
 TEST(ErrorModel, MistakesAreNamedWithTheirLine) {
-  EXPECT_THAT(mistake("risley_trajectory_errors: 1", "a: 1"), HasSubstr("states no errors"));
+  EXPECT_THAT(mistake("risley_trajectory_errors: 1", "a: 1"),
+              HasSubstr("is not a file of trajectory errors"));
   EXPECT_THAT(mistake("tilt_north_deg", "tilt_nort_deg"),
               HasSubstr("did you mean tilt_north_deg?"));
   EXPECT_THAT(mistake("correlation_time_s: 60, ", ""),

@@ -376,7 +376,7 @@ TEST(RosBags, OneTopicIsTakenAndOfSeveralOneIsNamed) {
   const std::string csv = folder().file("a.csv");
   write_trajectory(csv, trajectory_of(KnownFlight(), 5));
   EXPECT_THROW(load_trajectory(csv, {}, "/odom"), InvalidArgument);
-  EXPECT_THAT(fault(csv, "/odom"), HasSubstr("is no bag of ROS"));
+  EXPECT_THAT(fault(csv, "/odom"), HasSubstr("is not a ROS bag"));
 }
 
 TEST(RosBags, ABagWithALidarIsARecordingWhosePosesCanBeRead) {
@@ -426,14 +426,14 @@ TEST(RosBags, TimesThatRunBackAreSortedOrRefused) {
     EXPECT_EQ(t.size(), 30U);
     EXPECT_EQ(t.time_order.moved, 1U);
     ASSERT_EQ(t.warnings.size(), 1U);
-    EXPECT_THAT(t.warnings[0].message, HasSubstr("records behind later ones: 1 of 30"));
+    EXPECT_THAT(t.warnings[0].message, HasSubstr("records that come after later ones: 1 of 30"));
     flown[20].time_ns -= 5'000'000'000;
     EXPECT_THAT(fault(kind, flown), AllOf(HasSubstr("record 21: time runs back by 4.99"),
                                           ::testing::Not(HasSubstr("byte"))));
     flown = samples(5);
     for (Sample& s : flown) s.time_ns = 0;
     EXPECT_THAT(fault(kind, flown),
-                AllOf(HasSubstr("has the stamp 0"), HasSubstr("stamps were not set")));
+                AllOf(HasSubstr("has the time stamp 0"), HasSubstr("time stamps were not set")));
   }
 }
 

@@ -170,7 +170,7 @@ TEST(Sbet, FramesThatCannotBeToldStayUndecided) {
   }
   t = read(records);
   EXPECT_EQ(t.velocity_frame->name, "undecided");
-  EXPECT_THAT(t.velocity_frame->reason, HasSubstr("fit the change of the positions alike"));
+  EXPECT_THAT(t.velocity_frame->reason, HasSubstr("fit the change of the positions equally well"));
 }
 
 TEST(Sbet, NoisyPositionsDoNotHideTheFrame) {
@@ -241,7 +241,7 @@ TEST(Sbet, TimesThatRunBackAreSortedOrRefused) {
   const Trajectory t = read(records);
   EXPECT_EQ(t.size(), 300U);
   ASSERT_EQ(t.warnings.size(), 2U);
-  EXPECT_THAT(t.warnings[0].message, HasSubstr("records behind later ones: 1 of 301"));
+  EXPECT_THAT(t.warnings[0].message, HasSubstr("records that come after later ones: 1 of 301"));
   EXPECT_EQ(t.warnings[0].place.byte_offset, 101U * 136);
   EXPECT_THAT(t.warnings[1].message, HasSubstr("repeat the time of an earlier one: 1"));
   EXPECT_TRUE(std::is_sorted(t.time_ns.begin(), t.time_ns.end()));
@@ -250,7 +250,8 @@ TEST(Sbet, TimesThatRunBackAreSortedOrRefused) {
   // Another flight behind this one.
   const std::vector<SbetRecord> again = sbet_records(KnownFlight(), 260);
   records.insert(records.end(), again.begin(), again.end());
-  EXPECT_THAT(fault(records), AllOf(HasSubstr("byte 40936"), HasSubstr("time runs back by 1.495")));
+  EXPECT_THAT(fault(records),
+              AllOf(HasSubstr("byte 40936"), HasSubstr("time jumps back by 1.495")));
 }
 
 TEST(Sbet, TheWeekMayEnd) {

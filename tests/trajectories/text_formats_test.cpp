@@ -166,7 +166,7 @@ TEST(InertialExplorer, ScaledStandardDeviationsAreDividedAgain) {
   t = read(replaced(text, "Position: 2.0000", "Position: 95 percent"));
   EXPECT_THAT(t.warnings[0].message, HasSubstr("95 times"));  // a number is a number
   t = read(replaced(text, "Position: 2.0000", "Position: twice"));
-  EXPECT_THAT(t.warnings[0].message, HasSubstr("is no scaling"));
+  EXPECT_THAT(t.warnings[0].message, HasSubstr("is not a known scaling"));
 }
 
 TEST(InertialExplorer, MistakesAreNamed) {
@@ -185,7 +185,7 @@ TEST(InertialExplorer, MistakesAreNamed) {
               AllOf(HasSubstr("line 17"), HasSubstr("accuracy of the attitude")));
   EXPECT_THAT(fault(replaced(text, " 0.011 ", " 0.011 5 ")),
               HasSubstr("expected 17 fields, found 18"));
-  EXPECT_THAT(fault(kExplorerHead), HasSubstr("no line of names of columns"));
+  EXPECT_THAT(fault(kExplorerHead), HasSubstr("no line of column names"));
   const std::string places = replaced(explorer_text(20, true), "37 ", "37 75 ");
   EXPECT_THAT(fault(places), HasSubstr("line 17"));
 }
@@ -195,7 +195,7 @@ TEST(InertialExplorer, TextBehindTheRecordsAndCutLines) {
   Trajectory t = read(text + "\nProcessing summary\n  3 passes\n");
   EXPECT_EQ(t.size(), 20U);
   ASSERT_EQ(t.warnings.size(), 1U);
-  EXPECT_THAT(t.warnings[0].message, HasSubstr("text behind the records"));
+  EXPECT_THAT(t.warnings[0].message, HasSubstr("text after the records"));
   t = read(text.substr(0, text.size() - 9));
   EXPECT_EQ(t.size(), 19U);
   EXPECT_THAT(t.warnings[0].message, HasSubstr("cut off"));
@@ -366,13 +366,12 @@ TEST(TrajectoryCsv, WrongNamesGetANearOne) {
               HasSubstr("did you mean ellipsoidal_height_m?"));
   EXPECT_THAT(refused("heading_deg", "colour"), HasSubstr("column heading_deg is missing"));
   EXPECT_THAT(refused("gps_second_of_week_s", "hour"), HasSubstr("no column of times"));
-  EXPECT_THAT(refused("pitch_deg", "roll_rad"),
-              HasSubstr("column roll_rad says again what roll_deg"));
+  EXPECT_THAT(refused("pitch_deg", "roll_rad"), HasSubstr("column roll_rad repeats roll_deg"));
   const Trajectory t = read(replaced(csv_text(3), "velocity_up_m_per_s", "temperature"), "a.csv");
   EXPECT_THAT(t.velocity, IsEmpty());
   ASSERT_EQ(t.warnings.size(), 2U);
-  EXPECT_THAT(t.warnings[0].message, HasSubstr("velocities are there in part"));
-  EXPECT_THAT(t.warnings[1].message, HasSubstr("column temperature is not read"));
+  EXPECT_THAT(t.warnings[0].message, HasSubstr("velocities are incomplete"));
+  EXPECT_THAT(t.warnings[1].message, HasSubstr("column temperature was ignored"));
 }
 
 TEST(TrajectoryCsv, ValuesThatNoPlatformHasAreRefusedAtTheirLine) {
@@ -388,8 +387,8 @@ TEST(TrajectoryCsv, ValuesThatNoPlatformHasAreRefusedAtTheirLine) {
   EXPECT_THAT(with("400825.025,1,1,1,1,95,1,1,1,1"), HasSubstr("pitch = "));
   EXPECT_THAT(with("400825.025,1,1,1,1,5,1,1,1"), HasSubstr("expected 10 fields, found 9"));
   EXPECT_THAT(with("1e300,1,1,1,1,5,1,1,1,1"), HasSubstr("expected a time"));
-  EXPECT_THAT(with(""), HasSubstr("a row behind the empty line 7"));
-  EXPECT_THAT(with("400823.9,1,1,1,1,5,1,1,1,1"), HasSubstr("time runs back by 1.12"));
+  EXPECT_THAT(with(""), HasSubstr("a row after the empty line 7"));
+  EXPECT_THAT(with("400823.9,1,1,1,1,5,1,1,1,1"), HasSubstr("time jumps back by 1.12"));
 }
 
 TEST(TrajectoryCsv, StatedVelocitiesThatDoNotFitAreNamed) {
@@ -565,7 +564,7 @@ TEST(TextFormats, OtherTextsAreNoTrajectory) {
     const std::string path = folder().file("other.csv");
     write_bytes(path, text);
     EXPECT_EQ(trajectory_file_kind(path), TrajectoryFileKind::none) << text;
-    EXPECT_THAT(fault(text, "other.csv"), HasSubstr("is no trajectory of a known kind")) << text;
+    EXPECT_THAT(fault(text, "other.csv"), HasSubstr("is not a trajectory of a known kind")) << text;
   }
   EXPECT_EQ(trajectory_file_kind(folder().file("missing")), TrajectoryFileKind::none);
   EXPECT_THROW(load_trajectory(folder().file("missing")), FileError);

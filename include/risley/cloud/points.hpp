@@ -78,7 +78,7 @@ struct TrajectoryErrors {
 
 /// What is known of a cloud before its first point.
 struct CloudHeader {
-  std::string sensor;  ///< maker and model, e.g. "Livox Mid-40"
+  std::string sensor;  ///< manufacturer and model, e.g. "Livox Mid-40"
   std::string serial;  ///< empty when unknown
   recordings::TimeReference time_reference = recordings::TimeReference::relative;
   int prisms = 2;

@@ -34,7 +34,7 @@ struct SpeedCombination {
 /// When the emitters of a train fire.
 enum class Firing {
   in_turn,   ///< one after another, at equal intervals, as real sensors do
-  together,  ///< all at once, as in the scan sequences of the maker
+  together,  ///< all at once, as in the scan sequences of the manufacturer
 };
 
 /// "in_turn" or "together".

@@ -158,7 +158,7 @@ FileError BinaryTableReader::end_error(const Lane& lane, std::uint64_t missing) 
   return {path_,
           {lane.source->file_offset(), {}},
           fmt::format("expected {} more points of {} bytes, {}", missing, lane.record_bytes,
-                      problem.empty() ? "found the end" : problem)};
+                      problem.empty() ? "found the end of the file" : problem)};
 }
 
 bool BinaryTableReader::fill_block() {

@@ -63,14 +63,14 @@ bool LzfSource::next_run() {
   std::uint8_t longer = 0, low = 0;
   const bool is_long = control >> 5 == kLongRun;
   if ((is_long && !packed_byte(longer)) || !packed_byte(low)) {
-    problem_ = "the packed bytes end within a run";
+    problem_ = "the compressed data end in the middle of a run";
     return false;
   }
   copies_ = std::size_t{kFewestCopied} + (control >> 5) + longer;
   distance_ = (std::size_t{control} & 31U) * 256 + low + 1;
   if (distance_ > produced_) {
     problem_ =
-        fmt::format("the packed bytes copy from {} bytes back, where only {} bytes stand before",
+        fmt::format("the compressed data refer to {} bytes back, but only {} bytes come before",
                     distance_, produced_);
     copies_ = 0;
     return false;
@@ -85,7 +85,7 @@ std::size_t LzfSource::read(std::uint8_t* bytes, std::size_t count) {
     std::uint8_t byte = 0;
     if (literals_ > 0) {
       if (!packed_byte(byte)) {
-        problem_ = "the packed bytes end within a run";
+        problem_ = "the compressed data end in the middle of a run";
         literals_ = 0;
         break;
       }

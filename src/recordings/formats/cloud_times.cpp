@@ -129,7 +129,7 @@ CloudField find_field(const CloudLayout& layout, std::initializer_list<std::stri
                                  field->name, field->datatype)};
   }
   if (std::uint64_t{field->offset} + type.bytes > layout.point_step) {
-    throw BadMessage{fmt::format("the field {} takes bytes {} to {} of a point of {} bytes",
+    throw BadMessage{fmt::format("the field {} takes bytes {} to {}, but a point has only {} bytes",
                                  field->name, field->offset,
                                  std::uint64_t{field->offset} + type.bytes - 1, layout.point_step)};
   }
@@ -172,16 +172,15 @@ CloudField time_field(const CloudTime& time, const CloudLayout& layout) {
   const CloudField field = find_field(layout, {time.field});
   if (field && field.datatype == time.datatype) return field;
   throw BadMessage{fmt::format(
-      "expected the field {} of datatype {} with the times of the points, as in the "
-      "messages before, found {}",
+      "expected the times of the points in the field {} of datatype {}, as in earlier messages, "
+      "found {}",
       time.field, time.datatype,
       field ? fmt::format("datatype {}", field.datatype) : std::string("no such field"))};
 }
 
 void fail_time(const CloudTime& time, std::size_t point, double value) {
   throw BadMessage{
-      fmt::format("point {} has the {} {}, allowed at most {} s from the stamp of its "
-                  "message",
+      fmt::format("point {} has {} = {}, allowed at most {} s from the time stamp of its message",
                   point, time.field, value, kFarthest_ns / 1'000'000'000)};
 }
 
@@ -264,12 +263,12 @@ std::string CloudTimeSearch::problem() const {
   if (candidates_.empty()) return other_type_;
   const Candidate& first = candidates_.front();
   const std::string& field = first.time.field;
-  if (first.messages < messages_) return fmt::format("only some have a field {}", field);
+  if (first.messages < messages_) return fmt::format("only some messages have a field {}", field);
   if (shares_times(first)) {
-    return fmt::format("their field {} has one time for {} points", field,
+    return fmt::format("in their field {}, {} points share one time", field,
                        first.points / first.times);
   }
-  return fmt::format("the numbers of their field {} are further than {} s from the stamps", field,
+  return fmt::format("the numbers in their field {} are more than {} s from the time stamps", field,
                      kFarthest_ns / 1'000'000'000);
 }
 

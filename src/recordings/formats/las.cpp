@@ -74,7 +74,7 @@ class LasReader final : public Reader {
   double fraction_read() const override { return source_->fraction_read(); }
 
  private:
-  /// As our own clouds tell it: maker and model, then the serial number.
+  /// As our own clouds tell it: manufacturer and model, then the serial number.
   Device device() const {
     Device device;
     device.type = kUnknownDeviceType;
@@ -150,7 +150,7 @@ class LasReader final : public Reader {
     // Equal but for the rounding of decimal fractions is equal.
     if (*most <= *least * (1 + 1e-9)) return;
     warn({}, fmt::format("coordinates are multiples of {:g}, {:g} and {:g} m in x, y and z; {:g} m "
-                         "is taken for all",
+                         "is used for all three",
                          steps[0], steps[1], steps[2], step_));
   }
 
@@ -159,9 +159,9 @@ class LasReader final : public Reader {
     const bool adjusted = (file_.global_encoding & kAdjustedGpsTime) != 0;
     if (!gps_time_at(file_.point_format)) {
       header_.has_times = false;
-      warn({}, fmt::format("points of format {} have no times; rows are taken in their order as "
-                           "that of firing",
-                           file_.point_format));
+      warn({}, fmt::format(
+                   "points of format {} have no times; they are taken to be in the order of firing",
+                   file_.point_format));
       return;
     }
     std::size_t shots = 0, times = 0, backwards = 0;
@@ -177,8 +177,8 @@ class LasReader final : public Reader {
     }
     if ((times == 1 && shots > 1) || (times > 0 && shots / times >= kShotsOfOneTime)) {
       header_.has_times = false;
-      warn({}, fmt::format("GPS times are no times of single shots: {} of the first {} shots {}; "
-                           "rows are taken in their order as that of firing",
+      warn({}, fmt::format("GPS times are not those of single shots: {} of the first {} shots {}; "
+                           "points are taken to be in the order of firing",
                            times == 1 ? "all" : fmt::format("{} on average", shots / times), shots,
                            times == 1 ? fmt::format("have {} s", first) : "share one"));
       return;
@@ -216,10 +216,10 @@ class LasReader final : public Reader {
 
   void warn_of_map(const std::string& reason) {
     map_reported_ = true;
-    warn({}, fmt::format("points must be in the frame of the sensor, with the sensor at the "
-                         "origin; these look like coordinates of a map: {}. Export them without "
-                         "georeference",
-                         reason));
+    warn({},
+         fmt::format("points must be in the frame of the sensor, with the sensor at the origin; "
+                     "these look like map coordinates: {}. Export them without georeferencing",
+                     reason));
   }
 
   void set_row(Observations& rows, std::size_t row, const Point& point) {
@@ -254,8 +254,8 @@ class LasReader final : public Reader {
     if (value <= UINT8_MAX) return static_cast<std::uint8_t>(value);
     if (!intensity_reported_) {
       intensity_reported_ = true;
-      warn({}, fmt::format("the intensity of point {} is {}, while the first {} points have none "
-                           "above 255; what is above is given as 255",
+      warn({}, fmt::format("the intensity of point {} is {}, but none of the first {} points has "
+                           "more than 255; higher intensities are read as 255",
                            row_ + 1, point.intensity, kPointsLookedAt));
     }
     return UINT8_MAX;

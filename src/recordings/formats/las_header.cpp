@@ -53,7 +53,8 @@ class HeaderReader {
   PublicHeader read() {
     require_bytes(header_bytes(0));
     const std::uint8_t* const bytes = input_.at(0, header_bytes(0));
-    if (text_at(bytes, 4) != "LASF") fail(0, "expected the signature LASF, found other bytes");
+    if (text_at(bytes, 4) != "LASF")
+      fail(0, "expected the file to begin with LASF, found other bytes");
     const int major = bytes[kVersionAt];
     header_.minor_version = bytes[kVersionAt + 1];
     if (major != 1 || header_.minor_version > 4) {
@@ -90,9 +91,9 @@ class HeaderReader {
 
   void require_bytes(std::size_t bytes) const {
     if (input_.size() >= bytes) return;
-    fail(input_.size(), fmt::format("expected a header of LAS 1.{} of {} bytes, found the file's "
-                                    "end",
-                                    header_.minor_version, bytes));
+    fail(input_.size(),
+         fmt::format("expected a LAS 1.{} header of {} bytes, found the end of the file",
+                     header_.minor_version, bytes));
   }
 
   void read_layout() {
@@ -104,10 +105,9 @@ class HeaderReader {
     }
     header_.points_at = number<std::uint32_t>(kPointsAt);
     if (header_.points_at < header_size_ || header_.points_at > input_.size()) {
-      fail(kPointsAt,
-           fmt::format("expected the points to begin between byte {}, the header's end, and byte "
-                       "{}, the file's end, found byte {}",
-                       header_size_, input_.size(), header_.points_at));
+      fail(kPointsAt, fmt::format("expected the points to begin between byte {}, the end of the "
+                                  "header, and byte {}, the end of the file, found byte {}",
+                                  header_size_, input_.size(), header_.points_at));
     }
     header_.points_end = input_.size();
     const auto format = number<std::uint8_t>(kPointFormatAt);
@@ -151,8 +151,8 @@ class HeaderReader {
     if (count == 0 && !is_modern(header_.point_format)) return;  // some fill in the old one alone
     header_.points = count;
     if (old_count == 0 || old_count == count) return;
-    warn(kCountAt, fmt::format("the header counts {} points in its old counter and {} in that of "
-                               "LAS 1.4, which is taken",
+    warn(kCountAt, fmt::format("the header says {} points in its old counter and {} in that of LAS "
+                               "1.4; the latter is used",
                                old_count, count));
   }
 
@@ -189,10 +189,10 @@ class HeaderReader {
       const std::uint64_t length =
           left < kExtendedRecordHeaderBytes ? 0 : number<std::uint64_t>(at + 20);
       if (left < kExtendedRecordHeaderBytes || left - kExtendedRecordHeaderBytes < length) {
-        warn(kExtendedAt, fmt::format("extended record {} of {}, at byte {}, does not lie between "
-                                      "the points and the file's end; it and those after it were "
-                                      "left out",
-                                      i + 1, count, at));
+        warn(kExtendedAt,
+             fmt::format("extended record {} of {}, at byte {}, does not lie between the points "
+                         "and the end of the file; it and those after it were left out",
+                         i + 1, count, at));
         return;
       }
       if (describes_extra_bytes(at)) find_extra_bytes(at + kExtendedRecordHeaderBytes, length);
@@ -216,8 +216,8 @@ class HeaderReader {
       const std::uint8_t* const descriptor = input_.at(at, kDescriptorBytes);
       const std::size_t bytes = bytes_described(descriptor);
       if (place + bytes > header_.record_bytes) {
-        warn(at, fmt::format("extra bytes are described beyond the end of the point records, "
-                             "which have {} bytes; from here on they were left out",
+        warn(at, fmt::format("the extra bytes described from here on lie beyond the end of the "
+                             "point records, which have {} bytes; they were left out",
                              header_.record_bytes));
         return;
       }

@@ -27,27 +27,27 @@ class PlainPoints final : public PointSource {
       points_ = header_.points = room;
       warnings.push_back(
           {{.byte_offset = header_.points_at, .line = {}},
-           fmt::format("the header counts no points; the {} that follow it were read", room),
+           fmt::format("the header says that there are 0 points; the {} that follow it were read",
+                       room),
            0});
     }
     if (header_.points < room) {
-      warnings.push_back({{.byte_offset = place_of(header_.points), .line = {}},
-                          fmt::format("the header counts {} points; those that follow were left "
-                                      "out",
-                                      header_.points),
-                          room - header_.points});
+      warnings.push_back(
+          {{.byte_offset = place_of(header_.points), .line = {}},
+           fmt::format("the header says that there are {} points; those after them were left out",
+                       header_.points),
+           room - header_.points});
     }
   }
 
   std::size_t read(std::span<Point> points) override {
     if (next_ == points_ && points_ < header_.points) {
-      throw FileError(
-          input_.path(), {.byte_offset = place_of(points_), .line = {}},
-          fmt::format(
-              "expected {} points of {} bytes, as the header counts them, found room for "
-              "{} up to byte {}, where {}",
-              header_.points, header_.record_bytes, points_, header_.points_end,
-              header_.points_end < input_.size() ? "other records begin" : "the file ends"));
+      throw FileError(input_.path(), {.byte_offset = place_of(points_), .line = {}},
+                      fmt::format("expected {} points of {} bytes, as the header says, found room "
+                                  "for {} up to byte {}, where {}",
+                                  header_.points, header_.record_bytes, points_, header_.points_end,
+                                  header_.points_end < input_.size() ? "other records begin"
+                                                                     : "the file ends"));
     }
     std::size_t done = 0;
     for (; done < points.size() && next_ < points_; ++done, ++next_) {

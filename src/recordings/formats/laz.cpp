@@ -27,13 +27,13 @@ class LazPoints final : public PointSource {
       : path_(input.path()), header_(header), size_(input.size()) {
     if (header_.points == 0 && size_ > header_.points_at + sizeof(std::int64_t)) {
       warnings.push_back({{.byte_offset = header_.points_at, .line = {}},
-                          "the header counts no points; what follows it was left out",
+                          "the header says that there are 0 points; what follows it was left out",
                           0});
     }
     if (header_.points > 0) check_chunk_table(input);
     stream_.open(path_, std::ios::binary);
     if (!stream_) fail({}, fmt::format("cannot be read: {}", std::strerror(errno)));
-    if (laszip_create(&laszip_) != 0) fail({}, "cannot be read: LASzip cannot be set up");
+    if (laszip_create(&laszip_) != 0) fail({}, "cannot be read: LASzip could not be started");
     try {
       open();
     } catch (...) {
@@ -73,19 +73,19 @@ class LazPoints final : public PointSource {
   void check_chunk_table(io::BlockInput& input) const {
     constexpr std::uint64_t kTableHeaderBytes = 8;
     if (size_ - header_.points_at < sizeof(std::int64_t)) {
-      fail({size_, {}}, fmt::format("expected the place of the chunk table at byte {}, found the "
-                                    "file's end",
-                                    header_.points_at));
+      fail(
+          {size_, {}},
+          fmt::format("expected the place of the chunk table at byte {}, found the end of the file",
+                      header_.points_at));
     }
     const auto place = load<std::int64_t>(input.at(header_.points_at, sizeof(std::int64_t)));
     if (place == -1) return;  // at the end of the file, and LASzip finds it there
     const auto table = static_cast<std::uint64_t>(place);
     if (place < 0 || table < header_.points_at || table > size_ ||
         size_ - table < kTableHeaderBytes) {
-      fail({header_.points_at, {}},
-           fmt::format("expected the chunk table between byte {} and the file's end at byte {}, "
-                       "found byte {}",
-                       header_.points_at, size_, place));
+      fail({header_.points_at, {}}, fmt::format("expected the chunk table between byte {} and the "
+                                                "end of the file at byte {}, found byte {}",
+                                                header_.points_at, size_, place));
     }
     const std::uint64_t chunks = load<std::uint32_t>(input.at(table + 4, 4));
     if (chunks * header_.record_bytes > size_) {
@@ -107,9 +107,9 @@ class LazPoints final : public PointSource {
     const std::size_t base = kRecordBytes[static_cast<std::size_t>(header_.point_format)];
     if (point_->num_extra_bytes < 0 ||
         static_cast<std::size_t>(point_->num_extra_bytes) != header_.record_bytes - base) {
-      fail({}, fmt::format("expected {} extra bytes per point as the header has them, LASzip "
-                           "unpacks {}",
-                           header_.record_bytes - base, point_->num_extra_bytes));
+      fail({},
+           fmt::format("expected {} extra bytes per point, as the header says, LASzip unpacks {}",
+                       header_.record_bytes - base, point_->num_extra_bytes));
     }
   }
 
@@ -185,11 +185,10 @@ namespace risley::recordings::las {
 std::unique_ptr<PointSource> open_compressed_points(io::BlockInput input,
                                                     const PublicHeader& /*header*/,
                                                     std::vector<ReadWarning>& /*warnings*/) {
-  throw FileError(
-      input.path(), {.byte_offset = kPointFormatAt, .line = {}},
-      "is compressed by LASzip, and this build has no LASzip: Debian 12 has no package of it. "
-      "Build "
-      "with liblaszip-dev (Debian 13), or turn the file into LAS elsewhere (laszip, PDAL, laspy)");
+  throw FileError(input.path(), {.byte_offset = kPointFormatAt, .line = {}},
+                  "is compressed by LASzip, and this build has no LASzip, because Debian 12 has no "
+                  "package of it. Build with liblaszip-dev (Debian 13), or convert the file to LAS "
+                  "with another program (laszip, PDAL, laspy)");
 }
 
 }  // namespace risley::recordings::las

@@ -68,7 +68,7 @@ std::size_t run_length(const std::vector<MessagePoint>& points, std::size_t firs
 void append_point(LidarMessage& message, const MessagePoint& point) {
   if (!std::isfinite(point.x + point.y + point.z)) {
     throw BadMessage{
-        fmt::format("point {} has a coordinate that is no number", message.points.size() + 1)};
+        fmt::format("point {} has a coordinate that is not a number", message.points.size() + 1)};
   }
   message.points.push_back(point);
 }
@@ -152,8 +152,8 @@ void MessageReader::choose_topics() {
       has_kind(MessageKind::points) ? MessageKind::points : MessageKind::cloud;
   if (!has_kind(wanted)) {
     bag_->fail(
-        fmt::format("holds no points of a lidar: expected a topic of type CustomMsg of a Livox "
-                    "driver or sensor_msgs PointCloud2, found {}",
+        fmt::format("holds no points of a lidar: expected a topic of type CustomMsg (Livox driver) "
+                    "or sensor_msgs PointCloud2, found {}",
                     bags::words_of(topics())));
   }
   header_.devices.clear();
@@ -201,10 +201,9 @@ void MessageReader::choose_imu_topics() {
     } else if (imu_topics == 1 && header_.devices.size() == 1) {
       devices_[i] = std::uint8_t{0};
     } else {
-      warn(
-          fmt::format("the inertial samples of topic {} were left out: it does not say to which "
-                      "lidar they belong",
-                      topics()[i].name));
+      warn(fmt::format(
+          "the inertial samples of topic {} were left out: nothing says to which lidar they belong",
+          topics()[i].name));
     }
   }
 }
@@ -317,8 +316,8 @@ void MessageReader::describe() {
     } else if (!first[i].accelerations.empty() && median(first[i].accelerations) > kLongestInG) {
       acceleration_units_[i] = 1.0 / kStandardGravity;
       warn(
-          fmt::format("the accelerations of topic {} are in m/s^2 by their size and were "
-                      "divided by {} m/s^2",
+          fmt::format("judging by their size, the accelerations of topic {} are in m/s^2; they "
+                      "were divided by {} m/s^2",
                       topics()[i].name, kStandardGravity));
     }
   }
@@ -367,17 +366,17 @@ void MessageReader::settle_cloud_grid(std::size_t topic, FirstMessages& first) {
                         [&](const auto& a, const auto& b) { return distance(a) < distance(b); });
   clouds_[topic] = {best.grid, best.returns};
   std::string message = fmt::format(
-      "the points of topic {} have no times of their own: each got its message's time and {} us "
-      "per shot, {}",
+      "the points of topic {} have no times of their own: they were counted from the time of their "
+      "message, at {} us per shot, with {} per shot",
       topics()[topic].name, best.grid.beams == 1 ? "10" : "4.1667",
       best.returns == 1 ? "one point" : fmt::format("{} points", best.returns));
   if (!unused_times_[topic].empty()) message += fmt::format(" ({})", unused_times_[topic]);
   if (!is_known) {
-    message += "; too few messages to check that";
+    message += "; there are too few messages to check that";
   } else if (!is_close(rate, best.rate_hz)) {
     message += fmt::format(
         "; but {:.0f} points per second fit no known sensor: points may be missing, and those "
-        "behind them have wrong times",
+        "after them have wrong times",
         rate);
   }
   warn(std::move(message));
@@ -455,8 +454,8 @@ void MessageReader::append_points(const LidarMessage& message, std::uint8_t devi
     if (!is_shot && !equal_times_reported_) {
       equal_times_reported_ = true;
       warn(
-          fmt::format("{} points of topic {} have the same time; more than {} are taken as shots "
-                      "of their own, without knowledge of when they were fired",
+          fmt::format("{} points of topic {} have the same time; where more than {} do, each is "
+                      "taken as a separate shot, and when it was fired is unknown",
                       run, topics()[message.topic].name, kMostReturns));
     }
     for (std::size_t i = 0; i < run; ++i, ++row) {
@@ -492,8 +491,8 @@ void MessageReader::append_imu(const LidarMessage& message, std::uint8_t device,
     if (std::isfinite(sample.angular_velocity[axis] + sample.acceleration_g[axis])) continue;
     if (!std::exchange(imu_without_numbers_reported_, true)) {
       warn(
-          fmt::format("inertial samples of topic {} whose rates or accelerations are no numbers "
-                      "were left out",
+          fmt::format("inertial samples of topic {} whose rates or accelerations are not finite "
+                      "numbers were left out",
                       topics()[message.topic].name));
     }
     return;

@@ -47,7 +47,7 @@ std::unique_ptr<Reader> open_lvx11(const std::string& path, const Progress&) {
   }
   if (version_bytes != std::array<std::uint8_t, 4>{1, 1, 0, 0}) {
     throw FileError(path, {kLvxName.size(), {}},
-                    fmt::format("LVX version {}, supported are 1.0.0.0 and 1.1.0.0",
+                    fmt::format("LVX version = {}, allowed 1.0.0.0 and 1.1.0.0",
                                 fmt::join(version_bytes, ".")));
   }
   const std::uint8_t* bytes =
@@ -130,7 +130,8 @@ Lvx11Writer::Lvx11Writer(const std::string& path, const RecordingHeader& header)
   }
   if (header_.devices.empty()) header_.devices.emplace_back();
   if (header_.devices.size() > 255) {
-    throw InvalidArgument(fmt::format("{} devices, LVX holds 1 to 255", header_.devices.size()));
+    throw InvalidArgument(
+        fmt::format("number of devices = {}, allowed 1 to 255 in LVX", header_.devices.size()));
   }
   if (header_.returns_per_shot < 1 || header_.returns_per_shot > 3) {
     throw InvalidArgument(
@@ -157,10 +158,8 @@ void Lvx11Writer::write_header() {
   std::array<bool, 256> taken{};
   for (const Device& device : header_.devices) {
     if (taken[device.index]) {
-      throw InvalidArgument(
-          fmt::format("device index {} stands twice; LVX tells devices apart by "
-                      "their index",
-                      device.index));
+      throw InvalidArgument(fmt::format(
+          "device index {} is used twice; LVX tells devices apart by their index", device.index));
     }
     taken[device.index] = true;
     bytes = output_.append(kLvx11DeviceBytes);

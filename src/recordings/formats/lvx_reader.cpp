@@ -57,8 +57,8 @@ const std::uint8_t* lvx_header_bytes(io::BlockInput& file, std::uint64_t offset,
                                      std::string_view part) {
   if (offset + count > file.size()) {
     throw FileError(file.path(), {file.size(), {}},
-                    fmt::format("the file ends in the {}, which takes bytes {} to {}", part, offset,
-                                offset + count - 1));
+                    fmt::format("the file ends within the {}, which takes bytes {} to {}", part,
+                                offset, offset + count - 1));
   }
   return file.at(offset, count);
 }
@@ -103,7 +103,7 @@ std::vector<Device> read_lvx_devices(io::BlockInput& file, std::uint64_t offset,
       if (devices[other].index == device.index) {
         throw FileError(
             file.path(), {offset + i * bytes_per_device + 32, {}},
-            fmt::format("device index {} stands twice in the device table", device.index));
+            fmt::format("device index {} is used twice in the device table", device.index));
       }
     }
   }
@@ -194,12 +194,11 @@ void LvxReader::describe() {
       const RecordLayout& layout = *record_layout(device.data_type);
       const double interval_ns = static_cast<double>(device.shortest_period_ns) / layout.records;
       grids_[i] = interval_ns < 7000 ? kGrid240kHz : kGrid100kHz;
-      unknown.push_back(
-          {{},
-           fmt::format("device {} has the unknown type {}; by the distance of its packets it "
-                       "measures at {} kHz",
-                       i, header_.devices[i].type, interval_ns < 7000 ? 240 : 100),
-           0});
+      unknown.push_back({{},
+                         fmt::format("device {} has the unknown type {}; judging by the times of "
+                                     "its packets, it measures at {} kHz",
+                                     i, header_.devices[i].type, interval_ns < 7000 ? 240 : 100),
+                         0});
     } else if (device.data_type < 2) {
       // 50 shots of two records in 500 us, or 34 shots of three in 567 us (the last is cut).
       constexpr std::size_t kEnough = 10;
@@ -262,7 +261,7 @@ void LvxReader::open_frame() {
   if (left < version_.frame_header_bytes) {
     warnings_.push_back(
         {{position_, {}},
-         fmt::format("cut off while recording: {} bytes left, a frame header has {}", left,
+         fmt::format("cut off while recording: {} bytes are left, a frame header has {}", left,
                      version_.frame_header_bytes),
          0});
     position_ = file_.size();
@@ -272,7 +271,9 @@ void LvxReader::open_frame() {
   const std::uint8_t* bytes = file_.at(position_, version_.frame_header_bytes);
   const auto current = load<std::uint64_t>(bytes);
   if (current != position_) {
-    fail(position_, fmt::format("a frame header gives its own position as {}", current));
+    fail(position_,
+         fmt::format("expected a frame header with its own position, found the position {}",
+                     current));
     return;
   }
   next_offset_ = load<std::uint64_t>(bytes + kLvxFrameNextAt);
@@ -287,16 +288,16 @@ void LvxReader::stop_at_cut(std::optional<std::size_t> records) {
   const std::uint64_t left = frame_end_ - position_;
   std::string message = "cut off while recording: ";
   if (left == 0) {
-    message += "the last packet is whole";
+    message += "the last packet is complete";
   } else if (records) {
-    message += fmt::format("{} bytes of a packet of {} records are left", left, *records);
+    message += fmt::format("only {} bytes of a packet of {} records are there", left, *records);
   } else {
-    message += fmt::format("{} bytes of a packet are left", left);
+    message += fmt::format("only {} bytes of a packet are there", left);
   }
   if (open_ended_ && next_offset_ > file_.size()) {
-    message += fmt::format(", its frame should end at byte {}", next_offset_);
+    message += fmt::format("; its frame should end at byte {}", next_offset_);
   } else if (open_ended_) {
-    message += fmt::format(", its frame was never closed (next offset {})", next_offset_);
+    message += fmt::format("; its frame was never closed (next offset {})", next_offset_);
   }
   warnings_.push_back({{position_, {}}, message, records.value_or(0)});
   position_ = file_.size();
@@ -309,9 +310,8 @@ void LvxReader::step_over(std::uint8_t data_type) {
   const auto [entry, is_new] = stepped_over_.try_emplace(data_type, warnings_.size());
   if (is_new) warnings_.push_back({{position_, {}}, {}, 0});
   warnings_[entry->second].message = fmt::format(
-      "a packet has the unknown data type {}; the rest of {} was stepped over", data_type,
-      frames == 1 ? std::string("its frame")
-                  : fmt::format("its and of {} more frames", frames - 1));
+      "a packet has the unknown data type {}; the rest of {} was skipped", data_type,
+      frames == 1 ? std::string("its frame") : fmt::format("its frame and of {} more", frames - 1));
   position_ = frame_end_;
   in_frame_ = false;
   ended_ = open_ended_;
@@ -333,7 +333,7 @@ bool LvxReader::next_package(Chunk& chunk, std::size_t max_rows) {
       load<std::uint64_t>(bytes) == position_) {
     warnings_.push_back(
         {{position_, {}},
-         fmt::format("the frame before was never closed (next offset {})", next_offset_),
+         fmt::format("the previous frame was never closed (next offset {})", next_offset_),
          0});
     in_frame_ = false;
     return true;

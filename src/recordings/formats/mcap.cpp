@@ -17,7 +17,7 @@ constexpr std::string_view kMcap = "mcap";
 const Format kMcapFormat = {
     kMcap,
     "",
-    "MCAP of ROS 2 or ROS 1: messages of Livox drivers, point clouds (read only)",
+    "ROS 2 or ROS 1 bag in MCAP: messages of Livox drivers, point clouds (read only)",
     [](std::string_view head) { return bags::bag_kind(head) == bags::BagKind::mcap; },
     [](const std::string& path, const Progress& progress) -> std::unique_ptr<Reader> {
       return std::make_unique<MessageReader>(bags::open_bag(path, bags::BagKind::mcap, progress),

@@ -181,10 +181,10 @@ void NamedColumns::refuse_directions() const {
   for (const NamedColumn& column : columns_) {
     names += fmt::format("{}{}", names.empty() ? "" : ", ", column.name);
   }
-  throw BadColumns{fmt::format(
-      "expected columns x, y and z, or azimuth and zenith (or elevation) with or without range, "
-      "each with its unit as in x_m or azimuth_deg; found \"{}\"",
-      printable(names))};
+  throw BadColumns{
+      fmt::format("expected columns x, y and z, or azimuth and zenith (or elevation) with or "
+                  "without range, each with its unit, as in x_m or azimuth_deg; found \"{}\"",
+                  printable(names))};
 }
 
 const NamedColumns::Source* NamedColumns::find(Role role) const {
@@ -217,8 +217,8 @@ double NamedColumns::length_unit(std::initializer_list<Role> roles,
     const Source& source = *find(role);
     if (source.meaning.unit) {
       if (unit && unit->per_si != source.meaning.unit->per_si) {
-        throw BadColumns{
-            fmt::format("expected one unit for the columns {}, found several", names_of(roles))};
+        throw BadColumns{fmt::format("expected the same unit for the columns {}, found several",
+                                     names_of(roles))};
       }
       unit = source.meaning.unit;
       ++with_unit;
@@ -230,12 +230,12 @@ double NamedColumns::length_unit(std::initializer_list<Role> roles,
   if (with_unit == roles.size()) return unit->per_si;
   if (with_unit > 0) {
     throw BadColumns{
-        fmt::format("expected a unit for each or none of the columns {}", names_of(roles))};
+        fmt::format("expected a unit for all of the columns {} or for none", names_of(roles))};
   }
   if (!(whole && large)) return 1.0;
   warnings.push_back(
-      fmt::format("the columns {} have no unit and hold whole numbers beyond 1000: they were taken "
-                  "as millimetres; names such as x_m or x_mm tell the unit",
+      fmt::format("the columns {} have no unit and hold whole numbers above 1000: they were taken "
+                  "as millimetres; state the unit in their names, as in x_m or x_mm",
                   names_of(roles)));
   return 1000.0;
 }
@@ -252,9 +252,8 @@ double NamedColumns::angle_unit(const Source& source) const {
   }
   if (!any) return kDegreesPerRadian;  // no row needs it
   throw BadColumns{
-      fmt::format("the angles of column {} may be degrees or radians: none is beyond 2 pi; "
-                  "expected the unit in "
-                  "the column's name, as in azimuth_deg or azimuth_rad",
+      fmt::format("the angles of column {} may be degrees or radians, as none is above 2 pi; "
+                  "expected the unit in the column's name, as in azimuth_deg or azimuth_rad",
                   printable(name_of(source)))};
 }
 
@@ -306,10 +305,10 @@ int NamedColumns::time_shift(const Source& time, RecordingHeader& header,
   constexpr double kShortest_ns = 1e3, kLongest_ns = 1e5;  // between shots; no other unit fits
   if (whole && step >= kShortest_ns && step <= kLongest_ns) {
     if (since_1970(9) && !gps) header.time_reference = TimeReference::utc;
-    warnings.push_back(fmt::format(
-        "column {} was taken as nanoseconds, because it rises by {} from shot to shot; a name such "
-        "as time_ns tells the unit",
-        name, step));
+    warnings.push_back(
+        fmt::format("column {} was taken as nanoseconds, because it rises by {} from shot to shot; "
+                    "state the unit in its name, as in time_ns",
+                    name, step));
     return 9;
   }
   constexpr double kLongest_s = 0.1;
@@ -319,9 +318,9 @@ int NamedColumns::time_shift(const Source& time, RecordingHeader& header,
     if (!since_1970(shift) || step > kLongest_s * std::pow(10.0, shift)) continue;
     if (!gps) header.time_reference = TimeReference::utc;
     if (shift != 0) {
-      warnings.push_back(
-          fmt::format("column {} was taken as {} since 1970; a name such as time_ns tells the unit",
-                      name, unit));
+      warnings.push_back(fmt::format(
+          "column {} was taken as {} since 1970; state the unit in its name, as in time_ns", name,
+          unit));
     }
     return shift;
   }
@@ -329,10 +328,10 @@ int NamedColumns::time_shift(const Source& time, RecordingHeader& header,
                         std::any_of(time.samples.begin(), time.samples.end(),
                                     [](const Decimal& cell) { return cell.decimals != 0; });
   if (time.samples.empty() || (fraction && std::fmax(-low, high) < 9.2e9)) return 0;
-  throw BadColumns{fmt::format(
-      "the unit of column {} cannot be told: it rises by {} from shot to shot, up to {}; expected "
-      "the unit in the column's name, as in time_s, time_us or time_ns",
-      name, step, high)};
+  throw BadColumns{
+      fmt::format("the unit of column {} is unclear: its values rise by {} from shot to shot, up "
+                  "to {}; expected the unit in the column's name, as in time_s, time_us or time_ns",
+                  name, step, high)};
 }
 
 void NamedColumns::settle_time(RecordingHeader& header, std::vector<std::string>& warnings) {
@@ -349,10 +348,10 @@ void NamedColumns::settle_time(RecordingHeader& header, std::vector<std::string>
     }
   }
   if (!shared.empty()) {
-    warnings.push_back(fmt::format(
-        "column {} holds one time for many shots, of their packet or frame, and no times of single "
-        "shots{}",
-        printable(shared), chosen != nullptr ? "" : ": the recording has none"));
+    warnings.push_back(
+        fmt::format("column {} holds one time for many shots, that of their packet or frame, and "
+                    "no times of single shots{}",
+                    printable(shared), chosen != nullptr ? "" : ": the recording has no times"));
   }
   header.has_times = chosen != nullptr;
   auto& cell = cell_of_[static_cast<std::size_t>(Role::time)];
@@ -372,7 +371,7 @@ void NamedColumns::settle_index(std::vector<std::string>& warnings) {
       continue;
     }
     warnings.push_back(
-        fmt::format("column {} is no number of shots: {} follows {}; rows were counted instead",
+        fmt::format("column {} does not count shots: {} follows {}; rows were counted instead",
                     printable(name_of(*index)), cell.value, last));
     cell_of_[static_cast<std::size_t>(Role::index)].reset();
     return;
@@ -403,7 +402,7 @@ void NamedColumns::settle_intensity(RecordingHeader& header, std::vector<std::st
   } else if (high <= 1.0 && !all_whole(intensity->samples)) {
     intensity_factor_ = 255.0;
     warnings.push_back(
-        fmt::format("column {} holds {} to {}: taken as parts of 255", name, low, high));
+        fmt::format("column {} holds {} to {}: it was multiplied by 255", name, low, high));
   }
 }
 
@@ -438,7 +437,7 @@ void NamedColumns::settle(RecordingHeader& header, std::vector<std::string>& war
     for (const std::size_t column : unused_) {
       names += fmt::format("{}{}", names.empty() ? "" : ", ", columns_[column].name);
     }
-    warnings.push_back(fmt::format("columns that are not used: {}", printable(names)));
+    warnings.push_back(fmt::format("columns that were not used: {}", printable(names)));
   }
   for (Source& source : sources_) source.samples = {};
 }

@@ -158,13 +158,13 @@ NamedTextLayout read_layout(const std::string& path) {
   const auto head = find_head(bytes);
   if (!head) {
     throw FileError(path, {.byte_offset = {}, .line = 1},
-                    "expected a text with a line of column names, found none");
+                    "expected a line with the names of the columns, found none");
   }
   if (head->layout.names.empty()) {
     throw FileError(
         path, {.byte_offset = {}, .line = head->layout.first_row_line},
-        "expected a line with the names of the columns before the first row, found numbers "
-        "without names; add one, such as x_m,y_m,z_m or time_s,azimuth_deg,zenith_deg,range_m");
+        "expected a line with the names of the columns before the first row, found numbers; add "
+        "such a line, as in x_m,y_m,z_m or time_s,azimuth_deg,zenith_deg,range_m");
   }
   return head->layout;
 }

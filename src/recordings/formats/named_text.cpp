@@ -74,7 +74,7 @@ std::string_view HeaderLines::next() {
     fail(bytes_.size() < file_size_
              ? fmt::format("expected a header of at most {} bytes, found a longer one",
                            bytes_.size())
-             : std::string("expected more lines of the header, found the end of the file"));
+             : std::string("expected further lines of the header, found the end of the file"));
   }
   offset_ += end + 1;
   std::string_view line = rest.substr(0, end);

@@ -132,7 +132,8 @@ class NetcdfReader final : public Reader {
   void read_header() {
     if (!file_.has_attribute(kMarker)) {
       file_.fail(fmt::format(
-          "a NetCDF file, but not of a recording: its global attribute {} is missing", kMarker));
+          "is a NetCDF file, but not a recording of risley: its global attribute {} is missing",
+          kMarker));
     }
     if (const auto version = file_.number(kMarker); version != kLayoutVersion) {
       file_.fail(fmt::format("expected {} = {}, found {}", kMarker, kLayoutVersion, version));

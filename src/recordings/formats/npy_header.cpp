@@ -138,8 +138,8 @@ void add_field(ArrayHeader& header, const std::string& name, const SimpleType& t
                std::uint64_t count) {
   const std::uint64_t bytes = checked_product(type.bytes, count);
   if (header.element_bytes + bytes > kMostRecordBytes) {
-    throw BadArray{
-        fmt::format("expected elements of at most {} bytes, found more", kMostRecordBytes)};
+    throw BadArray{fmt::format("expected array elements of at most {} bytes, found larger ones",
+                               kMostRecordBytes)};
   }
   std::string full_name = name;
   if (!type.time_unit.empty() && !name.empty()) full_name += "_" + type.time_unit;
@@ -155,7 +155,7 @@ void add_field(ArrayHeader& header, const std::string& name, const SimpleType& t
 /// A list of fields: (name, type), (name, type, shape), where types may be lists again. Nameless
 /// fields are padding.
 void take_fields(LiteralReader& reader, ArrayHeader& header, int depth) {
-  if (depth > kDeepest) reader.fail("types that are nested less deeply");
+  if (depth > kDeepest) reader.fail("less deeply nested types");
   reader.require('[');
   while (!reader.take(']')) {
     reader.require('(');
@@ -214,7 +214,7 @@ ArrayHeader read_array_header(ByteSource& source) {
   const auto take = [&source](std::uint8_t* bytes, std::size_t count) {
     if (source.read(bytes, count) == count) return;
     throw BadArray{source.problem().empty()
-                       ? "expected the header of an array, found the end"
+                       ? "expected the header of an array, found the end of the file"
                        : fmt::format("expected the header of an array: {}", source.problem())};
   };
   take(start.data(), kVersion1Bytes);
@@ -300,7 +300,7 @@ void add_table(const ArrayHeader& header, const OpenArray& open, BinaryTable& ta
     }
     if (!others.empty()) {
       table.warnings.push_back(
-          fmt::format("fields that are no numbers were left out: {}", printable(others)));
+          fmt::format("fields that do not hold numbers were left out: {}", printable(others)));
     }
     return;
   }

@@ -36,7 +36,7 @@ BinaryTable npy_table(const std::string& path) {
     const std::uint64_t end = header.data_offset + header.elements() * header.element_bytes;
     const std::uint64_t size = io::BlockInput(path).size();
     if (size > end) {
-      table.warnings.push_back(fmt::format("{} bytes behind the array were not read", size - end));
+      table.warnings.push_back(fmt::format("{} bytes after the array were not read", size - end));
     }
     return table;
   } catch (const BadArray& bad) {
@@ -112,7 +112,7 @@ BinaryTable npz_table(const std::string& path) {
   std::vector<std::string> left_out;
   const std::vector<Member> members = npz_members(path, left_out);
   if (members.empty()) {
-    throw FileError(path, {0, {}}, "expected a zip file of NumPy arrays, found none in it");
+    throw FileError(path, {0, {}}, "expected a zip file of NumPy arrays, found no array in it");
   }
   BinaryTable table;
   table.columns_offset = members.front().begin;
@@ -160,8 +160,8 @@ BinaryTable npz_table(const std::string& path) {
   if (!left_out.empty()) {
     std::string names;
     for (const std::string& name : left_out) names += (names.empty() ? "" : ", ") + name;
-    table.warnings.push_back(fmt::format("members that are no columns of {} rows were left out: {}",
-                                         table.rows, printable(names)));
+    table.warnings.push_back(fmt::format(
+        "members that are not columns of {} rows were left out: {}", table.rows, printable(names)));
   }
   return table;
 }

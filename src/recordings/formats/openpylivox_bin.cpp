@@ -94,7 +94,7 @@ class OpenpylivoxBinReader final : public Reader {
   OpenpylivoxLayout read_layout() {
     if (input_.size() < kHeaderBytes) {
       fail(input_.size(),
-           fmt::format("expected a header of {} bytes, found the file's end", kHeaderBytes));
+           fmt::format("expected a header of {} bytes, found the end of the file", kHeaderBytes));
     }
     const std::uint8_t* const bytes = input_.at(0, kHeaderBytes);
     const std::string_view head(reinterpret_cast<const char*>(bytes), kHeaderBytes);

@@ -100,10 +100,10 @@ PcdHeader read_pcd_header(const std::string& path) {
               decimal_field(words[i], key).value == decimal_field(kIdentity[i - 1], key).value;
         }
         if (!identity) {
-          header.warnings.push_back(fmt::format(
-              "the header tells a pose of the sensor, \"{}\": the points were taken as they stand, "
-              "as if they were in its frame",
-              printable(line)));
+          header.warnings.push_back(
+              fmt::format("the header states a pose of the sensor, \"{}\": it was ignored, and the "
+                          "points were taken to be in the frame of the sensor",
+                          printable(line)));
         }
       } else if (key == "DATA") {
         header.data = std::string(only_value());
@@ -116,7 +116,7 @@ PcdHeader read_pcd_header(const std::string& path) {
   }
   header.data_line = lines.line() + 1;
   header.data_offset = lines.offset();
-  if (header.fields.empty()) lines.fail("expected a line FIELDS before DATA, found none");
+  if (header.fields.empty()) lines.fail("expected a FIELDS line before DATA, found none");
   std::uint64_t numbers = 0;
   for (const PcdField& field : header.fields) numbers += field.count;
   if (numbers > kMostRecordBytes) {
@@ -127,11 +127,11 @@ PcdHeader read_pcd_header(const std::string& path) {
   if (width && __builtin_mul_overflow(*width, height.value_or(1), &product)) {
     lines.fail(fmt::format("expected WIDTH x HEIGHT below 2^64, found {} x {}", *width, *height));
   }
-  if (!width && !points) lines.fail("expected a line POINTS or WIDTH before DATA, found none");
+  if (!width && !points) lines.fail("expected a POINTS or WIDTH line before DATA, found none");
   header.points = points.value_or(product);
   if (width && product != header.points) {
     header.warnings.push_back(
-        fmt::format("the header has POINTS {} but WIDTH x HEIGHT = {}: POINTS was taken",
+        fmt::format("the header has POINTS {} but WIDTH x HEIGHT = {}: POINTS was used",
                     header.points, product));
   }
   return header;
@@ -194,28 +194,28 @@ BinaryTable binary_table(const std::string& path, PcdHeader header) {
     const std::uint64_t left = file_size - begin;
     if (point_bytes > 0 && header.points <= left / point_bytes &&
         left > header.points * point_bytes) {
-      table.warnings.push_back(fmt::format("{} bytes behind the last point were not read",
+      table.warnings.push_back(fmt::format("{} bytes after the last point were not read",
                                            left - header.points * point_bytes));
     }
     return table;
   }
   constexpr std::size_t kSizesBytes = 8;
   if (file_size - begin < kSizesBytes) {
-    fail(begin, "expected the two sizes of the packed points, found the end of the file");
+    fail(begin, "expected the two sizes of the compressed points, found the end of the file");
   }
   io::BlockInput file(path);
   const std::uint8_t* const sizes = file.at(begin, kSizesBytes);
   const auto packed_bytes = load<std::uint32_t>(sizes), all_bytes = load<std::uint32_t>(sizes + 4);
   std::uint64_t expected = 0;
   if (__builtin_mul_overflow(header.points, point_bytes, &expected) || expected != all_bytes) {
-    fail(begin + 4, fmt::format("expected {} points of {} bytes, found {} bytes of packed points",
-                                header.points, point_bytes, all_bytes));
+    fail(begin + 4,
+         fmt::format("expected {} points of {} bytes, found a size of {} bytes before compression",
+                     header.points, point_bytes, all_bytes));
   }
   const std::uint64_t packed_begin = begin + kSizesBytes;
   if (packed_bytes > file_size - packed_begin) {
     table.warnings.push_back(
-        fmt::format("expected {} bytes of packed points, found {}: the file was "
-                    "cut off",
+        fmt::format("expected {} bytes of compressed points, found {}: the file was cut off",
                     packed_bytes, file_size - packed_begin));
   }
   for (std::size_t i = 0; i < header.fields.size(); ++i) {
@@ -247,7 +247,7 @@ bool is_pcd(std::string_view head) {
 const Format kPcdFormat = {
     kPcd,
     "",
-    "PCD point cloud, as text, bytes or packed bytes (read only)",
+    "PCD point cloud: text, binary or compressed binary (read only)",
     is_pcd,
     [](const std::string& path, const Progress&) -> std::unique_ptr<Reader> {
       PcdHeader header = read_pcd_header(path);

@@ -105,7 +105,7 @@ PlyHeader read_ply_header(const std::string& path) {
       }
       has_format = true;
     } else if (words[0] == "element" && words.size() == 3) {
-      if (!has_format) lines.fail("expected the line of the format before the first element");
+      if (!has_format) lines.fail("expected the format line before the first element");
       try {
         header.elements.push_back(
             {std::string(words[1]), count_field(words[2], "element"), lines.line(), offset, {}});
@@ -203,7 +203,7 @@ BinaryTable binary_table(const std::string& path, const PlyHeader& header) {
 const Format kPlyFormat = {
     kPly,
     "",
-    "PLY point cloud, as text or bytes (read only)",
+    "PLY point cloud: text or binary (read only)",
     [](std::string_view head) { return head.starts_with("ply\n") || head.starts_with("ply\r\n"); },
     [](const std::string& path, const Progress&) -> std::unique_ptr<Reader> {
       const PlyHeader header = read_ply_header(path);

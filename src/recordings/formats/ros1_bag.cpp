@@ -17,7 +17,7 @@ constexpr std::string_view kRos1Bag = "ros1-bag";
 const Format kRos1BagFormat = {
     kRos1Bag,
     "",
-    "bag of ROS 1: messages of Livox drivers, point clouds (read only)",
+    "ROS 1 bag: messages of Livox drivers, point clouds (read only)",
     [](std::string_view head) { return bags::bag_kind(head) == bags::BagKind::ros1; },
     [](const std::string& path, const Progress& progress) -> std::unique_ptr<Reader> {
       return std::make_unique<MessageReader>(bags::open_bag(path, bags::BagKind::ros1, progress),

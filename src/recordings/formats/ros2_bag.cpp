@@ -17,7 +17,7 @@ constexpr std::string_view kRos2Bag = "ros2-bag";
 const Format kRos2BagFormat = {
     kRos2Bag,
     "",
-    "bag of ROS 2 in SQLite (.db3): messages of Livox drivers, point clouds (read only)",
+    "ROS 2 bag in SQLite (.db3): messages of Livox drivers, point clouds (read only)",
     [](std::string_view head) { return bags::bag_kind(head) == bags::BagKind::ros2; },
     [](const std::string& path, const Progress& progress) -> std::unique_ptr<Reader> {
       return std::make_unique<MessageReader>(bags::open_bag(path, bags::BagKind::ros2, progress),

@@ -93,10 +93,10 @@ class ScanSequenceReader final : public TextTableReader {
     if (beyond_180) header_.set_detail(kAzimuthSense, "0-360");
     if (all_shot_numbers) {
       header_.has_times = false;
-      warnings_.push_back({{.byte_offset = {}, .line = 2},
-                           "column Time/s holds shot numbers and no seconds; the time between "
-                           "shots is unknown",
-                           0});
+      warnings_.push_back(
+          {{.byte_offset = {}, .line = 2},
+           "column Time/s holds shot numbers instead of seconds; the time between shots is unknown",
+           0});
     }
   }
 

@@ -91,11 +91,12 @@ bool TextTableReader::read(Chunk& chunk, std::size_t max_rows) {
       const int decimals = all_fields ? decimals_of(fields_.back()) : 0;
       if (!lines_.has_line_end() &&
           !(all_fields && decimals > 0 && decimals == last_field_decimals_)) {
-        warnings_.push_back({{.byte_offset = {}, .line = lines_.line_number()},
-                             fmt::format("the last line has no line end and may be cut off "
-                                         "(\"{}\"); it was left out",
-                                         printable(line)),
-                             rows_left_.value_or(1)});
+        warnings_.push_back(
+            {{.byte_offset = {}, .line = lines_.line_number()},
+             fmt::format(
+                 "the last line has no line end and may be cut off (\"{}\"); it was left out",
+                 printable(line)),
+             rows_left_.value_or(1)});
         finished_ = true;
         break;
       }

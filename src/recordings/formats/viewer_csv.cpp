@@ -202,13 +202,13 @@ class ViewerCsvReader final : public TextTableReader {
     chunk.packet_begins.push_back(chunk.observations.size());
     if (sensor.rows < sensor.rows_expected && !short_packet_reported_) {
       short_packet_reported_ = true;
-      warnings_.push_back({{.byte_offset = {}, .line = line_number()},
-                           fmt::format("the packet before has {} of {} points; where points are "
-                                       "missing in a packet, the times of those after them are "
-                                       "too early",
-                                       sensor.rows, sensor.rows_expected),
-                           sensor.rows_expected - sensor.rows,
-                           true});
+      warnings_.push_back(
+          {{.byte_offset = {}, .line = line_number()},
+           fmt::format("the previous packet has {} of {} points; where points are missing in a "
+                       "packet, the times of those after them are too early",
+                       sensor.rows, sensor.rows_expected),
+           sensor.rows_expected - sensor.rows,
+           true});
     }
     Packet packet;
     // The table has nanoseconds also where the packet had a date.

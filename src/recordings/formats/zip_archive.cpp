@@ -78,7 +78,7 @@ class ZipDirectory {
         return size - back;
       }
     }
-    fail(size, "expected the directory of a zip file, found the end: the file was cut off");
+    fail(size, "expected the directory of a zip file, found the end of the file: it was cut off");
   }
 
   void read_end64(std::uint64_t end, std::uint64_t& count, std::uint64_t& offset) {
@@ -118,12 +118,12 @@ class ZipDirectory {
     if (member.name.ends_with('/')) return std::nullopt;
     const std::string name = printable(member.name);
     if ((flags & kEncryptedFlag) != 0) {
-      fail(place, fmt::format("member {} is encrypted, expected a plain one", name));
+      fail(place, fmt::format("member {} is encrypted, expected one that is not", name));
     }
     if (member.method != kStored && member.method != kDeflated) {
-      fail(place, fmt::format("member {} is packed by method {}, expected 0 (stored) or 8 "
-                              "(deflated)",
-                              name, member.method));
+      fail(place,
+           fmt::format("member {} is compressed by method {}, expected 0 (stored) or 8 (deflated)",
+                       name, member.method));
     }
     const std::uint8_t* const header = bytes_at(local, kLocalBytes, "a member's header");
     if (load<std::uint32_t>(header) != kLocalSignature) {
@@ -132,14 +132,15 @@ class ZipDirectory {
     member.begin =
         local + kLocalBytes + load<std::uint16_t>(header + 26) + load<std::uint16_t>(header + 28);
     if (member.begin > file_.size() || member.packed_bytes > file_.size() - member.begin) {
-      fail(local, fmt::format("expected {} packed bytes of member {}, found the end of the file",
-                              member.packed_bytes, name));
+      fail(local,
+           fmt::format("expected {} compressed bytes of member {}, found the end of the file",
+                       member.packed_bytes, name));
     }
     const bool stored = member.method == kStored;
     if (stored ? member.bytes != member.packed_bytes
                : member.bytes / kMostExpansion > member.packed_bytes) {
       fail(place,
-           fmt::format("member {} is said to have {} bytes, which {} packed bytes cannot hold",
+           fmt::format("member {} is said to have {} bytes, more than {} compressed bytes can hold",
                        name, member.bytes, member.packed_bytes));
     }
     return member;
@@ -176,7 +177,7 @@ class MemberSource final : public ByteSource {
         packed_(path, member.begin, member.begin + member.packed_bytes),
         block_(member.method == kDeflated ? kBlockBytes : 0) {
     if (member.method == kDeflated && inflateInit2(&stream_, -MAX_WBITS) != Z_OK) {
-      throw FileError(path, {member.begin, {}}, "no memory to unpack a member");
+      throw FileError(path, {member.begin, {}}, "there is not enough memory to unpack a member");
     }
   }
   ~MemberSource() override {

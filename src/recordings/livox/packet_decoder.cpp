@@ -157,7 +157,7 @@ void append_records(const RecordLayout& layout, const std::uint8_t* bytes, bool 
   if (impossible) {
     rows.resize(first_row);
     throw BadPacket(*impossible * layout.bytes_per_record,
-                    float_points ? "a point has a coordinate that is no finite number"
+                    float_points ? "a point has a coordinate that is not a finite number"
                                  : "a return has an angle outside zenith [0, 18000] or azimuth "
                                    "[0, 36000] x 0.01 deg");
   }
@@ -202,8 +202,8 @@ void PacketDecoder::decode(std::span<const std::uint8_t> bytes, Chunk& chunk) {
   const std::optional<std::int64_t> time_ns = clock.time_ns(packet);
   if (!time_ns) {
     throw BadPacket(kTimestampTypeAt,
-                    fmt::format("timestamp of type {} with the bytes {:02X} is no time",
-                                packet.timestamp_type, fmt::join(packet.timestamp, " ")));
+                    fmt::format("the bytes {:02X} are not a time stamp of type {}",
+                                fmt::join(packet.timestamp, " "), packet.timestamp_type));
   }
   packet.rows = static_cast<std::uint32_t>(layout->rows());
   packet.device_index = options_.device;
@@ -216,8 +216,8 @@ void PacketDecoder::decode(std::span<const std::uint8_t> bytes, Chunk& chunk) {
         options_.grid ? options_.grid : shot_grid(options_.device_type, packet.data_type);
     if (!grid) {
       throw InvalidArgument(
-          fmt::format("device type = {} does not tell the shot rate of data type {}, allowed 1, 2, "
-                      "3, 6 and 7, or any with PacketDecoderOptions::grid",
+          fmt::format("device type = {}, whose shot rate with data type {} is unknown; allowed 1, "
+                      "2, 3, 6 and 7, or any with PacketDecoderOptions::grid",
                       options_.device_type, packet.data_type));
     }
     behind_header([&] {
@@ -231,7 +231,7 @@ void PacketDecoder::decode(std::span<const std::uint8_t> bytes, Chunk& chunk) {
 
 Packet decode_packet_header(std::span<const std::uint8_t> bytes) {
   if (bytes.size() < kPacketHeaderBytes) {
-    throw BadPacket(bytes.size(), fmt::format("expected {} bytes of header and more, found {}",
+    throw BadPacket(bytes.size(), fmt::format("expected a packet header of {} bytes, found {}",
                                               kPacketHeaderBytes, bytes.size()));
   }
   Packet packet;

@@ -140,28 +140,26 @@ ExplorerHeader read_explorer_header(const std::string& path) {
     if (in_scaling && (position || attitude)) {
       const auto scale = scaling_of(text);
       if (!scale) {
-        header.warnings.push_back(
-            {{{}, lines.line_number()},
-             fmt::format("\"{}\" is no scaling of standard deviations that is understood: they are "
-                         "taken for one sigma",
-                         io::printable(text))});
+        header.warnings.push_back({{{}, lines.line_number()},
+                                   fmt::format("\"{}\" is not a known scaling of standard "
+                                               "deviations: they are taken as one sigma",
+                                               io::printable(text))});
       } else {
         (position ? header.position_scale : header.attitude_scale) = *scale;
         if (*scale != 1) {
-          header.warnings.push_back(
-              {{{}, lines.line_number()},
-               fmt::format("standard deviations of the {} were written {:g} times as large: they "
-                           "are divided by it",
-                           position ? "position" : "attitude", *scale)});
+          header.warnings.push_back({{{}, lines.line_number()},
+                                     fmt::format("standard deviations of the {} were written {:g} "
+                                                 "times as large: they are divided by that",
+                                                 position ? "position" : "attitude", *scale)});
         }
       }
     }
     before = text;
   }
-  throw FileError(path, {},
-                  "holds no line of names of columns with a line of their units below it; expected "
-                  "text of Inertial Explorer with GPSTime, Latitude, Longitude, H-Ell, Roll, Pitch "
-                  "and Heading");
+  throw FileError(
+      path, {},
+      "has no line of column names with a line of their units below it; expected text of Inertial "
+      "Explorer with GPSTime, Latitude, Longitude, H-Ell, Roll, Pitch and Heading");
 }
 
 /// Sets scale and fields of a column by its unit. @throws FileError
@@ -268,8 +266,8 @@ Trajectory read_explorer(const std::string& path, const Progress& progress) {
     refuse(
         fmt::format("column {} is missing{}", fmt::join(missing, ", "),
                     has_word(header.names, "h-msl") && missing.size() == 1 && missing[0] == "H-Ell"
-                        ? ": H-MSL counts from a geoid that the file does not name; export the "
-                          "ellipsoidal height"
+                        ? ": H-MSL is a height above a geoid that the file does not name; export "
+                          "the ellipsoidal height"
                         : ""));
   }
   take_contents(table, header.warnings);

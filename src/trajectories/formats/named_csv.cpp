@@ -167,7 +167,7 @@ PoseTable csv_table(const std::string& path, std::string_view header,
       column.field = found->name->field;
       if (has_field(table.columns, column.field)) {
         refuse(fmt::format(
-            "column {} says again what {} says", io::printable(name),
+            "column {} repeats {}", io::printable(name),
             std::find_if(table.columns.begin(), table.columns.end(), [&](const PoseColumn& other) {
               return other.field == column.field;
             })->name));
@@ -204,11 +204,10 @@ PoseTable csv_table(const std::string& path, std::string_view header,
     return names;
   };
   if (time == nullptr) {
-    refuse(
-        fmt::format("no column of times: expected time_s, gps_second_of_week_s, "
-                    "utc_second_of_day_s, gps_s, adjusted_gps_s or utc_unix_s, or the same in "
-                    "_ms, _us or _ns; the columns are {}",
-                    io::printable(header)));
+    refuse(fmt::format(
+        "has no column of times: expected time_s, gps_second_of_week_s, utc_second_of_day_s, "
+        "gps_s, adjusted_gps_s or utc_unix_s, or the same in _ms, _us or _ns; the columns are {}",
+        io::printable(header)));
   }
   table.contents.time_scale = time->scale;
   const auto geodetic = missing({{PoseField::latitude, "latitude_deg"},
@@ -252,7 +251,7 @@ PoseTable csv_table(const std::string& path, std::string_view header,
   }
   take_contents(table, warnings);
   for (const std::string& name : unknown) {
-    warnings.push_back({{{}, 1}, fmt::format("column {} is not read", io::printable(name))});
+    warnings.push_back({{{}, 1}, fmt::format("column {} was ignored", io::printable(name))});
   }
   return table;
 }

@@ -151,7 +151,7 @@ void PoseRows::make_times_run_on() {
   trajectory_.week_crossings = crossings;
   if (crossings == 0) return;
   warn({},
-       fmt::format("{} ends within the trajectory: times run on beyond it",
+       fmt::format("{} ends within the trajectory: times were continued beyond it",
                    contents_.time_scale == TimeScale::gps_second_of_week ? "the GPS week (604800 s)"
                                                                          : "the day (86400 s)"));
 }
@@ -161,18 +161,17 @@ void PoseRows::put_in_order() {
   const TimeOrder& told = order.told;
   trajectory_.time_order = told;
   if (told.largest_back_ns > kLatest_ns) {
-    refuse(
-        told.largest_back_at, places_[told.largest_back_at],
-        fmt::format("time runs back by {:.6f} s, to {:.6f} s; expected one flight with one clock: "
-                    "keep its records alone",
-                    1e-9 * static_cast<double>(told.largest_back_ns),
-                    1e-9 * static_cast<double>(trajectory_.time_ns[told.largest_back_at])));
+    refuse(told.largest_back_at, places_[told.largest_back_at],
+           fmt::format("time jumps back by {:.6f} s, to {:.6f} s; expected one flight with one "
+                       "clock: keep only its records",
+                       1e-9 * static_cast<double>(told.largest_back_ns),
+                       1e-9 * static_cast<double>(trajectory_.time_ns[told.largest_back_at])));
   }
   if (order.rows.empty()) return;
   if (told.moved > 0) {
     warn(places_[told.largest_back_at],
-         fmt::format("records behind later ones: {} of {}, by up to {:.6f} s; all were put into "
-                     "the order of their times",
+         fmt::format("records that come after later ones: {} of {}, by up to {:.6f} s; all were "
+                     "sorted by time",
                      told.moved, trajectory_.size(),
                      1e-9 * static_cast<double>(told.largest_back_ns)));
   }

@@ -155,7 +155,7 @@ void take_contents(PoseTable& table, std::vector<TrajectoryWarning>& warnings) {
     }
     if (!there.empty()) {
       warnings.push_back({{},
-                          fmt::format("{} are there in part ({}), and were left out", what,
+                          fmt::format("{} are incomplete (only {}) and were left out", what,
                                       fmt::join(there, ", "))});
     }
     return false;
@@ -205,7 +205,9 @@ Trajectory read_pose_table(const std::string& path, const PoseTable& table,
     }
     if (table.comment != '\0' && io::trimmed(line).starts_with(table.comment)) continue;
     std::string problem;
-    if (empty_line) problem = fmt::format("a row behind the empty line {}", *empty_line);
+    if (empty_line)
+      problem =
+          fmt::format("found a row after the empty line {}, which ends the records", *empty_line);
     std::optional<PoseRow> row;
     try {
       const std::size_t count = io::split_fields(line, table.delimiter, fields);
@@ -218,7 +220,7 @@ Trajectory read_pose_table(const std::string& path, const PoseTable& table,
     }
     const bool footer = table.has_footer && empty_line && !row;
     if (footer) {
-      rows.warn(place, "text behind the records was not read");
+      rows.warn(place, "text after the records was not read");
       break;
     }
     const bool cut = !lines.has_line_end() &&

@@ -104,8 +104,8 @@ Trajectory read_pospac(const std::string& path, const Progress& progress) {
   }
   if (!degrees && !arc_minutes) {
     warnings.push_back({{{}, table.first_row - 1},
-                        "no unit of the attitudes' standard deviations is named: degrees are "
-                        "assumed"});
+                        "the unit of the standard deviations of roll, pitch and heading is not "
+                        "stated: degrees are assumed"});
   }
   const std::uint64_t names_line = table.first_row - 1;
   const bool heights = names.find("ELLIPSOID HEIGHT") != names.npos;

@@ -106,17 +106,16 @@ void add_ros_pose(const bags::Bag& bag, const bags::Message& message, const RosP
     constexpr std::string_view kGeocentricFrame = "earth";  // REP 105
     if (pose.frame == kGeocentricFrame) {
       bag.fail(message,
-               "stands in the frame earth, which is geocentric; expected a frame with z up (map, "
-               "odom, or one of its own)");
+               "is in the frame earth, which is geocentric; expected a frame with z up (map, odom, "
+               "or one of its own)");
     }
   } else if (pose.frame != all.frame || pose.body != all.body) {
-    bag.fail(message,
-             fmt::format("is the pose of \"{}\" in the frame \"{}\", the messages before it of "
-                         "\"{}\" in \"{}\"; expected one body in one frame",
-                         pose.body, pose.frame, all.body, all.frame));
+    bag.fail(message, fmt::format("is the pose of \"{}\" in the frame \"{}\", but earlier messages "
+                                  "are of \"{}\" in \"{}\"; expected one body in one frame",
+                                  pose.body, pose.frame, all.body, all.frame));
   }
   if (pose.time_ns == 0 && ++all.zero_stamps > 1) {
-    bag.fail(message, "has the stamp 0 like another before it: the stamps were not set");
+    bag.fail(message, "has the time stamp 0 like an earlier message: the time stamps were not set");
   }
   PoseRow row;
   row.time_ns = pose.time_ns;
@@ -178,9 +177,10 @@ Trajectory read_ros_bag(const std::string& path, const std::string& topic_name,
   PoseRows rows(path, contents);
   const auto warn_of_part = [&](std::size_t without, const char* what) {
     if (without == 0 || without == all.rows.size()) return;
-    rows.warn({}, fmt::format("{} of {} messages of topic {} state no {}: those of the others were "
-                              "left out",
-                              without, all.rows.size(), topic.name, what));
+    rows.warn(
+        {}, fmt::format(
+                "{} of {} messages of topic {} state no {}; they were left out for the others, too",
+                without, all.rows.size(), topic.name, what));
   };
   warn_of_part(all.without_accuracy, "accuracies of position and attitude");
   warn_of_part(all.without_velocity, "velocities");
@@ -195,7 +195,7 @@ Trajectory read_ros_bag(const std::string& path, const std::string& topic_name,
 
 const Format kRosBagFormat{"ros-bag",
                            "",
-                           "bag of ROS 1 or ROS 2, MCAP: odometry, poses, transforms",
+                           "ROS 1 or ROS 2 bag, also as MCAP: odometry, poses, transforms",
                            is_bag,
                            [](const std::string& path, const Progress& progress) {
                              return read_ros_bag(path, {}, progress);

@@ -23,11 +23,10 @@ bool is_rtklib(const FileHead& head) {
 }
 
 Trajectory refuse_rtklib(const std::string& path, const Progress& /*progress*/) {
-  throw FileError(
-      path, {},
-      "is a solution of RTKLIB: it holds places, but neither roll nor pitch nor heading, "
-      "without which no beam has a direction; expected the trajectory of an inertial "
-      "navigation system, such as an SBET");
+  throw FileError(path, {},
+                  "is a solution of RTKLIB: it holds positions, but neither roll nor pitch nor "
+                  "heading, without which no beam has a direction; expected the trajectory of an "
+                  "inertial navigation system, such as an SBET");
 }
 
 }  // namespace

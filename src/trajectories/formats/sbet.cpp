@@ -83,8 +83,8 @@ Trajectory read_sbet(const std::string& path, const Progress& progress) {
   io::BlockInput file(path);
   if (file.size() == 0 || file.size() % kSbetRecord != 0) {
     throw FileError(path, {},
-                    fmt::format("has {} bytes, no multiple of the 136 bytes of a record: the file "
-                                "was cut off or is no SBET",
+                    fmt::format("has {} bytes, not a multiple of the 136 bytes of a record: the "
+                                "file was cut off or is not an SBET",
                                 file.size()));
   }
   RowContents contents;
@@ -98,8 +98,8 @@ Trajectory read_sbet(const std::string& path, const Progress& progress) {
     constexpr double kMostWeeks = 20 * 604800.0;
     if (!time_ns || n[kSbetTime] < -1 || n[kSbetTime] > kMostWeeks) {
       throw FileError(path, {offset, {}},
-                      fmt::format("time = {:.10g} s, allowed 0 to 604800, or some weeks more where "
-                                  "times run on: GPS second of week",
+                      fmt::format("time = {:.10g} s, allowed 0 to 604800 (GPS second of week), or "
+                                  "some weeks more where times continue beyond a week",
                                   n[kSbetTime]));
     }
     PoseRow row;

@@ -75,8 +75,8 @@ AccuracyRecords load_accuracies(const std::string& path, const Progress& progres
   io::BlockInput file(path);
   if (file.size() == 0 || file.size() % kSmrmsgRecord != 0) {
     throw FileError(path, {},
-                    fmt::format("has {} bytes, no multiple of the 80 bytes of a record: the file "
-                                "was cut off or is no SMRMSG",
+                    fmt::format("has {} bytes, not a multiple of the 80 bytes of a record: the "
+                                "file was cut off or is not an SMRMSG",
                                 file.size()));
   }
   AccuracyRecords records;
@@ -107,7 +107,7 @@ AccuracyRecords load_accuracies(const std::string& path, const Progress& progres
       if (time < week / 2) time += week;
     }
     records.warnings.push_back(
-        {{}, "the GPS week (604800 s) ends within the accuracies: times run on beyond it"});
+        {{}, "the GPS week (604800 s) ends within the accuracies: times were continued beyond it"});
   }
   const RowOrder order = row_order(records.time_ns);
   const auto place_of = [](std::size_t row) {
@@ -116,9 +116,8 @@ AccuracyRecords load_accuracies(const std::string& path, const Progress& progres
   if (order.told.moved > 0) {
     records.warnings.push_back(
         {place_of(order.told.largest_back_at),
-         fmt::format(
-             "records behind later ones: {} of {}; all were put into the order of their times",
-             order.told.moved, records.time_ns.size())});
+         fmt::format("records that come after later ones: {} of {}; all were sorted by time",
+                     order.told.moved, records.time_ns.size())});
   }
   if (order.told.repeated > 0) {
     records.warnings.push_back(
