@@ -217,7 +217,7 @@ TEST(EstimateReport, DrawsEveryDistributionOfThePaper) {
   }
   // Thinned to what a page can hold, and said so.
   EXPECT_LE(r.residual_charts[0].series[0].x.size(), 4000u);
-  EXPECT_THAT(r.residual_charts[0].note, HasSubstr("Of 30\u202f000 shots one in 8 is drawn."));
+  EXPECT_THAT(r.residual_charts[0].note, HasSubstr("One in 8 of the 30\u202f000 shots is drawn."));
   // The density counts every shot of its half second.
   const report::Series& density = r.pattern_charts[1].series[0];
   double shots = 0;
@@ -254,7 +254,7 @@ TEST(EstimateReport, TheFiltersPageTellsTheSameThings) {
   EXPECT_LT(r.pieces->chi2, 1.5);
   EXPECT_EQ(r.parameter_charts.size(), r.free.size());
   EXPECT_FALSE(r.advice.empty());
-  EXPECT_THAT(report::estimate_page(r), HasSubstr("stand still"));
+  EXPECT_THAT(report::estimate_page(r), HasSubstr("Are the parameters stable?"));
 }
 
 }  // namespace risley::estimate_report_test
