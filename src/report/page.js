@@ -9,7 +9,7 @@
   const data = JSON.parse(document.getElementById('page-data').textContent);
   const sequential = ['#440154', '#414487', '#2a788e', '#22a884', '#7ad151', '#fde725'];
   const margins = { left: 74, right: 24, top: 36, bottom: 52 };
-  const toolsWidth = 125, scaleHeight = 36, narrow = 500; // pixels
+  const toolsWidth = 125, scaleHeight = 36, narrow = 500, narrowSpace = 700; // pixels
   const barWidth = 64; // of the colour scale
   const zoomStep = 0.8, panStep = 0.1, turnStep = 10;
   const thinnestBox = 8; // pixels
@@ -284,7 +284,9 @@
       grid3D: {
         left: 0, right: hasValues(one) && !below ? barWidth : 0, top: -30, bottom: below ? 30 : 0,
         boxWidth: box(0), boxDepth: box(1), boxHeight: box(2),
-        viewControl: { alpha: 25, beta: -50, distance: 140, zoomSensitivity: 1, animation: false },
+        viewControl: {
+          alpha: 25, beta: -50, distance: below ? 170 : 140, zoomSensitivity: 1, animation: false,
+        },
         postEffect: { enable: false }, temporalSuperSampling: { enable: false },
         axisPointer: { show: false },
       },
@@ -396,7 +398,8 @@
     return place.parentElement.clientWidth - parseFloat(figure.paddingLeft) -
       parseFloat(figure.paddingRight);
   }
-  const isNarrow = (entry) => room(entry) < narrow;
+  // Titles of axes in space stand beside them.
+  const isNarrow = (entry) => room(entry) < (entry.data.kind === 'space' ? narrowSpace : narrow);
 
   function size(entry) {
     if (!isSquare(entry.data)) return;
