@@ -52,6 +52,69 @@ def test_trains_are_pickled(train):
     np.testing.assert_array_equal(other.parameters, train.parameters)
 
 
+@st.composite
+def sensors(draw):
+    sensor = risley.load_sensor(draw(st.sampled_from(risley.presets())))
+    for name in sensor.train.names:
+        if "tilt" in name or name.startswith("incident_beam"):
+            sensor[name] = sensor[name] + draw(ERROR)
+    return sensor
+
+
+@settings(max_examples=15, deadline=None, derandomize=True)
+@given(sensors(), st.integers(0, 2 ** 32 - 1))
+def test_sensors_at_random_are_inverted_pickled_and_written(sensor, seed):
+    other = pickle.loads(pickle.dumps(sensor))
+    assert other == sensor == risley.Sensor.from_text(sensor.to_text())
+    assert other.parameters == sensor.parameters
+    angles = np.random.default_rng(seed).uniform(0, 2 * np.pi, (sensor.train.prisms, 40))
+    told = risley.observe(sensor, angles)
+    for one, two in zip(told, risley.observe(other, angles)):
+        np.testing.assert_array_equal(one, two)
+    if sensor.train.prisms != 2:
+        return
+    found = risley.invert(sensor, *told)
+    assert (found.count > 0).all()
+    for again, wanted in zip(risley.observe(sensor, [found.first, found.second]), told):
+        close = np.isclose(again, wanted[:, None], rtol=0, atol=1e-7)
+        assert (close == np.isfinite(found.first)).all()
+
+
+@settings(max_examples=20, deadline=None, derandomize=True)
+@given(sensors(), st.data())
+def test_nan_stays_where_it_is(sensor, data):
+    prisms, rows = sensor.train.prisms, data.draw(st.integers(1, 40))
+    angles = np.random.default_rng(rows).uniform(0, 2 * np.pi, (prisms, rows))
+    whole = risley.observe(sensor, angles)
+    lost = np.array(data.draw(st.lists(st.booleans(), min_size=rows, max_size=rows)))
+    angles[data.draw(st.integers(0, prisms - 1)), lost] = np.nan
+    for one, before in zip(risley.observe(sensor, angles), whole):
+        assert np.isnan(one[lost]).all()
+        np.testing.assert_array_equal(one[~lost], before[~lost])
+    if prisms == 2:
+        azimuth = np.where(lost, np.nan, whole.azimuth)
+        found = risley.invert(sensor, azimuth, whole.zenith)
+        assert (found.count[lost] == 0).all() and np.isnan(found.first[lost]).all()
+        assert (found.count[~lost] > 0).all()
+
+
+@settings(max_examples=30, deadline=None, derandomize=True)
+@given(sensors(), st.lists(st.integers(2, 5), min_size=1, max_size=3), st.data())
+def test_any_wrong_shape_is_named(sensor, shape, data):
+    prisms = sensor.train.prisms
+    which = data.draw(st.integers(1, prisms - 1))
+    wrong = list(shape)
+    wrong[data.draw(st.integers(0, len(shape) - 1))] += 1
+    angles = [np.zeros(shape) for _ in range(prisms)]
+    angles[which] = np.zeros(wrong)
+    words = "(" + ", ".join(map(str, wrong)) + (",)" if len(wrong) == 1 else ")")
+    with pytest.raises(ValueError) as error:
+        risley.observe(sensor, angles)
+    assert f"angles[{which}] has the shape {words}" in str(error.value)
+    with pytest.raises(ValueError, match=f"angles has {prisms + 1} values, expected {prisms}"):
+        risley.observe(sensor, [np.zeros(shape)] * (prisms + 1))
+
+
 def test_shapes_broadcast():
     a, b = np.linspace(0, 1, 3), np.linspace(2, 5, 4)
     grid = risley.observe(TRAIN, [a[:, None], b])

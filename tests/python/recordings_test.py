@@ -2,7 +2,9 @@
 # SPDX-License-Identifier: MIT
 """Recordings as columns: no copy, read-only, sound without their owner, errors with names."""
 import gc
+import os
 import pickle
+import signal
 
 import numpy as np
 import pytest
@@ -116,6 +118,51 @@ def test_files_that_cannot_be_read(tmp_path):
     assert not isinstance(damaged.value, FileNotFoundError)
     copy = pickle.loads(pickle.dumps(damaged.value))
     assert str(copy) == str(damaged.value) and copy.path == damaged.value.path
+
+
+def test_a_file_that_dies_while_it_is_read(tmp_path):
+    dying = tmp_path / "dying.nc"
+    risley.write(scan(5.0), dying)
+    reader = risley.read_chunks(dying, rows=5000)
+    first = next(reader)
+    before = first.azimuth.copy()
+    os.truncate(dying, dying.stat().st_size // 2)
+    for _ in range(2):  # it is said again, and nothing is made up
+        with pytest.raises(risley.FileError, match="dying.nc"):
+            list(reader)
+    np.testing.assert_array_equal(first.azimuth, before)
+    reader.close()
+    assert list(reader) == []
+
+
+def test_a_header_outlives_its_reader(path):
+    reader = risley.read_chunks(path, rows=700)
+    header, device = reader.header, reader.header.devices[0]
+    reader.close()
+    del reader
+    gc.collect()
+    assert header.format == "netcdf" and device.type_name == "Livox Mid-40"
+
+
+def test_a_reader_is_for_one_call_at_a_time(path):
+    reader = risley.read_chunks(path, rows=200)
+    refused = []
+
+    def close(*_):
+        try:
+            reader.close()
+        except ValueError as error:
+            refused.append(str(error))
+
+    usual = signal.signal(signal.SIGALRM, close)
+    signal.setitimer(signal.ITIMER_REAL, 0.001, 0.001)
+    try:
+        rows = sum(len(piece) for piece in reader)
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, usual)
+    assert 0 <= rows <= 10000  # closed between two pieces, never within one
+    assert set(refused) <= {"another call is reading this recording"}
 
 
 def test_wrong_options_of_reading(path):
