@@ -84,7 +84,8 @@ class ChunkReader {
         },
         &cancel_);
     const std::string& format = reader_->header().format;
-    may_wait_ = format == "netcdf" || format == "mcap" || format.ends_with("-bag");
+    may_wait_ =
+        rows > kQuickRows || format == "netcdf" || format == "mcap" || format.ends_with("-bag");
   }
 
   SharedRecording next() {
@@ -145,6 +146,7 @@ class ChunkReader {
   };
 
   std::size_t rows_;
+  static constexpr std::size_t kQuickRows = 1'000'000;  // read in a fraction of a second
   bool may_wait_ = false;  ///< where only the flag stops a wait, for a library or for the next row
   bool busy_ = false;
   std::shared_ptr<SparePieces> spare_ = std::make_shared<SparePieces>();

@@ -9,7 +9,7 @@
   const data = JSON.parse(document.getElementById('page-data').textContent);
   const sequential = ['#440154', '#414487', '#2a788e', '#22a884', '#7ad151', '#fde725'];
   const margins = { left: 74, right: 24, top: 36, bottom: 52 };
-  const toolsWidth = 125, scaleHeight = 36, narrow = 500, narrowSpace = 700; // pixels
+  const legendHeight = 18, scaleHeight = 36, narrow = 500, narrowSpace = 700; // pixels
   const barWidth = 64; // of the colour scale
   const zoomStep = 0.8, panStep = 0.1, turnStep = 10;
   const thinnestBox = 8; // pixels
@@ -65,6 +65,7 @@
     return Math.max(52, ...ends.map((end) => 16 + 7 * text(Number(end.toPrecision(3))).length));
   };
   const leftMargin = (one) => titleGap(one) + margins.left - 52;
+  const legendRow = (one) => (one.series.length > 1 ? legendHeight : 0);
   const hasValues = (one) => one.series.some((series) => series.value.length > 0);
 
   // Points take the colours that the reader chose.
@@ -210,20 +211,21 @@
     return {
       animation: false, backgroundColor: 'transparent',
       grid: {
-        ...margins, left: leftMargin(one), right: margins.right + (scaled && !below ? barWidth : 0),
+        ...margins, top: margins.top + legendRow(one), left: leftMargin(one),
+        right: margins.right + (scaled && !below ? barWidth : 0),
         bottom: margins.bottom + (scaled && below ? scaleHeight : 0), containLabel: false,
         outerBoundsMode: 'none',
       },
       xAxis: x, yAxis: y,
       legend: {
-        show: one.series.length > 1, top: 0, left: leftMargin(one), right: toolsWidth, type: 'scroll',
+        show: one.series.length > 1, top: 0, left: leftMargin(one), type: 'scroll',
         itemWidth: 16, itemHeight: 8,
         textStyle: { color: colour('ink') }, inactiveColor: colour('grid'),
         pageTextStyle: { color: colour('ink') },
       },
       tooltip: tip(one),
       toolbox: {
-        right: 0, top: 0, itemSize: 13, iconStyle: { borderColor: colour('muted') },
+        right: 0, top: legendRow(one), itemSize: 13, iconStyle: { borderColor: colour('muted') },
         emphasis: { iconStyle: { borderColor: colour('a') } },
         feature: {
           dataZoom: {
@@ -264,7 +266,7 @@
       animation: false, backgroundColor: 'transparent',
       tooltip: tip(one),
       toolbox: {
-        right: 0, top: 0, itemSize: 13, iconStyle: { borderColor: colour('muted') },
+        right: 0, top: legendRow(one), itemSize: 13, iconStyle: { borderColor: colour('muted') },
         emphasis: { iconStyle: { borderColor: colour('a') } },
         feature: {
           saveAsImage: {
@@ -273,7 +275,7 @@
         },
       },
       legend: {
-        show: one.series.length > 1, top: 0, left: 10, right: toolsWidth / 2, type: 'scroll',
+        show: one.series.length > 1, top: 0, left: 10, type: 'scroll',
         itemWidth: 16, itemHeight: 8,
         textStyle: { color: colour('ink') }, inactiveColor: colour('grid'),
       },
@@ -408,7 +410,7 @@
       : isNarrow(entry) ? [0, scaleHeight] : [barWidth, 0];
     entry.place.style.width = width + 'px';
     entry.place.style.height = width - leftMargin(entry.data) - margins.right - right +
-      margins.top + margins.bottom + bottom + 'px';
+      margins.top + legendRow(entry.data) + margins.bottom + bottom + 'px';
   }
 
   // Whether a box drawn with the mouse zooms.
