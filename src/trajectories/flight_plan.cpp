@@ -225,7 +225,7 @@ void read_strips(const YamlMap& map, const Strip& usual, std::vector<Strip>& str
             fmt::format("expected either {}, for strips through one place, or {} with count and "
                         "spacing_m, for parallel strips; found {}",
                         map.field("headings_deg"), map.field("heading_deg"),
-                        several ? "both" : "none"));
+                        several ? "both" : "neither"));
   }
   if (several && map.find("count") != nullptr) {
     fail_at(map.path(), map.at("count").line,

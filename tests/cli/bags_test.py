@@ -68,7 +68,7 @@ class BagsTest(CommandTest):
         broken[places[12] + 1:places[12] + 9] = b"\xff" * 8
         (self.folder / "broken.mcap").write_bytes(broken)
         done = self.expect(3, "convert", "broken.mcap", "-o", "broken.nc")
-        self.assertIn(f"byte {places[12]}: a record does not end", done.stderr)
+        self.assertIn(f"byte {places[12]}: expected a record that ends by byte", done.stderr)
         self.assertIn("the 1200 observations before it are saved", done.stderr)
 
     def test_a_folder_of_ros_2(self):

@@ -132,7 +132,7 @@ TEST(BagFolder, WhatIsWrongWithTheListIsSaid) {
   };
   EXPECT_THAT(refused({first, "gone_1.mcap", "gone_2.mcap"}),
               ::testing::AllOf(HasSubstr("metadata.yaml: line 8"),
-                               HasSubstr("not in the folder: gone_1.mcap, gone_2.mcap; bring")));
+                               HasSubstr("not in the folder: gone_1.mcap, gone_2.mcap; copy")));
   for (const char* name : {"../x.mcap", "/etc/passwd", "sub/x.mcap", "..", "''"}) {
     EXPECT_THAT(refused({first, name}), HasSubstr("expected the name of a file in this folder"));
   }
@@ -161,7 +161,8 @@ TEST(BagFolder, DamageInAFileKeepsTheFilesBefore) {
     put_bytes(folder.file(folder.name(1)), "no bag");
     Read read = read_folder(folder);
     EXPECT_EQ(read.rows.size(), 40U);
-    EXPECT_THAT(read.error, HasSubstr(folder.name(1) + ": byte 0: expected a bag of the kind"));
+    EXPECT_THAT(read.error,
+                HasSubstr(folder.name(1) + ": byte 0: expected a bag of the same kind"));
   }
   const BagFolder folder(true);
   std::string bytes = get_bytes(folder.file(folder.name(1)));

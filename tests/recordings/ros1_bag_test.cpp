@@ -277,11 +277,11 @@ TEST(Ros1Bag, CloudGridFollowsFromStampsAndCounts) {
     const char* warning;
   };
   const std::vector<Case> cases = {
-      {10'000, 1, 10'000.0, "10 us per shot, one point"},
-      {20'000, 2, 10'000.0, "10 us per shot, 2 points"},
-      {24'000, 1, 12'500.0 / 3, "4.1667 us per shot, one point"},
-      {48'000, 2, 12'500.0 / 3, "4.1667 us per shot, 2 points"},
-      {72'000, 3, 12'500.0 / 3, "4.1667 us per shot, 3 points"},
+      {10'000, 1, 10'000.0, "10 us per shot, with one point per shot"},
+      {20'000, 2, 10'000.0, "10 us per shot, with 2 points per shot"},
+      {24'000, 1, 12'500.0 / 3, "4.1667 us per shot, with one point per shot"},
+      {48'000, 2, 12'500.0 / 3, "4.1667 us per shot, with 2 points per shot"},
+      {72'000, 3, 12'500.0 / 3, "4.1667 us per shot, with 3 points per shot"},
       {3'000, 1, 10'000.0, "30000 points per second fit no known sensor"},
   };
   for (const Case& c : cases) {

@@ -687,8 +687,9 @@ TEST(Terrain, MistakesInAFileAreToldWithTheirLine) {
   EXPECT_THAT(message("name: garage", "name: barn"),
               HasSubstr("14: terrain.buildings[0].name = \"barn\" appears twice"));
   EXPECT_THAT(message("name: garage", "name: tower"), HasSubstr("appears twice"));
-  EXPECT_THAT(message("[20, 45]", "[45, 20]"),
-              HasSubstr("terrain.village.pitch_deg = [45, 20] deg: the first is the least"));
+  EXPECT_THAT(
+      message("[20, 45]", "[45, 20]"),
+      HasSubstr("terrain.village.pitch_deg = [45, 20] deg, expected the least value first"));
   EXPECT_THAT(message("roofs: 5", "roofs: 5000"), HasSubstr("found room within +-50 m"));
   EXPECT_THAT(message("ridge_height_m: 8", "ridge_height_m: 2"),
               HasSubstr("barn: its eaves are 0.5 m below the ground"));

@@ -396,7 +396,7 @@ INSTANTIATE_TEST_SUITE_P(
                 "  incident_beam_horizontal_deg",
                 "  refractive_index_b: {value: 1.5, unit: \"1\"}\n  incident_beam_horizontal_deg",
                 "refractive_index_b",
-                {"refractive_index_b says again"}},
+                {"refractive_index_b repeats refractive_index"}},
         Mistake{"Combination",
                 "combination: 1",
                 "combination: 3",

@@ -261,7 +261,7 @@ TEST(FlightPlan, MistakesAreToldWithTheirLine) {
   EXPECT_THAT(message("headings_deg: [90, 0]", "heading_deg: 1, headings_deg: [90, 0]"),
               HasSubstr("found both"));
   EXPECT_THAT(message("headings_deg: [90, 0], ", ""),
-              HasSubstr("12: strips[0].headings_deg for strips"));
+              HasSubstr("12: expected either strips[0].headings_deg, for strips"));
   EXPECT_THAT(message("headings_deg: [90, 0]", "headings_deg: []"),
               HasSubstr("strips[0].headings_deg: expected a list in deg"));
   EXPECT_THAT(message("spacing_m: 20, ", ""),

@@ -187,7 +187,7 @@ TEST(Mount, RefusesACovarianceThatIsNotOfItsSigmas) {
     parse_mount(text, "mount.yaml");
     FAIL() << "not refused";
   } catch (const FileError& error) {
-    EXPECT_THAT(error.what(), HasSubstr("lever_arm_x_m has a sigma of 0.01 in it, and 0.02"));
+    EXPECT_THAT(error.what(), HasSubstr("lever_arm_x_m has a sigma of 0.01 here, and 0.02"));
   }
 }
 

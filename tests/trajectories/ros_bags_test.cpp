@@ -428,7 +428,7 @@ TEST(RosBags, TimesThatRunBackAreSortedOrRefused) {
     ASSERT_EQ(t.warnings.size(), 1U);
     EXPECT_THAT(t.warnings[0].message, HasSubstr("records that come after later ones: 1 of 30"));
     flown[20].time_ns -= 5'000'000'000;
-    EXPECT_THAT(fault(kind, flown), AllOf(HasSubstr("record 21: time runs back by 4.99"),
+    EXPECT_THAT(fault(kind, flown), AllOf(HasSubstr("record 21: time jumps back by 4.99"),
                                           ::testing::Not(HasSubstr("byte"))));
     flown = samples(5);
     for (Sample& s : flown) s.time_ns = 0;
