@@ -1,5 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
+#include <pybind11/numpy.h>
+
 #include "risley/core/angle.hpp"
 
 #include "python/bind.hpp"
@@ -12,6 +14,9 @@ PYBIND11_MODULE(_risley, module) {
   module.attr("__version__") = RISLEY_VERSION;
   module.def("radians", &risley::radians_from_degrees, py::arg("degrees"),
              "An angle in degrees as the libraries convert it, rad.");
+  // pybind11 looks for numpy once, at its first array; two threads that made theirs at a time would
+  // wait for each other for ever.
+  py::dtype::of<double>();
   bind_errors(module);
   bind_calls(module);
   bind_recordings(module);

@@ -130,13 +130,33 @@ time.sleep(1.5)
     assert "terminate" not in errors and "Fatal" not in errors
 
 
-def test_the_interpreter_ends_while_a_recording_is_made(long_path, tmp_path):
+def test_the_interpreter_ends_while_recordings_are_read_and_made(long_path, tmp_path):
     process = child(long_path, f"""
+def read():
+    while True:
+        for piece in risley.read_chunks(sys.argv[1], rows=1000):
+            piece.azimuth.sum()
 def simulate():
     risley.simulate({str(tmp_path / "made.nc")!r}, duration=1000.0)
-threading.Thread(target=simulate, daemon=True).start()
+for target in (read, read, simulate):
+    threading.Thread(target=target, daemon=True).start()
 time.sleep(1.0)
 """)
     _, errors = process.communicate(timeout=120)
     assert process.returncode == 0, errors
     assert "terminate" not in errors and "Fatal" not in errors
+
+
+def test_threads_make_their_first_arrays_at_a_time(long_path):
+    process = child(long_path, """
+def read():
+    for piece in risley.read_chunks(sys.argv[1], rows=1000):
+        piece.azimuth.sum()
+threads = [threading.Thread(target=read) for _ in range(4)]
+for thread in threads:
+    thread.start()
+for thread in threads:
+    thread.join()
+""")
+    _, errors = process.communicate(timeout=120)
+    assert process.returncode == 0, errors
