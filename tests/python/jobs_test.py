@@ -1,18 +1,17 @@
 # SPDX-FileCopyrightText: 2026 The risley authors
 # SPDX-License-Identifier: MIT
 """Every job of Python gives what its verb of the command prints, to the last digit."""
-import json
 import math
 import os
 import pathlib
 import pickle
 import re
-import subprocess
 
 import numpy as np
 import pytest
 
 import risley
+from command import command
 
 DATA = pathlib.Path(os.environ["RISLEY_SOURCE_DIR"]) / "data"
 OF_A_RUN = {"command", "inputs", "seconds"}
@@ -23,14 +22,6 @@ speed_m_per_s: 5
 turn_duration_s: 10
 strips: [{headings_deg: [90, 270, 0, 180], length_m: 55}]
 """
-
-
-def command(*words, status=0):
-    """What a verb prints."""
-    done = subprocess.run([os.environ["RISLEY_COMMAND"], *map(str, words), "--json"],
-                          capture_output=True, text=True, check=False)
-    assert done.returncode == status, done.stderr
-    return json.loads(done.stdout)
 
 
 def without_names_of_options(value):

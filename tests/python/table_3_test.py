@@ -1,25 +1,16 @@
 # SPDX-FileCopyrightText: 2026 The risley authors
 # SPDX-License-Identifier: MIT
 """Table 3 of the paper from Python: errors over their Cramer-Rao bounds, equal to those of C++."""
-import json
-import os
-import subprocess
 
 import numpy as np
 import pytest
 
 import risley
+from command import command
 
 SEEDS = 4
 # Holds the root mean square of so many errors over its expected value in 999 of 1000 cases.
 LEAST, GREATEST = 0.126, 2.236
-
-
-def command(*words):
-    """What a verb prints."""
-    done = subprocess.run([os.environ["RISLEY_COMMAND"], *map(str, words), "--json"],
-                          capture_output=True, text=True, check=True)
-    return json.loads(done.stdout)
 
 
 def ratios(errors, bounds):

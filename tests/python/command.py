@@ -1,0 +1,14 @@
+# SPDX-FileCopyrightText: 2026 The risley authors
+# SPDX-License-Identifier: MIT
+"""The risley command, to compare the package with."""
+import json
+import os
+import subprocess
+
+
+def command(*words, status=0):
+    """What a verb prints."""
+    done = subprocess.run([os.environ["RISLEY_COMMAND"], *map(str, words), "--json"],
+                          capture_output=True, text=True, check=False)
+    assert done.returncode == status, done.stderr
+    return json.loads(done.stdout)
