@@ -330,8 +330,7 @@ def zsh_text(text):
     return re.sub(r"([\[\]\\:])", r"\\\1", text)
 
 
-def zsh_action(command, option):
-    kind, found = command.values(option)
+def zsh_action(kind, found):
     return {"words": f"({' '.join(found)})", "names": "_risley_names", "presets": "_risley_presets",
             "files": "_files", "none": " "}[kind]
 
@@ -344,7 +343,7 @@ def zsh_specs(command, options):
             value = ""
             if option.takes_value:
                 name += "=" if name.startswith("--") else ""
-                value = f":{zsh_text(option.value_text.split(':')[0])}:{zsh_action(command, option)}"
+                value = f":{zsh_text(option.value_text.split(':')[0])}:{zsh_action(*command.values(option))}"
             yield shlex.quote(f"{start}{name}[{zsh_text(option.text)}]{value}")
 
 
@@ -371,11 +370,9 @@ def zsh_completion(command):
         if page.entries("Subcommands"):
             level(zsh_function(words), words, page.entries("Subcommands"), page.options)
             continue
-        kind, found = command.arguments(words)
         lines += [f"{zsh_function(words)}() {{", "  _arguments \\"]
         lines += [f"    {spec} \\" for spec in zsh_specs(command, command.options(words))]
-        action = {"words": f"({' '.join(found)})", "files": "_files", "none": " "}[kind]
-        lines += [f"    '*:argument:{action}'", "}"]
+        lines += [f"    '*:argument:{zsh_action(*command.arguments(words))}'", "}"]
     level("_risley", (), command.main.entries("Subcommands"), command.main.options)
     lines += ['_risley "$@"']
     return "\n".join(lines) + "\n"
