@@ -26,10 +26,10 @@ recordings::Extrinsics extrinsics_from(const std::string& text) {
     char* end = nullptr;
     const double value = std::strtod(number.c_str(), &end);
     if (number.empty() || *end != '\0' || !(std::abs(value) <= kFullTurn)) {
-      throw InvalidArgument(
-          fmt::format("--extrinsics = '{}', '{}' is no angle; expected YAW,PITCH,ROLL in deg, each "
-                      "-360 to 360",
-                      text, number));
+      throw InvalidArgument(fmt::format(
+          "--extrinsics = '{}': '{}' is not an angle; expected YAW,PITCH,ROLL in deg, each "
+          "-360 to 360",
+          text, number));
     }
     angles.push_back(radians_from_degrees(value));
     begin = comma + 1;

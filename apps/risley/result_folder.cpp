@@ -32,9 +32,9 @@ void make_result_folder(const std::string& folder) {
   std::error_code code;
   std::filesystem::create_directories(folder, code);
   if (code || !std::filesystem::is_directory(folder)) {
-    throw FileError(
-        folder, {},
-        fmt::format("cannot be made a folder: {}", code ? code.message() : "a file has this name"));
+    throw FileError(folder, {},
+                    fmt::format("the folder cannot be created: {}",
+                                code ? code.message() : "a file has this name"));
   }
 }
 

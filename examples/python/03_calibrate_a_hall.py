@@ -38,7 +38,7 @@ print(found.verdict.words)
 print("what to do:", found.verdict.to_do)
 
 # %% [markdown]
-# The same hall with the same unit after somebody has told it its calibration: now the walls bear out what it believes.
+# The same hall with the same unit after somebody has told it its calibration: now the walls confirm what it believes.
 
 # %%
 calibrated = {name: one["value"] for name, one in found.to_dict()["parameters"].items()}

@@ -218,7 +218,8 @@ class Work {
     std::erase_if(problem.views,
                   [](const WallView& view) { return view.shots->size() < kLeastViewShots; });
     if (problem.views.empty()) {
-      throw EstimationError("no plane is left once every shot went to the plane it fits best");
+      throw EstimationError(
+          "no plane is left after every shot was assigned to the plane it fits best");
     }
   }
 

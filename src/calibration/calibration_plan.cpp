@@ -63,25 +63,25 @@ std::vector<std::string> advice_for(const CalibrationForecast& f, const Calibrat
   const auto recordings = static_cast<double>(std::max<std::size_t>(1, plan.scene.stations.size()));
   if (all < 0.9 * recordings) {
     advice.push_back(fmt::format(
-        "only {:.0f} % of the shots meet a wall: walls that fill the field of view tell more",
+        "only {:.0f} % of the shots meet a wall: walls that fill the field of view show more",
         100.0 * all / recordings));
   }
   if (std::hypot(f.datum.sigma_pitch, f.datum.sigma_yaw) > kPoorDatum) {
     if (steep < 0.5 * all) {
       advice.push_back(
-          "turn the sensor so that the walls stand at 50 to 65 degrees of incidence: from 10 to 60 "
-          "degrees the common direction becomes known ten times better");
+          "turn the sensor so that the beam meets the walls at 50 to 65 degrees of incidence: "
+          "between 10 and 60 degrees, the common direction becomes ten times better known");
     }
     if (far < 20.0) {
       advice.push_back(
-          fmt::format("the walls are {:.0f} m away: the sigma falls as the distance grows", far));
+          fmt::format("the walls are {:.0f} m away: walls farther away give a smaller sigma", far));
     }
     if (f.datum_kind == DatumKind::none || f.datum_kind == DatumKind::planes) {
       advice.push_back(
-          "scan the same walls with the body flipped by 180 degrees about its axis and turned by "
-          "30 "
-          "degrees to both sides against a stop (stations with a sigma_deg): that alone makes the "
-          "common direction independent of the walls' flatness");
+          "scan the same walls also with the body turned upside down (180 degrees about its axis) "
+          "and with it rotated by 30 degrees to both sides against a stop (stations with a "
+          "sigma_deg): "
+          "only that makes the common direction independent of the walls' flatness");
     }
     advice.push_back("record longer: the sigma falls with the square root of the duration");
   }
@@ -100,7 +100,7 @@ std::vector<estimation::FreeParameter> calibration_parameters(
   for (const std::string& name : fixed) {
     if (find_parameter(name, shape).kind != ParameterKind::train) {
       throw InvalidArgument(
-          fmt::format("{} cannot be held, choose among the prisms' parameters", name));
+          fmt::format("{} cannot be held, only parameters of the prisms can", name));
     }
     if (std::find(additional.begin(), additional.end(), name) != additional.end()) {
       throw InvalidArgument(fmt::format("{} can be held or freed, not both", name));

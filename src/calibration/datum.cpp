@@ -106,7 +106,7 @@ BeamBundle::BeamBundle(const PrismTrain& train, const std::vector<estimation::Fr
     check_beams(train, emitter, rotation_angles.front().size());
     add_beams<N>(train, free, rotation_angles, emitter, held);
   });
-  if (beams_.empty()) throw InvalidArgument("no beam gets through the prisms");
+  if (beams_.empty()) throw InvalidArgument("no beam passes through the prisms");
   Eigen::MatrixXd right = Eigen::MatrixXd::Zero(3, free_ + held_);
   for (const Beam& beam : beams_) {
     normal_ += Matrix3d::Identity() - beam.direction * beam.direction.transpose();

@@ -20,7 +20,7 @@ constexpr double kLeastWidthSquare = 1e-10;
 
 Plane fitted_plane(std::span<const Vector3<double>> points, std::span<const std::size_t> use) {
   if (use.size() < 3) {
-    throw EstimationError(fmt::format("a plane of {} points, needed 3", use.size()));
+    throw EstimationError(fmt::format("{} points for a plane, at least 3 are needed", use.size()));
   }
   require_place("row", *std::max_element(use.begin(), use.end()), points.size());
   Vector3<double> middle;
@@ -31,11 +31,11 @@ Plane fitted_plane(std::span<const Vector3<double>> points, std::span<const std:
     const Eigen::Vector3d from_middle(p.x, p.y, p.z);
     moments += from_middle * from_middle.transpose();
   }
-  if (!moments.allFinite()) throw EstimationError("a plane of points that are not finite");
+  if (!moments.allFinite()) throw EstimationError("the points of a plane are not finite");
   // Squares of the singular values, smallest first.
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(moments);
   if (!(axes.eigenvalues()[1] > kLeastWidthSquare * axes.eigenvalues()[2])) {
-    throw EstimationError("a plane of points that lie on one line");
+    throw EstimationError("the points of a plane lie on one line");
   }
   const Eigen::Vector3d normal = axes.eigenvectors().col(0).normalized();
   Plane plane{{normal.x(), normal.y(), normal.z()}, 0.0};

@@ -142,7 +142,7 @@ void require_priors(const FlightPriors& priors, const FlightModel& model) {
   require_length("columns of the priors' information",
                  static_cast<std::size_t>(priors.information.cols()), globals);
   if (!priors.mean.allFinite() || !priors.information.allFinite()) {
-    throw InvalidArgument("priors hold numbers that are not finite");
+    throw InvalidArgument("priors contain numbers that are not finite");
   }
   require_length_or_none("held", priors.held.size(), globals);
   for (const PlanePrior& prior : priors.planes) {
@@ -391,8 +391,8 @@ FlightSystem::FlightSystem(const FlightEquations& equations, const FlightModel& 
   p.root = Cholesky(std::move(hessian));
   if (!p.root.positive()) {
     throw EstimationError(
-        "the flight leaves some unknowns without any information, and no prior says anything of "
-        "them: state sigmas, or hold what is not to be adjusted");
+        "the flight gives no information on some of the unknowns, and they have no priors: state "
+        "sigmas, or hold what is not to be adjusted");
   }
 }
 

@@ -151,7 +151,8 @@ class FlightWork {
     full_.shots = rows.size() == shots.size() ? shots : rows_of(shots, rows);
     if (full_.shots.strip.front() == full_.shots.strip.back()) {
       throw EstimationError(
-          "all shots are of one strip: at least two that overlap are needed, best crossing ones");
+          "all shots are of one strip: at least two that overlap are needed, and crossing ones are "
+          "best");
     }
     coarse_.shots = sample_of_all(options_.coarse_shots);
   }
@@ -201,7 +202,7 @@ class FlightWork {
     if (flight.cells.planes.size() < kFewestCells) {
       throw EstimationError(fmt::format(
           "only {} cells of {:g} m of ground were seen by several strips, at least {} are needed: "
-          "do the strips overlap, and are mount and trajectory of this flight?",
+          "do the strips overlap, and do mount and trajectory belong to this flight?",
           flight.cells.planes.size(), size, kFewestCells));
     }
     model_.planes = flight.cells.planes;
@@ -241,9 +242,8 @@ class FlightWork {
         std::abs(model_.clock_offset - options_.mount.clock_offset.value) >
             std::max(1e-3, kPoseMargin * options_.mount.clock_offset.sigma)) {
       throw EstimationError(
-          "the adjustment ran away: boresight, lever arm or clock offset are far from what the "
-          "mount "
-          "states; are the axes of the mount right, and the times of sensor and trajectory?");
+          "the adjustment diverged: boresight, lever arm or clock offset are far from what the "
+          "mount states. Are the axes of the mount right, and the times of sensor and trajectory?");
     }
     return adjusted;
   }
@@ -323,8 +323,9 @@ class FlightWork {
     const double spacing = final_knot_spacing(options_, model_.knots, full_.shots.strips());
     if (spacing > options_.knot_spacing) {
       result_.warnings.push_back(fmt::format(
-          "corrections of the trajectory have knots every {:.2f} s instead of {:g}, since the "
-          "flight would need more than {} of them; sigmas consider what happens between",
+          "corrections of the trajectory have knots every {:.2f} s instead of {:g} s, because the "
+          "flight would need more than {} of them; the sigmas account for what happens between "
+          "them",
           spacing, options_.knot_spacing, options_.most_knots));
     }
     // The trajectory first, with shots that are enough for it.
@@ -454,7 +455,7 @@ void FlightWork::fill_result() {
   result_.converged = last_.converged && result_.reason.empty();
   if (!last_.converged && result_.reason.empty()) {
     result_.reason = fmt::format(
-        "the adjustment had not settled: its last step still promised {:.2g} squared sigmas",
+        "the adjustment had not converged: its last step still gained {:.2g} squared sigmas",
         last_.promised);
   }
   result_.model = std::move(model_);
@@ -559,11 +560,10 @@ void FlightWork::judge_clock_drift(double value, double sigma) {
   if (!found.significant) return;
   result_.warnings.push_back(fmt::format(
       "the clocks of sensor and trajectory drift apart: the trajectory's gains {:.2g} +- {:.1g} "
-      "ppm "
-      "on the recording's, {:.2g} ms over the {:.0f} s between the first shot and the last; an "
-      "offset of the clock cannot hold that, and what was found is off by more than its sigmas. "
-      "Set "
-      "the sensor's clock by PPS or PTP, or calibrate shorter parts of the flight",
+      "ppm on the recording's, {:.2g} ms over the {:.0f} s between the first shot and the last. A "
+      "constant clock offset cannot describe that, and the results are off by more than their "
+      "sigmas. Synchronise the sensor's clock by PPS or PTP, or calibrate shorter parts of the "
+      "flight",
       1e6 * found.value, 1e6 * found.sigma, 1e3 * found.value * found.seconds, found.seconds));
 }
 
@@ -571,10 +571,10 @@ void FlightWork::judge_held(HeldParameter held) {
   held.significant =
       std::abs(held.told - held.held) > kTestedSigmas * std::hypot(held.sigma, held.stated_sigma);
   if (held.significant) {
-    result_.warnings.push_back(
-        fmt::format("the strips contradict what is held: {}; what was found is off by more than "
-                    "its sigmas. Let it be estimated as well (option additional)",
-                    in_words(held, options_.sensor)));
+    result_.warnings.push_back(fmt::format(
+        "the strips contradict what is held: {}; the results are off by more than their "
+        "sigmas. Estimate it as well (option additional)",
+        in_words(held, options_.sensor)));
   }
   result_.held.push_back(std::move(held));
 }
@@ -595,9 +595,9 @@ void FlightWork::fill_control() {
           "known ground \"{}\" is left out: {} shots within {:g} m of it{}", ground.name,
           seen.shots, ground.radius,
           seen.shots < GroundCellOptions{}.least_shots
-              ? fmt::format(", at least {} are needed; is it in the map that is stated?",
+              ? fmt::format(", at least {} are needed; is it on the map that is stated?",
                             GroundCellOptions{}.least_shots)
-              : " are no plane"));
+              : " are not on a plane"));
       continue;
     }
     const GroundPlane& plane = model_.planes[static_cast<std::size_t>(control_plane_[i])];
@@ -606,7 +606,7 @@ void FlightWork::fill_control() {
     if (!seen.significant) continue;
     result_.warnings.push_back(fmt::format(
         "known ground \"{}\" contradicts the flight: the strips see it {:.3f} m {} what is stated, "
-        "{:.0f} of its sigmas; is the place right, or {:g} m about it no plane?",
+        "{:.0f} of its sigmas. Is the place right, and is the ground flat within {:g} m of it?",
         ground.name, std::abs(seen.off), seen.off > 0 ? "above" : "below",
         std::abs(seen.off) / seen.sigma, ground.radius));
   }

@@ -74,14 +74,14 @@ void require_knots(const FlightShots& shots, const FlightModel& model) {
                  kCorrections);
   require_length("corrections", static_cast<std::size_t>(model.corrections.cols()), knots.size());
   if (!model.corrections.allFinite()) {
-    throw InvalidArgument("corrections hold numbers that are not finite");
+    throw InvalidArgument("corrections contain numbers that are not finite");
   }
   std::size_t shot = 0;
   for (const TrajectoryKnots::Interval& interval : knots.intervals) {
     require_place("knot of an interval", interval.knot + 1, knots.size());
     if (interval.first_shot != shot || interval.end_shot < shot ||
         interval.end_shot > shots.size() || interval.end_ns <= interval.begin_ns) {
-      throw InvalidArgument("the knots are those of other shots");
+      throw InvalidArgument("the knots belong to other shots");
     }
     shot = interval.end_shot;
   }

@@ -278,7 +278,7 @@ FlightForecast forecast(const PlannedFlight& planned, const FlightForecastOption
   result.strips = flight.strips;
   if (flight.strips.size() < 2) {
     throw EstimationError(
-        "the plan has one strip: at least two that overlap are needed, best crossing ones");
+        "the plan has one strip: at least two that overlap are needed, and crossing ones are best");
   }
   ForecastWork work{.shots = {},
                     .poses = {},
@@ -298,8 +298,9 @@ FlightForecast forecast(const PlannedFlight& planned, const FlightForecastOption
   result.shots = work.shots.size();
   if (work.shots.size() == 0) {
     throw EstimationError(
-        "no shot of the plan ends on the terrain within the sensor's range: do heights of plan and "
-        "terrain belong together, and does the mount say which way the sensor looks?");
+        "no shot of the plan meets the terrain within the sensor's range: do the heights of plan "
+        "and "
+        "terrain fit together, and does the mount say which way the sensor looks?");
   }
   FlightModel& model = work.start.model;
   const double variance = stated_range_variance(calibration);
@@ -355,7 +356,7 @@ FlightForecast forecast(const PlannedFlight& planned, const FlightForecastOption
   for (std::size_t s = 0; s < result.strip_shots.size(); ++s) {
     if (result.strip_shots[s] > 0) continue;
     result.warnings.push_back(
-        fmt::format("no shot of strip {} ends on the terrain", result.strips[s].name));
+        fmt::format("no shot of strip {} meets the terrain", result.strips[s].name));
   }
   progress.report(1);
   return result;

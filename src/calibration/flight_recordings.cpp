@@ -35,7 +35,7 @@ std::vector<std::size_t> by_time(const std::vector<RangedRecording>& recordings)
     const RangedRecording &one = recordings[order[i - 1]], &next = recordings[order[i]];
     if (next.time_ns.front() < one.time_ns.back()) {
       throw InvalidArgument(fmt::format(
-          "{} begins before {} ends: one sensor cannot have made both", next.name, one.name));
+          "{} begins before {} ends: the same sensor cannot have made both", next.name, one.name));
     }
   }
   return order;

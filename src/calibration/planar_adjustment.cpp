@@ -551,7 +551,7 @@ HeldResponse held_response(const PlanarProblem& solved, const HeldQuantities& he
   const Places places(solved, held);
   const System system = build_system(solved, held, at, places, set);
   const algebra::SymmetricSolver solver(system.hessian);
-  if (!solver.positive()) throw EstimationError("the walls do not tell all parameters");
+  if (!solver.positive()) throw EstimationError("the walls do not determine all parameters");
   const Eigen::MatrixXd shift =
       -solver.solve_columns(system.considered.rightCols(held.count()).eval());
   HeldResponse response{shift.topRows(at.free()), Eigen::VectorXd::Zero(held.count())};

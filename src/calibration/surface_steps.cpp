@@ -387,8 +387,8 @@ SurfaceReport inspect_surface(const SurfaceResiduals& residuals) {
   if (residuals.azimuth.size() != size || residuals.zenith.size() != size ||
       residuals.sigma.size() != size) {
     throw InvalidArgument(fmt::format(
-        "surface residuals: columns of {} azimuths, {} zeniths, {} distances and {} sigmas, "
-        "needed the same number of each",
+        "surface residuals: {} azimuths, {} zeniths, {} distances and {} sigmas, expected the same "
+        "number of each",
         residuals.azimuth.size(), residuals.zenith.size(), size, residuals.sigma.size()));
   }
   SurfaceReport report;

@@ -112,7 +112,7 @@ TrajectoryKnots make_knots(const FlightShots& shots, double spacing) {
     const double wanted = std::max(1.0, std::round(seconds(length_ns) / spacing));
     if (static_cast<double>(knots.size()) + wanted + 1 > kMostKnots) {
       throw InvalidArgument(fmt::format(
-          "spacing of the knots = {} s makes more than {:.0f} of them, allowed longer ones",
+          "spacing of the knots = {} s makes more than {:.0f} of them: choose a longer one",
           spacing, kMostKnots));
     }
     const auto intervals = static_cast<std::int64_t>(wanted);

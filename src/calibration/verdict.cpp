@@ -55,8 +55,8 @@ std::string reason_of_failure(const Calibration& c, const PlanarSolution& soluti
   }
   if (!c.unobservable.empty()) {
     reason = fmt::format(
-        "the walls do not tell {}, only to {:.2g} degrees: walls tilted by 30 degrees and more "
-        "against the axis do, or a prior (option prior_sigma)",
+        "the walls determine {} only to {:.2g} degrees: walls tilted by 30 degrees or more against "
+        "the axis would do better, or a prior (option prior_sigma)",
         estimation::direction_text(c.unobservable.front()), c.unobservable.front().sigma);
   }
   const PriorTest* worst = nullptr;
@@ -66,7 +66,7 @@ std::string reason_of_failure(const Calibration& c, const PlanarSolution& soluti
   }
   if (worst != nullptr) {
     reason = fmt::format(
-        "{} {} contradicts the data: what is stated of it is off by {:.3g} degrees, chi2 {:.3g} "
+        "{} {} contradicts the data: it is off by {:.3g} degrees from what is stated, chi2 {:.3g} "
         "where {:.3g} is the limit",
         worst->station ? "station" : "plane", worst->name, degrees_from_radians(worst->misfit),
         worst->chi2, worst->critical);
@@ -76,7 +76,7 @@ std::string reason_of_failure(const Calibration& c, const PlanarSolution& soluti
       others += (others.empty() ? "" : ", ") + test.name;
     }
     if (!others.empty()) {
-      reason += fmt::format("; so do {}: they contradict each other", others);
+      reason += fmt::format("; so do {}: they contradict one another", others);
     }
   }
   return reason;
@@ -97,7 +97,7 @@ CalibrationVerdict verdict_of(const Calibration& c) {
       change.size() == 0 ? 0.0 : change.dot(algebra::SymmetricSolver(c.covariance).solve(change));
   if (!(chi2 > significant_chi2(freedom))) {
     return {CalibrationCode::as_believed,
-            fmt::format("the walls bear out what the sensor believes of itself to {} degree, {} "
+            fmt::format("the walls confirm what the sensor believes of itself to {} degree, {} "
                         "(chi2 {:.3g} of {:.0f} parameters)",
                         plain_text(degrees_from_radians(c.datum.total), 2),
                         offset_text(c.datum.total), chi2, freedom),
@@ -108,12 +108,12 @@ CalibrationVerdict verdict_of(const Calibration& c) {
     return {CalibrationCode::not_better,
             fmt::format("{}; but the walls are {:.4g} mm thick before and {:.4g} mm after", moved,
                         1e3 * c.rms_before, 1e3 * c.rms_after),
-            "do not use it: see whether the walls are flat and the sensor stood still"};
+            "do not use it: check that the walls are flat and that the sensor stood still"};
   }
   if (c.better_probability < kBetter) {
     return {CalibrationCode::not_better,
             fmt::format("{}; but the calibration itself may be off by {} degree ({}), and is "
-                        "better than what the sensor believes with a probability of {:.2g} only",
+                        "better than what the sensor believes with a probability of only {:.2g}",
                         moved, plain_text(degrees_from_radians(c.datum.total), 2),
                         offset_text(c.datum.total), c.better_probability),
             "scan more walls, tilted ones among them, or give what is known of walls and poses "
@@ -134,22 +134,24 @@ std::string in_words(const HeldParameter& held, const sensors::Sensor& sensor) {
 
 CalibrationVerdict verdict_of(const FlightCalibration& c) {
   if (!c.converged) {
-    return {CalibrationCode::undecided, c.reason,
-            "fly crossing strips that overlap, over roofs or other slopes, and see whether mount "
-            "and trajectory are of this flight"};
+    return {
+        CalibrationCode::undecided, c.reason,
+        "fly crossing strips that overlap, over roofs or other slopes, and check that mount and "
+        "trajectory belong to this flight"};
   }
   if (c.clock_drift.significant) {
-    return {CalibrationCode::undecided,
-            fmt::format("the clocks of sensor and trajectory drift apart by {:.2g} +- {:.1g} ppm, "
-                        "{:.2g} ms over the flight",
-                        1e6 * c.clock_drift.value, 1e6 * c.clock_drift.sigma,
-                        1e3 * std::abs(c.clock_drift.value) * c.clock_drift.seconds),
-            "set the sensor's clock by PPS or PTP, or calibrate shorter parts of the flight"};
+    return {
+        CalibrationCode::undecided,
+        fmt::format("the clocks of sensor and trajectory drift apart by {:.2g} +- {:.1g} ppm, "
+                    "{:.2g} ms over the flight",
+                    1e6 * c.clock_drift.value, 1e6 * c.clock_drift.sigma,
+                    1e3 * std::abs(c.clock_drift.value) * c.clock_drift.seconds),
+        "synchronise the sensor's clock by PPS or PTP, or calibrate shorter parts of the flight"};
   }
   for (const HeldParameter& held : c.held) {
     if (!held.significant) continue;
     return {CalibrationCode::undecided, in_words(held, c.sensor),
-            "let " + held.name + " be estimated as well (option additional)"};
+            "estimate " + held.name + " as well (option additional)"};
   }
   // Of the change of some unknowns, and how many these are.
   const auto significance = [&](std::size_t from) {
@@ -177,11 +179,11 @@ CalibrationVerdict verdict_of(const FlightCalibration& c) {
                   1e3 * c.rms_before, 1e3 * c.rms_after);
   if (significant(all) && c.rms_after >= c.rms_before) {
     return {CalibrationCode::not_better, strips,
-            "do not use it: see whether ground, trajectory and mount are those of this flight"};
+            "do not use it: check that ground, trajectory and mount belong to this flight"};
   }
   if (!significant(prisms)) {
     return {CalibrationCode::as_believed,
-            fmt::format("the strips bear out what the sensor believes of its prisms (chi2 {:.3g} "
+            fmt::format("the strips confirm what the sensor believes of its prisms (chi2 {:.3g} "
                         "of {:.0f} parameters); {}",
                         prisms.first, prisms.second, strips),
             "use the mount that was found for clouds of this platform"};
@@ -190,7 +192,7 @@ CalibrationVerdict verdict_of(const FlightCalibration& c) {
           fmt::format("the prisms differ from what the sensor believes (chi2 {:.3g} of {:.0f} "
                       "parameters); {}",
                       prisms.first, prisms.second, strips),
-          "use mount and calibration, both, for clouds of this platform"};
+          "use both the mount and the calibration for clouds of this platform"};
 }
 
 const char* to_string(CalibrationCode code) {
@@ -213,8 +215,8 @@ std::vector<std::string> warnings_of(const Calibration& c, const PlanarSolution&
   const double boresight = std::hypot(c.datum.sigma_pitch, c.datum.sigma_yaw);
   if (boresight > kPoorDatum) {
     warnings.push_back(fmt::format(
-        "the direction that all beams share is only known to {} degrees, {} (pitch {}, "
-        "yaw {}); their directions against each other to {} degrees, {}",
+        "the direction that all beams share is known only to {} degrees, {} (pitch {}, yaw {}); "
+        "their directions relative to one another to {} degrees, {}",
         plain_text(degrees_from_radians(boresight), 2), offset_text(boresight),
         plain_text(degrees_from_radians(c.datum.sigma_pitch), 2),
         plain_text(degrees_from_radians(c.datum.sigma_yaw), 2),
@@ -229,14 +231,15 @@ std::vector<std::string> warnings_of(const Calibration& c, const PlanarSolution&
         degrees_from_radians(step.zenith), step.points));
   }
   if (c.variance_factor > 1.0) {
-    warnings.push_back(
-        fmt::format("the walls are uneven: means over a square degree scatter {:.2g} times as much "
-                    "as the noise "
-                    "allows; variances are enlarged by that, and boresight may be off by more",
-                    c.unevenness));
+    warnings.push_back(fmt::format(
+        "the walls are uneven: means over a square degree scatter {:.2g} times as much as "
+        "the noise allows; variances are enlarged accordingly, and the boresight may "
+        "be off by more",
+        c.unevenness));
   }
   if (solution.lost > 0) {
-    warnings.push_back(fmt::format("{} shots do not meet their plane", solution.lost));
+    warnings.push_back(
+        fmt::format("{} shots do not meet the plane they were assigned to", solution.lost));
   }
   return warnings;
 }

@@ -134,7 +134,7 @@ WallMatching match_walls(std::vector<FoundPlane>& found, const std::vector<std::
     known_given = known_given || known;
     known_seen = known_seen || (known && !seen_by[w].empty());
     if (seen_by[w].empty()) {
-      result.warnings.push_back(fmt::format("plane {} is not seen by any recording ({})",
+      result.warnings.push_back(fmt::format("plane {} is not seen in any recording ({})",
                                             result.walls[w].name, normal_text(where[w])));
     }
   }
@@ -162,7 +162,7 @@ WallMatching match_walls(std::vector<FoundPlane>& found, const std::vector<std::
       const std::size_t other = nearest(mine, own->wall);
       std::string message = fmt::format(
           "station {} contradicts the data: none of its walls is seen from another station; its "
-          "largest is at {} in the scene",
+          "largest one is at {} in the scene",
           poses[r].name, normal_text(mine));
       if (other < where.size()) {
         message += fmt::format(", {:.1f} degrees from the nearest one, {} at {}",

@@ -136,10 +136,11 @@ MapProjection::MapProjection(const std::string& crs, const std::string& source)
   const auto create = [&](const char* what, const std::string& text) {
     Object object(proj_create(context, text.c_str()));
     if (!object || proj_is_crs(object.get()) == 0) {
-      throw InvalidArgument(fmt::format(
-          "{} = \"{}\" is no coordinate reference system that PROJ knows: give a number such as "
-          "EPSG:25832, with a height system EPSG:25832+7837, or WKT",
-          what, text));
+      throw InvalidArgument(
+          fmt::format("{} = \"{}\" is not a coordinate reference system that PROJ knows: give an "
+                      "EPSG code such as "
+                      "EPSG:25832, with a height system EPSG:25832+7837, or WKT",
+                      what, text));
     }
     return object;
   };
@@ -149,26 +150,27 @@ MapProjection::MapProjection(const std::string& crs, const std::string& source)
   const PJ* map = horizontal ? horizontal.get() : target.get();
   const std::string name = proj_get_name(target.get());
   if (type_of(context, map) != PJ_TYPE_PROJECTED_CRS) {
-    throw InvalidArgument(fmt::format(
-        "crs = \"{}\" ({}) is no map: points have eastings and northings in metres, as of a UTM "
-        "zone",
-        crs, name));
+    throw InvalidArgument(
+        fmt::format("crs = \"{}\" ({}) is not a map projection: points are written as eastings and "
+                    "northings in metres, as in a UTM zone",
+                    crs, name));
   }
   std::string unit = "no unit";
   for (const PJ* part : {map, static_cast<const PJ*>(vertical.get())}) {
     if (part != nullptr && !in_metres(context, part, unit)) {
-      throw InvalidArgument(fmt::format(
-          "crs = \"{}\" ({}) is in {}: points and their covariances are written in metres, choose "
-          "the same map in metres",
-          crs, name, unit));
+      throw InvalidArgument(
+          fmt::format("crs = \"{}\" ({}) is in {}: points and their covariances are written in "
+                      "metres, so choose "
+                      "a map projection in metres",
+                      crs, name, unit));
     }
   }
   const PJ_TYPE source_type = type_of(context, from.get());
   if (source_type != PJ_TYPE_GEOCENTRIC_CRS && source_type != PJ_TYPE_GEOGRAPHIC_3D_CRS) {
-    throw InvalidArgument(
-        fmt::format("source = \"{}\" ({}) has no three dimensions: give the datum of the positions "
-                    "with ellipsoidal heights, such as EPSG:4979 for WGS 84",
-                    source, proj_get_name(from.get())));
+    throw InvalidArgument(fmt::format(
+        "source = \"{}\" ({}) is not three-dimensional: give the datum of the positions "
+        "with ellipsoidal heights, such as EPSG:4979 for WGS 84",
+        source, proj_get_name(from.get())));
   }
   // Positions come geocentric; a geographic system names their datum.
   Object geocentric;
@@ -198,12 +200,13 @@ MapProjection::MapProjection(const std::string& crs, const std::string& source)
     state_->operation.reset(proj_normalize_for_visualization(context, operation.get()));
   }
   if (!state_->operation) {
-    throw InvalidArgument(fmt::format(
-        "no way from \"{}\" to \"{}\" ({}) with what PROJ has installed: a change of datum or a "
-        "geoid grid is missing (Debian: projinfo -s {} -t {} names the file; heights without a "
-        "height system are ellipsoidal and need none){}{}",
-        source, crs, name, source, crs,
-        state_->message.empty() ? "" : "; PROJ says: ", state_->message));
+    throw InvalidArgument(
+        fmt::format("PROJ cannot transform \"{}\" to \"{}\" ({}) with the files that are "
+                    "installed: those of a change of datum or of a geoid are missing (Debian: "
+                    "projinfo -s {} -t {} names the file; heights "
+                    "without a height system are ellipsoidal and need none){}{}",
+                    source, crs, name, source, crs,
+                    state_->message.empty() ? "" : "; PROJ says: ", state_->message));
   }
   state_->name = name;
   state_->has_height_system = vertical != nullptr;
@@ -231,7 +234,7 @@ Vector3d MapProjection::project(const Vector3d& geocentric_m) const {
   Vector3d mapped(to.xyz.x, to.xyz.y, to.xyz.z);
   if (!mapped.allFinite()) {
     throw InvalidArgument(
-        fmt::format("{} does not reach the place x = {:.3f}, y = {:.3f}, z = {:.3f} m "
+        fmt::format("{} is not defined at the place x = {:.3f}, y = {:.3f}, z = {:.3f} m "
                     "(geocentric): {}",
                     state_->name, geocentric_m.x(), geocentric_m.y(), geocentric_m.z(),
                     proj_errno(operation) == 0

@@ -335,7 +335,7 @@ SwathReach swath_reach(const sensors::Sensor& sensor, const trajectories::Mount&
     reach.right = std::max(reach.right, right);
     reach.left = std::max(reach.left, -right);
   }
-  if (!(reach.ahead > kNothing)) throw EstimationError("no beam gets through the prisms");
+  if (!(reach.ahead > kNothing)) throw EstimationError("no beam passes through the prisms");
   return reach;
 }
 

@@ -143,8 +143,7 @@ std::string implausible_parameter(const Estimate& estimate, const PrismTrain& no
     const ParameterInfo& info = find_parameter(parameter.name, nominal.shape());
     return fmt::format(
         "{} came out {:.4g}{} away from the sensor's value, more than any such sensor can be: "
-        "wrong "
-        "face order, wrong wedge angles or another sensor",
+        "wrong face order, wrong wedge angles or another sensor",
         parameter.name, change / info.si_per_unit, info.unit == "1" ? "" : " " + info.unit);
   }
   return {};
@@ -314,10 +313,11 @@ void judge(Estimate& estimate, const sensors::Sensor& nominal) {
                     degrees_from_radians(estimate.usual_residual)));
   } else if (!estimate.unobservable.empty()) {
     const WeakDirection& worst = estimate.unobservable.front();
-    fail(fmt::format("the data do not tell the combination {} (in units of 1 deg, or 0.01 of an "
-                     "index; its sigma "
-                     "is {:.2g} of them): hold one of these fixed, or record longer",
-                     direction_text(worst), worst.sigma),
+    fail(fmt::format(
+             "the data do not determine the combination {} (in units of 1 deg, or 0.01 of an "
+             "index; its sigma "
+             "is {:.2g} of them): hold one of these fixed, or record longer",
+             direction_text(worst), worst.sigma),
          EstimateCode::undecided);
   } else if (std::string words = implausible_parameter(estimate, nominal.train); !words.empty()) {
     fail(std::move(words));
@@ -350,12 +350,12 @@ void judge(Estimate& estimate, const sensors::Sensor& nominal) {
     uneven = k;
   }
   if (unevenness > kUneven * estimate.autocorrelation.factor) {
-    estimate.warnings.push_back(fmt::format(
-        "residuals depend on the rotation angle of prism {} ({:.3g} times what chance would make "
-        "of "
-        "them): the model lacks something that this sensor has, or a parameter is held at a wrong "
-        "value; the sigmas do not cover that",
-        prism_letter(static_cast<int>(uneven)), unevenness));
+    estimate.warnings.push_back(
+        fmt::format("residuals depend on the rotation angle of prism {} ({:.3g} times what chance "
+                    "would make of them): the model lacks something that this sensor has, or a "
+                    "parameter is held at a wrong "
+                    "value; the sigmas do not cover that",
+                    prism_letter(static_cast<int>(uneven)), unevenness));
     oddities.push_back(estimate.warnings.back());
   }
   if (estimate.autocorrelation.factor > 1.05) {

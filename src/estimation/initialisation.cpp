@@ -444,7 +444,7 @@ int turning_rotors(const sensors::Sensor& sensor) {
   std::vector<double> speeds;
   for (const SpectralLine& line : found.lines) speeds.push_back(line.angular_velocity);
   const std::string words =
-      fmt::format("the beam turns at {} deg/s, which is no combination of {}'s {} deg/s",
+      fmt::format("the beam turns at {} deg/s, and no combination of {}'s {} deg/s gives that",
                   speeds_text(speeds), sensor.name, speeds_text(sensor.angular_velocity));
   for (const Hypothesis& hypothesis : hypotheses) {
     const std::vector<double> expected = hypothesis.recorded_speeds();
@@ -459,13 +459,14 @@ int turning_rotors(const sensors::Sensor& sensor) {
       }
       if (low > 0 && high < 1.01 * low) {
         throw WrongClock(fmt::format(
-            "{}: {} are {:.4g} times as fast, so the time stamps are in another unit or their "
-            "clock is wrong",
+            "{}: {} are {:.4g} times as fast, so the time stamps are in another unit or the "
+            "clock was wrong",
             words, speeds.size() == 2 ? "both" : "all", low));
       }
     } while (std::next_permutation(order.begin(), order.end()));
   }
-  throw EstimationError(words + ": wrong sensor, a moving sensor, or a mirrored recording");
+  throw EstimationError(words +
+                        ": the sensor is another one, or it moved, or the recording is mirrored");
 }
 
 /// Looks for the best answer in one window.
@@ -519,7 +520,7 @@ Answer find_in_window(const StartWindow& window, const sensors::Sensor& sensor,
     if (better_elsewhere) refuse_speeds(everywhere.front(), sensor, hypotheses);
     if (answers.empty()) {
       throw EstimationError(
-          fmt::format("no {} turning lines about the speeds of {}, {} deg/s, describe the "
+          fmt::format("no {} spectral lines near the speeds of {}, {} deg/s, describe the "
                       "directions of the beam",
                       turning_rotors(sensor), sensor.name, speeds_text(sensor.angular_velocity)));
     }
@@ -538,7 +539,7 @@ Answer find_in_window(const StartWindow& window, const sensors::Sensor& sensor,
       if (chi2_lead(one, other, window.size(kManyShots)) < kDecisive) {
         throw EstimationError(fmt::format(
             "undecided: {} with residuals of {:.3g} deg and {} with {:.3g} deg describe the shots "
-            "equally well; more of the field of view or a longer recording would tell them apart",
+            "equally well; more of the field of view or a longer recording would decide",
             one.trial.hypothesis->words(), degrees_from_radians(one.fit.rms),
             other.trial.hypothesis->words(), degrees_from_radians(other.fit.rms)));
       }

@@ -159,7 +159,7 @@ IdentifiedSensor identified_sensor(const Identification& identification, const s
        {"range_noise_m", "range_resolution_m", "angle_resolution_deg", "range_minimum_m",
         "range_maximum_m", "beam_divergence_horizontal_deg", "beam_divergence_vertical_deg"}) {
     sensor.set_knowledge(
-        {assumed, 0, fmt::format("assumed, as of {}: directions do not tell", rest.name)});
+        {assumed, 0, fmt::format("assumed, as for {}: directions do not show it", rest.name)});
   }
   return result;
 }

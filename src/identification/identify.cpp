@@ -164,8 +164,8 @@ class Search {
     }
     if (trials.empty()) {
       throw EstimationError(
-          "no train of prisms sends beams where this recording has them: none of the arrangements "
-          "that were tried lets its beams through");
+          "no train of prisms sends its beams where this recording has them: in all arrangements "
+          "that were tried, the beams do not pass through the prisms");
     }
     return compare(std::move(trials));
   }
@@ -792,7 +792,7 @@ LineSpectrum lines_of(ShotGrid& grid, bool named, double window, const IdentifyO
   }
   if (spectrum.lines.empty()) {
     throw EstimationError(
-        "the directions of this recording hold no line that turns evenly: no prism can be told");
+        "the directions of this recording show no steadily turning line: no prism can be found");
   }
   return spectrum;
 }

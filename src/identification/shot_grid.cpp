@@ -43,7 +43,7 @@ ShotGrid shot_grid(const estimation::AngleSeries& series, estimation::ShotRange 
   grid.step = *middle;
   if (!(grid.step > 0)) {
     throw EstimationError(
-        "more than half of the shots have the time of the shot before: give the rate of the shots "
+        "more than half of the shots have the same time as the shot before: give their rate "
         "(option shot_rate), so that times are counted");
   }
   grid.slot.assign(stamp.size(), 0);

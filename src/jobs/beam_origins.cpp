@@ -14,7 +14,7 @@ BeamOrigins beam_origins(const sensors::Sensor& sensor) {
   constexpr double kCell = radians_from_degrees(0.5);
   BeamOrigins result{beam_origin_map(sensor.train, sensor.geometry, kSteps, kCell)};
   const BeamOriginMap& map = result.map;
-  if (map.size() == 0) throw EstimationError("no beam gets through the prisms");
+  if (map.size() == 0) throw EstimationError("no beam passes through the prisms");
   result.least_y = *std::min_element(map.least_y.begin(), map.least_y.end());
   result.greatest_y = *std::max_element(map.greatest_y.begin(), map.greatest_y.end());
   result.least_z = *std::min_element(map.least_z.begin(), map.least_z.end());

@@ -37,18 +37,18 @@ void check_flight_options(const CalibrateFlightOptions& options) {
   if (!options.truths.empty()) check_truths(options.truths, options.recordings.size());
   if (!options.platform.crs.empty() || !options.platform.datum.empty()) {
     throw InvalidArgument(
-        "option crs and option datum are of maps: a flight is calibrated without one");
+        "option crs and option datum choose a map, and a flight is calibrated without one");
   }
 }
 
 cloud::MovingPlatform platform_of(const CalibrateFlightOptions& options, const Progress& progress) {
   cloud::MovingPlatform platform = load_platform(options.platform, progress);
   if (!platform.errors) {
-    throw InvalidArgument(fmt::format(
-        "{} states no accuracies: option trajectory_errors says how wrong a trajectory may be, and "
-        "for how long, and without that nobody knows what strips that do not fit tell of the "
-        "sensor",
-        options.platform.trajectory));
+    throw InvalidArgument(
+        fmt::format("{} states no accuracies: give option trajectory_errors, which says how wrong "
+                    "the trajectory may be and for how long. Without it, strips that do not fit "
+                    "may be the fault of either the sensor or the trajectory",
+                    options.platform.trajectory));
   }
   return platform;
 }
@@ -61,17 +61,17 @@ std::vector<scenes::KnownGround> control_of(const std::string& path,
   if (trajectory.frame == trajectories::Frame::local) {
     if (!control.crs.empty()) {
       throw InvalidArgument(fmt::format(
-          "{} has known ground on the map {}, and the trajectory is in a frame of its own, which "
-          "no map knows: give the places in that frame, without crs",
+          "{} gives known ground on the map {}, but the trajectory is in a local frame that no map "
+          "knows: give the places in that frame, without crs",
           path, control.crs));
     }
     return std::move(control.ground);
   }
   if (control.crs.empty()) {
-    throw InvalidArgument(fmt::format(
-        "{} does not say on which map its places are, and the trajectory is on the Earth: crs is "
-        "missing, such as EPSG:25832",
-        path));
+    throw InvalidArgument(
+        fmt::format("{} does not say on which map its places are, and the trajectory is "
+                    "geocentric: add crs, such as EPSG:25832",
+                    path));
   }
   const cloud::MapProjection map(control.crs, control.datum.empty() ? "EPSG:4979" : control.datum);
   for (scenes::KnownGround& ground : control.ground) {
@@ -98,10 +98,11 @@ std::int64_t shift_of(const CalibratedFlight& result, const trajectories::Trajec
   const auto shift =
       utc ? trajectories::shift_from_utc_ns(trajectory, first_ns) : std::optional<std::int64_t>();
   if (!shift) {
-    warnings.push_back(fmt::format(
-        "{}: its times are taken for those of the trajectory, with the mount's clock offset",
-        utc ? "the trajectory does not say what its times count"
-            : "the recordings do not say what their clock counts"));
+    warnings.push_back(
+        fmt::format("{}: its times are taken to be on the trajectory's clock, after adding the "
+                    "clock offset of the mount",
+                    utc ? "the trajectory does not say what its times count"
+                        : "the recordings do not say what their clock counts"));
   }
   return shift.value_or(0);
 }
@@ -188,8 +189,8 @@ CalibratedFlight calibrate_flight(const CalibrateFlightOptions& options, const P
   }
   if (result.strips.size() < 2) {
     throw EstimationError(fmt::format(
-        "{} has {} strips, flown straight for ten seconds and more, at least 2 that overlap are "
-        "needed, best crossing ones",
+        "{} has {} strips (straight flight for ten seconds or more); at least 2 that overlap are "
+        "needed, and crossing ones are best",
         options.platform.trajectory, result.strips.size()));
   }
   // By the recordings' clock: what the offset really is will be found.

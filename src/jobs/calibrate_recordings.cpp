@@ -27,8 +27,8 @@ calibration::CalibrationOptions checked_settings(const CalibrateRecordingsOption
   if (options.method == calibration::CalibrationMethod::paper &&
       (options.planes || !options.stations.empty() || options.prior_sigma)) {
     throw InvalidArgument(
-        "option method paper knows no option planes, option stations and option prior_sigma: its "
-        "walls are all it has");
+        "option method paper cannot be combined with option planes, option stations or option "
+        "prior_sigma: it uses the walls of the recordings alone");
   }
   if (!options.truths.empty()) check_truths(options.truths, options.recordings.size());
   calibration::CalibrationOptions result;
@@ -83,10 +83,10 @@ std::vector<scenes::Station> stations_of(const std::string& path,
   for (const std::string& name : names) stations.push_back(scene.station(name));
   if (names.empty()) stations = scene.stations;
   if (stations.size() != recordings) {
-    throw InvalidArgument(fmt::format(
-        "{} stations for {} recordings: {} has to list one for each, in their order, or option "
-        "station names them",
-        stations.size(), recordings, path));
+    throw InvalidArgument(
+        fmt::format("{} stations for {} recordings: {} must list one per recording, in their "
+                    "order, or name them with option station",
+                    stations.size(), recordings, path));
   }
   return stations;
 }

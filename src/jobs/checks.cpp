@@ -36,8 +36,8 @@ void check_truth_name(const std::string& truth) {
 void check_truths(const std::vector<std::string>& truths, std::size_t recordings) {
   if (truths.size() != recordings) {
     throw InvalidArgument(
-        fmt::format("{} truth files for {} recordings: option truth takes one each", truths.size(),
-                    recordings));
+        fmt::format("{} truth files for {} recordings: give option truth once per recording",
+                    truths.size(), recordings));
   }
   for (const std::string& truth : truths) check_truth_name(truth);
 }
@@ -52,11 +52,10 @@ void check_truth_is_of_recording(std::span<const Vector3<double>> recorded,
   }
   const double middle = median(apart);
   if (!(middle > kMost)) return;
-  throw InvalidArgument(
-      fmt::format("option truth = {} is of another recording: at the same times its beams go "
-                  "elsewhere, by {:.3g} "
-                  "degrees in the middle of all, allowed {:.0f}",
-                  truth, degrees_from_radians(middle), degrees_from_radians(kMost)));
+  throw InvalidArgument(fmt::format(
+      "option truth = {} belongs to another recording: at the same times its beams point "
+      "elsewhere, by {:.3g} degrees in the median, allowed {:.0f}",
+      truth, degrees_from_radians(middle), degrees_from_radians(kMost)));
 }
 
 std::string truth_columns(const std::string& truth) {

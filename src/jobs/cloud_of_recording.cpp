@@ -36,7 +36,7 @@ RecordingCloud cloud_of_recording(const CloudOfRecordingOptions& options,
   if (settings.angle_noise) check_positive(*settings.angle_noise, "angle_noise", "rad");
   check_positive(settings.writer.las_scale, "las_scale", "m");
   if (settings.loadings && !settings.pointing.covariance) {
-    throw InvalidArgument("option common_factors yes and option covariance no do not go together");
+    throw InvalidArgument("option common_factors yes and option covariance no cannot be combined");
   }
   const sensors::Sensor calibration = sensors::load_sensor(options.calibration);
   cloud::find_cloud_format(options.output, settings.writer.format);  // before anything is read

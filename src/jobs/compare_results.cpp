@@ -37,10 +37,10 @@ void require_same_kind(const Sensor& a, const Sensor& b) {
     return fmt::format("{} prisms ({}) and {} emitters", sensor.prisms(),
                        to_string(sensor.train.face_order()), sensor.train.emitters());
   };
-  throw InvalidArgument(
-      fmt::format("two results of sensors of one kind can be compared, and the first has {}, the "
-                  "second {}",
-                  words(a), words(b)));
+  throw InvalidArgument(fmt::format(
+      "only results of sensors with the same optics can be compared: the first has {}, the "
+      "second {}",
+      words(a), words(b)));
 }
 
 double sigma_of(const NamedCovariance& known, const std::string& name) {
@@ -204,9 +204,10 @@ Sensor load_result(const std::string& path) {
   if (!fs::is_directory(path)) return sensors::load_sensor(path);
   const std::optional<std::string> file = calibration_in(path);
   if (!file) {
-    throw FileError((fs::path(path) / kCalibrationFile).string(), {},
-                    "is missing: a result folder holds it where estimate or calibrate came to a "
-                    "result that is better than what the sensor believed");
+    throw FileError(
+        (fs::path(path) / kCalibrationFile).string(), {},
+        "is missing: estimate and calibrate write it only if their result is better than "
+        "what the sensor believed");
   }
   return sensors::load_sensor(*file);
 }

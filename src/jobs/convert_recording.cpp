@@ -21,9 +21,9 @@ recordings::RecordingHeader header_of(const recordings::Reader& reader,
     for (recordings::Device& device : header.devices) {
       const std::string told = recordings::device_type_name(device.type);
       if (told != "unknown" && device.type != *options.sensor_type && !device.type_inferred) {
-        throw InvalidArgument(
-            fmt::format("option sensor_type {}: the recording tells that it is of a {}",
-                        recordings::device_type_name(*options.sensor_type), told));
+        throw InvalidArgument(fmt::format("option sensor_type {}: the recording itself names a {}",
+                                          recordings::device_type_name(*options.sensor_type),
+                                          told));
       }
       device.type = *options.sensor_type;
     }

@@ -28,8 +28,8 @@ void check(const EstimateRecordingOptions& options) {
   if (options.files.states == StatesRows::all && options.method == estimation::Method::ekf &&
       options.rate) {
     throw InvalidArgument(
-        "option states all needs option rate full: the filter has states at the shots it uses "
-        "only");
+        "option states all needs option rate full: the filter has states only at the shots it "
+        "uses");
   }
   if (!options.truth.empty()) check_truth_name(options.truth);
 }
@@ -54,12 +54,12 @@ void write_files(const EstimateRecordingOptions& options, EstimatedRecording& re
 /// What rotors say of the clock that turn too fast or too slowly all by the same factor.
 std::string clock_words(const estimation::SpeedFactor& factor, double counted_rate) {
   std::string words = fmt::format(
-      "all rotors turn {:.5f} ± {:.5f} times as fast as the type's, as they would if the clock of "
-      "the recording were wrong",
+      "all rotors turn {:.5f} ± {:.5f} times as fast as is usual for this type, as they would "
+      "appear to if the clock of the recording were wrong",
       factor.value, factor.sigma);
   if (counted_rate > 0) {
     words += fmt::format(
-        ": with a shot rate of {:.0f} Hz instead of {:.10g} they would turn as usual; nothing was "
+        ": at a shot rate of {:.0f} Hz instead of {:.10g} Hz they would turn as usual; nothing was "
         "changed",
         counted_rate / factor.value, counted_rate);
   }

@@ -32,7 +32,7 @@ estimation::AngleSeries read(const IdentifyRecordingOptions& options, Identified
   const recordings::RecordingHeader& header = reader->header();
   recordings::require_times(header);
   if (header.devices.size() > 1) {
-    throw InvalidArgument(fmt::format("{} holds {} sensors, identify takes the recording of one",
+    throw InvalidArgument(fmt::format("{} holds {} sensors, identify needs the recording of one",
                                       options.recording, header.devices.size()));
   }
   estimation::ShotSelector selector({});
@@ -45,10 +45,10 @@ estimation::AngleSeries read(const IdentifyRecordingOptions& options, Identified
   result.warnings.insert(result.warnings.end(), input.words.begin(), input.words.end());
   result.cropped = input.choice.has_value();
   if (result.cropped) {
-    result.warnings.push_back(fmt::format(
-        "the optics of {} told when the shots of packets that lack points were fired: what is "
-        "found here is not independent of them",
-        input.choice->sensor.name));
+    result.warnings.push_back(
+        fmt::format("the optics of {} were used to find when the shots in packets with missing "
+                    "points were fired: what is found here is not independent of them",
+                    input.choice->sensor.name));
   }
   return selector.take_series();
 }
@@ -84,7 +84,8 @@ void judge(IdentifiedRecording& result) {
   if (!found.fits) {
     result.verdict = IdentificationVerdict::inconsistent;
     result.words = fmt::format(
-        "no train of up to three prisms that was tried describes this scan: the best one leaves {}",
+        "none of the trains of up to three prisms that were tried describes this scan: the best "
+        "one leaves {}",
         rms);
     result.to_do =
         result.cropped
@@ -99,7 +100,7 @@ void judge(IdentifiedRecording& result) {
     result.verdict = IdentificationVerdict::undecided;
     result.words = fmt::format(
         "several trains describe this scan: the best one leaves {}, and the chi squared of another "
-        "is larger by {:.3g}, where {:.0f} would be fair to decide by",
+        "is larger by only {:.3g}, where {:.0f} would be needed to decide between them",
         rms, found.hypotheses.size() > 1 ? found.hypotheses[1].excess : 0.0,
         identification::kFairLead);
     result.to_do = "record for longer, or with less of the field of view without returns";
@@ -116,19 +117,19 @@ void say_what_is_never_told(IdentifiedRecording& result) {
   std::vector<std::string>& words = result.unobservable;
   if (found.emitters == 1) {
     words.emplace_back(
-        "one emitter on the axis shows only by how much the first prism turns its beam aside: its "
-        "face order, wedge and refractive index cannot be told apart, and it is taken to be of the "
-        "others' glass");
+        "a single emitter on the axis shows only how far the first prism deflects its beam: the "
+        "prism's face order, wedge angle and refractive index cannot be separated, and it is taken "
+        "to be of the same glass as the others");
   } else if (found.freedom.one_glass) {
     words.emplace_back(
-        "the prisms are taken to be of one glass, which the data allow; the sigmas hold without "
-        "that");
+        "the prisms are taken to be of the same glass, which fits the data; the sigmas do not rely "
+        "on that");
   }
   words.emplace_back(
-      "a wedge of the opposite sign is one turned by half a turn, and the mirror image of a scan "
-      "is that of the same prisms turning the other way");
+      "a wedge of the opposite sign is the same wedge rotated by half a turn, and the mirror image "
+      "of a scan is the scan of the same prisms turning the other way");
   words.emplace_back(
-      "refractive indices are relative to the air's; windows, and wedges that stand still before "
+      "refractive indices are relative to that of the air; windows, and fixed wedges in front of "
       "the first prism, cannot be seen");
 }
 

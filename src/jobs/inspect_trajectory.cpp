@@ -23,7 +23,7 @@ InspectedTrajectory inspect_trajectory(const InspectTrajectoryOptions& options,
   if (trajectories::trajectory_file_kind(options.trajectory) == TrajectoryFileKind::accuracies) {
     if (!options.accuracy.empty()) {
       throw InvalidArgument("option accuracy: " + options.trajectory +
-                            " holds accuracies itself, expected a trajectory");
+                            " itself holds accuracies, expected a trajectory");
     }
     take_accuracies(options.trajectory);
     return result;

@@ -24,7 +24,7 @@ std::vector<std::string> paths_of(const PlatformFiles& files) {
 cloud::MovingPlatform load_platform(const PlatformFiles& files, const Progress& progress) {
   if (files.trajectory.empty()) {
     throw InvalidArgument(
-        "option trajectory is missing: mount, accuracies, errors and crs are of a sensor that "
+        "option trajectory is missing: mount, accuracies, errors and crs are for a sensor that "
         "moves");
   }
   if (files.mount.empty()) {

@@ -131,42 +131,42 @@ PlacedRows PacketRecording::place_rows(const sensors::Sensor& sensor,
       "was exported from";
   PlacedRows result;
   if (found.followed) {
-    result.words.push_back(fmt::format(
-        "{}: the rotors were followed and tell when each of {} shots was fired; {} that fit two "
-        "places in their packet are left out",
-        lacking, told, unknown));
+    result.words.push_back(
+        fmt::format("{}: the rotors were followed, which shows when each of {} shots was fired; {} "
+                    "shots that fit two places in their packet are left out",
+                    lacking, told, unknown));
   } else if (untold == UntoldShots::guessed) {
     estimation::GuessedPlaces guess = estimation::guess_places(shots_, found.place);
     found.place = std::move(guess.place);
     result.time_uncertainty = guess.most_off / rate;
     result.words.push_back(fmt::format(
-        "{}: they do not tell the rotors of the sensor {}, and the times of {} of {} shots are "
-        "guesses, in their order, that may be off by up to {:.2g} ms; {}",
+        "{}: they do not show how the rotors of the sensor {} turned. The times of {} of {} shots "
+        "are guessed, in their order, and may be off by up to {:.2g} ms; {}",
         lacking, sensor.name, unknown, told + unknown, 1e3 * result.time_uncertainty, remedy));
   } else if (told < kFewestPackets * static_cast<std::size_t>(shots_.places)) {
     throw EstimationError(fmt::format(
-        "{}: when the shots were fired is unknown, because they do not tell the rotors of the "
-        "sensor {}, and {} shots whose places show without it, of {} whole packets and of runs "
-        "that go on from packet to packet, are too few, allowed from {} on; {}",
+        "{}: when the shots were fired is unknown, because they do not show how the rotors of the "
+        "sensor {} turned. The places of {} shots are known without that, in {} whole packets and "
+        "in runs that continue from packet to packet; at least {} are needed; {}",
         lacking, sensor.name, told, whole, kFewestPackets * static_cast<std::size_t>(shots_.places),
         remedy));
   } else {
-    result.words.push_back(
-        fmt::format("{}: they do not tell the rotors of the sensor {}, and only {} of {} shots are "
-                    "used, whose places show without it, of {} whole packets and of runs that go "
-                    "on from packet to packet; {}",
-                    lacking, sensor.name, told, told + unknown, whole, remedy));
+    result.words.push_back(fmt::format(
+        "{}: they do not show how the rotors of the sensor {} turned. Only {} of {} shots "
+        "are used, whose places are known without that, in {} whole packets and in "
+        "runs that continue from packet to packet; {}",
+        lacking, sensor.name, told, told + unknown, whole, remedy));
   }
   if (shot_rate) {
     result.words.push_back(
         fmt::format("shots cannot be counted where points are missing: the packets keep their "
-                    "times, and {:.6g} shots per second are those within a packet",
+                    "times, and {:.6g} shots per second hold within a packet only",
                     *shot_rate));
   }
   if (found.cut_coordinates) {
     result.words.emplace_back(
-        "the shots fit better as points whose coordinates were cut off towards zero than as "
-        "rounded ones: half a step was put back");
+        "the coordinates of the points were evidently truncated towards zero, not rounded: half a "
+        "step was added back");
   }
   result.places = places_of_rows(found.place, rate, std::move(found.firing_order));
   result.places.cut_coordinates = found.cut_coordinates;

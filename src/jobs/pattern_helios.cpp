@@ -56,8 +56,7 @@ std::string comment_of(const sensors::HeliosScanner& scanner, const sensors::Sen
       "<!-- The scan pattern of {} by risley. Axes: x right, y forward, z up. The sign of an angle "
       "chooses the face\n       that is inclined: positive the first, negative the second. Against "
       "the pattern itself {:.3g} degree (root mean\n       square), {:.3g} at most, over {} shots; "
-      "a "
-      "shot of the pattern at time t is at t {} {:.10g} s here.\n",
+      "a shot of the pattern at time t is at t {} {:.10g} s here.\n",
       commented(sensor.name), degrees_from_radians(scanner.rms),
       degrees_from_radians(scanner.worst), scanner.compared, scanner.time_lag < 0 ? '-' : '+',
       std::abs(scanner.time_lag));
@@ -79,7 +78,7 @@ void put_helios_xml(PatternStream& out) {
       sensors::helios_scanner(sensor, out.result().rows, out.options().scan, out.progress());
   if (sensor.beam_divergence_horizontal != sensor.beam_divergence_vertical) {
     scanner.not_carried.push_back(
-        fmt::format("A beam divergence of {:.4g} x {:.4g} degree: the smaller one is written.",
+        fmt::format("A beam divergence of {:.4g} x {:.4g} degree: the smaller value is written.",
                     degrees_from_radians(sensor.beam_divergence_horizontal),
                     degrees_from_radians(sensor.beam_divergence_vertical)));
   }

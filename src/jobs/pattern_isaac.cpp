@@ -90,21 +90,21 @@ void begin(PatternStream& out, bool whole_rate) {
   require_between("duration", duration, 0, kLongest, "s of a format with nanoseconds");
   WrittenPattern& result = out.result();
   result.not_carried = {
-      "What comes after the duration: Isaac Sim repeats one and the same scan.",
-      "Azimuths as another version of Isaac Sim may count them: here they go from X, forward, "
+      "What follows after the duration: Isaac Sim repeats the same scan.",
+      "The sense of azimuths in other versions of Isaac Sim: here they run from X, forward, "
       "towards Y, left. Check with a wall on one side.",
   };
   const double rate = 1 / duration;
   if (whole_rate && (rate < 1 || std::abs(rate - std::round(rate)) > 1e-6 * rate)) {
     result.not_carried.push_back(
-        fmt::format("A scan of {:.6g} s: scans per second are a whole number.", duration));
+        fmt::format("A scan of {:.6g} s: the number of scans per second must be whole.", duration));
   }
 }
 
 void end(PatternStream& out) {
   if (out.result().blocked == 0) return;
-  out.result().not_carried.push_back(fmt::format(
-      "{} shots that do not get through the prisms: they are left out.", out.result().blocked));
+  out.result().not_carried.push_back(
+      fmt::format("{} shots that do not pass through the prisms.", out.result().blocked));
 }
 
 double least_echo_distance(const sensors::Sensor& sensor) {

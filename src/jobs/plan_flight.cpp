@@ -65,8 +65,8 @@ void load_flight_plan(const FlightPlanFiles& files, PlanFlightOptions& options) 
   options.plan = trajectories::load_flight_plan(files.plan);
   if (files.mount.empty()) {
     throw InvalidArgument(
-        "option mount is missing: a file that says how the sensor sits on the platform, and by its "
-        "sigmas how well that is known before the flight");
+        "option mount is missing: a file that says how the sensor sits on the platform and, with "
+        "its sigmas, how well that is known before the flight");
   }
   if (files.errors.empty()) {
     throw InvalidArgument(
@@ -79,7 +79,7 @@ void load_flight_plan(const FlightPlanFiles& files, PlanFlightOptions& options) 
   const scenes::Scene scene = scenes::load_scene(files.scene);
   if (!scene.terrain) {
     throw InvalidArgument(fmt::format(
-        "{} has no terrain to fly over: give it terrain: {{ground: ...}}", files.scene));
+        "{} has no terrain to fly over: add terrain: {{ground: ...}} to it", files.scene));
   }
   options.terrain = scene.terrain->parts();
 }
@@ -94,8 +94,8 @@ PlannedFlightResult plan_flight(const PlanFlightOptions& options, const Progress
   for (const trajectories::ErrorTerm& term : options.errors.terms) {
     if (!term.sigma) {
       throw InvalidArgument(
-          "the trajectory's errors state no sigma for one of the six: of a flight that is planned "
-          "there are no accuracies to take its place");
+          "the trajectory errors lack a sigma for one of the six components, and a planned flight "
+          "has no accuracies that could replace it");
     }
   }
   PlannedFlightResult result;
@@ -128,23 +128,23 @@ PlannedFlightResult plan_flight(const PlanFlightOptions& options, const Progress
   } else {
     planned.terrain.ground = scenes::Ground{};
     result.warnings.emplace_back(
-        "no terrain is given: the ground is taken to be level at a height of 0, which tells the "
-        "least; roofs tell more");
+        "no terrain is given: the ground is taken to be level at a height of 0, from which the "
+        "least can be learned; roofs show more");
   }
   const bool all_held =
       std::all_of(options.mount.boresight.begin(), options.mount.boresight.end(),
                   [](const trajectories::StatedValue& angle) { return angle.sigma == 0; });
   if (all_held) {
     result.warnings.emplace_back(
-        "the mount states its boresight with a sigma of 0, so that it counts as known and is not "
-        "looked for: a sigma of 3 degrees is that of a mount as it was built");
+        "the mount gives its boresight a sigma of 0, so it counts as known and is not estimated: "
+        "for a mount as built, state a sigma of 3 degrees");
   }
   result.forecast = calibration::forecast(planned, wanted, progress.stage("calibration"));
   try {
     result.distribution = distribution_of(planned, options, progress.stage("points"));
   } catch (const InvalidArgument& error) {
     result.warnings.push_back(
-        fmt::format("how points lie on the ground is not told: {}", error.what()));
+        fmt::format("how densely points cover the ground is not reported: {}", error.what()));
   }
   return result;
 }

@@ -53,7 +53,7 @@ RangedRecording read_ranged(const RangedInputOptions& options, std::size_t numbe
   result.observations += input.recording.audit.observations;
   if (!input.recording.header.has_range) {
     throw EstimationError(
-        fmt::format("{} holds no ranges: there is nothing to calibrate on", path));
+        fmt::format("{} holds no ranges, which a calibration on walls needs", path));
   }
   estimation::EstimateOptions settings;
   settings.sensor = input.choice.sensor;

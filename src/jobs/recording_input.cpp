@@ -133,10 +133,10 @@ std::vector<std::string> count_words(const estimation::ShotCount& count, double 
   std::size_t mended = 0;
   for (const recordings::ShotSlip& slip : count.slips) {
     if (!slip.counted) {
-      words.push_back(fmt::format(
-          "shots are missing before row {}, and the rotors do not tell how many: the recording was "
-          "cut there",
-          slip.row));
+      words.push_back(
+          fmt::format("shots are missing before row {}, and the rotors do not show how many: the "
+                      "recording was cut there",
+                      slip.row));
       continue;
     }
     ++mended;
@@ -144,16 +144,15 @@ std::vector<std::string> count_words(const estimation::ShotCount& count, double 
   }
   if (mended > 0) {
     words.push_back(fmt::format(
-        "{} slip{} of the shot count {} found ({} shots lost) and the times behind {} mended",
+        "{} gap{} in the shot count {} found ({} shots lost), and the times behind {} corrected",
         mended, mended == 1 ? "" : "s", mended == 1 ? "was" : "were", lost,
         mended == 1 ? "it" : "them"));
   }
   if (!words.empty() && !given) {
-    words.push_back(
-        fmt::format("the times of the recording are evidently counted: they were counted anew, "
-                    "{:.6g} shots per "
-                    "second",
-                    rate));
+    words.push_back(fmt::format(
+        "the times of the recording are evidently shot numbers: they were counted anew at "
+        "{:.6g} shots per second",
+        rate));
   }
   bool in_turn = true;
   std::string order;
@@ -163,7 +162,7 @@ std::vector<std::string> count_words(const estimation::ShotCount& count, double 
   }
   if (!in_turn) {
     words.push_back(fmt::format(
-        "the file names no emitters: from its first shot on they fire in the order {}", order));
+        "the file names no emitters: from its first shot on, they fire in the order {}", order));
   }
   return words;
 }
@@ -193,8 +192,8 @@ SensorFrameRecording open_by_stated_pose(const std::string& path, recordings::Re
     result.reader = open_input(path, reading, progress);
     result.turned_back = true;
     result.warnings.push_back(fmt::format(
-        "the recording is rolled about the optical axis by {:.1f} deg, as the sensor's emitters "
-        "show: the shots were turned back by that",
+        "the recording is rotated about the optical axis by {:.1f} deg, as the positions of the "
+        "sensor's emitters show: the shots were turned back by that angle",
         degrees_from_radians(result.choice.roll)));
     return result;
   }
@@ -203,8 +202,8 @@ SensorFrameRecording open_by_stated_pose(const std::string& path, recordings::Re
       first_second(path, reading, progress), first_second(path, turned_back, progress),
       result.choice.sensor.field_of_view);
   const std::string found = fmt::format(
-      "the recording states a pose of its sensor ({}); outside the sensor's field of "
-      "view lie {} of the shots as recorded and {} after turning back",
+      "the recording states a pose of its sensor ({}); of the shots, {} lie outside the sensor's "
+      "field of view as recorded and {} after turning them back",
       pose_text(*pose), share_text(verdict.outside_as_recorded),
       share_text(verdict.outside_turned_back));
   const bool by_hub =
@@ -218,12 +217,13 @@ SensorFrameRecording open_by_stated_pose(const std::string& path, recordings::Re
   if (decided && result.turned_back) {
     result.warnings.push_back(found + ": the shots were turned back into the sensor's frame");
   } else if (!decided) {
-    result.warnings.push_back(fmt::format(
-        "{}: that does not tell whether they were moved by it; {}. Option extrinsics says it: the "
-        "pose, or 0,0,0 for shots in the sensor's frame",
-        found,
-        result.turned_back ? "they were turned back, because a hub recorded them"
-                           : "they were taken as they are"));
+    result.warnings.push_back(
+        fmt::format("{}: that does not show whether the pose was applied to them; {}. Option "
+                    "extrinsics decides it: "
+                    "give the pose, or 0,0,0 for shots in the sensor's frame",
+                    found,
+                    result.turned_back ? "they were turned back, because a hub recorded them"
+                                       : "they were taken as they are"));
   }
   return result;
 }
@@ -294,7 +294,7 @@ EstimationInput read_for_estimation(const EstimationInputOptions& options,
   recordings::Reader& reader = *input.reader;
   if (reader.header().devices.size() > 1) {
     throw InvalidArgument(
-        fmt::format("{} holds {} sensors, an estimation takes the recording of one", path,
+        fmt::format("{} holds {} sensors, an estimation needs the recording of one", path,
                     reader.header().devices.size()));
   }
   EstimationInput result;
@@ -314,9 +314,8 @@ EstimationInput read_for_estimation(const EstimationInputOptions& options,
   result.counts = selector.counts();
   if (result.counts.clock_resets > 0) {
     result.warnings.push_back(
-        fmt::format("the clock of the recording jumps back {} times: the "
-                    "pieces share the parameters, and their rotors are found "
-                    "anew",
+        fmt::format("the clock of the recording jumps back {} times: the pieces share their "
+                    "parameters, and in each the rotors are found anew",
                     result.counts.clock_resets));
   }
   result.head = selector.head();

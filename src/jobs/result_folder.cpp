@@ -50,9 +50,9 @@ ResultFolder::ResultFolder(const std::string& folder) : folder_(folder) {
   std::error_code code;
   made_ = fs::create_directories(folder_, code);
   if (code || !fs::is_directory(folder_)) {
-    throw FileError(
-        folder_, {},
-        fmt::format("cannot be made a folder: {}", code ? code.message() : "a file has this name"));
+    throw FileError(folder_, {},
+                    fmt::format("the folder cannot be created: {}",
+                                code ? code.message() : "a file has this name"));
   }
 }
 
@@ -95,12 +95,13 @@ std::vector<std::string> ResultFolder::commit() {
   committed_ = true;
   // From here on the folder holds files of two runs.
   io::write_text_file(path(kIncomplete),
-                      "The files beside this one may be of different runs: the last one was "
-                      "stopped while it gave its\nresults their names. Run it again.\n");
+                      "The files beside this one may come from different runs: the last run was "
+                      "stopped while it\nput its results in place. Run it again.\n");
   for (const std::string& name : left_over()) {
     const std::string aside = set_aside(path(name));
-    moves.push_back(fmt::format("{} is of an earlier run, and this one has none: it is {} now",
-                                path(name), aside));
+    moves.push_back(
+        fmt::format("{} is from an earlier run, and this run wrote none: it was renamed {}",
+                    path(name), aside));
   }
   for (io::OutputFile& file : files_) file.commit();
   std::error_code code;

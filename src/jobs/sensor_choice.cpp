@@ -149,7 +149,7 @@ void call_it_a_guess(SensorChoice& choice, const std::string& why) {
   choice.chosen_by = ChosenBy::guess;
   choice.words = why;
   choice.warnings.push_back(fmt::format(
-      "the file does not say which sensor recorded it: {} is a guess, {}; option sensor says which",
+      "the file does not say which sensor recorded it: {} is a guess, {}; option sensor decides it",
       choice.sensor.name, why));
 }
 
@@ -199,8 +199,8 @@ void guess(const FirstShots& shots, const std::optional<SensorRecognition>& foun
   }
   choice.words = "no built-in preset describes the scan: " + comparison(choice.misfits);
   choice.warnings.push_back(fmt::format(
-      "{}; {} is assumed. Option sensor says which sensor it was, by a preset or a calibration "
-      "file; the prisms of an unknown one are what identify finds",
+      "{}; {} is assumed. Option sensor names the sensor, by a preset or a calibration file; the "
+      "prisms of an unknown sensor can be found with identify",
       choice.words, choice.sensor.name));
 }
 
@@ -255,7 +255,7 @@ SensorChoice choose_by_name(const FirstShots& shots, const Sensor& named,
     choice.misfits.push_back({named.name, misfit_of(match)});
   }
   choice.warnings.push_back(fmt::format(
-      "the file names a {}, but its scan is that of a {}: {}; option sensor says which it was",
+      "the file names a {}, but its scan is that of a {}: {}; option sensor decides which it was",
       named.model, candidates[found->matches.front().candidate].model, comparison(choice.misfits)));
   return choice;
 }
@@ -336,9 +336,10 @@ SensorChoice choose_sensor(const std::string& path, const recordings::ReadOption
       if (sensor.device_type == device.type) named = &sensor;
     }
     if (named == nullptr) {
-      throw InvalidArgument(fmt::format(
-          "no built-in preset for the recording's sensor ({}): say which with option sensor",
-          recordings::device_type_name(device.type)));
+      throw InvalidArgument(
+          fmt::format("there is no built-in preset for the recording's sensor ({}): name one with "
+                      "option sensor",
+                      recordings::device_type_name(device.type)));
     }
   }
   if (named != nullptr && (!has_times || !one_sensor)) {

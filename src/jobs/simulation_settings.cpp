@@ -24,7 +24,7 @@ void assign(sensors::Sensor& sensor, const ParameterValues& values) {
     check_bounds(parameter, value);
     if (parameter.kind == ParameterKind::rotation_angle) {
       throw InvalidArgument(
-          fmt::format("{}: the rotation angles at the start are set by option start_angles", name));
+          fmt::format("{}: set the rotation angles at the start with option start_angles", name));
     }
     sensor.set(name, value);
   }
@@ -51,15 +51,15 @@ std::optional<simulation::Platform> platform_from(const SimulationOptions& optio
     return std::nullopt;
   }
   if (!options.trajectory.empty() && !options.flight.empty()) {
-    throw InvalidArgument("option trajectory and option flight do not go together");
+    throw InvalidArgument("option trajectory and option flight cannot be combined");
   }
   if (options.mount.empty()) {
     throw InvalidArgument(
-        "option mount is missing: how the sensor sits on what moves along the trajectory");
+        "option mount is missing: a file that says how the sensor sits on the moving platform");
   }
   if (!settings.scene) {
     throw InvalidArgument(
-        "option scene is missing: what the moving sensor meets, for example a terrain");
+        "option scene is missing: what the moving sensor scans, for example a terrain");
   }
   simulation::Platform platform;
   if (!options.flight.empty()) {

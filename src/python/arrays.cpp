@@ -83,7 +83,7 @@ Shape broadcast_shape(const std::vector<std::pair<std::string, py::array>>& arra
         length = other[i];
       } else if (other[i] != 1 && other[i] != length) {
         throw InvalidArgument(
-            fmt::format("{} has the shape {}, which does not go with {} of what stands before it",
+            fmt::format("{} has the shape {}, which does not fit {} of the argument before it",
                         name, shape_text(own), shape_text(common)));
       }
     }

@@ -51,19 +51,18 @@ void bind_errors(py::module_& module) {
   ErrorTypes& types = error_types();
   types.file =
       new_error(module, "FileError",
-                "A file is damaged, of no known kind, or cannot be read or written.\n\n"
+                "A file is damaged, of an unknown kind, or cannot be read or written.\n\n"
                 "Attributes\n----------\n"
                 "path : str\n    The file.\n"
-                "byte_offset, line : int or None\n    Where in it, if that is known; lines "
-                "count from 1.\n"
-                "problem : str\n    What was expected and what was found.\n",
+                "byte_offset, line : int or None\n    Where in it, if that is known; lines count "
+                "from 1.\nproblem : str\n    What was expected and what was found.\n",
                 PyExc_OSError);
   const py::tuple both = py::make_tuple(types.file, py::handle(PyExc_FileNotFoundError));
   types.missing_file =
       new_error(module, "MissingFileError", "A file is not there; also a FileNotFoundError.", both);
   types.estimation =
       new_error(module, "EstimationError",
-                "The numbers cannot answer: too few data, no convergence, no valid shot.",
+                "The data give no answer: too few of them, no convergence, or no valid shot.",
                 PyExc_RuntimeError);
   types.cancelled =
       new_error(module, "Cancelled", "A call was stopped because the interpreter is about to end.",

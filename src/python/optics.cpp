@@ -66,7 +66,7 @@ std::span<double> span_of(Numbers& array) {
 Numbers result_array(const py::object& given, std::string_view name, const Shape& shape) {
   if (given.is_none()) return Numbers(shape);
   if (!py::isinstance<Numbers>(given)) {
-    throw py::type_error(fmt::format("{} is no array of float64 in C order", name));
+    throw py::type_error(fmt::format("{} is not a float64 array in C order", name));
   }
   Numbers array(given);
   if (shape_of(array) != shape) {

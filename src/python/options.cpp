@@ -34,7 +34,7 @@ std::size_t Options::choice(const char* name, const std::vector<std::string>& al
 }
 
 py::type_error Options::wrong_type(const char* name) const {
-  return py::type_error(fmt::format("{} = {} is of a type that cannot be taken", name,
+  return py::type_error(fmt::format("{} = {} has a type that is not accepted here", name,
                                     py::repr(values_[name]).cast<std::string>()));
 }
 

@@ -295,13 +295,13 @@ void bind_recordings(py::module_& module) {
       module, "Recording",
       "Observations of a recording as columns, one row per return.\n\n"
       "Every column is a numpy array of shape (rows,) that shares the recording's memory: it\n"
-      "cannot be written to and stays sound when the recording is gone. `read` and `read_chunks`\n"
-      "make recordings of files, `from_arrays` of numbers.");
+      "cannot be written to, and stays valid after the recording is deleted. `read` and "
+      "`read_chunks`\nmake recordings of files, `from_arrays` of numbers.");
   type.def("__len__", [](const Recording& recording) { return recording.data.observations.size(); })
       .def_readonly("header", &Recording::header, "What is known of the whole recording.")
       .def_property_readonly(
           "warnings", [](const Recording& recording) { return texts_of(recording.warnings); },
-          "What does not make the recording useless, in sentences.")
+          "Problems that leave the recording usable, in sentences.")
       .def("__repr__", [](const Recording& recording) {
         return fmt::format("<risley.Recording {}, {} rows>", recording.header.format,
                            recording.data.observations.size());
@@ -344,7 +344,7 @@ void bind_recordings(py::module_& module) {
       .def_property_readonly("header", &ChunkReader::header,
                              "What is known of the whole recording.")
       .def_property_readonly("warnings", &ChunkReader::warnings,
-                             "What was found so far that does not make the recording useless.")
+                             "Problems found so far that leave the recording usable.")
       .def_property_readonly("fraction_read", &ChunkReader::fraction_read,
                              "Part of the file that was read, 0 to 1.");
 

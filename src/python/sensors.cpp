@@ -30,7 +30,7 @@ using sensors::Sensor;
 NamedParameter constant_parameter(const std::string& name, const Sensor& sensor) {
   const NamedParameter parameter = named_parameter(name, sensor.shape());
   if (parameter.info->kind == ParameterKind::rotation_angle) {
-    throw InvalidArgument(fmt::format("{} is no constant of a sensor", name));
+    throw InvalidArgument(fmt::format("{} is not a constant of a sensor", name));
   }
   return parameter;
 }
@@ -97,21 +97,22 @@ void bind_sensors(py::module_& module) {
           [](const Sensor& sensor) { return array_of(sensor.angular_velocity); },
           "Speeds of the rotors, rad/s; shape (prisms,).")
       .def_readonly("combination", &Sensor::combination,
-                    "Number of its speed combination, from 1; None where it has one alone.")
+                    "Number of its speed combination, from 1; None if it has only one.")
       .def("with_combination", &sensors::with_combination, py::arg("combination"),
            "The same sensor in another speed combination.\n\n"
            "Raises\n------\nValueError\n    When there is none of that number.")
       .def_property_readonly("parameters", &values_of,
                              "All parameters and speeds by name, SI units.")
       .def("sigma", &sigma_of, py::arg("name"),
-           "One standard deviation of a parameter, in the unit of the name; None where nobody "
-           "says.")
+           "One standard deviation of a parameter, in the unit of the name; None if it is "
+           "not known.")
       .def("source", &source_of, py::arg("name"), "Who says how large a parameter is.")
       .def_property_readonly(
           "reference", [](const Sensor& sensor) { return sensors::to_string(sensor.reference); },
           "What it was calibrated against: none, directions or planes.")
-      .def_property_readonly("covariance_names", &covariance_names,
-                             "What the covariance is of; empty for a type.")
+      .def_property_readonly(
+          "covariance_names", &covariance_names,
+          "Names of the values that the covariance belongs to; empty for a sensor type.")
       .def_property_readonly(
           "covariance", [](const Sensor& sensor) { return array_of(sensor.covariance); },
           "Covariance of the values in ``covariance_names``, SI units; shape (n, n).")

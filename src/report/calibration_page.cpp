@@ -72,13 +72,12 @@ std::string boresight_advice_html(const CalibrationReport& r) {
       "is poor. The shape of the bundle, and with it the flatness of point clouds, is not "
       "affected. Set-ups that help:</p>{}",
       sigma_degrees(boresight_sigma(r.datum)), degrees_from_radians(calibration::kPoorDatum),
-      list_html(
-          {"a wall that is steeply tilted against the axis of view, 50 to 65 degrees, and "
-           "fills the whole field of view",
-           "a longer range to the walls",
-           "the body flipped by 180 degrees against a stop between two recordings, given with "
-           "option stations",
-           "walls whose normals are known in the sensor's frame, given with option planes"}));
+      list_html({"a wall that is steeply tilted against the axis of view, 50 to 65 degrees, and "
+                 "fills the whole field of view",
+                 "a longer range to the walls",
+                 "the body turned upside down against a stop between two recordings, given with "
+                 "option stations",
+                 "walls whose normals are known in the sensor's frame, given with option planes"}));
 }
 
 Verdict verdict_of(const CalibrationReport& r) {
@@ -228,8 +227,7 @@ std::string pointing_html(const CalibrationReport& r) {
   if (!r.pointing_error) return "";
   const DirectionErrors& errors = r.pointing_error->errors;
   std::string html = fmt::format(
-      "<div class=\"wide\"><table><thead><tr><th>error of "
-      "reported "
+      "<div class=\"wide\"><table><thead><tr><th>error of reported "
       "directions</th><th>deg</th><th>σ</th><th>mm at {:.0f} m</th></tr></thead><tbody>\n",
       kStatedDistance);
   const auto add = [&](const char* name, double error, double sigma) {
@@ -300,8 +298,8 @@ std::string datum_html(const CalibrationReport& r) {
   std::string html = fmt::format(
       "<p>In this calibration {}.</p>\n"
       "<div class=\"wide\"><table><thead><tr><th>standard uncertainty of the beams, "
-      "deg</th><th>shape</th>"
-      "<th>gauge</th><th>total</th><th>roll</th><th>pitch</th><th>yaw</th></tr></thead><tbody>\n",
+      "deg</th><th>shape</th><th>gauge</th><th>total</th><th>roll</th><th>pitch</th><th>yaw</th></"
+      "tr></thead><tbody>\n",
       datum_text(r.datum_kind));
   html += formal_datum_row("everything included", r.datum);
   html +=

@@ -45,7 +45,7 @@ void check_known(const std::string& name, TrainShape shape, const std::string& p
 void check_series(const Series& series, ChartKind kind, const std::string& place) {
   static constexpr const char* kColours[] = {"a", "b", "c", "d", "ink", "bad"};
   expect(std::find(std::begin(kColours), std::end(kColours), series.colour) != std::end(kColours),
-         place + ".colour", fmt::format("'{}' is no known name", series.colour));
+         place + ".colour", fmt::format("unknown colour '{}'", series.colour));
   const std::size_t points = series.x.size();
   const bool space = kind == ChartKind::space, cells = series.kind == SeriesKind::cells;
   check_values(series.y, points, false, place + ".y");
@@ -54,7 +54,7 @@ void check_series(const Series& series, ChartKind kind, const std::string& place
   expect(!space || series.kind == SeriesKind::points, place + ".kind",
          "expected points in three dimensions");
   for (const double size : {series.cell_width, series.cell_height}) {
-    expect(size >= 0, place, "cell_width and cell_height are lengths");
+    expect(size >= 0, place, "cell_width and cell_height must not be negative");
   }
 }
 
@@ -67,9 +67,10 @@ void check_charts(const std::vector<Chart>& charts, const std::string& list) {
     }
     if (chart.value_range) {
       expect(chart.value_range->first <= chart.value_range->second, place + ".value_range",
-             "expected two numbers, the smaller one first");
+             "expected two numbers, the smaller first");
     }
-    expect(!chart.grows_for || *chart.grows_for > 0, place + ".grows_for", "expected a time");
+    expect(!chart.grows_for || *chart.grows_for > 0, place + ".grows_for",
+           "expected a time above 0 s");
   }
 }
 
@@ -87,11 +88,11 @@ void check_covariance(const Eigen::MatrixXd& c, std::size_t expected, const char
                       bool converged) {
   const auto size = static_cast<Eigen::Index>(expected);
   expect(c.rows() == size && (c.cols() == size || size == 0), "covariance",
-         fmt::format("{} rows of {} values, expected {} of {} as many as {} has", c.rows(),
+         fmt::format("{} rows of {} values, expected {} rows of {}: one per entry of {}", c.rows(),
                      c.cols(), size, size, list));
   for (Eigen::Index i = 0; i < size && converged; ++i) {
     expect(c.row(i).allFinite() && c(i, i) >= 0, fmt::format("covariance[{}]", i),
-           "expected numbers, on the diagonal none below 0");
+           "expected finite numbers, and none below 0 on the diagonal");
   }
 }
 
@@ -128,7 +129,7 @@ void check_unknowns(const FlightReport& r) {
     const std::string place = fmt::format("unknowns[{}]", i);
     if (is_of_train(own.name)) check_known(own.name, r.shape(), place + ".name");
     expect(names.insert(own.name).second, place + ".name",
-           fmt::format("'{}' stands there twice", own.name));
+           fmt::format("'{}' is listed twice", own.name));
     expect(!r.converged || std::isfinite(own.value), place + ".value", "expected a number");
     check_size_of(own.sigma, r.converged, place + ".sigma");
     expect(!(own.prior_sigma < 0), place + ".prior_sigma", "is negative");
@@ -140,7 +141,7 @@ void check_unknowns(const FlightReport& r) {
   for (std::size_t i = 0; i < r.unknowns.size(); ++i) {
     const std::string& twin = r.unknowns[i].twin;
     expect(twin.empty() || names.contains(twin), fmt::format("unknowns[{}].twin", i),
-           fmt::format("'{}' is none of the unknowns", twin));
+           fmt::format("'{}' is not one of the unknowns", twin));
   }
 }
 
@@ -148,7 +149,7 @@ void check_pairs(const std::vector<calibration::StripPair>& pairs, const std::st
   for (std::size_t i = 0; i < pairs.size(); ++i) {
     const std::string place = fmt::format("{}[{}]", list, i);
     expect(pairs[i].first < pairs[i].second, place,
-           "expected two strips, the one with the smaller number first");
+           "expected two strips, the smaller number first");
     expect(!(pairs[i].rms < 0), place + ".rms_m", "is negative");
     for (Eigen::Index axis = 0; axis < 3; ++axis) {
       expect(!(pairs[i].sigma[axis] < 0), place + ".shift_sigma_m", "is negative");
@@ -163,7 +164,7 @@ void check_report(const EstimateReport& r) {
   const auto prisms = static_cast<std::size_t>(r.prisms);
   expect(r.combination >= 0 && r.combination <= 2, "combination", "expected 0, 1 or 2");
   expect(r.method == "map" || r.method == "ekf", "method",
-         fmt::format("'{}' is no known name", r.method));
+         fmt::format("unknown method '{}', expected map or ekf", r.method));
   check_values(r.unevenness, prisms, true, "residuals_over_angle_chi2_per_bin");
   if (r.truth) {
     check_values(r.truth->rotation_angle_rmse, prisms, true, "truth.rotation_angle_rmse");
@@ -207,7 +208,7 @@ void check_report(const FlightReport& r) {
   }
   check_pairs(r.pairs_before, "pairs_before");
   check_pairs(r.pairs_after, "pairs_after");
-  expect(r.knot_spacing >= 0, "knot_spacing_s", "expected a time");
+  expect(r.knot_spacing >= 0, "knot_spacing_s", "is negative");
   check_charts(r.strip_charts, "strip_charts");
   check_charts(r.difference_charts, "difference_charts");
   check_charts(r.ground_charts, "ground_charts");

@@ -144,7 +144,7 @@ void from_json(const Json& json, const std::string& place, T& value) {
       value = static_cast<T>(i);
       return;
     }
-    throw FieldError(place + ": '" + name + "' is no known name");
+    throw FieldError(place + ": unknown name '" + name + "'");
   } else if constexpr (std::is_floating_point_v<T>) {
     expect(json.is_number() || json.is_null(), place, "a number or null", json);
     value = json.is_null() ? std::numeric_limits<T>::quiet_NaN() : json.get<T>();

@@ -487,9 +487,9 @@ Report parse_report(const std::string& text, const std::string& path) {
   try {
     object = Json::parse(text);
   } catch (const Json::parse_error& error) {
-    throw FileError(path, {error.byte, {}}, "the text is no JSON from here on");
+    throw FileError(path, {error.byte, {}}, "from here on, the text is not JSON");
   } catch (const Json::exception& error) {  // a number beyond all that can be stored
-    throw FileError(path, {}, fmt::format("is no JSON that can be read: {}", error.what()));
+    throw FileError(path, {}, fmt::format("the JSON cannot be read: {}", error.what()));
   }
   try {
     archive::expect(object.is_object(), "the file", "an object", object);

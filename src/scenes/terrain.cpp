@@ -192,10 +192,10 @@ void add_village(const VillageSettings& settings, TerrainParts& parts) {
       found = is_free(at);
     }
     if (!found) {
-      throw InvalidArgument(
-          fmt::format("village: {} of {} roofs found room within +-{:g} m at {:g} m from each "
-                      "other; ask for fewer, or for a smaller distance",
-                      i, settings.roofs, settings.half_extent, settings.minimum_distance));
+      throw InvalidArgument(fmt::format(
+          "village: only {} of {} roofs fit within +-{:g} m at {:g} m from one another; "
+          "ask for fewer, or for a smaller distance",
+          i, settings.roofs, settings.half_extent, settings.minimum_distance));
     }
     placed.emplace(square_of(at), at);
     const std::uint64_t draw = (attempt - 1) * kDrawsPerTry;

@@ -158,7 +158,7 @@ HeliosScanner helios_scanner(const Sensor& sensor, std::uint64_t rows,
   const int prisms = sensor.prisms(), emitters = sensor.train.emitters();
   if (prisms > kHeliosPrisms) {
     throw InvalidArgument(
-        fmt::format("sensor \"{}\" has {} prisms, allowed at most {} in a scanner of HELIOS++",
+        fmt::format("sensor \"{}\" has {} prisms, a scanner of HELIOS++ can have {} at most",
                     sensor.name, prisms, kHeliosPrisms));
   }
   if (options.every != 1) {
@@ -237,7 +237,7 @@ HeliosScanner helios_scanner(const Sensor& sensor, std::uint64_t rows,
   }
   if (tilted) {
     result.not_carried.emplace_back(
-        "Tilts of prisms and bearings: the scanner is turned as fits best instead.");
+        "Tilts of prisms and bearings: instead, the whole scanner is rotated as fits best.");
   }
   for (int i = 0; i < prisms; ++i) {
     const double left = start.left[static_cast<std::size_t>(i)];
@@ -248,7 +248,7 @@ HeliosScanner helios_scanner(const Sensor& sensor, std::uint64_t rows,
   }
   if (std::abs(pulses - static_cast<double>(result.pulse_frequency)) > 1e-9 * pulses) {
     result.not_carried.push_back(
-        fmt::format("A pulse frequency of {:.10g} Hz: HELIOS++ knows whole numbers.", pulses));
+        fmt::format("A pulse frequency of {:.10g} Hz: HELIOS++ takes only whole numbers.", pulses));
   }
   return result;
 }

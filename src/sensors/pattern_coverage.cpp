@@ -197,7 +197,7 @@ PatternCoverage pattern_coverage(const Sensor& sensor, const ScanPatternOptions&
   for (std::size_t at = 0; at < grid.size(); ++at) {
     if (in_field[at] != 0) field.push_back(at);
   }
-  if (field.empty()) throw EstimationError("no beam gets through the prisms");
+  if (field.empty()) throw EstimationError("no beam passes through the prisms");
   const double cell_angle = options.cell * options.cell;
   result.field_solid_angle = static_cast<double>(field.size()) * cell_angle;
   result.field_half_angle = std::acos(std::clamp(least_x, -1.0, 1.0));

@@ -89,8 +89,8 @@ PlatformPoses::PlatformPoses(const Platform& platform, const scenes::Scene& scen
   }
   if (!place) {
     throw InvalidArgument(
-        "the trajectory is geocentric, and the scene does not say where on the Earth it lies; "
-        "give its terrain an origin: {latitude_deg, longitude_deg, ellipsoidal_height_m}");
+        "the trajectory is geocentric, but the scene does not say where on the Earth it lies: give "
+        "its terrain an origin: {latitude_deg, longitude_deg, ellipsoidal_height_m}");
   }
   origin_ = trajectories::geocentric_from_geodetic(*place);
   const Eigen::Matrix3d ned = trajectories::geocentric_from_ned(*place);

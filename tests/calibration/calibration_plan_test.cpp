@@ -257,7 +257,7 @@ TEST(Forecast, AdvisesWhereSomethingIsPoor) {
   poor.scene.planes[0].plane.distance = 15;
   EXPECT_THAT(advice_of(poor), Contains(HasSubstr("50 to 65 degrees")));
   EXPECT_THAT(advice_of(poor), Contains(HasSubstr("16 m away")));
-  EXPECT_THAT(advice_of(poor), Contains(HasSubstr("flipped by 180 degrees")));
+  EXPECT_THAT(advice_of(poor), Contains(HasSubstr("upside down (180 degrees about its axis)")));
   EXPECT_THAT(advice_of(poor), Contains(HasSubstr("record longer")));
   EXPECT_THAT(advice_of(poor), Not(Contains(HasSubstr("% of the shots"))));
   EXPECT_THAT(advice_of(plan_of(corner())), Contains(HasSubstr("13 m away")));  // of both walls
@@ -290,7 +290,8 @@ TEST(Forecast, AdvisesWhereSomethingIsPoor) {
 
   CalibrationPlan tied = plan_of(stations());
   tied.duration = 0.05;
-  EXPECT_THAT(advice_of(tied), Not(Contains(HasSubstr("flipped by 180 degrees"))));
+  EXPECT_THAT(advice_of(tied),
+              Not(Contains(HasSubstr("upside down (180 degrees about its axis)"))));
 }
 
 TEST(Forecast, RefusesWhatCannotBePlanned) {

@@ -83,7 +83,7 @@ TEST(FlightRecordings, RefuseWhatOneFlightCannotBe) {
   EXPECT_NE(refused({recording("a", 0, 12)}, {}), "");
   EXPECT_NE(refused({recording("a", 0, 12)}, two_strips(), "horizon"), "");
   EXPECT_NE(refused({recording("a", 0, 0)}), "");
-  EXPECT_NE(refused({recording("a", 0, 12), recording("b", 8, 12)}).find("one sensor cannot"),
+  EXPECT_NE(refused({recording("a", 0, 12), recording("b", 8, 12)}).find("the same sensor cannot"),
             std::string::npos);
   RangedRecording other = recording("b", 12, 12);
   other.serial = "another unit";

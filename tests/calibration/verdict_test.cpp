@@ -71,7 +71,7 @@ TEST(Verdict, ACalibrationThatMayWellBeWorseThanTheBeliefIsNotBetter) {
 TEST(Verdict, WhatDidNotConvergeIsUndecidedAndSaysWhy) {
   Calibration c = moved_by(0.0);
   c.converged = false;
-  c.reason = "the walls do not tell";
+  c.reason = "the walls do not determine";
   EXPECT_EQ(code_of(c), "undecided");
   EXPECT_EQ(verdict_of(c).words, c.reason);
 }

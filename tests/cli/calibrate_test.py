@@ -237,7 +237,7 @@ class CalibrateTest(CommandTest):
     def test_the_truth_of_another_recording_is_refused(self):
         for verb, *more in (("calibrate",), ("estimate",)):
             done = self.expect(2, verb, "hall.nc", *truth_of("hall.csv"))
-            self.assertIn("--truth = hall.csv.truth.yaml is of another recording", done.stderr)
+            self.assertIn("--truth = hall.csv.truth.yaml belongs to another recording", done.stderr)
 
     def test_range_offset(self):
         head, *rows = (self.folder / "hall.csv").read_text().splitlines()

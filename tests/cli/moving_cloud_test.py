@@ -272,8 +272,8 @@ class MovingCloudTest(CommandTest):
         self.assertIn("how the sensor sits", said)
 
     def test_wrong_maps_are_told(self):
-        for crs, words in (("EPSG:4326", "is no map"), ("EPSG:2225", "US survey foot"),
-                           ("EPSG:999999", "no coordinate reference system that PROJ knows"),
+        for crs, words in (("EPSG:4326", "is not a map projection"), ("EPSG:2225", "US survey foot"),
+                           ("EPSG:999999", "not a coordinate reference system that PROJ knows"),
                            ("nonsense", "EPSG:25832"),
                            ("EPSG:32632+5703", "grid"),       # NAVD88, without its grid
                            ("EPSG:32756", "is it the right zone?"),  # Sydney

@@ -273,7 +273,7 @@ TEST(HeliosXml, SaysWhatItCosts) {
   EXPECT_GT(turn.rms, 0.05);
   EXPECT_THAT(avia.xml, HasSubstr("fire one after another"));
 
-  // Tilts of half a degree: turned as fits best, and no other turn fits better.
+  // Tilts of half a degree: rotated as fits best, and no other turn fits better.
   scan.rotation_angle = {1.0, 2.0};
   Written tilted = written("mid-40-table3", scan, 0.06);
   const Difference bent = difference("mid-40-table3", tilted, scan, false);

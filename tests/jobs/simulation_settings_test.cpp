@@ -58,7 +58,7 @@ TEST(SimulationSettings, RefusalsNameTheOption) {
   options.mount = "mount.yaml";
   EXPECT_NE(refusal(options).find("option scene is missing"), std::string::npos);
   options.trajectory = "flown.csv";
-  EXPECT_NE(refusal(options).find("do not go together"), std::string::npos);
+  EXPECT_NE(refusal(options).find("cannot be combined"), std::string::npos);
 }
 
 }  // namespace

@@ -147,7 +147,7 @@ def test_results_may_be_given():
 
 @pytest.mark.parametrize("angles, beam, error, words", [
     ([np.zeros(3), np.zeros(4)], None, ValueError,
-     r"angles\[1\] has the shape \(4,\), which does not go with \(3,\)"),
+     r"angles\[1\] has the shape \(4,\), which does not fit \(3,\)"),
     ([np.zeros(3)], None, ValueError, "angles has 1 values, expected 2"),
     ([np.zeros(3), "north"], None, TypeError, r"angles\[1\] has the type <U5, expected numbers"),
     ([np.zeros(3), None], None, TypeError, r"angles\[1\] has the type object"),

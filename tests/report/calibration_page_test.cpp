@@ -131,7 +131,7 @@ Calibration example() {
                       deg(0.0015),
                       deg(0.0512),
                       deg(0.0006)};
-  c.verdict = {calibration::CalibrationCode::as_believed, "walls <bear out> the belief", "nothing"};
+  c.verdict = {calibration::CalibrationCode::as_believed, "walls <confirm> the belief", "nothing"};
   c.sigma0 = 0.98;
   c.unevenness = 1.4;
   c.variance_factor = 1.4;
@@ -262,7 +262,7 @@ TEST(CalibrationPage, SaysFirstThatAGoodCalibrationIsHealthy) {
   EXPECT_THAT(shown, HasSubstr("roll is 0.0041°, of pitch 0.012°"));
   EXPECT_THAT(shown, Not(HasSubstr("must not be trusted")));
   EXPECT_THAT(shown, HasSubstr("The sensor points where it believes."));
-  EXPECT_THAT(shown, HasSubstr("walls &lt;bear out&gt; the belief"));
+  EXPECT_THAT(shown, HasSubstr("walls &lt;confirm&gt; the belief"));
   EXPECT_LT(shown.find("class=\"verdict"), shown.find("<h2>"));
 }
 
@@ -364,7 +364,7 @@ TEST(CalibrationPage, AFailureSaysWhyAndWhatToDo) {
   page.sample.clear();
   page.calibration.sensor = sensors::load_sensor("mid-40");
   page.calibration.believed = page.calibration.sensor.train;
-  page.calibration.reason = "the walls do not tell pitch & yaw";
+  page.calibration.reason = "the walls do not determine pitch & yaw";
   page.calibration.warnings = {"a single wall"};
   page.calibration.rms_after = kNaN;
   page.calibration.free = estimation::free_parameters(estimation::default_free_names({2}), {2});
@@ -376,7 +376,7 @@ TEST(CalibrationPage, AFailureSaysWhyAndWhatToDo) {
   const std::string html = page.html(), shown = visible(html);
   expect_sound(html);
   EXPECT_THAT(shown, HasSubstr("class=\"verdict bad\""));
-  EXPECT_THAT(shown, HasSubstr("the walls do not tell pitch &amp; yaw"));
+  EXPECT_THAT(shown, HasSubstr("the walls do not determine pitch &amp; yaw"));
   EXPECT_THAT(shown, HasSubstr("<li>a single wall</li>"));
   EXPECT_THAT(shown, HasSubstr("What to do:"));
   EXPECT_THAT(shown, HasSubstr("0.80 prism_tilt_a_vertical_deg - 0.60 incident_beam_vertical_deg"));

@@ -75,7 +75,7 @@ calibration::TrajectoryKnots knots() {
 FlightCalibration calibrated_example() {
   FlightCalibration c;
   c.converged = true;
-  c.verdict = {calibration::CalibrationCode::as_believed, "strips bear out the belief", "nothing"};
+  c.verdict = {calibration::CalibrationCode::as_believed, "strips confirm the belief", "nothing"};
   c.sensor = sensors::load_sensor("mid-40");
   c.sensor.serial = "1PQD&7";
   c.model.train = c.sensor.train;
@@ -510,14 +510,14 @@ TEST(FlightPage, AFailureSaysWhyAndWhatToDo) {
   Flight flight;
   flight.calibration = FlightCalibration();
   flight.calibration.sensor = sensors::load_sensor("mid-40");
-  flight.calibration.reason = "the adjustment had not settled & more";
+  flight.calibration.reason = "the adjustment had not converged & more";
   flight.calibration.rms_before = flight.calibration.rms_after = kNaN;
   flight.calibration.warnings = {"a warning"};
   flight.details = {};
   const std::string html = flight.html(), shown = visible(html);
   expect_sound(html);
   EXPECT_THAT(shown, HasSubstr("class=\"verdict bad\""));
-  EXPECT_THAT(shown, HasSubstr("the adjustment had not settled &amp; more"));
+  EXPECT_THAT(shown, HasSubstr("the adjustment had not converged &amp; more"));
   EXPECT_THAT(shown, HasSubstr("<li>a warning</li>"));
   EXPECT_THAT(shown, HasSubstr("What to do:"));
   EXPECT_EQ(data(html).size(), 0u);
@@ -681,7 +681,7 @@ TEST_F(FlightReportFile, WhatAPageCannotBeDrawnFromIsRefusedWithItsPlace) {
       {[](auto& r) { r.unknowns[1].prior_share = 2; }, "unknowns[1].prior_share: expected 0"},
       {[](auto& r) { r.unknowns[1].twin = "dog"; }, "unknowns[1].twin: 'dog' is none"},
       {[](auto& r) { r.unknowns[1].twin_correlation = 7; }, "unknowns[1].twin_correlation: exp"},
-      {[](auto& r) { r.unknowns.pop_back(); }, "is none of the unknowns"},
+      {[](auto& r) { r.unknowns.pop_back(); }, "is not one of the unknowns"},
       {[](auto& r) { r.truth->values.clear(); }, "truth.values: 0 values, expected 10"},
       {[](auto& r) { r.nominal.pop_back(); }, "nominal: 9 values, expected 10"},
       {[](auto& r) { r.covariance = Eigen::MatrixXd::Ones(900, 900); }, "covariance: 900 rows"},
@@ -702,8 +702,8 @@ TEST_F(FlightReportFile, WhatAPageCannotBeDrawnFromIsRefusedWithItsPlace) {
       {[](auto& r) { r.pairs_before[2].sigma[1] = -1; }, "shift_sigma_m: is negative"},
       {[](auto& r) { r.knot_spacing = kNaN; }, "knot_spacing_s: expected a time"},
       {[](auto& r) { r.difference_charts[0].series[0].value.pop_back(); }, "series[0].value: 1 v"},
-      {[](auto& r) { r.correction_charts[0].series[0].colour = "x"; }, "colour: 'x' is no known"},
-      {[](auto& r) { r.ground_charts[0].series[0].cell_width = -1; }, "are lengths"},
+      {[](auto& r) { r.correction_charts[0].series[0].colour = "x"; }, "unknown colour 'x'"},
+      {[](auto& r) { r.ground_charts[0].series[0].cell_width = -1; }, "must not be negative"},
       {[](auto& r) { r.residual_charts[0].series[0].y.clear(); }, "series[0].y: 0 values"},
       {[](auto& r) { r.strip_charts[0].kind = ChartKind::space; }, "strip_charts[0].series[0]."},
   };
@@ -725,7 +725,7 @@ TEST_F(FlightReportFile, TextsThatDoNotFitAreRefused) {
       {"\"calibrated_on\":\"flight\",", {"", "is missing"}},  // one on walls then
       {"\"first\":0", {"\"first\":70000", "first: 70000 is out of range"}},
       {"\"first\":0", {"\"first\":-1", "first: -1 is out of range"}},
-      {"\"cells\":1525", {"\"cells\":1e999", "is no JSON that can be read"}},
+      {"\"cells\":1525", {"\"cells\":1e999", "the JSON cannot be read"}},
       {"\"cells\":1525", {"\"cells\":\"many\"", "cells: expected a whole number"}},
       {"\"shift_m\":{", {"\"shift_m\":[],\"x\":{", "shift_m: expected an object, found array"}},
   };

@@ -216,7 +216,7 @@ TEST_F(ReportFile, AFieldOfAnotherKindIsNamedWithWhatWasFound) {
   const std::string kind = "\"kind\":\"cells\"";
   text.replace(text.find(kind), kind.size(), "\"kind\":\"clouds\"");
   write(text);
-  EXPECT_THAT(error(), HasSubstr("residual_charts[0].series[0].kind: 'clouds' is no known name"));
+  EXPECT_THAT(error(), HasSubstr("residual_charts[0].series[0].kind: unknown name 'clouds'"));
 }
 
 TEST_F(ReportFile, SomethingElseIsRefused) {
@@ -242,12 +242,12 @@ TEST_F(ReportFile, WhatAPageCannotBeDrawnFromIsRefusedWithItsPlace) {
       {[](auto& r) { r.prisms = 99; }, "prisms"},
       {[](auto& r) { r.emitters = -1; }, "emitters"},
       {[](auto& r) { r.combination = 3; }, "combination: "},
-      {[](auto& r) { r.method = "guess"; }, "method: 'guess' is no known name"},
+      {[](auto& r) { r.method = "guess"; }, "unknown method 'guess'"},
       {[](auto& r) { r.unevenness.resize(5); }, "chi2_per_bin: 5 values, expected 2"},
       {[](auto& r) { r.truth->rotation_angle_rmse.resize(40); }, "truth.rotation_angle_rmse: 40"},
       {[](auto& r) { r.residual_charts[0].series[0].y.pop_back(); }, "series[0].y: 1 values"},
       {[](auto& r) { r.residual_charts[0].series[0].value.clear(); }, "series[0].value: 0 val"},
-      {[](auto& r) { r.residual_charts[0].series[0].colour = "x"; }, "colour: 'x' is no known"},
+      {[](auto& r) { r.residual_charts[0].series[0].colour = "x"; }, "unknown colour 'x'"},
       {[](auto& r) { r.residual_charts[0].kind = ChartKind::space; }, "series[0].z: 0 values"},
       {[](auto& r) {
          r.residual_charts[0].value_range = {1, -1};
@@ -276,7 +276,7 @@ TEST_F(ReportFile, WhatAPageCannotBeDrawnFromIsRefusedWithItsPlace) {
 TEST_F(ReportFile, NumbersThatDoNotFitAreRefused) {
   const std::pair<const char*, const char*> cases[] = {
       {"\"outliers\":-17", "outliers: -17 is out of range"},
-      {"\"outliers\":1e999", "is no JSON that can be read"},
+      {"\"outliers\":1e999", "the JSON cannot be read"},
       {"\"outliers\":1.5", "outliers: expected a whole number"}};
   for (const auto& [damage, words] : cases) {
     write_report(path(), estimate_example());

@@ -564,9 +564,8 @@ TEST(Terrain, AVillageKeepsItsDistancesAndRanges) {
   add_village(settings, other);
   EXPECT_NE(other.roofs[0].center, parts.roofs[0].center);
   settings.roofs = 200;
-  EXPECT_THAT(
-      refusal([&] { add_village(settings, other); }),
-      AllOf(HasSubstr("of 200 roofs found room within +-50 m at 12 m"), HasSubstr("fewer")));
+  EXPECT_THAT(refusal([&] { add_village(settings, other); }),
+              AllOf(HasSubstr("of 200 roofs fit within +-50 m at 12 m"), HasSubstr("fewer")));
 }
 
 TEST(Terrain, HousesStandOnTheGroundBelowThem) {
