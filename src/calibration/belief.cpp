@@ -115,7 +115,7 @@ Belief pooled_belief(const std::vector<RangedRecording>& recordings) {
             belief.free[static_cast<std::size_t>(apart.worst)].name, belief.sensor.shape());
         throw EstimationError(fmt::format(
             "the recordings are of different sensors, or of one whose stored calibration changed: "
-            "the {} of one differs from that of the others, {}, by {:.4g} {}",
+            "{} differs from the others in its {} by {:.4g} {}",
             recording.name, info.name, off[apart.worst] / info.si_per_unit, info.unit));
       }
     }

@@ -338,7 +338,7 @@ void Work::fill_held(const PlanarSolution& solution) {
   if (paper() || !solution.converged || !result_.covariance.allFinite()) return;
   held_ = held_of(options_.sensor, belief_, solution.problem);
   if (held_.names.empty()) return;
-  HeldResponse response = held_response(solution.problem, held_.quantities);
+  SolutionResponse response = held_response(solution.problem, held_.quantities);
   result_.held = held_.names;
   result_.held_changes = std::move(response.parameters);
   result_.range_offset_held_changes = std::move(response.range_offset);

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 #include "calibration/calibrated_sensor.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include "risley/algebra/products.hpp"
@@ -16,13 +17,30 @@ namespace {
 void add_range_offset(const PlanarSolution& solution, const Calibration& result,
                       sensors::Sensor& sensor) {
   const Index n = result.covariance.rows();
-  sensor.covariance_names.emplace_back("range_offset_m");
   sensor.set_knowledge({"range_offset_m", result.range_offset_sigma,
                         "calibrated on plane walls by risley calibrate",
                         result.range_offset_total_sigma()});
   sensor.covariance.col(n).head(n) = solution.range_offset_covariance * result.variance_factor;
   sensor.covariance.row(n).head(n) = sensor.covariance.col(n).head(n).transpose();
   sensor.covariance(n, n) = result.range_offset_sigma * result.range_offset_sigma;
+}
+
+/// Places in belief.free of the materials that the recordings determined and the solution
+/// considers.
+std::vector<Index> considered_materials(const Belief& belief, const PlanarSolution& solution) {
+  std::vector<Index> materials;
+  for (Index j = 0; j < solution.considered.parameters.cols(); ++j) {
+    const int place = belief.free[static_cast<std::size_t>(j)].places.front();
+    if (is_held_material(place, solution.problem)) materials.push_back(j);
+  }
+  return materials;
+}
+
+/// The row of a name behind those of parameters and range offset, entered where it is new.
+Index row_of(const std::string& name, Index first, std::vector<std::string>& names) {
+  auto at = std::find(names.begin() + first, names.end(), name);
+  if (at == names.end()) at = names.insert(at, name);
+  return at - names.begin();
 }
 
 }  // namespace
@@ -53,20 +71,45 @@ sensors::Sensor calibrated_sensor(const CalibrationOptions& options, const Belie
   std::erase_if(sensor.knowledge,
                 [](const sensors::Knowledge& entry) { return entry.name == "range_offset_m"; });
   const bool offset = result.range_offset_sigma > 0;
-  const Index n = result.covariance.rows(), first = n + (offset ? 1 : 0),
-              all = first + static_cast<Index>(held.moved.size());
+  const Index n = result.covariance.rows(), first = n + (offset ? 1 : 0);
+  if (offset) sensor.covariance_names.emplace_back("range_offset_m");
+  // With what was not adjusted as quantities of their own, beams are as sure as they are: an error
+  // of one and what it does to the others cancel in them.
+  const std::vector<Index> materials = considered_materials(belief, solution);
+  std::vector<Index> material_rows, moved_rows;
+  for (const Index j : materials) {
+    material_rows.push_back(
+        row_of(belief.free[static_cast<std::size_t>(j)].name, first, sensor.covariance_names));
+  }
+  for (const auto& moved : held.moved) {
+    moved_rows.push_back(row_of(moved.name, first, sensor.covariance_names));
+  }
+  const auto all = static_cast<Index>(sensor.covariance_names.size());
   sensor.covariance = Eigen::MatrixXd::Zero(all, all);
   sensor.covariance.topLeftCorner(n, n) = result.covariance;
   if (offset) add_range_offset(solution, result, sensor);
-  // With what was held as quantities of their own, beams are as sure as they are: an error of one
-  // and what it does to the others cancel in them.
+  const Eigen::MatrixXd of_materials = belief.covariance(Eigen::all, materials);
+  Eigen::MatrixXd with_materials = Eigen::MatrixXd::Zero(first, of_materials.cols());
+  with_materials.topRows(n) = algebra::product(solution.considered.parameters, of_materials);
+  if (offset) {
+    with_materials.row(n) =
+        algebra::transposed_times(of_materials, solution.considered.range_offset).transpose();
+  }
+  for (std::size_t i = 0; i < materials.size(); ++i) {
+    const auto column = static_cast<Index>(i);
+    sensor.covariance.col(material_rows[i]).head(first) = with_materials.col(column);
+    sensor.covariance.row(material_rows[i]).head(first) = with_materials.col(column).transpose();
+    for (std::size_t k = 0; k < materials.size(); ++k) {
+      sensor.covariance(material_rows[i], material_rows[k]) =
+          belief.covariance(materials[i], materials[k]);
+    }
+  }
   Eigen::MatrixXd movement = Eigen::MatrixXd::Zero(all, result.held_changes.cols());
   if (movement.cols() == 0) return sensor;
   movement.topRows(n) = result.held_changes;
   if (offset) movement.row(n) = result.range_offset_held_changes.transpose();
   for (std::size_t i = 0; i < held.moved.size(); ++i) {
-    sensor.covariance_names.push_back(held.moved[i].name);
-    movement.row(first + static_cast<Index>(i)) = held.moved[i].by_held;
+    movement.row(moved_rows[i]) = held.moved[i].by_held;
   }
   for (std::size_t h = 0; h < held.moves_optics.size(); ++h) {
     if (!held.moves_optics[h]) movement.col(static_cast<Index>(h)).setZero();

@@ -14,9 +14,7 @@ using estimation::FreeParameter;
 
 Held held_of(const sensors::Sensor& sensor, const Belief& belief, const PlanarProblem& problem) {
   // What the sensor computes with and light meets, too.
-  const auto in_both = [&](int at) {
-    return is_material(at, sensor.prisms()) && !estimation::takes_place(problem.free, at);
-  };
+  const auto in_both = [&](int at) { return is_held_material(at, problem); };
   // What the true prisms have by themselves.
   std::vector<FreeParameter> own = estimation::uncertain_held(sensor, problem.free);
   std::erase_if(own, [&](const FreeParameter& parameter) {

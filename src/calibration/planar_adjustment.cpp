@@ -164,9 +164,7 @@ Chain chain_of(const PlanarProblem& p, const HeldQuantities& held, const Unknown
   for (Index j = 0; j < believed; ++j) {
     for (const int place : p.considered[static_cast<std::size_t>(j)].places) {
       // The other error parameters that the sensor believes in only act through the angles.
-      if (is_material(place, p.train.prisms()) && !estimation::takes_place(p.free, place)) {
-        chain.considered(places.column(place), j) = 1.0;
-      }
+      if (is_held_material(place, p)) chain.considered(places.column(place), j) = 1.0;
     }
     if (p.angle_sensitivity.empty()) continue;
     for (int k = 0; k < p.train.prisms(); ++k) {
@@ -298,6 +296,13 @@ Eigen::MatrixXd eliminated(const Eigen::MatrixXd& hessian, Index free) {
          algebra::pulled_back(hessian.bottomLeftCorner(rest, free), inverse);
 }
 
+/// @param shift  of all unknowns [unknowns, quantities]
+SolutionResponse response_of(const Eigen::MatrixXd& shift, const Unknowns& at) {
+  SolutionResponse response{shift.topRows(at.free()), Eigen::VectorXd::Zero(shift.cols())};
+  if (at.range_offset() >= 0) response.range_offset = shift.row(at.range_offset()).transpose();
+  return response;
+}
+
 PriorTest test_of(std::string name, bool station, const Eigen::VectorXd& misfit, double sigma,
                   const Eigen::MatrixXd& posterior) {
   PriorTest test;
@@ -402,6 +407,11 @@ Eigen::MatrixXd prior_information(const PlanarProblem& problem) {
   return information.asDiagonal();
 }
 
+bool is_held_material(int place, const PlanarProblem& problem) {
+  return is_material(place, problem.train.prisms()) &&
+         !estimation::takes_place(problem.free, place);
+}
+
 PlaneView plane_view(const PlanarProblem& problem, std::size_t view) {
   const WallView& seen = problem.views[view];
   const Wall& wall = problem.walls[seen.wall];
@@ -504,9 +514,12 @@ PlanarSolution adjust(PlanarProblem problem, const AdjustmentOptions& options,
     }
   }
   solution.noise_covariance = covariance.topLeftCorner(free, free);
+  const auto believed = static_cast<Index>(problem.considered.size());
+  solution.considered = {Eigen::MatrixXd::Zero(free, believed), Eigen::VectorXd::Zero(believed)};
   if (considered_size(problem) > 0 && solver.positive()) {
-    // Errors of the considered parameters shift the solution by -N^-1 J^T W K.
-    const Eigen::MatrixXd shift = algebra::product(covariance, system.considered);
+    // Errors of the considered quantities shift the solution by -N^-1 J^T W K.
+    const Eigen::MatrixXd shift = -algebra::product(covariance, system.considered);
+    solution.considered = response_of(shift.leftCols(believed), at);
     covariance += algebra::propagated(shift, considered_covariance(problem));
   }
   solution.covariance = covariance.topLeftCorner(free, free);
@@ -533,8 +546,8 @@ PlanarSolution adjust(PlanarProblem problem, const AdjustmentOptions& options,
   return solution;
 }
 
-HeldResponse held_response(const PlanarProblem& solved, const HeldQuantities& held,
-                           InstructionSet set) {
+SolutionResponse held_response(const PlanarProblem& solved, const HeldQuantities& held,
+                               InstructionSet set) {
   check(solved);
   const auto expect = [](const char* what, Index found, Index expected) {
     require_length(what, static_cast<std::size_t>(found), static_cast<std::size_t>(expected));
@@ -554,9 +567,7 @@ HeldResponse held_response(const PlanarProblem& solved, const HeldQuantities& he
   if (!solver.positive()) throw EstimationError("the walls do not determine all parameters");
   const Eigen::MatrixXd shift =
       -solver.solve_columns(system.considered.rightCols(held.count()).eval());
-  HeldResponse response{shift.topRows(at.free()), Eigen::VectorXd::Zero(held.count())};
-  if (at.range_offset() >= 0) response.range_offset = shift.row(at.range_offset()).transpose();
-  return response;
+  return response_of(shift, at);
 }
 
 }  // namespace risley::calibration

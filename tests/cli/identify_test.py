@@ -52,7 +52,7 @@ class IdentifyTest(CommandTest):
         rows = "\n".join(f"{0.0001 * i:.4f},10,90" for i in range(1, 3000))
         (self.folder / "still.csv").write_text(f"Time,Azimuth,Zenith\n{rows}\n")
         done = self.expect(1, "identify", "still.csv", "-o", "still.yaml")
-        self.assertIn("turns", done.stderr)
+        self.assertIn("turning line", done.stderr)
         self.assertFalse((self.folder / "still.yaml").exists())
 
     @unittest.skipUnless(FOLDER, "SKIPPED: RISLEY_VENDOR_DATA names no folder with the manufacturer's files")

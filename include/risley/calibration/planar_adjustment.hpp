@@ -81,6 +81,12 @@ struct PriorTest {
   double critical = 0;  ///< chi2 that a sound one exceeds once in 10,000
 };
 
+/// By how much a solution is off where a quantity that was not adjusted is off by one unit, SI.
+struct SolutionResponse {
+  Eigen::MatrixXd parameters;    ///< [free, quantities]
+  Eigen::VectorXd range_offset;  ///< [quantities]; 0 where it is held, too
+};
+
 /// Solution of a problem. Problem holds the adjusted values.
 struct PlanarSolution {
   PlanarProblem problem;  ///< train, range offset, stations, walls, distances as adjusted
@@ -93,6 +99,7 @@ struct PlanarSolution {
   Eigen::MatrixXd noise_covariance;  ///< [free, free], of the ranges' noise and the priors alone
   double range_offset_sigma = 0;     ///< m
   Eigen::VectorXd range_offset_covariance;  ///< with the parameters [free], SI; 0 where it is held
+  SolutionResponse considered;              ///< to the considered parameters of the problem
   std::vector<double> distance_sigma;       ///< [views], m
   std::vector<double> normal_sigma;         ///< [walls], of the two angles together, rad
   /// What data, stations and known walls say of the free parameters, everything else eliminated and
@@ -126,17 +133,11 @@ struct HeldQuantities {
   Eigen::Index count() const { return train.cols(); }  ///< of held quantities
 };
 
-/// By how much a solution is off where a held quantity is off by one unit, SI.
-struct HeldResponse {
-  Eigen::MatrixXd parameters;    ///< [free, held]
-  Eigen::VectorXd range_offset;  ///< [held]; 0 where it is held, too
-};
-
 /// -N^-1 J^T W K with N the normal equations at the solution and K what moves the predicted ranges.
 /// @throws InvalidArgument for matrices that do not belong to train, recordings or each other,
 ///         EstimationError when the normal equations are singular
-HeldResponse held_response(const PlanarProblem& solved, const HeldQuantities& held,
-                           InstructionSet set = best_instruction_set());
+SolutionResponse held_response(const PlanarProblem& solved, const HeldQuantities& held,
+                               InstructionSet set = best_instruction_set());
 
 /// Prior sigmas of free parameters when every angle has the same [free], SI; infinite for others,
 /// and for all without one.
@@ -146,6 +147,10 @@ std::vector<double> prior_sigmas(const std::vector<estimation::FreeParameter>& f
 
 /// Information of the priors on the free parameters [free, free].
 Eigen::MatrixXd prior_information(const PlanarProblem& problem);
+
+/// Whether a place of the flat vector is a material that is not adjusted: what the sensor computed
+/// with is what light meets.
+bool is_held_material(int place, const PlanarProblem& problem);
 
 /// The view of a problem as plane_equations() wants it.
 PlaneView plane_view(const PlanarProblem& problem, std::size_t view);
