@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "risley/algebra/products.hpp"
 
@@ -75,34 +76,32 @@ sensors::Sensor calibrated_sensor(const CalibrationOptions& options, const Belie
   if (offset) sensor.covariance_names.emplace_back("range_offset_m");
   // With what was not adjusted as quantities of their own, beams are as sure as they are: an error
   // of one and what it does to the others cancel in them.
+  std::vector<Index> moved_rows, material_rows;
+  for (const auto& moved : held.moved) {
+    moved_rows.push_back(row_of(moved.name, first, sensor.covariance_names));
+  }
   const std::vector<Index> materials = considered_materials(belief, solution);
-  std::vector<Index> material_rows, moved_rows;
   for (const Index j : materials) {
     material_rows.push_back(
         row_of(belief.free[static_cast<std::size_t>(j)].name, first, sensor.covariance_names));
-  }
-  for (const auto& moved : held.moved) {
-    moved_rows.push_back(row_of(moved.name, first, sensor.covariance_names));
   }
   const auto all = static_cast<Index>(sensor.covariance_names.size());
   sensor.covariance = Eigen::MatrixXd::Zero(all, all);
   sensor.covariance.topLeftCorner(n, n) = result.covariance;
   if (offset) add_range_offset(solution, result, sensor);
-  const Eigen::MatrixXd of_materials = belief.covariance(Eigen::all, materials);
-  Eigen::MatrixXd with_materials = Eigen::MatrixXd::Zero(first, of_materials.cols());
-  with_materials.topRows(n) = algebra::product(solution.considered.parameters, of_materials);
-  if (offset) {
-    with_materials.row(n) =
-        algebra::transposed_times(of_materials, solution.considered.range_offset).transpose();
-  }
-  for (std::size_t i = 0; i < materials.size(); ++i) {
-    const auto column = static_cast<Index>(i);
-    sensor.covariance.col(material_rows[i]).head(first) = with_materials.col(column);
-    sensor.covariance.row(material_rows[i]).head(first) = with_materials.col(column).transpose();
-    for (std::size_t k = 0; k < materials.size(); ++k) {
-      sensor.covariance(material_rows[i], material_rows[k]) =
-          belief.covariance(materials[i], materials[k]);
+  if (!materials.empty()) {
+    const Eigen::MatrixXd of_materials = belief.covariance(Eigen::all, materials);
+    Eigen::MatrixXd with_others(first, of_materials.cols());
+    with_others.topRows(n) = algebra::product(solution.considered.parameters, of_materials);
+    if (offset) {
+      with_others.row(n) =
+          algebra::transposed_times(of_materials, solution.considered.range_offset).transpose();
     }
+    std::vector<Index> others(static_cast<std::size_t>(first));
+    std::iota(others.begin(), others.end(), Index{0});
+    sensor.covariance(others, material_rows) = with_others;
+    sensor.covariance(material_rows, others) = with_others.transpose();
+    sensor.covariance(material_rows, material_rows) = belief.covariance(materials, materials);
   }
   Eigen::MatrixXd movement = Eigen::MatrixXd::Zero(all, result.held_changes.cols());
   if (movement.cols() == 0) return sensor;

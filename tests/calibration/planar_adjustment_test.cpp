@@ -724,7 +724,7 @@ TEST(HeldResponse, IsHowTheSolutionFollowsWhatIsHeld) {
   flipped << 0, 0.2, 0.7, 0, 0.4, 0.2;
   held.rotation_angles = {upright, flipped};
   const PlanarSolution solution = adjust(p);
-  const HeldResponse found = held_response(solution.problem, held);
+  const SolutionResponse found = held_response(solution.problem, held);
   const Index n = solution.parameters.size();
   ASSERT_EQ(found.parameters.rows(), n);
   ASSERT_EQ(found.range_offset.size(), 3);

@@ -301,7 +301,7 @@ class CalibrateTest(CommandTest):
         arguments = ("calibrate", "--plan", facing, "--rate-hz", "1000")
         poor = self.expect_json(0, *arguments)
         self.assertTrue(poor["unobservable"])
-        for word in ("flipped", "incidence", "m away", "longer"):
+        for word in ("upside down", "incidence", "farther away", "longer"):
             self.assertTrue(any(word in text for text in poor["advice"]), word)
         text = self.expect(0, *arguments).stdout
         self.assertIn("advice: ", text)

@@ -78,7 +78,7 @@ class CroppedTest(CommandTest):
         self.assertIn("export the recording again without cropping", refused["error"])
         info = self.expect_json(0, "info", "narrow.csv")
         self.assertGreater(info["time_uncertainty_s"], 1e-4)
-        self.assertTrue(any("guesses" in one["message"] for one in info["warnings"]))
+        self.assertTrue(any("guessed" in one["message"] for one in info["warnings"]))
         done = self.expect_json(0, "convert", "narrow.csv", "-o", "narrow.nc")
         self.assertEqual(done["observations"], len(self.times_s["narrow"]))
         self.assertEqual(done["time_uncertainty_s"], info["time_uncertainty_s"])
