@@ -200,13 +200,13 @@ MapProjection::MapProjection(const std::string& crs, const std::string& source)
     state_->operation.reset(proj_normalize_for_visualization(context, operation.get()));
   }
   if (!state_->operation) {
-    throw InvalidArgument(
-        fmt::format("PROJ cannot transform \"{}\" to \"{}\" ({}) with the files that are "
-                    "installed: those of a change of datum or of a geoid are missing (Debian: "
-                    "projinfo -s {} -t {} names the file; heights "
-                    "without a height system are ellipsoidal and need none){}{}",
-                    source, crs, name, source, crs,
-                    state_->message.empty() ? "" : "; PROJ says: ", state_->message));
+    throw InvalidArgument(fmt::format(
+        "PROJ cannot transform \"{}\" to \"{}\" ({}) with the files that are "
+        "installed: a grid for the change of datum or for the geoid is missing (Debian: "
+        "projinfo -s {} -t {} names the file; heights without a height system are "
+        "ellipsoidal and need none){}{}",
+        source, crs, name, source, crs,
+        state_->message.empty() ? "" : "; PROJ says: ", state_->message));
   }
   state_->name = name;
   state_->has_height_system = vertical != nullptr;

@@ -275,7 +275,7 @@ class MovingCloudTest(CommandTest):
         for crs, words in (("EPSG:4326", "is not a map projection"), ("EPSG:2225", "US survey foot"),
                            ("EPSG:999999", "not a coordinate reference system that PROJ knows"),
                            ("nonsense", "EPSG:25832"),
-                           ("EPSG:32632+5703", "of a geoid"),       # NAVD88, without its grid
+                           ("EPSG:32632+5703", "grid"),       # NAVD88, without its grid
                            ("EPSG:32756", "is it the right zone?"),  # Sydney
                            ("EPSG:6340", "is it the right zone?")):  # North America
             with self.subTest(crs=crs):

@@ -224,8 +224,8 @@ TEST_F(CalibrateFlightTest, IsFixedOnGroundOfAMap) {
   };
   std::string no_map = control(0);
   no_map.replace(no_map.find("crs"), no_map.find("ground") - no_map.find("crs"), "");
-  EXPECT_THAT(refused("earth.nc", no_map), ::testing::HasSubstr("crs is missing"));
-  EXPECT_THAT(refused("flight.nc", control(0)), ::testing::HasSubstr("a frame of its own"));
+  EXPECT_THAT(refused("earth.nc", no_map), ::testing::HasSubstr("add crs"));
+  EXPECT_THAT(refused("flight.nc", control(0)), ::testing::HasSubstr("a local frame"));
 }
 
 TEST_F(CalibrateFlightTest, LeavesNothingWhenCancelled) {

@@ -81,7 +81,7 @@ TEST(PlanFlight, RefusesWhatMakesNoSense) {
   EXPECT_THAT(refused([](auto& o) { o.range_offset_sigma = -1; }), HasSubstr("range_offset_sigma"));
   EXPECT_THAT(refused([](auto& o) { o.knot_spacing = 0; }), HasSubstr("knot_spacing"));
   EXPECT_THAT(refused([](auto& o) { o.cell_size = 0; }), HasSubstr("cell_size"));
-  EXPECT_THAT(refused([](auto& o) { o.errors.terms[2].sigma.reset(); }), HasSubstr("no sigma"));
+  EXPECT_THAT(refused([](auto& o) { o.errors.terms[2].sigma.reset(); }), HasSubstr("lack a sigma"));
   EXPECT_THAT(refused([](auto& o) { o.plan.strips[0].length = -3; }), HasSubstr("length"));
   EXPECT_THAT(refused([](auto& o) { o.additional = {"nonsense"}; }), HasSubstr("nonsense"));
 }

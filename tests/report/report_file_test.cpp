@@ -233,7 +233,7 @@ TEST_F(ReportFile, WhatAPageCannotBeDrawnFromIsRefusedWithItsPlace) {
   const std::vector<std::pair<std::function<void(EstimateReport&)>, std::string>> cases = {
       {[](auto& r) { r.covariance = Eigen::MatrixXd::Ones(60, 60); }, "covariance: 60 rows"},
       {[](auto& r) { r.covariance = Eigen::MatrixXd::Ones(2, 3); }, "covariance: 2 rows of 3"},
-      {[](auto& r) { r.covariance(1, 0) = kUnknown; }, "covariance[1]: expected numbers"},
+      {[](auto& r) { r.covariance(1, 0) = kUnknown; }, "covariance[1]: expected finite numbers"},
       {[](auto& r) { r.covariance(0, 0) = -1; }, "covariance[0]"},
       {[](auto& r) { r.free[1] = "<b>"; }, "free[1]: "},
       {[](auto& r) { r.parameters[0].name = "colour"; }, "parameters[0].name: "},

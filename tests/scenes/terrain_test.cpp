@@ -689,7 +689,7 @@ TEST(Terrain, MistakesInAFileAreToldWithTheirLine) {
   EXPECT_THAT(
       message("[20, 45]", "[45, 20]"),
       HasSubstr("terrain.village.pitch_deg = [45, 20] deg, expected the least value first"));
-  EXPECT_THAT(message("roofs: 5", "roofs: 5000"), HasSubstr("found room within +-50 m"));
+  EXPECT_THAT(message("roofs: 5", "roofs: 5000"), HasSubstr("roofs fit within +-50 m"));
   EXPECT_THAT(message("ridge_height_m: 8", "ridge_height_m: 2"),
               HasSubstr("barn: its eaves are 0.5 m below the ground"));
   EXPECT_THAT(message("wavelength_m: 1.5", "wavelength_m: 0.001"),
