@@ -1,4 +1,4 @@
-#!/usr/bin/env python3
+#!/usr/bin/python3
 # SPDX-FileCopyrightText: 2026 The risley authors
 # SPDX-License-Identifier: MIT
 """Executes the Python examples and writes docs/notebooks/NN-name.md: text, code, what the code prints, and pictures.
