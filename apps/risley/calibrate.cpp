@@ -11,6 +11,7 @@
 #include "risley/core/error.hpp"
 #include "risley/jobs/calibrate_flight.hpp"
 #include "risley/jobs/calibrate_recordings.hpp"
+#include "risley/jobs/inputs.hpp"
 #include "risley/jobs/plan_calibration.hpp"
 #include "risley/jobs/plan_flight.hpp"
 #include "risley/report/calibration_report.hpp"
@@ -33,6 +34,7 @@ using jobs::CalibratedRecordings;
 
 struct CalibrateCommandOptions {
   std::vector<std::string> inputs, station_names, truths;
+  std::string list;
   jobs::PlatformFiles platform;
   std::string folder, method = "adjustment", rate_hz = "full", sensor, planes, control, stations,
                       beam_origin = "yes", states = "knots", mirror = "auto", plan, scene, page;
@@ -195,13 +197,44 @@ ExitStatus run_plan(const CalibrateCommandOptions& options, const CommonOptions&
   return kDone;
 }
 
+/// Replaces patterns, folders and a list by the recordings that they stand for; files stay as they
+/// were typed, in their order.
+/// @return the common options with these
+CommonOptions with_recordings_found(CalibrateCommandOptions& options, CommonOptions common) {
+  std::vector<std::string> found;
+  const auto add = [&found](const jobs::InputNames& names) {
+    for (jobs::Input& input : jobs::find_inputs(names, cancellable())) {
+      found.push_back(std::move(input.path));
+    }
+  };
+  for (const std::string& name : options.inputs) {
+    jobs::are_many({{name}, "", {}}) ? add({{name}, "", {}}) : found.push_back(name);
+  }
+  if (!options.list.empty()) {
+    add({{}, options.list, {}});
+    common.files.push_back(options.list);
+  }
+  if (found == options.inputs) return common;
+  options.inputs = std::move(found);
+  common.inputs.clear();
+  for (const std::string& name : options.inputs) add_files(name, common.inputs);
+  return common;
+}
+
 }  // namespace
 
 Run declare_calibrate(CLI::App& verb) {
   const auto options = std::make_shared<CalibrateCommandOptions>();
   CalibrateCommandOptions& o = *options;
-  verb.add_option("INPUT", o.inputs,
-                  "Recordings of one sensor with ranges to plane walls, or from a flight");
+  verb.add_option(
+      "INPUT", o.inputs,
+      "Recordings of one sensor with ranges to plane walls, or from a flight, for one "
+      "calibration; folders, for all recordings in and below them; quoted patterns such "
+      "as '*.lvx' (** is any number of folders)");
+  verb.add_option("--list", o.list,
+                  "Text file with further recordings, one a line; lines that begin with # do not "
+                  "count")
+      ->type_name("FILE");
   verb.add_option(
       "-o,--output", o.folder,
       "Folder to write calibration.yaml, states.nc (states_1.nc, ...), report.json and report.html "
@@ -229,7 +262,7 @@ Run declare_calibrate(CLI::App& verb) {
   verb.add_option("--plan", o.plan,
                   "Scene or flight (YAML) to plan for: predicts how good a calibration there would "
                   "be and, for a flight, how its points would lie on the ground")
-      ->excludes("--output", "--method", "--planes", "--stations", "--station");
+      ->excludes("--output", "--method", "--planes", "--stations", "--station", "--list");
   verb.add_option("--duration-s", o.duration_s, "Length of each planned recording, s")
       ->needs("--plan")
       ->capture_default_str();
@@ -296,14 +329,15 @@ Run declare_calibrate(CLI::App& verb) {
       ->expected(1)
       ->allow_extra_args(false)
       ->take_all();
-  return [options](const CommonOptions& common) {
+  return [options](const CommonOptions& typed) {
     // `--truth A B` leaves B among the recordings.
     const auto truth = std::stable_partition(
         options->inputs.begin(), options->inputs.end(),
         [](const std::string& input) { return !input.ends_with(".truth.yaml"); });
     options->truths.insert(options->truths.end(), truth, options->inputs.end());
     options->inputs.erase(truth, options->inputs.end());
-    if (!options->plan.empty()) return run_plan(*options, common);
+    if (!options->plan.empty()) return run_plan(*options, typed);
+    const CommonOptions common = with_recordings_found(*options, typed);
     if ((options->knot_spacing_s || options->cell_size_m) && !moves(options->platform)) {
       throw InvalidArgument("--knot-spacing-s and --cell-size-m go with --trajectory or --plan");
     }

@@ -31,7 +31,7 @@ namespace risley::app {
 namespace {
 
 struct CloudCommandOptions {
-  std::vector<std::string> inputs;
+  ManyWishes many;
   std::string output, calibration, format, beam_origin_map, distribution, report;
   std::string directions = "smoothed", beam_origin = "yes", beam_divergence = "yes",
               covariance = "yes", common_factors = "no", time = "gps";
@@ -152,18 +152,17 @@ Run declare_cloud(CLI::App& verb) {
         ->check(CLI::IsMember({"yes", "no"}))
         ->capture_default_str();
   };
-  auto* inputs = verb.add_option("INPUT", o.inputs,
-                                 "Recordings with ranges, or quoted patterns such as '*.lvx'");
+  auto* inputs = add_many_options(verb, o.many, "Recordings with ranges");
   verb.add_option(
           "--calibration", o.calibration,
           "calibration.yaml of estimate or calibrate, the folder that holds it, or a preset by "
           "name")
       ->required();
-  auto* output = verb.add_option(
-      "-o,--output", o.output,
-      "Cloud to write, or a folder for several, which is made where it is missing; the ending "
-      "chooses the format:" +
-          cloud_endings());
+  auto* output = verb.add_option("-o,--output", o.output,
+                                 "Cloud to write, or a folder for several, which is made where it "
+                                 "is missing and in which they "
+                                 "are placed as the inputs are; the ending chooses the format:" +
+                                     cloud_endings());
   verb.add_option(
           "--format", o.format,
           "Format to write, whatever the ending (default: by the ending, las-1.4 in a folder)")
@@ -218,37 +217,46 @@ Run declare_cloud(CLI::App& verb) {
           "--beam-origin-map", o.beam_origin_map,
           "Page (HTML) to write with maps of where the calibration's beams start; no cloud is made")
       ->excludes(inputs, output);
-  return [options](const CommonOptions& common) {
+  return [options, &verb](const CommonOptions& common) {
     cloud::CloudOptions settings = cloud_options(*options);
     if (!options->beam_origin_map.empty()) {
       require_apart(common, {options->beam_origin_map});
       return write_beam_origin_map(*options, common);
     }
-    if (options->inputs.empty()) throw InvalidArgument("INPUT is missing: a recording");
+    if (options->many.inputs.empty() && options->many.list.empty()) {
+      throw InvalidArgument("INPUT is missing: a recording, or --list");
+    }
     if (options->output.empty()) throw InvalidArgument("--output is missing");
     std::string ending;
-    if (output_is_folder(options->inputs, options->output)) {
+    const bool folder = output_is_folder(options->many, options->output);
+    if (folder) {
       if (options->format.empty()) options->format = cloud::cloud_formats().front().name;
       ending = cloud::find_cloud_format("", options->format).ending;
     }
-    const std::vector<FileJob> files = file_jobs(options->inputs, options->output, ending);
+    const FileJobs files = file_jobs(options->many, options->output, folder, ending);
+    read_options(options->reading);  // wrong options are told before anything is read
     for (const auto& [name, page] : {std::pair{"--distribution", options->distribution},
                                      std::pair{"--report", options->report}}) {
-      if (page.empty() || files.size() == 1) continue;
+      if (page.empty() || files.jobs.size() == 1) continue;
       throw InvalidArgument(
-          fmt::format("{} is of one recording, and there are {}", name, files.size()));
-    }
-    if (files.size() == 1) {
-      require_apart(common, {options->distribution, options->report, files.front().output});
+          fmt::format("{} is of one recording, and there are {}", name, files.jobs.size()));
     }
     settings.writer.format = options->format;
     settings.provenance = provenance_of(common);
-    return run_file_jobs(
-        files, "making points", "points",
-        [&](const FileJob& job, const Progress& progress) {
-          return make_one(job, *options, settings, progress);
-        },
-        common);
+    FileWork work;
+    work.label = "making points";
+    work.counted = "points";
+    work.files = [&](const FileJob& job) {
+      std::vector<std::string> names = {job.output};
+      for (const std::string& page : {options->distribution, options->report}) {
+        if (!page.empty()) names.push_back(page);
+      }
+      return names;
+    };
+    work.run = [&](const FileJob& job, const Progress& progress) {
+      return make_one(job, *options, settings, progress);
+    };
+    return run_file_jobs(files, work, options->many, verb, common);
   };
 }
 

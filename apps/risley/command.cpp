@@ -13,11 +13,15 @@
 #include <cstring>
 #include <filesystem>
 #include <iostream>
+#include <map>
 #include <new>
+#include <set>
+#include <unordered_map>
 
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include "risley/cloud/rotor_tracking.hpp"
@@ -71,6 +75,11 @@ ProgressBar::~ProgressBar() {
   if (visible_ && shown_ >= 0) std::fputs("\r\033[K", stderr);
 }
 
+void ProgressBar::note(std::string text) {
+  const std::scoped_lock lock(note_mutex_);
+  note_ = std::move(text);
+}
+
 Progress ProgressBar::progress() {
   return {[this](double fraction, std::string_view stage) { show(fraction, stage); }, &interrupted};
 }
@@ -93,14 +102,25 @@ void ProgressBar::show(double fraction, std::string_view stage) {
   const double elapsed = time - started_;
   const std::string remaining =
       done > 0.01 && elapsed > 1 ? duration_text(elapsed * (1 - done) / done) + " left" : "";
-  fmt::print(stderr, "\r\033[K{} [{:=<{}}{: <{}}] {:3.0f} % {}", label_, "", filled, "",
-             kWidth - filled, 100 * done, remaining);
+  const std::scoped_lock lock(note_mutex_);
+  fmt::print(stderr, "\r\033[K{} [{:=<{}}{: <{}}] {:3.0f} % {}{}{}", label_, "", filled, "",
+             kWidth - filled, 100 * done, note_, note_.empty() || remaining.empty() ? "" : ", ",
+             remaining);
   std::fflush(stderr);
 }
 
 Json with_status(Json result, const std::optional<FileError>& damage) {
   if (damage) result["exit_status"] = static_cast<int>(kBadFile);
   return result;
+}
+
+Json undecided(const std::string& message) {
+  return {{"serial", nullptr},
+          {"sensor", nullptr},
+          {"verdict",
+           {{"code", "undecided"},
+            {"words", message},
+            {"to_do", "mend what the words name, or record again"}}}};
 }
 
 Failure current_failure() {
@@ -199,14 +219,16 @@ void note_files(const CLI::App& verb, CommonOptions& common) {
 }
 
 Json with_head(const CommonOptions& common, const Json& object, const jobs::Provenance& known) {
+  std::unordered_map<std::string_view, std::string_view> hashes;
+  for (std::size_t i = 0; i + 1 < known.size(); ++i) {
+    if (known[i + 1].first == known[i].first + "_sha256") {
+      hashes[known[i].second] = known[i + 1].second;
+    }
+  }
   Json inputs = Json::array();
   const auto add = [&](const std::string& path) {
     Json one = {{"path", path}, {"sha256", nullptr}};
-    for (std::size_t i = 0; i + 1 < known.size(); ++i) {
-      if (known[i].second == path && known[i + 1].first == known[i].first + "_sha256") {
-        one["sha256"] = known[i + 1].second;
-      }
-    }
+    if (const auto found = hashes.find(path); found != hashes.end()) one["sha256"] = found->second;
     std::error_code ignored;
     if (one["sha256"].is_null() && !interrupted.is_set() &&
         std::filesystem::is_regular_file(path, ignored)) {
@@ -258,23 +280,34 @@ void require_apart(const CommonOptions& common, const std::vector<std::string>& 
     if (!inputs[i].ends_with(".truth.yaml")) continue;
     inputs.push_back(fs::path(inputs[i]).replace_extension(".nc").string());  // read with it
   }
-  const auto same = [](const std::string& a, const std::string& b) {
-    std::error_code ignored;
-    return fs::is_regular_file(a, ignored) && fs::equivalent(a, b, ignored);
+  // Who a file is: by its name, and where it exists by what the disk has under whatever name.
+  using Identity = std::pair<dev_t, ino_t>;
+  const auto identity_of = [](const std::string& path) {
+    struct stat status {};
+    return ::stat(path.c_str(), &status) == 0 && S_ISREG(status.st_mode)
+               ? std::optional(Identity{status.st_dev, status.st_ino})
+               : std::nullopt;
   };
-  for (std::size_t i = 0; i < outputs.size(); ++i) {
-    if (outputs[i].empty() || outputs[i] == "-") continue;
-    for (const std::string& input : inputs) {
-      if (!same(input, outputs[i])) continue;
+  std::map<Identity, std::string> read, written;
+  std::set<std::string> names;
+  for (const std::string& input : inputs) {
+    if (const auto identity = identity_of(input)) read.try_emplace(*identity, input);
+  }
+  for (const std::string& output : outputs) {
+    if (output.empty() || output == "-") continue;
+    const auto identity = identity_of(output);
+    if (const auto input = identity ? read.find(*identity) : read.end(); input != read.end()) {
       throw InvalidArgument(
           fmt::format("the output {} would replace {}, which this command reads: give another name",
-                      outputs[i], input == outputs[i] ? "the input of that name" : input));
+                      output, input->second == output ? "the input of that name" : input->second));
     }
-    for (std::size_t j = 0; j < i; ++j) {
-      if (outputs[j] != outputs[i] && !same(outputs[j], outputs[i])) continue;
-      throw InvalidArgument(
-          fmt::format("the outputs {} and {} are one file", outputs[j], outputs[i]));
+    std::string other = names.insert(output).second ? "" : output;
+    if (identity && other.empty()) {
+      const auto [place, is_new] = written.try_emplace(*identity, output);
+      if (!is_new) other = place->second;
     }
+    if (other.empty()) continue;
+    throw InvalidArgument(fmt::format("the outputs {} and {} are one file", other, output));
   }
 }
 

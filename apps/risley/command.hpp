@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <mutex>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -61,6 +62,9 @@ Json with_status(Json result, const std::optional<FileError>& damage);
 /// Of the exception that is being handled.
 Failure current_failure();
 
+/// What objects of verbs with a verdict have where nothing could be estimated.
+Json undecided(const std::string& message);
+
 /// Does the work of a verb and prints its result.
 using Run = std::function<ExitStatus(const CommonOptions&)>;
 
@@ -100,10 +104,15 @@ class ProgressBar {
   /// For a library function; a signal cancels it.
   Progress progress();
 
+  /// What stands behind the bar from now on, such as how many files are done. @param text  short
+  void note(std::string text);
+
  private:
   void show(double fraction, std::string_view stage);
 
   std::string label_;
+  std::string note_;
+  std::mutex note_mutex_;
   bool visible_;
   double started_, shown_ = -1.0;
 };

@@ -29,7 +29,7 @@ namespace risley::app {
 namespace {
 
 struct ConvertOptions {
-  std::vector<std::string> inputs;
+  ManyWishes many;
   std::string output, format, sensor_type, accuracy, topic;
   ReadingWishes reading;
 };
@@ -137,14 +137,14 @@ FileOutcome convert(const FileJob& job, const ConvertOptions& options, const Pro
 
 Run declare_convert(CLI::App& verb) {
   const auto options = std::make_shared<ConvertOptions>();
-  verb.add_option("INPUT", options->inputs,
-                  "Recordings or trajectories of any known format, ROS 2 bag folders (with "
-                  "metadata.yaml), or quoted patterns such as '*.lvx'")
-      ->required();
-  verb.add_option("-o,--output", options->output,
-                  "File to write, or a folder for several, which is made where it is missing; the "
-                  "ending chooses the format:" +
-                      recording_endings())
+  add_many_options(verb, options->many,
+                   "Recordings or trajectories of any known format, or ROS 2 bag folders (with "
+                   "metadata.yaml)");
+  verb.add_option(
+          "-o,--output", options->output,
+          "File to write, or a folder for several, which is made where it is missing and in "
+          "which they are placed as the inputs are; the ending chooses the format:" +
+              recording_endings())
       ->required();
   verb.add_option(
           "--format", options->format,
@@ -162,16 +162,18 @@ Run declare_convert(CLI::App& verb) {
                   "Convert a ROS bag as a trajectory: the poses of this topic")
       ->type_name("NAME");
   add_reading_options(verb, options->reading);
-  return [options](const CommonOptions& common) {
-    const bool folder = output_is_folder(options->inputs, options->output);
-    const std::vector<FileJob> jobs =
-        file_jobs(options->inputs, options->output, folder ? ending_of(options->format) : "");
-    return run_file_jobs(
-        jobs, "converting", "observations",
-        [&](const FileJob& job, const Progress& progress) {
-          return convert(job, *options, progress);
-        },
-        common);
+  return [options, &verb](const CommonOptions& common) {
+    const bool folder = output_is_folder(options->many, options->output);
+    const FileJobs files =
+        file_jobs(options->many, options->output, folder, folder ? ending_of(options->format) : "");
+    read_options(options->reading);  // wrong options are told before anything is read
+    FileWork work;
+    work.label = "converting";
+    work.counted = "observations";
+    work.run = [&](const FileJob& job, const Progress& progress) {
+      return convert(job, *options, progress);
+    };
+    return run_file_jobs(files, work, options->many, verb, common);
   };
 }
 

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <memory>
 #include <optional>
 
@@ -14,6 +15,7 @@
 #include "risley/report/estimate_report.hpp"
 
 #include "command.hpp"
+#include "many_files.hpp"
 #include "option_names.hpp"
 #include "parameter_choice.hpp"
 #include "reading_options.hpp"
@@ -30,6 +32,8 @@ using jobs::EstimatedRecording;
 struct EstimateCommandOptions {
   std::string input, folder, method = "map", rate_hz, sensor, states = "knots", mirror = "auto",
                              process_noise = "auto", truth;
+  ManyWishes many;
+  bool no_report = false;
   std::optional<double> noise_angle_deg;
   ParameterWishes parameters;
   ReadingWishes reading;
@@ -64,12 +68,14 @@ jobs::EstimateRecordingOptions job_of(const EstimateCommandOptions& options,
   job.rotor_process = rotor_process(options.process_noise);
   if (options.mirror != "auto") job.mirrored = options.mirror == "yes";
   job.truth = options.truth;
-  job.details = !options.folder.empty();
+  job.details = !options.folder.empty() && !options.no_report;
   require_folder_apart(common, options.folder, {"states.nc"});
   job.files = result_files(options.folder, options.states, common);
-  job.texts = [](const EstimatedRecording& outcome) {
-    return report_texts(report::estimate_report(outcome));
-  };
+  if (job.details) {
+    job.texts = [](const EstimatedRecording& outcome) {
+      return report_texts(report::estimate_report(outcome));
+    };
+  }
   return job;
 }
 
@@ -152,6 +158,56 @@ void print_outcome(const EstimatedRecording& outcome) {
   }
 }
 
+/// One of several.
+FileOutcome estimate_one(const FileJob& file, const EstimateCommandOptions& options,
+                         const CommonOptions& common, const Progress& progress) {
+  EstimateCommandOptions own = options;
+  own.input = file.input;
+  own.folder = file.output;
+  EstimatedRecording found = jobs::estimate_recording(job_of(own, common), progress);
+  put_flags(found.warnings);
+  put_flags(found.choice.warnings);
+  put_flags(found.estimate.verdict);
+  const Estimate& e = found.estimate;
+  for (const std::string& words : found.warnings) spdlog::warn("{}: {}", file.input, words);
+  for (const std::string& words : e.warnings) spdlog::warn("{}: {}", file.input, words);
+  Json json = json::of(found);
+  json["input"] = file.input;
+  if (!file.output.empty()) json["output"] = file.output;
+  json["message"] = e.converged ? "" : with_flags(e.reason);
+  std::string text = fmt::format("{}: {}", file.input, to_string(e.verdict.code));
+  if (!e.converged) text += fmt::format(", not converged: {}", with_flags(e.reason));
+  text += fmt::format("; {}, {} shots, {} of them outliers", jobs::sensor_name(found.choice),
+                      grouped(e.series.size()), grouped(e.outliers));
+  return {e.converged ? kDone : kNumbersFailed, std::move(json), std::move(text)};
+}
+
+ExitStatus estimate_several(const FileJobs& files, const EstimateCommandOptions& options,
+                            const CLI::App& verb, const CommonOptions& common) {
+  if (!options.truth.empty() && files.jobs.size() > 1) {
+    throw InvalidArgument(
+        fmt::format("--truth is of one recording, and there are {}", files.jobs.size()));
+  }
+  EstimateCommandOptions first = options;
+  first.input = files.jobs.front().input;
+  job_of(first, common);  // wrong options are told before anything is read
+  FileWork work;
+  work.label = "estimating";
+  work.into_folders = true;
+  work.files = [](const FileJob& file) {
+    std::vector<std::string> names;
+    if (file.output.empty()) return names;
+    for (const char* name : {"calibration.yaml", "states.nc", "report.json", "report.html"}) {
+      names.push_back((std::filesystem::path(file.output) / name).string());
+    }
+    return names;
+  };
+  work.run = [&](const FileJob& file, const Progress& progress) {
+    return estimate_one(file, options, common, progress);
+  };
+  return run_file_jobs(files, work, options.many, verb, common);
+}
+
 ExitStatus run_estimate(const EstimateCommandOptions& options, const CommonOptions& common) {
   EstimatedRecording outcome;
   {
@@ -184,10 +240,14 @@ ExitStatus run_estimate(const EstimateCommandOptions& options, const CommonOptio
 Run declare_estimate(CLI::App& verb) {
   const auto options = std::make_shared<EstimateCommandOptions>();
   EstimateCommandOptions& o = *options;
-  verb.add_option("INPUT", o.input, "Recording of one sensor, of any known format")->required();
-  verb.add_option("-o,--output", o.folder,
-                  "Folder to write calibration.yaml, states.nc, report.json and report.html to "
-                  "(default: none)");
+  add_many_options(verb, o.many, "Recordings, each of one sensor, of any known format");
+  verb.add_option(
+      "-o,--output", o.folder,
+      "Folder to write calibration.yaml, states.nc, report.json and report.html to; for "
+      "several inputs a folder of such folders, placed as the inputs are (default: "
+      "none)");
+  verb.add_flag("--no-report", o.no_report,
+                "Write no report.json and report.html, and do not compute what only they show");
   verb.add_option(
           "--method", o.method,
           "map: the most probable motion of the rotors, from all shots at once; ekf: the paper's "
@@ -222,7 +282,13 @@ Run declare_estimate(CLI::App& verb) {
       ->capture_default_str();
   verb.add_option("--truth", o.truth,
                   "OUT.truth.yaml of the simulated recording, to compare the estimate with");
-  return [options](const CommonOptions& common) { return run_estimate(*options, common); };
+  return [options, &verb](const CommonOptions& common) {
+    const FileJobs files =
+        file_jobs(options->many, options->folder, are_several(options->many), "");
+    if (files.many) return estimate_several(files, *options, verb, common);
+    options->input = files.jobs.front().input;
+    return run_estimate(*options, common);
+  };
 }
 
 }  // namespace risley::app

@@ -17,6 +17,7 @@
 #include "risley/trajectories/trajectory_file.hpp"
 
 #include "command.hpp"
+#include "many_files.hpp"
 #include "reading_options.hpp"
 #include "recording_text.hpp"
 #include "table.hpp"
@@ -31,6 +32,7 @@ using recordings::TimeAuditResult;
 using recordings::ValueRange;
 
 struct InfoCommandOptions {
+  ManyWishes many;
   std::string input, share, accuracy, topic;
   bool share_ranges = false;
   ReadingWishes reading;
@@ -130,18 +132,77 @@ ExitStatus run_trajectory_info(const InfoCommandOptions& options, const CommonOp
   return kDone;
 }
 
+bool is_of_trajectory(const InfoCommandOptions& options) {
+  return !options.topic.empty() ||
+         trajectories::trajectory_file_kind(options.input, cancellable()) !=
+             trajectories::TrajectoryFileKind::none;
+}
+
+void require_no_accuracy(const InfoCommandOptions& options) {
+  if (options.accuracy.empty()) return;
+  throw InvalidArgument(
+      fmt::format("--accuracy goes with a trajectory, and {} is none", options.input));
+}
+
+FileOutcome inspect_poses(const InfoCommandOptions& options, const Progress& progress) {
+  require_no_reading_options(options.reading, "trajectories");
+  const jobs::InspectedTrajectory found =
+      jobs::inspect_trajectory({options.input, options.accuracy, options.topic}, progress);
+  log_warnings(options.input, found.warnings);
+  Json json = json::of(found);
+  json["input"] = options.input;
+  std::string text = fmt::format("{}: {}, {} records", options.input, json.value("format", ""),
+                                 grouped(json.value("records", std::uint64_t{0})));
+  return {kDone, std::move(json), std::move(text)};
+}
+
+/// One of several.
+FileOutcome inspect_one(const std::string& input, const InfoCommandOptions& all,
+                        const Progress& progress) {
+  InfoCommandOptions options = all;
+  options.input = input;
+  if (is_of_trajectory(options)) return inspect_poses(options, progress);
+  require_no_accuracy(options);
+  InspectedRecording found =
+      jobs::inspect_recording({input, read_options(options.reading), {}, {}}, progress);
+  log_warnings(input, found.warnings);
+  if (found.choice) {
+    put_flags(found.choice->warnings);
+    for (const std::string& words : found.choice->warnings) spdlog::warn("{}: {}", input, words);
+  }
+  Json json = with_status(json::of(found), found.damage);
+  json["input"] = input;
+  std::string text =
+      fmt::format("{}: {}, {}, {} observations", input, found.header.format,
+                  found.choice ? jobs::sensor_name(*found.choice) : jobs::sensor_name(found.header),
+                  grouped(found.audit.observations));
+  if (found.header.has_times) text += fmt::format(" in {:.6g} s", found.audit.duration_s);
+  if (found.audit.gaps.count > 0) text += fmt::format(", {} gaps", grouped(found.audit.gaps.count));
+  if (found.damage) text += fmt::format("; damaged: {}", found.damage->what());
+  return {found.damage ? kBadFile : kDone, std::move(json), std::move(text)};
+}
+
+ExitStatus inspect_several(const FileJobs& files, const InfoCommandOptions& options,
+                           const CLI::App& verb, const CommonOptions& common) {
+  if (!options.share.empty()) {
+    throw InvalidArgument(
+        fmt::format("--share is of one recording, and there are {}", files.jobs.size()));
+  }
+  read_options(options.reading);  // wrong options are told before anything is read
+  FileWork work;
+  work.label = "reading";
+  work.run = [&](const FileJob& file, const Progress& progress) {
+    return inspect_one(file.input, options, progress);
+  };
+  return run_file_jobs(files, work, options.many, verb, common);
+}
+
 ExitStatus run_info(const InfoCommandOptions& options, const CommonOptions& common) {
   if (options.share_ranges && options.share.empty()) {
     throw InvalidArgument("--share-ranges needs --share: it says what an excerpt holds");
   }
-  const bool is_trajectory =
-      !options.topic.empty() || trajectories::trajectory_file_kind(options.input, cancellable()) !=
-                                    trajectories::TrajectoryFileKind::none;
-  if (is_trajectory) return run_trajectory_info(options, common);
-  if (!options.accuracy.empty()) {
-    throw InvalidArgument(
-        fmt::format("--accuracy goes with a trajectory, and {} is none", options.input));
-  }
+  if (is_of_trajectory(options)) return run_trajectory_info(options, common);
+  require_no_accuracy(options);
   InspectedRecording found;
   {
     ProgressBar bar("reading", common);
@@ -172,11 +233,9 @@ ExitStatus run_info(const InfoCommandOptions& options, const CommonOptions& comm
 
 Run declare_info(CLI::App& verb) {
   const auto options = std::make_shared<InfoCommandOptions>();
-  verb.add_option(
-          "INPUT", options->input,
-          "Recording, trajectory or accuracies (SMRMSG file) of any known format, or a ROS 2 "
-          "bag folder (with metadata.yaml)")
-      ->required();
+  add_many_options(verb, options->many,
+                   "Recordings, trajectories or accuracies (SMRMSG files) of any known format, or "
+                   "ROS 2 bag folders (with metadata.yaml)");
   verb.add_option("--accuracy", options->accuracy, "Accuracies of the trajectory (SMRMSG file)")
       ->type_name("FILE");
   verb.add_option("--trajectory-topic", options->topic,
@@ -192,8 +251,11 @@ Run declare_info(CLI::App& verb) {
                 "Keep the ranges in the excerpt. They are left out otherwise because they show the "
                 "place of the recording; only calibrations on walls need them");
   add_reading_options(verb, options->reading);
-  return [options](const CommonOptions& common) {
+  return [options, &verb](const CommonOptions& common) {
     require_apart(common, {options->share});
+    const FileJobs files = file_jobs(options->many, "", false, "");
+    if (files.many) return inspect_several(files, *options, verb, common);
+    options->input = files.jobs.front().input;
     return run_info(*options, common);
   };
 }

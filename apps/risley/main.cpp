@@ -30,12 +30,7 @@ ExitStatus fail(ExitStatus status, const std::string& message, const CommonOptio
     Json object = {{"error", message}, {"exit_status", static_cast<int>(status)}};
     if (details.is_object()) object.update(details);
     if (common.verb == "estimate" || common.verb == "calibrate") {
-      object.update({{"serial", nullptr},
-                     {"sensor", nullptr},
-                     {"verdict",
-                      {{"code", "undecided"},
-                       {"words", message},
-                       {"to_do", "mend what the words name, or record again"}}}});
+      object.update(undecided(message));
     }
     print_json(common, object);
   }

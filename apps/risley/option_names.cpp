@@ -29,6 +29,7 @@ constexpr OptionName kNames[] = {
     {"knot_spacing", "--knot-spacing-s"},
     {"las_scale", "--las-scale-m"},
     {"method", "--method"},
+    {"list", "--list"},
     {"mirrored", "--mirror"},
     {"mount", "--mount"},
     {"planes", "--planes"},

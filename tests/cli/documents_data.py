@@ -83,7 +83,10 @@ LEFT_OUT = {
 }
 
 # Exit statuses that are not 0.
-STATUS = {}
+STATUS = {
+    "risley estimate out/fleet -o out/results --table out/fleet.csv --no-report": 3,
+    "risley estimate out/fleet -o out/results --table out/fleet.csv --no-report --resume": 3,
+}
 
 # Of every document, what a block of output begins with: the commands that print it, with their exit statuses.
 MESSAGES = {

@@ -1,0 +1,297 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "risley/jobs/inputs.hpp"
+
+#include <algorithm>
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <set>
+#include <string_view>
+#include <system_error>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <fnmatch.h>
+#include <sys/stat.h>
+
+#include "risley/core/error.hpp"
+#include "risley/core/text.hpp"
+#include "risley/io/sha256.hpp"
+#include "risley/io/text_table.hpp"
+#include "risley/recordings/reader.hpp"
+
+namespace risley::jobs {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::string_view kAnyFolders = "**";
+
+bool has_wildcard(std::string_view name) {
+  return name.find_first_of("*?[") != std::string_view::npos;
+}
+
+bool is_pattern(const std::string& name) {
+  std::error_code ignored;
+  return has_wildcard(name) && !fs::exists(name, ignored);
+}
+
+bool is_bag_folder(const fs::path& path) {
+  std::error_code ignored;
+  return fs::exists(path / "metadata.yaml", ignored);
+}
+
+bool is_folder_of_recordings(const std::string& name) {
+  std::error_code ignored;
+  return fs::is_directory(name, ignored) && !is_bag_folder(name);
+}
+
+/// What risley itself writes beside recordings and into results.
+bool is_own_output(const std::string& name) {
+  return ::fnmatch("states*.nc", name.c_str(), 0) == 0 || name.ends_with(".truth.nc") ||
+         name.ends_with(".trajectory.csv");
+}
+
+bool looks_like_recording(const fs::path& path) {
+  const std::string name = lower_case(path.filename().string());
+  if (is_own_output(name)) return false;
+  const auto& endings = recording_endings();
+  return std::any_of(endings.begin(), endings.end(),
+                     [&name](const std::string& ending) { return name.ends_with(ending); });
+}
+
+/// Who a file is, by whatever name.
+using Identity = std::pair<dev_t, ino_t>;
+
+std::optional<Identity> identity_of(const std::string& path) {
+  struct stat status {};
+  if (::stat(path.c_str(), &status) != 0) return std::nullopt;
+  return Identity{status.st_dev, status.st_ino};
+}
+
+/// Absolute, without "..", links as they are, and without a slash at its end; the current folder
+/// for an empty name.
+fs::path whole_path(const fs::path& path) {
+  const fs::path whole = (fs::current_path() / path).lexically_normal();
+  return whole.has_filename() || whole == whole.root_path() ? whole : whole.parent_path();
+}
+
+/// Collects inputs from names.
+class Finder {
+ public:
+  Finder(const std::vector<std::string>& excluded, const Progress& progress) : progress_(progress) {
+    for (const std::string& path : excluded) {
+      if (const auto identity = identity_of(path)) excluded_.insert(*identity);
+    }
+  }
+
+  /// @param once  whether a file may not be named a second time
+  void add(const std::string& name, bool once) {
+    progress_.check();
+    found_.clear();
+    if (is_pattern(name)) {
+      const fs::path pattern(name);
+      roots_.push_back(whole_path(fixed_part(pattern)));
+      const fs::path below = pattern.relative_path();
+      expand(pattern.root_path(), {below.begin(), below.end()}, 0);
+      if (found_.empty()) throw InvalidArgument(fmt::format("{}: no file has such a name", name));
+    } else if (is_folder_of_recordings(name)) {
+      roots_.push_back(whole_path(name));
+      walk(name);
+      if (found_.empty()) {
+        throw InvalidArgument(
+            fmt::format("{}: no recording is in this folder: no file's name ends "
+                        "in {}",
+                        name, fmt::join(recording_endings(), ", ")));
+      }
+    } else {
+      roots_.push_back(whole_path(name).parent_path());
+      take(name, once);
+      return;
+    }
+    std::sort(found_.begin(), found_.end());
+    for (const std::string& path : found_) take(path, false);
+  }
+
+  std::vector<Input> inputs() && {
+    fs::path common = roots_.empty() ? fs::path() : roots_.front();
+    for (const fs::path& root : roots_) {
+      const auto end = std::mismatch(common.begin(), common.end(), root.begin(), root.end()).first;
+      fs::path shared;
+      for (auto part = common.begin(); part != end; ++part) shared /= *part;
+      common = shared;
+    }
+    std::map<std::string, int> uses;
+    for (Input& input : inputs_) ++uses[input.place = place_of(input.path, common, false)];
+    std::map<std::string, std::string> owners;
+    for (Input& input : inputs_) {
+      if (uses[input.place] > 1) input.place = place_of(input.path, common, true);
+      const auto [owner, is_new] = owners.try_emplace(input.place, input.path);
+      if (is_new) continue;
+      throw InvalidArgument(
+          fmt::format("the results of {} and {} would have the same name, {}: "
+                      "read them one after the other",
+                      owner->second, input.path, input.place));
+    }
+    return std::move(inputs_);
+  }
+
+ private:
+  static fs::path fixed_part(const fs::path& pattern) {
+    fs::path fixed = pattern.root_path();
+    for (const fs::path& part : pattern.relative_path().parent_path()) {
+      if (has_wildcard(part.string())) break;
+      fixed /= part;
+    }
+    return fixed;
+  }
+
+  static std::string place_of(const std::string& path, const fs::path& common, bool with_ending) {
+    const fs::path whole = whole_path(path);
+    std::error_code ignored;
+    fs::path place = whole.lexically_relative(common);
+    if (!with_ending && !fs::is_directory(whole, ignored)) place.replace_extension();
+    return place.string();
+  }
+
+  void take(const std::string& path, bool once) {
+    // Files that are missing have nothing but their names.
+    const std::pair<std::optional<Identity>, std::string> who = {
+        identity_of(path), identity_of(path) ? std::string() : whole_path(path).string()};
+    if (once && !named_.insert(who).second) {
+      throw InvalidArgument(fmt::format("{} is named twice: once is enough", path));
+    }
+    if (taken_.insert(who).second) inputs_.push_back({path, {}});
+  }
+
+  bool is_excluded(const fs::path& path) const {
+    if (excluded_.empty()) return false;
+    const auto identity = identity_of(path.string());
+    return identity && excluded_.contains(*identity);
+  }
+
+  /// What a folder holds, sorted; a folder that cannot be listed is found itself, so that somebody
+  /// is told.
+  std::vector<fs::path> entries_of(const fs::path& folder) {
+    progress_.check();
+    std::vector<fs::path> entries;
+    std::error_code code;
+    for (fs::directory_iterator at(folder.empty() ? "." : folder, code), end; !code && at != end;
+         at.increment(code)) {
+      entries.push_back(folder.empty() ? at->path().filename() : at->path());
+    }
+    if (code) found_.push_back(folder.string());
+    std::sort(entries.begin(), entries.end());
+    return entries;
+  }
+
+  static bool is_hidden(const fs::path& path) { return path.filename().string().starts_with('.'); }
+  static bool is_real_folder(const fs::path& path) {
+    std::error_code ignored;
+    return fs::is_directory(fs::symlink_status(path, ignored));  // links may lead in circles
+  }
+
+  /// Recordings of a folder and of those below.
+  void walk(const fs::path& folder) {
+    for (const fs::path& entry : entries_of(folder)) {
+      if (is_hidden(entry) || is_excluded(entry)) continue;
+      if (is_real_folder(entry)) {
+        is_bag_folder(entry) ? found_.push_back(entry.string()) : walk(entry);
+        continue;
+      }
+      std::error_code ignored;
+      if (fs::is_regular_file(entry, ignored) && looks_like_recording(entry)) {
+        found_.push_back(entry.string());
+      }
+    }
+  }
+
+  /// Names that a pattern stands for, from one of its parts on.
+  void expand(const fs::path& folder, const std::vector<fs::path>& parts, std::size_t part) {
+    const std::string name = parts[part].string();
+    const bool is_last = part + 1 == parts.size();
+    if (name == kAnyFolders) {
+      if (is_last) {  // all recordings, as in "hall/**"
+        walk(folder);
+        return;
+      }
+      expand(folder, parts, part + 1);
+      for (const fs::path& entry : entries_of(folder)) {
+        if (!is_hidden(entry) && is_real_folder(entry) && !is_excluded(entry)) {
+          expand(entry, parts, part);
+        }
+      }
+      return;
+    }
+    const auto go_on = [&](const fs::path& path) {
+      std::error_code ignored;
+      const bool is_folder = fs::is_directory(path, ignored);
+      if (!is_last) {
+        if (is_folder) expand(path, parts, part + 1);
+      } else if (is_folder ? is_bag_folder(path) : fs::exists(path, ignored)) {
+        if (!is_excluded(path)) found_.push_back(path.string());
+      }
+    };
+    if (!has_wildcard(name)) {
+      go_on(folder / parts[part]);
+      return;
+    }
+    for (const fs::path& entry : entries_of(folder)) {
+      if (::fnmatch(name.c_str(), entry.filename().c_str(), FNM_PERIOD) == 0) go_on(entry);
+    }
+  }
+
+  const Progress& progress_;
+  std::set<Identity> excluded_;
+  std::set<std::pair<std::optional<Identity>, std::string>> taken_, named_;
+  std::vector<fs::path> roots_;     ///< the deepest folders that names stand in for sure
+  std::vector<std::string> found_;  ///< of the name that is being added
+  std::vector<Input> inputs_;
+};
+
+}  // namespace
+
+bool are_many(const InputNames& wanted) {
+  return wanted.names.size() > 1 || !wanted.list.empty() ||
+         std::any_of(wanted.names.begin(), wanted.names.end(), [](const std::string& name) {
+           return is_pattern(name) || is_folder_of_recordings(name);
+         });
+}
+
+const std::vector<std::string>& recording_endings() {
+  static const std::vector<std::string> endings = {".bag", ".bin", ".csv",  ".db3", ".las",
+                                                   ".laz", ".lvx", ".mcap", ".nc",  ".npy",
+                                                   ".npz", ".pcd", ".ply"};
+  return endings;
+}
+
+std::vector<Input> find_inputs(const InputNames& wanted, const Progress& progress) {
+  Finder finder(wanted.excluded, progress);
+  for (const std::string& name : wanted.names) finder.add(name, true);
+  if (!wanted.list.empty()) {
+    io::LineReader lines(wanted.list);
+    bool is_empty = true;
+    for (std::string_view line; lines.next(line);) {
+      if (io::trimmed(line).empty() || line.starts_with('#')) continue;
+      is_empty = false;
+      finder.add(std::string(line), false);
+    }
+    if (is_empty) {
+      throw InvalidArgument(
+          fmt::format("option list: {} names no recording, expected one a line", wanted.list));
+    }
+  }
+  return std::move(finder).inputs();
+}
+
+std::vector<std::pair<std::string, std::string>> input_hashes(const std::string& path,
+                                                              const Progress& progress) {
+  std::vector<std::pair<std::string, std::string>> hashes;
+  for (const std::string& file : recordings::recording_files(path)) {
+    hashes.emplace_back(file, io::sha256_of_file(file, progress));
+  }
+  return hashes;
+}
+
+}  // namespace risley::jobs
