@@ -19,6 +19,7 @@
 #include <spdlog/spdlog.h>
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
+#include <unistd.h>
 
 #include "risley/core/error.hpp"
 #include "risley/io/output_file.hpp"
@@ -27,6 +28,7 @@
 #include "risley/jobs/inputs.hpp"
 #include "risley/jobs/result_record.hpp"
 #include "risley/json/result_columns.hpp"
+#include "risley/recordings/reader.hpp"
 
 #include "recording_text.hpp"
 #include "result_folder.hpp"
@@ -197,6 +199,21 @@ std::string work_text(const CLI::App& verb, const CommonOptions& common) {
   return fmt::format("risley {} {}\n{}\n", RISLEY_VERSION, common.verb, fmt::join(lines, "\n"));
 }
 
+/// Whether as many such inputs as there are threads might not fit into memory at the same time. An
+/// estimate of ten minutes takes seven times the bytes of its file.
+bool is_large(const std::string& input) {
+  constexpr double kMemoryPerByte = 8.0;
+  const double memory =
+      static_cast<double>(sysconf(_SC_PHYS_PAGES)) * static_cast<double>(sysconf(_SC_PAGESIZE));
+  double bytes = 0;
+  for (const std::string& file : recordings::recording_files(input)) {
+    std::error_code code;
+    const std::uintmax_t size = fs::file_size(file, code);
+    if (!code) bytes += static_cast<double>(size);
+  }
+  return kMemoryPerByte * bytes * tbb::this_task_arena::max_concurrency() > memory;
+}
+
 /// Whether the same failure would come of the same bytes again: neither the machine nor another
 /// file was to blame.
 bool is_of_input(const FileOutcome& outcome, const std::vector<std::string>& files) {
@@ -263,8 +280,15 @@ class Runner {
       spool_.add(i, finished);
       progress.finish(i, finished.outcome.status == kDone);
     };
+    std::vector<std::size_t> together, alone;
+    for (std::size_t i = 0; i < jobs_.size(); ++i) {
+      (is_large(jobs_[i].input) ? alone : together).push_back(i);
+    }
     try {
-      tbb::parallel_for(std::size_t{0}, jobs_.size(), run_one, tbb::simple_partitioner());
+      tbb::parallel_for(
+          std::size_t{0}, together.size(), [&](std::size_t k) { run_one(together[k]); },
+          tbb::simple_partitioner());
+      for (const std::size_t i : alone) run_one(i);
     } catch (const Cancelled&) {
       return false;
     }
