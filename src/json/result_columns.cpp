@@ -163,7 +163,8 @@ ResultColumns::ResultColumns() {
 void ResultColumns::note_parameters(const Json& result) {
   const auto found = result.find("parameters");
   if (found == result.end() || !found->is_object()) return;
-  for (const auto& [name, value] : found->items()) {
+  for (const auto& parameter : found->items()) {
+    const std::string& name = parameter.key();
     const std::string place = fmt::format("/parameters/{}", name);
     const bool known = std::any_of(parameters_.begin(), parameters_.end(),
                                    [&](const Column& one) { return one.shown.name == name; });

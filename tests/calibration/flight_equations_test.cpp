@@ -201,10 +201,12 @@ struct Flight {
       });
     }
     const auto p = static_cast<std::size_t>(plane[i]);
-    const auto [first, second] = tangents_of(plain(model.planes[p].normal));
+    const auto tangents = tangents_of(plain(model.planes[p].normal));  // a lambda needs a name
     for (int k = 0; k < 2; ++k) {
       row[globals + 6 + k] = by_model(1e-5, [&](FlightModel& m, double h) {
-        m.planes[p].normal = (m.planes[p].normal + h * eigen(k == 0 ? first : second)).normalized();
+        m.planes[p].normal =
+            (m.planes[p].normal + h * eigen(k == 0 ? tangents.first : tangents.second))
+                .normalized();
       });
     }
     row[globals + 8] = by_model(
