@@ -214,6 +214,19 @@ class BagFolder final : public Bag {
 
 }  // namespace
 
+bool is_bag_folder(const std::string& folder) {
+  std::error_code code;
+  if (fs::exists(fs::path(folder) / kMetadata, code)) return true;
+  for (fs::directory_iterator file(folder, code), end; !code && file != end; file.increment(code)) {
+    const std::string ending = file->path().extension().string();
+    std::string name = file->path().stem().string();
+    if ((ending != ".mcap" && ending != ".db3") || !name.ends_with("_0")) continue;
+    name.back() = '1';
+    if (fs::exists(file->path().parent_path() / (name + ending), code)) return true;
+  }
+  return false;
+}
+
 std::vector<std::string> files_of_bag_folder(const std::string& folder) {
   const std::string metadata = (fs::path(folder) / kMetadata).string();
   std::error_code code;

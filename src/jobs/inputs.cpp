@@ -37,14 +37,9 @@ bool is_pattern(const std::string& name) {
   return has_wildcard(name) && !fs::exists(name, ignored);
 }
 
-bool is_bag_folder(const fs::path& path) {
-  std::error_code ignored;
-  return fs::exists(path / "metadata.yaml", ignored);
-}
-
 bool is_folder_of_recordings(const std::string& name) {
   std::error_code ignored;
-  return fs::is_directory(name, ignored) && !is_bag_folder(name);
+  return fs::is_directory(name, ignored) && !recordings::is_recording_folder(name);
 }
 
 /// What risley itself writes beside recordings and into results.
@@ -197,7 +192,8 @@ class Finder {
     for (const fs::path& entry : entries_of(folder)) {
       if (is_hidden(entry) || is_excluded(entry)) continue;
       if (is_real_folder(entry)) {
-        is_bag_folder(entry) ? found_.push_back(entry.string()) : walk(entry);
+        recordings::is_recording_folder(entry.string()) ? found_.push_back(entry.string())
+                                                        : walk(entry);
         continue;
       }
       std::error_code ignored;
@@ -229,7 +225,8 @@ class Finder {
       const bool is_folder = fs::is_directory(path, ignored);
       if (!is_last) {
         if (is_folder) expand(path, parts, part + 1);
-      } else if (is_folder ? is_bag_folder(path) : fs::exists(path, ignored)) {
+      } else if (is_folder ? recordings::is_recording_folder(path.string())
+                           : fs::exists(path, ignored)) {
         if (!is_excluded(path)) found_.push_back(path.string());
       }
     };

@@ -96,6 +96,8 @@ std::unique_ptr<Reader> open_recording(const std::string& path, const ReadOption
   return within_time_span(std::move(reader), path);
 }
 
+bool is_recording_folder(const std::string& path) { return bags::is_bag_folder(path); }
+
 std::vector<std::string> recording_files(const std::string& path) {
   std::error_code code;
   if (!std::filesystem::is_directory(path, code)) return {path};

@@ -53,7 +53,7 @@ if(WAY STREQUAL "installed")
   endforeach()
   consume(optics -DCOMPONENTS=optics ${hidden})
   refuse(no_such_layer "risley has no component telescope; it has core, " -DCOMPONENTS=telescope)
-  refuse(no_package "risley::bags needs packages that are missing.*libsqlite3-dev"
+  refuse(no_package "risley::io needs packages that are missing.*libsqlite3-dev"
          -DCMAKE_DISABLE_FIND_PACKAGE_SQLite3=ON)
   consume_pkg_config(risley)
   consume_pkg_config(risley-optics)

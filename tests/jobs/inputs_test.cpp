@@ -77,6 +77,15 @@ TEST_F(InputsTest, AFolderStandsForAllRecordingsInIt) {
   EXPECT_THAT(paths({{"fleet"}, "", {"fleet/a"}}), ElementsAre("fleet/b/scan.lvx", "fleet/bag"));
 }
 
+// Parts of one recording are no recordings: who reads the folder asks for its metadata.yaml.
+TEST_F(InputsTest, PartsOfABagAreOneRecordingAlsoWithoutMetadata) {
+  make({"fleet/drive/drive_0.mcap", "fleet/drive/drive_1.mcap", "fleet/days/monday_0.mcap",
+        "fleet/days/tuesday_0.mcap"});
+  EXPECT_THAT(paths({{"fleet"}, "", {}}),
+              ElementsAre("fleet/days/monday_0.mcap", "fleet/days/tuesday_0.mcap", "fleet/drive"));
+  EXPECT_FALSE(are_many({{"fleet/drive"}, "", {}}));
+}
+
 TEST_F(InputsTest, PatternsGoThroughFolders) {
   make({"x/scan.lvx", "y/scan.lvx", "y/z/scan.lvx", "y/z/scan.csv", "y/z/.scan.lvx", "top.lvx"});
   EXPECT_THAT(paths({{"*/scan.lvx"}, "", {}}), ElementsAre("x/scan.lvx", "y/scan.lvx"));

@@ -41,6 +41,10 @@ std::optional<BagKind> bag_kind(std::string_view head);
 /// cannot be read.
 std::optional<BagKind> bag_kind_of_file(const std::string& path);
 
+/// Whether a folder holds one recording of ROS 2: it has a metadata.yaml, or lacks it and has files
+/// named as rosbag2 names the parts of a bag (drive_0.mcap, drive_1.mcap).
+bool is_bag_folder(const std::string& folder);
+
 /// The files that a folder of ROS 2 names as one bag in its metadata.yaml, in their order. They lie
 /// in the folder itself.
 /// @throws FileError without such a file, with the names of files that are missing, for a name that

@@ -118,6 +118,10 @@ struct ReadOptions {
 std::unique_ptr<Reader> open_recording(const std::string& path, const ReadOptions& options = {},
                                        const Progress& progress = {});
 
+/// Whether a folder holds one recording and not any number of them: a bag of ROS 2, also where its
+/// metadata.yaml is missing.
+bool is_recording_folder(const std::string& path);
+
 /// The files that a recording consists of: its own, or metadata.yaml and the bags that it names
 /// where it is a folder of ROS 2. Of what is no recording the path itself.
 std::vector<std::string> recording_files(const std::string& path);
