@@ -168,9 +168,9 @@ class NetcdfTable final : public TableFile::Writer {
       }
       return {};
     }
-    const NetcdfVariable variable = column.is.kind == CellKind::integer
-                                        ? file.define<std::int64_t>(column.is.name, {&row}, {})
-                                        : file.define<double>(column.is.name, {&row}, {});
+    NetcdfVariable variable = column.is.kind == CellKind::integer
+                                  ? file.define<std::int64_t>(column.is.name, {&row}, {})
+                                  : file.define<double>(column.is.name, {&row}, {});
     file.put_text(variable, "long_name", column.is.description);
     file.put_text(variable, "units", column.is.unit);
     return variable;
