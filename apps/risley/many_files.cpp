@@ -242,7 +242,7 @@ class Runner {
     if (!wishes.table.empty()) const io::OutputFile can_be_written(wishes.table);
   }
 
-  ExitStatus run(CommonOptions told) {
+  ExitStatus run(const CommonOptions& told) {
     const bool interrupted = !run_all();
     if (!wishes_.table.empty()) write_table();
     count();
