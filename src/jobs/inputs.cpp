@@ -187,6 +187,13 @@ class Finder {
     return fs::is_directory(fs::symlink_status(path, ignored));  // links may lead in circles
   }
 
+  /// A link that leads nowhere is a file that is missing: who reads it is told.
+  static bool is_file_or_broken_link(const fs::path& path) {
+    std::error_code ignored;
+    return fs::is_regular_file(path, ignored) ||
+           (fs::is_symlink(path, ignored) && !fs::exists(path, ignored));
+  }
+
   /// Recordings of a folder and of those below.
   void walk(const fs::path& folder) {
     for (const fs::path& entry : entries_of(folder)) {
@@ -196,8 +203,7 @@ class Finder {
                                                         : walk(entry);
         continue;
       }
-      std::error_code ignored;
-      if (fs::is_regular_file(entry, ignored) && looks_like_recording(entry)) {
+      if (is_file_or_broken_link(entry) && looks_like_recording(entry)) {
         found_.push_back(entry.string());
       }
     }
@@ -226,7 +232,7 @@ class Finder {
       if (!is_last) {
         if (is_folder) expand(path, parts, part + 1);
       } else if (is_folder ? recordings::is_recording_folder(path.string())
-                           : fs::exists(path, ignored)) {
+                           : fs::exists(fs::symlink_status(path, ignored))) {
         if (!is_excluded(path)) found_.push_back(path.string());
       }
     };

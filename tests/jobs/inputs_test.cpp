@@ -77,6 +77,14 @@ TEST_F(InputsTest, AFolderStandsForAllRecordingsInIt) {
   EXPECT_THAT(paths({{"fleet"}, "", {"fleet/a"}}), ElementsAre("fleet/b/scan.lvx", "fleet/bag"));
 }
 
+TEST_F(InputsTest, ALinkThatLeadsNowhereIsNotPassedOver) {
+  make({"fleet/a.lvx"});
+  std::filesystem::create_symlink("gone.lvx", "fleet/b.lvx");
+  for (const char* names : {"fleet", "*/*.lvx", "**/*.lvx"}) {
+    EXPECT_THAT(paths({{names}, "", {}}), ElementsAre("fleet/a.lvx", "fleet/b.lvx")) << names;
+  }
+}
+
 // Parts of one recording are no recordings: who reads the folder asks for its metadata.yaml.
 TEST_F(InputsTest, PartsOfABagAreOneRecordingAlsoWithoutMetadata) {
   make({"fleet/drive/drive_0.mcap", "fleet/drive/drive_1.mcap", "fleet/days/monday_0.mcap",
