@@ -226,6 +226,11 @@ bool is_of_input(const FileOutcome& outcome, const std::vector<std::string>& fil
              files.end();
 }
 
+std::vector<std::string> files_of(const FileWork& work, const FileJob& job) {
+  if (work.files) return work.files(job);
+  return job.output.empty() ? std::vector<std::string>() : std::vector{job.output};
+}
+
 /// All jobs of one command.
 class Runner {
  public:
@@ -324,7 +329,7 @@ class Runner {
     finished.elapsed = now() - started;
     if (!records_.empty() && is_of_input(finished.outcome, files)) {
       // What stands where a failed result would be is of an earlier run.
-      keep(job, finished, is_made ? files_of(job) : std::vector<std::string>(), progress);
+      keep(job, finished, is_made ? files_of(work_, job) : std::vector<std::string>(), progress);
     }
     return finished;
   }
@@ -373,11 +378,6 @@ class Runner {
     if (work_.into_folders || job.output.empty()) return;
     const fs::path folder = fs::path(job.output).parent_path();
     if (!folder.empty()) make_result_folder(folder.string());
-  }
-
-  std::vector<std::string> files_of(const FileJob& job) const {
-    if (work_.files) return work_.files(job);
-    return job.output.empty() ? std::vector<std::string>() : std::vector{job.output};
   }
 
   void write_table() const {
@@ -562,12 +562,8 @@ ExitStatus run_file_jobs(const FileJobs& jobs, const FileWork& work, const ManyW
   std::vector<std::string> outputs = {wishes.table};
   for (const FileJob& job : jobs.jobs) {
     add_files(job.input, told.inputs);
-    if (work.files) {
-      const std::vector<std::string> files = work.files(job);
-      outputs.insert(outputs.end(), files.begin(), files.end());
-    } else {
-      outputs.push_back(job.output);
-    }
+    const std::vector<std::string> files = files_of(work, job);
+    outputs.insert(outputs.end(), files.begin(), files.end());
   }
   if (!wishes.list.empty()) told.files.push_back(wishes.list);
   require_apart(told, outputs);
