@@ -1,0 +1,30 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <string>
+
+namespace risley::io {
+
+/// Makes a folder with those above it where it is missing. @return whether it was missing
+/// @throws FileError
+bool make_folder(const std::string& path);
+
+/// A folder for files that nobody keeps, where the system has such files (TMPDIR, /tmp), under a
+/// name that nobody can foresee and for this user alone. The destructor removes it with all that is
+/// in it.
+class TemporaryFolder {
+ public:
+  /// @throws FileError
+  TemporaryFolder();
+  ~TemporaryFolder();
+  TemporaryFolder(const TemporaryFolder&) = delete;
+  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+
+  const std::string& path() const { return path_; }
+
+ private:
+  std::string path_;
+};
+
+}  // namespace risley::io
