@@ -9,12 +9,28 @@
 #include <system_error>
 
 #include <fmt/format.h>
+#include <sys/statvfs.h>
+#include <unistd.h>
 
 #include "risley/core/error.hpp"
 
 namespace risley::io {
 
 namespace fs = std::filesystem;
+
+namespace {
+
+constexpr const char* kMemory = "/dev/shm";
+/// Others want memory, too, and there may be as many such folders as there are threads.
+constexpr double kPlenty = 50.0;
+
+bool has_room(const char* folder, double bytes) {
+  struct statvfs room {};
+  return ::statvfs(folder, &room) == 0 && ::access(folder, W_OK) == 0 &&
+         static_cast<double>(room.f_bavail) * static_cast<double>(room.f_frsize) > kPlenty * bytes;
+}
+
+}  // namespace
 
 bool make_folder(const std::string& path) {
   std::error_code code;
@@ -27,9 +43,12 @@ bool make_folder(const std::string& path) {
   return made;
 }
 
-TemporaryFolder::TemporaryFolder() {
+TemporaryFolder::TemporaryFolder(double bytes) {
   std::error_code code;
-  const fs::path above = fs::temp_directory_path(code);
+  fs::path above = kMemory;
+  if (std::getenv("TMPDIR") != nullptr || !has_room(kMemory, bytes)) {
+    above = fs::temp_directory_path(code);
+  }
   path_ = (above / "risley-XXXXXX").string();
   if (code || ::mkdtemp(path_.data()) == nullptr) {
     throw FileError(code ? "TMPDIR" : above.string(), {},

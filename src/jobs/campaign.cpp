@@ -94,6 +94,16 @@ std::string without_folder(std::string message, const std::string& folder) {
   return message;
 }
 
+/// Of the recordings of a cell with their truth.
+double bytes_of(const CampaignSetting& setting) {
+  constexpr double kBytesPerShot = 200.0;
+  double bytes = 0;
+  for (const simulation::SimulationSettings& one : setting.simulations) {
+    bytes += kBytesPerShot * one.duration * one.rate.value_or(one.truth.shot_rate);
+  }
+  return bytes;
+}
+
 CampaignChunk range_of(const CampaignPlan& plan, const CampaignPart& part) {
   if (part.count < 1 || part.number < 1 || part.number > part.count) {
     throw InvalidArgument(fmt::format("option chunk = {}/{}, wanted I/N with I from 1 to N",
@@ -125,23 +135,20 @@ bool is_done(const std::string& file, const ChunkHead& head, const Progress& pro
   }
 }
 
-}  // namespace
-
-CellOutcome run_cell(const CampaignPlan& plan, std::uint64_t number, const Progress& progress) {
+/// @param folder  for the recordings
+CellOutcome outcome_in(const std::string& folder, const CampaignSetting& setting,
+                       const CampaignCell& cell, const Progress& progress) {
   CellOutcome outcome;
-  outcome.cell = plan.cell(number);
+  outcome.cell = cell;
   outcome.nees = outcome.nees_rotation_angles = kUnknown;
-  const CampaignSetting& setting = plan.settings[outcome.cell.setting];
-  const io::TemporaryFolder folder;
   std::vector<std::string> recordings, truths;
   for (std::size_t i = 0; i < setting.simulations.size(); ++i) {
     simulation::SimulationSettings settings = setting.simulations[i];
-    settings.seed = outcome.cell.seed;
+    settings.seed = cell.seed;
     // Stations are recorded one after the other, by rotors that meanwhile turned on.
     if (i > 0) settings.seed += i * (std::uint64_t{1} << 32U);
-    recordings.push_back(
-        (fs::path(folder.path()) / fmt::format("{}{}", i + 1, setting.format)).string());
-    simulation::simulate_to_file(settings, recordings.back(), {}, progress.silent());
+    recordings.push_back((fs::path(folder) / fmt::format("{}{}", i + 1, setting.format)).string());
+    simulation::simulate_to_file(settings, recordings.back(), {}, progress);
     truths.push_back(simulation::truth_preset_path(recordings.back()));
   }
   try {
@@ -149,19 +156,33 @@ CellOutcome run_cell(const CampaignPlan& plan, std::uint64_t number, const Progr
       EstimateRecordingOptions job = *estimate;
       job.recording = recordings.front();
       job.truth = truths.front();
-      take(estimate_recording(job, progress.silent()), outcome);
+      take(estimate_recording(job, progress), outcome);
     } else {
       CalibrateRecordingsOptions job = std::get<CalibrateRecordingsOptions>(setting.job);
       job.recordings = recordings;
       job.truths = truths;
-      job.seed = outcome.cell.seed;
-      take(calibrate_recordings(job, progress.silent()), outcome);
+      job.seed = cell.seed;
+      take(calibrate_recordings(job, progress), outcome);
     }
   } catch (const EstimationError& error) {
     outcome.message = error.what();
   }
-  outcome.message = without_folder(std::move(outcome.message), folder.path());
   return outcome;
+}
+
+}  // namespace
+
+CellOutcome run_cell(const CampaignPlan& plan, std::uint64_t number, const Progress& progress) {
+  const CampaignCell cell = plan.cell(number);
+  const CampaignSetting& setting = plan.settings[cell.setting];
+  const io::TemporaryFolder folder(bytes_of(setting));
+  try {
+    CellOutcome outcome = outcome_in(folder.path(), setting, cell, progress.silent());
+    outcome.message = without_folder(std::move(outcome.message), folder.path());
+    return outcome;
+  } catch (const InvalidArgument& error) {
+    throw InvalidArgument(plan.about(setting, without_folder(error.what(), folder.path())));
+  }
 }
 
 CampaignChunk run_chunk(const CampaignPlan& plan, const CampaignPart& part,

@@ -3,11 +3,13 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <limits>
 #include <map>
 #include <system_error>
 #include <utility>
 
 #include <fmt/format.h>
+#include <unsupported/Eigen/SpecialFunctions>
 
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
@@ -26,16 +28,34 @@ constexpr std::size_t kMostRanges = 100;
 constexpr double kTwoSided95 = 1.959963985;
 constexpr double kWithinTwoSigma = 0.954499736;
 
-/// Quantile of chi-square over its degrees of freedom, by Wilson and Hilferty (1931): to 1 % from
-/// three degrees on.
-double chi2_quantile_per_degree(double degrees, double normal_quantile) {
+/// Value that chi-square over its degrees of freedom exceeds with a probability.
+double chi2_per_degree(double degrees, double exceeded) {
+  if (!(degrees > 0)) return std::numeric_limits<double>::quiet_NaN();
+  double low = 0, high = 1;
+  const auto probability = [&](double value) {
+    return Eigen::numext::igammac(0.5 * degrees, 0.5 * degrees * value);
+  };
+  while (probability(high) > exceeded) high *= 2.0;
+  for (int i = 0; i < 60; ++i) {
+    const double middle = 0.5 * (low + high);
+    (probability(middle) > exceeded ? low : high) = middle;
+  }
+  return high;
+}
+
+/// The same where the degrees are many, by Wilson and Hilferty (1931): to 1e-6 from a thousand on,
+/// where the series of the exact one grows long.
+double chi2_per_many_degrees(double degrees, double normal_quantile) {
   const double ninth = 2.0 / (9.0 * degrees);
-  return std::pow(std::max(0.0, 1.0 - ninth + normal_quantile * std::sqrt(ninth)), 3);
+  return std::pow(1.0 - ninth + normal_quantile * std::sqrt(ninth), 3);
 }
 
 BandedFigure mean_square(double value, double degrees) {
-  return {value, chi2_quantile_per_degree(degrees, -kTwoSided95),
-          chi2_quantile_per_degree(degrees, kTwoSided95)};
+  if (degrees > 1000) {
+    return {value, chi2_per_many_degrees(degrees, -kTwoSided95),
+            chi2_per_many_degrees(degrees, kTwoSided95)};
+  }
+  return {value, chi2_per_degree(degrees, 0.975), chi2_per_degree(degrees, 0.025)};
 }
 
 /// Sums over the cells of a setting.
@@ -188,7 +208,8 @@ class CellTable {
       const std::string full = name_with_unit(name);
       const std::string unit = full.ends_with("_per_s") ? "deg/s" : "deg";
       columns.push_back({full + ".rmse", CellKind::real, unit, "root mean square error"});
-      columns.push_back({full + ".sigma", CellKind::real, unit, "what was stated of it"});
+      columns.push_back(
+          {full + ".rmse_stated", CellKind::real, unit, "the same as the estimate states it"});
     }
     return columns;
   }
@@ -261,6 +282,9 @@ std::vector<SoundChunk> find_chunks(const CampaignPlan& plan, const CampaignOpti
   }
   if (code && code != std::errc::no_such_file_or_directory) {
     throw FileError(folder, {}, fmt::format("cannot be read: {}", code.message()));
+  }
+  if (files.empty()) {
+    throw FileError(folder, {}, "no part of a campaign is there, such as chunk-1-of-40.jsonl");
   }
   std::sort(files.begin(), files.end());
   std::vector<SoundChunk> sound;

@@ -232,9 +232,9 @@ class PlanReader {
   }
 
   std::string format_of(const YamlMap& map) const {
-    std::vector<std::string> endings = {".nc"};
+    std::vector<std::string> endings = {".nc"};  // without loss
     for (const recordings::WritableFormat& format : recordings::writable_formats()) {
-      if (format.ending != ".nc") endings.push_back(format.ending);
+      if (format.ending != endings.front()) endings.push_back(format.ending);
     }
     for (std::string& ending : endings) ending.erase(0, 1);
     return "." + choice(map, "format", endings);
@@ -359,6 +359,11 @@ std::string CampaignSetting::words() const {
   return fmt::format("{}", fmt::join(parts, ", "));
 }
 
+std::string CampaignPlan::about(const CampaignSetting& setting, const std::string& message) const {
+  const std::string words = setting.words();
+  return fmt::format("{}: {}{}{}", path, words, words.empty() ? "" : ": ", message);
+}
+
 CampaignCell CampaignPlan::cell(std::uint64_t number) const {
   return {number, static_cast<std::size_t>(number % settings.size()),
           first_seed + number / settings.size()};
@@ -401,9 +406,7 @@ CampaignPlan load_campaign_plan(const std::string& path) {
       setting = reader.setting(node);
     } catch (const InvalidArgument& error) {
       setting.grid = grid;
-      const std::string words = setting.words();
-      throw InvalidArgument(
-          fmt::format("{}: {}{}{}", path, words, words.empty() ? "" : ": ", error.what()));
+      throw InvalidArgument(plan.about(setting, error.what()));
     }
     setting.grid = std::move(grid);
     plan.settings.push_back(std::move(setting));

@@ -10,13 +10,15 @@ namespace risley::io {
 /// @throws FileError
 bool make_folder(const std::string& path);
 
-/// A folder for files that nobody keeps, where the system has such files (TMPDIR, /tmp), under a
-/// name that nobody can foresee and for this user alone. The destructor removes it with all that is
-/// in it.
+/// A folder for files that nobody keeps, under a name that nobody can foresee and for this user
+/// alone: in TMPDIR where that is set, otherwise in memory (/dev/shm) where there is plenty of
+/// room, otherwise where the system has such files (/tmp). The destructor removes it with all that
+/// is in it.
 class TemporaryFolder {
  public:
+  /// @param bytes  that its files may have at the same time, roughly
   /// @throws FileError
-  TemporaryFolder();
+  explicit TemporaryFolder(double bytes);
   ~TemporaryFolder();
   TemporaryFolder(const TemporaryFolder&) = delete;
   TemporaryFolder& operator=(const TemporaryFolder&) = delete;

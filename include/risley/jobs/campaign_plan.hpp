@@ -47,6 +47,8 @@ struct CampaignPlan {
   std::string work;
 
   std::uint64_t cells() const { return settings.size() * seeds; }
+  /// A message with the plan and a setting before it.
+  std::string about(const CampaignSetting& setting, const std::string& message) const;
   /// Cells go through all settings of one seed, then to the next seed, so that any part of them has
   /// its share of every setting.
   CampaignCell cell(std::uint64_t number) const;
