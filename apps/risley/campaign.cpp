@@ -104,10 +104,8 @@ std::optional<FileError> damage_of(const jobs::CampaignResult& merged, const std
                                merged.cells - merged.done, merged.cells, ranges));
 }
 
-ExitStatus run_merge(const jobs::CampaignPlan& plan, const CampaignCommandOptions& options,
-                     const jobs::CampaignOptions& job, const CommonOptions& common,
-                     const Progress& progress) {
-  const jobs::CampaignResult merged = jobs::merge_chunks(plan, options.table, job, progress);
+ExitStatus tell_merged(const jobs::CampaignResult& merged, const CampaignCommandOptions& options,
+                       const CommonOptions& common) {
   const std::optional<FileError> damage = damage_of(merged, options.folder);
   Json json = json::of(merged);
   if (damage) json["error"] = damage->what();
@@ -156,17 +154,13 @@ ExitStatus run_campaign(CampaignCommandOptions options, const CommonOptions& typ
     }
     return kDone;
   }
-  ProgressBar bar("computing cells", common);
-  if (!options.merge) {
-    const std::uint64_t parts = jobs::usual_parts(plan);
-    for (std::uint64_t i = 1; i <= parts; ++i) {
-      const auto share = [&](std::uint64_t done) {
-        return static_cast<double>(done) / static_cast<double>(parts);
-      };
-      jobs::run_chunk(plan, {i, parts}, job, bar.progress().part(share(i - 1), share(i)));
-    }
+  jobs::CampaignResult merged;
+  {
+    ProgressBar bar(options.merge ? "merging" : "computing cells", common);
+    merged = options.merge ? jobs::merge_chunks(plan, options.table, job, bar.progress())
+                           : jobs::run_campaign(plan, options.table, job, bar.progress());
   }
-  return run_merge(plan, options, job, common, bar.progress().silent());
+  return tell_merged(merged, options, common);
 }
 
 }  // namespace

@@ -213,8 +213,16 @@ CampaignChunk run_chunk(const CampaignPlan& plan, const CampaignPart& part,
   return chunk;
 }
 
-std::uint64_t usual_parts(const CampaignPlan& plan) {
-  return (plan.cells() + kUsualCells - 1) / kUsualCells;
+CampaignResult run_campaign(const CampaignPlan& plan, const std::string& table,
+                            const CampaignOptions& options, const Progress& progress) {
+  const std::uint64_t parts = (plan.cells() + kUsualCells - 1) / kUsualCells;
+  const auto share = [&](std::uint64_t done) {
+    return static_cast<double>(done) / static_cast<double>(parts);
+  };
+  for (std::uint64_t i = 1; i <= parts; ++i) {
+    run_chunk(plan, {i, parts}, options, progress.part(share(i - 1), share(i)));
+  }
+  return merge_chunks(plan, table, options, progress.silent());
 }
 
 }  // namespace risley::jobs

@@ -81,9 +81,6 @@ struct CampaignChunk {
 CampaignChunk run_chunk(const CampaignPlan& plan, const CampaignPart& part,
                         const CampaignOptions& options, const Progress& progress = {});
 
-/// The parts in which a campaign is computed where nobody asks for others: about 100 cells each.
-std::uint64_t usual_parts(const CampaignPlan& plan);
-
 /// A figure over the cells of a setting, and the band in which 95 of 100 campaigns find it where
 /// covariances are true.
 struct BandedFigure {
@@ -140,8 +137,14 @@ struct CampaignResult {
 /// plan or by another program does not count, and a warning says so. Memory does not grow with the
 /// number of cells.
 /// @param table  its ending chooses the format, see io::TableFile
-/// @throws InvalidArgument for another ending; FileError, Cancelled
+/// @throws InvalidArgument for another ending; FileError, also where there is no part; Cancelled
 CampaignResult merge_chunks(const CampaignPlan& plan, const std::string& table,
+                            const CampaignOptions& options, const Progress& progress = {});
+
+/// A whole campaign on one machine: part after part, about 100 cells each, then all of them merged.
+/// When it is stopped, the parts that are whole stay, and the next run goes on behind them.
+/// @throws as run_chunk(), merge_chunks()
+CampaignResult run_campaign(const CampaignPlan& plan, const std::string& table,
                             const CampaignOptions& options, const Progress& progress = {});
 
 }  // namespace risley::jobs
