@@ -1,0 +1,70 @@
+#!/usr/bin/env python3
+# SPDX-FileCopyrightText: 2026 The risley authors
+# SPDX-License-Identifier: MIT
+"""A campaign of 2000 cells while the command, nodes, controller and scheduler are killed: the same command again
+makes the same bytes as one process that nobody disturbs."""
+import os
+import subprocess
+import time
+import unittest
+
+from engines import CLUSTER, COMMAND, CampaignTest, chunk_processes, kill, needs, wait_until
+
+CHUNKS = 20
+
+
+class KilledTest(CampaignTest):
+    seeds = 1000
+
+    @needs("snakemake", "slurmctld", "slurmd", "munged", "sbatch", root=True)
+    def test_snakemake_and_slurm(self):
+        cluster, output = self.folder / "cluster", self.folder / "slurm"
+        self.addCleanup(self.run_words, [CLUSTER, "stop", cluster])
+        self.expect(0, [CLUSTER, "start", cluster, 3])
+        environment = dict(os.environ, SLURM_CONF=str(cluster / "etc/slurm.conf"))
+        command = self.snakemake("slurm", output, CHUNKS)
+
+        engine = self.start(command, "first.log", env=environment)
+        self.addCleanup(engine.kill)
+        wait_until(lambda: len(self.chunks(output)) >= 3, "three chunks")
+        kept = self.chunks(output)
+        self.assertTrue(kill(wait_until(lambda: chunk_processes(output), "a chunk that is computed")[0]))
+        for name in ("node2", "slurmctld"):
+            self.assertTrue(kill(int((cluster / "run" / name).read_text())), name)
+        time.sleep(2)  # Snakemake asks for its jobs, and nobody answers
+        self.expect(0, [CLUSTER, "start", cluster])
+        wait_until(lambda: len(self.chunks(output)) >= 8 and chunk_processes(output), "eight chunks")
+        kept |= self.chunks(output)
+        self.assertLess(len(kept), CHUNKS)
+        engine.kill()
+        engine.wait()
+
+        self.expect(0, command, env=environment)
+        self.expect_reference(output)
+        self.expect_kept(kept, output)
+
+    @needs("parallel")
+    def test_parallel(self):
+        output = self.folder / "parallel"
+        command = ["sh", "-c", f"seq {CHUNKS} | exec parallel --jobs 2 --joblog {self.folder}/joblog --resume-failed "
+                   f"{COMMAND} campaign {self.plan} --chunk {{}}/{CHUNKS} --threads 1 -o {output}"]
+        # The command is killed; GNU Parallel goes on and counts it.
+        engine = self.start(command, "first.log")
+        self.addCleanup(engine.kill)
+        wait_until(lambda: len(self.chunks(output)) >= 3, "three chunks")
+        self.assertTrue(kill(wait_until(lambda: chunk_processes(output), "a chunk that is computed")[0]))
+        self.assertEqual(engine.wait(), 1)
+        kept = self.chunks(output)
+        self.assertEqual(len(kept), CHUNKS - 1)
+        missing = subprocess.run([COMMAND, "campaign", self.plan, "--merge", "-o", output], capture_output=True,
+                                 text=True, check=False)
+        self.assertEqual(missing.returncode, 3, missing.stderr)
+
+        self.expect(0, command)
+        self.expect(0, [COMMAND, "campaign", self.plan, "--merge", "-o", output])
+        self.expect_reference(output)
+        self.expect_kept(kept, output)
+
+
+if __name__ == "__main__":
+    unittest.main(verbosity=2)
