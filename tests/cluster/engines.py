@@ -59,13 +59,25 @@ def chunk_processes(output):
     return found
 
 
-def kill(process):
-    """As a lack of memory does."""
-    try:
-        os.kill(process, signal.SIGKILL)
-    except ProcessLookupError:
+def kill_chunk(output, session=None):
+    """As a lack of memory does: kills a process that computes a chunk, of a session if that is said, before the chunk
+    is whole."""
+    def kill_one():
+        for process in chunk_processes(output):
+            try:
+                if session not in (None, os.getsid(process)):
+                    continue
+                words = pathlib.Path(f"/proc/{process}/cmdline").read_text(encoding="utf-8").split("\0")
+                os.kill(process, signal.SIGSTOP)
+                chunk = words[words.index("--chunk") + 1].replace("/", "-of-")
+                whole = (pathlib.Path(output) / f"chunks/chunk-{chunk}.jsonl").exists()
+                os.kill(process, signal.SIGCONT if whole else signal.SIGKILL)
+                if not whole:
+                    return True
+            except (ProcessLookupError, FileNotFoundError, ValueError):
+                continue  # it has ended
         return False
-    return True
+    wait_until(kill_one, "a chunk that is computed")
 
 
 class CampaignTest(unittest.TestCase):

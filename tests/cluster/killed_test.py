@@ -4,11 +4,12 @@
 """A campaign while the command, a node, the controller and the scheduler are killed: the same command again makes the
 same bytes as one process that nobody disturbs. RISLEY_CAMPAIGN_CELLS=2000 is what scripts/nightly takes."""
 import os
+import signal
 import subprocess
 import time
 import unittest
 
-from engines import CLUSTER, COMMAND, CampaignTest, chunk_processes, kill, needs, wait_until
+from engines import CLUSTER, COMMAND, CampaignTest, chunk_processes, kill_chunk, needs, wait_until
 
 CHUNKS = 12
 
@@ -28,9 +29,9 @@ class KilledTest(CampaignTest):
         self.addCleanup(engine.kill)
         wait_until(lambda: len(self.chunks(output)) >= 2, "two chunks")
         kept = self.chunks(output)
-        self.assertTrue(kill(wait_until(lambda: chunk_processes(output), "a chunk that is computed")[0]))
+        kill_chunk(output)
         for name in ("node2", "slurmctld"):
-            self.assertTrue(kill(int((cluster / "run" / name).read_text())), name)
+            os.kill(int((cluster / "run" / name).read_text(encoding="utf-8")), signal.SIGKILL)
         time.sleep(2)  # Snakemake asks for its jobs, and nobody answers
         self.expect(0, [CLUSTER, "start", cluster])
         wait_until(lambda: len(self.chunks(output)) >= 5 and chunk_processes(output), "five chunks")
@@ -46,16 +47,23 @@ class KilledTest(CampaignTest):
     @needs("parallel")
     def test_parallel(self):
         output = self.folder / "parallel"
-        command = ["sh", "-c", f"seq {CHUNKS} | exec parallel --jobs 2 --joblog {self.folder}/joblog --resume-failed "
-                   f"{COMMAND} campaign {self.plan} --chunk {{}}/{CHUNKS} --threads 1 -o {output}"]
-        # The command is killed; GNU Parallel goes on and counts it.
+        command = ["parallel", "--jobs", 2, "--joblog", self.folder / "joblog", "--resume-failed", COMMAND, "campaign",
+                   self.plan, "--chunk", f"{{}}/{CHUNKS}", "--threads", 1, "-o", output, ":::", *range(1, CHUNKS + 1)]
+        # GNU Parallel itself is killed; the chunks that it had begun go on, beside those of its next run.
         engine = self.start(command, "first.log")
         self.addCleanup(engine.kill)
-        wait_until(lambda: len(self.chunks(output)) >= 2, "two chunks")
-        self.assertTrue(kill(wait_until(lambda: chunk_processes(output), "a chunk that is computed")[0]))
-        self.assertEqual(engine.wait(), 1)
+        wait_until(lambda: len(self.chunks(output)) >= 2 and chunk_processes(output), "two chunks")
         kept = self.chunks(output)
-        self.assertEqual(len(kept), CHUNKS - 1)
+        engine.kill()
+        engine.wait()
+        # The command is killed; GNU Parallel goes on and counts it.
+        engine = self.start(command, "second.log")
+        self.addCleanup(engine.kill)
+        wait_until(lambda: len(self.chunks(output)) >= 5, "five chunks")
+        kept |= self.chunks(output)
+        kill_chunk(output, session=engine.pid)
+        self.assertEqual(engine.wait(), 1)
+        self.assertEqual(len(self.chunks(output)), CHUNKS - 1)
         missing = subprocess.run([COMMAND, "campaign", self.plan, "--merge", "-o", output], capture_output=True,
                                  text=True, check=False)
         self.assertEqual(missing.returncode, 3, missing.stderr)
