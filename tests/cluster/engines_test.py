@@ -6,7 +6,7 @@ import importlib.util
 import os
 import unittest
 
-from engines import CLUSTER, COMMAND, WORKFLOW, CampaignTest, needs
+from engines import CLUSTER, COMMAND, WORKFLOW, CampaignTest, main, needs
 
 
 class SlurmStatusTest(unittest.TestCase):
@@ -58,6 +58,20 @@ class EnginesTest(CampaignTest):
         self.expect_kept(kept, output)
 
     @needs("snakemake")
+    def test_a_whole_chunk_outlives_a_job_that_is_called_failed(self):
+        output, seen, command = self.folder / "failed", self.folder / "seen", self.folder / "fails-once"
+        command.write_text(f'#!/bin/sh\n{COMMAND} "$@" && {{ [ -e {seen} ] || {{ : > {seen}; exit 1; }}; }}\n',
+                           encoding="utf-8")
+        command.chmod(0o755)
+        words = self.snakemake("local", output, 1, command)
+        self.expect(1, [*words, "--restart-times", 0])
+        kept = self.chunks(output)
+        self.assertEqual(list(kept), ["chunk-1-of-1.jsonl"])
+        self.expect(0, words)
+        self.expect_reference(output)
+        self.expect_kept(kept, output)
+
+    @needs("snakemake")
     def test_settings_that_are_missing_or_wrong_are_named(self):
         for words, message in ((["plan=plan.yaml", "output=out"], "chunks is missing"),
                                (["plan=plan.yaml", "output=out", "chunks=0"], "chunks = 0, wanted"),
@@ -91,4 +105,4 @@ class EnginesTest(CampaignTest):
 
 
 if __name__ == "__main__":
-    unittest.main(verbosity=2)
+    main()

@@ -7,9 +7,8 @@ import os
 import signal
 import subprocess
 import time
-import unittest
 
-from engines import CLUSTER, COMMAND, CampaignTest, chunk_processes, kill_chunk, needs, wait_until
+from engines import CLUSTER, COMMAND, CampaignTest, chunk_processes, kill_chunk, main, needs, wait_until
 
 CHUNKS = 12
 
@@ -75,4 +74,4 @@ class KilledTest(CampaignTest):
 
 
 if __name__ == "__main__":
-    unittest.main(verbosity=2)
+    main()
