@@ -21,13 +21,13 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include "risley/cloud/rotor_tracking.hpp"
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
 #include "risley/core/text.hpp"
+#include "risley/io/file_identity.hpp"
 #include "risley/io/sha256.hpp"
 #include "risley/jobs/result_files.hpp"
 #include "risley/recordings/reader.hpp"
@@ -280,15 +280,11 @@ void require_apart(const CommonOptions& common, const std::vector<std::string>& 
     if (!inputs[i].ends_with(".truth.yaml")) continue;
     inputs.push_back(fs::path(inputs[i]).replace_extension(".nc").string());  // read with it
   }
-  // Who a file is: by its name, and where it exists by what the disk has under whatever name.
-  using Identity = std::pair<dev_t, ino_t>;
   const auto identity_of = [](const std::string& path) {
-    struct stat status {};
-    return ::stat(path.c_str(), &status) == 0 && S_ISREG(status.st_mode)
-               ? std::optional(Identity{status.st_dev, status.st_ino})
-               : std::nullopt;
+    std::error_code ignored;
+    return fs::is_regular_file(path, ignored) ? io::file_identity(path) : std::nullopt;
   };
-  std::map<Identity, std::string> read, written;
+  std::map<io::FileIdentity, std::string> read, written;
   std::set<std::string> names;
   for (const std::string& input : inputs) {
     if (const auto identity = identity_of(input)) read.try_emplace(*identity, input);

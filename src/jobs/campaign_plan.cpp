@@ -34,7 +34,7 @@ using io::fail_at;
 using io::YamlMap;
 using io::YamlNode;
 
-constexpr std::uint64_t kMostSettings = 10'000;
+constexpr std::uint64_t kMostSettings = 1000;
 constexpr int kMostSeeds = 100'000'000;
 constexpr long double kMostDuration = 86'400, kMostRate = 1e7L;  // s, Hz
 constexpr long double kMostAngle_deg = 10, kMostDistance = 100;  // deg, m
@@ -107,8 +107,10 @@ class PlanReader {
       SimulationOptions one = simulation;
       one.station = station;
       result.simulations.push_back(simulation_settings(one));
-      // Whatever a simulation refuses, it refuses now.
-      const simulation::Scanner can_be_simulated(result.simulations.back());
+      // Whatever a simulation refuses, it refuses now. A short one: rotors take time to turn.
+      simulation::SimulationSettings begin = result.simulations.back();
+      begin.duration = std::min(begin.duration, 1.0);
+      const simulation::Scanner can_be_simulated(std::move(begin));
     }
     if (map.find("estimate") != nullptr) {
       if (stations.size() > 1) {
@@ -370,7 +372,11 @@ CampaignCell CampaignPlan::cell(std::uint64_t number) const {
 }
 
 CampaignPlan load_campaign_plan(const std::string& path) {
-  const YamlNode root = io::parse_yaml(io::read_text_file(path), path);
+  return parse_campaign_plan(io::read_text_file(path), path);
+}
+
+CampaignPlan parse_campaign_plan(const std::string& text, const std::string& path) {
+  const YamlNode root = io::parse_yaml(text, path);
   const YamlMap map(root, path, "");
   map.allow_only({"simulate", "estimate", "calibrate", "grid", "seeds"});
   map.at("simulate");

@@ -13,10 +13,10 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <fnmatch.h>
-#include <sys/stat.h>
 
 #include "risley/core/error.hpp"
 #include "risley/core/text.hpp"
+#include "risley/io/file_identity.hpp"
 #include "risley/io/sha256.hpp"
 #include "risley/io/text_table.hpp"
 #include "risley/recordings/reader.hpp"
@@ -56,15 +56,6 @@ bool looks_like_recording(const fs::path& path) {
                      [&name](const std::string& ending) { return name.ends_with(ending); });
 }
 
-/// Who a file is, by whatever name.
-using Identity = std::pair<dev_t, ino_t>;
-
-std::optional<Identity> identity_of(const std::string& path) {
-  struct stat status {};
-  if (::stat(path.c_str(), &status) != 0) return std::nullopt;
-  return Identity{status.st_dev, status.st_ino};
-}
-
 /// Absolute, without "..", links as they are, and without a slash at its end; the current folder
 /// for an empty name.
 fs::path whole_path(const fs::path& path) {
@@ -77,7 +68,7 @@ class Finder {
  public:
   Finder(const std::vector<std::string>& excluded, const Progress& progress) : progress_(progress) {
     for (const std::string& path : excluded) {
-      if (const auto identity = identity_of(path)) excluded_.insert(*identity);
+      if (const auto identity = io::file_identity(path)) excluded_.insert(*identity);
     }
   }
 
@@ -152,8 +143,9 @@ class Finder {
 
   void take(const std::string& path, bool once) {
     // Files that are missing have nothing but their names.
-    const std::pair<std::optional<Identity>, std::string> who = {
-        identity_of(path), identity_of(path) ? std::string() : whole_path(path).string()};
+    const std::pair<std::optional<io::FileIdentity>, std::string> who = {
+        io::file_identity(path),
+        io::file_identity(path) ? std::string() : whole_path(path).string()};
     if (once && !named_.insert(who).second) {
       throw InvalidArgument(fmt::format("{} is named twice: once is enough", path));
     }
@@ -162,7 +154,7 @@ class Finder {
 
   bool is_excluded(const fs::path& path) const {
     if (excluded_.empty()) return false;
-    const auto identity = identity_of(path.string());
+    const auto identity = io::file_identity(path.string());
     return identity && excluded_.contains(*identity);
   }
 
@@ -246,8 +238,8 @@ class Finder {
   }
 
   const Progress& progress_;
-  std::set<Identity> excluded_;
-  std::set<std::pair<std::optional<Identity>, std::string>> taken_, named_;
+  std::set<io::FileIdentity> excluded_;
+  std::set<std::pair<std::optional<io::FileIdentity>, std::string>> taken_, named_;
   std::vector<fs::path> roots_;     ///< the deepest folders that names stand in for sure
   std::vector<std::string> found_;  ///< of the name that is being added
   std::vector<Input> inputs_;

@@ -1,9 +1,10 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-// Presets, scenes, reports.
+// Presets, scenes, reports, plans of campaigns.
 #include <string>
 
 #include "risley/core/error.hpp"
+#include "risley/jobs/campaign_plan.hpp"
 #include "risley/report/report_file.hpp"
 #include "risley/scenes/scene.hpp"
 #include "risley/sensors/preset.hpp"
@@ -51,6 +52,23 @@ void run_scene(std::span<const std::uint8_t> bytes) {
   }
 }
 
+/// A plan that is accepted has settings and seeds, and its cells name them.
+void run_campaign_plan(std::span<const std::uint8_t> bytes) {
+  jobs::CampaignPlan plan;
+  try {
+    plan = jobs::parse_campaign_plan(text_of(bytes), "fuzz.yaml");
+  } catch (const Error&) {  // refused
+    return;
+  }
+  require(!plan.settings.empty() && plan.seeds > 0, "a plan has cells");
+  const jobs::CampaignCell last = plan.cell(plan.cells() - 1);
+  require(last.setting + 1 == plan.settings.size() && last.seed + 1 == plan.first_seed + plan.seeds,
+          "the last cell is of the last setting and seed");
+  for (const jobs::CampaignSetting& setting : plan.settings) {
+    require(!setting.simulations.empty(), "a setting is simulated");
+  }
+}
+
 /// A report that is accepted is drawn without a fault.
 void run_report(std::span<const std::uint8_t> bytes) {
   const MemoryFile file(bytes);
@@ -64,7 +82,10 @@ void run_report(std::span<const std::uint8_t> bytes) {
 }  // namespace
 
 std::vector<Target> text_targets() {
-  return {{"preset", run_preset}, {"scene", run_scene}, {"report", run_report}};
+  return {{"preset", run_preset},
+          {"scene", run_scene},
+          {"report", run_report},
+          {"campaign", run_campaign_plan}};
 }
 
 }  // namespace risley::fuzz

@@ -60,6 +60,10 @@ struct CampaignPlan {
 /// Files that it names stand beside it.
 /// @throws FileError with the line for what is not such a plan, and for files that it names;
 ///         InvalidArgument naming the setting for values that a simulation or an estimate refuses
+/// @param path  for messages, and to find the files
+CampaignPlan parse_campaign_plan(const std::string& text, const std::string& path);
+
+/// parse_campaign_plan() of a file. @throws FileError
 CampaignPlan load_campaign_plan(const std::string& path);
 
 }  // namespace risley::jobs
