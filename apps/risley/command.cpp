@@ -198,7 +198,7 @@ void note_files(const CLI::App& verb, CommonOptions& common) {
     for (const std::string& value : option->results()) {
       std::error_code ignored;
       const std::string name = option->get_name();
-      if (name == "INPUT" || name == "FILE") {
+      if (name == "INPUT" || name == "FILE" || name == "PLAN") {
         add_files(value, common.inputs);
       } else if (name == "RESULT") {
         const std::string file = jobs::calibration_in(value).value_or(value);

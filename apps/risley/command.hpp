@@ -77,6 +77,7 @@ Run declare_observability(CLI::App& verb);
 Run declare_calibrate(CLI::App& verb);
 Run declare_cloud(CLI::App& verb);
 Run declare_compare(CLI::App& verb);
+Run declare_campaign(CLI::App& verb);
 Run declare_identify(CLI::App& verb);
 Run declare_pattern(CLI::App& verb);
 Run declare_preset(CLI::App& verb);

@@ -64,6 +64,11 @@ constexpr Verb kVerbs[] = {
      "  risley compare march/ june/ november/\n"
      "  risley compare march/calibration.yaml november/calibration.yaml -o changes.html",
      declare_compare},
+    {"campaign", "Simulate and estimate, or calibrate, many times over, as a plan says",
+     "  risley campaign plan.yaml -o campaign/\n"
+     "  risley campaign plan.yaml --chunk 3/40 -o campaign/\n"
+     "  risley campaign plan.yaml --merge -o campaign/",
+     declare_campaign},
     {"identify", "Identify the prisms that made a scan, from its directions alone",
      "  risley identify sequence.csv -o mine.yaml\n"
      "  risley identify frame.pcd --shot-rate-hz 240385 --json",

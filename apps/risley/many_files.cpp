@@ -22,6 +22,7 @@
 #include <unistd.h>
 
 #include "risley/core/error.hpp"
+#include "risley/io/folder.hpp"
 #include "risley/io/output_file.hpp"
 #include "risley/io/sha256.hpp"
 #include "risley/io/table_file.hpp"
@@ -377,7 +378,7 @@ class Runner {
   void make_folder_of(const FileJob& job) const {
     if (work_.into_folders || job.output.empty()) return;
     const fs::path folder = fs::path(job.output).parent_path();
-    if (!folder.empty()) make_result_folder(folder.string());
+    if (!folder.empty()) io::make_folder(folder.string());
   }
 
   void write_table() const {
@@ -551,7 +552,7 @@ FileJobs file_jobs(const ManyWishes& wishes, const std::string& output, bool int
                                  : output;
     result.jobs.push_back({input.path, made, input.place});
   }
-  if (into_folder && !output.empty() && !ending.empty()) make_result_folder(output);
+  if (into_folder && !output.empty() && !ending.empty()) io::make_folder(output);
   return result;
 }
 

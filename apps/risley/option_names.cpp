@@ -17,6 +17,7 @@ constexpr OptionName kNames[] = {
     {"additional", "--free"},
     {"angle_noise", "--noise-angle-deg"},
     {"cell_size", "--cell-size-m"},
+    {"chunk", "--chunk"},
     {"clock_drift", "--clock-drift-ppm"},
     {"common_factors", "--common-factors"},
     {"covariance", "--covariance"},

@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include "risley/io/folder.hpp"
 #include "risley/io/output_file.hpp"
 #include "risley/io/text_file.hpp"
 #include "risley/jobs/recording_input.hpp"
@@ -121,7 +122,7 @@ ExitStatus run_reproduce(const ReproduceCommandOptions& options, const CommonOpt
     return (std::filesystem::path(options.folder) / name).string();
   };
   require_apart(common, {path("report.html"), path("reproduction.json")});
-  make_result_folder(options.folder);
+  io::make_folder(options.folder);
   reproduction::ReproduceOptions settings;
   settings.seed = common.seed;
   if (options.full) settings.effort = reproduction::kFullEffort;

@@ -28,16 +28,6 @@ jobs::ResultFiles result_files(const std::string& folder, const std::string& sta
   return files;
 }
 
-void make_result_folder(const std::string& folder) {
-  std::error_code code;
-  std::filesystem::create_directories(folder, code);
-  if (code || !std::filesystem::is_directory(folder)) {
-    throw FileError(folder, {},
-                    fmt::format("the folder cannot be created: {}",
-                                code ? code.message() : "a file has this name"));
-  }
-}
-
 void require_folder_apart(const CommonOptions& common, const std::string& folder,
                           std::vector<std::string> states) {
   if (folder.empty()) return;

@@ -20,9 +20,6 @@ jobs::Provenance provenance_of(const CommonOptions& common);
 jobs::ResultFiles result_files(const std::string& folder, const std::string& states,
                                const CommonOptions& common);
 
-/// Makes a folder for results, before an hour of computing. @throws FileError
-void make_result_folder(const std::string& folder);
-
 /// As require_apart(), for a verb that writes a folder for results.
 /// @param states  names of files of rotor states
 void require_folder_apart(const CommonOptions& common, const std::string& folder,

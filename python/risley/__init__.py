@@ -8,8 +8,8 @@ released. Wrong arguments raise `ValueError`, files that cannot be read or writt
 `OSError`), and data from which nothing can be estimated `EstimationError`. Ctrl-C stops what is
 running.
 """
-from risley._jobs import (calibrate, cloud, compare, coverage, estimate, identify, info,
-                          observability, pattern, plan, simulate)
+from risley._jobs import (calibrate, campaign, cloud, compare, coverage, estimate, identify,
+                          info, observability, pattern, plan, simulate)
 from risley._optics import (Directions, Inverse, Linearisation, Rays, invert, linearise, observe,
                             rays)
 from risley._recordings import from_arrays, read, read_chunks, write
@@ -25,7 +25,7 @@ __all__ = [
     "EstimationError", "FileError", "FlightCalibration", "Identification", "Inverse",
     "Linearisation", "MissingFileError", "Pattern", "Plan", "PrismTrain", "Rays", "Recording",
     "RecordingHeader", "Sensor", "Simulation", "Solution", "Verdict", "__version__", "calibrate",
-    "cloud", "compare", "coverage", "estimate", "from_arrays", "identify", "info", "invert",
+    "campaign", "cloud", "compare", "coverage", "estimate", "from_arrays", "identify", "info", "invert",
     "linearise", "load_sensor", "observability", "observe", "pattern", "plan", "presets", "rays", "read",
     "read_chunks", "simulate", "write",
 ]

@@ -607,6 +607,50 @@ def compare(results: Sequence[Path], *, false_alarm: float = 0.01,
         return dict(_risley.compare(_paths(results), false_alarm, tell))
 
 
+def campaign(plan: Path, output: Path, *, chunk: Optional[Tuple[int, int]] = None,
+             merge: bool = False, table: Path = "", threads: int = 0,
+             progress: Progress = None) -> Dict[str, Any]:
+    """Simulate and estimate, or calibrate, many times over, as a plan says.
+
+    Parameters
+    ----------
+    plan : str or path
+        Plan (YAML): what to simulate, what to do with it, a grid of settings, and how many seeds.
+    output : str or path
+        Folder for the results: ``chunks/`` and ``cells.csv``.
+    chunk : (int, int), optional
+        Number of the part to compute, from 1, and of how many. A part that is there and whole is
+        not computed again. By default all parts are computed and merged.
+    merge : bool, default False
+        Make the table of the parts that are there.
+    table : str or path, optional
+        Table to write with one row per cell, by default ``cells.csv`` in the folder. The ending
+        chooses the format.
+    threads, progress
+        As in `risley.estimate`.
+
+    Returns
+    -------
+    dict
+        As ``risley campaign --json``. ``missing`` holds the cells without a result.
+
+    Raises
+    ------
+    FileError, ValueError
+        For a plan that is none or asks for what cannot be simulated; with `merge` also where there
+        is no part.
+    """
+    if chunk is not None and merge:
+        raise ValueError("chunk and merge cannot be combined: merge when all parts are done")
+    options: Dict[str, Any] = {
+        "plan": os.fspath(plan), "output": os.fspath(output), "merge": merge,
+        "table": os.fspath(table) or os.path.join(os.fspath(output), "cells.csv")}
+    if chunk is not None:
+        options["chunk"], options["chunks"] = chunk
+    with telling(progress) as tell:
+        return dict(_risley.campaign(options, threads, tell))
+
+
 def info(file: Path, *, accuracy: Path = "", trajectory_topic: str = "",
          shot_rate: Optional[float] = None, extrinsics: YawPitchRoll = None,
          extrinsics_deg: YawPitchRoll = None, progress: Progress = None) -> Dict[str, Any]:

@@ -180,7 +180,7 @@ Eigen::MatrixXd BeamBundle::covariance_of_all(const Eigen::MatrixXd& covariance,
   require_length("columns of the covariance", static_cast<std::size_t>(covariance.cols()), free);
   Eigen::MatrixXd all = Eigen::MatrixXd::Zero(free_ + held_, free_ + held_);
   all.topLeftCorner(free_, free_) = covariance;
-  if (held == HeldErrors::included) all.diagonal().tail(held_).setOnes();
+  if (held == HeldErrors::included) all.bottomRightCorner(held_, held_).setIdentity();
   return all;
 }
 

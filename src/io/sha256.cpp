@@ -19,6 +19,12 @@ void require_done(bool done) {
   if (!done) throw Error("SHA-256 is not available in the cryptographic library (OpenSSL)");
 }
 
+std::string hexadecimal(const unsigned char* digest, unsigned int length) {
+  std::string text;
+  for (unsigned int i = 0; i < length; ++i) text += fmt::format("{:02x}", digest[i]);
+  return text;
+}
+
 }  // namespace
 
 std::string sha256_of_file(const std::string& path, const Progress& progress) {
@@ -32,9 +38,14 @@ std::string sha256_of_file(const std::string& path, const Progress& progress) {
   unsigned char digest[EVP_MAX_MD_SIZE];
   unsigned int length = 0;
   require_done(EVP_DigestFinal_ex(context.get(), digest, &length) == 1);
-  std::string text;
-  for (unsigned int i = 0; i < length; ++i) text += fmt::format("{:02x}", digest[i]);
-  return text;
+  return hexadecimal(digest, length);
+}
+
+std::string sha256(std::string_view text) {
+  unsigned char digest[EVP_MAX_MD_SIZE];
+  unsigned int length = 0;
+  require_done(EVP_Digest(text.data(), text.size(), digest, &length, EVP_sha256(), nullptr) == 1);
+  return hexadecimal(digest, length);
 }
 
 std::string sha256_base64(std::string_view text) {

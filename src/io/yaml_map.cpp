@@ -234,6 +234,15 @@ int YamlMap::integer(std::string_view key, int lower, int upper) const {
   return static_cast<int>(value);
 }
 
+bool YamlMap::yes(std::string_view key, bool absent) const {
+  if (find(key) == nullptr) return absent;
+  const std::string value = text(key);
+  if (value != "yes" && value != "no") {
+    fail_at(path_, at(key).line, fmt::format("{} = \"{}\", allowed yes and no", field(key), value));
+  }
+  return value == "yes";
+}
+
 std::string YamlMap::field(std::string_view key) const {
   return field_.empty() ? std::string(key) : fmt::format("{}.{}", field_, key);
 }

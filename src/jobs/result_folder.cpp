@@ -13,6 +13,7 @@
 #include <fmt/format.h>
 
 #include "risley/core/error.hpp"
+#include "risley/io/folder.hpp"
 #include "risley/io/text_file.hpp"
 #include "risley/jobs/states_file.hpp"
 #include "risley/sensors/preset.hpp"
@@ -47,13 +48,7 @@ std::string set_aside(const fs::path& file) {
 
 ResultFolder::ResultFolder(const std::string& folder) : folder_(folder) {
   if (folder_.empty()) return;
-  std::error_code code;
-  made_ = fs::create_directories(folder_, code);
-  if (code || !fs::is_directory(folder_)) {
-    throw FileError(folder_, {},
-                    fmt::format("the folder cannot be created: {}",
-                                code ? code.message() : "a file has this name"));
-  }
+  made_ = io::make_folder(folder_);
 }
 
 ResultFolder::~ResultFolder() {

@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "risley/core/error.hpp"
+#include "risley/io/folder.hpp"
 #include "risley/io/sha256.hpp"
 #include "risley/io/text_file.hpp"
 
@@ -25,13 +26,8 @@ constexpr int kRecordVersion = 1;
 }  // namespace
 
 void save_record(const std::string& path, const ResultRecord& record) {
-  std::error_code code;
   const fs::path folder = fs::path(path).parent_path();
-  if (!folder.empty()) fs::create_directories(folder, code);
-  if (code) {
-    throw FileError(folder.string(), {},
-                    fmt::format("cannot be made a folder: {}", code.message()));
-  }
+  if (!folder.empty()) io::make_folder(folder.string());
   RecordJson outputs = RecordJson::array();
   for (const auto& [file, hash] : record.outputs) {
     outputs.push_back({{"path", file}, {"sha256", hash}});

@@ -16,6 +16,7 @@
 #include "risley/core/require.hpp"
 #include "risley/io/text_file.hpp"
 #include "risley/jobs/cloud_of_recording.hpp"
+#include "risley/jobs/campaign.hpp"
 #include "risley/jobs/compare_series.hpp"
 #include "risley/jobs/identify_recording.hpp"
 #include "risley/jobs/inspect_recording.hpp"
@@ -415,6 +416,30 @@ py::object compare(const std::vector<std::string>& results, double false_alarm,
   });
 }
 
+py::object campaign(const py::dict& values, int threads, const py::object& tell) {
+  const Options options(values);
+  std::string path, table;
+  options.take("plan", path);
+  options.take("table", table);
+  jobs::CampaignOptions job{"", "risley " RISLEY_VERSION};
+  options.take("output", job.folder);
+  bool merge = false;
+  options.take("merge", merge);
+  if (options.has("chunk")) {
+    jobs::CampaignPart part;
+    options.take("chunk", part.number);
+    options.take("chunks", part.count);
+    return told_by(tell, threads, [&](const Progress& progress) {
+      return jobs::run_chunk(jobs::load_campaign_plan(path), part, job, progress);
+    });
+  }
+  return told_by(tell, threads, [&](const Progress& progress) {
+    const jobs::CampaignPlan plan = jobs::load_campaign_plan(path);
+    return merge ? jobs::merge_chunks(plan, table, job, progress)
+                 : jobs::run_campaign(plan, table, job, progress);
+  });
+}
+
 py::object info(const py::dict& values, const py::object& tell) {
   const Options options(values);
   std::string input, accuracy, topic;
@@ -484,6 +509,7 @@ void bind_jobs(py::module_& module) {
   module.def("coverage", &coverage, options, threads, tell);
   module.def("observability", &observability, options, threads, tell);
   module.def("compare", &compare, py::arg("results"), py::arg("false_alarm"), tell);
+  module.def("campaign", &campaign, options, threads, tell);
   module.def("info", &info, options, tell);
   module.def(
       "is_flight_plan",

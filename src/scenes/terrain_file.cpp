@@ -33,17 +33,6 @@ std::array<double, 2> center(const YamlMap& map) {
   return numbers<2>(map, "center_m", kPlaceLimits.lowest, kPlaceLimits.highest);
 }
 
-/// "yes" or "no"; no where it is absent.
-bool yes(const YamlMap& map, std::string_view key) {
-  if (map.find(key) == nullptr) return false;
-  const std::string text = map.text(key);
-  if (text != "yes" && text != "no") {
-    fail_at(map.path(), map.at(key).line,
-            fmt::format("{} = \"{}\", allowed yes and no", map.field(key), text));
-  }
-  return text == "yes";
-}
-
 /// [low, high]
 std::array<double, 2> range(const YamlMap& map, std::string_view key, const Limits& limits,
                             std::string_view unit) {
@@ -110,7 +99,7 @@ GableRoof read_roof(const YamlMap& map, std::string name) {
   roof.pitch = angle(map, "pitch_deg", kPitchLimits_deg.lowest, kPitchLimits_deg.highest);
   roof.ridge_height = within(map, "ridge_height_m", kSizeLimits);
   roof.heading = heading(map);
-  roof.walls = yes(map, "walls");
+  roof.walls = map.yes("walls");
   return roof;
 }
 
@@ -139,7 +128,7 @@ VillageSettings read_village(const YamlMap& map) {
     const auto pitch_deg = range(map, "pitch_deg", kPitchLimits_deg, "deg");
     village.pitch = {radians_from_degrees(pitch_deg[0]), radians_from_degrees(pitch_deg[1])};
     village.ridge_height = range(map, "ridge_height_m", kSizeLimits, "m");
-    village.walls = yes(map, "walls");
+    village.walls = map.yes("walls");
   }
   if (village.bushes > 0) {
     village.bush_radius = range(map, "bush_radius_m", kSizeLimits, "m");

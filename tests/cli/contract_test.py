@@ -10,7 +10,7 @@ from command import SOURCE, CommandTest, run
 
 HALL = SOURCE / "data" / "hall.yaml"
 VERBS = ("info", "convert", "simulate", "estimate", "observability", "calibrate", "cloud",
-         "compare", "identify", "pattern", "preset", "report")
+         "compare", "campaign", "identify", "pattern", "preset", "report")
 RATES = {"mid-40": 100000, "mid-70": 100000, "avia": 240000, "horizon": 240000, "tele-15": 240000}
 
 
@@ -27,6 +27,8 @@ class ContractTest(CommandTest):
                        "--duration-s", "2", "--rate-hz", "20000", "--seed", "3", *more,
                        folder=cls.folder)
             assert done.returncode == 0, done.stderr
+        (cls.folder / "plan.yaml").write_text(
+            f"simulate: {{duration_s: 0.5, rate_hz: 5000, scene: {HALL}}}\ncalibrate:\nseeds: {{count: 1}}\n")
         done = run("estimate", "believed.nc", "-o", "out", folder=cls.folder)
         assert done.returncode == 0, done.stderr
 
@@ -54,6 +56,7 @@ class ContractTest(CommandTest):
             "preset": (("check", "out/calibration.yaml"), ("out/calibration.yaml",)),
             "report": (("out",), ("out/report.json",)),
             "compare": (("out", "out"), ("out/calibration.yaml", "out/calibration.yaml")),
+            "campaign": (("plan.yaml", "--chunk", "1/1", "-o", "campaign"), ("plan.yaml", str(HALL))),
         }
         self.assertEqual(set(commands), set(VERBS))
         for verb, (arguments, inputs) in commands.items():

@@ -5,6 +5,7 @@
 import copy
 import json
 import re
+import shutil
 import unittest
 
 import schemas
@@ -177,6 +178,16 @@ class SchemasTest(CommandTest):
         cls.print(3, "report", "no")
         cls.print(0, "compare", "estimated", "calibrated", "mid-40", "-o", "series.html")
         cls.print(2, "compare", "no", "estimated")
+        (cls.folder / "plan.yaml").write_text(
+            "simulate: {sensor: mid-40-table3, duration_s: 0.5, rate_hz: 5000, scene: hall.yaml, reported: nominal}\n"
+            "calibrate:\ngrid: {simulate.noise_angle_deg: [0.01]}\nseeds: {count: 2}\n")
+        (cls.folder / "estimate.yaml").write_text(
+            "simulate: {duration_s: 0.5, rate_hz: 2000}\nestimate:\nseeds: {count: 1}\n")
+        shutil.copy(DATA / "hall.yaml", cls.folder / "hall.yaml")
+        cls.print(0, "campaign", "plan.yaml", "--chunk", "1/2", "-o", "campaign")
+        cls.print(3, "campaign", "plan.yaml", "--merge", "-o", "campaign")
+        cls.print(0, "campaign", "plan.yaml", "-o", "campaign")
+        cls.print(0, "campaign", "estimate.yaml", "-o", "of-estimates")
         cls.print(0, "pattern", "--sensor", "mid-40", "--format", "helios-xml", "-o", "p.xml",
                   "--duration-s", 0.1, "--coverage", "--report", "pattern.html", "--integration-s", 0.1)
         cls.print(0, "pattern", "--coverage", "--integration-s", 0.1, "--report", "pattern.html")

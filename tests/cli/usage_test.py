@@ -8,7 +8,7 @@ import unittest
 from command import CommandTest
 
 VERBS = ("info", "convert", "simulate", "estimate", "observability", "calibrate", "cloud",
-         "compare", "identify", "pattern", "preset", "report", "reproduce")
+         "compare", "campaign", "identify", "pattern", "preset", "report", "reproduce")
 
 # Arguments that are wrong, and what the message must name.
 WRONG = [
@@ -76,6 +76,7 @@ WRONG = [
     (["preset", "new", "mine"], "--from"),
     (["report"], "DIR"),
     (["compare"], "RESULT"),
+    (["campaign", "-o", "results"], "PLAN"),
     (["simulate", "-o", "a.csv", "--seed", "-1"], "found -1, allowed whole numbers 0 to"),
     (["simulate", "-o", "a.csv", "--seed=-1"], "found -1"),
     (["simulate", "-o", "a.csv", "--seed", "18446744073709551616"], "18446744073709551615"),

@@ -198,6 +198,27 @@ def test_compare(calibration, estimate, folder):
                 command("compare", folder / "a.yaml", folder / "b.yaml", folder / "a.yaml"))
 
 
+def test_campaign(folder):
+    (folder / "plan.yaml").write_text(
+        "simulate: {sensor: mid-40-table3, duration_s: 0.2, rate_hz: 2000}\n"
+        "estimate: {sensor: mid-40}\nseeds: {first: 1, count: 3}\n")
+    results = folder / "campaign"
+    part = risley.campaign(folder / "plan.yaml", results, chunk=(2, 3))
+    assert (part["first"], part["cells"], part["made_before"]) == (1, 1, False)
+    assert_same(risley.campaign(folder / "plan.yaml", results, chunk=(2, 3)),
+                command("campaign", folder / "plan.yaml", "--chunk", "2/3", "-o", results))
+    some = risley.campaign(folder / "plan.yaml", results, merge=True)
+    assert some["done"] == 1 and some["missing"] == [[0, 0], [2, 2]]
+    whole = risley.campaign(folder / "plan.yaml", results, threads=1)
+    printed = command("campaign", folder / "plan.yaml", "-o", results)
+    del printed["summary"]
+    assert_same(whole, printed)
+    with pytest.raises(ValueError, match="chunk and merge"):
+        risley.campaign(folder / "plan.yaml", results, chunk=(1, 3), merge=True)
+    with pytest.raises(risley.FileError, match="no part of a campaign"):
+        risley.campaign(folder / "plan.yaml", folder / "nowhere", merge=True)
+
+
 def test_presets():
     listed = command("preset", "list")["presets"]
     assert [one["name"] for one in listed] == list(risley.presets())

@@ -71,6 +71,10 @@ class YamlMap {
   /// As number(), for a whole number without unit.
   int integer(std::string_view key, int lower, int upper) const;
 
+  /// Whether an entry is "yes"; otherwise it has to be "no".
+  /// @param absent  what its absence means
+  bool yes(std::string_view key, bool absent = false) const;
+
   /// How messages call an entry, e.g. "noise.angle_noise_deg".
   std::string field(std::string_view key) const;
   const std::string& path() const { return path_; }  ///< of the file, for messages

@@ -17,6 +17,8 @@ namespace jobs {
 struct BeamOrigins;
 struct CalibratedFlight;
 struct CalibratedRecordings;
+struct CampaignChunk;
+struct CampaignResult;
 struct ComparedSeries;
 struct ConvertedRecording;
 struct ConvertedTrajectory;
@@ -76,6 +78,10 @@ Json of(const jobs::BeamOrigins& found);
 Json of(const jobs::ResultComparison& compared);
 /// Of `risley compare`.
 Json of(const jobs::ComparedSeries& series);
+/// Of `risley campaign` for one part.
+Json of(const jobs::CampaignChunk& chunk);
+/// Of `risley campaign` for all parts together.
+Json of(const jobs::CampaignResult& merged);
 /// Of `risley simulate`.
 Json of(const simulation::SimulationResult& simulated);
 /// The `coverage` of `risley pattern`.

@@ -1,0 +1,150 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "risley/core/progress.hpp"
+#include "risley/jobs/campaign_plan.hpp"
+#include "risley/optics/parameters.hpp"
+
+namespace risley::jobs {
+
+/// A parameter in one cell. SI units.
+struct CellParameter {
+  std::string name;
+  double truth = 0;
+  double error = 0;             ///< found minus true
+  double sigma = 0;             ///< what was held included
+  double sigma_given_held = 0;  ///< if that were exactly as held
+};
+
+/// Errors of one kind over all shots of a cell. SI units.
+struct CellErrors {
+  std::string name;  ///< "rotation_angle_a", "angular_velocity_a", "directions", "shape", ...
+  double rms = 0;    ///< root mean square
+  double sigma = 0;  ///< what was stated of it
+};
+
+/// Name of errors of a kind with the unit in which they are told: "rotation_angle_a_deg", degrees
+/// in place of radians.
+std::string name_with_unit(const std::string& errors);
+
+/// What came of one cell.
+struct CellOutcome {
+  CampaignCell cell;
+  bool answered = false;  ///< the estimate or the calibration converged
+  std::string verdict;    ///< its code; empty where there is none
+  std::string message;    ///< why there is no answer
+  std::vector<CellParameter> parameters;
+  /// Errors of the prisms' parameters together, squared and weighed by their covariance given what
+  /// was held, per degree of freedom; NaN without an answer.
+  double nees = 0;
+  std::size_t degrees_of_freedom = 0;
+  double nees_rotation_angles = 0;  ///< mean over the shots of an estimate; NaN otherwise
+  std::vector<CellErrors> errors;
+};
+
+/// Simulates a cell and estimates or calibrates with what was recorded. Cells do not depend on each
+/// other: the outcome is a matter of plan, number and program alone. What cannot be answered is an
+/// outcome, too.
+/// @throws FileError, InvalidArgument, Cancelled
+CellOutcome run_cell(const CampaignPlan& plan, std::uint64_t number, const Progress& progress = {});
+
+/// Which part of a campaign, and where its results are kept.
+struct CampaignOptions {
+  std::string folder;   ///< parts go to chunks/ in it
+  std::string program;  ///< name and version of what computes, part of what makes results the same
+};
+
+/// Part `number` of `count`, from 1. It has the cells from floor((number - 1) cells / count) on.
+struct CampaignPart {
+  std::uint64_t number = 1, count = 1;
+};
+
+/// A part that is done.
+struct CampaignChunk {
+  std::string file;
+  std::uint64_t first = 0, cells = 0;
+  bool made_before = false;
+};
+
+/// Runs the cells of a part, several at a time, and writes what comes of them to one file
+/// (chunk-I-of-N.jsonl), which appears when it is whole. If it is there already, whole and made of
+/// the same plan by the same program, nothing is done. The bytes do not depend on threads or on
+/// who ran the part when.
+/// @throws InvalidArgument for a part that there is not; FileError, Cancelled
+CampaignChunk run_chunk(const CampaignPlan& plan, const CampaignPart& part,
+                        const CampaignOptions& options, const Progress& progress = {});
+
+/// A figure over the cells of a setting, and the band in which 95 of 100 campaigns find it where
+/// covariances are true.
+struct BandedFigure {
+  double value = 0, low = 0, high = 0;
+
+  bool inside() const { return low <= value && value <= high; }
+};
+
+/// A parameter over the cells of a setting. SI units.
+struct ParameterSummary {
+  std::string name;
+  bool of_prisms = false;  ///< a parameter of the train; otherwise of the rotors
+  std::uint64_t cells = 0;
+  double bias = 0;   ///< mean error
+  double rmse = 0;   ///< root mean square error
+  double bound = 0;  ///< root mean square of the sigmas given what was held
+  double sigma = 0;  ///< the same of the sigmas that include it
+  BandedFigure error_over_bound;
+  /// Share of the errors that are below two sigmas given what was held: 0.9545 is honest.
+  BandedFigure within_two_sigma;
+};
+
+/// Errors of one kind over the cells of a setting.
+struct ErrorSummary {
+  std::string name;
+  std::uint64_t cells = 0;
+  double rms = 0, sigma = 0;  ///< root mean squares over the cells
+};
+
+/// All cells of a setting together.
+struct SettingSummary {
+  std::vector<std::pair<std::string, std::string>> grid;  ///< as CampaignSetting has it
+  TrainShape shape;                                       ///< of the sensor
+  std::uint64_t cells = 0, answered = 0;
+  std::vector<ParameterSummary> parameters;
+  double error_over_bound = 0;  ///< root mean square over the parameters of the prisms
+  BandedFigure nees;            ///< mean over the cells
+  double nees_rotation_angles = 0;
+  std::vector<ErrorSummary> errors;
+};
+
+/// A campaign, as far as it is done.
+struct CampaignResult {
+  std::string table;                     ///< that was written
+  std::uint64_t cells = 0, done = 0;     ///< of the plan; of them those with a result
+  std::vector<SettingSummary> settings;  ///< in the order of the plan
+  /// Cells without a result, as ranges, the last included; the first ones if they are many.
+  std::vector<std::pair<std::uint64_t, std::uint64_t>> missing;
+  std::vector<std::string> warnings;  ///< about files that do not count
+};
+
+/// Reads the parts that are done, in whatever way the campaign was divided, and writes one table
+/// with a row for each cell, each once and in order. A file that is damaged or was made of another
+/// plan or by another program does not count, and a warning says so. Memory does not grow with the
+/// number of cells.
+/// @param table  its ending chooses the format, see io::TableFile
+/// @throws InvalidArgument for another ending; FileError, also where there is no part; Cancelled
+CampaignResult merge_chunks(const CampaignPlan& plan, const std::string& table,
+                            const CampaignOptions& options, const Progress& progress = {});
+
+/// A whole campaign on one machine: part after part, about 100 cells each, then all of them merged.
+/// When it is stopped, the parts that are whole stay, and the next run goes on behind them.
+/// @throws as run_chunk(), merge_chunks()
+CampaignResult run_campaign(const CampaignPlan& plan, const std::string& table,
+                            const CampaignOptions& options, const Progress& progress = {});
+
+}  // namespace risley::jobs

@@ -1,0 +1,65 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "risley/jobs/calibrate_recordings.hpp"
+#include "risley/jobs/estimate_recording.hpp"
+#include "risley/simulation/scanner.hpp"
+
+namespace risley::jobs {
+
+/// One point of a campaign's grid: what is simulated and what is then done with it.
+struct CampaignSetting {
+  /// What the grid says here, by name and as it is written there.
+  std::vector<std::pair<std::string, std::string>> grid;
+  /// One per recording: one, or one at each station. The seed is a cell's.
+  std::vector<simulation::SimulationSettings> simulations;
+  std::string format;  ///< ending of the recordings, which chooses their format
+  /// Without recordings and truths, which are a cell's.
+  std::variant<EstimateRecordingOptions, CalibrateRecordingsOptions> job;
+
+  /// "simulate.noise_angle_deg 0.01, estimate.method ekf"; empty without a grid.
+  std::string words() const;
+};
+
+/// A simulation with what is then made of it, of one setting and one seed.
+struct CampaignCell {
+  std::uint64_t number = 0;  ///< from 0
+  std::size_t setting = 0;   ///< place in CampaignPlan::settings
+  std::uint64_t seed = 0;
+};
+
+/// A grid of settings times seeds.
+struct CampaignPlan {
+  std::string path;
+  std::vector<std::string> files;         ///< that it names, each once
+  std::vector<CampaignSetting> settings;  ///< the last name of the grid varies first
+  std::uint64_t first_seed = 0, seeds = 0;
+  /// All that decides what comes of the cells but the program, as a SHA-256: what the plan says, in
+  /// whatever order and with whatever comments, and the bytes of the files that it names.
+  std::string work;
+
+  std::uint64_t cells() const { return settings.size() * seeds; }
+  /// A message with the plan and a setting before it.
+  std::string about(const CampaignSetting& setting, const std::string& message) const;
+  /// Cells go through all settings of one seed, then to the next seed, so that any part of them has
+  /// its share of every setting.
+  CampaignCell cell(std::uint64_t number) const;
+};
+
+/// Reads a plan: the maps `simulate`, and `estimate` or `calibrate`, each with options by the name
+/// that the verb of the command has for them (noise_angle_deg); `grid`, with a list of values for
+/// each name such as simulate.noise_angle_deg; and `seeds`: {first, count}. See docs/files.md.
+/// Files that it names stand beside it.
+/// @throws FileError with the line for what is not such a plan, and for files that it names;
+///         InvalidArgument naming the setting for values that a simulation or an estimate refuses
+CampaignPlan load_campaign_plan(const std::string& path);
+
+}  // namespace risley::jobs

@@ -1,0 +1,40 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "risley/core/progress.hpp"
+#include "risley/jobs/campaign.hpp"
+
+namespace risley::jobs {
+
+/// What a file of cells says of itself.
+struct ChunkHead {
+  std::string work;     ///< CampaignPlan::work
+  std::string program;  ///< CampaignOptions::program
+  std::uint64_t first = 0, cells = 0;
+
+  bool operator==(const ChunkHead&) const = default;
+};
+
+/// Where the parts of a campaign are kept: FOLDER/chunks.
+std::string chunk_folder(const std::string& folder);
+
+/// Writes cells, in their order, as lines of JSON: the head, one line per cell, and at the end the
+/// SHA-256 of all lines before. @throws FileError
+void save_chunk(const std::string& path, const ChunkHead& head,
+                const std::vector<CellOutcome>& outcomes);
+
+/// Reads such a file to its end and calls with every cell, when the head is known and before
+/// anything is known of the end.
+/// @throws FileError with the line for what is damaged or no such file; Cancelled
+ChunkHead read_chunk(const std::string& path, const Progress& progress,
+                     const std::function<void(const ChunkHead&, CellOutcome&&)>& call = {});
+
+}  // namespace risley::jobs
