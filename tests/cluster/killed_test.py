@@ -14,7 +14,7 @@ CHUNKS = 12
 
 
 class KilledTest(CampaignTest):
-    cells = int(os.environ.get("RISLEY_CAMPAIGN_CELLS", "60"))
+    cells = int(os.environ.get("RISLEY_CAMPAIGN_CELLS", "120"))
 
     @needs("snakemake", "slurmctld", "slurmd", "munged", "sbatch", root=True)
     def test_snakemake_and_slurm(self):
