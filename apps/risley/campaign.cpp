@@ -3,6 +3,7 @@
 #include "risley/jobs/campaign.hpp"
 
 #include <charconv>
+#include <cmath>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -31,21 +32,24 @@ struct CampaignCommandOptions {
 };
 
 /// I/N
-jobs::CampaignPart part_from(const std::string& text) {
-  jobs::CampaignPart part;
+jobs::ChunkNumber chunk_number_from(const std::string& text) {
+  jobs::ChunkNumber which;
   const char* const end = text.data() + text.size();
-  const auto [slash, first] = std::from_chars(text.data(), end, part.number);
+  const auto [slash, first] = std::from_chars(text.data(), end, which.number);
   if (first == std::errc() && slash != end && *slash == '/') {
-    const auto [last, second] = std::from_chars(slash + 1, end, part.count);
-    if (second == std::errc() && last == end) return part;
+    const auto [last, second] = std::from_chars(slash + 1, end, which.count);
+    if (second == std::errc() && last == end) return which;
   }
   throw InvalidArgument(
-      fmt::format("--chunk: found {}, wanted I/N, as in 3/40: part 3 of 40", text));
+      fmt::format("--chunk: found {}, wanted I/N, as in 3/40: chunk 3 of 40", text));
 }
 
-std::string ratio(double value) { return fmt::format("{:.3f}", value); }
+std::string ratio(double value) {
+  return std::isfinite(value) ? fmt::format("{:.3f}", value) : "-";
+}
 
 std::string band(const jobs::BandedFigure& figure) {
+  if (!std::isfinite(figure.low)) return "-";
   return fmt::format("{:.3f} to {:.3f}", figure.low, figure.high);
 }
 
@@ -99,7 +103,7 @@ std::optional<FileError> damage_of(const jobs::CampaignResult& merged, const std
     ranges += first == last ? fmt::format("{}", first) : fmt::format("{}-{}", first, last);
   }
   return FileError(folder, {},
-                   fmt::format("{} of {} cells have no result ({}): run the parts that have them "
+                   fmt::format("{} of {} cells have no result ({}): run the chunks that have them "
                                "again, those that are whole take no time",
                                merged.cells - merged.done, merged.cells, ranges));
 }
@@ -125,7 +129,7 @@ ExitStatus tell_merged(const jobs::CampaignResult& merged, const CampaignCommand
 
 ExitStatus run_campaign(CampaignCommandOptions options, const CommonOptions& typed) {
   if (!options.chunk.empty() && options.merge) {
-    throw InvalidArgument("--chunk and --merge cannot be combined: merge when all parts are done");
+    throw InvalidArgument("--chunk and --merge cannot be combined: merge when all chunks are done");
   }
   if (!options.chunk.empty() && !options.table.empty()) {
     throw InvalidArgument("--table goes with --merge, not with --chunk");
@@ -140,11 +144,11 @@ ExitStatus run_campaign(CampaignCommandOptions options, const CommonOptions& typ
                 {options.table, (std::filesystem::path(options.folder) / "summary.json").string()});
   const jobs::CampaignOptions job{options.folder, "risley " RISLEY_VERSION};
   if (!options.chunk.empty()) {
-    const jobs::CampaignPart part = part_from(options.chunk);
+    const jobs::ChunkNumber which = chunk_number_from(options.chunk);
     jobs::CampaignChunk chunk;
     {
       ProgressBar bar("computing cells", common);
-      chunk = jobs::run_chunk(plan, part, job, bar.progress());
+      chunk = jobs::run_chunk(plan, which, job, bar.progress());
     }
     if (common.json) {
       print_json(common, json::of(chunk));
@@ -175,11 +179,12 @@ Run declare_campaign(CLI::App& verb) {
   verb.add_option("-o,--output", o.folder,
                   "Folder for the results: chunks/, cells.csv and summary.json")
       ->required();
-  verb.add_option("--chunk", o.chunk,
-                  "Compute part I of N alone, on this machine or another; a part that is there and "
-                  "whole is not computed again (default: all parts, then the merge)")
+  verb.add_option(
+          "--chunk", o.chunk,
+          "Compute chunk I of N alone, on this machine or another; a chunk that is there and "
+          "whole is not computed again (default: all chunks, then the merge)")
       ->type_name("I/N");
-  verb.add_flag("--merge", o.merge, "Make the table and the summary of the parts that are there");
+  verb.add_flag("--merge", o.merge, "Make the table and the summary of the chunks that are there");
   verb.add_option("--table", o.table,
                   "Table to write with one row per cell; the ending chooses the format: .csv, .nc "
                   "(NetCDF), .sqlite, .sqlite3 or .db (SQLite) (default: cells.csv in the folder)")

@@ -619,10 +619,10 @@ def campaign(plan: Path, output: Path, *, chunk: Optional[Tuple[int, int]] = Non
     output : str or path
         Folder for the results: ``chunks/`` and ``cells.csv``.
     chunk : (int, int), optional
-        Number of the part to compute, from 1, and of how many. A part that is there and whole is
-        not computed again. By default all parts are computed and merged.
+        Number of the chunk to compute, from 1, and of how many. One that is there and whole is
+        not computed again. By default all chunks are computed and merged.
     merge : bool, default False
-        Make the table of the parts that are there.
+        Make the table of the chunks that are there.
     table : str or path, optional
         Table to write with one row per cell, by default ``cells.csv`` in the folder. The ending
         chooses the format.
@@ -638,10 +638,10 @@ def campaign(plan: Path, output: Path, *, chunk: Optional[Tuple[int, int]] = Non
     ------
     FileError, ValueError
         For a plan that is none or asks for what cannot be simulated; with `merge` also where there
-        is no part.
+        is no chunk.
     """
     if chunk is not None and merge:
-        raise ValueError("chunk and merge cannot be combined: merge when all parts are done")
+        raise ValueError("chunk and merge cannot be combined: merge when all chunks are done")
     options: Dict[str, Any] = {
         "plan": os.fspath(plan), "output": os.fspath(output), "merge": merge,
         "table": os.fspath(table) or os.path.join(os.fspath(output), "cells.csv")}

@@ -104,24 +104,24 @@ double bytes_of(const CampaignSetting& setting) {
   return bytes;
 }
 
-CampaignChunk range_of(const CampaignPlan& plan, const CampaignPart& part) {
-  if (part.count < 1 || part.number < 1 || part.number > part.count) {
+CampaignChunk range_of(const CampaignPlan& plan, const ChunkNumber& which) {
+  if (which.count < 1 || which.number < 1 || which.number > which.count) {
     throw InvalidArgument(fmt::format("option chunk = {}/{}, wanted I/N with I from 1 to N",
-                                      part.number, part.count));
+                                      which.number, which.count));
   }
   const std::uint64_t cells = plan.cells();
-  if (part.count > cells) {
+  if (which.count > cells) {
     throw InvalidArgument(
-        fmt::format("option chunk = {}/{}: the plan has {} cells, so N is at most {}", part.number,
-                    part.count, cells, cells));
+        fmt::format("option chunk = {}/{}: the plan has {} cells, so N is at most {}", which.number,
+                    which.count, cells, cells));
   }
   CampaignChunk chunk;
-  // Products of two 64-bit numbers: in parts that cannot overflow.
+  // Products of two 64-bit numbers: in two steps, so that they cannot overflow.
   const auto begin = [&](std::uint64_t number) {
-    return cells / part.count * number + cells % part.count * number / part.count;
+    return cells / which.count * number + cells % which.count * number / which.count;
   };
-  chunk.first = begin(part.number - 1);
-  chunk.cells = begin(part.number) - chunk.first;
+  chunk.first = begin(which.number - 1);
+  chunk.cells = begin(which.number) - chunk.first;
   return chunk;
 }
 
@@ -185,12 +185,12 @@ CellOutcome run_cell(const CampaignPlan& plan, std::uint64_t number, const Progr
   }
 }
 
-CampaignChunk run_chunk(const CampaignPlan& plan, const CampaignPart& part,
+CampaignChunk run_chunk(const CampaignPlan& plan, const ChunkNumber& which,
                         const CampaignOptions& options, const Progress& progress) {
-  CampaignChunk chunk = range_of(plan, part);
+  CampaignChunk chunk = range_of(plan, which);
   const std::string folder = chunk_folder(options.folder);
   chunk.file =
-      (fs::path(folder) / fmt::format("chunk-{}-of-{}.jsonl", part.number, part.count)).string();
+      (fs::path(folder) / fmt::format("chunk-{}-of-{}.jsonl", which.number, which.count)).string();
   const ChunkHead head{plan.work, options.program, chunk.first, chunk.cells};
   chunk.made_before = is_done(chunk.file, head, progress);
   if (chunk.made_before) return chunk;
@@ -215,12 +215,12 @@ CampaignChunk run_chunk(const CampaignPlan& plan, const CampaignPart& part,
 
 CampaignResult run_campaign(const CampaignPlan& plan, const std::string& table,
                             const CampaignOptions& options, const Progress& progress) {
-  const std::uint64_t parts = (plan.cells() + kUsualCells - 1) / kUsualCells;
+  const std::uint64_t chunks = (plan.cells() + kUsualCells - 1) / kUsualCells;
   const auto share = [&](std::uint64_t done) {
-    return static_cast<double>(done) / static_cast<double>(parts);
+    return static_cast<double>(done) / static_cast<double>(chunks);
   };
-  for (std::uint64_t i = 1; i <= parts; ++i) {
-    run_chunk(plan, {i, parts}, options, progress.part(share(i - 1), share(i)));
+  for (std::uint64_t i = 1; i <= chunks; ++i) {
+    run_chunk(plan, {i, chunks}, options, progress.part(share(i - 1), share(i)));
   }
   return merge_chunks(plan, table, options, progress.silent());
 }

@@ -92,7 +92,7 @@ void save_chunk(const std::string& path, const ChunkHead& head,
 
 ChunkHead read_chunk(const std::string& path, const Progress& progress,
                      const std::function<void(const ChunkHead&, CellOutcome&&)>& call) {
-  // A part is small: its cells took minutes.
+  // A chunk is small: its cells took minutes.
   const std::string text = io::read_text_file(path);
   std::size_t begin = 0, line = 0;
   const auto fail = [&](const std::string& problem) {
@@ -113,7 +113,7 @@ ChunkHead read_chunk(const std::string& path, const Progress& progress,
     ChunkHead head;
     const ChunkJson json = next();
     if (!json.is_object() || json.value(kKind, 0) != kChunkVersion) {
-      fail("this is no part of a campaign, or one of another version of risley");
+      fail("this is no chunk of a campaign, or one of another version of risley");
     }
     json.at("work").get_to(head.work);
     json.at("program").get_to(head.program);

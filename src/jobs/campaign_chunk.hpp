@@ -23,7 +23,7 @@ struct ChunkHead {
   bool operator==(const ChunkHead&) const = default;
 };
 
-/// Where the parts of a campaign are kept: FOLDER/chunks.
+/// Where the chunks of a campaign are kept: FOLDER/chunks.
 std::string chunk_folder(const std::string& folder);
 
 /// Writes cells, in their order, as lines of JSON: the head, one line per cell, and at the end the

@@ -284,7 +284,7 @@ std::vector<SoundChunk> find_chunks(const CampaignPlan& plan, const CampaignOpti
     throw FileError(folder, {}, fmt::format("cannot be read: {}", code.message()));
   }
   if (files.empty()) {
-    throw FileError(folder, {}, "no part of a campaign is there, such as chunk-1-of-40.jsonl");
+    throw FileError(folder, {}, "no chunk of a campaign is there, such as chunk-1-of-40.jsonl");
   }
   std::sort(files.begin(), files.end());
   std::vector<SoundChunk> sound;
@@ -312,7 +312,7 @@ std::vector<SoundChunk> find_chunks(const CampaignPlan& plan, const CampaignOpti
       check(head);
       sound.push_back({file, head});
     } catch (const FileError& error) {
-      result.warnings.push_back(fmt::format("{}; this part does not count", error.what()));
+      result.warnings.push_back(fmt::format("{}; this chunk does not count", error.what()));
     }
   }
   std::stable_sort(sound.begin(), sound.end(), [](const SoundChunk& a, const SoundChunk& b) {

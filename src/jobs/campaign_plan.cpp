@@ -236,7 +236,9 @@ class PlanReader {
   std::string format_of(const YamlMap& map) const {
     std::vector<std::string> endings = {".nc"};  // without loss
     for (const recordings::WritableFormat& format : recordings::writable_formats()) {
-      if (format.ending != endings.front()) endings.push_back(format.ending);
+      if (std::find(endings.begin(), endings.end(), format.ending) == endings.end()) {
+        endings.push_back(format.ending);
+      }
     }
     for (std::string& ending : endings) ending.erase(0, 1);
     return "." + choice(map, "format", endings);

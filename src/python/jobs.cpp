@@ -426,11 +426,11 @@ py::object campaign(const py::dict& values, int threads, const py::object& tell)
   bool merge = false;
   options.take("merge", merge);
   if (options.has("chunk")) {
-    jobs::CampaignPart part;
-    options.take("chunk", part.number);
-    options.take("chunks", part.count);
+    jobs::ChunkNumber which;
+    options.take("chunk", which.number);
+    options.take("chunks", which.count);
     return told_by(tell, threads, [&](const Progress& progress) {
-      return jobs::run_chunk(jobs::load_campaign_plan(path), part, job, progress);
+      return jobs::run_chunk(jobs::load_campaign_plan(path), which, job, progress);
     });
   }
   return told_by(tell, threads, [&](const Progress& progress) {

@@ -102,7 +102,7 @@ class CampaignTest(CommandTest):
         self.assertIn("estimate.metod", self.expect(3, "campaign", "bad.yaml", "-o", "d").stderr)
         self.assertFalse((self.folder / "d").exists())
         nothing = self.expect(3, "campaign", "plan.yaml", "--merge", "-o", "d").stderr
-        self.assertIn("d/chunks: no part of a campaign is there", nothing)
+        self.assertIn("d/chunks: no chunk of a campaign is there", nothing)
         self.assertFalse((self.folder / "d").exists())
 
 

@@ -164,7 +164,7 @@ TEST_F(CampaignTest, AnyWayToDivideItGivesTheSameTable) {
   EXPECT_EQ(many.settings[4].cells, 2U);
 }
 
-TEST_F(CampaignTest, APartThatIsThereAndWholeIsNotComputedAgain) {
+TEST_F(CampaignTest, AChunkThatIsThereAndWholeIsNotComputedAgain) {
   const CampaignPlan all = plan();
   const CampaignChunk first = run_chunk(all, {2, 6}, options("a"));
   EXPECT_FALSE(first.made_before);
@@ -234,7 +234,7 @@ TEST_F(CampaignTest, CalibrationsOnWallsFromSeveralStationsAreJudgedToo) {
   EXPECT_LT(outcome.nees, 4.0);
 }
 
-TEST_F(CampaignTest, APartThatIsCancelledLeavesNothing) {
+TEST_F(CampaignTest, AChunkThatIsCancelledLeavesNothing) {
   const CampaignPlan all = plan();
   int told = 0;
   EXPECT_THROW(run_chunk(all, {1, 2}, options("a"),
@@ -256,7 +256,7 @@ TEST_F(CampaignTest, WhatAFormatCannotHoldIsToldWithTheSetting) {
       << words;
 }
 
-TEST_F(CampaignTest, PartsThatThereAreNotAreRefused) {
+TEST_F(CampaignTest, ChunksThatThereAreNotAreRefused) {
   const CampaignPlan all = plan();
   const auto refused = [&](const CampaignPart& part) {
     return refusal([&] { run_chunk(all, part, options("a")); });

@@ -215,7 +215,7 @@ def test_campaign(folder):
     assert_same(whole, printed)
     with pytest.raises(ValueError, match="chunk and merge"):
         risley.campaign(folder / "plan.yaml", results, chunk=(1, 3), merge=True)
-    with pytest.raises(risley.FileError, match="no part of a campaign"):
+    with pytest.raises(risley.FileError, match="no chunk of a campaign"):
         risley.campaign(folder / "plan.yaml", folder / "nowhere", merge=True)
 
 

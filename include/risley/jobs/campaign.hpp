@@ -55,30 +55,30 @@ struct CellOutcome {
 /// @throws FileError, InvalidArgument, Cancelled
 CellOutcome run_cell(const CampaignPlan& plan, std::uint64_t number, const Progress& progress = {});
 
-/// Which part of a campaign, and where its results are kept.
+/// Where results of a campaign are kept, and who makes them.
 struct CampaignOptions {
-  std::string folder;   ///< parts go to chunks/ in it
+  std::string folder;   ///< chunks go to chunks/ in it
   std::string program;  ///< name and version of what computes, part of what makes results the same
 };
 
-/// Part `number` of `count`, from 1. It has the cells from floor((number - 1) cells / count) on.
-struct CampaignPart {
+/// Chunk `number` of `count`, from 1. It has the cells from floor((number - 1) cells / count) on.
+struct ChunkNumber {
   std::uint64_t number = 1, count = 1;
 };
 
-/// A part that is done.
+/// A chunk that is done.
 struct CampaignChunk {
   std::string file;
   std::uint64_t first = 0, cells = 0;
   bool made_before = false;
 };
 
-/// Runs the cells of a part, several at a time, and writes what comes of them to one file
+/// Runs the cells of a chunk, several at a time, and writes what comes of them to one file
 /// (chunk-I-of-N.jsonl), which appears when it is whole. If it is there already, whole and made of
 /// the same plan by the same program, nothing is done. The bytes do not depend on threads or on
-/// who ran the part when.
-/// @throws InvalidArgument for a part that there is not; FileError, Cancelled
-CampaignChunk run_chunk(const CampaignPlan& plan, const CampaignPart& part,
+/// who ran the chunk when.
+/// @throws InvalidArgument for a chunk that there is not; FileError, Cancelled
+CampaignChunk run_chunk(const CampaignPlan& plan, const ChunkNumber& which,
                         const CampaignOptions& options, const Progress& progress = {});
 
 /// A figure over the cells of a setting, and the band in which 95 of 100 campaigns find it where
@@ -132,17 +132,18 @@ struct CampaignResult {
   std::vector<std::string> warnings;  ///< about files that do not count
 };
 
-/// Reads the parts that are done, in whatever way the campaign was divided, and writes one table
+/// Reads the chunks that are done, in whatever way the campaign was divided, and writes one table
 /// with a row for each cell, each once and in order. A file that is damaged or was made of another
 /// plan or by another program does not count, and a warning says so. Memory does not grow with the
 /// number of cells.
 /// @param table  its ending chooses the format, see io::TableFile
-/// @throws InvalidArgument for another ending; FileError, also where there is no part; Cancelled
+/// @throws InvalidArgument for another ending; FileError, also where there is no chunk; Cancelled
 CampaignResult merge_chunks(const CampaignPlan& plan, const std::string& table,
                             const CampaignOptions& options, const Progress& progress = {});
 
-/// A whole campaign on one machine: part after part, about 100 cells each, then all of them merged.
-/// When it is stopped, the parts that are whole stay, and the next run goes on behind them.
+/// A whole campaign on one machine: chunk after chunk, about 100 cells each, then all of them
+/// merged. When it is stopped, the chunks that are whole stay, and the next run goes on behind
+/// them.
 /// @throws as run_chunk(), merge_chunks()
 CampaignResult run_campaign(const CampaignPlan& plan, const std::string& table,
                             const CampaignOptions& options, const Progress& progress = {});

@@ -78,9 +78,9 @@ Json of(const jobs::BeamOrigins& found);
 Json of(const jobs::ResultComparison& compared);
 /// Of `risley compare`.
 Json of(const jobs::ComparedSeries& series);
-/// Of `risley campaign` for one part.
+/// Of `risley campaign` for one chunk.
 Json of(const jobs::CampaignChunk& chunk);
-/// Of `risley campaign` for all parts together.
+/// Of `risley campaign` for all chunks together.
 Json of(const jobs::CampaignResult& merged);
 /// Of `risley simulate`.
 Json of(const simulation::SimulationResult& simulated);
