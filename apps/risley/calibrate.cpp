@@ -20,11 +20,13 @@
 #include "calibration_text.hpp"
 #include "command.hpp"
 #include "flight_text.hpp"
+#include "many_files.hpp"
 #include "option_names.hpp"
 #include "parameter_choice.hpp"
 #include "plan_flight.hpp"
 #include "platform_options.hpp"
 #include "reading_options.hpp"
+#include "recording_text.hpp"
 #include "result_folder.hpp"
 
 namespace risley::app {
@@ -34,14 +36,14 @@ using jobs::CalibratedRecordings;
 
 struct CalibrateCommandOptions {
   std::vector<std::string> inputs, station_names, truths;
-  std::string list;
+  ManyWishes many;
   jobs::PlatformFiles platform;
   std::string folder, method = "adjustment", rate_hz = "full", sensor, planes, control, stations,
                       beam_origin = "yes", states = "knots", mirror = "auto", plan, scene, page;
   std::optional<double> noise_angle_deg, noise_range_m, prior_sigma_deg;
   std::optional<double> range_offset_sigma_m, knot_spacing_s, cell_size_m;
   double duration_s = 10.0, empty_circle_m = cloud::PointDistributionOptions{}.empty_circle;
-  bool force = false;
+  bool force = false, no_report = false;
   ParameterWishes parameters;
   ReadingWishes reading;
 };
@@ -89,7 +91,7 @@ void take_recordings(const CalibrateCommandOptions& options, const CommonOptions
   if (options.mirror != "auto") job.mirrored = options.mirror == "yes";
   job.seed = common.seed;
   job.truths = options.truths;
-  job.details = !options.folder.empty();
+  job.details = !options.folder.empty() && !options.no_report;
   job.force = options.force;
 }
 
@@ -107,10 +109,23 @@ jobs::CalibrateRecordingsOptions job_of(const CalibrateCommandOptions& options,
   }
   require_folder_apart(common, options.folder, states);
   job.files = result_files(options.folder, options.states, common);
-  job.texts = [](const CalibratedRecordings& outcome) {
-    return report_texts(report::calibration_report(outcome));
-  };
+  if (job.details) {
+    job.texts = [](const CalibratedRecordings& outcome) {
+      return report_texts(report::calibration_report(outcome));
+    };
+  }
   return job;
+}
+
+/// What is said of a calibration is in words of the command.
+template <class Outcome>
+void put_flags_into(Outcome& outcome) {
+  auto& c = outcome.calibration;
+  c.reason = with_flags(c.reason);
+  put_flags(outcome.warnings);
+  put_flags(outcome.choice.warnings);
+  put_flags(c.verdict);
+  put_flags(c.warnings);
 }
 
 /// Runs a calibration, on walls or in flight, and says what came of it.
@@ -121,12 +136,8 @@ ExitStatus run_job(const CalibrateCommandOptions& options, const CommonOptions& 
     ProgressBar bar("calibrating", common);
     return calibrate(bar.progress());
   }();
-  auto& c = outcome.calibration;
-  c.reason = with_flags(c.reason);
-  put_flags(outcome.warnings);
-  put_flags(outcome.choice.warnings);
-  put_flags(c.verdict);
-  put_flags(c.warnings);
+  put_flags_into(outcome);
+  const auto& c = outcome.calibration;
   for (const std::string& warning : outcome.warnings) spdlog::warn(warning);
   for (const std::string& warning : c.warnings) spdlog::warn(warning);
   if (!c.converged) log_failure(c.reason, common);
@@ -144,6 +155,54 @@ ExitStatus run_job(const CalibrateCommandOptions& options, const CommonOptions& 
   return c.converged ? kDone : kNumbersFailed;
 }
 
+/// One of several recordings, each calibrated on its own.
+FileOutcome calibrate_one(const FileJob& file, const CalibrateCommandOptions& options,
+                          const CommonOptions& common, const Progress& progress) {
+  CalibrateCommandOptions own = options;
+  own.inputs = {file.input};
+  own.folder = file.output;
+  CalibratedRecordings found = jobs::calibrate_recordings(job_of(own, common), progress);
+  put_flags_into(found);
+  const calibration::Calibration& c = found.calibration;
+  for (const std::string& words : found.warnings) spdlog::warn("{}: {}", file.input, words);
+  for (const std::string& words : c.warnings) spdlog::warn("{}: {}", file.input, words);
+  Json json = json::of(found);
+  json["input"] = file.input;
+  if (!file.output.empty()) json["output"] = file.output;
+  json["message"] = c.converged ? "" : c.reason;
+  std::string text = fmt::format("{}: {}", file.input, to_string(c.verdict.code));
+  if (!c.converged) text += fmt::format(", not converged: {}", c.reason);
+  text += fmt::format("; {}, {} points on {} planes", jobs::sensor_name(found.choice),
+                      grouped(c.points), c.planes.size());
+  return {c.converged ? kDone : kNumbersFailed, std::move(json), std::move(text)};
+}
+
+ExitStatus calibrate_each(const CalibrateCommandOptions& options, const CLI::App& verb,
+                          const CommonOptions& common) {
+  const FileJobs files = file_jobs(options.many, options.folder, are_several(options.many), "");
+  const auto one_alone = [&](bool given, const char* option) {
+    if (!given || files.jobs.size() == 1) return;
+    throw InvalidArgument(fmt::format(
+        "{} is of one recording, and there are {}: with --table or --resume each is calibrated on "
+        "its own",
+        option, files.jobs.size()));
+  };
+  one_alone(!options.truths.empty(), "--truth");
+  one_alone(!options.stations.empty(), "--stations");
+  CalibrateCommandOptions first = options;
+  first.inputs = {files.jobs.front().input};
+  first.folder.clear();
+  job_of(first, common);  // wrong options are told before anything is read
+  FileWork work;
+  work.label = "calibrating";
+  work.into_folders = true;
+  work.files = [](const FileJob& file) { return result_files_of(file.output); };
+  work.run = [&](const FileJob& file, const Progress& progress) {
+    return calibrate_one(file, options, common, progress);
+  };
+  return run_file_jobs(files, work, options.many, verb, common);
+}
+
 jobs::CalibrateFlightOptions flight_job_of(const CalibrateCommandOptions& options,
                                            const CommonOptions& common) {
   jobs::CalibrateFlightOptions job;
@@ -153,9 +212,11 @@ jobs::CalibrateFlightOptions flight_job_of(const CalibrateCommandOptions& option
   take_grid(options, job);
   require_folder_apart(common, options.folder, {"mount.yaml", "trajectory.csv"});
   job.files = result_files(options.folder, "none", common);
-  job.texts = [](const jobs::CalibratedFlight& outcome) {
-    return report_texts(report::flight_report(outcome));
-  };
+  if (job.details) {
+    job.texts = [](const jobs::CalibratedFlight& outcome) {
+      return report_texts(report::flight_report(outcome));
+    };
+  }
   return job;
 }
 
@@ -210,9 +271,9 @@ CommonOptions with_recordings_found(CalibrateCommandOptions& options, CommonOpti
   for (const std::string& name : options.inputs) {
     jobs::are_many({{name}, "", {}}) ? add({{name}, "", {}}) : found.push_back(name);
   }
-  if (!options.list.empty()) {
-    add({{}, options.list, {}});
-    common.files.push_back(options.list);
+  if (!options.many.list.empty()) {
+    add({{}, options.many.list, {}});
+    common.files.push_back(options.many.list);
   }
   if (found == options.inputs) return common;
   options.inputs = std::move(found);
@@ -226,19 +287,23 @@ CommonOptions with_recordings_found(CalibrateCommandOptions& options, CommonOpti
 Run declare_calibrate(CLI::App& verb) {
   const auto options = std::make_shared<CalibrateCommandOptions>();
   CalibrateCommandOptions& o = *options;
-  verb.add_option(
-      "INPUT", o.inputs,
-      "Recordings of one sensor with ranges to plane walls, or from a flight, for one "
-      "calibration; folders, for all recordings in and below them; quoted patterns such "
-      "as '*.lvx' (** is any number of folders)");
-  verb.add_option("--list", o.list,
-                  "Text file with further recordings, one a line; lines that begin with # do not "
-                  "count")
-      ->type_name("FILE");
+  add_many_options(verb, o.many,
+                   "Recordings of one sensor with ranges to plane walls, or from a flight, for one "
+                   "calibration, or with --table for one each");
+  verb.get_option("--table")->description(
+      "Calibrate every recording on its own, and write a table with one row for each; the ending "
+      "chooses the format: .csv, .nc (NetCDF), .sqlite, .sqlite3 or .db (SQLite)");
+  verb.get_option("--resume")
+      ->description(
+          "Calibrate every recording on its own, but skip those whose results are whole and were "
+          "made "
+          "from the same bytes with the same options and version");
   verb.add_option(
       "-o,--output", o.folder,
       "Folder to write calibration.yaml, states.nc (states_1.nc, ...), report.json and report.html "
-      "to (default: none)");
+      "to; with --table a folder of such folders, placed as the recordings are (default: none)");
+  verb.add_flag("--no-report", o.no_report,
+                "Write no report.json and report.html, and do not compute what only they show");
   verb.add_option("--method", o.method,
                   "adjustment: weighted, of all recordings together; paper: unweighted distances "
                   "from planes fitted by SVD")
@@ -262,7 +327,8 @@ Run declare_calibrate(CLI::App& verb) {
   verb.add_option("--plan", o.plan,
                   "Scene or flight (YAML) to plan for: predicts how good a calibration there would "
                   "be and, for a flight, how its points would lie on the ground")
-      ->excludes("--output", "--method", "--planes", "--stations", "--station", "--list");
+      ->excludes("--output", "--method", "--planes", "--stations", "--station", "--list", "--table",
+                 "--resume", "--no-report");
   verb.add_option("--duration-s", o.duration_s, "Length of each planned recording, s")
       ->needs("--plan")
       ->capture_default_str();
@@ -277,7 +343,8 @@ Run declare_calibrate(CLI::App& verb) {
   verb.add_option("--report", o.page, "Page (HTML) to write about the points of a planned flight")
       ->needs("--plan");
   add_platform_options(verb, o.platform);
-  verb.get_option("--trajectory")->excludes("--plan", "--method", "--planes", "--stations");
+  verb.get_option("--trajectory")
+      ->excludes("--plan", "--method", "--planes", "--stations", "--table", "--resume");
   verb.add_option("--control", o.control,
                   "Known points and planes on the ground that a flight is tied to (YAML)")
       ->needs("--trajectory");
@@ -329,7 +396,8 @@ Run declare_calibrate(CLI::App& verb) {
       ->expected(1)
       ->allow_extra_args(false)
       ->take_all();
-  return [options](const CommonOptions& typed) {
+  return [options, &verb](const CommonOptions& typed) {
+    options->inputs = options->many.inputs;
     // `--truth A B` leaves B among the recordings.
     const auto truth = std::stable_partition(
         options->inputs.begin(), options->inputs.end(),
@@ -337,6 +405,10 @@ Run declare_calibrate(CLI::App& verb) {
     options->truths.insert(options->truths.end(), truth, options->inputs.end());
     options->inputs.erase(truth, options->inputs.end());
     if (!options->plan.empty()) return run_plan(*options, typed);
+    options->many.inputs = options->inputs;
+    if (!options->many.table.empty() || options->many.resume) {
+      return calibrate_each(*options, verb, typed);
+    }
     const CommonOptions common = with_recordings_found(*options, typed);
     if ((options->knot_spacing_s || options->cell_size_m) && !moves(options->platform)) {
       throw InvalidArgument("--knot-spacing-s and --cell-size-m go with --trajectory or --plan");

@@ -194,14 +194,7 @@ ExitStatus estimate_several(const FileJobs& files, const EstimateCommandOptions&
   FileWork work;
   work.label = "estimating";
   work.into_folders = true;
-  work.files = [](const FileJob& file) {
-    std::vector<std::string> names;
-    if (file.output.empty()) return names;
-    for (const char* name : {"calibration.yaml", "states.nc", "report.json", "report.html"}) {
-      names.push_back((std::filesystem::path(file.output) / name).string());
-    }
-    return names;
-  };
+  work.files = [](const FileJob& file) { return result_files_of(file.output); };
   work.run = [&](const FileJob& file, const Progress& progress) {
     return estimate_one(file, options, common, progress);
   };

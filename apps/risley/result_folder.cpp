@@ -28,6 +28,15 @@ jobs::ResultFiles result_files(const std::string& folder, const std::string& sta
   return files;
 }
 
+std::vector<std::string> result_files_of(const std::string& folder) {
+  if (folder.empty()) return {};
+  std::vector<std::string> names;
+  for (const char* name : {"calibration.yaml", "states.nc", "report.json", "report.html"}) {
+    names.push_back((std::filesystem::path(folder) / name).string());
+  }
+  return names;
+}
+
 void require_folder_apart(const CommonOptions& common, const std::string& folder,
                           std::vector<std::string> states) {
   if (folder.empty()) return;

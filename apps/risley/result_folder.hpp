@@ -20,6 +20,9 @@ jobs::Provenance provenance_of(const CommonOptions& common);
 jobs::ResultFiles result_files(const std::string& folder, const std::string& states,
                                const CommonOptions& common);
 
+/// Files that stand in a folder of results of one recording; none for an empty name.
+std::vector<std::string> result_files_of(const std::string& folder);
+
 /// As require_apart(), for a verb that writes a folder for results.
 /// @param states  names of files of rotor states
 void require_folder_apart(const CommonOptions& common, const std::string& folder,

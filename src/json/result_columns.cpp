@@ -80,15 +80,16 @@ ResultColumns::ResultColumns() {
   text("sensor_chosen_by", "who said which sensor it was", {"/sensor_chosen_by"});
   text("verdict", "code of the verdict", {"/verdict/code"});
   text("calibration", "what sends the beams", {"/calibration/path"});
-  count("converged", "1: the estimate converged, 0: it did not", "/converged");
-  text("method", "of the estimate", {"/method"});
+  count("converged", "1: estimate or calibration converged, 0: it did not", "/converged");
+  text("method", "of the estimate or calibration", {"/method"});
   count("observations", "rows of the recording, or rows that were written", "/observations");
   count("records", "of a trajectory", "/records");
   count("shots", "of the recording", "/shots");
   count("no_return", "observations without a return", "/no_return");
-  count("points", "of the cloud", "/points");
+  count("points", "of the cloud, or on the planes of a calibration", "/points");
   count("left_out", "what the format has no place for", "/left_out");
   count("observations_used", "by the estimate", "/observations_used");
+  count("planes", "on which the sensor was calibrated", "/planes");
   count("outliers", "observations that the model does not describe", "/outliers");
   count("without_rotation_angle", "points left out", "/without_rotation_angle");
   count("without_pose", "points left out, outside the trajectory", "/without_pose");
@@ -110,6 +111,22 @@ ResultColumns::ResultColumns() {
   count("combination", "speed combination of a sensor with two prisms", "/combination");
   count("mirrored", "1: the elevation in the file has the opposite sign", "/mirrored");
 
+  real(after_, "range_offset_m", "m", "of the ranges", "/range_offset_m/value");
+  real(after_, "sigma_range_offset_m", "m", "its standard deviation", "/range_offset_m/sigma");
+  for (const auto& [figure, words] : {std::pair{"total", "of the reported directions"},
+                                      std::pair{"shared", "of them, the rotation that all share"},
+                                      std::pair{"shape", "of them, the rest"},
+                                      std::pair{"worst", "the rest where it is largest"}}) {
+    const std::string place = fmt::format("/pointing_error/{}_deg/", figure);
+    const std::string name = fmt::format("pointing_error_{}_deg", figure);
+    real(after_, name, "deg", words, place + "value");
+    real(after_, "sigma_" + name, "deg", "its standard deviation", place + "sigma");
+  }
+  real(after_, "better_probability", "1", "that calibrated directions are nearer to the truth",
+       "/better_probability");
+  real(after_, "plane_rms_before_m", "m", "distance of the points from their planes",
+       "/before/plane_rms_m");
+  real(after_, "plane_rms_after_m", "m", "the same after the calibration", "/after/plane_rms_m");
   for (const char* angle : {"azimuth", "zenith"}) {
     const std::string name = fmt::format("noise_{}_deg", angle);
     const std::string place = fmt::format("/noise/{}_deg/", angle);
