@@ -160,7 +160,9 @@ FileOutcome failed(const FileJob& job, const Failure& failure, const CommonOptio
                {"status", static_cast<int>(failure.status)},
                {"message", failure.message}};
   if (failure.details.is_object()) json.update(failure.details);
-  if (common.verb == "estimate") json.update(undecided(failure.message));
+  if (common.verb == "estimate" || common.verb == "calibrate") {
+    json.update(undecided(failure.message));
+  }
   std::string_view words = failure.message;
   if (words.starts_with(job.input + ": ")) words.remove_prefix(job.input.size() + 2);
   return {failure.status, json, fmt::format("{}: failed: {}", job.input, words)};

@@ -52,7 +52,7 @@ DATA = {
     "help": (
         f"risley simulate -o recording.lvx {HALL} --duration-s 1",
         f"risley simulate -o wall.lvx {HALL} --duration-s 1 --seed 1",
-        "cp data/hall.yaml .",
+        "cp data/hall.yaml .", "cp data/campaign.yaml plan.yaml",
         "sed '/upright left/d; /flipped left/d' data/stations.yaml > stations.yaml",
         *(f"risley simulate -o {station}.lvx --sensor mid-40-table3 --reported nominal "
           f"--scene stations.yaml --station '{station} right' --duration-s 1"

@@ -57,6 +57,38 @@ class FleetTest(CommandTest):
     def estimate(self, status, *more):
         return self.expect_json(status, "estimate", "fleet", "-o", "results", *FAST, *more)
 
+    def test_calibrations_each_on_its_own(self):
+        found = self.expect_json(3, "calibrate", "fleet/east", "fleet/north", "fleet/bad/empty.lvx", "-o", "calibrated",
+                                 "--table", "units.csv", "--no-report", "--states", "none")
+        self.assertEqual([found[key] for key in ("done", "failed", "skipped")], [3, 1, 0])
+        self.assertEqual(sorted(one["input"] for one in found["results"]),
+                         ["fleet/bad/empty.lvx", "fleet/east/scan.lvx", "fleet/north/deep/walk.nc", "fleet/north/scan.lvx"])
+        with open(self.folder / "units.csv", newline="", encoding="utf-8") as file:
+            rows = {row["input"]: row for row in csv.DictReader(file)}
+        self.assertEqual(rows["fleet/bad/empty.lvx"]["exit_status"], "3")
+        for one in found["results"]:
+            if one["status"] != 0:
+                self.assertEqual(one["verdict"]["code"], "undecided")
+                continue
+            row = rows[one["input"]]
+            tilt = one["parameters"]["prism_tilt_a_vertical_deg"]
+            self.assertEqual(float(row["prism_tilt_a_vertical_deg"]), tilt["value"])
+            self.assertEqual(float(row["sigma_prism_tilt_a_vertical_deg"]), tilt["sigma"])
+            self.assertEqual(float(row["pointing_error_total_deg"]), one["pointing_error"]["total_deg"]["value"])
+            self.assertEqual(int(row["planes"]), len(one["planes"]))
+            # The same as of this recording alone.
+            alone = self.expect_json(0, "calibrate", one["input"])
+            self.assertEqual(alone["parameters"], one["parameters"])
+        again = self.expect_json(3, "calibrate", "fleet/east", "fleet/north", "fleet/bad/empty.lvx", "-o", "calibrated",
+                                 "--table", "units.csv", "--no-report", "--states", "none", "--resume")
+        self.assertEqual([again[key] for key in ("done", "failed", "skipped")], [0, 1, 3])
+        self.assertIn("is of one recording, and there are", self.expect(
+            2, "calibrate", "fleet/east", "fleet/north", "--table", "t.csv", "--truth",
+            "fleet/east/scan.lvx.truth.yaml").stderr)
+        # Without a table, one calibration of all.
+        joint = self.expect_json(0, "calibrate", "fleet/east", "fleet/north/scan.lvx")
+        self.assertNotIn("results", joint)
+
     def counts(self, found):
         return found["done"], found["failed"], found["skipped"]
 

@@ -30,7 +30,7 @@ WALL = """planes:
   - {name: wall, distance_m: 20, normal_azimuth_deg: 0, normal_zenith_deg: 90, sigma_deg: 0.01}
 """
 # What the runs below do not meet, because it takes minutes or a fault of the machine.
-RARE = re.compile(r"^reproduce|^common#slip\.|^estimate#result(_of_many)?\.shot_clock\.|^calibrate#walls\.steps\[\]\."
+RARE = re.compile(r"^reproduce|^common#slip\.|^estimate#result(_of_many)?\.shot_clock\.|^calibrate#(walls|result_of_many)\.steps\[\]\."
                   r"|^info#accuracies(_of_many)?\.warnings\[\]|^common#failed_file\.line|^calibrate#flight\.control\[\]\."
                   r"|^calibrate#flight\.held\.\*\.")
 UNKNOWN = ("No such name", [["x"]])
@@ -155,6 +155,10 @@ class SchemasTest(CommandTest):
         cls.print(2, "calibrate", "hall.lvx", "--nonsense")
         cls.print(1, "calibrate", "scan.csv")
         cls.print(0, "calibrate", "--plan", DATA / "stations.yaml", "--duration-s", 1)
+        cls.print(3, "calibrate", "hall.lvx", "bad.lvx", "--table", "calibrated.csv")
+        cls.print(1, "calibrate", "wall.lvx", "--planes", "wall.yaml", "--table", "walls.csv")
+        for _ in range(2):
+            cls.print(0, "calibrate", "hall.lvx", *truth, "--resume", "--no-report", "-o", "each")
         cls.print(0, "observability", "--duration-s", 1, "--rate-hz", 1000)
         cls.print(0, "observability", "--sensor", "horizon", "--duration-s", 0.5, "--rate-hz", 24000)
         cloud = ("--calibration", "calibrated", "--common-factors", "yes")
