@@ -20,7 +20,7 @@ namespace {
 
 using ChunkJson = nlohmann::ordered_json;
 
-constexpr const char* kKind = "risley_campaign_chunk";
+constexpr const char* kChunkKind = "risley_campaign_chunk";
 constexpr int kChunkVersion = 1;
 
 /// NaN is null in JSON.
@@ -80,7 +80,7 @@ std::string chunk_folder(const std::string& folder) {
 
 void save_chunk(const std::string& path, const ChunkHead& head,
                 const std::vector<CellOutcome>& outcomes) {
-  std::string text = line_of({{kKind, kChunkVersion},
+  std::string text = line_of({{kChunkKind, kChunkVersion},
                               {"work", head.work},
                               {"program", head.program},
                               {"first", head.first},
@@ -112,7 +112,7 @@ ChunkHead read_chunk(const std::string& path, const Progress& progress,
   try {
     ChunkHead head;
     const ChunkJson json = next();
-    if (!json.is_object() || json.value(kKind, 0) != kChunkVersion) {
+    if (!json.is_object() || json.value(kChunkKind, 0) != kChunkVersion) {
       fail("this is no chunk of a campaign, or one of another version of risley");
     }
     json.at("work").get_to(head.work);

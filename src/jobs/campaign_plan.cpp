@@ -153,7 +153,7 @@ class PlanReader {
   std::string choice(const YamlMap& map, std::string_view key,
                      const std::vector<std::string>& known) const {
     if (map.find(key) == nullptr) return known.front();
-    const std::string text = map.text(key);
+    std::string text = map.text(key);
     if (std::find(known.begin(), known.end(), text) == known.end()) {
       fail_at(path_, map.at(key).line,
               fmt::format("{} = \"{}\"{}, allowed: {}", map.field(key), text,
@@ -164,7 +164,7 @@ class PlanReader {
 
   /// A file beside the plan, or an absolute one.
   std::string file(const std::string& name) {
-    const std::string path = (folder_ / name).lexically_normal().string();
+    std::string path = (folder_ / name).lexically_normal().string();
     files_.emplace(name, path);
     return path;
   }

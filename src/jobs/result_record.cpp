@@ -20,7 +20,7 @@ namespace {
 namespace fs = std::filesystem;
 using RecordJson = nlohmann::ordered_json;
 
-constexpr const char* kKind = "risley_record";
+constexpr const char* kRecordKind = "risley_record";
 constexpr int kRecordVersion = 1;
 
 }  // namespace
@@ -32,7 +32,7 @@ void save_record(const std::string& path, const ResultRecord& record) {
   for (const auto& [file, hash] : record.outputs) {
     outputs.push_back({{"path", file}, {"sha256", hash}});
   }
-  const RecordJson json = {{kKind, kRecordVersion},
+  const RecordJson json = {{kRecordKind, kRecordVersion},
                            {"work", record.work},
                            {"inputs_sha256", record.inputs},
                            {"outputs", outputs},
@@ -45,7 +45,7 @@ std::optional<ResultRecord> load_record(const std::string& path) {
   if (!fs::is_regular_file(path, ignored)) return std::nullopt;
   try {
     const RecordJson json = RecordJson::parse(io::read_text_file(path));
-    if (json.at(kKind) != kRecordVersion) return std::nullopt;
+    if (json.at(kRecordKind) != kRecordVersion) return std::nullopt;
     ResultRecord record;
     json.at("work").get_to(record.work);
     json.at("inputs_sha256").get_to(record.inputs);

@@ -258,8 +258,8 @@ TEST_F(CampaignTest, WhatAFormatCannotHoldIsToldWithTheSetting) {
 
 TEST_F(CampaignTest, ChunksThatThereAreNotAreRefused) {
   const CampaignPlan all = plan();
-  const auto refused = [&](const CampaignPart& part) {
-    return refusal([&] { run_chunk(all, part, options("a")); });
+  const auto refused = [&](const ChunkNumber& which) {
+    return refusal([&] { run_chunk(all, which, options("a")); });
   };
   EXPECT_EQ(refused({0, 3}), "option chunk = 0/3, wanted I/N with I from 1 to N");
   EXPECT_EQ(refused({4, 3}), "option chunk = 4/3, wanted I/N with I from 1 to N");

@@ -86,6 +86,7 @@ CampaignChunk run_chunk(const CampaignPlan& plan, const ChunkNumber& which,
 struct BandedFigure {
   double value = 0, low = 0, high = 0;
 
+  /// Whether the value lies in the band.
   bool inside() const { return low <= value && value <= high; }
 };
 

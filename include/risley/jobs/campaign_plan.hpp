@@ -46,6 +46,7 @@ struct CampaignPlan {
   /// whatever order and with whatever comments, and the bytes of the files that it names.
   std::string work;
 
+  /// Number of all cells.
   std::uint64_t cells() const { return settings.size() * seeds; }
   /// A message with the plan and a setting before it.
   std::string about(const CampaignSetting& setting, const std::string& message) const;
