@@ -40,7 +40,8 @@ FILES += [(f"pattern to {name}", ["pattern", "--sensor", "avia", "--duration-s",
 FILES += [("simulate", ["simulate", "--duration-s", "0.01", "-o"], "out.nc"),
           ("preset new", ["preset", "new", "mine", "--from", "mid-40", "-o"], "out.yaml"),
           ("report", ["report", "result", "-o"], "out.html"),
-          ("compare", ["compare", "result", "result", "-o"], "out.html")]
+          ("compare", ["compare", "result", "result", "-o"], "out.html"),
+          ("campaign", ["campaign", "plan.yaml", "--merge", "-o", "campaign", "--table"], "out.csv")]
 FILES += [("page of a pattern", ["pattern", "--sensor", "avia", "--duration-s", "0.002", "--report"],
            "out.html"),
           ("map of beam origins", ["cloud", "--calibration", "mid-40", "--beam-origin-map"], "map.html")]
@@ -102,6 +103,11 @@ class FaultsTest(unittest.TestCase):
                                    str(SOURCE / "data/room.yaml"), *more])
             assert done.returncode == 0, done.stderr
         done, _ = run(inputs, ["estimate", "old.nc", "-o", "result"])
+        assert done.returncode == 0, done.stderr
+        (inputs / "plan.yaml").write_text(
+            "simulate: {duration_s: 0.1, rate_hz: 1000, format: sequence.csv}\nestimate: {sensor: mid-40}\n"
+            "seeds: {count: 2}\n")
+        done, _ = run(inputs, ["campaign", "plan.yaml", "--chunk", "1/1", "-o", "campaign"])
         assert done.returncode == 0, done.stderr
         done, _ = run(inputs, ["simulate", "-o", "flight.lvx", "--flight", str(SOURCE / "data/flight-s4.yaml"),
                                *FLIGHT[2:], "--scene", str(SOURCE / "data/village.yaml"), "--rate-hz", "100",
