@@ -222,6 +222,9 @@ jobs::CalibrateFlightOptions flight_job_of(const CalibrateCommandOptions& option
 
 ExitStatus run_plan(const CalibrateCommandOptions& options, const CommonOptions& common) {
   if (!options.inputs.empty()) throw InvalidArgument("--plan takes no recordings");
+  if (!options.many.table.empty() || options.many.resume || options.no_report) {
+    throw InvalidArgument("--table, --resume and --no-report go with recordings, not with --plan");
+  }
   if (jobs::is_flight_plan(options.plan)) {
     jobs::PlanFlightOptions job;
     take_common(options, job);
@@ -327,8 +330,7 @@ Run declare_calibrate(CLI::App& verb) {
   verb.add_option("--plan", o.plan,
                   "Scene or flight (YAML) to plan for: predicts how good a calibration there would "
                   "be and, for a flight, how its points would lie on the ground")
-      ->excludes("--output", "--method", "--planes", "--stations", "--station", "--list", "--table",
-                 "--resume", "--no-report");
+      ->excludes("--output", "--method", "--planes", "--stations", "--station", "--list");
   verb.add_option("--duration-s", o.duration_s, "Length of each planned recording, s")
       ->needs("--plan")
       ->capture_default_str();
