@@ -189,7 +189,12 @@ Run declare_campaign(CLI::App& verb) {
                   "Table to write with one row per cell; the ending chooses the format: .csv, .nc "
                   "(NetCDF), .sqlite, .sqlite3 or .db (SQLite) (default: cells.csv in the folder)")
       ->type_name("FILE");
-  return [options](const CommonOptions& common) { return run_campaign(*options, common); };
+  return [options, &verb](const CommonOptions& common) {
+    if (verb.get_option("--seed")->count() > 0) {
+      throw InvalidArgument("--seed: the seeds of a campaign stand in its plan, under seeds");
+    }
+    return run_campaign(*options, common);
+  };
 }
 
 }  // namespace risley::app
