@@ -137,7 +137,7 @@ ExitStatus run_campaign(CampaignCommandOptions options, const CommonOptions& typ
   if (options.table.empty()) {
     options.table = (std::filesystem::path(options.folder) / "cells.csv").string();
   }
-  const jobs::CampaignPlan plan = jobs::load_campaign_plan(options.plan);
+  const jobs::CampaignPlan plan = jobs::load_campaign_plan(options.plan, typed.seed);
   CommonOptions common = typed;
   common.files.insert(common.files.end(), plan.files.begin(), plan.files.end());
   require_apart(common,
@@ -189,12 +189,7 @@ Run declare_campaign(CLI::App& verb) {
                   "Table to write with one row per cell; the ending chooses the format: .csv, .nc "
                   "(NetCDF), .sqlite, .sqlite3 or .db (SQLite) (default: cells.csv in the folder)")
       ->type_name("FILE");
-  return [options, &verb](const CommonOptions& common) {
-    if (verb.get_option("--seed")->count() > 0) {
-      throw InvalidArgument("--seed: the seeds of a campaign stand in its plan, under seeds");
-    }
-    return run_campaign(*options, common);
-  };
+  return [options](const CommonOptions& common) { return run_campaign(*options, common); };
 }
 
 }  // namespace risley::app

@@ -608,7 +608,7 @@ def compare(results: Sequence[Path], *, false_alarm: float = 0.01,
 
 
 def campaign(plan: Path, output: Path, *, chunk: Optional[Tuple[int, int]] = None,
-             merge: bool = False, table: Path = "", threads: int = 0,
+             merge: bool = False, table: Path = "", seed: int = 0, threads: int = 0,
              progress: Progress = None) -> Dict[str, Any]:
     """Simulate and estimate, or calibrate, many times over, as a plan says.
 
@@ -626,6 +626,8 @@ def campaign(plan: Path, output: Path, *, chunk: Optional[Tuple[int, int]] = Non
     table : str or path, optional
         Table to write with one row per cell, by default ``cells.csv`` in the folder. The ending
         chooses the format.
+    seed : int, default 0
+        Added to the seeds of the plan, for other draws.
     threads, progress
         As in `risley.estimate`.
 
@@ -644,7 +646,7 @@ def campaign(plan: Path, output: Path, *, chunk: Optional[Tuple[int, int]] = Non
         raise ValueError("chunk and merge cannot be combined: merge when all chunks are done")
     options: Dict[str, Any] = {
         "plan": os.fspath(plan), "output": os.fspath(output), "merge": merge,
-        "table": os.fspath(table) or os.path.join(os.fspath(output), "cells.csv")}
+        "seed": seed, "table": os.fspath(table) or os.path.join(os.fspath(output), "cells.csv")}
     if chunk is not None:
         options["chunk"], options["chunks"] = chunk
     with telling(progress) as tell:

@@ -34,7 +34,7 @@ using io::fail_at;
 using io::YamlMap;
 using io::YamlNode;
 
-constexpr std::uint64_t kMostSettings = 1000;
+constexpr std::uint64_t kMostSettings = 1000, kLargestSeed = std::uint64_t{1} << 62U;
 constexpr int kMostSeeds = 100'000'000;
 constexpr long double kMostDuration = 86'400, kMostRate = 1e7L;  // s, Hz
 constexpr long double kMostAngle_deg = 10, kMostDistance = 100;  // deg, m
@@ -373,11 +373,15 @@ CampaignCell CampaignPlan::cell(std::uint64_t number) const {
           first_seed + number / settings.size()};
 }
 
-CampaignPlan load_campaign_plan(const std::string& path) {
-  return parse_campaign_plan(io::read_text_file(path), path);
+CampaignPlan load_campaign_plan(const std::string& path, std::uint64_t seed) {
+  return parse_campaign_plan(io::read_text_file(path), path, seed);
 }
 
-CampaignPlan parse_campaign_plan(const std::string& text, const std::string& path) {
+CampaignPlan parse_campaign_plan(const std::string& text, const std::string& path,
+                                 std::uint64_t seed) {
+  if (seed > kLargestSeed) {
+    throw InvalidArgument(fmt::format("option seed = {}, allowed: 0 to {}", seed, kLargestSeed));
+  }
   const YamlNode root = io::parse_yaml(text, path);
   const YamlMap map(root, path, "");
   map.allow_only({"simulate", "estimate", "calibrate", "grid", "seeds"});
@@ -394,6 +398,7 @@ CampaignPlan parse_campaign_plan(const std::string& text, const std::string& pat
     plan.first_seed =
         static_cast<std::uint64_t>(seeds.integer("first", 0, std::numeric_limits<int>::max()));
   }
+  plan.first_seed += seed;
   plan.seeds = static_cast<std::uint64_t>(seeds.integer("count", 1, kMostSeeds));
   const std::vector<GridAxis> axes = grid_of(map);
   const std::uint64_t count = count_of(axes, path);

@@ -425,16 +425,18 @@ py::object campaign(const py::dict& values, int threads, const py::object& tell)
   options.take("output", job.folder);
   bool merge = false;
   options.take("merge", merge);
+  std::uint64_t seed = 0;
+  options.take("seed", seed);
   if (options.has("chunk")) {
     jobs::ChunkNumber which;
     options.take("chunk", which.number);
     options.take("chunks", which.count);
     return told_by(tell, threads, [&](const Progress& progress) {
-      return jobs::run_chunk(jobs::load_campaign_plan(path), which, job, progress);
+      return jobs::run_chunk(jobs::load_campaign_plan(path, seed), which, job, progress);
     });
   }
   return told_by(tell, threads, [&](const Progress& progress) {
-    const jobs::CampaignPlan plan = jobs::load_campaign_plan(path);
+    const jobs::CampaignPlan plan = jobs::load_campaign_plan(path, seed);
     return merge ? jobs::merge_chunks(plan, table, job, progress)
                  : jobs::run_campaign(plan, table, job, progress);
   });

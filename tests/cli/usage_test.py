@@ -77,7 +77,6 @@ WRONG = [
     (["report"], "DIR"),
     (["compare"], "RESULT"),
     (["campaign", "-o", "results"], "PLAN"),
-    (["campaign", "plan.yaml", "-o", "results", "--seed", "3"], "stand in its plan"),
     (["calibrate", "--plan", "a.yaml", "--table", "t.csv"], "go with recordings, not with --plan"),
     (["simulate", "-o", "a.csv", "--seed", "-1"], "found -1, allowed whole numbers 0 to"),
     (["simulate", "-o", "a.csv", "--seed=-1"], "found -1"),

@@ -72,6 +72,11 @@ TEST_F(CampaignTest, APlanIsAGridTimesSeeds) {
   EXPECT_EQ(found.cell(0).seed, 5U);
   EXPECT_EQ(found.cell(7).setting, 1U);
   EXPECT_EQ(found.cell(7).seed, 6U);
+  const CampaignPlan other = load_campaign_plan(file("plan.yaml"), 100);
+  EXPECT_EQ(other.cell(7).seed, 106U);
+  EXPECT_NE(other.work, found.work);
+  EXPECT_NE(refusal([&] { load_campaign_plan(file("plan.yaml"), ~std::uint64_t{0}); }).find("seed"),
+            std::string::npos);
 }
 
 TEST_F(CampaignTest, CommentsAndOrderAreNotTheWorkButFilesAre) {

@@ -62,9 +62,11 @@ struct CampaignPlan {
 /// @throws FileError with the line for what is not such a plan, and for files that it names;
 ///         InvalidArgument naming the setting for values that a simulation or an estimate refuses
 /// @param path  for messages, and to find the files
-CampaignPlan parse_campaign_plan(const std::string& text, const std::string& path);
+/// @param seed  added to the seeds of the plan, for other draws; at most 2^62
+CampaignPlan parse_campaign_plan(const std::string& text, const std::string& path,
+                                 std::uint64_t seed = 0);
 
 /// parse_campaign_plan() of a file. @throws FileError
-CampaignPlan load_campaign_plan(const std::string& path);
+CampaignPlan load_campaign_plan(const std::string& path, std::uint64_t seed = 0);
 
 }  // namespace risley::jobs
