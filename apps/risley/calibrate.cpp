@@ -166,15 +166,9 @@ FileOutcome calibrate_one(const FileJob& file, const CalibrateCommandOptions& op
   const calibration::Calibration& c = found.calibration;
   for (const std::string& words : found.warnings) spdlog::warn("{}: {}", file.input, words);
   for (const std::string& words : c.warnings) spdlog::warn("{}: {}", file.input, words);
-  Json json = json::of(found);
-  json["input"] = file.input;
-  if (!file.output.empty()) json["output"] = file.output;
-  json["message"] = c.converged ? "" : c.reason;
-  std::string text = fmt::format("{}: {}", file.input, to_string(c.verdict.code));
-  if (!c.converged) text += fmt::format(", not converged: {}", c.reason);
-  text += fmt::format("; {}, {} points on {} planes", jobs::sensor_name(found.choice),
-                      grouped(c.points), c.planes.size());
-  return {c.converged ? kDone : kNumbersFailed, std::move(json), std::move(text)};
+  return judged_outcome(file, json::of(found), c.converged ? "" : c.reason,
+                        fmt::format("{}, {} points on {} planes", jobs::sensor_name(found.choice),
+                                    grouped(c.points), c.planes.size()));
 }
 
 ExitStatus calibrate_each(const CalibrateCommandOptions& options, const CLI::App& verb,
@@ -299,8 +293,7 @@ Run declare_calibrate(CLI::App& verb) {
   verb.get_option("--resume")
       ->description(
           "Calibrate every recording on its own, but skip those whose results are whole and were "
-          "made "
-          "from the same bytes with the same options and version");
+          "made from the same bytes with the same options and version");
   verb.add_option(
       "-o,--output", o.folder,
       "Folder to write calibration.yaml, states.nc (states_1.nc, ...), report.json and report.html "

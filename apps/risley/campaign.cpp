@@ -14,7 +14,6 @@
 #include <spdlog/spdlog.h>
 
 #include "risley/core/error.hpp"
-#include "risley/core/number_text.hpp"
 #include "risley/io/text_file.hpp"
 
 #include "command.hpp"
@@ -69,9 +68,7 @@ void print_parameters(const jobs::SettingSummary& summary) {
 void print_merged(const jobs::CampaignResult& merged) {
   say("{} of {} cells\ntable: {}\n", grouped(merged.done), grouped(merged.cells), merged.table);
   const auto words = [](const jobs::SettingSummary& one) {
-    jobs::CampaignSetting setting;
-    setting.grid = one.grid;
-    return one.grid.empty() ? std::string("all") : setting.words();
+    return one.grid.empty() ? std::string("all") : jobs::grid_words(one.grid);
   };
   say("\n");
   Table table({"setting", "cells", "answered", "error/bound", "NEES", "95 of 100"});

@@ -171,15 +171,10 @@ FileOutcome estimate_one(const FileJob& file, const EstimateCommandOptions& opti
   const Estimate& e = found.estimate;
   for (const std::string& words : found.warnings) spdlog::warn("{}: {}", file.input, words);
   for (const std::string& words : e.warnings) spdlog::warn("{}: {}", file.input, words);
-  Json json = json::of(found);
-  json["input"] = file.input;
-  if (!file.output.empty()) json["output"] = file.output;
-  json["message"] = e.converged ? "" : with_flags(e.reason);
-  std::string text = fmt::format("{}: {}", file.input, to_string(e.verdict.code));
-  if (!e.converged) text += fmt::format(", not converged: {}", with_flags(e.reason));
-  text += fmt::format("; {}, {} shots, {} of them outliers", jobs::sensor_name(found.choice),
-                      grouped(e.series.size()), grouped(e.outliers));
-  return {e.converged ? kDone : kNumbersFailed, std::move(json), std::move(text)};
+  return judged_outcome(
+      file, json::of(found), e.converged ? "" : with_flags(e.reason),
+      fmt::format("{}, {} shots, {} of them outliers", jobs::sensor_name(found.choice),
+                  grouped(e.series.size()), grouped(e.outliers)));
 }
 
 ExitStatus estimate_several(const FileJobs& files, const EstimateCommandOptions& options,

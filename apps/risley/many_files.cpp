@@ -499,6 +499,19 @@ std::string records_beside(const std::string& result) {
 
 }  // namespace
 
+FileOutcome judged_outcome(const FileJob& file, Json json, const std::string& reason,
+                           const std::string& words) {
+  const bool converged = json.at("converged").get<bool>();
+  json["input"] = file.input;
+  if (!file.output.empty()) json["output"] = file.output;
+  json["message"] = reason;
+  std::string text =
+      fmt::format("{}: {}", file.input, json.at("verdict").at("code").get<std::string>());
+  if (!converged) text += fmt::format(", not converged: {}", reason);
+  text += "; " + words;
+  return {converged ? kDone : kNumbersFailed, std::move(json), std::move(text)};
+}
+
 CLI::Option* add_many_options(CLI::App& verb, ManyWishes& wishes, const std::string& what) {
   auto* inputs = verb.add_option(
       "INPUT", wishes.inputs,

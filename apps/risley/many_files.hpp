@@ -37,6 +37,13 @@ struct FileOutcome {
   std::string text;  ///< one line for people
 };
 
+/// The outcome of a job whose numbers have a verdict.
+/// @param json    what was found, with converged and verdict
+/// @param reason  why it did not converge, in words of the command; empty where it did
+/// @param words   what it was made from
+FileOutcome judged_outcome(const FileJob& file, Json json, const std::string& reason,
+                           const std::string& words);
+
 /// Jobs of one command.
 struct FileJobs {
   std::vector<FileJob> jobs;

@@ -2,7 +2,6 @@
 // SPDX-License-Identifier: MIT
 #include "risley/jobs/campaign.hpp"
 
-#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <limits>
@@ -16,7 +15,6 @@
 
 #include "risley/algebra/symmetric.hpp"
 #include "risley/core/error.hpp"
-#include "risley/core/require.hpp"
 #include "risley/io/folder.hpp"
 #include "risley/simulation/truth_file.hpp"
 
@@ -34,14 +32,19 @@ std::string with_letter(const char* name, std::size_t prism) {
   return fmt::format("{}_{}", name, static_cast<char>('a' + prism));
 }
 
+/// Whether an estimate or a calibration answers, and what it says of itself.
+template <class Found>
+bool take_answer(const Found& found, CellOutcome& outcome) {
+  outcome.answered = found.converged;
+  outcome.verdict = to_string(found.verdict.code);
+  outcome.message = found.reason;  // empty where it converged
+  outcome.degrees_of_freedom = found.converged ? found.free.size() : 0;
+  return found.converged;
+}
+
 void take(const EstimatedRecording& found, CellOutcome& outcome) {
   const estimation::Estimate& e = found.estimate;
-  outcome.answered = e.converged;
-  outcome.verdict = estimation::to_string(e.verdict.code);
-  if (!e.converged) {
-    outcome.message = e.reason;
-    return;
-  }
+  if (!take_answer(e, outcome)) return;
   const estimation::Evaluation& judged = *found.evaluation;
   for (std::size_t i = 0; i < e.values.size(); ++i) {
     const estimation::TruthComparison& one = judged.parameters[i];
@@ -49,7 +52,6 @@ void take(const EstimatedRecording& found, CellOutcome& outcome) {
         {one.name, one.truth, one.error, e.values[i].sigma, e.values[i].sigma_given_held});
   }
   outcome.nees = judged.nees_parameters;
-  outcome.degrees_of_freedom = e.free.size();
   outcome.nees_rotation_angles = judged.nees_rotation_angles;
   const auto add = [&](const char* name, const std::vector<double>& rms,
                        const std::vector<double>& over_sigma) {
@@ -63,12 +65,7 @@ void take(const EstimatedRecording& found, CellOutcome& outcome) {
 
 void take(const CalibratedRecordings& found, CellOutcome& outcome) {
   const calibration::Calibration& c = found.calibration;
-  outcome.answered = c.converged;
-  outcome.verdict = calibration::to_string(c.verdict.code);
-  if (!c.converged) {
-    outcome.message = c.reason;
-    return;
-  }
+  if (!take_answer(c, outcome)) return;
   const auto count = static_cast<Eigen::Index>(c.free.size());
   Eigen::VectorXd error(count);
   for (Eigen::Index i = 0; i < count; ++i) {
@@ -78,7 +75,6 @@ void take(const CalibratedRecordings& found, CellOutcome& outcome) {
     outcome.parameters.push_back(
         {c.free[place].name, truth, error[i], c.total_sigma(place), std::sqrt(c.covariance(i, i))});
   }
-  outcome.degrees_of_freedom = c.free.size();
   outcome.nees = algebra::SymmetricSolver(c.covariance).chi2(error) / static_cast<double>(count);
   outcome.errors = {{"directions", found.truth->after.total, c.datum_given_held.total},
                     {"shape", found.truth->after.shape, c.datum_given_held.shape},

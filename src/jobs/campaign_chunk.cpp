@@ -11,7 +11,6 @@
 #include <nlohmann/json.hpp>
 
 #include "risley/core/error.hpp"
-#include "risley/io/output_file.hpp"
 #include "risley/io/sha256.hpp"
 #include "risley/io/text_file.hpp"
 

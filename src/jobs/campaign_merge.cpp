@@ -143,7 +143,7 @@ class SettingSums {
     return all.emplace_back(name, Sums{}).second;
   }
 
-  std::vector<std::pair<std::string, std::string>> grid_;
+  GridPoint grid_;
   TrainShape shape_;
   std::uint64_t cells_ = 0, answered_ = 0;
   double nees_ = 0, degrees_ = 0, nees_rotation_angles_ = 0;
@@ -153,8 +153,11 @@ class SettingSums {
 /// Names in the order in which they were first seen.
 class Names {
  public:
-  void note(const std::string& name) {
-    if (places_.emplace(name, all_.size()).second) all_.push_back(name);
+  /// @return whether it is new
+  bool note(const std::string& name) {
+    const bool is_new = places_.emplace(name, all_.size()).second;
+    if (is_new) all_.push_back(name);
+    return is_new;
   }
   const std::vector<std::string>& all() const { return all_; }
   std::size_t place(const std::string& name) const { return places_.at(name); }
@@ -172,7 +175,11 @@ class CellTable {
   }
 
   void note(const CellOutcome& outcome) {
-    for (const CellParameter& one : outcome.parameters) parameters_.note(one.name);
+    const TrainShape shape =
+        plan_.settings.at(outcome.cell.setting).simulations.front().truth.shape();
+    for (const CellParameter& one : outcome.parameters) {
+      if (parameters_.note(one.name)) infos_.push_back(find_parameter(one.name, shape));
+    }
     for (const CellErrors& one : outcome.errors) errors_.note(one.name);
   }
 
@@ -190,7 +197,7 @@ class CellTable {
     columns.push_back({"verdict", CellKind::text, "", "code of the verdict"});
     columns.push_back({"message", CellKind::text, "", "why there is no answer"});
     for (const std::string& name : parameters_.all()) {
-      const std::string unit = unit_of(name);
+      const std::string unit = infos_[parameters_.place(name)].unit;
       columns.push_back({name + ".truth", CellKind::real, unit, "true value"});
       columns.push_back({name + ".error", CellKind::real, unit, "found minus true value"});
       columns.push_back({name + ".sigma", CellKind::real, unit,
@@ -225,10 +232,10 @@ class CellTable {
     const std::size_t parameters = row.size();
     row.resize(parameters + 4 * parameters_.all().size());
     for (const CellParameter& one : outcome.parameters) {
-      const double unit = si_per_unit(one.name);
-      std::size_t at = parameters + 4 * parameters_.place(one.name);
+      const std::size_t place = parameters_.place(one.name);
+      std::size_t at = parameters + 4 * place;
       for (const double value : {one.truth, one.error, one.sigma, one.sigma_given_held}) {
-        row[at++] = value / unit;
+        row[at++] = value / infos_[place].si_per_unit;
       }
     }
     row.emplace_back(outcome.nees);
@@ -247,21 +254,9 @@ class CellTable {
  private:
   static io::TableCell integer(std::uint64_t value) { return static_cast<std::int64_t>(value); }
 
-  /// Of the first setting that has such a parameter: units do not differ.
-  ParameterInfo info(const std::string& name) const {
-    for (const CampaignSetting& setting : plan_.settings) {
-      try {
-        return find_parameter(name, setting.simulations.front().truth.shape());
-      } catch (const InvalidArgument&) {  // a sensor with fewer prisms
-      }
-    }
-    throw InvalidArgument(fmt::format("{}: no setting has such a parameter", name));
-  }
-  std::string unit_of(const std::string& name) const { return info(name).unit; }
-  double si_per_unit(const std::string& name) const { return info(name).si_per_unit; }
-
   const CampaignPlan& plan_;
   Names grid_, parameters_, errors_;
+  std::vector<ParameterInfo> infos_;  ///< of the parameters
 };
 
 /// A file of cells that counts.

@@ -357,14 +357,14 @@ std::uint64_t count_of(const std::vector<GridAxis>& axes, const std::string& pat
 
 }  // namespace
 
-std::string CampaignSetting::words() const {
+std::string grid_words(const GridPoint& grid) {
   std::vector<std::string> parts;
   for (const auto& [name, value] : grid) parts.push_back(fmt::format("{} {}", name, value));
   return fmt::format("{}", fmt::join(parts, ", "));
 }
 
 std::string CampaignPlan::about(const CampaignSetting& setting, const std::string& message) const {
-  const std::string words = setting.words();
+  const std::string words = grid_words(setting.grid);
   return fmt::format("{}: {}{}{}", path, words, words.empty() ? "" : ": ", message);
 }
 
@@ -406,7 +406,7 @@ CampaignPlan parse_campaign_plan(const std::string& text, const std::string& pat
   std::vector<std::string> work = {fmt::format("seeds {} {}", plan.first_seed, plan.seeds)};
   for (std::uint64_t number = 0; number < count; ++number) {
     YamlNode node = root;
-    std::vector<std::pair<std::string, std::string>> grid;
+    GridPoint grid;
     std::uint64_t rest = number;
     for (auto axis = axes.rbegin(); axis != axes.rend(); ++axis) {
       const YamlNode& value = axis->values[static_cast<std::size_t>(rest % axis->values.size())];

@@ -65,7 +65,8 @@ TEST_F(CampaignTest, APlanIsAGridTimesSeeds) {
   const CampaignPlan found = plan();
   ASSERT_EQ(found.settings.size(), 6U);
   EXPECT_EQ(found.cells(), 12U);
-  EXPECT_EQ(found.settings[1].words(), "simulate.noise_angle_deg 0.01, simulate.rotor hunting");
+  EXPECT_EQ(grid_words(found.settings[1].grid),
+            "simulate.noise_angle_deg 0.01, simulate.rotor hunting");
   const simulation::SimulationSettings& last = found.settings[5].simulations.front();
   EXPECT_EQ(last.rotor, simulation::RotorKind::sinusoidal);
   EXPECT_DOUBLE_EQ(*last.angle_noise, radians_from_degrees(0.02));

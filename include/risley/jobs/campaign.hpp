@@ -113,8 +113,8 @@ struct ErrorSummary {
 
 /// All cells of a setting together.
 struct SettingSummary {
-  std::vector<std::pair<std::string, std::string>> grid;  ///< as CampaignSetting has it
-  TrainShape shape;                                       ///< of the sensor
+  GridPoint grid;
+  TrainShape shape;  ///< of the sensor
   std::uint64_t cells = 0, answered = 0;
   std::vector<ParameterSummary> parameters;
   double error_over_bound = 0;  ///< root mean square over the parameters of the prisms

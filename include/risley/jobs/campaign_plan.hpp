@@ -15,18 +15,20 @@
 
 namespace risley::jobs {
 
+/// What a campaign's grid says at one of its points, by name and as it is written there.
+using GridPoint = std::vector<std::pair<std::string, std::string>>;
+
+/// "simulate.noise_angle_deg 0.01, estimate.method ekf"; empty without a grid.
+std::string grid_words(const GridPoint& grid);
+
 /// One point of a campaign's grid: what is simulated and what is then done with it.
 struct CampaignSetting {
-  /// What the grid says here, by name and as it is written there.
-  std::vector<std::pair<std::string, std::string>> grid;
+  GridPoint grid;
   /// One per recording: one, or one at each station. The seed is a cell's.
   std::vector<simulation::SimulationSettings> simulations;
   std::string format;  ///< ending of the recordings, which chooses their format
   /// Without recordings and truths, which are a cell's.
   std::variant<EstimateRecordingOptions, CalibrateRecordingsOptions> job;
-
-  /// "simulate.noise_angle_deg 0.01, estimate.method ekf"; empty without a grid.
-  std::string words() const;
 };
 
 /// A simulation with what is then made of it, of one setting and one seed.
