@@ -581,15 +581,15 @@ def observability(recording: Path = "", *, sensor: Path = "", duration: Optional
 
 def compare(results: Sequence[Path], *, false_alarm: float = 0.01,
             progress: Progress = None) -> Dict[str, Any]:
-    """Find out whether a unit has changed, from results of different days.
+    """Find out whether a unit has changed, and which units of a fleet are unlike the others.
 
     Parameters
     ----------
     results : sequence of str or path
-        Folders that `estimate` or `calibrate` wrote, or calibration files, in order of time; at
-        least two.
+        Folders that `estimate` or `calibrate` wrote, or calibration files, in order of time;
+        also tables of such results, whose rows are followed. At least two results.
     false_alarm : float, default 0.01
-        Probability that a series without any change is called changed.
+        Probability that chance is taken for a change, or a unit for an outlier, at most.
     progress : bool or callable, optional
         As in `risley.read`.
 
@@ -601,7 +601,8 @@ def compare(results: Sequence[Path], *, false_alarm: float = 0.01,
     Raises
     ------
     FileError, ValueError
-        For damaged files, and for results of different kinds of sensors.
+        For damaged files and tables without any result, and for results of which no two are of one
+        kind of sensor.
     """
     with telling(progress) as tell:
         return dict(_risley.compare(_paths(results), false_alarm, tell))

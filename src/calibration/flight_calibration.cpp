@@ -12,6 +12,7 @@
 
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
+#include "risley/core/median.hpp"
 #include "risley/core/random.hpp"
 #include "risley/core/require.hpp"
 #include "risley/core/saturating.hpp"
@@ -32,8 +33,7 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kNormalOfMedian = 1.4826;  // sigma of a normal distribution over its MAD
-constexpr double kCauchy = 1.5;             // median absolute residuals
+constexpr double kCauchy = 1.5;  // median absolute residuals
 /// Variance of a normal distribution cut off at the gate.
 constexpr double kGatedVariance = 0.97334;
 constexpr double kCoarseKnots = 20;     // s
@@ -260,7 +260,7 @@ class FlightWork {
           std::max(coarse_.cells.scatter, std::sqrt(stated_range_variance(options_)));
       range_variance_ = scatter * scatter;
       FlightWeights own = weights();
-      own.cauchy_scale = kCauchy / kNormalOfMedian * scatter;
+      own.cauchy_scale = kCauchy / kSigmaOverMedianDistance * scatter;
       adjust(coarse_, own, steps);
       progress_.report(done += 0.035);
     };
@@ -335,7 +335,7 @@ class FlightWork {
         std::max(coarse_.cells.scatter, std::sqrt(stated_range_variance(options_)));
     range_variance_ = stated_range_variance(options_);
     FlightWeights first = weights();
-    first.cauchy_scale = 2 * kCauchy / kNormalOfMedian * scatter;
+    first.cauchy_scale = 2 * kCauchy / kSigmaOverMedianDistance * scatter;
     adjust(coarse_, first, 2);
     progress_.report(0.5);
     set_knots(full_.shots, spacing);

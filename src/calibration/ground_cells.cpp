@@ -25,8 +25,7 @@ namespace {
 using Eigen::Index;
 using Eigen::Vector3d;
 
-constexpr double kFarthest = 1e6;        // m
-constexpr double kNormalOfMad = 1.4826;  // sigma of a normal distribution over its MAD
+constexpr double kFarthest = 1e6;  // m
 constexpr double kCauchyMads = 1.5;
 constexpr int kFits = 8;
 /// Scatter that still is that of a plane, over the noise: a little unevenness, and what chance does
@@ -147,7 +146,7 @@ Outcome plane_of(const ShotPoints& points, std::span<const std::uint32_t> rows,
   const double significant =
       options.noise > 0 ? options.noise * (kUnevenness + kScatterSigmas / std::sqrt(points_fitted))
                         : std::numeric_limits<double>::infinity();
-  if (kNormalOfMad * median(distance) > std::min(options.most_roughness, significant)) {
+  if (kSigmaOverMedianDistance * median(distance) > std::min(options.most_roughness, significant)) {
     result.rough = true;
     return result;
   }
@@ -318,7 +317,7 @@ GroundCells ground_cells(const ShotPoints& points, const std::vector<std::uint16
       }
     }
   });
-  if (!distances.empty()) cells.scatter = kNormalOfMad * median(distances);
+  if (!distances.empty()) cells.scatter = kSigmaOverMedianDistance * median(distances);
   return cells;
 }
 

@@ -24,7 +24,6 @@ constexpr std::size_t kLeastPoints = 5;  ///< of a cell
 constexpr std::array<std::size_t, 4> kLeastCells{1, 10, 20, 40};
 constexpr double kTukey = 4.685;        ///< in robust sigmas: cells beyond have no weight
 constexpr int kMostWeightRounds = 30;   ///< of weights and fits
-constexpr double kNormalMad = 1.4826;   ///< sigma over the median absolute value
 constexpr double kOff = 2.5;            ///< sigmas of a cell that stands off
 constexpr double kAround = 1.5;         ///< the same of its neighbours
 constexpr double kLeastRegion = 3;      ///< cells of a step
@@ -99,7 +98,7 @@ class SmoothSurface {
       cell.z = cell.offset / cell.centre_sigma;
       if (cell.full) sizes.push_back(std::abs(cell.z));
     }
-    spread_ = std::max(1.0, kNormalMad * median(sizes));
+    spread_ = std::max(1.0, kSigmaOverMedianDistance * median(sizes));
   }
 
   void fit(std::vector<Cell>& cells, std::size_t terms) {

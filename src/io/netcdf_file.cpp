@@ -154,6 +154,33 @@ bool NetcdfFile::has_variable(const std::string& name) const {
   return nc_inq_varid(id_, name.c_str(), &number) == NC_NOERR;
 }
 
+std::vector<std::string> NetcdfFile::texts(const std::string& name,
+                                           const NetcdfDimension& along) const {
+  const std::string action = fmt::format("read the texts of variable {}", name);
+  int number = 0, rank = 0, dimension = 0;
+  nc_type type = NC_NAT;
+  if (nc_inq_varid(id_, name.c_str(), &number) != NC_NOERR ||
+      nc_inq_vartype(id_, number, &type) != NC_NOERR || type != NC_STRING ||
+      nc_inq_varndims(id_, number, &rank) != NC_NOERR || rank != 1 ||
+      nc_inq_vardimid(id_, number, &dimension) != NC_NOERR || dimension != along.id) {
+    fail(fmt::format("expected texts in variable {} along {}", name, shape_of({&along, 1})));
+  }
+  // In the file, a text takes a byte at least, and its bytes stand there as they are.
+  std::uint64_t bytes = along.length;
+  std::vector<std::string> texts;
+  for (std::size_t i = 0; i < along.length; ++i) {
+    if (bytes > bytes_) {
+      fail(fmt::format("variable {}: its texts do not fit in a file of {} bytes", name, bytes_));
+    }
+    char* text = nullptr;
+    check(nc_get_var1_string(id_, number, &i, &text), action);
+    texts.emplace_back(text == nullptr ? "" : text);
+    if (text != nullptr) nc_free_string(1, &text);
+    bytes += texts.back().size();
+  }
+  return texts;
+}
+
 NetcdfVariable NetcdfFile::variable(const std::string& name, NetcdfType type,
                                     std::span<const NetcdfDimension> dimensions,
                                     std::size_t block) const {

@@ -27,6 +27,7 @@ class NetcdfFile {
   std::vector<std::pair<std::string, std::string>> text_group(const std::string& group) const;
   NetcdfDimension dimension(const std::string& name) const;
   bool has_variable(const std::string& name) const;
+  std::vector<std::string> texts(const std::string& name, const NetcdfDimension& along) const;
   NetcdfVariable variable(const std::string& name, NetcdfType type,
                           std::span<const NetcdfDimension> dimensions, std::size_t block) const;
   void get(const NetcdfVariable& variable, std::size_t first, std::size_t count,

@@ -25,6 +25,7 @@ enum class Request : std::uint8_t {
   text_group,
   dimension,
   has_variable,
+  texts,
   variable,
   get,
 };
@@ -147,6 +148,13 @@ class Service {
       case Request::has_variable:
         answer.put(file_->has_variable(asked.take_text()));
         break;
+      case Request::texts: {
+        const std::string name = asked.take_text();
+        const std::vector<std::string> texts = file_->texts(name, take_dimension(asked));
+        answer.put(texts.size());
+        for (const std::string& text : texts) answer.put_text(text);
+        break;
+      }
       case Request::variable: {
         const std::string name = asked.take_text();
         const auto type = asked.take<NetcdfType>();
@@ -272,6 +280,19 @@ bool NetcdfInput::has_variable(const std::string& name) const {
   const std::string answer =
       process_->ask(request(Request::has_variable, name), fmt::format("variable {}", name));
   return Unpacker(answer).take<bool>();
+}
+
+std::vector<std::string> NetcdfInput::texts(const std::string& name,
+                                            const NetcdfDimension& along) const {
+  Parcel asked = request(Request::texts, name);
+  put(asked, along);
+  const std::string answer = process_->ask(std::move(asked), fmt::format("variable {}", name));
+  Unpacker parcel(answer);
+  std::vector<std::string> texts;
+  for (auto left = parcel.take<std::size_t>(); left > 0; --left) {
+    texts.push_back(parcel.take_text());
+  }
+  return texts;
 }
 
 NetcdfVariable NetcdfInput::variable(const std::string& name, NetcdfType type,

@@ -15,6 +15,7 @@
 #include "risley/core/text.hpp"
 #include "risley/io/netcdf.hpp"
 #include "risley/io/output_file.hpp"
+#include "risley/io/sqlite_input.hpp"
 #include "risley/io/text_table.hpp"
 
 namespace risley::io {
@@ -208,7 +209,7 @@ class SqliteTable final : public TableFile::Writer {
                          : column.kind == CellKind::integer ? "INTEGER"
                                                             : "REAL";
       definition +=
-          fmt::format("{}{} {}", definition.empty() ? "" : ", ", quoted(column.name), type);
+          fmt::format("{}{} {}", definition.empty() ? "" : ", ", sql_name(column.name), type);
       places += places.empty() ? "?" : ", ?";
     }
     run("CREATE TABLE columns (name TEXT, unit TEXT, description TEXT)");
@@ -233,11 +234,6 @@ class SqliteTable final : public TableFile::Writer {
  private:
   using Statement = std::unique_ptr<sqlite3_stmt, CloseTable>;
 
-  static std::string quoted(const std::string& name) {
-    std::string text = "\"";
-    for (const char c : name) text += c == '"' ? std::string("\"\"") : std::string(1, c);
-    return text + "\"";
-  }
   void check(int result) const {
     if (result == SQLITE_OK || result == SQLITE_DONE || result == SQLITE_ROW) return;
     throw FileError(

@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <iterator>
 #include <optional>
 
 #include <Eigen/Cholesky>
@@ -31,18 +32,6 @@ using sensors::Sensor;
 
 constexpr std::size_t kBeams = 2000;  // over all rotation angles; tell a mean square to 3 %
 
-void require_same_kind(const Sensor& a, const Sensor& b) {
-  if (a.shape() == b.shape() && a.train.face_order() == b.train.face_order()) return;
-  const auto words = [](const Sensor& sensor) {
-    return fmt::format("{} prisms ({}) and {} emitters", sensor.prisms(),
-                       to_string(sensor.train.face_order()), sensor.train.emitters());
-  };
-  throw InvalidArgument(fmt::format(
-      "only results of sensors with the same optics can be compared: the first has {}, the "
-      "second {}",
-      words(a), words(b)));
-}
-
 double sigma_of(const NamedCovariance& known, const std::string& name) {
   const Eigen::Index at = known.find(name);
   return at < 0 ? 0 : std::sqrt(known.matrix(at, at));
@@ -64,24 +53,6 @@ bool hold_alike(const Sensor& a, const Sensor& b) {
   return held == held_names(b) && std::all_of(held.begin(), held.end(), [&](const auto& name) {
            return a.get(name) == b.get(name);
          });
-}
-
-/// What a result would know if the parameters that it held were exactly as held: the joint
-/// covariance under that condition.
-NamedCovariance given_held(const NamedCovariance& all, const std::vector<std::string>& held) {
-  std::vector<std::string> free;
-  std::vector<Eigen::Index> free_at, held_at;
-  for (std::size_t i = 0; i < all.names.size(); ++i) {
-    const bool is_held = std::binary_search(held.begin(), held.end(), all.names[i]);
-    (is_held ? held_at : free_at).push_back(static_cast<Eigen::Index>(i));
-    if (!is_held) free.push_back(all.names[i]);
-  }
-  NamedCovariance known = all.part(free);
-  if (!held_at.empty()) {
-    const Eigen::MatrixXd both = all.matrix(free_at, held_at);
-    known.matrix -= both * all.matrix(held_at, held_at).ldlt().solve(both.transpose()).eval();
-  }
-  return known;
 }
 
 /// Both results, each with the covariance that its part of a difference has.
@@ -130,15 +101,10 @@ void add_covariance(const NamedCovariance& known, NamedCovariance& sum) {
 
 /// The covariance of the differences of the train's parameters.
 NamedCovariance covariance_of_differences(const Pair& pair) {
-  const Sensor& b = pair.b;
   NamedCovariance sum;
   for (const NamedCovariance* known : {&pair.known_a, &pair.known_b}) {
     for (const std::string& name : known->names) {
-      const auto& list = parameter_list(b.shape());
-      const bool of_train = std::any_of(list.begin(), list.end(), [&](const ParameterInfo& one) {
-        return one.name == name && one.kind == ParameterKind::train;
-      });
-      if (of_train && sum.find(name) < 0) sum.names.push_back(name);
+      if (is_of_train(name, pair.b) && sum.find(name) < 0) sum.names.push_back(name);
     }
   }
   const auto n = static_cast<Eigen::Index>(sum.names.size());
@@ -147,10 +113,6 @@ NamedCovariance covariance_of_differences(const Pair& pair) {
   add_covariance(pair.known_b, sum);
   return sum;
 }
-
-/// Combinations of parameters that neither result tells from zero by so little of the largest
-/// variance are numerically none.
-constexpr double kSmallestVariance = 1e-13;
 
 ChangeTest test_of_change(const Pair& pair, const NamedCovariance& sum) {
   ChangeTest test;
@@ -180,8 +142,51 @@ ChangeTest test_of_change(const Pair& pair, const NamedCovariance& sum) {
   return test;
 }
 
-calibration::PointingError compare_directions(const Pair& pair, const NamedCovariance& sum) {
-  const Sensor& b = pair.b;
+}  // namespace
+
+void require_same_optics(const Sensor& a, const Sensor& b) {
+  if (a.shape() == b.shape() && a.train.face_order() == b.train.face_order()) return;
+  const auto words = [](const Sensor& sensor) {
+    return fmt::format("{} prisms ({}) and {} emitters", sensor.prisms(),
+                       to_string(sensor.train.face_order()), sensor.train.emitters());
+  };
+  throw InvalidArgument(fmt::format(
+      "only results of sensors with the same optics can be compared: the first has {}, the "
+      "second {}",
+      words(a), words(b)));
+}
+
+bool is_of_train(const std::string& name, const Sensor& sensor) {
+  const auto& list = parameter_list(sensor.shape());
+  return std::any_of(list.begin(), list.end(), [&](const ParameterInfo& one) {
+    return one.name == name && one.kind == ParameterKind::train;
+  });
+}
+
+NamedCovariance covariance_given_held(const Sensor& sensor) {
+  const NamedCovariance all{sensor.covariance_names, sensor.covariance};
+  const std::vector<std::string> held = held_names(sensor);
+  std::vector<std::string> free;
+  std::vector<Eigen::Index> free_at, held_at;
+  for (std::size_t i = 0; i < all.names.size(); ++i) {
+    const bool is_held = std::binary_search(held.begin(), held.end(), all.names[i]);
+    (is_held ? held_at : free_at).push_back(static_cast<Eigen::Index>(i));
+    if (!is_held) free.push_back(all.names[i]);
+  }
+  NamedCovariance known = all.part(free);
+  if (!held_at.empty()) {
+    const Eigen::MatrixXd both = all.matrix(free_at, held_at);
+    known.matrix -= both * all.matrix(held_at, held_at).ldlt().solve(both.transpose()).eval();
+  }
+  return known;
+}
+
+calibration::PointingError directions_apart(const Sensor& a, const Sensor& b,
+                                            const NamedCovariance& difference) {
+  std::vector<std::string> names;
+  std::copy_if(difference.names.begin(), difference.names.end(), std::back_inserter(names),
+               [&](const std::string& name) { return is_of_train(name, b); });
+  const NamedCovariance known = difference.part(names);
   std::vector<std::vector<double>> angles(static_cast<std::size_t>(b.prisms()),
                                           std::vector<double>(kBeams));
   for (std::size_t k = 0; k < angles.size(); ++k) {
@@ -192,12 +197,10 @@ calibration::PointingError compare_directions(const Pair& pair, const NamedCovar
   for (std::size_t i = 0; i < kBeams; ++i) {
     emitters[i] = static_cast<std::uint8_t>(i % static_cast<std::size_t>(b.train.emitters()));
   }
-  const calibration::BeamBundle bundle(b.train, estimation::free_parameters(sum.names, b.shape()),
+  const calibration::BeamBundle bundle(b.train, estimation::free_parameters(known.names, b.shape()),
                                        angles, emitters);
-  return bundle.pointing_error(pair.a.train, sum.matrix);
+  return bundle.pointing_error(a.train, known.matrix);
 }
-
-}  // namespace
 
 Sensor load_result(const std::string& path) {
   namespace fs = std::filesystem;
@@ -226,20 +229,20 @@ ResultComparison compare_results(const Sensor& a, const Sensor& b, OneUnit one_u
   ResultComparison result;
   result.a = a;
   result.b = b;
-  require_same_kind(result.a, result.b);
+  require_same_optics(result.a, result.b);
   result.same_unit = !result.a.serial.empty() && result.a.serial == result.b.serial;
   const bool unknown = result.a.serial.empty() || result.b.serial.empty();
   const bool taken_for_one = result.same_unit || (one_unit == OneUnit::caller && unknown);
   result.held_alike = taken_for_one && hold_alike(result.a, result.b);
   const auto known = [&](const Sensor& sensor) {
-    const NamedCovariance all{sensor.covariance_names, sensor.covariance};
-    return result.held_alike ? given_held(all, held_names(sensor)) : all;
+    return result.held_alike ? covariance_given_held(sensor)
+                             : NamedCovariance{sensor.covariance_names, sensor.covariance};
   };
   const Pair pair{result.a, result.b, known(result.a), known(result.b)};
   result.parameters = differences(pair);
   const NamedCovariance covariance = covariance_of_differences(pair);
   result.change = test_of_change(pair, covariance);
-  result.beams = compare_directions(pair, covariance);
+  result.beams = directions_apart(result.a, result.b, covariance);
   return result;
 }
 

@@ -41,7 +41,6 @@ constexpr std::size_t kAreaPoints = 200'000;  // that it is measured with
 constexpr double kLargestPlane = 20;          // m
 constexpr std::size_t kFewestStripShots = 5;  // that say where a strip lies in a cell
 constexpr double kGate = 3;                   // range sigmas beyond which a point does not count
-constexpr double kSigmaOfMedian = 1.4826;     // of absolute values of a normal distribution
 constexpr double kClockMargin = 1e-3;         // s
 constexpr std::uint64_t kSampleStream = 1701;
 
@@ -149,7 +148,7 @@ std::vector<double> roughness_of(const ShotPoints& points, const GroundCells& ce
   }
   std::vector<double> roughness;
   roughness.reserve(distances.size());
-  for (auto& own : distances) roughness.push_back(kSigmaOfMedian * median(own));
+  for (auto& own : distances) roughness.push_back(kSigmaOverMedianDistance * median(own));
   return roughness;
 }
 

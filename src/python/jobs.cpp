@@ -17,7 +17,7 @@
 #include "risley/io/text_file.hpp"
 #include "risley/jobs/campaign.hpp"
 #include "risley/jobs/cloud_of_recording.hpp"
-#include "risley/jobs/compare_series.hpp"
+#include "risley/jobs/compare_units.hpp"
 #include "risley/jobs/identify_recording.hpp"
 #include "risley/jobs/inspect_recording.hpp"
 #include "risley/jobs/inspect_trajectory.hpp"
@@ -412,7 +412,7 @@ py::object observability(const py::dict& values, int threads, const py::object& 
 py::object compare(const std::vector<std::string>& results, double false_alarm,
                    const py::object& tell) {
   return told_by(tell, 0, [&](const Progress& progress) {
-    return jobs::compare_series({results, false_alarm}, progress);
+    return jobs::compare_units({results, false_alarm}, progress);
   });
 }
 

@@ -47,8 +47,51 @@ class CompareTest(CommandTest):
         self.assertIsNone(result["pairs"][0]["p_value"])
         self.assertFalse(result["pairs"][0]["changed"])
 
+    def test_units_of_a_table(self):
+        """Eight units of which one is bent, and one over time; a recording that is none."""
+        fleet = self.folder / "fleet"
+        fleet.mkdir()
+        preset = self.expect(0, "preset", "show", "mid-40").stdout
+        for number in range(8):
+            unit = self.folder / f"unit-{number}.yaml"
+            unit.write_text(preset.replace("\nmodel:", f'\nserial: "3GGDH5B0010001{number}"\nmodel:'))
+            for day in ("may", "june") if number == 2 else ("may",):
+                tilt = 0.2 if number == 5 else 0.1 if day == "june" else 0.02
+                self.expect(0, "simulate", "-o", fleet / f"{number}-{day}.lvx", "--scene", HALL, "--sensor", unit,
+                            "--reported", "nominal", "--set", f"prism_tilt_b_vertical_deg={tilt}", "--duration-s", "1",
+                            "--seed", str(number + 100 * len(day)))
+        (fleet / "9-cut.lvx").write_text("no recording")
+        for table in ("fleet.csv", "fleet.nc", "fleet.sqlite"):
+            self.expect(3, "calibrate", "fleet", "-o", "checked", "--force", "--no-report", "--states", "none",
+                        "--resume", "--table", table, "--rate-hz", "20000")
+        found = self.expect_json(0, "compare", "fleet.csv", "-o", "fleet.html")
+        self.assertEqual([len(unit["results"]) for unit in found["units"]], [1, 1, 2, 1, 1, 1, 1, 1])
+        self.assertEqual([unit["changed"] for unit in found["units"]],
+                         [number == 2 for number in range(8)])
+        self.assertEqual([(pair["a"], pair["b"]) for pair in found["pairs"]],
+                         [("checked/2-june", "checked/2-may")])
+        self.assertEqual([one["input"] for one in found["left_out"]], ["fleet/9-cut.lvx"])
+        self.assertEqual([one["path"] for one in found["inputs"]],
+                         ["fleet.csv"] + [f"{path}/calibration.yaml" for path in
+                                          [result for unit in found["units"] for result in unit["results"]]])
+        units = found["fleets"][0]["units"]
+        self.assertEqual([unit["outlier"] for unit in units], [number == 5 for number in range(8)])
+        self.assertEqual(units[5]["worst"], "prism_tilt_b_vertical_deg")
+        page = (self.folder / "fleet.html").read_text()
+        self.assertIn("1 of 8 units (mid-40) is not like the others: 3GGDH5B00100015.", page)
+        text = self.expect(0, "compare", "fleet.csv").stdout
+        self.assertRegex(text, r"3GGDH5B00100015 .* outlier\n")
+        for table in ("fleet.nc", "fleet.sqlite"):
+            other = self.expect_json(0, "compare", table)
+            for key in ("pairs", "units", "fleets", "left_out"):
+                self.assertEqual(other[key], found[key], table)
+        (self.folder / "checked/0-may/calibration.yaml").write_text("model: {")
+        self.assertEqual(self.expect_json(3, "compare", "fleet.csv")["left_out"][0]["failed"], True)
+        self.expect(2, "compare", "fleet.csv", "-o", "checked/1-may/calibration.yaml")
+
     def test_what_is_wrong_is_named(self):
-        self.assertIn("RESULT", self.expect(2, "compare", "march").stderr)
+        self.assertIn("number of results = 1", self.expect(2, "compare", "march").stderr)
+        self.assertIn("RESULT", self.expect(2, "compare").stderr)
         self.assertIn("the second 3 prisms", self.expect(2, "compare", "march", "horizon").stderr)
         self.assertIn("calibration.yaml", self.expect(3, "compare", "march", ".").stderr)
         self.assertIn("--false-alarm", self.expect(2, "compare", "march", "june", "--false-alarm",

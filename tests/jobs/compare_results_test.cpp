@@ -3,16 +3,19 @@
 #include "risley/jobs/compare_results.hpp"
 
 #include <cmath>
+#include <cstdint>
 #include <filesystem>
 #include <string>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
+#include "risley/io/table_file.hpp"
 #include "risley/io/text_file.hpp"
-#include "risley/jobs/compare_series.hpp"
+#include "risley/jobs/compare_units.hpp"
 #include "risley/sensors/preset.hpp"
 
 namespace risley::jobs::compare_results_test {
@@ -153,9 +156,9 @@ TEST_F(CompareResults, WhatIsHardlyKnownHardlyCounts) {
 TEST_F(CompareResults, OfASeriesEachIsComparedWithTheOneBeforeAndTheFirst) {
   sensors::Sensor moved = result("");
   moved.set(kTilt, moved.get(kTilt) + 20 * kSigma);
-  CompareSeriesOptions options;
+  CompareUnitsOptions options;
   options.results = {saved("a", result("")), saved("b", result("")), saved("c", moved)};
-  const ComparedSeries series = compare_series(options);
+  const ComparedUnits series = compare_units(options);
   ASSERT_EQ(series.pairs.size(), 3U);
   EXPECT_DOUBLE_EQ(series.least_p_value, 0.01 / 3);
   const auto is = [&](std::size_t pair, std::size_t a, std::size_t b, bool changed) {
@@ -167,10 +170,120 @@ TEST_F(CompareResults, OfASeriesEachIsComparedWithTheOneBeforeAndTheFirst) {
   EXPECT_TRUE(is(1, 1, 2, true));
   EXPECT_TRUE(is(2, 0, 2, true));
   options.results.resize(1);
-  EXPECT_THROW(compare_series(options), InvalidArgument);
+  EXPECT_THROW(compare_units(options), InvalidArgument);
   options.results = {"mid-40", "mid-40"};
   options.false_alarm = 2;
-  EXPECT_THROW(compare_series(options), InvalidArgument);
+  EXPECT_THROW(compare_units(options), InvalidArgument);
+}
+
+/// A table whose rows lead to results, as a fleet's.
+std::string table_of(const std::filesystem::path& path,
+                     const std::vector<std::vector<io::TableCell>>& rows) {
+  io::TableFile table(path.string(),
+                      {{"input"}, {"output"}, {"exit_status", io::CellKind::integer}, {"message"}},
+                      {});
+  for (const auto& row : rows) table.add(row);
+  table.close();
+  return path.string();
+}
+
+TEST_F(CompareResults, OfATableFollowsItsRows) {
+  sensors::Sensor moved = result("A1");
+  moved.set(kTilt, moved.get(kTilt) + 20 * kSigma);
+  saved("a1/may", result("A1"));
+  saved("b2/may", result("B2"));
+  saved("a1/june", moved);
+  std::filesystem::create_directories(folder_ / "b2/july");
+  std::filesystem::create_directories(folder_ / "c3");
+  io::write_text_file((folder_ / "c3/calibration.yaml").string(), "model: {");
+  const std::int64_t done = 0, failed = 3;
+  for (const char* name : {"table.csv", "table.nc", "table.sqlite"}) {
+    SCOPED_TRACE(name);
+    const std::string table = table_of(folder_ / name, {{"a/may.lvx", "a1/may", done, {}},
+                                                        {"b/may.lvx", "b2/may", done, {}},
+                                                        {"a/june.lvx", "a1/june", done, {}},
+                                                        {"b/june.lvx", {}, failed, "is cut off"},
+                                                        {"b/july.lvx", "b2/july", done, {}},
+                                                        {"c/may.lvx", "c3", done, {}},
+                                                        {"c/june.lvx", {}, done, {}}});
+    const ComparedUnits found = compare_units({{table}, 0.01});
+    ASSERT_EQ(found.results.size(), 3U);
+    ASSERT_EQ(found.units.size(), 2U);
+    EXPECT_EQ(found.units[0].serial, "A1");
+    EXPECT_THAT(found.units[0].results, ::testing::ElementsAre(0, 2));
+    EXPECT_TRUE(found.units[0].changed);
+    EXPECT_FALSE(found.units[1].changed);
+    ASSERT_EQ(found.pairs.size(), 2U);  // A1 over time, and A1 with B2
+    EXPECT_TRUE(found.pairs[0].comparison.same_unit);
+    EXPECT_TRUE(found.pairs[0].changed);
+    EXPECT_EQ(found.pairs[1].a, 1U);
+    EXPECT_EQ(found.pairs[1].b, 2U);
+    EXPECT_FALSE(found.pairs[1].comparison.same_unit);
+    EXPECT_TRUE(found.fleets.empty());
+    ASSERT_EQ(found.left_out.size(), 4U);
+    const auto is = [&](std::size_t i, const char* input, bool is_failure, const char* reason) {
+      EXPECT_EQ(found.left_out[i].name, input);
+      EXPECT_EQ(found.left_out[i].failed, is_failure) << input;
+      EXPECT_THAT(found.left_out[i].reason, HasSubstr(reason));
+    };
+    is(0, "b/june.lvx", false, "is cut off");
+    is(1, "b/july.lvx", false, "has no calibration.yaml");
+    is(2, "c/may.lvx", true, "calibration.yaml");
+    is(3, "c/june.lvx", true, "names no output");
+  }
+}
+
+TEST_F(CompareResults, OfATableWithoutResultsSaysWhy) {
+  const std::int64_t done = 0;
+  const std::string table = table_of(folder_ / "t.csv", {{"a.lvx", "nowhere", done, {}}});
+  try {
+    compare_units({{table}, 0.01});
+    FAIL();
+  } catch (const FileError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("none of its 1 rows leads to a result"));
+    EXPECT_THAT(error.what(), HasSubstr("nowhere"));
+  }
+}
+
+TEST_F(CompareResults, OfManyUnitsEachStandsBesideTheOthers) {
+  std::vector<std::vector<io::TableCell>> rows;
+  CompareUnitsOptions named;
+  const auto add = [&](const std::string& name, const sensors::Sensor& sensor) {
+    named.results.push_back(saved(name, sensor));
+    rows.push_back({name + ".lvx", name, std::int64_t{0}, {}});
+  };
+  for (int unit = 0; unit < 6; ++unit) {
+    const std::string serial = "U" + std::to_string(unit);
+    sensors::Sensor one = result(serial);
+    add(serial + "/may", one);
+    if (unit == 4) one.set(kTilt, one.get(kTilt) + 1000 * kSigma);
+    add(serial + "/june", one);
+  }
+  add("unknown", result(""));
+  const CompareUnitsOptions options{{table_of(folder_ / "t.csv", rows)}, 0.01};
+  std::vector<double> told;
+  const ComparedUnits found =
+      compare_units(options, Progress([&](double fraction) { told.push_back(fraction); }));
+  EXPECT_EQ(found.units.size(), 6U);
+  EXPECT_EQ(found.pairs.size(), 6U);
+  for (std::size_t i = 0; i < 6; ++i) EXPECT_EQ(found.units[i].changed, i == 4) << i;
+  ASSERT_EQ(found.fleets.size(), 1U);
+  const ComparedFleet& fleet = found.fleets.front();
+  ASSERT_EQ(fleet.units.size(), 6U);
+  for (std::size_t i = 0; i < 6; ++i) EXPECT_EQ(fleet.fleet.units[i].outlier, i == 4) << i;
+  ASSERT_EQ(found.left_out.size(), 1U);
+  EXPECT_THAT(found.left_out[0].reason, HasSubstr("could be of any of 6 units"));
+  EXPECT_EQ(told.back(), 1);
+
+  // The same by their names, in order of time.
+  const ComparedUnits series = compare_units(named);
+  EXPECT_EQ(series.pairs.size(), 23U);
+  EXPECT_TRUE(series.left_out.empty());
+  EXPECT_EQ(series.units.size(), 7U);
+
+  CancelFlag flag;
+  flag.set();
+  EXPECT_THROW(compare_units(options, Progress([](double) {}, &flag)), Cancelled);
 }
 
 TEST_F(CompareResults, IsOfSensorsOfOneKind) {

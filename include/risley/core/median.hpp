@@ -9,6 +9,9 @@
 
 namespace risley {
 
+/// Standard deviation of a normal distribution over the median distance from its middle.
+inline constexpr double kSigmaOverMedianDistance = 1.4826;
+
 /// The middle value, of two the mean, of none NaN. Orders the values anew.
 inline double median(std::span<double> values) {
   if (values.empty()) return std::numeric_limits<double>::quiet_NaN();

@@ -171,6 +171,10 @@ class NetcdfInput {
   /// Whether the file has a variable of that name, whatever its type.
   bool has_variable(const std::string& name) const;
 
+  /// All values of a variable of texts along one dimension, as NetcdfOutput::define_texts() writes
+  /// it. @throws FileError for another one, too
+  std::vector<std::string> texts(const std::string& name, const NetcdfDimension& along) const;
+
   /// A variable of values of type T along exactly these dimensions.
   /// @param block  entries of the first dimension that are going to be read together, for the
   ///               cache; 0: as the library likes

@@ -18,8 +18,8 @@ enum class CellKind { text, integer, real };
 struct TableColumn {
   std::string name;
   CellKind kind = CellKind::text;
-  std::string unit;  ///< "1" for numbers without, empty for texts
-  std::string description;
+  std::string unit = {};  ///< "1" for numbers without, empty for texts
+  std::string description = {};
 };
 
 /// A value, or none.

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "risley/algebra/named_covariance.hpp"
 #include "risley/calibration/datum.hpp"
 #include "risley/sensors/sensor.hpp"
 
@@ -12,6 +13,10 @@ namespace risley::jobs {
 
 /// Name of the only quantity in a comparison that is no parameter of the train.
 inline constexpr const char* kRangeOffset = "range_offset_m";
+
+/// Combinations of parameters, in sigmas, with so little of the largest variance are numerically
+/// none; times the number of parameters.
+inline constexpr double kSmallestVariance = 1e-13;
 
 /// One parameter as two results have it, SI units.
 struct ParameterDifference {
@@ -51,6 +56,21 @@ enum class OneUnit {
   serials,  ///< their serial numbers, which are known and equal
   caller,   ///< whoever asks, unless the serial numbers are known and differ
 };
+
+/// Refuses sensors whose optics have not the same parameters. @throws InvalidArgument naming them
+void require_same_optics(const sensors::Sensor& a, const sensors::Sensor& b);
+
+/// Whether a name is that of a parameter of a sensor's train.
+bool is_of_train(const std::string& name, const sensors::Sensor& sensor);
+
+/// What a result would know if the parameters that it held were exactly as held: the joint
+/// covariance of the others under that condition.
+algebra::NamedCovariance covariance_given_held(const sensors::Sensor& sensor);
+
+/// Directions of a minus those of b, over all rotation angles.
+/// @param difference  covariance of the difference of the trains; other names do not count
+calibration::PointingError directions_apart(const sensors::Sensor& a, const sensors::Sensor& b,
+                                            const algebra::NamedCovariance& difference);
 
 /// A result: the calibration.yaml of a folder, such a file, or a preset. @throws FileError
 sensors::Sensor load_result(const std::string& path);

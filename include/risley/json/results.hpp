@@ -19,7 +19,7 @@ struct CalibratedFlight;
 struct CalibratedRecordings;
 struct CampaignChunk;
 struct CampaignResult;
-struct ComparedSeries;
+struct ComparedUnits;
 struct ConvertedRecording;
 struct ConvertedTrajectory;
 struct EstimatedRecording;
@@ -77,7 +77,7 @@ Json of(const jobs::BeamOrigins& found);
 /// Of `risley report` about two results.
 Json of(const jobs::ResultComparison& compared);
 /// Of `risley compare`.
-Json of(const jobs::ComparedSeries& series);
+Json of(const jobs::ComparedUnits& compared);
 /// Of `risley campaign` for one chunk.
 Json of(const jobs::CampaignChunk& chunk);
 /// Of `risley campaign` for all chunks together.

@@ -1,0 +1,79 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "risley/core/progress.hpp"
+#include "risley/jobs/compare_results.hpp"
+#include "risley/jobs/fleet.hpp"
+
+namespace risley::jobs {
+
+/// The results that are compared, and how rarely chance may be taken for a change.
+struct CompareUnitsOptions {
+  /// As load_result(), in order of time; also tables of results (io::is_table()), of which each row
+  /// without a failure stands for the result in its `output`.
+  std::vector<std::string> results;
+  /// Probability that at least one pair of results is called changed where nothing changed, and
+  /// that at least one unit is called an outlier where none is one, each.
+  double false_alarm = 0.01;
+};
+
+/// Two results, of one unit or of two units of a kind.
+struct ComparedPair {
+  std::size_t a = 0, b = 0;  ///< places in ComparedUnits::results
+  ResultComparison comparison;
+  bool changed = false;
+};
+
+/// "changed", "no change seen", or "no sigmas to test with".
+std::string answer_words(const ComparedPair& pair);
+
+/// A unit with its results.
+struct ComparedUnit {
+  std::string serial;                ///< empty where it is not known
+  std::string sensor;                ///< name of the preset
+  std::vector<std::size_t> results;  ///< places in ComparedUnits::results, in order of time
+  bool changed = false;              ///< any of its pairs did
+};
+
+/// Units of one kind against each other, each by its latest result.
+struct ComparedFleet {
+  std::vector<std::size_t> units;  ///< places in ComparedUnits::units, as in fleet.units
+  Fleet fleet;
+};
+
+/// A row of a table, or a result that could be of any unit, without an answer.
+struct LeftOut {
+  std::string name;     ///< its input, or its path
+  std::string reason;   ///< to follow the name
+  bool failed = false;  ///< it should have been a result
+};
+
+/// Units over time, and units against each other.
+struct ComparedUnits {
+  std::vector<std::string> results;  ///< their paths
+  std::vector<ComparedUnit> units;   ///< in order of appearance
+  std::vector<ComparedPair> pairs;
+  bool is_one_series = false;  ///< the pairs are of all results in their order
+  std::vector<ComparedFleet> fleets;
+  std::vector<LeftOut> left_out;
+  double false_alarm = 0;
+  double least_p_value = 0;  ///< false_alarm over the number of pairs: changed is what lies below
+};
+
+/// Results that are named are one series, whatever their serial numbers are: each is compared with
+/// the one before it and, from the third on, with the first. With a table, serial numbers tell
+/// units apart, each is a series of its own, and up to four units of a kind are compared in pairs,
+/// each by its last result; results without a serial number are of the only unit that there is, and
+/// left out where several are known. From kFewestUnitsOfFleet on, units of a kind are compared as a
+/// fleet.
+/// @throws InvalidArgument for fewer than two results, a false alarm outside of 0 to 1, and as
+///         compare_results(); FileError for what was named and is no result, and for a table
+///         without any; Cancelled
+ComparedUnits compare_units(const CompareUnitsOptions& options, const Progress& progress = {});
+
+}  // namespace risley::jobs

@@ -1,0 +1,263 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "risley/jobs/compare_units.hpp"
+
+#include <algorithm>
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <mutex>
+#include <numeric>
+#include <optional>
+#include <set>
+#include <utility>
+#include <variant>
+
+#include <fmt/format.h>
+#include <tbb/parallel_for.h>
+
+#include "risley/core/error.hpp"
+#include "risley/core/require.hpp"
+#include "risley/io/table_input.hpp"
+
+namespace risley::jobs {
+namespace {
+
+namespace fs = std::filesystem;
+using sensors::Sensor;
+
+struct LoadedResults {
+  std::vector<std::string> paths;
+  std::vector<Sensor> sensors;
+  bool any_table = false;
+
+  void add(std::string path, Sensor sensor) {
+    paths.push_back(std::move(path));
+    sensors.push_back(std::move(sensor));
+  }
+};
+
+std::string text_of(const io::TableCell& cell) {
+  const auto* text = std::get_if<std::string>(&cell);
+  return text == nullptr ? std::string() : *text;
+}
+
+/// Names in a table are those of the folder in which it was made; a table and its results may have
+/// been moved together.
+std::string result_beside(const std::string& table, const std::string& output) {
+  std::error_code ignored;
+  if (fs::exists(output, ignored) || fs::path(output).is_absolute()) return output;
+  const std::string beside = (fs::path(table).parent_path() / output).string();
+  return fs::exists(beside, ignored) ? beside : output;
+}
+
+/// Follows one row to its result. @return why there is none, or nothing
+std::optional<LeftOut> load_row(const std::string& table, std::size_t row,
+                                const std::vector<io::TableCell>& cells, LoadedResults& loaded) {
+  const std::string input = text_of(cells[0]), output = text_of(cells[1]);
+  const std::string name = input.empty() ? fmt::format("{} row {}", table, row) : input;
+  const auto* status = std::get_if<std::int64_t>(&cells[2]);
+  if (status != nullptr && *status != 0) {
+    const std::string message = text_of(cells[3]);
+    return LeftOut{
+        name, message.empty() ? fmt::format("it failed with the exit status {}", *status) : message,
+        false};
+  }
+  if (output.empty()) return LeftOut{name, "the table names no output for it", true};
+  const std::string path = result_beside(table, output);
+  std::error_code ignored;
+  if (!fs::exists(path, ignored)) return LeftOut{name, fmt::format("{} is missing", path), true};
+  if (fs::is_directory(path, ignored) && !calibration_in(path)) {
+    return LeftOut{name, fmt::format("{} has no {}", path, kCalibrationFile), false};
+  }
+  try {
+    loaded.add(path, load_result(path));
+  } catch (const FileError& error) {
+    return LeftOut{name, error.what(), true};
+  }
+  return std::nullopt;
+}
+
+void load_table(const std::string& table, LoadedResults& loaded, std::vector<LeftOut>& left_out,
+                const Progress& progress) {
+  const std::vector<io::TableColumn> columns = {
+      {"input"}, {"output"}, {"exit_status", io::CellKind::integer}, {"message"}};
+  const std::size_t left_out_before = left_out.size();
+  std::size_t row = 0;
+  for (const auto& cells : io::read_table(table, columns, progress)) {
+    progress.check();
+    if (std::optional<LeftOut> none = load_row(table, ++row, cells, loaded)) {
+      left_out.push_back(*std::move(none));
+    }
+  }
+  if (row > left_out.size() - left_out_before) return;
+  std::string first;
+  if (row > 0) {
+    const LeftOut& one = left_out[left_out_before];
+    first = fmt::format(" (the first, {}: {})", one.name, one.reason);
+  }
+  throw FileError(table, {},
+                  fmt::format("none of its {} rows leads to a result{}; expected a table of "
+                              "estimates or calibrations that were written into an output folder",
+                              row, first));
+}
+
+LoadedResults load(const std::vector<std::string>& paths, std::vector<LeftOut>& left_out,
+                   const Progress& progress) {
+  LoadedResults loaded;
+  for (const std::string& path : paths) {
+    progress.check();
+    std::error_code ignored;
+    if (!fs::is_directory(path, ignored) && io::is_table(path)) {
+      loaded.any_table = true;
+      load_table(path, loaded, left_out, progress);
+    } else {
+      loaded.add(path, load_result(path));
+    }
+  }
+  return loaded;
+}
+
+std::vector<ComparedUnit> units_of(const LoadedResults& loaded, std::vector<LeftOut>& left_out) {
+  std::set<std::string> serials;
+  for (const Sensor& sensor : loaded.sensors) {
+    if (!sensor.serial.empty()) serials.insert(sensor.serial);
+  }
+  const std::string only = serials.size() == 1 ? *serials.begin() : std::string();
+  std::vector<ComparedUnit> units;
+  std::map<std::string, std::size_t> places;
+  for (std::size_t i = 0; i < loaded.paths.size(); ++i) {
+    const Sensor& sensor = loaded.sensors[i];
+    const std::string& serial = sensor.serial.empty() ? only : sensor.serial;
+    if (serial.empty() && serials.size() > 1 && loaded.any_table) {
+      left_out.push_back(
+          {loaded.paths[i],
+           fmt::format("it has no serial number and could be of any of {} units", serials.size()),
+           false});
+      continue;
+    }
+    const auto [place, is_new] = places.emplace(serial, units.size());
+    if (is_new) units.push_back({serial, sensor.name, {}, false});
+    units[place->second].results.push_back(i);
+  }
+  return units;
+}
+
+bool have_same_optics(const Sensor& a, const Sensor& b) {
+  return a.shape() == b.shape() && a.train.face_order() == b.train.face_order();
+}
+
+/// Units with one kind of optics and one name.
+std::vector<std::vector<std::size_t>> kinds_of(const std::vector<ComparedUnit>& units,
+                                               const std::vector<Sensor>& sensors) {
+  std::vector<std::vector<std::size_t>> kinds;
+  for (std::size_t i = 0; i < units.size(); ++i) {
+    const auto kind = std::find_if(kinds.begin(), kinds.end(), [&](const auto& one) {
+      const ComparedUnit& like = units[one.front()];
+      return like.sensor == units[i].sensor &&
+             have_same_optics(sensors[like.results.back()], sensors[units[i].results.back()]);
+    });
+    if (kind == kinds.end()) {
+      kinds.push_back({i});
+    } else {
+      kind->push_back(i);
+    }
+  }
+  return kinds;
+}
+
+/// Each with the one before and, from the third on, with the first.
+void add_pairs_along(const std::vector<std::size_t>& results, std::vector<ComparedPair>& pairs) {
+  for (std::size_t k = 1; k < results.size(); ++k) {
+    pairs.push_back({results[k - 1], results[k], {}, false});
+    if (k > 1) pairs.push_back({results.front(), results[k], {}, false});
+  }
+}
+
+void add_pairs_between(const std::vector<std::size_t>& kind, const std::vector<ComparedUnit>& units,
+                       std::vector<ComparedPair>& pairs) {
+  for (std::size_t b = 1; b < kind.size(); ++b) {
+    for (std::size_t a = 0; a < b; ++a) {
+      const auto [first, second] =
+          std::minmax(units[kind[a]].results.back(), units[kind[b]].results.back());
+      pairs.push_back({first, second, {}, false});
+    }
+  }
+}
+
+void compare(ComparedUnits& found, const std::vector<Sensor>& sensors, const Progress& progress) {
+  found.least_p_value =
+      found.false_alarm / static_cast<double>(std::max<std::size_t>(found.pairs.size(), 1));
+  std::mutex mutex;
+  std::size_t done = 0;
+  tbb::parallel_for(std::size_t{0}, found.pairs.size(), [&](std::size_t i) {
+    progress.check();
+    ComparedPair& pair = found.pairs[i];
+    pair.comparison = compare_results(sensors[pair.a], sensors[pair.b], OneUnit::caller);
+    pair.changed = pair.comparison.change.degrees_of_freedom > 0 &&
+                   pair.comparison.change.p_value < found.least_p_value;
+    const std::scoped_lock lock(mutex);
+    progress.report(static_cast<double>(++done) / static_cast<double>(found.pairs.size()));
+  });
+  std::vector<std::size_t> unit_of(sensors.size());
+  for (std::size_t i = 0; i < found.units.size(); ++i) {
+    for (const std::size_t result : found.units[i].results) unit_of[result] = i;
+  }
+  for (const ComparedPair& pair : found.pairs) {
+    ComparedUnit& unit = found.units[unit_of[pair.b]];
+    unit.changed = unit.changed || (pair.changed && unit_of[pair.a] == unit_of[pair.b]);
+  }
+}
+
+}  // namespace
+
+ComparedUnits compare_units(const CompareUnitsOptions& options, const Progress& progress) {
+  require_between("option false_alarm", options.false_alarm, 0, 1);
+  ComparedUnits found;
+  found.false_alarm = options.false_alarm;
+  LoadedResults loaded = load(options.results, found.left_out, progress);
+  require_at_least("number of results", static_cast<long long>(loaded.paths.size()), 2);
+  found.results = loaded.paths;
+  found.units = units_of(loaded, found.left_out);
+  found.is_one_series = !loaded.any_table || found.units.size() == 1;
+  if (found.is_one_series) {
+    std::vector<std::size_t> all(loaded.paths.size());
+    std::iota(all.begin(), all.end(), std::size_t{0});
+    add_pairs_along(all, found.pairs);
+  } else {
+    for (const ComparedUnit& unit : found.units) add_pairs_along(unit.results, found.pairs);
+  }
+  std::vector<std::vector<std::size_t>> fleets;
+  for (std::vector<std::size_t>& kind : kinds_of(found.units, loaded.sensors)) {
+    if (kind.size() >= kFewestUnitsOfFleet) {
+      fleets.push_back(std::move(kind));
+    } else if (loaded.any_table) {
+      add_pairs_between(kind, found.units, found.pairs);
+    }
+  }
+  if (found.pairs.empty() && fleets.empty()) {
+    require_same_optics(loaded.sensors[0], loaded.sensors[1]);
+    throw InvalidArgument(fmt::format(
+        "no two of the {} results are of one unit or of one kind of sensor", loaded.paths.size()));
+  }
+  compare(found, loaded.sensors, progress);
+  for (const std::vector<std::size_t>& kind : fleets) {
+    progress.check();
+    std::vector<Sensor> latest;
+    latest.reserve(kind.size());
+    for (const std::size_t unit : kind) {
+      latest.push_back(loaded.sensors[found.units[unit].results.back()]);
+    }
+    // Several fleets share the probability of a false alarm.
+    found.fleets.push_back(
+        {kind, fleet_of(latest, options.false_alarm / static_cast<double>(fleets.size()))});
+  }
+  return found;
+}
+
+std::string answer_words(const ComparedPair& pair) {
+  if (pair.comparison.change.degrees_of_freedom == 0) return "no sigmas to test with";
+  return pair.changed ? "changed" : "no change seen";
+}
+
+}  // namespace risley::jobs
