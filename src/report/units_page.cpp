@@ -291,9 +291,10 @@ std::string units_page(const ComparedUnits& compared, const Provenance& provenan
   for (const ComparedFleet& fleet : compared.fleets) words += fleet_words(fleet, compared);
   std::vector<Chart> fleets;
   for (const ComparedFleet& fleet : compared.fleets) fleets.push_back(chart_of_fleet(fleet));
-  const std::string head = fmt::format("<p class=\"verdict\"><b>{}</b></p>\n", escape_html(words)) +
-                           (is_one ? overview_html(numbers_of_series(compared), {}, figures)
-                                   : charts_html(fleets, figures));
+  const std::string head =
+      fmt::format("<p class=\"verdict\"><b>{}</b></p>\n", escape_html(words)) +
+      (compared.is_one_series ? overview_html(numbers_of_series(compared), {}, figures)
+                              : charts_html(fleets, figures));
   Sections sections;
   for (const ComparedFleet& fleet : compared.fleets) {
     const std::string& sensor = compared.units[fleet.units.front()].sensor;

@@ -181,6 +181,15 @@ class SchemasTest(CommandTest):
         cls.print(0, "report", "estimated", "calibrated", "-o", "two.html")
         cls.print(3, "report", "no")
         cls.print(0, "compare", "estimated", "calibrated", "mid-40", "-o", "series.html")
+        text = (cls.folder / "calibrated/calibration.yaml").read_text()
+        rows = ["input,output,exit_status,message", "cut.lvx,,3,it is cut off"]
+        for number in range(5):
+            unit = f"unit-{number}.yaml"
+            serial = f'serial: "3GGDH5B0010001{number}"'
+            (cls.folder / unit).write_text(re.sub(r"(?m)^serial: .*$", serial, text))
+            rows.append(f"{number}.lvx,{unit},0,")
+        (cls.folder / "units.csv").write_text("\n".join(rows) + "\n")
+        cls.print(0, "compare", "units.csv")
         cls.print(2, "compare", "no", "estimated")
         (cls.folder / "plan.yaml").write_text(
             "simulate: {sensor: mid-40-table3, duration_s: 0.5, rate_hz: 5000, scene: hall.yaml, reported: nominal}\n"

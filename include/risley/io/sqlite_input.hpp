@@ -26,11 +26,11 @@ class SqliteQuery {
   /// Goes back in front of the first row.
   void rewind();
 
-  // Values of the row, by place from 0.
-  bool is_missing(int column) const;
-  std::int64_t integer(int column) const;
-  double real(int column) const;
-  std::string text(int column) const;
+  // Values of the row, by place from 0; SQLite converts those of another kind.
+  bool is_missing(int column) const;                      ///< there is no value
+  std::int64_t integer(int column) const;                 ///< whole number
+  double real(int column) const;                          ///< number
+  std::string text(int column) const;                     ///< as it is stored, UTF-8 or not
   std::span<const std::uint8_t> bytes(int column) const;  ///< valid until next() or rewind()
 
  private:
