@@ -87,22 +87,23 @@ std::string pairs_html(const ComparedUnits& compared) {
 
 std::string fleet_html(const ComparedFleet& one, const ComparedUnits& compared) {
   std::string html =
-      "<div class=\"wide\"><table><thead><tr><th>unit</th><th>result</th>"
-      "<th>directions apart from the middle</th><th>of that, shape</th><th>furthest off in</th>"
-      "<th>robust z</th><th>p</th><th>answer</th></tr></thead><tbody>\n";
+      "<div class=\"wide\"><table><thead><tr><th>unit</th><th>answer</th>"
+      "<th>furthest off in</th><th>robust z</th><th>p</th>"
+      "<th>directions apart from the middle</th><th>of that, shape</th>"
+      "<th>result</th></tr></thead><tbody>\n";
   for (std::size_t i = 0; i < one.units.size(); ++i) {
     const ComparedUnit& unit = compared.units[one.units[i]];
     const jobs::FleetUnit& found = one.fleet.units[i];
     html += fmt::format(
         "<tr{}><th scope=\"row\">{}</th><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td>"
         "<td>{}</td><td>{}</td></tr>\n",
-        found.outlier ? " class=\"bad\"" : "", escape_html(unit.serial),
-        escape_html(compared.results[unit.results.back()]),
-        angle_with_sigma(found.beams.errors.total, found.beams.total_sigma),
-        angle_with_sigma(found.beams.errors.shape, found.beams.shape_sigma),
+        found.outlier ? " class=\"bad\"" : "", escape_html(unit.serial), jobs::answer_words(found),
         jobs::worst_words(found, one.fleet),
         found.tested ? fmt::format("{:.1f}", found.worst_z) : "&ndash;",
-        probability_text(found.tested, found.p_value), jobs::answer_words(found));
+        probability_text(found.tested, found.p_value),
+        angle_with_sigma(found.beams.errors.total, found.beams.total_sigma),
+        angle_with_sigma(found.beams.errors.shape, found.beams.shape_sigma),
+        escape_html(compared.results[unit.results.back()]));
   }
   return html +
          fmt::format(

@@ -1,9 +1,12 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-// Presets, scenes, reports, plans of campaigns.
+// Presets, scenes, reports, plans of campaigns, tables of results.
+#include <cstddef>
 #include <string>
+#include <vector>
 
 #include "risley/core/error.hpp"
+#include "risley/io/table_input.hpp"
 #include "risley/jobs/campaign_plan.hpp"
 #include "risley/report/report_file.hpp"
 #include "risley/scenes/scene.hpp"
@@ -69,6 +72,26 @@ void run_campaign_plan(std::span<const std::uint8_t> bytes) {
   }
 }
 
+/// Cells of a table that is accepted are of their columns' kinds, and no more than its bytes hold.
+void run_table(std::span<const std::uint8_t> bytes) {
+  const MemoryFile file(bytes);
+  const std::vector<io::TableColumn> columns = {
+      {"input"}, {"exit_status", io::CellKind::integer}, {"wedge_angle_deg", io::CellKind::real}};
+  try {
+    io::is_table(file.path());
+    const auto rows = io::read_table(file.path(), columns);
+    require(rows.size() <= bytes.size(), "a row has a byte at least");
+    for (const auto& row : rows) {
+      require(row.size() == columns.size(), "a row has all columns");
+      for (std::size_t k = 0; k < row.size(); ++k) {
+        require(row[k].index() == 0 || row[k].index() == (k == 0 ? io::TableCell("").index() : k),
+                "a cell is of its column's kind");
+      }
+    }
+  } catch (const Error&) {  // refused
+  }
+}
+
 /// A report that is accepted is drawn without a fault.
 void run_report(std::span<const std::uint8_t> bytes) {
   const MemoryFile file(bytes);
@@ -85,7 +108,8 @@ std::vector<Target> text_targets() {
   return {{"preset", run_preset},
           {"scene", run_scene},
           {"report", run_report},
-          {"campaign", run_campaign_plan}};
+          {"campaign", run_campaign_plan},
+          {"table", run_table}};
 }
 
 }  // namespace risley::fuzz
