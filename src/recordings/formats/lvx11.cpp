@@ -16,7 +16,7 @@
 
 #include "recordings/formats/format.hpp"
 #include "recordings/formats/lvx_reader.hpp"
-#include "recordings/livox/packet_encoder.hpp"
+#include "risley/recordings/livox/packet_encoder.hpp"
 
 namespace risley::recordings {
 

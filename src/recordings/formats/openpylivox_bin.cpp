@@ -20,7 +20,7 @@
 
 #include "recordings/formats/format.hpp"
 #include "recordings/formats/openpylivox.hpp"
-#include "recordings/livox/packet_encoder.hpp"
+#include "risley/recordings/livox/packet_encoder.hpp"
 
 namespace risley::recordings {
 
