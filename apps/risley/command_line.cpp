@@ -43,6 +43,10 @@ constexpr Verb kVerbs[] = {
      "\\\n"
      "    --scene data/village.yaml --rate-hz 5000",
      declare_simulate},
+    {"record", "Record first-generation Livox sensors from the network",
+     "  risley record -o hall.lvx --interface 192.168.1.5 --duration-s 30\n"
+     "  risley record --list",
+     declare_record},
     {"estimate", "Estimate the sensor's parameters and rotation angles from one recording",
      "  risley estimate recording.lvx -o result/\n"
      "  risley estimate unit.csv --truth unit.csv.truth.yaml --json",

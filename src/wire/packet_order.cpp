@@ -49,6 +49,7 @@ bool PacketOrder::add(std::span<const std::uint8_t> packet, std::int64_t host_ns
     ++counts_.rejected;
     return false;
   }
+  if (!first_host_ns_) first_host_ns_ = host_ns;
   const recordings::Packet& header = chunk_.packets.front();
   const bool is_imu = header.data_type == kImuDataType;
   Track& track = tracks_[is_imu ? 1 : 0];

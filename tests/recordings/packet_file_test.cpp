@@ -56,10 +56,10 @@ TEST_F(PacketFileTest, SeveralSensorsInOneFile) {
   EXPECT_TRUE(read.warnings.empty());
   EXPECT_EQ(read.header.devices.size(), 3U);
   EXPECT_EQ(read.header.devices[2].serial, "SENSOR2");
-  ASSERT_EQ(read.observations.size(), 9900U);
+  ASSERT_EQ(read.data.observations.size(), 9900U);
   for (std::size_t i = 0; i < 99; ++i) {
-    EXPECT_EQ(read.observations.time_ns[100 * i], std::int64_t(i + 1) * 1'000'000);
-    EXPECT_EQ(read.observations.device[100 * i], (i + 1) % 3);
+    EXPECT_EQ(read.data.observations.time_ns[100 * i], std::int64_t(i + 1) * 1'000'000);
+    EXPECT_EQ(read.data.observations.device[100 * i], (i + 1) % 3);
   }
 }
 
@@ -72,10 +72,10 @@ TEST_F(PacketFileTest, AFileThatWasNotClosedStays) {
       if (i % 10 == 0) file.end_frame();
     }
     const Recording growing = load_recording(unfinished_);
-    EXPECT_EQ(growing.observations.size(), 2000U);
+    EXPECT_EQ(growing.data.observations.size(), 2000U);
     EXPECT_TRUE(growing.warnings.empty());
   }
-  EXPECT_EQ(load_recording(unfinished_).observations.size(), 2000U);
+  EXPECT_EQ(load_recording(unfinished_).data.observations.size(), 2000U);
   EXPECT_FALSE(fs::exists(path_));
   // Nobody writes over it.
   try {
@@ -84,12 +84,12 @@ TEST_F(PacketFileTest, AFileThatWasNotClosedStays) {
   } catch (const FileError& error) {
     EXPECT_EQ(error.path(), unfinished_);
   }
-  EXPECT_EQ(load_recording(unfinished_).observations.size(), 2000U);
+  EXPECT_EQ(load_recording(unfinished_).data.observations.size(), 2000U);
   // However many bytes of it are there, it can be read up to the last whole packet.
   const auto size = fs::file_size(unfinished_);
   for (const std::uintmax_t cut : {size - 1, size - 500, size - 1000, size / 2}) {
     fs::resize_file(unfinished_, cut);
-    EXPECT_EQ(load_recording(unfinished_).observations.size() % 100, 0U);
+    EXPECT_EQ(load_recording(unfinished_).data.observations.size() % 100, 0U);
   }
 }
 
@@ -105,7 +105,7 @@ TEST_F(PacketFileTest, AnOlderFileIsReplacedAtTheEnd) {
   file.end_frame();
   EXPECT_EQ(fs::file_size(path_), 5U);
   file.close();
-  EXPECT_EQ(load_recording(path_).observations.size(), 100U);
+  EXPECT_EQ(load_recording(path_).data.observations.size(), 100U);
 }
 
 TEST_F(PacketFileTest, WhatCannotBeWritten) {

@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <vector>
+
 #include <nlohmann/json_fwd.hpp>
 
 namespace risley {
@@ -23,12 +25,14 @@ struct ComparedSeries;
 struct ConvertedRecording;
 struct ConvertedTrajectory;
 struct EstimatedRecording;
+struct FoundSensor;
 struct IdentifiedRecording;
 struct InspectedRecording;
 struct InspectedTrajectory;
 struct JudgedObservability;
 struct PlannedCalibration;
 struct PlannedFlightResult;
+struct RecordedSensors;
 struct RecordingCloud;
 struct ResultComparison;
 struct WrittenPattern;
@@ -84,6 +88,10 @@ Json of(const jobs::CampaignChunk& chunk);
 Json of(const jobs::CampaignResult& merged);
 /// Of `risley simulate`.
 Json of(const simulation::SimulationResult& simulated);
+/// Of `risley record --list`.
+Json of(const std::vector<jobs::FoundSensor>& found);
+/// Of `risley record`.
+Json of(const jobs::RecordedSensors& recorded);
 /// The `coverage` of `risley pattern`.
 Json of(const sensors::PatternCoverage& coverage);
 /// What a list of presets tells of one.

@@ -68,6 +68,8 @@ class PacketOrder {
 
   const PacketCounts& counts() const { return counts_; }
   const std::vector<PacketGap>& gaps() const { return gaps_; }  ///< the first kMostGaps
+  /// When the first packet came, by the host's clock; empty before there is one.
+  std::optional<std::int64_t> first_host_ns() const { return first_host_ns_; }
 
  private:
   struct Held {
@@ -97,6 +99,7 @@ class PacketOrder {
   recordings::Chunk chunk_;
   std::array<Track, 2> tracks_;
   PacketCounts counts_;
+  std::optional<std::int64_t> first_host_ns_;
   std::vector<PacketGap> gaps_;
   std::vector<std::vector<std::uint8_t>> ready_;
 };
