@@ -189,8 +189,8 @@ void Recorder::find() {
           "{}: {} in {} s; is it switched on, in the network of this address and not connected to "
           "another program?",
           to_string(wire::Endpoint{interface_.address, wire::kBroadcastPort}),
-          found.empty() ? "no sensor was heard"
-                        : fmt::format("nothing was heard of {}", fmt::join(missing, ", ")),
+          missing.empty() ? "no sensor was heard"
+                          : fmt::format("nothing was heard of {}", fmt::join(missing, ", ")),
           options_.find_time));
     }
   }
@@ -353,7 +353,7 @@ void Recorder::watch_silence(LiveSensor& live, std::int64_t now) {
   if (silent == live.silent) return;
   live.silent = silent;
   note_(fmt::format("{}: {}", name_of(live), silent ? "no data for 1 s" : "data come again"),
-        silent);
+        true);
 }
 
 void Recorder::write_frame(bool last) {

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 #include <nlohmann/json.hpp>
 
+#include "risley/jobs/emulate_sensor.hpp"
 #include "risley/jobs/record_sensors.hpp"
 #include "risley/json/results.hpp"
 #include "risley/recordings/observations.hpp"
@@ -62,6 +63,25 @@ Json of(const jobs::RecordedSensors& recorded) {
            {{"asked", recorded.receive_buffer_asked}, {"granted", recorded.receive_buffer_granted}}},
           {"strangers", recorded.strangers},
           {"sensors", sensors}};
+}
+
+Json of(const jobs::EmulatedSensor& truth) {
+  Json sensor = found_json({truth.serial, truth.device_type, truth.address});
+  sensor.update({{"rows", truth.rows},
+                 {"packets", truth.packets},
+                 {"imu_samples", truth.imu_samples},
+                 {"lost", truth.lost},
+                 {"lost_at_ends", truth.lost_at_ends},
+                 {"unsent", truth.unsent},
+                 {"kernel_drops", truth.kernel_drops},
+                 {"rejected", truth.rejected},
+                 {"duplicates", truth.duplicates},
+                 {"reordered", truth.reordered},
+                 {"wrong_checksums", truth.wrong_checksums},
+                 {"sessions", truth.sessions},
+                 {"restarts", truth.restarts},
+                 {"behind_s", truth.behind}});
+  return {{"duration_s", truth.duration}, {"sensors", Json::array({sensor})}};
 }
 
 }  // namespace risley::json

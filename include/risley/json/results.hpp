@@ -24,6 +24,7 @@ struct CampaignResult;
 struct ComparedSeries;
 struct ConvertedRecording;
 struct ConvertedTrajectory;
+struct EmulatedSensor;
 struct EstimatedRecording;
 struct FoundSensor;
 struct IdentifiedRecording;
@@ -92,6 +93,8 @@ Json of(const simulation::SimulationResult& simulated);
 Json of(const std::vector<jobs::FoundSensor>& found);
 /// Of `risley record`.
 Json of(const jobs::RecordedSensors& recorded);
+/// Of `risley emulate`.
+Json of(const jobs::EmulatedSensor& truth);
 /// The `coverage` of `risley pattern`.
 Json of(const sensors::PatternCoverage& coverage);
 /// What a list of presets tells of one.
