@@ -6,6 +6,7 @@
 #include <deque>
 #include <map>
 #include <optional>
+#include <set>
 #include <utility>
 #include <vector>
 
@@ -54,7 +55,7 @@ struct Outgoing {
   wire::Endpoint to;
   std::uint64_t number = 0;
   std::int64_t due_ns = 0;
-  bool again = false;  ///< a duplicate
+  bool twice = false;  ///< it has a copy
 };
 
 /// Data from a start to a stop.
@@ -119,6 +120,7 @@ class Emulator {
   std::optional<Stream> stream_;
   std::multimap<std::uint64_t, Outgoing> overtaken_;  // by the packet that they follow
   std::deque<Outgoing> delayed_;
+  std::set<std::uint64_t> sent_once_;  // whose copy has still to be sent
   std::int64_t power_on_ns_ = 0, dead_until_ns_ = 0;
   std::optional<std::int64_t> first_start_ns_;
   bool restarted_ = false, heart_dead_ = false, heart_died_ = false;
@@ -219,6 +221,7 @@ void Emulator::start_stream(std::int64_t now) {
 void Emulator::end_stream(std::int64_t now) {
   if (!stream_) return;
   let_go(now, true);
+  sent_once_.clear();
   truth_.lost_at_ends += stream_->pending_lost;
   stream_.reset();
 }
@@ -263,13 +266,10 @@ void Emulator::make_packet(std::int64_t now) {
                            ? static_cast<std::uint64_t>(disorder_.count(options_.faults.farthest))
                            : 0);
     };
-    Outgoing packet{{bytes.begin(), bytes.end()}, session_->data_target(), number, now + delay_ns,
-                    false};
+    const Outgoing packet{{bytes.begin(), bytes.end()}, session_->data_target(), number,
+                          now + delay_ns, duplication_.falls()};
     overtaken_.emplace(place(), packet);
-    if (duplication_.falls()) {
-      packet.again = true;
-      overtaken_.emplace(place(), std::move(packet));
-    }
+    if (packet.twice) overtaken_.emplace(place(), packet);
   }
 }
 
@@ -287,7 +287,9 @@ void Emulator::let_go(std::int64_t now, bool all) {
 
 void Emulator::send(const Outgoing& packet) {
   const bool sent = socket_.send(packet.to, packet.bytes);
-  if (packet.again) {
+  // Of two copies the one that is sent first counts.
+  if (packet.twice && !sent_once_.insert(packet.number).second) {
+    sent_once_.erase(packet.number);
     if (sent) ++truth_.duplicates;
     return;
   }

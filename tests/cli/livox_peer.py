@@ -207,3 +207,76 @@ class Sensor(threading.Thread):
     def send(self, data):
         self.socket.sendto(data, (self.host[0], self.host[1]))
         self.sent += 1
+
+
+class Host:
+    """A host that shakes hands with one sensor and keeps what it sends."""
+
+    def __init__(self, address="127.0.0.31"):
+        self.address = address
+        self.commands, self.data = bound(address, 0), bound(address, 0)
+        self.data.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 22)
+        self.broadcasts = bound("255.255.255.255", BROADCAST_PORT, reuse=True)
+        self.sensor = None
+        self.sequence = 0
+
+    def close(self):
+        for one in (self.commands, self.data, self.broadcasts):
+            one.close()
+
+    def find(self, code, seconds=5):
+        """Waits for the broadcast of a sensor; its type and the whole frame."""
+        end = time.monotonic() + seconds
+        while time.monotonic() < end:
+            self.broadcasts.settimeout(max(0.01, end - time.monotonic()))
+            try:
+                data, sender = self.broadcasts.recvfrom(2048)
+            except TimeoutError:
+                break
+            heard = parse(data)
+            if heard and heard[2:4] == (0, 0) and heard[4][:16].rstrip(b"\0").decode() == code:
+                assert sender[1] == SENSOR_PORT and heard[0] in (0, 2)
+                self.sensor = sender
+                return heard[4][16], data
+        raise AssertionError(f"{code} was not heard")
+
+    def ask(self, command_set, command, data=b"", kind=0, seconds=1):
+        """What the sensor answers to a command."""
+        self.sequence += 1
+        self.commands.sendto(frame(kind, self.sequence, command_set, command, data), self.sensor)
+        end = time.monotonic() + seconds
+        while time.monotonic() < end:
+            self.commands.settimeout(max(0.01, end - time.monotonic()))
+            try:
+                reply, sender = self.commands.recvfrom(2048)
+            except TimeoutError:
+                break
+            heard = parse(reply)
+            if heard and heard[:4] == (1, self.sequence, command_set, command) and sender == self.sensor:
+                return heard[4]
+        return None
+
+    def shake_hands(self, kind=0, with_imu_port=True):
+        ports = [self.data.getsockname()[1], self.commands.getsockname()[1]]
+        if with_imu_port:
+            ports.append(ports[0])
+        return self.ask(0, 1, socket.inet_aton(self.address) + struct.pack(f"<{len(ports)}H", *ports), kind)
+
+    def receive(self, seconds):
+        """Packets of a time, and all that is there at its end."""
+        packets, end = [], time.monotonic() + seconds
+        heartbeat = 0
+        while True:
+            now = time.monotonic()
+            if now < end and now - heartbeat > 0.8:
+                assert self.ask(0, 3) is not None
+                heartbeat = now
+            self.data.settimeout(max(0.05, min(0.5, end - now)))
+            try:
+                packets.append(self.data.recvfrom(2048)[0])
+            except TimeoutError:
+                if time.monotonic() >= end:
+                    return packets
+            else:
+                if time.monotonic() > end + 2:
+                    return packets

@@ -79,8 +79,8 @@ class RecordTest(CommandTest):
         other = self.sensor("127.0.0.12", "PEER00000000021", AVIA)
         found = self.expect_json(0, "record", "--list", "--interface", HOST)
         self.assertEqual(found["sensors"],
-                         [{"serial": "PEER00000000011", "sensor": "Mid-40", "address": "127.0.0.11"},
-                          {"serial": "PEER00000000021", "sensor": "Avia", "address": "127.0.0.12"}])
+                         [{"serial": "PEER00000000011", "sensor": "Livox Mid-40", "address": "127.0.0.11"},
+                          {"serial": "PEER00000000021", "sensor": "Livox Avia", "address": "127.0.0.12"}])
         self.assertEqual((one.heard, other.heard), ([], []))
 
     def test_every_packet_of_several_sensors(self):
@@ -243,7 +243,7 @@ class RecordTest(CommandTest):
             time.sleep(0.001)
         result = json.loads(self.end(process)[0])
         self.assertEqual([(one["serial"], one["sensor"], one["lost"]) for one in result["sensors"]],
-                         [("127.0.0.21", "Mid-40", 0), ("127.0.0.22", "Mid-70", 0)])
+                         [("127.0.0.21", "Livox Mid-40", 0), ("127.0.0.22", "Livox Mid-70", 0)])
         for index, step in enumerate((1_000_000, 960_000)):
             times = self.times("passive.lvx", index)
             self.assertGreater(len(times), 300)
