@@ -195,6 +195,15 @@ MESSAGES = {
             (0, "risley calibrate --plan data/flight-s4.yaml --mount data/mount-nadir.yaml --rate-hz 1000 "
                 "--trajectory-errors data/trajectory-errors.yaml --scene data/village.yaml"),),
     },
+    "record.md": {
+        "risley: error: 127.0.0.1:55000: no sensor": (
+            (3, "risley record -o out/no.lvx --interface 127.0.0.1 --find-s 0.2"),),
+        "risley: error: 127.0.0.1:55000: Address": (
+            (0, "{ risley record --list --interface 127.0.0.1 --find-s 3 > out/other.txt & sleep 0.5; }"),
+            (3, "risley record --list --interface 127.0.0.1"),
+            (0, "wait")),
+        "risley: error: --interface": ((2, "risley record --list --interface 192.0.2.1"),),
+    },
     "report.md": {
         "risley: error: out/converted": (
             (0, "mkdir out/converted out/bad && head -c 20000 out/unit/report.json > out/bad/report.json"),
