@@ -199,10 +199,10 @@ MESSAGES = {
         "risley: error: 127.0.0.1:55000: no sensor": (
             (3, "risley record -o out/no.lvx --interface 127.0.0.1 --find-s 0.2"),),
         "risley: error: 127.0.0.1:55000: Address": (
-            (0, "{ risley record --list --interface 127.0.0.1 --find-s 3 > out/other.txt & sleep 0.5; }"),
-            (3, "risley record --list --interface 127.0.0.1"),
+            (0, "{ risley record --interface 127.0.0.1 --list --find-s 3 > out/other.txt & sleep 0.5; }"),
+            (3, "risley record --interface 127.0.0.1 --list"),
             (0, "wait")),
-        "risley: error: --interface": ((2, "risley record --list --interface 192.0.2.1"),),
+        "risley: error: --interface": ((2, "risley record --interface 192.0.2.1 --list"),),
     },
     "report.md": {
         "risley: error: out/converted": (

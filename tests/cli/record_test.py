@@ -212,7 +212,7 @@ class RecordTest(CommandTest):
         self.assertEqual(len(result["gaps"]), 1)
         gap = result["gaps"][0]
         self.assertIsNone(gap["lost"])
-        self.assertTrue(2 < gap["end_s"] - gap["begin_s"] < 8, gap)
+        self.assertTrue(1 < gap["end_s"] - gap["begin_s"] < 8, gap)
 
     def test_a_sensor_that_is_silent_for_a_while(self):
         sensor = self.sensor()

@@ -114,7 +114,7 @@ void run_client(std::span<const std::uint8_t> bytes) {
     if ((how & kLater) == 0) return;
     now += kStep * (how >> 3U);
     client.advance(now);
-    require(client.take_datagrams().size() <= 3, "few commands at a time");
+    require(client.take_datagrams().size() <= 4, "few commands at a time");
     client.take_events();
   });
 }
