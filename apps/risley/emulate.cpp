@@ -91,8 +91,7 @@ void declare_faults(CLI::App& verb, EmulateChoices& o) {
       ->check(CLI::Range(0.0, 60000.0))
       ->capture_default_str()
       ->group(group);
-  share("--wrong-checksums", o.wrong_checksums,
-        "Share of replies and broadcasts that is damaged");
+  share("--wrong-checksums", o.wrong_checksums, "Share of replies and broadcasts that is damaged");
   verb.add_option("--heartbeat-dies-s", o.heartbeat_dies_s,
                   "When heartbeats are no longer answered, s after the first start")
       ->check(CLI::NonNegativeNumber)
@@ -144,8 +143,9 @@ Run declare_emulate(CLI::App& verb) {
   verb.add_option("--speed", o.speed, "How many times faster than real time the sensor runs")
       ->check(CLI::Range(0.01, 100.0))
       ->capture_default_str();
-  verb.add_option("--duration-s", o.duration_s,
-                  "How long the sensor is there, s of real time (default: until Ctrl-C or SIGTERM)");
+  verb.add_option(
+      "--duration-s", o.duration_s,
+      "How long the sensor is there, s of real time (default: until Ctrl-C or SIGTERM)");
   declare_faults(verb, o);
   return [options](const CommonOptions& common) {
     const jobs::EmulatedSensor truth = jobs::emulate_sensor(

@@ -76,7 +76,8 @@ void print_recorded(const jobs::RecordedSensors& recorded) {
   table.print();
   for (const jobs::RecordedSensor& one : recorded.sensors) {
     for (const jobs::RecordedGap& gap : one.gaps) {
-      say("{}: nothing from {:.1f} to {:.1f} s, {}\n", one.sensor.serial, gap.begin, gap.end,
+      say("{}: no {} from {:.1f} to {:.1f} s, {}\n", one.sensor.serial,
+          gap.imu ? "inertial samples" : "points", gap.begin, gap.end,
           gap.lost ? fmt::format("{} packets", grouped(*gap.lost))
                    : std::string("the sensor's clock began again"));
     }

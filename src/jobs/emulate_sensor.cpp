@@ -31,8 +31,8 @@ constexpr std::int64_t kLongestRest = 20'000'000, kShortestRest = 200'000;  // n
 constexpr int kPacketsAtOnce = 256;
 constexpr double kFastest = 100;
 
-/// Decisions with a share, one after the other; each purpose has its own, so that one fault does not
-/// change where others fall.
+/// Decisions with a share, one after the other; each purpose has its own, so that one fault does
+/// not change where others fall.
 class Chance {
  public:
   Chance(std::uint64_t seed, std::uint64_t purpose, double share)
@@ -233,8 +233,8 @@ void Emulator::send_due(std::int64_t now) {
       static_cast<std::int64_t>(static_cast<double>(now - stream.begin_ns) * options_.speed);
   const std::uint64_t due = scan_.packets_in(passed, stream.data_type) + 1;
   const std::uint64_t behind = due - std::min(due, stream.number);
-  truth_.behind = std::max(
-      truth_.behind, 1e-9 * static_cast<double>(scan_.time_of(behind, stream.data_type)));
+  truth_.behind =
+      std::max(truth_.behind, 1e-9 * static_cast<double>(scan_.time_of(behind, stream.data_type)));
   for (int i = 0; i < kPacketsAtOnce && stream.number < due; ++i) make_packet(now);
   let_go(now, false);
 }
@@ -266,8 +266,11 @@ void Emulator::make_packet(std::int64_t now) {
                            ? static_cast<std::uint64_t>(disorder_.count(options_.faults.farthest))
                            : 0);
     };
-    const Outgoing packet{{bytes.begin(), bytes.end()}, session_->data_target(), number,
-                          now + delay_ns, duplication_.falls()};
+    const Outgoing packet{{bytes.begin(), bytes.end()},
+                          session_->data_target(),
+                          number,
+                          now + delay_ns,
+                          duplication_.falls()};
     overtaken_.emplace(place(), packet);
     if (packet.twice) overtaken_.emplace(place(), packet);
   }

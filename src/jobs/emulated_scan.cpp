@@ -16,9 +16,9 @@ namespace {
 
 using namespace recordings::livox;
 
-constexpr double kScanDuration = 600;           // s; then it begins again
-constexpr std::size_t kShotsAtOnce = 24'000;    // a multiple of all packets' shots
-constexpr std::uint8_t kFirstEcho = 1U << 4U;   // of a tag: first real return
+constexpr double kScanDuration = 600;          // s; then it begins again
+constexpr std::size_t kShotsAtOnce = 24'000;   // a multiple of all packets' shots
+constexpr std::uint8_t kFirstEcho = 1U << 4U;  // of a tag: first real return
 constexpr const char* kRoom = R"(planes:
   - {name: front, distance_m: 12, normal_azimuth_deg: 4, normal_zenith_deg: 90}
   - {name: back, distance_m: 9, normal_azimuth_deg: 180, normal_zenith_deg: 90}
@@ -58,8 +58,7 @@ simulation::SimulationSettings settings_of(const SimulationOptions& options) {
 }  // namespace
 
 EmulatedScan::EmulatedScan(const SimulationOptions& options)
-    : settings_(settings_of(options)),
-      scanner_(std::make_unique<simulation::Scanner>(settings_)) {
+    : settings_(settings_of(options)), scanner_(std::make_unique<simulation::Scanner>(settings_)) {
   device_ = scanner_->header().devices.front();
 }
 

@@ -58,7 +58,9 @@ std::optional<recordings::livox::ShotGrid> grid_of_firmware(const std::string& f
 
 /// A sensor while it is recorded.
 struct LiveSensor {
-  explicit LiveSensor(const FoundSensor& found) : order(found.device_type) { result.sensor = found; }
+  explicit LiveSensor(const FoundSensor& found) : order(found.device_type) {
+    result.sensor = found;
+  }
 
   RecordedSensor result;
   wire::PacketOrder order;
@@ -131,8 +133,8 @@ std::vector<FoundSensor> Recorder::find_passively() {
     for (const FoundSensor& sensor : listener_.take()) named.try_emplace(sensor.address, sensor);
     passive_data_->receive([&](const wire::UdpSocket::Datagram& datagram) {
       wire::PacketOrder check(recordings::kMid40);
-      if (!check.add(datagram.bytes, 0) || (heard.size() >= kMostPassiveSensors &&
-                                            !heard.contains(datagram.from.address))) {
+      if (!check.add(datagram.bytes, 0) ||
+          (heard.size() >= kMostPassiveSensors && !heard.contains(datagram.from.address))) {
         return;
       }
       const auto packet = recordings::livox::decode_packet_header(datagram.bytes);
@@ -207,8 +209,8 @@ void Recorder::open_sockets() {
   if (!passive_data_) {
     for (const auto& live : sensors_) {
       live->commands = std::make_unique<wire::UdpSocket>(wire::Endpoint{interface_.address, 0});
-      live->data = std::make_unique<wire::UdpSocket>(wire::Endpoint{interface_.address, 0},
-                                                     kReceiveBuffer);
+      live->data =
+          std::make_unique<wire::UdpSocket>(wire::Endpoint{interface_.address, 0}, kReceiveBuffer);
       granted = std::min(granted, live->data->receive_buffer());
       waiting_.push_back(live->commands.get());
       waiting_.push_back(live->data.get());
@@ -259,7 +261,8 @@ void Recorder::take_event(LiveSensor& live, const ClientEvent& event) {
         if (known.size() < kMostStatuses &&
             std::find(known.begin(), known.end(), event.value) == known.end()) {
           known.push_back(event.value);
-          note_(fmt::format("{}: it reports the status 0x{:08X}", name_of(live), event.value), true);
+          note_(fmt::format("{}: it reports the status 0x{:08X}", name_of(live), event.value),
+                true);
         }
       }
       break;
@@ -267,8 +270,7 @@ void Recorder::take_event(LiveSensor& live, const ClientEvent& event) {
       note_(fmt::format("{}: it refuses the command \"{}\"", name_of(live), event.text), true);
       break;
     case ClientEvent::Kind::sampling:
-      note_(fmt::format("{} at {}: started", name_of(live),
-                        to_string(live.result.sensor.address)),
+      note_(fmt::format("{} at {}: started", name_of(live), to_string(live.result.sensor.address)),
             false);
       break;
     case ClientEvent::Kind::closed:
@@ -352,8 +354,7 @@ void Recorder::watch_silence(LiveSensor& live, std::int64_t now) {
   const bool silent = now - *live.data_ns > kSilenceTold;
   if (silent == live.silent) return;
   live.silent = silent;
-  note_(fmt::format("{}: {}", name_of(live), silent ? "no data for 1 s" : "data come again"),
-        true);
+  note_(fmt::format("{}: {}", name_of(live), silent ? "no data for 1 s" : "data come again"), true);
 }
 
 void Recorder::write_frame(bool last) {
@@ -429,13 +430,13 @@ RecordedSensors Recorder::run() {
     for (const auto& live : sensors_) begin_session(*live, begin);
   }
   constexpr std::int64_t kEndless = std::numeric_limits<std::int64_t>::max();
-  const auto duration = options_.duration ? static_cast<std::int64_t>(1e9 * *options_.duration)
-                                          : kEndless;
+  const auto duration =
+      options_.duration ? static_cast<std::int64_t>(1e9 * *options_.duration) : kEndless;
   std::exception_ptr failure;
   try {
     for (std::int64_t now = begin; !progress_.cancelled(); now = steady_ns()) {
-      const std::int64_t end = first_data_ns_ && options_.duration ? *first_data_ns_ + duration
-                                                                   : kEndless;
+      const std::int64_t end =
+          first_data_ns_ && options_.duration ? *first_data_ns_ + duration : kEndless;
       if (now >= end) break;
       if (options_.duration && first_data_ns_) {
         try {
@@ -458,9 +459,9 @@ RecordedSensors Recorder::run() {
   if (failure) std::rethrow_exception(failure);
   write_frame(true);
   if (file_->frames() == 0) {
-    throw wire::NetworkError(
-        fmt::format("{}: no packet came from {}; nothing was recorded",
-                    to_string(interface_.address), name_of(*sensors_.front())));
+    throw wire::NetworkError(fmt::format("{}: no packet came from {}; nothing was recorded",
+                                         to_string(interface_.address),
+                                         name_of(*sensors_.front())));
   }
   file_->close();
   return result();
@@ -493,7 +494,8 @@ RecordedSensors Recorder::result() {
                     (live->session ? live->session->rejected() : 0);
     for (const wire::PacketGap& gap : live->order.gaps()) {
       one.gaps.push_back({1e-9 * static_cast<double>(gap.host_from_ns - first_host_ns),
-                          1e-9 * static_cast<double>(gap.host_to_ns - first_host_ns), gap.lost});
+                          1e-9 * static_cast<double>(gap.host_to_ns - first_host_ns), gap.lost,
+                          gap.imu});
     }
     recorded.sensors.push_back(one);
   }

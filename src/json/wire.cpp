@@ -21,7 +21,8 @@ Json gaps_json(const std::vector<jobs::RecordedGap>& gaps) {
   for (const jobs::RecordedGap& gap : gaps) {
     json.push_back({{"begin_s", gap.begin},
                     {"end_s", gap.end},
-                    {"lost", gap.lost ? Json(*gap.lost) : Json()}});
+                    {"lost", gap.lost ? Json(*gap.lost) : Json()},
+                    {"data", gap.imu ? "imu" : "points"}});
   }
   return json;
 }
@@ -54,15 +55,16 @@ Json of(const jobs::RecordedSensors& recorded) {
                    {"statuses", one.statuses}});
     sensors.push_back(std::move(sensor));
   }
-  return {{"output", recorded.output},
-          {"interface", to_string(recorded.interface)},
-          {"duration_s", recorded.duration},
-          {"frames", recorded.frames},
-          {"bytes", recorded.bytes},
-          {"receive_buffer_bytes",
-           {{"asked", recorded.receive_buffer_asked}, {"granted", recorded.receive_buffer_granted}}},
-          {"strangers", recorded.strangers},
-          {"sensors", sensors}};
+  return {
+      {"output", recorded.output},
+      {"interface", to_string(recorded.interface)},
+      {"duration_s", recorded.duration},
+      {"frames", recorded.frames},
+      {"bytes", recorded.bytes},
+      {"receive_buffer_bytes",
+       {{"asked", recorded.receive_buffer_asked}, {"granted", recorded.receive_buffer_granted}}},
+      {"strangers", recorded.strangers},
+      {"sensors", sensors}};
 }
 
 Json of(const jobs::EmulatedSensor& truth) {

@@ -40,8 +40,9 @@ class DataWriter {
   }
   void code(const std::string& text) {
     if (text.size() >= kCodeBytes) {
-      throw InvalidArgument(fmt::format("broadcast code \"{}\" has {} characters, allowed at most {}",
-                                        text, text.size(), kCodeBytes - 1));
+      throw InvalidArgument(
+          fmt::format("broadcast code \"{}\" has {} characters, allowed at most {}", text,
+                      text.size(), kCodeBytes - 1));
     }
     bytes_.insert(bytes_.end(), text.begin(), text.end());
     bytes_.resize(bytes_.size() + kCodeBytes - text.size());
@@ -60,8 +61,8 @@ class DataWriter {
   }
   void keys(const std::vector<std::uint16_t>& list) {
     if (list.size() > kMostKeys) {
-      throw InvalidArgument(fmt::format("{} keys in a command, allowed at most {}", list.size(),
-                                        kMostKeys));
+      throw InvalidArgument(
+          fmt::format("{} keys in a command, allowed at most {}", list.size(), kMostKeys));
     }
     number(static_cast<std::uint8_t>(list.size()));
     for (const std::uint16_t key : list) number(key);
@@ -107,9 +108,8 @@ class DataReader {
     const auto end = std::find(field.begin(), field.end(), std::uint8_t{0});
     // A name of a device is plain text.
     const bool plain = end != field.end() && end != field.begin() &&
-                       std::all_of(field.begin(), end, [](std::uint8_t byte) {
-                         return byte > 0x20 && byte < 0x7F;
-                       });
+                       std::all_of(field.begin(), end,
+                                   [](std::uint8_t byte) { return byte > 0x20 && byte < 0x7F; });
     if (!plain) {
       fail(DataFault::value);
     } else {
@@ -174,7 +174,9 @@ class DataReader {
 template <class T, class Value>
 concept Is = std::same_as<std::remove_const_t<T>, Value>;
 template <class T>
-concept OneByte = requires { T::kMostValue; };
+concept OneByte = requires {
+  T::kMostValue;
+};
 
 void visit(auto& data, Is<Broadcast> auto& value) {
   data.code(value.code);
@@ -255,7 +257,9 @@ void visit(auto& data, Is<ValueReply> auto& value) {
 }
 
 template <class T>
-concept AnswersOne = requires { T::kId; };
+concept AnswersOne = requires {
+  T::kId;
+};
 
 template <class Value>
 CommandId id_of(const Value& value) {
@@ -302,10 +306,9 @@ std::variant<Any, DataFault> decode_any(const Frame& frame) {
 constexpr CommandId kAnsweredByValue[] = {QueryFan::kId, QueryReturnMode::kId, QueryImuRate::kId};
 constexpr CommandId kAnsweredByKey[] = {WriteParameters::kId, ResetParameters::kId};
 constexpr CommandId kAnsweredByResult[] = {
-    Handshake::kId,       SetSampling::kId,   SetCoordinates::kId, Disconnect::kId,
-    SetAddress::kId,      Reboot::kId,        SetMode::kId,        WriteExtrinsics::kId,
-    SetRainFilter::kId,   SetFan::kId,        SetReturnMode::kId,  SetImuRate::kId,
-    SetUtc::kId,
+    Handshake::kId,     SetSampling::kId, SetCoordinates::kId,  Disconnect::kId,    SetAddress::kId,
+    Reboot::kId,        SetMode::kId,     WriteExtrinsics::kId, SetRainFilter::kId, SetFan::kId,
+    SetReturnMode::kId, SetImuRate::kId,  SetUtc::kId,
 };
 
 bool is_among(std::span<const CommandId> list, CommandId command) {

@@ -11,8 +11,8 @@ namespace {
 
 using namespace recordings::livox;
 
-constexpr std::int64_t kImuPeriod = 5'000'000;      // ns
-constexpr std::int64_t kNotableGap = 100'000'000;   // ns
+constexpr std::int64_t kImuPeriod = 5'000'000;         // ns
+constexpr std::int64_t kNotableGap = 100'000'000;      // ns
 constexpr std::int64_t kSurelyNoJump = 1'000'000'000;  // ns
 /// A clock that runs faster than that has jumped: emulated time may be faster than real time.
 constexpr std::int64_t kFastestClock = 200;
@@ -35,8 +35,7 @@ PacketOrder::PacketOrder(std::uint8_t device_type)
 
 std::int64_t PacketOrder::period_of(std::uint8_t data_type) const {
   if (data_type == kImuDataType) return kImuPeriod;
-  const ShotGrid grid =
-      grid_ ? *grid_ : shot_grid(device_type_, data_type).value_or(kGrid100kHz);
+  const ShotGrid grid = grid_ ? *grid_ : shot_grid(device_type_, data_type).value_or(kGrid100kHz);
   const std::uint32_t records = record_layout(data_type)->records;
   return grid.offset_ns((records + grid.records_per_shot - 1U) / grid.records_per_shot);
 }
@@ -100,13 +99,13 @@ void PacketOrder::give_out(Track& track) {
   const std::int64_t time = first->first;
   Held& packet = first->second;
   if (track.last_ns) {
-    PacketGap gap{*track.last_ns, time, track.last_host_ns, packet.host_ns, {}};
+    PacketGap gap{*track.last_ns, time, track.last_host_ns, packet.host_ns, {}, packet.rows == 0};
     bool notable = track.jumped;
     if (track.jumped) {
       ++counts_.clock_jumps;
     } else {
-      const double periods = static_cast<double>(time - *track.last_ns) /
-                             static_cast<double>(track.last_period_ns);
+      const double periods =
+          static_cast<double>(time - *track.last_ns) / static_cast<double>(track.last_period_ns);
       const auto steps = static_cast<std::uint64_t>(std::max(1LL, std::llround(periods)));
       counts_.lost += steps - 1;
       gap.lost = steps - 1;

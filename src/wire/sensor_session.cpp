@@ -62,8 +62,8 @@ void SensorSession::advance(std::int64_t now_ns) {
     broadcast_due_ns_ = now_ns + kBroadcastPeriod;
   }
   if (host_ && (status_ >> kSystemAt) != 0 && now_ns >= status_due_ns_) {
-    datagrams_.push_back({Endpoint{*host_, command_port_},
-                          encode(Message(AbnormalStatus{status_}), sequence_++)});
+    datagrams_.push_back(
+        {Endpoint{*host_, command_port_}, encode(Message(AbnormalStatus{status_}), sequence_++)});
     status_due_ns_ = now_ns + kStatusPeriod;
   }
 }
@@ -112,8 +112,7 @@ void SensorSession::receive(const Endpoint& from, std::span<const std::uint8_t> 
 
 void SensorSession::shake_hands(const Endpoint& from, const Handshake& hand, std::uint16_t sequence,
                                 std::int64_t now_ns) {
-  const bool allowed =
-      hand.host == from.address && hand.data_port != 0 && hand.command_port != 0;
+  const bool allowed = hand.host == from.address && hand.data_port != 0 && hand.command_port != 0;
   const Reply reply = result_of(hand, allowed);
   if (!allowed) {
     ++rejected_;

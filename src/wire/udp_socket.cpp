@@ -101,7 +101,9 @@ std::vector<Interface> interfaces() {
     if (found.is_loopback && is_loopback(found.address)) {
       found.broadcast = Address{{127, 255, 255, 255}};
     } else if ((one->ifa_flags & IFF_BROADCAST) != 0 && one->ifa_broadaddr != nullptr) {
-      found.broadcast = address_of(*reinterpret_cast<const sockaddr_in*>(one->ifa_broadaddr));
+      // Without one of its own the address stands there again.
+      const Address told = address_of(*reinterpret_cast<const sockaddr_in*>(one->ifa_broadaddr));
+      if (told != found.address && told != Address{}) found.broadcast = told;
     }
     all.push_back(std::move(found));
   }
@@ -122,9 +124,9 @@ Interface interface_of(const std::string& address) {
   }
   const auto wanted = address_from(address);
   if (!wanted) {
-    throw InvalidArgument(fmt::format(
-        "option interface = {}, expected an IPv4 address of this machine: {}", address,
-        list_of(all)));
+    throw InvalidArgument(
+        fmt::format("option interface = {}, expected an IPv4 address of this machine: {}", address,
+                    list_of(all)));
   }
   for (const Interface& one : all) {
     if (one.address == *wanted) return one;
@@ -210,7 +212,8 @@ std::size_t UdpSocket::receive(const std::function<void(const Datagram&)>& take)
     batch_->headers[i].msg_hdr.msg_namelen = sizeof(sockaddr_in);
     batch_->headers[i].msg_hdr.msg_controllen = batch_->control[i].bytes.size();
   }
-  const int count = ::recvmmsg(socket_.get(), batch_->headers.data(), kBatch, MSG_DONTWAIT, nullptr);
+  const int count =
+      ::recvmmsg(socket_.get(), batch_->headers.data(), kBatch, MSG_DONTWAIT, nullptr);
   if (count < 0) {
     // An interface that went down comes up again.
     if (errno == EAGAIN || errno == EINTR || errno == ENETDOWN || errno == ECONNREFUSED) return 0;

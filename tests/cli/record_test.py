@@ -6,6 +6,7 @@ import json
 import signal
 import struct
 import subprocess
+import sys
 import time
 import unittest
 
@@ -230,6 +231,39 @@ class RecordTest(CommandTest):
         self.assertEqual(result["lost"], sensor.lost)
         self.assertEqual([gap["lost"] for gap in result["gaps"]], [sensor.lost])
         self.assertEqual(result["sessions"], 1)
+
+    def test_a_real_interface_that_goes_down(self):
+        """Two namespaces with a cable between them, which is pulled for a while."""
+        script = """set -e
+            mount -t tmpfs none /run; mkdir /run/netns; ip netns add sensor
+            ip link add host type veth peer name there netns sensor
+            ip link add other type veth peer name nobody
+            ip addr add 192.168.1.5/24 dev host; ip addr add 10.9.9.1/24 brd + dev other
+            ip netns exec sensor ip addr add 192.168.1.41/24 dev there
+            ip netns exec sensor ip link set there up
+            for one in lo host other nobody; do ip link set $one up; done
+            echo ready
+            ip netns exec sensor "$0" emulate --interface 192.168.1.41 --sensor avia --duration-s 20 \
+              --json > emulated.json &
+            "$0" record --list --interface 10.9.9.1 --json > elsewhere.json
+            (sleep 4.5; ip link set host down; sleep 4; ip link set host up) &
+            "$0" record --interface 192.168.1.5 -o cable.lvx --duration-s 11 --json 2> cable.txt
+            wait"""
+        done = subprocess.run(["unshare", "-rnm", "bash", "-c", script, COMMAND], cwd=self.folder, text=True,
+                              capture_output=True, timeout=120, check=False)
+        if not done.stdout.startswith("ready"):
+            print(f"SKIPPED: namespaces cannot be made: {done.stderr}", file=sys.stderr)
+            self.skipTest("namespaces")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual(json.loads((self.folder / "elsewhere.json").read_text())["sensors"], [])
+        result = json.loads(done.stdout.removeprefix("ready"))["sensors"][0]
+        truth = json.loads((self.folder / "emulated.json").read_text())["sensors"][0]
+        self.assertEqual(result["packets"] + result["lost"], truth["packets"])
+        self.assertEqual({gap["data"] for gap in result["gaps"]}, {"points", "imu"})
+        self.assertEqual(sum(gap["lost"] for gap in result["gaps"]), result["lost"])
+        for gap in result["gaps"]:
+            self.assertTrue(3.5 < gap["end_s"] - gap["begin_s"] < 8, gap)
+        self.assertIn("no data for 1 s", (self.folder / "cable.txt").read_text())
 
     def test_passive_listens_and_sends_nothing(self):
         sender, other = bound("127.0.0.21", 0), bound("127.0.0.22", 0)

@@ -171,8 +171,8 @@ TEST(Commands, LengthsCount) {
     const Frame frame = frame_of(bytes);
     std::vector<std::uint8_t> longer(frame.data.begin(), frame.data.end());
     longer.push_back(0);
-    EXPECT_TRUE(std::holds_alternative<DataFault>(
-        decode_command({frame.type, 0, frame.command, longer})))
+    EXPECT_TRUE(
+        std::holds_alternative<DataFault>(decode_command({frame.type, 0, frame.command, longer})))
         << to_string(frame.command);
     if (frame.data.empty() || std::holds_alternative<WriteParameters>(command)) continue;
     const auto shorter = frame.data.first(frame.data.size() - 1);

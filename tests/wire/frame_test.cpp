@@ -88,16 +88,14 @@ TEST(Frame, EveryFaultHasItsName) {
 }
 
 TEST(Frame, EveryBitCounts) {
-  const auto good =
-      bytes_of("AA0119000001000441 0001 C0A80102C1DACDD8C1DA 02443550");
+  const auto good = bytes_of("AA0119000001000441 0001 C0A80102C1DACDD8C1DA 02443550");
   for (std::size_t bit = 0; bit < 8 * good.size(); ++bit) {
     auto bad = good;
     bad[bit / 8] = static_cast<std::uint8_t>(bad[bit / 8] ^ (1U << (bit % 8)));
     EXPECT_TRUE(std::holds_alternative<FrameRefusal>(decode_frame(bad))) << bit;
   }
   for (std::size_t count = 0; count < good.size(); ++count) {
-    EXPECT_TRUE(std::holds_alternative<FrameRefusal>(
-        decode_frame(std::span(good).first(count))))
+    EXPECT_TRUE(std::holds_alternative<FrameRefusal>(decode_frame(std::span(good).first(count))))
         << count;
   }
 }

@@ -57,8 +57,8 @@ TEST(PacketOrder, CountsWhatIsMissingOfEveryType) {
         continue;
       }
       ++sent;
-      ASSERT_TRUE(order.add(packet(7 * kSecond + i * kind.period_ns, kind.data_type),
-                            i * kind.period_ns));
+      ASSERT_TRUE(
+          order.add(packet(7 * kSecond + i * kind.period_ns, kind.data_type), i * kind.period_ns));
     }
     order.flush();
     EXPECT_EQ(order.counts().lost, missing);

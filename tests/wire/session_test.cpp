@@ -29,7 +29,8 @@ class Link {
       : sensor(identity(type), 0), client(wanted, 0) {}
 
   /// Lets time pass until something holds. @return whether it came to hold
-  bool run(std::int64_t ms, const std::function<bool()>& holds = [] { return false; }) {
+  bool run(
+      std::int64_t ms, const std::function<bool()>& holds = [] { return false; }) {
     for (const std::int64_t end = now + ms * kMs; now < end; now += 10 * kMs) {
       client.advance(now);
       sensor.advance(now);

@@ -75,11 +75,11 @@ TEST(UdpSocket, MessagesNameAddressAndRemedy) {
     }
     return std::string();
   };
-  EXPECT_NE(message(first.local()).find(to_string(first.local()) + ": Address already in use: "
-                                                                   "another program"),
+  EXPECT_NE(message(first.local())
+                .find(to_string(first.local()) + ": Address already in use: "
+                                                 "another program"),
             std::string::npos);
-  EXPECT_NE(message({{{192, 0, 2, 1}}, 0}).find("no interface of this machine"),
-            std::string::npos);
+  EXPECT_NE(message({{{192, 0, 2, 1}}, 0}).find("no interface of this machine"), std::string::npos);
 }
 
 TEST(UdpSocket, Interfaces) {

@@ -22,9 +22,10 @@ struct EmulatedFaults {
   double delay = 0;        ///< s, by which data come late
   /// Share of frames, replies and broadcasts, whose last byte is wrong.
   double wrong_checksums = 0;
-  std::optional<double> heartbeat_dies;  ///< s after the first start; from then to the session's end
-  std::optional<double> restart;         ///< s after the first start, once
-  double restart_time = 2;               ///< s, for which a sensor that restarts says nothing
+  std::optional<double>
+      heartbeat_dies;             ///< s after the first start; from then to the session's end
+  std::optional<double> restart;  ///< s after the first start, once
+  double restart_time = 2;        ///< s, for which a sensor that restarts says nothing
 };
 
 /// Which sensor to be, and how.
@@ -44,7 +45,7 @@ struct EmulatedSensor {
   std::string serial;
   std::uint8_t device_type = 0;  ///< as recordings::Device::type
   wire::Address address;
-  double duration = 0;  ///< s of real time
+  double duration = 0;                                   ///< s of real time
   std::uint64_t packets = 0, rows = 0, imu_samples = 0;  ///< that were sent, each once
   /// Packets that were not sent and lie between others that were, in one session.
   std::uint64_t lost = 0;
@@ -55,7 +56,7 @@ struct EmulatedSensor {
   std::uint64_t kernel_drops = 0;               ///< of commands
   std::uint64_t rejected = 0;                   ///< datagrams that were no commands of the host
   std::uint64_t sessions = 0, restarts = 0;     ///< handshakes that were answered; restarts
-  double behind = 0;  ///< s, by which the sending fell behind at most
+  double behind = 0;                            ///< s, by which the sending fell behind at most
 };
 
 /// Told at once: where the sensor is and what it does.

@@ -40,6 +40,7 @@ struct FoundSensor {
 struct RecordedGap {
   double begin = 0, end = 0;
   std::optional<std::uint64_t> lost;  ///< packets; empty where the sensor's clock began again
+  bool imu = false;                   ///< of inertial samples, not of points
 };
 
 /// What was recorded of a sensor.
@@ -59,7 +60,7 @@ struct RecordedSensor {
 struct RecordedSensors {
   std::string output;
   wire::Address interface;
-  double duration = 0;  ///< s from the first data to the end
+  double duration = 0;                  ///< s from the first data to the end
   std::uint64_t frames = 0, bytes = 0;  ///< of the file
   std::size_t receive_buffer_asked = 0, receive_buffer_granted = 0;  ///< bytes per sensor
   std::vector<RecordedSensor> sensors;

@@ -38,14 +38,14 @@ enum class ClientState : std::uint8_t {
 /// Something that happened in a session.
 struct ClientEvent {
   enum class Kind : std::uint8_t {
-    connected,       ///< the handshake was answered
-    firmware,        ///< text is its number
-    sensor_state,    ///< value is a SensorState
-    status,          ///< value is a status, as recordings::Packet::status
-    refused,         ///< text names the command; the session goes on
-    sampling,        ///< data come from now on
-    closed,          ///< as was asked
-    lost,            ///< text says why
+    connected,     ///< the handshake was answered
+    firmware,      ///< text is its number
+    sensor_state,  ///< value is a SensorState
+    status,        ///< value is a status, as recordings::Packet::status
+    refused,       ///< text names the command; the session goes on
+    sampling,      ///< data come from now on
+    closed,        ///< as was asked
+    lost,          ///< text says why
   };
   Kind kind = Kind::connected;
   std::uint32_t value = 0;

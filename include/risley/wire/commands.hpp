@@ -21,9 +21,9 @@ namespace risley::wire {
 /// Says who is there, about once a second until somebody shakes hands.
 struct Broadcast {
   static constexpr CommandId kId{0, 0x00};
-  std::string code;             ///< broadcast code, at most 15 characters: "0TFDG3B006H2Z11"
-  std::uint8_t device_type = 0; ///< as recordings::Device::type
-  std::uint16_t reserved = 0;   ///< 0, or 65000 from an Avia
+  std::string code;              ///< broadcast code, at most 15 characters: "0TFDG3B006H2Z11"
+  std::uint8_t device_type = 0;  ///< as recordings::Device::type
+  std::uint16_t reserved = 0;    ///< 0, or 65000 from an Avia
   friend bool operator==(const Broadcast&, const Broadcast&) = default;
 };
 
@@ -154,7 +154,7 @@ struct SetUtc {
 
 /// The reply to commands that ask for nothing.
 struct ResultReply {
-  CommandId command;  ///< that is answered
+  CommandId command;        ///< that is answered
   std::uint8_t result = 0;  ///< 2: SetMode is being carried out
   friend bool operator==(const ResultReply&, const ResultReply&) = default;
 };
@@ -232,9 +232,9 @@ using Message = std::variant<Broadcast, AbnormalStatus>;
 /// What a host asks of a sensor.
 using Command =
     std::variant<Handshake, QueryDeviceInfo, Heartbeat, SetSampling, SetCoordinates, Disconnect,
-                 SetAddress, QueryAddress, Reboot, WriteParameters, ReadParameters,
-                 ResetParameters, SetMode, WriteExtrinsics, ReadExtrinsics, SetRainFilter, SetFan,
-                 QueryFan, SetReturnMode, QueryReturnMode, SetImuRate, QueryImuRate, SetUtc>;
+                 SetAddress, QueryAddress, Reboot, WriteParameters, ReadParameters, ResetParameters,
+                 SetMode, WriteExtrinsics, ReadExtrinsics, SetRainFilter, SetFan, QueryFan,
+                 SetReturnMode, QueryReturnMode, SetImuRate, QueryImuRate, SetUtc>;
 /// What a sensor answers.
 using Reply = std::variant<ResultReply, DeviceInfo, HeartbeatReply, AddressReply, ParametersReply,
                            ParameterValues, ExtrinsicsReply, ValueReply>;

@@ -59,7 +59,8 @@ std::string to_string(const FrameRefusal& refusal);
 
 /// CRC-16 of the header: reflected, polynomial 0x1021, register 0x4C49 at the start.
 std::uint16_t frame_crc16(std::span<const std::uint8_t> bytes);
-/// CRC-32 of the frame: reflected, polynomial 0x04C11DB7, register 0xA9B0A7F5 at the start, inverted.
+/// CRC-32 of the frame: reflected, polynomial 0x04C11DB7, register 0xA9B0A7F5 at the start,
+/// inverted.
 std::uint32_t frame_crc32(std::span<const std::uint8_t> bytes);
 
 /// The bytes of a frame. @throws InvalidArgument for more data than a frame can carry

@@ -32,9 +32,10 @@ struct PacketCounts {
 
 /// A place where more than 0.1 s is missing, or the clock jumped. Times are the sensor's, ns.
 struct PacketGap {
-  std::int64_t from_ns = 0, to_ns = 0;       ///< of the packets around it
+  std::int64_t from_ns = 0, to_ns = 0;            ///< of the packets around it
   std::int64_t host_from_ns = 0, host_to_ns = 0;  ///< when they came, by the host's clock
-  std::optional<std::uint64_t> lost;         ///< packets; empty where the clock jumped
+  std::optional<std::uint64_t> lost;              ///< packets; empty where the clock jumped
+  bool imu = false;                               ///< of inertial samples, not of points
 };
 
 /// Puts the packets of one sensor into their order and counts what is missing. Packets have no

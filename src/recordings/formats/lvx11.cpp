@@ -13,11 +13,11 @@
 
 #include "risley/io/block_file.hpp"
 #include "risley/io/little_endian.hpp"
+#include "risley/recordings/livox/packet_encoder.hpp"
 
 #include "recordings/formats/format.hpp"
 #include "recordings/formats/lvx11_head.hpp"
 #include "recordings/formats/lvx_reader.hpp"
-#include "risley/recordings/livox/packet_encoder.hpp"
 
 namespace risley::recordings {
 
