@@ -8,7 +8,6 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
-#include "risley/core/angle.hpp"
 #include "risley/jobs/emulate_sensor.hpp"
 
 #include "command.hpp"
@@ -21,7 +20,7 @@ namespace {
 
 struct EmulateChoices {
   std::string interface, serial, sensor = "mid-40", scene, station, rotor = "constant";
-  std::vector<std::string> assignments, reported;
+  SimulatedValues values;
   double speed = 1;
   std::optional<double> duration_s;
   double loss = 0, duplication = 0, disorder = 0, delay_ms = 0, wrong_checksums = 0,
@@ -41,10 +40,7 @@ jobs::EmulateOptions job_of(const EmulateChoices& options, const CommonOptions& 
   job.simulation.scene = options.scene;
   job.simulation.station = options.station;
   job.simulation.rotor = simulation::rotor_kind_from(options.rotor);
-  job.simulation.set = parameter_values(options.assignments);
-  std::vector<std::string> believed = options.reported;
-  job.simulation.reported_nominal = std::erase(believed, "nominal") > 0;
-  job.simulation.reported = parameter_values(believed);
+  take_simulated_values(options.values, job.simulation);
   job.simulation.seed = common.seed;
   job.simulation.threads = common.threads;
   jobs::EmulatedFaults& faults = job.faults;
@@ -125,21 +121,7 @@ Run declare_emulate(CLI::App& verb) {
   verb.add_option("--rotor", o.rotor, "How the rotors' speeds vary")
       ->check(CLI::IsMember(simulation::rotor_kind_names()))
       ->capture_default_str();
-  verb.add_option(
-          "--set", o.assignments,
-          "Set a parameter of the true sensor, in the unit that its name ends with (repeatable)")
-      ->type_name("NAME=VALUE")
-      ->expected(1)
-      ->allow_extra_args(false)
-      ->take_all();
-  verb.add_option(
-          "--reported", o.reported,
-          "Set a parameter as the sensor believes it to be, where that differs from the "
-          "truth (repeatable); 'nominal' sets every error parameter to 0 (default: the truth)")
-      ->type_name("NAME=VALUE|nominal")
-      ->expected(1)
-      ->allow_extra_args(false)
-      ->take_all();
+  add_simulated_values(verb, o.values);
   verb.add_option("--speed", o.speed, "How many times faster than real time the sensor runs")
       ->check(CLI::Range(0.01, 100.0))
       ->capture_default_str();

@@ -87,6 +87,7 @@ std::vector<FoundSensor> search_sensors(BroadcastListener& listener, const Recor
     if (!options.serials.empty() && found.size() == options.serials.size()) break;
   }
   std::vector<FoundSensor> sensors;
+  sensors.reserve(found.size());
   for (auto& [serial, sensor] : found) sensors.push_back(std::move(sensor));
   return sensors;
 }

@@ -65,7 +65,7 @@ void PacketOrder::restart(Track& track) {
   track.recent.clear();
 }
 
-void PacketOrder::place(Track& track, std::int64_t time_ns, Held packet) {
+void PacketOrder::place(Track& track, std::int64_t time_ns, Held&& packet) {
   if (track.last_ns && !track.jumped) {
     const std::int64_t last =
         track.held.empty() ? *track.last_ns : std::max(*track.last_ns, track.held.rbegin()->first);

@@ -74,6 +74,7 @@ bool is_loopback(const Address& address) { return address.bytes[0] == 127; }
 
 std::string list_of(const std::vector<Interface>& all) {
   std::vector<std::string> words;
+  words.reserve(all.size());
   for (const Interface& one : all) {
     words.push_back(fmt::format("{} ({})", to_string(one.address), one.name));
   }

@@ -258,7 +258,9 @@ class RecordTest(CommandTest):
         self.assertEqual(json.loads((self.folder / "elsewhere.json").read_text())["sensors"], [])
         result = json.loads(done.stdout.removeprefix("ready"))["sensors"][0]
         truth = json.loads((self.folder / "emulated.json").read_text())["sensors"][0]
-        self.assertEqual(result["packets"] + result["lost"], truth["packets"])
+        # Between its sessions the sensor sends nothing for some ms, which looks the same.
+        silent = result["packets"] + result["lost"] - truth["packets"]
+        self.assertTrue(0 <= silent < 200, silent)
         self.assertEqual({gap["data"] for gap in result["gaps"]}, {"points", "imu"})
         self.assertEqual(sum(gap["lost"] for gap in result["gaps"]), result["lost"])
         for gap in result["gaps"]:

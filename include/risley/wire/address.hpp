@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <algorithm>
 #include <array>
-#include <compare>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -19,7 +19,11 @@ inline constexpr std::uint16_t kBroadcastPort = 55000;
 /// An IPv4 address.
 struct Address {
   std::array<std::uint8_t, 4> bytes{};  ///< in the order in which they are written
-  friend auto operator<=>(const Address&, const Address&) = default;
+  friend bool operator==(const Address&, const Address&) = default;
+  friend bool operator<(const Address& a, const Address& b) {
+    return std::lexicographical_compare(a.bytes.begin(), a.bytes.end(), b.bytes.begin(),
+                                        b.bytes.end());
+  }
 };
 
 /// "192.168.1.2"
@@ -34,7 +38,7 @@ inline constexpr Address kEverybody{{255, 255, 255, 255}};
 struct Endpoint {
   Address address;
   std::uint16_t port = 0;
-  friend auto operator<=>(const Endpoint&, const Endpoint&) = default;
+  friend bool operator==(const Endpoint&, const Endpoint&) = default;
 };
 
 /// "192.168.1.2:65000"

@@ -37,6 +37,7 @@ enum class ClientState : std::uint8_t {
 
 /// Something that happened in a session.
 struct ClientEvent {
+  /// What happened.
   enum class Kind : std::uint8_t {
     connected,     ///< the handshake was answered
     firmware,      ///< text is its number
@@ -72,7 +73,7 @@ class ClientSession {
   /// Ends the session: stops the data and disconnects. Goes on until closed or lost.
   void stop(std::int64_t now_ns);
 
-  ClientState state() const { return state_; }
+  ClientState state() const { return state_; }  ///< where it stands
   /// When advance() has something to do next.
   std::int64_t next_ns() const;
   /// Datagrams for the sensor since the last call.

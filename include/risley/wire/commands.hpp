@@ -20,7 +20,7 @@ namespace risley::wire {
 
 /// Says who is there, about once a second until somebody shakes hands.
 struct Broadcast {
-  static constexpr CommandId kId{0, 0x00};
+  static constexpr CommandId kId{0, 0x00};  ///< of its frames
   std::string code;              ///< broadcast code, at most 15 characters: "0TFDG3B006H2Z11"
   std::uint8_t device_type = 0;  ///< as recordings::Device::type
   std::uint16_t reserved = 0;    ///< 0, or 65000 from an Avia
@@ -29,8 +29,8 @@ struct Broadcast {
 
 /// Something is wrong with the sensor.
 struct AbnormalStatus {
-  static constexpr CommandId kId{0, 0x07};
-  std::uint32_t status = 0;  ///< as recordings::Packet::status
+  static constexpr CommandId kId{0, 0x07};  ///< of its frames
+  std::uint32_t status = 0;                 ///< as recordings::Packet::status
   friend bool operator==(const AbnormalStatus&, const AbnormalStatus&) = default;
 };
 
@@ -38,7 +38,7 @@ struct AbnormalStatus {
 
 /// Binds the sensor to a host.
 struct Handshake {
-  static constexpr CommandId kId{0, 0x01};
+  static constexpr CommandId kId{0, 0x01};  ///< of its frames
   Address host;
   std::uint16_t data_port = 0, command_port = 0;
   std::optional<std::uint16_t> imu_port;  ///< early clients do not send it
@@ -48,7 +48,7 @@ struct Handshake {
 /// A command without data. @tparam kSet, kCommand  its id
 template <std::uint8_t kSet, std::uint8_t kCommand>
 struct PlainCommand {
-  static constexpr CommandId kId{kSet, kCommand};
+  static constexpr CommandId kId{kSet, kCommand};  ///< of its frames
   friend bool operator==(const PlainCommand&, const PlainCommand&) = default;
 };
 using QueryDeviceInfo = PlainCommand<0, 0x02>;  ///< answered by DeviceInfo
@@ -63,8 +63,9 @@ using QueryImuRate = PlainCommand<1, 0x09>;     ///< answered by ValueReply
 /// A command whose data are one byte. @tparam kMost, kLeast  allowed values
 template <std::uint8_t kSet, std::uint8_t kCommand, std::uint8_t kMost, std::uint8_t kLeast = 0>
 struct ByteCommand {
-  static constexpr CommandId kId{kSet, kCommand};
-  static constexpr std::uint8_t kLeastValue = kLeast, kMostValue = kMost;  ///< allowed
+  static constexpr CommandId kId{kSet, kCommand};      ///< of its frames
+  static constexpr std::uint8_t kLeastValue = kLeast,  ///< that is allowed
+      kMostValue = kMost;                              ///< that is allowed
   std::uint8_t value = kLeast;
   friend bool operator==(const ByteCommand&, const ByteCommand&) = default;
 };
@@ -81,7 +82,7 @@ enum class ReturnMode : std::uint8_t { first = 0, strongest = 1, dual = 2, tripl
 
 /// Gives the sensor its address from the next start on.
 struct SetAddress {
-  static constexpr CommandId kId{0, 0x08};
+  static constexpr CommandId kId{0, 0x08};  ///< of its frames
   bool is_static = false;
   Address address;
   std::optional<Address> mask, gateway;  ///< of newer firmware: both or none
@@ -90,7 +91,7 @@ struct SetAddress {
 
 /// Starts the sensor again.
 struct Reboot {
-  static constexpr CommandId kId{0, 0x0A};
+  static constexpr CommandId kId{0, 0x0A};  ///< of its frames
   std::uint16_t delay_ms = 0;
   friend bool operator==(const Reboot&, const Reboot&) = default;
 };
@@ -107,23 +108,23 @@ struct Parameter {
 
 /// Sets parameters. The length of each is that of its value, as in the maker's SDK.
 struct WriteParameters {
-  static constexpr CommandId kId{0, 0x0B};
+  static constexpr CommandId kId{0, 0x0B};  ///< of its frames
   std::vector<Parameter> parameters;
   friend bool operator==(const WriteParameters&, const WriteParameters&) = default;
 };
 
 /// Asks for parameters.
 struct ReadParameters {
-  static constexpr CommandId kId{0, 0x0C};
-  std::vector<std::uint16_t> keys;  ///< at most 255
+  static constexpr CommandId kId{0, 0x0C};  ///< of its frames
+  std::vector<std::uint16_t> keys;          ///< at most 255
   friend bool operator==(const ReadParameters&, const ReadParameters&) = default;
 };
 
 /// Sets parameters back.
 struct ResetParameters {
-  static constexpr CommandId kId{0, 0x0D};
-  bool listed = false;              ///< only those of keys; otherwise all
-  std::vector<std::uint16_t> keys;  ///< at most 255
+  static constexpr CommandId kId{0, 0x0D};  ///< of its frames
+  bool listed = false;                      ///< only those of keys; otherwise all
+  std::vector<std::uint16_t> keys;          ///< at most 255
   friend bool operator==(const ResetParameters&, const ResetParameters&) = default;
 };
 
@@ -136,15 +137,15 @@ struct Extrinsics {
 
 /// Stores the pose.
 struct WriteExtrinsics {
-  static constexpr CommandId kId{1, 0x01};
+  static constexpr CommandId kId{1, 0x01};  ///< of its frames
   Extrinsics extrinsics;
   friend bool operator==(const WriteExtrinsics&, const WriteExtrinsics&) = default;
 };
 
 /// Tells the hour that the last PPS edge lies in.
 struct SetUtc {
-  static constexpr CommandId kId{1, 0x0A};
-  std::uint8_t year = 0;  ///< since 2000
+  static constexpr CommandId kId{1, 0x0A};  ///< of its frames
+  std::uint8_t year = 0;                    ///< since 2000
   std::uint8_t month = 1, day = 1, hour = 0;
   std::uint32_t microseconds = 0;  ///< of the hour
   friend bool operator==(const SetUtc&, const SetUtc&) = default;
@@ -161,7 +162,7 @@ struct ResultReply {
 
 /// Firmware of the sensor.
 struct DeviceInfo {
-  static constexpr CommandId kId{0, 0x02};
+  static constexpr CommandId kId{0, 0x02};  ///< of its frames
   std::uint8_t result = 0;
   std::array<std::uint8_t, 4> firmware{};
   friend bool operator==(const DeviceInfo&, const DeviceInfo&) = default;
@@ -175,7 +176,7 @@ enum class SensorState : std::uint8_t { starting = 0, normal, power_saving, stan
 
 /// How the sensor is.
 struct HeartbeatReply {
-  static constexpr CommandId kId{0, 0x03};
+  static constexpr CommandId kId{0, 0x03};  ///< of its frames
   std::uint8_t result = 0;
   std::uint8_t state = 1;    ///< a SensorState
   std::uint8_t feature = 0;  ///< bit 0: filter against rain and fog
@@ -185,7 +186,7 @@ struct HeartbeatReply {
 
 /// Address of the sensor.
 struct AddressReply {
-  static constexpr CommandId kId{0, 0x09};
+  static constexpr CommandId kId{0, 0x09};  ///< of its frames
   std::uint8_t result = 0;
   bool is_static = false;
   Address address;
@@ -204,7 +205,7 @@ struct ParametersReply {
 
 /// The reply to ReadParameters.
 struct ParameterValues {
-  static constexpr CommandId kId{0, 0x0C};
+  static constexpr CommandId kId{0, 0x0C};  ///< of its frames
   std::uint8_t result = 0;
   std::uint16_t failing_key = 0;
   std::uint8_t error = 0;
@@ -214,7 +215,7 @@ struct ParameterValues {
 
 /// The reply to ReadExtrinsics.
 struct ExtrinsicsReply {
-  static constexpr CommandId kId{1, 0x02};
+  static constexpr CommandId kId{1, 0x02};  ///< of its frames
   std::uint8_t result = 0;
   Extrinsics extrinsics;
   friend bool operator==(const ExtrinsicsReply&, const ExtrinsicsReply&) = default;
@@ -248,7 +249,9 @@ std::string to_string(CommandId command);
 
 /// The bytes of a datagram. @throws InvalidArgument for texts and lists that are too long
 std::vector<std::uint8_t> encode(const Message& message, std::uint16_t sequence);
+/// As above, and for values that the command does not have.
 std::vector<std::uint8_t> encode(const Command& command, std::uint16_t sequence);
+/// As above. @param sequence  of the command
 std::vector<std::uint8_t> encode(const Reply& reply, std::uint16_t sequence);
 
 /// Why the data of a frame mean nothing.

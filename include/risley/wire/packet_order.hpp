@@ -67,7 +67,7 @@ class PacketOrder {
   /// Packets in their order since the last call.
   std::vector<std::vector<std::uint8_t>> take();
 
-  const PacketCounts& counts() const { return counts_; }
+  const PacketCounts& counts() const { return counts_; }        ///< of what take() has given
   const std::vector<PacketGap>& gaps() const { return gaps_; }  ///< the first kMostGaps
   /// When the first packet came, by the host's clock; empty before there is one.
   std::optional<std::int64_t> first_host_ns() const { return first_host_ns_; }
@@ -89,7 +89,7 @@ class PacketOrder {
     bool flushed = false;  // before the next packet
   };
 
-  void place(Track& track, std::int64_t time_ns, Held packet);
+  void place(Track& track, std::int64_t time_ns, Held&& packet);
   void restart(Track& track);
   void give_out(Track& track);
   std::int64_t period_of(std::uint8_t data_type) const;

@@ -53,8 +53,8 @@ class SensorSession {
   /// As the sensor knows itself from now on, see recordings::Packet::status.
   void set_status(std::uint32_t status) { status_ = status; }
 
-  bool connected() const { return host_.has_value(); }
-  bool sampling() const { return sampling_; }  ///< data are to be sent
+  bool connected() const { return host_.has_value(); }  ///< a host has shaken hands
+  bool sampling() const { return sampling_; }           ///< data are to be sent
   /// Of data, as commands have set it.
   bool spherical() const { return spherical_; }
   ReturnMode return_mode() const { return return_mode_; }  ///< as commands have set it
