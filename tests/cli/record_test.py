@@ -192,8 +192,8 @@ class RecordTest(CommandTest):
         sensor = self.sensor()
         process = self.start("-o", "gap.lvx", "--json")
         self.wait_for(lambda: len(sensor.times) > 500)
-        before = list(sensor.times)
         self.sensors.pop().stop()
+        before = sensor.times
         died = time.monotonic()
         line = process.stderr.readline()
         self.assertLess(time.monotonic() - died, 3)
@@ -262,7 +262,7 @@ class RecordTest(CommandTest):
         silent = result["packets"] + result["lost"] - truth["packets"]
         self.assertTrue(0 <= silent < 200, silent)
         self.assertEqual({gap["data"] for gap in result["gaps"]}, {"points", "imu"})
-        self.assertEqual(sum(gap["lost"] for gap in result["gaps"]), result["lost"])
+        self.assertTrue(0 <= result["lost"] - sum(gap["lost"] for gap in result["gaps"]) < 200)
         for gap in result["gaps"]:
             self.assertTrue(3.5 < gap["end_s"] - gap["begin_s"] < 8, gap)
         self.assertIn("no data for 1 s", (self.folder / "cable.txt").read_text())
