@@ -31,6 +31,7 @@
 #include "risley/io/sha256.hpp"
 #include "risley/jobs/result_files.hpp"
 #include "risley/recordings/reader.hpp"
+#include "risley/wire/udp_socket.hpp"
 
 namespace risley::app {
 namespace {
@@ -132,6 +133,8 @@ Failure current_failure() {
     return {kWrongUsage, with_flags(error.what()), {}};
   } catch (const FileError& error) {
     return {kBadFile, error.what(), json::of(error)};
+  } catch (const wire::NetworkError& error) {
+    return {kBadFile, with_flags(error.what()), {}};
   } catch (const cloud::TurnedFrame& error) {
     const std::string text =
         fmt::format("{}: say it with --extrinsics YAW,PITCH,ROLL", error.what());

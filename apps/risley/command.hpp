@@ -83,6 +83,8 @@ Run declare_pattern(CLI::App& verb);
 Run declare_preset(CLI::App& verb);
 Run declare_report(CLI::App& verb);
 Run declare_reproduce(CLI::App& verb);
+Run declare_record(CLI::App& verb);
+Run declare_emulate(CLI::App& verb);
 
 /// From now on SIGINT, SIGTERM and SIGHUP cancel what is being computed, so that every output in
 /// the making is removed by its owner.

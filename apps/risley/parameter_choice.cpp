@@ -55,4 +55,29 @@ jobs::ParameterValues parameter_values(const std::vector<std::string>& assignmen
   return values;
 }
 
+void add_simulated_values(CLI::App& verb, SimulatedValues& values) {
+  verb.add_option(
+          "--set", values.set,
+          "Set a parameter of the true sensor, in the unit that its name ends with (repeatable)")
+      ->type_name("NAME=VALUE")
+      ->expected(1)
+      ->allow_extra_args(false)
+      ->take_all();
+  verb.add_option(
+          "--reported", values.reported,
+          "Set a parameter as the sensor believes it to be, where that differs from the "
+          "truth (repeatable); 'nominal' sets every error parameter to 0 (default: the truth)")
+      ->type_name("NAME=VALUE|nominal")
+      ->expected(1)
+      ->allow_extra_args(false)
+      ->take_all();
+}
+
+void take_simulated_values(const SimulatedValues& values, jobs::SimulationOptions& job) {
+  job.set = parameter_values(values.set);
+  std::vector<std::string> believed = values.reported;
+  job.reported_nominal = std::erase(believed, "nominal") > 0;
+  job.reported = parameter_values(believed);
+}
+
 }  // namespace risley::app

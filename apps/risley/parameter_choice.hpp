@@ -21,6 +21,16 @@ struct ParameterWishes {
 /// Declares --fix and --free.
 void add_parameter_choice(CLI::App& verb, ParameterWishes& wishes);
 
+/// Values of a simulated sensor, as typed.
+struct SimulatedValues {
+  std::vector<std::string> set, reported;
+};
+
+/// Declares --set and --reported.
+void add_simulated_values(CLI::App& verb, SimulatedValues& values);
+/// What was typed, for a simulation. @throws InvalidArgument
+void take_simulated_values(const SimulatedValues& values, jobs::SimulationOptions& job);
+
 /// NAME=VALUE, the value in SI units where the name is known. @throws InvalidArgument
 std::pair<std::string, double> assignment(const std::string& text);
 

@@ -28,7 +28,7 @@ struct SimulateOptions {
                       trajectory_format = "csv";
   std::optional<double> duration_s, start_s, clock_drift_ppm, rate_hz, noise_angle_deg,
       noise_range_m;
-  std::vector<std::string> assignments, reported;
+  SimulatedValues values;
   std::vector<double> start_angles_deg;
 };
 
@@ -41,10 +41,7 @@ jobs::SimulationOptions job_of(const SimulateOptions& options, const CommonOptio
   if (options.noise_range_m) check_not_negative(*options.noise_range_m, "--noise-range-m", "m");
   jobs::SimulationOptions job;
   job.sensor = options.sensor;
-  job.set = parameter_values(options.assignments);
-  std::vector<std::string> believed = options.reported;
-  job.reported_nominal = std::erase(believed, "nominal") > 0;
-  job.reported = parameter_values(believed);
+  take_simulated_values(options.values, job);
   job.duration = options.duration_s;
   job.rate = options.rate_hz;
   if (options.noise_angle_deg) job.angle_noise = radians_from_degrees(*options.noise_angle_deg);
@@ -134,21 +131,7 @@ Run declare_simulate(CLI::App& verb) {
   verb.add_option("--rotor", o.rotor, "How the rotors' speeds vary")
       ->check(CLI::IsMember(simulation::rotor_kind_names()))
       ->capture_default_str();
-  verb.add_option(
-          "--set", o.assignments,
-          "Set a parameter of the true sensor, in the unit that its name ends with (repeatable)")
-      ->type_name("NAME=VALUE")
-      ->expected(1)
-      ->allow_extra_args(false)
-      ->take_all();
-  verb.add_option(
-          "--reported", o.reported,
-          "Set a parameter as the sensor believes it to be, where that differs from the "
-          "truth (repeatable); 'nominal' sets every error parameter to 0 (default: the truth)")
-      ->type_name("NAME=VALUE|nominal")
-      ->expected(1)
-      ->allow_extra_args(false)
-      ->take_all();
+  add_simulated_values(verb, o.values);
   verb.add_option("--scene", o.scene,
                   "Planes or terrain (YAML) to measure ranges to (default: none, and no ranges)");
   verb.add_option("--station", o.station,

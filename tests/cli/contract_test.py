@@ -9,7 +9,7 @@ import unittest
 from command import SOURCE, CommandTest, run
 
 HALL = SOURCE / "data" / "hall.yaml"
-VERBS = ("info", "convert", "simulate", "estimate", "observability", "calibrate", "cloud",
+VERBS = ("info", "convert", "simulate", "record", "emulate", "estimate", "observability", "calibrate", "cloud",
          "compare", "campaign", "identify", "pattern", "preset", "report")
 RATES = {"mid-40": 100000, "mid-70": 100000, "avia": 240000, "horizon": 240000, "tele-15": 240000}
 
@@ -56,6 +56,8 @@ class ContractTest(CommandTest):
             "preset": (("check", "out/calibration.yaml"), ("out/calibration.yaml",)),
             "report": (("out",), ("out/report.json",)),
             "compare": (("out", "out"), ("out/calibration.yaml", "out/calibration.yaml")),
+            "record": (("--list", "--interface", "127.0.0.91", "--find-s", "0.1"), ()),
+            "emulate": (("--interface", "127.0.0.92", "--duration-s", "0.1"), ()),
             "campaign": (("plan.yaml", "--chunk", "1/1", "-o", "campaign"), ("plan.yaml", str(HALL))),
         }
         self.assertEqual(set(commands), set(VERBS))

@@ -78,6 +78,9 @@ LEFT_OUT = {
     "scripts/package": "it installs packages and builds",
     "apt-get install ./build/packages": "tools/try-packages does it on a bare system",
     "man risley": "tools/try-packages does it on a bare system; cli.man_test looks at the pages",
+    "risley record -o hall.lvx": "there is no sensor; cli.record_test has one",
+    "risley record --list": "which interface it is depends on the machine; cli.record_test has one",
+    "risley emulate --interface 127.0.0.5": "it takes a minute, or has no end; record.md has one",
     "risley reproduce -o": "a minute of two cores; cli.reproduce_test runs it",
     "risley reproduce --full": "it takes many minutes",
 }
@@ -191,6 +194,15 @@ MESSAGES = {
         "risley: warning: the mount": (
             (0, "risley calibrate --plan data/flight-s4.yaml --mount data/mount-nadir.yaml --rate-hz 1000 "
                 "--trajectory-errors data/trajectory-errors.yaml --scene data/village.yaml"),),
+    },
+    "record.md": {
+        "risley: error: 127.0.0.1:55000: no sensor": (
+            (3, "risley record -o out/no.lvx --interface 127.0.0.1 --find-s 0.2"),),
+        "risley: error: 127.0.0.1:55000: Address": (
+            (0, "{ risley record --interface 127.0.0.1 --list --find-s 3 > out/other.txt & sleep 0.5; }"),
+            (3, "risley record --interface 127.0.0.1 --list"),
+            (0, "wait")),
+        "risley: error: --interface": ((2, "risley record --interface 192.0.2.1 --list"),),
     },
     "report.md": {
         "risley: error: out/converted": (

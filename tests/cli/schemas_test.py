@@ -6,10 +6,11 @@ import copy
 import json
 import re
 import shutil
+import subprocess
 import unittest
 
 import schemas
-from command import SOURCE, CommandTest, run
+from command import COMMAND, SOURCE, CommandTest, run
 from trajectory_test import sbet, smrmsg
 
 DATA = SOURCE / "data"
@@ -212,6 +213,16 @@ class SchemasTest(CommandTest):
         cls.print(0, "preset", "new", "mine", "--from", "avia", "-o", "mine.yaml")
         cls.print(3, "preset", "check", "mine.yaml", "no.yaml")
         cls.fly(bent)
+        cls.record()
+
+    @classmethod
+    def record(cls):
+        emulator = subprocess.Popen([COMMAND, "emulate", "--interface", "127.0.0.93", "--restart-s", "1",
+                                     "--restart-takes-s", "0.5", "--json"], stdout=subprocess.PIPE, text=True)
+        cls.print(0, "record", "--list", "--interface", "127.0.0.94")
+        cls.print(0, "record", "-o", "live.lvx", "--interface", "127.0.0.94", "--duration-s", 5)
+        emulator.terminate()
+        cls.outputs.append(("emulate", json.loads(emulator.communicate()[0])))
 
     @classmethod
     def fly(cls, bent):

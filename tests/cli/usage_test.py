@@ -7,7 +7,7 @@ import unittest
 
 from command import CommandTest
 
-VERBS = ("info", "convert", "simulate", "estimate", "observability", "calibrate", "cloud",
+VERBS = ("info", "convert", "simulate", "record", "emulate", "estimate", "observability", "calibrate", "cloud",
          "compare", "campaign", "identify", "pattern", "preset", "report", "reproduce")
 
 # Arguments that are wrong, and what the message must name.
@@ -83,6 +83,20 @@ WRONG = [
     (["simulate", "-o", "a.csv", "--seed", "18446744073709551616"], "18446744073709551615"),
     (["simulate", "-o", "a.csv", "--seed", "0.5"], "found 0.5"),
     (["reproduce"], "--output"),
+    (["record"], "--output"),
+    (["record", "--list", "-o", "a.lvx"], "--list"),
+    (["record", "--list", "--passive"], "--passive"),
+    (["record", "--list", "--interface", "eth0"], "--interface = eth0"),
+    (["record", "--list", "--interface", "192.0.2.1"], "127.0.0.1"),
+    (["record", "-o", "a.lvx", "--duration-s", "0"], "--duration-s"),
+    (["record", "-o", "a.lvx", "--return-mode", "last"], "last"),
+    (["record", "-o", "a.lvx", "--find-s", "0"], "--find-s"),
+    (["emulate"], "--interface"),
+    (["emulate", "--interface", "192.0.2.1"], "--interface = 192.0.2.1"),
+    (["emulate", "--interface", "127.0.0.5", "--loss", "2"], "--loss"),
+    (["emulate", "--interface", "127.0.0.5", "--speed", "0"], "--speed"),
+    (["emulate", "--interface", "127.0.0.5", "--sensor", "mid-41"], "mid-41"),
+    (["emulate", "--interface", "127.0.0.5", "--serial", "sixteen-letters."], "15"),
     (["estimate", "a.csv", "--rate-hz", "fast"], "--rate-hz"),
     (["estimate", "a.csv", "--method", "guess"], "guess"),
     (["estimate", "a.csv", "--method", "ekf", "--states", "all"], "--rate-hz full"),

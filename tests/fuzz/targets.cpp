@@ -10,8 +10,9 @@ namespace risley::fuzz {
 const std::vector<Target>& all_targets() {
   static const std::vector<Target> all = [] {
     std::vector<Target> targets;
-    for (const auto& group : {recording_targets(), decoder_targets(), netcdf_targets(),
-                              text_targets(), trajectory_targets(), command_targets()}) {
+    for (const auto& group :
+         {recording_targets(), decoder_targets(), netcdf_targets(), text_targets(),
+          trajectory_targets(), command_targets(), wire_targets()}) {
       targets.insert(targets.end(), group.begin(), group.end());
     }
     return targets;

@@ -29,5 +29,6 @@ std::vector<Target> netcdf_targets();
 std::vector<Target> text_targets();
 std::vector<Target> trajectory_targets();
 std::vector<Target> command_targets();
+std::vector<Target> wire_targets();
 
 }  // namespace risley::fuzz

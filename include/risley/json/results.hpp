@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <vector>
+
 #include <nlohmann/json_fwd.hpp>
 
 namespace risley {
@@ -22,13 +24,16 @@ struct CampaignResult;
 struct ComparedUnits;
 struct ConvertedRecording;
 struct ConvertedTrajectory;
+struct EmulatedSensor;
 struct EstimatedRecording;
+struct FoundSensor;
 struct IdentifiedRecording;
 struct InspectedRecording;
 struct InspectedTrajectory;
 struct JudgedObservability;
 struct PlannedCalibration;
 struct PlannedFlightResult;
+struct RecordedSensors;
 struct RecordingCloud;
 struct ResultComparison;
 struct WrittenPattern;
@@ -84,6 +89,12 @@ Json of(const jobs::CampaignChunk& chunk);
 Json of(const jobs::CampaignResult& merged);
 /// Of `risley simulate`.
 Json of(const simulation::SimulationResult& simulated);
+/// Of `risley record --list`.
+Json of(const std::vector<jobs::FoundSensor>& found);
+/// Of `risley record`.
+Json of(const jobs::RecordedSensors& recorded);
+/// Of `risley emulate`.
+Json of(const jobs::EmulatedSensor& truth);
 /// The `coverage` of `risley pattern`.
 Json of(const sensors::PatternCoverage& coverage);
 /// What a list of presets tells of one.

@@ -13,10 +13,11 @@
 
 #include "risley/io/block_file.hpp"
 #include "risley/io/little_endian.hpp"
+#include "risley/recordings/livox/packet_encoder.hpp"
 
 #include "recordings/formats/format.hpp"
+#include "recordings/formats/lvx11_head.hpp"
 #include "recordings/formats/lvx_reader.hpp"
-#include "recordings/livox/packet_encoder.hpp"
 
 namespace risley::recordings {
 
@@ -29,7 +30,6 @@ using io::store;
 
 constexpr std::size_t kFrameDurationAt = kLvxPublicHeaderBytes, kLvx11DeviceCountAt = 28;
 constexpr std::size_t kDeviceTableAt = 29, kLvx11DeviceBytes = 59;
-constexpr std::size_t kFrameHeaderBytes = 24;
 constexpr std::size_t kSerialBytes = 16;
 constexpr std::uint32_t kUsualFrameDurationMs = 50;
 
@@ -59,9 +59,56 @@ std::unique_ptr<Reader> open_lvx11(const std::string& path, const Progress&) {
   header.devices = read_lvx_devices(file, kDeviceTableAt, count, true);
   LvxVersion version;
   version.first_frame = kDeviceTableAt + count * kLvx11DeviceBytes;
-  version.frame_header_bytes = kFrameHeaderBytes;
+  version.frame_header_bytes = kLvx11FrameHeaderBytes;
   return std::make_unique<LvxReader>(std::move(file), std::move(header), version);
 }
+
+}  // namespace
+
+std::vector<std::uint8_t> lvx11_head(const std::vector<Device>& devices,
+                                     std::uint32_t frame_duration_ms) {
+  constexpr std::size_t kMostDevices = 255;
+  if (devices.empty() || devices.size() > kMostDevices) {
+    throw InvalidArgument(
+        fmt::format("number of devices = {}, allowed 1 to 255 in LVX", devices.size()));
+  }
+  std::vector<std::uint8_t> head(kDeviceTableAt + devices.size() * kLvx11DeviceBytes);
+  std::copy(kLvxName.begin(), kLvxName.end(), head.begin());
+  constexpr std::array<std::uint8_t, 4> kVersion{1, 1, 0, 0};
+  std::copy(kVersion.begin(), kVersion.end(), &head[kLvxName.size()]);
+  store<std::uint32_t>(&head[20], kLvxMagicCode);
+  store<std::uint32_t>(&head[kFrameDurationAt], frame_duration_ms);
+  head[kLvx11DeviceCountAt] = static_cast<std::uint8_t>(devices.size());
+  std::array<bool, 256> taken{};
+  std::uint8_t* bytes = &head[kDeviceTableAt];
+  for (const Device& device : devices) {
+    if (taken[device.index]) {
+      throw InvalidArgument(fmt::format(
+          "device index {} is used twice; LVX tells devices apart by their index", device.index));
+    }
+    taken[device.index] = true;
+    const auto put_text = [](const std::string& text, std::uint8_t* field) {
+      if (text.size() > kSerialBytes) {
+        throw InvalidArgument(
+            fmt::format("serial '{}' has {} characters, allowed at most 16", text, text.size()));
+      }
+      std::copy(text.begin(), text.end(), field);
+    };
+    put_text(device.serial, bytes);
+    put_text(device.hub_serial, bytes + 16);
+    bytes[32] = device.index;
+    bytes[33] = device.type;
+    bytes[34] = device.extrinsic_enabled ? 1 : 0;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      store<float>(bytes + 35 + 4 * axis, device.roll_pitch_yaw_deg[axis]);
+      store<float>(bytes + 47 + 4 * axis, device.translation_m[axis]);
+    }
+    bytes += kLvx11DeviceBytes;
+  }
+  return head;
+}
+
+namespace {
 
 /// A packet that is being formed from rows that came without packets.
 struct OpenPacket {
@@ -92,7 +139,6 @@ class Lvx11Writer final : public Writer {
   void close() override;
 
  private:
-  void write_header();
   void write_packets(const Chunk& chunk);
   void write_rows(const Chunk& chunk);
   void place(const Observations& o, std::size_t row);
@@ -129,10 +175,6 @@ Lvx11Writer::Lvx11Writer(const std::string& path, const RecordingHeader& header)
         path));
   }
   if (header_.devices.empty()) header_.devices.emplace_back();
-  if (header_.devices.size() > 255) {
-    throw InvalidArgument(
-        fmt::format("number of devices = {}, allowed 1 to 255 in LVX", header_.devices.size()));
-  }
   if (header_.returns_per_shot < 1 || header_.returns_per_shot > 3) {
     throw InvalidArgument(
         fmt::format("returns_per_shot = {}, allowed 1 to 3 in LVX", header_.returns_per_shot));
@@ -144,43 +186,8 @@ Lvx11Writer::Lvx11Writer(const std::string& path, const RecordingHeader& header)
   }
   // openpylivox rounds times to us; two rounded times differ by up to one step from the grid.
   if (header_.format.starts_with("openpylivox")) time_tolerance_ns_ = 1000;
-  write_header();
-}
-
-void Lvx11Writer::write_header() {
-  std::uint8_t* bytes = output_.append(kDeviceTableAt);
-  std::copy(kLvxName.begin(), kLvxName.end(), bytes);
-  constexpr std::array<std::uint8_t, 4> kVersion{1, 1, 0, 0};
-  std::copy(kVersion.begin(), kVersion.end(), bytes + kLvxName.size());
-  store<std::uint32_t>(bytes + 20, kLvxMagicCode);
-  store<std::uint32_t>(bytes + kFrameDurationAt, header_.frame_duration_ms);
-  bytes[kLvx11DeviceCountAt] = static_cast<std::uint8_t>(header_.devices.size());
-  std::array<bool, 256> taken{};
-  for (const Device& device : header_.devices) {
-    if (taken[device.index]) {
-      throw InvalidArgument(fmt::format(
-          "device index {} is used twice; LVX tells devices apart by their index", device.index));
-    }
-    taken[device.index] = true;
-    bytes = output_.append(kLvx11DeviceBytes);
-    std::fill_n(bytes, kLvx11DeviceBytes, std::uint8_t{0});
-    const auto put_text = [](const std::string& text, std::uint8_t* field) {
-      if (text.size() > kSerialBytes) {
-        throw InvalidArgument(
-            fmt::format("serial '{}' has {} characters, allowed at most 16", text, text.size()));
-      }
-      std::copy(text.begin(), text.end(), field);
-    };
-    put_text(device.serial, bytes);
-    put_text(device.hub_serial, bytes + 16);
-    bytes[32] = device.index;
-    bytes[33] = device.type;
-    bytes[34] = device.extrinsic_enabled ? 1 : 0;
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      store<float>(bytes + 35 + 4 * axis, device.roll_pitch_yaw_deg[axis]);
-      store<float>(bytes + 47 + 4 * axis, device.translation_m[axis]);
-    }
-  }
+  const auto head = lvx11_head(header_.devices, header_.frame_duration_ms);
+  std::copy(head.begin(), head.end(), output_.append(head.size()));
 }
 
 void Lvx11Writer::end_frame() {
@@ -191,7 +198,7 @@ void Lvx11Writer::end_frame() {
 void Lvx11Writer::start_frame() {
   end_frame();
   frame_at_ = output_.size();
-  std::uint8_t* bytes = output_.append(kFrameHeaderBytes);
+  std::uint8_t* bytes = output_.append(kLvx11FrameHeaderBytes);
   store<std::uint64_t>(bytes, *frame_at_);
   store<std::uint64_t>(bytes + kLvxFrameNextAt, 0);
   store<std::uint64_t>(bytes + kLvxFrameIndexAt, frames_++);

@@ -17,10 +17,10 @@
 #include "risley/io/little_endian.hpp"
 #include "risley/io/seconds.hpp"
 #include "risley/recordings/livox/packet_decoder.hpp"
+#include "risley/recordings/livox/packet_encoder.hpp"
 
 #include "recordings/formats/format.hpp"
 #include "recordings/formats/openpylivox.hpp"
-#include "recordings/livox/packet_encoder.hpp"
 
 namespace risley::recordings {
 

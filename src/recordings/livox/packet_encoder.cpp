@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-#include "recordings/livox/packet_encoder.hpp"
+#include "risley/recordings/livox/packet_encoder.hpp"
 
 #include <algorithm>
 #include <chrono>

@@ -1,0 +1,145 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include "risley/jobs/emulate_sensor.hpp"
+
+#include "command.hpp"
+#include "parameter_choice.hpp"
+#include "recording_text.hpp"
+#include "table.hpp"
+
+namespace risley::app {
+namespace {
+
+struct EmulateChoices {
+  std::string interface, serial, sensor = "mid-40", scene, station, rotor = "constant";
+  SimulatedValues values;
+  double speed = 1;
+  std::optional<double> duration_s;
+  double loss = 0, duplication = 0, disorder = 0, delay_ms = 0, wrong_checksums = 0,
+         restart_takes_s = 2;
+  int farthest = 10;
+  std::optional<double> heartbeat_dies_s, restart_s;
+};
+
+jobs::EmulateOptions job_of(const EmulateChoices& options, const CommonOptions& common) {
+  if (options.duration_s) check_positive(*options.duration_s, "--duration-s", "s");
+  jobs::EmulateOptions job;
+  job.interface = options.interface;
+  job.serial = options.serial;
+  job.speed = options.speed;
+  job.duration = options.duration_s;
+  job.simulation.sensor = options.sensor;
+  job.simulation.scene = options.scene;
+  job.simulation.station = options.station;
+  job.simulation.rotor = simulation::rotor_kind_from(options.rotor);
+  take_simulated_values(options.values, job.simulation);
+  job.simulation.seed = common.seed;
+  job.simulation.threads = common.threads;
+  jobs::EmulatedFaults& faults = job.faults;
+  faults.loss = options.loss;
+  faults.duplication = options.duplication;
+  faults.disorder = options.disorder;
+  faults.farthest = options.farthest;
+  faults.delay = 1e-3 * options.delay_ms;
+  faults.wrong_checksums = options.wrong_checksums;
+  faults.heartbeat_dies = options.heartbeat_dies_s;
+  faults.restart = options.restart_s;
+  faults.restart_time = options.restart_takes_s;
+  return job;
+}
+
+void print_emulated(const jobs::EmulatedSensor& truth) {
+  say("{} at {}: {:.1f} s\n\n", truth.serial, to_string(truth.address), truth.duration);
+  Table table({"observations", "packets", "lost", "twice", "overtaken", "sessions"});
+  table.add({grouped(truth.rows), grouped(truth.packets), grouped(truth.lost),
+             grouped(truth.duplicates), grouped(truth.reordered), grouped(truth.sessions)});
+  table.print();
+  if (truth.lost_at_ends > 0) {
+    say("{} more packets were not sent at the beginning or end, where nobody can miss them\n",
+        grouped(truth.lost_at_ends));
+  }
+}
+
+void declare_faults(CLI::App& verb, EmulateChoices& o) {
+  const std::string group = "Faults to order";
+  const auto share = [&](const char* name, double& value, const char* description) {
+    verb.add_option(name, value, description)
+        ->check(CLI::Range(0.0, 1.0))
+        ->capture_default_str()
+        ->group(group);
+  };
+  share("--loss", o.loss, "Share of packets that is not sent");
+  share("--duplication", o.duplication, "Share of packets that is sent twice");
+  share("--disorder", o.disorder, "Share of packets that others overtake");
+  verb.add_option("--disorder-packets", o.farthest, "How many packets overtake one at most")
+      ->check(CLI::Range(1, 1000))
+      ->capture_default_str()
+      ->group(group);
+  verb.add_option("--delay-ms", o.delay_ms, "By how much data come late, ms")
+      ->check(CLI::Range(0.0, 60000.0))
+      ->capture_default_str()
+      ->group(group);
+  share("--wrong-checksums", o.wrong_checksums, "Share of replies and broadcasts that is damaged");
+  verb.add_option("--heartbeat-dies-s", o.heartbeat_dies_s,
+                  "When heartbeats are no longer answered, s after the first start")
+      ->check(CLI::NonNegativeNumber)
+      ->group(group);
+  verb.add_option("--restart-s", o.restart_s,
+                  "When the sensor restarts, with its clock at zero, s after the first start")
+      ->check(CLI::NonNegativeNumber)
+      ->group(group);
+  verb.add_option("--restart-takes-s", o.restart_takes_s, "How long a restart takes, s")
+      ->check(CLI::Range(0.0, 3600.0))
+      ->capture_default_str()
+      ->group(group);
+}
+
+}  // namespace
+
+Run declare_emulate(CLI::App& verb) {
+  const auto options = std::make_shared<EmulateChoices>();
+  EmulateChoices& o = *options;
+  verb.add_option("--interface", o.interface,
+                  "IPv4 address of this machine that is to be the sensor's, such as 127.0.0.5")
+      ->type_name("ADDRESS")
+      ->required();
+  verb.add_option("--serial", o.serial,
+                  "Serial number (broadcast code) of the sensor (default: from its optics)");
+  verb.add_option("--sensor", o.sensor, "Preset by name, or a preset or calibration file")
+      ->capture_default_str();
+  verb.add_option("--scene", o.scene, "Planes or terrain (YAML) around it (default: a room)");
+  verb.add_option("--station", o.station,
+                  "Station of the scene to stand on (default: the scene's origin)");
+  verb.add_option("--rotor", o.rotor, "How the rotors' speeds vary")
+      ->check(CLI::IsMember(simulation::rotor_kind_names()))
+      ->capture_default_str();
+  add_simulated_values(verb, o.values);
+  verb.add_option("--speed", o.speed, "How many times faster than real time the sensor runs")
+      ->check(CLI::Range(0.01, 100.0))
+      ->capture_default_str();
+  verb.add_option(
+      "--duration-s", o.duration_s,
+      "How long the sensor is there, s of real time (default: until Ctrl-C or SIGTERM)");
+  declare_faults(verb, o);
+  return [options](const CommonOptions& common) {
+    const jobs::EmulatedSensor truth = jobs::emulate_sensor(
+        job_of(*options, common), [](const std::string& words) { spdlog::debug(words); },
+        cancellable());
+    if (common.json) {
+      print_json(common, json::of(truth));
+    } else {
+      print_emulated(truth);
+    }
+    return kDone;
+  };
+}
+
+}  // namespace risley::app

@@ -1,0 +1,70 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+
+#include "risley/core/progress.hpp"
+#include "risley/jobs/simulation_settings.hpp"
+#include "risley/wire/address.hpp"
+
+namespace risley::jobs {
+
+/// What goes wrong on the way from a virtual sensor, to order. Shares are of packets, [0, 1].
+struct EmulatedFaults {
+  double loss = 0;         ///< share that is never sent
+  double duplication = 0;  ///< share that is sent twice
+  double disorder = 0;     ///< share that others overtake
+  int farthest = 10;       ///< packets that overtake one at most
+  double delay = 0;        ///< s, by which data come late
+  /// Share of frames, replies and broadcasts, whose last byte is wrong.
+  double wrong_checksums = 0;
+  std::optional<double>
+      heartbeat_dies;             ///< s after the first start; from then to the session's end
+  std::optional<double> restart;  ///< s after the first start, once
+  double restart_time = 2;        ///< s, for which a sensor that restarts says nothing
+};
+
+/// Which sensor to be, and how.
+struct EmulateOptions {
+  std::string interface;  ///< address of the sensor, one of this machine
+  std::string serial;     ///< broadcast code; empty: that of the simulation
+  /// What it measures; without a scene the inside of a room. The shot rate is that of the sensor's
+  /// type, the duration and what moves it do not count.
+  SimulationOptions simulation;
+  double speed = 1;                ///< times faster than real time
+  std::optional<double> duration;  ///< s from the beginning; empty: until it is cancelled
+  EmulatedFaults faults;
+};
+
+/// The truth of what a virtual sensor sent.
+struct EmulatedSensor {
+  std::string serial;
+  std::uint8_t device_type = 0;  ///< as recordings::Device::type
+  wire::Address address;
+  double duration = 0;                                   ///< s of real time
+  std::uint64_t packets = 0, rows = 0, imu_samples = 0;  ///< that were sent, each once
+  /// Packets that were not sent and lie between others that were, in one session.
+  std::uint64_t lost = 0;
+  std::uint64_t lost_at_ends = 0;  ///< not sent before the first or behind the last of a session
+  std::uint64_t unsent = 0;        ///< of both: because the kernel did not take them
+  std::uint64_t duplicates = 0, reordered = 0;  ///< that were sent twice; that were overtaken
+  std::uint64_t wrong_checksums = 0;            ///< frames that were damaged
+  std::uint64_t kernel_drops = 0;               ///< of commands
+  std::uint64_t rejected = 0;                   ///< datagrams that were no commands of the host
+  std::uint64_t sessions = 0, restarts = 0;     ///< handshakes that were answered; restarts
+  double behind = 0;                            ///< s, by which the sending fell behind at most
+};
+
+/// Told at once: where the sensor is and what it does.
+using EmulateNote = std::function<void(const std::string& words)>;
+
+/// Is a sensor until the time is over or the progress is cancelled, which is its usual end.
+/// @throws InvalidArgument, FileError, NetworkError
+EmulatedSensor emulate_sensor(const EmulateOptions& options, const EmulateNote& note,
+                              const Progress& progress = {});
+
+}  // namespace risley::jobs

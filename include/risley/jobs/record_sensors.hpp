@@ -1,0 +1,87 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "risley/core/progress.hpp"
+#include "risley/wire/commands.hpp"
+#include "risley/wire/packet_order.hpp"
+
+namespace risley::jobs {
+
+/// What to record from the network, and how.
+struct RecordOptions {
+  std::string interface;             ///< its address; empty: the only one there is
+  std::vector<std::string> serials;  ///< broadcast codes of the sensors; empty: all that are found
+  double find_time = 2.5;            ///< s, for which sensors are looked for
+  bool passive = false;              ///< only listens, on data_port, and sends nothing
+  std::uint16_t data_port = 56001;   ///< where another host receives the data, of a passive one
+  std::optional<double> duration;    ///< s from the first data on; empty: until it is cancelled
+  std::optional<bool> spherical = true;         ///< empty: as the sensors are
+  std::optional<wire::ReturnMode> return_mode;  ///< empty: as the sensors are
+  bool imu = true;                              ///< inertial samples, where the sensor has them
+  std::string output;                           ///< path, ends in .lvx
+};
+
+/// A sensor on the interface.
+struct FoundSensor {
+  std::string serial;  ///< broadcast code; of a passive recording the address where none was heard
+  std::uint8_t device_type = 0;  ///< as recordings::Device::type
+  wire::Address address;
+};
+
+/// A time without data of a sensor, by the host's clock; s since the first data of the recording.
+struct RecordedGap {
+  double begin = 0, end = 0;
+  std::optional<std::uint64_t> lost;  ///< packets; empty where the sensor's clock began again
+  bool imu = false;                   ///< of inertial samples, not of points
+};
+
+/// What was recorded of a sensor.
+struct RecordedSensor {
+  FoundSensor sensor;
+  std::string firmware;       ///< empty where it was not told
+  wire::PacketCounts counts;  ///< without those of strangers
+  std::uint64_t kernel_drops = 0;
+  std::uint64_t rejected = 0;  ///< datagrams that were no packets, or from somebody else
+  std::uint64_t sessions = 0;  ///< handshakes that were answered
+  std::vector<RecordedGap> gaps;
+  /// Warnings and errors of the sensor itself, each status once: recordings::Packet::status.
+  std::vector<std::uint32_t> statuses;
+};
+
+/// What came of a recording.
+struct RecordedSensors {
+  std::string output;
+  wire::Address interface;
+  double duration = 0;                  ///< s from the first data to the end
+  std::uint64_t frames = 0, bytes = 0;  ///< of the file
+  std::size_t receive_buffer_asked = 0, receive_buffer_granted = 0;  ///< bytes per sensor
+  std::vector<RecordedSensor> sensors;
+  std::uint64_t strangers = 0;  ///< datagrams at the broadcast port that name no sensor
+};
+
+/// Told at once: words about a sensor, and whether something is wrong.
+using RecordNote = std::function<void(const std::string& words, bool is_wrong)>;
+
+/// Sensors that broadcast on the interface, by serial number. Sends nothing.
+/// @throws InvalidArgument, NetworkError, Cancelled
+std::vector<FoundSensor> find_sensors(const RecordOptions& options, const Progress& progress = {});
+
+/// Finds sensors, starts them, and writes what they send into one LVX 1.1 file while it comes, see
+/// recordings::livox::PacketFile, until the time is over or the progress is cancelled: that is the
+/// clean end of a recording, for which the sensors are stopped. A sensor that falls silent is told
+/// of, waited for, and goes on in the same file; one that is found later than the others is not
+/// taken.
+/// @throws InvalidArgument; NetworkError also where there is no sensor, or none sends anything;
+///         FileError
+RecordedSensors record_sensors(const RecordOptions& options, const RecordNote& note,
+                               const Progress& progress = {});
+
+}  // namespace risley::jobs

@@ -1,0 +1,108 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <deque>
+#include <map>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "risley/recordings/livox/packet.hpp"
+#include "risley/recordings/livox/packet_decoder.hpp"
+
+namespace risley::wire {
+
+/// What the packets of one sensor came to.
+struct PacketCounts {
+  std::uint64_t packets = 0;      ///< in order, each once, inertial samples among them
+  std::uint64_t rows = 0;         ///< observations of those packets
+  std::uint64_t imu_samples = 0;  ///< inertial samples of those packets
+  /// Packets that are missing between others, by the times of those.
+  std::uint64_t lost = 0;
+  std::uint64_t duplicates = 0;  ///< that were left out
+  std::uint64_t reordered = 0;   ///< that were put right
+  std::uint64_t late = 0;        ///< of the lost: came too late, and were left out
+  std::uint64_t rejected = 0;    ///< that no sensor sends
+  /// Places where the clock of the sensor jumped or began again, so that nothing can be counted.
+  std::uint64_t clock_jumps = 0;
+};
+
+/// A place where more than 0.1 s is missing, or the clock jumped. Times are the sensor's, ns.
+struct PacketGap {
+  std::int64_t from_ns = 0, to_ns = 0;            ///< of the packets around it
+  std::int64_t host_from_ns = 0, host_to_ns = 0;  ///< when they came, by the host's clock
+  std::optional<std::uint64_t> lost;              ///< packets; empty where the clock jumped
+  bool imu = false;                               ///< of inertial samples, not of points
+};
+
+/// Puts the packets of one sensor into their order and counts what is missing. Packets have no
+/// numbers, so everything follows from their times and the period of their data type. Packets that
+/// overtake each other are put right as long as not more than kWindow came in between.
+class PacketOrder {
+ public:
+  /// Packets that wait for others.
+  static constexpr std::size_t kWindow = 64;
+  /// Longest time that a packet waits, ns.
+  static constexpr std::int64_t kLongestWait = 200'000'000;
+  /// Gaps that are kept; those behind are only counted.
+  static constexpr std::size_t kMostGaps = 1000;
+
+  /// @param device_type  as recordings::Device::type
+  explicit PacketOrder(std::uint8_t device_type);
+
+  /// How special firmware measures, where the device type does not tell.
+  void set_grid(const recordings::livox::ShotGrid& grid) { grid_ = grid; }
+
+  /// Takes a datagram that the sensor sent to the data port.
+  /// @param host_ns  when it came  @return whether it is a packet
+  bool add(std::span<const std::uint8_t> packet, std::int64_t host_ns);
+  /// Lets time pass for packets that wait.
+  void advance(std::int64_t host_ns);
+  /// Nothing more will come, or the sensor comes back: no packet waits. Times that go back behind
+  /// this are those of a clock that began again.
+  void flush();
+  /// Packets in their order since the last call.
+  std::vector<std::vector<std::uint8_t>> take();
+
+  const PacketCounts& counts() const { return counts_; }        ///< of what take() has given
+  const std::vector<PacketGap>& gaps() const { return gaps_; }  ///< the first kMostGaps
+  /// When the first packet came, by the host's clock; empty before there is one.
+  std::optional<std::int64_t> first_host_ns() const { return first_host_ns_; }
+
+ private:
+  struct Held {
+    std::vector<std::uint8_t> bytes;
+    std::int64_t host_ns = 0, period_ns = 0;
+    std::uint32_t rows = 0;
+  };
+  /// Points, or inertial samples.
+  struct Track {
+    std::map<std::int64_t, Held> held;  // by time
+    std::optional<std::int64_t> last_ns;
+    std::int64_t last_period_ns = 0, last_host_ns = 0;
+    std::deque<std::int64_t> recent;  // times of the last packets given out
+    std::optional<std::uint8_t> timestamp_type;
+    bool jumped = false;   // before the next packet
+    bool flushed = false;  // before the next packet
+  };
+
+  void place(Track& track, std::int64_t time_ns, Held&& packet);
+  void restart(Track& track);
+  void give_out(Track& track);
+  std::int64_t period_of(std::uint8_t data_type) const;
+
+  std::uint8_t device_type_;
+  std::optional<recordings::livox::ShotGrid> grid_;
+  recordings::livox::PacketDecoder decoder_;
+  recordings::Chunk chunk_;
+  std::array<Track, 2> tracks_;
+  PacketCounts counts_;
+  std::optional<std::int64_t> first_host_ns_;
+  std::vector<PacketGap> gaps_;
+  std::vector<std::vector<std::uint8_t>> ready_;
+};
+
+}  // namespace risley::wire

@@ -1,0 +1,386 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "risley/jobs/emulate_sensor.hpp"
+
+#include <algorithm>
+#include <deque>
+#include <map>
+#include <optional>
+#include <set>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "risley/core/random.hpp"
+#include "risley/core/require.hpp"
+#include "risley/wire/sensor_session.hpp"
+#include "risley/wire/udp_socket.hpp"
+
+#include "jobs/emulated_scan.hpp"
+#include "jobs/sensor_search.hpp"
+
+namespace risley::jobs {
+namespace {
+
+using recordings::livox::record_layout;
+
+constexpr std::int64_t kEmulatedSecond = 1'000'000'000;  // ns
+constexpr std::int64_t kImuStep = 5'000'000;             // ns of the sensor's clock
+constexpr std::int64_t kLongestRest = 20'000'000, kShortestRest = 200'000;  // ns
+constexpr int kPacketsAtOnce = 256;
+constexpr double kFastest = 100;
+
+/// Decisions with a share, one after the other; each purpose has its own, so that one fault does
+/// not change where others fall.
+class Chance {
+ public:
+  Chance(std::uint64_t seed, std::uint64_t purpose, double share)
+      : random_(seed, purpose), share_(share) {}
+  bool falls() { return share_ > 0 && random_.uniform(index_++) < share_; }
+  /// A whole number from 1 to most.
+  int count(int most) {
+    return 1 + std::min(most - 1, static_cast<int>(random_.uniform(index_++) * most));
+  }
+
+ private:
+  RandomStream random_;
+  double share_;
+  std::uint64_t index_ = 0;
+};
+
+/// A packet that is to be sent.
+struct Outgoing {
+  std::vector<std::uint8_t> bytes;
+  wire::Endpoint to;
+  std::uint64_t number = 0;
+  std::int64_t due_ns = 0;
+  bool twice = false;  ///< it has a copy
+};
+
+/// Data from a start to a stop.
+struct Stream {
+  std::uint8_t data_type = 0;
+  std::int64_t first_ns = 0;  ///< of the sensor's clock
+  std::int64_t begin_ns = 0;  ///< of real time
+  std::uint64_t number = 0;   ///< packets since then
+  std::uint64_t of_all = 0;   ///< packets since the start, whatever their types
+  std::uint64_t imu_number = 0;
+  bool sent_any = false;
+  std::uint64_t pending_lost = 0;
+  std::uint64_t last_sent = 0;
+};
+
+class Emulator {
+ public:
+  Emulator(const EmulateOptions& options, const EmulateNote& note, const Progress& progress)
+      : options_(options),
+        note_(note),
+        progress_(progress),
+        scan_(options.simulation),
+        socket_({wire::interface_of(options.interface).address, wire::kSensorPort}),
+        loss_(options.simulation.seed, 101, options.faults.loss),
+        duplication_(options.simulation.seed, 102, options.faults.duplication),
+        disorder_(options.simulation.seed, 103, options.faults.disorder),
+        damage_(options.simulation.seed, 104, options.faults.wrong_checksums) {
+    identity_.code = options.serial.empty() ? scan_.device().serial : options.serial;
+    identity_.device_type = scan_.device().type;
+    identity_.firmware = {3, 8, 0, 0};
+    identity_.address = socket_.local().address;
+  }
+
+  EmulatedSensor run();
+
+ private:
+  void power_on(std::int64_t now);
+  void power_off(std::int64_t now, std::int64_t time_ns);
+  void take_commands(std::int64_t now);
+  void say(std::int64_t now);
+  void follow_session(std::int64_t now);
+  void start_stream(std::int64_t now);
+  void end_stream(std::int64_t now);
+  std::uint8_t data_type() const;
+  void send_due(std::int64_t now);
+  void make_packet(std::int64_t now);
+  void let_go(std::int64_t now, bool all);
+  void send(const Outgoing& packet);
+  std::int64_t clock_ns(std::int64_t now) const {
+    return static_cast<std::int64_t>(static_cast<double>(now - power_on_ns_) * options_.speed);
+  }
+  std::int64_t rest_until(std::int64_t now) const;
+
+  const EmulateOptions& options_;
+  const EmulateNote& note_;
+  const Progress& progress_;
+  EmulatedScan scan_;
+  wire::UdpSocket socket_;
+  Chance loss_, duplication_, disorder_, damage_;
+  wire::SensorIdentity identity_;
+  std::optional<wire::SensorSession> session_;
+  std::optional<Stream> stream_;
+  std::multimap<std::uint64_t, Outgoing> overtaken_;  // by the packet that they follow
+  std::deque<Outgoing> delayed_;
+  std::set<std::uint64_t> sent_once_;  // whose copy has still to be sent
+  std::int64_t power_on_ns_ = 0, dead_until_ns_ = 0;
+  std::optional<std::int64_t> first_start_ns_;
+  bool restarted_ = false, heart_dead_ = false, heart_died_ = false;
+  EmulatedSensor truth_;
+};
+
+void Emulator::power_on(std::int64_t now) {
+  power_on_ns_ = now;
+  session_.emplace(identity_, now);
+}
+
+void Emulator::power_off(std::int64_t now, std::int64_t time_ns) {
+  end_stream(now);
+  truth_.rejected += session_->rejected();
+  truth_.sessions += session_->handshakes();
+  session_.reset();
+  dead_until_ns_ = now + time_ns;
+}
+
+void Emulator::take_commands(std::int64_t now) {
+  socket_.receive([&](const wire::UdpSocket::Datagram& datagram) {
+    if (!session_) return;
+    if (heart_dead_) {
+      const auto decoded = wire::decode_frame(datagram.bytes);
+      const auto* frame = std::get_if<wire::Frame>(&decoded);
+      if (frame != nullptr && frame->command == wire::Heartbeat::kId) return;
+    }
+    session_->receive(datagram.from, datagram.bytes, now);
+    follow_session(now);
+  });
+}
+
+void Emulator::say(std::int64_t now) {
+  if (!session_) return;
+  session_->advance(now);
+  follow_session(now);
+  for (auto& datagram : session_->take_datagrams()) {
+    if (damage_.falls()) {
+      datagram.bytes.back() ^= 1U;
+      ++truth_.wrong_checksums;
+    }
+    socket_.send(datagram.to.value_or(wire::Endpoint{wire::kEverybody, wire::kBroadcastPort}),
+                 datagram.bytes);
+  }
+}
+
+std::uint8_t Emulator::data_type() const {
+  const bool cartesian = !session_->spherical();
+  if (identity_.device_type == recordings::kMid40) {
+    return recordings::livox::data_type_of(cartesian, false, 1);
+  }
+  const int returns = session_->return_mode() == wire::ReturnMode::triple ? 3
+                      : session_->return_mode() == wire::ReturnMode::dual ? 2
+                                                                          : 1;
+  return recordings::livox::data_type_of(cartesian, true, returns);
+}
+
+/// Starts, stops and changes what is sent as commands have it.
+void Emulator::follow_session(std::int64_t now) {
+  if (!session_->connected()) heart_dead_ = false;
+  if (!session_->sampling()) {
+    end_stream(now);
+  } else if (!stream_) {
+    start_stream(now);
+  } else if (stream_->data_type != data_type()) {
+    // The next packet follows the last one.
+    Stream& stream = *stream_;
+    const std::int64_t passed = scan_.time_of(stream.number, stream.data_type);
+    stream.first_ns += passed;
+    stream.begin_ns += static_cast<std::int64_t>(static_cast<double>(passed) / options_.speed);
+    stream.number = 0;
+    stream.data_type = data_type();
+  }
+  if (const auto delay = session_->take_reboot()) {
+    // The reply goes out first.
+    for (const auto& datagram : session_->take_datagrams()) {
+      if (datagram.to) socket_.send(*datagram.to, datagram.bytes);
+    }
+    ++truth_.restarts;
+    note_("restarts as it was told to");
+    power_off(now, *delay + static_cast<std::int64_t>(1e9 * options_.faults.restart_time));
+  }
+}
+
+void Emulator::start_stream(std::int64_t now) {
+  constexpr std::int64_t kClockStep = 1000;
+  Stream stream;
+  stream.data_type = data_type();
+  stream.first_ns = clock_ns(now) / kClockStep * kClockStep;
+  stream.begin_ns = now;
+  stream.imu_number = static_cast<std::uint64_t>(stream.first_ns / kImuStep) + 1;
+  stream_ = stream;
+  if (!first_start_ns_) first_start_ns_ = now;
+  note_(fmt::format("sends data of type {} to {}", stream.data_type,
+                    to_string(session_->data_target())));
+}
+
+void Emulator::end_stream(std::int64_t now) {
+  if (!stream_) return;
+  let_go(now, true);
+  sent_once_.clear();
+  truth_.lost_at_ends += stream_->pending_lost;
+  stream_.reset();
+}
+
+void Emulator::send_due(std::int64_t now) {
+  if (!stream_) return;
+  Stream& stream = *stream_;
+  const auto passed =
+      static_cast<std::int64_t>(static_cast<double>(now - stream.begin_ns) * options_.speed);
+  const std::uint64_t due = scan_.packets_in(passed, stream.data_type) + 1;
+  const std::uint64_t behind = due - std::min(due, stream.number);
+  truth_.behind =
+      std::max(truth_.behind, 1e-9 * static_cast<double>(scan_.time_of(behind, stream.data_type)));
+  for (int i = 0; i < kPacketsAtOnce && stream.number < due; ++i) make_packet(now);
+  let_go(now, false);
+}
+
+void Emulator::make_packet(std::int64_t now) {
+  Stream& stream = *stream_;
+  const std::int64_t time_ns = stream.first_ns + scan_.time_of(stream.number, stream.data_type);
+  const auto delay_ns = static_cast<std::int64_t>(1e9 * options_.faults.delay);
+  if (session_->imu() && static_cast<std::int64_t>(stream.imu_number) * kImuStep <= time_ns) {
+    const auto sample = scan_.imu(static_cast<std::int64_t>(stream.imu_number++) * kImuStep);
+    if (socket_.send(session_->imu_target(), sample)) {
+      ++truth_.packets;
+      ++truth_.imu_samples;
+    } else {
+      ++truth_.unsent;
+      ++truth_.lost;
+    }
+  }
+  const auto bytes = scan_.next(stream.data_type, time_ns);
+  const std::uint64_t number = stream.of_all++;
+  ++stream.number;
+  if (loss_.falls()) {
+    ++stream.pending_lost;
+  } else {
+    (stream.sent_any ? truth_.lost : truth_.lost_at_ends) += std::exchange(stream.pending_lost, 0);
+    stream.sent_any = true;
+    const auto place = [&] {
+      return number + (disorder_.falls()
+                           ? static_cast<std::uint64_t>(disorder_.count(options_.faults.farthest))
+                           : 0);
+    };
+    const Outgoing packet{{bytes.begin(), bytes.end()},
+                          session_->data_target(),
+                          number,
+                          now + delay_ns,
+                          duplication_.falls()};
+    overtaken_.emplace(place(), packet);
+    if (packet.twice) overtaken_.emplace(place(), packet);
+  }
+}
+
+/// Sends what waits no longer. @param all  nothing waits
+void Emulator::let_go(std::int64_t now, bool all) {
+  while (!overtaken_.empty() && (all || overtaken_.begin()->first < stream_->of_all)) {
+    delayed_.push_back(std::move(overtaken_.begin()->second));
+    overtaken_.erase(overtaken_.begin());
+  }
+  while (!delayed_.empty() && (all || delayed_.front().due_ns <= now)) {
+    send(delayed_.front());
+    delayed_.pop_front();
+  }
+}
+
+void Emulator::send(const Outgoing& packet) {
+  const bool sent = socket_.send(packet.to, packet.bytes);
+  // Of two copies the one that is sent first counts.
+  if (packet.twice && !sent_once_.insert(packet.number).second) {
+    sent_once_.erase(packet.number);
+    if (sent) ++truth_.duplicates;
+    return;
+  }
+  if (!sent) {
+    ++truth_.unsent;
+    ++truth_.lost;
+    return;
+  }
+  ++truth_.packets;
+  const std::uint8_t type = packet.bytes[recordings::livox::kDataTypeAt];
+  truth_.rows += record_layout(type)->rows();
+  if (packet.number < stream_->last_sent) ++truth_.reordered;
+  stream_->last_sent = std::max(stream_->last_sent, packet.number);
+}
+
+std::int64_t Emulator::rest_until(std::int64_t now) const {
+  std::int64_t until = now + kLongestRest;
+  if (session_) until = std::min(until, session_->next_ns());
+  if (stream_) {
+    const auto due = static_cast<std::int64_t>(
+        static_cast<double>(scan_.time_of(stream_->number, stream_->data_type)) / options_.speed);
+    until = std::min(until, std::max(stream_->begin_ns + due, now + kShortestRest));
+  }
+  if (!delayed_.empty()) until = std::min(until, delayed_.front().due_ns);
+  return until;
+}
+
+EmulatedSensor Emulator::run() {
+  const std::int64_t begin = steady_ns();
+  const auto duration = static_cast<std::int64_t>(1e9 * options_.duration.value_or(0));
+  power_on(begin);
+  note_(fmt::format("{}, a {}, at {}", identity_.code,
+                    recordings::device_type_name(identity_.device_type),
+                    to_string(socket_.local())));
+  const wire::UdpSocket* const sockets[] = {&socket_};
+  const EmulatedFaults& faults = options_.faults;
+  for (std::int64_t now = begin; !progress_.cancelled(); now = steady_ns()) {
+    if (options_.duration && now - begin >= duration) break;
+    take_commands(now);
+    if (!session_ && now >= dead_until_ns_) power_on(now);
+    say(now);
+    send_due(now);
+    const auto since_start =
+        first_start_ns_ ? 1e-9 * static_cast<double>(now - *first_start_ns_) : -1.0;
+    if (faults.heartbeat_dies && !heart_died_ && since_start >= *faults.heartbeat_dies) {
+      heart_dead_ = heart_died_ = true;
+      note_("its heartbeat dies");
+    }
+    if (faults.restart && !restarted_ && session_ && since_start >= *faults.restart) {
+      restarted_ = true;
+      ++truth_.restarts;
+      note_("restarts");
+      power_off(now, static_cast<std::int64_t>(1e9 * faults.restart_time));
+    }
+    wire::wait_for(sockets, rest_until(now) - steady_ns());
+  }
+  end_stream(steady_ns());
+  truth_.serial = identity_.code;
+  truth_.device_type = identity_.device_type;
+  truth_.address = identity_.address;
+  truth_.duration = 1e-9 * static_cast<double>(steady_ns() - begin);
+  truth_.kernel_drops = socket_.kernel_drops();
+  if (session_) {
+    truth_.rejected += session_->rejected();
+    truth_.sessions += session_->handshakes();
+  }
+  return truth_;
+}
+
+}  // namespace
+
+EmulatedSensor emulate_sensor(const EmulateOptions& options, const EmulateNote& note,
+                              const Progress& progress) {
+  if (options.duration) require_above("option duration", *options.duration, 0, "s");
+  require_between("option speed", options.speed, 1 / kFastest, kFastest);
+  const EmulatedFaults& faults = options.faults;
+  require_between("option loss", faults.loss, 0, 1);
+  require_between("option duplication", faults.duplication, 0, 1);
+  require_between("option disorder", faults.disorder, 0, 1);
+  require_between("option wrong_checksums", faults.wrong_checksums, 0, 1);
+  require_between("option farthest", faults.farthest, 1, 1000);
+  require_between("option delay", faults.delay, 0, 60, "s");
+  require_between("option restart_time", faults.restart_time, 0, 3600, "s");
+  if (faults.heartbeat_dies) {
+    require_not_below("option heartbeat_dies", *faults.heartbeat_dies, 0, "s");
+  }
+  if (faults.restart) require_not_below("option restart", *faults.restart, 0, "s");
+  return Emulator(options, note, progress).run();
+}
+
+}  // namespace risley::jobs

@@ -1,0 +1,123 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "jobs/emulated_scan.hpp"
+
+#include <limits>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "risley/core/error.hpp"
+#include "risley/recordings/livox/packet_encoder.hpp"
+#include "risley/scenes/scene.hpp"
+
+namespace risley::jobs {
+namespace {
+
+using namespace recordings::livox;
+
+constexpr double kScanDuration = 600;          // s; then it begins again
+constexpr std::size_t kShotsAtOnce = 24'000;   // a multiple of all packets' shots
+constexpr std::uint8_t kFirstEcho = 1U << 4U;  // of a tag: first real return
+constexpr const char* kRoom = R"(planes:
+  - {name: front, distance_m: 12, normal_azimuth_deg: 4, normal_zenith_deg: 90}
+  - {name: back, distance_m: 9, normal_azimuth_deg: 180, normal_zenith_deg: 90}
+  - {name: left, distance_m: 5, normal_azimuth_deg: 90, normal_zenith_deg: 90}
+  - {name: right, distance_m: 6, normal_azimuth_deg: -90, normal_zenith_deg: 90}
+  - {name: floor, distance_m: 1.5, normal_azimuth_deg: 0, normal_zenith_deg: 180}
+  - {name: ceiling, distance_m: 2.5, normal_azimuth_deg: 0, normal_zenith_deg: 0}
+)";
+
+ShotGrid grid_of(std::uint8_t device_type) {
+  return device_type == recordings::kMid40 || device_type == recordings::kMid70 ? kGrid100kHz
+                                                                                : kGrid240kHz;
+}
+
+simulation::SimulationSettings settings_of(const SimulationOptions& options) {
+  SimulationOptions wanted = options;
+  wanted.duration = kScanDuration;
+  wanted.rate = 100'000;
+  wanted.quantize = false;  // what a packet holds is rounded as the sensor does
+  simulation::SimulationSettings settings = simulation_settings(wanted);
+  const int type = settings.truth.device_type;
+  const bool known = type == recordings::kMid40 || type == recordings::kTele15 ||
+                     type == recordings::kHorizon || type == recordings::kMid70 ||
+                     type == recordings::kAvia;
+  if (!known) {
+    throw InvalidArgument(fmt::format(
+        "option sensor = {}: the device type {} is none that can be emulated, allowed 1 (Mid-40), "
+        "2 (Tele-15), 3 (Horizon), 6 (Mid-70), 7 (Avia)",
+        options.sensor, type));
+  }
+  const ShotGrid grid = grid_of(static_cast<std::uint8_t>(type));
+  settings.rate = 1e9 * grid.interval_denominator / grid.interval_numerator_ns;
+  if (!settings.scene) settings.scene = scenes::parse_scene(kRoom, "the built-in room");
+  return settings;
+}
+
+}  // namespace
+
+EmulatedScan::EmulatedScan(const SimulationOptions& options)
+    : settings_(settings_of(options)), scanner_(std::make_unique<simulation::Scanner>(settings_)) {
+  device_ = scanner_->header().devices.front();
+}
+
+void EmulatedScan::read_shots() {
+  next_shot_ = 0;
+  if (scanner_->read(chunk_, truth_, kShotsAtOnce)) return;
+  scanner_ = std::make_unique<simulation::Scanner>(settings_);
+  scanner_->read(chunk_, truth_, kShotsAtOnce);
+}
+
+void EmulatedScan::begin_packet(std::uint8_t data_type, std::int64_t time_ns) {
+  recordings::Packet header;
+  header.data_type = data_type;
+  header.timestamp = encode_timestamp(header.timestamp_type, time_ns);
+  packet_.resize(kPacketHeaderBytes + record_layout(data_type)->bytes());
+  encode_packet_header(header, packet_.data());
+}
+
+std::span<const std::uint8_t> EmulatedScan::next(std::uint8_t data_type, std::int64_t time_ns) {
+  begin_packet(data_type, time_ns);
+  const RecordLayout& layout = *record_layout(data_type);
+  record_.clear();
+  record_.resize(layout.returns);
+  std::uint8_t* bytes = &packet_[kPacketHeaderBytes];
+  for (std::uint32_t shot = 0; shot < layout.records; ++shot, ++next_shot_) {
+    if (next_shot_ == chunk_.observations.size()) read_shots();
+    const recordings::Observations& shots = chunk_.observations;
+    record_.azimuth[0] = shots.azimuth[next_shot_];
+    record_.zenith[0] = shots.zenith[next_shot_];
+    record_.range[0] = shots.range[next_shot_];
+    record_.valid[0] = shots.valid[next_shot_];
+    record_.intensity[0] = shots.intensity[next_shot_];
+    record_.tag[0] = layout.tagged && shots.valid[next_shot_] != 0 ? kFirstEcho : std::uint8_t{0};
+    encode_record(layout, record_, 0, next_shot_, bytes);
+    bytes += layout.bytes_per_record;
+  }
+  return packet_;
+}
+
+std::span<const std::uint8_t> EmulatedScan::imu(std::int64_t time_ns) {
+  begin_packet(kImuDataType, time_ns);
+  recordings::ImuSample sample;
+  sample.acceleration_g = {0, 0, 1};
+  encode_imu(sample, &packet_[kPacketHeaderBytes]);
+  return packet_;
+}
+
+std::int64_t EmulatedScan::time_of(std::uint64_t packets, std::uint8_t data_type) const {
+  const ShotGrid grid = grid_of(device_.type);
+  const std::uint64_t period =
+      std::uint64_t{record_layout(data_type)->records} * grid.interval_numerator_ns;
+  return static_cast<std::int64_t>(packets * period / grid.interval_denominator);
+}
+
+std::uint64_t EmulatedScan::packets_in(std::int64_t time_ns, std::uint8_t data_type) const {
+  const ShotGrid grid = grid_of(device_.type);
+  const std::uint64_t period =
+      std::uint64_t{record_layout(data_type)->records} * grid.interval_numerator_ns;
+  return static_cast<std::uint64_t>(time_ns) * grid.interval_denominator / period;
+}
+
+}  // namespace risley::jobs

@@ -1,0 +1,514 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "risley/jobs/record_sensors.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <exception>
+#include <iterator>
+#include <limits>
+#include <map>
+#include <memory>
+#include <utility>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "risley/core/require.hpp"
+#include "risley/recordings/livox/packet_file.hpp"
+#include "risley/wire/client_session.hpp"
+
+#include "jobs/sensor_search.hpp"
+
+namespace risley::jobs {
+namespace {
+
+using recordings::livox::PacketFile;
+using wire::ClientEvent;
+using wire::ClientState;
+
+constexpr std::int64_t kMillisecond = 1'000'000, kWireSecond = 1'000'000'000;  // ns
+constexpr std::int64_t kFramePeriod = 50 * kMillisecond;
+constexpr std::int64_t kSilenceTold = kWireSecond;
+/// Broadcasts that were on their way when the handshake came say nothing.
+constexpr std::int64_t kBroadcastSettles = 1500 * kMillisecond;
+constexpr std::int64_t kLongestStop = 2 * kWireSecond;
+constexpr std::int64_t kLongestPoll = 20 * kMillisecond;
+constexpr std::size_t kReceiveBuffer = std::size_t{4} << 20U;
+constexpr std::size_t kMostStatuses = 100;
+constexpr std::size_t kMostPassiveSensors = 16;
+/// Of a status: anything but what a healthy sensor reports (PPS, PTP, time synchronisation).
+constexpr std::uint32_t kTroubles = 0xC0000DFF;
+
+bool may_have_imu(std::uint8_t device_type) {
+  return device_type == recordings::kAvia || device_type == recordings::kHorizon ||
+         device_type == recordings::kTele15;
+}
+
+/// Shots of the Mid-40 firmware that stores several returns as so many records.
+std::optional<recordings::livox::ShotGrid> grid_of_firmware(const std::string& firmware) {
+  if (firmware == "03.03.0001" || firmware == "03.03.0006") {
+    return recordings::livox::ShotGrid{10'000, 1, 1, 2};
+  }
+  if (firmware == "03.03.0002" || firmware == "03.03.0007") {
+    return recordings::livox::ShotGrid{50'000, 3, 1, 3};
+  }
+  return std::nullopt;
+}
+
+/// A sensor while it is recorded.
+struct LiveSensor {
+  explicit LiveSensor(const FoundSensor& found) : order(found.device_type) {
+    result.sensor = found;
+  }
+
+  RecordedSensor result;
+  wire::PacketOrder order;
+  std::unique_ptr<wire::UdpSocket> commands, data;
+  std::optional<wire::ClientSession> session;
+  std::int64_t session_begin_ns = 0;
+  std::optional<std::int64_t> data_ns;  ///< when the last packet came
+  bool silent = false, stopped = false;
+  std::uint64_t session_rejected = 0;  ///< by sessions that are over
+};
+
+class Recorder {
+ public:
+  Recorder(const RecordOptions& options, const wire::Interface& interface, const RecordNote& note,
+           const Progress& progress)
+      : options_(options),
+        interface_(interface),
+        note_(note),
+        progress_(progress),
+        listener_(interface) {}
+
+  RecordedSensors run();
+
+ private:
+  void find();
+  std::vector<FoundSensor> find_passively();
+  void open_sockets();
+  void begin_session(LiveSensor& live, std::int64_t now);
+  void step(std::int64_t now, std::int64_t wait_until);
+  void step_session(LiveSensor& live, std::int64_t now);
+  void take_event(LiveSensor& live, const ClientEvent& event);
+  void take_broadcasts(std::int64_t now);
+  void take_commands(LiveSensor& live, std::int64_t now);
+  void take_data(LiveSensor& live, std::int64_t now);
+  void watch_silence(LiveSensor& live, std::int64_t now);
+  void write_frame(bool last);
+  void stop_all();
+  RecordedSensors result();
+  static std::string name_of(const LiveSensor& live) { return live.result.sensor.serial; }
+
+  const RecordOptions& options_;
+  wire::Interface interface_;
+  const RecordNote& note_;
+  const Progress& progress_;
+  BroadcastListener listener_;
+  std::unique_ptr<wire::UdpSocket> passive_data_;  // for all sensors
+  std::vector<std::unique_ptr<LiveSensor>> sensors_;
+  std::unique_ptr<PacketFile> file_;
+  std::vector<const wire::UdpSocket*> waiting_;
+  std::optional<std::int64_t> first_data_ns_;
+  std::int64_t last_data_ns_ = 0, frame_due_ns_ = 0;
+  std::uint64_t passive_strangers_ = 0;
+};
+
+/// Whoever sends packets to the data port, and what their times say of the sensor.
+std::vector<FoundSensor> Recorder::find_passively() {
+  struct Heard {
+    std::optional<std::int64_t> last_time_ns;
+    std::int64_t shortest_ns = std::numeric_limits<std::int64_t>::max();
+    std::uint8_t data_type = 0;
+  };
+  std::map<wire::Address, Heard> heard;
+  std::map<wire::Address, FoundSensor> named;
+  recordings::livox::PacketClock clock;
+  const std::int64_t begin = steady_ns();
+  const auto time = static_cast<std::int64_t>(1e9 * options_.find_time);
+  for (std::int64_t now = begin; now - begin < time; now = steady_ns()) {
+    progress_.check();
+    wire::wait_for(waiting_, std::min(kLongestPoll, begin + time - now));
+    for (const FoundSensor& sensor : listener_.take()) named.try_emplace(sensor.address, sensor);
+    passive_data_->receive([&](const wire::UdpSocket::Datagram& datagram) {
+      wire::PacketOrder check(recordings::kMid40);
+      if (!check.add(datagram.bytes, 0) ||
+          (heard.size() >= kMostPassiveSensors && !heard.contains(datagram.from.address))) {
+        return;
+      }
+      const auto packet = recordings::livox::decode_packet_header(datagram.bytes);
+      if (packet.data_type == recordings::livox::kImuDataType) return;
+      Heard& one = heard[datagram.from.address];
+      const std::int64_t time_ns = clock.time_ns(packet).value_or(0);
+      if (one.last_time_ns && time_ns > *one.last_time_ns) {
+        one.shortest_ns = std::min(one.shortest_ns, time_ns - *one.last_time_ns);
+      }
+      one.last_time_ns = time_ns;
+      one.data_type = packet.data_type;
+    });
+  }
+  std::vector<FoundSensor> found;
+  for (const auto& [address, one] : heard) {
+    FoundSensor sensor{to_string(address), recordings::kUnknownDeviceType, address};
+    if (const auto known = named.find(address); known != named.end()) {
+      sensor = known->second;
+    } else if (one.data_type < 2) {
+      sensor.device_type = recordings::kMid40;
+    } else if (one.data_type > recordings::livox::kImuDataType) {
+      sensor.device_type = recordings::kAvia;
+    } else {
+      // 10 us between shots are the Mid-70's; 4.2 us are those of three sensors.
+      constexpr std::int64_t kBetween = 7000;
+      const std::int64_t interval =
+          one.shortest_ns / recordings::livox::record_layout(one.data_type)->records;
+      if (interval > kBetween) sensor.device_type = recordings::kMid70;
+    }
+    found.push_back(std::move(sensor));
+  }
+  return found;
+}
+
+void Recorder::find() {
+  std::vector<FoundSensor> found;
+  if (options_.passive) {
+    passive_data_ = std::make_unique<wire::UdpSocket>(
+        wire::Endpoint{interface_.address, options_.data_port}, kReceiveBuffer);
+    waiting_.push_back(passive_data_.get());
+    found = find_passively();
+    if (found.empty()) {
+      throw wire::NetworkError(fmt::format(
+          "{}: no packet came in {} s; a passive recording hears only what sensors send to this "
+          "address and port: name the port that the other host told them with option data_port",
+          to_string(passive_data_->local()), options_.find_time));
+    }
+  } else {
+    found = search_sensors(listener_, options_, progress_.silent());
+    std::vector<std::string> missing = options_.serials;
+    for (const FoundSensor& sensor : found) std::erase(missing, sensor.serial);
+    if (found.empty() || !missing.empty()) {
+      throw wire::NetworkError(fmt::format(
+          "{}: {} in {} s; is it switched on, in the network of this address and not connected to "
+          "another program?",
+          to_string(wire::Endpoint{interface_.address, wire::kBroadcastPort}),
+          missing.empty() ? "no sensor was heard"
+                          : fmt::format("nothing was heard of {}", fmt::join(missing, ", ")),
+          options_.find_time));
+    }
+  }
+  for (const FoundSensor& sensor : found) {
+    sensors_.push_back(std::make_unique<LiveSensor>(sensor));
+    if (sensor.device_type == recordings::kUnknownDeviceType) {
+      sensors_.back()->order.set_grid(recordings::livox::kGrid240kHz);
+    }
+  }
+}
+
+void Recorder::open_sockets() {
+  std::size_t granted = passive_data_ ? passive_data_->receive_buffer() : kReceiveBuffer;
+  if (!passive_data_) {
+    for (const auto& live : sensors_) {
+      live->commands = std::make_unique<wire::UdpSocket>(wire::Endpoint{interface_.address, 0});
+      live->data =
+          std::make_unique<wire::UdpSocket>(wire::Endpoint{interface_.address, 0}, kReceiveBuffer);
+      granted = std::min(granted, live->data->receive_buffer());
+      waiting_.push_back(live->commands.get());
+      waiting_.push_back(live->data.get());
+    }
+    listener_.add_to(waiting_);
+  }
+  if (granted < kReceiveBuffer) {
+    note_(fmt::format("the receive buffer has {} bytes, {} were asked for: if the kernel drops "
+                      "packets, allow more with sysctl -w net.core.rmem_max={}",
+                      granted, kReceiveBuffer, kReceiveBuffer),
+          true);
+  }
+}
+
+void Recorder::begin_session(LiveSensor& live, std::int64_t now) {
+  wire::ClientSettings settings;
+  settings.host = interface_.address;
+  settings.data_port = live.data->local().port;
+  settings.command_port = live.commands->local().port;
+  settings.spherical = options_.spherical;
+  settings.return_mode = options_.return_mode;
+  if (may_have_imu(live.result.sensor.device_type)) settings.imu = options_.imu;
+  if (live.session) live.session_rejected += live.session->rejected();
+  live.session.emplace(settings, now);
+  live.session_begin_ns = now;
+}
+
+void Recorder::take_event(LiveSensor& live, const ClientEvent& event) {
+  switch (event.kind) {
+    case ClientEvent::Kind::connected:
+      ++live.result.sessions;
+      break;
+    case ClientEvent::Kind::firmware:
+      live.result.firmware = event.text;
+      if (const auto grid = grid_of_firmware(event.text)) live.order.set_grid(*grid);
+      break;
+    case ClientEvent::Kind::sensor_state:
+      if (event.value != static_cast<std::uint32_t>(wire::SensorState::normal)) {
+        constexpr const char* kNames[] = {"starting", "normal", "power saving", "standby", "error"};
+        note_(fmt::format("{}: its state is {}", name_of(live),
+                          event.value < std::size(kNames) ? kNames[event.value] : "unknown"),
+              true);
+      }
+      break;
+    case ClientEvent::Kind::status:
+      if ((event.value & kTroubles) != 0) {
+        auto& known = live.result.statuses;
+        if (known.size() < kMostStatuses &&
+            std::find(known.begin(), known.end(), event.value) == known.end()) {
+          known.push_back(event.value);
+          note_(fmt::format("{}: it reports the status 0x{:08X}", name_of(live), event.value),
+                true);
+        }
+      }
+      break;
+    case ClientEvent::Kind::refused:
+      note_(fmt::format("{}: it refuses the command \"{}\"", name_of(live), event.text), true);
+      break;
+    case ClientEvent::Kind::sampling:
+      note_(fmt::format("{} at {}: started", name_of(live), to_string(live.result.sensor.address)),
+            false);
+      break;
+    case ClientEvent::Kind::closed:
+      live.stopped = true;
+      break;
+    case ClientEvent::Kind::lost:
+      note_(fmt::format("{}: lost, {}; waiting for it", name_of(live), event.text), true);
+      live.order.flush();
+      break;
+  }
+}
+
+void Recorder::step_session(LiveSensor& live, std::int64_t now) {
+  if (!live.session) return;
+  live.session->advance(now);
+  const wire::Endpoint to{live.result.sensor.address, wire::kSensorPort};
+  for (const auto& datagram : live.session->take_datagrams()) live.commands->send(to, datagram);
+  for (const ClientEvent& event : live.session->take_events()) take_event(live, event);
+}
+
+/// A sensor that broadcasts has no host: it is new, or it came back.
+void Recorder::take_broadcasts(std::int64_t now) {
+  for (const FoundSensor& heard : listener_.take()) {
+    for (const auto& live : sensors_) {
+      if (live->result.sensor.serial != heard.serial || !live->session || live->stopped) continue;
+      const bool lost = live->session->state() == ClientState::lost;
+      const bool settled = now - live->session_begin_ns > kBroadcastSettles &&
+                           now - live->session->heard_ns() > kBroadcastSettles / 2 &&
+                           heard.address == live->result.sensor.address;
+      if (!lost && !settled) continue;
+      if (!lost) live->order.flush();
+      live->result.sensor.address = heard.address;
+      begin_session(*live, now);
+    }
+  }
+}
+
+void Recorder::take_commands(LiveSensor& live, std::int64_t now) {
+  const wire::Endpoint sensor{live.result.sensor.address, wire::kSensorPort};
+  live.commands->receive([&](const wire::UdpSocket::Datagram& datagram) {
+    if (datagram.from == sensor && live.session) {
+      live.session->receive(datagram.bytes, now);
+    } else {
+      ++live.result.rejected;
+    }
+  });
+}
+
+void Recorder::take_data(LiveSensor& live, std::int64_t now) {
+  const auto take = [&](LiveSensor& whose, const wire::UdpSocket::Datagram& datagram) {
+    if (!whose.order.add(datagram.bytes, datagram.kernel_ns)) return;
+    if (!first_data_ns_) first_data_ns_ = now;
+    last_data_ns_ = now;
+    whose.data_ns = now;
+  };
+  if (passive_data_) {
+    passive_data_->receive([&](const wire::UdpSocket::Datagram& datagram) {
+      for (const auto& one : sensors_) {
+        if (one->result.sensor.address == datagram.from.address) {
+          take(*one, datagram);
+          return;
+        }
+      }
+      ++passive_strangers_;
+    });
+    return;
+  }
+  // From the handshake on, and from nobody but whom it was shaken with.
+  const bool connected = live.session && live.result.sessions > 0;
+  live.data->receive([&](const wire::UdpSocket::Datagram& datagram) {
+    if (connected && datagram.from.address == live.result.sensor.address) {
+      take(live, datagram);
+    } else {
+      ++live.result.rejected;
+    }
+  });
+}
+
+void Recorder::watch_silence(LiveSensor& live, std::int64_t now) {
+  if (!live.data_ns || live.stopped) return;
+  const bool silent = now - *live.data_ns > kSilenceTold;
+  if (silent == live.silent) return;
+  live.silent = silent;
+  note_(fmt::format("{}: {}", name_of(live), silent ? "no data for 1 s" : "data come again"), true);
+}
+
+void Recorder::write_frame(bool last) {
+  for (std::size_t i = 0; i < sensors_.size(); ++i) {
+    LiveSensor& live = *sensors_[i];
+    if (last) live.order.flush();
+    for (const auto& packet : live.order.take()) {
+      file_->add(static_cast<std::uint8_t>(i), packet);
+    }
+  }
+  file_->end_frame();
+}
+
+void Recorder::step(std::int64_t now, std::int64_t wait_until) {
+  take_broadcasts(now);
+  std::int64_t until = std::min(wait_until, now + kLongestPoll);
+  for (const auto& live : sensors_) {
+    if (!passive_data_) take_commands(*live, now);
+    step_session(*live, now);
+    take_data(*live, now);
+    watch_silence(*live, now);
+    if (live->session) until = std::min(until, live->session->next_ns());
+  }
+  if (now >= frame_due_ns_) {
+    const auto host_ns = std::chrono::duration_cast<std::chrono::nanoseconds>(
+                             std::chrono::system_clock::now().time_since_epoch())
+                             .count();
+    for (const auto& live : sensors_) live->order.advance(host_ns);
+    write_frame(false);
+    frame_due_ns_ = now + kFramePeriod;
+  }
+  wire::wait_for(waiting_, std::min(until, frame_due_ns_) - steady_ns());
+}
+
+void Recorder::stop_all() {
+  for (const auto& live : sensors_) {
+    if (live->session) live->session->stop(steady_ns());
+  }
+  const auto all_stopped = [&] {
+    return std::all_of(sensors_.begin(), sensors_.end(), [](const auto& live) {
+      return !live->session || live->session->state() == ClientState::closed ||
+             live->session->state() == ClientState::lost;
+    });
+  };
+  const std::int64_t begin = steady_ns();
+  for (std::int64_t now = begin; !all_stopped() && now - begin < kLongestStop; now = steady_ns()) {
+    step(now, begin + kLongestStop);
+  }
+  // What came before the sensors stopped is still in the kernel.
+  constexpr int kMostRounds = 1000;
+  for (int round = 0; round < kMostRounds && !sensors_.empty(); ++round) {
+    const std::int64_t before = last_data_ns_;
+    const std::int64_t now = steady_ns();
+    for (const auto& live : sensors_) take_data(*live, now);
+    if (last_data_ns_ == before) break;
+  }
+}
+
+RecordedSensors Recorder::run() {
+  find();
+  open_sockets();
+  std::vector<recordings::Device> devices;
+  for (const auto& live : sensors_) {
+    recordings::Device device;
+    device.serial = live->result.sensor.serial;
+    device.type = live->result.sensor.device_type;
+    device.index = static_cast<std::uint8_t>(devices.size());
+    devices.push_back(device);
+  }
+  file_ = std::make_unique<PacketFile>(options_.output, devices);
+  const std::int64_t begin = steady_ns();
+  if (!passive_data_) {
+    for (const auto& live : sensors_) begin_session(*live, begin);
+  }
+  constexpr std::int64_t kEndless = std::numeric_limits<std::int64_t>::max();
+  const auto duration =
+      options_.duration ? static_cast<std::int64_t>(1e9 * *options_.duration) : kEndless;
+  std::exception_ptr failure;
+  try {
+    for (std::int64_t now = begin; !progress_.cancelled(); now = steady_ns()) {
+      const std::int64_t end =
+          first_data_ns_ && options_.duration ? *first_data_ns_ + duration : kEndless;
+      if (now >= end) break;
+      if (options_.duration && first_data_ns_) {
+        try {
+          progress_.report(static_cast<double>(now - *first_data_ns_) /
+                           static_cast<double>(duration));
+        } catch (const Cancelled&) {  // between two looks: the same clean end
+          break;
+        }
+      }
+      step(now, end);
+    }
+    stop_all();
+  } catch (const FileError&) {  // no room on the disk: the sensors are stopped all the same
+    failure = std::current_exception();
+    for (const auto& live : sensors_) {
+      if (live->session) live->session->stop(steady_ns());
+      step_session(*live, steady_ns());
+    }
+  }
+  if (failure) std::rethrow_exception(failure);
+  write_frame(true);
+  if (file_->frames() == 0) {
+    throw wire::NetworkError(fmt::format("{}: no packet came from {}; nothing was recorded",
+                                         to_string(interface_.address),
+                                         name_of(*sensors_.front())));
+  }
+  file_->close();
+  return result();
+}
+
+RecordedSensors Recorder::result() {
+  RecordedSensors recorded;
+  recorded.output = file_->path();
+  recorded.interface = interface_.address;
+  recorded.duration = 1e-9 * static_cast<double>(last_data_ns_ - first_data_ns_.value_or(0));
+  recorded.frames = file_->frames();
+  recorded.bytes = file_->size();
+  recorded.receive_buffer_asked = kReceiveBuffer;
+  recorded.receive_buffer_granted = kReceiveBuffer;
+  recorded.strangers = listener_.strangers() + passive_strangers_;
+  std::int64_t first_host_ns = std::numeric_limits<std::int64_t>::max();
+  for (const auto& live : sensors_) {
+    if (const auto first = live->order.first_host_ns()) {
+      first_host_ns = std::min(first_host_ns, *first);
+    }
+  }
+  for (const auto& live : sensors_) {
+    RecordedSensor& one = live->result;
+    const wire::UdpSocket& data = passive_data_ ? *passive_data_ : *live->data;
+    recorded.receive_buffer_granted =
+        std::min(recorded.receive_buffer_granted, data.receive_buffer());
+    one.counts = live->order.counts();
+    one.kernel_drops = data.kernel_drops();
+    one.rejected += one.counts.rejected + live->session_rejected +
+                    (live->session ? live->session->rejected() : 0);
+    for (const wire::PacketGap& gap : live->order.gaps()) {
+      one.gaps.push_back({1e-9 * static_cast<double>(gap.host_from_ns - first_host_ns),
+                          1e-9 * static_cast<double>(gap.host_to_ns - first_host_ns), gap.lost,
+                          gap.imu});
+    }
+    recorded.sensors.push_back(one);
+  }
+  return recorded;
+}
+
+}  // namespace
+
+RecordedSensors record_sensors(const RecordOptions& options, const RecordNote& note,
+                               const Progress& progress) {
+  if (options.duration) require_above("option duration", *options.duration, 0, "s");
+  require_between("option find_time", options.find_time, 0.1, 3600, "s");
+  return Recorder(options, wire::interface_of(options.interface), note, progress).run();
+}
+
+}  // namespace risley::jobs

@@ -1,0 +1,100 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "jobs/sensor_search.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <map>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "risley/core/require.hpp"
+
+namespace risley::jobs {
+namespace {
+
+/// Of one network; more are somebody's noise.
+constexpr std::size_t kMostSensors = 255;
+
+}  // namespace
+
+std::int64_t steady_ns() {
+  return std::chrono::nanoseconds(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+BroadcastListener::BroadcastListener(const wire::Interface& interface) {
+  // Each hears what is sent to its address only. Broadcasts come to 255.255.255.255; those of some
+  // emulators to the network, or to this host alone.
+  sockets_.emplace_back(wire::Endpoint{wire::kEverybody, wire::kBroadcastPort}, 0, interface.name);
+  if (interface.broadcast && *interface.broadcast != wire::kEverybody) {
+    sockets_.emplace_back(wire::Endpoint{*interface.broadcast, wire::kBroadcastPort}, 0,
+                          interface.name);
+  }
+  sockets_.emplace_back(wire::Endpoint{interface.address, wire::kBroadcastPort});
+}
+
+void BroadcastListener::add_to(std::vector<const wire::UdpSocket*>& waiting) const {
+  for (const wire::UdpSocket& socket : sockets_) waiting.push_back(&socket);
+}
+
+std::vector<FoundSensor> BroadcastListener::take() {
+  std::vector<FoundSensor> found;
+  for (wire::UdpSocket& socket : sockets_) {
+    socket.receive([&](const wire::UdpSocket::Datagram& datagram) {
+      const auto decoded = wire::decode_frame(datagram.bytes);
+      const auto* frame = std::get_if<wire::Frame>(&decoded);
+      // Some sensors broadcast with the type of a command.
+      const bool plausible = frame != nullptr && frame->type != wire::FrameType::reply &&
+                             datagram.from.port == wire::kSensorPort;
+      if (plausible) {
+        const auto meaning = wire::decode_message(*frame);
+        const auto* message = std::get_if<wire::Message>(&meaning);
+        const auto* broadcast =
+            message != nullptr ? std::get_if<wire::Broadcast>(message) : nullptr;
+        if (broadcast != nullptr) {
+          found.push_back({broadcast->code, broadcast->device_type, datagram.from.address});
+          return;
+        }
+      }
+      ++strangers_;
+    });
+  }
+  return found;
+}
+
+std::vector<FoundSensor> search_sensors(BroadcastListener& listener, const RecordOptions& options,
+                                        const Progress& progress) {
+  require_between("option find_time", options.find_time, 0.1, 3600, "s");
+  std::map<std::string, FoundSensor> found;
+  std::vector<const wire::UdpSocket*> waiting;
+  listener.add_to(waiting);
+  const auto wanted = [&](const std::string& serial) {
+    return options.serials.empty() || std::find(options.serials.begin(), options.serials.end(),
+                                                serial) != options.serials.end();
+  };
+  const std::int64_t begin = steady_ns();
+  const auto time = static_cast<std::int64_t>(1e9 * options.find_time);
+  for (std::int64_t passed = 0; passed < time; passed = steady_ns() - begin) {
+    progress.report(static_cast<double>(passed) / static_cast<double>(time));
+    constexpr std::int64_t kLongestWait = 50'000'000;
+    wire::wait_for(waiting, std::min(time - passed, kLongestWait));
+    for (FoundSensor& sensor : listener.take()) {
+      if (wanted(sensor.serial) && found.size() < kMostSensors) {
+        found.try_emplace(sensor.serial, sensor);
+      }
+    }
+    if (!options.serials.empty() && found.size() == options.serials.size()) break;
+  }
+  std::vector<FoundSensor> sensors;
+  sensors.reserve(found.size());
+  for (auto& [serial, sensor] : found) sensors.push_back(std::move(sensor));
+  return sensors;
+}
+
+std::vector<FoundSensor> find_sensors(const RecordOptions& options, const Progress& progress) {
+  BroadcastListener listener(wire::interface_of(options.interface));
+  return search_sensors(listener, options, progress);
+}
+
+}  // namespace risley::jobs

@@ -1,0 +1,38 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "risley/jobs/record_sensors.hpp"
+#include "risley/wire/udp_socket.hpp"
+
+namespace risley::jobs {
+
+/// ns of a clock that never goes back.
+std::int64_t steady_ns();
+
+/// Hears the broadcasts of sensors on one interface.
+class BroadcastListener {
+ public:
+  /// @throws NetworkError
+  explicit BroadcastListener(const wire::Interface& interface);
+
+  /// Sensors that have broadcast since the last call, at most a few hundred.
+  std::vector<FoundSensor> take();
+  /// Datagrams that were no broadcasts of sensors.
+  std::uint64_t strangers() const { return strangers_; }
+  void add_to(std::vector<const wire::UdpSocket*>& waiting) const;  ///< for wait_for()
+
+ private:
+  std::vector<wire::UdpSocket> sockets_;
+  std::uint64_t strangers_ = 0;
+};
+
+/// Listens for options.find_time, or until all of options.serials were heard. By serial number.
+std::vector<FoundSensor> search_sensors(BroadcastListener& listener, const RecordOptions& options,
+                                        const Progress& progress);
+
+}  // namespace risley::jobs

@@ -1,0 +1,262 @@
+#!/usr/bin/env python3
+# SPDX-FileCopyrightText: 2026 The risley authors
+# SPDX-License-Identifier: MIT
+"""The virtual sensor: against a host that knows nothing of risley, and against risley record."""
+import json
+import os
+import random
+import signal
+import struct
+import subprocess
+import time
+import unittest
+
+import schemas
+from command import COMMAND, CommandTest
+from livox_peer import SENSOR_PORT, TYPES, Host, bound, frame, parse
+
+ADDRESS, CODE = "127.0.0.41", "EMULATED0000011"
+
+
+def header(packet):
+    """Version, slot, id, timestamp type, data type, time."""
+    version, slot, number, _, _, clock, kind, stamp = struct.unpack_from("<BBBBIBBQ", packet)
+    return version, slot, number, clock, kind, stamp
+
+
+class EmulateTest(CommandTest):
+    def setUp(self):
+        self.processes = []
+
+    def tearDown(self):
+        for process in self.processes:
+            process.kill()
+            process.communicate()
+
+    def emulate(self, *arguments, address=ADDRESS, code=CODE):
+        process = subprocess.Popen(
+            [COMMAND, "emulate", "--interface", address, "--serial", code, "--json", *map(str, arguments)],
+            cwd=self.folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        self.processes.append(process)
+        return process
+
+    def truth(self, process):
+        """What an emulator says at its end."""
+        process.send_signal(signal.SIGTERM)
+        out, err = process.communicate(timeout=20)
+        self.processes.remove(process)
+        self.assertEqual(process.returncode, 0, err)
+        schemas.check_output(("emulate",), out)
+        return json.loads(out)["sensors"][0]
+
+    def host(self):
+        host = Host()
+        self.addCleanup(host.close)
+        return host
+
+    def record(self, name, *arguments):
+        result = self.expect_json(0, "record", "-o", name, "--interface", "127.0.0.32", *arguments)
+        info = self.expect_json(0, "info", name)
+        self.assertEqual(info["observations"], sum(one["rows"] for one in result["sensors"]))
+        return result["sensors"]
+
+    def test_known_frames_over_the_network(self):
+        self.emulate(code="0TFDG3B006H2Z11")
+        host = self.host()
+        kind, broadcast = host.find("0TFDG3B006H2Z11")
+        self.assertEqual(kind, 1)
+        self.assertEqual(broadcast.hex(), "aa012200020000597e0000"
+                         "3054464447334230303648325a31310001000034ab3f89")
+        self.assertEqual(host.shake_hands(), b"\0")
+        for asked, answered in (
+                ("aa010f0000000004d7000338ba8d0c", "00010000000000"),  # heartbeat
+                ("aa010f0000000004d70002ae8a8a7b", "0003080000"),      # device info
+                ("aa011000000000b809000501" "63bc481e", "00"),         # spherical
+                ("aa011000000000b809000500" "f58c4f69", "00"),         # Cartesian
+                ("aa011000000000b809000401" "228d5307", "00"),         # start
+                ("aa011000000000b809000400" "b4bd5470", "00"),         # stop
+                ("aa0117000000006439010a14090a1100e9a435d0337994", "01"),  # UTC: it has its own clock
+                ("aa010f0000000004d70006b74ee77c", "00")):             # disconnect
+            host.commands.sendto(bytes.fromhex(asked), host.sensor)
+            host.commands.settimeout(2)
+            reply = parse(host.commands.recvfrom(2048)[0])
+            self.assertEqual(reply, (1, 0, int(asked[18:20], 16), int(asked[20:22], 16),
+                                     bytes.fromhex(answered)), asked)
+
+    def test_every_data_type_at_its_rate(self):
+        for sensor, device_type, modes in (("mid-40", 1, (None,)), ("mid-70", 6, (0, 2)),
+                                           ("horizon", 3, (0, 2)), ("tele-15", 2, (1,)), ("avia", 7, (0, 2, 3))):
+            process = self.emulate("--sensor", sensor)
+            host = self.host()
+            self.assertEqual(host.find(CODE)[0], device_type)
+            self.assertEqual(host.shake_hands(kind=1), b"\0")  # as the maker's SDK has it
+            for mode in modes:
+                for spherical in (0, 1):
+                    expected = spherical if device_type == 1 else spherical + {0: 2, 1: 2, 2: 4, 3: 7}[mode]
+                    with self.subTest(sensor=sensor, data_type=expected):
+                        if mode is not None:
+                            self.assertEqual(host.ask(1, 6, bytes([mode])), b"\0")
+                        self.assertEqual(host.ask(0, 5, bytes([spherical])), b"\0")
+                        self.assertEqual(host.ask(0, 4, b"\1"), b"\0")
+                        packets = host.receive(0.25)
+                        self.assertEqual(host.ask(0, 4, b"\0"), b"\0")
+                        packets += host.receive(0)
+                        records, size, slow, fast = TYPES[expected]
+                        step = slow if device_type in (1, 6) else fast
+                        self.assertGreater(len(packets), 0.2e9 / step)
+                        self.assertEqual({len(one) for one in packets}, {18 + records * size})
+                        self.assertEqual({header(one)[:5] for one in packets}, {(5, 1, 1, 0, expected)})
+                        times = [header(one)[5] for one in packets]
+                        self.assertEqual(times, list(range(times[0], times[-1] + 1, step)))
+            self.assertEqual(host.ask(0, 6), b"\0")
+            host.close()
+            self.assertEqual(self.truth(process)["sessions"], 1)
+
+    def test_points_lie_on_the_walls_of_the_scene(self):
+        self.expect(0, "simulate", "-o", "room.lvx", "--scene", os.path.join(
+            os.environ["RISLEY_SOURCE_DIR"], "data/room.yaml"), "--duration-s", 0.1)
+        self.emulate("--scene", os.path.join(os.environ["RISLEY_SOURCE_DIR"], "data/room.yaml"))
+        host = self.host()
+        host.find(CODE)
+        host.shake_hands(with_imu_port=False)  # as early clients do
+        host.ask(0, 5, b"\1")
+        host.ask(0, 4, b"\1")
+        packets = host.receive(0.3)
+        rows = b"".join(one[18:] for one in packets)[:9 * 10_000]
+        simulated = (self.folder / "room.lvx").read_bytes()
+        # The same seed makes the same shots; the simulation rounds them as the packets do.
+        told = b"".join(simulated[at + 18:at + 918] for at in self.package_places(simulated))
+        self.assertEqual(rows, told)
+
+    @staticmethod
+    def package_places(data):
+        at, places = 29 + 59 * data[28], []
+        while at < len(data):
+            following = struct.unpack_from("<Q", data, at + 8)[0]
+            places += range(at + 25, following, 919)
+            at = following
+        return places
+
+    def test_inertial_samples(self):
+        self.emulate("--sensor", "avia")
+        host = self.host()
+        host.find(CODE)
+        host.shake_hands()
+        self.assertEqual(host.ask(1, 8, b"\1"), b"\0")
+        host.ask(0, 4, b"\1")
+        samples = [one for one in host.receive(0.5) if header(one)[4] == 6]
+        self.assertGreater(len(samples), 80)
+        times = [header(one)[5] for one in samples]
+        self.assertEqual(times, list(range(times[0], times[-1] + 1, 5_000_000)))
+        self.assertEqual(struct.unpack("<6f", samples[0][18:]), (0, 0, 0, 0, 0, 1))
+
+    def test_strangers_and_junk(self):
+        process = self.emulate()
+        host = self.host()
+        host.find(CODE)
+        host.shake_hands()
+        host.ask(0, 4, b"\1")
+        stranger = bound("127.0.0.66", 0)
+        self.addCleanup(stranger.close)
+        sensor = (ADDRESS, SENSOR_PORT)
+        handshake = bytes((127, 0, 0, 66)) + struct.pack("<3H", 1, 2, 3)
+        before = self.memory(process)
+        for command_set, command, data in ((0, 4, b"\0"), (0, 6, b""), (0, 1, handshake), (0, 10, b"\0\0"), (0, 2, b"")):
+            stranger.sendto(frame(0, 1, command_set, command, data), sensor)
+        numbers = random.Random(1)
+        for i in range(30_000):
+            junk = numbers.randbytes(numbers.randrange(80))
+            if i % 3 == 0:
+                junk = frame(numbers.randrange(3), i, numbers.randrange(3), numbers.randrange(16), junk[:40])
+            stranger.sendto(junk, sensor)
+            if i % 10 == 0:  # from the host, and damaged
+                host.commands.sendto(frame(0, i & 0xFFFF, 0, 4, b"\0")[:-1] + b"\0", sensor)
+                time.sleep(0.0005)
+        self.assertGreater(len(host.receive(0.3)), 200)
+        stranger.settimeout(0.2)
+        with self.assertRaises(TimeoutError):
+            stranger.recvfrom(100)
+        self.assertLess(self.memory(process) - before, 4000)
+        truth = self.truth(process)
+        self.assertEqual(truth["sessions"], 1)
+        self.assertGreater(truth["rejected"] + truth["kernel_drops"], 30_000)
+
+    @staticmethod
+    def memory(process):
+        """kB."""
+        with open(f"/proc/{process.pid}/status", encoding="ascii") as status:
+            return int(next(line for line in status if line.startswith("VmRSS")).split()[1])
+
+    def test_a_host_that_is_gone_is_forgotten(self):
+        self.emulate()
+        host = self.host()
+        host.find(CODE)
+        host.shake_hands()
+        host.ask(0, 4, b"\1")
+        gone = time.monotonic()
+        with self.assertRaises(AssertionError):
+            host.find(CODE, 3)
+        host.find(CODE, 4)
+        self.assertGreater(time.monotonic() - gone, 4)
+
+    def check_counts(self, truth, recorded):
+        for name in ("rows", "packets", "imu_samples", "lost", "duplicates", "reordered"):
+            self.assertEqual(recorded[name], truth[name], name)
+        self.assertEqual((recorded["kernel_drops"], recorded["late"], truth["unsent"]), (0, 0, 0))
+
+    def test_record_counts_what_went_wrong(self):
+        for faults in ((), ("--loss", 0.01), ("--duplication", 0.02), ("--disorder", 0.05),
+                       ("--loss", 0.02, "--duplication", 0.02, "--disorder", 0.1, "--delay-ms", 30)):
+            with self.subTest(faults):
+                process = self.emulate(*faults, "--sensor", "avia", "--seed", 7)
+                recorded = self.record("faults.lvx", "--duration-s", 1.5, "--find-s", 1.2)[0]
+                truth = self.truth(process)
+                self.check_counts(truth, recorded)
+                self.assertEqual(truth["lost"] > 0, "--loss" in faults)
+                self.assertEqual(truth["duplicates"] > 0, "--duplication" in faults)
+                self.assertEqual(truth["reordered"] > 0, "--disorder" in faults)
+
+    def test_three_sensors_ten_times_faster(self):
+        speed = 3 if os.environ.get("RISLEY_SANITIZED") == "ON" else 10
+        processes = [self.emulate("--sensor", "mid-40", "--speed", speed, address=f"127.0.0.{50 + i}",
+                                  code=f"EMULATED000000{i}") for i in range(3)]
+        recorded = self.record("three.lvx", "--duration-s", 2)
+        self.assertEqual([one["serial"][-1] for one in recorded], ["0", "1", "2"])
+        for process, one in zip(processes, recorded):
+            self.check_counts(self.truth(process), one)
+            self.assertEqual(one["lost"], 0)
+
+    def test_wrong_checksums_are_survived(self):
+        process = self.emulate("--wrong-checksums", 0.3, "--seed", 3)
+        recorded = self.record("checksums.lvx", "--duration-s", 3, "--find-s", 4)[0]
+        truth = self.truth(process)
+        self.assertGreater(truth["wrong_checksums"], 0)
+        self.assertEqual(recorded["rows"], truth["rows"])
+        self.assertEqual(recorded["lost"], 0)
+
+    def test_a_heartbeat_that_dies_and_a_restart(self):
+        process = self.emulate("--heartbeat-dies-s", 1)
+        recorded = self.record("heart.lvx", "--duration-s", 10)[0]
+        truth = self.truth(process)
+        self.assertEqual((truth["sessions"], recorded["sessions"]), (2, 2))
+        self.assertEqual(recorded["rows"], truth["rows"])
+        process = self.emulate("--restart-s", 1, "--restart-takes-s", 1)
+        recorded = self.record("restart.lvx", "--duration-s", 7)[0]
+        truth = self.truth(process)
+        self.assertEqual((truth["restarts"], recorded["sessions"], recorded["clock_jumps"]), (1, 2, 1))
+        self.assertEqual((recorded["rows"], recorded["lost"]), (truth["rows"], 0))
+        self.assertEqual([gap["lost"] for gap in recorded["gaps"]], [None])
+
+    def test_a_reboot_that_is_commanded(self):
+        process = self.emulate("--restart-takes-s", 0.5)
+        host = self.host()
+        host.find(CODE)
+        host.shake_hands()
+        self.assertEqual(host.ask(0, 10, b"\0\0"), b"\0")
+        self.assertIsNone(host.ask(0, 2, seconds=0.3))
+        host.find(CODE, 3)
+        self.assertEqual(self.truth(process)["restarts"], 1)
+
+
+if __name__ == "__main__":
+    unittest.main()

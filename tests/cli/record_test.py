@@ -1,0 +1,313 @@
+#!/usr/bin/env python3
+# SPDX-FileCopyrightText: 2026 The risley authors
+# SPDX-License-Identifier: MIT
+"""Recording from the network: against a sensor that knows nothing of risley, on loopback."""
+import json
+import signal
+import struct
+import subprocess
+import sys
+import time
+import unittest
+
+from command import COMMAND, CommandTest
+from livox_peer import AVIA, HORIZON, MID_40, MID_70, SENSOR_PORT, TYPES, Sensor, bound, frame, packet
+
+HOST = "127.0.0.1"
+
+
+def lvx_packets(data):
+    """Device index and bytes of every packet of an LVX 1.1 file, and its device table."""
+    assert data[:10] == b"livox_tech" and data[16:20] == b"\1\1\0\0"
+    count, at, packets = data[28], 29, []
+    devices = []
+    for _ in range(count):
+        devices.append((data[at:at + 16].rstrip(b"\0").decode(), data[at + 32], data[at + 33]))
+        at += 59
+    index = 0
+    while at < len(data):
+        current, following, number = struct.unpack_from("<QQQ", data, at)
+        assert current == at and following <= len(data) and number == index
+        at, index = at + 24, index + 1
+        while at < following:
+            records, size, _, _ = TYPES[data[at + 10]]
+            length = 18 + records * size
+            packets.append((data[at], data[at + 1:at + 1 + length]))
+            at += 1 + length
+    return devices, packets
+
+
+class RecordTest(CommandTest):
+    def setUp(self):
+        self.sensors = []
+
+    def tearDown(self):
+        for sensor in self.sensors:
+            sensor.stop()
+
+    def sensor(self, *arguments, **faults):
+        self.sensors.append(Sensor(*arguments, **faults))
+        return self.sensors[-1]
+
+    def start(self, *arguments):
+        return subprocess.Popen([COMMAND, "record", "--interface", HOST, *map(str, arguments)],
+                                cwd=self.folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+    def wait_for(self, what, seconds=10):
+        end = time.monotonic() + seconds
+        while not what():
+            self.assertLess(time.monotonic(), end, "it did not happen")
+            time.sleep(0.02)
+
+    def end(self, process, status=0):
+        out, err = process.communicate(timeout=20)
+        self.assertEqual(process.returncode, status, out + err)
+        return out, err
+
+    def packets(self, name):
+        return lvx_packets((self.folder / name).read_bytes())
+
+    def times(self, name, device=0):
+        return [struct.unpack_from("<Q", data, 10)[0] for index, data in self.packets(name)[1]
+                if index == device and data[9] != 6]
+
+    def record(self, name, *arguments, status=0):
+        out, _ = self.end(self.start("-o", name, "--json", *arguments), status)
+        return json.loads(out)
+
+    def test_list_shows_what_is_there_and_disturbs_nobody(self):
+        one = self.sensor("127.0.0.11", "PEER00000000011", MID_40)
+        other = self.sensor("127.0.0.12", "PEER00000000021", AVIA)
+        found = self.expect_json(0, "record", "--list", "--interface", HOST)
+        self.assertEqual(found["sensors"],
+                         [{"serial": "PEER00000000011", "sensor": "Livox Mid-40", "address": "127.0.0.11"},
+                          {"serial": "PEER00000000021", "sensor": "Livox Avia", "address": "127.0.0.12"}])
+        self.assertEqual((one.heard, other.heard), ([], []))
+
+    def test_every_packet_of_several_sensors(self):
+        mid, avia = self.sensor(), self.sensor("127.0.0.12", "3JEDPEERX000021", AVIA)
+        result = self.record("two.lvx", "--duration-s", 2)
+        self.assertEqual([one["serial"] for one in result["sensors"]], [mid.code, avia.code])
+        devices, packets = self.packets("two.lvx")
+        self.assertEqual(devices, [(mid.code, 0, MID_40), (avia.code, 1, AVIA)])
+        for index, sensor in enumerate((mid, avia)):
+            told = result["sensors"][index]
+            self.assertEqual(self.times("two.lvx", index), sensor.times)
+            self.assertEqual(told["packets"], len(sensor.times))
+            self.assertEqual((told["lost"], told["kernel_drops"], told["rejected"]), (0, 0, 0))
+            self.assertEqual(told["firmware"], "03.08.0000")
+            self.assertEqual(sensor.spherical, 1)
+            self.assertIn((0, 6), sensor.heard)
+        rows = sum(one["rows"] for one in result["sensors"])
+        info = self.expect_json(0, "info", "two.lvx")
+        self.assertEqual(info["observations"], rows)
+        self.assertGreater(rows, 600_000)
+        # The bytes are those that came.
+        first = [data for index, data in packets if index == 0][7]
+        self.assertEqual(first, packet(1, mid.first_ns + 7_000_000, 7))
+
+    def test_loss_duplicates_and_disorder_are_counted(self):
+        sensor = self.sensor(loss=0.01, duplication=0.01, disorder=0.05)
+        result = self.record("lossy.lvx", "--duration-s", 3)["sensors"][0]
+        self.assertGreater(sensor.lost, 10)
+        self.assertEqual(result["lost"], sensor.lost)
+        self.assertEqual(self.times("lossy.lvx"), sensor.times)
+        self.assertEqual(result["duplicates"], sensor.sent - len(sensor.times))
+        self.assertGreater(result["reordered"], 0)
+        self.assertEqual(result["rows"], 100 * len(sensor.times))
+
+    def test_coordinates_and_return_modes(self):
+        for sensor_type, options, data_type in (
+                (MID_40, ("--coordinates", "cartesian"), 0),
+                (MID_70, ("--return-mode", "first"), 3),
+                (MID_70, ("--coordinates", "cartesian", "--return-mode", "strongest"), 2),
+                (HORIZON, ("--coordinates", "cartesian", "--return-mode", "dual"), 4),
+                (AVIA, ("--return-mode", "dual"), 5),
+                (AVIA, ("--return-mode", "triple"), 8),
+                (AVIA, ("--coordinates", "cartesian", "--return-mode", "triple"), 7)):
+            with self.subTest(data_type):
+                sensor = self.sensor(device_type=sensor_type)
+                name = f"type{data_type}.lvx"
+                result = self.record(name, "--duration-s", 0.3, *options, "--find-s", 1.2)["sensors"][0]
+                self.assertEqual({data[9] for _, data in self.packets(name)[1]}, {data_type})
+                self.assertEqual(self.times(name), sensor.times)
+                self.assertEqual(result["lost"], 0)
+                self.assertEqual(result["rows"], self.expect_json(0, "info", name)["observations"])
+                self.sensors.pop().stop()
+
+    def test_a_signal_is_the_clean_end(self):
+        for sent in (signal.SIGINT, signal.SIGTERM):
+            sensor = self.sensor()
+            process = self.start("-o", "signal.lvx", "--json")
+            self.wait_for(lambda: len(sensor.times) > 500)
+            process.send_signal(sent)
+            out, _ = self.end(process)
+            self.assertEqual(json.loads(out)["sensors"][0]["rows"], 100 * len(sensor.times))
+            self.assertEqual(self.times("signal.lvx"), sensor.times)
+            self.assertIn((0, 6), sensor.heard)
+            self.assertFalse((self.folder / "signal.lvx.unfinished").exists())
+            self.sensors.pop().stop()
+
+    def test_strangers_never_reach_the_file(self):
+        sensor = self.sensor()
+        process = self.start("-o", "strange.lvx", "--json", "--serial", sensor.code)
+        self.wait_for(lambda: sensor.sampling)
+        stranger = bound("127.0.0.66", SENSOR_PORT)
+        data_to, command_to = (HOST, sensor.host[1]), (HOST, sensor.host[2])
+        for i in range(200):
+            stranger.sendto(packet(1, 1_000_000 * i, i), data_to)
+            stranger.sendto(frame(1, i, 0, 6, b"\0"), command_to)
+            stranger.sendto(frame(2, i, 0, 0, b"PEER00000000661\0\1\0\0"), (HOST, 55000))
+        # From the sensor's own address, but no packets.
+        for junk in (b"", b"x", packet(1, 0, 0)[:-1], packet(1, 0, 0) + b"x", bytes(918), bytes(60000)):
+            sensor.socket.sendto(junk, data_to)
+        self.wait_for(lambda: len(sensor.times) > 300)
+        process.send_signal(signal.SIGINT)
+        result = json.loads(self.end(process)[0])["sensors"][0]
+        self.assertEqual(result["rejected"], 406)
+        self.assertEqual(result["lost"], 0)
+        self.assertEqual(self.times("strange.lvx"), sensor.times)
+        self.assertEqual(self.packets("strange.lvx")[0], [(sensor.code, 0, MID_40)])
+        stranger.close()
+
+    def test_a_killed_recording_can_be_read(self):
+        sensor = self.sensor()
+        process = self.start("-o", "killed.lvx")
+        self.wait_for(lambda: len(sensor.times) > 1000)
+        process.kill()
+        process.communicate()
+        self.assertFalse((self.folder / "killed.lvx").exists())
+        times = self.times("killed.lvx.unfinished")
+        self.assertGreater(len(times), 600)
+        self.assertEqual(times, sensor.times[:len(times)])
+        info = self.expect_json(0, "info", "killed.lvx.unfinished")
+        self.assertEqual(info["observations"], 100 * len(times))
+        # Nobody writes over it; the next one is told so before it disturbs a sensor.
+        self.wait_for(lambda: sensor.host is None)
+        failed = self.expect_json(3, "record", "-o", "killed.lvx", "--interface", HOST)
+        self.assertIn("killed.lvx.unfinished", failed["error"])
+        self.assertEqual(self.times("killed.lvx.unfinished"), times)
+
+    def test_a_sensor_that_dies_and_comes_back(self):
+        sensor = self.sensor()
+        process = self.start("-o", "gap.lvx", "--json")
+        self.wait_for(lambda: len(sensor.times) > 500)
+        self.sensors.pop().stop()
+        before = sensor.times
+        died = time.monotonic()
+        line = process.stderr.readline()
+        self.assertLess(time.monotonic() - died, 3)
+        self.assertIn("no data for 1 s", line)
+        self.assertIn("lost", process.stderr.readline())
+        again = self.sensor(first_ns=1_000_000)
+        self.wait_for(lambda: len(again.times) > 500)
+        process.send_signal(signal.SIGINT)
+        out, err = self.end(process)
+        self.assertIn("data come again", err)
+        result = json.loads(out)["sensors"][0]
+        times = self.times("gap.lvx")
+        self.assertEqual(times[-len(again.times):], again.times)
+        # It may have died with packets in its hands.
+        self.assertEqual(times[:len(times) - len(again.times)], before[:len(times) - len(again.times)])
+        self.assertEqual((result["sessions"], result["clock_jumps"], result["lost"]), (2, 1, 0))
+        self.assertEqual(len(result["gaps"]), 1)
+        gap = result["gaps"][0]
+        self.assertIsNone(gap["lost"])
+        self.assertTrue(1 < gap["end_s"] - gap["begin_s"] < 8, gap)
+
+    def test_a_sensor_that_is_silent_for_a_while(self):
+        sensor = self.sensor()
+        process = self.start("-o", "pause.lvx", "--json")
+        self.wait_for(lambda: len(sensor.times) > 500)
+        sensor.loss = 1.0
+        time.sleep(2)
+        sensor.loss = 0.0
+        count = len(sensor.times)
+        self.wait_for(lambda: len(sensor.times) > count + 500)
+        process.send_signal(signal.SIGINT)
+        out, err = self.end(process)
+        self.assertIn("no data for 1 s", err)
+        result = json.loads(out)["sensors"][0]
+        self.assertEqual(result["lost"], sensor.lost)
+        self.assertEqual([gap["lost"] for gap in result["gaps"]], [sensor.lost])
+        self.assertEqual(result["sessions"], 1)
+
+    def test_a_real_interface_that_goes_down(self):
+        """Two namespaces with a cable between them, which is pulled for a while."""
+        script = """set -e
+            mount -t tmpfs none /run; mkdir /run/netns; ip netns add sensor
+            ip link add host type veth peer name there netns sensor
+            ip link add other type veth peer name nobody
+            ip addr add 192.168.1.5/24 dev host; ip addr add 10.9.9.1/24 brd + dev other
+            ip netns exec sensor ip addr add 192.168.1.41/24 dev there
+            ip netns exec sensor ip link set there up
+            for one in lo host other nobody; do ip link set $one up; done
+            echo ready
+            ip netns exec sensor "$0" emulate --interface 192.168.1.41 --sensor avia --duration-s 20 \
+              --json > emulated.json &
+            "$0" record --list --interface 10.9.9.1 --json > elsewhere.json
+            (sleep 4.5; ip link set host down; sleep 4; ip link set host up) &
+            "$0" record --interface 192.168.1.5 -o cable.lvx --duration-s 11 --json 2> cable.txt
+            wait"""
+        done = subprocess.run(["unshare", "-rnm", "bash", "-c", script, COMMAND], cwd=self.folder, text=True,
+                              capture_output=True, timeout=120, check=False)
+        if not done.stdout.startswith("ready"):
+            print(f"SKIPPED: namespaces cannot be made: {done.stderr}", file=sys.stderr)
+            self.skipTest("namespaces")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual(json.loads((self.folder / "elsewhere.json").read_text())["sensors"], [])
+        result = json.loads(done.stdout.removeprefix("ready"))["sensors"][0]
+        truth = json.loads((self.folder / "emulated.json").read_text())["sensors"][0]
+        # Between its sessions the sensor sends nothing for some ms, which looks the same.
+        silent = result["packets"] + result["lost"] - truth["packets"]
+        self.assertTrue(0 <= silent < 200, silent)
+        self.assertEqual({gap["data"] for gap in result["gaps"]}, {"points", "imu"})
+        self.assertTrue(0 <= result["lost"] - sum(gap["lost"] for gap in result["gaps"]) < 200)
+        for gap in result["gaps"]:
+            self.assertTrue(3.5 < gap["end_s"] - gap["begin_s"] < 8, gap)
+        self.assertIn("no data for 1 s", (self.folder / "cable.txt").read_text())
+
+    def test_passive_listens_and_sends_nothing(self):
+        sender, other = bound("127.0.0.21", 0), bound("127.0.0.22", 0)
+        process = self.start("-o", "passive.lvx", "--json", "--passive", "--find-s", 1, "--data-port",
+                             56101, "--duration-s", 1)
+        number = 0
+        while process.poll() is None:
+            sender.sendto(packet(1, number * 1_000_000, number), (HOST, 56101))
+            other.sendto(packet(3, number * 960_000, number), (HOST, 56101))
+            number += 1
+            time.sleep(0.001)
+        result = json.loads(self.end(process)[0])
+        self.assertEqual([(one["serial"], one["sensor"], one["lost"]) for one in result["sensors"]],
+                         [("127.0.0.21", "Livox Mid-40", 0), ("127.0.0.22", "Livox Mid-70", 0)])
+        for index, step in enumerate((1_000_000, 960_000)):
+            times = self.times("passive.lvx", index)
+            self.assertGreater(len(times), 300)
+            self.assertEqual(times, list(range(times[0], times[-1] + 1, step)))
+        for one in (sender, other):
+            one.setblocking(False)
+            with self.assertRaises(BlockingIOError):
+                one.recv(100)
+            one.close()
+
+    def test_nobody_is_there(self):
+        failed = self.expect_json(3, "record", "-o", "nobody.lvx", "--interface", HOST, "--find-s", 0.3)
+        self.assertIn("no sensor was heard", failed["error"])
+        self.assertIn("127.0.0.1:55000", failed["error"])
+        self.sensor()
+        failed = self.expect_json(3, "record", "-o", "nobody.lvx", "--interface", HOST, "--find-s", 1.2,
+                                  "--serial", "PEER00000000991")
+        self.assertIn("PEER00000000991", failed["error"])
+        self.assertEqual(self.expect_json(0, "record", "--list", "--interface", "127.0.0.2", "--find-s",
+                                          0.1)["sensors"], [])
+        self.assertFalse((self.folder / "nobody.lvx.unfinished").exists())
+
+    def test_another_program_has_the_port(self):
+        other = bound(HOST, 55000)
+        failed = self.expect_json(3, "record", "--list", "--interface", HOST)
+        self.assertIn("127.0.0.1:55000: Address already in use: another program", failed["error"])
+        other.close()
+
+
+if __name__ == "__main__":
+    unittest.main()
