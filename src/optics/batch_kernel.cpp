@@ -68,21 +68,6 @@ class Block {
   std::size_t begin_, count_;
 };
 
-/// Face orders as the templates want them, without a std::array function of FaceOrder.
-template <int N>
-std::array<FaceOrder, N> face_orders(const FaceOrder* order) {
-  std::array<FaceOrder, N> result;
-  __builtin_memcpy(&result, order, sizeof(result));
-  return result;
-}
-
-template <int N>
-std::array<Batch, parameter_count(N)> parameter_batches(const BatchArguments& a) {
-  std::array<Batch, parameter_count(N)> result;
-  for (std::size_t i = 0; i < parameter_count(N); ++i) result[i] = Batch(a.parameters[i]);
-  return result;
-}
-
 /// Blocks of shots on their way through a train, step by step.
 template <int N>
 class Directions {
@@ -90,7 +75,7 @@ class Directions {
   explicit Directions(const BatchArguments& a)
       : a_(a),
         emitters_(a.parameters, a.emitters, a.beam),
-        train_(prepare<Batch, N>(parameter_batches<N>(a), face_orders<N>(a.face_order))) {
+        train_(prepared_train<Batch, N>(a.parameters, a.face_order)) {
     for (std::size_t i = 0; i < 2 * N; ++i) {
       face_position_[i] = Batch(a.face_position ? a.face_position[i] : 0.0);
     }
@@ -191,12 +176,10 @@ class Linearisations {
   explicit Linearisations(const BatchArguments& a)
       : a_(a),
         emitters_(a.parameters, a.emitters, a.beam),
-        train_(prepare<Batch, N>(parameter_batches<N>(a), face_orders<N>(a.face_order))),
-        derivatives_(
-            prepare_derivatives<Batch, N>(parameter_batches<N>(a), face_orders<N>(a.face_order))) {
-    leave_out(derivatives_,
-              [&a](int place) { return a.d_azimuth[place] != nullptr || a.d_zenith[place]; });
-  }
+        train_(prepared_train<Batch, N>(a.parameters, a.face_order)),
+        derivatives_(prepared_derivatives<Batch, N>(a.parameters, a.face_order, [&a](int place) {
+          return a.d_azimuth[place] || a.d_zenith[place];
+        })) {}
 
   /// @return shots that are not valid
   [[gnu::flatten]] std::size_t compute(const Block& block) {

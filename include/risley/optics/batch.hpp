@@ -23,8 +23,8 @@ struct DirectionColumns {
 };
 
 /// Where many shots of one train point. A shot that does not get through is NaN in every column.
-/// @param rotation_angles  one column per prism in beam order, rad, all of the same length. The
-///                         sines are most accurate below a few thousand turns: pass wrapped angles
+/// @param rotation_angles  one column per prism in beam order, rad, all of the same length. Of any
+///                         number of turns; a batch with an angle beyond 1e6 rad takes longer
 /// @param beam             number of the emitter of every shot, counted from 0; empty: all the
 ///                         first
 /// @param set              instruction set, for tests and benchmarks; default the best available
