@@ -307,7 +307,7 @@ void accumulate(benchmark::State& state, InstructionSet set) {
   const std::size_t shots = data.series.size();
   std::vector<double> azimuth(shots), zenith(shots);
   std::vector<unsigned char> outlier(shots);
-  const estimation::ShotWeights weights{kAngleNoise, 0.0, 20.0};
+  const estimation::ShotWeights weights{estimation::equal_noise(kAngleNoise), 0.0, 20.0};
   estimation::NormalEquations equations;
   for (auto _ : state) {
     estimation::accumulate(answer.series, answer.trajectory, answer.train, answer.free, weights,

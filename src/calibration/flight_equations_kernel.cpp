@@ -6,13 +6,12 @@
 #include <array>
 
 #include "risley/calibration/shot_pose.hpp"
+#include "risley/core/column_products.hpp"
 #include "risley/core/matrix3.hpp"
 #include "risley/core/simd.hpp"
 #include "risley/optics/beam_origin.hpp"
 #include "risley/optics/emitter_lanes.hpp"
 #include "risley/optics/observation_adjoint.hpp"
-
-#include "calibration/column_products.hpp"
 
 namespace risley::calibration::RISLEY_KERNEL_NAMESPACE {
 namespace {
@@ -99,12 +98,9 @@ struct FlightConstants {
         turn_before(broadcast(a.corrections[0] + 3)),
         turn_change(broadcast(a.corrections[1] + 3) - turn_before),
         main(static_cast<std::size_t>(a.global_count()) + 2 * kKnot + 1) {
-    std::array<Batch, parameter_count(N)> parameters;
-    for (std::size_t i = 0; i < parameter_count(N); ++i) parameters[i] = Batch(a.parameters[i]);
-    std::array<FaceOrder, N> order;
-    __builtin_memcpy(&order, a.face_order, sizeof(order));
-    train = prepare<Batch, N>(parameters, order);
-    derivatives = prepare_derivatives<Batch, N>(parameters, order);
+    train = prepared_train<Batch, N>(a.parameters, a.face_order);
+    derivatives = prepare_derivatives<Batch, N>(parameter_batches<Batch, N>(a.parameters),
+                                                face_orders<Batch, N>(a.face_order));
     for (std::size_t i = 0; i < 2 * N; ++i) face_position[i] = Batch(a.face_position[i]);
     body_from_sensor = Matrix::from_columns(a.body_from_sensor);
   }

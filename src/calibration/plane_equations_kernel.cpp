@@ -5,12 +5,11 @@
 
 #include <array>
 
+#include "risley/core/column_products.hpp"
 #include "risley/core/simd.hpp"
 #include "risley/optics/beam_origin.hpp"
 #include "risley/optics/emitter_lanes.hpp"
 #include "risley/optics/observation_adjoint.hpp"
-
-#include "calibration/column_products.hpp"
 
 namespace risley::calibration::RISLEY_KERNEL_NAMESPACE {
 namespace {
@@ -70,12 +69,13 @@ struct Constants {
         distance(a.distance),
         range_offset(a.range_offset),
         range_variance(a.range_variance) {
-    std::array<Batch, parameter_count(N)> parameters;
-    for (std::size_t i = 0; i < parameter_count(N); ++i) parameters[i] = Batch(a.parameters[i]);
-    std::array<FaceOrder, N> order;
-    __builtin_memcpy(&order, a.face_order, sizeof(order));
-    train = prepare<Batch, N>(parameters, order);
-    derivatives = prepare_derivatives<Batch, N>(parameters, order);
+    train = prepared_train<Batch, N>(a.parameters, a.face_order);
+    derivatives = prepared_derivatives<Batch, N>(a.parameters, a.face_order, [&a](int place) {
+      for (int i = 0; i < a.place_count; ++i) {
+        if (a.places[i] == place) return true;
+      }
+      return false;
+    });
     for (std::size_t i = 0; i < 2 * N; ++i) face_position[i] = Batch(a.face_position[i]);
   }
 
@@ -145,66 +145,122 @@ struct BlockResiduals {
   alignas(64) double variance[kBlock];
 };
 
-/// One group of shots, a lane each: writes its row.
-/// @return lanes that are lost
+/// The groups of a block on their way to the plane and back, which take each step of the model
+/// together: see AngleLinearisations.
 template <int N>
-std::size_t fill_row(const PlaneArguments& a, const Constants<N>& c, const Block<N>& block,
-                     std::size_t group, Batch* row, BlockResiduals& residuals) {
-  const Batch zero(0.0), one(1.0);
-  std::array<Batch, N> angles;
-  for (std::size_t k = 0; k < N; ++k) angles[k] = block.rotation_angle(k, group);
-  const auto forward = trace_forward(c.train, angles);
-  const Vector3<Batch>& direction = forward.direction();
-  const Vector3<Batch> origin = beam_origin(forward, c.face_position);
-  const Batch approach = dot(c.normal, direction);
-  const Batch over_approach = one / approach;
-  const Batch range = (c.distance - dot(c.normal, origin)) * over_approach;
-  Batch residual = block.range(group) - c.range_offset - range;
-
-  const std::array<Vector3<Batch>, 1> seeds{-range * over_approach * c.normal};
-  const auto gradients = trace_adjoint(c.train, c.derivatives, forward, seeds);
-  const Gradient<Batch, N>& gradient = gradients[0];
-  Batch variance = c.range_variance;
-  std::size_t pair = 0;
-  for (std::size_t k = 0; k < N; ++k) {
-    Batch sum = gradient.rotation_angles[k] * block.covariance(pair++, group);
-    for (std::size_t l = k + 1; l < N; ++l) {
-      const Batch twice = gradient.rotation_angles[l] + gradient.rotation_angles[l];
-      sum = xsimd::fma(twice, block.covariance(pair++, group), sum);
+class Walks {
+ public:
+  /// Writes the rows of all groups.
+  /// @param first  shot of the call's columns
+  /// @return lanes that are lost
+  [[gnu::flatten]] std::size_t fill_rows(const PlaneArguments& a, Constants<N>& c,
+                                         const Block<N>& block, std::size_t first,
+                                         Products<N>& products, BlockResiduals& residuals) {
+    const std::size_t groups = block.groups();
+    for (std::size_t g = 0; g < groups; ++g) {
+      c.turn_to(first + g * kLanes, a.end);
+      trace_[g].beam[0] = c.train.incident;
     }
-    variance = xsimd::fma(gradient.rotation_angles[k], sum, variance);
+    for (std::size_t k = 0; k < N; ++k) {
+      for (std::size_t g = 0; g < groups; ++g) {
+        turn_prism(block.rotation_angle(k, g), k, trace_[g]);
+      }
+    }
+#pragma GCC unroll 4  // gcc 12 keeps batches in registers only where indices are constants
+    for (std::size_t k = 0; k < N; ++k) {
+      for (std::size_t g = 0; g < groups; ++g) {
+        pass_prism(c.train, k, trace_[g]);
+        set_inside(c.train, k, trace_[g]);
+      }
+    }
+    for (std::size_t g = 0; g < groups; ++g) meet_plane(c, g);
+#pragma GCC unroll 4
+    for (std::size_t k = 0; k < N; ++k) {
+      for (std::size_t g = 0; g < groups; ++g) {
+        reverse_prism(c.train, c.derivatives, trace_[g], N - 1 - k, pass_[g]);
+      }
+    }
+    std::size_t lost = 0;
+    for (std::size_t g = 0; g < groups; ++g) {
+      c.turn_to(first + g * kLanes, a.end);
+      end_reverse(c.derivatives, pass_[g]);
+      lost += fill_row(a, c, block, g, products.row(g), residuals);
+    }
+    return lost;
   }
 
-  const Batch scale = one / xsimd::sqrt(variance);
-  Batch storage[EmitterLanes<Batch, N>::kPlaces];
-  const Batch* by_place = c.emitters.by_place(gradient, storage);
-  Batch* column = row;
-  for (int i = 0; i < a.place_count; ++i) *column++ = scale * by_place[a.places[i]];
-  for (std::size_t k = 0; k < N; ++k) *column++ = scale * gradient.rotation_angles[k];
-  *column++ = scale;
-  const Batch slope = scale * over_approach;
-  const Vector3<Batch> point = origin + range * direction;
-  *column++ = -slope * dot(c.tangent_1, point);
-  *column++ = -slope * dot(c.tangent_2, point);
-  *column++ = slope;
-  *column++ = scale * residual;
+ private:
+  struct Meeting {
+    Vector3<Batch> origin;
+    Batch approach, over_approach, range;
+  };
 
-  // Comparison with NaN is false: so is what a beam that does not get through leads to.
-  const Lanes good = (approach > Batch(kLeastApproach)) & (range > zero) &
-                     (xsimd::abs(residual) <= Batch(kLargest)) & (variance > zero) &
-                     (variance <= Batch(kLargest));
-  std::size_t lost = 0;
-  if (!xsimd::all(good)) {
-    for (Batch* entry = row; entry != column; ++entry) *entry = xsimd::select(good, *entry, zero);
-    const Batch nan(__builtin_nan(""));
-    residual = xsimd::select(good, residual, nan);
-    variance = xsimd::select(good, variance, nan);
-    lost = static_cast<std::size_t>(sum_of_lanes(xsimd::select(good, zero, one)));
+  /// Where the beams of a group meet the plane, and how that depends on their directions.
+  void meet_plane(const Constants<N>& c, std::size_t g) {
+    const Vector3<Batch>& direction = trace_[g].direction();
+    Meeting& m = meeting_[g];
+    m.origin = beam_origin(trace_[g], c.face_position);
+    m.approach = dot(c.normal, direction);
+    m.over_approach = Batch(1.0) / m.approach;
+    m.range = (c.distance - dot(c.normal, m.origin)) * m.over_approach;
+    pass_[g] = begin_reverse<N>(
+        direction, std::array<Vector3<Batch>, 1>{-m.range * m.over_approach * c.normal});
   }
-  residual.store_aligned(residuals.residual + group * kLanes);
-  variance.store_aligned(residuals.variance + group * kLanes);
-  return lost;
-}
+
+  /// One group of shots, a lane each: writes its row.
+  /// @return lanes that are lost
+  std::size_t fill_row(const PlaneArguments& a, const Constants<N>& c, const Block<N>& block,
+                       std::size_t group, Batch* row, BlockResiduals& residuals) const {
+    const Batch zero(0.0), one(1.0);
+    const Meeting& m = meeting_[group];
+    Batch residual = block.range(group) - c.range_offset - m.range;
+    const Gradient<Batch, N>& gradient = pass_[group].gradients[0];
+    Batch variance = c.range_variance;
+    std::size_t pair = 0;
+    for (std::size_t k = 0; k < N; ++k) {
+      Batch sum = gradient.rotation_angles[k] * block.covariance(pair++, group);
+      for (std::size_t l = k + 1; l < N; ++l) {
+        const Batch twice = gradient.rotation_angles[l] + gradient.rotation_angles[l];
+        sum = xsimd::fma(twice, block.covariance(pair++, group), sum);
+      }
+      variance = xsimd::fma(gradient.rotation_angles[k], sum, variance);
+    }
+
+    const Batch scale = one / xsimd::sqrt(variance);
+    Batch storage[EmitterLanes<Batch, N>::kPlaces];
+    const Batch* by_place = c.emitters.by_place(gradient, storage);
+    Batch* column = row;
+    for (int i = 0; i < a.place_count; ++i) *column++ = scale * by_place[a.places[i]];
+    for (std::size_t k = 0; k < N; ++k) *column++ = scale * gradient.rotation_angles[k];
+    *column++ = scale;
+    const Batch slope = scale * m.over_approach;
+    const Vector3<Batch> point = m.origin + m.range * trace_[group].direction();
+    *column++ = -slope * dot(c.tangent_1, point);
+    *column++ = -slope * dot(c.tangent_2, point);
+    *column++ = slope;
+    *column++ = scale * residual;
+
+    // Comparison with NaN is false: so is what a beam that does not get through leads to.
+    const Lanes good = (m.approach > Batch(kLeastApproach)) & (m.range > zero) &
+                       (xsimd::abs(residual) <= Batch(kLargest)) & (variance > zero) &
+                       (variance <= Batch(kLargest));
+    std::size_t lost = 0;
+    if (!xsimd::all(good)) {
+      for (Batch* entry = row; entry != column; ++entry) *entry = xsimd::select(good, *entry, zero);
+      const Batch nan(__builtin_nan(""));
+      residual = xsimd::select(good, residual, nan);
+      variance = xsimd::select(good, variance, nan);
+      lost = static_cast<std::size_t>(sum_of_lanes(xsimd::select(good, zero, one)));
+    }
+    residual.store_aligned(residuals.residual + group * kLanes);
+    variance.store_aligned(residuals.variance + group * kLanes);
+    return lost;
+  }
+
+  Trace<Batch, N> trace_[kGroups];
+  Meeting meeting_[kGroups];
+  ReversePass<Batch, N, 1> pass_[kGroups];
+};
 
 template <int N>
 std::size_t accumulate_shots(const PlaneArguments& a) {
@@ -212,13 +268,11 @@ std::size_t accumulate_shots(const PlaneArguments& a) {
   Products<N> products(static_cast<std::size_t>(a.place_count) + N + 5);
   Block<N> block;
   BlockResiduals residuals;
+  Walks<N> walks;
   std::size_t lost = 0;
   for (std::size_t shot = a.begin; shot < a.end; shot += kBlock) {
     block.load(a, shot, a.end - shot < kBlock ? a.end - shot : kBlock);
-    for (std::size_t group = 0; group < block.groups(); ++group) {
-      constants.turn_to(shot + group * kLanes, a.end);
-      lost += fill_row(a, constants, block, group, products.row(group), residuals);
-    }
+    lost += walks.fill_rows(a, constants, block, shot, products, residuals);
     lost -= block.groups() * kLanes - block.shots();
     products.add(block.groups());
     for (std::size_t i = 0; a.residual && i < block.shots(); ++i) {

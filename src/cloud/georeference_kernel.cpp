@@ -171,8 +171,8 @@ void stand_shots(const StandArguments& a) {
   const Vector reference = broadcast_vector(a.reference),
                lever = broadcast_vector(a.poses.lever_arm);
   for_each_group(a.shots, [&](const Group& group) {
-    const auto [sine_azimuth, cosine_azimuth] = xsimd::sincos(group.load(a.azimuth));
-    const auto [sine_zenith, cosine_zenith] = xsimd::sincos(group.load(a.zenith));
+    const auto [sine_azimuth, cosine_azimuth] = sin_cos(group.load(a.azimuth));
+    const auto [sine_zenith, cosine_zenith] = sin_cos(group.load(a.zenith));
     const Batch range = group.load(a.range) - Batch(a.range_offset);
     const Batch across = range * sine_zenith;
     const Vector point{across * cosine_azimuth, across * sine_azimuth, range * cosine_zenith};

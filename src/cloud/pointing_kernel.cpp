@@ -302,7 +302,7 @@ class Kernel : public Points {
     for (std::size_t i = 0; i < kFaces; ++i) {
       const auto& face = believed_.faces[i];
       const Vector3<Batch> normal = face.normal.at(forward.sine[i / 2], forward.cosine[i / 2]);
-      beam = refract(beam, normal, face.index_ratio).direction;
+      beam = refract(beam, normal, face.index_ratio);
     }
     return beam;
   }

@@ -104,7 +104,7 @@ std::size_t linearise_batch(const PrismTrain& train,
     const auto expected = static_cast<std::size_t>(parameter_count(train.shape()) + train.prisms());
     require_length(name, columns.size(), expected);
     const std::string one = fmt::format("a column of {}", name);
-    for (const auto column : columns) pointers.push_back(call.column(one, column, true));
+    for (const auto column : columns) pointers.push_back(call.column(one, column, false));
     return pointers.data();
   };
   a.azimuth = call.column("azimuth", out.azimuth, true);

@@ -6,6 +6,7 @@
 #include <array>
 
 #include "risley/core/simd.hpp"
+#include "risley/optics/angle_linearisations.hpp"
 #include "risley/optics/beam_origin.hpp"
 #include "risley/optics/emitter_lanes.hpp"
 #include "risley/optics/observation_adjoint.hpp"
@@ -16,127 +17,231 @@ namespace {
 using Batch = xsimd::batch<double>;
 constexpr std::size_t kLanes = Batch::size;
 
-/// Lanes [shot, shot + kLanes) of a column; beyond its end the last value is repeated.
-Batch load(const double* column, std::size_t shot, std::size_t shots) {
-  if (shot + kLanes <= shots) return Batch::load_unaligned(column + shot);
-  alignas(64) double lanes[kLanes];
-  for (std::size_t i = 0; i < kLanes; ++i) {
-    lanes[i] = column[shot + i < shots ? shot + i : shots - 1];
+/// Groups of shots that take each step of the model together: see AngleLinearisations. 16 and 32
+/// are no faster. Functions of a block have to be `flatten`: a call within a step costs more than
+/// it.
+constexpr std::size_t kGroups = 8;
+constexpr std::size_t kBlock = kGroups * kLanes;
+
+/// The columns of one block of shots. The last one is filled up with copies of its last shot.
+class Block {
+ public:
+  Block(std::size_t begin, std::size_t shots)
+      : begin_(begin), count_(shots - begin < kBlock ? shots - begin : kBlock) {}
+
+  std::size_t begin() const { return begin_; }
+  std::size_t groups() const { return (count_ + kLanes - 1) / kLanes; }
+  std::size_t first_shot(std::size_t group) const { return begin_ + group * kLanes; }
+
+  Batch load(const double* column, std::size_t group) const {
+    const double* from = column + first_shot(group);
+    if (full(group)) return Batch::load_unaligned(from);
+    alignas(64) double lanes[kLanes];
+    for (std::size_t i = 0; i < kLanes; ++i) lanes[i] = from[i < rest() ? i : rest() - 1];
+    return Batch::load_aligned(lanes);
   }
-  return Batch::load_aligned(lanes);
-}
-
-void store(const Batch& value, double* column, std::size_t shot, std::size_t shots) {
-  if (shot + kLanes <= shots) {
-    value.store_unaligned(column + shot);
-    return;
-  }
-  alignas(64) double lanes[kLanes];
-  value.store_aligned(lanes);
-  for (std::size_t i = 0; shot + i < shots; ++i) column[shot + i] = lanes[i];
-}
-
-/// How many of the lanes that stand for a shot are NaN.
-std::size_t count_invalid(const Batch& value, std::size_t shot, std::size_t shots) {
-  alignas(64) double lanes[kLanes];
-  value.store_aligned(lanes);
-  std::size_t count = 0;
-  for (std::size_t i = 0; i < kLanes && shot + i < shots; ++i) count += lanes[i] != lanes[i];
-  return count;
-}
-
-template <int N>
-struct Inputs {
-  std::array<Batch, parameter_count(N)> parameters;
-  const BatchArguments& arguments;
-
-  explicit Inputs(const BatchArguments& a) : arguments(a) {
-    for (std::size_t i = 0; i < parameter_count(N); ++i) parameters[i] = Batch(a.parameters[i]);
-  }
-  std::array<Batch, N> angles(std::size_t shot) const {
-    std::array<Batch, N> result;
-    for (std::size_t i = 0; i < N; ++i) {
-      result[i] = load(arguments.rotation_angles[i], shot, arguments.shots);
+  void store(const Batch& value, double* column, std::size_t group) const {
+    double* to = column + first_shot(group);
+    if (full(group)) {
+      value.store_unaligned(to);
+      return;
     }
-    return result;
+    alignas(64) double lanes[kLanes];
+    value.store_aligned(lanes);
+    for (std::size_t i = 0; i < rest(); ++i) to[i] = lanes[i];
   }
+  /// How many shots of a group are NaN.
+  std::size_t count_invalid(const Batch& value, std::size_t group) const {
+    if (xsimd::all(value == value)) return 0;  // xsimd's != says no to two NaN
+    alignas(64) double lanes[kLanes];
+    value.store_aligned(lanes);
+    std::size_t count = 0;
+    const std::size_t shots = full(group) ? kLanes : rest();
+    for (std::size_t i = 0; i < shots; ++i) count += lanes[i] != lanes[i];
+    return count;
+  }
+
+ private:
+  bool full(std::size_t group) const { return (group + 1) * kLanes <= count_; }
+  std::size_t rest() const { return count_ % kLanes; }
+
+  std::size_t begin_, count_;
 };
 
-/// Face orders as the templates want them, without a std::array function of FaceOrder.
+/// Blocks of shots on their way through a train, step by step.
 template <int N>
-std::array<FaceOrder, N> face_orders(const FaceOrder* order) {
-  std::array<FaceOrder, N> result;
-  __builtin_memcpy(&result, order, sizeof(result));
-  return result;
-}
+class Directions {
+ public:
+  explicit Directions(const BatchArguments& a)
+      : a_(a),
+        emitters_(a.parameters, a.emitters, a.beam),
+        train_(prepared_train<Batch, N>(a.parameters, a.face_order)) {
+    for (std::size_t i = 0; i < 2 * N; ++i) {
+      face_position_[i] = Batch(a.face_position ? a.face_position[i] : 0.0);
+    }
+  }
+
+  /// @return shots that are not valid
+  [[gnu::flatten]] std::size_t compute(const Block& block) {
+    turn(block);
+    if (a_.face_position) {
+      trace_with_origins(block);
+    } else {
+#pragma GCC unroll 4
+      for (std::size_t prism = 0; prism < N; ++prism) {
+        for (std::size_t g = 0; g < block.groups(); ++g) {
+          Trace<Batch, N> trace;
+          set_up(prism, g, trace);
+          pass_prism(train_, prism, trace);
+          beam_[g] = trace.beam[prism + 1];
+        }
+      }
+    }
+    std::size_t invalid = 0;
+    for (std::size_t g = 0; g < block.groups(); ++g) {
+      invalid += block.count_invalid(beam_[g].x, g);
+      if (a_.direction[0]) block.store(beam_[g].x, a_.direction[0], g);
+      if (a_.direction[1]) block.store(beam_[g].y, a_.direction[1], g);
+      if (a_.direction[2]) block.store(beam_[g].z, a_.direction[2], g);
+    }
+    if (a_.azimuth || a_.zenith) {
+      for (std::size_t g = 0; g < block.groups(); ++g) {
+        const auto angles = angles_from_unit_vector(beam_[g]);
+        if (a_.azimuth) block.store(angles.azimuth, a_.azimuth, g);
+        if (a_.zenith) block.store(angles.zenith, a_.zenith, g);
+      }
+    }
+    return invalid;
+  }
+
+ private:
+  void turn(const Block& block) {
+    for (std::size_t prism = 0; prism < N; ++prism) {
+      for (std::size_t g = 0; g < block.groups(); ++g) {
+        const auto [sine, cosine] = sin_cos(block.load(a_.rotation_angles[prism], g));
+        sine_[prism][g] = sine;
+        cosine_[prism][g] = cosine;
+      }
+    }
+    for (std::size_t g = 0; g < block.groups(); ++g) {
+      emitters_.select(block.first_shot(g), a_.shots);
+      emitters_.apply(train_);
+      beam_[g] = train_.incident;
+    }
+  }
+  void set_up(std::size_t prism, std::size_t g, Trace<Batch, N>& trace) const {
+    trace.sine[prism] = sine_[prism][g];
+    trace.cosine[prism] = cosine_[prism][g];
+    trace.beam[prism] = beam_[g];
+  }
+  void trace_with_origins(const Block& block) {
+    for (std::size_t g = 0; g < block.groups(); ++g) {
+      Trace<Batch, N> trace;
+#pragma GCC unroll 4
+      for (std::size_t prism = 0; prism < N; ++prism) {
+        set_up(prism, g, trace);
+        pass_prism(train_, prism, trace);
+        set_inside(train_, prism, trace);
+        beam_[g] = trace.beam[prism + 1];
+      }
+      const Vector3<Batch> origin = beam_origin(trace, face_position_);
+      block.store(origin.x, a_.origin[0], g);
+      block.store(origin.y, a_.origin[1], g);
+      block.store(origin.z, a_.origin[2], g);
+    }
+  }
+
+  const BatchArguments& a_;
+  EmitterLanes<Batch, N> emitters_;
+  PreparedTrain<Batch, N> train_;
+  std::array<Batch, 2 * N> face_position_;
+  Batch sine_[N][kGroups], cosine_[N][kGroups];
+  Vector3<Batch> beam_[kGroups];
+};
 
 template <int N>
 std::size_t observe_shots(const BatchArguments& a) {
-  const Inputs<N> inputs(a);
-  EmitterLanes<Batch, N> emitters(a.parameters, a.emitters, a.beam);
-  auto train = prepare<Batch, N>(inputs.parameters, face_orders<N>(a.face_order));
-  std::array<Batch, 2 * N> face_position;
-  for (std::size_t i = 0; i < 2 * N; ++i) {
-    face_position[i] = Batch(a.face_position ? a.face_position[i] : 0.0);
-  }
+  Directions<N> directions(a);
   std::size_t invalid = 0;
-  for (std::size_t shot = 0; shot < a.shots; shot += kLanes) {
-    emitters.select(shot, a.shots);
-    emitters.apply(train);
-    Vector3<Batch> direction;
-    if (a.face_position) {
-      const auto forward = trace_forward(train, inputs.angles(shot));
-      direction = forward.direction();
-      const Vector3<Batch> origin = beam_origin(forward, face_position);
-      store(origin.x, a.origin[0], shot, a.shots);
-      store(origin.y, a.origin[1], shot, a.shots);
-      store(origin.z, a.origin[2], shot, a.shots);
-    } else {
-      direction = trace(train, inputs.angles(shot)).direction;
-    }
-    invalid += count_invalid(direction.x, shot, a.shots);
-    if (a.direction[0]) store(direction.x, a.direction[0], shot, a.shots);
-    if (a.direction[1]) store(direction.y, a.direction[1], shot, a.shots);
-    if (a.direction[2]) store(direction.z, a.direction[2], shot, a.shots);
-    if (a.azimuth || a.zenith) {
-      const auto angles = angles_from_direction(direction);
-      if (a.azimuth) store(angles.azimuth, a.azimuth, shot, a.shots);
-      if (a.zenith) store(angles.zenith, a.zenith, shot, a.shots);
-    }
+  for (std::size_t shot = 0; shot < a.shots; shot += kBlock) {
+    invalid += directions.compute(Block(shot, a.shots));
   }
   return invalid;
 }
 
+/// As Directions, and back again.
 template <int N>
-void store_gradient(const BatchArguments& a, const EmitterLanes<Batch, N>& emitters,
-                    const Gradient<Batch, N>& gradient, double* const* columns, std::size_t shot) {
-  Batch storage[EmitterLanes<Batch, N>::kPlaces];
-  const Batch* by_place = emitters.by_place(gradient, storage);
-  const auto places = static_cast<std::size_t>(parameter_count(TrainShape{N, a.emitters}));
-  for (std::size_t i = 0; i < places; ++i) store(by_place[i], columns[i], shot, a.shots);
-  for (std::size_t i = 0; i < N; ++i) {
-    store(gradient.rotation_angles[i], columns[places + i], shot, a.shots);
+class Linearisations {
+ public:
+  explicit Linearisations(const BatchArguments& a)
+      : a_(a),
+        emitters_(a.parameters, a.emitters, a.beam),
+        train_(prepared_train<Batch, N>(a.parameters, a.face_order)),
+        derivatives_(prepared_derivatives<Batch, N>(a.parameters, a.face_order, [&a](int place) {
+          return a.d_azimuth[place] || a.d_zenith[place];
+        })) {}
+
+  /// @return shots that are not valid
+  [[gnu::flatten]] std::size_t compute(const Block& block) {
+    const std::size_t groups = block.groups();
+    for (std::size_t g = 0; g < groups; ++g) {
+      emitters_.select(block.first_shot(g), a_.shots);
+      emitters_.apply(train_);
+      shots_.start(g, train_.incident);
+    }
+    for (std::size_t prism = 0; prism < N; ++prism) {
+      for (std::size_t g = 0; g < groups; ++g) {
+        shots_.turn(g, prism, block.load(a_.rotation_angles[prism], g));
+      }
+    }
+    shots_.trace(train_, groups);
+    std::size_t invalid = 0;
+    for (std::size_t g = 0; g < groups; ++g) {
+      const Vector3<Batch>& direction = shots_.direction(g);
+      invalid += block.count_invalid(direction.x, g);
+      const auto angles = angles_from_unit_vector(direction);
+      block.store(angles.azimuth, a_.azimuth, g);
+      block.store(angles.zenith, a_.zenith, g);
+      shots_.begin(g, angle_seeds(direction));
+    }
+    shots_.reverse(train_, derivatives_, groups);
+    for (std::size_t g = 0; g < groups; ++g) {
+      emitters_.select(block.first_shot(g), a_.shots);
+      emitters_.apply(derivatives_);
+      shots_.end(g, derivatives_);
+      store_gradient(block, g, shots_.azimuth(g), a_.d_azimuth);
+      store_gradient(block, g, shots_.zenith(g), a_.d_zenith);
+    }
+    return invalid;
   }
-}
+
+ private:
+  void store_gradient(const Block& block, std::size_t g, const Gradient<Batch, N>& gradient,
+                      double* const* columns) const {
+    Batch storage[EmitterLanes<Batch, N>::kPlaces];
+    const Batch* by_place = emitters_.by_place(gradient, storage);
+    const auto places = static_cast<std::size_t>(parameter_count(TrainShape{N, a_.emitters}));
+    for (std::size_t i = 0; i < places; ++i) {
+      if (columns[i]) block.store(by_place[i], columns[i], g);
+    }
+    for (std::size_t i = 0; i < N; ++i) {
+      if (columns[places + i]) block.store(gradient.rotation_angles[i], columns[places + i], g);
+    }
+  }
+
+  const BatchArguments& a_;
+  EmitterLanes<Batch, N> emitters_;
+  PreparedTrain<Batch, N> train_;
+  PreparedDerivatives<Batch, N> derivatives_;
+  AngleLinearisations<Batch, N, kGroups> shots_;
+};
 
 template <int N>
 std::size_t linearise_shots(const BatchArguments& a) {
-  const Inputs<N> inputs(a);
-  const auto order = face_orders<N>(a.face_order);
-  EmitterLanes<Batch, N> emitters(a.parameters, a.emitters, a.beam);
-  auto train = prepare<Batch, N>(inputs.parameters, order);
-  auto derivatives = prepare_derivatives<Batch, N>(inputs.parameters, order);
+  Linearisations<N> linearisations(a);
   std::size_t invalid = 0;
-  for (std::size_t shot = 0; shot < a.shots; shot += kLanes) {
-    emitters.select(shot, a.shots);
-    emitters.apply(train);
-    emitters.apply(derivatives);
-    const auto result = linearise_angles(train, derivatives, inputs.angles(shot));
-    invalid += count_invalid(result.direction.x, shot, a.shots);
-    store(result.angles.azimuth, a.azimuth, shot, a.shots);
-    store(result.angles.zenith, a.zenith, shot, a.shots);
-    store_gradient<N>(a, emitters, result.azimuth, a.d_azimuth, shot);
-    store_gradient<N>(a, emitters, result.zenith, a.d_zenith, shot);
+  for (std::size_t shot = 0; shot < a.shots; shot += kBlock) {
+    invalid += linearisations.compute(Block(shot, a.shots));
   }
   return invalid;
 }

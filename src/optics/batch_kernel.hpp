@@ -24,7 +24,8 @@ struct BatchArguments {
   double* zenith = nullptr;
   const double* face_position = nullptr;  ///< [2 prisms], for the origin
   double* origin[3] = {nullptr, nullptr, nullptr};
-  double* const* d_azimuth = nullptr;  ///< [parameter_count(shape) + prisms][shots]
+  double* const* d_azimuth =
+      nullptr;  ///< [parameter_count(shape) + prisms][shots], some maybe nullptr
   double* const* d_zenith = nullptr;
 };
 

@@ -62,7 +62,7 @@ class Gap {
     Vector beam = direction_;
     for (std::size_t face = 2 * N; face-- > 2 * N - 2;) {
       const auto& f = train_.faces[face];
-      beam = refract(beam, f.normal.at(sine, cosine), 1.0 / f.index_ratio).direction;
+      beam = refract(beam, f.normal.at(sine, cosine), 1.0 / f.index_ratio);
     }
     return beam;
   }
@@ -92,7 +92,7 @@ class Gap {
     const double sine = std::sin(angle), cosine = std::cos(angle);
     for (std::size_t face = 2 * prism; face < 2 * prism + 2; ++face) {
       const auto& f = train_.faces[face];
-      beam = refract(beam, f.normal.at(sine, cosine), f.index_ratio).direction;
+      beam = refract(beam, f.normal.at(sine, cosine), f.index_ratio);
     }
     return beam;
   }

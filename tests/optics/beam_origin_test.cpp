@@ -97,7 +97,7 @@ TEST(BeamOrigin, WalksFromFaceToFace) {
       for (std::size_t face = 1; face < 2 * N; ++face) {
         const Vector3<double> corner{positions[face], 0, 0};
         const Plane plane{trace.normal[face], dot(trace.normal[face], corner)};
-        point += hit_distance(plane, point, trace.incident[face]) * trace.incident[face];
+        point += hit_distance(plane, point, trace.incident(face)) * trace.incident(face);
         EXPECT_NEAR(signed_distance(plane, point), 0.0, 1e-15);
       }
       const Ray ray = emergent_ray(train, kMid40, angles);

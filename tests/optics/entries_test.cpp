@@ -160,12 +160,15 @@ TEST(Entries, BatchesAskForColumnsOfOneLength) {
   EXPECT_EQ(run({}), "rotation_angles has 2 values, expected 1");
 }
 
-TEST(Entries, LinearisedBatchesAskForEveryColumn) {
+TEST(Entries, LinearisedBatchesAskForThePlaceOfEveryColumn) {
   Shots shots;
   const auto run = [&](const LinearisationColumns& out) {
     return refusal([&] { linearise_batch(shots.train, shots.angles(), out); });
   };
   LinearisationColumns out{shots.three, shots.three, shots.gradient(), shots.gradient()};
+  EXPECT_EQ(run(out), "");
+  out.d_azimuth.front() = {};
+  out.d_zenith.front() = {};
   EXPECT_EQ(run(out), "");
   out.d_zenith.back() = shots.four;
   EXPECT_EQ(run(out), "a column of d_zenith has 4 values, expected 3");

@@ -34,6 +34,21 @@ SphericalAngles<T> angles_from_direction(const Vector3<T>& direction) {
   return {atan2(direction.y, direction.x), atan2(horizontal, direction.z)};
 }
 
+/// How a scalar computes the angles of a unit vector; batches specialise it.
+template <class T>
+struct UnitVectorAngles {
+  /// As angles_from_direction().
+  static SphericalAngles<T> of(const Vector3<T>& direction) {
+    return angles_from_direction(direction);
+  }
+};
+
+/// As angles_from_direction(), of a vector of length 1 (or NaN), which is quicker for batches.
+template <class T>
+SphericalAngles<T> angles_from_unit_vector(const Vector3<T>& direction) {
+  return UnitVectorAngles<T>::of(direction);
+}
+
 /// Angle between two unit vectors, rad, exact also for nearly parallel ones.
 inline double angle_between(const Vector3<double>& a, const Vector3<double>& b) {
   return std::atan2(norm(cross(a, b)), dot(a, b));

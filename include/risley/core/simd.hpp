@@ -6,6 +6,7 @@
 
 #include <xsimd/xsimd.hpp>
 
+#include "risley/core/batch_functions.hpp"
 #include "risley/core/scalar.hpp"
 
 // What kernels share. A kernel is compiled once per instruction set, with RISLEY_KERNEL = baseline,
@@ -19,11 +20,21 @@
 namespace risley {
 
 /// Sine and cosine of all lanes of a batch at once.
-template <class Number, class Arch>
-struct SineCosine<xsimd::batch<Number, Arch>> {
-  using Batch = xsimd::batch<Number, Arch>;  ///< of any instruction set
+template <class Arch>
+struct SineCosine<xsimd::batch<double, Arch>> {
+  using Batch = xsimd::batch<double, Arch>;  ///< of any instruction set
   /// Sine and cosine of an angle in rad, in this order.
-  static std::pair<Batch, Batch> of(const Batch& angle) { return xsimd::sincos(angle); }
+  static std::pair<Batch, Batch> of(const Batch& angle) { return sine_cosine(angle); }
+};
+
+/// Azimuth and zenith of all lanes of a batch at once.
+template <class Arch>
+struct UnitVectorAngles<xsimd::batch<double, Arch>> {
+  using Batch = xsimd::batch<double, Arch>;  ///< of any instruction set
+  /// As angles_from_direction().
+  static SphericalAngles<Batch> of(const Vector3<Batch>& direction) {
+    return cone_angles(direction);
+  }
 };
 
 /// Sum of the lanes of a batch.

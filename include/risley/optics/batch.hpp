@@ -23,8 +23,8 @@ struct DirectionColumns {
 };
 
 /// Where many shots of one train point. A shot that does not get through is NaN in every column.
-/// @param rotation_angles  one column per prism in beam order, rad, all of the same length. The
-///                         sines are most accurate below a few thousand turns: pass wrapped angles
+/// @param rotation_angles  one column per prism in beam order, rad, all of the same length. Of any
+///                         number of turns; a batch with an angle beyond 1e6 rad takes longer
 /// @param beam             number of the emitter of every shot, counted from 0; empty: all the
 ///                         first
 /// @param set              instruction set, for tests and benchmarks; default the best available
@@ -42,14 +42,15 @@ std::size_t observe_batch(const PrismTrain& train,
 void check_beams(const PrismTrain& train, std::span<const std::uint8_t> beam, std::size_t shots);
 
 /// Azimuth, zenith and their gradients for many shots: first by the flat parameters, those of all
-/// emitters included, then by the rotation angles.
+/// emitters included, then by the rotation angles. An empty column of a gradient is not computed.
 struct LinearisationColumns {
   std::span<double> azimuth, zenith;                   ///< [shots], rad
   std::vector<std::span<double>> d_azimuth, d_zenith;  ///< [parameter_count(shape) + prisms][shots]
 };
 
 /// As observe_batch, with derivatives.
-/// @throws InvalidArgument as observe_batch(), and for a column that is missing
+/// @throws InvalidArgument as observe_batch(), and when azimuth, zenith or the place of a column is
+///         missing
 std::size_t linearise_batch(const PrismTrain& train,
                             std::span<const std::span<const double>> rotation_angles,
                             const LinearisationColumns& out,

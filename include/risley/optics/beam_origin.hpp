@@ -68,9 +68,9 @@ BeamPath<T, N> beam_path(const Trace<T, N>& trace, const std::array<T, 2 * N>& f
   for (std::size_t i = 1; i < 2 * N; ++i) {
     const Vector3<T>& before = path.point[i - 1];
     const Vector3<T> to_face{face_position[i] - before.x, -before.y, -before.z};
-    path.over_cosine[i] = T(1.0) / trace.refraction[i].cosine_in;
+    path.over_cosine[i] = T(1.0) / trace.cosine_in[i];
     path.length[i] = dot(trace.normal[i], to_face) * path.over_cosine[i];
-    path.point[i] = before + path.length[i] * trace.incident[i];
+    path.point[i] = before + path.length[i] * trace.incident(i);
   }
   return path;
 }
@@ -100,7 +100,7 @@ BeamPathAdjoint<T, N> beam_path_adjoint(const Trace<T, N>& trace, const BeamPath
 #pragma GCC unroll 8
   for (std::size_t i = 2 * N - 1; i > 0; --i) {
     const Vector3<T>& before = path.point[i - 1];
-    const Vector3<T>& beam = trace.incident[i];
+    const Vector3<T>& beam = trace.incident(i);
     const Vector3<T>& normal = trace.normal[i];
     const Vector3<T> to_face{face_position[i] - before.x, -before.y, -before.z};
     // length = normal . to_face / normal . beam

@@ -11,6 +11,40 @@
 
 namespace risley {
 
+/// The flat vector of a kernel's plain arguments, every value in all lanes.
+template <class Batch, int N>
+std::array<Batch, parameter_count(N)> parameter_batches(const double* parameters) {
+  std::array<Batch, parameter_count(N)> result;
+  for (std::size_t i = 0; i < parameter_count(N); ++i) result[i] = Batch(parameters[i]);
+  return result;
+}
+
+/// Face orders of plain arguments, without a std::array function of FaceOrder: its name would not
+/// say the instruction set.
+template <class Batch, int N>
+std::array<FaceOrder, N> face_orders(const FaceOrder* order) {
+  std::array<FaceOrder, N> result;
+  __builtin_memcpy(&result, order, sizeof(result));
+  return result;
+}
+
+/// prepare() from a kernel's plain arguments.
+template <class Batch, int N>
+PreparedTrain<Batch, N> prepared_train(const double* parameters, const FaceOrder* order) {
+  return prepare<Batch, N>(parameter_batches<Batch, N>(parameters), face_orders<Batch, N>(order));
+}
+
+/// prepare_derivatives() from a kernel's plain arguments.
+/// @param wanted  as leave_out()
+template <class Batch, int N, class Wanted>
+PreparedDerivatives<Batch, N> prepared_derivatives(const double* parameters, const FaceOrder* order,
+                                                   const Wanted& wanted) {
+  auto derivatives = prepare_derivatives<Batch, N>(parameter_batches<Batch, N>(parameters),
+                                                   face_orders<Batch, N>(order));
+  leave_out(derivatives, wanted);
+  return derivatives;
+}
+
 /// The emitters of a kernel's shots. With several, every lane has an emitter of its own: incident
 /// beam and its derivatives are taken from a small table, lane by lane. With one, nothing is done
 /// at all, and everything stays as prepare() made it.

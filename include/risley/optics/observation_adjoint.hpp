@@ -4,7 +4,7 @@
 
 #include <array>
 #include <cmath>
-#include <tuple>
+#include <type_traits>
 
 #include "risley/optics/observation_model.hpp"
 
@@ -30,16 +30,32 @@ T derivative_by(const Gradient<T, N>& gradient, int at, int beam) {
 /// What the derivatives need of a train, computed once for all shots.
 template <ModelScalar T, int N>
 struct PreparedDerivatives {
-  /// d normal / d (prism tilt horizontal, vertical, bearing tilt horizontal, vertical). A wedge
-  /// angle acts on a face as wedge_sign times the vertical tilt.
-  struct Face {
-    TurningVector<T> tilt_horizontal, tilt_vertical, bearing_horizontal, bearing_vertical;
-    T wedge_sign;
-    T ratio_by_glass, ratio_by_air;  ///< d index ratio / d refractive indices
+  /// A small turn of both normals about an axis w changes a result by w times its torque: see
+  /// reverse_prism(). Each of these is such an axis, per unit of the parameter.
+  struct Prism {
+    Vector3<T> rotation;  ///< of the rotation angle
+    TurningVector<T> tilt_horizontal, tilt_vertical, bearing_vertical;
+    TurningVector<T> wedge;               ///< d normal of the angled face / d wedge angle
+    T wedge_by_other;                     ///< that times the normal of the other face: constant
+    T first_is_angled, second_is_angled;  ///< one is 1, the other 0
+    std::array<T, 2> ratio_by_glass, ratio_by_air;  ///< d index ratio / d refractive indices
+    /// Whether anybody wants these derivatives, which otherwise are zero.
+    bool wedge_wanted = true, tilt_horizontal_wanted = true;
   };
   Vector3<T> incident_horizontal, incident_vertical;  ///< of the emitter that fires
-  std::array<Face, 2 * N> faces;
+  std::array<Prism, N> prisms;
 };
+
+/// Leaves out the dearest derivatives if nobody wants them.
+/// @param wanted  called with a place of the flat vector of a train with one emitter
+template <ModelScalar T, int N, class Wanted>
+void leave_out(PreparedDerivatives<T, N>& derivatives, const Wanted& wanted) {
+  for (int prism = 0; prism < N; ++prism) {
+    auto& d = derivatives.prisms[static_cast<std::size_t>(prism)];
+    d.wedge_wanted = wanted(place::wedge_angle(prism));
+    d.tilt_horizontal_wanted = wanted(place::prism_tilt_horizontal(prism));
+  }
+}
 
 /// @copydoc prepare
 template <ModelScalar T, int N>
@@ -52,78 +68,39 @@ PreparedDerivatives<T, N> prepare_derivatives(const std::array<T, parameter_coun
   d.incident_horizontal = leaning_horizontal_rate(beam_h, beam_v);
   d.incident_vertical = leaning_vertical_rate(beam_h, beam_v);
   const T& air = p(place::refractive_index_air());
+  const T zero(0.0);
   for (int prism = 0; prism < N; ++prism) {
     const bool last = prism == N - 1;
+    const FaceOrder order = face_order[static_cast<std::size_t>(prism)];
     const T& glass = p(place::refractive_index(prism));
-    const T bearing_h = last ? T(0.0) : p(place::bearing_tilt_horizontal(prism));
-    const T bearing_v = last ? T(0.0) : p(place::bearing_tilt_vertical(prism));
+    const T bearing_h = last ? zero : p(place::bearing_tilt_horizontal(prism));
+    const T bearing_v = last ? zero : p(place::bearing_tilt_vertical(prism));
+    const T h = bearing_h + p(place::prism_tilt_horizontal(prism));
+    const T v = bearing_v + p(place::prism_tilt_vertical(prism));
     const Vector3<T> axis = leaning_direction(bearing_h, bearing_v);
-    for (int side = 0; side < 2; ++side) {
-      const T sign(wedge_sign(face_order[static_cast<std::size_t>(prism)], side));
-      const T h = bearing_h + p(place::prism_tilt_horizontal(prism));
-      const T v =
-          bearing_v + p(place::prism_tilt_vertical(prism)) + sign * p(place::wedge_angle(prism));
-      const Vector3<T> normal = leaning_direction(h, v);
-      // The derivative of a turning vector when its normal and its axis move together.
-      const auto moved = [&](const Vector3<T>& d_normal, const Vector3<T>& d_axis) {
-        const Vector3<T> along =
-            dot(axis, normal) * d_axis + T(dot(d_axis, normal) + dot(axis, d_normal)) * axis;
-        return TurningVector<T>{along, d_normal - along,
-                                cross(d_axis, normal) + cross(axis, d_normal)};
-      };
-      const Vector3<T> still{T(0.0), T(0.0), T(0.0)};
-      auto& face = d.faces[static_cast<std::size_t>(2 * prism + side)];
-      face.wedge_sign = sign;
-      // Ratios: air / glass into the prism, glass / air out of it.
-      face.ratio_by_glass = side == 0 ? -air / (glass * glass) : T(1.0) / air;
-      face.ratio_by_air = side == 0 ? T(1.0) / glass : -glass / (air * air);
-      face.tilt_horizontal = moved(leaning_horizontal_rate(h, v), still);
-      face.tilt_vertical = moved(leaning_vertical_rate(h, v), still);
-      face.bearing_horizontal =
-          moved(leaning_horizontal_rate(h, v), leaning_horizontal_rate(bearing_h, bearing_v));
-      face.bearing_vertical =
-          moved(leaning_vertical_rate(h, v), leaning_vertical_rate(bearing_h, bearing_v));
-    }
+    // Horizontal angles turn a leaning direction about -Z, vertical ones about a level vector.
+    const Vector3<T> level = leaning_horizontal_rate(h, zero);
+    const Vector3<T> bearing_level = leaning_horizontal_rate(bearing_h, zero);
+    auto& out = d.prisms[static_cast<std::size_t>(prism)];
+    out.rotation = axis;
+    out.tilt_horizontal = turning_about(axis, Vector3<T>{zero, zero, T(-1.0)});
+    out.tilt_vertical = turning_about(axis, level);
+    // The axis and all that turns about it lean together, but for what the tilts turn the normals.
+    out.bearing_vertical = turning_about(axis, level - bearing_level);
+    out.bearing_vertical.along = out.bearing_vertical.along + bearing_level;
+    const bool first = wedge_sign(order, 0) != 0;
+    const T sign(wedge_sign(order, first ? 0 : 1));
+    const Vector3<T> wedge =
+        sign * leaning_vertical_rate(h, T(v + sign * p(place::wedge_angle(prism))));
+    out.wedge = turning_about(axis, wedge);
+    out.wedge_by_other = dot(wedge, leaning_direction(h, v));
+    out.first_is_angled = T(first ? 1.0 : 0.0);
+    out.second_is_angled = T(first ? 0.0 : 1.0);
+    // Ratios: air / glass into the prism, glass / air out of it.
+    out.ratio_by_glass = {T(-air / (glass * glass)), T(T(1.0) / air)};
+    out.ratio_by_air = {T(T(1.0) / glass), T(-glass / (air * air))};
   }
   return d;
-}
-
-/// Everything that one forward pass leaves behind for the reverse passes.
-template <ModelScalar T, int N>
-struct Trace {
-  std::array<Vector3<T>, 2 * N> incident, normal;
-  std::array<Refraction<T>, 2 * N> refraction;
-  std::array<T, N> sine, cosine;
-
-  /// The emergent beam: unit vector, sensor frame.
-  const Vector3<T>& direction() const { return refraction[2 * N - 1].direction; }
-  /// Whether the beam gets through every face.
-  Mask<T> valid() const {
-    Mask<T> all = refraction[0].valid;
-    for (std::size_t i = 1; i < 2 * N; ++i) all = Mask<T>(all & refraction[i].valid);
-    return all;
-  }
-};
-
-/// As trace(), keeping the intermediate beams.
-template <ModelScalar T, int N>
-Trace<T, N> trace_forward(const PreparedTrain<T, N>& train,
-                          const RotationAngles<T, N>& rotation_angle) {
-  Trace<T, N> out;
-  Vector3<T> beam = train.incident;
-#pragma GCC unroll 4  // gcc 12 keeps batches in registers only where indices are constants
-  for (std::size_t prism = 0; prism < N; ++prism) {
-    std::tie(out.sine[prism], out.cosine[prism]) = sin_cos(rotation_angle[prism]);
-#pragma GCC unroll 2
-    for (std::size_t side = 0; side < 2; ++side) {
-      const std::size_t i = 2 * prism + side;
-      out.incident[i] = beam;
-      out.normal[i] = train.faces[i].normal.at(out.sine[prism], out.cosine[prism]);
-      out.refraction[i] = refract(beam, out.normal[i], train.faces[i].index_ratio);
-      beam = out.refraction[i].direction;
-    }
-  }
-  return out;
 }
 
 /// For results that depend on the beam behind the last face alone.
@@ -131,6 +108,148 @@ struct NothingAtFaces {
   template <class Vector>
   void operator()(std::size_t, std::size_t, Vector&, Vector&) const {}
 };
+
+/// How far the reverse passes of some results have come, from the last prism to the first.
+template <ModelScalar T, int N, std::size_t Results>
+struct ReversePass {
+  std::array<Gradient<T, N>, Results> gradients;
+  std::array<Vector3<T>, Results> beam;    ///< d result / d beam before the prism that is next
+  std::array<Vector3<T>, Results> torque;  ///< that beam x d result / d beam
+  std::array<T, Results> air;              ///< d result / d refractive index of the air, so far
+};
+
+/// @param direction  the emergent beam
+/// @param seeds      d result / d direction [results][3]
+template <int N, ModelScalar T, std::size_t Results>
+ReversePass<T, N, Results> begin_reverse(const Vector3<T>& direction,
+                                         const std::array<Vector3<T>, Results>& seeds) {
+  ReversePass<T, N, Results> pass;
+#pragma GCC unroll 3
+  for (std::size_t r = 0; r < Results; ++r) {
+    pass.beam[r] = seeds[r];
+    pass.torque[r] = cross(direction, seeds[r]);
+    pass.air[r] = T(0.0);
+    // No bearing leans behind the last prism.
+    pass.gradients[r].parameters[static_cast<std::size_t>(place::frame_yaw(N))] = T(0.0);
+    pass.gradients[r].parameters[static_cast<std::size_t>(place::frame_pitch(N))] = T(0.0);
+  }
+  return pass;
+}
+
+/// One prism of trace_adjoint(): the adjoint of pass_prism(). With g = d result / d L'':
+///   g2 = N2.g dk2/dc2,  g1 = (N1.g / m + N1.N2 g2) dk1/dc1,  d result / d L = g + g1 N1 + m g2 N2.
+/// Whoever turns beam and faces together turns L'' with them: so the torque of both normals, the
+/// sum of N x d result / d N, is L'' x g less L x d result / d L. Every angle but the wedge's turns
+/// both normals about some axis w, and w times the torque is its derivative.
+/// Derivation: docs/theory/derivatives.md
+template <ModelScalar T, int N, std::size_t Results, class AtFace = NothingAtFaces>
+void reverse_prism(const PreparedTrain<T, N>& train, const PreparedDerivatives<T, N>& derivatives,
+                   const Trace<T, N>& forward, std::size_t prism, ReversePass<T, N, Results>& pass,
+                   const AtFace& at_face = {}) {
+  constexpr bool kAtFaces = !std::is_same_v<AtFace, NothingAtFaces>;
+  const bool last = prism == N - 1;
+  const int number = static_cast<int>(prism);
+  const std::size_t first = 2 * prism, second = first + 1;
+  const auto& d = derivatives.prisms[prism];
+  const T& sine = forward.sine[prism];
+  const T& cosine = forward.cosine[prism];
+  const T& into = train.faces[first].index_ratio;
+  const T& out_of = train.faces[second].index_ratio;
+  const Vector3<T>& beam = forward.beam[prism];
+  const Vector3<T>& n1 = forward.normal[first];
+  const Vector3<T>& n2 = forward.normal[second];
+  const T& in1 = forward.cosine_in[first];
+  const T& in2 = forward.cosine_in[second];
+  // k = out - ratio in, out^2 = 1 - ratio^2 (1 - in^2)
+  const T one(1.0);
+  const T scaled1 = into / forward.cosine_out[first], scaled2 = out_of / forward.cosine_out[second];
+  const T k1 = forward.cosine_out[first] - into * in1;
+  const T k2 = forward.cosine_out[second] - out_of * in2;
+  const T k1_by_in = into * (scaled1 * in1 - one), k2_by_in = out_of * (scaled2 * in2 - one);
+  const T k1_by_ratio = -(scaled1 * (one - in1 * in1) + in1);
+  const T k2_by_ratio = -(scaled2 * (one - in2 * in2) + in2);
+  const T beam_on_n2 = dot(beam, n2);
+  const Vector3<T> tilt_vertical = d.tilt_vertical.at(sine, cosine);
+  const T zero(0.0);
+  Vector3<T> tilt_horizontal{zero, zero, zero}, wedge{zero, zero, zero};
+  T wedge_on_beam = zero, wedge_k = zero;
+  if (d.tilt_horizontal_wanted) tilt_horizontal = d.tilt_horizontal.at(sine, cosine);
+  if (d.wedge_wanted) {
+    wedge = d.wedge.at(sine, cosine);
+    wedge_on_beam = dot(wedge, beam);
+    wedge_k = d.first_is_angled * (out_of * k1) + d.second_is_angled * k2;
+  }
+  Vector3<T> bearing_vertical;
+  if (!last) bearing_vertical = d.bearing_vertical.at(sine, cosine);
+#pragma GCC unroll 3
+  for (std::size_t r = 0; r < Results; ++r) {
+    Gradient<T, N>& gradient = pass.gradients[r];
+    const auto by = [&gradient](int where) -> T& {
+      return gradient.parameters[static_cast<std::size_t>(where)];
+    };
+    const Vector3<T> behind = pass.beam[r];
+    const T along1 = dot(n1, behind), along2 = dot(n2, behind);
+    const T in2_bar = along2 * k2_by_in;
+    T k1_bar = out_of * along1 + train.cosine_between[prism] * in2_bar;
+    T into_bar = beam_on_n2 * in2_bar;
+    Vector3<T> inside, at_second, before, at_first;
+    if constexpr (kAtFaces) {
+      inside = at_second = before = at_first = Vector3<T>{zero, zero, zero};
+      at_face(second, r, inside, at_second);
+      at_face(first, r, before, at_first);
+      k1_bar = k1_bar + dot(n1, inside);  // L' = m L + k1 N1
+      into_bar = into_bar + dot(beam, inside);
+    }
+    into_bar = into_bar + k1_bar * k1_by_ratio;
+    const T out_of_bar = along1 * k1 + along2 * k2_by_ratio;
+    const T in1_bar = k1_bar * k1_by_in;
+    const T on_n2_bar = into * in2_bar;
+    Vector3<T>& ahead = pass.beam[r];
+    ahead = behind + in1_bar * n1 + on_n2_bar * n2;
+    if constexpr (kAtFaces) ahead = ahead + into * inside;
+    const Vector3<T> torque_ahead = cross(beam, ahead);
+    Vector3<T> torque = pass.torque[r] - torque_ahead;
+    T wedge_bar = zero;
+    if (d.wedge_wanted) {
+      wedge_bar = wedge_k * dot(wedge, behind) +
+                  T(d.first_is_angled * in1_bar + d.second_is_angled * on_n2_bar) * wedge_on_beam +
+                  k1 * in2_bar * d.wedge_by_other;
+    }
+    pass.torque[r] = torque_ahead;
+    if constexpr (kAtFaces) {
+      torque = torque + cross(forward.inside[prism], inside) + cross(n1, at_first) +
+               cross(n2, at_second);
+      wedge_bar = wedge_bar + d.first_is_angled * dot(wedge, k1 * inside + at_first) +
+                  d.second_is_angled * dot(wedge, at_second);
+      ahead = ahead + before;
+      pass.torque[r] = cross(beam, ahead);
+    }
+    gradient.rotation_angles[prism] = last ? torque.x : dot(d.rotation, torque);
+    by(place::prism_tilt_horizontal(number)) =
+        d.tilt_horizontal_wanted ? dot(tilt_horizontal, torque) : zero;
+    by(place::prism_tilt_vertical(number)) = dot(tilt_vertical, torque);
+    by(place::wedge_angle(number)) = wedge_bar;
+    if (!last) {
+      by(place::bearing_tilt_horizontal(number)) = -torque.z;
+      by(place::bearing_tilt_vertical(number)) = dot(bearing_vertical, torque);
+    }
+    by(place::refractive_index(number)) =
+        into_bar * d.ratio_by_glass[0] + out_of_bar * d.ratio_by_glass[1];
+    pass.air[r] = pass.air[r] + into_bar * d.ratio_by_air[0] + out_of_bar * d.ratio_by_air[1];
+  }
+}
+
+/// After the first prism: the derivatives by the incident beam and by the air.
+template <ModelScalar T, int N, std::size_t Results>
+void end_reverse(const PreparedDerivatives<T, N>& d, ReversePass<T, N, Results>& pass) {
+#pragma GCC unroll 3
+  for (std::size_t r = 0; r < Results; ++r) {
+    auto& parameters = pass.gradients[r].parameters;
+    parameters[place::refractive_index_air()] = pass.air[r];
+    parameters[place::incident_beam_horizontal()] = dot(pass.beam[r], d.incident_horizontal);
+    parameters[place::incident_beam_vertical()] = dot(pass.beam[r], d.incident_vertical);
+  }
+}
 
 /// Reverse pass: the gradients of some scalar results from their derivatives with respect to the
 /// emergent direction, all at once because they share how the faces move.
@@ -143,67 +262,11 @@ std::array<Gradient<T, N>, Results> trace_adjoint(const PreparedTrain<T, N>& tra
                                                   const Trace<T, N>& forward,
                                                   const std::array<Vector3<T>, Results>& seeds,
                                                   const AtFace& at_face = {}) {
-  std::array<Gradient<T, N>, Results> gradients;
-  std::array<Vector3<T>, Results> beams = seeds;
-  std::array<T, Results> air_bar;
-  for (T& bar : air_bar) bar = T(0.0);
+  auto pass = begin_reverse<N>(forward.direction(), seeds);
 #pragma GCC unroll 4
-  for (int prism = N - 1; prism >= 0; --prism) {
-    const auto k = static_cast<std::size_t>(prism);
-    const bool last = prism == N - 1;
-    const T& sine = forward.sine[k];
-    const T& cosine = forward.cosine[k];
-    for (Gradient<T, N>& gradient : gradients) {
-      gradient.rotation_angles[k] = T(0.0);
-      for (int i = 3 + 6 * prism; i < 9 + 6 * prism; ++i) {
-        gradient.parameters[static_cast<std::size_t>(i)] = T(0.0);
-      }
-    }
-#pragma GCC unroll 2
-    for (int side = 1; side >= 0; --side) {
-      const std::size_t i = 2 * k + static_cast<std::size_t>(side);
-      const auto& face = d.faces[i];
-      const Vector3<T> turning = train.faces[i].normal.turning_rate(sine, cosine);
-      const Vector3<T> tilt_horizontal = face.tilt_horizontal.at(sine, cosine);
-      const Vector3<T> tilt_vertical = face.tilt_vertical.at(sine, cosine);
-      Vector3<T> bearing_horizontal, bearing_vertical;
-      if (!last) {
-        bearing_horizontal = face.bearing_horizontal.at(sine, cosine);
-        bearing_vertical = face.bearing_vertical.at(sine, cosine);
-      }
-#pragma GCC unroll 3
-      for (std::size_t r = 0; r < Results; ++r) {
-        Gradient<T, N>& gradient = gradients[r];
-        const auto add = [&](int where, const T& value) {
-          T& sum = gradient.parameters[static_cast<std::size_t>(where)];
-          sum = sum + value;
-        };
-        Vector3<T> normal_bar;
-        const T ratio_bar =
-            refract_adjoint(forward.refraction[i], forward.incident[i], forward.normal[i],
-                            train.faces[i].index_ratio, beams[r], normal_bar);
-        at_face(i, r, beams[r], normal_bar);
-        gradient.rotation_angles[k] = gradient.rotation_angles[k] + dot(normal_bar, turning);
-        const T vertical = dot(normal_bar, tilt_vertical);
-        add(place::prism_tilt_horizontal(prism), dot(normal_bar, tilt_horizontal));
-        add(place::prism_tilt_vertical(prism), vertical);
-        add(place::wedge_angle(prism), face.wedge_sign * vertical);
-        if (!last) {
-          add(place::bearing_tilt_horizontal(prism), dot(normal_bar, bearing_horizontal));
-          add(place::bearing_tilt_vertical(prism), dot(normal_bar, bearing_vertical));
-        }
-        add(place::refractive_index(prism), ratio_bar * face.ratio_by_glass);
-        air_bar[r] = air_bar[r] + ratio_bar * face.ratio_by_air;
-      }
-    }
-  }
-  for (std::size_t r = 0; r < Results; ++r) {
-    auto& parameters = gradients[r].parameters;
-    parameters[place::refractive_index_air()] = air_bar[r];
-    parameters[place::incident_beam_horizontal()] = dot(beams[r], d.incident_horizontal);
-    parameters[place::incident_beam_vertical()] = dot(beams[r], d.incident_vertical);
-  }
-  return gradients;
+  for (std::size_t i = 0; i < N; ++i) reverse_prism(train, d, forward, N - 1 - i, pass, at_face);
+  end_reverse(d, pass);
+  return pass.gradients;
 }
 
 /// d azimuth and d zenith / d direction [3]; NaN on the Z axis, where azimuth has no derivative.
@@ -212,17 +275,15 @@ struct AngleSeeds {
   Vector3<T> azimuth, zenith;
 };
 
-/// Derivatives of both angles by a direction: what trace_adjoint() starts from.
+/// Derivatives of both angles by a direction of length 1: what trace_adjoint() starts from.
 template <ModelScalar T>
 AngleSeeds<T> angle_seeds(const Vector3<T>& direction) {
   using std::sqrt;
   const Vector3<T>& v = direction;
-  const T horizontal2 = v.x * v.x + v.y * v.y;
-  const T over2 = T(1.0) / horizontal2;
-  const T over_all = T(1.0) / (horizontal2 + v.z * v.z);
-  const T horizontal = sqrt(horizontal2);
-  const T zx = v.z * over_all / horizontal;
-  return {{-v.y * over2, v.x * over2, T(0.0)}, {v.x * zx, v.y * zx, -horizontal * over_all}};
+  const T horizontal = sqrt(v.x * v.x + v.y * v.y);
+  const T over = T(1.0) / horizontal;
+  const T over2 = over * over, zx = v.z * over;
+  return {{-v.y * over2, v.x * over2, T(0.0)}, {v.x * zx, v.y * zx, -horizontal}};
 }
 
 /// Azimuth and zenith of one shot and their gradients.
@@ -243,23 +304,37 @@ AngleLinearisation<T, N> linearise_angles(const PreparedTrain<T, N>& train,
   const AngleSeeds<T> seeds = angle_seeds(forward.direction());
   const auto gradients = trace_adjoint(train, derivatives, forward,
                                        std::array<Vector3<T>, 2>{seeds.azimuth, seeds.zenith});
-  return {forward.direction(), angles_from_direction(forward.direction()), gradients[0],
+  return {forward.direction(), angles_from_unit_vector(forward.direction()), gradients[0],
           gradients[1], forward.valid()};
+}
+
+/// What a small turn of a direction about Y does to its angles; about Z it adds itself to the
+/// azimuth.
+template <ModelScalar T>
+struct TurnDerivatives {
+  T azimuth_by_pitch, zenith_by_pitch;
+};
+
+/// @param direction  not along the Z axis
+template <ModelScalar T>
+TurnDerivatives<T> turn_derivatives(const Vector3<T>& direction) {
+  using std::sqrt;
+  const Vector3<T>& v = direction;
+  const T horizontal2 = v.x * v.x + v.y * v.y;
+  return {-v.y * v.z / horizontal2, v.x / sqrt(horizontal2)};
 }
 
 /// Fills the places of place::frame_yaw and place::frame_pitch: what a small turn of the emergent
 /// beam about Z and about Y does to both angles. No other function of this file writes there.
 template <ModelScalar T, int N>
 void add_turn_derivatives(AngleLinearisation<T, N>& shot) {
-  using std::sqrt;
   constexpr auto kYaw = static_cast<std::size_t>(place::frame_yaw(N));
   constexpr auto kPitch = static_cast<std::size_t>(place::frame_pitch(N));
-  const Vector3<T>& v = shot.direction;
-  const T horizontal2 = v.x * v.x + v.y * v.y;
+  const TurnDerivatives<T> turn = turn_derivatives(shot.direction);
   shot.azimuth.parameters[kYaw] = T(1.0);
   shot.zenith.parameters[kYaw] = T(0.0);
-  shot.azimuth.parameters[kPitch] = -v.y * v.z / horizontal2;
-  shot.zenith.parameters[kPitch] = v.x / sqrt(horizontal2);
+  shot.azimuth.parameters[kPitch] = turn.azimuth_by_pitch;
+  shot.zenith.parameters[kPitch] = turn.zenith_by_pitch;
 }
 
 /// The three components of the direction of one shot and their gradients.

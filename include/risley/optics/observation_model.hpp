@@ -53,21 +53,32 @@ constexpr double wedge_sign(FaceOrder order, int face_of_prism) {
   return face_of_prism == 0 ? -1.0 : 0.0;
 }
 
-/// A unit normal as its prism turns: along + cos(angle) cosine + sin(angle) sine. This is
-/// Rodrigues' form of the rotation that the paper writes with quaternions.     [B21 Eq. (19-26)]
+/// A vector as its prism turns, such as a face's unit normal: along + cos(angle) cosine +
+/// sin(angle) sine. This is Rodrigues' form of the rotation that the paper writes with quaternions.
+/// [B21 Eq. (19-26)]
 template <ModelScalar T>
 struct TurningVector {
   Vector3<T> along, cosine, sine;
 
-  /// The normal at an angle, given by its sine and cosine.
+  /// The vector at an angle, given by its sine and cosine.
   Vector3<T> at(const T& sin_angle, const T& cos_angle) const {
     return along + cos_angle * cosine + sin_angle * sine;
   }
-  /// Derivative with respect to the angle.
-  Vector3<T> turning_rate(const T& sin_angle, const T& cos_angle) const {
-    return cos_angle * sine - sin_angle * cosine;
+  /// The same about the X axis, as the last prism turns: a third of the products are zero. It saves
+  /// 2 to 3 % of a direction's time.
+  Vector3<T> at_about_x(const T& sin_angle, const T& cos_angle) const {
+    return {along.x, cos_angle * cosine.y + sin_angle * sine.y,
+            cos_angle * cosine.z + sin_angle * sine.z};
   }
 };
+
+/// A vector that turns about an axis with a prism.
+/// @param vector  at rotation angle zero
+template <ModelScalar T>
+TurningVector<T> turning_about(const Vector3<T>& axis, const Vector3<T>& vector) {
+  const Vector3<T> along = dot(axis, vector) * axis;
+  return {along, vector - along, cross(axis, vector)};
+}
 
 /// A train with everything computed that does not depend on the rotation angles.
 template <ModelScalar T, int N>
@@ -79,6 +90,7 @@ struct PreparedTrain {
   };
   Vector3<T> incident;  ///< of the emitter that fires
   std::array<Face, 2 * N> faces;
+  std::array<T, N> cosine_between;  ///< of the two normals of each prism, which turn together
 };
 
 /// @param parameters  flat vector, SI units, see namespace place
@@ -95,20 +107,111 @@ PreparedTrain<T, N> prepare(const std::array<T, parameter_count(N)>& parameters,
     const T bearing_h = last ? T(0.0) : p(place::bearing_tilt_horizontal(prism));
     const T bearing_v = last ? T(0.0) : p(place::bearing_tilt_vertical(prism));
     const Vector3<T> axis = leaning_direction(bearing_h, bearing_v);  // Eq. (9), (13)
+    std::array<Vector3<T>, 2> normals;
     for (int side = 0; side < 2; ++side) {
       const double sign = wedge_sign(face_order[static_cast<std::size_t>(prism)], side);
-      const Vector3<T> normal = leaning_direction(  // Eq. (15-18)
+      Vector3<T>& normal = normals[static_cast<std::size_t>(side)];
+      normal = leaning_direction(  // Eq. (15-18)
           T(bearing_h + p(place::prism_tilt_horizontal(prism))),
           T(bearing_v + p(place::prism_tilt_vertical(prism)) +
             T(sign) * p(place::wedge_angle(prism))));
       auto& face = train.faces[static_cast<std::size_t>(2 * prism + side)];
-      const Vector3<T> along = dot(axis, normal) * axis;
-      face.normal = {along, normal - along, cross(axis, normal)};
+      face.normal = turning_about(axis, normal);
       const T& glass = p(place::refractive_index(prism));
       face.index_ratio = side == 0 ? air / glass : glass / air;
     }
+    train.cosine_between[static_cast<std::size_t>(prism)] = dot(normals[0], normals[1]);
   }
   return train;
+}
+
+/// How one beam goes through all prisms: what a forward pass leaves behind for the reverse passes.
+template <ModelScalar T, int N>
+struct Trace {
+  std::array<T, N> sine, cosine;         ///< of the rotation angles
+  std::array<Vector3<T>, N + 1> beam;    ///< before each prism and behind the last, unit vectors
+  std::array<Vector3<T>, N> inside;      ///< the beam within each prism: see trace_forward()
+  std::array<Vector3<T>, 2 * N> normal;  ///< of the faces, unit vectors
+  /// Of the angles of incidence and refraction at the faces; out is NaN from where the beam does
+  /// not get through.
+  std::array<T, 2 * N> cosine_in, cosine_out;
+
+  /// The emergent beam: unit vector, sensor frame; NaN where not valid.
+  const Vector3<T>& direction() const { return beam[N]; }
+  /// The beam that meets a face.
+  const Vector3<T>& incident(std::size_t face) const {
+    return face % 2 == 0 ? beam[face / 2] : inside[face / 2];
+  }
+  /// Whether the beam gets through every face.
+  Mask<T> valid() const { return Mask<T>(cosine_out[2 * N - 1] >= T(0.0)); }
+};
+
+/// Turns one prism. @param rotation_angle  rad
+template <ModelScalar T, int N>
+void turn_prism(const T& rotation_angle, std::size_t prism, Trace<T, N>& trace) {
+  const auto [sine, cosine] = sin_cos(rotation_angle);
+  trace.sine[prism] = sine;
+  trace.cosine[prism] = cosine;
+}
+
+/// Sends the beam through one prism. With m and 1/m the index ratios of its faces, Eq. (10) twice
+/// is
+///   L' = m L + k1 N1,  L'' = L'/m + k2 N2 = L + k1/m N1 + k2 N2,  k = cos_out - ratio cos_in,
+///   N2.L' = m N2.L + k1 N1.N2,
+/// and N1.N2 is constant: the beam within the prism need not be known, which saves 4 % of a
+/// direction's time.                                                         [B21 section 2.2]
+/// @param[in,out] trace  sine, cosine and beam of the prism are given, the rest of it is set
+template <ModelScalar T, int N>
+void pass_prism(const PreparedTrain<T, N>& train, std::size_t prism, Trace<T, N>& trace) {
+  const std::size_t first = 2 * prism, second = first + 1;
+  const T& into = train.faces[first].index_ratio;
+  const T& out_of = train.faces[second].index_ratio;
+  const Vector3<T>& beam = trace.beam[prism];
+  const auto turned = [&](std::size_t face) {
+    const TurningVector<T>& normal = train.faces[face].normal;
+    return prism == N - 1 ? normal.at_about_x(trace.sine[prism], trace.cosine[prism])
+                          : normal.at(trace.sine[prism], trace.cosine[prism]);
+  };
+  const Vector3<T> n1 = turned(first), n2 = turned(second);
+  const T in1 = dot(n1, beam);
+  const T out1 = refraction_cosine(in1, into);
+  const T k1 = out1 - into * in1;
+  const T in2 = into * dot(n2, beam) + k1 * train.cosine_between[prism];
+  const T out2 = refraction_cosine(in2, out_of);
+  const T k2 = out2 - out_of * in2;
+  trace.beam[prism + 1] = beam + T(out_of * k1) * n1 + k2 * n2;
+  trace.normal[first] = n1;
+  trace.normal[second] = n2;
+  trace.cosine_in[first] = in1;
+  trace.cosine_in[second] = in2;
+  trace.cosine_out[first] = out1;
+  trace.cosine_out[second] = out2;
+}
+
+/// The beam within one prism, L' = m L + k1 N1. @param[in,out] trace  as pass_prism() left it
+template <ModelScalar T, int N>
+void set_inside(const PreparedTrain<T, N>& train, std::size_t prism, Trace<T, N>& trace) {
+  const std::size_t face = 2 * prism;
+  const T& into = train.faces[face].index_ratio;
+  trace.inside[prism] =
+      into * trace.beam[prism] +
+      T(trace.cosine_out[face] - into * trace.cosine_in[face]) * trace.normal[face];
+}
+
+/// Sends the beam through all prisms.                                         [B21 section 2.2]
+/// @param rotation_angle  of every prism in beam order, rad
+template <ModelScalar T, int N>
+Trace<T, N> trace_forward(const PreparedTrain<T, N>& train,
+                          const RotationAngles<T, N>& rotation_angle) {
+  Trace<T, N> out;
+  out.beam[0] = train.incident;
+#pragma GCC unroll 4  // gcc 12 keeps batches in registers only where indices are constants
+  for (std::size_t prism = 0; prism < N; ++prism) {
+    turn_prism(rotation_angle[prism], prism, out);
+    pass_prism(train, prism, out);
+    set_inside(train, prism, out);
+  }
+  return out;
 }
 
 /// A beam that has left the sensor.
@@ -118,22 +221,17 @@ struct Beam {
   Mask<T> valid;         ///< false when the beam does not get through the prisms
 };
 
-/// Sends the beam through all faces.                                          [B21 section 2.2]
-/// @param rotation_angle  of every prism in beam order, rad
+/// As trace_forward(), of which only the emergent beam is wanted.
 template <ModelScalar T, int N>
 Beam<T> trace(const PreparedTrain<T, N>& train, const RotationAngles<T, N>& rotation_angle) {
-  Vector3<T> beam = train.incident;
-  Mask<T> valid = Mask<T>(T(0.0) >= T(0.0));
+  Trace<T, N> forward;
+  forward.beam[0] = train.incident;
+#pragma GCC unroll 4
   for (std::size_t prism = 0; prism < N; ++prism) {
-    const auto [sine, cosine] = sin_cos(rotation_angle[prism]);
-    for (std::size_t side = 0; side < 2; ++side) {
-      const auto& face = train.faces[2 * prism + side];
-      const auto refraction = refract(beam, face.normal.at(sine, cosine), face.index_ratio);
-      beam = refraction.direction;
-      valid = Mask<T>(valid & refraction.valid);
-    }
+    turn_prism(rotation_angle[prism], prism, forward);
+    pass_prism(train, prism, forward);
   }
-  return {beam, valid};
+  return {forward.direction(), forward.valid()};
 }
 
 /// Direction, azimuth and zenith of one shot in plain numbers.

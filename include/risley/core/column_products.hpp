@@ -6,23 +6,30 @@
 
 #include "risley/core/simd.hpp"
 
-namespace risley::calibration {
+namespace risley {
 
 /// Sums of the products of all pairs of columns, for kernels: a row holds one group of shots, a
 /// lane each. The products are summed up in squares of so many rows and columns as the registers
 /// allow, over so many groups at once that the rows stay in the nearest cache.
 /// @tparam Most  columns at most
-template <class Batch, std::size_t Most>
+/// @tparam Tile  side of the squares
+template <class Batch, std::size_t Most, std::size_t Tile = Batch::size == 8 ? 4 : 3>
 class ColumnProducts {
  public:
-  static constexpr std::size_t kTile = Batch::size == 8 ? 4 : 3;
+  static constexpr std::size_t kTile = Tile;  ///< side of the squares
+  /// Squares beside each other.
   static constexpr std::size_t tiles_of(std::size_t columns) {
     return (columns + kTile - 1) / kTile;
   }
   /// Room of a row of so many columns; those behind the last one must be zero.
   static constexpr std::size_t padded(std::size_t columns) { return tiles_of(columns) * kTile; }
 
-  explicit ColumnProducts(std::size_t columns) : columns_(columns), tiles_(tiles_of(columns)) {
+  /// @param columns  at most Most
+  explicit ColumnProducts(std::size_t columns) { start(columns); }
+  /// From zero, with so many columns.
+  void start(std::size_t columns) {
+    columns_ = columns;
+    tiles_ = tiles_of(columns);
     const Batch zero(0.0);
     for (std::size_t i = 0; i < tiles_ * (tiles_ + 1) / 2 * kTile * kTile; ++i) sums_[i] = zero;
   }
@@ -38,15 +45,16 @@ class ColumnProducts {
     }
   }
 
+  /// Sum of the products of columns i and j, of which i is not the larger.
+  const Batch& sum(std::size_t i, std::size_t j) const {
+    const std::size_t row = i / kTile;
+    const Batch* tile = sums_ + (row * tiles_ - row * (row + 1) / 2 + j / kTile) * kTile * kTile;
+    return tile[i % kTile * kTile + j % kTile];
+  }
   /// Writes the upper triangle row by row.
   void store(double* out) const {
     for (std::size_t i = 0; i < columns_; ++i) {
-      const std::size_t row_tile = i / kTile;
-      const Batch* first =
-          sums_ + (row_tile * tiles_ - row_tile * (row_tile + 1) / 2) * kTile * kTile;
-      for (std::size_t j = i; j < columns_; ++j) {
-        *out++ = sum_of_lanes(first[j / kTile * kTile * kTile + i % kTile * kTile + j % kTile]);
-      }
+      for (std::size_t j = i; j < columns_; ++j) *out++ = sum_of_lanes(sum(i, j));
     }
   }
 
@@ -70,8 +78,8 @@ class ColumnProducts {
     }
   }
 
-  std::size_t columns_, tiles_;
+  std::size_t columns_ = 0, tiles_ = 0;
   Batch sums_[kMost * (kMost + 1) / 2 * kTile * kTile];
 };
 
-}  // namespace risley::calibration
+}  // namespace risley
