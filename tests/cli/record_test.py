@@ -267,6 +267,24 @@ class RecordTest(CommandTest):
             self.assertTrue(3.5 < gap["end_s"] - gap["begin_s"] < 8, gap)
         self.assertIn("no data for 1 s", (self.folder / "cable.txt").read_text())
 
+    def test_a_full_disk(self):
+        sensor = self.sensor()
+        (self.folder / "small").mkdir()
+        script = """mount -t tmpfs -o size=1M none small && echo ready
+            "$0" record --interface 127.0.0.1 -o small/full.lvx --duration-s 20; echo $?; ls small
+            "$0" info small/full.lvx.unfinished --json > full.json"""
+        done = subprocess.run(["unshare", "-rm", "bash", "-c", script, COMMAND], cwd=self.folder, text=True,
+                              capture_output=True, timeout=120, check=False)
+        if not done.stdout.startswith("ready"):
+            print(f"SKIPPED: no small disk can be made: {done.stderr}", file=sys.stderr)
+            self.skipTest("namespaces")
+        self.assertEqual(done.stdout.split(), ["ready", "3", "full.lvx.unfinished"])
+        self.assertIn("No space left on device; what was recorded before is in it", done.stderr)
+        info = json.loads((self.folder / "full.json").read_text())
+        self.assertGreater(info["observations"], 80_000)
+        self.assertEqual(info["warnings"], [])
+        self.wait_for(lambda: not sensor.sampling)
+
     def test_passive_listens_and_sends_nothing(self):
         sender, other = bound("127.0.0.21", 0), bound("127.0.0.22", 0)
         process = self.start("-o", "passive.lvx", "--json", "--passive", "--find-s", 1, "--data-port",
