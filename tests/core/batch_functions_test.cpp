@@ -221,5 +221,37 @@ TEST(BatchFunctions, AxesQuadrantsAndLostShotsHaveTheirAngles) {
   }
 }
 
+// A shot's direction does not depend on the shots that happen to be computed with it.
+TEST(BatchFunctions, OfALaneDoNotDependOnTheOthers) {
+  const std::vector<double> angles = {0.3, 12.5, -400.0, 1e5};
+  const std::vector<Vector3<double>> directions = {
+      {0.98, 0.019, 0.198}, {0.9, 0.3, 0.316}, {0.99, -0.1, 0.09}, {0.97, 0.2, -0.13}};
+  for (const InstructionSet set : available_instruction_sets()) {
+    for (std::size_t lane = 0; lane < angles.size(); ++lane) {
+      const Sines alone = sines_of(std::vector<double>(kMostLanes, angles[lane]), set);
+      const Angles alone_at =
+          angles_of(std::vector<Vector3<double>>(kMostLanes, directions[lane]), set);
+      for (std::size_t other = 0; other < kMostLanes; ++other) {
+        if (other == lane) continue;
+        for (const double strange : {1e9, kNan, kInfinity}) {
+          std::vector<double> beside(kMostLanes, angles[lane]);
+          beside[other] = strange;
+          const Sines found = sines_of(beside, set);
+          EXPECT_EQ(found.sine[lane], alone.sine[lane]);
+          EXPECT_EQ(found.cosine[lane], alone.cosine[lane]);
+        }
+        for (const Vector3<double>& strange :
+             {Vector3<double>{0, 0, 1}, {-1, 0, 0}, {0.6, 0.8, 0}, {kNan, kNan, kNan}}) {
+          std::vector<Vector3<double>> beside(kMostLanes, directions[lane]);
+          beside[other] = strange;
+          const Angles found = angles_of(beside, set);
+          EXPECT_EQ(found.azimuth[lane], alone_at.azimuth[lane]);
+          EXPECT_EQ(found.zenith[lane], alone_at.zenith[lane]);
+        }
+      }
+    }
+  }
+}
+
 }  // namespace
 }  // namespace risley::batch_functions_test

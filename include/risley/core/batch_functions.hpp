@@ -12,12 +12,12 @@
 
 /// @file
 /// Sine, cosine and the angles of a direction for all lanes of a batch at once: polynomials where
-/// almost all shots are, and xsimd's functions, which are slower and know no limits, for a batch
-/// with a lane elsewhere. Absolute errors stay below 2.5e-16 and 1e-15
-/// (tests/core/batch_functions_test.cpp). Directions of shots take 6 % less time than with xsimd's
-/// sines and 22 % less than with its arcs with AVX2, 12 and 26 % less with AVX-512 (Zen 4).
-/// The polynomials interpolate at Chebyshev's nodes of the range that is named; the error beside
-/// each is theirs alone.
+/// almost all shots are, and xsimd's functions, which are slower and know no limits, for the lanes
+/// elsewhere: what a lane gives does not depend on the others. Absolute errors stay below 2.5e-16
+/// and 1e-15 (tests/core/batch_functions_test.cpp). Directions of shots take 6 % less time than
+/// with xsimd's sines and 22 % less than with its arcs with AVX2, 12 and 26 % less with AVX-512
+/// (Zen 4). The polynomials interpolate at Chebyshev's nodes of the range that is named; the error
+/// beside each is theirs alone.
 namespace risley {
 
 /// Coefficients of a polynomial, each in all lanes.
@@ -101,9 +101,7 @@ std::pair<xsimd::batch<double, Arch>, xsimd::batch<double, Arch>> sine_cosine(
     const xsimd::batch<double, Arch>& angle) {
   using Batch = xsimd::batch<double, Arch>;
   using Bits = xsimd::batch<std::uint64_t, Arch>;
-  if (__builtin_expect(xsimd::any(xsimd::abs(angle) > Batch(kLargestReduced)), 0)) {
-    return any_sine_cosine(angle);
-  }
+  const auto beyond = xsimd::abs(angle) > Batch(kLargestReduced);
   // Adding 1.5 * 2^52 leaves q in the lowest bits: no conversion to integers, which AVX2 lacks.
   constexpr double kToLowestBits = 6755399441055744.0;
   constexpr double kQuartersPerRadian = 0x1.45f306dc9c883p-1;
@@ -125,8 +123,14 @@ std::pair<xsimd::batch<double, Arch>, xsimd::batch<double, Arch>> sine_cosine(
   const auto odd = xsimd::bitwise_cast<Batch>(q & Bits(kTwo)) != Batch(0.0);
   const Batch sine_sign = xsimd::bitwise_cast<Batch>(q & Bits(kSign));
   const Batch cosine_sign = xsimd::bitwise_cast<Batch>((q + Bits(kTwo)) & Bits(kSign));
-  return {xsimd::select(odd, cosine, sine) ^ sine_sign,
-          xsimd::select(odd, sine, cosine) ^ cosine_sign};
+  std::pair<Batch, Batch> result{xsimd::select(odd, cosine, sine) ^ sine_sign,
+                                 xsimd::select(odd, sine, cosine) ^ cosine_sign};
+  if (__builtin_expect(xsimd::any(beyond), 0)) {
+    const std::pair<Batch, Batch> others = any_sine_cosine(angle);
+    result.first = xsimd::select(beyond, others.first, result.first);
+    result.second = xsimd::select(beyond, others.second, result.second);
+  }
+  return result;
 }
 
 /// (atan t / t - 1) / s in s = t^2, for |t| <= 0.4142: error 6e-17 of atan t.
@@ -149,17 +153,22 @@ SphericalAngles<xsimd::batch<double, Arch>> cone_angles(
     const Vector3<xsimd::batch<double, Arch>>& direction) {
   using Batch = xsimd::batch<double, Arch>;
   constexpr double kMostTangent = 0.4142, kMostHeight = 0.42;
-  // Comparison with NaN is false: shots that do not get through send no batch the long way.
+  // Comparison with NaN is false: shots that do not get through take no batch the long way.
   const auto outside = (xsimd::abs(direction.y) > Batch(kMostTangent) * direction.x) |
                        (xsimd::abs(direction.z) > Batch(kMostHeight));
-  if (__builtin_expect(xsimd::any(outside), 0)) return any_angles(direction);
   const Batch t = direction.y / direction.x, s = t * t;
   const Batch& z = direction.z;
   const Batch w = z * z;
   const Batch one(1.0);
   const Batch arc_sine = z * xsimd::fma(w, polynomial<kArcSineSeries>(w), one);
-  return {t * xsimd::fma(s, polynomial<kArcTangentSeries>(s), one),
-          Batch(1.5707963267948966) - arc_sine};
+  SphericalAngles<Batch> result{t * xsimd::fma(s, polynomial<kArcTangentSeries>(s), one),
+                                Batch(1.5707963267948966) - arc_sine};
+  if (__builtin_expect(xsimd::any(outside), 0)) {
+    const SphericalAngles<Batch> others = any_angles(direction);
+    result.azimuth = xsimd::select(outside, others.azimuth, result.azimuth);
+    result.zenith = xsimd::select(outside, others.zenith, result.zenith);
+  }
+  return result;
 }
 
 }  // namespace risley
