@@ -144,8 +144,22 @@ ChangeTest test_of_change(const Pair& pair, const NamedCovariance& sum) {
 
 }  // namespace
 
+double value_of(const Sensor& sensor, const std::string& name) {
+  return name == kRangeOffset ? sensor.range_offset : sensor.get(name);
+}
+
+FileUnit file_unit_of(const std::string& name, TrainShape shape) {
+  if (name == kRangeOffset) return {"m", 1};
+  const ParameterInfo& parameter = find_parameter(name, shape);
+  return {parameter.unit, parameter.si_per_unit};
+}
+
+bool have_same_optics(const Sensor& a, const Sensor& b) {
+  return a.shape() == b.shape() && a.train.face_order() == b.train.face_order();
+}
+
 void require_same_optics(const Sensor& a, const Sensor& b) {
-  if (a.shape() == b.shape() && a.train.face_order() == b.train.face_order()) return;
+  if (have_same_optics(a, b)) return;
   const auto words = [](const Sensor& sensor) {
     return fmt::format("{} prisms ({}) and {} emitters", sensor.prisms(),
                        to_string(sensor.train.face_order()), sensor.train.emitters());

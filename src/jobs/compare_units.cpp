@@ -19,6 +19,7 @@
 #include "risley/core/error.hpp"
 #include "risley/core/require.hpp"
 #include "risley/io/table_input.hpp"
+#include "risley/jobs/result_files.hpp"
 
 namespace risley::jobs {
 namespace {
@@ -141,10 +142,6 @@ std::vector<ComparedUnit> units_of(const LoadedResults& loaded, std::vector<Left
     units[place->second].results.push_back(i);
   }
   return units;
-}
-
-bool have_same_optics(const Sensor& a, const Sensor& b) {
-  return a.shape() == b.shape() && a.train.face_order() == b.train.face_order();
 }
 
 /// Units with one kind of optics and one name.

@@ -94,6 +94,7 @@ class Emulator {
  private:
   void power_on(std::int64_t now);
   void power_off(std::int64_t now, std::int64_t time_ns);
+  void end_session();
   void take_commands(std::int64_t now);
   void say(std::int64_t now);
   void follow_session(std::int64_t now);
@@ -134,10 +135,15 @@ void Emulator::power_on(std::int64_t now) {
 
 void Emulator::power_off(std::int64_t now, std::int64_t time_ns) {
   end_stream(now);
+  end_session();
+  dead_until_ns_ = now + time_ns;
+}
+
+void Emulator::end_session() {
+  if (!session_) return;
   truth_.rejected += session_->rejected();
   truth_.sessions += session_->handshakes();
   session_.reset();
-  dead_until_ns_ = now + time_ns;
 }
 
 void Emulator::take_commands(std::int64_t now) {
@@ -355,10 +361,7 @@ EmulatedSensor Emulator::run() {
   truth_.address = identity_.address;
   truth_.duration = 1e-9 * static_cast<double>(steady_ns() - begin);
   truth_.kernel_drops = socket_.kernel_drops();
-  if (session_) {
-    truth_.rejected += session_->rejected();
-    truth_.sessions += session_->handshakes();
-  }
+  end_session();
   return truth_;
 }
 

@@ -3,6 +3,7 @@
 #include "jobs/emulated_scan.hpp"
 
 #include <limits>
+#include <optional>
 #include <utility>
 
 #include <fmt/format.h>
@@ -28,9 +29,11 @@ constexpr const char* kRoom = R"(planes:
   - {name: ceiling, distance_m: 2.5, normal_azimuth_deg: 0, normal_zenith_deg: 0}
 )";
 
-ShotGrid grid_of(std::uint8_t device_type) {
-  return device_type == recordings::kMid40 || device_type == recordings::kMid70 ? kGrid100kHz
-                                                                                : kGrid240kHz;
+/// Of packets with tags; those without are of the Mid-40, whose grid is the same.
+std::optional<ShotGrid> grid_of(int device_type) {
+  constexpr std::uint8_t kTagged = 2;
+  const auto type = static_cast<std::uint8_t>(device_type);
+  return type == device_type ? shot_grid(type, kTagged) : std::nullopt;
 }
 
 simulation::SimulationSettings settings_of(const SimulationOptions& options) {
@@ -40,17 +43,14 @@ simulation::SimulationSettings settings_of(const SimulationOptions& options) {
   wanted.quantize = false;  // what a packet holds is rounded as the sensor does
   simulation::SimulationSettings settings = simulation_settings(wanted);
   const int type = settings.truth.device_type;
-  const bool known = type == recordings::kMid40 || type == recordings::kTele15 ||
-                     type == recordings::kHorizon || type == recordings::kMid70 ||
-                     type == recordings::kAvia;
-  if (!known) {
+  const std::optional<ShotGrid> grid = grid_of(type);
+  if (!grid) {
     throw InvalidArgument(fmt::format(
         "option sensor = {}: the device type {} is none that can be emulated, allowed 1 (Mid-40), "
         "2 (Tele-15), 3 (Horizon), 6 (Mid-70), 7 (Avia)",
         options.sensor, type));
   }
-  const ShotGrid grid = grid_of(static_cast<std::uint8_t>(type));
-  settings.rate = 1e9 * grid.interval_denominator / grid.interval_numerator_ns;
+  settings.rate = 1e9 * grid->interval_denominator / grid->interval_numerator_ns;
   if (!settings.scene) settings.scene = scenes::parse_scene(kRoom, "the built-in room");
   return settings;
 }
@@ -58,7 +58,9 @@ simulation::SimulationSettings settings_of(const SimulationOptions& options) {
 }  // namespace
 
 EmulatedScan::EmulatedScan(const SimulationOptions& options)
-    : settings_(settings_of(options)), scanner_(std::make_unique<simulation::Scanner>(settings_)) {
+    : settings_(settings_of(options)),
+      grid_(*grid_of(settings_.truth.device_type)),
+      scanner_(std::make_unique<simulation::Scanner>(settings_)) {
   device_ = scanner_->header().devices.front();
 }
 
@@ -106,18 +108,18 @@ std::span<const std::uint8_t> EmulatedScan::imu(std::int64_t time_ns) {
   return packet_;
 }
 
+std::uint64_t EmulatedScan::period_numerator_ns(std::uint8_t data_type) const {
+  return std::uint64_t{record_layout(data_type)->records} * grid_.interval_numerator_ns;
+}
+
 std::int64_t EmulatedScan::time_of(std::uint64_t packets, std::uint8_t data_type) const {
-  const ShotGrid grid = grid_of(device_.type);
-  const std::uint64_t period =
-      std::uint64_t{record_layout(data_type)->records} * grid.interval_numerator_ns;
-  return static_cast<std::int64_t>(packets * period / grid.interval_denominator);
+  return static_cast<std::int64_t>(packets * period_numerator_ns(data_type) /
+                                   grid_.interval_denominator);
 }
 
 std::uint64_t EmulatedScan::packets_in(std::int64_t time_ns, std::uint8_t data_type) const {
-  const ShotGrid grid = grid_of(device_.type);
-  const std::uint64_t period =
-      std::uint64_t{record_layout(data_type)->records} * grid.interval_numerator_ns;
-  return static_cast<std::uint64_t>(time_ns) * grid.interval_denominator / period;
+  return static_cast<std::uint64_t>(time_ns) * grid_.interval_denominator /
+         period_numerator_ns(data_type);
 }
 
 }  // namespace risley::jobs

@@ -33,9 +33,12 @@ class EmulatedScan {
 
  private:
   void read_shots();
+  /// Of a packet's period, over the grid's denominator.
+  std::uint64_t period_numerator_ns(std::uint8_t data_type) const;
   void begin_packet(std::uint8_t data_type, std::int64_t time_ns);
 
   simulation::SimulationSettings settings_;
+  recordings::livox::ShotGrid grid_;
   recordings::Device device_;
   std::unique_ptr<simulation::Scanner> scanner_;
   recordings::Chunk chunk_;

@@ -45,7 +45,7 @@ Known known_of(const Sensor& unit, const NamedCovariance& known, const std::stri
   const Eigen::Index at = known.find(name);
   const double variance = at < 0 ? 0 : known.matrix(at, at);
   if (!(variance > 0)) return {};
-  return {name == kRangeOffset ? unit.range_offset : unit.get(name), std::sqrt(variance)};
+  return {value_of(unit, name), std::sqrt(variance)};
 }
 
 /// Everything that the bundle of beams follows from, in the middle of the fleet.
@@ -166,9 +166,8 @@ std::size_t largest_part(const Sensor& unit, const Fleet& fleet, Eigen::Index co
   double most = 0;
   for (std::size_t k = 0; k < fleet.parameters.size(); ++k) {
     const FleetParameter& one = fleet.parameters[k];
-    const double value = one.name == kRangeOffset ? unit.range_offset : unit.get(one.name);
     const double part = std::abs(fleet.combinations(static_cast<Eigen::Index>(k), combination) *
-                                 (value - one.middle));
+                                 (value_of(unit, one.name) - one.middle));
     if (part <= most) continue;
     most = part;
     largest = k;

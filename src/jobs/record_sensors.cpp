@@ -40,11 +40,6 @@ constexpr std::size_t kMostPassiveSensors = 16;
 /// Of a status: anything but what a healthy sensor reports (PPS, PTP, time synchronisation).
 constexpr std::uint32_t kTroubles = 0xC0000DFF;
 
-bool may_have_imu(std::uint8_t device_type) {
-  return device_type == recordings::kAvia || device_type == recordings::kHorizon ||
-         device_type == recordings::kTele15;
-}
-
 /// Shots of the Mid-40 firmware that stores several returns as so many records.
 std::optional<recordings::livox::ShotGrid> grid_of_firmware(const std::string& firmware) {
   if (firmware == "03.03.0001" || firmware == "03.03.0006") {
@@ -232,7 +227,7 @@ void Recorder::begin_session(LiveSensor& live, std::int64_t now) {
   settings.command_port = live.commands->local().port;
   settings.spherical = options_.spherical;
   settings.return_mode = options_.return_mode;
-  if (may_have_imu(live.result.sensor.device_type)) settings.imu = options_.imu;
+  if (wire::has_imu(live.result.sensor.device_type)) settings.imu = options_.imu;
   if (live.session) live.session_rejected += live.session->rejected();
   live.session.emplace(settings, now);
   live.session_begin_ns = now;
@@ -507,7 +502,7 @@ RecordedSensors Recorder::result() {
 RecordedSensors record_sensors(const RecordOptions& options, const RecordNote& note,
                                const Progress& progress) {
   if (options.duration) require_above("option duration", *options.duration, 0, "s");
-  require_between("option find_time", options.find_time, 0.1, 3600, "s");
+  require_find_time(options);
   return Recorder(options, wire::interface_of(options.interface), note, progress).run();
 }
 

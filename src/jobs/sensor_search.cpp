@@ -23,6 +23,10 @@ std::int64_t steady_ns() {
   return std::chrono::nanoseconds(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
+void require_find_time(const RecordOptions& options) {
+  require_between("option find_time", options.find_time, 0.1, 3600, "s");
+}
+
 BroadcastListener::BroadcastListener(const wire::Interface& interface) {
   // Each hears what is sent to its address only. Broadcasts come to 255.255.255.255; those of some
   // emulators to the network, or to this host alone.
@@ -65,7 +69,6 @@ std::vector<FoundSensor> BroadcastListener::take() {
 
 std::vector<FoundSensor> search_sensors(BroadcastListener& listener, const RecordOptions& options,
                                         const Progress& progress) {
-  require_between("option find_time", options.find_time, 0.1, 3600, "s");
   std::map<std::string, FoundSensor> found;
   std::vector<const wire::UdpSocket*> waiting;
   listener.add_to(waiting);
@@ -93,6 +96,7 @@ std::vector<FoundSensor> search_sensors(BroadcastListener& listener, const Recor
 }
 
 std::vector<FoundSensor> find_sensors(const RecordOptions& options, const Progress& progress) {
+  require_find_time(options);
   BroadcastListener listener(wire::interface_of(options.interface));
   return search_sensors(listener, options, progress);
 }

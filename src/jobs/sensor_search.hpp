@@ -31,6 +31,9 @@ class BroadcastListener {
   std::uint64_t strangers_ = 0;
 };
 
+/// @throws InvalidArgument for an option find_time out of its range
+void require_find_time(const RecordOptions& options);
+
 /// Listens for options.find_time, or until all of options.serials were heard. By serial number.
 std::vector<FoundSensor> search_sensors(BroadcastListener& listener, const RecordOptions& options,
                                         const Progress& progress);

@@ -11,19 +11,10 @@
 #include "json/parts.hpp"
 
 namespace risley::json {
-namespace {
-
-/// SI units per unit that the name of a parameter ends with.
-double si_per_unit(const std::string& name, TrainShape shape) {
-  return name == jobs::kRangeOffset ? 1 : find_parameter(name, shape).si_per_unit;
-}
-
-}  // namespace
-
 Json of(const jobs::ResultComparison& compared) {
   Json differences = Json::object();
   for (const jobs::ParameterDifference& one : compared.parameters) {
-    const double unit = si_per_unit(one.name, compared.b.shape());
+    const double unit = jobs::file_unit_of(one.name, compared.b.shape()).si_per_unit;
     differences[one.name] = {{"value", one.difference / unit}, {"sigma", one.sigma / unit}};
   }
   return {{"same_unit", compared.same_unit},
@@ -58,7 +49,7 @@ Json fleet_json(const jobs::ComparedFleet& one, const jobs::ComparedUnits& compa
   const jobs::Fleet& fleet = one.fleet;
   Json parameters = Json::object(), units = Json::array();
   for (const jobs::FleetParameter& parameter : fleet.parameters) {
-    const double unit = si_per_unit(parameter.name, fleet.shape);
+    const double unit = jobs::file_unit_of(parameter.name, fleet.shape).si_per_unit;
     parameters[parameter.name] = {{"middle", parameter.middle / unit},
                                   {"spread", parameter.spread / unit}};
   }

@@ -115,20 +115,12 @@ std::string fleet_html(const ComparedFleet& one, const ComparedUnits& compared) 
              one.units.size(), one.fleet.parameters.size(), one.fleet.combinations.cols());
 }
 
-double si_per_unit(const std::string& name, TrainShape shape) {
-  return name == jobs::kRangeOffset ? 1 : find_parameter(name, shape).si_per_unit;
-}
-
-std::string unit_of(const std::string& name, TrainShape shape) {
-  return name == jobs::kRangeOffset ? "m" : find_parameter(name, shape).unit;
-}
-
 /// One parameter over results, in the unit of files.
 class ParameterChart {
  public:
   ParameterChart(std::string name, std::string x_label, TrainShape shape)
-      : unit_(si_per_unit(name, shape)) {
-    chart_.y_label = unit_of(name, shape);
+      : unit_(jobs::file_unit_of(name, shape).si_per_unit) {
+    chart_.y_label = jobs::file_unit_of(name, shape).unit;
     chart_.title = std::move(name);
     chart_.x_label = std::move(x_label);
   }
@@ -205,10 +197,10 @@ std::string fleet_parameters_html(const jobs::Fleet& fleet) {
       "<table><thead><tr><th>parameter</th><th>middle</th><th>spread among units</th><th>unit</th>"
       "</tr></thead><tbody>\n";
   for (const jobs::FleetParameter& one : fleet.parameters) {
-    const double unit = si_per_unit(one.name, fleet.shape);
-    html +=
-        fmt::format("<tr><th scope=\"row\">{}</th><td>{:.5f}</td><td>{:.5f}</td><td>{}</td></tr>\n",
-                    one.name, one.middle / unit, one.spread / unit, unit_of(one.name, fleet.shape));
+    const jobs::FileUnit unit = jobs::file_unit_of(one.name, fleet.shape);
+    html += fmt::format(
+        "<tr><th scope=\"row\">{}</th><td>{:.5f}</td><td>{:.5f}</td><td>{}</td></tr>\n", one.name,
+        one.middle / unit.si_per_unit, one.spread / unit.si_per_unit, unit.unit);
   }
   return html +
          "</tbody></table>\n<p class=\"note\">Median of the units and standard deviation among "

@@ -18,11 +18,6 @@ constexpr std::uint8_t kOk = 0, kFailed = 1;
 constexpr unsigned kSystemAt = 30;
 constexpr std::uint8_t kMostParameterValue = 1;
 
-bool has_imu(std::uint8_t device_type) {
-  return device_type == recordings::kAvia || device_type == recordings::kHorizon ||
-         device_type == recordings::kTele15;
-}
-
 ResultReply result_of(const Command& command, bool ok) {
   return {command_id(command), ok ? kOk : kFailed};
 }

@@ -57,6 +57,20 @@ enum class OneUnit {
   caller,   ///< whoever asks, unless the serial numbers are known and differ
 };
 
+/// A quantity's value in a sensor, SI units. @param name  as in parameter_list(), or kRangeOffset
+/// @throws InvalidArgument
+double value_of(const sensors::Sensor& sensor, const std::string& name);
+
+/// How files have a quantity.
+struct FileUnit {
+  std::string unit;        ///< "1", "deg", "m"
+  double si_per_unit = 1;  ///< SI units in one of it
+};
+/// @param name  as value_of(). @throws InvalidArgument
+FileUnit file_unit_of(const std::string& name, TrainShape shape);
+
+/// Whether the optics of two sensors have the same parameters.
+bool have_same_optics(const sensors::Sensor& a, const sensors::Sensor& b);
 /// Refuses sensors whose optics have not the same parameters. @throws InvalidArgument naming them
 void require_same_optics(const sensors::Sensor& a, const sensors::Sensor& b);
 
