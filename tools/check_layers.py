@@ -19,8 +19,8 @@ FLAG = re.compile(r"(?<![\w-])--[a-z][a-z0-9-]*")
 PROGRAMS = ("apps", "studies", "bench")  # may use every layer
 BINDINGS = "python"  # src/python: may use every layer's public headers, and nothing may use it
 # Libraries with one home: what others need of them, they ask that layer for.
-HOMES = {"netcdf": "io", "hdf5": "io", "yaml-cpp": "io", "openssl": "io", "sqlite3": "io", "proj": "cloud",
-         "proj_experimental": "cloud", "pybind11": BINDINGS}
+HOMES = {"netcdf": "io", "hdf5": "io", "yaml-cpp": "io", "openssl": "io", "sqlite3": "io", "pcap": "recordings",
+         "proj": "cloud", "proj_experimental": "cloud", "pybind11": BINDINGS}
 STRANGERS = ("simulation", "estimation")  # they meet only in tests, so their agreement counts
 
 

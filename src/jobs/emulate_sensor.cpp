@@ -31,6 +31,18 @@ constexpr std::int64_t kLongestRest = 20'000'000, kShortestRest = 200'000;  // n
 constexpr int kPacketsAtOnce = 256;
 constexpr double kFastest = 100;
 
+/// What sensors of a type can do. @param device_type  as recordings::Device::type
+wire::SensorAbilities abilities_of(std::uint8_t device_type) {
+  const bool is_avia = device_type == recordings::kAvia;
+  wire::SensorAbilities abilities;
+  abilities.return_modes = device_type != recordings::kMid40;
+  abilities.triple = abilities.scan_pattern = is_avia;
+  abilities.imu = recordings::livox::has_imu(device_type);
+  abilities.high_sensitivity = is_avia || device_type == recordings::kTele15;
+  if (is_avia) abilities.reserved = wire::kSensorPort;
+  return abilities;
+}
+
 /// Decisions with a share, one after the other; each purpose has its own, so that one fault does
 /// not change where others fall.
 class Chance {
@@ -87,6 +99,7 @@ class Emulator {
     identity_.device_type = scan_.device().type;
     identity_.firmware = {3, 8, 0, 0};
     identity_.address = socket_.local().address;
+    identity_.abilities = abilities_of(identity_.device_type);
   }
 
   EmulatedSensor run();

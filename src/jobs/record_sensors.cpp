@@ -15,6 +15,8 @@
 #include <fmt/ranges.h>
 
 #include "risley/core/require.hpp"
+#include "risley/recordings/livox/first_packets.hpp"
+#include "risley/recordings/livox/packet_decoder.hpp"
 #include "risley/recordings/livox/packet_file.hpp"
 #include "risley/wire/client_session.hpp"
 
@@ -40,17 +42,6 @@ constexpr std::size_t kMostPassiveSensors = 16;
 /// Of a status: anything but what a healthy sensor reports (PPS, PTP, time synchronisation).
 constexpr std::uint32_t kTroubles = 0xC0000DFF;
 
-/// Shots of the Mid-40 firmware that stores several returns as so many records.
-std::optional<recordings::livox::ShotGrid> grid_of_firmware(const std::string& firmware) {
-  if (firmware == "03.03.0001" || firmware == "03.03.0006") {
-    return recordings::livox::ShotGrid{10'000, 1, 1, 2};
-  }
-  if (firmware == "03.03.0002" || firmware == "03.03.0007") {
-    return recordings::livox::ShotGrid{50'000, 3, 1, 3};
-  }
-  return std::nullopt;
-}
-
 /// A sensor while it is recorded.
 struct LiveSensor {
   explicit LiveSensor(const FoundSensor& found) : order(found.device_type) {
@@ -58,7 +49,7 @@ struct LiveSensor {
   }
 
   RecordedSensor result;
-  wire::PacketOrder order;
+  recordings::livox::PacketOrder order;
   std::unique_ptr<wire::UdpSocket> commands, data;
   std::optional<wire::ClientSession> session;
   std::int64_t session_begin_ns = 0;
@@ -113,13 +104,12 @@ class Recorder {
 /// Whoever sends packets to the data port, and what their times say of the sensor.
 std::vector<FoundSensor> Recorder::find_passively() {
   struct Heard {
-    std::optional<std::int64_t> last_time_ns;
-    std::int64_t shortest_ns = std::numeric_limits<std::int64_t>::max();
-    std::uint8_t data_type = 0;
+    recordings::livox::PacketDecoder decoder{{.grid = recordings::livox::kGrid100kHz}};
+    recordings::livox::FirstPackets packets;
   };
   std::map<wire::Address, Heard> heard;
   std::map<wire::Address, FoundSensor> named;
-  recordings::livox::PacketClock clock;
+  recordings::Chunk chunk;
   const std::int64_t begin = steady_ns();
   const auto time = static_cast<std::int64_t>(1e9 * options_.find_time);
   for (std::int64_t now = begin; now - begin < time; now = steady_ns()) {
@@ -127,20 +117,17 @@ std::vector<FoundSensor> Recorder::find_passively() {
     wire::wait_for(waiting_, std::min(kLongestPoll, begin + time - now));
     for (const FoundSensor& sensor : listener_.take()) named.try_emplace(sensor.address, sensor);
     passive_data_->receive([&](const wire::UdpSocket::Datagram& datagram) {
-      wire::PacketOrder check(recordings::kMid40);
-      if (!check.add(datagram.bytes, 0) ||
-          (heard.size() >= kMostPassiveSensors && !heard.contains(datagram.from.address))) {
+      if (heard.size() >= kMostPassiveSensors && !heard.contains(datagram.from.address)) return;
+      chunk.clear();
+      Heard one = heard.contains(datagram.from.address) ? heard[datagram.from.address] : Heard{};
+      try {
+        one.decoder.decode(datagram.bytes, chunk);
+      } catch (const recordings::livox::BadPacket&) {
         return;
       }
-      const auto packet = recordings::livox::decode_packet_header(datagram.bytes);
-      if (packet.data_type == recordings::livox::kImuDataType) return;
-      Heard& one = heard[datagram.from.address];
-      const std::int64_t time_ns = clock.time_ns(packet).value_or(0);
-      if (one.last_time_ns && time_ns > *one.last_time_ns) {
-        one.shortest_ns = std::min(one.shortest_ns, time_ns - *one.last_time_ns);
-      }
-      one.last_time_ns = time_ns;
-      one.data_type = packet.data_type;
+      if (chunk.observations.size() == 0) return;
+      one.packets.add(chunk.packets.front(), chunk.observations, 0);
+      heard[datagram.from.address] = one;
     });
   }
   std::vector<FoundSensor> found;
@@ -148,16 +135,8 @@ std::vector<FoundSensor> Recorder::find_passively() {
     FoundSensor sensor{to_string(address), recordings::kUnknownDeviceType, address};
     if (const auto known = named.find(address); known != named.end()) {
       sensor = known->second;
-    } else if (one.data_type < 2) {
-      sensor.device_type = recordings::kMid40;
-    } else if (one.data_type > recordings::livox::kImuDataType) {
-      sensor.device_type = recordings::kAvia;
     } else {
-      // 10 us between shots are the Mid-70's; 4.2 us are those of three sensors.
-      constexpr std::int64_t kBetween = 7000;
-      const std::int64_t interval =
-          one.shortest_ns / recordings::livox::record_layout(one.data_type)->records;
-      if (interval > kBetween) sensor.device_type = recordings::kMid70;
+      sensor.device_type = one.packets.device_type();
     }
     found.push_back(std::move(sensor));
   }
@@ -227,7 +206,7 @@ void Recorder::begin_session(LiveSensor& live, std::int64_t now) {
   settings.command_port = live.commands->local().port;
   settings.spherical = options_.spherical;
   settings.return_mode = options_.return_mode;
-  if (wire::has_imu(live.result.sensor.device_type)) settings.imu = options_.imu;
+  if (recordings::livox::has_imu(live.result.sensor.device_type)) settings.imu = options_.imu;
   if (live.session) live.session_rejected += live.session->rejected();
   live.session.emplace(settings, now);
   live.session_begin_ns = now;
@@ -240,7 +219,7 @@ void Recorder::take_event(LiveSensor& live, const ClientEvent& event) {
       break;
     case ClientEvent::Kind::firmware:
       live.result.firmware = event.text;
-      if (const auto grid = grid_of_firmware(event.text)) live.order.set_grid(*grid);
+      if (const auto grid = recordings::livox::grid_of_firmware(event.text)) live.order.set_grid(*grid);
       break;
     case ClientEvent::Kind::sensor_state:
       if (event.value != static_cast<std::uint32_t>(wire::SensorState::normal)) {
@@ -487,7 +466,7 @@ RecordedSensors Recorder::result() {
     one.kernel_drops = data.kernel_drops();
     one.rejected += one.counts.rejected + live->session_rejected +
                     (live->session ? live->session->rejected() : 0);
-    for (const wire::PacketGap& gap : live->order.gaps()) {
+    for (const recordings::livox::PacketGap& gap : live->order.gaps()) {
       one.gaps.push_back({1e-9 * static_cast<double>(gap.host_from_ns - first_host_ns),
                           1e-9 * static_cast<double>(gap.host_to_ns - first_host_ns), gap.lost,
                           gap.imu});

@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "risley/core/progress.hpp"
+#include "risley/recordings/livox/packet_order.hpp"
 #include "risley/wire/commands.hpp"
-#include "risley/wire/packet_order.hpp"
 
 namespace risley::jobs {
 
@@ -47,7 +47,7 @@ struct RecordedGap {
 struct RecordedSensor {
   FoundSensor sensor;
   std::string firmware;       ///< empty where it was not told
-  wire::PacketCounts counts;  ///< without those of strangers
+  recordings::livox::PacketCounts counts;  ///< without those of strangers
   std::uint64_t kernel_drops = 0;
   std::uint64_t rejected = 0;  ///< datagrams that were no packets, or from somebody else
   std::uint64_t sessions = 0;  ///< handshakes that were answered

@@ -13,7 +13,7 @@
 #include "risley/recordings/livox/packet.hpp"
 #include "risley/recordings/livox/packet_decoder.hpp"
 
-namespace risley::wire {
+namespace risley::recordings::livox {
 
 /// What the packets of one sensor came to.
 struct PacketCounts {
@@ -54,7 +54,7 @@ class PacketOrder {
   explicit PacketOrder(std::uint8_t device_type);
 
   /// How special firmware measures, where the device type does not tell.
-  void set_grid(const recordings::livox::ShotGrid& grid) { grid_ = grid; }
+  void set_grid(const ShotGrid& grid) { grid_ = grid; }
 
   /// Takes a datagram that the sensor sent to the data port.
   /// @param host_ns  when it came  @return whether it is a packet
@@ -95,9 +95,9 @@ class PacketOrder {
   std::int64_t period_of(std::uint8_t data_type) const;
 
   std::uint8_t device_type_;
-  std::optional<recordings::livox::ShotGrid> grid_;
-  recordings::livox::PacketDecoder decoder_;
-  recordings::Chunk chunk_;
+  std::optional<ShotGrid> grid_;
+  PacketDecoder decoder_;
+  Chunk chunk_;
   std::array<Track, 2> tracks_;
   PacketCounts counts_;
   std::optional<std::int64_t> first_host_ns_;
@@ -105,4 +105,4 @@ class PacketOrder {
   std::vector<std::vector<std::uint8_t>> ready_;
 };
 
-}  // namespace risley::wire
+}  // namespace risley::recordings::livox

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-#include "risley/wire/packet_order.hpp"
+#include "risley/recordings/livox/packet_order.hpp"
 
 #include <algorithm>
 #include <random>
@@ -10,22 +10,19 @@
 #include "risley/io/little_endian.hpp"
 #include "risley/recordings/livox/packet_encoder.hpp"
 
-namespace risley::wire::order_test {
-
-using recordings::livox::kPacketHeaderBytes;
-using recordings::livox::record_layout;
+namespace risley::recordings::livox::order_test {
 
 constexpr std::int64_t kMicrosecond = 1000, kMillisecond = 1'000'000, kSecond = 1'000'000'000;
 
 /// A packet without a return of a sensor that counts from power-on or as the type says.
 std::vector<std::uint8_t> packet(std::int64_t time_ns, std::uint8_t data_type = 1,
                                  std::uint8_t timestamp_type = 0) {
-  recordings::Packet header;
+  Packet header;
   header.data_type = data_type;
   header.timestamp_type = timestamp_type;
-  header.timestamp = recordings::livox::encode_timestamp(timestamp_type, time_ns);
+  header.timestamp = encode_timestamp(timestamp_type, time_ns);
   std::vector<std::uint8_t> bytes(kPacketHeaderBytes + record_layout(data_type)->bytes());
-  recordings::livox::encode_packet_header(header, bytes.data());
+  encode_packet_header(header, bytes.data());
   return bytes;
 }
 
@@ -222,4 +219,4 @@ TEST(PacketOrder, GapsAreLimited) {
   EXPECT_EQ(order.counts().lost, 2999U * 199U);
 }
 
-}  // namespace risley::wire::order_test
+}  // namespace risley::recordings::livox::order_test

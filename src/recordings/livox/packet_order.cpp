@@ -1,15 +1,13 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-#include "risley/wire/packet_order.hpp"
+#include "risley/recordings/livox/packet_order.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
-namespace risley::wire {
+namespace risley::recordings::livox {
 namespace {
-
-using namespace recordings::livox;
 
 constexpr std::int64_t kImuPeriod = 5'000'000;         // ns
 constexpr std::int64_t kNotableGap = 100'000'000;      // ns
@@ -49,7 +47,7 @@ bool PacketOrder::add(std::span<const std::uint8_t> packet, std::int64_t host_ns
     return false;
   }
   if (!first_host_ns_) first_host_ns_ = host_ns;
-  const recordings::Packet& header = chunk_.packets.front();
+  const Packet& header = chunk_.packets.front();
   const bool is_imu = header.data_type == kImuDataType;
   Track& track = tracks_[is_imu ? 1 : 0];
   if (track.timestamp_type && *track.timestamp_type != header.timestamp_type) restart(track);
@@ -143,4 +141,4 @@ void PacketOrder::flush() {
 
 std::vector<std::vector<std::uint8_t>> PacketOrder::take() { return std::exchange(ready_, {}); }
 
-}  // namespace risley::wire
+}  // namespace risley::recordings::livox
