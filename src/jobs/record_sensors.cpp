@@ -5,16 +5,21 @@
 #include <algorithm>
 #include <chrono>
 #include <exception>
+#include <filesystem>
 #include <iterator>
 #include <limits>
 #include <map>
 #include <memory>
+#include <set>
+#include <system_error>
 #include <utility>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
 #include "risley/core/require.hpp"
+#include "risley/core/text.hpp"
+#include "risley/jobs/convert_recording.hpp"
 #include "risley/recordings/livox/first_packets.hpp"
 #include "risley/recordings/livox/packet_decoder.hpp"
 #include "risley/recordings/livox/packet_file.hpp"
@@ -41,6 +46,9 @@ constexpr std::size_t kMostStatuses = 100;
 constexpr std::size_t kMostPassiveSensors = 16;
 /// Of a status: anything but what a healthy sensor reports (PPS, PTP, time synchronisation).
 constexpr std::uint32_t kTroubles = 0xC0000DFF;
+
+/// Whether the output is made of the file that grows.
+bool is_converted(const std::string& output) { return lower_case(output).ends_with(".nc"); }
 
 /// A sensor while it is recorded.
 struct LiveSensor {
@@ -79,11 +87,13 @@ class Recorder {
   void step_session(LiveSensor& live, std::int64_t now);
   void take_event(LiveSensor& live, const ClientEvent& event);
   void take_broadcasts(std::int64_t now);
+  void tell_of_newcomer(const FoundSensor& heard);
   void take_commands(LiveSensor& live, std::int64_t now);
   void take_data(LiveSensor& live, std::int64_t now);
   void watch_silence(LiveSensor& live, std::int64_t now);
   void write_frame(bool last);
   void stop_all();
+  void finish_file();
   RecordedSensors result();
   static std::string name_of(const LiveSensor& live) { return live.result.sensor.serial; }
 
@@ -94,6 +104,7 @@ class Recorder {
   BroadcastListener listener_;
   std::unique_ptr<wire::UdpSocket> passive_data_;  // for all sensors
   std::vector<std::unique_ptr<LiveSensor>> sensors_;
+  std::set<std::string> newcomers_;  // serial numbers
   std::unique_ptr<PacketFile> file_;
   std::vector<const wire::UdpSocket*> waiting_;
   std::optional<std::int64_t> first_data_ns_;
@@ -215,11 +226,15 @@ void Recorder::begin_session(LiveSensor& live, std::int64_t now) {
 void Recorder::take_event(LiveSensor& live, const ClientEvent& event) {
   switch (event.kind) {
     case ClientEvent::Kind::connected:
+      // What is there was sent before; the sensor sends nothing more until it is started again.
+      take_data(live, steady_ns());
+      live.order.flush();
       ++live.result.sessions;
       break;
     case ClientEvent::Kind::firmware:
       live.result.firmware = event.text;
-      if (const auto grid = recordings::livox::grid_of_firmware(event.text)) live.order.set_grid(*grid);
+      if (const auto grid = recordings::livox::grid_of_firmware(event.text))
+        live.order.set_grid(*grid);
       break;
     case ClientEvent::Kind::sensor_state:
       if (event.value != static_cast<std::uint32_t>(wire::SensorState::normal)) {
@@ -265,9 +280,26 @@ void Recorder::step_session(LiveSensor& live, std::int64_t now) {
   for (const ClientEvent& event : live.session->take_events()) take_event(live, event);
 }
 
+/// The table of sensors stands before the data: nobody can join.
+void Recorder::tell_of_newcomer(const FoundSensor& heard) {
+  constexpr std::size_t kMostNewcomers = 100;
+  const bool known = std::any_of(sensors_.begin(), sensors_.end(), [&](const auto& live) {
+    return live->result.sensor.serial == heard.serial;
+  });
+  if (known || !options_.serials.empty() || newcomers_.size() == kMostNewcomers ||
+      !newcomers_.insert(heard.serial).second) {
+    return;
+  }
+  note_(fmt::format("{} at {}: came after the recording had begun, and cannot join it, because the "
+                    "table of sensors stands at the beginning of the file; record it into another",
+                    heard.serial, to_string(heard.address)),
+        true);
+}
+
 /// A sensor that broadcasts has no host: it is new, or it came back.
 void Recorder::take_broadcasts(std::int64_t now) {
   for (const FoundSensor& heard : listener_.take()) {
+    tell_of_newcomer(heard);
     for (const auto& live : sensors_) {
       if (live->result.sensor.serial != heard.serial || !live->session || live->stopped) continue;
       const bool lost = live->session->state() == ClientState::lost;
@@ -437,8 +469,29 @@ RecordedSensors Recorder::run() {
                                          to_string(interface_.address),
                                          name_of(*sensors_.front())));
   }
-  file_->close();
+  finish_file();
   return result();
+}
+
+/// Gives the file its name, or makes what was asked for of it.
+void Recorder::finish_file() {
+  if (!is_converted(options_.output)) {
+    file_->close();
+    return;
+  }
+  file_->end_frame();
+  try {
+    ConvertRecordingOptions wanted;
+    wanted.recording = file_->unfinished_path();
+    wanted.output = options_.output;
+    const ConvertedRecording converted = convert_recording(wanted);
+    if (converted.damage) throw FileError(*converted.damage);
+  } catch (const FileError& error) {
+    throw FileError(
+        error.path(), error.place(),
+        fmt::format("{}; the recording is whole in {}", error.problem(), file_->unfinished_path()));
+  }
+  file_->discard();
 }
 
 RecordedSensors Recorder::result() {
@@ -447,7 +500,9 @@ RecordedSensors Recorder::result() {
   recorded.interface = interface_.address;
   recorded.duration = 1e-9 * static_cast<double>(last_data_ns_ - first_data_ns_.value_or(0));
   recorded.frames = file_->frames();
-  recorded.bytes = file_->size();
+  std::error_code gone;
+  recorded.bytes = is_converted(options_.output) ? std::filesystem::file_size(options_.output, gone)
+                                                 : file_->size();
   recorded.receive_buffer_asked = kReceiveBuffer;
   recorded.receive_buffer_granted = kReceiveBuffer;
   recorded.strangers = listener_.strangers() + passive_strangers_;
@@ -469,7 +524,20 @@ RecordedSensors Recorder::result() {
     for (const recordings::livox::PacketGap& gap : live->order.gaps()) {
       one.gaps.push_back({1e-9 * static_cast<double>(gap.host_from_ns - first_host_ns),
                           1e-9 * static_cast<double>(gap.host_to_ns - first_host_ns), gap.lost,
-                          gap.imu});
+                          gap.imu, gap.cause});
+    }
+    const auto since_first = [&](std::int64_t host_ns) {
+      return 1e-9 * static_cast<double>(host_ns - first_host_ns);
+    };
+    const recordings::livox::ClockWatch& clock = live->order.clock();
+    for (const recordings::livox::ClockStretch& stretch : clock.stretches()) {
+      one.clocks.push_back({recordings::livox::time_reference_of(stretch.timestamp_type),
+                            since_first(stretch.host_from_ns), since_first(stretch.host_to_ns),
+                            1e-9 * static_cast<double>(stretch.least_offset_ns),
+                            1e-9 * static_cast<double>(stretch.greatest_offset_ns), stretch.drift});
+    }
+    for (const recordings::livox::StatusChange& change : clock.status_changes()) {
+      one.status_changes.push_back({since_first(change.host_ns), change.status});
     }
     recorded.sensors.push_back(one);
   }
@@ -482,6 +550,12 @@ RecordedSensors record_sensors(const RecordOptions& options, const RecordNote& n
                                const Progress& progress) {
   if (options.duration) require_above("option duration", *options.duration, 0, "s");
   require_find_time(options);
+  if (!is_converted(options.output) && !lower_case(options.output).ends_with(".lvx")) {
+    throw InvalidArgument(fmt::format(
+        "option output = {}: packets are recorded as LVX or NetCDF, expected the ending "
+        ".lvx or .nc; convert the recording afterwards",
+        options.output));
+  }
   return Recorder(options, wire::interface_of(options.interface), note, progress).run();
 }
 

@@ -97,8 +97,8 @@ CaptureFile::CaptureFile(std::string path) : path_(std::move(path)) {
   }
   if (std::fseek(file, 0, SEEK_END) == 0) size_ = static_cast<std::uint64_t>(::ftello(file));
   std::rewind(file);
-  capture_.reset(::pcap_fopen_offline_with_tstamp_precision(file, PCAP_TSTAMP_PRECISION_NANO,
-                                                            words.data()));
+  capture_.reset(
+      ::pcap_fopen_offline_with_tstamp_precision(file, PCAP_TSTAMP_PRECISION_NANO, words.data()));
   if (!capture_) {
     std::fclose(file);
     throw FileError(path_, {0, {}}, fmt::format("is no whole capture: {}", words.data()));
@@ -135,7 +135,7 @@ std::optional<CapturedDatagram> CaptureFile::next() {
     position_ = static_cast<std::uint64_t>(::ftello(::pcap_file(capture_.get())));
     constexpr std::int64_t kSecond = 1'000'000'000;
     // Damaged times stay within what 64 bits hold.
-    const std::int64_t seconds = std::clamp<std::int64_t>(record->ts.tv_sec, 0, 8 * kSecond);
+    const std::int64_t seconds = std::clamp<std::int64_t>(record->ts.tv_sec, 0, 4 * kSecond);
     datagram.time_ns = seconds * kSecond + std::clamp<std::int64_t>(record->ts.tv_usec, 0, kSecond);
 
     const Bytes ip = ip_of(link_type_, {data, record->caplen});
@@ -165,8 +165,8 @@ std::optional<CapturedDatagram> CaptureFile::next() {
 }
 
 double CaptureFile::fraction_read() const {
-  return size_ == 0 ? 1.0 : static_cast<double>(std::min(position_, size_)) /
-                                static_cast<double>(size_);
+  return size_ == 0 ? 1.0
+                    : static_cast<double>(std::min(position_, size_)) / static_cast<double>(size_);
 }
 
 }  // namespace risley::recordings

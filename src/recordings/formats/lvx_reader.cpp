@@ -157,8 +157,7 @@ void LvxReader::describe() {
     if (device.empty() || version_.float_points) continue;
     grids_[i] = device.grid(header_.devices[i].type);
     if (!grids_[i]) continue;
-    header_.returns_per_shot =
-        std::max<int>(header_.returns_per_shot, grids_[i]->records_per_shot);
+    header_.returns_per_shot = std::max<int>(header_.returns_per_shot, grids_[i]->records_per_shot);
     if (!shot_grid(header_.devices[i].type, device.data_type())) {
       unknown.push_back({{},
                          fmt::format("device {} has the unknown type {}; judging by the times of "

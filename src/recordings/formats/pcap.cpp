@@ -229,8 +229,8 @@ void PcapReader::look_at_packet(const CapturedDatagram& datagram, Chunk& chunk) 
   const Packet& packet = chunk.packets.front();
   if (packet.rows > 0) {
     const RecordLayout& layout = *record_layout(packet.data_type);
-    const bool is_first = std::none_of(seen_.begin(), seen_.end(),
-                                       [](const Seen& one) { return one.has_points; });
+    const bool is_first =
+        std::none_of(seen_.begin(), seen_.end(), [](const Seen& one) { return one.has_points; });
     if (is_first) {
       header_.time_reference = time_reference_of(packet.timestamp_type);
       header_.cartesian = layout.cartesian;

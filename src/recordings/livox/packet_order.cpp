@@ -4,7 +4,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
+#include <functional>
+#include <string_view>
 #include <utility>
+
+#include "risley/core/saturating.hpp"
+#include "risley/io/little_endian.hpp"
 
 namespace risley::recordings::livox {
 namespace {
@@ -17,6 +23,18 @@ constexpr std::int64_t kFastestClock = 200;
 /// Farther back than packets can be late: the clock began again.
 constexpr std::int64_t kFarBack = 1'000'000'000;  // ns
 constexpr std::size_t kRemembered = 1024;
+/// So many late packets in a row are none: the clock was set back.
+constexpr std::size_t kSetBack = 16;
+/// Delays of packets differ by less on a network that is not overloaded.
+constexpr std::int64_t kSurelyEarly = 10'000'000;            // ns
+constexpr std::int64_t kRememberedArrivals = 2'000'000'000;  // ns
+constexpr std::uint8_t kPps = 4;                             // Packet::timestamp_type
+constexpr std::int64_t kPpsPeriod = 1'000'000'000;           // ns
+constexpr std::size_t kStatusAt = 4;                         // of a packet
+
+std::size_t hash_of(const std::vector<std::uint8_t>& bytes) {
+  return std::hash<std::string_view>()({reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+}
 
 /// The checks of a packet do not depend on the sensor, but need a grid.
 PacketDecoderOptions decoder_options(std::uint8_t device_type) {
@@ -59,8 +77,36 @@ bool PacketOrder::add(std::span<const std::uint8_t> packet, std::int64_t host_ns
 
 void PacketOrder::restart(Track& track) {
   while (!track.held.empty()) give_out(track);
+  counts_.late += track.late.size();
+  track.late.clear();
   track.jumped = track.last_ns.has_value();
   track.recent.clear();
+}
+
+void PacketOrder::Arrivals::add(std::int64_t time_ns, std::int64_t host_ns) {
+  const std::int64_t offset = saturating_difference(time_ns, host_ns);
+  if (empty) {
+    *this = {time_ns, host_ns, time_ns, host_ns, offset, offset, host_ns, false};
+  } else if (host_ns - turn_ns > kRememberedArrivals) {
+    offset_before_ns = std::exchange(offset_ns, offset);
+    turn_ns = host_ns;
+  }
+  offset_ns = std::max(offset_ns, offset);
+  last_time_ns = time_ns;
+  last_host_ns = host_ns;
+}
+
+bool PacketOrder::Arrivals::in_real_time() const {
+  // The first packets may have come late.
+  constexpr double kFewestNs = 1e9, kTolerance = 0.02, kLatestNs = 0.25e9;
+  const auto host = static_cast<double>(last_host_ns - first_host_ns);
+  const auto sensor = static_cast<double>(last_time_ns - first_time_ns);
+  return !empty && host > kFewestNs && std::abs(sensor - host) < kTolerance * host + kLatestNs;
+}
+
+std::int64_t PacketOrder::Arrivals::early_ns(std::int64_t time_ns, std::int64_t host_ns) const {
+  return saturating_difference(saturating_difference(time_ns, host_ns),
+                               std::max(offset_ns, offset_before_ns));
 }
 
 void PacketOrder::place(Track& track, std::int64_t time_ns, Held&& packet) {
@@ -75,20 +121,51 @@ void PacketOrder::place(Track& track, std::int64_t time_ns, Held&& packet) {
         (passed > kSurelyNoJump && passed / kFastestClock > host_passed)) {
       restart(track);
     } else if (time_ns <= *track.last_ns) {
-      const bool known =
-          std::find(track.recent.rbegin(), track.recent.rend(), time_ns) != track.recent.rend();
-      ++(known ? counts_.duplicates : counts_.late);
+      place_late(track, time_ns, std::move(packet));
       return;
     }
   }
+  counts_.late += track.late.size();
+  track.late.clear();
   track.flushed = false;
   const bool overtaken = !track.held.empty() && time_ns < track.held.rbegin()->first;
-  if (!track.held.try_emplace(time_ns, std::move(packet)).second) {
+  if (const auto same = track.held.find(time_ns); same != track.held.end()) {
+    if (same->second.bytes == packet.bytes) {
+      ++counts_.duplicates;
+      return;
+    }
+    restart(track);  // no packet comes twice with other points
+  }
+  track.held.try_emplace(time_ns, std::move(packet));
+  if (overtaken) ++counts_.reordered;
+  while (track.held.size() > kWindow) give_out(track);
+}
+
+/// A packet of a time that was given out already: it came twice, or too late, or the clock was set
+/// back.
+void PacketOrder::place_late(Track& track, std::int64_t time_ns, Held&& packet) {
+  const Mark mark{time_ns, hash_of(packet.bytes)};
+  if (std::find(track.recent.rbegin(), track.recent.rend(), mark) != track.recent.rend()) {
     ++counts_.duplicates;
     return;
   }
-  if (overtaken) ++counts_.reordered;
-  while (track.held.size() > kWindow) give_out(track);
+  track.late.emplace_back(time_ns, std::move(packet));
+  if (track.late.size() < kSetBack) return;
+  auto again = std::exchange(track.late, {});
+  restart(track);
+  for (auto& [time, held] : again) place(track, time, std::move(held));
+}
+
+/// Time from the last packet to this one, ns.
+std::int64_t PacketOrder::passed_ns(const Track& track, std::int64_t time_ns,
+                                    const Held& packet) const {
+  const std::int64_t passed = time_ns - *track.last_ns;
+  if (track.timestamp_type != kPps || !track.arrivals.in_real_time()) return passed;
+  // Of PPS times the whole seconds of a silence are not known but by the host's clock.
+  const double unseen = static_cast<double>(packet.host_ns) -
+                        static_cast<double>(track.last_host_ns) - static_cast<double>(passed);
+  const std::int64_t seconds = std::llround(unseen / static_cast<double>(kPpsPeriod));
+  return saturating_sum(passed, std::max<std::int64_t>(seconds, 0) * kPpsPeriod);
 }
 
 /// Gives out the first packet of those that wait, and counts what is missing before it.
@@ -98,24 +175,42 @@ void PacketOrder::give_out(Track& track) {
   Held& packet = first->second;
   if (track.last_ns) {
     PacketGap gap{*track.last_ns, time, track.last_host_ns, packet.host_ns, {}, packet.rows == 0};
-    bool notable = track.jumped;
+    const std::int64_t passed = passed_ns(track, time, packet);
+    const double periods = static_cast<double>(passed) / static_cast<double>(track.last_period_ns);
+    const auto missing = static_cast<std::uint64_t>(std::max(1LL, std::llround(periods))) - 1;
+    if (missing > 0 && !track.paused && track.arrivals.in_real_time()) {
+      const std::int64_t early =
+          track.arrivals.early_ns(saturating_sum(*track.last_ns, passed), packet.host_ns);
+      track.jumped = track.jumped || (early > kSurelyEarly && early > passed / 2);
+    }
+    bool notable = true;
     if (track.jumped) {
       ++counts_.clock_jumps;
+      gap.cause = GapCause::clock;
+    } else if (track.paused) {
+      gap.cause = GapCause::session;
+      gap.lost = missing;
+      notable = missing > 0;
     } else {
-      const double periods =
-          static_cast<double>(time - *track.last_ns) / static_cast<double>(track.last_period_ns);
-      const auto steps = static_cast<std::uint64_t>(std::max(1LL, std::llround(periods)));
-      counts_.lost += steps - 1;
-      gap.lost = steps - 1;
-      notable = steps > 1 && time - *track.last_ns > kNotableGap;
+      counts_.lost += missing;
+      gap.lost = missing;
+      notable = missing > 0 && passed > kNotableGap;
     }
     if (notable && gaps_.size() < kMostGaps) gaps_.push_back(gap);
   }
+  if (track.jumped) track.arrivals = {};
+  track.arrivals.add(time, packet.host_ns);
+  if (packet.rows > 0) {
+    if (track.jumped || track.paused) clock_.jump();
+    clock_.add(packet.bytes[kTimestampTypeAt], io::load<std::uint32_t>(&packet.bytes[kStatusAt]),
+               time, packet.host_ns);
+  }
+  track.paused = false;
   track.jumped = false;
   track.last_ns = time;
   track.last_period_ns = packet.period_ns;
   track.last_host_ns = packet.host_ns;
-  track.recent.push_back(time);
+  track.recent.emplace_back(time, hash_of(packet.bytes));
   if (track.recent.size() > kRemembered) track.recent.pop_front();
   ++counts_.packets;
   counts_.rows += packet.rows;
@@ -135,7 +230,9 @@ void PacketOrder::advance(std::int64_t host_ns) {
 void PacketOrder::flush() {
   for (Track& track : tracks_) {
     while (!track.held.empty()) give_out(track);
-    track.flushed = true;
+    counts_.late += track.late.size();
+    track.late.clear();
+    track.flushed = track.paused = true;
   }
 }
 

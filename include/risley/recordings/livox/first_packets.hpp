@@ -20,8 +20,8 @@ class FirstPackets {
   /// A packet of points. @param rows  its rows are [first_row, first_row + packet.rows)
   void add(const Packet& packet, const Observations& rows, std::size_t first_row);
 
-  bool empty() const { return !last_time_ns_; }           ///< no packet of points was added
-  std::uint8_t data_type() const { return data_type_; }   ///< of the last packet
+  bool empty() const { return !last_time_ns_; }          ///< no packet of points was added
+  std::uint8_t data_type() const { return data_type_; }  ///< of the last packet
   /// Shortest time between two packets over the records of one, ns; of use behind two packets.
   double interval_ns() const;
   /// Grid of its shots: where the type does not tell it, it is judged by the packets' times, and
