@@ -180,15 +180,14 @@ void LvxReader::fail(std::uint64_t offset, std::string problem) {
 }
 
 bool LvxReader::read(Chunk& chunk, std::size_t max_rows) {
-  chunk.clear();
-  // Room for all rows at once. No record has less than 7 bytes per row, so a huge max_rows costs no
-  // memory.
+  chunk.packets.clear();
+  chunk.imu.clear();
+  chunk.packet_begins.clear();
+  rows_ = 0;
+  // Room for all rows at once, in which the rows before stand. No record has less than 7 bytes per
+  // row, so a huge max_rows costs no memory.
   const std::uint64_t left = file_.size() - std::min(position_, file_.size());
-  const auto room = static_cast<std::size_t>(std::min<std::uint64_t>(max_rows, left / 7));
-  if (chunk.observations.time_ns.capacity() < room) {
-    chunk.observations.resize(room);
-    chunk.observations.clear();
-  }
+  chunk.observations.resize(static_cast<std::size_t>(std::min<std::uint64_t>(max_rows, left / 7)));
   while (!ended_) {
     if (!in_frame_) {
       open_frame();
@@ -196,6 +195,7 @@ bool LvxReader::read(Chunk& chunk, std::size_t max_rows) {
       break;
     }
   }
+  chunk.observations.resize(rows_);
   if (!chunk.packets.empty()) return true;
   if (failure_) throw FileError(*failure_);
   return false;
@@ -329,7 +329,7 @@ bool LvxReader::next_package(Chunk& chunk, std::size_t max_rows) {
 
   // Packets stay whole; one alone is delivered however small the chunk is to be.
   if (!chunk.packets.empty() &&
-      (chunk.observations.size() + layout->rows() > max_rows || chunk.packets.size() >= max_rows)) {
+      (rows_ + layout->rows() > max_rows || chunk.packets.size() >= max_rows)) {
     return false;
   }
   const auto device_row = static_cast<std::size_t>(device);
@@ -344,12 +344,14 @@ bool LvxReader::next_package(Chunk& chunk, std::size_t max_rows) {
   const std::span package(file_.at(position_, kLvxPackageHeaderBytes + layout->bytes()),
                           kLvxPackageHeaderBytes + layout->bytes());
   try {
-    decoder.decode(package.subspan(1), chunk);
+    chunk.observations.resize(std::max(chunk.observations.size(), rows_ + layout->rows()));
+    decoder.decode_into(package.subspan(1), chunk, rows_);
   } catch (const BadPacket& bad) {
     fail(position_ + 1 + bad.byte_offset(), bad.problem());
     return true;
   }
   clock_wraps_ += decoder.clock_wraps() - wraps_before;
+  rows_ += layout->rows();
   chunk.packets.back().device_index = package[0];
   chunk.packets.back().frame = frames_ - 1;
   position_ += kLvxPackageHeaderBytes + layout->bytes();
