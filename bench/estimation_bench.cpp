@@ -13,6 +13,7 @@
 #include <cmath>
 #include <cstdint>
 #include <ctime>
+#include <limits>
 #include <map>
 #include <stdexcept>
 #include <utility>
@@ -22,6 +23,7 @@
 #include <Eigen/LU>
 #include <benchmark/benchmark.h>
 #include <ceres/jet.h>
+#include <fmt/format.h>
 #include <tbb/global_control.h>
 
 #include "risley/core/angle.hpp"
@@ -32,6 +34,9 @@
 #include "risley/optics/observation_model.hpp"
 #include "risley/sensors/preset.hpp"
 #include "risley/simulation/scanner.hpp"
+
+#include "estimation/filter.hpp"
+#include "in_turn.hpp"
 
 namespace risley {
 namespace {
@@ -172,6 +177,10 @@ class PlainFilter {
   }
 
   const Vector& mean() const { return mean_; }
+  const Matrix& covariance() const { return covariance_; }
+  /// How fast the rotors may change their speed: fits these, rad/s/sqrt(s); from a fifth to twenty
+  /// times this the parameters come out equally well.
+  static constexpr double kAcceleration = radians_from_degrees(1.0);
 
  private:
   using Jet = ceres::Jet<double, kStates>;
@@ -181,9 +190,6 @@ class PlainFilter {
   static constexpr double kTiltSigma = radians_from_degrees(1.0);
   static constexpr double kAngleSigma = radians_from_degrees(5.0);
   static constexpr double kSpeedSigma = radians_from_degrees(100.0);
-  /// Fits these rotors, rad/s/sqrt(s); from a fifth to twenty times this the parameters come out
-  /// equally well.
-  static constexpr double kAcceleration = radians_from_degrees(1.0);
 
   static constexpr double square(double x) { return x * x; }
   static constexpr int angle_of(int rotor) { return 8 + 2 * rotor; }
@@ -299,19 +305,63 @@ void ratio(benchmark::State& state) {
   }
 }
 
+/// Prediction and update by one observation: the library's own filter and the peer in turn, from
+/// the same start. difference_in_sigmas is the largest of the states after the last shot.
+void filter_step(benchmark::State& state) {
+  constexpr std::size_t kSteps = 2000, kStride = 100;
+  const Recording& data = recording(3);
+  estimation::AngleSeries series;
+  for (std::size_t i = 0; i < kSteps; ++i) series.append(data.series, i * kStride);
+  const estimation::EstimateOptions options = map_options();
+  estimation::EkfOptions ekf;
+  ekf.angle_noise = kAngleNoise;
+  ekf.free = estimation::free_parameters(estimation::default_free_names({2}), {2});
+  const estimation::Start start = estimation::find_start(
+      data.head, options.sensor, {ekf.free, kAngleNoise, options.mirrored, options.turned});
+  const std::vector<estimation::RotorProcess> process(2, {PlainFilter::kAcceleration, 0.0, 0.0});
+  estimation::Filter filter(series, start.train, ekf, process, nullptr);
+  const estimation::FilterState first = first_state(filter, series, start, ekf.free);
+  estimation::FilterState ours;
+  PlainFilter peer(start, series.time_ns[0]);
+  bench::run_in_turn(
+      state, kSteps,
+      [&] {
+        ours = first;
+        for (std::size_t i = 0; i < kSteps; ++i) {
+          if (i > 0) filter.predict(ours, series.time(i) - series.time(i - 1));
+          filter.update(ours, i, std::numeric_limits<double>::infinity());
+        }
+      },
+      kSteps,
+      [&] {
+        peer = PlainFilter(start, series.time_ns[0]);
+        for (std::size_t i = 0; i < kSteps; ++i) {
+          peer.predict(series.time_ns[i]);
+          peer.update(series.azimuth[i], series.zenith[i]);
+        }
+      });
+  Eigen::VectorXd difference = ours.mean - peer.mean();
+  for (const int angle : {8, 10}) difference[angle] = wrap_to_pi(difference[angle]);
+  state.counters["difference_in_sigmas"] =
+      (difference.array() / peer.covariance().diagonal().array().sqrt()).abs().maxCoeff();
+}
+
 /// The step of the batch estimator that sees every shot, at its answer.
-void accumulate(benchmark::State& state, InstructionSet set) {
+/// @param parameters  how many of the free ones, the first
+void accumulate(benchmark::State& state, InstructionSet set, std::size_t parameters) {
   const Recording& data = recording(3);
   static const auto answer =
       estimation::estimate(estimation::Method::map, data.series, data.head, map_options());
+  const std::vector<estimation::FreeParameter> free(
+      answer.free.begin(), answer.free.begin() + static_cast<std::ptrdiff_t>(parameters));
   const std::size_t shots = data.series.size();
   std::vector<double> azimuth(shots), zenith(shots);
   std::vector<unsigned char> outlier(shots);
   const estimation::ShotWeights weights{estimation::equal_noise(kAngleNoise), 0.0, 20.0};
   estimation::NormalEquations equations;
   for (auto _ : state) {
-    estimation::accumulate(answer.series, answer.trajectory, answer.train, answer.free, weights,
-                           equations, {azimuth, zenith, outlier}, set);
+    estimation::accumulate(answer.series, answer.trajectory, answer.train, free, weights, equations,
+                           {azimuth, zenith, outlier}, set);
     benchmark::ClobberMemory();
   }
   state.counters["per_shot"] =
@@ -332,9 +382,19 @@ const bool registered = [] {
   once("plain_ekf", plain_ekf);
   once("ratio", ratio);
   for (const InstructionSet set : available_instruction_sets()) {
-    benchmark::RegisterBenchmark(("accumulate/" + to_string(set)).c_str(), accumulate, set)
+    benchmark::RegisterBenchmark(("accumulate/" + to_string(set)).c_str(), accumulate, set,
+                                 kBounds.size())
         ->Unit(benchmark::kMillisecond);
   }
+  for (std::size_t parameters = 1; parameters <= kBounds.size(); ++parameters) {
+    benchmark::RegisterBenchmark(fmt::format("accumulate_parameters/{}", parameters).c_str(),
+                                 accumulate, best_instruction_set(), parameters)
+        ->Unit(benchmark::kMillisecond);
+  }
+  benchmark::RegisterBenchmark("filter_step", filter_step)
+      ->Iterations(101)
+      ->UseManualTime()
+      ->Unit(benchmark::kMillisecond);
   return true;
 }();
 
