@@ -144,7 +144,15 @@ def google_benchmark(build, name, wanted):
     return found
 
 
+def interpreter(build):
+    """The Python that the package of a build is made for."""
+    cache = (build / "CMakeCache.txt").read_text(encoding="utf-8")
+    return first_match(r"^_Python_EXECUTABLE:\w+=(.*)$", cache, sys.executable)
+
+
 def kernels(build, quick):
+    python = json.loads(measured(["env", f"PYTHONPATH={build / 'python'}", "PYTHONDONTWRITEBYTECODE=1", interpreter(build),
+                                  ROOT / "bench" / "numpy_directions.py", "15" if quick else "61"])["printed"])
     optics = google_benchmark(build, "optics", "^(directions|directions_in_memory|sequence|jacobian|jacobian_prepared)/")
     sets = [name.split("/")[1] for name in optics if name.startswith("directions/")]
     best = sets[-1]
@@ -154,8 +162,6 @@ def kernels(build, quick):
     calibration = google_benchmark(build, "calibration", f"^adjust/{best}/" if quick else "^adjust/avx")
     recordings = google_benchmark(build, "recordings", "^(bytes_only|read)/lvx")
     points = google_benchmark(build, "cloud", "^points/")
-    python = json.loads(measured(["env", f"PYTHONPATH={build / 'python'}", "PYTHONDONTWRITEBYTECODE=1", sys.executable,
-                                  ROOT / "bench" / "numpy_directions.py", "15" if quick else "61"])["printed"])
     keep = ("peer_over_ours", "ratio_min", "ratio_q1", "ratio_q3", "ours_ns", "peer_ns", "error_rad", "error",
             "difference_in_sigmas", "peer_GB_per_s", "cost_difference", "cpu_over_ours", "cpu_ratio_min",
             "cpu_ratio_max", "ours_s", "peer_s", "per_shot", "error_over_bound", "ratio", "cpu_ratio", "map_s",
@@ -478,7 +484,7 @@ def parameter_text(result, found):
 def machine_text(result):
     m = result["machine"]
     changed = " with changes" if m["changed_since_commit"] else ""
-    return (f"Measured on {m['date']} at commit {m['commit']}{changed}, version of {m['build_type']}: {m['processor']} "
+    return (f"{'A quick run, of short recordings. ' if result['quick'] else ''}Measured on {m['date']} at commit {m['commit']}{changed}, version of {m['build_type']}: {m['processor']} "
             f"(family/model {m['family_model']}), {m['cores']} processors, {m['memory_GB']} GB, {m['instruction_set']}; "
             f"{m['compiler']}; Linux {m['kernel']}. Load before: {m['load_at_begin']}, after: {m['load_at_end']}"
             f"{'; **other programs ran, too**' if max(m['load_at_begin'], 0) > 1 else ''}. "
