@@ -193,16 +193,17 @@ class Jobs:
                            "--rotor", "sinusoidal", *more, threads=threads)
 
     def make(self, name, seconds, *more):
-        """A recording, made once."""
+        """A recording, made once, with one thread."""
         if not self.path(name).exists():
-            self.simulate(name, seconds, *more)
+            self.simulate(name, seconds, *more, threads=1)
         return self.path(name)
 
 
 def flatness(las, scene_distances, rows=200_000):
     """Root mean square of the means of the points' distances from each plane of the hall, m, and the number of points:
     noise averages out, errors of directions do not."""
-    header = las.read_bytes()[:375] if size_of(las) < 375 else las.open("rb").read(375)
+    with las.open("rb") as file:
+        header = file.read(375)  # of LAS 1.4
     offset, length = struct.unpack_from("<I", header, 96)[0], struct.unpack_from("<H", header, 105)[0]
     count = struct.unpack_from("<Q", header, 247)[0]
     scale, shift = struct.unpack_from("<3d", header, 131), struct.unpack_from("<3d", header, 155)
@@ -268,8 +269,8 @@ def job_list(jobs, seconds):
         ("convert", "LVX to NetCDF, lossless", ["convert", unit, "-o", jobs.path("unit.nc")], [unit], "unit.nc",
          lambda result: same_again(result, "unit.nc", "-o", jobs.path("back.lvx"))),
         ("simulate", "a hall, to LVX, and the truth to NetCDF", ["simulate", "-o", jobs.path("sim.lvx"), *hall], [],
-         "sim.lvx", lambda result: "the bytes of every run and number of threads are the same"
-         if filecmp.cmp(jobs.path("sim.lvx"), unit, shallow=False) else "OTHER BYTES than before"),
+         "sim.lvx", lambda result: "the same bytes with one thread and with all"
+         if filecmp.cmp(jobs.path("sim.lvx"), unit, shallow=False) else "OTHER BYTES with one thread"),
         ("estimate", "LVX to calibration, states of the rotors and covariances",
          ["estimate", unit, "--truth", f"{unit}.truth.yaml", "--no-report", "-o", jobs.path("result")], [unit], "result",
          estimated),
