@@ -57,7 +57,8 @@ def record(output: Path, *, duration: Optional[float] = None, stop: Optional[Sto
     Parameters
     ----------
     output : str or path
-        The recording; until the end it is called ``OUTPUT.unfinished``.
+        The recording, LVX or NetCDF by its ending; until the end it is an LVX file called
+        ``OUTPUT.unfinished``.
     duration : float, optional
         Length, s, from the first data on; by default until `stop` is set.
     stop : Stop, optional
@@ -105,12 +106,14 @@ def record(output: Path, *, duration: Optional[float] = None, stop: Optional[Sto
 
 def emulate(interface: str, *, duration: Optional[float] = None, stop: Optional[Stop] = None,
             serial: str = "", sensor: Path = "mid-40", scene: Path = "", station: str = "",
-            speed: float = 1.0, angle_noise: Optional[float] = None,
+            recording: Path = "", speed: float = 1.0, angle_noise: Optional[float] = None,
             angle_noise_deg: Optional[float] = None, range_noise: Optional[float] = None,
             quantize: bool = True, beam_origin: bool = True, rotor: str = "constant",
             set: Mapping[str, float] = {}, reported: Mapping[str, float] = {},
             reported_nominal: bool = False, start_angles: Optional[Sequence[float]] = None,
-            start_angles_deg: Optional[Sequence[float]] = None, loss: float = 0.0,
+            start_angles_deg: Optional[Sequence[float]] = None, time: str = "power-on",
+            time_from: float = 0.0, clock_drift_ppm: float = 0.0,
+            clock_jump: Optional[float] = None, clock_jump_by: float = 0.25, loss: float = 0.0,
             duplication: float = 0.0, disorder: float = 0.0, disorder_packets: int = 10,
             delay: float = 0.0, wrong_checksums: float = 0.0,
             heartbeat_dies: Optional[float] = None, restart: Optional[float] = None,
@@ -130,12 +133,22 @@ def emulate(interface: str, *, duration: Optional[float] = None, stop: Optional[
         Serial number (broadcast code); by default from the optics.
     scene : str or path, optional
         Planes or terrain (YAML) around it; by default a room.
+    recording : str or path, optional
+        Recording of one sensor whose shots are sent instead, with its gaps, over and over.
     speed : float, default 1
         How many times faster than real time it runs.
     sensor, station, angle_noise, angle_noise_deg, range_noise, quantize, beam_origin, rotor
         As in `risley.simulate`.
     set, reported, reported_nominal, start_angles, start_angles_deg, seed
         As in `risley.simulate`.
+    time : {'power-on', 'ptp', 'pps'}
+        What its times count from.
+    time_from : float, default 0
+        When that begins, s after the first start; before, they count from power-on.
+    clock_drift_ppm : float, default 0
+        By how much its clock is faster than this machine's, ppm.
+    clock_jump, clock_jump_by : float
+        When its clock jumps, s after the first start; by default never. How far it jumps, s.
     loss, duplication, disorder, wrong_checksums : float
         Shares of packets that are not sent, sent twice, or overtaken by others, and of replies and
         broadcasts that are damaged, from 0 to 1.
@@ -165,7 +178,9 @@ def emulate(interface: str, *, duration: Optional[float] = None, stop: Optional[
     options = {
         "interface": interface, "duration": duration, "serial": serial,
         "sensor": os.fspath(sensor), "scene": os.fspath(scene), "station": station,
-        "speed": speed, "angle_noise": angle("angle_noise", angle_noise, angle_noise_deg),
+        "recording": os.fspath(recording), "speed": speed, "time": time, "time_from": time_from,
+        "clock_drift_ppm": clock_drift_ppm, "clock_jump": clock_jump,
+        "clock_jump_by": clock_jump_by, "angle_noise": angle("angle_noise", angle_noise, angle_noise_deg),
         "range_noise": range_noise, "quantize": quantize, "beam_origin": beam_origin,
         "rotor": rotor, "set": list(set.items()), "reported": list(reported.items()),
         "reported_nominal": reported_nominal,

@@ -101,6 +101,18 @@ jobs::EmulatedFaults faults_of(const Options& options) {
   return faults;
 }
 
+jobs::EmulatedClock clock_of(const Options& options) {
+  using recordings::TimeReference;
+  constexpr std::array kSources = {TimeReference::power_on, TimeReference::ptp, TimeReference::pps};
+  jobs::EmulatedClock clock;
+  clock.source = kSources.at(options.choice("time", {"power-on", "ptp", "pps"}));
+  options.take("time_from", clock.source_from);
+  options.take("clock_drift_ppm", clock.drift_ppm);
+  options.take("clock_jump", clock.jump);
+  options.take("clock_jump_by", clock.jump_by);
+  return clock;
+}
+
 py::object emulate(const py::dict& values, int threads, const py::object& note, const Stop& stop,
                    const py::object& tell) {
   const Options options(values);
@@ -108,9 +120,11 @@ py::object emulate(const py::dict& values, int threads, const py::object& note, 
   options.take("interface", job.interface);
   options.take("serial", job.serial);
   job.simulation = simulation_options(options, threads);
+  options.take("recording", job.recording);
   options.take("speed", job.speed);
   options.take("duration", job.duration);
   if (job.duration) require_above("duration", *job.duration, 0, "s");
+  job.clock = clock_of(options);
   job.faults = faults_of(options);
   jobs::EmulatedSensor truth;
   run_job(

@@ -65,6 +65,19 @@ def test_record_writes_what_was_sent(sensors, tmp_path):
     assert np.isfinite(recording.azimuth).all()
 
 
+def test_a_recording_is_sent_again_with_a_clock_that_is_faster(sensors, tmp_path):
+    risley.simulate(tmp_path / "made.lvx", duration=0.5, seed=8)
+    start, end = sensors
+    start("127.0.0.70", serial="PYTHON000000071", recording=tmp_path / "made.lvx",
+          clock_drift_ppm=400.0, time="ptp")
+    recorded = risley.record(tmp_path / "again.nc", interface=HOST, duration=6.0,
+                             serials=["PYTHON000000071"])["sensors"][0]
+    assert recorded["rows"] == end()[0]["sensors"][0]["rows"] == len(risley.read(tmp_path / "again.nc"))
+    clock = recorded["clocks"][0]
+    assert clock["source"].upper() == "PTP"
+    assert abs(clock["drift_ppm"] - 400.0) < 6 * clock["drift_sigma_ppm"]
+
+
 def test_stop_ends_a_recording_and_words_are_logged(sensors, tmp_path, caplog):
     start, end = sensors
     start("127.0.0.63", serial="PYTHON000000031", heartbeat_dies=0.3, wrong_checksums=0.2)
