@@ -26,6 +26,9 @@ struct EmulatedFaults {
       heartbeat_dies;             ///< s after the first start; from then to the session's end
   std::optional<double> restart;  ///< s after the first start, once
   double restart_time = 2;        ///< s, for which a sensor that restarts says nothing
+  /// What is added to parameters of the true sensor, SI units, while the rotors go on.
+  ParameterValues bend;
+  std::optional<double> bend_time;  ///< s after the first start, once
 };
 
 /// Which sensor to be, and how.
@@ -56,6 +59,7 @@ struct EmulatedSensor {
   std::uint64_t kernel_drops = 0;               ///< of commands
   std::uint64_t rejected = 0;                   ///< datagrams that were no commands of the host
   std::uint64_t sessions = 0, restarts = 0;     ///< handshakes that were answered; restarts
+  std::uint64_t bends = 0;                      ///< times that the optics changed
   double behind = 0;                            ///< s, by which the sending fell behind at most
 };
 
