@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "risley/core/progress.hpp"
+#include "risley/jobs/optics_watch.hpp"
 #include "risley/wire/commands.hpp"
 #include "risley/wire/packet_order.hpp"
 
@@ -27,6 +28,8 @@ struct RecordOptions {
   std::optional<wire::ReturnMode> return_mode;  ///< empty: as the sensors are
   bool imu = true;                              ///< inertial samples, where the sensor has them
   std::string output;                           ///< path, ends in .lvx
+  bool watch_optics = false;                    ///< see OpticsWatch
+  std::string optics_reference;                 ///< as OpticsWatch's
 };
 
 /// A sensor on the interface.
@@ -54,6 +57,7 @@ struct RecordedSensor {
   std::vector<RecordedGap> gaps;
   /// Warnings and errors of the sensor itself, each status once: recordings::Packet::status.
   std::vector<std::uint32_t> statuses;
+  std::optional<OpticsHealth> optics;  ///< where they were watched
 };
 
 /// What came of a recording.
@@ -66,6 +70,26 @@ struct RecordedSensors {
   std::vector<RecordedSensor> sensors;
   std::uint64_t strangers = 0;  ///< datagrams at the broadcast port that name no sensor
 };
+
+/// A sensor while it is recorded.
+struct LiveSensorState {
+  FoundSensor sensor;
+  wire::PacketCounts counts;  ///< so far
+  std::uint64_t kernel_drops = 0, rejected = 0;
+  bool silent = false;                  ///< nothing came for a second
+  std::optional<std::uint32_t> status;  ///< the last one, as recordings::Packet::status
+  std::optional<OpticsHealth> optics;   ///< where they are watched
+};
+
+/// A recording while it runs.
+struct LiveRecording {
+  double duration = 0;  ///< s since the first data
+  bool over = false;    ///< nothing will be told any more
+  std::vector<LiveSensorState> sensors;
+};
+
+/// Told twice a second, and at the end. The recording waits for it: it must be quick.
+using RecordWatch = std::function<void(const LiveRecording&)>;
 
 /// Told at once: words about a sensor, and whether something is wrong.
 using RecordNote = std::function<void(const std::string& words, bool is_wrong)>;
@@ -82,6 +106,9 @@ std::vector<FoundSensor> find_sensors(const RecordOptions& options, const Progre
 /// @throws InvalidArgument; NetworkError also where there is no sensor, or none sends anything;
 ///         FileError
 RecordedSensors record_sensors(const RecordOptions& options, const RecordNote& note,
-                               const Progress& progress = {});
+                               const Progress& progress = {}, const RecordWatch& watch = {});
+
+/// An alarm in a sentence, such as "prism_tilt_b_vertical_deg has changed by ...".
+std::string alarm_words(const OpticsHealth& health);
 
 }  // namespace risley::jobs
