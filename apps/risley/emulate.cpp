@@ -26,7 +26,8 @@ struct EmulateChoices {
   double loss = 0, duplication = 0, disorder = 0, delay_ms = 0, wrong_checksums = 0,
          restart_takes_s = 2;
   int farthest = 10;
-  std::optional<double> heartbeat_dies_s, restart_s;
+  std::optional<double> heartbeat_dies_s, restart_s, bend_s;
+  std::vector<std::string> bend;
   std::string time_source = "power-on";
   double time_source_from_s = 0, clock_drift_ppm = 0, clock_jump_by_ms = 250;
   std::optional<double> clock_jump_s;
@@ -65,6 +66,8 @@ jobs::EmulateOptions job_of(const EmulateChoices& options, const CommonOptions& 
   faults.heartbeat_dies = options.heartbeat_dies_s;
   faults.restart = options.restart_s;
   faults.restart_time = options.restart_takes_s;
+  faults.bend = parameter_values(options.bend);
+  faults.bend_time = options.bend_s;
   return job;
 }
 
@@ -137,6 +140,14 @@ void declare_faults(CLI::App& verb, EmulateChoices& o) {
       ->check(CLI::Range(0.0, 3600.0))
       ->capture_default_str()
       ->group(group);
+  auto* bend = verb.add_option("--bend", o.bend,
+                               "What is added to a parameter of the true sensor while it runs, in "
+                               "the unit that its name ends with (repeatable)");
+  bend->type_name("NAME=CHANGE")->expected(1)->allow_extra_args(false)->take_all()->group(group);
+  auto* bend_s =
+      verb.add_option("--bend-s", o.bend_s, "When the optics bend so, s after the first start");
+  bend_s->check(CLI::NonNegativeNumber)->needs(bend)->group(group);
+  bend->needs(bend_s);
 }
 
 }  // namespace

@@ -95,7 +95,7 @@ class Emulator {
       : options_(options),
         note_(note),
         progress_(progress),
-        scan_(options.simulation, options.recording),
+        scan_(options.simulation, options.recording, options.faults.bend),
         rate_(options.speed * (1 + 1e-6 * options.clock.drift_ppm)),
         socket_({wire::interface_of(options.interface).address, wire::kSensorPort}),
         loss_(options.simulation.seed, 101, options.faults.loss),
@@ -422,6 +422,11 @@ EmulatedSensor Emulator::run() {
       note_("restarts");
       power_off(now, static_cast<std::int64_t>(1e9 * faults.restart_time));
     }
+    if (faults.bend_time && truth_.bends == 0 && since_start >= *faults.bend_time) {
+      ++truth_.bends;
+      scan_.bend();
+      note_("its optics bend");
+    }
     wire::wait_for(sockets, rest_until(now) - steady_ns());
   }
   end_stream(steady_ns());
@@ -462,6 +467,11 @@ EmulatedSensor emulate_sensor(const EmulateOptions& options, const EmulateNote& 
     require_not_below("option heartbeat_dies", *faults.heartbeat_dies, 0, "s");
   }
   if (faults.restart) require_not_below("option restart", *faults.restart, 0, "s");
+  if (faults.bend_time) require_not_below("option bend_time", *faults.bend_time, 0, "s");
+  if (faults.bend_time.has_value() == faults.bend.empty()) {
+    throw InvalidArgument(
+        "option bend and option bend_time need each other: which parameters change, and when");
+  }
   return Emulator(options, note, progress).run();
 }
 

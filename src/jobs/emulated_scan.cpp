@@ -55,9 +55,19 @@ simulation::SimulationSettings settings_of(const SimulationOptions& options) {
   return settings;
 }
 
+/// Reads the next shots; after the last ones come the first again.
+void read_on(const simulation::SimulationSettings& settings,
+             std::unique_ptr<simulation::Scanner>& scanner, recordings::Chunk& chunk) {
+  recordings::TruthColumns truth;
+  if (scanner && scanner->read(chunk, truth, kShotsAtOnce)) return;
+  scanner = std::make_unique<simulation::Scanner>(settings);
+  scanner->read(chunk, truth, kShotsAtOnce);
+}
+
 }  // namespace
 
-EmulatedScan::EmulatedScan(const SimulationOptions& options, const std::string& recording)
+EmulatedScan::EmulatedScan(const SimulationOptions& options, const std::string& recording,
+                           const ParameterValues& bend)
     : settings_(settings_of(options)), grid_(*grid_of(settings_.truth.device_type)) {
   if (recording.empty()) {
     scanner_ = std::make_unique<simulation::Scanner>(settings_);
@@ -67,13 +77,24 @@ EmulatedScan::EmulatedScan(const SimulationOptions& options, const std::string& 
     device_ = recorded_->device();
     grid_ = recorded_->grid();
   }
+  if (bend.empty()) return;
+  if (recorded_) {
+    throw InvalidArgument(
+        "option bend changes simulated optics: the shots of a recording are as they are");
+  }
+  SimulationOptions bent = options;
+  for (const auto& [name, change] : bend) {
+    bent.set.emplace_back(name, settings_.truth.get(name) + change);
+  }
+  bent_settings_ = settings_of(bent);
+  // What the sensor believes of itself does not change.
+  bent_settings_->reported = settings_.reported;
 }
 
 void EmulatedScan::read_shots() {
   next_shot_ = 0;
-  if (scanner_->read(chunk_, truth_, kShotsAtOnce)) return;
-  scanner_ = std::make_unique<simulation::Scanner>(settings_);
-  scanner_->read(chunk_, truth_, kShotsAtOnce);
+  read_on(settings_, scanner_, chunk_);
+  if (bent_settings_) read_on(*bent_settings_, bent_scanner_, bent_chunk_);
 }
 
 void EmulatedScan::begin_packet(std::uint8_t data_type, std::int64_t time_ns) {
@@ -86,7 +107,7 @@ void EmulatedScan::begin_packet(std::uint8_t data_type, std::int64_t time_ns) {
 
 void EmulatedScan::simulate_shot(bool tagged) {
   if (next_shot_ == chunk_.observations.size()) read_shots();
-  const recordings::Observations& shots = chunk_.observations;
+  const recordings::Observations& shots = (bent_ ? bent_chunk_ : chunk_).observations;
   record_.azimuth[0] = shots.azimuth[next_shot_];
   record_.zenith[0] = shots.zenith[next_shot_];
   record_.range[0] = shots.range[next_shot_];

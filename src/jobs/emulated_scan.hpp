@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -19,8 +20,10 @@ namespace risley::jobs {
 class EmulatedScan {
  public:
   /// @param recording  path; empty: what options simulate
+  /// @param bend  what bend() adds to parameters of the true sensor, SI units; not of a recording
   /// @throws InvalidArgument where Livox has no such type of sensor, and as RecordedScan; FileError
-  EmulatedScan(const SimulationOptions& options, const std::string& recording);
+  EmulatedScan(const SimulationOptions& options, const std::string& recording,
+               const ParameterValues& bend = {});
 
   const recordings::Device& device() const { return device_; }  ///< serial number and type
 
@@ -32,6 +35,8 @@ class EmulatedScan {
   /// The next packet of points. @param time_ns  of its first shot
   /// @return header and records, until the next call
   std::span<const std::uint8_t> next(std::uint8_t data_type, std::int64_t time_ns);
+  /// From now on its optics are others. Its rotors and its noise go on as they would have.
+  void bend() { bent_ = true; }
   /// An inertial sample of a sensor at rest.
   std::span<const std::uint8_t> imu(std::int64_t time_ns);
   /// Time of so many packets of a type, ns.
@@ -49,10 +54,12 @@ class EmulatedScan {
   simulation::SimulationSettings settings_;
   recordings::livox::ShotGrid grid_;
   recordings::Device device_;
-  std::unique_ptr<simulation::Scanner> scanner_;  // unless it is recorded
   std::optional<RecordedScan> recorded_;
-  recordings::Chunk chunk_;
-  recordings::TruthColumns truth_;
+  std::optional<simulation::SimulationSettings> bent_settings_;
+  bool bent_ = false;
+  // Unless it is recorded; the second where it can bend.
+  std::unique_ptr<simulation::Scanner> scanner_, bent_scanner_;
+  recordings::Chunk chunk_, bent_chunk_;
   std::size_t next_shot_ = 0;  // of the chunk
   recordings::Observations record_;
   std::vector<std::uint8_t> packet_;

@@ -20,6 +20,7 @@
 #include "risley/core/require.hpp"
 #include "risley/core/text.hpp"
 #include "risley/jobs/convert_recording.hpp"
+#include "risley/optics/parameters.hpp"
 #include "risley/recordings/livox/first_packets.hpp"
 #include "risley/recordings/livox/packet_decoder.hpp"
 #include "risley/recordings/livox/packet_file.hpp"
@@ -41,6 +42,9 @@ constexpr std::int64_t kSilenceTold = kWireSecond;
 constexpr std::int64_t kBroadcastSettles = 1500 * kMillisecond;
 constexpr std::int64_t kLongestStop = 2 * kWireSecond;
 constexpr std::int64_t kLongestPoll = 20 * kMillisecond;
+constexpr std::int64_t kWatchPeriod = 500 * kMillisecond;
+/// How long the end of a recording waits for the estimate of what came last, s.
+constexpr double kLongestFinish = 2;
 constexpr std::size_t kReceiveBuffer = std::size_t{4} << 20U;
 constexpr std::size_t kMostStatuses = 100;
 constexpr std::size_t kMostPassiveSensors = 16;
@@ -60,20 +64,24 @@ struct LiveSensor {
   recordings::livox::PacketOrder order;
   std::unique_ptr<wire::UdpSocket> commands, data;
   std::optional<wire::ClientSession> session;
+  std::size_t place = 0;  ///< among all sensors
   std::int64_t session_begin_ns = 0;
   std::optional<std::int64_t> data_ns;  ///< when the last packet came
   bool silent = false, stopped = false;
   std::uint64_t session_rejected = 0;  ///< by sessions that are over
+  std::optional<std::uint32_t> status;
+  std::uint64_t alarms_told = 0;
 };
 
 class Recorder {
  public:
   Recorder(const RecordOptions& options, const wire::Interface& interface, const RecordNote& note,
-           const Progress& progress)
+           const Progress& progress, const RecordWatch& watch)
       : options_(options),
         interface_(interface),
         note_(note),
         progress_(progress),
+        watch_(watch),
         listener_(interface) {}
 
   RecordedSensors run();
@@ -94,6 +102,9 @@ class Recorder {
   void write_frame(bool last);
   void stop_all();
   void finish_file();
+  void begin_watch(const std::vector<recordings::Device>& devices);
+  void tell_watch(std::int64_t now, bool over);
+  std::uint64_t rejected_by(const LiveSensor& live) const;
   RecordedSensors result();
   static std::string name_of(const LiveSensor& live) { return live.result.sensor.serial; }
 
@@ -101,14 +112,16 @@ class Recorder {
   wire::Interface interface_;
   const RecordNote& note_;
   const Progress& progress_;
+  const RecordWatch& watch_;
   BroadcastListener listener_;
   std::unique_ptr<wire::UdpSocket> passive_data_;  // for all sensors
   std::vector<std::unique_ptr<LiveSensor>> sensors_;
   std::set<std::string> newcomers_;  // serial numbers
   std::unique_ptr<PacketFile> file_;
+  std::unique_ptr<OpticsWatch> optics_;  // where the optics are watched
   std::vector<const wire::UdpSocket*> waiting_;
   std::optional<std::int64_t> first_data_ns_;
-  std::int64_t last_data_ns_ = 0, frame_due_ns_ = 0;
+  std::int64_t last_data_ns_ = 0, frame_due_ns_ = 0, watch_due_ns_ = 0;
   std::uint64_t passive_strangers_ = 0;
 };
 
@@ -233,8 +246,10 @@ void Recorder::take_event(LiveSensor& live, const ClientEvent& event) {
       break;
     case ClientEvent::Kind::firmware:
       live.result.firmware = event.text;
-      if (const auto grid = recordings::livox::grid_of_firmware(event.text))
+      if (const auto grid = recordings::livox::grid_of_firmware(event.text)) {
         live.order.set_grid(*grid);
+        if (optics_) optics_->set_grid(live.place, *grid);
+      }
       break;
     case ClientEvent::Kind::sensor_state:
       if (event.value != static_cast<std::uint32_t>(wire::SensorState::normal)) {
@@ -245,6 +260,7 @@ void Recorder::take_event(LiveSensor& live, const ClientEvent& event) {
       }
       break;
     case ClientEvent::Kind::status:
+      live.status = event.value;
       if ((event.value & kTroubles) != 0) {
         auto& known = live.result.statuses;
         if (known.size() < kMostStatuses &&
@@ -369,6 +385,7 @@ void Recorder::write_frame(bool last) {
     if (last) live.order.flush();
     for (const auto& packet : live.order.take()) {
       file_->add(static_cast<std::uint8_t>(i), packet);
+      if (optics_) optics_->add(i, packet);
     }
   }
   file_->end_frame();
@@ -391,6 +408,10 @@ void Recorder::step(std::int64_t now, std::int64_t wait_until) {
     for (const auto& live : sensors_) live->order.advance(host_ns);
     write_frame(false);
     frame_due_ns_ = now + kFramePeriod;
+  }
+  if (now >= watch_due_ns_) {
+    tell_watch(now, false);
+    watch_due_ns_ = now + kWatchPeriod;
   }
   wire::wait_for(waiting_, std::min(until, frame_due_ns_) - steady_ns());
 }
@@ -430,6 +451,7 @@ RecordedSensors Recorder::run() {
     device.index = static_cast<std::uint8_t>(devices.size());
     devices.push_back(device);
   }
+  begin_watch(devices);
   file_ = std::make_unique<PacketFile>(options_.output, devices);
   const std::int64_t begin = steady_ns();
   if (!passive_data_) {
@@ -470,7 +492,51 @@ RecordedSensors Recorder::run() {
                                          name_of(*sensors_.front())));
   }
   finish_file();
+  if (optics_) optics_->finish(kLongestFinish);
+  tell_watch(last_data_ns_, true);
   return result();
+}
+
+void Recorder::begin_watch(const std::vector<recordings::Device>& devices) {
+  for (std::size_t i = 0; i < sensors_.size(); ++i) sensors_[i]->place = i;
+  if (!options_.watch_optics) return;
+  std::vector<WatchedSensor> watched;
+  watched.reserve(devices.size());
+  for (const recordings::Device& device : devices) watched.push_back({device.serial, device.type});
+  optics_ = std::make_unique<OpticsWatch>(watched, options_.optics_reference);
+}
+
+/// Tells of alarms, and whoever watches of all.
+void Recorder::tell_watch(std::int64_t now, bool over) {
+  std::vector<OpticsHealth> optics;
+  if (optics_) optics = optics_->health();
+  for (std::size_t i = 0; i < optics.size(); ++i) {
+    LiveSensor& live = *sensors_[i];
+    if (optics[i].state.alarms == live.alarms_told) continue;
+    live.alarms_told = optics[i].state.alarms;
+    note_(fmt::format("{}: {}", name_of(live), alarm_words(optics[i])), true);
+  }
+  if (!watch_) return;
+  LiveRecording state;
+  state.over = over;
+  if (first_data_ns_) state.duration = 1e-9 * static_cast<double>(now - *first_data_ns_);
+  for (const auto& live : sensors_) {
+    LiveSensorState one;
+    one.sensor = live->result.sensor;
+    one.counts = live->order.counts();
+    one.kernel_drops = (passive_data_ ? *passive_data_ : *live->data).kernel_drops();
+    one.rejected = rejected_by(*live);
+    one.silent = live->silent;
+    one.status = live->status;
+    if (live->place < optics.size()) one.optics = optics[live->place];
+    state.sensors.push_back(std::move(one));
+  }
+  watch_(state);
+}
+
+std::uint64_t Recorder::rejected_by(const LiveSensor& live) const {
+  return live.result.rejected + live.order.counts().rejected + live.session_rejected +
+         (live.session ? live.session->rejected() : 0);
 }
 
 /// Gives the file its name, or makes what was asked for of it.
@@ -506,6 +572,8 @@ RecordedSensors Recorder::result() {
   recorded.receive_buffer_asked = kReceiveBuffer;
   recorded.receive_buffer_granted = kReceiveBuffer;
   recorded.strangers = listener_.strangers() + passive_strangers_;
+  std::vector<OpticsHealth> optics;
+  if (optics_) optics = optics_->health();
   std::int64_t first_host_ns = std::numeric_limits<std::int64_t>::max();
   for (const auto& live : sensors_) {
     if (const auto first = live->order.first_host_ns()) {
@@ -519,8 +587,8 @@ RecordedSensors Recorder::result() {
         std::min(recorded.receive_buffer_granted, data.receive_buffer());
     one.counts = live->order.counts();
     one.kernel_drops = data.kernel_drops();
-    one.rejected += one.counts.rejected + live->session_rejected +
-                    (live->session ? live->session->rejected() : 0);
+    one.rejected = rejected_by(*live);
+    if (live->place < optics.size()) one.optics = optics[live->place];
     for (const recordings::livox::PacketGap& gap : live->order.gaps()) {
       one.gaps.push_back({1e-9 * static_cast<double>(gap.host_from_ns - first_host_ns),
                           1e-9 * static_cast<double>(gap.host_to_ns - first_host_ns), gap.lost,
@@ -547,7 +615,7 @@ RecordedSensors Recorder::result() {
 }  // namespace
 
 RecordedSensors record_sensors(const RecordOptions& options, const RecordNote& note,
-                               const Progress& progress) {
+                               const Progress& progress, const RecordWatch& watch) {
   if (options.duration) require_above("option duration", *options.duration, 0, "s");
   require_find_time(options);
   if (!is_converted(options.output) && !lower_case(options.output).ends_with(".lvx")) {
@@ -556,7 +624,25 @@ RecordedSensors record_sensors(const RecordOptions& options, const RecordNote& n
         ".lvx or .nc; convert the recording afterwards",
         options.output));
   }
-  return Recorder(options, wire::interface_of(options.interface), note, progress).run();
+  return Recorder(options, wire::interface_of(options.interface), note, progress, watch).run();
+}
+
+std::string alarm_words(const OpticsHealth& health) {
+  const auto& alarm = health.state.alarm;
+  if (!alarm) return {};
+  const ParameterInfo* known = find_parameter_of_any_train(alarm->parameter);
+  const double per_unit = known != nullptr ? known->si_per_unit : 1;
+  return fmt::format(
+      "{}: {} is {:+.2g} +- {:.1g} from {}; a difference as large as that of all parameters comes "
+      "by "
+      "chance with a probability of {:.1g}",
+      alarm->kind == estimation::OpticsAlarmKind::changed
+          ? "its optics have changed"
+          : "its optics are not those of " + health.reference,
+      alarm->parameter, alarm->difference / per_unit, alarm->sigma / per_unit,
+      alarm->kind == estimation::OpticsAlarmKind::changed ? "what it was in the beginning"
+                                                          : "what it should be",
+      alarm->p_value);
 }
 
 }  // namespace risley::jobs

@@ -27,6 +27,9 @@ struct EmulatedFaults {
       heartbeat_dies;             ///< s after the first start; from then to the session's end
   std::optional<double> restart;  ///< s after the first start, once
   double restart_time = 2;        ///< s, for which a sensor that restarts says nothing
+  /// What is added to parameters of the true sensor, SI units, while the rotors go on.
+  ParameterValues bend;
+  std::optional<double> bend_time;  ///< s after the first start, once
 };
 
 /// How the clock of a virtual sensor goes. Times are s after the first start.
@@ -72,6 +75,7 @@ struct EmulatedSensor {
   std::uint64_t rejected = 0;                   ///< datagrams that were no commands of the host
   std::uint64_t sessions = 0, restarts = 0;     ///< handshakes that were answered; restarts
   std::uint64_t clock_jumps = 0;  ///< that were ordered, changes of the source among them
+  std::uint64_t bends = 0;        ///< times that the optics changed
   double behind = 0;              ///< s, by which the sending fell behind at most
 };
 

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "risley/core/progress.hpp"
+#include "risley/jobs/optics_watch.hpp"
 #include "risley/recordings/livox/packet_order.hpp"
 #include "risley/wire/commands.hpp"
 
@@ -28,6 +29,8 @@ struct RecordOptions {
   bool imu = true;                              ///< inertial samples, where the sensor has them
   /// Path; ends in .lvx, or in .nc for what is converted at the end.
   std::string output;
+  bool watch_optics = false;                    ///< see OpticsWatch
+  std::string optics_reference;                 ///< as OpticsWatch's
 };
 
 /// A sensor on the interface.
@@ -74,6 +77,7 @@ struct RecordedSensor {
   std::vector<std::uint32_t> statuses;
   std::vector<RecordedClock> clocks;           ///< one after the other, the first 100
   std::vector<RecordedStatus> status_changes;  ///< as packets have them, the first 1000
+  std::optional<OpticsHealth> optics;  ///< where they were watched
 };
 
 /// What came of a recording.
@@ -86,6 +90,26 @@ struct RecordedSensors {
   std::vector<RecordedSensor> sensors;
   std::uint64_t strangers = 0;  ///< datagrams at the broadcast port that name no sensor
 };
+
+/// A sensor while it is recorded.
+struct LiveSensorState {
+  FoundSensor sensor;
+  wire::PacketCounts counts;  ///< so far
+  std::uint64_t kernel_drops = 0, rejected = 0;
+  bool silent = false;                  ///< nothing came for a second
+  std::optional<std::uint32_t> status;  ///< the last one, as recordings::Packet::status
+  std::optional<OpticsHealth> optics;   ///< where they are watched
+};
+
+/// A recording while it runs.
+struct LiveRecording {
+  double duration = 0;  ///< s since the first data
+  bool over = false;    ///< nothing will be told any more
+  std::vector<LiveSensorState> sensors;
+};
+
+/// Told twice a second, and at the end. The recording waits for it: it must be quick.
+using RecordWatch = std::function<void(const LiveRecording&)>;
 
 /// Told at once: words about a sensor, and whether something is wrong.
 using RecordNote = std::function<void(const std::string& words, bool is_wrong)>;
@@ -103,6 +127,9 @@ std::vector<FoundSensor> find_sensors(const RecordOptions& options, const Progre
 /// @throws InvalidArgument; NetworkError also where there is no sensor, or none sends anything;
 ///         FileError
 RecordedSensors record_sensors(const RecordOptions& options, const RecordNote& note,
-                               const Progress& progress = {});
+                               const Progress& progress = {}, const RecordWatch& watch = {});
+
+/// An alarm in a sentence, such as "prism_tilt_b_vertical_deg has changed by ...".
+std::string alarm_words(const OpticsHealth& health);
 
 }  // namespace risley::jobs
