@@ -48,7 +48,7 @@ def find_sensors(interface: str = "", *, time: float = 2.5,
 def record(output: Path, *, duration: Optional[float] = None, stop: Optional[Stop] = None,
            interface: str = "", serials: Sequence[str] = (), find_time: float = 2.5,
            passive: bool = False, data_port: int = 56001, coordinates: str = "spherical",
-           return_mode: str = "as-is", imu: bool = True,
+           return_mode: str = "as-is", imu: bool = True, optics: Path = "",
            progress: Progress = None) -> Dict[str, Any]:
     """Record first-generation Livox sensors from the network.
 
@@ -80,6 +80,10 @@ def record(output: Path, *, duration: Optional[float] = None, stop: Optional[Sto
         Returns of a shot that they are to send.
     imu : bool, default True
         Record inertial samples where the sensor has them.
+    optics : str or path, optional
+        Watch the optics: 'own' tells when they change while they are recorded, a preset or
+        calibration file also when they are not those. An alarm is a warning of the logger and
+        stands in the result.
     progress : bool or callable, optional
         As in `risley.read`.
 
@@ -99,7 +103,7 @@ def record(output: Path, *, duration: Optional[float] = None, stop: Optional[Sto
         "output": os.fspath(output), "duration": duration, "interface": interface,
         "serials": list(serials), "find_time": find_time, "passive": passive,
         "data_port": data_port, "coordinates": coordinates, "return_mode": return_mode,
-        "imu": imu}
+        "imu": imu, "optics": os.fspath(optics)}
     with telling(progress) as tell:
         return dict(_risley.record(options, _note, stop, tell))
 
@@ -117,7 +121,8 @@ def emulate(interface: str, *, duration: Optional[float] = None, stop: Optional[
             duplication: float = 0.0, disorder: float = 0.0, disorder_packets: int = 10,
             delay: float = 0.0, wrong_checksums: float = 0.0,
             heartbeat_dies: Optional[float] = None, restart: Optional[float] = None,
-            restart_takes: float = 2.0, seed: int = 0, threads: int = 0,
+            restart_takes: float = 2.0, bend: Mapping[str, float] = {},
+            bend_time: Optional[float] = None, seed: int = 0, threads: int = 0,
             progress: Progress = None) -> Dict[str, Any]:
     """Be a first-generation Livox sensor on the network, with known truth.
 
@@ -160,6 +165,10 @@ def emulate(interface: str, *, duration: Optional[float] = None, stop: Optional[
         When heartbeats are no longer answered, and when the sensor restarts, s after the start.
     restart_takes : float, default 2
         How long a restart takes, s.
+    bend : mapping of str to float
+        What is added to parameters of the true sensor while it runs, in the unit of the name.
+    bend_time : float, optional
+        When the optics bend so, s after the start.
     threads, progress
         As in `risley.estimate`.
 
@@ -187,6 +196,7 @@ def emulate(interface: str, *, duration: Optional[float] = None, stop: Optional[
         "start_angles": angles("start_angles", start_angles, start_angles_deg), "loss": loss,
         "duplication": duplication, "disorder": disorder, "disorder_packets": disorder_packets,
         "delay": delay, "wrong_checksums": wrong_checksums, "heartbeat_dies": heartbeat_dies,
-        "restart": restart, "restart_takes": restart_takes, "seed": seed}
+        "restart": restart, "restart_takes": restart_takes,
+        "bend": list(bend.items()), "bend_time": bend_time, "seed": seed}
     with telling(progress) as tell:
         return dict(_risley.emulate(options, threads, _note, stop, tell))

@@ -61,6 +61,10 @@ jobs::RecordOptions record_options(const Options& options) {
   }
   options.take("imu", job.imu);
   options.take("output", job.output);
+  std::string optics;
+  options.take("optics", optics);
+  job.watch_optics = !optics.empty();
+  if (optics != "own") job.optics_reference = optics;
   return job;
 }
 
@@ -98,6 +102,8 @@ jobs::EmulatedFaults faults_of(const Options& options) {
   options.take("heartbeat_dies", faults.heartbeat_dies);
   options.take("restart", faults.restart);
   options.take("restart_takes", faults.restart_time);
+  faults.bend = parameter_values(options, "bend");
+  options.take("bend_time", faults.bend_time);
   return faults;
 }
 

@@ -78,6 +78,18 @@ def test_a_recording_is_sent_again_with_a_clock_that_is_faster(sensors, tmp_path
     assert abs(clock["drift_ppm"] - 400.0) < 6 * clock["drift_sigma_ppm"]
 
 
+def test_a_bend_while_recording_is_told(sensors, tmp_path, caplog):
+    start, end = sensors
+    start("127.0.0.72", serial="PYTHON000000081", bend_time=6.0,
+          bend={"prism_tilt_b_vertical_deg": 0.1})
+    with caplog.at_level(logging.WARNING, logger="risley"):
+        recorded = risley.record(tmp_path / "bent.lvx", interface=HOST, duration=12.0,
+                                 serials=["PYTHON000000081"], optics="own")
+    assert end()[0]["sensors"][0]["bends"] == 1
+    assert recorded["sensors"][0]["optics"]["alarm"]["kind"] == "changed"
+    assert any("optics have changed" in record.getMessage() for record in caplog.records)
+
+
 def test_stop_ends_a_recording_and_words_are_logged(sensors, tmp_path, caplog):
     start, end = sensors
     start("127.0.0.63", serial="PYTHON000000031", heartbeat_dies=0.3, wrong_checksums=0.2)
