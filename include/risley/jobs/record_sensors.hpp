@@ -94,7 +94,7 @@ struct RecordedSensors {
 /// A sensor while it is recorded.
 struct LiveSensorState {
   FoundSensor sensor;
-  wire::PacketCounts counts;  ///< so far
+  recordings::livox::PacketCounts counts;  ///< so far
   std::uint64_t kernel_drops = 0, rejected = 0;
   bool silent = false;                  ///< nothing came for a second
   std::optional<std::uint32_t> status;  ///< the last one, as recordings::Packet::status
