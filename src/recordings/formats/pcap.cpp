@@ -188,10 +188,10 @@ void PcapReader::look_through(const Progress& progress) {
   // Inertial samples may come from another port than points.
   for (const Seen& seen : seen_) {
     if (seen.has_points) continue;
-    const auto& [address, port, slot, number] = seen.sender;
     const auto same = std::find_if(devices_.begin(), devices_.end(), [&](const auto& one) {
-      return std::get<0>(one.first) == address && std::get<2>(one.first) == slot &&
-             std::get<3>(one.first) == number;
+      return std::get<0>(one.first) == std::get<0>(seen.sender) &&
+             std::get<2>(one.first) == std::get<2>(seen.sender) &&
+             std::get<3>(one.first) == std::get<3>(seen.sender);
     });
     if (same == devices_.end()) {
       add_device(seen);
@@ -250,7 +250,8 @@ void PcapReader::look_at_packet(const CapturedDatagram& datagram, Chunk& chunk) 
 
 void PcapReader::add_device(const Seen& seen) {
   const std::size_t row = header_.devices.size();
-  const auto& [address, port, slot, number] = seen.sender;
+  const wire::Address address = std::get<0>(seen.sender);
+  const std::uint16_t port = std::get<1>(seen.sender);
   Device device;
   device.index = static_cast<std::uint8_t>(row);
   const auto named = named_.find(address);

@@ -41,8 +41,10 @@ struct StatusChange {
 /// the drift. Memory does not grow with the time.
 class ClockWatch {
  public:
-  /// Stretches and changes that are kept; those behind are left out.
-  static constexpr std::size_t kMostStretches = 100, kMostChanges = 1000;
+  /// Stretches that are kept; those behind are left out.
+  static constexpr std::size_t kMostStretches = 100;
+  /// Changes of the status that are kept; those behind are left out.
+  static constexpr std::size_t kMostChanges = 1000;
 
   /// A packet, in the order of the sensor's times.
   /// @param time_ns  the sensor's  @param host_ns  when it came

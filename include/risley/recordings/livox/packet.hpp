@@ -69,8 +69,10 @@ inline constexpr ShotGrid kGrid100kHz{10'000, 1, 1, 1};
 /// Sensors with six beams: a shot every 12500/3 ns.
 inline constexpr ShotGrid kGrid240kHz{12'500, 3, 6, 1};
 
-/// Mid-40 firmware with two or three returns of a shot as so many records.
-inline constexpr ShotGrid kGridOfTwo{10'000, 1, 1, 2}, kGridOfThree{50'000, 3, 1, 3};
+/// Mid-40 firmware with two returns of a shot as so many records.
+inline constexpr ShotGrid kGridOfTwo{10'000, 1, 1, 2};
+/// The same with three.
+inline constexpr ShotGrid kGridOfThree{50'000, 3, 1, 3};
 
 /// Grid of a device type and data type, empty when the two do not tell.
 std::optional<ShotGrid> shot_grid(std::uint8_t device_type, std::uint8_t data_type);
