@@ -6,22 +6,23 @@
 // Compare rows of one run; the argument is the recording's length in seconds, so that
 // --benchmark_filter=/3/ is the short way. `ratio` measures both back to back; cpu_ratio is the one
 // to read on a machine that does other work too.
-// The library chooses its instruction set at run time, while the peer has that of the compiler's
-// flags. Configure everything with CMAKE_CXX_FLAGS=-march=native to compare on equal terms.
+// The peer (filter_peer.cpp) is compiled for this processor; the library chooses its instruction
+// set when it runs.
+#include <algorithm>
 #include <array>
 #include <chrono>
 #include <cmath>
 #include <cstdint>
 #include <ctime>
+#include <limits>
 #include <map>
 #include <stdexcept>
 #include <utility>
 #include <vector>
 
 #include <Eigen/Core>
-#include <Eigen/LU>
 #include <benchmark/benchmark.h>
-#include <ceres/jet.h>
+#include <fmt/format.h>
 #include <tbb/global_control.h>
 
 #include "risley/core/angle.hpp"
@@ -29,9 +30,12 @@
 #include "risley/estimation/free_parameters.hpp"
 #include "risley/estimation/initialisation.hpp"
 #include "risley/estimation/normal_equations.hpp"
-#include "risley/optics/observation_model.hpp"
 #include "risley/sensors/preset.hpp"
 #include "risley/simulation/scanner.hpp"
+
+#include "estimation/filter.hpp"
+#include "filter_peer.hpp"
+#include "in_turn.hpp"
 
 namespace risley {
 namespace {
@@ -106,115 +110,15 @@ estimation::EstimateOptions map_options() {
   return options;
 }
 
-/// The peer: the filter as one writes it down, and competently. Its model is the library's template
-/// with Jets of all twelve states, because that is leaner than Eq. (10-26) as printed (Rodrigues'
-/// form, no quaternions); the train is prepared anew for every shot because every shot changes its
-/// parameters. Matrices have fixed sizes, so nothing is allocated, and lazyProduct() spares the
-/// 12 x 12 products Eigen's blocking, which costs more than it gives at this size. What it does not
-/// use is the structure of F and H, nor does it look for outliers.
-class PlainFilter {
- public:
-  static constexpr int kStates = 12;  // eight constants as in kBounds, angle and speed of A, of B
-  using Vector = Eigen::Matrix<double, kStates, 1>;
-  using Matrix = Eigen::Matrix<double, kStates, kStates>;
-
-  PlainFilter(const estimation::Start& start, std::int64_t time_ns)
-      : fixed_(parameter_array<2>(start.train)),
-        face_order_(face_order_array<2>(start.train)),
-        time_ns_(time_ns) {
-    for (std::size_t i = 0; i < kBounds.size(); ++i) {
-      const auto at = static_cast<Eigen::Index>(i);
-      mean_[at] = start.train.get(kBounds[i].name);
-      covariance_(at, at) = square(i == 0 ? kIndexSigma : kTiltSigma);
-    }
-    const double ahead = 1e-9 * static_cast<double>(time_ns - start.time_ns);
-    for (int rotor = 0; rotor < 2; ++rotor) {
-      const auto k = static_cast<std::size_t>(rotor);
-      const int angle = angle_of(rotor), speed = angle + 1;
-      mean_[angle] = start.rotation_angle[k] + ahead * start.angular_velocity[k];
-      mean_[speed] = start.angular_velocity[k];
-      covariance_(angle, angle) = square(kAngleSigma);
-      covariance_(speed, speed) = square(kSpeedSigma);
-    }
+peers::PlainFilter peer_filter(const estimation::Start& start, std::int64_t time_ns) {
+  const double ahead = 1e-9 * static_cast<double>(time_ns - start.time_ns);
+  std::array<double, 2> angle{}, speed{};
+  for (std::size_t k = 0; k < 2; ++k) {
+    speed[k] = start.angular_velocity[k];
+    angle[k] = start.rotation_angle[k] + ahead * speed[k];
   }
-
-  /// Constant speed with white acceleration.                                  [B21 Eq. (27)]
-  void predict(std::int64_t time_ns) {
-    const double dt = 1e-9 * static_cast<double>(time_ns - time_ns_);
-    time_ns_ = time_ns;
-    Matrix f = Matrix::Identity(), q = Matrix::Zero();
-    for (int rotor = 0; rotor < 2; ++rotor) {
-      const int angle = angle_of(rotor), speed = angle + 1;
-      f(angle, speed) = dt;
-      q(angle, angle) = kAcceleration * kAcceleration * dt * dt * dt / 3.0;
-      q(angle, speed) = q(speed, angle) = kAcceleration * kAcceleration * dt * dt / 2.0;
-      q(speed, speed) = kAcceleration * kAcceleration * dt;
-    }
-    mean_ = f * mean_;
-    const Matrix turned = f.lazyProduct(covariance_);
-    covariance_ = turned.lazyProduct(f.transpose()) + q;
-  }
-
-  void update(double azimuth, double zenith) {
-    const SphericalAngles<Jet> model = observe_with_derivatives();
-    const Eigen::Vector2d innovation(azimuth - model.azimuth.a, zenith - model.zenith.a);
-    Eigen::Matrix<double, 2, kStates> h;
-    h.row(0) = model.azimuth.v.transpose();
-    h.row(1) = model.zenith.v.transpose();
-    const Eigen::Matrix2d noise = square(kAngleNoise) * Eigen::Matrix2d::Identity();
-    const Eigen::Matrix<double, kStates, 2> cross = covariance_ * h.transpose();
-    const Eigen::Matrix2d innovation_covariance = h * cross + noise;
-    const Eigen::Matrix<double, kStates, 2> gain = cross * innovation_covariance.inverse();
-    mean_ += gain * innovation;
-    const Matrix rest = Matrix::Identity() - gain * h;
-    const Matrix kept = rest.lazyProduct(covariance_);
-    covariance_ = kept.lazyProduct(rest.transpose()) + gain * noise * gain.transpose();  // Joseph
-  }
-
-  const Vector& mean() const { return mean_; }
-
- private:
-  using Jet = ceres::Jet<double, kStates>;
-
-  // The start leaves little open, so wide priors do no harm: those of the library's own filter.
-  static constexpr double kIndexSigma = 0.01;
-  static constexpr double kTiltSigma = radians_from_degrees(1.0);
-  static constexpr double kAngleSigma = radians_from_degrees(5.0);
-  static constexpr double kSpeedSigma = radians_from_degrees(100.0);
-  /// Fits these rotors, rad/s/sqrt(s); from a fifth to twenty times this the parameters come out
-  /// equally well.
-  static constexpr double kAcceleration = radians_from_degrees(1.0);
-
-  static constexpr double square(double x) { return x * x; }
-  static constexpr int angle_of(int rotor) { return 8 + 2 * rotor; }
-
-  SphericalAngles<Jet> observe_with_derivatives() const {
-    std::array<Jet, parameter_count(2)> parameters;
-    for (std::size_t i = 0; i < parameters.size(); ++i) parameters[i] = Jet(fixed_[i]);
-    const auto set = [&](int at, int state) {
-      parameters[static_cast<std::size_t>(at)] = Jet(mean_[state], state);
-    };
-    set(place::refractive_index(0), 0);
-    set(place::refractive_index(1), 0);
-    set(place::incident_beam_horizontal(), 1);
-    set(place::incident_beam_vertical(), 2);
-    set(place::bearing_tilt_horizontal(0), 3);
-    set(place::bearing_tilt_vertical(0), 4);
-    set(place::prism_tilt_vertical(0), 5);
-    set(place::prism_tilt_horizontal(1), 6);
-    set(place::prism_tilt_vertical(1), 7);
-    const auto train = prepare<Jet, 2>(parameters, face_order_);
-    const std::array<Jet, 2> angles{Jet(mean_[angle_of(0)], angle_of(0)),
-                                    Jet(mean_[angle_of(1)], angle_of(1))};
-    return angles_from_direction(trace(train, angles).direction);
-  }
-
-  std::array<double, parameter_count(2)> fixed_;
-  std::array<FaceOrder, 2> face_order_;
-  std::int64_t time_ns_;
-  Vector mean_ = Vector::Zero();
-  Matrix covariance_ = Matrix::Zero();
-};
+  return {start.train, angle, speed, time_ns, kAngleNoise};
+}
 
 /// One run of an estimator.
 struct Run {
@@ -259,13 +163,14 @@ Run run_peer(const Recording& data) {
   const estimation::AngleSeries& series = data.series;
   Run run;
   const Stopwatch stopwatch;
-  PlainFilter filter(start, series.time_ns[0]);
+  peers::PlainFilter filter = peer_filter(start, series.time_ns[0]);
   for (std::size_t i = 0; i < series.size(); ++i) {
     filter.predict(series.time_ns[i]);
     filter.update(series.azimuth[i], series.zenith[i]);
   }
   stopwatch.stop(run);
-  run.parameters = filter.mean().head<8>();
+  const auto mean = filter.mean();
+  run.parameters = Eigen::Map<const Eigen::VectorXd>(mean.data(), peers::PlainFilter::kConstants);
   return run;
 }
 
@@ -299,19 +204,68 @@ void ratio(benchmark::State& state) {
   }
 }
 
+/// Prediction and update by one observation: the library's own filter and the peer in turn, from
+/// the same start. difference_in_sigmas is the largest of the states after the last shot.
+void filter_step(benchmark::State& state) {
+  constexpr std::size_t kSteps = 2000, kStride = 100;
+  const Recording& data = recording(3);
+  estimation::AngleSeries series;
+  for (std::size_t i = 0; i < kSteps; ++i) series.append(data.series, i * kStride);
+  const estimation::EstimateOptions options = map_options();
+  estimation::EkfOptions ekf;
+  ekf.angle_noise = kAngleNoise;
+  ekf.free = estimation::free_parameters(estimation::default_free_names({2}), {2});
+  const estimation::Start start = estimation::find_start(
+      data.head, options.sensor, {ekf.free, kAngleNoise, options.mirrored, options.turned});
+  const std::vector<estimation::RotorProcess> process(
+      2, {peers::PlainFilter::kAcceleration, 0.0, 0.0});
+  estimation::Filter filter(series, start.train, ekf, process, nullptr);
+  const estimation::FilterState first = first_state(filter, series, start, ekf.free);
+  estimation::FilterState ours;
+  peers::PlainFilter peer = peer_filter(start, series.time_ns[0]);
+  bench::run_in_turn(
+      state, kSteps,
+      [&] {
+        ours = first;
+        for (std::size_t i = 0; i < kSteps; ++i) {
+          if (i > 0) filter.predict(ours, series.time(i) - series.time(i - 1));
+          filter.update(ours, i, std::numeric_limits<double>::infinity());
+        }
+      },
+      kSteps,
+      [&] {
+        peer = peer_filter(start, series.time_ns[0]);
+        for (std::size_t i = 0; i < kSteps; ++i) {
+          peer.predict(series.time_ns[i]);
+          peer.update(series.azimuth[i], series.zenith[i]);
+        }
+      });
+  double difference = 0;
+  const auto mean = peer.mean(), sigma = peer.sigma();
+  for (std::size_t i = 0; i < mean.size(); ++i) {
+    double apart = ours.mean[static_cast<Eigen::Index>(i)] - mean[i];
+    if (i == 8 || i == 10) apart = wrap_to_pi(apart);
+    difference = std::max(difference, std::abs(apart) / sigma[i]);
+  }
+  state.counters["difference_in_sigmas"] = difference;
+}
+
 /// The step of the batch estimator that sees every shot, at its answer.
-void accumulate(benchmark::State& state, InstructionSet set) {
+/// @param parameters  how many of the free ones, the first
+void accumulate(benchmark::State& state, InstructionSet set, std::size_t parameters) {
   const Recording& data = recording(3);
   static const auto answer =
       estimation::estimate(estimation::Method::map, data.series, data.head, map_options());
+  const std::vector<estimation::FreeParameter> free(
+      answer.free.begin(), answer.free.begin() + static_cast<std::ptrdiff_t>(parameters));
   const std::size_t shots = data.series.size();
   std::vector<double> azimuth(shots), zenith(shots);
   std::vector<unsigned char> outlier(shots);
   const estimation::ShotWeights weights{estimation::equal_noise(kAngleNoise), 0.0, 20.0};
   estimation::NormalEquations equations;
   for (auto _ : state) {
-    estimation::accumulate(answer.series, answer.trajectory, answer.train, answer.free, weights,
-                           equations, {azimuth, zenith, outlier}, set);
+    estimation::accumulate(answer.series, answer.trajectory, answer.train, free, weights, equations,
+                           {azimuth, zenith, outlier}, set);
     benchmark::ClobberMemory();
   }
   state.counters["per_shot"] =
@@ -332,9 +286,19 @@ const bool registered = [] {
   once("plain_ekf", plain_ekf);
   once("ratio", ratio);
   for (const InstructionSet set : available_instruction_sets()) {
-    benchmark::RegisterBenchmark(("accumulate/" + to_string(set)).c_str(), accumulate, set)
+    benchmark::RegisterBenchmark(("accumulate/" + to_string(set)).c_str(), accumulate, set,
+                                 kBounds.size())
         ->Unit(benchmark::kMillisecond);
   }
+  for (std::size_t parameters = 1; parameters <= kBounds.size(); ++parameters) {
+    benchmark::RegisterBenchmark(fmt::format("accumulate_parameters/{}", parameters).c_str(),
+                                 accumulate, best_instruction_set(), parameters)
+        ->Unit(benchmark::kMillisecond);
+  }
+  benchmark::RegisterBenchmark("filter_step", filter_step)
+      ->Iterations(101)
+      ->UseManualTime()
+      ->Unit(benchmark::kMillisecond);
   return true;
 }();
 

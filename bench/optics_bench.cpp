@@ -4,11 +4,11 @@
 // comparison runs peer and library in turn, many times, in one process: peer_over_ours is the
 // median of the ratios of neighbours, beside the smallest, the quartiles and the median times per
 // shot. The peers (optics_peers.cpp) are compiled for this processor; the library chooses its
-// instruction set when it runs.
+// instruction set when it runs. error_rad and error are the largest differences from the model in
+// long double and from the derivatives by Jets.
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <ctime>
 #include <random>
 #include <string>
 #include <vector>
@@ -21,10 +21,13 @@
 #include "risley/optics/observation_adjoint.hpp"
 #include "risley/sensors/preset.hpp"
 
+#include "in_turn.hpp"
 #include "optics_peers.hpp"
 
 namespace risley {
 namespace {
+
+using bench::run_in_turn;
 
 constexpr std::size_t kShots = 1 << 14;
 
@@ -81,43 +84,20 @@ void scalar_adjoint(benchmark::State& state) {
 }
 BENCHMARK(scalar_adjoint);
 
-/// Processor time of this thread: other programs of a busy machine change it least.
-double thread_seconds() {
-  std::timespec now{};
-  ::clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
-
-/// Runs both in turn and tells how many times longer the peer takes.
-/// @param peer_shots  of the peer's run, which may be shorter than ours
-template <class Ours, class Peer>
-void compare(benchmark::State& state, const Ours& ours, const Peer& peer,
-             std::size_t peer_shots = kShots) {
-  const auto seconds = [](const auto& run) {
-    const double begin = thread_seconds();
-    run();
-    benchmark::ClobberMemory();
-    return thread_seconds() - begin;
-  };
-  std::vector<double> ratios, our_times, peer_times;
-  for (auto _ : state) {
-    const double theirs = 1e9 * seconds(peer) / static_cast<double>(peer_shots);
-    const double mine = 1e9 * seconds(ours) / static_cast<double>(kShots);
-    state.SetIterationTime(1e-9 * mine * static_cast<double>(kShots));
-    our_times.push_back(mine);
-    peer_times.push_back(theirs);
-    ratios.push_back(theirs / mine);
+/// The largest error of columns of directions, rad: the template of the model in long double.
+double largest_error(const Shots& shots) {
+  const auto doubles = parameter_array<2>(shots.train);
+  std::array<long double, doubles.size()> parameters;
+  std::copy(doubles.begin(), doubles.end(), parameters.begin());
+  const auto train = prepare<long double, 2>(parameters, face_order_array<2>(shots.train));
+  long double worst = 0;
+  for (std::size_t i = 0; i < kShots; ++i) {
+    const std::array<long double, 2> angles{shots.a[i], shots.b[i]};
+    const auto exact = angles_from_direction(trace(train, angles).direction);
+    worst = std::max({worst, std::abs(exact.azimuth - shots.azimuth[i]),
+                      std::abs(exact.zenith - shots.zenith[i])});
   }
-  const auto at = [](std::vector<double>& values, double part) {
-    std::sort(values.begin(), values.end());
-    return values[static_cast<std::size_t>(part * static_cast<double>(values.size() - 1))];
-  };
-  state.counters["peer_over_ours"] = at(ratios, 0.5);
-  state.counters["ratio_min"] = ratios.front();
-  state.counters["ratio_q1"] = at(ratios, 0.25);
-  state.counters["ratio_q3"] = at(ratios, 0.75);
-  state.counters["ours_ns"] = at(our_times, 0.5);
-  state.counters["peer_ns"] = at(peer_times, 0.5);
+  return static_cast<double>(worst);
 }
 
 /// Azimuth and zenith against plain Eigen.
@@ -128,16 +108,33 @@ void directions(benchmark::State& state, InstructionSet set) {
   const auto ours = [&] {
     observe_batch(shots.train, angles, {{}, {}, {}, shots.azimuth, shots.zenith}, {}, set);
   };
-  compare(state, ours, [&] {
+  run_in_turn(state, kShots, ours, kShots, [&] {
     peers::plain_directions(shots.train, shots.a.data(), shots.b.data(), kShots, azimuth.data(),
                             zenith.data());
   });
-  double worst = 0;
-  for (std::size_t i = 0; i < kShots; ++i) {
-    worst = std::max(
-        {worst, std::abs(azimuth[i] - shots.azimuth[i]), std::abs(zenith[i] - shots.zenith[i])});
+  state.counters["error_rad"] = largest_error(shots);
+}
+
+/// More shots than any cache holds, against reading and writing the same bytes.
+void directions_in_memory(benchmark::State& state, InstructionSet set) {
+  constexpr std::size_t kTimes = 256;
+  const Shots shots;
+  std::array<std::vector<double>, 4> columns;
+  for (auto& column : columns) column.resize(kTimes * kShots);
+  for (std::size_t i = 0; i < kTimes; ++i) {
+    const auto at = static_cast<std::ptrdiff_t>(i * kShots);
+    std::copy(shots.a.begin(), shots.a.end(), columns[0].begin() + at);
+    std::copy(shots.b.begin(), shots.b.end(), columns[1].begin() + at);
   }
-  state.counters["difference_rad"] = worst;
+  const std::vector<std::span<const double>> angles{columns[0], columns[1]};
+  const auto ours = [&] {
+    observe_batch(shots.train, angles, {{}, {}, {}, columns[2], columns[3]}, {}, set);
+  };
+  run_in_turn(state, kTimes * kShots, ours, kTimes * kShots, [&] {
+    std::copy(columns[0].begin(), columns[0].end(), columns[2].begin());
+    std::copy(columns[1].begin(), columns[1].end(), columns[3].begin());
+  });
+  state.counters["peer_GB_per_s"] = 32.0 / state.counters["peer_ns"];
 }
 
 /// The same at constant speeds, from times on: 100 kHz for longer and longer.
@@ -158,11 +155,13 @@ void sequence(benchmark::State& state, InstructionSet set) {
     turn();
     observe_batch(shots.train, shots.angles(), {{}, {}, {}, shots.azimuth, shots.zenith}, {}, set);
   };
-  compare(state, ours, [&] {
+  run_in_turn(state, kShots, ours, kShots, [&] {
     turn();
     peers::plain_directions(shots.train, shots.a.data(), shots.b.data(), kShots, azimuth.data(),
                             zenith.data());
   });
+  ours();
+  state.counters["error_rad"] = largest_error(shots);
 }
 
 /// Both angles and their derivatives by nine parameters and two rotation angles against Jets, block
@@ -193,13 +192,28 @@ void jacobian(benchmark::State& state, InstructionSet set, bool every_shot) {
       linearise_batch(shots.train, angles, out, {}, set);
     }
   };
-  compare(
-      state, ours,
-      [&] {
-        benchmark::DoNotOptimize(peers::jet_jacobians(shots.train, shots.a.data(), shots.b.data(),
-                                                      kPeerShots, every_shot));
-      },
-      kPeerShots);
+  run_in_turn(state, kShots, ours, kPeerShots, [&] {
+    benchmark::DoNotOptimize(
+        peers::jet_jacobians(shots.train, shots.a.data(), shots.b.data(), kPeerShots, every_shot));
+  });
+  // The last block against the same shots by Jets.
+  std::vector<double> derivatives(kBlock * 2 * peers::kJetColumns);
+  peers::jet_jacobians(shots.train, shots.a.data() + kShots - kBlock,
+                       shots.b.data() + kShots - kBlock, kBlock, every_shot, derivatives.data());
+  double worst = 0;
+  const double* exact = derivatives.data();
+  for (std::size_t i = 0; i < kBlock; ++i) {
+    for (const auto& gradient : gradients) {
+      for (int column = 0; column < peers::kJetColumns; ++column, ++exact) {
+        const std::size_t place =
+            column < peers::kJetColumns - 2
+                ? static_cast<std::size_t>(peers::jet_place(column))
+                : columns - peers::kJetColumns + static_cast<std::size_t>(column);
+        worst = std::max(worst, std::abs(gradient[place][i] - *exact));
+      }
+    }
+  }
+  state.counters["error"] = worst;
 }
 
 void inverse(benchmark::State& state) {
@@ -215,15 +229,18 @@ void inverse(benchmark::State& state) {
 BENCHMARK(inverse);
 
 const bool registered = [] {
-  const auto in_turn = [](const std::string& name, auto function) {
+  const auto in_turn = [](const std::string& name, auto function, int times = 201) {
     benchmark::RegisterBenchmark(name.c_str(), function)
-        ->Iterations(201)
+        ->Iterations(times)
         ->UseManualTime()
         ->Unit(benchmark::kMicrosecond);
   };
   for (const InstructionSet set : available_instruction_sets()) {
     const std::string name = to_string(set);
     in_turn("directions/" + name, [set](benchmark::State& state) { directions(state, set); });
+    in_turn(
+        "directions_in_memory/" + name,
+        [set](benchmark::State& state) { directions_in_memory(state, set); }, 21);
     in_turn("sequence/" + name, [set](benchmark::State& state) { sequence(state, set); });
     in_turn("jacobian/" + name, [set](benchmark::State& state) { jacobian(state, set, true); });
     in_turn("jacobian_prepared/" + name,

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 #include "optics_peers.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include <Eigen/Geometry>
@@ -44,7 +45,7 @@ void plain_directions(const PrismTrain& train, const double* a, const double* b,
 }
 
 double jet_jacobians(const PrismTrain& train, const double* a, const double* b, std::size_t shots,
-                     bool every_shot) {
+                     bool every_shot, double* derivatives) {
   using Jet = ceres::Jet<double, kJetColumns>;
   std::array<Jet, parameter_count(2)> parameters;
   for (int i = 0; i < parameter_count(2); ++i) {
@@ -63,6 +64,11 @@ double jet_jacobians(const PrismTrain& train, const double* a, const double* b, 
     }
     const auto beam = trace(prepared, {Jet(a[i], kJetColumns - 2), Jet(b[i], kJetColumns - 1)});
     const auto angles = angles_from_direction(beam.direction);
+    if (derivatives) {
+      for (const Jet& angle : {angles.azimuth, angles.zenith}) {
+        derivatives = std::copy_n(angle.v.data(), kJetColumns, derivatives);
+      }
+    }
     sum += angles.azimuth.a + angles.zenith.a + angles.azimuth.v.sum() + angles.zenith.v.sum();
   }
   return sum;

@@ -22,11 +22,11 @@ inline constexpr int kJetColumns = 11;
 /// Both angles and their derivatives by forward-mode automatic differentiation of the library's
 /// template.
 /// @param every_shot  whether every shot gets its parameters anew, as a cost function of Ceres
-/// does,
-///                    or all share what depends on the parameters alone
+///                    does, or all share what depends on the parameters alone
+/// @param derivatives  nullptr, or where they go [shots][azimuth, zenith][kJetColumns]
 /// @return some number made of all results
 double jet_jacobians(const PrismTrain& train, const double* a, const double* b, std::size_t shots,
-                     bool every_shot);
+                     bool every_shot, double* derivatives = nullptr);
 
 /// The place of the flat vector that a column belongs to; the two angles have none.
 constexpr int jet_place(int column) {

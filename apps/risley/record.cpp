@@ -1,6 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
 #include <algorithm>
+#include <cstddef>
 #include <cstdint>
 #include <cstdio>
 #include <map>
@@ -11,6 +12,7 @@
 #include <vector>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <spdlog/spdlog.h>
 #include <sys/ioctl.h>
 #include <unistd.h>
@@ -77,6 +79,39 @@ void print_found(const std::vector<jobs::FoundSensor>& found) {
                to_string(sensor.address)});
   }
   table.print();
+}
+
+std::string cause_text(const jobs::RecordedGap& gap) {
+  switch (gap.cause) {
+    case recordings::livox::GapCause::clock:
+      return "the sensor's clock jumped or began again";
+    case recordings::livox::GapCause::session:
+      return fmt::format("between two sessions, {} packets at most", grouped(gap.lost.value_or(0)));
+    case recordings::livox::GapCause::loss:
+      break;
+  }
+  return fmt::format("{} packets", grouped(gap.lost.value_or(0)));
+}
+
+/// What the clock of a sensor did, and what it said of itself; the first lines are enough.
+void print_clock(const jobs::RecordedSensor& one) {
+  constexpr std::size_t kMostLines = 20;
+  for (std::size_t i = 0; i < std::min(one.clocks.size(), kMostLines); ++i) {
+    const jobs::RecordedClock& clock = one.clocks[i];
+    if (!clock.drift && one.clocks.size() == 1) continue;
+    say("{}: clock of {} from {:.1f} to {:.1f} s{}\n", one.sensor.serial, to_string(clock.source),
+        clock.begin, clock.end,
+        clock.drift ? fmt::format(", {:+.2f} +- {:.2f} ppm beside this machine's", clock.drift->ppm,
+                                  clock.drift->sigma_ppm)
+                    : "");
+  }
+  for (std::size_t i = 0; i < std::min(one.status_changes.size(), kMostLines); ++i) {
+    const jobs::RecordedStatus& change = one.status_changes[i];
+    const auto words = recordings::livox::status_words(change.status);
+    if (words.empty() && i == 0) continue;
+    say("{}: from {:.1f} s on {}\n", one.sensor.serial, change.begin,
+        words.empty() ? "healthy" : fmt::format("{}", fmt::join(words, ", ")));
+  }
 }
 
 /// The page of the recording, as --watch has it.
@@ -167,10 +202,9 @@ void print_recorded(const jobs::RecordedSensors& recorded) {
   for (const jobs::RecordedSensor& one : recorded.sensors) {
     for (const jobs::RecordedGap& gap : one.gaps) {
       say("{}: no {} from {:.1f} to {:.1f} s, {}\n", one.sensor.serial,
-          gap.imu ? "inertial samples" : "points", gap.begin, gap.end,
-          gap.lost ? fmt::format("{} packets", grouped(*gap.lost))
-                   : std::string("the sensor's clock began again"));
+          gap.imu ? "inertial samples" : "points", gap.begin, gap.end, cause_text(gap));
     }
+    print_clock(one);
   }
   for (const jobs::RecordedSensor& one : recorded.sensors) {
     if (!one.optics) continue;
@@ -199,8 +233,9 @@ void print_recorded(const jobs::RecordedSensors& recorded) {
 Run declare_record(CLI::App& verb) {
   const auto options = std::make_shared<RecordChoices>();
   RecordChoices& o = *options;
-  verb.add_option("-o,--output", o.output,
-                  "Recording to write (.lvx); until the end it is called FILE.unfinished");
+  verb.add_option(
+      "-o,--output", o.output,
+      "Recording to write (.lvx, .nc); until the end it is an LVX file called FILE.unfinished");
   verb.add_option("--interface", o.interface,
                   "IPv4 address of this machine where the sensors are (default: the only one)")
       ->type_name("ADDRESS");

@@ -13,6 +13,7 @@
 #include "risley/core/error.hpp"
 #include "risley/core/require.hpp"
 #include "risley/optics/batch.hpp"
+#include "risley/trajectories/mount.hpp"
 
 #include "calibration/eigen_vectors.hpp"
 #include "calibration/flight_equations_kernel.hpp"

@@ -6,7 +6,6 @@
 #include <cmath>
 #include <limits>
 
-#include <Eigen/LU>
 #include <fmt/format.h>
 
 #include "risley/algebra/products.hpp"
@@ -18,15 +17,12 @@
 #include "risley/optics/batch.hpp"
 
 #include "estimation/entry_checks.hpp"
-#include "estimation/knot_model.hpp"
+#include "estimation/filter.hpp"
 #include "estimation/residual_model.hpp"
 
 namespace risley::estimation {
 namespace {
 
-/// How loose the rotors are before the first observation of either direction.
-constexpr double kAngleSigma = radians_from_degrees(5.0);
-constexpr double kSpeedSigma = radians_from_degrees(100.0);
 /// Chi-square of the innovations while the filter settles.
 constexpr double kOpenGate = 400.0;
 /// Filtered states kept at a time for the combination.
@@ -34,189 +30,9 @@ constexpr std::size_t kBlock = 1024;
 /// Shots that the search for the process noise looks at.
 constexpr std::size_t kLikelihoodShots = 10000;
 
-/// Mean and covariance: free parameters, then angle and speed of each rotor.
-struct State {
-  Eigen::VectorXd mean;
-  Eigen::MatrixXd covariance;
-};
-
-/// Where the model is linearised when not at the filter's own state: the smoothed answer of the
-/// pass before. With it a forward-backward pass is one Gauss-Newton step of the whole trajectory.
-struct Reference {
-  const Solution& before;
-
-  const Eigen::VectorXd& parameters() const { return before.parameters; }
-  double angle(std::size_t shot, std::size_t rotor) const {
-    return before.trajectory.angle(shot, rotor, 0.0);
-  }
-};
-
-class Filter {
- public:
-  Filter(const AngleSeries& series, const PrismTrain& train, const EkfOptions& options,
-         const std::vector<RotorProcess>& process, const Reference* reference)
-      : series_(series),
-        options_(options),
-        process_(process),
-        reference_(reference),
-        model_(train, options.free),
-        prisms_(train.prisms()),
-        statics_(static_cast<Eigen::Index>(options.free.size())),
-        size_(statics_ + 2 * prisms_),
-        angles_(static_cast<std::size_t>(prisms_)),
-        jacobian_(2, size_),
-        cross_(size_, 2),
-        gain_(size_, 2) {
-    if (reference_) model_.set(reference_->parameters());
-  }
-
-  Eigen::Index prisms() const { return prisms_; }
-  Eigen::Index statics() const { return statics_; }
-  Eigen::Index size() const { return size_; }
-
-  /// The covariance before any observation.
-  Eigen::MatrixXd wide_covariance() const {
-    Eigen::VectorXd sigma(size_);
-    for (Eigen::Index i = 0; i < statics_; ++i) {
-      sigma[i] = options_.free[static_cast<std::size_t>(i)].prior_sigma;
-    }
-    for (Eigen::Index k = 0; k < prisms_; ++k) {
-      sigma[statics_ + 2 * k] = kAngleSigma;
-      sigma[statics_ + 2 * k + 1] = kSpeedSigma;
-    }
-    return sigma.array().square().matrix().asDiagonal();
-  }
-
-  /// Moves a state by dt seconds, forwards or backwards.                     [B21 Eq. (27)]
-  void predict(State& state, double dt) const {
-    Eigen::MatrixXd& p = state.covariance;
-    for (Eigen::Index k = 0; k < prisms_; ++k) {
-      const Eigen::Index angle = statics_ + 2 * k, speed = angle + 1;
-      state.mean[angle] += dt * state.mean[speed];
-      p.row(angle) += dt * p.row(speed);
-      p.col(angle) += dt * p.col(speed);
-      const auto q = step_covariance(process_[static_cast<std::size_t>(k)], dt);
-      p(angle, angle) += q.angle_angle;
-      p(angle, speed) += q.angle_speed;
-      p(speed, angle) += q.angle_speed;
-      p(speed, speed) += q.speed_speed;
-    }
-    if (options_.parameter_walk > 0) {
-      p.diagonal().head(statics_).array() +=
-          options_.parameter_walk * options_.parameter_walk * std::abs(dt);
-    }
-  }
-
-  /// What one observation did.
-  struct Update {
-    bool accepted = false;
-    double chi_square = 0;
-    double log_likelihood = 0;
-  };
-
-  /// Takes the observation of a row into a state, unless it lies beyond the gate.
-  Update update(State& state, std::size_t row, double gate) {
-    linearise(state, row);
-    Eigen::MatrixXd& p = state.covariance;
-    cross_.setZero();
-    add_product(p, jacobian_.transpose(), cross_);
-    Eigen::Matrix2d innovation_covariance = jacobian_ * cross_;
-    const double noise = options_.angle_noise * options_.angle_noise;
-    innovation_covariance(0, 0) +=
-        noise + static_cast<double>(series_.azimuth_rounding_variance[row]);
-    innovation_covariance(1, 1) +=
-        noise + static_cast<double>(series_.zenith_rounding_variance[row]);
-    const double determinant = innovation_covariance.determinant();
-    const Eigen::Matrix2d inverse = innovation_covariance.inverse();
-    Update result;
-    result.chi_square = innovation_.dot(inverse * innovation_);
-    if (!(result.chi_square <= gate)) return result;
-    result.accepted = true;
-    result.log_likelihood = -0.5 * (result.chi_square + std::log(determinant));
-    gain_.noalias() = cross_ * inverse;
-    state.mean.noalias() += gain_ * innovation_;
-    subtract_product(gain_, cross_.transpose(), p);
-    // Rounding would otherwise let the two halves drift apart.
-    p.triangularView<Eigen::StrictlyLower>() = p.transpose();
-    return result;
-  }
-
-  /// Observed minus modelled at a state, rad; NaN when the beam does not get through.
-  Eigen::Vector2d residual_at(const Eigen::VectorXd& mean, std::size_t row) {
-    model_.set(mean.head(statics_));
-    take_angles(mean);
-    model_.linearise(angles_, series_.beam[row]);
-    Eigen::Vector2d residual = model_.residual(series_.azimuth[row], series_.zenith[row]);
-    if (reference_) model_.set(reference_->parameters());
-    return residual;
-  }
-
- private:
-  void take_angles(const Eigen::VectorXd& mean) {
-    for (Eigen::Index k = 0; k < prisms_; ++k) {
-      angles_[static_cast<std::size_t>(k)] = mean[statics_ + 2 * k];
-    }
-  }
-
-  /// Sets innovation_ and jacobian_.
-  void linearise(const State& state, std::size_t row) {
-    if (reference_) {
-      for (std::size_t k = 0; k < angles_.size(); ++k) {
-        angles_[k] = reference_->angle(row, k);
-      }
-    } else {
-      model_.set(state.mean.head(statics_));
-      take_angles(state.mean);
-    }
-    // An invalid beam makes the innovation NaN, which no gate lets through.
-    model_.linearise(angles_, series_.beam[row]);
-    innovation_ = model_.residual(series_.azimuth[row], series_.zenith[row]);
-    jacobian_.setZero();
-    jacobian_.leftCols(statics_) = model_.d_parameters();
-    for (Eigen::Index k = 0; k < prisms_; ++k) {
-      jacobian_.col(statics_ + 2 * k) = model_.d_angles().col(k);
-    }
-    if (reference_) {
-      innovation_ -= model_.d_parameters() * (state.mean.head(statics_) - reference_->parameters());
-      for (Eigen::Index k = 0; k < prisms_; ++k) {
-        innovation_ -= model_.d_angles().col(k) *
-                       (state.mean[statics_ + 2 * k] - angles_[static_cast<std::size_t>(k)]);
-      }
-    }
-  }
-
-  const AngleSeries& series_;
-  const EkfOptions& options_;
-  const std::vector<RotorProcess>& process_;
-  const Reference* reference_;
-  ResidualModel model_;
-  Eigen::Index prisms_, statics_, size_;
-  std::vector<double> angles_;  ///< of the shot at hand
-  Eigen::Vector2d innovation_;
-  Eigen::Matrix2Xd jacobian_;
-  Eigen::MatrixX2d cross_, gain_;
-};
-
-/// State at the first shot of a series, from a start at some other time.
-State first_state(const Filter& filter, const AngleSeries& series, const Start& start,
-                  const std::vector<FreeParameter>& free) {
-  State state;
-  state.mean.resize(filter.size());
-  state.mean.head(filter.statics()) = free_values(start.train, free);
-  const double ahead = 1e-9 * static_cast<double>(series.time_ns[0] - start.time_ns);
-  for (Eigen::Index k = 0; k < filter.prisms(); ++k) {
-    const double speed = start.angular_velocity[static_cast<std::size_t>(k)];
-    const double angle = start.rotation_angle[static_cast<std::size_t>(k)] + ahead * speed;
-    state.mean[filter.statics() + 2 * k] = wrap_to_pi(angle);
-    state.mean[filter.statics() + 2 * k + 1] = speed;
-  }
-  state.covariance = filter.wide_covariance();
-  return state;
-}
-
 /// State at the first shot, from a reference.
-State first_state(const Filter& filter, const Reference& reference) {
-  State state{Eigen::VectorXd(filter.size()), filter.wide_covariance()};
+FilterState first_state(const Filter& filter, const FilterReference& reference) {
+  FilterState state{Eigen::VectorXd(filter.size()), filter.wide_covariance()};
   state.mean.head(filter.statics()) = reference.parameters();
   for (Eigen::Index k = 0; k < filter.prisms(); ++k) {
     const auto rotor = static_cast<std::size_t>(k);
@@ -238,7 +54,7 @@ std::vector<RotorProcess> processes(const std::vector<double>& decades) {
 /// Shots that no filter may take although its prior is still wide enough to swallow them: those
 /// among the first that lie far from what the start, or the pass before, expects.
 std::vector<unsigned char> screen(const AngleSeries& series, const Start& start,
-                                  const EkfOptions& options, const Reference* reference) {
+                                  const EkfOptions& options, const FilterReference* reference) {
   std::vector<unsigned char> outlier(series.size(), 0);
   const PrismTrain& start_train = start.train;
   ResidualModel model(start_train, options.free);
@@ -265,9 +81,9 @@ std::vector<unsigned char> screen(const AngleSeries& series, const Start& start,
 /// Log likelihood of the innovations over the first shots for a choice of process noise, linearised
 /// at a reference so that it is that of a linear filter, whatever the noise.
 double likelihood(const AngleSeries& series, const PrismTrain& train, const EkfOptions& options,
-                  const std::vector<RotorProcess>& process, const Reference& reference) {
+                  const std::vector<RotorProcess>& process, const FilterReference& reference) {
   Filter filter(series, train, options, process, &reference);
-  State state = first_state(filter, reference);
+  FilterState state = first_state(filter, reference);
   double sum = 0;
   const std::size_t shots = std::min(series.size(), kLikelihoodShots);
   for (std::size_t i = 0; i < shots; ++i) {
@@ -283,7 +99,8 @@ double likelihood(const AngleSeries& series, const PrismTrain& train, const EkfO
 /// White acceleration of every rotor that makes the innovations likeliest: one value for all on a
 /// coarse grid, then each rotor's own.
 std::vector<RotorProcess> likeliest_process(const AngleSeries& series, const PrismTrain& train,
-                                            const EkfOptions& options, const Reference& reference) {
+                                            const EkfOptions& options,
+                                            const FilterReference& reference) {
   const auto likelihood_of = [&](const std::vector<double>& decades) {
     return likelihood(series, train, options, processes(decades), reference);
   };
@@ -331,9 +148,9 @@ void take_motion(const Eigen::VectorXd& mean, const Eigen::MatrixXd& covariance,
 }
 
 /// One forward and one backward filter and their combination.
-Solution run_pass(const AngleSeries& series, const State& first, const PrismTrain& train,
+Solution run_pass(const AngleSeries& series, const FilterState& first, const PrismTrain& train,
                   const EkfOptions& options, const std::vector<RotorProcess>& process,
-                  const Reference* reference, std::vector<unsigned char> screened,
+                  const FilterReference* reference, std::vector<unsigned char> screened,
                   const Progress& progress) {
   Filter filter(series, train, options, process, reference);
   const std::size_t shots = series.size();
@@ -359,7 +176,7 @@ Solution run_pass(const AngleSeries& series, const State& first, const PrismTrai
   motion.covariance.resize(shots * states * (states + 1) / 2);
 
   const auto gap_before = [&](std::size_t i) { return series.time(i) - series.time(i - 1); };
-  const auto forward_step = [&](State& state, std::size_t i, bool decide) {
+  const auto forward_step = [&](FilterState& state, std::size_t i, bool decide) {
     if (i > 0) filter.predict(state, gap_before(i));
     if (result.outlier[i]) return;
     if (!decide) {
@@ -375,8 +192,8 @@ Solution run_pass(const AngleSeries& series, const State& first, const PrismTrai
   };
 
   // Forward: decides on outliers and keeps the state before each block.
-  std::vector<State> before_block;
-  State state = first;
+  std::vector<FilterState> before_block;
+  FilterState state = first;
   for (std::size_t i = 0; i < shots; ++i) {
     if (i % kBlock == 0) {
       before_block.push_back(state);
@@ -391,10 +208,10 @@ Solution run_pass(const AngleSeries& series, const State& first, const PrismTrai
 
   // Backward, block by block: the forward filter runs again through the block and is combined with
   // what the backward filter knows of the shots behind it.
-  State backward{state.mean, filter.wide_covariance()};
+  FilterState backward{state.mean, filter.wide_covariance()};
   Eigen::VectorXd mean_parameters = Eigen::VectorXd::Zero(statics);
   Eigen::MatrixXd mean_covariance = Eigen::MatrixXd::Zero(statics, statics);
-  std::vector<State> filtered(std::min(kBlock, shots));
+  std::vector<FilterState> filtered(std::min(kBlock, shots));
   for (std::size_t block = before_block.size(); block-- > 0;) {
     const std::size_t begin = block * kBlock, end = std::min(begin + kBlock, shots);
     state = before_block[block];
@@ -404,7 +221,7 @@ Solution run_pass(const AngleSeries& series, const State& first, const PrismTrai
     }
     for (std::size_t i = end; i-- > begin;) {
       if (i + 1 < shots) filter.predict(backward, -gap_before(i + 1));
-      const State& f = filtered[i - begin];
+      const FilterState& f = filtered[i - begin];
       const algebra::SymmetricSolver both(f.covariance + backward.covariance);
       const Eigen::MatrixXd share = both.solve_columns(f.covariance);  // transposed
       const Eigen::VectorXd mean =
@@ -451,13 +268,13 @@ Solution run_ekf(const AngleSeries& series, const Start& start, const EkfOptions
     if (rotor.jerk != 0)
       throw InvalidArgument("white jerk is a motion model of the batch estimator");
   }
-  State first = first_state(Filter(series, start.train, options, process, nullptr), series, start,
-                            options.free);
+  FilterState first = first_state(Filter(series, start.train, options, process, nullptr), series,
+                                  start, options.free);
   Solution result =
       run_pass(series, first, start.train, options, process, nullptr,
                screen(series, start, options, nullptr), progress.part(0.0, 1.0 / options.passes));
   for (int pass = 1; pass < options.passes; ++pass) {
-    const Reference reference{result};
+    const FilterReference reference{result};
     if (choose && pass == 1) {
       process = likeliest_process(series, start.train, options, reference);
     }

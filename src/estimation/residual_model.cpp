@@ -8,6 +8,15 @@
 
 namespace risley::estimation {
 
+template <int N>
+[[gnu::flatten]] void ResidualModel::prepare_all(const PrismTrain& train, Prepared<N>& prepared) {
+  std::array<double, parameter_count(N)> parameters;
+  std::copy_n(train.parameters().begin(), parameters.size(), parameters.begin());
+  const auto faces = face_order_array<N>(train);
+  prepared.train = prepare<double, N>(parameters, faces);
+  prepared.derivatives = prepare_derivatives<double, N>(parameters, faces);
+}
+
 ResidualModel::ResidualModel(const PrismTrain& train, const std::vector<FreeParameter>& free)
     : train_(train),
       free_(free),
@@ -23,11 +32,8 @@ void ResidualModel::set(const Eigen::Ref<const Eigen::VectorXd>& values) {
     }
   }
   with_prism_count(train_.prisms(), [&]<int N>() {
-    std::array<double, parameter_count(N)> parameters;
-    std::copy_n(train_.parameters().begin(), parameters.size(), parameters.begin());
-    const auto faces = face_order_array<N>(train_);
-    prepared_ = Prepared<N>{prepare<double, N>(parameters, faces),
-                            prepare_derivatives<double, N>(parameters, faces)};
+    if (!std::holds_alternative<Prepared<N>>(prepared_)) prepared_.emplace<Prepared<N>>();
+    prepare_all(train_, std::get<Prepared<N>>(prepared_));
   });
 }
 

@@ -41,6 +41,11 @@ class ResidualModel {
     PreparedDerivatives<double, N> derivatives;
   };
 
+  /// In one function without calls, where the compiler computes every sine once: FIGURE % less
+  /// time.
+  template <int N>
+  static void prepare_all(const PrismTrain& train, Prepared<N>& prepared);
+
   PrismTrain train_;
   const std::vector<FreeParameter>& free_;
   std::variant<Prepared<1>, Prepared<2>, Prepared<3>, Prepared<4>> prepared_;

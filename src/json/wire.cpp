@@ -18,13 +18,50 @@ Json found_json(const jobs::FoundSensor& sensor) {
           {"address", to_string(sensor.address)}};
 }
 
+const char* cause_name(recordings::livox::GapCause cause) {
+  switch (cause) {
+    case recordings::livox::GapCause::clock:
+      return "clock";
+    case recordings::livox::GapCause::session:
+      return "session";
+    case recordings::livox::GapCause::loss:
+      break;
+  }
+  return "loss";
+}
+
 Json gaps_json(const std::vector<jobs::RecordedGap>& gaps) {
   Json json = Json::array();
   for (const jobs::RecordedGap& gap : gaps) {
     json.push_back({{"begin_s", gap.begin},
                     {"end_s", gap.end},
                     {"lost", gap.lost ? Json(*gap.lost) : Json()},
-                    {"data", gap.imu ? "imu" : "points"}});
+                    {"data", gap.imu ? "imu" : "points"},
+                    {"cause", cause_name(gap.cause)}});
+  }
+  return json;
+}
+
+Json clocks_json(const std::vector<jobs::RecordedClock>& clocks) {
+  Json json = Json::array();
+  for (const jobs::RecordedClock& clock : clocks) {
+    const auto& drift = clock.drift;
+    json.push_back({{"source", to_string(clock.source)},
+                    {"begin_s", clock.begin},
+                    {"end_s", clock.end},
+                    {"offset_s", {{"min", clock.least_offset}, {"max", clock.greatest_offset}}},
+                    {"drift_ppm", drift ? Json(drift->ppm) : Json()},
+                    {"drift_sigma_ppm", drift ? Json(drift->sigma_ppm) : Json()}});
+  }
+  return json;
+}
+
+Json statuses_json(const std::vector<jobs::RecordedStatus>& statuses) {
+  Json json = Json::array();
+  for (const jobs::RecordedStatus& one : statuses) {
+    json.push_back({{"begin_s", one.begin},
+                    {"status", one.status},
+                    {"says", recordings::livox::status_words(one.status)}});
   }
   return json;
 }
@@ -125,6 +162,8 @@ Json of(const jobs::RecordedSensors& recorded) {
                    {"sessions", one.sessions},
                    {"gaps", gaps_json(one.gaps)},
                    {"statuses", one.statuses},
+                   {"clocks", clocks_json(one.clocks)},
+                   {"status_changes", statuses_json(one.status_changes)},
                    {"optics", optics_json(one.optics)}});
     sensors.push_back(std::move(sensor));
   }
@@ -172,6 +211,7 @@ Json of(const jobs::EmulatedSensor& truth) {
                  {"wrong_checksums", truth.wrong_checksums},
                  {"sessions", truth.sessions},
                  {"restarts", truth.restarts},
+                 {"clock_jumps", truth.clock_jumps},
                  {"bends", truth.bends},
                  {"behind_s", truth.behind}});
   return {{"duration_s", truth.duration}, {"sensors", Json::array({sensor})}};

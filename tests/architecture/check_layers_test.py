@@ -66,6 +66,7 @@ class CheckLayersTest(unittest.TestCase):
             "src/report/html.cpp": '#include "estimation/knots.hpp"\n',
             "apps/risley/main.cpp": '#include "report/charts.hpp"\n',
             "studies/paper/run.cpp": '#include "report/charts.hpp"\n',
+            "bench/steps_bench.cpp": '#include "estimation/knots.hpp"\n',
         }), [
             "include/risley/estimation/ekf.hpp:1: estimation/knots.hpp is a private header of the layer"
             " estimation",
