@@ -114,13 +114,6 @@ void print_clock(const jobs::RecordedSensor& one) {
   }
 }
 
-/// Serial numbers come from the network: nothing of them may act on a terminal.
-std::string printable(std::string text) {
-  std::replace_if(
-      text.begin(), text.end(), [](unsigned char c) { return c < 0x20 || c >= 0x7F; }, '?');
-  return text;
-}
-
 /// The page of the recording, as --watch has it.
 std::unique_ptr<wire::EventServer> serve_page(const RecordChoices& options,
                                               const CommonOptions& common) {
@@ -171,7 +164,7 @@ class StatusLine {
     if (!visible_) return;
     std::string text = fmt::format("{:.1f} s", live.duration);
     for (const jobs::LiveSensorState& one : live.sensors) {
-      text += fmt::format(" | {}: {} packets, {} lost", printable(one.sensor.serial),
+      text += fmt::format(" | {}: {} packets, {} lost", one.sensor.serial,
                           grouped(one.counts.packets), grouped(one.counts.lost));
       if (one.silent) text += ", SILENT";
       if (!one.optics) continue;

@@ -12,7 +12,7 @@ import { ownFolder } from './pages.mjs';
 skipWithoutBrowser();
 const folder = ownFolder();
 const sensorAddress = '127.0.0.47', hostAddress = '127.0.0.37';
-const serial = '<img src=x>"&\'0'; // 15 characters of a broadcast code
+const serial = '<img/src=x>"&\'0'; // broadcast codes are visible ASCII
 const patience = { timeout: 60_000 };
 let browser, emulator, recorder, opened, url;
 

@@ -128,7 +128,7 @@ class WatchTest(CommandTest):
         out, _ = self.end(process)
         sensor = json.loads(out)["sensors"][0]
         self.assertEqual((sensor["lost"], sensor["kernel_drops"]), (0, 0))
-        self.assertGreater(sensor["packets"], 4 * 5000)
+        self.assertGreater(sensor["packets"], 5000)
         for one in crowd:
             one.close()
 

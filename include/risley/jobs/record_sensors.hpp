@@ -29,8 +29,8 @@ struct RecordOptions {
   bool imu = true;                              ///< inertial samples, where the sensor has them
   /// Path; ends in .lvx, or in .nc for what is converted at the end.
   std::string output;
-  bool watch_optics = false;                    ///< see OpticsWatch
-  std::string optics_reference;                 ///< as OpticsWatch's
+  bool watch_optics = false;     ///< see OpticsWatch
+  std::string optics_reference;  ///< as OpticsWatch's
 };
 
 /// A sensor on the interface.
@@ -77,7 +77,7 @@ struct RecordedSensor {
   std::vector<std::uint32_t> statuses;
   std::vector<RecordedClock> clocks;           ///< one after the other, the first 100
   std::vector<RecordedStatus> status_changes;  ///< as packets have them, the first 1000
-  std::optional<OpticsHealth> optics;  ///< where they were watched
+  std::optional<OpticsHealth> optics;          ///< where they were watched
 };
 
 /// What came of a recording.
