@@ -31,6 +31,8 @@ risley_package(fastcdr TARGET fastcdr DEBIAN libfastcdr-dev LIBS -lfastcdr FIND 
 risley_package(lz4 TARGET PkgConfig::LZ4 DEBIAN liblz4-dev PKG_CONFIG liblz4)
 risley_package(zstd TARGET PkgConfig::ZSTD DEBIAN libzstd-dev PKG_CONFIG libzstd)
 risley_package(zlib TARGET ZLIB::ZLIB DEBIAN zlib1g-dev PKG_CONFIG zlib FIND ZLIB)
+risley_package(pcap TARGET PkgConfig::PCAP DEBIAN libpcap-dev PKG_CONFIG libpcap)
+risley_package(microhttpd TARGET PkgConfig::MICROHTTPD DEBIAN libmicrohttpd-dev PKG_CONFIG libmicrohttpd)
 risley_package(proj TARGET PROJ::proj DEBIAN libproj-dev PKG_CONFIG proj FIND PROJ)
 risley_package(nlohmann-json TARGET nlohmann_json::nlohmann_json DEBIAN nlohmann-json3-dev
                PKG_CONFIG nlohmann_json FIND nlohmann_json)

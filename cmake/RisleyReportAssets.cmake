@@ -10,3 +10,7 @@ risley_embed_text(risley_report ${PROJECT_SOURCE_DIR}/src/report/page.js
                   risley::report::page_script)
 risley_embed_text(risley_report ${PROJECT_SOURCE_DIR}/src/report/page.css
                   risley::report::page_style)
+# The page of a recording that runs.
+risley_embed_text(risley_report ${PROJECT_SOURCE_DIR}/src/report/watch.html risley::report::watch_page)
+risley_embed_text(risley_report ${PROJECT_SOURCE_DIR}/src/report/watch.js risley::report::watch_script)
+risley_embed_text(risley_report ${PROJECT_SOURCE_DIR}/src/report/watch.css risley::report::watch_style)

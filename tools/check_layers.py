@@ -20,8 +20,8 @@ PROGRAMS = ("apps", "studies", "bench")  # may use every layer
 MEASURING = ("bench",)  # programs that measure what is private, as tests test it
 BINDINGS = "python"  # src/python: may use every layer's public headers, and nothing may use it
 # Libraries with one home: what others need of them, they ask that layer for.
-HOMES = {"netcdf": "io", "hdf5": "io", "yaml-cpp": "io", "openssl": "io", "sqlite3": "io", "proj": "cloud",
-         "proj_experimental": "cloud", "pybind11": BINDINGS}
+HOMES = {"netcdf": "io", "hdf5": "io", "yaml-cpp": "io", "openssl": "io", "sqlite3": "io", "pcap": "recordings",
+         "proj": "cloud", "proj_experimental": "cloud", "pybind11": BINDINGS}
 STRANGERS = ("simulation", "estimation")  # they meet only in tests, so their agreement counts
 
 

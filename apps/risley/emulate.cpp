@@ -19,14 +19,18 @@ namespace risley::app {
 namespace {
 
 struct EmulateChoices {
-  std::string interface, serial, sensor = "mid-40", scene, station, rotor = "constant";
+  std::string interface, serial, recording, sensor = "mid-40", scene, station, rotor = "constant";
   SimulatedValues values;
   double speed = 1;
   std::optional<double> duration_s;
   double loss = 0, duplication = 0, disorder = 0, delay_ms = 0, wrong_checksums = 0,
          restart_takes_s = 2;
   int farthest = 10;
-  std::optional<double> heartbeat_dies_s, restart_s;
+  std::optional<double> heartbeat_dies_s, restart_s, bend_s;
+  std::vector<std::string> bend;
+  std::string time_source = "power-on";
+  double time_source_from_s = 0, clock_drift_ppm = 0, clock_jump_by_ms = 250;
+  std::optional<double> clock_jump_s;
 };
 
 jobs::EmulateOptions job_of(const EmulateChoices& options, const CommonOptions& common) {
@@ -34,6 +38,7 @@ jobs::EmulateOptions job_of(const EmulateChoices& options, const CommonOptions& 
   jobs::EmulateOptions job;
   job.interface = options.interface;
   job.serial = options.serial;
+  job.recording = options.recording;
   job.speed = options.speed;
   job.duration = options.duration_s;
   job.simulation.sensor = options.sensor;
@@ -43,6 +48,14 @@ jobs::EmulateOptions job_of(const EmulateChoices& options, const CommonOptions& 
   take_simulated_values(options.values, job.simulation);
   job.simulation.seed = common.seed;
   job.simulation.threads = common.threads;
+  using recordings::TimeReference;
+  job.clock.source = options.time_source == "ptp"   ? TimeReference::ptp
+                     : options.time_source == "pps" ? TimeReference::pps
+                                                    : TimeReference::power_on;
+  job.clock.source_from = options.time_source_from_s;
+  job.clock.drift_ppm = options.clock_drift_ppm;
+  job.clock.jump = options.clock_jump_s;
+  job.clock.jump_by = 1e-3 * options.clock_jump_by_ms;
   jobs::EmulatedFaults& faults = job.faults;
   faults.loss = options.loss;
   faults.duplication = options.duplication;
@@ -53,6 +66,8 @@ jobs::EmulateOptions job_of(const EmulateChoices& options, const CommonOptions& 
   faults.heartbeat_dies = options.heartbeat_dies_s;
   faults.restart = options.restart_s;
   faults.restart_time = options.restart_takes_s;
+  faults.bend = parameter_values(options.bend);
+  faults.bend_time = options.bend_s;
   return job;
 }
 
@@ -66,6 +81,31 @@ void print_emulated(const jobs::EmulatedSensor& truth) {
     say("{} more packets were not sent at the beginning or end, where nobody can miss them\n",
         grouped(truth.lost_at_ends));
   }
+}
+
+void declare_clock(CLI::App& verb, EmulateChoices& o) {
+  const std::string group = "Clock of the sensor";
+  verb.add_option("--time", o.time_source, "What its times count from")
+      ->check(CLI::IsMember({"power-on", "ptp", "pps"}))
+      ->capture_default_str()
+      ->group(group);
+  verb.add_option("--time-from-s", o.time_source_from_s,
+                  "When that begins, s after the first start; before, they count from power-on")
+      ->check(CLI::Range(0.0, 1e6))
+      ->capture_default_str()
+      ->group(group);
+  verb.add_option("--clock-drift-ppm", o.clock_drift_ppm,
+                  "By how much its clock is faster than this machine's, ppm")
+      ->check(CLI::Range(-10000.0, 10000.0))
+      ->capture_default_str()
+      ->group(group);
+  verb.add_option("--clock-jump-s", o.clock_jump_s,
+                  "Its clock jumps once, so many s after the first start")
+      ->group(group);
+  verb.add_option("--clock-jump-by-ms", o.clock_jump_by_ms, "How far it jumps, ms")
+      ->check(CLI::Range(-3.6e6, 3.6e6))
+      ->capture_default_str()
+      ->group(group);
 }
 
 void declare_faults(CLI::App& verb, EmulateChoices& o) {
@@ -100,6 +140,14 @@ void declare_faults(CLI::App& verb, EmulateChoices& o) {
       ->check(CLI::Range(0.0, 3600.0))
       ->capture_default_str()
       ->group(group);
+  auto* bend = verb.add_option("--bend", o.bend,
+                               "What is added to a parameter of the true sensor while it runs, in "
+                               "the unit that its name ends with (repeatable)");
+  bend->type_name("NAME=CHANGE")->expected(1)->allow_extra_args(false)->take_all()->group(group);
+  auto* bend_s =
+      verb.add_option("--bend-s", o.bend_s, "When the optics bend so, s after the first start");
+  bend_s->check(CLI::NonNegativeNumber)->needs(bend)->group(group);
+  bend->needs(bend_s);
 }
 
 }  // namespace
@@ -115,7 +163,11 @@ Run declare_emulate(CLI::App& verb) {
                   "Serial number (broadcast code) of the sensor (default: from its optics)");
   verb.add_option("--sensor", o.sensor, "Preset by name, or a preset or calibration file")
       ->capture_default_str();
-  verb.add_option("--scene", o.scene, "Planes or terrain (YAML) around it (default: a room)");
+  auto* scene =
+      verb.add_option("--scene", o.scene, "Planes or terrain (YAML) around it (default: a room)");
+  verb.add_option("--recording", o.recording,
+                  "Recording of one sensor whose shots are sent, with its gaps, over and over")
+      ->excludes(scene);
   verb.add_option("--station", o.station,
                   "Station of the scene to stand on (default: the scene's origin)");
   verb.add_option("--rotor", o.rotor, "How the rotors' speeds vary")
@@ -128,6 +180,7 @@ Run declare_emulate(CLI::App& verb) {
   verb.add_option(
       "--duration-s", o.duration_s,
       "How long the sensor is there, s of real time (default: until Ctrl-C or SIGTERM)");
+  declare_clock(verb, o);
   declare_faults(verb, o);
   return [options](const CommonOptions& common) {
     const jobs::EmulatedSensor truth = jobs::emulate_sensor(

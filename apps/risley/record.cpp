@@ -1,17 +1,27 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
+#include <algorithm>
+#include <cstddef>
 #include <cstdint>
+#include <cstdio>
 #include <map>
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <spdlog/spdlog.h>
+#include <sys/ioctl.h>
+#include <unistd.h>
 
+#include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
 #include "risley/jobs/record_sensors.hpp"
+#include "risley/report/watch_page.hpp"
+#include "risley/wire/event_server.hpp"
 
 #include "command.hpp"
 #include "recording_text.hpp"
@@ -20,8 +30,11 @@
 namespace risley::app {
 namespace {
 
+constexpr const char* kOwnBeginning = "own";
+
 struct RecordChoices {
-  std::string output, interface, coordinates = "spherical", return_mode = "as-is", imu = "yes";
+  std::string output, interface, optics, watch, coordinates = "spherical", return_mode = "as-is",
+                                                imu = "yes";
   bool list = false, passive = false;
   std::vector<std::string> serials;
   std::optional<double> duration_s;
@@ -54,6 +67,8 @@ jobs::RecordOptions job_of(const RecordChoices& options) {
   }
   job.imu = options.imu == "yes";
   job.output = options.output;
+  job.watch_optics = !options.optics.empty() || !options.watch.empty();
+  if (options.optics != kOwnBeginning) job.optics_reference = options.optics;
   return job;
 }
 
@@ -66,6 +81,123 @@ void print_found(const std::vector<jobs::FoundSensor>& found) {
   table.print();
 }
 
+std::string cause_text(const jobs::RecordedGap& gap) {
+  switch (gap.cause) {
+    case recordings::livox::GapCause::clock:
+      return "the sensor's clock jumped or began again";
+    case recordings::livox::GapCause::session:
+      return fmt::format("between two sessions, {} packets at most", grouped(gap.lost.value_or(0)));
+    case recordings::livox::GapCause::loss:
+      break;
+  }
+  return fmt::format("{} packets", grouped(gap.lost.value_or(0)));
+}
+
+/// What the clock of a sensor did, and what it said of itself; the first lines are enough.
+void print_clock(const jobs::RecordedSensor& one) {
+  constexpr std::size_t kMostLines = 20;
+  for (std::size_t i = 0; i < std::min(one.clocks.size(), kMostLines); ++i) {
+    const jobs::RecordedClock& clock = one.clocks[i];
+    if (!clock.drift && one.clocks.size() == 1) continue;
+    say("{}: clock of {} from {:.1f} to {:.1f} s{}\n", one.sensor.serial, to_string(clock.source),
+        clock.begin, clock.end,
+        clock.drift ? fmt::format(", {:+.2f} +- {:.2f} ppm beside this machine's", clock.drift->ppm,
+                                  clock.drift->sigma_ppm)
+                    : "");
+  }
+  for (std::size_t i = 0; i < std::min(one.status_changes.size(), kMostLines); ++i) {
+    const jobs::RecordedStatus& change = one.status_changes[i];
+    const auto words = recordings::livox::status_words(change.status);
+    if (words.empty() && i == 0) continue;
+    say("{}: from {:.1f} s on {}\n", one.sensor.serial, change.begin,
+        words.empty() ? "healthy" : fmt::format("{}", fmt::join(words, ", ")));
+  }
+}
+
+/// Serial numbers come from the network: nothing of them may act on a terminal.
+std::string printable(std::string text) {
+  std::replace_if(
+      text.begin(), text.end(), [](unsigned char c) { return c < 0x20 || c >= 0x7F; }, '?');
+  return text;
+}
+
+/// The page of the recording, as --watch has it.
+std::unique_ptr<wire::EventServer> serve_page(const RecordChoices& options,
+                                              const CommonOptions& common) {
+  if (options.watch.empty()) return nullptr;
+  const auto text = [](const char* path, const char* type, std::string_view body) {
+    return wire::ServedText{path, fmt::format("{}; charset=utf-8", type), std::string(body)};
+  };
+  auto server = std::make_unique<wire::EventServer>(
+      wire::listening_endpoint(options.watch),
+      std::vector<wire::ServedText>{text("/", "text/html", report::watch_page()),
+                                    text("/watch.js", "text/javascript", report::watch_script()),
+                                    text("/watch.css", "text/css", report::watch_style())});
+  if (!common.quiet) {
+    fmt::print(stderr, "watch it at http://{}/\n", to_string(server->local()));
+    std::fflush(stderr);
+  }
+  return server;
+}
+
+/// An event of the page: one line, whatever texts came from the network.
+std::string event_of(const jobs::LiveRecording& live) {
+  return json::of(live).dump(-1, ' ', true, json::Json::error_handler_t::replace);
+}
+
+/// What the optics say in a few words.
+std::string optics_words(const jobs::OpticsHealth& health) {
+  const estimation::RunningState& state = health.state;
+  if (!health.words.empty()) return "not watched";
+  if (state.alarmed) return "OPTICS CHANGED";
+  if (state.unfit_in_a_row > 0) return "not described by the optics";
+  using Phase = estimation::RunningState::Phase;
+  if (state.phase == Phase::waiting) return "optics: waiting for shots";
+  if (state.phase == Phase::beginning) return "optics: getting to know them";
+  return state.alarm ? "optics: changed before" : "optics: no change seen";
+}
+
+/// What is going on in one line on stderr, only on a terminal and not with --quiet. The line is
+/// gone when the object is.
+class StatusLine {
+ public:
+  explicit StatusLine(const CommonOptions& common)
+      : visible_(!common.quiet && isatty(STDERR_FILENO) != 0) {}
+  ~StatusLine() { clear(); }
+  StatusLine(const StatusLine&) = delete;
+  StatusLine& operator=(const StatusLine&) = delete;
+
+  void show(const jobs::LiveRecording& live) {
+    if (!visible_) return;
+    std::string text = fmt::format("{:.1f} s", live.duration);
+    for (const jobs::LiveSensorState& one : live.sensors) {
+      text += fmt::format(" | {}: {} packets, {} lost", printable(one.sensor.serial),
+                          grouped(one.counts.packets), grouped(one.counts.lost));
+      if (one.silent) text += ", SILENT";
+      if (!one.optics) continue;
+      text += ", " + optics_words(*one.optics);
+      for (std::size_t k = 0; k < one.optics->state.speeds.size(); ++k) {
+        text += fmt::format("{}{:.0f}", k == 0 ? ", rotors " : " ",
+                            degrees_from_radians(one.optics->state.speeds[k].value));
+      }
+      if (!one.optics->state.speeds.empty()) text += " deg/s";
+    }
+    winsize size{};
+    const bool known = ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 1;
+    text.resize(std::min<std::size_t>(text.size(), known ? size.ws_col - 1U : 79U));
+    fmt::print(stderr, "\r\033[K{}", text);
+    std::fflush(stderr);
+    shown_ = true;
+  }
+  /// Before something else is said.
+  void clear() {
+    if (std::exchange(shown_, false)) std::fputs("\r\033[K", stderr);
+  }
+
+ private:
+  bool visible_, shown_ = false;
+};
+
 void print_recorded(const jobs::RecordedSensors& recorded) {
   say("{}: {:.1f} s, {} bytes\n\n", recorded.output, recorded.duration, grouped(recorded.bytes));
   Table table({"sensor", "observations", "packets", "lost", "dropped by the kernel", "rejected"});
@@ -77,9 +209,28 @@ void print_recorded(const jobs::RecordedSensors& recorded) {
   for (const jobs::RecordedSensor& one : recorded.sensors) {
     for (const jobs::RecordedGap& gap : one.gaps) {
       say("{}: no {} from {:.1f} to {:.1f} s, {}\n", one.sensor.serial,
-          gap.imu ? "inertial samples" : "points", gap.begin, gap.end,
-          gap.lost ? fmt::format("{} packets", grouped(*gap.lost))
-                   : std::string("the sensor's clock began again"));
+          gap.imu ? "inertial samples" : "points", gap.begin, gap.end, cause_text(gap));
+    }
+    print_clock(one);
+  }
+  for (const jobs::RecordedSensor& one : recorded.sensors) {
+    if (!one.optics) continue;
+    const jobs::OpticsHealth& health = *one.optics;
+    using Phase = estimation::RunningState::Phase;
+    std::string words = "no change of the optics seen";
+    if (!health.words.empty()) {
+      words = "optics not watched: " + health.words;
+    } else if (health.state.alarm) {
+      words = "ALARM: " + jobs::alarm_words(health);
+    } else if (health.state.phase != Phase::watching) {
+      words = "optics not compared: " + (health.state.reason.empty()
+                                             ? std::string("the recording is too short")
+                                             : health.state.reason);
+    }
+    say("{}: {}\n", one.sensor.serial, words);
+    if (health.dropped_packets > 0) {
+      say("{}: the watch was too slow for {} packets, which are in the file all the same\n",
+          one.sensor.serial, grouped(health.dropped_packets));
     }
   }
 }
@@ -89,8 +240,9 @@ void print_recorded(const jobs::RecordedSensors& recorded) {
 Run declare_record(CLI::App& verb) {
   const auto options = std::make_shared<RecordChoices>();
   RecordChoices& o = *options;
-  verb.add_option("-o,--output", o.output,
-                  "Recording to write (.lvx); until the end it is called FILE.unfinished");
+  verb.add_option(
+      "-o,--output", o.output,
+      "Recording to write (.lvx, .nc); until the end it is an LVX file called FILE.unfinished");
   verb.add_option("--interface", o.interface,
                   "IPv4 address of this machine where the sensors are (default: the only one)")
       ->type_name("ADDRESS");
@@ -118,6 +270,16 @@ Run declare_record(CLI::App& verb) {
   verb.add_option("--return-mode", o.return_mode, "Returns of a shot that the sensors are to send")
       ->check(CLI::IsMember({"first", "strongest", "dual", "triple", "as-is"}))
       ->capture_default_str();
+  verb.add_option("--optics", o.optics,
+                  "Watch the optics, and tell when they change: 'own' against their beginning; a "
+                  "preset or calibration file also against that")
+      ->type_name("own|NAME|FILE")
+      ->excludes(list);
+  verb.add_option("--watch", o.watch,
+                  "Show the recording and its optics on a page while it runs, at this port of "
+                  "127.0.0.1, or at an address and port of this machine")
+      ->type_name("[ADDRESS:]PORT")
+      ->excludes(list);
   verb.add_option("--imu", o.imu, "Inertial samples of Avia, Horizon and Tele-15")
       ->check(CLI::IsMember({"yes", "no"}))
       ->capture_default_str();
@@ -137,13 +299,19 @@ Run declare_record(CLI::App& verb) {
     if (options->output.empty()) throw InvalidArgument("--output is required, or --list");
     jobs::RecordedSensors recorded;
     {
-      ProgressBar bar("recording", common);
+      const auto page = serve_page(*options, common);
+      StatusLine line(common);
       recorded = jobs::record_sensors(
           job,
-          [](const std::string& words, bool is_wrong) {
+          [&line](const std::string& words, bool is_wrong) {
+            line.clear();
             spdlog::log(is_wrong ? spdlog::level::warn : spdlog::level::debug, words);
           },
-          bar.progress());
+          cancellable(),
+          [&](const jobs::LiveRecording& live) {
+            line.show(live);
+            if (page) page->send(event_of(live));
+          });
     }
     if (common.json) {
       print_json(common, json::of(recorded));

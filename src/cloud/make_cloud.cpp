@@ -15,6 +15,7 @@
 #include <fmt/format.h>
 #include <tbb/parallel_pipeline.h>
 #include <tbb/task_arena.h>
+#include <tbb/task_group.h>
 
 #include "risley/cloud/surface_normals.hpp"
 #include "risley/core/angle.hpp"
@@ -85,6 +86,16 @@ bool same_shot(const Observations& o, std::size_t a, std::size_t b) {
   return o.time_ns[a] == o.time_ns[b] && o.return_number[a] != o.return_number[b];
 }
 
+/// Observations that are worked on together.
+struct Piece {
+  Observations rows;
+  std::size_t done = 0, end = 0;  ///< rows [done, end) become points, the others are there for them
+  std::uint64_t first_row = 0;    ///< number of the first observation
+  bool more = false;              ///< the recording goes on
+  std::unique_ptr<RotorTracker> tracker;  ///< where rotation angles are needed
+  std::optional<std::string> failure;     ///< why there are none
+};
+
 class Work {
  public:
   Work(recordings::Reader& reader, const sensors::Sensor& calibration, const std::string& path,
@@ -100,22 +111,16 @@ class Work {
     check_sensor();
     summary_.slips = reader_.header().slips;
     summary_.format = find_cloud_format(path_, options_.writer.format).name;
-    bool more = true;
-    while (more) {
-      more = fill_piece();
-      if (piece_.size() == 0) break;
-      if (!writer_) set_up();
-      std::size_t end =
-          more && rotors_ ? overlap_begin(piece_.time_ns, piece_.size()) : piece_.size();
-      if (end <= done_) end = piece_.size();  // times that make no sense
-      last_time_ns_ = piece_.time_ns[end - 1];
-      if (end > done_) emit(end);
-      if (!more) break;
-      const std::size_t keep =
-          rotors_ ? overlap_begin(piece_.time_ns, std::max(done_, std::size_t{1})) : done_;
-      piece_.drop_front(keep);
-      first_row_ += keep;
-      done_ -= keep;
+    piece_ = first_piece();
+    while (piece_) {
+      // While the points of one piece are made and written, the next is read and its rotors
+      // tracked.
+      std::unique_ptr<Piece> next;
+      tbb::task_group ahead;
+      if (piece_->more) ahead.run([&] { next = piece_after(*piece_); });
+      emit();
+      ahead.wait();
+      piece_ = std::move(next);
     }
     finish();
     return std::move(summary_);
@@ -145,24 +150,65 @@ class Work {
     recordings::require_times(reader_.header());
   }
 
-  /// Reads until the piece is full. @return whether there is more
-  bool fill_piece() {
+  /// @return nothing where the recording holds nothing
+  std::unique_ptr<Piece> first_piece() {
+    auto piece = std::make_unique<Piece>();
+    fill(*piece);
+    if (piece->rows.size() == 0) return nullptr;
+    set_up(*piece);
+    prepare(*piece);
+    return piece;
+  }
+
+  /// @return nothing where nothing is left
+  std::unique_ptr<Piece> piece_after(const Piece& before) {
+    auto piece = std::make_unique<Piece>();
+    const std::size_t keep =
+        rotors_ ? overlap_begin(before.rows.time_ns, std::max(before.end, std::size_t{1}))
+                : before.end;
+    piece->rows = before.rows;
+    piece->rows.drop_front(keep);
+    piece->done = before.end - keep;
+    piece->first_row = before.first_row + keep;
+    if (before.tracker) piece->tracker = std::make_unique<RotorTracker>(*before.tracker);
+    fill(*piece);
+    if (piece->rows.size() == 0) return nullptr;
+    prepare(*piece);
+    return piece;
+  }
+
+  /// Reads until a piece is full.
+  void fill(Piece& piece) {
     recordings::Chunk chunk;
     const std::size_t wanted = !rotors_ ? kReportedRows : (belief_ ? kPieceRows : kBeginningRows);
-    while (piece_.size() < done_ + wanted) {
-      bool read = false;
+    piece.more = true;
+    while (piece.rows.size() < piece.done + wanted) {
       try {
-        read = reader_.read(chunk);
+        piece.more = reader_.read(chunk);
       } catch (const FileError& error) {
         summary_.damage = error;  // the sound part is worth keeping
+        piece.more = false;
       }
-      if (!read) return false;
+      if (!piece.more) return;
       if (belief_ && belief_->mirrored) mirror(chunk.observations);
-      piece_.append(chunk.observations);
+      piece.rows.append(chunk.observations);
       summary_.observations += chunk.observations.size();
       progress_.report(reader_.fraction_read());
     }
-    return true;
+  }
+
+  /// Finds out which rows of a piece become points, and the rotation angles.
+  void prepare(Piece& piece) {
+    const std::vector<std::int64_t>& time_ns = piece.rows.time_ns;
+    piece.end = piece.more && rotors_ ? overlap_begin(time_ns, time_ns.size()) : time_ns.size();
+    if (piece.end <= piece.done) piece.end = time_ns.size();  // times that make no sense
+    last_time_ns_ = time_ns[piece.end - 1];
+    if (!rotors_ || piece.end <= piece.done) return;
+    try {
+      piece.tracker->track(piece.rows);
+    } catch (const EstimationError& error) {
+      piece.failure = error.what();
+    }
   }
 
   static void mirror(Observations& rows) {
@@ -170,10 +216,10 @@ class Work {
   }
 
   /// As many directions a second of the beginning as the belief wants; empty for all.
-  std::optional<double> beginning_rate() const {
-    if (piece_.size() <= kBeliefShots) return std::nullopt;
+  static std::optional<double> beginning_rate(const Observations& rows) {
+    if (rows.size() <= kBeliefShots) return std::nullopt;
     const double seconds =
-        1e-9 * static_cast<double>(std::llabs(piece_.time_ns.back() - piece_.time_ns.front()));
+        1e-9 * static_cast<double>(std::llabs(rows.time_ns.back() - rows.time_ns.front()));
     if (seconds == 0) return std::nullopt;
     return static_cast<double>(kBeliefShots) / seconds;
   }
@@ -183,13 +229,13 @@ class Work {
   }
 
   /// Everything that wants to have seen the beginning of the recording.
-  void set_up() {
+  void set_up(Piece& piece) {
     if (rotors_) {
-      estimation::ShotSelector selector({beginning_rate()});
-      selector.add(piece_);
+      estimation::ShotSelector selector({beginning_rate(piece.rows)});
+      selector.add(piece.rows);
       belief_ = sensor_belief(selector.series(), selector.head(), calibration_,
                               options_.angle_noise, progress_.silent());
-      if (belief_->mirrored) mirror(piece_);
+      if (belief_->mirrored) mirror(piece.rows);
       summary_.mirrored = belief_->mirrored;
       summary_.warnings = belief_->warnings;
       model_ = pointing_model(calibration_, *belief_, options_.pointing, mount());
@@ -200,7 +246,7 @@ class Work {
             "their "
             "sigmas: points go where the parameters send the beam");
       }
-      tracker_.emplace(*belief_, options_.rate);
+      piece.tracker = std::make_unique<RotorTracker>(*belief_, options_.rate);
     } else {
       model_ =
           reported_pointing_model(calibration_, options_.pointing, options_.angle_noise, mount());
@@ -213,8 +259,8 @@ class Work {
     }
     if (options_.platform) {
       georeference_ = std::make_unique<Georeference>(
-          *options_.platform, reader_.header().time_reference, piece_.time_ns.front());
-      first_time_ns_ = last_time_ns_ = piece_.time_ns.front();
+          *options_.platform, reader_.header().time_reference, piece.rows.time_ns.front());
+      first_time_ns_ = last_time_ns_ = piece.rows.time_ns.front();
     }
     expect_distortion(0);
     const recordings::Device& device = reader_.header().devices.front();
@@ -252,43 +298,40 @@ class Work {
         std::make_unique<SurfaceNormals>(std::max(range, kLeastRangeNoise), std::sqrt(direction));
   }
 
-  /// Turns rows [done_, end) of the piece into points.
-  void emit(std::size_t end) {
-    if (rotors_ && !track(end)) return;
-    while (done_ < end) {
-      const std::size_t surface_end = end_of_surface(done_, end);
-      find_surfaces(done_, surface_end);
-      write_rows(done_, surface_end);
-      done_ = surface_end;
+  /// Turns the piece into points.
+  void emit() {
+    if (piece_->failure) {
+      leave_out();
+      return;
+    }
+    if (rotors_ && piece_->end > piece_->done && !repointing_known_) find_repointing();
+    for (std::size_t begin = piece_->done; begin < piece_->end;) {
+      const std::size_t surface_end = end_of_surface(begin, piece_->end);
+      find_surfaces(begin, surface_end);
+      write_rows(begin, surface_end);
+      begin = surface_end;
     }
   }
 
-  /// Finds the rotation angles of the piece. @return whether there are any; without them rows up to
-  /// `end` are done
-  bool track(std::size_t end) {
-    try {
-      tracker_->track(piece_);
-    } catch (const EstimationError& error) {
-      for (std::size_t row = done_; row < end; ++row) {
-        ++(has_return(row) ? summary_.without_rotation_angle : summary_.no_return);
-      }
-      summary_.warnings.push_back(fmt::format("no points from observations {} to {}: {}",
-                                              first_row_ + done_, first_row_ + end - 1,
-                                              error.what()));
-      done_ = end;
-      return false;
+  /// Counts the rows of a piece without rotation angles.
+  void leave_out() {
+    for (std::size_t row = piece_->done; row < piece_->end; ++row) {
+      ++(has_return(row) ? summary_.without_rotation_angle : summary_.no_return);
     }
-    if (!repointing_known_) find_repointing();
-    return true;
+    summary_.warnings.push_back(fmt::format("no points from observations {} to {}: {}",
+                                            piece_->first_row + piece_->done,
+                                            piece_->first_row + piece_->end - 1, *piece_->failure));
   }
 
-  bool has_return(std::size_t row) const { return piece_.valid[row] != 0 && piece_.range[row] > 0; }
+  bool has_return(std::size_t row) const {
+    return piece_->rows.valid[row] != 0 && piece_->rows.range[row] > 0;
+  }
 
   std::size_t end_of_surface(std::size_t begin, std::size_t end) const {
     std::size_t row = begin;
-    const std::int64_t first = piece_.time_ns[begin];
+    const std::int64_t first = piece_->rows.time_ns[begin];
     const std::int64_t longest = georeference_ ? kMovingSurfaceNs : kSurfaceNs;
-    while (row < end && std::llabs(piece_.time_ns[row] - first) < longest) ++row;
+    while (row < end && std::llabs(piece_->rows.time_ns[row] - first) < longest) ++row;
     return row;
   }
 
@@ -301,12 +344,13 @@ class Work {
       if (has_return(row)) rows.push_back(row);
     }
     if (georeference_) {
-      add_moving(piece_.time_ns[begin] + (piece_.time_ns[end - 1] - piece_.time_ns[begin]) / 2,
+      add_moving(piece_->rows.time_ns[begin] +
+                     (piece_->rows.time_ns[end - 1] - piece_->rows.time_ns[begin]) / 2,
                  rows);
     } else {
       for (const std::size_t row : rows) {
-        normals_->add(piece_.azimuth[row], piece_.zenith[row],
-                      piece_.range[row] - calibration_.range_offset);
+        normals_->add(piece_->rows.azimuth[row], piece_->rows.zenith[row],
+                      piece_->rows.range[row] - calibration_.range_offset);
       }
     }
     normals_->fit();
@@ -314,7 +358,7 @@ class Work {
 
   std::vector<std::int64_t> times_of(const std::vector<std::size_t>& rows) const {
     std::vector<std::int64_t> times(rows.size());
-    for (std::size_t i = 0; i < rows.size(); ++i) times[i] = piece_.time_ns[rows[i]];
+    for (std::size_t i = 0; i < rows.size(); ++i) times[i] = piece_->rows.time_ns[rows[i]];
     return times;
   }
 
@@ -327,9 +371,9 @@ class Work {
     georeference_->find_poses(times_of(rows), poses, known);
     PolarShots shots, stood;
     for (const std::size_t i : known) {
-      shots.azimuth.push_back(piece_.azimuth[rows[i]]);
-      shots.zenith.push_back(piece_.zenith[rows[i]]);
-      shots.range.push_back(piece_.range[rows[i]]);
+      shots.azimuth.push_back(piece_->rows.azimuth[rows[i]]);
+      shots.zenith.push_back(piece_->rows.zenith[rows[i]]);
+      shots.range.push_back(piece_->rows.range[rows[i]]);
     }
     stand_still(poses, shots.azimuth, shots.zenith, shots.range, stood);
     for (std::size_t i = 0; i < poses.size(); ++i) {
@@ -435,7 +479,7 @@ class Work {
     std::size_t row = begin;
     while (row < end && block.rows.size() < kBlockRows) {
       std::size_t shot_end = row + 1;
-      while (shot_end < end && same_shot(piece_, row, shot_end)) ++shot_end;
+      while (shot_end < end && same_shot(piece_->rows, row, shot_end)) ++shot_end;
       std::size_t returns = 0;
       for (std::size_t i = row; i < shot_end; ++i) returns += has_return(i) ? 1 : 0;
       for (std::size_t i = row; i < shot_end; ++i) {
@@ -444,8 +488,8 @@ class Work {
           continue;
         }
         block.rows.push_back(i);
-        block.returns.push_back(
-            static_cast<std::uint8_t>(std::max<std::size_t>(returns, piece_.return_number[i])));
+        block.returns.push_back(static_cast<std::uint8_t>(
+            std::max<std::size_t>(returns, piece_->rows.return_number[i])));
       }
       row = shot_end;
     }
@@ -461,7 +505,8 @@ class Work {
     shots.resize(header_.prisms, n);
     header_.resize(points, n);
     if (rotors_) {
-      tracker_->angles(piece_, block.rows, shots.rotation_angle, shots.angle_covariance);
+      piece_->tracker->angles(piece_->rows, block.rows, shots.rotation_angle,
+                              shots.angle_covariance);
     }
     // Mostly every row has a return, and columns can be copied as they stand.
     const bool whole = n > 0 && block.rows.back() - block.rows.front() + 1 == n;
@@ -478,21 +523,21 @@ class Work {
     const auto variance = [](float step) {
       return static_cast<double>(step) * static_cast<double>(step) / 12.0;
     };
-    take(piece_.time_ns, points.time_ns, same);
-    take(piece_.intensity, points.intensity, same);
-    take(piece_.return_number, points.return_number, same);
+    take(piece_->rows.time_ns, points.time_ns, same);
+    take(piece_->rows.intensity, points.intensity, same);
+    take(piece_->rows.return_number, points.return_number, same);
     points.number_of_returns = block.returns;
-    take(piece_.tag, points.tag, same);
-    take(piece_.beam, points.beam, same);
-    take(piece_.beam, shots.beam, same);
-    take(piece_.azimuth, shots.azimuth, same);
-    take(piece_.zenith, shots.zenith, same);
-    take(piece_.range, shots.range, same);
-    take(piece_.intensity, shots.intensity,
+    take(piece_->rows.tag, points.tag, same);
+    take(piece_->rows.beam, points.beam, same);
+    take(piece_->rows.beam, shots.beam, same);
+    take(piece_->rows.azimuth, shots.azimuth, same);
+    take(piece_->rows.zenith, shots.zenith, same);
+    take(piece_->rows.range, shots.range, same);
+    take(piece_->rows.intensity, shots.intensity,
          [](std::uint8_t value) { return static_cast<double>(value); });
-    take(piece_.azimuth_resolution, shots.azimuth_rounding, variance);
-    take(piece_.zenith_resolution, shots.zenith_rounding, variance);
-    take(piece_.range_resolution, shots.range_rounding, variance);
+    take(piece_->rows.azimuth_resolution, shots.azimuth_rounding, variance);
+    take(piece_->rows.zenith_resolution, shots.zenith_rounding, variance);
+    take(piece_->rows.range_resolution, shots.range_rounding, variance);
     find_normals(block);
     compute_points(model_, header_, shots, points, block.poses);
     block.outliers = block.without_rotation_angle = 0;
@@ -583,19 +628,19 @@ class Work {
   void find_repointing() {
     constexpr std::size_t kBeams = 2000;  // tell a root mean square to 2 %, 1 / sqrt(2 * 2000)
     std::vector<std::size_t> rows;
-    const std::size_t stride = std::max<std::size_t>(1, piece_.size() / kBeams);
-    for (std::size_t row = 0; row < piece_.size(); row += stride) rows.push_back(row);
+    const std::size_t stride = std::max<std::size_t>(1, piece_->rows.size() / kBeams);
+    for (std::size_t row = 0; row < piece_->rows.size(); row += stride) rows.push_back(row);
     PointedShots shots;
     shots.resize(header_.prisms, rows.size());
-    tracker_->angles(piece_, rows, shots.rotation_angle, shots.angle_covariance);
+    piece_->tracker->angles(piece_->rows, rows, shots.rotation_angle, shots.angle_covariance);
     double squares = 0, count = 0;
     Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();  // of the rotation that all beams share
     Eigen::Vector3d moment = Eigen::Vector3d::Zero();
     std::vector<double> angles(shots.rotation_angle.size());
     for (std::size_t i = 0; i < rows.size(); ++i) {
       for (std::size_t k = 0; k < angles.size(); ++k) angles[k] = shots.rotation_angle[k][i];
-      const Observation to = observe(model_.train, angles, piece_.beam[rows[i]]);
-      const Observation from = observe(model_.believed, angles, piece_.beam[rows[i]]);
+      const Observation to = observe(model_.train, angles, piece_->rows.beam[rows[i]]);
+      const Observation from = observe(model_.believed, angles, piece_->rows.beam[rows[i]]);
       if (!to.valid || !from.valid) continue;
       const Vector3<double> moved = to.direction - from.direction;
       squares += square(norm(moved));
@@ -647,7 +692,6 @@ class Work {
   std::optional<SensorBelief> belief_;
   PointingModel model_;
   bool rotors_;  ///< points depend on the rotation angles
-  std::optional<RotorTracker> tracker_;
   std::unique_ptr<SurfaceNormals> normals_;
   std::unique_ptr<Georeference> georeference_;  ///< of a moving sensor
   SensorPoses surface_pose_;  ///< in the middle of a surface's time, where it is known
@@ -657,9 +701,7 @@ class Work {
   CloudHeader header_;
   std::unique_ptr<CloudWriter> writer_;
   std::vector<Block> blocks_;
-  Observations piece_;
-  std::size_t done_ = 0;         // rows of the piece that are in the file
-  std::uint64_t first_row_ = 0;  // number of the piece's first observation
+  std::unique_ptr<Piece> piece_;  ///< that is being written
   bool repointing_known_ = false;
 };
 

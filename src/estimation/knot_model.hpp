@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <cstddef>
+#include <type_traits>
 
 #include <Eigen/Core>
 
@@ -133,41 +134,48 @@ void predict_rotors(Vector& mean, Square& covariance, const RotorProcess& proces
   }
 }
 
+/// A column of a matrix that stays in registers while products are added to it, which takes a third
+/// of the instructions of adding them in memory; where the number of rows has no bound, the
+/// matrix's own.
+template <class Matrix>
+using HeldColumn =
+    std::conditional_t<Matrix::MaxRowsAtCompileTime == Eigen::Dynamic, typename Matrix::ColXpr,
+                       Eigen::Matrix<double, Matrix::RowsAtCompileTime, 1, Eigen::ColMajor,
+                                     Matrix::MaxRowsAtCompileTime, 1>>;
+
 /// out += a b, column by column; out is neither a nor b. Eigen's own product of matrices this small
 /// is no faster and takes seconds of compilation for every expression.
 template <class A, class B, class Out>
 void add_product(const A& a, const B& b, Out& out) {
   for (Eigen::Index j = 0; j < b.cols(); ++j) {
-    for (Eigen::Index k = 0; k < a.cols(); ++k) {
-      const double factor = b(k, j);
-      for (Eigen::Index i = 0; i < a.rows(); ++i) out(i, j) += a(i, k) * factor;
-    }
+    HeldColumn<Out> column = out.col(j);
+    for (Eigen::Index k = 0; k < a.cols(); ++k) column += a.col(k) * b(k, j);
+    out.col(j) = column;
   }
 }
 /// out -= a b
 template <class A, class B, class Out>
 void subtract_product(const A& a, const B& b, Out& out) {
   for (Eigen::Index j = 0; j < b.cols(); ++j) {
-    for (Eigen::Index k = 0; k < a.cols(); ++k) {
-      const double factor = b(k, j);
-      for (Eigen::Index i = 0; i < a.rows(); ++i) out(i, j) -= a(i, k) * factor;
-    }
+    HeldColumn<Out> column = out.col(j);
+    for (Eigen::Index k = 0; k < a.cols(); ++k) column -= a.col(k) * b(k, j);
+    out.col(j) = column;
   }
 }
 
-/// Lower Cholesky factor, in place; unrolled where the size is fixed.
+/// Lower Cholesky factor, in place. Whole columns are worked on: what stands above the diagonal is
+/// never used and becomes 0.
 /// @return false when the matrix is not positive definite
 template <class Square>
 bool cholesky(Square& a) {
-  const auto d = static_cast<int>(a.rows());
-  for (int j = 0; j < d; ++j) {
-    for (int k = 0; k < j; ++k) {
-      for (int i = j; i < d; ++i) a(i, j) -= a(i, k) * a(j, k);
-    }
-    if (!(a(j, j) > 0)) return false;
-    const double scale = 1.0 / std::sqrt(a(j, j));
-    for (int i = j; i < d; ++i) a(i, j) *= scale;
-    for (int i = 0; i < j; ++i) a(i, j) = 0;
+  const Eigen::Index d = a.rows();
+  for (Eigen::Index j = 0; j < d; ++j) {
+    HeldColumn<Square> column = a.col(j);
+    for (Eigen::Index k = 0; k < j; ++k) column -= a.col(k) * a(j, k);
+    if (!(column[j] > 0)) return false;
+    column *= 1.0 / std::sqrt(column[j]);
+    for (Eigen::Index i = 0; i < j; ++i) column[i] = 0;
+    a.col(j) = column;
   }
   return true;
 }
@@ -179,37 +187,28 @@ bool cholesky(Square& a) {
 template <class Square>
 bool add_information(Square& covariance, const Square& information,
                      double* log_determinant = nullptr) {
-  const auto d = static_cast<int>(covariance.rows());
+  const Eigen::Index d = covariance.rows();
   Square lower = covariance;
   if (!cholesky(lower)) return false;
+  const Square upper = lower.transpose();
   Square half(d, d), inner(d, d), root(d, d);
   half.setZero();
   inner.setIdentity();
   add_product(information, lower, half);
-  for (int j = 0; j < d; ++j) {  // the lower triangle of I + L^T half
-    for (int i = j; i < d; ++i) {
-      for (int k = i; k < d; ++k) inner(i, j) += lower(k, i) * half(k, j);
-    }
-  }
+  add_product(upper, half, inner);
   if (!cholesky(inner)) return false;
   // W, column by column: R W^T = L^T read as rows.
-  for (int j = 0; j < d; ++j) {
-    for (int i = 0; i < d; ++i) {
-      double sum = lower(j, i);
-      for (int k = 0; k < i; ++k) sum -= inner(i, k) * root(j, k);
-      root(j, i) = sum / inner(i, i);
-    }
+  for (Eigen::Index i = 0; i < d; ++i) {
+    HeldColumn<Square> column = lower.col(i);
+    for (Eigen::Index k = 0; k < i; ++k) column -= root.col(k) * inner(i, k);
+    root.col(i) = column / inner(i, i);
   }
-  for (int j = 0; j < d; ++j) {
-    for (int i = 0; i <= j; ++i) {
-      double sum = 0;
-      for (int k = 0; k < d; ++k) sum += root(i, k) * root(j, k);
-      covariance(i, j) = covariance(j, i) = sum;
-    }
-  }
+  const Square turned = root.transpose();
+  covariance.setZero();
+  add_product(root, turned, covariance);
   if (log_determinant) {
     double product = 1.0;
-    for (int i = 0; i < d; ++i) product *= inner(i, i);
+    for (Eigen::Index i = 0; i < d; ++i) product *= inner(i, i);
     *log_determinant = 2.0 * std::log(product);
   }
   return true;

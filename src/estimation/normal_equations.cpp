@@ -50,6 +50,23 @@ void require_shots(const AngleSeries& series, const RotorTrajectory& knots,
   require_length_or_none("outlier", columns.outlier.size(), shots);
 }
 
+/// Whether some knot has a beam that the train does not have. Others are not looked at: a rotor is
+/// tracked through a recording a knot at a time.
+bool has_unknown_beam(const AngleSeries& series, const RotorTrajectory& knots,
+                      const PrismTrain& train) {
+  if (series.beam.empty()) return false;
+  require_length("beam", series.beam.size(), series.size());
+  std::size_t begin = series.size(), end = 0;
+  for (std::size_t knot = 0; knot < knots.size(); ++knot) {
+    begin = std::min(begin, knots.first_shot[knot]);
+    end = std::max(end, knots.last_shot[knot]);
+  }
+  const auto at = [&](std::size_t row) {
+    return series.beam.begin() + static_cast<std::ptrdiff_t>(row);
+  };
+  return begin < end && *std::max_element(at(begin), at(end)) >= train.emitters();
+}
+
 }  // namespace
 
 void NormalEquations::scale(double factor) {
@@ -72,7 +89,9 @@ void accumulate(const AngleSeries& series, const RotorTrajectory& knots, const P
   check_noise(weights.angle_noise);
   require_not_below("softening", weights.softening, 0);
   require_threshold("cut", weights.cut);
-  check_beams(train, series.beam, series.size());
+  if (has_unknown_beam(series, knots, train)) {
+    check_beams(train, series.beam, series.size());
+  }
   const auto n = static_cast<int>(free.size());
   const auto prisms = static_cast<std::size_t>(knots.prisms);
   std::vector<int> place_begin{0}, places;

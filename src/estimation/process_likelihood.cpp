@@ -6,6 +6,8 @@
 #include <cmath>
 #include <limits>
 
+#include <tbb/parallel_for.h>
+
 #include "risley/algebra/symmetric.hpp"
 #include "risley/core/golden_section.hpp"
 #include "risley/core/require.hpp"
@@ -180,8 +182,8 @@ std::vector<RotorProcess> likeliest_process(const NormalEquations& equations,
                                             const RotorTrajectory& linearisation) {
   constexpr std::size_t kMostWindows = 3000;
   const double length = window_length(linearisation);
-  std::vector<RotorProcess> result;
-  for (int rotor = 0; rotor < linearisation.prisms; ++rotor) {
+  std::vector<RotorProcess> result(static_cast<std::size_t>(linearisation.prisms));
+  tbb::parallel_for(0, linearisation.prisms, [&](int rotor) {
     const RotorWindows windows(equations, linearisation, rotor, kMostWindows, length);
     const auto cost = [&](double acceleration, double jerk) {
       return -windows.log_likelihood(process_of(acceleration, jerk));
@@ -208,8 +210,8 @@ std::vector<RotorProcess> likeliest_process(const NormalEquations& equations,
       if (before - both < 0.1 * kWorthIt || both > best_cost - 0.1 * kWorthIt) break;
     }
     if (both + kWorthIt < best_cost) best = process_of(walk, jerk);
-    result.push_back(best);
-  }
+    result[static_cast<std::size_t>(rotor)] = best;
+  });
   return result;
 }
 

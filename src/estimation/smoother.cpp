@@ -2,10 +2,14 @@
 // SPDX-License-Identifier: MIT
 #include "risley/estimation/smoother.hpp"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
+#include <utility>
 
 #include <Eigen/LU>
 #include <fmt/format.h>
+#include <tbb/parallel_pipeline.h>
 
 #include "risley/algebra/products.hpp"
 #include "risley/algebra/symmetric.hpp"
@@ -19,7 +23,42 @@ namespace {
 
 constexpr int kMostFree = kMaxParameters;
 /// Knots whose rows are multiplied at once.
-constexpr Eigen::Index kStackedKnots = 16;
+constexpr std::size_t kStackedKnots = 16;
+/// Knots that go through the stages of a pass together, and how many such blocks are underway: a
+/// stage takes some tens of microseconds.
+constexpr std::size_t kBlockKnots = 4 * kStackedKnots, kBlocks = 6;
+
+/// Calls stages with blocks of the knots, each stage with one block after the other. A pass is a
+/// chain of what covariances do, which needs no means, and a chain of means, which needs them: with
+/// two threads the second runs behind the first.
+/// @param blocks  kBlocks of them, with the knots [begin, end) in the order of the pass
+template <class Block, class First, class Second, class Third>
+void run_stages(std::size_t knots, std::vector<Block>& blocks, const First& first,
+                const Second& second, const Third& third) {
+  std::size_t next = 0, turn = 0;
+  const auto stage = [](const auto& work) {
+    return tbb::make_filter<Block*, Block*>(tbb::filter_mode::serial_in_order,
+                                            [&work](Block* block) {
+                                              work(*block);
+                                              return block;
+                                            });
+  };
+  const auto choose = [&](tbb::flow_control& control) -> Block* {
+    if (next == knots) {
+      control.stop();
+      return nullptr;
+    }
+    Block& block = blocks[turn++ % kBlocks];
+    block.begin = next;
+    block.end = next = std::min(next + kBlockKnots, knots);
+    return &block;
+  };
+  tbb::parallel_pipeline(
+      kBlocks, tbb::make_filter<void, Block*>(tbb::filter_mode::serial_in_order, choose) &
+                   stage(first) & stage(second) &
+                   tbb::make_filter<Block*, void>(tbb::filter_mode::serial_in_order,
+                                                  [&third](Block* block) { third(*block); }));
+}
 
 /// Of N rotors, which may be Eigen::Dynamic.
 template <int N>
@@ -33,6 +72,18 @@ class Smoother {
   using AffineMap = Eigen::Map<Eigen::Matrix<double, kD, Eigen::Dynamic>>;
   using SquareMap = Eigen::Map<Square>;
   using Coupling = Eigen::Map<const Eigen::Matrix<double, kD, Eigen::Dynamic, Eigen::RowMajor>>;
+  /// Knots on their way forward, with their rows of what they tell of the parameters.
+  struct AheadBlock {
+    std::size_t begin = 0, end = 0;
+    std::array<Eigen::MatrixXd, kBlockKnots / kStackedKnots> left, right;
+  };
+  /// Knots on their way back, counted from the last: what the later ones say of each as
+  /// information, and what leads over the step before it.
+  struct BackBlock {
+    std::size_t begin = 0, end = 0;
+    std::array<Square, kBlockKnots> later, before_step;
+    std::array<Eigen::PartialPivLU<Square>, kBlockKnots> step;
+  };
 
  public:
   Smoother(const NormalEquations& equations, const RotorTrajectory& at,
@@ -99,40 +150,53 @@ class Smoother {
     filtered_.resize(knots * states() * static_cast<std::size_t>(free_ + 1));
     covariances_.resize(knots * states() * states());
     shared_ = Eigen::MatrixXd::Zero(free_, free_ + 1);
-    left_.resize(kStackedKnots * 3 * d(), free_);
-    right_.resize(kStackedKnots * 3 * d(), free_ + 1);
-    stacked_ = 0;
-    Affine x = Affine::Zero(d(), free_ + 1), e(d(), free_ + 1), moved(d(), free_ + 1);
-    Square p(d(), d());
-    std::size_t stretch = 0;
-    for (std::size_t knot = 0; knot < knots; ++knot) {
-      if (stretch < at_.stretch_begin.size() && at_.stretch_begin[stretch] == knot) {
-        ++stretch;
-        begin(knot, x, p);
-      } else {
-        predict(knot, x, p);
-      }
-      const Square h = knot_curvature<N>(equations_, knot);
-      if (!add_information(p, h)) throw not_definite(knot);
-      take_gradient(knot, h, x, e);
-      moved.setZero();
-      add_product(p, e, moved);
-      if (free_ > 0) share(knot, x, e, moved);
-      x += moved;
-      affine(knot) = x;
-      covariance(knot) = p;
+    std::vector<AheadBlock> blocks(kBlocks);
+    const auto rows = static_cast<Eigen::Index>(kStackedKnots) * 3 * d();
+    for (AheadBlock& block : blocks) {
+      block.left.fill(Eigen::MatrixXd(rows, free_));
+      block.right.fill(Eigen::MatrixXd(rows, free_ + 1));
     }
-    add_shared();
+    Square p(d(), d());
+    Affine x = Affine::Zero(d(), free_ + 1);
+    run_stages(
+        knots, blocks,
+        [&](AheadBlock& block) {
+          for (std::size_t knot = block.begin; knot < block.end; ++knot) {
+            begins_stretch(knot) ? begin_covariance(p) : predict_covariance(knot, p);
+            if (!add_information(p, knot_curvature<N>(equations_, knot))) throw not_definite(knot);
+            covariance(knot) = p;
+          }
+        },
+        [&](AheadBlock& block) {
+          Affine e(d(), free_ + 1), moved(d(), free_ + 1);
+          for (std::size_t knot = block.begin; knot < block.end; ++knot) {
+            begins_stretch(knot) ? begin_means(knot, x) : predict_means(knot, x);
+            take_gradient(knot, knot_curvature<N>(equations_, knot), x, e);
+            moved.setZero();
+            add_product(covariance(knot), e, moved);
+            if (free_ > 0) share(knot, x, e, moved, block);
+            x += moved;
+            affine(knot) = x;
+          }
+        },
+        [&](AheadBlock& block) {
+          if (free_ > 0) add_shared(block);
+        });
     information_ = equations_.static_hessian + shared_.rightCols(free_);
     gradient_ = equations_.static_gradient - shared_.col(0);
   }
 
   /// What a knot tells of the parameters: (gradient, information) -= X^T (E, e) - C^T (X, x) +
   /// E^T P (E, e), as one product of many knots' rows.
-  void share(std::size_t knot, const Affine& x, const Affine& e, const Affine& moved) {
+  void share(std::size_t knot, const Affine& x, const Affine& e, const Affine& moved,
+             AheadBlock& block) const {
     const auto c = coupling(knot);
+    const std::size_t place = knot - block.begin;
+    const auto first = static_cast<Eigen::Index>(place % kStackedKnots) * 3 * d();
+    Eigen::MatrixXd& left_rows = block.left[place / kStackedKnots];
+    Eigen::MatrixXd& right_rows = block.right[place / kStackedKnots];
     for (Eigen::Index j = 0; j < free_; ++j) {
-      double* left = &left_(stacked_, j);
+      double* left = &left_rows(first, j);
       for (Eigen::Index i = 0; i < d(); ++i) {
         left[i] = -x(i, j + 1);
         left[d() + i] = c(i, j);
@@ -140,30 +204,37 @@ class Smoother {
       }
     }
     for (Eigen::Index j = 0; j <= free_; ++j) {
-      double* right = &right_(stacked_, j);
+      double* right = &right_rows(first, j);
       for (Eigen::Index i = 0; i < d(); ++i) {
         right[i] = e(i, j);
         right[d() + i] = x(i, j);
         right[2 * d() + i] = moved(i, j);
       }
     }
-    stacked_ += 3 * d();
-    if (stacked_ == left_.rows()) add_shared();
   }
-  void add_shared() {
-    algebra::add_transposed_product(left_, right_, stacked_, shared_);
-    stacked_ = 0;
+  void add_shared(const AheadBlock& block) {
+    for (std::size_t first = block.begin, part = 0; first < block.end;
+         first += kStackedKnots, ++part) {
+      const std::size_t stacked = std::min(kStackedKnots, block.end - first);
+      algebra::add_transposed_product(block.left[part], block.right[part],
+                                      static_cast<Eigen::Index>(stacked) * 3 * d(), shared_);
+    }
   }
 
-  void begin(std::size_t knot, Affine& x, Square& p) const {
-    x.setZero();
+  void begin_covariance(Square& p) const {
     p.setZero();
     for (int k = 0; k < prisms(); ++k) {
       const RotorProcess& process = process_[static_cast<std::size_t>(k)];
       const double sigma[] = {kFirstAngleSigma, kFirstSpeedSigma,
                               first_acceleration_sigma(process)};
       for (int i = 0; i < 3; ++i) p(3 * k + i, 3 * k + i) = sigma[i] * sigma[i];
-      if (!(process.jerk > 0)) x(3 * k + 2, 0) = -state(knot)[3 * k + 2];
+    }
+  }
+  void begin_means(std::size_t knot, Affine& x) const {
+    x.setZero();
+    for (int k = 0; k < prisms(); ++k) {
+      const bool jerks = process_[static_cast<std::size_t>(k)].jerk > 0;
+      if (!jerks) x(3 * k + 2, 0) = -state(knot)[3 * k + 2];
     }
   }
 
@@ -173,23 +244,22 @@ class Smoother {
     return motion_offset(state(knot - 1), state(knot), step_before(knot));
   }
 
-  void predict(std::size_t knot, Affine& x, Square& p) const {
+  void predict_covariance(std::size_t knot, Square& p) const {
     const double dt = step_before(knot);
-    for (int k = 0; k < prisms(); ++k) {
-      advance_rows(x, 3 * k, dt);
-      advance_rows(p, 3 * k, dt);
-    }
-    x.col(0) += step_offset(knot);
+    for (int k = 0; k < prisms(); ++k) advance_rows(p, 3 * k, dt);
     for (int k = 0; k < prisms(); ++k) {
       advance_columns(p, 3 * k, dt);
       p.template block<3, 3>(3 * k, 3 * k) += step_noise(process_[static_cast<std::size_t>(k)], dt);
     }
   }
+  void predict_means(std::size_t knot, Affine& x) const {
+    const double dt = step_before(knot);
+    for (int k = 0; k < prisms(); ++k) advance_rows(x, 3 * k, dt);
+    x.col(0) += step_offset(knot);
+  }
 
-  bool is_stretch_begin(std::size_t knot, std::size_t& stretch) const {
-    if (stretch == 0 || at_.stretch_begin[stretch - 1] != knot) return false;
-    --stretch;
-    return true;
+  bool begins_stretch(std::size_t knot) const {
+    return std::binary_search(at_.stretch_begin.begin(), at_.stretch_begin.end(), knot);
   }
 
   /// Smoothed means alone (modified Bryson-Frazier).
@@ -197,14 +267,13 @@ class Smoother {
     Eigen::VectorXd one(free_ + 1);
     one << 1.0, out.parameter_step;
     Vector lambda = Vector::Zero(d()), x(d()), back(d());
-    std::size_t stretch = at_.stretch_begin.size();
     for (std::size_t knot = at_.size(); knot-- > 0;) {
       x.setZero();
       back.setZero();
       add_product(affine(knot), one, x);
       add_product(covariance(knot), lambda, back);
       Eigen::Map<Vector>(out.state_step.data() + knot * states(), d()) = x - back;
-      if (is_stretch_begin(knot, stretch)) {
+      if (begins_stretch(knot)) {
         lambda.setZero();
         continue;
       }
@@ -224,63 +293,101 @@ class Smoother {
     const std::size_t triangle = states() * (states() + 1) / 2;
     out.state_covariance.resize(at_.size() * triangle);
     out.sensitivity.resize(at_.size() * states() * static_cast<std::size_t>(free_));
-    Affine later = Affine::Zero(d(), free_ + 1), smoothed(d(), free_ + 1), rest(d(), free_ + 1);
-    Affine spread_parameters(d(), free_);
+    std::vector<BackBlock> blocks(kBlocks);
     Square information = Square::Zero(d(), d());
-    std::size_t stretch = at_.stretch_begin.size();
-    for (std::size_t knot = at_.size(); knot-- > 0;) {
-      Square p = covariance(knot);
-      if (!add_information(p, information)) throw not_definite(knot);
-      smoothed = affine(knot);
-      rest = later;
-      subtract_product(information, smoothed, rest);
-      add_product(p, rest, smoothed);
-      const auto sensitivity = smoothed.rightCols(free_);
-      Vector step = smoothed.col(0);
-      add_product(sensitivity, out.parameter_step, step);
-      Eigen::Map<Vector>(out.state_step.data() + knot * states(), d()) = step;
-      Eigen::Map<Eigen::Matrix<double, kD, Eigen::Dynamic, Eigen::RowMajor>>(
-          out.sensitivity.data() + knot * states() * static_cast<std::size_t>(free_), d(), free_) =
-          sensitivity;
-      spread_parameters.setZero();
-      add_product(sensitivity, out.parameter_covariance, spread_parameters);
-      Square total = p;
-      add_product(spread_parameters, sensitivity.transpose(), total);
-      double* entry = out.state_covariance.data() + knot * triangle;
-      for (int i = 0; i < d(); ++i) {
-        for (int j = i; j < d(); ++j) *entry++ = 0.5 * (total(i, j) + total(j, i));
+    Affine later = Affine::Zero(d(), free_ + 1);
+    const auto each_knot = [this](BackBlock& block, const auto& work) {
+      for (std::size_t i = block.begin; i < block.end; ++i) {
+        work(at_.size() - 1 - i, i - block.begin);
       }
-      if (is_stretch_begin(knot, stretch)) {
-        later.setZero();
-        information.setZero();
-        continue;
-      }
-      // This knot's own shots, then the noise of the step before it: J := (I + J Q)^-1 J.
-      const double dt = step_before(knot);
-      information += knot_curvature<N>(equations_, knot);
-      later.col(0) += gradient(knot);
-      later.rightCols(free_) -= coupling(knot);
-      Square spread = Square::Identity(d(), d());
-      for (int k = 0; k < prisms(); ++k) {
-        auto columns = spread.template middleCols<3>(3 * k);
-        add_product(information.template middleCols<3>(3 * k),
-                    step_noise(process_[static_cast<std::size_t>(k)], dt), columns);
-      }
-      const Eigen::PartialPivLU<Square> solver(spread);
-      const Square solved = solver.solve(information);
-      for (int i = 0; i < d(); ++i) {
-        for (int j = 0; j < d(); ++j) information(i, j) = 0.5 * (solved(i, j) + solved(j, i));
-      }
-      rest = solver.solve(later);
-      later = rest;
-      Vector moved = Vector::Zero(d());
-      add_product(information, step_offset(knot), moved);
-      later.col(0) -= moved;
-      for (int k = 0; k < prisms(); ++k) {
-        retreat_rows(later, 3 * k, dt);
-        retreat_rows(information, 3 * k, dt);
-      }
-      for (int k = 0; k < prisms(); ++k) retreat_columns(information, 3 * k, dt);
+    };
+    run_stages(
+        at_.size(), blocks,
+        [&](BackBlock& block) {
+          each_knot(block, [&](std::size_t knot, std::size_t place) {
+            block.later[place] = information;
+            Square p = covariance(knot);
+            if (!add_information(p, information)) throw not_definite(knot);
+            covariance(knot) = p;
+            retreat_information(knot, information, block.before_step[place], block.step[place]);
+          });
+        },
+        [&](BackBlock& block) {
+          Affine smoothed(d(), free_ + 1), rest(d(), free_ + 1);
+          each_knot(block, [&](std::size_t knot, std::size_t place) {
+            smoothed = affine(knot);
+            rest = later;
+            subtract_product(block.later[place], smoothed, rest);
+            add_product(covariance(knot), rest, smoothed);
+            affine(knot) = smoothed;
+            retreat_means(knot, block.before_step[place], block.step[place], later);
+          });
+        },
+        [&](BackBlock& block) {
+          each_knot(block, [&](std::size_t knot, std::size_t) { tell_state(knot, out); });
+        });
+  }
+
+  /// Takes a knot's own shots and the noise of the step before it into what later knots say of it,
+  /// J := (I + J Q)^-1 J, and goes to the end of that step.
+  /// @param[out] before_step  J between the two  @param[out] step  I + J Q
+  void retreat_information(std::size_t knot, Square& information, Square& before_step,
+                           Eigen::PartialPivLU<Square>& step) const {
+    if (begins_stretch(knot)) {
+      information.setZero();
+      return;
+    }
+    const double dt = step_before(knot);
+    information += knot_curvature<N>(equations_, knot);
+    Square spread = Square::Identity(d(), d());
+    for (int k = 0; k < prisms(); ++k) {
+      auto columns = spread.template middleCols<3>(3 * k);
+      add_product(information.template middleCols<3>(3 * k),
+                  step_noise(process_[static_cast<std::size_t>(k)], dt), columns);
+    }
+    step.compute(spread);
+    const Square solved = step.solve(information);
+    for (int i = 0; i < d(); ++i) {
+      for (int j = 0; j < d(); ++j) information(i, j) = 0.5 * (solved(i, j) + solved(j, i));
+    }
+    before_step = information;
+    for (int k = 0; k < prisms(); ++k) retreat_rows(information, 3 * k, dt);
+    for (int k = 0; k < prisms(); ++k) retreat_columns(information, 3 * k, dt);
+  }
+  /// The same with the vectors.
+  void retreat_means(std::size_t knot, const Square& before_step,
+                     const Eigen::PartialPivLU<Square>& step, Affine& later) const {
+    if (begins_stretch(knot)) {
+      later.setZero();
+      return;
+    }
+    later.col(0) += gradient(knot);
+    later.rightCols(free_) -= coupling(knot);
+    const Affine rest = step.solve(later);
+    later = rest;
+    Vector moved = Vector::Zero(d());
+    add_product(before_step, step_offset(knot), moved);
+    later.col(0) -= moved;
+    for (int k = 0; k < prisms(); ++k) retreat_rows(later, 3 * k, step_before(knot));
+  }
+
+  /// Puts a knot's smoothed states and their covariance into the solution.
+  void tell_state(std::size_t knot, SmootherSolution& out) {
+    const AffineMap smoothed = affine(knot);
+    const auto sensitivity = smoothed.rightCols(free_);
+    Vector step = smoothed.col(0);
+    add_product(sensitivity, out.parameter_step, step);
+    Eigen::Map<Vector>(out.state_step.data() + knot * states(), d()) = step;
+    Eigen::Map<Eigen::Matrix<double, kD, Eigen::Dynamic, Eigen::RowMajor>>(
+        out.sensitivity.data() + knot * states() * static_cast<std::size_t>(free_), d(), free_) =
+        sensitivity;
+    Affine spread_parameters = Affine::Zero(d(), free_);
+    add_product(sensitivity, out.parameter_covariance, spread_parameters);
+    Square total = covariance(knot);
+    add_product(spread_parameters, sensitivity.transpose(), total);
+    double* entry = out.state_covariance.data() + knot * (states() * (states() + 1) / 2);
+    for (int i = 0; i < d(); ++i) {
+      for (int j = i; j < d(); ++j) *entry++ = 0.5 * (total(i, j) + total(j, i));
     }
   }
 
@@ -296,8 +403,6 @@ class Smoother {
   Eigen::Index free_;
   std::vector<double> filtered_, covariances_;  ///< after each knot's shots
   Eigen::MatrixXd shared_;                      ///< what the knots tell of the parameters
-  Eigen::MatrixXd left_, right_;                ///< rows of knots that wait to be added to it
-  Eigen::Index stacked_ = 0;
   Eigen::MatrixXd information_;
   Eigen::VectorXd gradient_;
 };

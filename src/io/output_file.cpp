@@ -24,34 +24,15 @@
 
 #include "risley/core/error.hpp"
 
+#include "io/file_target.hpp"
+
 namespace risley::io {
 namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kMostLinks = 40;   // as the kernel follows
 constexpr int kMostTries = 100;  // of names that all exist already
-constexpr mode_t kModeBits = 0777;
 constexpr std::string_view kLetters = "abcdefghijklmnopqrstuvwxyz234567";
-
-[[noreturn]] void refuse(const std::string& path, int error) {
-  throw FileError(path, {}, fmt::format("cannot be written: {}", std::strerror(error)));
-}
-
-/// Calls again what a signal interrupted.
-template <class Call>
-auto whole(const Call& call) {
-  auto result = call();
-  while (result < 0 && errno == EINTR) result = call();
-  return result;
-}
-
-/// The names of open files of this or of another process, /dev/stdout among them.
-bool is_name_of_open_file(const fs::path& link) {
-  const fs::path folder = fs::canonical(fs::absolute(link).parent_path());
-  const auto top = std::next(folder.begin());  // behind "/"
-  return folder == "/dev" || (top != folder.end() && *top == "proc");
-}
 
 /// 12 random characters of 32.
 std::string random_name() {
@@ -81,13 +62,6 @@ bool locks_are_shared(int file) {
   return ::fstatfs(file, &system) != 0 ||
          std::find(kNetworkTypes.begin(), kNetworkTypes.end(),
                    static_cast<unsigned>(system.f_type)) != kNetworkTypes.end();
-}
-
-bool is_named(int file, const std::string& path) {
-  struct stat opened {
-  }, named{};
-  return ::fstat(file, &opened) == 0 && ::lstat(path.c_str(), &named) == 0 &&
-         opened.st_dev == named.st_dev && opened.st_ino == named.st_ino;
 }
 
 /// Marks an open file as one that somebody is writing. The kernel takes the lock back when its
@@ -162,41 +136,16 @@ int copy_bytes(int from, int to) {
   }
 }
 
-/// Puts a folder's entries on the disk. @return 0 or the error
-int sync_folder(const fs::path& folder) {
-  const int descriptor = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (descriptor < 0) return errno == EACCES ? 0 : errno;  // may be written but not read
-  const int error = ::fsync(descriptor) != 0 ? errno : 0;
-  ::close(descriptor);
-  return error == EINVAL || error == ENOTSUP ? 0 : error;  // file systems without
-}
-
 }  // namespace
 
 OutputFile::OutputFile(std::string path) : path_(std::move(path)) {
   if (path_.empty()) refuse(path_, ENOENT);
-  fs::path target = path_;
   try {
-    for (int links = 0; fs::is_symlink(target); ++links) {
-      if (is_name_of_open_file(target)) {
-        copied_ = true;
-        break;
-      }
-      if (links == kMostLinks) refuse(path_, ELOOP);
-      target = target.parent_path() / fs::read_symlink(target);
-    }
-    const fs::file_status status = fs::status(target);
-    if (fs::is_directory(status)) {
-      throw FileError(path_, {}, "is a folder, expected a file name");
-    }
-    copied_ = copied_ || (fs::exists(status) && !fs::is_regular_file(status));
-    target_ = target.string();
-    if (copied_ && ::access(target_.c_str(), W_OK) != 0) refuse(path_, errno);
-    mode_t mode = copied_ ? S_IRUSR | S_IWUSR : 0666;
-    if (struct stat before{}; !copied_ && ::stat(target_.c_str(), &before) == 0) {
-      mode = (before.st_mode & kModeBits) | S_IRUSR | S_IWUSR;  // nobody else reads it meanwhile
-    }
-    const fs::path beside = copied_ ? fs::temp_directory_path() / "risley" : target;
+    const FileTarget target = find_target(path_);
+    copied_ = target.copied;
+    target_ = target.path;
+    const mode_t mode = target.mode;
+    const fs::path beside = copied_ ? fs::temp_directory_path() / "risley" : fs::path(target_);
     remove_orphans(beside);
     const std::string beginning =
         (beside.parent_path() / marked(beside.filename().string())).string();
@@ -233,17 +182,7 @@ OutputFile::~OutputFile() {
 }
 
 void OutputFile::sync() const {
-  if (!is_named(temporary_, temporary_path_)) {
-    throw FileError(
-        path_, {},
-        fmt::format("cannot be written: {} was replaced in the meantime", temporary_path_));
-  }
-  struct stat before {};
-  if (!copied_ && ::stat(target_.c_str(), &before) == 0 &&
-      ::fchmod(temporary_, before.st_mode & kModeBits) != 0) {
-    refuse(path_, errno);
-  }
-  if (whole([&] { return ::fsync(temporary_); }) != 0) refuse(path_, errno);
+  sync_output({target_, copied_}, path_, temporary_, temporary_path_);
 }
 
 void OutputFile::commit() {
@@ -258,10 +197,7 @@ void OutputFile::commit() {
     temporary_path_.clear();
     return;
   }
-  if (::rename(temporary_path_.c_str(), target_.c_str()) != 0) refuse(path_, errno);
-  temporary_path_.clear();
-  const fs::path folder = fs::path(target_).parent_path();
-  if (const int error = sync_folder(folder.empty() ? "." : folder)) refuse(path_, error);
+  replace_target({target_, copied_}, path_, temporary_path_);
 }
 
 }  // namespace risley::io

@@ -2,7 +2,10 @@
 // SPDX-License-Identifier: MIT
 #include "risley/jobs/convert_recording.hpp"
 
+#include <utility>
+
 #include <fmt/format.h>
+#include <tbb/task_group.h>
 
 #include "risley/recordings/writer.hpp"
 
@@ -52,20 +55,25 @@ ConvertedRecording convert_recording(const ConvertRecordingOptions& options,
   const auto writer = recordings::create_recording(
       options.output, header_of(*reader, options, input, result, progress.silent()),
       options.format);
-  recordings::Chunk chunk;
+  // While one chunk is written, the next is read.
+  recordings::Chunk chunk, next;
+  tbb::task_group writing;
   const auto read_next = [&] {
     try {
-      return reader->read(chunk);
+      return reader->read(next);
     } catch (const FileError& error) {
       result.damage = error;  // the sound part is worth keeping
       return false;
     }
   };
   while (read_next()) {
-    writer->write(chunk);
+    writing.wait();
+    std::swap(chunk, next);
+    writing.run([&] { writer->write(chunk); });
     result.observations += chunk.observations.size();
     progress.report(reader->fraction_read());
   }
+  writing.wait();
   writer->close();
   result.left_out = writer->left_out();
   result.input_format = reader->header().format;

@@ -3,6 +3,7 @@
 #include "risley/jobs/emulate_sensor.hpp"
 
 #include <algorithm>
+#include <chrono>
 #include <deque>
 #include <map>
 #include <optional>
@@ -14,6 +15,7 @@
 
 #include "risley/core/random.hpp"
 #include "risley/core/require.hpp"
+#include "risley/recordings/livox/packet_encoder.hpp"
 #include "risley/wire/sensor_session.hpp"
 #include "risley/wire/udp_socket.hpp"
 
@@ -30,6 +32,22 @@ constexpr std::int64_t kImuStep = 5'000'000;             // ns of the sensor's c
 constexpr std::int64_t kLongestRest = 20'000'000, kShortestRest = 200'000;  // ns
 constexpr int kPacketsAtOnce = 256;
 constexpr double kFastest = 100;
+constexpr std::int64_t kFarthestJump = 3600;  // s
+/// Of a status: what synchronises the clock.
+constexpr std::uint32_t kPpsSignal = 1U << 9U, kPtpSignal = 1U << 13U, kSyncByPtp = 1U << 14U,
+                        kSyncByPps = 3U << 14U;
+
+/// What sensors of a type can do. @param device_type  as recordings::Device::type
+wire::SensorAbilities abilities_of(std::uint8_t device_type) {
+  const bool is_avia = device_type == recordings::kAvia;
+  wire::SensorAbilities abilities;
+  abilities.return_modes = device_type != recordings::kMid40;
+  abilities.triple = abilities.scan_pattern = is_avia;
+  abilities.imu = recordings::livox::has_imu(device_type);
+  abilities.high_sensitivity = is_avia || device_type == recordings::kTele15;
+  if (is_avia) abilities.reserved = wire::kSensorPort;
+  return abilities;
+}
 
 /// Decisions with a share, one after the other; each purpose has its own, so that one fault does
 /// not change where others fall.
@@ -77,16 +95,22 @@ class Emulator {
       : options_(options),
         note_(note),
         progress_(progress),
-        scan_(options.simulation),
+        scan_(options.simulation, options.recording, options.faults.bend),
+        rate_(options.speed * (1 + 1e-6 * options.clock.drift_ppm)),
         socket_({wire::interface_of(options.interface).address, wire::kSensorPort}),
         loss_(options.simulation.seed, 101, options.faults.loss),
         duplication_(options.simulation.seed, 102, options.faults.duplication),
         disorder_(options.simulation.seed, 103, options.faults.disorder),
         damage_(options.simulation.seed, 104, options.faults.wrong_checksums) {
     identity_.code = options.serial.empty() ? scan_.device().serial : options.serial;
+    if (identity_.code.empty()) {
+      throw InvalidArgument(fmt::format(
+          "option recording = {}: does not name its serial number; choose one", options.recording));
+    }
     identity_.device_type = scan_.device().type;
     identity_.firmware = {3, 8, 0, 0};
     identity_.address = socket_.local().address;
+    identity_.abilities = abilities_of(identity_.device_type);
   }
 
   EmulatedSensor run();
@@ -106,14 +130,20 @@ class Emulator {
   void let_go(std::int64_t now, bool all);
   void send(const Outgoing& packet);
   std::int64_t clock_ns(std::int64_t now) const {
-    return static_cast<std::int64_t>(static_cast<double>(now - power_on_ns_) * options_.speed);
+    return static_cast<std::int64_t>(static_cast<double>(now - power_on_ns_) * rate_);
   }
   std::int64_t rest_until(std::int64_t now) const;
+  void set_clock(std::int64_t now);
+  std::int64_t stamp(std::int64_t time_ns) const { return time_ns + epoch_ns_; }
 
   const EmulateOptions& options_;
   const EmulateNote& note_;
   const Progress& progress_;
   EmulatedScan scan_;
+  double rate_;  ///< of its clock, to this machine's
+  /// Of power-on, as its clock has it.
+  std::int64_t epoch_ns_ = 0;
+  bool has_source_ = false, has_jumped_ = false;
   wire::UdpSocket socket_;
   Chance loss_, duplication_, disorder_, damage_;
   wire::SensorIdentity identity_;
@@ -130,6 +160,9 @@ class Emulator {
 
 void Emulator::power_on(std::int64_t now) {
   power_on_ns_ = now;
+  epoch_ns_ = 0;
+  has_source_ = false;
+  scan_.set_header(0, 0);
   session_.emplace(identity_, now);
 }
 
@@ -137,6 +170,42 @@ void Emulator::power_off(std::int64_t now, std::int64_t time_ns) {
   end_stream(now);
   end_session();
   dead_until_ns_ = now + time_ns;
+}
+
+/// Gains the source of its time and lets its clock jump when it is time.
+void Emulator::set_clock(std::int64_t now) {
+  if (!first_start_ns_) return;
+  const EmulatedClock& clock = options_.clock;
+  const double since_start = 1e-9 * static_cast<double>(now - *first_start_ns_);
+  const bool synchronised = clock.source != recordings::TimeReference::power_on;
+  if (synchronised && !has_source_ && since_start >= clock.source_from) {
+    has_source_ = true;
+    const bool by_ptp = clock.source == recordings::TimeReference::ptp;
+    if (by_ptp) {
+      // Whole microseconds, as its own times have.
+      constexpr std::int64_t kMicrosecond = 1000;
+      const std::int64_t here = std::chrono::duration_cast<std::chrono::nanoseconds>(
+                                    std::chrono::system_clock::now().time_since_epoch())
+                                    .count();
+      epoch_ns_ = (here - clock_ns(now)) / kMicrosecond * kMicrosecond;
+    } else {
+      epoch_ns_ = kFarthestJump * kEmulatedSecond;  // so that it can jump back
+    }
+    scan_.set_header(recordings::livox::timestamp_type_of(clock.source),
+                     by_ptp ? kPtpSignal | kSyncByPtp : kPpsSignal | kSyncByPps);
+    if (clock.source_from > 0 && stream_) {
+      ++truth_.clock_jumps;
+      note_(fmt::format("its time is that of {} now", to_string(clock.source)));
+    }
+  }
+  if (clock.jump && !has_jumped_ && since_start >= *clock.jump) {
+    has_jumped_ = true;
+    // No clock shows less than nothing.
+    epoch_ns_ = std::max(epoch_ns_ + static_cast<std::int64_t>(1e9 * clock.jump_by),
+                         stream_ ? -stream_->first_ns : std::int64_t{0});
+    ++truth_.clock_jumps;
+    note_(fmt::format("its clock jumps by {} s", clock.jump_by));
+  }
 }
 
 void Emulator::end_session() {
@@ -196,7 +265,7 @@ void Emulator::follow_session(std::int64_t now) {
     Stream& stream = *stream_;
     const std::int64_t passed = scan_.time_of(stream.number, stream.data_type);
     stream.first_ns += passed;
-    stream.begin_ns += static_cast<std::int64_t>(static_cast<double>(passed) / options_.speed);
+    stream.begin_ns += static_cast<std::int64_t>(static_cast<double>(passed) / rate_);
     stream.number = 0;
     stream.data_type = data_type();
   }
@@ -235,8 +304,7 @@ void Emulator::end_stream(std::int64_t now) {
 void Emulator::send_due(std::int64_t now) {
   if (!stream_) return;
   Stream& stream = *stream_;
-  const auto passed =
-      static_cast<std::int64_t>(static_cast<double>(now - stream.begin_ns) * options_.speed);
+  const auto passed = static_cast<std::int64_t>(static_cast<double>(now - stream.begin_ns) * rate_);
   const std::uint64_t due = scan_.packets_in(passed, stream.data_type) + 1;
   const std::uint64_t behind = due - std::min(due, stream.number);
   truth_.behind =
@@ -250,7 +318,7 @@ void Emulator::make_packet(std::int64_t now) {
   const std::int64_t time_ns = stream.first_ns + scan_.time_of(stream.number, stream.data_type);
   const auto delay_ns = static_cast<std::int64_t>(1e9 * options_.faults.delay);
   if (session_->imu() && static_cast<std::int64_t>(stream.imu_number) * kImuStep <= time_ns) {
-    const auto sample = scan_.imu(static_cast<std::int64_t>(stream.imu_number++) * kImuStep);
+    const auto sample = scan_.imu(stamp(static_cast<std::int64_t>(stream.imu_number++) * kImuStep));
     if (socket_.send(session_->imu_target(), sample)) {
       ++truth_.packets;
       ++truth_.imu_samples;
@@ -259,7 +327,7 @@ void Emulator::make_packet(std::int64_t now) {
       ++truth_.lost;
     }
   }
-  const auto bytes = scan_.next(stream.data_type, time_ns);
+  const auto bytes = scan_.next(stream.data_type, stamp(time_ns));
   const std::uint64_t number = stream.of_all++;
   ++stream.number;
   if (loss_.falls()) {
@@ -319,7 +387,7 @@ std::int64_t Emulator::rest_until(std::int64_t now) const {
   if (session_) until = std::min(until, session_->next_ns());
   if (stream_) {
     const auto due = static_cast<std::int64_t>(
-        static_cast<double>(scan_.time_of(stream_->number, stream_->data_type)) / options_.speed);
+        static_cast<double>(scan_.time_of(stream_->number, stream_->data_type)) / rate_);
     until = std::min(until, std::max(stream_->begin_ns + due, now + kShortestRest));
   }
   if (!delayed_.empty()) until = std::min(until, delayed_.front().due_ns);
@@ -338,6 +406,7 @@ EmulatedSensor Emulator::run() {
   for (std::int64_t now = begin; !progress_.cancelled(); now = steady_ns()) {
     if (options_.duration && now - begin >= duration) break;
     take_commands(now);
+    set_clock(now);
     if (!session_ && now >= dead_until_ns_) power_on(now);
     say(now);
     send_due(now);
@@ -352,6 +421,11 @@ EmulatedSensor Emulator::run() {
       ++truth_.restarts;
       note_("restarts");
       power_off(now, static_cast<std::int64_t>(1e9 * faults.restart_time));
+    }
+    if (faults.bend_time && truth_.bends == 0 && since_start >= *faults.bend_time) {
+      ++truth_.bends;
+      scan_.bend();
+      note_("its optics bend");
     }
     wire::wait_for(sockets, rest_until(now) - steady_ns());
   }
@@ -371,6 +445,16 @@ EmulatedSensor emulate_sensor(const EmulateOptions& options, const EmulateNote& 
                               const Progress& progress) {
   if (options.duration) require_above("option duration", *options.duration, 0, "s");
   require_between("option speed", options.speed, 1 / kFastest, kFastest);
+  const EmulatedClock& clock = options.clock;
+  require_between("option source_from", clock.source_from, 0, 1e6, "s");
+  require_between("option drift_ppm", clock.drift_ppm, -10'000, 10'000, "ppm");
+  require_between("option jump_by", clock.jump_by, -kFarthestJump, kFarthestJump, "s");
+  if (clock.jump) require_not_below("option jump", *clock.jump, 0, "s");
+  if (clock.source == recordings::TimeReference::utc ||
+      clock.source == recordings::TimeReference::relative) {
+    throw InvalidArgument(
+        fmt::format("option source = {}, allowed power-on, PTP and PPS", to_string(clock.source)));
+  }
   const EmulatedFaults& faults = options.faults;
   require_between("option loss", faults.loss, 0, 1);
   require_between("option duplication", faults.duplication, 0, 1);
@@ -383,6 +467,11 @@ EmulatedSensor emulate_sensor(const EmulateOptions& options, const EmulateNote& 
     require_not_below("option heartbeat_dies", *faults.heartbeat_dies, 0, "s");
   }
   if (faults.restart) require_not_below("option restart", *faults.restart, 0, "s");
+  if (faults.bend_time) require_not_below("option bend_time", *faults.bend_time, 0, "s");
+  if (faults.bend_time.has_value() == faults.bend.empty()) {
+    throw InvalidArgument(
+        "option bend and option bend_time need each other: which parameters change, and when");
+  }
   return Emulator(options, note, progress).run();
 }
 

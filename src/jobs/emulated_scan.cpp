@@ -55,28 +55,66 @@ simulation::SimulationSettings settings_of(const SimulationOptions& options) {
   return settings;
 }
 
+/// Reads the next shots; after the last ones come the first again.
+void read_on(const simulation::SimulationSettings& settings,
+             std::unique_ptr<simulation::Scanner>& scanner, recordings::Chunk& chunk) {
+  recordings::TruthColumns truth;
+  if (scanner && scanner->read(chunk, truth, kShotsAtOnce)) return;
+  scanner = std::make_unique<simulation::Scanner>(settings);
+  scanner->read(chunk, truth, kShotsAtOnce);
+}
+
 }  // namespace
 
-EmulatedScan::EmulatedScan(const SimulationOptions& options)
-    : settings_(settings_of(options)),
-      grid_(*grid_of(settings_.truth.device_type)),
-      scanner_(std::make_unique<simulation::Scanner>(settings_)) {
-  device_ = scanner_->header().devices.front();
+EmulatedScan::EmulatedScan(const SimulationOptions& options, const std::string& recording,
+                           const ParameterValues& bend)
+    : settings_(settings_of(options)), grid_(*grid_of(settings_.truth.device_type)) {
+  if (recording.empty()) {
+    scanner_ = std::make_unique<simulation::Scanner>(settings_);
+    device_ = scanner_->header().devices.front();
+  } else {
+    recorded_.emplace(recording, static_cast<std::uint8_t>(settings_.truth.device_type));
+    device_ = recorded_->device();
+    grid_ = recorded_->grid();
+  }
+  if (bend.empty()) return;
+  if (recorded_) {
+    throw InvalidArgument(
+        "option bend changes simulated optics: the shots of a recording are as they are");
+  }
+  SimulationOptions bent = options;
+  for (const auto& [name, change] : bend) {
+    bent.set.emplace_back(name, settings_.truth.get(name) + change);
+  }
+  bent_settings_ = settings_of(bent);
+  // What the sensor believes of itself does not change.
+  bent_settings_->reported = settings_.reported;
 }
 
 void EmulatedScan::read_shots() {
   next_shot_ = 0;
-  if (scanner_->read(chunk_, truth_, kShotsAtOnce)) return;
-  scanner_ = std::make_unique<simulation::Scanner>(settings_);
-  scanner_->read(chunk_, truth_, kShotsAtOnce);
+  read_on(settings_, scanner_, chunk_);
+  if (bent_settings_) read_on(*bent_settings_, bent_scanner_, bent_chunk_);
 }
 
 void EmulatedScan::begin_packet(std::uint8_t data_type, std::int64_t time_ns) {
-  recordings::Packet header;
+  recordings::Packet header = header_;
   header.data_type = data_type;
   header.timestamp = encode_timestamp(header.timestamp_type, time_ns);
   packet_.resize(kPacketHeaderBytes + record_layout(data_type)->bytes());
   encode_packet_header(header, packet_.data());
+}
+
+void EmulatedScan::simulate_shot(bool tagged) {
+  if (next_shot_ == chunk_.observations.size()) read_shots();
+  const recordings::Observations& shots = (bent_ ? bent_chunk_ : chunk_).observations;
+  record_.azimuth[0] = shots.azimuth[next_shot_];
+  record_.zenith[0] = shots.zenith[next_shot_];
+  record_.range[0] = shots.range[next_shot_];
+  record_.valid[0] = shots.valid[next_shot_];
+  record_.intensity[0] = shots.intensity[next_shot_];
+  record_.tag[0] = tagged && shots.valid[next_shot_] != 0 ? kFirstEcho : std::uint8_t{0};
+  ++next_shot_;
 }
 
 std::span<const std::uint8_t> EmulatedScan::next(std::uint8_t data_type, std::int64_t time_ns) {
@@ -85,16 +123,13 @@ std::span<const std::uint8_t> EmulatedScan::next(std::uint8_t data_type, std::in
   record_.clear();
   record_.resize(layout.returns);
   std::uint8_t* bytes = &packet_[kPacketHeaderBytes];
-  for (std::uint32_t shot = 0; shot < layout.records; ++shot, ++next_shot_) {
-    if (next_shot_ == chunk_.observations.size()) read_shots();
-    const recordings::Observations& shots = chunk_.observations;
-    record_.azimuth[0] = shots.azimuth[next_shot_];
-    record_.zenith[0] = shots.zenith[next_shot_];
-    record_.range[0] = shots.range[next_shot_];
-    record_.valid[0] = shots.valid[next_shot_];
-    record_.intensity[0] = shots.intensity[next_shot_];
-    record_.tag[0] = layout.tagged && shots.valid[next_shot_] != 0 ? kFirstEcho : std::uint8_t{0};
-    encode_record(layout, record_, 0, next_shot_, bytes);
+  for (std::uint32_t shot = 0; shot < layout.records; ++shot) {
+    if (recorded_) {
+      recorded_->next(record_);
+    } else {
+      simulate_shot(layout.tagged);
+    }
+    encode_record(layout, record_, 0, shot, bytes);
     bytes += layout.bytes_per_record;
   }
   return packet_;

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -11,19 +12,31 @@
 #include "risley/recordings/livox/packet.hpp"
 #include "risley/simulation/scanner.hpp"
 
+#include "jobs/recorded_scan.hpp"
+
 namespace risley::jobs {
 
-/// Packets of a simulated scan, which never ends.
+/// Packets of a scan that never ends, simulated or recorded.
 class EmulatedScan {
  public:
-  /// @throws InvalidArgument where Livox has no such type of sensor; FileError
-  explicit EmulatedScan(const SimulationOptions& options);
+  /// @param recording  path; empty: what options simulate
+  /// @param bend  what bend() adds to parameters of the true sensor, SI units; not of a recording
+  /// @throws InvalidArgument where Livox has no such type of sensor, and as RecordedScan; FileError
+  EmulatedScan(const SimulationOptions& options, const std::string& recording,
+               const ParameterValues& bend = {});
 
   const recordings::Device& device() const { return device_; }  ///< serial number and type
 
+  /// What headers say from now on: Packet::timestamp_type and Packet::status.
+  void set_header(std::uint8_t timestamp_type, std::uint32_t status) {
+    header_.timestamp_type = timestamp_type;
+    header_.status = status;
+  }
   /// The next packet of points. @param time_ns  of its first shot
   /// @return header and records, until the next call
   std::span<const std::uint8_t> next(std::uint8_t data_type, std::int64_t time_ns);
+  /// From now on its optics are others. Its rotors and its noise go on as they would have.
+  void bend() { bent_ = true; }
   /// An inertial sample of a sensor at rest.
   std::span<const std::uint8_t> imu(std::int64_t time_ns);
   /// Time of so many packets of a type, ns.
@@ -33,6 +46,7 @@ class EmulatedScan {
 
  private:
   void read_shots();
+  void simulate_shot(bool tagged);
   /// Of a packet's period, over the grid's denominator.
   std::uint64_t period_numerator_ns(std::uint8_t data_type) const;
   void begin_packet(std::uint8_t data_type, std::int64_t time_ns);
@@ -40,12 +54,16 @@ class EmulatedScan {
   simulation::SimulationSettings settings_;
   recordings::livox::ShotGrid grid_;
   recordings::Device device_;
-  std::unique_ptr<simulation::Scanner> scanner_;
-  recordings::Chunk chunk_;
-  recordings::TruthColumns truth_;
+  std::optional<RecordedScan> recorded_;
+  std::optional<simulation::SimulationSettings> bent_settings_;
+  bool bent_ = false;
+  // Unless it is recorded; the second where it can bend.
+  std::unique_ptr<simulation::Scanner> scanner_, bent_scanner_;
+  recordings::Chunk chunk_, bent_chunk_;
   std::size_t next_shot_ = 0;  // of the chunk
   recordings::Observations record_;
   std::vector<std::uint8_t> packet_;
+  recordings::Packet header_;
 };
 
 }  // namespace risley::jobs

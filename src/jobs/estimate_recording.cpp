@@ -123,6 +123,7 @@ EstimatedRecording estimate_recording(const EstimateRecordingOptions& options,
   }
   settings.mirrored = options.mirrored;
   settings.cartesian = input.whole_steps;
+  if (!input.whole_steps) input.series.range = {};  // a fifth of a long recording's memory
   result.nominal = settings.sensor;
   result.choice = std::move(input.choice);
   result.recording = std::move(input.recording);

@@ -255,9 +255,9 @@ bool are_many(const InputNames& wanted) {
 }
 
 const std::vector<std::string>& recording_endings() {
-  static const std::vector<std::string> endings = {".bag", ".bin", ".csv",  ".db3", ".las",
-                                                   ".laz", ".lvx", ".mcap", ".nc",  ".npy",
-                                                   ".npz", ".pcd", ".ply"};
+  static const std::vector<std::string> endings = {".bag", ".bin",  ".csv",    ".db3", ".las",
+                                                   ".laz", ".lvx",  ".mcap",   ".nc",  ".npy",
+                                                   ".npz", ".pcap", ".pcapng", ".pcd", ".ply"};
   return endings;
 }
 

@@ -5,16 +5,24 @@
 #include <algorithm>
 #include <chrono>
 #include <exception>
+#include <filesystem>
 #include <iterator>
 #include <limits>
 #include <map>
 #include <memory>
+#include <set>
+#include <system_error>
 #include <utility>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
 #include "risley/core/require.hpp"
+#include "risley/core/text.hpp"
+#include "risley/jobs/convert_recording.hpp"
+#include "risley/optics/parameters.hpp"
+#include "risley/recordings/livox/first_packets.hpp"
+#include "risley/recordings/livox/packet_decoder.hpp"
 #include "risley/recordings/livox/packet_file.hpp"
 #include "risley/wire/client_session.hpp"
 
@@ -34,22 +42,17 @@ constexpr std::int64_t kSilenceTold = kWireSecond;
 constexpr std::int64_t kBroadcastSettles = 1500 * kMillisecond;
 constexpr std::int64_t kLongestStop = 2 * kWireSecond;
 constexpr std::int64_t kLongestPoll = 20 * kMillisecond;
+constexpr std::int64_t kWatchPeriod = 500 * kMillisecond;
+/// How long the end of a recording waits for the estimate of what came last, s.
+constexpr double kLongestFinish = 2;
 constexpr std::size_t kReceiveBuffer = std::size_t{4} << 20U;
 constexpr std::size_t kMostStatuses = 100;
 constexpr std::size_t kMostPassiveSensors = 16;
 /// Of a status: anything but what a healthy sensor reports (PPS, PTP, time synchronisation).
 constexpr std::uint32_t kTroubles = 0xC0000DFF;
 
-/// Shots of the Mid-40 firmware that stores several returns as so many records.
-std::optional<recordings::livox::ShotGrid> grid_of_firmware(const std::string& firmware) {
-  if (firmware == "03.03.0001" || firmware == "03.03.0006") {
-    return recordings::livox::ShotGrid{10'000, 1, 1, 2};
-  }
-  if (firmware == "03.03.0002" || firmware == "03.03.0007") {
-    return recordings::livox::ShotGrid{50'000, 3, 1, 3};
-  }
-  return std::nullopt;
-}
+/// Whether the output is made of the file that grows.
+bool is_converted(const std::string& output) { return lower_case(output).ends_with(".nc"); }
 
 /// A sensor while it is recorded.
 struct LiveSensor {
@@ -58,23 +61,27 @@ struct LiveSensor {
   }
 
   RecordedSensor result;
-  wire::PacketOrder order;
+  recordings::livox::PacketOrder order;
   std::unique_ptr<wire::UdpSocket> commands, data;
   std::optional<wire::ClientSession> session;
+  std::size_t place = 0;  ///< among all sensors
   std::int64_t session_begin_ns = 0;
   std::optional<std::int64_t> data_ns;  ///< when the last packet came
   bool silent = false, stopped = false;
   std::uint64_t session_rejected = 0;  ///< by sessions that are over
+  std::optional<std::uint32_t> status;
+  std::uint64_t alarms_told = 0;
 };
 
 class Recorder {
  public:
   Recorder(const RecordOptions& options, const wire::Interface& interface, const RecordNote& note,
-           const Progress& progress)
+           const Progress& progress, const RecordWatch& watch)
       : options_(options),
         interface_(interface),
         note_(note),
         progress_(progress),
+        watch_(watch),
         listener_(interface) {}
 
   RecordedSensors run();
@@ -88,11 +95,16 @@ class Recorder {
   void step_session(LiveSensor& live, std::int64_t now);
   void take_event(LiveSensor& live, const ClientEvent& event);
   void take_broadcasts(std::int64_t now);
+  void tell_of_newcomer(const FoundSensor& heard);
   void take_commands(LiveSensor& live, std::int64_t now);
   void take_data(LiveSensor& live, std::int64_t now);
   void watch_silence(LiveSensor& live, std::int64_t now);
   void write_frame(bool last);
   void stop_all();
+  void finish_file();
+  void begin_watch(const std::vector<recordings::Device>& devices);
+  void tell_watch(std::int64_t now, bool over);
+  std::uint64_t rejected_by(const LiveSensor& live) const;
   RecordedSensors result();
   static std::string name_of(const LiveSensor& live) { return live.result.sensor.serial; }
 
@@ -100,26 +112,28 @@ class Recorder {
   wire::Interface interface_;
   const RecordNote& note_;
   const Progress& progress_;
+  const RecordWatch& watch_;
   BroadcastListener listener_;
   std::unique_ptr<wire::UdpSocket> passive_data_;  // for all sensors
   std::vector<std::unique_ptr<LiveSensor>> sensors_;
+  std::set<std::string> newcomers_;  // serial numbers
   std::unique_ptr<PacketFile> file_;
+  std::unique_ptr<OpticsWatch> optics_;  // where the optics are watched
   std::vector<const wire::UdpSocket*> waiting_;
   std::optional<std::int64_t> first_data_ns_;
-  std::int64_t last_data_ns_ = 0, frame_due_ns_ = 0;
+  std::int64_t last_data_ns_ = 0, frame_due_ns_ = 0, watch_due_ns_ = 0;
   std::uint64_t passive_strangers_ = 0;
 };
 
 /// Whoever sends packets to the data port, and what their times say of the sensor.
 std::vector<FoundSensor> Recorder::find_passively() {
   struct Heard {
-    std::optional<std::int64_t> last_time_ns;
-    std::int64_t shortest_ns = std::numeric_limits<std::int64_t>::max();
-    std::uint8_t data_type = 0;
+    recordings::livox::PacketDecoder decoder{{.grid = recordings::livox::kGrid100kHz}};
+    recordings::livox::FirstPackets packets;
   };
   std::map<wire::Address, Heard> heard;
   std::map<wire::Address, FoundSensor> named;
-  recordings::livox::PacketClock clock;
+  recordings::Chunk chunk;
   const std::int64_t begin = steady_ns();
   const auto time = static_cast<std::int64_t>(1e9 * options_.find_time);
   for (std::int64_t now = begin; now - begin < time; now = steady_ns()) {
@@ -127,20 +141,17 @@ std::vector<FoundSensor> Recorder::find_passively() {
     wire::wait_for(waiting_, std::min(kLongestPoll, begin + time - now));
     for (const FoundSensor& sensor : listener_.take()) named.try_emplace(sensor.address, sensor);
     passive_data_->receive([&](const wire::UdpSocket::Datagram& datagram) {
-      wire::PacketOrder check(recordings::kMid40);
-      if (!check.add(datagram.bytes, 0) ||
-          (heard.size() >= kMostPassiveSensors && !heard.contains(datagram.from.address))) {
+      if (heard.size() >= kMostPassiveSensors && !heard.contains(datagram.from.address)) return;
+      chunk.clear();
+      Heard one = heard.contains(datagram.from.address) ? heard[datagram.from.address] : Heard{};
+      try {
+        one.decoder.decode(datagram.bytes, chunk);
+      } catch (const recordings::livox::BadPacket&) {
         return;
       }
-      const auto packet = recordings::livox::decode_packet_header(datagram.bytes);
-      if (packet.data_type == recordings::livox::kImuDataType) return;
-      Heard& one = heard[datagram.from.address];
-      const std::int64_t time_ns = clock.time_ns(packet).value_or(0);
-      if (one.last_time_ns && time_ns > *one.last_time_ns) {
-        one.shortest_ns = std::min(one.shortest_ns, time_ns - *one.last_time_ns);
-      }
-      one.last_time_ns = time_ns;
-      one.data_type = packet.data_type;
+      if (chunk.observations.size() == 0) return;
+      one.packets.add(chunk.packets.front(), chunk.observations, 0);
+      heard[datagram.from.address] = one;
     });
   }
   std::vector<FoundSensor> found;
@@ -148,16 +159,8 @@ std::vector<FoundSensor> Recorder::find_passively() {
     FoundSensor sensor{to_string(address), recordings::kUnknownDeviceType, address};
     if (const auto known = named.find(address); known != named.end()) {
       sensor = known->second;
-    } else if (one.data_type < 2) {
-      sensor.device_type = recordings::kMid40;
-    } else if (one.data_type > recordings::livox::kImuDataType) {
-      sensor.device_type = recordings::kAvia;
     } else {
-      // 10 us between shots are the Mid-70's; 4.2 us are those of three sensors.
-      constexpr std::int64_t kBetween = 7000;
-      const std::int64_t interval =
-          one.shortest_ns / recordings::livox::record_layout(one.data_type)->records;
-      if (interval > kBetween) sensor.device_type = recordings::kMid70;
+      sensor.device_type = one.packets.device_type();
     }
     found.push_back(std::move(sensor));
   }
@@ -227,7 +230,7 @@ void Recorder::begin_session(LiveSensor& live, std::int64_t now) {
   settings.command_port = live.commands->local().port;
   settings.spherical = options_.spherical;
   settings.return_mode = options_.return_mode;
-  if (wire::has_imu(live.result.sensor.device_type)) settings.imu = options_.imu;
+  if (recordings::livox::has_imu(live.result.sensor.device_type)) settings.imu = options_.imu;
   if (live.session) live.session_rejected += live.session->rejected();
   live.session.emplace(settings, now);
   live.session_begin_ns = now;
@@ -236,11 +239,17 @@ void Recorder::begin_session(LiveSensor& live, std::int64_t now) {
 void Recorder::take_event(LiveSensor& live, const ClientEvent& event) {
   switch (event.kind) {
     case ClientEvent::Kind::connected:
+      // What is there was sent before; the sensor sends nothing more until it is started again.
+      take_data(live, steady_ns());
+      live.order.flush();
       ++live.result.sessions;
       break;
     case ClientEvent::Kind::firmware:
       live.result.firmware = event.text;
-      if (const auto grid = grid_of_firmware(event.text)) live.order.set_grid(*grid);
+      if (const auto grid = recordings::livox::grid_of_firmware(event.text)) {
+        live.order.set_grid(*grid);
+        if (optics_) optics_->set_grid(live.place, *grid);
+      }
       break;
     case ClientEvent::Kind::sensor_state:
       if (event.value != static_cast<std::uint32_t>(wire::SensorState::normal)) {
@@ -251,6 +260,7 @@ void Recorder::take_event(LiveSensor& live, const ClientEvent& event) {
       }
       break;
     case ClientEvent::Kind::status:
+      live.status = event.value;
       if ((event.value & kTroubles) != 0) {
         auto& known = live.result.statuses;
         if (known.size() < kMostStatuses &&
@@ -286,9 +296,26 @@ void Recorder::step_session(LiveSensor& live, std::int64_t now) {
   for (const ClientEvent& event : live.session->take_events()) take_event(live, event);
 }
 
+/// The table of sensors stands before the data: nobody can join.
+void Recorder::tell_of_newcomer(const FoundSensor& heard) {
+  constexpr std::size_t kMostNewcomers = 100;
+  const bool known = std::any_of(sensors_.begin(), sensors_.end(), [&](const auto& live) {
+    return live->result.sensor.serial == heard.serial;
+  });
+  if (known || !options_.serials.empty() || newcomers_.size() == kMostNewcomers ||
+      !newcomers_.insert(heard.serial).second) {
+    return;
+  }
+  note_(fmt::format("{} at {}: came after the recording had begun, and cannot join it, because the "
+                    "table of sensors stands at the beginning of the file; record it into another",
+                    heard.serial, to_string(heard.address)),
+        true);
+}
+
 /// A sensor that broadcasts has no host: it is new, or it came back.
 void Recorder::take_broadcasts(std::int64_t now) {
   for (const FoundSensor& heard : listener_.take()) {
+    tell_of_newcomer(heard);
     for (const auto& live : sensors_) {
       if (live->result.sensor.serial != heard.serial || !live->session || live->stopped) continue;
       const bool lost = live->session->state() == ClientState::lost;
@@ -358,6 +385,7 @@ void Recorder::write_frame(bool last) {
     if (last) live.order.flush();
     for (const auto& packet : live.order.take()) {
       file_->add(static_cast<std::uint8_t>(i), packet);
+      if (optics_) optics_->add(i, packet);
     }
   }
   file_->end_frame();
@@ -380,6 +408,10 @@ void Recorder::step(std::int64_t now, std::int64_t wait_until) {
     for (const auto& live : sensors_) live->order.advance(host_ns);
     write_frame(false);
     frame_due_ns_ = now + kFramePeriod;
+  }
+  if (now >= watch_due_ns_) {
+    tell_watch(now, false);
+    watch_due_ns_ = now + kWatchPeriod;
   }
   wire::wait_for(waiting_, std::min(until, frame_due_ns_) - steady_ns());
 }
@@ -419,6 +451,7 @@ RecordedSensors Recorder::run() {
     device.index = static_cast<std::uint8_t>(devices.size());
     devices.push_back(device);
   }
+  begin_watch(devices);
   file_ = std::make_unique<PacketFile>(options_.output, devices);
   const std::int64_t begin = steady_ns();
   if (!passive_data_) {
@@ -458,8 +491,73 @@ RecordedSensors Recorder::run() {
                                          to_string(interface_.address),
                                          name_of(*sensors_.front())));
   }
-  file_->close();
+  finish_file();
+  if (optics_) optics_->finish(kLongestFinish);
+  tell_watch(last_data_ns_, true);
   return result();
+}
+
+void Recorder::begin_watch(const std::vector<recordings::Device>& devices) {
+  for (std::size_t i = 0; i < sensors_.size(); ++i) sensors_[i]->place = i;
+  if (!options_.watch_optics) return;
+  std::vector<WatchedSensor> watched;
+  watched.reserve(devices.size());
+  for (const recordings::Device& device : devices) watched.push_back({device.serial, device.type});
+  optics_ = std::make_unique<OpticsWatch>(watched, options_.optics_reference);
+}
+
+/// Tells of alarms, and whoever watches of all.
+void Recorder::tell_watch(std::int64_t now, bool over) {
+  std::vector<OpticsHealth> optics;
+  if (optics_) optics = optics_->health();
+  for (std::size_t i = 0; i < optics.size(); ++i) {
+    LiveSensor& live = *sensors_[i];
+    if (optics[i].state.alarms == live.alarms_told) continue;
+    live.alarms_told = optics[i].state.alarms;
+    note_(fmt::format("{}: {}", name_of(live), alarm_words(optics[i])), true);
+  }
+  if (!watch_) return;
+  LiveRecording state;
+  state.over = over;
+  if (first_data_ns_) state.duration = 1e-9 * static_cast<double>(now - *first_data_ns_);
+  for (const auto& live : sensors_) {
+    LiveSensorState one;
+    one.sensor = live->result.sensor;
+    one.counts = live->order.counts();
+    one.kernel_drops = (passive_data_ ? *passive_data_ : *live->data).kernel_drops();
+    one.rejected = rejected_by(*live);
+    one.silent = live->silent;
+    one.status = live->status;
+    if (live->place < optics.size()) one.optics = optics[live->place];
+    state.sensors.push_back(std::move(one));
+  }
+  watch_(state);
+}
+
+std::uint64_t Recorder::rejected_by(const LiveSensor& live) const {
+  return live.result.rejected + live.order.counts().rejected + live.session_rejected +
+         (live.session ? live.session->rejected() : 0);
+}
+
+/// Gives the file its name, or makes what was asked for of it.
+void Recorder::finish_file() {
+  if (!is_converted(options_.output)) {
+    file_->close();
+    return;
+  }
+  file_->end_frame();
+  try {
+    ConvertRecordingOptions wanted;
+    wanted.recording = file_->unfinished_path();
+    wanted.output = options_.output;
+    const ConvertedRecording converted = convert_recording(wanted);
+    if (converted.damage) throw FileError(*converted.damage);
+  } catch (const FileError& error) {
+    throw FileError(
+        error.path(), error.place(),
+        fmt::format("{}; the recording is whole in {}", error.problem(), file_->unfinished_path()));
+  }
+  file_->discard();
 }
 
 RecordedSensors Recorder::result() {
@@ -468,10 +566,14 @@ RecordedSensors Recorder::result() {
   recorded.interface = interface_.address;
   recorded.duration = 1e-9 * static_cast<double>(last_data_ns_ - first_data_ns_.value_or(0));
   recorded.frames = file_->frames();
-  recorded.bytes = file_->size();
+  std::error_code gone;
+  recorded.bytes = is_converted(options_.output) ? std::filesystem::file_size(options_.output, gone)
+                                                 : file_->size();
   recorded.receive_buffer_asked = kReceiveBuffer;
   recorded.receive_buffer_granted = kReceiveBuffer;
   recorded.strangers = listener_.strangers() + passive_strangers_;
+  std::vector<OpticsHealth> optics;
+  if (optics_) optics = optics_->health();
   std::int64_t first_host_ns = std::numeric_limits<std::int64_t>::max();
   for (const auto& live : sensors_) {
     if (const auto first = live->order.first_host_ns()) {
@@ -485,12 +587,25 @@ RecordedSensors Recorder::result() {
         std::min(recorded.receive_buffer_granted, data.receive_buffer());
     one.counts = live->order.counts();
     one.kernel_drops = data.kernel_drops();
-    one.rejected += one.counts.rejected + live->session_rejected +
-                    (live->session ? live->session->rejected() : 0);
-    for (const wire::PacketGap& gap : live->order.gaps()) {
+    one.rejected = rejected_by(*live);
+    if (live->place < optics.size()) one.optics = optics[live->place];
+    for (const recordings::livox::PacketGap& gap : live->order.gaps()) {
       one.gaps.push_back({1e-9 * static_cast<double>(gap.host_from_ns - first_host_ns),
                           1e-9 * static_cast<double>(gap.host_to_ns - first_host_ns), gap.lost,
-                          gap.imu});
+                          gap.imu, gap.cause});
+    }
+    const auto since_first = [&](std::int64_t host_ns) {
+      return 1e-9 * static_cast<double>(host_ns - first_host_ns);
+    };
+    const recordings::livox::ClockWatch& clock = live->order.clock();
+    for (const recordings::livox::ClockStretch& stretch : clock.stretches()) {
+      one.clocks.push_back({recordings::livox::time_reference_of(stretch.timestamp_type),
+                            since_first(stretch.host_from_ns), since_first(stretch.host_to_ns),
+                            1e-9 * static_cast<double>(stretch.least_offset_ns),
+                            1e-9 * static_cast<double>(stretch.greatest_offset_ns), stretch.drift});
+    }
+    for (const recordings::livox::StatusChange& change : clock.status_changes()) {
+      one.status_changes.push_back({since_first(change.host_ns), change.status});
     }
     recorded.sensors.push_back(one);
   }
@@ -500,10 +615,34 @@ RecordedSensors Recorder::result() {
 }  // namespace
 
 RecordedSensors record_sensors(const RecordOptions& options, const RecordNote& note,
-                               const Progress& progress) {
+                               const Progress& progress, const RecordWatch& watch) {
   if (options.duration) require_above("option duration", *options.duration, 0, "s");
   require_find_time(options);
-  return Recorder(options, wire::interface_of(options.interface), note, progress).run();
+  if (!is_converted(options.output) && !lower_case(options.output).ends_with(".lvx")) {
+    throw InvalidArgument(fmt::format(
+        "option output = {}: packets are recorded as LVX or NetCDF, expected the ending "
+        ".lvx or .nc; convert the recording afterwards",
+        options.output));
+  }
+  return Recorder(options, wire::interface_of(options.interface), note, progress, watch).run();
+}
+
+std::string alarm_words(const OpticsHealth& health) {
+  const auto& alarm = health.state.alarm;
+  if (!alarm) return {};
+  const ParameterInfo* known = find_parameter_of_any_train(alarm->parameter);
+  const double per_unit = known != nullptr ? known->si_per_unit : 1;
+  return fmt::format(
+      "{}: {} is {:+.2g} +- {:.1g} from {}; a difference as large as that of all parameters comes "
+      "by "
+      "chance with a probability of {:.1g}",
+      alarm->kind == estimation::OpticsAlarmKind::changed
+          ? "its optics have changed"
+          : "its optics are not those of " + health.reference,
+      alarm->parameter, alarm->difference / per_unit, alarm->sigma / per_unit,
+      alarm->kind == estimation::OpticsAlarmKind::changed ? "what it was in the beginning"
+                                                          : "what it should be",
+      alarm->p_value);
 }
 
 }  // namespace risley::jobs

@@ -10,6 +10,7 @@
 
 #include <Eigen/Geometry>
 #include <fmt/format.h>
+#include <tbb/task_group.h>
 
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
@@ -301,12 +302,17 @@ EstimationInput read_for_estimation(const EstimationInputOptions& options,
   result.whole_steps = reader.header().cartesian && !input.turned_back && !input.cut_mended;
   estimation::ShotSelector selector(options.selection);
   recordings::TimeAudit audit;
-  recordings::Chunk chunk;
-  while (reader.read(chunk)) {
-    audit.add(chunk);
-    selector.add(chunk.observations);
+  // While one chunk is looked at, the next is read.
+  recordings::Chunk chunk, next;
+  tbb::task_group looks;
+  while (reader.read(next)) {
     progress.report(reader.fraction_read());
+    looks.wait();
+    std::swap(chunk, next);
+    looks.run([&] { audit.add(chunk); });
+    looks.run([&] { selector.add(chunk.observations); });
   }
+  looks.wait();
   result.recording = {path, reader.header(), audit.result()};
   for (const auto& warning : reader.warnings()) result.warnings.push_back(warning_text(warning));
   result.warnings.insert(result.warnings.end(), input.warnings.begin(), input.warnings.end());

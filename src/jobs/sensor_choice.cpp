@@ -309,6 +309,13 @@ AngleSeries first_second(const std::string& path, const recordings::ReadOptions&
   return selector.head();
 }
 
+std::optional<Sensor> preset_of_type(int device_type) {
+  for (Sensor& sensor : type_presets()) {
+    if (sensor.device_type == device_type) return std::move(sensor);
+  }
+  return std::nullopt;
+}
+
 std::optional<Sensor> given_sensor(const std::string& name_or_path) {
   if (name_or_path.empty()) return std::nullopt;
   return sensors::load_sensor(name_or_path);

@@ -2,9 +2,11 @@
 // SPDX-License-Identifier: MIT
 #include <nlohmann/json.hpp>
 
+#include "risley/core/angle.hpp"
 #include "risley/jobs/emulate_sensor.hpp"
 #include "risley/jobs/record_sensors.hpp"
 #include "risley/json/results.hpp"
+#include "risley/optics/parameters.hpp"
 #include "risley/recordings/observations.hpp"
 
 namespace risley::json {
@@ -16,15 +18,122 @@ Json found_json(const jobs::FoundSensor& sensor) {
           {"address", to_string(sensor.address)}};
 }
 
+const char* cause_name(recordings::livox::GapCause cause) {
+  switch (cause) {
+    case recordings::livox::GapCause::clock:
+      return "clock";
+    case recordings::livox::GapCause::session:
+      return "session";
+    case recordings::livox::GapCause::loss:
+      break;
+  }
+  return "loss";
+}
+
 Json gaps_json(const std::vector<jobs::RecordedGap>& gaps) {
   Json json = Json::array();
   for (const jobs::RecordedGap& gap : gaps) {
     json.push_back({{"begin_s", gap.begin},
                     {"end_s", gap.end},
                     {"lost", gap.lost ? Json(*gap.lost) : Json()},
-                    {"data", gap.imu ? "imu" : "points"}});
+                    {"data", gap.imu ? "imu" : "points"},
+                    {"cause", cause_name(gap.cause)}});
   }
   return json;
+}
+
+Json clocks_json(const std::vector<jobs::RecordedClock>& clocks) {
+  Json json = Json::array();
+  for (const jobs::RecordedClock& clock : clocks) {
+    const auto& drift = clock.drift;
+    json.push_back({{"source", to_string(clock.source)},
+                    {"begin_s", clock.begin},
+                    {"end_s", clock.end},
+                    {"offset_s", {{"min", clock.least_offset}, {"max", clock.greatest_offset}}},
+                    {"drift_ppm", drift ? Json(drift->ppm) : Json()},
+                    {"drift_sigma_ppm", drift ? Json(drift->sigma_ppm) : Json()}});
+  }
+  return json;
+}
+
+Json statuses_json(const std::vector<jobs::RecordedStatus>& statuses) {
+  Json json = Json::array();
+  for (const jobs::RecordedStatus& one : statuses) {
+    json.push_back({{"begin_s", one.begin},
+                    {"status", one.status},
+                    {"says", recordings::livox::status_words(one.status)}});
+  }
+  return json;
+}
+
+/// In the unit that the parameter's name ends with.
+double per_unit(const std::string& parameter) {
+  const ParameterInfo* known = find_parameter_of_any_train(parameter);
+  return known != nullptr ? known->si_per_unit : 1.0;
+}
+
+Json alarm_json(const estimation::OpticsAlarm& alarm) {
+  const double unit = per_unit(alarm.parameter);
+  return {{"kind", to_string(alarm.kind)}, {"sensor_time_ns", alarm.time_ns},
+          {"after_s", alarm.time},         {"p_value", alarm.p_value},
+          {"parameter", alarm.parameter},  {"difference", alarm.difference / unit},
+          {"sigma", alarm.sigma / unit}};
+}
+
+/// What a sensor says of itself, in words.
+Json status_json(std::uint32_t status) {
+  const auto level = [status](int bit) {
+    constexpr const char* kNames[] = {"normal", "warning", "error", "unknown"};
+    return kNames[status >> static_cast<unsigned>(bit) & 3U];
+  };
+  constexpr int kTemperature = 0, kVoltage = 2, kMotor = 4, kWindow = 6, kSystem = 30;
+  return {{"temperature", level(kTemperature)},
+          {"voltage", level(kVoltage)},
+          {"motor", level(kMotor)},
+          {"window", level(kWindow)},
+          {"system", level(kSystem)}};
+}
+
+/// @param optics  empty where they are not watched
+Json optics_json(const std::optional<jobs::OpticsHealth>& optics) {
+  if (!optics) return {};
+  const estimation::RunningState& state = optics->state;
+  Json parameters = Json::array(), speeds = Json::array();
+  for (const estimation::RunningParameter& one : state.parameters) {
+    const double unit = per_unit(one.name);
+    parameters.push_back({{"name", one.name},
+                          {"value", one.value / unit},
+                          {"sigma", one.sigma / unit},
+                          {"sigma_given_held", one.sigma_given_held / unit},
+                          {"change", one.change / unit},
+                          {"change_sigma", one.change_sigma / unit},
+                          {"off_reference", one.off_sensor / unit},
+                          {"off_reference_sigma", one.off_sensor_sigma / unit}});
+  }
+  for (const estimation::RunningSpeed& one : state.speeds) {
+    speeds.push_back({{"deg_per_s", degrees_from_radians(one.value)},
+                      {"sigma_deg_per_s", degrees_from_radians(one.sigma)}});
+  }
+  return {{"reference", optics->reference},
+          {"is_reference", optics->is_reference},
+          {"words", optics->words},
+          {"phase", to_string(state.phase)},
+          {"pieces", state.pieces},
+          {"short_pieces", state.short_pieces},
+          {"unfit_pieces", state.unfit_pieces},
+          {"reason", state.reason},
+          {"dropped_packets", optics->dropped_packets},
+          {"window_s", state.window},
+          {"angle_noise_deg", degrees_from_radians(state.angle_noise)},
+          {"speeds", speeds},
+          {"parameters", parameters},
+          {"scatter_variance_factor", state.scatter_variance_factor},
+          {"change_p_value", state.change_p_value},
+          {"reference_p_value", optics->is_reference ? Json(state.unlike_p_value) : Json()},
+          {"alarm_p_value", state.alarm_p_value},
+          {"alarmed", state.alarmed},
+          {"alarms", state.alarms},
+          {"alarm", state.alarm ? alarm_json(*state.alarm) : Json()}};
 }
 
 }  // namespace
@@ -52,7 +161,10 @@ Json of(const jobs::RecordedSensors& recorded) {
                    {"clock_jumps", one.counts.clock_jumps},
                    {"sessions", one.sessions},
                    {"gaps", gaps_json(one.gaps)},
-                   {"statuses", one.statuses}});
+                   {"statuses", one.statuses},
+                   {"clocks", clocks_json(one.clocks)},
+                   {"status_changes", statuses_json(one.status_changes)},
+                   {"optics", optics_json(one.optics)}});
     sensors.push_back(std::move(sensor));
   }
   return {
@@ -65,6 +177,23 @@ Json of(const jobs::RecordedSensors& recorded) {
        {{"asked", recorded.receive_buffer_asked}, {"granted", recorded.receive_buffer_granted}}},
       {"strangers", recorded.strangers},
       {"sensors", sensors}};
+}
+
+Json of(const jobs::LiveRecording& live) {
+  Json sensors = Json::array();
+  for (const jobs::LiveSensorState& one : live.sensors) {
+    Json sensor = found_json(one.sensor);
+    sensor.update({{"rows", one.counts.rows},
+                   {"packets", one.counts.packets},
+                   {"lost", one.counts.lost},
+                   {"kernel_drops", one.kernel_drops},
+                   {"rejected", one.rejected},
+                   {"silent", one.silent},
+                   {"status", one.status ? status_json(*one.status) : Json()},
+                   {"optics", optics_json(one.optics)}});
+    sensors.push_back(std::move(sensor));
+  }
+  return {{"duration_s", live.duration}, {"over", live.over}, {"sensors", sensors}};
 }
 
 Json of(const jobs::EmulatedSensor& truth) {
@@ -82,6 +211,8 @@ Json of(const jobs::EmulatedSensor& truth) {
                  {"wrong_checksums", truth.wrong_checksums},
                  {"sessions", truth.sessions},
                  {"restarts", truth.restarts},
+                 {"clock_jumps", truth.clock_jumps},
+                 {"bends", truth.bends},
                  {"behind_s", truth.behind}});
   return {{"duration_s", truth.duration}, {"sensors", Json::array({sensor})}};
 }

@@ -16,5 +16,6 @@ void bind_recordings(py::module_& module);
 void bind_optics(py::module_& module);
 void bind_sensors(py::module_& module);
 void bind_jobs(py::module_& module);
+void bind_network(py::module_& module);
 
 }  // namespace risley::python

@@ -8,6 +8,7 @@
 
 #include "risley/core/error.hpp"
 #include "risley/core/progress.hpp"
+#include "risley/wire/udp_socket.hpp"
 
 #include "python/bind.hpp"
 
@@ -16,7 +17,7 @@ namespace {
 
 /// Types of exceptions, which live as long as the interpreter.
 struct ErrorTypes {
-  py::handle file, missing_file, estimation, cancelled;
+  py::handle file, missing_file, network, estimation, cancelled;
 };
 
 ErrorTypes& error_types() {
@@ -60,6 +61,9 @@ void bind_errors(py::module_& module) {
   const py::tuple both = py::make_tuple(types.file, py::handle(PyExc_FileNotFoundError));
   types.missing_file =
       new_error(module, "MissingFileError", "A file is not there; also a FileNotFoundError.", both);
+  types.network =
+      new_error(module, "NetworkError",
+                "No sensor answers, or the system refuses a socket or an address.", PyExc_OSError);
   types.estimation =
       new_error(module, "EstimationError",
                 "The data give no answer: too few of them, no convergence, or no valid shot.",
@@ -74,6 +78,8 @@ void bind_errors(py::module_& module) {
       PyErr_SetString(PyExc_ValueError, error.what());
     } catch (const FileError& error) {
       raise_file_error(error);
+    } catch (const wire::NetworkError& error) {
+      PyErr_SetString(error_types().network.ptr(), error.what());
     } catch (const EstimationError& error) {
       PyErr_SetString(error_types().estimation.ptr(), error.what());
     } catch (const Cancelled& error) {

@@ -298,25 +298,11 @@ py::object cloud(const py::dict& values, int threads, const py::object& tell) {
 
 py::object simulate(const py::dict& values, int threads, const py::object& tell) {
   const Options options(values);
-  jobs::SimulationOptions job;
+  jobs::SimulationOptions job = simulation_options(options, threads);
   std::string output;
   options.take("output", output);
-  options.take("sensor", job.sensor);
-  job.set = parameter_values(options, "set");
-  options.take("reported_nominal", job.reported_nominal);
-  job.reported = parameter_values(options, "reported");
   options.take("duration", job.duration);
   options.take("rate", job.rate);
-  options.take("angle_noise", job.angle_noise);
-  options.take("range_noise", job.range_noise);
-  options.take("quantize", job.quantize);
-  options.take("beam_origin", job.beam_origin);
-  std::string rotor = to_string(job.rotor);
-  options.take("rotor", rotor);
-  job.rotor = simulation::rotor_kind_from(rotor);
-  options.take("start_angles", job.start_angles);
-  options.take("scene", job.scene);
-  options.take("station", job.station);
   options.take("trajectory", job.trajectory);
   options.take("trajectory_topic", job.topic);
   options.take("flight", job.flight);
@@ -328,8 +314,6 @@ py::object simulate(const py::dict& values, int threads, const py::object& tell)
   }
   options.take("start", job.start);
   options.take("clock_drift", job.clock_drift);
-  options.take("seed", job.seed);
-  job.threads = threads;
   return told_by(tell, threads, [&](const Progress& progress) {
     return simulation::simulate_to_file(jobs::simulation_settings(job), output,
                                         provenance_of("simulate"), progress);

@@ -23,4 +23,5 @@ PYBIND11_MODULE(_risley, module) {
   bind_optics(module);
   bind_sensors(module);
   bind_jobs(module);
+  bind_network(module);
 }

@@ -87,6 +87,27 @@ jobs::PlatformFiles platform_files(const Options& options) {
   return files;
 }
 
+jobs::SimulationOptions simulation_options(const Options& options, int threads) {
+  jobs::SimulationOptions simulation;
+  options.take("sensor", simulation.sensor);
+  simulation.set = parameter_values(options, "set");
+  options.take("reported_nominal", simulation.reported_nominal);
+  simulation.reported = parameter_values(options, "reported");
+  options.take("angle_noise", simulation.angle_noise);
+  options.take("range_noise", simulation.range_noise);
+  options.take("quantize", simulation.quantize);
+  options.take("beam_origin", simulation.beam_origin);
+  std::string rotor = to_string(simulation.rotor);
+  options.take("rotor", rotor);
+  simulation.rotor = simulation::rotor_kind_from(rotor);
+  options.take("start_angles", simulation.start_angles);
+  options.take("scene", simulation.scene);
+  options.take("station", simulation.station);
+  options.take("seed", simulation.seed);
+  simulation.threads = threads;
+  return simulation;
+}
+
 jobs::Provenance provenance_of(const char* job) {
   return {{"command", fmt::format("risley.{} of Python", job)}, {"version", RISLEY_VERSION}};
 }

@@ -67,6 +67,9 @@ std::vector<std::string> parameter_names(const Options& options, const char* nam
 jobs::ParameterValues parameter_values(const Options& options, const char* name);
 /// trajectory, topic, mount, accuracy, trajectory_errors, crs, datum: paths and names.
 jobs::PlatformFiles platform_files(const Options& options);
+/// What `simulate` and `emulate` share: sensor, set, reported, reported_nominal, angle_noise,
+/// range_noise, quantize, beam_origin, rotor, start_angles, scene, station, seed.
+jobs::SimulationOptions simulation_options(const Options& options, int threads);
 /// output: the folder of results; states: knots, all or none.
 jobs::ResultFiles result_files(const Options& options, const char* job);
 /// What a file says of the program that made it.

@@ -3,7 +3,8 @@
 #include "risley/recordings/time_audit.hpp"
 
 #include <algorithm>
-#include <cmath>
+#include <array>
+#include <limits>
 
 #include "risley/core/saturating.hpp"
 
@@ -14,18 +15,53 @@ constexpr double kSecondsPerNanosecond = 1e-9;
 constexpr double kGapFactor = 1.8;
 constexpr std::int64_t kLatePacket_ns = 10'000'000;
 
-void include(std::optional<ValueRange>& range, double value) {
-  if (std::isnan(value)) return;
-  if (!range) {
-    range = ValueRange{value, value};
-  } else {
-    range->min = std::min(range->min, value);
-    range->max = std::max(range->max, value);
+/// Least and greatest of some values; NaN does not count.
+class Extremes {
+ public:
+  void add(double value) {
+    if (value < low_) low_ = value;
+    if (value > high_) high_ = value;
   }
-}
+  void include_in(std::optional<ValueRange>& range) const {
+    if (!(low_ <= high_)) return;
+    if (!range) range = ValueRange{low_, high_};
+    range->min = std::min(range->min, low_);
+    range->max = std::max(range->max, high_);
+  }
+
+ private:
+  static constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  double low_ = kInfinity, high_ = -kInfinity;
+};
 
 bool is_gap(std::int64_t step_ns, std::int64_t nominal_ns) {
   return static_cast<double>(step_ns) > kGapFactor * static_cast<double>(nominal_ns);
+}
+
+/// Counts what rows hold, whatever their order.
+void count_columns(const Observations& o, TimeAuditResult& totals) {
+  std::array<std::uint64_t, 256> tags{};
+  Extremes azimuth, zenith, range;
+  for (std::size_t row = 0; row < o.size(); ++row) {
+    ++totals.rows_by_return_number[o.return_number[row]];
+    ++tags[o.tag[row]];
+    if (o.valid[row] == 0) {
+      ++totals.no_return;
+      continue;
+    }
+    azimuth.add(o.azimuth[row]);
+    zenith.add(o.zenith[row]);
+    range.add(o.range[row]);
+  }
+  azimuth.include_in(totals.azimuth);
+  zenith.include_in(totals.zenith);
+  range.include_in(totals.range);
+  for (unsigned tag = 0; tag < tags.size(); ++tag) {
+    totals.tags.position[tag & 3U] += tags[tag];
+    totals.tags.intensity[tag >> 2U & 3U] += tags[tag];
+    totals.tags.echo[tag >> 4U & 3U] += tags[tag];
+    totals.tags.reserved[tag >> 6U] += tags[tag];
+  }
 }
 
 }  // namespace
@@ -34,6 +70,7 @@ void TimeAudit::add(const Chunk& chunk) {
   const Observations& o = chunk.observations;
   require_columns(o);
   totals_.imu += chunk.imu.size();
+  count_columns(o, totals_);
   std::size_t row = 0;
   for (const Packet& packet : chunk.packets) {
     if (packet.data_type < totals_.packets_by_data_type.size()) {
@@ -68,20 +105,6 @@ void TimeAudit::add_row(const Observations& o, std::size_t row) {
   totals_.last_time_ns = time;
   const std::uint64_t row_number = totals_.observations++;
   ++state.rows;
-  ++totals_.rows_by_return_number[o.return_number[row]];
-  const unsigned tag = o.tag[row];
-  ++totals_.tags.position[tag & 3U];
-  ++totals_.tags.intensity[tag >> 2U & 3U];
-  ++totals_.tags.echo[tag >> 4U & 3U];
-  ++totals_.tags.reserved[tag >> 6U];
-  if (o.valid[row]) {
-    include(totals_.azimuth, o.azimuth[row]);
-    include(totals_.zenith, o.zenith[row]);
-    include(totals_.range, o.range[row]);
-  } else {
-    ++totals_.no_return;
-  }
-
   const bool same_shot =
       state.started && time == state.last_shot_ns && o.return_number[row] > state.last_return;
   state.last_return = o.return_number[row];

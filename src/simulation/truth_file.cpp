@@ -7,6 +7,7 @@
 #include <utility>
 
 #include <fmt/format.h>
+#include <tbb/task_group.h>
 
 #include "risley/core/angle.hpp"
 #include "risley/io/text_file.hpp"
@@ -134,14 +135,20 @@ SimulationResult simulate_to_file(
   FilesInProgress beside;
   std::vector<std::string> left_out;
   if (settings.platform) left_out = write_platform(settings, path, beside);
-  recordings::Chunk chunk;
-  recordings::TruthColumns truth;
-  while (scanner.read(chunk, truth)) {
-    recording->write(chunk);
-    truth_columns.write(truth);
+  // While one chunk is written, the next is simulated.
+  recordings::Chunk chunk, next_chunk;
+  recordings::TruthColumns truth, next_truth;
+  tbb::task_group writing;
+  while (scanner.read(next_chunk, next_truth)) {
+    writing.wait();
+    std::swap(chunk, next_chunk);
+    std::swap(truth, next_truth);
+    writing.run([&] { recording->write(chunk); });
+    writing.run([&] { truth_columns.write(truth); });
     progress.report(static_cast<double>(scanner.shots_done()) /
                     static_cast<double>(scanner.shots()));
   }
+  writing.wait();
   recording->close();
   truth_columns.close();
   SimulationResult result;

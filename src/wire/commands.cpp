@@ -11,7 +11,6 @@
 
 #include "risley/core/error.hpp"
 #include "risley/io/little_endian.hpp"
-#include "risley/recordings/observations.hpp"
 
 namespace risley::wire {
 namespace {
@@ -349,11 +348,6 @@ constexpr CommandName kNames[] = {
 };
 
 }  // namespace
-
-bool has_imu(std::uint8_t device_type) {
-  return device_type == recordings::kAvia || device_type == recordings::kHorizon ||
-         device_type == recordings::kTele15;
-}
 
 std::string firmware_text(const std::array<std::uint8_t, 4>& firmware) {
   return fmt::format("{:02}.{:02}.{:02}{:02}", firmware[0], firmware[1], firmware[2], firmware[3]);

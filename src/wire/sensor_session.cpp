@@ -8,7 +8,6 @@
 #include <fmt/format.h>
 
 #include "risley/core/error.hpp"
-#include "risley/recordings/observations.hpp"
 
 namespace risley::wire {
 namespace {
@@ -31,10 +30,10 @@ SensorSession::SensorSession(SensorIdentity identity, std::int64_t now_ns)
     throw InvalidArgument(fmt::format("broadcast code \"{}\" has {} characters, allowed 1 to {}",
                                       identity_.code, identity_.code.size(), kMostCharacters));
   }
-  if (identity_.device_type == recordings::kAvia || identity_.device_type == recordings::kTele15) {
+  if (identity_.abilities.high_sensitivity) {
     parameters_[static_cast<std::uint16_t>(ParameterKey::high_sensitivity)] = 0;
   }
-  if (identity_.device_type == recordings::kAvia) {
+  if (identity_.abilities.scan_pattern) {
     parameters_[static_cast<std::uint16_t>(ParameterKey::scan_pattern)] = 0;
   }
 }
@@ -48,11 +47,9 @@ void SensorSession::leave(std::int64_t now_ns) {
 void SensorSession::advance(std::int64_t now_ns) {
   if (host_ && now_ns - heartbeat_ns_ >= kHeartbeatTimeout) leave(now_ns);
   if (!host_ && now_ns >= broadcast_due_ns_) {
-    constexpr std::uint16_t kAviaReserved = kSensorPort;
-    const bool is_avia = identity_.device_type == recordings::kAvia;
     datagrams_.push_back({{},
                           encode(Message(Broadcast{identity_.code, identity_.device_type,
-                                                   is_avia ? kAviaReserved : std::uint16_t{0}}),
+                                                   identity_.abilities.reserved}),
                                  0)});
     broadcast_due_ns_ = now_ns + kBroadcastPeriod;
   }
@@ -126,10 +123,9 @@ void SensorSession::shake_hands(const Endpoint& from, const Handshake& hand, std
 }
 
 std::uint8_t SensorSession::set_return_mode(std::uint8_t mode) {
-  const std::uint8_t type = identity_.device_type;
   const auto wanted = static_cast<ReturnMode>(mode);
-  if (type == recordings::kMid40) return kFailed;
-  if (wanted == ReturnMode::triple && type != recordings::kAvia) return kFailed;
+  if (!identity_.abilities.return_modes) return kFailed;
+  if (wanted == ReturnMode::triple && !identity_.abilities.triple) return kFailed;
   return_mode_ = wanted;
   return kOk;
 }
@@ -198,15 +194,14 @@ std::optional<Reply> SensorSession::obey(const Command& command, std::int64_t no
         } else if constexpr (std::is_same_v<Kind, SetReturnMode>) {
           return ResultReply{Kind::kId, set_return_mode(wanted.value)};
         } else if constexpr (std::is_same_v<Kind, QueryReturnMode>) {
-          const bool known = identity_.device_type != recordings::kMid40;
-          return ValueReply{Kind::kId, known ? kOk : kFailed,
+          return ValueReply{Kind::kId, identity_.abilities.return_modes ? kOk : kFailed,
                             static_cast<std::uint8_t>(return_mode_)};
         } else if constexpr (std::is_same_v<Kind, SetImuRate>) {
-          const bool ok = has_imu(identity_.device_type);
+          const bool ok = identity_.abilities.imu;
           if (ok) imu_ = wanted.value == 1;
           return result_of(command, ok);
         } else if constexpr (std::is_same_v<Kind, QueryImuRate>) {
-          return ValueReply{Kind::kId, has_imu(identity_.device_type) ? kOk : kFailed,
+          return ValueReply{Kind::kId, identity_.abilities.imu ? kOk : kFailed,
                             static_cast<std::uint8_t>(imu_ ? 1 : 0)};
         } else if constexpr (std::is_same_v<Kind, SetRainFilter>) {
           rain_filter_ = wanted.value == 1;

@@ -216,6 +216,98 @@ class EmulateTest(CommandTest):
                 self.assertEqual(truth["duplicates"] > 0, "--duplication" in faults)
                 self.assertEqual(truth["reordered"] > 0, "--disorder" in faults)
 
+    def test_clocks(self):
+        """Sources of time, drift and jumps: none of them is a loss, and losses stay counted."""
+        for options, sources, jumps in (
+                (("--time", "ptp"), ["PTP"], 0),
+                (("--time", "pps", "--clock-drift-ppm", 40), ["PPS"], 0),
+                (("--clock-drift-ppm", -150), ["power-on"], 0),
+                (("--time", "ptp", "--time-from-s", 2), ["power-on", "PTP"], 1),
+                (("--time", "pps", "--clock-jump-s", 2.3, "--clock-jump-by-ms", 300), ["PPS", "PPS"], 1),
+                (("--time", "pps", "--clock-jump-s", 2.3, "--clock-jump-by-ms", -250), ["PPS", "PPS"], 1),
+                (("--clock-jump-s", 2, "--clock-jump-by-ms", 500), ["power-on", "power-on"], 1),
+                (("--clock-jump-s", 3, "--clock-jump-by-ms", -500), ["power-on", "power-on"], 1)):
+            with self.subTest(options):
+                process = self.emulate("--loss", 0.01, *options)
+                recorded = self.record("clock.lvx", "--duration-s", 8 if jumps == 0 else 5, "--find-s", 1.2)[0]
+                truth = self.truth(process)
+                self.assertEqual([clock["source"] for clock in recorded["clocks"]], sources)
+                self.assertEqual((recorded["clock_jumps"], truth["clock_jumps"]), (jumps, jumps))
+                self.assertEqual([gap["cause"] for gap in recorded["gaps"]], ["clock"] * jumps)
+                # A packet that is lost where the clock jumps cannot be told from the jump.
+                self.assertTrue(truth["lost"] - 3 * jumps <= recorded["lost"] <= truth["lost"],
+                                (truth["lost"], recorded["lost"]))
+                self.assertEqual(recorded["rows"], truth["rows"])
+                clock = recorded["clocks"][-1]
+                if jumps == 0:
+                    drift = options[-1] if "--clock-drift-ppm" in options else 0
+                    self.assertLess(abs(clock["drift_ppm"] - drift), 6 * clock["drift_sigma_ppm"] + 2)
+                    self.assertLess(clock["drift_sigma_ppm"], 100)
+                if clock["source"] == "PTP":
+                    self.assertLess(abs(clock["offset_s"]["max"]), 0.05)
+                says = {"PTP": ["PTP signal", "synchronised by PTP"], "PPS": ["PPS signal", "synchronised by PPS"]}
+                self.assertEqual(recorded["status_changes"][-1]["says"], says.get(clock["source"], []))
+                info = self.expect_json(0, "info", "clock.lvx")
+                self.assertEqual(info["observations"], truth["rows"])
+
+    def test_a_recording_is_sent(self):
+        self.expect(0, "simulate", "-o", "source.lvx", "--sensor", "avia", "--duration-s", 0.3, "--seed", 3,
+                    "--scene", os.path.join(os.environ["RISLEY_SOURCE_DIR"], "data/room.yaml"))
+        self.emulate("--recording", "source.lvx")
+        host = self.host()
+        self.assertEqual(host.find(CODE)[0], 7)
+        host.shake_hands()
+        host.ask(0, 5, b"\1")
+        host.ask(0, 4, b"\1")
+        rows = b"".join(one[18:] for one in host.receive(0.5) if header(one)[4] == 3)
+        simulated = (self.folder / "source.lvx").read_bytes()
+        at, told = 29 + 59, b""
+        while at < len(simulated):
+            following = struct.unpack_from("<Q", simulated, at + 8)[0]
+            told += b"".join(simulated[one + 19:one + 979] for one in range(at + 24, following, 979))
+            at = following
+        # Depths and angles of every shot, and once more from the beginning; the tags are the emulator's.
+        points = [rows[at:at + 9] for at in range(0, len(rows), 10)]
+        source = [told[at:at + 9] for at in range(0, len(told), 10)]
+        self.assertGreater(len(points), len(source))
+        self.assertEqual(points[:len(source)], source)
+        self.assertEqual(points[len(source):2 * len(source)], source[:len(points) - len(source)])
+
+    def test_all_returns_and_gaps_of_a_recording_are_sent(self):
+        def dual(number):
+            body = b"".join(struct.pack("<HHIBBIBB", 9000, 100, 1000 + number, 50, 0x10,
+                                        2000 + record if record % 2 else 0, 60, 0x20) for record in range(48))
+            return b"\0" + struct.pack("<BBBBIBBQ", 5, 1, 1, 0, 0, 0, 5, number * 200_000) + body
+        kept = [0, 1, 2, 6, 7]
+        frame_bytes = b"".join(dual(number) for number in kept)
+        head = b"livox_tech" + bytes(6) + b"\1\1\0\0" + struct.pack("<IIB", 0xAC0EA767, 50, 1)
+        device = b"RECORDED0000011".ljust(32, b"\0") + struct.pack("<BBB6f", 0, 7, 0, *(0,) * 6)
+        at = len(head + device)
+        (self.folder / "dual.lvx").write_bytes(
+            head + device + struct.pack("<QQQ", at, at + 24 + len(frame_bytes), 0) + frame_bytes)
+        self.emulate("--recording", "dual.lvx")
+        host = self.host()
+        host.find(CODE)
+        host.shake_hands()
+        host.ask(0, 5, b"\1")
+        host.ask(1, 6, b"\2")
+        host.ask(0, 4, b"\1")
+        packets = [one[18:] for one in host.receive(0.1) if header(one)[4] == 5][:8]
+        self.assertEqual(len(packets), 8)
+        for number in range(8):
+            expected = [(1000 + number, 2000 + record if record % 2 else 0) if number in kept else (0, 0)
+                        for record in range(48)]
+            self.assertEqual([(struct.unpack_from("<I", packets[number], 16 * record + 4)[0],
+                               struct.unpack_from("<I", packets[number], 16 * record + 10)[0])
+                              for record in range(48)], expected, number)
+
+    def test_recordings_that_cannot_be_sent(self):
+        for name, text, says in (("angles.sequence.csv", "Time/s,Azimuth/deg,Zenith/deg\n0,1,90\n0.00001,2,90\n", "ranges"),
+                                 ("none.lvx", "", "is empty")):
+            (self.folder / name).write_text(text, encoding="ascii")
+            done = self.expect_json(3 if name == "none.lvx" else 2, "emulate", "--interface", ADDRESS, "--recording", name)
+            self.assertIn(says, done["error"])
+
     def test_three_sensors_ten_times_faster(self):
         speed = 3 if os.environ.get("RISLEY_SANITIZED") == "ON" else 10
         processes = [self.emulate("--sensor", "mid-40", "--speed", speed, address=f"127.0.0.{50 + i}",

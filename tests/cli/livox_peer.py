@@ -84,7 +84,7 @@ class Sensor(threading.Thread):
         self.farthest = 10  # packets that one may be overtaken by
         self.spherical, self.mode, self.imu = 0, 0, 0
         self.first_ns = 5_000_000_000
-        self.timestamp_type = 0
+        self.timestamp_type = self.status = 0
         for name, value in faults.items():
             assert hasattr(self, name), name
             setattr(self, name, value)
@@ -178,7 +178,7 @@ class Sensor(threading.Thread):
         period = self.period or step * 1e-9
         due = int((time.monotonic() - began) / period)
         while number < due:
-            one = packet(self.data_type(), self.first_ns + number * step, number, self.timestamp_type)
+            one = packet(self.data_type(), self.first_ns + number * step, number, self.timestamp_type, self.status)
             if number > 0 and self.random.random() < self.loss:
                 self.lost += 1
             else:
@@ -202,7 +202,7 @@ class Sensor(threading.Thread):
         _, _, slow, fast = TYPES[self.data_type()]
         step = slow if self.device_type in (MID_40, MID_70) else fast
         self.times.append(self.first_ns + self.number * step)
-        self.send(packet(self.data_type(), self.times[-1], self.number, self.timestamp_type))
+        self.send(packet(self.data_type(), self.times[-1], self.number, self.timestamp_type, self.status))
 
     def send(self, data):
         self.socket.sendto(data, (self.host[0], self.host[1]))

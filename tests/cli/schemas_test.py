@@ -218,9 +218,10 @@ class SchemasTest(CommandTest):
     @classmethod
     def record(cls):
         emulator = subprocess.Popen([COMMAND, "emulate", "--interface", "127.0.0.93", "--restart-s", "1",
-                                     "--restart-takes-s", "0.5", "--json"], stdout=subprocess.PIPE, text=True)
+                                     "--restart-takes-s", "0.5", "--set", "prism_tilt_b_vertical_deg=3", "--json"], stdout=subprocess.PIPE, text=True)
         cls.print(0, "record", "--list", "--interface", "127.0.0.94")
-        cls.print(0, "record", "-o", "live.lvx", "--interface", "127.0.0.94", "--duration-s", 5)
+        cls.print(0, "record", "-o", "live.lvx", "--interface", "127.0.0.94", "--duration-s", 13,
+                  "--optics", "mid-40")
         emulator.terminate()
         cls.outputs.append(("emulate", json.loads(emulator.communicate()[0])))
 

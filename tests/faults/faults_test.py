@@ -150,7 +150,7 @@ class FaultsTest(unittest.TestCase):
         self.assertEqual(done.returncode, 0, f"{arguments}: {done.stderr}")
         return state(folder)
 
-    def each(self, cases, check):
+    def each(self, cases, check, at_a_time=2):
         """Runs check(case, kind, number) until a kind of call does not happen any more."""
         wrong = []
 
@@ -170,7 +170,7 @@ class FaultsTest(unittest.TestCase):
                     shutil.rmtree(folder)
             return seen
         jobs = [(case, kind) for case in cases for kind in STATUSES]
-        with concurrent.futures.ThreadPoolExecutor(2) as pool:
+        with concurrent.futures.ThreadPoolExecutor(at_a_time) as pool:
             faults = sum(pool.map(all_of, jobs))
         print(f"{faults} faults in {len(cases)} cases, {len(wrong)} with a wrong end", flush=True)
         self.assertEqual(wrong, [], "\n".join(wrong))
@@ -255,6 +255,44 @@ class FaultsTest(unittest.TestCase):
                 for number in NUMBERS:
                     if not check(self.inputs, case, kind, number):
                         break
+
+    def test_a_recording_is_the_new_one_or_unfinished(self):
+        serial, unfinished = "FAULTS000000011", "out.lvx.unfinished"
+        arguments = ["record", "--interface", "127.0.0.1", "--serial", serial, "--find-s", "5",
+                     "--duration-s", "0.2", "-o", "out.lvx"]
+
+        def check(folder, _, kind, number):
+            where = f"record, {kind} {number}"
+            old = b"of an earlier run"
+            (folder / "out.lvx").write_bytes(old)
+            done, happened = run(folder, arguments, (kind, number))
+            if not happened:
+                self.assertEqual(done.returncode, 0, f"{where}: {done.stderr}")
+                return False
+            self.expect_status(done, kind, where)
+            made = set(state(folder)) - set(state(self.inputs))
+            self.assertLessEqual(made, {"out.lvx", unfinished}, f"{where}: left behind")
+            # What was recorded before the fault is worth more than a clean folder.
+            # Of the new file only the folder's sync may have failed.
+            renamed = (folder / "out.lvx").read_bytes() != old
+            self.assertTrue(renamed or done.returncode != 0, where)
+            self.assertFalse(renamed and unfinished in made, where)
+            if unfinished in made:
+                self.assertNotEqual(done.returncode, 0, where)
+                read, _ = run(folder, ["info", unfinished])
+                self.assertIn(read.returncode, {0, 3}, f"{where}: {read.stderr}")
+            if renamed:
+                read, _ = run(folder, ["info", "out.lvx"])
+                self.assertEqual(read.returncode, 0, f"{where}: {read.stderr}")
+            return True
+
+        with subprocess.Popen([COMMAND, "emulate", "--interface", "127.0.0.71", "--serial", serial,
+                               "--speed", "10"], stdout=subprocess.DEVNULL,
+                              stderr=subprocess.DEVNULL) as sensor:
+            try:
+                self.each([("record",)], check, at_a_time=1)  # all need the same port
+            finally:
+                sensor.terminate()
 
     def test_a_killed_run_leaves_the_old_or_the_new_file(self):
         reference = self.copy_of_inputs()

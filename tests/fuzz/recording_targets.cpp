@@ -195,6 +195,7 @@ std::vector<Target> recording_targets() {
       {"ros1-bag", run<kRos1BagFormat, kPackedRows>},
       {"ros2-bag", run<kRos2BagFormat, kPlainRows>},
       {"mcap", run<kMcapFormat, kZstdRows>},
+      {"pcap", run<kPcapFormat, kPlainRows>},
   };
 }
 

@@ -69,7 +69,8 @@ void run_frames(std::span<const std::uint8_t> bytes) {
 
 void run_sensor(std::span<const std::uint8_t> bytes) {
   std::int64_t now = 0;
-  SensorSession sensor({"0TFDG3B006H2Z11", 7, {}, kHostAddress}, now);
+  SensorSession sensor(
+      {"0TFDG3B006H2Z11", 7, {}, kHostAddress, {true, true, true, true, true, kSensorPort}}, now);
   std::optional<Address> host;
   for_each_datagram(bytes, [&](std::span<const std::uint8_t> datagram, std::uint8_t how) {
     constexpr unsigned kFromStranger = 2, kLater = 4;

@@ -13,7 +13,7 @@ import risley
 PACKAGE = pathlib.Path(risley.__file__).parent
 # pybind11 gives its classes a metaclass, and those without a constructor one that refuses.
 ALLOWED = r"risley\._risley\.(CalibratedFlight|CalibratedRecordings|ChunkReader|Device|EstimatedRecording|PlannedCalibration"
-ALLOWED += r"|PlannedFlight|PrismTrain|Recording|RecordingHeader|Sensor|ValueTable)(\.__init__)?"
+ALLOWED += r"|PlannedFlight|PrismTrain|Recording|RecordingHeader|Sensor|Stop|ValueTable)(\.__init__)?"
 
 
 def run(*words, folder):

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 #include "risley/recordings/livox/packet_decoder.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <random>
@@ -117,6 +118,29 @@ TEST(PacketDecoder, AChunkThatIsUsedAgainNeedsNoMoreMemory) {
   }
   EXPECT_EQ(chunk.observations.azimuth.data(), first);
   EXPECT_EQ(chunk.observations.azimuth.capacity(), room);
+}
+
+TEST(PacketDecoder, PutsRowsIntoColumnsThatHaveRoomForThem) {
+  std::mt19937 random(8);
+  const std::string first = packet(3, 1000, random), second = packet(3, 2000, random);
+  PacketDecoder decoder({.device_type = kHorizon});
+  Chunk appended, filled;
+  decoder.decode(bytes_of(first), appended);
+  decoder.decode(bytes_of(second), appended);
+  filled.observations.resize(200);
+  std::fill(filled.observations.range.begin(), filled.observations.range.end(), -1.0);
+  decoder.decode_into(bytes_of(first), filled, 0);
+  decoder.decode_into(bytes_of(second), filled, 96);
+  EXPECT_EQ(filled.packets.size(), 2U);
+  EXPECT_EQ(filled.observations.range[192], -1.0);
+  filled.observations.resize(192);
+  EXPECT_EQ(filled.observations.azimuth, appended.observations.azimuth);
+  EXPECT_EQ(filled.observations.zenith, appended.observations.zenith);
+  EXPECT_EQ(filled.observations.range, appended.observations.range);
+  EXPECT_EQ(filled.observations.time_ns, appended.observations.time_ns);
+  EXPECT_EQ(filled.observations.range_resolution, appended.observations.range_resolution);
+  EXPECT_THROW(decoder.decode_into(bytes_of(first), filled, 97), InvalidArgument);
+  EXPECT_EQ(filled.packets.size(), 2U);
 }
 
 TEST(PacketDecoder, NamesTheByteOfWhatIsWrong) {

@@ -109,7 +109,6 @@ TEST_F(PacketFileTest, AnOlderFileIsReplacedAtTheEnd) {
 }
 
 TEST_F(PacketFileTest, WhatCannotBeWritten) {
-  EXPECT_THROW(PacketFile(folder_.file("a.nc"), devices(1)), InvalidArgument);
   EXPECT_THROW(PacketFile(folder_.file("no/a.lvx"), devices(1)), FileError);
   EXPECT_THROW(PacketFile(path_, devices(0)), InvalidArgument);
   EXPECT_THROW(PacketFile(path_, devices(256)), InvalidArgument);

@@ -19,7 +19,11 @@ constexpr std::uint16_t kDataPort = 56001, kCommandPort = 55501;
 
 ClientSettings settings() { return {kHost, kDataPort, kCommandPort, true, {}, {}}; }
 SensorIdentity identity(std::uint8_t type = 1) {
-  return {"0TFDG3B006H2Z11", type, {3, 8, 0, 0}, kSensor};
+  constexpr std::uint8_t kMid40 = 1, kAvia = 7;
+  SensorAbilities abilities;
+  abilities.return_modes = type != kMid40;
+  if (type == kAvia) abilities = {true, true, true, true, true, kSensorPort};
+  return {"0TFDG3B006H2Z11", type, {3, 8, 0, 0}, kSensor, abilities};
 }
 
 /// A host and a sensor, and time in steps of 10 ms.
@@ -273,8 +277,8 @@ TEST(Session, AnAbnormalStatusIsToldTenTimesASecond) {
 }
 
 TEST(Session, CodesOfSensors) {
-  EXPECT_THROW(SensorSession({"", 1, {}, kSensor}, 0), InvalidArgument);
-  EXPECT_THROW(SensorSession({"sixteen letters.", 1, {}, kSensor}, 0), InvalidArgument);
+  EXPECT_THROW(SensorSession({"", 1, {}, kSensor, {}}, 0), InvalidArgument);
+  EXPECT_THROW(SensorSession({"sixteen letters.", 1, {}, kSensor, {}}, 0), InvalidArgument);
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 
 #include "risley/core/progress.hpp"
 #include "risley/jobs/simulation_settings.hpp"
+#include "risley/recordings/observations.hpp"
 #include "risley/wire/address.hpp"
 
 namespace risley::jobs {
@@ -26,6 +27,19 @@ struct EmulatedFaults {
       heartbeat_dies;             ///< s after the first start; from then to the session's end
   std::optional<double> restart;  ///< s after the first start, once
   double restart_time = 2;        ///< s, for which a sensor that restarts says nothing
+  /// What is added to parameters of the true sensor, SI units, while the rotors go on.
+  ParameterValues bend;
+  std::optional<double> bend_time;  ///< s after the first start, once
+};
+
+/// How the clock of a virtual sensor goes. Times are s after the first start.
+struct EmulatedClock {
+  /// Of its times: power_on; ptp, this machine's time; or pps, which begins again every second.
+  recordings::TimeReference source = recordings::TimeReference::power_on;
+  double source_from = 0;      ///< before, its times are from power-on
+  double drift_ppm = 0;        ///< by which it is faster than this machine's, (-10000, 10000)
+  std::optional<double> jump;  ///< once, at this time
+  double jump_by = 0.25;       ///< s, [-3600, 3600]
 };
 
 /// Which sensor to be, and how.
@@ -35,8 +49,12 @@ struct EmulateOptions {
   /// What it measures; without a scene the inside of a room. The shot rate is that of the sensor's
   /// type, the duration and what moves it do not count.
   SimulationOptions simulation;
+  /// Path of a recording of one sensor, whose shots are sent instead, with its gaps and all their
+  /// returns, over and over. simulation.sensor says its type where it does not.
+  std::string recording;
   double speed = 1;                ///< times faster than real time
   std::optional<double> duration;  ///< s from the beginning; empty: until it is cancelled
+  EmulatedClock clock;
   EmulatedFaults faults;
 };
 
@@ -56,7 +74,9 @@ struct EmulatedSensor {
   std::uint64_t kernel_drops = 0;               ///< of commands
   std::uint64_t rejected = 0;                   ///< datagrams that were no commands of the host
   std::uint64_t sessions = 0, restarts = 0;     ///< handshakes that were answered; restarts
-  double behind = 0;                            ///< s, by which the sending fell behind at most
+  std::uint64_t clock_jumps = 0;  ///< that were ordered, changes of the source among them
+  std::uint64_t bends = 0;        ///< times that the optics changed
+  double behind = 0;              ///< s, by which the sending fell behind at most
 };
 
 /// Told at once: where the sensor is and what it does.

@@ -10,8 +10,9 @@
 #include <vector>
 
 #include "risley/core/progress.hpp"
+#include "risley/jobs/optics_watch.hpp"
+#include "risley/recordings/livox/packet_order.hpp"
 #include "risley/wire/commands.hpp"
-#include "risley/wire/packet_order.hpp"
 
 namespace risley::jobs {
 
@@ -26,7 +27,10 @@ struct RecordOptions {
   std::optional<bool> spherical = true;         ///< empty: as the sensors are
   std::optional<wire::ReturnMode> return_mode;  ///< empty: as the sensors are
   bool imu = true;                              ///< inertial samples, where the sensor has them
-  std::string output;                           ///< path, ends in .lvx
+  /// Path; ends in .lvx, or in .nc for what is converted at the end.
+  std::string output;
+  bool watch_optics = false;                    ///< see OpticsWatch
+  std::string optics_reference;                 ///< as OpticsWatch's
 };
 
 /// A sensor on the interface.
@@ -39,21 +43,41 @@ struct FoundSensor {
 /// A time without data of a sensor, by the host's clock; s since the first data of the recording.
 struct RecordedGap {
   double begin = 0, end = 0;
-  std::optional<std::uint64_t> lost;  ///< packets; empty where the sensor's clock began again
+  std::optional<std::uint64_t> lost;  ///< as recordings::livox::PacketGap::lost
   bool imu = false;                   ///< of inertial samples, not of points
+  recordings::livox::GapCause cause = recordings::livox::GapCause::loss;
+};
+
+/// A time in which the clock of a sensor neither jumped nor changed its source; s since the first
+/// data of the recording, by the host's clock.
+struct RecordedClock {
+  recordings::TimeReference source = recordings::TimeReference::power_on;
+  double begin = 0, end = 0;
+  /// Sensor's time less the host's, s, of the packets with the least delay in every second.
+  double least_offset = 0, greatest_offset = 0;
+  std::optional<recordings::livox::ClockDrift> drift;  ///< empty where it was too short
+};
+
+/// A status that a sensor reports from some time on: recordings::Packet::status.
+struct RecordedStatus {
+  double begin = 0;  ///< s since the first data of the recording, by the host's clock
+  std::uint32_t status = 0;
 };
 
 /// What was recorded of a sensor.
 struct RecordedSensor {
   FoundSensor sensor;
-  std::string firmware;       ///< empty where it was not told
-  wire::PacketCounts counts;  ///< without those of strangers
+  std::string firmware;                    ///< empty where it was not told
+  recordings::livox::PacketCounts counts;  ///< without those of strangers
   std::uint64_t kernel_drops = 0;
   std::uint64_t rejected = 0;  ///< datagrams that were no packets, or from somebody else
   std::uint64_t sessions = 0;  ///< handshakes that were answered
   std::vector<RecordedGap> gaps;
   /// Warnings and errors of the sensor itself, each status once: recordings::Packet::status.
   std::vector<std::uint32_t> statuses;
+  std::vector<RecordedClock> clocks;           ///< one after the other, the first 100
+  std::vector<RecordedStatus> status_changes;  ///< as packets have them, the first 1000
+  std::optional<OpticsHealth> optics;  ///< where they were watched
 };
 
 /// What came of a recording.
@@ -67,6 +91,26 @@ struct RecordedSensors {
   std::uint64_t strangers = 0;  ///< datagrams at the broadcast port that name no sensor
 };
 
+/// A sensor while it is recorded.
+struct LiveSensorState {
+  FoundSensor sensor;
+  wire::PacketCounts counts;  ///< so far
+  std::uint64_t kernel_drops = 0, rejected = 0;
+  bool silent = false;                  ///< nothing came for a second
+  std::optional<std::uint32_t> status;  ///< the last one, as recordings::Packet::status
+  std::optional<OpticsHealth> optics;   ///< where they are watched
+};
+
+/// A recording while it runs.
+struct LiveRecording {
+  double duration = 0;  ///< s since the first data
+  bool over = false;    ///< nothing will be told any more
+  std::vector<LiveSensorState> sensors;
+};
+
+/// Told twice a second, and at the end. The recording waits for it: it must be quick.
+using RecordWatch = std::function<void(const LiveRecording&)>;
+
 /// Told at once: words about a sensor, and whether something is wrong.
 using RecordNote = std::function<void(const std::string& words, bool is_wrong)>;
 
@@ -75,13 +119,17 @@ using RecordNote = std::function<void(const std::string& words, bool is_wrong)>;
 std::vector<FoundSensor> find_sensors(const RecordOptions& options, const Progress& progress = {});
 
 /// Finds sensors, starts them, and writes what they send into one LVX 1.1 file while it comes, see
-/// recordings::livox::PacketFile, until the time is over or the progress is cancelled: that is the
-/// clean end of a recording, for which the sensors are stopped. A sensor that falls silent is told
-/// of, waited for, and goes on in the same file; one that is found later than the others is not
-/// taken.
+/// recordings::livox::PacketFile, also where that is converted to NetCDF at the end: until the time
+/// is over or the progress is cancelled: that is the clean end of a recording, for which the
+/// sensors are stopped. A sensor that falls silent is told of, waited for, and goes on in the same
+/// file; one that is found later than the others is not taken: the table of sensors stands before
+/// the data.
 /// @throws InvalidArgument; NetworkError also where there is no sensor, or none sends anything;
 ///         FileError
 RecordedSensors record_sensors(const RecordOptions& options, const RecordNote& note,
-                               const Progress& progress = {});
+                               const Progress& progress = {}, const RecordWatch& watch = {});
+
+/// An alarm in a sentence, such as "prism_tilt_b_vertical_deg has changed by ...".
+std::string alarm_words(const OpticsHealth& health);
 
 }  // namespace risley::jobs

@@ -79,6 +79,10 @@ estimation::AngleSeries first_second(const std::string& path,
                                      const recordings::ReadOptions& options,
                                      const Progress& progress = {});
 
+/// The built-in preset of a type of sensors; empty where there is none.
+/// @param device_type  as recordings::Device::type
+std::optional<sensors::Sensor> preset_of_type(int device_type);
+
 /// A sensor by name or path; empty for an empty text. @throws as sensors::load_sensor
 std::optional<sensors::Sensor> given_sensor(const std::string& name_or_path);
 

@@ -34,6 +34,7 @@ struct JudgedObservability;
 struct PlannedCalibration;
 struct PlannedFlightResult;
 struct RecordedSensors;
+struct LiveRecording;
 struct RecordingCloud;
 struct ResultComparison;
 struct WrittenPattern;
@@ -93,6 +94,8 @@ Json of(const simulation::SimulationResult& simulated);
 Json of(const std::vector<jobs::FoundSensor>& found);
 /// Of `risley record`.
 Json of(const jobs::RecordedSensors& recorded);
+/// A recording while it runs: events of its page.
+Json of(const jobs::LiveRecording& live);
 /// Of `risley emulate`.
 Json of(const jobs::EmulatedSensor& truth);
 /// The `coverage` of `risley pattern`.

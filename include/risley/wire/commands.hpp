@@ -77,9 +77,6 @@ using SetFan = ByteCommand<1, 0x04, 1>;          ///< 1 on
 using SetReturnMode = ByteCommand<1, 0x06, 3>;   ///< see ReturnMode
 using SetImuRate = ByteCommand<1, 0x08, 1>;      ///< 0 off, 1 200 Hz
 
-/// Whether sensors of this type send inertial samples. @param device_type  recordings::Device::type
-bool has_imu(std::uint8_t device_type);
-
 /// Values of SetReturnMode.
 enum class ReturnMode : std::uint8_t { first = 0, strongest = 1, dual = 2, triple = 3 };
 

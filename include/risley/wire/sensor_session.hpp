@@ -15,12 +15,23 @@
 
 namespace risley::wire {
 
+/// What only some types of sensors can do.
+struct SensorAbilities {
+  bool return_modes = false;      ///< the host may choose returns: first, strongest, dual
+  bool triple = false;            ///< three returns among them
+  bool imu = false;               ///< inertial samples
+  bool high_sensitivity = false;  ///< as a parameter
+  bool scan_pattern = false;      ///< as a parameter
+  std::uint16_t reserved = 0;     ///< Broadcast::reserved
+};
+
 /// Who a virtual sensor is.
 struct SensorIdentity {
   std::string code;              ///< broadcast code, at most 15 characters
   std::uint8_t device_type = 1;  ///< as recordings::Device::type
   std::array<std::uint8_t, 4> firmware{};
   Address address;  ///< what QueryAddress is answered with
+  SensorAbilities abilities;
 };
 
 /// A sensor as hosts see it through commands: it broadcasts until a host shakes hands, then obeys

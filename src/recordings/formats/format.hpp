@@ -43,6 +43,7 @@ extern const Format kNetcdfFormat;           // netcdf.cpp
 extern const Format kRos1BagFormat;          // ros1_bag.cpp
 extern const Format kRos2BagFormat;          // ros2_bag.cpp
 extern const Format kMcapFormat;             // mcap.cpp
+extern const Format kPcapFormat;             // pcap.cpp
 extern const Format kLasFormat;              // las.cpp
 extern const Format kLazFormat;              // las.cpp, laz.cpp
 extern const Format kPcdFormat;              // pcd.cpp

@@ -3,14 +3,13 @@
 #include "recordings/formats/lvx_reader.hpp"
 
 #include <algorithm>
-#include <cmath>
-#include <limits>
 #include <span>
 #include <utility>
 
 #include <fmt/format.h>
 
 #include "risley/io/little_endian.hpp"
+#include "risley/recordings/livox/first_packets.hpp"
 
 namespace risley::recordings {
 
@@ -23,32 +22,6 @@ using io::load;
 /// Text of a field that is filled up with NUL.
 std::string text_field(const std::uint8_t* bytes, std::size_t count) {
   return {bytes, std::find(bytes, bytes + count, std::uint8_t{0})};
-}
-
-/// What the first packets of one device say.
-struct FirstPackets {
-  std::int64_t shortest_period_ns = std::numeric_limits<std::int64_t>::max();
-  std::optional<std::int64_t> last_time_ns;
-  std::uint8_t data_type = 0;
-  // Records of the Mid-40 firmware that stores n returns as n records have intensity 200 (second
-  // return) or 250 (third), or are null: counted for n = 2 and 3.
-  std::array<std::size_t, 4> fitting{}, contradicting{};
-};
-
-void count_interleaved(FirstPackets& first, const Observations& o, std::size_t row,
-                       std::size_t rows) {
-  for (std::size_t i = 0; i < rows; ++i, ++row) {
-    if (!o.valid[row]) continue;
-    for (std::size_t n = 2; n <= 3; ++n) {
-      if (i % n == 0) continue;
-      ++(o.intensity[row] == (i % n == 1 ? 200 : 250) ? first.fitting : first.contradicting)[n];
-    }
-  }
-}
-
-bool period_is(const FirstPackets& first, double expected_ns) {
-  return std::fabs(static_cast<double>(first.shortest_period_ns) - expected_ns) <
-         0.04 * expected_ns;
 }
 
 }  // namespace
@@ -171,15 +144,7 @@ void LvxReader::describe() {
       header_.returns_per_shot = layout.returns;
       described = true;
     }
-    FirstPackets& device = first[chunk.observations.device[row]];
-    const std::int64_t time = chunk.observations.time_ns[row];
-    if (device.last_time_ns && device.data_type == packet.data_type &&
-        time > *device.last_time_ns) {
-      device.shortest_period_ns = std::min(device.shortest_period_ns, time - *device.last_time_ns);
-    }
-    device.last_time_ns = time;
-    device.data_type = packet.data_type;
-    if (packet.data_type < 2) count_interleaved(device, chunk.observations, row, packet.rows);
+    first[chunk.observations.device[row]].add(packet, chunk.observations, row);
     row += packet.rows;
   }
   if (!described) {
@@ -189,29 +154,16 @@ void LvxReader::describe() {
   std::vector<ReadWarning> unknown;
   for (std::size_t i = 0; i < first.size(); ++i) {
     const FirstPackets& device = first[i];
-    if (!device.last_time_ns || version_.float_points) continue;
-    if (!shot_grid(header_.devices[i].type, device.data_type)) {
-      const RecordLayout& layout = *record_layout(device.data_type);
-      const double interval_ns = static_cast<double>(device.shortest_period_ns) / layout.records;
-      grids_[i] = interval_ns < 7000 ? kGrid240kHz : kGrid100kHz;
+    if (device.empty() || version_.float_points) continue;
+    grids_[i] = device.grid(header_.devices[i].type);
+    if (!grids_[i]) continue;
+    header_.returns_per_shot = std::max<int>(header_.returns_per_shot, grids_[i]->records_per_shot);
+    if (!shot_grid(header_.devices[i].type, device.data_type())) {
       unknown.push_back({{},
                          fmt::format("device {} has the unknown type {}; judging by the times of "
                                      "its packets, it measures at {} kHz",
-                                     i, header_.devices[i].type, interval_ns < 7000 ? 240 : 100),
+                                     i, header_.devices[i].type, grids_[i]->beams > 1 ? 240 : 100),
                          0});
-    } else if (device.data_type < 2) {
-      // 50 shots of two records in 500 us, or 34 shots of three in 567 us (the last is cut).
-      constexpr std::size_t kEnough = 10;
-      const auto is_interleaved = [&](std::size_t n, double period_ns) {
-        return period_is(device, period_ns) && device.fitting[n] >= kEnough &&
-               device.contradicting[n] == 0;
-      };
-      if (is_interleaved(2, 500'000)) grids_[i] = ShotGrid{10'000, 1, 1, 2};
-      if (is_interleaved(3, 566'667)) grids_[i] = ShotGrid{50'000, 3, 1, 3};
-      if (grids_[i]) {
-        header_.returns_per_shot =
-            std::max<int>(header_.returns_per_shot, grids_[i]->records_per_shot);
-      }
     }
   }
   rewind();
@@ -228,15 +180,14 @@ void LvxReader::fail(std::uint64_t offset, std::string problem) {
 }
 
 bool LvxReader::read(Chunk& chunk, std::size_t max_rows) {
-  chunk.clear();
-  // Room for all rows at once. No record has less than 7 bytes per row, so a huge max_rows costs no
-  // memory.
+  chunk.packets.clear();
+  chunk.imu.clear();
+  chunk.packet_begins.clear();
+  rows_ = 0;
+  // Room for all rows at once, in which the rows before stand. No record has less than 7 bytes per
+  // row, so a huge max_rows costs no memory.
   const std::uint64_t left = file_.size() - std::min(position_, file_.size());
-  const auto room = static_cast<std::size_t>(std::min<std::uint64_t>(max_rows, left / 7));
-  if (chunk.observations.time_ns.capacity() < room) {
-    chunk.observations.resize(room);
-    chunk.observations.clear();
-  }
+  chunk.observations.resize(static_cast<std::size_t>(std::min<std::uint64_t>(max_rows, left / 7)));
   while (!ended_) {
     if (!in_frame_) {
       open_frame();
@@ -244,6 +195,7 @@ bool LvxReader::read(Chunk& chunk, std::size_t max_rows) {
       break;
     }
   }
+  chunk.observations.resize(rows_);
   if (!chunk.packets.empty()) return true;
   if (failure_) throw FileError(*failure_);
   return false;
@@ -377,7 +329,7 @@ bool LvxReader::next_package(Chunk& chunk, std::size_t max_rows) {
 
   // Packets stay whole; one alone is delivered however small the chunk is to be.
   if (!chunk.packets.empty() &&
-      (chunk.observations.size() + layout->rows() > max_rows || chunk.packets.size() >= max_rows)) {
+      (rows_ + layout->rows() > max_rows || chunk.packets.size() >= max_rows)) {
     return false;
   }
   const auto device_row = static_cast<std::size_t>(device);
@@ -392,12 +344,14 @@ bool LvxReader::next_package(Chunk& chunk, std::size_t max_rows) {
   const std::span package(file_.at(position_, kLvxPackageHeaderBytes + layout->bytes()),
                           kLvxPackageHeaderBytes + layout->bytes());
   try {
-    decoder.decode(package.subspan(1), chunk);
+    chunk.observations.resize(std::max(chunk.observations.size(), rows_ + layout->rows()));
+    decoder.decode_into(package.subspan(1), chunk, rows_);
   } catch (const BadPacket& bad) {
     fail(position_ + 1 + bad.byte_offset(), bad.problem());
     return true;
   }
   clock_wraps_ += decoder.clock_wraps() - wraps_before;
+  rows_ += layout->rows();
   chunk.packets.back().device_index = package[0];
   chunk.packets.back().frame = frames_ - 1;
   position_ += kLvxPackageHeaderBytes + layout->bytes();

@@ -78,6 +78,7 @@ class LvxReader final : public Reader {
   std::uint64_t frame_end_ = 0;
   std::uint64_t next_offset_ = 0;  // as the frame header gives it
   std::uint64_t frames_ = 0;       // begun so far
+  std::size_t rows_ = 0;           // of the chunk that is being read
   bool in_frame_ = false;
   bool open_ended_ = false;  // the frame header does not say where the frame ends
   bool ended_ = false;

@@ -16,6 +16,7 @@ const std::vector<const Format*>& all_formats() {
       &kRos1BagFormat,
       &kRos2BagFormat,
       &kMcapFormat,
+      &kPcapFormat,
       &kLasFormat,
       &kLazFormat,
       &kPcdFormat,

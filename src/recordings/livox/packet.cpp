@@ -65,6 +65,16 @@ std::optional<ShotGrid> shot_grid(std::uint8_t device_type, std::uint8_t data_ty
   return std::nullopt;
 }
 
+bool has_imu(std::uint8_t device_type) {
+  return device_type == kAvia || device_type == kHorizon || device_type == kTele15;
+}
+
+std::optional<ShotGrid> grid_of_firmware(std::string_view firmware) {
+  if (firmware == "03.03.0001" || firmware == "03.03.0006") return kGridOfTwo;
+  if (firmware == "03.03.0002" || firmware == "03.03.0007") return kGridOfThree;
+  return std::nullopt;
+}
+
 TimeReference time_reference_of(std::uint8_t timestamp_type) {
   switch (timestamp_type) {
     case 1:

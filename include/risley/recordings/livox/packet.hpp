@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <string_view>
 
 #include "risley/recordings/observations.hpp"
 
@@ -68,8 +69,18 @@ inline constexpr ShotGrid kGrid100kHz{10'000, 1, 1, 1};
 /// Sensors with six beams: a shot every 12500/3 ns.
 inline constexpr ShotGrid kGrid240kHz{12'500, 3, 6, 1};
 
+/// Mid-40 firmware with two or three returns of a shot as so many records.
+inline constexpr ShotGrid kGridOfTwo{10'000, 1, 1, 2}, kGridOfThree{50'000, 3, 1, 3};
+
 /// Grid of a device type and data type, empty when the two do not tell.
 std::optional<ShotGrid> shot_grid(std::uint8_t device_type, std::uint8_t data_type);
+
+/// Whether sensors of this type send inertial samples. @param device_type  Device::type
+bool has_imu(std::uint8_t device_type);
+
+/// Shots of the Mid-40 firmware that stores several returns as so many records, empty for others.
+/// @param firmware  "03.03.0001"
+std::optional<ShotGrid> grid_of_firmware(std::string_view firmware);
 
 /// What the origin of times of a timestamp type is.
 TimeReference time_reference_of(std::uint8_t timestamp_type);

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "risley/io/block_file.hpp"
+#include "risley/io/growing_file.hpp"
 #include "risley/recordings/observations.hpp"
 
 namespace risley::recordings::livox {
@@ -16,13 +16,14 @@ namespace risley::recordings::livox {
 /// An LVX 1.1 file that grows while sensors run. What was measured cannot be measured again, so
 /// unlike other outputs it is there from the beginning, under the name unfinished_path(), and stays
 /// when the program or the machine dies: every frame is written whole, so that the file can be read
-/// up to its last one. close() gives it its final name.
+/// up to its last one. close() gives it its final name. Where the output is to be of another
+/// format, it is made of this file afterwards, and discard() removes it.
 class PacketFile {
  public:
-  /// @param path     final name, which ends in .lvx; a file of that name is replaced by close()
+  /// @param path     final name; a file of that name is replaced by close()
   /// @param devices  [1 to 255], the sensors whose packets will come
   /// @throws FileError when the file cannot be made, or an unfinished one of that name is there;
-  ///         InvalidArgument for another ending, and for devices that LVX cannot hold
+  ///         InvalidArgument for devices that LVX cannot hold
   PacketFile(const std::string& path, const std::vector<Device>& devices);
   /// Without close() the unfinished file stays, unless it has no frame.
   ~PacketFile();
@@ -37,20 +38,19 @@ class PacketFile {
   void end_frame();
   /// Writes the last frame and gives the file its final name. @throws FileError
   void close();
+  /// Removes the file, whose packets stand elsewhere now.
+  void discard();
 
-  const std::string& path() const { return path_; }  ///< final name
+  const std::string& path() const { return file_.path(); }  ///< final name
   /// Name until close().
-  const std::string& unfinished_path() const { return unfinished_path_; }
-  std::uint64_t frames() const { return frames_; }  ///< written so far
-  std::uint64_t size() const { return size_; }      ///< bytes written so far
+  const std::string& unfinished_path() const { return file_.unfinished_path(); }
+  std::uint64_t frames() const { return frames_; }     ///< written so far
+  std::uint64_t size() const { return file_.size(); }  ///< bytes written so far
 
  private:
-  void write(std::span<const std::uint8_t> bytes);
-
-  std::string path_, unfinished_path_;
-  io::FileDescriptor file_;
+  io::GrowingFile file_;
   std::vector<std::uint8_t> frame_;
-  std::uint64_t frames_ = 0, size_ = 0;
+  std::uint64_t frames_ = 0;
   bool closed_ = false;
 };
 

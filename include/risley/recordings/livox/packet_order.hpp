@@ -8,12 +8,14 @@
 #include <map>
 #include <optional>
 #include <span>
+#include <utility>
 #include <vector>
 
+#include "risley/recordings/livox/clock_watch.hpp"
 #include "risley/recordings/livox/packet.hpp"
 #include "risley/recordings/livox/packet_decoder.hpp"
 
-namespace risley::wire {
+namespace risley::recordings::livox {
 
 /// What the packets of one sensor came to.
 struct PacketCounts {
@@ -30,17 +32,30 @@ struct PacketCounts {
   std::uint64_t clock_jumps = 0;
 };
 
-/// A place where more than 0.1 s is missing, or the clock jumped. Times are the sensor's, ns.
+/// Why the times of two packets that follow each other do not.
+enum class GapCause : std::uint8_t {
+  loss,     ///< packets between them were lost
+  clock,    ///< the clock jumped, changed its source or began again
+  session,  ///< the sensor stopped and was started again between them
+};
+
+/// A place where more than 0.1 s is missing, the clock jumped, or another session began. Times are
+/// the sensor's, ns.
 struct PacketGap {
   std::int64_t from_ns = 0, to_ns = 0;            ///< of the packets around it
   std::int64_t host_from_ns = 0, host_to_ns = 0;  ///< when they came, by the host's clock
-  std::optional<std::uint64_t> lost;              ///< packets; empty where the clock jumped
-  bool imu = false;                               ///< of inertial samples, not of points
+  /// Packets that were lost; between two sessions as many as would be if the sensor had not
+  /// stopped, which PacketCounts::lost does not count; empty where the clock jumped.
+  std::optional<std::uint64_t> lost;
+  bool imu = false;  ///< of inertial samples, not of points
+  GapCause cause = GapCause::loss;
 };
 
 /// Puts the packets of one sensor into their order and counts what is missing. Packets have no
 /// numbers, so everything follows from their times and the period of their data type. Packets that
-/// overtake each other are put right as long as not more than kWindow came in between.
+/// overtake each other are put right as long as not more than kWindow came in between. A clock that
+/// jumps ahead is told from loss by when packets come: they can be late, never early. One that
+/// jumps back by less than kWindow packets, or ahead by less than 10 ms, is not seen.
 class PacketOrder {
  public:
   /// Packets that wait for others.
@@ -54,7 +69,7 @@ class PacketOrder {
   explicit PacketOrder(std::uint8_t device_type);
 
   /// How special firmware measures, where the device type does not tell.
-  void set_grid(const recordings::livox::ShotGrid& grid) { grid_ = grid; }
+  void set_grid(const ShotGrid& grid) { grid_ = grid; }
 
   /// Takes a datagram that the sensor sent to the data port.
   /// @param host_ns  when it came  @return whether it is a packet
@@ -62,11 +77,14 @@ class PacketOrder {
   /// Lets time pass for packets that wait.
   void advance(std::int64_t host_ns);
   /// Nothing more will come, or the sensor comes back: no packet waits. Times that go back behind
-  /// this are those of a clock that began again.
+  /// this are those of a clock that began again, and what is missing behind it is a pause between
+  /// two sessions.
   void flush();
   /// Packets in their order since the last call.
   std::vector<std::vector<std::uint8_t>> take();
 
+  /// The sensor's clock and its status, as the packets of points tell them.
+  const ClockWatch& clock() const { return clock_; }
   const PacketCounts& counts() const { return counts_; }        ///< of what take() has given
   const std::vector<PacketGap>& gaps() const { return gaps_; }  ///< the first kMostGaps
   /// When the first packet came, by the host's clock; empty before there is one.
@@ -78,31 +96,53 @@ class PacketOrder {
     std::int64_t host_ns = 0, period_ns = 0;
     std::uint32_t rows = 0;
   };
+  /// By which a packet that comes twice is known: its time and its bytes.
+  using Mark = std::pair<std::int64_t, std::size_t>;
+  /// When packets came since the clock last jumped.
+  struct Arrivals {
+    std::int64_t first_time_ns = 0, first_host_ns = 0;
+    std::int64_t last_time_ns = 0, last_host_ns = 0;
+    /// Greatest difference of sensor's and host's time: of the last seconds, and of those before.
+    std::int64_t offset_ns = 0, offset_before_ns = 0, turn_ns = 0;
+    bool empty = true;
+
+    void add(std::int64_t time_ns, std::int64_t host_ns);
+    /// Whether the sensor's time goes as fast as the host's, as far as it can be told.
+    bool in_real_time() const;
+    /// By how much a packet comes before it can have been sent, ns; below 0: it does not.
+    std::int64_t early_ns(std::int64_t time_ns, std::int64_t host_ns) const;
+  };
   /// Points, or inertial samples.
   struct Track {
     std::map<std::int64_t, Held> held;  // by time
     std::optional<std::int64_t> last_ns;
     std::int64_t last_period_ns = 0, last_host_ns = 0;
-    std::deque<std::int64_t> recent;  // times of the last packets given out
+    std::deque<Mark> recent;                          // of the last packets given out
+    std::vector<std::pair<std::int64_t, Held>> late;  // one after the other, by time
     std::optional<std::uint8_t> timestamp_type;
     bool jumped = false;   // before the next packet
     bool flushed = false;  // before the next packet
+    bool paused = false;   // before the next packet that is given out
+    Arrivals arrivals;
   };
 
   void place(Track& track, std::int64_t time_ns, Held&& packet);
+  void place_late(Track& track, std::int64_t time_ns, Held&& packet);
+  std::int64_t passed_ns(const Track& track, std::int64_t time_ns, const Held& packet) const;
   void restart(Track& track);
   void give_out(Track& track);
   std::int64_t period_of(std::uint8_t data_type) const;
 
   std::uint8_t device_type_;
-  std::optional<recordings::livox::ShotGrid> grid_;
-  recordings::livox::PacketDecoder decoder_;
-  recordings::Chunk chunk_;
+  std::optional<ShotGrid> grid_;
+  PacketDecoder decoder_;
+  Chunk chunk_;
   std::array<Track, 2> tracks_;
   PacketCounts counts_;
   std::optional<std::int64_t> first_host_ns_;
   std::vector<PacketGap> gaps_;
   std::vector<std::vector<std::uint8_t>> ready_;
+  ClockWatch clock_;
 };
 
-}  // namespace risley::wire
+}  // namespace risley::recordings::livox

@@ -1,0 +1,47 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+// Whether constants have changed between pieces of a recording. Everything is in units of the
+// constants' priors: the prior has mean 0 and covariance 1.
+#pragma once
+
+#include <cstddef>
+#include <deque>
+#include <optional>
+#include <vector>
+
+#include <Eigen/Core>
+
+namespace risley::estimation {
+
+/// Constants as shots tell them: a posterior mean and its covariance, the prior counted once.
+struct ConstantsEstimate {
+  Eigen::VectorXd mean;
+  Eigen::MatrixXd covariance;
+};
+
+/// All pieces together, each of which saw the same constants: information adds up.
+/// @param pieces  at least one
+ConstantsEstimate pooled(const std::deque<ConstantsEstimate>& pieces, std::size_t newest);
+
+/// By how much the scatter of pieces about their mean exceeds what their covariances say, over the
+/// combinations that every piece measures.
+struct PieceScatter {
+  double variance_factor = 1;     ///< never below 1
+  double degrees_of_freedom = 0;  ///< that it was found from
+};
+PieceScatter piece_scatter(const std::deque<ConstantsEstimate>& pieces);
+
+/// How surprising a difference is where nothing changed.
+struct ConstantsDifference {
+  double chi2 = 0;
+  int combinations = 0;  ///< that both sides measure
+  double p_value = 1;    ///< probability of such a difference, or a larger one
+};
+/// Compares two independent estimates. Combinations of which the priors say as much as the shots do
+/// not count.
+/// @param also     covariance of the difference beside that of both estimates
+/// @param scatter  multiplies the covariances of both estimates; chi2 then follows F's distribution
+ConstantsDifference difference_of(const ConstantsEstimate& a, const ConstantsEstimate& b,
+                                  const Eigen::MatrixXd& also, const PieceScatter& scatter);
+
+}  // namespace risley::estimation

@@ -1,0 +1,89 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "risley/io/growing_file.hpp"
+
+#include <cerrno>
+#include <cstring>
+#include <system_error>
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include "risley/core/error.hpp"
+
+#include "io/file_target.hpp"
+
+namespace risley::io {
+namespace {
+
+FileTarget target_of(const std::string& path) {
+  try {
+    FileTarget target = find_target(path);
+    if (target.copied) {
+      throw FileError(path, {}, "is no regular file, expected the name of a file");
+    }
+    return target;
+  } catch (const std::system_error& error) {
+    throw FileError(path, {}, fmt::format("cannot be written: {}", error.code().message()));
+  }
+}
+
+int create(const std::string& path, const FileTarget& target, const std::string& unfinished) {
+  const int file = whole([&] {
+    return ::open(unfinished.c_str(), O_RDWR | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC,
+                  target.mode);
+  });
+  if (file >= 0) return file;
+  if (errno != EEXIST) refuse(path, errno);
+  throw FileError(unfinished, {},
+                  "was not finished, and can be read; move it away, or write under another name");
+}
+
+}  // namespace
+
+GrowingFile::GrowingFile(const std::string& path)
+    : path_(path),
+      target_(target_of(path).path),
+      unfinished_path_(target_ + kUnfinished),
+      file_(create(path, target_of(path), unfinished_path_)) {}
+
+void GrowingFile::append(std::span<const std::uint8_t> bytes) {
+  for (std::size_t done = 0; done < bytes.size();) {
+    const ssize_t count = whole([&] {
+      return ::pwrite(file_.get(), bytes.data() + done, bytes.size() - done,
+                      static_cast<off_t>(size_ + done));
+    });
+    if (count <= 0) {
+      const int error = count < 0 ? errno : ENOSPC;
+      // What is not whole is taken back; where even that fails, readers stop at it.
+      const bool taken_back = ::ftruncate(file_.get(), static_cast<off_t>(size_)) == 0;
+      throw FileError(unfinished_path_, {size_, {}},
+                      fmt::format("cannot be written: {}{}", std::strerror(error),
+                                  taken_back ? "; what was recorded before is in it" : ""));
+    }
+    done += static_cast<std::size_t>(count);
+  }
+  size_ += bytes.size();
+}
+
+void GrowingFile::commit() {
+  const FileTarget target{target_, false, 0};
+  try {
+    sync_output(target, path_, file_.get(), unfinished_path_);
+    replace_target(target, path_, unfinished_path_);
+  } catch (const FileError& error) {
+    throw FileError(error.path(), error.place(),
+                    fmt::format("{}; it is whole in {}", error.problem(),
+                                unfinished_path_.empty() ? path_ : unfinished_path_));
+  }
+}
+
+void GrowingFile::discard() {
+  if (!unfinished_path_.empty() && is_named(file_.get(), unfinished_path_)) {
+    ::unlink(unfinished_path_.c_str());
+  }
+  unfinished_path_.clear();
+}
+
+}  // namespace risley::io

@@ -1,0 +1,212 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "risley/jobs/optics_watch.hpp"
+
+#include <chrono>
+#include <condition_variable>
+#include <deque>
+#include <mutex>
+#include <optional>
+#include <thread>
+#include <utility>
+
+#include <fmt/format.h>
+#include <tbb/task_arena.h>
+
+#include "risley/core/error.hpp"
+#include "risley/core/progress.hpp"
+#include "risley/jobs/sensor_choice.hpp"
+#include "risley/recordings/livox/packet_decoder.hpp"
+
+namespace risley::jobs {
+namespace {
+
+using recordings::livox::PacketDecoder;
+using recordings::livox::ShotGrid;
+
+/// What the thread has of a sensor, and nobody else.
+struct Followed {
+  std::optional<PacketDecoder> decoder;
+  std::optional<estimation::RunningEstimate> estimate;
+};
+
+}  // namespace
+
+class OpticsWatch::Work {
+ public:
+  Work(const std::vector<WatchedSensor>& sensors, const std::string& reference) {
+    const std::optional<sensors::Sensor> given = given_sensor(reference);
+    for (const WatchedSensor& watched : sensors) {
+      OpticsHealth& health = health_.emplace_back();
+      std::optional<sensors::Sensor>& sensor = sensors_.emplace_back();
+      device_types_.push_back(watched.device_type);
+      if (given && (given->serial.empty() || given->serial == watched.serial)) {
+        if (given->device_type != watched.device_type) {
+          throw InvalidArgument(fmt::format(
+              "{}: it is a {}, and the sensor {} on the network is a {}; name another reference",
+              reference,
+              recordings::device_type_name(static_cast<std::uint8_t>(given->device_type)),
+              watched.serial, recordings::device_type_name(watched.device_type)));
+        }
+        sensor = given;
+        health.is_reference = true;
+      } else {
+        sensor = preset_of_type(watched.device_type);
+      }
+      if (sensor) {
+        health.reference = sensor->name;
+      } else {
+        health.words = "there is no preset for its type";
+      }
+    }
+    grids_.resize(sensors.size());
+    followed_.resize(sensors.size());
+    thread_ = std::thread([this] { run(); });
+  }
+
+  ~Work() {
+    {
+      const std::scoped_lock lock(mutex_);
+      ending_ = true;
+      cancel_.set();
+    }
+    changed_.notify_all();
+    thread_.join();
+  }
+  Work(const Work&) = delete;
+  Work& operator=(const Work&) = delete;
+
+  void set_grid(std::size_t sensor, const ShotGrid& grid) {
+    const std::scoped_lock lock(mutex_);
+    grids_[sensor] = grid;
+  }
+
+  void add(std::size_t sensor, std::span<const std::uint8_t> packet) {
+    const std::scoped_lock lock(mutex_);
+    OpticsHealth& health = health_[sensor];
+    if (!health.words.empty()) return;
+    if (waiting_.size() >= kMostWaiting) {
+      ++health.dropped_packets;
+      return;
+    }
+    waiting_.push_back({sensor, {packet.begin(), packet.end()}});
+    changed_.notify_all();
+  }
+
+  void finish(double longest) {
+    std::unique_lock lock(mutex_);
+    changed_.wait_for(lock, std::chrono::duration<double>(longest),
+                      [this] { return waiting_.empty() && !busy_; });
+  }
+
+  std::vector<OpticsHealth> health() const {
+    const std::scoped_lock lock(mutex_);
+    return health_;
+  }
+
+ private:
+  struct Waiting {
+    std::size_t sensor = 0;
+    std::vector<std::uint8_t> packet;
+  };
+
+  void run() {
+    // Recording needs the other cores.
+    tbb::task_arena alone(1);
+    for (;;) {
+      std::deque<Waiting> taken;
+      {
+        std::unique_lock lock(mutex_);
+        busy_ = false;
+        changed_.notify_all();
+        changed_.wait(lock, [this] { return ending_ || !waiting_.empty(); });
+        if (ending_) return;
+        // Few at a time, so that what waits keeps to its bound.
+        constexpr std::size_t kAtOnce = 200;
+        while (!waiting_.empty() && taken.size() < kAtOnce) {
+          taken.push_back(std::move(waiting_.front()));
+          waiting_.pop_front();
+        }
+        busy_ = true;
+      }
+      try {
+        alone.execute([&] {
+          for (const Waiting& one : taken) take(one);
+        });
+      } catch (const Cancelled&) {
+        return;
+      }
+    }
+  }
+
+  void take(const Waiting& one) {
+    try {
+      follow(one);
+    } catch (const Cancelled&) {
+      throw;
+    } catch (const recordings::livox::BadPacket&) {  // who writes the file counts it
+    } catch (const std::exception& error) {          // such as no memory: the recording goes on
+      const std::scoped_lock lock(mutex_);
+      health_[one.sensor].words = error.what();
+    }
+  }
+
+  void follow(const Waiting& one) {
+    Followed& followed = followed_[one.sensor];
+    const auto header = recordings::livox::decode_packet_header(one.packet);
+    if (header.data_type == recordings::livox::kImuDataType) return;
+    if (!followed.decoder) begin(one.sensor, header.data_type);
+    chunk_.clear();
+    followed.decoder->decode(one.packet, chunk_);
+    const bool estimated = followed.estimate->add(chunk_.observations, progress_);
+    const std::scoped_lock lock(mutex_);
+    ++health_[one.sensor].packets;
+    if (estimated) health_[one.sensor].state = followed.estimate->state();
+  }
+
+  void begin(std::size_t sensor, std::uint8_t data_type) {
+    recordings::livox::PacketDecoderOptions decoding;
+    decoding.device_type = device_types_[sensor];
+    {
+      const std::scoped_lock lock(mutex_);
+      decoding.grid = grids_[sensor];
+    }
+    followed_[sensor].decoder.emplace(decoding);
+    estimation::RunningOptions options;
+    options.sensor = *sensors_[sensor];
+    options.is_sensor = health_[sensor].is_reference;  // does not change
+    options.cartesian = recordings::livox::record_layout(data_type)->cartesian;
+    followed_[sensor].estimate.emplace(std::move(options));
+  }
+
+  std::vector<std::uint8_t> device_types_;
+  std::vector<std::optional<sensors::Sensor>> sensors_;
+
+  mutable std::mutex mutex_;  // of all that follows
+  std::condition_variable changed_;
+  std::deque<Waiting> waiting_;
+  std::vector<OpticsHealth> health_;
+  std::vector<std::optional<ShotGrid>> grids_;
+  bool ending_ = false, busy_ = false;
+
+  CancelFlag cancel_;
+  Progress progress_{[](double, std::string_view) {}, &cancel_};
+  std::vector<Followed> followed_;  // of the thread
+  recordings::Chunk chunk_;
+  std::thread thread_;
+};
+
+OpticsWatch::OpticsWatch(const std::vector<WatchedSensor>& sensors, const std::string& reference)
+    : work_(std::make_unique<Work>(sensors, reference)) {}
+OpticsWatch::~OpticsWatch() = default;
+
+void OpticsWatch::set_grid(std::size_t sensor, const ShotGrid& grid) {
+  work_->set_grid(sensor, grid);
+}
+void OpticsWatch::add(std::size_t sensor, std::span<const std::uint8_t> packet) {
+  work_->add(sensor, packet);
+}
+void OpticsWatch::finish(double longest) { work_->finish(longest); }
+std::vector<OpticsHealth> OpticsWatch::health() const { return work_->health(); }
+
+}  // namespace risley::jobs

@@ -1,0 +1,164 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include <array>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+#include <pybind11/stl.h>
+
+#include "risley/core/require.hpp"
+#include "risley/jobs/emulate_sensor.hpp"
+#include "risley/jobs/record_sensors.hpp"
+#include "risley/json/results.hpp"
+
+#include "python/call.hpp"
+#include "python/json.hpp"
+#include "python/options.hpp"
+
+namespace risley::python {
+namespace {
+
+/// What somebody sets to end a recording or a virtual sensor: both go on until then.
+using Stop = std::shared_ptr<CancelFlag>;
+
+CancelFlag* flag_of(const Stop& stop) { return stop.get(); }
+
+/// Words of a job, told to Python while it runs.
+/// @param note  callable(words, is_wrong)
+void tell_words(const py::object& note, const std::string& words, bool is_wrong) {
+  const py::gil_scoped_acquire lock;
+  try {
+    note(words, is_wrong);
+  } catch (py::error_already_set& error) {
+    error.discard_as_unraisable("risley");  // a message lost must not end a recording
+  }
+}
+
+jobs::RecordOptions record_options(const Options& options) {
+  jobs::RecordOptions job;
+  options.take("interface", job.interface);
+  options.take("serials", job.serials);
+  options.take("find_time", job.find_time);
+  require_above("find_time", job.find_time, 0, "s");
+  options.take("passive", job.passive);
+  options.take("data_port", job.data_port);
+  options.take("duration", job.duration);
+  if (job.duration) require_above("duration", *job.duration, 0, "s");
+  if (options.has("coordinates")) {
+    const std::size_t coordinates =
+        options.choice("coordinates", {"spherical", "cartesian", "as-is"});
+    job.spherical = coordinates == 2 ? std::nullopt : std::optional(coordinates == 0);
+  }
+  if (options.has("return_mode")) {
+    constexpr std::array kModes = {wire::ReturnMode::first, wire::ReturnMode::strongest,
+                                   wire::ReturnMode::dual, wire::ReturnMode::triple};
+    const std::size_t mode =
+        options.choice("return_mode", {"first", "strongest", "dual", "triple", "as-is"});
+    if (mode < kModes.size()) job.return_mode = kModes.at(mode);
+  }
+  options.take("imu", job.imu);
+  options.take("output", job.output);
+  std::string optics;
+  options.take("optics", optics);
+  job.watch_optics = !optics.empty();
+  if (optics != "own") job.optics_reference = optics;
+  return job;
+}
+
+py::object find_sensors(const py::dict& values, const py::object& tell) {
+  const jobs::RecordOptions job = record_options(Options(values));
+  std::vector<jobs::FoundSensor> found;
+  run_job(tell, 0, [&](const Progress& progress) { found = jobs::find_sensors(job, progress); });
+  return dict_of(json::of(found));
+}
+
+py::object record(const py::dict& values, const py::object& note, const Stop& stop,
+                  const py::object& tell) {
+  const jobs::RecordOptions job = record_options(Options(values));
+  jobs::RecordedSensors recorded;
+  run_job(
+      tell, 0,
+      [&](const Progress& progress) {
+        recorded = jobs::record_sensors(
+            job,
+            [&](const std::string& words, bool is_wrong) { tell_words(note, words, is_wrong); },
+            progress);
+      },
+      flag_of(stop));
+  return dict_of(json::of(recorded));
+}
+
+jobs::EmulatedFaults faults_of(const Options& options) {
+  jobs::EmulatedFaults faults;
+  options.take("loss", faults.loss);
+  options.take("duplication", faults.duplication);
+  options.take("disorder", faults.disorder);
+  options.take("disorder_packets", faults.farthest);
+  options.take("delay", faults.delay);
+  options.take("wrong_checksums", faults.wrong_checksums);
+  options.take("heartbeat_dies", faults.heartbeat_dies);
+  options.take("restart", faults.restart);
+  options.take("restart_takes", faults.restart_time);
+  faults.bend = parameter_values(options, "bend");
+  options.take("bend_time", faults.bend_time);
+  return faults;
+}
+
+jobs::EmulatedClock clock_of(const Options& options) {
+  using recordings::TimeReference;
+  constexpr std::array kSources = {TimeReference::power_on, TimeReference::ptp, TimeReference::pps};
+  jobs::EmulatedClock clock;
+  clock.source = kSources.at(options.choice("time", {"power-on", "ptp", "pps"}));
+  options.take("time_from", clock.source_from);
+  options.take("clock_drift_ppm", clock.drift_ppm);
+  options.take("clock_jump", clock.jump);
+  options.take("clock_jump_by", clock.jump_by);
+  return clock;
+}
+
+py::object emulate(const py::dict& values, int threads, const py::object& note, const Stop& stop,
+                   const py::object& tell) {
+  const Options options(values);
+  jobs::EmulateOptions job;
+  options.take("interface", job.interface);
+  options.take("serial", job.serial);
+  job.simulation = simulation_options(options, threads);
+  options.take("recording", job.recording);
+  options.take("speed", job.speed);
+  options.take("duration", job.duration);
+  if (job.duration) require_above("duration", *job.duration, 0, "s");
+  job.clock = clock_of(options);
+  job.faults = faults_of(options);
+  jobs::EmulatedSensor truth;
+  run_job(
+      tell, threads,
+      [&](const Progress& progress) {
+        truth = jobs::emulate_sensor(
+            job, [&](const std::string& words) { tell_words(note, words, false); }, progress);
+      },
+      flag_of(stop));
+  return dict_of(json::of(truth));
+}
+
+}  // namespace
+
+void bind_network(py::module_& module) {
+  py::class_<CancelFlag, Stop>(module, "Stop",
+                               "Ends a recording or a virtual sensor from another thread.\n\n"
+                               "Give it as ``stop`` and call `set`; it cannot be used again.")
+      .def(py::init<>())
+      .def("set", &CancelFlag::set, "End what was given this, within a second.")
+      .def("is_set", &CancelFlag::is_set, "Whether `set` was called.");
+  const auto options = py::arg("options");
+  const auto note = py::arg("note");
+  const auto stop = py::arg("stop").none(true);
+  const auto tell = py::arg("tell");
+  module.def("find_sensors", &find_sensors, options, tell);
+  module.def("record", &record, options, note, stop, tell);
+  module.def("emulate", &emulate, options, py::arg("threads"), note, stop, tell);
+}
+
+}  // namespace risley::python

@@ -1,0 +1,62 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "risley/core/error.hpp"
+#include "risley/wire/address.hpp"
+
+struct pcap;
+
+namespace risley::recordings {
+
+/// Whether a file that begins so is a capture: pcap in any byte order, or pcapng.
+bool is_capture(std::string_view head);
+
+/// A UDP datagram that somebody's program saw on a network.
+struct CapturedDatagram {
+  wire::Endpoint from;
+  std::span<const std::uint8_t> bytes;  ///< its data, until the next call
+  std::size_t length = 0;               ///< of the data as they were sent; more than bytes are cut
+  std::int64_t time_ns = 0;             ///< when it was captured, ns since 1970
+  std::uint64_t offset = 0;             ///< in the file, of the record that holds it
+};
+
+/// Reads the UDP datagrams of a capture, as libpcap gives its records. Everything else is stepped
+/// over.
+class CaptureFile {
+ public:
+  /// @throws FileError when it is no capture, cut off in its header, or of a link type that is not
+  ///         Ethernet, Linux cooked (SLL, SLL2), raw IP or loopback
+  explicit CaptureFile(std::string path);
+
+  const std::string& path() const { return path_; }  ///< as it was given
+  /// @return the next datagram; empty at the end of a whole file
+  /// @throws FileError at a record that is cut off or damaged, with its place; then nothing follows
+  std::optional<CapturedDatagram> next();
+
+  /// Pieces of UDP datagrams that IP had split, which are left out.
+  std::uint64_t fragments() const { return fragments_; }
+  std::uint32_t snap_length() const { return snap_length_; }  ///< bytes kept of a packet at most
+  double fraction_read() const;                               ///< of the file, [0, 1]
+
+ private:
+  struct Close {
+    void operator()(pcap* capture) const;
+  };
+
+  std::string path_;
+  std::unique_ptr<pcap, Close> capture_;
+  int link_type_ = 0;
+  std::uint64_t size_ = 0, position_ = 0, fragments_ = 0;
+  std::uint32_t snap_length_ = 0;
+};
+
+}  // namespace risley::recordings

@@ -1,0 +1,429 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+// Captures of what sensors sent. Packets do not name their sensor: whoever sends them is one, told
+// apart by address and port, and behind a hub by slot and number. Broadcasts and replies in the
+// capture name serial number, type and firmware. Packets are put into their order, and what is
+// missing is counted, as while recording from the network.
+#include <algorithm>
+#include <array>
+#include <deque>
+#include <map>
+#include <optional>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "risley/recordings/livox/first_packets.hpp"
+#include "risley/recordings/livox/packet_decoder.hpp"
+#include "risley/recordings/livox/packet_order.hpp"
+#include "risley/wire/commands.hpp"
+
+#include "recordings/formats/capture_file.hpp"
+#include "recordings/formats/format.hpp"
+
+namespace risley::recordings {
+
+using namespace livox;
+
+namespace {
+
+using Bytes = std::span<const std::uint8_t>;
+
+constexpr std::size_t kMostSenders = 255;
+constexpr std::int64_t kFramePeriod = 50'000'000;  // ns of the capture's clock
+constexpr std::size_t kMostPending = 4096;         // packets of a frame
+constexpr std::uint8_t kHub = 0;                   // Broadcast::device_type
+constexpr std::uint8_t kDataTypes = 9;
+
+/// Who sent a packet: address, port, and slot and number behind a hub.
+using Sender = std::tuple<wire::Address, std::uint16_t, std::uint8_t, std::uint8_t>;
+
+Sender sender_of(const CapturedDatagram& datagram) {
+  return {datagram.from.address, datagram.from.port, datagram.bytes[1], datagram.bytes[2]};
+}
+
+/// The layout of a datagram that may be a packet, also one whose end was not captured; nullptr for
+/// others.
+const RecordLayout* layout_of(const CapturedDatagram& datagram) {
+  const Bytes bytes = datagram.bytes;
+  if (bytes.size() > kVersionAt && bytes[kVersionAt] != kPacketVersion) return nullptr;
+  for (std::uint8_t type = 0; type < kDataTypes; ++type) {
+    const RecordLayout* layout = record_layout(type);
+    if (bytes.size() > kDataTypeAt && bytes[kDataTypeAt] != type) continue;
+    if (datagram.length == kPacketHeaderBytes + layout->bytes()) return layout;
+  }
+  return nullptr;
+}
+
+/// What a sensor says of itself; behind one address there may be several.
+struct Named {
+  std::optional<wire::Broadcast> broadcast;
+  std::string firmware;
+};
+
+/// The broadcast of a datagram, if it is one.
+std::optional<wire::Broadcast> broadcast_of(const CapturedDatagram& datagram) {
+  const auto decoded = wire::decode_frame(datagram.bytes);
+  const auto* frame = std::get_if<wire::Frame>(&decoded);
+  if (frame == nullptr || frame->type == wire::FrameType::reply) return std::nullopt;
+  const auto message = wire::decode_message(*frame);
+  const auto* said = std::get_if<wire::Message>(&message);
+  const auto* broadcast = said == nullptr ? nullptr : std::get_if<wire::Broadcast>(said);
+  return broadcast == nullptr ? std::nullopt : std::optional(*broadcast);
+}
+
+/// The firmware that a reply names, if it does.
+std::optional<std::string> firmware_of(const CapturedDatagram& datagram) {
+  const auto decoded = wire::decode_frame(datagram.bytes);
+  const auto* frame = std::get_if<wire::Frame>(&decoded);
+  if (frame == nullptr || frame->type != wire::FrameType::reply) return std::nullopt;
+  const auto reply = wire::decode_reply(*frame);
+  const auto* said = std::get_if<wire::Reply>(&reply);
+  const auto* info = said == nullptr ? nullptr : std::get_if<wire::DeviceInfo>(said);
+  return info == nullptr ? std::nullopt : std::optional(wire::firmware_text(info->firmware));
+}
+
+/// Reads captures. The first look at the file finds its sensors.
+class PcapReader final : public Reader {
+ public:
+  PcapReader(const std::string& path, const Progress& progress);
+
+  bool read(Chunk& chunk, std::size_t max_rows) override;
+  double fraction_read() const override { return file_.fraction_read(); }
+
+ private:
+  /// A sensor while the file is looked through.
+  struct Seen {
+    explicit Seen(Sender whose) : sender(std::move(whose)) {}
+
+    Sender sender;
+    FirstPackets first;
+    PacketDecoder decoder{{.grid = kGrid100kHz}};
+    std::size_t rows = 0;
+    bool has_points = false;
+  };
+  /// A sensor while its packets are read.
+  struct Live {
+    PacketOrder order;
+    PacketDecoder decoder;
+  };
+  struct Ready {
+    std::size_t device = 0;
+    std::uint64_t frame = 0;
+    std::vector<std::uint8_t> bytes;
+  };
+
+  void look_through(const Progress& progress);
+  void look_at_packet(const CapturedDatagram& datagram, Chunk& chunk);
+  void add_device(const Seen& seen);
+  void take(const CapturedDatagram& datagram);
+  void give_frame();
+  void end();
+  void say_what_is_missing();
+  std::string name_of(std::size_t device) const;
+  void warn(std::string message, std::uint64_t lost_records = 0) {
+    warnings_.push_back({{}, std::move(message), lost_records});
+  }
+
+  CaptureFile file_;
+  std::map<Sender, std::size_t> devices_;  ///< by sender: row of the header's table
+  std::vector<wire::Endpoint> endpoints_;  ///< by device
+  std::vector<std::optional<ShotGrid>> grids_;
+  std::vector<Live> live_;
+  std::deque<Ready> ready_;
+  std::size_t pending_ = 0;
+  std::uint64_t frames_ = 0, cut_ = 0, cut_rows_ = 0, strangers_ = 0;
+  std::optional<std::int64_t> frame_begin_ns_;
+  std::int64_t now_ns_ = 0;
+  bool ended_ = false;
+  std::optional<FileError> failure_;
+  // Of the first look.
+  std::vector<Seen> seen_;
+  std::map<Sender, std::size_t> seen_rows_;
+  std::map<wire::Address, Named> named_;
+};
+
+PcapReader::PcapReader(const std::string& path, const Progress& progress) : file_(path) {
+  header_.format = kPcapFormat.name;
+  look_through(progress);
+  for (std::size_t row = 0; row < header_.devices.size(); ++row) {
+    const std::uint8_t type = header_.devices[row].type;
+    live_.push_back({PacketOrder(type), PacketDecoder({.device_type = type,
+                                                       .device = static_cast<std::uint8_t>(row),
+                                                       .grid = grids_[row]})});
+    if (grids_[row]) live_.back().order.set_grid(*grids_[row]);
+  }
+  seen_.clear();
+  seen_rows_.clear();
+  cut_ = 0;
+  file_ = CaptureFile(path);
+}
+
+void PcapReader::look_through(const Progress& progress) {
+  Chunk chunk;
+  try {
+    for (std::size_t count = 0; const auto datagram = file_.next(); ++count) {
+      constexpr std::size_t kSometimes = 1024;
+      if (count % kSometimes == 0) progress.check();
+      if (layout_of(*datagram) != nullptr) {
+        look_at_packet(*datagram, chunk);
+      } else if (const auto broadcast = broadcast_of(*datagram)) {
+        constexpr std::size_t kMostNames = 4096;
+        if (named_.size() < kMostNames || named_.contains(datagram->from.address)) {
+          auto& known = named_[datagram->from.address].broadcast;
+          if (!known) known = *broadcast;
+        }
+      } else if (const auto firmware = firmware_of(*datagram);
+                 firmware && named_.contains(datagram->from.address)) {
+        named_[datagram->from.address].firmware = *firmware;
+      }
+    }
+  } catch (const FileError&) {  // who reads comes to it again
+  }
+  for (const Seen& seen : seen_) {
+    if (seen.has_points) add_device(seen);
+  }
+  // Inertial samples may come from another port than points.
+  for (const Seen& seen : seen_) {
+    if (seen.has_points) continue;
+    const auto& [address, port, slot, number] = seen.sender;
+    const auto same = std::find_if(devices_.begin(), devices_.end(), [&](const auto& one) {
+      return std::get<0>(one.first) == address && std::get<2>(one.first) == slot &&
+             std::get<3>(one.first) == number;
+    });
+    if (same == devices_.end()) {
+      add_device(seen);
+    } else {
+      devices_.emplace(seen.sender, same->second);
+    }
+  }
+  if (!header_.devices.empty()) return;
+  throw FileError(file_.path(), {},
+                  cut_ > 0
+                      ? fmt::format("holds no whole packet of a Livox sensor of the first "
+                                    "generation: {} were cut by the snap length of {} bytes; "
+                                    "capture whole packets, as tcpdump -s 0 does",
+                                    cut_, file_.snap_length())
+                      : std::string("holds no packet of a Livox sensor of the first generation"));
+}
+
+void PcapReader::look_at_packet(const CapturedDatagram& datagram, Chunk& chunk) {
+  if (datagram.bytes.size() < datagram.length) {
+    ++cut_;
+    return;
+  }
+  const Sender sender = sender_of(datagram);
+  const auto found = seen_rows_.find(sender);
+  if (found == seen_rows_.end() && seen_.size() == kMostSenders) return;
+  constexpr std::size_t kEnoughRows = 20'000;
+  if (found != seen_rows_.end() && seen_[found->second].rows >= kEnoughRows) return;
+  Seen seen = found == seen_rows_.end() ? Seen(sender) : seen_[found->second];
+  chunk.clear();
+  try {
+    seen.decoder.decode(datagram.bytes, chunk);
+  } catch (const BadPacket&) {
+    return;
+  }
+  const Packet& packet = chunk.packets.front();
+  if (packet.rows > 0) {
+    const RecordLayout& layout = *record_layout(packet.data_type);
+    const bool is_first =
+        std::none_of(seen_.begin(), seen_.end(), [](const Seen& one) { return one.has_points; });
+    if (is_first) {
+      header_.time_reference = time_reference_of(packet.timestamp_type);
+      header_.cartesian = layout.cartesian;
+      header_.returns_per_shot = layout.returns;
+    }
+    seen.first.add(packet, chunk.observations, 0);
+    seen.rows += packet.rows;
+    seen.has_points = true;
+  }
+  if (found == seen_rows_.end()) {
+    seen_rows_.emplace(sender, seen_.size());
+    seen_.push_back(std::move(seen));
+  } else {
+    seen_[found->second] = std::move(seen);
+  }
+}
+
+void PcapReader::add_device(const Seen& seen) {
+  const std::size_t row = header_.devices.size();
+  const auto& [address, port, slot, number] = seen.sender;
+  Device device;
+  device.index = static_cast<std::uint8_t>(row);
+  const auto named = named_.find(address);
+  const bool is_named = named != named_.end() && named->second.broadcast.has_value();
+  if (is_named && named->second.broadcast->device_type != kHub) {
+    device.serial = named->second.broadcast->code;
+    device.type = named->second.broadcast->device_type;
+  } else {
+    if (is_named) device.hub_serial = named->second.broadcast->code;
+    device.type = seen.first.device_type();
+    device.type_inferred = true;
+  }
+  std::optional<ShotGrid> grid =
+      named == named_.end() ? std::nullopt : grid_of_firmware(named->second.firmware);
+  if (!grid) grid = seen.first.grid(device.type);
+  if (!grid && !seen.has_points && !shot_grid(device.type, 2)) grid = kGrid240kHz;
+  devices_.emplace(seen.sender, row);
+  endpoints_.push_back({address, port});
+  grids_.push_back(grid);
+  if (grid) {
+    header_.returns_per_shot = std::max<int>(header_.returns_per_shot, grid->records_per_shot);
+  }
+  header_.devices.push_back(device);
+  if (device.serial.empty()) {
+    const std::string type =
+        device.type == kUnknownDeviceType
+            ? fmt::format("its type is unknown, too: by its packets it measures at {} kHz",
+                          grid && grid->beams == 1 ? 100 : 240)
+            : fmt::format("by its packets it is a {}", device_type_name(device.type));
+    warn(fmt::format("device {} is {}: no broadcast names its serial number; {}", row,
+                     to_string(endpoints_[row]), type));
+  }
+}
+
+std::string PcapReader::name_of(std::size_t device) const {
+  const std::string& serial = header_.devices[device].serial;
+  return serial.empty() ? to_string(endpoints_[device]) : serial;
+}
+
+void PcapReader::take(const CapturedDatagram& datagram) {
+  now_ns_ = datagram.time_ns;
+  if (!frame_begin_ns_) frame_begin_ns_ = now_ns_;
+  if (now_ns_ - *frame_begin_ns_ >= kFramePeriod || now_ns_ < *frame_begin_ns_ ||
+      pending_ >= kMostPending) {
+    give_frame();
+  }
+  if (const RecordLayout* layout = layout_of(datagram)) {
+    if (datagram.bytes.size() < datagram.length) {
+      ++cut_;
+      cut_rows_ += layout->rows();
+      return;
+    }
+    const auto found = devices_.find(sender_of(datagram));
+    if (found == devices_.end()) {
+      ++strangers_;
+    } else {
+      live_[found->second].order.add(datagram.bytes, now_ns_);
+      ++pending_;
+    }
+  } else if (broadcast_of(datagram)) {
+    // A sensor that broadcasts has no host: what it sends later is another session.
+    for (std::size_t row = 0; row < live_.size(); ++row) {
+      if (endpoints_[row].address == datagram.from.address) live_[row].order.flush();
+    }
+  }
+}
+
+void PcapReader::give_frame() {
+  bool any = false;
+  for (std::size_t row = 0; row < live_.size(); ++row) {
+    live_[row].order.advance(now_ns_);
+    for (auto& packet : live_[row].order.take()) {
+      ready_.push_back({row, frames_, std::move(packet)});
+      any = true;
+    }
+  }
+  if (any) ++frames_;
+  pending_ = 0;
+  frame_begin_ns_ = now_ns_;
+}
+
+void PcapReader::end() {
+  ended_ = true;
+  for (Live& live : live_) live.order.flush();
+  give_frame();
+  say_what_is_missing();
+}
+
+void PcapReader::say_what_is_missing() {
+  for (std::size_t row = 0; row < live_.size(); ++row) {
+    const PacketCounts& counts = live_[row].order.counts();
+    if (counts.lost > 0) {
+      warn(fmt::format("{}: {} packets are missing between others", name_of(row), counts.lost));
+    }
+    if (counts.duplicates > 0) {
+      warn(fmt::format("{}: {} packets were captured twice; the second ones were left out",
+                       name_of(row), counts.duplicates));
+    }
+    if (counts.rejected > 0) {
+      warn(fmt::format("{}: {} packets that no sensor sends were left out", name_of(row),
+                       counts.rejected));
+    }
+  }
+  if (cut_ > 0) {
+    warn(fmt::format("{} packets were not captured whole, because only {} bytes of each were kept; "
+                     "capture whole packets, as tcpdump -s 0 does",
+                     cut_, file_.snap_length()),
+         cut_rows_);
+  }
+  if (file_.fragments() > 0) {
+    warn(fmt::format("{} fragments of datagrams were left out; sensors send none",
+                     file_.fragments()));
+  }
+  if (strangers_ > 0) {
+    warn(fmt::format("{} packets were left out: of more than {} senders, or with impossible times",
+                     strangers_, kMostSenders));
+  }
+}
+
+bool PcapReader::read(Chunk& chunk, std::size_t max_rows) {
+  chunk.clear();
+  for (;;) {
+    if (ready_.empty()) {
+      if (ended_) break;
+      try {
+        if (const auto datagram = file_.next()) {
+          take(*datagram);
+        } else {
+          end();
+        }
+      } catch (const FileError& damage) {
+        failure_ = damage;
+        end();
+      }
+      continue;
+    }
+    const Ready& next = ready_.front();
+    const std::size_t rows = record_layout(next.bytes[kDataTypeAt])->rows();
+    // Packets stay whole; one alone is delivered however small the chunk is to be.
+    if (!chunk.packets.empty() &&
+        (chunk.observations.size() + rows > max_rows || chunk.packets.size() >= max_rows)) {
+      return true;
+    }
+    PacketDecoder& decoder = live_[next.device].decoder;
+    const std::uint64_t wraps_before = decoder.clock_wraps();
+    try {
+      decoder.decode(next.bytes, chunk);
+    } catch (const BadPacket&) {  // a clock whose seconds do not fit 64 bits any more
+      ++strangers_;
+      ready_.pop_front();
+      continue;
+    }
+    clock_wraps_ += decoder.clock_wraps() - wraps_before;
+    chunk.packets.back().device_index = header_.devices[next.device].index;
+    chunk.packets.back().frame = next.frame;
+    ready_.pop_front();
+  }
+  if (!chunk.packets.empty()) return true;
+  if (failure_) throw FileError(*failure_);
+  return false;
+}
+
+}  // namespace
+
+const Format kPcapFormat = {
+    "pcap",
+    "",
+    "capture of a network, pcap or pcapng: packets of Livox sensors (read only)",
+    is_capture,
+    [](const std::string& path, const Progress& progress) -> std::unique_ptr<Reader> {
+      return std::make_unique<PcapReader>(path, progress);
+    },
+    nullptr,
+};
+
+}  // namespace risley::recordings

@@ -1,0 +1,304 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "risley/wire/event_server.hpp"
+
+#include <algorithm>
+#include <cctype>
+#include <cerrno>
+#include <charconv>
+#include <chrono>
+#include <cstring>
+#include <deque>
+#include <list>
+#include <mutex>
+#include <optional>
+#include <thread>
+#include <utility>
+
+#include <fmt/format.h>
+#include <microhttpd.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+
+#include "risley/core/error.hpp"
+#include "risley/wire/udp_socket.hpp"
+
+namespace risley::wire {
+namespace {
+
+constexpr unsigned kIdleSeconds = 10;  // for a request, and for a browser that takes no bytes
+constexpr std::size_t kStreamBlock = 4096;
+constexpr const char* kEventsPath = "/events";
+constexpr const char* kPolicy =
+    "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; "
+    "base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
+
+/// Values of one header.
+struct HeaderValues {
+  std::string_view name;
+  std::vector<std::string> values;
+};
+
+std::vector<std::string> header_values(MHD_Connection* connection, std::string_view name) {
+  HeaderValues wanted{name, {}};
+  MHD_get_connection_values(
+      connection, MHD_HEADER_KIND,
+      [](void* to, MHD_ValueKind, const char* key, const char* value) {
+        auto& found = *static_cast<HeaderValues*>(to);
+        const std::string_view other(key);
+        const bool same = std::equal(
+            other.begin(), other.end(), found.name.begin(), found.name.end(),
+            [](unsigned char a, unsigned char b) { return std::tolower(a) == std::tolower(b); });
+        if (same) found.values.emplace_back(value == nullptr ? "" : value);
+        return MHD_YES;
+      },
+      &wanted);
+  return wanted.values;
+}
+
+void add_headers(MHD_Response* response, const char* type) {
+  const std::pair<const char*, const char*> headers[] = {
+      {"Content-Type", type},
+      {"Content-Security-Policy", kPolicy},
+      {"X-Content-Type-Options", "nosniff"},
+      {"Referrer-Policy", "no-referrer"},
+      {"Cross-Origin-Resource-Policy", "same-origin"},
+      {"Cache-Control", "no-store"}};
+  for (const auto& [name, value] : headers) MHD_add_response_header(response, name, value);
+}
+
+}  // namespace
+
+class EventServer::Work {
+ public:
+  Work(const Endpoint& local, std::vector<ServedText> texts)
+      : local_(local), texts_(std::move(texts)) {
+    if (local.address == Address{}) {
+      throw InvalidArgument(
+          "0.0.0.0 is no address that a page can be at, expected one of this machine, such as "
+          "127.0.0.1");
+    }
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_port = htons(local.port);
+    std::memcpy(&address.sin_addr, local.address.bytes.data(), local.address.bytes.size());
+    daemon_ = MHD_start_daemon(
+        MHD_USE_INTERNAL_POLLING_THREAD | MHD_USE_EPOLL | MHD_ALLOW_SUSPEND_RESUME, local.port,
+        nullptr, nullptr, &Work::answer, this, MHD_OPTION_SOCK_ADDR,
+        reinterpret_cast<sockaddr*>(&address), MHD_OPTION_CONNECTION_LIMIT,
+        static_cast<unsigned>(kMostConnections), MHD_OPTION_CONNECTION_TIMEOUT, kIdleSeconds,
+        MHD_OPTION_CONNECTION_MEMORY_LIMIT, kMostHeaderBytes, MHD_OPTION_END);
+    const int error = errno;
+    if (daemon_ == nullptr) {
+      throw NetworkError(fmt::format(
+          "{}: {}: {}", to_string(local), std::strerror(error),
+          error == EADDRINUSE ? "another program has this port; name another, or 0"
+                              : "name an address of this machine and a port that is free"));
+    }
+    if (const auto* info = MHD_get_daemon_info(daemon_, MHD_DAEMON_INFO_BIND_PORT)) {
+      local_.port = info->port;
+    }
+    const std::scoped_lock lock(mutex_);  // whoever asks already waits for this
+    hosts_.push_back(to_string(local_));
+    constexpr std::uint8_t kLoopback = 127;
+    if (local_.address.bytes[0] == kLoopback)
+      hosts_.push_back(fmt::format("localhost:{}", local_.port));
+  }
+
+  ~Work() {
+    {
+      const std::scoped_lock lock(mutex_);
+      ending_ = true;
+      for (Listener& one : listeners_) wake(one);
+    }
+    // Browsers that take their bytes hear how it ended.
+    constexpr int kLooks = 30;
+    constexpr std::chrono::milliseconds kBetween(10);
+    for (int look = 0; look < kLooks && counts().listeners > 0; ++look) {
+      std::this_thread::sleep_for(kBetween);
+    }
+    MHD_stop_daemon(daemon_);
+  }
+  Work(const Work&) = delete;
+  Work& operator=(const Work&) = delete;
+
+  const Endpoint& local() const { return local_; }
+
+  void send(std::string_view data) {
+    const std::scoped_lock lock(mutex_);
+    latest_ = fmt::format("data: {}\n\n", data);
+    for (Listener& one : listeners_) {
+      if (one.waiting.size() >= kMostWaiting) {
+        one.waiting.pop_front();
+        ++counts_.dropped_events;
+      }
+      one.waiting.push_back(latest_);
+      wake(one);
+    }
+  }
+
+  EventServerCounts counts() const {
+    const std::scoped_lock lock(mutex_);
+    EventServerCounts result = counts_;
+    result.listeners = listeners_.size();
+    return result;
+  }
+
+ private:
+  /// A browser that gets events.
+  struct Listener {
+    Work* work = nullptr;
+    MHD_Connection* connection = nullptr;
+    std::deque<std::string> waiting;
+    std::string current;  // of which `sent` bytes are gone
+    std::size_t sent = 0;
+    bool suspended = false;
+    std::list<Listener>::iterator place;
+  };
+
+  static void wake(Listener& one) {
+    if (std::exchange(one.suspended, false)) MHD_resume_connection(one.connection);
+  }
+
+  static MHD_Result answer(void* self, MHD_Connection* connection, const char* url,
+                           const char* method, const char*, const char*, std::size_t*,
+                           void** of_request) {
+    auto& work = *static_cast<Work*>(self);
+    if (std::string_view(method) != MHD_HTTP_METHOD_GET) {
+      return work.refuse(connection, MHD_HTTP_METHOD_NOT_ALLOWED, "only GET is allowed\n");
+    }
+    static char seen;
+    if (*of_request == nullptr) {  // the headers are there, a body might follow
+      *of_request = &seen;
+      return MHD_YES;
+    }
+    if (!work.is_for_us(connection)) {
+      return work.refuse(connection, MHD_HTTP_FORBIDDEN,
+                         "Host or Origin is not the address of this page\n");
+    }
+    const std::string_view path(url);
+    if (path == kEventsPath) return work.listen(connection);
+    for (const ServedText& text : work.texts_) {
+      if (text.path == path) return queue(connection, MHD_HTTP_OK, text.body, text.type.c_str());
+    }
+    return work.refuse(connection, MHD_HTTP_NOT_FOUND, "there is no such page\n");
+  }
+
+  bool is_for_us(MHD_Connection* connection) const {
+    const std::scoped_lock lock(mutex_);
+    const auto hosts = header_values(connection, MHD_HTTP_HEADER_HOST);
+    if (hosts.size() != 1 || std::find(hosts_.begin(), hosts_.end(), hosts[0]) == hosts_.end()) {
+      return false;
+    }
+    const auto origins = header_values(connection, MHD_HTTP_HEADER_ORIGIN);
+    return origins.empty() || (origins.size() == 1 && origins[0] == "http://" + hosts[0]);
+  }
+
+  MHD_Result refuse(MHD_Connection* connection, unsigned status, const char* words) {
+    {
+      const std::scoped_lock lock(mutex_);
+      ++counts_.refused;
+    }
+    return queue(connection, status, words, "text/plain; charset=utf-8");
+  }
+
+  static MHD_Result queue(MHD_Connection* connection, unsigned status, std::string_view body,
+                          const char* type) {
+    MHD_Response* response = MHD_create_response_from_buffer(
+        body.size(), const_cast<char*>(body.data()), MHD_RESPMEM_MUST_COPY);
+    if (response == nullptr) return MHD_NO;
+    add_headers(response, type);
+    if (status == MHD_HTTP_METHOD_NOT_ALLOWED) MHD_add_response_header(response, "Allow", "GET");
+    const MHD_Result result = MHD_queue_response(connection, status, response);
+    MHD_destroy_response(response);
+    return result;
+  }
+
+  MHD_Result listen(MHD_Connection* connection) {
+    Listener* listener = nullptr;
+    {
+      const std::scoped_lock lock(mutex_);
+      listener = &listeners_.emplace_front();
+      listener->place = listeners_.begin();
+      listener->work = this;
+      listener->connection = connection;
+      if (!latest_.empty()) listener->waiting.push_back(latest_);
+    }
+    MHD_Response* response = MHD_create_response_from_callback(
+        MHD_SIZE_UNKNOWN, kStreamBlock, &Work::give, listener, &Work::forget);
+    if (response == nullptr) {
+      forget(listener);
+      return MHD_NO;
+    }
+    add_headers(response, "text/event-stream");
+    const MHD_Result result = MHD_queue_response(connection, MHD_HTTP_OK, response);
+    MHD_destroy_response(response);
+    return result;
+  }
+
+  /// Gives bytes of events to the server's thread, which waits where there are none.
+  static ssize_t give(void* to, std::uint64_t, char* bytes, std::size_t most) {
+    auto& listener = *static_cast<Listener*>(to);
+    const std::scoped_lock lock(listener.work->mutex_);
+    if (listener.sent == listener.current.size()) {
+      if (listener.waiting.empty()) {
+        if (listener.work->ending_) return MHD_CONTENT_READER_END_OF_STREAM;
+        listener.suspended = true;
+        MHD_suspend_connection(listener.connection);
+        return 0;
+      }
+      listener.current = std::move(listener.waiting.front());
+      listener.waiting.pop_front();
+      listener.sent = 0;
+    }
+    const std::size_t count = std::min(most, listener.current.size() - listener.sent);
+    std::memcpy(bytes, listener.current.data() + listener.sent, count);
+    listener.sent += count;
+    return static_cast<ssize_t>(count);
+  }
+
+  static void forget(void* whom) {
+    auto* listener = static_cast<Listener*>(whom);
+    Work& work = *listener->work;
+    const std::scoped_lock lock(work.mutex_);
+    work.listeners_.erase(listener->place);
+  }
+
+  Endpoint local_;
+  std::vector<ServedText> texts_;
+  mutable std::mutex mutex_;  // of all that follows but the daemon
+  std::vector<std::string> hosts_;
+  std::list<Listener> listeners_;
+  std::string latest_;
+  bool ending_ = false;
+  EventServerCounts counts_;
+  MHD_Daemon* daemon_ = nullptr;
+};
+
+EventServer::EventServer(const Endpoint& local, std::vector<ServedText> texts)
+    : work_(std::make_unique<Work>(local, std::move(texts))) {}
+EventServer::~EventServer() = default;
+
+const Endpoint& EventServer::local() const { return work_->local(); }
+void EventServer::send(std::string_view data) { work_->send(data); }
+EventServerCounts EventServer::counts() const { return work_->counts(); }
+
+Endpoint listening_endpoint(std::string_view text) {
+  constexpr Address kLoopback{{127, 0, 0, 1}};
+  const std::size_t colon = text.rfind(':');
+  const std::string_view port = colon == std::string_view::npos ? text : text.substr(colon + 1);
+  const auto address = colon == std::string_view::npos ? std::optional<Address>(kLoopback)
+                                                       : address_from(text.substr(0, colon));
+  Endpoint endpoint;
+  const auto [end, error] = std::from_chars(port.data(), port.data() + port.size(), endpoint.port);
+  if (!address || error != std::errc() || end != port.data() + port.size()) {
+    throw InvalidArgument(
+        fmt::format("'{}', expected a port (0: any that is free) or ADDRESS:PORT, such as "
+                    "127.0.0.1:8421",
+                    text));
+  }
+  endpoint.address = *address;
+  return endpoint;
+}
+
+}  // namespace risley::wire
