@@ -47,7 +47,7 @@ struct PlainFilter::State {
       q(angle, speed) = q(speed, angle) = kAcceleration * kAcceleration * dt * dt / 2.0;
       q(speed, speed) = kAcceleration * kAcceleration * dt;
     }
-    mean = f * mean;
+    mean = f.lazyProduct(mean).eval();
     const Matrix turned = f.lazyProduct(covariance);
     covariance = turned.lazyProduct(f.transpose()) + q;
   }
@@ -59,13 +59,15 @@ struct PlainFilter::State {
     h.row(0) = model.azimuth.v.transpose();
     h.row(1) = model.zenith.v.transpose();
     const Eigen::Matrix2d noise = square(angle_noise) * Eigen::Matrix2d::Identity();
-    const Eigen::Matrix<double, kStates, 2> cross = covariance * h.transpose();
-    const Eigen::Matrix2d scatter = h * cross + noise;
-    const Eigen::Matrix<double, kStates, 2> gain = cross * scatter.inverse();
-    mean += gain * innovation;
-    const Matrix rest = Matrix::Identity() - gain * h;
+    const Eigen::Matrix<double, kStates, 2> cross = covariance.lazyProduct(h.transpose());
+    const Eigen::Matrix2d scatter = h.lazyProduct(cross) + noise;
+    const Eigen::Matrix<double, kStates, 2> gain = cross.lazyProduct(scatter.inverse());
+    mean += gain.lazyProduct(innovation);
+    const Matrix rest = Matrix::Identity() - gain.lazyProduct(h);
     const Matrix kept = rest.lazyProduct(covariance);
-    covariance = kept.lazyProduct(rest.transpose()) + gain * noise * gain.transpose();  // Joseph
+    const Eigen::Matrix<double, kStates, 2> noisy = gain.lazyProduct(noise);
+    covariance =
+        kept.lazyProduct(rest.transpose()) + noisy.lazyProduct(gain.transpose());  // Joseph
   }
 
   SphericalAngles<Jet> observe_with_derivatives() const {

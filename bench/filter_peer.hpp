@@ -16,8 +16,8 @@ namespace risley::peers {
 /// Jets of all twelve states and Joseph's form. Its model is the library's template, because that
 /// is leaner than Eq. (10-26) as printed (Rodrigues' form, no quaternions); the train is prepared
 /// anew for every shot because every shot changes its parameters. Matrices have fixed sizes, so
-/// nothing is allocated, and lazyProduct() spares the 12 x 12 products Eigen's blocking, which
-/// costs more than it gives at this size. What it does not use is the structure of F and H, nor
+/// nothing is allocated, and lazyProduct() spares the products Eigen's blocking, which costs more
+/// than it gives at this size. What it does not use is the structure of F and H, nor
 /// does it look for outliers.
 class PlainFilter {
  public:

@@ -29,6 +29,7 @@ import struct
 import subprocess
 import sys
 import tempfile
+import textwrap
 import time
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
@@ -506,6 +507,13 @@ def texts(result):
     return found
 
 
+def wrapped(text):
+    """Text whose lines, but for those of tables, have at most 118 characters."""
+    return "\n".join(line if line.startswith("|") else
+                     textwrap.fill(line, 118, subsequent_indent="  " if line.startswith("- ") else "",
+                                   break_on_hyphens=False) for line in text.splitlines())
+
+
 def fill_page(found):
     text = PAGE.read_text(encoding="utf-8")
     for part, words in found.items():
@@ -513,7 +521,7 @@ def fill_page(found):
         if begin not in text or end not in text:
             raise Failed(f"{PAGE} has no marks {begin} and {end}")
         head, rest = text.split(begin)
-        text = f"{head}{begin}\n{words}\n{end}{rest.split(end)[1]}"
+        text = f"{head}{begin}\n{wrapped(words)}\n{end}{rest.split(end)[1]}"
     PAGE.write_text(text, encoding="utf-8")
 
 

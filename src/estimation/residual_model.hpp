@@ -41,8 +41,7 @@ class ResidualModel {
     PreparedDerivatives<double, N> derivatives;
   };
 
-  /// In one function without calls, where the compiler computes every sine once: FIGURE % less
-  /// time.
+  /// In one function without calls, where the compiler computes every sine once.
   template <int N>
   static void prepare_all(const PrismTrain& train, Prepared<N>& prepared);
 
