@@ -25,7 +25,7 @@ SimulationOptions mid_40() {
 }
 
 TEST(OpticsWatch, ABendInPacketsIsToldOf) {
-  EmulatedScan scan(mid_40(), {{"prism_tilt_b_vertical_deg", radians_from_degrees(0.02)}});
+  EmulatedScan scan(mid_40(), "", {{"prism_tilt_b_vertical_deg", radians_from_degrees(0.02)}});
   OpticsWatch watch({{"BENDING00000001", recordings::kMid40}}, "");
   constexpr std::uint64_t kPackets = 9000, kBend = 6000;  // of 1 ms
   for (std::uint64_t i = 0; i < kPackets; ++i) {
@@ -46,7 +46,7 @@ TEST(OpticsWatch, ABendInPacketsIsToldOf) {
 
 /// What it is too slow for is dropped and counted, and whoever brings it does not wait.
 TEST(OpticsWatch, TooManyPacketsAreDroppedAndCounted) {
-  EmulatedScan scan(mid_40());
+  EmulatedScan scan(mid_40(), "");
   std::vector<std::vector<std::uint8_t>> packets;
   constexpr std::uint64_t kPackets = 30'000;
   for (std::uint64_t i = 0; i < kPackets; ++i) {
