@@ -134,9 +134,8 @@ void predict_rotors(Vector& mean, Square& covariance, const RotorProcess& proces
   }
 }
 
-/// A column of a matrix that stays in registers while products are added to it, which takes a third
-/// of the instructions of adding them in memory; where the number of rows has no bound, the
-/// matrix's own.
+/// A column of a matrix that stays in registers while products are added to it, instead of going to
+/// memory and back for each; where the number of rows has no bound, the matrix's own.
 template <class Matrix>
 using HeldColumn =
     std::conditional_t<Matrix::MaxRowsAtCompileTime == Eigen::Dynamic, typename Matrix::ColXpr,

@@ -34,7 +34,7 @@ void to_radians(const double* centidegrees, std::size_t count, double* radians) 
   }
 }
 
-/// Column by column, which takes half the time of record by record.
+/// Column by column, which compilers turn into wide instructions.
 /// @return number of the first record that no sensor can have sent
 template <int kReturns, bool kTagged>
 std::optional<std::size_t> decode_spherical(std::size_t records, const std::uint8_t* bytes,

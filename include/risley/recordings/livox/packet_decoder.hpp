@@ -58,7 +58,7 @@ class PacketDecoder {
   ///         are then as before.
   void decode(std::span<const std::uint8_t> bytes, Chunk& chunk);
   /// The same for a chunk that is filled by many packets: rows go where the columns have room for
-  /// them already, from a row on, as columns that grow packet by packet take a third of the time.
+  /// them already, from a row on, so that no column grows packet by packet.
   void decode_into(std::span<const std::uint8_t> bytes, Chunk& chunk, std::size_t row);
 
   /// New seconds seen in PPS times.
