@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 #include "jobs/emulated_scan.hpp"
 
+#include <algorithm>
 #include <limits>
 #include <optional>
 #include <utility>
@@ -126,6 +127,7 @@ std::span<const std::uint8_t> EmulatedScan::next(std::uint8_t data_type, std::in
   for (std::uint32_t shot = 0; shot < layout.records; ++shot) {
     if (recorded_) {
       recorded_->next(record_);
+      if (!layout.tagged) std::fill(record_.tag.begin(), record_.tag.end(), std::uint8_t{0});
     } else {
       simulate_shot(layout.tagged);
     }

@@ -20,6 +20,7 @@
 #include "risley/core/require.hpp"
 #include "risley/core/text.hpp"
 #include "risley/jobs/convert_recording.hpp"
+#include "risley/jobs/sensor_choice.hpp"
 #include "risley/optics/parameters.hpp"
 #include "risley/recordings/livox/first_packets.hpp"
 #include "risley/recordings/livox/packet_decoder.hpp"
@@ -624,6 +625,8 @@ RecordedSensors record_sensors(const RecordOptions& options, const RecordNote& n
         ".lvx or .nc; convert the recording afterwards",
         options.output));
   }
+  if (options.watch_optics)
+    given_sensor(options.optics_reference);  // not after a search of seconds
   return Recorder(options, wire::interface_of(options.interface), note, progress, watch).run();
 }
 

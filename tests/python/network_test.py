@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: MIT
 """Recording a virtual sensor on loopback, both in Python."""
 import logging
+import os
+import pathlib
 import signal
 import subprocess
 import sys
@@ -13,6 +15,7 @@ import pytest
 import risley
 from command import command
 
+DATA = pathlib.Path(os.environ["RISLEY_SOURCE_DIR"]) / "data"
 HOST = "127.0.0.1"
 
 
@@ -66,7 +69,7 @@ def test_record_writes_what_was_sent(sensors, tmp_path):
 
 
 def test_a_recording_is_sent_again_with_a_clock_that_is_faster(sensors, tmp_path):
-    risley.simulate(tmp_path / "made.lvx", duration=0.5, seed=8)
+    risley.simulate(tmp_path / "made.lvx", duration=0.5, seed=8, scene=DATA / "room.yaml")
     start, end = sensors
     start("127.0.0.70", serial="PYTHON000000071", recording=tmp_path / "made.lvx",
           clock_drift_ppm=400.0, time="ptp")
