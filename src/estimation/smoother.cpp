@@ -26,7 +26,7 @@ constexpr int kMostFree = kMaxParameters;
 constexpr std::size_t kStackedKnots = 16;
 /// Knots that go through the stages of a pass together, and how many such blocks are underway: a
 /// stage takes some tens of microseconds.
-constexpr std::size_t kBlockKnots = 4 * kStackedKnots, kBlocks = 6;
+constexpr std::size_t kStageKnots = 4 * kStackedKnots, kBlocks = 6;
 
 /// Calls stages with blocks of the knots, each stage with one block after the other. A pass is a
 /// chain of what covariances do, which needs no means, and a chain of means, which needs them: with
@@ -50,7 +50,7 @@ void run_stages(std::size_t knots, std::vector<Block>& blocks, const First& firs
     }
     Block& block = blocks[turn++ % kBlocks];
     block.begin = next;
-    block.end = next = std::min(next + kBlockKnots, knots);
+    block.end = next = std::min(next + kStageKnots, knots);
     return &block;
   };
   tbb::parallel_pipeline(
@@ -75,14 +75,14 @@ class Smoother {
   /// Knots on their way forward, with their rows of what they tell of the parameters.
   struct AheadBlock {
     std::size_t begin = 0, end = 0;
-    std::array<Eigen::MatrixXd, kBlockKnots / kStackedKnots> left, right;
+    std::array<Eigen::MatrixXd, kStageKnots / kStackedKnots> left, right;
   };
   /// Knots on their way back, counted from the last: what the later ones say of each as
   /// information, and what leads over the step before it.
   struct BackBlock {
     std::size_t begin = 0, end = 0;
-    std::array<Square, kBlockKnots> later, before_step;
-    std::array<Eigen::PartialPivLU<Square>, kBlockKnots> step;
+    std::array<Square, kStageKnots> later, before_step;
+    std::array<Eigen::PartialPivLU<Square>, kStageKnots> step;
   };
 
  public:
