@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <bit>
 #include <cstdint>
 #include <utility>
 
@@ -119,10 +120,10 @@ std::pair<xsimd::batch<double, Arch>, xsimd::batch<double, Arch>> sine_cosine(
       xsimd::fma(z, xsimd::fma(z, polynomial<kCosineSeries>(z), Batch(-0.5)), Batch(1.0));
   // Bits 1 and 0 of q go to the two highest bits: to the sign, and to what makes a double 2.0.
   constexpr std::uint64_t kSign = std::uint64_t{1} << 63, kTwo = std::uint64_t{1} << 62;
-  const Bits q = xsimd::bitwise_cast<Bits>(shifted) << 62;
-  const auto odd = xsimd::bitwise_cast<Batch>(q & Bits(kTwo)) != Batch(0.0);
-  const Batch sine_sign = xsimd::bitwise_cast<Batch>(q & Bits(kSign));
-  const Batch cosine_sign = xsimd::bitwise_cast<Batch>((q + Bits(kTwo)) & Bits(kSign));
+  const Bits q = std::bit_cast<Bits>(shifted) << 62;
+  const auto odd = std::bit_cast<Batch>(q & Bits(kTwo)) != Batch(0.0);
+  const Batch sine_sign = std::bit_cast<Batch>(q & Bits(kSign));
+  const Batch cosine_sign = std::bit_cast<Batch>((q + Bits(kTwo)) & Bits(kSign));
   std::pair<Batch, Batch> result{xsimd::select(odd, cosine, sine) ^ sine_sign,
                                  xsimd::select(odd, sine, cosine) ^ cosine_sign};
   if (__builtin_expect(xsimd::any(beyond), 0)) {
