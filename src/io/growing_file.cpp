@@ -42,11 +42,13 @@ int create(const std::string& path, const FileTarget& target, const std::string&
 
 }  // namespace
 
-GrowingFile::GrowingFile(const std::string& path)
+GrowingFile::GrowingFile(const std::string& path) : GrowingFile(path, target_of(path)) {}
+
+GrowingFile::GrowingFile(const std::string& path, const FileTarget& target)
     : path_(path),
-      target_(target_of(path).path),
+      target_(target.path),
       unfinished_path_(target_ + kUnfinished),
-      file_(create(path, target_of(path), unfinished_path_)) {}
+      file_(create(path, target, unfinished_path_)) {}
 
 void GrowingFile::append(std::span<const std::uint8_t> bytes) {
   for (std::size_t done = 0; done < bytes.size();) {

@@ -24,8 +24,6 @@ namespace {
 /// What somebody sets to end a recording or a virtual sensor: both go on until then.
 using Stop = std::shared_ptr<CancelFlag>;
 
-CancelFlag* flag_of(const Stop& stop) { return stop.get(); }
-
 /// Words of a job, told to Python while it runs.
 /// @param note  callable(words, is_wrong)
 void tell_words(const py::object& note, const std::string& words, bool is_wrong) {
@@ -87,7 +85,7 @@ py::object record(const py::dict& values, const py::object& note, const Stop& st
             [&](const std::string& words, bool is_wrong) { tell_words(note, words, is_wrong); },
             progress);
       },
-      flag_of(stop));
+      stop.get());
   return dict_of(json::of(recorded));
 }
 
@@ -139,7 +137,7 @@ py::object emulate(const py::dict& values, int threads, const py::object& note, 
         truth = jobs::emulate_sensor(
             job, [&](const std::string& words) { tell_words(note, words, false); }, progress);
       },
-      flag_of(stop));
+      stop.get());
   return dict_of(json::of(truth));
 }
 

@@ -51,3 +51,22 @@ class CommandTest(unittest.TestCase):
     def names(self):
         """What lies in the folder."""
         return {path.name for path in self.folder.iterdir()}
+
+
+class ProcessTest(CommandTest):
+    """A test that starts commands which run beside it, and end with it."""
+
+    def setUp(self):
+        self.processes = []
+
+    def tearDown(self):
+        for process in self.processes:
+            process.kill()
+            process.communicate()
+
+    def start(self, *arguments, **options):
+        """A running command, with text of stdout and stderr unless options of Popen say otherwise."""
+        process = subprocess.Popen([COMMAND, *map(str, arguments)], cwd=self.folder, text=True,
+                                   **{"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, **options})
+        self.processes.append(process)
+        return process

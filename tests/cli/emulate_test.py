@@ -7,12 +7,11 @@ import os
 import random
 import signal
 import struct
-import subprocess
 import time
 import unittest
 
 import schemas
-from command import COMMAND, CommandTest
+from command import ProcessTest
 from livox_peer import SENSOR_PORT, TYPES, Host, bound, frame, parse
 
 ADDRESS, CODE = "127.0.0.41", "EMULATED0000011"
@@ -24,21 +23,9 @@ def header(packet):
     return version, slot, number, clock, kind, stamp
 
 
-class EmulateTest(CommandTest):
-    def setUp(self):
-        self.processes = []
-
-    def tearDown(self):
-        for process in self.processes:
-            process.kill()
-            process.communicate()
-
+class EmulateTest(ProcessTest):
     def emulate(self, *arguments, address=ADDRESS, code=CODE):
-        process = subprocess.Popen(
-            [COMMAND, "emulate", "--interface", address, "--serial", code, "--json", *map(str, arguments)],
-            cwd=self.folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-        self.processes.append(process)
-        return process
+        return self.start("emulate", "--interface", address, "--serial", code, "--json", *arguments)
 
     def truth(self, process):
         """What an emulator says at its end."""

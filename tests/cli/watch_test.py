@@ -15,7 +15,7 @@ import time
 import unittest
 
 import schemas
-from command import COMMAND, CommandTest
+from command import COMMAND, ProcessTest
 
 HOST, CODE = "127.0.0.35", "WATCHED00000011"
 BEND = "prism_tilt_b_vertical_deg=0.02"
@@ -34,21 +34,7 @@ def events(url, seconds):
     connection.close()
 
 
-class WatchTest(CommandTest):
-    def setUp(self):
-        self.processes = []
-
-    def tearDown(self):
-        for process in self.processes:
-            process.kill()
-            process.communicate()
-
-    def start(self, *arguments, **options):
-        process = subprocess.Popen([COMMAND, *map(str, arguments)], cwd=self.folder, text=True,
-                                   **{"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, **options})
-        self.processes.append(process)
-        return process
-
+class WatchTest(ProcessTest):
     def emulate(self, *arguments, address="127.0.0.45", code=CODE):
         return self.start("emulate", "--interface", address, "--serial", code, "--rotor", "hunting", *arguments)
 

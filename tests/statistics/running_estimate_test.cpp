@@ -70,6 +70,17 @@ class BendingScanner {
   recordings::Chunk chunk_, other_;
 };
 
+/// Gives a whole scan to an estimate, all shots with a direction.
+void follow(const simulation::SimulationSettings& settings, RunningEstimate& running) {
+  simulation::Scanner scanner(settings);
+  recordings::Chunk chunk;
+  recordings::TruthColumns truth;
+  while (scanner.read(chunk, truth, kRowsAtOnce)) {
+    std::fill(chunk.observations.valid.begin(), chunk.observations.valid.end(), 1);
+    running.add(chunk.observations);
+  }
+}
+
 struct Bend {
   const char* preset;
   const char* parameter;
@@ -119,14 +130,8 @@ INSTANTIATE_TEST_SUITE_P(Sensors, RunningEstimateOf,
 TEST(RunningEstimate, ParametersAndSpeedsAreWithinTheirSigmas) {
   simulation::SimulationSettings settings = hunting("mid-40-table3", 12);
   settings.rate = 20'000;
-  simulation::Scanner scanner(settings);
   RunningEstimate running(watching("mid-40"));
-  recordings::Chunk chunk;
-  recordings::TruthColumns truth;
-  while (scanner.read(chunk, truth, kRowsAtOnce)) {
-    std::fill(chunk.observations.valid.begin(), chunk.observations.valid.end(), 1);
-    running.add(chunk.observations);
-  }
+  follow(settings, running);
   const RunningState& state = running.state();
   EXPECT_EQ(state.phase, Phase::watching);
   EXPECT_FALSE(state.alarm);
@@ -206,14 +211,8 @@ TEST(RunningEstimate, AUnitThatIsNotTheSensorIsToldOf) {
   for (const double bend_deg : {0.2, 3.0}) {  // the preset's sigma is 0.3
     simulation::SimulationSettings settings = hunting("mid-40", 6);
     settings.truth.set("prism_tilt_b_vertical_deg", radians_from_degrees(bend_deg));
-    simulation::Scanner scanner(settings);
     RunningEstimate running(options);
-    recordings::Chunk chunk;
-    recordings::TruthColumns truth;
-    while (scanner.read(chunk, truth, kRowsAtOnce)) {
-      std::fill(chunk.observations.valid.begin(), chunk.observations.valid.end(), 1);
-      running.add(chunk.observations);
-    }
+    follow(settings, running);
     ASSERT_EQ(running.state().alarm.has_value(), bend_deg > 1) << bend_deg;
     if (!running.state().alarm) continue;
     EXPECT_EQ(running.state().alarm->kind, OpticsAlarmKind::unlike);
@@ -222,14 +221,8 @@ TEST(RunningEstimate, AUnitThatIsNotTheSensorIsToldOf) {
 }
 
 TEST(RunningEstimate, AnotherSensorWaitsAndSaysWhy) {
-  simulation::Scanner scanner(hunting("avia", 1.2));
   RunningEstimate running(watching("mid-40"));
-  recordings::Chunk chunk;
-  recordings::TruthColumns truth;
-  while (scanner.read(chunk, truth, kRowsAtOnce)) {
-    std::fill(chunk.observations.valid.begin(), chunk.observations.valid.end(), 1);
-    running.add(chunk.observations);
-  }
+  follow(hunting("avia", 1.2), running);
   EXPECT_EQ(running.state().phase, Phase::waiting);
   EXPECT_GT(running.state().unfit_in_a_row, 0U);
   EXPECT_FALSE(running.state().reason.empty());

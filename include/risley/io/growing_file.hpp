@@ -10,6 +10,8 @@
 
 namespace risley::io {
 
+struct FileTarget;
+
 /// An output that grows for long and cannot be made again. As OutputFile it gets its name, and
 /// replaces a file of that name and keeps its mode, when it is whole; but until then it has a name
 /// that everybody can find, and stays whatever happens.
@@ -36,6 +38,8 @@ class GrowingFile {
   void discard();
 
  private:
+  GrowingFile(const std::string& path, const FileTarget& target);
+
   std::string path_, target_, unfinished_path_;
   FileDescriptor file_;
   std::uint64_t size_ = 0;
