@@ -3,6 +3,8 @@
 #include "estimation/optics_change.hpp"
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 
 #include <unsupported/Eigen/SpecialFunctions>
 
@@ -24,10 +26,17 @@ Eigen::MatrixXd measured_combinations(const Eigen::MatrixXd& covariance) {
   return axes.vectors.leftCols(count);
 }
 
-/// Probability that F's distribution exceeds a value.
-double f_tail(double value, double numerator, double denominator) {
-  return Eigen::numext::betainc(0.5 * denominator, 0.5 * numerator,
-                                denominator / (denominator + numerator * value));
+/// Shorter parts of a constant in what was measured are rounding.
+constexpr double kLeastPart = 1e-3;
+
+/// Probability that chi-squared, over a variance factor that the scatter of pieces gave, exceeds a
+/// value: then F's distribution.
+double tail(double chi2, double combinations, const PieceScatter& scatter) {
+  if (scatter.variance_factor > 1 && scatter.degrees_of_freedom > 0) {
+    return Eigen::numext::betainc(0.5 * scatter.degrees_of_freedom, 0.5 * combinations,
+                                  scatter.degrees_of_freedom / (scatter.degrees_of_freedom + chi2));
+  }
+  return Eigen::numext::igammac(0.5 * combinations, 0.5 * chi2);
 }
 
 }  // namespace
@@ -73,14 +82,33 @@ ConstantsDifference difference_of(const ConstantsEstimate& a, const ConstantsEst
   const Eigen::MatrixXd both = a.covariance + b.covariance;
   const Eigen::MatrixXd measured = measured_combinations(both);
   if (measured.cols() == 0) return result;
-  const Eigen::MatrixXd covariance =
-      measured.transpose() * (scatter.variance_factor * both + also) * measured;
-  result.chi2 = algebra::SymmetricSolver(covariance).chi2(measured.transpose() * (b.mean - a.mean));
+  const algebra::SymmetricSolver solver(measured.transpose() *
+                                        (scatter.variance_factor * both + also) * measured);
+  const Eigen::VectorXd off = measured.transpose() * (b.mean - a.mean);
+  const Eigen::VectorXd weighted = solver.solve(off);
+  result.chi2 = off.dot(weighted);
   result.combinations = static_cast<int>(measured.cols());
-  const double m = result.combinations;
-  result.p_value = scatter.variance_factor > 1 && scatter.degrees_of_freedom > 0
-                       ? f_tail(result.chi2 / m, m, scatter.degrees_of_freedom)
-                       : Eigen::numext::igammac(0.5 * m, 0.5 * result.chi2);
+  result.joint_p_value = tail(result.chi2, result.combinations, scatter);
+  // Of the constant i alone, the measured combinations tell u = row i of them: off = change u +
+  // noise.
+  result.change = result.change_sigma =
+      Eigen::VectorXd::Constant(measured.rows(), std::numeric_limits<double>::quiet_NaN());
+  double best = 0;
+  int tried = 0;
+  for (Index i = 0; i < measured.rows(); ++i) {
+    const Eigen::VectorXd u = measured.row(i);
+    if (u.norm() < kLeastPart) continue;
+    ++tried;
+    const double information = u.dot(solver.solve(u)), vector = u.dot(weighted);
+    result.change[i] = vector / information;
+    result.change_sigma[i] = 1 / std::sqrt(information);
+    const double chi2 = vector * vector / information;
+    if (chi2 < best) continue;
+    best = chi2;
+    result.constant = i;
+  }
+  result.single_p_value = std::min(1.0, tried * tail(best, 1, scatter));
+  result.p_value = std::min(1.0, 2 * std::min(result.joint_p_value, result.single_p_value));
   return result;
 }
 

@@ -33,12 +33,18 @@ PieceScatter piece_scatter(const std::deque<ConstantsEstimate>& pieces);
 
 /// How surprising a difference is where nothing changed.
 struct ConstantsDifference {
-  double chi2 = 0;
+  double chi2 = 0;       ///< of all combinations
   int combinations = 0;  ///< that both sides measure
-  double p_value = 1;    ///< probability of such a difference, or a larger one
+  double joint_p_value = 1;
+  /// Of each constant, by how much it changed if no other did; NaN if it was not measured.
+  Eigen::VectorXd change, change_sigma;
+  std::optional<Eigen::Index> constant;  ///< whose change alone explains the difference best
+  double single_p_value = 1;             ///< of as good an explanation by any constant
+  double p_value = 1;  ///< of either; chance gives a smaller one at most as often as it says
 };
-/// Compares two independent estimates. Combinations of which the priors say as much as the shots do
-/// not count.
+/// Compares two independent estimates: all combinations of constants together, and each constant as
+/// the only one that changed. Combinations of which the priors say as much as the shots do not
+/// count.
 /// @param also     covariance of the difference beside that of both estimates
 /// @param scatter  multiplies the covariances of both estimates; chi2 then follows F's distribution
 ConstantsDifference difference_of(const ConstantsEstimate& a, const ConstantsEstimate& b,

@@ -374,47 +374,43 @@ void RunningEstimate::Work::look() {
   const Index n = scale_.size();
   const Eigen::MatrixXd none = Eigen::MatrixXd::Zero(n, n);
   const ConstantsEstimate sensor{Eigen::VectorXd::Zero(n), none};
-  state_.change_p_value = state_.unlike_p_value = 1;
-  std::size_t change_window = 1, unlike_window = 1;
+  const auto change_of = [&](const ConstantsEstimate& recent) {
+    return difference_of(*beginning_, recent, none, scatter_);
+  };
+  const auto unlike_of = [&](const ConstantsEstimate& recent) {
+    return difference_of(sensor, recent, sensor_covariance_, scatter_);
+  };
+  ConstantsDifference change, unlike;
+  const auto keep_least = [](const ConstantsDifference& one, ConstantsDifference& least) {
+    if (one.p_value < least.p_value) least = one;
+  };
   for (const std::size_t window : kWindows) {
     if (window > pieces_.size()) break;
     const ConstantsEstimate recent = pooled(pieces_, window);
-    const double change = difference_of(*beginning_, recent, none, scatter_).p_value;
-    if (change < state_.change_p_value) {
-      state_.change_p_value = change;
-      change_window = window;
-    }
-    if (!options_.is_sensor) continue;
-    const double unlike = difference_of(sensor, recent, sensor_covariance_, scatter_).p_value;
-    if (unlike < state_.unlike_p_value) {
-      state_.unlike_p_value = unlike;
-      unlike_window = window;
-    }
+    keep_least(change_of(recent), change);
+    if (options_.is_sensor) keep_least(unlike_of(recent), unlike);
   }
-  const bool beyond = std::min(state_.change_p_value, state_.unlike_p_value) < state_.alarm_p_value;
-  agreeing_ = beyond ? std::min(agreeing_ + 1, kLooksThatAgree) : 0;
+  state_.change_p_value = change.p_value;
+  state_.unlike_p_value = unlike.p_value;
+  const bool changed = change.p_value <= unlike.p_value;
+  const ConstantsDifference& most = changed ? change : unlike;
+  agreeing_ = most.p_value < state_.alarm_p_value ? std::min(agreeing_ + 1, kLooksThatAgree) : 0;
   const bool alarmed = agreeing_ == kLooksThatAgree;
   if (alarmed && !state_.alarmed) ++state_.alarms;
   state_.alarmed = alarmed;
   if (!alarmed || state_.alarm) return;
-  OpticsAlarm alarm;
-  alarm.time_ns = state_.time_ns;
-  alarm.time = looked_at_;
-  const bool changed = state_.change_p_value <= state_.unlike_p_value;
-  alarm.kind = changed ? OpticsAlarmKind::changed : OpticsAlarmKind::unlike;
-  alarm.p_value = changed ? state_.change_p_value : state_.unlike_p_value;
-  const ConstantsEstimate recent = pooled(pieces_, changed ? change_window : unlike_window);
-  const ConstantsEstimate& before = changed ? *beginning_ : sensor;
-  const Eigen::MatrixXd covariance =
-      scatter_.variance_factor * (before.covariance + recent.covariance) +
-      (changed ? none : sensor_covariance_);
-  Index worst = 0;
-  const Eigen::VectorXd off = recent.mean - before.mean;
-  off.cwiseAbs().cwiseQuotient(covariance.diagonal().cwiseSqrt()).maxCoeff(&worst);
-  alarm.parameter = free_[static_cast<std::size_t>(worst)].name;
-  alarm.difference = scale_[worst] * off[worst];
-  alarm.sigma = scale_[worst] * std::sqrt(covariance(worst, worst));
-  state_.alarm = std::move(alarm);
+  // The change may lie within the longer windows; the last piece is behind it.
+  const ConstantsEstimate last = pooled(pieces_, 1);
+  const ConstantsDifference now = changed ? change_of(last) : unlike_of(last);
+  const Index worst = most.constant.value();
+  const ConstantsDifference& told = std::isfinite(now.change[worst]) ? now : most;
+  state_.alarm = {changed ? OpticsAlarmKind::changed : OpticsAlarmKind::unlike,
+                  state_.time_ns,
+                  looked_at_,
+                  most.p_value,
+                  free_[static_cast<std::size_t>(worst)].name,
+                  scale_[worst] * told.change[worst],
+                  scale_[worst] * told.change_sigma[worst]};
 }
 
 /// Parameters over the last pieces.

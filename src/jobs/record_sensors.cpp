@@ -635,17 +635,17 @@ std::string alarm_words(const OpticsHealth& health) {
   if (!alarm) return {};
   const ParameterInfo* known = find_parameter_of_any_train(alarm->parameter);
   const double per_unit = known != nullptr ? known->si_per_unit : 1;
+  constexpr double kLeast = 1e-300;  // below, doubles lose their digits and end at zero
   return fmt::format(
-      "{}: {} is {:+.2g} +- {:.1g} from {}; a difference as large as that of all parameters comes "
-      "by "
-      "chance with a probability of {:.1g}",
+      "{}: {}, if nothing else differs, is {:+.2g} +- {:.1g} from {}; the probability of such a "
+      "difference by chance is {} {:.1g}",
       alarm->kind == estimation::OpticsAlarmKind::changed
           ? "its optics have changed"
           : "its optics are not those of " + health.reference,
       alarm->parameter, alarm->difference / per_unit, alarm->sigma / per_unit,
       alarm->kind == estimation::OpticsAlarmKind::changed ? "what it was in the beginning"
                                                           : "what it should be",
-      alarm->p_value);
+      alarm->p_value < kLeast ? "below" : "at most", std::max(alarm->p_value, kLeast));
 }
 
 }  // namespace risley::jobs

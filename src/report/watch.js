@@ -20,7 +20,15 @@ function row(cells, head) {
 }
 
 const count = (value) => value.toLocaleString("en").replaceAll(",", "\u202f");
-const signed = (value, digits) => (value >= 0 ? "+" : "\u2212") + Math.abs(value).toFixed(digits);
+// A number with a minus sign as long as the plus, and none before what is shown as zero.
+const number = (value, digits) => {
+  const text = Math.abs(value).toFixed(digits);
+  return (value < 0 && Number(text) !== 0 ? "\u2212" : "") + text;
+};
+const signed = (value, digits) => {
+  const text = number(value, digits);
+  return text.startsWith("\u2212") || Number(text) === 0 ? text : "+" + text;
+};
 
 // As many decimals as leave two digits of a sigma.
 function decimals(sigma) {
@@ -55,7 +63,7 @@ function opticsParts(optics) {
   parts.push(element("p", "Optics: " + words, ("state " + kind).trim()));
   if (optics.speeds.length > 0) {
     parts.push(element("p", "Rotors: " + optics.speeds.map((one) =>
-      `${one.deg_per_s.toFixed(decimals(one.sigma_deg_per_s))} \u00b1 ` +
+      `${number(one.deg_per_s, decimals(one.sigma_deg_per_s))} \u00b1 ` +
       one.sigma_deg_per_s.toFixed(decimals(one.sigma_deg_per_s))).join(", ") + " deg/s"));
   }
   if (optics.dropped_packets > 0) {
@@ -69,7 +77,7 @@ function opticsParts(optics) {
     "from " + optics.reference, "\u00b1 sigma"], true));
   for (const one of optics.parameters) {
     const change = decimals(one.change_sigma), off = decimals(one.off_reference_sigma);
-    table.append(row([one.name, one.value.toFixed(decimals(one.sigma)), one.sigma.toFixed(decimals(one.sigma)),
+    table.append(row([one.name, number(one.value, decimals(one.sigma)), one.sigma.toFixed(decimals(one.sigma)),
       signed(one.change, change), one.change_sigma.toFixed(change),
       signed(one.off_reference, off), one.off_reference_sigma.toFixed(off)]));
   }

@@ -58,15 +58,47 @@ TEST(OpticsChange, PooledPiecesHaveTheCovarianceOfTheirMean) {
 TEST(OpticsChange, AProbabilityIsThatOfChance) {
   Pieces source(2);
   constexpr int kDraws = 4000;
-  int below_tenth = 0, below_hundredth = 0;
+  int below_tenth = 0, below_hundredth = 0, single = 0, either = 0;
   for (int i = 0; i < kDraws; ++i) {
     const auto difference = difference_of(source.draw(), source.draw(), kNothing, {});
     EXPECT_EQ(difference.combinations, kConstants);
-    below_tenth += difference.p_value < 0.1 ? 1 : 0;
-    below_hundredth += difference.p_value < 0.01 ? 1 : 0;
+    below_tenth += difference.joint_p_value < 0.1 ? 1 : 0;
+    below_hundredth += difference.joint_p_value < 0.01 ? 1 : 0;
+    single += difference.single_p_value < 0.01 ? 1 : 0;
+    either += difference.p_value < 0.01 ? 1 : 0;
   }
   EXPECT_NEAR(below_tenth, 0.1 * kDraws, 4 * std::sqrt(0.09 * kDraws));
   EXPECT_NEAR(below_hundredth, 0.01 * kDraws, 4 * std::sqrt(0.0099 * kDraws));
+  // Bounds: constants hang together, and so do both tests.
+  EXPECT_LT(single, 0.01 * kDraws + 3 * std::sqrt(0.0099 * kDraws));
+  EXPECT_GT(single, 0.001 * kDraws);
+  EXPECT_LT(either, 0.01 * kDraws + 3 * std::sqrt(0.0099 * kDraws));
+  EXPECT_GT(either, 0.002 * kDraws);
+}
+
+TEST(OpticsChange, TheConstantThatChangedAloneIsNamedWithItsChange) {
+  Pieces source(6);
+  constexpr int kDraws = 2000;
+  const Eigen::MatrixXd information = (2 * source.covariance()).inverse();
+  for (Eigen::Index changed = 0; changed < kConstants; ++changed) {
+    const double sigma = 1 / std::sqrt(information(changed, changed));
+    int named = 0, sooner = 0;
+    double squares = 0;
+    for (int i = 0; i < kDraws; ++i) {
+      ConstantsEstimate a = source.draw(), b = source.draw();
+      b.mean[changed] += 7 * sigma;
+      const auto difference = difference_of(a, b, kNothing, {});
+      sooner += difference.single_p_value < difference.joint_p_value ? 1 : 0;
+      if (difference.constant != changed) continue;
+      ++named;
+      EXPECT_NEAR(difference.change_sigma[changed], sigma, 1e-6 * sigma);
+      squares += std::pow((difference.change[changed] - 7 * sigma) / sigma, 2);
+    }
+    EXPECT_GT(named, 0.5 * kDraws) << changed;
+    EXPECT_GT(sooner, 0.8 * kDraws) << changed;
+    // Chosen for fitting best, it scatters by a little less than the sigma.
+    EXPECT_NEAR(squares / named, 1, 0.2) << changed;
+  }
 }
 
 TEST(OpticsChange, SigmasThatAreTooSmallAreFoundOutInTheBeginning) {
@@ -80,8 +112,9 @@ TEST(OpticsChange, SigmasThatAreTooSmallAreFoundOutInTheBeginning) {
     const PieceScatter scatter = piece_scatter(pieces);
     EXPECT_EQ(scatter.degrees_of_freedom, 7.0 * kConstants);
     const ConstantsEstimate beginning = pooled(pieces, 8), recent = source.draw(kScale);
-    below_hundredth += difference_of(beginning, recent, kNothing, scatter).p_value < 0.01 ? 1 : 0;
-    without += difference_of(beginning, recent, kNothing, {}).p_value < 0.01 ? 1 : 0;
+    below_hundredth +=
+        difference_of(beginning, recent, kNothing, scatter).joint_p_value < 0.01 ? 1 : 0;
+    without += difference_of(beginning, recent, kNothing, {}).joint_p_value < 0.01 ? 1 : 0;
   }
   EXPECT_NEAR(below_hundredth, 0.01 * kDraws, 4 * std::sqrt(0.0099 * kDraws));
   EXPECT_GT(without, kDraws / 2);
@@ -99,6 +132,7 @@ TEST(OpticsChange, CombinationsThatNobodyMeasuredDoNotCount) {
   b.mean[2] = 50;
   const auto difference = difference_of(a, b, kNothing, {});
   EXPECT_EQ(difference.combinations, kConstants - 1);
+  EXPECT_TRUE(std::isnan(difference.change[2]));
   EXPECT_GT(difference.p_value, 1e-6);
 }
 

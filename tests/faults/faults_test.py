@@ -60,6 +60,10 @@ if EVERY:  # which take longer
 FOLDERS = [("estimate", ["estimate", "walls.nc", "-o"], "result"),
            ("calibrate", ["calibrate", "walls.nc", "-o"],
             "result")]
+if EVERY:
+    FOLDERS += [("calibrate a flight", ["calibrate", "strips.lvx", "--trajectory", "strips.lvx.trajectory.csv",
+                                        "--mount", str(SOURCE / "data/mount-as-built.yaml"), "-o"], "result"),
+                ("reproduce", ["reproduce", "-o"], "result")]  # a minute each
 STDOUT = [("info", ["info", "walls.nc", "--json"]), ("estimate", ["estimate", "walls.nc", "--json"]),
           ("observability", ["observability", "walls.nc", "--json"]),
           ("trajectory", ["info", "trajectory.csv", "--json"]),
@@ -74,7 +78,7 @@ def run(folder, arguments, fault=None):
         environment |= {"LD_PRELOAD": FAULTS, "RISLEY_FAULT": f"{fault[0]} {fault[1]}",
                         "RISLEY_FAULT_FIRED": str(fired)}
     done = subprocess.run([COMMAND, *arguments, "--threads", "1"], cwd=folder, env=environment,
-                          capture_output=True, timeout=120, check=False)
+                          capture_output=True, timeout=600, check=False)
     happened = fired.exists()
     if happened:
         fired.unlink()
@@ -127,7 +131,12 @@ class FaultsTest(unittest.TestCase):
             left.unlink()
         (inputs / "trajectory.csv").write_text("".join(lines[:120]))
         if EVERY:
+            (inputs / "strips.yaml").write_text(
+                "risley_flight: 1\nrate_hz: 200\nheight_m: 40\nspeed_m_per_s: 3\nturn_duration_s: 4\n"
+                "strips: [{headings_deg: [90, 270, 0, 180], length_m: 33}]\n")
             for arguments in (SIMULATED_FLIGHT + ["flown.nc"],
+                              ["simulate", "-o", "strips.lvx", "--flight", "strips.yaml", *FLIGHT[2:], "--scene",
+                               str(SOURCE / "data/village.yaml"), "--rate-hz", "300"],
                               ["simulate", "-o", "short.nc", "--duration-s", "0.05", "--rate-hz", "10000"]):
                 done, _ = run(inputs, arguments)
                 assert done.returncode == 0, done.stderr

@@ -107,6 +107,8 @@ TEST_P(RunningEstimateOf, ABendIsToldOfWithinFiveSeconds) {
   EXPECT_LT(1e-9 * static_cast<double>(state.alarm->time_ns), kBendTime + 5);
   EXPECT_EQ(state.alarm->kind, OpticsAlarmKind::changed);
   EXPECT_LT(state.alarm->p_value, state.alarm_p_value);
+  EXPECT_EQ(state.alarm->parameter, GetParam().parameter);
+  EXPECT_LT(std::abs(state.alarm->difference - bend), 4.5 * state.alarm->sigma);
   EXPECT_EQ(state.unfit_pieces, 0U);
   EXPECT_EQ(state.used_shots, state.shots);
 }
@@ -119,7 +121,7 @@ INSTANTIATE_TEST_SUITE_P(Sensors, RunningEstimateOf,
                                            Bend{"avia", "bearing_tilt_a_horizontal_deg"},
                                            Bend{"horizon", "prism_tilt_c_horizontal_deg"},
                                            Bend{"horizon", "bearing_tilt_b_vertical_deg"},
-                                           Bend{"tele-15", "prism_tilt_b_vertical_deg"}),
+                                           Bend{"tele-15", "prism_tilt_b_horizontal_deg"}),
                          [](const auto& test) {
                            std::string name =
                                std::string(test.param.preset) + "_" + test.param.parameter;

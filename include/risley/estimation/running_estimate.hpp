@@ -61,8 +61,8 @@ struct OpticsAlarm {
   std::int64_t time_ns = 0;          ///< of the last shot that was looked at, by the sensor's clock
   double time = 0;                   ///< the same, s of shots that were looked at before
   double p_value = 1;                ///< probability of such a difference by chance
-  std::string parameter;             ///< that differs by the most of its sigmas
-  double difference = 0, sigma = 0;  ///< of that parameter, SI units
+  std::string parameter;             ///< whose difference alone would explain it best
+  double difference = 0, sigma = 0;  ///< of the last piece, if all others are the same; SI units
 };
 
 /// What is known of a sensor that runs.
@@ -101,9 +101,9 @@ const char* to_string(RunningState::Phase phase);
 
 /// Follows the optics of one sensor while its shots come in, with constant memory. Every piece of
 /// the recording is estimated by itself, as run_batch_map() does; pieces that cannot be estimated
-/// are left out. The last one, two, four and eight are compared with the beginning in a joint test
-/// of all parameters whose error is shared among all looks: docs/theory/watch.md. Not for several
-/// threads at once.
+/// are left out. The last one, two, four and eight are compared with the beginning, all parameters
+/// together and each by itself; false alarms are shared among all looks: docs/theory/watch.md. Not
+/// for several threads at once.
 class RunningEstimate {
  public:
   /// @throws InvalidArgument
