@@ -49,7 +49,7 @@ function opticsState(optics) {
     const what = a.kind === "changed" ? "Alarm: the optics have changed" : "Alarm: the optics are not those of " +
       optics.reference;
     return [`${what}: ${a.parameter} by ${signed(a.difference, decimals(a.sigma))} \u00b1 ` +
-      `${a.sigma.toFixed(decimals(a.sigma))}${optics.alarmed ? "" : "; the last looks see nothing of it"}`, "alarm"];
+      `${a.sigma.toFixed(decimals(a.sigma))} if nothing else differs${optics.alarmed ? "" : "; the last looks see nothing of it"}`, "alarm"];
   }
   if (optics.reason) return ["the last shots gave no estimate: " + optics.reason, "care"];
   if (optics.phase === "waiting") return ["waiting for shots", "care"];

@@ -51,6 +51,7 @@ FILES += [("page of a pattern", ["pattern", "--sensor", "avia", "--duration-s", 
 FILES += [("excerpt", ["info", "walls.nc", "--share"], "out.nc"),
           ("convert a trajectory", ["convert", "trajectory.csv", "-o"], "out.csv")]
 FLIGHT = ["--trajectory", "trajectory.csv", "--mount", str(SOURCE / "data/mount-nadir.yaml")]
+TRAJECTORY_ERRORS = ["--trajectory-errors", str(SOURCE / "data/trajectory-errors.yaml")]
 SIMULATED_FLIGHT = ["simulate", *FLIGHT, "--scene", str(SOURCE / "data/village.yaml"), "--rate-hz", "2000",
                     "--duration-s", "0.2", "-o"]
 if EVERY:  # which take longer
@@ -62,7 +63,8 @@ FOLDERS = [("estimate", ["estimate", "walls.nc", "-o"], "result"),
             "result")]
 if EVERY:
     FOLDERS += [("calibrate a flight", ["calibrate", "strips.lvx", "--trajectory", "strips.lvx.trajectory.csv",
-                                        "--mount", str(SOURCE / "data/mount-as-built.yaml"), "-o"], "result"),
+                                        "--mount", str(SOURCE / "data/mount-as-built.yaml"), *TRAJECTORY_ERRORS, "-o"],
+                 "result"),
                 ("reproduce", ["reproduce", "-o"], "result")]  # a minute each
 STDOUT = [("info", ["info", "walls.nc", "--json"]), ("estimate", ["estimate", "walls.nc", "--json"]),
           ("observability", ["observability", "walls.nc", "--json"]),
@@ -136,7 +138,7 @@ class FaultsTest(unittest.TestCase):
                 "strips: [{headings_deg: [90, 270, 0, 180], length_m: 33}]\n")
             for arguments in (SIMULATED_FLIGHT + ["flown.nc"],
                               ["simulate", "-o", "strips.lvx", "--flight", "strips.yaml", *FLIGHT[2:], "--scene",
-                               str(SOURCE / "data/village.yaml"), "--rate-hz", "300"],
+                               str(SOURCE / "data/village.yaml"), "--rate-hz", "300", *TRAJECTORY_ERRORS],
                               ["simulate", "-o", "short.nc", "--duration-s", "0.05", "--rate-hz", "10000"]):
                 done, _ = run(inputs, arguments)
                 assert done.returncode == 0, done.stderr
