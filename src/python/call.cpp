@@ -28,6 +28,13 @@ struct RunningCalls {
   std::thread::id ending_thread;
 };
 
+/// Threads that still run when the interpreter ends do nothing more of it: what they raised would
+/// be printed while its streams go away.
+[[noreturn]] void stand_still() {
+  PyEval_SaveThread();
+  for (;;) std::this_thread::sleep_for(std::chrono::hours(1));  // until the process ends
+}
+
 thread_local int depth = 0;  // NOLINT(*-avoid-non-const-global-variables): calls within calls
 
 RunningCalls& running_calls() {
@@ -104,8 +111,7 @@ RunningCall::RunningCall(CancelFlag* cancel) : cancel_(cancel) {
     may_unlock_ = false;
     if (calls.ending_thread != std::this_thread::get_id()) {
       lock.unlock();
-      PyEval_SaveThread();
-      for (;;) std::this_thread::sleep_for(std::chrono::hours(1));  // until the process ends
+      stand_still();
     }
   }
   ++depth;
@@ -118,11 +124,15 @@ RunningCall::RunningCall(CancelFlag* cancel) : cancel_(cancel) {
 
 RunningCall::~RunningCall() {
   RunningCalls& calls = running_calls();
-  const std::lock_guard lock(calls.mutex);
+  std::unique_lock lock(calls.mutex);
   --depth;
   --calls.count;
   if (cancel_ != nullptr) calls.flags.erase(calls.flags.find(cancel_));
   calls.ended.notify_all();
+  if (calls.interpreter_ends && depth == 0 && calls.ending_thread != std::this_thread::get_id()) {
+    lock.unlock();
+    stand_still();
+  }
 }
 
 void run_job(const py::object& tell, int threads, const std::function<void(const Progress&)>& job,

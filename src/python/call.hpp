@@ -13,9 +13,9 @@
 namespace risley::python {
 
 /// A call that may give the interpreter's lock away is noted as long as it runs: the interpreter,
-/// before it ends, stops it or waits for it, and stills threads that begin one afterwards. A thread
-/// that wants the lock later would be killed in the midst of C++. A call within another is part of
-/// it.
+/// before it ends, stops it or waits for it, and stills its thread then, as well as threads that
+/// begin one afterwards. A thread that wants the lock later would be killed in the midst of C++. A
+/// call within another is part of it. Made and destroyed with the lock.
 class RunningCall {
  public:
   /// @param cancel  stops it, if any

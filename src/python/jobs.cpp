@@ -370,8 +370,9 @@ py::object coverage(const py::dict& values, int threads, const py::object& tell)
   sensors::CoverageOptions settings;
   options.take("after", settings.after);
   options.take("cell", settings.cell);
+  const sensors::ScanPatternOptions scan = scan_options(options);
   const auto found = found_by(tell, threads, [&](const Progress& progress) {
-    return jobs::pattern_details(sensor, scan_options(options), settings, progress);
+    return jobs::pattern_details(sensor, scan, settings, progress);
   });
   return dict_of(json::of(found->coverage));
 }
@@ -444,8 +445,9 @@ py::object info(const py::dict& values, const py::object& tell) {
       return jobs::inspect_trajectory({input, accuracy, topic}, progress);
     });
   }
+  const recordings::ReadOptions reading = read_options(options);
   return told_by(tell, 0, [&](const Progress& progress) {
-    return jobs::inspect_recording({input, read_options(options), {}, {}}, progress);
+    return jobs::inspect_recording({input, reading, {}, {}}, progress);
   });
 }
 

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <optional>
+#include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
@@ -21,12 +22,17 @@
 
 namespace risley::python {
 
-/// Keyword arguments of a job by name. None, and what is not there, leaves a default as it is.
+/// Keyword arguments of a job by name. None, and what is not there, leaves a default as it is. To
+/// be read with the interpreter's lock, which the threads of jobs do not have: all else is a
+/// mistake of ours that some versions of Python forgive.
 class Options {
  public:
   explicit Options(py::dict values) : values_(std::move(values)) {}
 
-  bool has(const char* name) const { return values_.contains(name) && !values_[name].is_none(); }
+  bool has(const char* name) const {
+    if (PyGILState_Check() == 0) throw std::logic_error("options read without Python's lock");
+    return values_.contains(name) && !values_[name].is_none();
+  }
 
   bool is_text(const char* name) const {
     return has(name) && py::isinstance<py::str>(values_[name]);

@@ -21,6 +21,7 @@
 #include <sys/socket.h>
 
 #include "risley/core/error.hpp"
+#include "risley/io/block_file.hpp"
 #include "risley/wire/udp_socket.hpp"
 
 namespace risley::wire {
@@ -67,6 +68,32 @@ void add_headers(MHD_Response* response, const char* type) {
   for (const auto& [name, value] : headers) MHD_add_response_header(response, name, value);
 }
 
+/// A socket of our own, because libmicrohttpd does not say why it could not make one.
+/// @param local  its port, if 0, becomes the one that was free  @throws NetworkError
+io::FileDescriptor listening_socket(Endpoint& local) {
+  const auto refuse_if = [&](bool failed) {
+    if (!failed) return;
+    throw NetworkError(fmt::format(
+        "{}: {}: {}", to_string(local), std::strerror(errno),
+        errno == EADDRINUSE ? "another program has this port; name another, or 0"
+                            : "name an address of this machine and a port that is free"));
+  };
+  io::FileDescriptor socket(::socket(AF_INET, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
+  refuse_if(socket.get() < 0);
+  const int on = 1;  // a port whose last connections have not timed out yet is free
+  refuse_if(::setsockopt(socket.get(), SOL_SOCKET, SO_REUSEADDR, &on, sizeof on) != 0);
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_port = htons(local.port);
+  std::memcpy(&address.sin_addr, local.address.bytes.data(), local.address.bytes.size());
+  socklen_t bytes = sizeof address;
+  auto* any = reinterpret_cast<sockaddr*>(&address);
+  refuse_if(::bind(socket.get(), any, bytes) != 0 || ::listen(socket.get(), SOMAXCONN) != 0 ||
+            ::getsockname(socket.get(), any, &bytes) != 0);
+  local.port = ntohs(address.sin_port);
+  return socket;
+}
+
 }  // namespace
 
 class EventServer::Work {
@@ -78,25 +105,16 @@ class EventServer::Work {
           "0.0.0.0 is no address that a page can be at, expected one of this machine, such as "
           "127.0.0.1");
     }
-    sockaddr_in address{};
-    address.sin_family = AF_INET;
-    address.sin_port = htons(local.port);
-    std::memcpy(&address.sin_addr, local.address.bytes.data(), local.address.bytes.size());
+    io::FileDescriptor socket = listening_socket(local_);
     daemon_ = MHD_start_daemon(
-        MHD_USE_INTERNAL_POLLING_THREAD | MHD_USE_EPOLL | MHD_ALLOW_SUSPEND_RESUME, local.port,
-        nullptr, nullptr, &Work::answer, this, MHD_OPTION_SOCK_ADDR,
-        reinterpret_cast<sockaddr*>(&address), MHD_OPTION_CONNECTION_LIMIT,
-        static_cast<unsigned>(kMostConnections), MHD_OPTION_CONNECTION_TIMEOUT, kIdleSeconds,
-        MHD_OPTION_CONNECTION_MEMORY_LIMIT, kMostHeaderBytes, MHD_OPTION_END);
-    const int error = errno;
+        MHD_USE_INTERNAL_POLLING_THREAD | MHD_USE_EPOLL | MHD_ALLOW_SUSPEND_RESUME, local_.port,
+        nullptr, nullptr, &Work::answer, this, MHD_OPTION_LISTEN_SOCKET, socket.release(),
+        MHD_OPTION_CONNECTION_LIMIT, static_cast<unsigned>(kMostConnections),
+        MHD_OPTION_CONNECTION_TIMEOUT, kIdleSeconds, MHD_OPTION_CONNECTION_MEMORY_LIMIT,
+        kMostHeaderBytes, MHD_OPTION_END);
     if (daemon_ == nullptr) {
-      throw NetworkError(fmt::format(
-          "{}: {}: {}", to_string(local), std::strerror(error),
-          error == EADDRINUSE ? "another program has this port; name another, or 0"
-                              : "name an address of this machine and a port that is free"));
-    }
-    if (const auto* info = MHD_get_daemon_info(daemon_, MHD_DAEMON_INFO_BIND_PORT)) {
-      local_.port = info->port;
+      throw NetworkError(to_string(local_) +
+                         ": libmicrohttpd could not start: end other programs, or watch no page");
     }
     const std::scoped_lock lock(mutex_);  // whoever asks already waits for this
     hosts_.push_back(to_string(local_));

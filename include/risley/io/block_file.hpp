@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "risley/io/output_file.hpp"
@@ -18,7 +19,8 @@ class FileDescriptor {
   ~FileDescriptor();
   FileDescriptor(FileDescriptor&& other) noexcept : value_(other.value_) { other.value_ = -1; }
   FileDescriptor& operator=(FileDescriptor&&) = delete;
-  int get() const { return value_; }  ///< the descriptor, still owned by this
+  int get() const { return value_; }                   ///< the descriptor, still owned by this
+  int release() { return std::exchange(value_, -1); }  ///< the caller's from now on
 
   /// @return 0, or errno when the system refuses (a full disk may show only here)
   int close();
