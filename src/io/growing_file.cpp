@@ -5,6 +5,7 @@
 #include <cerrno>
 #include <cstring>
 #include <system_error>
+#include <utility>
 
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -48,28 +49,90 @@ GrowingFile::GrowingFile(const std::string& path, const FileTarget& target)
     : path_(path),
       target_(target.path),
       unfinished_path_(target_ + kUnfinished),
-      file_(create(path, target, unfinished_path_)) {}
+      file_(create(path, target, unfinished_path_)) {
+  try {
+    thread_ = std::thread([this] { write_what_comes(); });
+  } catch (...) {
+    discard();
+    throw;
+  }
+}
 
-void GrowingFile::append(std::span<const std::uint8_t> bytes) {
+GrowingFile::~GrowingFile() { end_thread(); }
+
+void GrowingFile::end_thread() {
+  {
+    const std::lock_guard lock(mutex_);
+    ending_ = true;
+  }
+  changed_.notify_all();
+  if (thread_.joinable()) thread_.join();
+}
+
+void GrowingFile::write_what_comes() {
+  std::unique_lock lock(mutex_);
+  for (;;) {
+    changed_.wait(lock, [&] { return ending_ || !waiting_.empty(); });
+    if (waiting_.empty()) return;
+    const std::vector<std::uint8_t>& bytes = waiting_.front();  // stays where it is
+    std::exception_ptr failure;
+    lock.unlock();
+    try {
+      write(bytes);
+    } catch (const FileError&) {
+      failure = std::current_exception();
+    }
+    lock.lock();
+    if (failure) {  // what would follow has no place any more
+      failure_ = failure;
+      waiting_.clear();
+      waiting_bytes_ = 0;
+    } else {
+      waiting_bytes_ -= waiting_.front().size();
+      waiting_.pop_front();
+    }
+    changed_.notify_all();
+    if (failure) return;
+  }
+}
+
+void GrowingFile::append(std::vector<std::uint8_t> bytes) {
+  std::unique_lock lock(mutex_);
+  changed_.wait(lock, [&] { return failure_ || waiting_bytes_ <= kMostWaiting; });
+  if (failure_) std::rethrow_exception(failure_);
+  size_ += bytes.size();
+  waiting_bytes_ += bytes.size();
+  waiting_.push_back(std::move(bytes));
+  changed_.notify_all();
+}
+
+void GrowingFile::settle() {
+  std::unique_lock lock(mutex_);
+  changed_.wait(lock, [&] { return failure_ || waiting_.empty(); });
+  if (failure_) std::rethrow_exception(failure_);
+}
+
+void GrowingFile::write(const std::vector<std::uint8_t>& bytes) {
   for (std::size_t done = 0; done < bytes.size();) {
     const ssize_t count = whole([&] {
       return ::pwrite(file_.get(), bytes.data() + done, bytes.size() - done,
-                      static_cast<off_t>(size_ + done));
+                      static_cast<off_t>(written_ + done));
     });
     if (count <= 0) {
       const int error = count < 0 ? errno : ENOSPC;
       // What is not whole is taken back; where even that fails, readers stop at it.
-      const bool taken_back = ::ftruncate(file_.get(), static_cast<off_t>(size_)) == 0;
-      throw FileError(unfinished_path_, {size_, {}},
+      const bool taken_back = ::ftruncate(file_.get(), static_cast<off_t>(written_)) == 0;
+      throw FileError(unfinished_path_, {written_, {}},
                       fmt::format("cannot be written: {}{}", std::strerror(error),
                                   taken_back ? "; what was recorded before is in it" : ""));
     }
     done += static_cast<std::size_t>(count);
   }
-  size_ += bytes.size();
+  written_ += bytes.size();
 }
 
 void GrowingFile::commit() {
+  settle();
   const FileTarget target{target_, false, 0};
   try {
     sync_output(target, path_, file_.get(), unfinished_path_);
@@ -82,6 +145,7 @@ void GrowingFile::commit() {
 }
 
 void GrowingFile::discard() {
+  end_thread();
   if (!unfinished_path_.empty() && is_named(file_.get(), unfinished_path_)) {
     ::unlink(unfinished_path_.c_str());
   }

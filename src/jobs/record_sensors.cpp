@@ -546,7 +546,7 @@ void Recorder::finish_file() {
     file_->close();
     return;
   }
-  file_->end_frame();
+  file_->settle();
   try {
     ConvertRecordingOptions wanted;
     wanted.recording = file_->unfinished_path();

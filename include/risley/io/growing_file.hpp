@@ -2,9 +2,15 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <condition_variable>
+#include <cstddef>
 #include <cstdint>
-#include <span>
+#include <deque>
+#include <exception>
+#include <mutex>
 #include <string>
+#include <thread>
+#include <vector>
 
 #include "risley/io/block_file.hpp"
 
@@ -14,24 +20,35 @@ struct FileTarget;
 
 /// An output that grows for long and cannot be made again. As OutputFile it gets its name, and
 /// replaces a file of that name and keeps its mode, when it is whole; but until then it has a name
-/// that everybody can find, and stays whatever happens.
+/// that everybody can find, and stays whatever happens. A thread of its own writes, so that a disk
+/// that pauses does not hold up who measures.
 class GrowingFile {
  public:
   /// What its name ends with until commit().
   static constexpr const char* kUnfinished = ".unfinished";
+  /// Bytes that may wait for the disk: half a second of three sensors at ten times their speed.
+  static constexpr std::size_t kMostWaiting = std::size_t{32} << 20U;
 
   /// @throws FileError as OutputFile; for what is no regular file; where there is an unfinished
   ///         file of that name, which is never written over
   explicit GrowingFile(const std::string& path);
+  /// Writes what waits.
+  ~GrowingFile();
+  GrowingFile(const GrowingFile&) = delete;
+  GrowingFile& operator=(const GrowingFile&) = delete;
 
   const std::string& path() const { return path_; }  ///< that commit() gives the file
   /// Its name until commit(): path(), or what a symbolic link of that name leads to, with
   /// kUnfinished behind. Empty afterwards.
   const std::string& unfinished_path() const { return unfinished_path_; }
-  std::uint64_t size() const { return size_; }  ///< bytes written so far
+  std::uint64_t size() const { return size_; }  ///< bytes appended so far
 
-  /// Appends bytes, all or none. @throws FileError when the disk refuses; the file is as before
-  void append(std::span<const std::uint8_t> bytes);
+  /// Appends bytes, all or none, soon; waits while more than kMostWaiting wait already.
+  /// @throws FileError when the disk refused something that was appended before: the file ends
+  ///         there
+  void append(std::vector<std::uint8_t> bytes);
+  /// Waits until the file has all bytes. @throws FileError as append()
+  void settle();
   /// Puts the bytes on the disk and gives the file its name. @throws FileError
   void commit();
   /// Removes the file. @throws nothing
@@ -39,10 +56,22 @@ class GrowingFile {
 
  private:
   GrowingFile(const std::string& path, const FileTarget& target);
+  void write_what_comes();
+  void write(const std::vector<std::uint8_t>& bytes);
+  void end_thread();
 
   std::string path_, target_, unfinished_path_;
   FileDescriptor file_;
   std::uint64_t size_ = 0;
+
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::deque<std::vector<std::uint8_t>> waiting_;  ///< the first one is being written
+  std::size_t waiting_bytes_ = 0;
+  std::exception_ptr failure_;
+  bool ending_ = false;
+  std::uint64_t written_ = 0;  ///< of the thread
+  std::thread thread_;
 };
 
 }  // namespace risley::io

@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: MIT
 #include "risley/recordings/livox/packet_file.hpp"
 
+#include <utility>
+
 #include "risley/io/little_endian.hpp"
 
 #include "recordings/formats/lvx11_head.hpp"
@@ -17,6 +19,7 @@ constexpr std::uint32_t kFrameDurationMs = 50;
 PacketFile::PacketFile(const std::string& path, const std::vector<Device>& devices) : file_(path) {
   try {
     file_.append(lvx11_head(devices, kFrameDurationMs));
+    file_.settle();
   } catch (...) {
     file_.discard();
     throw;
@@ -38,9 +41,13 @@ void PacketFile::end_frame() {
   io::store<std::uint64_t>(frame_.data(), size());
   io::store<std::uint64_t>(&frame_[kLvxFrameNextAt], size() + frame_.size());
   io::store<std::uint64_t>(&frame_[kLvxFrameIndexAt], frames_);
-  file_.append(frame_);
-  frame_.clear();
+  file_.append(std::exchange(frame_, {}));
   ++frames_;
+}
+
+void PacketFile::settle() {
+  end_frame();
+  file_.settle();
 }
 
 void PacketFile::close() {

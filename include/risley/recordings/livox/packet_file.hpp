@@ -33,9 +33,11 @@ class PacketFile {
   /// Puts a packet into the present frame.
   /// @param packet  header and records as PacketDecoder takes them
   void add(std::uint8_t device_index, std::span<const std::uint8_t> packet);
-  /// Writes the present frame, if it has packets. @throws FileError when the disk refuses; the file
-  /// then ends with the frame before
+  /// Ends the present frame, if it has packets, which then is written. @throws FileError when the
+  /// disk refused a frame before; the file ends before that one
   void end_frame();
+  /// Ends the present frame and waits until all are written. @throws FileError as end_frame()
+  void settle();
   /// Writes the last frame and gives the file its final name. @throws FileError
   void close();
   /// Removes the file, whose packets stand elsewhere now.
@@ -44,8 +46,8 @@ class PacketFile {
   const std::string& path() const { return file_.path(); }  ///< final name
   /// Name until close().
   const std::string& unfinished_path() const { return file_.unfinished_path(); }
-  std::uint64_t frames() const { return frames_; }     ///< written so far
-  std::uint64_t size() const { return file_.size(); }  ///< bytes written so far
+  std::uint64_t frames() const { return frames_; }     ///< that have ended
+  std::uint64_t size() const { return file_.size(); }  ///< bytes of these and of the head
 
  private:
   io::GrowingFile file_;
