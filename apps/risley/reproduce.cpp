@@ -9,10 +9,8 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
-#include "risley/io/folder.hpp"
-#include "risley/io/output_file.hpp"
-#include "risley/io/text_file.hpp"
 #include "risley/jobs/recording_input.hpp"
+#include "risley/jobs/result_folder.hpp"
 #include "risley/jobs/sensor_choice.hpp"
 
 #include "command.hpp"
@@ -122,7 +120,7 @@ ExitStatus run_reproduce(const ReproduceCommandOptions& options, const CommonOpt
     return (std::filesystem::path(options.folder) / name).string();
   };
   require_apart(common, {path("report.html"), path("reproduction.json")});
-  io::make_folder(options.folder);
+  jobs::ResultFolder folder(options.folder);
   reproduction::ReproduceOptions settings;
   settings.seed = common.seed;
   if (options.full) settings.effort = reproduction::kFullEffort;
@@ -137,13 +135,11 @@ ExitStatus run_reproduce(const ReproduceCommandOptions& options, const CommonOpt
     found = reproduction::reproduce(settings, bar.progress());
   }
   const Json object = with_head(common, reproduction_json(found, common, inputs));
-  io::OutputFile page(path("report.html")), numbers(path("reproduction.json"));
-  io::write_text(page, reproduction::reproduction_page(
-                           found, jobs::with_inputs(provenance_of(common), inputs)));
-  io::write_text(numbers, object.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
-  for (const io::OutputFile* file : {&page, &numbers}) file->sync();  // both, before one is named
-  page.commit();
-  numbers.commit();
+  folder.add_text({"report.html", reproduction::reproduction_page(
+                                      found, jobs::with_inputs(provenance_of(common), inputs))});
+  folder.add_text(
+      {"reproduction.json", object.dump(2, ' ', false, Json::error_handler_t::replace) + "\n"});
+  for (const std::string& move : folder.commit()) spdlog::warn("{}", move);
   if (common.json) {
     print_json(common, object);
   } else {

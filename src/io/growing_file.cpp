@@ -18,6 +18,8 @@
 namespace risley::io {
 namespace {
 
+constexpr std::uint64_t kBeginBytes = std::uint64_t{8} << 20U;
+
 FileTarget target_of(const std::string& path) {
   try {
     FileTarget target = find_target(path);
@@ -129,6 +131,13 @@ void GrowingFile::write(const std::vector<std::uint8_t>& bytes) {
     done += static_cast<std::size_t>(count);
   }
   written_ += bytes.size();
+  // The disk begins at once: bytes that the system collects are lost with the machine, and later it
+  // makes writers wait until they are on the disk.
+  if (written_ - begun_ >= kBeginBytes) {
+    ::sync_file_range(file_.get(), static_cast<off_t>(begun_),
+                      static_cast<off_t>(written_ - begun_), SYNC_FILE_RANGE_WRITE);
+    begun_ = written_;
+  }
 }
 
 void GrowingFile::commit() {

@@ -10,6 +10,7 @@
 #include "risley/calibration/flight_recordings.hpp"
 #include "risley/cloud/map_projection.hpp"
 #include "risley/core/error.hpp"
+#include "risley/jobs/result_folder.hpp"
 #include "risley/scenes/control.hpp"
 #include "risley/trajectories/clock.hpp"
 #include "risley/trajectories/interpolation.hpp"
@@ -17,7 +18,6 @@
 
 #include "jobs/checks.hpp"
 #include "jobs/ranged_input.hpp"
-#include "jobs/result_folder.hpp"
 #include "jobs/stopwatch.hpp"
 
 namespace risley::jobs {

@@ -7,10 +7,10 @@
 #include <fmt/format.h>
 
 #include "risley/core/error.hpp"
+#include "risley/jobs/result_folder.hpp"
 
 #include "jobs/checks.hpp"
 #include "jobs/ranged_input.hpp"
-#include "jobs/result_folder.hpp"
 #include "jobs/stopwatch.hpp"
 
 namespace risley::jobs {

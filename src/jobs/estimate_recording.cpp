@@ -10,10 +10,10 @@
 #include "risley/core/direction.hpp"
 #include "risley/core/error.hpp"
 #include "risley/core/vector3.hpp"
+#include "risley/jobs/result_folder.hpp"
 #include "risley/sensors/preset.hpp"
 
 #include "jobs/checks.hpp"
-#include "jobs/result_folder.hpp"
 #include "jobs/stopwatch.hpp"
 
 namespace risley::jobs {

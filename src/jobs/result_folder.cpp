@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-#include "jobs/result_folder.hpp"
+#include "risley/jobs/result_folder.hpp"
 
 #include <algorithm>
 #include <cerrno>
@@ -113,7 +113,8 @@ void ResultFolder::write(const std::string& name, const std::string& text) {
 std::vector<std::string> ResultFolder::left_over() const {
   static const std::regex results(
       "(calibration\\.yaml|mount\\.yaml|trajectory\\.csv|states(_[0-9]+)?\\.nc|report\\.(json|html)"
-      ")");
+      "|"
+      "reproduction\\.json)");
   std::vector<std::string> names;
   for (const fs::directory_entry& entry : fs::directory_iterator(folder_)) {
     const std::string name = entry.path().filename().string();

@@ -70,7 +70,7 @@ class GrowingFile {
   std::size_t waiting_bytes_ = 0;
   std::exception_ptr failure_;
   bool ending_ = false;
-  std::uint64_t written_ = 0;  ///< of the thread
+  std::uint64_t written_ = 0, begun_ = 0;  ///< of the thread: bytes in the file, toward the disk
   std::thread thread_;
 };
 

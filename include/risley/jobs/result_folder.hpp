@@ -31,6 +31,7 @@ class ResultFolder {
                   const Provenance& provenance, const Progress& progress);
   /// calibration.yaml.
   void add_calibration(const sensors::Sensor& sensor);
+  /// Any other file.
   void add_text(const NamedText& text);
   /// Gives all files their names.
   /// @return what happened to results of an earlier run, in sentences
