@@ -91,6 +91,8 @@ void GrowingFile::write_what_comes() {
       waiting_bytes_ = 0;
     } else {
       waiting_bytes_ -= waiting_.front().size();
+      spare_ = std::move(waiting_.front());
+      spare_.clear();
       waiting_.pop_front();
     }
     changed_.notify_all();
@@ -98,7 +100,7 @@ void GrowingFile::write_what_comes() {
   }
 }
 
-void GrowingFile::append(std::vector<std::uint8_t> bytes) {
+std::vector<std::uint8_t> GrowingFile::append(std::vector<std::uint8_t> bytes) {
   std::unique_lock lock(mutex_);
   changed_.wait(lock, [&] { return failure_ || waiting_bytes_ <= kMostWaiting; });
   if (failure_) std::rethrow_exception(failure_);
@@ -106,6 +108,7 @@ void GrowingFile::append(std::vector<std::uint8_t> bytes) {
   waiting_bytes_ += bytes.size();
   waiting_.push_back(std::move(bytes));
   changed_.notify_all();
+  return std::exchange(spare_, {});
 }
 
 void GrowingFile::settle() {

@@ -44,9 +44,11 @@ class GrowingFile {
   std::uint64_t size() const { return size_; }  ///< bytes appended so far
 
   /// Appends bytes, all or none, soon; waits while more than kMostWaiting wait already.
+  /// @return an empty vector that has room, as soon as others were written: who appends again need
+  ///         not ask the system for memory
   /// @throws FileError when the disk refused something that was appended before: the file ends
   ///         there
-  void append(std::vector<std::uint8_t> bytes);
+  std::vector<std::uint8_t> append(std::vector<std::uint8_t> bytes);
   /// Waits until the file has all bytes. @throws FileError as append()
   void settle();
   /// Puts the bytes on the disk and gives the file its name. @throws FileError
@@ -68,6 +70,7 @@ class GrowingFile {
   std::condition_variable changed_;
   std::deque<std::vector<std::uint8_t>> waiting_;  ///< the first one is being written
   std::size_t waiting_bytes_ = 0;
+  std::vector<std::uint8_t> spare_;
   std::exception_ptr failure_;
   bool ending_ = false;
   std::uint64_t written_ = 0, begun_ = 0;  ///< of the thread: bytes in the file, toward the disk

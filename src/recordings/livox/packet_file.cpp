@@ -41,7 +41,7 @@ void PacketFile::end_frame() {
   io::store<std::uint64_t>(frame_.data(), size());
   io::store<std::uint64_t>(&frame_[kLvxFrameNextAt], size() + frame_.size());
   io::store<std::uint64_t>(&frame_[kLvxFrameIndexAt], frames_);
-  file_.append(std::exchange(frame_, {}));
+  frame_ = file_.append(std::move(frame_));
   ++frames_;
 }
 
