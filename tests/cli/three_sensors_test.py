@@ -19,7 +19,7 @@ from livox_peer import TYPES
 
 SECONDS = float(os.environ.get("RISLEY_THREE_SENSORS_S", "2"))  # of this machine
 LONG = SECONDS >= 60
-SPEED = 10 if LONG else 2 if os.environ.get("RISLEY_SANITIZED") == "ON" else 5  # beside other tests
+SPEED = 10 if LONG else 2 if os.environ.get("RISLEY_SANITIZED") == "ON" else 3  # beside other tests
 # Sensor, data type, ns between packets, inertial samples a second.
 SENSORS = (("mid-40", 1, 1_000_000, 0), ("avia", 3, 400_000, 200), ("horizon", 3, 400_000, 200))
 IMU = 6
