@@ -112,9 +112,8 @@ void ResultFolder::write(const std::string& name, const std::string& text) {
 
 std::vector<std::string> ResultFolder::left_over() const {
   static const std::regex results(
-      "(calibration\\.yaml|mount\\.yaml|trajectory\\.csv|states(_[0-9]+)?\\.nc|report\\.(json|html)"
-      "|"
-      "reproduction\\.json)");
+      "(calibration\\.yaml|mount\\.yaml|reproduction\\.json|trajectory\\.csv|"
+      "states(_[0-9]+)?\\.nc|report\\.(json|html))");
   std::vector<std::string> names;
   for (const fs::directory_entry& entry : fs::directory_iterator(folder_)) {
     const std::string name = entry.path().filename().string();

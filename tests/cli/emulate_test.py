@@ -298,6 +298,16 @@ class EmulateTest(ProcessTest):
             done = self.expect_json(3 if name == "none.lvx" else 2, "emulate", "--interface", ADDRESS, "--recording", name)
             self.assertIn(says, done["error"])
 
+    def test_three_sensors_ten_times_faster(self):
+        speed = 3 if os.environ.get("RISLEY_SANITIZED") == "ON" else 10
+        processes = [self.emulate("--sensor", "mid-40", "--speed", speed, address=f"127.0.0.{50 + i}",
+                                  code=f"EMULATED000000{i}") for i in range(3)]
+        recorded = self.record("three.lvx", "--duration-s", 2)
+        self.assertEqual([one["serial"][-1] for one in recorded], ["0", "1", "2"])
+        for process, one in zip(processes, recorded):
+            self.check_counts(self.truth(process), one)
+            self.assertEqual(one["lost"], 0)
+
     def test_wrong_checksums_are_survived(self):
         process = self.emulate("--wrong-checksums", 0.3, "--seed", 3)
         recorded = self.record("checksums.lvx", "--duration-s", 3, "--find-s", 4)[0]

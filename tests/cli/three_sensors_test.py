@@ -20,16 +20,16 @@ from livox_peer import TYPES
 SECONDS = float(os.environ.get("RISLEY_THREE_SENSORS_S", "2"))  # of this machine
 LONG = SECONDS >= 60
 SPEED = 10 if LONG else 2 if os.environ.get("RISLEY_SANITIZED") == "ON" else 3  # beside other tests
-# Sensor, data type, ns between packets, inertial samples a second.
-SENSORS = (("mid-40", 1, 1_000_000, 0), ("avia", 3, 400_000, 200), ("horizon", 3, 400_000, 200))
+# Sensor, data type, ns between packets.
+SENSORS = (("mid-40", 1, 1_000_000), ("avia", 3, 400_000), ("horizon", 3, 400_000))
 IMU = 6
 TICKS = os.sysconf("SC_CLK_TCK")
 
 
-def packets_of(data, begin, end):
-    """(device, data type, time stamp, points or sample) of every packet between two places of an LVX 1.1 file."""
-    at = begin
-    while at < end:
+def packets_of(data):
+    """(device, data type, time stamp, points or sample) of every packet of a frame."""
+    at = 0
+    while at < len(data):
         kind = data[at + 10]
         following = at + 19 + TYPES[kind][0] * TYPES[kind][1]
         yield data[at], kind, int.from_bytes(data[at + 11:at + 19], "little"), data[at + 19:following]
@@ -65,7 +65,7 @@ class ThreeSensorsTest(ProcessTest):
                     10 if LONG else 1, "--scene", SOURCE / "data/room.yaml", "--seed", 5)
         data = (self.folder / name).read_bytes()
         return [without_tags(kind, points) for frame in frames_of(data)[1]
-                for _, kind, _, points in packets_of(frame, 0, len(frame)) if kind != IMU]
+                for _, kind, _, points in packets_of(frame) if kind != IMU]
 
     def figures(self, process):
         """Processor time so far, s, and most memory of its own, kB."""
@@ -124,12 +124,12 @@ class ThreeSensorsTest(ProcessTest):
             devices, frames = frames_of(data)
             order = [codes.index(device) for device in devices]
             for frame in frames:
-                for device, kind, stamp, points in packets_of(frame, 0, len(frame)):
+                for device, kind, stamp, points in packets_of(frame):
                     i = order[device]
                     if kind == IMU:
                         samples[i] += 1
                         continue
-                    _, expected, step, _ = SENSORS[i]
+                    _, expected, step = SENSORS[i]
                     number, cycle = seen[i], cycles[i]
                     if first[i] is None:
                         first[i] = stamp
