@@ -121,6 +121,7 @@ INSTANTIATE_TEST_SUITE_P(Sensors, RunningEstimateOf,
                                            Bend{"avia", "bearing_tilt_a_horizontal_deg"},
                                            Bend{"horizon", "prism_tilt_c_horizontal_deg"},
                                            Bend{"horizon", "bearing_tilt_b_vertical_deg"},
+                                           Bend{"tele-15", "prism_tilt_b_vertical_deg"},
                                            Bend{"tele-15", "prism_tilt_b_horizontal_deg"}),
                          [](const auto& test) {
                            std::string name =
