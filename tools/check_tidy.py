@@ -8,9 +8,9 @@ piece, as one file that includes them all. That also finds a name which stands f
 twice for the same, within a folder. Kernels, which have a compiler command of their own, are looked
 at alone.
 
-Usage: tools/check_tidy.py BUILD_FOLDER [--changed]
+Usage: tools/check_tidy.py BUILD_FOLDER [--changed [COMMIT]]
   BUILD_FOLDER  holds compile_commands.json, as the presets dev and test write it
-  --changed     only the sources that differ from the last commit, one by one
+  --changed     only the folders of sources that differ from COMMIT (without it: from the last one)
 RISLEY_JOBS limits the number of processes. Exit status: 0 all well, 1 a check fails, 77 skipped for
 want of clang-tidy.
 """
@@ -26,23 +26,23 @@ from pathlib import Path
 from compile_commands import ROOT, at_once, commands_of
 
 
-def changed_sources():
+def changed_sources(commit):
     def git(*words):
         return subprocess.run(['git', *words, '--', 'src', 'studies', 'apps'], cwd=ROOT, check=True,
                               capture_output=True, text=True).stdout.splitlines()
-    names = git('diff', '--name-only', '--diff-filter=d', 'HEAD')
+    names = git('diff', '--name-only', '--diff-filter=d', commit)
     names += git('ls-files', '--others', '--exclude-standard')
-    return sorted({ROOT / name for name in names if name.endswith('.cpp')})
+    return {ROOT / name for name in names if name.endswith('.cpp')}
 
 
-def pieces_of(sources, commands, together):
+def pieces_of(sources, commands):
     """Lists of sources that are looked at as one file, those that take longest first."""
     groups = defaultdict(list)
     for source in sources:
         if source not in commands:
             sys.exit(f'check_tidy: {source} is not in compile_commands.json; configure anew')
         folder = source.parent.relative_to(ROOT).parts
-        alone = not together or source.stem.endswith('_kernel')
+        alone = source.stem.endswith('_kernel')
         groups[folder + ((source.name,) if alone else ())].append(source)
     return sorted(groups.values(), key=len, reverse=True)
 
@@ -71,20 +71,22 @@ def look_at(sources, number, folder, commands):
 
 
 def main(arguments):
-    if not arguments or arguments[1:] not in ([], ['--changed']):
+    if not arguments or len(arguments) > 3 or arguments[1:2] not in ([], ['--changed']):
         sys.exit(__doc__)
     if not shutil.which('clang-tidy'):
         print('check_tidy: SKIPPED, there is no clang-tidy (scripts/install-dependencies --lint)')
         return 77
     build = Path(arguments[0]).resolve()
     commands = commands_of(build)
-    changed = arguments[1:] == ['--changed']
-    sources = changed_sources() if changed else sorted(
-        source for folder in ('src', 'studies', 'apps') for source in (ROOT / folder).rglob('*.cpp'))
+    pieces = pieces_of(
+        sorted(source for folder in ('src', 'studies', 'apps')
+               for source in (ROOT / folder).rglob('*.cpp')), commands)
+    if arguments[1:]:
+        changed = changed_sources((arguments[2:] or ['HEAD'])[0])
+        pieces = [piece for piece in pieces if changed.intersection(piece)]
     folder = build / 'tidy'
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir()
-    pieces = pieces_of(sources, commands, not changed)
     results = at_once(lambda piece: look_at(piece[1], piece[0], folder, commands),
                       enumerate(pieces))
     for passed, said in results:
@@ -93,7 +95,7 @@ def main(arguments):
     if not all(passed for passed, _ in results):
         print('check_tidy: failed, see above')
         return 1
-    print(f'check_tidy: {len(sources)} sources pass')
+    print(f'check_tidy: {sum(map(len, pieces))} sources pass')
     return 0
 
 

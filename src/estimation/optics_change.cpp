@@ -27,7 +27,7 @@ Eigen::MatrixXd measured_combinations(const Eigen::MatrixXd& covariance) {
 }
 
 /// Shorter parts of a constant in what was measured are rounding.
-constexpr double kLeastPart = 1e-3;
+constexpr double kLeastMeasured = 1e-3;
 
 /// Probability that chi-squared, over a variance factor that the scatter of pieces gave, exceeds a
 /// value: then F's distribution.
@@ -97,7 +97,7 @@ ConstantsDifference difference_of(const ConstantsEstimate& a, const ConstantsEst
   int tried = 0;
   for (Index i = 0; i < measured.rows(); ++i) {
     const Eigen::VectorXd u = measured.row(i);
-    if (u.norm() < kLeastPart) continue;
+    if (u.norm() < kLeastMeasured) continue;
     ++tried;
     const double information = u.dot(solver.solve(u)), vector = u.dot(weighted);
     result.change[i] = vector / information;

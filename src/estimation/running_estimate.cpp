@@ -25,7 +25,7 @@ using Eigen::Index;
 
 constexpr std::size_t kFewestRunningShots = 2000;  // of a piece
 /// A shorter part of a piece, before a gap, is left out.
-constexpr double kLeastPart = 0.5;
+constexpr double kLeastPieceFilled = 0.5;
 /// Rotors are not followed over more than this, ns: they hunt.
 constexpr std::int64_t kLongestRunningGap = 100'000'000;
 /// Pieces that are pooled and compared with the beginning.
@@ -169,7 +169,7 @@ bool RunningEstimate::Work::add(const recordings::Observations& rows, const Prog
 /// @return whether the piece was looked at
 bool RunningEstimate::Work::end_piece(const Progress& progress) {
   AngleSeries series = std::exchange(series_, {});
-  if (series.size() < kFewestRunningShots || series.duration() < kLeastPart * options_.piece) {
+  if (series.size() < kFewestRunningShots || series.duration() < kLeastPieceFilled * options_.piece) {
     ++state_.short_pieces;
     return false;
   }

@@ -19,6 +19,8 @@ namespace risley::io {
 namespace {
 
 constexpr std::uint64_t kBeginBytes = std::uint64_t{8} << 20U;
+/// Bytes that may be on their way to the disk: a second of what kMostWaiting is half a second of.
+constexpr std::uint64_t kMostOnTheWay = std::uint64_t{64} << 20U;
 
 FileTarget target_of(const std::string& path) {
   try {
@@ -134,13 +136,26 @@ void GrowingFile::write(const std::vector<std::uint8_t>& bytes) {
     done += static_cast<std::size_t>(count);
   }
   written_ += bytes.size();
-  // The disk begins at once: bytes that the system collects are lost with the machine, and later it
-  // makes writers wait until they are on the disk.
-  if (written_ - begun_ >= kBeginBytes) {
-    ::sync_file_range(file_.get(), static_cast<off_t>(begun_),
-                      static_cast<off_t>(written_ - begun_), SYNC_FILE_RANGE_WRITE);
-    begun_ = written_;
-  }
+  if (written_ - begun_ >= kBeginBytes) hand_to_disk();
+}
+
+/// The disk begins at once: bytes that the system collects are lost with the machine, and later it
+/// makes writers wait until they are on the disk. What is there leaves memory: a file that fills it
+/// makes the system look for pages while packets wait.
+void GrowingFile::hand_to_disk() {
+  const auto range = [&](std::uint64_t from, std::uint64_t to) {
+    return std::pair{static_cast<off_t>(from), static_cast<off_t>(to - from)};
+  };
+  const auto [begin, length] = range(begun_, written_);
+  ::sync_file_range(file_.get(), begin, length, SYNC_FILE_RANGE_WRITE);
+  begun_ = written_;
+  if (begun_ - on_disk_ <= kMostOnTheWay) return;
+  const auto [oldest, bytes] = range(on_disk_, begun_ - kMostOnTheWay);
+  ::sync_file_range(file_.get(), oldest, bytes,
+                    SYNC_FILE_RANGE_WAIT_BEFORE | SYNC_FILE_RANGE_WRITE |
+                        SYNC_FILE_RANGE_WAIT_AFTER);
+  ::posix_fadvise(file_.get(), oldest, bytes, POSIX_FADV_DONTNEED);
+  on_disk_ = begun_ - kMostOnTheWay;
 }
 
 void GrowingFile::commit() {

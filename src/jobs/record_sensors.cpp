@@ -46,7 +46,8 @@ constexpr std::int64_t kLongestPoll = 20 * kMillisecond;
 constexpr std::int64_t kWatchPeriod = 500 * kMillisecond;
 /// How long the end of a recording waits for the estimate of what came last, s.
 constexpr double kLongestFinish = 2;
-constexpr std::size_t kReceiveBuffer = std::size_t{4} << 20U;
+/// Half a second of an Avia at ten times its speed.
+constexpr std::size_t kReceiveBuffer = std::size_t{16} << 20U;
 constexpr std::size_t kMostStatuses = 100;
 constexpr std::size_t kMostPassiveSensors = 16;
 /// Of a status: anything but what a healthy sensor reports (PPS, PTP, time synchronisation).

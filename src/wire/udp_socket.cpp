@@ -182,7 +182,10 @@ UdpSocket::UdpSocket(const Endpoint& local, std::size_t receive_buffer, const st
   }
   if (receive_buffer > 0) {
     const int asked = static_cast<int>(std::min<std::size_t>(receive_buffer, 1U << 30U));
-    set(SO_RCVBUF, &asked, sizeof asked);
+    // Who administers the network gets more than the system allows everybody.
+    if (::setsockopt(socket_.get(), SOL_SOCKET, SO_RCVBUFFORCE, &asked, sizeof asked) != 0) {
+      set(SO_RCVBUF, &asked, sizeof asked);
+    }
     int granted = 0;
     socklen_t bytes = sizeof granted;
     if (::getsockopt(socket_.get(), SOL_SOCKET, SO_RCVBUF, &granted, &bytes) != 0) {

@@ -7,8 +7,12 @@
 #include <fstream>
 #include <iterator>
 
+#include <fcntl.h>
 #include <gtest/gtest.h>
+#include <linux/magic.h>
+#include <sys/mman.h>
 #include <sys/resource.h>
+#include <sys/statfs.h>
 
 #include "risley/core/error.hpp"
 
@@ -26,6 +30,16 @@ std::vector<std::uint8_t> bytes(std::size_t count, int value) {
 std::string content(const std::string& path) {
   std::ifstream file(path, std::ios::binary);
   return {std::istreambuf_iterator<char>(file), {}};
+}
+
+/// Whether the system holds the byte of a file in memory.
+bool is_in_memory(const std::string& path, std::size_t byte) {
+  const FileDescriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
+  void* page = ::mmap(nullptr, 1, PROT_READ, MAP_SHARED, file.get(), static_cast<off_t>(byte));
+  unsigned char resident = 0;
+  EXPECT_EQ(::mincore(page, 1, &resident), 0);
+  ::munmap(page, 1);
+  return (resident & 1U) != 0;
 }
 
 /// No file of this process can become longer, as on a full disk.
@@ -77,6 +91,19 @@ TEST_F(GrowingFileTest, WhatWaitsIsWrittenAtTheEnd) {
     for (int i = 0; i < 50; ++i) file.append(bytes(1 << 20, i));  // more than may wait
   }
   EXPECT_EQ(fs::file_size(unfinished_), std::uintmax_t{50} << 20U);
+}
+
+// A recording that fills the memory makes the system drop packets.
+TEST_F(GrowingFileTest, WhatIsOnTheDiskLeavesMemory) {
+  GrowingFile file(path_);
+  struct statfs system {};
+  ASSERT_EQ(::statfs(unfinished_.c_str(), &system), 0);
+  if (system.f_type == TMPFS_MAGIC) GTEST_SKIP() << "a file system that is in memory";
+  for (int i = 0; i < 96; ++i) file.append(bytes(1 << 20, i));
+  file.settle();
+  EXPECT_FALSE(is_in_memory(unfinished_, 0));
+  EXPECT_TRUE(is_in_memory(unfinished_, std::size_t{90} << 20U));
+  EXPECT_EQ(content(unfinished_).at((std::size_t{5} << 20U) + 7), '\5');
 }
 
 TEST_F(GrowingFileTest, ADiskThatRefusesEndsTheFileBefore) {

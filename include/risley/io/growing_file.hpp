@@ -60,6 +60,7 @@ class GrowingFile {
   GrowingFile(const std::string& path, const FileTarget& target);
   void write_what_comes();
   void write(const std::vector<std::uint8_t>& bytes);
+  void hand_to_disk();
   void end_thread();
 
   std::string path_, target_, unfinished_path_;
@@ -73,7 +74,8 @@ class GrowingFile {
   std::vector<std::uint8_t> spare_;
   std::exception_ptr failure_;
   bool ending_ = false;
-  std::uint64_t written_ = 0, begun_ = 0;  ///< of the thread: bytes in the file, toward the disk
+  /// Of the thread: bytes in the file, of which so many went toward the disk and are there.
+  std::uint64_t written_ = 0, begun_ = 0, on_disk_ = 0;
   std::thread thread_;
 };
 

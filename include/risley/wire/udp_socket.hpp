@@ -43,7 +43,8 @@ Interface interface_of(const std::string& address);
 class UdpSocket {
  public:
   /// @param local           address and port to bind; port 0: any that is free
-  /// @param receive_buffer  bytes to ask for; 0: the system's usual
+  /// @param receive_buffer  bytes to ask for, beyond what the system allows everybody where this
+  ///                        user may; 0: the usual
   /// @param device          takes only what arrives at this interface; empty: whatever is for the
   ///                        address. For broadcast addresses, which several programs may share.
   /// @throws NetworkError
