@@ -169,7 +169,8 @@ bool RunningEstimate::Work::add(const recordings::Observations& rows, const Prog
 /// @return whether the piece was looked at
 bool RunningEstimate::Work::end_piece(const Progress& progress) {
   AngleSeries series = std::exchange(series_, {});
-  if (series.size() < kFewestRunningShots || series.duration() < kLeastPieceFilled * options_.piece) {
+  if (series.size() < kFewestRunningShots ||
+      series.duration() < kLeastPieceFilled * options_.piece) {
     ++state_.short_pieces;
     return false;
   }

@@ -151,9 +151,9 @@ void GrowingFile::hand_to_disk() {
   begun_ = written_;
   if (begun_ - on_disk_ <= kMostOnTheWay) return;
   const auto [oldest, bytes] = range(on_disk_, begun_ - kMostOnTheWay);
-  ::sync_file_range(file_.get(), oldest, bytes,
-                    SYNC_FILE_RANGE_WAIT_BEFORE | SYNC_FILE_RANGE_WRITE |
-                        SYNC_FILE_RANGE_WAIT_AFTER);
+  ::sync_file_range(
+      file_.get(), oldest, bytes,
+      SYNC_FILE_RANGE_WAIT_BEFORE | SYNC_FILE_RANGE_WRITE | SYNC_FILE_RANGE_WAIT_AFTER);
   ::posix_fadvise(file_.get(), oldest, bytes, POSIX_FADV_DONTNEED);
   on_disk_ = begun_ - kMostOnTheWay;
 }

@@ -17,12 +17,13 @@
 
 #include <fmt/format.h>
 #include <microhttpd.h>
-#include <netinet/in.h>
 #include <sys/socket.h>
 
 #include "risley/core/error.hpp"
 #include "risley/io/block_file.hpp"
 #include "risley/wire/udp_socket.hpp"
+
+#include "wire/system_address.hpp"
 
 namespace risley::wire {
 namespace {
@@ -82,15 +83,12 @@ io::FileDescriptor listening_socket(Endpoint& local) {
   refuse_if(socket.get() < 0);
   const int on = 1;  // a port whose last connections have not timed out yet is free
   refuse_if(::setsockopt(socket.get(), SOL_SOCKET, SO_REUSEADDR, &on, sizeof on) != 0);
-  sockaddr_in address{};
-  address.sin_family = AF_INET;
-  address.sin_port = htons(local.port);
-  std::memcpy(&address.sin_addr, local.address.bytes.data(), local.address.bytes.size());
+  sockaddr_in address = system_address(local);
   socklen_t bytes = sizeof address;
-  auto* any = reinterpret_cast<sockaddr*>(&address);
-  refuse_if(::bind(socket.get(), any, bytes) != 0 || ::listen(socket.get(), SOMAXCONN) != 0 ||
-            ::getsockname(socket.get(), any, &bytes) != 0);
-  local.port = ntohs(address.sin_port);
+  refuse_if(::bind(socket.get(), any_address(&address), bytes) != 0 ||
+            ::listen(socket.get(), SOMAXCONN) != 0 ||
+            ::getsockname(socket.get(), any_address(&address), &bytes) != 0);
+  local = endpoint_of(address);
   return socket;
 }
 

@@ -9,7 +9,6 @@
 #include <ctime>
 #include <utility>
 
-#include <arpa/inet.h>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <ifaddrs.h>
@@ -19,38 +18,12 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include "wire/system_address.hpp"
+
 namespace risley::wire {
 namespace {
 
 constexpr std::int64_t kNanoseconds = 1'000'000'000;
-
-sockaddr_in system_address(const Endpoint& endpoint) {
-  sockaddr_in address{};
-  address.sin_family = AF_INET;
-  address.sin_port = htons(endpoint.port);
-  std::memcpy(&address.sin_addr, endpoint.address.bytes.data(), endpoint.address.bytes.size());
-  return address;
-}
-
-Address address_of(const sockaddr_in& system) {
-  Address address;
-  std::memcpy(address.bytes.data(), &system.sin_addr, address.bytes.size());
-  return address;
-}
-
-Endpoint endpoint_of(const sockaddr_in& system) {
-  return {address_of(system), ntohs(system.sin_port)};
-}
-
-/// The calls of BSD sockets take one type of address for all.
-template <class System>
-auto* any_address(System* address) {
-  if constexpr (std::is_const_v<System>) {
-    return reinterpret_cast<const sockaddr*>(address);
-  } else {
-    return reinterpret_cast<sockaddr*>(address);
-  }
-}
 
 [[noreturn]] void refuse(const Endpoint& local, int error) {
   std::string remedy;
