@@ -10,6 +10,7 @@ import struct
 import time
 import unittest
 
+import lvx_file
 import schemas
 from command import ProcessTest
 from livox_peer import SENSOR_PORT, TYPES, Host, bound, frame, parse
@@ -112,17 +113,8 @@ class EmulateTest(ProcessTest):
         rows = b"".join(one[18:] for one in packets)[:9 * 10_000]
         simulated = (self.folder / "room.lvx").read_bytes()
         # The same seed makes the same shots; the simulation rounds them as the packets do.
-        told = b"".join(simulated[at + 18:at + 918] for at in self.package_places(simulated))
+        told = b"".join(one[18:] for _, one in lvx_file.packets(simulated))
         self.assertEqual(rows, told)
-
-    @staticmethod
-    def package_places(data):
-        at, places = 29 + 59 * data[28], []
-        while at < len(data):
-            following = struct.unpack_from("<Q", data, at + 8)[0]
-            places += range(at + 25, following, 919)
-            at = following
-        return places
 
     def test_inertial_samples(self):
         self.emulate("--sensor", "avia")
@@ -251,11 +243,7 @@ class EmulateTest(ProcessTest):
         host.ask(0, 4, b"\1")
         rows = b"".join(one[18:] for one in host.receive(0.5) if header(one)[4] == 3)
         simulated = (self.folder / "source.lvx").read_bytes()
-        at, told = 29 + 59, b""
-        while at < len(simulated):
-            following = struct.unpack_from("<Q", simulated, at + 8)[0]
-            told += b"".join(simulated[one + 19:one + 979] for one in range(at + 24, following, 979))
-            at = following
+        told = b"".join(one[18:] for _, one in lvx_file.packets(simulated))
         # Depths and angles of every shot, and once more from the beginning; the tags are the emulator's.
         points = [rows[at:at + 9] for at in range(0, len(rows), 10)]
         source = [told[at:at + 9] for at in range(0, len(told), 10)]

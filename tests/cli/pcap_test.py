@@ -9,10 +9,10 @@ import time
 import unittest
 
 import captures
+import lvx_file
 from captures import HOST, framed, pcap, pcapng, udp
 from command import COMMAND, CommandTest
 from livox_peer import AVIA, MID_40, MID_70, TYPES, Host, bound, frame, packet
-from record_test import lvx_packets
 
 BEGIN = 1_790_000_000 * 10**9
 MID, OTHER = ("192.168.1.41", 65000), ("192.168.1.42", 65000)
@@ -42,7 +42,8 @@ class PcapTest(CommandTest):
         """Device table and packets, as convert writes them."""
         out = name + ".lvx"
         self.expect(status, "convert", name, "-o", out)
-        return lvx_packets((self.folder / out).read_bytes())
+        data = (self.folder / out).read_bytes()
+        return lvx_file.devices(data), list(lvx_file.packets(data))
 
     def warnings(self, name, status=0):
         return [one["message"] for one in self.expect_json(status, "info", name)["warnings"]]
@@ -210,7 +211,7 @@ class PcapTest(CommandTest):
         self.assertEqual(recorder.returncode, 0, out)
         said = (BEGIN, framed(1, udp(("127.0.0.61", 65000), ("255.255.255.255", 55000), hello)))
         devices, packets = self.packets(self.write("live.pcap", pcap([said] + records, nanoseconds=True)))
-        _, recorded = lvx_packets((self.folder / "live.lvx").read_bytes())
+        recorded = list(lvx_file.packets((self.folder / "live.lvx").read_bytes()))
         self.assertEqual(devices, [("CAPTURED0000011", 0, AVIA)])
         for inertial in (False, True):
             self.assertEqual([data for _, data in recorded if (data[9] == 6) == inertial],

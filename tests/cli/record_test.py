@@ -10,31 +10,11 @@ import sys
 import time
 import unittest
 
+import lvx_file
 from command import COMMAND, CommandTest
-from livox_peer import AVIA, HORIZON, MID_40, MID_70, SENSOR_PORT, TYPES, Sensor, bound, frame, packet
+from livox_peer import AVIA, HORIZON, MID_40, MID_70, SENSOR_PORT, Sensor, bound, frame, packet
 
 HOST = "127.0.0.1"
-
-
-def lvx_packets(data):
-    """Device index and bytes of every packet of an LVX 1.1 file, and its device table."""
-    assert data[:10] == b"livox_tech" and data[16:20] == b"\1\1\0\0"
-    count, at, packets = data[28], 29, []
-    devices = []
-    for _ in range(count):
-        devices.append((data[at:at + 16].rstrip(b"\0").decode(), data[at + 32], data[at + 33]))
-        at += 59
-    index = 0
-    while at < len(data):
-        current, following, number = struct.unpack_from("<QQQ", data, at)
-        assert current == at and following <= len(data) and number == index
-        at, index = at + 24, index + 1
-        while at < following:
-            records, size, _, _ = TYPES[data[at + 10]]
-            length = 18 + records * size
-            packets.append((data[at], data[at + 1:at + 1 + length]))
-            at += 1 + length
-    return devices, packets
 
 
 class RecordTest(CommandTest):
@@ -65,7 +45,8 @@ class RecordTest(CommandTest):
         return out, err
 
     def packets(self, name):
-        return lvx_packets((self.folder / name).read_bytes())
+        data = (self.folder / name).read_bytes()
+        return lvx_file.devices(data), list(lvx_file.packets(data))
 
     def times(self, name, device=0):
         return [struct.unpack_from("<Q", data, 10)[0] for index, data in self.packets(name)[1]

@@ -10,12 +10,11 @@ import os
 import pathlib
 import shutil
 import signal
-import struct
 import time
 import unittest
 
+import lvx_file
 from command import SOURCE, ProcessTest
-from livox_peer import TYPES
 
 SECONDS = float(os.environ.get("RISLEY_THREE_SENSORS_S", "2"))  # of this machine
 LONG = SECONDS >= 60
@@ -26,27 +25,10 @@ IMU = 6
 TICKS = os.sysconf("SC_CLK_TCK")
 
 
-def packets_of(data):
-    """(device, data type, time stamp, points or sample) of every packet of a frame."""
-    at = 0
-    while at < len(data):
-        kind = data[at + 10]
-        following = at + 19 + TYPES[kind][0] * TYPES[kind][1]
-        yield data[at], kind, int.from_bytes(data[at + 11:at + 19], "little"), data[at + 19:following]
-        at = following
-
-
-def frames_of(data):
-    """Bytes of every frame, and the serial numbers of the devices."""
-    devices = [data[at:at + 16].rstrip(b"\0").decode() for at in range(29, 29 + 59 * data[28], 59)]
-
-    def frames():
-        at = 29 + 59 * len(devices)
-        while at < len(data):
-            following = struct.unpack_from("<Q", data, at + 8)[0]
-            yield data[at + 24:following]
-            at = following
-    return devices, frames()
+def data_packets(data):
+    """(index of the device, data type, time stamp, records) of every packet of a recording."""
+    for device, packet in lvx_file.packets(data):
+        yield device, packet[9], int.from_bytes(packet[10:18], "little"), packet[18:]
 
 
 def without_tags(kind, points):
@@ -63,9 +45,8 @@ class ThreeSensorsTest(ProcessTest):
         name = f"{sensor}.lvx"
         self.expect(0, "simulate", "-o", name, "--sensor", sensor, "--rotor", "hunting", "--duration-s",
                     10 if LONG else 1, "--scene", SOURCE / "data/room.yaml", "--seed", 5)
-        data = (self.folder / name).read_bytes()
-        return [without_tags(kind, points) for frame in frames_of(data)[1]
-                for _, kind, _, points in packets_of(frame) if kind != IMU]
+        return [without_tags(kind, points)
+                for _, kind, _, points in data_packets((self.folder / name).read_bytes()) if kind != IMU]
 
     def figures(self, process):
         """Processor time so far, s, and most memory of its own, kB."""
@@ -121,27 +102,25 @@ class ThreeSensorsTest(ProcessTest):
         seen, samples, first, cycles = [0] * len(codes), [0] * len(codes), [None] * len(codes), [[] for _ in codes]
         with open(self.folder / "three.lvx", "rb") as file, \
                 mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
-            devices, frames = frames_of(data)
-            order = [codes.index(device) for device in devices]
-            for frame in frames:
-                for device, kind, stamp, points in packets_of(frame):
-                    i = order[device]
-                    if kind == IMU:
-                        samples[i] += 1
-                        continue
-                    _, expected, step = SENSORS[i]
-                    number, cycle = seen[i], cycles[i]
-                    if first[i] is None:
-                        first[i] = stamp
-                    self.assertEqual(kind, expected)
-                    if stamp != first[i] + number * step:
-                        self.fail(f"packet {number} of {codes[i]}: time {stamp}")
-                    if number < len(sent[i]):
-                        self.assertEqual(without_tags(kind, points), sent[i][number], f"packet {number} of {codes[i]}")
-                        cycle.append(points)
-                    elif points != cycle[number % len(cycle)]:
-                        self.fail(f"packet {number} of {codes[i]}: other points")
-                    seen[i] += 1
+            order = [codes.index(serial) for serial, *_ in lvx_file.devices(data)]
+            for device, kind, stamp, points in data_packets(data):
+                i = order[device]
+                if kind == IMU:
+                    samples[i] += 1
+                    continue
+                _, expected, step = SENSORS[i]
+                number, cycle = seen[i], cycles[i]
+                if first[i] is None:
+                    first[i] = stamp
+                self.assertEqual(kind, expected)
+                if stamp != first[i] + number * step:
+                    self.fail(f"packet {number} of {codes[i]}: time {stamp}")
+                if number < len(sent[i]):
+                    self.assertEqual(without_tags(kind, points), sent[i][number], f"packet {number} of {codes[i]}")
+                    cycle.append(points)
+                elif points != cycle[number % len(cycle)]:
+                    self.fail(f"packet {number} of {codes[i]}: other points")
+                seen[i] += 1
         return seen, samples
 
 
