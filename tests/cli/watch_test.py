@@ -39,7 +39,8 @@ class WatchTest(ProcessTest):
         return self.start("emulate", "--interface", address, "--serial", code, "--rotor", "hunting", *arguments)
 
     def record(self, name, *arguments, code=CODE, **options):
-        return self.start("record", "-o", name, "--interface", HOST, "--serial", code, *arguments, **options)
+        return self.start("record", "-o", name, "--interface", HOST, "--serial", code, "--find-s", 20, *arguments,
+                          **options)
 
     def page(self, process):
         """Address and port of a recording's page."""
@@ -128,7 +129,10 @@ class WatchTest(ProcessTest):
         while b"getting to know them" not in shown.replace(b"\r\n", b""):
             self.assertLess(time.monotonic(), end, shown)
             if select.select([controller], [], [], 1)[0]:
-                shown += os.read(controller, 4096)
+                try:
+                    shown += os.read(controller, 4096)
+                except OSError:  # nobody has the terminal any more
+                    self.fail((process.wait(), shown))
         process.send_signal(signal.SIGTERM)
         out, _ = process.communicate(timeout=20)
         self.assertEqual(process.returncode, 0)
