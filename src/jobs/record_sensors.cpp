@@ -99,7 +99,8 @@ class Recorder {
   void take_broadcasts(std::int64_t now);
   void tell_of_newcomer(const FoundSensor& heard);
   void take_commands(LiveSensor& live, std::int64_t now);
-  void take_data(LiveSensor& live, std::int64_t now);
+  /// @return how many datagrams there were, of strangers too
+  std::size_t take_data(LiveSensor& live, std::int64_t now);
   void watch_silence(LiveSensor& live, std::int64_t now);
   void write_frame(bool last);
   void stop_all();
@@ -343,7 +344,7 @@ void Recorder::take_commands(LiveSensor& live, std::int64_t now) {
   });
 }
 
-void Recorder::take_data(LiveSensor& live, std::int64_t now) {
+std::size_t Recorder::take_data(LiveSensor& live, std::int64_t now) {
   const auto take = [&](LiveSensor& whose, const wire::UdpSocket::Datagram& datagram) {
     if (!whose.order.add(datagram.bytes, datagram.kernel_ns)) return;
     if (!first_data_ns_) first_data_ns_ = now;
@@ -351,7 +352,7 @@ void Recorder::take_data(LiveSensor& live, std::int64_t now) {
     whose.data_ns = now;
   };
   if (passive_data_) {
-    passive_data_->receive([&](const wire::UdpSocket::Datagram& datagram) {
+    return passive_data_->receive([&](const wire::UdpSocket::Datagram& datagram) {
       for (const auto& one : sensors_) {
         if (one->result.sensor.address == datagram.from.address) {
           take(*one, datagram);
@@ -360,11 +361,10 @@ void Recorder::take_data(LiveSensor& live, std::int64_t now) {
       }
       ++passive_strangers_;
     });
-    return;
   }
   // From the handshake on, and from nobody but whom it was shaken with.
   const bool connected = live.session && live.result.sessions > 0;
-  live.data->receive([&](const wire::UdpSocket::Datagram& datagram) {
+  return live.data->receive([&](const wire::UdpSocket::Datagram& datagram) {
     if (connected && datagram.from.address == live.result.sensor.address) {
       take(live, datagram);
     } else {
@@ -432,13 +432,13 @@ void Recorder::stop_all() {
   for (std::int64_t now = begin; !all_stopped() && now - begin < kLongestStop; now = steady_ns()) {
     step(now, begin + kLongestStop);
   }
-  // What came before the sensors stopped is still in the kernel.
+  // What came before the sensors stopped is still in the kernel, among what strangers sent.
   constexpr int kMostRounds = 1000;
   for (int round = 0; round < kMostRounds && !sensors_.empty(); ++round) {
-    const std::int64_t before = last_data_ns_;
     const std::int64_t now = steady_ns();
-    for (const auto& live : sensors_) take_data(*live, now);
-    if (last_data_ns_ == before) break;
+    std::size_t datagrams = 0;
+    for (const auto& live : sensors_) datagrams += take_data(*live, now);
+    if (datagrams == 0) break;
   }
 }
 
