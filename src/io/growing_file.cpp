@@ -19,7 +19,7 @@ namespace risley::io {
 namespace {
 
 constexpr std::uint64_t kBeginBytes = std::uint64_t{8} << 20U;
-/// Bytes that may be on their way to the disk: a second of what kMostWaiting is half a second of.
+/// Bytes that may be on their way to the disk: a second of three sensors at ten times their speed.
 constexpr std::uint64_t kMostOnTheWay = std::uint64_t{64} << 20U;
 
 FileTarget target_of(const std::string& path) {
@@ -143,19 +143,24 @@ void GrowingFile::write(const std::vector<std::uint8_t>& bytes) {
 /// makes writers wait until they are on the disk. What is there leaves memory: a file that fills it
 /// makes the system look for pages while packets wait.
 void GrowingFile::hand_to_disk() {
-  const auto range = [&](std::uint64_t from, std::uint64_t to) {
-    return std::pair{static_cast<off_t>(from), static_cast<off_t>(to - from)};
+  const auto sync = [&](std::uint64_t from, std::uint64_t to, unsigned how) {
+    return ::sync_file_range(file_.get(), static_cast<off_t>(from), static_cast<off_t>(to - from),
+                             how);
   };
-  const auto [begin, length] = range(begun_, written_);
-  ::sync_file_range(file_.get(), begin, length, SYNC_FILE_RANGE_WRITE);
+  sync(begun_, written_, SYNC_FILE_RANGE_WRITE);
   begun_ = written_;
   if (begun_ - on_disk_ <= kMostOnTheWay) return;
-  const auto [oldest, bytes] = range(on_disk_, begun_ - kMostOnTheWay);
-  ::sync_file_range(
-      file_.get(), oldest, bytes,
-      SYNC_FILE_RANGE_WAIT_BEFORE | SYNC_FILE_RANGE_WRITE | SYNC_FILE_RANGE_WAIT_AFTER);
-  ::posix_fadvise(file_.get(), oldest, bytes, POSIX_FADV_DONTNEED);
-  on_disk_ = begun_ - kMostOnTheWay;
+  const std::uint64_t settled = begun_ - kMostOnTheWay;
+  // Who waits is told of a disk that failed, and nobody after him: commit() would not be.
+  if (sync(on_disk_, settled,
+           SYNC_FILE_RANGE_WAIT_BEFORE | SYNC_FILE_RANGE_WRITE | SYNC_FILE_RANGE_WAIT_AFTER) != 0 &&
+      (errno == EIO || errno == ENOSPC || errno == EDQUOT)) {
+    throw FileError(unfinished_path_, {on_disk_, {}},
+                    fmt::format("cannot be written: {}", std::strerror(errno)));
+  }
+  ::posix_fadvise(file_.get(), static_cast<off_t>(on_disk_), static_cast<off_t>(settled - on_disk_),
+                  POSIX_FADV_DONTNEED);
+  on_disk_ = settled;
 }
 
 void GrowingFile::commit() {

@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: MIT
 #include "risley/io/growing_file.hpp"
 
+#include <atomic>
+#include <cerrno>
 #include <csignal>
 #include <filesystem>
 #include <fstream>
@@ -13,10 +15,28 @@
 #include <sys/mman.h>
 #include <sys/resource.h>
 #include <sys/statfs.h>
+#include <sys/syscall.h>
+#include <unistd.h>
 
 #include "risley/core/error.hpp"
 
 #include "io/temporary_folder.hpp"
+
+namespace {
+
+/// Whether the disk fails those who wait for it.
+std::atomic<bool> disk_fails{false};
+
+}  // namespace
+
+// Instead of the system library's.
+extern "C" int sync_file_range(int file, off64_t from, off64_t bytes, unsigned how) {
+  if (disk_fails && (how & SYNC_FILE_RANGE_WAIT_AFTER) != 0) {
+    errno = EIO;
+    return -1;
+  }
+  return static_cast<int>(::syscall(SYS_sync_file_range, file, from, bytes, how));
+}
 
 namespace risley::io {
 namespace {
@@ -104,6 +124,20 @@ TEST_F(GrowingFileTest, WhatIsOnTheDiskLeavesMemory) {
   EXPECT_FALSE(is_in_memory(unfinished_, 0));
   EXPECT_TRUE(is_in_memory(unfinished_, std::size_t{90} << 20U));
   EXPECT_EQ(content(unfinished_).at((std::size_t{5} << 20U) + 7), '\5');
+}
+
+// The system tells it once, and not again when the file gets its name.
+TEST_F(GrowingFileTest, ADiskThatFailsLaterIsToldOf) {
+  GrowingFile file(path_);
+  disk_fails = true;
+  const auto write = [&] {
+    for (int i = 0; i < 96; ++i) file.append(bytes(1 << 20, i));
+    file.settle();
+  };
+  EXPECT_THROW(write(), FileError);
+  disk_fails = false;
+  EXPECT_THROW(file.commit(), FileError);
+  EXPECT_FALSE(fs::exists(path_));
 }
 
 TEST_F(GrowingFileTest, ADiskThatRefusesEndsTheFileBefore) {
