@@ -52,6 +52,7 @@ if("avx2" IN_LIST RISLEY_INSTRUCTION_SETS)
 endif()
 
 risley_add_kernels(optics)
+risley_add_kernels(recordings)
 risley_add_kernels(estimation)
 risley_add_kernels(calibration)
 risley_add_kernels(cloud)

@@ -52,9 +52,12 @@ class TimeSpanReader final : public DecoratingReader {
     const std::int64_t low = saturating_difference(*first_ns_, kLongestTimeSpan_ns),
                        high = saturating_sum(*first_ns_, kLongestTimeSpan_ns);
     const auto is_far = [low, high](std::int64_t time_ns) {
-      return time_ns < low || time_ns > high;
+      return (time_ns < low) | (time_ns > high);
     };
-    const auto row = std::find_if(times.begin(), times.end(), is_far);
+    // All at once: looking row by row took 5 % of the time of reading LVX.
+    bool any_far = false;
+    for (const std::int64_t time_ns : times) any_far |= is_far(time_ns);
+    const auto row = any_far ? std::find_if(times.begin(), times.end(), is_far) : times.end();
     const auto sample = std::find_if(chunk.imu.begin(), chunk.imu.end(),
                                      [&](const ImuSample& imu) { return is_far(imu.time_ns); });
     if (row == times.end() && sample == chunk.imu.end()) {

@@ -10,91 +10,40 @@
 #include <vector>
 
 #include <fmt/format.h>
-#include <xsimd/xsimd.hpp>
 
 #include "risley/core/require.hpp"
 #include "risley/core/saturating.hpp"
 #include "risley/io/little_endian.hpp"
 
 #include "recordings/formats/cartesian.hpp"
-#include "recordings/livox/spherical_record.hpp"
+#include "recordings/spherical_kernel.hpp"
 
 namespace risley::recordings::livox {
 namespace {
 
 using io::load;
 
-/// Angles in radians, from numbers of 0.01 deg that a double holds.
-/// @param count  a multiple of the batch's size
-void to_radians(const double* centidegrees, std::size_t count, double* radians) {
-  using Batch = xsimd::batch<double>;
-  for (std::size_t i = 0; i < count; i += Batch::size) {
-    const Batch degrees = Batch::load_unaligned(centidegrees + i) / Batch(100.0);
-    (degrees * Batch(kRadiansPerDegree)).store_unaligned(radians + i);
-  }
-}
-
-/// Column by column, which compilers turn into wide instructions.
 /// @return number of the first record that no sensor can have sent
-template <int kReturns, bool kTagged>
-std::optional<std::size_t> decode_spherical(std::size_t records, const std::uint8_t* bytes,
-                                            Observations& o, std::size_t row) {
-  constexpr std::size_t kBytes = kReturns == 1 ? (kTagged ? 10 : 9) : 4 + 6 * kReturns;
-  constexpr std::size_t kBlock = 128;  // all records of a packet
-  constexpr auto kPerRecord = static_cast<std::size_t>(kReturns);
-  std::array<double, kBlock> azimuth, zenith;
-  for (std::size_t first = 0; first < records; first += kBlock) {
-    const std::size_t count = std::min(kBlock, records - first);
-    bool all_possible = true;
-    const std::uint8_t* from = bytes + first * kBytes;
-    const std::size_t begin = row + first * kPerRecord;
-    std::size_t to = begin;
-    for (std::size_t i = 0; i < count; ++i, from += kBytes) {
-      const int zenith_steps = load<std::uint16_t>(from + zenith_at(kReturns));
-      const int azimuth_steps = load<std::uint16_t>(from + zenith_at(kReturns) + 2);
-      // Beyond a full turn stand only angles that nobody trusts; they are kept as they are.
-      const bool over_half = azimuth_steps > kHalfTurn && azimuth_steps <= kFullTurn;
-      azimuth[i] = over_half ? azimuth_steps - kFullTurn : azimuth_steps;
-      zenith[i] = zenith_steps;
-      const bool possible = zenith_steps <= kHalfTurn && azimuth_steps <= kFullTurn;
-      for (int number = 0; number < kReturns; ++number, ++to) {
-        const auto depth = load<std::uint32_t>(from + depth_at(kReturns, number));
-        all_possible &= possible | (depth == 0);
-        o.range[to] = depth * kMillimetre;
-        o.valid[to] = depth > 0 ? 1 : 0;
-        o.intensity[to] = from[intensity_at(kReturns, number)];
-        o.tag[to] = kTagged ? from[intensity_at(kReturns, number) + 1] : 0;
-      }
-    }
-    if (!all_possible) {
-      for (std::size_t i = 0;; ++i) {
-        const bool possible = zenith[i] <= kHalfTurn && azimuth[i] <= kHalfTurn;
-        const auto shot = o.valid.begin() + static_cast<std::ptrdiff_t>(begin + i * kPerRecord);
-        if (!possible && std::find(shot, shot + kReturns, 1) != shot + kReturns) return first + i;
-      }
-    }
-    std::array<double, kBlock> azimuth_rad, zenith_rad;
-    std::fill(azimuth.begin() + static_cast<std::ptrdiff_t>(count), azimuth.end(), 0.0);
-    std::fill(zenith.begin() + static_cast<std::ptrdiff_t>(count), zenith.end(), 0.0);
-    to_radians(azimuth.data(), kBlock, azimuth_rad.data());
-    to_radians(zenith.data(), kBlock, zenith_rad.data());
-    to = begin;
-    for (std::size_t i = 0; i < count; ++i) {
-      const double azimuth_there = azimuth[i] == kHalfTurn ? kPi : azimuth_rad[i];
-      const double zenith_there = std::min(zenith_rad[i], zenith[i] <= kHalfTurn ? kPi : 1e3);
-      for (int number = 0; number < kReturns; ++number, ++to) {
-        o.azimuth[to] = azimuth_there;
-        o.zenith[to] = zenith_there;
-      }
-    }
-  }
-  const auto fill = [row, rows = records * kPerRecord](std::vector<float>& column, double step) {
-    std::fill_n(column.begin() + static_cast<std::ptrdiff_t>(row), rows, static_cast<float>(step));
-  };
-  fill(o.azimuth_resolution, kCentidegree);
-  fill(o.zenith_resolution, kCentidegree);
-  fill(o.range_resolution, kMillimetre);
-  return std::nullopt;
+std::optional<std::size_t> decode_spherical_records(const RecordLayout& layout,
+                                                    const std::uint8_t* bytes, Observations& o,
+                                                    std::size_t row) {
+  static const auto& kernel = RISLEY_KERNEL_COPIES(decode_spherical).at(best_instruction_set());
+  SphericalArguments a;
+  a.records = layout.records;
+  a.returns = layout.returns;
+  a.tagged = layout.tagged;
+  a.bytes = bytes;
+  a.azimuth = o.azimuth.data() + row;
+  a.zenith = o.zenith.data() + row;
+  a.range = o.range.data() + row;
+  a.azimuth_resolution = o.azimuth_resolution.data() + row;
+  a.zenith_resolution = o.zenith_resolution.data() + row;
+  a.range_resolution = o.range_resolution.data() + row;
+  a.intensity = o.intensity.data() + row;
+  a.tag = o.tag.data() + row;
+  a.valid = o.valid.data() + row;
+  const std::size_t sound = kernel(a);
+  return sound < a.records ? std::optional(sound) : std::nullopt;
 }
 
 template <bool kTagged>
@@ -193,7 +142,6 @@ void set_shots(const RecordLayout& layout, std::int64_t time_ns, const ShotGrid&
 /// @return number of the first record that no sensor can have sent
 std::optional<std::size_t> decode_points(const RecordLayout& layout, const std::uint8_t* bytes,
                                          Observations& o, std::size_t first_row) {
-  const std::size_t records = layout.records;
   if (layout.cartesian) {
     if (layout.tagged) {
       decode_cartesian<true>(layout.rows(), bytes, o, first_row);
@@ -202,12 +150,7 @@ std::optional<std::size_t> decode_points(const RecordLayout& layout, const std::
     }
     return std::nullopt;
   }
-  if (layout.returns == 1) {
-    return layout.tagged ? decode_spherical<1, true>(records, bytes, o, first_row)
-                         : decode_spherical<1, false>(records, bytes, o, first_row);
-  }
-  return layout.returns == 2 ? decode_spherical<2, true>(records, bytes, o, first_row)
-                             : decode_spherical<3, true>(records, bytes, o, first_row);
+  return decode_spherical_records(layout, bytes, o, first_row);
 }
 
 /// Puts the rows of records where a chunk's columns have room for them already.
