@@ -18,6 +18,10 @@ using Lanes = xsimd::batch_bool<double>;
 constexpr std::size_t kLanes = Batch::size;
 static_assert(kPointPadding % kLanes == 0);
 
+/// Shots that take each step of the model together: points with covariance take 22 % less time than
+/// group by group with AVX-512 (Zen 4), and no less with more.
+constexpr std::size_t kBlock = 16, kGroups = kBlock / kLanes;
+
 constexpr double kPi = 3.14159265358979323846;
 
 Batch load(const double* column, std::size_t at) { return Batch::load_unaligned(column + at); }
@@ -31,15 +35,6 @@ std::array<Vector3<Batch>, 2> vectors_across(const Vector3<Batch>& d) {
   const Batch b = d.y * d.z * a;
   return {Vector3<Batch>{-sign * d.y, one + sign * d.y * d.y * a, sign * b},
           Vector3<Batch>{-d.z, b, sign + d.z * d.z * a}};
-}
-
-template <int N>
-PreparedTrain<Batch, N> prepared(const double* parameters, const std::array<FaceOrder, N>& order,
-                                 PreparedDerivatives<Batch, N>* derivatives) {
-  std::array<Batch, parameter_count(N)> batch;
-  for (std::size_t i = 0; i < parameter_count(N); ++i) batch[i] = Batch(parameters[i]);
-  if (derivatives) *derivatives = prepare_derivatives<Batch, N>(batch, order);
-  return prepare<Batch, N>(batch, order);
 }
 
 /// A symmetric matrix in the frame of the beam: along the two vectors across it, and along it.
@@ -225,45 +220,61 @@ class Kernel : public Points {
       : Points(a),
         emitters_(a.parameters, a.emitters, a.beam),
         believed_emitters_(a.believed_parameters, a.emitters, a.beam) {
-    std::array<FaceOrder, N> order;
-    __builtin_memcpy(&order, a.face_order, sizeof(order));
-    train_ = prepared<N>(a.parameters, order, &derivatives_);
-    believed_ = prepared<N>(a.believed_parameters, order, nullptr);
+    train_ = prepared_train<Batch, N>(a.parameters, a.face_order);
+    believed_ = prepared_train<Batch, N>(a.believed_parameters, a.face_order);
+    derivatives_ = prepared_derivatives<Batch, N>(a.parameters, a.face_order, [&a](int place) {
+      for (int i = 0; i < a.place_count; ++i) {
+        if (a.places[i] == place) return true;
+      }
+      return false;
+    });
     for (int i = 0; i < parameter_count(TrainShape{N, a.emitters}); ++i) {
       same_ = same_ && a.parameters[i] == a.believed_parameters[i];
     }
     for (std::size_t i = 0; i < kFaces; ++i) face_position_[i] = Batch(a.face_position[i]);
   }
 
-  /// Shots [at, at + kLanes).
-  [[gnu::flatten]] void compute(std::size_t at) {
-    if (emitters_.several()) turn_to(at);
-    std::array<Batch, N> angles;
-    for (std::size_t k = 0; k < N; ++k) angles[k] = load(a_.rotation_angle[k], at);
-    const auto forward = trace_forward(train_, angles);
-    const auto path = beam_path(forward, face_position_);
-    const Sines azimuth = sines(a_.azimuth, at), zenith = sines(a_.zenith, at);
-    Ray ray{path.origin(), forward.direction(), {}};
-    if (a_.reported_directions) {
-      set_reported(azimuth, zenith, ray);
-      // The last face can stop a beam that has an origin.
-      ray.direction =
-          xsimd::select(forward.valid(), Batch(1.0), Batch(__builtin_nan(""))) * ray.direction;
-    } else {
-      ray.across = vectors_across(ray.direction);
+  /// The groups of shots [at, end), which take each step of the model together: see
+  /// AngleLinearisations. @param end  at most kBlock later
+  [[gnu::flatten]] void compute(std::size_t at, std::size_t end) {
+    const std::size_t groups = (end - at) / kLanes;
+    for (std::size_t g = 0; g < groups; ++g) {
+      turn_to(at + g * kLanes);
+      trace_[g].beam[0] = train_.incident;
+      believed_beam_[g] = believed_.incident;
     }
-    const Batch range = load(a_.range, at) - Batch(a_.range_offset);
-    const Batch cosine = store_point(at, ray, range);
-    if (a_.azimuth_residual) store_residuals(at, forward, azimuth, zenith);
+    for (std::size_t k = 0; k < N; ++k) {
+      for (std::size_t g = 0; g < groups; ++g) {
+        turn_prism(load(a_.rotation_angle[k], at + g * kLanes), k, trace_[g]);
+      }
+    }
+#pragma GCC unroll 4  // gcc 12 keeps batches in registers only where indices are constants
+    for (std::size_t k = 0; k < N; ++k) {
+      for (std::size_t g = 0; g < groups; ++g) {
+        pass_prism(train_, k, trace_[g]);
+        set_inside(train_, k, trace_[g]);
+      }
+    }
+    for (std::size_t g = 0; g < groups; ++g) find_point(at + g * kLanes, g);
+    if (a_.azimuth_residual) {
+      if (!same_) trace_again(groups);
+      for (std::size_t g = 0; g < groups; ++g) store_residuals(at + g * kLanes, g);
+    }
     if (!a_.covariance[0]) return;
 
-    const auto jacobian =
-        linearise_point(train_, derivatives_, forward, path, face_position_, ray.across, range);
-    BeamCovariance own = own_covariance(at, jacobian, zenith, range);
-    own.dd = own.dd + range_noise(at, range, cosine);
-    if (a_.own_covariance[0]) store_covariance(at, ray, own, a_.own_covariance);
-    add_factors(at, jacobian, ray, range, own);
-    store_covariance(at, ray, own, a_.covariance);
+    for (std::size_t g = 0; g < groups; ++g) turn_back(g);
+#pragma GCC unroll 4
+    for (std::size_t k = 0; k < N; ++k) {
+      for (std::size_t g = 0; g < groups; ++g) {
+        reverse_prism(train_, derivatives_, trace_[g], N - 1 - k, pass_[g],
+                      [&origin = origin_[g]](std::size_t face, std::size_t r, Vector3<Batch>& beam,
+                                             Vector3<Batch>& normal) {
+                        beam = beam + origin[r].incident[face];
+                        normal = normal + origin[r].normal[face];
+                      });
+      }
+    }
+    for (std::size_t g = 0; g < groups; ++g) store_covariances(at + g * kLanes, g);
   }
 
  private:
@@ -277,12 +288,53 @@ class Kernel : public Points {
     believed_emitters_.apply(believed_);
   }
 
+  /// Point and directions across the beam of a group.
+  void find_point(std::size_t at, std::size_t g) {
+    path_[g] = beam_path(trace_[g], face_position_);
+    azimuth_[g] = sines(a_.azimuth, at);
+    zenith_[g] = sines(a_.zenith, at);
+    Ray& ray = ray_[g];
+    ray.origin = path_[g].origin();
+    ray.direction = trace_[g].direction();
+    if (a_.reported_directions) {
+      set_reported(azimuth_[g], zenith_[g], ray);
+      // The last face can stop a beam that has an origin.
+      ray.direction =
+          xsimd::select(trace_[g].valid(), Batch(1.0), Batch(__builtin_nan(""))) * ray.direction;
+    } else {
+      ray.across = vectors_across(ray.direction);
+    }
+    range_[g] = load(a_.range, at) - Batch(a_.range_offset);
+    cosine_[g] = store_point(at, ray, range_[g]);
+  }
+
+  /// How the components of a group's points across the beam depend on the faces and on the
+  /// direction: what the way back begins with.
+  void turn_back(std::size_t g) {
+    const std::array<Vector3<Batch>, 2>& across = ray_[g].across;
+    for (std::size_t r = 0; r < 2; ++r) {
+      origin_[g][r] = beam_path_adjoint(trace_[g], path_[g], face_position_, across[r]);
+    }
+    pass_[g] = begin_reverse<N>(
+        trace_[g].direction(),
+        std::array<Vector3<Batch>, 2>{range_[g] * across[0], range_[g] * across[1]});
+  }
+
+  void store_covariances(std::size_t at, std::size_t g) {
+    if (emitters_.several()) turn_to(at);
+    end_reverse(derivatives_, pass_[g]);
+    BeamCovariance c = own_covariance(at, g);
+    c.dd = c.dd + range_noise(at, range_[g], cosine_[g]);
+    if (a_.own_covariance[0]) store_covariance(at, ray_[g], c, a_.own_covariance);
+    add_factors(at, g, c);
+    store_covariance(at, ray_[g], c, a_.covariance);
+  }
+
   /// Reported direction minus that of the believed parameters. The series of the two angles are
   /// exact to 1e-8 of them up to 0.1 rad; larger ones only have to be large.
-  void store_residuals(std::size_t at, const Trace<Batch, N>& forward, const Sines& azimuth,
-                       const Sines& zenith) const {
-    Vector3<Batch> d = forward.direction();
-    if (!same_) d = trace_again(forward);
+  void store_residuals(std::size_t at, std::size_t g) const {
+    const Sines &azimuth = azimuth_[g], &zenith = zenith_[g];
+    const Vector3<Batch>& d = same_ ? trace_[g].direction() : believed_beam_[g];
     const Batch horizontal = xsimd::sqrt(d.x * d.x + d.y * d.y);
     const Batch across = azimuth.sine * d.x - azimuth.cosine * d.y;
     const Batch along = azimuth.cosine * d.x + azimuth.sine * d.y;
@@ -296,26 +348,25 @@ class Kernel : public Points {
   }
 
   /// The same rotation angles through the believed train.
-  Vector3<Batch> trace_again(const Trace<Batch, N>& forward) const {
-    Vector3<Batch> beam = believed_.incident;
+  void trace_again(std::size_t groups) {
 #pragma GCC unroll 8
     for (std::size_t i = 0; i < kFaces; ++i) {
       const auto& face = believed_.faces[i];
-      const Vector3<Batch> normal = face.normal.at(forward.sine[i / 2], forward.cosine[i / 2]);
-      beam = refract(beam, normal, face.index_ratio);
+      for (std::size_t g = 0; g < groups; ++g) {
+        const Vector3<Batch> normal =
+            face.normal.at(trace_[g].sine[i / 2], trace_[g].cosine[i / 2]);
+        believed_beam_[g] = refract(believed_beam_[g], normal, face.index_ratio);
+      }
     }
-    return beam;
   }
 
   /// What is independent from shot to shot, the range's noise aside.
-  BeamCovariance own_covariance(std::size_t at, const PointLinearisation<Batch, N>& jacobian,
-                                const Sines& zenith, const Batch& range) const {
+  BeamCovariance own_covariance(std::size_t at, std::size_t g) const {
     const Batch zero(0.0);
     BeamCovariance c{zero, zero, zero, zero, zero, zero};
-    const auto& u = jacobian.across[0];
-    const auto& v = jacobian.across[1];
+    const Gradient<Batch, N>&u = pass_[g].gradients[0], &v = pass_[g].gradients[1];
     if (a_.reported_directions) {
-      add_angle_noise(at, zenith, range, c);
+      add_angle_noise(at, zenith_[g], range_[g], c);
     } else {
       std::size_t pair = 0;
       for (std::size_t k = 0; k < N; ++k) {
@@ -344,33 +395,33 @@ class Kernel : public Points {
   }
 
   /// Adds the common factors' covariance and stores their loadings.
-  void add_factors(std::size_t at, const PointLinearisation<Batch, N>& jacobian, const Ray& ray,
-                   const Batch& range, BeamCovariance& c) const {
+  void add_factors(std::size_t at, std::size_t g, BeamCovariance& c) const {
     constexpr std::size_t kPlaces = EmitterLanes<Batch, N>::kPlaces;
     constexpr std::size_t kMostRows = kPlaces + N + kMostSizes;
     Batch u[kMostRows], v[kMostRows];
     std::size_t rows = 0;
     Batch u_storage[kPlaces], v_storage[kPlaces];
-    const Batch* u_by_place = emitters_.by_place(jacobian.across[0], u_storage);
-    const Batch* v_by_place = emitters_.by_place(jacobian.across[1], v_storage);
+    const Gradient<Batch, N>&by_u = pass_[g].gradients[0], &by_v = pass_[g].gradients[1];
+    const Batch* u_by_place = emitters_.by_place(by_u, u_storage);
+    const Batch* v_by_place = emitters_.by_place(by_v, v_storage);
     for (int i = 0; i < a_.place_count; ++i, ++rows) {
       u[rows] = u_by_place[a_.places[i]];
       v[rows] = v_by_place[a_.places[i]];
     }
     for (std::size_t k = 0; k < N; ++k, ++rows) {
-      u[rows] = jacobian.across[0].rotation_angles[k];
-      v[rows] = jacobian.across[1].rotation_angles[k];
+      u[rows] = by_u.rotation_angles[k];
+      v[rows] = by_v.rotation_angles[k];
     }
     for (int size = 0; size < a_.sizes; ++size) {
       const double* over = a_.face_over_size + static_cast<std::size_t>(size) * kFaces;
       u[rows] = v[rows] = Batch(0.0);
       for (std::size_t i = 0; i < kFaces; ++i) {
-        u[rows] = u[rows] + jacobian.face_position[0][i] * Batch(over[i]);
-        v[rows] = v[rows] + jacobian.face_position[1][i] * Batch(over[i]);
+        u[rows] = u[rows] + origin_[g][0].face_position[i] * Batch(over[i]);
+        v[rows] = v[rows] + origin_[g][1].face_position[i] * Batch(over[i]);
       }
       ++rows;
     }
-    const MountEffects effects = mount_effects(at, ray, range);
+    const MountEffects effects = mount_effects(at, ray_[g], range_[g]);
     for (int factor = 0; factor < a_.factors; ++factor) {
       Batch fu(0.0), fv(0.0);
       for (int entry = a_.factor_begin[factor]; entry < a_.factor_begin[factor + 1]; ++entry) {
@@ -379,7 +430,7 @@ class Kernel : public Points {
         fu = xsimd::fma(u[row], w, fu);
         fv = xsimd::fma(v[row], w, fv);
       }
-      add_factor(at, factor, fu, fv, effects, ray, c);
+      add_factor(at, factor, fu, fv, effects, ray_[g], c);
     }
   }
 
@@ -388,6 +439,16 @@ class Kernel : public Points {
   PreparedDerivatives<Batch, N> derivatives_;
   std::array<Batch, kFaces> face_position_;
   bool same_ = true;
+
+  // Of the groups of a block.
+  Trace<Batch, N> trace_[kGroups];
+  Vector3<Batch> believed_beam_[kGroups];
+  BeamPath<Batch, N> path_[kGroups];
+  Sines azimuth_[kGroups], zenith_[kGroups];
+  Ray ray_[kGroups];
+  Batch range_[kGroups], cosine_[kGroups];
+  ReversePass<Batch, N, 2> pass_[kGroups];
+  BeamPathAdjoint<Batch, N> origin_[kGroups][2];
 };
 
 }  // namespace
@@ -400,7 +461,9 @@ void compute_points(const PointArguments& a) {
   }
   with_prism_count(a.prisms, [&]<int N>() {
     Kernel<N> kernel(a);
-    for (std::size_t at = 0; at < a.shots; at += kLanes) kernel.compute(at);
+    for (std::size_t at = 0; at < a.shots; at += kBlock) {
+      kernel.compute(at, a.shots - at < kBlock ? a.shots : at + kBlock);
+    }
   });
 }
 
