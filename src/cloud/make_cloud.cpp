@@ -120,6 +120,7 @@ class Work {
       if (piece_->more) ahead.run([&] { next = piece_after(*piece_); });
       emit();
       ahead.wait();
+      spare_ = std::move(piece_->rows);
       piece_ = std::move(next);
     }
     finish();
@@ -163,6 +164,7 @@ class Work {
   /// @return nothing where nothing is left
   std::unique_ptr<Piece> piece_after(const Piece& before) {
     auto piece = std::make_unique<Piece>();
+    piece->rows = std::move(spare_);
     const std::size_t keep =
         rotors_ ? overlap_begin(before.rows.time_ns, std::max(before.end, std::size_t{1}))
                 : before.end;
@@ -177,12 +179,22 @@ class Work {
     return piece;
   }
 
+  /// Columns that grow row by row would be copied to fresh memory several times.
+  static void make_room(Observations& rows, std::size_t more) {
+    const std::size_t size = rows.size();
+    if (rows.time_ns.capacity() >= more) return;
+    rows.resize(more);
+    rows.resize(size);
+  }
+
   /// Reads until a piece is full.
   void fill(Piece& piece) {
     recordings::Chunk chunk;
-    const std::size_t wanted = !rotors_ ? kReportedRows : (belief_ ? kPieceRows : kBeginningRows);
+    const std::size_t wanted =
+        piece.done + (!rotors_ ? kReportedRows : (belief_ ? kPieceRows : kBeginningRows));
+    make_room(piece.rows, wanted + recordings::kDefaultChunkRows);
     piece.more = true;
-    while (piece.rows.size() < piece.done + wanted) {
+    while (piece.rows.size() < wanted) {
       try {
         piece.more = reader_.read(chunk);
       } catch (const FileError& error) {
@@ -702,6 +714,7 @@ class Work {
   std::unique_ptr<CloudWriter> writer_;
   std::vector<Block> blocks_;
   std::unique_ptr<Piece> piece_;  ///< that is being written
+  Observations spare_;            ///< memory of the one before, for the one after
   bool repointing_known_ = false;
 };
 
