@@ -179,23 +179,12 @@ class Work {
     return piece;
   }
 
-  /// Columns that grow chunk by chunk are copied to fresh memory several times: 15 % of all memory
-  /// of a cloud of 30 s, and a sixth of its page faults.
-  static void make_room(Observations& rows, std::size_t more) {
-    const std::size_t size = rows.size();
-    if (rows.time_ns.capacity() >= more) return;
-    rows.resize(more);
-    rows.resize(size);
-  }
-
   /// Reads until a piece is full.
   void fill(Piece& piece) {
     recordings::Chunk chunk;
-    const std::size_t wanted =
-        piece.done + (!rotors_ ? kReportedRows : (belief_ ? kPieceRows : kBeginningRows));
-    make_room(piece.rows, wanted + recordings::kDefaultChunkRows);
+    const std::size_t wanted = !rotors_ ? kReportedRows : (belief_ ? kPieceRows : kBeginningRows);
     piece.more = true;
-    while (piece.rows.size() < wanted) {
+    while (piece.rows.size() < piece.done + wanted) {
       try {
         piece.more = reader_.read(chunk);
       } catch (const FileError& error) {
