@@ -142,9 +142,10 @@ void take_motion(const Eigen::VectorXd& mean, const Eigen::MatrixXd& covariance,
 ///   mean = f + W^T y,  covariance = F - W^T W,  F + B = L L^T,  W = L^-1 F,  y = L^-1 (b - f)
 /// Without temporary matrices: with those, and with pivots, the whole filter took four times as
 /// long.
-struct Combination {
+class Combination {
+ public:
   explicit Combination(Eigen::Index size)
-      : mean(size), covariance(size, size), root(size, size), share(size, size), pull(size) {}
+      : mean(size), covariance(size, size), root_(size, size), share_(size, size), pull_(size) {}
 
   /// @param forward,backward  mean and covariance of each [states (1 + states)]
   void combine(const double* forward, const double* backward) {
@@ -152,24 +153,24 @@ struct Combination {
     using Vector = Eigen::Map<const Eigen::VectorXd>;
     using Matrix = Eigen::Map<const Eigen::MatrixXd>;
     mean = Vector(forward, size);
-    pull = Vector(backward, size) - mean;
-    share = covariance = Matrix(forward + size, size, size);
-    root = covariance + Matrix(backward + size, size, size);
+    pull_ = Vector(backward, size) - mean;
+    share_ = covariance = Matrix(forward + size, size, size);
+    root_ = covariance + Matrix(backward + size, size, size);
     for (Eigen::Index k = 0; k < size; ++k) {
-      if (root(k, k) <= 0) continue;  // nothing is known in this direction
-      const double scale = 1.0 / std::sqrt(root(k, k));
+      if (root_(k, k) <= 0) continue;  // nothing is known in this direction
+      const double scale = 1.0 / std::sqrt(root_(k, k));
       const Eigen::Index below = size - k - 1;
-      root.col(k).tail(below) *= scale;
-      share.col(k) *= scale;
-      pull[k] *= scale;
+      root_.col(k).tail(below) *= scale;
+      share_.col(k) *= scale;
+      pull_[k] *= scale;
       for (Eigen::Index j = k + 1; j < size; ++j) {
-        const double factor = root(j, k);
-        root.col(j).tail(size - j) -= factor * root.col(k).tail(size - j);
-        share.col(j) -= factor * share.col(k);
-        pull[j] -= factor * pull[k];
+        const double factor = root_(j, k);
+        root_.col(j).tail(size - j) -= factor * root_.col(k).tail(size - j);
+        share_.col(j) -= factor * share_.col(k);
+        pull_[j] -= factor * pull_[k];
       }
-      mean += pull[k] * share.col(k);
-      for (Eigen::Index j = 0; j < size; ++j) covariance.col(j) -= share(j, k) * share.col(k);
+      mean += pull_[k] * share_.col(k);
+      for (Eigen::Index j = 0; j < size; ++j) covariance.col(j) -= share_(j, k) * share_.col(k);
     }
   }
 
@@ -177,8 +178,8 @@ struct Combination {
   Eigen::MatrixXd covariance;
 
  private:
-  Eigen::MatrixXd root, share;  ///< L and W^T
-  Eigen::VectorXd pull;         ///< y
+  Eigen::MatrixXd root_, share_;  ///< L and W^T
+  Eigen::VectorXd pull_;          ///< y
 };
 
 /// Observed minus modelled of a shot, rad; NaN when the beam does not get through.
