@@ -140,8 +140,7 @@ void take_motion(const Eigen::VectorXd& mean, const Eigen::MatrixXd& covariance,
 
 /// Two independent estimates of the same states, weighted by their inverse covariances F and B:
 ///   mean = f + W^T y,  covariance = F - W^T W,  F + B = L L^T,  W = L^-1 F,  y = L^-1 (b - f)
-/// Without temporary matrices: with those, and with pivots, the whole filter took four times as
-/// long.
+/// Temporary matrices and pivots would take more than twice as many instructions.
 class Combination {
  public:
   explicit Combination(Eigen::Index size)
