@@ -206,7 +206,7 @@ void ratio(benchmark::State& state) {
 
 /// Prediction and update by one observation: the library's own filter and the peer in turn, from
 /// the same start. difference_in_sigmas is the largest of the states after the last shot.
-void filter_step(benchmark::State& state) {
+void filter_step(benchmark::State& state, InstructionSet set) {
   constexpr std::size_t kSteps = 2000, kStride = 100;
   const Recording& data = recording(3);
   estimation::AngleSeries series;
@@ -219,7 +219,12 @@ void filter_step(benchmark::State& state) {
       data.head, options.sensor, {ekf.free, kAngleNoise, options.mirrored, options.turned});
   const std::vector<estimation::RotorProcess> process(
       2, {peers::PlainFilter::kAcceleration, 0.0, 0.0});
-  estimation::Filter filter(series, start.train, ekf, process, nullptr);
+  const estimation::Filter filter(series, start.train, ekf, process, nullptr);
+  const std::vector<unsigned char> outlier(kSteps);
+  estimation::FilterRun all;
+  all.count = kSteps;
+  all.gate = std::numeric_limits<double>::infinity();
+  all.outlier = outlier.data();
   const estimation::FilterState first = first_state(filter, series, start, ekf.free);
   estimation::FilterState ours;
   peers::PlainFilter peer = peer_filter(start, series.time_ns[0]);
@@ -227,10 +232,7 @@ void filter_step(benchmark::State& state) {
       state, kSteps,
       [&] {
         ours = first;
-        for (std::size_t i = 0; i < kSteps; ++i) {
-          if (i > 0) filter.predict(ours, series.time(i) - series.time(i - 1));
-          filter.update(ours, i, std::numeric_limits<double>::infinity());
-        }
+        filter.run(ours, all, set);
       },
       kSteps,
       [&] {
@@ -289,16 +291,16 @@ const bool registered = [] {
     benchmark::RegisterBenchmark(("accumulate/" + to_string(set)).c_str(), accumulate, set,
                                  kBounds.size())
         ->Unit(benchmark::kMillisecond);
+    benchmark::RegisterBenchmark(("filter_step/" + to_string(set)).c_str(), filter_step, set)
+        ->Iterations(101)
+        ->UseManualTime()
+        ->Unit(benchmark::kMillisecond);
   }
   for (std::size_t parameters = 1; parameters <= kBounds.size(); ++parameters) {
     benchmark::RegisterBenchmark(fmt::format("accumulate_parameters/{}", parameters).c_str(),
                                  accumulate, best_instruction_set(), parameters)
         ->Unit(benchmark::kMillisecond);
   }
-  benchmark::RegisterBenchmark("filter_step", filter_step)
-      ->Iterations(101)
-      ->UseManualTime()
-      ->Unit(benchmark::kMillisecond);
   return true;
 }();
 

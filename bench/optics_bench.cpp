@@ -144,10 +144,12 @@ void sequence(benchmark::State& state, InstructionSet set) {
   constexpr double kSpeedA = -763.8, kSpeedB = 488.4, kInterval = 1e-5;
   double begin = 0;
   const auto turn = [&] {
-    for (std::size_t i = 0; i < kShots; ++i) {
-      const double time = begin + kInterval * static_cast<double>(i);
-      shots.a[i] = rotation_angle_at(0.3, kSpeedA, time);
-      shots.b[i] = rotation_angle_at(1.7, kSpeedB, time);
+    // An int becomes a double in batches, a std::size_t one by one, which costs both sides 0.5 ns.
+    for (int i = 0; i < static_cast<int>(kShots); ++i) {
+      const double time = begin + kInterval * i;
+      const auto shot = static_cast<std::size_t>(i);
+      shots.a[shot] = rotation_angle_at(0.3, kSpeedA, time);
+      shots.b[shot] = rotation_angle_at(1.7, kSpeedB, time);
     }
     begin += kInterval * static_cast<double>(kShots);
   };

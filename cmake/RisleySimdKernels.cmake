@@ -13,12 +13,20 @@ if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
                    -Wno-uninitialized -Wno-maybe-uninitialized)
 endif()
 
+# Kernels whose lanes are parts of one shot: AVX-512 runs their copy for AVX2, and its eight lanes would
+# be mostly empty.
+set(RISLEY_NARROW_KERNELS filter_kernel.cpp)
+
 # Adds some kernels to a target, as object libraries named after it. Whoever asks for their copies has
 # RISLEY_HAS_X86_KERNELS if there are any.
 function(risley_add_kernels_to owner)
   foreach(set IN LISTS RISLEY_INSTRUCTION_SETS)
     set(target ${owner}_kernels_${set})
-    add_library(${target} OBJECT ${ARGN})
+    set(kernels ${ARGN})
+    if(set STREQUAL avx512)
+      list(FILTER kernels EXCLUDE REGEX "/(${RISLEY_NARROW_KERNELS})$")
+    endif()
+    add_library(${target} OBJECT ${kernels})
     risley_target_defaults(${target})
     set_target_properties(${target} PROPERTIES CXX_VISIBILITY_PRESET hidden UNITY_BUILD OFF)
     target_include_directories(${target} PRIVATE ${PROJECT_SOURCE_DIR}/include

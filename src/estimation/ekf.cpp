@@ -3,13 +3,12 @@
 #include "risley/estimation/ekf.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
 #include <fmt/format.h>
 
-#include "risley/algebra/products.hpp"
-#include "risley/algebra/symmetric.hpp"
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
 #include "risley/core/golden_section.hpp"
@@ -30,18 +29,6 @@ constexpr std::size_t kBlock = 1024;
 /// Shots that the search for the process noise looks at.
 constexpr std::size_t kLikelihoodShots = 10000;
 
-/// State at the first shot, from a reference.
-FilterState first_state(const Filter& filter, const FilterReference& reference) {
-  FilterState state{Eigen::VectorXd(filter.size()), filter.wide_covariance()};
-  state.mean.head(filter.statics()) = reference.parameters();
-  for (Eigen::Index k = 0; k < filter.prisms(); ++k) {
-    const auto rotor = static_cast<std::size_t>(k);
-    state.mean[filter.statics() + 2 * k] = reference.angle(0, rotor);
-    state.mean[filter.statics() + 2 * k + 1] = reference.before.trajectory.speed(0, rotor, 0.0);
-  }
-  return state;
-}
-
 /// White accelerations from decimal logarithms of (deg/s) / sqrt(s).
 std::vector<RotorProcess> processes(const std::vector<double>& decades) {
   std::vector<RotorProcess> result;
@@ -58,14 +45,14 @@ std::vector<unsigned char> screen(const AngleSeries& series, const Start& start,
   std::vector<unsigned char> outlier(series.size(), 0);
   const PrismTrain& start_train = start.train;
   ResidualModel model(start_train, options.free);
-  model.set(reference ? reference->parameters() : free_values(start_train, options.free));
+  model.set(reference ? reference->before.parameters : free_values(start_train, options.free));
   std::vector<double> angle(static_cast<std::size_t>(start_train.prisms()));
   const double start_limit = std::max(radians_from_degrees(0.1), 8.0 * start.residual_rms);
   for (std::size_t i = 0; i < std::min(options.gate_after, series.size()); ++i) {
     const double t = 1e-9 * static_cast<double>(series.time_ns[i] - start.time_ns);
     if (!reference && std::abs(t) > start.reach) continue;
     for (std::size_t k = 0; k < angle.size(); ++k) {
-      angle[k] = reference ? reference->angle(i, k)
+      angle[k] = reference ? reference->angles(i)[k]
                            : start.rotation_angle[k] + t * start.angular_velocity[k];
     }
     model.linearise(angle, series.beam[i]);
@@ -82,16 +69,20 @@ std::vector<unsigned char> screen(const AngleSeries& series, const Start& start,
 /// at a reference so that it is that of a linear filter, whatever the noise.
 double likelihood(const AngleSeries& series, const PrismTrain& train, const EkfOptions& options,
                   const std::vector<RotorProcess>& process, const FilterReference& reference) {
-  Filter filter(series, train, options, process, &reference);
-  FilterState state = first_state(filter, reference);
-  double sum = 0;
+  const Filter filter(series, train, options, process, &reference);
+  FilterState state = reference.first_state(filter.wide_covariance());
   const std::size_t shots = std::min(series.size(), kLikelihoodShots);
-  for (std::size_t i = 0; i < shots; ++i) {
-    if (i > 0) filter.predict(state, series.time(i) - series.time(i - 1));
-    if (reference.before.outlier[i]) continue;
-    const double gain =
-        filter.update(state, i, std::numeric_limits<double>::infinity()).log_likelihood;
-    if (i >= options.gate_after) sum += gain;  // before, the wide prior speaks
+  std::vector<double> chi_square(shots), determinant(shots);
+  FilterRun run;
+  run.count = shots;
+  run.gate = std::numeric_limits<double>::infinity();
+  run.outlier = reference.before.outlier.data();
+  run.chi_square = chi_square.data();
+  run.determinant = determinant.data();
+  double sum = 0;
+  if (filter.run(state, run) < shots) sum = std::numeric_limits<double>::quiet_NaN();
+  for (std::size_t i = options.gate_after; i < shots; ++i) {  // before, the wide prior speaks
+    sum -= 0.5 * (chi_square[i] + std::log(determinant[i]));
   }
   return std::isfinite(sum) ? sum : -std::numeric_limits<double>::infinity();
 }
@@ -147,20 +138,75 @@ void take_motion(const Eigen::VectorXd& mean, const Eigen::MatrixXd& covariance,
   }
 }
 
+/// Two independent estimates of the same states, weighted by their inverse covariances F and B:
+///   mean = f + W^T y,  covariance = F - W^T W,  F + B = L L^T,  W = L^-1 F,  y = L^-1 (b - f)
+/// Temporary matrices and pivots would take more than twice as many instructions.
+class Combination {
+ public:
+  explicit Combination(Eigen::Index size)
+      : mean(size), covariance(size, size), root_(size, size), share_(size, size), pull_(size) {}
+
+  /// @param forward,backward  mean and covariance of each [states (1 + states)]
+  void combine(const double* forward, const double* backward) {
+    const Eigen::Index size = mean.size();
+    using Vector = Eigen::Map<const Eigen::VectorXd>;
+    using Matrix = Eigen::Map<const Eigen::MatrixXd>;
+    mean = Vector(forward, size);
+    pull_ = Vector(backward, size) - mean;
+    share_ = covariance = Matrix(forward + size, size, size);
+    root_ = covariance + Matrix(backward + size, size, size);
+    for (Eigen::Index k = 0; k < size; ++k) {
+      if (root_(k, k) <= 0) continue;  // nothing is known in this direction
+      const double scale = 1.0 / std::sqrt(root_(k, k));
+      const Eigen::Index below = size - k - 1;
+      root_.col(k).tail(below) *= scale;
+      share_.col(k) *= scale;
+      pull_[k] *= scale;
+      for (Eigen::Index j = k + 1; j < size; ++j) {
+        const double factor = root_(j, k);
+        root_.col(j).tail(size - j) -= factor * root_.col(k).tail(size - j);
+        share_.col(j) -= factor * share_.col(k);
+        pull_[j] -= factor * pull_[k];
+      }
+      mean += pull_[k] * share_.col(k);
+      for (Eigen::Index j = 0; j < size; ++j) covariance.col(j) -= share_(j, k) * share_.col(k);
+    }
+  }
+
+  Eigen::VectorXd mean;
+  Eigen::MatrixXd covariance;
+
+ private:
+  Eigen::MatrixXd root_, share_;  ///< L and W^T
+  Eigen::VectorXd pull_;          ///< y
+};
+
+/// Observed minus modelled of a shot, rad; NaN when the beam does not get through.
+Eigen::Vector2d residual_at(ResidualModel& model, const AngleSeries& series, std::size_t shot,
+                            const Eigen::VectorXd& mean, Eigen::Index statics) {
+  std::array<double, kMaxPrisms> angle{};
+  const auto prisms = static_cast<std::size_t>((mean.size() - statics) / 2);
+  for (std::size_t k = 0; k < prisms; ++k) {
+    angle[k] = mean[statics + 2 * static_cast<Eigen::Index>(k)];
+  }
+  model.set(mean.head(statics));
+  model.linearise({angle.data(), prisms}, series.beam[shot]);
+  return model.residual(series.azimuth[shot], series.zenith[shot]);
+}
+
 /// One forward and one backward filter and their combination.
 Solution run_pass(const AngleSeries& series, const FilterState& first, const PrismTrain& train,
                   const EkfOptions& options, const std::vector<RotorProcess>& process,
                   const FilterReference* reference, std::vector<unsigned char> screened,
                   const Progress& progress) {
-  Filter filter(series, train, options, process, reference);
+  const Filter filter(series, train, options, process, reference);
+  ResidualModel model(train, options.free);
   const std::size_t shots = series.size();
   const Eigen::Index statics = filter.statics();
   const Eigen::Index prisms = filter.prisms();
   Solution result;
   result.rotor_process = process;
   result.outlier = std::move(screened);
-  result.outliers =
-      static_cast<std::size_t>(std::count(result.outlier.begin(), result.outlier.end(), 1));
   result.azimuth_residual.resize(shots);
   result.zenith_residual.resize(shots);
   RotorTrajectory& motion = result.trajectory;  // every shot is a knot
@@ -175,74 +221,69 @@ Solution run_pass(const AngleSeries& series, const FilterState& first, const Pri
   motion.state.resize(shots * states);
   motion.covariance.resize(shots * states * (states + 1) / 2);
 
-  const auto gap_before = [&](std::size_t i) { return series.time(i) - series.time(i - 1); };
-  const auto forward_step = [&](FilterState& state, std::size_t i, bool decide) {
-    if (i > 0) filter.predict(state, gap_before(i));
-    if (result.outlier[i]) return;
-    if (!decide) {
-      filter.update(state, i, std::numeric_limits<double>::infinity());
-      return;
-    }
-    const auto update =
-        filter.update(state, i, i < options.gate_after ? kOpenGate : options.gate_chi_square);
-    if (!update.accepted) {
-      result.outlier[i] = 1;
-      ++result.outliers;
-    }
-  };
+  FilterRun open;  // without a gate
+  open.gate = std::numeric_limits<double>::infinity();
+  open.outlier = result.outlier.data();
 
   // Forward: decides on outliers and keeps the state before each block.
   std::vector<FilterState> before_block;
   FilterState state = first;
-  for (std::size_t i = 0; i < shots; ++i) {
-    if (i % kBlock == 0) {
+  for (std::size_t begin = 0; begin < shots;) {
+    if (begin % kBlock == 0) {
       before_block.push_back(state);
-      progress.report(0.3 * static_cast<double>(i) / static_cast<double>(shots));
+      progress.report(0.3 * static_cast<double>(begin) / static_cast<double>(shots));
     }
-    forward_step(state, i, true);
-    if (!state.mean.allFinite()) {
+    const bool settling = begin < options.gate_after;
+    std::size_t end = std::min((begin / kBlock + 1) * kBlock, shots);
+    if (settling) end = std::min(end, options.gate_after);
+    FilterRun deciding = open;
+    deciding.first = begin;
+    deciding.count = end - begin;
+    deciding.gate = settling ? kOpenGate : options.gate_chi_square;
+    deciding.refused = result.outlier.data();
+    begin += filter.run(state, deciding);
+    if (begin < end) {
       throw EstimationError(
-          fmt::format("the filter diverged at shot {} ({:.6f} s)", i, series.time(i)));
+          fmt::format("the filter diverged at shot {} ({:.6f} s)", begin, series.time(begin)));
     }
   }
+  result.outliers =
+      static_cast<std::size_t>(std::count(result.outlier.begin(), result.outlier.end(), 1));
 
   // Backward, block by block: the forward filter runs again through the block and is combined with
   // what the backward filter knows of the shots behind it.
-  FilterState backward{state.mean, filter.wide_covariance()};
+  FilterState backward{state.mean, filter.wide_covariance(), state.time_ns};
   Eigen::VectorXd mean_parameters = Eigen::VectorXd::Zero(statics);
   Eigen::MatrixXd mean_covariance = Eigen::MatrixXd::Zero(statics, statics);
-  std::vector<FilterState> filtered(std::min(kBlock, shots));
+  Combination both(filter.size());
+  const auto size = static_cast<std::size_t>(filter.size()), kept = size * (1 + size);
+  std::vector<double> filtered(kept * std::min(kBlock, shots)), predicted(filtered.size());
   for (std::size_t block = before_block.size(); block-- > 0;) {
     const std::size_t begin = block * kBlock, end = std::min(begin + kBlock, shots);
     state = before_block[block];
-    for (std::size_t i = begin; i < end; ++i) {
-      forward_step(state, i, false);
-      filtered[i - begin] = state;
-    }
+    FilterRun run = open;
+    run.first = begin;
+    run.count = end - begin;
+    run.kept = filtered.data();
+    filter.run(state, run);
+    run.first = end - 1;
+    run.backwards = true;
+    run.kept = predicted.data();
+    run.keep_predicted = true;
+    filter.run(backward, run);
     for (std::size_t i = end; i-- > begin;) {
-      if (i + 1 < shots) filter.predict(backward, -gap_before(i + 1));
-      const FilterState& f = filtered[i - begin];
-      const algebra::SymmetricSolver both(f.covariance + backward.covariance);
-      const Eigen::MatrixXd share = both.solve_columns(f.covariance);  // transposed
-      const Eigen::VectorXd mean =
-          f.mean + algebra::transposed_times(share, backward.mean - f.mean);
-      const Eigen::MatrixXd covariance =
-          f.covariance - algebra::transposed_product(share, f.covariance);
-      mean_parameters += mean.head(statics);
-      mean_covariance += covariance.topLeftCorner(statics, statics);
-      take_motion(mean, covariance, statics, motion, i);
-      const Eigen::Vector2d residual = filter.residual_at(mean, i);
+      both.combine(filtered.data() + kept * (i - begin), predicted.data() + kept * (end - 1 - i));
+      mean_parameters += both.mean.head(statics);
+      mean_covariance += both.covariance.topLeftCorner(statics, statics);
+      take_motion(both.mean, both.covariance, statics, motion, i);
+      const Eigen::Vector2d residual = residual_at(model, series, i, both.mean, statics);
       result.azimuth_residual[i] = residual[0];
       result.zenith_residual[i] = residual[1];
-      if (!result.outlier[i]) {
-        filter.update(backward, i, std::numeric_limits<double>::infinity());
-      }
     }
     progress.report(0.3 + 0.7 * static_cast<double>(shots - begin) / static_cast<double>(shots));
   }
   result.parameters = mean_parameters / static_cast<double>(shots);
   result.covariance = mean_covariance / static_cast<double>(shots);
-  result.covariance = 0.5 * (result.covariance + result.covariance.transpose().eval());
   result.train = with_free_values(train, options.free, result.parameters);
   return result;
 }
@@ -258,6 +299,7 @@ Solution run_ekf(const AngleSeries& series, const Start& start, const EkfOptions
   require_threshold("gate", options.gate_chi_square);
   require_start(start, start.train.prisms());
   require_process(options.rotor_process, start.train.prisms());
+  require_free(options.free, start.train);
   check_beams(start.train, series.beam, series.size());
   const bool choose = options.rotor_process.empty();
   std::vector<RotorProcess> process =
@@ -268,8 +310,8 @@ Solution run_ekf(const AngleSeries& series, const Start& start, const EkfOptions
     if (rotor.jerk != 0)
       throw InvalidArgument("white jerk is a motion model of the batch estimator");
   }
-  FilterState first = first_state(Filter(series, start.train, options, process, nullptr), series,
-                                  start, options.free);
+  const FilterState first = first_state(Filter(series, start.train, options, process, nullptr),
+                                        series, start, options.free);
   Solution result =
       run_pass(series, first, start.train, options, process, nullptr,
                screen(series, start, options, nullptr), progress.part(0.0, 1.0 / options.passes));
@@ -278,10 +320,9 @@ Solution run_ekf(const AngleSeries& series, const Start& start, const EkfOptions
     if (choose && pass == 1) {
       process = likeliest_process(series, start.train, options, reference);
     }
-    first = first_state(Filter(series, start.train, options, process, &reference), reference);
     Solution next =
-        run_pass(series, first, start.train, options, process, &reference,
-                 screen(series, start, options, &reference),
+        run_pass(series, reference.first_state(first.covariance), start.train, options, process,
+                 &reference, screen(series, start, options, &reference),
                  progress.part(double(pass) / options.passes, (pass + 1.0) / options.passes));
     result = std::move(next);
   }

@@ -4,11 +4,13 @@
 
 #include <cstddef>
 #include <span>
+#include <vector>
 
 #include <fmt/format.h>
 
 #include "risley/core/error.hpp"
 #include "risley/core/require.hpp"
+#include "risley/estimation/free_parameters.hpp"
 #include "risley/estimation/initialisation.hpp"
 #include "risley/estimation/rotor_process.hpp"
 
@@ -37,6 +39,23 @@ inline void require_process(std::span<const RotorProcess> process, int prisms) {
     require_not_below("angle walk", rotor.angle_walk, 0, "rad/sqrt(s)");
     require_not_below("jerk", rotor.jerk, 0, "rad/s^2/sqrt(s)");
   }
+}
+
+/// Places of the flat vector, and no more parameters, nor more places of theirs, than it has: the
+/// kernels have room for those.
+inline void require_free(const std::vector<FreeParameter>& free, const PrismTrain& train) {
+  const std::size_t places = train.parameters().size();
+  require_between("number of free parameters", static_cast<double>(free.size()), 0,
+                  static_cast<double>(places));
+  std::size_t taken = 0;
+  for (const FreeParameter& parameter : free) {
+    taken += parameter.places.size();
+    for (const int place : parameter.places) {
+      require_between("place of " + parameter.name, place, 0, static_cast<double>(places - 1));
+    }
+  }
+  require_between("number of places of free parameters", static_cast<double>(taken), 0,
+                  static_cast<double>(places));
 }
 
 }  // namespace risley::estimation

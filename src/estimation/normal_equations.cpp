@@ -18,18 +18,6 @@ static_assert(kRotorStates == kStatesPerRotor);
 /// Knots that one task sums up: fixed, so that sums do not depend on the number of threads.
 constexpr std::size_t kBlockKnots = 1000;
 
-/// Places of the flat vector, and no more parameters than places: the kernels have room for those.
-void require_free(const std::vector<FreeParameter>& free, const PrismTrain& train) {
-  const std::size_t places = train.parameters().size();
-  require_between("number of free parameters", static_cast<double>(free.size()), 0,
-                  static_cast<double>(places));
-  for (const FreeParameter& parameter : free) {
-    for (const int place : parameter.places) {
-      require_between("place of " + parameter.name, place, 0, static_cast<double>(places - 1));
-    }
-  }
-}
-
 void require_shots(const AngleSeries& series, const RotorTrajectory& knots,
                    const ShotColumns& columns) {
   const std::size_t shots = series.size();

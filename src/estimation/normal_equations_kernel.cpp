@@ -19,9 +19,7 @@ using Lanes = xsimd::batch_bool<double>;
 constexpr std::size_t kLanes = Batch::size;
 constexpr double kTurn = 6.283185307179586;
 
-/// The same angle within half a turn, as a difference or for an accurate sine.
-Batch wrapped(const Batch& angle) { return angle - kTurn * xsimd::nearbyint(angle / kTurn); }
-
+using risley::wrapped;
 double wrapped(double angle) { return angle - kTurn * __builtin_nearbyint(angle / kTurn); }
 
 /// Up to kLanes shots of one emitter.

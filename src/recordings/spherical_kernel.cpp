@@ -23,8 +23,8 @@ std::uint32_t load(const std::uint8_t* bytes) {
 }
 
 /// The numbers of records are collected one by one, as they stand at odd places, and turned into
-/// columns by loops that compilers make wide instructions of: reading LVX takes half the time of
-/// doing all of it record by record (AVX-512, Zen 4).
+/// columns by loops that compilers make wide instructions of: reading LVX takes 40 % less time than
+/// with all of it record by record (AVX-512, Zen 4).
 template <int kReturns, bool kTagged>
 std::size_t decode(const SphericalArguments& a) {
   constexpr std::size_t kBytes = kReturns == 1 ? (kTagged ? 10 : 9) : 4 + 6 * kReturns;

@@ -81,6 +81,13 @@ template <class Arch>
   return angles;
 }
 
+/// The same angle within half a turn of 0, rad: of a difference, or for an accurate sine.
+template <class Arch>
+xsimd::batch<double, Arch> wrapped(const xsimd::batch<double, Arch>& angle) {
+  constexpr double kTurn = 6.283185307179586;
+  return angle - kTurn * xsimd::nearbyint(angle / kTurn);
+}
+
 /// Largest angle that sine_cosine() brings into the first eighth of a turn by itself, rad: up to
 /// there, quarter turns times a third of the bits of pi / 2 is exact.
 inline constexpr double kLargestReduced = 1e6;

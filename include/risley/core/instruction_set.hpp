@@ -22,8 +22,8 @@ InstructionSet best_instruction_set();
 /// @throws InvalidArgument when this binary does not hold it or this processor does not run it
 void check_available(InstructionSet set);
 
-/// The copies of one kernel, a function of plain arguments: nullptr where the binary has none. A
-/// kernel for another device would be one more copy.
+/// The copies of one kernel, a function of plain arguments: nullptr where the binary has none, and
+/// the next narrower one serves. A kernel for another device would be one more copy.
 template <class Function>
 struct KernelCopies {
   Function* baseline;
@@ -34,7 +34,7 @@ struct KernelCopies {
   Function& at(InstructionSet set) const {
     check_available(set);
     if (set == InstructionSet::avx512 && avx512 != nullptr) return *avx512;
-    if (set == InstructionSet::avx2 && avx2 != nullptr) return *avx2;
+    if (set != InstructionSet::baseline && avx2 != nullptr) return *avx2;
     return *baseline;
   }
 };
@@ -58,11 +58,17 @@ struct KernelCopies {
   risley::KernelCopies<decltype(kernel_baseline::function)> {                    \
     &kernel_baseline::function, &kernel_avx2::function, &kernel_avx512::function \
   }
+/// The same of a kernel that has nothing to do for eight lanes: there is no copy for AVX-512.
+#define RISLEY_NARROW_KERNEL_COPIES(function)                   \
+  risley::KernelCopies<decltype(kernel_baseline::function)> {   \
+    &kernel_baseline::function, &kernel_avx2::function, nullptr \
+  }
 #else
 #define RISLEY_KERNEL_COPIES(function)                        \
   risley::KernelCopies<decltype(kernel_baseline::function)> { \
     &kernel_baseline::function, nullptr, nullptr              \
   }
+#define RISLEY_NARROW_KERNEL_COPIES(function) RISLEY_KERNEL_COPIES(function)
 #endif
 
 }  // namespace risley

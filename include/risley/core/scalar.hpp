@@ -32,11 +32,15 @@ constexpr const T& select(bool mask, const T& a, const T& b) {
   return mask ? a : b;
 }
 
+/// Sine and cosine of one angle, in this order.
+template <class T>
+using SinePair = std::pair<T, T>;
+
 /// How a scalar computes sine and cosine together; batches specialise it.
 template <class T>
 struct SineCosine {
-  /// Sine and cosine of an angle in rad, in this order.
-  static std::pair<T, T> of(const T& angle) {
+  /// Of an angle in rad.
+  static SinePair<T> of(const T& angle) {
     using std::cos;
     using std::sin;
     return {sin(angle), cos(angle)};
@@ -45,7 +49,7 @@ struct SineCosine {
 
 /// Sine and cosine of one angle, rad.
 template <class T>
-std::pair<T, T> sin_cos(const T& angle) {
+SinePair<T> sin_cos(const T& angle) {
   return SineCosine<T>::of(angle);
 }
 

@@ -35,14 +35,11 @@ PreparedTrain<Batch, N> prepared_train(const double* parameters, const FaceOrder
 }
 
 /// prepare_derivatives() from a kernel's plain arguments.
-/// @param wanted  as leave_out()
 template <class Batch, int N, class Wanted>
 PreparedDerivatives<Batch, N> prepared_derivatives(const double* parameters, const FaceOrder* order,
                                                    const Wanted& wanted) {
-  auto derivatives = prepare_derivatives<Batch, N>(parameter_batches<Batch, N>(parameters),
-                                                   face_orders<Batch, N>(order));
-  leave_out(derivatives, wanted);
-  return derivatives;
+  return prepare_derivatives<Batch, N>(parameter_batches<Batch, N>(parameters),
+                                       face_orders<Batch, N>(order), wanted);
 }
 
 /// The emitters of a kernel's shots. With several, every lane has an emitter of its own: incident

@@ -35,9 +35,9 @@ struct PreparedDerivatives {
   struct Prism {
     Vector3<T> rotation;  ///< of the rotation angle
     TurningVector<T> tilt_horizontal, tilt_vertical, bearing_vertical;
-    TurningVector<T> wedge;               ///< d normal of the angled face / d wedge angle
-    T wedge_by_other;                     ///< that times the normal of the other face: constant
-    T first_is_angled, second_is_angled;  ///< one is 1, the other 0
+    TurningVector<T> wedge;                   ///< d normal of the angled face / d wedge angle
+    T wedge_by_other{};                       ///< that times the normal of the other face: constant
+    T first_is_angled{}, second_is_angled{};  ///< one is 1, the other 0
     std::array<T, 2> ratio_by_glass, ratio_by_air;  ///< d index ratio / d refractive indices
     /// Whether anybody wants these derivatives, which otherwise are zero.
     bool wedge_wanted = true, tilt_horizontal_wanted = true;
@@ -46,61 +46,81 @@ struct PreparedDerivatives {
   std::array<Prism, N> prisms;
 };
 
-/// Leaves out the dearest derivatives if nobody wants them.
-/// @param wanted  called with a place of the flat vector of a train with one emitter
-template <ModelScalar T, int N, class Wanted>
-void leave_out(PreparedDerivatives<T, N>& derivatives, const Wanted& wanted) {
-  for (int prism = 0; prism < N; ++prism) {
-    auto& d = derivatives.prisms[static_cast<std::size_t>(prism)];
-    d.wedge_wanted = wanted(place::wedge_angle(prism));
-    d.tilt_horizontal_wanted = wanted(place::prism_tilt_horizontal(prism));
+/// What prepare_derivatives() asks whether anybody wants a derivative: everything is wanted.
+struct AllWanted {
+  constexpr bool operator()(int) const { return true; }
+};
+
+/// One prism of prepare_derivatives().
+/// @param parameters,sines  as prepare_prism()
+template <ModelScalar T, int N, class Parameters, class Sines, class Wanted>
+void prepare_prism_derivatives(const Parameters& parameters, FaceOrder order, const Sines& sines,
+                               const Wanted& wanted, std::size_t prism,
+                               PreparedDerivatives<T, N>& derivatives) {
+  const int number = static_cast<int>(prism);
+  const T zero(0.0), one(1.0);
+  SinePair<T> level_angle{zero, one};
+  PrismAxis<T> axis = prism_axis<T, N>(sines, prism);
+  auto&& horizontal = sines[leaning::horizontal(prism)];
+  // Horizontal angles turn a leaning direction about -Z, vertical ones about a level vector.
+  Vector3<T> level = leaning_horizontal_rate<T>(horizontal, level_angle);
+  auto& out = derivatives.prisms[prism];
+  out.rotation = axis.direction;
+  out.tilt_vertical = turning_about(axis.direction, level);
+  out.tilt_horizontal_wanted = wanted(place::prism_tilt_horizontal(number));
+  if (out.tilt_horizontal_wanted) {
+    out.tilt_horizontal = turning_about(axis.direction, Vector3<T>{zero, zero, T(-1.0)});
   }
+  if (prism + 1 < N) {
+    // The axis and all that turns about it lean together, but for what the tilts turn the normals.
+    Vector3<T> bearing_level = leaning_horizontal_rate<T>(axis.horizontal, level_angle);
+    out.bearing_vertical = turning_about(axis.direction, level - bearing_level);
+    out.bearing_vertical.along = out.bearing_vertical.along + bearing_level;
+  }
+  out.wedge_wanted = wanted(place::wedge_angle(number));
+  if (out.wedge_wanted) {
+    const std::size_t angled = wedge_sign(order, 0) != 0 ? 0 : 1, other = 1 - angled;
+    const T sign(wedge_sign(order, static_cast<int>(angled)));
+    Vector3<T> wedge =
+        sign * leaning_vertical_rate<T>(horizontal, sines[leaning::vertical(prism, angled)]);
+    out.wedge = turning_about(axis.direction, wedge);
+    out.wedge_by_other =
+        dot(wedge, leaning_direction<T>(horizontal, sines[leaning::vertical(prism, other)]));
+    out.first_is_angled = T(angled == 0 ? 1.0 : 0.0);
+    out.second_is_angled = T(angled == 0 ? 0.0 : 1.0);
+  }
+  // Ratios: air / glass into the prism, glass / air out of it.
+  auto&& air = parameters[static_cast<std::size_t>(place::refractive_index_air())];
+  auto&& glass = parameters[static_cast<std::size_t>(place::refractive_index(number))];
+  T over_air = one / air, over_glass = one / glass;
+  out.ratio_by_glass = {T(-air * over_glass * over_glass), over_air};
+  out.ratio_by_air = {over_glass, T(-glass * over_air * over_air)};
+}
+
+/// The incident beam of prepare_derivatives(). @param sines  as prepare_prism()
+template <ModelScalar T, int N, class Sines>
+void prepare_incident_derivatives(const Sines& sines, PreparedDerivatives<T, N>& derivatives) {
+  auto&& horizontal = sines[leaning::incident_horizontal()];
+  auto&& vertical = sines[leaning::incident_vertical()];
+  derivatives.incident_horizontal = leaning_horizontal_rate<T>(horizontal, vertical);
+  derivatives.incident_vertical = leaning_vertical_rate<T>(horizontal, vertical);
 }
 
 /// @copydoc prepare
-template <ModelScalar T, int N>
+/// @param wanted  called with a place of the flat vector of a train with one emitter: where it says
+///                false, the dearest derivatives are left out, which then are zero
+template <ModelScalar T, int N, class Wanted = AllWanted>
 PreparedDerivatives<T, N> prepare_derivatives(const std::array<T, parameter_count(N)>& parameters,
-                                              const std::array<FaceOrder, N>& face_order) {
-  const auto p = [&](int at) -> const T& { return parameters[static_cast<std::size_t>(at)]; };
-  PreparedDerivatives<T, N> d;
-  const T& beam_h = p(place::incident_beam_horizontal());
-  const T& beam_v = p(place::incident_beam_vertical());
-  d.incident_horizontal = leaning_horizontal_rate(beam_h, beam_v);
-  d.incident_vertical = leaning_vertical_rate(beam_h, beam_v);
-  const T& air = p(place::refractive_index_air());
-  const T zero(0.0);
-  for (int prism = 0; prism < N; ++prism) {
-    const bool last = prism == N - 1;
-    const FaceOrder order = face_order[static_cast<std::size_t>(prism)];
-    const T& glass = p(place::refractive_index(prism));
-    const T bearing_h = last ? zero : p(place::bearing_tilt_horizontal(prism));
-    const T bearing_v = last ? zero : p(place::bearing_tilt_vertical(prism));
-    const T h = bearing_h + p(place::prism_tilt_horizontal(prism));
-    const T v = bearing_v + p(place::prism_tilt_vertical(prism));
-    const Vector3<T> axis = leaning_direction(bearing_h, bearing_v);
-    // Horizontal angles turn a leaning direction about -Z, vertical ones about a level vector.
-    const Vector3<T> level = leaning_horizontal_rate(h, zero);
-    const Vector3<T> bearing_level = leaning_horizontal_rate(bearing_h, zero);
-    auto& out = d.prisms[static_cast<std::size_t>(prism)];
-    out.rotation = axis;
-    out.tilt_horizontal = turning_about(axis, Vector3<T>{zero, zero, T(-1.0)});
-    out.tilt_vertical = turning_about(axis, level);
-    // The axis and all that turns about it lean together, but for what the tilts turn the normals.
-    out.bearing_vertical = turning_about(axis, level - bearing_level);
-    out.bearing_vertical.along = out.bearing_vertical.along + bearing_level;
-    const bool first = wedge_sign(order, 0) != 0;
-    const T sign(wedge_sign(order, first ? 0 : 1));
-    const Vector3<T> wedge =
-        sign * leaning_vertical_rate(h, T(v + sign * p(place::wedge_angle(prism))));
-    out.wedge = turning_about(axis, wedge);
-    out.wedge_by_other = dot(wedge, leaning_direction(h, v));
-    out.first_is_angled = T(first ? 1.0 : 0.0);
-    out.second_is_angled = T(first ? 0.0 : 1.0);
-    // Ratios: air / glass into the prism, glass / air out of it.
-    out.ratio_by_glass = {T(-air / (glass * glass)), T(T(1.0) / air)};
-    out.ratio_by_air = {T(T(1.0) / glass), T(-glass / (air * air))};
+                                              const std::array<FaceOrder, N>& face_order,
+                                              const Wanted& wanted = {}) {
+  const auto sines = sines_of(leaning_angles<T, N>(parameters, face_order));
+  PreparedDerivatives<T, N> derivatives;
+  prepare_incident_derivatives(sines, derivatives);
+#pragma GCC unroll 4
+  for (std::size_t prism = 0; prism < N; ++prism) {
+    prepare_prism_derivatives(parameters, face_order[prism], sines, wanted, prism, derivatives);
   }
-  return d;
+  return derivatives;
 }
 
 /// For results that depend on the beam behind the last face alone.

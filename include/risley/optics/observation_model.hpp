@@ -23,27 +23,42 @@ template <class T, int N>
 using RotationAngles = std::type_identity_t<std::array<T, static_cast<std::size_t>(N)>>;
 
 /// Unit vector [3] that leans from X by a horizontal angle towards -Y and a vertical angle towards
-/// +Z, rad: the pattern of the incident beam, the bearing and every normal.    [B21 Eq. (13-18)]
+/// +Z: the pattern of the incident beam, the bearing and every normal.         [B21 Eq. (13-18)]
 template <ModelScalar T>
-Vector3<T> leaning_direction(const T& horizontal, const T& vertical) {
-  const auto [sin_h, cos_h] = sin_cos(horizontal);
-  const auto [sin_v, cos_v] = sin_cos(vertical);
+Vector3<T> leaning_direction(const SinePair<T>& horizontal, const SinePair<T>& vertical) {
+  const auto& [sin_h, cos_h] = horizontal;
+  const auto& [sin_v, cos_v] = vertical;
   return {cos_h * cos_v, -sin_h * cos_v, sin_v};
 }
-
 /// Derivative of leaning_direction() by its horizontal angle.
 template <ModelScalar T>
-Vector3<T> leaning_horizontal_rate(const T& horizontal, const T& vertical) {
-  const auto [sin_h, cos_h] = sin_cos(horizontal);
-  const auto [sin_v, cos_v] = sin_cos(vertical);
+Vector3<T> leaning_horizontal_rate(const SinePair<T>& horizontal, const SinePair<T>& vertical) {
+  const auto& [sin_h, cos_h] = horizontal;
+  const auto& [sin_v, cos_v] = vertical;
   return {-sin_h * cos_v, -cos_h * cos_v, T(0.0)};
 }
 /// Derivative of leaning_direction() by its vertical angle.
 template <ModelScalar T>
-Vector3<T> leaning_vertical_rate(const T& horizontal, const T& vertical) {
-  const auto [sin_h, cos_h] = sin_cos(horizontal);
-  const auto [sin_v, cos_v] = sin_cos(vertical);
+Vector3<T> leaning_vertical_rate(const SinePair<T>& horizontal, const SinePair<T>& vertical) {
+  const auto& [sin_h, cos_h] = horizontal;
+  const auto& [sin_v, cos_v] = vertical;
   return {-cos_h * sin_v, sin_h * sin_v, cos_v};
+}
+
+/// The same from the angles themselves, rad.
+template <ModelScalar T>
+Vector3<T> leaning_direction(const T& horizontal, const T& vertical) {
+  return leaning_direction<T>(sin_cos(horizontal), sin_cos(vertical));
+}
+/// As leaning_direction().
+template <ModelScalar T>
+Vector3<T> leaning_horizontal_rate(const T& horizontal, const T& vertical) {
+  return leaning_horizontal_rate<T>(sin_cos(horizontal), sin_cos(vertical));
+}
+/// As leaning_direction().
+template <ModelScalar T>
+Vector3<T> leaning_vertical_rate(const T& horizontal, const T& vertical) {
+  return leaning_vertical_rate<T>(sin_cos(horizontal), sin_cos(vertical));
 }
 
 /// Part of the wedge angle that a face's vertical angle contains: 0 for a perpendicular face,
@@ -93,35 +108,112 @@ struct PreparedTrain {
   std::array<T, N> cosine_between;  ///< of the two normals of each prism, which turn together
 };
 
+/// The angles by which incident beam, axes and normals lean, as places of one array, so that
+/// whoever prepares a train for every shot computes all their sines at once.
+namespace leaning {
+constexpr std::size_t incident_horizontal() { return 0; }  ///< of the emitter that fires
+constexpr std::size_t incident_vertical() { return 1; }    ///< of the emitter that fires
+/// Of both normals of a prism.
+constexpr std::size_t horizontal(std::size_t prism) { return 2 + 5 * prism; }
+/// Of the normal of a prism's face, 0 or 1, in which the wedge may be.
+constexpr std::size_t vertical(std::size_t prism, std::size_t face) { return 3 + 5 * prism + face; }
+/// Of a prism's axis, but not of the last prism's, which is X.
+constexpr std::size_t bearing_horizontal(std::size_t prism) { return 5 + 5 * prism; }
+/// As bearing_horizontal().
+constexpr std::size_t bearing_vertical(std::size_t prism) { return 6 + 5 * prism; }
+/// How many there are.
+constexpr std::size_t count(int prisms) { return 5 * static_cast<std::size_t>(prisms); }
+}  // namespace leaning
+
+/// The leaning angles of a train, rad: see namespace leaning.
+/// @param parameters  flat vector, SI units, see namespace place
+template <ModelScalar T, int N>
+std::array<T, leaning::count(N)> leaning_angles(const std::array<T, parameter_count(N)>& parameters,
+                                                const std::array<FaceOrder, N>& face_order) {
+  const auto p = [&](int at) -> const T& { return parameters[static_cast<std::size_t>(at)]; };
+  std::array<T, leaning::count(N)> angles;
+  angles[leaning::incident_horizontal()] = p(place::incident_beam_horizontal());
+  angles[leaning::incident_vertical()] = p(place::incident_beam_vertical());
+#pragma GCC unroll 4
+  for (std::size_t prism = 0; prism < N; ++prism) {
+    const int number = static_cast<int>(prism);
+    T horizontal = p(place::prism_tilt_horizontal(number));
+    T vertical = p(place::prism_tilt_vertical(number));
+    if (prism + 1 < N) {
+      const T& bearing_horizontal = p(place::bearing_tilt_horizontal(number));
+      const T& bearing_vertical = p(place::bearing_tilt_vertical(number));
+      angles[leaning::bearing_horizontal(prism)] = bearing_horizontal;
+      angles[leaning::bearing_vertical(prism)] = bearing_vertical;
+      horizontal = bearing_horizontal + horizontal;
+      vertical = bearing_vertical + vertical;
+    }
+    angles[leaning::horizontal(prism)] = horizontal;
+#pragma GCC unroll 2
+    for (std::size_t face = 0; face < 2; ++face) {
+      const double sign = wedge_sign(face_order[prism], static_cast<int>(face));
+      angles[leaning::vertical(prism, face)] = vertical + T(sign) * p(place::wedge_angle(number));
+    }
+  }
+  return angles;
+}
+
+/// Sine and cosine of each of some angles, rad.
+template <ModelScalar T, std::size_t Count>
+std::array<SinePair<T>, Count> sines_of(const std::array<T, Count>& angles) {
+  std::array<SinePair<T>, Count> sines;
+  for (std::size_t i = 0; i < Count; ++i) sines[i] = sin_cos(angles[i]);
+  return sines;
+}
+
+/// The axis about which a prism turns, Eq. (9, 13), and sine and cosine of its horizontal angle.
+template <class T>
+struct PrismAxis {
+  Vector3<T> direction;
+  SinePair<T> horizontal;
+};
+
+/// @param sines  by leaning angle: an array of SinePair<T>, or what gives its elements
+template <ModelScalar T, int N, class Sines>
+PrismAxis<T> prism_axis(const Sines& sines, std::size_t prism) {
+  const T zero(0.0), one(1.0);
+  if (prism + 1 == N) return {{one, zero, zero}, {zero, one}};
+  auto&& horizontal = sines[leaning::bearing_horizontal(prism)];
+  return {leaning_direction<T>(horizontal, sines[leaning::bearing_vertical(prism)]), horizontal};
+}
+
+/// One prism of prepare().
+/// @param parameters  flat vector: an array of T, or what gives its elements
+/// @param sines       as prism_axis()
+template <ModelScalar T, int N, class Parameters, class Sines>
+void prepare_prism(const Parameters& parameters, const Sines& sines, std::size_t prism,
+                   PreparedTrain<T, N>& train) {
+  const int number = static_cast<int>(prism);
+  auto&& air = parameters[static_cast<std::size_t>(place::refractive_index_air())];
+  auto&& glass = parameters[static_cast<std::size_t>(place::refractive_index(number))];
+  Vector3<T> axis = prism_axis<T, N>(sines, prism).direction;
+  auto&& horizontal = sines[leaning::horizontal(prism)];
+  std::array<Vector3<T>, 2> normals;
+#pragma GCC unroll 2
+  for (std::size_t side = 0; side < 2; ++side) {
+    Vector3<T>& normal = normals[side];
+    normal = leaning_direction<T>(horizontal, sines[leaning::vertical(prism, side)]);
+    auto& face = train.faces[2 * prism + side];
+    face.normal = turning_about(axis, normal);
+    face.index_ratio = side == 0 ? T(air / glass) : T(glass / air);
+  }
+  train.cosine_between[prism] = dot(normals[0], normals[1]);
+}
+
 /// @param parameters  flat vector, SI units, see namespace place
 template <ModelScalar T, int N>
 PreparedTrain<T, N> prepare(const std::array<T, parameter_count(N)>& parameters,
                             const std::array<FaceOrder, N>& face_order) {
-  const auto p = [&](int at) -> const T& { return parameters[static_cast<std::size_t>(at)]; };
+  const auto sines = sines_of(leaning_angles<T, N>(parameters, face_order));
   PreparedTrain<T, N> train;
-  train.incident = leaning_direction(p(place::incident_beam_horizontal()),
-                                     p(place::incident_beam_vertical()));  // Eq. (14)
-  const T& air = p(place::refractive_index_air());
-  for (int prism = 0; prism < N; ++prism) {
-    const bool last = prism == N - 1;
-    const T bearing_h = last ? T(0.0) : p(place::bearing_tilt_horizontal(prism));
-    const T bearing_v = last ? T(0.0) : p(place::bearing_tilt_vertical(prism));
-    const Vector3<T> axis = leaning_direction(bearing_h, bearing_v);  // Eq. (9), (13)
-    std::array<Vector3<T>, 2> normals;
-    for (int side = 0; side < 2; ++side) {
-      const double sign = wedge_sign(face_order[static_cast<std::size_t>(prism)], side);
-      Vector3<T>& normal = normals[static_cast<std::size_t>(side)];
-      normal = leaning_direction(  // Eq. (15-18)
-          T(bearing_h + p(place::prism_tilt_horizontal(prism))),
-          T(bearing_v + p(place::prism_tilt_vertical(prism)) +
-            T(sign) * p(place::wedge_angle(prism))));
-      auto& face = train.faces[static_cast<std::size_t>(2 * prism + side)];
-      face.normal = turning_about(axis, normal);
-      const T& glass = p(place::refractive_index(prism));
-      face.index_ratio = side == 0 ? air / glass : glass / air;
-    }
-    train.cosine_between[static_cast<std::size_t>(prism)] = dot(normals[0], normals[1]);
-  }
+  train.incident = leaning_direction<T>(sines[leaning::incident_horizontal()],
+                                        sines[leaning::incident_vertical()]);
+#pragma GCC unroll 4
+  for (std::size_t prism = 0; prism < N; ++prism) prepare_prism(parameters, sines, prism, train);
   return train;
 }
 

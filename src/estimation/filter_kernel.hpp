@@ -1,0 +1,66 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "risley/core/instruction_set.hpp"
+#include "risley/estimation/rotor_process.hpp"
+#include "risley/optics/prism.hpp"
+
+namespace risley::estimation {
+
+/// One run of the filter through some shots of a series.
+struct FilterRun {
+  std::size_t first = 0, count = 0;
+  bool backwards = false;  ///< from the first shot to the one before it, and so on
+  /// Observations of a larger chi-square are refused, as are those whose modelled beam does not get
+  /// through.
+  double gate = 0;
+  const unsigned char* outlier = nullptr;  ///< [shots of the series], whose observation is left out
+  unsigned char* refused = nullptr;        ///< [shots of the series], set where one is; or nullptr
+
+  /// Of the innovations, [count] or nullptr: chi-square and determinant of the covariance, rad^4.
+  /// Where no observation is taken they are 0 and 1.
+  double* chi_square = nullptr;
+  double* determinant = nullptr;
+  /// Mean and covariance at every shot [count][states (1 + states)], or nullptr.
+  double* kept = nullptr;
+  bool keep_predicted = false;  ///< as they are before the shot's own observation
+};
+
+/// Plain arguments of one call, see optics/batch_kernel.hpp for why they are plain. States are the
+/// free parameters, then angle and speed of each rotor.
+struct FilterArguments {
+  const double* parameters = nullptr;     ///< whole flat vector
+  const FaceOrder* face_order = nullptr;  ///< [prisms]
+  int prisms = 0, emitters = 1;
+  int free = 0;                           ///< number of free parameters, at most one per place
+  const int* place_begin = nullptr;       ///< [free + 1], into places
+  const int* places = nullptr;            ///< of the flat vector
+  const RotorProcess* process = nullptr;  ///< [prisms]
+  double noise_variance = 0;              ///< of both angles without rounding, rad^2
+  double walk_variance = 0;               ///< of every free parameter, per second
+
+  const std::int64_t* time_ns = nullptr;
+  const std::uint8_t* beam = nullptr;  ///< each below emitters
+  const double* azimuth = nullptr;
+  const double* zenith = nullptr;
+  const float* azimuth_rounding_variance = nullptr;
+  const float* zenith_rounding_variance = nullptr;
+
+  /// Where the model is linearised; nullptr: at the filter's own state.
+  const double* reference_parameters = nullptr;  ///< [free]
+  const double* reference_angle = nullptr;       ///< [shots][prisms]
+
+  FilterRun run;
+  double* mean = nullptr;                 ///< [states], changed
+  double* covariance = nullptr;           ///< [states][states], changed
+  std::int64_t* state_time_ns = nullptr;  ///< when the state is so, changed
+};
+
+/// @return how many shots it went through: all, unless the mean ceased to be finite
+RISLEY_DECLARE_KERNEL(std::size_t run_filter(const FilterArguments& arguments))
+
+}  // namespace risley::estimation
