@@ -85,7 +85,7 @@ template <class Job>
 void take_recordings(const CalibrateCommandOptions& options, const CommonOptions& common,
                      Job& job) {
   take_common(options, job);
-  job.recordings = options.inputs;
+  job.recordings.assign(options.inputs.begin(), options.inputs.end());
   job.reading = read_options(options.reading);
   job.angle_noise = noise_angle(options.noise_angle_deg);
   if (options.mirror != "auto") job.mirrored = options.mirror == "yes";

@@ -66,21 +66,19 @@ Json row_json(const Row& row) {
   return object;
 }
 
-Json reproduction_json(const Reproduction& found, const CommonOptions& common,
-                       const std::vector<std::string>& inputs) {
+Json reproduction_json(const Reproduction& found, const jobs::Provenance& provenance) {
   Json tables = Json::object();
   for (const reproduction::Table& table : found.tables) {
     Json rows = Json::array();
     for (const Row& row : table.rows) rows.push_back(row_json(row));
     tables[table.name] = {{"title", table.title}, {"method", table.method}, {"rows", rows}};
   }
-  Json provenance = Json::object();
-  for (const auto& [name, value] : jobs::with_inputs(provenance_of(common), inputs))
-    provenance[name] = value;
+  Json origin = Json::object();
+  for (const auto& [name, value] : provenance) origin[name] = value;
   return {{"rows", row_count(found)},
           {"passed", passed_count(found)},
           {"tables", tables},
-          {"provenance", provenance}};
+          {"provenance", origin}};
 }
 
 void print_reproduction(const Reproduction& found) {
@@ -124,19 +122,19 @@ ExitStatus run_reproduce(const ReproduceCommandOptions& options, const CommonOpt
   reproduction::ReproduceOptions settings;
   settings.seed = common.seed;
   if (options.full) settings.effort = reproduction::kFullEffort;
-  std::vector<std::string> inputs;
+  std::vector<recordings::Source> inputs;
   if (!options.recording.empty()) {
     settings.recording = real_recording(options.recording, options.reading, common);
-    inputs.push_back(options.recording);
+    inputs.emplace_back(options.recording);
   }
   Reproduction found;
   {
     ProgressBar bar("reproducing", common);
     found = reproduction::reproduce(settings, bar.progress());
   }
-  const Json object = with_head(common, reproduction_json(found, common, inputs));
-  folder.add_text({"report.html", reproduction::reproduction_page(
-                                      found, jobs::with_inputs(provenance_of(common), inputs))});
+  const jobs::Provenance provenance = jobs::with_inputs(provenance_of(common), inputs);
+  const Json object = with_head(common, reproduction_json(found, provenance));
+  folder.add_text({"report.html", reproduction::reproduction_page(found, provenance)});
   folder.add_text(
       {"reproduction.json", object.dump(2, ' ', false, Json::error_handler_t::replace) + "\n"});
   for (const std::string& move : folder.commit()) spdlog::warn("{}", move);

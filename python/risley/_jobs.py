@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The risley authors
 # SPDX-License-Identifier: MIT
-"""Jobs on files: each does what a verb of the command does."""
+"""Jobs on recordings and files: each does what a verb of the command does."""
 import os
 from typing import Any, Dict, Iterable, List, Mapping, Optional, Sequence, Tuple, Union
 
@@ -8,7 +8,7 @@ from risley import _risley
 from risley._progress import Progress, telling
 from risley._results import (Calibration, Cloud, Estimate, FlightCalibration, Identification,
                              Pattern, Plan, Simulation)
-from risley._units import Path, YawPitchRoll, angle, angles, pose
+from risley._units import (Path, Source, YawPitchRoll, angle, angles, pose, source, sources)
 
 Fixed = Union[Mapping[str, Optional[float]], Iterable[str]]
 Rate = Union[None, float, str]
@@ -26,7 +26,7 @@ def _paths(paths: Union[Path, Sequence[Path]]) -> List[str]:
     return [os.fspath(path) for path in paths]
 
 
-def estimate(recording: Path, *, sensor: Path = "", output: Path = "", method: str = "map",
+def estimate(recording: Source, *, sensor: Path = "", output: Path = "", method: str = "map",
              rate: Rate = None, angle_noise: Optional[float] = None,
              angle_noise_deg: Optional[float] = None, fixed: Fixed = (), free: Iterable[str] = (),
              mirrored: Optional[bool] = None, truth: Path = "", states: str = "knots",
@@ -37,8 +37,8 @@ def estimate(recording: Path, *, sensor: Path = "", output: Path = "", method: s
 
     Parameters
     ----------
-    recording : str or path
-        A recording of one sensor.
+    recording : str, path or Recording
+        A recording of one sensor: a file, or in memory.
     sensor : str or path, optional
         Name of a preset, or a preset or calibration file; otherwise found from the recording.
     output : str or path, optional
@@ -79,7 +79,7 @@ def estimate(recording: Path, *, sensor: Path = "", output: Path = "", method: s
         For damaged files, and for options that make no sense.
     """
     options = {
-        "recording": os.fspath(recording), "sensor": os.fspath(sensor),
+        "recording": source(recording), "sensor": os.fspath(sensor),
         "output": os.fspath(output), "method": method, "rate": rate,
         "angle_noise": angle("angle_noise", angle_noise, angle_noise_deg), "fixed": _held(fixed),
         "free": list(free), "mirrored": mirrored, "truth": os.fspath(truth), "states": states,
@@ -88,7 +88,7 @@ def estimate(recording: Path, *, sensor: Path = "", output: Path = "", method: s
         return Estimate(_risley.estimate(options, threads, tell))
 
 
-def calibrate(recordings: Union[Path, Sequence[Path]], *, sensor: Path = "", output: Path = "",
+def calibrate(recordings: Union[Source, Sequence[Source]], *, sensor: Path = "", output: Path = "",
               method: str = "adjustment", planes: Path = "", stations: Path = "",
               station: Sequence[str] = (), trajectory: Path = "", trajectory_topic: str = "",
               mount: Path = "", accuracy: Path = "", trajectory_errors: Path = "",
@@ -107,8 +107,8 @@ def calibrate(recordings: Union[Path, Sequence[Path]], *, sensor: Path = "", out
 
     Parameters
     ----------
-    recordings : str, path or a sequence of them
-        Recordings of one sensor, with ranges.
+    recordings : str, path, Recording or a sequence of them
+        Recordings of one sensor, with ranges: files, or in memory.
     sensor : str or path, optional
         Name of a preset, or a preset or calibration file; otherwise found from the recordings.
     output : str or path, optional
@@ -169,7 +169,7 @@ def calibrate(recordings: Union[Path, Sequence[Path]], *, sensor: Path = "", out
         For damaged files, and for options that make no sense.
     """
     options = {
-        "recordings": _paths(recordings), "sensor": os.fspath(sensor),
+        "recordings": sources(recordings), "sensor": os.fspath(sensor),
         "output": os.fspath(output), "knot_spacing": knot_spacing, "cell_size": cell_size,
         "rate": rate, "angle_noise": angle("angle_noise", angle_noise, angle_noise_deg),
         "range_noise": range_noise,
@@ -262,7 +262,7 @@ def plan(scene_or_flight: Path, *, sensor: Path = "", duration: Optional[float] 
                                  tell))
 
 
-def cloud(recording: Path, calibration: Path, output: Path, *, format: str = "",
+def cloud(recording: Source, calibration: Path, output: Path, *, format: str = "",
           directions: str = "smoothed", beam_origin: bool = True, beam_divergence: bool = True,
           covariance: bool = True, common_factors: bool = False, rate: Rate = None,
           angle_noise: Optional[float] = None, angle_noise_deg: Optional[float] = None,
@@ -276,8 +276,8 @@ def cloud(recording: Path, calibration: Path, output: Path, *, format: str = "",
 
     Parameters
     ----------
-    recording : str or path
-        A recording of one sensor, with ranges.
+    recording : str, path or Recording
+        A recording of one sensor, with ranges: a file, or in memory.
     calibration : str or path
         ``calibration.yaml`` of an estimate or a calibration, or the name of a preset.
     output : str or path
@@ -321,7 +321,7 @@ def cloud(recording: Path, calibration: Path, output: Path, *, format: str = "",
         For damaged files, and for options that make no sense.
     """
     options = {
-        "recording": os.fspath(recording), "calibration": os.fspath(calibration),
+        "recording": source(recording), "calibration": os.fspath(calibration),
         "output": os.fspath(output), "format": format, "directions": directions,
         "beam_origin": beam_origin, "beam_divergence": beam_divergence, "covariance": covariance,
         "common_factors": common_factors, "rate": rate,
@@ -423,7 +423,7 @@ def simulate(output: Path, *, sensor: Path = "mid-40", duration: Optional[float]
         return Simulation(_risley.simulate(options, threads, tell))
 
 
-def identify(recording: Path, *, output: Path = "", force: bool = False, most_prisms: int = 3,
+def identify(recording: Source, *, output: Path = "", force: bool = False, most_prisms: int = 3,
              fastest: Optional[float] = None, shot_rate: Optional[float] = None,
              extrinsics: YawPitchRoll = None, extrinsics_deg: YawPitchRoll = None,
              threads: int = 0, progress: Progress = None) -> Identification:
@@ -431,8 +431,8 @@ def identify(recording: Path, *, output: Path = "", force: bool = False, most_pr
 
     Parameters
     ----------
-    recording : str or path
-        A recording of one sensor.
+    recording : str, path or Recording
+        A recording of one sensor: a file, or in memory.
     output : str or path, optional
         Preset to write (.yaml), which can be given as ``sensor`` elsewhere.
     force : bool, default False
@@ -456,7 +456,7 @@ def identify(recording: Path, *, output: Path = "", force: bool = False, most_pr
         For damaged files, and for options that make no sense.
     """
     options = {
-        "recording": os.fspath(recording), "output": os.fspath(output), "force": force,
+        "recording": source(recording), "output": os.fspath(output), "force": force,
         "most_prisms": most_prisms, "fastest": fastest, "shot_rate": shot_rate,
         "extrinsics": pose(extrinsics, extrinsics_deg)}
     with telling(progress) as tell:
@@ -542,7 +542,7 @@ def coverage(sensor: Path, *, after: Optional[Sequence[float]] = None,
         return dict(_risley.coverage(options, threads, tell))
 
 
-def observability(recording: Path = "", *, sensor: Path = "", duration: Optional[float] = None,
+def observability(recording: Source = "", *, sensor: Path = "", duration: Optional[float] = None,
                   rate: Rate = None, angle_noise: Optional[float] = None,
                   angle_noise_deg: Optional[float] = None, rounding: bool = True,
                   fixed: Fixed = (), free: Iterable[str] = (), shot_rate: Optional[float] = None,
@@ -552,8 +552,8 @@ def observability(recording: Path = "", *, sensor: Path = "", duration: Optional
 
     Parameters
     ----------
-    recording : str or path, optional
-        The recording; without one, the bounds are those of a plan.
+    recording : str, path or Recording, optional
+        The recording, a file or in memory; without one, the bounds are those of a plan.
     duration : float, optional
         Length of the plan, s; by default 30.
     rate : float or 'full', optional
@@ -571,7 +571,7 @@ def observability(recording: Path = "", *, sensor: Path = "", duration: Optional
         As in ``risley observability --json``.
     """
     options = {
-        "recording": os.fspath(recording), "sensor": os.fspath(sensor), "duration": duration,
+        "recording": source(recording), "sensor": os.fspath(sensor), "duration": duration,
         "rate": rate, "angle_noise": angle("angle_noise", angle_noise, angle_noise_deg),
         "rounding": rounding, "fixed": _held(fixed), "free": list(free), "shot_rate": shot_rate,
         "extrinsics": pose(extrinsics, extrinsics_deg)}
@@ -654,15 +654,15 @@ def campaign(plan: Path, output: Path, *, chunk: Optional[Tuple[int, int]] = Non
         return dict(_risley.campaign(options, threads, tell))
 
 
-def info(file: Path, *, accuracy: Path = "", trajectory_topic: str = "",
+def info(file: Source, *, accuracy: Path = "", trajectory_topic: str = "",
          shot_rate: Optional[float] = None, extrinsics: YawPitchRoll = None,
          extrinsics_deg: YawPitchRoll = None, progress: Progress = None) -> Dict[str, Any]:
     """Describe what a recording or a trajectory holds, and check its times.
 
     Parameters
     ----------
-    file : str or path
-        A recording or trajectory in any known format.
+    file : str, path or Recording
+        A recording or trajectory in any known format, or a recording in memory.
     accuracy : str or path, optional
         Accuracies of a trajectory (SMRMSG).
     trajectory_topic : str, optional
@@ -675,7 +675,7 @@ def info(file: Path, *, accuracy: Path = "", trajectory_topic: str = "",
     dict
         As in ``risley info --json``. Damage is reported under ``error``.
     """
-    options = {"input": os.fspath(file), "accuracy": os.fspath(accuracy),
+    options = {"input": source(file), "accuracy": os.fspath(accuracy),
                "trajectory_topic": trajectory_topic, "shot_rate": shot_rate,
                "extrinsics": pose(extrinsics, extrinsics_deg)}
     with telling(progress) as tell:

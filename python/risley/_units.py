@@ -1,13 +1,26 @@
 # SPDX-FileCopyrightText: 2026 The risley authors
 # SPDX-License-Identifier: MIT
-"""Arguments that may be given in SI units or, under another name, in degrees."""
+"""Arguments of jobs: recordings, files, and angles in SI units or, under another name, in degrees."""
 import os
-from typing import Optional, Sequence, Tuple, Union
+from typing import List, Optional, Sequence, Tuple, Union
 
 from risley import _risley
 
 Path = Union[str, "os.PathLike[str]"]
+Source = Union[Path, _risley.Recording]
 YawPitchRoll = Optional[Tuple[float, float, float]]
+
+
+def source(recording: Source) -> Union[str, _risley.Recording]:
+    """A recording by its path, or one in memory."""
+    return recording if isinstance(recording, _risley.Recording) else os.fspath(recording)
+
+
+def sources(recordings: Union[Source, Sequence[Source]]) -> List[Union[str, _risley.Recording]]:
+    """One recording or several, as a list."""
+    if isinstance(recordings, (str, os.PathLike, _risley.Recording)):
+        return [source(recordings)]
+    return [source(recording) for recording in recordings]
 
 
 def angle(name: str, radians: Optional[float], degrees: Optional[float]) -> Optional[float]:

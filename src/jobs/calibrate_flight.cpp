@@ -128,9 +128,9 @@ calibration::FlightCalibrationOptions settings_of(const CalibrateFlightOptions& 
 
 void write_flight(const CalibrateFlightOptions& options, CalibratedFlight& result,
                   ResultFolder& folder, const Progress& progress) {
-  std::vector<std::string> inputs = options.recordings;
+  std::vector<recordings::Source> inputs = options.recordings;
   for (const std::string& path : paths_of(options.platform)) inputs.push_back(path);
-  if (!options.control.empty()) inputs.push_back(options.control);
+  if (!options.control.empty()) inputs.emplace_back(options.control);
   result.provenance = with_inputs(options.files.provenance, inputs, progress);
   const calibration::FlightCalibration& found = result.calibration;
   const CalibrationCode code = found.verdict.code;

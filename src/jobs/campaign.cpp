@@ -155,7 +155,7 @@ CellOutcome outcome_in(const std::string& folder, const CampaignSetting& setting
       take(estimate_recording(job, progress), outcome);
     } else {
       CalibrateRecordingsOptions job = std::get<CalibrateRecordingsOptions>(setting.job);
-      job.recordings = recordings;
+      job.recordings.assign(recordings.begin(), recordings.end());
       job.truths = truths;
       job.seed = cell.seed;
       take(calibrate_recordings(job, progress), outcome);

@@ -19,10 +19,11 @@ namespace risley::jobs {
 namespace {
 
 /// The day on which a file was last changed, UTC: of a recording, mostly when it was made.
-std::optional<std::chrono::sys_days> day_of(const std::string& path) {
+std::optional<std::chrono::sys_days> day_of(const recordings::Source& recording) {
   using namespace std::chrono;
+  if (recording.recording()) return std::nullopt;
   std::error_code problem;
-  const auto time = std::filesystem::last_write_time(path, problem);
+  const auto time = std::filesystem::last_write_time(recording.name(), problem);
   if (problem) return std::nullopt;
   return floor<days>(file_clock::to_sys(time));
 }
@@ -40,7 +41,7 @@ RecordingCloud cloud_of_recording(const CloudOfRecordingOptions& options,
   }
   const sensors::Sensor calibration = sensors::load_sensor(options.calibration);
   cloud::find_cloud_format(options.output, settings.writer.format);  // before anything is read
-  std::vector<std::string> inputs{options.recording};
+  std::vector<recordings::Source> inputs{options.recording};
   if (moves(options.platform)) {
     settings.platform = load_platform(options.platform, progress);
     for (const std::string& path : paths_of(options.platform)) inputs.push_back(path);
@@ -54,7 +55,7 @@ RecordingCloud cloud_of_recording(const CloudOfRecordingOptions& options,
   const SensorFrameRecording input =
       open_in_sensor_frame(options.recording, options.reading, calibration, progress);
   RecordingCloud result{
-      options.recording, options.output, options.calibration, calibration.reference,
+      options.recording.name(), options.output, options.calibration, calibration.reference,
       cloud::make_cloud(*input.reader, calibration, options.output, settings, progress)};
   std::vector<std::string>& warnings = result.summary.warnings;
   warnings.insert(warnings.begin(), input.warnings.begin(), input.warnings.end());

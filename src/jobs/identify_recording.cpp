@@ -33,7 +33,7 @@ estimation::AngleSeries read(const IdentifyRecordingOptions& options, Identified
   recordings::require_times(header);
   if (header.devices.size() > 1) {
     throw InvalidArgument(fmt::format("{} holds {} sensors, identify needs the recording of one",
-                                      options.recording, header.devices.size()));
+                                      options.recording.name(), header.devices.size()));
   }
   estimation::ShotSelector selector({});
   recordings::Chunk chunk;

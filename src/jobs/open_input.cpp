@@ -8,14 +8,14 @@
 
 namespace risley::jobs {
 
-std::unique_ptr<recordings::Reader> open_input(const std::string& path,
+std::unique_ptr<recordings::Reader> open_input(const recordings::Source& source,
                                                const recordings::ReadOptions& options,
                                                const Progress& progress) {
-  if (!options.extrinsics) return recordings::open_recording(path, options, progress);
+  if (!options.extrinsics) return recordings::open_recording(source, options, progress);
   try {
-    return recordings::open_recording(path, options, progress);
+    return recordings::open_recording(source, options, progress);
   } catch (const InvalidArgument& error) {  // several sensors
-    throw InvalidArgument(fmt::format("option extrinsics, {}: {}", path, error.what()));
+    throw InvalidArgument(fmt::format("option extrinsics, {}: {}", source.name(), error.what()));
   }
 }
 

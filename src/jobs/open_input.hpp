@@ -10,7 +10,7 @@
 namespace risley::jobs {
 
 /// As recordings::open_recording; refused extrinsics are told with option and file.
-std::unique_ptr<recordings::Reader> open_input(const std::string& path,
+std::unique_ptr<recordings::Reader> open_input(const recordings::Source& source,
                                                const recordings::ReadOptions& options,
                                                const Progress& progress);
 

@@ -26,12 +26,12 @@ bool PacketRecording::is_one(const recordings::RecordingHeader& header) {
   return header.packet_shots > 0 && header.devices.size() == 1;
 }
 
-std::optional<PacketRecording> PacketRecording::open(const std::string& path,
+std::optional<PacketRecording> PacketRecording::open(const recordings::Source& source,
                                                      const recordings::ReadOptions& options,
                                                      const Progress& progress) {
   recordings::ReadOptions as_it_is;
   as_it_is.extrinsics = options.extrinsics;
-  const auto reader = open_input(path, as_it_is, progress);
+  const auto reader = open_input(source, as_it_is, progress);
   if (!is_one(reader->header())) return std::nullopt;
   const auto variance = [](float step) { return step * step / 12.0F; };
   PacketRecording result;
@@ -173,22 +173,22 @@ PlacedRows PacketRecording::place_rows(const sensors::Sensor& sensor,
   return result;
 }
 
-PlacedInput place_input(const std::string& path, const recordings::ReadOptions& options,
+PlacedInput place_input(const recordings::Source& source, const recordings::ReadOptions& options,
                         UntoldShots untold, const Progress& progress) {
-  PlacedInput result{options, open_input(path, options, progress), {}, {}, 0};
+  PlacedInput result{options, open_input(source, options, progress), {}, {}, 0};
   if (!PacketRecording::is_one(result.reader->header())) return result;
-  const auto packets = PacketRecording::open(path, options, progress);
+  const auto packets = PacketRecording::open(source, options, progress);
   if (!packets) return result;
   result.reading.shot_rate.reset();
   result.reading.packet_places = packets->middle_places();
-  result.reader = open_input(path, result.reading, progress);
-  result.choice = choose_sensor(path, result.reading, result.reader->header(), {}, progress);
+  result.reader = open_input(source, result.reading, progress);
+  result.choice = choose_sensor(source, result.reading, result.reader->header(), {}, progress);
   PlacedRows placed =
       packets->place_rows(result.choice->sensor, options.shot_rate, untold, progress);
   result.reading.packet_places = std::move(placed.places);
   result.words = std::move(placed.words);
   result.time_uncertainty = placed.time_uncertainty;
-  result.reader = open_input(path, result.reading, progress);
+  result.reader = open_input(source, result.reading, progress);
   return result;
 }
 

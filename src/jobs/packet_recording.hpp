@@ -37,7 +37,7 @@ class PacketRecording {
   /// Whether a recording has one time for each packet, and is of one sensor.
   static bool is_one(const recordings::RecordingHeader& header);
   /// Empty for any other recording. One may end within a packet.
-  static std::optional<PacketRecording> open(const std::string& path,
+  static std::optional<PacketRecording> open(const recordings::Source& source,
                                              const recordings::ReadOptions& options,
                                              const Progress& progress);
 
@@ -76,7 +76,7 @@ struct PlacedInput {
 /// read as asked for.
 /// @throws EstimationError as PacketRecording::place_rows(); as recordings::open_recording,
 ///         choose_sensor()
-PlacedInput place_input(const std::string& path, const recordings::ReadOptions& options,
+PlacedInput place_input(const recordings::Source& source, const recordings::ReadOptions& options,
                         UntoldShots untold, const Progress& progress);
 
 }  // namespace risley::jobs

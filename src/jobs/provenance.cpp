@@ -5,19 +5,22 @@
 #include <fmt/format.h>
 
 #include "risley/io/sha256.hpp"
-#include "risley/recordings/reader.hpp"
 
 namespace risley::jobs {
 
-Provenance with_inputs(Provenance provenance, const std::vector<std::string>& inputs,
+Provenance with_inputs(Provenance provenance, const std::vector<recordings::Source>& inputs,
                        const Progress& progress) {
   std::size_t count = 0;
-  for (const std::string& input : inputs) {
+  const auto add = [&](const std::string& input) {
+    ++count;
+    std::string name = count == 1 ? "input" : fmt::format("input_{}", count);
+    provenance.emplace_back(name, input);
+    return name;
+  };
+  for (const recordings::Source& input : inputs) {
+    if (input.recording()) add(input.name());
     for (const std::string& file : recordings::recording_files(input)) {
-      const std::string name = count == 0 ? "input" : fmt::format("input_{}", count + 1);
-      provenance.emplace_back(name, file);
-      provenance.emplace_back(name + "_sha256", io::sha256_of_file(file, progress));
-      ++count;
+      provenance.emplace_back(add(file) + "_sha256", io::sha256_of_file(file, progress));
     }
   }
   return provenance;

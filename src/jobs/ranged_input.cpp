@@ -2,7 +2,6 @@
 // SPDX-License-Identifier: MIT
 #include "jobs/ranged_input.hpp"
 
-#include <filesystem>
 #include <utility>
 
 #include <fmt/format.h>
@@ -19,13 +18,12 @@ using calibration::RangedRecording;
 namespace {
 
 /// Each recording stands for observations of its own.
-void require_recordings(const std::vector<std::string>& recordings) {
+void require_recordings(const std::vector<recordings::Source>& recordings) {
   if (recordings.empty()) throw InvalidArgument("option recordings is empty, expected one or more");
   for (std::size_t i = 0; i < recordings.size(); ++i) {
     for (std::size_t j = 0; j < i; ++j) {
-      std::error_code ignored;
-      if (std::filesystem::equivalent(recordings[i], recordings[j], ignored)) {
-        throw InvalidArgument(fmt::format("{} is given twice", recordings[i]));
+      if (recordings[i].is_same_as(recordings[j])) {
+        throw InvalidArgument(fmt::format("{} is given twice", recordings[i].name()));
       }
     }
   }
@@ -42,9 +40,9 @@ void check_ranged_input(const RangedInputOptions& options) {
 RangedRecording read_ranged(const RangedInputOptions& options, std::size_t number,
                             RangedInput& result, const Progress& progress,
                             const EstimateTaker& take) {
-  const std::string& path = options.recordings[number];
+  const std::string& path = options.recordings[number].name();
   EstimationInput input =
-      read_for_estimation({path,
+      read_for_estimation({options.recordings[number],
                            options.reading,
                            options.sensor,
                            {.rate = options.rate, .ranges = true, .rows = false}},

@@ -90,12 +90,12 @@ class EvenTimes {
 
 /// All valid shots of a recording whose times are counted, because a rate was asked for or because
 /// they evidently are.
-std::optional<estimation::CountedShots> counted_shots(const std::string& path,
+std::optional<estimation::CountedShots> counted_shots(const recordings::Source& source,
                                                       recordings::ReadOptions options,
                                                       const sensors::Sensor& sensor,
                                                       const Progress& progress) {
   options.emitters = 0;  // beams as the file has them
-  const auto reader = recordings::open_recording(path, options, progress);
+  const auto reader = recordings::open_recording(source, options, progress);
   estimation::ShotSelector selector({.rate = std::nullopt, .ranges = false, .rows = true});
   EvenTimes even(sensor.shot_rate);
   recordings::Chunk chunk;
@@ -173,14 +173,15 @@ std::string share_text(double share) { return fmt::format("{:.1f} %", 100.0 * sh
 /// Opens a recording, chooses its sensor, and turns it back by the pose that it states where its
 /// points were moved by it.
 /// @param[in,out] reading  as asked for; on return with the pose
-SensorFrameRecording open_by_stated_pose(const std::string& path, recordings::ReadOptions& reading,
+SensorFrameRecording open_by_stated_pose(const recordings::Source& source,
+                                         recordings::ReadOptions& reading,
                                          const std::optional<sensors::Sensor>& given,
                                          const Progress& progress) {
   progress.check();
   SensorFrameRecording result{
-      open_input(path, reading, progress), {}, {}, reading.extrinsics.has_value()};
+      open_input(source, reading, progress), {}, {}, reading.extrinsics.has_value()};
   recordings::require_times(result.reader->header());
-  result.choice = choose_sensor(path, reading, result.reader->header(), given, progress);
+  result.choice = choose_sensor(source, reading, result.reader->header(), given, progress);
   result.warnings = result.choice.warnings;
   const recordings::RecordingHeader& header = result.reader->header();
   if (reading.extrinsics || header.devices.size() != 1) return result;
@@ -190,7 +191,7 @@ SensorFrameRecording open_by_stated_pose(const std::string& path, recordings::Re
   if (!pose) {
     if (result.choice.roll == 0) return result;
     reading.extrinsics = roll_about_axis(result.choice.roll, result.choice.frame);
-    result.reader = open_input(path, reading, progress);
+    result.reader = open_input(source, reading, progress);
     result.turned_back = true;
     result.warnings.push_back(fmt::format(
         "the recording is rotated about the optical axis by {:.1f} deg, as the positions of the "
@@ -200,7 +201,7 @@ SensorFrameRecording open_by_stated_pose(const std::string& path, recordings::Re
   }
   turned_back.extrinsics = pose;
   const estimation::StoredPoseVerdict verdict = estimation::judge_stored_pose(
-      first_second(path, reading, progress), first_second(path, turned_back, progress),
+      first_second(source, reading, progress), first_second(source, turned_back, progress),
       result.choice.sensor.field_of_view);
   const std::string found = fmt::format(
       "the recording states a pose of its sensor ({}); of the shots, {} lie outside the sensor's "
@@ -213,7 +214,7 @@ SensorFrameRecording open_by_stated_pose(const std::string& path, recordings::Re
   result.turned_back = decided ? verdict.use == StoredPoseUse::applied : by_hub;
   if (result.turned_back) {
     reading = turned_back;
-    result.reader = open_input(path, reading, progress);
+    result.reader = open_input(source, reading, progress);
   }
   if (decided && result.turned_back) {
     result.warnings.push_back(found + ": the shots were turned back into the sensor's frame");
@@ -231,45 +232,47 @@ SensorFrameRecording open_by_stated_pose(const std::string& path, recordings::Re
 
 /// Opens a recording whose packets lack points: shots cannot be counted in it, but packets have
 /// their times.
-SensorFrameRecording open_with_places(const std::string& path, recordings::ReadOptions reading,
+SensorFrameRecording open_with_places(const recordings::Source& source,
+                                      recordings::ReadOptions reading,
                                       const std::optional<sensors::Sensor>& given,
                                       PacketRecording packets, const Progress& progress) {
   const bool given_pose = reading.extrinsics.has_value();
   const std::optional<double> given_rate = std::exchange(reading.shot_rate, std::nullopt);
   reading.packet_places = packets.middle_places();
-  SensorFrameRecording result = open_by_stated_pose(path, reading, given, progress);
-  if (reading.extrinsics && !given_pose) packets = *PacketRecording::open(path, reading, progress);
+  SensorFrameRecording result = open_by_stated_pose(source, reading, given, progress);
+  if (reading.extrinsics && !given_pose)
+    packets = *PacketRecording::open(source, reading, progress);
   PlacedRows placed =
       packets.place_rows(result.choice.sensor, given_rate, UntoldShots::left_out, progress);
   result.warnings.insert(result.warnings.end(), placed.words.begin(), placed.words.end());
   result.cut_mended = placed.places.cut_coordinates;
   reading.packet_places = std::move(placed.places);
-  result.reader = open_input(path, reading, progress);
+  result.reader = open_input(source, reading, progress);
   return result;
 }
 
 }  // namespace
 
-SensorFrameRecording open_in_sensor_frame(const std::string& path,
+SensorFrameRecording open_in_sensor_frame(const recordings::Source& source,
                                           const recordings::ReadOptions& options,
                                           const std::optional<sensors::Sensor>& asked_for,
                                           const Progress& progress) {
   recordings::ReadOptions reading = options;
-  if (auto packets = PacketRecording::open(path, reading, progress)) {
-    return open_with_places(path, reading, asked_for, *std::move(packets), progress);
+  if (auto packets = PacketRecording::open(source, reading, progress)) {
+    return open_with_places(source, reading, asked_for, *std::move(packets), progress);
   }
-  SensorFrameRecording result = open_by_stated_pose(path, reading, asked_for, progress);
+  SensorFrameRecording result = open_by_stated_pose(source, reading, asked_for, progress);
   const sensors::Sensor& sensor = result.choice.sensor;
   const bool given = reading.shot_rate.has_value();
   if (result.reader->header().devices.size() != 1) {  // nobody knows whose shots are missing
     if (given && sensor.train.emitters() > 1) {
       reading.emitters = sensor.train.emitters();
       reading.firing_order = estimation::emitters_in_order(result.choice.order, reading.emitters);
-      result.reader = open_input(path, reading, progress);
+      result.reader = open_input(source, reading, progress);
     }
     return result;
   }
-  const auto shots = counted_shots(path, reading, sensor, progress);
+  const auto shots = counted_shots(source, reading, sensor, progress);
   if (!shots) return result;
   reading.shot_rate = shots->shot_rate;
   reading.emitters = sensor.train.emitters();
@@ -282,20 +285,20 @@ SensorFrameRecording open_in_sensor_frame(const std::string& path,
       count.firing_order.empty() && sensor.train.emitters() > 1
           ? estimation::emitters_in_order(result.choice.order, sensor.train.emitters())
           : std::move(count.firing_order);
-  result.reader = open_input(path, reading, progress);
+  result.reader = open_input(source, reading, progress);
   return result;
 }
 
 EstimationInput read_for_estimation(const EstimationInputOptions& options,
                                     const Progress& progress) {
   const Stopwatch watch;
-  const std::string& path = options.recording;
+  const recordings::Source& source = options.recording;
   SensorFrameRecording input =
-      open_in_sensor_frame(path, options.reading, given_sensor(options.sensor), progress);
+      open_in_sensor_frame(source, options.reading, given_sensor(options.sensor), progress);
   recordings::Reader& reader = *input.reader;
   if (reader.header().devices.size() > 1) {
     throw InvalidArgument(
-        fmt::format("{} holds {} sensors, an estimation needs the recording of one", path,
+        fmt::format("{} holds {} sensors, an estimation needs the recording of one", source.name(),
                     reader.header().devices.size()));
   }
   EstimationInput result;
@@ -318,7 +321,7 @@ EstimationInput read_for_estimation(const EstimationInputOptions& options,
     });
   }
   looks.wait();
-  result.recording = {path, reader.header(), audit.result()};
+  result.recording = {source.name(), reader.header(), audit.result()};
   for (const auto& warning : reader.warnings()) result.warnings.push_back(warning_text(warning));
   result.warnings.insert(result.warnings.end(), input.warnings.begin(), input.warnings.end());
   result.choice = std::move(input.choice);

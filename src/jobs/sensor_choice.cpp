@@ -68,9 +68,9 @@ struct FirstShots {
   BeamSource beams = BeamSource::recorded;
 };
 
-FirstShots first_shots(const std::string& path, const recordings::ReadOptions& reading,
+FirstShots first_shots(const recordings::Source& source, const recordings::ReadOptions& reading,
                        std::span<const Sensor> candidates, const Progress& progress) {
-  FirstShots shots{first_second(path, reading, progress)};
+  FirstShots shots{first_second(source, reading, progress)};
   if (!reading.shot_rate) return shots;
   const std::vector<std::uint8_t>& beam = shots.head.beam;
   if (std::any_of(beam.begin(), beam.end(), [](std::uint8_t one) { return one != 0; })) {
@@ -205,7 +205,7 @@ void guess(const FirstShots& shots, const std::optional<SensorRecognition>& foun
 }
 
 /// Tries the shot rates of the presets, because the recording has no times.
-SensorChoice choose_without_times(const std::string& path, recordings::ReadOptions reading,
+SensorChoice choose_without_times(const recordings::Source& source, recordings::ReadOptions reading,
                                   std::span<const Sensor> candidates, const Progress& progress) {
   SensorChoice choice;
   std::set<double> rates;
@@ -217,7 +217,7 @@ SensorChoice choose_without_times(const std::string& path, recordings::ReadOptio
     std::copy_if(candidates.begin(), candidates.end(), std::back_inserter(some),
                  [rate](const Sensor& sensor) { return sensor.shot_rate == rate; });
     reading.shot_rate = rate;
-    shots = first_shots(path, reading, some, progress);
+    shots = first_shots(source, reading, some, progress);
     const auto found = recognised(shots, some);
     if (!found || !found->fits || misfit_of(found->matches.front()) >= least) continue;
     least = misfit_of(found->matches.front());
@@ -293,12 +293,12 @@ std::string to_string(ChosenBy chosen_by) {
   return "guess";
 }
 
-AngleSeries first_second(const std::string& path, const recordings::ReadOptions& options,
+AngleSeries first_second(const recordings::Source& source, const recordings::ReadOptions& options,
                          const Progress& progress) {
   // One shot a second, and all of the head.
   estimation::ShotSelector selector({.rate = 1.0, .ranges = false, .rows = false});
   try {
-    const auto reader = recordings::open_recording(path, options, progress);
+    const auto reader = recordings::open_recording(source, options, progress);
     recordings::Chunk chunk;
     while (selector.series().size() < 2 && reader->read(chunk)) {
       selector.add(chunk.observations);
@@ -321,7 +321,7 @@ std::optional<Sensor> given_sensor(const std::string& name_or_path) {
   return sensors::load_sensor(name_or_path);
 }
 
-SensorChoice choose_sensor(const std::string& path, const recordings::ReadOptions& reading,
+SensorChoice choose_sensor(const recordings::Source& source, const recordings::ReadOptions& reading,
                            const recordings::RecordingHeader& header,
                            const std::optional<Sensor>& given, const Progress& progress) {
   SensorChoice choice;
@@ -331,7 +331,7 @@ SensorChoice choose_sensor(const std::string& path, const recordings::ReadOption
     choice.sensor = *given;
     choice.words = "as asked for" + origin_of(*given);
     if (given->train.emitters() == 1 || !has_times || !one_sensor) return choice;
-    const FirstShots shots = first_shots(path, reading, {&*given, 1}, progress);
+    const FirstShots shots = first_shots(source, reading, {&*given, 1}, progress);
     if (const auto found = recognised(shots, {&*given, 1})) take(*found, {&*given, 1}, choice);
     return choice;
   }
@@ -355,9 +355,9 @@ SensorChoice choose_sensor(const std::string& path, const recordings::ReadOption
     choice.words = "named by the file";
     return choice;
   }
-  if (!has_times) return choose_without_times(path, reading, candidates, progress);
+  if (!has_times) return choose_without_times(source, reading, candidates, progress);
   const FirstShots shots =
-      one_sensor ? first_shots(path, reading, candidates, progress) : FirstShots{};
+      one_sensor ? first_shots(source, reading, candidates, progress) : FirstShots{};
   if (named != nullptr && !device.type_inferred) {
     return choose_by_name(shots, *named, candidates);
   }

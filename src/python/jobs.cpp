@@ -126,7 +126,7 @@ py::object told_by(const py::object& tell, int threads, const Job& job) {
 
 /// Shots per second to use: a number, or 'full' for all.
 void take_rate(const Options& options, std::optional<double>& rate) {
-  if (options.is_text("rate")) {
+  if (options.is<py::str>("rate")) {
     options.choice("rate", {"full"});
     rate.reset();
     return;
@@ -138,7 +138,7 @@ std::shared_ptr<EstimatedRecording> estimate(const py::dict& values, int threads
                                              const py::object& tell) {
   const Options options(values);
   jobs::EstimateRecordingOptions job;
-  options.take("recording", job.recording);
+  job.recording = recording_source(options, "recording");
   job.reading = read_options(options);
   options.take("sensor", job.sensor);
   constexpr std::array kMethods = {estimation::Method::map, estimation::Method::ekf};
@@ -174,7 +174,7 @@ void take_model(const Options& options, Job& job) {
 template <class Job>
 void take_recordings(const Options& options, Job& job) {
   take_model(options, job);
-  options.take("recordings", job.recordings);
+  job.recordings = recording_sources(options, "recordings");
   job.reading = read_options(options);
   options.take("angle_noise", job.angle_noise);
   options.take("mirrored", job.mirrored);
@@ -270,7 +270,7 @@ void bind_planned(py::module_& module, const char* name) {
 py::object cloud(const py::dict& values, int threads, const py::object& tell) {
   const Options options(values);
   jobs::CloudOfRecordingOptions job;
-  options.take("recording", job.recording);
+  job.recording = recording_source(options, "recording");
   job.reading = read_options(options);
   options.take("calibration", job.calibration);
   options.take("output", job.output);
@@ -323,7 +323,7 @@ py::object simulate(const py::dict& values, int threads, const py::object& tell)
 py::object identify(const py::dict& values, int threads, const py::object& tell) {
   const Options options(values);
   jobs::IdentifyRecordingOptions job;
-  options.take("recording", job.recording);
+  job.recording = recording_source(options, "recording");
   job.reading = read_options(options);
   options.take("most_prisms", job.identify.most_prisms);
   options.take("fastest", job.identify.fastest);
@@ -380,7 +380,7 @@ py::object coverage(const py::dict& values, int threads, const py::object& tell)
 py::object observability(const py::dict& values, int threads, const py::object& tell) {
   const Options options(values);
   jobs::ObservabilityOptions job;
-  options.take("recording", job.recording);
+  job.recording = recording_source(options, "recording");
   job.reading = read_options(options);
   options.take("sensor", job.sensor);
   options.take("duration", job.duration);
@@ -429,20 +429,20 @@ py::object campaign(const py::dict& values, int threads, const py::object& tell)
 
 py::object info(const py::dict& values, const py::object& tell) {
   const Options options(values);
-  std::string input, accuracy, topic;
-  options.take("input", input);
+  const recordings::Source input = recording_source(options, "input");
+  std::string accuracy, topic;
   options.take("accuracy", accuracy);
   options.take("trajectory_topic", topic);
   bool is_trajectory = !topic.empty() || !accuracy.empty();
-  if (!is_trajectory) {
+  if (!is_trajectory && !input.recording()) {
     run_job(tell, 0, [&](const Progress& progress) {
-      is_trajectory = trajectories::trajectory_file_kind(input, progress.silent()) !=
+      is_trajectory = trajectories::trajectory_file_kind(input.name(), progress.silent()) !=
                       trajectories::TrajectoryFileKind::none;
     });
   }
   if (is_trajectory) {
     return told_by(tell, 0, [&](const Progress& progress) {
-      return jobs::inspect_trajectory({input, accuracy, topic}, progress);
+      return jobs::inspect_trajectory({input.name(), accuracy, topic}, progress);
     });
   }
   const recordings::ReadOptions reading = read_options(options);

@@ -4,9 +4,14 @@
 
 #include <algorithm>
 #include <array>
+#include <memory>
+#include <string>
+#include <utility>
+#include <variant>
 
 #include <fmt/ranges.h>
 
+#include "python/call.hpp"
 #include "python/names.hpp"
 #include "python/reading.hpp"
 
@@ -16,6 +21,11 @@ namespace {
 /// The name in files of a parameter of any train; an unknown name as it is, for the job to refuse.
 std::string file_name_of(const NamedParameter& parameter, const std::string& name) {
   return parameter.info != nullptr ? parameter.info->name : name;
+}
+
+recordings::Source in_memory(std::shared_ptr<const recordings::Recording> recording,
+                             std::string name) {
+  return unlocked([&] { return recordings::Source(std::move(recording), std::move(name)); });
 }
 
 }  // namespace
@@ -36,6 +46,32 @@ std::size_t Options::choice(const char* name, const std::vector<std::string>& al
 py::type_error Options::wrong_type(const char* name) const {
   return py::type_error(fmt::format("{} = {} has a type that is not accepted here", name,
                                     py::repr(values_[name]).cast<std::string>()));
+}
+
+recordings::Source recording_source(const Options& options, const char* name) {
+  if (options.is<recordings::Recording>(name)) {
+    std::shared_ptr<recordings::Recording> recording;
+    options.take(name, recording);
+    return in_memory(std::move(recording), "recording in memory");
+  }
+  std::string path;
+  options.take(name, path);
+  return path;
+}
+
+std::vector<recordings::Source> recording_sources(const Options& options, const char* name) {
+  std::vector<std::variant<std::shared_ptr<recordings::Recording>, std::string>> given;
+  options.take(name, given);
+  std::vector<recordings::Source> sources;
+  for (auto& one : given) {
+    if (auto* recording = std::get_if<std::shared_ptr<recordings::Recording>>(&one)) {
+      sources.push_back(in_memory(std::move(*recording),
+                                  fmt::format("recording {} in memory", sources.size() + 1)));
+    } else {
+      sources.emplace_back(std::get<std::string>(std::move(one)));
+    }
+  }
+  return sources;
 }
 
 recordings::ReadOptions read_options(const Options& options) {

@@ -34,8 +34,9 @@ class Options {
     return values_.contains(name) && !values_[name].is_none();
   }
 
-  bool is_text(const char* name) const {
-    return has(name) && py::isinstance<py::str>(values_[name]);
+  template <class T>
+  bool is(const char* name) const {
+    return has(name) && py::isinstance<T>(values_[name]);
   }
 
   /// @throws TypeError naming the option
@@ -63,6 +64,10 @@ class Options {
   py::dict values_;
 };
 
+/// A recording by its path, or a Recording.
+recordings::Source recording_source(const Options& options, const char* name);
+/// A list of them.
+std::vector<recordings::Source> recording_sources(const Options& options, const char* name);
 /// shot_rate, Hz, and extrinsics, yaw, pitch, roll in rad.
 recordings::ReadOptions read_options(const Options& options);
 /// fixed: [(name, value or None)], by either name of a parameter.

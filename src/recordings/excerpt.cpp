@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <deque>
-#include <filesystem>
 #include <limits>
 #include <memory>
 
@@ -242,15 +241,14 @@ class ExcerptWriter {
   std::uint8_t last_return_ = 0;
 };
 
-void check(const std::string& recording, const std::string& path, const ExcerptOptions& options) {
+void check(const Source& recording, const std::string& path, const ExcerptOptions& options) {
   if (!lower_case(path).ends_with(kEnding)) {
     throw InvalidArgument(fmt::format(
         "{}: the name of an excerpt must end in {}: it is written in the lossless NetCDF format, "
         "because other formats drop shots without return or round directions",
         path, kEnding));
   }
-  std::error_code missing;
-  if (std::filesystem::equivalent(recording, path, missing)) {
+  if (recording.is_same_as(path)) {
     throw InvalidArgument(
         fmt::format("{}: the excerpt would replace the recording; name another file", path));
   }
@@ -312,7 +310,7 @@ ExcerptContents contents_of(const Excerpt& excerpt) {
   return contents;
 }
 
-Excerpt write_excerpt(const std::string& recording, const std::string& path,
+Excerpt write_excerpt(const Source& recording, const std::string& path,
                       const ExcerptOptions& options, const ReadOptions& reading,
                       const Progress& progress) {
   check(recording, path, options);
@@ -322,7 +320,8 @@ Excerpt write_excerpt(const std::string& recording, const std::string& path,
   std::vector<ReadWarning> warnings = reader->warnings();
   if (stretch.valid == 0) {
     if (damage) throw FileError(*damage);
-    throw FileError(recording, {}, "holds no shot with a direction, so there is nothing to share");
+    throw FileError(recording.name(), {},
+                    "holds no shot with a direction, so there is nothing to share");
   }
   reader = open_recording(recording, reading, progress);
   ExcerptWriter writer(path, reader->header(), stretch, options);

@@ -42,11 +42,17 @@ void Observations::resize(std::size_t rows) {
   for_each_column([rows](std::string_view, auto& column) { column.resize(rows); }, *this);
 }
 
-void Observations::append(const Observations& other) {
+void Observations::append(const Observations& other) { append(other, 0, other.size()); }
+
+void Observations::append(const Observations& other, std::size_t begin, std::size_t end) {
   require_columns(other);
-  for_each_column([](std::string_view, auto& column,
-                     const auto& more) { column.insert(column.end(), more.begin(), more.end()); },
-                  *this, other);
+  require_rows("rows", begin, end, other.size());
+  for_each_column(
+      [begin, end](std::string_view, auto& column, const auto& more) {
+        column.insert(column.end(), more.begin() + static_cast<std::ptrdiff_t>(begin),
+                      more.begin() + static_cast<std::ptrdiff_t>(end));
+      },
+      *this, other);
 }
 
 void Observations::drop_front(std::size_t rows) {

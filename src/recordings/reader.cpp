@@ -15,6 +15,7 @@
 #include "risley/bags/bag.hpp"
 
 #include "recordings/formats/format.hpp"
+#include "recordings/memory_reader.hpp"
 #include "recordings/reader_decorators.hpp"
 
 namespace risley::recordings {
@@ -87,9 +88,12 @@ std::unique_ptr<Reader> open_as_it_is(const std::string& path, const Progress& p
 
 }  // namespace
 
-std::unique_ptr<Reader> open_recording(const std::string& path, const ReadOptions& options,
+std::unique_ptr<Reader> open_recording(const Source& source, const ReadOptions& options,
                                        const Progress& progress) {
-  std::unique_ptr<Reader> reader = open_as_it_is(path, progress);
+  const std::string& path = source.name();
+  std::unique_ptr<Reader> reader = source.recording()
+                                       ? std::make_unique<MemoryReader>(source.recording())
+                                       : open_as_it_is(path, progress);
   if (options.shot_rate) reader = with_counted_times(std::move(reader), path, options);
   if (options.packet_places) reader = with_packet_places(std::move(reader), options);
   if (options.extrinsics) reader = in_sensor_frame(std::move(reader), *options.extrinsics);
@@ -97,18 +101,6 @@ std::unique_ptr<Reader> open_recording(const std::string& path, const ReadOption
 }
 
 bool is_recording_folder(const std::string& path) { return bags::is_bag_folder(path); }
-
-std::vector<std::string> recording_files(const std::string& path) {
-  std::error_code code;
-  if (!std::filesystem::is_directory(path, code)) return {path};
-  try {
-    std::vector<std::string> files = bags::files_of_bag_folder(path);
-    files.insert(files.begin(), (std::filesystem::path(path) / "metadata.yaml").string());
-    return files;
-  } catch (const FileError&) {  // who reads it is told of it
-    return {path};
-  }
-}
 
 void require_times(const RecordingHeader& header) {
   if (header.has_times) return;
@@ -118,12 +110,15 @@ void require_times(const RecordingHeader& header) {
                   header.format));
 }
 
-Recording load_recording(const std::string& path, const Progress& progress,
+Recording load_recording(const Source& source, const Progress& progress,
                          const ReadOptions& options) {
-  const std::unique_ptr<Reader> reader = open_recording(path, options, progress);
+  const std::unique_ptr<Reader> reader = open_recording(source, options, progress);
   Recording recording;
   Chunk chunk;
   while (reader->read(chunk)) {
+    for (const std::size_t row : chunk.packet_begins) {
+      recording.data.packet_begins.push_back(recording.data.observations.size() + row);
+    }
     recording.data.observations.append(chunk.observations);
     recording.data.packets.insert(recording.data.packets.end(), chunk.packets.begin(),
                                   chunk.packets.end());

@@ -219,6 +219,42 @@ def test_campaign(folder):
         risley.campaign(folder / "plan.yaml", folder / "nowhere", merge=True)
 
 
+def named_alike(value, path):
+    """What says which recording it was, said the same way."""
+    if isinstance(value, dict):
+        return {key: named_alike(one, path) for key, one in value.items()}
+    if isinstance(value, list):
+        return [named_alike(one, path) for one in value]
+    return value.replace("recording 1 in memory", path) if isinstance(value, str) else value
+
+
+def test_recordings_in_memory_give_what_their_files_give(hall, truth, estimate, calibration,
+                                                         folder):
+    recording = risley.read(hall)
+    assert_same(risley.estimate(recording, truth=truth, rate=5000).to_dict(), estimate.to_dict())
+    found = risley.calibrate(recording, truth=truth, rate=5000, output=folder / "of-memory")
+    assert_same(named_alike(found.to_dict(), hall), calibration.to_dict())
+    assert_same(risley.info(recording), risley.info(hall))
+    assert_same(risley.observability(recording, rate=2000.0),
+                risley.observability(hall, rate=2000.0))
+    written = (folder / "of-memory" / "calibration.yaml").read_text(encoding="utf-8")
+    assert "recording 1 in memory" in written and "input_sha256" not in written
+    points = [risley.cloud(one, folder / "of-memory" / "calibration.yaml", folder / name).points
+              for one, name in ((recording, "memory.csv"), (hall, "file.csv"))]
+    assert points[0] == points[1] > 10000
+    rows = [[line for line in (folder / name).read_text(encoding="utf-8").splitlines()
+             if not line.startswith("#")] for name in ("memory.csv", "file.csv")]
+    assert rows[0] == rows[1]
+    scan = risley.from_arrays(time_ns=recording.time_ns, azimuth=recording.azimuth,
+                              zenith=recording.zenith, range=recording.range,
+                              valid=recording.valid, device_type=1)
+    assert risley.identify(scan, most_prisms=2).verdict.code == "identified"
+    with pytest.raises(ValueError, match="recording 2 in memory is given twice"):
+        risley.calibrate([recording, recording])
+    with pytest.raises(TypeError):
+        risley.estimate(5)
+
+
 def test_presets():
     listed = command("preset", "list")["presets"]
     assert [one["name"] for one in listed] == list(risley.presets())

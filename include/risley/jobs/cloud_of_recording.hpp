@@ -14,7 +14,7 @@ namespace risley::jobs {
 
 /// Which points to make.
 struct CloudOfRecordingOptions {
-  std::string recording;            ///< path; of one sensor, with ranges
+  recordings::Source recording;     ///< of one sensor, with ranges
   recordings::ReadOptions reading;  ///< see open_in_sensor_frame() where it holds no extrinsics
   std::string calibration;          ///< preset by name, or a preset or calibration file
   std::string output;               ///< path; its ending chooses the format unless one is named

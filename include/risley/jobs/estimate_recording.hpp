@@ -25,7 +25,7 @@ struct EstimatedRecording;
 
 /// What to estimate, and how. SI units.
 struct EstimateRecordingOptions {
-  std::string recording;            ///< path; of one sensor
+  recordings::Source recording;     ///< of one sensor
   recordings::ReadOptions reading;  ///< see open_in_sensor_frame()
   std::string sensor;               ///< as given_sensor()
   estimation::Method method = estimation::Method::map;

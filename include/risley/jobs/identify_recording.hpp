@@ -16,7 +16,7 @@ namespace risley::jobs {
 
 /// What to identify, and where the answer goes.
 struct IdentifyRecordingOptions {
-  std::string recording;            ///< path; of one sensor
+  recordings::Source recording;     ///< of one sensor
   recordings::ReadOptions reading;  ///< no pose of the header is used: the frame is found
   identification::IdentifyOptions identify;
   std::string output;      ///< preset to write; empty: none

@@ -17,7 +17,7 @@ namespace risley::jobs {
 
 /// What to look at.
 struct InspectRecordingOptions {
-  std::string recording;  ///< path
+  recordings::Source recording;
   recordings::ReadOptions reading;
   std::string excerpt;                         ///< file to write one to (.nc); empty: none
   recordings::ExcerptOptions excerpt_options;  ///< what it may hold

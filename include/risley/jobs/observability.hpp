@@ -15,7 +15,7 @@ namespace risley::jobs {
 
 /// Which recording to judge, planned or made. SI units.
 struct ObservabilityOptions {
-  std::string recording;              ///< path; empty: a plan is judged
+  recordings::Source recording;       ///< empty: a plan is judged
   recordings::ReadOptions reading;    ///< of the recording
   std::string sensor;                 ///< as given_sensor(); a plan takes kUsualSensor
   double duration = 30;               ///< of the plan, s

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "risley/core/progress.hpp"
+#include "risley/recordings/source.hpp"
 
 namespace risley::jobs {
 
@@ -14,9 +15,9 @@ namespace risley::jobs {
 using Provenance = std::vector<std::pair<std::string, std::string>>;
 
 /// Appends name and SHA-256 of every input: "input", "input_sha256", "input_2", ...; of a folder of
-/// ROS 2 those of each of its files.
+/// ROS 2 those of each of its files, of columns in memory the name alone.
 /// @throws FileError, Cancelled
-Provenance with_inputs(Provenance provenance, const std::vector<std::string>& inputs,
+Provenance with_inputs(Provenance provenance, const std::vector<recordings::Source>& inputs,
                        const Progress& progress = {});
 
 }  // namespace risley::jobs

@@ -15,12 +15,12 @@ namespace risley::jobs {
 
 /// Recordings to calibrate with, and how their rotation angles are found. SI units.
 struct RangedInputOptions {
-  std::vector<std::string> recordings;  ///< paths; of one sensor, each with ranges
-  recordings::ReadOptions reading;      ///< see open_in_sensor_frame()
-  std::string sensor;                   ///< as given_sensor()
-  std::optional<double> rate;           ///< shots per second to use; empty: all
-  std::optional<double> angle_noise;    ///< as estimation::EstimateOptions
-  std::optional<bool> mirrored;         ///< the elevation's sign is turned; empty: find out
+  std::vector<recordings::Source> recordings;  ///< of one sensor, each with ranges
+  recordings::ReadOptions reading;             ///< see open_in_sensor_frame()
+  std::string sensor;                          ///< as given_sensor()
+  std::optional<double> rate;                  ///< shots per second to use; empty: all
+  std::optional<double> angle_noise;           ///< as estimation::EstimateOptions
+  std::optional<bool> mirrored;                ///< the elevation's sign is turned; empty: find out
 };
 
 /// What reading them leaves beside their shots.

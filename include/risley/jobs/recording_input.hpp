@@ -45,14 +45,14 @@ struct SensorFrameRecording {
 /// and all of its directions are held in memory meanwhile.
 /// @param given  sensor that was asked for, see choose_sensor()
 /// @throws recordings::MissingTimes, Cancelled, and as recordings::open_recording, choose_sensor()
-SensorFrameRecording open_in_sensor_frame(const std::string& path,
+SensorFrameRecording open_in_sensor_frame(const recordings::Source& source,
                                           const recordings::ReadOptions& reading,
                                           const std::optional<sensors::Sensor>& given,
                                           const Progress& progress = {});
 
 /// One recording that was read to its end.
 struct ReadRecording {
-  std::string path;
+  std::string path;  ///< as recordings::Source::name()
   recordings::RecordingHeader header;
   recordings::TimeAuditResult audit;
 
@@ -62,7 +62,7 @@ struct ReadRecording {
 
 /// What is to be read for an estimation.
 struct EstimationInputOptions {
-  std::string recording;            ///< path; of one sensor, with times
+  recordings::Source recording;     ///< of one sensor, with times
   recordings::ReadOptions reading;  ///< see open_in_sensor_frame() where it holds no extrinsics
   std::string sensor;               ///< as given_sensor()
   estimation::SelectionOptions selection;  ///< ranges of whole steps are kept all the same

@@ -64,7 +64,7 @@ struct SensorChoice {
 /// @param header  of the recording
 /// @param given   sensor that was asked for
 /// @throws FileError, InvalidArgument, Cancelled
-SensorChoice choose_sensor(const std::string& path, const recordings::ReadOptions& reading,
+SensorChoice choose_sensor(const recordings::Source& source, const recordings::ReadOptions& reading,
                            const recordings::RecordingHeader& header,
                            const std::optional<sensors::Sensor>& given,
                            const Progress& progress = {});
@@ -75,7 +75,7 @@ std::string sensor_name(const recordings::RecordingHeader& header);
 std::string sensor_name(const SensorChoice& choice);
 
 /// Every shot of a recording's first second, up to damage.
-estimation::AngleSeries first_second(const std::string& path,
+estimation::AngleSeries first_second(const recordings::Source& source,
                                      const recordings::ReadOptions& options,
                                      const Progress& progress = {});
 

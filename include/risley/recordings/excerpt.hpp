@@ -66,7 +66,7 @@ ExcerptContents contents_of(const Excerpt& excerpt);
 /// @param path  must end in ".nc"; appears when it is whole
 /// @throws InvalidArgument for another ending, for an output that is the recording and for limits
 ///         that are not positive; FileError, also when there is no shot with a direction
-Excerpt write_excerpt(const std::string& recording, const std::string& path,
+Excerpt write_excerpt(const Source& recording, const std::string& path,
                       const ExcerptOptions& options = {}, const ReadOptions& reading = {},
                       const Progress& progress = {});
 

@@ -38,6 +38,8 @@ struct Observations {
   void resize(std::size_t rows);  ///< gives every column so many rows
   /// @throws InvalidArgument as require_columns()
   void append(const Observations& other);
+  /// Appends rows [begin, end) of another. @throws InvalidArgument as append(), and beyond its rows
+  void append(const Observations& other, std::size_t begin, std::size_t end);
   /// Removes rows from the beginning.
   /// @throws InvalidArgument when there are fewer, and as require_columns()
   void drop_front(std::size_t rows);

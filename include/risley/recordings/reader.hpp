@@ -12,6 +12,7 @@
 #include "risley/core/progress.hpp"
 #include "risley/recordings/extrinsics.hpp"
 #include "risley/recordings/observations.hpp"
+#include "risley/recordings/source.hpp"
 
 namespace risley::recordings {
 
@@ -107,7 +108,8 @@ struct ReadOptions {
 };
 
 /// Opens a recording of any known format, recognised by its content and not by its name: a file, or
-/// a folder of ROS 2 whose metadata.yaml names the bags that are read one after the other.
+/// a folder of ROS 2 whose metadata.yaml names the bags that are read one after the other; or one
+/// in memory.
 /// @param progress  cancels opening, and reading where a chunk may take long; its flag must outlive
 ///                  the reader
 /// @throws FileError when it is missing, empty, of no known format, or its header is damaged;
@@ -115,16 +117,12 @@ struct ReadOptions {
 ///         255 or not as many as the firing order has, slips do not ascend, places come with a shot
 ///         rate, without a firing order or for a recording that has none, extrinsics are not
 ///         finite, or when they are given for a recording of several sensors
-std::unique_ptr<Reader> open_recording(const std::string& path, const ReadOptions& options = {},
+std::unique_ptr<Reader> open_recording(const Source& source, const ReadOptions& options = {},
                                        const Progress& progress = {});
 
 /// Whether a folder holds one recording and not any number of them: a bag of ROS 2, also where its
 /// metadata.yaml is missing.
 bool is_recording_folder(const std::string& path);
-
-/// The files that a recording consists of: its own, or metadata.yaml and the bags that it names
-/// where it is a folder of ROS 2. Of what is no recording the path itself.
-std::vector<std::string> recording_files(const std::string& path);
 
 /// A recording without times was given to something that needs them.
 class MissingTimes : public InvalidArgument {
@@ -143,7 +141,7 @@ struct Recording {
 };
 
 /// Reads a whole recording into memory. @throws as open_recording
-Recording load_recording(const std::string& path, const Progress& progress = {},
+Recording load_recording(const Source& source, const Progress& progress = {},
                          const ReadOptions& options = {});
 
 }  // namespace risley::recordings

@@ -1,0 +1,76 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "risley/recordings/source.hpp"
+
+#include <filesystem>
+#include <system_error>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "risley/bags/bag.hpp"
+#include "risley/core/error.hpp"
+#include "risley/core/require.hpp"
+#include "risley/recordings/livox/packet.hpp"
+#include "risley/recordings/reader.hpp"
+
+namespace risley::recordings {
+namespace {
+
+void require_devices(const Recording& recording) {
+  const std::size_t devices = recording.header.devices.size();
+  if (devices == 0) throw InvalidArgument("recording has no device, expected at least one");
+  const auto& device = recording.data.observations.device;
+  for (std::size_t row = 0; row < device.size(); ++row) {
+    if (device[row] < devices) continue;
+    throw InvalidArgument(
+        fmt::format("device = {} in row {}, allowed 0 to {}", device[row], row, devices - 1));
+  }
+}
+
+/// Packets, where there are any, own all rows and inertial samples.
+void require_packets(const Chunk& data) {
+  if (data.packets.empty()) return;
+  std::size_t rows = 0, samples = 0;
+  for (const Packet& packet : data.packets) {
+    rows += packet.rows;
+    samples += packet.data_type == livox::kImuDataType ? 1 : 0;
+  }
+  require_length("rows of packets", rows, data.observations.size());
+  require_length("inertial samples of packets", samples, data.imu.size());
+}
+
+}  // namespace
+
+Source::Source(std::string path) : name_(std::move(path)) {}
+Source::Source(const char* path) : name_(path) {}
+
+Source::Source(std::shared_ptr<const Recording> recording, std::string name)
+    : name_(std::move(name)), recording_(std::move(recording)) {
+  if (!recording_) throw InvalidArgument("recording is missing, expected columns");
+  require_angles(recording_->data.observations);
+  require_devices(*recording_);
+  require_packets(recording_->data);
+}
+
+bool Source::is_same_as(const Source& other) const {
+  if (recording_ || other.recording_) return recording_ == other.recording_;
+  std::error_code ignored;
+  return std::filesystem::equivalent(name_, other.name_, ignored);
+}
+
+std::vector<std::string> recording_files(const Source& source) {
+  if (source.recording()) return {};
+  const std::string& path = source.name();
+  std::error_code code;
+  if (!std::filesystem::is_directory(path, code)) return {path};
+  try {
+    std::vector<std::string> files = bags::files_of_bag_folder(path);
+    files.insert(files.begin(), (std::filesystem::path(path) / "metadata.yaml").string());
+    return files;
+  } catch (const FileError&) {  // who reads it is told of it
+    return {path};
+  }
+}
+
+}  // namespace risley::recordings
