@@ -67,9 +67,7 @@ AngleSeries rows_of(const AngleSeries& series, std::size_t begin, std::size_t en
 
 TickSampler::TickSampler(double rate) : rate_(rate) { require_above("rate", rate, 0, "Hz"); }
 
-bool TickSampler::take(std::int64_t time_ns, std::uint8_t beam) {
-  seen_[beam] = true;
-  if (time_ns < next_ns_) return false;
+bool TickSampler::take_at_tick(std::int64_t time_ns, std::uint8_t beam) {
   if (had_turn_ == seen_) had_turn_.reset();
   if (had_turn_[beam]) {
     // A beam that stays away holds the others up for one round only.

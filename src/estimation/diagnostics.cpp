@@ -217,7 +217,11 @@ void AngleProfiler::add(double angle, double azimuth_residual, double zenith_res
   if (!std::isfinite(angle + azimuth_residual + zenith_residual)) return;
   const double turns = angle * (1.0 / kTwoPi);
   const double bins = static_cast<double>(bins_.size());
-  const auto at = static_cast<std::size_t>((turns - std::floor(turns)) * bins);
+  // Rounded down by hand where that is exact: it is done for every shot, and a call costs more.
+  double whole = static_cast<double>(static_cast<std::int64_t>(std::clamp(turns, -1e15, 1e15)));
+  if (whole > turns) whole -= 1.0;
+  if (std::abs(turns) > 1e15) whole = std::floor(turns);
+  const auto at = static_cast<std::size_t>((turns - whole) * bins);
   Bin& bin = bins_[std::min(at, bins_.size() - 1)];
   bin.count += 1.0;
   bin.azimuth += azimuth_residual;

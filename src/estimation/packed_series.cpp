@@ -48,14 +48,6 @@ std::int64_t common_step(const std::vector<std::int64_t>& time_ns) {
 
 }  // namespace
 
-std::int64_t PackedSeries::Times::at(std::size_t i) const {
-  if (!time_ns.empty()) return time_ns[i];
-  const std::int64_t steps = !few_steps.empty()    ? std::int64_t{few_steps[i]}
-                             : !many_steps.empty() ? std::int64_t{many_steps[i]}
-                                                   : static_cast<std::int64_t>(i);
-  return base + step * steps;
-}
-
 PackedSeries::Times::Times(const std::vector<std::int64_t>& all)
     : base(all.front()), step(all[1] - all[0]) {
   const auto even = [&](std::size_t i) {
@@ -108,16 +100,6 @@ PackedSeries::Angles::Angles(const std::vector<double>& all, const Mostly<float>
       return;
     }
   }
-}
-
-std::int64_t PackedSeries::time_ns(std::size_t row) const {
-  const std::size_t block = row / kBlockRows, place = row % kBlockRows;
-  return block < blocks_.size() ? blocks_[block].time.at(place) : tail_.time_ns[place];
-}
-
-std::uint8_t PackedSeries::beam(std::size_t row) const {
-  const std::size_t block = row / kBlockRows, place = row % kBlockRows;
-  return block < blocks_.size() ? blocks_[block].beam.at(place) : tail_.beam[place];
 }
 
 std::pair<double, double> PackedSeries::angles(std::size_t row) const {

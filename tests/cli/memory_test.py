@@ -9,8 +9,7 @@ from command import COMMAND, SANITIZED, SOURCE, CommandTest
 
 RATE = 100_000  # Hz
 LENGTHS = (4, 16)  # s
-# Those of 0.01 degree and equal steps of time take 12 bytes, coordinates some 40.
-MOST_BYTES = {"lvx": 18.0, "las": 60.0}
+MOST_BYTES = 18.0  # a shot; some 13 stay
 
 
 @unittest.skipIf(SANITIZED, "a sanitizer takes memory of its own")
@@ -26,18 +25,16 @@ class MemoryTest(CommandTest):
         return 1024 * usage.ru_maxrss
 
     def test_estimate_keeps_few_bytes_of_a_shot(self):
-        for ending, most in MOST_BYTES.items():
-            peaks = []
-            for seconds in LENGTHS:
-                recording = self.folder / f"{seconds}.{ending}"
-                self.expect(0, "simulate", "-o", recording, "--sensor", "mid-40-table3", "--rotor", "hunting",
-                            "--scene", SOURCE / "data/hall.yaml", "--duration-s", seconds)
-                peaks.append(self.peak("estimate", recording, "-o", self.folder / f"{seconds}-{ending}",
-                                       "--no-report", "--quiet", "--threads", 1))
-                recording.unlink()
-            each = (peaks[1] - peaks[0]) / (RATE * (LENGTHS[1] - LENGTHS[0]))
-            print(f"{ending}: {each:.1f} bytes a shot")
-            self.assertLess(each, most, ending)
+        peaks = []
+        for seconds in LENGTHS:
+            recording = self.folder / f"{seconds}.lvx"
+            self.expect(0, "simulate", "-o", recording, "--sensor", "mid-40-table3", "--rotor", "hunting",
+                        "--scene", SOURCE / "data/hall.yaml", "--duration-s", seconds)
+            peaks.append(self.peak("estimate", recording, "-o", self.folder / f"{seconds}", "--no-report", "--quiet",
+                                   "--threads", 1))
+        each = (peaks[1] - peaks[0]) / (RATE * (LENGTHS[1] - LENGTHS[0]))
+        self.assertLess(each, MOST_BYTES)
+        self.assertGreater(each, 0)  # or other things hide what a shot takes
 
 
 if __name__ == "__main__":

@@ -78,9 +78,14 @@ class TickSampler {
     waited_ = 0;
   }
   /// Whether to take the next shot. @param beam  that fired it
-  bool take(std::int64_t time_ns, std::uint8_t beam);
+  bool take(std::int64_t time_ns, std::uint8_t beam) {
+    seen_[beam] = true;
+    return time_ns >= next_ns_ && take_at_tick(time_ns, beam);
+  }
 
  private:
+  bool take_at_tick(std::int64_t time_ns, std::uint8_t beam);
+
   double rate_;  // Hz
   std::int64_t origin_ns_ = 0, next_ns_ = 0;
   std::bitset<256> seen_, had_turn_;  // beams, ever and in this round

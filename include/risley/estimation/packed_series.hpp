@@ -29,9 +29,15 @@ class PackedSeries {
   /// Largest number of an emitter that fired.
   std::uint8_t largest_beam() const { return largest_beam_; }
   /// Time of a row, as recorded.
-  std::int64_t time_ns(std::size_t row) const;
+  std::int64_t time_ns(std::size_t row) const {
+    const std::size_t block = row / kBlockRows, place = row % kBlockRows;
+    return block < blocks_.size() ? blocks_[block].time.at(place) : tail_.time_ns[place];
+  }
   /// Emitter of a row.
-  std::uint8_t beam(std::size_t row) const;
+  std::uint8_t beam(std::size_t row) const {
+    const std::size_t block = row / kBlockRows, place = row % kBlockRows;
+    return block < blocks_.size() ? blocks_[block].beam.at(place) : tail_.beam[place];
+  }
   /// Azimuth and zenith of a row, rad.
   std::pair<double, double> angles(std::size_t row) const;
   /// Time since the first shot, s.
@@ -66,7 +72,12 @@ class PackedSeries {
     Times() = default;
     /// @param all  two or more
     explicit Times(const std::vector<std::int64_t>& all);
-    std::int64_t at(std::size_t i) const;
+    std::int64_t at(std::size_t i) const {
+      if (!time_ns.empty()) return time_ns[i];
+      return base + step * (!few_steps.empty()    ? std::int64_t{few_steps[i]}
+                            : !many_steps.empty() ? std::int64_t{many_steps[i]}
+                                                  : static_cast<std::int64_t>(i));
+    }
   };
   /// One value, or one per row.
   template <class T>
