@@ -266,7 +266,7 @@ void accumulate(benchmark::State& state, InstructionSet set, std::size_t paramet
   const estimation::ShotWeights weights{estimation::equal_noise(kAngleNoise), 0.0, 20.0};
   estimation::NormalEquations equations;
   for (auto _ : state) {
-    estimation::accumulate(answer.series, answer.trajectory, answer.train, free, weights, equations,
+    estimation::accumulate(data.series, answer.trajectory, answer.train, free, weights, equations,
                            {azimuth, zenith, outlier}, set);
     benchmark::ClobberMemory();
   }

@@ -203,9 +203,9 @@ std::string work_text(const CLI::App& verb, const CommonOptions& common) {
 }
 
 /// Whether as many such inputs as there are threads might not fit into memory at the same time. An
-/// estimate of ten minutes takes seven times the bytes of its file.
+/// estimate of ten minutes with its page takes up to four times the bytes of its file.
 bool is_large(const std::string& input) {
-  constexpr double kMemoryPerByte = 8.0;
+  constexpr double kMemoryPerByte = 4.0;
   const double memory =
       static_cast<double>(sysconf(_SC_PHYS_PAGES)) * static_cast<double>(sysconf(_SC_PAGESIZE));
   double bytes = 0;

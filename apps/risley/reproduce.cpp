@@ -110,7 +110,7 @@ reproduction::RealRecording real_recording(const std::string& path, const Readin
     spdlog::warn("{}: {}", path, with_flags(warning));
   }
   return {std::filesystem::path(path).filename().string(), std::move(input.choice.sensor),
-          std::move(input.series), std::move(input.head)};
+          input.series.rows(), std::move(input.head)};
 }
 
 ExitStatus run_reproduce(const ReproduceCommandOptions& options, const CommonOptions& common) {

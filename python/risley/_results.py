@@ -158,8 +158,7 @@ class Estimate(Solution):
 
     def __init__(self, found: _risley.EstimatedRecording) -> None:
         super().__init__(found)
-        self.azimuth_residual = found.azimuth_residual
-        self.zenith_residual = found.zenith_residual
+        self.azimuth_residual, self.zenith_residual = found.residuals
 
 
 class Calibration(Solution):

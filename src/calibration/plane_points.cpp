@@ -59,11 +59,10 @@ RangedRecording ranged_recording(const estimation::Estimate& estimate, std::stri
     throw EstimationError(
         fmt::format("{}: the rotation angles were not found: {}", name, estimate.reason));
   }
-  if (!estimate.common_angles || estimate.series.range.size() != estimate.series.size()) {
+  if (!estimate.common_angles || !estimate.series.has_ranges()) {
     throw EstimationError(fmt::format(
         "{}: calibration needs ranges, and an estimate of all shots at once (method map)", name));
   }
-  require_length_or_none("beam", estimate.series.beam.size(), estimate.series.size());
   const int prisms = estimate.sensor.prisms();
   RangedRecording recording;
   recording.believed = estimate.sensor;
@@ -81,8 +80,9 @@ RangedRecording ranged_recording(const estimation::Estimate& estimate, std::stri
   for (std::size_t begin = 0; begin < estimate.series.size(); begin += kStatesBlock) {
     const std::size_t end = std::min(begin + kStatesBlock, estimate.series.size());
     const estimation::RotorStates states = states_of_shots(estimate, {begin, end});
+    const estimation::AngleSeries rows = estimate.series.rows({begin, end});
     for (std::size_t i = 0; i < states.size(); ++i) {
-      const double range = estimate.series.range[begin + i];
+      const double range = rows.range[i];
       if (!(range > 0.0)) {
         ++recording.without_range;
         continue;
@@ -98,8 +98,7 @@ RangedRecording ranged_recording(const estimation::Estimate& estimate, std::stri
         shots.angle_covariance[k][row] = static_cast<float>(states.rotation_angle_covariance[k][i]);
       }
       shots.range[row] = range;
-      shots.beam[row] =
-          estimate.series.beam.empty() ? std::uint8_t{0} : estimate.series.beam[begin + i];
+      shots.beam[row] = rows.beam[i];
       recording.time_ns[row] = states.time_ns[i];
       ++row;
     }

@@ -65,23 +65,9 @@ AngleSeries rows_of(const AngleSeries& series, std::size_t begin, std::size_t en
   return rows;
 }
 
-std::vector<ShotRange> stretches(const AngleSeries& series, double longest_gap) {
-  require_between("longest gap", longest_gap, 0, kMostSeconds, "s");
-  std::vector<ShotRange> ranges;
-  const auto longest_ns = static_cast<std::int64_t>(longest_gap * 1e9);
-  for (std::size_t i = 0; i < series.size(); ++i) {
-    const std::int64_t step = i == 0 ? -1 : series.time_ns[i] - series.time_ns[i - 1];
-    if (step <= 0 || step > longest_ns) ranges.push_back({i, i});
-    ranges.back().end = i + 1;
-  }
-  return ranges;
-}
-
 TickSampler::TickSampler(double rate) : rate_(rate) { require_above("rate", rate, 0, "Hz"); }
 
-bool TickSampler::take(std::int64_t time_ns, std::uint8_t beam) {
-  seen_[beam] = true;
-  if (time_ns < next_ns_) return false;
+bool TickSampler::take_at_tick(std::int64_t time_ns, std::uint8_t beam) {
   if (had_turn_ == seen_) had_turn_.reset();
   if (had_turn_[beam]) {
     // A beam that stays away holds the others up for one round only.
@@ -95,21 +81,6 @@ bool TickSampler::take(std::int64_t time_ns, std::uint8_t beam) {
   const double tick = std::floor(since * rate_) + 1.0;
   next_ns_ = origin_ns_ + std::llround(tick / rate_ * 1e9);
   return true;
-}
-
-AngleSeries thinned(const AngleSeries& series, double rate, std::vector<ShotRange>& ranges) {
-  AngleSeries rows;
-  TickSampler ticks(rate);
-  for (ShotRange& range : ranges) {
-    require_rows("range", range.begin, range.end, series.size());
-    const std::size_t begin = rows.size();
-    if (range.size() > 0) ticks.restart(series.time_ns[range.begin]);
-    for (std::size_t i = range.begin; i < range.end; ++i) {
-      if (ticks.take(series.time_ns[i], series.beam[i])) rows.append(series, i);
-    }
-    range = {begin, rows.size()};
-  }
-  return rows;
 }
 
 std::size_t thinning_stride(const AngleSeries& series, ShotRange rows, std::size_t most) {
@@ -126,9 +97,8 @@ std::size_t thinning_stride(const AngleSeries& series, ShotRange rows, std::size
 
 std::int64_t median_step_ns(std::span<const std::int64_t> time_ns) {
   require_at_least("number of times", static_cast<long long>(time_ns.size()), 2);
-  constexpr std::size_t kEnough = 20000;
   std::vector<std::int64_t> steps;
-  for (std::size_t i = 1; i < std::min(time_ns.size(), kEnough); ++i) {
+  for (std::size_t i = 1; i < std::min(time_ns.size(), kMedianSteps); ++i) {
     steps.push_back(time_ns[i] - time_ns[i - 1]);
   }
   const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);

@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <span>
 #include <utility>
@@ -12,6 +14,7 @@
 #include <fmt/format.h>
 
 #include "risley/core/error.hpp"
+#include "risley/estimation/frame_turn.hpp"
 #include "risley/estimation/free_parameters.hpp"
 #include "risley/estimation/normal_equations.hpp"
 #include "risley/estimation/process_likelihood.hpp"
@@ -56,51 +59,123 @@ struct Constants {
   Eigen::Index count() const { return static_cast<Eigen::Index>(parameters.size()); }
 };
 
+/// Residuals of some shots of a series: NaN, and outliers, until they are taken.
+class ResidualSample {
+ public:
+  /// @param ranges  rows of the series, ascending
+  ResidualSample(const PackedSeries& series, std::vector<ShotRange> ranges)
+      : ranges_(std::move(ranges)) {
+    for (const ShotRange& range : ranges_) {
+      begin_.push_back(shots.size());
+      for (std::size_t row = range.begin; row < range.end; ++row) {
+        shots.append(series.time_ns(row), 0, 0);
+      }
+    }
+    azimuth.assign(shots.size(), std::numeric_limits<double>::quiet_NaN());
+    zenith = azimuth;
+    outlier.assign(shots.size(), 1);
+  }
+
+  /// Takes those of its shots that were evaluated; different ones from several threads.
+  void take(const EvaluatedShots& all) {
+    const std::size_t end = all.first + all.shots.size();
+    auto range = std::partition_point(ranges_.begin(), ranges_.end(),
+                                      [&](const ShotRange& one) { return one.end <= all.first; });
+    for (; range != ranges_.end() && range->begin < end; ++range) {
+      const std::size_t first = begin_[static_cast<std::size_t>(range - ranges_.begin())];
+      for (std::size_t row = std::max(range->begin, all.first); row < std::min(range->end, end);
+           ++row) {
+        const std::size_t from = row - all.first, to = first + row - range->begin;
+        azimuth[to] = all.azimuth_residual[from];
+        zenith[to] = all.zenith_residual[from];
+        outlier[to] = all.outlier[from];
+        shots.azimuth_rounding_variance[to] = all.shots.azimuth_rounding_variance[from];
+        shots.zenith_rounding_variance[to] = all.shots.zenith_rounding_variance[from];
+      }
+    }
+  }
+
+  AngleSeries shots;  ///< times and roundings alone
+  std::vector<double> azimuth, zenith;
+  std::vector<unsigned char> outlier;
+
+ private:
+  std::vector<ShotRange> ranges_;
+  std::vector<std::size_t> begin_;  ///< of the ranges, among the sampled shots
+};
+
+/// Every n-th row.
+std::vector<ShotRange> spread_rows(std::size_t rows, std::size_t stride) {
+  std::vector<ShotRange> ranges;
+  for (std::size_t row = 0; row < rows; row += stride) ranges.push_back({row, row + 1});
+  return ranges;
+}
+
 /// Parameters and motion, and what one evaluation of them gave.
 class Iteration {
  public:
-  Iteration(const AngleSeries& series, const BatchMapOptions& options, const Constants& constants,
+  Iteration(const PackedSeries& series, const BatchMapOptions& options, const Constants& constants,
             const PrismTrain& nominal, PrismTrain train, RotorTrajectory knots,
             const Eigen::Matrix3d& frame)
-      : recorded_(series),
+      : series_(series),
         constants_(constants),
         noise_is_held_(options.angle_noise.has_value()),
         prior_mean_(free_values(nominal, options.free)),
         train_(std::move(train)),
         knots_(std::move(knots)),
-        frame_(frame) {
-    azimuth_.assign(series.size(), std::numeric_limits<double>::quiet_NaN());
-    zenith_ = azimuth_;
-    outlier_.assign(series.size(), 1);
-    if (constants_.frame_is_free()) turn_shots();
-  }
+        frame_(frame),
+        spread_(series,
+                spread_rows(series.size(),
+                            robust_stride(series.size(),
+                                          noise_is_held_ ? kRobustLevelShots : kRobustNoiseShots))),
+        outlier_(series.size(), 1) {}
 
   ShotWeights& weights() { return weights_; }
   const ShotWeights& weights() const { return weights_; }
-  const AngleSeries& series() const { return constants_.frame_is_free() ? turned_ : recorded_; }
   const PrismTrain& train() const { return train_; }
   const Eigen::Matrix3d& frame() const { return frame_; }
   const RotorTrajectory& knots() const { return knots_; }
   RotorTrajectory& knots() { return knots_; }
   NormalEquations& equations() { return equations_; }
-  std::vector<double>& azimuth() { return azimuth_; }
-  std::vector<double>& zenith() { return zenith_; }
   std::vector<unsigned char>& outlier() { return outlier_; }
+  const SquaredAngles& squares() const { return squares_; }
+  /// From here on evaluations leave an autocorrelation, too.
+  void watch_autocorrelation() {
+    windows_.emplace(series_, autocorrelation_windows(series_.size()));
+  }
+  Autocorrelation autocorrelation() const {
+    return estimation::autocorrelation(windows_->shots.time_ns, windows_->azimuth, windows_->zenith,
+                                       windows_->outlier);
+  }
 
-  /// Residuals and normal equations at the present state.
+  /// Normal equations at the present state, and what the residuals there tell.
   void evaluate() {
-    accumulate(series(), knots_, train_, constants_.all, weights_, equations_,
-               {azimuth_, zenith_, outlier_});
+    squares_ = {};
+    ShotLooks looks;
+    if (constants_.frame_is_free()) {
+      looks.prepare = [&](AngleSeries& rows) { turn(rows, frame_.transpose()); };
+    }
+    looks.look = [&](const EvaluatedShots& shots) -> std::function<void()> {
+      spread_.take(shots);
+      if (windows_) windows_->take(shots);
+      std::copy(shots.outlier.begin(), shots.outlier.end(),
+                outlier_.begin() + static_cast<std::ptrdiff_t>(shots.first));
+      const auto squares = std::make_shared<SquaredAngles>();
+      squares->add(shots.shots, shots.azimuth_residual, shots.zenith_residual, shots.outlier);
+      return [this, squares] { squares_.add(*squares); };
+    };
+    accumulate(series_, knots_, train_, constants_.all, weights_, equations_, looks);
   }
 
   /// Residual scale over noise and rounding; outliers do not count. Noise that is held is not below
   /// what it was said to be, noise that is found is what the residuals say, and the scale then 1.
   double level() {
     if (!noise_is_held_) {
-      weights_.angle_noise = robust_noise(series(), azimuth_, zenith_);
+      weights_.angle_noise = robust_noise(spread_.shots, spread_.azimuth, spread_.zenith);
       return 1.0;
     }
-    return std::max(1.0, robust_level(series(), weights_.angle_noise, azimuth_, zenith_));
+    return std::max(
+        1.0, robust_level(spread_.shots, weights_.angle_noise, spread_.azimuth, spread_.zenith));
   }
 
   SmootherSolution solve(std::span<const RotorProcess> process, bool covariances) const {
@@ -129,7 +204,6 @@ class Iteration {
                               free_values(train_, constants_.parameters) + step);
     if (constants_.frame_is_free()) {
       frame_ = turned_further(frame_, solution.parameter_step.tail(2));
-      turn_shots();
     }
     double largest = 0;
     for (Eigen::Index i = 0; i < solution.parameter_step.size(); ++i) {
@@ -154,23 +228,19 @@ class Iteration {
   }
 
  private:
-  void turn_shots() {
-    turned_ = recorded_;
-    turn(turned_, frame_.transpose());
-  }
-
-  const AngleSeries& recorded_;
+  const PackedSeries& series_;
   const Constants& constants_;
   bool noise_is_held_;
   Eigen::VectorXd prior_mean_;
   PrismTrain train_;
   RotorTrajectory knots_;
   Eigen::Matrix3d frame_;
-  AngleSeries turned_;  ///< where the frame is free
   ShotWeights weights_;
   NormalEquations equations_;
-  std::vector<double> azimuth_, zenith_;
+  ResidualSample spread_;
+  std::optional<ResidualSample> windows_;
   std::vector<unsigned char> outlier_;
+  SquaredAngles squares_;
 };
 
 /// Starts of all stretches of a thinned series; an empty one where none was found.
@@ -228,8 +298,7 @@ double used_observations(const NormalEquations& equations, const SmootherSolutio
     if (n == 0) continue;
     const auto at = static_cast<std::size_t>(states * n) * knot;
     const Eigen::Map<const RowMajor> coupling(equations.coupling.data() + at, states, n);
-    const Eigen::Map<const RowMajor> sensitivity(solution.sensitivity.data() + at, states, n);
-    add_product(coupling.transpose(), sensitivity, shared);
+    add_product(coupling.transpose(), solution.sensitivity(knot, states), shared);
   }
   return used + 2.0 * shared.cwiseProduct(solution.parameter_covariance).sum();
 }
@@ -242,11 +311,11 @@ double square_factor(const Autocorrelation& autocorrelation) {
 }
 
 /// Rate, Hz, of the coarse pass.
-double coarse_rate(const AngleSeries& series, const std::vector<ShotRange>& ranges) {
+double coarse_rate(const PackedSeries& series, const std::vector<ShotRange>& ranges) {
   double duration = 0;
   for (const ShotRange& range : ranges) {
     duration +=
-        1e-9 * static_cast<double>(series.time_ns[range.end - 1] - series.time_ns[range.begin]);
+        1e-9 * static_cast<double>(series.time_ns(range.end - 1) - series.time_ns(range.begin));
   }
   return std::max(kCoarseRate, kFewestCoarseShots / std::max(duration, 1e-3));
 }
@@ -266,17 +335,13 @@ Eigen::MatrixXd shared_angle_information(const NormalEquations& equations) {
 }
 
 /// Mean over the knots of d rotation angles / d parameters [prisms, free].
-/// @param sensitivity  of all states [knots][states][free]
-Eigen::MatrixXd mean_angle_sensitivity(const std::vector<double>& sensitivity,
-                                       const RotorTrajectory& knots, std::size_t free) {
-  const auto states = static_cast<std::size_t>(knots.states());
-  Eigen::MatrixXd mean = Eigen::MatrixXd::Zero(knots.prisms, static_cast<Eigen::Index>(free));
+Eigen::MatrixXd mean_angle_sensitivity(const SmootherSolution& solution,
+                                       const RotorTrajectory& knots) {
+  Eigen::MatrixXd mean = Eigen::MatrixXd::Zero(knots.prisms, solution.parameter_step.size());
   for (std::size_t knot = 0; knot < knots.size(); ++knot) {
+    const auto sensitivity = solution.sensitivity(knot, knots.states());
     for (Eigen::Index k = 0; k < mean.rows(); ++k) {
-      const std::size_t row = knot * states + static_cast<std::size_t>(k) * kStatesPerRotor;
-      for (Eigen::Index j = 0; j < mean.cols(); ++j) {
-        mean(k, j) += sensitivity[row * free + static_cast<std::size_t>(j)];
-      }
+      mean.row(k) += sensitivity.row(kStatesPerRotor * k);
     }
   }
   return mean / static_cast<double>(knots.size());
@@ -284,8 +349,9 @@ Eigen::MatrixXd mean_angle_sensitivity(const std::vector<double>& sensitivity,
 
 }  // namespace
 
-Solution run_batch_map(const AngleSeries& series, const Start& start, const sensors::Sensor& sensor,
-                       const BatchMapOptions& options, const Progress& progress) {
+Solution run_batch_map(const PackedSeries& series, const Start& start,
+                       const sensors::Sensor& sensor, const BatchMapOptions& options,
+                       const Progress& progress) {
   if (series.size() == 0) throw EstimationError("no valid shot to estimate from");
   if (options.angle_noise) check_noise(*options.angle_noise);
   require_between("knot interval", options.knot_interval, 1e-9, kMostSeconds, "s");
@@ -305,8 +371,9 @@ Solution run_batch_map(const AngleSeries& series, const Start& start, const sens
   const Constants constants(options, prisms);
   const std::vector<ShotRange> all_stretches = stretches(series);
   std::vector<ShotRange> coarse_stretches = all_stretches;
-  const AngleSeries coarse_series =
+  const PackedSeries coarse_shots =
       thinned(series, coarse_rate(series, all_stretches), coarse_stretches);
+  const AngleSeries coarse_series = coarse_shots.rows();
   const AngleNoise first_noise =
       options.angle_noise.value_or(equal_noise(std::max(start.residual_rms, kLeastAngleNoise)));
   const auto starts =
@@ -321,8 +388,8 @@ Solution run_batch_map(const AngleSeries& series, const Start& start, const sens
     }
   }
   if (used.empty()) throw EstimationError("no stretch of the recording has a start");
-  Iteration coarse(coarse_series, options, constants, sensor.train, start.train,
-                   make_knots(coarse_series, coarse_used, prisms, options.knot_interval),
+  Iteration coarse(coarse_shots, options, constants, sensor.train, start.train,
+                   make_knots(coarse_shots, coarse_used, prisms, options.knot_interval),
                    Eigen::Matrix3d::Identity());
   coarse.weights().angle_noise = first_noise;
   for (std::size_t s = 0, stretch = 0; s < starts.size(); ++s) {
@@ -358,8 +425,9 @@ Solution run_batch_map(const AngleSeries& series, const Start& start, const sens
   }
   progress.report(0.4);
 
-  // Some of the shots, and then all: the same stretches, starting where the pass before ended.
-  const auto go_on = [&](const Iteration& from, const AngleSeries& shots,
+  // Some of the shots, and then all: the same stretches, starting where the pass before ended. What
+  // that one had in memory is as much as the next one needs.
+  const auto go_on = [&](Iteration from, const PackedSeries& shots,
                          const std::vector<ShotRange>& ranges) {
     Iteration next(shots, options, constants, sensor.train, from.train(),
                    make_knots(shots, ranges, prisms, options.knot_interval), from.frame());
@@ -371,17 +439,18 @@ Solution run_batch_map(const AngleSeries& series, const Start& start, const sens
   const auto go_on_with_all = [&] {
     const double thinning =
         static_cast<double>(series.size()) / static_cast<double>(coarse_series.size());
-    if (thinning < kStrongThinning) return go_on(coarse, series, used);
+    if (thinning < kStrongThinning) return go_on(std::move(coarse), series, used);
     std::vector<ShotRange> ranges = used;
-    const AngleSeries some =
+    const PackedSeries some =
         thinned(series, coarse_rate(series, all_stretches) * thinning * kSomeShots, ranges);
-    Iteration middle = go_on(coarse, some, ranges);
+    Iteration middle = go_on(std::move(coarse), some, ranges);
     middle.evaluate();
     level = middle.level();
     middle.move(middle.solve(process, false));
-    return go_on(middle, series, used);
+    return go_on(std::move(middle), series, used);
   };
   Iteration full = go_on_with_all();
+  full.watch_autocorrelation();
   const bool noise_is_held = options.angle_noise.has_value();
   double used_share = 0, first_factor = 1;
   std::vector<RotorProcess> stiff_process;  // of rotors whose noise is taken to be correlated
@@ -390,20 +459,18 @@ Solution run_batch_map(const AngleSeries& series, const Start& start, const sens
     if (noise_is_held) level = full.level();
     full.weights().cut = options.outlier_chi2 * level * level;
     // The rotors' noise shows more sharply in all shots than in the thinned ones.
-    result.autocorrelation =
-        autocorrelation(series.time_ns, full.azimuth(), full.zenith(), full.outlier());
+    result.autocorrelation = full.autocorrelation();
     const AngleNoise assumed = full.weights().angle_noise;
     bool noise_is_found = true;
     if (noise_is_held) {
       result.noise.value = assumed;
     } else {
-      result.noise = noise_components(full.series(), full.azimuth(), full.zenith(), full.outlier(),
-                                      used_share, square_factor(result.autocorrelation));
+      result.noise =
+          noise_components(full.squares(), used_share, square_factor(result.autocorrelation));
       full.weights().angle_noise = usable_noise(result.noise.value);
       noise_is_found = std::abs(assumed.rms() / full.weights().angle_noise.rms() - 1.0) < 0.01;
     }
-    result.unit_variance =
-        unit_variance(full.series(), assumed, full.azimuth(), full.zenith(), full.outlier());
+    result.unit_variance = unit_variance(full.squares(), assumed);
     const double excess = result.unit_variance > kSignificantExcess ? result.unit_variance : 1.0;
     const double factor = result.autocorrelation.factor;
     result.variance_factor = factor * excess;
@@ -445,10 +512,8 @@ Solution run_batch_map(const AngleSeries& series, const Start& start, const sens
     }
     result.information = std::move(solution.parameter_information);
     full.knots().covariance = std::move(solution.state_covariance);
-    result.common_angles = {
-        mean_angle_sensitivity(solution.sensitivity, full.knots(), constants.all.size())
-            .leftCols(n),
-        shared_angle_information(full.equations())};
+    result.common_angles = {mean_angle_sensitivity(solution, full.knots()).leftCols(n),
+                            shared_angle_information(full.equations())};
     break;
   }
   result.train = full.train();
@@ -457,8 +522,6 @@ Solution run_batch_map(const AngleSeries& series, const Start& start, const sens
   result.parameters = free_values(result.train, options.free);
   result.rotor_process = std::move(process);
   result.trajectory = std::move(full.knots());
-  result.azimuth_residual = std::move(full.azimuth());
-  result.zenith_residual = std::move(full.zenith());
   result.outlier = std::move(full.outlier());
   result.outliers = full.equations().outliers;
   progress.report(1.0);

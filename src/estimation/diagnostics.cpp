@@ -15,44 +15,85 @@
 
 namespace risley::estimation {
 
+namespace {
+
+/// Fewer shots in a row tell nothing of how they hang together.
+constexpr std::size_t kFewestInARow = 100;
+
+/// Moments about the mean.
+struct CentralMoments {
+  double count = 0, mean = 0, mean_square = 0, second = 0, third = 0, fourth = 0;
+
+  Moments moments() const {
+    Moments result;
+    if (!(count > 0)) {
+      const double nan = std::numeric_limits<double>::quiet_NaN();
+      result.mean = result.std = result.rms = result.skewness = result.kurtosis = nan;
+      return result;
+    }
+    result.count = static_cast<std::size_t>(count);
+    result.mean = mean;
+    result.rms = std::sqrt(mean_square);
+    result.std = std::sqrt(second * count / std::max(count - 1.0, 1.0));
+    if (second > 0) {
+      result.skewness = third / std::pow(second, 1.5);
+      result.kurtosis = fourth / (second * second) - 3.0;
+    }
+    return result;
+  }
+};
+
+}  // namespace
+
 Moments moments(std::span<const double> values, std::span<const unsigned char> skip) {
   require_length_or_none("skip", skip.size(), values.size());
   const auto used = [&](std::size_t i) {
     return std::isfinite(values[i]) && (skip.empty() || skip[i] == 0);
   };
-  Moments result;
+  CentralMoments result;
   double sum = 0, squares = 0;
   for (std::size_t i = 0; i < values.size(); ++i) {
     if (!used(i)) continue;
-    ++result.count;
+    result.count += 1.0;
     sum += values[i];
     squares += values[i] * values[i];
   }
-  if (result.count == 0) {
-    const double nan = std::numeric_limits<double>::quiet_NaN();
-    result.mean = result.std = result.rms = result.skewness = result.kurtosis = nan;
-    return result;
-  }
-  const double n = static_cast<double>(result.count);
-  result.mean = sum / n;
-  result.rms = std::sqrt(squares / n);
-  double second = 0, third = 0, fourth = 0;  // central moments, second pass for accuracy
-  for (std::size_t i = 0; i < values.size(); ++i) {
+  result.mean = sum / result.count;
+  result.mean_square = squares / result.count;
+  for (std::size_t i = 0; i < values.size(); ++i) {  // second pass for accuracy
     if (!used(i)) continue;
     const double d = values[i] - result.mean;
-    second += d * d;
-    third += d * d * d;
-    fourth += d * d * d * d;
+    result.second += d * d;
+    result.third += d * d * d;
+    result.fourth += d * d * d * d;
   }
-  second /= n;
-  third /= n;
-  fourth /= n;
-  result.std = std::sqrt(second * n / std::max(n - 1.0, 1.0));
-  if (second > 0) {
-    result.skewness = third / std::pow(second, 1.5);
-    result.kurtosis = fourth / (second * second) - 3.0;
+  for (double* moment : {&result.second, &result.third, &result.fourth}) *moment /= result.count;
+  return result.moments();
+}
+
+Moments moments_together(std::span<const Moments> samples) {
+  CentralMoments all;
+  for (const Moments& one : samples) {
+    if (one.count == 0) continue;
+    const double n = static_cast<double>(one.count);
+    all.count += n;
+    all.mean += n * one.mean;
+    all.mean_square += n * one.rms * one.rms;
   }
-  return result;
+  all.mean /= all.count;
+  all.mean_square /= all.count;
+  for (const Moments& one : samples) {
+    if (one.count == 0) continue;
+    const double n = static_cast<double>(one.count), d = one.mean - all.mean;
+    const double second = one.std * one.std * std::max(n - 1.0, 1.0) / n;
+    const double third = one.skewness * std::pow(second, 1.5);
+    const double fourth = second > 0 ? (one.kurtosis + 3.0) * second * second : 0.0;
+    all.second += n * (second + d * d);
+    all.third += n * (third + 3.0 * d * second + d * d * d);
+    all.fourth += n * (fourth + 4.0 * d * third + 6.0 * d * d * second + d * d * d * d);
+  }
+  for (double* moment : {&all.second, &all.third, &all.fourth}) *moment /= all.count;
+  return all.moments();
 }
 
 double robust_scale(std::span<const double> azimuth, std::span<const double> zenith) {
@@ -72,16 +113,26 @@ double robust_scale(std::span<const double> azimuth, std::span<const double> zen
   return std::sqrt(*middle) / kMedian;
 }
 
+std::vector<ShotRange> autocorrelation_windows(std::size_t shots) {
+  constexpr std::size_t kWindows = 8, kWindowShots = 50000;
+  const std::size_t spacing = std::max(kWindowShots, shots / kWindows);
+  std::vector<ShotRange> windows;
+  for (std::size_t begin = 0; begin + kFewestInARow <= shots; begin += spacing) {
+    windows.push_back({begin, std::min(begin + kWindowShots, shots)});
+  }
+  return windows;
+}
+
 Autocorrelation autocorrelation(std::span<const std::int64_t> time_ns,
                                 std::span<const double> azimuth, std::span<const double> zenith,
                                 std::span<const unsigned char> skip) {
   constexpr double kSignificant = 2.0;  // sigmas: a group too many costs less than one too few
-  constexpr std::size_t kBlocks = 8, kBlockShots = 50000, kMostLags = 4000;
+  constexpr std::size_t kMostLags = 4000;
   require_length("azimuth", azimuth.size(), time_ns.size());
   require_length("zenith", zenith.size(), time_ns.size());
   require_length_or_none("skip", skip.size(), time_ns.size());
   Autocorrelation result;
-  if (time_ns.size() < 100) return result;
+  if (time_ns.size() < kFewestInARow) return result;
   const std::int64_t step = median_step_ns(time_ns);
   if (step <= 0) return result;  // a clock that stands still tells no lags
   // Blocks spread over the recording, left-out shots as zeros with weight zero.
@@ -89,11 +140,9 @@ Autocorrelation autocorrelation(std::span<const std::int64_t> time_ns,
     std::vector<double> azimuth, zenith, weight;
   };
   std::vector<Block> blocks;
-  const std::size_t spacing = std::max(kBlockShots, time_ns.size() / kBlocks);
   double variance = 0, used = 0;
-  for (std::size_t begin = 0; begin + 100 <= time_ns.size(); begin += spacing) {
+  for (const auto& [begin, end] : autocorrelation_windows(time_ns.size())) {
     Block block;
-    const std::size_t end = std::min(begin + kBlockShots, time_ns.size());
     for (std::size_t i = begin; i < end; ++i) {
       if (i > begin) {  // missing shots take their places; behind a long gap a new block begins
         const std::int64_t missing = (time_ns[i] - time_ns[i - 1] + step / 2) / step - 1;
@@ -168,13 +217,28 @@ void AngleProfiler::add(double angle, double azimuth_residual, double zenith_res
   if (!std::isfinite(angle + azimuth_residual + zenith_residual)) return;
   const double turns = angle * (1.0 / kTwoPi);
   const double bins = static_cast<double>(bins_.size());
-  const auto at = static_cast<std::size_t>((turns - std::floor(turns)) * bins);
+  // Rounded down by hand where that is exact: it is done for every shot, and a call costs more.
+  double whole = static_cast<double>(static_cast<std::int64_t>(std::clamp(turns, -1e15, 1e15)));
+  if (whole > turns) whole -= 1.0;
+  if (std::abs(turns) > 1e15) whole = std::floor(turns);
+  const auto at = static_cast<std::size_t>((turns - whole) * bins);
   Bin& bin = bins_[std::min(at, bins_.size() - 1)];
   bin.count += 1.0;
   bin.azimuth += azimuth_residual;
   bin.zenith += zenith_residual;
   squares_azimuth_ += azimuth_residual * azimuth_residual;
   squares_zenith_ += zenith_residual * zenith_residual;
+}
+
+void AngleProfiler::add(const AngleProfiler& others) {
+  require_length("bins", others.bins_.size(), bins_.size());
+  for (std::size_t i = 0; i < bins_.size(); ++i) {
+    bins_[i].count += others.bins_[i].count;
+    bins_[i].azimuth += others.bins_[i].azimuth;
+    bins_[i].zenith += others.bins_[i].zenith;
+  }
+  squares_azimuth_ += others.squares_azimuth_;
+  squares_zenith_ += others.squares_zenith_;
 }
 
 AngleProfile AngleProfiler::result() const {

@@ -327,8 +327,9 @@ Solution run_ekf(const AngleSeries& series, const Start& start, const EkfOptions
     result = std::move(next);
   }
   result.noise.value = equal_noise(options.angle_noise);
-  result.unit_variance = unit_variance(series, result.noise.value, result.azimuth_residual,
-                                       result.zenith_residual, result.outlier);
+  SquaredAngles squares;
+  squares.add(series, result.azimuth_residual, result.zenith_residual, result.outlier);
+  result.unit_variance = unit_variance(squares, result.noise.value);
   result.iterations = static_cast<std::size_t>(options.passes);
   result.settled = true;
   return result;

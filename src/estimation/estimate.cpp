@@ -121,13 +121,9 @@ sensors::Sensor calibrated_sensor(const sensors::Sensor& nominal, const PrismTra
 }
 
 /// Root mean square that noise and rounding together should leave, rad.
-double expected_residual(const AngleSeries& series, const AngleNoise& noise) {
-  double rounding = 0;
-  for (std::size_t i = 0; i < series.size(); ++i) {
-    rounding += static_cast<double>(series.azimuth_rounding_variance[i]) +
-                static_cast<double>(series.zenith_rounding_variance[i]);
-  }
-  return std::sqrt(noise.rms() * noise.rms() + rounding / (2.0 * double(series.size())));
+/// @param rounding  mean variance of the rounding of both angles, rad^2
+double expected_residual(const AngleNoise& noise, double rounding) {
+  return std::sqrt(noise.rms() * noise.rms() + rounding);
 }
 
 /// A parameter that ended where no sensor of the kind can be, as words; empty when there is none.
@@ -378,21 +374,53 @@ void judge(Estimate& estimate, const sensors::Sensor& nominal) {
   say_verdict(estimate, nominal, std::move(oddities), unusual_values(estimate, nominal));
 }
 
-/// Mean residuals over every prism's angle, of all shots that were used.
-std::vector<AngleProfile> profiles(const Estimate& estimate) {
-  std::vector<AngleProfiler> profilers(static_cast<std::size_t>(estimate.states.prisms()));
-  for_each_used_shot(estimate, [&](const auto& angle, double azimuth, double zenith) {
-    for (std::size_t k = 0; k < profilers.size(); ++k) profilers[k].add(angle(k), azimuth, zenith);
-  });
-  std::vector<AngleProfile> result;
-  result.reserve(profilers.size());
-  for (const AngleProfiler& profiler : profilers) result.push_back(profiler.result());
-  return result;
+/// What all residuals of an estimate look like.
+struct Statistics {
+  Moments azimuth, zenith;
+  std::vector<AngleProfiler> over_angle;  ///< [prisms], of the shots that were used
+  double rounding = 0;                    ///< sum of the rounding variances of both angles, rad^2
+};
+
+void add_statistics(Estimate& estimate) {
+  const auto prisms = static_cast<std::size_t>(estimate.trajectory.prisms);
+  std::vector<Moments> azimuth, zenith;
+  Statistics all{{}, {}, std::vector<AngleProfiler>(prisms)};
+  for_all_shots(
+      estimate,
+      [&](const SolvedShots& solved) {
+        Statistics one{moments(solved.residuals.azimuth, solved.outlier),
+                       moments(solved.residuals.zenith, solved.outlier),
+                       std::vector<AngleProfiler>(prisms)};
+        for (std::size_t i = 0; i < solved.shots.size(); ++i) {
+          one.rounding += static_cast<double>(solved.shots.azimuth_rounding_variance[i]) +
+                          static_cast<double>(solved.shots.zenith_rounding_variance[i]);
+          if (!solved.used(i)) continue;
+          for (std::size_t k = 0; k < prisms; ++k) {
+            one.over_angle[k].add(solved.rotation_angle[k][i], solved.residuals.azimuth[i],
+                                  solved.residuals.zenith[i]);
+          }
+        }
+        return one;
+      },
+      [&](const Statistics& one) {
+        azimuth.push_back(one.azimuth);
+        zenith.push_back(one.zenith);
+        all.rounding += one.rounding;
+        for (std::size_t k = 0; k < prisms; ++k) all.over_angle[k].add(one.over_angle[k]);
+      });
+  estimate.azimuth_moments = moments_together(azimuth);
+  estimate.zenith_moments = moments_together(zenith);
+  for (const AngleProfiler& profiler : all.over_angle) {
+    estimate.residuals_over_angle.push_back(profiler.result());
+  }
+  const double rounding = all.rounding / (2.0 * static_cast<double>(estimate.series.size()));
+  estimate.expected_residual = expected_residual(estimate.noise.value, rounding);
+  estimate.usual_residual = expected_residual(equal_noise(estimate.usual_noise), rounding);
 }
 
 /// Turns the shots on by what the solution found of their frame, and states the whole turn.
 void take_frame(Estimate& estimate) {
-  turn(estimate.series, estimate.frame.transpose());
+  estimate.series.change([&](AngleSeries& rows) { turn(rows, estimate.frame.transpose()); });
   FrameEstimate& whole = *estimate.frame_turn;
   whole.turn = turn_of(recording_from_sensor(whole.turn) * estimate.frame);
   // Turns about the sensor's Z and Y axes; a yaw about the recording's Z moves the axis by its
@@ -405,10 +433,11 @@ void take_frame(Estimate& estimate) {
 /// Holds the directions of emitters of which the series has no shot: it cannot tell them.
 void hold_mute_emitters(const PrismTrain& train, Estimate& estimate) {
   if (train.emitters() < 2) return;
-  check_beams(train, estimate.series.beam, estimate.series.size());
+  if (estimate.series.largest_beam() >= train.emitters()) {
+    check_beams(train, estimate.series.rows().beam, estimate.series.size());
+  }
   std::vector<std::size_t> shots(static_cast<std::size_t>(train.emitters()), 0);
-  for (const std::uint8_t beam : estimate.series.beam) ++shots[beam];
-  if (estimate.series.beam.empty()) shots.front() = estimate.series.size();
+  for (std::size_t i = 0; i < estimate.series.size(); ++i) ++shots[estimate.series.beam(i)];
   for (int emitter = 0; emitter < train.emitters(); ++emitter) {
     if (shots[static_cast<std::size_t>(emitter)] > 0) continue;
     std::erase_if(estimate.free, [&](const FreeParameter& parameter) {
@@ -431,8 +460,11 @@ BatchMapOptions map_options(const Estimate& estimate, const EstimateOptions& opt
 /// Logarithm of the likelihood of residuals under the noise that was found in them, over the shots
 /// that neither of two results leaves out; correlated residuals count for as many as they are
 /// worth.
-double log_likelihood(const Solution& result, const AngleSeries& series,
+/// @param series  as it was estimated
+double log_likelihood(const Solution& result, AngleSeries series,
                       const std::vector<unsigned char>& also_out) {
+  turn(series, result.frame.transpose());
+  const ShotResiduals residuals = residuals_of_shots(result, series, {0, series.size()});
   const AngleNoise noise = usable_noise(result.noise.value);
   const auto term = [](double residual, double sigma, float rounding) {
     const double variance = sigma * sigma + static_cast<double>(rounding);
@@ -441,8 +473,8 @@ double log_likelihood(const Solution& result, const AngleSeries& series,
   double sum = 0;
   for (std::size_t i = 0; i < series.size(); ++i) {
     if (result.outlier[i] != 0 || also_out[i] != 0) continue;
-    sum += term(result.azimuth_residual[i], noise.azimuth, series.azimuth_rounding_variance[i]) +
-           term(result.zenith_residual[i], noise.zenith, series.zenith_rounding_variance[i]);
+    sum += term(residuals.azimuth[i], noise.azimuth, series.azimuth_rounding_variance[i]) +
+           term(residuals.zenith[i], noise.zenith, series.zenith_rounding_variance[i]);
   }
   return sum / result.autocorrelation.factor;
 }
@@ -454,7 +486,7 @@ CoordinateRounding rounding_of(const Estimate& estimate, const EstimateOptions& 
   constexpr std::size_t kEnoughShots = 50000;
   constexpr double kVisible = 5.0, kDecisive = 12.5;  // sigmas, and a logarithm of a likelihood
   const AngleSeries nearest =
-      rows_of(estimate.series, 0, std::min(kEnoughShots, estimate.series.size()));
+      estimate.series.rows({0, std::min(kEnoughShots, estimate.series.size())});
   if (half_step_signal(nearest, estimate.start.residual_rms) < kVisible) {
     return CoordinateRounding::unknown;
   }
@@ -493,12 +525,12 @@ Solution solve(const Estimate& estimate, const EstimateOptions& options, const P
   settings.angle_noise = estimate.noise.value.rms();
   settings.free = estimate.free;
   settings.rotor_process = options.rotor_process;
-  return run_ekf(estimate.series, estimate.start, settings, progress);
+  return run_ekf(estimate.series.rows(), estimate.start, settings, progress);
 }
 
 /// A start from the first second, or, where that holds too little, from the first place in the
 /// series that has enough.
-Start start_anywhere(const AngleSeries& series, const AngleSeries& head,
+Start start_anywhere(const PackedSeries& series, const AngleSeries& head,
                      const EstimateOptions& options, const Estimate& estimate,
                      const Progress& progress) {
   const auto start_of = [&](const AngleSeries& shots) {
@@ -517,12 +549,12 @@ Start start_anywhere(const AngleSeries& series, const AngleSeries& head,
     for (std::size_t place = 1; place < kPlaces; ++place) {
       const std::size_t begin = place * series.size() / kPlaces;
       std::size_t end = begin;
-      while (end < series.size() && series.time_ns[end] >= series.time_ns[begin] &&
-             series.time_ns[end] - series.time_ns[begin] < kLongestNs) {
+      while (end < series.size() && series.time_ns(end) >= series.time_ns(begin) &&
+             series.time_ns(end) - series.time_ns(begin) < kLongestNs) {
         ++end;
       }
       try {
-        return start_of(rows_of(series, begin, end));
+        return start_of(series.rows({begin, end}));
       } catch (const WrongClock& other) {
         if (wrong_clock) throw *wrong_clock;  // two places that agree are enough
         wrong_clock = other;
@@ -564,7 +596,7 @@ std::vector<FreeParameter> chosen_parameters(const EstimateOptions& options) {
   return free_parameters(names, shape);
 }
 
-Estimate estimate(Method method, AngleSeries series, const AngleSeries& head,
+Estimate estimate(Method method, PackedSeries series, const AngleSeries& head,
                   const EstimateOptions& options, const Progress& progress) {
   if (series.size() == 0) throw EstimationError("the recording holds no valid shot");
   Estimate estimate;
@@ -588,24 +620,26 @@ Estimate estimate(Method method, AngleSeries series, const AngleSeries& head,
           "piece, {} of {} shots",
           ranges.size() - 1, longest->size(), estimate.series.size()));
       head_is_used = longest == ranges.begin();
-      estimate.series = rows_of(estimate.series, longest->begin, longest->end);
+      estimate.series = estimate.series.rows(*longest);
     }
   }
   hold_mute_emitters(options.sensor.train, estimate);
   constexpr std::size_t kHeadRows = 2000;
   estimate.start = start_anywhere(
       estimate.series,
-      head_is_used ? head
-                   : rows_of(estimate.series, 0, std::min(kHeadRows, estimate.series.size())),
+      head_is_used ? head : estimate.series.rows({0, std::min(kHeadRows, estimate.series.size())}),
       options, estimate, progress);
   estimate.mirrored = estimate.start.mirrored;
-  prepare_shots(estimate.series, estimate.start);
+  if (estimate.start.mirrored || estimate.start.frame) {
+    estimate.series.change([&](AngleSeries& rows) { prepare_shots(rows, estimate.start); });
+  }
   if (estimate.start.frame) estimate.frame_turn.emplace().turn = *estimate.start.frame;
   if (options.cartesian && method == Method::map) {
     estimate.coordinates = rounding_of(estimate, options, progress.silent());
     if (estimate.coordinates == CoordinateRounding::toward_zero) {
-      add_half_steps(estimate.series,
-                     recording_from_sensor(estimate.start.frame.value_or(FrameTurn{})));
+      estimate.series.change([&](AngleSeries& rows) {
+        add_half_steps(rows, recording_from_sensor(estimate.start.frame.value_or(FrameTurn{})));
+      });
       estimate.warnings.push_back(
           "the coordinates were cut off to whole steps and not rounded: half a step was added to "
           "each");
@@ -621,27 +655,34 @@ Estimate estimate(Method method, AngleSeries series, const AngleSeries& head,
     estimate.warnings.push_back(frame_words(estimate));
   }
   estimate.states = states_of_knots(estimate, estimate.series);
-  estimate.azimuth_moments = moments(estimate.azimuth_residual, estimate.outlier);
-  estimate.zenith_moments = moments(estimate.zenith_residual, estimate.outlier);
+  estimate.usual_noise = options.sensor.angle_noise;
+  add_statistics(estimate);
   if (!estimate.constants.empty()) {
     estimate.unobservable = weak_directions(estimate.information, estimate.constants, kUnmeasured);
   }
-  estimate.expected_residual = expected_residual(estimate.series, estimate.noise.value);
-  estimate.usual_noise = options.sensor.angle_noise;
-  estimate.usual_residual = expected_residual(estimate.series, equal_noise(estimate.usual_noise));
   estimate.values = named_values(estimate);
   count_held_parameters(estimate, options.sensor);
   estimate.speed_factor = speed_factor(options.sensor, estimate);
   estimate.sensor = calibrated_sensor(
       options.sensor, with_free_values(options.sensor.train, estimate.free, estimate.parameters),
       estimate);
-  estimate.residuals_over_angle = profiles(estimate);
   judge(estimate, options.sensor);
   return estimate;
 }
 
 RotorStates states_of_shots(const Estimate& estimate, ShotRange shots) {
   return states_of_shots(estimate, estimate.series, shots);
+}
+
+ShotResiduals residuals_of_shots(const Estimate& estimate) {
+  ShotResiduals all;
+  for_all_shots(
+      estimate, [](SolvedShots solved) { return std::move(solved.residuals); },
+      [&](const ShotResiduals& some) {
+        all.azimuth.insert(all.azimuth.end(), some.azimuth.begin(), some.azimuth.end());
+        all.zenith.insert(all.zenith.end(), some.zenith.begin(), some.zenith.end());
+      });
+  return all;
 }
 
 }  // namespace risley::estimation

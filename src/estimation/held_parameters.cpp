@@ -23,9 +23,10 @@ constexpr double kSampleShots = 20000;
 std::vector<FreeParameter> telling_held(const Estimate& estimate, const sensors::Sensor& sensor) {
   std::vector<FreeParameter> held = uncertain_held(sensor, estimate.free);
   const auto fires = [&](int emitter) {
-    if (estimate.series.beam.empty()) return emitter == 0;
-    return std::find(estimate.series.beam.begin(), estimate.series.beam.end(), emitter) !=
-           estimate.series.beam.end();
+    for (std::size_t i = 0; i < estimate.series.size(); ++i) {
+      if (estimate.series.beam(i) == emitter) return true;
+    }
+    return false;
   };
   std::erase_if(held, [&](const FreeParameter& parameter) {
     const int emitter = place::emitter(parameter.places.front(), sensor.prisms());
@@ -36,7 +37,7 @@ std::vector<FreeParameter> telling_held(const Estimate& estimate, const sensors:
 
 /// Some of the shots that an estimate used, with knots of their own on its trajectory.
 struct Sample {
-  AngleSeries series;
+  PackedSeries series;
   RotorTrajectory knots;
   double share = 1;  // of the shots
 
@@ -48,8 +49,10 @@ struct Sample {
                         motion.last_shot[motion.stretch_end(s) - 1]});
     }
     const auto all = static_cast<double>(estimate.series.size());
-    const double step = 1e-9 * static_cast<double>(std::max<std::int64_t>(
-                                   1, median_step_ns(estimate.series.time_ns)));
+    const AngleSeries beginning =
+        estimate.series.rows({0, std::min(kMedianSteps, estimate.series.size())});
+    const double step =
+        1e-9 * static_cast<double>(std::max<std::int64_t>(1, median_step_ns(beginning.time_ns)));
     series = kSampleShots < all ? thinned(estimate.series, kSampleShots / all / step, ranges)
                                 : estimate.series;
     share = static_cast<double>(series.size()) / all;
@@ -99,13 +102,9 @@ HeldChanges changes_by_held_parameters(const Estimate& estimate, const sensors::
     constants.col(j) *= held[static_cast<std::size_t>(j)].prior_sigma;
   }
 
-  using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
   const RotorTrajectory& knots = sample.knots;
   const auto angles_of = [&](std::size_t knot) -> Eigen::MatrixXd {
-    const Index states = knots.states();
-    const Eigen::Map<const RowMajor> own(
-        solution.sensitivity.data() + knot * static_cast<std::size_t>(states * (free + count)),
-        states, free + count);
+    const auto own = solution.sensitivity(knot, knots.states());
     Eigen::MatrixXd angles(prisms, count);
     for (Index k = 0; k < prisms; ++k) angles.row(k) = own.row(kStatesPerRotor * k) * constants;
     return angles;

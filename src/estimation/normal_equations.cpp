@@ -3,11 +3,14 @@
 #include "risley/estimation/normal_equations.hpp"
 
 #include <algorithm>
+#include <limits>
 
+#include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 
 #include "risley/core/require.hpp"
 
+#include "estimation/in_order.hpp"
 #include "estimation/normal_equations_kernel.hpp"
 
 namespace risley::estimation {
@@ -18,13 +21,7 @@ static_assert(kRotorStates == kStatesPerRotor);
 /// Knots that one task sums up: fixed, so that sums do not depend on the number of threads.
 constexpr std::size_t kBlockKnots = 1000;
 
-void require_shots(const AngleSeries& series, const RotorTrajectory& knots,
-                   const ShotColumns& columns) {
-  const std::size_t shots = series.size();
-  require_length("azimuth", series.azimuth.size(), shots);
-  require_length("zenith", series.zenith.size(), shots);
-  require_length("azimuth_rounding_variance", series.azimuth_rounding_variance.size(), shots);
-  require_length("zenith_rounding_variance", series.zenith_rounding_variance.size(), shots);
+void require_knots(std::size_t shots, const RotorTrajectory& knots) {
   require_length("first_shot", knots.first_shot.size(), knots.size());
   require_length("last_shot", knots.last_shot.size(), knots.size());
   require_length("state", knots.state.size(),
@@ -32,6 +29,14 @@ void require_shots(const AngleSeries& series, const RotorTrajectory& knots,
   for (std::size_t knot = 0; knot < knots.size(); ++knot) {
     require_rows("shots of a knot", knots.first_shot[knot], knots.last_shot[knot], shots);
   }
+}
+
+void require_shots(const AngleSeries& series, const ShotColumns& columns) {
+  const std::size_t shots = series.size();
+  require_length("azimuth", series.azimuth.size(), shots);
+  require_length("zenith", series.zenith.size(), shots);
+  require_length("azimuth_rounding_variance", series.azimuth_rounding_variance.size(), shots);
+  require_length("zenith_rounding_variance", series.zenith_rounding_variance.size(), shots);
   require_length_or_none("azimuth_residual", columns.azimuth_residual.size(), shots);
   require_length("zenith_residual", columns.zenith_residual.size(),
                  columns.azimuth_residual.size());
@@ -55,6 +60,138 @@ bool has_unknown_beam(const AngleSeries& series, const RotorTrajectory& knots,
   return begin < end && *std::max_element(at(begin), at(end)) >= train.emitters();
 }
 
+/// The sums of one call, block by block of knots.
+class BlockSums {
+ public:
+  BlockSums(const RotorTrajectory& knots, const PrismTrain& train,
+            const std::vector<FreeParameter>& free, const ShotWeights& weights,
+            NormalEquations& equations, InstructionSet set)
+      : knots_(knots),
+        equations_(equations),
+        kernel_(RISLEY_KERNEL_COPIES(accumulate).at(set)),
+        triangle_(free.size() * (free.size() + 1) / 2) {
+    check_shape(train.shape());
+    require_free(free, train);
+    require_between("number of prisms of the knots", knots.prisms, train.prisms(), train.prisms());
+    check_noise(weights.angle_noise);
+    require_not_below("softening", weights.softening, 0);
+    require_threshold("cut", weights.cut);
+    const auto prisms = static_cast<std::size_t>(knots.prisms);
+    for (const FreeParameter& parameter : free) {
+      places_.insert(places_.end(), parameter.places.begin(), parameter.places.end());
+      place_begin_.push_back(static_cast<int>(places_.size()));
+    }
+    equations.prisms = knots.prisms;
+    equations.free = static_cast<int>(free.size());
+    equations.curvature.resize(knots.size() * (prisms * (prisms + 1) / 2) * kTimePowers);
+    equations.coupling.resize(knots.size() * prisms * kRotorStates * free.size());
+    equations.gradient.resize(knots.size() * prisms * kRotorStates);
+    hessians_.resize(blocks() * triangle_);
+    gradients_.resize(blocks() * free.size());
+    counts_.resize(blocks());
+
+    all_.parameters = train.parameters().data();
+    all_.face_order = train.face_order().data();
+    all_.prisms = knots.prisms;
+    all_.emitters = train.emitters();
+    all_.free = equations.free;
+    all_.place_begin = place_begin_.data();
+    all_.places = places_.data();
+    all_.azimuth_noise_variance = weights.angle_noise.azimuth * weights.angle_noise.azimuth;
+    all_.zenith_noise_variance = weights.angle_noise.zenith * weights.angle_noise.zenith;
+    all_.turned = std::any_of(places_.begin(), places_.end(), [&](int place) {
+      return place == place::frame_yaw(knots.prisms) || place == place::frame_pitch(knots.prisms);
+    });
+    all_.softening = weights.softening;
+    all_.cut = weights.cut;
+  }
+
+  std::size_t blocks() const { return (knots_.size() + kBlockKnots - 1) / kBlockKnots; }
+  /// Knots [begin, end) of a block.
+  ShotRange knots_of(std::size_t block) const {
+    return {block * kBlockKnots, std::min((block + 1) * kBlockKnots, knots_.size())};
+  }
+
+  /// Sums up a block. @param rows  of the series from row `first` on, with all shots of the block
+  void add(std::size_t block, const AngleSeries& rows, std::size_t first,
+           const ShotColumns& columns) {
+    const ShotRange own = knots_of(block);
+    NormalEquationArguments mine = all_;
+    std::vector<std::size_t> first_shot, last_shot;
+    for (std::size_t knot = own.begin; knot < own.end; ++knot) {
+      first_shot.push_back(knots_.first_shot[knot] - first);
+      last_shot.push_back(knots_.last_shot[knot] - first);
+    }
+    const auto states = static_cast<std::size_t>(knots_.states());
+    const std::size_t curvatures = equations_.curvature.size() / knots_.size();
+    const auto free = static_cast<std::size_t>(all_.free);
+    mine.knot_end = own.size();
+    mine.first_shot = first_shot.data();
+    mine.last_shot = last_shot.data();
+    mine.knot_time_ns = knots_.time_ns.data() + own.begin;
+    mine.state = knots_.state.data() + own.begin * states;
+    mine.curvature = equations_.curvature.data() + own.begin * curvatures;
+    mine.coupling = equations_.coupling.data() + own.begin * states * free;
+    mine.gradient = equations_.gradient.data() + own.begin * states;
+    mine.static_hessian = hessians_.data() + block * triangle_;
+    mine.static_gradient = gradients_.data() + block * free;
+    if (!rows.beam.empty()) mine.beam = rows.beam.data();
+    mine.time_ns = rows.time_ns.data();
+    mine.azimuth = rows.azimuth.data();
+    mine.zenith = rows.zenith.data();
+    mine.azimuth_rounding_variance = rows.azimuth_rounding_variance.data();
+    mine.zenith_rounding_variance = rows.zenith_rounding_variance.data();
+    if (!columns.azimuth_residual.empty()) {
+      mine.azimuth_residual = columns.azimuth_residual.data();
+      mine.zenith_residual = columns.zenith_residual.data();
+    }
+    if (!columns.outlier.empty()) mine.outlier = columns.outlier.data();
+    counts_[block] = kernel_(mine);
+  }
+
+  /// Adds the blocks' sums up, once all are there.
+  void finish() {
+    const int n = equations_.free;
+    const auto free = static_cast<std::size_t>(n);
+    equations_.static_hessian = Eigen::MatrixXd::Zero(n, n);
+    equations_.static_gradient = Eigen::VectorXd::Zero(n);
+    equations_.cost = 0;
+    equations_.outliers = 0;
+    equations_.shots = 0;
+    for (std::size_t knot = 0; knot < knots_.size(); ++knot) {
+      equations_.shots += knots_.last_shot[knot] - knots_.first_shot[knot];
+    }
+    for (std::size_t block = 0; block < blocks(); ++block) {
+      equations_.cost += counts_[block].cost;
+      equations_.outliers += counts_[block].outliers;
+      const double* entry = hessians_.data() + block * triangle_;
+      for (int i = 0; i < n; ++i) {
+        equations_.static_gradient[i] += gradients_[block * free + static_cast<std::size_t>(i)];
+        for (int j = i; j < n; ++j) equations_.static_hessian(i, j) += *entry++;
+      }
+    }
+    equations_.static_hessian.triangularView<Eigen::StrictlyLower>() =
+        equations_.static_hessian.transpose();
+  }
+
+ private:
+  const RotorTrajectory& knots_;
+  NormalEquations& equations_;
+  NormalEquationCounts (*kernel_)(const NormalEquationArguments&);
+  std::size_t triangle_;
+  std::vector<int> place_begin_{0}, places_;
+  NormalEquationArguments all_;
+  std::vector<double> hessians_, gradients_;
+  std::vector<NormalEquationCounts> counts_;
+};
+
+/// Memory of one thread for a block of shots.
+struct Unpacked {
+  AngleSeries rows;
+  std::vector<double> azimuth_residual, zenith_residual;
+  std::vector<unsigned char> outlier;
+};
+
 }  // namespace
 
 void NormalEquations::scale(double factor) {
@@ -70,96 +207,59 @@ void accumulate(const AngleSeries& series, const RotorTrajectory& knots, const P
                 const std::vector<FreeParameter>& free, const ShotWeights& weights,
                 NormalEquations& equations, const ShotColumns& columns, InstructionSet set) {
   check_available(set);
-  check_shape(train.shape());
-  require_shots(series, knots, columns);
-  require_free(free, train);
-  require_between("number of prisms of the knots", knots.prisms, train.prisms(), train.prisms());
-  check_noise(weights.angle_noise);
-  require_not_below("softening", weights.softening, 0);
-  require_threshold("cut", weights.cut);
+  require_shots(series, columns);
+  require_knots(series.size(), knots);
+  BlockSums sums(knots, train, free, weights, equations, set);
   if (has_unknown_beam(series, knots, train)) {
     check_beams(train, series.beam, series.size());
   }
-  const auto n = static_cast<int>(free.size());
-  const auto prisms = static_cast<std::size_t>(knots.prisms);
-  std::vector<int> place_begin{0}, places;
-  for (const FreeParameter& parameter : free) {
-    places.insert(places.end(), parameter.places.begin(), parameter.places.end());
-    place_begin.push_back(static_cast<int>(places.size()));
-  }
-  equations.prisms = knots.prisms;
-  equations.free = n;
-  equations.curvature.resize(knots.size() * (prisms * (prisms + 1) / 2) * kTimePowers);
-  equations.coupling.resize(knots.size() * prisms * kRotorStates * free.size());
-  equations.gradient.resize(knots.size() * prisms * kRotorStates);
+  tbb::parallel_for(std::size_t{0}, sums.blocks(),
+                    [&](std::size_t block) { sums.add(block, series, 0, columns); });
+  sums.finish();
+}
 
-  NormalEquationArguments all;
-  all.parameters = train.parameters().data();
-  all.face_order = train.face_order().data();
-  all.prisms = knots.prisms;
-  all.emitters = train.emitters();
-  if (!series.beam.empty()) all.beam = series.beam.data();
-  all.free = n;
-  all.place_begin = place_begin.data();
-  all.places = places.data();
-  all.first_shot = knots.first_shot.data();
-  all.last_shot = knots.last_shot.data();
-  all.knot_time_ns = knots.time_ns.data();
-  all.state = knots.state.data();
-  all.time_ns = series.time_ns.data();
-  all.azimuth = series.azimuth.data();
-  all.zenith = series.zenith.data();
-  all.azimuth_rounding_variance = series.azimuth_rounding_variance.data();
-  all.zenith_rounding_variance = series.zenith_rounding_variance.data();
-  all.azimuth_noise_variance = weights.angle_noise.azimuth * weights.angle_noise.azimuth;
-  all.zenith_noise_variance = weights.angle_noise.zenith * weights.angle_noise.zenith;
-  all.turned = std::any_of(places.begin(), places.end(), [&](int place) {
-    return place == place::frame_yaw(knots.prisms) || place == place::frame_pitch(knots.prisms);
-  });
-  all.softening = weights.softening;
-  all.cut = weights.cut;
-  all.curvature = equations.curvature.data();
-  all.coupling = equations.coupling.data();
-  all.gradient = equations.gradient.data();
-  if (!columns.azimuth_residual.empty()) {
-    all.azimuth_residual = columns.azimuth_residual.data();
-    all.zenith_residual = columns.zenith_residual.data();
+void accumulate(const PackedSeries& series, const RotorTrajectory& knots, const PrismTrain& train,
+                const std::vector<FreeParameter>& free, const ShotWeights& weights,
+                NormalEquations& equations, const ShotLooks& looks) {
+  require_knots(series.size(), knots);
+  BlockSums sums(knots, train, free, weights, equations, best_instruction_set());
+  if (series.size() > 0 && series.largest_beam() >= train.emitters()) {
+    check_beams(train, series.rows().beam, series.size());
   }
-  if (!columns.outlier.empty()) all.outlier = columns.outlier.data();
-
-  const auto& kernel = RISLEY_KERNEL_COPIES(accumulate).at(set);
-  const std::size_t blocks = (knots.size() + kBlockKnots - 1) / kBlockKnots;
-  const std::size_t triangle = free.size() * (free.size() + 1) / 2;
-  std::vector<double> hessians(blocks * triangle), gradients(blocks * free.size());
-  std::vector<NormalEquationCounts> counts(blocks);
-  tbb::parallel_for(std::size_t{0}, blocks, [&](std::size_t block) {
-    NormalEquationArguments mine = all;
-    mine.knot_begin = block * kBlockKnots;
-    mine.knot_end = std::min(mine.knot_begin + kBlockKnots, knots.size());
-    mine.static_hessian = hessians.data() + block * triangle;
-    mine.static_gradient = gradients.data() + block * free.size();
-    counts[block] = kernel(mine);
-  });
-
-  equations.static_hessian = Eigen::MatrixXd::Zero(n, n);
-  equations.static_gradient = Eigen::VectorXd::Zero(n);
-  equations.cost = 0;
-  equations.outliers = 0;
-  equations.shots = 0;
-  for (std::size_t knot = 0; knot < knots.size(); ++knot) {
-    equations.shots += knots.last_shot[knot] - knots.first_shot[knot];
-  }
-  for (std::size_t block = 0; block < blocks; ++block) {
-    equations.cost += counts[block].cost;
-    equations.outliers += counts[block].outliers;
-    const double* entry = hessians.data() + block * triangle;
-    for (int i = 0; i < n; ++i) {
-      equations.static_gradient[i] += gradients[block * free.size() + static_cast<std::size_t>(i)];
-      for (int j = i; j < n; ++j) equations.static_hessian(i, j) += *entry++;
-    }
-  }
-  equations.static_hessian.triangularView<Eigen::StrictlyLower>() =
-      equations.static_hessian.transpose();
+  tbb::enumerable_thread_specific<Unpacked> memory;
+  in_order(
+      sums.blocks(),
+      [&](std::size_t block) -> std::function<void()> {
+        Unpacked& own = memory.local();
+        const ShotRange served = sums.knots_of(block);
+        const ShotRange shots{knots.first_shot[served.begin], knots.last_shot[served.end - 1]};
+        series.rows(shots, own.rows);
+        if (looks.prepare) looks.prepare(own.rows);
+        if (!looks.look) {
+          sums.add(block, own.rows, shots.begin, {});
+          return {};
+        }
+        own.azimuth_residual.resize(shots.size());
+        own.zenith_residual.resize(shots.size());
+        own.outlier.resize(shots.size());
+        std::size_t row = 0;  // behind those of the knots so far
+        for (std::size_t knot = served.begin; knot < served.end; ++knot) {
+          for (; row < knots.first_shot[knot] - shots.begin; ++row) {
+            own.azimuth_residual[row] = own.zenith_residual[row] =
+                std::numeric_limits<double>::quiet_NaN();
+            own.outlier[row] = 1;
+          }
+          row = knots.last_shot[knot] - shots.begin;
+        }
+        sums.add(block, own.rows, shots.begin,
+                 {own.azimuth_residual, own.zenith_residual, own.outlier});
+        return looks.look(
+            {own.rows, shots.begin, own.azimuth_residual, own.zenith_residual, own.outlier});
+      },
+      [](const std::function<void()>& after) {
+        if (after) after();
+      });
+  sums.finish();
 }
 
 }  // namespace risley::estimation

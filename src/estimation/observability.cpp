@@ -88,9 +88,7 @@ struct Middle {
 Middle middle_of(const SmootherSolution& solution, const RotorTrajectory& knots) {
   const Eigen::Index d = knots.states(), n = solution.parameter_covariance.rows();
   const std::size_t knot = knots.size() / 2;
-  using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-  const Eigen::MatrixXd all = Eigen::Map<const RowMajor>(
-      solution.sensitivity.data() + knot * static_cast<std::size_t>(d * n), d, n);
+  const Eigen::MatrixXd all = solution.sensitivity(knot, d);
   Eigen::MatrixXd total(d, d);
   const double* entry =
       solution.state_covariance.data() + knot * static_cast<std::size_t>(d * (d + 1) / 2);
@@ -311,14 +309,16 @@ Observability observability_of_estimate(const Estimate& estimate, const Progress
       estimate.expected_residual * estimate.expected_residual * estimate.variance_factor;
   double duration = 0;
   for (const ShotRange& range : stretches(estimate.series)) {
-    duration += 1e-9 * static_cast<double>(estimate.series.time_ns[range.end - 1] -
-                                           estimate.series.time_ns[range.begin]);
+    duration += 1e-9 * static_cast<double>(estimate.series.time_ns(range.end - 1) -
+                                           estimate.series.time_ns(range.begin));
   }
   Observability result = analyse(equations, estimate.trajectory, estimate.rotor_process, all,
                                  estimate.free, duration, shots, shots / variance, progress);
-  result.emitters =
-      compare_emitters(estimate.series, estimate.trajectory, estimate.train, estimate.rotor_process,
-                       estimate.free, weights, 1.0 / estimate.variance_factor, progress);
+  if (estimate.train.emitters() > 1) {
+    result.emitters = compare_emitters(estimate.series.rows(), estimate.trajectory, estimate.train,
+                                       estimate.rotor_process, estimate.free, weights,
+                                       1.0 / estimate.variance_factor, progress);
+  }
   return result;
 }
 

@@ -49,7 +49,8 @@ std::optional<Start> fit_optics(const AngleSeries& series, const Start& start,
     const Solution solution = run_batch_map(series, start, sensor, options);
     Start found = start;
     found.train = solution.train;
-    found.residual_rms = robust_scale(solution.azimuth_residual, solution.zenith_residual);
+    const ShotResiduals residuals = residuals_of_shots(solution, series, {0, series.size()});
+    found.residual_rms = robust_scale(residuals.azimuth, residuals.zenith);
     take_rotors(found, solution.trajectory);
     return found;
   } catch (const EstimationError&) {

@@ -36,7 +36,7 @@ std::optional<Piece> estimate_piece(const Estimate& estimate, const sensors::Sen
   shots.end = std::min(shots.end, shots.begin + kMostPieceShots);
   if (!knot || shots.size() < kFewestPieceShots) return std::nullopt;
   Start start = estimate.start;
-  start.time_ns = estimate.series.time_ns[shots.begin];
+  start.time_ns = estimate.series.time_ns(shots.begin);
   start.train = estimate.train;
   const double seconds = 1e-9 * static_cast<double>(start.time_ns - trajectory.time_ns[*knot]);
   for (std::size_t k = 0; k < start.rotation_angle.size(); ++k) {
@@ -47,7 +47,7 @@ std::optional<Piece> estimate_piece(const Estimate& estimate, const sensors::Sen
   options.angle_noise = usable_noise(estimate.noise.value);
   options.free = estimate.free;
   options.rotor_process = estimate.rotor_process;
-  const AngleSeries series = rows_of(estimate.series, shots.begin, shots.end);
+  const AngleSeries series = estimate.series.rows(shots);
   try {
     const Solution result = run_batch_map(series, start, sensor, options, progress);
     if (!result.settled) return std::nullopt;

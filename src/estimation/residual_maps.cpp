@@ -36,6 +36,17 @@ class MapMaker {
     squares_zenith_ += zenith_residual * zenith_residual;
   }
 
+  void add(const MapMaker& others) {
+    for (const auto& [place, other] : others.cells_) {
+      Cell& cell = cells_[place];
+      cell.count += other.count;
+      cell.azimuth += other.azimuth;
+      cell.zenith += other.zenith;
+    }
+    squares_azimuth_ += others.squares_azimuth_;
+    squares_zenith_ += others.squares_zenith_;
+  }
+
   ResidualMap result() const {
     ResidualMap map;
     map.cell = cell_;
@@ -65,17 +76,32 @@ class MapMaker {
   double squares_azimuth_ = 0, squares_zenith_ = 0;
 };
 
+/// Map of all used shots. @param place_of  (solved shots, one of them) where it is counted
+template <class PlaceOf>
+ResidualMap map_of(const Estimate& estimate, double cell, const PlaceOf& place_of) {
+  MapMaker all(cell);
+  for_all_shots(
+      estimate,
+      [&](const SolvedShots& solved) {
+        MapMaker some(cell);
+        for (std::size_t i = 0; i < solved.shots.size(); ++i) {
+          if (!solved.used(i)) continue;
+          const auto [x, y] = place_of(solved, i);
+          some.add(x, y, solved.residuals.azimuth[i], solved.residuals.zenith[i]);
+        }
+        return some;
+      },
+      [&](const MapMaker& some) { all.add(some); });
+  return all.result();
+}
+
 }  // namespace
 
 ResidualMap residuals_over_field(const Estimate& estimate, double cell) {
-  MapMaker maker(cell);
-  const AngleSeries& shots = estimate.series;
-  for (std::size_t i = 0; i < shots.size(); ++i) {
-    if (estimate.outlier[i] != 0) continue;
-    const double azimuth = estimate.azimuth_residual[i], zenith = estimate.zenith_residual[i];
-    maker.add(shots.azimuth[i] - azimuth, shots.zenith[i] - zenith, azimuth, zenith);
-  }
-  return maker.result();
+  return map_of(estimate, cell, [](const SolvedShots& solved, std::size_t i) {
+    return std::pair(solved.shots.azimuth[i] - solved.residuals.azimuth[i],
+                     solved.shots.zenith[i] - solved.residuals.zenith[i]);
+  });
 }
 
 ResidualMap residuals_over_angles(const Estimate& estimate, int prism_x, int prism_y, double cell) {
@@ -84,12 +110,11 @@ ResidualMap residuals_over_angles(const Estimate& estimate, int prism_x, int pri
     throw InvalidArgument(
         fmt::format("prisms {} and {}, allowed 0 to {}", prism_x, prism_y, prisms - 1));
   }
-  MapMaker maker(cell);
   const auto x = static_cast<std::size_t>(prism_x), y = static_cast<std::size_t>(prism_y);
-  for_each_used_shot(estimate, [&](const auto& angle, double azimuth, double zenith) {
-    maker.add(wrap_to_two_pi(angle(x)), wrap_to_two_pi(angle(y)), azimuth, zenith);
+  return map_of(estimate, cell, [&](const SolvedShots& solved, std::size_t i) {
+    return std::pair(wrap_to_two_pi(solved.rotation_angle[x][i]),
+                     wrap_to_two_pi(solved.rotation_angle[y][i]));
   });
-  return maker.result();
 }
 
 }  // namespace risley::estimation

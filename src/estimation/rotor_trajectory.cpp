@@ -66,8 +66,8 @@ double RotorTrajectory::speed_variance(std::size_t knot, std::size_t rotor, doub
                     seconds * covariance_entry(knot, speed + 1, speed + 1));
 }
 
-RotorTrajectory make_knots(const AngleSeries& series, std::span<const ShotRange> ranges, int prisms,
-                           double interval) {
+RotorTrajectory make_knots(const PackedSeries& series, std::span<const ShotRange> ranges,
+                           int prisms, double interval) {
   require_between("number of prisms", prisms, 1, kMaxPrisms);
   require_between("interval", interval, 1e-9, kMostSeconds, "s");
   RotorTrajectory knots;
@@ -77,15 +77,19 @@ RotorTrajectory make_knots(const AngleSeries& series, std::span<const ShotRange>
     require_rows("range", range.begin, range.end, series.size());
     if (range.size() == 0) continue;
     knots.stretch_begin.push_back(knots.size());
-    const std::int64_t origin = series.time_ns[range.begin];
+    const std::int64_t origin = series.time_ns(range.begin);
     for (std::size_t i = range.begin; i < range.end;) {
-      const std::int64_t slot = (series.time_ns[i] - origin) / interval_ns;
-      const std::size_t first = i;
-      while (i < range.end && (series.time_ns[i] - origin) / interval_ns == slot) ++i;
-      knots.first_shot.push_back(first);
+      const std::int64_t first_ns = series.time_ns(i);
+      const std::int64_t slot_end = first_ns - (first_ns - origin) % interval_ns + interval_ns;
+      knots.first_shot.push_back(i);
+      std::int64_t last_ns = first_ns;
+      for (++i; i < range.end; ++i) {
+        const std::int64_t time_ns = series.time_ns(i);
+        if (time_ns >= slot_end) break;
+        last_ns = time_ns;
+      }
       knots.last_shot.push_back(i);
-      knots.time_ns.push_back(series.time_ns[first] +
-                              (series.time_ns[i - 1] - series.time_ns[first]) / 2);
+      knots.time_ns.push_back(first_ns + (last_ns - first_ns) / 2);
     }
   }
   knots.state.assign(knots.size() * static_cast<std::size_t>(knots.states()), 0.0);

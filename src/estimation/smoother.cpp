@@ -70,7 +70,6 @@ class Smoother {
   using Affine =
       Eigen::Matrix<double, kD, Eigen::Dynamic, Eigen::ColMajor, kMostKnotStates<N>, kMostFree + 1>;
   using AffineMap = Eigen::Map<Eigen::Matrix<double, kD, Eigen::Dynamic>>;
-  using SquareMap = Eigen::Map<Square>;
   using Coupling = Eigen::Map<const Eigen::Matrix<double, kD, Eigen::Dynamic, Eigen::RowMajor>>;
   /// Knots on their way forward, with their rows of what they tell of the parameters.
   struct AheadBlock {
@@ -119,8 +118,20 @@ class Smoother {
     const auto columns = static_cast<std::size_t>(free_ + 1);
     return {filtered_.data() + knot * states() * columns, d(), free_ + 1};
   }
-  SquareMap covariance(std::size_t knot) {
-    return SquareMap(covariances_.data() + knot * states() * states(), d(), d());
+  std::size_t triangle() const { return states() * (states() + 1) / 2; }
+  Square covariance(std::size_t knot) const {
+    Square p(d(), d());
+    const double* entry = covariances_.data() + knot * triangle();
+    for (int i = 0; i < d(); ++i) {
+      for (int j = i; j < d(); ++j) p(i, j) = p(j, i) = *entry++;
+    }
+    return p;
+  }
+  void keep_covariance(std::size_t knot, const Square& p) {
+    double* entry = covariances_.data() + knot * triangle();
+    for (int i = 0; i < d(); ++i) {
+      for (int j = i; j < d(); ++j) *entry++ = p(i, j);
+    }
   }
   Coupling coupling(std::size_t knot) const {
     return {equations_.coupling.data() + knot * states() * static_cast<std::size_t>(free_), d(),
@@ -148,7 +159,7 @@ class Smoother {
   void forward() {
     const std::size_t knots = at_.size();
     filtered_.resize(knots * states() * static_cast<std::size_t>(free_ + 1));
-    covariances_.resize(knots * states() * states());
+    covariances_.resize(knots * triangle());
     shared_ = Eigen::MatrixXd::Zero(free_, free_ + 1);
     std::vector<AheadBlock> blocks(kBlocks);
     const auto rows = static_cast<Eigen::Index>(kStackedKnots) * 3 * d();
@@ -164,7 +175,7 @@ class Smoother {
           for (std::size_t knot = block.begin; knot < block.end; ++knot) {
             begins_stretch(knot) ? begin_covariance(p) : predict_covariance(knot, p);
             if (!add_information(p, knot_curvature<N>(equations_, knot))) throw not_definite(knot);
-            covariance(knot) = p;
+            keep_covariance(knot, p);
           }
         },
         [&](AheadBlock& block) {
@@ -290,9 +301,6 @@ class Smoother {
   /// As backward, with covariances: what the later knots say of a state as information Y and vector
   /// y, so that nothing is ever a small difference of large numbers.
   void backward_with_covariance(SmootherSolution& out) {
-    const std::size_t triangle = states() * (states() + 1) / 2;
-    out.state_covariance.resize(at_.size() * triangle);
-    out.sensitivity.resize(at_.size() * states() * static_cast<std::size_t>(free_));
     std::vector<BackBlock> blocks(kBlocks);
     Square information = Square::Zero(d(), d());
     Affine later = Affine::Zero(d(), free_ + 1);
@@ -308,7 +316,7 @@ class Smoother {
             block.later[place] = information;
             Square p = covariance(knot);
             if (!add_information(p, information)) throw not_definite(knot);
-            covariance(knot) = p;
+            keep_covariance(knot, p);
             retreat_information(knot, information, block.before_step[place], block.step[place]);
           });
         },
@@ -326,6 +334,8 @@ class Smoother {
         [&](BackBlock& block) {
           each_knot(block, [&](std::size_t knot, std::size_t) { tell_state(knot, out); });
         });
+    out.state_covariance = std::move(covariances_);
+    out.affine_states = std::move(filtered_);
   }
 
   /// Takes a knot's own shots and the noise of the step before it into what later knots say of it,
@@ -371,24 +381,21 @@ class Smoother {
     for (int k = 0; k < prisms(); ++k) retreat_rows(later, 3 * k, step_before(knot));
   }
 
-  /// Puts a knot's smoothed states and their covariance into the solution.
+  /// Steps of a knot's states, and their covariance with that of the parameters.
   void tell_state(std::size_t knot, SmootherSolution& out) {
     const AffineMap smoothed = affine(knot);
     const auto sensitivity = smoothed.rightCols(free_);
     Vector step = smoothed.col(0);
     add_product(sensitivity, out.parameter_step, step);
     Eigen::Map<Vector>(out.state_step.data() + knot * states(), d()) = step;
-    Eigen::Map<Eigen::Matrix<double, kD, Eigen::Dynamic, Eigen::RowMajor>>(
-        out.sensitivity.data() + knot * states() * static_cast<std::size_t>(free_), d(), free_) =
-        sensitivity;
     Affine spread_parameters = Affine::Zero(d(), free_);
     add_product(sensitivity, out.parameter_covariance, spread_parameters);
     Square total = covariance(knot);
     add_product(spread_parameters, sensitivity.transpose(), total);
-    double* entry = out.state_covariance.data() + knot * (states() * (states() + 1) / 2);
     for (int i = 0; i < d(); ++i) {
-      for (int j = i; j < d(); ++j) *entry++ = 0.5 * (total(i, j) + total(j, i));
+      for (int j = i; j < d(); ++j) total(i, j) = 0.5 * (total(i, j) + total(j, i));
     }
+    keep_covariance(knot, total);
   }
 
   EstimationError not_definite(std::size_t knot) const {
@@ -401,8 +408,9 @@ class Smoother {
   const RotorTrajectory& at_;
   std::span<const RotorProcess> process_;
   Eigen::Index free_;
-  std::vector<double> filtered_, covariances_;  ///< after each knot's shots
-  Eigen::MatrixXd shared_;                      ///< what the knots tell of the parameters
+  /// After each knot's shots, then after all shots.
+  std::vector<double> filtered_, covariances_;
+  Eigen::MatrixXd shared_;  ///< what the knots tell of the parameters
   Eigen::MatrixXd information_;
   Eigen::VectorXd gradient_;
 };

@@ -5,17 +5,79 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <span>
+#include <utility>
 
+#include "risley/core/angle.hpp"
 #include "risley/core/require.hpp"
+#include "risley/optics/batch.hpp"
+
+#include "estimation/used_shots.hpp"
 
 namespace risley::estimation {
 namespace {
 
-/// Fills row of the states from a shot and the knot that serves it.
-void fill_state(const Solution& solution, const AngleSeries& series, std::size_t knot,
-                std::size_t shot, std::size_t row, RotorStates& states) {
+/// The knot whose shots a shot is among or behind.
+std::size_t knot_before(const RotorTrajectory& trajectory, std::size_t shot) {
+  const auto after =
+      std::upper_bound(trajectory.first_shot.begin(), trajectory.first_shot.end(), shot);
+  const auto knot = static_cast<std::size_t>(after - trajectory.first_shot.begin());
+  return knot > 0 ? knot - 1 : 0;
+}
+
+double seconds_from(const RotorTrajectory& trajectory, std::size_t knot, std::int64_t time_ns) {
+  return 1e-9 * static_cast<double>(time_ns - trajectory.time_ns[knot]);
+}
+
+/// Rotation angles of a rotor about a knot, less the turns before it.
+struct KnotMotion {
+  double angle, speed, acceleration;
+
+  KnotMotion(const RotorTrajectory& trajectory, std::size_t knot, std::size_t rotor) {
+    const auto state = trajectory.state_of(knot).subspan(kStatesPerRotor * rotor);
+    angle = std::remainder(state[0], kTwoPi);
+    speed = state[1];
+    acceleration = state[2];
+  }
+  /// @param seconds  from the knot
+  double at(double seconds) const {
+    return angle + seconds * (speed + 0.5 * seconds * acceleration);
+  }
+};
+
+/// Residuals of shots with known rotation angles. @param row_of  the series' row of a shot
+template <class RowOf>
+ShotResiduals residuals_at(const Solution& solution, const AngleSeries& shots,
+                           const std::vector<std::vector<double>>& rotation_angle,
+                           const RowOf& row_of) {
+  ShotResiduals out;
+  out.azimuth.resize(shots.size());
+  out.zenith.resize(shots.size());
+  if (!solution.azimuth_residual.empty()) {
+    for (std::size_t i = 0; i < shots.size(); ++i) {
+      out.azimuth[i] = solution.azimuth_residual[row_of(i)];
+      out.zenith[i] = solution.zenith_residual[row_of(i)];
+    }
+    return out;
+  }
+  const std::vector<std::span<const double>> angles(rotation_angle.begin(), rotation_angle.end());
+  DirectionColumns modelled;
+  modelled.azimuth = out.azimuth;
+  modelled.zenith = out.zenith;
+  observe_batch(solution.train, angles, modelled, shots.beam);
+  for (std::size_t i = 0; i < shots.size(); ++i) {
+    const double difference = shots.azimuth[i] - out.azimuth[i];
+    out.azimuth[i] = std::abs(difference) <= kPi ? difference : wrap_to_pi(difference);
+    out.zenith[i] = shots.zenith[i] - out.zenith[i];
+  }
+  return out;
+}
+
+/// Fills a row of the states from a shot and the knot that serves it, residuals apart.
+void fill_state(const Solution& solution, std::int64_t time_ns, std::size_t knot, std::size_t shot,
+                std::size_t row, RotorStates& states) {
   const RotorTrajectory& t = solution.trajectory;
-  double seconds = 1e-9 * static_cast<double>(series.time_ns[shot] - t.time_ns[knot]);
+  double seconds = seconds_from(t, knot, time_ns);
   if (shot < t.first_shot[knot] || shot >= t.last_shot[knot]) {  // of a stretch that was not used
     seconds = std::numeric_limits<double>::quiet_NaN();
   }
@@ -28,42 +90,94 @@ void fill_state(const Solution& solution, const AngleSeries& series, std::size_t
       states.rotation_angle_covariance[entry++][row] = t.angle_covariance(knot, k, l, seconds);
     }
   }
-  states.time_ns[row] = series.time_ns[shot];
-  states.azimuth_residual[row] = solution.azimuth_residual[shot];
-  states.zenith_residual[row] = solution.zenith_residual[shot];
+  states.time_ns[row] = time_ns;
   states.outlier[row] = solution.outlier[shot];
 }
 
 }  // namespace
 
-RotorStates states_of_shots(const Solution& solution, const AngleSeries& series, ShotRange shots) {
+SolvedShots solved_shots(const Solution& solution, const PackedSeries& series, ShotRange shots) {
   require_rows("shots", shots.begin, shots.end, series.size());
   const RotorTrajectory& t = solution.trajectory;
+  SolvedShots out;
+  series.rows(shots, out.shots);
+  out.outlier = std::span(solution.outlier).subspan(shots.begin, shots.size());
+  out.rotation_angle.assign(static_cast<std::size_t>(t.prisms), std::vector<double>(shots.size()));
+  std::size_t knot = knot_before(t, shots.begin);
+  for (std::size_t shot = shots.begin; shot < shots.end;) {
+    while (knot + 1 < t.size() && t.first_shot[knot + 1] <= shot) ++knot;
+    // Shots up to the knot's last, or, where none serves, up to the next knot's first.
+    const bool served = shot >= t.first_shot[knot] && shot < t.last_shot[knot];
+    const std::size_t next = shot < t.first_shot[knot] ? t.first_shot[knot]
+                             : knot + 1 < t.size()     ? t.first_shot[knot + 1]
+                                                       : shots.end;
+    const std::size_t end = std::min(shots.end, served ? t.last_shot[knot] : next);
+    for (std::size_t k = 0; k < out.rotation_angle.size(); ++k) {
+      KnotMotion motion(t, knot, k);
+      if (!served) motion.angle = std::numeric_limits<double>::quiet_NaN();
+      for (std::size_t i = shot - shots.begin; i < end - shots.begin; ++i) {
+        out.rotation_angle[k][i] = motion.at(seconds_from(t, knot, out.shots.time_ns[i]));
+      }
+    }
+    shot = end;
+  }
+  out.residuals = residuals_at(solution, out.shots, out.rotation_angle,
+                               [&](std::size_t i) { return shots.begin + i; });
+  return out;
+}
+
+ShotResiduals residuals_of_shots(const Solution& solution, const PackedSeries& series,
+                                 ShotRange shots) {
+  return solved_shots(solution, series, shots).residuals;
+}
+
+RotorStates states_of_shots(const Solution& solution, const PackedSeries& series, ShotRange shots) {
+  const RotorTrajectory& t = solution.trajectory;
+  SolvedShots solved = solved_shots(solution, series, shots);
   RotorStates states;
   states.resize(t.prisms, shots.size());
-  auto knot = static_cast<std::size_t>(
-      std::upper_bound(t.first_shot.begin(), t.first_shot.end(), shots.begin) -
-      t.first_shot.begin());
-  knot = knot > 0 ? knot - 1 : 0;
+  std::size_t knot = knot_before(t, shots.begin);
   for (std::size_t shot = shots.begin; shot < shots.end; ++shot) {
     while (knot + 1 < t.size() && t.first_shot[knot + 1] <= shot) ++knot;
-    fill_state(solution, series, knot, shot, shot - shots.begin, states);
+    const std::size_t row = shot - shots.begin;
+    fill_state(solution, solved.shots.time_ns[row], knot, shot, row, states);
   }
+  states.azimuth_residual = std::move(solved.residuals.azimuth);
+  states.zenith_residual = std::move(solved.residuals.zenith);
   return states;
 }
 
-RotorStates states_of_knots(const Solution& solution, const AngleSeries& series) {
+RotorStates states_of_knots(const Solution& solution, const PackedSeries& series) {
   const RotorTrajectory& t = solution.trajectory;
   RotorStates states;
   states.resize(t.prisms, t.size());
+  PackedSeries shots;
+  std::vector<std::size_t> shot_of;
+  std::vector<std::vector<double>> angles(static_cast<std::size_t>(t.prisms));
   for (std::size_t knot = 0; knot < t.size(); ++knot) {
-    const auto begin = series.time_ns.begin();
-    const auto first = begin + static_cast<std::ptrdiff_t>(t.first_shot[knot]);
-    const auto last = begin + static_cast<std::ptrdiff_t>(t.last_shot[knot]);
-    auto shot = static_cast<std::size_t>(std::lower_bound(first, last, t.time_ns[knot]) - begin);
-    shot = std::min(shot, t.last_shot[knot] - 1);
-    fill_state(solution, series, knot, shot, knot, states);
+    // The first shot at or behind the knot, or its last.
+    std::size_t shot = t.first_shot[knot];
+    for (std::size_t left = t.last_shot[knot] - shot; left > 1;) {
+      const std::size_t half = left / 2;
+      if (series.time_ns(shot + half - 1) < t.time_ns[knot]) {
+        shot += half;
+        left -= half;
+      } else {
+        left = half;
+      }
+    }
+    const std::int64_t time_ns = series.time_ns(shot);
+    fill_state(solution, time_ns, knot, shot, knot, states);
+    for (std::size_t k = 0; k < angles.size(); ++k) {
+      angles[k].push_back(KnotMotion(t, knot, k).at(seconds_from(t, knot, time_ns)));
+    }
+    shots.append(series, shot);
+    shot_of.push_back(shot);
   }
+  ShotResiduals residuals =
+      residuals_at(solution, shots.rows(), angles, [&](std::size_t knot) { return shot_of[knot]; });
+  states.azimuth_residual = std::move(residuals.azimuth);
+  states.zenith_residual = std::move(residuals.zenith);
   return states;
 }
 

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include <fmt/format.h>
+#include <tbb/parallel_for.h>
 #include <unsupported/Eigen/FFT>
 
 #include "risley/core/angle.hpp"
@@ -165,9 +166,14 @@ LineSearch::LineSearch(const AngleSeries& series) {
     emitter_.push_back(place);
     value_.push_back(value);
   }
-  Eigen::FFT<double> fft;
-  for (std::size_t j = 0; j < emitters_.size(); ++j) fft.fwd(emitters_[j].spectrum, shot_grids[j]);
-  fft.fwd(value_spectrum_, value_grid);
+  tbb::parallel_for(std::size_t{0}, emitters_.size() + 1, [&](std::size_t j) {
+    Eigen::FFT<double> fft;
+    if (j < emitters_.size()) {
+      fft.fwd(emitters_[j].spectrum, shot_grids[j]);
+    } else {
+      fft.fwd(value_spectrum_, value_grid);
+    }
+  });
 }
 
 /// Times count from the first shot here, which turns amplitudes but changes no sum of squares.
@@ -327,9 +333,8 @@ std::vector<RotorLines> LineSearch::best_of(std::span<const Bins> bins, bool ord
       }
     };
     choose(choose, 0);
-    std::vector<RotorLines> best;
     std::vector<Candidate> taken;
-    while (best.size() < most) {
+    while (taken.size() < most) {
       const Candidate* next = nullptr;
       for (const Candidate& one : all) {
         if (next != nullptr && one.unexplained >= next->unexplained) continue;
@@ -343,8 +348,10 @@ std::vector<RotorLines> LineSearch::best_of(std::span<const Bins> bins, bool ord
       }
       if (next == nullptr) break;
       taken.push_back(*next);
-      best.push_back(refined<Lines>(*next));
     }
+    std::vector<RotorLines> best(taken.size());
+    tbb::parallel_for(std::size_t{0}, taken.size(),
+                      [&](std::size_t i) { best[i] = refined<Lines>(taken[i]); });
     std::stable_sort(best.begin(), best.end(), [](const RotorLines& a, const RotorLines& b) {
       return a.unexplained < b.unexplained;
     });

@@ -5,11 +5,15 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <span>
+#include <vector>
 
 #include "risley/estimation/angle_noise.hpp"
 #include "risley/estimation/batch_map.hpp"
 #include "risley/estimation/estimate.hpp"
 #include "risley/estimation/normal_equations.hpp"
+
+#include "estimation/in_order.hpp"
 
 namespace risley::estimation {
 
@@ -21,20 +25,30 @@ inline ShotWeights weights_of(const Estimate& estimate) {
   return weights;
 }
 
-/// Calls visit(angle, azimuth_residual, zenith_residual) for every shot that the estimate used;
-/// angle(k) is the rotation angle of prism k there, rad, any number of turns.
-template <class Visit>
-void for_each_used_shot(const Estimate& estimate, const Visit& visit) {
-  const RotorTrajectory& t = estimate.trajectory;
-  for (std::size_t knot = 0; knot < t.size(); ++knot) {
-    for (std::size_t i = t.first_shot[knot]; i < t.last_shot[knot]; ++i) {
-      if (estimate.outlier[i] != 0 || !std::isfinite(estimate.azimuth_residual[i])) continue;
-      const double seconds =
-          1e-9 * static_cast<double>(estimate.series.time_ns[i] - t.time_ns[knot]);
-      visit([&](std::size_t k) { return t.angle(knot, k, seconds); }, estimate.azimuth_residual[i],
-            estimate.zenith_residual[i]);
-    }
-  }
+/// Shots of a series, and where a solution says that they went.
+struct SolvedShots {
+  AngleSeries shots;
+  std::vector<std::vector<double>> rotation_angle;  ///< [prisms], rad, of any number of turns
+  ShotResiduals residuals;                          ///< these and the angles: NaN: not used
+  std::span<const unsigned char> outlier;
+
+  bool used(std::size_t i) const { return outlier[i] == 0 && std::isfinite(residuals.azimuth[i]); }
+};
+
+SolvedShots solved_shots(const Solution& solution, const PackedSeries& series, ShotRange shots);
+
+/// Calls make(solved) with the shots of an estimate, some at a time and from several threads, and
+/// take(result) with what it returned, in the order of the shots.
+template <class Make, class Take>
+void for_all_shots(const Estimate& estimate, const Make& make, const Take& take) {
+  constexpr std::size_t kShots = 1 << 16;
+  const std::size_t all = estimate.series.size();
+  in_order((all + kShots - 1) / kShots,
+           [&](std::size_t i) {
+             return make(solved_shots(estimate, estimate.series,
+                                      {i * kShots, std::min((i + 1) * kShots, all)}));
+           },
+           take);
 }
 
 }  // namespace risley::estimation

@@ -13,6 +13,7 @@
 
 #include "risley/core/error.hpp"
 #include "risley/core/require.hpp"
+#include "risley/estimation/packed_series.hpp"
 #include "risley/optics/parameters.hpp"
 
 namespace risley::identification {

@@ -67,15 +67,17 @@ std::string clock_words(const estimation::SpeedFactor& factor, double counted_ra
 }
 
 /// @throws InvalidArgument as check_truth_is_of_recording()
-void check_beams(const estimation::AngleSeries& series, const recordings::TruthColumns& columns,
+void check_beams(const estimation::PackedSeries& series, const recordings::TruthColumns& columns,
                  const std::string& truth) {
   std::vector<Vector3<double>> recorded, beams;
   std::size_t row = 0;
   for (std::size_t i = 0; i < series.size(); ++i) {
-    while (row < columns.size() && columns.time_ns[row] < series.time_ns[i]) ++row;
+    const std::int64_t time_ns = series.time_ns(i);
+    while (row < columns.size() && columns.time_ns[row] < time_ns) ++row;
     if (row == columns.size()) break;
-    if (columns.time_ns[row] != series.time_ns[i]) continue;
-    recorded.push_back(direction_from_angles<double>({series.azimuth[i], series.zenith[i]}));
+    if (columns.time_ns[row] != time_ns) continue;
+    const auto [azimuth, zenith] = series.angles(i);
+    recorded.push_back(direction_from_angles<double>({azimuth, zenith}));
     beams.push_back(direction_from_angles<double>({columns.azimuth[row], columns.zenith[row]}));
   }
   check_truth_is_of_recording(recorded, beams, truth);
@@ -109,7 +111,7 @@ EstimatedRecording estimate_recording(const EstimateRecordingOptions& options,
       read_for_estimation({options.recording,
                            options.reading,
                            options.sensor,
-                           {.rate = options.rate, .ranges = true, .rows = false}},
+                           {.rate = options.rate, .ranges = false, .rows = false}},
                           progress.stage("reading"));
   EstimatedRecording result;
   estimation::EstimateOptions settings;
@@ -123,7 +125,6 @@ EstimatedRecording estimate_recording(const EstimateRecordingOptions& options,
   }
   settings.mirrored = options.mirrored;
   settings.cartesian = input.whole_steps;
-  if (!input.whole_steps) input.series.range = {};  // a fifth of a long recording's memory
   result.nominal = settings.sensor;
   result.choice = std::move(input.choice);
   result.recording = std::move(input.recording);

@@ -56,7 +56,7 @@ JudgedObservability judge_observability(const ObservabilityOptions& options,
         read_for_estimation({options.recording,
                              options.reading,
                              options.sensor,
-                             {.rate = options.rate, .ranges = true, .rows = false}},
+                             {.rate = options.rate, .ranges = false, .rows = false}},
                             progress.stage("reading"));
     estimation::EstimateOptions settings = settings_of(options, input.choice.sensor);
     settings.cartesian = input.whole_steps;

@@ -303,7 +303,9 @@ EstimationInput read_for_estimation(const EstimationInputOptions& options,
   }
   EstimationInput result;
   result.whole_steps = reader.header().cartesian && !input.turned_back && !input.cut_mended;
-  estimation::ShotSelector selector(options.selection);
+  estimation::SelectionOptions selection = options.selection;
+  selection.ranges = options.selection.ranges || result.whole_steps;
+  estimation::ShotSelector selector(selection);
   recordings::TimeAudit audit;
   // While one chunk is looked at, the next is read.
   recordings::Chunk chunk, next;
@@ -313,7 +315,10 @@ EstimationInput read_for_estimation(const EstimationInputOptions& options,
     looks.wait();
     std::swap(chunk, next);
     looks.run([&] { audit.add(chunk); });
-    looks.run([&] { selector.add(chunk.observations); });
+    looks.run([&] {
+      selector.add(chunk.observations);
+      result.series.append(selector.take_series());
+    });
   }
   looks.wait();
   result.recording = {source.name(), reader.header(), audit.result()};
@@ -328,7 +333,6 @@ EstimationInput read_for_estimation(const EstimationInputOptions& options,
                     result.counts.clock_resets));
   }
   result.head = selector.head();
-  result.series = selector.take_series();
   result.reading_time = watch.seconds();
   return result;
 }

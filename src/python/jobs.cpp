@@ -468,15 +468,11 @@ void bind_jobs(py::module_& module) {
       .def_property_readonly("covariance",
                              [](const ValueTable& table) { return array_of(table.covariance); });
   bind_found<EstimatedRecording>(module, "EstimatedRecording")
-      .def_property_readonly("azimuth_residual",
-                             [](const std::shared_ptr<EstimatedRecording>& found) {
-                               return view_of<double, EstimatedRecording>(
-                                   found->estimate.azimuth_residual, found);
-                             })
-      .def_property_readonly(
-          "zenith_residual", [](const std::shared_ptr<EstimatedRecording>& found) {
-            return view_of<double, EstimatedRecording>(found->estimate.zenith_residual, found);
-          });
+      .def_property_readonly("residuals", [](const EstimatedRecording& found) {
+        estimation::ShotResiduals residuals = residuals_of_shots(found.estimate);
+        return py::make_tuple(array_of(std::move(residuals.azimuth)),
+                              array_of(std::move(residuals.zenith)));
+      });
   bind_found<CalibratedRecordings>(module, "CalibratedRecordings");
   bind_found<CalibratedFlight>(module, "CalibratedFlight");
   bind_planned<jobs::PlannedCalibration>(module, "PlannedCalibration");

@@ -144,14 +144,14 @@ class EstimateCharts {
   }
 
   std::vector<Chart> residuals() const {
+    const estimation::ShotResiduals all = estimation::residuals_of_shots(input_.estimate);
     const Estimate& e = input_.estimate;
     std::vector<Chart> charts{
-        over_time("Azimuth residuals over time", input_.estimate.azimuth_residual, "a"),
-        over_time("Zenith residuals over time", input_.estimate.zenith_residual, "b"),
-        residual_histogram("Histogram of the azimuth residuals", input_.estimate.azimuth_residual,
-                           e.azimuth_moments, "a"),
-        residual_histogram("Histogram of the zenith residuals", input_.estimate.zenith_residual,
-                           e.zenith_moments, "b")};
+        over_time("Azimuth residuals over time", all.azimuth, "a"),
+        over_time("Zenith residuals over time", all.zenith, "b"),
+        residual_histogram("Histogram of the azimuth residuals", all.azimuth, e.azimuth_moments,
+                           "a"),
+        residual_histogram("Histogram of the zenith residuals", all.zenith, e.zenith_moments, "b")};
     for (Chart& chart : maps(input_.details.residuals_over_field, "the field of view",
                              "azimuth, deg", "zenith, deg")) {
       chart.kind = ChartKind::map;

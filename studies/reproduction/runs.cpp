@@ -57,7 +57,7 @@ estimation::Estimate estimate_run(estimation::Method method, const SimulatedRun&
 
 estimation::AngleSeries thinned_to(const estimation::AngleSeries& series, double rate) {
   std::vector<estimation::ShotRange> ranges = estimation::stretches(series);
-  return estimation::thinned(series, rate, ranges);
+  return estimation::thinned(series, rate, ranges).rows();
 }
 
 std::uint64_t run_seed(const ReproduceOptions& options, std::size_t i) {

@@ -110,10 +110,11 @@ Figure residual_figure(const Estimate& estimate, const std::string& table, const
                 "Fig. 10: sample distribution of the residuals",
                 {}};
   const char* rate = estimate.method == Method::map ? ", all shots" : ", filter at 1 kHz";
-  figure.charts = {histogram_chart(fmt::format("(a) azimuth{}", rate), "deg",
-                                   estimate.azimuth_residual, kDegreesPerRadian),
-                   histogram_chart(fmt::format("(b) zenith{}", rate), "deg",
-                                   estimate.zenith_residual, kDegreesPerRadian)};
+  const estimation::ShotResiduals residuals = estimation::residuals_of_shots(estimate);
+  figure.charts = {histogram_chart(fmt::format("(a) azimuth{}", rate), "deg", residuals.azimuth,
+                                   kDegreesPerRadian),
+                   histogram_chart(fmt::format("(b) zenith{}", rate), "deg", residuals.zenith,
+                                   kDegreesPerRadian)};
   return figure;
 }
 

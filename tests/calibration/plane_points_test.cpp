@@ -79,6 +79,16 @@ TEST(RangedShots, RowsAreCopiedWhole) {
 
 constexpr std::size_t kShots = 200;
 
+/// Shots straight ahead, 0.2 ms apart.
+estimation::AngleSeries some_shots() {
+  estimation::AngleSeries series;
+  for (std::size_t i = 0; i < kShots; ++i) {
+    series.append(static_cast<std::int64_t>(1'000'000'000 + 200'000 * i), 0.0, 0.5 * kPi);
+    series.range.push_back(10.0 + 0.01 * static_cast<double>(i));
+  }
+  return series;
+}
+
 /// An estimate by hand: rotors at constant speed, a knot every 2 ms with ten shots.
 estimation::Estimate some_estimate() {
   estimation::Estimate estimate;
@@ -86,12 +96,7 @@ estimation::Estimate some_estimate() {
   estimate.sensor = sensors::load_sensor("mid-40");
   estimate.free = estimation::free_parameters({"refractive_index"}, {2});
   estimate.covariance = Eigen::MatrixXd::Constant(1, 1, 4e-8);
-  for (std::size_t i = 0; i < kShots; ++i) {
-    estimate.series.time_ns.push_back(static_cast<std::int64_t>(1'000'000'000 + 200'000 * i));
-    estimate.series.azimuth.push_back(0.0);
-    estimate.series.zenith.push_back(0.5 * kPi);
-    estimate.series.range.push_back(10.0 + 0.01 * static_cast<double>(i));
-  }
+  estimate.series = some_shots();
   const std::vector<estimation::ShotRange> all{{0, kShots}};
   estimate.trajectory = estimation::make_knots(estimate.series, all, 2);
   for (std::size_t knot = 0; knot < estimate.trajectory.size(); ++knot) {
@@ -130,8 +135,8 @@ TEST(RangedRecording, HoldsRangesAndRotationAngles) {
   EXPECT_EQ(recording.outliers, 0u);
   ASSERT_EQ(recording.shots.size(), kShots);
   ASSERT_EQ(recording.shots.prisms(), 2);
-  EXPECT_EQ(recording.time_ns, estimate.series.time_ns);
-  EXPECT_EQ(recording.shots.range, estimate.series.range);
+  EXPECT_EQ(recording.time_ns, some_shots().time_ns);
+  EXPECT_EQ(recording.shots.range, some_shots().range);
   for (std::size_t i = 0; i < kShots; ++i) {
     const double time = 2e-4 * static_cast<double>(i);
     for (std::size_t k = 0; k < 2; ++k) {
@@ -148,9 +153,11 @@ TEST(RangedRecording, HoldsRangesAndRotationAngles) {
 
 TEST(RangedRecording, LeavesOutWhatHasNoRangeOrNoDirection) {
   estimation::Estimate estimate = some_estimate();
-  estimate.series.range[3] = kNaN;
-  estimate.series.range[4] = 0.0;
-  estimate.series.range[199] = -1.0;
+  estimate.series.change([](estimation::AngleSeries& rows) {
+    rows.range[3] = kNaN;
+    rows.range[4] = 0.0;
+    rows.range[199] = -1.0;
+  });
   estimate.outlier[3] = 1;  // counted as one without range
   estimate.outlier[10] = 1;
   estimate.outlier[11] = 1;
@@ -189,13 +196,13 @@ TEST(RangedRecording, RefusesWhatIsNoEstimateWithRanges) {
   estimate.reason = "it did not settle";
   EXPECT_THAT(error_of(estimate), AllOf(HasSubstr("one.lvx"), HasSubstr("it did not settle")));
   estimate = some_estimate();
-  estimate.series.range.clear();
+  estimate.series.change([](estimation::AngleSeries& rows) { rows.range.clear(); });
   EXPECT_THAT(error_of(estimate), AllOf(HasSubstr("one.lvx"), HasSubstr("ranges")));
   estimate = some_estimate();
   estimate.common_angles.reset();
   EXPECT_THAT(error_of(estimate), HasSubstr("one.lvx"));
   estimate = some_estimate();
-  estimate.series.range.assign(kShots, 0.0);
+  estimate.series.change([](estimation::AngleSeries& rows) { rows.range.assign(kShots, 0.0); });
   EXPECT_THAT(error_of(estimate), HasSubstr("no shot has both"));
 }
 

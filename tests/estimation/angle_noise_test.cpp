@@ -34,7 +34,9 @@ struct Residuals {
     }
   }
   NoiseEstimate components(double used_share = 0.0) const {
-    return noise_components(series, azimuth, zenith, outlier, used_share, 1.0);
+    SquaredAngles squares;
+    squares.add(series, azimuth, zenith, outlier);
+    return noise_components(squares, used_share, 1.0);
   }
 };
 

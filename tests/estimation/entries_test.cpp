@@ -92,13 +92,14 @@ TEST(Entries, NoiseAsksForNumbersAndColumnsOfTheSeries) {
             "azimuth noise = nan rad, allowed 0 and above");
   EXPECT_EQ(refusal([&] { return robust_noise(series, four, three); }),
             "zenith has 3 values, expected 4");
-  EXPECT_EQ(refusal([&] { return noise_components(series, three, four, outlier, 0, 1); }),
-            "azimuth has 3 values, expected 4");
-  EXPECT_EQ(refusal([&] { return noise_components(series, four, four, few, 0, 1); }),
+  SquaredAngles squares;
+  EXPECT_EQ(refusal([&] { squares.add(series, three, four, outlier); }),
+            "azimuth residuals has 3 values, expected 4");
+  EXPECT_EQ(refusal([&] { squares.add(series, four, four, few); }),
             "outlier has 3 values, expected 4");
-  EXPECT_THAT(refusal([&] { return noise_components(series, four, four, outlier, 1, 1); }),
+  EXPECT_THAT(refusal([&] { return noise_components(squares, 1, 1); }),
               ::testing::StartsWith("used share = 1, allowed 0 to "));
-  EXPECT_EQ(refusal([&] { return noise_components(series, four, four, outlier, 0, kNan); }),
+  EXPECT_EQ(refusal([&] { return noise_components(squares, 0, kNan); }),
             "square factor = nan, allowed above 0");
 }
 

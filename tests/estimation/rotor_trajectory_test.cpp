@@ -52,7 +52,7 @@ TEST(Thinned, TakesTheFirstShotOfEveryTickOfEachStretch) {
   for (std::int64_t i = 0; i < 300; ++i) times.push_back(77 + i * 10'000);      // clock reset
   const AngleSeries series = series_at(times);
   std::vector<ShotRange> ranges{{0, 1000}, {1000, 1300}};
-  const AngleSeries thin = thinned(series, 1000.0, ranges);
+  const AngleSeries thin = thinned(series, 1000.0, ranges).rows();
   ASSERT_EQ(thin.size(), 13u);
   EXPECT_THAT(pairs(ranges), ElementsAre(std::pair(0u, 10u), std::pair(10u, 13u)));
   for (std::size_t i = 0; i < 13; ++i) {
@@ -70,7 +70,7 @@ TEST(Thinned, EveryBeamHasItsTurnAtEveryRate) {
                     static_cast<std::uint8_t>(i % kBeams));
     }
     std::vector<ShotRange> ranges{{0, kShots}};
-    const AngleSeries thin = thinned(series, 250000.0 / static_cast<double>(every), ranges);
+    const AngleSeries thin = thinned(series, 250000.0 / static_cast<double>(every), ranges).rows();
     std::vector<std::size_t> count(kBeams);
     for (const std::uint8_t beam : thin.beam) ++count[beam];
     const double expected = static_cast<double>(kShots / every);
@@ -99,7 +99,7 @@ TEST(Thinned, ABeamThatStaysAwayHoldsNobodyUp) {
                   static_cast<std::uint8_t>(i % 6));
   }
   std::vector<ShotRange> ranges{{0, series.size()}};
-  const AngleSeries thin = thinned(series, 25000.0, ranges);
+  const AngleSeries thin = thinned(series, 25000.0, ranges).rows();
   std::vector<std::size_t> count(6);
   for (const std::uint8_t beam : thin.beam) ++count[beam];
   EXPECT_NEAR(static_cast<double>(thin.size()), 6000.0, 300.0);
@@ -111,10 +111,10 @@ TEST(Thinned, TicksStayWhereTheyAreOverGapsAndJitter) {
   const AngleSeries series = series_at({500, 990'000, 1'000'499, 1'000'500, 1'400'000, 2'700'000,
                                         2'990'000, 3'000'600, 7'999'000, 8'000'000, 8'000'500});
   std::vector<ShotRange> ranges{{0, 11}};
-  EXPECT_THAT(thinned(series, 1000.0, ranges).azimuth, ElementsAre(0, 3, 5, 7, 8, 10));
+  EXPECT_THAT(thinned(series, 1000.0, ranges).rows().azimuth, ElementsAre(0, 3, 5, 7, 8, 10));
   // Only what was asked for, and all of it where there is less than a shot per tick.
   ranges = {{2, 5}, {8, 11}};
-  EXPECT_THAT(thinned(series, 1e9, ranges).azimuth, ElementsAre(2, 3, 4, 8, 9, 10));
+  EXPECT_THAT(thinned(series, 1e9, ranges).rows().azimuth, ElementsAre(2, 3, 4, 8, 9, 10));
   EXPECT_THAT(pairs(ranges), ElementsAre(std::pair(0u, 3u), std::pair(3u, 6u)));
 }
 

@@ -235,14 +235,15 @@ void expect_dense_solution(const Problem& p) {
     EXPECT_LE(difference(states, dense.state_step, state_size, one), kStateTolerance);
     if (!covariances) {
       EXPECT_TRUE(found.state_covariance.empty());
-      EXPECT_TRUE(found.sensitivity.empty());
+      EXPECT_TRUE(found.affine_states.empty());
       continue;
     }
-    using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-    ASSERT_EQ(found.sensitivity.size(),
-              p.at.state.size() * static_cast<std::size_t>(p.equations.free));
-    const Eigen::Map<const RowMajor> sensitivity(found.sensitivity.data(), dense.sensitivity.rows(),
-                                                 dense.sensitivity.cols());
+    ASSERT_EQ(found.affine_states.size(),
+              p.at.state.size() * static_cast<std::size_t>(p.equations.free + 1));
+    Eigen::MatrixXd sensitivity(dense.sensitivity.rows(), dense.sensitivity.cols());
+    for (std::size_t knot = 0; knot < p.at.size(); ++knot) {
+      sensitivity.middleRows(static_cast<Eigen::Index>(knot) * d, d) = found.sensitivity(knot, d);
+    }
     EXPECT_LE(difference(sensitivity, dense.sensitivity, state_sigma, sigma.cwiseInverse()),
               kStateTolerance);
     ASSERT_EQ(found.state_covariance.size(),

@@ -3,7 +3,11 @@
 #pragma once
 
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <span>
+#include <unordered_map>
+#include <vector>
 
 #include "risley/estimation/angle_series.hpp"
 
@@ -34,6 +38,15 @@ struct NoiseEstimate {
   AngleNoise sigma;  ///< one standard deviation of the value
 };
 
+/// So many shots, spread evenly, are enough for robust_noise() and robust_level(): of more they
+/// look at every n-th.
+inline constexpr std::size_t kRobustNoiseShots = 4000, kRobustLevelShots = 20000;
+
+/// n where so many of the shots are enough and every n-th is looked at.
+constexpr std::size_t robust_stride(std::size_t shots, std::size_t enough) {
+  return shots < enough ? 1 : shots / enough;
+}
+
 /// Noise with which half of the residuals would be as small as they are, rounding of each shot
 /// apart; half of them may be gross errors. Not below kLeastAngleNoise.
 /// @param azimuth, zenith  residuals [shots], rad; NaN counts as a gross error
@@ -46,20 +59,49 @@ AngleNoise robust_noise(const AngleSeries& series, std::span<const double> azimu
 double robust_level(const AngleSeries& series, const AngleNoise& noise,
                     std::span<const double> azimuth, std::span<const double> zenith);
 
+/// Squared residuals of one angle, gathered by the rounding of the shots: all that is needed to
+/// find the noise beside it. Roundings that differ by less than a 500th share a group.
+class SquaredResiduals {
+ public:
+  /// Sums over shots of one rounding.
+  struct Group {
+    double count = 0, squares = 0, fourth_powers = 0;
+    double rounding = 0;  ///< sum of the rounding variances, rad^2
+    double rounding_variance() const { return rounding / count; }
+  };
+  /// @param residual  [shots], rad  @param rounding  [shots], their variances, rad^2
+  /// @param outlier   [shots], shots that are not 0 are left out
+  void add(std::span<const double> residual, std::span<const float> rounding,
+           std::span<const unsigned char> outlier);
+  void add(const SquaredResiduals& others);
+  const std::vector<Group>& groups() const { return groups_; }  ///< as they were met
+
+ private:
+  void add(const Group& more, float rounding);
+
+  std::vector<Group> groups_;
+  std::unordered_map<std::uint32_t, std::size_t> group_of_;
+};
+
+/// Squared residuals of both angles.
+struct SquaredAngles {
+  SquaredResiduals azimuth, zenith;
+
+  /// @param azimuth_residual, zenith_residual  [shots], rad
+  /// @param outlier  [shots], shots that are not 0 are left out
+  void add(const AngleSeries& series, std::span<const double> azimuth_residual,
+           std::span<const double> zenith_residual, std::span<const unsigned char> outlier);
+  void add(const SquaredAngles& others);
+};
+
 /// Most likely noise of normal residuals beside the known rounding of each shot: one variance
 /// component per angle, its sigma from the scatter of the squares. docs/theory/map.md
-/// @param outlier        [shots], shots that are not 0 are left out
 /// @param used_share     share of the observed angles that the estimate itself used up
 /// @param square_factor  1 + 2 (rho_1^2 + rho_2^2 + ...) of the residuals' autocorrelation
-NoiseEstimate noise_components(const AngleSeries& series, std::span<const double> azimuth,
-                               std::span<const double> zenith,
-                               std::span<const unsigned char> outlier, double used_share,
+NoiseEstimate noise_components(const SquaredAngles& squares, double used_share,
                                double square_factor);
 
-/// Mean square of residuals over their stated variances [shots], outliers left out; NaN when all
-/// are.
-double unit_variance(const AngleSeries& series, const AngleNoise& noise,
-                     std::span<const double> azimuth, std::span<const double> zenith,
-                     std::span<const unsigned char> outlier);
+/// Mean square of residuals over their stated variances; NaN when there is none.
+double unit_variance(const SquaredAngles& squares, const AngleNoise& noise);
 
 }  // namespace risley::estimation

@@ -49,19 +49,14 @@ struct ShotRange {
   std::size_t size() const { return end - begin; }
 };
 
-/// The stretches of a series: it is cut where the clock was reset and at gaps over which the turns
-/// of a rotor could not be counted (longer than longest_gap, s).
-std::vector<ShotRange> stretches(const AngleSeries& series, double longest_gap = 5.0);
-
-/// At most so many shots per second, evenly spread over time and beams, of every given stretch.
-/// @param[in,out] ranges  rows of the series, on return those of the result
-AngleSeries thinned(const AngleSeries& series, double rate, std::vector<ShotRange>& ranges);
-
 /// Step through rows that leaves about so many of them and meets every beam in turn, where shot i
 /// is one of beam i mod beams.
 std::size_t thinning_stride(const AngleSeries& series, ShotRange rows, std::size_t most);
 
-/// Typical time between shots, ns: the median of the first 20,000 steps, which gaps do not move.
+/// So many times are looked at for the typical one between shots.
+inline constexpr std::size_t kMedianSteps = 20000;
+
+/// Typical time between shots, ns: the median of the first ones, which gaps do not move.
 /// @param time_ns  of at least two shots
 std::int64_t median_step_ns(std::span<const std::int64_t> time_ns);
 
@@ -83,9 +78,14 @@ class TickSampler {
     waited_ = 0;
   }
   /// Whether to take the next shot. @param beam  that fired it
-  bool take(std::int64_t time_ns, std::uint8_t beam);
+  bool take(std::int64_t time_ns, std::uint8_t beam) {
+    seen_[beam] = true;
+    return time_ns >= next_ns_ && take_at_tick(time_ns, beam);
+  }
 
  private:
+  bool take_at_tick(std::int64_t time_ns, std::uint8_t beam);
+
   double rate_;  // Hz
   std::int64_t origin_ns_ = 0, next_ns_ = 0;
   std::bitset<256> seen_, had_turn_;  // beams, ever and in this round

@@ -40,7 +40,8 @@ struct BatchMapOptions {
 /// @param series  as it is to be used: prepare_shots()
 /// @param start   of the first stretch
 /// @throws EstimationError when there is nothing to estimate from; InvalidArgument
-Solution run_batch_map(const AngleSeries& series, const Start& start, const sensors::Sensor& sensor,
-                       const BatchMapOptions& options, const Progress& progress = {});
+Solution run_batch_map(const PackedSeries& series, const Start& start,
+                       const sensors::Sensor& sensor, const BatchMapOptions& options,
+                       const Progress& progress = {});
 
 }  // namespace risley::estimation

@@ -7,6 +7,8 @@
 #include <span>
 #include <vector>
 
+#include "risley/estimation/angle_series.hpp"
+
 namespace risley::estimation {
 
 /// Sample statistics of residuals, in the unit of the sample.
@@ -23,6 +25,12 @@ struct Moments {
 /// @param skip  where not zero the value is left out (outliers); empty skips nothing
 Moments moments(std::span<const double> values, std::span<const unsigned char> skip = {});
 
+/// Moments of several samples together.
+Moments moments_together(std::span<const Moments> samples);
+
+/// The shots of a recording that autocorrelation() looks at: some stretches, spread over it.
+std::vector<ShotRange> autocorrelation_windows(std::size_t shots);
+
 /// Standard deviation of one component of residual pairs, from the median of their lengths: half of
 /// the pairs may be gross errors. Infinite when half of them are NaN.
 double robust_scale(std::span<const double> azimuth, std::span<const double> zenith);
@@ -36,8 +44,9 @@ struct Autocorrelation {
 };
 
 /// Autocorrelation of residual columns, both axes together; pairs with a shot missing between them
-/// do not count. The sum ends before the first group of 1, 1, 2, 4, ... lags whose mean is below 2
-/// sigma; the factor is one standard deviation of itself above what the sum says.
+/// do not count. The shots of autocorrelation_windows() alone give the same as all. The sum ends
+/// before the first group of 1, 1, 2, 4, ... lags whose mean is below 2 sigma; the factor is one
+/// standard deviation of itself above what the sum says.
 /// @param time_ns  of the shots  @param skip  where not zero the shot is left out
 Autocorrelation autocorrelation(std::span<const std::int64_t> time_ns,
                                 std::span<const double> azimuth, std::span<const double> zenith,
@@ -60,6 +69,8 @@ class AngleProfiler {
   /// A shot of which any number is not finite does not count.
   /// @param angle  rotation angle of the prism, rad, any number of turns
   void add(double angle, double azimuth_residual, double zenith_residual);
+  /// All shots of another one with as many bins.
+  void add(const AngleProfiler& others);
   /// The profile of the shots so far.
   AngleProfile result() const;
 

@@ -92,8 +92,8 @@ struct Estimate : Solution {
   /// Parameter combinations that the data do not tell; any makes the estimate not converged.
   std::vector<WeakDirection> unobservable;
 
-  AngleSeries series;  ///< the shots in the sensor's frame, see prepare_shots()
-  RotorStates states;  ///< at one shot per knot of the trajectory
+  PackedSeries series;  ///< the shots in the sensor's frame, see prepare_shots()
+  RotorStates states;   ///< at one shot per knot of the trajectory
 
   Moments azimuth_moments, zenith_moments;         ///< of all residuals, rad, outliers left out
   std::vector<AngleProfile> residuals_over_angle;  ///< [prisms], of all shots
@@ -107,13 +107,16 @@ struct Estimate : Solution {
 /// Rotor states of shots [begin, end) of an estimate's series.
 RotorStates states_of_shots(const Estimate& estimate, ShotRange shots);
 
+/// Residuals of all shots of an estimate's series.
+ShotResiduals residuals_of_shots(const Estimate& estimate);
+
 /// Estimates parameters and rotation angles. A mirrored recording is turned first; results describe
 /// the turned one. The filter works on one stretch of time alone and takes the longest where the
 /// clock was reset or the recording paused; the batch estimator takes all.
 /// @param series  shots to use, as recorded
 /// @param head    all shots of the first second, as recorded, for the start
 /// @throws EstimationError when the data cannot answer, InvalidArgument for unknown parameters
-Estimate estimate(Method method, AngleSeries series, const AngleSeries& head,
+Estimate estimate(Method method, PackedSeries series, const AngleSeries& head,
                   const EstimateOptions& options, const Progress& progress = {});
 
 }  // namespace risley::estimation

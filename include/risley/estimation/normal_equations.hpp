@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstddef>
+#include <functional>
 #include <limits>
 #include <span>
 #include <vector>
@@ -12,6 +13,7 @@
 #include "risley/estimation/angle_noise.hpp"
 #include "risley/estimation/angle_series.hpp"
 #include "risley/estimation/free_parameters.hpp"
+#include "risley/estimation/packed_series.hpp"
 #include "risley/estimation/rotor_trajectory.hpp"
 #include "risley/optics/batch.hpp"
 #include "risley/optics/prism_train.hpp"
@@ -73,5 +75,29 @@ void accumulate(const AngleSeries& series, const RotorTrajectory& knots, const P
                 const std::vector<FreeParameter>& free, const ShotWeights& weights,
                 NormalEquations& equations, const ShotColumns& columns = {},
                 InstructionSet set = best_instruction_set());
+
+/// Shots that were evaluated together.
+struct EvaluatedShots {
+  const AngleSeries& shots;
+  std::size_t first = 0;  ///< row of the series that the first of them is
+  std::span<const double> azimuth_residual, zenith_residual;  ///< rad; NaN where no knot serves
+  std::span<const unsigned char> outlier;                     ///< not 0 also where no knot serves
+};
+
+/// What is to be done with the shots of a packed series while they are unpacked; either may be
+/// empty. Both are called from several threads, for one block of shots at a time.
+struct ShotLooks {
+  /// Changes rows before they are evaluated.
+  std::function<void(AngleSeries& rows)> prepare;
+  /// Looks at what came out; the function that it returns is called by one thread at a time, in the
+  /// order of the shots.
+  std::function<std::function<void()>(const EvaluatedShots& shots)> look;
+};
+
+/// The same of a packed series, which is unpacked block by block.
+/// @throws as above, for beams of all rows
+void accumulate(const PackedSeries& series, const RotorTrajectory& knots, const PrismTrain& train,
+                const std::vector<FreeParameter>& free, const ShotWeights& weights,
+                NormalEquations& equations, const ShotLooks& looks = {});
 
 }  // namespace risley::estimation

@@ -9,7 +9,7 @@
 #include <span>
 #include <vector>
 
-#include "risley/estimation/angle_series.hpp"
+#include "risley/estimation/packed_series.hpp"
 
 namespace risley::estimation {
 
@@ -79,8 +79,8 @@ struct RotorTrajectory {
 
 /// Knots for the shots of some stretches, on a regular grid from each stretch's first shot and only
 /// where there are shots; states are zero.
-RotorTrajectory make_knots(const AngleSeries& series, std::span<const ShotRange> ranges, int prisms,
-                           double interval = kKnotInterval);
+RotorTrajectory make_knots(const PackedSeries& series, std::span<const ShotRange> ranges,
+                           int prisms, double interval = kKnotInterval);
 
 /// Fills the states of a trajectory with those of another one of the same stretches, each knot from
 /// the other's nearest knot.

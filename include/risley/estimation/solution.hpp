@@ -12,6 +12,7 @@
 #include "risley/estimation/angle_series.hpp"
 #include "risley/estimation/diagnostics.hpp"
 #include "risley/estimation/free_parameters.hpp"
+#include "risley/estimation/packed_series.hpp"
 #include "risley/estimation/rotor_process.hpp"
 #include "risley/estimation/rotor_states.hpp"
 #include "risley/estimation/rotor_trajectory.hpp"
@@ -37,9 +38,10 @@ struct Solution {
   /// With covariances. A knot serves as many shots as its estimator takes together, one at least.
   RotorTrajectory trajectory;
 
-  std::vector<double> azimuth_residual,
-      zenith_residual;                 ///< [shots], observed minus estimated, rad; NaN: not used
   std::vector<unsigned char> outlier;  ///< [shots], not 0 where the shot was left out
+  /// Residuals [shots] of a filter, whose parameters may wander; empty where those of the solution
+  /// leave them, see residuals_of_shots().
+  std::vector<double> azimuth_residual, zenith_residual;
   std::size_t outliers = 0;
   std::size_t unused_shots = 0;  ///< in stretches too short to find their rotors' phases
   /// Mean square of residuals over stated variances, outliers left out.
@@ -63,11 +65,21 @@ struct Solution {
   std::optional<CommonAngleErrors> common_angles;
 };
 
-/// Rotor states of shots [begin, end) of the series that a solution is of; NaN for shots of
-/// stretches that were not used. @throws InvalidArgument for rows that are not there
-RotorStates states_of_shots(const Solution& solution, const AngleSeries& series, ShotRange shots);
+/// Residuals of shots: observed minus estimated, rad; NaN in stretches that were not used.
+struct ShotResiduals {
+  std::vector<double> azimuth, zenith;
+};
+
+/// Residuals of shots [begin, end) of the series that a solution is of, turned back by its frame.
+/// @throws InvalidArgument for rows that are not there
+ShotResiduals residuals_of_shots(const Solution& solution, const PackedSeries& series,
+                                 ShotRange shots);
+
+/// Rotor states of such shots; NaN for shots of stretches that were not used.
+/// @throws InvalidArgument for rows that are not there
+RotorStates states_of_shots(const Solution& solution, const PackedSeries& series, ShotRange shots);
 
 /// Rotor states of one shot per knot, the one nearest to it.
-RotorStates states_of_knots(const Solution& solution, const AngleSeries& series);
+RotorStates states_of_knots(const Solution& solution, const PackedSeries& series);
 
 }  // namespace risley::estimation

@@ -9,6 +9,7 @@
 
 #include "risley/core/progress.hpp"
 #include "risley/estimation/angle_series.hpp"
+#include "risley/estimation/packed_series.hpp"
 #include "risley/jobs/sensor_choice.hpp"
 #include "risley/recordings/extrinsics.hpp"
 #include "risley/recordings/reader.hpp"
@@ -64,15 +65,15 @@ struct EstimationInputOptions {
   recordings::Source recording;     ///< of one sensor, with times
   recordings::ReadOptions reading;  ///< see open_in_sensor_frame() where it holds no extrinsics
   std::string sensor;               ///< as given_sensor()
-  estimation::SelectionOptions selection;
+  estimation::SelectionOptions selection;  ///< ranges of whole steps are kept all the same
 };
 
 /// What reading a recording leaves for an estimation.
 struct EstimationInput {
   ReadRecording recording;
   SensorChoice choice;
-  estimation::AngleSeries series;  ///< the chosen shots, in the sensor's frame
-  estimation::AngleSeries head;    ///< every shot of the first second
+  estimation::PackedSeries series;  ///< the chosen shots, in the sensor's frame
+  estimation::AngleSeries head;     ///< every shot of the first second
   estimation::SelectionCounts counts;
   std::vector<std::string> warnings;  ///< of the reader, about frame, sensor and clock
   bool whole_steps = false;           ///< directions come from coordinates in whole steps

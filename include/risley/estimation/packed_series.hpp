@@ -1,0 +1,131 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <utility>
+#include <vector>
+
+#include "risley/estimation/angle_series.hpp"
+
+namespace risley::estimation {
+
+/// An AngleSeries in less memory and without any loss, for whole recordings: four bytes a shot
+/// where angles are multiples of a step such as 0.01 degree and the time from shot to shot is the
+/// same, some thirty where coordinates say where shots went. Rows are packed in blocks of
+/// kBlockRows, each by itself; those behind the last whole block are kept as they are.
+class PackedSeries {
+ public:
+  static constexpr std::size_t kBlockRows = 4096;
+
+  PackedSeries() = default;
+  /// @throws InvalidArgument where columns have other lengths
+  PackedSeries(const AngleSeries& series) { append(series); }  // NOLINT(*-explicit-*)
+
+  std::size_t size() const { return blocks_.size() * kBlockRows + tail_.size(); }
+  bool has_ranges() const { return has_ranges_; }  ///< as AngleSeries::range
+  /// Largest number of an emitter that fired.
+  std::uint8_t largest_beam() const { return largest_beam_; }
+  /// Time of a row, as recorded.
+  std::int64_t time_ns(std::size_t row) const {
+    const std::size_t block = row / kBlockRows, place = row % kBlockRows;
+    return block < blocks_.size() ? blocks_[block].time.at(place) : tail_.time_ns[place];
+  }
+  /// Emitter of a row.
+  std::uint8_t beam(std::size_t row) const {
+    const std::size_t block = row / kBlockRows, place = row % kBlockRows;
+    return block < blocks_.size() ? blocks_[block].beam.at(place) : tail_.beam[place];
+  }
+  /// Azimuth and zenith of a row, rad.
+  std::pair<double, double> angles(std::size_t row) const;
+  /// Time since the first shot, s.
+  double time(std::size_t row) const {
+    return 1e-9 * static_cast<double>(time_ns(row) - time_ns(0));
+  }
+  /// Of a series without resets, s.
+  double duration() const { return size() == 0 ? 0.0 : time(size() - 1); }
+
+  /// Rows [begin, end).
+  AngleSeries rows(ShotRange range) const;
+  /// The same into a series whose memory is used again.
+  void rows(ShotRange range, AngleSeries& out) const;
+  /// All rows.
+  AngleSeries rows() const { return rows({0, size()}); }
+
+  /// Appends all rows of a series. @throws InvalidArgument where columns have other lengths
+  void append(const AngleSeries& series);
+  /// Appends one row of another series.
+  void append(const PackedSeries& other, std::size_t row);
+  /// Changes all rows, some at a time.
+  void change(const std::function<void(AngleSeries& rows)>& change_rows);
+
+ private:
+  /// Times as steps of one length since the first.
+  struct Times {
+    std::int64_t base = 0, step = 0;
+    std::vector<std::uint16_t> few_steps;  ///< this and the next empty: as many steps as rows
+    std::vector<std::uint32_t> many_steps;
+    std::vector<std::int64_t> time_ns;  ///< where there are no such steps
+
+    Times() = default;
+    /// @param all  two or more
+    explicit Times(const std::vector<std::int64_t>& all);
+    std::int64_t at(std::size_t i) const {
+      if (!time_ns.empty()) return time_ns[i];
+      return base + step * (!few_steps.empty()    ? std::int64_t{few_steps[i]}
+                            : !many_steps.empty() ? std::int64_t{many_steps[i]}
+                                                  : static_cast<std::int64_t>(i));
+    }
+  };
+  /// One value, or one per row.
+  template <class T>
+  struct Mostly {
+    T all{};
+    std::vector<T> each;
+
+    T at(std::size_t i) const { return each.empty() ? all : each[i]; }
+  };
+  /// What the numbers of angles that are multiples of a step stand for.
+  struct Grid {
+    float variance = 0;         ///< of rounding, which tells the step; 0: none was met
+    std::vector<double> value;  ///< [65536] by number; NaN where none was met
+  };
+  /// Numbers of a grid, or the angles themselves.
+  struct Angles {
+    std::vector<std::uint16_t> number;
+    std::vector<double> value;
+
+    Angles() = default;
+    Angles(const std::vector<double>& all, const Mostly<float>& variance, Grid& grid);
+    double at(std::size_t i, const Grid& grid) const {
+      return number.empty() ? value[i] : grid.value[number[i]];
+    }
+  };
+  struct Block {
+    Times time;
+    Angles azimuth, zenith;
+    Mostly<std::uint8_t> beam;
+    Mostly<float> azimuth_variance, zenith_variance;
+    std::vector<double> range;
+  };
+
+  void pack_tail();
+
+  std::vector<Block> blocks_;
+  Grid azimuth_grid_, zenith_grid_;
+  AngleSeries tail_;
+  bool has_ranges_ = false;
+  std::uint8_t largest_beam_ = 0;
+};
+
+/// The stretches of a series: it is cut where the clock was reset and at gaps over which the turns
+/// of a rotor could not be counted (longer than longest_gap, s).
+std::vector<ShotRange> stretches(const PackedSeries& series, double longest_gap = 5.0);
+
+/// At most so many shots per second, evenly spread over time and beams, of every given stretch.
+/// @param[in,out] ranges  rows of the series, on return those of the result
+PackedSeries thinned(const PackedSeries& series, double rate, std::vector<ShotRange>& ranges);
+
+}  // namespace risley::estimation
