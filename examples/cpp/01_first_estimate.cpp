@@ -22,9 +22,9 @@ int first_estimate(const Arguments& arguments) {
     simulation.sensor = "mid-40-table3";
     simulation.duration = 1.0;
     simulation.seed = 1;
-    options.recording = arguments.folder / "unit.nc";
-    const auto made =
-        simulation::simulate_to_file(jobs::simulation_settings(simulation), options.recording, {});
+    const std::string unit = arguments.folder / "unit.nc";
+    const auto made = simulation::simulate_to_file(jobs::simulation_settings(simulation), unit, {});
+    options.recording = unit;
     fmt::print("{} shots simulated\n", made.observations);
   }
   options.files.folder = arguments.folder;  // calibration.yaml and states.nc

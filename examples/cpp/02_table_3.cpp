@@ -42,9 +42,10 @@ int table_3(const Arguments& arguments) {
   simulation.angle_noise = radians_from_degrees(noise);
   simulation.seed = 1;
   jobs::EstimateRecordingOptions options;
-  options.recording = arguments.folder / "table-3.nc";
-  options.truth = simulation::truth_preset_path(options.recording);
-  simulation::simulate_to_file(jobs::simulation_settings(simulation), options.recording, {});
+  const std::string recording = arguments.folder / "table-3.nc";
+  simulation::simulate_to_file(jobs::simulation_settings(simulation), recording, {});
+  options.recording = recording;
+  options.truth = simulation::truth_preset_path(recording);
   const jobs::EstimatedRecording found = jobs::estimate_recording(options);
   if (!found.estimate.converged || !found.evaluation) return 1;
 

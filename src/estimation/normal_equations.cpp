@@ -10,6 +10,7 @@
 
 #include "risley/core/require.hpp"
 
+#include "estimation/entry_checks.hpp"
 #include "estimation/in_order.hpp"
 #include "estimation/normal_equations_kernel.hpp"
 

@@ -2,7 +2,6 @@
 // SPDX-License-Identifier: MIT
 #include "risley/recordings/source.hpp"
 
-#include <filesystem>
 #include <system_error>
 #include <utility>
 
@@ -44,6 +43,7 @@ void require_packets(const Chunk& data) {
 
 Source::Source(std::string path) : name_(std::move(path)) {}
 Source::Source(const char* path) : name_(path) {}
+Source::Source(const std::filesystem::path& path) : name_(path.string()) {}
 
 Source::Source(std::shared_ptr<const Recording> recording, std::string name)
     : name_(std::move(name)), recording_(std::move(recording)) {

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <filesystem>
 #include <memory>
 #include <string>
 #include <vector>
@@ -15,8 +16,9 @@ class Source {
  public:
   Source() = default;
   // A path is a source wherever one is expected.
-  Source(std::string path);  // NOLINT(google-explicit-constructor)
-  Source(const char* path);  // NOLINT(google-explicit-constructor)
+  Source(std::string path);                   // NOLINT(google-explicit-constructor)
+  Source(const char* path);                   // NOLINT(google-explicit-constructor)
+  Source(const std::filesystem::path& path);  // NOLINT(google-explicit-constructor)
 
   /// @param recording  must not change while it is read
   /// @param name       for messages and reports, such as "recording in memory"

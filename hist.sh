@@ -1,1 +1,0 @@
-cd /tmp/proto; bash mk.sh avx2 -g; timeout 100 valgrind --tool=callgrind --callgrind-out-file=cg.out ./n_avx2 1 np 2>&1 | grep refs; callgrind_annotate cg.out | grep -i "kernel_avx2\|estimation" | cut -c1-150
