@@ -262,6 +262,13 @@ class Host:
             ports.append(ports[0])
         return self.ask(0, 1, socket.inet_aton(self.address) + struct.pack(f"<{len(ports)}H", *ports), kind)
 
+    def receive_packets(self, count):
+        """So many packets or more, for which a busy machine may take up to a minute."""
+        packets, end = [], time.monotonic() + 60
+        while len(packets) < count and time.monotonic() < end:
+            packets += self.receive(0.1)
+        return packets
+
     def receive(self, seconds):
         """Packets of a time, and all that is there at its end."""
         packets, end = [], time.monotonic() + seconds
