@@ -351,7 +351,7 @@ class RecordTest(CommandTest):
                          [("127.0.0.21", "Livox Mid-40", 0), ("127.0.0.22", "Livox Mid-70", 0)])
         for index, step in enumerate((1_000_000, 960_000)):
             times = self.times("passive.lvx", index)
-            self.assertGreater(len(times), 300)
+            self.assertGreater(len(times), number // 10)  # the rest was sent while it started and looked
             self.assertEqual(times, list(range(times[0], times[-1] + 1, step)))
         for one in (sender, other):
             one.setblocking(False)
