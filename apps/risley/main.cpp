@@ -5,7 +5,6 @@
 #include <exception>
 #include <limits>
 #include <memory>
-#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -59,10 +58,13 @@ ExitStatus run_command(const std::vector<std::string>& words) {
   if (parsed.problem) return fail(kWrongUsage, *parsed.problem, common);
   if (common.quiet) spdlog::set_level(spdlog::level::err);
   if (common.verbose) spdlog::set_level(spdlog::level::debug);
-  std::optional<tbb::global_control> limit;
   if (common.threads > 0) {
-    limit.emplace(tbb::global_control::max_allowed_parallelism,
-                  static_cast<std::size_t>(common.threads));
+    // Never lifted: oneTBB may start threads then, and where there is no memory for them it ends the
+    // process before anybody was told.
+    [[maybe_unused]] static const auto* const limit =
+        std::make_unique<tbb::global_control>(tbb::global_control::max_allowed_parallelism,
+                                              static_cast<std::size_t>(common.threads))
+            .release();
   }
   return run_verb(line.run_of(*parsed.verb), common);
 }
