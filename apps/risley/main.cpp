@@ -59,8 +59,8 @@ ExitStatus run_command(const std::vector<std::string>& words) {
   if (common.quiet) spdlog::set_level(spdlog::level::err);
   if (common.verbose) spdlog::set_level(spdlog::level::debug);
   if (common.threads > 0) {
-    // Never lifted: oneTBB may start threads then, and where there is no memory for them it ends the
-    // process before anybody was told.
+    // Never lifted: oneTBB may start threads then, and where there is no memory for them it ends
+    // the process before anybody was told.
     [[maybe_unused]] static const auto* const limit =
         std::make_unique<tbb::global_control>(tbb::global_control::max_allowed_parallelism,
                                               static_cast<std::size_t>(common.threads))
