@@ -38,9 +38,10 @@ struct NoiseEstimate {
   AngleNoise sigma;  ///< one standard deviation of the value
 };
 
-/// So many shots, spread evenly, are enough for robust_noise() and robust_level(): of more they
-/// look at every n-th.
-inline constexpr std::size_t kRobustNoiseShots = 4000, kRobustLevelShots = 20000;
+/// So many shots, spread evenly, are enough for robust_noise(): of more it looks at every n-th.
+inline constexpr std::size_t kRobustNoiseShots = 4000;
+/// The same for robust_level().
+inline constexpr std::size_t kRobustLevelShots = 20000;
 
 /// n where so many of the shots are enough and every n-th is looked at.
 constexpr std::size_t robust_stride(std::size_t shots, std::size_t enough) {
@@ -67,12 +68,13 @@ class SquaredResiduals {
   struct Group {
     double count = 0, squares = 0, fourth_powers = 0;
     double rounding = 0;  ///< sum of the rounding variances, rad^2
-    double rounding_variance() const { return rounding / count; }
+    double rounding_variance() const { return rounding / count; }  ///< mean of them, rad^2
   };
   /// @param residual  [shots], rad  @param rounding  [shots], their variances, rad^2
   /// @param outlier   [shots], shots that are not 0 are left out
   void add(std::span<const double> residual, std::span<const float> rounding,
            std::span<const unsigned char> outlier);
+  /// Adds what was gathered elsewhere.
   void add(const SquaredResiduals& others);
   const std::vector<Group>& groups() const { return groups_; }  ///< as they were met
 
@@ -91,6 +93,7 @@ struct SquaredAngles {
   /// @param outlier  [shots], shots that are not 0 are left out
   void add(const AngleSeries& series, std::span<const double> azimuth_residual,
            std::span<const double> zenith_residual, std::span<const unsigned char> outlier);
+  /// Adds what was gathered elsewhere.
   void add(const SquaredAngles& others);
 };
 

@@ -18,7 +18,7 @@ namespace risley::estimation {
 /// kBlockRows, each by itself; those behind the last whole block are kept as they are.
 class PackedSeries {
  public:
-  static constexpr std::size_t kBlockRows = 4096;
+  static constexpr std::size_t kBlockRows = 4096;  ///< rows of a block
 
   PackedSeries() = default;
   /// @throws InvalidArgument where columns have other lengths
