@@ -3,7 +3,7 @@
 """Results of jobs as plain data: columns, dictionaries, a sensor. All of it can be pickled."""
 import html
 import os
-from typing import Any, Dict, List, NamedTuple, Optional, Union
+from typing import Any, Dict, List, NamedTuple, Optional, Tuple, Union
 
 from risley import _risley
 from risley._progress import Progress, telling
@@ -148,17 +148,31 @@ class Solution(_Columns):
 
 
 class Estimate(Solution):
-    """What `risley.estimate` found: parameters, mean speeds, first rotation angles.
-
-    Attributes
-    ----------
-    azimuth_residual, zenith_residual : ndarray
-        Observed minus estimated direction of every used shot, rad.
-    """
+    """What `risley.estimate` found: parameters, mean speeds, first rotation angles."""
 
     def __init__(self, found: _risley.EstimatedRecording) -> None:
         super().__init__(found)
-        self.azimuth_residual, self.zenith_residual = found.residuals
+        self._residuals: Optional[Tuple[Any, Any]] = None
+
+    def _both_residuals(self) -> Tuple[Any, Any]:
+        if self._residuals is None:  # nobody asked before: they are as many as shots
+            assert isinstance(self._found, _risley.EstimatedRecording)
+            self._residuals = self._found.residuals
+        return self._residuals
+
+    @property
+    def azimuth_residual(self) -> Any:
+        """Observed minus estimated azimuth of every used shot, rad. ndarray."""
+        return self._both_residuals()[0]
+
+    @property
+    def zenith_residual(self) -> Any:
+        """Observed minus estimated zenith of every used shot, rad. ndarray."""
+        return self._both_residuals()[1]
+
+    def __getstate__(self) -> Dict[str, Any]:
+        self._both_residuals()  # gone with the C++ object, as what the page needs
+        return super().__getstate__()
 
 
 class Calibration(Solution):
