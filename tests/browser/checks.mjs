@@ -124,11 +124,12 @@ export async function checkDrawn(tab) {
 }
 
 // Pointing at a value shows it.
-// patience: ms to wait for it, for pages that will not do it
-export async function checkHover(tab, { patience } = {}) {
+// most: so many diagrams at most, where one that fails is enough. patience: ms to wait for it, for
+// pages that will not do it
+export async function checkHover(tab, { most = Infinity, patience = longestReaction } = {}) {
   await look(tab);
   const complaints = [];
-  for (const figure of await flatOnes(tab)) {
+  for (const figure of (await flatOnes(tab)).slice(0, most)) {
     const { place } = await boxOf(tab, figure);
     const point = await tab.evaluate((k) => window.looking.pointToHover(k), figure.index);
     if (!point) {
@@ -148,7 +149,7 @@ export async function checkHover(tab, { patience } = {}) {
 }
 
 // Boxes thick and thin, double click, wheel, Shift and dragging.
-// most: so many diagrams at most, where one that fails is enough. patience: as for checkHover
+// most, patience: as for checkHover
 export async function checkMouse(tab, { most = Infinity, patience = longestReaction } = {}) {
   await look(tab);
   const complaints = [];
