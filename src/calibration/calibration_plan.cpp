@@ -205,9 +205,7 @@ CalibrationForecast forecast(const CalibrationPlan& plan, const Progress& progre
       result.walls.push_back({plane.name, names.back(), n / static_cast<double>(kSampleShots),
                               seen.incidence[w] / n, seen.range[w] / n});
       result.shots += n * weight;
-      auto shots = std::make_shared<RangedShots>();
-      shots->resize(sensor.prisms(), seen.rows[w].size());
-      for (std::size_t i = 0; i < seen.rows[w].size(); ++i) shots->set_row(i, all, seen.rows[w][i]);
+      auto shots = std::make_shared<RangedShots>(rows_of(all, seen.rows[w]));
       // The plane in the sensor's frame: R^T n, and nearer by what the station stands towards it.
       const Vector3<double>& n_scene = plane.plane.normal;
       const Vector3<double> axes[] = {station.scene_from_sensor({1, 0, 0}),

@@ -14,11 +14,88 @@
 #include "risley/core/require.hpp"
 #include "risley/optics/prism.hpp"
 
+#include "calibration/shot_blocks.hpp"
+
 namespace risley::calibration {
 namespace {
 
-/// Shots whose rotor states are in memory at a time: some megabytes.
-constexpr std::size_t kStatesBlock = 65536;
+/// Shots of a block with a range and a sound direction, and how many others there are.
+struct SoundShots {
+  RangedShots shots;
+  std::vector<std::int64_t> time_ns;
+  std::size_t without_range = 0, outliers = 0;
+};
+
+SoundShots sound_shots(const estimation::Estimate& estimate, estimation::ShotRange block) {
+  const estimation::RotorStates states = states_of_shots(estimate, block);
+  const estimation::AngleSeries rows = estimate.series.rows(block);
+  SoundShots sound;
+  std::vector<std::size_t> taken;
+  for (std::size_t i = 0; i < states.size(); ++i) {
+    if (!(rows.range[i] > 0.0)) {
+      ++sound.without_range;
+    } else if (states.outlier[i] != 0 || std::isnan(states.rotation_angle[0][i])) {
+      ++sound.outliers;
+    } else {
+      taken.push_back(i);
+    }
+  }
+  RangedShots& shots = sound.shots;
+  shots.resize(estimate.sensor.prisms(), taken.size());
+  sound.time_ns.resize(taken.size());
+  const auto take = [&](const auto& from, auto& to, const auto& change) {
+    for (std::size_t i = 0; i < taken.size(); ++i) to[i] = change(from[taken[i]]);
+  };
+  const auto same = [](auto value) { return value; };
+  for (std::size_t k = 0; k < shots.rotation_angle.size(); ++k) {
+    take(states.rotation_angle[k], shots.rotation_angle[k],
+         [](double angle) { return std::remainder(angle, kTwoPi); });
+  }
+  for (std::size_t k = 0; k < shots.angle_covariance.size(); ++k) {
+    take(states.rotation_angle_covariance[k], shots.angle_covariance[k],
+         [](double value) { return static_cast<float>(value); });
+  }
+  take(rows.range, shots.range, same);
+  take(rows.beam, shots.beam, same);
+  take(states.time_ns, sound.time_ns, same);
+  return sound;
+}
+
+/// Takes the shots of an estimate in parallel, some megabytes of rotor states at a time.
+void take_shots(const estimation::Estimate& estimate, RangedRecording& recording) {
+  const std::size_t size = estimate.series.size();
+  std::vector<SoundShots> blocks(block_count(size));
+  for_each_block(size, [&](std::size_t begin, std::size_t end) {
+    blocks[begin / kBlockShots] = sound_shots(estimate, {begin, end});
+  });
+  std::vector<std::size_t> first;
+  std::size_t count = 0;
+  for (const SoundShots& block : blocks) {
+    first.push_back(count);
+    count += block.shots.size();
+    recording.without_range += block.without_range;
+    recording.outliers += block.outliers;
+  }
+  RangedShots& shots = recording.shots;
+  shots.resize(estimate.sensor.prisms(), count);
+  recording.time_ns.resize(count);
+  for_each_block(size, [&](std::size_t begin, std::size_t) {
+    const std::size_t number = begin / kBlockShots;
+    const SoundShots block = std::move(blocks[number]);
+    const auto put = [at = first[number]](const auto& from, auto& to) {
+      std::copy(from.begin(), from.end(), to.begin() + static_cast<std::ptrdiff_t>(at));
+    };
+    for (std::size_t k = 0; k < shots.rotation_angle.size(); ++k) {
+      put(block.shots.rotation_angle[k], shots.rotation_angle[k]);
+    }
+    for (std::size_t k = 0; k < shots.angle_covariance.size(); ++k) {
+      put(block.shots.angle_covariance[k], shots.angle_covariance[k]);
+    }
+    put(block.shots.range, shots.range);
+    put(block.shots.beam, shots.beam);
+    put(block.time_ns, recording.time_ns);
+  });
+}
 
 }  // namespace
 
@@ -33,23 +110,24 @@ void RangedShots::resize(int prisms, std::size_t shots) {
   beam.resize(shots);
 }
 
-void RangedShots::set_row(std::size_t row, const RangedShots& from, std::size_t from_row) {
-  for (std::size_t k = 0; k < rotation_angle.size(); ++k) {
-    rotation_angle[k][row] = from.rotation_angle[k][from_row];
-  }
-  for (std::size_t k = 0; k < angle_covariance.size(); ++k) {
-    angle_covariance[k][row] = from.angle_covariance[k][from_row];
-  }
-  range[row] = from.range[from_row];
-  beam[row] = from.beam.empty() ? std::uint8_t{0} : from.beam[from_row];
-}
-
 RangedShots rows_of(const RangedShots& shots, const std::vector<std::size_t>& rows) {
   if (!rows.empty())
     require_place("row", *std::max_element(rows.begin(), rows.end()), shots.size());
   RangedShots result;
   result.resize(shots.prisms(), rows.size());
-  for (std::size_t i = 0; i < rows.size(); ++i) result.set_row(i, shots, rows[i]);
+  for_each_block(rows.size(), [&](std::size_t begin, std::size_t end) {
+    const auto take = [&](const auto& from, auto& to) {
+      for (std::size_t i = begin; i < end; ++i) to[i] = from[rows[i]];
+    };
+    for (std::size_t k = 0; k < result.rotation_angle.size(); ++k) {
+      take(shots.rotation_angle[k], result.rotation_angle[k]);
+    }
+    for (std::size_t k = 0; k < result.angle_covariance.size(); ++k) {
+      take(shots.angle_covariance[k], result.angle_covariance[k]);
+    }
+    take(shots.range, result.range);
+    if (!shots.beam.empty()) take(shots.beam, result.beam);
+  });
   return result;
 }
 
@@ -63,7 +141,6 @@ RangedRecording ranged_recording(const estimation::Estimate& estimate, std::stri
     throw EstimationError(fmt::format(
         "{}: calibration needs ranges, and an estimate of all shots at once (method map)", name));
   }
-  const int prisms = estimate.sensor.prisms();
   RangedRecording recording;
   recording.believed = estimate.sensor;
   recording.free = estimate.free;
@@ -73,39 +150,8 @@ RangedRecording ranged_recording(const estimation::Estimate& estimate, std::stri
       algebra::SymmetricSolver(estimate.common_angles->information).inverse();
   recording.held_changes = estimate.held_changes;
   recording.serial = std::move(serial);
-  RangedShots& shots = recording.shots;
-  shots.resize(prisms, estimate.series.size());
-  recording.time_ns.resize(estimate.series.size());
-  std::size_t row = 0;
-  for (std::size_t begin = 0; begin < estimate.series.size(); begin += kStatesBlock) {
-    const std::size_t end = std::min(begin + kStatesBlock, estimate.series.size());
-    const estimation::RotorStates states = states_of_shots(estimate, {begin, end});
-    const estimation::AngleSeries rows = estimate.series.rows({begin, end});
-    for (std::size_t i = 0; i < states.size(); ++i) {
-      const double range = rows.range[i];
-      if (!(range > 0.0)) {
-        ++recording.without_range;
-        continue;
-      }
-      if (states.outlier[i] != 0 || std::isnan(states.rotation_angle[0][i])) {
-        ++recording.outliers;
-        continue;
-      }
-      for (std::size_t k = 0; k < shots.rotation_angle.size(); ++k) {
-        shots.rotation_angle[k][row] = std::remainder(states.rotation_angle[k][i], kTwoPi);
-      }
-      for (std::size_t k = 0; k < shots.angle_covariance.size(); ++k) {
-        shots.angle_covariance[k][row] = static_cast<float>(states.rotation_angle_covariance[k][i]);
-      }
-      shots.range[row] = range;
-      shots.beam[row] = rows.beam[i];
-      recording.time_ns[row] = states.time_ns[i];
-      ++row;
-    }
-  }
-  shots.resize(prisms, row);
-  recording.time_ns.resize(row);
-  if (row == 0) {
+  take_shots(estimate, recording);
+  if (recording.shots.size() == 0) {
     throw EstimationError(fmt::format("{}: no shot has both a direction and a range", name));
   }
   recording.name = std::move(name);

@@ -13,14 +13,17 @@ namespace risley::calibration {
 /// it.
 inline constexpr std::size_t kBlockShots = 65536;
 
+inline std::size_t block_count(std::size_t shots) {
+  return (shots + kBlockShots - 1) / kBlockShots;
+}
+
 /// Calls function(begin, end) for blocks of so many shots, in parallel.
 template <class Function>
 void for_each_block(std::size_t shots, const Function& function) {
-  tbb::parallel_for(std::size_t{0}, (shots + kBlockShots - 1) / kBlockShots,
-                    [&](std::size_t block) {
-                      const std::size_t begin = block * kBlockShots;
-                      function(begin, std::min(begin + kBlockShots, shots));
-                    });
+  tbb::parallel_for(std::size_t{0}, block_count(shots), [&](std::size_t block) {
+    const std::size_t begin = block * kBlockShots;
+    function(begin, std::min(begin + kBlockShots, shots));
+  });
 }
 
 }  // namespace risley::calibration

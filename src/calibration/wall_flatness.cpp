@@ -4,6 +4,8 @@
 
 #include <cmath>
 
+#include <tbb/parallel_for.h>
+
 #include "risley/calibration/surface_steps.hpp"
 
 namespace risley::calibration {
@@ -12,21 +14,35 @@ namespace {
 /// Sigmas of a mean chi2, sqrt(2 / cells), beyond which it is more than chance.
 constexpr double kBeyondChance = 4.0;
 
-SurfaceReport inspect(const ViewDistances& d) {
-  return inspect_surface({d.azimuth, d.zenith, d.distance, d.sigma});
+/// The surface of every view, by the shots that some labels give it; rows of steps are those of the
+/// view's recording.
+template <class LabelsOf>
+std::vector<SurfaceReport> inspect_views(const PlanarProblem& problem,
+                                         const std::vector<LabelledShots>& recordings,
+                                         const LabelsOf& labels_of) {
+  std::vector<SurfaceReport> reports(problem.views.size());
+  tbb::parallel_for(std::size_t{0}, reports.size(), [&](std::size_t v) {
+    const LabelledShots& recording = recordings[problem.views[v].recording];
+    const ViewDistances d = view_distances(problem, v, recording, labels_of(recording.labels));
+    reports[v] = inspect_surface({d.azimuth, d.zenith, d.distance, d.sigma});
+    for (StepRegion& step : reports[v].steps) {
+      for (std::size_t& row : step.rows) row = d.rows[row];
+    }
+  });
+  return reports;
 }
 
 }  // namespace
 
 std::vector<SurfaceStep> leave_out_steps(const PlanarProblem& problem,
                                          std::vector<LabelledShots>& recordings) {
+  const std::vector<SurfaceReport> reports = inspect_views(
+      problem, recordings, [](const Labels& labels) -> const auto& { return labels.nearby; });
   std::vector<SurfaceStep> steps;
-  for (std::size_t v = 0; v < problem.views.size(); ++v) {
+  for (std::size_t v = 0; v < reports.size(); ++v) {
     const std::size_t r = problem.views[v].recording;
-    Labels& labels = recordings[r].labels;
-    const ViewDistances d = view_distances(problem, v, recordings[r], labels.nearby);
-    for (const StepRegion& step : inspect(d).steps) {
-      for (const std::size_t row : step.rows) labels.view[d.rows[row]] = -1;
+    for (const StepRegion& step : reports[v].steps) {
+      for (const std::size_t row : step.rows) recordings[r].labels.view[row] = -1;
       steps.push_back(
           {r, v, step.height, step.azimuth, step.zenith, std::sqrt(step.solid_angle), step.points});
     }
@@ -36,10 +52,8 @@ std::vector<SurfaceStep> leave_out_steps(const PlanarProblem& problem,
 
 Evenness evenness_of(const PlanarProblem& problem, const std::vector<LabelledShots>& recordings) {
   double squares = 0, cells = 0;
-  for (std::size_t v = 0; v < problem.views.size(); ++v) {
-    const LabelledShots& recording = recordings[problem.views[v].recording];
-    const SurfaceReport report =
-        inspect(view_distances(problem, v, recording, recording.labels.view));
+  for (const SurfaceReport& report : inspect_views(
+           problem, recordings, [](const Labels& labels) -> const auto& { return labels.view; })) {
     squares += report.unevenness * static_cast<double>(report.cells);
     cells += static_cast<double>(report.cells);
   }

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include <fmt/format.h>
+#include <tbb/parallel_for.h>
 
 #include "risley/calibration/fitted_plane.hpp"
 #include "risley/calibration/rays.hpp"
@@ -37,6 +38,16 @@ class ProfileBuilder {
     s.after += after;
     s.before2 += before * before;
     s.after2 += after * after;
+  }
+  /// Adds what another one was given.
+  void add(const ProfileBuilder& other) {
+    for (std::size_t i = 0; i < sums_.size(); ++i) {
+      sums_[i].count += other.sums_[i].count;
+      sums_[i].before += other.sums_[i].before;
+      sums_[i].after += other.sums_[i].after;
+      sums_[i].before2 += other.sums_[i].before2;
+      sums_[i].after2 += other.sums_[i].after2;
+    }
   }
   ThicknessProfile result() && {
     for (std::size_t i = 0; i < sums_.size(); ++i) {
@@ -74,6 +85,7 @@ FittedView fitted_view(const PrismTrain& train, const PrismGeometry& geometry,
                        const RangedShots& shots) {
   const Rays rays(train, geometry, shots);
   std::vector<Vector3<double>> points;
+  points.reserve(shots.size());
   for (std::size_t i = 0; i < shots.size(); ++i) points.push_back(rays.point(i, shots.range[i]));
   std::vector<std::size_t> all(points.size());
   std::iota(all.begin(), all.end(), std::size_t{0});
@@ -88,51 +100,69 @@ FittedView fitted_view(const PrismTrain& train, const PrismGeometry& geometry,
   return view;
 }
 
+/// What the shots of one view say.
+struct ViewThickness {
+  CalibratedPlane plane;
+  double squares_before = 0, squares_after = 0;
+  std::vector<ProfileBuilder> profiles;
+};
+
+ViewThickness thickness_of(const PlanarProblem& problem, std::size_t view,
+                           const PrismTrain& believed, const LabelledShots& recording,
+                           std::vector<ProfileBuilder> empty) {
+  const WallView& own = problem.views[view];
+  const ViewDistances d = view_distances(problem, view, recording, recording.labels.view);
+  const RangedShots shots = rows_of(recording.shots, d.rows);
+  const FittedView before = fitted_view(believed, problem.geometry, shots);
+  ViewThickness result;
+  result.profiles = std::move(empty);
+  for (std::size_t i = 0; i < d.rows.size(); ++i) {
+    result.squares_after += d.distance[i] * d.distance[i];
+    result.profiles[0].add(d.incidence[i], before.distance[i], d.distance[i]);
+    for (std::size_t k = 0; k < shots.rotation_angle.size(); ++k) {
+      result.profiles[k + 1].add(wrap_to_two_pi(shots.rotation_angle[k][i]), before.distance[i],
+                                 d.distance[i]);
+    }
+  }
+  const auto n = static_cast<double>(d.rows.size());
+  result.squares_before = n * before.rms * before.rms;
+  CalibratedPlane& plane = result.plane;
+  plane.name = problem.walls[own.wall].name;
+  plane.recording = own.recording;
+  const Plane adjusted = plane_view(problem, view).plane;
+  plane.normal = adjusted.normal;
+  plane.distance = adjusted.distance;
+  plane.believed = before.plane;
+  plane.points = d.rows.size();
+  plane.outliers = recording.labels.near[view];
+  plane.rms_before = before.rms;
+  plane.rms = std::sqrt(result.squares_after / n);
+  plane.range_sigma = std::sqrt(own.range_variance);
+  return result;
+}
+
 }  // namespace
 
 WallThickness wall_thickness(const PlanarProblem& problem, const PrismTrain& believed,
                              const std::vector<LabelledShots>& recordings) {
-  const auto prisms = static_cast<std::size_t>(problem.train.prisms());
   std::vector<ProfileBuilder> builders;
   builders.emplace_back("incidence", 0.0, kPi / 2, kIncidenceBins);
-  for (std::size_t k = 0; k < prisms; ++k) {
-    builders.emplace_back(fmt::format("rotation_angle_{}", prism_letter(static_cast<int>(k))), 0.0,
-                          kTwoPi, kTurnBins);
+  for (int k = 0; k < problem.train.prisms(); ++k) {
+    builders.emplace_back(fmt::format("rotation_angle_{}", prism_letter(k)), 0.0, kTwoPi,
+                          kTurnBins);
   }
+  std::vector<ViewThickness> views(problem.views.size());
+  tbb::parallel_for(std::size_t{0}, views.size(), [&, empty = builders](std::size_t v) {
+    views[v] = thickness_of(problem, v, believed, recordings[problem.views[v].recording], empty);
+  });
   WallThickness result;
   double before2 = 0, after2 = 0;
-  for (std::size_t v = 0; v < problem.views.size(); ++v) {
-    const WallView& view = problem.views[v];
-    const LabelledShots& recording = recordings[view.recording];
-    const ViewDistances d = view_distances(problem, v, recording, recording.labels.view);
-    const RangedShots shots = rows_of(recording.shots, d.rows);
-    const FittedView before = fitted_view(believed, problem.geometry, shots);
-    CalibratedPlane plane;
-    plane.name = problem.walls[view.wall].name;
-    plane.recording = view.recording;
-    const Plane adjusted = plane_view(problem, v).plane;
-    plane.normal = adjusted.normal;
-    plane.distance = adjusted.distance;
-    plane.believed = before.plane;
-    plane.points = d.rows.size();
-    plane.outliers = recording.labels.near[v];
-    plane.rms_before = before.rms;
-    plane.range_sigma = std::sqrt(view.range_variance);
-    double squares = 0;
-    for (std::size_t i = 0; i < d.rows.size(); ++i) {
-      squares += d.distance[i] * d.distance[i];
-      builders[0].add(d.incidence[i], before.distance[i], d.distance[i]);
-      for (std::size_t k = 0; k < prisms; ++k) {
-        builders[k + 1].add(wrap_to_two_pi(shots.rotation_angle[k][i]), before.distance[i],
-                            d.distance[i]);
-      }
-    }
-    const auto n = static_cast<double>(d.rows.size());
-    plane.rms = std::sqrt(squares / n);
-    before2 += n * before.rms * before.rms;
-    after2 += squares;
-    result.points += d.rows.size();
-    result.planes.push_back(std::move(plane));
+  for (ViewThickness& view : views) {
+    before2 += view.squares_before;
+    after2 += view.squares_after;
+    result.points += view.plane.points;
+    for (std::size_t k = 0; k < builders.size(); ++k) builders[k].add(view.profiles[k]);
+    result.planes.push_back(std::move(view.plane));
   }
   result.rms_before = std::sqrt(before2 / static_cast<double>(result.points));
   result.rms_after = std::sqrt(after2 / static_cast<double>(result.points));

@@ -168,8 +168,8 @@ class Work {
     const std::size_t keep =
         rotors_ ? overlap_begin(before.rows.time_ns, std::max(before.end, std::size_t{1}))
                 : before.end;
-    piece->rows = before.rows;
-    piece->rows.drop_front(keep);
+    piece->rows.clear();
+    piece->rows.append(before.rows, keep, before.rows.size());
     piece->done = before.end - keep;
     piece->first_row = before.first_row + keep;
     if (before.tracker) piece->tracker = std::make_unique<RotorTracker>(*before.tracker);

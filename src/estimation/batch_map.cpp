@@ -104,8 +104,8 @@ class ResidualSample {
   std::vector<std::size_t> begin_;  ///< of the ranges, among the sampled shots
 };
 
-/// Every n-th row.
-std::vector<ShotRange> spread_rows(std::size_t rows, std::size_t stride) {
+/// Every n-th row, as ranges of one.
+std::vector<ShotRange> every_nth_row(std::size_t rows, std::size_t stride) {
   std::vector<ShotRange> ranges;
   for (std::size_t row = 0; row < rows; row += stride) ranges.push_back({row, row + 1});
   return ranges;
@@ -125,9 +125,9 @@ class Iteration {
         knots_(std::move(knots)),
         frame_(frame),
         spread_(series,
-                spread_rows(series.size(),
-                            robust_stride(series.size(),
-                                          noise_is_held_ ? kRobustLevelShots : kRobustNoiseShots))),
+                every_nth_row(series.size(),
+                              robust_stride(series.size(), noise_is_held_ ? kRobustLevelShots
+                                                                          : kRobustNoiseShots))),
         outlier_(series.size(), 1) {}
 
   ShotWeights& weights() { return weights_; }

@@ -293,6 +293,7 @@ Solution run_pass(const AngleSeries& series, const FilterState& first, const Pri
 Solution run_ekf(const AngleSeries& series, const Start& start, const EkfOptions& options,
                  const Progress& progress) {
   if (series.size() == 0) throw EstimationError("no valid shot to estimate from");
+  require_columns(series);
   check_noise(equal_noise(options.angle_noise));
   require_at_least("passes", options.passes, 1);
   require_not_below("parameter walk", options.parameter_walk, 0, "rad/sqrt(s)");

@@ -10,11 +10,23 @@
 
 #include "risley/core/error.hpp"
 #include "risley/core/require.hpp"
+#include "risley/estimation/angle_series.hpp"
 #include "risley/estimation/free_parameters.hpp"
 #include "risley/estimation/initialisation.hpp"
 #include "risley/estimation/rotor_process.hpp"
 
 namespace risley::estimation {
+
+/// Columns of one length; beams and ranges may be left out.
+inline void require_columns(const AngleSeries& series) {
+  const std::size_t size = series.size();
+  require_length("azimuth", series.azimuth.size(), size);
+  require_length("zenith", series.zenith.size(), size);
+  require_length_or_none("beam", series.beam.size(), size);
+  require_length("azimuth_rounding_variance", series.azimuth_rounding_variance.size(), size);
+  require_length("zenith_rounding_variance", series.zenith_rounding_variance.size(), size);
+  require_length_or_none("range", series.range.size(), size);
+}
 
 /// A start with an angle and a speed for every prism of a train.
 inline void require_start(const Start& start, int prisms) {

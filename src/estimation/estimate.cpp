@@ -436,8 +436,8 @@ void hold_mute_emitters(const PrismTrain& train, Estimate& estimate) {
   if (estimate.series.largest_beam() >= train.emitters()) {
     check_beams(train, estimate.series.rows().beam, estimate.series.size());
   }
-  std::vector<std::size_t> shots(static_cast<std::size_t>(train.emitters()), 0);
-  for (std::size_t i = 0; i < estimate.series.size(); ++i) ++shots[estimate.series.beam(i)];
+  std::vector<std::size_t> shots = estimate.series.shots_of_beams();
+  shots.resize(static_cast<std::size_t>(train.emitters()), 0);
   for (int emitter = 0; emitter < train.emitters(); ++emitter) {
     if (shots[static_cast<std::size_t>(emitter)] > 0) continue;
     std::erase_if(estimate.free, [&](const FreeParameter& parameter) {

@@ -37,29 +37,13 @@ FilterState FilterReference::first_state(const Eigen::MatrixXd& covariance) cons
 
 Filter::Filter(const AngleSeries& series, const PrismTrain& train, const EkfOptions& options,
                const std::vector<RotorProcess>& process, const FilterReference* reference)
-    : options_(options),
-      prisms_(train.prisms()),
-      statics_(static_cast<Eigen::Index>(options.free.size())),
-      place_begin_{0} {
-  for (const FreeParameter& parameter : options.free) {
-    places_.insert(places_.end(), parameter.places.begin(), parameter.places.end());
-    place_begin_.push_back(static_cast<int>(places_.size()));
-  }
+    : options_(options), prisms_(train.prisms()), free_(options.free) {
   FilterArguments& a = arguments_;
-  a.parameters = train.parameters().data();
-  a.face_order = train.face_order().data();
-  a.prisms = train.prisms();
-  a.emitters = train.emitters();
-  a.free = static_cast<int>(statics_);
+  static_cast<TrainArguments&>(a) = arguments_of(train, free_);
+  static_cast<ShotArguments&>(a) = arguments_of(series);
   a.process = process.data();
   a.noise_variance = options.angle_noise * options.angle_noise;
   a.walk_variance = options.parameter_walk * options.parameter_walk;
-  a.time_ns = series.time_ns.data();
-  a.beam = series.beam.data();
-  a.azimuth = series.azimuth.data();
-  a.zenith = series.zenith.data();
-  a.azimuth_rounding_variance = series.azimuth_rounding_variance.data();
-  a.zenith_rounding_variance = series.zenith_rounding_variance.data();
   if (reference) {
     a.reference_parameters = reference->before.parameters.data();
     a.reference_angle = reference->angle.data();
@@ -68,20 +52,18 @@ Filter::Filter(const AngleSeries& series, const PrismTrain& train, const EkfOpti
 
 Eigen::MatrixXd Filter::wide_covariance() const {
   Eigen::VectorXd sigma(size());
-  for (Eigen::Index i = 0; i < statics_; ++i) {
+  for (Eigen::Index i = 0; i < statics(); ++i) {
     sigma[i] = options_.free[static_cast<std::size_t>(i)].prior_sigma;
   }
   for (Eigen::Index k = 0; k < prisms_; ++k) {
-    sigma[statics_ + 2 * k] = kLooseAngle;
-    sigma[statics_ + 2 * k + 1] = kLooseSpeed;
+    sigma[statics() + 2 * k] = kLooseAngle;
+    sigma[statics() + 2 * k + 1] = kLooseSpeed;
   }
   return sigma.array().square().matrix().asDiagonal();
 }
 
 std::size_t Filter::run(FilterState& state, const FilterRun& run, InstructionSet set) const {
   FilterArguments a = arguments_;
-  a.place_begin = place_begin_.data();
-  a.places = places_.data();
   a.run = run;
   a.mean = state.mean.data();
   a.covariance = state.covariance.data();

@@ -16,6 +16,7 @@
 #include "risley/estimation/solution.hpp"
 
 #include "estimation/filter_kernel.hpp"
+#include "estimation/kernel_call.hpp"
 
 namespace risley::estimation {
 
@@ -46,14 +47,16 @@ struct FilterReference {
 /// to stay where they are.                                                   [B21 section 2.4]
 class Filter {
  public:
+  Filter(const Filter&) = delete;
+  Filter& operator=(const Filter&) = delete;
   /// @param train    with the parameters that are not free
   /// @param process  of every rotor
   Filter(const AngleSeries& series, const PrismTrain& train, const EkfOptions& options,
          const std::vector<RotorProcess>& process, const FilterReference* reference);
 
   Eigen::Index prisms() const { return prisms_; }
-  Eigen::Index statics() const { return statics_; }
-  Eigen::Index size() const { return statics_ + 2 * prisms_; }
+  Eigen::Index statics() const { return arguments_.free; }
+  Eigen::Index size() const { return statics() + 2 * prisms_; }
 
   /// The covariance before any observation.
   Eigen::MatrixXd wide_covariance() const;
@@ -65,8 +68,8 @@ class Filter {
 
  private:
   const EkfOptions& options_;
-  Eigen::Index prisms_, statics_;
-  std::vector<int> place_begin_, places_;
+  Eigen::Index prisms_;
+  FreePlaces free_;
   FilterArguments arguments_;
 };
 

@@ -310,7 +310,7 @@ class FilterPass {
   /// while that one's beam waits for roots: this saves 5 % of a step.
   [[gnu::flatten]] bool take(std::size_t shot, std::size_t done) {
     advance_mean();
-    const int beam = a_.emitters > 1 ? a_.beam[shot] : 0;
+    const int beam = a_.beam != nullptr ? a_.beam[shot] : 0;
     const double* const values =
         a_.reference_parameters ? a_.reference_parameters : states_.mean + States::kRotors;
     for (std::size_t p = 0; p < places_; ++p) {

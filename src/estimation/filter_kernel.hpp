@@ -7,7 +7,8 @@
 
 #include "risley/core/instruction_set.hpp"
 #include "risley/estimation/rotor_process.hpp"
-#include "risley/optics/prism.hpp"
+
+#include "estimation/kernel_arguments.hpp"
 
 namespace risley::estimation {
 
@@ -30,25 +31,11 @@ struct FilterRun {
   bool keep_predicted = false;  ///< as they are before the shot's own observation
 };
 
-/// Plain arguments of one call, see optics/batch_kernel.hpp for why they are plain. States are the
-/// free parameters, then angle and speed of each rotor.
-struct FilterArguments {
-  const double* parameters = nullptr;     ///< whole flat vector
-  const FaceOrder* face_order = nullptr;  ///< [prisms]
-  int prisms = 0, emitters = 1;
-  int free = 0;                           ///< number of free parameters, at most one per place
-  const int* place_begin = nullptr;       ///< [free + 1], into places
-  const int* places = nullptr;            ///< of the flat vector
+/// Plain arguments of one call. States are the free parameters, then angle and speed of each rotor.
+struct FilterArguments : TrainArguments, ShotArguments {
   const RotorProcess* process = nullptr;  ///< [prisms]
   double noise_variance = 0;              ///< of both angles without rounding, rad^2
   double walk_variance = 0;               ///< of every free parameter, per second
-
-  const std::int64_t* time_ns = nullptr;
-  const std::uint8_t* beam = nullptr;  ///< each below emitters
-  const double* azimuth = nullptr;
-  const double* zenith = nullptr;
-  const float* azimuth_rounding_variance = nullptr;
-  const float* zenith_rounding_variance = nullptr;
 
   /// Where the model is linearised; nullptr: at the filter's own state.
   const double* reference_parameters = nullptr;  ///< [free]

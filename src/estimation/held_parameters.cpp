@@ -22,15 +22,11 @@ constexpr double kSampleShots = 20000;
 /// Held parameters that some answer depends on.
 std::vector<FreeParameter> telling_held(const Estimate& estimate, const sensors::Sensor& sensor) {
   std::vector<FreeParameter> held = uncertain_held(sensor, estimate.free);
-  const auto fires = [&](int emitter) {
-    for (std::size_t i = 0; i < estimate.series.size(); ++i) {
-      if (estimate.series.beam(i) == emitter) return true;
-    }
-    return false;
-  };
+  const std::vector<std::size_t> shots = estimate.series.shots_of_beams();
   std::erase_if(held, [&](const FreeParameter& parameter) {
     const int emitter = place::emitter(parameter.places.front(), sensor.prisms());
-    return emitter >= 0 && !fires(emitter);
+    const auto beam = static_cast<std::size_t>(emitter);
+    return emitter >= 0 && (beam >= shots.size() || shots[beam] == 0);
   });
   return held;
 }

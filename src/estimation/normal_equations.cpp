@@ -12,6 +12,7 @@
 
 #include "estimation/entry_checks.hpp"
 #include "estimation/in_order.hpp"
+#include "estimation/kernel_call.hpp"
 #include "estimation/normal_equations_kernel.hpp"
 
 namespace risley::estimation {
@@ -19,8 +20,9 @@ namespace {
 
 static_assert(kRotorStates == kStatesPerRotor);
 
-/// Knots that one task sums up: fixed, so that sums do not depend on the number of threads.
-constexpr std::size_t kBlockKnots = 1000;
+/// Knots that one task sums up: fixed, so that sums do not depend on the number of threads. Their
+/// shots, some ten thousand, stay in the processor's own memory.
+constexpr std::size_t kBlockKnots = 125;
 
 void require_knots(std::size_t shots, const RotorTrajectory& knots) {
   require_length("first_shot", knots.first_shot.size(), knots.size());
@@ -33,15 +35,11 @@ void require_knots(std::size_t shots, const RotorTrajectory& knots) {
 }
 
 void require_shots(const AngleSeries& series, const ShotColumns& columns) {
-  const std::size_t shots = series.size();
-  require_length("azimuth", series.azimuth.size(), shots);
-  require_length("zenith", series.zenith.size(), shots);
-  require_length("azimuth_rounding_variance", series.azimuth_rounding_variance.size(), shots);
-  require_length("zenith_rounding_variance", series.zenith_rounding_variance.size(), shots);
-  require_length_or_none("azimuth_residual", columns.azimuth_residual.size(), shots);
+  require_columns(series);
+  require_length_or_none("azimuth_residual", columns.azimuth_residual.size(), series.size());
   require_length("zenith_residual", columns.zenith_residual.size(),
                  columns.azimuth_residual.size());
-  require_length_or_none("outlier", columns.outlier.size(), shots);
+  require_length_or_none("outlier", columns.outlier.size(), series.size());
 }
 
 /// Whether some knot has a beam that the train does not have. Others are not looked at: a rotor is
@@ -49,7 +47,6 @@ void require_shots(const AngleSeries& series, const ShotColumns& columns) {
 bool has_unknown_beam(const AngleSeries& series, const RotorTrajectory& knots,
                       const PrismTrain& train) {
   if (series.beam.empty()) return false;
-  require_length("beam", series.beam.size(), series.size());
   std::size_t begin = series.size(), end = 0;
   for (std::size_t knot = 0; knot < knots.size(); ++knot) {
     begin = std::min(begin, knots.first_shot[knot]);
@@ -70,6 +67,7 @@ class BlockSums {
       : knots_(knots),
         equations_(equations),
         kernel_(RISLEY_KERNEL_COPIES(accumulate).at(set)),
+        places_(free),
         triangle_(free.size() * (free.size() + 1) / 2) {
     check_shape(train.shape());
     require_free(free, train);
@@ -78,10 +76,6 @@ class BlockSums {
     require_not_below("softening", weights.softening, 0);
     require_threshold("cut", weights.cut);
     const auto prisms = static_cast<std::size_t>(knots.prisms);
-    for (const FreeParameter& parameter : free) {
-      places_.insert(places_.end(), parameter.places.begin(), parameter.places.end());
-      place_begin_.push_back(static_cast<int>(places_.size()));
-    }
     equations.prisms = knots.prisms;
     equations.free = static_cast<int>(free.size());
     equations.curvature.resize(knots.size() * (prisms * (prisms + 1) / 2) * kTimePowers);
@@ -91,16 +85,10 @@ class BlockSums {
     gradients_.resize(blocks() * free.size());
     counts_.resize(blocks());
 
-    all_.parameters = train.parameters().data();
-    all_.face_order = train.face_order().data();
-    all_.prisms = knots.prisms;
-    all_.emitters = train.emitters();
-    all_.free = equations.free;
-    all_.place_begin = place_begin_.data();
-    all_.places = places_.data();
+    static_cast<TrainArguments&>(all_) = arguments_of(train, places_);
     all_.azimuth_noise_variance = weights.angle_noise.azimuth * weights.angle_noise.azimuth;
     all_.zenith_noise_variance = weights.angle_noise.zenith * weights.angle_noise.zenith;
-    all_.turned = std::any_of(places_.begin(), places_.end(), [&](int place) {
+    all_.turned = std::any_of(places_.places.begin(), places_.places.end(), [&](int place) {
       return place == place::frame_yaw(knots.prisms) || place == place::frame_pitch(knots.prisms);
     });
     all_.softening = weights.softening;
@@ -136,12 +124,7 @@ class BlockSums {
     mine.gradient = equations_.gradient.data() + own.begin * states;
     mine.static_hessian = hessians_.data() + block * triangle_;
     mine.static_gradient = gradients_.data() + block * free;
-    if (!rows.beam.empty()) mine.beam = rows.beam.data();
-    mine.time_ns = rows.time_ns.data();
-    mine.azimuth = rows.azimuth.data();
-    mine.zenith = rows.zenith.data();
-    mine.azimuth_rounding_variance = rows.azimuth_rounding_variance.data();
-    mine.zenith_rounding_variance = rows.zenith_rounding_variance.data();
+    static_cast<ShotArguments&>(mine) = arguments_of(rows);
     if (!columns.azimuth_residual.empty()) {
       mine.azimuth_residual = columns.azimuth_residual.data();
       mine.zenith_residual = columns.zenith_residual.data();
@@ -179,8 +162,8 @@ class BlockSums {
   const RotorTrajectory& knots_;
   NormalEquations& equations_;
   NormalEquationCounts (*kernel_)(const NormalEquationArguments&);
+  FreePlaces places_;
   std::size_t triangle_;
-  std::vector<int> place_begin_{0}, places_;
   NormalEquationArguments all_;
   std::vector<double> hessians_, gradients_;
   std::vector<NormalEquationCounts> counts_;

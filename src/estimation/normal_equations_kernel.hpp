@@ -6,7 +6,8 @@
 #include <cstdint>
 
 #include "risley/core/instruction_set.hpp"
-#include "risley/optics/prism.hpp"
+
+#include "estimation/kernel_arguments.hpp"
 
 namespace risley::estimation {
 
@@ -16,26 +17,14 @@ inline constexpr int kTimePowers = 5;
 /// Angle, speed and acceleration of a rotor at a knot.
 inline constexpr int kRotorStates = 3;
 
-/// Plain arguments of one call, see optics/batch_kernel.hpp for why they are plain. Columns are
-/// those of the whole series; the call works on knots [knot_begin, knot_end).
-struct NormalEquationArguments {
-  const double* parameters = nullptr;     ///< whole flat vector
-  const FaceOrder* face_order = nullptr;  ///< [prisms]
-  int prisms = 0, emitters = 1;
-  int free = 0;                      ///< number of free parameters, at most one per place
-  const int* place_begin = nullptr;  ///< [free + 1], into places
-  const int* places = nullptr;       ///< of the flat vector
+/// Plain arguments of one call. Columns are those of the whole series; the call works on knots
+/// [knot_begin, knot_end).
+struct NormalEquationArguments : TrainArguments, ShotArguments {
   std::size_t knot_begin = 0, knot_end = 0;
   const std::size_t* first_shot = nullptr;  ///< [knots]
   const std::size_t* last_shot = nullptr;   ///< [knots], one behind the last
   const std::int64_t* knot_time_ns = nullptr;
   const double* state = nullptr;  ///< [knots][prisms][3]; angles of any number of turns
-  const std::int64_t* time_ns = nullptr;
-  const std::uint8_t* beam = nullptr;  ///< [shots], each below emitters, or nullptr: all the first
-  const double* azimuth = nullptr;
-  const double* zenith = nullptr;
-  const float* azimuth_rounding_variance = nullptr;
-  const float* zenith_rounding_variance = nullptr;
   /// Without rounding, rad^2.
   double azimuth_noise_variance = 0, zenith_noise_variance = 0;
   bool turned = false;   ///< some place is one of the frame's turn

@@ -11,21 +11,13 @@
 
 #include "risley/core/require.hpp"
 
+#include "estimation/entry_checks.hpp"
+
 namespace risley::estimation {
 namespace {
 
 /// Numbers that a grid can have.
 constexpr std::size_t kGridNumbers = 1 << 16;
-
-void require_columns(const AngleSeries& series) {
-  const std::size_t size = series.size();
-  require_length("azimuth", series.azimuth.size(), size);
-  require_length("zenith", series.zenith.size(), size);
-  require_length_or_none("beam", series.beam.size(), size);
-  require_length("azimuth_rounding_variance", series.azimuth_rounding_variance.size(), size);
-  require_length("zenith_rounding_variance", series.zenith_rounding_variance.size(), size);
-  require_length_or_none("range", series.range.size(), size);
-}
 
 /// Appends rows [begin, end) of a column.
 template <class T>
@@ -33,6 +25,16 @@ void append_part(const std::vector<T>& from, std::size_t begin, std::size_t end,
                  std::vector<T>& to) {
   to.insert(to.end(), from.begin() + static_cast<std::ptrdiff_t>(begin),
             from.begin() + static_cast<std::ptrdiff_t>(end));
+}
+
+/// The parts of a range that lie in one block each.
+std::vector<ShotRange> blocks_of(ShotRange range) {
+  std::vector<ShotRange> blocks;
+  for (std::size_t begin = range.begin; begin < range.end; begin = blocks.back().end) {
+    const std::size_t next = (begin / PackedSeries::kBlockRows + 1) * PackedSeries::kBlockRows;
+    blocks.push_back({begin, std::min(range.end, next)});
+  }
+  return blocks;
 }
 
 /// Of times that do not decrease: the longest step of which all are multiples.
@@ -86,12 +88,14 @@ PackedSeries::Angles::Angles(const std::vector<double>& all, const Mostly<float>
     value = all;
     return;
   }
-  // What counts is that a number stands for one value; how it came about does not.
+  // What counts is that a number stands for one value; how it came about does not. Added to kWhole,
+  // a number is rounded to the integer in its lowest bits.
+  constexpr double kWhole = 0x1.8p52;
   const double per_step = 1.0 / std::sqrt(12.0 * static_cast<double>(grid.variance));
   number.resize(all.size());
   for (std::size_t i = 0; i < all.size(); ++i) {
     number[i] = static_cast<std::uint16_t>(
-        static_cast<std::int64_t>(std::nearbyint(std::clamp(all[i] * per_step, -1e15, 1e15))));
+        std::bit_cast<std::uint64_t>(std::clamp(all[i] * per_step, -1e15, 1e15) + kWhole));
     double& met = grid.value[number[i]];
     if (std::isnan(met)) met = all[i];
     if (std::bit_cast<std::uint64_t>(met) != std::bit_cast<std::uint64_t>(all[i])) {
@@ -102,11 +106,107 @@ PackedSeries::Angles::Angles(const std::vector<double>& all, const Mostly<float>
   }
 }
 
+void PackedSeries::Times::put(std::size_t first, std::size_t rows, std::int64_t* to) const {
+  const auto put_steps = [=, base = base, step = step](const auto& steps_of) {
+    for (std::size_t i = 0; i < rows; ++i) to[i] = base + step * std::int64_t{steps_of(i)};
+  };
+  if (!time_ns.empty()) {
+    std::copy_n(time_ns.data() + first, rows, to);
+  } else if (!few_steps.empty()) {
+    put_steps([steps = few_steps.data() + first](std::size_t i) { return steps[i]; });
+  } else if (!many_steps.empty()) {
+    put_steps([steps = many_steps.data() + first](std::size_t i) { return steps[i]; });
+  } else {
+    put_steps([first](std::size_t i) { return static_cast<std::int64_t>(first + i); });
+  }
+}
+
+template <class T>
+void PackedSeries::Mostly<T>::put(std::size_t first, std::size_t rows, T* to) const {
+  if (each.empty()) {
+    std::fill_n(to, rows, all);
+  } else {
+    std::copy_n(each.data() + first, rows, to);
+  }
+}
+
+void PackedSeries::Angles::put(std::size_t first, std::size_t rows, const Grid& grid,
+                               double* to) const {
+  if (number.empty()) {
+    std::copy_n(value.data() + first, rows, to);
+  } else {
+    const double* values = grid.value.data();
+    const std::uint16_t* numbers = number.data() + first;
+    for (std::size_t i = 0; i < rows; ++i) to[i] = values[numbers[i]];
+  }
+}
+
 std::pair<double, double> PackedSeries::angles(std::size_t row) const {
   const std::size_t block = row / kBlockRows, place = row % kBlockRows;
   if (block >= blocks_.size()) return {tail_.azimuth[place], tail_.zenith[place]};
   return {blocks_[block].azimuth.at(place, azimuth_grid_),
           blocks_[block].zenith.at(place, zenith_grid_)};
+}
+
+std::size_t PackedSeries::first_at(ShotRange range, std::int64_t wanted_ns) const {
+  require_rows("range", range.begin, range.end, size());
+  std::size_t begin = range.begin;
+  for (std::size_t left = range.size(); left > 0;) {
+    const std::size_t half = left / 2;
+    if (time_ns(begin + half) < wanted_ns) {
+      begin += half + 1;
+      left -= half + 1;
+    } else {
+      left = half;
+    }
+  }
+  return begin;
+}
+
+template <class See>
+void PackedSeries::visit(ShotRange range, const See& see) const {
+  require_rows("rows", range.begin, range.end, size());
+  for (std::size_t row = range.begin; row < range.end;) {
+    const std::size_t block = row / kBlockRows, first = row % kBlockRows;
+    const std::size_t rows = std::min(kBlockRows - first, range.end - row);
+    see(block < blocks_.size() ? &blocks_[block] : nullptr, first, rows, row - range.begin);
+    row += rows;
+  }
+}
+
+std::vector<std::size_t> PackedSeries::shots_of_beams() const {
+  std::vector<std::size_t> shots(largest_beam_ + std::size_t{1}, 0);
+  visit({0, size()}, [&](const Block* block, std::size_t, std::size_t rows, std::size_t) {
+    if (block != nullptr && block->beam.each.empty()) {
+      shots[block->beam.all] += rows;
+    } else {
+      for (const std::uint8_t beam : block != nullptr ? block->beam.each : tail_.beam)
+        ++shots[beam];
+    }
+  });
+  return shots;
+}
+
+void PackedSeries::times(ShotRange range, std::vector<std::int64_t>& out) const {
+  out.resize(range.size());
+  visit(range, [&](const Block* block, std::size_t first, std::size_t rows, std::size_t at) {
+    if (block != nullptr) {
+      block->time.put(first, rows, out.data() + at);
+    } else {
+      std::copy_n(tail_.time_ns.data() + first, rows, out.data() + at);
+    }
+  });
+}
+
+void PackedSeries::beams(ShotRange range, std::vector<std::uint8_t>& out) const {
+  out.resize(range.size());
+  visit(range, [&](const Block* block, std::size_t first, std::size_t rows, std::size_t at) {
+    if (block != nullptr) {
+      block->beam.put(first, rows, out.data() + at);
+    } else {
+      std::copy_n(tail_.beam.data() + first, rows, out.data() + at);
+    }
+  });
 }
 
 AngleSeries PackedSeries::rows(ShotRange range) const {
@@ -116,73 +216,31 @@ AngleSeries PackedSeries::rows(ShotRange range) const {
 }
 
 void PackedSeries::rows(ShotRange range, AngleSeries& out) const {
-  require_rows("rows", range.begin, range.end, size());
-  const std::size_t count = range.size();
-  out.time_ns.resize(count);
-  out.azimuth.resize(count);
-  out.zenith.resize(count);
-  out.beam.resize(count);
-  out.azimuth_rounding_variance.resize(count);
-  out.zenith_rounding_variance.resize(count);
-  out.range.resize(has_ranges_ ? count : 0);
-  for (std::size_t row = range.begin, at = 0; row < range.end;) {
-    const std::size_t first = row % kBlockRows;
-    const std::size_t rows = std::min(kBlockRows - first, range.end - row);
-    const auto put = [&](const auto& value, auto& column) {
-      auto* const to = column.data() + at;
-      for (std::size_t i = 0; i < rows; ++i) to[i] = value(first + i);
+  times(range, out.time_ns);
+  beams(range, out.beam);
+  out.azimuth.resize(range.size());
+  out.zenith.resize(range.size());
+  out.azimuth_rounding_variance.resize(range.size());
+  out.zenith_rounding_variance.resize(range.size());
+  out.range.resize(has_ranges_ ? range.size() : 0);
+  visit(range, [&](const Block* block, std::size_t first, std::size_t rows, std::size_t at) {
+    const auto copy = [&](const auto& from, auto& to) {
+      std::copy_n(from.data() + first, rows, to.data() + at);
     };
-    const auto copy = [&](const auto& from, auto& column) {
-      std::copy_n(from.begin() + static_cast<std::ptrdiff_t>(first), rows,
-                  column.begin() + static_cast<std::ptrdiff_t>(at));
-    };
-    const auto unpack = [&](const auto& mostly, auto& column) {
-      if (!mostly.each.empty()) return copy(mostly.each, column);
-      std::fill_n(column.begin() + static_cast<std::ptrdiff_t>(at), rows, mostly.all);
-    };
-    const auto unpack_times = [&](const Times& times, auto& column) {
-      if (!times.time_ns.empty()) return copy(times.time_ns, column);
-      const auto put_steps = [&](const auto& steps_of) {
-        const std::int64_t base = times.base, step = times.step;
-        put([&](std::size_t i) { return base + step * std::int64_t{steps_of(i)}; }, column);
-      };
-      if (!times.few_steps.empty()) {
-        const std::uint16_t* steps = times.few_steps.data();
-        put_steps([=](std::size_t i) { return steps[i]; });
-      } else if (!times.many_steps.empty()) {
-        const std::uint32_t* steps = times.many_steps.data();
-        put_steps([=](std::size_t i) { return steps[i]; });
-      } else {
-        put_steps([](std::size_t i) { return static_cast<std::int64_t>(i); });
-      }
-    };
-    const auto unpack_angles = [&](const Angles& angles, const Grid& grid, auto& column) {
-      if (angles.number.empty()) return copy(angles.value, column);
-      const double* value = grid.value.data();
-      const std::uint16_t* number = angles.number.data();
-      put([=](std::size_t i) { return value[number[i]]; }, column);
-    };
-    if (row / kBlockRows < blocks_.size()) {
-      const Block& block = blocks_[row / kBlockRows];
-      unpack_times(block.time, out.time_ns);
-      unpack_angles(block.azimuth, azimuth_grid_, out.azimuth);
-      unpack_angles(block.zenith, zenith_grid_, out.zenith);
-      unpack(block.beam, out.beam);
-      unpack(block.azimuth_variance, out.azimuth_rounding_variance);
-      unpack(block.zenith_variance, out.zenith_rounding_variance);
-      if (has_ranges_) copy(block.range, out.range);
+    if (block != nullptr) {
+      block->azimuth.put(first, rows, azimuth_grid_, out.azimuth.data() + at);
+      block->zenith.put(first, rows, zenith_grid_, out.zenith.data() + at);
+      block->azimuth_variance.put(first, rows, out.azimuth_rounding_variance.data() + at);
+      block->zenith_variance.put(first, rows, out.zenith_rounding_variance.data() + at);
+      if (has_ranges_) copy(block->range, out.range);
     } else {
-      copy(tail_.time_ns, out.time_ns);
       copy(tail_.azimuth, out.azimuth);
       copy(tail_.zenith, out.zenith);
-      copy(tail_.beam, out.beam);
       copy(tail_.azimuth_rounding_variance, out.azimuth_rounding_variance);
       copy(tail_.zenith_rounding_variance, out.zenith_rounding_variance);
       if (has_ranges_) copy(tail_.range, out.range);
     }
-    row += rows;
-    at += rows;
-  }
+  });
 }
 
 void PackedSeries::append(const AngleSeries& series) {
@@ -205,21 +263,44 @@ void PackedSeries::append(const AngleSeries& series) {
   }
 }
 
-void PackedSeries::append(const PackedSeries& other, std::size_t row) {
-  require_place("row", row, other.size());
+void PackedSeries::append(const PackedSeries& other, std::span<const std::size_t> rows) {
+  for (const std::size_t row : rows) require_place("row", row, other.size());
+  if (rows.empty()) return;
   if (size() == 0) has_ranges_ = other.has_ranges_;
-  const std::size_t place = row % kBlockRows;
-  if (row / kBlockRows < other.blocks_.size()) {
-    const Block& block = other.blocks_[row / kBlockRows];
-    tail_.append(block.time.at(place), block.azimuth.at(place, other.azimuth_grid_),
-                 block.zenith.at(place, other.zenith_grid_), block.beam.at(place),
-                 block.azimuth_variance.at(place), block.zenith_variance.at(place));
-    if (has_ranges_) tail_.range.push_back(block.range[place]);
-  } else {
-    tail_.append(other.tail_, place);
+  require_length("range", other.has_ranges_ ? rows.size() : 0, has_ranges_ ? rows.size() : 0);
+  while (!rows.empty()) {
+    // Those of one block, as many as the tail still takes.
+    const std::size_t block = rows.front() / kBlockRows, before = tail_.size();
+    const std::size_t most = std::min(rows.size(), kBlockRows - before);
+    std::size_t count = 1;
+    while (count < most && rows[count] / kBlockRows == block) ++count;
+    const auto gather = [&](const auto& value_at, auto& column) {
+      column.resize(before + count);
+      auto* const to = column.data() + before;
+      for (std::size_t i = 0; i < count; ++i) to[i] = value_at(rows[i] % kBlockRows);
+    };
+    if (block < other.blocks_.size()) {
+      const Block& from = other.blocks_[block];
+      const auto angles = [&](const Angles& all, const Grid& grid) {
+        return [&](std::size_t i) { return all.at(i, grid); };
+      };
+      const auto each = [](const auto& all) { return [&](std::size_t i) { return all.at(i); }; };
+      gather(each(from.time), tail_.time_ns);
+      gather(angles(from.azimuth, other.azimuth_grid_), tail_.azimuth);
+      gather(angles(from.zenith, other.zenith_grid_), tail_.zenith);
+      gather(each(from.beam), tail_.beam);
+      gather(each(from.azimuth_variance), tail_.azimuth_rounding_variance);
+      gather(each(from.zenith_variance), tail_.zenith_rounding_variance);
+      if (has_ranges_) gather(each(from.range), tail_.range);
+    } else {
+      for (const std::size_t row : rows.first(count)) tail_.append(other.tail_, row % kBlockRows);
+    }
+    for (std::size_t i = before; i < tail_.size(); ++i) {
+      largest_beam_ = std::max(largest_beam_, tail_.beam[i]);
+    }
+    if (tail_.size() == kBlockRows) pack_tail();
+    rows = rows.subspan(count);
   }
-  largest_beam_ = std::max(largest_beam_, tail_.beam.back());
-  if (tail_.size() == kBlockRows) pack_tail();
 }
 
 void PackedSeries::change(const std::function<void(AngleSeries& rows)>& change_rows) {
@@ -268,28 +349,40 @@ std::vector<ShotRange> stretches(const PackedSeries& series, double longest_gap)
   std::vector<ShotRange> ranges;
   const auto longest_ns = static_cast<std::int64_t>(longest_gap * 1e9);
   std::int64_t before = 0;
-  for (std::size_t i = 0; i < series.size(); ++i) {
-    const std::int64_t time = series.time_ns(i);
-    if (i == 0 || time <= before || time - before > longest_ns) ranges.push_back({i, i});
-    ranges.back().end = i + 1;
-    before = time;
+  std::vector<std::int64_t> times;
+  for (const ShotRange& some : blocks_of({0, series.size()})) {
+    series.times(some, times);
+    for (std::size_t i = some.begin; const std::int64_t time : times) {
+      if (i == 0 || time <= before || time - before > longest_ns) ranges.push_back({i, i});
+      ranges.back().end = ++i;
+      before = time;
+    }
   }
   return ranges;
 }
 
 PackedSeries thinned(const PackedSeries& series, double rate, std::vector<ShotRange>& ranges) {
-  PackedSeries rows;
+  PackedSeries result;
   TickSampler ticks(rate);
+  std::vector<std::int64_t> times;
+  std::vector<std::uint8_t> beams;
+  std::vector<std::size_t> taken;
   for (ShotRange& range : ranges) {
     require_rows("range", range.begin, range.end, series.size());
-    const std::size_t begin = rows.size();
+    const std::size_t begin = result.size();
     if (range.size() > 0) ticks.restart(series.time_ns(range.begin));
-    for (std::size_t i = range.begin; i < range.end; ++i) {
-      if (ticks.take(series.time_ns(i), series.beam(i))) rows.append(series, i);
+    for (const ShotRange& some : blocks_of(range)) {
+      series.times(some, times);
+      series.beams(some, beams);
+      taken.clear();
+      for (std::size_t i = 0; i < times.size(); ++i) {
+        if (ticks.take(times[i], beams[i])) taken.push_back(some.begin + i);
+      }
+      result.append(series, taken);
     }
-    range = {begin, rows.size()};
+    range = {begin, result.size()};
   }
-  return rows;
+  return result;
 }
 
 }  // namespace risley::estimation

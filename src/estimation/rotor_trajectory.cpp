@@ -82,12 +82,8 @@ RotorTrajectory make_knots(const PackedSeries& series, std::span<const ShotRange
       const std::int64_t first_ns = series.time_ns(i);
       const std::int64_t slot_end = first_ns - (first_ns - origin) % interval_ns + interval_ns;
       knots.first_shot.push_back(i);
-      std::int64_t last_ns = first_ns;
-      for (++i; i < range.end; ++i) {
-        const std::int64_t time_ns = series.time_ns(i);
-        if (time_ns >= slot_end) break;
-        last_ns = time_ns;
-      }
+      i = series.first_at({i + 1, range.end}, slot_end);
+      const std::int64_t last_ns = series.time_ns(i - 1);
       knots.last_shot.push_back(i);
       knots.time_ns.push_back(first_ns + (last_ns - first_ns) / 2);
     }

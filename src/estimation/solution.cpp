@@ -151,29 +151,21 @@ RotorStates states_of_knots(const Solution& solution, const PackedSeries& series
   const RotorTrajectory& t = solution.trajectory;
   RotorStates states;
   states.resize(t.prisms, t.size());
-  PackedSeries shots;
   std::vector<std::size_t> shot_of;
   std::vector<std::vector<double>> angles(static_cast<std::size_t>(t.prisms));
   for (std::size_t knot = 0; knot < t.size(); ++knot) {
     // The first shot at or behind the knot, or its last.
-    std::size_t shot = t.first_shot[knot];
-    for (std::size_t left = t.last_shot[knot] - shot; left > 1;) {
-      const std::size_t half = left / 2;
-      if (series.time_ns(shot + half - 1) < t.time_ns[knot]) {
-        shot += half;
-        left -= half;
-      } else {
-        left = half;
-      }
-    }
+    const ShotRange own{t.first_shot[knot], t.last_shot[knot]};
+    const std::size_t shot = std::min(series.first_at(own, t.time_ns[knot]), own.end - 1);
     const std::int64_t time_ns = series.time_ns(shot);
     fill_state(solution, time_ns, knot, shot, knot, states);
     for (std::size_t k = 0; k < angles.size(); ++k) {
       angles[k].push_back(KnotMotion(t, knot, k).at(seconds_from(t, knot, time_ns)));
     }
-    shots.append(series, shot);
     shot_of.push_back(shot);
   }
+  PackedSeries shots;
+  shots.append(series, shot_of);
   ShotResiduals residuals =
       residuals_at(solution, shots.rows(), angles, [&](std::size_t knot) { return shot_of[knot]; });
   states.azimuth_residual = std::move(residuals.azimuth);

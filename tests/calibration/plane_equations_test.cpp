@@ -250,15 +250,12 @@ INSTANTIATE_TEST_SUITE_P(FaceOrders, PlaneEquationsOfATrain,
 
 /// The shots of one emitter, as its own.
 RangedShots shots_of_emitter(const RangedShots& shots, int beam) {
-  RangedShots own;
-  own.resize(shots.prisms(), 0);
+  std::vector<std::size_t> rows;
   for (std::size_t i = 0; i < shots.size(); ++i) {
-    if (shots.beam[i] != beam) continue;
-    const std::size_t row = own.size();
-    own.resize(shots.prisms(), row + 1);
-    own.set_row(row, shots, i);
-    own.beam[row] = 0;
+    if (shots.beam[i] == beam) rows.push_back(i);
   }
+  RangedShots own = rows_of(shots, rows);
+  own.beam.assign(own.size(), 0);
   return own;
 }
 

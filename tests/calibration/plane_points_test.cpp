@@ -54,9 +54,8 @@ TEST(SpreadRows, FallIntoStepWithNoNumberOfBeams) {
 }
 
 TEST(RangedShots, RowsAreCopiedWhole) {
-  RangedShots from, to;
+  RangedShots from;
   from.resize(3, 2);
-  to.resize(3, 4);
   EXPECT_EQ(from.size(), 2u);
   EXPECT_EQ(from.prisms(), 3);
   EXPECT_EQ(from.angle_covariance.size(), 6u);
@@ -67,14 +66,21 @@ TEST(RangedShots, RowsAreCopiedWhole) {
     from.angle_covariance[k] = {2.0F, 3.0F + static_cast<float>(k)};
   }
   from.range = {7, 8};
-  to.set_row(2, from, 1);
+  from.beam = {4, 5};
+  const RangedShots to = rows_of(from, {1, 0, 1});
   for (std::size_t k = 0; k < 3; ++k) {
-    EXPECT_THAT(to.rotation_angle[k], ElementsAre(0, 0, 1.1 + static_cast<double>(k), 0));
+    EXPECT_THAT(to.rotation_angle[k],
+                ElementsAre(1.1 + static_cast<double>(k), 0.1 + static_cast<double>(k),
+                            1.1 + static_cast<double>(k)));
   }
   for (std::size_t k = 0; k < 6; ++k) {
-    EXPECT_THAT(to.angle_covariance[k], ElementsAre(0, 0, 3.0F + static_cast<float>(k), 0));
+    EXPECT_THAT(to.angle_covariance[k],
+                ElementsAre(3.0F + static_cast<float>(k), 2.0F, 3.0F + static_cast<float>(k)));
   }
-  EXPECT_THAT(to.range, ElementsAre(0, 0, 8, 0));
+  EXPECT_THAT(to.range, ElementsAre(8, 7, 8));
+  EXPECT_THAT(to.beam, ElementsAre(5, 4, 5));
+  from.beam.clear();
+  EXPECT_THAT(rows_of(from, {1, 0}).beam, ElementsAre(0, 0));
 }
 
 constexpr std::size_t kShots = 200;

@@ -2,9 +2,12 @@
 // SPDX-License-Identifier: MIT
 #include "risley/estimation/packed_series.hpp"
 
+#include <array>
 #include <cmath>
 #include <numbers>
+#include <numeric>
 #include <random>
+#include <span>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -47,14 +50,26 @@ void expect_kept(const AngleSeries& series) {
   expect_same(packed.rows(), series);
   const std::size_t begin = PackedSeries::kBlockRows - 3, end = series.size() - 5;
   expect_same(packed.rows({begin, end}), series, begin);
-  PackedSeries single;
+  std::vector<std::int64_t> times;
+  std::vector<std::uint8_t> beams;
+  packed.times({begin, end}, times);
+  packed.beams({begin, end}, beams);
+  const AngleSeries part = rows_of(series, begin, end);
+  EXPECT_EQ(times, part.time_ns);
+  EXPECT_EQ(beams, part.beam);
+  PackedSeries single, all;
+  std::vector<std::size_t> rows(series.size());
+  std::iota(rows.begin(), rows.end(), 0);
   for (std::size_t i = 0; i < series.size(); ++i) {
     EXPECT_EQ(packed.time_ns(i), series.time_ns[i]);
     EXPECT_EQ(packed.beam(i), series.beam[i]);
     EXPECT_EQ(packed.angles(i), std::pair(series.azimuth[i], series.zenith[i]));
-    single.append(packed, i);
+    single.append(packed, std::array{i});
   }
   expect_same(single.rows(), series);
+  all.append(packed, std::span(rows).first(10));  // so that its blocks are others
+  all.append(packed, std::span(rows).subspan(10));
+  expect_same(all.rows(), series);
 }
 
 TEST(PackedSeries, KeepsAnglesInWholeSteps) { expect_kept(even_shots()); }
@@ -101,6 +116,9 @@ TEST(PackedSeries, KeepsEmittersAndRanges) {
   const PackedSeries packed(series);
   EXPECT_TRUE(packed.has_ranges());
   EXPECT_EQ(packed.largest_beam(), 5);
+  std::vector<std::size_t> shots(6, 0);
+  for (const std::uint8_t beam : series.beam) ++shots[beam];
+  EXPECT_EQ(packed.shots_of_beams(), shots);
   EXPECT_EQ(packed.duration(), series.duration());
 }
 
@@ -113,6 +131,48 @@ TEST(PackedSeries, GrowsPieceByPiece) {
   }
   expect_same(packed.rows(), series);
   EXPECT_FALSE(packed.has_ranges());
+}
+
+TEST(PackedSeries, PicksRowsInAnyOrder) {
+  const AngleSeries series = even_shots();
+  const std::vector<std::size_t> rows{5, 3, kRows - 1, 5000, 5001, 4095, 4096, 5};
+  PackedSeries picked;
+  picked.append(PackedSeries(series), rows);
+  AngleSeries expected;
+  for (const std::size_t row : rows) expected.append(series, row);
+  expect_same(picked.rows(), expected);
+}
+
+TEST(PackedSeries, FindsTheFirstRowAtATime) {
+  const PackedSeries packed(even_shots());
+  const std::int64_t time = packed.time_ns(5000);
+  EXPECT_EQ(packed.first_at({0, kRows}, time), 5000);
+  EXPECT_EQ(packed.first_at({0, kRows}, time - 1), 5000);
+  EXPECT_EQ(packed.first_at({0, kRows}, time + 1), 5001);
+  EXPECT_EQ(packed.first_at({5002, kRows}, time), 5002);
+  EXPECT_EQ(packed.first_at({0, 4000}, time), 4000);
+  EXPECT_EQ(packed.first_at({7, 7}, time), 7);
+}
+
+TEST(PackedSeries, IsThinnedByTicksAndBeams) {
+  AngleSeries series = even_shots();
+  for (std::size_t i = 0; i < series.size(); ++i) series.beam[i] = static_cast<std::uint8_t>(i % 6);
+  for (std::size_t i = 9000; i < series.size(); ++i) series.time_ns[i] += 77'000;  // shots are lost
+  std::vector<ShotRange> ranges{{3, 9000}, {9000, 9000}, {9001, kRows}};
+  const std::vector<ShotRange> whole = ranges;
+  const PackedSeries found = thinned(series, 7000.0, ranges);
+  AngleSeries expected;
+  TickSampler ticks(7000.0);
+  for (std::size_t k = 0; k < whole.size(); ++k) {
+    EXPECT_EQ(ranges[k].begin, expected.size());
+    if (whole[k].size() > 0) ticks.restart(series.time_ns[whole[k].begin]);
+    for (std::size_t i = whole[k].begin; i < whole[k].end; ++i) {
+      if (ticks.take(series.time_ns[i], series.beam[i])) expected.append(series, i);
+    }
+    EXPECT_EQ(ranges[k].end, expected.size());
+  }
+  EXPECT_GT(expected.size(), 800);
+  expect_same(found.rows(), expected);
 }
 
 TEST(PackedSeries, ChangesRows) {
@@ -130,6 +190,14 @@ TEST(PackedSeries, RefusesColumnsOfOtherLengthsAndRowsThatAreNotThere) {
   series.range = {1, 2, 3, 4};
   PackedSeries other(series);
   EXPECT_EQ(refusal([&] { other.append(even_shots(4)); }), "range has 0 values, expected 4");
+  EXPECT_EQ(refusal([&] { other.append(packed, std::array<std::size_t, 1>{0}); }),
+            "range has 0 values, expected 1");
+  EXPECT_EQ(refusal([&] { PackedSeries().append(packed, std::array<std::size_t, 1>{4}); }),
+            "row = 4, allowed 0 to 3");
+  EXPECT_EQ(refusal([&] {
+              return packed.first_at({2, 5}, 0);
+            }),
+            "range = [2, 5), allowed within [0, 4)");
   series.zenith.pop_back();
   EXPECT_EQ(refusal([&] { PackedSeries{series}; }), "zenith has 3 values, expected 4");
 }

@@ -318,11 +318,8 @@ PrismTrain adjusted_with_true_labels(const WallRecording& walls) {
   for (std::size_t i = 0; i < walls.size(); ++i) rows[walls.hit(i).surface].push_back(i);
   for (std::size_t p = 0; p < planes.size(); ++p) {
     if (rows[p].empty()) continue;
-    const auto shots = std::make_shared<calibration::RangedShots>();
-    shots->resize(recording.shots.prisms(), rows[p].size());
-    for (std::size_t i = 0; i < rows[p].size(); ++i) {
-      shots->set_row(i, recording.shots, rows[p][i]);
-    }
+    const auto shots =
+        std::make_shared<const calibration::RangedShots>(rows_of(recording.shots, rows[p]));
     const Plane& plane = planes[p].plane;
     problem.views.push_back({0, problem.walls.size(), plane.distance, noise * noise, shots});
     problem.walls.push_back({planes[p].name, plane.normal, plane.normal, -1});

@@ -30,8 +30,6 @@ struct RangedShots {
   int prisms() const { return static_cast<int>(rotation_angle.size()); }
   /// @throws InvalidArgument for a number of prisms that no sensor has
   void resize(int prisms, std::size_t shots);
-  /// Copies one row of other shots to a row of these.
-  void set_row(std::size_t row, const RangedShots& from, std::size_t from_row);
 };
 
 /// Some shots by their rows. @throws InvalidArgument for a row that is not there

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -47,17 +48,26 @@ class PackedSeries {
   /// Of a series without resets, s.
   double duration() const { return size() == 0 ? 0.0 : time(size() - 1); }
 
+  /// First row at or after a time in a range whose times ascend; the range's end where there is
+  /// none.
+  std::size_t first_at(ShotRange range, std::int64_t time_ns) const;
+  /// How many shots each emitter fired, [largest_beam() + 1].
+  std::vector<std::size_t> shots_of_beams() const;
+
   /// Rows [begin, end).
   AngleSeries rows(ShotRange range) const;
   /// The same into a series whose memory is used again.
   void rows(ShotRange range, AngleSeries& out) const;
   /// All rows.
   AngleSeries rows() const { return rows({0, size()}); }
+  /// The same, times and emitters alone.
+  void times(ShotRange range, std::vector<std::int64_t>& out) const;
+  void beams(ShotRange range, std::vector<std::uint8_t>& out) const;
 
   /// Appends all rows of a series. @throws InvalidArgument where columns have other lengths
   void append(const AngleSeries& series);
-  /// Appends one row of another series.
-  void append(const PackedSeries& other, std::size_t row);
+  /// Appends some rows of another series.
+  void append(const PackedSeries& other, std::span<const std::size_t> rows);
   /// Changes all rows, some at a time.
   void change(const std::function<void(AngleSeries& rows)>& change_rows);
 
@@ -78,6 +88,7 @@ class PackedSeries {
                             : !many_steps.empty() ? std::int64_t{many_steps[i]}
                                                   : static_cast<std::int64_t>(i));
     }
+    void put(std::size_t first, std::size_t rows, std::int64_t* to) const;
   };
   /// One value, or one per row.
   template <class T>
@@ -86,6 +97,7 @@ class PackedSeries {
     std::vector<T> each;
 
     T at(std::size_t i) const { return each.empty() ? all : each[i]; }
+    void put(std::size_t first, std::size_t rows, T* to) const;
   };
   /// What the numbers of angles that are multiples of a step stand for.
   struct Grid {
@@ -102,6 +114,7 @@ class PackedSeries {
     double at(std::size_t i, const Grid& grid) const {
       return number.empty() ? value[i] : grid.value[number[i]];
     }
+    void put(std::size_t first, std::size_t rows, const Grid& grid, double* to) const;
   };
   struct Block {
     Times time;
@@ -112,6 +125,9 @@ class PackedSeries {
   };
 
   void pack_tail();
+  /// Calls see(block or null for the tail, its first row, rows, rows of the range before them).
+  template <class See>
+  void visit(ShotRange range, const See& see) const;
 
   std::vector<Block> blocks_;
   Grid azimuth_grid_, zenith_grid_;

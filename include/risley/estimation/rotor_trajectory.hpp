@@ -77,8 +77,8 @@ struct RotorTrajectory {
   double covariance_entry(std::size_t knot, std::size_t row, std::size_t column) const;
 };
 
-/// Knots for the shots of some stretches, on a regular grid from each stretch's first shot and only
-/// where there are shots; states are zero.
+/// Knots for the shots of some stretches, in which times ascend, on a regular grid from each
+/// stretch's first shot and only where there are shots; states are zero.
 RotorTrajectory make_knots(const PackedSeries& series, std::span<const ShotRange> ranges,
                            int prisms, double interval = kKnotInterval);
 
