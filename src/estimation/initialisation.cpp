@@ -11,6 +11,7 @@
 
 #include <Eigen/Geometry>
 #include <fmt/format.h>
+#include <tbb/parallel_for.h>
 
 #include "risley/algebra/symmetric.hpp"
 #include "risley/core/direction.hpp"
@@ -415,8 +416,11 @@ std::vector<Answer> answers_of(const StartWindow& window, const std::vector<Tria
   std::vector<Answer> answers;
   for (const Trial& trial : trials) {
     if (trial.lines.unexplained > std::max(kHopeless * least, kSecondOrder)) continue;
-    answers.push_back(window.answer(trial, kEnoughShots, frame_is_free));
+    answers.emplace_back().trial = trial;
   }
+  tbb::parallel_for(std::size_t{0}, answers.size(), [&](std::size_t i) {
+    answers[i] = window.answer(answers[i].trial, kEnoughShots, frame_is_free);
+  });
   sort_by_likelihood(answers, window.size(kEnoughShots));
   return answers;
 }

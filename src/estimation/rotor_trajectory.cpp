@@ -54,16 +54,19 @@ std::array<double, 5> RotorTrajectory::angle_covariance_terms(std::size_t knot, 
 
 double RotorTrajectory::angle_covariance(std::size_t knot, std::size_t a, std::size_t b,
                                          double seconds) const {
-  const std::array<double, 5> c = angle_covariance_terms(knot, a, b);
-  return c[0] + seconds * (c[1] + seconds * (c[2] + seconds * (c[3] + seconds * c[4])));
+  return polynomial_at(angle_covariance_terms(knot, a, b), seconds);
+}
+
+std::array<double, 3> RotorTrajectory::speed_variance_terms(std::size_t knot,
+                                                            std::size_t rotor) const {
+  require_entry(*this, knot, rotor);
+  const std::size_t speed = kStatesPerRotor * rotor + 1;
+  return {covariance_entry(knot, speed, speed), 2.0 * covariance_entry(knot, speed, speed + 1),
+          covariance_entry(knot, speed + 1, speed + 1)};
 }
 
 double RotorTrajectory::speed_variance(std::size_t knot, std::size_t rotor, double seconds) const {
-  require_entry(*this, knot, rotor);
-  const std::size_t speed = kStatesPerRotor * rotor + 1;
-  return covariance_entry(knot, speed, speed) +
-         seconds * (2.0 * covariance_entry(knot, speed, speed + 1) +
-                    seconds * covariance_entry(knot, speed + 1, speed + 1));
+  return polynomial_at(speed_variance_terms(knot, rotor), seconds);
 }
 
 RotorTrajectory make_knots(const PackedSeries& series, std::span<const ShotRange> ranges,

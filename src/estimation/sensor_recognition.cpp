@@ -10,6 +10,7 @@
 #include <utility>
 
 #include <Eigen/Core>
+#include <tbb/parallel_for_each.h>
 
 #include "risley/core/angle.hpp"
 #include "risley/core/direction.hpp"
@@ -182,8 +183,8 @@ class LineMatcher {
 
   /// Tries every candidate in a frame. @return the optical axis of the best one there
   Complex try_frame(const AngleSeries& shots, const Eigen::Matrix3d& frame) {
-    const LineSearch search(in_frame(shots, frame));
-    std::map<std::vector<double>, std::vector<RotorLines>> known;  // by ascending speeds
+    const std::map<std::vector<double>, std::vector<RotorLines>> known =
+        lines_near_speeds(LineSearch(in_frame(shots, frame)));
     double least = std::numeric_limits<double>::infinity();
     Complex axis = 0;
     for (SensorMatch& match : matches_) {
@@ -194,24 +195,11 @@ class LineMatcher {
           for (Complex& one : emitters) one = std::conj(one);
         }
         for (const sensors::Sensor& sensor : candidate.combinations) {
-          // Ascending speeds, so that all ways to say the same are looked for once.
-          std::vector<std::pair<double, double>> rotors;  // speed, amplitude
-          for (std::size_t k = 0; k < sensor.angular_velocity.size(); ++k) {
-            rotors.emplace_back(mirrored ? -sensor.angular_velocity[k] : sensor.angular_velocity[k],
-                                candidate.lines.amplitude[k]);
-          }
-          std::sort(rotors.begin(), rotors.end());
-          std::vector<double> speeds, amplitudes;
-          for (const auto& [speed, amplitude] : rotors) {
-            speeds.push_back(speed);
-            amplitudes.push_back(amplitude);
-          }
-          const auto [place, is_new] = known.try_emplace(speeds);
-          if (is_new) place->second = search.near(speeds, kSpeedShare, kMostMinima);
-          for (const RotorLines& lines : place->second) {
+          const ExpectedLines expected = expected_lines(sensor, candidate.lines, mirrored);
+          for (const RotorLines& lines : known.at(expected.speeds)) {
             const EmitterFit fit = emitter_fit(lines, emitters, beams_);
             const double misfit =
-                std::sqrt(std::max(0.0, unexplained_with(lines, amplitudes) + fit.miss));
+                std::sqrt(std::max(0.0, unexplained_with(lines, expected.amplitudes) + fit.miss));
             if (misfit < least) {
               least = misfit;
               axis = lines.constant;
@@ -243,6 +231,42 @@ class LineMatcher {
     std::vector<sensors::Sensor> combinations;
     NominalLines lines;
   };
+  /// By ascending speeds, so that all ways to say the same are looked for once.
+  struct ExpectedLines {
+    std::vector<double> speeds, amplitudes;
+  };
+
+  static ExpectedLines expected_lines(const sensors::Sensor& sensor, const NominalLines& lines,
+                                      bool mirrored) {
+    std::vector<std::pair<double, double>> rotors;  // speed, amplitude
+    for (std::size_t k = 0; k < sensor.angular_velocity.size(); ++k) {
+      rotors.emplace_back(mirrored ? -sensor.angular_velocity[k] : sensor.angular_velocity[k],
+                          lines.amplitude[k]);
+    }
+    std::sort(rotors.begin(), rotors.end());
+    ExpectedLines expected;
+    for (const auto& [speed, amplitude] : rotors) {
+      expected.speeds.push_back(speed);
+      expected.amplitudes.push_back(amplitude);
+    }
+    return expected;
+  }
+
+  /// The lines of a recording near the speeds that candidates have, by these.
+  std::map<std::vector<double>, std::vector<RotorLines>> lines_near_speeds(
+      const LineSearch& search) const {
+    std::map<std::vector<double>, std::vector<RotorLines>> found;
+    for (const Candidate& candidate : candidates_) {
+      for (const sensors::Sensor& sensor : candidate.combinations) {
+        for (const bool mirrored : {false, true}) {
+          found.try_emplace(expected_lines(sensor, candidate.lines, mirrored).speeds);
+        }
+      }
+    }
+    tbb::parallel_for_each(
+        found, [&](auto& one) { one.second = search.near(one.first, kSpeedShare, kMostMinima); });
+    return found;
+  }
 
   BeamSource beams_;
   std::vector<Candidate> candidates_;

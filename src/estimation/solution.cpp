@@ -3,6 +3,7 @@
 #include "risley/estimation/solution.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <span>
@@ -73,26 +74,45 @@ ShotResiduals residuals_at(const Solution& solution, const AngleSeries& shots,
   return out;
 }
 
-/// Fills a row of the states from a shot and the knot that serves it, residuals apart.
-void fill_state(const Solution& solution, std::int64_t time_ns, std::size_t knot, std::size_t shot,
-                std::size_t row, RotorStates& states) {
-  const RotorTrajectory& t = solution.trajectory;
-  double seconds = seconds_from(t, knot, time_ns);
-  if (shot < t.first_shot[knot] || shot >= t.last_shot[knot]) {  // of a stretch that was not used
-    seconds = std::numeric_limits<double>::quiet_NaN();
-  }
-  std::size_t entry = 0;
-  for (std::size_t k = 0; k < static_cast<std::size_t>(t.prisms); ++k) {
-    states.rotation_angle[k][row] = t.angle(knot, k, seconds);
-    states.angular_velocity[k][row] = t.speed(knot, k, seconds);
-    states.angular_velocity_sigma[k][row] = std::sqrt(t.speed_variance(knot, k, seconds));
-    for (std::size_t l = k; l < static_cast<std::size_t>(t.prisms); ++l) {
-      states.rotation_angle_covariance[entry++][row] = t.angle_covariance(knot, k, l, seconds);
+/// What rows of the states take from the knot that serves their shots, residuals apart.
+class KnotStates {
+ public:
+  KnotStates(const Solution& solution, std::size_t knot)
+      : solution_(solution), trajectory_(solution.trajectory), knot_(knot) {
+    const auto prisms = static_cast<std::size_t>(trajectory_.prisms);
+    std::size_t pair = 0;
+    for (std::size_t k = 0; k < prisms; ++k) {
+      speed_variance_[k] = trajectory_.speed_variance_terms(knot, k);
+      for (std::size_t l = k; l < prisms; ++l) {
+        angle_covariance_[pair++] = trajectory_.angle_covariance_terms(knot, k, l);
+      }
     }
   }
-  states.time_ns[row] = time_ns;
-  states.outlier[row] = solution.outlier[shot];
-}
+
+  void fill(std::int64_t time_ns, std::size_t shot, std::size_t row, RotorStates& states) const {
+    double seconds = seconds_from(trajectory_, knot_, time_ns);
+    if (shot < trajectory_.first_shot[knot_] || shot >= trajectory_.last_shot[knot_]) {
+      seconds = std::numeric_limits<double>::quiet_NaN();  // of a stretch that was not used
+    }
+    for (std::size_t k = 0; k < states.rotation_angle.size(); ++k) {
+      states.rotation_angle[k][row] = trajectory_.angle(knot_, k, seconds);
+      states.angular_velocity[k][row] = trajectory_.speed(knot_, k, seconds);
+      states.angular_velocity_sigma[k][row] = std::sqrt(polynomial_at(speed_variance_[k], seconds));
+    }
+    for (std::size_t pair = 0; pair < states.rotation_angle_covariance.size(); ++pair) {
+      states.rotation_angle_covariance[pair][row] = polynomial_at(angle_covariance_[pair], seconds);
+    }
+    states.time_ns[row] = time_ns;
+    states.outlier[row] = solution_.outlier[shot];
+  }
+
+ private:
+  const Solution& solution_;
+  const RotorTrajectory& trajectory_;
+  std::size_t knot_;
+  std::array<std::array<double, 3>, kMaxPrisms> speed_variance_{};
+  std::array<std::array<double, 5>, kMaxPrisms*(kMaxPrisms + 1) / 2> angle_covariance_{};
+};
 
 }  // namespace
 
@@ -136,11 +156,14 @@ RotorStates states_of_shots(const Solution& solution, const PackedSeries& series
   SolvedShots solved = solved_shots(solution, series, shots);
   RotorStates states;
   states.resize(t.prisms, shots.size());
-  std::size_t knot = knot_before(t, shots.begin);
-  for (std::size_t shot = shots.begin; shot < shots.end; ++shot) {
-    while (knot + 1 < t.size() && t.first_shot[knot + 1] <= shot) ++knot;
-    const std::size_t row = shot - shots.begin;
-    fill_state(solution, solved.shots.time_ns[row], knot, shot, row, states);
+  for (std::size_t shot = shots.begin; shot < shots.end;) {
+    const std::size_t knot = knot_before(t, shot);
+    const KnotStates served(solution, knot);
+    const std::size_t next = knot + 1 < t.size() ? t.first_shot[knot + 1] : shots.end;
+    for (const std::size_t end = std::min(next, shots.end); shot < end; ++shot) {
+      const std::size_t row = shot - shots.begin;
+      served.fill(solved.shots.time_ns[row], shot, row, states);
+    }
   }
   states.azimuth_residual = std::move(solved.residuals.azimuth);
   states.zenith_residual = std::move(solved.residuals.zenith);
@@ -158,7 +181,7 @@ RotorStates states_of_knots(const Solution& solution, const PackedSeries& series
     const ShotRange own{t.first_shot[knot], t.last_shot[knot]};
     const std::size_t shot = std::min(series.first_at(own, t.time_ns[knot]), own.end - 1);
     const std::int64_t time_ns = series.time_ns(shot);
-    fill_state(solution, time_ns, knot, shot, knot, states);
+    KnotStates(solution, knot).fill(time_ns, shot, knot, states);
     for (std::size_t k = 0; k < angles.size(); ++k) {
       angles[k].push_back(KnotMotion(t, knot, k).at(seconds_from(t, knot, time_ns)));
     }

@@ -11,7 +11,8 @@
 #include <thread>
 #include <vector>
 
-#include <tbb/global_control.h>
+#include <tbb/info.h>
+#include <tbb/task_arena.h>
 
 #include "risley/core/require.hpp"
 
@@ -146,13 +147,17 @@ void run_job(const py::object& tell, int threads, const std::function<void(const
   std::exception_ptr failure;
   std::thread worker([&] {
     try {
-      std::optional<tbb::global_control> limit;
+      const auto run = [&] {
+        job({[&news](double fraction, std::string_view stage) { news.tell(stage, fraction); },
+             cancel});
+      };
+      // An arena and no global limit: to lift one starts threads, and ends the process where there
+      // is no memory for them.
       if (threads > 0) {
-        limit.emplace(tbb::global_control::max_allowed_parallelism,
-                      static_cast<std::size_t>(threads));
+        tbb::task_arena(std::min(threads, tbb::info::default_concurrency())).execute(run);
+      } else {
+        run();
       }
-      job({[&news](double fraction, std::string_view stage) { news.tell(stage, fraction); },
-           cancel});
     } catch (...) {
       failure = std::current_exception();
     }

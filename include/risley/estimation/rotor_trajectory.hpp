@@ -70,12 +70,23 @@ struct RotorTrajectory {
                                                std::size_t b) const;
   /// Covariance of the angles of two rotors, rad^2, seconds from a knot.
   double angle_covariance(std::size_t knot, std::size_t a, std::size_t b, double seconds) const;
+  /// Variance of the speed of one rotor as a polynomial in the seconds from a knot: (rad/s)^2 times
+  /// s^0, s^-1, s^-2.
+  std::array<double, 3> speed_variance_terms(std::size_t knot, std::size_t rotor) const;
   /// Variance of the speed of one rotor, (rad/s)^2, seconds from a knot.
   double speed_variance(std::size_t knot, std::size_t rotor, double seconds) const;
 
  private:
   double covariance_entry(std::size_t knot, std::size_t row, std::size_t column) const;
 };
+
+/// Value of c[0] + c[1] x + c[2] x^2 + ...
+template <std::size_t N>
+double polynomial_at(const std::array<double, N>& c, double x) {
+  double value = 0;
+  for (std::size_t i = N; i-- > 0;) value = c[i] + x * value;
+  return value;
+}
 
 /// Knots for the shots of some stretches, in which times ascend, on a regular grid from each
 /// stretch's first shot and only where there are shots; states are zero.
