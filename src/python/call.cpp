@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 #include "python/call.hpp"
 
+#include <algorithm>
 #include <chrono>
 #include <condition_variable>
 #include <exception>
