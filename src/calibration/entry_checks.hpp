@@ -10,20 +10,21 @@
 
 namespace risley::calibration {
 
-/// Rotation angles of every prism of a train and emitters that it has, for every range.
-inline void require_angles(const RangedShots& shots, const PrismTrain& train) {
+/// Rotation angles of every prism of a train for every range, and as many emitters or none.
+inline void require_angle_columns(const RangedShots& shots, const PrismTrain& train) {
   check_shape(train.shape());
   require_length("rotation_angle", shots.rotation_angle.size(),
                  static_cast<std::size_t>(train.prisms()));
   for (const auto& column : shots.rotation_angle) {
     require_length("rotation_angle of a prism", column.size(), shots.size());
   }
-  check_beams(train, shots.beam, shots.size());
+  require_length_or_none("beam", shots.beam.size(), shots.size());
 }
 
-/// The same with the covariance of the rotation angles.
+/// The same with emitters that the train has and the covariance of the rotation angles.
 inline void require_shots(const RangedShots& shots, const PrismTrain& train) {
-  require_angles(shots, train);
+  require_angle_columns(shots, train);
+  check_beams(train, shots.beam, shots.size());
   const auto prisms = static_cast<std::size_t>(train.prisms());
   require_length("angle_covariance", shots.angle_covariance.size(), prisms * (prisms + 1) / 2);
   for (const auto& column : shots.angle_covariance) {

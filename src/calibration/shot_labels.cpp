@@ -35,7 +35,6 @@ double pointing_of_angles(const RangedShots& shots) {
 
 Labels label_shots(const PlanarProblem& problem, std::size_t recording, const RangedShots& shots,
                    double pointing) {
-  const Rays rays(problem.train, problem.geometry, shots);
   Labels labels{std::vector<int>(shots.size(), -1), std::vector<int>(shots.size(), -1),
                 std::vector<std::size_t>(problem.views.size(), 0)};
   std::vector<std::pair<int, PlaneView>> planes;
@@ -46,14 +45,15 @@ Labels label_shots(const PlanarProblem& problem, std::size_t recording, const Ra
   }
   std::vector<int> closest(shots.size(), -1);
   for_each_block(shots.size(), [&](std::size_t begin, std::size_t end) {
+    const Rays rays(problem.train, problem.geometry, shots, {begin, end});
     std::vector<double> predicted(planes.size()), sigma(planes.size());
     std::size_t nearest = 0;
     for (std::size_t i = begin; i < end; ++i) {
       double best = kNearby;
       for (std::size_t p = 0; p < planes.size(); ++p) {
         const PlaneView& plane = planes[p].second;
-        const Vector3<double> direction = rays.direction(i);
-        const double range = hit_distance(plane.plane, rays.origin(i), direction);
+        const Vector3<double> direction = rays.direction(i - begin);
+        const double range = hit_distance(plane.plane, rays.origin(i - begin), direction);
         const double cosine = dot(plane.plane.normal, direction);
         const double across =
             pointing * range * std::sqrt(std::max(0.0, 1.0 - cosine * cosine)) / cosine;

@@ -15,6 +15,8 @@
 #include "risley/calibration/rays.hpp"
 #include "risley/core/angle.hpp"
 
+#include "calibration/shot_blocks.hpp"
+
 namespace risley::calibration {
 namespace {
 
@@ -83,10 +85,11 @@ struct FittedView {
 
 FittedView fitted_view(const PrismTrain& train, const PrismGeometry& geometry,
                        const RangedShots& shots) {
-  const Rays rays(train, geometry, shots);
-  std::vector<Vector3<double>> points;
-  points.reserve(shots.size());
-  for (std::size_t i = 0; i < shots.size(); ++i) points.push_back(rays.point(i, shots.range[i]));
+  std::vector<Vector3<double>> points(shots.size());
+  for_each_block(shots.size(), [&](std::size_t begin, std::size_t end) {
+    const Rays rays(train, geometry, shots, {begin, end});
+    for (std::size_t i = begin; i < end; ++i) points[i] = rays.point(i - begin, shots.range[i]);
+  });
   std::vector<std::size_t> all(points.size());
   std::iota(all.begin(), all.end(), std::size_t{0});
   FittedView view;

@@ -53,11 +53,13 @@ TEST(Entries, RaysAskForAnglesOfEveryPrismAndShot) {
   EXPECT_EQ(run(shots), "rotation_angle of a prism has 3 values, expected 4");
   shots = some_shots(4);
   shots.beam.pop_back();
-  EXPECT_EQ(run(shots), "beam has 3 values, expected 4");
+  EXPECT_EQ(run(shots), "beam has 3 values, expected 4 or none");
   shots = some_shots(4);
   shots.beam[2] = 1;
   EXPECT_EQ(run(shots), "beam = 1 in row 2, allowed 0 to 0");
   EXPECT_EQ(run(some_shots(4)), "");
+  EXPECT_EQ(refusal([&] { return Rays(two_prisms(), {}, some_shots(4), {2, 5}); }),
+            "rows = [2, 5), allowed within [0, 4)");
 }
 
 TEST(Entries, PlaneEquationsAskForColumnsPlacesAndNumbers) {

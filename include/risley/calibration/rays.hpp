@@ -16,7 +16,12 @@ class Rays {
  public:
   /// @throws InvalidArgument for shots of another number of prisms, columns of different lengths,
   ///         or emitters that the train does not have
-  Rays(const PrismTrain& train, const PrismGeometry& geometry, const RangedShots& shots);
+  Rays(const PrismTrain& train, const PrismGeometry& geometry, const RangedShots& shots)
+      : Rays(train, geometry, shots, {0, shots.size()}) {}
+  /// The same of some rows, which count from 0 here: a block of them stays in the processor's
+  /// memory.
+  Rays(const PrismTrain& train, const PrismGeometry& geometry, const RangedShots& shots,
+       estimation::ShotRange rows);
 
   std::size_t size() const { return x_.size(); }
   /// Unit vector, sensor frame.
