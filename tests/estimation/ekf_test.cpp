@@ -129,6 +129,19 @@ TEST(Ekf, AGapIsBridgedAndItsUncertaintyShown) {
   EXPECT_GT(variance[1200], 1.2 * variance[600]);
 }
 
+TEST(Ekf, ShotsWithoutEmittersAreAllOfTheFirst) {
+  AngleSeries series = testing::constant_speed_series(bent_sensor(), 0.5, 2.5, 0.3, 1000.0);
+  const auto nominal = sensors::load_sensor("mid-40");
+  EkfOptions options;
+  options.angle_noise = kNoise;
+  Start start = find_start(series, nominal, {default_parameters(), kNoise, false, false});
+  start.train = PrismTrain(nominal.train.face_order(), 2);
+  const Solution named = run_ekf(series, start, options);
+  series.beam.clear();
+  const Solution nameless = run_ekf(series, start, options);
+  EXPECT_EQ(named.azimuth_residual, nameless.azimuth_residual);
+}
+
 TEST(Ekf, PoliteRefusals) {
   EkfOptions options;
   options.angle_noise = kNoise;
