@@ -58,7 +58,9 @@ TEST(Entries, RaysAskForAnglesOfEveryPrismAndShot) {
   shots.beam[2] = 1;
   EXPECT_EQ(run(shots), "beam = 1 in row 2, allowed 0 to 0");
   EXPECT_EQ(run(some_shots(4)), "");
-  EXPECT_EQ(refusal([&] { return Rays(two_prisms(), {}, some_shots(4), {2, 5}); }),
+  EXPECT_EQ(refusal([&] {
+              return Rays(two_prisms(), {}, some_shots(4), {2, 5});
+            }),
             "rows = [2, 5), allowed within [0, 4)");
 }
 

@@ -60,8 +60,9 @@ class PackedSeries {
   void rows(ShotRange range, AngleSeries& out) const;
   /// All rows.
   AngleSeries rows() const { return rows({0, size()}); }
-  /// The same, times and emitters alone.
+  /// Times of rows, as recorded, into memory that is used again.
   void times(ShotRange range, std::vector<std::int64_t>& out) const;
+  /// Emitters of rows, into memory that is used again.
   void beams(ShotRange range, std::vector<std::uint8_t>& out) const;
 
   /// Appends all rows of a series. @throws InvalidArgument where columns have other lengths
