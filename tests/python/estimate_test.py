@@ -1,6 +1,8 @@
 # SPDX-FileCopyrightText: 2026 The risley authors
 # SPDX-License-Identifier: MIT
 """An estimate from Python: numbers, page, interrupts, exceptions, and the end of the interpreter."""
+import os
+import pathlib
 import signal
 import subprocess
 import sys
@@ -11,6 +13,8 @@ import pytest
 
 import risley
 from scans import scan
+
+SCENE = pathlib.Path(os.environ["RISLEY_SOURCE_DIR"]) / "data" / "room.yaml"
 
 
 @pytest.fixture(scope="module")
@@ -160,3 +164,25 @@ for thread in threads:
 """)
     _, errors = process.communicate(timeout=120)
     assert process.returncode == 0, errors
+
+
+def test_without_memory_no_number_of_threads_ends_the_interpreter(tmp_path):
+    path = tmp_path / "scan.lvx"  # HDF5 has words of its own
+    risley.simulate(path, duration=2.0, scene=SCENE)
+    process = child(path, """
+import resource
+def has(megabytes, threads):
+    with open("/proc/self/statm") as file:
+        used = int(file.read().split()[0]) * resource.getpagesize()
+    limits = (used + (megabytes << 20), resource.RLIM_INFINITY)
+    resource.setrlimit(resource.RLIMIT_AS, limits)
+    try:
+        risley.estimate(sys.argv[1], threads=threads)
+        return True
+    except (MemoryError, RuntimeError):  # the latter where a thread has no room for its stack
+        return False
+print([has(megabytes, threads) for megabytes in (16, 24, 40) for threads in (1, 2, 0)])
+""")
+    words, errors = process.communicate(timeout=120)
+    assert process.returncode == 0, errors
+    assert words.startswith("[False, ")
