@@ -439,8 +439,8 @@ class Accumulation {
     const OwnColumns<N>& own = own_[emitter_];
     const auto all = static_cast<std::size_t>(a_.free + 1);
     for (std::size_t i = 0; i < own.count; ++i) {
-      Batch* const row =
-          static_sums_ + own.number[i] * all - own.number[i] * (own.number[i] + 1) / 2;
+      const std::size_t first = own.number[i] * all - own.number[i] * (own.number[i] + 1) / 2;
+      Batch* const row = static_sums_ + first;
       for (std::size_t j = i; j < own.count; ++j) {
         row[own.number[j]] = row[own.number[j]] + products_.sum(i, j);
       }
