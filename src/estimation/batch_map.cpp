@@ -338,6 +338,7 @@ Eigen::MatrixXd shared_angle_information(const NormalEquations& equations) {
 Eigen::MatrixXd mean_angle_sensitivity(const SmootherSolution& solution,
                                        const RotorTrajectory& knots) {
   Eigen::MatrixXd mean = Eigen::MatrixXd::Zero(knots.prisms, solution.parameter_step.size());
+  if (mean.cols() == 0) return mean;  // everything is held
   for (std::size_t knot = 0; knot < knots.size(); ++knot) {
     const auto sensitivity = solution.sensitivity(knot, knots.states());
     for (Eigen::Index k = 0; k < mean.rows(); ++k) {
