@@ -43,6 +43,8 @@ constexpr std::int64_t kSilenceTold = kWireSecond;
 constexpr std::int64_t kBroadcastSettles = 1500 * kMillisecond;
 constexpr std::int64_t kLongestStop = 2 * kWireSecond;
 constexpr std::int64_t kLongestPoll = 20 * kMillisecond;
+/// After a longer step this process stood still, and what came meanwhile is not yet read.
+constexpr std::int64_t kStoodStill = 200 * kMillisecond;
 constexpr std::int64_t kWatchPeriod = 500 * kMillisecond;
 /// How long the end of a recording waits for the estimate of what came last, s.
 constexpr double kLongestFinish = 2;
@@ -125,6 +127,8 @@ class Recorder {
   std::vector<const wire::UdpSocket*> waiting_;
   std::optional<std::int64_t> first_data_ns_;
   std::int64_t last_data_ns_ = 0, frame_due_ns_ = 0, watch_due_ns_ = 0;
+  std::int64_t step_ns_ = 0;           // when the last step began
+  std::int64_t patient_until_ns_ = 0;  // until then packets may wait for longer
   std::uint64_t passive_strangers_ = 0;
 };
 
@@ -394,6 +398,13 @@ void Recorder::write_frame(bool last) {
 }
 
 void Recorder::step(std::int64_t now, std::int64_t wait_until) {
+  const auto host_ns = std::chrono::duration_cast<std::chrono::nanoseconds>(
+                           std::chrono::system_clock::now().time_since_epoch())
+                           .count();
+  const std::int64_t begin = steady_ns();  // behind host_ns, so that no standstill hides between
+  if (begin - std::exchange(step_ns_, begin) > kStoodStill) {
+    patient_until_ns_ = begin + recordings::livox::PacketOrder::kLongestWait;
+  }
   take_broadcasts(now);
   std::int64_t until = std::min(wait_until, now + kLongestPoll);
   for (const auto& live : sensors_) {
@@ -404,10 +415,9 @@ void Recorder::step(std::int64_t now, std::int64_t wait_until) {
     if (live->session) until = std::min(until, live->session->next_ns());
   }
   if (now >= frame_due_ns_) {
-    const auto host_ns = std::chrono::duration_cast<std::chrono::nanoseconds>(
-                             std::chrono::system_clock::now().time_since_epoch())
-                             .count();
-    for (const auto& live : sensors_) live->order.advance(host_ns);
+    if (begin >= patient_until_ns_) {
+      for (const auto& live : sensors_) live->order.advance(host_ns);
+    }
     write_frame(false);
     frame_due_ns_ = now + kFramePeriod;
   }

@@ -47,6 +47,8 @@ void ClientSession::send_heartbeat(std::int64_t now_ns) {
 
 void ClientSession::advance(std::int64_t now_ns) {
   if (state_ == ClientState::closed || state_ == ClientState::lost) return;
+  // While the caller stood still, nobody asked the sensor anything.
+  heard_ns_ += std::max<std::int64_t>(now_ns - next_ns(), 0);
   if (now_ns - heard_ns_ >= kSilence) {
     lose(fmt::format("no reply for {:.1f} s", 1e-9 * static_cast<double>(now_ns - heard_ns_)));
     return;

@@ -4,15 +4,14 @@
 """Captures of a network as recordings: written here by hand, and of what a virtual sensor sends."""
 import os
 import struct
-import subprocess
 import time
 import unittest
 
 import captures
 import lvx_file
 from captures import HOST, framed, pcap, pcapng, udp
-from command import COMMAND, CommandTest
-from livox_peer import AVIA, MID_40, MID_70, TYPES, Host, bound, frame, packet
+from command import ProcessTest
+from livox_peer import AVIA, MID_40, MID_70, TYPES, Host, bound, frame, packet, send_with_room
 
 BEGIN = 1_790_000_000 * 10**9
 MID, OTHER = ("192.168.1.41", 65000), ("192.168.1.42", 65000)
@@ -33,7 +32,7 @@ def links(datagrams, link=captures.ETHERNET, **options):
     return [(time_ns, framed(link, data, **options)) for time_ns, data in datagrams]
 
 
-class PcapTest(CommandTest):
+class PcapTest(ProcessTest):
     def write(self, name, data):
         (self.folder / name).write_bytes(data)
         return name
@@ -170,27 +169,23 @@ class PcapTest(CommandTest):
 
     def test_the_same_datagrams_as_record(self):
         """What a virtual sensor sends, with faults, is kept by a host, sent once more to `record`, and captured."""
-        emulator = subprocess.Popen(
-            [COMMAND, "emulate", "--interface", "127.0.0.61", "--serial", "CAPTURED0000011", "--sensor", "avia", "--loss",
-             "0.02", "--duplication", "0.02", "--disorder", "0.05", "--seed", "5"], cwd=self.folder)
-        try:
-            host = Host("127.0.0.62")
-            self.addCleanup(host.close)
-            _, hello = host.find("CAPTURED0000011")
-            host.shake_hands()
-            host.ask(0, 5, b"\1")
-            host.ask(1, 8, b"\1")
-            host.ask(0, 4, b"\1")
-            received = host.receive(1)
-        finally:
-            emulator.terminate()
-            emulator.wait(20)
+        emulator = self.start("emulate", "--interface", "127.0.0.61", "--serial", "CAPTURED0000011", "--sensor", "avia",
+                              "--loss", 0.02, "--duplication", 0.02, "--disorder", 0.05, "--seed", 5)
+        host = Host("127.0.0.62")
+        self.addCleanup(host.close)
+        _, hello = host.find("CAPTURED0000011")
+        host.shake_hands()
+        host.ask(0, 5, b"\1")
+        host.ask(1, 8, b"\1")
+        host.ask(0, 4, b"\1")
+        received = host.receive(1)
+        emulator.terminate()
+        emulator.wait(20)
         self.assertGreater(len(received), 2000)
         sender = bound("127.0.0.61", 65000)
         self.addCleanup(sender.close)
-        recorder = subprocess.Popen(
-            [COMMAND, "record", "-o", "live.lvx", "--passive", "--interface", "127.0.0.63", "--data-port", "56201",
-             "--find-s", "2", "--json"], cwd=self.folder, stdout=subprocess.PIPE, text=True)
+        recorder = self.start("record", "-o", "live.lvx", "--passive", "--interface", "127.0.0.63", "--data-port", 56201,
+                              "--find-s", 2, "--json")
         end = time.monotonic() + 60
         # The first packet, by which the recording finds the sensor: once more it is one that came twice.
         sample = min((one for one in received if one[9] != 6), key=lambda one: struct.unpack_from("<Q", one, 10))
@@ -200,16 +195,16 @@ class PcapTest(CommandTest):
             sender.sendto(sample, ("127.0.0.63", 56201))
             time.sleep(0.05)
         time.sleep(0.5)
-        records = []
         for one in received:
-            sender.sendto(one, ("127.0.0.63", 56201))
-            records.append((time.time_ns(), framed(1, udp(("127.0.0.61", 65000), ("127.0.0.63", 56201), one))))
+            send_with_room(sender, one, ("127.0.0.63", 56201))
             time.sleep(0.0002)
         time.sleep(1)
         recorder.terminate()
         out, _ = recorder.communicate(timeout=60)
         self.assertEqual(recorder.returncode, 0, out)
         said = (BEGIN, framed(1, udp(("127.0.0.61", 65000), ("255.255.255.255", 55000), hello)))
+        records = [(BEGIN + i * 400_000, framed(1, udp(("127.0.0.61", 65000), ("127.0.0.63", 56201), one)))
+                   for i, one in enumerate(received)]
         devices, packets = self.packets(self.write("live.pcap", pcap([said] + records, nanoseconds=True)))
         recorded = list(lvx_file.packets((self.folder / "live.lvx").read_bytes()))
         self.assertEqual(devices, [("CAPTURED0000011", 0, AVIA)])

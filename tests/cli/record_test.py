@@ -11,17 +11,19 @@ import time
 import unittest
 
 import lvx_file
-from command import COMMAND, CommandTest
+from command import COMMAND, ProcessTest
 from livox_peer import AVIA, HORIZON, MID_40, MID_70, SENSOR_PORT, Sensor, bound, frame, packet
 
 HOST = "127.0.0.1"
 
 
-class RecordTest(CommandTest):
+class RecordTest(ProcessTest):
     def setUp(self):
+        super().setUp()
         self.sensors = []
 
     def tearDown(self):
+        super().tearDown()
         for sensor in self.sensors:
             sensor.stop()
 
@@ -30,8 +32,7 @@ class RecordTest(CommandTest):
         return self.sensors[-1]
 
     def start(self, *arguments):
-        return subprocess.Popen([COMMAND, "record", "--interface", HOST, *map(str, arguments)],
-                                cwd=self.folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        return super().start("record", "--interface", HOST, *arguments)
 
     def wait_for(self, what, seconds=10):
         end = time.monotonic() + seconds
@@ -43,6 +44,10 @@ class RecordTest(CommandTest):
         out, err = process.communicate(timeout=20)
         self.assertEqual(process.returncode, status, out + err)
         return out, err
+
+    def size(self, name):
+        """Bytes of a file, which need not be there yet."""
+        return (self.folder / name).stat().st_size if (self.folder / name).exists() else 0
 
     def packets(self, name):
         data = (self.folder / name).read_bytes()
@@ -96,6 +101,22 @@ class RecordTest(CommandTest):
         self.assertEqual(result["duplicates"], sensor.sent - len(sensor.times))
         self.assertGreater(result["reordered"], 0)
         self.assertEqual(result["rows"], 100 * len(sensor.times))
+
+    def test_a_recording_that_stands_still_for_a_while(self):
+        """What came meanwhile waits in the kernel: packets that were overtaken are still put right."""
+        sensor = self.sensor(disorder=0.5)
+        process = self.start("-o", "still.lvx", "--json")
+        for _ in range(4):
+            count = len(sensor.times)
+            self.wait_for(lambda: len(sensor.times) > count + 500)
+            process.send_signal(signal.SIGSTOP)
+            time.sleep(1.5)
+            process.send_signal(signal.SIGCONT)
+        self.wait_for(lambda: len(sensor.times) > count + 1000)
+        process.send_signal(signal.SIGINT)
+        result = json.loads(self.end(process)[0])["sensors"][0]
+        self.assertEqual((result["lost"], result["late"], result["kernel_drops"]), (0, 0, 0))
+        self.assertEqual(self.times("still.lvx"), sensor.times)
 
     def test_coordinates_and_return_modes(self):
         for sensor_type, options, data_type in (
@@ -154,7 +175,7 @@ class RecordTest(CommandTest):
     def test_a_killed_recording_can_be_read(self):
         sensor = self.sensor()
         process = self.start("-o", "killed.lvx")
-        self.wait_for(lambda: len(sensor.times) > 1000)
+        self.wait_for(lambda: self.size("killed.lvx.unfinished") > 600_000)
         process.kill()
         process.communicate()
         self.assertFalse((self.folder / "killed.lvx").exists())
@@ -175,11 +196,9 @@ class RecordTest(CommandTest):
         self.wait_for(lambda: len(sensor.times) > 500)
         self.sensors.pop().stop()
         before = sensor.times
-        died = time.monotonic()
-        line = process.stderr.readline()
-        self.assertLess(time.monotonic() - died, 3)
-        self.assertIn("no data for 1 s", line)
-        self.assertIn("lost", process.stderr.readline())
+        notes = (line for line in process.stderr if "receive buffer" not in line)  # of which few grant enough
+        self.assertIn("no data for 1 s", next(notes))
+        self.assertIn("lost", next(notes))
         again = self.sensor(first_ns=1_000_000)
         self.wait_for(lambda: len(again.times) > 500)
         process.send_signal(signal.SIGINT)
@@ -209,7 +228,7 @@ class RecordTest(CommandTest):
         self.sensors.pop().stop()
         sensor = self.sensor()
         process = self.start("-o", "killed.nc")
-        self.wait_for(lambda: len(sensor.times) > 500)
+        self.wait_for(lambda: self.size("killed.nc.unfinished") > 200_000)
         process.kill()
         process.communicate()
         times = self.times("killed.nc.unfinished")

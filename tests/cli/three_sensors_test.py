@@ -74,13 +74,12 @@ class ThreeSensorsTest(ProcessTest):
                 break
             time.sleep(0.05)
         out, err = recording.communicate(timeout=60)
-        self.processes.remove(recording)
         self.assertEqual(recording.returncode, 0, err)
         truth = []
         for process in sensors:
             process.send_signal(signal.SIGTERM)
             truth.append(json.loads(process.communicate(timeout=20)[0])["sensors"][0])
-            self.processes.remove(process)
+        self.skip_where_the_kernel_drops(json.loads(out))
         told = json.loads(out)["sensors"]
         self.assertEqual([one["serial"] for one in told], codes)
         wrong = ("lost", "duplicates", "reordered", "kernel_drops", "late", "rejected")

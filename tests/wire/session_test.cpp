@@ -140,6 +140,24 @@ TEST(Session, ADeadSensorIsLostWithinThreeSeconds) {
   ASSERT_TRUE(nobody.run_until(ClientState::lost, 4000));
 }
 
+// Nobody asked the sensor anything meanwhile: that it did not answer says nothing.
+TEST(Session, AClientThatStandsStillLosesNobody) {
+  Link link;
+  ASSERT_TRUE(link.run_until(ClientState::sampling, 3000));
+  for (std::int64_t phase_ms = 0; phase_ms < 800; phase_ms += 50) {
+    link.run(1000 + phase_ms);
+    link.now += 4000 * kMs;  // less than a sensor waits
+    link.run(1000);
+    ASSERT_EQ(link.client.state(), ClientState::sampling) << phase_ms;
+  }
+  // A sensor that died meanwhile is found out.
+  link.to_client = false;
+  link.now += 4000 * kMs;
+  const std::int64_t awake = link.now;
+  ASSERT_TRUE(link.run_until(ClientState::lost, 4000));
+  EXPECT_LE(link.now - awake, 3000 * kMs);
+}
+
 TEST(Session, AHostThatIsGoneIsForgotten) {
   Link link;
   ASSERT_TRUE(link.run_until(ClientState::sampling, 3000));

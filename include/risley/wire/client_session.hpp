@@ -65,7 +65,8 @@ class ClientSession {
 
   ClientSession(const ClientSettings& settings, std::int64_t now_ns);
 
-  /// Lets time pass: commands and heartbeats that are due go out, and a silent sensor is lost.
+  /// Lets time pass: commands and heartbeats that are due go out, and a silent sensor is lost. By
+  /// how much the call comes after next_ns() is no silence of the sensor.
   void advance(std::int64_t now_ns);
   /// A datagram that the sensor sent to the command port. What is no reply to a command of this
   /// session is counted and does nothing else.
@@ -80,7 +81,8 @@ class ClientSession {
   std::vector<std::vector<std::uint8_t>> take_datagrams();
   /// Events since the last call.
   std::vector<ClientEvent> take_events();
-  /// Time of the last reply, ns; that of the beginning before there is one.
+  /// Time of the last reply, ns, and later by what calls of advance() came too late; that of the
+  /// beginning before there is one.
   std::int64_t heard_ns() const { return heard_ns_; }
   /// Datagrams that were no frames, or none that a sensor sends now.
   std::uint64_t rejected() const { return rejected_; }

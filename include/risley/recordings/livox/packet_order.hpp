@@ -61,7 +61,7 @@ class PacketOrder {
   /// Packets that wait for others.
   static constexpr std::size_t kWindow = 64;
   /// Longest time that a packet waits, ns.
-  static constexpr std::int64_t kLongestWait = 200'000'000;
+  static constexpr std::int64_t kLongestWait = 1'000'000'000;
   /// Gaps that are kept; those behind are only counted.
   static constexpr std::size_t kMostGaps = 1000;
 
