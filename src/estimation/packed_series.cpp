@@ -150,8 +150,12 @@ std::pair<double, double> PackedSeries::angles(std::size_t row) const {
 
 std::size_t PackedSeries::first_at(ShotRange range, std::int64_t wanted_ns) const {
   require_rows("range", range.begin, range.end, size());
-  std::size_t begin = range.begin;
-  for (std::size_t left = range.size(); left > 0;) {
+  std::size_t begin = range.begin, left = range.size(), step = 1;
+  for (; step < left && time_ns(begin + step - 1) < wanted_ns; step *= 2) {
+    begin += step;
+    left -= step;
+  }
+  for (left = std::min(left, step); left > 0;) {
     const std::size_t half = left / 2;
     if (time_ns(begin + half) < wanted_ns) {
       begin += half + 1;
@@ -364,22 +368,25 @@ std::vector<ShotRange> stretches(const PackedSeries& series, double longest_gap)
 PackedSeries thinned(const PackedSeries& series, double rate, std::vector<ShotRange>& ranges) {
   PackedSeries result;
   TickSampler ticks(rate);
-  std::vector<std::int64_t> times;
-  std::vector<std::uint8_t> beams;
+  const std::vector<std::size_t> shots = series.shots_of_beams();
+  for (std::size_t beam = 0; beam < shots.size(); ++beam) {
+    if (shots[beam] > 0) ticks.expect(static_cast<std::uint8_t>(beam));
+  }
   std::vector<std::size_t> taken;
+  const auto put = [&] {
+    result.append(series, taken);
+    taken.clear();
+  };
   for (ShotRange& range : ranges) {
     require_rows("range", range.begin, range.end, series.size());
     const std::size_t begin = result.size();
     if (range.size() > 0) ticks.restart(series.time_ns(range.begin));
-    for (const ShotRange& some : blocks_of(range)) {
-      series.times(some, times);
-      series.beams(some, beams);
-      taken.clear();
-      for (std::size_t i = 0; i < times.size(); ++i) {
-        if (ticks.take(times[i], beams[i])) taken.push_back(some.begin + i);
-      }
-      result.append(series, taken);
+    for (std::size_t row = range.begin; row < range.end;
+         row = series.first_at({row + 1, range.end}, ticks.next_ns())) {
+      if (ticks.take(series.time_ns(row), series.beam(row))) taken.push_back(row);
+      if (taken.size() == PackedSeries::kBlockRows) put();
     }
+    put();
     range = {begin, result.size()};
   }
   return result;

@@ -77,6 +77,10 @@ class TickSampler {
     had_turn_.reset();
     waited_ = 0;
   }
+  /// A beam that will fire, and shall have its turns. Others are known once they fire.
+  void expect(std::uint8_t beam) { seen_[beam] = true; }
+  /// No shot before this time is taken, ns.
+  std::int64_t next_ns() const { return next_ns_; }
   /// Whether to take the next shot. @param beam  that fired it
   bool take(std::int64_t time_ns, std::uint8_t beam) {
     seen_[beam] = true;

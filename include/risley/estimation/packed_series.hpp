@@ -49,7 +49,7 @@ class PackedSeries {
   double duration() const { return size() == 0 ? 0.0 : time(size() - 1); }
 
   /// First row at or after a time in a range whose times ascend; the range's end where there is
-  /// none.
+  /// none. The nearer it is to the beginning, the sooner it is found.
   std::size_t first_at(ShotRange range, std::int64_t time_ns) const;
   /// How many shots each emitter fired, [largest_beam() + 1].
   std::vector<std::size_t> shots_of_beams() const;
