@@ -12,7 +12,7 @@ import unittest
 
 import lvx_file
 import schemas
-from command import ProcessTest
+from command import SANITIZED, ProcessTest
 from livox_peer import SENSOR_PORT, TYPES, Host, bound, frame, parse, send_with_room
 
 ADDRESS, CODE = "127.0.0.41", "EMULATED0000011"
@@ -160,7 +160,8 @@ class EmulateTest(ProcessTest):
         stranger.settimeout(0.2)
         with self.assertRaises(TimeoutError):
             stranger.recvfrom(100)
-        self.assertLess(self.memory(process) - before, 4000)
+        if not SANITIZED:  # its allocator keeps what was freed
+            self.assertLess(self.memory(process) - before, 4000)
         truth = self.truth(process)
         self.assertEqual(truth["sessions"], 1)
         self.assertGreater(truth["rejected"] + truth["kernel_drops"], 30_000)
@@ -289,7 +290,7 @@ class EmulateTest(ProcessTest):
             self.assertIn(says, done["error"])
 
     def test_three_sensors_ten_times_faster(self):
-        speed = 3 if os.environ.get("RISLEY_SANITIZED") == "ON" else 10
+        speed = 3 if SANITIZED else 10
         processes = [self.emulate("--sensor", "mid-40", "--speed", speed, address=f"127.0.0.{50 + i}",
                                   code=f"EMULATED000000{i}") for i in range(3)]
         recorded = self.record("three.lvx", "--duration-s", 2)
