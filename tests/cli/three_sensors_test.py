@@ -14,11 +14,11 @@ import time
 import unittest
 
 import lvx_file
-from command import SOURCE, ProcessTest
+from command import SANITIZED, SOURCE, ProcessTest
 
 SECONDS = float(os.environ.get("RISLEY_THREE_SENSORS_S", "2"))  # of this machine
 LONG = SECONDS >= 60
-SPEED = 10 if LONG else 2 if os.environ.get("RISLEY_SANITIZED") == "ON" else 3  # beside other tests
+SPEED = 10 if LONG else 2 if SANITIZED else 3  # beside other tests
 # Sensor, data type, ns between packets.
 SENSORS = (("mid-40", 1, 1_000_000), ("avia", 3, 400_000), ("horizon", 3, 400_000))
 IMU = 6
