@@ -13,7 +13,7 @@
 #include <sys/mman.h>
 #include <unistd.h>
 
-#include "io/temporary_folder.hpp"
+#include "io/test_folder.hpp"
 
 namespace risley::fuzz {
 
@@ -25,7 +25,7 @@ class MemoryFile {
     constexpr std::string_view kDatabase = "SQLite";
     if (bytes.size() >= kDatabase.size() &&
         std::equal(kDatabase.begin(), kDatabase.end(), bytes.begin())) {
-      static const io::TemporaryFolder folder;
+      static const io::TestFolder folder;
       path_ = folder.file("input");
       descriptor_ = ::open(path_.c_str(), O_CREAT | O_WRONLY | O_TRUNC | O_CLOEXEC, 0600);
     } else {

@@ -16,7 +16,7 @@
 
 #include "fuzz/invariants.hpp"
 #include "fuzz/targets.hpp"
-#include "io/temporary_folder.hpp"
+#include "io/test_folder.hpp"
 
 namespace risley::fuzz {
 namespace {
@@ -141,7 +141,7 @@ void change(const std::string& path, Numbers& numbers) {
 
 /// A file that was written and then changed as the bytes say.
 std::string changed_file(void (*write)(const std::string&), std::span<const std::uint8_t> bytes) {
-  static const io::TemporaryFolder folder;
+  static const io::TestFolder folder;
   const std::string path = folder.file("changed.nc");
   write(path);
   Numbers numbers(bytes);

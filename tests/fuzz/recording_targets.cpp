@@ -16,7 +16,7 @@
 #include "fuzz/invariants.hpp"
 #include "fuzz/memory_file.hpp"
 #include "fuzz/targets.hpp"
-#include "io/temporary_folder.hpp"
+#include "io/test_folder.hpp"
 #include "recordings/formats/format.hpp"
 
 namespace risley::fuzz {
@@ -56,7 +56,7 @@ bool read_all(Reader& reader, std::uint64_t most_rows, std::vector<Chunk>* chunk
 
 /// The anonymous part of a recording has no more rows than that.
 void share(const std::string& path, std::uint64_t most_rows) {
-  static const io::TemporaryFolder folder;
+  static const io::TestFolder folder;
   try {
     const auto excerpt = recordings::write_excerpt(path, folder.file("share.nc"));
     require(excerpt.observations <= most_rows, "an excerpt invents no rows");
@@ -77,7 +77,7 @@ recordings::PacketPlaces some_places(std::span<const std::uint8_t> bytes) {
 /// Rows that a writer of the format was given are those that its file has.
 void write_and_read(const Format& format, const recordings::RecordingHeader& header,
                     const std::vector<Chunk>& chunks) {
-  static const io::TemporaryFolder folder;
+  static const io::TestFolder folder;
   const std::string path = folder.file("again" + std::string(format.ending));
   std::uint64_t written = 0;
   try {
@@ -106,7 +106,7 @@ void write_and_read(const Format& format, const recordings::RecordingHeader& hea
 /// As the command's convert: into a format that another ending names.
 void convert(const recordings::RecordingHeader& header, const std::vector<Chunk>& chunks,
              std::size_t choice) {
-  static const io::TemporaryFolder folder;
+  static const io::TestFolder folder;
   constexpr std::array kEndings = {".lvx", ".openpylivox.csv", ".openpylivox.bin", ".sequence.csv",
                                    ".csv", ".no-format"};
   const std::string path = folder.file(std::string("other") + kEndings[choice % kEndings.size()]);

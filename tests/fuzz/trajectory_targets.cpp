@@ -16,7 +16,7 @@
 #include "fuzz/invariants.hpp"
 #include "fuzz/memory_file.hpp"
 #include "fuzz/targets.hpp"
-#include "io/temporary_folder.hpp"
+#include "io/test_folder.hpp"
 
 namespace risley::fuzz {
 namespace {
@@ -27,7 +27,7 @@ std::string yaml_of(std::span<const std::uint8_t> bytes) { return {bytes.begin()
 
 /// A trajectory that is read is sound, can be audited and interpolated, and comes back from CSV.
 void run_trajectory(std::span<const std::uint8_t> bytes) {
-  static const io::TemporaryFolder folder;
+  static const io::TestFolder folder;
   const MemoryFile file(bytes);
   Trajectory trajectory;
   try {

@@ -11,20 +11,20 @@
 #include "risley/io/netcdf.hpp"
 #include "risley/io/text_table.hpp"
 
-#include "io/temporary_folder.hpp"
+#include "io/test_folder.hpp"
 #include "refusal.hpp"
 
 namespace risley::io::entries_test {
 
 TEST(Entries, NetcdfDimensionsAskForALength) {
-  const TemporaryFolder folder;
+  const TestFolder folder;
   NetcdfOutput file(folder.file("a.nc"));
   EXPECT_EQ(refusal([&] { return file.define_dimension("axis", 0); }),
             "length of dimension axis = 0, allowed 1 or more");
 }
 
 TEST(Entries, NetcdfVariablesAskForOneOrTwoDimensions) {
-  const TemporaryFolder folder;
+  const TestFolder folder;
   NetcdfOutput file(folder.file("a.nc"));
   const auto row = file.define_growing_dimension("row"), axis = file.define_dimension("axis", 3);
   EXPECT_EQ(refusal([&] { return file.define<float>("scalar", {}, {}); }),
@@ -41,7 +41,7 @@ TEST(Entries, NetcdfVariablesAskForOneOrTwoDimensions) {
 }
 
 TEST(Entries, NetcdfAsksForValuesThatFitTheirVariable) {
-  const TemporaryFolder folder;
+  const TestFolder folder;
   NetcdfOutput file(folder.file("a.nc"));
   const auto row = file.define_growing_dimension("row"), axis = file.define_dimension("axis", 3);
   const auto place = file.define<float>("place", {&row, &axis}, {});
@@ -58,7 +58,7 @@ TEST(Entries, NetcdfAsksForValuesThatFitTheirVariable) {
 }
 
 TEST(Entries, NetcdfIsReadByDimensionsAndTypesThatItHas) {
-  const TemporaryFolder folder;
+  const TestFolder folder;
   const std::string path = folder.file("a.nc");
   {
     NetcdfOutput file(path);
@@ -83,7 +83,7 @@ TEST(Entries, NetcdfIsReadByDimensionsAndTypesThatItHas) {
 }
 
 TEST(Entries, BlocksOfFilesLieWithinThem) {
-  const TemporaryFolder folder;
+  const TestFolder folder;
   const std::string path = folder.file("a.bin");
   {
     BlockOutput file(path);
@@ -102,7 +102,7 @@ TEST(Entries, PowersOfTenFit64Bits) {
   EXPECT_EQ(power_of_ten(18), 1'000'000'000'000'000'000);
   EXPECT_EQ(refusal([] { power_of_ten(19); }), "exponent = 19, allowed 0 to 18");
   EXPECT_EQ(refusal([] { power_of_ten(-1); }), "exponent = -1, allowed 0 to 18");
-  const TemporaryFolder folder;
+  const TestFolder folder;
   TextOutput output(folder.file("a.txt"));
   EXPECT_EQ(refusal([&] { output.append_fixed(1, 19); }), "exponent = 19, allowed 0 to 18");
   EXPECT_EQ(refusal([&] { output.append_decimal(1, 19); }), "decimals = 19, allowed 0 to 18");

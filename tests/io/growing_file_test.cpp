@@ -20,7 +20,7 @@
 
 #include "risley/core/error.hpp"
 
-#include "io/temporary_folder.hpp"
+#include "io/test_folder.hpp"
 
 namespace {
 
@@ -85,7 +85,7 @@ class FileSizeLimit {
 
 class GrowingFileTest : public ::testing::Test {
  protected:
-  TemporaryFolder folder_;
+  TestFolder folder_;
   std::string path_ = folder_.file("grows"), unfinished_ = path_ + ".unfinished";
 };
 

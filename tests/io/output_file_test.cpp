@@ -18,7 +18,7 @@
 #include "risley/io/sha256.hpp"
 #include "risley/io/text_file.hpp"
 
-#include "io/temporary_folder.hpp"
+#include "io/test_folder.hpp"
 
 namespace risley::io::output_file_test {
 
@@ -40,7 +40,7 @@ mode_t mode_of(const std::string& path) {
 }
 
 TEST(OutputFile, AppearsWhole) {
-  const TemporaryFolder folder;
+  const TestFolder folder;
   const std::string path = folder.file("out");
   put(path, "before");
   {
@@ -62,7 +62,7 @@ TEST(OutputFile, AppearsWhole) {
 }
 
 TEST(OutputFile, NobodyForeseesItsTemporaryName) {
-  const TemporaryFolder folder;
+  const TestFolder folder;
   const std::string path = folder.file("out");
   std::set<std::string> names;
   for (int i = 0; i < 20; ++i) {
@@ -77,7 +77,7 @@ TEST(OutputFile, NobodyForeseesItsTemporaryName) {
 
 TEST(OutputFile, PlantedLinksAreNotFollowed) {
   // The name that earlier versions would have used, and a link in the place of the temporary.
-  const TemporaryFolder folder;
+  const TestFolder folder;
   const std::string path = folder.file("out"), victim = folder.file("victim");
   put(victim, "precious");
   fs::create_symlink(victim, fmt::format("{}.part-{}", path, ::getpid()));
@@ -99,7 +99,7 @@ TEST(OutputFile, PlantedLinksAreNotFollowed) {
 }
 
 TEST(OutputFile, KeepsTheModeOfWhatItReplaces) {
-  const TemporaryFolder folder;
+  const TestFolder folder;
   const std::string path = folder.file("out");
   const mode_t mask = ::umask(022);
   write_text_file(path, "new");
@@ -116,7 +116,7 @@ TEST(OutputFile, KeepsTheModeOfWhatItReplaces) {
 }
 
 TEST(OutputFile, WritesBehindLinks) {
-  const TemporaryFolder folder;
+  const TestFolder folder;
   const std::string path = folder.file("out");
   fs::create_directory(folder.file("elsewhere"));
   put(folder.file("elsewhere/real"), "old");
@@ -142,7 +142,7 @@ TEST(OutputFile, DevicesAreWrittenAndSurvive) {
 }
 
 TEST(OutputFile, FifosGetTheBytes) {
-  const TemporaryFolder folder;
+  const TestFolder folder;
   const std::string path = folder.file("fifo");
   ASSERT_EQ(::mkfifo(path.c_str(), 0600), 0);
   const std::string text(300'000, 'x');  // more than a pipe holds
@@ -156,7 +156,7 @@ TEST(OutputFile, FifosGetTheBytes) {
 }
 
 TEST(OutputFile, OpenFilesAreWrittenByTheirNames) {
-  const TemporaryFolder folder;
+  const TestFolder folder;
   const std::string path = folder.file("log");
   const int descriptor = ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600);
   ASSERT_GE(descriptor, 0);
@@ -168,7 +168,7 @@ TEST(OutputFile, OpenFilesAreWrittenByTheirNames) {
 }
 
 TEST(OutputFile, RemovesWhatKilledRunsLeft) {
-  const TemporaryFolder folder;
+  const TestFolder folder;
   const std::string path = folder.file("out");
   const pid_t child = ::fork();
   if (child == 0) {
@@ -188,7 +188,7 @@ TEST(OutputFile, RemovesWhatKilledRunsLeft) {
 }
 
 TEST(OutputFile, LeavesWhatAnotherIsWritingAlone) {
-  const TemporaryFolder folder;
+  const TestFolder folder;
   const std::string path = folder.file("out");
   int ready[2], done[2];
   ASSERT_EQ(::pipe(ready), 0);
@@ -215,7 +215,7 @@ TEST(OutputFile, LeavesWhatAnotherIsWritingAlone) {
 }
 
 TEST(OutputFile, NamesMayBeAsLongAsTheSystemAllows) {
-  const TemporaryFolder folder;
+  const TestFolder folder;
   const std::string path = folder.file(std::string(255, 'n'));
   write_text_file(path, "long");
   EXPECT_EQ(read_text_file(path), "long");
@@ -224,7 +224,7 @@ TEST(OutputFile, NamesMayBeAsLongAsTheSystemAllows) {
 }
 
 TEST(OutputFile, SaysAtOnceWhatCannotBeWritten) {
-  const TemporaryFolder folder;
+  const TestFolder folder;
   EXPECT_THROW(OutputFile(folder.path().string()), FileError);
   EXPECT_THROW(OutputFile(folder.file("no/such/folder")), FileError);
   EXPECT_THROW(OutputFile(""), FileError);
@@ -233,7 +233,7 @@ TEST(OutputFile, SaysAtOnceWhatCannotBeWritten) {
 }
 
 TEST(Reading, ErrorsNeverGiveATextOrAHash) {
-  const TemporaryFolder folder;
+  const TestFolder folder;
   EXPECT_THROW(sha256_of_file(folder.path().string()), FileError);
   EXPECT_THROW(read_text_file(folder.path().string()), FileError);
   EXPECT_THROW(sha256_of_file(folder.file("missing")), FileError);
@@ -255,7 +255,7 @@ TEST(Sha256, InBase64AsBrowsersTakeIt) {
 
 TEST(Sha256, KnownAnswers) {
   // FIPS 180-2, appendix B, and the empty message.
-  const TemporaryFolder folder;
+  const TestFolder folder;
   const std::string path = folder.file("message");
   put(path, "");
   EXPECT_EQ(sha256_of_file(path),

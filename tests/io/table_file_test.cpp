@@ -18,7 +18,7 @@
 #include "risley/io/netcdf.hpp"
 #include "risley/io/text_file.hpp"
 
-#include "io/temporary_folder.hpp"
+#include "io/test_folder.hpp"
 
 namespace risley::io::table_file_test {
 
@@ -56,7 +56,7 @@ std::vector<std::string> queried(const std::string& path, const std::string& que
 }
 
 TEST(TableFile, WritesText) {
-  const TemporaryFolder folder;
+  const TestFolder folder;
   write(folder.file("t.csv"));
   EXPECT_EQ(read_text_file(folder.file("t.csv")),
             "input,exit_status,wedge_angle_deg\n"
@@ -66,7 +66,7 @@ TEST(TableFile, WritesText) {
 }
 
 TEST(TableFile, WritesDatabases) {
-  const TemporaryFolder folder;
+  const TestFolder folder;
   for (const char* name : {"t.sqlite", "t.DB", "t.sqlite3"}) {
     write(folder.file(name));
     EXPECT_THAT(queried(folder.file(name), "SELECT * FROM results"),
@@ -82,7 +82,7 @@ TEST(TableFile, WritesDatabases) {
 }
 
 TEST(TableFile, WritesNetcdf) {
-  const TemporaryFolder folder;
+  const TestFolder folder;
   write(folder.file("t.nc"));
   const NetcdfInput file(folder.file("t.nc"));
   EXPECT_EQ(file.text("version"), "0.1.0");
@@ -100,7 +100,7 @@ TEST(TableFile, WritesNetcdf) {
 }
 
 TEST(TableFile, MayHaveNoRows) {
-  const TemporaryFolder folder;
+  const TestFolder folder;
   for (const char* name : {"t.csv", "t.nc", "t.sqlite"}) {
     TableFile(folder.file(name), kColumns, {}).close();
   }
@@ -108,7 +108,7 @@ TEST(TableFile, MayHaveNoRows) {
 }
 
 TEST(TableFile, IsThereWholeOrNotAtAll) {
-  const TemporaryFolder folder;
+  const TestFolder folder;
   for (const char* name : {"t.csv", "t.nc", "t.sqlite"}) {
     write_text_file(folder.file(name), "before");
     {
@@ -122,7 +122,7 @@ TEST(TableFile, IsThereWholeOrNotAtAll) {
 }
 
 TEST(TableFile, RefusesWhatDoesNotFit) {
-  const TemporaryFolder folder;
+  const TestFolder folder;
   EXPECT_THROW(TableFile::check_name("t.xlsx"), InvalidArgument);
   EXPECT_THROW(TableFile(folder.file("t.csv"), {}, {}), InvalidArgument);
   EXPECT_THROW(TableFile(folder.file("nowhere/t.csv"), kColumns, {}), FileError);

@@ -16,7 +16,7 @@
 #include "risley/io/netcdf.hpp"
 #include "risley/io/text_file.hpp"
 
-#include "io/temporary_folder.hpp"
+#include "io/test_folder.hpp"
 
 namespace risley::io::table_input_test {
 
@@ -46,7 +46,7 @@ std::string problem_of(const std::string& path) {
 }
 
 TEST(TableInput, ReadsWhatWasWritten) {
-  const TemporaryFolder folder;
+  const TestFolder folder;
   for (const char* name : {"t.csv", "t.nc", "t.sqlite"}) {
     SCOPED_TRACE(name);
     write(folder.file(name));
@@ -63,7 +63,7 @@ TEST(TableInput, ReadsWhatWasWritten) {
 }
 
 TEST(TableInput, ReadsWhatASpreadsheetSaved) {
-  const TemporaryFolder folder;
+  const TestFolder folder;
   const std::string path = folder.file("t.csv");
   for (const char delimiter : {';', '\t', ','}) {
     std::string text =
@@ -76,7 +76,7 @@ TEST(TableInput, ReadsWhatASpreadsheetSaved) {
 }
 
 TEST(TableInput, IsRecognised) {
-  const TemporaryFolder folder;
+  const TestFolder folder;
   write_text_file(folder.file("preset.yaml"), "name: x\n");
   write_text_file(folder.file("empty.csv"), "");
   EXPECT_FALSE(is_table(folder.file("preset.yaml")));
@@ -86,7 +86,7 @@ TEST(TableInput, IsRecognised) {
 }
 
 TEST(TableInput, NamesWhereTextIsDamaged) {
-  const TemporaryFolder folder;
+  const TestFolder folder;
   const std::string path = folder.file("t.csv");
   const auto of = [&](const std::string& text) {
     write_text_file(path, text);
@@ -104,7 +104,7 @@ TEST(TableInput, NamesWhereTextIsDamaged) {
 }
 
 TEST(TableInput, RefusesOtherKinds) {
-  const TemporaryFolder folder;
+  const TestFolder folder;
   {
     NetcdfOutput file(folder.file("t.nc"));
     const NetcdfDimension row = file.define_dimension("row", 2);
@@ -122,7 +122,7 @@ struct CloseDatabase {
 };
 
 TEST(TableInput, ReadsStoredTablesOnly) {
-  const TemporaryFolder folder;
+  const TestFolder folder;
   const std::string path = folder.file("t.sqlite");
   write(path);
   sqlite3* opened = nullptr;
@@ -140,7 +140,7 @@ TEST(TableInput, ReadsStoredTablesOnly) {
 }
 
 TEST(TableInput, SurvivesAnyChangedByte) {
-  const TemporaryFolder folder;
+  const TestFolder folder;
   for (const char* name : {"t.csv", "t.sqlite"}) {
     write(folder.file(name));
     const std::string bytes = read_text_file(folder.file(name));
@@ -157,7 +157,7 @@ TEST(TableInput, SurvivesAnyChangedByte) {
 }
 
 TEST(TableInput, CanBeCancelled) {
-  const TemporaryFolder folder;
+  const TestFolder folder;
   CancelFlag flag;
   flag.set();
   const Progress progress([](double) {}, &flag);

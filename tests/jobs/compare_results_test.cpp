@@ -18,6 +18,8 @@
 #include "risley/jobs/compare_units.hpp"
 #include "risley/sensors/preset.hpp"
 
+#include "io/test_folder.hpp"
+
 namespace risley::jobs::compare_results_test {
 
 using ::testing::HasSubstr;
@@ -28,15 +30,6 @@ constexpr double kSigma = 1e-5, kHeldSigma = 1e-3, kResponse = 0.5;  // rad, rad
 
 class CompareResults : public ::testing::Test {
  protected:
-  CompareResults()
-      : folder_(std::filesystem::path(::testing::TempDir()) /
-                ("compare_results_" +
-                 std::string(::testing::UnitTest::GetInstance()->current_test_info()->name()))) {
-    std::filesystem::remove_all(folder_);
-    std::filesystem::create_directories(folder_);
-  }
-  ~CompareResults() override { std::filesystem::remove_all(folder_); }
-
   /// A result that knows a tilt by kSigma, if the wedge is as held; each wedge error moves it.
   static sensors::Sensor result(const std::string& serial) {
     sensors::Sensor sensor = sensors::load_sensor("mid-40");
@@ -52,7 +45,7 @@ class CompareResults : public ::testing::Test {
   }
 
   std::string saved(const std::string& name, const sensors::Sensor& sensor) const {
-    const std::filesystem::path folder = folder_ / name;
+    const std::filesystem::path folder = folder_.path() / name;
     std::filesystem::create_directories(folder);
     io::write_text_file((folder / "calibration.yaml").string(), sensors::preset_text(sensor));
     return folder.string();
@@ -65,7 +58,7 @@ class CompareResults : public ::testing::Test {
     throw std::out_of_range(name);
   }
 
-  std::filesystem::path folder_;
+  io::TestFolder folder_;
 };
 
 TEST_F(CompareResults, OfOneResultWithItselfHasNoDifference) {
@@ -193,19 +186,20 @@ TEST_F(CompareResults, OfATableFollowsItsRows) {
   saved("a1/may", result("A1"));
   saved("b2/may", result("B2"));
   saved("a1/june", moved);
-  std::filesystem::create_directories(folder_ / "b2/july");
-  std::filesystem::create_directories(folder_ / "c3");
-  io::write_text_file((folder_ / "c3/calibration.yaml").string(), "model: {");
+  std::filesystem::create_directories(folder_.path() / "b2/july");
+  std::filesystem::create_directories(folder_.path() / "c3");
+  io::write_text_file((folder_.path() / "c3/calibration.yaml").string(), "model: {");
   const std::int64_t done = 0, failed = 3;
   for (const char* name : {"table.csv", "table.nc", "table.sqlite"}) {
     SCOPED_TRACE(name);
-    const std::string table = table_of(folder_ / name, {{"a/may.lvx", "a1/may", done, {}},
-                                                        {"b/may.lvx", "b2/may", done, {}},
-                                                        {"a/june.lvx", "a1/june", done, {}},
-                                                        {"b/june.lvx", {}, failed, "is cut off"},
-                                                        {"b/july.lvx", "b2/july", done, {}},
-                                                        {"c/may.lvx", "c3", done, {}},
-                                                        {"c/june.lvx", {}, done, {}}});
+    const std::string table =
+        table_of(folder_.path() / name, {{"a/may.lvx", "a1/may", done, {}},
+                                         {"b/may.lvx", "b2/may", done, {}},
+                                         {"a/june.lvx", "a1/june", done, {}},
+                                         {"b/june.lvx", {}, failed, "is cut off"},
+                                         {"b/july.lvx", "b2/july", done, {}},
+                                         {"c/may.lvx", "c3", done, {}},
+                                         {"c/june.lvx", {}, done, {}}});
     const ComparedUnits found = compare_units({{table}, 0.01});
     ASSERT_EQ(found.results.size(), 3U);
     ASSERT_EQ(found.units.size(), 2U);
@@ -235,7 +229,7 @@ TEST_F(CompareResults, OfATableFollowsItsRows) {
 
 TEST_F(CompareResults, OfATableWithoutResultsSaysWhy) {
   const std::int64_t done = 0;
-  const std::string table = table_of(folder_ / "t.csv", {{"a.lvx", "nowhere", done, {}}});
+  const std::string table = table_of(folder_.path() / "t.csv", {{"a.lvx", "nowhere", done, {}}});
   try {
     compare_units({{table}, 0.01});
     FAIL();
@@ -260,7 +254,7 @@ TEST_F(CompareResults, OfManyUnitsEachStandsBesideTheOthers) {
     add(serial + "/june", one);
   }
   add("unknown", result(""));
-  const CompareUnitsOptions options{{table_of(folder_ / "t.csv", rows)}, 0.01};
+  const CompareUnitsOptions options{{table_of(folder_.path() / "t.csv", rows)}, 0.01};
   std::vector<double> told;
   const ComparedUnits found =
       compare_units(options, Progress([&](double fraction) { told.push_back(fraction); }));
@@ -299,7 +293,7 @@ TEST_F(CompareResults, IsOfSensorsOfOneKind) {
 
 TEST_F(CompareResults, SaysWhatIsMissing) {
   try {
-    compare_results(folder_.string(), "mid-40");
+    compare_results(folder_.path().string(), "mid-40");
     FAIL();
   } catch (const FileError& error) {
     EXPECT_THAT(error.what(), HasSubstr("calibration.yaml"));

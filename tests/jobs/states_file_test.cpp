@@ -16,6 +16,8 @@
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
 
+#include "io/test_folder.hpp"
+
 namespace risley::jobs::states_file_test {
 
 namespace fs = std::filesystem;
@@ -85,14 +87,7 @@ class Reader {
 
 class StatesFile : public ::testing::Test {
  protected:
-  void SetUp() override {
-    const auto* test = ::testing::UnitTest::GetInstance()->current_test_info();
-    folder_ = fs::path(::testing::TempDir()) / (std::string("risley_states_") + test->name());
-    fs::remove_all(folder_);
-    fs::create_directories(folder_);
-  }
-  void TearDown() override { fs::remove_all(folder_); }
-  std::string path() const { return (folder_ / "states.nc").string(); }
+  std::string path() const { return folder_.file("states.nc"); }
 
   /// A number that no other column and no other row has.
   static double number(int column, std::size_t row) {
@@ -137,7 +132,7 @@ class StatesFile : public ::testing::Test {
     }
   }
 
-  fs::path folder_;
+  io::TestFolder folder_;
 };
 
 TEST_F(StatesFile, EveryColumnComesBackInTheUnitsOfTheFile) {
@@ -271,7 +266,7 @@ TEST_F(StatesFile, AFailureLeavesNoFile) {
     return states(2, rows);
   };
   EXPECT_THROW(write_states(path(), failing, {}), std::runtime_error);
-  EXPECT_TRUE(fs::is_empty(folder_));
+  EXPECT_TRUE(fs::is_empty(folder_.path()));
 }
 
 TEST_F(StatesFile, AFailureKeepsTheFileThatWasThere) {
@@ -286,9 +281,8 @@ TEST_F(StatesFile, AFailureKeepsTheFileThatWasThere) {
 }
 
 TEST_F(StatesFile, AMissingFolderIsSaid) {
-  EXPECT_THROW(write_states((folder_ / "missing" / "states.nc").string(), content(1, 5), {}),
-               FileError);
-  EXPECT_TRUE(fs::is_empty(folder_));
+  EXPECT_THROW(write_states(folder_.file("missing/states.nc"), content(1, 5), {}), FileError);
+  EXPECT_TRUE(fs::is_empty(folder_.path()));
 }
 
 }  // namespace risley::jobs::states_file_test

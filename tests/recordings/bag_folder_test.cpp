@@ -66,7 +66,7 @@ class BagFolder {
   }
 
  private:
-  TemporaryFolder folder_;
+  TestFolder folder_;
   bool mcap_;
 };
 
@@ -100,7 +100,7 @@ Read read_folder(const BagFolder& folder) {
 }
 
 TEST(BagFolder, ItsFilesAreReadInOrder) {
-  const TemporaryFolder other;
+  const TestFolder other;
   small_ros2_bag().write(other.file("whole.db3")).reset();
   const Recording wanted = load_recording(other.file("whole.db3"));
   for (const bool mcap : {false, true}) {

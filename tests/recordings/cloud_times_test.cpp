@@ -118,7 +118,7 @@ struct Clouds {
       cdr.put<std::uint32_t>(step() * kShots).raw(data(message, stamp)).put<std::uint8_t>(1);
       bag.add(topic, cdr.bytes());
     }
-    const TemporaryFolder folder;
+    const TestFolder folder;
     bag.write(folder.file("input.db3")).reset();
     return read_all(kRos2BagFormat, folder.file("input.db3"));
   }
@@ -146,7 +146,7 @@ struct Clouds {
       put<std::uint8_t>(bytes, 1);
       bag.add("/points", raw);
     }
-    const TemporaryFolder folder;
+    const TestFolder folder;
     bag.write(folder.file("input.bag"));
     return read_all(kRos1BagFormat, folder.file("input.bag"));
   }

@@ -19,7 +19,7 @@
 
 namespace risley::recordings::entries_test {
 
-using format_tests::TemporaryFolder;
+using format_tests::TestFolder;
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
@@ -46,7 +46,7 @@ RecordingHeader header_of_one() {
 }
 
 /// A recording of a few points, as NetCDF.
-std::string saved(const TemporaryFolder& folder) {
+std::string saved(const TestFolder& folder) {
   const std::string path = folder.file("points.nc");
   const auto writer = create_recording(path, header_of_one());
   Chunk chunk;
@@ -101,7 +101,7 @@ TEST(Entries, RowsAskForColumnsOfOneLength) {
 }
 
 TEST(Entries, EveryWriterAsksForColumnsOfOneLength) {
-  const TemporaryFolder folder;
+  const TestFolder folder;
   Chunk uneven;
   uneven.observations = points(4);
   uneven.observations.device.pop_back();
@@ -111,7 +111,7 @@ TEST(Entries, EveryWriterAsksForColumnsOfOneLength) {
     EXPECT_EQ(refusal([&] { writer->write(uneven); }), "device has 3 values, expected 4")
         << format.name;
   }
-  EXPECT_EQ(folder.count(), 0U);
+  EXPECT_EQ(folder.names().size(), 0U);
 }
 
 TEST(Entries, AuditsAskForColumnsOfOneLength) {
@@ -124,7 +124,7 @@ TEST(Entries, AuditsAskForColumnsOfOneLength) {
 }
 
 TEST(Entries, ReadersAskForRowsARateAndAPose) {
-  const TemporaryFolder folder;
+  const TestFolder folder;
   const std::string path = saved(folder);
   Chunk chunk;
   EXPECT_EQ(refusal([&] { open_recording(path)->read(chunk, 0); }),
@@ -146,7 +146,7 @@ TEST(Entries, ReadersAskForRowsARateAndAPose) {
 }
 
 TEST(Entries, ExcerptsAskForALengthAndShots) {
-  const TemporaryFolder folder;
+  const TestFolder folder;
   const std::string path = saved(folder);
   const auto run = [&](const ExcerptOptions& options) {
     return refusal([&] { write_excerpt(path, folder.file("excerpt.nc"), options); });
@@ -168,7 +168,7 @@ TruthColumns truth_of(int prisms, std::size_t rows) {
 }
 
 TEST(Entries, TruthAsksForPrismsAndColumnsOfOneLength) {
-  const TemporaryFolder folder;
+  const TestFolder folder;
   TruthColumns two = truth_of(2, 3);
   EXPECT_EQ(refusal([&] { two.resize(-1, 3); }), "number of prisms = -1, allowed 0 to 26");
   EXPECT_EQ(refusal([&] { TruthWriter(folder.file("truth.nc"), 0); }),
@@ -195,7 +195,7 @@ TEST(Entries, TruthAsksForPrismsAndColumnsOfOneLength) {
 }
 
 TEST(Entries, TruthIsAskedForAtAscendingTimes) {
-  const TemporaryFolder folder;
+  const TestFolder folder;
   const std::string path = folder.file("truth.nc");
   TruthWriter writer(path, 2);
   writer.write(truth_of(2, 5));

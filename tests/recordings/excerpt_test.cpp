@@ -117,7 +117,7 @@ class ExcerptTest : public ::testing::Test {
     }
   }
 
-  TemporaryFolder folder_;
+  TestFolder folder_;
   std::string path_ = folder_.file("excerpt.nc");
   Recording shared_;
 };
@@ -428,7 +428,7 @@ TEST_F(ExcerptTest, RefusesWhatMakesNoSense) {
   EXPECT_THAT(problem(path_, {.longest = std::numeric_limits<double>::quiet_NaN()}),
               HasSubstr("longest = nan"));
   EXPECT_THAT(problem(path_, {.most_shots = 0}), HasSubstr("most_shots = 0"));
-  EXPECT_EQ(folder_.count(), 1U);  // the recording
+  EXPECT_EQ(folder_.names().size(), 1U);  // the recording
 }
 
 TEST_F(ExcerptTest, WithoutADirectionThereIsNothingToShare) {
@@ -437,7 +437,7 @@ TEST_F(ExcerptTest, WithoutADirectionThereIsNothingToShare) {
   source.invalidate(0, 10);
   const std::string recording = save(source);
   EXPECT_THROW(write_excerpt(recording, path_), FileError);
-  EXPECT_EQ(folder_.count(), 1U);
+  EXPECT_EQ(folder_.names().size(), 1U);
 }
 
 TEST_F(ExcerptTest, AnInterruptedOneLeavesNothing) {
@@ -448,7 +448,7 @@ TEST_F(ExcerptTest, AnInterruptedOneLeavesNothing) {
     if (fraction > 0.7) throw std::runtime_error("interrupted");
   };
   EXPECT_THROW(write_excerpt(recording, path_, {}, {}, stop), std::runtime_error);
-  EXPECT_EQ(folder_.count(), 1U);
+  EXPECT_EQ(folder_.names().size(), 1U);
 }
 
 }  // namespace risley::recordings::excerpt_test

@@ -25,7 +25,7 @@
 
 namespace risley::recordings::extrinsics_test {
 
-using format_tests::TemporaryFolder;
+using format_tests::TestFolder;
 using ::testing::HasSubstr;
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
@@ -114,7 +114,7 @@ RecordingHeader header_of(bool has_range) {
   return header;
 }
 
-std::string saved(const TemporaryFolder& folder, const Observations& rows, bool has_range = true) {
+std::string saved(const TestFolder& folder, const Observations& rows, bool has_range = true) {
   std::string path = folder.file("moved.nc");
   const auto writer = create_recording(path, header_of(has_range));
   Chunk chunk;
@@ -146,7 +146,7 @@ void expect_same_shots(const Observations& found, const Observations& expected) 
 }
 
 TEST(Extrinsics, PointsComeBackFromAnyPose) {
-  const TemporaryFolder folder;
+  const TestFolder folder;
   const Observations rows = sensor_rows(100, true);
   for (const Extrinsics& pose : many_poses()) {
     SCOPED_TRACE(fmt::format("yaw {} pitch {} roll {}", pose.yaw, pose.pitch, pose.roll));
@@ -160,7 +160,7 @@ TEST(Extrinsics, PointsComeBackFromAnyPose) {
 }
 
 TEST(Extrinsics, DirectionsAloneAreTurnedAndNotMoved) {
-  const TemporaryFolder folder;
+  const TestFolder folder;
   const Observations rows = sensor_rows(100, false);
   for (Extrinsics pose : many_poses()) {
     const std::string path = saved(folder, moved_rows(rows, pose), false);
@@ -175,7 +175,7 @@ TEST(Extrinsics, DirectionsAloneAreTurnedAndNotMoved) {
 }
 
 TEST(Extrinsics, AMovedOriginIsAShotWithoutReturn) {
-  const TemporaryFolder folder;
+  const TestFolder folder;
   const Extrinsics pose = pose_deg(30, 20, 10, {0.1234, -0.0567, 1.0005});
   Observations rows;
   rows.resize(2);
@@ -190,7 +190,7 @@ TEST(Extrinsics, AMovedOriginIsAShotWithoutReturn) {
 }
 
 TEST(Extrinsics, StepsOfCoordinatesStayThoseOfTheCoordinates) {
-  const TemporaryFolder folder;
+  const TestFolder folder;
   for (const Extrinsics& pose : many_poses()) {
     Observations sensor, moved;
     sensor.resize(3);
@@ -212,7 +212,7 @@ TEST(Extrinsics, StepsOfCoordinatesStayThoseOfTheCoordinates) {
 }
 
 TEST(Extrinsics, OfTwoAngularStepsTheLargerCounts) {
-  const TemporaryFolder folder;
+  const TestFolder folder;
   Observations rows;
   rows.resize(2);
   const auto step = static_cast<float>(kCentidegree);
@@ -232,7 +232,7 @@ TEST(Extrinsics, OfTwoAngularStepsTheLargerCounts) {
 }
 
 TEST(Extrinsics, RoundingAlongAndAcrossTheBeamMixAsTheLineOfSightTurns) {
-  const TemporaryFolder folder;
+  const TestFolder folder;
   Observations rows;
   rows.resize(1);
   set_spherical(rows, 0, 0.0, radians_from_degrees(90), 10.0);
@@ -247,7 +247,7 @@ TEST(Extrinsics, RoundingAlongAndAcrossTheBeamMixAsTheLineOfSightTurns) {
 }
 
 TEST(Extrinsics, PacketsAreLeftOutUnlessNothingIsTurned) {
-  const TemporaryFolder folder;
+  const TestFolder folder;
   const std::string path = folder.file("one.lvx");
   std::string bytes = lvx_bytes::header_lvx11({{"0TFDG3B006H2Z11", 0, 1}});
   std::mt19937 random(2);
@@ -282,7 +282,7 @@ TEST(Extrinsics, PacketsAreLeftOutUnlessNothingIsTurned) {
 }
 
 TEST(Extrinsics, PosesThatMakeNoSenseAreRefused) {
-  const TemporaryFolder folder;
+  const TestFolder folder;
   const std::string path = saved(folder, sensor_rows(3, true));
   const std::string names[] = {"yaw",           "pitch",         "roll",
                                "translation.x", "translation.y", "translation.z"};

@@ -3,7 +3,6 @@
 #pragma once
 
 #include <cstring>
-#include <filesystem>
 #include <fstream>
 #include <functional>
 #include <iterator>
@@ -12,35 +11,15 @@
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include "risley/core/error.hpp"
 
+#include "io/test_folder.hpp"
 #include "recordings/formats/format.hpp"
 
 namespace risley::recordings::format_tests {
 
-/// A new folder, removed with its owner.
-class TemporaryFolder {
- public:
-  TemporaryFolder() {
-    static int count = 0;
-    const std::string name = fmt::format("risley-formats-{}-{}", ::getpid(), ++count);
-    path_ = std::filesystem::temp_directory_path() / name;
-    std::filesystem::create_directories(path_);
-  }
-  ~TemporaryFolder() {
-    std::error_code ignored;
-    std::filesystem::remove_all(path_, ignored);
-  }
-  std::string file(const std::string& name) const { return (path_ / name).string(); }
-  std::size_t count() const {
-    return static_cast<std::size_t>(std::distance(std::filesystem::directory_iterator(path_), {}));
-  }
-
- private:
-  std::filesystem::path path_;
-};
+using io::TestFolder;
 
 inline void put_bytes(const std::string& path, std::string_view bytes) {
   std::ofstream stream(path, std::ios::binary | std::ios::trunc);
@@ -91,7 +70,7 @@ inline Outcome read_all(const Format& format, const std::string& path,
 
 inline Outcome read_text(const Format& format, std::string_view bytes,
                          std::size_t chunk_rows = kDefaultChunkRows) {
-  const TemporaryFolder folder;
+  const TestFolder folder;
   const std::string path = folder.file("input");
   put_bytes(path, bytes);
   return read_all(format, path, chunk_rows);
@@ -107,7 +86,7 @@ inline void write_all(const Format& format, const std::string& path, const Recor
 /// Reads a file in pieces of a few rows and writes it again piece by piece.
 inline std::string copy_of(const Format& format, const std::string& path, std::size_t chunk_rows,
                            const Format* target = nullptr) {
-  const TemporaryFolder folder;
+  const TestFolder folder;
   const std::string copy = folder.file("copy");
   auto reader = format.open(path, {});
   auto writer = (target != nullptr ? *target : format).create(copy, reader->header());
@@ -119,7 +98,7 @@ inline std::string copy_of(const Format& format, const std::string& path, std::s
 
 inline std::string rewritten(const Format& format, std::string_view bytes,
                              std::size_t chunk_rows = 3, const Format* target = nullptr) {
-  const TemporaryFolder folder;
+  const TestFolder folder;
   const std::string path = folder.file("input");
   put_bytes(path, bytes);
   return copy_of(format, path, chunk_rows, target);
@@ -154,7 +133,7 @@ inline bool is_same(const Observations& a, const Observations& b) {
 inline void check_cuts(
     const Format& format, const std::string& bytes, std::size_t step,
     const std::function<std::pair<std::size_t, bool>(std::string_view)>& expected_rows) {
-  const TemporaryFolder folder;
+  const TestFolder folder;
   const std::string path = folder.file("cut");
   put_bytes(path, bytes);
   const Outcome whole = read_all(format, path);

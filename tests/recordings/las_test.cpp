@@ -156,7 +156,7 @@ TEST(LasTest, ReadsEveryVersionAndLongerHeaders) {
 }
 
 TEST(LasTest, IsRecognisedByItsContent) {
-  const TemporaryFolder folder;
+  const TestFolder folder;
   put_bytes(folder.file("cloud.dat"), some_file().bytes());
   EXPECT_EQ(open_recording(folder.file("cloud.dat"))->header().format, "las");
 }
@@ -537,7 +537,7 @@ TEST(LasTest, WithoutLaszipCompressedFilesAreRefusedWithWords) {
 #ifdef RISLEY_HAS_LASZIP
   GTEST_SKIP() << "SKIPPED: this build has LASzip";
 #else
-  const TemporaryFolder folder;
+  const TestFolder folder;
   std::string bytes = some_file().bytes();
   bytes[104] = static_cast<char>(0x81);
   put_bytes(folder.file("cloud.laz"), bytes);

@@ -11,29 +11,12 @@
 #include <string>
 #include <vector>
 
-#include <unistd.h>
+#include "io/test_folder.hpp"
 
 // Builds LVX files byte by byte from the format's description, without the code under test.
 namespace risley::recordings::lvx_bytes {
 
-/// A folder that disappears with its owner.
-class TemporaryFolder {
- public:
-  TemporaryFolder() {
-    std::string name = std::filesystem::temp_directory_path() / "risley-lvx-XXXXXX";
-    path_ = mkdtemp(name.data());
-  }
-  ~TemporaryFolder() {
-    std::error_code ignored;
-    std::filesystem::remove_all(path_, ignored);
-  }
-  TemporaryFolder(const TemporaryFolder&) = delete;
-  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
-  std::string file(const std::string& name) const { return path_ + "/" + name; }
-
- private:
-  std::string path_;
-};
+using io::TestFolder;
 
 inline void save(const std::string& path, const std::string& bytes) {
   std::filesystem::remove(path);  // much faster on most disks than to overwrite

@@ -94,7 +94,7 @@ class LvxTest : public ::testing::Test {
     return contents(folder_.file("rows.lvx"));
   }
 
-  TemporaryFolder folder_;
+  TestFolder folder_;
 };
 
 RecordingHeader header_for(std::uint8_t device_type, bool cartesian = false, int returns = 1) {

@@ -53,7 +53,7 @@ std::vector<McapFile> all_ways(const McapFile& file) {
 }
 
 TEST(Mcap, HasTheRowsOfTheSameBagInSqlite) {
-  const TemporaryFolder folder;
+  const TestFolder folder;
   const std::string path = folder.file("input.db3");
   small_ros2_bag().write(path).reset();
   const Outcome wanted = read_all(kRos2BagFormat, path);
@@ -95,14 +95,14 @@ TEST(Mcap, HoldsMessagesOfRos1) {
 }
 
 TEST(Mcap, OpensByContentAndIsNotWritten) {
-  const TemporaryFolder folder;
+  const TestFolder folder;
   const std::string path = folder.file("without_ending");
   small_file().write(path);
   const Recording recording = load_recording(path);
   EXPECT_EQ(recording.header.format, "mcap");
   EXPECT_EQ(recording.data.observations.size(), 120U);
   EXPECT_THROW(create_recording(folder.file("out.mcap"), recording.header), InvalidArgument);
-  EXPECT_EQ(folder.count(), 1U);
+  EXPECT_EQ(folder.names().size(), 1U);
 }
 
 TEST(Mcap, OtherEncodingsAndVersionsAreNamed) {
@@ -344,7 +344,7 @@ TEST(Mcap, AClaimedChunkCostsNoMemory) {
 }
 
 TEST(Mcap, OpeningAndReadingCanBeCancelled) {
-  const TemporaryFolder folder;
+  const TestFolder folder;
   McapFile file = small_file();
   file.write(folder.file("whole.mcap"));
   file.summary = false;

@@ -678,7 +678,7 @@ TEST(Npz, Damage) {
 // ---- shot rate -------------------------------------------------------------------------------
 
 TEST(ShotRate, CountsTimes) {
-  const TemporaryFolder folder;
+  const TestFolder folder;
   const std::string path = folder.file("a.csv");
   put_bytes(path, "index,x_m,y_m,z_m\n0,1.5,2.5,3.5\n1,0,0,0\n7,1.5,2.5,3.5\n");
   EXPECT_FALSE(load_recording(path).header.has_times);
@@ -699,7 +699,7 @@ TEST(ShotRate, CountsTimes) {
 }
 
 TEST(ShotRate, EmittersThatTheFileDoesNotNameFireInTurn) {
-  const TemporaryFolder folder;
+  const TestFolder folder;
   const std::string path = folder.file("a.csv");
   const ReadOptions six{.shot_rate = 240'000.0, .emitters = 6};
   put_bytes(path, "index,x_m,y_m,z_m\n0,1,2,3\n1,0,0,0\n7,1,2,3\n12,1,2,3\n");
@@ -726,7 +726,7 @@ TEST(ShotRate, EmittersThatTheFileDoesNotNameFireInTurn) {
 }
 
 TEST(ShotRate, WritersOfTimesNeedThem) {
-  const TemporaryFolder folder;
+  const TestFolder folder;
   const std::string path = folder.file("a.csv");
   put_bytes(path, "index,x_m,y_m,z_m\n3,1.500,2.500,3.500\n4,0,0,0\n9,1.500,2.500,3.500\n");
   const Recording recording = load_recording(path);
@@ -744,7 +744,7 @@ TEST(ShotRate, WritersOfTimesNeedThem) {
 }
 
 TEST(ShotRate, ScanSequencesOfShotNumbers) {
-  const TemporaryFolder folder;
+  const TestFolder folder;
   const std::string path = folder.file("a.csv");
   const std::string bytes = "Time/s,Azimuth/deg,Zenith/deg\n1,19.17241,90.03013\n2,19.1,90.1\n";
   put_bytes(path, bytes);

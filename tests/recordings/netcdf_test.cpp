@@ -113,7 +113,7 @@ bool is_prefix_of(const std::vector<T>& part, const std::vector<T>& whole) {
 }
 
 TEST(Netcdf, HoldsEverything) {
-  const TemporaryFolder folder;
+  const TestFolder folder;
   const std::string path = folder.file("recording.nc");
   const Chunk chunk = packet_chunk(20);
   const RecordingHeader header = rich_header();
@@ -152,7 +152,7 @@ TEST(Netcdf, HoldsEverything) {
 }
 
 TEST(Netcdf, ChunksHoldWholePackets) {
-  const TemporaryFolder folder;
+  const TestFolder folder;
   const std::string path = folder.file("recording.nc");
   write_all(kNetcdfFormat, path, rich_header(), packet_chunk(30));
   auto reader = kNetcdfFormat.open(path, {});
@@ -172,7 +172,7 @@ TEST(Netcdf, ChunksHoldWholePackets) {
 }
 
 TEST(Netcdf, TheSameRecordingGivesTheSameBytes) {
-  const TemporaryFolder folder;
+  const TestFolder folder;
   // More than one block of rows and of packets, so that their order in the file matters.
   for (const std::size_t packets : {0, 1, 20, 1500}) {
     for (const bool with_packets : {true, false}) {
@@ -192,7 +192,7 @@ TEST(Netcdf, TheSameRecordingGivesTheSameBytes) {
 }
 
 TEST(Netcdf, KeepsTheDetailsOfTextFormats) {
-  const TemporaryFolder folder;
+  const TestFolder folder;
   const std::string text =
       "Time/s,Azimuth/deg,Zenith/deg\n0.00001,19.1724,90.030\n0.00002,-19.1712,90.060\n";
   const std::string table = folder.file("sequence.csv"), copy = folder.file("sequence.nc");
@@ -202,7 +202,7 @@ TEST(Netcdf, KeepsTheDetailsOfTextFormats) {
 }
 
 TEST(Netcdf, ACutNeverCrashesNorInvents) {
-  const TemporaryFolder folder;
+  const TestFolder folder;
   const std::string path = folder.file("whole.nc"), cut_path = folder.file("cut.nc");
   const Chunk chunk = packet_chunk(4);
   write_all(kNetcdfFormat, path, rich_header(), chunk);
@@ -224,7 +224,7 @@ TEST(Netcdf, ACutNeverCrashesNorInvents) {
 }
 
 TEST(Netcdf, ADamagedBlockCostsOnlyWhatFollows) {
-  const TemporaryFolder folder;
+  const TestFolder folder;
   const std::string path = folder.file("whole.nc");
   const Chunk chunk = packet_chunk(1000);  // almost three blocks of rows
   for (const bool with_packets : {true, false}) {
@@ -261,7 +261,7 @@ TEST(Netcdf, ADamagedBlockCostsOnlyWhatFollows) {
 }
 
 TEST(Netcdf, RefusesForeignFiles) {
-  const TemporaryFolder folder;
+  const TestFolder folder;
   const std::string path = folder.file("foreign.nc");
   int id = 0, dimension = 0, variable = 0;
   ASSERT_EQ(nc_create(path.c_str(), NC_NETCDF4, &id), NC_NOERR);
@@ -323,7 +323,7 @@ class SpoiltRecording {
   }
 
  private:
-  const TemporaryFolder folder_;
+  const TestFolder folder_;
   std::string path_;
   int id_ = 0;
 };
@@ -383,7 +383,7 @@ TEST(HostileNetcdf, VariablesThatAreNotThere) {
 }
 
 TEST(Netcdf, RefusesPacketsThatDoNotFit) {
-  const TemporaryFolder folder;
+  const TestFolder folder;
   Chunk short_packet = packet_chunk(2);
   short_packet.packets[0].rows = 95;
   EXPECT_THROW(kNetcdfFormat.create(folder.file("x.nc"), rich_header())->write(short_packet),
@@ -401,7 +401,7 @@ TEST(Netcdf, RefusesPacketsThatDoNotFit) {
   RecordingHeader nobody = rich_header();
   nobody.devices.clear();
   EXPECT_THROW(kNetcdfFormat.create(folder.file("x.nc"), nobody), InvalidArgument);
-  EXPECT_EQ(folder.count(), 0U) << "an unfinished writer must leave nothing";
+  EXPECT_EQ(folder.names().size(), 0U) << "an unfinished writer must leave nothing";
   EXPECT_THROW(kNetcdfFormat.create(folder.file("no/such/folder.nc"), rich_header()), FileError);
 }
 

@@ -351,7 +351,7 @@ TEST(Openpylivox, ChoosesTheLayoutByTheHeader) {
     std::uint8_t device_type;
     int firmware_type, data_type;
   };
-  const TemporaryFolder folder;
+  const TestFolder folder;
   for (const auto& c : {Case{true, 1, 1, 1, 0},
                         {false, 1, 1, 1, 1},
                         {true, 2, 1, 2, 0},
@@ -377,7 +377,7 @@ TEST(Openpylivox, ChoosesTheLayoutByTheHeader) {
 }
 
 TEST(Openpylivox, RefusesWhatItCannotHoldAndDropsNulls) {
-  const TemporaryFolder folder;
+  const TestFolder folder;
   for (const auto* format : {&kOpenpylivoxBinFormat, &kOpenpylivoxCsvFormat}) {
     const std::string path = folder.file("written");
     write_all(*format, path, foreign_header(false, 1, 1), one_row(0.0));
@@ -408,11 +408,11 @@ TEST(Openpylivox, RefusesWhatItCannotHoldAndDropsNulls) {
   EXPECT_THROW(
       kOpenpylivoxBinFormat.create(folder.file("x"), foreign_header(true, 1, 1))->write(second),
       InvalidArgument);
-  EXPECT_EQ(folder.count(), 1U) << "an unfinished writer must leave nothing";
+  EXPECT_EQ(folder.names().size(), 1U) << "an unfinished writer must leave nothing";
 }
 
 TEST(Openpylivox, LargeTimesComeBack) {
-  const TemporaryFolder folder;
+  const TestFolder folder;
   const std::string first = folder.file("first.bin");
   Chunk chunk = one_row(10.0);
   chunk.observations.time_ns[0] = 1'600'000'000'123'456'789;  // a PTP clock
@@ -436,7 +436,7 @@ TEST(OpenpylivoxCsv, PointsCloserThanTheStepAreCounted) {
       chunk.observations.return_number[row] = 1;
     }
     chunk.observations.range = {5.0, 0.0001, 6.0};
-    const TemporaryFolder folder;
+    const TestFolder folder;
     const auto writer = kOpenpylivoxCsvFormat.create(folder.file("out.openpylivox.csv"), header);
     writer->write(chunk);
     writer->close();

@@ -65,7 +65,7 @@ TEST(PacketDecoder, GivesTheRowsThatAFileOfThePacketsGives) {
   }
   std::string file = header_lvx11({{"3JEDK1E001F6361", 0, kAvia}});
   put_frame(file, packages, 0);
-  const TemporaryFolder folder;
+  const TestFolder folder;
   save(folder.file("in.lvx"), file);
   const Recording recording = load_recording(folder.file("in.lvx"));
 

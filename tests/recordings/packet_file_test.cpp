@@ -11,7 +11,7 @@
 #include "risley/recordings/livox/packet_encoder.hpp"
 #include "risley/recordings/reader.hpp"
 
-#include "io/temporary_folder.hpp"
+#include "io/test_folder.hpp"
 
 namespace risley::recordings::packet_file_test {
 
@@ -38,7 +38,7 @@ std::vector<Device> devices(int count) {
 
 class PacketFileTest : public ::testing::Test {
  protected:
-  io::TemporaryFolder folder_;
+  io::TestFolder folder_;
   std::string path_ = folder_.file("a.lvx");
   std::string unfinished_ = path_ + ".unfinished";
 };

@@ -1,7 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
 #include <cmath>
-#include <filesystem>
 #include <fstream>
 #include <string>
 
@@ -11,12 +10,13 @@
 #include "risley/core/error.hpp"
 #include "risley/recordings/reader.hpp"
 
+#include "io/test_folder.hpp"
+
 namespace risley::recordings::packet_places_test {
 
 /// A Viewer table of an Avia: packets of two points, of 96, with one time each.
-std::string viewer_table() {
-  const std::string path =
-      (std::filesystem::path(testing::TempDir()) / "packet_places_test.csv").string();
+std::string viewer_table(const io::TestFolder& folder) {
+  const std::string path = folder.file("viewer.csv");
   std::ofstream file(path);
   file << "Version,Slot ID,LiDAR Index,Rsvd,Error Code,Timestamp Type,Data Type,Timestamp,X,Y,Z,"
           "Reflectivity,Tag,Ori_x,Ori_y,Ori_z,Ori_radius,Ori_theta,Ori_phi\n";
@@ -30,7 +30,8 @@ std::string viewer_table() {
 }
 
 TEST(PacketPlaces, GiveRowsTheirTimesAndEmitters) {
-  const std::string path = viewer_table();
+  const io::TestFolder folder;
+  const std::string path = viewer_table(folder);
   const Recording as_it_is = load_recording(path);
   EXPECT_EQ(as_it_is.header.packet_shots, 96);
   EXPECT_EQ(as_it_is.warnings.size(), 1u);  // of missing points
@@ -50,20 +51,22 @@ TEST(PacketPlaces, GiveRowsTheirTimesAndEmitters) {
 TEST(PacketPlaces, PutBackWhatWasCutOffCoordinates) {
   ReadOptions options;
   options.packet_places = PacketPlaces{{0, 1, 0, 1}, 240e3, {0}, true};
-  const Observations rows = load_recording(viewer_table(), {}, options).data.observations;
+  const io::TestFolder folder;
+  const Observations rows = load_recording(viewer_table(folder), {}, options).data.observations;
   EXPECT_NEAR(std::tan(rows.azimuth[0]), 0.1005 / 2.0005, 1e-6);
   EXPECT_NEAR(rows.range[0] * std::cos(rows.zenith[0]), -0.1005, 1e-6);
   EXPECT_NEAR(rows.range[0], std::hypot(2.0005, 0.1005, 0.1005), 1e-6);
 }
 
 TEST(PacketPlaces, AreRefusedTogetherWithAShotRate) {
+  const io::TestFolder folder;
   ReadOptions options;
   options.packet_places = PacketPlaces{{0, 1, 0, 1}, 240e3, {0}};
   options.shot_rate = 240e3;
-  EXPECT_THROW(load_recording(viewer_table(), {}, options), InvalidArgument);
+  EXPECT_THROW(load_recording(viewer_table(folder), {}, options), InvalidArgument);
   options.shot_rate.reset();
   options.packet_places->firing_order.clear();
-  EXPECT_THROW(load_recording(viewer_table(), {}, options), InvalidArgument);
+  EXPECT_THROW(load_recording(viewer_table(folder), {}, options), InvalidArgument);
 }
 
 }  // namespace risley::recordings::packet_places_test

@@ -49,7 +49,7 @@ class PacketTest : public ::testing::Test {
   /// Writes and checks that the same bytes come out.
   void expect_same_bytes(const std::string& bytes) { EXPECT_TRUE(write(load(bytes)) == bytes); }
 
-  TemporaryFolder folder_;
+  TestFolder folder_;
 };
 
 TEST_F(PacketTest, SphericalRecordsGiveAzimuthZenithAndRange) {

@@ -60,7 +60,7 @@ class RegistryTest : public ::testing::Test {
     return open_recording(folder_.file("renamed"))->header().format;
   }
 
-  lvx_bytes::TemporaryFolder folder_;
+  lvx_bytes::TestFolder folder_;
 };
 
 TEST_F(RegistryTest, FilesThatCannotBeARecordingAreNamed) {
@@ -153,7 +153,7 @@ TEST_F(RegistryTest, AWholeRecordingIsLoadedWithItsWarnings) {
 void expect_changes_survived(const std::string& ending, bool shrinks) {
   SCOPED_TRACE(ending);
   constexpr std::size_t kRows = 150'000;
-  const lvx_bytes::TemporaryFolder folder;
+  const lvx_bytes::TestFolder folder;
   const std::string path = folder.file("recording" + ending);
   RecordingHeader header;
   header.devices.resize(1);

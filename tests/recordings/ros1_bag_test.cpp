@@ -140,7 +140,7 @@ RawMessage imu(std::uint64_t time_ns, double acceleration_z) {
 
 struct Bag : Ros1BagFile {
   Outcome read(std::size_t chunk_rows = kDefaultChunkRows) const {
-    const TemporaryFolder folder;
+    const TestFolder folder;
     const std::string path = folder.file("input.bag");
     write(path);
     return read_all(kRos1BagFormat, path, chunk_rows);
@@ -419,7 +419,7 @@ TEST(Ros1Bag, AnyTypeNameWithTheSameMd5) {
 }
 
 TEST(Ros1Bag, OpeningAndReadingCanBeCancelled) {
-  const TemporaryFolder folder;
+  const TestFolder folder;
   const std::string path = folder.file("input.bag");
   small_bag().write(path);
   CancelFlag flag;
@@ -432,7 +432,7 @@ TEST(Ros1Bag, OpeningAndReadingCanBeCancelled) {
 }
 
 TEST(Ros1Bag, MessagesStayWhole) {
-  const TemporaryFolder folder;
+  const TestFolder folder;
   const std::string path = folder.file("input.bag");
   small_bag().write(path);
   const auto reader = kRos1BagFormat.open(path, {});
@@ -454,7 +454,7 @@ TEST(Ros1Bag, MessagesStayWhole) {
 }
 
 TEST(Ros1Bag, OpensByContentAndIsNotWritten) {
-  const TemporaryFolder folder;
+  const TestFolder folder;
   const std::string path = folder.file("without_ending");
   small_bag().write(path);
   const Recording recording = load_recording(path);
@@ -469,7 +469,7 @@ TEST(Ros1Bag, OpensByContentAndIsNotWritten) {
 
 TEST(Ros1Bag, CutAnywhere) {
   for (const auto compression : {rosbag::compression::Uncompressed, rosbag::compression::LZ4}) {
-    const TemporaryFolder folder;
+    const TestFolder folder;
     const std::string path = folder.file("input.bag");
     Bag bag = small_bag();
     bag.compression = compression;
@@ -490,7 +490,7 @@ TEST(Ros1Bag, CutAnywhere) {
 TEST(Ros1Bag, SurvivesAnyChangedByte) {
   for (const auto compression :
        {rosbag::compression::Uncompressed, rosbag::compression::BZ2, rosbag::compression::LZ4}) {
-    const TemporaryFolder folder;
+    const TestFolder folder;
     const std::string path = folder.file("input.bag");
     Bag bag = small_bag();
     bag.compression = compression;
@@ -508,7 +508,7 @@ TEST(Ros1Bag, SurvivesAnyChangedByte) {
 }
 
 TEST(Ros1Bag, NotClosed) {
-  const TemporaryFolder folder;
+  const TestFolder folder;
   const std::string path = folder.file("input.bag");
   small_bag().write(path);
   std::string bytes = get_bytes(path);
@@ -610,7 +610,7 @@ TEST(Ros1Bag, AClaimedChunkCostsNoMemory) {
   Bag bag;
   bag.compression = rosbag::compression::BZ2;
   bag.add(kTopic, custom(kPowerOn, shots(20)));
-  const TemporaryFolder folder;
+  const TestFolder folder;
   const std::string path = folder.file("input.bag");
   bag.write(path);
   std::string bytes = get_bytes(path);
@@ -633,7 +633,7 @@ TEST(Ros1Bag, AClaimedChunkCostsNoMemory) {
 }
 
 TEST(Ros1Bag, ReadersOfSeveralThreadsLeaveTheLoggingAsItWas) {
-  const TemporaryFolder folder;
+  const TestFolder folder;
   const std::string path = folder.file("input.bag");
   small_bag().write(path);
   console_bridge::OutputHandler* const handler = console_bridge::getOutputHandler();

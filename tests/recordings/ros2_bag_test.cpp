@@ -23,7 +23,7 @@ using ::testing::HasSubstr;
 
 struct Bag : Ros2BagFile {
   Outcome read(std::size_t chunk_rows = kDefaultChunkRows) const {
-    const TemporaryFolder folder;
+    const TestFolder folder;
     const std::string path = folder.file("input.db3");
     write(path).reset();
     return read_all(kRos2BagFormat, path, chunk_rows);
@@ -107,7 +107,7 @@ TEST(Ros2Bag, Clouds) {
 }
 
 TEST(Ros2Bag, InertialSamplesAndMessagesStayWhole) {
-  const TemporaryFolder folder;
+  const TestFolder folder;
   const std::string path = folder.file("input.db3");
   small_bag().write(path).reset();
   const auto reader = open_recording(path);
@@ -130,7 +130,7 @@ TEST(Ros2Bag, InertialSamplesAndMessagesStayWhole) {
   EXPECT_EQ(samples[1].time_ns, static_cast<std::int64_t>(kPowerOn) + 200'000);
   EXPECT_THAT(samples[1].angular_velocity, ElementsAre(0.25F, -0.5F, 0.125F));
   EXPECT_THAT(samples[1].acceleration_g, ElementsAre(0.0625F, -0.03125F, 1.0F));
-  EXPECT_EQ(folder.count(), 1U);  // nothing was written beside it
+  EXPECT_EQ(folder.names().size(), 1U);  // nothing was written beside it
   EXPECT_THROW(create_recording(folder.file("out.db3"), reader->header()), InvalidArgument);
 }
 
@@ -155,16 +155,16 @@ TEST(Ros2Bag, EachTopicIsADevice) {
 }
 
 TEST(Ros2Bag, ReadsWhatIsStillInTheJournal) {
-  const TemporaryFolder folder;
+  const TestFolder folder;
   const std::string path = folder.file("a b?c#d%41.db3");
   Bag bag = small_bag();
   bag.pragma = "PRAGMA journal_mode=WAL;";
   auto database = bag.write(path);
   EXPECT_EQ(read_all(kRos2BagFormat, path).rows().size(), 120U);
   database.reset();
-  EXPECT_EQ(folder.count(), 1U);
+  EXPECT_EQ(folder.names().size(), 1U);
   EXPECT_EQ(read_all(kRos2BagFormat, path).rows().size(), 120U);
-  EXPECT_EQ(folder.count(), 1U);
+  EXPECT_EQ(folder.names().size(), 1U);
 }
 
 TEST(Ros2Bag, WithoutLidarMessages) {
@@ -188,7 +188,7 @@ TEST(Ros2Bag, WithoutLidarMessages) {
 }
 
 TEST(Ros2Bag, OtherDatabasesAreRefused) {
-  const TemporaryFolder folder;
+  const TestFolder folder;
   const std::string path = folder.file("other.db3");
   sqlite3* database = nullptr;
   ASSERT_EQ(sqlite3_open(path.c_str(), &database), SQLITE_OK);
@@ -243,7 +243,7 @@ TEST(Ros2Bag, DamagedMessagesAreNamed) {
 }
 
 TEST(Ros2Bag, CutAnywhere) {
-  const TemporaryFolder folder;
+  const TestFolder folder;
   const std::string path = folder.file("input.db3");
   small_bag().write(path).reset();
   const std::string bytes = get_bytes(path);
@@ -259,7 +259,7 @@ TEST(Ros2Bag, CutAnywhere) {
 }
 
 TEST(Ros2Bag, SurvivesAnyChangedByte) {
-  const TemporaryFolder folder;
+  const TestFolder folder;
   const std::string path = folder.file("input.db3");
   small_bag().write(path).reset();
   const std::string bytes = get_bytes(path);
@@ -275,7 +275,7 @@ TEST(Ros2Bag, SurvivesAnyChangedByte) {
 
 /// A bag whose tables are changed by hand before it is read.
 Outcome read_changed(const std::string& sql, const Bag& bag = small_bag()) {
-  const TemporaryFolder folder;
+  const TestFolder folder;
   const std::string path = folder.file("input.db3");
   const auto database = bag.write(path);
   char* message = nullptr;
@@ -286,7 +286,7 @@ Outcome read_changed(const std::string& sql, const Bag& bag = small_bag()) {
 
 /// Expects a bag whose tables were changed to be given up at once when that is asked for.
 void expect_cancelled(const std::string& sql, bool while_opened) {
-  const TemporaryFolder folder;
+  const TestFolder folder;
   const std::string path = folder.file("input.db3");
   const auto database = small_bag().write(path);
   ASSERT_EQ(sqlite3_exec(database.get(), sql.c_str(), nullptr, nullptr, nullptr), SQLITE_OK);

@@ -18,7 +18,7 @@
 
 namespace risley::recordings::source_test {
 
-using format_tests::TemporaryFolder;
+using format_tests::TestFolder;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
@@ -72,7 +72,7 @@ std::vector<std::string> chunks_of(const Source& source, std::size_t max_rows) {
 }
 
 TEST(SourceTest, ColumnsInMemoryAreReadAsTheirFileIs) {
-  const TemporaryFolder folder;
+  const TestFolder folder;
   const std::string path = folder.file("packets.nc");
   const auto recording = shared(recording_of(40));
   const auto writer = create_recording(path, recording->header);
@@ -120,7 +120,7 @@ TEST(SourceTest, OptionsOfReadingHoldInMemoryToo) {
 }
 
 TEST(SourceTest, TwoSourcesAreTheSameOrNot) {
-  const TemporaryFolder folder;
+  const TestFolder folder;
   format_tests::put_bytes(folder.file("a"), "a");
   format_tests::put_bytes(folder.file("b"), "b");
   const auto recording = shared(recording_of(1));

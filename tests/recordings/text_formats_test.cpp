@@ -111,7 +111,7 @@ TEST(ScanSequence, CountsWhatItHasNoPlaceFor) {
   chunk.observations.valid[2] = 0;          // a shot without a direction
   chunk.observations.return_number[4] = 2;  // a further return of the shot before
   chunk.observations.time_ns[4] = chunk.observations.time_ns[3];
-  const TemporaryFolder folder;
+  const TestFolder folder;
   const auto writer = kScanSequenceCsvFormat.create(folder.file("out.csv"), whole.recording.header);
   writer->write(chunk);
   writer->close();
@@ -190,7 +190,7 @@ TEST(ScanSequence, NamesTheDamagedLine) {
 }
 
 TEST(ScanSequence, DamageIsReportedAgain) {
-  const TemporaryFolder folder;
+  const TestFolder folder;
   const std::string path = folder.file("damaged.csv");
   put_bytes(path, kHead + "0.00001,1.00000,2.00000\nx\n");
   auto reader = kScanSequenceCsvFormat.open(path, {});
@@ -238,7 +238,7 @@ TEST(ScanSequence, ReadsExponents) {
 }
 
 TEST(ScanSequence, WritesTimesExactToTheNanosecond) {
-  const TemporaryFolder folder;
+  const TestFolder folder;
   const std::string path = folder.file("240kHz.csv");
   RecordingHeader header;
   header.devices.resize(1);
@@ -256,7 +256,7 @@ TEST(ScanSequence, WritesTimesExactToTheNanosecond) {
 }
 
 TEST(ScanSequence, WritesOneRowPerShot) {
-  const TemporaryFolder folder;
+  const TestFolder folder;
   const std::string path = folder.file("dual.csv");
   RecordingHeader header;
   header.devices.resize(1);
@@ -274,7 +274,7 @@ TEST(ScanSequence, WritesOneRowPerShot) {
 }
 
 TEST(ScanSequence, RefusesWhatItCannotHold) {
-  const TemporaryFolder folder;
+  const TestFolder folder;
   RecordingHeader header;
   header.devices.resize(2);
   const double nan = std::numeric_limits<double>::quiet_NaN();
@@ -294,7 +294,7 @@ TEST(ScanSequence, RefusesWhatItCannotHold) {
   chunk.observations.device = {0, 1};
   EXPECT_THROW(kScanSequenceCsvFormat.create(folder.file("bad.csv"), header)->write(chunk),
                InvalidArgument);
-  EXPECT_EQ(folder.count(), 0U) << "an unfinished writer must leave nothing";
+  EXPECT_TRUE(folder.names().empty()) << "an unfinished writer must leave nothing";
   EXPECT_THROW(kScanSequenceCsvFormat.create(folder.file("no/such/folder.csv"), header), FileError);
 }
 
@@ -316,7 +316,7 @@ TEST(ScanSequence, MakersSequenceComesBackByteByByte) {
 }
 
 TEST(TextOutput, PrintsFixedDecimals) {
-  const TemporaryFolder folder;
+  const TestFolder folder;
   const std::string path = folder.file("numbers");
   TextOutput output(path);
   const std::vector<std::pair<double, int>> numbers = {{0.0, 3},     {-0.0, 2},      {1.0, 0},

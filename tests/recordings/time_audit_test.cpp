@@ -234,7 +234,7 @@ TEST(TimeAudit, AJumpWithTheSourceOfTimeIsAResetAndNoGap) {
 }
 
 TEST(TimeAudit, AFileIsAuditedWithItsWrapsAndSamples) {
-  const lvx_bytes::TemporaryFolder folder;
+  const lvx_bytes::TestFolder folder;
   std::mt19937 random(1);
   std::string file = lvx_bytes::header_lvx11({{"A", 0, 7}});
   lvx_bytes::put_frame(
@@ -274,7 +274,7 @@ TEST(TimeAudit, TimesOfAnySizeDoNotOverflow) {
 }
 
 TEST(TimeAudit, TimesTooFarApartAreDamage) {
-  const lvx_bytes::TemporaryFolder folder;
+  const lvx_bytes::TestFolder folder;
   const std::string path = folder.file("far.csv");
   lvx_bytes::save(path,
                   "Time/s,Azimuth/deg,Zenith/deg\n-9100000000.0,1.0,90.0\n-9099999999.0,1.0,90.0\n"
@@ -296,7 +296,7 @@ TEST(TimeAudit, TimesTooFarApartAreDamage) {
 }
 
 TEST(TimeAudit, PacketsStayWholeInFrontOfATimeTooFarAway) {
-  const lvx_bytes::TemporaryFolder folder;
+  const lvx_bytes::TestFolder folder;
   const std::string path = folder.file("far.lvx");
   std::mt19937 random(1);
   std::string file = lvx_bytes::header_lvx11({{"0TFDG3B006H2Z11", 0, 7}});

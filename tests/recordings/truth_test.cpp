@@ -18,20 +18,15 @@
 #include "risley/core/error.hpp"
 #include "risley/io/text_file.hpp"
 
+#include "io/test_folder.hpp"
+
 namespace risley::recordings::truth_test {
 
 namespace fs = std::filesystem;
 
 class Truth : public ::testing::Test {
  protected:
-  void SetUp() override {
-    const auto* test = ::testing::UnitTest::GetInstance()->current_test_info();
-    folder_ = fs::path(::testing::TempDir()) / (std::string("risley_truth_file_") + test->name());
-    fs::remove_all(folder_);
-    fs::create_directories(folder_);
-  }
-  void TearDown() override { fs::remove_all(folder_); }
-  std::string path() const { return (folder_ / "truth.nc").string(); }
+  std::string path() const { return folder_.file("truth.nc"); }
 
   /// Rows that all differ, beginning with row number `first`.
   static TruthColumns rows(int prisms, std::size_t first, std::size_t count) {
@@ -51,7 +46,7 @@ class Truth : public ::testing::Test {
     return t;
   }
 
-  fs::path folder_;
+  io::TestFolder folder_;
 };
 
 TEST_F(Truth, PiecesComeBackAsOneTable) {
@@ -144,7 +139,7 @@ TEST_F(Truth, AFileNotClosedLeavesNothing) {
     TruthWriter writer(path(), 2);
     writer.write(rows(2, 0, 10));
   }
-  EXPECT_TRUE(fs::is_empty(folder_));
+  EXPECT_TRUE(fs::is_empty(folder_.path()));
 }
 
 TEST_F(Truth, WrongColumnsAreRefused) {

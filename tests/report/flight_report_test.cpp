@@ -28,6 +28,7 @@
 #include "risley/sensors/preset.hpp"
 
 #include "calibration/flights.hpp"
+#include "io/test_folder.hpp"
 
 namespace risley::report::flight_report_test {
 
@@ -590,10 +591,7 @@ TEST(FlightPage, EscapesNames) {
 class FlightReportFile : public ::testing::Test {
  protected:
   std::string path(const std::string& ending = ".json") const {
-    const auto folder = std::filesystem::path(::testing::TempDir()) / "flight_report";
-    std::filesystem::create_directories(folder);
-    const auto* info = ::testing::UnitTest::GetInstance()->current_test_info();
-    return (folder / (info->name() + ending)).string();
+    return folder_.file("report" + ending);
   }
   std::string error() const {
     try {
@@ -603,6 +601,7 @@ class FlightReportFile : public ::testing::Test {
     }
     return "no error";
   }
+  io::TestFolder folder_;
 };
 
 TEST_F(FlightReportFile, ComesBackAsItWas) {

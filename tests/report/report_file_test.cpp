@@ -3,7 +3,6 @@
 #include "risley/report/report_file.hpp"
 
 #include <cmath>
-#include <filesystem>
 #include <fstream>
 #include <functional>
 #include <string>
@@ -15,6 +14,8 @@
 
 #include "risley/core/error.hpp"
 #include "risley/io/text_file.hpp"
+
+#include "io/test_folder.hpp"
 
 namespace risley::report::report_file_test {
 
@@ -111,12 +112,7 @@ CalibrationReport calibration_example() {
 
 class ReportFile : public ::testing::Test {
  protected:
-  std::string path() const {
-    const auto folder = std::filesystem::path(::testing::TempDir()) / "report_file";
-    std::filesystem::create_directories(folder);
-    const auto* info = ::testing::UnitTest::GetInstance()->current_test_info();
-    return (folder / (std::string(info->name()) + ".json")).string();
-  }
+  std::string path() const { return folder_.file("report.json"); }
   void write(const std::string& text) const { std::ofstream(path()) << text; }
   std::string error() const {
     try {
@@ -126,6 +122,7 @@ class ReportFile : public ::testing::Test {
     }
     return "no error";
   }
+  io::TestFolder folder_;
 };
 
 TEST_F(ReportFile, AnEstimateComesBackAsItWas) {

@@ -14,6 +14,7 @@
 #include "risley/core/angle.hpp"
 #include "risley/io/text_file.hpp"
 
+#include "io/test_folder.hpp"
 #include "source_tree.hpp"
 
 namespace risley::sensors::preset_test {
@@ -219,7 +220,8 @@ TEST(Preset, ThreePrismsWithOwnGlass) {
 }
 
 TEST(Preset, FileWithAPathIsRead) {
-  const std::string path = ::testing::TempDir() + "risley_preset_test.yaml";
+  const io::TestFolder folder;
+  const std::string path = folder.file("unit.yaml");
   io::write_text_file(path, preset_text(calibrated_unit()));
   expect_same(load_sensor(path), calibrated_unit());
   std::filesystem::remove(path);

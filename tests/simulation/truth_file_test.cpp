@@ -22,6 +22,7 @@
 #include "risley/trajectories/mount.hpp"
 #include "risley/trajectories/trajectory_file.hpp"
 
+#include "io/test_folder.hpp"
 #include "source_tree.hpp"
 
 namespace risley::simulation::truth_file_test {
@@ -33,14 +34,7 @@ namespace fs = std::filesystem;
 
 class TruthFile : public ::testing::Test {
  protected:
-  void SetUp() override {
-    const auto* test = ::testing::UnitTest::GetInstance()->current_test_info();
-    folder_ = fs::path(::testing::TempDir()) / (std::string("risley_truth_") + test->name());
-    fs::remove_all(folder_);
-    fs::create_directories(folder_);
-  }
-  void TearDown() override { fs::remove_all(folder_); }
-  std::string path(const std::string& name) const { return (folder_ / name).string(); }
+  std::string path(const std::string& name) const { return folder_.file(name); }
 
   SimulationSettings settings() const {
     SimulationSettings s;
@@ -53,7 +47,7 @@ class TruthFile : public ::testing::Test {
     return s;
   }
 
-  fs::path folder_;
+  io::TestFolder folder_;
 };
 
 TEST_F(TruthFile, RecordingAndTruthComeBack) {
@@ -228,18 +222,18 @@ TEST_F(TruthFile, AFlightThatCannotBeWrittenLeavesNothing) {
   SimulationSettings s = flying();
   s.platform->trajectory_ending = ".sbet";  // of a trajectory that is not on the Earth
   EXPECT_THROW(simulate_to_file(s, path("out.nc"), {}), InvalidArgument);
-  EXPECT_TRUE(fs::is_empty(folder_));
+  EXPECT_TRUE(fs::is_empty(folder_.path()));
   s.platform->trajectory_ending = ".csv";
   EXPECT_THROW(simulate_to_file(s, path("out.unknown"), {}), InvalidArgument);
   const Progress cancelled([](double) { throw Cancelled(); });
   EXPECT_THROW(simulate_to_file(s, path("out.nc"), {}, cancelled), Cancelled);
-  EXPECT_TRUE(fs::is_empty(folder_));
+  EXPECT_TRUE(fs::is_empty(folder_.path()));
 }
 
 TEST_F(TruthFile, NothingIsLeftWhenTheOutputCannotBeWritten) {
   EXPECT_THROW(simulate_to_file(settings(), path("out.unknown"), {}), InvalidArgument);
   EXPECT_THROW(simulate_to_file(settings(), path("missing/out.nc"), {}), FileError);
-  EXPECT_TRUE(fs::is_empty(folder_));
+  EXPECT_TRUE(fs::is_empty(folder_.path()));
 }
 
 }  // namespace risley::simulation::truth_file_test

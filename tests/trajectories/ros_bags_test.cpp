@@ -23,7 +23,7 @@
 
 #include "bags/written_bags.hpp"
 #include "bags/written_mcap.hpp"
-#include "io/temporary_folder.hpp"
+#include "io/test_folder.hpp"
 #include "trajectories/known_flight.hpp"
 
 namespace risley::trajectories::ros_bags_test {
@@ -109,8 +109,8 @@ struct TopicOfSamples {
   std::vector<Sample> samples;
 };
 
-const io::TemporaryFolder& folder() {
-  static const io::TemporaryFolder one;
+const io::TestFolder& folder() {
+  static const io::TestFolder one;
   return one;
 }
 

@@ -17,7 +17,7 @@
 #include "risley/trajectories/interpolation.hpp"
 #include "risley/trajectories/trajectory_file.hpp"
 
-#include "io/temporary_folder.hpp"
+#include "io/test_folder.hpp"
 #include "trajectories/known_flight.hpp"
 
 namespace risley::trajectories::sbet_test {
@@ -27,8 +27,8 @@ using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
-const io::TemporaryFolder& folder() {
-  static const io::TemporaryFolder one;
+const io::TestFolder& folder() {
+  static const io::TestFolder one;
   return one;
 }
 
