@@ -21,7 +21,8 @@ MEASURING = ("bench",)  # programs that measure what is private, as tests test i
 BINDINGS = "python"  # src/python: may use every layer's public headers, and nothing may use it
 # Libraries with one home: what others need of them, they ask that layer for.
 HOMES = {"netcdf": "io", "hdf5": "io", "yaml-cpp": "io", "openssl": "io", "sqlite3": "io", "pcap": "recordings",
-         "proj": "cloud", "proj_experimental": "cloud", "pybind11": BINDINGS}
+         "proj": "cloud", "proj_experimental": "cloud", "pybind11": BINDINGS, "tbb": "parallel", "oneapi": "parallel"}
+LIMITED_BY_PROGRAMS = ("tbb",)  # whose threads they may limit
 STRANGERS = ("simulation", "estimation")  # they meet only in tests, so their agreement counts
 
 
@@ -85,7 +86,7 @@ def check_file(path, shown, own, allowed, layers):
             errors.append(f'{shown}:{number}: "{include}" hides its layer, name it from the root')
             continue
         library = library_of(include)
-        if library and own != HOMES[library]:
+        if library and own != HOMES[library] and not (own is None and library in LIMITED_BY_PROGRAMS):
             errors.append(f"{shown}:{number}: only the layer {HOMES[library]} may include {include}")
         layer, private = included_layer(include, layers)
         if layer is None or layer == own == BINDINGS:

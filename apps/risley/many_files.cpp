@@ -17,8 +17,6 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <spdlog/spdlog.h>
-#include <tbb/parallel_for.h>
-#include <tbb/task_arena.h>
 #include <unistd.h>
 
 #include "risley/core/error.hpp"
@@ -29,6 +27,7 @@
 #include "risley/jobs/inputs.hpp"
 #include "risley/jobs/result_record.hpp"
 #include "risley/json/result_columns.hpp"
+#include "risley/parallel/parallel.hpp"
 #include "risley/recordings/reader.hpp"
 
 #include "recording_text.hpp"
@@ -214,7 +213,7 @@ bool is_large(const std::string& input) {
     const std::uintmax_t size = fs::file_size(file, code);
     if (!code) bytes += static_cast<double>(size);
   }
-  return kMemoryPerByte * bytes * tbb::this_task_arena::max_concurrency() > memory;
+  return kMemoryPerByte * bytes * static_cast<double>(parallel::thread_count()) > memory;
 }
 
 /// Whether the same failure would come of the same bytes again: neither the machine nor another
@@ -276,8 +275,7 @@ class Runner {
       Finished finished;
       const double started = now();
       try {
-        // A thread that waits within one file must not begin another.
-        tbb::this_task_arena::isolate([&] { finished = outcome_of(i, progress.of(i)); });
+        finished = outcome_of(i, progress.of(i));
       } catch (const Cancelled&) {
         throw;
       } catch (...) {
@@ -293,9 +291,7 @@ class Runner {
       (is_large(jobs_[i].input) ? alone : together).push_back(i);
     }
     try {
-      tbb::parallel_for(
-          std::size_t{0}, together.size(), [&](std::size_t k) { run_one(together[k]); },
-          tbb::simple_partitioner());
+      parallel::for_each_job(together.size(), [&](std::size_t k) { run_one(together[k]); });
       for (const std::size_t i : alone) run_one(i);
     } catch (const Cancelled&) {
       return false;

@@ -6,7 +6,8 @@
 #include <utility>
 
 #include <Eigen/Cholesky>
-#include <tbb/parallel_for.h>
+
+#include "risley/parallel/parallel.hpp"
 
 namespace risley::calibration {
 namespace {
@@ -25,16 +26,16 @@ Cholesky::Cholesky(MatrixXd matrix) : factor_(std::move(matrix)) {
     Eigen::Ref<MatrixXd> corner = factor_.block(at, at, width, width);
     const Eigen::LLT<Eigen::Ref<MatrixXd>> own(corner);
     if (own.info() != Eigen::Success) return;
-    const Index tiles = (size - behind + kTile - 1) / kTile;
+    const auto tiles = static_cast<std::size_t>((size - behind + kTile - 1) / kTile);
     const auto rows_of = [&](Index tile) {
       return std::pair{behind + tile * kTile, std::min(kTile, size - behind - tile * kTile)};
     };
-    tbb::parallel_for(Index{0}, tiles, [&](Index tile) {
+    parallel::for_each(tiles, [&](Index tile) {
       const auto [row, rows] = rows_of(tile);
       own.matrixL().transpose().solveInPlace<Eigen::OnTheRight>(
           factor_.block(row, at, rows, width));
     });
-    tbb::parallel_for(Index{0}, tiles * (tiles + 1) / 2, [&](Index number) {
+    parallel::for_each(tiles * (tiles + 1) / 2, [&](Index number) {
       Index tile = 0;  // of the rows; columns of up to as many tiles
       while (number > tile) number -= ++tile;
       const auto [row, rows] = rows_of(tile);

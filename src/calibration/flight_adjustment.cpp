@@ -10,12 +10,12 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 #include <fmt/format.h>
-#include <tbb/parallel_for.h>
 
 #include "risley/algebra/symmetric.hpp"
 #include "risley/calibration/planar_adjustment.hpp"
 #include "risley/core/error.hpp"
 #include "risley/core/require.hpp"
+#include "risley/parallel/parallel.hpp"
 
 #include "calibration/cholesky.hpp"
 #include "calibration/eigen_vectors.hpp"
@@ -224,7 +224,7 @@ void FlightSystem::Parts::eliminate(const FlightEquations& equations, const Flig
   const Listing blocks(planes, equations.plane_blocks.size(),
                        [&](std::size_t i) { return equations.plane_blocks[i].plane; });
   eliminated.resize(planes);
-  tbb::parallel_for(std::size_t{0}, planes, [&](std::size_t p) {
+  parallel::for_each(planes, [&](std::size_t p) {
     Matrix3d own = known[p].information.asDiagonal();
     Vector3d gradient = known[p].information.cwiseProduct(known[p].off);
     MatrixXd by_global = MatrixXd::Zero(3, globals);
@@ -279,7 +279,7 @@ void FlightSystem::Parts::reduce(MatrixXd& hessian) {
   });
   const Index g0 = first_global();
   // Each task has the columns of one knot for itself.
-  tbb::parallel_for(Index{0}, knots, [&](Index knot) {
+  parallel::for_each(static_cast<std::size_t>(knots), [&](Index knot) {
     const Index column = kCorrections * knot;
     const auto key = static_cast<std::size_t>(knot);
     for (std::size_t i = by_knot.begin[key]; i < by_knot.begin[key + 1]; ++i) {
@@ -415,7 +415,7 @@ MatrixXd FlightSystem::solve(const MatrixXd& right) const {
 MatrixXd FlightSystem::planes_of(const MatrixXd& solution) const {
   const Parts& p = *parts_;
   MatrixXd result(3 * static_cast<Index>(p.planes), solution.cols());
-  tbb::parallel_for(std::size_t{0}, p.planes, [&](std::size_t i) {
+  parallel::for_each(p.planes, [&](std::size_t i) {
     const EliminatedPlane& plane = p.eliminated[i];
     MatrixXd sum = plane.globals * solution.bottomRows(p.globals);
     for (std::size_t k = 0; k < plane.knots.size(); ++k) {
@@ -448,7 +448,7 @@ VectorXd FlightSystem::inverse_diagonal() const {
   const Index n = size(), blocks = (n + kInverseColumns - 1) / kInverseColumns;
   VectorXd diagonal = VectorXd::Zero(n);
   // Column j of L^-1 begins in row j; the diagonal sums up the squares of its columns.
-  tbb::parallel_for(Index{0}, blocks, [&](Index block) {
+  parallel::for_each(static_cast<std::size_t>(blocks), [&](Index block) {
     const Index at = block * kInverseColumns, columns = std::min(kInverseColumns, n - at);
     MatrixXd part = MatrixXd::Zero(n - at, columns);
     part.topRows(columns).setIdentity();

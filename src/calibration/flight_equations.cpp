@@ -6,13 +6,13 @@
 #include <cmath>
 
 #include <fmt/format.h>
-#include <tbb/enumerable_thread_specific.h>
-#include <tbb/parallel_for.h>
 
 #include "risley/calibration/planar_adjustment.hpp"
 #include "risley/core/error.hpp"
 #include "risley/core/require.hpp"
 #include "risley/optics/batch.hpp"
+#include "risley/parallel/parallel.hpp"
+#include "risley/parallel/pool.hpp"
 #include "risley/trajectories/mount.hpp"
 
 #include "calibration/eigen_vectors.hpp"
@@ -306,9 +306,10 @@ FlightEquations flight_equations(const FlightShots& shots, const ShotPoses& pose
   const auto triangle = static_cast<std::size_t>(main * (main + 1) / 2);
   const auto block = static_cast<std::size_t>(kPlaneColumns * (main + kPlaneColumns));
   std::vector<PieceSums> sums(pieces.size());
-  tbb::enumerable_thread_specific<RunSorter> sorters;
-  tbb::parallel_for(std::size_t{0}, pieces.size(), [&](std::size_t i) {
-    RunSorter& sorter = sorters.local();
+  parallel::Pool<RunSorter> sorters;
+  parallel::for_each(pieces.size(), [&](std::size_t i) {
+    const auto taken = sorters.take();
+    RunSorter& sorter = *taken;
     sorter.sort(plane, model.planes.size(), pieces[i]);
     PieceSums& own = sums[i];
     own.planes = sorter.planes();
@@ -388,9 +389,10 @@ void for_each_flight_piece(
   const FlightCalls calls(shots, poses, plane, model, weights, set);
   const std::vector<FlightPiece> pieces = pieces_of(model.knots);
   const int columns = calls.globals() + kCorrections + kPlaneColumns + 3;
-  tbb::enumerable_thread_specific<RunSorter> sorters;
-  tbb::parallel_for(std::size_t{0}, pieces.size(), [&](std::size_t i) {
-    RunSorter& sorter = sorters.local();
+  parallel::Pool<RunSorter> sorters;
+  parallel::for_each(pieces.size(), [&](std::size_t i) {
+    const auto taken = sorters.take();
+    RunSorter& sorter = *taken;
     sorter.sort(plane, model.planes.size(), pieces[i]);
     std::vector<double> values(sorter.order().size() * static_cast<std::size_t>(columns));
     FlightArguments wanted;

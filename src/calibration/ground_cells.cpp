@@ -10,12 +10,12 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Geometry>
-#include <tbb/parallel_for.h>
 
 #include "risley/core/error.hpp"
 #include "risley/core/median.hpp"
 #include "risley/core/require.hpp"
 #include "risley/optics/batch.hpp"
+#include "risley/parallel/parallel.hpp"
 
 #include "calibration/shot_blocks.hpp"
 
@@ -251,7 +251,7 @@ ShotPoints georeferenced(const FlightShots& shots, const ShotPoses& poses,
     }
   };
   const auto& intervals = model.knots.intervals;
-  tbb::parallel_for(std::size_t{0}, intervals.size(), [&](std::size_t i) {
+  parallel::for_each(intervals.size(), [&](std::size_t i) {
     require_rows("shots of an interval", intervals[i].first_shot, intervals[i].end_shot,
                  shots.size());
     for (std::size_t begin = intervals[i].first_shot; begin < intervals[i].end_shot;
@@ -292,7 +292,7 @@ GroundCells ground_cells(const ShotPoints& points, const std::vector<std::uint16
   });
   const SortedRows rows(numbers.size(), cells.plane, kNoPlane);
   std::vector<Outcome> outcome(numbers.size());
-  tbb::parallel_for(std::size_t{0}, numbers.size(), [&](std::size_t cell) {
+  parallel::for_each(numbers.size(), [&](std::size_t cell) {
     const auto own = rows.of(cell);
     if (own.size() < options.least_shots) return;
     std::size_t strips = 1;  // rows ascend, and so do their strips
@@ -362,7 +362,7 @@ std::vector<StripInCell> strips_in_cells(const ShotPoints& points,
   require_threshold("gate", gate);
   const SortedRows rows(planes.size(), plane, kNoPlane);
   std::vector<std::vector<StripInCell>> seen(planes.size());
-  tbb::parallel_for(std::size_t{0}, planes.size(), [&](std::size_t p) {
+  parallel::for_each(planes.size(), [&](std::size_t p) {
     const auto own = rows.of(p);
     for (std::size_t i = 0; i < own.size();) {
       StripInCell one{p, strip[own[i]], 0, 0};

@@ -7,14 +7,13 @@
 #include <cmath>
 #include <numeric>
 
-#include <tbb/parallel_for.h>
-
 #include "risley/algebra/products.hpp"
 #include "risley/algebra/symmetric.hpp"
 #include "risley/calibration/fitted_plane.hpp"
 #include "risley/core/error.hpp"
 #include "risley/optics/batch.hpp"
 #include "risley/optics/beam_origin.hpp"
+#include "risley/parallel/parallel.hpp"
 
 namespace risley::calibration {
 namespace {
@@ -72,7 +71,7 @@ class View {
   Cloud cloud() const {
     Cloud cloud;
     cloud.points.resize(shots_.size());
-    tbb::parallel_for(std::size_t{0}, blocks(), [&](std::size_t block) {
+    parallel::for_each(blocks(), [&](std::size_t block) {
       for (std::size_t i = begin(block); i < end(block); ++i) {
         const auto trace = trace_forward(prepared_[beam(i)], angles(i));
         cloud.points[i] = beam_origin(trace, face_position_) + shots_.range[i] * trace.direction();
@@ -88,7 +87,7 @@ class View {
     const auto free = static_cast<Index>(p_.free.size()), size = free + 3;
     const auto [t1, t2] = tangents_of(cloud.plane.normal);
     std::vector<Sums> parts(blocks());
-    tbb::parallel_for(std::size_t{0}, blocks(), [&, t1 = t1, t2 = t2](std::size_t block) {
+    parallel::for_each(blocks(), [&, t1 = t1, t2 = t2](std::size_t block) {
       Sums& part = parts[block];
       part = Sums(size);
       Eigen::VectorXd row(size);

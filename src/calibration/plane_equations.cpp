@@ -5,9 +5,9 @@
 #include <algorithm>
 
 #include <fmt/format.h>
-#include <tbb/parallel_for.h>
 
 #include "risley/core/error.hpp"
+#include "risley/parallel/parallel.hpp"
 
 #include "calibration/entry_checks.hpp"
 #include "calibration/plane_equations_kernel.hpp"
@@ -82,7 +82,7 @@ PlaneEquations plane_equations(const RangedShots& shots, const PlaneView& view,
   const std::size_t chunks = (shots.size() + kChunkShots - 1) / kChunkShots;
   std::vector<double> products(chunks * triangle);
   std::vector<std::size_t> lost(chunks);
-  tbb::parallel_for(std::size_t{0}, chunks, [&](std::size_t chunk) {
+  parallel::for_each(chunks, [&](std::size_t chunk) {
     PlaneArguments mine = all;
     mine.begin = chunk * kChunkShots;
     mine.end = std::min(mine.begin + kChunkShots, shots.size());

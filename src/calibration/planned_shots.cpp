@@ -8,14 +8,13 @@
 #include <span>
 #include <utility>
 
-#include <tbb/parallel_for.h>
-
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
 #include "risley/core/random.hpp"
 #include "risley/core/require.hpp"
 #include "risley/optics/batch.hpp"
 #include "risley/optics/observation_model.hpp"
+#include "risley/parallel/parallel.hpp"
 #include "risley/trajectories/interpolation.hpp"
 
 namespace risley::calibration {
@@ -86,7 +85,7 @@ std::vector<double> ranges_of(const PlannedFlight& planned, const scenes::Terrai
   piece.x.resize(n);
   piece.y.resize(n);
   piece.z.resize(n);
-  tbb::parallel_for(std::size_t{0}, (n + kTaskShots - 1) / kTaskShots, [&](std::size_t task) {
+  parallel::for_each((n + kTaskShots - 1) / kTaskShots, [&](std::size_t task) {
     auto cursor = poses.cursor();
     for (std::size_t i = task * kTaskShots; i < std::min(n, (task + 1) * kTaskShots); ++i) {
       if (std::isnan(beams[0][i])) continue;

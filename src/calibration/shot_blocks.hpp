@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cstddef>
 
-#include <tbb/parallel_for.h>
+#include "risley/parallel/parallel.hpp"
 
 namespace risley::calibration {
 
@@ -20,7 +20,7 @@ inline std::size_t block_count(std::size_t shots) {
 /// Calls function(begin, end) for blocks of so many shots, in parallel.
 template <class Function>
 void for_each_block(std::size_t shots, const Function& function) {
-  tbb::parallel_for(std::size_t{0}, block_count(shots), [&](std::size_t block) {
+  parallel::for_each(block_count(shots), [&](std::size_t block) {
     const std::size_t begin = block * kBlockShots;
     function(begin, std::min(begin + kBlockShots, shots));
   });

@@ -4,9 +4,8 @@
 
 #include <cmath>
 
-#include <tbb/parallel_for.h>
-
 #include "risley/calibration/surface_steps.hpp"
+#include "risley/parallel/parallel.hpp"
 
 namespace risley::calibration {
 namespace {
@@ -21,7 +20,7 @@ std::vector<SurfaceReport> inspect_views(const PlanarProblem& problem,
                                          const std::vector<LabelledShots>& recordings,
                                          const LabelsOf& labels_of) {
   std::vector<SurfaceReport> reports(problem.views.size());
-  tbb::parallel_for(std::size_t{0}, reports.size(), [&](std::size_t v) {
+  parallel::for_each(reports.size(), [&](std::size_t v) {
     const LabelledShots& recording = recordings[problem.views[v].recording];
     const ViewDistances d = view_distances(problem, v, recording, labels_of(recording.labels));
     reports[v] = inspect_surface({d.azimuth, d.zenith, d.distance, d.sigma});

@@ -9,11 +9,11 @@
 #include <utility>
 
 #include <fmt/format.h>
-#include <tbb/parallel_for.h>
 
 #include "risley/calibration/fitted_plane.hpp"
 #include "risley/calibration/rays.hpp"
 #include "risley/core/angle.hpp"
+#include "risley/parallel/parallel.hpp"
 
 #include "calibration/shot_blocks.hpp"
 
@@ -155,7 +155,7 @@ WallThickness wall_thickness(const PlanarProblem& problem, const PrismTrain& bel
                           kTurnBins);
   }
   std::vector<ViewThickness> views(problem.views.size());
-  tbb::parallel_for(std::size_t{0}, views.size(), [&, empty = builders](std::size_t v) {
+  parallel::for_each(views.size(), [&, empty = builders](std::size_t v) {
     views[v] = thickness_of(problem, v, believed, recordings[problem.views[v].recording], empty);
   });
   WallThickness result;

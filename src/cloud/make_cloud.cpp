@@ -13,14 +13,12 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <fmt/format.h>
-#include <tbb/parallel_pipeline.h>
-#include <tbb/task_arena.h>
-#include <tbb/task_group.h>
 
 #include "risley/cloud/surface_normals.hpp"
 #include "risley/core/angle.hpp"
 #include "risley/core/require.hpp"
 #include "risley/optics/observation_model.hpp"
+#include "risley/parallel/parallel.hpp"
 #include "risley/trajectories/clock.hpp"
 
 #include "cloud/georeference_kernel.hpp"
@@ -116,7 +114,7 @@ class Work {
       // While the points of one piece are made and written, the next is read and its rotors
       // tracked.
       std::unique_ptr<Piece> next;
-      tbb::task_group ahead;
+      parallel::TaskGroup ahead;
       if (piece_->more) ahead.run([&] { next = piece_after(*piece_); });
       emit();
       ahead.wait();
@@ -449,29 +447,19 @@ class Work {
   /// Blocks are made in parallel and written in order. No more of them are on their way than there
   /// are, and they finish in order, so each is free again when its turn comes.
   void write_rows(std::size_t begin, std::size_t end) {
-    const auto threads = static_cast<std::size_t>(tbb::this_task_arena::max_concurrency());
+    const std::size_t threads = parallel::thread_count();
     blocks_.resize(threads > 1 ? 2 * threads : 1);
-    std::size_t next = begin, turn = 0;
-    const auto choose = [&](tbb::flow_control& control) -> Block* {
-      if (next == end) {
-        control.stop();
-        return nullptr;
-      }
-      Block* block = &blocks_[turn++ % blocks_.size()];
-      next = choose_rows(next, end, *block);
-      return block;
+    std::size_t next = begin;
+    const auto choose = [&](std::size_t slot) {
+      if (next == end) return false;
+      next = choose_rows(next, end, blocks_[slot]);
+      return true;
     };
-    const auto compute_block = [this](Block* block) {
-      compute(*block);
-      return block;
-    };
-    const auto write_block = [this](Block* block) { write(*block); };
-    using tbb::filter_mode;
-    tbb::parallel_pipeline(
-        blocks_.size(),
-        tbb::make_filter<void, Block*>(filter_mode::serial_in_order, choose) &
-            tbb::make_filter<Block*, Block*>(filter_mode::parallel, compute_block) &
-            tbb::make_filter<Block*, void>(filter_mode::serial_in_order, write_block));
+    using Order = parallel::Stage::Order;
+    parallel::run_pipeline(
+        blocks_.size(), choose,
+        {{Order::as_they_come, [this](std::size_t slot) { compute(blocks_[slot]); }},
+         {Order::in_turn, [this](std::size_t slot) { write(blocks_[slot]); }}});
   }
 
   /// Takes up to kBlockRows rows that have a return. @return where the next block begins

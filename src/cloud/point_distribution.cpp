@@ -11,12 +11,12 @@
 #include <utility>
 
 #include <fmt/format.h>
-#include <tbb/parallel_for.h>
 
 #include "risley/core/angle.hpp"
 #include "risley/core/direction.hpp"
 #include "risley/core/error.hpp"
 #include "risley/core/require.hpp"
+#include "risley/parallel/parallel.hpp"
 #include "risley/sensors/scan_pattern.hpp"
 
 namespace risley::cloud {
@@ -623,7 +623,7 @@ class PointDistribution::Work {
     });
     const std::vector<std::pair<std::int32_t, std::int32_t>> blocks(places.begin(), places.end());
     std::vector<EmptyCircles> found(blocks.size());
-    tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t i) {
+    parallel::for_each(blocks.size(), [&](std::size_t i) {
       found[i] =
           circles_of_block(pixels_, blocks[i].first, blocks[i].second, ground, half_swath, pixel_);
     });

@@ -11,7 +11,6 @@
 
 #include <Eigen/Geometry>
 #include <fmt/format.h>
-#include <tbb/parallel_for.h>
 
 #include "risley/algebra/symmetric.hpp"
 #include "risley/core/direction.hpp"
@@ -21,6 +20,7 @@
 #include "risley/estimation/normal_equations.hpp"
 #include "risley/estimation/spectral_lines.hpp"
 #include "risley/optics/batch.hpp"
+#include "risley/parallel/parallel.hpp"
 
 #include "estimation/field_of_view.hpp"
 #include "estimation/frame_prior.hpp"
@@ -418,7 +418,7 @@ std::vector<Answer> answers_of(const StartWindow& window, const std::vector<Tria
     if (trial.lines.unexplained > std::max(kHopeless * least, kSecondOrder)) continue;
     answers.emplace_back().trial = trial;
   }
-  tbb::parallel_for(std::size_t{0}, answers.size(), [&](std::size_t i) {
+  parallel::for_each(answers.size(), [&](std::size_t i) {
     answers[i] = window.answer(answers[i].trial, kEnoughShots, frame_is_free);
   });
   sort_by_likelihood(answers, window.size(kEnoughShots));

@@ -5,13 +5,12 @@
 #include <algorithm>
 #include <limits>
 
-#include <tbb/enumerable_thread_specific.h>
-#include <tbb/parallel_for.h>
-
 #include "risley/core/require.hpp"
+#include "risley/parallel/in_order.hpp"
+#include "risley/parallel/parallel.hpp"
+#include "risley/parallel/pool.hpp"
 
 #include "estimation/entry_checks.hpp"
-#include "estimation/in_order.hpp"
 #include "estimation/kernel_call.hpp"
 #include "estimation/normal_equations_kernel.hpp"
 
@@ -197,8 +196,8 @@ void accumulate(const AngleSeries& series, const RotorTrajectory& knots, const P
   if (has_unknown_beam(series, knots, train)) {
     check_beams(train, series.beam, series.size());
   }
-  tbb::parallel_for(std::size_t{0}, sums.blocks(),
-                    [&](std::size_t block) { sums.add(block, series, 0, columns); });
+  parallel::for_each(sums.blocks(),
+                     [&](std::size_t block) { sums.add(block, series, 0, columns); });
   sums.finish();
 }
 
@@ -210,11 +209,12 @@ void accumulate(const PackedSeries& series, const RotorTrajectory& knots, const 
   if (series.size() > 0 && series.largest_beam() >= train.emitters()) {
     check_beams(train, series.rows().beam, series.size());
   }
-  tbb::enumerable_thread_specific<Unpacked> memory;
-  in_order(
+  parallel::Pool<Unpacked> memory;
+  parallel::in_order(
       sums.blocks(),
       [&](std::size_t block) -> std::function<void()> {
-        Unpacked& own = memory.local();
+        const auto taken = memory.take();
+        Unpacked& own = *taken;
         const ShotRange served = sums.knots_of(block);
         const ShotRange shots{knots.first_shot[served.begin], knots.last_shot[served.end - 1]};
         series.rows(shots, own.rows);

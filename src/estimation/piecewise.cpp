@@ -5,17 +5,15 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <mutex>
 #include <optional>
 
 #include <fmt/format.h>
-#include <tbb/parallel_for.h>
-#include <tbb/task_arena.h>
 
 #include "risley/algebra/products.hpp"
 #include "risley/algebra/symmetric.hpp"
 #include "risley/core/error.hpp"
 #include "risley/estimation/batch_map.hpp"
+#include "risley/parallel/parallel.hpp"
 
 namespace risley::estimation {
 namespace {
@@ -88,17 +86,13 @@ PiecewiseEstimate estimate_piecewise(const Estimate& estimate, const sensors::Se
   if (pieces < 1) throw InvalidArgument(fmt::format("pieces = {}, allowed 1 or more", pieces));
   std::vector<std::optional<Piece>> all(pieces);
   const std::size_t shots = estimate.series.size();
-  std::mutex mutex;
-  std::size_t done = 0;
-  tbb::parallel_for(std::size_t{0}, pieces, [&](std::size_t i) {
-    // A thread that waits within one piece must not begin another and then wait for the mutex.
-    tbb::this_task_arena::isolate([&] {
-      all[i] = estimate_piece(estimate, sensor, {i * shots / pieces, (i + 1) * shots / pieces},
-                              progress.silent());
-    });
-    const std::lock_guard lock(mutex);
-    progress.report(static_cast<double>(++done) / static_cast<double>(pieces));
-  });
+  parallel::for_each_job(
+      pieces,
+      [&](std::size_t i) {
+        all[i] = estimate_piece(estimate, sensor, {i * shots / pieces, (i + 1) * shots / pieces},
+                                progress.silent());
+      },
+      progress);
   std::vector<Piece> sound;
   PiecewiseEstimate result;
   result.value.resize(estimate.free.size());

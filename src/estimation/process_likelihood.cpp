@@ -6,11 +6,10 @@
 #include <cmath>
 #include <limits>
 
-#include <tbb/parallel_for.h>
-
 #include "risley/algebra/symmetric.hpp"
 #include "risley/core/golden_section.hpp"
 #include "risley/core/require.hpp"
+#include "risley/parallel/parallel.hpp"
 
 #include "estimation/knot_model.hpp"
 
@@ -183,7 +182,7 @@ std::vector<RotorProcess> likeliest_process(const NormalEquations& equations,
   constexpr std::size_t kMostWindows = 3000;
   const double length = window_length(linearisation);
   std::vector<RotorProcess> result(static_cast<std::size_t>(linearisation.prisms));
-  tbb::parallel_for(0, linearisation.prisms, [&](int rotor) {
+  parallel::for_each(result.size(), [&](int rotor) {
     const RotorWindows windows(equations, linearisation, rotor, kMostWindows, length);
     const auto cost = [&](double acceleration, double jerk) {
       return -windows.log_likelihood(process_of(acceleration, jerk));

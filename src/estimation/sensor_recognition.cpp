@@ -10,7 +10,6 @@
 #include <utility>
 
 #include <Eigen/Core>
-#include <tbb/parallel_for_each.h>
 
 #include "risley/core/angle.hpp"
 #include "risley/core/direction.hpp"
@@ -21,6 +20,7 @@
 #include "risley/estimation/initialisation.hpp"
 #include "risley/estimation/spectral_lines.hpp"
 #include "risley/optics/observation_model.hpp"
+#include "risley/parallel/parallel.hpp"
 
 #include "estimation/field_of_view.hpp"
 
@@ -263,8 +263,11 @@ class LineMatcher {
         }
       }
     }
-    tbb::parallel_for_each(
-        found, [&](auto& one) { one.second = search.near(one.first, kSpeedShare, kMostMinima); });
+    std::vector<decltype(found)::value_type*> each;
+    for (auto& one : found) each.push_back(&one);
+    parallel::for_each(each.size(), [&](std::size_t i) {
+      each[i]->second = search.near(each[i]->first, kSpeedShare, kMostMinima);
+    });
     return found;
   }
 

@@ -9,12 +9,12 @@
 
 #include <Eigen/LU>
 #include <fmt/format.h>
-#include <tbb/parallel_pipeline.h>
 
 #include "risley/algebra/products.hpp"
 #include "risley/algebra/symmetric.hpp"
 #include "risley/core/error.hpp"
 #include "risley/core/require.hpp"
+#include "risley/parallel/parallel.hpp"
 
 #include "estimation/knot_model.hpp"
 
@@ -35,29 +35,18 @@ constexpr std::size_t kStageKnots = 4 * kStackedKnots, kBlocks = 6;
 template <class Block, class First, class Second, class Third>
 void run_stages(std::size_t knots, std::vector<Block>& blocks, const First& first,
                 const Second& second, const Third& third) {
-  std::size_t next = 0, turn = 0;
-  const auto stage = [](const auto& work) {
-    return tbb::make_filter<Block*, Block*>(tbb::filter_mode::serial_in_order,
-                                            [&work](Block* block) {
-                                              work(*block);
-                                              return block;
-                                            });
+  std::size_t next = 0;
+  const auto choose = [&](std::size_t slot) {
+    if (next == knots) return false;
+    blocks[slot].begin = next;
+    blocks[slot].end = next = std::min(next + kStageKnots, knots);
+    return true;
   };
-  const auto choose = [&](tbb::flow_control& control) -> Block* {
-    if (next == knots) {
-      control.stop();
-      return nullptr;
-    }
-    Block& block = blocks[turn++ % kBlocks];
-    block.begin = next;
-    block.end = next = std::min(next + kStageKnots, knots);
-    return &block;
+  const auto stage = [&](const auto& work) {
+    return parallel::Stage{parallel::Stage::Order::in_turn,
+                           [&](std::size_t slot) { work(blocks[slot]); }};
   };
-  tbb::parallel_pipeline(
-      kBlocks, tbb::make_filter<void, Block*>(tbb::filter_mode::serial_in_order, choose) &
-                   stage(first) & stage(second) &
-                   tbb::make_filter<Block*, void>(tbb::filter_mode::serial_in_order,
-                                                  [&third](Block* block) { third(*block); }));
+  parallel::run_pipeline(kBlocks, choose, {stage(first), stage(second), stage(third)});
 }
 
 /// Of N rotors, which may be Eigen::Dynamic.

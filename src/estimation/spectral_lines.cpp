@@ -9,7 +9,6 @@
 #include <utility>
 
 #include <fmt/format.h>
-#include <tbb/parallel_for.h>
 #include <unsupported/Eigen/FFT>
 
 #include "risley/core/angle.hpp"
@@ -17,6 +16,7 @@
 #include "risley/core/error.hpp"
 #include "risley/core/golden_section.hpp"
 #include "risley/optics/prism_train.hpp"
+#include "risley/parallel/parallel.hpp"
 
 namespace risley::estimation {
 namespace {
@@ -166,7 +166,7 @@ LineSearch::LineSearch(const AngleSeries& series) {
     emitter_.push_back(place);
     value_.push_back(value);
   }
-  tbb::parallel_for(std::size_t{0}, emitters_.size() + 1, [&](std::size_t j) {
+  parallel::for_each(emitters_.size() + 1, [&](std::size_t j) {
     Eigen::FFT<double> fft;
     if (j < emitters_.size()) {
       fft.fwd(emitters_[j].spectrum, shot_grids[j]);
@@ -350,8 +350,7 @@ std::vector<RotorLines> LineSearch::best_of(std::span<const Bins> bins, bool ord
       taken.push_back(*next);
     }
     std::vector<RotorLines> best(taken.size());
-    tbb::parallel_for(std::size_t{0}, taken.size(),
-                      [&](std::size_t i) { best[i] = refined<Lines>(taken[i]); });
+    parallel::for_each(taken.size(), [&](std::size_t i) { best[i] = refined<Lines>(taken[i]); });
     std::stable_sort(best.begin(), best.end(), [](const RotorLines& a, const RotorLines& b) {
       return a.unexplained < b.unexplained;
     });

@@ -12,8 +12,7 @@
 #include "risley/estimation/batch_map.hpp"
 #include "risley/estimation/estimate.hpp"
 #include "risley/estimation/normal_equations.hpp"
-
-#include "estimation/in_order.hpp"
+#include "risley/parallel/in_order.hpp"
 
 namespace risley::estimation {
 
@@ -43,12 +42,12 @@ template <class Make, class Take>
 void for_all_shots(const Estimate& estimate, const Make& make, const Take& take) {
   constexpr std::size_t kShots = 1 << 16;
   const std::size_t all = estimate.series.size();
-  in_order((all + kShots - 1) / kShots,
-           [&](std::size_t i) {
-             return make(solved_shots(estimate, estimate.series,
-                                      {i * kShots, std::min((i + 1) * kShots, all)}));
-           },
-           take);
+  parallel::in_order((all + kShots - 1) / kShots,
+                     [&](std::size_t i) {
+                       return make(solved_shots(estimate, estimate.series,
+                                                {i * kShots, std::min((i + 1) * kShots, all)}));
+                     },
+                     take);
 }
 
 }  // namespace risley::estimation

@@ -9,12 +9,11 @@
 #include <optional>
 #include <utility>
 
-#include <tbb/parallel_for.h>
-
 #include "risley/core/error.hpp"
 #include "risley/core/require.hpp"
 #include "risley/estimation/packed_series.hpp"
 #include "risley/optics/parameters.hpp"
+#include "risley/parallel/parallel.hpp"
 
 namespace risley::identification {
 namespace {
@@ -240,7 +239,7 @@ class Search {
       for (Arrangement& one : arrangements(set)) sets.back().trials.push_back({std::move(one), {}});
     }
     const ShotGrid rough = thinned(trial_grid_, 0, trial_grid_.size(), kRoughShots);
-    tbb::parallel_for(std::size_t{0}, sets.size(), [&](std::size_t s) {
+    parallel::for_each(sets.size(), [&](std::size_t s) {
       for (const Trial& trial : sets[s].trials) {
         const TrainFit fit = rough_fit(rough, trial.arrangement, 6);
         sets[s].least = std::min(sets[s].least, fit.rms);
@@ -260,7 +259,7 @@ class Search {
     TrainFreedom free_glass = start_freedom_;
     free_glass.one_glass = prisms == 1;
     const ShotGrid fewer = thinned(trial_grid_, 0, trial_grid_.size(), trial_grid_.size() / 2);
-    tbb::parallel_for(std::size_t{0}, trials.size(), [&](std::size_t t) {
+    parallel::for_each(trials.size(), [&](std::size_t t) {
       TrainFit fit = rough_fit(fewer, trials[t].arrangement, 12);
       if (std::isfinite(fit.rms)) {
         fit = fit_train(fewer, fit.model, free_glass,
@@ -270,7 +269,7 @@ class Search {
     });
     std::stable_sort(trials.begin(), trials.end(), better);
     if (trials.size() > kTriedInFull) trials.resize(kTriedInFull);
-    tbb::parallel_for(std::size_t{0}, trials.size(), [&](std::size_t t) {
+    parallel::for_each(trials.size(), [&](std::size_t t) {
       Trial& trial = trials[t];
       std::vector<TrainModel> starts{trial.fit.model};
       trial.fit = {};
@@ -526,7 +525,7 @@ class Search {
       motion = choose_motion(model, wide);
       freedom = choose_freedom(model, motion, best);
       fits.assign(chosen.size(), {});
-      tbb::parallel_for(std::size_t{0}, chosen.size(), [&](std::size_t c) {
+      parallel::for_each(chosen.size(), [&](std::size_t c) {
         auto fit = fit_whole(compared_, chosen[c].fit.model, freedom, motion, 25);
         fits[c].rms = std::numeric_limits<double>::infinity();
         if (fit) fits[c] = std::move(*fit);

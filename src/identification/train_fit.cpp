@@ -8,7 +8,6 @@
 #include <limits>
 
 #include <fmt/format.h>
-#include <tbb/parallel_for.h>
 
 #include "risley/algebra/symmetric.hpp"
 #include "risley/core/angle.hpp"
@@ -17,6 +16,7 @@
 #include "risley/optics/observation_adjoint.hpp"
 #include "risley/optics/observation_model.hpp"
 #include "risley/optics/parameters.hpp"
+#include "risley/parallel/parallel.hpp"
 
 namespace risley::identification {
 namespace {
@@ -298,7 +298,7 @@ class Fit {
       }
     };
     if (chunks_.size() > 1 && grid_.size() > 4 * kChunkShots) {
-      tbb::parallel_for(std::size_t{0}, chunks_.size(), work);
+      parallel::for_each(chunks_.size(), work);
     } else {
       for (std::size_t c = 0; c < chunks_.size(); ++c) work(c);
     }

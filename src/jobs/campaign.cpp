@@ -5,17 +5,15 @@
 #include <cmath>
 #include <filesystem>
 #include <limits>
-#include <mutex>
 #include <utility>
 
 #include <Eigen/Core>
 #include <fmt/format.h>
-#include <tbb/parallel_for.h>
-#include <tbb/task_arena.h>
 
 #include "risley/algebra/symmetric.hpp"
 #include "risley/core/error.hpp"
 #include "risley/io/folder.hpp"
+#include "risley/parallel/parallel.hpp"
 #include "risley/simulation/truth_file.hpp"
 
 #include "jobs/campaign_chunk.hpp"
@@ -192,19 +190,9 @@ CampaignChunk run_chunk(const CampaignPlan& plan, const ChunkNumber& which,
   if (chunk.made_before) return chunk;
   io::make_folder(folder);
   std::vector<CellOutcome> outcomes(chunk.cells);
-  std::mutex mutex;
-  std::uint64_t done = 0;
-  tbb::parallel_for(
-      std::uint64_t{0}, chunk.cells,
-      [&](std::uint64_t i) {
-        progress.check();
-        // A thread that waits within one cell must not begin another.
-        tbb::this_task_arena::isolate(
-            [&] { outcomes[i] = run_cell(plan, chunk.first + i, progress); });
-        const std::scoped_lock lock(mutex);
-        progress.report(static_cast<double>(++done) / static_cast<double>(chunk.cells));
-      },
-      tbb::simple_partitioner());
+  parallel::for_each_job(
+      chunk.cells, [&](std::size_t i) { outcomes[i] = run_cell(plan, chunk.first + i, progress); },
+      progress);
   save_chunk(chunk.file, head, outcomes);
   return chunk;
 }

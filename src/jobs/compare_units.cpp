@@ -6,7 +6,6 @@
 #include <cstdint>
 #include <filesystem>
 #include <map>
-#include <mutex>
 #include <numeric>
 #include <optional>
 #include <set>
@@ -14,12 +13,12 @@
 #include <variant>
 
 #include <fmt/format.h>
-#include <tbb/parallel_for.h>
 
 #include "risley/core/error.hpp"
 #include "risley/core/require.hpp"
 #include "risley/io/table_input.hpp"
 #include "risley/jobs/result_files.hpp"
+#include "risley/parallel/parallel.hpp"
 
 namespace risley::jobs {
 namespace {
@@ -185,17 +184,15 @@ void add_pairs_between(const std::vector<std::size_t>& kind, const std::vector<C
 void compare(ComparedUnits& found, const std::vector<Sensor>& sensors, const Progress& progress) {
   found.least_p_value =
       found.false_alarm / static_cast<double>(std::max<std::size_t>(found.pairs.size(), 1));
-  std::mutex mutex;
-  std::size_t done = 0;
-  tbb::parallel_for(std::size_t{0}, found.pairs.size(), [&](std::size_t i) {
-    progress.check();
-    ComparedPair& pair = found.pairs[i];
-    pair.comparison = compare_results(sensors[pair.a], sensors[pair.b], OneUnit::caller);
-    pair.changed = pair.comparison.change.degrees_of_freedom > 0 &&
-                   pair.comparison.change.p_value < found.least_p_value;
-    const std::scoped_lock lock(mutex);
-    progress.report(static_cast<double>(++done) / static_cast<double>(found.pairs.size()));
-  });
+  parallel::for_each_job(
+      found.pairs.size(),
+      [&](std::size_t i) {
+        ComparedPair& pair = found.pairs[i];
+        pair.comparison = compare_results(sensors[pair.a], sensors[pair.b], OneUnit::caller);
+        pair.changed = pair.comparison.change.degrees_of_freedom > 0 &&
+                       pair.comparison.change.p_value < found.least_p_value;
+      },
+      progress);
   std::vector<std::size_t> unit_of(sensors.size());
   for (std::size_t i = 0; i < found.units.size(); ++i) {
     for (const std::size_t result : found.units[i].results) unit_of[result] = i;

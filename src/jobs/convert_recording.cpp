@@ -5,8 +5,8 @@
 #include <utility>
 
 #include <fmt/format.h>
-#include <tbb/task_group.h>
 
+#include "risley/parallel/parallel.hpp"
 #include "risley/recordings/writer.hpp"
 
 #include "jobs/packet_recording.hpp"
@@ -57,7 +57,7 @@ ConvertedRecording convert_recording(const ConvertRecordingOptions& options,
       options.format);
   // While one chunk is written, the next is read.
   recordings::Chunk chunk, next;
-  tbb::task_group writing;
+  parallel::TaskGroup writing;
   const auto read_next = [&] {
     try {
       return reader->read(next);

@@ -11,11 +11,11 @@
 #include <utility>
 
 #include <fmt/format.h>
-#include <tbb/task_arena.h>
 
 #include "risley/core/error.hpp"
 #include "risley/core/progress.hpp"
 #include "risley/jobs/sensor_choice.hpp"
+#include "risley/parallel/parallel.hpp"
 #include "risley/recordings/livox/packet_decoder.hpp"
 
 namespace risley::jobs {
@@ -112,7 +112,7 @@ class OpticsWatch::Work {
 
   void run() {
     // Recording needs the other cores.
-    tbb::task_arena alone(1);
+    parallel::Threads alone(1);
     for (;;) {
       std::deque<Waiting> taken;
       {
@@ -130,7 +130,7 @@ class OpticsWatch::Work {
         busy_ = true;
       }
       try {
-        alone.execute([&] {
+        alone.run([&] {
           for (const Waiting& one : taken) take(one);
         });
       } catch (const Cancelled&) {

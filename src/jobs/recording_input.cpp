@@ -10,13 +10,13 @@
 
 #include <Eigen/Geometry>
 #include <fmt/format.h>
-#include <tbb/task_group.h>
 
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
 #include "risley/estimation/shot_slips.hpp"
 #include "risley/estimation/stored_pose.hpp"
 #include "risley/jobs/sensor_choice.hpp"
+#include "risley/parallel/parallel.hpp"
 
 #include "jobs/open_input.hpp"
 #include "jobs/packet_recording.hpp"
@@ -309,7 +309,7 @@ EstimationInput read_for_estimation(const EstimationInputOptions& options,
   recordings::TimeAudit audit;
   // While one chunk is looked at, the next is read.
   recordings::Chunk chunk, next;
-  tbb::task_group looks;
+  parallel::TaskGroup looks;
   while (reader.read(next)) {
     progress.report(reader.fraction_read());
     looks.wait();

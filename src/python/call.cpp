@@ -12,10 +12,8 @@
 #include <thread>
 #include <vector>
 
-#include <tbb/info.h>
-#include <tbb/task_arena.h>
-
 #include "risley/core/require.hpp"
+#include "risley/parallel/parallel.hpp"
 
 namespace risley::python {
 namespace {
@@ -152,13 +150,9 @@ void run_job(const py::object& tell, int threads, const std::function<void(const
         job({[&news](double fraction, std::string_view stage) { news.tell(stage, fraction); },
              cancel});
       };
-      // An arena and no global limit: to lift one starts threads, and ends the process where there
-      // is no memory for them.
-      if (threads > 0) {
-        tbb::task_arena(std::min(threads, tbb::info::default_concurrency())).execute(run);
-      } else {
-        run();
-      }
+      // No global limit: to lift one starts threads, and ends the process where there is no memory
+      // for them.
+      parallel::Threads(threads).run(run);
     } catch (...) {
       failure = std::current_exception();
     }

@@ -11,15 +11,13 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <oneapi/tbb/blocked_range.h>
-#include <oneapi/tbb/parallel_for.h>
-#include <oneapi/tbb/task_arena.h>
 
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
 #include "risley/core/random.hpp"
 #include "risley/core/require.hpp"
 #include "risley/optics/batch.hpp"
+#include "risley/parallel/parallel.hpp"
 #include "risley/simulation/noise.hpp"
 
 #include "simulation/platform_poses.hpp"
@@ -143,7 +141,7 @@ class Scanner::Work {
         header(make_header(settings)),
         shots(static_cast<std::uint64_t>(std::llround(settings.duration * *settings.rate))),
         noise_(noise_settings(settings), settings.seed),
-        arena_(settings.threads == 0 ? oneapi::tbb::task_arena::automatic : settings.threads),
+        threads_(settings.threads),
         bush_depth_(settings.seed, stream::kBushDepth),
         has_bushes_(settings.scene && settings.scene->terrain &&
                     !settings.scene->terrain->parts().bushes.empty()) {
@@ -163,8 +161,8 @@ class Scanner::Work {
     truth.resize(settings.truth.prisms(), rows);
     if (rows == 0) return false;
     const std::size_t blocks = (rows + kBlockRows - 1) / kBlockRows;
-    arena_.execute([&] {
-      oneapi::tbb::parallel_for(std::size_t{0}, blocks, [&](std::size_t block) {
+    threads_.run([&] {
+      parallel::for_each(blocks, [&](std::size_t block) {
         const std::size_t first = block * kBlockRows;
         fill(chunk.observations, truth, first, std::min(kBlockRows, rows - first));
       });
@@ -292,7 +290,7 @@ class Scanner::Work {
   }
 
   ObservationNoise noise_;
-  oneapi::tbb::task_arena arena_;
+  parallel::Threads threads_;
   scenes::Station station_;
   std::optional<PlatformPoses> poses_;
   RandomStream bush_depth_;

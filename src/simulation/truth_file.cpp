@@ -7,10 +7,10 @@
 #include <utility>
 
 #include <fmt/format.h>
-#include <tbb/task_group.h>
 
 #include "risley/core/angle.hpp"
 #include "risley/io/text_file.hpp"
+#include "risley/parallel/parallel.hpp"
 #include "risley/recordings/writer.hpp"
 #include "risley/sensors/preset.hpp"
 #include "risley/simulation/trajectory_noise.hpp"
@@ -138,7 +138,7 @@ SimulationResult simulate_to_file(
   // While one chunk is written, the next is simulated.
   recordings::Chunk chunk, next_chunk;
   recordings::TruthColumns truth, next_truth;
-  tbb::task_group writing;
+  parallel::TaskGroup writing;
   while (scanner.read(next_chunk, next_truth)) {
     writing.wait();
     std::swap(chunk, next_chunk);

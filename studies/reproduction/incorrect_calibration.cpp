@@ -13,6 +13,7 @@
 #include "risley/calibration/calibrate.hpp"
 #include "risley/core/direction.hpp"
 #include "risley/optics/observation_model.hpp"
+#include "risley/parallel/parallel.hpp"
 
 #include "reproduction/runs.hpp"
 
@@ -297,7 +298,7 @@ Figure figure_12(const std::vector<CalibrationDraw>& draws) {
 Reproduction incorrect_calibration(const ReproduceOptions& options, const Progress& progress) {
   const Effort& effort = options.effort;
   std::vector<CalibrationDraw> draws(effort.wall_seeds);
-  for_each_draw(
+  parallel::for_each_job(
       draws.size(),
       [&](std::size_t i) {
         const WallRun wall = record_wall(options, i, kPapersRate, false);
@@ -313,7 +314,7 @@ Reproduction incorrect_calibration(const ReproduceOptions& options, const Progre
       },
       progress.part(0.0, 0.6));
   std::vector<Judged> full(effort.wall_full_rate_seeds);
-  for_each_draw(
+  parallel::for_each_job(
       full.size(),
       [&](std::size_t i) {
         const WallRun wall = record_wall(options, i, kFullRate, true);

@@ -13,6 +13,7 @@
 #include <fmt/format.h>
 
 #include "risley/core/error.hpp"
+#include "risley/parallel/parallel.hpp"
 
 #include "reproduction/papers_unit.hpp"
 #include "reproduction/runs.hpp"
@@ -57,7 +58,7 @@ Row vertical_tilt_row(const ReproduceOptions& options, const Progress& progress)
   const double noise = std::sqrt(residual * residual - rounding);
   std::vector<double> size(options.effort.tilt_draws);
   std::vector<unsigned char> negative(size.size());
-  for_each_draw(
+  parallel::for_each_job(
       size.size(),
       [&](std::size_t i) {
         simulation::SimulationSettings settings = unit_settings(options, 700000 + i);

@@ -4,12 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <mutex>
 #include <utility>
 
 #include <fmt/format.h>
-#include <tbb/parallel_for.h>
-#include <tbb/task_arena.h>
 
 #include "risley/core/error.hpp"
 
@@ -63,20 +60,6 @@ estimation::AngleSeries thinned_to(const estimation::AngleSeries& series, double
 std::uint64_t run_seed(const ReproduceOptions& options, std::size_t i) {
   constexpr std::uint64_t kDrawsPerSeed = 1000000;
   return options.seed * kDrawsPerSeed + i;
-}
-
-void for_each_draw(std::size_t draws, const std::function<void(std::size_t)>& work,
-                   const Progress& progress) {
-  std::mutex mutex;
-  std::size_t done = 0;
-  tbb::parallel_for(
-      std::size_t{0}, draws,
-      [&](std::size_t i) {
-        tbb::this_task_arena::isolate([&] { work(i); });
-        const std::lock_guard lock(mutex);
-        progress.report(static_cast<double>(++done) / static_cast<double>(draws));
-      },
-      tbb::simple_partitioner());
 }
 
 const estimation::EstimatedValue& value_of(const estimation::Estimate& estimate,

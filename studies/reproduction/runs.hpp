@@ -43,12 +43,6 @@ estimation::AngleSeries thinned_to(const estimation::AngleSeries& series, double
 /// The seed of the i-th random draw: draws of different user seeds do not overlap.
 std::uint64_t run_seed(const ReproduceOptions& options, std::size_t i);
 
-/// Calls work(0), work(1), ... from several threads, each alone in its task arena: a thread that
-/// waits inside one draw does not start another. Results go where the number says, so they do not
-/// depend on the threads.
-void for_each_draw(std::size_t draws, const std::function<void(std::size_t)>& work,
-                   const Progress& progress);
-
 /// The value of an estimate under a name, in the unit of files. @throws InvalidArgument
 const estimation::EstimatedValue& value_of(const estimation::Estimate& estimate,
                                            const std::string& name);

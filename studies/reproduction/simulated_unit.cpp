@@ -12,6 +12,7 @@
 #include <fmt/format.h>
 
 #include "risley/estimation/observability.hpp"
+#include "risley/parallel/parallel.hpp"
 
 #include "reproduction/papers_unit.hpp"
 #include "reproduction/runs.hpp"
@@ -76,7 +77,7 @@ std::vector<UnitDraw> draw_all(const ReproduceOptions& options, Method method, s
                                const Progress& progress) {
   std::vector<UnitDraw> result(draws);
   const double told = radians_from_degrees(printed(kPapersNoise).value);
-  for_each_draw(
+  parallel::for_each_job(
       draws,
       [&](std::size_t i) {
         simulation::SimulationSettings settings = unit_settings(options, i);

@@ -16,6 +16,7 @@
 
 #include "risley/core/error.hpp"
 #include "risley/estimation/observability.hpp"
+#include "risley/parallel/parallel.hpp"
 
 #include "reproduction/runs.hpp"
 #include "reproduction/triple_unit.hpp"
@@ -300,7 +301,7 @@ Table model_table(const ReproduceOptions& options, const Estimate& practical,
     models.push_back(two_prism_wishes(options.triple_type, k));
   }
   std::vector<WrongModel> found(models.size());
-  for_each_draw(
+  parallel::for_each_job(
       models.size(), [&](std::size_t i) { found[i] = wrong_model(piece, models[i]); }, progress);
   for (std::size_t i = 0; i < found.size(); ++i) {
     Row row{i == 0 ? "ideal model, residuals"
@@ -444,7 +445,7 @@ Table emitter_table(const ReproduceOptions& options, const Estimate& six, const 
 Reproduction triple_prism(const ReproduceOptions& options, const Progress& progress) {
   std::vector<TripleDraw> draws(options.effort.triple_seeds);
   SimulatedRun first;
-  for_each_draw(
+  parallel::for_each_job(
       draws.size(),
       [&](std::size_t i) {
         SimulatedRun run = triple_run(options, i);

@@ -42,7 +42,7 @@ struct SimulationSettings {
   std::optional<Platform> platform;
 
   std::uint64_t seed = 0;
-  int threads = 0;  ///< 0: as many as the machine has
+  int threads = 0;  ///< 0: as many as the caller has
 };
 
 /// A simulated sensor that gives its recording piece by piece, so that memory does not grow with
