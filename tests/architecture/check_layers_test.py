@@ -32,7 +32,7 @@ class CheckLayersTest(unittest.TestCase):
             "include/risley/estimation/ekf.hpp": '#include "risley/core/angle.hpp"\n',
             "src/io/netcdf.cpp": "#include <netcdf.h>\n#include <openssl/evp.h>\n",
             "src/report/html.cpp": '#include "risley/estimation/ekf.hpp"\n#include "report/page.hpp"\n',
-            "apps/risley/main.cpp": '#include "risley/simulation/a.hpp"\n#include "verb.hpp"\n',
+            "apps/risley/main.cpp": '#include <tbb/global_control.h>\n#include "risley/simulation/a.hpp"\n#include "verb.hpp"\n',
         }), [])
 
     def test_every_wrong_include_is_found_with_its_line(self):
@@ -49,6 +49,8 @@ class CheckLayersTest(unittest.TestCase):
              "apps/risley/main.cpp:2: risley/clouds/cloud.hpp is in no declared layer"),
             ("src/report/states.cpp", "#include <netcdf.h>",
              "src/report/states.cpp:2: only the layer io may include netcdf.h"),
+            ("src/report/states.cpp", "#include <tbb/parallel_for.h>",
+             "src/report/states.cpp:2: only the layer parallel may include tbb/parallel_for.h"),
             ("apps/risley/main.cpp", "#include <yaml-cpp/yaml.h>",
              "apps/risley/main.cpp:2: only the layer io may include yaml-cpp/yaml.h"),
             ("include/risley/core/hash.hpp", "#include <openssl/evp.h>",

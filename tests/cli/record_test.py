@@ -12,7 +12,7 @@ import unittest
 
 import lvx_file
 from command import COMMAND, ProcessTest
-from livox_peer import AVIA, HORIZON, MID_40, MID_70, SENSOR_PORT, Sensor, bound, frame, packet
+from livox_peer import AVIA, HORIZON, MID_40, MID_70, SENSOR_PORT, Sensor, bound, frame, packet, send_with_room
 
 HOST = "127.0.0.1"
 
@@ -34,14 +34,14 @@ class RecordTest(ProcessTest):
     def start(self, *arguments):
         return super().start("record", "--interface", HOST, *arguments)
 
-    def wait_for(self, what, seconds=10):
+    def wait_for(self, what, seconds=60):
         end = time.monotonic() + seconds
         while not what():
             self.assertLess(time.monotonic(), end, "it did not happen")
             time.sleep(0.02)
 
     def end(self, process, status=0):
-        out, err = process.communicate(timeout=20)
+        out, err = process.communicate(timeout=60)
         self.assertEqual(process.returncode, status, out + err)
         return out, err
 
@@ -87,15 +87,17 @@ class RecordTest(ProcessTest):
         rows = sum(one["rows"] for one in result["sensors"])
         info = self.expect_json(0, "info", "two.lvx")
         self.assertEqual(info["observations"], rows)
-        self.assertGreater(rows, 600_000)
+        self.assertEqual(rows, 100 * len(mid.times) + 96 * len(avia.times))
         # The bytes are those that came.
         first = [data for index, data in packets if index == 0][7]
         self.assertEqual(first, packet(1, mid.first_ns + 7_000_000, 7))
 
     def test_loss_duplicates_and_disorder_are_counted(self):
         sensor = self.sensor(loss=0.01, duplication=0.01, disorder=0.05)
-        result = self.record("lossy.lvx", "--duration-s", 3)["sensors"][0]
-        self.assertGreater(sensor.lost, 10)
+        process = self.start("-o", "lossy.lvx", "--json")
+        self.wait_for(lambda: sensor.lost > 20)
+        process.send_signal(signal.SIGINT)
+        result = json.loads(self.end(process)[0])["sensors"][0]
         self.assertEqual(result["lost"], sensor.lost)
         self.assertEqual(self.times("lossy.lvx"), sensor.times)
         self.assertEqual(result["duplicates"], sensor.sent - len(sensor.times))
@@ -157,12 +159,12 @@ class RecordTest(ProcessTest):
         stranger = bound("127.0.0.66", SENSOR_PORT)
         data_to, command_to = (HOST, sensor.host[1]), (HOST, sensor.host[2])
         for i in range(200):
-            stranger.sendto(packet(1, 1_000_000 * i, i), data_to)
-            stranger.sendto(frame(1, i, 0, 6, b"\0"), command_to)
-            stranger.sendto(frame(2, i, 0, 0, b"PEER00000000661\0\1\0\0"), (HOST, 55000))
+            send_with_room(stranger, packet(1, 1_000_000 * i, i), data_to)
+            send_with_room(stranger, frame(1, i, 0, 6, b"\0"), command_to)
+            send_with_room(stranger, frame(2, i, 0, 0, b"PEER00000000661\0\1\0\0"), (HOST, 55000))
         # From the sensor's own address, but no packets.
         for junk in (b"", b"x", packet(1, 0, 0)[:-1], packet(1, 0, 0) + b"x", bytes(918), bytes(60000)):
-            sensor.socket.sendto(junk, data_to)
+            send_with_room(sensor.socket, junk, data_to)
         self.wait_for(lambda: len(sensor.times) > 300)
         process.send_signal(signal.SIGINT)
         result = json.loads(self.end(process)[0])["sensors"][0]
@@ -196,11 +198,9 @@ class RecordTest(ProcessTest):
         self.wait_for(lambda: len(sensor.times) > 500)
         self.sensors.pop().stop()
         before = sensor.times
-        died = time.monotonic()
         notes = (line for line in process.stderr if "receive buffer" not in line)  # of which few grant enough
         line = next(notes)
-        self.assertLess(time.monotonic() - died, 3)
-        self.assertIn("no data for 1 s", line)
+        self.assertIn("no data for 1 s", line)  # before it is given up
         self.assertIn("lost", next(notes))
         again = self.sensor(first_ns=1_000_000)
         self.wait_for(lambda: len(again.times) > 500)
@@ -277,7 +277,8 @@ class RecordTest(ProcessTest):
         changes = json.loads(self.end(process)[0])["sensors"][0]["status_changes"]
         self.assertEqual([one["says"] for one in changes], [[], ["motor: warning", "system: warning"], []])
         self.assertEqual([one["status"] for one in changes], [0, 1 << 4 | 1 << 30, 0])
-        self.assertTrue(0.2 < changes[1]["begin_s"] < changes[2]["begin_s"] < 5, changes)
+        # Packets 300, 600 and some later are a millisecond apart by their own clock.
+        self.assertTrue(0 < changes[1]["begin_s"] < changes[2]["begin_s"], changes)
         # The file has them, too: every packet has its status.
         stored = [struct.unpack_from("<I", data, 4)[0] for _, data in self.packets("status.lvx")[1]]
         self.assertEqual([stored[i] for i in range(len(stored)) if i == 0 or stored[i] != stored[i - 1]],
@@ -311,20 +312,26 @@ class RecordTest(ProcessTest):
             ip netns exec sensor ip link set there up
             for one in lo host other nobody; do ip link set $one up; done
             echo ready
-            ip netns exec sensor "$0" emulate --interface 192.168.1.41 --sensor avia --duration-s 20 \
-              --json > emulated.json &
+            ip netns exec sensor "$0" emulate --interface 192.168.1.41 --sensor avia --json > emulated.json &
+            emulating=$!
             "$0" record --list --interface 10.9.9.1 --json > elsewhere.json
-            (sleep 4.5; ip link set host down; sleep 4; ip link set host up) &
-            "$0" record --interface 192.168.1.5 -o cable.lvx --duration-s 11 --json 2> cable.txt
-            wait"""
+            "$0" record --interface 192.168.1.5 -o cable.lvx --json > recorded.json 2> cable.txt &
+            recording=$!
+            until [ "$(stat -c %s cable.lvx.unfinished 2> /dev/null || echo 0)" -gt 2000000 ]; do sleep 0.1; done
+            ip link set host down; sleep 4; ip link set host up
+            until grep -q "data come again" cable.txt; do sleep 0.1; done
+            sleep 1
+            for one in $recording $emulating; do kill -TERM $one; wait $one; done"""
+        began = time.monotonic()
         done = subprocess.run(["unshare", "-rnm", "bash", "-c", script, COMMAND], cwd=self.folder, text=True,
                               capture_output=True, timeout=120, check=False)
+        elapsed = time.monotonic() - began
         if not done.stdout.startswith("ready"):
             print(f"SKIPPED: namespaces cannot be made: {done.stderr}", file=sys.stderr)
             self.skipTest("namespaces")
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertEqual(json.loads((self.folder / "elsewhere.json").read_text())["sensors"], [])
-        result = json.loads(done.stdout.removeprefix("ready"))["sensors"][0]
+        result = json.loads((self.folder / "recorded.json").read_text())["sensors"][0]
         truth = json.loads((self.folder / "emulated.json").read_text())["sensors"][0]
         # Between two sessions the sensor sends nothing, but nobody knows since when: the gap of a session says how many
         # packets may be missing.
@@ -333,11 +340,11 @@ class RecordTest(ProcessTest):
         made = truth["packets"] + truth["lost"] + truth["lost_at_ends"]
         self.assertLessEqual(result["packets"] + result["lost"], made, (result, truth))
         self.assertGreaterEqual(result["packets"] + result["lost"] + of["session"], truth["packets"])
-        self.assertLess(result["packets"] + of["session"], 20 * (2500 + 200))
+        self.assertLess(result["packets"] + of["session"], elapsed * (2500 + 200))
         self.assertEqual({gap["data"] for gap in result["gaps"]}, {"points", "imu"})
         self.assertGreaterEqual(result["lost"], of["loss"])
         longest = max(gap["end_s"] - gap["begin_s"] for gap in result["gaps"])
-        self.assertTrue(3.5 < longest < 20, result["gaps"])
+        self.assertTrue(3.5 < longest < elapsed, result["gaps"])
         self.assertIn("no data for 1 s", (self.folder / "cable.txt").read_text())
 
     def test_a_full_disk(self):
@@ -364,8 +371,8 @@ class RecordTest(ProcessTest):
                              56101, "--duration-s", 1)
         number = 0
         while process.poll() is None:
-            sender.sendto(packet(1, number * 1_000_000, number), (HOST, 56101))
-            other.sendto(packet(3, number * 960_000, number), (HOST, 56101))
+            send_with_room(sender, packet(1, number * 1_000_000, number), (HOST, 56101))
+            send_with_room(other, packet(3, number * 960_000, number), (HOST, 56101))
             number += 1
             time.sleep(0.001)
         result = json.loads(self.end(process)[0])
@@ -373,7 +380,7 @@ class RecordTest(ProcessTest):
                          [("127.0.0.21", "Livox Mid-40", 0), ("127.0.0.22", "Livox Mid-70", 0)])
         for index, step in enumerate((1_000_000, 960_000)):
             times = self.times("passive.lvx", index)
-            self.assertGreater(len(times), number // 10)  # the rest was sent while it started and looked
+            self.assertGreater(len(times), 10)  # the rest was sent while it started and looked
             self.assertEqual(times, list(range(times[0], times[-1] + 1, step)))
         for one in (sender, other):
             one.setblocking(False)

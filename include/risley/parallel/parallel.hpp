@@ -48,8 +48,9 @@ class TaskGroup {
   std::unique_ptr<Work> work_;
 };
 
-/// What a pipeline does with one item after the other, or with several at a time.
+/// What a pipeline does with each item.
 struct Stage {
+  /// Several items at a time, or one after the other.
   enum class Order { as_they_come, in_turn };
   Order order;
   std::function<void(std::size_t slot)> work;
