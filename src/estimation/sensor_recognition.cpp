@@ -264,6 +264,7 @@ class LineMatcher {
       }
     }
     std::vector<decltype(found)::value_type*> each;
+    each.reserve(found.size());
     for (auto& one : found) each.push_back(&one);
     parallel::for_each(each.size(), [&](std::size_t i) {
       each[i]->second = search.near(each[i]->first, kSpeedShare, kMostMinima);
