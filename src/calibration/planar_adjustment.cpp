@@ -299,7 +299,9 @@ Eigen::MatrixXd eliminated(const Eigen::MatrixXd& hessian, Index free) {
 /// @param shift  of all unknowns [unknowns, quantities]
 SolutionResponse response_of(const Eigen::MatrixXd& shift, const Unknowns& at) {
   SolutionResponse response{shift.topRows(at.free()), Eigen::VectorXd::Zero(shift.cols())};
-  if (at.range_offset() >= 0) response.range_offset = shift.row(at.range_offset()).transpose();
+  if (at.range_offset() >= 0 && shift.cols() > 0) {
+    response.range_offset = shift.row(at.range_offset()).transpose();
+  }
   return response;
 }
 
