@@ -99,7 +99,8 @@ struct Places {
       }
     }
     for (Index place = 0; place < held.train.rows(); ++place) {
-      if ((held.train.row(place).array() != 0.0).any()) add(static_cast<int>(place));
+      const bool any = held.train.cols() > 0 && (held.train.row(place).array() != 0.0).any();
+      if (any) add(static_cast<int>(place));
     }
   }
   Index column(int place) const { return std::find(all.begin(), all.end(), place) - all.begin(); }
