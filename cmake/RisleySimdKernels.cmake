@@ -3,29 +3,67 @@
 # A kernel (src/<layer>/<name>_kernel.cpp) is one source, compiled once per instruction set into the
 # same binary; the code beside it picks one at run time. Only these files get wide-instruction flags,
 # and tests/architecture checks that nothing compiled with them can leak into the rest.
-set(RISLEY_INSTRUCTION_SETS baseline)
+set(RISLEY_INSTRUCTION_SETS all CACHE STRING
+    "Instruction sets of the kernels: all, native (the best of this processor), or a list of baseline, avx2, avx512")
+set(known_sets baseline)
 set(flags_baseline "")
 if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
-  list(APPEND RISLEY_INSTRUCTION_SETS avx2 avx512)
+  list(APPEND known_sets avx2 avx512)
   set(flags_avx2 -mavx2 -mfma)
   # gcc 12 takes variables of its own avx512 header for uninitialised (gcc.gnu.org/PR105593).
   set(flags_avx512 -mavx512f -mavx512dq -mavx512bw -mavx512cd -mavx512vl -mfma
                    -Wno-uninitialized -Wno-maybe-uninitialized)
 endif()
+if(RISLEY_INSTRUCTION_SETS STREQUAL all)
+  set(held_sets ${known_sets})
+elseif(RISLEY_INSTRUCTION_SETS STREQUAL native)
+  if(CMAKE_CROSSCOMPILING)
+    message(FATAL_ERROR "RISLEY_INSTRUCTION_SETS = native asks the processor that builds; for another "
+                        "one, name its sets: ${known_sets}, or all")
+  endif()
+  try_run(status compiled SOURCES ${CMAKE_CURRENT_LIST_DIR}/best_instruction_set.cpp
+          CMAKE_FLAGS -DINCLUDE_DIRECTORIES=${PROJECT_SOURCE_DIR}/src
+          COMPILE_OUTPUT_VARIABLE errors RUN_OUTPUT_VARIABLE held_sets)
+  if(NOT compiled OR NOT status EQUAL 0)
+    message(FATAL_ERROR "RISLEY_INSTRUCTION_SETS = native: ${CMAKE_CURRENT_LIST_DIR}/best_instruction_set.cpp "
+                        "did not run (${status}). Name sets instead: ${known_sets}, or all\n${errors}")
+  endif()
+else()
+  set(held_sets ${RISLEY_INSTRUCTION_SETS})
+endif()
+if(NOT held_sets)
+  message(FATAL_ERROR "RISLEY_INSTRUCTION_SETS is empty, allowed: all, native, or a list of ${known_sets}")
+endif()
+foreach(set IN LISTS held_sets)
+  if(NOT set IN_LIST known_sets)
+    message(FATAL_ERROR "RISLEY_INSTRUCTION_SETS = ${set}, allowed: all, native, or a list of ${known_sets}")
+  endif()
+endforeach()
+
+# For sources that choose among the copies (risley/core/instruction_set.hpp).
+list(TRANSFORM held_sets TOUPPER OUTPUT_VARIABLE RISLEY_HELD_SETS)
+list(TRANSFORM RISLEY_HELD_SETS PREPEND RISLEY_HOLDS_)
 
 # Kernels whose lanes are parts of one shot: AVX-512 runs their copy for AVX2, and its eight lanes would
 # be mostly empty.
 set(RISLEY_NARROW_KERNELS filter_kernel.cpp)
 
-# Adds some kernels to a target, as object libraries named after it. Whoever asks for their copies has
-# RISLEY_HAS_X86_KERNELS if there are any.
+# Adds some kernels to a target, as object libraries named after it.
 function(risley_add_kernels_to owner)
-  foreach(set IN LISTS RISLEY_INSTRUCTION_SETS)
-    set(target ${owner}_kernels_${set})
+  foreach(set IN LISTS known_sets)
     set(kernels ${ARGN})
-    if(set STREQUAL avx512)
-      list(FILTER kernels EXCLUDE REGEX "/(${RISLEY_NARROW_KERNELS})$")
+    set(narrow "/(${RISLEY_NARROW_KERNELS})$")
+    if(set STREQUAL avx2 AND NOT set IN_LIST held_sets AND avx512 IN_LIST held_sets)
+      list(FILTER kernels INCLUDE REGEX ${narrow})
+    elseif(NOT set IN_LIST held_sets)
+      set(kernels "")
+    elseif(set STREQUAL avx512)
+      list(FILTER kernels EXCLUDE REGEX ${narrow})
     endif()
+    if(NOT kernels)
+      continue()
+    endif()
+    set(target ${owner}_kernels_${set})
     add_library(${target} OBJECT ${kernels})
     risley_target_defaults(${target})
     set_target_properties(${target} PROPERTIES CXX_VISIBILITY_PRESET hidden UNITY_BUILD OFF)
@@ -49,15 +87,11 @@ function(risley_add_kernels layer)
   endif()
   file(GLOB kernels CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/src/${layer}/*_kernel.cpp)
   risley_add_kernels_to(risley_${layer} ${kernels})
-  if("avx2" IN_LIST RISLEY_INSTRUCTION_SETS)
-    target_compile_definitions(risley_${layer} PRIVATE RISLEY_HAS_X86_KERNELS)
-  endif()
+  target_compile_definitions(risley_${layer} PRIVATE ${RISLEY_HELD_SETS})
 endfunction()
 
 # The one choice among them.
-if("avx2" IN_LIST RISLEY_INSTRUCTION_SETS)
-  target_compile_definitions(risley_core PRIVATE RISLEY_HAS_X86_KERNELS)
-endif()
+target_compile_definitions(risley_core PRIVATE ${RISLEY_HELD_SETS})
 
 risley_add_kernels(optics)
 risley_add_kernels(recordings)

@@ -105,10 +105,11 @@ ExitStatus write_beam_origin_map(const CloudCommandOptions& options, const Commo
 }
 
 FileOutcome make_one(const FileJob& job, const CloudCommandOptions& options,
-                     const cloud::CloudOptions& settings, const Progress& progress) {
+                     const cloud::CloudOptions& settings, const jobs::Provenance& provenance,
+                     const Progress& progress) {
   jobs::RecordingCloud made =
       jobs::cloud_of_recording({job.input, read_options(options.reading), options.calibration,
-                                job.output, options.platform, settings},
+                                job.output, options.platform, settings, provenance},
                                progress);
   cloud::CloudSummary& s = made.summary;
   put_flags(s.warnings);
@@ -120,10 +121,10 @@ FileOutcome make_one(const FileJob& job, const CloudCommandOptions& options,
   }
   if (s.distribution) {
     io::write_text_file(options.distribution,
-                        report::distribution_page(*s.distribution, job.input, settings.provenance));
+                        report::distribution_page(*s.distribution, job.input, provenance));
   }
   if (s.sample) {
-    io::write_text_file(options.report, report::cloud_page(s, job.input, settings.provenance));
+    io::write_text_file(options.report, report::cloud_page(s, job.input, provenance));
   }
   std::string text = fmt::format("{}: {} points", job.output, grouped(s.points));
   if (s.no_return > 0) text += fmt::format(", {} shots without return", grouped(s.no_return));
@@ -242,7 +243,6 @@ Run declare_cloud(CLI::App& verb) {
           fmt::format("{} is of one recording, and there are {}", name, files.jobs.size()));
     }
     settings.writer.format = options->format;
-    settings.provenance = provenance_of(common);
     FileWork work;
     work.label = "making points";
     work.counted = "points";
@@ -254,7 +254,7 @@ Run declare_cloud(CLI::App& verb) {
       return names;
     };
     work.run = [&](const FileJob& job, const Progress& progress) {
-      return make_one(job, *options, settings, progress);
+      return make_one(job, *options, settings, provenance_of(common), progress);
     };
     return run_file_jobs(files, work, options->many, verb, common);
   };

@@ -18,6 +18,7 @@
 #include "calibration/entry_checks.hpp"
 #include "calibration/held.hpp"
 #include "calibration/labelled_shots.hpp"
+#include "calibration/shot_blocks.hpp"
 #include "calibration/verdict.hpp"
 #include "calibration/wall_flatness.hpp"
 #include "calibration/wall_matching.hpp"
@@ -69,6 +70,27 @@ void require_recording(const RangedRecording& recording) {
          recording.mean_angle_covariance, prisms, prisms);
 }
 
+/// The shots with other rotation angles. @param shift  [prisms], rad
+RangedShots shifted(const RangedShots& shots, const std::vector<double>& shift) {
+  RangedShots result;
+  result.resize(shots.prisms(), shots.size());
+  result.beam = shots.beam;
+  for_each_block(shots.size(), [&](std::size_t begin, std::size_t end) {
+    const auto copy = [&](const auto& from, auto& to) {
+      std::copy(from.data() + begin, from.data() + end, to.data() + begin);
+    };
+    for (std::size_t k = 0; k < shots.rotation_angle.size(); ++k) {
+      const std::vector<double>& from = shots.rotation_angle[k];
+      for (std::size_t i = begin; i < end; ++i) result.rotation_angle[k][i] = from[i] + shift[k];
+    }
+    for (std::size_t k = 0; k < shots.angle_covariance.size(); ++k) {
+      copy(shots.angle_covariance[k], result.angle_covariance[k]);
+    }
+    copy(shots.range, result.range);
+  });
+  return result;
+}
+
 /// One run, from recordings to results.
 class Work {
  public:
@@ -82,10 +104,7 @@ class Work {
     range_noise_ = std::hypot(range_noise_, options.sensor.range_resolution / std::sqrt(12.0));
     for (std::size_t r = 0; r < recordings.size(); ++r) {
       LabelledShots& own = all_.emplace_back();
-      own.shots = recordings[r].shots;
-      for (std::size_t k = 0; k < belief_.angle_shift[r].size(); ++k) {
-        for (double& angle : own.shots.rotation_angle[k]) angle += belief_.angle_shift[r][k];
-      }
+      own.shots = shifted(recordings[r].shots, belief_.angle_shift[r]);
       own.pointing = pointing_of_angles(own.shots);
     }
   }

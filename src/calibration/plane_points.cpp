@@ -13,6 +13,7 @@
 #include "risley/core/error.hpp"
 #include "risley/core/require.hpp"
 #include "risley/optics/prism.hpp"
+#include "risley/parallel/parallel.hpp"
 
 #include "calibration/shot_blocks.hpp"
 
@@ -104,10 +105,19 @@ void RangedShots::resize(int prisms, std::size_t shots) {
   const auto n = static_cast<std::size_t>(prisms);
   rotation_angle.resize(n);
   angle_covariance.resize(n * (n + 1) / 2);
-  for (auto& column : rotation_angle) column.resize(shots);
-  for (auto& column : angle_covariance) column.resize(shots);
-  range.resize(shots);
-  beam.resize(shots);
+  // At once: of long columns, most of the time goes into memory that is touched for the first time.
+  const std::size_t angles = n, covariances = angle_covariance.size();
+  parallel::for_each(angles + covariances + 2, [&](std::size_t i) {
+    if (i < angles) {
+      rotation_angle[i].resize(shots);
+    } else if (i < angles + covariances) {
+      angle_covariance[i - angles].resize(shots);
+    } else if (i == angles + covariances) {
+      range.resize(shots);
+    } else {
+      beam.resize(shots);
+    }
+  });
 }
 
 RangedShots rows_of(const RangedShots& shots, const std::vector<std::size_t>& rows) {

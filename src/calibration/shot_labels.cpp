@@ -5,9 +5,11 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <mutex>
 #include <utility>
 
 #include "risley/calibration/rays.hpp"
+#include "risley/parallel/parallel.hpp"
 
 #include "calibration/shot_blocks.hpp"
 
@@ -43,8 +45,9 @@ Labels label_shots(const PlanarProblem& problem, std::size_t recording, const Ra
       planes.emplace_back(static_cast<int>(v), plane_view(problem, v));
     }
   }
-  std::vector<int> closest(shots.size(), -1);
+  std::mutex counting;
   for_each_block(shots.size(), [&](std::size_t begin, std::size_t end) {
+    std::vector<std::size_t> near(problem.views.size(), 0);
     const Rays rays(problem.train, problem.geometry, shots, {begin, end});
     std::vector<double> predicted(planes.size()), sigma(planes.size());
     std::size_t nearest = 0;
@@ -66,33 +69,43 @@ Labels label_shots(const PlanarProblem& problem, std::size_t recording, const Ra
         }
       }
       if (best == kNearby) continue;
-      closest[i] = planes[nearest].first;
+      const int closest = planes[nearest].first;
       bool edge = false;
       for (std::size_t p = 0; p < planes.size(); ++p) {
         edge = edge || (p != nearest && std::abs(predicted[p] - predicted[nearest]) <
                                             kGate * (sigma[p] + sigma[nearest]));
       }
-      if (edge) continue;
-      labels.nearby[i] = closest[i];
-      if (best <= kGate) labels.view[i] = closest[i];
+      if (!edge) labels.nearby[i] = closest;
+      if (!edge && best <= kGate) {
+        labels.view[i] = closest;
+      } else {
+        ++near[static_cast<std::size_t>(closest)];
+      }
     }
+    const std::scoped_lock lock(counting);
+    for (std::size_t v = 0; v < near.size(); ++v) labels.near[v] += near[v];
   });
-  for (std::size_t i = 0; i < shots.size(); ++i) {
-    if (labels.view[i] < 0 && closest[i] >= 0) ++labels.near[static_cast<std::size_t>(closest[i])];
-  }
   return labels;
 }
 
 void hand_out(const RangedShots& shots, const std::vector<int>& view, std::size_t recording,
               PlanarProblem& problem) {
-  std::vector<std::vector<std::size_t>> rows(problem.views.size());
-  for (std::size_t i = 0; i < view.size(); ++i) {
-    if (view[i] >= 0) rows[static_cast<std::size_t>(view[i])].push_back(i);
-  }
-  for (std::size_t v = 0; v < problem.views.size(); ++v) {
-    if (problem.views[v].recording != recording) continue;
-    problem.views[v].shots = std::make_shared<const RangedShots>(rows_of(shots, rows[v]));
-  }
+  std::vector<std::vector<std::vector<std::size_t>>> rows_of_blocks(block_count(view.size()));
+  for_each_block(view.size(), [&](std::size_t begin, std::size_t end) {
+    auto& rows = rows_of_blocks[begin / kBlockShots];
+    rows.resize(problem.views.size());
+    for (std::size_t i = begin; i < end; ++i) {
+      if (view[i] >= 0) rows[static_cast<std::size_t>(view[i])].push_back(i);
+    }
+  });
+  parallel::for_each(problem.views.size(), [&](std::size_t v) {
+    if (problem.views[v].recording != recording) return;
+    std::vector<std::size_t> rows;
+    for (const auto& block : rows_of_blocks) {
+      rows.insert(rows.end(), block[v].begin(), block[v].end());
+    }
+    problem.views[v].shots = std::make_shared<const RangedShots>(rows_of(shots, rows));
+  });
 }
 
 }  // namespace risley::calibration

@@ -2,7 +2,9 @@
 // SPDX-License-Identifier: MIT
 #include "calibration/wall_flatness.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "risley/calibration/surface_steps.hpp"
 #include "risley/parallel/parallel.hpp"
@@ -20,7 +22,14 @@ std::vector<SurfaceReport> inspect_views(const PlanarProblem& problem,
                                          const std::vector<LabelledShots>& recordings,
                                          const LabelsOf& labels_of) {
   std::vector<SurfaceReport> reports(problem.views.size());
-  parallel::for_each(reports.size(), [&](std::size_t v) {
+  // The largest first: one thread would be left alone with it.
+  std::vector<std::size_t> order(reports.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+    return problem.views[a].shots->size() > problem.views[b].shots->size();
+  });
+  parallel::for_each(order.size(), [&](std::size_t i) {
+    const std::size_t v = order[i];
     const LabelledShots& recording = recordings[problem.views[v].recording];
     const ViewDistances d = view_distances(problem, v, recording, labels_of(recording.labels));
     reports[v] = inspect_surface({d.azimuth, d.zenith, d.distance, d.sigma});

@@ -152,6 +152,10 @@ class Work {
   /// @return nothing where the recording holds nothing
   std::unique_ptr<Piece> first_piece() {
     auto piece = std::make_unique<Piece>();
+    // Growing at the end would copy all: the last chunk may hold more than is wanted, packets stay
+    // whole.
+    piece->rows.reserve((rotors_ ? kBeginningRows : kReportedRows) +
+                        2 * recordings::kDefaultChunkRows);
     fill(*piece);
     if (piece->rows.size() == 0) return nullptr;
     set_up(*piece);
@@ -283,7 +287,7 @@ class Work {
     }
     summary_.frame = header_.frame.text;
     if (options_.sample) sampler_.emplace(header_.frame, *options_.sample);
-    header_.provenance = options_.provenance;
+    if (options_.provenance) header_.provenance = options_.provenance();
     writer_ = create_cloud(path_, header_, options_.writer);
   }
 

@@ -9,6 +9,8 @@
 
 #include "risley/core/error.hpp"
 
+#include "core/processor.hpp"
+
 namespace risley {
 
 std::string to_string(InstructionSet set) {
@@ -23,35 +25,69 @@ std::string to_string(InstructionSet set) {
   return "unknown";
 }
 
+namespace {
+
+std::vector<InstructionSet> held_instruction_sets() {
+  return {
+#ifdef RISLEY_HOLDS_BASELINE
+      InstructionSet::baseline,
+#endif
+#ifdef RISLEY_HOLDS_AVX2
+      InstructionSet::avx2,
+#endif
+#ifdef RISLEY_HOLDS_AVX512
+      InstructionSet::avx512,
+#endif
+  };
+}
+
+bool processor_runs(InstructionSet set) {
+  switch (set) {
+    case InstructionSet::baseline:
+      return true;
+    case InstructionSet::avx2:
+      return processor_runs_avx2();
+    case InstructionSet::avx512:
+      return processor_runs_avx512();
+  }
+  return false;
+}
+
+std::string names(const std::vector<InstructionSet>& sets) {
+  std::vector<std::string> found;
+  found.reserve(sets.size());
+  for (const InstructionSet set : sets) found.push_back(to_string(set));
+  return fmt::format("{}", fmt::join(found, ", "));
+}
+
+}  // namespace
+
 const std::vector<InstructionSet>& available_instruction_sets() {
   static const std::vector<InstructionSet> sets = [] {
-    std::vector<InstructionSet> found{InstructionSet::baseline};
-#ifdef RISLEY_HAS_X86_KERNELS
-    __builtin_cpu_init();
-    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) {
-      found.push_back(InstructionSet::avx2);
-      if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&
-          __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512cd") &&
-          __builtin_cpu_supports("avx512vl")) {
-        found.push_back(InstructionSet::avx512);
-      }
-    }
-#endif
+    std::vector<InstructionSet> found = held_instruction_sets();
+    std::erase_if(found, [](InstructionSet set) { return !processor_runs(set); });
     return found;
   }();
   return sets;
 }
 
-InstructionSet best_instruction_set() { return available_instruction_sets().back(); }
+InstructionSet best_instruction_set() {
+  if (available_instruction_sets().empty()) {
+    throw InvalidArgument(
+        fmt::format("instruction sets of this binary = {}, of which this processor runs none: "
+                    "build risley on this "
+                    "machine, or for all processors with cmake -DRISLEY_INSTRUCTION_SETS=all",
+                    names(held_instruction_sets())));
+  }
+  return available_instruction_sets().back();
+}
 
 void check_available(InstructionSet set) {
+  best_instruction_set();  // or none at all
   const auto& sets = available_instruction_sets();
   if (std::find(sets.begin(), sets.end(), set) != sets.end()) return;
-  std::vector<std::string> names;
-  names.reserve(sets.size());
-  for (const InstructionSet each : sets) names.push_back(to_string(each));
   throw InvalidArgument(fmt::format("instruction set = {}, this processor and binary allow {}",
-                                    to_string(set), fmt::join(names, ", ")));
+                                    to_string(set), names(sets)));
 }
 
 }  // namespace risley

@@ -20,6 +20,7 @@
 #include "risley/estimation/process_likelihood.hpp"
 #include "risley/estimation/rotor_track.hpp"
 #include "risley/estimation/smoother.hpp"
+#include "risley/parallel/parallel.hpp"
 
 #include "estimation/entry_checks.hpp"
 #include "estimation/knot_model.hpp"
@@ -389,6 +390,18 @@ Solution run_batch_map(const PackedSeries& series, const Start& start,
     }
   }
   if (used.empty()) throw EstimationError("no stretch of the recording has a start");
+  // The shots of the pass between the coarse one and that of all are picked out during the coarse
+  // one.
+  const double thinning =
+      static_cast<double>(series.size()) / static_cast<double>(coarse_series.size());
+  PackedSeries some;
+  std::vector<ShotRange> some_ranges = used;
+  parallel::TaskGroup picking;
+  if (thinning >= kStrongThinning) {
+    picking.run([&, rate = coarse_rate(series, all_stretches) * thinning * kSomeShots] {
+      some = thinned(series, rate, some_ranges);
+    });
+  }
   Iteration coarse(coarse_shots, options, constants, sensor.train, start.train,
                    make_knots(coarse_shots, coarse_used, prisms, options.knot_interval),
                    Eigen::Matrix3d::Identity());
@@ -438,19 +451,16 @@ Solution run_batch_map(const PackedSeries& series, const Start& start,
     return next;
   };
   const auto go_on_with_all = [&] {
-    const double thinning =
-        static_cast<double>(series.size()) / static_cast<double>(coarse_series.size());
     if (thinning < kStrongThinning) return go_on(std::move(coarse), series, used);
-    std::vector<ShotRange> ranges = used;
-    const PackedSeries some =
-        thinned(series, coarse_rate(series, all_stretches) * thinning * kSomeShots, ranges);
-    Iteration middle = go_on(std::move(coarse), some, ranges);
+    picking.wait();
+    Iteration middle = go_on(std::move(coarse), some, some_ranges);
     middle.evaluate();
     level = middle.level();
     middle.move(middle.solve(process, false));
     return go_on(std::move(middle), series, used);
   };
   Iteration full = go_on_with_all();
+  some = {};
   full.watch_autocorrelation();
   const bool noise_is_held = options.angle_noise.has_value();
   double used_share = 0, first_factor = 1;

@@ -174,37 +174,28 @@ class Smoother {
             take_gradient(knot, knot_curvature<N>(equations_, knot), x, e);
             moved.setZero();
             add_product(covariance(knot), e, moved);
-            if (free_ > 0) share(knot, x, e, moved, block);
+            if (free_ > 0) keep_for_sharing(knot - block.begin, x, e, moved, block);
             x += moved;
             affine(knot) = x;
           }
         },
         [&](AheadBlock& block) {
-          if (free_ > 0) add_shared(block);
+          if (free_ > 0) share(block);
         });
     information_ = equations_.static_hessian + shared_.rightCols(free_);
     gradient_ = equations_.static_gradient - shared_.col(0);
   }
 
-  /// What a knot tells of the parameters: (gradient, information) -= X^T (E, e) - C^T (X, x) +
-  /// E^T P (E, e), as one product of many knots' rows.
-  void share(std::size_t knot, const Affine& x, const Affine& e, const Affine& moved,
-             AheadBlock& block) const {
-    const auto c = coupling(knot);
-    const std::size_t place = knot - block.begin;
-    const auto first = static_cast<Eigen::Index>(place % kStackedKnots) * 3 * d();
-    Eigen::MatrixXd& left_rows = block.left[place / kStackedKnots];
-    Eigen::MatrixXd& right_rows = block.right[place / kStackedKnots];
-    for (Eigen::Index j = 0; j < free_; ++j) {
-      double* left = &left_rows(first, j);
-      for (Eigen::Index i = 0; i < d(); ++i) {
-        left[i] = -x(i, j + 1);
-        left[d() + i] = c(i, j);
-        left[2 * d() + i] = -e(i, j + 1);
-      }
-    }
+  /// First row of a knot among those of its part of a block. @param place  within the block
+  Eigen::Index stacked_row(std::size_t place) const {
+    return static_cast<Eigen::Index>(place % kStackedKnots) * 3 * d();
+  }
+  /// The right side of what a knot tells of the parameters, see share().
+  void keep_for_sharing(std::size_t place, const Affine& x, const Affine& e, const Affine& moved,
+                        AheadBlock& block) const {
+    Eigen::MatrixXd& rows = block.right[place / kStackedKnots];
     for (Eigen::Index j = 0; j <= free_; ++j) {
-      double* right = &right_rows(first, j);
+      double* right = &rows(stacked_row(place), j);
       for (Eigen::Index i = 0; i < d(); ++i) {
         right[i] = e(i, j);
         right[d() + i] = x(i, j);
@@ -212,10 +203,24 @@ class Smoother {
       }
     }
   }
-  void add_shared(const AheadBlock& block) {
+  /// What knots tell of the parameters: (gradient, information) -= X^T (E, e) - C^T (X, x) +
+  /// E^T P (E, e), as one product of many knots' rows.
+  void share(AheadBlock& block) {
     for (std::size_t first = block.begin, part = 0; first < block.end;
          first += kStackedKnots, ++part) {
       const std::size_t stacked = std::min(kStackedKnots, block.end - first);
+      for (std::size_t place = 0; place < stacked; ++place) {
+        const auto c = coupling(first + place);
+        for (Eigen::Index j = 0; j < free_; ++j) {
+          const double* right = &block.right[part](stacked_row(place), j + 1);
+          double* left = &block.left[part](stacked_row(place), j);
+          for (Eigen::Index i = 0; i < d(); ++i) {
+            left[i] = -right[d() + i];
+            left[d() + i] = c(i, j);
+            left[2 * d() + i] = -right[i];
+          }
+        }
+      }
       algebra::add_transposed_product(block.left[part], block.right[part],
                                       static_cast<Eigen::Index>(stacked) * 3 * d(), shared_);
     }

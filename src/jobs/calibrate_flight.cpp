@@ -10,6 +10,7 @@
 #include "risley/calibration/flight_recordings.hpp"
 #include "risley/cloud/map_projection.hpp"
 #include "risley/core/error.hpp"
+#include "risley/jobs/provenance.hpp"
 #include "risley/jobs/result_folder.hpp"
 #include "risley/scenes/control.hpp"
 #include "risley/trajectories/clock.hpp"
@@ -126,12 +127,16 @@ calibration::FlightCalibrationOptions settings_of(const CalibrateFlightOptions& 
   return settings;
 }
 
-void write_flight(const CalibrateFlightOptions& options, CalibratedFlight& result,
-                  ResultFolder& folder, const Progress& progress) {
+std::vector<recordings::Source> inputs_of(const CalibrateFlightOptions& options) {
   std::vector<recordings::Source> inputs = options.recordings;
   for (const std::string& path : paths_of(options.platform)) inputs.push_back(path);
   if (!options.control.empty()) inputs.emplace_back(options.control);
-  result.provenance = with_inputs(options.files.provenance, inputs, progress);
+  return inputs;
+}
+
+void write_flight(const CalibrateFlightOptions& options, CalibratedFlight& result,
+                  ResultFolder& folder, InputHashes& hashes, const Progress& progress) {
+  result.provenance = hashes.with_inputs(options.files.provenance);
   const calibration::FlightCalibration& found = result.calibration;
   const CalibrationCode code = found.verdict.code;
   const bool sound = code != CalibrationCode::not_better && code != CalibrationCode::undecided;
@@ -155,6 +160,8 @@ CalibratedFlight calibrate_flight(const CalibrateFlightOptions& options, const P
   const Stopwatch whole;
   check_flight_options(options);
   ResultFolder folder(options.files.folder);
+  std::optional<InputHashes> hashes;
+  if (folder) hashes.emplace(inputs_of(options), progress);
   CalibratedFlight result;
   cloud::MovingPlatform platform = platform_of(options, progress.stage("reading"));
   result.mount = platform.mount;
@@ -217,7 +224,7 @@ CalibratedFlight calibrate_flight(const CalibrateFlightOptions& options, const P
     result.details = flight_details(flight.shots, platform.trajectory, settings, result.calibration,
                                     {}, calibrating.silent());
   }
-  if (folder) write_flight(options, result, folder, progress.silent());
+  if (folder) write_flight(options, result, folder, *hashes, progress.silent());
   result.total_time = whole.seconds();
   return result;
 }

@@ -2,11 +2,13 @@
 // SPDX-License-Identifier: MIT
 #include "risley/jobs/calibrate_recordings.hpp"
 
+#include <optional>
 #include <utility>
 
 #include <fmt/format.h>
 
 #include "risley/core/error.hpp"
+#include "risley/jobs/provenance.hpp"
 #include "risley/jobs/result_folder.hpp"
 
 #include "jobs/checks.hpp"
@@ -52,8 +54,8 @@ std::string states_name(const CalibrateRecordingsOptions& options, std::size_t r
 
 /// calibration.yaml; what did not converge is no calibration, nor what is not better.
 void write_files(const CalibrateRecordingsOptions& options, CalibratedRecordings& result,
-                 ResultFolder& folder, const Progress& progress) {
-  result.provenance = with_inputs(options.files.provenance, options.recordings, progress);
+                 ResultFolder& folder, InputHashes& hashes, const Progress& progress) {
+  result.provenance = hashes.with_inputs(options.files.provenance);
   result.provenance.emplace_back("datum", calibration::to_string(result.calibration.datum_kind));
   const bool better = result.calibration.verdict.code != calibration::CalibrationCode::not_better;
   if (result.calibration.converged && (better || options.force)) {
@@ -96,12 +98,14 @@ CalibratedRecordings calibrate_recordings(const CalibrateRecordingsOptions& opti
   const Stopwatch whole;
   calibration::CalibrationOptions settings = checked_settings(options);
   ResultFolder folder(options.files.folder);
+  std::optional<InputHashes> hashes;
+  if (folder) hashes.emplace(options.recordings, progress);
   CalibratedRecordings result;
   std::vector<RangedRecording> recordings;
   for (std::size_t r = 0; r < options.recordings.size(); ++r) {
     const auto states = [&](const estimation::Estimate& estimate, const Progress& own) {
       folder.add_states(states_name(options, r), estimate, options.files.states,
-                        with_inputs(options.files.provenance, {options.recordings[r]}, own), own);
+                        hashes->with_input(options.files.provenance, r), own);
     };
     recordings.push_back(read_ranged(options, r, result, progress,
                                      folder && options.files.states != StatesRows::none
@@ -124,7 +128,7 @@ CalibratedRecordings calibrate_recordings(const CalibrateRecordingsOptions& opti
     result.details = calibration_details(result.calibration, options.recordings.size(),
                                          wall_sample(recordings, result.calibration), result.truth);
   }
-  if (folder) write_files(options, result, folder, progress.silent());
+  if (folder) write_files(options, result, folder, *hashes, progress.silent());
   result.total_time = whole.seconds();
   return result;
 }

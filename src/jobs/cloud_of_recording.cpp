@@ -46,11 +46,15 @@ RecordingCloud cloud_of_recording(const CloudOfRecordingOptions& options,
     settings.platform = load_platform(options.platform, progress);
     for (const std::string& path : paths_of(options.platform)) inputs.push_back(path);
   }
-  settings.provenance = with_inputs(settings.provenance, inputs, progress);
-  settings.provenance.emplace_back("calibration", options.calibration);
-  if (std::filesystem::exists(options.calibration)) {
-    settings.provenance.emplace_back("calibration_sha256", io::sha256_of_file(options.calibration));
-  }
+  InputHashes hashes(inputs, progress);
+  settings.provenance = [&] {
+    Provenance provenance = hashes.with_inputs(options.provenance);
+    provenance.emplace_back("calibration", options.calibration);
+    if (std::filesystem::exists(options.calibration)) {
+      provenance.emplace_back("calibration_sha256", io::sha256_of_file(options.calibration));
+    }
+    return provenance;
+  };
   if (!settings.writer.date) settings.writer.date = day_of(options.recording);
   const SensorFrameRecording input =
       open_in_sensor_frame(options.recording, options.reading, calibration, progress);

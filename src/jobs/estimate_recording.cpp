@@ -3,6 +3,7 @@
 #include "risley/jobs/estimate_recording.hpp"
 
 #include <algorithm>
+#include <optional>
 #include <utility>
 
 #include <fmt/format.h>
@@ -10,6 +11,7 @@
 #include "risley/core/direction.hpp"
 #include "risley/core/error.hpp"
 #include "risley/core/vector3.hpp"
+#include "risley/jobs/provenance.hpp"
 #include "risley/jobs/result_folder.hpp"
 #include "risley/sensors/preset.hpp"
 
@@ -107,6 +109,8 @@ EstimatedRecording estimate_recording(const EstimateRecordingOptions& options,
   const Stopwatch whole;
   check(options);
   ResultFolder folder(options.files.folder);
+  std::optional<InputHashes> hashes;
+  if (folder) hashes.emplace(std::vector{options.recording}, progress);
   EstimationInput input =
       read_for_estimation({options.recording,
                            options.reading,
@@ -149,7 +153,7 @@ EstimatedRecording estimate_recording(const EstimateRecordingOptions& options,
         estimate_details(result.estimate, result.nominal, result.head, result.evaluation, judging);
   }
   if (folder) {
-    result.provenance = with_inputs(options.files.provenance, {options.recording}, judging);
+    result.provenance = hashes->with_inputs(options.files.provenance);
     write_files(options, result, folder, judging);
   }
   result.total_time = whole.seconds();

@@ -4,26 +4,60 @@
 
 #include <fmt/format.h>
 
+#include "risley/core/require.hpp"
 #include "risley/io/sha256.hpp"
+#include "risley/parallel/parallel.hpp"
 
 namespace risley::jobs {
 
+struct InputHashes::Input {
+  recordings::Source source;
+  std::vector<std::pair<std::string, std::string>> hashes{};  ///< file and SHA-256
+  parallel::TaskGroup task{};                                 ///< that finds them
+
+  /// Appends them. @param count  inputs so far
+  void add_to(Provenance& provenance, std::size_t& count) {
+    const auto add = [&](const std::string& input) {
+      ++count;
+      std::string name = count == 1 ? "input" : fmt::format("input_{}", count);
+      provenance.emplace_back(name, input);
+      return name;
+    };
+    task.wait();
+    if (source.recording()) add(source.name());
+    for (const auto& [file, hash] : hashes) provenance.emplace_back(add(file) + "_sha256", hash);
+  }
+};
+
+InputHashes::InputHashes(const std::vector<recordings::Source>& inputs, const Progress& progress) {
+  for (const recordings::Source& source : inputs) {
+    Input& input = *inputs_.emplace_back(new Input{source});
+    input.task.run([&input, own = progress.silent()] {
+      for (const std::string& file : recordings::recording_files(input.source)) {
+        input.hashes.emplace_back(file, io::sha256_of_file(file, own));
+      }
+    });
+  }
+}
+
+InputHashes::~InputHashes() = default;
+
+Provenance InputHashes::with_inputs(Provenance provenance) {
+  std::size_t count = 0;
+  for (const auto& input : inputs_) input->add_to(provenance, count);
+  return provenance;
+}
+
+Provenance InputHashes::with_input(Provenance provenance, std::size_t input) {
+  require_place("input", input, inputs_.size());
+  std::size_t count = 0;
+  inputs_[input]->add_to(provenance, count);
+  return provenance;
+}
+
 Provenance with_inputs(Provenance provenance, const std::vector<recordings::Source>& inputs,
                        const Progress& progress) {
-  std::size_t count = 0;
-  const auto add = [&](const std::string& input) {
-    ++count;
-    std::string name = count == 1 ? "input" : fmt::format("input_{}", count);
-    provenance.emplace_back(name, input);
-    return name;
-  };
-  for (const recordings::Source& input : inputs) {
-    if (input.recording()) add(input.name());
-    for (const std::string& file : recordings::recording_files(input)) {
-      provenance.emplace_back(add(file) + "_sha256", io::sha256_of_file(file, progress));
-    }
-  }
-  return provenance;
+  return InputHashes(inputs, progress).with_inputs(std::move(provenance));
 }
 
 }  // namespace risley::jobs

@@ -3,6 +3,7 @@
 #include "risley/jobs/recording_input.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <optional>
@@ -307,20 +308,20 @@ EstimationInput read_for_estimation(const EstimationInputOptions& options,
   selection.ranges = options.selection.ranges || result.whole_steps;
   estimation::ShotSelector selector(selection);
   recordings::TimeAudit audit;
-  // While one chunk is looked at, the next is read.
-  recordings::Chunk chunk, next;
-  parallel::TaskGroup looks;
-  while (reader.read(next)) {
+  // While some chunks are looked at, the next are read.
+  std::array<recordings::Chunk, 4> chunks;
+  const auto read_next = [&](std::size_t slot) {
+    if (!reader.read(chunks[slot])) return false;
     progress.report(reader.fraction_read());
-    looks.wait();
-    std::swap(chunk, next);
-    looks.run([&] { audit.add(chunk); });
-    looks.run([&] {
-      selector.add(chunk.observations);
-      result.series.append(selector.take_series());
-    });
-  }
-  looks.wait();
+    return true;
+  };
+  using Order = parallel::Stage::Order;
+  parallel::run_pipeline(chunks.size(), read_next,
+                         {{Order::in_turn, [&](std::size_t slot) { audit.add(chunks[slot]); }},
+                          {Order::in_turn, [&](std::size_t slot) {
+                             selector.add(chunks[slot].observations);
+                             result.series.append(selector.take_series());
+                           }}});
   result.recording = {source.name(), reader.header(), audit.result()};
   for (const auto& warning : reader.warnings()) result.warnings.push_back(warning_text(warning));
   result.warnings.insert(result.warnings.end(), input.warnings.begin(), input.warnings.end());

@@ -291,7 +291,7 @@ py::object cloud(const py::dict& values, int threads, const py::object& tell) {
   bool distribution = false;
   options.take("distribution", distribution);
   if (distribution) settings.distribution.emplace();
-  settings.provenance = provenance_of("cloud");
+  job.provenance = provenance_of("cloud");
   return told_by(tell, threads,
                  [&](const Progress& progress) { return jobs::cloud_of_recording(job, progress); });
 }

@@ -42,6 +42,10 @@ void Observations::resize(std::size_t rows) {
   for_each_column([rows](std::string_view, auto& column) { column.resize(rows); }, *this);
 }
 
+void Observations::reserve(std::size_t rows) {
+  for_each_column([rows](std::string_view, auto& column) { column.reserve(rows); }, *this);
+}
+
 void Observations::append(const Observations& other) { append(other, 0, other.size()); }
 
 void Observations::append(const Observations& other, std::size_t begin, std::size_t end) {

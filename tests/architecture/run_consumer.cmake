@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: MIT
 # Builds and runs tests/consumer from nothing, in the ways that WAY names:
 #   installed  what BUILD installs: all of it, one component, and with pkg-config
-#   in_tree    TREE as a subfolder
+#   in_tree    TREE as a subfolder, with the kernels of one processor
 #   shared     the component optics of TREE as shared libraries: installed, and with pkg-config
 # Further variables: CONSUMER (its folder), WORK (emptied), OPTIONS (of configure steps), COMPILER.
 function(run)
@@ -76,7 +76,22 @@ if(WAY STREQUAL "installed")
     run(${WORK}/prefix/bin/risley preset check ${WORK}/prefix/share/risley/presets/mid-40.yaml)
   endif()
 elseif(WAY STREQUAL "in_tree")
-  consume(in_tree -DRISLEY_TREE=${TREE} -DCOMPONENTS=optics -DCMAKE_BUILD_TYPE=)
+  set(optics -DRISLEY_TREE=${TREE} -DCOMPONENTS=optics)
+  consume(in_tree ${optics} -DCMAKE_BUILD_TYPE= -DRISLEY_INSTRUCTION_SETS=native)
+  refuse(no_such_set "RISLEY_INSTRUCTION_SETS = sse9, allowed: all, native, or a list of baseline"
+         ${optics} -DRISLEY_INSTRUCTION_SETS=sse9)
+  # Valgrind's processor has no AVX-512.
+  find_program(valgrind valgrind)
+  cmake_host_system_information(RESULT architecture QUERY OS_PLATFORM)
+  if(valgrind AND architecture STREQUAL x86_64)
+    run(${CMAKE_COMMAND} -S ${CONSUMER} -B ${WORK}/in_tree -DRISLEY_INSTRUCTION_SETS=avx512)
+    run(${CMAKE_COMMAND} --build ${WORK}/in_tree)
+    execute_process(COMMAND ${valgrind} -q ${WORK}/in_tree/point_a_beam
+                    RESULT_VARIABLE status OUTPUT_VARIABLE text)
+    if(NOT status EQUAL 3 OR NOT text MATCHES "= avx512, of which this processor runs none: build risley")
+      message(FATAL_ERROR "with kernels of another processor: status ${status}:\n${text}")
+    endif()
+  endif()
   refuse(no_package "Packages are missing.*libyaml-cpp-dev" -DRISLEY_TREE=${TREE}
          -DCOMPONENTS=sensors -DCMAKE_DISABLE_FIND_PACKAGE_yaml-cpp=ON)
 elseif(WAY STREQUAL "shared")

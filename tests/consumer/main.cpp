@@ -1,12 +1,13 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-// Points one beam through two prisms, through air where there is nothing to deviate it, and catches
-// an error.
+// Points one beam through two prisms, through air where there is nothing to deviate it, catches an
+// error, and asks which kernels this processor runs: exit status 3 if none.
 #include <cmath>
 #include <cstdio>
 
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
+#include "risley/core/instruction_set.hpp"
 #include "risley/optics/observation_model.hpp"
 
 int main() {
@@ -25,6 +26,12 @@ int main() {
     train.set("no_such_parameter", 1.0);
   } catch (const InvalidArgument& error) {  // thrown in the library, caught here by its type
     caught = true;
+  }
+  try {
+    std::printf("kernels for %s\n", to_string(best_instruction_set()).c_str());
+  } catch (const InvalidArgument& error) {
+    std::puts(error.what());
+    return 3;
   }
   return deviated && straight && caught ? 0 : 1;
 }

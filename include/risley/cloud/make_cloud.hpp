@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <string>
 #include <utility>
@@ -36,7 +37,8 @@ struct CloudOptions {
   /// Draw a sample of at most so many points.
   std::optional<std::size_t> sample;
   CloudWriterOptions writer;
-  std::vector<std::pair<std::string, std::string>> provenance;
+  /// CloudHeader::provenance: asked once, when the file is begun.
+  std::function<std::vector<std::pair<std::string, std::string>>()> provenance;
 };
 
 /// What came of it. Every observation is in exactly one of the counts.

@@ -13,10 +13,11 @@ enum class InstructionSet { baseline, avx2, avx512 };
 /// "baseline", "avx2" or "avx512".
 std::string to_string(InstructionSet set);
 
-/// The instruction sets this binary holds and this processor runs, best last.
+/// The instruction sets this binary holds and this processor runs, best last: none where the binary
+/// was built for another kind of processor (RISLEY_INSTRUCTION_SETS).
 const std::vector<InstructionSet>& available_instruction_sets();
 
-/// The last of available_instruction_sets().
+/// The last of available_instruction_sets(). @throws InvalidArgument when there is none
 InstructionSet best_instruction_set();
 
 /// @throws InvalidArgument when this binary does not hold it or this processor does not run it
@@ -52,23 +53,34 @@ struct KernelCopies {
   __VA_ARGS__;                     \
   }
 
-/// The copies of a declared kernel, by its name.
-#ifdef RISLEY_HAS_X86_KERNELS
-#define RISLEY_KERNEL_COPIES(function)                                           \
-  risley::KernelCopies<decltype(kernel_baseline::function)> {                    \
-    &kernel_baseline::function, &kernel_avx2::function, &kernel_avx512::function \
-  }
-/// The same of a kernel that has nothing to do for eight lanes: there is no copy for AVX-512.
-#define RISLEY_NARROW_KERNEL_COPIES(function)                   \
-  risley::KernelCopies<decltype(kernel_baseline::function)> {   \
-    &kernel_baseline::function, &kernel_avx2::function, nullptr \
-  }
+// What RISLEY_INSTRUCTION_SETS chose is defined by cmake/RisleySimdKernels.cmake.
+#ifdef RISLEY_HOLDS_BASELINE
+#define RISLEY_BASELINE_COPY(function) &kernel_baseline::function
 #else
-#define RISLEY_KERNEL_COPIES(function)                        \
-  risley::KernelCopies<decltype(kernel_baseline::function)> { \
-    &kernel_baseline::function, nullptr, nullptr              \
-  }
-#define RISLEY_NARROW_KERNEL_COPIES(function) RISLEY_KERNEL_COPIES(function)
+#define RISLEY_BASELINE_COPY(function) nullptr
 #endif
+#ifdef RISLEY_HOLDS_AVX2
+#define RISLEY_AVX2_COPY(function) &kernel_avx2::function
+#else
+#define RISLEY_AVX2_COPY(function) nullptr
+#endif
+#ifdef RISLEY_HOLDS_AVX512
+#define RISLEY_AVX512_COPY(function) &kernel_avx512::function
+#define RISLEY_NARROW_AVX2_COPY(function) &kernel_avx2::function
+#else
+#define RISLEY_AVX512_COPY(function) nullptr
+#define RISLEY_NARROW_AVX2_COPY(function) RISLEY_AVX2_COPY(function)
+#endif
+
+/// The copies of a declared kernel, by its name.
+#define RISLEY_KERNEL_COPIES(function)                                                       \
+  risley::KernelCopies<decltype(kernel_baseline::function)> {                                \
+    RISLEY_BASELINE_COPY(function), RISLEY_AVX2_COPY(function), RISLEY_AVX512_COPY(function) \
+  }
+/// The same of a kernel that has nothing to do for eight lanes: AVX-512 runs its copy for AVX2.
+#define RISLEY_NARROW_KERNEL_COPIES(function)                                  \
+  risley::KernelCopies<decltype(kernel_baseline::function)> {                  \
+    RISLEY_BASELINE_COPY(function), RISLEY_NARROW_AVX2_COPY(function), nullptr \
+  }
 
 }  // namespace risley

@@ -7,6 +7,7 @@
 #include "risley/cloud/make_cloud.hpp"
 #include "risley/core/progress.hpp"
 #include "risley/jobs/moving_platform.hpp"
+#include "risley/jobs/provenance.hpp"
 #include "risley/recordings/reader.hpp"
 #include "risley/sensors/sensor.hpp"
 
@@ -19,8 +20,8 @@ struct CloudOfRecordingOptions {
   std::string calibration;          ///< preset by name, or a preset or calibration file
   std::string output;               ///< path; its ending chooses the format unless one is named
   PlatformFiles platform;           ///< of a sensor that moved
-  /// Provenance goes into the cloud, with input's and calibration's SHA-256.
-  cloud::CloudOptions cloud;  ///< without a platform
+  cloud::CloudOptions cloud;        ///< without a platform and provenance
+  Provenance provenance;            ///< goes into it, with input's and calibration's SHA-256
 };
 
 /// The points of a recording.

@@ -34,8 +34,9 @@ struct Observations {
   std::vector<std::uint8_t> valid;          ///< 1 where the direction can be trusted
 
   std::size_t size() const { return time_ns.size(); }
-  void clear();                   ///< leaves no row
-  void resize(std::size_t rows);  ///< gives every column so many rows
+  void clear();                    ///< leaves no row
+  void resize(std::size_t rows);   ///< gives every column so many rows
+  void reserve(std::size_t rows);  ///< takes memory for so many at once
   /// @throws InvalidArgument as require_columns()
   void append(const Observations& other);
   /// Appends rows [begin, end) of another. @throws InvalidArgument as append(), and beyond its rows
